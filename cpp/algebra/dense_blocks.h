@@ -1,0 +1,261 @@
+// Blocks of any size per body, as dense row-major matrices: the block policy of bare SKO trees, of compound and flexible bodies.
+// The sweeps see the same functions as of the rigid policy (operators/rigid_blocks.h).
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include "algebra/errors.h"
+#include "algebra/small_cholesky.h"
+#include "algebra/small_matrix.h"
+#include "algebra/structure.h"
+#include "algebra/sweeps/singular_pivot.h"
+#include "algebra/symbol.h"
+
+namespace pycraft {
+
+template <class S>
+class DenseBlocks {
+ public:
+  using Scalar = S;
+
+  explicit DenseBlocks(const SkoStructure& tree) : tree_(tree) {
+    size_t e = 0, h = 0, m = 0, d = 0;
+    int s_max = 0, n_max = 0;
+    for (int k = 0; k < tree.bodies(); ++k) {
+      const int s = tree.size[k], n = tree.dof[k], p = tree.parent[k];
+      at_.push_back({e, h, m, d});
+      e += p >= 0 ? static_cast<size_t>(tree.size[p]) * s : 0;
+      h += static_cast<size_t>(n) * s;
+      m += static_cast<size_t>(s) * s;
+      d += static_cast<size_t>(n) * n;
+      s_max = std::max(s_max, s);
+      n_max = std::max(n_max, n);
+    }
+    E.resize(e);
+    for (auto* x : {&H, &G}) x->resize(h);
+    for (auto* x : {&M, &P, &Pplus, &R, &Y, &X}) x->resize(m);
+    for (auto* x : {&J, &D, &L}) x->resize(d);
+    pivots_.resize(tree.coordinates());
+    work_.resize(4 * s_max * s_max + n_max * s_max);
+  }
+
+  S* edge(int k) { return E.data() + at_[k].e; }
+  S* hinge_map(int k) { return H.data() + at_[k].h; }
+  S* mass(int k) { return M.data() + at_[k].m; }
+  S* hinge_diagonal(int k) { return J.data() + at_[k].d; }
+  const S* edge(int k) const { return E.data() + at_[k].e; }
+  const S* hinge_map(int k) const { return H.data() + at_[k].h; }
+
+  // ---------------------------------------------------------------- applied to vectors (m columns, row-major)
+  void shift_add(int k, const S* x, S* y, int m) const { multiply_add(edge(k), x, y, tree_.size[tree_.parent[k]], tree_.size[k], m); }
+  void shift_transposed_add(int k, const S* x, S* y, int m) const {
+    transposed_multiply_add(edge(k), x, y, tree_.size[k], tree_.size[tree_.parent[k]], m);
+  }
+  // y += E (x - G H x)
+  void articulated_shift_add(int k, const S* x, S* y, int m) const {
+    const int s = tree_.size[k], n = tree_.dof[k];
+    thread_local std::vector<S> w;
+    w.assign(x, x + s * m);
+    thread_local std::vector<S> hx;
+    hx.assign(n * m, S(0));
+    multiply_add(hinge_map(k), x, hx.data(), n, s, m);
+    transposed_multiply_add(gain(k), hx.data(), w.data(), s, n, m, S(-1));
+    shift_add(k, w.data(), y, m);
+  }
+  // y += (I - H*G*) E* x
+  void articulated_shift_transposed_add(int k, const S* x, S* y, int m) const {
+    const int s = tree_.size[k], n = tree_.dof[k];
+    thread_local std::vector<S> w, gw;
+    w.assign(s * m, S(0));
+    shift_transposed_add(k, x, w.data(), m);
+    gw.assign(n * m, S(0));
+    multiply_add(gain(k), w.data(), gw.data(), n, s, m);
+    transposed_multiply_add(hinge_map(k), gw.data(), w.data(), s, n, m, S(-1));
+    for (int i = 0; i < s * m; ++i) y[i] += w[i];
+  }
+  void hinge(int k, const S* x, S* y, int m) const {
+    std::fill_n(y, tree_.dof[k] * m, S(0));
+    multiply_add(hinge_map(k), x, y, tree_.dof[k], tree_.size[k], m);
+  }
+  void hinge_transposed_add(int k, const S* x, S* y, int m) const { transposed_multiply_add(hinge_map(k), x, y, tree_.size[k], tree_.dof[k], m); }
+  void hinge_diagonal_add(int k, const S* x, S* y, int m) const { multiply_add(J.data() + at_[k].d, x, y, tree_.dof[k], tree_.dof[k], m); }
+  void inertia_in_place(int k, S* x, int m) const {
+    thread_local std::vector<S> w;
+    w.assign(x, x + tree_.size[k] * m);
+    std::fill_n(x, tree_.size[k] * m, S(0));
+    multiply_add(M.data() + at_[k].m, w.data(), x, tree_.size[k], tree_.size[k], m);
+  }
+  // e = x - H z,  z += G e
+  void innovation(int k, const S* x, S* z, S* e, int m) const {
+    std::copy_n(x, tree_.dof[k] * m, e);
+    multiply_add(hinge_map(k), z, e, tree_.dof[k], tree_.size[k], m, S(-1));
+    transposed_multiply_add(gain(k), e, z, tree_.size[k], tree_.dof[k], m);
+  }
+  // y -= G* a
+  void gain_transposed_subtract(int k, const S* a, S* y, int m) const { multiply_add(gain(k), a, y, tree_.dof[k], tree_.size[k], m, S(-1)); }
+  void solve_D_in_place(int k, S* x, int m) const {
+    forward_substitute(L.data() + at_[k].d, tree_.dof[k], x, m);
+    back_substitute(L.data() + at_[k].d, tree_.dof[k], x, m);
+  }
+  // y = A(k) x or A(k)* x of a block-diagonal symbol
+  void apply(int id, bool transposed, int k, const S* x, S* y, int m) const {
+    const int s = tree_.size[k], n = tree_.dof[k];
+    switch (id) {
+      case SymbolId::H:
+        if (transposed) {
+          std::fill_n(y, s * m, S(0));
+          transposed_multiply_add(hinge_map(k), x, y, s, n, m);
+        } else {
+          hinge(k, x, y, m);
+        }
+        return;
+      case SymbolId::G:  // stored as G*, n rows
+        std::fill_n(y, (transposed ? n : s) * m, S(0));
+        if (transposed)
+          multiply_add(gain(k), x, y, n, s, m);
+        else
+          transposed_multiply_add(gain(k), x, y, s, n, m);
+        return;
+      case SymbolId::J:
+      case SymbolId::D:
+        std::fill_n(y, n * m, S(0));
+        multiply_add((id == SymbolId::J ? J : D).data() + at_[k].d, x, y, n, n, m);
+        return;
+      default:
+        std::fill_n(y, s * m, S(0));
+        multiply_add(square(id).data() + at_[k].m, x, y, s, s, m);
+    }
+  }
+  // Block (k,k), row-major; E: block (parent, k).
+  void block(int id, int k, S* out) const {
+    const int s = tree_.size[k], n = tree_.dof[k];
+    switch (id) {
+      case SymbolId::E: std::copy_n(edge(k), tree_.size[tree_.parent[k]] * s, out); return;
+      case SymbolId::H: std::copy_n(hinge_map(k), n * s, out); return;
+      case SymbolId::G:
+        for (int i = 0; i < s; ++i)
+          for (int j = 0; j < n; ++j) out[i * n + j] = gain(k)[j * s + i];
+        return;
+      case SymbolId::J: std::copy_n(J.data() + at_[k].d, n * n, out); return;
+      case SymbolId::D: std::copy_n(D.data() + at_[k].d, n * n, out); return;
+      default: std::copy_n(square(id).data() + at_[k].m, s * s, out);
+    }
+  }
+  S log_determinant_of_D() const {
+    using std::log;
+    S sum = S(0);
+    for (const S& p : pivots_) sum += log(p);
+    return sum;
+  }
+
+  // ---------------------------------------------------------------- articulated inertia (sweeps/articulated_inertia.h)
+  void start_articulated(int k) { std::copy_n(mass(k), tree_.size[k] * tree_.size[k], P.data() + at_[k].m); }
+  // D, G, P⁺ of body k. Always in doubt: blocks of any size have no cheap bound on their rounding.
+  bool eliminate_hinge(int k) {
+    const int s = tree_.size[k], n = tree_.dof[k];
+    const S* h = hinge_map(k);
+    S *p = P.data() + at_[k].m, *plus = Pplus.data() + at_[k].m, *d = D.data() + at_[k].d, *l = L.data() + at_[k].d, *g = G.data() + at_[k].h;
+    std::copy_n(p, s * s, plus);
+    if (n == 0) return false;
+    std::fill_n(g, n * s, S(0));
+    multiply_add(h, p, g, n, s, s);  // HP, n x s
+    std::copy_n(hinge_diagonal(k), n * n, d);
+    multiply_transposed_add(g, h, d, n, s, n);
+    symmetrise(d, n);
+    std::copy_n(d, n * n, l);
+    S* pivots = pivots_.data() + tree_.dof_offset[k];
+    const int failed = cholesky_in_place(l, n, pivots);
+    if (failed < n) throw_singular_hinge(tree_, k, failed, to_double(pivots[failed]), 0.0);
+    forward_substitute(l, n, g, s);                       // L⁻¹HP
+    transposed_multiply_add(g, g, plus, s, n, s, S(-1));  // P - (L⁻¹HP)*(L⁻¹HP)
+    symmetrise(plus, s);
+    back_substitute(l, n, g, s);                          // G* = D⁻¹HP
+    return true;
+  }
+  void articulated_to_parent(int k) { congruence_add(k, Pplus.data() + at_[k].m, P.data() + at_[tree_.parent[k]].m); }
+  // ---------------------------------------------------------------- error bound (sweeps/singular_pivot.h)
+  void start_error(int k) { std::copy_n(mass(k), tree_.size[k] * tree_.size[k], X.data() + at_[k].m); }
+  void check_pivots(int k) {
+    const int s = tree_.size[k], n = tree_.dof[k];
+    for (int j = 0; j < n; ++j) {
+      S bound = hinge_diagonal(k)[j * n + j];
+      for (int a = 0; a < s; ++a)
+        for (int b = 0; b < s; ++b) bound += hinge_map(k)[j * s + a] * X[at_[k].m + a * s + b] * hinge_map(k)[j * s + b];
+      bound *= rounding_bound<S>();
+      const S pivot = pivots_[tree_.dof_offset[k] + j];
+      if (!(pivot > bound)) throw_singular_hinge(tree_, k, j, to_double(pivot), to_double(bound));
+    }
+  }
+  void error_to_parent(int k) {
+    const int s = tree_.size[k];
+    std::vector<S> bar(s * s, S(0)), t(s * s, S(0)), plus(P.begin() + at_[k].m, P.begin() + at_[k].m + s * s);
+    for (int i = 0; i < s; ++i) bar[i * s + i] = S(1);
+    transposed_multiply_add(gain(k), hinge_map(k), bar.data(), s, tree_.dof[k], s, S(-1));
+    multiply_add(bar.data(), X.data() + at_[k].m, t.data(), s, s, s);
+    multiply_transposed_add(t.data(), bar.data(), plus.data(), s, s, s);
+    congruence_add(k, plus.data(), X.data() + at_[tree_.parent[k]].m);
+  }
+
+  // ---------------------------------------------------------------- composite inertia, compliance
+  void start_composite(int k) { std::copy_n(mass(k), tree_.size[k] * tree_.size[k], R.data() + at_[k].m); }
+  void composite_to_parent(int k) { congruence_add(k, R.data() + at_[k].m, R.data() + at_[tree_.parent[k]].m); }
+  void compliance_from_parent(int k, int p) {
+    const int s = tree_.size[k], n = tree_.dof[k];
+    S *y = Y.data() + at_[k].m, *t = work_.data();
+    std::fill_n(y, s * s, S(0));
+    if (p >= 0) {  // τ̄* E* Υ(p) E τ̄
+      const int sp = tree_.size[p];
+      S *e = t + s * s, *w = e + sp * s;
+      std::copy_n(edge(k), sp * s, e);                                         // E τ̄ = E - (EG)H
+      std::fill_n(w, sp * s, S(0));
+      for (int i = 0; i < sp; ++i)
+        for (int j = 0; j < n; ++j) {
+          S eg = S(0);
+          for (int a = 0; a < s; ++a) eg += edge(k)[i * s + a] * gain(k)[j * s + a];
+          for (int a = 0; a < s; ++a) e[i * s + a] -= eg * hinge_map(k)[j * s + a];
+        }
+      multiply_add(Y.data() + at_[p].m, e, w, sp, sp, s);
+      transposed_multiply_add(e, w, y, s, sp, s);
+    }
+    std::copy_n(hinge_map(k), n * s, t);
+    forward_substitute(L.data() + at_[k].d, n, t, s);
+    transposed_multiply_add(t, t, y, s, n, s);                                 // + H*D⁻¹H
+    symmetrise(y, s);
+  }
+
+ private:
+  struct Offsets {
+    size_t e, h, m, d;
+  };
+  const S* gain(int k) const { return G.data() + at_[k].h; }  // G*, n x s
+  const std::vector<S>& square(int id) const {
+    switch (id) {
+      case SymbolId::M: return M;
+      case SymbolId::P: return P;
+      case SymbolId::P_plus: return Pplus;
+      case SymbolId::R: return R;
+      default: return Y;
+    }
+  }
+  // A(parent) += E B E*, kept symmetric.
+  void congruence_add(int k, const S* B, S* A) {
+    const int s = tree_.size[k], sp = tree_.size[tree_.parent[k]];
+    S* t = work_.data();
+    std::fill_n(t, sp * s, S(0));
+    multiply_add(edge(k), B, t, sp, s, s);
+    for (int i = 0; i < sp; ++i)
+      for (int j = 0; j <= i; ++j) {
+        S sum = S(0);
+        for (int a = 0; a < s; ++a) sum += t[i * s + a] * edge(k)[j * s + a];
+        A[i * sp + j] += sum;
+        if (j < i) A[j * sp + i] = A[i * sp + j];
+      }
+  }
+
+  const SkoStructure& tree_;
+  std::vector<Offsets> at_;
+  std::vector<S> E, H, G, M, P, Pplus, R, Y, X, J, D, L, pivots_, work_;
+};
+
+}  // namespace pycraft

@@ -1,0 +1,112 @@
+// Block elimination of a realization over the tree, leaves to root. Body k's states form one pivot block; a body is coupled to its
+// parent (through the few rows and columns that edges carry) and to the border (the states of low-rank terms), so nothing fills in:
+//
+//   U(k) = A(k,k)⁻¹ [A(k,p) A(k,b)],     [A(p,p) A(p,b); A(b,p) A(b,b)] -= [A(p,k); A(b,k)] U(k)
+//
+// A singular pivot block is merged with its parent's (the re-ordering attempt) until the merged block is regular or too large; then
+// everything is eliminated as one dense block, and the caller says so. Diagonal blocks of the inverse come base to tip:
+//
+//   Z(k,k) = A(k,k)⁻¹ + U(k) Z(pb,pb) L(k),   Z(k,b) = -U(k) Z(pb,b),   Z(b,k) = -Z(b,pb) L(k),   L(k) = [A(p,k); A(b,k)] A(k,k)⁻¹
+//
+// Cost O(N) with the pivot blocks' size cubed; one step of iterative refinement with every solve.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "algebra/errors.h"
+#include "algebra/realization.h"
+#include "algebra/small_lu.h"
+#include "algebra/small_matrix.h"
+#include "algebra/values.h"
+
+namespace pycraft {
+
+// Blocks of a block-diagonal operator, body after body, row-major.
+template <class S>
+struct BlockStorage {
+  std::vector<int> rows, columns;
+  std::vector<size_t> offset;
+  std::vector<S> data;
+  void shape(const Space& r, const Space& c) {
+    const size_t bodies = r.layout().of_body.size();
+    if (rows.size() == bodies && bodies) return;
+    rows.clear(), columns.clear(), offset.assign(1, 0);
+    for (size_t k = 0; k < bodies; ++k) {
+      rows.push_back(r.body_size(k));
+      columns.push_back(c.body_size(k));
+      offset.push_back(offset.back() + size_t(rows[k]) * columns[k]);
+    }
+    data.assign(offset.back(), S(0));
+  }
+  S* at(int k) { return data.data() + offset[k]; }
+  const S* at(int k) const { return data.data() + offset[k]; }
+};
+
+template <class S>
+class TreeElimination {
+ public:
+  explicit TreeElimination(std::shared_ptr<const Realization> realization);
+
+  // Assembles and factors. blocks(i): the i-th register; values(c): the numbers of context c. True if it stayed sparse.
+  template <class Blocks, class Values>
+  bool factor(Blocks&& blocks, Values&& values);
+
+  // y = operator x, m columns.
+  template <class Blocks>
+  void solve(const S* x, S* y, int m, Blocks&& blocks);
+
+  // Diagonal blocks of the operator (inputs and outputs local).
+  template <class Blocks>
+  void selected(BlockStorage<S>& out, Blocks&& blocks);
+
+  S log_abs_determinant() const;
+  const std::string& note() const { return note_; }
+
+ private:
+  struct Front {
+    std::vector<int> bodies;                  // eliminated together, the topmost first
+    int parent = -1;                          // front
+    int n = 0;                                // states
+    size_t matrix = 0, across = 0, over = 0;  // offsets of A(k,k), [A(k,p) A(k,b)], [A(p,k); A(b,k)]
+    std::vector<int> columns, rows;           // states and equations of the parent front that edges join to this one
+    std::vector<int> column_index, row_index; // their numbers by position in the parent front; -1 for the others
+    size_t vector = 0;                        // offset of its states in a solution
+    int width() const { return static_cast<int>(columns.size()); }
+    int height() const { return static_cast<int>(rows.size()); }
+  };
+  struct Place {  // where a state or an equation lies: front -1 is the border
+    int front, position;
+  };
+
+  void lay_out(bool one_front);
+  bool eliminate();
+  void add_block(Place row, Place column, const S* block, int r, int c, S factor);
+  template <class Blocks, class Values>
+  void assemble(Blocks&& blocks, Values&& values);
+  void subtract_product(const S* s, S* r, int m) const;   // r -= T s
+  void solve_system(S* b, int m);
+  void selected_fronts();                                  // Z(k,k), Z(k,b), Z(b,k) of every front
+
+  std::shared_ptr<const Realization> r_;
+  const SkoStructure& tree_;
+  std::vector<int> front_of_;                                // body -> front
+  std::vector<Front> fronts_;                                // parents before children
+  std::vector<std::vector<Place>> state_at_, equation_at_;   // of state j at body k; Euclidean: one entry
+  int border_ = 0;
+  size_t total_ = 0;
+  std::vector<S> A_, original_, magnitude_;                  // all matrices, factored and as assembled; rows' largest entries
+  std::vector<S> border_matrix_, border_original_, border_magnitude_;
+  std::vector<SmallLU<S>> lu_;
+  SmallLU<S> border_lu_;
+  std::vector<S> rhs_, residual_, work_, block_, edge_, product_, Z_, z_border_;
+  std::vector<size_t> z_offset_;
+  std::vector<char> merged_with_parent_;
+  int failed_ = -1;
+  std::string note_;
+};
+
+}  // namespace pycraft
+
+#include "algebra/elimination_impl.h"

@@ -1,0 +1,37 @@
+// Every error of the core names the thing at fault. The bindings map these classes one to one to pycraft.<same name>.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace pycraft {
+
+struct Error : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+// Operators that cannot be combined: their spaces do not meet. (TypeError in Python)
+struct SpaceError : Error {
+  using Error::Error;
+};
+// A model, a size or a number that makes no sense. (ValueError)
+struct ModelError : Error {
+  using Error::Error;
+};
+// A value that cannot be computed: a missing operand, an unknown name, a precision that is not there. (ValueError)
+struct EvaluationError : Error {
+  using Error::Error;
+};
+// D(k) singular at the rounding bound of the form in use. (ArithmeticError)
+struct SingularHingeError : Error {
+  using Error::Error;
+};
+// Any other inverse that does not exist numerically. (ArithmeticError)
+struct SingularOperatorError : Error {
+  using Error::Error;
+};
+// An operator made before its model's structure changed. (RuntimeError)
+struct StaleOperatorError : Error {
+  using Error::Error;
+};
+
+}  // namespace pycraft

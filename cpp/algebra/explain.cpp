@@ -1,0 +1,67 @@
+// The plan as a table: what runs, in which tier, what it costs.
+#include <cstdio>
+#include <sstream>
+
+#include "algebra/plan.h"
+
+namespace pycraft {
+
+namespace {
+
+// Columns are padded by characters, not bytes: the text is UTF-8 and has combining marks (φ̃, τ̄).
+size_t display_width(const std::string& text) {
+  size_t width = 0;
+  for (size_t i = 0; i < text.size(); ++i) {
+    const unsigned char c = text[i];
+    if ((c & 0xC0) == 0x80) continue;                                            // continuation byte
+    if (c == 0xCC || (c == 0xCD && i + 1 < text.size() && static_cast<unsigned char>(text[i + 1]) < 0xB0)) continue;  // combining mark
+    ++width;
+  }
+  return width;
+}
+
+std::string padded(const std::string& text, size_t width) {
+  const size_t own = display_width(text);
+  return own < width ? text + std::string(width - own, ' ') : text;
+}
+
+std::string quantity(double x, const char* unit) {
+  char buffer[40];
+  if (x >= 1e9)
+    std::snprintf(buffer, sizeof buffer, "%.1f G%s", x / 1e9, unit);
+  else if (x >= 1e6)
+    std::snprintf(buffer, sizeof buffer, "%.1f M%s", x / 1e6, unit);
+  else if (x >= 1e3)
+    std::snprintf(buffer, sizeof buffer, "%.1f k%s", x / 1e3, unit);
+  else
+    std::snprintf(buffer, sizeof buffer, "%.0f %s", x, unit);
+  return buffer;
+}
+
+}  // namespace
+
+std::string explain(const Plan& plan) {
+  static const char* tiers[] = {"values", "kernel", "sweep", "elimination", "dense"};
+  static const char* requests[] = {"applied to a vector", "as a matrix", "its diagonal blocks", "its diagonal", "its trace", "its ln|det|", "its norm"};
+  std::ostringstream out;
+  out << plan.text << "\n" << requests[static_cast<int>(plan.request)];
+  if (plan.domain) out << ", from " << plan.domain.description() << " to " << plan.codomain.description();
+  if (plan.batched) out << ", at " << plan.batch << " states";
+  if (plan.precision != Precision::double_) out << ", in " << precision_name(plan.precision) << " precision";
+  out << "\n";
+  for (const std::string& note : plan.notes) out << "  by " << note << "\n";
+  size_t widest = 20;
+  for (const Step& s : plan.steps) widest = std::max(widest, std::min<size_t>(display_width(s.text), 70));
+  out << "  #  " << padded("step", widest + 2) << padded("tier", 13) << padded("flops", 11) << "memory\n";
+  int i = 0;
+  for (const Step& s : plan.steps) {
+    char number[16];
+    std::snprintf(number, sizeof number, "%3d  ", ++i);
+    out << number << padded(s.text, widest + 2) << padded(tiers[s.tier], 13) << padded(quantity(s.flops, "flop"), 11) << quantity(s.bytes, "B") << "\n";
+  }
+  out << "     " << padded("total" + std::string(plan.columns_of_identity ? " (per column)" : ""), widest + 15) << padded(quantity(plan.flops(), "flop"), 11)
+      << quantity(plan.bytes(), "B") << "\n";
+  return out.str();
+}
+
+}  // namespace pycraft

@@ -1,0 +1,368 @@
+#include "algebra/expression.h"
+
+#include <algorithm>
+#include <atomic>
+#include <unordered_map>
+
+#include "algebra/errors.h"
+#include "algebra/plan.h"
+#include "algebra/properties.h"
+#include "algebra/source.h"
+
+namespace pycraft {
+
+namespace {
+
+using Node = Expression::Node;
+
+size_t mix(size_t seed, size_t value) { return seed ^ (value * 0x9e3779b97f4a7c15ULL + 0x7f4a7c15ULL + (seed << 6) + (seed >> 2)); }
+
+size_t hash_of(const Node& n) {
+  size_t h = mix(17, static_cast<size_t>(n.kind));
+  switch (n.kind) {
+    case NodeKind::symbol:
+      h = mix(mix(mix(h, n.symbol.definition->id), reinterpret_cast<size_t>(n.symbol.source.get())), reinterpret_cast<size_t>(n.symbol.binding.get()));
+      for (int a : n.symbol.arguments) h = mix(h, a);
+      return h;
+    case NodeKind::vector: return mix(h, std::hash<std::string>()(n.name));
+    case NodeKind::constant: return mix(h, reinterpret_cast<size_t>(n.constant.get()));
+    case NodeKind::external: return mix(h, reinterpret_cast<size_t>(n.external.get()));
+    case NodeKind::scaled: return mix(mix(h, std::hash<double>()(n.coefficient)), n.children[0].node().hash);
+    case NodeKind::sum: {
+      size_t total = 0;  // whatever the order
+      for (const Expression& c : n.children) total += mix(31, c.node().hash);
+      return mix(h, total);
+    }
+    default:
+      for (const Expression& c : n.children) h = mix(h, c.node().hash);
+      return h;
+  }
+}
+
+Expression make(Node node, std::shared_ptr<PlanCache> plans = nullptr) {
+  node.hash = hash_of(node);
+  node.plans = plans ? std::move(plans) : std::make_shared<PlanCache>();
+  node.inverse_plans = nullptr;
+  return Expression(std::make_shared<const Node>(std::move(node)));
+}
+
+// What an error calls an expression: short ones by their text.
+std::string label(const Expression& e) {
+  const std::string text = show(e);
+  return text.size() > 60 ? "(an expression that begins " + text.substr(0, 40) + "…)" : text;
+}
+
+std::string owner_note(const Space& a, const Space& b) {
+  const std::string x = a.layout().owner_name, y = b.layout().owner_name;
+  if (a.layout().owner == b.layout().owner || x.empty() || y.empty()) return "";
+  return x == y ? " They belong to two different models, both named '" + x + "'."
+                : " They belong to two different models, '" + x + "' and '" + y + "'.";
+}
+
+bool commute_free_equal(const std::vector<Expression>& a, const std::vector<Expression>& b) {
+  if (a.size() != b.size()) return false;
+  std::vector<char> used(b.size(), 0);
+  for (const Expression& x : a) {
+    bool found = false;
+    for (size_t j = 0; j < b.size() && !found; ++j)
+      if (!used[j] && x == b[j]) used[j] = found = true;
+    if (!found) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+bool operator==(const Expression& a, const Expression& b) {
+  if (a.get() == b.get()) return true;
+  if (!a || !b) return false;
+  const Node &x = a.node(), &y = b.node();
+  if (x.hash != y.hash || x.kind != y.kind || x.children.size() != y.children.size()) return false;
+  switch (x.kind) {
+    case NodeKind::symbol: return x.symbol == y.symbol;
+    case NodeKind::vector: return x.name == y.name && x.codomain == y.codomain;
+    case NodeKind::identity: return x.domain == y.domain;
+    case NodeKind::zero: return x.domain == y.domain && x.codomain == y.codomain;
+    case NodeKind::constant: return x.constant == y.constant;
+    case NodeKind::external: return x.external == y.external;
+    case NodeKind::sum: return commute_free_equal(x.children, y.children);
+    case NodeKind::scaled:
+      if (x.coefficient != y.coefficient) return false;
+      break;
+    default: break;
+  }
+  for (size_t i = 0; i < x.children.size(); ++i)
+    if (x.children[i] != y.children[i]) return false;
+  return true;
+}
+
+// ------------------------------------------------------------------ leaves
+
+Expression make_symbol(const SymbolDefinition& definition, std::shared_ptr<SkoSource> source, std::vector<int> arguments, std::string argument_text) {
+  Node n{NodeKind::symbol, source->space(definition.domain, arguments), source->space(definition.codomain, arguments), {}};
+  n.symbol = Symbol{&definition, std::move(source), nullptr, std::move(arguments), std::move(argument_text)};
+  return make(std::move(n));
+}
+
+Expression make_symbol(SymbolId id, std::shared_ptr<SkoSource> source) { return make_symbol(sko_symbols()[id], std::move(source)); }
+
+Expression make_vector(const std::string& name, const Space& space) {
+  Node n{NodeKind::vector, Space::euclidean(1), space, {}};
+  n.name = name;
+  return make(std::move(n));
+}
+
+Expression identity() {
+  return make(Node{NodeKind::identity, Space(), Space(), {}});
+}
+
+Expression identity(const Space& space) {
+  return make(Node{NodeKind::identity, space, space, {}});
+}
+
+Expression zero(const Space& domain, const Space& codomain) {
+  return make(Node{NodeKind::zero, domain, codomain, {}});
+}
+
+Expression constant(std::vector<double> dense, const Space& domain, const Space& codomain, const std::string& name) {
+  const int rows = codomain.dimension(), columns = domain.dimension();
+  if (static_cast<int>(dense.size()) != rows * columns)
+    throw SpaceError("constant '" + name + "' has " + std::to_string(dense.size()) + " entries; from " + domain.description() + " to " +
+                     codomain.description() + " it takes " + std::to_string(rows) + " x " + std::to_string(columns));
+  auto data = std::make_shared<ConstantData>();
+  data->name = name;
+  data->symmetric = domain == codomain.dual();
+  for (int i = 0; i < rows && data->symmetric; ++i)
+    for (int j = 0; j < i && data->symmetric; ++j) data->symmetric = dense[i * columns + j] == dense[j * columns + i];
+  const bool trees = domain.belongs_to_bodies() && codomain.belongs_to_bodies() && domain.layout().of_body.size() == codomain.layout().of_body.size();
+  if (trees) {  // block diagonal over the bodies: every entry outside its body's block is zero
+    std::vector<int> row_body(rows), column_body(columns);
+    for (const auto& b : codomain.layout().blocks) std::fill_n(row_body.begin() + b.offset, b.size, b.body);
+    for (const auto& b : domain.layout().blocks) std::fill_n(column_body.begin() + b.offset, b.size, b.body);
+    bool diagonal = true;
+    for (int i = 0; i < rows && diagonal; ++i)
+      for (int j = 0; j < columns && diagonal; ++j) diagonal = row_body[i] == column_body[j] || dense[i * columns + j] == 0;
+    if (diagonal) {
+      const int bodies = static_cast<int>(domain.layout().of_body.size());
+      for (int k = 0; k < bodies; ++k) {
+        std::vector<double> block;
+        for (int bi : codomain.layout().of_body[k])
+          for (int i = 0; i < codomain.layout().blocks[bi].size; ++i)
+            for (int bj : domain.layout().of_body[k])
+              for (int j = 0; j < domain.layout().blocks[bj].size; ++j)
+                block.push_back(dense[(codomain.layout().blocks[bi].offset + i) * columns + domain.layout().blocks[bj].offset + j]);
+        data->blocks.push_back(std::move(block));
+      }
+      dense.clear();
+    }
+  }
+  data->dense = std::move(dense);
+  Node n{NodeKind::constant, domain, codomain, {}};
+  n.constant = std::move(data);
+  return make(std::move(n));
+}
+
+Expression constant_blocks(std::vector<std::vector<double>> blocks, const Space& domain, const Space& codomain, const std::string& name) {
+  const size_t bodies = domain.layout().of_body.size();
+  if (!domain.belongs_to_bodies() || !codomain.belongs_to_bodies() || codomain.layout().of_body.size() != bodies || blocks.size() != bodies)
+    throw SpaceError("constant '" + name + "': " + std::to_string(blocks.size()) + " blocks do not fit " + domain.description() + " to " +
+                     codomain.description() + "; give one block per body");
+  auto data = std::make_shared<ConstantData>();
+  data->name = name;
+  data->symmetric = domain == codomain.dual();
+  for (size_t k = 0; k < bodies; ++k) {
+    const size_t r = codomain.body_size(k), c = domain.body_size(k);
+    if (blocks[k].size() != r * c)
+      throw SpaceError("constant '" + name + "': block " + std::to_string(k) + " has " + std::to_string(blocks[k].size()) + " entries, not " +
+                       std::to_string(r) + " x " + std::to_string(c));
+    for (size_t i = 0; i < r && data->symmetric; ++i)
+      for (size_t j = 0; j < i && data->symmetric; ++j) data->symmetric = blocks[k][i * c + j] == blocks[k][j * c + i];
+  }
+  data->blocks = std::move(blocks);
+  Node n{NodeKind::constant, domain, codomain, {}};
+  n.constant = std::move(data);
+  return make(std::move(n));
+}
+
+Expression external(std::shared_ptr<const ExternalData> data, const Space& domain, const Space& codomain) {
+  Node n{NodeKind::external, domain, codomain, {}};
+  n.external = std::move(data);
+  return make(std::move(n));
+}
+
+// ------------------------------------------------------------------ arithmetic
+
+Expression with_space(const Expression& e, const Space& space) {
+  if (!e.floating()) return e;
+  Node n = e.node();
+  n.domain = n.codomain = space;
+  for (Expression& c : n.children) c = with_space(c, space);
+  return make(std::move(n));
+}
+
+Expression sum_of(std::vector<Expression> terms) {
+  const Expression* spaced = nullptr;
+  for (const Expression& t : terms)
+    if (!t.floating()) {
+      spaced = &t;
+      break;
+    }
+  std::vector<Expression> flat;
+  for (const Expression& t : terms) {
+    Expression term = t;
+    if (spaced) {
+      if (term.floating()) {
+        if (!(spaced->domain() == spaced->codomain()))
+          throw SpaceError("I cannot be added to " + label(*spaced) + ", which maps " + spaced->domain().description() + " to " +
+                           spaced->codomain().description() + ": an identity maps a space to itself");
+        term = with_space(term, spaced->domain());
+      }
+      if (!(term.domain() == spaced->domain()) || !(term.codomain() == spaced->codomain())) {
+        term.check_current();
+        spaced->check_current();
+        throw SpaceError(label(*spaced) + " maps " + spaced->domain().description() + " to " + spaced->codomain().description() + "; " + label(term) +
+                         " maps " + term.domain().description() + " to " + term.codomain().description() + ": they cannot be added." +
+                         owner_note(spaced->domain(), term.domain()));
+      }
+    }
+    if (term.kind() == NodeKind::sum)
+      flat.insert(flat.end(), term.children().begin(), term.children().end());
+    else
+      flat.push_back(term);
+  }
+  if (flat.size() == 1) return flat[0];
+  return make(Node{NodeKind::sum, flat[0].domain(), flat[0].codomain(), std::move(flat)});
+}
+
+Expression product_of(std::vector<Expression> factors) {
+  // An identity without a space takes it from its neighbour, from the right first.
+  for (size_t i = factors.size(); i-- > 0;)
+    if (factors[i].floating() && i + 1 < factors.size() && !factors[i + 1].floating()) factors[i] = with_space(factors[i], factors[i + 1].codomain());
+  for (size_t i = 1; i < factors.size(); ++i)
+    if (factors[i].floating() && !factors[i - 1].floating()) factors[i] = with_space(factors[i], factors[i - 1].domain());
+  std::vector<Expression> flat;
+  for (size_t i = 0; i < factors.size(); ++i) {
+    const Expression& f = factors[i];
+    if (i && !f.floating() && !(factors[i - 1].domain() == f.codomain())) {
+      const Expression& before = factors[i - 1];
+      before.check_current();
+      f.check_current();
+      throw SpaceError(label(before) + " maps " + before.domain().description() + " to " + before.codomain().description() + "; it cannot follow " +
+                       label(f) + ", which ends in " + f.codomain().description() + "." + owner_note(before.domain(), f.codomain()));
+    }
+    if (f.kind() == NodeKind::product)
+      flat.insert(flat.end(), f.children().begin(), f.children().end());
+    else
+      flat.push_back(f);
+  }
+  if (flat.size() == 1) return flat[0];
+  const Space domain = flat.back().domain(), codomain = flat.front().codomain();
+  return make(Node{NodeKind::product, domain, codomain, std::move(flat)});
+}
+
+Expression operator+(const Expression& a, const Expression& b) { return sum_of({a, b}); }
+Expression operator-(const Expression& a) { return -1.0 * a; }
+Expression operator-(const Expression& a, const Expression& b) { return sum_of({a, -b}); }
+Expression operator*(const Expression& a, const Expression& b) { return product_of({a, b}); }
+
+Expression operator*(double c, const Expression& a) {
+  Node n{NodeKind::scaled, a.domain(), a.codomain(), {a}};
+  n.coefficient = c;
+  return make(std::move(n));
+}
+
+Expression Expression::T() const {
+  if (floating()) return make(Node{NodeKind::transpose, Space(), Space(), {*this}});
+  return make(Node{NodeKind::transpose, codomain().dual(), domain().dual(), {*this}});
+}
+
+Expression Expression::inv() const {
+  if (!floating() && domain().dimension() != codomain().dimension())
+    throw SpaceError(label(*this) + " maps " + domain().description() + " to " + codomain().description() + ": it is not square and has no inverse");
+  std::shared_ptr<PlanCache> plans;
+  {
+    static std::mutex mutex;
+    std::lock_guard<std::mutex> lock(mutex);
+    Node& self = const_cast<Node&>(node());
+    if (!self.inverse_plans) self.inverse_plans = std::make_shared<PlanCache>();
+    plans = self.inverse_plans;
+  }
+  return make(Node{NodeKind::inverse, codomain(), domain(), {*this}}, std::move(plans));
+}
+
+Expression block_diagonal(const Expression& a) {
+  if (a.floating()) return a;
+  if (!a.domain().belongs_to_bodies() || !a.codomain().belongs_to_bodies() ||
+      a.domain().layout().of_body.size() != a.codomain().layout().of_body.size())
+    throw SpaceError("blockdiag(" + label(a) + "): " + a.domain().description() + " and " + a.codomain().description() + " are not cut into the same bodies");
+  return make(Node{NodeKind::block_diagonal, a.domain(), a.codomain(), {a}});
+}
+
+Expression square_root(const Expression& a) {
+  if (a.floating()) return a;
+  if (!is_block_diagonal(a) || !is_symmetric(a))
+    throw SpaceError("sqrt(" + label(a) + "): a square root is taken of a symmetric block-diagonal operator, body by body");
+  const Space domain = a.domain().dual() == a.domain() ? a.domain() : Space(SpaceKind::Whitened, a.domain().layout_pointer());
+  return make(Node{NodeKind::square_root, domain, a.codomain(), {a}});
+}
+
+Expression power(const Expression& a, int exponent) {
+  if (!a.floating() && !(a.domain() == a.codomain()) && exponent != 1 && exponent != -1)
+    throw SpaceError(label(a) + " maps " + a.domain().description() + " to " + a.codomain().description() + ": only a map of a space to itself has powers");
+  if (exponent == 0) return a.floating() ? identity() : identity(a.domain());
+  const Expression factor = exponent < 0 ? a.inv() : a;
+  return product_of(std::vector<Expression>(std::abs(exponent), factor));
+}
+
+// ------------------------------------------------------------------ walks
+
+void visit(const Expression& e, const std::function<void(const Expression&)>& f) {
+  f(e);
+  for (const Expression& c : e.children()) visit(c, f);
+}
+
+Expression Expression::at(std::shared_ptr<const Binding> binding) const {
+  std::unordered_map<const Node*, Expression> done;
+  std::function<Expression(const Expression&)> walk = [&](const Expression& e) -> Expression {
+    auto found = done.find(e.get());
+    if (found != done.end()) return found->second;
+    Expression result = e;
+    if (e.kind() == NodeKind::symbol) {
+      if (!e.node().symbol.binding) {
+        Node n = e.node();
+        n.symbol.binding = binding;
+        result = make(std::move(n));
+      }
+    } else if (!e.children().empty()) {
+      Node n = e.node();
+      bool changed = false;
+      for (Expression& c : n.children) {
+        Expression moved = walk(c);
+        changed |= moved.get() != c.get();
+        c = moved;
+      }
+      if (changed) result = make(std::move(n));
+    }
+    done.emplace(e.get(), result);
+    return result;
+  };
+  return walk(*this);
+}
+
+std::vector<Context> contexts(const Expression& e) {
+  std::vector<Context> found;
+  visit(e, [&](const Expression& x) {
+    if (x.kind() != NodeKind::symbol) return;
+    const Context c{x.node().symbol.source, x.node().symbol.binding};
+    if (std::find(found.begin(), found.end(), c) == found.end()) found.push_back(c);
+  });
+  return found;
+}
+
+void Expression::check_current() const {
+  visit(*this, [](const Expression& x) {
+    if (x.kind() == NodeKind::symbol) x.node().symbol.source->check_current();
+  });
+}
+
+}  // namespace pycraft

@@ -1,0 +1,130 @@
+// Expressions: what a user wrote, as data. An expression holds no numbers but the user's own constants; its parts are shared and
+// immutable; constructors check spaces and never rewrite (semantics: what was typed is what is shown). Sums and products are kept flat.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "algebra/space.h"
+#include "algebra/symbol.h"
+
+namespace pycraft {
+
+struct Plan;
+class PlanCache;
+
+enum class NodeKind { symbol, vector, identity, zero, constant, external, sum, product, scaled, transpose, inverse, block_diagonal, square_root };
+
+// A user's numbers. Cut into tree blocks where they are block diagonal over the bodies; else dense.
+struct ConstantData {
+  std::vector<double> dense;                // row-major (codomain, domain); empty where blocks are kept
+  std::vector<std::vector<double>> blocks;  // per body, row-major
+  bool symmetric = false;
+  std::string name;
+};
+
+// Somebody else's linear operator: double precision only.
+struct ExternalData {
+  std::function<void(const double* x, double* y, int columns)> apply, apply_transposed;  // row-major columns
+  std::string name;
+};
+
+class Expression {
+ public:
+  struct Node;
+  Expression() = default;
+  explicit Expression(std::shared_ptr<const Node> node) : node_(std::move(node)) {}
+  explicit operator bool() const { return node_ != nullptr; }
+  const Node& node() const { return *node_; }
+  const Node* get() const { return node_.get(); }
+  NodeKind kind() const;
+  const Space& domain() const;    // empty for an identity that has not met an operator yet
+  const Space& codomain() const;
+  const std::vector<Expression>& children() const;
+  bool floating() const { return !domain(); }
+  bool is(SymbolId id) const;     // this very symbol, not transposed
+
+  Expression T() const;
+  Expression inv() const;
+
+  // The same expression with every symbol that is not bound yet bound to this state.
+  Expression at(std::shared_ptr<const Binding> binding) const;
+  // Throws StaleOperatorError if a model's structure changed since.
+  void check_current() const;
+
+ private:
+  std::shared_ptr<const Node> node_;
+};
+
+struct Expression::Node {
+  NodeKind kind;
+  Space domain, codomain;
+  std::vector<Expression> children;
+  double coefficient = 1;                       // scaled
+  Symbol symbol{};                              // symbol
+  std::string name;                             // vector
+  std::shared_ptr<const ConstantData> constant;
+  std::shared_ptr<const ExternalData> external;
+  size_t hash = 0;
+  std::shared_ptr<PlanCache> plans;             // filled at the first evaluation; it holds no expression, so no cycle
+  std::shared_ptr<PlanCache> inverse_plans;     // of every inv() of this expression: `MM.inv() @ x` in a loop is planned once
+};
+
+inline NodeKind Expression::kind() const { return node_->kind; }
+inline const Space& Expression::domain() const { return node_->domain; }
+inline const Space& Expression::codomain() const { return node_->codomain; }
+inline const std::vector<Expression>& Expression::children() const { return node_->children; }
+inline bool Expression::is(SymbolId id) const { return kind() == NodeKind::symbol && node_->symbol.definition->id == id; }
+
+// Structural, after flattening; sums whatever their order.
+bool operator==(const Expression& a, const Expression& b);
+inline bool operator!=(const Expression& a, const Expression& b) { return !(a == b); }
+struct ExpressionHash {
+  size_t operator()(const Expression& e) const { return e.node().hash; }
+};
+
+Expression make_symbol(const SymbolDefinition& definition, std::shared_ptr<SkoSource> source, std::vector<int> arguments = {},
+                       std::string argument_text = "");
+Expression make_symbol(SymbolId id, std::shared_ptr<SkoSource> source);
+Expression make_vector(const std::string& name, const Space& space);
+Expression identity();
+Expression identity(const Space& space);
+Expression zero(const Space& domain, const Space& codomain);
+// dense: row-major (codomain, domain). Recognises what is block diagonal over the bodies.
+Expression constant(std::vector<double> dense, const Space& domain, const Space& codomain, const std::string& name);
+Expression constant_blocks(std::vector<std::vector<double>> blocks, const Space& domain, const Space& codomain, const std::string& name);
+Expression external(std::shared_ptr<const ExternalData> data, const Space& domain, const Space& codomain);
+
+Expression operator+(const Expression& a, const Expression& b);
+Expression operator-(const Expression& a, const Expression& b);
+Expression operator-(const Expression& a);
+Expression operator*(const Expression& a, const Expression& b);
+Expression operator*(double c, const Expression& a);
+Expression sum_of(std::vector<Expression> terms);
+Expression product_of(std::vector<Expression> factors);
+Expression block_diagonal(const Expression& a);
+// L with A = L L*, block by block lower triangular (Cholesky); A symmetric and block diagonal.
+Expression square_root(const Expression& a);
+Expression power(const Expression& a, int exponent);
+
+// An identity (or an expression made of identities alone) given its space.
+Expression with_space(const Expression& e, const Space& space);
+
+// Every distinct (source, binding) below, in order of appearance; throws StaleOperatorError for a stale one.
+struct Context {
+  std::shared_ptr<SkoSource> source;
+  std::shared_ptr<const Binding> binding;
+};
+inline bool operator==(const Context& a, const Context& b) { return a.source == b.source && a.binding == b.binding; }
+std::vector<Context> contexts(const Expression& e);
+
+// Calls f on every node below and including e, parents before children.
+void visit(const Expression& e, const std::function<void(const Expression&)>& f);
+
+// ------------------------------------------------------------------ how an expression is shown
+enum class Style { unicode, python, latex };
+std::string show(const Expression& e, Style style = Style::unicode);
+
+}  // namespace pycraft

@@ -1,0 +1,92 @@
+// From an expression to a plan, in three tiers: a recognised kernel; sweeps of resolvents; realization and elimination. Only a full
+// dense constant, somebody else's operator under an inverse, or (found at run time) a singular pivot goes to a dense factorization.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "algebra/expression.h"
+#include "algebra/plan.h"
+#include "algebra/realization.h"
+#include "algebra/scalar_expression.h"
+
+namespace pycraft {
+
+class Planner {
+ public:
+  explicit Planner(const PlanOptions& options) : options_(options) {}
+
+  // The request as a plan.
+  Plan plan(const Expression& e, Request request);
+
+ private:
+  friend class RealizationBuilder;
+
+  // ---- steps and registers
+  int new_register(RegisterKind kind, const Space& rows, const Space& columns, bool wide);
+  int emit(Step step, Register out);
+  int context_of(const Symbol& symbol, unsigned groups);
+  void emit_values();
+
+  // ---- vectors: registers of y = e x
+  int apply(const Expression& e, int x);
+  int apply_product(const std::vector<Expression>& factors, int x, const Expression& whole);
+  int apply_sum(const Expression& e, int x);
+  int apply_symbol(const Symbol& symbol, bool transposed, bool inverted, int x);
+  int apply_inverse(const Expression& e, int x);
+  int apply_blocks(int block, bool transposed, int x, const std::string& text);
+  int vector_value(const Expression& e);
+  int solve_realization(const Expression& e, int x);
+  int solve_dense(const Expression& operand, int x, const std::string& reason);
+
+  // ---- block registers of block-diagonal expressions
+  int blocks(const Expression& e);
+  int multiply_blocks(int a, int b);
+  int identity_blocks(const Space& rows, const Space& columns);
+  int zero_blocks(const Space& rows, const Space& columns);
+
+  // ---- structure
+  std::optional<int> diagonal_by_structure(const Expression& e);   // block register of blockdiag(e), no elimination
+  int diagonal_blocks(const Expression& e);
+  int logdet(const Expression& e);
+  std::optional<int> logdet_by_structure(const Expression& e);
+
+  bool same_session(const Expression& a, const Expression& b) const;
+  int id_of(const Expression& e);
+  double vector_bytes(const Space& space) const { return 8.0 * space.dimension(); }
+
+  PlanOptions options_;
+  Plan plan_;
+  std::unordered_map<Expression, int, ExpressionHash> ids_;
+  std::map<std::pair<int, int>, int> vector_memo_;
+  std::map<int, int> block_memo_;
+};
+
+// ---------------------------------------------------------------- optimisation by theorems (optimise.cpp)
+// The cheapest expression that the theorems give for e: recognised forms, cancelled inverses, normal form if it costs less.
+Expression optimise(const Expression& lowered, std::vector<std::string>& notes);
+
+// HφMφ*H* and [I-HψK]* D⁻¹ [I-HψK] of one model at one state, lowered: the forms that have kernels.
+struct Kernels {
+  std::vector<Expression> mass_matrix;          // factors
+  std::vector<Expression> mass_matrix_inverse;  // factors
+};
+Kernels kernels_of(const Symbol& like);
+
+// ---------------------------------------------------------------- costs (costs.cpp)
+// Floating-point operations per column and per sweep of a tree, by the structure of its blocks.
+double symbol_flops(const Symbol& symbol);
+double resolvent_flops(const Symbol& symbol);
+double group_flops(const SkoSource& source, unsigned group);
+double group_bytes(const SkoSource& source, unsigned group);
+double mass_matrix_flops(const SkoSource& source, bool inverse);
+double mass_matrix_dense_flops(const SkoSource& source);
+
+// ---------------------------------------------------------------- realization (realization.cpp)
+// The realization of y = e x; emits the block registers it needs through the planner. On failure `reason` says why.
+std::shared_ptr<const Realization> build_realization(Planner& planner, const Expression& e, bool local_ends, std::string& reason);
+
+}  // namespace pycraft

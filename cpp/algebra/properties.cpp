@@ -1,0 +1,79 @@
+#include "algebra/properties.h"
+
+#include "algebra/lower.h"
+
+namespace pycraft {
+
+namespace {
+
+enum Triangle : unsigned { upper = 1, lower_ = 2, both = 3 };
+
+unsigned flip(unsigned t) { return ((t & upper) ? lower_ : 0u) | ((t & lower_) ? upper : 0u); }
+
+const SymbolDefinition* edge_symbol(const Expression& e, bool& transposed) {
+  transposed = e.kind() == NodeKind::transpose;
+  const Expression& inner = transposed ? e.children()[0] : e;
+  if (inner.kind() != NodeKind::symbol || inner.node().symbol.definition->pattern != Pattern::edges) return nullptr;
+  return inner.node().symbol.definition;
+}
+
+unsigned triangles(const Expression& e) {
+  switch (e.kind()) {
+    case NodeKind::symbol: {
+      const SymbolDefinition& d = *e.node().symbol.definition;
+      switch (d.pattern) {
+        case Pattern::block_diagonal: return both;
+        case Pattern::edges:
+        case Pattern::resolvent: return upper;
+        case Pattern::compound: return triangles(lower(d.expand(e.node().symbol), true));
+        case Pattern::vector: return 0;
+      }
+      return 0;
+    }
+    case NodeKind::identity:
+    case NodeKind::square_root:
+    case NodeKind::block_diagonal: return both;
+    case NodeKind::zero: return e.domain().belongs_to_bodies() && e.codomain().belongs_to_bodies() ? both : 0u;
+    case NodeKind::constant: return e.node().constant->blocks.empty() ? 0u : both;
+    case NodeKind::vector:
+    case NodeKind::external: return 0;
+    case NodeKind::transpose: return flip(triangles(e.children()[0]));
+    case NodeKind::scaled:
+    case NodeKind::inverse: return triangles(e.children()[0]);  // the inverse of a block-triangular operator is so too
+    case NodeKind::sum: {
+      unsigned t = both;
+      for (const Expression& c : e.children()) t &= triangles(c);
+      return t;
+    }
+    case NodeKind::product: {
+      // E X E* with X block diagonal is block diagonal: every body has one parent.
+      const auto& f = e.children();
+      bool first_transposed = false, last_transposed = false;
+      const SymbolDefinition* first = edge_symbol(f.front(), first_transposed);
+      const SymbolDefinition* last = edge_symbol(f.back(), last_transposed);
+      if (f.size() >= 3 && first && first == last && !first_transposed && last_transposed) {
+        bool inner = true;
+        for (size_t i = 1; i + 1 < f.size(); ++i) inner &= triangles(f[i]) == both;
+        if (inner) return both;
+      }
+      unsigned t = both;
+      for (const Expression& c : f) t &= triangles(c);
+      return t;
+    }
+  }
+  return 0;
+}
+
+}  // namespace
+
+bool is_block_diagonal(const Expression& e) { return triangles(e) == both; }
+bool is_upper_triangular(const Expression& e) { return triangles(e) & upper; }
+bool is_lower_triangular(const Expression& e) { return triangles(e) & lower_; }
+
+bool is_symmetric(const Expression& e) {
+  if (e.floating()) return true;
+  if (!(e.domain() == e.codomain().dual())) return false;
+  return lower(e, true) == lower(e.T(), true);
+}
+
+}  // namespace pycraft

@@ -1,0 +1,41 @@
+// Scalars made of operators: trace, ln|det|, norm, and their sums. Data, like expressions.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "algebra/expression.h"
+
+namespace pycraft {
+
+enum class ScalarKind { number, trace, logdet, norm, sum, scaled };
+
+class Scalar {
+ public:
+  struct Node {
+    ScalarKind kind;
+    double value = 0;                // number; factor of scaled
+    Expression operand;              // trace, logdet, norm
+    std::vector<Scalar> terms;       // sum, scaled
+  };
+  explicit Scalar(Node node) : node_(std::make_shared<const Node>(std::move(node))) {}
+  const Node& node() const { return *node_; }
+
+ private:
+  std::shared_ptr<const Node> node_;
+};
+
+Scalar number(double value);
+Scalar trace(const Expression& e);    // of a map of a space to itself, or to its dual
+Scalar logdet(const Expression& e);   // ln|det|
+Scalar norm(const Expression& e);     // Frobenius
+Scalar operator+(const Scalar& a, const Scalar& b);
+Scalar operator-(const Scalar& a, const Scalar& b);
+Scalar operator*(double c, const Scalar& a);
+bool operator==(const Scalar& a, const Scalar& b);
+Scalar at(const Scalar& a, const std::shared_ptr<const Binding>& binding);
+std::string show(const Scalar& a, Style style = Style::unicode);
+void visit(const Scalar& a, const std::function<void(const Expression&)>& operands);
+
+}  // namespace pycraft

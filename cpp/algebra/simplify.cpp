@@ -1,0 +1,42 @@
+// simplify(): the shortest of what was typed, what lowering gives and what the theorems give.
+#include "algebra/lower.h"
+#include "algebra/planner.h"
+#include "algebra/polynomial.h"
+#include "algebra/simplify.h"
+
+namespace pycraft {
+
+namespace {
+
+// Letters, and a little for every sum, inverse and scalar.
+double length(const Expression& e) {
+  double sum = e.kind() == NodeKind::symbol || e.kind() == NodeKind::vector || e.kind() == NodeKind::constant ? 1.0 : 0.0;
+  if (e.kind() == NodeKind::sum) sum += 0.1 * e.children().size();
+  if (e.kind() == NodeKind::inverse) sum += 0.5;
+  if (e.kind() == NodeKind::transpose) sum += 0.05;
+  if (e.kind() == NodeKind::scaled) sum += 0.1;
+  if (e.kind() == NodeKind::identity) sum += 0.2;
+  for (const Expression& c : e.children()) sum += length(c);
+  return sum;
+}
+
+}  // namespace
+
+Expression simplify(const Expression& e) {
+  if (e.floating()) return e;
+  e.check_current();
+  std::vector<Expression> candidates = {lower(e, false)};
+  std::vector<std::string> notes;
+  candidates.push_back(optimise(candidates[0], notes));
+  for (size_t i = 0; i < 2; ++i) {
+    Alphabet alphabet;
+    if (const auto form = normal_form(candidates[i], alphabet))
+      candidates.push_back(lower(to_expression(*form, alphabet, e.domain(), e.codomain()), false));
+  }
+  Expression best = e;
+  for (const Expression& c : candidates)
+    if (length(c) < length(best)) best = c;
+  return best;
+}
+
+}  // namespace pycraft

@@ -1,0 +1,27 @@
+// The Riccati sweep, tip to base:
+//
+//   P(k)  = M(k) + Σ_{children c} E(k,c) P⁺(c) E(k,c)*       articulated-body inertia
+//   D(k)  = H(k) P(k) H(k)* + J(k)                            refused where singular: see singular_pivot.h
+//   G(k)  = P(k) H(k)* D(k)⁻¹
+//   P⁺(k) = P(k) - G(k) D(k) G(k)*                            (= τ̄P)
+//
+// Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, the articulated-body chapter. Cost O(N).
+#pragma once
+
+#include "algebra/structure.h"
+#include "algebra/sweeps/singular_pivot.h"
+
+namespace pycraft {
+
+template <class Blocks>
+void articulated_inertia_tip_to_base(const SkoStructure& tree, Blocks& blocks) {
+  bool doubtful = false;
+  for (int k = 0; k < tree.bodies(); ++k) blocks.start_articulated(k);
+  for (int k = tree.bodies() - 1; k >= 0; --k) {
+    doubtful |= blocks.eliminate_hinge(k);
+    if (tree.parent[k] >= 0) blocks.articulated_to_parent(k);
+  }
+  if (doubtful) check_pivots_tip_to_base(tree, blocks);
+}
+
+}  // namespace pycraft

@@ -1,0 +1,60 @@
+// The numbers of an SKO model at one state, as the engine sees them: apply a symbol, sweep a resolvent, hand out a block.
+// One virtual call per sweep, none inside. Vectors of several columns are row-major: entry (i, c) at x[i * columns + c].
+#pragma once
+
+#include <mutex>
+
+#include "algebra/source.h"
+#include "algebra/symbol.h"
+
+namespace pycraft {
+
+template <class S>
+class SkoValues {
+ public:
+  virtual ~SkoValues() = default;
+
+  // Moves to a state (null pointers where the source has none): nothing is computed yet.
+  void move_to(const double* q, const double* v) {
+    set_state(q, v);
+    ready_ = 0;
+  }
+  // Computes the groups that are missing. Safe from several threads; afterwards reading is.
+  void require(unsigned groups) {
+    if ((ready_.load(std::memory_order_acquire) & groups) == groups) return;
+    std::lock_guard<std::mutex> lock(mutex_);
+    unsigned ready = ready_.load();
+    for (unsigned group : {unsigned(Group::kinematics), unsigned(Group::articulated), unsigned(Group::composite), unsigned(Group::compliance), unsigned(Group::velocities)}) {
+      const unsigned wanted = groups & group & ~ready;
+      if (!wanted) continue;
+      compute(wanted);
+      ready |= wanted;
+    }
+    ready_.store(ready, std::memory_order_release);
+  }
+
+  // y = A x or A* x for a block-diagonal or edge symbol; inverse: y = A⁻¹ x (D only).
+  virtual void apply(const Symbol& symbol, bool transposed, bool inverse, const S* x, S* y, int columns) const = 0;
+  // y = φ x, φ* x, ψ x, ψ* x.
+  virtual void sweep(SymbolId resolvent, bool transposed, const S* x, S* y, int columns) const = 0;
+  // Block (k, k) of a block-diagonal symbol, row-major; for an edge symbol the block (parent of k, k).
+  virtual void block(const Symbol& symbol, int k, S* out) const = 0;
+  // A vector symbol.
+  virtual void vector(const Symbol& symbol, S* out) const = 0;
+  // The fused kernels: y = HφMφ*H* x + J x if asked; y = [I-HψK]* D⁻¹ [I-HψK] x; HφMφ*H* as a dense matrix.
+  virtual void mass_matrix(bool with_hinge_diagonal, const S* x, S* y, int columns, S* scratch) const = 0;
+  virtual void mass_matrix_inverse(const S* x, S* y, int columns, S* scratch) const = 0;
+  virtual void mass_matrix_dense(bool with_hinge_diagonal, S* out) const = 0;
+  // ln det D(k) summed over the hinges.
+  virtual S log_determinant_of_D() const = 0;
+
+ protected:
+  virtual void set_state(const double* q, const double* v) = 0;
+  virtual void compute(unsigned group) = 0;
+
+ private:
+  std::mutex mutex_;
+  std::atomic<unsigned> ready_{0};
+};
+
+}  // namespace pycraft

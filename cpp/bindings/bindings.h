@@ -1,0 +1,44 @@
+// What the registrations share. They convert and forward; mathematics lives in the core.
+#pragma once
+
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <string>
+#include <vector>
+
+#include "algebra/engine.h"
+#include "algebra/expression.h"
+#include "spatial/pose.h"
+#include "spatial/symmetric3.h"
+
+namespace pycraft {
+
+namespace py = pybind11;
+
+using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+void register_errors(py::module_& m);
+void register_spaces(py::module_& m);
+void register_operators(py::module_& m);
+void register_scalars(py::module_& m);
+void register_plans(py::module_& m);
+void register_multibody(py::module_& m);
+void register_dynamics(py::module_& m);
+void register_theorems(py::module_& m);
+void register_bench(py::module_& m);
+
+// ---- conversions
+Vector3<double> to_vector3(const py::handle& value, const char* what);
+Matrix3<double> to_matrix3(const py::handle& value, const char* what);
+Symmetric3<double> to_symmetric3(const py::handle& value, const char* what);
+py::array_t<double> to_numpy(const Vector3<double>& v);
+py::array_t<double> to_numpy(const Matrix3<double>& A);
+py::array_t<double> to_numpy(const std::vector<double>& v);
+
+// A run's numbers as an array of this shape; with expansions, an object array of mpmath numbers that lose nothing.
+py::object to_array(const Result& result, std::vector<py::ssize_t> shape);
+bool wants_objects(const py::object& dtype);
+
+}  // namespace pycraft

@@ -1,0 +1,84 @@
+#include <cstring>
+
+#include "algebra/errors.h"
+#include "bindings/bindings.h"
+
+namespace pycraft {
+
+namespace {
+
+Array numbers(const py::handle& value, const char* what) {
+  Array a = Array::ensure(value);
+  if (!a) {
+    PyErr_Clear();
+    throw ModelError(std::string(what) + " is not an array of numbers");
+  }
+  return a;
+}
+
+}  // namespace
+
+Vector3<double> to_vector3(const py::handle& value, const char* what) {
+  const Array a = numbers(value, what);
+  if (a.size() != 3) throw ModelError(std::string(what) + " takes 3 numbers, not " + std::to_string(a.size()));
+  return {a.data()[0], a.data()[1], a.data()[2]};
+}
+
+Matrix3<double> to_matrix3(const py::handle& value, const char* what) {
+  const Array a = numbers(value, what);
+  if (a.ndim() != 2 || a.shape(0) != 3 || a.shape(1) != 3) throw ModelError(std::string(what) + " takes a 3 x 3 matrix");
+  Matrix3<double> A;
+  std::memcpy(A.m, a.data(), sizeof A.m);
+  return A;
+}
+
+Symmetric3<double> to_symmetric3(const py::handle& value, const char* what) {
+  const Matrix3<double> A = to_matrix3(value, what);
+  double largest = 0;
+  for (double x : A.m) largest = std::max(largest, std::abs(x));
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < i; ++j)
+      if (std::abs(A(i, j) - A(j, i)) > 1e-9 * largest)
+        throw ModelError(std::string(what) + " is not symmetric: entries (" + std::to_string(i) + ", " + std::to_string(j) + ") and (" + std::to_string(j) +
+                         ", " + std::to_string(i) + ") differ by " + std::to_string(A(i, j) - A(j, i)));
+  return upper(A);
+}
+
+py::array_t<double> to_numpy(const Vector3<double>& v) {
+  py::array_t<double> a(3);
+  std::memcpy(a.mutable_data(), v.v, sizeof v.v);
+  return a;
+}
+py::array_t<double> to_numpy(const Matrix3<double>& A) {
+  py::array_t<double> a({3, 3});
+  std::memcpy(a.mutable_data(), A.m, sizeof A.m);
+  return a;
+}
+py::array_t<double> to_numpy(const std::vector<double>& v) {
+  py::array_t<double> a(static_cast<py::ssize_t>(v.size()));
+  if (!v.empty()) std::memcpy(a.mutable_data(), v.data(), v.size() * sizeof(double));
+  return a;
+}
+
+py::object to_array(const Result& r, std::vector<py::ssize_t> shape) {
+  if (r.expansions.empty() || r.expansions.size() != r.values.size()) {
+    py::array_t<double> a(shape);
+    if (!r.values.empty()) std::memcpy(a.mutable_data(), r.values.data(), r.values.size() * sizeof(double));
+    return a;
+  }
+  py::list parts;
+  for (const auto& e : r.expansions) parts.append(py::cast(e));
+  return py::module_::import("pycraft.operators").attr("exact_numbers")(parts, py::cast(shape));
+}
+
+bool wants_objects(const py::object& dtype) {
+  if (dtype.is_none()) return false;
+  if (dtype.is(py::handle(reinterpret_cast<PyObject*>(&PyBaseObject_Type)))) return true;
+  const py::object np = py::module_::import("numpy");
+  const py::object given = np.attr("dtype")(dtype);
+  if (given.equal(np.attr("dtype")("object"))) return true;
+  if (given.equal(np.attr("dtype")("float64"))) return false;
+  throw EvaluationError("results are float64, or dtype=object for numbers that keep a wider precision");
+}
+
+}  // namespace pycraft

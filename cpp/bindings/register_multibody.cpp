@@ -1,0 +1,191 @@
+#include "algebra/errors.h"
+#include "bindings/bindings.h"
+#include "model/multibody.h"
+
+namespace pycraft {
+
+namespace {
+
+py::dict subhinge_dict(const Subhinge& s) {
+  py::dict d;
+  d["kind"] = subhinge_kind_name(s.kind);
+  d["axis"] = to_numpy(s.axis);
+  d["point"] = to_numpy(s.point);
+  d["pitch"] = s.pitch;
+  return d;
+}
+
+Subhinge subhinge_from(const py::handle& item, const std::string& hinge) {
+  const py::dict d = py::cast<py::dict>(item);
+  Subhinge s;
+  s.kind = subhinge_kind_from_name(py::cast<std::string>(d["kind"]));
+  Vector3<double> axis{0, 0, 1}, point{0, 0, 0};
+  double pitch = 0;
+  if (d.contains("axis")) axis = to_vector3(d["axis"], ("axis of hinge '" + hinge + "'").c_str());
+  if (d.contains("point")) point = to_vector3(d["point"], ("point of hinge '" + hinge + "'").c_str());
+  if (d.contains("pitch")) pitch = py::cast<double>(d["pitch"]);
+  switch (s.kind) {  // the checks of the one-subhinge kinds serve here too
+    case SubhingeKind::pin: return subhinges_of(HingeKind::pin, {axis}, point, 0, hinge)[0];
+    case SubhingeKind::slider: return subhinges_of(HingeKind::slider, {axis}, point, 0, hinge)[0];
+    case SubhingeKind::screw: return subhinges_of(HingeKind::screw, {axis}, point, pitch, hinge)[0];
+    case SubhingeKind::ball: return subhinges_of(HingeKind::ball, {}, point, 0, hinge)[0];
+    case SubhingeKind::free: return subhinges_of(HingeKind::free, {}, point, 0, hinge)[0];
+  }
+  return s;
+}
+
+Pose<double> pose_from(const py::object& rotation, const py::object& position, const std::string& what) {
+  Pose<double> X = Pose<double>::identity();
+  if (!rotation.is_none()) X.R = to_matrix3(rotation, ("rotation of " + what).c_str());
+  if (!position.is_none()) X.p = to_vector3(position, ("position of " + what).c_str());
+  return X;
+}
+
+}  // namespace
+
+void register_multibody(py::module_& m) {
+  py::class_<Multibody, std::shared_ptr<Multibody>>(m, "Multibody")
+      .def(py::init<std::string, bool, bool>(), py::arg("name") = "multibody", py::arg("keep_welds") = false, py::arg("strict") = false)
+      .def_property_readonly("name", &Multibody::name)
+      .def_property_readonly("keeps_welds", &Multibody::keeps_welds)
+      .def_property_readonly("strict", &Multibody::strict)
+      .def_property_readonly("nq", &Multibody::nq, "Numbers in q: 4 for a ball, 7 for a free hinge, else one a coordinate.")
+      .def_property_readonly("nv", &Multibody::nv, "Generalized velocities: the degrees of freedom.")
+      .def_property_readonly("_size", &Multibody::bodies)
+      .def("_add_body",
+           [](Multibody& mb, const std::string& name, const std::string& parent, const std::string& hinge, const std::string& hinge_name,
+              const std::vector<py::object>& axes, const py::object& point, double pitch, const py::object& subhinges, const py::object& rotation,
+              const py::object& position, double mass, const py::object& com, const py::object& inertia, const std::vector<double>& rotor_inertia,
+              const std::vector<double>& lower, const std::vector<double>& upper) {
+             Body b;
+             b.name = name;
+             b.mass = mass;
+             if (!com.is_none()) b.com = to_vector3(com, ("centre of mass of body '" + name + "'").c_str());
+             if (!inertia.is_none()) b.inertia = to_symmetric3(inertia, ("inertia of body '" + name + "'").c_str());
+             b.hinge.name = hinge_name;
+             b.hinge.kind = hinge_kind_from_name(hinge);
+             const std::string shown = hinge_name.empty() ? name : hinge_name;
+             if (b.hinge.kind == HingeKind::custom) {
+               if (subhinges.is_none()) throw ModelError("hinge '" + shown + "' of kind 'custom' takes its subhinges one by one: subhinges=[...]");
+               for (const auto& item : py::cast<py::list>(subhinges)) b.hinge.subhinges.push_back(subhinge_from(item, shown));
+             } else if (!subhinges.is_none()) {
+               for (const auto& item : py::cast<py::list>(subhinges)) b.hinge.subhinges.push_back(subhinge_from(item, shown));
+             } else {
+               std::vector<Vector3<double>> directions;
+               for (const py::object& a : axes) directions.push_back(to_vector3(a, ("axis of hinge '" + shown + "'").c_str()));
+               const Vector3<double> at = point.is_none() ? Vector3<double>{0, 0, 0} : to_vector3(point, ("point of hinge '" + shown + "'").c_str());
+               b.hinge.subhinges = subhinges_of(b.hinge.kind, directions, at, pitch, shown);
+             }
+             b.hinge.placement = pose_from(rotation, position, "the placement of hinge '" + shown + "'");
+             b.hinge.rotor_inertia = rotor_inertia;
+             b.hinge.lower = lower;
+             b.hinge.upper = upper;
+             mb.add_body(std::move(b), parent);
+           },
+           py::arg("name"), py::arg("parent"), py::arg("hinge"), py::arg("hinge_name"), py::arg("axes"), py::arg("point"), py::arg("pitch"),
+           py::arg("subhinges"), py::arg("rotation"), py::arg("position"), py::arg("mass"), py::arg("com"), py::arg("inertia"), py::arg("rotor_inertia"),
+           py::arg("lower"), py::arg("upper"))
+      .def("remove_body", &Multibody::remove_body, py::arg("name"),
+           "Removes a body with everything outboard of it. Operators made before are stale; q and v are carried over by hinge name.")
+      .def("_add_node", [](Multibody& mb, const std::string& name, const std::string& body, const py::object& rotation, const py::object& position) {
+        mb.add_node(name, body, pose_from(rotation, position, "node '" + name + "'"));
+      })
+      .def("_body_index", &Multibody::body_index)
+      .def("_hinge_index", &Multibody::hinge_index)
+      .def("_node_index", &Multibody::node_index)
+      .def("_body", [](const Multibody& mb, int k) {
+        const Body& b = mb.body(k);
+        Matrix3<double> I = full(b.inertia);
+        py::dict d;
+        d["name"] = b.name;
+        d["parent"] = b.parent;
+        d["mass"] = b.mass;
+        d["com"] = to_numpy(b.com);
+        d["inertia"] = to_numpy(I);
+        py::dict h;
+        h["name"] = b.hinge.name;
+        h["kind"] = hinge_kind_name(b.hinge.kind);
+        py::dict placement;
+        placement["rotation"] = to_numpy(b.hinge.placement.R);
+        placement["position"] = to_numpy(b.hinge.placement.p);
+        h["placement"] = placement;
+        py::list subhinges;
+        for (const Subhinge& s : b.hinge.subhinges) subhinges.append(subhinge_dict(s));
+        h["subhinges"] = subhinges;
+        h["rotor_inertia"] = to_numpy(b.hinge.rotor_inertia);
+        h["lower"] = to_numpy(b.hinge.lower);
+        h["upper"] = to_numpy(b.hinge.upper);
+        d["hinge"] = h;
+        return d;
+      })
+      .def("_nodes", [](const Multibody& mb) {
+        py::list nodes;
+        for (const Node& n : mb.nodes()) {
+          py::dict d;
+          d["name"] = n.name;
+          d["body"] = n.body;
+          d["rotation"] = to_numpy(n.pose.R);
+          d["position"] = to_numpy(n.pose.p);
+          nodes.append(d);
+        }
+        return nodes;
+      })
+      .def("_slices", [](const Multibody& mb, int k) {
+        const Hinge& h = mb.body(k).hinge;
+        return py::make_tuple(py::slice(mb.q_offset(k), mb.q_offset(k) + h.nq(), 1), py::slice(mb.v_offset(k), mb.v_offset(k) + h.nv(), 1));
+      })
+      .def("_names", [](const Multibody& mb) {
+        std::vector<std::string> bodies, hinges;
+        for (int k = 0; k < mb.bodies(); ++k) {
+          bodies.push_back(mb.body(k).name);
+          hinges.push_back(mb.body(k).hinge.name);
+        }
+        return py::make_tuple(bodies, hinges);
+      })
+      .def_property_readonly("coordinate_names", [](const Multibody& mb) { return mb.structure().coordinate_names; },
+                             "One per generalized velocity: the hinge's name, or \"hinge[j]\" where it has several.")
+      .def("_set_mass_properties", [](Multibody& mb, int k, double mass, const py::object& com, const py::object& inertia) {
+        const std::string name = mb.body(k).name;
+        mb.set_mass_properties(k, mass, to_vector3(com, ("centre of mass of body '" + name + "'").c_str()),
+                               to_symmetric3(inertia, ("inertia of body '" + name + "'").c_str()));
+      })
+      .def("_set_placement", [](Multibody& mb, int k, const py::object& rotation, const py::object& position) {
+        mb.set_placement(k, pose_from(rotation, position, "the placement of hinge '" + mb.body(k).hinge.name + "'"));
+      })
+      .def("_set_rotor_inertia", &Multibody::set_rotor_inertia)
+      .def_property("gravity", [](const Multibody& mb) { return to_numpy(mb.gravity()); },
+                    [](Multibody& mb, const py::object& g) { mb.set_gravity(to_vector3(g, "gravity")); },
+                    "Gravity acceleration in world axes, m/s²; zero until it is set.")
+      .def_property("q", [](const Multibody& mb) {
+        py::array_t<double> a = to_numpy(mb.state()->q);
+        a.attr("setflags")(py::arg("write") = false);
+        return a;
+      }, [](Multibody& mb, const Array& q) { mb.set_q(std::vector<double>(q.data(), q.data() + q.size())); },
+         "Generalized coordinates (nq,): copied in when set, read-only when read.")
+      .def_property("v", [](const Multibody& mb) {
+        py::array_t<double> a = to_numpy(mb.state()->v);
+        a.attr("setflags")(py::arg("write") = false);
+        return a;
+      }, [](Multibody& mb, const Array& v) { mb.set_v(std::vector<double>(v.data(), v.data() + v.size())); },
+         "Generalized velocities (nv,): copied in when set, read-only when read.")
+      .def("zero_q", [](const Multibody& mb) { return to_numpy(mb.zero_q()); }, "All coordinates zero, quaternions (1, 0, 0, 0).")
+      .def("integrate", [](const Multibody& mb, const Array& q, const Array& dv) {
+        mb.check_q(q.data(), q.size());
+        mb.check_v(dv.data(), dv.size(), "dv");
+        std::vector<double> out(mb.nq());
+        mb.integrate(q.data(), dv.data(), out.data());
+        return to_numpy(out);
+      }, py::arg("q"), py::arg("dv"), "q moved along the velocity dv for unit time: on the group for ball and free hinges (exponential of the body twist).")
+      .def("difference", [](const Multibody& mb, const Array& q0, const Array& q1) {
+        mb.check_q(q0.data(), q0.size());
+        mb.check_q(q1.data(), q1.size());
+        std::vector<double> out(mb.nv());
+        mb.difference(q0.data(), q1.data(), out.data());
+        return to_numpy(out);
+      }, py::arg("q0"), py::arg("q1"), "The velocity dv with integrate(q0, dv) = q1.")
+      .def("check_q", [](const Multibody& mb, const Array& q) { mb.check_q(q.data(), q.size()); })
+      .def("take_warnings", &Multibody::take_warnings)
+      .def_property_readonly("has_rotor_inertia", &Multibody::has_rotor_inertia);
+}
+
+}  // namespace pycraft

@@ -1,0 +1,75 @@
+#include "algebra/scalar_expression.h"
+
+#include "bindings/bindings.h"
+
+namespace pycraft {
+
+namespace {
+
+py::object value(const Scalar& s) {
+  int batch = -1;
+  std::vector<double> v;
+  {
+    py::gil_scoped_release release;
+    v = evaluate(s, &batch);
+  }
+  if (batch < 0) return py::float_(v[0]);
+  return to_numpy(v);
+}
+
+double single(const Scalar& s) {
+  const py::object v = value(s);
+  if (!py::isinstance<py::float_>(v)) throw py::type_error("this scalar is bound to a batch of states: take it with numpy.asarray");
+  return v.cast<double>();
+}
+
+}  // namespace
+
+void register_scalars(py::module_& m) {
+  py::class_<Scalar> scalar(m, "Scalar", "A scalar made of operators (trace, ln|det|, norm and their sums): an expression, evaluated by float() or numpy.asarray.");
+  scalar.attr("__array_ufunc__") = py::none();
+  scalar.def("value", &value, "The number; with a batch bound, an array (batch,).")
+      .def("__float__", &single)
+      .def("__array__", [](const Scalar& s, const py::object& dtype, const py::object&) {
+        return py::module_::import("numpy").attr("array")(value(s), dtype);
+      }, py::arg("dtype") = py::none(), py::arg("copy") = py::none())
+      .def("__format__", [](const Scalar& s, const std::string& spec) { return py::float_(single(s)).attr("__format__")(spec); })
+      .def("at", [](const Scalar& s, const py::args& args, const py::kwargs& kwargs) {
+        return py::module_::import("pycraft.operators").attr("scalar_at")(s, *args, **kwargs);
+      })
+      .def("operands", [](const Scalar& s) {
+        py::list all;
+        visit(s, [&](const Expression& e) { all.append(py::cast(e)); });
+        return all;
+      })
+      .def("bound", [](const Scalar& s, const std::shared_ptr<const Binding>& b) { return at(s, b); })
+      .def("__add__", [](const Scalar& a, const Scalar& b) { return a + b; })
+      .def("__add__", [](const Scalar& a, double b) { return a + number(b); })
+      .def("__radd__", [](const Scalar& a, double b) { return number(b) + a; })
+      .def("__sub__", [](const Scalar& a, const Scalar& b) { return a - b; })
+      .def("__sub__", [](const Scalar& a, double b) { return a - number(b); })
+      .def("__rsub__", [](const Scalar& a, double b) { return number(b) - a; })
+      .def("__mul__", [](const Scalar& a, double c) { return c * a; })
+      .def("__rmul__", [](const Scalar& a, double c) { return c * a; })
+      .def("__truediv__", [](const Scalar& a, double c) { return (1 / c) * a; })
+      .def("__neg__", [](const Scalar& a) { return -1.0 * a; })
+      .def("__eq__", [](const Scalar& a, const Scalar& b) { return a == b; })
+      .def("__hash__", [](const Scalar& a) { return std::hash<std::string>()(show(a)); })
+      .def("text", [](const Scalar& a) { return show(a); })
+      .def("latex", [](const Scalar& a) { return show(a, Style::latex); })
+      .def("_repr_latex_", [](const Scalar& a) { return "$" + show(a, Style::latex) + "$"; })
+      .def("__repr__", [](const Scalar& a) { return "<scalar " + show(a) + ">"; })
+      .def("_parts", [](const Scalar& a) {
+        const auto& n = a.node();
+        return py::make_tuple(static_cast<int>(n.kind), n.value, n.operand ? py::cast(n.operand) : py::none(), py::cast(n.terms));
+      })
+      .def("__reduce__", [](const Scalar& a) {
+        return py::make_tuple(py::module_::import("pycraft._core").attr("_scalar_from_parts"), py::cast(a).attr("_parts")());
+      });
+  m.def("_scalar_from_parts", [](int kind, double value, const py::object& operand, const std::vector<Scalar>& terms) {
+    return Scalar({static_cast<ScalarKind>(kind), value, operand.is_none() ? Expression() : operand.cast<Expression>(), terms});
+  });
+  m.def("scalar", &number, py::arg("value"));
+}
+
+}  // namespace pycraft

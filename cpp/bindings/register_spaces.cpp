@@ -1,0 +1,30 @@
+#include "algebra/space.h"
+
+#include "bindings/bindings.h"
+
+namespace pycraft {
+
+void register_spaces(py::module_& m) {
+  py::class_<Space>(m, "Space",
+                    "A space that operators map between: Θ generalized coordinates, V and F stacked body motions and forces (dual), NodesV and\n"
+                    "NodesF those of nodes (dual), R^n a user's own. Spaces compare by kind, model and blocks, never by size alone.")
+      .def_property_readonly("name", &Space::name)
+      .def_property_readonly("dimension", &Space::dimension)
+      .def_property_readonly("dual", &Space::dual)
+      .def_property_readonly(
+          "blocks",
+          [](const Space& s) {
+            py::list blocks;
+            for (const auto& b : s.layout().blocks) blocks.append(py::make_tuple(b.label, py::slice(b.offset, b.offset + b.size, 1), b.body));
+            return blocks;
+          },
+          "List of (label, slice, body number) in the order of a vector's entries; body -1 for none.")
+      .def("__len__", &Space::dimension)
+      .def("__eq__", [](const Space& a, const Space& b) { return a == b; })
+      .def("__eq__", [](const Space&, const py::object&) { return py::reinterpret_borrow<py::object>(Py_NotImplemented); })
+      .def("__hash__", [](const Space& s) { return py::hash(py::make_tuple(static_cast<int>(s.kind()), s.dimension())); })
+      .def("__repr__", [](const Space& s) { return "<space " + s.description() + ">"; });
+  m.def("euclidean", &Space::euclidean, py::arg("dimension"), "R^n, a space of a user's own: self-dual, cut into no bodies.");
+}
+
+}  // namespace pycraft

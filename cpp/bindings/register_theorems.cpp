@@ -1,0 +1,62 @@
+#include "algebra/theorems.h"
+
+#include "algebra/matrix_tree.h"
+#include "bindings/bindings.h"
+#include "operators/multibody_operators.h"
+
+namespace pycraft {
+
+void register_theorems(py::module_& m) {
+  const auto side = [](const Side& s) -> py::object {
+    return std::holds_alternative<Expression>(s) ? py::cast(std::get<Expression>(s)) : py::cast(std::get<Scalar>(s));
+  };
+  py::class_<Theorem>(m, "Theorem", "A theorem as data: both sides as expressions, its hypotheses, its source.")
+      .def_readonly("name", &Theorem::name)
+      .def_readonly("group", &Theorem::group)
+      .def_property_readonly("lhs", [side](const Theorem& t) { return side(t.lhs); })
+      .def_property_readonly("rhs", [side](const Theorem& t) { return side(t.rhs); })
+      .def_property_readonly("hypotheses", [](const Theorem& t) { return hypothesis_names(t.hypotheses); })
+      .def_readonly("source", &Theorem::source)
+      .def_readonly("on_one_path", &Theorem::on_one_path)
+      .def_readonly("waiting", &Theorem::waiting)
+      .def_property_readonly("use", [](const Theorem& t) {
+        static const char* names[] = {"check", "rewrite", "inverse"};
+        return names[static_cast<int>(t.use)];
+      })
+      .def("unmet", [](const Theorem& t, const SkoSource& s) { return hypothesis_names(unmet(t.hypotheses, s.traits())); }, "Hypotheses that the model does not meet.")
+      .def_property_readonly("latex", [](const Theorem& t) {
+        const auto tex = [](const Side& s) {
+          return std::holds_alternative<Expression>(s) ? show(std::get<Expression>(s), Style::latex) : show(std::get<Scalar>(s), Style::latex);
+        };
+        return tex(t.lhs) + " = " + tex(t.rhs);
+      })
+      .def_property_readonly("text", [](const Theorem& t) {
+        const auto text = [](const Side& s) { return std::holds_alternative<Expression>(s) ? show(std::get<Expression>(s)) : show(std::get<Scalar>(s)); };
+        return text(t.lhs) + " = " + text(t.rhs);
+      })
+      .def("__repr__", [](const Theorem& t) { return "<theorem " + t.name + ">"; });
+  m.def("theorems", [](const std::shared_ptr<SkoSource>& source) {
+    std::vector<Theorem> all = sko_theorems(source);
+    if (const auto mechanics = std::dynamic_pointer_cast<MultibodyOperators>(source)) {
+      const std::vector<Theorem> more = mechanics_theorems(mechanics);
+      all.insert(all.end(), more.begin(), more.end());
+    }
+    return all;
+  }, py::arg("source"), "Every theorem, stated on the letters of one model.");
+  m.def("residual", [](const py::object& a, const py::object& b, const std::map<std::string, std::vector<double>>& vectors, bool on_one_path) {
+    Residual r;
+    if (py::isinstance<Scalar>(a)) {
+      const Scalar x = a.cast<Scalar>(), y = b.cast<Scalar>();
+      py::gil_scoped_release release;
+      r = residual(x, y);
+    } else {
+      const Expression x = a.cast<Expression>(), y = b.cast<Expression>();
+      py::gil_scoped_release release;
+      r = residual(x, y, vectors, on_one_path);
+    }
+    return py::make_tuple(r.difference, r.left, r.right);
+  }, py::arg("a"), py::arg("b"), py::arg("vectors") = std::map<std::string, std::vector<double>>(), py::arg("on_one_path") = false,
+        "Largest entries of a - b, a and b: both evaluated as typed, no theorem used, the difference taken at the bound precision.");
+}
+
+}  // namespace pycraft

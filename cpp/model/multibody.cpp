@@ -1,0 +1,523 @@
+#include "model/multibody.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "algebra/errors.h"
+#include "model/compiled_model.h"
+
+namespace pycraft {
+
+namespace {
+
+std::string number(double x) {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%.6g", x);
+  return buffer;
+}
+
+template <class Names>
+[[noreturn]] void throw_unknown(const char* what, const std::string& name, const std::string& model, const Names& known) {
+  std::string text = std::string("no ") + what + " of '" + model + "' is called '" + name + "'; there are ";
+  std::vector<std::string> names;
+  for (const auto& [known_name, _] : known) names.push_back(known_name);
+  std::sort(names.begin(), names.end());
+  if (names.empty()) text += "none";
+  for (size_t i = 0; i < names.size() && i < 12; ++i) text += (i ? ", " : "") + names[i];
+  if (names.size() > 12) text += ", ... (" + std::to_string(names.size()) + " in all)";
+  throw ModelError(text);
+}
+
+RigidInertia<long double> wide_inertia(const Body& b) { return rigid_inertia(static_cast<long double>(b.mass), cast<long double>(b.com), cast<long double>(b.inertia)); }
+
+}  // namespace
+
+Multibody::Multibody(std::string name, bool keep_welds, bool strict) : name_(std::move(name)), keep_welds_(keep_welds), strict_(strict) {
+  q_offset_ = v_offset_ = {0};
+  state_ = std::make_shared<StateData>();
+}
+
+// ------------------------------------------------------------------ structure
+
+void Multibody::check_new_name(const std::string& name, const char* what) const {
+  if (name.empty()) throw ModelError(std::string("a ") + what + " of '" + name_ + "' has no name");
+  if (body_numbers_.count(name) || node_numbers_.count(name))
+    throw ModelError(std::string("'") + name_ + "' has a body or node called '" + name + "' already; give every " + what + " a name of its own");
+}
+
+Node Multibody::find_frame(const std::string& name) const {
+  if (name.empty()) return {"", -1, Pose<double>::identity()};
+  if (const auto b = body_numbers_.find(name); b != body_numbers_.end()) return {name, b->second, Pose<double>::identity()};
+  if (const auto n = node_numbers_.find(name); n != node_numbers_.end()) return nodes_[n->second];
+  auto known = body_numbers_;
+  known.insert(node_numbers_.begin(), node_numbers_.end());
+  throw_unknown("body or node", name, name_, known);
+}
+
+void Multibody::add_body(Body body, const std::string& parent) {
+  check_new_name(body.name, "body");
+  if (body.hinge.name.empty()) body.hinge.name = body.name;
+  if (hinge_numbers_.count(body.hinge.name))
+    throw ModelError("'" + name_ + "' has a hinge called '" + body.hinge.name + "' already; give every hinge a name of its own");
+  const Node onto = find_frame(parent);
+  for (int i = 0; i < 9; ++i)
+    if (!std::isfinite(body.hinge.placement.R.m[i]) || (i < 3 && !std::isfinite(body.hinge.placement.p[i])))
+      throw ModelError("hinge '" + body.hinge.name + "': its placement has an entry that is not a number");
+  const Matrix3<double> gram = transpose(body.hinge.placement.R) * body.hinge.placement.R;
+  for (int i = 0; i < 9; ++i)
+    if (std::abs(gram.m[i] - (i % 4 == 0)) > 1e-6)
+      throw ModelError("hinge '" + body.hinge.name + "': the rotation of its placement is not orthogonal (off by " + number(std::abs(gram.m[i] - (i % 4 == 0))) + ")");
+  if (determinant(body.hinge.placement.R) < 0) throw ModelError("hinge '" + body.hinge.name + "': the rotation of its placement is a reflection");
+  const int nv = body.hinge.nv();
+  if (body.hinge.rotor_inertia.empty()) body.hinge.rotor_inertia.assign(nv, 0.0);
+  if (static_cast<int>(body.hinge.rotor_inertia.size()) != nv)
+    throw ModelError("hinge '" + body.hinge.name + "' has " + std::to_string(nv) + " coordinates and " + std::to_string(body.hinge.rotor_inertia.size()) +
+                     " rotor inertias");
+  for (double j : body.hinge.rotor_inertia)
+    if (!(j >= 0) || !std::isfinite(j)) throw ModelError("hinge '" + body.hinge.name + "': rotor inertia " + number(j) + " is not a nonnegative number");
+  check_mass_properties(body.name, body.mass, body.com, body.inertia);
+  body.hinge.placement = onto.pose * body.hinge.placement;
+  body.parent = onto.body;
+  if (body.hinge.subhinges.empty() && !keep_welds_) {
+    lump(body, onto);
+    return;
+  }
+  structure_changed("body '" + body.name + "' was added");
+  body_numbers_[body.name] = bodies();
+  hinge_numbers_[body.hinge.name] = bodies();
+  bodies_.push_back(std::move(body));
+}
+
+// A welded body becomes part of the body that moves it, and a node.
+void Multibody::lump(const Body& body, const Node& onto) {
+  const Pose<double> X = body.hinge.placement;  // in the body that moves it
+  if (onto.body >= 0 && (body.mass != 0 || std::any_of(body.inertia.s, body.inertia.s + 6, [](double x) { return x != 0; }))) {
+    Body& b = bodies_[onto.body];
+    const RigidInertia<long double> sum = wide_inertia(b) + to_parent(cast<long double>(X), wide_inertia(body));
+    Vector3<long double> com{0, 0, 0};
+    if (sum.mass > 0) com = (1 / sum.mass) * sum.moment;
+    Symmetric3<long double> about = sum.rotational;
+    const Symmetric3<long double> point = point_inertia(com);
+    for (int i = 0; i < 6; ++i) about.s[i] -= sum.mass * point.s[i];
+    b.mass = static_cast<double>(sum.mass);
+    b.com = cast<double>(com);
+    b.inertia = cast<double>(about);
+    ++parameters_;
+  }
+  node_numbers_[body.name] = static_cast<int>(nodes_.size());
+  nodes_.push_back({body.name, onto.body, X});
+}
+
+void Multibody::remove_body(const std::string& name) {
+  settle();
+  const int first = body_index(name);
+  structure_changed("body '" + name + "' was removed");
+  int last = first + 1;  // depth first: the subtree is a run
+  while (last < bodies() && bodies_[last].parent >= first) ++last;
+  bodies_.erase(bodies_.begin() + first, bodies_.begin() + last);
+  for (Body& b : bodies_)
+    if (b.parent >= last) b.parent -= last - first;
+  std::erase_if(nodes_, [&](const Node& n) { return n.body >= first && n.body < last; });
+  for (Node& n : nodes_)
+    if (n.body >= last) n.body -= last - first;
+  settle();
+}
+
+void Multibody::add_node(const std::string& name, const std::string& body, const Pose<double>& pose) {
+  check_new_name(name, "node");
+  const Node onto = find_frame(body);
+  for (int i = 0; i < 9; ++i)
+    if (!std::isfinite(pose.R.m[i]) || (i < 3 && !std::isfinite(pose.p[i]))) throw ModelError("node '" + name + "': its pose has an entry that is not a number");
+  node_numbers_[name] = static_cast<int>(nodes_.size());
+  nodes_.push_back({name, onto.body, onto.pose * pose});
+}
+
+void Multibody::structure_changed(const std::string& reason) {
+  if (const auto source = operators_.lock()) source->invalidate(reason);
+  operators_.reset();
+  ++parameters_;
+  if (!settled_.load()) return;
+  for (int k = 0; k < bodies(); ++k) {
+    const auto &q = state_->q, &v = state_->v;
+    carried_[bodies_[k].hinge.name] = {{q.begin() + q_offset_[k], q.begin() + q_offset_[k + 1]}, {v.begin() + v_offset_[k], v.begin() + v_offset_[k + 1]}};
+  }
+  settled_.store(false);
+}
+
+const Multibody& Multibody::settled() const {
+  if (!settled_.load(std::memory_order_acquire)) {
+    std::lock_guard<std::mutex> lock(mutex_);
+    if (!settled_.load()) const_cast<Multibody*>(this)->settle();
+  }
+  return *this;
+}
+
+void Multibody::settle() {
+  if (settled_.load()) return;
+  const int n = bodies();
+  std::vector<std::vector<int>> children(n + 1);
+  for (int k = 0; k < n; ++k) children[bodies_[k].parent + 1].push_back(k);
+  std::vector<int> order, stack(children[0].rbegin(), children[0].rend());
+  while (!stack.empty()) {
+    const int k = stack.back();
+    stack.pop_back();
+    order.push_back(k);
+    stack.insert(stack.end(), children[k + 1].rbegin(), children[k + 1].rend());
+  }
+  std::vector<int> place(n);
+  for (int i = 0; i < n; ++i) place[order[i]] = i;
+  std::vector<Body> sorted;
+  sorted.reserve(n);
+  for (int k : order) {
+    sorted.push_back(std::move(bodies_[k]));
+    if (sorted.back().parent >= 0) sorted.back().parent = place[sorted.back().parent];
+  }
+  bodies_ = std::move(sorted);
+  for (Node& node : nodes_)
+    if (node.body >= 0) node.body = place[node.body];
+  body_numbers_.clear(), hinge_numbers_.clear(), node_numbers_.clear();
+  q_offset_ = v_offset_ = {0};
+  auto state = std::make_shared<StateData>();
+  for (int k = 0; k < n; ++k) {
+    const Hinge& h = bodies_[k].hinge;
+    body_numbers_[bodies_[k].name] = k;
+    hinge_numbers_[h.name] = k;
+    q_offset_.push_back(q_offset_.back() + h.nq());
+    v_offset_.push_back(v_offset_.back() + h.nv());
+    const auto old = carried_.find(h.name);
+    if (old != carried_.end() && static_cast<int>(old->second.first.size()) == h.nq()) {
+      state->q.insert(state->q.end(), old->second.first.begin(), old->second.first.end());
+      state->v.insert(state->v.end(), old->second.second.begin(), old->second.second.end());
+    } else {
+      for (const Subhinge& s : h.subhinges) {
+        const size_t at = state->q.size();
+        state->q.resize(at + s.nq(), 0.0);
+        if (s.nq() > 1) state->q[at] = 1;
+        state->v.resize(state->v.size() + s.nv(), 0.0);
+      }
+    }
+  }
+  for (size_t i = 0; i < nodes_.size(); ++i) node_numbers_[nodes_[i].name] = static_cast<int>(i);
+  carried_.clear();
+  state_ = state;
+  settled_.store(true, std::memory_order_release);
+}
+
+int Multibody::body_index(const std::string& name) const {
+  settled();
+  const auto found = body_numbers_.find(name);
+  if (found != body_numbers_.end()) return found->second;
+  const auto node = node_numbers_.find(name);
+  if (node != node_numbers_.end() && nodes_[node->second].body >= 0)
+    throw ModelError("'" + name + "' is welded to body '" + bodies_[nodes_[node->second].body].name + "' and is a node of it; load with welds=\"keep\" to have it as a body");
+  throw_unknown("body", name, name_, body_numbers_);
+}
+int Multibody::hinge_index(const std::string& name) const {
+  settled();
+  const auto found = hinge_numbers_.find(name);
+  if (found == hinge_numbers_.end()) throw_unknown("hinge", name, name_, hinge_numbers_);
+  return found->second;
+}
+int Multibody::node_index(const std::string& name) const {
+  settled();
+  if (const auto n = node_numbers_.find(name); n != node_numbers_.end()) return n->second;
+  if (const auto b = body_numbers_.find(name); b != body_numbers_.end()) return static_cast<int>(nodes_.size()) + b->second;
+  auto known = body_numbers_;
+  known.insert(node_numbers_.begin(), node_numbers_.end());
+  throw_unknown("node or body", name, name_, known);
+}
+Node Multibody::node(int index) const {
+  settled();
+  if (index < static_cast<int>(nodes_.size())) return nodes_[index];
+  const int k = index - static_cast<int>(nodes_.size());
+  return {bodies_[k].name, k, Pose<double>::identity()};
+}
+
+SkoStructure Multibody::structure() const {
+  settled();
+  SkoStructure s;
+  for (const Body& b : bodies_) {
+    s.parent.push_back(b.parent);
+    s.size.push_back(6);
+    s.dof.push_back(b.hinge.nv());
+    s.body_names.push_back(b.name);
+    s.hinge_names.push_back(b.hinge.name);
+  }
+  s.finish();
+  return s;
+}
+
+// ------------------------------------------------------------------ parameters
+
+void Multibody::check_mass_properties(const std::string& body, double mass, const Vector3<double>& com, const Symmetric3<double>& inertia) {
+  if (!std::isfinite(mass)) throw ModelError("body '" + body + "': its mass is " + number(mass));
+  if (mass < 0) throw ModelError("body '" + body + "': its mass is " + number(mass) + " kg; a mass is not negative");
+  for (int i = 0; i < 3; ++i)
+    if (!std::isfinite(com[i])) throw ModelError("body '" + body + "': its centre of mass has an entry that is " + number(com[i]));
+  double largest = 0;
+  for (double x : inertia.s) {
+    if (!std::isfinite(x)) throw ModelError("body '" + body + "': its inertia has an entry that is " + number(x));
+    largest = std::max(largest, std::abs(x));
+  }
+  if (largest == 0) return;
+  Eigen::Matrix3d A;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) A(i, j) = inertia(i, j);
+  const Eigen::Vector3d moments = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(A, Eigen::EigenvaluesOnly).eigenvalues();
+  // Published inertias are rounded to a few digits: a negative moment within 1e-12 of the largest entry is rounding.
+  if (moments[0] < -1e-12 * largest)
+    throw ModelError("body '" + body + "': its inertia has the principal moment " + number(moments[0]) + " kg m²; an inertia is positive semidefinite");
+  const double violation = moments[2] - moments[0] - moments[1];
+  if (violation > 1e-9 * largest) {
+    const std::string text = "body '" + body + "': its principal moments " + number(moments[0]) + ", " + number(moments[1]) + ", " + number(moments[2]) +
+                             " kg m² violate the triangle inequality by " + number(violation) + "; no distribution of mass has them";
+    if (strict_) throw ModelError(text);
+    warnings_.push_back(text);
+  }
+}
+
+void Multibody::set_mass_properties(int k, double mass, const Vector3<double>& com, const Symmetric3<double>& inertia) {
+  check_mass_properties(body(k).name, mass, com, inertia);
+  bodies_[k].mass = mass;
+  bodies_[k].com = com;
+  bodies_[k].inertia = inertia;
+  ++parameters_;
+}
+void Multibody::set_placement(int k, const Pose<double>& placement) {
+  settled();
+  bodies_[k].hinge.placement = placement;
+  ++parameters_;
+}
+void Multibody::set_rotor_inertia(int k, const std::vector<double>& values) {
+  const Hinge& h = body(k).hinge;
+  if (static_cast<int>(values.size()) != h.nv())
+    throw ModelError("hinge '" + h.name + "' has " + std::to_string(h.nv()) + " coordinates, not " + std::to_string(values.size()) + " rotor inertias");
+  for (double j : values)
+    if (!(j >= 0) || !std::isfinite(j)) throw ModelError("hinge '" + h.name + "': rotor inertia " + number(j) + " is not a nonnegative number");
+  bodies_[k].hinge.rotor_inertia = values;
+  ++parameters_;
+}
+void Multibody::set_gravity(const Vector3<double>& g) {
+  for (int i = 0; i < 3; ++i)
+    if (!std::isfinite(g[i])) throw ModelError("gravity of '" + name_ + "' has an entry that is " + number(g[i]));
+  gravity_ = g;
+  ++parameters_;
+}
+bool Multibody::has_rotor_inertia() const {
+  return std::any_of(bodies_.begin(), bodies_.end(), [](const Body& b) {
+    return std::any_of(b.hinge.rotor_inertia.begin(), b.hinge.rotor_inertia.end(), [](double j) { return j != 0; });
+  });
+}
+
+std::vector<std::string> Multibody::take_warnings() {
+  settled();
+  std::vector<std::string> all = std::move(warnings_);
+  warnings_.clear();
+  for (const Body& b : bodies_)
+    if (b.hinge.nv() > 0 && b.mass == 0 && std::all_of(b.inertia.s, b.inertia.s + 6, [](double x) { return x == 0; }))
+      all.push_back("body '" + b.name + "' on hinge '" + b.hinge.name +
+                    "' has no mass: what needs D⁻¹ (forward dynamics, ℳ⁻¹) works only where the bodies outboard give the hinge inertia");
+  return all;
+}
+
+// ------------------------------------------------------------------ state
+
+std::shared_ptr<const StateData> Multibody::state() const {
+  settled();
+  std::lock_guard<std::mutex> lock(mutex_);
+  return state_;
+}
+
+void Multibody::check_q(const double* q, size_t size) const {
+  if (static_cast<int>(size) != nq())
+    throw ModelError("q of '" + name_ + "' takes " + std::to_string(nq()) + " numbers (" + std::to_string(bodies()) + " hinges), not " + std::to_string(size));
+  for (int k = 0; k < bodies(); ++k) {
+    const Hinge& h = bodies_[k].hinge;
+    const double* at = q + q_offset_[k];
+    for (int i = 0; i < h.nq(); ++i)
+      if (!std::isfinite(at[i])) throw ModelError("q of hinge '" + h.name + "': entry " + std::to_string(i) + " is " + number(at[i]));
+    for (const Subhinge& s : h.subhinges) {
+      if (s.nq() >= 4) {
+        const double length = std::sqrt(at[0] * at[0] + at[1] * at[1] + at[2] * at[2] + at[3] * at[3]);
+        if (length < 1e-8)
+          throw ModelError("q of hinge '" + h.name + "': its quaternion has length " + number(length) + " and no direction; (1, 0, 0, 0) is no rotation");
+      }
+      at += s.nq();
+    }
+  }
+}
+
+void Multibody::check_v(const double* v, size_t size, const char* what) const {
+  if (static_cast<int>(size) != nv())
+    throw ModelError(std::string(what) + " of '" + name_ + "' takes " + std::to_string(nv()) + " numbers, not " + std::to_string(size));
+  for (int k = 0; k < bodies(); ++k)
+    for (int i = v_offset_[k]; i < v_offset_[k + 1]; ++i)
+      if (!std::isfinite(v[i]))
+        throw ModelError(std::string(what) + " of hinge '" + bodies_[k].hinge.name + "': entry " + std::to_string(i - v_offset_[k]) + " is " + number(v[i]));
+}
+
+void Multibody::set_q(const std::vector<double>& q) {
+  check_q(q.data(), q.size());
+  auto next = std::make_shared<StateData>();
+  next->q = q;
+  std::lock_guard<std::mutex> lock(mutex_);
+  next->v = state_->v;
+  state_ = next;
+}
+void Multibody::set_v(const std::vector<double>& v) {
+  check_v(v.data(), v.size(), "v");
+  auto next = std::make_shared<StateData>();
+  next->v = v;
+  std::lock_guard<std::mutex> lock(mutex_);
+  next->q = state_->q;
+  state_ = next;
+}
+
+std::vector<double> Multibody::zero_q() const {
+  std::vector<double> q;
+  for (int k = 0; k < bodies(); ++k)
+    for (const Subhinge& s : body(k).hinge.subhinges) {
+      const size_t at = q.size();
+      q.resize(at + s.nq(), 0.0);
+      if (s.nq() > 1) q[at] = 1;
+    }
+  return q;
+}
+
+void Multibody::integrate(const double* q, const double* dv, double* out) const {
+  for (int k = 0; k < bodies(); ++k) {
+    const double *x = q + q_offset_[k], *d = dv + v_offset_[k];
+    double* y = out + q_offset_[k];
+    for (const Subhinge& s : body(k).hinge.subhinges) {
+      if (s.nq() == 1) {
+        y[0] = x[0] + d[0];
+      } else {
+        const Quaternion<double> q0{x[0], x[1], x[2], x[3]};
+        const Vector3<double> w{d[0], d[1], d[2]};
+        Quaternion<double> q1 = q0 * exp_quaternion(w);
+        // The product keeps |q0| up to rounding; over many steps rounding would walk, so the length is set to what it was.
+        const double want = std::sqrt(q0.w * q0.w + q0.x * q0.x + q0.y * q0.y + q0.z * q0.z);
+        const double have = std::sqrt(q1.w * q1.w + q1.x * q1.x + q1.y * q1.y + q1.z * q1.z);
+        const double scale = want / have;
+        if (s.nq() == 7) {
+          const Vector3<double> moved = quaternion_rotation(q0) * screw_translation(w, {d[3], d[4], d[5]});
+          for (int i = 0; i < 3; ++i) y[4 + i] = x[4 + i] + moved[i];
+        }
+        y[0] = scale * q1.w, y[1] = scale * q1.x, y[2] = scale * q1.y, y[3] = scale * q1.z;
+      }
+      x += s.nq(), y += s.nq(), d += s.nv();
+    }
+  }
+}
+
+void Multibody::difference(const double* q0, const double* q1, double* out) const {
+  for (int k = 0; k < bodies(); ++k) {
+    const double *a = q0 + q_offset_[k], *b = q1 + q_offset_[k];
+    double* d = out + v_offset_[k];
+    for (const Subhinge& s : body(k).hinge.subhinges) {
+      if (s.nq() == 1) {
+        d[0] = b[0] - a[0];
+      } else {
+        const Quaternion<double> from{a[0], -a[1], -a[2], -a[3]}, to{b[0], b[1], b[2], b[3]};
+        const Vector3<double> w = log_quaternion(from * to);
+        Vector6<double> twist{w, {0, 0, 0}};
+        if (s.nq() == 7) {
+          const Matrix3<double> R = quaternion_rotation(Quaternion<double>{a[0], a[1], a[2], a[3]});
+          twist = log_pose(w, transpose_times(R, Vector3<double>{b[4] - a[4], b[5] - a[5], b[6] - a[6]}));
+        }
+        for (int i = 0; i < s.nv(); ++i) d[i] = twist[i];
+      }
+      a += s.nq(), b += s.nq(), d += s.nv();
+    }
+  }
+}
+
+// ------------------------------------------------------------------ flat arrays
+
+namespace {
+
+// Unit axes and orthogonal rotations are so to the rounding of S, not of the doubles they were given in.
+template <class S>
+Vector3<S> renormalised(const Vector3<double>& a) {
+  const Vector3<S> x = cast<S>(a);
+  if constexpr (std::is_same_v<S, double>) return x;
+  return (S(1) / norm(x)) * x;
+}
+template <class S>
+Pose<S> renormalised(const Pose<double>& X) {
+  if constexpr (std::is_same_v<S, double>) return X;
+  const Pose<S> wide = cast<S>(X);
+  const Quaternion<S> q = rotation_quaternion(wide.R);
+  return {quaternion_rotation(q), wide.p};
+}
+
+template <class S>
+std::shared_ptr<const CompiledModel<S>> compile(const Multibody& model) {
+  auto c = std::make_shared<CompiledModel<S>>();
+  c->parameters = model.parameters();
+  c->bodies = model.bodies();
+  c->nq = model.nq();
+  c->nv = model.nv();
+  c->gravity = cast<S>(model.gravity());
+  c->first_subhinge.push_back(0);
+  for (int k = 0; k < model.bodies(); ++k) {
+    const Body& b = model.body(k);
+    c->parent.push_back(b.parent);
+    c->q_offset.push_back(model.q_offset(k));
+    c->v_offset.push_back(model.v_offset(k));
+    c->nv_of.push_back(b.hinge.nv());
+    c->placement.push_back(renormalised<S>(b.hinge.placement));
+    c->inertia.push_back(rigid_inertia(S(b.mass), cast<S>(b.com), cast<S>(b.inertia)));
+    for (size_t i = 0; i < b.hinge.subhinges.size(); ++i) {
+      const Subhinge& h = b.hinge.subhinges[i];
+      const Vector3<S> axis = renormalised<S>(h.axis), point = cast<S>(h.point);
+      const S pitch = S(h.pitch);
+      Vector6<S> twist = Vector6<S>::zero();
+      if (h.kind == SubhingeKind::pin || h.kind == SubhingeKind::screw) twist = {axis, cross(point, axis) + pitch * axis};
+      if (h.kind == SubhingeKind::slider) twist = {Vector3<S>::zero(), axis};
+      c->subhinges.push_back({h.kind, twist, axis, point, pitch});
+      // Which coordinate axis the rows are, exactly and at every q: only in the last subhinge.
+      const bool last = i + 1 == b.hinge.subhinges.size();
+      for (int j = 0; j < h.nv(); ++j) {
+        int index = -1;
+        const bool at_origin = point[0] == S(0) && point[1] == S(0) && point[2] == S(0);
+        if (last && h.kind == SubhingeKind::free) index = j;
+        if (last && h.kind == SubhingeKind::ball && at_origin) index = j;
+        if (last && h.nv() == 1)
+          for (int a = 0; a < 6; ++a) {
+            bool is = twist[a] == S(1) || twist[a] == S(-1);
+            for (int o = 0; o < 6 && is; ++o) is = o == a || twist[o] == S(0);
+            if (is) index = a;
+          }
+        c->aligned.push_back(index);
+      }
+    }
+    c->first_subhinge.push_back(static_cast<int>(c->subhinges.size()));
+    for (double j : b.hinge.rotor_inertia) {
+      c->rotor_inertia.push_back(S(j));
+      c->has_rotor_inertia |= j != 0;
+    }
+  }
+  return c;
+}
+
+}  // namespace
+
+template <class S>
+std::shared_ptr<const CompiledModel<S>> Multibody::compiled() const {
+  settled();
+  std::lock_guard<std::mutex> lock(mutex_);
+  auto& kept = std::get<std::shared_ptr<const CompiledModel<S>>>(compiled_);
+  if (!kept || kept->parameters != parameters_) kept = compile<S>(*this);
+  return kept;
+}
+template std::shared_ptr<const CompiledModel<double>> Multibody::compiled<double>() const;
+template std::shared_ptr<const CompiledModel<Extended>> Multibody::compiled<Extended>() const;
+template std::shared_ptr<const CompiledModel<Quad>> Multibody::compiled<Quad>() const;
+
+std::shared_ptr<SkoSource> Multibody::operators() const { return operators_.lock(); }
+void Multibody::keep_operators(const std::shared_ptr<SkoSource>& source) { operators_ = source; }
+
+}  // namespace pycraft

@@ -1,0 +1,127 @@
+// The DARTS side: bodies on hinges in a tree, nodes on bodies, a state, gravity. Structure is edited here; numbers are checked here.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "algebra/source.h"
+#include "model/hinge.h"
+#include "spatial/rigid_inertia.h"
+
+namespace pycraft {
+
+struct Body {
+  std::string name;
+  int parent = -1;                          // -1: the base
+  double mass = 0;                          // kg
+  Vector3<double> com{0, 0, 0};             // in the body frame
+  Symmetric3<double> inertia{0, 0, 0, 0, 0, 0};  // about the centre of mass, in the body's axes
+  Hinge hinge;
+};
+
+// A frame on a body (or on the base): a welded link, a sensor, a tool.
+struct Node {
+  std::string name;
+  int body = -1;
+  Pose<double> pose;  // X_BN
+};
+
+template <class S>
+struct CompiledModel;
+
+class Multibody : public std::enable_shared_from_this<Multibody> {
+ public:
+  // keep_welds: a body on a weld stays a body with no coordinates; else it is lumped into the body that moves it and becomes a node.
+  explicit Multibody(std::string name, bool keep_welds = false, bool strict = false);
+
+  // ---- structure
+  // `body.parent` is ignored; `parent` names a body, a node, or is empty for the base. Numbers are checked first: ModelError names body
+  // and number and leaves the model as it was.
+  void add_body(Body body, const std::string& parent);
+  void remove_body(const std::string& name);  // with everything outboard of it
+  void add_node(const std::string& name, const std::string& body, const Pose<double>& pose);
+
+  const std::string& name() const { return name_; }
+  bool keeps_welds() const { return keep_welds_; }
+  bool strict() const { return strict_; }
+  int bodies() const { return static_cast<int>(bodies_.size()); }
+  const Body& body(int k) const { return settled().bodies_[k]; }
+  const std::vector<Node>& nodes() const { return settled().nodes_; }
+  int body_index(const std::string& name) const;   // ModelError with near names
+  int hinge_index(const std::string& name) const;
+  int node_index(const std::string& name) const;   // bodies count as nodes at their own frames
+  // Nodes first, then the bodies' own frames.
+  Node node(int index) const;
+  int nq() const { return settled().q_offset_.back(); }
+  int nv() const { return settled().v_offset_.back(); }
+  int q_offset(int body) const { return settled().q_offset_[body]; }
+  int v_offset(int body) const { return settled().v_offset_[body]; }
+  SkoStructure structure() const;
+
+  // ---- parameters: each change raises parameters()
+  std::uint64_t parameters() const { return parameters_; }
+  void set_mass_properties(int body, double mass, const Vector3<double>& com, const Symmetric3<double>& inertia);
+  void set_placement(int body, const Pose<double>& placement);
+  void set_rotor_inertia(int body, const std::vector<double>& values);
+  Vector3<double> gravity() const { return gravity_; }
+  void set_gravity(const Vector3<double>& g);
+  bool has_rotor_inertia() const;
+
+  // ---- state
+  std::shared_ptr<const StateData> state() const;
+  void set_q(const std::vector<double>& q);
+  void set_v(const std::vector<double>& v);
+  std::vector<double> zero_q() const;       // unit quaternions, zeros
+  // Throws ModelError that names the hinge: wrong size, NaN, a quaternion of no length.
+  void check_q(const double* q, size_t size) const;
+  void check_v(const double* v, size_t size, const char* what) const;
+  void integrate(const double* q, const double* dv, double* out) const;          // q moved by the velocity dv for unit time
+  void difference(const double* q0, const double* q1, double* out) const;        // dv with integrate(q0, dv) = q1
+
+  // What is legal but worth a word: triangle inequalities, massless bodies on hinges. Said once.
+  std::vector<std::string> take_warnings();
+
+  // ---- the numbers in flat arrays of one scalar, for kernels; rebuilt when parameters changed
+  template <class S>
+  std::shared_ptr<const CompiledModel<S>> compiled() const;
+
+  // The operators made for this structure; told when it changes.
+  std::shared_ptr<SkoSource> operators() const;
+  void keep_operators(const std::shared_ptr<SkoSource>& source);
+
+ private:
+  // Throws for what cannot be, warns of what should not; names the body.
+  void check_mass_properties(const std::string& body, double mass, const Vector3<double>& com, const Symmetric3<double>& inertia);
+  void check_new_name(const std::string& name, const char* what) const;
+  Node find_frame(const std::string& name) const;   // a node, or a body's own frame
+  void lump(const Body& body, const Node& onto);
+  void structure_changed(const std::string& reason);
+  // Bodies are put in depth-first order, coordinates numbered and q, v carried over by hinge name: at the first look after an edit.
+  const Multibody& settled() const;
+  void settle();
+
+  std::string name_;
+  bool keep_welds_, strict_;
+  std::vector<Body> bodies_;
+  std::vector<Node> nodes_;
+  std::unordered_map<std::string, int> body_numbers_, hinge_numbers_, node_numbers_;
+  std::vector<int> q_offset_, v_offset_;    // one longer than bodies
+  Vector3<double> gravity_{0, 0, 0};
+  std::shared_ptr<const StateData> state_;
+  mutable std::mutex mutex_;
+  std::uint64_t parameters_ = 1;
+  std::vector<std::string> warnings_;
+  std::unordered_map<std::string, std::pair<std::vector<double>, std::vector<double>>> carried_;  // q, v by hinge, across an edit
+  std::atomic<bool> settled_{true};
+  std::weak_ptr<SkoSource> operators_;
+  template <class S>
+  using CompiledPointer = std::shared_ptr<const CompiledModel<S>>;
+  mutable PerScalar<CompiledPointer> compiled_;
+};
+
+}  // namespace pycraft

@@ -1,0 +1,73 @@
+// The operators of a multibody model: the SKO view that the algebra consumes, and the symbols that mechanics adds to the alphabet.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "algebra/expression.h"
+#include "algebra/source.h"
+#include "algebra/theorems.h"
+#include "algebra/tree_values.h"
+#include "model/multibody.h"
+#include "operators/rigid_blocks.h"
+
+namespace pycraft {
+
+// Symbols of mechanics. Arguments: B, Jacobian, Lambda take node numbers, Delta a coordinate.
+enum MechanicsSymbolId : int {
+  B = first_extra,
+  Jacobian,
+  Lambda,
+  Delta,             // crf(h_i) at the body of coordinate i
+  Delta_theta_dot,   // crf(H*θ̇)
+  V_tilde,           // crm(V)
+  V_bar,             // crf(V)
+  momentum_cross,    // -[[ñ, f̃], [f̃, 0]] of (n; f) = M V
+  X_world,           // φ(0,k): forces in body k's frame to the world's
+  H_dot,             // Ḣ along θ̇
+  theta_dot,         // the model's v
+  velocity,          // V = φ*H*θ̇
+  coriolis_acceleration,  // a = ṼH*θ̇ + Ḣ*θ̇
+  gyroscopic_force,  // b = V̄MV
+  gravity_field,     // the gravity acceleration (0; g) seen in every body
+  gravity_base       // -φ*(0,r)(0; g) at the roots: the base acceleration that stands for gravity
+};
+const std::vector<SymbolDefinition>& mechanics_symbols();
+
+class MultibodyOperators final : public SkoSource {
+ public:
+  explicit MultibodyOperators(std::shared_ptr<Multibody> model);
+
+  const std::shared_ptr<Multibody>& model() const { return model_; }
+  Traits traits() const override;
+  bool rigid() const override { return true; }
+  int nq() const override { return model_->nq(); }
+  int nv() const override { return model_->nv(); }
+  void check_state(const double* q, size_t nq, const double* v, size_t nv) const override {
+    model_->check_q(q, nq);
+    model_->check_v(v, nv, "v");
+  }
+  std::shared_ptr<const StateData> state() const override { return model_->state(); }
+  std::uint64_t parameters() const override { return model_->parameters(); }
+  Space space(SpaceKind kind, const std::vector<int>& arguments) const override;
+  std::unique_ptr<SkoValues<double>> make_values(double) const override;
+  std::unique_ptr<SkoValues<Extended>> make_values(Extended) const override;
+  std::unique_ptr<SkoValues<Quad>> make_values(Quad) const override;
+
+ private:
+  std::shared_ptr<Multibody> model_;
+};
+
+// The model's operators, made at the first call and again after its structure changed.
+std::shared_ptr<MultibodyOperators> operators_of(const std::shared_ptr<Multibody>& model);
+
+// Node operators by name (ModelError for an unknown one).
+Expression node_operator(MechanicsSymbolId id, const std::shared_ptr<MultibodyOperators>& source, const std::vector<std::string>& names);
+Expression mechanics_operator(MechanicsSymbolId id, const std::shared_ptr<MultibodyOperators>& source);
+Expression delta_operator(const std::shared_ptr<MultibodyOperators>& source, int coordinate);
+
+// Theorems that need mechanics: velocities, dynamics, Coriolis matrices, gravity, other frames, hybrid dynamics.
+std::vector<Theorem> mechanics_theorems(const std::shared_ptr<MultibodyOperators>& source);
+
+}  // namespace pycraft

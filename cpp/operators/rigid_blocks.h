@@ -1,0 +1,353 @@
+// The rigid-body block policy: φ(p,k) is a rotation and a vector, M(k) ten numbers, P(k), R(k), Υ(k) twenty-one, H(k) one row of six
+// per coordinate. The same functions as DenseBlocks (algebra/dense_blocks.h), on flat arrays in body order; no 6x6 product anywhere.
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include "algebra/small_cholesky.h"
+#include "algebra/structure.h"
+#include "algebra/sweeps/singular_pivot.h"
+#include "algebra/symbol.h"
+#include "model/compiled_model.h"
+#include "spatial/articulated_inertia.h"
+
+namespace pycraft {
+
+// Column c of six rows of m columns.
+template <class S>
+inline Vector6<S> load(const S* x, int m, int c) {
+  return {{x[c], x[m + c], x[2 * m + c]}, {x[3 * m + c], x[4 * m + c], x[5 * m + c]}};
+}
+template <class S>
+inline void store(const Vector6<S>& v, S* y, int m, int c) {
+  for (int i = 0; i < 6; ++i) y[i * m + c] = v[i];
+}
+template <class S>
+inline void add_to(const Vector6<S>& v, S* y, int m, int c) {
+  for (int i = 0; i < 6; ++i) y[i * m + c] += v[i];
+}
+
+template <class S>
+class RigidBlocks {
+ public:
+  using Scalar = S;
+
+  explicit RigidBlocks(const SkoStructure& tree) : tree_(tree) {
+    const size_t n = tree.bodies(), N = tree.coordinates();
+    pose.resize(n);
+    inertia.resize(n);
+    for (auto* x : {&P, &Pplus, &R, &Y}) x->resize(n);
+    for (auto* x : {&H, &G, &W}) x->resize(N);
+    J.resize(N);
+    pivots_.resize(N);
+    aligned.assign(N, -1);
+    mass_.resize(n), rotational_.resize(n), reach_.resize(n);
+    size_t d = 0;
+    for (size_t k = 0; k < n; ++k) {
+      d_.push_back(d);
+      d += size_t(tree.dof[k]) * tree.dof[k];
+    }
+    D.resize(d), L.resize(d);
+  }
+
+  // ---- what a model fills in
+  std::vector<Pose<S>> pose;              // X_pk
+  std::vector<Vector6<S>> H;              // rows, one per coordinate
+  std::vector<RigidInertia<S>> inertia;
+  std::vector<S> J;                       // rotor inertia per coordinate
+  std::vector<int> aligned;               // coordinate axis that a row of H is exactly, or -1
+
+  // ---------------------------------------------------------------- applied to vectors
+  void shift_add(int k, const S* x, S* y, int m) const {
+    for (int c = 0; c < m; ++c) add_to(force_to_parent(pose[k], load(x, m, c)), y, m, c);
+  }
+  void shift_transposed_add(int k, const S* x, S* y, int m) const {
+    for (int c = 0; c < m; ++c) add_to(motion_to_child(pose[k], load(x, m, c)), y, m, c);
+  }
+  void articulated_shift_add(int k, const S* x, S* y, int m) const {  // y += E (x - G H x)
+    for (int c = 0; c < m; ++c) {
+      const Vector6<S> xc = load(x, m, c);
+      Vector6<S> w = xc;
+      for (int j = first(k); j < last(k); ++j) w = w - dot(H[j], xc) * G[j];
+      add_to(force_to_parent(pose[k], w), y, m, c);
+    }
+  }
+  void articulated_shift_transposed_add(int k, const S* x, S* y, int m) const {  // y += (I - H*G*) E* x
+    for (int c = 0; c < m; ++c) {
+      const Vector6<S> w = motion_to_child(pose[k], load(x, m, c));
+      Vector6<S> v = w;
+      for (int j = first(k); j < last(k); ++j) v = v - dot(G[j], w) * H[j];
+      add_to(v, y, m, c);
+    }
+  }
+  void hinge(int k, const S* x, S* y, int m) const {
+    for (int c = 0; c < m; ++c) {
+      const Vector6<S> xc = load(x, m, c);
+      for (int j = first(k); j < last(k); ++j) y[(j - first(k)) * m + c] = dot(H[j], xc);
+    }
+  }
+  void hinge_transposed_add(int k, const S* x, S* y, int m) const {
+    for (int c = 0; c < m; ++c)
+      for (int j = first(k); j < last(k); ++j) add_to(x[(j - first(k)) * m + c] * H[j], y, m, c);
+  }
+  void hinge_diagonal_add(int k, const S* x, S* y, int m) const {
+    for (int j = first(k); j < last(k); ++j)
+      for (int c = 0; c < m; ++c) y[(j - first(k)) * m + c] += J[j] * x[(j - first(k)) * m + c];
+  }
+  void inertia_in_place(int k, S* x, int m) const {
+    for (int c = 0; c < m; ++c) store(inertia[k] * load(x, m, c), x, m, c);
+  }
+  void innovation(int k, const S* x, S* z, S* e, int m) const {  // e = x - H z, z += G e
+    for (int c = 0; c < m; ++c) {
+      Vector6<S> zc = load(z, m, c), w = zc;
+      for (int j = first(k); j < last(k); ++j) {
+        const int i = j - first(k);
+        const S innovation = x[i * m + c] - dot(H[j], zc);
+        e[i * m + c] = innovation;
+        w = w + innovation * G[j];
+      }
+      store(w, z, m, c);
+    }
+  }
+  void gain_transposed_subtract(int k, const S* a, S* y, int m) const {
+    for (int c = 0; c < m; ++c) {
+      const Vector6<S> ac = load(a, m, c);
+      for (int j = first(k); j < last(k); ++j) y[(j - first(k)) * m + c] -= dot(G[j], ac);
+    }
+  }
+  void solve_D_in_place(int k, S* x, int m) const {
+    const int n = tree_.dof[k];
+    if (n == 1) {
+      for (int c = 0; c < m; ++c) x[c] /= D[d_[k]];
+      return;
+    }
+    forward_substitute(L.data() + d_[k], n, x, m);
+    back_substitute(L.data() + d_[k], n, x, m);
+  }
+  void apply(int id, bool transposed, int k, const S* x, S* y, int m) const {
+    const int n = tree_.dof[k];
+    switch (id) {
+      case SymbolId::H:
+      case SymbolId::G: {
+        const std::vector<Vector6<S>>& rows = id == SymbolId::H ? H : G;
+        const bool to_six = (id == SymbolId::H) == transposed;
+        if (to_six) {
+          std::fill_n(y, 6 * m, S(0));
+          for (int c = 0; c < m; ++c)
+            for (int j = first(k); j < last(k); ++j) add_to(x[(j - first(k)) * m + c] * rows[j], y, m, c);
+        } else {
+          for (int c = 0; c < m; ++c) {
+            const Vector6<S> xc = load(x, m, c);
+            for (int j = first(k); j < last(k); ++j) y[(j - first(k)) * m + c] = dot(rows[j], xc);
+          }
+        }
+        return;
+      }
+      case SymbolId::J:
+        std::fill_n(y, n * m, S(0));
+        hinge_diagonal_add(k, x, y, m);
+        return;
+      case SymbolId::D:
+        for (int i = 0; i < n; ++i)
+          for (int c = 0; c < m; ++c) {
+            S sum = S(0);
+            for (int j = 0; j < n; ++j) sum += D[d_[k] + i * n + j] * x[j * m + c];
+            y[i * m + c] = sum;
+          }
+        return;
+      case SymbolId::M:
+        for (int c = 0; c < m; ++c) store(inertia[k] * load(x, m, c), y, m, c);
+        return;
+      default: {
+        const ArticulatedInertia<S>& A = six(id, k);
+        for (int c = 0; c < m; ++c) store(A * load(x, m, c), y, m, c);
+      }
+    }
+  }
+  void block(int id, int k, S* out) const {
+    const int n = tree_.dof[k];
+    switch (id) {
+      case SymbolId::E: {
+        const Matrix3<S> lR = skew(pose[k].p) * pose[k].R;
+        for (int i = 0; i < 3; ++i)
+          for (int j = 0; j < 3; ++j) {
+            out[i * 6 + j] = out[(i + 3) * 6 + j + 3] = pose[k].R(i, j);
+            out[i * 6 + j + 3] = lR(i, j);
+            out[(i + 3) * 6 + j] = S(0);
+          }
+        return;
+      }
+      case SymbolId::H:
+        for (int j = 0; j < n; ++j)
+          for (int i = 0; i < 6; ++i) out[j * 6 + i] = H[first(k) + j][i];
+        return;
+      case SymbolId::G:
+        for (int j = 0; j < n; ++j)
+          for (int i = 0; i < 6; ++i) out[i * n + j] = G[first(k) + j][i];
+        return;
+      case SymbolId::J:
+        std::fill_n(out, n * n, S(0));
+        for (int j = 0; j < n; ++j) out[j * n + j] = J[first(k) + j];
+        return;
+      case SymbolId::D: std::copy_n(D.data() + d_[k], n * n, out); return;
+      default: {
+        const ArticulatedInertia<S> A = id == SymbolId::M ? articulated_inertia(inertia[k]) : six(id, k);
+        for (int i = 0; i < 6; ++i)
+          for (int j = 0; j < 6; ++j) out[i * 6 + j] = A(i, j);
+      }
+    }
+  }
+  S log_determinant_of_D() const {
+    using std::log;
+    S sum = S(0);
+    for (const S& p : pivots_) sum += log(p);
+    return sum;
+  }
+
+  // ---------------------------------------------------------------- articulated inertia
+  void start_articulated(int k) {
+    P[k] = articulated_inertia(inertia[k]);
+    mass_[k] = inertia[k].mass;
+    rotational_[k] = inertia[k].rotational.s[0] + inertia[k].rotational.s[3] + inertia[k].rotational.s[5];
+    reach_[k] = S(0);
+  }
+  // D, G, P⁺ of body k; true where a pivot is so small that only the error sweep can tell whether it is noise.
+  bool eliminate_hinge(int k) {
+    const int n = tree_.dof[k], f = first(k);
+    Pplus[k] = P[k];
+    if (n == 0) return false;
+    S *d = D.data() + d_[k], *l = L.data() + d_[k], *pivots = pivots_.data() + f;
+    for (int j = 0; j < n; ++j) G[f + j] = P[k] * H[f + j];  // PH*
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j <= i; ++j) d[i * n + j] = d[j * n + i] = dot(H[f + i], G[f + j]) + (i == j ? J[f + i] : S(0));
+    bool doubtful = false;
+    if (n == 1) {
+      pivots[0] = d[0];
+      if (!(d[0] > S(0))) throw_singular_hinge(tree_, k, 0, to_double(d[0]), 0.0);
+      W[f] = (S(1) / d[0]) * G[f];
+      // P - (PH*)(PH*)*/D, symmetric by construction
+      downdate(Pplus[k], G[f], W[f]);
+      G[f] = W[f];
+    } else {
+      std::copy_n(d, n * n, l);
+      const int failed = cholesky_in_place(l, n, pivots);
+      if (failed < n) throw_singular_hinge(tree_, k, failed, to_double(pivots[failed]), 0.0);
+      for (int j = 0; j < n; ++j) W[f + j] = G[f + j];
+      for (int i = 0; i < n; ++i) {  // W = PH*L⁻*
+        for (int a = 0; a < i; ++a) W[f + i] = W[f + i] - l[i * n + a] * W[f + a];
+        W[f + i] = (S(1) / l[i * n + i]) * W[f + i];
+        subtract_square(Pplus[k], W[f + i]);
+      }
+      for (int i = n - 1; i >= 0; --i) {  // G = W L⁻¹
+        for (int a = i + 1; a < n; ++a) W[f + i] = W[f + i] - l[a * n + i] * W[f + a];
+        W[f + i] = (S(1) / l[i * n + i]) * W[f + i];
+      }
+      for (int j = 0; j < n; ++j) G[f + j] = W[f + j];
+    }
+    for (int j = 0; j < n; ++j) {
+      if (aligned[f + j] >= 0 && no_hinge_diagonal(k)) annihilate(Pplus[k], aligned[f + j]);
+      const Vector6<S>& h = H[f + j];
+      const S inertia_bound = S(4) * (rotational_[k] + mass_[k] * reach_[k] * reach_[k]);
+      const S bound = dot(h.angular, h.angular) * inertia_bound + S(2) * dot(h.linear, h.linear) * mass_[k] + J[f + j];
+      doubtful |= !(pivots[j] > S(tree_.bodies()) * rounding_bound<S>() * bound);
+    }
+    return doubtful;
+  }
+  void articulated_to_parent(int k) {
+    const int p = tree_.parent[k];
+    pycraft::add(P[p], to_parent(pose[k], Pplus[k]));
+    using std::abs;
+    const Vector3<S>& l = pose[k].p;
+    mass_[p] += mass_[k];
+    rotational_[p] += rotational_[k];
+    reach_[p] = std::max(reach_[p], S(reach_[k] + abs(l[0]) + abs(l[1]) + abs(l[2])));
+  }
+  // ---------------------------------------------------------------- error bound
+  void start_error(int k) {
+    X_.resize(tree_.bodies());
+    X_[k] = articulated_inertia(inertia[k]);
+  }
+  void check_pivots(int k) {
+    for (int j = first(k); j < last(k); ++j) {
+      const S bound = rounding_bound<S>() * (dot(H[j], X_[k] * H[j]) + J[j]);
+      if (!(pivots_[j] > bound)) throw_singular_hinge(tree_, k, j - first(k), to_double(pivots_[j]), to_double(bound));
+    }
+  }
+  void error_to_parent(int k) {
+    ArticulatedInertia<S> plus = projected(X_[k], H, G, k);  // τ̄Xτ̄*
+    pycraft::add(plus, P[k]);
+    pycraft::add(X_[tree_.parent[k]], to_parent(pose[k], plus));
+  }
+
+  // ---------------------------------------------------------------- composite inertia, compliance
+  void start_composite(int k) { R[k] = articulated_inertia(inertia[k]); }
+  void composite_to_parent(int k) { pycraft::add(R[tree_.parent[k]], to_parent(pose[k], R[k])); }
+  void compliance_from_parent(int k, int p) {
+    // τ̄* (E*Υ(p)E) τ̄ + H*D⁻¹H
+    Y[k] = p < 0 ? ArticulatedInertia<S>::zero() : projected(compliance_to_child(pose[k], Y[p]), G, H, k);
+    const int n = tree_.dof[k], f = first(k);
+    if (n == 1) {
+      Vector6<S> h = (S(1) / D[d_[k]]) * H[f];
+      add_symmetric_product(Y[k], S(0.5) * h, H[f]);
+      return;
+    }
+    for (int i = 0; i < n; ++i) {  // L⁻¹H
+      W[f + i] = H[f + i];
+      for (int a = 0; a < i; ++a) W[f + i] = W[f + i] - L[d_[k] + i * n + a] * W[f + a];
+      W[f + i] = (S(1) / L[d_[k] + i * n + i]) * W[f + i];
+      add_symmetric_product(Y[k], S(0.5) * W[f + i], W[f + i]);
+    }
+  }
+
+  std::vector<ArticulatedInertia<S>> P, Pplus, R, Y;
+  std::vector<Vector6<S>> G;   // columns of G, one per coordinate
+  std::vector<S> D, L;         // n_k x n_k per body: D(k) and its Cholesky factor
+  size_t d_offset(int k) const { return d_[k]; }
+
+ private:
+  int first(int k) const { return tree_.dof_offset[k]; }
+  int last(int k) const { return tree_.dof_offset[k + 1]; }
+  const ArticulatedInertia<S>& six(int id, int k) const {
+    switch (id) {
+      case SymbolId::P: return P[k];
+      case SymbolId::P_plus: return Pplus[k];
+      case SymbolId::R: return R[k];
+      default: return Y[k];
+    }
+  }
+  bool no_hinge_diagonal(int k) const {
+    for (int j = first(k); j < last(k); ++j)
+      if (!(J[j] == S(0))) return false;
+    return true;
+  }
+  // A - u w*, known to be symmetric (w a multiple of u).
+  static void downdate(ArticulatedInertia<S>& A, const Vector6<S>& u, const Vector6<S>& w) {
+    for (int i = 0; i < 3; ++i)
+      for (int j = i; j < 3; ++j) {
+        A.A(i, j) -= u.angular[i] * w.angular[j];
+        A.C(i, j) -= u.linear[i] * w.linear[j];
+      }
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) A.B(i, j) -= u.angular[i] * w.linear[j];
+  }
+  // (I - Σ b a*) A (I - Σ a b*) for the rows a, b of hinge k.
+  ArticulatedInertia<S> projected(const ArticulatedInertia<S>& A, const std::vector<Vector6<S>>& a, const std::vector<Vector6<S>>& b, int k) const {
+    ArticulatedInertia<S> Q = A;
+    // A - Σ_j (b_j (A a_j)* + (A a_j) b_j*) + Σ_ij b_i (a_i* A a_j) b_j*
+    for (int j = first(k); j < last(k); ++j) {
+      Vector6<S> u = S(-1) * (A * a[j]);
+      for (int i = first(k); i < last(k); ++i) u = u + (S(0.5) * dot(a[i], A * a[j])) * b[i];
+      add_symmetric_product(Q, u, b[j]);
+    }
+    return Q;
+  }
+
+  const SkoStructure& tree_;
+  std::vector<size_t> d_;
+  std::vector<S> pivots_, mass_, rotational_, reach_;
+  std::vector<Vector6<S>> W;
+  std::vector<ArticulatedInertia<S>> X_;
+};
+
+}  // namespace pycraft

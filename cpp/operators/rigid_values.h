@@ -1,0 +1,51 @@
+// The numbers of a multibody model's operators at one state: E, H, M, J from the hinges' kinematics, velocities when asked for.
+#pragma once
+
+#include <memory>
+
+#include "algebra/tree_values.h"
+#include "operators/multibody_operators.h"
+#include "recursions/kinematics.h"
+#include "recursions/velocities.h"
+
+namespace pycraft {
+
+template <class S>
+class RigidValues final : public TreeValues<RigidBlocks<S>> {
+ public:
+  RigidValues(const SkoStructure& structure, const Multibody& model)
+      : TreeValues<RigidBlocks<S>>(structure), model_(model), q_(model.nq()), v_(model.nv()) {}
+
+  void block(const Symbol& symbol, int k, S* out) const override;
+  void vector(const Symbol& symbol, S* out) const override;
+
+  const CompiledModel<S>& compiled() const { return *compiled_; }
+  const std::vector<S>& q() const { return q_; }
+  const std::vector<S>& v() const { return v_; }
+  const Velocities<S>& velocities() const { return velocities_; }
+
+ protected:
+  void set_state(const double* q, const double* v) override {
+    compiled_ = model_.compiled<S>();
+    for (size_t i = 0; i < q_.size(); ++i) q_[i] = S(q[i]);
+    for (size_t i = 0; i < v_.size(); ++i) v_[i] = S(v[i]);
+  }
+  void fill() override { kinematics(*compiled_, q_.data(), this->blocks_); }
+  void compute_velocities() override {
+    velocities_base_to_tip(*compiled_, this->blocks_.pose.data(), this->blocks_.H.data(), v_.data(), velocities_);
+    world_.resize(this->tree_.bodies());
+    for (int k = 0; k < this->tree_.bodies(); ++k) {
+      const int p = this->tree_.parent[k];
+      world_[k] = p < 0 ? this->blocks_.pose[k] : world_[p] * this->blocks_.pose[k];
+    }
+  }
+
+ private:
+  const Multibody& model_;
+  std::shared_ptr<const CompiledModel<S>> compiled_;
+  std::vector<S> q_, v_;
+  Velocities<S> velocities_;
+  std::vector<Pose<S>> world_;  // X_0k
+};
+
+}  // namespace pycraft

@@ -1,0 +1,48 @@
+// Velocities, base to tip, and the velocity-dependent terms of the equations of motion:
+//
+//   V(k) = E(p,k)* V(p) + H(k)* θ̇(k)
+//   a(k) = Ṽ(k) H(k)* θ̇(k) + Ḣ(k)* θ̇(k)        Coriolis acceleration (Ḣ: hinges of several subhinges only)
+//   b(k) = V̄(k) M(k) V(k)                        gyroscopic force
+//
+// Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, the equations-of-motion chapter. Cost O(N).
+#pragma once
+
+#include <vector>
+
+#include "model/compiled_model.h"
+#include "model/hinge_kinematics.h"
+
+namespace pycraft {
+
+template <class S>
+struct Velocities {
+  std::vector<Vector6<S>> V, a, b, relative;  // per body; relative: H*θ̇
+  std::vector<Vector6<S>> H_dot;              // per coordinate
+  void resize(int bodies, int coordinates) {
+    for (auto* x : {&V, &a, &b, &relative}) x->resize(bodies);
+    H_dot.resize(coordinates);
+  }
+};
+
+template <class S>
+void velocities_base_to_tip(const CompiledModel<S>& model, const Pose<S>* pose, const Vector6<S>* H, const S* v, Velocities<S>& out) {
+  out.resize(model.bodies, model.nv);
+  for (int k = 0; k < model.bodies; ++k) {
+    const int p = model.parent[k], f = model.v_offset[k], n = model.nv_of[k];
+    Vector6<S> relative = Vector6<S>::zero(), rate = Vector6<S>::zero();
+    for (int j = f; j < f + n; ++j) relative = relative + v[j] * H[j];
+    if (model.first_subhinge[k + 1] - model.first_subhinge[k] > 1) {
+      hinge_map_rate(model, k, H + f, v + f, out.H_dot.data() + f);
+      for (int j = f; j < f + n; ++j) rate = rate + v[j] * out.H_dot[j];
+    } else {
+      for (int j = f; j < f + n; ++j) out.H_dot[j] = Vector6<S>::zero();
+    }
+    const Vector6<S> V = p < 0 ? relative : motion_to_child(pose[k], out.V[p]) + relative;
+    out.V[k] = V;
+    out.relative[k] = relative;
+    out.a[k] = cross_motion(V, relative) + rate;
+    out.b[k] = cross_force(V, model.inertia[k] * V);
+  }
+}
+
+}  // namespace pycraft

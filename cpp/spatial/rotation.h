@@ -1,0 +1,124 @@
+// Rotations: from an axis and an angle, from a unit quaternion, and the exponential and logarithm on SO(3).
+#pragma once
+
+#include <cmath>
+
+#include "spatial/scalar.h"
+#include "spatial/vector3.h"
+
+namespace pycraft {
+
+// sin(x)/x.
+template <class S>
+inline S sinc(const S& x) {
+  using std::abs;
+  using std::sin;
+  if (abs(x) > S(1e-2)) return sin(x) / x;
+  const S y = x * x;  // the terms left out are below 1e-2^14/15! = 1e-40
+  return S(1) - y / S(6) * (S(1) - y / S(20) * (S(1) - y / S(42) * (S(1) - y / S(72) * (S(1) - y / S(110) * (S(1) - y / S(156))))));
+}
+// (1 - cos x)/x², without cancellation.
+template <class S>
+inline S cosc(const S& x) {
+  const S half = sinc(x / S(2));
+  return half * half / S(2);
+}
+// (x - sin x)/x³, without cancellation: the series below 1 (19 terms reach 1e-40 there).
+template <class S>
+inline S sincc(const S& x) {
+  using std::abs;
+  using std::sin;
+  if (abs(x) > S(1)) return (x - sin(x)) / (x * x * x);
+  const S y = x * x;
+  S term = S(1) / S(6), sum = term;
+  for (int k = 2; k < 20; ++k) {
+    term *= -y / (S(2 * k) * S(2 * k + 1));
+    sum += term;
+  }
+  return sum;
+}
+
+// exp(w~) = 1 + sinc|w| w~ + cosc|w| w~².
+template <class S>
+inline Matrix3<S> exp_rotation(const Vector3<S>& w) {
+  const S angle = norm(w), a = sinc(angle), b = cosc(angle);
+  const S xx = w[0] * w[0], yy = w[1] * w[1], zz = w[2] * w[2], xy = w[0] * w[1], xz = w[0] * w[2], yz = w[1] * w[2];
+  return {S(1) - b * (yy + zz), b * xy - a * w[2],      b * xz + a * w[1],
+          b * xy + a * w[2],    S(1) - b * (xx + zz),   b * yz - a * w[0],
+          b * xz - a * w[1],    b * yz + a * w[0],      S(1) - b * (xx + yy)};
+}
+
+// The rotation about a unit axis: cos, sin of the angle taken once, at full accuracy for angles of any size.
+template <class S>
+inline Matrix3<S> axis_rotation(const Vector3<S>& axis, const S& angle) {
+  using std::cos;
+  using std::sin;
+  const S c = cos(angle), s = sin(angle), half = sin(angle / S(2)), v = S(2) * half * half;
+  const S xy = v * axis[0] * axis[1], xz = v * axis[0] * axis[2], yz = v * axis[1] * axis[2];
+  return {c + v * axis[0] * axis[0], xy - s * axis[2],          xz + s * axis[1],
+          xy + s * axis[2],          c + v * axis[1] * axis[1], yz - s * axis[0],
+          xz - s * axis[1],          yz + s * axis[0],          c + v * axis[2] * axis[2]};
+}
+
+template <class S>
+struct Quaternion {
+  S w, x, y, z;
+};
+
+// R(q/|q|): the quaternion is used normalised and never rewritten.
+template <class S>
+inline Matrix3<S> quaternion_rotation(const Quaternion<S>& q) {
+  const S s = S(2) / (q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z);
+  const S xx = s * q.x * q.x, yy = s * q.y * q.y, zz = s * q.z * q.z, xy = s * q.x * q.y, xz = s * q.x * q.z, yz = s * q.y * q.z;
+  const S wx = s * q.w * q.x, wy = s * q.w * q.y, wz = s * q.w * q.z;
+  return {S(1) - (yy + zz), xy - wz, xz + wy, xy + wz, S(1) - (xx + zz), yz - wx, xz - wy, yz + wx, S(1) - (xx + yy)};
+}
+
+template <class S>
+inline Quaternion<S> operator*(const Quaternion<S>& a, const Quaternion<S>& b) {
+  return {a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z, a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
+          a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x, a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w};
+}
+
+// The unit quaternion of exp(w~).
+template <class S>
+inline Quaternion<S> exp_quaternion(const Vector3<S>& w) {
+  using std::cos;
+  const S half = norm(w) / S(2), a = sinc(half) / S(2);
+  return {cos(half), a * w[0], a * w[1], a * w[2]};
+}
+
+// w with exp(w~) = R(q), |w| <= pi.
+template <class S>
+inline Vector3<S> log_quaternion(Quaternion<S> q) {
+  using std::atan2;
+  using std::sqrt;
+  if (q.w < S(0)) q = {-q.w, -q.x, -q.y, -q.z};
+  const S sine = sqrt(q.x * q.x + q.y * q.y + q.z * q.z);
+  const S length = sqrt(q.w * q.w + sine * sine);
+  // angle/sin(angle/2), of relative accuracy epsilon down to zero: atan2(s, w)/s -> 1/w.
+  const S scale = sine > length * epsilon<S>() ? S(2) * atan2(sine, q.w) / sine : S(2) / q.w;
+  return {scale * q.x, scale * q.y, scale * q.z};
+}
+
+// The quaternion of a rotation matrix, w >= 0 (Shepperd's choice of the largest component).
+template <class S>
+inline Quaternion<S> rotation_quaternion(const Matrix3<S>& R) {
+  using std::sqrt;
+  const S trace = R(0, 0) + R(1, 1) + R(2, 2);
+  Quaternion<S> q;
+  if (trace >= R(0, 0) && trace >= R(1, 1) && trace >= R(2, 2)) {
+    q = {S(1) + trace, R(2, 1) - R(1, 2), R(0, 2) - R(2, 0), R(1, 0) - R(0, 1)};
+  } else if (R(0, 0) >= R(1, 1) && R(0, 0) >= R(2, 2)) {
+    q = {R(2, 1) - R(1, 2), S(1) + S(2) * R(0, 0) - trace, R(0, 1) + R(1, 0), R(0, 2) + R(2, 0)};
+  } else if (R(1, 1) >= R(2, 2)) {
+    q = {R(0, 2) - R(2, 0), R(0, 1) + R(1, 0), S(1) + S(2) * R(1, 1) - trace, R(1, 2) + R(2, 1)};
+  } else {
+    q = {R(1, 0) - R(0, 1), R(0, 2) + R(2, 0), R(1, 2) + R(2, 1), S(1) + S(2) * R(2, 2) - trace};
+  }
+  S scale = S(1) / sqrt(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z);
+  if (q.w < S(0)) scale = -scale;
+  return {scale * q.w, scale * q.x, scale * q.y, scale * q.z};
+}
+
+}  // namespace pycraft

@@ -1,0 +1,152 @@
+"""How large a residual may be: a bound from sizes, norms and epsilon, derived and not tuned to what was measured.
+
+A product F₁F₂…Fₘ is applied factor by factor. The rounding of step i is at most a few eps times ‖Fᵢ‖‖Fᵢ₊₁…Fₘ‖ and reaches the result
+through F₁…Fᵢ₋₁; so the product is off by at most
+
+    c · eps · m · maxᵢ ‖F₁…Fᵢ₋₁‖ ‖Fᵢ‖ ‖Fᵢ₊₁…Fₘ‖
+
+with c the number of roundings that an entry meets in one sweep: six products a body, along a path of the tree. A resolvent φ rounds at
+every body of the sweep: ‖F₁…φ‖‖E‖‖φ…Fₘ‖. An inverse X⁻¹ passes the error of X on: ‖F₁…X⁻¹‖ size(X) ‖X⁻¹…Fₘ‖. A sum adds. Values of the
+Riccati sweep (P, D, G, K, ψ, Υ, Ω) carry that sweep's rounding, amplified by at most the largest ratio of HRH* + J to D over the
+hinges: how little of the locked inertia the articulated one is left with. Residuals are judged relative to the larger side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+
+EPSILON = {"double": float(np.finfo(np.float64).eps), "extended": float(np.finfo(np.longdouble).eps)}
+if EPSILON["extended"] >= EPSILON["double"]:  # no wider long double here: double-double, 106 bits
+    EPSILON["extended"] = 2.0**-105
+CONSTANT = 4.0
+"""Roundings per product that the count above leaves out: forming the entry of a letter, adding it up, two sides."""
+
+_RICCATI = {"P", "P_plus", "D", "G", "K", "tau", "tau_bar", "E_psi", "psi", "psi_tilde", "Upsilon", "Omega", "Lambda"}
+
+
+class Sizes:
+    """Norms of expressions at one state, remembered; and what rounding makes of them."""
+
+    def __init__(self, bind: Callable[[_core.Operator], _core.Operator], operators: Any):
+        self._bind, self._operators = bind, operators
+        self._norms: dict[Any, float] = {}
+        self._amplification: float | None = None
+
+    def norm(self, operator: _core.Operator) -> float:
+        """Frobenius norm, estimated by a few random vectors where the operator is large."""
+        if operator.kind == "identity":
+            return float(np.sqrt(operator.shape[0]))
+        if operator not in self._norms:
+            self._norms[operator] = _norm(self._bind(operator))
+        return self._norms[operator]
+
+    def size(self, side: Any) -> float:
+        """The error of a side per unit of c · eps."""
+        if isinstance(side, (int, float)):
+            return abs(side)
+        if isinstance(side, _core.Scalar):
+            return self._scalar(side)
+        children = side.children
+        match side.kind:
+            case "sum":
+                return sum(self.size(c) for c in children)
+            case "product":
+                return len(children) * max(self._step(children, i) for i in range(len(children)))
+            case "scaled":
+                return abs(side.coefficient) * self.size(children[0])
+            case "zero":
+                return 0.0
+            case "vector":
+                return float(np.sqrt(side.shape[0]))
+            case _:
+                return self._step([side], 0)
+
+    def _step(self, factors: list[_core.Operator], i: int) -> float:
+        """What the rounding of factor i makes of the product."""
+        factor = factors[i]
+        base = factor.children[0] if factor.kind == "transpose" else factor
+        if base.kind in ("sum", "scaled", "product"):
+            own = self.size(factor if factor.kind != "transpose" else base)
+        elif base.kind == "inverse":
+            own = self.size(base.children[0])
+            return self._product(factors[: i + 1]) * own * self._product(factors[i:])
+        elif base.name in ("phi", "psi", "phi_tilde", "psi_tilde"):
+            edge = self.norm(self._operators.E if base.name.startswith("phi") else self._operators.E_psi)
+            # a bare resolvent: its own norm counts once for the sweep that made it
+            return max(self._product(factors[: i + 1]) * edge * self._product(factors[i:]), self._product(factors))
+        elif base.kind in ("blockdiag", "sqrt"):
+            inner = self.size(base.children[0])
+            own = inner if base.kind == "blockdiag" else inner / max(self.norm(base), 1e-300)
+        else:
+            own = self.norm(base) if base.kind != "vector" else float(np.sqrt(base.shape[0]))
+        return self._product(factors[:i]) * own * self._product(factors[i + 1 :])
+
+    def _product(self, factors: list[_core.Operator]) -> float:
+        if not factors:
+            return 1.0
+        if any(f.kind == "vector" or (f.kind == "transpose" and f.children[0].kind == "vector") for f in factors):
+            return float(np.prod([self.size(f) for f in factors]))
+        return self.norm(factors[0] if len(factors) == 1 else _core._make("product", factors, 1.0))
+
+    def _scalar(self, side: _core.Scalar) -> float:
+        kind, value, operand, terms = side._parts()
+        if operand is None:
+            if not terms:
+                return abs(value)
+            return (abs(value) if kind == 5 else 1.0) * sum(self._scalar(t) for t in terms)
+        if kind == 2:  # ln|det X| moves by tr(X⁻¹ δX)
+            return max(1.0, self.size(operand) * self.norm(operand.inv()))
+        return self.size(operand)
+
+    def amplification(self) -> float:
+        """max over coordinates of the locked over the articulated inertia, diag(HRH* + J) · diag(D⁻¹)."""
+        if self._amplification is None:
+            H, R, J, D = self._operators("H R J D")
+            locked, free = self._bind(H @ R @ H.T + J).diagonal(), self._bind(D.inv()).diagonal()
+            self._amplification = float(max([1.0, *(np.abs(locked) * np.abs(free))]))
+        return self._amplification
+
+    def sweep(self) -> float:
+        """Roundings that an entry meets in one sweep: six products a body along the longest path to the base."""
+        depth: list[int] = []
+        for parent in self._operators._source.parents:
+            depth.append(depth[parent] + 1 if parent >= 0 else 1)
+        return 6.0 * max([1, *depth])
+
+
+PROBE_ABOVE = 400
+"""Columns up to which operators are compared entry by entry; larger ones are compared on random vectors."""
+PROBES = 8
+
+
+def probes(dimension: int) -> np.ndarray:
+    """Random vectors of signs (dimension, PROBES): the mean of |Ax|² over them is the squared Frobenius norm."""
+    return np.random.default_rng(dimension).choice([-1.0, 1.0], (dimension, PROBES))
+
+
+def _norm(operator: _core.Operator) -> float:
+    n = operator.shape[1]
+    if n <= PROBE_ABOVE:
+        return float(operator.norm())
+    return float(np.linalg.norm(operator @ probes(n)) / np.sqrt(PROBES))
+
+
+def uses_riccati(side: Any) -> bool:
+    """Whether a side mentions a value that the Riccati sweep makes."""
+    if isinstance(side, _core.Scalar):
+        return any(uses_riccati(e) for e in side.operands())
+    if not isinstance(side, _core.Operator):
+        return False
+    return (side.name in _RICCATI) or any(uses_riccati(c) for c in side.children)
+
+
+def relative_bound(lhs: Any, rhs: Any, sizes: Sizes, scale: float, precision: str) -> float:
+    """The bound on |lhs - rhs| relative to `scale`, the larger side's largest entry."""
+    size = sizes.size(lhs) + sizes.size(rhs)
+    grown = sizes.amplification() if uses_riccati(lhs) or uses_riccati(rhs) else 1.0
+    return CONSTANT * sizes.sweep() * EPSILON[precision] * max(1.0, size / max(scale, 1e-300)) * grown

@@ -1,0 +1,1 @@
+"""Other tools' conventions: Pinocchio, MuJoCo, SciPy. The only place that knows them."""

@@ -1,0 +1,107 @@
+"""Models made by rule: the uniform chain, random trees."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from .multibody import Multibody
+
+KINDS = ("weld", "pin", "slider", "screw", "universal", "gimbal", "cylindrical", "planar", "ball", "free", "custom")
+
+
+def chain(n: int, kind: str = "pin", seed: int | None = None, *, mass: float = 1.0, length: float = 1.0, welds: str = "lump", name: str | None = None) -> Multibody:
+    """A serial chain of n bodies.
+
+    With `seed=None`: uniform thin rods of 1 kg and 1 m along x, all axes z, so that everything has a closed form. With a seed: poses,
+    axes and positive definite inertias drawn from it.
+
+    Examples
+    --------
+    >>> import pycraft as pc
+    >>> pc.chain(3).nv
+    3
+    """
+    if seed is not None:
+        return tree(range(-1, n - 1), [kind] * n, seed=seed, welds=welds, name=name or f"chain of {n}")
+    model = Multibody(name or f"chain of {n} rods", welds=welds)
+    rod = dict(mass=mass, com=(length / 2, 0, 0), inertia=np.diag([0.0, mass * length**2 / 12, mass * length**2 / 12]))
+    for k in range(n):
+        options: dict[str, Any] = {}
+        if kind == "custom":
+            options["subhinges"] = [{"kind": s, "axis": (0, 0, 1)} for s in ("pin", "slider", "pin")]
+        elif kind in ("universal", "gimbal"):
+            options["axes"] = [(0, 0, 1), (0, 1, 0), (1, 0, 0)][: 2 if kind == "universal" else 3]
+        model.add_body(
+            f"body{k}", f"body{k - 1}" if k else None, kind, hinge_name=f"hinge{k}", position=(length, 0, 0) if k else (0, 0, 0), **rod, **options
+        )
+    return model
+
+
+def tree(parents: Sequence[int], kinds: Sequence[str] | str = "pin", seed: int = 0, *, rotor_inertia: bool = False, welds: str = "lump",
+         name: str | None = None) -> Multibody:
+    """A random tree: `parents[k] < k`, -1 for the base; poses, axes and positive definite inertias drawn from the seed.
+
+    Bodies are named "body0", "body1", ... and hinges "hinge0", ... by their index in `parents`; the model keeps them depth first. A
+    "custom" hinge here is pin, slider, pin. With `rotor_inertia` every coordinate has one. Bodies on welds are lumped into the bodies that
+    move them and become nodes, unless `welds="keep"`.
+    """
+    parents = [int(p) for p in parents]
+    kinds = [kinds] * len(parents) if isinstance(kinds, str) else list(kinds)
+    if len(kinds) != len(parents):
+        raise _core.ModelError(f"a tree of {len(parents)} bodies takes {len(parents)} hinge kinds, not {len(kinds)}")
+    rng = np.random.default_rng(seed)
+    model = Multibody(name or f"tree of {len(parents)}", welds=welds)
+    for k, (parent, kind) in enumerate(zip(parents, kinds, strict=True)):
+        if not -1 <= parent < k:
+            raise _core.ModelError(f"body {k} of a tree has parent {parent}; parents come before their children, -1 is the base")
+        options: dict[str, Any] = {}
+        if kind == "custom":
+            options["subhinges"] = [{"kind": s, "axis": _axis(rng), "point": rng.uniform(-0.2, 0.2, 3)} for s in ("pin", "slider", "pin")]
+        elif kind in ("universal", "gimbal"):
+            options["axes"] = list(_orthogonal(rng)[: 2 if kind == "universal" else 3])
+            options["point"] = rng.uniform(-0.2, 0.2, 3)
+        elif kind in ("pin", "slider", "screw", "cylindrical", "planar"):
+            options["axis"] = _axis(rng)
+            options["point"] = rng.uniform(-0.2, 0.2, 3)
+            if kind == "screw":
+                options["pitch"] = rng.uniform(0.05, 0.3)
+        elif kind == "ball":
+            options["point"] = rng.uniform(-0.2, 0.2, 3)
+        spread = rng.normal(size=(3, 3))
+        inertia = 0.1 * spread @ spread.T + 0.05 * np.eye(3)
+        # Second moments of a body are a positive definite matrix S; tr(S) 1 - S obeys the triangle inequality.
+        inertia = np.trace(inertia) * np.eye(3) - inertia
+        model.add_body(
+            f"body{k}",
+            f"body{parent}" if parent >= 0 else None,
+            kind,
+            hinge_name=f"hinge{k}",
+            rotation=_orthogonal(rng),
+            position=rng.uniform(-1, 1, 3),
+            mass=rng.uniform(0.5, 3.0),
+            com=rng.uniform(-0.2, 0.2, 3),
+            inertia=(inertia + inertia.T) / 2,
+            **options,
+        )
+        count = model.hinges[f"hinge{k}"].rotor_inertia.size if rotor_inertia and kind != "weld" else 0
+        if count:
+            model.hinges[f"hinge{k}"].rotor_inertia = rng.uniform(0.05, 0.5, count)
+    return model
+
+
+def _axis(rng: np.random.Generator) -> np.ndarray:
+    axis = rng.normal(size=3)
+    return axis / np.linalg.norm(axis)
+
+
+def _orthogonal(rng: np.random.Generator) -> np.ndarray:
+    """A rotation matrix, uniform on the group."""
+    q, r = np.linalg.qr(rng.normal(size=(3, 3)))
+    q *= np.sign(np.diag(r))
+    if np.linalg.det(q) < 0:
+        q[:, 0] *= -1
+    return q

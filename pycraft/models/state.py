@@ -1,0 +1,49 @@
+"""States: q and v of one model, and how random ones are drawn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from .multibody import Multibody
+
+
+@dataclass
+class State:
+    """Generalized coordinates `q` (nq,) and velocities `v` (nv,) of a model. Anything that takes q takes a State."""
+
+    q: np.ndarray
+    v: np.ndarray
+
+
+def random_state(model: Multibody, seed: int | np.random.Generator = 0) -> State:
+    """A random state of `model`, the same for the same seed.
+
+    One-coordinate subhinges: uniform within the limits, else ±π for angles and ±1 m for travels. Ball and free: rotations uniform on
+    the group (a normalised Gaussian quaternion), positions in ±1 m. Velocities uniform in ±1.
+    """
+    rng = np.random.default_rng(seed)
+    q = np.array(model.zero_q())
+    for hinge in model.hinges.values():
+        at = hinge.q_slice.start
+        limits = hinge.limits
+        for i, subhinge in enumerate(hinge.subhinges):
+            if subhinge["kind"] in ("ball", "free"):
+                quaternion = rng.normal(size=4)
+                q[at : at + 4] = quaternion / np.linalg.norm(quaternion)
+                if subhinge["kind"] == "free":
+                    q[at + 4 : at + 7] = rng.uniform(-1, 1, 3)
+                at += 4 if subhinge["kind"] == "ball" else 7
+            else:
+                span = np.pi if subhinge["kind"] in ("pin", "screw") else 1.0
+                low, high = -span, span
+                if limits is not None and i < len(limits[0]):
+                    low, high = max(low, limits[0][i]), min(high, limits[1][i])
+                    if not low <= high:  # limits that lie beyond the span
+                        low, high = limits[0][i], limits[1][i]
+                q[at] = rng.uniform(low, high)
+                at += 1
+    return State(q, rng.uniform(-1, 1, model.nv))

@@ -1,0 +1,283 @@
+"""The operator set of a model (`soa.phi`, `soa.H`, ...), block views, and how expressions evaluate and display in Python."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from html import escape
+from typing import Any
+
+import numpy as np
+
+from . import _core
+
+_NAMES = {entry[0]: entry for entry in _core.symbol_table()}
+_NODE_OPERATORS = ("B", "Jacobian", "Lambda")
+_PLAIN = tuple(name for name in _NAMES if name not in (*_NODE_OPERATORS, "Delta"))
+_SPACES = ("Theta", "V", "F")
+
+
+class OperatorSet:
+    """The spatial operators of one model.
+
+    Attributes are the book's letters in ASCII: ``E phi phi_tilde H M J R P P_plus D G K tau tau_bar E_psi psi psi_tilde Upsilon Omega``,
+    ``I`` the identity, the velocity-dependent ``Delta_theta_dot V_tilde V_bar momentum_cross H_dot``, the vectors ``theta_dot velocity a
+    b gravity_field gravity_base``, and ``X_world``. With arguments: ``B(names)``, ``Jacobian(names)``, ``Lambda(names)`` of nodes,
+    ``Delta(coordinate)``. Spaces: ``Theta``, ``V``, ``F``, ``NodesV(names)``, ``NodesF(names)``. Calling the set with a string of names
+    returns a tuple.
+
+    Examples
+    --------
+    >>> import pycraft as pc
+    >>> arm = pc.chain(3)
+    >>> H, phi, M = arm.soa("H phi M")
+    >>> H @ phi @ M @ phi.T @ H.T
+    <H φ M φ* H* : Θ (3) → Θ (3)>
+    """
+
+    def __init__(self, source: _core.SkoSource):
+        self._source = source
+        self._made: dict[str, _core.Operator] = {}
+
+    def is_current(self) -> bool:
+        """Whether the model's structure is still the one these operators were made for."""
+        try:
+            self._source.check_current()
+        except _core.StaleOperatorError:
+            return False
+        return True
+
+    def __call__(self, names: str) -> Any:
+        operators = tuple(getattr(self, name) for name in names.split())
+        return operators[0] if len(operators) == 1 else operators
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        if name == "I":
+            return _core.identity()
+        if name in _SPACES:
+            return getattr(self._source, name)
+        if name in _NODE_OPERATORS or name == "Delta":
+            return _WithArguments(self, name)
+        if name in _PLAIN:
+            if name not in self._made:
+                try:
+                    self._made[name] = self._source.symbol(name)
+                except _core.EvaluationError as error:
+                    raise AttributeError(str(error)) from None
+            return self._made[name]
+        raise AttributeError(f"no operator is called {name!r}; there are {', '.join(_NAMES)}, I, and the spaces Theta, V, F, NodesV, NodesF")
+
+    def __dir__(self) -> Iterable[str]:
+        return [*super().__dir__(), *_NAMES, "I", *_SPACES]
+
+    def NodesV(self, names: str | Sequence[str]) -> _core.Space:
+        """Stacked motions of these nodes, six numbers each."""
+        return self._source.nodes_space(_listed(names), True)
+
+    def NodesF(self, names: str | Sequence[str]) -> _core.Space:
+        """Stacked forces on these nodes, six numbers each."""
+        return self._source.nodes_space(_listed(names), False)
+
+    def check(self, **options: Any):
+        """Check every theorem on this model, see `pycraft.identities.check_model`."""
+        from .identities.checker import check_model
+
+        return check_model(self, **options)
+
+    def theorems(self) -> list[_core.Theorem]:
+        """Every theorem as data: name, both sides as expressions, hypotheses, source."""
+        return _core.theorems(self._source)
+
+    def __repr__(self) -> str:
+        return f"<operators of {self._source.name!r}: {self._source.Theta.dimension} degrees of freedom>"
+
+    def __reduce__(self):
+        return OperatorSet, (self._source,)
+
+
+class _WithArguments:
+    """soa.B, soa.Jacobian, soa.Lambda, soa.Delta: operators that take node names or a coordinate."""
+
+    def __init__(self, operators: OperatorSet, name: str):
+        self._operators, self._name = operators, name
+        self.__doc__ = _NAMES[name][-1]
+
+    def __call__(self, argument: str | int | Sequence[str]) -> _core.Operator:
+        source = self._operators._source
+        if self._name != "Delta":
+            return source.symbol(self._name, nodes=_listed(argument))
+        if isinstance(argument, str):
+            names = source.coordinate_names
+            if argument not in names:
+                raise _core.ModelError(f"no coordinate of {source.name!r} is called {argument!r}; there are {', '.join(names[:12])}")
+            argument = names.index(argument)
+        return source.symbol("Delta", coordinate=int(argument))
+
+    def __repr__(self) -> str:
+        return f"<{self._name}: {_NAMES[self._name][-1]}>"
+
+
+def _listed(names: str | Sequence[str]) -> list[str]:
+    return [names] if isinstance(names, str) else list(names)
+
+
+def sko_model(
+    parents: Sequence[int],
+    E: Sequence[np.ndarray | None],
+    H: Sequence[np.ndarray],
+    M: Sequence[np.ndarray],
+    J: Sequence[np.ndarray] | None = None,
+    *,
+    names: Sequence[str] | None = None,
+    name: str = "SKO model",
+) -> OperatorSet:
+    """The operators of a bare tree of matrices: the algebra without any mechanics, blocks of any size per body.
+
+    Parameters
+    ----------
+    parents : parents before children, -1 for the base
+    E : (s_parent, s_k) block of each body, None for roots
+    H, M, J : (n_k, s_k), symmetric (s_k, s_k), symmetric (n_k, n_k); J zero if left out
+    names : body names
+
+    Examples
+    --------
+    >>> import numpy as np, pycraft as pc
+    >>> soa = pc.sko_model([-1, 0], [None, np.eye(2)], [np.eye(1, 2)] * 2, [np.eye(2)] * 2)
+    >>> (soa.H @ soa.phi @ soa.M @ soa.phi.T @ soa.H.T).dense()
+    array([[2., 1.],
+           [1., 1.]])
+    """
+    n = len(parents)
+    H = [np.asarray(h, float).reshape(-1, np.asarray(m).shape[0]) for h, m in zip(H, M, strict=True)]
+    flat = lambda blocks: [[] if b is None else [float(x) for x in np.asarray(b, float).ravel()] for b in blocks]  # noqa: E731
+    source = _core.MatrixTree(
+        list(map(int, parents)), [np.asarray(m).shape[0] for m in M], [h.shape[0] for h in H], flat(E), flat(H), flat(M),
+        flat(J) if J is not None else [], list(names) if names is not None else [f"body{k}" for k in range(n)], name,
+    )  # fmt: skip
+    return OperatorSet(source)
+
+
+# ---------------------------------------------------------------------- what the core asks for
+def exact_numbers(parts: list[list[float]], shape: Sequence[int]) -> np.ndarray:
+    """Exact sums of doubles as an object array of mpmath numbers."""
+    import mpmath
+
+    out = np.empty(len(parts), dtype=object)
+    with mpmath.workprec(300):
+        for i, terms in enumerate(parts):
+            out[i] = mpmath.fsum(terms)
+    return out.reshape(tuple(shape))
+
+
+def scalar_at(scalar: _core.Scalar, q=None, v=None, *, form: str = "fast", refine: int = 0, precision: str = "double") -> _core.Scalar:
+    """The same scalar bound to a state, as Operator.at."""
+    return scalar.bound(_core._bind(scalar.operands(), q, v, form, refine, precision))
+
+
+def operator_from_parts(kind: int, payload: Any, children: list[_core.Operator]) -> _core.Operator:
+    """An operator from what it was pickled as."""
+    name = ("symbol", "vector", "identity", "zero", "constant", "external", "sum", "product", "scaled", "transpose", "inverse", "blockdiag", "sqrt")[kind]
+    if name == "symbol":
+        source, symbol, arguments, binding = payload
+        made = source.symbol(symbol, coordinate=arguments[0]) if symbol == "Delta" else source.symbol(symbol, nodes=list(arguments))
+        return made if binding is None else made._bound(binding)
+    if name in ("vector", "identity", "zero", "constant"):
+        return _core._leaf_from_parts(name, payload)
+    return _core._make(name, children, payload if name == "scaled" else 1.0)
+
+
+# ---------------------------------------------------------------------- block views
+class BlockView:
+    """A dense operator cut into labelled blocks: rows and columns by body, hinge or node name.
+
+    `view["link2", "link3"]` is the block in that row and column; `view.rows`, `view.columns` are the labels. With
+    `order="tip-to-base"` the last body comes first, so that φ is lower triangular as in the book. Shown in a notebook as a table whose
+    cells are shaded by the logarithm of the block's largest entry.
+    """
+
+    def __init__(self, values: np.ndarray, rows: list[tuple[str, slice]], columns: list[tuple[str, slice]], title: str):
+        self.values, self.title = values, title
+        self._rows, self._columns = dict(rows), dict(columns)
+
+    @property
+    def rows(self) -> list[str]:
+        return list(self._rows)
+
+    @property
+    def columns(self) -> list[str]:
+        return list(self._columns)
+
+    def __getitem__(self, key: tuple[str, str]) -> np.ndarray:
+        row, column = key
+        for name, known in ((row, self._rows), (column, self._columns)):
+            if name not in known:
+                raise KeyError(f"no block row or column is called {name!r}; there are {', '.join(known)}")
+        return self.values[self._rows[row], self._columns[column]]
+
+    def __iter__(self) -> Iterator[tuple[str, str]]:
+        return ((r, c) for r in self._rows for c in self._columns)
+
+    def norms(self) -> np.ndarray:
+        """The largest entry of each block, (rows, columns)."""
+        return np.array([[np.abs(b).max() if (b := self[r, c]).size else 0.0 for c in self._columns] for r in self._rows]).reshape(
+            len(self._rows), len(self._columns)
+        )
+
+    def __repr__(self) -> str:
+        norms = self.norms()
+        width = max([len(c) for c in self._columns] + [7]) + 2
+        left = max([len(r) for r in self._rows] + [0]) + 2
+        limit = 12
+        names = list(self._columns)[:limit]
+        lines = [self.title, " " * left + "".join(f"{c:>{width}}" for c in names) + (" ..." if len(self._columns) > limit else "")]
+        for i, r in enumerate(list(self._rows)[:limit]):
+            lines.append(f"{r:<{left}}" + "".join(f"{'·' if x == 0 else format(x, '.2g'):>{width}}" for x in norms[i, :limit]))
+        if len(self._rows) > limit:
+            lines.append("...")
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        norms = self.norms()
+        limit = 40
+        top = norms.max() if norms.size else 1.0
+        head = "".join(f"<th style='writing-mode:vertical-rl'>{escape(c)}</th>" for c in self.columns[:limit])
+        body = []
+        for i, r in enumerate(self.rows[:limit]):
+            cells = []
+            for x in norms[i, :limit]:
+                depth = 0.0 if x == 0 else max(0.15, 1 + np.log10(x / top) / 8)
+                ink = "#fff" if depth > 0.6 else "#222"
+                text = "" if x == 0 else f"{x:.2g}"
+                cells.append(f"<td style='background:rgba(31,78,121,{depth:.2f});color:{ink};text-align:center;padding:2px 6px'>{text}</td>")
+            body.append(f"<tr><th style='text-align:left'>{escape(r)}</th>{''.join(cells)}</tr>")
+        more = "" if max(norms.shape) <= limit else f"<caption>first {limit} of {norms.shape[0]} x {norms.shape[1]} blocks</caption>"
+        return f"<p>{escape(self.title)}</p><table style='border-collapse:collapse;font-size:80%'>{more}<tr><th></th>{head}</tr>{''.join(body)}</table>"
+
+
+def block_view(operator: _core.Operator, order: str = "base-to-tip") -> BlockView:
+    """The operator's dense form as labelled blocks."""
+    if order not in ("base-to-tip", "tip-to-base"):
+        raise _core.EvaluationError(f"order={order!r}: there are 'base-to-tip' and 'tip-to-base'")
+    values = operator.dense()
+    if values.ndim == 3:
+        raise _core.EvaluationError("blocks() shows one state; bind one with .at(q)")
+
+    def labels(space: _core.Space) -> list[tuple[str, slice]]:
+        blocks = [(label or str(i), where) for i, (label, where, _) in enumerate(space.blocks)]
+        return blocks if order == "base-to-tip" else blocks[::-1]
+
+    return BlockView(values, labels(operator.codomain), labels(operator.domain), f"{operator.text()} : {operator.domain.name} → {operator.codomain.name}")
+
+
+class Explanation(str):
+    """A plan as text: prints as a table, and shows as one at the end of a notebook cell."""
+
+    def __repr__(self) -> str:
+        return str(self)
+
+
+def explain(operator: _core.Operator, request: str = "apply") -> Explanation:
+    """The plan of an expression as a table of steps, tiers and costs; after a run, with what the run reported."""
+    return Explanation(str(operator.plan(request)))
