@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <random>
 
 #include "algebra/elimination.h"
 #include "algebra/errors.h"
@@ -690,38 +691,61 @@ std::vector<double> evaluate(const Scalar& s, int* batch, bool rules) {
 
 // ------------------------------------------------------------------ residuals
 
-Residual residual(const Expression& a, const Expression& b, const std::map<std::string, std::vector<double>>& vectors, bool on_one_path) {
-  const Space domain = a.domain(), codomain = a.codomain();
-  // Largest entries of a, b and a - b over the columns; the difference is planned as typed, so that it is taken at the full precision.
-  const auto largest = [&](const Expression& e) {
-    Result r;
-    Inputs inputs;
-    inputs.vectors = vectors;
+namespace {
+
+constexpr int probe_above = 400, probe_count = 8;
+
+// Random signs, the same for the same size.
+std::vector<double> probes(int dimension) {
+  std::mt19937 generator(static_cast<unsigned>(dimension));
+  std::vector<double> x(size_t(dimension) * probe_count);
+  for (double& s : x) s = generator() & 1 ? 1.0 : -1.0;
+  return x;
+}
+
+// Largest entry of e (signed, if the positive part alone counts), of all blocks or of those on one path to the base.
+double largest_entry(const Expression& e, const std::map<std::string, std::vector<double>>& vectors, bool on_one_path, bool positive_part) {
+  Result r;
+  Inputs inputs;
+  inputs.vectors = vectors;
+  std::vector<double> x;
+  if (e.domain().dimension() > probe_above && !on_one_path) {
+    x = probes(e.domain().dimension());
+    inputs.x = x.data();
+    inputs.columns = probe_count;
+    prepare(e, Request::apply, false)->run(inputs, false, r);
+  } else {
     prepare(e, Request::dense, false)->run(inputs, false, r);
-    double top = 0;
-    std::vector<int> row_body, column_body;
-    const SkoStructure* tree = nullptr;
-    if (on_one_path) {
-      tree = &contexts(e).at(0).source->structure();
-      row_body.resize(r.rows), column_body.resize(r.columns);
-      for (const auto& block : codomain.layout().blocks) std::fill_n(row_body.begin() + block.offset, block.size, block.body);
-      for (const auto& block : domain.layout().blocks) std::fill_n(column_body.begin() + block.offset, block.size, block.body);
-    }
-    const auto related = [&](int i, int j) {
-      int low = std::max(i, j);
-      const int high = std::min(i, j);
-      while (low > high) low = tree->parent[low];
-      return low == high;
-    };
-    for (int i = 0; i < r.rows; ++i)
-      for (int j = 0; j < r.columns; ++j) {
-        if (on_one_path && !related(row_body[i], column_body[j])) continue;
-        const double value = std::abs(r.values[size_t(i) * r.columns + j]);
-        if (!(value <= top)) top = value;  // lets a NaN through
-      }
-    return top;
+  }
+  std::vector<int> row_body, column_body;
+  const SkoStructure* tree = nullptr;
+  if (on_one_path) {
+    tree = &contexts(e).at(0).source->structure();
+    row_body.resize(r.rows), column_body.resize(r.columns);
+    for (const auto& block : e.codomain().layout().blocks) std::fill_n(row_body.begin() + block.offset, block.size, block.body);
+    for (const auto& block : e.domain().layout().blocks) std::fill_n(column_body.begin() + block.offset, block.size, block.body);
+  }
+  const auto related = [&](int i, int j) {
+    int low = std::max(i, j);
+    const int high = std::min(i, j);
+    while (low > high) low = tree->parent[low];
+    return low == high;
   };
-  return {largest(a - b), largest(a), largest(b)};
+  double top = 0;
+  for (int i = 0; i < r.rows; ++i)
+    for (int j = 0; j < r.columns; ++j) {
+      if (on_one_path && !related(row_body[i], column_body[j])) continue;
+      const double value = r.values[size_t(i) * r.columns + j], counted = positive_part ? std::max(value, 0.0) : std::abs(value);
+      if (!(counted <= top)) top = counted;  // lets a NaN through
+    }
+  return top;
+}
+
+}  // namespace
+
+Residual residual(const Expression& a, const Expression& b, const std::map<std::string, std::vector<double>>& vectors, bool on_one_path, bool at_most) {
+  // The difference is planned as typed, so that it is taken at the full precision.
+  return {largest_entry(a - b, vectors, on_one_path, at_most), largest_entry(a, vectors, on_one_path, false), largest_entry(b, vectors, on_one_path, false)};
 }
 
 Residual residual(const Scalar& a, const Scalar& b) {

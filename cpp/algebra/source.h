@@ -42,6 +42,7 @@ struct Traits {
   bool single_dof;      // no hinge of more than one coordinate
   bool constant_hinges; // H constant in the body's frame: no hinge of several subhinges
   bool hinge_diagonal;  // J != 0
+  bool free_root;       // one root, its hinge free: H square there
 };
 
 // The source a space belongs to, while it lives; null for R^n.
@@ -81,7 +82,9 @@ class SkoSource : public std::enable_shared_from_this<SkoSource> {
   std::shared_ptr<SkoValues<S>> current_values(unsigned groups);
 
  protected:
+  // Derived models whose bodies, or coordinates, are those of another: their operators combine with its.
   void share_bodies_with(const SkoSource& other) { body_layout_ = other.body_layout_; }
+  void share_coordinates_with(const SkoSource& other) { theta_layout_ = other.theta_layout_; }
 
  private:
   SkoStructure structure_;

@@ -34,4 +34,8 @@ bool SkoStructure::single_dof() const {
   return std::all_of(dof.begin(), dof.end(), [](int n) { return n <= 1; });
 }
 
+bool SkoStructure::free_root() const {
+  return std::count(parent.begin(), parent.end(), -1) == 1 && dof[0] == size[0];
+}
+
 }  // namespace pycraft

@@ -3,6 +3,7 @@
 // statement with a hinge-diagonal term (rotor inertia, implicit damping) that reduces to the book's for J = 0.
 #include "algebra/theorems.h"
 
+#include "algebra/aggregated_tree.h"
 #include "algebra/errors.h"
 
 namespace pycraft {
@@ -14,6 +15,7 @@ std::vector<std::string> hypothesis_names(unsigned h) {
   if (h & single_dof) names.push_back("single-DOF hinges");
   if (h & constant_hinges) names.push_back("constant H");
   if (h & no_loop) names.push_back("no loop");
+  if (h & free_root) names.push_back("free root");
   return names;
 }
 
@@ -23,6 +25,7 @@ unsigned unmet(unsigned h, const Traits& t) {
   if ((h & no_hinge_diagonal) && t.hinge_diagonal) missing |= no_hinge_diagonal;
   if ((h & single_dof) && !t.single_dof) missing |= single_dof;
   if ((h & constant_hinges) && !t.constant_hinges) missing |= constant_hinges;
+  if ((h & free_root) && !t.free_root) missing |= free_root;
   return missing;
 }
 
@@ -132,7 +135,7 @@ std::vector<Theorem> sko_theorems(const std::shared_ptr<SkoSource>& source) {
   state("#1 D^-½HψM^½ is a co-isometry", W * W.T(), I, no_hinge_diagonal, check, "soa.md #1");
   state("#2 Newton-Euler to innovations is a QR", H * phi * square_root(M), A * square_root(D) * W, no_hinge_diagonal, check, "soa.md #2");
   state("#6 φ*H*ℳ⁻¹ by the factors", phi.T() * H.T() * (MM + J).inv(), psi.T() * H.T() * D.inv() * S, no_hypothesis, check, "soa.md #6");
-  state("#7 ℳ⁻¹HφMφ* by the factors", MM.inv() * H * phi * M * phi.T(), K.T() * psi.T() + S.T() * D.inv() * H * psi * P, no_hinge_diagonal, check, "soa.md #7");
+  state("#7 ℳ⁻¹HφMφ* by the factors", (MM + J).inv() * H * phi * M * phi.T(), K.T() * psi.T() + S.T() * D.inv() * H * psi * P, no_hypothesis, check, "soa.md #7");
 
   group = "Operational space";
   state("Ω is ψ*H*D⁻¹Hψ", Omega, psi.T() * H.T() * D.inv() * H * psi, no_hypothesis, rewrite);
@@ -149,6 +152,35 @@ std::vector<Theorem> sko_theorems(const std::shared_ptr<SkoSource>& source) {
   state("#3 ΩMΩ = Ω", Omega * M * Omega, Omega, no_hinge_diagonal, check, "soa.md #3");
   state("#4 the bodies' shares add up to N", trace(Upsilon * M), number(source->structure().coordinates()), no_hinge_diagonal, check, "soa.md #4");
   state("#5 (I-ΩM)φ* = ψ*-ΩP", (I - Omega * M) * phi.T(), psi.T() - Omega * P, no_hypothesis, check, "soa.md #5");
+
+  // #57: an error of the inertias, however the masses are graded: ‖x'-x‖_ℳ <= max_k ‖M^-½ δM M^-½‖ ‖x'‖_ℳ, x = ℳ⁻¹T, x' = ℳ'⁻¹T.
+  std::vector<std::vector<double>> spread;
+  constexpr double largest = 0.125;
+  for (int k = 0; k < source->structure().bodies(); ++k) {
+    const int s = source->structure().size[k];
+    spread.emplace_back(size_t(s) * s, 0.0);
+    for (int i = 0; i < s; ++i) spread.back()[size_t(i) * s + i] = largest * ((k * s + i) % 5 - 2) / 2.0;
+  }
+  const Expression root = square_root(M), C = constant_blocks(std::move(spread), root.domain(), root.domain(), "C");
+  const Expression MM_prime = H * phi * (M + root * C * root.T()) * phi.T() * H.T(), T = make_vector("T", source->theta());
+  const Expression error = (MM_prime.inv() - MM.inv()) * T, moved = MM_prime.inv() * T;
+  state("#57 perturbed inertias, relative error in the ℳ norm", error.T() * MM * error, (largest * largest) * moved.T() * MM * moved, no_hypothesis, check, "soa.md #57");
+  list.back().at_most = true;
+
+  group = "Re-rooting and aggregation";
+  // Υ⁻¹ = P + S⁺: the articulated inertia of everything re-rooted at body k. The root's block of E*ΥE is empty; any regular one serves there.
+  std::vector<std::vector<double>> at_root;
+  for (int k = 0; k < source->structure().bodies(); ++k) {
+    const int s = source->structure().size[k];
+    at_root.emplace_back(size_t(s) * s, 0.0);
+    for (int i = 0; i < s && source->structure().parent[k] < 0; ++i) at_root.back()[size_t(i) * s + i] = 1;
+  }
+  const Expression seen = block_diagonal(E.T() * Upsilon * E) + constant_blocks(std::move(at_root), source->forces(), source->motions(), "I_r");
+  const Expression other = seen.inv() - P_plus;
+  state("#58 two-filter form", Upsilon.inv(), P + other - other * H.T() * (H * other * H.T()).inv() * H * other, free_root | no_hinge_diagonal, check, "soa.md #58");
+  const Letters grouped(std::make_shared<AggregatedTree>(source));
+  state("#64 bodies grouped in pairs: the same mass matrix", grouped.H * grouped.phi * grouped.M * grouped.phi.T() * grouped.H.T(), MM, no_hypothesis, check,
+        "soa.md #64");
   return list;
 }
 

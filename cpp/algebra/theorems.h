@@ -13,7 +13,7 @@
 namespace pycraft {
 
 // What a theorem asks for beyond a tree with D invertible.
-enum Hypothesis : unsigned { no_hypothesis = 0, chain = 1, no_hinge_diagonal = 2, single_dof = 4, constant_hinges = 8, no_loop = 16 };
+enum Hypothesis : unsigned { no_hypothesis = 0, chain = 1, no_hinge_diagonal = 2, single_dof = 4, constant_hinges = 8, no_loop = 16, free_root = 32 };
 std::vector<std::string> hypothesis_names(unsigned hypotheses);
 // Those that the model does not meet.
 unsigned unmet(unsigned hypotheses, const Traits& traits);
@@ -35,6 +35,7 @@ struct Theorem {
   std::string source;
   Use use = Use::check;
   bool on_one_path = false;  // stated only for blocks (i, j) with i and j on one path to the base
+  bool at_most = false;      // lhs <= rhs instead of lhs = rhs
   std::string waiting;       // not evaluated yet, and for what it waits
 };
 

@@ -5,6 +5,13 @@
 namespace pycraft {
 
 void register_plans(py::module_& m) {
+  m.def("epsilons", [] {
+    py::dict d;
+    d["double"] = to_double(epsilon<double>());
+    d["extended"] = to_double(epsilon<Extended>());
+    d["quad"] = to_double(epsilon<Quad>());
+    return d;
+  }, "Epsilon of each precision by name.");
   py::class_<PassCounts>(m, "PassCounts", "What the last run of a plan executed.")
       .def_readonly("values", &PassCounts::values)
       .def_readonly("gathers", &PassCounts::gathers)

@@ -18,6 +18,7 @@ void register_theorems(py::module_& m) {
       .def_property_readonly("hypotheses", [](const Theorem& t) { return hypothesis_names(t.hypotheses); })
       .def_readonly("source", &Theorem::source)
       .def_readonly("on_one_path", &Theorem::on_one_path)
+      .def_readonly("at_most", &Theorem::at_most)
       .def_readonly("waiting", &Theorem::waiting)
       .def_property_readonly("use", [](const Theorem& t) {
         static const char* names[] = {"check", "rewrite", "inverse"};
@@ -28,11 +29,11 @@ void register_theorems(py::module_& m) {
         const auto tex = [](const Side& s) {
           return std::holds_alternative<Expression>(s) ? show(std::get<Expression>(s), Style::latex) : show(std::get<Scalar>(s), Style::latex);
         };
-        return tex(t.lhs) + " = " + tex(t.rhs);
+        return t.waiting.empty() ? tex(t.lhs) + (t.at_most ? " \\le " : " = ") + tex(t.rhs) : "\\text{" + t.name + "}";
       })
       .def_property_readonly("text", [](const Theorem& t) {
         const auto text = [](const Side& s) { return std::holds_alternative<Expression>(s) ? show(std::get<Expression>(s)) : show(std::get<Scalar>(s)); };
-        return text(t.lhs) + " = " + text(t.rhs);
+        return t.waiting.empty() ? text(t.lhs) + (t.at_most ? " ≤ " : " = ") + text(t.rhs) : t.name;
       })
       .def("__repr__", [](const Theorem& t) { return "<theorem " + t.name + ">"; });
   m.def("theorems", [](const std::shared_ptr<SkoSource>& source) {
@@ -43,7 +44,7 @@ void register_theorems(py::module_& m) {
     }
     return all;
   }, py::arg("source"), "Every theorem, stated on the letters of one model.");
-  m.def("residual", [](const py::object& a, const py::object& b, const std::map<std::string, std::vector<double>>& vectors, bool on_one_path) {
+  m.def("residual", [](const py::object& a, const py::object& b, const std::map<std::string, std::vector<double>>& vectors, bool on_one_path, bool at_most) {
     Residual r;
     if (py::isinstance<Scalar>(a)) {
       const Scalar x = a.cast<Scalar>(), y = b.cast<Scalar>();
@@ -52,10 +53,10 @@ void register_theorems(py::module_& m) {
     } else {
       const Expression x = a.cast<Expression>(), y = b.cast<Expression>();
       py::gil_scoped_release release;
-      r = residual(x, y, vectors, on_one_path);
+      r = residual(x, y, vectors, on_one_path, at_most);
     }
     return py::make_tuple(r.difference, r.left, r.right);
-  }, py::arg("a"), py::arg("b"), py::arg("vectors") = std::map<std::string, std::vector<double>>(), py::arg("on_one_path") = false,
+  }, py::arg("a"), py::arg("b"), py::arg("vectors") = std::map<std::string, std::vector<double>>(), py::arg("on_one_path") = false, py::arg("at_most") = false,
         "Largest entries of a - b, a and b: both evaluated as typed, no theorem used, the difference taken at the bound precision.");
 }
 

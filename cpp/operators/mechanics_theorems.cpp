@@ -1,5 +1,118 @@
-#include "operators/multibody_operators.h"
+// Theorems that need mechanics: velocities and forces, innovations, Coriolis matrices, gravity, hybrid dynamics, the world frame.
+// Those whose sides need derivatives, loops or flexible bodies are listed as waiting.
+#include "operators/derived_operators.h"
 
 namespace pycraft {
-std::vector<Theorem> mechanics_theorems(const std::shared_ptr<MultibodyOperators>&) { return {}; }
+
+std::vector<Theorem> mechanics_theorems(const std::shared_ptr<MultibodyOperators>& source) {
+  const Letters letters(source);
+  const auto& [_, E, phi, phi_tilde, H, M, J, P, P_plus, D, G, K, tau, tau_bar, E_psi, psi, psi_tilde, R, Upsilon, Omega, I] = letters;
+  const auto mechanics = [&](MechanicsSymbolId id) { return mechanics_operator(id, source); };
+  const Expression S = I - H * psi * K, A = I + H * phi * K, MM = H * phi * M * phi.T() * H.T();
+  const Expression qd = mechanics(theta_dot), V = mechanics(velocity), a = mechanics(coriolis_acceleration), b = mechanics(gyroscopic_force);
+  const Expression qdd = make_vector("vdot", source->theta()), T = make_vector("T", source->theta());
+  std::vector<Theorem> list;
+  std::string group;
+  const auto state = [&](const std::string& name, Side lhs, Side rhs, unsigned hypotheses = no_hypothesis, const std::string& from = "Jain 2011") {
+    list.push_back({name, group, std::move(lhs), std::move(rhs), hypotheses, from, Use::check});
+  };
+  const auto wait = [&](const std::string& name, const std::string& what, const std::string& from) {
+    list.push_back({name, group, number(0), number(0), no_hypothesis, from, Use::check});
+    list.back().waiting = what;
+  };
+
+  group = "Equations of motion";
+  const Expression alpha = phi.T() * (H.T() * qdd + a), f = phi * (M * alpha + b), torque = H * f + J * qdd;
+  const Expression bias = H * phi * (M * phi.T() * a + b);
+  state("velocities", V, phi.T() * H.T() * qd);
+  state("Coriolis acceleration", a, mechanics(V_tilde) * H.T() * qd + mechanics(H_dot).T() * qd);
+  state("gyroscopic force", b, mechanics(V_bar) * M * V);
+  state("momentum_cross acts as V̄M", mechanics(momentum_cross) * V, mechanics(V_bar) * M * V);
+  state("equations of motion", torque, (MM + J) * qdd + bias);
+  const Expression z = psi * (K * torque + P * a + b), epsilon = torque - H * z, nu = D.inv() * epsilon;
+  state("forward dynamics", S.T() * nu - K.T() * psi.T() * a, qdd);
+  state("accelerations by innovations", psi.T() * (H.T() * nu + a), alpha);
+  state("interbody forces by innovations", P * (alpha - a) + z, f);
+  state("#13 forces without hinge quantities", P_plus * E.T() * alpha + z + G * epsilon, f, no_hypothesis, "soa.md #13");
+  state("#14 accelerations by Ω", phi.T() * H.T() * (MM + J).inv() * torque + (I - Omega * M) * phi.T() * a - Omega * b, alpha, no_hypothesis, "soa.md #14");
+
+  group = "Innovations";
+  const Expression xi = A.T() * qd;
+  state("#8 innovations velocity", xi, G.T() * V, no_hinge_diagonal, "soa.md #8");
+  state("#9 kinetic energy", V.T() * M * V + qd.T() * J * qd, xi.T() * D * xi, no_hypothesis, "soa.md #9");
+  state("#10 innovations form", T.T() * (MM + J).inv() * T, (S * T).T() * D.inv() * S * T, no_hypothesis, "soa.md #10");
+  state("#15 composite momentum", H * phi * M * V, MM * qd, no_hypothesis, "soa.md #15");
+  if (source->traits().free_root || std::count(source->structure().parent.begin(), source->structure().parent.end(), -1) == 1) {
+    std::vector<double> pick(size_t(6) * source->structure().dimension(), 0.0);
+    for (int i = 0; i < 6; ++i) pick[size_t(i) * source->structure().dimension() + i] = 1;
+    const Expression root = constant(std::move(pick), source->forces(), Space::euclidean(6), "root");
+    state("#19 momentum matrix about the root", root * phi * R * H.T(), root * phi * M * phi.T() * H.T(), no_hypothesis, "soa.md #19");
+  }
+
+  group = "Coriolis matrices";
+  const Expression J_dot = phi.T() * (mechanics(Delta_theta_dot).T() * phi_tilde.T() * H.T() + mechanics(H_dot).T());
+  const Expression jacobian = phi.T() * H.T();
+  const Expression C_skew = H * phi * (M * J_dot + mechanics(momentum_cross) * jacobian);
+  const Expression C_christoffel = H * phi * (M * J_dot + 0.5 * (mechanics(momentum_cross) + mechanics(V_bar) * M + M * mechanics(V_tilde)) * jacobian);
+  const Expression half = (mechanics(H_dot) * phi + H * phi_tilde * mechanics(Delta_theta_dot) * phi) * M * phi.T() * H.T();
+  const Expression rate = half + half.T();  // ℳ̇
+  state("C θ̇ is the Coriolis force", C_skew * qd, bias);
+  state("ℳ̇ - 2C is skew", rate - 2 * C_skew, -(rate - 2 * C_skew).T());
+  state("#20 the Christoffel-consistent C gives the same force", C_christoffel * qd, bias, no_hypothesis, "soa.md #20");
+  state("#21 ... and ℳ̇ - 2C is skew", rate - 2 * C_christoffel, -(rate - 2 * C_christoffel).T(), no_hypothesis, "soa.md #21");
+
+  group = "Gravity";
+  state("#55 gravity as the base's acceleration", phi.T() * mechanics(gravity_base), -mechanics(gravity_field), no_hypothesis, "soa.md #55");
+
+  group = "World frame";
+  const auto world = std::make_shared<WorldFrame>(source);
+  const Letters w(world);
+  const Expression X = mechanics(X_world);
+  state("#51 X E X⁻¹ is constant", X * E * X.inv(), w.E, no_hypothesis, "soa.md #51");
+  state("#52 P' = XPX*", w.P, X * P * X.T(), no_hypothesis, "soa.md #52");
+  state("#52 D' = D", w.D, D, no_hypothesis, "soa.md #52");
+  state("#52 G' = XG", w.G, X * G, no_hypothesis, "soa.md #52");
+  state("#52 ψ' = XψX⁻¹", w.psi, X * psi * X.inv(), no_hypothesis, "soa.md #52");
+
+  group = "Hybrid dynamics (every third hinge prescribed)";
+  const int n = source->structure().bodies();
+  std::vector<char> free(n), prescribed(n);
+  for (int k = 0; k < n; ++k) {
+    prescribed[k] = k % 3 == 1;
+    free[k] = !prescribed[k];
+  }
+  const auto free_hinges = std::make_shared<HingeSubset>(source, free), prescribed_hinges = std::make_shared<HingeSubset>(source, prescribed);
+  const Letters F(free_hinges), Q(prescribed_hinges);
+  const Expression qdd_f = make_vector("vdot_f", free_hinges->theta()), qdd_p = make_vector("vdot_p", prescribed_hinges->theta());
+  const Expression a_p = a + Q.H.T() * qdd_p, alpha_h = phi.T() * (F.H.T() * qdd_f + a_p), f_h = phi * (M * alpha_h + b);
+  const Expression T_f = F.H * f_h + F.J * qdd_f, T_p = Q.H * f_h;
+  const Expression S_f = I - F.H * F.psi * F.K;
+  const Expression z_f = F.psi * (F.K * T_f + F.P * a_p + b), nu_f = F.D.inv() * (T_f - F.H * z_f);
+  state("#38 hybrid forward dynamics", S_f.T() * nu_f - F.K.T() * F.psi.T() * a_p, qdd_f, no_hypothesis, "soa.md #38");
+  state("#39 prescribed hinges' forces", Q.H * (F.P * (F.psi.T() * (F.H.T() * nu_f + a_p) - a_p) + z_f), T_p, no_hypothesis, "soa.md #39");
+  const Expression MM_ff = F.H * phi * M * phi.T() * F.H.T(), MM_fp = F.H * phi * M * phi.T() * Q.H.T(), MM_pp = Q.H * phi * M * phi.T() * Q.H.T();
+  const Expression Y = F.psi.T() - F.Omega * F.P;
+  const Expression schur = MM_pp - MM_fp.T() * (MM_ff + F.J).inv() * MM_fp;
+  state("#40 Schur complement", schur, Q.H * Y.T() * M * Y * Q.H.T(), no_hinge_diagonal, "soa.md #40");
+  state("#41 generalized Jacobian", phi.T() * Q.H.T() - phi.T() * F.H.T() * (MM_ff + F.J).inv() * MM_fp, Y * Q.H.T(), no_hypothesis, "soa.md #41");
+  state("#42 ℳ_ff⁻¹ℳ_fp by the factors", (MM_ff + F.J).inv() * MM_fp, (F.K.T() * F.psi.T() + S_f.T() * F.D.inv() * F.H * F.psi * F.P) * Q.H.T(), no_hypothesis,
+        "soa.md #42");
+  state("#43 determinants of the partition", logdet(MM), logdet(MM_ff) + logdet(schur), no_hinge_diagonal, "soa.md #43");
+
+  group = "Waiting";
+  const std::string derivatives = "derivatives of operators", loops = "loops", flexible = "flexible bodies";
+  wait("∂ℳ, ∂φ, ∂P, ∂D, ∂G, ∂K, ∂ψ, ∂R, ∂Υ by the tangent rule (#31, #36)", derivatives, "soa.md, Calculus");
+  wait("∂ ln det ℳ by coordinates, inertias, geometry, axes (#32-#35)", derivatives, "soa.md, Calculus");
+  wait("α = dV/dt (#11)", derivatives, "soa.md #11");
+  wait("Hamiltonian form (#16-#18)", derivatives, "soa.md #16");
+  wait("C is the Christoffel matrix (#22), diagonalised dynamics (#23-#24)", derivatives, "soa.md #22");
+  wait("derivatives of inverse dynamics (#25-#27)", derivatives, "soa.md #25");
+  wait("commutator of quasi-derivatives (#37)", derivatives, "soa.md #37");
+  wait("world-frame calculus (#53-#54), gravity as ∂U/∂θ (#56)", derivatives, "soa.md #53");
+  wait("compound bodies: ℳ_C = X*ℳX, their accelerations and calculus (#60-#62)", loops, "soa.md #60");
+  wait("tree augmentation (#63)", loops, "soa.md #63");
+  wait("modal blocks and their calculus (F1-F8)", flexible, "verify_flexible.py");
+  return list;
+}
+
 }  // namespace pycraft

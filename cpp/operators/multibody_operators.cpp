@@ -11,7 +11,7 @@ MultibodyOperators::MultibodyOperators(std::shared_ptr<Multibody> model) : SkoSo
 Traits MultibodyOperators::traits() const {
   bool constant = true;
   for (int k = 0; k < model_->bodies(); ++k) constant &= model_->body(k).hinge.subhinges.size() <= 1;
-  return {structure().is_chain(), structure().single_dof(), constant, model_->has_rotor_inertia()};
+  return {structure().is_chain(), structure().single_dof(), constant, model_->has_rotor_inertia(), structure().free_root()};
 }
 
 Space MultibodyOperators::space(SpaceKind kind, const std::vector<int>& nodes) const {

@@ -7,8 +7,9 @@ through F₁…Fᵢ₋₁; so the product is off by at most
 
 with c the number of roundings that an entry meets in one sweep: six products a body, along a path of the tree. A resolvent φ rounds at
 every body of the sweep: ‖F₁…φ‖‖E‖‖φ…Fₘ‖. An inverse X⁻¹ passes the error of X on: ‖F₁…X⁻¹‖ size(X) ‖X⁻¹…Fₘ‖. A sum adds. Values of the
-Riccati sweep (P, D, G, K, ψ, Υ, Ω) carry that sweep's rounding, amplified by at most the largest ratio of HRH* + J to D over the
-hinges: how little of the locked inertia the articulated one is left with. Residuals are judged relative to the larger side.
+Riccati sweep (P, D, G, K, ψ, Υ, Ω) carry that sweep's rounding: the downdate P⁺ = P - GDG* rounds at the size of P, so D(k) at that of
+H(M + EPE*)H* + J, the inertia it would have with the next hinges outboard locked; the largest ratio of that to D amplifies. Residuals are
+judged relative to the larger side.
 """
 
 from __future__ import annotations
@@ -20,9 +21,8 @@ import numpy as np
 
 from .. import _core
 
-EPSILON = {"double": float(np.finfo(np.float64).eps), "extended": float(np.finfo(np.longdouble).eps)}
-if EPSILON["extended"] >= EPSILON["double"]:  # no wider long double here: double-double, 106 bits
-    EPSILON["extended"] = 2.0**-105
+EPSILON = _core.epsilons()
+"""Epsilon of each precision by name."""
 CONSTANT = 4.0
 """Roundings per product that the count above leaves out: forming the entry of a letter, adding it up, two sides."""
 
@@ -36,13 +36,24 @@ class Sizes:
         self._bind, self._operators = bind, operators
         self._norms: dict[Any, float] = {}
         self._amplification: float | None = None
+        self._vectors: dict[str, Any] = {}
+
+    def give(self, vectors: dict[str, Any]) -> None:
+        """The values of named vectors from here on."""
+        if vectors != self._vectors:
+            self._vectors = vectors
+            self._norms = {e: x for e, x in self._norms.items() if not _has_vectors(e)}
 
     def norm(self, operator: _core.Operator) -> float:
         """Frobenius norm, estimated by a few random vectors where the operator is large."""
         if operator.kind == "identity":
             return float(np.sqrt(operator.shape[0]))
         if operator not in self._norms:
-            self._norms[operator] = _norm(self._bind(operator))
+            if _has_vectors(operator):
+                column = operator if operator.shape[1] == 1 else operator.T
+                self._norms[operator] = float(np.linalg.norm(self._bind(column).value(**self._vectors)))
+            else:
+                self._norms[operator] = _norm(self._bind(operator))
         return self._norms[operator]
 
     def size(self, side: Any) -> float:
@@ -61,8 +72,6 @@ class Sizes:
                 return abs(side.coefficient) * self.size(children[0])
             case "zero":
                 return 0.0
-            case "vector":
-                return float(np.sqrt(side.shape[0]))
             case _:
                 return self._step([side], 0)
 
@@ -83,14 +92,12 @@ class Sizes:
             inner = self.size(base.children[0])
             own = inner if base.kind == "blockdiag" else inner / max(self.norm(base), 1e-300)
         else:
-            own = self.norm(base) if base.kind != "vector" else float(np.sqrt(base.shape[0]))
+            own = self.norm(base)
         return self._product(factors[:i]) * own * self._product(factors[i + 1 :])
 
     def _product(self, factors: list[_core.Operator]) -> float:
         if not factors:
             return 1.0
-        if any(f.kind == "vector" or (f.kind == "transpose" and f.children[0].kind == "vector") for f in factors):
-            return float(np.prod([self.size(f) for f in factors]))
         return self.norm(factors[0] if len(factors) == 1 else _core._make("product", factors, 1.0))
 
     def _scalar(self, side: _core.Scalar) -> float:
@@ -104,10 +111,10 @@ class Sizes:
         return self.size(operand)
 
     def amplification(self) -> float:
-        """max over coordinates of the locked over the articulated inertia, diag(HRH* + J) · diag(D⁻¹)."""
+        """max over coordinates of diag(H(M + EPE*)H* + J) · diag(D⁻¹)."""
         if self._amplification is None:
-            H, R, J, D = self._operators("H R J D")
-            locked, free = self._bind(H @ R @ H.T + J).diagonal(), self._bind(D.inv()).diagonal()
+            H, M, E, P, J, D = self._operators("H M E P J D")
+            locked, free = self._bind(H @ (M + E @ P @ E.T) @ H.T + J).diagonal(), self._bind(D.inv()).diagonal()
             self._amplification = float(max([1.0, *(np.abs(locked) * np.abs(free))]))
         return self._amplification
 
@@ -117,6 +124,10 @@ class Sizes:
         for parent in self._operators._source.parents:
             depth.append(depth[parent] + 1 if parent >= 0 else 1)
         return 6.0 * max([1, *depth])
+
+
+def _has_vectors(operator: _core.Operator) -> bool:
+    return operator.kind == "vector" or any(_has_vectors(c) for c in operator.children)
 
 
 PROBE_ABOVE = 400

@@ -12,7 +12,8 @@ class Finding:
     """What was found for one theorem: worst residual in double and in the wider scalar, the bounds they are judged against, the verdict.
 
     Verdicts: "holds", "fails", "undecided" (the bound is above 1e-6 even in the wider scalar), "expected to fail" (outside its
-    hypotheses, and it does), "holds anyway" (outside its hypotheses, and it does not fail), "waiting" (not evaluated yet).
+    hypotheses, and it does), "holds anyway" (outside its hypotheses, and it does not fail), "undefined" (D is singular), "waiting" (not
+    evaluated yet).
     """
 
     name: str
@@ -33,7 +34,7 @@ class Finding:
 
     @property
     def passed(self) -> bool:
-        return self.verdict in ("holds", "expected to fail", "holds anyway", "waiting", "undecided")
+        return self.verdict in ("holds", "expected to fail", "holds anyway", "waiting", "undecided", "undefined")
 
 
 @dataclass
@@ -75,18 +76,19 @@ class Report:
         for header, justify in (("theorem", "left"), ("hypotheses", "left"), ("double", "right"), (wide, "right"), ("bound", "right"), ("verdict", "left"), ("ms", "right")):
             table.add_column(header, justify=justify, no_wrap=header in ("double", "bound", wide, "ms"), overflow="fold")
         group = None
-        style = {"holds": "green", "fails": "bold red", "undecided": "yellow", "expected to fail": "cyan", "holds anyway": "green", "waiting": "dim"}
+        style = {"holds": "green", "fails": "bold red", "undecided": "yellow", "expected to fail": "cyan", "holds anyway": "green", "waiting": "dim", "undefined": "yellow"}
         for f in self.findings:
             if f.group != group:
                 group = f.group
                 table.add_row(Text(group, style="bold underline"))
             hypotheses = Text(", ".join(f.hypotheses))
-            if f.verdict == "waiting":
-                table.add_row("  " + f.statement, hypotheses, "", "", "", Text(f"waits for {f.note}", style="dim"), "")
+            if f.verdict in ("waiting", "undefined"):
+                text = f"waits for {f.note}" if f.verdict == "waiting" else "undefined: D is singular"
+                table.add_row("  " + f.statement, hypotheses, "", "", "", Text(text, style=style[f.verdict]), "")
                 continue
             verdict = f.verdict + (f": {', '.join(f.unmet)} not met" if f.unmet else "")
             table.add_row(
-                "  " + f.statement, hypotheses, f"{f.residual:.1e}", f"{f.wide_residual:.1e}", f"{f.bound:.0e}", Text(verdict, style=style[f.verdict]), f"{1e3 * f.seconds:.0f}"
+                "  " + f.statement, hypotheses, f"{f.residual:.1e}", f"{f.wide_residual:.1e}" + ("q" if f.wide_precision == "quad" and wide != "quad" else ""), f"{f.bound:.0e}", Text(verdict, style=style[f.verdict]), f"{1e3 * f.seconds:.0f}"
             )
         return table
 
@@ -107,7 +109,7 @@ class Report:
         from html import escape
 
         rows, group = [], None
-        color = {"holds": "#2a7", "fails": "#c22", "undecided": "#c90", "expected to fail": "#28a", "holds anyway": "#2a7", "waiting": "#999"}
+        color = {"holds": "#2a7", "fails": "#c22", "undecided": "#c90", "expected to fail": "#28a", "holds anyway": "#2a7", "waiting": "#999", "undefined": "#c90"}
         for f in self.findings:
             if f.group != group:
                 group = f.group

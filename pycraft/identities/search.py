@@ -104,7 +104,7 @@ def statement_text(read: Statement) -> str:
 
 def refutes(text: str, parents: list[int], kinds: list[str], rotor: bool, seed: int, precision: str, states: int = STATES) -> Any:
     """(q, residual) at the first refuting state, or None."""
-    from .checker import BoundState, Residuals, drawn_vectors
+    from .checker import BoundState, drawn_vectors, evaluate
 
     model = tree(parents, kinds, seed=seed, rotor_inertia=rotor, welds="keep")
     try:
@@ -115,9 +115,8 @@ def refutes(text: str, parents: list[int], kinds: list[str], rotor: bool, seed: 
     for _ in range(states):
         state = model.random_state(rng)
         vectors = drawn_vectors(read.rhs, rng, drawn_vectors(read.lhs, rng, {}))
-        residuals = Residuals(precision)
         try:
-            residuals.add(read.lhs, read.rhs, BoundState(model.soa, state), vectors)
+            residuals = evaluate(read.lhs, read.rhs, [BoundState(model.soa, state)], [vectors], precision)
         except ArithmeticError:
             continue
         if residuals.verdict == "fails":

@@ -1,0 +1,117 @@
+#include "operators/derived_operators.h"
+
+#include "algebra/tree_values.h"
+#include "recursions/kinematics.h"
+
+namespace pycraft {
+
+namespace {
+
+SkoStructure kept_structure(const SkoStructure& t, const std::vector<char>& kept) {
+  SkoStructure s = t;
+  s.coordinate_names.clear();
+  s.offset.clear(), s.dof_offset.clear();
+  for (int k = 0; k < t.bodies(); ++k)
+    if (!kept[k]) s.dof[k] = 0;
+  s.finish();
+  return s;
+}
+
+// Kinematics of the whole model, from which derived blocks are taken.
+template <class S>
+class DerivedValues : public TreeValues<RigidBlocks<S>> {
+ public:
+  DerivedValues(const SkoStructure& own, const SkoStructure& whole, const Multibody& model)
+      : TreeValues<RigidBlocks<S>>(own), whole_(whole), all_(whole_), model_(model), q_(model.nq()) {}
+
+ protected:
+  void set_state(const double* q, const double*) override {
+    compiled_ = model_.compiled<S>();
+    for (size_t i = 0; i < q_.size(); ++i) q_[i] = S(q[i]);
+  }
+  void fill() override {
+    kinematics(*compiled_, q_.data(), all_);
+    derive(all_);
+  }
+  virtual void derive(const RigidBlocks<S>& all) = 0;
+
+  const SkoStructure whole_;
+  RigidBlocks<S> all_;
+  const Multibody& model_;
+  std::shared_ptr<const CompiledModel<S>> compiled_;
+  std::vector<S> q_;
+};
+
+template <class S>
+class SubsetValues final : public DerivedValues<S> {
+ public:
+  SubsetValues(const HingeSubset& source, const SkoStructure& whole) : DerivedValues<S>(source.structure(), whole, source.model()), kept_(source.kept()) {}
+
+ protected:
+  void derive(const RigidBlocks<S>& all) override {
+    RigidBlocks<S>& b = this->blocks_;
+    b.pose = all.pose;
+    b.inertia = all.inertia;
+    for (int k = 0; k < this->tree_.bodies(); ++k)
+      for (int j = 0; j < this->tree_.dof[k]; ++j) {
+        const int to = this->tree_.dof_offset[k] + j, from = this->whole_.dof_offset[k] + j;
+        b.H[to] = all.H[from];
+        b.J[to] = all.J[from];
+        b.aligned[to] = all.aligned[from];
+      }
+  }
+
+ private:
+  const std::vector<char>& kept_;
+};
+
+template <class S>
+class WorldValues final : public DerivedValues<S> {
+ public:
+  explicit WorldValues(const WorldFrame& source) : DerivedValues<S>(source.structure(), source.structure(), source.model()) {}
+
+ protected:
+  void derive(const RigidBlocks<S>& all) override {
+    RigidBlocks<S>& b = this->blocks_;
+    std::vector<Pose<S>> world(this->tree_.bodies());
+    for (int k = 0; k < this->tree_.bodies(); ++k) {
+      const int p = this->tree_.parent[k];
+      world[k] = p < 0 ? all.pose[k] : world[p] * all.pose[k];
+      b.pose[k] = Pose<S>::identity();
+      b.inertia[k] = to_parent(world[k], all.inertia[k]);
+      for (int j = this->tree_.dof_offset[k]; j < this->tree_.dof_offset[k + 1]; ++j) {
+        b.H[j] = motion_to_child(inverse(world[k]), all.H[j]);  // a row of HX⁻¹ is X⁻* h
+        b.J[j] = all.J[j];
+      }
+    }
+  }
+};
+
+}  // namespace
+
+DerivedOperators::DerivedOperators(SkoStructure structure, const std::string& name, std::shared_ptr<MultibodyOperators> base)
+    : SkoSource(std::move(structure), name), base_(std::move(base)) {
+  share_bodies_with(*base_);
+}
+
+Traits DerivedOperators::traits() const {
+  Traits t = base_->traits();
+  t.single_dof = structure().single_dof();
+  t.free_root = structure().free_root();
+  return t;
+}
+
+HingeSubset::HingeSubset(std::shared_ptr<MultibodyOperators> base, std::vector<char> kept)
+    : DerivedOperators(kept_structure(base->structure(), kept), base->name() + ", some hinges", base), kept_(std::move(kept)) {}
+std::unique_ptr<SkoValues<double>> HingeSubset::make_values(double) const { return std::make_unique<SubsetValues<double>>(*this, base_->structure()); }
+std::unique_ptr<SkoValues<Extended>> HingeSubset::make_values(Extended) const { return std::make_unique<SubsetValues<Extended>>(*this, base_->structure()); }
+std::unique_ptr<SkoValues<Quad>> HingeSubset::make_values(Quad) const { return std::make_unique<SubsetValues<Quad>>(*this, base_->structure()); }
+
+WorldFrame::WorldFrame(std::shared_ptr<MultibodyOperators> base) : DerivedOperators(base->structure(), base->name() + ", world frame", base) {
+  share_coordinates_with(*base_);
+}
+std::unique_ptr<SkoValues<double>> WorldFrame::make_values(double) const { return std::make_unique<WorldValues<double>>(*this); }
+std::unique_ptr<SkoValues<Extended>> WorldFrame::make_values(Extended) const { return std::make_unique<WorldValues<Extended>>(*this); }
+std::unique_ptr<SkoValues<Quad>> WorldFrame::make_values(Quad) const { return std::make_unique<WorldValues<Quad>>(*this); }
+
+}  // namespace pycraft

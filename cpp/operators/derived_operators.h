@@ -1,0 +1,52 @@
+// Models derived from a multibody model that are SKO trees again, with operators of their own that combine with the model's:
+//
+//   a subset of hinges:  H_s keeps the rows of some hinges, the others are locked (hybrid dynamics: free and prescribed hinges)
+//   the world frame:     X = blockdiag φ(0,k):  E' = parent matrix ⊗ 1,  H' = HX⁻¹,  M' = XMX*
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "operators/multibody_operators.h"
+
+namespace pycraft {
+
+class DerivedOperators : public SkoSource {
+ public:
+  Traits traits() const override;
+  bool rigid() const override { return true; }
+  int nq() const override { return base_->nq(); }
+  int nv() const override { return base_->nv(); }
+  void check_state(const double* q, size_t nq, const double* v, size_t nv) const override { base_->check_state(q, nq, v, nv); }
+  std::shared_ptr<const StateData> state() const override { return base_->state(); }
+  std::uint64_t parameters() const override { return base_->parameters(); }
+  const Multibody& model() const { return *base_->model(); }
+
+ protected:
+  DerivedOperators(SkoStructure structure, const std::string& name, std::shared_ptr<MultibodyOperators> base);
+  std::shared_ptr<MultibodyOperators> base_;
+};
+
+// The hinges marked in `kept` move; the others are locked.
+class HingeSubset final : public DerivedOperators {
+ public:
+  HingeSubset(std::shared_ptr<MultibodyOperators> base, std::vector<char> kept);
+  const std::vector<char>& kept() const { return kept_; }
+  std::unique_ptr<SkoValues<double>> make_values(double) const override;
+  std::unique_ptr<SkoValues<Extended>> make_values(Extended) const override;
+  std::unique_ptr<SkoValues<Quad>> make_values(Quad) const override;
+
+ private:
+  std::vector<char> kept_;
+};
+
+// Everything in world axes about the world's origin.
+class WorldFrame final : public DerivedOperators {
+ public:
+  explicit WorldFrame(std::shared_ptr<MultibodyOperators> base);
+  std::unique_ptr<SkoValues<double>> make_values(double) const override;
+  std::unique_ptr<SkoValues<Extended>> make_values(Extended) const override;
+  std::unique_ptr<SkoValues<Quad>> make_values(Quad) const override;
+};
+
+}  // namespace pycraft
