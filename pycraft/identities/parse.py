@@ -6,6 +6,8 @@ transposes); the one whose names and spaces fit is taken. Where both fit and dif
 
 from __future__ import annotations
 
+import ast
+import operator
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -28,7 +30,7 @@ _FUNCTIONS = {
 _WITH_ARGUMENTS = ("B", "Jacobian", "Lambda", "Delta")
 # Symbols in the order of the core's table: (ascii, unicode, latex, domain, codomain, meaning).
 _TABLE = _core.symbol_table()
-_UNICODE = {entry[1]: entry[0] for entry in _TABLE} | {"ℳ": "MM", "τ̄": "tau_bar", "E": "E"}
+_NAMES = {entry[0] for entry in _TABLE}
 
 _BOOK = r"""
 start: side (("==" | "=") side)?
@@ -67,38 +69,6 @@ NAME.2: /%(names)s/
 %%import common.WS
 %%ignore WS
 """
-
-_PYTHON = r"""
-start: side (("==" | "=") side)?
-side: sum
-sum: (PLUS | MINUS)? term ((PLUS | MINUS) term)*
-term: factor (("*" | "@") factor)* ("/" NUMBER)?
-factor: NUMBER -> number
-      | "-" factor -> negative
-      | postfix
-postfix: atom suffix*
-suffix: ".T" -> star
-      | ".inv()" -> inverse
-      | ".sqrt()" -> root
-      | "**" "-" INT -> negative_power
-      | "**" INT -> power
-atom: NAME -> name
-    | FUNCTION "(" sum ")" -> function
-    | INDEXED "(" ARGUMENT ("," ARGUMENT)* ")" -> indexed
-    | "(" sum ")" -> group
-    | "[" sum "]" -> group
-PLUS: "+"
-MINUS: "-"
-NUMBER: /\d+(\.\d*)?([eE][+-]?\d+)?/
-INT: /\d+/
-ARGUMENT: /[A-Za-z_][\w.\/-]*|\d+/
-FUNCTION.3: /(%(functions)s)(?=\s*\()/
-INDEXED.3: /(%(indexed)s)(?=\s*\()/
-NAME.2: /%(names)s/
-%%import common.WS
-%%ignore WS
-"""
-
 
 class ParseError(_core.EvaluationError):
     """A statement that cannot be read, or that can be read in two ways."""
@@ -146,24 +116,89 @@ class Statements:
         return first
 
     def _read(self, text: str, reading: str) -> Statement:
-        names = {entry[0] for entry in _TABLE if entry[0] not in _WITH_ARGUMENTS} | set(self._extra)
         source = book_text(text)
-        parser = _parser(reading, tuple(sorted(names, key=lambda n: (-len(n), n))))
+        sides = self._read_python(source) if reading == "python" else self._read_book(source)
+        lhs, rhs = sides if len(sides) == 2 else (sides[0], None)
+        lhs, rhs = _balance(lhs, rhs), _balance(rhs, lhs) if rhs is not None else None
+        if rhs is not None:
+            _check_same_spaces(lhs, rhs)
+        return Statement(lhs, rhs, text, "Python" if reading == "python" else "the book")
+
+
+    # ------------------------------------------------------------------ Python's reading: Python's own parser
+    def _read_python(self, source: str) -> list[Any]:
         try:
-            sides = _Evaluate(self._operators, self._extra).transform(parser.parse(source))
+            tree = ast.parse(re.sub(r"(?<![=<>!])=(?!=)", "==", source), mode="eval").body
+        except SyntaxError as error:
+            raise ParseError(f"not understood at {source[max(0, (error.offset or 1) - 1) :][:12]!r}") from None
+        if isinstance(tree, ast.Compare):
+            if len(tree.ops) != 1 or not isinstance(tree.ops[0], ast.Eq):
+                raise ParseError("a statement is lhs == rhs")
+            return [self._evaluate(tree.left), self._evaluate(tree.comparators[0])]
+        return [self._evaluate(tree)]
+
+    def _name(self, name: str) -> Any:
+        if name in self._extra:
+            return self._extra[name]
+        if name in _WITH_ARGUMENTS or name not in _NAMES:
+            raise ParseError(f"no operator is called {name!r}")
+        return getattr(self._operators, name)
+
+    def _evaluate(self, node: ast.AST) -> Any:
+        match node:
+            case ast.Constant(value=int() | float() as value):
+                return float(value)
+            case ast.Name(id=name):
+                return self._name(name)
+            case ast.UnaryOp(op=ast.USub(), operand=inner):
+                return -self._evaluate(inner)
+            case ast.BinOp(left=left, op=ast.Pow(), right=right):
+                exponent = self._evaluate(right)
+                if exponent != int(exponent):
+                    raise ParseError("an operator's power is a whole number")
+                return self._evaluate(left) ** int(exponent)
+            case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
+                return _combine(_BINARY[type(op)], self._evaluate(left), self._evaluate(right))
+            case ast.Attribute(value=inner, attr="T"):
+                return self._evaluate(inner).T
+            case ast.Call(func=ast.Attribute(value=inner, attr=("inv" | "sqrt" | "trace" | "logdet" | "norm") as method), args=[]):
+                return getattr(self._evaluate(inner), method)()
+            case ast.Call(func=ast.Name(id=name), args=[inner]) if name in _FUNCTIONS:
+                return _FUNCTIONS[name](self._evaluate(inner))
+            case ast.Call(func=ast.Name(id=name), args=arguments) if name in _WITH_ARGUMENTS:
+                return _indexed(self._operators, name, [ast.unparse(a).strip("'\"") for a in arguments])
+        raise ParseError(f"{ast.unparse(node)!r} is no operator expression")
+
+    # ------------------------------------------------------------------ the book's reading
+    def _read_book(self, source: str) -> list[Any]:
+        names = tuple(sorted({*(_NAMES - set(_WITH_ARGUMENTS)), *self._extra}))
+        try:
+            return _Evaluate(self._operators, self._extra).transform(_parser(names).parse(source))
         except exceptions.VisitError as error:
             if isinstance(error.orig_exc, (_core.Error, ParseError)):
                 raise error.orig_exc from None
             raise ParseError(str(error.orig_exc)) from None
         except exceptions.UnexpectedInput as error:
             at = getattr(error, "pos_in_stream", None)
-            where = f" at {source[at : at + 12]!r}" if at is not None and at < len(source) else " at its end"
-            raise ParseError(f"not understood{where}") from None
-        lhs, rhs = sides if len(sides) == 2 else (sides[0], None)
-        lhs, rhs = _balance(lhs, rhs), _balance(rhs, lhs) if rhs is not None else None
-        if rhs is not None:
-            _check_same_spaces(lhs, rhs)
-        return Statement(lhs, rhs, text, "Python" if reading == "python" else "the book")
+            raise ParseError(f"not understood at {source[at : at + 12]!r}" if at is not None and at < len(source) else "not understood at its end") from None
+
+
+_BINARY = {ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.MatMult: operator.matmul, ast.Div: operator.truediv}
+
+
+def _combine(f: Any, a: Any, b: Any) -> Any:
+    try:
+        return f(a, b)
+    except TypeError as error:
+        if isinstance(error, _core.SpaceError):
+            raise
+        raise ParseError(str(error)) from None
+
+
+def _indexed(operators: Any, name: str, arguments: list[str]) -> Any:
+    if name == "Delta":
+        return operators.Delta(int(arguments[0]) if arguments[0].isdigit() else arguments[0])
+    return getattr(operators, name)(arguments)
 
 
 def _same(a: Any, b: Any) -> bool:
@@ -197,18 +232,15 @@ def _check_same_spaces(lhs: Any, rhs: Any) -> None:
         raise ParseError("a statement about numbers alone")
 
 
-@lru_cache(maxsize=16)
-def _parser(reading: str, names: tuple[str, ...]) -> Lark:
+@lru_cache(maxsize=4)
+def _parser(names: tuple[str, ...]) -> Lark:
     longest_first = sorted(names, key=lambda n: (-len(n), n))
-    # In Python a name ends where no letter follows; in the book H ψ K may be written HψK.
-    pattern = "|".join(re.escape(n) for n in longest_first)
-    pattern = rf"({pattern})(?![A-Za-z0-9_])" if reading == "python" else f"({pattern})"
-    grammar = (_BOOK if reading == "book" else _PYTHON) % {
+    grammar = _BOOK % {
         "functions": "|".join(sorted(_FUNCTIONS, key=len, reverse=True)),
         "indexed": "|".join(_WITH_ARGUMENTS),
-        "names": pattern,
+        "names": "(" + "|".join(re.escape(n) for n in longest_first) + ")",
     }
-    return Lark(grammar, parser="earley" if reading == "book" else "lalr", lexer="dynamic" if reading == "book" else "contextual")
+    return Lark(grammar, parser="earley", lexer="dynamic")
 
 
 _LATEX = [
@@ -297,9 +329,6 @@ class _Evaluate(Transformer):
     def number(self, parts):
         return float(parts[0])
 
-    def negative(self, parts):
-        return -parts[0]
-
     def postfix(self, parts):
         value = parts[0]
         for suffix in parts[1:]:
@@ -312,17 +341,11 @@ class _Evaluate(Transformer):
     def inverse(self, _):
         return lambda x: x.inv()
 
-    def root(self, _):
-        return lambda x: x.sqrt()
-
     def square(self, _):
         return lambda x: x**2
 
     def power(self, parts):
         return lambda x: x ** int(parts[0])
-
-    def negative_power(self, parts):
-        return lambda x: x ** (-int(parts[0]))
 
     def name(self, parts):
         name = str(parts[0])
@@ -332,7 +355,4 @@ class _Evaluate(Transformer):
         return _FUNCTIONS[str(parts[0])](parts[1])
 
     def indexed(self, parts):
-        arguments = [str(a) for a in parts[1:]]
-        if str(parts[0]) == "Delta" and arguments[0].isdigit():
-            return self._operators.Delta(int(arguments[0]))
-        return getattr(self._operators, str(parts[0]))(arguments[0] if str(parts[0]) == "Delta" else arguments)
+        return _indexed(self._operators, str(parts[0]), [str(a) for a in parts[1:]])
