@@ -54,7 +54,6 @@ class Planner {
   int logdet(const Expression& e);
   std::optional<int> logdet_by_structure(const Expression& e);
 
-  bool same_session(const Expression& a, const Expression& b) const;
   int id_of(const Expression& e);
   double vector_bytes(const Space& space) const { return 8.0 * space.dimension(); }
 
@@ -63,6 +62,7 @@ class Planner {
   std::unordered_map<Expression, int, ExpressionHash> ids_;
   std::map<std::pair<int, int>, int> vector_memo_;
   std::map<int, int> block_memo_;
+  std::map<std::pair<int, int>, int> block_product_memo_;
 };
 
 // ---------------------------------------------------------------- optimisation by theorems (optimise.cpp)

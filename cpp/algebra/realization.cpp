@@ -20,6 +20,7 @@ struct SignalTerm {
   int right = -1, left = -1;
   Shift shift = Shift::none;
   int context = -1;
+  bool operator==(const SignalTerm&) const = default;
 };
 struct Signal {
   Space space;
@@ -77,7 +78,6 @@ class RealizationBuilder {
     const SkoStructure& tree = r_->tree->structure();
     for (const Context& c : models)
       if (c.source->structure().parent != tree.parent) return fail("it mixes two different trees");
-    local_ends_ = local_ends;
     Signal input{e.domain(), {{-1}}};
     if (local_ends || e.domain().kind() == SpaceKind::Euclidean) {
       if (!materialise(input)) return nullptr;
@@ -140,7 +140,20 @@ class RealizationBuilder {
     return std::any_of(s.terms.begin(), s.terms.end(), [](const SignalTerm& t) { return t.shift != Shift::none; });
   }
 
+  // The same expression of the same signal is the same signal: shared parts of an expression share their states.
   bool apply(const Expression& e, const Signal& x, Signal& y) {
+    const int id = planner_.id_of(e);
+    for (const Known& k : known_)
+      if (k.expression == id && k.input == x.terms) {
+        y = k.output;
+        return true;
+      }
+    if (!compute(e, x, y)) return false;
+    known_.push_back({id, x.terms, y});
+    return true;
+  }
+
+  bool compute(const Expression& e, const Signal& x, Signal& y) {
     y.space = e.codomain();
     y.terms.clear();
     switch (e.kind()) {
@@ -322,7 +335,12 @@ class RealizationBuilder {
   Planner& planner_;
   std::string& reason_;
   std::shared_ptr<Realization> r_;
-  bool local_ends_ = false;
+  struct Known {
+    int expression;
+    std::vector<SignalTerm> input;
+    Signal output;
+  };
+  std::vector<Known> known_;
 };
 
 std::shared_ptr<const Realization> build_realization(Planner& planner, const Expression& e, bool local_ends, std::string& reason) {

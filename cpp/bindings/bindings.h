@@ -10,6 +10,7 @@
 
 #include "algebra/engine.h"
 #include "algebra/expression.h"
+#include "algebra/source.h"
 #include "spatial/pose.h"
 #include "spatial/symmetric3.h"
 
@@ -21,7 +22,10 @@ using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
 void register_errors(py::module_& m);
 void register_spaces(py::module_& m);
+void register_sources(py::module_& m);
 void register_operators(py::module_& m);
+void register_constants(py::module_& m);
+void register_pickling(py::module_& m);
 void register_scalars(py::module_& m);
 void register_plans(py::module_& m);
 void register_multibody(py::module_& m);
@@ -40,5 +44,18 @@ py::array_t<double> to_numpy(const std::vector<double>& v);
 // A run's numbers as an array of this shape; with expansions, an object array of mpmath numbers that lose nothing.
 py::object to_array(const Result& result, std::vector<py::ssize_t> shape);
 bool wants_objects(const py::object& dtype);
+
+// An array of real numbers; complex ones and anything else are refused.
+Array real_array(const py::object& x);
+
+// The batch an expression is bound to, -1 for none.
+int batch_of(const Expression& e);
+// The symbol of this name of a source; node operators take node names, Delta a coordinate.
+Expression source_symbol(const std::shared_ptr<SkoSource>& source, const std::string& name, const std::vector<std::string>& nodes, int coordinate);
+// A state, or a batch, for all models that occur unbound in the operands; q None takes the model's present state.
+std::shared_ptr<const Binding> make_binding(const std::vector<Expression>& operands, const py::object& q, const py::object& v, const std::string& form,
+                                            int refine, const std::string& precision);
+// What an expression is pickled as.
+py::tuple parts(const Expression& e);
 
 }  // namespace pycraft

@@ -71,6 +71,23 @@ py::object to_array(const Result& r, std::vector<py::ssize_t> shape) {
   return py::module_::import("pycraft.operators").attr("exact_numbers")(parts, py::cast(shape));
 }
 
+Array real_array(const py::object& x) {
+  if (py::isinstance<py::array>(x) && py::cast<py::array>(x).dtype().kind() == 'c')
+    throw py::type_error("operators act on real arrays; apply them to the real and imaginary parts");
+  Array a = Array::ensure(x);
+  if (!a) {
+    PyErr_Clear();
+    throw py::type_error("an operator is applied to an array of numbers, not to this");
+  }
+  return a;
+}
+
+int batch_of(const Expression& e) {
+  for (const Context& c : contexts(e))
+    if (c.binding && c.binding->batch >= 0) return c.binding->batch;
+  return -1;
+}
+
 bool wants_objects(const py::object& dtype) {
   if (dtype.is_none()) return false;
   if (dtype.is(py::handle(reinterpret_cast<PyObject*>(&PyBaseObject_Type)))) return true;

@@ -16,7 +16,10 @@ PYBIND11_MODULE(_core, m) {
   pycraft::register_errors(m);
   pycraft::register_spaces(m);
   pycraft::register_multibody(m);
+  pycraft::register_sources(m);
   pycraft::register_operators(m);
+  pycraft::register_constants(m);
+  pycraft::register_pickling(m);
   pycraft::register_scalars(m);
   pycraft::register_plans(m);
   pycraft::register_dynamics(m);

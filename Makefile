@@ -1,0 +1,73 @@
+# Every target makes what it needs in .venv. Needed beforehand: Python 3.10+ (with headers and venv), a C++20 compiler, make.
+#   make tour                   set up, then the main job on a real robot (MODEL=path.urdf for your own)
+#   make test                   set up, then all tests, C++ and Python, that need no peer packages
+#   make test-peers             the same robots against Pinocchio and MuJoCo (extra [peers])
+#   make check                  the everyday subset, under three minutes
+#   make lab | bench | docs     JupyterLab in notebooks; the bounds measured
+PYTHON ?= python3
+MODEL ?=
+BIN := .venv/bin
+JOBS ?= $(shell nproc 2>/dev/null || sysctl -n hw.ncpu)
+
+SOURCES := $(shell find cpp pycraft -name '*.h' -o -name '*.cpp' -o -name '*.py' -o -name '*.in' -o -name '*.urdf') CMakeLists.txt pyproject.toml
+# What is compiled: a change in any of these rebuilds. Python sources are used where they lie.
+COMPILED := $(shell find cpp -name '*.h' -o -name '*.cpp' -o -name '*.in' -o -name '*.py') CMakeLists.txt pyproject.toml
+
+.PHONY: tour test test-cpp test-python test-peers check lab bench lint clean
+
+tour: .venv/installed
+	$(BIN)/pycraft tour $(MODEL)
+
+test: test-cpp test-python
+
+test-cpp: .venv/installed
+	$(BIN)/cmake --build build --target cpp_tests -j $(JOBS)
+	$(BIN)/ctest --test-dir build --output-on-failure -j $(JOBS)
+
+test-python: .venv/tested
+	$(BIN)/python -m pytest -m "not peers"
+
+check: .venv/tested
+	$(BIN)/ruff check pycraft tests
+	$(BIN)/python -m pytest -m "not peers and not slow" -x
+
+test-peers: .venv/peers
+	$(BIN)/python -m pytest -m peers
+	$(BIN)/pycraft peers --output tests/peers/robots.md
+
+lab: .venv/lab
+	$(BIN)/jupyter lab --notebook-dir=notebooks
+
+bench: .venv/installed
+	$(BIN)/pycraft bench
+
+lint: .venv/tested
+	$(BIN)/ruff check pycraft tests
+	$(BIN)/ruff format --check pycraft tests || true
+	$(BIN)/mypy
+
+# ---- environments. The build requirements are installed into the environment once, so that rebuilding is incremental.
+.venv/requirements: pyproject.toml
+	test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --upgrade pip
+	$(BIN)/python cpp/build_requirements.py | $(BIN)/python -m pip install --quiet -r /dev/stdin
+	touch $@
+
+.venv/installed: .venv/requirements $(COMPILED)
+	$(BIN)/python -m pip install --quiet --no-build-isolation --editable . -C build-dir=build
+	touch $@
+
+.venv/tested: .venv/installed
+	$(BIN)/python -m pip install --quiet --no-build-isolation --editable ".[test]" -C build-dir=build
+	touch $@
+
+.venv/peers: .venv/tested
+	$(BIN)/python -m pip install --quiet --no-build-isolation --editable ".[test,peers]" -C build-dir=build
+	touch $@
+
+.venv/lab: .venv/installed
+	$(BIN)/python -m pip install --quiet --no-build-isolation --editable ".[lab]" -C build-dir=build
+	touch $@
+
+clean:
+	rm -rf build .venv

@@ -1,0 +1,265 @@
+// elimination.h: factorization, solves, and what to do when a pivot is singular or digits are lost.
+#pragma once
+
+#include <algorithm>
+
+#include "algebra/elimination_assembly.h"
+
+namespace pycraft {
+
+template <class S>
+bool TreeElimination<S>::eliminate() {
+  using std::abs;
+  for (int k = static_cast<int>(fronts_.size()) - 1; k >= 0; --k) {
+    const Front& f = fronts_[k];
+    const int across = f.width() + border_;
+    S *U = A_.data() + f.across, *over = A_.data() + f.over;
+    failed_ = k;
+    if (!lu_[k].factor(A_.data() + f.matrix, f.n, magnitude_.data() + f.vector)) return false;
+    work_.resize(std::max(work_.size(), size_t(f.n) * std::max(across, 1)));
+    lu_[k].solve(U, across, work_.data());
+    // Schur complement in the parent and the border
+    for (int i = 0; i < f.height() + border_; ++i) {
+      const bool parent_row = i < f.height();
+      const Front* p = f.parent >= 0 ? &fronts_[f.parent] : nullptr;
+      for (int j = 0; j < across; ++j) {
+        S update = S(0);
+        for (int a = 0; a < f.n; ++a) update += over[size_t(i) * f.n + a] * U[size_t(a) * across + j];
+        if (update == S(0)) continue;
+        const bool parent_column = j < f.width();
+        if (parent_row && parent_column) {
+          A_[p->matrix + size_t(f.rows[i]) * p->n + f.columns[j]] -= update;
+          S& magnitude = magnitude_[p->vector + f.rows[i]];
+          magnitude = std::max(magnitude, S(abs(update)));
+        } else if (parent_row) {
+          A_[p->across + size_t(f.rows[i]) * (p->width() + border_) + p->width() + (j - f.width())] -= update;
+        } else if (parent_column) {
+          A_[p->over + size_t(p->height() + (i - f.height())) * p->n + f.columns[j]] -= update;
+        } else {
+          border_matrix_[size_t(i - f.height()) * border_ + (j - f.width())] -= update;
+          S& magnitude = border_magnitude_[i - f.height()];
+          magnitude = std::max(magnitude, S(abs(update)));
+        }
+      }
+    }
+  }
+  failed_ = -1;
+  return border_ == 0 || border_lu_.factor(border_matrix_.data(), border_, border_magnitude_.data());
+}
+
+template <class S>
+S TreeElimination<S>::lost() {
+  using std::abs;
+  const size_t size = total_ + border_;
+  rhs_.assign(size, S(0));
+  residual_.resize(size);
+  for (size_t i = 0; i < size; ++i) residual_[i] = (i * 2654435761u >> 7) & 1 ? S(1) : S(-1);  // scattered signs
+  subtract_product(residual_.data(), rhs_.data(), 1);
+  for (S& b : rhs_) b = -b;
+  size_t largest = border_;
+  for (const Front& f : fronts_) largest = std::max(largest, size_t(f.n));
+  if (work_.size() < largest) work_.resize(largest);
+  solve_system(rhs_.data(), 1);
+  S error = S(0);
+  for (size_t i = 0; i < size; ++i) {
+    const S e = abs(rhs_[i] - residual_[i]);
+    if (!(e <= error)) error = e;
+  }
+  return error;
+}
+
+template <class S>
+void TreeElimination<S>::coarsen() {
+  std::vector<char> odd(fronts_.size(), 0);
+  for (size_t f = 0; f < fronts_.size(); ++f) {
+    odd[f] = fronts_[f].parent >= 0 && !odd[fronts_[f].parent];
+    if (odd[f]) merged_with_parent_[fronts_[f].bodies[0]] = 1;
+  }
+  lay_out(false);
+}
+
+template <class S>
+template <class Blocks, class Values>
+void TreeElimination<S>::factor(Blocks&& blocks, Values&& values) {
+  const S tolerated = S(1e7) * epsilon<S>();
+  const auto widest = [&] {
+    int n = 0;
+    for (const Front& f : fronts_) n = std::max(n, f.n);
+    return n;
+  };
+  std::string where = "the pivot block of the low-rank border is singular";
+  dense_ = false;
+  for (int attempt = 0; attempt < elimination::merges; ++attempt) {
+    assemble(blocks, values);
+    if (eliminate()) {
+      growth_ = lost();
+      if (growth_ <= tolerated) return;
+      where = "elimination body by body loses " + elimination::digits(growth_) + " digits";
+      // One front, or one per root: nothing is left to merge.
+      if (std::all_of(fronts_.begin(), fronts_.end(), [](const Front& f) { return f.parent < 0; }) || 2 * widest() > elimination::largest_merged_front) break;
+      coarsen();
+      continue;
+    }
+    if (failed_ < 0) break;  // the border's own block
+    const Front& f = fronts_[failed_];
+    where = "the pivot block of body '" + tree_.body_names[f.bodies[0]] + "' is singular";
+    if (f.parent < 0 || f.n + fronts_[f.parent].n > elimination::largest_merged_front) break;
+    merged_with_parent_[f.bodies[0]] = 1;
+    lay_out(false);
+  }
+  const std::string remedy = "; a wider precision (.at(precision=\"quad\")) may decide";
+  if (static_cast<int>(total_) + border_ > elimination::largest_dense)
+    throw SingularOperatorError(where + ", and with " + std::to_string(total_) + " states the operator is too large for a dense factorization" + remedy);
+  lay_out(true);
+  assemble(blocks, values);
+  if (!eliminate()) throw SingularOperatorError(where + ", and so is the operator as a whole: it has no inverse at this state");
+  growth_ = lost();
+  if (!(growth_ < S(0.3))) throw SingularOperatorError("the operator is singular to working precision at this state (" + where + ")" + remedy);
+  dense_ = true;
+  note_ = "dense: " + where + "; eliminated as one block of " + std::to_string(total_) + " states";
+}
+
+template <class S>
+void TreeElimination<S>::solve_system(S* b, int m) {
+  S* border = b + total_ * m;
+  for (int k = static_cast<int>(fronts_.size()) - 1; k >= 0; --k) {
+    const Front& f = fronts_[k];
+    S* y = b + f.vector * m;
+    lu_[k].solve(y, m, work_.data());
+    for (int i = 0; i < f.height() + border_; ++i) {
+      S* target = i < f.height() ? b + (fronts_[f.parent].vector + f.rows[i]) * m : border + (i - f.height()) * m;
+      const S* row = A_.data() + f.over + size_t(i) * f.n;
+      for (int a = 0; a < f.n; ++a)
+        if (!(row[a] == S(0)))
+          for (int c = 0; c < m; ++c) target[c] -= row[a] * y[a * m + c];
+    }
+  }
+  if (border_) border_lu_.solve(border, m, work_.data());
+  for (size_t k = 0; k < fronts_.size(); ++k) {
+    const Front& f = fronts_[k];
+    S* y = b + f.vector * m;
+    const int across = f.width() + border_;
+    const S* U = A_.data() + f.across;
+    for (int j = 0; j < across; ++j) {
+      const S* s = j < f.width() ? b + (fronts_[f.parent].vector + f.columns[j]) * m : border + (j - f.width()) * m;
+      for (int i = 0; i < f.n; ++i) {
+        const S u = U[size_t(i) * across + j];
+        if (u == S(0)) continue;
+        for (int c = 0; c < m; ++c) y[i * m + c] -= u * s[c];
+      }
+    }
+  }
+}
+
+template <class S>
+void TreeElimination<S>::subtract_product(const S* s, S* r, int m) const {
+  const S* border_s = s + total_ * m;
+  S* border_r = r + total_ * m;
+  const auto row_product = [&](const S* row, const S* v, int n, S* target) {
+    for (int a = 0; a < n; ++a)
+      if (!(row[a] == S(0)))
+        for (int c = 0; c < m; ++c) target[c] -= row[a] * v[a * m + c];
+  };
+  for (const Front& f : fronts_) {
+    const S* own = s + f.vector * m;
+    const int across = f.width() + border_;
+    for (int i = 0; i < f.n; ++i) {
+      S* target = r + (f.vector + i) * m;
+      row_product(original_.data() + f.matrix + size_t(i) * f.n, own, f.n, target);
+      const S* line = original_.data() + f.across + size_t(i) * across;
+      for (int j = 0; j < across; ++j) {
+        if (line[j] == S(0)) continue;
+        const S* v = j < f.width() ? s + (fronts_[f.parent].vector + f.columns[j]) * m : border_s + (j - f.width()) * m;
+        for (int c = 0; c < m; ++c) target[c] -= line[j] * v[c];
+      }
+    }
+    for (int i = 0; i < f.height() + border_; ++i) {
+      S* target = i < f.height() ? r + (fronts_[f.parent].vector + f.rows[i]) * m : border_r + (i - f.height()) * m;
+      row_product(original_.data() + f.over + size_t(i) * f.n, own, f.n, target);
+    }
+  }
+  for (int i = 0; i < border_; ++i) row_product(border_original_.data() + size_t(i) * border_, border_s, border_, border_r + i * m);
+}
+
+template <class S>
+template <class Blocks>
+void TreeElimination<S>::solve(const S* x, S* y, int m, Blocks&& blocks) {
+  const size_t size = (total_ + border_) * m;
+  rhs_.assign(size, S(0));
+  size_t largest = border_;
+  for (const Front& f : fronts_) largest = std::max(largest, size_t(f.n));
+  if (work_.size() < largest * m) work_.resize(largest * m);
+  const auto at = [&](Place p, int i) { return ((p.front < 0 ? total_ : fronts_[p.front].vector) + p.position + i) * m; };
+  // right-hand side from the input
+  for (const Realization::Term& t : r_->inputs) {
+    if (!r_->domain.belongs_to_bodies()) {
+      for (int i = 0; i < r_->domain.dimension(); ++i)
+        for (int c = 0; c < m; ++c) rhs_[at(equation_at_[t.row][0], i) + c] += S(t.coefficient) * x[i * m + c];
+      continue;
+    }
+    for (int k = 0; k < tree_.bodies(); ++k) {
+      const Place place = equation_at_[t.row][k];
+      elimination::for_rows(r_->domain, k, [&](int local, int row) {
+        if (t.right < 0) {
+          for (int c = 0; c < m; ++c) rhs_[at(place, local) + c] += S(t.coefficient) * x[row * m + c];
+        } else {
+          const BlockStorage<S>& b = blocks(t.right);
+          for (int i = 0; i < b.rows[k]; ++i) {
+            const S f = S(t.coefficient) * b.at(k)[i * b.columns[k] + local];
+            for (int c = 0; c < m; ++c) rhs_[at(place, i) + c] += f * x[row * m + c];
+          }
+        }
+      });
+    }
+  }
+  residual_ = rhs_;
+  solve_system(rhs_.data(), m);
+  // One step of refinement on the system itself; further ones while the correction is large and shrinks.
+  using std::abs;
+  S last = S(-1);
+  for (int step = 0; step < 4; ++step) {
+    product_ = residual_;
+    subtract_product(rhs_.data(), product_.data(), m);
+    solve_system(product_.data(), m);
+    S correction = S(0), solution = S(0);
+    for (size_t i = 0; i < size; ++i) {
+      correction = std::max(correction, S(abs(product_[i])));
+      solution = std::max(solution, S(abs(rhs_[i])));
+    }
+    if (step && !(correction < last / S(2))) break;
+    for (size_t i = 0; i < size; ++i) rhs_[i] += product_[i];
+    if (!(correction > S(1e6) * epsilon<S>() * solution)) break;
+    last = correction;
+  }
+  // output
+  std::fill_n(y, size_t(r_->codomain.dimension()) * m, S(0));
+  for (const Realization::Term& t : r_->outputs) {
+    if (!r_->codomain.belongs_to_bodies()) {
+      for (int i = 0; i < r_->codomain.dimension(); ++i)
+        for (int c = 0; c < m; ++c) y[i * m + c] += S(t.coefficient) * rhs_[at(state_at_[t.column][0], i) + c];
+      continue;
+    }
+    for (int k = 0; k < tree_.bodies(); ++k)
+      elimination::for_rows(r_->codomain, k, [&](int local, int row) {
+        const auto source = [&](int i, int c) -> S {
+          if (t.column >= 0) return rhs_[at(state_at_[t.column][k], i) + c];
+          S value = S(0);
+          elimination::for_rows(r_->domain, k, [&](int l, int xr) {
+            if (l == i) value = x[xr * m + c];
+          });
+          return value;
+        };
+        if (t.right < 0) {
+          for (int c = 0; c < m; ++c) y[row * m + c] += S(t.coefficient) * source(local, c);
+        } else {
+          const BlockStorage<S>& b = blocks(t.right);
+          for (int i = 0; i < b.columns[k]; ++i) {
+            const S f = S(t.coefficient) * b.at(k)[local * b.columns[k] + i];
+            for (int c = 0; c < m; ++c) y[row * m + c] += f * source(i, c);
+          }
+        }
+      });
+  }
+}
+
+}  // namespace pycraft

@@ -1,0 +1,118 @@
+// Scalars and residuals: what is made of several evaluations.
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "algebra/engine.h"
+#include "algebra/errors.h"
+
+namespace pycraft {
+
+namespace {
+
+// Sums are taken in the widest scalar, so that a difference of two scalars keeps what the engine computed.
+Quad widened(const std::vector<double>& parts) {
+  Quad sum = 0;
+  for (auto p = parts.rbegin(); p != parts.rend(); ++p) sum += Quad(*p);
+  return sum;
+}
+
+void add_scalar(const Scalar& s, Quad factor, std::vector<Quad>& total, int& batch, bool rules) {
+  const auto& n = s.node();
+  switch (n.kind) {
+    case ScalarKind::number:
+      for (Quad& t : total) t += factor * Quad(n.value);
+      return;
+    case ScalarKind::sum:
+      for (const Scalar& t : n.terms) add_scalar(t, factor, total, batch, rules);
+      return;
+    case ScalarKind::scaled: add_scalar(n.terms[0], factor * Quad(n.value), total, batch, rules); return;
+    default: break;
+  }
+  const Request request = n.kind == ScalarKind::trace ? Request::trace : n.kind == ScalarKind::logdet ? Request::logdet : Request::norm;
+  Result r;
+  evaluate(n.operand, request, r, rules, true);
+  if (r.batch >= 0) {
+    if (batch >= 0 && batch != r.batch) throw EvaluationError("batches of different lengths in one scalar");
+    if (batch < 0) total.assign(r.batch, total.empty() ? Quad(0) : total[0]);
+    batch = r.batch;
+  }
+  for (size_t i = 0; i < total.size(); ++i) total[i] += factor * widened(r.expansions[r.batch >= 0 ? i : 0]);
+}
+
+}  // namespace
+
+std::vector<double> evaluate(const Scalar& s, int* batch, bool rules) {
+  std::vector<Quad> total(1, Quad(0));
+  int b = -1;
+  add_scalar(s, Quad(1), total, b, rules);
+  if (batch) *batch = b;
+  std::vector<double> rounded;
+  for (const Quad& t : total) rounded.push_back(to_double(t));
+  return rounded;
+}
+
+// ------------------------------------------------------------------ residuals
+
+namespace {
+
+constexpr int probe_above = 400, probe_count = 8;
+
+// Random signs, the same for the same size.
+std::vector<double> probes(int dimension) {
+  std::mt19937 generator(static_cast<unsigned>(dimension));
+  std::vector<double> x(size_t(dimension) * probe_count);
+  for (double& s : x) s = generator() & 1 ? 1.0 : -1.0;
+  return x;
+}
+
+// Largest entry of e (signed, if the positive part alone counts), of all blocks or of those on one path to the base.
+double largest_entry(const Expression& e, const std::map<std::string, std::vector<double>>& vectors, bool on_one_path, bool positive_part) {
+  Result r;
+  Inputs inputs;
+  inputs.vectors = vectors;
+  std::vector<double> x;
+  if (e.domain().dimension() > probe_above && !on_one_path) {
+    x = probes(e.domain().dimension());
+    inputs.x = x.data();
+    inputs.columns = probe_count;
+    prepare(e, Request::apply, false)->run(inputs, false, r);
+  } else {
+    prepare(e, Request::dense, false)->run(inputs, false, r);
+  }
+  std::vector<int> row_body, column_body;
+  const SkoStructure* tree = nullptr;
+  if (on_one_path) {
+    tree = &contexts(e).at(0).source->structure();
+    row_body.resize(r.rows), column_body.resize(r.columns);
+    for (const auto& block : e.codomain().layout().blocks) std::fill_n(row_body.begin() + block.offset, block.size, block.body);
+    for (const auto& block : e.domain().layout().blocks) std::fill_n(column_body.begin() + block.offset, block.size, block.body);
+  }
+  const auto related = [&](int i, int j) {
+    int low = std::max(i, j);
+    const int high = std::min(i, j);
+    while (low > high) low = tree->parent[low];
+    return low == high;
+  };
+  double top = 0;
+  for (int i = 0; i < r.rows; ++i)
+    for (int j = 0; j < r.columns; ++j) {
+      if (on_one_path && !related(row_body[i], column_body[j])) continue;
+      const double value = r.values[size_t(i) * r.columns + j], counted = positive_part ? std::max(value, 0.0) : std::abs(value);
+      if (!(counted <= top)) top = counted;  // lets a NaN through
+    }
+  return top;
+}
+
+}  // namespace
+
+Residual residual(const Expression& a, const Expression& b, const std::map<std::string, std::vector<double>>& vectors, bool on_one_path, bool at_most) {
+  // The difference is planned as typed, so that it is taken at the full precision.
+  return {largest_entry(a - b, vectors, on_one_path, at_most), largest_entry(a, vectors, on_one_path, false), largest_entry(b, vectors, on_one_path, false)};
+}
+
+Residual residual(const Scalar& a, const Scalar& b) {
+  return {std::abs(evaluate(a - b, nullptr, false)[0]), std::abs(evaluate(a, nullptr, false)[0]), std::abs(evaluate(b, nullptr, false)[0])};
+}
+
+}  // namespace pycraft

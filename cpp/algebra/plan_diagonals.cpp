@@ -1,0 +1,238 @@
+// Steps for diagonal blocks and determinants: by structure where the algebra gives them, else from an elimination.
+#include <cmath>
+
+#include "algebra/errors.h"
+#include "algebra/lower.h"
+#include "algebra/planner.h"
+#include "algebra/planning.h"
+#include "algebra/properties.h"
+
+namespace pycraft {
+
+using namespace planning;
+
+std::optional<int> Planner::diagonal_by_structure(const Expression& e) {
+  if (is_block_diagonal(e)) return blocks(e);
+  switch (e.kind()) {
+    case NodeKind::symbol:
+    case NodeKind::transpose: {
+      bool t = false;
+      const Symbol* symbol = letter_of(e, t);
+      if (!symbol) return std::nullopt;
+      if (symbol->definition->pattern == Pattern::resolvent) return identity_blocks(e.codomain(), e.domain());
+      if (symbol->definition->pattern == Pattern::edges) return zero_blocks(e.codomain(), e.domain());
+      if (symbol->definition->pattern == Pattern::compound) return diagonal_by_structure(lower(e, true));
+      return std::nullopt;
+    }
+    case NodeKind::scaled:
+    case NodeKind::sum: {
+      const std::vector<Expression> terms = e.kind() == NodeKind::sum ? e.children() : std::vector<Expression>{e};
+      Step s{StepKind::combine_blocks};
+      for (const Expression& t : terms) {
+        const Scaled part = split_scalar(t);
+        const auto r = diagonal_by_structure(part.expression);
+        if (!r) return std::nullopt;
+        s.in.push_back(*r);
+        s.coefficients.push_back(part.coefficient);
+      }
+      s.flops = 2 * block_entries(e.codomain(), e.domain()) * terms.size();
+      s.bytes = 8 * block_entries(e.codomain(), e.domain());
+      s.text = "blocks: blockdiag(" + show(e) + ")";
+      return emit(std::move(s), {RegisterKind::blocks, e.codomain(), e.domain(), nullptr, false});
+    }
+    case NodeKind::inverse: {
+      const Expression& inner = e.children()[0];
+      if (!is_upper_triangular(inner) && !is_lower_triangular(inner)) return std::nullopt;
+      const auto r = diagonal_by_structure(inner);
+      if (!r) return std::nullopt;
+      Step s{StepKind::invert_blocks};
+      s.in = {*r};
+      s.flops = block_product_flops(e.codomain(), e.codomain(), e.domain());
+      s.bytes = 8 * block_entries(e.codomain(), e.domain());
+      s.text = "blocks: blockdiag(" + show(e) + ")";
+      return emit(std::move(s), {RegisterKind::blocks, e.codomain(), e.domain(), nullptr, false});
+    }
+    case NodeKind::product: {
+      const auto& f = e.children();
+      if (is_upper_triangular(e) || is_lower_triangular(e)) {
+        bool each = true;  // a triangular product is the product of triangular factors unless E ... E* met inside
+        for (const Expression& x : f) each &= is_upper_triangular(e) ? is_upper_triangular(x) : is_lower_triangular(x);
+        if (!each) return std::nullopt;
+        std::optional<int> r;
+        for (const Expression& x : f) {
+          const auto d = diagonal_by_structure(x);
+          if (!d) return std::nullopt;
+          r = r ? multiply_blocks(*r, *d) : *d;
+        }
+        return r;
+      }
+      // A φ X φ* B with A, X, B block diagonal: a Lyapunov sweep.
+      size_t i = 0;
+      while (i < f.size() && is_block_diagonal(f[i])) ++i;
+      size_t j = f.size();
+      while (j > i && is_block_diagonal(f[j - 1])) --j;
+      if (j < i + 2) return std::nullopt;
+      bool left_t = false, right_t = false;
+      const Symbol *left = letter_of(f[i], left_t), *right = letter_of(f[j - 1], right_t);
+      if (!left || !right || left->definition != right->definition || left->definition->pattern != Pattern::resolvent || !same_model(*left, *right) ||
+          left_t == right_t)
+        return std::nullopt;
+      for (size_t k = i + 1; k + 1 < j; ++k)
+        if (!is_block_diagonal(f[k])) return std::nullopt;
+      int middle;
+      if (j == i + 2) {
+        middle = identity_blocks(f[i].domain(), f[j - 1].codomain());
+      } else {
+        middle = blocks(product_of(std::vector<Expression>(f.begin() + i + 1, f.begin() + j - 1)));
+      }
+      Step s{StepKind::lyapunov_blocks};
+      s.in = {middle};
+      s.symbol = *left;
+      s.transposed = left_t;
+      s.context = context_of(*left, left->definition->groups);
+      s.flops = group_flops(*left->source, Group::composite) * (left->definition->id == SymbolId::psi ? 2 : 1);
+      s.bytes = 8 * block_entries(f[i].codomain(), f[j - 1].domain());
+      s.text = "blocks: blockdiag(" + show(product_of(std::vector<Expression>(f.begin() + i, f.begin() + j))) + ")" +
+               (left_t ? " (base to tip)" : " (tip to base)");
+      int r = emit(std::move(s), {RegisterKind::blocks, f[i].codomain(), f[j - 1].domain(), nullptr, false});
+      if (i > 0) r = multiply_blocks(blocks(product_of(std::vector<Expression>(f.begin(), f.begin() + i))), r);
+      if (j < f.size()) r = multiply_blocks(r, blocks(product_of(std::vector<Expression>(f.begin() + j, f.end()))));
+      return r;
+    }
+    default: return std::nullopt;
+  }
+}
+
+int Planner::diagonal_blocks(const Expression& e) {
+  // Attempts that fail leave steps behind that nothing reads: drop_unused removes them.
+  if (const auto r = diagonal_by_structure(e)) return *r;
+  std::string reason;
+  const auto realization = build_realization(*this, e, true, reason);
+  if (realization) {
+    Step f{StepKind::factor};
+    f.realization = realization;
+    f.flops = realization->factor_flops();
+    f.bytes = 8 * realization->entries();
+    f.tier = 3;
+    f.text = "eliminate " + show(e) + " over the tree, leaves to root";
+    const int factor = emit(std::move(f), {RegisterKind::factor, {}, {}, realization, false});
+    Step s{StepKind::selected_blocks};
+    s.in = {factor};
+    s.realization = realization;
+    s.flops = 2 * realization->factor_flops();
+    s.bytes = 8 * realization->entries();
+    s.tier = 3;
+    s.text = "blocks: blockdiag(" + show(e) + ") from the factors, root to leaves";
+    return emit(std::move(s), {RegisterKind::blocks, e.codomain(), e.domain(), nullptr, false});
+  }
+  plan_.notes.push_back("dense: " + reason);
+  Step s{StepKind::blocks_of_dense};
+  s.operand = std::make_shared<const Plan>(Planner(options_).plan(e, Request::apply));
+  for (size_t c = 0; c < s.operand->contexts.size(); ++c)
+    context_of(Symbol{nullptr, s.operand->contexts[c].source, s.operand->contexts[c].binding, {}, {}}, s.operand->groups[c]);
+  s.flops = e.domain().dimension() * s.operand->flops();
+  s.bytes = 8.0 * e.domain().dimension() * e.codomain().dimension();
+  s.tier = 4;
+  s.text = "blocks: blockdiag(" + show(e) + ") column by column: " + reason;
+  return emit(std::move(s), {RegisterKind::blocks, e.codomain(), e.domain(), nullptr, false});
+}
+
+std::optional<int> Planner::logdet_by_structure(const Expression& e) {
+  const Register scalar{RegisterKind::scalar, {}, {}, nullptr, false};
+  const auto combine = [&](std::vector<int> in, std::vector<double> c, const std::string& text, double constant) {
+    Step s{StepKind::combine_scalars};
+    s.in = std::move(in);
+    s.coefficients = std::move(c);
+    s.coefficients.push_back(constant);
+    s.text = text;
+    return emit(std::move(s), scalar);
+  };
+  switch (e.kind()) {
+    case NodeKind::identity: return combine({}, {}, "ln det I = 0", 0);
+    case NodeKind::scaled: {
+      const auto r = logdet_by_structure(e.children()[0]);
+      if (!r) return std::nullopt;
+      return combine({*r}, {1.0}, "ln det of a multiple", e.domain().dimension() * std::log(std::abs(e.node().coefficient)));
+    }
+    case NodeKind::inverse: {
+      const auto r = logdet_by_structure(e.children()[0]);
+      if (!r) return std::nullopt;
+      return combine({*r}, {-1.0}, "ln det of an inverse", 0);
+    }
+    case NodeKind::product: {
+      std::vector<int> parts;
+      bool square = true;
+      for (const Expression& f : e.children()) square &= f.domain().dimension() == f.codomain().dimension();
+      if (square) {
+        for (const Expression& f : e.children()) {
+          const auto r = logdet_by_structure(f);
+          if (!r) break;
+          parts.push_back(*r);
+        }
+        if (parts.size() == e.children().size()) return combine(parts, std::vector<double>(parts.size(), 1.0), "ln det of a product", 0);
+      }
+      break;
+    }
+    default: break;
+  }
+  if (e.kind() == NodeKind::symbol && e.node().symbol.definition->id == SymbolId::D) {
+    const Symbol& symbol = e.node().symbol;
+    Step s{StepKind::logdet_of_D};
+    s.symbol = symbol;
+    s.context = context_of(symbol, symbol.definition->groups);
+    s.flops = 10.0 * symbol.source->structure().coordinates();
+    s.text = "Σ ln det D(k)";
+    return emit(std::move(s), scalar);
+  }
+  if (!e.domain().belongs_to_bodies() || !e.codomain().belongs_to_bodies()) return std::nullopt;
+  if (is_block_diagonal(e) || is_upper_triangular(e) || is_lower_triangular(e)) {
+    const auto b = diagonal_by_structure(e);
+    if (!b) return std::nullopt;
+    Step s{StepKind::logdet_of_blocks};
+    s.in = {*b};
+    s.flops = block_product_flops(e.codomain(), e.codomain(), e.domain()) / 3;
+    s.text = "Σ ln|det| of the diagonal blocks";
+    return emit(std::move(s), scalar);
+  }
+  return std::nullopt;
+}
+
+int Planner::logdet(const Expression& e) {
+  if (const auto r = logdet_by_structure(e)) return *r;
+  const Register scalar{RegisterKind::scalar, {}, {}, nullptr, false};
+  std::string reason;
+  const auto system = build_realization(*this, lower(e.inv(), false), false, reason);
+  const auto own = system ? build_realization(*this, e, false, reason) : nullptr;
+  if (!system || !own) {
+    Step s{StepKind::logdet_of_dense};
+    s.in = {solve_dense(e, -1, reason)};
+    s.tier = 4;
+    s.text = "ln|det| from the dense factors";
+    return emit(std::move(s), scalar);
+  }
+  // det X = det[T -B; C D] / det T
+  std::vector<int> parts;
+  for (const auto& realization : {system, own}) {
+    Step f{StepKind::factor};
+    f.realization = realization;
+    f.flops = realization->factor_flops();
+    f.bytes = 8 * realization->entries();
+    f.tier = 3;
+    f.text = std::string("eliminate the realization of ") + show(e) + (realization == system ? " closed, leaves to root" : " itself");
+    const int factor = emit(std::move(f), {RegisterKind::factor, {}, {}, realization, false});
+    Step s{StepKind::logdet_of_factor};
+    s.in = {factor};
+    s.flops = 10.0 * e.domain().dimension();
+    s.tier = 3;
+    s.text = "ln|det| from the pivots";
+    parts.push_back(emit(std::move(s), scalar));
+  }
+  Step s{StepKind::combine_scalars};
+  s.in = parts;
+  s.coefficients = {1.0, -1.0, 0.0};
+  s.tier = 3;
+  s.text = "ln|det| of " + show(e);
+  return emit(std::move(s), scalar);
+}
+
+}  // namespace pycraft

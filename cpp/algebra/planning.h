@@ -1,0 +1,36 @@
+// What the planner's files share.
+#pragma once
+
+#include <vector>
+
+#include "algebra/planner.h"
+
+namespace pycraft::planning {
+
+inline bool is_symbol(const Expression& e, SymbolId id) { return e.kind() == NodeKind::symbol && e.node().symbol.definition->id == id; }
+
+// A symbol or its transpose.
+inline const Symbol* letter_of(const Expression& e, bool& transposed) {
+  transposed = e.kind() == NodeKind::transpose;
+  const Expression& inner = transposed ? e.children()[0] : e;
+  return inner.kind() == NodeKind::symbol ? &inner.node().symbol : nullptr;
+}
+
+inline bool same_model(const Symbol& a, const Symbol& b) { return a.source == b.source && a.binding == b.binding; }
+
+inline double block_entries(const Space& rows, const Space& columns) {
+  double sum = 0;
+  for (size_t k = 0; k < rows.layout().of_body.size(); ++k) sum += double(rows.body_size(static_cast<int>(k))) * columns.body_size(static_cast<int>(k));
+  return sum;
+}
+
+inline double block_product_flops(const Space& rows, const Space& middle, const Space& columns) {
+  double sum = 0;
+  for (size_t k = 0; k < rows.layout().of_body.size(); ++k) {
+    const int i = static_cast<int>(k);
+    sum += 2.0 * rows.body_size(i) * middle.body_size(i) * columns.body_size(i);
+  }
+  return sum;
+}
+
+}  // namespace pycraft::planning

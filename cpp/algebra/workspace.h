@@ -1,0 +1,439 @@
+// The memory of a plan's runs at one scalar, and its steps: each does one sweep, one product, one factorization.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "algebra/elimination.h"
+#include "algebra/engine.h"
+#include "algebra/errors.h"
+#include "algebra/small_lu.h"
+#include "algebra/values.h"
+
+namespace pycraft {
+
+// Columns of the identity that dense requests take at a time: bounds the memory of a run.
+constexpr int columns_at_a_time = 64;
+
+template <class S>
+class Workspace {
+ public:
+  explicit Workspace(std::shared_ptr<const Plan> plan) : plan_(std::move(plan)), vectors_(plan_->registers.size()), blocks_(plan_->registers.size()),
+                                                         scalars_(plan_->registers.size(), S(0)), dense_(plan_->registers.size()) {
+    eliminations_.resize(plan_->registers.size());
+    dense_lu_.resize(plan_->registers.size());
+    for (size_t r = 0; r < plan_->registers.size(); ++r) {
+      const Register& reg = plan_->registers[r];
+      if (reg.kind == RegisterKind::blocks) blocks_[r].shape(reg.space, reg.columns);
+    }
+    for (const Step& s : plan_->steps)
+      if (s.operand) operands_.emplace_back(&s, std::make_unique<Workspace>(s.operand));
+  }
+
+  // The first step that depends on the columns: the steps before it run once per state, not once per columns_at_a_time.
+  void run(const std::vector<SkoValues<S>*>& values, int columns, bool values_changed, PassCounts& counts) {
+    for (size_t r = 0; r < plan_->registers.size(); ++r) {
+      const Register& reg = plan_->registers[r];
+      if (reg.kind == RegisterKind::vector) vectors_[r].resize(size_t(reg.space.dimension()) * (reg.wide ? columns : 1));
+    }
+    for (const Step& s : plan_->steps) {
+      const bool per_column = s.out >= 0 && plan_->registers[s.out].kind == RegisterKind::vector;
+      if (!values_changed && !per_column) continue;
+      step(s, values, columns, counts);
+    }
+  }
+
+  std::vector<S>& vector(int r) { return vectors_[r]; }
+  BlockStorage<S>& blocks(int r) { return blocks_[r]; }
+  std::vector<S>& dense(int r) { return dense_[r]; }
+  S& scalar(int r) { return scalars_[r]; }
+  const std::vector<std::string>& notes() const { return notes_; }
+
+ private:
+  void step(const Step& s, const std::vector<SkoValues<S>*>& values, int m, PassCounts& counts) {
+    const Plan& plan = *plan_;
+    const auto rows = [&](int r) { return plan.registers[r].space.dimension(); };
+    switch (s.kind) {
+      case StepKind::values:
+        ++counts.values;
+        return;  // done before the run
+      case StepKind::gather:
+      case StepKind::scatter:
+        ++(s.kind == StepKind::gather ? counts.gathers : counts.scatters);
+        values[s.context]->sweep(static_cast<SymbolId>(s.symbol.definition->id), s.kind == StepKind::scatter, vectors_[s.in[0]].data(),
+                                 vectors_[s.out].data(), width(s.in[0], m));
+        return;
+      case StepKind::apply_symbol:
+        values[s.context]->apply(s.symbol, s.transposed, s.inverted, vectors_[s.in[0]].data(), vectors_[s.out].data(), width(s.in[0], m));
+        return;
+      case StepKind::apply_blocks: apply_block_register(s, width(s.in[1], m)); return;
+      case StepKind::apply_constant: {
+        const int r = rows(s.out), c = rows(s.in[0]), w = width(s.in[0], m);
+        const S* x = vectors_[s.in[0]].data();
+        S* y = vectors_[s.out].data();
+        std::fill_n(y, size_t(r) * w, S(0));
+        for (int i = 0; i < r; ++i)
+          for (int j = 0; j < c; ++j) {
+            const S a = S(s.transposed ? s.constant->dense[size_t(j) * r + i] : s.constant->dense[size_t(i) * c + j]);
+            if (a == S(0)) continue;
+            for (int k = 0; k < w; ++k) y[size_t(i) * w + k] += a * x[size_t(j) * w + k];
+          }
+        return;
+      }
+      case StepKind::apply_column: {
+        const int w = width(s.in[1], m);
+        const S *v = vectors_[s.in[0]].data(), *x = vectors_[s.in[1]].data();
+        S* y = vectors_[s.out].data();
+        if (s.transposed) {
+          std::fill_n(y, w, S(0));
+          for (int i = 0; i < rows(s.in[0]); ++i)
+            for (int k = 0; k < w; ++k) y[k] += v[i] * x[size_t(i) * w + k];
+        } else {
+          for (int i = 0; i < rows(s.in[0]); ++i)
+            for (int k = 0; k < w; ++k) y[size_t(i) * w + k] = v[i] * x[k];
+        }
+        return;
+      }
+      case StepKind::apply_external: apply_external_operator(s, width(s.in[0], m)); return;
+      case StepKind::combine: {
+        const size_t n = vectors_[s.out].size();
+        S* y = vectors_[s.out].data();
+        for (size_t t = 0; t < s.in.size(); ++t) {
+          const S* x = vectors_[s.in[t]].data();
+          const S c = S(s.coefficients[t]);
+          if (t == 0)
+            for (size_t i = 0; i < n; ++i) y[i] = c * x[i];
+          else
+            for (size_t i = 0; i < n; ++i) y[i] += c * x[i];
+        }
+        return;
+      }
+      case StepKind::vector_symbol: values[s.context]->vector(s.symbol, vectors_[s.out].data()); return;
+      case StepKind::zero: std::fill(vectors_[s.out].begin(), vectors_[s.out].end(), S(0)); return;
+      case StepKind::load_blocks:
+      case StepKind::identity_blocks:
+      case StepKind::multiply_blocks:
+      case StepKind::combine_blocks:
+      case StepKind::transpose_blocks:
+      case StepKind::invert_blocks:
+      case StepKind::root_blocks:
+      case StepKind::congruence_blocks:
+      case StepKind::lyapunov_blocks: block_step(s, values); return;
+      case StepKind::factor: {
+        ++counts.eliminations;
+        auto& e = eliminations_[s.out];
+        if (!e) e = std::make_unique<TreeElimination<S>>(s.realization);
+        e->factor([&](int r) -> const BlockStorage<S>& { return blocks_[r]; }, [&](int c) -> const SkoValues<S>& { return *values[c]; });
+        if (e->dense()) {
+          ++counts.dense;
+          if (std::find(notes_.begin(), notes_.end(), e->note()) == notes_.end()) notes_.push_back(e->note());
+        }
+        return;
+      }
+      case StepKind::solve:
+        eliminations_[s.in[0]]->solve(vectors_[s.in[1]].data(), vectors_[s.out].data(), width(s.in[1], m),
+                                      [&](int r) -> const BlockStorage<S>& { return blocks_[r]; });
+        return;
+      case StepKind::selected_blocks:
+        eliminations_[s.in[0]]->selected(blocks_[s.out], [&](int r) -> const BlockStorage<S>& { return blocks_[r]; });
+        return;
+      case StepKind::mass_matrix:
+      case StepKind::mass_matrix_solve: {
+        ++counts.kernels;
+        const int w = width(s.in[0], m);
+        scratch_.resize(std::max(scratch_.size(), size_t(plan.contexts[s.context].source->structure().dimension()) * w));
+        if (s.kind == StepKind::mass_matrix)
+          values[s.context]->mass_matrix(s.flag, vectors_[s.in[0]].data(), vectors_[s.out].data(), w, scratch_.data());
+        else
+          values[s.context]->mass_matrix_inverse(vectors_[s.in[0]].data(), vectors_[s.out].data(), w, scratch_.data());
+        return;
+      }
+      case StepKind::mass_matrix_dense:
+        ++counts.kernels;
+        dense_[s.out].resize(size_t(rows(s.out)) * rows(s.out));
+        values[s.context]->mass_matrix_dense(s.flag, dense_[s.out].data());
+        return;
+      case StepKind::dense_factor: {
+        ++counts.dense;
+        std::vector<S>& A = dense_[s.out];
+        operand_as_matrix(s, values, A, counts);
+        const int n = rows(s.out);
+        std::vector<S> magnitude(n, S(0));
+        if (!dense_lu_[s.out].factor(A.data(), n, magnitude.data())) throw SingularOperatorError(plan.text + ": singular at this state");
+        return;
+      }
+      case StepKind::dense_solve: {
+        const int w = width(s.in[1], m);
+        vectors_[s.out] = vectors_[s.in[1]];
+        scratch_.resize(std::max(scratch_.size(), vectors_[s.out].size()));
+        dense_lu_[s.in[0]].solve(vectors_[s.out].data(), w, scratch_.data());
+        return;
+      }
+      case StepKind::blocks_of_dense: {
+        ++counts.dense;
+        std::vector<S> A;
+        operand_as_matrix(s, values, A, counts);
+        BlockStorage<S>& b = blocks_[s.out];
+        const int columns = s.operand->domain.dimension();
+        for (size_t k = 0; k < b.rows.size(); ++k)
+          elimination::for_rows(s.operand->codomain, static_cast<int>(k), [&](int i, int row) {
+            elimination::for_rows(s.operand->domain, static_cast<int>(k), [&](int j, int column) {
+              b.at(static_cast<int>(k))[i * b.columns[k] + j] = A[size_t(row) * columns + column];
+            });
+          });
+        return;
+      }
+      case StepKind::gather_blocks: {
+        const BlockStorage<S>& b = blocks_[s.in[0]];
+        const Register& reg = plan.registers[s.in[0]];
+        const int columns = reg.columns.dimension();
+        dense_[s.out].assign(size_t(reg.space.dimension()) * columns, S(0));
+        for (size_t k = 0; k < b.rows.size(); ++k)
+          elimination::for_rows(reg.space, static_cast<int>(k), [&](int i, int row) {
+            elimination::for_rows(reg.columns, static_cast<int>(k), [&](int j, int column) {
+              dense_[s.out][size_t(row) * columns + column] = b.at(static_cast<int>(k))[i * b.columns[k] + j];
+            });
+          });
+        return;
+      }
+      case StepKind::diagonal_of_blocks: {
+        const BlockStorage<S>& b = blocks_[s.in[0]];
+        for (size_t k = 0; k < b.rows.size(); ++k)
+          elimination::for_rows(plan.registers[s.in[0]].space, static_cast<int>(k),
+                                [&](int i, int row) { vectors_[s.out][row] = b.at(static_cast<int>(k))[i * b.columns[k] + i]; });
+        return;
+      }
+      case StepKind::trace_of_blocks:
+      case StepKind::root_of_trace: {
+        const BlockStorage<S>& b = blocks_[s.in[0]];
+        S sum = S(0);
+        for (size_t k = 0; k < b.rows.size(); ++k)
+          for (int i = 0; i < b.rows[k]; ++i) sum += b.at(static_cast<int>(k))[i * b.columns[k] + i];
+        using std::sqrt;
+        scalars_[s.out] = s.kind == StepKind::trace_of_blocks ? sum : sqrt(std::max(sum, S(0)));
+        return;
+      }
+      case StepKind::logdet_of_blocks: {
+        const BlockStorage<S>& b = blocks_[s.in[0]];
+        S sum = S(0);
+        for (size_t k = 0; k < b.rows.size(); ++k) {
+          factor_block(b, static_cast<int>(k), plan.registers[s.in[0]].space);
+          sum += lu_.log_abs_determinant();
+        }
+        scalars_[s.out] = sum;
+        return;
+      }
+      case StepKind::logdet_of_D: scalars_[s.out] = values[s.context]->log_determinant_of_D(); return;
+      case StepKind::logdet_of_factor: scalars_[s.out] = eliminations_[s.in[0]]->log_abs_determinant(); return;
+      case StepKind::logdet_of_dense: scalars_[s.out] = dense_lu_[s.in[0]].log_abs_determinant(); return;
+      case StepKind::norm_of_vector: return;  // taken by the pool over all columns_at_a_times
+      case StepKind::combine_scalars: {
+        S sum = S(s.coefficients.back());
+        for (size_t i = 0; i < s.in.size(); ++i) sum += S(s.coefficients[i]) * scalars_[s.in[i]];
+        scalars_[s.out] = sum;
+        return;
+      }
+    }
+  }
+
+  int width(int r, int m) const { return plan_->registers[r].wide ? m : 1; }
+
+  void factor_block(const BlockStorage<S>& b, int k, const Space& space) {
+    block_.assign(b.at(k), b.at(k) + size_t(b.rows[k]) * b.columns[k]);
+    magnitude_.assign(b.rows[k], S(0));
+    if (!lu_.factor(block_.data(), b.rows[k], magnitude_.data()))
+      throw SingularOperatorError("block '" + space.layout().blocks[space.layout().of_body[k][0]].label + "' of a block-diagonal operator in " +
+                                  plan_->text + " is singular: it has no inverse at this state");
+  }
+
+  void apply_block_register(const Step& s, int w) {
+    const BlockStorage<S>& b = blocks_[s.in[0]];
+    const Register& reg = plan_->registers[s.in[0]];
+    const S* x = vectors_[s.in[1]].data();
+    S* y = vectors_[s.out].data();
+    for (size_t kk = 0; kk < b.rows.size(); ++kk) {
+      const int k = static_cast<int>(kk);
+      elimination::for_rows(reg.space, k, [&](int i, int row) {
+        S* target = y + size_t(row) * w;
+        std::fill_n(target, w, S(0));
+        elimination::for_rows(reg.columns, k, [&](int j, int column) {
+          const S a = b.at(k)[i * b.columns[kk] + j];
+          const S* source = x + size_t(column) * w;
+          for (int c = 0; c < w; ++c) target[c] += a * source[c];
+        });
+      });
+    }
+  }
+
+  void apply_external_operator(const Step& s, int w) {
+    if constexpr (std::is_same_v<S, double>) {
+      const auto& f = s.transposed ? s.external->apply_transposed : s.external->apply;
+      if (!f) throw EvaluationError("the operator '" + s.external->name + "' has no " + (s.transposed ? "transpose" : "product"));
+      f(vectors_[s.in[0]].data(), vectors_[s.out].data(), w);
+    } else {
+      throw EvaluationError("the operator '" + s.external->name + "' comes from outside and computes in double precision only");
+    }
+  }
+
+  void operand_as_matrix(const Step& s, const std::vector<SkoValues<S>*>& values, std::vector<S>& A, PassCounts& counts) {
+    Workspace* w = nullptr;
+    for (auto& [step, workspace] : operands_)
+      if (step == &s) w = workspace.get();
+    std::vector<SkoValues<S>*> own;
+    for (const Context& c : s.operand->contexts) own.push_back(values[std::find(plan_->contexts.begin(), plan_->contexts.end(), c) - plan_->contexts.begin()]);
+    const int rows = s.operand->codomain.dimension(), columns = s.operand->domain.dimension();
+    A.resize(size_t(rows) * columns);
+    for (int start = 0; start < columns; start += columns_at_a_time) {
+      const int m = std::min(columns_at_a_time, columns - start);
+      std::vector<S>& x = w->vector(s.operand->input);
+      x.assign(size_t(columns) * m, S(0));
+      for (int j = 0; j < m; ++j) x[size_t(start + j) * m + j] = S(1);
+      w->run(own, m, start == 0, counts);
+      const std::vector<S>& y = w->vector(s.operand->output);
+      for (int i = 0; i < rows; ++i) std::copy_n(y.data() + size_t(i) * m, m, A.data() + size_t(i) * columns + start);
+      check_interrupt();
+    }
+  }
+
+  void block_step(const Step& s, const std::vector<SkoValues<S>*>& values) {
+    BlockStorage<S>& out = blocks_[s.out];
+    const int bodies = static_cast<int>(out.rows.size());
+    const auto in = [&](int i) -> const BlockStorage<S>& { return blocks_[s.in[i]]; };
+    switch (s.kind) {
+      case StepKind::load_blocks:
+        for (int k = 0; k < bodies; ++k) {
+          if (out.rows[k] == 0 || out.columns[k] == 0) continue;
+          if (s.constant)
+            std::transform(s.constant->blocks[k].begin(), s.constant->blocks[k].end(), out.at(k), [](double v) { return S(v); });
+          else
+            values[s.context]->block(s.symbol, k, out.at(k));
+        }
+        return;
+      case StepKind::identity_blocks:
+        std::fill(out.data.begin(), out.data.end(), S(0));
+        for (int k = 0; k < bodies; ++k)
+          for (int i = 0; i < std::min(out.rows[k], out.columns[k]); ++i) out.at(k)[i * out.columns[k] + i] = S(1);
+        return;
+      case StepKind::multiply_blocks:
+        std::fill(out.data.begin(), out.data.end(), S(0));
+        for (int k = 0; k < bodies; ++k) multiply_add(in(0).at(k), in(1).at(k), out.at(k), out.rows[k], in(0).columns[k], out.columns[k]);
+        return;
+      case StepKind::combine_blocks:
+        std::fill(out.data.begin(), out.data.end(), S(0));
+        for (size_t t = 0; t < s.in.size(); ++t)
+          for (size_t i = 0; i < out.data.size(); ++i) out.data[i] += S(s.coefficients[t]) * in(static_cast<int>(t)).data[i];
+        return;
+      case StepKind::transpose_blocks:
+        for (int k = 0; k < bodies; ++k)
+          for (int i = 0; i < out.rows[k]; ++i)
+            for (int j = 0; j < out.columns[k]; ++j) out.at(k)[i * out.columns[k] + j] = in(0).at(k)[j * out.rows[k] + i];
+        return;
+      case StepKind::invert_blocks:
+        for (int k = 0; k < bodies; ++k) {
+          const int n = out.rows[k];
+          factor_block(in(0), k, plan_->registers[s.in[0]].space);
+          std::fill_n(out.at(k), size_t(n) * n, S(0));
+          for (int i = 0; i < n; ++i) out.at(k)[i * n + i] = S(1);
+          product_.resize(std::max(product_.size(), size_t(n) * n));
+          lu_.solve(out.at(k), n, product_.data());
+        }
+        return;
+      case StepKind::root_blocks:
+        for (int k = 0; k < bodies; ++k) root_block(in(0), out, k);
+        return;
+      case StepKind::congruence_blocks:
+        std::fill(out.data.begin(), out.data.end(), S(0));
+        for (int k = 0; k < bodies; ++k) {
+          const int p = structure(s).parent[k];
+          if (p >= 0) add_congruence(s, values, k, in(0).at(k), out.at(p), false);
+        }
+        return;
+      case StepKind::lyapunov_blocks:
+        out.data = in(0).data;
+        if (!s.transposed) {
+          for (int k = bodies - 1; k >= 0; --k)
+            if (const int p = structure(s).parent[k]; p >= 0) add_congruence(s, values, k, out.at(k), out.at(p), false);
+        } else {
+          for (int k = 0; k < bodies; ++k)
+            if (const int p = structure(s).parent[k]; p >= 0) add_congruence(s, values, k, out.at(p), out.at(k), true);
+        }
+        return;
+      default: return;
+    }
+  }
+
+  const SkoStructure& structure(const Step& s) const { return plan_->contexts[s.context].source->structure(); }
+
+  // Y += X B X* (up: Y the parent's block) or X* B X (down: Y the child's), X = E(p,k) or E_ψ(p,k).
+  void add_congruence(const Step& s, const std::vector<SkoValues<S>*>& values, int k, const S* B, S* Y, bool down) {
+    static const Symbol edge{&sko_symbols()[SymbolId::E], nullptr, nullptr, {}, {}}, gain{&sko_symbols()[SymbolId::G], nullptr, nullptr, {}, {}},
+        hinge{&sko_symbols()[SymbolId::H], nullptr, nullptr, {}, {}};
+    const SkoStructure& t = structure(s);
+    const int sk = t.size[k], sp = t.size[t.parent[k]], n = t.dof[k];
+    block_.resize(size_t(sp) * sk);
+    values[s.context]->block(edge, k, block_.data());
+    if (s.symbol.definition->id == SymbolId::psi && n > 0) {  // E - (EG)H
+      magnitude_.resize(2 * size_t(sk) * n);
+      S *g = magnitude_.data(), *h = g + size_t(sk) * n;
+      values[s.context]->block(gain, k, g);
+      values[s.context]->block(hinge, k, h);
+      product_.assign(size_t(sp) * n, S(0));
+      multiply_add(block_.data(), g, product_.data(), sp, sk, n);
+      multiply_add(product_.data(), h, block_.data(), sp, n, sk, S(-1));
+    }
+    product_.assign(size_t(sp) * sk, S(0));
+    if (!down) {
+      multiply_add(block_.data(), B, product_.data(), sp, sk, sk);
+      multiply_transposed_add(product_.data(), block_.data(), Y, sp, sk, sp);
+    } else {
+      multiply_add(B, block_.data(), product_.data(), sp, sp, sk);
+      transposed_multiply_add(block_.data(), product_.data(), Y, sk, sp, sk);
+    }
+  }
+
+  // Lower Cholesky factor; a semidefinite block is let through (zero columns), an indefinite one is not.
+  void root_block(const BlockStorage<S>& in, BlockStorage<S>& out, int k) {
+    using std::sqrt;
+    const int n = in.rows[k];
+    const S* A = in.at(k);
+    S* L = out.at(k);
+    std::fill_n(L, size_t(n) * n, S(0));
+    S largest = S(0);
+    for (int i = 0; i < n; ++i) largest = std::max(largest, A[i * n + i]);
+    for (int j = 0; j < n; ++j) {
+      S pivot = A[j * n + j];
+      for (int a = 0; a < j; ++a) pivot -= L[j * n + a] * L[j * n + a];
+      const S bound = S(16 * n) * epsilon<S>() * largest;
+      if (pivot < -bound)
+        throw SingularOperatorError("block '" + plan_->registers[0].space.name() + "' number " + std::to_string(k) +
+                                    " is not positive semidefinite: it has no square root");
+      if (!(pivot > bound)) continue;
+      L[j * n + j] = sqrt(pivot);
+      for (int i = j + 1; i < n; ++i) {
+        S sum = A[i * n + j];
+        for (int a = 0; a < j; ++a) sum -= L[i * n + a] * L[j * n + a];
+        L[i * n + j] = sum / L[j * n + j];
+      }
+    }
+  }
+
+  std::shared_ptr<const Plan> plan_;
+  std::vector<std::vector<S>> vectors_;
+  std::vector<BlockStorage<S>> blocks_;
+  std::vector<S> scalars_;
+  std::vector<std::vector<S>> dense_;
+  std::vector<std::unique_ptr<TreeElimination<S>>> eliminations_;
+  std::vector<SmallLU<S>> dense_lu_;
+  std::vector<std::pair<const Step*, std::unique_ptr<Workspace>>> operands_;
+  SmallLU<S> lu_;
+  std::vector<S> scratch_, block_, product_, magnitude_;
+  std::vector<std::string> notes_;
+
+ public:
+  std::vector<std::unique_ptr<SkoValues<S>>> own_values;  // of batched contexts
+};
+
+}  // namespace pycraft

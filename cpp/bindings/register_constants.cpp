@@ -1,0 +1,91 @@
+// A user's own operators: arrays, and linear operators from outside.
+#include <cmath>
+
+#include "algebra/errors.h"
+#include "bindings/bindings.h"
+
+namespace pycraft {
+
+namespace {
+
+Expression constant_operator(const py::object& given, const py::object& domain, const py::object& codomain, const std::string& name) {
+  const auto space = [](const py::object& s) { return py::isinstance<py::int_>(s) ? Space::euclidean(s.cast<int>()) : s.cast<Space>(); };
+  const Space in = space(domain), out = space(codomain);
+  if (py::isinstance<py::list>(given) && py::len(given) > 0 && py::isinstance<py::array>(py::list(given)[0]) && in.belongs_to_bodies() &&
+      py::len(given) == in.layout().of_body.size()) {
+    std::vector<std::vector<double>> blocks;
+    for (const auto& item : py::list(given)) {
+      const Array b = real_array(py::reinterpret_borrow<py::object>(item));
+      blocks.emplace_back(b.data(), b.data() + b.size());
+    }
+    return constant_blocks(std::move(blocks), in, out, name);
+  }
+  const Array a = real_array(given);
+  for (py::ssize_t i = 0; i < a.size(); ++i)
+    if (!std::isfinite(a.data()[i])) throw EvaluationError("constant '" + name + "' has an entry that is not a finite number");
+  if (a.ndim() == 1) {  // a diagonal
+    const int n = static_cast<int>(a.shape(0));
+    if (in.dimension() != n || out.dimension() != n)
+      throw SpaceError("constant '" + name + "': a diagonal of " + std::to_string(n) + " numbers does not map " + in.description() + " to " + out.description());
+    if (in.belongs_to_bodies() && out.belongs_to_bodies() && in.layout().of_body.size() == out.layout().of_body.size()) {
+      std::vector<std::vector<double>> blocks;
+      for (size_t k = 0; k < in.layout().of_body.size(); ++k) {
+        const int size = in.body_size(static_cast<int>(k));
+        std::vector<double> block(size_t(size) * size, 0.0);
+        int at = 0;
+        for (int b : in.layout().of_body[k])
+          for (int i = 0; i < in.layout().blocks[b].size; ++i, ++at) block[size_t(at) * size + at] = a.data()[in.layout().blocks[b].offset + i];
+        blocks.push_back(std::move(block));
+      }
+      return constant_blocks(std::move(blocks), in, out, name);
+    }
+    std::vector<double> full(size_t(n) * n, 0.0);
+    for (int i = 0; i < n; ++i) full[size_t(i) * n + i] = a.data()[i];
+    return constant(std::move(full), in, out, name);
+  }
+  if (a.ndim() != 2 || a.shape(0) != out.dimension() || a.shape(1) != in.dimension())
+    throw SpaceError("constant '" + name + "' from " + in.description() + " to " + out.description() + " takes an array (" + std::to_string(out.dimension()) +
+                     ", " + std::to_string(in.dimension()) + "), or one diagonal, or a list of one block per body");
+  return constant(std::vector<double>(a.data(), a.data() + a.size()), in, out, name);
+}
+
+// Holds a Python callable; lets it go under the GIL.
+struct Callable {
+  py::object f;
+  explicit Callable(py::object g) : f(std::move(g)) {}
+  ~Callable() {
+    py::gil_scoped_acquire gil;
+    f = py::object();
+  }
+};
+
+Expression external_operator(const py::object& product, const py::object& transposed, const Space& domain, const Space& codomain, const std::string& name) {
+  auto data = std::make_shared<ExternalData>();
+  data->name = name;
+  const auto wrap = [](const py::object& f, int in, int out) -> std::function<void(const double*, double*, int)> {
+    if (f.is_none()) return nullptr;
+    auto held = std::make_shared<Callable>(f);
+    return [held, in, out](const double* x, double* y, int m) {
+      py::gil_scoped_acquire gil;
+      py::array_t<double> a({static_cast<py::ssize_t>(in), static_cast<py::ssize_t>(m)});
+      std::copy_n(x, size_t(in) * m, a.mutable_data());
+      const Array r = Array::ensure(held->f(a));
+      if (!r || r.size() != py::ssize_t(out) * m) throw EvaluationError("an operator from outside returned an array of the wrong shape");
+      std::copy_n(r.data(), r.size(), y);
+    };
+  };
+  data->apply = wrap(product, domain.dimension(), codomain.dimension());
+  data->apply_transposed = wrap(transposed, codomain.dimension(), domain.dimension());
+  return external(std::move(data), domain, codomain);
+}
+
+}  // namespace
+
+void register_constants(py::module_& m) {
+  m.def("constant", &constant_operator, py::arg("array"), py::arg("domain"), py::arg("codomain"), py::arg("name") = "C",
+        "An array as an operator from `domain` to `codomain` (spaces, or a size n for R^n): a matrix, one diagonal, or a list of one block per\n"
+        "body. What is block diagonal over the bodies is kept so; what has low rank is found when a plan needs it.");
+  m.def("external", &external_operator, py::arg("product"), py::arg("transposed"), py::arg("domain"), py::arg("codomain"), py::arg("name"));
+}
+
+}  // namespace pycraft

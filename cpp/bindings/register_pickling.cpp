@@ -1,0 +1,90 @@
+// Expressions as plain parts and back: pickling, copying.
+#include "algebra/errors.h"
+#include "bindings/bindings.h"
+#include "operators/multibody_operators.h"
+
+namespace pycraft {
+
+namespace {
+
+// Where a symbol's source comes back from in Python: the model's operators.
+py::object source_of(const Symbol& s) { return py::cast(s.source); }
+
+// A space as its model and kind, so that it can be pickled and found again.
+py::tuple space_parts(const Space& s) {
+  if (s.kind() == SpaceKind::Euclidean) return py::make_tuple(py::none(), static_cast<int>(s.kind()), s.dimension(), py::list());
+  const auto source = source_owning(s);
+  py::list names;
+  for (const auto& b : s.layout().blocks)
+    if (!s.layout().nodes.empty()) names.append(b.label);
+  return py::make_tuple(py::cast(source), static_cast<int>(s.kind()), s.dimension(), names);
+}
+
+Space space_from_parts(const py::tuple& t) {
+  const SpaceKind kind = static_cast<SpaceKind>(t[1].cast<int>());
+  if (kind == SpaceKind::Euclidean) return Space::euclidean(t[2].cast<int>());
+  const auto source = t[0].cast<std::shared_ptr<SkoSource>>();
+  const auto names = t[3].cast<std::vector<std::string>>();
+  if (!names.empty()) {
+    const Space forces = source_symbol(source, "B", names, -1).domain();
+    return kind == SpaceKind::NodesF ? forces : forces.dual();
+  }
+  if (kind == SpaceKind::Whitened) return Space(kind, source->forces().layout_pointer());
+  return source->space(kind, {});
+}
+
+}  // namespace
+
+py::tuple parts(const Expression& e) {
+  const auto& n = e.node();
+  py::object payload = py::none();
+  switch (n.kind) {
+    case NodeKind::symbol: {
+      py::list names;
+      if (const auto mechanics = std::dynamic_pointer_cast<MultibodyOperators>(n.symbol.source); mechanics && n.symbol.definition->id >= first_extra)
+        for (int a : n.symbol.arguments) {
+          if (n.symbol.definition->id == MechanicsSymbolId::Delta)
+            names.append(a);
+          else
+            names.append(a >= 0 ? mechanics->model()->node(a).name : mechanics->model()->body(-1 - a).name);
+        }
+      payload = py::make_tuple(source_of(n.symbol), n.symbol.definition->ascii, names, n.symbol.binding ? py::cast(std::const_pointer_cast<Binding>(n.symbol.binding)) : py::none());
+      break;
+    }
+    case NodeKind::vector: payload = py::make_tuple(n.name, space_parts(n.codomain)); break;
+    case NodeKind::identity: payload = e.floating() ? py::object(py::none()) : py::object(space_parts(n.domain)); break;
+    case NodeKind::zero: payload = py::make_tuple(space_parts(n.domain), space_parts(n.codomain)); break;
+    case NodeKind::scaled: payload = py::float_(n.coefficient); break;
+    case NodeKind::constant:
+      payload = py::make_tuple(n.constant->dense, n.constant->blocks, space_parts(n.domain), space_parts(n.codomain), n.constant->name);
+      break;
+    case NodeKind::external: throw py::type_error("an operator from outside ('" + n.external->name + "') cannot be pickled");
+    default: break;
+  }
+  return py::make_tuple(static_cast<int>(n.kind), payload, py::cast(n.children));
+}
+
+void register_pickling(py::module_& m) {
+  m.def("_make", [](const std::string& kind, const std::vector<Expression>& children, double coefficient) {
+    if (kind == "sum") return sum_of(children);
+    if (kind == "product") return product_of(children);
+    if (kind == "scaled") return coefficient * children[0];
+    if (kind == "transpose") return children[0].T();
+    if (kind == "inverse") return children[0].inv();
+    if (kind == "blockdiag") return block_diagonal(children[0]);
+    return square_root(children[0]);
+  });
+  m.def("_leaf_from_parts", [](const std::string& kind, const py::object& payload) {
+    if (kind == "identity") return payload.is_none() ? identity() : identity(space_from_parts(payload.cast<py::tuple>()));
+    const py::tuple t = payload.cast<py::tuple>();
+    if (kind == "vector") return make_vector(t[0].cast<std::string>(), space_from_parts(t[1].cast<py::tuple>()));
+    if (kind == "zero") return zero(space_from_parts(t[0].cast<py::tuple>()), space_from_parts(t[1].cast<py::tuple>()));
+    const Space domain = space_from_parts(t[2].cast<py::tuple>()), codomain = space_from_parts(t[3].cast<py::tuple>());
+    auto dense = t[0].cast<std::vector<double>>();
+    auto blocks = t[1].cast<std::vector<std::vector<double>>>();
+    const auto name = t[4].cast<std::string>();
+    return blocks.empty() ? constant(std::move(dense), domain, codomain, name) : constant_blocks(std::move(blocks), domain, codomain, name);
+  });
+}
+
+}  // namespace pycraft

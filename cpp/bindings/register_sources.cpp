@@ -1,0 +1,167 @@
+// Where operators come from: multibody models, trees of matrices, and the states that expressions are bound to.
+#include <algorithm>
+
+#include "algebra/errors.h"
+#include "algebra/matrix_tree.h"
+#include "bindings/bindings.h"
+#include "operators/multibody_operators.h"
+
+namespace pycraft {
+
+namespace {
+
+const SymbolDefinition& definition_named(const std::string& name) {
+  for (const SymbolDefinition& d : sko_symbols())
+    if (d.ascii == name) return d;
+  for (const SymbolDefinition& d : mechanics_symbols())
+    if (d.ascii == name) return d;
+  throw EvaluationError("no operator is called '" + name + "'");
+}
+
+}  // namespace
+
+Expression source_symbol(const std::shared_ptr<SkoSource>& source, const std::string& name, const std::vector<std::string>& nodes, int coordinate) {
+  const SymbolDefinition& d = definition_named(name);
+  source->check_current();
+  if (d.id < first_extra) return make_symbol(d, source);
+  const auto mechanics = std::dynamic_pointer_cast<MultibodyOperators>(source);
+  if (!mechanics) throw EvaluationError("'" + name + "' is an operator of mechanics; '" + source->name() + "' is a bare tree of matrices");
+  switch (d.id) {
+    case MechanicsSymbolId::B:
+    case MechanicsSymbolId::Jacobian:
+    case MechanicsSymbolId::Lambda: return node_operator(static_cast<MechanicsSymbolId>(d.id), mechanics, nodes);
+    case MechanicsSymbolId::Delta: return delta_operator(mechanics, coordinate);
+    default: return mechanics_operator(static_cast<MechanicsSymbolId>(d.id), mechanics);
+  }
+}
+
+std::shared_ptr<const Binding> make_binding(const std::vector<Expression>& operands, const py::object& q_given, const py::object& v_given, const std::string& form,
+                                            int refine, const std::string& precision) {
+  if (form != "fast") throw EvaluationError("form '" + form + "' of the articulated-inertia sweep is not there; there is 'fast'");
+  if (refine != 0) throw EvaluationError("refine=" + std::to_string(refine) + ": refinement is not there yet; there is refine=0");
+  auto binding = std::make_shared<Binding>();
+  binding->form = form;
+  binding->precision = precision_from_name(precision);
+  std::vector<std::shared_ptr<SkoSource>> sources;
+  for (const Expression& e : operands)
+    for (const Context& c : contexts(e))
+      if (!c.binding && std::find(sources.begin(), sources.end(), c.source) == sources.end()) sources.push_back(c.source);
+  if (sources.empty()) return binding;  // nothing to bind
+  for (const auto& s : sources) s->check_current();
+  int nq = 0, nv = 0;
+  for (const auto& s : sources)
+    if (s->nq() || s->nv()) nq = s->nq(), nv = s->nv();
+  if (q_given.is_none()) {
+    for (const auto& s : sources)
+      if (s->nq() || s->nv()) {
+        const auto now = s->state();
+        binding->q = now->q;
+        binding->v = now->v;
+      }
+    if (sources.size() > 1)
+      for (const auto& s : sources)
+        if (s->nq() && (s->nq() != nq)) throw EvaluationError("operators of two models: bind each with its own .at(q)");
+  } else {
+    py::object q = q_given, v = v_given;
+    if (py::hasattr(q, "q") && py::hasattr(q, "v")) {
+      v = q.attr("v");
+      q = q.attr("q");
+    }
+    const Array a = real_array(q);
+    if (a.ndim() != 1 && a.ndim() != 2) throw ModelError("a state is an array (nq,), a batch of states (B, nq)");
+    const py::ssize_t width = a.shape(a.ndim() - 1);
+    binding->batch = a.ndim() == 2 ? static_cast<int>(a.shape(0)) : -1;
+    const int states = std::max(binding->batch, a.ndim() == 2 ? 0 : 1);
+    binding->q.assign(a.data(), a.data() + a.size());
+    binding->v.assign(size_t(states) * nv, 0.0);
+    if (!v.is_none()) {
+      const Array w = real_array(v);
+      if (w.ndim() == 1 && w.shape(0) == nv) {
+        for (int b = 0; b < states; ++b) std::copy_n(w.data(), nv, binding->v.begin() + size_t(b) * nv);
+      } else if (w.ndim() == 2 && w.shape(0) == binding->batch && w.shape(1) == nv) {
+        binding->v.assign(w.data(), w.data() + w.size());
+      } else {
+        throw ModelError("v has not the shape that goes with q: (" + std::to_string(nv) + ",) or (B, " + std::to_string(nv) + ")");
+      }
+    }
+    for (const auto& s : sources)
+      for (int b = 0; b < std::max(states, binding->batch == 0 ? 0 : 1); ++b)
+        s->check_state(binding->q.data() + size_t(b) * width, width, binding->v.data() + size_t(b) * nv, nv);
+    if (binding->batch == 0 && width != nq) throw ModelError("q takes " + std::to_string(nq) + " numbers a state, not " + std::to_string(width));
+  }
+  binding->nq = nq;
+  binding->nv = nv;
+  return binding;
+}
+
+void register_sources(py::module_& m) {
+  py::class_<Binding, std::shared_ptr<Binding>>(m, "Binding", "A state, or a batch of them, that an expression is bound to.")
+      .def("__reduce__", [](const Binding& b) {
+        return py::make_tuple(py::module_::import("pycraft._core").attr("_binding_from_parts"),
+                              py::make_tuple(b.batch, b.nq, b.nv, b.q, b.v, precision_name(b.precision)));
+      });
+  m.def("_binding_from_parts", [](int batch, int nq, int nv, std::vector<double> q, std::vector<double> v, const std::string& precision) {
+    auto b = std::make_shared<Binding>();
+    b->batch = batch, b->nq = nq, b->nv = nv, b->q = std::move(q), b->v = std::move(v), b->precision = precision_from_name(precision);
+    return b;
+  });
+  m.def("_bind", &make_binding, py::arg("operands"), py::arg("q"), py::arg("v"), py::arg("form"), py::arg("refine"), py::arg("precision"));
+
+  py::class_<SkoSource, std::shared_ptr<SkoSource>>(m, "SkoSource", "Where the blocks of operators come from: a model, or a bare tree of matrices.")
+      .def_property_readonly("name", &SkoSource::name)
+      .def_property_readonly("Theta", &SkoSource::theta)
+      .def_property_readonly("V", &SkoSource::motions)
+      .def_property_readonly("F", &SkoSource::forces)
+      .def_property_readonly("parents", [](const SkoSource& s) { return s.structure().parent; })
+      .def_property_readonly("sizes", [](const SkoSource& s) { return s.structure().size; })
+      .def_property_readonly("dof", [](const SkoSource& s) { return s.structure().dof; })
+      .def_property_readonly("body_names", [](const SkoSource& s) { return s.structure().body_names; })
+      .def_property_readonly("hinge_names", [](const SkoSource& s) { return s.structure().hinge_names; })
+      .def_property_readonly("coordinate_names", [](const SkoSource& s) { return s.structure().coordinate_names; })
+      .def_property_readonly("traits", [](const SkoSource& s) {
+        const Traits t = s.traits();
+        py::dict d;
+        d["serial chain"] = t.chain, d["single-DOF hinges"] = t.single_dof, d["constant H"] = t.constant_hinges, d["J = 0"] = !t.hinge_diagonal;
+        return d;
+      })
+      .def("symbol", &source_symbol, py::arg("name"), py::arg("nodes") = std::vector<std::string>(), py::arg("coordinate") = -1)
+      .def("nodes_space", [](const std::shared_ptr<SkoSource>& s, const std::vector<std::string>& nodes, bool motions) {
+        const Expression b = source_symbol(s, "B", nodes, -1);
+        return motions ? b.domain().dual() : b.domain();
+      })
+      .def("check_current", &SkoSource::check_current);
+  py::class_<MultibodyOperators, SkoSource, std::shared_ptr<MultibodyOperators>>(m, "MultibodyOperators", "The operators' source of a multibody model.")
+      .def_property_readonly("model", [](const MultibodyOperators& s) { return s.model(); })
+      .def("__reduce__", [](const MultibodyOperators& s) {
+        return py::make_tuple(py::module_::import("pycraft._core").attr("operators_of"), py::make_tuple(py::cast(s.model())));
+      });
+  m.def("operators_of", &operators_of, py::arg("model"));
+  py::class_<MatrixTree, SkoSource, std::shared_ptr<MatrixTree>>(m, "MatrixTree", "A tree whose blocks E, H, M, J are given as matrices of any size.")
+      .def(py::init([](const std::vector<int>& parents, const std::vector<int>& sizes, const std::vector<int>& dof, std::vector<std::vector<double>> E,
+                       std::vector<std::vector<double>> H, std::vector<std::vector<double>> M, std::vector<std::vector<double>> J,
+                       const std::vector<std::string>& names, const std::string& name) {
+             SkoStructure s;
+             s.parent = parents, s.size = sizes, s.dof = dof, s.body_names = names;
+             for (const std::string& n : names) s.hinge_names.push_back(n);
+             s.finish();
+             return std::make_shared<MatrixTree>(std::move(s), name, std::move(E), std::move(H), std::move(M), std::move(J));
+           }),
+           py::arg("parents"), py::arg("sizes"), py::arg("dof"), py::arg("E"), py::arg("H"), py::arg("M"), py::arg("J"), py::arg("names"), py::arg("name"))
+      .def("__reduce__", [](const MatrixTree& t) {
+        const SkoStructure& s = t.structure();
+        return py::make_tuple(py::module_::import("pycraft._core").attr("MatrixTree"),
+                              py::make_tuple(s.parent, s.size, s.dof, t.E, t.H, t.M, t.J, s.body_names, t.name()));
+      });
+
+  m.def("symbol_table", [] {
+    py::list table;
+    for (const auto* symbols : {&sko_symbols(), &mechanics_symbols()})
+      for (const SymbolDefinition& d : *symbols) {
+        static const char* kinds[] = {"Θ", "V", "F", "W", "NodesV", "NodesF", "Loops", "R^1"};
+        table.append(py::make_tuple(d.ascii, d.unicode, d.latex, kinds[static_cast<int>(d.domain)], kinds[static_cast<int>(d.codomain)], d.meaning));
+      }
+    return table;
+  }, "Every operator: (ASCII, Unicode, LaTeX, domain, codomain, meaning).");
+}
+
+}  // namespace pycraft
