@@ -114,6 +114,15 @@ void ExecutionPool::run_at(const Inputs& inputs, bool expansions, Result& result
       values[c]->move_to(context.binding->q.data() + size_t(b) * context.binding->nq, context.binding->v.data() + size_t(b) * context.binding->nv);
       values[c]->require(plan.groups[c]);
     }
+    // Blocks and factors of the last run serve again where the values are the same.
+    bool fresh = w.generations.size() != values.size();
+    w.generations.resize(values.size());
+    for (size_t c = 0; c < values.size(); ++c) {
+      fresh |= w.generations[c] != values[c]->generation();
+      w.generations[c] = values[c]->generation();
+    }
+    if (values.empty()) fresh = !w.ran;
+    w.ran = true;
     for (const auto& [name, r] : plan.vectors) {
       const std::vector<double>& given = inputs.vectors.at(name);
       w.vector(r).assign(given.begin(), given.end());
@@ -129,7 +138,7 @@ void ExecutionPool::run_at(const Inputs& inputs, bool expansions, Result& result
         std::vector<S>& x = w.vector(plan.input);
         x.assign(size_t(n_in) * m, S(0));
         for (int j = 0; j < m; ++j) x[size_t(start + j) * m + j] = S(1);
-        w.run(values, m, start == 0, counts);
+        w.run(values, m, start == 0 && fresh, counts);
         const std::vector<S>& y = w.vector(output);
         for (int i = 0; i < n_out; ++i)
           for (int j = 0; j < m; ++j) {
@@ -157,7 +166,7 @@ void ExecutionPool::run_at(const Inputs& inputs, bool expansions, Result& result
       const double* given = inputs.x ? inputs.x + (inputs.batched ? size_t(b) * n_in * m : 0) : nullptr;
       for (size_t i = 0; i < x.size(); ++i) x[i] = given ? S(given[i]) : S(1);
     }
-    w.run(values, m, true, counts);
+    w.run(values, m, fresh, counts);
     if (states > 1) check_interrupt();
     switch (out->kind) {
       case RegisterKind::vector: {

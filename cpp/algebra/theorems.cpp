@@ -166,6 +166,8 @@ std::vector<Theorem> sko_theorems(const std::shared_ptr<SkoSource>& source) {
   const Expression error = (MM_prime.inv() - MM.inv()) * T, moved = MM_prime.inv() * T;
   state("#57 perturbed inertias, relative error in the ℳ norm", error.T() * MM * error, (largest * largest) * moved.T() * MM * moved, no_hypothesis, check, "soa.md #57");
   list.back().at_most = true;
+  list.back().text = "‖x'-x‖_ℳ ≤ max_k ‖M^-½ δM M^-½‖ ‖x'‖_ℳ,  ℳx = ℳ'x' = T";
+  list.back().latex = "\\Vert x'-x\\Vert_{\\mathcal{M}} \\le \\max_k \\Vert M_k^{-1/2}\\,\\delta M_k\\,M_k^{-1/2}\\Vert\\,\\Vert x'\\Vert_{\\mathcal{M}}";
 
   group = "Re-rooting and aggregation";
   // Υ⁻¹ = P + S⁺: the articulated inertia of everything re-rooted at body k. The root's block of E*ΥE is empty; any regular one serves there.
@@ -177,10 +179,16 @@ std::vector<Theorem> sko_theorems(const std::shared_ptr<SkoSource>& source) {
   }
   const Expression seen = block_diagonal(E.T() * Upsilon * E) + constant_blocks(std::move(at_root), source->forces(), source->motions(), "I_r");
   const Expression other = seen.inv() - P_plus;
+  const auto shown = [&](const char* text, const char* latex) {
+    list.back().text = text;
+    list.back().latex = latex;
+  };
   state("#58 two-filter form", Upsilon.inv(), P + other - other * H.T() * (H * other * H.T()).inv() * H * other, free_root | no_hinge_diagonal, check, "soa.md #58");
+  shown("Υ⁻¹ = P + S⁺,  S = (E*ΥE)⁻¹ - P⁺", "\\Upsilon^{-1} = P + S^{+},\\quad S = (\\mathcal{E}^*\\Upsilon \\mathcal{E})^{-1} - P^{+}");
   const Letters grouped(std::make_shared<AggregatedTree>(source));
   state("#64 bodies grouped in pairs: the same mass matrix", grouped.H * grouped.phi * grouped.M * grouped.phi.T() * grouped.H.T(), MM, no_hypothesis, check,
         "soa.md #64");
+  shown("ℳ of bodies grouped in pairs = ℳ", "\\mathcal{M}_{\\text{pairs}} = \\mathcal{M}");
   return list;
 }
 

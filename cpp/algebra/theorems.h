@@ -37,6 +37,7 @@ struct Theorem {
   bool on_one_path = false;  // stated only for blocks (i, j) with i and j on one path to the base
   bool at_most = false;      // lhs <= rhs instead of lhs = rhs
   std::string waiting;       // not evaluated yet, and for what it waits
+  std::string text, latex;   // how it is shown, where the sides spelled out would hide it
 };
 
 // What an expression is made of: the letters of one model.

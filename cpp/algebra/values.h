@@ -2,6 +2,8 @@
 // One virtual call per sweep, none inside. Vectors of several columns are row-major: entry (i, c) at x[i * columns + c].
 #pragma once
 
+#include <atomic>
+#include <cstdint>
 #include <mutex>
 
 #include "algebra/source.h"
@@ -18,7 +20,10 @@ class SkoValues {
   void move_to(const double* q, const double* v) {
     set_state(q, v);
     ready_ = 0;
+    generation_ = next_generation();
   }
+  // Tells one filling from another, also of another object: factors made from these numbers are good as long as it stays.
+  std::uint64_t generation() const { return generation_; }
   // Computes the groups that are missing. Safe from several threads; afterwards reading is.
   void require(unsigned groups) {
     if ((ready_.load(std::memory_order_acquire) & groups) == groups) return;
@@ -53,8 +58,13 @@ class SkoValues {
   virtual void compute(unsigned group) = 0;
 
  private:
+  static std::uint64_t next_generation() {
+    static std::atomic<std::uint64_t> counter{0};
+    return ++counter;
+  }
   std::mutex mutex_;
   std::atomic<unsigned> ready_{0};
+  std::uint64_t generation_ = 0;
 };
 
 }  // namespace pycraft

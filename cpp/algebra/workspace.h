@@ -33,7 +33,7 @@ class Workspace {
       if (s.operand) operands_.emplace_back(&s, std::make_unique<Workspace>(s.operand));
   }
 
-  // The first step that depends on the columns: the steps before it run once per state, not once per columns_at_a_time.
+  // Steps that make no vector (blocks, factors, scalars) run only where the values changed.
   void run(const std::vector<SkoValues<S>*>& values, int columns, bool values_changed, PassCounts& counts) {
     for (size_t r = 0; r < plan_->registers.size(); ++r) {
       const Register& reg = plan_->registers[r];
@@ -434,6 +434,8 @@ class Workspace {
 
  public:
   std::vector<std::unique_ptr<SkoValues<S>>> own_values;  // of batched contexts
+  bool ran = false;
+  std::vector<std::uint64_t> generations;                 // of the values that blocks and factors were made from
 };
 
 }  // namespace pycraft

@@ -24,4 +24,5 @@ PYBIND11_MODULE(_core, m) {
   pycraft::register_plans(m);
   pycraft::register_dynamics(m);
   pycraft::register_theorems(m);
+  pycraft::register_bench(m);
 }

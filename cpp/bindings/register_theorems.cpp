@@ -26,12 +26,14 @@ void register_theorems(py::module_& m) {
       })
       .def("unmet", [](const Theorem& t, const SkoSource& s) { return hypothesis_names(unmet(t.hypotheses, s.traits())); }, "Hypotheses that the model does not meet.")
       .def_property_readonly("latex", [](const Theorem& t) {
+        if (!t.latex.empty()) return t.latex;
         const auto tex = [](const Side& s) {
           return std::holds_alternative<Expression>(s) ? show(std::get<Expression>(s), Style::latex) : show(std::get<Scalar>(s), Style::latex);
         };
         return t.waiting.empty() ? tex(t.lhs) + (t.at_most ? " \\le " : " = ") + tex(t.rhs) : "\\text{" + t.name + "}";
       })
       .def_property_readonly("text", [](const Theorem& t) {
+        if (!t.text.empty()) return t.text;
         const auto text = [](const Side& s) { return std::holds_alternative<Expression>(s) ? show(std::get<Expression>(s)) : show(std::get<Scalar>(s)); };
         return t.waiting.empty() ? text(t.lhs) + (t.at_most ? " ≤ " : " = ") + text(t.rhs) : t.name;
       })

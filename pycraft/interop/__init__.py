@@ -1,1 +1,5 @@
-"""Other tools' conventions: Pinocchio, MuJoCo, SciPy. The only place that knows them."""
+"""Other tools' conventions: SciPy, Pinocchio, MuJoCo. The only place that knows them."""
+
+from .scipy import from_scipy, to_scipy
+
+__all__ = ["from_scipy", "to_scipy"]

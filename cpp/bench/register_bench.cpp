@@ -1,0 +1,71 @@
+// What `pycraft bench` times in the core, without Python in the loop: an expression applied, a direct call over a set of states.
+#include <string>
+
+#include "algebra/errors.h"
+#include "bench/timing.h"
+#include "bindings/bindings.h"
+#include "dynamics/rigid_dynamics.h"
+
+namespace pycraft {
+
+namespace {
+
+py::dict result(const Timing& t) {
+  py::dict d;
+  d["minimum"] = t.minimum;
+  d["median"] = t.median;
+  d["calls"] = t.calls;
+  return d;
+}
+
+py::dict time_apply(const Expression& e, const Array& x, double seconds) {
+  Inputs inputs;
+  inputs.x = x.data();
+  inputs.columns = x.ndim() == 2 ? static_cast<int>(x.shape(1)) : 1;
+  const auto pool = prepare(e, Request::apply);
+  Result r;
+  Timing t;
+  {
+    py::gil_scoped_release release;
+    t = time_calls([&] { pool->run(inputs, false, r); }, seconds);
+  }
+  return result(t);
+}
+
+// One call per state in rotation; q (K, nq), v, u (K, nv).
+py::dict time_dynamics(const std::shared_ptr<Multibody>& model, const std::string& call, const Array& q, const Array& v, const Array& u, double seconds) {
+  RigidDynamics<double> w(*model);
+  const int K = static_cast<int>(q.shape(0)), nq = model->nq(), nv = model->nv();
+  std::vector<double> out(size_t(nv) * std::max(nv, 6));
+  int k = 0;
+  const auto next = [&] { k = (k + 1) % K; };
+  const double *Q = q.data(), *V = v.data(), *U = u.data();
+  py::gil_scoped_release release;
+  Timing t;
+  const auto run = [&](auto f) {
+    t = time_calls([&] { f(Q + size_t(k) * nq, V + size_t(k) * nv, U + size_t(k) * nv), next(); }, seconds);
+  };
+  if (call == "forward_dynamics") {
+    run([&](auto a, auto b, auto c) { w.forward_dynamics(a, b, c, out.data()); });
+  } else if (call == "inverse_dynamics") {
+    run([&](auto a, auto b, auto c) { w.inverse_dynamics(a, b, c, out.data()); });
+  } else if (call == "mass_matrix") {
+    run([&](auto a, auto, auto) { w.mass_matrix(a, out.data()); });
+  } else if (call == "mass_matrix_inverse") {
+    run([&](auto a, auto, auto) { w.mass_matrix_inverse(a, out.data()); });
+  } else {
+    throw EvaluationError("no direct call '" + call + "' to time");
+  }
+  py::gil_scoped_acquire acquire;
+  return result(t);
+}
+
+}  // namespace
+
+void register_bench(py::module_& m) {
+  m.def("time_apply", &time_apply, py::arg("operator"), py::arg("x"), py::arg("seconds") = 0.2, "Seconds per application: minimum, median, calls.");
+  m.def("time_dynamics", &time_dynamics, py::arg("model"), py::arg("call"), py::arg("q"), py::arg("v"), py::arg("u"), py::arg("seconds") = 0.2,
+        "Seconds per direct call over a set of states in rotation: minimum, median, calls.");
+}
+
+}  // namespace pycraft

@@ -1,0 +1,96 @@
+// A run of the engine, and a direct call, allocate nothing after the first. Counted by replacing operator new and, on glibc, malloc.
+#define BOOST_TEST_MODULE allocation
+#include <atomic>
+#include <boost/test/included/unit_test.hpp>
+#include <cstdlib>
+#include <new>
+
+#include "dynamics/rigid_dynamics.h"
+#include "operators/multibody_operators.h"
+#include "random_tree.h"
+
+namespace {
+std::atomic<long> allocations{0};
+}
+
+#if defined(__GLIBC__)
+extern "C" void* __libc_malloc(size_t);
+extern "C" void* malloc(size_t size) {
+  ++allocations;
+  return __libc_malloc(size);
+}
+#else
+void* operator new(size_t size) {
+  ++allocations;
+  if (void* p = std::malloc(size)) return p;
+  throw std::bad_alloc();
+}
+void operator delete(void* p) noexcept { std::free(p); }
+void operator delete(void* p, size_t) noexcept { std::free(p); }
+#endif
+
+using namespace pycraft;
+using namespace pycraft::testing;
+
+namespace {
+
+std::shared_ptr<Multibody> robot() {
+  auto mb = std::make_shared<Multibody>("robot");
+  const HingeKind kinds[] = {HingeKind::free, HingeKind::pin, HingeKind::ball, HingeKind::slider, HingeKind::pin, HingeKind::universal};
+  for (int k = 0; k < 6; ++k) {
+    Body b;
+    b.name = "body" + std::to_string(k);
+    b.mass = 1 + k;
+    b.com = {0.1, 0.2, 0.05};
+    b.inertia = {1, 0.1, 0, 1.2, 0, 0.9};
+    b.hinge.kind = kinds[k];
+    b.hinge.name = "hinge" + std::to_string(k);
+    b.hinge.placement.p = {0.3, 0, 0.1};
+    std::vector<Vector3<double>> axes;
+    if (kinds[k] == HingeKind::pin || kinds[k] == HingeKind::slider) axes = {{0.6, 0, 0.8}};
+    if (kinds[k] == HingeKind::universal) axes = {{1, 0, 0}, {0, 1, 0}};
+    b.hinge.subhinges = subhinges_of(kinds[k], axes, {0, 0, 0}, 0, b.hinge.name);
+    mb->add_body(b, k == 0 ? "" : k == 4 ? "body1" : "body" + std::to_string(k - 1));
+  }
+  return mb;
+}
+
+template <class F>
+long count(F f) {
+  f(), f();
+  const long before = allocations;
+  f();
+  return allocations - before;
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(runs_of_plans) {
+  const auto mb = robot();
+  const Letters o(operators_of(mb));
+  const Expression MM = o.H * o.phi * o.M * o.phi.T() * o.H.T();
+  const Letters m(random_tree(1, {-1, 0, 1, 1, 0, 4, -1}));
+  const Expression MMm = m.H * m.phi * m.M * m.phi.T() * m.H.T();
+  for (const Expression& e : {o.phi, o.psi.T(), o.K, o.Omega, o.D.inv(), o.tau_bar, MM, MM.inv(), (MM + 0.1 * o.I).inv(), block_diagonal(o.Omega), (MM.inv() + 0.01 * o.D).inv(),
+                              MMm, MMm.inv(), m.psi, (MMm + 0.1 * m.I).inv()})
+    for (int columns : {1, 3}) {
+      const auto pool = prepare(e, Request::apply);
+      const std::vector<double> x(size_t(e.domain().dimension()) * columns, 0.5);
+      Inputs inputs;
+      inputs.x = x.data();
+      inputs.columns = columns;
+      Result r;
+      BOOST_TEST(count([&] { pool->run(inputs, false, r); }) == 0, show(e));
+    }
+}
+
+BOOST_AUTO_TEST_CASE(direct_calls) {
+  const auto mb = robot();
+  RigidDynamics<double> w(*mb);
+  const std::vector<double> q = mb->zero_q(), v(mb->nv(), 0.3), tau(mb->nv(), 0.1);
+  std::vector<double> out(size_t(mb->nv()) * mb->nv());
+  BOOST_TEST(count([&] { w.forward_dynamics(q.data(), v.data(), tau.data(), out.data()); }) == 0);
+  BOOST_TEST(count([&] { w.inverse_dynamics(q.data(), v.data(), tau.data(), out.data()); }) == 0);
+  BOOST_TEST(count([&] { w.mass_matrix(q.data(), out.data()); }) == 0);
+  BOOST_TEST(count([&] { w.mass_matrix_inverse(q.data(), out.data()); }) == 0);
+}

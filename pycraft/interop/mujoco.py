@@ -1,0 +1,164 @@
+"""MuJoCo's coordinates: the order and the axes in which it keeps the state of free hinges. Needs nothing of MuJoCo itself.
+
+                  here                                      MuJoCo
+free, position    (w, x, y, z, x, y, z), in the parent      (x, y, z, w, x, y, z), in the world
+free, velocity    twist in the body's axes: (ω; v)          (v; ω), v in world axes, ω in the body's axes
+ball              (w, x, y, z); ω in the body's axes        the same
+all others        one number per coordinate                 the same
+
+Hinges are taken to come in MuJoCo's order, as they do in a model that was loaded from an MJCF file. Free hinges are on the
+base, as MuJoCo has them nowhere else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from .. import _core
+
+if TYPE_CHECKING:
+    from ..models.multibody import Multibody
+
+
+class _Free(NamedTuple):
+    """Where a free hinge's numbers start in q and v, and the pose (4, 4) of its inboard frame in the world."""
+
+    q: int
+    v: int
+    placement: np.ndarray
+
+
+def _free_hinges(model: Multibody) -> Iterator[_Free]:
+    for hinge in model.hinges.values():
+        if all(subhinge["kind"] != "free" for subhinge in hinge.subhinges):
+            continue
+        if len(hinge.subhinges) > 1 or hinge.body.parent is not None:
+            text = f"hinge {hinge.name!r} of {model.name!r} is free and not alone on the base; MuJoCo has no such joint"
+            raise _core.ModelError(text)
+        yield _Free(hinge.q_slice.start, hinge.v_slice.start, hinge.placement)
+
+
+def permutation(model: Multibody) -> tuple[np.ndarray, np.ndarray]:
+    """The order of MuJoCo's numbers: `q[..., i]` is qpos and `v[..., j]` is in the order of qvel, i (nq,) and j (nv,).
+
+    This is the whole conversion of positions where free hinges are placed at the world's origin; linear velocities of free
+    hinges must be turned as well: see `to_mujoco`. Raises ModelError for a free hinge that is not on the base.
+    """
+    i, j = np.arange(model.nq), np.arange(model.nv)
+    for free in _free_hinges(model):
+        i[free.q : free.q + 7] = free.q + np.array([4, 5, 6, 0, 1, 2, 3])
+        j[free.v : free.v + 6] = free.v + np.array([3, 4, 5, 0, 1, 2])
+    return i, j
+
+
+def to_mujoco(model: Multibody, q, v) -> tuple[np.ndarray, np.ndarray]:
+    """qpos (..., nq) and qvel (..., nv) of the state q (..., nq), v (..., nv).
+
+    Raises ModelError for a free hinge that is not on the base.
+
+    Examples
+    --------
+    >>> import pycraft as pc
+    >>> from pycraft.interop import mujoco
+    >>> body = pc.chain(1, "free")
+    >>> mujoco.to_mujoco(body, [1, 0, 0, 0, 5, 6, 7], [0, 0, 1, 2, 0, 0])[0]
+    array([5., 6., 7., 1., 0., 0., 0.])
+    """
+    q, v = _sized(model, q, model.nq, "q"), _sized(model, v, model.nv, "v")
+    i, j = permutation(model)
+    qpos, qvel = q[..., i], v[..., j]
+    for free in _free_hinges(model):
+        R = free.placement[:3, :3]
+        if not np.array_equal(free.placement, np.eye(4)):
+            qpos[..., free.q : free.q + 3] = q[..., free.q + 4 : free.q + 7] @ R.T + free.placement[:3, 3]
+            qpos[..., free.q + 3 : free.q + 7] = _product(_quaternion(R), q[..., free.q : free.q + 4])
+        linear = slice(free.v, free.v + 3)
+        qvel[..., linear] = _turn(R @ _rotations(q[..., free.q : free.q + 4]), qvel[..., linear])
+    return qpos, qvel
+
+
+def from_mujoco(model: Multibody, qpos, qvel) -> tuple[np.ndarray, np.ndarray]:
+    """The state q (..., nq), v (..., nv) of MuJoCo's qpos (..., nq), qvel (..., nv): the inverse of `to_mujoco`."""
+    qpos, qvel = _sized(model, qpos, model.nq, "qpos"), _sized(model, qvel, model.nv, "qvel")
+    i, j = permutation(model)
+    q, v = np.empty(qpos.shape), np.empty(qvel.shape)
+    q[..., i], v[..., j] = qpos, qvel
+    for free in _free_hinges(model):
+        R = free.placement[:3, :3]
+        if not np.array_equal(free.placement, np.eye(4)):
+            q[..., free.q + 4 : free.q + 7] = (qpos[..., free.q : free.q + 3] - free.placement[:3, 3]) @ R
+            q[..., free.q : free.q + 4] = _product(_quaternion(R.T), qpos[..., free.q + 3 : free.q + 7])
+        linear = slice(free.v + 3, free.v + 6)
+        world = R @ _rotations(q[..., free.q : free.q + 4])
+        v[..., linear] = _turn(np.swapaxes(world, -1, -2), v[..., linear])
+    return q, v
+
+
+def velocity_map(model: Multibody, q) -> np.ndarray:
+    """T (nv, nv), orthogonal, with qvel = T v at the state q (nq,).
+
+    Forces follow by duality, qfrc = T tau, and MuJoCo's mass matrix is T (ℳ + J) T*.
+    """
+    q = _sized(model, q, model.nq, "q")
+    return to_mujoco(model, np.broadcast_to(q, (model.nv, model.nq)), np.eye(model.nv))[1].T
+
+
+def acceleration_to_mujoco(model: Multibody, q, v, vdot) -> np.ndarray:
+    """qacc (nv,) of the accelerations vdot (nv,) at the state q (nq,), v (nv,): T v̇ + Ṫ v.
+
+    MuJoCo's linear acceleration is that of the body's origin in world axes, R(v̇ + ω × v).
+    """
+    v, vdot = _sized(model, v, model.nv, "v"), np.array(_sized(model, vdot, model.nv, "vdot"))
+    for free in _free_hinges(model):
+        angular, linear = slice(free.v, free.v + 3), slice(free.v + 3, free.v + 6)
+        vdot[linear] += np.cross(v[angular], v[linear])
+    return velocity_map(model, q) @ vdot
+
+
+# Quaternions (w, x, y, z) with leading axes ---------------------------------------------------------------------------
+
+
+def _sized(model: Multibody, x, size: int, name: str) -> np.ndarray:
+    x = np.asarray(x, float)
+    if x.shape[-1:] != (size,):
+        raise _core.ModelError(f"{name} of {model.name!r} takes {size} numbers, not an array {x.shape}")
+    return x
+
+
+def _rotations(q: np.ndarray) -> np.ndarray:
+    """R(q/|q|), (..., 3, 3)."""
+    length = np.linalg.norm(q, axis=-1, keepdims=True)
+    if not np.all(length > 1e-8):
+        raise _core.ModelError("a free hinge's quaternion has no direction; (1, 0, 0, 0) is no rotation")
+    w, x, y, z = np.moveaxis(q / length, -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+
+
+def _turn(R: np.ndarray, x: np.ndarray) -> np.ndarray:
+    return np.einsum("...ij,...j->...i", R, x)
+
+
+def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    w, u, t, s = a[..., :1], a[..., 1:], b[..., :1], b[..., 1:]
+    return np.concatenate([w * t - np.sum(u * s, -1, keepdims=True), w * s + t * u + np.cross(u, s)], axis=-1)
+
+
+def _quaternion(R: np.ndarray) -> np.ndarray:
+    """The quaternion of a rotation matrix: the eigenvector of Bar-Itzhack's matrix, well conditioned for every rotation."""
+    K = np.array(
+        [
+            [np.trace(R), R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]],
+            [0, R[0, 0] - R[1, 1] - R[2, 2], R[0, 1] + R[1, 0], R[0, 2] + R[2, 0]],
+            [0, 0, R[1, 1] - R[0, 0] - R[2, 2], R[1, 2] + R[2, 1]],
+            [0, 0, 0, R[2, 2] - R[0, 0] - R[1, 1]],
+        ]
+    )
+    return np.linalg.eigh(K, UPLO="U")[1][:, -1]

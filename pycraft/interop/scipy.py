@@ -1,0 +1,50 @@
+"""SciPy's linear operators, both ways."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy.sparse.linalg import LinearOperator
+
+from .. import _core
+
+
+def to_scipy(operator: _core.Operator) -> LinearOperator:
+    """The operator as a `scipy.sparse.linalg.LinearOperator` with matvec, rmatvec, matmat and rmatmat; nothing is formed.
+
+    Examples
+    --------
+    >>> import pycraft as pc
+    >>> from scipy.sparse.linalg import cg
+    >>> arm = pc.chain(4)
+    >>> H, phi, M = arm.soa("H phi M")
+    >>> x, info = cg(pc.interop.to_scipy(H @ phi @ M @ phi.T @ H.T), np.ones(4), rtol=1e-12)
+    >>> info
+    0
+    """
+    if operator.domain is None:
+        raise _core.SpaceError("I has no space yet: combine it with an operator first")
+    if operator.batch is not None:
+        raise _core.EvaluationError("a SciPy operator acts at one state; bind one with .at(q)")
+    transposed = operator.T
+
+    def flat(op: _core.Operator):
+        return lambda x: op @ np.ascontiguousarray(x)
+
+    return LinearOperator(operator.shape, matvec=flat(operator), rmatvec=flat(transposed), matmat=flat(operator), rmatmat=flat(transposed), dtype=np.float64)
+
+
+def from_scipy(linear_operator: Any, domain: _core.Space, codomain: _core.Space, name: str = "L") -> _core.Operator:
+    """A SciPy linear operator, sparse or dense matrix as an operator between spaces of a model.
+
+    A `LinearOperator` is applied as it is, in double precision, and its inverse is dense (`explain()` says so); a matrix becomes a
+    constant, which keeps its block structure.
+    """
+    shape = (codomain.dimension, domain.dimension)
+    if tuple(linear_operator.shape) != shape:
+        raise _core.SpaceError(f"{name!r} has shape {tuple(linear_operator.shape)}; from {domain} to {codomain} it takes {shape}")
+    if not isinstance(linear_operator, LinearOperator):
+        dense = linear_operator.toarray() if hasattr(linear_operator, "toarray") else np.asarray(linear_operator, float)
+        return _core.constant(dense, domain, codomain, name)
+    return _core.external(linear_operator.matmat, linear_operator.rmatmat, domain, codomain, name)
