@@ -128,7 +128,7 @@ std::vector<Theorem> sko_theorems(const std::shared_ptr<SkoSource>& source) {
   state("innovations factorization", MM, A * D * A.T(), no_hinge_diagonal);
   state("innovations factorization with J", MM + J, A * D * A.T(), no_hypothesis, check, extended);
   state("mass matrix inverse", MM.inv(), S.T() * D.inv() * S, no_hinge_diagonal);
-  state("mass matrix inverse with J", MM + J, S.T() * D.inv() * S, no_hypothesis, inverse, extended);
+  state("inverse by the innovations factors", MM + J, S.T() * D.inv() * S, no_hypothesis, inverse, extended);
   state("ln det ℳ = Σ ln det D(k)", logdet(MM), logdet(D), no_hinge_diagonal);
   state("ln det (ℳ+J) = Σ ln det D(k)", logdet(MM + J), logdet(D), no_hypothesis, check, extended);
   const Expression W = square_root(D).inv() * H * psi * square_root(M);
@@ -145,10 +145,16 @@ std::vector<Theorem> sko_theorems(const std::shared_ptr<SkoSource>& source) {
   state("Ω decomposed by Υ", Omega, Upsilon + psi_tilde.T() * Upsilon + Upsilon * psi_tilde, chain);
   state("Ω decomposed by Υ, blocks on one path", Omega, Upsilon + psi_tilde.T() * Upsilon + Upsilon * psi_tilde);
   list.back().on_one_path = true;
+  list.back().text = "Ω = Υ + ψ̃* Υ + Υ ψ̃ in the blocks on one path to the base";
+  list.back().latex = "[\\Omega = \\Upsilon + \\tilde\\psi^*\\Upsilon + \\Upsilon\\tilde\\psi]_{(i,j)\\text{ on one path to the base}}";
   const Expression siblings = E_psi.T() * Upsilon * E_psi - block_diagonal(E_psi.T() * Upsilon * E_psi);
   state("#28 Ω decomposed with siblings", Omega, Upsilon + psi_tilde.T() * Upsilon + Upsilon * psi_tilde + psi.T() * siblings * psi, no_hypothesis, check,
         "soa.md #28");
+  list.back().text = "Ω = Υ + ψ̃*Υ + Υψ̃ + ψ*Sψ,  S = E_ψ*ΥE_ψ - blockdiag(E_ψ*ΥE_ψ)";
+  list.back().latex = "\\Omega = \\Upsilon + \\tilde\\psi^*\\Upsilon + \\Upsilon\\tilde\\psi + \\psi^*S\\psi,\\quad S = \\mathcal{E}_\\psi^*\\Upsilon \\mathcal{E}_\\psi - \\operatorname{blockdiag}(\\cdot)";
   state("#29 Lyapunov equation with siblings", Upsilon - E_psi.T() * Upsilon * E_psi + siblings, H.T() * D.inv() * H, no_hypothesis, check, "soa.md #29");
+  list.back().text = "Υ - E_ψ*ΥE_ψ + S = H*D⁻¹H,  S = E_ψ*ΥE_ψ - blockdiag(E_ψ*ΥE_ψ)";
+  list.back().latex = "\\Upsilon - \\mathcal{E}_\\psi^*\\Upsilon \\mathcal{E}_\\psi + S = H^*\\mathcal{D}^{-1}H,\\quad S = \\mathcal{E}_\\psi^*\\Upsilon \\mathcal{E}_\\psi - \\operatorname{blockdiag}(\\cdot)";
   state("#3 ΩMΩ = Ω", Omega * M * Omega, Omega, no_hinge_diagonal, check, "soa.md #3");
   state("#4 the bodies' shares add up to N", trace(Upsilon * M), number(source->structure().coordinates()), no_hinge_diagonal, check, "soa.md #4");
   state("#5 (I-ΩM)φ* = ψ*-ΩP", (I - Omega * M) * phi.T(), psi.T() - Omega * P, no_hypothesis, check, "soa.md #5");

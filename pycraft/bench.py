@@ -1,0 +1,118 @@
+"""`pycraft bench`: the bounds on speed, measured; each result is checked in the same run that times it. Figures are ratios of one run."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from . import _core
+from .models.generators import chain
+
+SHORT, LONG = 100, 1000
+
+
+@dataclass
+class Figure:
+    """One measured figure: value, unit, and the bound it is held to (None where there is none)."""
+
+    name: str
+    value: float
+    unit: str
+    bound: float | None = None
+    note: str = ""
+
+    @property
+    def passed(self) -> bool:
+        return self.bound is None or self.value <= self.bound
+
+
+def operators_of(arm: Any) -> dict[str, _core.Operator]:
+    """What is timed: every operator, ℳ, its inverse, and one inverse that no theorem gives."""
+    soa = arm.soa
+    names = "E phi phi_tilde H M J R P P_plus D G K tau tau_bar E_psi psi psi_tilde Upsilon Omega".split()
+    chosen = {name: getattr(soa, name) for name in names}
+    chosen |= {"phi*": soa.phi.T, "psi*": soa.psi.T, "H*": soa.H.T, "D^-1": soa.D.inv()}
+    MM = soa.H @ soa.phi @ soa.M @ soa.phi.T @ soa.H.T
+    last = list(arm.bodies)[-1]
+    chosen |= {"Jacobian(tip)": soa.Jacobian(last), "MM": MM, "MM^-1": MM.inv(), "(MM + 0.1 I)^-1": (MM + 0.1 * soa.I).inv()}
+    return chosen
+
+
+def _checked(name: str, operator: _core.Operator, x: np.ndarray) -> None:
+    """The rules change the cost, never the result: what was planned against what was typed."""
+    fast = operator @ x
+    literal = operator.at(precision="quad")
+    exact = literal @ x
+    error = np.abs(fast - exact).max(initial=0.0) / max(np.abs(exact).max(initial=0.0), 1e-300)
+    if not error < 1e-6:
+        raise _core.EvaluationError(f"{name} is wrong in the run that times it: off by {error:.1e}")
+
+
+def per_link(seconds: float = 0.1) -> list[Figure]:
+    """Time per link for chains of 1000 links over that for 100, of every operator and of ℳ⁻¹x: O(N) means about one."""
+    medians: dict[str, dict[int, float]] = {}
+    rng = np.random.default_rng(0)
+    for n in (SHORT, LONG):
+        arm = chain(n, seed=1)
+        arm.q = arm.random_state(1).q
+        for name, operator in operators_of(arm).items():
+            x = rng.uniform(-1, 1, operator.shape[1])
+            if n == SHORT:
+                _checked(name, operator, x)
+            medians.setdefault(name, {})[n] = _core.time_apply(operator, x, seconds)["median"] / n
+        q, v, u = _states(arm)
+        for call in ("forward_dynamics", "inverse_dynamics"):
+            medians.setdefault(call, {})[n] = _core.time_dynamics(arm, call, q, v, u, seconds)["median"] / n
+    return [
+        Figure(name, t[LONG] / t[SHORT], "x", 1.5, f"{1e9 * t[LONG]:.0f} ns a link at {LONG}, {1e9 * t[SHORT]:.0f} at {SHORT}") for name, t in medians.items()
+    ]
+
+
+def _states(arm: Any, count: int = 8) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    states = [arm.random_state(seed) for seed in range(count)]
+    return np.array([s.q for s in states]), np.array([s.v for s in states]), np.array([s.v for s in states[::-1]])
+
+
+def building(repeats: int = 2000) -> Figure:
+    """Building an expression of ten operators in Python."""
+    soa = chain(7, seed=1).soa
+    H, psi, K, D, I = soa("H psi K D I")
+    best = min(_elapsed(lambda: (I - H @ psi @ K).T @ D.inv() @ (I - H @ psi @ K), repeats) for _ in range(5))
+    return Figure("building an expression of ten operators in Python", 1e6 * best, "us", 50.0)
+
+
+def _elapsed(f: Any, repeats: int) -> float:
+    begin = time.perf_counter()
+    for _ in range(repeats):
+        f()
+    return (time.perf_counter() - begin) / repeats
+
+
+def direct_calls(seconds: float = 0.2) -> list[Figure]:
+    """Direct calls on the shipped robots, microseconds; each checked by the other (forward of inverse dynamics)."""
+    from . import robots
+
+    figures = []
+    for name in ("panda", "a1", "g1"):
+        robot = getattr(robots, name)()
+        q, v, u = _states(robot)
+        back = robot.forward_dynamics(q, v, robot.inverse_dynamics(q, v, u))
+        error = np.abs(back - u).max() / np.abs(u).max()
+        if not error < 1e-6:
+            raise _core.EvaluationError(f"forward dynamics of {name} is wrong in the run that times it: off by {error:.1e}")
+        for call in ("forward_dynamics", "inverse_dynamics", "mass_matrix"):
+            timing = _core.time_dynamics(robot, call, q, v, u, seconds)
+            figures.append(Figure(f"{name} ({robot.nv} dof): {call}", 1e6 * timing["median"], "us"))
+    return figures
+
+
+def run(seconds: float = 0.1) -> dict[str, list[Figure]]:
+    """All figures, by heading."""
+    return {
+        f"O(N): time per link at {LONG} links over {SHORT}": per_link(seconds),
+        "Expressions": [building()],
+        "Direct calls": direct_calls(2 * seconds),
+    }
