@@ -90,7 +90,7 @@ def from_mujoco(model: Multibody, qpos, qvel) -> tuple[np.ndarray, np.ndarray]:
         R = free.placement[:3, :3]
         if not np.array_equal(free.placement, np.eye(4)):
             q[..., free.q + 4 : free.q + 7] = (qpos[..., free.q : free.q + 3] - free.placement[:3, 3]) @ R
-            q[..., free.q : free.q + 4] = _product(_quaternion(R.T), qpos[..., free.q + 3 : free.q + 7])
+            q[..., free.q : free.q + 4] = _product(_quaternion(R) * [1, -1, -1, -1], qpos[..., free.q + 3 : free.q + 7])
         linear = slice(free.v + 3, free.v + 6)
         world = R @ _rotations(q[..., free.q : free.q + 4])
         v[..., linear] = _turn(np.swapaxes(world, -1, -2), v[..., linear])

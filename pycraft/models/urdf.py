@@ -1,0 +1,219 @@
+"""URDF files read into a `Multibody`: links become bodies, joints hinges, with the file's names and order.
+
+joint type                  hinge     coordinates
+revolute, continuous        pin       angle about the axis
+prismatic                   slider    travel along the axis
+planar                      planar    (x, y, angle) in the plane that the axis is normal to
+ball, spherical             ball      quaternion (w, x, y, z); not in the specification, but some tools write it
+floating                    free      quaternion, position
+fixed                       weld      none
+
+Visuals, collision shapes, materials, transmissions, gazebo blocks and the dynamics element (damping and friction are
+effects) are not read. One element is our own, inside a joint: `<pycraft rotor_inertia="1.14"/>`, one value per coordinate
+in kg m² or kg as seen at the joint; other readers pass over it.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from urllib.parse import unquote
+
+import numpy as np
+
+from .. import _core
+from .multibody import Multibody
+from .rotations import rotation_about
+from .urdf_elements import Elements, Joint, Link
+from .xml_file import XmlFile, label
+
+_CUT = "a model is a tree: take one joint out"
+
+
+def read(file: XmlFile, *, root: str, mimic: str, welds: str, strict: bool) -> tuple[Multibody, list[str]]:
+    """The model of a URDF file, and what is worth a warning about it (each text with file and line).
+
+    Parameters are those of `pycraft.load`. Raises ModelError, with file, line and element, for what the file gets wrong.
+    """
+    elements = Elements(file, follow=mimic != "free")
+    _settle_mimics(file, elements.joints, mimic)
+    tree = _Tree(file, elements.links, elements.joints)
+    model = _build(tree, root, welds, strict)
+    return model, elements.warnings + [tree.with_line(text) for text in model.take_warnings()]
+
+
+# Mimic joints ---------------------------------------------------------------------------------------------------------
+
+
+def _settle_mimics(file: XmlFile, joints: dict[str, Joint], mimic: str) -> None:
+    """Refuse joints that follow others, or weld them where they stand when the joint they follow is at zero."""
+    followers = [joint for joint in joints.values() if joint.mimic]
+    if followers and mimic == "refuse":
+        pairs = ", ".join(f"{j.name!r} follows {j.mimic.follows!r} (line {j.mimic.element.sourceline})" for j in followers)
+        raise file.error(
+            followers[0].mimic.element,
+            f"mimic joints are not coupled to the joints they follow: {pairs}; "
+            'load with mimic="lock" to weld them at their offsets, or with mimic="free" to have them move on their own',
+        )
+    positions = {joint.name: _locked_at(file, joints, joint, []) for joint in followers}
+    for joint in followers:
+        axis = joint.axis / np.linalg.norm(joint.axis)
+        if joint.kind == "pin":
+            joint.rotation = joint.rotation @ rotation_about(axis, positions[joint.name])
+        else:
+            joint.position = joint.position + joint.rotation @ axis * positions[joint.name]
+        joint.kind, joint.limits, joint.rotor_inertia = "weld", None, None
+
+
+def _locked_at(file: XmlFile, joints: dict[str, Joint], joint: Joint, before: list[str]) -> float:
+    """Where a locked joint stands; one that follows a locked joint follows it to where that stands."""
+    if not joint.mimic:
+        return 0.0
+    element, follows, remedy = joint.mimic.element, joint.mimic.follows, 'load with mimic="free"'
+    if follows not in joints:
+        text = f"{label(joint.element)} follows {follows!r}, and no joint has this name; correct it, or {remedy}"
+        raise file.error(element, text)
+    if joint.name in before:
+        circle = " → ".join([*before, joint.name])
+        raise file.error(element, f"joints follow each other in a circle: {circle}; correct them, or {remedy}")
+    if joint.kind not in ("pin", "slider"):
+        kind = joint.element.get("type")
+        raise file.error(element, f"{label(joint.element)} of type {kind!r} has no single coordinate that could follow; {remedy}")
+    return joint.mimic.multiplier * _locked_at(file, joints, joints[follows], [*before, joint.name]) + joint.mimic.offset
+
+
+# The tree -------------------------------------------------------------------------------------------------------------
+
+
+class _Tree:
+    """Links and joints that were found to be a tree: `root`, `inboard[link]` the joint that carries a link."""
+
+    def __init__(self, file: XmlFile, links: dict[str, Link], joints: dict[str, Joint]):
+        self.file, self.links, self.joints = file, links, joints
+        self.inboard: dict[str, Joint] = {}
+        self.children: dict[str, list[str]] = {name: [] for name in links}
+        for joint in joints.values():
+            other = self.inboard.setdefault(joint.child, joint)
+            if other is not joint:
+                first = f"{other.parent!r} by joint {other.name!r} (line {other.element.sourceline})"
+                second = f"{joint.parent!r} by joint {joint.name!r}"
+                raise file.error(joint.element, f"link {joint.child!r} has two parents, {first} and {second}; {_CUT}")
+            self.children[joint.parent].append(joint.child)
+        self.root = self._root()
+
+    def _root(self) -> str:
+        roots = [link for link in self.links.values() if link.name not in self.inboard]
+        if len(roots) > 1:
+            names = ", ".join(f"{link.name!r} (line {link.element.sourceline})" for link in roots)
+            text = f"{len(roots)} links have no parent: {names}; join them to one root by fixed joints"
+            raise self.file.error(roots[1].element, text)
+        reached = set(self.depth_first(roots[0].name)) if roots else set()
+        for name in self.links:
+            if name not in reached:
+                raise self._loop(name)
+        return roots[0].name
+
+    def depth_first(self, root: str) -> Iterator[str]:
+        """Links from `root` outward, parents first, siblings in the order of their joint elements."""
+        stack = [root]  # not recursive: chains are longer than Python's stack
+        while stack:
+            name = stack.pop()
+            yield name
+            stack.extend(reversed(self.children[name]))
+
+    def _loop(self, name: str) -> Exception:
+        """The error for a link that no root carries: going inboard from it ends in a loop, which is named."""
+        path: list[str] = []
+        while name not in path:
+            path.append(name)
+            name = self.inboard[name].parent
+        cycle = [name, *reversed(path[path.index(name) :])]
+        joints = [self.inboard[link] for link in cycle[1:]]
+        names = ", ".join(f"{joint.name!r} (line {joint.element.sourceline})" for joint in joints)
+        return self.file.error(joints[0].element, f"the links {' → '.join(cycle)} are a loop, by the joints {names}; {_CUT}")
+
+    def with_line(self, text: str) -> str:
+        """A warning of the core's about a body, with the line of its link."""
+        body = re.match(r"body '(.*?)'", text)
+        link = self.links.get(body[1]) if body else None
+        return f"{self.file.at(link.element) if link else self.file.path}: {text}"
+
+    def located(self, text: str, link: str) -> Exception:
+        """What the core refuses about a link or the joint that carries it, with the element it comes from."""
+        owner, at = self.links[link].element, None
+        if text.startswith("hinge") and link in self.inboard:
+            owner = self.inboard[link].element
+            at = self.file.child(owner, "pycraft") if "rotor" in text else None
+        elif (inertial := self.file.child(owner, "inertial")) is not None:
+            at = self.file.child(inertial, "mass" if "its mass" in text else "inertia")
+        text = re.sub("^(body|hinge) '.*?'", label(owner), text)  # the file's words for the core's
+        return self.file.error(at if at is not None else owner, text)
+
+
+def _build(tree: _Tree, root: str, welds: str, strict: bool) -> Multibody:
+    file, joints = tree.file, tree.joints
+    if root == "free" and "root" in joints:
+        text = 'has the name of the free hinge that root="free" adds; rename it, or load with root="fixed"'
+        raise file.error(joints["root"].element, f"{label(joints['root'].element)} {text}")
+    model = Multibody(file.root.get("name") or Path(file.path).stem, welds=welds, strict=strict)
+    for name in tree.depth_first(tree.root):
+        link, joint = tree.links[name], tree.inboard.get(name)
+        body = dict(mass=link.mass, com=link.com, inertia=link.inertia)
+        try:
+            if joint is None:
+                hinge = "root" if "root" not in joints else f"root of {name}"
+                model.add_body(name, None, "free" if root == "free" else "weld", hinge_name=hinge, **body)
+                continue
+            model.add_body(
+                name,
+                joint.parent,
+                joint.kind,
+                axis=joint.axis if joint.kind in ("pin", "slider", "planar") else None,
+                hinge_name=joint.name,
+                rotation=joint.rotation,
+                position=joint.position,
+                limits=joint.limits,
+                rotor_inertia=joint.rotor_inertia,
+                **body,
+            )
+        except _core.ModelError as error:
+            raise tree.located(str(error), name) from None
+    return model
+
+
+# Files that a URDF file names -----------------------------------------------------------------------------------------
+
+
+def resolve_package(uri: str, urdf_path: str | os.PathLike[str], package_dirs: Iterable[str | os.PathLike[str]] = ()) -> Path:
+    """The file that a mesh or texture name of a URDF file means. The loader opens none; viewers do.
+
+    Parameters
+    ----------
+    uri : str
+        "package://name/rest", "file:///path", or a path, which is relative to the URDF file's folder.
+    urdf_path : path of the URDF file
+    package_dirs : folders
+        Where packages lie: folders that hold a folder `name` or are called so themselves. Tried first and in order; then
+        the folders above the URDF file, from the nearest up.
+
+    Raises
+    ------
+    ModelError
+        A file that is nowhere: names the URI and the folders tried.
+    """
+    above = Path(urdf_path).absolute().parent
+    if uri.startswith("package://"):
+        package, _, rest = uri.removeprefix("package://").partition("/")
+        folders = [*(Path(folder).absolute() for folder in package_dirs), above, *above.parents]
+        tried = [place for folder in folders for place in (folder / package, *([folder] if folder.name == package else []))]
+        found, remedy = [place / rest for place in tried], f"give the folder that holds {package!r} in package_dirs"
+    else:
+        name = unquote(uri.removeprefix("file://")) if uri.startswith("file://") else uri
+        tried, found, remedy = [above], [above / name], "a name without package:// is relative to the URDF file"
+    for path in found:
+        if path.exists():
+            return path
+    places = ", ".join(map(str, tried[:6])) + (", ..." if len(tried) > 6 else "")
+    raise _core.ModelError(f"{os.fspath(urdf_path)}: {uri!r} is not found in {places}; {remedy}")
