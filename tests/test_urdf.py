@@ -1,5 +1,7 @@
 """URDF files: what is read and how, trees and their degenerate cases, mimic joints, welds, warnings."""
 
+import doctest
+import shutil
 import warnings
 from pathlib import Path
 
@@ -356,3 +358,14 @@ def test_resolve_package(tmp_path):
         resolve_package("package://hand_description/hand.stl", urdf)
     with pytest.raises(pc.ModelError, match="'nothing.stl' is not found in .*relative to the URDF file"):
         resolve_package("nothing.stl", urdf)
+
+
+# The page -------------------------------------------------------------------------------------------------------------
+
+
+def test_the_page_on_models_runs(tmp_path, monkeypatch):
+    root = Path(__file__).parents[1]
+    shutil.copy(root / "pycraft" / "models" / "robots" / "panda.urdf", tmp_path / "arm.urdf")
+    monkeypatch.chdir(tmp_path)
+    result = doctest.testfile(str(root / "docs" / "models.md"), module_relative=False, optionflags=doctest.NORMALIZE_WHITESPACE)
+    assert result.failed == 0 and result.attempted > 15
