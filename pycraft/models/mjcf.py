@@ -169,7 +169,8 @@ class _Reader:
         placement: a step that is passed gets its axis and point from C⁻¹. A ball joint keeps its quaternion: MuJoCo allows no
         rotation after it, so that C is a translation there.
         """
-        C, subhinges = np.eye(4), []
+        C = np.eye(4)
+        subhinges: list[dict[str, Any]] = []
         for j in reversed(joints):
             kind, axis, point = int(self.m.jnt_type[j]), np.array(self.m.jnt_axis[j]), np.array(self.m.jnt_pos[j])
             moved = not np.array_equal(C, np.eye(4))

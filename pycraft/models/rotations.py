@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 
-def rotation_from_rpy(rpy: Sequence[float]) -> np.ndarray:
+def rotation_from_rpy(rpy: Sequence[float] | np.ndarray) -> np.ndarray:
     """Rz(yaw) Ry(pitch) Rx(roll), (3, 3): turns about the fixed axes x, y, z in that order, angles in radians."""
     (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
     return np.array(
@@ -19,7 +19,7 @@ def rotation_from_rpy(rpy: Sequence[float]) -> np.ndarray:
     )
 
 
-def rotation_from_quaternion(quaternion: Sequence[float]) -> np.ndarray:
+def rotation_from_quaternion(quaternion: Sequence[float] | np.ndarray) -> np.ndarray:
     """R(q), (3, 3), of the quaternion (w, x, y, z), which is used as q/|q|; the caller sees to it that |q| is not zero."""
     w, x, y, z = np.asarray(quaternion, float) / np.linalg.norm(quaternion)
     return np.array(
@@ -31,7 +31,7 @@ def rotation_from_quaternion(quaternion: Sequence[float]) -> np.ndarray:
     )
 
 
-def rotation_about(axis: Sequence[float], angle: float) -> np.ndarray:
+def rotation_about(axis: Sequence[float] | np.ndarray, angle: float) -> np.ndarray:
     """exp(ã angle), (3, 3), by Rodrigues' formula, for a unit axis a and an angle in radians."""
     x, y, z = axis
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])

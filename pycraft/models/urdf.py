@@ -19,6 +19,7 @@ import os
 import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
@@ -49,11 +50,11 @@ def read(file: XmlFile, *, root: str, mimic: str, welds: str, strict: bool) -> t
 
 def _settle_mimics(file: XmlFile, joints: dict[str, Joint], mimic: str) -> None:
     """Refuse joints that follow others, or weld them where they stand when the joint they follow is at zero."""
-    followers = [joint for joint in joints.values() if joint.mimic]
+    followers = {joint: joint.mimic for joint in joints.values() if joint.mimic}
     if followers and mimic == "refuse":
-        pairs = ", ".join(f"{j.name!r} follows {j.mimic.follows!r} (line {j.mimic.element.sourceline})" for j in followers)
+        pairs = ", ".join(f"{j.name!r} follows {m.follows!r} (line {m.element.sourceline})" for j, m in followers.items())
         raise file.error(
-            followers[0].mimic.element,
+            next(iter(followers.values())).element,
             f"mimic joints are not coupled to the joints they follow: {pairs}; "
             'load with mimic="lock" to weld them at their offsets, or with mimic="free" to have them move on their own',
         )
@@ -160,7 +161,7 @@ def _build(tree: _Tree, root: str, welds: str, strict: bool) -> Multibody:
     model = Multibody(file.root.get("name") or Path(file.path).stem, welds=welds, strict=strict)
     for name in tree.depth_first(tree.root):
         link, joint = tree.links[name], tree.inboard.get(name)
-        body = dict(mass=link.mass, com=link.com, inertia=link.inertia)
+        body: dict[str, Any] = dict(mass=link.mass, com=link.com, inertia=link.inertia)
         try:
             if joint is None:
                 hinge = "root" if "root" not in joints else f"root of {name}"

@@ -48,7 +48,7 @@ class Mimic:
     offset: float
 
 
-@dataclass
+@dataclass(eq=False)  # hashed by identity
 class Joint:
     """A joint: its element, kind of hinge, the pose of the child link in the parent link at zero, and how it moves."""
 
@@ -60,7 +60,7 @@ class Joint:
     rotation: np.ndarray
     position: np.ndarray
     axis: np.ndarray
-    limits: tuple[float, float] | None
+    limits: tuple[np.ndarray, np.ndarray] | None
     rotor_inertia: np.ndarray | None
     mimic: Mimic | None
 
@@ -178,7 +178,7 @@ class Elements:
             raise self.file.error(axis, f"{label(element)}: its axis has length {length:g}; give a direction")
         return direction
 
-    def _limits(self, element: Element, kind: str) -> tuple[float, float] | None:
+    def _limits(self, element: Element, kind: str) -> tuple[np.ndarray, np.ndarray] | None:
         limit = self.file.child(element, "limit") if kind in ("revolute", "prismatic") else None
         if limit is None or (limit.get("lower") is None and limit.get("upper") is None):
             return None
@@ -187,7 +187,7 @@ class Elements:
             text = f"its lower limit {lower:g} lies above the upper one {upper:g}; both are left out"
             self.warnings.append(f"{self.file.at(limit)}: {label(element)}: {text}")
             return None
-        return lower, upper
+        return np.array([lower]), np.array([upper])
 
     def _rotor_inertia(self, element: Element, hinge: str) -> np.ndarray | None:
         ours = self.file.child(element, "pycraft")

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterator
+from typing import TypeAlias
 
 import numpy as np
 from lxml import etree
 
 from .. import _core
 
-Element = etree._Element
+Element: TypeAlias = "etree._Element"
 
 
 class XmlFile:
@@ -36,10 +37,10 @@ class XmlFile:
         self.path = os.fspath(path)
         try:
             with open(self.path, "rb") as file:
-                text = file.read()
+                data = file.read()
         except OSError as error:
             raise _core.ModelError(f"{self.path}: cannot be read: {error.strerror or error}") from None
-        self.root = self._parse(text)
+        self.root = self._parse(data)
         self.root_name = etree.QName(self.root).localname
         self._space = etree.QName(self.root).namespace
         dtd = self.root.getroottree().docinfo.internalDTD
@@ -48,17 +49,17 @@ class XmlFile:
             text = f"the file declares entities ({', '.join(entities)}), which are not expanded; write their text out"
             raise self.error(self.root, text)
 
-    def _parse(self, text: bytes) -> Element:
+    def _parse(self, data: bytes) -> Element:
         # Files come from anywhere: nothing is fetched, no entity is expanded, the parser's limits on depth and size stay.
         options = dict(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
         options |= dict(remove_comments=True, remove_pis=True)
         parser = etree.XMLParser(**options)
         try:
-            return etree.fromstring(text, parser)
+            return etree.fromstring(data, parser)
         except etree.XMLSyntaxError as error:
             # Old files use prefixes such as <controller:gazebo_ros> without declaring them, in parts that are not read.
             if len(parser.error_log) and all(entry.domain_name == "NAMESPACE" for entry in parser.error_log):
-                return etree.fromstring(text, etree.XMLParser(recover=True, **options))
+                return etree.fromstring(data, etree.XMLParser(recover=True, **options))
             line = f":{error.lineno}" if error.lineno else ""
             raise _core.ModelError(f"{self.path}{line}: not well-formed XML: {error.msg}") from None
 
