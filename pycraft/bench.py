@@ -67,7 +67,8 @@ def per_link(seconds: float = 0.1) -> list[Figure]:
         for call in ("forward_dynamics", "inverse_dynamics"):
             medians.setdefault(call, {})[n] = _core.time_dynamics(arm, call, q, v, u, seconds)["median"] / n
     return [
-        Figure(name, t[LONG] / t[SHORT], "x", 1.5, f"{1e9 * t[LONG]:.0f} ns a link at {LONG}, {1e9 * t[SHORT]:.0f} at {SHORT}") for name, t in medians.items()
+        Figure(name, t[LONG] / t[SHORT], "x", 1.5, f"{1e9 * t[LONG]:.0f} ns a link at {LONG}, {1e9 * t[SHORT]:.0f} at {SHORT}")
+        for name, t in medians.items()
     ]
 
 

@@ -66,7 +66,9 @@ class OperatorSet:
                 except _core.EvaluationError as error:
                     raise AttributeError(str(error)) from None
             return self._made[name]
-        raise AttributeError(f"no operator is called {name!r}; there are {', '.join(_NAMES)}, I, and the spaces Theta, V, F, NodesV, NodesF")
+        raise AttributeError(
+            f"no operator is called {name!r}; there are {', '.join(_NAMES)}, I, and the spaces Theta, V, F, NodesV, NodesF"
+        )
 
     def __dir__(self) -> Iterable[str]:
         return [*super().__dir__(), *_NAMES, "I", *_SPACES]
@@ -106,13 +108,13 @@ class _WithArguments:
     def __call__(self, argument: str | int | Sequence[str]) -> _core.Operator:
         source = self._operators._source
         if self._name != "Delta":
-            return source.symbol(self._name, nodes=_listed(argument))
+            return source.symbol(self._name, nodes=_listed(argument))  # type: ignore[arg-type]
         if isinstance(argument, str):
             names = source.coordinate_names
             if argument not in names:
                 raise _core.ModelError(f"no coordinate of {source.name!r} is called {argument!r}; there are {', '.join(names[:12])}")
             argument = names.index(argument)
-        return source.symbol("Delta", coordinate=int(argument))
+        return source.symbol("Delta", coordinate=int(argument))  # type: ignore[arg-type]
 
     def __repr__(self) -> str:
         return f"<{self._name}: {_NAMES[self._name][-1]}>"
@@ -178,7 +180,21 @@ def scalar_at(scalar: _core.Scalar, q=None, v=None, *, form: str = "fast", refin
 
 def operator_from_parts(kind: int, payload: Any, children: list[_core.Operator]) -> _core.Operator:
     """An operator from what it was pickled as."""
-    name = ("symbol", "vector", "identity", "zero", "constant", "external", "sum", "product", "scaled", "transpose", "inverse", "blockdiag", "sqrt")[kind]
+    name = (
+        "symbol",
+        "vector",
+        "identity",
+        "zero",
+        "constant",
+        "external",
+        "sum",
+        "product",
+        "scaled",
+        "transpose",
+        "inverse",
+        "blockdiag",
+        "sqrt",
+    )[kind]
     if name == "symbol":
         source, symbol, arguments, binding = payload
         made = source.symbol(symbol, coordinate=arguments[0]) if symbol == "Delta" else source.symbol(symbol, nodes=list(arguments))
@@ -231,7 +247,10 @@ class BlockView:
         left = max([len(r) for r in self._rows] + [0]) + 2
         limit = 12
         names = list(self._columns)[:limit]
-        lines = [self.title, " " * left + "".join(f"{c:>{width}}" for c in names) + (" ..." if len(self._columns) > limit else "")]
+        lines = [
+            self.title,
+            " " * left + "".join(f"{c:>{width}}" for c in names) + (" ..." if len(self._columns) > limit else ""),
+        ]
         for i, r in enumerate(list(self._rows)[:limit]):
             lines.append(f"{r:<{left}}" + "".join(f"{'·' if x == 0 else format(x, '.2g'):>{width}}" for x in norms[i, :limit]))
         if len(self._rows) > limit:
@@ -250,10 +269,13 @@ class BlockView:
                 depth = 0.0 if x == 0 else max(0.15, 1 + np.log10(x / top) / 8)
                 ink = "#fff" if depth > 0.6 else "#222"
                 text = "" if x == 0 else f"{x:.2g}"
-                cells.append(f"<td style='background:rgba(31,78,121,{depth:.2f});color:{ink};text-align:center;padding:2px 6px'>{text}</td>")
+                cells.append(
+                    f"<td style='background:rgba(31,78,121,{depth:.2f});color:{ink};text-align:center;padding:2px 6px'>{text}</td>"
+                )
             body.append(f"<tr><th style='text-align:left'>{escape(r)}</th>{''.join(cells)}</tr>")
         more = "" if max(norms.shape) <= limit else f"<caption>first {limit} of {norms.shape[0]} x {norms.shape[1]} blocks</caption>"
-        return f"<p>{escape(self.title)}</p><table style='border-collapse:collapse;font-size:80%'>{more}<tr><th></th>{head}</tr>{''.join(body)}</table>"
+        table = f"<table style='border-collapse:collapse;font-size:80%'>{more}<tr><th></th>{head}</tr>{''.join(body)}</table>"
+        return f"<p>{escape(self.title)}</p>{table}"
 
 
 def block_view(operator: _core.Operator, order: str = "base-to-tip") -> BlockView:
@@ -268,7 +290,12 @@ def block_view(operator: _core.Operator, order: str = "base-to-tip") -> BlockVie
         blocks = [(label or str(i), where) for i, (label, where, _) in enumerate(space.blocks)]
         return blocks if order == "base-to-tip" else blocks[::-1]
 
-    return BlockView(values, labels(operator.codomain), labels(operator.domain), f"{operator.text()} : {operator.domain.name} → {operator.codomain.name}")
+    return BlockView(
+        values,
+        labels(operator.codomain),
+        labels(operator.domain),
+        f"{operator.text()} : {operator.domain.name} → {operator.codomain.name}",
+    )
 
 
 class Explanation(str):

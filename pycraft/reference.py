@@ -40,6 +40,7 @@ SINGULAR = 16 * np.finfo(float).eps
 
 # Spatial algebra ------------------------------------------------------------------------------------------------------
 
+
 def skew(u):
     """ũ, (3, 3): ũ w = u × w."""
     return np.array([[0, -u[2], u[1]], [u[2], 0, -u[0]], [-u[1], u[0], 0]])
@@ -82,6 +83,7 @@ def spatial_inertia(body):
 
 
 # Hinges ---------------------------------------------------------------------------------------------------------------
+
 
 def subhinge_rows(subhinge):
     """Rows of H of one subhinge, (n_v, 6), in the frame after its own step: axis a through the point c.
@@ -127,7 +129,7 @@ def hinge_kinematics(body, q):
     X, rows = pose(**hinge["placement"]), []
     for j, subhinge in enumerate(hinge["subhinges"]):
         X = X @ steps[j]
-        later = reduce(np.matmul, steps[j + 1:], np.eye(4))
+        later = reduce(np.matmul, steps[j + 1 :], np.eye(4))
         rows.append(subhinge_rows(subhinge) @ force_transform(later))  # (φ*h)* = h*φ
     return X, rows
 
@@ -137,7 +139,7 @@ def split(x, sizes):
     x, ends = np.asarray(x), np.cumsum(np.array(sizes, int))
     if x.shape != (sum(sizes),):
         raise ValueError(f"expected an array of shape ({sum(sizes)},), got {x.shape}")
-    return [x[end - size:end] for end, size in zip(ends, sizes, strict=True)]
+    return [x[end - size : end] for end, size in zip(ends, sizes, strict=True)]
 
 
 def hinge_sizes(description, table):
@@ -151,6 +153,7 @@ def block_diagonal(blocks):
 
 
 # The algebra over blocks of any size ----------------------------------------------------------------------------------
+
 
 def symbol(formula, meaning):
     """An attribute computed from the others by its formula when first read, with its meaning as docstring."""
@@ -173,7 +176,7 @@ class Operators:
         self.parents, bodies = list(parents), range(len(parents))
         self.names = names or [f"body {k}" for k in bodies]
         s, t = np.cumsum([0, *map(len, M_blocks)]), np.cumsum([0, *map(len, H_blocks)])
-        self.states = [slice(s[k], s[k + 1]) for k in bodies]       # body k in V and F
+        self.states = [slice(s[k], s[k + 1]) for k in bodies]  # body k in V and F
         self.coordinates = [slice(t[k], t[k + 1]) for k in bodies]  # hinge k in Θ
         self.H, self.M = block_diagonal(H_blocks), block_diagonal(M_blocks)
         J_blocks = [np.zeros(len(h) ** 2) for h in H_blocks] if J_blocks is None else J_blocks
@@ -237,8 +240,10 @@ class Operators:
     I = symbol(lambda o: np.eye(len(o.M)), "I: identity, F → F.")
     phi = symbol(lambda o: inv(o.I - o.E), "φ: tip-to-base gather, F → F: (I − E_φ)⁻¹.")
     phi_tilde = symbol(lambda o: o.phi - o.I, "φ̃, F → F: φ − I.")
-    mass_matrix = symbol(lambda o: o.H @ o.phi @ o.M @ o.phi.T @ o.H.T,
-                         "ℳ: mass matrix of the bodies, Θ → Θ: HφMφ*H*. The equations of motion have ℳ + J in its place.")
+    mass_matrix = symbol(
+        lambda o: o.H @ o.phi @ o.M @ o.phi.T @ o.H.T,
+        "ℳ: mass matrix of the bodies, Θ → Θ: HφMφ*H*. The equations of motion have ℳ + J in its place.",
+    )
     P = symbol(lambda o: o.articulated[0], "P: articulated-body inertias, V → F, block diagonal: M + blockdiag(E_φP⁺E_φ*).")
     D = symbol(lambda o: o.articulated[1], "D: articulated hinge inertias, Θ → Θ, block diagonal: HPH* + J.")
     G = symbol(lambda o: o.articulated[2], "G: articulated-body gain, Θ → F, block diagonal: PH*D⁻¹.")
@@ -249,11 +254,9 @@ class Operators:
     E_psi = symbol(lambda o: o.E @ o.tau_bar, "E_ψ: articulated E_φ, F → F: E_φτ̄.")
     psi = symbol(lambda o: inv(o.I - o.E_psi), "ψ: articulated gather, F → F: (I − E_ψ)⁻¹.")
     psi_tilde = symbol(lambda o: o.psi - o.I, "ψ̃, F → F: ψ − I.")
-    Omega = symbol(lambda o: o.psi.T @ o.H.T @ inv(o.D) @ o.H @ o.psi,
-                   "Ω: extended operational-space compliance, F → V: ψ*H*D⁻¹Hψ.")
+    Omega = symbol(lambda o: o.psi.T @ o.H.T @ inv(o.D) @ o.H @ o.psi, "Ω: extended operational-space compliance, F → V: ψ*H*D⁻¹Hψ.")
     innovations = symbol(lambda o: np.eye(len(o.D)) - o.H @ o.psi @ o.K, "I − HψK, Θ → Θ.")
-    mass_matrix_inverse = symbol(lambda o: o.innovations.T @ inv(o.D) @ o.innovations,
-                                 "(ℳ + J)⁻¹, Θ → Θ: [I − HψK]* D⁻¹ [I − HψK].")
+    mass_matrix_inverse = symbol(lambda o: o.innovations.T @ inv(o.D) @ o.innovations, "(ℳ + J)⁻¹, Θ → Θ: [I − HψK]* D⁻¹ [I − HψK].")
 
 
 def sko_operators(parents, E_blocks, H_blocks, M_blocks, J_blocks=None):
@@ -285,11 +288,13 @@ def sko_operators(parents, E_blocks, H_blocks, M_blocks, J_blocks=None):
 
 # The algebra of a rigid multibody model -------------------------------------------------------------------------------
 
+
 class RigidOperators(Operators):
     """`Operators` of rigid bodies, with what mechanics adds: see `operators`."""
 
     def __init__(self, description, q, v=None):
-        bodies, q_sizes, v_sizes = description["bodies"], *(hinge_sizes(description, n) for n in (Q_SIZE, V_SIZE))
+        bodies = description["bodies"]
+        q_sizes, v_sizes = hinge_sizes(description, Q_SIZE), hinge_sizes(description, V_SIZE)
         self.description = description
         kinematics = list(map(hinge_kinematics, bodies, split(q, q_sizes)))
         self.X, self.rows = [X for X, _ in kinematics], [rows for _, rows in kinematics]
@@ -321,7 +326,7 @@ class RigidOperators(Operators):
         B = np.zeros((len(self.M), 6 * len(names)))
         for j, (k, X) in enumerate(map(self.node, names)):
             if k >= 0:
-                B[self.states[k], 6 * j:6 * j + 6] = force_transform(X)
+                B[self.states[k], 6 * j : 6 * j + 6] = force_transform(X)
         return B
 
     def Jacobian(self, names):
@@ -348,7 +353,7 @@ class RigidOperators(Operators):
         blocks = []
         for rows, t in zip(self.rows, self.coordinates, strict=True):
             velocities = [h.T @ speed for h, speed in zip(rows, split(self.v[t], [len(h) for h in rows]), strict=True)]
-            later = [sum(velocities[j + 1:], np.zeros(6)) for j in range(len(rows))]
+            later = [sum(velocities[j + 1 :], np.zeros(6)) for j in range(len(rows))]
             blocks.append(np.vstack([np.zeros((0, 6)), *[h @ crf(w) for h, w in zip(rows, later, strict=True)]]))
         return block_diagonal(blocks)
 
@@ -365,9 +370,12 @@ class RigidOperators(Operators):
     V_bar = symbol(lambda o: o.each(crf, o.V), "V̄, F → F, block diagonal: crf(V).")
     momentum_cross = symbol(
         lambda o: o.each(lambda p: -np.block([[skew(p[:3]), skew(p[3:])], [skew(p[3:]), np.zeros((3, 3))]]), o.M @ o.V),
-        "𝓑, V → F, block diagonal, skew: −[[ñ, f̃], [f̃, 0]] with (n; f) = M(k)V(k); 𝓑V = V̄MV.")
-    a = symbol(lambda o: o.V_tilde @ o.H.T @ o.v + o.H_dot.T @ o.v + o.a_gravity,
-               "a: velocity-dependent acceleration, and gravity at the roots, (6n,): ṼH*θ̇ + Ḣ*θ̇ + a_gravity.")
+        "𝓑, V → F, block diagonal, skew: −[[ñ, f̃], [f̃, 0]] with (n; f) = M(k)V(k); 𝓑V = V̄MV.",
+    )
+    a = symbol(
+        lambda o: o.V_tilde @ o.H.T @ o.v + o.H_dot.T @ o.v + o.a_gravity,
+        "a: velocity-dependent acceleration, and gravity at the roots, (6n,): ṼH*θ̇ + Ḣ*θ̇ + a_gravity.",
+    )
     b = symbol(lambda o: o.V_bar @ o.M @ o.V, "b: gyroscopic forces, (6n,): V̄MV.")
 
 
@@ -399,6 +407,7 @@ def operators(description, q, v=None):
 
 
 # Dynamics -------------------------------------------------------------------------------------------------------------
+
 
 def inverse_dynamics_vectors(description, q, v, vdot):
     """alpha = φ*(H*θ̈ + a), f = φ(Mα + b), both (6n,), and T = Hf + Jθ̈, (nv,), as a namespace.

@@ -69,8 +69,15 @@ def _numbers(values: np.ndarray, limit: int = 7) -> str:
     return f"[{shown}{' ...' if len(values) > limit else ''}]"
 
 
+def _relative(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.abs(a - b).max(initial=0.0) / max(np.abs(b).max(initial=0.0), 1e-300))
+
+
 def _show_model(robot: Any, say: Say) -> None:
-    say.heading(f"{robot.name}: {len(robot.bodies)} bodies, {robot.nv} degrees of freedom, {sum(b.mass for b in robot.bodies.values()):.4g} kg that move")
+    say.heading(
+        f"{robot.name}: {len(robot.bodies)} bodies, {robot.nv} degrees of freedom, "
+        f"{sum(b.mass for b in robot.bodies.values()):.4g} kg that move"
+    )
     root = Tree(f"[bold]{robot.name}[/] (base)")
     branches: dict[str | None, Tree] = {None: root}
     for i, body in enumerate(robot.bodies.values()):
@@ -91,7 +98,7 @@ def _show_operators(robot: Any, MM: _core.Operator, soa: Any, say: Say) -> None:
     x = np.ones(robot.nv)
     y = MM @ x
     say.code("MM @ np.ones(robot.nv)        # O(N), nothing formed", _numbers(y))
-    say.text(f"against the composite-body assembly: {np.abs(y - robot.mass_matrix(robot.q) @ x + soa.J @ x).max() / np.abs(y).max():.0e} relative")
+    say.text(f"against the composite-body assembly: {_relative(y + soa.J @ x, robot.mass_matrix(robot.q) @ x):.0e} relative")
     if len(robot.bodies) <= LARGEST_PICTURE:
         S = soa.I - soa.H @ soa.psi @ soa.K
         say.text("\nWhich blocks are there, in the book's order (tip to base): φ gathers forces along the tree; [I-HψK] is what inverts.")
@@ -123,7 +130,9 @@ def _show_factorization(robot: Any, MM: _core.Operator, soa: Any, say: Say) -> N
     say.code("S = I - H@psi@K; by_hand = S.T @ D.inv() @ S")
     say.code(f"{name}.inv() @ x - by_hand @ x", f"largest entry {np.abs(solved - by_hand @ x).max():.0e}")
     exact = np.linalg.solve(system.dense(), x)
-    say.text(f"against a dense solve: {np.abs(solved - exact).max() / np.abs(exact).max():.0e} relative (condition of the matrix {np.linalg.cond(system.dense()):.0e})")
+    say.text(
+        f"against a dense solve: {_relative(solved, exact):.0e} relative (condition of the matrix {np.linalg.cond(system.dense()):.0e})"
+    )
     say.code(f"print({name}.inv().explain())", str(system.inv().explain()).rstrip())
     say.code(f"{name}.logdet(), D.logdet()", f"{float(system.logdet()):.12f}, {float(D.logdet()):.12f}")
     share = {body: float(np.trace(block)) for body, block in _shares(robot, soa)}
@@ -151,8 +160,14 @@ def _show_beyond(MM: _core.Operator, soa: Any, say: Say) -> None:
         ("(MM.inv() + 0.01*D).inv()", (MM.inv() + 0.01 * D).inv(), np.linalg.inv(np.linalg.inv(A) + 0.01 * Dd)),
     ):
         y = operator @ x
-        say.code(f"{code} @ x", f"against dense inverses {np.abs(y - dense @ x).max() / np.abs(y).max():.0e} relative; dense step in the plan: {operator.plan().has_dense_step}")
-    say.code("(MM + 0.1*I).inv().logdet()", f"{float((MM + 0.1 * I).inv().logdet()):.12f}   dense: {-np.linalg.slogdet(A + 0.1 * np.eye(n))[1]:.12f}")
+        say.code(
+            f"{code} @ x",
+            f"against dense inverses {_relative(y, dense @ x):.0e} relative; dense step in the plan: {operator.plan().has_dense_step}",
+        )
+    say.code(
+        "(MM + 0.1*I).inv().logdet()",
+        f"{float((MM + 0.1 * I).inv().logdet()):.12f}   dense: {-np.linalg.slogdet(A + 0.1 * np.eye(n))[1]:.12f}",
+    )
 
 
 def _show_tip(robot: Any, soa: Any, say: Say) -> None:

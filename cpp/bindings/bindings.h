@@ -33,6 +33,13 @@ void register_dynamics(py::module_& m);
 void register_theorems(py::module_& m);
 void register_bench(py::module_& m);
 
+// Classes are declared before anything is defined on them, so that signatures and stubs know every type.
+void declare_types(py::module_& m);
+template <class Class>
+Class declared(py::module_& m, const char* name) {
+  return py::reinterpret_borrow<Class>(m.attr(name));
+}
+
 // ---- conversions
 Vector3<double> to_vector3(const py::handle& value, const char* what);
 Matrix3<double> to_matrix3(const py::handle& value, const char* what);

@@ -1,5 +1,7 @@
 // The Python module: a table of contents.
+#include "algebra/scalar_expression.h"
 #include "bindings/bindings.h"
+#include "model/multibody.h"
 
 namespace {
 
@@ -10,10 +12,32 @@ void check_signals() {
 
 }  // namespace
 
+namespace pycraft {
+
+void declare_types(py::module_& m) {
+  py::class_<Space>(m, "Space",
+                    "A space that operators map between: Θ generalized coordinates, V and F stacked body motions and forces (dual), NodesV and\n"
+                    "NodesF those of nodes (dual), R^n a user's own. Spaces compare by kind, model and blocks, never by size alone.");
+  py::class_<Multibody, std::shared_ptr<Multibody>>(m, "Multibody", "A multibody model in the core; pycraft.Multibody is its Python face.");
+  py::class_<SkoSource, std::shared_ptr<SkoSource>>(m, "SkoSource", "Where the blocks of operators come from: a model, or a bare tree of matrices.");
+  py::class_<Binding, std::shared_ptr<Binding>>(m, "Binding", "A state, or a batch of them, that an expression is bound to.");
+  py::class_<Expression>(m, "Operator",
+                         "An operator expression: what was typed, as data. It holds no numbers and computes nothing until it is applied to an array\n"
+                         "(`op @ x`) or asked for one (`dense()`, `diagonal()`, `trace()`, ...). Then rules, planner and engine evaluate it by sweeps\n"
+                         "over the tree.");
+  py::class_<Scalar>(m, "Scalar",
+                     "A scalar made of operators (trace, ln|det|, norm and their sums): an expression, evaluated by float() or numpy.asarray.");
+  py::class_<ExecutionPool, std::shared_ptr<ExecutionPool>>(
+      m, "Plan", "A plan: what an expression becomes before any number is touched. `str(plan)` is the table that explain() shows.");
+}
+
+}  // namespace pycraft
+
 PYBIND11_MODULE(_core, m) {
   m.doc() = "The compiled core of pycraft: operators, planner, engine and model. Use it through the package pycraft.";
   pycraft::set_interrupt_check(&check_signals);
   pycraft::register_errors(m);
+  pycraft::declare_types(m);
   pycraft::register_spaces(m);
   pycraft::register_multibody(m);
   pycraft::register_sources(m);

@@ -44,7 +44,7 @@ Pose<double> pose_from(const py::object& rotation, const py::object& position, c
 }  // namespace
 
 void register_multibody(py::module_& m) {
-  py::class_<Multibody, std::shared_ptr<Multibody>>(m, "Multibody")
+  declared<py::class_<Multibody, std::shared_ptr<Multibody>>>(m, "Multibody")
       .def(py::init<std::string, bool, bool>(), py::arg("name") = "multibody", py::arg("keep_welds") = false, py::arg("strict") = false)
       .def_property_readonly("name", &Multibody::name)
       .def_property_readonly("keeps_welds", &Multibody::keeps_welds)

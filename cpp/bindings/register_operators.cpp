@@ -167,10 +167,7 @@ py::object value(const Expression& e, const py::kwargs& vectors) {
 }  // namespace
 
 void register_operators(py::module_& m) {
-  py::class_<Expression> op(m, "Operator",
-                            "An operator expression: what was typed, as data. It holds no numbers and computes nothing until it is applied to an array\n"
-                            "(`op @ x`) or asked for one (`dense()`, `diagonal()`, `trace()`, ...). Then rules, planner and engine evaluate it by sweeps\n"
-                            "over the tree.");
+  auto op = declared<py::class_<Expression>>(m, "Operator");
   op.attr("__array_ufunc__") = py::none();
   op.attr("__array_priority__") = py::float_(1000.0);
   op.def_property_readonly("domain", [](const Expression& e) { return e.floating() ? py::object(py::none()) : py::cast(e.domain()); }, "The space it acts on; None for an I that has none yet.")
@@ -285,7 +282,7 @@ void register_operators(py::module_& m) {
       })
       .def("_repr_latex_", [](const Expression& e) { return "$\\displaystyle " + show(e, Style::latex) + "$"; })
       .def("_parts", &parts)
-      .def("__reduce__", [](const Expression& e) {
+      .def("__reduce__", [](const Expression& e) -> py::tuple {
         return py::make_tuple(py::module_::import("pycraft.operators").attr("operator_from_parts"), parts(e));
       });
 

@@ -23,7 +23,7 @@ void register_plans(py::module_& m) {
         return "<passes: " + std::to_string(c.kernels) + " kernels, " + std::to_string(c.gathers) + " gathers, " + std::to_string(c.scatters) +
                " scatters, " + std::to_string(c.eliminations) + " eliminations, " + std::to_string(c.dense) + " dense>";
       });
-  py::class_<ExecutionPool, std::shared_ptr<ExecutionPool>>(m, "Plan", "A plan: what an expression becomes before any number is touched. `str(plan)` is the table that explain() shows.")
+  declared<py::class_<ExecutionPool, std::shared_ptr<ExecutionPool>>>(m, "Plan")
       .def("__str__",
            [](const ExecutionPool& p) {
              std::string text = explain(p.plan());

@@ -1,3 +1,5 @@
+#include <cmath>
+
 #include "algebra/scalar_expression.h"
 
 #include "bindings/bindings.h"
@@ -26,7 +28,7 @@ double single(const Scalar& s) {
 }  // namespace
 
 void register_scalars(py::module_& m) {
-  py::class_<Scalar> scalar(m, "Scalar", "A scalar made of operators (trace, ln|det|, norm and their sums): an expression, evaluated by float() or numpy.asarray.");
+  auto scalar = declared<py::class_<Scalar>>(m, "Scalar");
   scalar.attr("__array_ufunc__") = py::none();
   scalar.def("value", &value, "The number; with a batch bound, an array (batch,).")
       .def("__float__", &single)
@@ -53,6 +55,11 @@ void register_scalars(py::module_& m) {
       .def("__rmul__", [](const Scalar& a, double c) { return c * a; })
       .def("__truediv__", [](const Scalar& a, double c) { return (1 / c) * a; })
       .def("__neg__", [](const Scalar& a) { return -1.0 * a; })
+      .def("__abs__", [](const Scalar& a) { return std::abs(single(a)); })
+      .def("__lt__", [](const Scalar& a, double b) { return single(a) < b; })
+      .def("__le__", [](const Scalar& a, double b) { return single(a) <= b; })
+      .def("__gt__", [](const Scalar& a, double b) { return single(a) > b; })
+      .def("__ge__", [](const Scalar& a, double b) { return single(a) >= b; })
       .def("__eq__", [](const Scalar& a, const Scalar& b) { return a == b; })
       .def("__hash__", [](const Scalar& a) { return std::hash<std::string>()(show(a)); })
       .def("text", [](const Scalar& a) { return show(a); })
@@ -63,7 +70,7 @@ void register_scalars(py::module_& m) {
         const auto& n = a.node();
         return py::make_tuple(static_cast<int>(n.kind), n.value, n.operand ? py::cast(n.operand) : py::none(), py::cast(n.terms));
       })
-      .def("__reduce__", [](const Scalar& a) {
+      .def("__reduce__", [](const Scalar& a) -> py::tuple {
         return py::make_tuple(py::module_::import("pycraft._core").attr("_scalar_from_parts"), py::cast(a).attr("_parts")());
       });
   m.def("_scalar_from_parts", [](int kind, double value, const py::object& operand, const std::vector<Scalar>& terms) {

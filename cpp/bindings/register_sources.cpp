@@ -95,8 +95,8 @@ std::shared_ptr<const Binding> make_binding(const std::vector<Expression>& opera
 }
 
 void register_sources(py::module_& m) {
-  py::class_<Binding, std::shared_ptr<Binding>>(m, "Binding", "A state, or a batch of them, that an expression is bound to.")
-      .def("__reduce__", [](const Binding& b) {
+  declared<py::class_<Binding, std::shared_ptr<Binding>>>(m, "Binding")
+      .def("__reduce__", [](const Binding& b) -> py::tuple {
         return py::make_tuple(py::module_::import("pycraft._core").attr("_binding_from_parts"),
                               py::make_tuple(b.batch, b.nq, b.nv, b.q, b.v, precision_name(b.precision)));
       });
@@ -107,7 +107,7 @@ void register_sources(py::module_& m) {
   });
   m.def("_bind", &make_binding, py::arg("operands"), py::arg("q"), py::arg("v"), py::arg("form"), py::arg("refine"), py::arg("precision"));
 
-  py::class_<SkoSource, std::shared_ptr<SkoSource>>(m, "SkoSource", "Where the blocks of operators come from: a model, or a bare tree of matrices.")
+  declared<py::class_<SkoSource, std::shared_ptr<SkoSource>>>(m, "SkoSource")
       .def_property_readonly("name", &SkoSource::name)
       .def_property_readonly("Theta", &SkoSource::theta)
       .def_property_readonly("V", &SkoSource::motions)
@@ -132,7 +132,7 @@ void register_sources(py::module_& m) {
       .def("check_current", &SkoSource::check_current);
   py::class_<MultibodyOperators, SkoSource, std::shared_ptr<MultibodyOperators>>(m, "MultibodyOperators", "The operators' source of a multibody model.")
       .def_property_readonly("model", [](const MultibodyOperators& s) { return s.model(); })
-      .def("__reduce__", [](const MultibodyOperators& s) {
+      .def("__reduce__", [](const MultibodyOperators& s) -> py::tuple {
         return py::make_tuple(py::module_::import("pycraft._core").attr("operators_of"), py::make_tuple(py::cast(s.model())));
       });
   m.def("operators_of", &operators_of, py::arg("model"));
@@ -147,7 +147,7 @@ void register_sources(py::module_& m) {
              return std::make_shared<MatrixTree>(std::move(s), name, std::move(E), std::move(H), std::move(M), std::move(J));
            }),
            py::arg("parents"), py::arg("sizes"), py::arg("dof"), py::arg("E"), py::arg("H"), py::arg("M"), py::arg("J"), py::arg("names"), py::arg("name"))
-      .def("__reduce__", [](const MatrixTree& t) {
+      .def("__reduce__", [](const MatrixTree& t) -> py::tuple {
         const SkoStructure& s = t.structure();
         return py::make_tuple(py::module_::import("pycraft._core").attr("MatrixTree"),
                               py::make_tuple(s.parent, s.size, s.dof, t.E, t.H, t.M, t.J, s.body_names, t.name()));

@@ -5,9 +5,7 @@
 namespace pycraft {
 
 void register_spaces(py::module_& m) {
-  py::class_<Space>(m, "Space",
-                    "A space that operators map between: Θ generalized coordinates, V and F stacked body motions and forces (dual), NodesV and\n"
-                    "NodesF those of nodes (dual), R^n a user's own. Spaces compare by kind, model and blocks, never by size alone.")
+  declared<py::class_<Space>>(m, "Space")
       .def_property_readonly("name", &Space::name)
       .def_property_readonly("dimension", &Space::dimension)
       .def_property_readonly("dual", &Space::dual)

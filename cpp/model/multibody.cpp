@@ -266,11 +266,12 @@ void Multibody::check_mass_properties(const std::string& body, double mass, cons
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) A(i, j) = inertia(i, j);
   const Eigen::Vector3d moments = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(A, Eigen::EigenvaluesOnly).eigenvalues();
-  // Published inertias are rounded to a few digits: a negative moment within 1e-12 of the largest entry is rounding.
-  if (moments[0] < -1e-12 * largest)
+  // Published numbers carry rounding: a negative moment within 1e-12 of the largest entry, or of a point mass of 30 nm, is that.
+  const double rounding = 1e-12 * largest + 1e-15 * mass;
+  if (moments[0] < -rounding)
     throw ModelError("body '" + body + "': its inertia has the principal moment " + number(moments[0]) + " kg m²; an inertia is positive semidefinite");
   const double violation = moments[2] - moments[0] - moments[1];
-  if (violation > 1e-9 * largest) {
+  if (violation > 1e-9 * largest + rounding) {
     const std::string text = "body '" + body + "': its principal moments " + number(moments[0]) + ", " + number(moments[1]) + ", " + number(moments[2]) +
                              " kg m² violate the triangle inequality by " + number(violation) + "; no distribution of mass has them";
     if (strict_) throw ModelError(text);
@@ -316,7 +317,7 @@ std::vector<std::string> Multibody::take_warnings() {
   std::vector<std::string> all = std::move(warnings_);
   warnings_.clear();
   for (const Body& b : bodies_)
-    if (b.hinge.nv() > 0 && b.mass == 0 && std::all_of(b.inertia.s, b.inertia.s + 6, [](double x) { return x == 0; }))
+    if (b.hinge.nv() > 0 && b.mass == 0 && std::all_of(b.inertia.s, b.inertia.s + 6, [](double x) { return x == 0; }) && said_massless_.insert(b.name).second)
       all.push_back("body '" + b.name + "' on hinge '" + b.hinge.name +
                     "' has no mass: what needs D⁻¹ (forward dynamics, ℳ⁻¹) works only where the bodies outboard give the hinge inertia");
   return all;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -116,6 +117,7 @@ class Multibody : public std::enable_shared_from_this<Multibody> {
   mutable std::mutex mutex_;
   std::uint64_t parameters_ = 1;
   std::vector<std::string> warnings_;
+  std::set<std::string> said_massless_;
   std::unordered_map<std::string, std::pair<std::vector<double>, std::vector<double>>> carried_;  // q, v by hinge, across an edit
   std::atomic<bool> settled_{true};
   std::weak_ptr<SkoSource> operators_;

@@ -44,14 +44,22 @@ class Residuals:
         self.states = 0
         self.worst_state: Any = None
 
-    def add(self, lhs: Any, rhs: Any, at: BoundState, vectors: dict[str, np.ndarray] | None = None, on_one_path: bool = False, at_most: bool = False) -> float:
+    def add(
+        self,
+        lhs: Any,
+        rhs: Any,
+        at: BoundState,
+        vectors: dict[str, np.ndarray] | None = None,
+        on_one_path: bool = False,
+        at_most: bool = False,
+    ) -> float:
         """Evaluate at one state; returns the ratio of the double residual to its bound."""
-        vectors = {name: [float(x) for x in value] for name, value in (vectors or {}).items()}
+        values = {name: [float(x) for x in value] for name, value in (vectors or {}).items()}
         relative = {}
         scale = 0.0
         for precision in ("double", self.wide):
-            difference, left, right = _core.residual(at.bind(lhs, precision), at.bind(rhs, precision), vectors, on_one_path, at_most)
-            at.sizes.give(vectors)
+            difference, left, right = _core.residual(at.bind(lhs, precision), at.bind(rhs, precision), values, on_one_path, at_most)
+            at.sizes.give(values)
             if precision == "double":
                 scale = _scale(lhs, rhs, left, right, at.sizes)
             relative[precision] = difference / scale if scale > 0 else difference
@@ -125,7 +133,10 @@ def check_model(operators: Any, *, states: int = 3, seed: int = 0, precision: st
     report = Report(source.name, dict(source.traits))
     begin = time.perf_counter()
     rng = np.random.default_rng(seed)
-    drawn = [BoundState(operators, s) for s in ([None] if model is None else [_present(model), *(model.random_state(rng) for _ in range(states))])]
+    drawn = [
+        BoundState(operators, s)
+        for s in ([None] if model is None else [_present(model), *(model.random_state(rng) for _ in range(states))])
+    ]
     drawn[0].bind(operators.E, precision)  # raises by name where the precision is not there yet
     for theorem in operators.theorems():
         if progress is not None:
@@ -141,10 +152,20 @@ def _present(model: Any) -> Any:
     return State(np.array(model.q), np.array(model.v))
 
 
-def check_theorem(theorem: _core.Theorem, unmet: list[str], states: list[BoundState], rng: np.random.Generator, precision: str = "extended") -> Finding:
+def check_theorem(
+    theorem: _core.Theorem, unmet: list[str], states: list[BoundState], rng: np.random.Generator, precision: str = "extended"
+) -> Finding:
     """One theorem at these states; `unmet` are those of its hypotheses that the model does not meet."""
     finding = Finding(
-        theorem.name, theorem.group, theorem.text, theorem.latex, list(theorem.hypotheses), unmet, "waiting", wide_precision=precision, note=theorem.waiting
+        theorem.name,
+        theorem.group,
+        theorem.text,
+        theorem.latex,
+        list(theorem.hypotheses),
+        unmet,
+        "waiting",
+        wide_precision=precision,
+        note=theorem.waiting,
     )
     if theorem.waiting:
         return finding
@@ -161,12 +182,24 @@ def check_theorem(theorem: _core.Theorem, unmet: list[str], states: list[BoundSt
         verdict = "expected to fail" if verdict == "fails" else "holds anyway"
     finding.verdict = verdict
     finding.residual, finding.bound = residuals.residual, residuals.bound
-    finding.wide_residual, finding.wide_bound, finding.wide_precision = residuals.wide_residual, residuals.wide_bound, residuals.wide
+    finding.wide_residual, finding.wide_bound, finding.wide_precision = (
+        residuals.wide_residual,
+        residuals.wide_bound,
+        residuals.wide,
+    )
     finding.states, finding.seconds = residuals.states, time.perf_counter() - begin
     return finding
 
 
-def evaluate(lhs: Any, rhs: Any, states: list[BoundState], vectors: list[dict[str, np.ndarray]], precision: str, on_one_path: bool = False, at_most: bool = False) -> Residuals:
+def evaluate(
+    lhs: Any,
+    rhs: Any,
+    states: list[BoundState],
+    vectors: list[dict[str, np.ndarray]],
+    precision: str,
+    on_one_path: bool = False,
+    at_most: bool = False,
+) -> Residuals:
     """The residuals over these states; in quad where the wider scalar decides nothing."""
     residuals = Residuals(precision)
     for state, values in zip(states, vectors, strict=True):
@@ -186,7 +219,16 @@ def with_spaces(lhs: Any, rhs: Any) -> tuple[Any, Any]:
     return lhs, rhs
 
 
-def check(statement: Any, model: Any = None, *, states: int = 20, seed: int = 0, search: bool = True, precision: str = "extended", budget: float = 20.0) -> CheckReport:
+def check(
+    statement: Any,
+    model: Any = None,
+    *,
+    states: int = 20,
+    seed: int = 0,
+    search: bool = True,
+    precision: str = "extended",
+    budget: float = 20.0,
+) -> CheckReport:
     """Check a statement numerically: on a model over many seeded states, or on random trees.
 
     Parameters
@@ -227,7 +269,15 @@ def check(statement: Any, model: Any = None, *, states: int = 20, seed: int = 0,
         read = Statement(*with_spaces(*statement), text, "expressions")
     residuals = run(read, operators, states, seed, precision)
     name = operators._source.name
-    report = CheckReport(text, residuals.verdict != "fails", residuals.residual, residuals.bound, residuals.states, [name], undecided=residuals.verdict == "undecided")
+    report = CheckReport(
+        text,
+        residuals.verdict != "fails",
+        residuals.residual,
+        residuals.bound,
+        residuals.states,
+        [name],
+        undecided=residuals.verdict == "undecided",
+    )
     if not report.held and search:
         report.counterexample = searching.smallest(searching.statement_text(read), seed=seed, precision=precision, budget=budget)
     return report

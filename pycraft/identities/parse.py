@@ -70,6 +70,7 @@ NAME.2: /%(names)s/
 %%ignore WS
 """
 
+
 class ParseError(_core.EvaluationError):
     """A statement that cannot be read, or that can be read in two ways."""
 
@@ -123,7 +124,6 @@ class Statements:
         if rhs is not None:
             _check_same_spaces(lhs, rhs)
         return Statement(lhs, rhs, text, "Python" if reading == "python" else "the book")
-
 
     # ------------------------------------------------------------------ Python's reading: Python's own parser
     def _read_python(self, source: str) -> list[Any]:
@@ -180,10 +180,18 @@ class Statements:
             raise ParseError(str(error.orig_exc)) from None
         except exceptions.UnexpectedInput as error:
             at = getattr(error, "pos_in_stream", None)
-            raise ParseError(f"not understood at {source[at : at + 12]!r}" if at is not None and at < len(source) else "not understood at its end") from None
+            raise ParseError(
+                f"not understood at {source[at : at + 12]!r}" if at is not None and at < len(source) else "not understood at its end"
+            ) from None
 
 
-_BINARY = {ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.MatMult: operator.matmul, ast.Div: operator.truediv}
+_BINARY = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.MatMult: operator.matmul,
+    ast.Div: operator.truediv,
+}
 
 
 def _combine(f: Any, a: Any, b: Any) -> Any:
@@ -263,9 +271,11 @@ _LATEX = [
     (r"\^\{1/2\}", " .sqrt() "),
 ]
 _LETTERS = [
-    ("E_φ", " E "), ("E_ψ", " E_psi "), ("φ̃", " phi_tilde "), ("ψ̃", " psi_tilde "), ("τ̄", " tau_bar "), ("P⁺", " P_plus "), ("Δ_θ̇", " Delta_theta_dot "),
-    ("Ṽ", " V_tilde "), ("V̄", " V_bar "), ("𝓑", " momentum_cross "), ("𝒥", " Jacobian "), ("φ", " phi "), ("ψ", " psi "), ("τ", " tau "), ("Υ", " Upsilon "),
-    ("Ω", " Omega "), ("Λ", " Lambda "), ("Δ", " Delta "), ("ℳ", " MM "), ("−", "-"), ("×", "@"), ("⁻¹", "^-1"), ("ᵀ", " ^* "), ("∗", "*"), ("ln det", "logdet"),
+    ("E_φ", " E "), ("E_ψ", " E_psi "), ("φ̃", " phi_tilde "), ("ψ̃", " psi_tilde "), ("τ̄", " tau_bar "),
+    ("P⁺", " P_plus "), ("Δ_θ̇", " Delta_theta_dot "), ("Ṽ", " V_tilde "), ("V̄", " V_bar "),
+    ("𝓑", " momentum_cross "), ("𝒥", " Jacobian "), ("φ", " phi "), ("ψ", " psi "), ("τ", " tau "),
+    ("Υ", " Upsilon "), ("Ω", " Omega "), ("Λ", " Lambda "), ("Δ", " Delta "), ("ℳ", " MM "), ("−", "-"), ("×", "@"),
+    ("⁻¹", "^-1"), ("ᵀ", " ^* "), ("∗", "*"), ("ln det", "logdet"),
 ]  # fmt: skip
 
 

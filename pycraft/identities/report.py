@@ -64,7 +64,10 @@ class Report:
         return counts
 
     def to_json(self) -> str:
-        return json.dumps({"model": self.model, "traits": self.traits, "seconds": self.seconds, "findings": [asdict(f) for f in self.findings]}, indent=1)
+        return json.dumps(
+            {"model": self.model, "traits": self.traits, "seconds": self.seconds, "findings": [asdict(f) for f in self.findings]},
+            indent=1,
+        )
 
     def table(self):
         """The findings as a rich table."""
@@ -73,10 +76,26 @@ class Report:
 
         wide = next((f.wide_precision for f in self.findings if f.states), "extended")
         table = Table(title=f"Theorems on {self.model}", title_justify="left", box=None, pad_edge=False, header_style="bold")
-        for header, justify in (("theorem", "left"), ("hypotheses", "left"), ("double", "right"), (wide, "right"), ("bound", "right"), ("verdict", "left"), ("ms", "right")):
+        for header, justify in (
+            ("theorem", "left"),
+            ("hypotheses", "left"),
+            ("double", "right"),
+            (wide, "right"),
+            ("bound", "right"),
+            ("verdict", "left"),
+            ("ms", "right"),
+        ):
             table.add_column(header, justify=justify, no_wrap=header in ("double", "bound", wide, "ms"), overflow="fold")
         group = None
-        style = {"holds": "green", "fails": "bold red", "undecided": "yellow", "expected to fail": "cyan", "holds anyway": "green", "waiting": "dim", "undefined": "yellow"}
+        style = {
+            "holds": "green",
+            "fails": "bold red",
+            "undecided": "yellow",
+            "expected to fail": "cyan",
+            "holds anyway": "green",
+            "waiting": "dim",
+            "undefined": "yellow",
+        }
         for f in self.findings:
             if f.group != group:
                 group = f.group
@@ -88,7 +107,13 @@ class Report:
                 continue
             verdict = f.verdict + (f": {', '.join(f.unmet)} not met" if f.unmet else "")
             table.add_row(
-                "  " + f.statement, hypotheses, f"{f.residual:.1e}", f"{f.wide_residual:.1e}" + ("q" if f.wide_precision == "quad" and wide != "quad" else ""), f"{f.bound:.0e}", Text(verdict, style=style[f.verdict]), f"{1e3 * f.seconds:.0f}"
+                "  " + f.statement,
+                hypotheses,
+                f"{f.residual:.1e}",
+                f"{f.wide_residual:.1e}" + ("q" if f.wide_precision == "quad" and wide != "quad" else ""),
+                f"{f.bound:.0e}",
+                Text(verdict, style=style[f.verdict]),
+                f"{1e3 * f.seconds:.0f}",
             )
         return table
 
@@ -109,15 +134,28 @@ class Report:
         from html import escape
 
         rows, group = [], None
-        color = {"holds": "#2a7", "fails": "#c22", "undecided": "#c90", "expected to fail": "#28a", "holds anyway": "#2a7", "waiting": "#999", "undefined": "#c90"}
+        color = {
+            "holds": "#2a7",
+            "fails": "#c22",
+            "undecided": "#c90",
+            "expected to fail": "#28a",
+            "holds anyway": "#2a7",
+            "waiting": "#999",
+            "undefined": "#c90",
+        }
         for f in self.findings:
             if f.group != group:
                 group = f.group
                 rows.append(f"<tr><th colspan=6 style='text-align:left;padding-top:8px'>{escape(group)}</th></tr>")
-            numbers = "<td></td><td></td><td></td>" if f.verdict == "waiting" else f"<td>{f.residual:.1e}</td><td>{f.wide_residual:.1e}</td><td>{f.bound:.0e}</td>"
+            numbers = (
+                "<td></td><td></td><td></td>"
+                if f.verdict == "waiting"
+                else f"<td>{f.residual:.1e}</td><td>{f.wide_residual:.1e}</td><td>{f.bound:.0e}</td>"
+            )
             note = f" ({escape(', '.join(f.unmet))} not met)" if f.unmet else f" ({escape(f.note)})" if f.verdict == "waiting" else ""
             rows.append(
-                f"<tr><td style='text-align:left'>${f.latex}$</td><td style='text-align:left'>{escape(', '.join(f.hypotheses))}</td>{numbers}"
+                f"<tr><td style='text-align:left'>${f.latex}$</td>"
+                f"<td style='text-align:left'>{escape(', '.join(f.hypotheses))}</td>{numbers}"
                 f"<td style='text-align:left;color:{color[f.verdict]}'>{f.verdict}{note}</td></tr>"
             )
         head = "<tr><th>theorem</th><th>hypotheses</th><th>double</th><th>extended</th><th>bound</th><th>verdict</th></tr>"
@@ -126,7 +164,10 @@ class Report:
 
 @dataclass
 class CheckReport:
-    """The outcome of `pycraft.check`: true where the statement held at every state; else `.counterexample` is the smallest refutation found."""
+    """The outcome of `pycraft.check`: true where the statement held at every state.
+
+    `.counterexample` is the smallest refutation found of a false one.
+    """
 
     statement: str
     held: bool
@@ -145,7 +186,8 @@ class CheckReport:
         on = self.models[0] if len(self.models) == 1 else f"{len(self.models)} models"
         if self.held:
             word = "undecided" if self.undecided else "holds"
-            text = f"{self.statement}\n  {word} on {on}, {self.states} states: worst relative residual {self.worst:.1e} (bound {self.bound:.0e})"
+            text = f"{self.statement}\n  {word} on {on}, {self.states} states: "
+            text += f"worst relative residual {self.worst:.1e} (bound {self.bound:.0e})"
         else:
             text = f"{self.statement}\n  FALSE: relative residual {self.worst:.1e} (bound {self.bound:.0e})"
             if self.counterexample is not None:

@@ -21,7 +21,18 @@ from .parse import Statement, Statements
 from .report import CheckReport
 
 STATES = 3
-DOF = {"pin": 1, "slider": 1, "screw": 1, "universal": 2, "cylindrical": 2, "gimbal": 3, "planar": 3, "ball": 3, "custom": 3, "free": 6}
+DOF = {
+    "pin": 1,
+    "slider": 1,
+    "screw": 1,
+    "universal": 2,
+    "cylindrical": 2,
+    "gimbal": 3,
+    "planar": 3,
+    "ball": 3,
+    "custom": 3,
+    "free": 6,
+}
 KINDS = tuple(sorted(DOF, key=lambda kind: DOF[kind]))
 
 
@@ -98,7 +109,10 @@ def candidates(largest: int) -> Iterator[tuple[list[int], list[str], bool]]:
 
 def statement_text(read: Statement) -> str:
     """The statement in Python's spelling, to be read on another model."""
-    sides = [side if isinstance(side, (int, float)) else side.python() if isinstance(side, _core.Operator) else side.text() for side in (read.lhs, read.rhs)]
+    sides = [
+        side if isinstance(side, (int, float)) else side.python() if isinstance(side, _core.Operator) else side.text()
+        for side in (read.lhs, read.rhs)
+    ]
     return read.text if read.reading != "expressions" else f"{sides[0]} == {sides[1]}"
 
 
@@ -141,9 +155,18 @@ def smallest(text: str, *, seed: int = 0, precision: str = "extended", budget: f
 
 _CLASSES: list[tuple[str, list[tuple[list[int], list[str], bool]]]] = [
     ("J = 0", [([-1, 0, 0, 1], ["pin", "slider", "ball", "universal"], False), ([-1, 0, 1], ["free", "pin", "custom"], False)]),
-    ("the tree is a serial chain", [([-1, 0, 1, 2], ["pin", "slider", "ball", "universal"], True), ([-1, 0, 1], ["free", "pin", "custom"], True)]),
-    ("every hinge has one degree of freedom", [([-1, 0, 0, 1], ["pin", "slider", "screw", "pin"], True), ([-1, 0, 1, 1], ["slider", "pin", "pin", "pin"], True)]),
-    ("H is constant", [([-1, 0, 0, 1], ["pin", "ball", "free", "slider"], True), ([-1, 0, 1, 1], ["free", "pin", "ball", "pin"], True)]),
+    (
+        "the tree is a serial chain",
+        [([-1, 0, 1, 2], ["pin", "slider", "ball", "universal"], True), ([-1, 0, 1], ["free", "pin", "custom"], True)],
+    ),
+    (
+        "every hinge has one degree of freedom",
+        [([-1, 0, 0, 1], ["pin", "slider", "screw", "pin"], True), ([-1, 0, 1, 1], ["slider", "pin", "pin", "pin"], True)],
+    ),
+    (
+        "H is constant",
+        [([-1, 0, 0, 1], ["pin", "ball", "free", "slider"], True), ([-1, 0, 1, 1], ["free", "pin", "ball", "pin"], True)],
+    ),
     (
         "the tree is a serial chain and J = 0",
         [([-1, 0, 1, 2], ["pin", "slider", "ball", "universal"], False), ([-1, 0, 1], ["free", "pin", "custom"], False)],

@@ -17,6 +17,7 @@ import numpy as np
 from .. import _core
 from . import pinocchio as convention
 
+GRAVITY = (0.0, 0.0, -9.81)
 QUANTITIES = ("mass matrix", "inverse dynamics", "Jacobians", "inverse", "forward dynamics")
 
 
@@ -33,6 +34,7 @@ class Comparison:
     largest: dict[str, float] = field(default_factory=dict)
     condition: float = 0.0
     settled: list[str] = field(default_factory=list)
+    singular: str = ""
     refused: str = ""
 
     @property
@@ -59,8 +61,6 @@ def _prefixes(module: Any) -> Iterator[Path]:
 
 def compare(path: Path, root: str, states: int = 20, seed: int = 0) -> Comparison:
     """One robot against Pinocchio at `states` random states."""
-    import pinocchio
-
     from ..models.load import load
     from ..models.warning import ModelWarning
 
@@ -86,43 +86,63 @@ def compare(path: Path, root: str, states: int = 20, seed: int = 0) -> Compariso
     if model.nv == 0:
         result.refused = "no degrees of freedom"
         return result
-    data = pin_model.createData()
-    gravity = (0.0, 0.0, -9.81)
-    model.gravity = gravity
-    pin_model.gravity.linear = np.array(gravity)
-    eps, n = np.finfo(float).eps, model.nv
+    pin_model.gravity.linear = np.array(GRAVITY)
+    model.gravity = GRAVITY
     rng = np.random.default_rng(seed)
-    frames = [name for name in [*model.bodies] if pin_model.existFrame(name, pinocchio.FrameType.BODY)]
     for _ in range(states):
-        state = model.random_state(rng)
-        q, v, u = state.q, state.v, rng.uniform(-1, 1, n)
-        pq, S = twin.q(q), twin.velocities(q)
-        pv, pu = S @ v, S @ u
-        pm = pinocchio.crba(pin_model, data, pq)
-        pm = np.triu(pm) + np.triu(pm, 1).T
-        # Pinocchio adds its own armature where a file has one; URDF files have none.
-        own = model.mass_matrix(q)
-        condition = float(np.linalg.cond(own))
-        result.condition = max(result.condition, condition)
-        minverse = pinocchio.computeMinverse(pin_model, data, pq)
-        minverse = np.triu(minverse) + np.triu(minverse, 1).T
-        base = 100 * n * eps
-        chosen = [frames[i] for i in rng.choice(len(frames), min(3, len(frames)), replace=False)] if frames else []
-        pairs: dict[str, tuple[Callable[[str], np.ndarray], np.ndarray, float]] = {
-            "mass matrix": (lambda p: model.mass_matrix(q, precision=p), S.T @ pm @ S, base),
-            "inverse dynamics": (lambda p: model.inverse_dynamics(q, v, u, precision=p), S.T @ pinocchio.rnea(pin_model, data, pq, pv, pu), base),
-            "Jacobians": (
-                lambda p: np.array([model.jacobian(f, q, precision=p) for f in chosen]),
-                np.array([convention.jacobian(pin_model, data, pq, f) @ S for f in chosen]),
-                base,
-            ),
-            "inverse": (lambda p: model.mass_matrix_inverse(q, precision=p), S.T @ minverse @ S, base * condition),
-            "forward dynamics": (lambda p: model.forward_dynamics(q, v, u, precision=p), S.T @ pinocchio.aba(pin_model, data, pq, pv, pu), base * condition),
-        }
-        for name, (mine, theirs, bound) in pairs.items():
-            _judge(result, name, mine, theirs, bound)
+        _compare_at(result, model, twin, model.random_state(rng), rng)
         result.states += 1
     return result
+
+
+def _compare_at(result: Comparison, model: Any, twin: convention.Coordinates, state: Any, rng: np.random.Generator) -> None:
+    """All quantities at one state."""
+    import pinocchio
+
+    pin_model = twin.pin_model
+    data = pin_model.createData()
+    q, v, u = state.q, state.v, rng.uniform(-1, 1, model.nv)
+    pq, S = twin.q(q), twin.velocities(q)
+    pv, pu = S @ v, S @ u
+    # Pinocchio's Python functions fill the upper triangle alone.
+    pm, minverse = (
+        np.triu(A) + np.triu(A, 1).T for A in (pinocchio.crba(pin_model, data, pq), pinocchio.computeMinverse(pin_model, data, pq))
+    )
+    condition = float(np.linalg.cond(model.mass_matrix(q)))
+    result.condition = max(result.condition, condition)
+    bound = 100 * model.nv * float(np.finfo(float).eps)
+    frames = [name for name in model.bodies if pin_model.existFrame(name, pinocchio.FrameType.BODY)]
+    chosen = [frames[i] for i in rng.choice(len(frames), min(3, len(frames)), replace=False)] if frames else []
+    theirs = {
+        "mass matrix": S.T @ pm @ S,
+        "inverse dynamics": S.T @ pinocchio.rnea(pin_model, data, pq, pv, pu),
+        "Jacobians": np.array([convention.jacobian(pin_model, data, pq, f) @ S for f in chosen]),
+        "inverse": S.T @ minverse @ S,
+        "forward dynamics": S.T @ pinocchio.aba(pin_model, data, pq, pv, pu),
+    }
+
+    def mine(name: str, precision: str) -> np.ndarray:
+        match name:
+            case "mass matrix":
+                return model.mass_matrix(q, precision=precision)
+            case "inverse dynamics":
+                return model.inverse_dynamics(q, v, u, precision=precision)
+            case "Jacobians":
+                return np.array([model.jacobian(f, q, precision=precision) for f in chosen])
+            case "inverse":
+                return model.mass_matrix_inverse(q, precision=precision)
+            case _:
+                return model.forward_dynamics(q, v, u, precision=precision)
+
+    for name, value in theirs.items():
+        inverse = name in ("inverse", "forward dynamics")
+        if inverse and result.singular:
+            continue
+        try:
+            _judge(result, name, lambda precision, name=name: mine(name, precision), value, bound * (condition if inverse else 1))
+        except _core.SingularHingeError as error:
+            result.singular = str(error).split(":")[0]
+            result.ratio.pop("inverse", None)
 
 
 def _judge(result: Comparison, name: str, mine: Callable[[str], np.ndarray], theirs: np.ndarray, bound: float) -> None:
@@ -159,20 +179,30 @@ def markdown(results: list[Comparison], states: int) -> str:
     lines = [
         "# Robots against Pinocchio",
         "",
-        f"Largest relative differences over {states} random states; in parentheses the largest ratio to the bound (100 N eps; times cond(ℳ) for",
-        "the inverse and the forward dynamics). Made by `pycraft peers`.",
+        f"Largest relative differences over {states} random states; in parentheses the largest ratio to the bound (100 N eps; times",
+        "cond(ℳ) for the inverse and the forward dynamics). Made by `pycraft peers`.",
         "",
-        f"{len({r.robot for r in compared})} robots compared, {sum(r.passed for r in compared)} of {len(compared)} models within all bounds, {len(refused)} not compared.",
+        f"{len({r.robot for r in compared})} robots compared, {sum(r.passed for r in compared)} of {len(compared)} models within all "
+        f"bounds, {len(refused)} not compared.",
         "",
         "| robot | root | bodies | nv | cond(ℳ) | " + " | ".join(QUANTITIES) + " |",
         "|" + "---|" * (5 + len(QUANTITIES)),
     ]
     for r in compared:
-        cells = [f"{r.largest[k]:.0e} ({r.ratio[k]:.0e})" if k in r.largest else "" for k in QUANTITIES]
+        cells = [f"{r.largest[k]:.0e} ({r.ratio[k]:.0e})" if k in r.ratio else "—" for k in QUANTITIES]
         lines.append(f"| {r.robot} | {r.root} | {r.bodies} | {r.nv} | {r.condition:.0e} | " + " | ".join(cells) + " |")
     if any(r.settled for r in compared):
         lines += ["", "## Settled in quad precision", ""]
         lines += [f"- {r.robot} ({r.root}): {note}" for r in compared for note in r.settled]
+    if any(r.singular for r in compared):
+        lines += [
+            "",
+            "## No inverse: a massless link on a hinge",
+            "",
+            "ℳ, inverse dynamics and Jacobians are compared; ℳ⁻¹ and forward dynamics do not exist.",
+            "",
+        ]
+        lines += [f"- {r.robot} ({r.root}): {r.singular}" for r in compared if r.singular]
     if refused:
         lines += ["", "## Not compared", ""]
         for r in refused:

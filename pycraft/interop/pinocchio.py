@@ -23,7 +23,11 @@ def build(path: str, root: str = "fixed") -> Any:
     """Pinocchio's model of a URDF file, with a free flyer for root="free"."""
     import pinocchio
 
-    return pinocchio.buildModelFromUrdf(str(path), pinocchio.JointModelFreeFlyer()) if root == "free" else pinocchio.buildModelFromUrdf(str(path))
+    return (
+        pinocchio.buildModelFromUrdf(str(path), pinocchio.JointModelFreeFlyer())
+        if root == "free"
+        else pinocchio.buildModelFromUrdf(str(path))
+    )
 
 
 @dataclass
@@ -85,7 +89,9 @@ def coordinates(model: Multibody, pin_model: Any) -> Coordinates:
         hinge = hinges[own]
         joint = pin_model.joints[j]
         if joint.nv != hinge.v_slice.stop - hinge.v_slice.start:
-            raise _core.ModelError(f"joint {name!r} has {joint.nv} velocities in Pinocchio and {hinge.v_slice.stop - hinge.v_slice.start} here")
+            raise _core.ModelError(
+                f"joint {name!r} has {joint.nv} velocities in Pinocchio and {hinge.v_slice.stop - hinge.v_slice.start} here"
+            )
         joints.append((own, hinge.kind, hinge.q_slice, hinge.v_slice, joint.idx_q, joint.nq, joint.idx_v))
     missing = {name for name in hinges if hinges[name].v_slice.stop > hinges[name].v_slice.start} - {j[0] for j in joints}
     if missing:

@@ -32,7 +32,14 @@ def to_scipy(operator: _core.Operator) -> LinearOperator:
     def flat(op: _core.Operator):
         return lambda x: op @ np.ascontiguousarray(x)
 
-    return LinearOperator(operator.shape, matvec=flat(operator), rmatvec=flat(transposed), matmat=flat(operator), rmatmat=flat(transposed), dtype=np.float64)
+    return LinearOperator(
+        operator.shape,
+        matvec=flat(operator),
+        rmatvec=flat(transposed),
+        matmat=flat(operator),
+        rmatmat=flat(transposed),
+        dtype=np.float64,
+    )
 
 
 def from_scipy(linear_operator: Any, domain: _core.Space, codomain: _core.Space, name: str = "L") -> _core.Operator:

@@ -13,7 +13,16 @@ from .multibody import Multibody
 KINDS = ("weld", "pin", "slider", "screw", "universal", "gimbal", "cylindrical", "planar", "ball", "free", "custom")
 
 
-def chain(n: int, kind: str = "pin", seed: int | None = None, *, mass: float = 1.0, length: float = 1.0, welds: str = "lump", name: str | None = None) -> Multibody:
+def chain(
+    n: int,
+    kind: str = "pin",
+    seed: int | None = None,
+    *,
+    mass: float = 1.0,
+    length: float = 1.0,
+    welds: str = "lump",
+    name: str | None = None,
+) -> Multibody:
     """A serial chain of n bodies.
 
     With `seed=None`: uniform thin rods of 1 kg and 1 m along x, all axes z, so that everything has a closed form. With a seed: poses,
@@ -28,7 +37,7 @@ def chain(n: int, kind: str = "pin", seed: int | None = None, *, mass: float = 1
     if seed is not None:
         return tree(range(-1, n - 1), [kind] * n, seed=seed, welds=welds, name=name or f"chain of {n}")
     model = Multibody(name or f"chain of {n} rods", welds=welds)
-    rod = dict(mass=mass, com=(length / 2, 0, 0), inertia=np.diag([0.0, mass * length**2 / 12, mass * length**2 / 12]))
+    rod: dict[str, Any] = dict(mass=mass, com=(length / 2, 0, 0), inertia=np.diag([0.0, mass * length**2 / 12, mass * length**2 / 12]))
     for k in range(n):
         options: dict[str, Any] = {}
         if kind == "custom":
@@ -36,13 +45,26 @@ def chain(n: int, kind: str = "pin", seed: int | None = None, *, mass: float = 1
         elif kind in ("universal", "gimbal"):
             options["axes"] = [(0, 0, 1), (0, 1, 0), (1, 0, 0)][: 2 if kind == "universal" else 3]
         model.add_body(
-            f"body{k}", f"body{k - 1}" if k else None, kind, hinge_name=f"hinge{k}", position=(length, 0, 0) if k else (0, 0, 0), **rod, **options
+            f"body{k}",
+            f"body{k - 1}" if k else None,
+            kind,
+            hinge_name=f"hinge{k}",
+            position=(length, 0, 0) if k else (0, 0, 0),
+            **rod,
+            **options,
         )
     return model
 
 
-def tree(parents: Sequence[int], kinds: Sequence[str] | str = "pin", seed: int = 0, *, rotor_inertia: bool = False, welds: str = "lump",
-         name: str | None = None) -> Multibody:
+def tree(
+    parents: Sequence[int],
+    kinds: Sequence[str] | str = "pin",
+    seed: int = 0,
+    *,
+    rotor_inertia: bool = False,
+    welds: str = "lump",
+    name: str | None = None,
+) -> Multibody:
     """A random tree: `parents[k] < k`, -1 for the base; poses, axes and positive definite inertias drawn from the seed.
 
     Bodies are named "body0", "body1", ... and hinges "hinge0", ... by their index in `parents`; the model keeps them depth first. A

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Sequence
 
 from .. import _core
 from . import urdf
 from .multibody import Multibody
-from .warning import ModelWarning
+from .warning import warn
 from .xml_file import XmlFile
 
 _OPTIONS = {"root": ("fixed", "free"), "mimic": ("refuse", "lock", "free"), "welds": ("lump", "keep")}
@@ -67,7 +66,7 @@ def load(
     """
     model, words = read(path, root=root, mimic=mimic, welds=welds, package_dirs=package_dirs, strict=strict)
     for text in words:
-        warnings.warn(text, ModelWarning, stacklevel=2)
+        warn(text)
     return model
 
 

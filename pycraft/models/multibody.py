@@ -142,7 +142,9 @@ class Hinge:
         return Body(self._model, self._model._names()[0][self._index()])
 
     def __repr__(self) -> str:
-        return f"<hinge {self.name!r}: {self.kind}, q[{self.q_slice.start}:{self.q_slice.stop}], v[{self.v_slice.start}:{self.v_slice.stop}]>"
+        return (
+            f"<hinge {self.name!r}: {self.kind}, q[{self.q_slice.start}:{self.q_slice.stop}], v[{self.v_slice.start}:{self.v_slice.stop}]>"
+        )
 
 
 class Node:
@@ -294,19 +296,32 @@ class Multibody(_core.Multibody):
         if rotor_inertia is not None:
             rotor = np.atleast_1d(np.asarray(rotor_inertia, float))
             if rotor.size == 1:
-                count = {"pin": 1, "slider": 1, "screw": 1, "universal": 2, "cylindrical": 2, "gimbal": 3, "planar": 3, "ball": 3, "free": 6}.get(hinge)
+                count = {
+                    "pin": 1,
+                    "slider": 1,
+                    "screw": 1,
+                    "universal": 2,
+                    "cylindrical": 2,
+                    "gimbal": 3,
+                    "planar": 3,
+                    "ball": 3,
+                    "free": 6,
+                }.get(hinge)
                 if hinge == "custom" and subhinges is not None:
                     count = sum({"ball": 3, "free": 6}.get(s["kind"], 1) for s in subhinges)
             rotor = np.full(count, rotor[0]) if count else rotor
         lower, upper = (np.atleast_1d(np.asarray(x, float)) for x in limits) if limits is not None else ((), ())
         self._add_body(
-            name, parent or "", hinge, hinge_name or "", directions, point, float(pitch), list(subhinges) if subhinges is not None else None,
+            name, parent or "", hinge, hinge_name or "", directions, point, float(pitch),
+            list(subhinges) if subhinges is not None else None,
             rotation, position, float(mass), com, inertia, [float(x) for x in rotor] if rotor_inertia is not None else [],
             [float(x) for x in lower], [float(x) for x in upper],
         )  # fmt: skip
         return Body(self, name)
 
-    def add_node(self, name: str, body: str | Body | None = None, *, position: Vector | None = None, rotation: np.ndarray | None = None) -> Node:
+    def add_node(
+        self, name: str, body: str | Body | None = None, *, position: Vector | None = None, rotation: np.ndarray | None = None
+    ) -> Node:
         """Add a frame on a body, on a node, or on the base (None). It invalidates no operator."""
         self._add_node(name, body.name if isinstance(body, Body) else body or "", rotation, position)
         return Node(self, name)
@@ -419,7 +434,8 @@ class Multibody(_core.Multibody):
         for body in data["bodies"]:
             hinge = body["hinge"]
             model._add_body(
-                body["name"], names[body["parent"]] if body["parent"] >= 0 else "", hinge.get("kind", "custom"), hinge["name"], [], None, 0.0,
+                body["name"], names[body["parent"]] if body["parent"] >= 0 else "", hinge.get("kind", "custom"), hinge["name"],
+                [], None, 0.0,
                 [dict(s) for s in hinge["subhinges"]], np.asarray(hinge["placement"]["rotation"], float),
                 np.asarray(hinge["placement"]["position"], float), float(body["mass"]), body["com"], np.asarray(body["inertia"], float),
                 [float(x) for x in hinge.get("rotor_inertia", [])], [float(x) for x in hinge.get("lower", [])],

@@ -138,9 +138,7 @@ class XmlFile:
             raise self.error(element, f'{where}="{value}" has {len(words)} values; write {wanted}')
         return np.array([self._number(element, where, value, word, wanted, infinite) for word in words])
 
-    def number(
-        self, element: Element, attribute: str, owner: Element, default: float | None = None, infinite: bool = False
-    ) -> float:
+    def number(self, element: Element, attribute: str, owner: Element, default: float | None = None, infinite: bool = False) -> float:
         """One number of an attribute: see `numbers`."""
         fallback = None if default is None else np.array([default])
         return float(self.numbers(element, attribute, 1, owner, fallback, infinite)[0])

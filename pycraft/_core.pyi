@@ -1,0 +1,681 @@
+"""
+The compiled core of pycraft: operators, planner, engine and model. Use it through the package pycraft.
+"""
+
+from __future__ import annotations
+import collections.abc
+import numpy
+import numpy.typing
+import typing
+
+__all__: list[str] = [
+    "Binding",
+    "Dynamics",
+    "Error",
+    "EvaluationError",
+    "MatrixTree",
+    "ModelError",
+    "Multibody",
+    "MultibodyOperators",
+    "Operator",
+    "PassCounts",
+    "Plan",
+    "Scalar",
+    "SingularHingeError",
+    "SingularOperatorError",
+    "SkoSource",
+    "Space",
+    "SpaceError",
+    "StaleOperatorError",
+    "Theorem",
+    "blockdiag",
+    "constant",
+    "epsilons",
+    "equal_by_theorems",
+    "euclidean",
+    "external",
+    "identity",
+    "operators_of",
+    "residual",
+    "scalar",
+    "symbol_table",
+    "theorems",
+    "time_apply",
+    "time_dynamics",
+    "vector",
+    "zero",
+]
+
+class Error(Exception): ...
+class SpaceError(Error, TypeError): ...
+class ModelError(Error, ValueError): ...
+class EvaluationError(Error, ValueError): ...
+class SingularHingeError(Error, ArithmeticError): ...
+class SingularOperatorError(Error, ArithmeticError): ...
+class StaleOperatorError(Error, RuntimeError): ...
+
+class Space:
+    """
+    A space that operators map between: Θ generalized coordinates, V and F stacked body motions and forces (dual), NodesV and
+    NodesF those of nodes (dual), R^n a user's own. Spaces compare by kind, model and blocks, never by size alone.
+    """
+    @typing.overload
+    def __eq__(self, arg0: object) -> bool: ...
+    @typing.overload
+    def __eq__(self, arg0: typing.Any) -> typing.Any: ...
+    def __hash__(self) -> int: ...
+    def __len__(self) -> int: ...
+    def __repr__(self) -> str: ...
+    @property
+    def blocks(self) -> list:
+        """
+        List of (label, slice, body number) in the order of a vector's entries; body -1 for none.
+        """
+    @property
+    def dimension(self) -> int: ...
+    @property
+    def dual(self) -> Space: ...
+    @property
+    def name(self) -> str: ...
+
+class Multibody:
+    """
+    A multibody model in the core; pycraft.Multibody is its Python face.
+    """
+    def __init__(self, name: str = "multibody", keep_welds: bool = False, strict: bool = False) -> None: ...
+    def _add_body(
+        self,
+        name: str,
+        parent: str,
+        hinge: str,
+        hinge_name: str,
+        axes: collections.abc.Sequence[typing.Any],
+        point: typing.Any,
+        pitch: typing.SupportsFloat | typing.SupportsIndex,
+        subhinges: typing.Any,
+        rotation: typing.Any,
+        position: typing.Any,
+        mass: typing.SupportsFloat | typing.SupportsIndex,
+        com: typing.Any,
+        inertia: typing.Any,
+        rotor_inertia: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
+        lower: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
+        upper: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
+    ) -> None: ...
+    def _add_node(self, arg0: str, arg1: str, arg2: typing.Any, arg3: typing.Any) -> None: ...
+    def _body(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> dict: ...
+    def _body_index(self, arg0: str) -> int: ...
+    def _hinge_index(self, arg0: str) -> int: ...
+    def _names(self) -> tuple[list[str], list[str]]: ...
+    def _node_index(self, arg0: str) -> int: ...
+    def _nodes(self) -> list: ...
+    def _set_mass_properties(
+        self,
+        arg0: typing.SupportsInt | typing.SupportsIndex,
+        arg1: typing.SupportsFloat | typing.SupportsIndex,
+        arg2: typing.Any,
+        arg3: typing.Any,
+    ) -> None: ...
+    def _set_placement(self, arg0: typing.SupportsInt | typing.SupportsIndex, arg1: typing.Any, arg2: typing.Any) -> None: ...
+    def _set_rotor_inertia(
+        self,
+        arg0: typing.SupportsInt | typing.SupportsIndex,
+        arg1: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
+    ) -> None: ...
+    def _slices(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> tuple[slice, slice]: ...
+    def check_q(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None: ...
+    def difference(
+        self,
+        q0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        q1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The velocity dv with integrate(q0, dv) = q1.
+        """
+    def integrate(
+        self,
+        q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        dv: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        q moved along the velocity dv for unit time: on the group for ball and free hinges (exponential of the body twist).
+        """
+    def remove_body(self, name: str) -> None:
+        """
+        Removes a body with everything outboard of it. Operators made before are stale; q and v are carried over by hinge name.
+        """
+    def take_warnings(self) -> list[str]: ...
+    def zero_q(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        All coordinates zero, quaternions (1, 0, 0, 0).
+        """
+    @property
+    def _size(self) -> int: ...
+    @property
+    def coordinate_names(self) -> list[str]:
+        """
+        One per generalized velocity: the hinge's name, or "hinge[j]" where it has several.
+        """
+    @property
+    def gravity(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Gravity acceleration in world axes, m/s²; zero until it is set.
+        """
+    @gravity.setter
+    def gravity(self, arg1: typing.Any) -> None: ...
+    @property
+    def has_rotor_inertia(self) -> bool: ...
+    @property
+    def keeps_welds(self) -> bool: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def nq(self) -> int:
+        """
+        Numbers in q: 4 for a ball, 7 for a free hinge, else one a coordinate.
+        """
+    @property
+    def nv(self) -> int:
+        """
+        Generalized velocities: the degrees of freedom.
+        """
+    @property
+    def q(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Generalized coordinates (nq,): copied in when set, read-only when read.
+        """
+    @q.setter
+    def q(self, arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None: ...
+    @property
+    def strict(self) -> bool: ...
+    @property
+    def v(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Generalized velocities (nv,): copied in when set, read-only when read.
+        """
+    @v.setter
+    def v(self, arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None: ...
+
+class SkoSource:
+    """
+    Where the blocks of operators come from: a model, or a bare tree of matrices.
+    """
+    def check_current(self) -> None: ...
+    def nodes_space(self, arg0: collections.abc.Sequence[str], arg1: bool) -> Space: ...
+    def symbol(
+        self, name: str, nodes: collections.abc.Sequence[str] = [], coordinate: typing.SupportsInt | typing.SupportsIndex = -1
+    ) -> Operator: ...
+    @property
+    def F(self) -> Space: ...
+    @property
+    def Theta(self) -> Space: ...
+    @property
+    def V(self) -> Space: ...
+    @property
+    def body_names(self) -> list[str]: ...
+    @property
+    def coordinate_names(self) -> list[str]: ...
+    @property
+    def dof(self) -> list[int]: ...
+    @property
+    def hinge_names(self) -> list[str]: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def parents(self) -> list[int]: ...
+    @property
+    def sizes(self) -> list[int]: ...
+    @property
+    def traits(self) -> dict: ...
+
+class Binding:
+    """
+    A state, or a batch of them, that an expression is bound to.
+    """
+    def __reduce__(self) -> tuple: ...
+
+class Operator:
+    """
+    An operator expression: what was typed, as data. It holds no numbers and computes nothing until it is applied to an array
+    (`op @ x`) or asked for one (`dense()`, `diagonal()`, `trace()`, ...). Then rules, planner and engine evaluate it by sweeps
+    over the tree.
+    """
+
+    __array_priority__: typing.ClassVar[float] = 1000.0
+    __array_ufunc__ = None
+    def __add__(self, arg0: typing.Any) -> typing.Any: ...
+    def __array__(self, dtype: typing.Any = None, copy: typing.Any = None) -> typing.Any: ...
+    def __eq__(self, arg0: typing.Any) -> typing.Any:
+        """
+        Structural equality after flattening sums and products: a bool, no numbers. Equality by value is pycraft.check.
+        """
+    def __hash__(self) -> int: ...
+    def __matmul__(self, arg0: typing.Any) -> typing.Any: ...
+    def __mul__(self, arg0: typing.Any) -> typing.Any: ...
+    def __neg__(self) -> Operator: ...
+    def __pos__(self) -> Operator: ...
+    def __pow__(self, arg0: typing.Any) -> typing.Any: ...
+    def __radd__(self, arg0: typing.Any) -> typing.Any: ...
+    def __reduce__(self) -> tuple: ...
+    def __repr__(self) -> str: ...
+    def __rmatmul__(self, arg0: typing.Any) -> typing.Any: ...
+    def __rmul__(self, arg0: typing.Any) -> typing.Any: ...
+    def __rsub__(self, arg0: typing.Any) -> typing.Any: ...
+    def __str__(self) -> str: ...
+    def __sub__(self, arg0: typing.Any) -> typing.Any: ...
+    def __truediv__(self, arg0: typing.Any) -> typing.Any: ...
+    def _bound(self, arg0: Binding) -> Operator: ...
+    def _parts(self) -> tuple: ...
+    def _repr_latex_(self) -> str: ...
+    def at(
+        self,
+        q: typing.Any = None,
+        v: typing.Any = None,
+        *,
+        form: str = "fast",
+        refine: typing.SupportsInt | typing.SupportsIndex = 0,
+        precision: str = "double",
+    ) -> Operator:
+        """
+        The same expression bound to a state: q (nq,) or a batch (B, nq), v likewise (zero if left out); q=None takes the model's present
+        state. The innermost binding wins. precision: "double" or "extended".
+        """
+    def blocks(self, order: str = "base-to-tip") -> typing.Any:
+        """
+        A labelled block view of the dense form; order="tip-to-base" shows the book's triangles.
+        """
+    def check_current(self) -> None:
+        """
+        Raises StaleOperatorError if a model's structure changed since this was made.
+        """
+    def dense(self, dtype: typing.Any = None, rules: bool = True) -> typing.Any:
+        """
+        The operator as an array (codomain, domain), with a leading batch axis if one is bound. dtype=object keeps a wider precision as
+        mpmath numbers; rules=False evaluates what was typed, no theorem used.
+        """
+    def diagonal(self) -> typing.Any:
+        """
+        The diagonal entries (n,), or (B, n). Cost O(N).
+        """
+    def explain(self, request: str = "apply") -> typing.Any:
+        """
+        The plan as a table: steps, tiers, cost; shown when it is the last line of a cell.
+        """
+    def inv(self) -> Operator:
+        """
+        The inverse, as an expression; how it is evaluated is the planner's business (see explain).
+        """
+    def latex(self) -> str: ...
+    def logdet(self) -> Scalar:
+        """
+        ln|det|, as a scalar expression. Cost O(N); exact by structure where a theorem gives it.
+        """
+    def norm(self) -> Scalar:
+        """
+        The Frobenius norm, as a scalar expression.
+        """
+    def plan(self, request: str = "apply", rules: bool = True) -> Plan:
+        """
+        The plan: what is run, step by step, with its cost.
+        """
+    def python(self) -> str:
+        """
+        As Python reads it.
+        """
+    def simplify(self) -> Operator:
+        """
+        The shortest expression that the rewriting theorems find equal to this one.
+        """
+    def sqrt(self) -> Operator:
+        """
+        L with A = L L.T, body by body; for symmetric block-diagonal operators.
+        """
+    def text(self) -> str:
+        """
+        As the book prints it, in Unicode.
+        """
+    def trace(self) -> Scalar:
+        """
+        The trace, as a scalar expression. Cost O(N).
+        """
+    def value(self, **kwargs) -> typing.Any:
+        """
+        The value of a vector expression; named vectors (pycraft.vector) are given by name.
+        """
+    @property
+    def T(self) -> Operator:
+        """
+        The transpose, the book's star: A: X→Y gives A.T: Y'→X'. Cost: none.
+        """
+    @property
+    def batch(self) -> typing.Any: ...
+    @property
+    def children(self) -> list[Operator]: ...
+    @property
+    def codomain(self) -> typing.Any: ...
+    @property
+    def coefficient(self) -> float: ...
+    @property
+    def domain(self) -> typing.Any:
+        """
+        The space it acts on; None for an I that has none yet.
+        """
+    @property
+    def is_block_diagonal(self) -> bool:
+        """
+        Known by rule.
+        """
+    @property
+    def is_lower_triangular(self) -> bool:
+        """
+        By blocks: φ* and ψ* are. Known by rule.
+        """
+    @property
+    def is_symmetric(self) -> bool:
+        """
+        Known by rule, no number looked at.
+        """
+    @property
+    def is_upper_triangular(self) -> bool:
+        """
+        By blocks, parents before children: φ and ψ are. Known by rule.
+        """
+    @property
+    def kind(self) -> str: ...
+    @property
+    def name(self) -> typing.Any:
+        """
+        A symbol's ASCII name; None for anything composed.
+        """
+    @property
+    def shape(self) -> tuple[int, int]: ...
+    @property
+    def sources(self) -> list: ...
+
+class Scalar:
+    """
+    A scalar made of operators (trace, ln|det|, norm and their sums): an expression, evaluated by float() or numpy.asarray.
+    """
+
+    __array_ufunc__ = None
+    def __abs__(self) -> float: ...
+    @typing.overload
+    def __add__(self, arg0: Scalar) -> Scalar: ...
+    @typing.overload
+    def __add__(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> Scalar: ...
+    def __array__(self, dtype: typing.Any = None, copy: typing.Any = None) -> typing.Any: ...
+    def __eq__(self, arg0: object) -> bool: ...
+    def __float__(self) -> float: ...
+    def __format__(self, arg0: str) -> typing.Any: ...
+    def __ge__(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> bool: ...
+    def __gt__(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __le__(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> bool: ...
+    def __lt__(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> bool: ...
+    def __mul__(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> Scalar: ...
+    def __neg__(self) -> Scalar: ...
+    def __radd__(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> Scalar: ...
+    def __reduce__(self) -> tuple: ...
+    def __repr__(self) -> str: ...
+    def __rmul__(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> Scalar: ...
+    def __rsub__(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> Scalar: ...
+    @typing.overload
+    def __sub__(self, arg0: Scalar) -> Scalar: ...
+    @typing.overload
+    def __sub__(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> Scalar: ...
+    def __truediv__(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> Scalar: ...
+    def _parts(self) -> tuple[int, float, typing.Any, typing.Any]: ...
+    def _repr_latex_(self) -> str: ...
+    def at(self, *args, **kwargs) -> typing.Any: ...
+    def bound(self, arg0: Binding) -> Scalar: ...
+    def latex(self) -> str: ...
+    def operands(self) -> list: ...
+    def text(self) -> str: ...
+    def value(self) -> typing.Any:
+        """
+        The number; with a batch bound, an array (batch,).
+        """
+
+class Plan:
+    """
+    A plan: what an expression becomes before any number is touched. `str(plan)` is the table that explain() shows.
+    """
+    def __repr__(self) -> str: ...
+    def __str__(self) -> str: ...
+    @property
+    def flops(self) -> float:
+        """
+        Floating-point operations, for one column.
+        """
+    @property
+    def has_dense_step(self) -> bool: ...
+    @property
+    def memory(self) -> float:
+        """
+        Bytes of the registers written.
+        """
+    @property
+    def notes(self) -> list[str]:
+        """
+        Theorems used, and the reason of a dense step.
+        """
+    @property
+    def passes(self) -> PassCounts:
+        """
+        Counters of the last run.
+        """
+    @property
+    def run_notes(self) -> list[str]: ...
+    @property
+    def steps(self) -> list:
+        """
+        The steps as dictionaries: text, tier, flops, memory.
+        """
+
+class MultibodyOperators(SkoSource):
+    """
+    The operators' source of a multibody model.
+    """
+    def __reduce__(self) -> tuple: ...
+    @property
+    def model(self) -> Multibody: ...
+
+class MatrixTree(SkoSource):
+    """
+    A tree whose blocks E, H, M, J are given as matrices of any size.
+    """
+    def __init__(
+        self,
+        parents: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
+        sizes: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
+        dof: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
+        E: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]],
+        H: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]],
+        M: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]],
+        J: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]],
+        names: collections.abc.Sequence[str],
+        name: str,
+    ) -> None: ...
+    def __reduce__(self) -> tuple: ...
+
+class PassCounts:
+    """
+    What the last run of a plan executed.
+    """
+    def __repr__(self) -> str: ...
+    @property
+    def dense(self) -> int: ...
+    @property
+    def eliminations(self) -> int: ...
+    @property
+    def gathers(self) -> int: ...
+    @property
+    def kernels(self) -> int: ...
+    @property
+    def scatters(self) -> int: ...
+    @property
+    def values(self) -> int: ...
+
+class Dynamics:
+    def __init__(self, arg0: Multibody) -> None: ...
+    def energy(self, q: typing.Any, v: typing.Any) -> numpy.typing.NDArray[numpy.float64]: ...
+    def forward_dynamics(
+        self,
+        q: typing.Any,
+        v: typing.Any,
+        tau: typing.Any,
+        form: str,
+        refine: typing.SupportsInt | typing.SupportsIndex,
+        precision: str,
+        out: typing.Any,
+    ) -> numpy.typing.NDArray[numpy.float64]: ...
+    def inverse_dynamics(
+        self, q: typing.Any, v: typing.Any, vdot: typing.Any, precision: str, out: typing.Any
+    ) -> numpy.typing.NDArray[numpy.float64]: ...
+    def jacobian(self, frame: str, q: typing.Any, precision: str, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]: ...
+    def mass_matrix(self, q: typing.Any, inverse: bool, precision: str, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]: ...
+    def pose(self, frame: str, q: typing.Any) -> numpy.typing.NDArray[numpy.float64]: ...
+
+class Theorem:
+    """
+    A theorem as data: both sides as expressions, its hypotheses, its source.
+    """
+    def __repr__(self) -> str: ...
+    def unmet(self, arg0: SkoSource) -> list[str]:
+        """
+        Hypotheses that the model does not meet.
+        """
+    @property
+    def at_most(self) -> bool: ...
+    @property
+    def group(self) -> str: ...
+    @property
+    def hypotheses(self) -> list[str]: ...
+    @property
+    def latex(self) -> str: ...
+    @property
+    def lhs(self) -> typing.Any: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def on_one_path(self) -> bool: ...
+    @property
+    def rhs(self) -> typing.Any: ...
+    @property
+    def source(self) -> str: ...
+    @property
+    def text(self) -> str: ...
+    @property
+    def use(self) -> str: ...
+    @property
+    def waiting(self) -> str: ...
+
+def _bind(
+    operands: collections.abc.Sequence[Operator],
+    q: typing.Any,
+    v: typing.Any,
+    form: str,
+    refine: typing.SupportsInt | typing.SupportsIndex,
+    precision: str,
+) -> Binding: ...
+def _binding_from_parts(
+    arg0: typing.SupportsInt | typing.SupportsIndex,
+    arg1: typing.SupportsInt | typing.SupportsIndex,
+    arg2: typing.SupportsInt | typing.SupportsIndex,
+    arg3: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
+    arg4: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
+    arg5: str,
+) -> Binding: ...
+def _leaf_from_parts(arg0: str, arg1: typing.Any) -> Operator: ...
+def _make(arg0: str, arg1: collections.abc.Sequence[Operator], arg2: typing.SupportsFloat | typing.SupportsIndex) -> Operator: ...
+def _scalar_from_parts(
+    arg0: typing.SupportsInt | typing.SupportsIndex,
+    arg1: typing.SupportsFloat | typing.SupportsIndex,
+    arg2: typing.Any,
+    arg3: collections.abc.Sequence[Scalar],
+) -> Scalar: ...
+def blockdiag(operator: Operator) -> Operator:
+    """
+    The operator's diagonal blocks, body by body, zero elsewhere.
+    """
+
+def constant(array: typing.Any, domain: typing.Any, codomain: typing.Any, name: str = "C") -> Operator:
+    """
+    An array as an operator from `domain` to `codomain` (spaces, or a size n for R^n): a matrix, one diagonal, or a list of one block per
+    body. What is block diagonal over the bodies is kept so; what has low rank is found when a plan needs it.
+    """
+
+def epsilons() -> dict:
+    """
+    Epsilon of each precision by name.
+    """
+
+def equal_by_theorems(a: Operator, b: Operator) -> bool:
+    """
+    Whether the rewriting theorems bring both to the same normal form.
+    """
+
+def euclidean(dimension: typing.SupportsInt | typing.SupportsIndex) -> Space:
+    """
+    R^n, a space of a user's own: self-dual, cut into no bodies.
+    """
+
+def external(product: typing.Any, transposed: typing.Any, domain: Space, codomain: Space, name: str) -> Operator: ...
+def identity(space: typing.Any = None) -> Operator:
+    """
+    I; without a space it takes that of the operator it is combined with.
+    """
+
+def operators_of(model: Multibody) -> MultibodyOperators: ...
+def residual(
+    a: typing.Any,
+    b: typing.Any,
+    vectors: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]] = {},
+    on_one_path: bool = False,
+    at_most: bool = False,
+) -> tuple[float, float, float]:
+    """
+    Largest entries of a - b, a and b: both evaluated as typed, no theorem used, the difference taken at the bound precision.
+    """
+
+def scalar(value: typing.SupportsFloat | typing.SupportsIndex) -> Scalar: ...
+def symbol_table() -> list:
+    """
+    Every operator: (ASCII, Unicode, LaTeX, domain, codomain, meaning).
+    """
+
+def theorems(source: SkoSource) -> list[Theorem]:
+    """
+    Every theorem, stated on the letters of one model.
+    """
+
+def time_apply(
+    operator: Operator,
+    x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2,
+) -> dict:
+    """
+    Seconds per application: minimum, median, calls.
+    """
+
+def time_dynamics(
+    model: Multibody,
+    call: str,
+    q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2,
+) -> dict:
+    """
+    Seconds per direct call over a set of states in rotation: minimum, median, calls.
+    """
+
+def vector(name: str, space: Space) -> Operator:
+    """
+    A named vector of a space: stands for an array that is given at the evaluation.
+    """
+
+def zero(domain: Space, codomain: Space) -> Operator:
+    """
+    The zero operator.
+    """
