@@ -12,6 +12,8 @@ from rich.table import Table
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, help="A workbench for the Spatial Operator Algebra over a multibody model.")
 console = Console()
+if not console.is_terminal:  # a file or a pipe has no width of its own
+    console = Console(width=140)
 
 Model = Annotated[str, typer.Argument(help="A URDF or MJCF file, or the name of a robot that comes with the package (see pycraft.robots).")]
 Root = Annotated[str, typer.Option(help="fixed | free: a free hinge first.")]

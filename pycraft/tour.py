@@ -141,6 +141,7 @@ def _show_factorization(robot: Any, MM: _core.Operator, soa: Any, say: Say) -> N
         f"\nEach body's share of the {robot.nv} degrees of freedom, tr(Υ(k)M(k)): "
         + ", ".join(f"{name} {value:.3f}" for name, value in top)
         + f", ...; all together {sum(share.values()):.12g}"
+        + (", the rest is the rotors'" if robot.has_rotor_inertia else "")
     )
 
 

@@ -102,6 +102,8 @@ Expression operator-(const Expression& a, const Expression& b);
 Expression operator-(const Expression& a);
 Expression operator*(const Expression& a, const Expression& b);
 Expression operator*(double c, const Expression& a);
+inline Expression operator*(const Expression& a, double c) { return c * a; }
+inline Expression operator/(const Expression& a, double c) { return (1 / c) * a; }
 Expression sum_of(std::vector<Expression> terms);
 Expression product_of(std::vector<Expression> factors);
 Expression block_diagonal(const Expression& a);

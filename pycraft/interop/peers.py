@@ -9,6 +9,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -139,7 +140,7 @@ def _compare_at(result: Comparison, model: Any, twin: convention.Coordinates, st
         if inverse and result.singular:
             continue
         try:
-            _judge(result, name, lambda precision, name=name: mine(name, precision), value, bound * (condition if inverse else 1))
+            _judge(result, name, partial(mine, name), value, bound * (condition if inverse else 1))
         except _core.SingularHingeError as error:
             result.singular = str(error).split(":")[0]
             result.ratio.pop("inverse", None)
