@@ -1,0 +1,131 @@
+"""Statements one step from a true one: a letter exchanged for another between the same spaces; and an evaluator of expressions
+by dense NumPy that says whether such a statement is false indeed.
+"""
+
+import functools
+import operator
+
+import numpy as np
+from formulas import blocks_only
+
+import pycraft as pc
+
+EXCHANGED = {
+    "E": "E_psi",
+    "E_psi": "E",
+    "phi": "psi",
+    "psi": "phi",
+    "phi_tilde": "psi_tilde",
+    "psi_tilde": "phi_tilde",
+    "tau": "tau_bar",
+    "tau_bar": "tau",
+    "M": "R",
+    "P": "R",
+    "P_plus": "P",
+    "R": "P",
+    "G": "K",
+    "K": "G",
+    "Upsilon": "Omega",
+    "Omega": "Upsilon",
+    "D": "J",
+    "J": "D",
+    "V_bar": "Delta_theta_dot",
+    "Delta_theta_dot": "V_bar",
+}
+
+
+def rebuilt(op, children):
+    """The same node over other children."""
+    match op.kind:
+        case "sum":
+            return functools.reduce(operator.add, children)
+        case "product":
+            return functools.reduce(operator.matmul, children)
+        case "scaled":
+            return op.coefficient * children[0]
+        case "transpose":
+            return children[0].T
+        case "inverse":
+            return children[0].inv()
+        case "blockdiag":
+            return pc.blockdiag(children[0])
+        case "sqrt":
+            return children[0].sqrt()
+    raise AssertionError(op.kind)
+
+
+def exchanges(op):
+    """(what was done, the expression) with one letter exchanged; what makes no sense then is left out."""
+    if op.kind == "symbol":
+        source = op.sources[0]
+        if op.name in EXCHANGED:
+            yield f"{op.name} -> {EXCHANGED[op.name]}", source.symbol(EXCHANGED[op.name])
+        elif op.name in (
+            "H",
+            "H_dot",
+            "V_tilde",
+            "momentum_cross",
+            "X_world",
+            "theta_dot",
+            "velocity",
+            "a",
+            "b",
+            "gravity_base",
+            "gravity_field",
+        ):
+            yield f"{op.name} -> 1.25 {op.name}", 1.25 * op
+    for i, child in enumerate(op.children):
+        for what, changed in exchanges(child):
+            try:
+                yield what, rebuilt(op, [*op.children[:i], changed, *op.children[i + 1 :]])
+            except pc.SpaceError:
+                continue
+
+
+def dense(op, vectors):
+    """The value of an expression by NumPy's own products, sums and inverses, from the entries of its letters."""
+    parts = [dense(child, vectors) for child in op.children]
+    match op.kind:
+        case "symbol" | "constant":
+            return op.dense()
+        case "vector":
+            return vectors[op.name][:, None]
+        case "identity":
+            return np.eye(op.shape[0])
+        case "zero":
+            return np.zeros(op.shape)
+        case "sum":
+            return sum(parts)
+        case "product":
+            return functools.reduce(np.matmul, parts)
+        case "scaled":
+            return op.coefficient * parts[0]
+        case "transpose":
+            return parts[0].T
+        case "inverse":
+            return np.linalg.inv(parts[0])
+        case "blockdiag":
+            return blocks_only(parts[0], op.codomain.blocks, op.domain.blocks)
+        case "sqrt":
+            root = np.zeros_like(parts[0])
+            for _, s, _ in op.codomain.blocks:
+                root[s, s] = np.linalg.cholesky(parts[0][s, s])
+            return root
+    raise AssertionError(op.kind)
+
+
+def named_vectors(op):
+    """Names and sizes of the vectors of an expression."""
+    found = {op.name: len(op.codomain)} if op.kind == "vector" else {}
+    for child in op.children:
+        found |= named_vectors(child)
+    return found
+
+
+def difference(lhs, rhs, seed=0):
+    """How far two expressions are apart, relative to the larger, at random vectors: dense NumPy's word on a statement."""
+    rng = np.random.default_rng(seed)
+    names = named_vectors(lhs) | named_vectors(rhs)
+    vectors = {name: rng.uniform(-1, 1, size) for name, size in sorted(names.items())}
+    left, right = dense(lhs, vectors), dense(rhs, vectors)
+    return np.abs(left - right).max(initial=0.0) / max(np.abs(left).max(initial=0.0), np.abs(right).max(initial=0.0), 1e-300)
