@@ -1,5 +1,12 @@
 """PyCraft: an interactive workbench for the Spatial Operator Algebra over a DARTS-style multibody model."""
 
+import importlib.util
+import pkgutil
+
+# In a source checkout the folder `pycraft` hides the installed package: its compiled core is found all the same.
+if importlib.util.find_spec("pycraft._core") is None:
+    __path__ = pkgutil.extend_path(__path__, __name__)
+
 from . import _core, interop, models, robots
 from ._core import (
     Error,

@@ -34,8 +34,9 @@ class OperatorSet:
     <H φ M φ* H* : Θ (3) → Θ (3)>
     """
 
-    def __init__(self, source: _core.SkoSource):
+    def __init__(self, source: _core.SkoSource, model: Any = None):
         self._source = source
+        self._model = model  # keeps the Python face alive: the core knows only its own half
         self._made: dict[str, _core.Operator] = {}
 
     def is_current(self) -> bool:
@@ -95,7 +96,11 @@ class OperatorSet:
         return f"<operators of {self._source.name!r}: {self._source.Theta.dimension} degrees of freedom>"
 
     def __reduce__(self):
-        return OperatorSet, (self._source,)
+        return _operators_again, (self._source, self._model)
+
+
+def _operators_again(source: _core.SkoSource, model: Any) -> OperatorSet:
+    return OperatorSet(source) if model is None else model.soa
 
 
 class _WithArguments:

@@ -185,6 +185,11 @@ void register_multibody(py::module_& m) {
       }, py::arg("q0"), py::arg("q1"), "The velocity dv with integrate(q0, dv) = q1.")
       .def("check_q", [](const Multibody& mb, const Array& q) { mb.check_q(q.data(), q.size()); })
       .def("take_warnings", &Multibody::take_warnings)
+      // A model whose Python face is gone (an operator held alone) is pickled as its face would be.
+      .def("__reduce__", [](const py::object& self) -> py::tuple {
+        const py::module_ face = py::module_::import("pycraft.models.multibody");
+        return py::make_tuple(face.attr("Multibody").attr("from_description"), py::make_tuple(face.attr("describe")(self)));
+      })
       .def_property_readonly("has_rotor_inertia", &Multibody::has_rotor_inertia);
 }
 

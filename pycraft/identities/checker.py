@@ -129,7 +129,7 @@ def check_model(operators: Any, *, states: int = 3, seed: int = 0, precision: st
     if precision == "double":
         raise _core.EvaluationError("precision 'double' is always taken; name the wider scalar: 'extended' or 'quad'")
     source = operators._source
-    model = getattr(source, "model", None)
+    model = operators._model
     report = Report(source.name, dict(source.traits))
     begin = time.perf_counter()
     rng = np.random.default_rng(seed)
@@ -285,7 +285,7 @@ def check(
 
 def run(read: Statement, operators: Any, states: int, seed: int, precision: str) -> Residuals:
     """The residuals of a statement on one model."""
-    model = getattr(operators._source, "model", None)
+    model = operators._model
     rng = np.random.default_rng(seed)
     drawn = [BoundState(operators, s) for s in ([None] if model is None else [model.random_state(rng) for _ in range(states)])]
     vectors = [drawn_vectors(read.rhs, rng, drawn_vectors(read.lhs, rng, {})) for _ in drawn]

@@ -354,7 +354,7 @@ class Multibody(_core.Multibody):
 
         if self._soa is None or not self._soa.is_current():
             self.warn()
-            self._soa = OperatorSet(_core.operators_of(self))
+            self._soa = OperatorSet(_core.operators_of(self), self)
         return self._soa
 
     def warn(self) -> None:
@@ -413,16 +413,7 @@ class Multibody(_core.Multibody):
     # ------------------------------------------------------------------ copies
     def description(self) -> dict[str, Any]:
         """The whole model as plain data: bodies with hinges, nodes, gravity, state (see `pycraft.reference` for the schema)."""
-        return {
-            "name": self.name,
-            "gravity": self.gravity,
-            "bodies": [self._body(k) for k in range(self._size)],
-            "nodes": self._nodes(),
-            "welds": "keep" if self.keeps_welds else "lump",
-            "strict": self.strict,
-            "q": np.array(self.q),
-            "v": np.array(self.v),
-        }
+        return describe(self)
 
     @classmethod
     def from_description(cls, description: Mapping[str, Any]) -> Multibody:
@@ -460,3 +451,17 @@ class Multibody(_core.Multibody):
 
     def __repr__(self) -> str:
         return f"<multibody {self.name!r}: {self._size} bodies, {self.nv} degrees of freedom>"
+
+
+def describe(model: _core.Multibody) -> dict[str, Any]:
+    """The core's model as plain data."""
+    return {
+        "name": model.name,
+        "gravity": model.gravity,
+        "bodies": [model._body(k) for k in range(model._size)],
+        "nodes": model._nodes(),
+        "welds": "keep" if model.keeps_welds else "lump",
+        "strict": model.strict,
+        "q": np.array(model.q),
+        "v": np.array(model.v),
+    }
