@@ -127,8 +127,9 @@ def _show_factorization(robot: Any, MM: _core.Operator, soa: Any, say: Say) -> N
     by_hand = S.T @ D.inv() @ S
     x = np.ones(robot.nv)
     solved = system.inv() @ x
-    say.code("S = I - H@psi@K; by_hand = S.T @ D.inv() @ S")
-    say.code(f"{name}.inv() @ x - by_hand @ x", f"largest entry {np.abs(solved - by_hand @ x).max():.0e}")
+    say.code("S = I - H@psi@K; by_hand = (S.T @ D.inv() @ S).dense(rules=False)     # as typed, letter by letter")
+    typed = by_hand.dense(rules=False)
+    say.code(f"{name}.inv() @ x - by_hand @ x", f"{_relative(solved, typed @ x):.0e} relative")
     exact = np.linalg.solve(system.dense(), x)
     say.text(
         f"against a dense solve: {_relative(solved, exact):.0e} relative (condition of the matrix {np.linalg.cond(system.dense()):.0e})"

@@ -12,8 +12,8 @@ class Finding:
     """What was found for one theorem: worst residual in double and in the wider scalar, the bounds they are judged against, the verdict.
 
     Verdicts: "holds", "fails", "undecided" (the bound is above 1e-6 even in the wider scalar), "expected to fail" (outside its
-    hypotheses, and it does), "holds anyway" (outside its hypotheses, and it does not fail), "undefined" (D is singular), "waiting" (not
-    evaluated yet).
+    hypotheses, and it does), "holds anyway" (outside its hypotheses, and it does not fail), "undefined" (an inverse in it does not exist),
+    "waiting" (not evaluated yet).
     """
 
     name: str
@@ -102,7 +102,8 @@ class Report:
                 table.add_row(Text(group, style="bold underline"))
             hypotheses = Text(", ".join(f.hypotheses))
             if f.verdict in ("waiting", "undefined"):
-                text = f"waits for {f.note}" if f.verdict == "waiting" else "undefined: D is singular"
+                reason = f"{', '.join(f.unmet)} not met" if f.unmet else "D is singular"
+                text = f"waits for {f.note}" if f.verdict == "waiting" else f"undefined: {reason}"
                 table.add_row("  " + f.statement, hypotheses, "", "", "", Text(text, style=style[f.verdict]), "")
                 continue
             verdict = f.verdict + (f": {', '.join(f.unmet)} not met" if f.unmet else "")
