@@ -23,7 +23,7 @@ REFUSED = {
 
 def test_the_list_is_whole():
     assert len(FILES) >= 60
-    assert {"panda", "ur5_robot", "talos_full_v2", "cassie", "g1_29dof_rev_1_0", "icub", "simple_humanoid"} <= {f.stem for f in FILES}
+    assert {"panda", "ur5_robot", "talos_full_v2", "g1_29dof_rev_1_0", "icub", "simple_humanoid"} <= {f.stem for f in FILES}
 
 
 @pytest.mark.parametrize("root", ["fixed", "free"])

@@ -65,7 +65,7 @@ def compare(path: Path, root: str, states: int = 20, seed: int = 0) -> Compariso
     from ..models.load import load
     from ..models.warning import ModelWarning
 
-    result = Comparison(path.stem, root)
+    result = Comparison(f"{path.parent.parent.name.removesuffix('_description')}/{path.stem}", root)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ModelWarning)
