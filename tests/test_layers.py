@@ -1,0 +1,174 @@
+"""Dependencies point one way (architecture.md, Layout): a grep of the C++ includes, the Python imports and the build's flags."""
+
+import ast
+import pathlib
+import re
+
+import pytest
+
+ROOT = pathlib.Path(__file__).parents[1]
+CPP, PYTHON = ROOT / "cpp", ROOT / "pycraft"
+
+# What a folder may include besides itself. `algebra` is a leaf but for the numbers that the engine runs on.
+MAY_INCLUDE = {
+    "spatial": set(),
+    "algebra": {"spatial/scalar.h"},
+    "model": {"spatial", "algebra"},
+    "operators": {"spatial", "algebra", "model", "recursions"},
+    "recursions": {"spatial", "algebra", "model", "operators"},
+    "dynamics": {"spatial", "algebra", "model", "operators", "recursions"},
+    "bindings": {"spatial", "algebra", "model", "operators", "recursions", "dynamics"},
+    "bench": {"spatial", "algebra", "model", "operators", "recursions", "dynamics", "bindings"},
+    "tests": {"spatial", "algebra", "model", "operators", "recursions", "dynamics"},
+}
+CORE = ["spatial", "algebra", "model", "operators", "recursions", "dynamics"]
+PEERS = {"pinocchio", "mujoco", "example_robot_data"}
+
+
+def sources(folder):
+    return sorted(path for path in (CPP / folder).rglob("*") if path.suffix in (".h", ".cpp"))
+
+
+def includes(path):
+    """(quoted, angled) includes of a file."""
+    text = path.read_text(encoding="utf-8")
+    return re.findall(r'^\s*#\s*include\s+"([^"]+)"', text, re.M), re.findall(r"^\s*#\s*include\s+<([^>]+)>", text, re.M)
+
+
+def modules():
+    return sorted(PYTHON.rglob("*.py"))
+
+
+def imports(path):
+    """(absolute module of the import, the node) of every import of a module, also inside functions."""
+    package = ["pycraft", *path.relative_to(PYTHON).parent.parts]
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield alias.name, node
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else []
+            yield ".".join([*base, *([node.module] if node.module else [])]), node
+
+
+def test_there_is_something_to_look_at():
+    assert {path.name for path in CPP.iterdir() if path.is_dir()} <= set(MAY_INCLUDE)
+    assert all(sources(folder) for folder in CORE) and len(modules()) > 15
+
+
+@pytest.mark.parametrize("folder", MAY_INCLUDE)
+def test_includes_point_one_way(folder):
+    allowed = MAY_INCLUDE[folder] | {folder}
+    for path in sources(folder):
+        for name in includes(path)[0]:
+            target = name.split("/")[0]
+            if folder == "tests" and (path.parent / name).exists():
+                continue  # what the C++ tests share among themselves
+            assert "/" in name, f"{path}: '{name}' is not named from cpp/"
+            assert target in allowed or name in allowed, f"{path.relative_to(ROOT)} includes {name}: {folder} may not"
+            assert (CPP / name).exists(), f"{path.relative_to(ROOT)} includes {name}, which is not there"
+
+
+def test_no_header_includes_itself_by_way_of_others():
+    edges = {path.relative_to(CPP).as_posix(): includes(path)[0] for folder in CORE for path in sources(folder)}
+    done, open_ = set(), []
+
+    def visit(name):
+        assert name not in open_, f"a circle of includes: {' -> '.join([*open_[open_.index(name) :], name])}"
+        if name in done:
+            return
+        open_.append(name)
+        for target in edges.get(name, []):
+            visit(target)
+        open_.pop()
+        done.add(name)
+
+    for name in edges:
+        visit(name)
+
+
+def test_the_core_knows_no_python():
+    for folder in CORE:
+        for path in sources(folder):
+            for name in includes(path)[1]:
+                assert not re.match(r"pybind11|Python\.h|numpy|nanobind", name), f"{path.relative_to(ROOT)} includes <{name}>"
+    cmake = (ROOT / "CMakeLists.txt").read_text(encoding="utf-8")
+    linked = re.findall(r"target_link_libraries\(pycraft_core([^)]*)\)", cmake)
+    assert linked and not any("ython" in libraries or "pybind" in libraries for libraries in linked)
+    globbed = re.search(r"GLOB PYCRAFT_CORE_SOURCES[^)]*\)", cmake).group()
+    assert "bindings" not in globbed and all(f"cpp/{folder}/*.cpp" in globbed for folder in CORE)
+
+
+def test_the_algebra_knows_no_mechanics():
+    words = re.compile(r"\b(gravity|gyroscopic|coriolis|quaternion|screw|hinge_kinematics|Pose<|Vector6<|RigidInertia)\b", re.I)
+    for path in sources("algebra"):
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+            code = line.split("//")[0]
+            assert not words.search(code), f"{path.relative_to(ROOT)}:{number}: {line.strip()}"
+
+
+def test_no_flag_trades_accuracy():
+    flags = re.compile(r"-ffast-math|-Ofast|-funsafe-math|-fassociative-math|-freciprocal-math|-ffinite-math|/fp:fast|optimize\(")
+    files = [ROOT / name for name in ("CMakeLists.txt", "pyproject.toml", "Makefile")] + [
+        path for folder in MAY_INCLUDE for path in sources(folder)
+    ]
+    for path in files:
+        if path.exists():
+            assert not flags.search(path.read_text(encoding="utf-8")), path.relative_to(ROOT)
+
+
+# ---------------------------------------------------------------------- Python
+
+
+def test_the_oracle_imports_nothing_of_the_package():
+    found = {name.split(".")[0] for name, _ in imports(PYTHON / "reference.py")}
+    assert found <= {"__future__", "functools", "types", "typing", "numpy", "scipy"}
+
+
+def test_other_tools_are_imported_by_interop_alone():
+    for path in modules():
+        if path.relative_to(PYTHON).parts[0] == "interop":
+            continue
+        for name, node in imports(path):
+            assert name.split(".")[0] not in PEERS, f"{path.relative_to(ROOT)}:{node.lineno} imports {name}"
+
+
+def test_peers_are_not_needed_to_import_the_package():
+    """Other tools are optional: they are imported inside functions."""
+    for path in modules():
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        for node in tree.body:
+            if isinstance(node, ast.Import | ast.ImportFrom):
+                names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else [node.module or ""]
+                absolute = isinstance(node, ast.Import) or node.level == 0
+                assert not absolute or not any(name.split(".")[0] in PEERS for name in names), (
+                    f"{path.relative_to(ROOT)}:{node.lineno}"
+                )
+
+
+def test_python_imports_point_one_way():
+    """models, operators ← identities, and nobody needs the command line."""
+    above = {
+        "models": {"identities", "cli", "symbolic", "accuracy", "scenes", "view"},
+        "operators.py": {"identities", "cli", "models"},
+    }
+    for path in modules():
+        first = path.relative_to(PYTHON).parts[0]
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        top = {id(node) for node in tree.body}
+        for name, node in imports(path):
+            target = name.split(".")[1] if name.startswith("pycraft.") else ""
+            if id(node) in top and first in above:
+                assert target not in above[first], f"{path.relative_to(ROOT)}:{node.lineno} imports {name}"
+            assert first == "cli.py" or target != "cli" or first == "__main__.py", (
+                f"{path.relative_to(ROOT)} imports the command line"
+            )
+
+
+def test_nothing_prints_but_the_command_line():
+    for path in modules():
+        if path.name in ("cli.py", "__main__.py") or path.relative_to(PYTHON).parts[0] == "cli":
+            continue
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+                assert node.func.id != "print", f"{path.relative_to(ROOT)}:{node.lineno} prints"
