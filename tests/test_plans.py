@@ -222,26 +222,18 @@ def test_steps_are_constant_and_cost_grows_as_the_bodies(name, chains):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "name", ["ℳ as typed", "ℳ⁻¹ as typed", "shifted", "nested shifts", "rank two", "(B*ΩB)⁻¹", "compliance and M⁻¹"]
-)
-def test_time_grows_as_the_bodies(name, chains):
-    """Ten times the bodies may cost at most forty times the time: caches are left, n² would be a hundred times."""
-    import time
-
-    def seconds(n):
-        o, arm = chains[n]
-        op = GROWTH[name](o, bare_constants(o, n)).op
-        x = np.ones(op.shape[1])
-        best = np.inf
-        for i in range(4):
-            arm.q = np.full(n, 0.01 * i)
-            begin = time.perf_counter()
-            op @ x
-            best = min(best, time.perf_counter() - begin)
-        return best
-
-    assert seconds(5000) <= 40 * seconds(500) + 0.01
+@pytest.mark.parametrize("name", ["shifted", "nested shifts", "rank two", "(B*ΩB)⁻¹"])
+def test_a_stretched_chain_of_thousands_is_solved(name, chains):
+    """Elimination body by body loses up to 21 digits there, and 5000 bodies are too many for one front: it goes on in quad."""
+    o, arm = chains[5000]
+    op = GROWTH[name](o, bare_constants(o, 5000)).op
+    arm.q = np.full(5000, 0.01)
+    x = np.ones(op.shape[1])
+    y = op @ x
+    back = op.inv() @ y
+    size = norm(x) + norm(y) * max(norm(op.inv() @ (y / norm(y))), 1.0)
+    assert norm(back - x) <= 1e4 * EPS * size
+    assert any(note.startswith("quad: ") for note in op.plan().run_notes), op.plan()
 
 
 # ---------------------------------------------------------------------- what does go dense, and says so

@@ -178,19 +178,19 @@ class DenseBlocks {
   void start_error(int k) { std::copy_n(mass(k), tree_.size[k] * tree_.size[k], X.data() + at_[k].m); }
   void check_pivots(int k) {
     const int s = tree_.size[k], n = tree_.dof[k];
+    std::vector<S> x(n);
     for (int j = 0; j < n; ++j) {
-      S bound = hinge_diagonal(k)[j * n + j];
+      x[j] = hinge_diagonal(k)[j * n + j];
       for (int a = 0; a < s; ++a)
-        for (int b = 0; b < s; ++b) bound += hinge_map(k)[j * s + a] * X[at_[k].m + a * s + b] * hinge_map(k)[j * s + b];
-      bound *= rounding_bound<S>();
-      const S pivot = pivots_[tree_.dof_offset[k] + j];
-      if (!(pivot > bound)) throw_singular_hinge(tree_, k, j, to_double(pivot), to_double(bound));
+        for (int b = 0; b < s; ++b) x[j] += hinge_map(k)[j * s + a] * X[at_[k].m + a * s + b] * hinge_map(k)[j * s + b];
     }
+    require_pivots(tree_, k, L.data() + at_[k].d, pivots_.data() + tree_.dof_offset[k], x.data());
   }
   void error_to_parent(int k) {
     const int s = tree_.size[k];
-    std::vector<S> bar(s * s, S(0)), t(s * s, S(0)), plus(P.begin() + at_[k].m, P.begin() + at_[k].m + s * s);
-    for (int i = 0; i < s; ++i) bar[i * s + i] = S(1);
+    std::vector<S> bar(s * s, S(0)), t(s * s, S(0)), plus(s * s, S(0));
+    // Entries of P round at sqrt(P(i,i) P(j,j)), whatever cancels when it moves on: the diagonal, not P.
+    for (int i = 0; i < s; ++i) bar[i * s + i] = S(1), plus[i * s + i] = P[at_[k].m + i * s + i];
     transposed_multiply_add(gain(k), hinge_map(k), bar.data(), s, tree_.dof[k], s, S(-1));
     multiply_add(bar.data(), X.data() + at_[k].m, t.data(), s, s, s);
     multiply_transposed_add(t.data(), bar.data(), plus.data(), s, s, s);

@@ -6,7 +6,8 @@
 // A singular pivot block is merged with its parent's (the re-ordering attempt). Pivoting is within a block only, and an expression that
 // hides a well-conditioned operator behind large terms that cancel can make the elimination unstable: after every factorization a solve
 // with a known solution measures what was lost, and where that is more than seven digits, fronts are merged two by two, and again, until
-// it is not. When everything is one front the elimination is dense, and the caller says so. Diagonal blocks of the inverse come base to tip:
+// it is not. When everything is one front the elimination is dense, and the caller says so; a model too large for that is eliminated in
+// a wider scalar (the caller's business: blocks and values may be narrower than S). Diagonal blocks of the inverse come base to tip:
 //
 //   Z(k,k) = A(k,k)⁻¹ + U(k) Z(pb,pb) L(k),   Z(k,b) = -U(k) Z(pb,b),   Z(b,k) = -Z(b,pb) L(k),   L(k) = [A(p,k); A(b,k)] A(k,k)⁻¹
 //
@@ -51,17 +52,19 @@ class TreeElimination {
  public:
   explicit TreeElimination(std::shared_ptr<const Realization> realization);
 
-  // Assembles and factors. blocks(i): the i-th register; values(c): the numbers of context c. Throws SingularOperatorError.
+  // Assembles and factors. blocks(i): the i-th register; values(c): the numbers of context c; either may be of a narrower scalar.
+  // False where a solution loses more than `tolerated` and the operator is too large for one front: note() says where, and a wider
+  // scalar may decide.
   template <class Blocks, class Values>
-  void factor(Blocks&& blocks, Values&& values);
+  bool factor(Blocks&& blocks, Values&& values, S tolerated = S(1e7) * epsilon<S>());
 
   // y = operator x, m columns.
-  template <class Blocks>
-  void solve(const S* x, S* y, int m, Blocks&& blocks);
+  template <class T, class Blocks>
+  void solve(const T* x, T* y, int m, Blocks&& blocks);
 
   // Diagonal blocks of the operator (inputs and outputs local).
-  template <class Blocks>
-  void selected(BlockStorage<S>& out, Blocks&& blocks);
+  template <class T>
+  void selected(BlockStorage<T>& out);
 
   S log_abs_determinant() const;
   const std::string& note() const { return note_; }
@@ -88,6 +91,8 @@ class TreeElimination {
   S lost();                                                // relative error of a solve whose solution is known
   void coarsen();                                          // every other front merged into its parent
   S growth_ = S(0);
+  template <class T>
+  const S* own_scalar(const T* block, size_t entries, std::vector<S>& converted) const;
   void add_block(Place row, Place column, const S* block, int r, int c, S factor);
   template <class Blocks, class Values>
   void assemble(Blocks&& blocks, Values&& values);
@@ -106,7 +111,7 @@ class TreeElimination {
   std::vector<S> border_matrix_, border_original_, border_magnitude_;
   std::vector<SmallLU<S>> lu_;
   SmallLU<S> border_lu_;
-  std::vector<S> rhs_, residual_, work_, block_, edge_, product_, Z_, z_border_;
+  std::vector<S> rhs_, residual_, work_, block_, edge_, product_, left_, right_, output_, Z_, z_border_;
   std::vector<size_t> z_offset_;
   std::vector<char> merged_with_parent_;
   int failed_ = -1;

@@ -145,6 +145,19 @@ void TreeElimination<S>::add_block(Place row, Place column, const S* block, int 
   }
 }
 
+// The block itself, or, where it is of a narrower scalar, a copy of it.
+template <class S>
+template <class T>
+const S* TreeElimination<S>::own_scalar(const T* block, size_t entries, std::vector<S>& converted) const {
+  if constexpr (std::is_same_v<S, T>) {
+    return block;
+  } else {
+    converted.resize(entries);
+    for (size_t i = 0; i < entries; ++i) converted[i] = S(block[i]);
+    return converted.data();
+  }
+}
+
 template <class S>
 template <class Blocks, class Values>
 void TreeElimination<S>::assemble(Blocks&& blocks, Values&& values) {
@@ -169,7 +182,7 @@ void TreeElimination<S>::assemble(Blocks&& blocks, Values&& values) {
       const Place row = equation_at_[t.row][row_body], column = state_at_[t.column][column_body];
       if (t.shift == Shift::none) {
         if (t.right >= 0) {
-          add_block(row, column, blocks(t.right).at(k), r, c, S(t.coefficient));
+          add_block(row, column, own_scalar(blocks(t.right).at(k), size_t(r) * c, right_), r, c, S(t.coefficient));
         } else {
           block_.assign(size_t(r) * c, S(0));
           for (int i = 0; i < std::min(r, c); ++i) block_[size_t(i) * c + i] = S(1);
@@ -180,7 +193,14 @@ void TreeElimination<S>::assemble(Blocks&& blocks, Values&& values) {
       // left · (E or E*) · right
       const int sp = tree_.size[p], sk = tree_.size[k];
       edge_.resize(size_t(sp) * sk);
-      values(t.context).block(edge_symbol, k, edge_.data());
+      using T = std::decay_t<decltype(*blocks(0).at(0))>;
+      if constexpr (std::is_same_v<S, T>) {
+        values(t.context).block(edge_symbol, k, edge_.data());
+      } else {
+        std::vector<T> edge(edge_.size());
+        values(t.context).block(edge_symbol, k, edge.data());
+        for (size_t i = 0; i < edge.size(); ++i) edge_[i] = S(edge[i]);
+      }
       int er = sp, ec = sk;
       if (t.shift == Shift::down) {
         block_.resize(edge_.size());
@@ -191,13 +211,13 @@ void TreeElimination<S>::assemble(Blocks&& blocks, Values&& values) {
       }
       if (t.right >= 0) {
         product_.assign(size_t(er) * c, S(0));
-        multiply_add(edge_.data(), blocks(t.right).at(column_body), product_.data(), er, ec, c);
+        multiply_add(edge_.data(), own_scalar(blocks(t.right).at(column_body), size_t(ec) * c, right_), product_.data(), er, ec, c);
         edge_.swap(product_);
         ec = c;
       }
       if (t.left >= 0) {
         product_.assign(size_t(r) * ec, S(0));
-        multiply_add(blocks(t.left).at(row_body), edge_.data(), product_.data(), r, er, ec);
+        multiply_add(own_scalar(blocks(t.left).at(row_body), size_t(r) * er, left_), edge_.data(), product_.data(), r, er, ec);
         edge_.swap(product_);
       }
       add_block(row, column, edge_.data(), r, c, S(t.coefficient));

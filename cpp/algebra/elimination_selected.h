@@ -64,11 +64,11 @@ void TreeElimination<S>::selected_fronts() {
 }
 
 template <class S>
-template <class Blocks>
-void TreeElimination<S>::selected(BlockStorage<S>& out, Blocks&&) {
+template <class T>
+void TreeElimination<S>::selected(BlockStorage<T>& out) {
   selected_fronts();
   // Inputs and outputs are states of their own (local ends): the block is read off.
-  std::fill(out.data.begin(), out.data.end(), S(0));
+  std::fill(out.data.begin(), out.data.end(), T(0));
   for (const Realization::Term& o : r_->outputs)
     for (const Realization::Term& i : r_->inputs)
       for (int k = 0; k < tree_.bodies(); ++k) {
@@ -78,7 +78,7 @@ void TreeElimination<S>::selected(BlockStorage<S>& out, Blocks&&) {
         for (int a = 0; a < out.rows[k]; ++a)
           for (int b = 0; b < out.columns[k]; ++b)
             out.at(k)[a * out.columns[k] + b] +=
-                S(o.coefficient) * S(i.coefficient) * z[size_t(state.position + a) * n + equation.position + b];
+                static_cast<T>(S(o.coefficient) * S(i.coefficient) * z[size_t(state.position + a) * n + equation.position + b]);
       }
 }
 

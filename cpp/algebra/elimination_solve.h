@@ -80,8 +80,7 @@ void TreeElimination<S>::coarsen() {
 
 template <class S>
 template <class Blocks, class Values>
-void TreeElimination<S>::factor(Blocks&& blocks, Values&& values) {
-  const S tolerated = S(1e7) * epsilon<S>();
+bool TreeElimination<S>::factor(Blocks&& blocks, Values&& values, S tolerated) {
   const auto widest = [&] {
     int n = 0;
     for (const Front& f : fronts_) n = std::max(n, f.n);
@@ -93,7 +92,7 @@ void TreeElimination<S>::factor(Blocks&& blocks, Values&& values) {
     assemble(blocks, values);
     if (eliminate()) {
       growth_ = lost();
-      if (growth_ <= tolerated) return;
+      if (growth_ <= tolerated) return true;
       where = "elimination body by body loses " + elimination::digits(growth_) + " digits";
       // One front, or one per root: nothing is left to merge.
       if (std::all_of(fronts_.begin(), fronts_.end(), [](const Front& f) { return f.parent < 0; }) || 2 * widest() > elimination::largest_merged_front) break;
@@ -107,16 +106,19 @@ void TreeElimination<S>::factor(Blocks&& blocks, Values&& values) {
     merged_with_parent_[f.bodies[0]] = 1;
     lay_out(false);
   }
-  const std::string remedy = "; a wider precision (.at(precision=\"quad\")) may decide";
-  if (static_cast<int>(total_) + border_ > elimination::largest_dense)
-    throw SingularOperatorError(where + ", and with " + std::to_string(total_) + " states the operator is too large for a dense factorization" + remedy);
+  if (static_cast<int>(total_) + border_ > elimination::largest_dense) {
+    note_ = where + ", and with " + std::to_string(total_) + " states the operator is too large for a dense factorization";
+    return false;
+  }
   lay_out(true);
   assemble(blocks, values);
   if (!eliminate()) throw SingularOperatorError(where + ", and so is the operator as a whole: it has no inverse at this state");
   growth_ = lost();
-  if (!(growth_ < S(0.3))) throw SingularOperatorError("the operator is singular to working precision at this state (" + where + ")" + remedy);
+  if (!(growth_ < S(0.3))) throw SingularOperatorError("the operator is singular to working precision at this state (" + where +
+                                                         "); a wider precision (.at(precision=\"quad\")) may decide");
   dense_ = true;
   note_ = "dense: " + where + "; eliminated as one block of " + std::to_string(total_) + " states";
+  return true;
 }
 
 template <class S>
@@ -182,8 +184,8 @@ void TreeElimination<S>::subtract_product(const S* s, S* r, int m) const {
 }
 
 template <class S>
-template <class Blocks>
-void TreeElimination<S>::solve(const S* x, S* y, int m, Blocks&& blocks) {
+template <class T, class Blocks>
+void TreeElimination<S>::solve(const T* x, T* y, int m, Blocks&& blocks) {
   const size_t size = (total_ + border_) * m;
   rhs_.assign(size, S(0));
   size_t largest = border_;
@@ -194,19 +196,19 @@ void TreeElimination<S>::solve(const S* x, S* y, int m, Blocks&& blocks) {
   for (const Realization::Term& t : r_->inputs) {
     if (!r_->domain.belongs_to_bodies()) {
       for (int i = 0; i < r_->domain.dimension(); ++i)
-        for (int c = 0; c < m; ++c) rhs_[at(equation_at_[t.row][0], i) + c] += S(t.coefficient) * x[i * m + c];
+        for (int c = 0; c < m; ++c) rhs_[at(equation_at_[t.row][0], i) + c] += S(t.coefficient) * S(x[i * m + c]);
       continue;
     }
     for (int k = 0; k < tree_.bodies(); ++k) {
       const Place place = equation_at_[t.row][k];
       elimination::for_rows(r_->domain, k, [&](int local, int row) {
         if (t.right < 0) {
-          for (int c = 0; c < m; ++c) rhs_[at(place, local) + c] += S(t.coefficient) * x[row * m + c];
+          for (int c = 0; c < m; ++c) rhs_[at(place, local) + c] += S(t.coefficient) * S(x[row * m + c]);
         } else {
-          const BlockStorage<S>& b = blocks(t.right);
+          const auto& b = blocks(t.right);
           for (int i = 0; i < b.rows[k]; ++i) {
-            const S f = S(t.coefficient) * b.at(k)[i * b.columns[k] + local];
-            for (int c = 0; c < m; ++c) rhs_[at(place, i) + c] += f * x[row * m + c];
+            const S f = S(t.coefficient) * S(b.at(k)[i * b.columns[k] + local]);
+            for (int c = 0; c < m; ++c) rhs_[at(place, i) + c] += f * S(x[row * m + c]);
           }
         }
       });
@@ -232,11 +234,11 @@ void TreeElimination<S>::solve(const S* x, S* y, int m, Blocks&& blocks) {
     last = correction;
   }
   // output
-  std::fill_n(y, size_t(r_->codomain.dimension()) * m, S(0));
+  output_.assign(size_t(r_->codomain.dimension()) * m, S(0));
   for (const Realization::Term& t : r_->outputs) {
     if (!r_->codomain.belongs_to_bodies()) {
       for (int i = 0; i < r_->codomain.dimension(); ++i)
-        for (int c = 0; c < m; ++c) y[i * m + c] += S(t.coefficient) * rhs_[at(state_at_[t.column][0], i) + c];
+        for (int c = 0; c < m; ++c) output_[i * m + c] += S(t.coefficient) * rhs_[at(state_at_[t.column][0], i) + c];
       continue;
     }
     for (int k = 0; k < tree_.bodies(); ++k)
@@ -245,21 +247,22 @@ void TreeElimination<S>::solve(const S* x, S* y, int m, Blocks&& blocks) {
           if (t.column >= 0) return rhs_[at(state_at_[t.column][k], i) + c];
           S value = S(0);
           elimination::for_rows(r_->domain, k, [&](int l, int xr) {
-            if (l == i) value = x[xr * m + c];
+            if (l == i) value = S(x[xr * m + c]);
           });
           return value;
         };
         if (t.right < 0) {
-          for (int c = 0; c < m; ++c) y[row * m + c] += S(t.coefficient) * source(local, c);
+          for (int c = 0; c < m; ++c) output_[row * m + c] += S(t.coefficient) * source(local, c);
         } else {
-          const BlockStorage<S>& b = blocks(t.right);
+          const auto& b = blocks(t.right);
           for (int i = 0; i < b.columns[k]; ++i) {
-            const S f = S(t.coefficient) * b.at(k)[local * b.columns[k] + i];
-            for (int c = 0; c < m; ++c) y[row * m + c] += f * source(i, c);
+            const S f = S(t.coefficient) * S(b.at(k)[local * b.columns[k] + i]);
+            for (int c = 0; c < m; ++c) output_[row * m + c] += f * source(i, c);
           }
         }
       });
   }
+  for (size_t i = 0; i < output_.size(); ++i) y[i] = static_cast<T>(output_[i]);
 }
 
 }  // namespace pycraft

@@ -196,7 +196,8 @@ Expression with_space(const Expression& e, const Space& space) {
   if (!e.floating()) return e;
   Node n = e.node();
   n.domain = n.codomain = space;
-  for (Expression& c : n.children) c = with_space(c, space);
+  const bool transposed = n.kind == NodeKind::transpose;
+  for (Expression& c : n.children) c = with_space(c, transposed ? space.dual() : space);
   return make(std::move(n));
 }
 

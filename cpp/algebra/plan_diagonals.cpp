@@ -139,42 +139,6 @@ int Planner::diagonal_blocks(const Expression& e) {
 
 std::optional<int> Planner::logdet_by_structure(const Expression& e) {
   const Register scalar{RegisterKind::scalar, {}, {}, nullptr, false};
-  const auto combine = [&](std::vector<int> in, std::vector<double> c, const std::string& text, double constant) {
-    Step s{StepKind::combine_scalars};
-    s.in = std::move(in);
-    s.coefficients = std::move(c);
-    s.coefficients.push_back(constant);
-    s.text = text;
-    return emit(std::move(s), scalar);
-  };
-  switch (e.kind()) {
-    case NodeKind::identity: return combine({}, {}, "ln det I = 0", 0);
-    case NodeKind::scaled: {
-      const auto r = logdet_by_structure(e.children()[0]);
-      if (!r) return std::nullopt;
-      return combine({*r}, {1.0}, "ln det of a multiple", e.domain().dimension() * std::log(std::abs(e.node().coefficient)));
-    }
-    case NodeKind::inverse: {
-      const auto r = logdet_by_structure(e.children()[0]);
-      if (!r) return std::nullopt;
-      return combine({*r}, {-1.0}, "ln det of an inverse", 0);
-    }
-    case NodeKind::product: {
-      std::vector<int> parts;
-      bool square = true;
-      for (const Expression& f : e.children()) square &= f.domain().dimension() == f.codomain().dimension();
-      if (square) {
-        for (const Expression& f : e.children()) {
-          const auto r = logdet_by_structure(f);
-          if (!r) break;
-          parts.push_back(*r);
-        }
-        if (parts.size() == e.children().size()) return combine(parts, std::vector<double>(parts.size(), 1.0), "ln det of a product", 0);
-      }
-      break;
-    }
-    default: break;
-  }
   if (e.kind() == NodeKind::symbol && e.node().symbol.definition->id == SymbolId::D) {
     const Symbol& symbol = e.node().symbol;
     Step s{StepKind::logdet_of_D};
@@ -198,10 +162,34 @@ std::optional<int> Planner::logdet_by_structure(const Expression& e) {
 }
 
 int Planner::logdet(const Expression& e) {
-  if (const auto r = logdet_by_structure(e)) return *r;
   const Register scalar{RegisterKind::scalar, {}, {}, nullptr, false};
+  const auto combine = [&](std::vector<int> in, std::vector<double> c, const std::string& text, double constant) {
+    Step s{StepKind::combine_scalars};
+    s.in = std::move(in);
+    s.coefficients = std::move(c);
+    s.coefficients.push_back(constant);
+    s.text = text;
+    return emit(std::move(s), scalar);
+  };
+  switch (e.kind()) {
+    case NodeKind::identity: return combine({}, {}, "ln det I = 0", 0);
+    case NodeKind::scaled:
+      return combine({logdet(e.children()[0])}, {1.0}, "ln det of a multiple", e.domain().dimension() * std::log(std::abs(e.node().coefficient)));
+    case NodeKind::inverse: return combine({logdet(e.children()[0])}, {-1.0}, "ln det of an inverse", 0);
+    case NodeKind::product: {
+      bool square = true;
+      for (const Expression& f : e.children()) square &= f.domain().dimension() == f.codomain().dimension();
+      if (!square) break;
+      std::vector<int> parts;
+      for (const Expression& f : e.children()) parts.push_back(logdet(f));
+      return combine(parts, std::vector<double>(parts.size(), 1.0), "ln det of a product", 0);
+    }
+    default: break;
+  }
+  if (const auto r = logdet_by_structure(e)) return *r;
+  // A sum, or a product of factors that are not square: the closed realization has its determinant over that of its own states.
   std::string reason;
-  const auto system = build_realization(*this, lower(e.inv(), false), false, reason);
+  const auto system = build_realization(*this, e.inv(), false, reason);
   const auto own = system ? build_realization(*this, e, false, reason) : nullptr;
   if (!system || !own) {
     Step s{StepKind::logdet_of_dense};
@@ -227,12 +215,7 @@ int Planner::logdet(const Expression& e) {
     s.text = "ln|det| from the pivots";
     parts.push_back(emit(std::move(s), scalar));
   }
-  Step s{StepKind::combine_scalars};
-  s.in = parts;
-  s.coefficients = {1.0, -1.0, 0.0};
-  s.tier = 3;
-  s.text = "ln|det| of " + show(e);
-  return emit(std::move(s), scalar);
+  return combine(parts, {1.0, -1.0}, "ln|det| of " + show(e), 0);
 }
 
 }  // namespace pycraft

@@ -77,8 +77,9 @@ class Normaliser {
 
   std::optional<Polynomial> run(const Expression& lowered) {
     Polynomial p = expand(lowered);
+    if (!overflow_) p = reduce(p);
     if (overflow_) return std::nullopt;
-    return reduce(p);
+    return p;
   }
 
  private:

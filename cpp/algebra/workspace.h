@@ -124,21 +124,16 @@ class Workspace {
       case StepKind::lyapunov_blocks: block_step(s, values); return;
       case StepKind::factor: {
         ++counts.eliminations;
-        auto& e = eliminations_[s.out];
-        if (!e) e = std::make_unique<TreeElimination<S>>(s.realization);
-        e->factor([&](int r) -> const BlockStorage<S>& { return blocks_[r]; }, [&](int c) -> const SkoValues<S>& { return *values[c]; });
-        if (e->dense()) {
-          ++counts.dense;
-          if (std::find(notes_.begin(), notes_.end(), e->note()) == notes_.end()) notes_.push_back(e->note());
-        }
+        eliminate(s, values, counts);
         return;
       }
       case StepKind::solve:
-        eliminations_[s.in[0]]->solve(vectors_[s.in[1]].data(), vectors_[s.out].data(), width(s.in[1], m),
-                                      [&](int r) -> const BlockStorage<S>& { return blocks_[r]; });
+        with_factors(s.in[0], [&](auto& factors) {
+          factors.solve(vectors_[s.in[1]].data(), vectors_[s.out].data(), width(s.in[1], m), [&](int r) -> const BlockStorage<S>& { return blocks_[r]; });
+        });
         return;
       case StepKind::selected_blocks:
-        eliminations_[s.in[0]]->selected(blocks_[s.out], [&](int r) -> const BlockStorage<S>& { return blocks_[r]; });
+        with_factors(s.in[0], [&](auto& factors) { factors.selected(blocks_[s.out]); });
         return;
       case StepKind::mass_matrix:
       case StepKind::mass_matrix_solve: {
@@ -227,7 +222,9 @@ class Workspace {
         return;
       }
       case StepKind::logdet_of_D: scalars_[s.out] = values[s.context]->log_determinant_of_D(); return;
-      case StepKind::logdet_of_factor: scalars_[s.out] = eliminations_[s.in[0]]->log_abs_determinant(); return;
+      case StepKind::logdet_of_factor: 
+        with_factors(s.in[0], [&](const auto& factors) { scalars_[s.out] = static_cast<S>(factors.log_abs_determinant()); });
+        return;
       case StepKind::logdet_of_dense: scalars_[s.out] = dense_lu_[s.in[0]].log_abs_determinant(); return;
       case StepKind::norm_of_vector: return;  // taken by the pool over all columns_at_a_times
       case StepKind::combine_scalars: {
@@ -266,6 +263,39 @@ class Workspace {
         });
       });
     }
+  }
+
+  // Body by body in S; where that loses digits and the model is too large for one front, in quad.
+  void eliminate(const Step& s, const std::vector<SkoValues<S>*>& values, PassCounts& counts) {
+    const auto blocks = [&](int r) -> const BlockStorage<S>& { return blocks_[r]; };
+    const auto numbers = [&](int c) -> const SkoValues<S>& { return *values[c]; };
+    const auto note = [&](const std::string& text) {
+      if (std::find(notes_.begin(), notes_.end(), text) == notes_.end()) notes_.push_back(text);
+    };
+    auto& [own, wide] = eliminations_[s.out];
+    if (!own) own = std::make_unique<TreeElimination<S>>(s.realization);
+    wide.reset();
+    const bool solved = own->factor(blocks, numbers);
+    if (solved && own->dense()) {
+      ++counts.dense;
+      note(own->note());
+    }
+    if (solved) return;
+    const std::string reason = own->note();
+    if constexpr (!std::is_same_v<S, Quad>) {
+      wide = std::make_unique<TreeElimination<Quad>>(s.realization);
+      if (wide->factor(blocks, numbers, Quad(1e7) * Quad(epsilon<S>()))) return note("quad: " + reason + "; eliminated in quad precision");
+    }
+    throw SingularOperatorError(reason + ": it counts as singular at this state");
+  }
+
+  template <class F>
+  void with_factors(int r, F f) {
+    auto& [own, wide] = eliminations_[r];
+    if (wide)
+      f(*wide);
+    else
+      f(*own);
   }
 
   void apply_external_operator(const Step& s, int w) {
@@ -425,7 +455,11 @@ class Workspace {
   std::vector<BlockStorage<S>> blocks_;
   std::vector<S> scalars_;
   std::vector<std::vector<S>> dense_;
-  std::vector<std::unique_ptr<TreeElimination<S>>> eliminations_;
+  struct Factors {
+    std::unique_ptr<TreeElimination<S>> own;
+    std::unique_ptr<TreeElimination<Quad>> wide;
+  };
+  std::vector<Factors> eliminations_;
   std::vector<SmallLU<S>> dense_lu_;
   std::vector<std::pair<const Step*, std::unique_ptr<Workspace>>> operands_;
   SmallLU<S> lu_;

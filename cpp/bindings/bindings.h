@@ -53,7 +53,8 @@ py::object to_array(const Result& result, std::vector<py::ssize_t> shape);
 bool wants_objects(const py::object& dtype);
 
 // An array of real numbers; complex ones and anything else are refused.
-Array real_array(const py::object& x);
+Array real_array(const py::object& x);                           // TypeError unless real numbers
+Array numbers(const py::handle& value, const char* what);       // ModelError unless real numbers
 
 // The batch an expression is bound to, -1 for none.
 int batch_of(const Expression& e);

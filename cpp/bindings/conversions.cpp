@@ -7,7 +7,20 @@ namespace pycraft {
 
 namespace {
 
+// Casting complex to real would drop the imaginary part: a complex step would come back as zero.
+bool is_complex(const py::handle& x) {
+  if (PyFloat_Check(x.ptr()) || PyLong_Check(x.ptr())) return false;
+  if (PyComplex_Check(x.ptr())) return true;
+  if (py::isinstance<py::array_t<double>>(x)) return false;
+  const py::array any = py::array::ensure(x);
+  if (!any) PyErr_Clear();
+  return any && any.dtype().kind() == 'c';
+}
+
+}  // namespace
+
 Array numbers(const py::handle& value, const char* what) {
+  if (is_complex(value)) throw ModelError(std::string(what) + " is complex; models take real numbers");
   Array a = Array::ensure(value);
   if (!a) {
     PyErr_Clear();
@@ -15,8 +28,6 @@ Array numbers(const py::handle& value, const char* what) {
   }
   return a;
 }
-
-}  // namespace
 
 Vector3<double> to_vector3(const py::handle& value, const char* what) {
   const Array a = numbers(value, what);
@@ -72,8 +83,7 @@ py::object to_array(const Result& r, std::vector<py::ssize_t> shape) {
 }
 
 Array real_array(const py::object& x) {
-  if (py::isinstance<py::array>(x) && py::cast<py::array>(x).dtype().kind() == 'c')
-    throw py::type_error("operators act on real arrays; apply them to the real and imaginary parts");
+  if (is_complex(x)) throw py::type_error("operators act on real arrays; apply them to the real and imaginary parts");
   Array a = Array::ensure(x);
   if (!a) {
     PyErr_Clear();

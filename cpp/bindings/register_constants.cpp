@@ -8,6 +8,11 @@ namespace pycraft {
 
 namespace {
 
+void require_finite(const Array& a, const std::string& name) {
+  for (py::ssize_t i = 0; i < a.size(); ++i)
+    if (!std::isfinite(a.data()[i])) throw EvaluationError("constant '" + name + "' has an entry that is not a finite number");
+}
+
 Expression constant_operator(const py::object& given, const py::object& domain, const py::object& codomain, const std::string& name) {
   const auto space = [](const py::object& s) { return py::isinstance<py::int_>(s) ? Space::euclidean(s.cast<int>()) : s.cast<Space>(); };
   const Space in = space(domain), out = space(codomain);
@@ -16,13 +21,13 @@ Expression constant_operator(const py::object& given, const py::object& domain, 
     std::vector<std::vector<double>> blocks;
     for (const auto& item : py::list(given)) {
       const Array b = real_array(py::reinterpret_borrow<py::object>(item));
+      require_finite(b, name);
       blocks.emplace_back(b.data(), b.data() + b.size());
     }
     return constant_blocks(std::move(blocks), in, out, name);
   }
   const Array a = real_array(given);
-  for (py::ssize_t i = 0; i < a.size(); ++i)
-    if (!std::isfinite(a.data()[i])) throw EvaluationError("constant '" + name + "' has an entry that is not a finite number");
+  require_finite(a, name);
   if (a.ndim() == 1) {  // a diagonal
     const int n = static_cast<int>(a.shape(0));
     if (in.dimension() != n || out.dimension() != n)

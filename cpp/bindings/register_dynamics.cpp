@@ -40,11 +40,7 @@ struct Argument {
 
 Argument argument(const py::object& given, int width, const char* what, const Multibody& model) {
   Argument a;
-  a.array = Array::ensure(given);
-  if (!a.array) {
-    PyErr_Clear();
-    throw ModelError(std::string(what) + " is not an array of numbers");
-  }
+  a.array = numbers(given, what);
   if (a.array.ndim() < 1 || a.array.ndim() > 2 || a.array.shape(a.array.ndim() - 1) != width)
     throw ModelError(std::string(what) + " of '" + model.name() + "' takes " + std::to_string(width) + " numbers, or (B, " + std::to_string(width) + ") for a batch");
   if (a.array.ndim() == 2) {

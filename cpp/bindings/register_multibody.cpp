@@ -160,30 +160,41 @@ void register_multibody(py::module_& m) {
         py::array_t<double> a = to_numpy(mb.state()->q);
         a.attr("setflags")(py::arg("write") = false);
         return a;
-      }, [](Multibody& mb, const Array& q) { mb.set_q(std::vector<double>(q.data(), q.data() + q.size())); },
+      }, [](Multibody& mb, const py::object& given) {
+        const Array q = numbers(given, "q");
+        mb.set_q(std::vector<double>(q.data(), q.data() + q.size()));
+      },
          "Generalized coordinates (nq,): copied in when set, read-only when read.")
       .def_property("v", [](const Multibody& mb) {
         py::array_t<double> a = to_numpy(mb.state()->v);
         a.attr("setflags")(py::arg("write") = false);
         return a;
-      }, [](Multibody& mb, const Array& v) { mb.set_v(std::vector<double>(v.data(), v.data() + v.size())); },
+      }, [](Multibody& mb, const py::object& given) {
+        const Array v = numbers(given, "v");
+        mb.set_v(std::vector<double>(v.data(), v.data() + v.size()));
+      },
          "Generalized velocities (nv,): copied in when set, read-only when read.")
       .def("zero_q", [](const Multibody& mb) { return to_numpy(mb.zero_q()); }, "All coordinates zero, quaternions (1, 0, 0, 0).")
-      .def("integrate", [](const Multibody& mb, const Array& q, const Array& dv) {
+      .def("integrate", [](const Multibody& mb, const py::object& at, const py::object& along) {
+        const Array q = numbers(at, "q"), dv = numbers(along, "dv");
         mb.check_q(q.data(), q.size());
         mb.check_v(dv.data(), dv.size(), "dv");
         std::vector<double> out(mb.nq());
         mb.integrate(q.data(), dv.data(), out.data());
         return to_numpy(out);
       }, py::arg("q"), py::arg("dv"), "q moved along the velocity dv for unit time: on the group for ball and free hinges (exponential of the body twist).")
-      .def("difference", [](const Multibody& mb, const Array& q0, const Array& q1) {
+      .def("difference", [](const Multibody& mb, const py::object& from, const py::object& to) {
+        const Array q0 = numbers(from, "q0"), q1 = numbers(to, "q1");
         mb.check_q(q0.data(), q0.size());
         mb.check_q(q1.data(), q1.size());
         std::vector<double> out(mb.nv());
         mb.difference(q0.data(), q1.data(), out.data());
         return to_numpy(out);
       }, py::arg("q0"), py::arg("q1"), "The velocity dv with integrate(q0, dv) = q1.")
-      .def("check_q", [](const Multibody& mb, const Array& q) { mb.check_q(q.data(), q.size()); })
+      .def("check_q", [](const Multibody& mb, const py::object& given) {
+        const Array q = numbers(given, "q");
+        mb.check_q(q.data(), q.size());
+      })
       .def("take_warnings", &Multibody::take_warnings)
       // A model whose Python face is gone (an operator held alone) is pickled as its face would be.
       .def("__reduce__", [](const py::object& self) -> py::tuple {

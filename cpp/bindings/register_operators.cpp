@@ -14,10 +14,6 @@ namespace pycraft {
 
 namespace {
 
-}  // namespace
-
-namespace {
-
 // Entries that dense() and numpy.asarray refuse to exceed: 512 MB.
 constexpr double dense_limit = 64e6;
 
@@ -25,7 +21,8 @@ py::object not_implemented() { return py::reinterpret_borrow<py::object>(Py_NotI
 bool is_operator(const py::object& x) { return py::isinstance<Expression>(x); }
 bool is_number(const py::object& x) {
   if (PyFloat_Check(x.ptr()) || PyLong_Check(x.ptr())) return true;
-  return py::hasattr(x, "__float__") && py::hasattr(x, "ndim") && x.attr("ndim").cast<int>() == 0 && !py::hasattr(x, "imag_is_set");
+  if (!py::hasattr(x, "__float__") || !py::hasattr(x, "ndim") || x.attr("ndim").cast<int>() != 0) return false;
+  return !py::hasattr(x, "dtype") || std::string("biuf").find(x.attr("dtype").attr("kind").cast<std::string>()) != std::string::npos;  // not complex
 }
 bool is_array(const py::object& x) { return py::isinstance<py::array>(x) || py::isinstance<py::list>(x) || py::isinstance<py::tuple>(x); }
 

@@ -19,6 +19,13 @@ py::object value(const Scalar& s) {
   return to_numpy(v);
 }
 
+// A number beside a scalar; anything else is refused: an operator or another scalar would have to be frozen at the present state.
+double factor(const py::object& x) {
+  if (py::isinstance<Scalar>(x) || py::isinstance<Expression>(x))
+    throw py::type_error(std::string("a scalar expression is added to scalars and multiplied by numbers; for its value at the present state write float(...)"));
+  return py::float_(x).cast<double>();
+}
+
 double single(const Scalar& s) {
   const py::object v = value(s);
   if (!py::isinstance<py::float_>(v)) throw py::type_error("this scalar is bound to a batch of states: take it with numpy.asarray");
@@ -46,14 +53,14 @@ void register_scalars(py::module_& m) {
       })
       .def("bound", [](const Scalar& s, const std::shared_ptr<const Binding>& b) { return at(s, b); })
       .def("__add__", [](const Scalar& a, const Scalar& b) { return a + b; })
-      .def("__add__", [](const Scalar& a, double b) { return a + number(b); })
-      .def("__radd__", [](const Scalar& a, double b) { return number(b) + a; })
+      .def("__add__", [](const Scalar& a, const py::object& b) { return a + number(factor(b)); })
+      .def("__radd__", [](const Scalar& a, const py::object& b) { return number(factor(b)) + a; })
       .def("__sub__", [](const Scalar& a, const Scalar& b) { return a - b; })
-      .def("__sub__", [](const Scalar& a, double b) { return a - number(b); })
-      .def("__rsub__", [](const Scalar& a, double b) { return number(b) - a; })
-      .def("__mul__", [](const Scalar& a, double c) { return c * a; })
-      .def("__rmul__", [](const Scalar& a, double c) { return c * a; })
-      .def("__truediv__", [](const Scalar& a, double c) { return (1 / c) * a; })
+      .def("__sub__", [](const Scalar& a, const py::object& b) { return a - number(factor(b)); })
+      .def("__rsub__", [](const Scalar& a, const py::object& b) { return number(factor(b)) - a; })
+      .def("__mul__", [](const Scalar& a, const py::object& c) { return factor(c) * a; })
+      .def("__rmul__", [](const Scalar& a, const py::object& c) { return factor(c) * a; })
+      .def("__truediv__", [](const Scalar& a, const py::object& c) { return (1 / factor(c)) * a; })
       .def("__neg__", [](const Scalar& a) { return -1.0 * a; })
       .def("__abs__", [](const Scalar& a) { return std::abs(single(a)); })
       .def("__lt__", [](const Scalar& a, double b) { return single(a) < b; })

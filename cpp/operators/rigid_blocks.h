@@ -245,12 +245,15 @@ class RigidBlocks {
       }
       for (int j = 0; j < n; ++j) G[f + j] = W[f + j];
     }
+    // Of several coordinates a pivot inherits the errors of those before it, in the worst case over their own square roots.
+    using std::sqrt;
+    const S noise = S(tree_.bodies()) * rounding_bound<S>(), doubt = n == 1 ? noise : S(n * sqrt(noise));
     for (int j = 0; j < n; ++j) {
       if (aligned[f + j] >= 0 && no_hinge_diagonal(k)) annihilate(Pplus[k], aligned[f + j]);
       const Vector6<S>& h = H[f + j];
       const S inertia_bound = S(4) * (rotational_[k] + mass_[k] * reach_[k] * reach_[k]);
       const S bound = dot(h.angular, h.angular) * inertia_bound + S(2) * dot(h.linear, h.linear) * mass_[k] + J[f + j];
-      doubtful |= !(pivots[j] > S(tree_.bodies()) * rounding_bound<S>() * bound);
+      doubtful |= !(pivots[j] > doubt * bound);
     }
     return doubtful;
   }
@@ -269,14 +272,14 @@ class RigidBlocks {
     X_[k] = articulated_inertia(inertia[k]);
   }
   void check_pivots(int k) {
-    for (int j = first(k); j < last(k); ++j) {
-      const S bound = rounding_bound<S>() * (dot(H[j], X_[k] * H[j]) + J[j]);
-      if (!(pivots_[j] > bound)) throw_singular_hinge(tree_, k, j - first(k), to_double(pivots_[j]), to_double(bound));
-    }
+    std::vector<S> x;
+    for (int j = first(k); j < last(k); ++j) x.push_back(dot(H[j], X_[k] * H[j]) + J[j]);
+    require_pivots(tree_, k, L.data() + d_[k], pivots_.data() + first(k), x.data());
   }
   void error_to_parent(int k) {
     ArticulatedInertia<S> plus = projected(X_[k], H, G, k);  // τ̄Xτ̄*
-    pycraft::add(plus, P[k]);
+    // Entries of P round at sqrt(P(i,i) P(j,j)), whatever cancels when it moves on: the diagonal, not P.
+    for (int i = 0; i < 3; ++i) plus.A(i, i) += P[k].A(i, i), plus.C(i, i) += P[k].C(i, i);
     pycraft::add(X_[tree_.parent[k]], to_parent(pose[k], plus));
   }
 

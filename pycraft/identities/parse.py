@@ -11,7 +11,7 @@ import operator
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, reduce
 from typing import Any
 
 from lark import Lark, Token, Transformer, exceptions
@@ -32,25 +32,23 @@ _WITH_ARGUMENTS = ("B", "Jacobian", "Lambda", "Delta")
 _TABLE = _core.symbol_table()
 _NAMES = {entry[0] for entry in _TABLE}
 
+# What stands for a letter in ASCII where its own name is another: X, V.
+_ALIASES = {shown: name for name, shown, *_ in _TABLE if shown != name and shown.isascii()}
+_LARGEST_POWER = 1000
+
 _BOOK = r"""
 start: side (("==" | "=") side)?
 side: sum
 sum: (PLUS | MINUS)? term ((PLUS | MINUS) term)*
-term: factor (_TIMES? factor)* ("/" NUMBER)?
-factor: NUMBER "*"? -> number
-      | postfix
+term: (number* product | number+) ("/" NUMBER)?
+number: NUMBER ("*" | _TIMES)?
+product: postfix (_TIMES? postfix)*
 postfix: atom suffix*
-suffix: "*" -> star
-      | "^*" -> star
-      | "^T" -> star
-      | ".T" -> star
-      | "'" -> star
-      | "⁻¹" -> inverse
-      | "^-1" -> inverse
-      | "**-1" -> inverse
+suffix: (_STAR | "^*" | "^T" | ".T" | "'") -> star
+      | ("^" | "**") POWER -> power
       | ".inv()" -> inverse
-      | "²" -> square
-      | "^" INT -> power
+      | ("^½" | ".sqrt()") -> root
+      | "^-½" -> inverse_root
 atom: NAME -> name
     | FUNCTION "(" sum ")" -> function
     | INDEXED "(" ARGUMENT ("," ARGUMENT)* ")" -> indexed
@@ -60,9 +58,10 @@ atom: NAME -> name
 PLUS: "+"
 MINUS: "-"
 _TIMES: "@" | "·"
+_STAR: /\*(?!\*\s*-?\d)/
 NUMBER: /\d+(\.\d*)?([eE][+-]?\d+)?/
-INT: /\d+/
-ARGUMENT: /[A-Za-z_][\w.\/-]*|\d+/
+POWER: /-?\d+/
+ARGUMENT: /[^(),]+/
 FUNCTION.3: /(%(functions)s)(?=\s*\()/
 INDEXED.3: /(%(indexed)s)(?=\s*\()/
 NAME.2: /%(names)s/
@@ -106,7 +105,8 @@ class Statements:
         for reading in ("python", "book"):
             try:
                 found.append(self._read(text, reading))
-            except (ParseError, _core.SpaceError, _core.ModelError) as error:
+            # The core's errors of names, spaces and models are TypeErrors and ValueErrors; what Python finds wrong reads no better.
+            except (TypeError, ValueError, AttributeError, ArithmeticError) as error:
                 reasons.append(f"  read as {'Python' if reading == 'python' else 'the book'}: {error}")
         if not found:
             raise ParseError(f"{text!r} does not read as a statement of operators.\n" + "\n".join(dict.fromkeys(reasons)))
@@ -140,9 +140,9 @@ class Statements:
     def _name(self, name: str) -> Any:
         if name in self._extra:
             return self._extra[name]
-        if name in _WITH_ARGUMENTS or name not in _NAMES:
+        if name in _WITH_ARGUMENTS or name not in _NAMES and name not in _ALIASES:
             raise ParseError(f"no operator is called {name!r}")
-        return getattr(self._operators, name)
+        return getattr(self._operators, _ALIASES.get(name, name))
 
     def _evaluate(self, node: ast.AST) -> Any:
         match node:
@@ -153,10 +153,7 @@ class Statements:
             case ast.UnaryOp(op=ast.USub(), operand=inner):
                 return -self._evaluate(inner)
             case ast.BinOp(left=left, op=ast.Pow(), right=right):
-                exponent = self._evaluate(right)
-                if exponent != int(exponent):
-                    raise ParseError("an operator's power is a whole number")
-                return self._evaluate(left) ** int(exponent)
+                return _power(self._evaluate(left), self._evaluate(right))
             case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
                 return _combine(_BINARY[type(op)], self._evaluate(left), self._evaluate(right))
             case ast.Attribute(value=inner, attr="T"):
@@ -166,14 +163,14 @@ class Statements:
             case ast.Call(func=ast.Name(id=name), args=[inner]) if name in _FUNCTIONS:
                 return _FUNCTIONS[name](self._evaluate(inner))
             case ast.Call(func=ast.Name(id=name), args=arguments) if name in _WITH_ARGUMENTS:
-                return _indexed(self._operators, name, [ast.unparse(a).strip("'\"") for a in arguments])
+                return _indexed(self._operators, name, [ast.unparse(a) for a in arguments])
         raise ParseError(f"{ast.unparse(node)!r} is no operator expression")
 
     # ------------------------------------------------------------------ the book's reading
     def _read_book(self, source: str) -> list[Any]:
-        names = tuple(sorted({*(_NAMES - set(_WITH_ARGUMENTS)), *self._extra}))
+        names = tuple(sorted({*(_NAMES - set(_WITH_ARGUMENTS)), *_ALIASES, *self._extra}))
         try:
-            return _Evaluate(self._operators, self._extra).transform(_parser(names).parse(source))
+            return _Evaluate(self).transform(_parser(names).parse(source))
         except exceptions.VisitError as error:
             if isinstance(error.orig_exc, (_core.Error, ParseError)):
                 raise error.orig_exc from None
@@ -203,16 +200,37 @@ def _combine(f: Any, a: Any, b: Any) -> Any:
         raise ParseError(str(error)) from None
 
 
+def _power(base: Any, exponent: Any) -> Any:
+    if not isinstance(exponent, (int, float)) or not abs(exponent) <= _LARGEST_POWER or exponent != int(exponent):
+        raise ParseError(f"a power is a whole number up to {_LARGEST_POWER}")
+    return base ** int(exponent)
+
+
 def _indexed(operators: Any, name: str, arguments: list[str]) -> Any:
+    arguments = [a.strip().strip("'\"") for a in arguments]
     if name == "Delta":
         return operators.Delta(int(arguments[0]) if arguments[0].isdigit() else arguments[0])
     return getattr(operators, name)(arguments)
 
 
 def _same(a: Any, b: Any) -> bool:
+    """Whether two readings are one: also where a number scales one factor in Python, (2 D) D, and the product in the book, 2 (D D)."""
     if isinstance(a, _core.Operator) and isinstance(b, _core.Operator):
-        return a == b or _core.equal_by_theorems(a, b) and a.text() == b.text()
+        return a == b or _unscaled(a) == _unscaled(b) and _core.equal_by_theorems(a, b)
     return type(a) is type(b) and a == b
+
+
+def _unscaled(side: _core.Operator) -> Any:
+    """What an expression is made of, whatever the numbers in it."""
+    if not side.children:
+        return side
+    if side.kind == "scaled":
+        return _unscaled(side.children[0])
+    parts: list[Any] = []
+    for part in map(_unscaled, side.children):
+        nested = isinstance(part, tuple) and part[0] == side.kind == "product"
+        parts += part[1:] if nested else [part]
+    return (side.kind, *parts)
 
 
 def _text(side: Any) -> str:
@@ -235,9 +253,16 @@ def _check_same_spaces(lhs: Any, rhs: Any) -> None:
     if isinstance(lhs, _core.Operator) != isinstance(rhs, _core.Operator):
         raise _core.SpaceError(f"{_text(lhs)} and {_text(rhs)}: one is an operator, the other a number")
     if isinstance(lhs, _core.Operator):
+        check_has_space(lhs, rhs)
         lhs - rhs  # raises where the spaces differ
     elif not isinstance(lhs, _core.Scalar) and not isinstance(rhs, _core.Scalar):
         raise ParseError("a statement about numbers alone")
+
+
+def check_has_space(lhs: _core.Operator, rhs: _core.Operator) -> None:
+    """Raises where neither side says on which space its I acts."""
+    if lhs.domain is None and rhs.domain is None:
+        raise _core.SpaceError(f"{lhs.text()} = {rhs.text()} is said of no space: an I takes its space from an operator beside it")
 
 
 @lru_cache(maxsize=4)
@@ -251,31 +276,42 @@ def _parser(names: tuple[str, ...]) -> Lark:
     return Lark(grammar, parser="earley", lexer="dynamic")
 
 
-_LATEX = [
+def _symbol_patterns() -> list[tuple[str, str]]:
+    """LaTeX of every letter of the core's table, as it is shown, to its ASCII name: the longest first."""
+    entries = [(latex, name) for name, _, latex, *_ in _TABLE if not latex.isalnum()]
+    ends = r"(?![A-Za-z])"
+    return [
+        (re.escape(latex) + (ends if latex[-1].isalpha() else ""), f" {name} ")
+        for latex, name in sorted(entries, key=lambda entry: -len(entry[0]))
+    ]
+
+
+def _with_arguments(found: re.Match[str]) -> str:
+    r"""Γ_{\mathrm{a\_b, c}} as Γ(a_b, c)."""
+    return "(" + re.sub(r"\\(.)", r"\1", found[1]) + ")"
+
+
+_LATEX: list[tuple[str, Any]] = [
+    (r"_\{\\mathrm\{((?:[^{}\\]|\\.)*)\}\}", _with_arguments),
+    (r"(\d)\s*\\cdot\s*10\^\{(-?\d+)\}", r"\1e\2"),
+    (r"\\cdot(?![A-Za-z])", "·"),
     (r"\\left|\\right|\\displaystyle|\\mathrm|\\!|\\,|\\;|\\:|\\ |\\quad|\$|&|~", " "),
     (r"\\operatorname\{(\w+)\}", r" \1 "),
     (r"\\ln\s*\\det", " logdet "),
+    (r"\{\s*(\\[A-Za-z]+)\s*\}", r"\1"),  # \tilde{\phi}, \mathcal{E}_{\phi}
+    (r"\\(tilde|bar)\\mathcal\{V\}", r" V_\1 "),
     (r"\\mathcal\{M\}|\\mathscr\{M\}", " MM "),
-    (r"\\mathscr\{B\}", " momentum_cross "),
-    (r"\\mathcal\{E\}_\{?\\phi\}?", " E "),
-    (r"\\mathcal\{E\}_\{?\\psi\}?", " E_psi "),
-    (r"\\mathcal\{E\}", " E "),
-    (r"\\(tilde|bar)\{?\\(phi|psi|tau)\}?", r" \2_\1 "),
-    (r"\\(tilde|bar)\{?\\mathcal\{V\}\}?", r" V_\1 "),
-    (r"\\Delta_\{\\dot\\theta\}", " Delta_theta_dot "),
-    (r"\\(phi|psi|tau|Upsilon|Omega|Lambda|Delta)", r" \1 "),
+    (r"P\^\+", " P_plus "),
+    *_symbol_patterns(),
     (r"\\mathcal\{(\w)\}", r" \1 "),
-    (r"P\^\{\+\}|P\^\+", " P_plus "),
     (r"\^\{\s*\*\s*\}|\^\s*\*|\^\{\s*\\top\s*\}|\^\\top|\^\{T\}", " ^* "),
-    (r"\^\{\s*-1\s*\}|\^\s*-\s*1", " ^-1 "),
-    (r"\^\{1/2\}", " .sqrt() "),
+    (r"\^\{\s*(-?)\s*1\s*/\s*2\s*\}", r" ^\1½ "),
+    (r"\^\{\s*(-?)\s*(\d+)\s*\}", r" ^\1\2 "),
+    (r"\^\s*-\s*1", " ^-1 "),
 ]
 _LETTERS = [
-    ("E_φ", " E "), ("E_ψ", " E_psi "), ("φ̃", " phi_tilde "), ("ψ̃", " psi_tilde "), ("τ̄", " tau_bar "),
-    ("P⁺", " P_plus "), ("Δ_θ̇", " Delta_theta_dot "), ("Ṽ", " V_tilde "), ("V̄", " V_bar "),
-    ("𝓑", " momentum_cross "), ("𝒥", " Jacobian "), ("φ", " phi "), ("ψ", " psi "), ("τ", " tau "),
-    ("Υ", " Upsilon "), ("Ω", " Omega "), ("Λ", " Lambda "), ("Δ", " Delta "), ("ℳ", " MM "), ("−", "-"), ("×", "@"),
-    ("⁻¹", "^-1"), ("ᵀ", " ^* "), ("∗", "*"), ("ln det", "logdet"),
+    *sorted(((shown, f" {name} ") for name, shown, *_ in _TABLE if not shown.isascii()), key=lambda entry: -len(entry[0])),
+    ("ℳ", " MM "), ("−", "-"), ("×", "@"), ("⁻¹", "^-1"), ("²", "^2"), ("ᵀ", " ^* "), ("∗", "*"), ("ln det", "logdet"),
 ]  # fmt: skip
 
 
@@ -284,7 +320,7 @@ def book_text(text: str) -> str:
     import unicodedata
 
     text = unicodedata.normalize("NFC", text)
-    if "\\" in text:
+    if "\\" in text or "{" in text:
         for pattern, replacement in _LATEX:
             text = re.sub(pattern, replacement, text)
     for letter, name in _LETTERS:
@@ -298,9 +334,9 @@ def book_text(text: str) -> str:
 class _Evaluate(Transformer):
     """From the syntax tree to expressions."""
 
-    def __init__(self, operators: Any, extra: Mapping[str, Any]):
+    def __init__(self, statements: Statements):
         super().__init__()
-        self._operators, self._extra = operators, extra
+        self._statements = statements
 
     def start(self, sides):
         return sides
@@ -312,32 +348,36 @@ class _Evaluate(Transformer):
         return parts[0]
 
     def sum(self, parts):
-        total, sign = None, 1
+        total, negative = None, False
         for part in parts:
             if isinstance(part, Token):
-                sign = -1 if part == "-" else 1
+                negative = part == "-"
                 continue
-            value = part if sign == 1 else -part
+            numbers, operators, divisor = part
+            # A sign in front belongs to the number after it, as in Python: -2φ is (-2)φ, but ψ - 2φ is ψ - (2φ).
+            if negative and total is None and numbers:
+                numbers, negative = [-numbers[0], *numbers[1:]], False
+            value = reduce(operator.matmul, operators) if operators else numbers.pop()
+            for number in reversed(numbers):
+                value = number * value
+            value = value if divisor is None else value / divisor
+            value = -value if negative else value
             total = value if total is None else total + value
-            sign = 1
+            negative = False
         return total
 
     def term(self, parts):
-        product = parts[0]
-        for part in parts[1:]:
-            if isinstance(part, Token):
-                product = product / float(part)
-            elif isinstance(product, _core.Operator) and isinstance(part, _core.Operator):
-                product = product @ part
-            else:
-                product = product * part
-        return product
-
-    def factor(self, parts):
-        return parts[0]
+        """Numbers, operators, divisor: the numbers scale the whole product."""
+        divisor = float(parts.pop()) if isinstance(parts[-1], Token) else None
+        factors = parts.pop() if isinstance(parts[-1], list) else []
+        operators = [f for f in factors if isinstance(f, _core.Operator)]
+        return [*parts, *(f for f in factors if not isinstance(f, _core.Operator))], operators, divisor
 
     def number(self, parts):
         return float(parts[0])
+
+    def product(self, parts):
+        return list(parts)
 
     def postfix(self, parts):
         value = parts[0]
@@ -351,18 +391,20 @@ class _Evaluate(Transformer):
     def inverse(self, _):
         return lambda x: x.inv()
 
-    def square(self, _):
-        return lambda x: x**2
-
     def power(self, parts):
-        return lambda x: x ** int(parts[0])
+        return lambda x: _power(x, int(parts[0]))
+
+    def root(self, _):
+        return lambda x: x.sqrt()
+
+    def inverse_root(self, _):
+        return lambda x: x.sqrt().inv()
 
     def name(self, parts):
-        name = str(parts[0])
-        return self._extra[name] if name in self._extra else getattr(self._operators, name)
+        return self._statements._name(str(parts[0]))
 
     def function(self, parts):
         return _FUNCTIONS[str(parts[0])](parts[1])
 
     def indexed(self, parts):
-        return _indexed(self._operators, str(parts[0]), [str(a) for a in parts[1:]])
+        return _indexed(self._statements._operators, str(parts[0]), [str(a) for a in parts[1:]])

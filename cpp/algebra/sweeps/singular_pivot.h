@@ -3,13 +3,17 @@
 // The downdate P⁺ = P - GDG* rounds at the size of P, and an error δP of P passes the hinge as τ̄ δP τ̄*. So the errors of the plain
 // form are bounded by a small multiple of eps times X, where, tip to base,
 //
-//   X⁺(c) = P(c) + τ̄(c) X(c) τ̄(c)*,     X(k) = M(k) + Σ_{children c} E(k,c) X⁺(c) E(k,c)*,
+//   X⁺(c) = diag P(c) + τ̄(c) X(c) τ̄(c)*,     X(k) = M(k) + Σ_{children c} E(k,c) X⁺(c) E(k,c)*,
 //
-// and a Cholesky pivot of D(k) at or below rounding_bound · (H X H* + J) is noise: no digit of D⁻¹ would be right.
+// bound D's own error entry by entry: |δD(i,j)| <= rounding_bound · x(i) x(j), x(i)² = (H X H* + J)(i,i). Pivot j of D(k) is the Schur
+// complement w* D w, w = (-D₁₁⁻¹ D₁ⱼ, 1), so its error is at most rounding_bound · (Σ |w(i)| x(i))²; at or below that it is noise, and no
+// digit of D⁻¹ would be right.
 // The sweep costs as much again as P's own; block policies run it only where a cheap bound on X leaves a doubt.
 #pragma once
 
+#include <cmath>
 #include <string>
+#include <vector>
 
 #include "algebra/errors.h"
 #include "algebra/structure.h"
@@ -28,6 +32,27 @@ inline S rounding_bound() {
   throw SingularHingeError("hinge '" + tree.hinge_names[k] + "' of body '" + tree.body_names[k] + "' feels no inertia along coordinate '" +
                            tree.coordinate_names[tree.dof_offset[k] + coordinate] + "' (" + numbers +
                            "): give the bodies it moves a mass, or the hinge a rotor inertia, or weld it");
+}
+
+// Throws unless every pivot of body k's D = L L* stands out of its rounding. x: diagonal of H X H* + J, n numbers, overwritten.
+template <class S>
+void require_pivots(const SkoStructure& tree, int k, const S* L, const S* pivots, S* x) {
+  using std::abs, std::sqrt;
+  const int n = tree.dof[k];
+  for (int i = 0; i < n; ++i) x[i] = sqrt(x[i]);
+  std::vector<S> w(n);
+  for (int j = 0; j < n; ++j) {
+    // L₁₁* w₁ = -L(j, ·)*
+    S reach = x[j];
+    for (int i = j - 1; i >= 0; --i) {
+      S sum = -L[j * n + i];
+      for (int a = i + 1; a < j; ++a) sum -= L[a * n + i] * w[a];
+      w[i] = sum / L[i * n + i];
+      reach += abs(w[i]) * x[i];
+    }
+    const S bound = rounding_bound<S>() * reach * reach;
+    if (!(pivots[j] > bound)) throw_singular_hinge(tree, k, j, to_double(pivots[j]), to_double(bound));
+  }
 }
 
 // Throws SingularHingeError at the first hinge whose pivot is noise.
