@@ -286,7 +286,7 @@ class Workspace {
       wide = std::make_unique<TreeElimination<Quad>>(s.realization);
       if (wide->factor(blocks, numbers, Quad(1e7) * Quad(epsilon<S>()))) return note("quad: " + reason + "; eliminated in quad precision");
     }
-    throw SingularOperatorError(reason + ": it counts as singular at this state");
+    throw SingularOperatorError((wide ? wide->note() : reason) + ": it counts as singular at this state");
   }
 
   template <class F>
