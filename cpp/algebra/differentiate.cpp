@@ -1,5 +1,6 @@
 #include "algebra/differentiate.h"
 
+#include <optional>
 #include <unordered_map>
 
 #include "algebra/errors.h"

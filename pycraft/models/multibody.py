@@ -24,6 +24,13 @@ _DEFAULT_AXES: dict[str, tuple[tuple[float, float, float], ...]] = {
 }
 
 
+_TWIST = ("rx", "ry", "rz", "x", "y", "z")
+
+
+def _component(i: int | str) -> int:
+    return "xyz".index(i) if isinstance(i, str) else range(3)[i]
+
+
 class Body:
     """A body of a model: `.mass` (kg), `.com` (3,) in the body frame (m), `.inertia` (3, 3) about the centre of mass (kg m²).
 
@@ -67,6 +74,23 @@ class Body:
     @property
     def hinge(self) -> Hinge:
         return Hinge(self._model, self._data()["hinge"]["name"])
+
+    def symbol(self, name: str, i: int | str = 0, j: int | str | None = None) -> _core.Parameter:
+        """A mass property as what `diff` takes: "mass"; "com" with a component i; "inertia" with an entry (i, j), the symmetric one along.
+
+        Components are numbers 0, 1, 2 or "x", "y", "z", in the body's axes; the inertia is about the centre of mass.
+        """
+        body = self._model._body_index(self.name)
+        if name == "mass":
+            which, text = 0, "mass"
+        elif name == "com":
+            which, text = 1 + _component(i), f"com.{'xyz'[_component(i)]}"
+        elif name == "inertia":
+            row, column = sorted((_component(i), _component(i if j is None else j)))
+            which, text = 4 + row * (5 - row) // 2 + column, f"inertia.{'xyz'[row]}{'xyz'[column]}"
+        else:
+            raise _core.ModelError(f"body {self.name!r} has no parameter {name!r}; there are mass, com, inertia, and those of its hinge")
+        return _core._inertia_parameter(self._model.soa._source, body, which, f"{self.name}.{text}")
 
     @property
     def parent(self) -> Body | None:
@@ -123,6 +147,29 @@ class Hinge:
     def rotor_inertia(self, value: float | Vector) -> None:
         values = np.broadcast_to(np.asarray(value, float), self.rotor_inertia.shape)
         self._model._set_rotor_inertia(self._index(), [float(x) for x in values])
+
+    def symbol(self, name: str, component: int | str = 0, subhinge: int = 0) -> _core.Parameter:
+        """A parameter of the hinge as what `diff` takes.
+
+        "placement": the hinge's inboard frame moved by a unit twist on its own side, components "rx", "ry", "rz", "x", "y", "z" (or 0 to 5),
+        radians or metres; "axis": a subhinge's axis turned about component x, y or z of the axes before it, its point held; "point": that
+        axis shifted along x, y or z; "rotor_inertia": of coordinate number `component` of the hinge.
+        """
+        k, source = self._index(), self._model.soa._source
+        if name == "rotor_inertia":
+            coordinate = range(self._model.nv)[self.v_slice][int(component)]
+            return _core._rotor_parameter(source, coordinate, f"{self.name}.rotor_inertia[{int(component)}]")
+        if name == "placement":
+            c = _TWIST.index(component) if isinstance(component, str) else int(component)
+            return _core._twist_parameter(source, [(k, 0, np.eye(6)[c])], f"{self.name}.placement.{_TWIST[c]}")
+        if name not in ("axis", "point"):
+            raise _core.ModelError(f"hinge {self.name!r} has no parameter {name!r}; there are placement, axis, point, rotor_inertia")
+        subhinges, c = self.subhinges, _component(component)
+        if not 0 <= subhinge < len(subhinges):
+            raise _core.ModelError(f"hinge {self.name!r} has {len(subhinges)} subhinges, none with number {subhinge}")
+        turn = np.eye(3)[c]
+        twist = np.r_[turn, np.cross(subhinges[subhinge]["point"], turn)] if name == "axis" else np.r_[np.zeros(3), turn]
+        return _core._twist_parameter(source, [(k, subhinge, twist), (k, subhinge + 1, -twist)], f"{self.name}.{name}[{subhinge}].{'xyz'[c]}")
 
     @property
     def limits(self) -> tuple[np.ndarray, np.ndarray] | None:

@@ -130,12 +130,14 @@ class Rationals:
         best = min(forms, key=terms)
         made = best.as_expr().xreplace(self._to_atom)
         candidates = [made]
-        if terms(best) <= 40:
+        if terms(best) <= 40 and max(c.bit_length() for part in (best.numer, best.denom) for c in part.values()) <= 60:
             numerator, denominator = best.numer.as_expr(), best.denom.as_expr()
-            factored = (sympy.factor(numerator) / sympy.factor(denominator)).xreplace(self._to_atom)
-            candidates.append(factored)
+            candidates += [
+                (sympy.factor(sign * numerator) / sympy.factor(sign * denominator)).xreplace(self._to_atom)
+                for sign in ((1, -1) if len(best.denom) > 1 else (1,))
+            ]
             if sum(isinstance(a, sympy.sin | sympy.cos) for a in made.atoms(sympy.Function)) > 1:
-                candidates += [_angle_sums(c) for c in (made, factored)]
+                candidates += [_angle_sums(c) for c in candidates]
         return min(candidates, key=lambda e: (sympy.count_ops(e), len(str(e))))
 
 
