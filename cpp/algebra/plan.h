@@ -25,7 +25,7 @@ enum class StepKind {
   apply_column,      // y = v x or v* x for a vector register v
   apply_external,    // y = L x or L* x for somebody else's operator
   combine,           // y = Σ c_i x_i
-  vector_symbol,     // y = a vector of the model
+  vector_symbol,     // y = a vector of the model, or a constant one
   zero,              // y = 0
   load_blocks,       // blocks of a symbol or a block-diagonal constant
   identity_blocks,

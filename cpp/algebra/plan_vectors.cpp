@@ -291,6 +291,15 @@ int Planner::column(const Expression& e) {
     case NodeKind::symbol:
       if (e.node().symbol.definition->pattern == Pattern::vector) return vector_value(e);
       break;
+    case NodeKind::constant: {
+      if (!(e.domain() == Space::euclidean(1))) break;
+      Step s{StepKind::vector_symbol};
+      s.constant = e.node().constant;
+      s.bytes = vector_bytes(e.codomain());
+      s.text = show(e);
+      r = emit(std::move(s), {RegisterKind::vector, e.codomain(), {}, nullptr, false});
+      break;
+    }
     case NodeKind::product: {
       const auto& f = e.children();
       r = apply_product(std::vector<Expression>(f.begin(), f.end() - 1), column(f.back()), e);

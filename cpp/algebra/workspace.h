@@ -114,7 +114,12 @@ class Workspace {
         }
         return;
       }
-      case StepKind::vector_symbol: values[s.context]->vector(s.symbol, vectors_[s.out].data()); return;
+      case StepKind::vector_symbol:
+        if (s.constant)
+          std::transform(s.constant->dense.begin(), s.constant->dense.end(), vectors_[s.out].begin(), [](double v) { return S(v); });
+        else
+          values[s.context]->vector(s.symbol, vectors_[s.out].data());
+        return;
       case StepKind::zero: std::fill(vectors_[s.out].begin(), vectors_[s.out].end(), S(0)); return;
       case StepKind::load_blocks:
       case StepKind::identity_blocks:
