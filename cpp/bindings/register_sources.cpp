@@ -131,7 +131,7 @@ void register_sources(py::module_& m) {
       .def_property_readonly("traits", [](const SkoSource& s) {
         const Traits t = s.traits();
         py::dict d;
-        d["serial chain"] = t.chain, d["single-DOF hinges"] = t.single_dof, d["constant H"] = t.constant_hinges, d["J = 0"] = !t.hinge_diagonal;
+        d["serial chain"] = t.chain, d["single-DOF hinges"] = t.single_dof, d["constant H"] = t.constant_hinges, d["J = 0"] = !t.hinge_diagonal, d["blocks of one size"] = t.equal_blocks;
         return d;
       })
       .def("symbol", &source_symbol, py::arg("name"), py::arg("nodes") = std::vector<std::string>(), py::arg("coordinate") = -1)

@@ -10,10 +10,11 @@ Together with its transposes, the lemmas marked as rules in `rules.py` bring wor
 
 from __future__ import annotations
 
+from collections import deque
 from functools import lru_cache
 
 from .equations import Equation, Step, Use
-from .words import Alphabet, Polynomial, Word, add_to, parse_equation, split
+from .words import Alphabet, Polynomial, Word, add_to, parse_equation
 
 # What the operators are. M = P - E_ψPE_φ* and M = R - E_φRE_φ* are the sweeps of P and R; φ⁻¹ and ψ⁻¹ exist since E_φ is strictly
 # triangular, D⁻¹ since the hinges are regular.
@@ -71,7 +72,10 @@ LEMMAS: list[tuple[str, list[tuple[str, str]]]] = [
     ("G* P⁻¹ = D⁻¹ H", [("G*", "(G = P H* D⁻¹)*"), ("P P⁻¹", "P P⁻¹ = I")]),
     ("P⁺ = P − G D G*", [("P⁺", "P⁺ = τ̄ P"), ("τ̄", "τ̄ = I − G H"), ("H P", "(G D = P H*)*")]),
     # ------------------------------------------------------------------ the recursion of P
-    ("M = P − E_φ P E_φ* + K D K*", [("M", "M = P − E_ψ P E_φ*"), ("E_ψ", "E_ψ = E_φ − K H"), ("H P", "(G D = P H*)*"), ("G* E_φ*", "(K = E_φ G)*")]),
+    (
+        "M = P − E_φ P E_φ* + K D K*",
+        [("M", "M = P − E_ψ P E_φ*"), ("E_ψ", "E_ψ = E_φ − K H"), ("H P", "(G D = P H*)*"), ("G* E_φ*", "(K = E_φ G)*")],
+    ),
     ("E_φ P φ* = E_φ P + P φ* − M φ* + K D K* φ*", [("M", "M = P − E_φ P E_φ* + K D K*"), ("E_φ* φ*", "(φ E_φ = φ − I)*")]),
     ("E_φ P ψ* = E_φ P + P ψ* − M ψ*", [("M", "(M = P − E_ψ P E_φ*)*"), ("E_ψ* ψ*", "(ψ E_ψ = ψ − I)*")]),
     (
@@ -131,7 +135,6 @@ LEMMAS: list[tuple[str, list[tuple[str, str]]]] = [
         ],
     ),
     # ------------------------------------------------------------------ the recursion of Υ
-    ("S = E_ψ* Υ E_ψ − Υ + H* D⁻¹ H", [("Υ", "Υ = E_ψ* Υ E_ψ − S + H* D⁻¹ H")][:0] + [("S", "Υ = E_ψ* Υ E_ψ − S + H* D⁻¹ H")]),
     (
         "E_φ* Υ E_φ = S + Υ − H* D⁻¹ H + E_φ* Υ K H + H* K* Υ E_φ − H* K* Υ K H",
         [("S", "Υ = E_ψ* Υ E_ψ − S + H* D⁻¹ H"), ("E_ψ", "E_ψ = E_φ − K H"), ("E_ψ*", "(E_ψ = E_φ − K H)*")],
@@ -227,16 +230,16 @@ def solved(equation: Equation, word: Word) -> tuple[Equation, Word, Polynomial, 
 def replaced_everywhere(p: Polynomial, equation: Equation, word: Word, by: Polynomial, sign: int, alphabet: Alphabet) -> Step | None:
     """The step that replaces a word at every place, until none is left; None where there is none."""
     uses: list[Use] = []
-    todo, done = list(p.items()), {}
+    todo, done = deque(p.items()), {}
     while todo:
-        at, c = todo.pop()
+        at, c = todo.popleft()
         place = find(at, word)
         if place < 0:
             add_to(done, at, c)
             continue
         left, right = at[:place], at[place + len(word) :]
         uses.append(Use(sign * c, left, equation, right, sign > 0))
-        todo += [(left + w + right, c * x) for w, x in by.items()]
+        todo.extendleft([(left + w + right, c * x) for w, x in reversed(by.items())])
         if len(uses) > 1000:
             raise AssertionError(f"{' '.join(word)} does not go away by {equation.text}")
     return Step(dict(p), done, uses, alphabet) if uses else None
@@ -267,8 +270,3 @@ def joined(left: list[Step], right: list[Step], lhs: Polynomial, rhs: Polynomial
 def theory() -> Theory:
     """The one theory, on the letters of the table."""
     return Theory()
-
-
-def models_letters(p: Polynomial) -> set[str]:
-    """Names of the letters that occur."""
-    return {split(x)[0] for word in p for x in word}

@@ -1,9 +1,10 @@
-"""Exact arithmetic for closed forms: rational functions of sines, cosines, quaternions, parameters, and sparse matrices of them.
+"""Exact arithmetic for closed forms: rational functions of angles, quaternions and parameters, and sparse matrices of them.
 
-Entries of the operators are rational in the sines and cosines of the angles. SymPy's own expressions would be simplified after every
-product to stay small; here a number is one fraction of two polynomials in generators c, s, q, v, m, ..., reduced by the relations
-s² = 1 - c² (of every angle), w² = 1 - x² - y² - z² (of unit quaternions) and r² = n (of square roots). The squared generators
-are coprime, so the relations are a Gröbner basis: a numerator that is zero on every state reduces to zero.
+Entries of the operators are rational in the sines and cosines of the angles. SymPy's own expressions would have to be simplified
+after every product to stay small; here a number is one fraction of two polynomials with whole coefficients, in lowest terms. Angles
+come in by t = tan(q/2): sin q = 2t/(1 + t²), cos q = (1 - t²)/(1 + t²) need no relation between them, so lowest terms are the
+shortest, and a fraction is zero only where its numerator is. What is shown has sines and cosines again. Relations remain for unit
+quaternions, w² = 1 - x² - y² - z², and for roots, r² = n; they are applied after every operation.
 """
 
 from __future__ import annotations
@@ -51,32 +52,62 @@ class Rationals:
         atoms: dict[sympy.Expr, None] = {}
         for expression in expressions:
             _collect(sympy.sympify(expression), atoms)
-        for atom in list(atoms):  # a sine brings its cosine
-            if isinstance(atom, sympy.sin):
-                atoms.setdefault(sympy.cos(*atom.args))
-            elif isinstance(atom, sympy.cos):
-                atoms.setdefault(sympy.sin(*atom.args))
         self.atoms = list(atoms)
-        names = [sympy.Dummy(f"g{i}") for i in range(len(self.atoms))]
-        self._of_atom = dict(zip(self.atoms, names, strict=True))
+        self._unit = [list(quaternion) for quaternion in unit]
+        self._make([sympy.Dummy(f"g{i}") for i in range(len(self.atoms))])
+
+    def _make(self, names: list[sympy.Dummy]) -> None:
+        self._names = names
         self._to_atom = dict(zip(names, self.atoms, strict=True))
         self.field = ZZ.frac_field(*(names or [sympy.Dummy("g")])).field
         self._gens = dict(zip(self.atoms, self.field.gens, strict=False))
-        ring_gens = dict(zip(self.atoms, self.field.ring.gens, strict=False))
+        ring = self.field.ring
         # index of a generator → what its square is, in the ring
         self._squares: dict[int, Any] = {}
-        self._cosines: dict[int, Any] = {}
+        self._angles: dict[int, sympy.Expr] = {}
         for i, atom in enumerate(self.atoms):
-            if isinstance(atom, sympy.sin):
-                cosine = sympy.cos(*atom.args)
-                self._squares[i] = 1 - ring_gens[cosine] ** 2
-                self._cosines[self.atoms.index(cosine)] = 1 - ring_gens[atom] ** 2
+            if isinstance(atom, sympy.tan):
+                self._angles[i] = 2 * atom.args[0]
             elif isinstance(atom, sympy.Pow):
-                self._squares[i] = self.field.ring(int(atom.base))
-        for w, *u in unit:
-            self._squares[self.atoms.index(w)] = 1 - sum(ring_gens[x] ** 2 for x in u)
+                square = self.element(atom.base)
+                self._squares[i] = square.numer
+        of_atom = dict(zip(self.atoms, ring.gens, strict=False))
+        for w, *u in self._unit:
+            self._squares[self.atoms.index(w)] = 1 - sum(of_atom[x] ** 2 for x in u)
         self.zero, self.one = self.field.zero, self.field.one
         self._shown: dict[tuple[Any, bool], sympy.Expr] = {}
+        # The same with sines and cosines: where elements are shown.
+        cosines = [sympy.Dummy("c") for _ in self._angles]
+        self._shown_ring = ring.clone(symbols=[*ring.symbols, *cosines])
+        last = self._shown_ring.gens[len(ring.gens) :]
+        self._trigonometric = {i: (self._shown_ring.gens[i], c) for i, c in zip(self._angles, last, strict=True)}
+        self._shown_atoms = dict(zip(ring.symbols, self.atoms, strict=False)) | {
+            names[i]: sympy.sin(angle) for i, angle in self._angles.items()
+        }
+        self._shown_atoms |= {c: sympy.cos(angle) for c, angle in zip(cosines, self._angles.values(), strict=True)}
+
+    def extended(self, expressions: Iterable[sympy.Expr]) -> Rationals:
+        """The field with more generators, itself where there is nothing new; `lift` brings elements there."""
+        atoms = dict.fromkeys(self.atoms)
+        for expression in expressions:
+            _collect(sympy.sympify(expression), atoms)
+        if len(atoms) == len(self.atoms):
+            return self
+        made = Rationals.__new__(Rationals)
+        made.atoms, made._unit = list(atoms), self._unit
+        made._make([*self._names, *(sympy.Dummy(f"g{i}") for i in range(len(self.atoms), len(atoms)))])
+        return made
+
+    def lift(self, f: Any) -> Any:
+        """An element of a field that this one extends."""
+        more = len(self.field.gens) - len(f.field.gens)
+        if not more and f.field == self.field:
+            return f
+        if not self._names[: len(f.field.gens)] == list(f.field.symbols):  # the field of numbers alone has a generator of its own
+            return self.field(int(f.numer.LC)) / self.field(int(f.denom.LC)) if f.numer else self.zero
+        ring, pad = self.field.ring, (0,) * more
+        numerator, denominator = (ring.from_dict({m + pad: c for m, c in p.items()}) for p in (f.numer, f.denom))
+        return self.field.raw_new(numerator, denominator)
 
     def element(self, expression: Any) -> Any:
         """The element that a SymPy expression in the field's atoms is."""
@@ -86,9 +117,9 @@ class Rationals:
         if e in self._gens:
             return self._gens[e]
         if e.is_Add:
-            return self.reduce(sum((self.element(a) for a in e.args), self.zero))
+            return self.reduce(sum((self.element(a) for a in e.args), self.field.zero))
         if e.is_Mul:
-            made = self.one
+            made = self.field.one
             for a in e.args:
                 made = self.reduce(made * self.element(a))
             return made
@@ -96,6 +127,10 @@ class Rationals:
             return self.reduce(self.element(e.base) ** int(e.exp))
         if e.is_Pow and e.exp.is_Rational and e.base.is_Rational:
             return self.element(_root(e))
+        if isinstance(e, sympy.sin | sympy.cos | sympy.tan) and sympy.tan(e.args[0] / 2) in self._gens:
+            t = self._gens[sympy.tan(e.args[0] / 2)]
+            over = 2 * t if not isinstance(e, sympy.cos) else 1 - t**2
+            return over / (1 - t**2 if isinstance(e, sympy.tan) else 1 + t**2)
         raise _core.EvaluationError(f"{e} is no rational function of {', '.join(map(str, self.atoms))}")
 
     def reduce(self, f: Any) -> Any:
@@ -111,34 +146,65 @@ class Rationals:
             return self.zero
         return self.field.new(numerator, denominator)
 
+    # ------------------------------------------------------------------ as SymPy shows it
     def expression(self, f: Any, simplify: bool = True) -> sympy.Expr:
         """The element as a SymPy expression, shortest of the forms tried where `simplify` is set."""
         key = (f, simplify)
         if key not in self._shown:
-            self._shown[key] = self._shortest(f) if simplify else f.as_expr().xreplace(self._to_atom)
+            numerator, denominator = self._in_sines(f)
+            if not simplify:
+                self._shown[key] = (numerator.as_expr() / denominator.as_expr()).xreplace(self._shown_atoms)
+            else:
+                self._shown[key] = self._shortest(numerator, denominator) if numerator else sympy.S.Zero
         return self._shown[key]
 
-    def _shortest(self, f: Any) -> sympy.Expr:
-        if not f.numer:
-            return sympy.S.Zero
-        forms = [f]
-        if self._cosines:
-            by_sines = _replace(f.numer, self._cosines), _replace(f.denom, self._cosines)
-            if by_sines[1]:
-                forms.append(self.field.new(*by_sines))
-        terms = lambda g: len(g.numer) + len(g.denom)  # noqa: E731
-        best = min(forms, key=terms)
-        made = best.as_expr().xreplace(self._to_atom)
-        candidates = [made]
-        if terms(best) <= 40 and max(c.bit_length() for part in (best.numer, best.denom) for c in part.values()) <= 60:
-            numerator, denominator = best.numer.as_expr(), best.denom.as_expr()
-            candidates += [
-                (sympy.factor(sign * numerator) / sympy.factor(sign * denominator)).xreplace(self._to_atom)
-                for sign in ((1, -1) if len(best.denom) > 1 else (1,))
-            ]
-            if sum(isinstance(a, sympy.sin | sympy.cos) for a in made.atoms(sympy.Function)) > 1:
+    def _in_sines(self, f: Any) -> tuple[Any, Any]:
+        """Numerator and denominator as polynomials in sines and cosines, of degree at most one in every sine.
+
+        Both are multiplied by cos^{2k}(q/2), 2k the degree in t = tan(q/2): t^j cos^{2k}(q/2) is a product of (1 ∓ cos q)/2, with one
+        sin q / 2 where j is odd.
+        """
+        ring = self._shown_ring
+        pad = (0,) * len(self._angles)
+        parts = [ring.from_dict({m + pad: c for m, c in p.items()}) for p in (f.numer, f.denom)]
+        for i, (s, c) in self._trigonometric.items():
+            degree = max(p.degree(s) for p in parts)
+            if degree <= 0:
+                continue
+            half = (degree + 1) // 2
+            power = [(1 - c) ** (j // 2) * (1 + c) ** (half - (j + 1) // 2) * (s if j % 2 else 1) for j in range(degree + 1)]
+            turned = []
+            for p in parts:
+                by_degree: dict[int, dict[Any, Any]] = {}
+                for m, x in p.items():
+                    by_degree.setdefault(m[i], {})[m[:i] + (0,) + m[i + 1 :]] = x
+                turned.append(sum((ring.from_dict(rest) * power[j] for j, rest in by_degree.items()), ring.zero))
+            parts = turned
+        numerator, denominator = parts[0].cancel(parts[1])
+        return numerator, denominator
+
+    def _shortest(self, numerator: Any, denominator: Any) -> sympy.Expr:
+        ring, forms = self._shown_ring, [(numerator, denominator)]
+        index = {g: i for i, g in enumerate(ring.gens)}
+        squares = {index[c]: 1 - s**2 for s, c in self._trigonometric.values()}
+        by_sines = _replace(numerator, squares), _replace(denominator, squares)
+        if by_sines != forms[0] and by_sines[1]:
+            forms += [by_sines[0].cancel(by_sines[1]), (numerator, by_sines[1]), (by_sines[0], denominator)]
+        best = min(forms, key=lambda g: (len(g[0]) + len(g[1]), _degrees(g[0]) + _degrees(g[1])))
+        up, down = (p.as_expr() for p in best)
+        candidates = [up / down, (-up) / (-down)] if len(best[1]) > 1 else [up / down]
+        if len(best[0]) + len(best[1]) <= 40 and max(c.bit_length() for p in best for c in p.values()) <= 60:
+            candidates += [sympy.factor(sign * up) / sympy.factor(sign * down) for sign in ((1, -1) if len(best[1]) > 1 else (1,))]
+            candidates = [c.xreplace(self._shown_atoms) for c in candidates]
+            if sum(isinstance(a, sympy.sin | sympy.cos) for a in candidates[0].atoms(sympy.Function)) > 1:
                 candidates += [_angle_sums(c) for c in candidates]
+        else:
+            candidates = [c.xreplace(self._shown_atoms) for c in candidates]
         return min(candidates, key=lambda e: (sympy.count_ops(e), len(str(e))))
+
+
+def _degrees(p: Any) -> int:
+    return sum(sum(m) for m in p)
 
 
 def _angle_sums(e: sympy.Expr) -> sympy.Expr:
@@ -161,6 +227,8 @@ def _collect(e: sympy.Expr, atoms: dict[sympy.Expr, None]) -> None:
         for a in _root(e).atoms(sympy.Pow):
             if a.exp == sympy.Rational(1, 2):
                 atoms.setdefault(a)
+    elif isinstance(e, sympy.sin | sympy.cos | sympy.tan):
+        atoms.setdefault(sympy.tan(e.args[0] / 2))
     else:
         atoms.setdefault(e)
 

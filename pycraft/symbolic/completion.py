@@ -1,0 +1,79 @@
+"""Completion: where two rules overlap on a word, it can be rewritten in two ways; if these differ, their equality is a new rule.
+
+Only overlaps with what a statement adds are looked at: the rules of `rules.py` have none left that say anything new. Bounded, in rules and
+rewrites; each new rule is a lemma with its own proof.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from .attempt import Attempt
+from .equations import Equation, Step, Use
+from .rules import Budget, GaveUp, Rule, overlaps, rule_from, weight
+from .words import Polynomial, Word, add_to, combine
+
+RULES, LENGTH, REWRITES = 24, 14, 1500
+"""How many rules are added, how long their words may be, how many rewrites are spent."""
+
+
+def complete(attempt: Attempt) -> int:
+    """Adds rules by overlaps of the attempt's own ones; returns how many."""
+    local = {id(e) for e in attempt.local} | {id(e.transposed(attempt.alphabet)) for e in attempt.local}
+    queue = [rule for rule in attempt.rules.all() if id(rule.equation) in local]
+    budget, added = Budget(REWRITES), 0
+    while queue and added < RULES:
+        rule = queue.pop(0)
+        for lemma, word in _pairs(attempt, rule, budget):
+            if added == RULES or budget.rewrites <= 0:
+                return added
+            attempt.add(lemma, word, both=False)
+            added += 1
+            queue += [r for r in attempt.rules.all() if r.equation is lemma]
+    return added
+
+
+def _pairs(attempt: Attempt, rule: Rule, budget: Budget):
+    for other in attempt.rules.all():
+        for first, second in ((rule, other), (other, rule)):
+            for k in overlaps(first.word, second.word):
+                try:
+                    found = _critical(attempt, first, second, k, budget)
+                except GaveUp:
+                    continue
+                if found is not None:
+                    yield found
+
+
+def _critical(attempt: Attempt, first: Rule, second: Rule, k: int, budget: Budget) -> tuple[Equation, Word] | None:
+    """The lemma that the overlap of two rules gives, with the word that it replaces; None if it gives nothing new or too long a word."""
+    a = attempt.alphabet
+    whole = first.word + second.word[k:]
+    sides = []
+    for rule, left, right in ((first, (), second.word[k:]), (second, first.word[:-k], ())):
+        p: Polynomial = {}
+        for w, c in rule.to:
+            add_to(p, left + w + right, c)
+        step = Step({whole: Fraction(1)}, p, [Use(rule.factor, left, rule.equation, right, rule.factor > 0)], a)
+        form, steps = attempt.rules.reduce(p, a, budget)
+        sides.append((form, [step, *steps]))
+    (p, way), (q, other_way) = sides
+    difference = combine((1, p), (-1, q))
+    if not difference:
+        return None
+    lead = max(difference, key=weight)
+    if len(lead) > LENGTH or not lead:
+        return None
+    chain = [s.reversed() for s in reversed(way)] + other_way
+    for number, step in enumerate(chain, 1):
+        step.number = number
+    equal = Equation(p, q, "lemma", f"{a.text(p)} = {a.text(q)}", steps=chain, note=f"two ways to write {a.word_text(whole)}")
+    c = difference[lead]
+    rest = {w: -x / c for w, x in difference.items() if w != lead}
+    step = Step({lead: Fraction(1)}, rest, [Use(1 / c, (), equal, ())], a, number=1)
+    lemma = Equation({lead: Fraction(1)}, rest, "lemma", f"{a.word_text(lead)} = {a.text(rest)}", steps=[step])
+    return lemma, lead
+
+
+def _rule_of(lemma: Equation, word: Word, group: int) -> Rule:
+    return rule_from(lemma, word, group)
