@@ -48,6 +48,7 @@ PYBIND11_MODULE(_core, m) {
   pycraft::register_calculus(m);
   pycraft::register_plans(m);
   pycraft::register_dynamics(m);
+  pycraft::register_sensitivities(m);
   pycraft::register_theorems(m);
   pycraft::register_bench(m);
 }

@@ -13,8 +13,8 @@ from __future__ import annotations
 from collections import deque
 from functools import lru_cache
 
-from .equations import Equation, Step, Use
-from .words import Alphabet, Polynomial, Word, add_to, parse_equation
+from .equations import SYMMETRY, Equation, Step, Use, joined
+from .words import Alphabet, Polynomial, Word, add_to, parse, parse_equation
 
 # What the operators are. M = P - E_ψPE_φ* and M = R - E_φRE_φ* are the sweeps of P and R; φ⁻¹ and ψ⁻¹ exist since E_φ is strictly
 # triangular, D⁻¹ since the hinges are regular.
@@ -33,8 +33,9 @@ AXIOMS = [
     "Υ = E_ψ* Υ E_ψ − S + H* D⁻¹ H",
 ]
 SYMMETRIC = ("M", "P", "R", "D", "J")
+"""M* = M, ... are axioms too."""
 
-# Abbreviations. S = E_ψ*ΥE_ψ - blockdiag(E_ψ*ΥE_ψ), the blocks between siblings, is what is left of the recursion's blockdiag.
+# Abbreviations. In the recursion of Υ, S = E_ψ*ΥE_ψ - blockdiag(E_ψ*ΥE_ψ): the blocks between siblings.
 DEFINITIONS = [
     "φ̃ = φ − I",
     "ψ̃ = ψ − I",
@@ -47,7 +48,9 @@ DEFINITIONS = [
 # Under these alone.
 HYPOTHESES = {"J = 0": "J = 0", "S = 0": "serial chain"}
 
-INVERSES = ["φ φ⁻¹ = I", "φ⁻¹ φ = I", "ψ ψ⁻¹ = I", "ψ⁻¹ ψ = I", "D D⁻¹ = I", "D⁻¹ D = I", "P P⁻¹ = I"]
+# What an inverse is. Where M⁻¹, P⁻¹, R⁻¹, J⁻¹, Υ⁻¹ stand in a statement, it presupposes that they exist.
+INVERTIBLE = ("φ", "ψ", "D", "M", "P", "R", "J", "Υ")
+INVERSES = [f"{x} {x}⁻¹ = I" for x in INVERTIBLE] + [f"{x}⁻¹ {x} = I" for x in INVERTIBLE]
 
 LEMMAS: list[tuple[str, list[tuple[str, str]]]] = [
     # ------------------------------------------------------------------ resolvents
@@ -172,14 +175,25 @@ class Theory:
                 self._declare(kind, text)
         for text, name in HYPOTHESES.items():
             self._declare("hypothesis", text, hypothesis=name)
+        self._declare_symmetries()
         self._lemmas = dict(LEMMAS)
         for text in self._lemmas:
             self._order[text] = len(self._order)
 
     def _declare(self, kind: str, text: str, hypothesis: str | None = None) -> None:
         lhs, rhs = parse_equation(text)
-        self._equations[text] = Equation(lhs, rhs, kind, text, hypothesis=hypothesis)
+        self._equations[text] = Equation(kind, text, lhs, rhs, hypothesis=hypothesis)
         self._order[text] = len(self._order)
+
+    def _declare_symmetries(self) -> None:
+        for name in SYMMETRIC:
+            SYMMETRY[name] = Equation("axiom", f"{name}* = {name}", parse(name), parse(name))
+        recursion = self._equations["Υ = E_ψ* Υ E_ψ − S + H* D⁻¹ H"]
+        SYMMETRY["Υ"] = Equation(
+            "structure", "Υ* = Υ", parse("Υ"), parse("Υ"), uses=[recursion, SYMMETRY["D"]],
+            note="Υ and Υ* obey Υ = blockdiag(E_ψ*ΥE_ψ) + H*D⁻¹H, which has one solution: E_ψ is strictly triangular",
+            check=lambda: self.alphabet.star_of(recursion.rhs) == recursion.rhs,
+        )  # fmt: skip
 
     def __call__(self, text: str) -> Equation:
         """The equation of this text; "(...)*" is the transpose. Raises KeyError if there is none."""
@@ -201,7 +215,7 @@ class Theory:
         steps = joined(left, right, lhs, rhs, self.alphabet)
         if steps is None:
             raise AssertionError(f"the proof of {text} does not close")
-        return Equation(lhs, rhs, "lemma", text, steps=steps)
+        return Equation("lemma", text, lhs, rhs, steps=steps)
 
     def _reduced(self, side: Polynomial, lemma: str) -> list[Step]:
         steps: list[Step] = []
@@ -238,7 +252,7 @@ def replaced_everywhere(p: Polynomial, equation: Equation, word: Word, by: Polyn
             add_to(done, at, c)
             continue
         left, right = at[:place], at[place + len(word) :]
-        uses.append(Use(sign * c, left, equation, right, sign > 0))
+        uses.append(Use(sign * c, left, equation, right, word, sign > 0))
         todo.extendleft([(left + w + right, c * x) for w, x in reversed(by.items())])
         if len(uses) > 1000:
             raise AssertionError(f"{' '.join(word)} does not go away by {equation.text}")
@@ -249,21 +263,6 @@ def find(word: Word, part: Word) -> int:
     """Where the part begins in the word, -1 if nowhere."""
     n = len(part)
     return next((i for i in range(len(word) - n + 1) if word[i : i + n] == part), -1)
-
-
-def joined(left: list[Step], right: list[Step], lhs: Polynomial, rhs: Polynomial, alphabet: Alphabet) -> list[Step] | None:
-    """One chain from lhs to rhs of two that meet; None if they do not."""
-    a, b = left[-1].after if left else lhs, right[-1].after if right else rhs
-    if a != b:
-        return None
-    backwards = [step.reversed() for step in reversed(right)]
-    if backwards:
-        backwards[0].before = a  # the same terms in the same order
-    chain = [*left, *backwards] or [Step(lhs, rhs, [], alphabet)]
-    chain[-1].after = rhs
-    for number, step in enumerate(chain, 1):
-        step.number = number
-    return chain
 
 
 @lru_cache(maxsize=1)

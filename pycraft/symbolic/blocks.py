@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from .words import Alphabet, Letter, Polynomial, Word, add_to, split
+from .words import Alphabet, Letter, Polynomial, Word, add_to, plain, split
 
 _STEPS = {"E_φ", "E_ψ", "K"}
 
@@ -24,7 +24,7 @@ def _moves(letter: str, alphabet: Alphabet) -> str:
         return shape if mark in ("", "*") or shape == "diagonal" else "full"
     if mark not in ("", "*"):
         return "full"
-    if shape == "down" and known is not None and known.name.rstrip("₂₃₄₅₆₇₈₉") in _STEPS:
+    if shape == "down" and known is not None and plain(name) in _STEPS:
         shape = "step"
     return shape + mark
 
@@ -81,7 +81,7 @@ def _own_letter(word: Word, alphabet: Alphabet) -> str:
         symmetric = word == starred
         text = f"blockdiag({alphabet.word_text(canonical)})"
         latex = f"\\operatorname{{blockdiag}}({' '.join(map(alphabet.letter_latex, canonical))})"
-        alphabet.add(Letter(name, text, latex, symmetric, "diagonal"))
+        alphabet.add(Letter(name, text, latex, symmetric, "diagonal", word=canonical))
     return name if word == canonical else alphabet.star(name)
 
 

@@ -6,12 +6,12 @@ rewrites; each new rule is a lemma with its own proof.
 
 from __future__ import annotations
 
-from fractions import Fraction
+from collections.abc import Iterator
 
 from .attempt import Attempt
-from .equations import Equation, Step, Use
-from .rules import Budget, GaveUp, Rule, overlaps, rule_from, weight
-from .words import Polynomial, Word, add_to, combine
+from .equations import Equation, Step, Use, numbered
+from .rules import Budget, GaveUp, Rule, overlaps, weight
+from .words import ONE, Polynomial, Word, add_to, combine
 
 RULES, LENGTH, REWRITES = 24, 14, 1500
 """How many rules are added, how long their words may be, how many rewrites are spent."""
@@ -19,21 +19,21 @@ RULES, LENGTH, REWRITES = 24, 14, 1500
 
 def complete(attempt: Attempt) -> int:
     """Adds rules by overlaps of the attempt's own ones; returns how many."""
-    local = {id(e) for e in attempt.local} | {id(e.transposed(attempt.alphabet)) for e in attempt.local}
-    queue = [rule for rule in attempt.rules.all() if id(rule.equation) in local]
+    own = {id(e) for e in attempt.local} | {id(e.transposed(attempt.alphabet)) for e in attempt.local}
+    queue = [rule for rule in attempt.rules.all() if id(rule.equation) in own]
     budget, added = Budget(REWRITES), 0
-    while queue and added < RULES:
-        rule = queue.pop(0)
-        for lemma, word in _pairs(attempt, rule, budget):
+    while queue:
+        for lemma, word in _new(attempt, queue.pop(0), budget):
             if added == RULES or budget.rewrites <= 0:
                 return added
-            attempt.add(lemma, word, both=False)
+            attempt.add(lemma, word, blocks=False)
             added += 1
             queue += [r for r in attempt.rules.all() if r.equation is lemma]
     return added
 
 
-def _pairs(attempt: Attempt, rule: Rule, budget: Budget):
+def _new(attempt: Attempt, rule: Rule, budget: Budget) -> Iterator[tuple[Equation, Word]]:
+    """What the overlaps of a rule with all others give."""
     for other in attempt.rules.all():
         for first, second in ((rule, other), (other, rule)):
             for k in overlaps(first.word, second.word):
@@ -46,7 +46,7 @@ def _pairs(attempt: Attempt, rule: Rule, budget: Budget):
 
 
 def _critical(attempt: Attempt, first: Rule, second: Rule, k: int, budget: Budget) -> tuple[Equation, Word] | None:
-    """The lemma that the overlap of two rules gives, with the word that it replaces; None if it gives nothing new or too long a word."""
+    """The lemma of one overlap, with the word that it replaces; None if it says nothing new, or of too long a word."""
     a = attempt.alphabet
     whole = first.word + second.word[k:]
     sides = []
@@ -54,26 +54,18 @@ def _critical(attempt: Attempt, first: Rule, second: Rule, k: int, budget: Budge
         p: Polynomial = {}
         for w, c in rule.to:
             add_to(p, left + w + right, c)
-        step = Step({whole: Fraction(1)}, p, [Use(rule.factor, left, rule.equation, right, rule.factor > 0)], a)
+        step = Step({whole: ONE}, p, [Use(rule.factor, left, rule.equation, right, rule.word, rule.factor > 0)], a)
         form, steps = attempt.rules.reduce(p, a, budget)
         sides.append((form, [step, *steps]))
     (p, way), (q, other_way) = sides
     difference = combine((1, p), (-1, q))
-    if not difference:
+    lead = max(difference, key=weight, default=())
+    if not lead or len(lead) > LENGTH:
         return None
-    lead = max(difference, key=weight)
-    if len(lead) > LENGTH or not lead:
-        return None
-    chain = [s.reversed() for s in reversed(way)] + other_way
-    for number, step in enumerate(chain, 1):
-        step.number = number
-    equal = Equation(p, q, "lemma", f"{a.text(p)} = {a.text(q)}", steps=chain, note=f"two ways to write {a.word_text(whole)}")
+    chain = numbered([s.reversed() for s in reversed(way)] + other_way)
+    note = f"two ways to write {a.word_text(whole)}"
+    equal = Equation("lemma", f"{a.text(p)} = {a.text(q)}", p, q, steps=chain, note=note)
     c = difference[lead]
     rest = {w: -x / c for w, x in difference.items() if w != lead}
-    step = Step({lead: Fraction(1)}, rest, [Use(1 / c, (), equal, ())], a, number=1)
-    lemma = Equation({lead: Fraction(1)}, rest, "lemma", f"{a.word_text(lead)} = {a.text(rest)}", steps=[step])
-    return lemma, lead
-
-
-def _rule_of(lemma: Equation, word: Word, group: int) -> Rule:
-    return rule_from(lemma, word, group)
+    solve = Step({lead: ONE}, rest, [Use(1 / c, (), equal, (), lead)], a)
+    return Equation("lemma", f"{a.word_text(lead)} = {a.text(rest)}", {lead: ONE}, rest, steps=numbered([solve])), lead

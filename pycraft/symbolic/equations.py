@@ -14,9 +14,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any
 
-from .words import Alphabet, Polynomial, Word, combine, framed, inverse_of, split
+from .words import ONE, Alphabet, Polynomial, Word, combine, framed, inverse_of, of_model
+
+Frame = tuple[Word, Word]
+NO_FRAME: Frame = ((), ())
 
 
 @dataclass(eq=False)
@@ -25,24 +27,25 @@ class Equation:
 
     Attributes
     ----------
-    kind : "axiom", "definition" (of an abbreviation or of a part of the statement), "hypothesis", "inverse" (X X⁻¹ = I), "lemma",
-        "transpose", "derivative", "copy" (the same for another model), "structure" (of diagonal blocks)
+    kind : "axiom"; "definition" of an abbreviation or of a part of the statement; "hypothesis"; "inverse", X X⁻¹ = I; "lemma"; "transpose",
+        "derivative" and "copy" (the same for another model) of `source`; "structure", on diagonal blocks and the like, shown by `check`
+    text : how it is cited
     hypothesis : its name, where it is one
-    source : what it is the transpose, derivative or copy of
-    steps : of a lemma, from lhs to rhs
+    steps : of a lemma, from lhs to rhs; of a structure, what it needs
+    uses : what it rests on besides
+    note : a remark for the reader
     """
 
-    lhs: Polynomial
-    rhs: Polynomial
     kind: str
     text: str
+    lhs: Polynomial
+    rhs: Polynomial
     hypothesis: str | None = None
     source: Equation | None = None
     steps: list[Step] = field(default_factory=list)
     uses: list[Equation] = field(default_factory=list)
     note: str = ""
     check: Callable[[], bool] | None = None
-    alphabet: Alphabet | None = None
     _star: Equation | None = None
     _copies: dict[str, Equation] = field(default_factory=dict)
 
@@ -56,19 +59,19 @@ class Equation:
             return self.source
         if self._star is None:
             lhs, rhs = alphabet.star_of(self.lhs), alphabet.star_of(self.rhs)
-            self._star = Equation(lhs, rhs, "transpose", f"({self.text})*", source=self, alphabet=alphabet)
-            self._star.uses = symmetries(alphabet, [*self.lhs, *self.rhs])
+            self._star = Equation("transpose", f"({self.text})*", lhs, rhs, source=self, uses=symmetries(alphabet, [*self.lhs, *self.rhs]))
+            self._star.check = lambda: lhs == alphabet.star_of(self.lhs) and rhs == alphabet.star_of(self.rhs)
         return self._star
 
-    def copied(self, suffix: str) -> Equation:
-        """The same equation with the letters of another model, marked by a suffix."""
-        if not suffix:
+    def copied(self, mark: str) -> Equation:
+        """The same equation with the letters of another model."""
+        if not mark:
             return self
-        if suffix not in self._copies:
-            self._copies[suffix] = Equation(
-                marked(self.lhs, suffix), marked(self.rhs, suffix), "copy", self.text, hypothesis=self.hypothesis, source=self
-            )
-        return self._copies[suffix]
+        if mark not in self._copies:
+            lhs, rhs = _marked(self.lhs, mark), _marked(self.rhs, mark)
+            self._copies[mark] = Equation("copy", self.text, lhs, rhs, hypothesis=self.hypothesis, source=self)
+            self._copies[mark].check = lambda: lhs == _marked(self.lhs, mark) and rhs == _marked(self.rhs, mark)
+        return self._copies[mark]
 
     @property
     def root(self) -> Equation:
@@ -84,66 +87,50 @@ class Equation:
             yield from step.premises()
 
     def holds(self) -> bool:
-        """Whether what it is said to rest on gives it. Premises are not looked into: `proof.recheck` goes through all of them."""
-        if self.kind in ("transpose", "copy"):
-            return self.source is not None and self._is_image()
-        if self.kind in ("derivative", "structure"):
-            return self.check is not None and self.check()
+        """Whether its premises give it. They are not looked into: `Proof.recheck` goes through all of them."""
         if self.kind == "lemma":
             return chain_holds(self.steps, self.lhs, self.rhs)
         if self.kind == "inverse":
             (word,) = self.lhs
             return len(word) == 2 and word[1] == inverse_of(word[0]) and self.lhs[word] == 1 and self.rhs == {(): 1}
-        return self.kind in ("axiom", "definition", "hypothesis") and (self.kind != "hypothesis" or self.hypothesis is not None)
-
-    def _is_image(self) -> bool:
-        assert self.source is not None
-        if self.kind == "copy":
-            suffix = next(s for s, e in self.source._copies.items() if e is self)
-            return self.lhs == marked(self.source.lhs, suffix) and self.rhs == marked(self.source.rhs, suffix)
-        assert self.alphabet is not None
-        return self.lhs == self.alphabet.star_of(self.source.lhs) and self.rhs == self.alphabet.star_of(self.source.rhs)
+        if self.kind in ("axiom", "definition", "hypothesis"):
+            return self.kind != "hypothesis" or self.hypothesis is not None
+        return self.check is not None and self.check()
 
     def __repr__(self) -> str:
         return f"<{self.kind}: {self.text}>"
 
 
-_SYMMETRY: dict[str, Equation] = {}
+SYMMETRY: dict[str, Equation] = {}
+"""X* = X, by letter: what a transposition of symmetric letters uses. Both sides are the same word, as X* is written X."""
 
 
 def symmetries(alphabet: Alphabet, words: Iterable[Word]) -> list[Equation]:
-    """The axioms X* = X of the symmetric letters that occur: what a transposition uses."""
-    found = []
-    for name in sorted(alphabet.symmetric_letters(words)):
-        if alphabet.letters[name].expression is None and name in ("M", "P", "R", "D", "J", "Υ"):
-            if name not in _SYMMETRY:
-                _SYMMETRY[name] = Equation({(name,): Fraction(1)}, {(name,): Fraction(1)}, "axiom", f"{name}* = {name}")
-            found.append(_SYMMETRY[name])
-    return found
+    """The symmetries of letters that a transposition of these words uses."""
+    return [SYMMETRY[name] for name in alphabet.symmetric_letters(words) if name in SYMMETRY]
 
 
-def marked(p: Polynomial, suffix: str) -> Polynomial:
-    """The same polynomial in the letters of another model."""
-    return {tuple(_with_suffix(x, suffix) for x in word): c for word, c in p.items()}
-
-
-def _with_suffix(letter: str, suffix: str) -> str:
-    name, mark = split(letter)
-    return name + suffix + mark
+def _marked(p: Polynomial, mark: str) -> Polynomial:
+    return {tuple(of_model(x, mark) for x in word): c for word, c in p.items()}
 
 
 @dataclass
 class Use:
-    """c · u (lhs - rhs) v of one equation; `forward` if it is read from left to right."""
+    """c · left (lhs - rhs) right of one equation: at this place `word` was replaced, lhs by rhs if `forward`."""
 
     coefficient: Fraction
     left: Word
     equation: Equation
     right: Word
+    word: Word = ()
     forward: bool = True
 
     def value(self) -> Polynomial:
         return {w: self.coefficient * c for w, c in framed(self.left, self.equation.difference, self.right).items()}
+
+    def between(self, left: Word, right: Word, c: Fraction = ONE) -> Use:
+        """The same, times c, between two words."""
+        return Use(c * self.coefficient, left + self.left, self.equation, self.right + right, self.word, self.forward)
 
 
 @dataclass
@@ -153,10 +140,10 @@ class Step:
     Attributes
     ----------
     number : its place in the proof, from 1
-    before, after : polynomials
-    uses : the instances; none where only terms are collected
-    frame : words that stand to the left and right of the whole throughout, shown as factors
-    expression : the pycraft expression that this step writes out as words, where it is such a step
+    before, after : polynomials; `before_text()`, `after_latex()`, ... show them
+    uses : the instances, written with the frames multiplied out; none where only terms are collected
+    title : said of the step instead of the equations used
+    frames : words to the left and right of the whole, before and after: shown as factors
     residual : |before - after| relative to the largest term, at a random state of a model; None where it was not evaluated
     """
 
@@ -165,31 +152,23 @@ class Step:
     uses: list[Use]
     alphabet: Alphabet
     title: str = ""
-    frame: tuple[Word, Word] = ((), ())
-    frame_before: tuple[Word, Word] | None = None
-    expression: Any = None
-    extra: list[Equation] = field(default_factory=list)
-    check: Callable[[], bool] | None = None
+    frames: tuple[Frame, Frame] = (NO_FRAME, NO_FRAME)
     number: int = 0
     residual: float | None = None
 
     def full(self) -> tuple[Polynomial, Polynomial]:
-        """Both sides with the frame multiplied out."""
-        first = self.frame if self.frame_before is None else self.frame_before
-        return framed(first[0], self.before, first[1]), framed(self.frame[0], self.after, self.frame[1])
+        """Both sides with the frames multiplied out."""
+        (a, b), (c, d) = self.frames
+        return framed(a, self.before, b), framed(c, self.after, d)
 
     def holds(self) -> bool:
-        """Whether the instances of equations named add up to before - after, exactly."""
-        if self.check is not None:
-            return self.check()
+        """Whether the instances of equations add up to before - after, exactly."""
         before, after = self.full()
-        claimed = combine((1, before), (-1, after), *((-1, use.value()) for use in self.uses))
-        return not claimed
+        return not combine((1, before), (-1, after), *((-1, use.value()) for use in self.uses))
 
     def premises(self) -> Iterator[Equation]:
         for use in self.uses:
             yield use.equation
-        yield from self.extra
 
     @property
     def equations(self) -> list[Equation]:
@@ -197,63 +176,65 @@ class Step:
         return list(dict.fromkeys(e.root for e in self.premises()))
 
     @property
-    def reason(self) -> str:
-        """The axiom or lemma used, as text, and at how many places."""
-        if self.title:
-            return self.title
-        if not self.uses:
-            return "collect terms"
-        texts = "; ".join(dict.fromkeys(use.equation.root.text for use in self.uses))
-        starred = all(use.equation.kind == "transpose" for use in self.uses)
-        note = " (transposed)" if starred else ""
-        places = f", at {len(self.uses)} places" if len(self.uses) > 1 else ""
-        return texts + note + places
-
-    @property
     def kind(self) -> str:
-        """What the step uses: "axiom", "lemma", "hypothesis", "definition", "inverse", "arithmetic", ..."""
-        kinds = list(dict.fromkeys(e.kind for e in self.equations))
-        return ", ".join(kinds) if kinds else "arithmetic"
+        """What the step uses: "axiom", "lemma", "hypothesis", "definition", "inverse", ... or "arithmetic"."""
+        return ", ".join(dict.fromkeys(e.kind for e in self.equations)) or "arithmetic"
 
     @property
-    def positions(self) -> list[tuple[str, int]]:
-        """Where: the word that is rewritten, and the number of letters that stand before the place in it."""
-        return [(self.alphabet.word_text(use.left + ("…",) + use.right), len(use.left)) for use in self.uses]
+    def reason(self) -> str:
+        """The axioms or lemmas used, as text, and at how many places."""
+        if self.title or not self.uses:
+            return self.title or "collect terms"
+        transposed = all(use.equation.kind == "transpose" for use in self.uses)
+        places = f", at {len(self.uses)} places" if len(self.uses) > 1 else ""
+        return "; ".join(e.text for e in self.equations) + (" (transposed)" if transposed else "") + places
+
+    @property
+    def positions(self) -> list[tuple[str, int, str]]:
+        """Where: (the word, how many of its letters stand before the place, what is replaced there)."""
+        text = self.alphabet.word_text
+        return [(text(u.left + u.word + u.right), len(u.left), text(u.word)) for u in self.uses]
 
     def reversed(self) -> Step:
         """after = before."""
-        uses = [Use(-u.coefficient, u.left, u.equation, u.right, not u.forward) for u in self.uses]
-        first = self.frame if self.frame_before is None else self.frame_before
-        return Step(
-            self.after, self.before, uses, self.alphabet, self.title, first, self.frame, self.expression, self.extra, self.check
-        )
+        uses = [Use(-u.coefficient, u.left, u.equation, u.right, u.word, not u.forward) for u in self.uses]
+        return Step(self.after, self.before, uses, self.alphabet, self.title, (self.frames[1], self.frames[0]))
+
+    def between(self, left: Word, right: Word, c: Fraction = ONE) -> Step:
+        """The same step, times c, between two words."""
+        before, after = ({w: c * x for w, x in framed(left, p, right).items()} for p in self.full())
+        return Step(before, after, [u.between(left, right, c) for u in self.uses], self.alphabet, self.title)
 
     # ------------------------------------------------------------------ how it is shown
     def before_text(self) -> str:
-        frame = self.frame if self.frame_before is None else self.frame_before
-        return shown(self.alphabet.text(self.before), frame, self.alphabet.word_text)
+        return _shown(self.alphabet.text(self.before), self.frames[0], self.alphabet.word_text)
 
     def after_text(self) -> str:
-        return shown(self.alphabet.text(self.after), self.frame, self.alphabet.word_text)
+        return _shown(self.alphabet.text(self.after), self.frames[1], self.alphabet.word_text)
 
     def before_latex(self) -> str:
-        frame = self.frame if self.frame_before is None else self.frame_before
-        return shown(self.alphabet.latex(self.before), frame, self._word_latex)
+        return _shown(self.alphabet.latex(self.before), self.frames[0], self.alphabet.word_latex)
 
     def after_latex(self) -> str:
-        return shown(self.alphabet.latex(self.after), self.frame, self._word_latex)
-
-    def _word_latex(self, word: Word) -> str:
-        return " ".join(map(self.alphabet.letter_latex, word))
+        return _shown(self.alphabet.latex(self.after), self.frames[1], self.alphabet.word_latex)
 
     def __repr__(self) -> str:
         return f"{self.before_text()} = {self.after_text()}   [{self.reason}]"
 
 
-def shown(inner: str, frame: tuple[Word, Word], word: Callable[[Word], str]) -> str:
+def _shown(inner: str, frame: Frame, word: Callable[[Word], str]) -> str:
     """A polynomial between the factors of a frame."""
+    if frame == NO_FRAME:
+        return inner
     left, right = (word(w) if w else "" for w in frame)
-    return " ".join(x for x in (left, f"({inner})" if left or right else inner, right) if x)
+    return " ".join(x for x in (left, f"({inner})", right) if x)
+
+
+def numbered(steps: list[Step]) -> list[Step]:
+    """The steps with their numbers, from 1."""
+    for number, step in enumerate(steps, 1):
+        step.number = number
+    return steps
 
 
 def chain_holds(steps: Sequence[Step], lhs: Polynomial, rhs: Polynomial) -> bool:
@@ -267,9 +248,26 @@ def chain_holds(steps: Sequence[Step], lhs: Polynomial, rhs: Polynomial) -> bool
     return at == rhs
 
 
+def joined(left: Sequence[Step], right: Sequence[Step], lhs: Polynomial, rhs: Polynomial, alphabet: Alphabet) -> list[Step] | None:
+    """One chain from lhs to rhs of two that lead from them to the same; None if they do not."""
+    a, b = left[-1].after if left else lhs, right[-1].after if right else rhs
+    if a != b:
+        return None
+    backwards = [step.reversed() for step in reversed(right)]
+    if backwards:
+        backwards[0].before = a  # the same terms in the same order
+    return numbered([*left, *backwards] or [Step(lhs, rhs, [], alphabet)])
+
+
 # ---------------------------------------------------------------------- what a proof rests on
 def foundations(equations: Iterable[Equation]) -> list[Equation]:
-    """Everything that these rest on, themselves included, premises first. Raises RecursionError where a lemma rests on itself."""
+    """Everything that these rest on, themselves included, premises first.
+
+    Raises
+    ------
+    RecursionError
+        A lemma rests on itself.
+    """
     order: list[Equation] = []
     done: set[int] = set()
     open_: set[int] = set()

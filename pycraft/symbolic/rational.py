@@ -60,21 +60,24 @@ class Rationals:
         self._names = names
         self._to_atom = dict(zip(names, self.atoms, strict=True))
         self.field = ZZ.frac_field(*(names or [sympy.Dummy("g")])).field
+        self.zero, self.one = self.field.zero, self.field.one
         self._gens = dict(zip(self.atoms, self.field.gens, strict=False))
         ring = self.field.ring
         # index of a generator → what its square is, in the ring
         self._squares: dict[int, Any] = {}
+        below: dict[int, Any] = {}
         self._angles: dict[int, sympy.Expr] = {}
         for i, atom in enumerate(self.atoms):
             if isinstance(atom, sympy.tan):
                 self._angles[i] = 2 * atom.args[0]
-            elif isinstance(atom, sympy.Pow):
-                square = self.element(atom.base)
-                self._squares[i] = square.numer
+            elif isinstance(atom, sympy.Pow):  # a root √(n/d) is r/d with r² = nd
+                inside = self.element(atom.base)
+                self._squares[i] = inside.numer * inside.denom
+                self._gens[atom] = self.field.gens[i] / self.field.raw_new(inside.denom, ring.one)
+                below[i] = inside.denom
         of_atom = dict(zip(self.atoms, ring.gens, strict=False))
         for w, *u in self._unit:
             self._squares[self.atoms.index(w)] = 1 - sum(of_atom[x] ** 2 for x in u)
-        self.zero, self.one = self.field.zero, self.field.one
         self._shown: dict[tuple[Any, bool], sympy.Expr] = {}
         # The same with sines and cosines: where elements are shown.
         cosines = [sympy.Dummy("c") for _ in self._angles]
@@ -85,6 +88,9 @@ class Rationals:
             names[i]: sympy.sin(angle) for i, angle in self._angles.items()
         }
         self._shown_atoms |= {c: sympy.cos(angle) for c, angle in zip(cosines, self._angles.values(), strict=True)}
+        for i, denominator in below.items():
+            if denominator != 1:
+                self._shown_atoms[names[i]] = self.expression(self.field.raw_new(denominator, ring.one), False) * self.atoms[i]
 
     def extended(self, expressions: Iterable[sympy.Expr]) -> Rationals:
         """The field with more generators, itself where there is nothing new; `lift` brings elements there."""
@@ -127,6 +133,8 @@ class Rationals:
             return self.reduce(self.element(e.base) ** int(e.exp))
         if e.is_Pow and e.exp.is_Rational and e.base.is_Rational:
             return self.element(_root(e))
+        if e.is_Pow and e.exp.is_Rational and e.exp.q == 2 and sympy.sqrt(e.base) in self._gens:
+            return self.reduce(self._gens[sympy.sqrt(e.base)] ** e.exp.p)
         if isinstance(e, sympy.sin | sympy.cos | sympy.tan) and sympy.tan(e.args[0] / 2) in self._gens:
             t = self._gens[sympy.tan(e.args[0] / 2)]
             over = 2 * t if not isinstance(e, sympy.cos) else 1 - t**2
@@ -145,6 +153,41 @@ class Rationals:
         if not numerator:
             return self.zero
         return self.field.new(numerator, denominator)
+
+    def inner(self, pairs: Sequence[tuple[Any, Any]]) -> Any:
+        """Σ xy over the pairs: products of one denominator are added before a common factor is looked for."""
+        if len(pairs) == 1:
+            x, y = pairs[0]
+            return self.reduce(x * y)
+        sums: dict[Any, Any] = {}
+        for x, y in pairs:
+            below = x.denom * y.denom
+            above = x.numer * y.numer
+            sums[below] = sums[below] + above if below in sums else above
+        total = self.field.zero
+        for below, above in sums.items():
+            if above:
+                total = self.reduce(total + self.reduce(self.field.new(above, below)))
+        return total
+
+    def root(self, f: Any, sample: Mapping[sympy.Expr, float]) -> tuple[Rationals, Any]:
+        """√f in a field that has it, f positive at the sample: roots of the irreducible factors of what is shown.
+
+        Raises EvaluationError where f is negative at the sample.
+        """
+        numerator, denominator = (p.as_expr().xreplace(self._shown_atoms) for p in self._in_sines(f))
+        if float(sympy.sympify(numerator / denominator).subs(sample)) < 0:
+            raise _core.EvaluationError("the root of a negative number: the operator is not positive semidefinite")
+        made = sympy.S.One
+        for side, power in ((numerator, 1), (denominator, -1)):
+            number, factors = sympy.factor_list(side)
+            made *= sympy.sqrt(abs(number)) ** power
+            for factor, times in factors:
+                factor = -factor if float(factor.subs(sample)) < 0 else factor
+                whole = factor ** (times // 2) if (times // 2) % 2 == 0 or factor.is_positive else sympy.Abs(factor) ** (times // 2)
+                made *= (whole * (sympy.sqrt(factor) if times % 2 else 1)) ** power
+        field = self.extended([made])
+        return field, field.element(made)
 
     # ------------------------------------------------------------------ as SymPy shows it
     def expression(self, f: Any, simplify: bool = True) -> sympy.Expr:
@@ -196,7 +239,8 @@ class Rationals:
         if len(best[0]) + len(best[1]) <= 40 and max(c.bit_length() for p in best for c in p.values()) <= 60:
             candidates += [sympy.factor(sign * up) / sympy.factor(sign * down) for sign in ((1, -1) if len(best[1]) > 1 else (1,))]
             candidates = [c.xreplace(self._shown_atoms) for c in candidates]
-            if sum(isinstance(a, sympy.sin | sympy.cos) for a in candidates[0].atoms(sympy.Function)) > 1:
+            trigonometric = sum(isinstance(a, sympy.sin | sympy.cos) for a in candidates[0].atoms(sympy.Function))
+            if trigonometric > 1 and len(best[0]) + len(best[1]) <= 20:
                 candidates += [_angle_sums(c) for c in candidates]
         else:
             candidates = [c.xreplace(self._shown_atoms) for c in candidates]
@@ -227,6 +271,9 @@ def _collect(e: sympy.Expr, atoms: dict[sympy.Expr, None]) -> None:
         for a in _root(e).atoms(sympy.Pow):
             if a.exp == sympy.Rational(1, 2):
                 atoms.setdefault(a)
+    elif e.is_Pow and e.exp.is_Rational and e.exp.q == 2:
+        _collect(e.base, atoms)
+        atoms.setdefault(sympy.sqrt(e.base))
     elif isinstance(e, sympy.sin | sympy.cos | sympy.tan):
         atoms.setdefault(sympy.tan(e.args[0] / 2))
     else:
@@ -291,6 +338,12 @@ class Matrix:
             at += block.columns
         return cls(field, rows, at)
 
+    def lifted(self, field: Rationals) -> Matrix:
+        """The same matrix over a field that extends this one."""
+        if field is self.field:
+            return self
+        return Matrix(field, [{j: field.lift(x) for j, x in row.items()} for row in self.rows], self.columns)
+
     @property
     def shape(self) -> tuple[int, int]:
         return len(self.rows), self.columns
@@ -317,14 +370,13 @@ class Matrix:
         return Matrix(self.field, rows, len(self.rows))
 
     def __matmul__(self, other: Matrix) -> Matrix:
-        reduce, made = self.field.reduce, []
+        made = []
         for row in self.rows:
-            sums: dict[int, Any] = {}
+            products: dict[int, list[tuple[Any, Any]]] = {}
             for k, x in row.items():
                 for j, y in other.rows[k].items():
-                    product = reduce(x * y)
-                    sums[j] = reduce(sums[j] + product) if j in sums else product
-            made.append({j: x for j, x in sums.items() if x})
+                    products.setdefault(j, []).append((x, y))
+            made.append({j: total for j, pairs in products.items() if (total := self.field.inner(pairs))})
         return Matrix(self.field, made, other.columns)
 
     def __add__(self, other: Matrix) -> Matrix:
@@ -389,7 +441,28 @@ class Matrix:
         return Matrix(self.field, made, right.columns), determinant
 
     def inverse(self) -> Matrix:
+        """By cofactors up to (3, 3), which divide once; by elimination above."""
+        if len(self.rows) <= 3:
+            return self._by_cofactors()
         return self.eliminated(Matrix.identity(self.field, len(self.rows)))[0]
+
+    def _by_cofactors(self) -> Matrix:
+        n, field = len(self.rows), self.field
+        at = lambda i, j: self.rows[i % n].get(j % n, field.zero)  # noqa: E731
+        if n == 3:
+            minor = lambda i, j: field.inner(  # noqa: E731
+                [(at(i + 1, j + 1), at(i + 2, j + 2)), (-at(i + 1, j + 2), at(i + 2, j + 1))]
+            )
+        elif n == 2:
+            minor = lambda i, j: at(i + 1, j + 1) if i == j else -at(i + 1, j + 1)  # noqa: E731
+        else:
+            minor = lambda i, j: field.one  # noqa: E731
+        cofactors = [[minor(i, j) for j in range(n)] for i in range(n)]
+        determinant = field.inner([(at(0, j), cofactors[0][j]) for j in range(n)]) if n else field.one
+        if not determinant:
+            raise _core.SingularOperatorError("an inverse of an operator that is singular at every state")
+        transposed = [{j: field.reduce(cofactors[j][i] / determinant) for j in range(n) if cofactors[j][i]} for i in range(n)]
+        return Matrix(field, transposed, n)
 
     def determinant(self) -> Any:
         """Zero for a singular matrix."""

@@ -1,6 +1,6 @@
 """The normal form: which equations are read in which direction, and how a polynomial is brought there, step by step.
 
-A rule replaces a word by shorter or lighter ones (`weight`), so that every chain of rules ends. In each step one equation is applied wherever
+A rule replaces a word by lighter or shorter ones (`weight`), so that every chain of rules ends. In each step one equation is applied wherever
 it fits, the one that stands first in the list before all others: hypotheses, what cancels, then what makes words short, then what opens
 abbreviations.
 """
@@ -10,17 +10,17 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import lru_cache
+from functools import cache, lru_cache
 
 from .axioms import Theory, solved, theory
-from .equations import Equation, Step, Use
-from .words import Alphabet, Polynomial, Word, add_to, split
+from .equations import Equation, Step, Use, numbered
+from .words import ONE, Alphabet, Polynomial, Word, add_to, inverted, of_model, plain
 
 WORDS, REWRITES = 1500, 6000
 """Sizes at which a reduction gives up."""
 
 # (the word that goes, the equation), in order of rank. Transposes are rules as well.
-_CANCELLING = [("D D⁻¹", "D D⁻¹ = I"), ("D⁻¹ D", "D⁻¹ D = I")]
+_CANCELLING = [(f"{x} {x}⁻¹", f"{x} {x}⁻¹ = I") for x in ("D", "M", "P", "R", "J", "Υ")]
 _RESOLVENTS = [
     ("φ E_φ", "φ E_φ = φ − I"),
     ("E_φ φ", "E_φ φ = φ − I"),
@@ -81,31 +81,30 @@ _COMPLIANCE = [
 _VELOCITIES = [("a", "a = Ṽ H* θ̇ + Ḣ* θ̇"), ("b", "b = V̄ M V")]
 
 _WEIGHTS = {
-    **{"D": 0, "J": 0, "K": 1, "H": 1, "G": 2, "P": 3, "R": 3, "M": 5, "E_φ": 3, "φ": 1, "ψ": 1, "Υ": 3, "S": 20},
+    **{"D": 0, "J": 0, "K": 1, "H": 1, "G": 2, "P": 3, "R": 3, "M": 5, "E_φ": 3, "φ": 1, "ψ": 1, "Υ": 3, "S": 22},
     **{"φ̃": 9, "ψ̃": 9, "τ": 9, "τ̄": 9, "P⁺": 19, "E_ψ": 9, "Ω": 19, "V": 9, "a": 19, "b": 29},
 }
 _INVERSE_WEIGHTS = {"D": 0, "φ": 9, "ψ": 19}
 
 
-@lru_cache(maxsize=None)
+@cache
 def letter_weight(letter: str) -> int:
-    """What a letter weighs: every rule of `rules_for` replaces a word by lighter ones, or shorter ones of the same weight."""
-    name, mark = split(letter)
-    name = name.rstrip("₂₃₄₅₆₇₈₉")
-    if mark in ("⁻¹", "⁻*"):
+    """What a letter weighs. Derivatives are heavy: the rules write them by Δ."""
+    name = plain(letter)
+    if inverted(letter):
         return _INVERSE_WEIGHTS.get(name, 1)
     return _WEIGHTS.get(name, 40 if name.startswith("∂") else 1)
 
 
 def weight(word: Word) -> tuple[int, int, Word]:
-    """The order that all rules lower."""
+    """The order that rules lower: weight, then length, then the letters."""
     return sum(map(letter_weight, word)), len(word), word
 
 
 # ---------------------------------------------------------------------- rules
 @dataclass(frozen=True)
 class Rule:
-    """word → to, by lhs - rhs = sign (word - to); `group` is its rank, shared by its transpose."""
+    """word → to, since word - to = factor⁻¹ (lhs - rhs) of the equation; `group` is its rank, which its transpose shares."""
 
     word: Word
     to: tuple[tuple[Word, Fraction], ...]
@@ -123,7 +122,7 @@ def rule_from(equation: Equation, word: Word, group: int) -> Rule:
 
 @dataclass
 class Budget:
-    """What a search may still spend, in rewrites; the same input spends the same."""
+    """How many rewrites may still be spent; the same input spends the same."""
 
     rewrites: int = REWRITES
 
@@ -137,22 +136,18 @@ class Rules:
     """Rules by the first letter of the word that they replace."""
 
     by_first: dict[str, list[Rule]] = field(default_factory=dict)
-    groups: int = 0
-    known: dict[Word, tuple[int, int, Rule] | None] = field(default_factory=dict)
+    _best: dict[Word, int | None] = field(default_factory=dict)
 
     def copy(self) -> Rules:
-        return Rules({k: list(v) for k, v in self.by_first.items()}, self.groups)
+        return Rules({k: list(v) for k, v in self.by_first.items()})
 
     def add(self, rule: Rule) -> None:
         self.by_first.setdefault(rule.word[0], []).append(rule)
-        self.groups = max(self.groups, rule.group + 1)
-        self.known.clear()
+        self._best.clear()
 
-    def add_equation(self, equation: Equation, word: Word, alphabet: Alphabet, group: int | None = None) -> None:
+    def add_equation(self, equation: Equation, word: Word, alphabet: Alphabet, group: int) -> None:
         """Its rule and its transpose's."""
-        group = self.groups if group is None else group
-        first = rule_from(equation, word, group)
-        self.add(first)
+        self.add(rule_from(equation, word, group))
         star = alphabet.star_word(word)
         if star != word:
             self.add(rule_from(equation.transposed(alphabet), star, group))
@@ -160,37 +155,37 @@ class Rules:
     def all(self) -> list[Rule]:
         return [rule for rules in self.by_first.values() for rule in rules]
 
-    def best(self, word: Word) -> tuple[int, int, Rule] | None:
-        """(group, place, rule) of the first rule in rank that fits anywhere, leftmost."""
-        if word in self.known:
-            return self.known[word]
-        best = None
+    def _fitting(self, word: Word) -> Iterable[tuple[int, Rule]]:
+        """(place, rule), leftmost first."""
         for place, letter in enumerate(word):
             for rule in self.by_first.get(letter, ()):
-                if (best is None or rule.group < best[0]) and word[place : place + len(rule.word)] == rule.word:
-                    best = (rule.group, place, rule)
-        if len(self.known) < 20000:
-            self.known[word] = best
-        return best
+                if word[place : place + len(rule.word)] == rule.word:
+                    yield place, rule
 
-    def _of_group(self, word: Word, group: int) -> tuple[int, Rule] | None:
-        for place, letter in enumerate(word):
-            for rule in self.by_first.get(letter, ()):
-                if rule.group == group and word[place : place + len(rule.word)] == rule.word:
-                    return place, rule
-        return None
+    def best(self, word: Word) -> int | None:
+        """The first group in rank that fits anywhere."""
+        if word not in self._best:
+            if len(self._best) > 50000:
+                self._best.clear()
+            self._best[word] = min((rule.group for _, rule in self._fitting(word)), default=None)
+        return self._best[word]
 
     def reduce(self, p: Polynomial, alphabet: Alphabet, budget: Budget | None = None) -> tuple[Polynomial, list[Step]]:
-        """(the normal form, the steps that lead there). Raises GaveUp where it grows beyond all limits."""
+        """(the normal form, the steps that lead there).
+
+        Raises
+        ------
+        GaveUp
+            It grows beyond `WORDS` words, or takes more than the budget's rewrites.
+        """
         budget = budget or Budget()
         steps: list[Step] = []
         while True:
-            fitting = [b[0] for word in p if (b := self.best(word)) is not None]
-            if not fitting:
+            groups = [group for word in p if (group := self.best(word)) is not None]
+            if not groups:
                 return p, steps
-            step = self._apply(p, min(fitting), alphabet, budget)
-            steps.append(step)
-            p = step.after
+            steps.append(self._apply(p, min(groups), alphabet, budget))
+            p = steps[-1].after
 
     def _apply(self, p: Polynomial, group: int, alphabet: Alphabet, budget: Budget) -> Step:
         """One equation, at every place."""
@@ -200,13 +195,13 @@ class Rules:
             todo = [(start, x)]
             while todo:
                 word, c = todo.pop()
-                found = self._of_group(word, group)
+                found = next(((place, rule) for place, rule in self._fitting(word) if rule.group == group), None)
                 if found is None:
                     add_to(done, word, c)
                     continue
                 place, rule = found
                 left, right = word[:place], word[place + len(rule.word) :]
-                uses.append(Use(c * rule.factor, left, rule.equation, right, rule.factor > 0))
+                uses.append(Use(c * rule.factor, left, rule.equation, right, rule.word, rule.factor > 0))
                 todo += [(left + w + right, c * y) for w, y in reversed(rule.to)]
                 budget.rewrites -= 1
                 if budget.rewrites < 0 or len(todo) + len(done) > WORDS:
@@ -224,7 +219,8 @@ def normal_form(p: Polynomial, rules: Rules, alphabet: Alphabet) -> Polynomial:
 class Setting:
     """What decides on the rules: hypotheses, and which recursions the statement needs.
 
-    With `composite`, φMφ* is written by R; with `compliance`, Ω by Υ and S; else S by Υ, which is then like any other letter.
+    With `composite`, φMφ* is written by R; with `compliance`, Ω by Υ and S, else S by Υ, which then is like any other letter; with
+    `velocities`, a and b are written by Ṽ, V̄ and Ḣ.
     """
 
     hypotheses: frozenset[str] = frozenset()
@@ -233,53 +229,61 @@ class Setting:
     velocities: bool = False
 
 
-@lru_cache(maxsize=64)
-def rules_for(setting: Setting, suffixes: tuple[str, ...] = ("",)) -> Rules:
-    """The rules of a setting for the letters of one or more models. Shared: copy before adding."""
-    facts = theory()
-    rules = Rules()
-    group = 0
-    for word, text in chosen(setting):
-        equation = facts(text)
-        if tuple(word.split()) not in equation.difference:
-            equation = equation.transposed(facts.alphabet)
-        for suffix in suffixes:
-            _add_both(rules, equation, tuple(word.split()), facts, suffix, group)
-        group += 1
-    rules.groups = group
-    return rules
-
-
 def chosen(setting: Setting) -> list[tuple[str, str]]:
     """(word, equation) of a setting, by rank."""
-    facts: list[tuple[str, str]] = []
-    if "J = 0" in setting.hypotheses:
-        facts.append(("J", "J = 0"))
-    if "serial chain" in setting.hypotheses:
-        facts.append(("S", "S = 0"))
+    facts: list[tuple[str, str]] = [(letter, text) for letter, text in _vanishing(setting)]
     facts += [*_CANCELLING, *_RESOLVENTS, *_GAINS, *_ARTICULATED]
     facts += _WITH_R if setting.composite else _WITHOUT_R
     facts += _OPENING
-    if setting.velocities:
-        facts += _VELOCITIES
+    facts += _VELOCITIES if setting.velocities else []
     facts += _REST
     facts += _COMPLIANCE if setting.compliance else _SIBLINGS
     return facts
 
 
-def _add_both(rules: Rules, equation: Equation, word: Word, facts: Theory, suffix: str, group: int) -> None:
+def _vanishing(setting: Setting) -> list[tuple[str, str]]:
+    """(letter, equation) of what is zero."""
+    return [("J", "J = 0")] * ("J = 0" in setting.hypotheses) + [("S", "S = 0")] * ("serial chain" in setting.hypotheses)
+
+
+@lru_cache(maxsize=64)
+def rules_for(setting: Setting, marks: tuple[str, ...] = ("",)) -> Rules:
+    """The rules of a setting for the letters of one or more models. Shared: copy before adding."""
+    facts = theory()
+    rules = Rules()
+    for group, (text_word, text) in enumerate(chosen(setting)):
+        word = tuple(text_word.split())
+        equation = facts(text)
+        if word not in equation.difference:
+            equation = equation.transposed(facts.alphabet)
+        for letter, zero in _vanishing(setting):
+            if text != zero:
+                equation = corollary(equation, word, letter, zero)
+        for mark in marks:
+            _add_both(rules, equation, word, facts, mark, group)
+    return rules
+
+
+def _add_both(rules: Rules, equation: Equation, word: Word, facts: Theory, mark: str, group: int) -> None:
     """A rule and its transpose, for the letters of one model."""
-    solved_ = solved(equation, word)
     starred = facts.alphabet.star_word(word)
-    pairs = [(solved_[0], word)] + ([(equation.transposed(facts.alphabet), starred)] if starred != word else [])
+    pairs = [(equation, word)] + ([(equation.transposed(facts.alphabet), starred)] if starred != word else [])
     for e, w in pairs:
-        copy = e.copied(suffix)
-        rules.add(rule_from(copy, tuple(_suffixed(x, suffix) for x in w), group))
+        rules.add(rule_from(e.copied(mark), tuple(of_model(x, mark) for x in w), group))
 
 
-def _suffixed(letter: str, suffix: str) -> str:
-    name, mark = split(letter)
-    return name + suffix + mark
+@cache
+def corollary(equation: Equation, word: Word, letter: str, zero: str) -> Equation:
+    """What an equation says where a letter is zero: H G = I, of H G = I − J D⁻¹. Itself where the letter does not occur."""
+    facts = theory()
+    _, _, rest, sign = solved(equation, word)
+    gone = [(w, c, w.index(letter)) for w, c in rest.items() if letter in w]
+    if not gone or letter in word:
+        return equation
+    a, kept = facts.alphabet, {w: c for w, c in rest.items() if letter not in w}
+    uses = [Use(c, w[:at], facts(zero), w[at + 1 :], (letter,)) for w, c, at in gone]
+    steps = [Step({word: ONE}, rest, [Use(Fraction(sign), (), equation, (), word, sign > 0)], a), Step(rest, kept, uses, a)]
+    return Equation("lemma", f"{a.word_text(word)} = {a.text(kept)}", {word: ONE}, kept, steps=numbered(steps))
 
 
 def overlaps(first: Sequence[str], second: Sequence[str]) -> Iterable[int]:

@@ -14,7 +14,8 @@ import numpy as np
 
 from .. import _core
 from .equations import Step
-from .words import Alphabet, Polynomial, Word, split
+from .expand import symbol_parts
+from .words import FURTHER, Alphabet, Polynomial, Word, split
 
 PROBES = 3
 LARGEST = 600
@@ -35,8 +36,9 @@ class Values:
     own : whether the letters' expressions are this model's own
     """
 
-    def __init__(self, alphabet: Alphabet, operators: Any, state: Any = None, own: bool = True, seed: int = 0):
+    def __init__(self, alphabet: Alphabet, operators: Any, state: Any = None, own: bool = True, seed: int = 0, contexts: Any = ()):
         self.alphabet, self.operators, self.own, self.seed = alphabet, operators, own, seed
+        self._contexts = list(contexts)
         q, v = (None, None) if state is None else (state.q, state.v)
         self._binding = _core._bind([operators.E], q, v, "fast", 0, "double")
         self.state = state
@@ -76,15 +78,21 @@ class Values:
         o, known = self.operators, self.alphabet.letters[name]
         if known.expression is not None:
             return known.expression if self.own else transferred(known.expression, o)
-        if name.startswith("S"):
-            X = o.E_psi.T @ o.Upsilon @ o.E_psi
-            return X - _core.blockdiag(X)
         if name.startswith("⟨blockdiag("):
             factors = [self._marked(x) for x in name[len("⟨blockdiag(") : -2].split(" ")]
             return _core.blockdiag(functools.reduce(operator.matmul, factors))
+        source = o._source
+        if name[-1] in FURTHER:
+            if not self.own:
+                raise NoValue(f"{known.text} belongs to its own model")
+            source, name = self._contexts[1 + FURTHER.index(name[-1])][0], name[:-1]
+        if name == "S":
+            E_psi, Upsilon = source.symbol("E_psi"), source.symbol("Upsilon")
+            X = E_psi.T @ Upsilon @ E_psi
+            return X - _core.blockdiag(X)
         if known.ascii is None:
             raise NoValue(f"{known.text} has no value")
-        return getattr(o, known.ascii)
+        return source.symbol(known.ascii)
 
     def _marked(self, letter: str) -> Any:
         name, mark = split(letter)
@@ -171,7 +179,7 @@ def transferred(e: Any, operators: Any) -> Any:
     children = [transferred(c, operators) for c in e.children]
     match e.kind:
         case "symbol":
-            _, (_, name, arguments, _), _ = e._parts()
+            _, name, arguments, _ = symbol_parts(e)
             source = operators._source
             if name == "Delta":
                 return source.symbol("Delta", coordinate=arguments[0])

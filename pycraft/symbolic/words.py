@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 from .. import _core
@@ -19,6 +19,8 @@ Word = tuple[str, ...]
 Polynomial = dict[Word, Fraction]
 
 ONE = Fraction(1)
+FURTHER = "₂₃₄₅₆₇₈₉"
+"""Marks of the letters of a second model, a third, ..., in one statement."""
 _MARKS = ("⁻*", "⁻¹", "*")
 _TRANSPOSED = {"": "*", "*": "", "⁻¹": "⁻*", "⁻*": "⁻¹"}
 _INVERTED = {"": "⁻¹", "⁻¹": "", "*": "⁻*", "⁻*": "*"}
@@ -68,6 +70,7 @@ class Letter:
     symmetric : whether it is its own transpose
     expression : the pycraft expression, where one is known; `ascii` names it in the operator set of any model
     shape : "diagonal" by bodies, "down" (strictly, towards the children), "unit" (down, with I on the diagonal), "siblings", or "full"
+    word : of a letter that stands for the diagonal blocks of a word
     """
 
     name: str
@@ -77,9 +80,10 @@ class Letter:
     shape: str = "full"
     ascii: str | None = None
     expression: Any = None
+    word: Word = ()
 
 
-_SYMMETRIC = {"M", "J", "P", "P⁺", "D", "R", "Υ", "Ω", "S"}
+SYMMETRIC = ("M", "P", "R", "D", "J", "Υ", "S")
 _SHAPES = {
     **dict.fromkeys(["H", "M", "J", "P", "P⁺", "D", "G", "τ", "τ̄", "R", "Υ", "Δ", "Δ_θ̇", "Ṽ", "V̄", "𝓑", "X", "Ḣ"], "diagonal"),
     **dict.fromkeys(["E_φ", "E_ψ", "K", "φ̃", "ψ̃"], "down"),
@@ -96,7 +100,7 @@ def shape_of(name: str) -> str:
 def sko_letters() -> dict[str, Letter]:
     """The letters of the core's table that take no argument, and S, the siblings' part of E_ψ*ΥE_ψ."""
     letters = {
-        text: Letter(text, text, latex, text in _SYMMETRIC, shape_of(text), ascii)
+        text: Letter(text, text, latex, text in SYMMETRIC, shape_of(text), ascii)
         for ascii, text, latex, *_ in _core.symbol_table()
         if ascii not in ("B", "Jacobian", "Lambda", "Delta")
     }
@@ -104,7 +108,7 @@ def sko_letters() -> dict[str, Letter]:
     return letters
 
 
-@lru_cache(maxsize=None)
+@cache
 def split(letter: str) -> tuple[str, str]:
     """(name, mark)."""
     for mark in _MARKS:
@@ -113,11 +117,29 @@ def split(letter: str) -> tuple[str, str]:
     return letter, ""
 
 
-@lru_cache(maxsize=None)
+@cache
 def inverse_of(letter: str) -> str:
     """X⁻¹ of X."""
     name, mark = split(letter)
     return name + _INVERTED[mark]
+
+
+@cache
+def plain(letter: str) -> str:
+    """The name of a letter as the first model has it."""
+    return split(letter)[0].rstrip(FURTHER)
+
+
+@cache
+def of_model(letter: str, mark: str) -> str:
+    """The letter of a further model, given that of the first."""
+    name, done = split(letter)
+    return name + mark + done
+
+
+def inverted(letter: str) -> bool:
+    """Whether the letter is an inverse."""
+    return split(letter)[1] in ("⁻¹", "⁻*")
 
 
 class Alphabet:
@@ -150,9 +172,10 @@ class Alphabet:
             add_to(starred, self.star_word(word), c)
         return starred
 
-    def symmetric_letters(self, p: Iterable[Word]) -> set[str]:
+    def symmetric_letters(self, words: Iterable[Word]) -> list[str]:
         """Names of the symmetric letters that occur."""
-        return {split(x)[0] for word in p for x in word if (k := self.letters.get(split(x)[0])) is not None and k.symmetric}
+        names = dict.fromkeys(split(x)[0] for word in words for x in word)
+        return [n for n in names if n in self.letters and self.letters[n].symmetric]
 
     # ------------------------------------------------------------------ how words are shown
     def letter_text(self, letter: str) -> str:
@@ -172,13 +195,16 @@ class Alphabet:
     def word_text(self, word: Word) -> str:
         return " ".join(map(self.letter_text, word)) or "I"
 
+    def word_latex(self, word: Word) -> str:
+        return " ".join(map(self.letter_latex, word)) or "I"
+
     def text(self, p: Polynomial) -> str:
         """As the book prints it."""
-        return _sum(((c, self.word_text(w), bool(w)) for w, c in p.items()), "−", " ")
+        return _sum(((c, self.word_text(w)) for w, c in p.items()), "−", " ")
 
     def latex(self, p: Polynomial) -> str:
         """LaTeX."""
-        return _sum(((c, " ".join(map(self.letter_latex, w)) or "I", bool(w)) for w, c in p.items()), "-", "\\,")
+        return _sum(((c, self.word_latex(w)) for w, c in p.items()), "-", "\\,")
 
 
 @lru_cache(maxsize=1)
@@ -186,9 +212,9 @@ def _sko() -> dict[str, Letter]:
     return sko_letters()
 
 
-def _sum(terms: Iterable[tuple[Fraction, str, bool]], minus: str, space: str) -> str:
+def _sum(terms: Iterable[tuple[Fraction, str]], minus: str, space: str) -> str:
     text = ""
-    for c, word, _ in terms:
+    for c, word in terms:
         size = "" if abs(c) == 1 else number(abs(c)) + space
         sign = f" {minus} " if c < 0 else " + "
         text += (sign if text else minus if c < 0 else "") + size + word
