@@ -110,10 +110,61 @@ def direct_calls(seconds: float = 0.2) -> list[Figure]:
     return figures
 
 
+def sensitivities(seconds: float = 0.2) -> list[Figure]:
+    """What derivatives cost: sweeps of ∂ℳ x, ratios to one forward dynamics, and Pinocchio's own beside them where it is installed."""
+    from . import robots
+
+    figures = []
+    for name in ("panda", "g1"):
+        robot = getattr(robots, name)()
+        q, v, u = _states(robot)
+        H, phi, M = robot.soa("H phi M")
+        MM = H @ phi @ M @ phi.T @ H.T
+        i, x = robot.nv - 1, u[0]
+        derivative = MM.diff(i).at(q[0])
+        _checked("derivative of MM", derivative, x)
+        passes = derivative.plan().passes
+        sweeps = passes.gathers + passes.scatters + passes.kernels
+        figures.append(Figure(f"{name}: MM.diff(i) @ x", float(sweeps), "sweeps", 6.0))
+        dense = robot.mass_matrix_derivative(q[0])[:, :, i] @ x
+        if not np.abs(derivative @ x - dense).max() <= 1e-9 * (1 + np.abs(dense).max()):
+            raise _core.EvaluationError(f"the derivative of the mass matrix of {name} is wrong in the run that times it")
+        slope = float((MM + robot.soa.J).logdet().diff(i).at(q[0]))
+        if not abs(robot.log_determinant_gradient(q[0])[i] - slope) <= 1e-9 * (1 + abs(slope)):
+            raise _core.EvaluationError(f"the gradient of ln det of {name} is wrong in the run that times it")
+        forward = _core.time_dynamics(robot, "forward_dynamics", q, v, u, seconds)["median"]
+        for call in ("log_determinant_gradient", "inverse_dynamics_derivatives", "forward_dynamics_derivatives"):
+            own = _core.time_dynamics(robot, call, q, v, u, seconds)["median"]
+            bound, what = 4.0 if call == "log_determinant_gradient" else None, f"{name} ({robot.nv} dof): {call} over forward dynamics"
+            figures.append(Figure(what, own / forward, "x", bound, f"{1e6 * own:.2f} us"))
+        figures.extend(_beside_pinocchio(name, robot, q[0], v[0], u[0]))
+    return figures
+
+
+def _beside_pinocchio(name: str, robot: Any, q: np.ndarray, v: np.ndarray, u: np.ndarray) -> list[Figure]:
+    """Derivative calls from Python, ours over Pinocchio's; none where Pinocchio is not installed."""
+    try:
+        from .interop.pinocchio import derivative_calls
+
+        theirs = derivative_calls(name, robot.nq != robot.nv)
+    except ImportError:
+        return []
+    figures = []
+    for call, ours in (
+        ("inverse_dynamics_derivatives", lambda: robot.inverse_dynamics_derivatives(q, v, u)),
+        ("forward_dynamics_derivatives", lambda: robot.forward_dynamics_derivatives(q, v, u)),
+    ):
+        mine, other = (min(_elapsed(f, 300) for _ in range(5)) for f in (ours, theirs[call]))
+        note = f"{1e6 * mine:.1f} us and {1e6 * other:.1f} us a call from Python"
+        figures.append(Figure(f"{name}: {call} over Pinocchio's", mine / other, "x", None, note))
+    return figures
+
+
 def run(seconds: float = 0.1) -> dict[str, list[Figure]]:
     """All figures, by heading."""
     return {
         f"O(N): time per link at {LONG} links over {SHORT}": per_link(seconds),
         "Expressions": [building()],
         "Direct calls": direct_calls(2 * seconds),
+        "Sensitivities": sensitivities(2 * seconds),
     }

@@ -206,7 +206,8 @@ def operator_from_parts(kind: int, payload: Any, children: list[_core.Operator])
         made = source._symbol_again(symbol, numbers, nodes, text)
         return made if binding is None else made._bound(binding)
     if name == "function" and payload is not None:
-        return _core._function(*payload, children[0])
+        source, function, binding = payload
+        return _core._function(source, function, binding, children[0])
     if name in ("vector", "identity", "zero", "constant"):
         return _core._leaf_from_parts(name, payload)
     return _core._make(name, children, payload if name == "scaled" else 1.0)
@@ -217,14 +218,15 @@ def scalar_gradient(scalar: _core.Scalar, over: str = "coordinates") -> np.ndarr
     """All derivatives of a scalar expression, see `Scalar.gradient`."""
     kind, value, operand, terms = scalar._parts()
     if terms:
-        return (value if kind == _SCALED else 1.0) * sum(scalar_gradient(t, over) for t in terms)
+        parts = [scalar_gradient(t, over) for t in terms]
+        return np.asarray((value if kind == _SCALED else 1.0) * sum(parts))
     if operand is None:  # a number in a sum
         return np.zeros(())
     models = {source.model for source in operand.sources if isinstance(source, _core.MultibodyOperators)}
     if len(models) != 1:
         what = "depends on two models: differentiate along one coordinate at a time" if models else "does not depend on a multibody model"
         raise _core.EvaluationError(f"{scalar!r} has no gradient: it {what}")
-    model = models.pop()
+    model: Any = models.pop()
     if kind == _LOGDET and _is_mass_matrix(operand):
         q, _, precision = operand._state or (model.q, None, "double")
         return model.log_determinant_gradient(q, over, precision=precision)

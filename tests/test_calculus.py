@@ -114,7 +114,10 @@ def test_along_time(name, model):
 PAIRS = [(1, 2), (2, 1), (4, 3), (6, 7), (7, 6), (10, 11), (3, 3), (8, 9), (12, 5), (20, 4)]
 
 
-@pytest.mark.parametrize("name", ["E", "H", "P", "D", "psi", "Upsilon", "R", "X_world", "V_tilde", "H_dot", "ℳ", "ℳ⁻¹", "a realization", "√D", "m"])
+TWICE = ["E", "H", "P", "D", "psi", "Upsilon", "R", "X_world", "V_tilde", "H_dot", "ℳ", "ℳ⁻¹", "a realization", "√D", "m"]
+
+
+@pytest.mark.parametrize("name", TWICE)
 def test_second_derivatives(name, model):
     op = expressions(model)[name]
     for i, j in PAIRS:
@@ -168,7 +171,10 @@ def parameters(model):
         yield f"placement of {name}", hinges[name].symbol("placement", c), placed(name, number)
 
 
-OF_PARAMETERS = ["E", "H", "M", "J", "P", "D", "K", "psi", "Upsilon", "ℳ", "(ℳ+J)⁻¹", "a realization", "X_world", "V_tilde", "𝒥", "H_dot", "b", "gravity_field", "gravity_base"]  # fmt: skip
+OF_PARAMETERS = [
+    "E", "H", "M", "J", "P", "D", "K", "psi", "Upsilon", "ℳ", "(ℳ+J)⁻¹", "a realization", "X_world", "V_tilde", "𝒥", "H_dot", "b",
+    "gravity_field", "gravity_base",
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("which", range(10))
@@ -345,7 +351,8 @@ def test_errors_name_what_is_wrong(model):
 
 
 def test_derivatives_are_pickled(model):
-    for op in (expressions(model)["m"].diff(7), model.soa.V_bar.diff(3), model.soa.H.diff(2), model.soa.P.diff(model.bodies["body2"].symbol("mass"))):
+    soa, mass = model.soa, model.bodies["body2"].symbol("mass")
+    for op in (expressions(model)["m"].diff(7), soa.V_bar.diff(3), soa.H.diff(2), soa.P.diff(mass)):
         again = pickle.loads(pickle.dumps(op))
         assert str(again) == str(op)
         expected = op.at(model.q, model.v).dense()

@@ -96,6 +96,10 @@ class Pair:
         slabs = [self.S.T @ self.call(pin.computeJointTorqueRegressor, rest, e, still=True)[:, columns] for e in np.eye(self.model.nv)]
         return np.stack(slabs, axis=1)
 
+    def inertia(self):
+        """The largest entry of ℳ: what the terms are like that make a derivative of it, per radian or metre."""
+        return np.abs(self.model.mass_matrix(self.q)).max()
+
     def mass_slope(self):
         """∂ℳ/∂q by Pinocchio, derivative last."""
         rest = np.zeros(self.model.nv)
@@ -202,7 +206,7 @@ def test_forward_dynamics(pairs):
 
 def test_mass_matrix_derivative(pairs):
     for p in pairs:
-        agree(p, p.model.mass_matrix_derivative(p.q), p.mass_slope())
+        agree(p, p.model.mass_matrix_derivative(p.q), p.mass_slope(), terms=p.inertia())
 
 
 def test_mass_matrix_derivative_by_rule(pairs):
@@ -211,7 +215,7 @@ def test_mass_matrix_derivative_by_rule(pairs):
     H, phi, M = p.model.soa("H phi M")
     mass_matrix, slope = H @ phi @ M @ phi.T @ H.T, p.mass_slope()
     for i in {0, p.model.nv // 2, p.model.nv - 1}:
-        agree(p, mass_matrix.diff(i).at(p.q).dense(), slope[:, :, i])
+        agree(p, mass_matrix.diff(i).at(p.q).dense(), slope[:, :, i], terms=p.inertia())
 
 
 def test_mass_matrix_by_parameters_of_bodies(pairs):
@@ -237,13 +241,13 @@ def test_christoffel(pairs):
     """Pinocchio's Coriolis matrix is Christoffel's, on free and ball hinges too (Koszul's); it is linear in v."""
     for p in pairs:
         theirs = np.stack([p.ours(p.call(pin.computeCoriolisMatrix, e)) for e in np.eye(p.model.nv)], axis=-1)
-        agree(p, p.model.christoffel(p.q), theirs)
+        agree(p, p.model.christoffel(p.q), theirs, terms=p.inertia())
 
 
 def test_coriolis_matrix(pairs):
     for p in pairs:
         theirs = p.ours(p.call(pin.computeCoriolisMatrix, p.v))
-        agree(p, p.model.coriolis_matrix(p.q, p.v), theirs)
+        agree(p, p.model.coriolis_matrix(p.q, p.v), theirs, terms=p.inertia() * np.abs(p.v).max())
         agree(p, p.model.coriolis_matrix(p.q, p.v, form="skew") @ p.v, theirs @ p.v, terms=abs(theirs) @ abs(p.v))
 
 
@@ -344,6 +348,7 @@ def test_log_determinant_gradients(pairs):
     """tr(ℳ⁻¹∂ℳ), with both factors Pinocchio's."""
     p = pairs[0]
     inverse = p.inverse()
-    agree(p, p.model.log_determinant_gradient(p.q), np.einsum("ij,jik->k", inverse, p.mass_slope()), solved=True)
-    mine = p.model.log_determinant_gradient(p.q, over="inertias").ravel()
-    agree(p, mine, np.einsum("ij,jik->k", inverse, p.mass_columns()), solved=True)
+    for over, slope in (("coordinates", p.mass_slope()), ("inertias", p.mass_columns())):
+        mine = p.model.log_determinant_gradient(p.q, over=over).ravel()
+        products = np.einsum("ij,jik->k", np.abs(inverse), np.abs(slope))
+        agree(p, mine, np.einsum("ij,jik->k", inverse, slope), solved=True, terms=products)

@@ -188,7 +188,8 @@ def test_hamiltonian_and_diagonalised_forms(case):
     D = m.soa.D.at(q)
     assert abs(xi @ (D @ xi) - 2 * m.kinetic_energy(q, v)) <= 1e-11 * (1 + abs(xi @ (D @ xi)))
     forces = tau - m.bias_forces(q, v)
-    assert abs(epsilon @ (D.inv() @ epsilon) - forces @ np.linalg.solve(m.mass_matrix(q), forces)) <= 1e-12 * condition * norm(forces) ** 2 * norm(D.inv().dense())
+    size = norm(forces) ** 2 * norm(D.inv().dense())
+    assert abs(epsilon @ (D.inv() @ epsilon) - forces @ np.linalg.solve(m.mass_matrix(q), forces)) <= 1e-12 * condition * size
     eta, S, driven = m.diagonalised_dynamics(q, v, tau)
     assert abs(eta @ eta - 2 * m.kinetic_energy(q, v)) <= 1e-11 * (1 + eta @ eta)
     assert_close(S, -S.T, 1e-10)
@@ -252,7 +253,11 @@ def test_no_coordinates_and_singular_hinges():
     arm.add_body("tip", "link", axis=(1, 0, 0), position=(1, 0, 0))
     arm.take_warnings()
     zero = np.zeros(2)
-    for call in (lambda: arm.forward_dynamics_derivatives(zero, zero, zero), lambda: arm.log_determinant_gradient(zero), lambda: arm.hamiltonian_dynamics(zero, zero, zero)):
+    for call in (
+        lambda: arm.forward_dynamics_derivatives(zero, zero, zero),
+        lambda: arm.log_determinant_gradient(zero),
+        lambda: arm.hamiltonian_dynamics(zero, zero, zero),
+    ):
         with pytest.raises(pc.SingularHingeError, match="'tip'"):
             call()
     assert np.isfinite(arm.inverse_dynamics_derivatives(zero, zero, zero).q).all()

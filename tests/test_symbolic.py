@@ -186,7 +186,9 @@ def test_expressions_that_no_letter_names():
     for s in (MM.trace(), (MM + C).logdet(), P.norm(), MM.trace() - 2 * D.logdet() + 3):
         assert float(forms.at(s)) == pytest.approx(float(s), rel=1e-13)
     W = D.sqrt().inv() @ H @ psi @ M.sqrt()
-    assert forms.evaluate(W @ W.T + D.sqrt().inv() @ (I - H @ psi @ soa.K) @ soa.J @ (I - H @ psi @ soa.K).T @ D.sqrt().inv().T) == sympy.eye(2)
+    assert forms.evaluate(
+        W @ W.T + D.sqrt().inv() @ (I - H @ psi @ soa.K) @ soa.J @ (I - H @ psi @ soa.K).T @ D.sqrt().inv().T
+    ) == sympy.eye(2)
 
 
 def test_vectors_and_constants_by_name():
@@ -248,7 +250,6 @@ def test_chosen_parameters():
             ("node1", "position"): ["x", 0, 0], "gravity": [0, "-g", 0], ("body0", "inertia"): [[0, 0, 0], [0, "I", 0], [0, 0, "I"]],
         },
     )  # fmt: skip
-    m, J, I = sympy.symbols("m J I", real=True)
     assert {str(x): v for x, v in forms.parameters.items()} == {"m": 1.0, "l": 1.0, "x": 1.0, "g": 9.81, "I": 1 / 12, "J": 0.0}
     assert np.abs(forms.at("mass_matrix") - model.mass_matrix(model.q)).max() <= 1e-14
     assert np.abs(forms.at("bias_forces")[:, 0] - model.bias_forces(model.q, model.v)).max() <= 1e-13

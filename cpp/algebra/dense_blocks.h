@@ -37,7 +37,8 @@ class DenseBlocks {
     for (auto* x : {&M, &P, &Pplus, &R, &Y, &X}) x->resize(m);
     for (auto* x : {&J, &D, &L}) x->resize(d);
     pivots_.resize(tree.coordinates());
-    work_.resize(4 * s_max * s_max + n_max * s_max);
+    work_.resize(std::max(4 * s_max * s_max + n_max * s_max, 2 * n_max));
+    error_work_.resize(3 * s_max * s_max);
   }
 
   S* edge(int k) { return E.data() + at_[k].e; }
@@ -178,23 +179,24 @@ class DenseBlocks {
   void start_error(int k) { std::copy_n(mass(k), tree_.size[k] * tree_.size[k], X.data() + at_[k].m); }
   void check_pivots(int k) {
     const int s = tree_.size[k], n = tree_.dof[k];
-    std::vector<S> x(n);
+    S* x = work_.data();
     for (int j = 0; j < n; ++j) {
       x[j] = hinge_diagonal(k)[j * n + j];
       for (int a = 0; a < s; ++a)
         for (int b = 0; b < s; ++b) x[j] += hinge_map(k)[j * s + a] * X[at_[k].m + a * s + b] * hinge_map(k)[j * s + b];
     }
-    require_pivots(tree_, k, L.data() + at_[k].d, pivots_.data() + tree_.dof_offset[k], x.data());
+    require_pivots(tree_, k, L.data() + at_[k].d, pivots_.data() + tree_.dof_offset[k], x);
   }
   void error_to_parent(int k) {
     const int s = tree_.size[k];
-    std::vector<S> bar(s * s, S(0)), t(s * s, S(0)), plus(s * s, S(0));
+    S *bar = error_work_.data(), *t = bar + s * s, *plus = t + s * s;
+    std::fill_n(bar, 3 * s * s, S(0));
     // Entries of P round at sqrt(P(i,i) P(j,j)), whatever cancels when it moves on: the diagonal, not P.
     for (int i = 0; i < s; ++i) bar[i * s + i] = S(1), plus[i * s + i] = P[at_[k].m + i * s + i];
-    transposed_multiply_add(gain(k), hinge_map(k), bar.data(), s, tree_.dof[k], s, S(-1));
-    multiply_add(bar.data(), X.data() + at_[k].m, t.data(), s, s, s);
-    multiply_transposed_add(t.data(), bar.data(), plus.data(), s, s, s);
-    congruence_add(k, plus.data(), X.data() + at_[tree_.parent[k]].m);
+    transposed_multiply_add(gain(k), hinge_map(k), bar, s, tree_.dof[k], s, S(-1));
+    multiply_add(bar, X.data() + at_[k].m, t, s, s, s);
+    multiply_transposed_add(t, bar, plus, s, s, s);
+    congruence_add(k, plus, X.data() + at_[tree_.parent[k]].m);
   }
 
   // ---------------------------------------------------------------- composite inertia, compliance
@@ -255,7 +257,7 @@ class DenseBlocks {
 
   const SkoStructure& tree_;
   std::vector<Offsets> at_;
-  std::vector<S> E, H, G, M, P, Pplus, R, Y, X, J, D, L, pivots_, work_;
+  std::vector<S> E, H, G, M, P, Pplus, R, Y, X, J, D, L, pivots_, work_, error_work_;
 };
 
 }  // namespace pycraft

@@ -5,6 +5,7 @@
 #include "bench/timing.h"
 #include "bindings/bindings.h"
 #include "dynamics/rigid_dynamics.h"
+#include "dynamics/sensitivities.h"
 
 namespace pycraft {
 
@@ -35,8 +36,10 @@ py::dict time_apply(const Expression& e, const Array& x, double seconds) {
 // One call per state in rotation; q (K, nq), v, u (K, nv).
 py::dict time_dynamics(const std::shared_ptr<Multibody>& model, const std::string& call, const Array& q, const Array& v, const Array& u, double seconds) {
   RigidDynamics<double> w(*model);
+  Sensitivities<double> s(*model);
   const int K = static_cast<int>(q.shape(0)), nq = model->nq(), nv = model->nv();
-  std::vector<double> out(size_t(nv) * std::max(nv, 6));
+  const size_t square = size_t(nv) * nv;
+  std::vector<double> out(std::max(3 * square, size_t(6) * nv));
   int k = 0;
   const auto next = [&] { k = (k + 1) % K; };
   const double *Q = q.data(), *V = v.data(), *U = u.data();
@@ -53,6 +56,16 @@ py::dict time_dynamics(const std::shared_ptr<Multibody>& model, const std::strin
     run([&](auto a, auto, auto) { w.mass_matrix(a, out.data()); });
   } else if (call == "mass_matrix_inverse") {
     run([&](auto a, auto, auto) { w.mass_matrix_inverse(a, out.data()); });
+  } else if (call == "inverse_dynamics_derivatives") {
+    run([&](auto a, auto b, auto c) { s.inverse_dynamics(a, b, c, out.data(), out.data() + square); });
+  } else if (call == "forward_dynamics_derivatives") {  // the accelerations and their derivatives
+    std::vector<double> vdot(nv);
+    run([&](auto a, auto b, auto c) {
+      w.forward_dynamics(a, b, c, vdot.data());
+      s.forward_dynamics(a, b, vdot.data(), out.data(), out.data() + square, out.data() + 2 * square);
+    });
+  } else if (call == "log_determinant_gradient") {
+    run([&](auto a, auto, auto) { s.log_determinant(a, out.data(), nullptr, nullptr, nullptr); });
   } else {
     throw EvaluationError("no direct call '" + call + "' to time");
   }

@@ -272,9 +272,9 @@ class RigidBlocks {
     X_[k] = articulated_inertia(inertia[k]);
   }
   void check_pivots(int k) {
-    std::vector<S> x;
-    for (int j = first(k); j < last(k); ++j) x.push_back(dot(H[j], X_[k] * H[j]) + J[j]);
-    require_pivots(tree_, k, L.data() + d_[k], pivots_.data() + first(k), x.data());
+    pivot_work_.resize(std::max(pivot_work_.size(), 2 * size_t(tree_.dof[k])));
+    for (int j = first(k); j < last(k); ++j) pivot_work_[j - first(k)] = dot(H[j], X_[k] * H[j]) + J[j];
+    require_pivots(tree_, k, L.data() + d_[k], pivots_.data() + first(k), pivot_work_.data());
   }
   void error_to_parent(int k) {
     ArticulatedInertia<S> plus = projected(X_[k], H, G, k);  // τ̄Xτ̄*
@@ -348,7 +348,7 @@ class RigidBlocks {
 
   const SkoStructure& tree_;
   std::vector<size_t> d_;
-  std::vector<S> pivots_, mass_, rotational_, reach_;
+  std::vector<S> pivots_, pivot_work_, mass_, rotational_, reach_;
   std::vector<Vector6<S>> W;
   std::vector<ArticulatedInertia<S>> X_;
 };

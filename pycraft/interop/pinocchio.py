@@ -6,6 +6,7 @@ Pinocchio (package `pin`, extra [peers]) is imported only when a function here i
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib.resources import as_file, files
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -105,3 +106,16 @@ def jacobian(pin_model: Any, data: Any, q: np.ndarray, frame: str) -> np.ndarray
 
     index = pin_model.getFrameId(frame, pinocchio.FrameType.BODY)
     return pinocchio.computeFrameJacobian(pin_model, data, q, index, pinocchio.ReferenceFrame.LOCAL)[_SWAP]
+
+
+def derivative_calls(robot: str, floating: bool) -> dict[str, Any]:
+    """Pinocchio's derivatives of inverse and forward dynamics on a shipped robot, as calls without arguments, to be timed."""
+    import pinocchio
+
+    with as_file(files("pycraft.models") / "robots" / f"{robot}.urdf") as path:
+        model = build(str(path), "free" if floating else "fixed")
+    data, q, rates = model.createData(), pinocchio.neutral(model), np.full(model.nv, 0.1)
+    return {
+        "inverse_dynamics_derivatives": lambda: pinocchio.computeRNEADerivatives(model, data, q, rates, rates),
+        "forward_dynamics_derivatives": lambda: pinocchio.computeABADerivatives(model, data, q, rates, rates),
+    }

@@ -142,8 +142,8 @@ class Hinge:
         """A parameter of the hinge as what `diff` takes.
 
         "placement": the hinge's inboard frame moved by a unit twist on its own side, components "rx", "ry", "rz", "x", "y", "z" (or 0
-        to 5), radians or metres; "axis": a subhinge's axis turned about component x, y or z of the axes before it, its point held; "point": that
-        axis shifted along x, y or z; "rotor_inertia": of coordinate number `component` of the hinge.
+        to 5), radians or metres; "axis": a subhinge's axis turned about component x, y or z of the axes before it, its point held;
+        "point": that axis shifted along x, y or z; "rotor_inertia": of coordinate number `component` of the hinge.
         """
         k, source = self._index(), self._model.soa._source
         if name == "rotor_inertia":

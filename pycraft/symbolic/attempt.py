@@ -38,32 +38,34 @@ class Attempt(LocalRules):
 
     def run(self, lhs: Polynomial, rhs: Polynomial) -> Outcome:
         """Normal forms of both sides, cleared of inverses where that closes the gap. Raises GaveUp."""
-        p, left, q, right = self.rules.reduce_both(lhs, rhs, self.alphabet)
-        first = at = Outcome(left, right, p, q)
+        turned = self._turned(rhs, lhs) if self.problem.numbers else []
+        p, left, q, right = self.rules.reduce_both(lhs, turned[-1].after if turned else rhs, self.alphabet)
+        first = at = Outcome(left, [*turned, *right], p, q)
         for _ in range(ROUNDS):
             found = None if at.closed else _end(combine((1, at.lhs), (-1, at.rhs)))
             if found is None:
                 break
             at = self._cleared(at, *found)
         if not at.closed and self.problem.numbers:
-            return Outcome(*self._as_numbers(left, p, right, q))
+            ends = [[*steps, *self._turned(side)] for steps, side in ((first.left, p), (first.right, q))]
+            sides = [steps[-1].after if steps else side for steps, side in zip(ends, (p, q), strict=True)]
+            return Outcome(ends[0], ends[1], sides[0], sides[1])
         return at if at.closed else first
 
-    def _as_numbers(self, left: list[Step], p: Polynomial, right: list[Step], q: Polynomial) -> tuple:
-        """Both sides, where they are numbers: a number is its own transpose."""
-        a, made = self.alphabet, []
-        for steps, side in ((left, p), (right, q)):
-            out: Polynomial = {}
-            uses = []
-            for word, c in side.items():
-                star = a.star_word(word)
-                add_to(out, min(word, star), c)
-                if star < word:
-                    equation = Equation("structure", "a number is its own transpose", {word: ONE}, {star: ONE})
-                    equation.check = lambda w=word, s=star: a.star_word(w) == s and self.problem.numbers
-                    uses.append(Use(c, (), equation, (), word))
-            made.append(([*steps, Step(side, out, uses, a)] if uses else steps, out))
-        return made[0][0], made[1][0], made[0][1], made[1][1]
+    def _turned(self, p: Polynomial, like: Polynomial | None = None) -> list[Step]:
+        """Words that are numbers transposed: where the transpose stands in `like`, or, without it, to the one of the two that comes first."""
+        a = self.alphabet
+        out: Polynomial = {}
+        uses = []
+        for word, c in p.items():
+            star = a.star_word(word)
+            turn = star < word if like is None else word not in like and star in like
+            add_to(out, star if turn else word, c)
+            if turn:
+                equation = Equation("structure", "a number is its own transpose", {word: ONE}, {star: ONE})
+                equation.check = lambda w=word, s=star: a.star_word(w) == s and self.problem.numbers
+                uses.append(Use(c, (), equation, (), word))
+        return [Step(p, out, uses, a, "a number is its own transpose")] if uses else []
 
     def _cleared(self, at: Outcome, letter: str, on_left: bool) -> Outcome:
         """Both sides times X, where X⁻¹ stands at an end of a word of their difference: Y = X⁻¹(XY)."""

@@ -239,7 +239,7 @@ def solved(equation: Equation, word: Word) -> tuple[Equation, Word, Polynomial, 
     c = difference.get(word, 0)
     if abs(c) != 1:
         raise ValueError(f"{equation.text} does not give {' '.join(word)}")
-    return equation, word, {w: -x / c for w, x in difference.items() if w != word}, int(c)
+    return equation, word, {w: -x * int(c) for w, x in difference.items() if w != word}, int(c)
 
 
 def replaced_everywhere(p: Polynomial, equation: Equation, word: Word, by: Polynomial, sign: int, alphabet: Alphabet) -> Step | None:

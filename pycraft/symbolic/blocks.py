@@ -8,9 +8,8 @@ these are all that moves.
 
 from __future__ import annotations
 
-from fractions import Fraction
 
-from .words import Alphabet, Letter, Polynomial, Word, add_to, plain, split
+from .words import ONE, Alphabet, Letter, Polynomial, Word, add_to, plain, split
 
 _STEPS = {"E_φ", "E_ψ", "K"}
 
@@ -40,18 +39,18 @@ def diagonal_blocks(word: Word, alphabet: Alphabet) -> Polynomial:
         tail -= 1
     left, inner, right = _join(parts[:head]), parts[head:tail], _join(parts[tail:])
     if not inner:
-        return {left + right: Fraction(1)}
+        return {left + right: ONE}
     moves = [m for _, m in inner if m != "diagonal"]
     for star in ("", "*"):
         if all(m in ("step" + star, "down" + star, "unit" + star) for m in moves):
             if any(m != "unit" + star for m in moves):
                 return {}
-            return {left + _join([p for p in inner if p[1] == "diagonal"]) + right: Fraction(1)}
+            return {left + _join([p for p in inner if p[1] == "diagonal"]) + right: ONE}
     if moves.count("siblings") == 1:
         at = moves.index("siblings")
         if all(m.endswith("*") for m in moves[:at]) and all(m in ("step", "down", "unit") for m in moves[at + 1 :]):
             return {}
-    return {(*left, _own_letter(_join(inner), alphabet), *right): Fraction(1)}
+    return {(*left, _own_letter(_join(inner), alphabet), *right): ONE}
 
 
 def _closed(parts: list[tuple[Word, str]]) -> list[tuple[Word, str]]:

@@ -9,16 +9,20 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from .attempt import Attempt
+from .axioms import theory
 from .equations import Equation, Step, Use, numbered
 from .rules import Budget, GaveUp, Rule, overlaps, weight
-from .words import ONE, Polynomial, Word, add_to, combine
+from .words import ONE, Polynomial, Word, add_to, combine, ratio, split
 
 RULES, LENGTH, REWRITES = 24, 14, 1500
 """How many rules are added, how long their words may be, how many rewrites are spent."""
 
 
 def complete(attempt: Attempt) -> int:
-    """Adds rules by overlaps of the attempt's own ones; returns how many."""
+    """Adds rules by overlaps of the attempt's own ones; returns how many.
+
+    None if they say something of the letters of the table alone: the axioms do not, so what the statement presupposes cannot be.
+    """
     own = {id(e) for e in attempt.local} | {id(e.transposed(attempt.alphabet)) for e in attempt.local}
     queue = [rule for rule in attempt.rules.all() if id(rule.equation) in own]
     budget, added = Budget(REWRITES), 0
@@ -26,10 +30,17 @@ def complete(attempt: Attempt) -> int:
         for lemma, word in _new(attempt, queue.pop(0), budget):
             if added == RULES or budget.rewrites <= 0:
                 return added
+            if not attempt.setting.compliance and _on_base(lemma):
+                return 0
             attempt.add(lemma, word, blocks=False)
             added += 1
             queue += [r for r in attempt.rules.all() if r.equation is lemma]
     return added
+
+
+def _on_base(lemma: Equation) -> bool:
+    """Whether an equation holds letters of the table alone."""
+    return all(split(x)[0] in theory().alphabet.letters for w in [*lemma.lhs, *lemma.rhs] for x in w)
 
 
 def _new(attempt: Attempt, rule: Rule, budget: Budget) -> Iterator[tuple[Equation, Word]]:
@@ -66,6 +77,6 @@ def _critical(attempt: Attempt, first: Rule, second: Rule, k: int, budget: Budge
     note = f"two ways to write {a.word_text(whole)}"
     equal = Equation("lemma", f"{a.text(p)} = {a.text(q)}", p, q, steps=chain, note=note)
     c = difference[lead]
-    rest = {w: -x / c for w, x in difference.items() if w != lead}
-    solve = Step({lead: ONE}, rest, [Use(1 / c, (), equal, (), lead)], a)
+    rest = {w: ratio(-x, c) for w, x in difference.items() if w != lead}
+    solve = Step({lead: ONE}, rest, [Use(ratio(1, c), (), equal, (), lead)], a)
     return Equation("lemma", f"{a.word_text(lead)} = {a.text(rest)}", {lead: ONE}, rest, steps=numbered([solve])), lead

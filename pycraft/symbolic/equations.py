@@ -13,9 +13,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from fractions import Fraction
+from functools import cached_property
 
-from .words import ONE, Alphabet, Polynomial, Word, combine, framed, inverse_of, of_model
+from .words import ONE, Alphabet, Number, Polynomial, Word, add_to, combine, framed, inverse_of, of_model
 
 Frame = tuple[Word, Word]
 NO_FRAME: Frame = ((), ())
@@ -49,8 +49,9 @@ class Equation:
     _star: Equation | None = None
     _copies: dict[str, Equation] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def difference(self) -> Polynomial:
+        """lhs - rhs."""
         return combine((1, self.lhs), (-1, self.rhs))
 
     def transposed(self, alphabet: Alphabet) -> Equation:
@@ -118,17 +119,14 @@ def _marked(p: Polynomial, mark: str) -> Polynomial:
 class Use:
     """c · left (lhs - rhs) right of one equation: at this place `word` was replaced, lhs by rhs if `forward`."""
 
-    coefficient: Fraction
+    coefficient: Number
     left: Word
     equation: Equation
     right: Word
     word: Word = ()
     forward: bool = True
 
-    def value(self) -> Polynomial:
-        return {w: self.coefficient * c for w, c in framed(self.left, self.equation.difference, self.right).items()}
-
-    def between(self, left: Word, right: Word, c: Fraction = ONE) -> Use:
+    def between(self, left: Word, right: Word, c: Number = ONE) -> Use:
         """The same, times c, between two words."""
         return Use(c * self.coefficient, left + self.left, self.equation, self.right + right, self.word, self.forward)
 
@@ -164,7 +162,11 @@ class Step:
     def holds(self) -> bool:
         """Whether the instances of equations add up to before - after, exactly."""
         before, after = self.full()
-        return not combine((1, before), (-1, after), *((-1, use.value()) for use in self.uses))
+        left = combine((1, before), (-1, after))
+        for use in self.uses:
+            for word, c in use.equation.difference.items():
+                add_to(left, use.left + word + use.right, -use.coefficient * c)
+        return not left
 
     def premises(self) -> Iterator[Equation]:
         for use in self.uses:
@@ -200,7 +202,7 @@ class Step:
         uses = [Use(-u.coefficient, u.left, u.equation, u.right, u.word, not u.forward) for u in self.uses]
         return Step(self.after, self.before, uses, self.alphabet, self.title, (self.frames[1], self.frames[0]))
 
-    def between(self, left: Word, right: Word, c: Fraction = ONE) -> Step:
+    def between(self, left: Word, right: Word, c: Number = ONE) -> Step:
         """The same step, times c, between two words."""
         before, after = ({w: c * x for w, x in framed(left, p, right).items()} for p in self.full())
         return Step(before, after, [u.between(left, right, c) for u in self.uses], self.alphabet, self.title)

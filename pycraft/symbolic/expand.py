@@ -7,6 +7,7 @@ what stands inside it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
@@ -16,7 +17,7 @@ from .. import _core
 from .axioms import INVERTIBLE
 from .equations import Equation, Step, symmetries
 from .rules import WORDS, GaveUp
-from .words import FURTHER, ONE, Alphabet, Letter, Polynomial, combine, inverse_of, monomial, parse, plain, shape_of, sko_letters, times
+from .words import FURTHER, ONE, Alphabet, Letter, Number, Polynomial, combine, inverse_of, monomial, parse, plain, ratio, shape_of, sko_letters, times
 
 UNFOLDED = {"Jacobian": "𝒥 = B* φ* H*", "Lambda": "Λ = (B* Ω B)⁻¹"}
 """Symbols that are written out at once."""
@@ -122,7 +123,7 @@ class Problem:
             case "identity":
                 return {(): ONE}
             case "scaled":
-                c = Fraction(e.coefficient)
+                c = _exact(e.coefficient)
                 return {w: c * x for w, x in self.words(e.children[0], transposed).items()} if c else {}
             case "sum":
                 return combine(*((1, self.words(c, transposed)) for c in e.children))
@@ -154,7 +155,7 @@ class Problem:
             case "identity":
                 return {(): ONE}
             case "scaled" if e.coefficient:
-                c = 1 / Fraction(e.coefficient)
+                c = ratio(1, _exact(e.coefficient))
                 return {w: c * x for w, x in self._inverse(e.children[0]).items()}
             case "transpose":
                 return self._star(self._inverse(e.children[0]))
@@ -192,7 +193,7 @@ class Problem:
         mark = self._mark_of(source, binding)
         text, _ = _TABLE.get(ascii, (e.text(), ""))
         known = self.alphabet.letters.get(text + mark)
-        if known is not None and not arguments:
+        if known is not None and known.ascii == ascii and not arguments:
             self.alphabet.add(Letter(known.name, known.text, known.latex, known.symmetric, known.shape, known.ascii, e))
             return known.name
         shape = "diagonal" if e.is_block_diagonal else shape_of(text)
@@ -201,7 +202,7 @@ class Problem:
     def _mark_of(self, source: Any, binding: Any) -> str:
         """The mark of a model at a state."""
         for i, (s, b) in enumerate(self.contexts):
-            if s is source and b is binding:
+            if s is source and _same_state(b, binding):
                 return ["", *FURTHER][i]
         if len(self.contexts) > len(FURTHER):
             raise GaveUp
@@ -258,6 +259,16 @@ def symbol_parts(e: Any) -> tuple[Any, str, list[Any], Any]:
     """(source, ASCII name, arguments: node names or a coordinate, binding) of a symbol."""
     source, name, numbers, nodes, _, binding = e._parts()[1]
     return source, name, [*numbers, *nodes], binding
+
+
+def _same_state(a: Any, b: Any) -> bool:
+    return a is b or a is not None and b is not None and a.__reduce__()[1] == b.__reduce__()[1]
+
+
+def _exact(coefficient: float) -> Number:
+    if not math.isfinite(coefficient):
+        raise _core.EvaluationError(f"a coefficient {coefficient} is no number to reckon with")
+    return ratio(Fraction(coefficient), 1)
 
 
 def _bound(symbol: Any, binding: Any) -> Any:

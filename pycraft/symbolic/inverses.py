@@ -7,7 +7,6 @@ operator whose inverse stands elsewhere in the statement. Otherwise XX⁻¹ = I 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from fractions import Fraction
 from functools import lru_cache
 
 from .axioms import theory
@@ -15,7 +14,24 @@ from .blocks import diagonal_part
 from .equations import Equation, Step, Use, chain_holds, numbered
 from .expand import Opaque, Problem
 from .rules import Rules, Setting, normal_form, rule_from, rules_for, weight
-from .words import ONE, Alphabet, Polynomial, Word, combine, framed, inverse_of, inverted, monomial, of_model, parse, plain, split, times
+from .words import (
+    ONE,
+    Alphabet,
+    Number,
+    Polynomial,
+    Word,
+    combine,
+    framed,
+    inverse_of,
+    inverted,
+    monomial,
+    of_model,
+    parse,
+    plain,
+    ratio,
+    split,
+    times,
+)
 
 KNOWN_INVERSES = [
     ("I − E_φ", "φ"),
@@ -120,17 +136,17 @@ class LocalRules:
         if len(form) == 1:
             ((word, c),) = form.items()
             if all(plain(x) in ("φ", "ψ", "D", "M", "P", "R", "Υ") or inverted(x) for x in word):
-                yield {tuple(inverse_of(x) for x in reversed(word)): 1 / c}
+                yield {tuple(inverse_of(x) for x in reversed(word)): ratio(1, c)}
         for mark in self.problem.marks:
             key, scale = _scaled({tuple(_unmarked(x, mark) for x in w): c for w, c in form.items()})
             for z, its_scale in _known_inverses(self.setting).get(key, ()):
-                yield {tuple(of_model(x, mark) for x in w): c * its_scale / scale for w, c in z.items()}
+                yield {tuple(of_model(x, mark) for x in w): ratio(c * its_scale, scale) for w, c in z.items()}
         key, scale = _scaled(form)
         for X, other in self._forms:
             for name, p in ((X, other), (self.alphabet.star(X), self.alphabet.star_of(other))):
                 its_key, its_scale = _scaled(p)
                 if its_key == key:
-                    yield {(inverse_of(name),): its_scale / scale}
+                    yield {(inverse_of(name),): ratio(its_scale, scale)}
 
     def _inverse_is(self, X: str, inner: Polynomial, z: Polynomial, definition: Equation) -> Equation | None:
         """The lemma X⁻¹ = Z, by XZ = I and ZX = I; None if these do not come out."""
@@ -223,8 +239,8 @@ class LocalRules:
         a = self.alphabet
         form, steps = self.reduce(equation.difference)
         c = form[lead]
-        rest = {w: -x / c for w, x in form.items() if w != lead}
-        uses = [Use(1 / c, (), equation, (), lead)] + [u.between((), (), -1 / c) for step in steps for u in step.uses]
+        rest = {w: ratio(-x, c) for w, x in form.items() if w != lead}
+        uses = [Use(ratio(1, c), (), equation, (), lead)] + [u.between((), (), ratio(-1, c)) for step in steps for u in step.uses]
         step = Step({lead: ONE}, rest, uses, a, f"{equation.text}, solved for {a.word_text(lead)}")
         self.add(Equation("lemma", f"{a.word_text(lead)} = {a.text(rest)}", {lead: ONE}, rest, steps=numbered([step])), lead)
 
@@ -251,26 +267,27 @@ class LocalRules:
             self.presupposed.discard(L)
         Y = inverse_of(L)
         if any(Y in w or a.star(Y) in w for p in self.problem.polynomials() for w in p):
-            chain = [step.reversed().between((Y,), (), 1 / c) for step in reversed(steps)]
-            inner = {w: x / c for w, x in framed((Y,), o.inner, ()).items()}
-            whole: Polynomial = {(Y, L, star): 1 / c}
-            chain.append(Step(inner, whole, [Use(-1 / c, (Y,), square, (), (), False)], a))
-            chain.append(Step(whole, {(star,): 1 / c}, [Use(1 / c, (), self.pair(Y, L), (star,), (Y, L))], a))
-            lhs, rhs = monomial(Y, *word), monomial(star, c=1 / c)
+            scale = ratio(1, c)
+            chain = [step.reversed().between((Y,), (), scale) for step in reversed(steps)]
+            inner = {w: x * scale for w, x in framed((Y,), o.inner, ()).items()}
+            whole = monomial(Y, L, star, c=scale)
+            chain.append(Step(inner, whole, [Use(-scale, (Y,), square, (), (), False)], a))
+            chain.append(Step(whole, monomial(star, c=scale), [Use(scale, (), self.pair(Y, L), (star,), (Y, L))], a))
+            lhs, rhs = monomial(Y, *word), monomial(star, c=scale)
             self.add(Equation("lemma", f"{a.text(lhs)} = {a.text(rhs)}", lhs, rhs, steps=numbered(chain)), (Y, *word))
 
 
-def _scaled(p: Polynomial) -> tuple[tuple, Fraction]:
+def _scaled(p: Polynomial) -> tuple[tuple, Number]:
     """(a key for the polynomial up to a factor, that factor)."""
     lead = p[max(p, key=weight)]
-    return tuple(sorted((w, c / lead) for w, c in p.items())), lead
+    return tuple(sorted((w, ratio(c, lead)) for w, c in p.items())), lead
 
 
 @lru_cache(maxsize=32)
-def _known_inverses(setting: Setting) -> dict[tuple, list[tuple[Polynomial, Fraction]]]:
+def _known_inverses(setting: Setting) -> dict[tuple, list[tuple[Polynomial, Number]]]:
     """Candidates by the normal form of X, scaled."""
     rules, alphabet = rules_for(setting), theory().alphabet
-    found: dict[tuple, list[tuple[Polynomial, Fraction]]] = {}
+    found: dict[tuple, list[tuple[Polynomial, Number]]] = {}
     for one, other in KNOWN_INVERSES:
         for x, z in ((parse(one), parse(other)), (parse(other), parse(one))):
             for p, q in ((x, z), (alphabet.star_of(x), alphabet.star_of(z))):

@@ -14,7 +14,8 @@ import sympy
 
 from .. import _core
 from .parameters import Parameters
-from .rational import Matrix, Rationals
+from .rational import Rationals
+from .sparse import Matrix
 
 Q_SIZE = {"pin": 1, "slider": 1, "screw": 1, "ball": 4, "free": 7}
 V_SIZE = {"pin": 1, "slider": 1, "screw": 1, "ball": 3, "free": 6}

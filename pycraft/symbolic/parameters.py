@@ -108,7 +108,11 @@ class Parameters:
         return made.tolist()
 
     def _one(self, entry: Any, number: float, positive: bool) -> sympy.Expr:
+        if isinstance(entry, str) and entry.startswith("-"):
+            return -self._one(entry[1:], -number, positive)
         if isinstance(entry, str):
+            if not entry.isidentifier():
+                raise _core.ModelError(f"{entry!r} is no name of a parameter; write formulas as SymPy expressions")
             entry = sympy.Symbol(entry, real=True, positive=True if positive and number > 0 else None)
         if isinstance(entry, float | np.floating):
             return exact(float(entry))

@@ -58,7 +58,7 @@ class Proof:
         self._contexts: list[tuple[Any, Any]] = []
         self._read: Any = None
         self._model: Any = None
-        self._found = self.recheck()
+        self._found = False
 
     @classmethod
     def of_statement(

@@ -9,14 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass, field
-from fractions import Fraction
 from functools import cache, lru_cache
 
 from .axioms import Theory, solved, theory
 from .equations import Equation, Step, Use, numbered
-from .words import ONE, Alphabet, Polynomial, Word, add_to, inverted, of_model, plain
+from .words import ONE, Alphabet, Number, Polynomial, Word, add_to, inverted, of_model, plain, ratio
 
-WORDS, REWRITES = 1500, 6000
+WORDS, REWRITES = 2000, 12000
 """Sizes at which a reduction gives up."""
 
 # (the word that goes, the equation), in order of rank. Transposes are rules as well.
@@ -107,9 +106,9 @@ class Rule:
     """word → to, since word - to = factor⁻¹ (lhs - rhs) of the equation; `group` is its rank, which its transpose shares."""
 
     word: Word
-    to: tuple[tuple[Word, Fraction], ...]
+    to: tuple[tuple[Word, Number], ...]
     equation: Equation
-    factor: Fraction
+    factor: Number
     group: int
 
 
@@ -117,7 +116,7 @@ def rule_from(equation: Equation, word: Word, group: int) -> Rule:
     """The equation read as word → the rest."""
     difference = equation.difference
     c = difference[word]
-    return Rule(word, tuple((w, -x / c) for w, x in difference.items() if w != word), equation, 1 / c, group)
+    return Rule(word, tuple((w, ratio(-x, c)) for w, x in difference.items() if w != word), equation, ratio(1, c), group)
 
 
 @dataclass
@@ -251,7 +250,8 @@ class Setting:
 def chosen(setting: Setting) -> list[tuple[str, str]]:
     """(word, equation) of a setting, by rank."""
     facts: list[tuple[str, str]] = [(letter, text) for letter, text in _vanishing(setting)]
-    facts += [*_CANCELLING, *_RESOLVENTS, *_GAINS, *_OPENING]
+    facts += [(word, text) for word, text in _CANCELLING if word != "J J⁻¹" or "J = 0" not in setting.hypotheses]
+    facts += [*_RESOLVENTS, *_GAINS, *_OPENING]
     facts += _VELOCITIES if setting.velocities else []
     facts += _ARTICULATED
     facts += _WITH_R if setting.composite else _WITHOUT_R
@@ -301,7 +301,7 @@ def corollary(equation: Equation, word: Word, letter: str, zero: str) -> Equatio
         return equation
     a, kept = facts.alphabet, {w: c for w, c in rest.items() if letter not in w}
     uses = [Use(c, w[:at], facts(zero), w[at + 1 :], (letter,)) for w, c, at in gone]
-    steps = [Step({word: ONE}, rest, [Use(Fraction(sign), (), equation, (), word, sign > 0)], a), Step(rest, kept, uses, a)]
+    steps = [Step({word: ONE}, rest, [Use(sign, (), equation, (), word, sign > 0)], a), Step(rest, kept, uses, a)]
     return Equation("lemma", f"{a.word_text(word)} = {a.text(kept)}", {word: ONE}, kept, steps=numbered(steps))
 
 

@@ -79,18 +79,20 @@ class Values:
             return known.expression if self._contexts else transferred(known.expression, o)
         if known.word:
             return _core.blockdiag(functools.reduce(operator.matmul, map(self._marked, known.word)))
-        source = o._source
+        source, binding = self._contexts[0] if self._contexts else (o._source, None)
         if name[-1] in FURTHER:
             if not self._contexts:
                 raise NoValue(f"{known.text} belongs to its own model")
-            source, name = self._contexts[1 + FURTHER.index(name[-1])][0], name[:-1]
+            (source, binding), name = self._contexts[1 + FURTHER.index(name[-1])], name[:-1]
         if name == "S":
             E_psi, Upsilon = source.symbol("E_psi"), source.symbol("Upsilon")
             X = E_psi.T @ Upsilon @ E_psi
-            return X - _core.blockdiag(X)
-        if known.ascii is None:
+            e = X - _core.blockdiag(X)
+        elif known.ascii is None:
             raise NoValue(f"{known.text} has no value")
-        return source.symbol(known.ascii)
+        else:
+            e = source.symbol(known.ascii)
+        return e if binding is None else e._bound(binding)
 
     def _marked(self, letter: str) -> Any:
         name, mark = split(letter)

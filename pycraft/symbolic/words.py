@@ -16,9 +16,10 @@ from typing import Any
 from .. import _core
 
 Word = tuple[str, ...]
-Polynomial = dict[Word, Fraction]
+Number = int | Fraction
+Polynomial = dict[Word, Number]
 
-ONE = Fraction(1)
+ONE = 1
 FURTHER = "₂₃₄₅₆₇₈₉"
 """Marks of the letters of a second model, a third, ..., in one statement."""
 _MARKS = ("⁻*", "⁻¹", "*")
@@ -27,21 +28,27 @@ _INVERTED = {"": "⁻¹", "⁻¹": "", "*": "⁻*", "⁻*": "*"}
 
 
 # ---------------------------------------------------------------------- arithmetic
-def add_to(p: Polynomial, word: Word, c: Fraction) -> None:
+def ratio(a: Number, b: Number) -> Number:
+    """a / b, exactly."""
+    quotient = Fraction(a) / b
+    return quotient.numerator if quotient.denominator == 1 else quotient
+
+
+def add_to(p: Polynomial, word: Word, c: Number) -> None:
     """p += c word, in place; what becomes zero is dropped."""
     total = p.get(word, 0) + c
     if total:
-        p[word] = Fraction(total)
+        p[word] = total
     else:
         p.pop(word, None)
 
 
-def monomial(*letters: str, c: Fraction = ONE) -> Polynomial:
+def monomial(*letters: str, c: Number = ONE) -> Polynomial:
     """c times one word."""
     return {letters: c}
 
 
-def combine(*parts: tuple[Fraction | int, Polynomial]) -> Polynomial:
+def combine(*parts: tuple[Number, Polynomial]) -> Polynomial:
     """Σ c p."""
     total: Polynomial = {}
     for c, p in parts:
@@ -217,7 +224,7 @@ def _sko() -> dict[str, Letter]:
     return sko_letters()
 
 
-def _sum(terms: Iterable[tuple[Fraction, str]], minus: str, space: str) -> str:
+def _sum(terms: Iterable[tuple[Number, str]], minus: str, space: str) -> str:
     text = ""
     for c, word in terms:
         size = "" if abs(c) == 1 else number(abs(c)) + space
@@ -226,7 +233,7 @@ def _sum(terms: Iterable[tuple[Fraction, str]], minus: str, space: str) -> str:
     return text or "0"
 
 
-def number(c: Fraction) -> str:
+def number(c: Number) -> str:
     """A coefficient: exactly, or as the shortest decimal that names its double."""
     if c.denominator == 1:
         return str(c.numerator)
@@ -240,14 +247,15 @@ def parse(text: str) -> Polynomial:
     """A sum of words whose letters stand apart: "φ K H ψ − 2 φ + I"."""
     p: Polynomial = {}
     word: list[str] = []
-    sign, c, started = ONE, ONE, False
+    c: Number = ONE
+    sign, started = ONE, False
     for token in [*text.split(), "+"]:
         if token in ("+", "−", "-"):
             if started:
                 add_to(p, tuple(word), sign * c)
-            sign, word, c, started = ONE if token == "+" else -ONE, [], ONE, False
+            sign, word, c, started = 1 if token == "+" else -1, [], ONE, False
         elif re.fullmatch(r"\d+(/\d+)?", token):
-            c, started = c * Fraction(token), True
+            c, started = ratio(c * Fraction(token), 1), True
         elif token == "I":
             started = True
         else:

@@ -13,7 +13,6 @@
 
 #include <cmath>
 #include <string>
-#include <vector>
 
 #include "algebra/errors.h"
 #include "algebra/structure.h"
@@ -34,13 +33,13 @@ inline S rounding_bound() {
                            "): give the bodies it moves a mass, or the hinge a rotor inertia, or weld it");
 }
 
-// Throws unless every pivot of body k's D = L L* stands out of its rounding. x: diagonal of H X H* + J, n numbers, overwritten.
+// Throws unless every pivot of body k's D = L L* stands out of its rounding. x: diagonal of H X H* + J, n numbers, overwritten, and n more.
 template <class S>
 void require_pivots(const SkoStructure& tree, int k, const S* L, const S* pivots, S* x) {
   using std::abs, std::sqrt;
   const int n = tree.dof[k];
   for (int i = 0; i < n; ++i) x[i] = sqrt(x[i]);
-  std::vector<S> w(n);
+  S* w = x + n;
   for (int j = 0; j < n; ++j) {
     // L₁₁* w₁ = -L(j, ·)*
     S reach = x[j];
