@@ -118,21 +118,34 @@ class Algorithm:
     def text(self) -> str:
         """The recursion in Unicode letters."""
         words = Text()
-        lines = [self.title]
-        given = ", ".join(_place(words, leaf.quantity) for leaf in self._book.leaves if leaf.quantity in self._needed)
-        if given:
-            tail = " of every body k, p its parent, c its children; what is read at the parent of a root is zero"
-            lines.append(f"given: {given}{tail if self._book.trees else ''}")
-        lines += ["  " * depth + line for depth, line in words.items(self._program.items)]
+        lines = [self.title, *(f"by {note}" for plan in self._plans for note in plan.notes)]
+        lines += [f"in {precision} precision; source is written in double" for precision in self._precisions()]
+        leaves = [leaf for leaf in self._book.leaves if leaf.quantity in self._needed]
+        blocks = ", ".join(_place(words, leaf.quantity) for leaf in leaves if leaf.quantity.kind == "blocks")
+        if blocks:
+            lines.append(f"given: {blocks} of every body k, p its parent, c its children; what is read at the parent of a root is zero")
+        others = ", ".join(words.letter(leaf.quantity) for leaf in leaves if leaf.quantity.kind != "blocks")
+        lines += [f"given: {others}"] if others else []
+        for model in self._book.models if len(self._book.models) > 1 else []:
+            own = ", ".join(words.letter(leaf.quantity) for leaf in leaves if leaf.context == model.index)
+            lines += [f"  {own}: {model.words}"] if own else []
+        lines += ["  " * depth + line for depth, line in self._lines(words)]
         return "\n".join([*lines, self._cost()])
 
     @property
     def latex(self) -> str:
         """The recursion in LaTeX: an aligned block."""
         words = Latex()
-        lines: list[Line] = words.items(self._program.items)
+        lines = self._lines(words)
         rows = "\\\\\n".join("&" + "\\quad " * depth + line for depth, line in lines)
         return "\\begin{aligned}\n" + rows + "\n\\end{aligned}"
+
+    def _precisions(self) -> list[str]:
+        return sorted({r.plan["precision"] for r in self._recursions} - {"double"})
+
+    def _lines(self, words: Text) -> list[Line]:
+        columns = [(0, f"{words.letter(x)} = I") for x in self._program.inputs if self._program.identity_columns]
+        return columns + words.items(self._program.items)
 
     def _cost(self) -> str:
         flops = sum(plan.flops for plan in self._plans)

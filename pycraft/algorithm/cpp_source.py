@@ -32,7 +32,7 @@ from .formulas import (
 )
 from .letters import total
 from .recursion import pass_words
-from .source import Source, at_child, documentation, helpers, parent_is_read, place_of, tree_of_terms
+from .source import WORDS, Source, at_child, documentation, helpers, parent_is_read, place_of, tree_of_terms
 
 _RESULT_TYPES = {"vector": "Matrix", "matrix": "Matrix", "blocks": "Blocks", "scalar": "double"}
 
@@ -78,7 +78,7 @@ class CppSource(Source):
             return f"{node.system.quantity.name}.block({node.quantity.name}, k, {node.state}, {node.equation})"
         assert isinstance(node, MadeDense)
         size = total(node.operator.program.inputs[0].rows)
-        return f"{node.operator.name}(Matrix::Identity({size}, {size}))"
+        return f"{node.operator.quantity.name}(Matrix::Identity({size}, {size}))"
 
     def factor(self, node: Node) -> str:
         text = super().factor(node)
@@ -153,9 +153,13 @@ class CppSource(Source):
             f"for (int k = 0; k < n{suffix}; ++k) sizes_of_{name}.push_back({{{bodies}}});",
             f"TreeSystem {name}(parent{suffix}, sizes_of_{name}, {{{border}}});",
             f"for (int k = 0; k < n{suffix}; ++k) {{",
+            f"  [[maybe_unused]] const int p = parent{suffix}[k];",
         ]
-        corner = []
+        corner: list[str] = []
         for i, relation in enumerate(system.relations):
+            lines_of = lines if isinstance(system.cuts[i], Cut) else corner
+            indent = "  " if isinstance(system.cuts[i], Cut) else ""
+            lines_of.append(f"{indent}// {WORDS.relation(system, i)}")
             for term, j in relation:
                 place, guarded = place_of(system, i, j, term)
                 node = at_child(term).node if term.over == "c" else term.node
@@ -163,26 +167,27 @@ class CppSource(Source):
                 sign = "-=" if term.coefficient < 0 else "+="
                 if place == "corner":
                     corner.append(f"{name}.corner({i}, {j}) {sign} {value};")
-                    continue
-                guard = f"if (parent{suffix}[k] >= 0) " if guarded else ""
-                if guarded and "[p]" in value:
-                    value = value.replace("[p]", f"[parent{suffix}[k]]")
-                lines.append(f"  {guard}{name}.{place}(k, {i}, {j}) {sign} {value};")
+                elif place == "below":
+                    corner.append(f"for (int k = 0; k < n{suffix}; ++k) {name}.below(k, {i}, {j}) {sign} {value};")
+                else:
+                    lines.append(f"  {'if (p >= 0) ' if guarded else ''}{name}.{place}(k, {i}, {j}) {sign} {value};")
         return [*lines, "}", *corner]
 
     def solution(self, item: Solution) -> list[str]:
         name, suffix = item.system.quantity.name, self.suffix(item.system.tree)
         columns = item.columns if isinstance(item.columns, str) else str(item.columns)
         b = f"b_of_{next(iter(item.states.values())).name if item.states else name}"
-        lines, body, once = ["", f"Blocks {b} = {name}.vector({columns});"], [], []
+        body: list[str] = []
+        once: list[str] = []
+        lines = ["", f"Blocks {b} = {name}.vector({columns});"]
         for i, terms in enumerate(item.inputs):
+            local = isinstance(item.system.cuts[i], Cut)
+            lines_of, indent = (body, "  ") if local else (once, "")
+            lines_of += [f"{indent}// {WORDS.input_equation(item, i)}"] if terms else []
             for term in terms:
                 value = self.scaled(Term(term.node, abs(term.coefficient)), True)
                 sign = "-=" if term.coefficient < 0 else "+="
-                if isinstance(item.system.cuts[i], Cut):
-                    body.append(f"  {name}.part({b}, k, {i}) {sign} {value};")
-                else:
-                    once.append(f"{name}.part({b}, -1, {i}) {sign} {value};")
+                lines_of.append(f"{indent}{name}.part({b}, {'k' if local else -1}, {i}) {sign} {value};")
         if body:
             lines += [f"for (int k = 0; k < n{suffix}; ++k) {{", *body, "}"]
         lines += [*once, f"{b} = {name}.solve({b});"]
@@ -220,7 +225,11 @@ class CppSource(Source):
 
     def operator(self, item: Operator) -> list[str]:
         x = item.program.inputs[0]
-        lines = ["", f"// {item.text}, applied to columns", f"const auto {item.name} = [&](const Matrix& given_{x.name}) -> Matrix {{"]
+        lines = [
+            "",
+            f"// {item.text}, applied to columns",
+            f"const auto {item.quantity.name} = [&](const Matrix& given_{x.name}) -> Matrix {{",
+        ]
         return [*lines, *("  " + line if line else "" for line in self.body(item.program)), "};"]
 
     def body(self, program: Program) -> list[str]:
@@ -255,7 +264,7 @@ class CppSource(Source):
             body[-1] = f"return {program.result.name};"
         parameters = ", ".join(["const Data& data", *(f"const Matrix& given_{q.name}" for q in given)])
         words = [f"// {line}".rstrip() for line in [title, "", *documentation(self, program, shape)]]
-        includes = ("Eigen/Dense", "cmath", "functional", "iostream", "limits", "stdexcept", "vector")
+        includes = ("Eigen/Dense", "algorithm", "cmath", "functional", "iostream", "limits", "stdexcept", "vector")
         text = "\n".join([*words, *(f"#include <{header}>" for header in includes), "", f"namespace {name} {{", "", ""])
         text += "using Matrix = Eigen::MatrixXd;\nusing Blocks = std::vector<Matrix>;\nusing Rows = std::vector<std::vector<int>>;\n\n"
         text += "struct Data {\n" + "".join(f"  {line}\n" for line in self.members()) + "};\n"

@@ -318,11 +318,10 @@ class CompositeAssembly:
 
 @dataclass
 class Operator:
-    """A recursion inside a recursion: y = X x of an operator that is made dense."""
+    """A recursion inside a recursion: w = X x of an operator that is made dense; `quantity` is X."""
 
-    name: str
+    quantity: Quantity
     text: str
-    latex: str
     program: Program
 
 

@@ -218,6 +218,11 @@ class Model:
         self.theta, self.bodies = theta, bodies
         self._made: dict[tuple[str, tuple[int, ...]], Quantity] = {}
 
+    @property
+    def words(self) -> str:
+        """Which model, and whether at a state of its own."""
+        return f"of '{self.source.name}'" + (" at a bound state" if self.binding else "")
+
     # ------------------------------------------------------------------ shapes and places
     def _new(self, name: str, arguments: tuple[int, ...] = (), **shape: Any) -> Quantity:
         square = {"rows": self.bodies, "columns": self.bodies}

@@ -36,9 +36,9 @@ def cut(x, rows):
     "stack": (
         (),
         '''
-def stack(y, rows):
+def stack(y, rows, columns):
     """Blocks body by body as one vector (or columns)."""
-    out = np.zeros((sum(map(len, rows)), y[0].shape[1] if len(y) else 1))
+    out = np.zeros((sum(map(len, rows)), columns))
     for block, r in zip(y, rows):
         out[r] = block
     return out

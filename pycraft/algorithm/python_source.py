@@ -31,7 +31,7 @@ from .formulas import (
 from .letters import total
 from .python_helpers import HELPERS
 from .recursion import pass_words
-from .source import Source, at_child, documentation, helpers, parent_is_read, place_of, tree_of_terms
+from .source import WORDS, Source, at_child, documentation, helpers, parent_is_read, place_of, tree_of_terms
 
 
 class PythonSource(Source):
@@ -44,7 +44,7 @@ class PythonSource(Source):
             return f"{q.name}[{node.at}]"
         if q.kind == "blocks":
             assert isinstance(q.rows, Cut)
-            return self.call("stack", q.name, q.rows.name)
+            return self.call("stack", q.name, q.rows.name, self.extent(q.columns, "k"))
         return q.name
 
     def length(self, cut: Cut, k: str) -> str:
@@ -70,7 +70,7 @@ class PythonSource(Source):
         if isinstance(node, InverseBlock):
             return f"{node.system.quantity.name}.block({node.quantity.name}, k, {node.state}, {node.equation})"
         assert isinstance(node, MadeDense)
-        return f"{node.operator.name}(np.eye({total(node.operator.program.inputs[0].rows)}))"
+        return f"{node.operator.quantity.name}(np.eye({total(node.operator.program.inputs[0].rows)}))"
 
     def zeros(self, q: Quantity) -> str:
         """Zeros of a quantity's shape."""
@@ -140,33 +140,40 @@ class PythonSource(Source):
             f"for k in range(n{suffix}):",
             f"    p = parent{suffix}[k]",
         ]
-        corner = []
+        corner: list[str] = []
         for i, relation in enumerate(system.relations):
+            lines_of = lines if isinstance(system.cuts[i], Cut) else corner
+            indent = "    " if isinstance(system.cuts[i], Cut) else ""
+            lines_of.append(f"{indent}# {WORDS.relation(system, i)}")
             for term, j in relation:
                 place, guarded = place_of(system, i, j, term)
-                guard = "if p >= 0: " if guarded else ""
-                term_here = at_child(term) if term.over == "c" else term
-                value = self.scaled(Term(term_here.node, abs(term.coefficient)), True)
+                node = at_child(term).node if term.over == "c" else term.node
+                value = self.scaled(Term(node, abs(term.coefficient)), True)
                 sign = "-=" if term.coefficient < 0 else "+="
                 if place == "corner":
                     corner.append(f"{name}.corner({i}, {j})[...] {sign} {value}")
-                    continue
-                lines.append(f"    {guard}{name}.{place}(k, {i}, {j})[...] {sign} {value}")
+                elif place == "below":
+                    corner += [f"for k in range(n{suffix}):", f"    {name}.below(k, {i}, {j})[...] {sign} {value}"]
+                else:
+                    lines += ["    if p >= 0:"] if guarded else []
+                    lines.append(f"{'        ' if guarded else '    '}{name}.{place}(k, {i}, {j})[...] {sign} {value}")
         return lines + corner
 
     def solution(self, item: Solution) -> list[str]:
         name, suffix = item.system.quantity.name, self.suffix(item.system.tree)
         columns = item.columns if isinstance(item.columns, str) else str(item.columns)
         b = f"b_of_{name}"
-        lines, body, once = ["", f"{b} = {name}.vector({columns})"], [], []
+        body: list[str] = []
+        once: list[str] = []
+        lines = ["", f"{b} = {name}.vector({columns})"]
         for i, terms in enumerate(item.inputs):
+            local = isinstance(item.system.cuts[i], Cut)
+            lines_of, indent = (body, "    ") if local else (once, "")
+            lines_of += [f"{indent}# {WORDS.input_equation(item, i)}"] if terms else []
             for term in terms:
                 value = self.scaled(Term(term.node, abs(term.coefficient)), True)
                 sign = "-=" if term.coefficient < 0 else "+="
-                if isinstance(item.system.cuts[i], Cut):
-                    body.append(f"    {name}.part({b}, k, {i})[...] {sign} {value}")
-                else:
-                    once.append(f"{name}.part({b}, -1, {i})[...] {sign} {value}")
+                lines_of.append(f"{indent}{name}.part({b}, {'k' if local else -1}, {i})[...] {sign} {value}")
         if body:
             lines += [f"for k in range(n{suffix}):", *body]
         lines += [*once, f"{b} = {name}.solve({b})"]
@@ -202,7 +209,7 @@ class PythonSource(Source):
 
     def operator(self, item: Operator) -> list[str]:
         x = item.program.inputs[0]
-        lines = ["", f"def {item.name}({x.name}):", f'    """{item.text}, applied to columns."""']
+        lines = ["", f"def {item.quantity.name}({x.name}):", f'    """{item.text}, applied to columns."""']
         return lines + ["    " + line if line else "" for line in self.body(item.program)]
 
     def body(self, program: Program) -> list[str]:
@@ -233,7 +240,7 @@ class PythonSource(Source):
                 body.append(f"{x.name} = np.eye({total(x.rows)})")
             else:
                 body += [f"{x.name} = np.asarray({x.name}, float)", f"single = {x.name}.ndim == 1"]
-                body.append(f"{x.name} = {x.name}.reshape({x.name}.shape[0], -1)")
+                body.append(f"{x.name} = {x.name}[:, None] if single else {x.name}")
         inside = self.body(program)
         returned = inside.pop().removeprefix("return ")
         body += inside

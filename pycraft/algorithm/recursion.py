@@ -205,7 +205,7 @@ class Text:
         if isinstance(node, InverseBlock):
             return f"{self.letter(node.quantity)}(k,k)[s{node.state + 1}, b{node.equation + 1}]"
         assert isinstance(node, MadeDense)
-        return node.operator.name + self.join + "I"
+        return self.letter(node.operator.quantity) + self.join + "I"
 
     def hinge_row(self, node: HingeRow) -> str:
         """Row j of H(k) as a column."""
@@ -287,16 +287,22 @@ class Text:
         """The equations of a realization and their elimination."""
         T, s, b = (self.letter(_Local(system)(name, "k")) for name in "Tsb")
         lines = [(0, self.words("equations of the realization,") + f" {T}{self.join}{s} = {b}:")]
-        for i, relation in enumerate(system.relations):
-            terms = []
-            for term, j in relation:
-                state = system.states[j]
-                at = {"c": "c", "p": "p"}.get(term.over, "k") if state.kind == "blocks" else ""
-                terms.append(Term(product(term.node, At(state, at)), term.coefficient, term.over))
-            side = self.input_side(system, i)
-            lines.append((1, f"{self.terms(tuple(terms))} = {side}"))
+        lines += [(1, self.relation(system, i)) for i in range(len(system.relations))]
         lines.append((0, self.words("eliminated from the leaves to the root, T the blocks of these equations body by body")))
         return lines + self.items(system_passes(system))
+
+    def relation(self, system: System, i: int) -> str:
+        """Equation i of a realization."""
+        terms = []
+        for term, j in system.relations[i]:
+            state = system.states[j]
+            at = {"c": "c", "p": "p"}.get(term.over, "k") if state.kind == "blocks" else ""
+            terms.append(Term(product(term.node, At(state, at)), term.coefficient, term.over))
+        return f"{self.terms(tuple(terms))} = {self.input_side(system, i)}"
+
+    def input_equation(self, item: Solution, i: int) -> str:
+        """The right-hand side of equation i."""
+        return f"{self.input_side(item.system, i)} = {self.terms(item.inputs[i])}"
 
     def input_side(self, system: System, i: int) -> str:
         """b_i(k)."""
@@ -310,9 +316,7 @@ class Text:
     def solution(self, item: Solution) -> list[Line]:
         """One solve with the factors."""
         lines = [(0, self.words("solved for"))]
-        for i, terms in enumerate(item.inputs):
-            if terms:
-                lines.append((1, f"{self.input_side(item.system, i)} = {self.terms(terms)}"))
+        lines += [(1, self.input_equation(item, i)) for i, terms in enumerate(item.inputs) if terms]
         return lines + self.items(solution_passes(item.system))
 
     def composite(self, item: CompositeAssembly) -> list[Line]:
@@ -332,7 +336,7 @@ class Text:
     def operator(self, item: Operator) -> list[Line]:
         """A recursion inside a recursion."""
         x = item.program.inputs[0]
-        title = f"{self.letter(item.program.result)} = {item.name}{self.join}{self.letter(x)}"
+        title = f"{self.letter(item.program.result)} = {self.letter(item.quantity)}{self.join}{self.letter(x)}"
         lines = [(0, self.words("column by column,") + f" {title}:")]
         return lines + [(depth + 1, line) for depth, line in self.items(item.program.items)]
 

@@ -33,7 +33,7 @@ from .formulas import (
 from .letters import Workbook
 from .recursion import Text
 
-_WORDS = Text()
+WORDS = Text()
 
 
 class Source:
@@ -180,7 +180,7 @@ class Source:
 
     def comment(self, equation: Equation, whole: bool = False) -> str:
         """The equation as the book writes it."""
-        return _WORDS.whole(equation) if whole else _WORDS.equation(equation)
+        return WORDS.whole(equation) if whole else WORDS.equation(equation)
 
 
 def is_vector(node: Node) -> bool:
@@ -212,18 +212,23 @@ def documentation(source: Source, program: Program, shape: str) -> list[str]:
         lines.append(f"    {cut.key}: {what if cut.contiguous else 'the rows of a vector that belong to each body'}")
     for leaf in source.leaves:
         q = leaf.quantity
-        word = {"pk": f"{q.letter.text}(p,k)", "k": f"{q.letter.text}(k)"}.get(q.indices, q.letter.text)
+        letter = WORDS.letter(q)
+        where = f" ({source.book.models[leaf.context].words})" if leaf.context > 0 else ""
+        word = {"pk": f"{letter}(p,k)", "k": f"{letter}(k)"}.get(q.indices, letter)
         if q.kind == "function":
-            lines.append(f"    {q.name}: a function that applies {q.letter.text} to the columns of a matrix")
+            lines.append(f"    {q.name}: a function that applies {letter} to the columns of a matrix")
         elif q.kind == "matrix":
-            lines.append(f"    {q.name}: the matrix {q.letter.text}")
+            lines.append(f"    {q.name}: the matrix {letter}")
         elif q.columns == 1:
-            lines.append(f"    {q.name}: the vector {q.letter.text}")
+            lines.append(f"    {q.name}: the vector {letter}{where}")
         else:
-            lines.append(f"    {q.name}: the blocks {word}" + (", none for roots" if q.indices == "pk" else ""))
+            lines.append(f"    {q.name}: the blocks {word}" + (", none for roots" if q.indices == "pk" else "") + where)
     returned = {"vector": "a vector", "matrix": "a matrix", "blocks": "one block per body", "scalar": "a number"}[shape]
     if program.inputs and not program.identity_columns:
         lines.append(f"{program.inputs[0].name}: a vector, or the columns of a matrix.")
+    for q in source.inputs:
+        if q not in program.inputs:
+            lines.append(f"{q.name}: the vector {WORDS.letter(q)}.")
     return [*lines, f"Returns {returned}."]
 
 

@@ -223,10 +223,10 @@ class Recursion:
 
     def operator(self, step: Step) -> Quantity:
         """The dense matrix of a step's operand."""
-        program = Recursion(self.book, step["operand"], vectors=self.vectors, nested=True).write()
+        quantity = self.book.new("X", "function")
+        program = Recursion(self.book, step["operand"], "w", self.vectors, nested=True).write()
         program.items = fused(program.items)
-        name = self.book.names.letter("X")[2]
-        operator = Operator(name, step["operand"]["text"], step["operand"]["text"], program)
+        operator = Operator(quantity, step["operand"]["text"], program)
         self.program.items.append(operator)
         operand = step["operand"]
         made = self.book.new("A", "matrix", rows=total(self.book.cut(operand["codomain"])), columns=total(self.book.cut(operand["domain"])))
