@@ -9,6 +9,7 @@ writer per kind of step, and all four languages are written from its equations. 
 from __future__ import annotations
 
 import json
+import re
 from typing import Any
 
 import numpy as np
@@ -57,7 +58,7 @@ class Algorithm:
     for k from tip to base:
       f(k) = M(k) x(k) + Σ_c E(k,c) f(c)
       y(k) = H(k) f(k)
-    cost: O(N), about 351 flops for one column; 3 bodies, 3 coordinates
+    cost: O(N), about 531 flops for one column; 3 bodies, 3 coordinates
     """
 
     def __init__(self, expression: Any, language: str = "text", request: str = "apply"):
@@ -77,6 +78,7 @@ class Algorithm:
             recursion.write()
         self._program = self._sum() if scalar else self._recursions[0].program
         self._vectors = list(vectors.values())
+        self._book.sort_leaves()
         needed = {q for item in self._program.items for q in reads(item)} | {self._program.result}
         inside = [q for item in self._program.items if isinstance(item, Operator) for q in reads(item)]
         self._needed = needed.union(inside)
@@ -169,6 +171,7 @@ class Algorithm:
     # ------------------------------------------------------------------ source
     def python(self, *, with_data: bool = False, name: str = "algorithm") -> str:
         """A Python module that needs NumPy alone: `name(data, x)`; `with_data` adds DATA, the numbers at the present state."""
+        _check_name(name)
         source = PythonSource(self._book, self._arguments(), self._needed)
         return source.module(self._program, self.title, self._shape(), _listed(self.data()) if with_data else None, name)
 
@@ -178,6 +181,7 @@ class Algorithm:
         `with_data` adds `name::present()`, the numbers at the present state, and a `main` that prints the result for x = 1
         (left out where NO_MAIN is defined).
         """
+        _check_name(name)
         source = CppSource(self._book, self._arguments(), self._needed)
         return source.file(self._program, self.title, self._shape(), self.data() if with_data else None, name)
 
@@ -236,6 +240,12 @@ class Algorithm:
             if model in recursion.models:
                 return part, recursion.models.index(model)
         raise AssertionError("a model of no part")
+
+
+def _check_name(name: str) -> None:
+    """A name that both languages take."""
+    if not re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII):
+        raise _core.EvaluationError(f"name={name!r}: source needs a name of letters, digits and underscores")
 
 
 def _place(words: Text, quantity: Quantity) -> str:

@@ -236,7 +236,7 @@ class CppSource(Source):
         """The inside of a function: cut what is given, pass over the tree, stack what is returned."""
         lines: list[str] = []
         for x in program.inputs:
-            lines.append(f"[[maybe_unused]] const int m = static_cast<int>(given_{x.name}.cols());")
+            lines.append(f"[[maybe_unused]] const int {x.columns} = static_cast<int>(given_{x.name}.cols());")
             lines.append(self.given(x))
         for item in program.items:
             lines += self.item(item)
@@ -262,7 +262,7 @@ class CppSource(Source):
         body += self.body(program)
         if shape == "blocks":
             body[-1] = f"return {program.result.name};"
-        parameters = ", ".join(["const Data& data", *(f"const Matrix& given_{q.name}" for q in given)])
+        parameters = ", ".join(["[[maybe_unused]] const Data& data", *(f"const Matrix& given_{q.name}" for q in given)])
         words = [f"// {line}".rstrip() for line in [title, "", *documentation(self, program, shape)]]
         includes = ("Eigen/Dense", "algorithm", "cmath", "functional", "iostream", "limits", "stdexcept", "vector")
         text = "\n".join([*words, *(f"#include <{header}>" for header in includes), "", f"namespace {name} {{", "", ""])
@@ -271,7 +271,7 @@ class CppSource(Source):
         if data is not None:
             self.used.add("matrix")
         self.used.add("children_of")
-        text += helpers(HELPERS, self.used)
+        text += helpers(HELPERS, self.used).replace("\n\n", "\n")
         text += f"\n// {title}\ninline {_RESULT_TYPES[shape]} run({parameters}) {{\n"
         text += "".join(f"  {line}\n" if line else "\n" for line in body) + "}\n"
         if data is not None:

@@ -55,6 +55,7 @@ class Names:
         self.taken = set(_RESERVED)
         for name in _SYMBOLS:  # the book's letters keep their meaning
             self.taken.add(name)
+        self.chosen: set[str] = set()  # what the user named
         self._numbers: dict[str, int] = {}
 
     def letter(self, name: str) -> tuple[Letter, int, str]:
@@ -79,6 +80,7 @@ class Names:
             made = "w_" + made
         latex = name if re.fullmatch(r"[A-Za-z]", name) else "\\mathrm{" + re.sub(r"([_%&#$])", r"\\\1", name) + "}"
         letter = Letter(made, name, latex)
+        self.chosen.add(name)
         number = 1
         while (made if number == 1 else f"{made}_{number}") in self.taken:
             number += 1
@@ -187,6 +189,11 @@ class Workbook:
             self._externals[name, transposed] = made
             self.leaves.append(Leaf(made, "external"))
         return self._externals[name, transposed]
+
+    def sort_leaves(self) -> None:
+        """What is given, in the order E, H, M, J, ..., model by model; constants last."""
+        order = {name: i for i, name in enumerate(_GIVEN)}
+        self.leaves.sort(key=lambda leaf: (leaf.context < 0, leaf.context, order.get(leaf.symbol, len(order))))
 
     def model(self, source: Any, binding: int, hinge_diagonal: bool) -> Model:
         """The letters of a model at a state."""

@@ -216,7 +216,7 @@ class PythonSource(Source):
         """The inside of a function: cut what is given, pass over the tree, stack what is returned."""
         lines: list[str] = []
         for x in program.inputs:
-            lines.append(f"m = {x.name}.shape[1]")
+            lines.append(f"{x.columns} = {x.name}.shape[1]")
             if isinstance(x.rows, Cut):
                 lines.append(f"{x.name} = {self.call('cut', x.name, x.rows.name)}")
         for item in program.items:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from .formulas import (
     Assembled,
     At,
@@ -395,4 +397,4 @@ class Latex(Text):
         return f"{name}_{{{i}}}"
 
     def words(self, text: str) -> str:
-        return f"\\text{{{text} }}".replace(" k ", " $k$ ").replace(" k:", " $k$:").replace(" T ", " $T$ ")
+        return "\\text{" + re.sub(r"\b([kcpT])\b", r"$\1$", text) + " }"

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from .formulas import (
-    COLUMNS,
     At,
     CompositeAssembly,
     Cut,
@@ -189,7 +188,7 @@ def is_vector(node: Node) -> bool:
         return False
     if isinstance(node, Product):
         return bool(node.factors) and is_vector(node.factors[-1])
-    return isinstance(node, At) and node.quantity.columns in (COLUMNS, 1)
+    return isinstance(node, At) and (node.quantity.columns == 1 or isinstance(node.quantity.columns, str))
 
 
 def parent_is_read(sweep: Sweep) -> bool:

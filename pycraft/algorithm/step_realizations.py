@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from .formulas import (
-    COLUMNS,
     At,
     Cut,
     Elimination,
@@ -34,7 +33,7 @@ def _factor(r: Recursion, step: Step) -> None:
     book = r.book
     tree = book.tree(tuple(data["parents"])).index
     cuts = tuple(book.cut(space) for space in data["states"])
-    states = [r._shaped(book.new, "s", space, 1 if r.unit_input else COLUMNS) for space in data["states"]]
+    states = [r._shaped(book.new, "s", space, 1 if r.unit_input else r.columns) for space in data["states"]]
     relations: list[list[tuple[Term, int]]] = [[] for _ in data["equations"]]
     for t in data["terms"]:
         relations[t["row"]].append((_relation_term(r, t, cuts[t["column"]]), t["column"]))
@@ -51,6 +50,8 @@ def _factor(r: Recursion, step: Step) -> None:
         over = "bodies" if isinstance(node, Part) and node.axis else ""
         relations[t["row"]].append((Term(node, t["coefficient"], over), t["column"]))
     quantity = book.new("T", "function", tree=tree)
+    if not quantity.number and book.names.chosen & set("AUXYSNFZ"):  # letters of the elimination that the user has taken
+        quantity = book.new("T", "function", tree=tree)
     system = System(quantity, tree, tuple(states), cuts, tuple(map(tuple, relations)))
     r.systems[step["out"]] = system, data
     r.program.items.append(Elimination(system))
@@ -112,7 +113,7 @@ def _solve(r: Recursion, step: Step) -> None:
             right = r.value(t["right"])
             node, coefficient = product(right.node, node), coefficient * right.coefficient
         terms.append(Term(node, coefficient))
-    columns = 1 if r.unit_input else COLUMNS
+    columns = 1 if r.unit_input else r.columns
     r.program.items.append(Solution(system, tuple(map(tuple, inputs)), fresh, columns))
     r.define(y, *terms)
 

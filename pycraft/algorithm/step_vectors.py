@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from .formulas import (
-    COLUMNS,
     Assembled,
     At,
     CompositeAssembly,
@@ -175,7 +174,7 @@ def _mass_matrix(r: Recursion, step: Step) -> None:
     H, M, E, E_child = model.at("H"), model.at("M"), model.at("E"), model.at("E", "c")
     if step["flag"]:
         r.stored(step["in"][0])
-    columns = 1 if r.unit_input else COLUMNS
+    columns = 1 if r.unit_input else r.columns
     alpha = r.book.new("alpha", tree=model.tree, rows=model.bodies, columns=columns)
     f = r.book.new("f", tree=model.tree, rows=model.bodies, columns=columns)
     terms = (Term(product(star(E), At(alpha, "p")), over="p"), r.term(step["in"][0], star(H)))
@@ -194,7 +193,7 @@ def _mass_matrix_solve(r: Recursion, step: Step) -> None:
     """y = [I-HψK]* D⁻¹ [I-HψK] x: the innovations tip to base, accelerations base to tip."""
     model = r.models[step["context"]]
     H, G, D, E, E_child = model.at("H"), model.at("G"), model.at("D"), model.at("E"), model.at("E", "c")
-    forces: dict[str, Any] = {"tree": model.tree, "rows": model.bodies, "columns": 1 if r.unit_input else COLUMNS}
+    forces: dict[str, Any] = {"tree": model.tree, "rows": model.bodies, "columns": 1 if r.unit_input else r.columns}
     coordinates = forces | {"rows": model.theta}
     z, z_plus = r.book.new("z", **forces), r.book.new("z_plus", **forces)
     eps, nu = r.book.new("eps", **coordinates), r.book.new("nu", **coordinates)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from .formulas import (
@@ -75,6 +75,7 @@ class Recursion:
             for realization in [step["realization"]] if step["realization"] else []:
                 self.uses.update(t["right"] for t in realization["outputs"])
         self.nested = nested
+        self.columns: str = COLUMNS
         # A vector expression: x is the number 1.
         readers = [step for step in plan["steps"] if plan["input"] in step["in"]]
         one = plan["request"] == "apply" and not nested and plan["input"] >= 0 and plan["domain"].name == "R^1"
@@ -93,6 +94,8 @@ class Recursion:
             self.values[register] = self.vectors[name]
         if plan["input"] >= 0 and not self.unit_input:
             x = self._shaped(self.book.new, "x", plan["domain"], COLUMNS)
+            self.columns += x.name.removeprefix("x")
+            x = replace(x, columns=self.columns)
             self.values[plan["input"]] = x
             program.inputs.append(x)
             program.identity_columns = plan["columns_of_identity"]
@@ -125,7 +128,7 @@ class Recursion:
             given = value in [leaf.quantity for leaf in self.book.leaves]
             if not given and plan["request"] != "apply":
                 return value
-        columns = COLUMNS if register["wide"] and not self.unit_input else 1
+        columns = self.columns if register["wide"] and not self.unit_input else 1
         made = self._shaped(self.book.new, self.result_letter, register["space"], columns)
         if isinstance(value, Quantity) and value.kind in ("matrix", "scalar"):
             self.once(made, Term(At(value, "")))
@@ -154,7 +157,7 @@ class Recursion:
             name = letter or _VECTOR_LETTERS.get(space.name, "f" if space.name.startswith("NodesF") else "w")
             if out == self.plan["output"] and self.plan["request"] == "apply":
                 name = self.result_letter
-            made = self._shaped(self.book.new, name, space, COLUMNS if register["wide"] and not self.unit_input else 1)
+            made = self._shaped(self.book.new, name, space, self.columns if register["wide"] and not self.unit_input else 1)
         elif register["kind"] == "blocks":
             made = self.book.new(letter or "W", **self._block_shape(register))
         elif register["kind"] == "dense":
