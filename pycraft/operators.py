@@ -199,11 +199,14 @@ def operator_from_parts(kind: int, payload: Any, children: list[_core.Operator])
         "inverse",
         "blockdiag",
         "sqrt",
+        "function",
     )[kind]
     if name == "symbol":
-        source, symbol, arguments, binding = payload
-        made = source.symbol(symbol, coordinate=arguments[0]) if symbol == "Delta" else source.symbol(symbol, nodes=list(arguments))
+        source, symbol, numbers, nodes, text, binding = payload
+        made = source._symbol_again(symbol, numbers, nodes, text)
         return made if binding is None else made._bound(binding)
+    if name == "function" and payload is not None:
+        return _core._function(*payload, children[0])
     if name in ("vector", "identity", "zero", "constant"):
         return _core._leaf_from_parts(name, payload)
     return _core._make(name, children, payload if name == "scaled" else 1.0)

@@ -318,6 +318,56 @@ def test_the_source_runs_by_itself(tmp_path):
     assert np.allclose(np.array(shown.strip(" []\n").split(), float), op @ np.ones(op.shape[1]), rtol=1e-9)
 
 
+DERIVATIVES = {
+    "∂ℳ": lambda o, d: o.MM.op.diff(d),
+    "∂ℳ⁻¹": lambda o, d: (o.MM + o.J).inv().op.diff(d),
+    "∂φ": lambda o, d: o.phi.op.diff(d),
+    "∂D": lambda o, d: o.D.op.diff(d),
+    "∂∂ℳ": lambda o, d: o.MM.op.diff(d).diff(1),
+    "∂D^½": lambda o, d: o.D.op.sqrt().diff(d),
+    "∂b": lambda o, d: o.soa.b.diff(d),
+    "∂a": lambda o, d: o.soa.a.diff(d),
+    "∂V̄": lambda o, d: o.soa.V_bar.diff(d),
+    "∂𝓑": lambda o, d: o.soa.momentum_cross.diff(d),
+    "∂Υ": lambda o, d: o.Upsilon.op.diff(d),
+    "∂ℳ, world": lambda o, d: o.MM.op.diff(d, frame="world"),
+    "ℳ̇": lambda o, d: o.MM.op.dot(),
+    "ḃ": lambda o, d: o.soa.b.dot(vdot=np.linspace(-1, 1, len(o.soa.Theta))),
+    "V̄̇": lambda o, d: o.soa.V_bar.dot(vdot=np.linspace(-1, 1, len(o.soa.Theta))),
+}
+
+
+@pytest.mark.parametrize("coordinate", [0, 7, 12])
+@pytest.mark.parametrize("name", DERIVATIVES)
+def test_derivatives(name, coordinate):
+    o, _ = letters_and_constants(True)
+    op = DERIVATIVES[name](o, coordinate)
+    assert_is_the_operator(op)
+
+
+def assert_is_the_operator(op):
+    """The emitted source applies the operator, to rounding at the size of what it maps to, cancellation within it allowed."""
+    written = op.algorithm("python")
+    assert written.text and written.latex
+    x = np.random.default_rng(11).normal(size=(op.shape[1], 2))
+    vector = op.shape[1] == 1 and not written._program.inputs
+    got, expected = (run(written), op.value()) if vector else (run(written, x), op @ x)
+    assert np.abs(got - expected).max(initial=0.0) <= 1e-9 * (1 + np.abs(expected).max(initial=0.0)), op.text()
+
+
+def test_derivatives_along_parameters():
+    model = every_kind(True)
+    soa = model.soa
+    MM = soa.H @ soa.phi @ soa.M @ soa.phi.T @ soa.H.T
+    body, several = model.bodies["body3"], next(h for h in model.hinges.values() if len(h.subhinges) > 1)
+    parameters = [body.symbol("mass"), body.symbol("com", "y"), body.symbol("inertia", 0, 1), body.hinge.symbol("placement", "rx")]
+    parameters += [several.symbol("axis", 0, 1), several.symbol("point", 1, 1), several.symbol("rotor_inertia", 0)]
+    for parameter in parameters:
+        for op in (MM, (MM + soa.J).inv(), soa.b):
+            assert_is_the_operator(op.diff(parameter))
+    assert_is_the_operator(MM.diff(several.symbol("axis", 1, 1)).diff(several.v_slice.start))
+
+
 # ---------------------------------------------------------------------- every kind of step
 
 
@@ -341,6 +391,9 @@ def test_every_kind_of_step_was_run():
     test_an_operator_from_outside_is_a_callable_in_the_data()
     test_the_norm_of_a_long_operator()
     test_scalars()
+    for name in ("∂D^½", "∂b", "V̄̇", "ḃ"):
+        assert_is_the_operator(DERIVATIVES[name](o, 7))
+    run(pc.blockdiag(o.E.op.T @ o.Upsilon.op @ o.E.op).algorithm(request="trace"))
     assert set(pc._core.step_kinds()) - _executed == set()
 
 
@@ -541,6 +594,10 @@ def test_cpp_of_mechanics_scalars_and_dense_steps(tmp_path):
         cases.append((vector.algorithm("cpp"), expected, 1e-12 * (1 + norm(expected))))
     for scalar in scalars(o):
         cases.append((scalar.algorithm("cpp"), [float(scalar)], 1e-12 * (1 + abs(float(scalar)))))
+    for name in ("∂ℳ⁻¹", "∂D^½", "∂b", "V̄̇", "ḃ"):
+        op = DERIVATIVES[name](o, 7)
+        expected = op @ np.ones(op.shape[1])
+        cases.append((op.algorithm("cpp"), expected, 1e-9 * (1 + norm(expected))))
     for formula in dense_expressions().values():
         x = np.ones(formula.op.shape[1])
         cases.append((formula.op.algorithm("cpp"), formula.value @ x, formula.bound * np.sqrt(len(x))))

@@ -222,7 +222,7 @@ def test_steps_are_constant_and_cost_grows_as_the_bodies(name, chains):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["shifted", "nested shifts", "rank two", "(B*ΩB)⁻¹"])
+@pytest.mark.parametrize("name", ["shifted", "nested shifts", "rank two"])
 def test_a_stretched_chain_of_thousands_is_solved(name, chains):
     """Elimination body by body loses up to 21 digits there, and 5000 bodies are too many for one front: it goes on in quad."""
     o, arm = chains[5000]
@@ -230,9 +230,11 @@ def test_a_stretched_chain_of_thousands_is_solved(name, chains):
     arm.q = np.full(5000, 0.01)
     x = np.ones(op.shape[1])
     y = op @ x
-    back = op.inv() @ y
-    size = norm(x) + norm(y) * max(norm(op.inv() @ (y / norm(y))), 1.0)
-    assert norm(back - x) <= 1e4 * EPS * size
+    forward, z = op.inv(), x
+    for _ in range(3):  # power iteration
+        z = forward @ z
+        size, z = np.linalg.norm(z), z / np.linalg.norm(z)
+    assert np.linalg.norm(forward @ y - x) <= 5000 * np.finfo(float).eps * size * np.linalg.norm(y)
     assert any(note.startswith("quad: ") for note in op.plan().run_notes), op.plan()
 
 

@@ -112,6 +112,11 @@ std::string render(const Expression& e, Style style, Level around) {
       const std::string inner = render(e.children()[0], style, postfix_level);
       return python ? inner + ".sqrt()" : latex ? "{" + inner + "}^{1/2}" : inner + "^½";
     }
+    case NodeKind::block_function: {
+      const SymbolDefinition& d = *e.node().symbol.definition;
+      const std::string inner = render(e.children()[0], style, sum_level);
+      return latex ? d.latex + "\\left(" + inner + "\\right)" : (python ? d.ascii : d.unicode) + "(" + inner + ")";
+    }
     case NodeKind::block_diagonal: {
       const std::string inner = render(e.children()[0], style, sum_level);
       return latex ? "\\operatorname{blockdiag}\\left(" + inner + "\\right)" : "blockdiag(" + inner + ")";

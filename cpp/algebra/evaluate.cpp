@@ -109,6 +109,7 @@ double largest_entry(const Expression& e, const std::map<std::string, std::vecto
 Residual residual(const Expression& left, const Expression& right, const std::map<std::string, std::vector<double>>& vectors, bool on_one_path, bool at_most) {
   const Expression a = left.floating() && !right.floating() ? with_space(left, right.domain()) : left;
   const Expression b = right.floating() && !left.floating() ? with_space(right, left.domain()) : right;
+  if (a.floating()) throw SpaceError("a residual of " + show(a) + " and " + show(b) + ": they have no space yet");
   // The difference is planned as typed, so that it is taken at the full precision.
   return {largest_entry(a - b, vectors, on_one_path, at_most), largest_entry(a, vectors, on_one_path, false), largest_entry(b, vectors, on_one_path, false)};
 }

@@ -60,6 +60,7 @@ const char* step_kind_name(StepKind kind) {
     case StepKind::transpose_blocks: return "transpose_blocks";
     case StepKind::invert_blocks: return "invert_blocks";
     case StepKind::root_blocks: return "root_blocks";
+    case StepKind::function_blocks: return "function_blocks";
     case StepKind::congruence_blocks: return "congruence_blocks";
     case StepKind::lyapunov_blocks: return "lyapunov_blocks";
     case StepKind::factor: return "factor";

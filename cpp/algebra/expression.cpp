@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <unordered_map>
+#include <unordered_set>
 
 #include "algebra/errors.h"
 #include "algebra/plan.h"
@@ -17,6 +19,17 @@ using Node = Expression::Node;
 
 size_t mix(size_t seed, size_t value) { return seed ^ (value * 0x9e3779b97f4a7c15ULL + 0x7f4a7c15ULL + (seed << 6) + (seed >> 2)); }
 
+// The number in front and what it scales. Signs move freely, -(2X) is (-2)X, as they round nothing.
+std::pair<double, const Expression*> scaling(const Node& n) {
+  double c = n.coefficient;
+  const Expression* x = &n.children[0];
+  while (x->kind() == NodeKind::scaled && (std::abs(c) == 1 || std::abs(x->node().coefficient) == 1)) {
+    c *= x->node().coefficient;
+    x = &x->children()[0];
+  }
+  return {c, x};
+}
+
 size_t hash_of(const Node& n) {
   size_t h = mix(17, static_cast<size_t>(n.kind));
   switch (n.kind) {
@@ -24,10 +37,14 @@ size_t hash_of(const Node& n) {
       h = mix(mix(mix(h, n.symbol.definition->id), reinterpret_cast<size_t>(n.symbol.source.get())), reinterpret_cast<size_t>(n.symbol.binding.get()));
       for (int a : n.symbol.arguments) h = mix(h, a);
       return h;
+    case NodeKind::block_function: return mix(mix(h, n.symbol.definition->id), n.children[0].node().hash);
     case NodeKind::vector: return mix(h, std::hash<std::string>()(n.name));
     case NodeKind::constant: return mix(h, reinterpret_cast<size_t>(n.constant.get()));
     case NodeKind::external: return mix(h, reinterpret_cast<size_t>(n.external.get()));
-    case NodeKind::scaled: return mix(mix(h, std::hash<double>()(n.coefficient)), n.children[0].node().hash);
+    case NodeKind::scaled: {
+      const auto [c, x] = scaling(n);
+      return mix(mix(h, std::hash<double>()(c)), x->node().hash);
+    }
     case NodeKind::sum: {
       size_t total = 0;  // whatever the order
       for (const Expression& c : n.children) total += mix(31, c.node().hash);
@@ -86,8 +103,13 @@ bool operator==(const Expression& a, const Expression& b) {
     case NodeKind::constant: return x.constant == y.constant;
     case NodeKind::external: return x.external == y.external;
     case NodeKind::sum: return commute_free_equal(x.children, y.children);
-    case NodeKind::scaled:
-      if (x.coefficient != y.coefficient) return false;
+    case NodeKind::scaled: {
+      const auto [c, s] = scaling(x);
+      const auto [d, t] = scaling(y);
+      return c == d && *s == *t;
+    }
+    case NodeKind::block_function:
+      if (x.symbol.definition != y.symbol.definition || x.symbol.source != y.symbol.source) return false;
       break;
     default: break;
   }
@@ -300,11 +322,26 @@ Expression block_diagonal(const Expression& a) {
 }
 
 Expression square_root(const Expression& a) {
-  if (a.floating()) return a;
+  if (a.kind() == NodeKind::identity) return a;
+  if (a.floating()) throw SpaceError("sqrt(" + label(a) + "): it has no space yet");
   if (!is_block_diagonal(a) || !is_symmetric(a))
     throw SpaceError("sqrt(" + label(a) + "): a square root is taken of a symmetric block-diagonal operator, body by body");
   const Space domain = a.domain().dual() == a.domain() ? a.domain() : Space(SpaceKind::Whitened, a.domain().layout_pointer());
   return make(Node{NodeKind::square_root, domain, a.codomain(), {a}});
+}
+
+Expression block_function(const SymbolDefinition& function, std::shared_ptr<SkoSource> source, std::shared_ptr<const Binding> binding, const Expression& operand) {
+  Node n{NodeKind::block_function, source->space(function.domain, {}), source->space(function.codomain, {}), {operand}};
+  n.symbol = Symbol{&function, std::move(source), std::move(binding), {}, {}};
+  return make(std::move(n));
+}
+
+Expression lower_half(const Expression& a) {
+  static const SymbolDefinition definition{SymbolId::lower_half_of, "lower_half", "lower½", "\\operatorname{lower}_{1/2}", "lower triangle with half its diagonal",
+                                           SpaceKind::Theta, SpaceKind::Theta, Pattern::function};
+  Node n{NodeKind::block_function, a.domain(), a.codomain(), {a}};
+  n.symbol.definition = &definition;
+  return make(std::move(n));
 }
 
 Expression power(const Expression& a, int exponent) {
@@ -318,8 +355,17 @@ Expression power(const Expression& a, int exponent) {
 // ------------------------------------------------------------------ walks
 
 void visit(const Expression& e, const std::function<void(const Expression&)>& f) {
-  f(e);
-  for (const Expression& c : e.children()) visit(c, f);
+  if (e.children().empty()) return f(e);
+  // Derivatives share most of their parts: each is visited once.
+  std::unordered_set<const Node*> seen;
+  std::vector<Expression> todo = {e};
+  while (!todo.empty()) {
+    const Expression x = todo.back();
+    todo.pop_back();
+    if (!x.children().empty() && !seen.insert(x.get()).second) continue;
+    f(x);
+    todo.insert(todo.end(), x.children().rbegin(), x.children().rend());
+  }
 }
 
 Expression Expression::at(std::shared_ptr<const Binding> binding) const {
@@ -334,6 +380,11 @@ Expression Expression::at(std::shared_ptr<const Binding> binding) const {
         n.symbol.binding = binding;
         result = make(std::move(n));
       }
+    } else if (e.kind() == NodeKind::block_function) {
+      Node n = e.node();
+      if (!n.symbol.binding) n.symbol.binding = binding;
+      n.children[0] = walk(n.children[0]);
+      result = make(std::move(n));
     } else if (!e.children().empty()) {
       Node n = e.node();
       bool changed = false;

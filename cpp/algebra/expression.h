@@ -15,7 +15,7 @@ namespace pycraft {
 struct Plan;
 class PlanCache;
 
-enum class NodeKind { symbol, vector, identity, zero, constant, external, sum, product, scaled, transpose, inverse, block_diagonal, square_root };
+enum class NodeKind { symbol, vector, identity, zero, constant, external, sum, product, scaled, transpose, inverse, block_diagonal, square_root, block_function };
 
 // A user's numbers. Cut into tree blocks where they are block diagonal over the bodies; else dense.
 struct ConstantData {
@@ -63,7 +63,7 @@ struct Expression::Node {
   Space domain, codomain;
   std::vector<Expression> children;
   double coefficient = 1;                       // scaled
-  Symbol symbol{};                              // symbol
+  Symbol symbol{};                              // symbol, block_function (the function, and whose)
   std::string name;                             // vector
   std::shared_ptr<const ConstantData> constant;
   std::shared_ptr<const ExternalData> external;
@@ -110,6 +110,10 @@ Expression block_diagonal(const Expression& a);
 // L with A = L L*, block by block lower triangular (Cholesky); A symmetric and block diagonal.
 Expression square_root(const Expression& a);
 Expression power(const Expression& a, int exponent);
+// A block-diagonal operator made of an operand, body by body (Pattern::function); linear in it.
+Expression block_function(const SymbolDefinition& function, std::shared_ptr<SkoSource> source, std::shared_ptr<const Binding> binding, const Expression& operand);
+// The lower triangle of every diagonal block with half its diagonal: what differentiates a Cholesky factor.
+Expression lower_half(const Expression& a);
 
 // An identity (or an expression made of identities alone) given its space.
 Expression with_space(const Expression& e, const Space& space);
@@ -122,7 +126,7 @@ struct Context {
 inline bool operator==(const Context& a, const Context& b) { return a.source == b.source && a.binding == b.binding; }
 std::vector<Context> contexts(const Expression& e);
 
-// Calls f on every node below and including e, parents before children.
+// Calls f on every node below and including e, each once and before what is below it.
 void visit(const Expression& e, const std::function<void(const Expression&)>& f);
 
 // ------------------------------------------------------------------ how an expression is shown

@@ -113,6 +113,17 @@ class Lowering {
         const Expression root = square_root(run(e.children()[0], false));
         return t ? root.T() : root;
       }
+      case NodeKind::block_function: {
+        const Expression& operand = e.children()[0];
+        const Expression inner = run(operand, false);
+        if (inner.kind() == NodeKind::zero) return zero(domain, codomain);
+        Expression made = e;
+        if (inner.get() != operand.get()) {
+          const Symbol& s = e.node().symbol;
+          made = s.source ? block_function(*s.definition, s.source, s.binding, inner) : lower_half(inner);
+        }
+        return t ? made.T() : made;
+      }
       case NodeKind::block_diagonal: {
         const Expression inner = run(e.children()[0], t);
         if (is_block_diagonal(inner)) return inner;

@@ -64,7 +64,7 @@ MatrixTree::MatrixTree(SkoStructure s, std::string name, std::vector<std::vector
 Traits MatrixTree::traits() const {
   bool with_J = false;
   for (const auto& block : J) with_J |= std::any_of(block.begin(), block.end(), [](double x) { return x != 0; });
-  return {structure().is_chain(), structure().single_dof(), true, with_J, structure().free_root()};
+  return {structure().is_chain(), structure().single_dof(), true, with_J, structure().free_root(), structure().equal_blocks()};
 }
 
 void MatrixTree::check_state(const double*, size_t nq, const double*, size_t nv) const {

@@ -25,7 +25,7 @@ enum class StepKind {
   apply_column,      // y = v x or v* x for a vector register v
   apply_external,    // y = L x or L* x for somebody else's operator
   combine,           // y = Σ c_i x_i
-  vector_symbol,     // y = a vector of the model
+  vector_symbol,     // y = a vector of the model, or a constant one
   zero,              // y = 0
   load_blocks,       // blocks of a symbol or a block-diagonal constant
   identity_blocks,
@@ -34,7 +34,8 @@ enum class StepKind {
   transpose_blocks,
   invert_blocks,     // body by body
   root_blocks,       // Cholesky factor, body by body
-  congruence_blocks, // blockdiag(E B E*), tip to base
+  function_blocks,   // a linear function of a vector or of blocks, body by body
+  congruence_blocks, // blockdiag(E B E*), tip to base; blockdiag(E* B E), base to tip (transposed)
   lyapunov_blocks,   // blockdiag(φBφ*), blockdiag(ψBψ*) tip to base; blockdiag(φ*Bφ), blockdiag(ψ*Bψ) base to tip (transposed)
   factor,            // block elimination of a realization over the tree
   solve,             // y = T⁻¹-solution of a factored realization

@@ -132,6 +132,18 @@ int Planner::blocks(const Expression& e) {
       r = emit(std::move(s), out);
       break;
     }
+    case NodeKind::block_function: {
+      const Symbol& symbol = e.node().symbol;
+      const Expression& operand = e.children()[0];
+      Step s{StepKind::function_blocks};
+      s.symbol = symbol;
+      if (symbol.source) s.context = context_of(symbol, Group::kinematics);
+      s.in = {symbol.source ? column(operand) : blocks(operand)};
+      s.bytes = 8 * entries;
+      s.text = "blocks: " + show(e);
+      r = emit(std::move(s), out);
+      break;
+    }
     case NodeKind::block_diagonal: r = diagonal_blocks(e.children()[0]); break;
     default: throw EvaluationError(show(e) + " has no blocks");
   }

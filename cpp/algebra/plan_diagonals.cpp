@@ -66,7 +66,7 @@ std::optional<int> Planner::diagonal_by_structure(const Expression& e) {
         }
         return r;
       }
-      // A φ X φ* B with A, X, B block diagonal: a Lyapunov sweep.
+      // A φ X φ* B with A, X, B block diagonal: a Lyapunov sweep. A E* X E B: a step base to tip.
       size_t i = 0;
       while (i < f.size() && is_block_diagonal(f[i])) ++i;
       size_t j = f.size();
@@ -74,9 +74,9 @@ std::optional<int> Planner::diagonal_by_structure(const Expression& e) {
       if (j < i + 2) return std::nullopt;
       bool left_t = false, right_t = false;
       const Symbol *left = letter_of(f[i], left_t), *right = letter_of(f[j - 1], right_t);
-      if (!left || !right || left->definition != right->definition || left->definition->pattern != Pattern::resolvent || !same_model(*left, *right) ||
-          left_t == right_t)
-        return std::nullopt;
+      if (!left || !right || left->definition != right->definition || !same_model(*left, *right) || left_t == right_t) return std::nullopt;
+      const bool edges = left->definition->pattern == Pattern::edges && left_t;
+      if (left->definition->pattern != Pattern::resolvent && !edges) return std::nullopt;
       for (size_t k = i + 1; k + 1 < j; ++k)
         if (!is_block_diagonal(f[k])) return std::nullopt;
       int middle;
@@ -85,7 +85,7 @@ std::optional<int> Planner::diagonal_by_structure(const Expression& e) {
       } else {
         middle = blocks(product_of(std::vector<Expression>(f.begin() + i + 1, f.begin() + j - 1)));
       }
-      Step s{StepKind::lyapunov_blocks};
+      Step s{edges ? StepKind::congruence_blocks : StepKind::lyapunov_blocks};
       s.in = {middle};
       s.symbol = *left;
       s.transposed = left_t;

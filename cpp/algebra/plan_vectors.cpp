@@ -113,6 +113,7 @@ int Planner::apply(const Expression& e, int x) {
     case NodeKind::product: y = apply_product(e.children(), x, e); break;
     case NodeKind::inverse: y = apply_inverse(e, x); break;
     case NodeKind::block_diagonal:
+    case NodeKind::block_function:
     case NodeKind::square_root: y = apply_blocks(blocks(e), false, x, show(e)); break;
   }
   vector_memo_[key] = y;
@@ -277,6 +278,50 @@ int Planner::vector_value(const Expression& e) {
     s.text = show(e);
     r = emit(std::move(s), {RegisterKind::vector, e.codomain(), {}, nullptr, false});
   }
+  block_memo_[id_of(e)] = r;
+  return r;
+}
+
+int Planner::column(const Expression& e) {
+  const auto known = block_memo_.find(id_of(e));
+  if (known != block_memo_.end()) return known->second;
+  int r = -1;
+  switch (e.kind()) {
+    case NodeKind::vector: return vector_value(e);
+    case NodeKind::symbol:
+      if (e.node().symbol.definition->pattern == Pattern::vector) return vector_value(e);
+      break;
+    case NodeKind::constant: {
+      if (!(e.domain() == Space::euclidean(1))) break;
+      Step s{StepKind::vector_symbol};
+      s.constant = e.node().constant;
+      s.bytes = vector_bytes(e.codomain());
+      s.text = show(e);
+      r = emit(std::move(s), {RegisterKind::vector, e.codomain(), {}, nullptr, false});
+      break;
+    }
+    case NodeKind::product: {
+      const auto& f = e.children();
+      r = apply_product(std::vector<Expression>(f.begin(), f.end() - 1), column(f.back()), e);
+      break;
+    }
+    case NodeKind::scaled:
+    case NodeKind::sum: {
+      Step s{StepKind::combine};
+      for (const Expression& t : e.kind() == NodeKind::sum ? e.children() : std::vector<Expression>{e}) {
+        const Scaled part = split_scalar(t);
+        s.in.push_back(column(part.expression));
+        s.coefficients.push_back(part.coefficient);
+      }
+      s.flops = 2.0 * e.codomain().dimension() * s.in.size();
+      s.bytes = vector_bytes(e.codomain());
+      s.text = show(e);
+      r = emit(std::move(s), {RegisterKind::vector, e.codomain(), {}, nullptr, false});
+      break;
+    }
+    default: break;
+  }
+  if (r < 0) throw EvaluationError(show(e) + " is no vector that a block can be made of");
   block_memo_[id_of(e)] = r;
   return r;
 }

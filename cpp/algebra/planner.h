@@ -39,6 +39,7 @@ class Planner {
   int apply_inverse(const Expression& e, int x);
   int apply_blocks(int block, bool transposed, int x, const std::string& text);
   int vector_value(const Expression& e);
+  int column(const Expression& e);   // a vector expression as one column, whatever the run's width
   int solve_realization(const Expression& e, int x);
   int solve_dense(const Expression& operand, int x, const std::string& reason);
 

@@ -22,7 +22,8 @@ unsigned triangles(const Expression& e) {
     case NodeKind::symbol: {
       const SymbolDefinition& d = *e.node().symbol.definition;
       switch (d.pattern) {
-        case Pattern::block_diagonal: return both;
+        case Pattern::block_diagonal:
+        case Pattern::function: return both;
         case Pattern::edges:
         case Pattern::resolvent: return upper;
         case Pattern::compound: return triangles(lower(d.expand(e.node().symbol), true));
@@ -32,6 +33,7 @@ unsigned triangles(const Expression& e) {
     }
     case NodeKind::identity:
     case NodeKind::square_root:
+    case NodeKind::block_function:
     case NodeKind::block_diagonal: return both;
     case NodeKind::zero: return e.domain().belongs_to_bodies() && e.codomain().belongs_to_bodies() ? both : 0u;
     case NodeKind::constant: return e.node().constant->blocks.empty() ? 0u : both;

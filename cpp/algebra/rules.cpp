@@ -15,7 +15,7 @@ namespace {
 class Prototype final : public SkoSource {
  public:
   Prototype() : SkoSource(skeleton(), "prototype") {}
-  Traits traits() const override { return {true, true, true, true, true}; }
+  Traits traits() const override { return {true, true, true, true, true, true}; }
   int nq() const override { return 0; }
   int nv() const override { return 0; }
   void check_state(const double*, size_t, const double*, size_t) const override {}

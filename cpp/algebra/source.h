@@ -43,6 +43,7 @@ struct Traits {
   bool constant_hinges; // H constant in the body's frame: no hinge of several subhinges
   bool hinge_diagonal;  // J != 0
   bool free_root;       // one root, its hinge free: H square there
+  bool equal_blocks;    // every body has as many rows as its parent: E square
 };
 
 // The source a space belongs to, while it lives; null for R^n.

@@ -34,6 +34,12 @@ bool SkoStructure::single_dof() const {
   return std::all_of(dof.begin(), dof.end(), [](int n) { return n <= 1; });
 }
 
+bool SkoStructure::equal_blocks() const {
+  for (int k = 0; k < bodies(); ++k)
+    if (parent[k] >= 0 && size[k] != size[parent[k]]) return false;
+  return true;
+}
+
 bool SkoStructure::free_root() const {
   return std::count(parent.begin(), parent.end(), -1) == 1 && dof[0] == size[0];
 }

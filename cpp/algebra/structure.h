@@ -21,6 +21,7 @@ struct SkoStructure {
   void finish();
   bool is_chain() const;                       // every body's parent is the body before it
   bool single_dof() const;                     // no hinge of more than one coordinate
+  bool equal_blocks() const;                   // every body as many rows as its parent
   bool free_root() const;                      // one root, with as many coordinates as rows
 };
 

@@ -19,6 +19,7 @@ enum class Pattern {
   edges,           // block (parent of k, k) only: strictly triangular, nilpotent
   resolvent,       // (I - edges)⁻¹: unit triangular, applied by a sweep and never formed
   compound,        // an abbreviation: expand() says for what
+  function,        // a block-diagonal operator made of another operator's blocks, or of a vector: lower½(X), crm(x)
   vector           // a column: a vector of the codomain that the model provides
 };
 
@@ -28,7 +29,7 @@ struct Group {
 };
 
 // The SKO symbols, which any tree of blocks has. Mechanics adds its own, from first_extra on.
-enum SymbolId : int { E, phi, phi_tilde, H, M, J, P, P_plus, D, G, K, tau, tau_bar, E_psi, psi, psi_tilde, R, Upsilon, Omega, first_extra };
+enum SymbolId : int { E, phi, phi_tilde, H, M, J, P, P_plus, D, G, K, tau, tau_bar, E_psi, psi, psi_tilde, R, Upsilon, Omega, lower_half_of, first_extra };
 
 struct Symbol;
 

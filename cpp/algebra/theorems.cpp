@@ -16,6 +16,7 @@ std::vector<std::string> hypothesis_names(unsigned h) {
   if (h & constant_hinges) names.push_back("constant H");
   if (h & no_loop) names.push_back("no loop");
   if (h & free_root) names.push_back("free root");
+  if (h & equal_blocks) names.push_back("blocks of one size");
   return names;
 }
 
@@ -26,6 +27,7 @@ unsigned unmet(unsigned h, const Traits& t) {
   if ((h & single_dof) && !t.single_dof) missing |= single_dof;
   if ((h & constant_hinges) && !t.constant_hinges) missing |= constant_hinges;
   if ((h & free_root) && !t.free_root) missing |= free_root;
+  if ((h & equal_blocks) && !t.equal_blocks) missing |= equal_blocks;
   return missing;
 }
 
@@ -189,7 +191,7 @@ std::vector<Theorem> sko_theorems(const std::shared_ptr<SkoSource>& source) {
     list.back().text = text;
     list.back().latex = latex;
   };
-  state("#58 two-filter form", Upsilon.inv(), P + other - other * H.T() * (H * other * H.T()).inv() * H * other, free_root | no_hinge_diagonal, check, "soa.md #58");
+  state("#58 two-filter form", Upsilon.inv(), P + other - other * H.T() * (H * other * H.T()).inv() * H * other, free_root | equal_blocks | no_hinge_diagonal, check, "soa.md #58");
   shown("Υ⁻¹ = P + S⁺,  S = (E*ΥE)⁻¹ - P⁺", "\\Upsilon^{-1} = P + S^{+},\\quad S = (\\mathcal{E}^*\\Upsilon \\mathcal{E})^{-1} - P^{+}");
   const Letters grouped(std::make_shared<AggregatedTree>(source));
   state("#64 bodies grouped in pairs: the same mass matrix", grouped.H * grouped.phi * grouped.M * grouped.phi.T() * grouped.H.T(), MM, no_hypothesis, check,

@@ -55,6 +55,7 @@ class TreeValues : public SkoValues<typename Blocks::Scalar> {
     }
   }
   void block(const Symbol& symbol, int k, S* out) const override { blocks_.block(symbol.definition->id, k, out); }
+  void function_block(const Symbol& function, const S*, S*) const override { throw EvaluationError("no function '" + function.definition->ascii + "' here"); }
   void vector(const Symbol& symbol, S*) const override { throw EvaluationError("no vector '" + symbol.definition->ascii + "' here"); }
   void mass_matrix(bool with_hinge_diagonal, const S* x, S* y, int m, S* scratch) const override {
     mass_matrix_apply(tree_, blocks_, with_hinge_diagonal, x, y, m, scratch);

@@ -30,6 +30,8 @@ class Workspace {
       if (reg.kind == RegisterKind::blocks) blocks_[r].shape(reg.space, reg.columns);
     }
     for (const Step& s : plan_->steps)
+      functions_of_vectors_ |= s.kind == StepKind::function_blocks && plan_->registers[s.in[0]].kind == RegisterKind::vector;
+    for (const Step& s : plan_->steps)
       if (s.operand) operands_.emplace_back(&s, std::make_unique<Workspace>(s.operand));
   }
 
@@ -41,7 +43,8 @@ class Workspace {
     }
     for (const Step& s : plan_->steps) {
       const bool per_column = s.out >= 0 && plan_->registers[s.out].kind == RegisterKind::vector;
-      if (!values_changed && !per_column) continue;
+      // a function of a vector, and what is made of it, may hang on a named vector
+      if (!values_changed && !per_column && !functions_of_vectors_) continue;
       step(s, values, columns, counts);
     }
   }
@@ -111,7 +114,12 @@ class Workspace {
         }
         return;
       }
-      case StepKind::vector_symbol: values[s.context]->vector(s.symbol, vectors_[s.out].data()); return;
+      case StepKind::vector_symbol:
+        if (s.constant)
+          std::transform(s.constant->dense.begin(), s.constant->dense.end(), vectors_[s.out].begin(), [](double v) { return S(v); });
+        else
+          values[s.context]->vector(s.symbol, vectors_[s.out].data());
+        return;
       case StepKind::zero: std::fill(vectors_[s.out].begin(), vectors_[s.out].end(), S(0)); return;
       case StepKind::load_blocks:
       case StepKind::identity_blocks:
@@ -120,6 +128,7 @@ class Workspace {
       case StepKind::transpose_blocks:
       case StepKind::invert_blocks:
       case StepKind::root_blocks:
+      case StepKind::function_blocks:
       case StepKind::congruence_blocks:
       case StepKind::lyapunov_blocks: block_step(s, values); return;
       case StepKind::factor: {
@@ -286,7 +295,7 @@ class Workspace {
       wide = std::make_unique<TreeElimination<Quad>>(s.realization);
       if (wide->factor(blocks, numbers, Quad(1e7) * Quad(epsilon<S>()))) return note("quad: " + reason + "; eliminated in quad precision");
     }
-    throw SingularOperatorError(reason + ": it counts as singular at this state");
+    throw SingularOperatorError((wide ? wide->note() : reason) + ": it counts as singular at this state");
   }
 
   template <class F>
@@ -374,11 +383,25 @@ class Workspace {
       case StepKind::root_blocks:
         for (int k = 0; k < bodies; ++k) root_block(in(0), out, k);
         return;
+      case StepKind::function_blocks:
+        for (int k = 0; k < bodies; ++k) {
+          if (s.context >= 0) {
+            const Space& space = plan_->registers[s.in[0]].space;
+            gathered_.clear();
+            elimination::for_rows(space, k, [&](int, int row) { gathered_.push_back(vectors_[s.in[0]][row]); });
+            values[s.context]->function_block(s.symbol, gathered_.data(), out.at(k));
+          } else {
+            const int n = out.rows[k];
+            for (int i = 0; i < n; ++i)
+              for (int j = 0; j < n; ++j) out.at(k)[i * n + j] = i > j ? in(0).at(k)[i * n + j] : i == j ? in(0).at(k)[i * n + j] / S(2) : S(0);
+          }
+        }
+        return;
       case StepKind::congruence_blocks:
         std::fill(out.data.begin(), out.data.end(), S(0));
         for (int k = 0; k < bodies; ++k) {
           const int p = structure(s).parent[k];
-          if (p >= 0) add_congruence(s, values, k, in(0).at(k), out.at(p), false);
+          if (p >= 0) add_congruence(s, values, k, in(0).at(s.transposed ? p : k), out.at(s.transposed ? k : p), s.transposed);
         }
         return;
       case StepKind::lyapunov_blocks:
@@ -453,6 +476,7 @@ class Workspace {
   std::shared_ptr<const Plan> plan_;
   std::vector<std::vector<S>> vectors_;
   std::vector<BlockStorage<S>> blocks_;
+  bool functions_of_vectors_ = false;
   std::vector<S> scalars_;
   std::vector<std::vector<S>> dense_;
   struct Factors {
@@ -463,7 +487,7 @@ class Workspace {
   std::vector<SmallLU<S>> dense_lu_;
   std::vector<std::pair<const Step*, std::unique_ptr<Workspace>>> operands_;
   SmallLU<S> lu_;
-  std::vector<S> scratch_, block_, product_, magnitude_;
+  std::vector<S> gathered_, scratch_, block_, product_, magnitude_;
   std::vector<std::string> notes_;
 
  public:

@@ -30,6 +30,8 @@ void register_scalars(py::module_& m);
 void register_plans(py::module_& m);
 void register_multibody(py::module_& m);
 void register_dynamics(py::module_& m);
+void register_calculus(py::module_& m);
+void register_sensitivities(py::module_& m);
 void register_theorems(py::module_& m);
 void register_bench(py::module_& m);
 

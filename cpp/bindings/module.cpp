@@ -45,8 +45,10 @@ PYBIND11_MODULE(_core, m) {
   pycraft::register_constants(m);
   pycraft::register_pickling(m);
   pycraft::register_scalars(m);
+  pycraft::register_calculus(m);
   pycraft::register_plans(m);
   pycraft::register_dynamics(m);
+  pycraft::register_sensitivities(m);
   pycraft::register_theorems(m);
   pycraft::register_bench(m);
 }

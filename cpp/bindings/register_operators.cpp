@@ -255,7 +255,7 @@ void register_operators(py::module_& m) {
       }, py::arg("request") = "apply", py::arg("rules") = true, "The plan: what is run, step by step, with its cost.")
       .def_property_readonly("children", [](const Expression& e) { return e.children(); })
       .def_property_readonly("kind", [](const Expression& e) {
-        static const char* names[] = {"symbol", "vector", "identity", "zero", "constant", "external", "sum", "product", "scaled", "transpose", "inverse", "blockdiag", "sqrt"};
+        static const char* names[] = {"symbol", "vector", "identity", "zero", "constant", "external", "sum", "product", "scaled", "transpose", "inverse", "blockdiag", "sqrt", "function"};
         return names[static_cast<int>(e.kind())];
       })
       .def_property_readonly("coefficient", [](const Expression& e) { return e.node().coefficient; })

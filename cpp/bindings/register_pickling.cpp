@@ -1,7 +1,7 @@
 // Expressions as plain parts and back: pickling, copying.
 #include "algebra/errors.h"
 #include "bindings/bindings.h"
-#include "operators/multibody_operators.h"
+#include "operators/directions.h"
 
 namespace pycraft {
 
@@ -9,6 +9,8 @@ namespace {
 
 // Where a symbol's source comes back from in Python: the model's operators.
 py::object source_of(const Symbol& s) { return py::cast(s.source); }
+
+py::object binding_of(const Symbol& s) { return s.binding ? py::cast(std::const_pointer_cast<Binding>(s.binding)) : py::none(); }
 
 // A space as its model and kind, so that it can be pickled and found again.
 py::tuple space_parts(const Space& s) {
@@ -40,17 +42,21 @@ py::tuple parts(const Expression& e) {
   py::object payload = py::none();
   switch (n.kind) {
     case NodeKind::symbol: {
-      py::list names;
-      if (const auto mechanics = std::dynamic_pointer_cast<MultibodyOperators>(n.symbol.source); mechanics && n.symbol.definition->id >= first_extra)
-        for (int a : n.symbol.arguments) {
-          if (n.symbol.definition->id == MechanicsSymbolId::Delta)
-            names.append(a);
-          else
-            names.append(a >= 0 ? mechanics->model()->node(a).name : mechanics->model()->body(-1 - a).name);
-        }
-      payload = py::make_tuple(source_of(n.symbol), n.symbol.definition->ascii, names, n.symbol.binding ? py::cast(std::const_pointer_cast<Binding>(n.symbol.binding)) : py::none());
+      // Nodes by name: their numbers may differ in the model that is there then.
+      std::vector<std::string> nodes;
+      std::vector<int> numbers = n.symbol.arguments;
+      const int id = n.symbol.definition->id;
+      if (id == MechanicsSymbolId::B || id == MechanicsSymbolId::Jacobian || id == MechanicsSymbolId::Lambda) {
+        const auto mechanics = std::dynamic_pointer_cast<MultibodyOperators>(n.symbol.source);
+        for (int a : numbers) nodes.push_back(a >= 0 ? mechanics->model()->node(a).name : mechanics->model()->body(-1 - a).name);
+        numbers.clear();
+      }
+      payload = py::make_tuple(source_of(n.symbol), n.symbol.definition->ascii, numbers, nodes, n.symbol.argument_text, binding_of(n.symbol));
       break;
     }
+    case NodeKind::block_function:
+      payload = n.symbol.source ? py::object(py::make_tuple(source_of(n.symbol), n.symbol.definition->ascii, binding_of(n.symbol))) : py::object(py::none());
+      break;
     case NodeKind::vector: payload = py::make_tuple(n.name, space_parts(n.codomain)); break;
     case NodeKind::identity: payload = e.floating() ? py::object(py::none()) : py::object(space_parts(n.domain)); break;
     case NodeKind::zero: payload = py::make_tuple(space_parts(n.domain), space_parts(n.codomain)); break;
@@ -72,7 +78,13 @@ void register_pickling(py::module_& m) {
     if (kind == "transpose") return children[0].T();
     if (kind == "inverse") return children[0].inv();
     if (kind == "blockdiag") return block_diagonal(children[0]);
+    if (kind == "function") return lower_half(children[0]);
     return square_root(children[0]);
+  });
+  m.def("_function", [](const std::shared_ptr<SkoSource>& source, const std::string& name, const std::shared_ptr<Binding>& binding, const Expression& operand) {
+    for (const SymbolDefinition& d : derivative_symbols())
+      if (d.ascii == name) return block_function(d, source, binding, operand);
+    throw EvaluationError("no function is called '" + name + "'");
   });
   m.def("_leaf_from_parts", [](const std::string& kind, const py::object& payload) {
     if (kind == "identity") return payload.is_none() ? identity() : identity(space_from_parts(payload.cast<py::tuple>()));

@@ -6,7 +6,7 @@
 #include "algebra/realization.h"
 #include "algebra/values.h"
 #include "bindings/bindings.h"
-#include "operators/multibody_operators.h"
+#include "operators/directions.h"
 
 namespace pycraft {
 
@@ -140,7 +140,7 @@ std::shared_ptr<SkoValues<double>> values_at(const Context& c, unsigned groups, 
 py::object numbers_of(const Plan& p, size_t context, const std::string& name, const std::vector<int>& arguments, int state) {
   const Context& c = p.contexts.at(context);
   c.source->check_current();
-  for (const auto* symbols : {&sko_symbols(), &mechanics_symbols()})
+  for (const auto* symbols : {&sko_symbols(), &mechanics_symbols(), &derivative_symbols()})
     for (const SymbolDefinition& d : *symbols) {
       if (d.ascii != name) continue;
       const Symbol symbol{&d, nullptr, nullptr, arguments, ""};

@@ -4,7 +4,7 @@
 #include "algebra/errors.h"
 #include "algebra/matrix_tree.h"
 #include "bindings/bindings.h"
-#include "operators/multibody_operators.h"
+#include "operators/directions.h"
 
 namespace pycraft {
 
@@ -15,10 +15,20 @@ const SymbolDefinition& definition_named(const std::string& name) {
     if (d.ascii == name) return d;
   for (const SymbolDefinition& d : mechanics_symbols())
     if (d.ascii == name) return d;
+  for (const SymbolDefinition& d : derivative_symbols())
+    if (d.ascii == name) return d;
   throw EvaluationError("no operator is called '" + name + "'");
 }
 
 }  // namespace
+
+// A symbol as it was pickled: arguments are numbers, or the names of nodes.
+Expression symbol_again(const std::shared_ptr<SkoSource>& source, const std::string& name, const std::vector<int>& numbers, const std::vector<std::string>& nodes,
+                        const std::string& text) {
+  if (!nodes.empty()) return source_symbol(source, name, nodes, -1);
+  source->check_current();
+  return make_symbol(definition_named(name), source, numbers, text);
+}
 
 Expression source_symbol(const std::shared_ptr<SkoSource>& source, const std::string& name, const std::vector<std::string>& nodes, int coordinate) {
   const SymbolDefinition& d = definition_named(name);
@@ -121,10 +131,11 @@ void register_sources(py::module_& m) {
       .def_property_readonly("traits", [](const SkoSource& s) {
         const Traits t = s.traits();
         py::dict d;
-        d["serial chain"] = t.chain, d["single-DOF hinges"] = t.single_dof, d["constant H"] = t.constant_hinges, d["J = 0"] = !t.hinge_diagonal;
+        d["serial chain"] = t.chain, d["single-DOF hinges"] = t.single_dof, d["constant H"] = t.constant_hinges, d["J = 0"] = !t.hinge_diagonal, d["blocks of one size"] = t.equal_blocks;
         return d;
       })
       .def("symbol", &source_symbol, py::arg("name"), py::arg("nodes") = std::vector<std::string>(), py::arg("coordinate") = -1)
+      .def("_symbol_again", &symbol_again)
       .def("nodes_space", [](const std::shared_ptr<SkoSource>& s, const std::vector<std::string>& nodes, bool motions) {
         const Expression b = source_symbol(s, "B", nodes, -1);
         return motions ? b.domain().dual() : b.domain();

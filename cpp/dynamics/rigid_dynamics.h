@@ -3,10 +3,10 @@
 #pragma once
 
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
+#include "dynamics/workspace_pool.h"
 #include "model/multibody.h"
 #include "operators/rigid_blocks.h"
 #include "recursions/velocities.h"
@@ -42,35 +42,7 @@ extern template class RigidDynamics<double>;
 extern template class RigidDynamics<Extended>;
 extern template class RigidDynamics<Quad>;
 
-// Workspaces of one model, taken and given back: threads do not share them.
 template <class S>
-class DynamicsPool {
- public:
-  template <class F>
-  void with(const Multibody& model, F f) {
-    std::unique_ptr<RigidDynamics<S>> workspace;
-    {
-      std::lock_guard<std::mutex> lock(mutex_);
-      if (version_ != model.parameters()) {
-        free_.clear();
-        version_ = model.parameters();
-      }
-      if (!free_.empty()) {
-        workspace = std::move(free_.back());
-        free_.pop_back();
-      }
-    }
-    if (!workspace) workspace = std::make_unique<RigidDynamics<S>>(model);
-    const auto version = model.parameters();
-    f(*workspace);
-    std::lock_guard<std::mutex> lock(mutex_);
-    if (version == version_) free_.push_back(std::move(workspace));
-  }
-
- private:
-  std::mutex mutex_;
-  std::uint64_t version_ = 0;
-  std::vector<std::unique_ptr<RigidDynamics<S>>> free_;
-};
+using DynamicsPool = WorkspacePool<RigidDynamics<S>>;
 
 }  // namespace pycraft

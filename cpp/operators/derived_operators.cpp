@@ -98,6 +98,7 @@ Traits DerivedOperators::traits() const {
   Traits t = base_->traits();
   t.single_dof = structure().single_dof();
   t.free_root = structure().free_root();
+  t.equal_blocks = structure().equal_blocks();
   return t;
 }
 

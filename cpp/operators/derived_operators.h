@@ -21,6 +21,7 @@ class DerivedOperators : public SkoSource {
   std::shared_ptr<const StateData> state() const override { return base_->state(); }
   std::uint64_t parameters() const override { return base_->parameters(); }
   const Multibody& model() const { return *base_->model(); }
+  const std::shared_ptr<MultibodyOperators>& base() const { return base_; }
 
  protected:
   DerivedOperators(SkoStructure structure, const std::string& name, std::shared_ptr<MultibodyOperators> base);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "operators/directions.h"
 #include "operators/rigid_values.h"
 
 namespace pycraft {
@@ -11,7 +12,7 @@ MultibodyOperators::MultibodyOperators(std::shared_ptr<Multibody> model) : SkoSo
 Traits MultibodyOperators::traits() const {
   bool constant = true;
   for (int k = 0; k < model_->bodies(); ++k) constant &= model_->body(k).hinge.subhinges.size() <= 1;
-  return {structure().is_chain(), structure().single_dof(), constant, model_->has_rotor_inertia(), structure().free_root()};
+  return {structure().is_chain(), structure().single_dof(), constant, model_->has_rotor_inertia(), structure().free_root(), structure().equal_blocks()};
 }
 
 Space MultibodyOperators::space(SpaceKind kind, const std::vector<int>& nodes) const {
@@ -67,6 +68,14 @@ void cross_motion_block(const Vector6<S>& V, S* out) {
   put(skew(V.linear), out, 6, 3, 0);
   put(skew(V.angular), out, 6, 3, 3);
 }
+// -[[ñ, f̃], [f̃, 0]]
+template <class S>
+void momentum_cross_block(const Vector6<S>& h, S* out) {
+  std::fill_n(out, 36, S(0));
+  put(S(-1) * skew(h.angular), out, 6, 0, 0);
+  put(S(-1) * skew(h.linear), out, 6, 0, 3);
+  put(S(-1) * skew(h.linear), out, 6, 3, 0);
+}
 // φ = [[R, l~R], [0, R]]
 template <class S>
 void force_transform_block(const Pose<S>& X, S* out, int columns, int column) {
@@ -94,22 +103,40 @@ void RigidValues<S>::block(const Symbol& symbol, int k, S* out) const {
       return;
     }
     case Delta: {
-      const int i = symbol.arguments[0];
-      if (i >= tree.dof_offset[k] && i < tree.dof_offset[k + 1])
-        cross_force_block(b.H[i], out);
+      int body;
+      const Vector6<S> h = twist(symbol.arguments, body);
+      if (body == k)
+        cross_force_block(h, out);
       else
         std::fill_n(out, 36, S(0));
+      return;
+    }
+    case inertia_derivative:
+      std::fill_n(out, 36, S(0));
+      if (symbol.arguments[0] == k) inertia_derivative_block(symbol.arguments, out);
+      return;
+    case coordinate_selection: {
+      const int n = tree.dof[k];
+      std::fill_n(out, n * n, S(0));
+      if (symbol.arguments.size() == 1) {
+        const int i = symbol.arguments[0] - tree.dof_offset[k];
+        if (i >= 0 && i < n) out[i * n + i] = S(1);
+        return;
+      }
+      if (symbol.arguments[0] >= 0 && symbol.arguments[0] != k) return;
+      int j = 0, s = 0;
+      for (const Subhinge& h : model_.body(k).hinge.subhinges) {
+        for (int c = 0; c < h.nv(); ++c, ++j)
+          if (s >= symbol.arguments[1] && s < symbol.arguments[2]) out[j * n + j] = S(1);
+        ++s;
+      }
       return;
     }
     case Delta_theta_dot: cross_force_block(velocities_.relative[k], out); return;
     case V_tilde: cross_motion_block(velocities_.V[k], out); return;
     case V_bar: cross_force_block(velocities_.V[k], out); return;
     case momentum_cross: {
-      const Vector6<S> h = b.inertia[k] * velocities_.V[k];
-      std::fill_n(out, 36, S(0));
-      put(S(-1) * skew(h.angular), out, 6, 0, 0);
-      put(S(-1) * skew(h.linear), out, 6, 0, 3);
-      put(S(-1) * skew(h.linear), out, 6, 3, 0);
+      momentum_cross_block(b.inertia[k] * velocities_.V[k], out);
       return;
     }
     case X_world: force_transform_block(world_[k], out, 6, 0); return;
@@ -118,6 +145,74 @@ void RigidValues<S>::block(const Symbol& symbol, int k, S* out) const {
         for (int i = 0; i < 6; ++i) out[(j - tree.dof_offset[k]) * 6 + i] = velocities_.H_dot[j][i];
       return;
     default: b.block(symbol.definition->id, k, out);
+  }
+}
+
+template <class S>
+Vector6<S> RigidValues<S>::twist(const std::vector<int>& direction, int& body) const {
+  const SkoStructure& tree = this->tree_;
+  if (direction.size() == 1) {
+    body = 0;
+    while (tree.dof_offset[body + 1] <= direction[0]) ++body;
+    return this->blocks_.H[direction[0]];
+  }
+  // a twist fixed before a subhinge, carried past the steps that follow
+  body = direction[0];
+  Vector6<S> h = Vector6<S>::zero();
+  h[direction[2]] = S(1);
+  const CompiledModel<S>& model = *compiled_;
+  const S* q = q_.data() + model.q_offset[body];
+  for (int i = model.first_subhinge[body]; i < model.first_subhinge[body + 1]; ++i) {
+    if (i - model.first_subhinge[body] >= direction[1]) h = motion_to_child(subhinge_step(model.subhinges[i], q), h);
+    q += model.subhinges[i].kind == SubhingeKind::ball ? 4 : model.subhinges[i].kind == SubhingeKind::free ? 7 : 1;
+  }
+  return h;
+}
+
+// M is linear in the mass and in the inertia about the centre of mass, quadratic in the centre of mass c:
+// M = [[I + m(c·c 1 - cc*), m c~], [-m c~, m 1]]
+template <class S>
+void RigidValues<S>::inertia_derivative_block(const std::vector<int>& arguments, S* out) const {
+  const Body& body = model_.body(arguments[0]);
+  const Vector3<S> c = cast<S>(body.com);
+  S mass = S(body.mass), linear = S(0);
+  std::vector<int> along;
+  for (size_t i = 1; i < arguments.size(); ++i) {
+    if (arguments[i] == mass_of_body) {
+      mass = linear = S(1);
+    } else if (arguments[i] <= com_z) {
+      along.push_back(arguments[i] - com_x);
+    } else {
+      static const int row[] = {0, 0, 0, 1, 1, 2}, column[] = {0, 1, 2, 1, 2, 2};
+      const int a = row[arguments[i] - inertia_xx], b = column[arguments[i] - inertia_xx];
+      out[a * 6 + b] = out[b * 6 + a] = S(1);
+      return;
+    }
+  }
+  const auto unit = [](int a) {
+    Vector3<S> e = Vector3<S>::zero();
+    e[a] = S(1);
+    return e;
+  };
+  // moment and rotational part, differentiated along the components asked for
+  Vector3<S> moment = along.empty() ? c : along.size() == 1 ? unit(along[0]) : Vector3<S>::zero();
+  const Vector3<S> u = along.size() == 2 ? unit(along[1]) : c, w = along.empty() ? c : unit(along[0]);
+  const S half = along.empty() ? S(1) / S(2) : S(1);
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) out[i * 6 + j] = mass * half * ((i == j ? S(2) * dot(u, w) : S(0)) - (u[i] * w[j] + w[i] * u[j]));
+  put(mass * skew(moment), out, 6, 0, 3);
+  put(S(-1) * mass * skew(moment), out, 6, 3, 0);
+  if (along.empty())
+    for (int i = 3; i < 6; ++i) out[i * 6 + i] = linear;
+}
+
+template <class S>
+void RigidValues<S>::function_block(const Symbol& function, const S* x, S* out) const {
+  const Vector6<S> v{{x[0], x[1], x[2]}, {x[3], x[4], x[5]}};
+  switch (function.definition->id) {
+    case motion_cross: cross_motion_block(v, out); return;
+    case force_cross: cross_force_block(v, out); return;
+    default: momentum_cross_block(v, out);
   }
 }
 
@@ -133,6 +228,13 @@ void RigidValues<S>::vector(const Symbol& symbol, S* out) const {
     case velocity: copy(velocities_.V); return;
     case coriolis_acceleration: copy(velocities_.a); return;
     case gyroscopic_force: copy(velocities_.b); return;
+    case direction_twist: {
+      std::fill_n(out, 6 * tree.bodies(), S(0));
+      int body;
+      const Vector6<S> h = twist(symbol.arguments, body);
+      for (int i = 0; i < 6; ++i) out[6 * body + i] = h[i];
+      return;
+    }
     default: {
       const bool base = symbol.definition->id == gravity_base;
       const Vector6<S> g{Vector3<S>::zero(), compiled_->gravity};

@@ -18,6 +18,7 @@ class RigidValues final : public TreeValues<RigidBlocks<S>> {
 
   void block(const Symbol& symbol, int k, S* out) const override;
   void vector(const Symbol& symbol, S* out) const override;
+  void function_block(const Symbol& function, const S* x, S* out) const override;
 
   const CompiledModel<S>& compiled() const { return *compiled_; }
   const std::vector<S>& q() const { return q_; }
@@ -41,6 +42,10 @@ class RigidValues final : public TreeValues<RigidBlocks<S>> {
   }
 
  private:
+  // The twist of a direction (Delta's arguments) in the axes of its body, and the body.
+  Vector6<S> twist(const std::vector<int>& direction, int& body) const;
+  void inertia_derivative_block(const std::vector<int>& arguments, S* out) const;
+
   const Multibody& model_;
   std::shared_ptr<const CompiledModel<S>> compiled_;
   std::vector<S> q_, v_;

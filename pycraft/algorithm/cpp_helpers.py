@@ -162,6 +162,16 @@ inline Matrix root(const Matrix& A) {  // L, lower triangular, with A = L L*; co
 }
 """,
     ),
+    "lower_half": (
+        (),
+        """
+inline Matrix lower_half(const Matrix& A) {  // the lower triangle of A with half its diagonal
+  Matrix L = A.triangularView<Eigen::Lower>();
+  L.diagonal() /= 2;
+  return L;
+}
+""",
+    ),
     "diagonal": ((), "\ninline Matrix diagonal(const Matrix& A) { return A.diagonal(); }\n"),
     "trace": ((), "\ninline double trace(const Matrix& A) { return A.trace(); }\n"),
     "norm": ((), "\ninline double norm(const Matrix& A) { return A.norm(); }\n"),

@@ -20,6 +20,7 @@ from .formulas import (
     Item,
     Leaf,
     Letter,
+    Node,
     Quantity,
     Sweep,
     Term,
@@ -37,10 +38,12 @@ _LETTERS = {
     "tau_bar": ("τ̄", "\\bar\\tau"),
     "theta_dot": ("θ̇", "\\dot\\theta"),
     "X_root": ("X₀", "X_{0}"),
+    "dM": ("∂M", "\\partial M"),
+    "Pi": ("Π", "\\Pi"),
 }
 _RESERVED = set(
     "algorithm data parent children n m k p c np solve inverse cut stack ranges blocks zeros symmetric crm crf "
-    "cross_of_momentum root diagonal trace logdet norm square_root assembled Data Matrix Blocks Rows TreeSystem "
+    "cross_of_momentum lower_half root diagonal trace logdet norm square_root assembled Data Matrix Blocks Rows TreeSystem "
     "main run state int double float auto const for if else while return struct class namespace using template "
     "typename new delete this operator public private bool char void std Eigen size sum max min abs sqrt log "
     "present range list len reversed rows columns system short long signed unsigned switch case default do goto "
@@ -182,6 +185,15 @@ class Workbook:
             self.leaves.append(Leaf(made, "constant", numbers=numbers))
         return self._constants[data["id"]]
 
+    def constant_vector(self, data: dict[str, Any], rows: Cut | int) -> Quantity:
+        """A user's vector."""
+        if data["id"] not in self._constants:
+            shape = {"kind": "blocks", "tree": rows.tree} if isinstance(rows, Cut) else {"kind": "matrix"}
+            made = self.named(data["name"], rows=rows, columns=1, **shape)
+            self._constants[data["id"]] = made
+            self.leaves.append(Leaf(made, "constant", numbers=data["dense"].reshape(-1, 1)))
+        return self._constants[data["id"]]
+
     def external(self, name: str, transposed: bool, rows: Cut | int, columns: Cut | int) -> Quantity:
         """Somebody else's operator, or its transpose: a function of matrices."""
         if (name, transposed) not in self._externals:
@@ -209,8 +221,8 @@ def total(cut: Cut | int) -> int:
     return cut if isinstance(cut, int) else cut.total
 
 
-_SQUARE = ("M", "P", "P_plus", "R", "Upsilon", "V_tilde", "V_bar", "Delta_theta_dot", "momentum_cross", "X_world", "Delta", "tau_bar")
-_GIVEN = ("E", "H", "M", "J", "H_dot", "B", "theta_dot", "gravity_base")
+_SQUARE = ("M", "P", "P_plus", "R", "Upsilon", "V_tilde", "V_bar", "Delta_theta_dot", "momentum_cross", "X_world", "Delta", "tau_bar", "dM")
+_GIVEN = ("E", "H", "M", "J", "H_dot", "B", "theta_dot", "gravity_base", "dM", "Pi")
 
 
 class Model:
@@ -240,6 +252,7 @@ class Model:
             "G": {"rows": self.bodies, "columns": self.theta},
             "D": {"rows": self.theta, "columns": self.theta},
             "J": {"rows": self.theta, "columns": self.theta},
+            "Pi": {"rows": self.theta, "columns": self.theta},
             "theta_dot": {"rows": self.theta, "columns": 1},
         }
         vector = {"rows": self.bodies, "columns": 1}
@@ -260,15 +273,16 @@ class Model:
         """The quantity of a letter, its recursion written where this is the first use of it."""
         if (name, arguments) in self._made:
             return self._made[name, arguments]
-        if name in _GIVEN:
+        inserted = name == "h" and len(arguments) > 1  # a twist within a hinge: given
+        if name in _GIVEN or inserted:
             shape: dict[str, Any] = {"rows": self.bodies, "columns": columns} if name == "B" else {}
             made = self._new(name, arguments, **shape)
             self.book.leaves.append(Leaf(made, "symbol", self.index, name, arguments))
             return made
         if name in ("P", "D", "G", "P_plus"):
             self.articulated_inertia()
-        elif name == "Delta":
-            self._delta(arguments)
+        elif name in ("Delta", "h"):
+            self._direction(name, arguments)
         else:
             getattr(self, "_" + name)()
         return self._made[name, arguments]
@@ -341,14 +355,19 @@ class Model:
         M, V = self.at("M"), self.at("velocity")
         self.sweep(0, Equation(self._new("momentum_cross"), (Term(Function("cross_of_momentum", product(M, V))),)))
 
-    def _delta(self, arguments: tuple[int, ...]) -> None:
-        H = self.letter("H")
-        body, first = 0, 0
-        while arguments[0] >= first + len(self.theta.rows[body]):
-            first += len(self.theta.rows[body])
-            body += 1
-        term = Term(Function("crf", HingeRow(H, arguments[0] - first)), body=body)
-        self.sweep(0, Equation(self._new("Delta", arguments), (term,)))
+    def _direction(self, name: str, arguments: tuple[int, ...]) -> None:
+        """Δ = crf(h) at the body of a direction: a coordinate, whose twist h is a row of H, or a twist given within a hinge."""
+        twist: Node
+        if len(arguments) == 1:
+            body, first = 0, 0
+            while arguments[0] >= first + len(self.theta.rows[body]):
+                first += len(self.theta.rows[body])
+                body += 1
+            twist = HingeRow(self.letter("H"), arguments[0] - first)
+        else:
+            body, twist = arguments[0], At(self.letter("h", arguments))
+        node = twist if name == "h" else Function("crf", twist)
+        self.sweep(0, Equation(self._new(name, arguments), (Term(node, body=body),)))
 
     # ------------------------------------------------------------------ frames and gravity
     def _X_world(self) -> None:

@@ -107,6 +107,14 @@ def root(A):
     return L
 ''',
     ),
+    "lower_half": (
+        (),
+        '''
+def lower_half(A):
+    """The lower triangle of A with half its diagonal."""
+    return np.tril(A) - np.diag(np.diag(A)) / 2
+''',
+    ),
     "diagonal": (
         (),
         '''

@@ -386,9 +386,8 @@ class Latex(Text):
             "diagonal": "\\operatorname{{diag}} {}",
             "root": "\\operatorname{{chol}}\\left({}\\right)",
             "blockdiag": "\\operatorname{{blockdiag}} {}",
-            "cross_of_momentum": "\\operatorname{{cross\\_of\\_momentum}}\\left({}\\right)",
         }
-        return shapes.get(name, "\\operatorname{{" + name + "}}\\left({}\\right)").format(inner)
+        return shapes.get(name, "\\operatorname{{" + name.replace("_", "\\_") + "}}\\left({}\\right)").format(inner)
 
     def only_at(self, body: int) -> str:
         return f"\\text{{ for }} k = {body}\\text{{, else }} 0"

@@ -63,13 +63,24 @@ def _root_blocks(r: Recursion, step: Step) -> None:
     r.define(r.target(step["out"], "L"), Term(Function("root", inner)))
 
 
+@writer("function_blocks")
+def _function_blocks(r: Recursion, step: Step) -> None:
+    """crm(x(k)), crf(x(k)), ... of a vector; the lower triangle of B(k) with half its diagonal."""
+    name = step["symbol"]["name"]
+    inner = r.stored(step["in"][0])
+    names = {"crm": "crm", "crf": "crf", "mcross": "cross_of_momentum"}
+    r.define(r.target(step["out"]), Term(Function(names.get(name, "lower_half"), At(inner))))
+
+
 @writer("congruence_blocks")
 def _congruence_blocks(r: Recursion, step: Step) -> None:
-    """blockdiag(E B E*): Σ E(k,c) B(c) E*(k,c)."""
-    E = r.models[step["context"]].at("E", "c")
-    B = r.value(step["in"][0])
-    carried = product(E, moved(B.node, {"k": "c"}), star(E))
-    r.sweep(-1, Equation(r.target(step["out"]), (Term(carried, B.coefficient, over="c"),)))
+    """blockdiag(E B E*): Σ E(k,c) B(c) E*(k,c); transposed, blockdiag(E* B E): E*(p,k) B(p) E(p,k)."""
+    model, B = r.models[step["context"]], r.value(step["in"][0])
+    over = "p" if step["transposed"] else "c"
+    E = model.at("E") if step["transposed"] else model.at("E", "c")
+    inner = moved(B.node, {"k": over})
+    carried = product(star(E), inner, E) if step["transposed"] else product(E, inner, star(E))
+    r.sweep(1 if step["transposed"] else -1, Equation(r.target(step["out"]), (Term(carried, B.coefficient, over=over),)))
 
 
 @writer("lyapunov_blocks")

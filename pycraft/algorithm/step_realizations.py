@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from .formulas import (
@@ -33,7 +34,7 @@ def _factor(r: Recursion, step: Step) -> None:
     book = r.book
     tree = book.tree(tuple(data["parents"])).index
     cuts = tuple(book.cut(space) for space in data["states"])
-    states = [r._shaped(book.new, "s", space, 1 if r.unit_input else r.columns) for space in data["states"]]
+    states = [r._shaped(book.new, "s", space, 1) for space in data["states"]]
     relations: list[list[tuple[Term, int]]] = [[] for _ in data["equations"]]
     for t in data["terms"]:
         relations[t["row"]].append((_relation_term(r, t, cuts[t["column"]]), t["column"]))
@@ -95,6 +96,7 @@ def _solve(r: Recursion, step: Step) -> None:
     for t in data["inputs"]:
         inputs[t["row"]].append(local(x, t))
     y = r.target(step["out"])
+    columns = r.columns_of(step["out"])
     fresh: dict[int, Quantity] = {}
     terms = []
     for t in data["outputs"]:
@@ -102,9 +104,9 @@ def _solve(r: Recursion, step: Step) -> None:
             terms.append(local(x, t))
             continue
         if t["column"] not in fresh:
-            like = system.states[t["column"]]
-            shape = {"tree": like.tree, "rows": like.rows, "columns": like.columns}
+            like = replace(system.states[t["column"]], columns=columns)
             used = any(isinstance(item, Solution) and item.system is system for item in r.program.items)
+            shape = {"tree": like.tree, "rows": like.rows, "columns": columns}
             fresh[t["column"]] = r.book.new("s", like.kind, **shape) if used else like
         s = fresh[t["column"]]
         node: Node = At(s, "k" if s.kind == "blocks" else "")
@@ -113,7 +115,6 @@ def _solve(r: Recursion, step: Step) -> None:
             right = r.value(t["right"])
             node, coefficient = product(right.node, node), coefficient * right.coefficient
         terms.append(Term(node, coefficient))
-    columns = 1 if r.unit_input else r.columns
     r.program.items.append(Solution(system, tuple(map(tuple, inputs)), fresh, columns))
     r.define(y, *terms)
 

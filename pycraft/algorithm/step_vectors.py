@@ -156,8 +156,12 @@ def _combine(r: Recursion, step: Step) -> None:
 
 @writer("vector_symbol")
 def _vector_symbol(r: Recursion, step: Step) -> None:
-    """A vector of the model: given, or by the recursion of velocities, accelerations, gravity."""
-    r.values[step["out"]] = r.symbol(step)
+    """A vector of the model: given, or by the recursion of velocities, accelerations, gravity; or a constant one."""
+    if step["constant"] is None:
+        r.values[step["out"]] = r.symbol(step)
+    else:
+        rows = r.book.cut(r.plan["registers"][step["out"]]["space"])
+        r.values[step["out"]] = r.book.constant_vector(step["constant"], rows)
 
 
 @writer("zero")
@@ -174,7 +178,7 @@ def _mass_matrix(r: Recursion, step: Step) -> None:
     H, M, E, E_child = model.at("H"), model.at("M"), model.at("E"), model.at("E", "c")
     if step["flag"]:
         r.stored(step["in"][0])
-    columns = 1 if r.unit_input else r.columns
+    columns = r.columns_of(step["out"])
     alpha = r.book.new("alpha", tree=model.tree, rows=model.bodies, columns=columns)
     f = r.book.new("f", tree=model.tree, rows=model.bodies, columns=columns)
     terms = (Term(product(star(E), At(alpha, "p")), over="p"), r.term(step["in"][0], star(H)))
@@ -193,7 +197,7 @@ def _mass_matrix_solve(r: Recursion, step: Step) -> None:
     """y = [I-HψK]* D⁻¹ [I-HψK] x: the innovations tip to base, accelerations base to tip."""
     model = r.models[step["context"]]
     H, G, D, E, E_child = model.at("H"), model.at("G"), model.at("D"), model.at("E"), model.at("E", "c")
-    forces: dict[str, Any] = {"tree": model.tree, "rows": model.bodies, "columns": 1 if r.unit_input else r.columns}
+    forces: dict[str, Any] = {"tree": model.tree, "rows": model.bodies, "columns": r.columns_of(step["out"])}
     coordinates = forces | {"rows": model.theta}
     z, z_plus = r.book.new("z", **forces), r.book.new("z_plus", **forces)
     eps, nu = r.book.new("eps", **coordinates), r.book.new("nu", **coordinates)

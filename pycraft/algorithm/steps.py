@@ -128,7 +128,7 @@ class Recursion:
             given = value in [leaf.quantity for leaf in self.book.leaves]
             if not given and plan["request"] != "apply":
                 return value
-        columns = self.columns if register["wide"] and not self.unit_input else 1
+        columns = self.columns_of(plan["output"])
         made = self._shaped(self.book.new, self.result_letter, register["space"], columns)
         if isinstance(value, Quantity) and value.kind in ("matrix", "scalar"):
             self.once(made, Term(At(value, "")))
@@ -149,6 +149,10 @@ class Recursion:
         assert isinstance(rows, Cut)
         return {"tree": rows.tree, "rows": rows, "columns": columns}
 
+    def columns_of(self, register: int) -> int | str:
+        """How many columns a vector register has."""
+        return self.columns if self.plan["registers"][register]["wide"] and not self.unit_input else 1
+
     def target(self, out: int, letter: str = "") -> Quantity:
         """The quantity that a step writes; the plan's output is y."""
         register = self.plan["registers"][out]
@@ -157,7 +161,7 @@ class Recursion:
             name = letter or _VECTOR_LETTERS.get(space.name, "f" if space.name.startswith("NodesF") else "w")
             if out == self.plan["output"] and self.plan["request"] == "apply":
                 name = self.result_letter
-            made = self._shaped(self.book.new, name, space, self.columns if register["wide"] and not self.unit_input else 1)
+            made = self._shaped(self.book.new, name, space, self.columns_of(out))
         elif register["kind"] == "blocks":
             made = self.book.new(letter or "W", **self._block_shape(register))
         elif register["kind"] == "dense":

@@ -26,6 +26,8 @@ EPSILON = _core.epsilons()
 CONSTANT = 4.0
 """Roundings per product that the count above leaves out: forming the entry of a letter, adding it up, two sides."""
 
+_NUMBERS = _core.euclidean(1)
+"""The domain of a vector."""
 _RICCATI = {"P", "P_plus", "D", "G", "K", "tau", "tau_bar", "E_psi", "psi", "psi_tilde", "Upsilon", "Omega", "Lambda"}
 
 
@@ -50,11 +52,26 @@ class Sizes:
             return float(np.sqrt(operator.shape[0]))
         if operator not in self._norms:
             if _has_vectors(operator):
-                column = operator if operator.shape[1] == 1 else operator.T
-                self._norms[operator] = float(np.linalg.norm(self._bind(column).value(**self._vectors)))
+                self._norms[operator] = self._norm_with_vectors(operator)
             else:
                 self._norms[operator] = _norm(self._bind(operator))
         return self._norms[operator]
+
+    def _norm_with_vectors(self, operator: _core.Operator) -> float:
+        # A column is told by its space: a row on a model of one degree of freedom has one column as well.
+        if _NUMBERS not in (operator.domain, operator.codomain):
+            norms = [self.norm(c) for c in operator.children]
+            match operator.kind:  # an outer product, or what is made of some: at most
+                case "product":
+                    return float(np.prod(norms))
+                case "sum":
+                    return sum(norms)
+                case "scaled":
+                    return abs(operator.coefficient) * norms[0]
+                case "transpose":
+                    return norms[0]
+        column = operator if operator.domain == _NUMBERS else operator.T
+        return float(np.linalg.norm(self._bind(column).value(**self._vectors)))
 
     def size(self, side: Any) -> float:
         """The error of a side per unit of c · eps."""
@@ -156,8 +173,12 @@ def uses_riccati(side: Any) -> bool:
     return (side.name in _RICCATI) or any(uses_riccati(c) for c in side.children)
 
 
+def growth(lhs: Any, rhs: Any, sizes: Sizes) -> float:
+    """What the Riccati sweep makes of its roundings, where a side mentions a value of it."""
+    return sizes.amplification() if uses_riccati(lhs) or uses_riccati(rhs) else 1.0
+
+
 def relative_bound(lhs: Any, rhs: Any, sizes: Sizes, scale: float, precision: str) -> float:
     """The bound on |lhs - rhs| relative to `scale`, the larger side's largest entry."""
     size = sizes.size(lhs) + sizes.size(rhs)
-    grown = sizes.amplification() if uses_riccati(lhs) or uses_riccati(rhs) else 1.0
-    return CONSTANT * sizes.sweep() * EPSILON[precision] * max(1.0, size / max(scale, 1e-300)) * grown
+    return CONSTANT * sizes.sweep() * EPSILON[precision] * max(1.0, size / max(scale, 1e-300)) * growth(lhs, rhs, sizes)

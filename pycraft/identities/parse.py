@@ -1,7 +1,8 @@
 """Statements as text: Python's spelling, the book's (Unicode or ASCII, juxtaposition and a postfix star), or LaTeX.
 
 Both readings are tried, Python's (``*`` and ``@`` multiply, ``.T`` transposes) and the book's (juxtaposition multiplies, a postfix ``*``
-transposes); the one whose names and spaces fit is taken. Where both fit and differ, the error shows both.
+transposes); the one whose names and spaces fit is taken. Where both fit and differ, the error shows both. In both ``**`` is Python's power.
+In the book's reading the numbers in front of a product scale the whole of it: 2 D D is 2 (D D), as it is shown.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ number: NUMBER ("*" | _TIMES)?
 product: postfix (_TIMES? postfix)*
 postfix: atom suffix*
 suffix: (_STAR | "^*" | "^T" | ".T" | "'") -> star
-      | ("^" | "**") POWER -> power
+      | ("^" EXPONENT | "**" POWER) -> power
       | ".inv()" -> inverse
       | ("^½" | ".sqrt()") -> root
       | "^-½" -> inverse_root
@@ -58,9 +59,10 @@ atom: NAME -> name
 PLUS: "+"
 MINUS: "-"
 _TIMES: "@" | "·"
-_STAR: /\*(?!\*\s*-?\d)/
+_STAR: /\*(?!\*[\w(\[{-])/
 NUMBER: /\d+(\.\d*)?([eE][+-]?\d+)?/
-POWER: /-?\d+/
+EXPONENT: /-?\d+/
+POWER: /-?\d+(?!\d|\s*\*\*)/
 ARGUMENT: /[^(),]+/
 FUNCTION.3: /(%(functions)s)(?=\s*\()/
 INDEXED.3: /(%(indexed)s)(?=\s*\()/
@@ -106,7 +108,7 @@ class Statements:
             try:
                 found.append(self._read(text, reading))
             # The core's errors of names, spaces and models are TypeErrors and ValueErrors; what Python finds wrong reads no better.
-            except (TypeError, ValueError, AttributeError, ArithmeticError) as error:
+            except (TypeError, ValueError, AttributeError, ArithmeticError, RecursionError) as error:
                 reasons.append(f"  read as {'Python' if reading == 'python' else 'the book'}: {error}")
         if not found:
             raise ParseError(f"{text!r} does not read as a statement of operators.\n" + "\n".join(dict.fromkeys(reasons)))

@@ -12,8 +12,8 @@ class Finding:
     """What was found for one theorem: worst residual in double and in the wider scalar, the bounds they are judged against, the verdict.
 
     Verdicts: "holds", "fails", "undecided" (the bound is above 1e-6 even in the wider scalar), "expected to fail" (outside its
-    hypotheses, and it does), "holds anyway" (outside its hypotheses, and it does not fail), "undefined" (an inverse in it does not exist),
-    "waiting" (not evaluated yet).
+    hypotheses, and it does, or asks for an inverse that does not exist: then `note` says so and there is no residual), "holds anyway"
+    (outside its hypotheses, and it does not fail), "undefined" (an inverse in it does not exist), "waiting" (not evaluated yet).
     """
 
     name: str
@@ -101,9 +101,9 @@ class Report:
                 group = f.group
                 table.add_row(Text(group, style="bold underline"))
             hypotheses = Text(", ".join(f.hypotheses))
-            if f.verdict in ("waiting", "undefined"):
-                reason = f"{', '.join(f.unmet)} not met" if f.unmet else "D is singular"
-                text = f"waits for {f.note}" if f.verdict == "waiting" else f"undefined: {reason}"
+            if not f.states:
+                reason = f"{', '.join(f.unmet)} not met, an inverse does not exist" if f.unmet else "an inverse does not exist"
+                text = f"waits for {f.note}" if f.verdict == "waiting" else f"{f.verdict}: {reason}"
                 table.add_row("  " + f.statement, hypotheses, "", "", "", Text(text, style=style[f.verdict]), "")
                 continue
             verdict = f.verdict + (f": {', '.join(f.unmet)} not met" if f.unmet else "")
@@ -150,10 +150,10 @@ class Report:
                 rows.append(f"<tr><th colspan=6 style='text-align:left;padding-top:8px'>{escape(group)}</th></tr>")
             numbers = (
                 "<td></td><td></td><td></td>"
-                if f.verdict == "waiting"
+                if not f.states
                 else f"<td>{f.residual:.1e}</td><td>{f.wide_residual:.1e}</td><td>{f.bound:.0e}</td>"
             )
-            note = f" ({escape(', '.join(f.unmet))} not met)" if f.unmet else f" ({escape(f.note)})" if f.verdict == "waiting" else ""
+            note = f" ({escape(', '.join(f.unmet))} not met)" if f.unmet else f" ({escape(f.note)})" if f.note else ""
             rows.append(
                 f"<tr><td style='text-align:left'>${f.latex}$</td>"
                 f"<td style='text-align:left'>{escape(', '.join(f.hypotheses))}</td>{numbers}"

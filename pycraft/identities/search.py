@@ -2,7 +2,8 @@
 
 Models are tried in order of size: by bodies, then degrees of freedom. For a number of bodies every tree shape is tried with every
 choice of hinge kinds, without and then with rotor inertia, `STATES` seeded states each, so that the first refutation found is smallest by
-(bodies, degrees of freedom) among all that were tried.
+(bodies, degrees of freedom) among all that were tried. Welds count as kinds: they are kept, as bodies without a coordinate. Models of
+welds alone are left out, as they have no state.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from .report import CheckReport
 
 STATES = 3
 DOF = {
+    "weld": 0,
     "pin": 1,
     "slider": 1,
     "screw": 1,
@@ -34,6 +36,7 @@ DOF = {
     "free": 6,
 }
 KINDS = tuple(sorted(DOF, key=lambda kind: DOF[kind]))
+MOVING = tuple(kind for kind in KINDS if DOF[kind])
 
 
 @dataclass
@@ -58,14 +61,16 @@ class Counterexample:
 
     def model(self) -> Any:
         """The model, at the refuting state."""
-        model = tree(self.parents, self.kinds, seed=self.seed, rotor_inertia=self.rotor_inertia)
+        model = tree(self.parents, self.kinds, seed=self.seed, rotor_inertia=self.rotor_inertia, welds="keep")
         model.q = self.q
         return model
 
     def __repr__(self) -> str:
         shape = "one body" if self.bodies == 1 else f"{self.bodies} bodies, parents {self.parents}"
         text = f"  smallest counterexample: {shape}, hinges {', '.join(self.kinds)}{', with rotor inertia' if self.rotor_inertia else ''}"
-        text += f"\n    pc.tree({self.parents}, {self.kinds}, seed={self.seed}{', rotor_inertia=True' if self.rotor_inertia else ''})"
+        options = ", rotor_inertia=True" if self.rotor_inertia else ""
+        options += ', welds="keep"' if "weld" in self.kinds else ""
+        text += f"\n    pc.tree({self.parents}, {self.kinds}, seed={self.seed}{options})"
         text += f"\n    q = {np.array2string(self.q, precision=4, separator=', ')}, relative residual {self.residual:.1e}"
         text += f"\n    every smaller tree shape and choice of hinge kinds was tried, {self.states} states each ({self.tried} models)"
         if self.saved_by:
@@ -97,7 +102,8 @@ def _canonical(parents: list[int]) -> Any:
 def candidates(largest: int) -> Iterator[tuple[list[int], list[str], bool]]:
     """Models by bodies, then degrees of freedom, then without before with rotor inertia."""
     for n in range(1, largest + 1):
-        choices = sorted(itertools.product(KINDS, repeat=n), key=lambda kinds: sum(DOF[k] for k in kinds))
+        moving = (kinds for kinds in itertools.product(KINDS, repeat=n) if any(DOF[k] for k in kinds))
+        choices = sorted(moving, key=lambda kinds: sum(DOF[k] for k in kinds))
         forests = list(shapes(n))
         for _, group in itertools.groupby(choices, key=lambda kinds: sum(DOF[k] for k in kinds)):
             same_size = list(group)
@@ -196,7 +202,7 @@ def check_on_trees(text: str, *, states: int, seed: int, search: bool, precision
     for n in (1, 2, 3, 5, 8):
         for rotor in (False, True):
             parents = [-1] + [int(rng.integers(-1, k)) for k in range(1, n)]
-            kinds = [str(k) for k in rng.choice(KINDS, n)]
+            kinds = [str(k) for k in rng.choice(MOVING, n)]
             model = tree(parents, kinds, seed=int(rng.integers(2**31)), rotor_inertia=rotor)
             read = Statements(model.soa).read(text)
             if read.rhs is None:

@@ -1,4 +1,4 @@
-"""MuJoCo's coordinates: the order and the axes in which it keeps the state of free hinges. Needs nothing of MuJoCo itself.
+"""MuJoCo's coordinates: the order and the axes in which it keeps the state of free hinges. Only `compiled` needs MuJoCo itself.
 
                   here                                      MuJoCo
 free, position    (w, x, y, z, x, y, z), in the parent      (x, y, z, w, x, y, z), in the world
@@ -13,7 +13,7 @@ base, as MuJoCo has them nowhere else.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -21,6 +21,31 @@ from .. import _core
 
 if TYPE_CHECKING:
     from ..models.multibody import Multibody
+
+
+class MissingPackageError(_core.Error, ImportError):
+    """A package that only one extra needs is not installed."""
+
+
+def compiled(path: str) -> Any:
+    """The MjModel that MuJoCo's compiler makes of an MJCF file.
+
+    Raises
+    ------
+    MissingPackageError
+        The mujoco package is not installed: names the extra.
+    ModelError
+        What MuJoCo refuses, in its words.
+    """
+    try:
+        import mujoco
+    except ImportError:
+        text = f"{path}: MJCF files are read by the package mujoco, which is not installed: pip install pycraft-soa[mjcf]"
+        raise MissingPackageError(text) from None
+    try:
+        return mujoco.MjSpec.from_file(path).compile()
+    except ValueError as error:
+        raise _core.ModelError(f"{path}: MuJoCo refuses the file: {' '.join(str(error).split())}") from None
 
 
 class _Free(NamedTuple):

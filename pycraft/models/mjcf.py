@@ -41,10 +41,6 @@ _V_SIZE = {_FREE: 6, _BALL: 3, _SLIDE: 1, _HINGE: 1}
 _EQUALITIES = ("connect", "weld", "joint", "tendon", "flex", "flexvert", "flexstrain", "distance")  # mjtEq
 
 
-class MissingPackageError(_core.Error, ImportError):
-    """A package that only one extra needs is not installed."""
-
-
 def read(file: XmlFile, *, root: str, welds: str, strict: bool) -> tuple[Multibody, list[str]]:
     """The model of an MJCF file, and what is worth a warning about it. Parameters are those of `pycraft.load`.
 
@@ -57,16 +53,7 @@ def read(file: XmlFile, *, root: str, welds: str, strict: bool) -> tuple[Multibo
     """
     if root == "free":
         raise file.error(file.root, 'root="free" is for URDF files; in an MJCF file give the body a <freejoint name="root"/>')
-    try:
-        import mujoco
-    except ImportError:
-        text = f"{file.path}: MJCF files are read by the package mujoco, which is not installed: pip install pycraft-soa[mjcf]"
-        raise MissingPackageError(text) from None
-    try:
-        compiled = mujoco.MjSpec.from_file(file.path).compile()
-    except ValueError as error:
-        raise _core.ModelError(f"{file.path}: MuJoCo refuses the file: {' '.join(str(error).split())}") from None
-    return _Reader(compiled, file).model(welds, strict)
+    return _Reader(conventions.compiled(file.path), file).model(welds, strict)
 
 
 class _Reader:

@@ -1,16 +1,16 @@
-"""The model in Python: a multibody system built body by body, its handles, its state and the direct calls on arrays."""
+"""The model in Python: a multibody system built body by body, and its state."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from .. import _core
+from .handles import Body, Hinge, Named, Node, Vector
+from .sensitivities import SensitivityCalls
 from .state import State, random_state
-
-Vector = Sequence[float] | np.ndarray
 
 _Z = (0.0, 0.0, 1.0)
 _DEFAULT_AXES: dict[str, tuple[tuple[float, float, float], ...]] = {
@@ -24,179 +24,7 @@ _DEFAULT_AXES: dict[str, tuple[tuple[float, float, float], ...]] = {
 }
 
 
-class Body:
-    """A body of a model: `.mass` (kg), `.com` (3,) in the body frame (m), `.inertia` (3, 3) about the centre of mass (kg m²).
-
-    The values can be set; each is checked (see `Multibody.add_body`). `.hinge` is the hinge that carries the body.
-    """
-
-    def __init__(self, model: Multibody, name: str):
-        self._model, self.name = model, name
-
-    def _data(self) -> dict[str, Any]:
-        return self._model._body(self._model._body_index(self.name))
-
-    def _set(self, **changed: Any) -> None:
-        data = self._data() | changed
-        self._model._set_mass_properties(self._model._body_index(self.name), float(data["mass"]), data["com"], data["inertia"])
-
-    @property
-    def mass(self) -> float:
-        return self._data()["mass"]
-
-    @mass.setter
-    def mass(self, value: float) -> None:
-        self._set(mass=value)
-
-    @property
-    def com(self) -> np.ndarray:
-        return self._data()["com"]
-
-    @com.setter
-    def com(self, value: Vector) -> None:
-        self._set(com=value)
-
-    @property
-    def inertia(self) -> np.ndarray:
-        return self._data()["inertia"]
-
-    @inertia.setter
-    def inertia(self, value: np.ndarray) -> None:
-        self._set(inertia=value)
-
-    @property
-    def hinge(self) -> Hinge:
-        return Hinge(self._model, self._data()["hinge"]["name"])
-
-    @property
-    def parent(self) -> Body | None:
-        """The body inboard, None for the base."""
-        k = self._data()["parent"]
-        return None if k < 0 else Body(self._model, self._model._names()[0][k])
-
-    def __repr__(self) -> str:
-        parent = self.parent
-        return f"<body {self.name!r}: {self.mass:g} kg on hinge {self.hinge.name!r} of {parent.name if parent else 'the base'!r}>"
-
-
-class Hinge:
-    """A hinge: `.kind`, `.subhinges` (kind, axis, point, pitch of each), `.placement` (4, 4), `.q_slice`, `.v_slice`, `.rotor_inertia`.
-
-    `.placement` is the pose of the hinge's inboard frame in the parent body's frame; `.limits` are (lower, upper) per coordinate, or None.
-    """
-
-    def __init__(self, model: Multibody, name: str):
-        self._model, self.name = model, name
-
-    def _index(self) -> int:
-        return self._model._hinge_index(self.name)
-
-    def _data(self) -> dict[str, Any]:
-        return self._model._body(self._index())["hinge"]
-
-    @property
-    def kind(self) -> str:
-        return self._data()["kind"]
-
-    @property
-    def subhinges(self) -> list[dict[str, Any]]:
-        return self._data()["subhinges"]
-
-    @property
-    def placement(self) -> np.ndarray:
-        pose = np.eye(4)
-        placement = self._data()["placement"]
-        pose[:3, :3], pose[:3, 3] = placement["rotation"], placement["position"]
-        return pose
-
-    @placement.setter
-    def placement(self, pose: np.ndarray) -> None:
-        pose = np.asarray(pose, float)
-        self._model._set_placement(self._index(), pose[:3, :3], pose[:3, 3])
-
-    @property
-    def rotor_inertia(self) -> np.ndarray:
-        """Inertia that a rotor adds along each coordinate, reflected through its gear (kg m² or kg): the block J(k)."""
-        return self._data()["rotor_inertia"]
-
-    @rotor_inertia.setter
-    def rotor_inertia(self, value: float | Vector) -> None:
-        values = np.broadcast_to(np.asarray(value, float), self.rotor_inertia.shape)
-        self._model._set_rotor_inertia(self._index(), [float(x) for x in values])
-
-    @property
-    def limits(self) -> tuple[np.ndarray, np.ndarray] | None:
-        data = self._data()
-        return (data["lower"], data["upper"]) if len(data["lower"]) else None
-
-    @property
-    def q_slice(self) -> slice:
-        return self._model._slices(self._index())[0]
-
-    @property
-    def v_slice(self) -> slice:
-        return self._model._slices(self._index())[1]
-
-    @property
-    def body(self) -> Body:
-        return Body(self._model, self._model._names()[0][self._index()])
-
-    def __repr__(self) -> str:
-        return (
-            f"<hinge {self.name!r}: {self.kind}, q[{self.q_slice.start}:{self.q_slice.stop}], v[{self.v_slice.start}:{self.v_slice.stop}]>"
-        )
-
-
-class Node:
-    """A frame on a body, or on the base: `.body` (None for the base), `.pose` (4, 4) in the body's frame."""
-
-    def __init__(self, model: Multibody, name: str):
-        self._model, self.name = model, name
-
-    def _data(self) -> dict[str, Any]:
-        return next(node for node in self._model._nodes() if node["name"] == self.name)
-
-    @property
-    def body(self) -> Body | None:
-        k = self._data()["body"]
-        return None if k < 0 else Body(self._model, self._model._names()[0][k])
-
-    @property
-    def pose(self) -> np.ndarray:
-        data, pose = self._data(), np.eye(4)
-        pose[:3, :3], pose[:3, 3] = data["rotation"], data["position"]
-        return pose
-
-    def __repr__(self) -> str:
-        return f"<node {self.name!r} on {self.body.name if self.body else 'the base'!r}>"
-
-
-class _Named(Mapping):
-    """Handles by name, in the model's order."""
-
-    def __init__(self, names: Sequence[str], make: Callable[[str], Any], find: Callable[[str], Any]):
-        self._names, self._make, self._find = names, make, find
-
-    def __getitem__(self, name: str) -> Any:
-        if name not in self._names:
-            try:
-                self._find(name)  # raises with the names there are
-            except _core.ModelError as error:
-                raise KeyError(str(error)) from None
-            raise KeyError(name)
-        return self._make(name)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._names)
-
-    def __len__(self) -> int:
-        return len(self._names)
-
-    def __repr__(self) -> str:
-        return "{" + ", ".join(self._names) + "}"
-
-
-class Multibody(_core.Multibody):
+class Multibody(SensitivityCalls, _core.Multibody):
     """A tree of bodies on hinges, with nodes, a state (`q`, `v`) and gravity (zero until it is set).
 
     Build one body by body, or load it (`pycraft.load`). Bodies are kept depth first, children in the order they were added, and
@@ -226,7 +54,6 @@ class Multibody(_core.Multibody):
             raise _core.ModelError(f"welds={welds!r}: there are 'lump' and 'keep'")
         super().__init__(name, welds == "keep", strict)
         self._soa = None
-        self._direct: _core.Dynamics | None = None
 
     # ------------------------------------------------------------------ structure
     def add_body(
@@ -329,17 +156,17 @@ class Multibody(_core.Multibody):
     @property
     def bodies(self) -> Mapping[str, Body]:
         """The bodies by name, in the model's order."""
-        return _Named(self._names()[0], lambda name: Body(self, name), self._body_index)
+        return Named(self._names()[0], lambda name: Body(self, name), self._body_index)
 
     @property
     def hinges(self) -> Mapping[str, Hinge]:
         """The hinges by name, in the bodies' order."""
-        return _Named(self._names()[1], lambda name: Hinge(self, name), self._hinge_index)
+        return Named(self._names()[1], lambda name: Hinge(self, name), self._hinge_index)
 
     @property
     def nodes(self) -> Mapping[str, Node]:
         """The nodes by name: welded links, and frames that were added."""
-        return _Named([node["name"] for node in self._nodes()], lambda name: Node(self, name), self._node_index)
+        return Named([node["name"] for node in self._nodes()], lambda name: Node(self, name), self._node_index)
 
     # ------------------------------------------------------------------ state
     def random_state(self, seed: int | np.random.Generator = 0) -> State:
@@ -363,52 +190,6 @@ class Multibody(_core.Multibody):
 
         for text in self.take_warnings():
             warn(text)
-
-    # ------------------------------------------------------------------ direct calls
-    def _calls(self) -> _core.Dynamics:
-        if self._direct is None:
-            self._direct = _core.Dynamics(self)
-        return self._direct
-
-    def forward_dynamics(self, q, v, tau, *, form: str = "fast", refine: int = 0, precision: str = "double", out=None) -> np.ndarray:
-        """Accelerations (nv,) or (B, nv) under generalized forces tau, gravity included: articulated-body algorithm, O(N).
-
-        Each argument has one state or a leading batch axis. Raises SingularHingeError where D(k) is singular at the rounding bound.
-        """
-        return self._calls().forward_dynamics(q, v, tau, form, refine, precision, out)
-
-    def inverse_dynamics(self, q, v, vdot, *, precision: str = "double", out=None) -> np.ndarray:
-        """Generalized forces (nv,) or (B, nv) for the accelerations vdot, gravity and rotor inertia included: Newton-Euler, O(N)."""
-        return self._calls().inverse_dynamics(q, v, vdot, precision, out)
-
-    def bias_forces(self, q, v, *, precision: str = "double", out=None) -> np.ndarray:
-        """Coriolis, gyroscopic and gravity forces 𝒞 (nv,) or (B, nv): inverse dynamics at zero acceleration. O(N)."""
-        return self._calls().inverse_dynamics(q, v, None, precision, out)
-
-    def mass_matrix(self, q, *, precision: str = "double", out=None) -> np.ndarray:
-        """The mass matrix of the equations of motion, HφMφ*H* + J, full symmetric (nv, nv) or (B, nv, nv): composite bodies."""
-        return self._calls().mass_matrix(q, False, precision, out)
-
-    def mass_matrix_inverse(self, q, *, precision: str = "double", out=None) -> np.ndarray:
-        """The inverse of mass_matrix, full symmetric, by the innovations factors: O(N) a column."""
-        return self._calls().mass_matrix(q, True, precision, out)
-
-    def jacobian(self, frame: str, q, *, precision: str = "double", out=None) -> np.ndarray:
-        """Jacobian (6, nv) or (B, 6, nv) of a body's or node's spatial velocity: its own axes, about its origin, angular first."""
-        return self._calls().jacobian(frame, q, precision, out)
-
-    def pose(self, frame: str, q) -> np.ndarray:
-        """Pose (4, 4) or (B, 4, 4) of a body or node in the world."""
-        return self._calls().pose(frame, q)
-
-    def kinetic_energy(self, q, v) -> np.ndarray:
-        """½ v·(ℳ + J)v, in joules. O(N)."""
-        return self._calls().energy(q, v)[..., 0]
-
-    def potential_energy(self, q) -> np.ndarray:
-        """Energy in the uniform gravity field, zero with the centre of mass at the world's origin, in joules. O(N)."""
-        shape = np.shape(q)[:-1] + (self.nv,)
-        return self._calls().energy(q, np.zeros(shape))[..., 1]
 
     # ------------------------------------------------------------------ copies
     def description(self) -> dict[str, Any]:

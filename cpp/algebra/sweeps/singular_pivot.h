@@ -44,7 +44,8 @@ void require_pivots(const SkoStructure& tree, int k, const S* L, const S* pivots
   for (int j = 0; j < n; ++j) {
     // L₁₁* w₁ = -L(j, ·)*
     S reach = x[j];
-    for (int i = j - 1; i >= 0; --i) {
+    for (int back = 1; back <= j; ++back) {
+      const int i = j - back;
       S sum = -L[j * n + i];
       for (int a = i + 1; a < j; ++a) sum -= L[a * n + i] * w[a];
       w[i] = sum / L[i * n + i];

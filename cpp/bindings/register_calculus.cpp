@@ -1,0 +1,138 @@
+// Derivatives of operators and scalars: along coordinates, time and parameters.
+#include "algebra/differentiate.h"
+#include "algebra/errors.h"
+#include "bindings/bindings.h"
+#include "operators/derived_operators.h"
+#include "operators/directions.h"
+
+namespace pycraft {
+
+namespace {
+
+std::shared_ptr<MultibodyOperators> mechanics_of(const std::shared_ptr<SkoSource>& source) {
+  if (auto own = std::dynamic_pointer_cast<MultibodyOperators>(source)) return own;
+  if (auto derived = std::dynamic_pointer_cast<DerivedOperators>(source)) return derived->base();
+  return nullptr;
+}
+
+// The one model of an expression; null where it has none that moves.
+std::shared_ptr<MultibodyOperators> model_of(const std::vector<Expression>& operands) {
+  std::shared_ptr<MultibodyOperators> found;
+  for (const Expression& e : operands)
+    for (const Context& c : contexts(e)) {
+      const auto own = mechanics_of(c.source);
+      if (own && found && own != found)
+        throw EvaluationError("operators of two models, '" + found->name() + "' and '" + own->name() + "': differentiate along a coordinate of either before they are combined");
+      if (own) found = own;
+    }
+  return found;
+}
+
+std::vector<Expression> operands_of(const Expression& e) { return {e}; }
+std::vector<Expression> operands_of(const Scalar& s) {
+  std::vector<Expression> all;
+  visit(s, [&](const Expression& e) { all.push_back(e); });
+  return all;
+}
+
+Expression along(const Expression& e, const Direction& direction, bool world) {
+  return world ? differentiate_in_world(e, direction) : differentiate(e, direction);
+}
+Scalar along(const Scalar& s, const Direction& direction, bool) { return differentiate(s, direction); }
+Expression nothing_of(const Expression& e) { return e.floating() ? e - e : zero(e.domain(), e.codomain()); }
+Scalar nothing_of(const Scalar&) { return number(0); }
+
+int coordinate_of(const MultibodyOperators& model, const py::object& direction) {
+  const auto& names = model.structure().coordinate_names;
+  if (!py::isinstance<py::str>(direction)) {
+    const int i = direction.cast<int>();
+    return i < 0 ? i + static_cast<int>(names.size()) : i;
+  }
+  const auto name = direction.cast<std::string>();
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found != names.end()) return static_cast<int>(found - names.begin());
+  std::string text;
+  for (size_t i = 0; i < names.size() && i < 12; ++i) text += (i ? ", " : "") + names[i];
+  throw ModelError("no coordinate of '" + model.name() + "' is called '" + name + "'; there are " + text + (names.size() > 12 ? ", …" : ""));
+}
+
+template <class T>
+T diff(const T& operand, const py::args& directions, const std::string& frame) {
+  if (frame != "body" && frame != "world") throw EvaluationError("frame '" + frame + "': derivatives are taken in \"body\" or \"world\" axes");
+  if (directions.empty()) throw EvaluationError("diff takes a coordinate's name or number, or a parameter; for the time derivative there is dot()");
+  T result = operand;
+  for (const auto& item : directions) {
+    const py::object direction = py::reinterpret_borrow<py::object>(item);
+    if (py::isinstance<Parameter>(direction)) {
+      result = along(result, *parameter_direction(direction.cast<const Parameter&>()), frame == "world");
+      continue;
+    }
+    if (!py::isinstance<py::str>(direction) && !py::isinstance<py::int_>(direction) && !py::hasattr(direction, "__index__"))
+      throw py::type_error("diff takes a coordinate's name or number, or a parameter such as body.symbol(\"mass\"), not " + std::string(py::repr(direction)));
+    const auto model = model_of(operands_of(operand));
+    if (!model) {
+      result = nothing_of(result);
+      continue;
+    }
+    result = along(result, *coordinate_direction(model, coordinate_of(*model, direction)), frame == "world");
+  }
+  return result;
+}
+
+template <class T>
+T time_derivative(const T& operand, const py::object& vdot, const std::string& frame) {
+  if (frame != "body" && frame != "world") throw EvaluationError("frame '" + frame + "': derivatives are taken in \"body\" or \"world\" axes");
+  const auto model = model_of(operands_of(operand));
+  if (!model) return nothing_of(operand);
+  Expression accelerations;
+  if (py::isinstance<Expression>(vdot)) {
+    accelerations = vdot.cast<Expression>();
+  } else if (!vdot.is_none()) {
+    const Array a = numbers(vdot, "vdot");
+    if (a.ndim() != 1 || a.shape(0) != model->nv())
+      throw ModelError("vdot of '" + model->name() + "' takes " + std::to_string(model->nv()) + " numbers, or a vector of " + model->theta().description());
+    accelerations = constant(std::vector<double>(a.data(), a.data() + a.size()), Space::euclidean(1), model->theta(), "θ̈");
+  }
+  return along(operand, *time_direction(model, accelerations), frame == "world");
+}
+
+}  // namespace
+
+void register_calculus(py::module_& m) {
+  const char* diff_text =
+      "The derivative along a coordinate (its name or number), along a parameter (body.symbol(\"mass\"), hinge.symbol(\"axis\", 0), ...), or\n"
+      "along several in turn: diff(i, j) is ∂_j(∂_i ·). An expression again, by rule, evaluated by sweeps; zero by structure is the zero\n"
+      "operator. On ball and free hinges coordinates are quasi-velocities, along which derivatives do not commute.\n"
+      "frame=\"world\": of the operator as resolved in world axes, given in body axes; spaces and shape are the operator's own.";
+  const char* dot_text =
+      "The time derivative along the model's velocity v; what depends on v itself needs the accelerations: vdot, an array (nv,) or a\n"
+      "vector of Θ. EvaluationError without them.";
+  declared<py::class_<Expression>>(m, "Operator")
+      .def("diff", &diff<Expression>, py::arg("frame") = "body", diff_text)
+      .def("dot", &time_derivative<Expression>, py::arg("vdot") = py::none(), py::kw_only(), py::arg("frame") = "body", dot_text);
+  declared<py::class_<Scalar>>(m, "Scalar")
+      .def("diff", &diff<Scalar>, py::arg("frame") = "body", "The derivative along a coordinate or a parameter, as a scalar expression.")
+      .def("dot", &time_derivative<Scalar>, py::arg("vdot") = py::none(), py::kw_only(), py::arg("frame") = "body", "The time derivative along the model's velocity.");
+
+  py::class_<Parameter>(m, "Parameter", "What diff() takes beside a coordinate: a mass property, a rotor inertia, a placement, a hinge axis.")
+      .def_readonly("name", &Parameter::name)
+      .def("__repr__", [](const Parameter& p) { return "<parameter " + p.name + ">"; });
+  m.def("_inertia_parameter", [](const std::shared_ptr<MultibodyOperators>& source, int body, int which, const std::string& name) {
+    Parameter p{source, name, {}, body, static_cast<InertiaParameter>(which), -1};
+    return p;
+  });
+  m.def("_rotor_parameter", [](const std::shared_ptr<MultibodyOperators>& source, int coordinate, const std::string& name) {
+    return Parameter{source, name, {}, -1, mass_of_body, coordinate};
+  });
+  m.def("_twist_parameter", [](const std::shared_ptr<MultibodyOperators>& source, const std::vector<std::tuple<int, int, std::vector<double>>>& twists, const std::string& name) {
+    Parameter p{source, name, {}, -1, mass_of_body, -1};
+    for (const auto& [body, position, twist] : twists) {
+      InsertedTwist t{body, position, {}};
+      std::copy_n(twist.begin(), 6, t.twist);
+      p.twists.push_back(t);
+    }
+    return p;
+  });
+}
+
+}  // namespace pycraft

@@ -1,0 +1,52 @@
+// Derivatives of the direct calls along coordinates, velocities and inertial parameters, on arrays: no algebra, O(N · depth) or the
+// size of the result. Derivatives are along quasi-velocities on ball and free hinges; third-order arrays have the derivative last.
+// Source of the equations: recursions/inertial_frame.h; the same quantities as expressions: Operator.diff.
+#pragma once
+
+#include "algebra/sweeps/mass_matrix.h"
+#include "model/multibody.h"
+#include "recursions/inertial_frame.h"
+
+namespace pycraft {
+
+template <class S>
+class Sensitivities {
+ public:
+  explicit Sensitivities(const Multibody& model);
+
+  // ∂T/∂q, ∂T/∂v (nv x nv), row the component of T. Rotor inertias add J to ∂T/∂v̇ = ℳ + J alone.
+  void inverse_dynamics(const S* q, const S* v, const S* vdot, S* dq, S* dv);
+  // ∂v̇/∂q, ∂v̇/∂v, ∂v̇/∂T = (ℳ + J)⁻¹, at v̇ the forward dynamics of T. SingularHingeError as there.
+  void forward_dynamics(const S* q, const S* v, const S* vdot, S* dq, S* dv, S* dtau);
+  // ∂ℳ/∂q, (nv, nv, nv).
+  void mass_matrix(const S* q, S* out);
+  // Γ(i, j, k) of Koszul's formula, with the brackets of quasi-velocities: Σ Γ(i,j,k) v_j v_k = C v without gravity. (nv, nv, nv).
+  void christoffel(const S* q, S* out);
+  // ∂KE/∂q (nv); ∂KE/∂v is ℳv. Rotors do not depend on q.
+  void kinetic_energy(const S* q, const S* v, S* out);
+  // Momentum about the world's origin in world axes: the matrix A (6 x nv), h = A v, and ∂h/∂q (6 x nv).
+  void momentum(const S* q, const S* v, S* matrix, S* dq);
+  // d/dt of the node Jacobian (6 x nv), and ∂𝒥/∂q (6, nv, nv), both in the node's axes.
+  void jacobian_rate(const Node& node, const S* q, const S* v, S* out);
+  void jacobian_derivative(const Node& node, const S* q, S* out);
+  // Y (nv, 10 bodies) with T = Y π + J v̇; π per body: mass, m c (3), rotational inertia about its origin (xx, xy, xz, yy, yz, zz).
+  void inertial_regressor(const S* q, const S* v, const S* vdot, S* out);
+  // ∂ ln det(ℳ + J): along coordinates (nv); by π (10 per body); by a twist of each hinge's placement (6 per body); by the rows of H as
+  // they stand in the body's axes, poses held (6 per coordinate). Each may be null. Three sweeps in all.
+  void log_determinant(const S* q, S* coordinates, S* inertias, S* geometry, S* axes);
+
+ private:
+  void frame_at(const S* q, const S* v, const S* vdot);
+
+  const SkoStructure tree_;
+  std::shared_ptr<const CompiledModel<S>> model_;
+  RigidBlocks<S> blocks_;
+  InertialFrame<S> frame_;
+  std::vector<S> work_, inverse_, scratch_;
+};
+
+extern template class Sensitivities<double>;
+extern template class Sensitivities<Extended>;
+extern template class Sensitivities<Quad>;
+
+}  // namespace pycraft

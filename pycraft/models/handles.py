@@ -1,0 +1,234 @@
+"""Handles of a model's bodies, hinges and nodes: values that are read and set, and parameters to differentiate along."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .. import _core
+
+if TYPE_CHECKING:
+    from .multibody import Multibody
+
+Vector = Sequence[float] | np.ndarray
+
+_TWIST = ("rx", "ry", "rz", "x", "y", "z")
+
+
+def _component(i: int | str) -> int:
+    return "xyz".index(i) if isinstance(i, str) else range(3)[i]
+
+
+class Body:
+    """A body of a model: `.mass` (kg), `.com` (3,) in the body frame (m), `.inertia` (3, 3) about the centre of mass (kg m²).
+
+    The values can be set; each is checked (see `Multibody.add_body`). `.hinge` is the hinge that carries the body.
+    """
+
+    def __init__(self, model: Multibody, name: str):
+        self._model, self.name = model, name
+
+    def _data(self) -> dict[str, Any]:
+        return self._model._body(self._model._body_index(self.name))
+
+    def _set(self, **changed: Any) -> None:
+        data = self._data() | changed
+        self._model._set_mass_properties(self._model._body_index(self.name), float(data["mass"]), data["com"], data["inertia"])
+
+    @property
+    def mass(self) -> float:
+        return self._data()["mass"]
+
+    @mass.setter
+    def mass(self, value: float) -> None:
+        self._set(mass=value)
+
+    @property
+    def com(self) -> np.ndarray:
+        return self._data()["com"]
+
+    @com.setter
+    def com(self, value: Vector) -> None:
+        self._set(com=value)
+
+    @property
+    def inertia(self) -> np.ndarray:
+        return self._data()["inertia"]
+
+    @inertia.setter
+    def inertia(self, value: np.ndarray) -> None:
+        self._set(inertia=value)
+
+    @property
+    def hinge(self) -> Hinge:
+        return Hinge(self._model, self._data()["hinge"]["name"])
+
+    def symbol(self, name: str, i: int | str = 0, j: int | str | None = None) -> _core.Parameter:
+        """A mass property as what `diff` takes: "mass"; "com" with a component i; "inertia" with an entry (i, j), the symmetric one along.
+
+        Components are numbers 0, 1, 2 or "x", "y", "z", in the body's axes; the inertia is about the centre of mass.
+        """
+        body = self._model._body_index(self.name)
+        if name == "mass":
+            which, text = 0, "mass"
+        elif name == "com":
+            which, text = 1 + _component(i), f"com.{'xyz'[_component(i)]}"
+        elif name == "inertia":
+            row, column = sorted((_component(i), _component(i if j is None else j)))
+            which, text = 4 + row * (5 - row) // 2 + column, f"inertia.{'xyz'[row]}{'xyz'[column]}"
+        else:
+            raise _core.ModelError(f"body {self.name!r} has no parameter {name!r}; there are mass, com, inertia, and those of its hinge")
+        return _core._inertia_parameter(self._model.soa._source, body, which, f"{self.name}.{text}")
+
+    @property
+    def parent(self) -> Body | None:
+        """The body inboard, None for the base."""
+        k = self._data()["parent"]
+        return None if k < 0 else Body(self._model, self._model._names()[0][k])
+
+    def __repr__(self) -> str:
+        parent = self.parent
+        return f"<body {self.name!r}: {self.mass:g} kg on hinge {self.hinge.name!r} of {parent.name if parent else 'the base'!r}>"
+
+
+class Hinge:
+    """A hinge: `.kind`, `.subhinges` (kind, axis, point, pitch of each), `.placement` (4, 4), `.q_slice`, `.v_slice`, `.rotor_inertia`.
+
+    `.placement` is the pose of the hinge's inboard frame in the parent body's frame; `.limits` are (lower, upper) per coordinate, or None.
+    """
+
+    def __init__(self, model: Multibody, name: str):
+        self._model, self.name = model, name
+
+    def _index(self) -> int:
+        return self._model._hinge_index(self.name)
+
+    def _data(self) -> dict[str, Any]:
+        return self._model._body(self._index())["hinge"]
+
+    @property
+    def kind(self) -> str:
+        return self._data()["kind"]
+
+    @property
+    def subhinges(self) -> list[dict[str, Any]]:
+        return self._data()["subhinges"]
+
+    @property
+    def placement(self) -> np.ndarray:
+        pose = np.eye(4)
+        placement = self._data()["placement"]
+        pose[:3, :3], pose[:3, 3] = placement["rotation"], placement["position"]
+        return pose
+
+    @placement.setter
+    def placement(self, pose: np.ndarray) -> None:
+        pose = np.asarray(pose, float)
+        self._model._set_placement(self._index(), pose[:3, :3], pose[:3, 3])
+
+    @property
+    def rotor_inertia(self) -> np.ndarray:
+        """Inertia that a rotor adds along each coordinate, reflected through its gear (kg m² or kg): the block J(k)."""
+        return self._data()["rotor_inertia"]
+
+    @rotor_inertia.setter
+    def rotor_inertia(self, value: float | Vector) -> None:
+        values = np.broadcast_to(np.asarray(value, float), self.rotor_inertia.shape)
+        self._model._set_rotor_inertia(self._index(), [float(x) for x in values])
+
+    def symbol(self, name: str, component: int | str = 0, subhinge: int = 0) -> _core.Parameter:
+        """A parameter of the hinge as what `diff` takes.
+
+        "placement": the hinge's inboard frame moved by a unit twist on its own side, components "rx", "ry", "rz", "x", "y", "z" (or 0
+        to 5), radians or metres; "axis": a subhinge's axis turned about component x, y or z of the axes before it, its point held; "point": that
+        axis shifted along x, y or z; "rotor_inertia": of coordinate number `component` of the hinge.
+        """
+        k, source = self._index(), self._model.soa._source
+        if name == "rotor_inertia":
+            coordinate = range(self._model.nv)[self.v_slice][int(component)]
+            return _core._rotor_parameter(source, coordinate, f"{self.name}.rotor_inertia[{int(component)}]")
+        if name == "placement":
+            c = _TWIST.index(component) if isinstance(component, str) else int(component)
+            return _core._twist_parameter(source, [(k, 0, np.eye(6)[c])], f"{self.name}.placement.{_TWIST[c]}")
+        if name not in ("axis", "point"):
+            raise _core.ModelError(f"hinge {self.name!r} has no parameter {name!r}; there are placement, axis, point, rotor_inertia")
+        subhinges, c = self.subhinges, _component(component)
+        if not 0 <= subhinge < len(subhinges):
+            raise _core.ModelError(f"hinge {self.name!r} has {len(subhinges)} subhinges, none with number {subhinge}")
+        turn = np.eye(3)[c]
+        twist = np.r_[turn, np.cross(subhinges[subhinge]["point"], turn)] if name == "axis" else np.r_[np.zeros(3), turn]
+        label = f"{self.name}.{name}[{subhinge}].{'xyz'[c]}"
+        return _core._twist_parameter(source, [(k, subhinge, twist), (k, subhinge + 1, -twist)], label)
+
+    @property
+    def limits(self) -> tuple[np.ndarray, np.ndarray] | None:
+        data = self._data()
+        return (data["lower"], data["upper"]) if len(data["lower"]) else None
+
+    @property
+    def q_slice(self) -> slice:
+        return self._model._slices(self._index())[0]
+
+    @property
+    def v_slice(self) -> slice:
+        return self._model._slices(self._index())[1]
+
+    @property
+    def body(self) -> Body:
+        return Body(self._model, self._model._names()[0][self._index()])
+
+    def __repr__(self) -> str:
+        return (
+            f"<hinge {self.name!r}: {self.kind}, q[{self.q_slice.start}:{self.q_slice.stop}], v[{self.v_slice.start}:{self.v_slice.stop}]>"
+        )
+
+
+class Node:
+    """A frame on a body, or on the base: `.body` (None for the base), `.pose` (4, 4) in the body's frame."""
+
+    def __init__(self, model: Multibody, name: str):
+        self._model, self.name = model, name
+
+    def _data(self) -> dict[str, Any]:
+        return next(node for node in self._model._nodes() if node["name"] == self.name)
+
+    @property
+    def body(self) -> Body | None:
+        k = self._data()["body"]
+        return None if k < 0 else Body(self._model, self._model._names()[0][k])
+
+    @property
+    def pose(self) -> np.ndarray:
+        data, pose = self._data(), np.eye(4)
+        pose[:3, :3], pose[:3, 3] = data["rotation"], data["position"]
+        return pose
+
+    def __repr__(self) -> str:
+        return f"<node {self.name!r} on {self.body.name if self.body else 'the base'!r}>"
+
+
+class Named(Mapping):
+    """Handles by name, in the model's order."""
+
+    def __init__(self, names: Sequence[str], make: Callable[[str], Any], find: Callable[[str], Any]):
+        self._names, self._make, self._find = names, make, find
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in self._names:
+            try:
+                self._find(name)  # raises with the names there are
+            except _core.ModelError as error:
+                raise KeyError(str(error)) from None
+            raise KeyError(name)
+        return self._make(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    def __repr__(self) -> str:
+        return "{" + ", ".join(self._names) + "}"

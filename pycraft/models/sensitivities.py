@@ -1,0 +1,121 @@
+"""Derivatives of the direct calls: arrays in, arrays out. The same quantities as expressions are `Operator.diff`.
+
+Derivatives along q are along coordinates, and on ball and free hinges along quasi-velocities (in which v is given). Third-order arrays
+have the derivative last. Every call takes one state or a leading batch axis, and a precision.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .. import _core
+from .direct_calls import DirectCalls, cached
+
+
+class DynamicsDerivatives(NamedTuple):
+    """Derivatives of inverse dynamics (by q, v and v̇) or of forward dynamics (by q, v and τ), each (nv, nv) or (B, nv, nv)."""
+
+    q: np.ndarray
+    v: np.ndarray
+    input: np.ndarray
+
+
+class Momentum(NamedTuple):
+    """Momentum about the world's origin in world axes: h = matrix @ v, (6,); matrix (6, nv); dq = ∂h/∂q at v, (6, nv)."""
+
+    value: np.ndarray
+    matrix: np.ndarray
+    dq: np.ndarray
+
+
+class SensitivityCalls(DirectCalls):
+    """Derivatives of inverse and forward dynamics, of the mass matrix, of energy, momentum and Jacobians; the inertial regressor."""
+
+    def _sensitivities(self) -> _core.Sensitivities:
+        return cached(self, "_derivatives", _core.Sensitivities)
+
+    def inverse_dynamics_derivatives(self, q, v, vdot, *, precision: str = "double") -> DynamicsDerivatives:
+        """∂T/∂q, ∂T/∂v and ∂T/∂v̇ = ℳ + J of T = inverse_dynamics(q, v, v̇), gravity included. Cost O(N · depth)."""
+        dq, dv = self._sensitivities().dynamics(False, q, v, vdot, precision)
+        mass = self.mass_matrix(q, precision=precision)
+        return DynamicsDerivatives(dq, dv, mass if mass.shape == dq.shape else np.broadcast_to(mass, dq.shape).copy())
+
+    def forward_dynamics_derivatives(self, q, v, tau, *, precision: str = "double") -> DynamicsDerivatives:
+        """∂v̇/∂q, ∂v̇/∂v and ∂v̇/∂τ = (ℳ + J)⁻¹ of v̇ = forward_dynamics(q, v, τ). Cost O(N²). Raises SingularHingeError as it does."""
+        vdot = self.forward_dynamics(q, v, tau, precision=precision)
+        return DynamicsDerivatives(*self._sensitivities().dynamics(True, q, v, vdot, precision))
+
+    def mass_matrix_derivative(self, q, *, precision: str = "double", out=None) -> np.ndarray:
+        """∂ℳ/∂q, (nv, nv, nv) or (B, nv, nv, nv): entry (i, j, k) is ∂ℳ(i,j)/∂q_k. Cost O(N · depth²) beside the zeros."""
+        return self._sensitivities().third_order(False, q, precision, out)
+
+    def christoffel(self, q, *, precision: str = "double", out=None) -> np.ndarray:
+        """Christoffel symbols of the first kind Γ (nv, nv, nv): Σ_jk Γ(i,j,k) v_j v_k is the Coriolis force, and Σ_k Γ(i,j,k) v_k = C(i,j).
+
+        Γ(i,j,k) = ½(∂_kℳ(i,j) + ∂_jℳ(i,k) - ∂_iℳ(j,k)), and on ball and free hinges the brackets of the quasi-velocities besides (Koszul).
+        Γ(i,j,k) - Γ(i,k,j) is the bracket's: zero for coordinates. Rotor inertias are constant and add nothing.
+        """
+        return self._sensitivities().third_order(True, q, precision, out)
+
+    def coriolis_matrix(self, q, v, *, form: str = "christoffel", precision: str = "double") -> np.ndarray:
+        """C (nv, nv) with C v the Coriolis and gyroscopic forces (gravity apart) and ℳ̇ - 2C skew.
+
+        form="christoffel": C = Γ v, the one for which also ∂(Cv)/∂v = 2C on hinges of one coordinate each; "skew": the operators'
+        C = Hφ(M𝒥̇ + 𝓑𝒥), 𝒥 = φ*H*, which is skew-consistent too and not Christoffel's. Cost O(N · depth²), O(N²).
+        """
+        if form == "christoffel":
+            symbols = self.christoffel(q, precision=precision)
+            return np.einsum("...ijk,...k->...ij", symbols, np.asarray(v, float))
+        if form == "skew":
+            H, phi, M, turning, H_dot, cross = self.soa("H phi M Delta_theta_dot H_dot momentum_cross")  # type: ignore[attr-defined]
+            J = phi.T @ H.T
+            J_dot = phi.T @ (turning.T @ self.soa.phi_tilde.T @ H.T + H_dot.T)  # type: ignore[attr-defined]
+            return (H @ phi @ (M @ J_dot + cross @ J)).at(q, v, precision=precision).dense()
+        raise _core.EvaluationError(f"form {form!r} of the Coriolis matrix is not there; there are 'christoffel' and 'skew'")
+
+    def kinetic_energy_derivatives(self, q, v, *, precision: str = "double") -> tuple[np.ndarray, np.ndarray]:
+        """∂KE/∂q and ∂KE/∂v = (ℳ + J) v, each (nv,) or (B, nv). Cost O(N)."""
+        slope = self._sensitivities().kinetic_energy(q, v, precision)
+        rest = np.zeros_like(slope)
+        at_rest = self.inverse_dynamics(q, rest, rest, precision=precision)
+        return slope, self.inverse_dynamics(q, rest, v, precision=precision) - at_rest
+
+    def momentum(self, q, v, *, precision: str = "double") -> Momentum:
+        """Momentum of all bodies about the world's origin, its matrix and its derivative. Cost O(N)."""
+        matrix, dq = self._sensitivities().momentum(q, v, precision)
+        return Momentum(np.einsum("...ij,...j->...i", matrix, np.asarray(v, float)), matrix, dq)
+
+    def jacobian_dot(self, frame: str, q, v, *, precision: str = "double") -> np.ndarray:
+        """Time derivative (6, nv) or (B, 6, nv) of `jacobian(frame, q)` along v, in the same axes. Cost O(depth)."""
+        return self._sensitivities().jacobian_rate(frame, q, v, precision)
+
+    def jacobian_derivative(self, frame: str, q, *, precision: str = "double") -> np.ndarray:
+        """The kinematic Hessian ∂𝒥/∂q, (6, nv, nv) or (B, 6, nv, nv), of `jacobian(frame, q)` in its own axes, derivative last."""
+        return self._sensitivities().jacobian_derivative(frame, q, precision)
+
+    def inertial_regressor(self, q, v, vdot, *, precision: str = "double") -> np.ndarray:
+        """Y (nv, 10 n) or (B, nv, 10 n) with inverse_dynamics = Y π + J v̇, gravity included. Cost O(N · depth).
+
+        π holds ten numbers per body, in the bodies' order (`inertial_parameters`): mass, mass times centre of mass (3), rotational inertia
+        about the body's origin (xx, xy, xz, yy, yz, zz).
+        """
+        return self._sensitivities().inertial_regressor(q, v, vdot, precision)
+
+    def inertial_parameters(self) -> np.ndarray:
+        """π (10 n,) of the regressor, from the bodies' present mass properties."""
+        rows = []
+        for body in self.bodies.values():  # type: ignore[attr-defined]
+            c, mass = body.com, body.mass
+            about_origin = body.inertia + mass * (c @ c * np.eye(3) - np.outer(c, c))
+            rows.append(np.r_[mass, mass * c, about_origin[np.triu_indices(3)]])
+        return np.concatenate(rows) if rows else np.zeros(0)
+
+    def log_determinant_gradient(self, q, over: str = "coordinates", *, precision: str = "double") -> np.ndarray:
+        """Gradient of ln det(ℳ + J) in three sweeps, O(N), whatever it is taken over.
+
+        "coordinates" (nv,); "inertias" (n, 10), by the regressor's parameters: tr(Υ∂M); "geometry" (n, 6), by a twist at each hinge's
+        placement: 2 tr(P⁺WΔ), W = blockdiag(E*ΥE); "axes" (nv, 6), by the rows of H in the body's axes, poses held: 2(I - P⁺W)G.
+        """
+        return self._sensitivities().log_determinant(over, q, precision)

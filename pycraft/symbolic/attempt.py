@@ -1,0 +1,95 @@
+"""One attempt at a statement, under given hypotheses: normal forms of both sides, then both sides multiplied by what stands inverted in them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from .equations import NO_FRAME, Equation, Frame, Step, Use
+from .expand import Problem
+from .inverses import LocalRules
+from .rules import Setting
+from .words import Polynomial, Word, add_to, combine, inverse_of, inverted, plain, split
+
+ROUNDS = 4
+"""How many inverses are cleared, one after the other."""
+
+
+@dataclass
+class Outcome:
+    """Normal forms of both sides and the steps to them; `frame` holds the inverses of what both were multiplied by."""
+
+    left: list[Step]
+    right: list[Step]
+    lhs: Polynomial
+    rhs: Polynomial
+    frame: Frame = NO_FRAME
+
+    @property
+    def closed(self) -> bool:
+        return self.lhs == self.rhs
+
+
+class Attempt(LocalRules):
+    """The rules of one setting and statement, and what they make of it."""
+
+    def __init__(self, problem: Problem, setting: Setting, extra: Iterable[tuple[Equation, Word]] = ()):
+        super().__init__(problem, setting, list(extra))
+
+    def run(self, lhs: Polynomial, rhs: Polynomial) -> Outcome:
+        """Normal forms of both sides, cleared of inverses where that closes the gap. Raises GaveUp."""
+        p, left = self.reduce(lhs)
+        q, right = self.reduce(rhs)
+        first = at = Outcome(left, right, p, q)
+        for _ in range(ROUNDS):
+            found = None if at.closed else _end(combine((1, at.lhs), (-1, at.rhs)))
+            if found is None:
+                break
+            at = self._cleared(at, *found)
+        return at if at.closed else first
+
+    def _cleared(self, at: Outcome, letter: str, on_left: bool) -> Outcome:
+        """Both sides times X, where X⁻¹ stands at an end of a word of their difference: Y = X⁻¹(XY)."""
+        X, (a, b) = inverse_of(letter), at.frame
+        frame = ((*a, letter), b) if on_left else (a, (letter, *b))
+        pair = self.pair(letter, X) if on_left else self.pair(X, letter)
+        sides = []
+        for steps, p in ((at.left, at.lhs), (at.right, at.rhs)):
+            times_x = {((X, *w) if on_left else (*w, X)): c for w, c in p.items()}
+            uses = [Use(-c, *((a, pair, w + b) if on_left else (a + w, pair, b)), (), False) for w, c in p.items()]
+            insert = Step(p, times_x, uses, self.alphabet, f"{pair.text}, read backwards", (at.frame, frame))
+            opened = self._opened(X, times_x)
+            form, rest = self.reduce(opened[-1].after if opened else times_x)
+            sides.append(([*steps, insert, *(_in_frame(step, frame) for step in [*opened, *rest])], form))
+        return Outcome(sides[0][0], sides[1][0], sides[0][1], sides[1][1], frame)
+
+    def _opened(self, X: str, p: Polynomial) -> list[Step]:
+        """X written as its operand, where it has one."""
+        name, mark = split(X)
+        opaque = next((o for o in self.problem.opaque if o.name == name and o.kind == "inverse"), None)
+        if opaque is None:
+            return []
+        definition = opaque.definition.transposed(self.alphabet) if mark == "*" else opaque.definition
+        out: Polynomial = {}
+        uses = []
+        for word, c in p.items():
+            at = word.index(X)
+            uses.append(Use(c, word[:at], definition, word[at + 1 :], (X,)))
+            for w, x in definition.rhs.items():
+                add_to(out, word[:at] + w + word[at + 1 :], c * x)
+        return [Step(p, out, uses, self.alphabet)] if uses else []
+
+
+def _end(difference: Polynomial) -> tuple[str, bool] | None:
+    """(X⁻¹, whether it stands at the left end) of a word, where one does; D⁻¹, φ⁻¹ and ψ⁻¹ have rules of their own."""
+    for on_left in (True, False):
+        for word in difference:
+            letter = word[0 if on_left else -1] if word else ""
+            if word and inverted(letter) and plain(letter) not in ("D", "φ", "ψ"):
+                return letter, on_left
+    return None
+
+
+def _in_frame(step: Step, frame: Frame) -> Step:
+    """The step with a frame around it."""
+    return Step(step.before, step.after, [u.between(*frame) for u in step.uses], step.alphabet, step.title, (frame, frame))

@@ -1,0 +1,255 @@
+"""Expressions written out as sums of words: products distributed, transposes and inverses carried to the letters.
+
+(AB)* = B*A*, (AB)⁻¹ = B⁻¹A⁻¹ for factors that are square by meaning, (A⁻¹)* = (A*)⁻¹, coefficients as exact fractions of the doubles that
+were typed. What is no product of letters (the inverse of a sum, a diagonal part, a square root) becomes a letter of its own that remembers
+what stands inside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from .. import _core
+from .axioms import INVERTIBLE
+from .equations import Equation, Step, symmetries
+from .rules import WORDS, GaveUp
+from .words import FURTHER, ONE, Alphabet, Letter, Polynomial, combine, inverse_of, plain, shape_of, sko_letters, times
+
+UNFOLDED = {"Jacobian": "𝒥 = B* φ* H*", "Lambda": "Λ = (B* Ω B)⁻¹"}
+"""Symbols that are written out at once."""
+_TABLE = {ascii: (text, latex) for ascii, text, latex, *_ in _core.symbol_table()}
+
+
+@dataclass(eq=False)
+class Opaque:
+    """A letter that stands for the operand of an inverse, for a diagonal part or for a square root.
+
+    `name` is the letter; an inverse is that of its operand with the mark ⁻¹. `inner` is the operand in words.
+    """
+
+    name: str
+    kind: str
+    expression: Any
+    inner: Polynomial
+    definition: Equation
+
+
+class Spelling(Step):
+    """The step from an expression as it was typed to words."""
+
+    def __init__(self, problem: Problem, expression: Any, p: Polynomial, uses: list[Equation], backwards: bool = False):
+        super().__init__(p, p, [], problem.alphabet)
+        self.problem, self.expression, self.definitions, self.backwards = problem, expression, uses, backwards
+        opened = [e.text for e in uses if e.kind == "definition"]
+        self.title = "write out" + (f", {'; '.join(opened)}" if opened else "")
+
+    def holds(self) -> bool:
+        return self.problem.words(self.expression) == self.before
+
+    def premises(self) -> Iterator[Equation]:
+        yield from self.definitions
+
+    def reversed(self) -> Spelling:
+        return Spelling(self.problem, self.expression, self.before, self.definitions, not self.backwards)
+
+    @property
+    def says_something(self) -> bool:
+        """Whether what was typed looks different."""
+        return self.expression.text() != self.alphabet.text(self.before) or bool(self.definitions)
+
+    def before_text(self) -> str:
+        return super().before_text() if self.backwards else self.expression.text()
+
+    def after_text(self) -> str:
+        return self.expression.text() if self.backwards else super().after_text()
+
+    def before_latex(self) -> str:
+        return super().before_latex() if self.backwards else self.expression.latex()
+
+    def after_latex(self) -> str:
+        return self.expression.latex() if self.backwards else super().after_latex()
+
+
+class Problem:
+    """The letters of one statement, and how its expressions are written in them."""
+
+    def __init__(self) -> None:
+        self.alphabet = Alphabet()
+        self.opaque: list[Opaque] = []
+        self.contexts: list[tuple[Any, Any]] = []  # (source, binding): the models at their states
+        self.sides: list[Polynomial] = []
+        self._leaves: dict[Any, str] = {}
+        self._definitions: dict[str, Equation] = {}
+        self._transposed = False
+        self._used: list[Equation] = []
+
+    @property
+    def marks(self) -> tuple[str, ...]:
+        """The marks of the models whose letters occur; the first has none."""
+        return tuple(["", *FURTHER][: max(1, len(self.contexts))])
+
+    def polynomials(self) -> list[Polynomial]:
+        """What the statement is made of: both sides, and the operands of the letters that it adds."""
+        return [*self.sides, *(o.inner for o in self.opaque)]
+
+    def expand(self, expression: Any) -> Spelling:
+        """The expression in words, as the step that says so.
+
+        Raises
+        ------
+        GaveUp
+            More than `rules.WORDS` words.
+        """
+        self._transposed, self._used = False, []
+        p = self.words(expression)
+        uses = list(dict.fromkeys(self._used))
+        if self._transposed:
+            uses += symmetries(self.alphabet, p)
+        return Spelling(self, expression, p, uses)
+
+    # ------------------------------------------------------------------ by kind
+    def words(self, e: Any, transposed: bool = False) -> Polynomial:
+        """The expression, or its transpose, as a polynomial."""
+        match e.kind:
+            case "zero":
+                return {}
+            case "identity":
+                return {(): ONE}
+            case "scaled":
+                c = Fraction(e.coefficient)
+                return {w: c * x for w, x in self.words(e.children[0], transposed).items()} if c else {}
+            case "sum":
+                return combine(*((1, self.words(c, transposed)) for c in e.children))
+            case "product":
+                return self._product(self.words(f, transposed) for f in (reversed(e.children) if transposed else e.children))
+            case "transpose":
+                self._transposed = True
+                return self.words(e.children[0], not transposed)
+            case "inverse":
+                p = self._inverse(e.children[0])
+            case "symbol" if e.name in UNFOLDED:
+                return self.words(self._unfolded(e), transposed)
+            case _:
+                p = {(self.letter(e),): ONE}
+        return self.alphabet.star_of(p) if transposed else p
+
+    def _product(self, factors: Iterator[Polynomial]) -> Polynomial:
+        p: Polynomial = {(): ONE}
+        for factor in factors:
+            p = times(p, factor)
+            if len(p) > WORDS:
+                raise GaveUp
+        return p
+
+    def _inverse(self, e: Any) -> Polynomial:
+        """The words of e⁻¹."""
+        match e.kind:
+            case "inverse":
+                return self.words(e.children[0])
+            case "identity":
+                return {(): ONE}
+            case "scaled" if e.coefficient:
+                c = 1 / Fraction(e.coefficient)
+                return {w: c * x for w, x in self._inverse(e.children[0]).items()}
+            case "transpose":
+                self._transposed = True
+                return self.alphabet.star_of(self._inverse(e.children[0]))
+            case "product" if all(map(_square, e.children)):
+                return self._product(self._inverse(f) for f in reversed(e.children))
+            case "symbol" if e.name in UNFOLDED:
+                return self._inverse(self._unfolded(e))
+            case "symbol" if plain(self.letter(e)) not in INVERTIBLE:
+                return {(inverse_of(self._operand("inverse", e, e)),): ONE}
+            case "sum" | "product" | "scaled":
+                return {(inverse_of(self._operand("inverse", e, e)),): ONE}
+        return {(inverse_of(self.letter(e)),): ONE}
+
+    def _unfolded(self, e: Any) -> Any:
+        """𝒥 and Λ by their definitions."""
+        source, name, nodes, binding = symbol_parts(e)
+        if name not in self._definitions:
+            self._definitions[name] = Equation("definition", UNFOLDED[name], {}, {})
+        self._used.append(self._definitions[name])
+        phi, H, Omega = (_bound(source.symbol(n), binding) for n in ("phi", "H", "Omega"))
+        B = _bound(source.symbol("B", nodes=nodes), binding)
+        return B.T @ phi.T @ H.T if name == "Jacobian" else (B.T @ Omega @ B).inv()
+
+    # ------------------------------------------------------------------ letters
+    def letter(self, e: Any) -> str:
+        """The letter that an expression is."""
+        if e not in self._leaves:
+            if e.kind in ("blockdiag", "sqrt"):
+                return self._operand(e.kind, e, e.children[0])
+            self._leaves[e] = self._symbol(e) if e.kind == "symbol" else self._other(e)
+        return self._leaves[e]
+
+    def _symbol(self, e: Any) -> str:
+        source, ascii, arguments, binding = symbol_parts(e)
+        mark = self._mark_of(source, binding)
+        text, _ = _TABLE.get(ascii, (e.text(), ""))
+        known = self.alphabet.letters.get(text + mark)
+        if known is not None and not arguments:
+            self.alphabet.add(Letter(known.name, known.text, known.latex, known.symmetric, known.shape, known.ascii, e))
+            return known.name
+        shape = "diagonal" if e.is_block_diagonal else shape_of(text)
+        return self._named(f"‹{e.text()}›{mark}", Letter("", e.text() + mark, e.latex(), bool(e.is_symmetric), shape, None, e))
+
+    def _mark_of(self, source: Any, binding: Any) -> str:
+        """The mark of a model at a state."""
+        for i, (s, b) in enumerate(self.contexts):
+            if s is source and b is binding:
+                return ["", *FURTHER][i]
+        if len(self.contexts) > len(FURTHER):
+            raise GaveUp
+        self.contexts.append((source, binding))
+        mark = ["", *FURTHER][len(self.contexts) - 1]
+        for known in sko_letters().values() if mark else ():
+            latex = f"{{{known.latex}}}_{{({len(self.contexts)})}}"
+            self.alphabet.add(Letter(known.name + mark, known.text + mark, latex, known.symmetric, known.shape, known.ascii))
+        return mark
+
+    def _other(self, e: Any) -> str:
+        """Vectors, constants, others' operators: letters of which nothing is known but what their kind says."""
+        vector = e.kind == "vector"
+        shape = "diagonal" if not vector and e.is_block_diagonal else "full"
+        return self._named(f"‹{e.text()}›", Letter("", e.text(), e.latex(), not vector and bool(e.is_symmetric), shape, None, e))
+
+    def _named(self, name: str, letter: Letter) -> str:
+        """Adds a letter under a name that no other has."""
+        while name in self.alphabet.letters:
+            name = "‹" + name + "›"
+        self.alphabet.add(Letter(name, letter.text, letter.latex, letter.symmetric, letter.shape, letter.ascii, letter.expression))
+        return name
+
+    def _operand(self, kind: str, e: Any, operand: Any) -> str:
+        """The letter of something opaque."""
+        key = (kind, e)
+        if key not in self._leaves:
+            inner = self.words(operand) if kind != "inverse" or e.kind != "symbol" else {(self.letter(e),): ONE}
+            name = f"⟨{len(self.opaque) + 1}⟩"
+            text, latex = (f"({e.text()})", f"({e.latex()})") if kind == "inverse" else (e.text(), f"{{{e.latex()}}}")
+            symmetric = kind == "blockdiag" and bool(e.is_symmetric)
+            self.alphabet.add(Letter(name, text, latex, symmetric, "full" if kind == "inverse" else "diagonal", None, e))
+            definition = Equation("definition", f"{text} is written out", {(name,): ONE}, inner)
+            self.opaque.append(Opaque(name, kind, e, inner, definition))
+            self._leaves[key] = name
+        return self._leaves[key]
+
+
+def symbol_parts(e: Any) -> tuple[Any, str, list[Any], Any]:
+    """(source, ASCII name, arguments: node names or a coordinate, binding) of a symbol."""
+    source, name, numbers, nodes, _, binding = e._parts()[1]
+    return source, name, [*numbers, *nodes], binding
+
+
+def _bound(symbol: Any, binding: Any) -> Any:
+    return symbol if binding is None else symbol._bound(binding)
+
+
+def _square(factor: Any) -> bool:
+    """Whether a factor is square by meaning: H may be square by accident."""
+    domain, codomain = factor.domain, factor.codomain
+    return domain is None or domain == codomain or domain.dual == codomain

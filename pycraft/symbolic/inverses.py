@@ -1,0 +1,238 @@
+"""What a statement adds to the rules: the letters that stand for inverses of sums, diagonal parts and square roots.
+
+X⁻¹ = Z where a candidate Z shows XZ = I and ZX = I: for X a single word, for X one of the operators whose inverse is known, for X an operator
+whose inverse stands elsewhere in the statement. Otherwise XX⁻¹ = I and X⁻¹X = I are rules, with X in its normal form.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+from functools import lru_cache
+
+from .axioms import theory
+from .blocks import diagonal_part
+from .equations import Equation, Step, Use, chain_holds, numbered
+from .expand import Opaque, Problem
+from .rules import Rules, Setting, normal_form, rule_from, rules_for, weight
+from .words import ONE, Alphabet, Polynomial, Word, framed, inverse_of, inverted, of_model, parse, plain, split, times
+
+KNOWN_INVERSES = [
+    ("I − E_φ", "φ"),
+    ("I − E_φ + K H", "ψ"),
+    ("I + K H φ", "I − K H ψ"),
+    ("I + φ K H", "I − ψ K H"),
+    ("I + H φ K", "I − H ψ K"),
+    ("H φ M φ* H* + J", "D⁻¹ − D⁻¹ H ψ K − K* ψ* H* D⁻¹ + K* ψ* H* D⁻¹ H ψ K"),
+    ("φ M φ*", "φ⁻* M⁻¹ φ⁻¹"),
+]
+"""Pairs X, Z with XZ = ZX = I: candidates only, each is proved where it is used."""
+
+_UNIT: Polynomial = {(): ONE}
+_ALWAYS = ("φ", "ψ", "D")
+"""Letters that have an inverse on every tree with regular hinges."""
+
+
+class LocalRules:
+    """The rules of one setting with those of the letters that a statement adds.
+
+    Attributes
+    ----------
+    rules : for normal forms; `block_rules` for operands of blockdiag, which need the recursions of R and Υ
+    local : the equations added
+    presupposed : names of letters whose inverse the proof takes to exist
+    """
+
+    def __init__(self, problem: Problem, setting: Setting, extra: list[tuple[Equation, Word]]):
+        self.problem, self.setting = problem, setting
+        self.alphabet: Alphabet = problem.alphabet
+        self.local: list[Equation] = []
+        own = bool(problem.opaque or extra)
+        base = rules_for(setting, problem.marks)
+        self.rules: Rules = base.copy()
+        blocks = Setting(setting.hypotheses, composite=True, compliance=True)
+        self.block_rules = rules_for(blocks, problem.marks).copy() if any(o.kind == "blockdiag" for o in problem.opaque) else None
+        self._rank = 0
+        self._forms: list[tuple[str, Polynomial]] = []
+        self._roots: list[tuple[Opaque, Polynomial, list[Step]]] = []
+        named = sorted({split(x)[0] for p in problem.polynomials() for w in p for x in w if inverted(x)})
+        self.presupposed = {n for n in named if plain(n) not in _ALWAYS}
+        for equation, word in extra:
+            self.add(equation, word)
+        for name in named:
+            if name not in theory().alphabet.letters:
+                self._add_pairs(name)
+        if own:
+            for opaque in problem.opaque:
+                {"inverse": self._inverse, "blockdiag": self._blocks, "sqrt": self._root}[opaque.kind](opaque)
+
+    def add(self, equation: Equation, word: Word, blocks: bool = True) -> None:
+        """A rule and its transpose, before all that are there."""
+        self.local.append(equation)
+        self._rank -= 1
+        for rules in [self.rules, *([self.block_rules] if blocks and self.block_rules is not None else [])]:
+            rules.add_equation(equation, word, self.alphabet, self._rank)
+
+    def reduce(self, p: Polynomial) -> tuple[Polynomial, list[Step]]:
+        """(the normal form, the steps to it)."""
+        return self.rules.reduce(p, self.alphabet)
+
+    def _add_pairs(self, name: str) -> None:
+        """X X⁻¹ = I and X⁻¹ X = I of a letter."""
+        for pair in ((name, inverse_of(name)), (inverse_of(name), name)):
+            self.add(self.pair(*pair), pair)
+
+    def pair(self, a: str, b: str) -> Equation:
+        """a b = I for a letter and its inverse."""
+        word = (a, b)
+        for equation in self.local:
+            for e in (equation, equation.transposed(self.alphabet)) if equation.kind == "inverse" else ():
+                if word in e.lhs:
+                    return e
+        return Equation("inverse", f"{self.alphabet.word_text(word)} = I", {word: ONE}, _UNIT)
+
+    # ------------------------------------------------------------------ inverses
+    def _inverse(self, o: Opaque) -> None:
+        X, a = o.name, self.alphabet
+        form, steps = self.reduce(o.inner)
+        if not form:
+            return
+        for z in self._candidates(form):
+            lemma = self._inverse_is(X, o.inner, z, o.definition)
+            if lemma is not None:
+                self.presupposed.discard(X)
+                self.presupposed |= {split(x)[0] for w in z for x in w if inverted(x) and plain(x) not in _ALWAYS}
+                self.add(lemma, (inverse_of(X),))
+                return
+        lead = max(form, key=weight)
+        for left, right in (((), (inverse_of(X),)), ((inverse_of(X),), ())):
+            self.add(self._times_inverse(o, left, right, form, steps), left + lead + right, blocks=False)
+        starred = a.star_of(o.inner)
+        if normal_form(starred, self.rules, a) == form:
+            lemma = self._inverse_is(a.star(X), starred, {(inverse_of(X),): ONE}, o.definition.transposed(a))
+            if lemma is not None:  # X⁻* = X⁻¹; its transpose says the same
+                self.local.append(lemma)
+                self._rank -= 1
+                for rules in filter(None, (self.rules, self.block_rules)):
+                    rules.add(rule_from(lemma, (inverse_of(a.star(X)),), self._rank))
+        self._forms.append((X, form))
+
+    def _candidates(self, form: Polynomial) -> Iterator[Polynomial]:
+        """What may be the inverse of an operator with this normal form."""
+        if len(form) == 1:
+            ((word, c),) = form.items()
+            if all(plain(x) in ("φ", "ψ", "D", "M", "P", "R", "Υ") or inverted(x) for x in word):
+                yield {tuple(inverse_of(x) for x in reversed(word)): 1 / c}
+        for mark in self.problem.marks:
+            key, scale = _scaled({tuple(_unmarked(x, mark) for x in w): c for w, c in form.items()})
+            for z, its_scale in _known_inverses(self.setting).get(key, ()):
+                yield {tuple(of_model(x, mark) for x in w): c * its_scale / scale for w, c in z.items()}
+        key, scale = _scaled(form)
+        for X, other in self._forms:
+            for name, p in ((X, other), (self.alphabet.star(X), self.alphabet.star_of(other))):
+                its_key, its_scale = _scaled(p)
+                if its_key == key:
+                    yield {(inverse_of(name),): its_scale / scale}
+
+    def _inverse_is(self, X: str, inner: Polynomial, z: Polynomial, definition: Equation) -> Equation | None:
+        """The lemma X⁻¹ = Z, by XZ = I and ZX = I; None if these do not come out."""
+        a, Y = self.alphabet, inverse_of(X)
+        halves = []
+        for product, text in ((times(inner, z), "X Z = I"), (times(z, inner), "Z X = I")):
+            form, steps = self.reduce(product)
+            if form != _UNIT:
+                return None
+            where = f"X = {a.letter_text(X)}, Z = {a.text(z)}"
+            halves.append(Equation("lemma", f"{text}, {where}", product, _UNIT, steps=numbered(steps)))
+        first, second = framed((Y,), times(inner, z), ()), {(Y, X, *w): c for w, c in z.items()}
+        pair = self.pair(Y, X)
+        steps = [
+            Step({(Y,): ONE}, first, [Use(-ONE, (Y,), halves[0], (), (), False)], a),
+            Step(first, second, [Use(-c, (Y,), definition, w, (), False) for w, c in z.items()], a),
+            Step(second, z, [Use(c, (), pair, w, (Y, X)) for w, c in z.items()], a),
+        ]
+        text = f"{a.letter_text(Y)} = {a.text(z)}"
+        note = "both products are I between equal spaces, so that the one is the inverse of the other"
+        return Equation("lemma", text, {(Y,): ONE}, z, steps=numbered(steps), uses=[halves[1]], note=note)
+
+    def _times_inverse(self, o: Opaque, left: Word, right: Word, form: Polynomial, steps: list[Step]) -> Equation:
+        """left (the normal form of X) right = I, where one of left and right is X⁻¹ and the other I."""
+        a, whole = self.alphabet, (*left, o.name, *right)
+        chain = [step.reversed().between(left, right) for step in reversed(steps)]
+        chain.append(Step(framed(left, o.inner, right), {whole: ONE}, [Use(-ONE, left, o.definition, right, (), False)], a))
+        chain.append(Step({whole: ONE}, _UNIT, [Use(ONE, (), self.pair(whole[0], whole[1]), (), whole)], a))
+        lhs = framed(left, form, right)
+        return Equation("lemma", f"{a.text(lhs)} = I", lhs, _UNIT, steps=numbered(chain))
+
+    # ------------------------------------------------------------------ diagonal parts and roots
+    def _blocks(self, o: Opaque) -> None:
+        """blockdiag(X), by the normal form of X."""
+        assert self.block_rules is not None
+        a = self.alphabet
+        form, steps = self.block_rules.reduce(o.inner, a)
+        value = diagonal_part(form, a)
+        if value == {(o.name,): ONE}:
+            return
+        text = f"{a.letters[o.name].text} = {a.text(value)}"
+        note = "the diagonal blocks of each word, by where its letters lead on the tree"
+        equation = Equation("structure", text, {(o.name,): ONE}, value, steps=numbered(steps), uses=[o.definition], note=note)
+        equation.check = lambda: chain_holds(steps, o.inner, form) and diagonal_part(form, a) == value
+        self.add(equation, (o.name,))
+
+    def _root(self, o: Opaque) -> None:
+        """LL* = A of L = A^½; L⁻¹A = L* where A is one word."""
+        a, L = self.alphabet, o.name
+        form, steps = self.reduce(o.inner)
+        text = a.letters[L].text
+        for other, its_form, its_steps in self._roots:
+            if its_form == form:
+                same = Equation("structure", f"{text} = {a.letters[other.name].text}", {(L,): ONE}, {(other.name,): ONE})
+                same.steps, same.note = [*steps, *its_steps], "roots of equal operators"
+                same.check = lambda: chain_holds(steps, o.inner, form) and chain_holds(its_steps, other.inner, form)
+                self.add(same, (L,))
+                return
+        self._roots.append((o, form, steps))
+        star = a.star(L)
+        square = Equation("definition", f"{text} ({text})* = {a.text(o.inner)}", {(L, star): ONE}, o.inner)
+        self.add(square, (L, star))
+        if len(form) != 1:
+            return
+        ((word, c),) = form.items()
+        if all(plain(x) in _ALWAYS for x in word):
+            self.presupposed.discard(L)
+        Y = inverse_of(L)
+        if any(Y in w or a.star(Y) in w for p in self.problem.polynomials() for w in p):
+            chain = [step.reversed().between((Y,), (), 1 / c) for step in reversed(steps)]
+            inner = {w: x / c for w, x in framed((Y,), o.inner, ()).items()}
+            whole: Polynomial = {(Y, L, star): 1 / c}
+            chain.append(Step(inner, whole, [Use(-1 / c, (Y,), square, (), (), False)], a))
+            chain.append(Step(whole, {(star,): 1 / c}, [Use(1 / c, (), self.pair(Y, L), (star,), (Y, L))], a))
+            lhs, rhs = {(Y, *word): ONE}, {(star,): 1 / c}
+            self.add(Equation("lemma", f"{a.text(lhs)} = {a.text(rhs)}", lhs, rhs, steps=numbered(chain)), (Y, *word))
+
+
+def _scaled(p: Polynomial) -> tuple[tuple, Fraction]:
+    """(a key for the polynomial up to a factor, that factor)."""
+    lead = p[max(p, key=weight)]
+    return tuple(sorted((w, c / lead) for w, c in p.items())), lead
+
+
+@lru_cache(maxsize=32)
+def _known_inverses(setting: Setting) -> dict[tuple, list[tuple[Polynomial, Fraction]]]:
+    """Candidates by the normal form of X, scaled."""
+    rules, alphabet = rules_for(setting), theory().alphabet
+    found: dict[tuple, list[tuple[Polynomial, Fraction]]] = {}
+    for one, other in KNOWN_INVERSES:
+        for x, z in ((parse(one), parse(other)), (parse(other), parse(one))):
+            for p, q in ((x, z), (alphabet.star_of(x), alphabet.star_of(z))):
+                key, scale = _scaled(normal_form(p, rules, alphabet))
+                found.setdefault(key, []).append((q, scale))
+    return found
+
+
+def _unmarked(letter: str, mark: str) -> str:
+    """A letter of a further model as the first has it; letters of other models stay apart."""
+    name, done = split(letter)
+    if not mark:
+        return letter
+    return name[: -len(mark)] + done if name.endswith(mark) else "?" + letter

@@ -1,0 +1,487 @@
+"""Exact arithmetic for closed forms: rational functions of angles, quaternions and parameters, and sparse matrices of them.
+
+Entries of the operators are rational in the sines and cosines of the angles. SymPy's own expressions would have to be simplified
+after every product to stay small; here a number is one fraction of two polynomials with whole coefficients, in lowest terms. Angles
+come in by t = tan(q/2): sin q = 2t/(1 + t²), cos q = (1 - t²)/(1 + t²) need no relation between them, so lowest terms are the
+shortest, and a fraction is zero only where its numerator is. What is shown has sines and cosines again. Relations remain for unit
+quaternions, w² = 1 - x² - y² - z², and for roots, r² = n; they are applied after every operation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import sympy
+from sympy.polys.domains import ZZ
+
+from .. import _core
+
+
+def exact(x: float, simplest: bool = True) -> sympy.Expr:
+    """A double as an exact number: the fraction with a denominator up to 10⁶, or the root of one up to 1000, whose double it is.
+
+    Any other double is the binary fraction that it stands for.
+    """
+    x = float(x)
+    if not np.isfinite(x):
+        raise _core.ModelError(f"{x} has no exact form")
+    if simplest:
+        near = Fraction(x).limit_denominator(10**6)
+        if float(near) == x:
+            return sympy.Rational(near.numerator, near.denominator)
+        square = Fraction(x * x).limit_denominator(1000)
+        root = sympy.sqrt(sympy.Rational(square.numerator, square.denominator))
+        if square and abs(float(square) ** 0.5 - abs(x)) <= 2 * np.spacing(abs(x)):
+            return root if x > 0 else -root
+    return sympy.Rational(Fraction(x).numerator, Fraction(x).denominator)
+
+
+class Rationals:
+    """The field of the entries: generators, relations, and the way to and from SymPy expressions.
+
+    Parameters
+    ----------
+    expressions : every expression that entries are made of; what is not rational in them becomes a generator
+    unit : quaternions (w, x, y, z) taken as of unit length
+    """
+
+    def __init__(self, expressions: Iterable[sympy.Expr], unit: Sequence[Sequence[sympy.Symbol]] = ()):
+        atoms: dict[sympy.Expr, None] = {}
+        for expression in expressions:
+            _collect(sympy.sympify(expression), atoms)
+        self.atoms = list(atoms)
+        self._unit = [list(quaternion) for quaternion in unit]
+        self._make([sympy.Dummy(f"g{i}") for i in range(len(self.atoms))])
+
+    def _make(self, names: list[sympy.Dummy]) -> None:
+        self._names = names
+        self._to_atom = dict(zip(names, self.atoms, strict=True))
+        self.field = ZZ.frac_field(*(names or [sympy.Dummy("g")])).field
+        self.zero, self.one = self.field.zero, self.field.one
+        self._gens = dict(zip(self.atoms, self.field.gens, strict=False))
+        ring = self.field.ring
+        # index of a generator → what its square is, in the ring
+        self._squares: dict[int, Any] = {}
+        below: dict[int, Any] = {}
+        self._angles: dict[int, sympy.Expr] = {}
+        for i, atom in enumerate(self.atoms):
+            if isinstance(atom, sympy.tan):
+                self._angles[i] = 2 * atom.args[0]
+            elif isinstance(atom, sympy.Pow):  # a root √(n/d) is r/d with r² = nd
+                inside = self.element(atom.base)
+                self._squares[i] = inside.numer * inside.denom
+                self._gens[atom] = self.field.gens[i] / self.field.raw_new(inside.denom, ring.one)
+                below[i] = inside.denom
+        of_atom = dict(zip(self.atoms, ring.gens, strict=False))
+        for w, *u in self._unit:
+            self._squares[self.atoms.index(w)] = 1 - sum(of_atom[x] ** 2 for x in u)
+        self._shown: dict[tuple[Any, bool], sympy.Expr] = {}
+        # The same with sines and cosines: where elements are shown.
+        cosines = [sympy.Dummy("c") for _ in self._angles]
+        self._shown_ring = ring.clone(symbols=[*ring.symbols, *cosines])
+        last = self._shown_ring.gens[len(ring.gens) :]
+        self._trigonometric = {i: (self._shown_ring.gens[i], c) for i, c in zip(self._angles, last, strict=True)}
+        self._shown_atoms = dict(zip(ring.symbols, self.atoms, strict=False)) | {
+            names[i]: sympy.sin(angle) for i, angle in self._angles.items()
+        }
+        self._shown_atoms |= {c: sympy.cos(angle) for c, angle in zip(cosines, self._angles.values(), strict=True)}
+        for i, denominator in below.items():
+            if denominator != 1:
+                self._shown_atoms[names[i]] = self.expression(self.field.raw_new(denominator, ring.one), False) * self.atoms[i]
+
+    def extended(self, expressions: Iterable[sympy.Expr]) -> Rationals:
+        """The field with more generators, itself where there is nothing new; `lift` brings elements there."""
+        atoms = dict.fromkeys(self.atoms)
+        for expression in expressions:
+            _collect(sympy.sympify(expression), atoms)
+        if len(atoms) == len(self.atoms):
+            return self
+        made = Rationals.__new__(Rationals)
+        made.atoms, made._unit = list(atoms), self._unit
+        made._make([*self._names, *(sympy.Dummy(f"g{i}") for i in range(len(self.atoms), len(atoms)))])
+        return made
+
+    def lift(self, f: Any) -> Any:
+        """An element of a field that this one extends."""
+        more = len(self.field.gens) - len(f.field.gens)
+        if not more and f.field == self.field:
+            return f
+        if not self._names[: len(f.field.gens)] == list(f.field.symbols):  # the field of numbers alone has a generator of its own
+            return self.field(int(f.numer.LC)) / self.field(int(f.denom.LC)) if f.numer else self.zero
+        ring, pad = self.field.ring, (0,) * more
+        numerator, denominator = (ring.from_dict({m + pad: c for m, c in p.items()}) for p in (f.numer, f.denom))
+        return self.field.raw_new(numerator, denominator)
+
+    def element(self, expression: Any) -> Any:
+        """The element that a SymPy expression in the field's atoms is."""
+        e = sympy.sympify(expression)
+        if e.is_Rational:
+            return self.field(int(e.p)) / self.field(int(e.q))
+        if e in self._gens:
+            return self._gens[e]
+        if e.is_Add:
+            return self.reduce(sum((self.element(a) for a in e.args), self.field.zero))
+        if e.is_Mul:
+            made = self.field.one
+            for a in e.args:
+                made = self.reduce(made * self.element(a))
+            return made
+        if e.is_Pow and e.exp.is_Integer:
+            return self.reduce(self.element(e.base) ** int(e.exp))
+        if e.is_Pow and e.exp.is_Rational and e.base.is_Rational:
+            return self.element(_root(e))
+        if e.is_Pow and e.exp.is_Rational and e.exp.q == 2 and sympy.sqrt(e.base) in self._gens:
+            return self.reduce(self._gens[sympy.sqrt(e.base)] ** e.exp.p)
+        if isinstance(e, sympy.sin | sympy.cos | sympy.tan) and sympy.tan(e.args[0] / 2) in self._gens:
+            t = self._gens[sympy.tan(e.args[0] / 2)]
+            over = 2 * t if not isinstance(e, sympy.cos) else 1 - t**2
+            return over / (1 - t**2 if isinstance(e, sympy.tan) else 1 + t**2)
+        raise _core.EvaluationError(f"{e} is no rational function of {', '.join(map(str, self.atoms))}")
+
+    def reduce(self, f: Any) -> Any:
+        """The same element with squares replaced by the relations, in lowest terms. Raises EvaluationError where the denominator is 0."""
+        if not self._squares:
+            return f
+        numerator, denominator = _replace(f.numer, self._squares), _replace(f.denom, self._squares)
+        if numerator is f.numer and denominator is f.denom:
+            return f
+        if not denominator:
+            raise _core.EvaluationError("division by an entry that is zero at every state")
+        if not numerator:
+            return self.zero
+        return self.field.new(numerator, denominator)
+
+    def inner(self, pairs: Sequence[tuple[Any, Any]]) -> Any:
+        """Σ xy over the pairs: products of one denominator are added before a common factor is looked for."""
+        if len(pairs) == 1:
+            x, y = pairs[0]
+            return self.reduce(x * y)
+        sums: dict[Any, Any] = {}
+        for x, y in pairs:
+            below = x.denom * y.denom
+            above = x.numer * y.numer
+            sums[below] = sums[below] + above if below in sums else above
+        total = self.field.zero
+        for below, above in sums.items():
+            if above:
+                total = self.reduce(total + self.reduce(self.field.new(above, below)))
+        return total
+
+    def root(self, f: Any, sample: Mapping[sympy.Expr, float]) -> tuple[Rationals, Any]:
+        """√f in a field that has it, f positive at the sample: roots of the irreducible factors of what is shown.
+
+        Raises EvaluationError where f is negative at the sample.
+        """
+        numerator, denominator = (p.as_expr().xreplace(self._shown_atoms) for p in self._in_sines(f))
+        if float(sympy.sympify(numerator / denominator).subs(sample)) < 0:
+            raise _core.EvaluationError("the root of a negative number: the operator is not positive semidefinite")
+        made = sympy.S.One
+        for side, power in ((numerator, 1), (denominator, -1)):
+            number, factors = sympy.factor_list(side)
+            made *= sympy.sqrt(abs(number)) ** power
+            for factor, times in factors:
+                factor = -factor if float(factor.subs(sample)) < 0 else factor
+                whole = factor ** (times // 2) if (times // 2) % 2 == 0 or factor.is_positive else sympy.Abs(factor) ** (times // 2)
+                made *= (whole * (sympy.sqrt(factor) if times % 2 else 1)) ** power
+        field = self.extended([made])
+        return field, field.element(made)
+
+    # ------------------------------------------------------------------ as SymPy shows it
+    def expression(self, f: Any, simplify: bool = True) -> sympy.Expr:
+        """The element as a SymPy expression, shortest of the forms tried where `simplify` is set."""
+        key = (f, simplify)
+        if key not in self._shown:
+            numerator, denominator = self._in_sines(f)
+            if not simplify:
+                self._shown[key] = (numerator.as_expr() / denominator.as_expr()).xreplace(self._shown_atoms)
+            else:
+                self._shown[key] = self._shortest(numerator, denominator) if numerator else sympy.S.Zero
+        return self._shown[key]
+
+    def _in_sines(self, f: Any) -> tuple[Any, Any]:
+        """Numerator and denominator as polynomials in sines and cosines, of degree at most one in every sine.
+
+        Both are multiplied by cos^{2k}(q/2), 2k the degree in t = tan(q/2): t^j cos^{2k}(q/2) is a product of (1 ∓ cos q)/2, with one
+        sin q / 2 where j is odd.
+        """
+        ring = self._shown_ring
+        pad = (0,) * len(self._angles)
+        parts = [ring.from_dict({m + pad: c for m, c in p.items()}) for p in (f.numer, f.denom)]
+        for i, (s, c) in self._trigonometric.items():
+            degree = max(p.degree(s) for p in parts)
+            if degree <= 0:
+                continue
+            half = (degree + 1) // 2
+            power = [(1 - c) ** (j // 2) * (1 + c) ** (half - (j + 1) // 2) * (s if j % 2 else 1) for j in range(degree + 1)]
+            turned = []
+            for p in parts:
+                by_degree: dict[int, dict[Any, Any]] = {}
+                for m, x in p.items():
+                    by_degree.setdefault(m[i], {})[m[:i] + (0,) + m[i + 1 :]] = x
+                turned.append(sum((ring.from_dict(rest) * power[j] for j, rest in by_degree.items()), ring.zero))
+            parts = turned
+        numerator, denominator = parts[0].cancel(parts[1])
+        return numerator, denominator
+
+    def _shortest(self, numerator: Any, denominator: Any) -> sympy.Expr:
+        ring, forms = self._shown_ring, [(numerator, denominator)]
+        index = {g: i for i, g in enumerate(ring.gens)}
+        squares = {index[c]: 1 - s**2 for s, c in self._trigonometric.values()}
+        by_sines = _replace(numerator, squares), _replace(denominator, squares)
+        if by_sines != forms[0] and by_sines[1]:
+            forms += [by_sines[0].cancel(by_sines[1]), (numerator, by_sines[1]), (by_sines[0], denominator)]
+        best = min(forms, key=lambda g: (len(g[0]) + len(g[1]), _degrees(g[0]) + _degrees(g[1])))
+        up, down = (p.as_expr() for p in best)
+        candidates = [up / down, (-up) / (-down)] if len(best[1]) > 1 else [up / down]
+        if len(best[0]) + len(best[1]) <= 40 and max(c.bit_length() for p in best for c in p.values()) <= 60:
+            candidates += [sympy.factor(sign * up) / sympy.factor(sign * down) for sign in ((1, -1) if len(best[1]) > 1 else (1,))]
+            candidates = [c.xreplace(self._shown_atoms) for c in candidates]
+            trigonometric = sum(isinstance(a, sympy.sin | sympy.cos) for a in candidates[0].atoms(sympy.Function))
+            if trigonometric > 1 and len(best[0]) + len(best[1]) <= 20:
+                candidates += [_angle_sums(c) for c in candidates]
+        else:
+            candidates = [c.xreplace(self._shown_atoms) for c in candidates]
+        return min(candidates, key=lambda e: (sympy.count_ops(e), len(str(e))))
+
+
+def _degrees(p: Any) -> int:
+    return sum(sum(m) for m in p)
+
+
+def _angle_sums(e: sympy.Expr) -> sympy.Expr:
+    """Products of sines and cosines gathered into those of sums of angles, where that makes it shorter."""
+    from sympy.simplify.fu import TR8, TR10i
+
+    forms = [TR10i(e), TR8(e)]
+    return min(forms, key=sympy.count_ops)
+
+
+def _collect(e: sympy.Expr, atoms: dict[sympy.Expr, None]) -> None:
+    if e.is_Rational:
+        return
+    if e.is_Add or e.is_Mul:
+        for a in e.args:
+            _collect(a, atoms)
+    elif e.is_Pow and e.exp.is_Integer:
+        _collect(e.base, atoms)
+    elif e.is_Pow and e.exp.is_Rational and e.base.is_Rational:
+        for a in _root(e).atoms(sympy.Pow):
+            if a.exp == sympy.Rational(1, 2):
+                atoms.setdefault(a)
+    elif e.is_Pow and e.exp.is_Rational and e.exp.q == 2:
+        _collect(e.base, atoms)
+        atoms.setdefault(sympy.sqrt(e.base))
+    elif isinstance(e, sympy.sin | sympy.cos | sympy.tan):
+        atoms.setdefault(sympy.tan(e.args[0] / 2))
+    else:
+        atoms.setdefault(e)
+
+
+def _root(e: sympy.Expr) -> sympy.Expr:
+    """A power of a rational as a multiple of a square root of a whole number."""
+    if e.exp.q != 2:
+        raise _core.EvaluationError(f"{e} is no square root")
+    whole, p, q = e.base ** ((e.exp.p - 1) // 2), e.base.p, e.base.q
+    if p < 0:
+        raise _core.EvaluationError(f"{e} is not real")
+    return sympy.Mul(whole / q, sympy.sqrt(p * q)) if q != 1 else sympy.Mul(whole, sympy.Pow(p, sympy.Rational(1, 2)))
+
+
+def _replace(p: Any, squares: Mapping[int, Any]) -> Any:
+    """The polynomial with x_i² replaced by squares[i], in every monomial as often as it goes."""
+    if not any(monomial[i] > 1 for monomial in p for i in squares):
+        return p
+    ring, made = p.ring, p.ring.zero
+    for monomial, coefficient in p.terms():
+        factor, rest = None, list(monomial)
+        for i, square in squares.items():
+            if rest[i] > 1:
+                power = square ** (rest[i] // 2)
+                factor = power if factor is None else factor * power
+                rest[i] %= 2
+        term = ring({tuple(rest): coefficient})
+        made += term if factor is None else term * factor
+    return _replace(made, squares)
+
+
+class Matrix:
+    """A sparse matrix over the field: rows as dictionaries from column to nonzero element."""
+
+    def __init__(self, field: Rationals, rows: list[dict[int, Any]], columns: int):
+        self.field, self.rows, self.columns = field, rows, columns
+
+    # ------------------------------------------------------------------ making them
+    @classmethod
+    def of(cls, field: Rationals, entries: Sequence[Sequence[Any]], columns: int | None = None) -> Matrix:
+        """A matrix of SymPy expressions or numbers, given row by row."""
+        rows = [{j: x for j, e in enumerate(row) if (x := field.element(e))} for row in entries]
+        return cls(field, rows, len(entries[0]) if columns is None else columns)
+
+    @classmethod
+    def zeros(cls, field: Rationals, rows: int, columns: int) -> Matrix:
+        return cls(field, [{} for _ in range(rows)], columns)
+
+    @classmethod
+    def identity(cls, field: Rationals, n: int) -> Matrix:
+        return cls(field, [{i: field.one} for i in range(n)], n)
+
+    @classmethod
+    def diagonal(cls, field: Rationals, blocks: Sequence[Matrix]) -> Matrix:
+        """Block diagonal of the given blocks."""
+        rows: list[dict[int, Any]] = []
+        at = 0
+        for block in blocks:
+            rows += [{at + j: x for j, x in row.items()} for row in block.rows]
+            at += block.columns
+        return cls(field, rows, at)
+
+    def lifted(self, field: Rationals) -> Matrix:
+        """The same matrix over a field that extends this one."""
+        if field is self.field:
+            return self
+        return Matrix(field, [{j: field.lift(x) for j, x in row.items()} for row in self.rows], self.columns)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        return len(self.rows), self.columns
+
+    # ------------------------------------------------------------------ blocks
+    def block(self, rows: slice, columns: slice) -> Matrix:
+        low, high = columns.start, columns.stop
+        cut = [{j - low: x for j, x in row.items() if low <= j < high} for row in self.rows[rows]]
+        return Matrix(self.field, cut, high - low)
+
+    def place(self, rows: slice, columns: slice, block: Matrix) -> None:
+        """Write a block."""
+        for i, row in zip(range(rows.start, rows.stop), block.rows, strict=True):
+            kept = {j: x for j, x in self.rows[i].items() if not columns.start <= j < columns.stop}
+            self.rows[i] = kept | {columns.start + j: x for j, x in row.items()}
+
+    # ------------------------------------------------------------------ arithmetic
+    @property
+    def T(self) -> Matrix:
+        rows: list[dict[int, Any]] = [{} for _ in range(self.columns)]
+        for i, row in enumerate(self.rows):
+            for j, x in row.items():
+                rows[j][i] = x
+        return Matrix(self.field, rows, len(self.rows))
+
+    def __matmul__(self, other: Matrix) -> Matrix:
+        made = []
+        for row in self.rows:
+            products: dict[int, list[tuple[Any, Any]]] = {}
+            for k, x in row.items():
+                for j, y in other.rows[k].items():
+                    products.setdefault(j, []).append((x, y))
+            made.append({j: total for j, pairs in products.items() if (total := self.field.inner(pairs))})
+        return Matrix(self.field, made, other.columns)
+
+    def __add__(self, other: Matrix) -> Matrix:
+        reduce, made = self.field.reduce, []
+        for mine, theirs in zip(self.rows, other.rows, strict=True):
+            row = dict(mine)
+            for j, y in theirs.items():
+                row[j] = reduce(row[j] + y) if j in row else y
+            made.append({j: x for j, x in row.items() if x})
+        return Matrix(self.field, made, self.columns)
+
+    def scaled(self, number: Any) -> Matrix:
+        reduce = self.field.reduce
+        return Matrix(self.field, [{j: reduce(number * x) for j, x in row.items()} if number else {} for row in self.rows], self.columns)
+
+    def __neg__(self) -> Matrix:
+        return self.scaled(-self.field.one)
+
+    def __sub__(self, other: Matrix) -> Matrix:
+        return self + -other
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Matrix) and self.shape == other.shape and not any((self - other).rows)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def eliminated(self, right: Matrix) -> tuple[Matrix, Any]:
+        """A⁻¹B and det A, by Gauss and Jordan on entries reduced at every step.
+
+        The pivot is the shortest nonzero entry of its column. Raises ArithmeticError for a matrix that is singular at every state.
+        """
+        n, reduce = len(self.rows), self.field.reduce
+        rows = [dict(row) | {n + j: x for j, x in other.items()} for row, other in zip(self.rows, right.rows, strict=True)]
+        determinant = self.field.one
+        for column in range(n):
+            candidates = [i for i in range(column, n) if column in rows[i]]
+            if not candidates:
+                raise _core.SingularOperatorError("an inverse of an operator that is singular at every state")
+            best = min(candidates, key=lambda i: (_length(rows[i][column]), len(rows[i])))
+            if best != column:
+                rows[column], rows[best] = rows[best], rows[column]
+                determinant = -determinant
+            pivot = rows[column][column]
+            determinant = reduce(determinant * pivot)
+            if pivot != self.field.one:
+                rows[column] = {j: reduce(x / pivot) for j, x in rows[column].items() if j != column}
+                rows[column][column] = self.field.one
+            for i in range(n):
+                if i == column or column not in rows[i]:
+                    continue
+                factor, row = rows[i].pop(column), rows[i]
+                for j, x in rows[column].items():
+                    if j == column:
+                        continue
+                    product = reduce(factor * x)
+                    value = reduce(row[j] - product) if j in row else -product
+                    if value:
+                        row[j] = value
+                    else:
+                        row.pop(j, None)
+        made = [{j - n: x for j, x in row.items() if j >= n} for row in rows]
+        return Matrix(self.field, made, right.columns), determinant
+
+    def inverse(self) -> Matrix:
+        """By cofactors up to (3, 3), which divide once; by elimination above."""
+        if len(self.rows) <= 3:
+            return self._by_cofactors()
+        return self.eliminated(Matrix.identity(self.field, len(self.rows)))[0]
+
+    def _by_cofactors(self) -> Matrix:
+        n, field = len(self.rows), self.field
+        at = lambda i, j: self.rows[i % n].get(j % n, field.zero)  # noqa: E731
+        if n == 3:
+            minor = lambda i, j: field.inner(  # noqa: E731
+                [(at(i + 1, j + 1), at(i + 2, j + 2)), (-at(i + 1, j + 2), at(i + 2, j + 1))]
+            )
+        elif n == 2:
+            minor = lambda i, j: at(i + 1, j + 1) if i == j else -at(i + 1, j + 1)  # noqa: E731
+        else:
+            minor = lambda i, j: field.one  # noqa: E731
+        cofactors = [[minor(i, j) for j in range(n)] for i in range(n)]
+        determinant = field.inner([(at(0, j), cofactors[0][j]) for j in range(n)]) if n else field.one
+        if not determinant:
+            raise _core.SingularOperatorError("an inverse of an operator that is singular at every state")
+        transposed = [{j: field.reduce(cofactors[j][i] / determinant) for j in range(n) if cofactors[j][i]} for i in range(n)]
+        return Matrix(field, transposed, n)
+
+    def determinant(self) -> Any:
+        """Zero for a singular matrix."""
+        try:
+            return self.eliminated(Matrix.zeros(self.field, len(self.rows), 0))[1]
+        except _core.SingularOperatorError:
+            return self.field.zero
+
+    def trace(self) -> Any:
+        total = self.field.zero
+        for i, row in enumerate(self.rows):
+            total = self.field.reduce(total + row.get(i, self.field.zero))
+        return total
+
+    def sympy(self, simplify: bool = True) -> sympy.ImmutableDenseMatrix:
+        """The matrix as SymPy shows it."""
+        entries = {(i, j): self.field.expression(x, simplify) for i, row in enumerate(self.rows) for j, x in row.items()}
+        return sympy.ImmutableDenseMatrix(sympy.SparseMatrix(len(self.rows), self.columns, entries))
+
+
+def _length(f: Any) -> int:
+    return len(f.numer) + len(f.denom)

@@ -1,0 +1,291 @@
+"""The normal form: which equations are read in which direction, and how a polynomial is brought there, step by step.
+
+A rule replaces a word by lighter or shorter ones (`weight`), so that every chain of rules ends. In each step one equation is applied wherever
+it fits, the one that stands first in the list before all others: hypotheses, what cancels, then what makes words short, then what opens
+abbreviations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cache, lru_cache
+
+from .axioms import Theory, solved, theory
+from .equations import Equation, Step, Use, numbered
+from .words import ONE, Alphabet, Polynomial, Word, add_to, inverted, of_model, plain
+
+WORDS, REWRITES = 1500, 6000
+"""Sizes at which a reduction gives up."""
+
+# (the word that goes, the equation), in order of rank. Transposes are rules as well.
+_CANCELLING = [(f"{x} {x}⁻¹", f"{x} {x}⁻¹ = I") for x in ("D", "M", "P", "R", "J", "Υ")]
+_RESOLVENTS = [
+    ("φ E_φ", "φ E_φ = φ − I"),
+    ("E_φ φ", "E_φ φ = φ − I"),
+    ("ψ E_ψ", "ψ E_ψ = ψ − I"),
+    ("E_ψ ψ", "E_ψ ψ = ψ − I"),
+    ("φ K H ψ", "φ K H ψ = φ − ψ"),
+    ("ψ K H φ", "ψ K H φ = φ − ψ"),
+]
+_GAINS = [
+    ("H P H*", "D = H P H* + J"),
+    ("P H*", "G D = P H*"),
+    ("H G", "H G = I − J D⁻¹"),
+    ("E_φ G", "K = E_φ G"),
+    ("φ G", "φ G = G + φ K"),
+    ("ψ G", "ψ G = G + ψ K J D⁻¹"),
+    ("G* P⁻¹", "G* P⁻¹ = D⁻¹ H"),
+]
+_ARTICULATED = [("ψ M ψ*", "ψ M ψ* = ψ P + P ψ* − P − ψ K J K* ψ*"), ("φ M ψ*", "φ M ψ* = φ P + P ψ* − P")]
+_WITHOUT_R = [("φ M φ*", "φ M φ* = φ P + P φ* − P + φ K D K* φ*")]
+_WITH_R = [
+    ("φ M φ*", "φ M φ* = φ R + R φ* − R"),
+    ("φ K D K* φ*", "φ K D K* φ* = φ R + R φ* − R − φ P − P φ* + P"),
+    ("E_φ R E_φ*", "M = R − E_φ R E_φ*"),
+    ("E_φ R φ*", "E_φ R φ* = E_φ R + R φ* − M φ*"),
+    ("φ R H* K* ψ*", "φ R H* K* ψ* = R H* K* ψ* + φ R − φ P + R ψ* − P ψ* − R + P"),
+    ("E_φ R H* K* ψ*", "E_φ R H* K* ψ* = − E_φ R ψ* + E_φ R − M ψ* + R ψ*"),
+    (
+        "ψ K H R H* K* ψ*",
+        "ψ K H R H* K* ψ* = − ψ R H* K* ψ* − ψ K H R ψ* + ψ K H R + R H* K* ψ* + ψ K J K* ψ* + ψ R − ψ P + R ψ* − P ψ* − R + P",
+    ),
+]
+_OPENING = [
+    ("φ⁻¹", "φ⁻¹ = I − E_φ"),
+    ("ψ⁻¹", "ψ⁻¹ = I − E_ψ"),
+    ("φ̃", "φ̃ = φ − I"),
+    ("ψ̃", "ψ̃ = ψ − I"),
+    ("τ̄", "τ̄ = I − G H"),
+    ("τ", "τ = G H"),
+    ("P⁺", "P⁺ = P − G D G*"),
+    ("E_ψ", "E_ψ = E_φ − K H"),
+    ("Ω", "Ω = ψ* H* D⁻¹ H ψ"),
+    ("V", "V = φ* H* θ̇"),
+]
+_REST = [
+    ("ψ E_φ", "ψ E_φ = ψ − I + ψ K H"),
+    ("E_φ ψ", "E_φ ψ = ψ − I + K H ψ"),
+    ("E_φ P E_φ*", "M = P − E_φ P E_φ* + K D K*"),
+    ("E_φ P φ*", "E_φ P φ* = E_φ P + P φ* − M φ* + K D K* φ*"),
+    ("E_φ P ψ*", "E_φ P ψ* = E_φ P + P ψ* − M ψ*"),
+]
+_SIBLINGS = [("S", "Υ = E_ψ* Υ E_ψ − S + H* D⁻¹ H")]
+_COMPLIANCE = [
+    ("ψ* H* D⁻¹ H ψ", "ψ* H* D⁻¹ H ψ = ψ* Υ + Υ ψ − Υ + ψ* S ψ"),
+    ("E_φ* Υ E_φ", "E_φ* Υ E_φ = S + Υ − H* D⁻¹ H + E_φ* Υ K H + H* K* Υ E_φ − H* K* Υ K H"),
+    ("E_φ* Υ ψ", "E_φ* Υ ψ = H* K* Υ ψ + E_φ* Υ − H* K* Υ + S ψ + Υ ψ − H* D⁻¹ H ψ"),
+    ("φ* H* K* Υ ψ", "φ* H* K* Υ ψ = φ* H* K* Υ + φ* H* D⁻¹ H ψ − φ* Υ − Υ ψ + Υ − φ* S ψ"),
+]
+_VELOCITIES = [("a", "a = Ṽ H* θ̇ + Ḣ* θ̇"), ("b", "b = V̄ M V")]
+
+_WEIGHTS = {
+    **{"D": 0, "J": 0, "K": 1, "H": 1, "G": 2, "P": 3, "R": 3, "M": 5, "E_φ": 3, "φ": 1, "ψ": 1, "Υ": 3, "S": 22},
+    **{"φ̃": 9, "ψ̃": 9, "τ": 9, "τ̄": 9, "P⁺": 19, "E_ψ": 9, "Ω": 19, "V": 9, "a": 19, "b": 29},
+}
+_INVERSE_WEIGHTS = {"D": 0, "φ": 9, "ψ": 19}
+
+
+@cache
+def letter_weight(letter: str) -> int:
+    """What a letter weighs. Derivatives are heavy: the rules write them by Δ."""
+    name = plain(letter)
+    if inverted(letter):
+        return _INVERSE_WEIGHTS.get(name, 1)
+    return _WEIGHTS.get(name, 40 if name.startswith("∂") else 1)
+
+
+def weight(word: Word) -> tuple[int, int, Word]:
+    """The order that rules lower: weight, then length, then the letters."""
+    return sum(map(letter_weight, word)), len(word), word
+
+
+# ---------------------------------------------------------------------- rules
+@dataclass(frozen=True)
+class Rule:
+    """word → to, since word - to = factor⁻¹ (lhs - rhs) of the equation; `group` is its rank, which its transpose shares."""
+
+    word: Word
+    to: tuple[tuple[Word, Fraction], ...]
+    equation: Equation
+    factor: Fraction
+    group: int
+
+
+def rule_from(equation: Equation, word: Word, group: int) -> Rule:
+    """The equation read as word → the rest."""
+    difference = equation.difference
+    c = difference[word]
+    return Rule(word, tuple((w, -x / c) for w, x in difference.items() if w != word), equation, 1 / c, group)
+
+
+@dataclass
+class Budget:
+    """How many rewrites may still be spent; the same input spends the same."""
+
+    rewrites: int = REWRITES
+
+
+class GaveUp(Exception):
+    """A reduction outgrew its limits."""
+
+
+@dataclass
+class Rules:
+    """Rules by the first letter of the word that they replace."""
+
+    by_first: dict[str, list[Rule]] = field(default_factory=dict)
+    _best: dict[Word, int | None] = field(default_factory=dict)
+
+    def copy(self) -> Rules:
+        return Rules({k: list(v) for k, v in self.by_first.items()})
+
+    def add(self, rule: Rule) -> None:
+        self.by_first.setdefault(rule.word[0], []).append(rule)
+        self._best.clear()
+
+    def add_equation(self, equation: Equation, word: Word, alphabet: Alphabet, group: int) -> None:
+        """Its rule and its transpose's."""
+        self.add(rule_from(equation, word, group))
+        star = alphabet.star_word(word)
+        if star != word:
+            self.add(rule_from(equation.transposed(alphabet), star, group))
+
+    def all(self) -> list[Rule]:
+        return [rule for rules in self.by_first.values() for rule in rules]
+
+    def _fitting(self, word: Word) -> Iterable[tuple[int, Rule]]:
+        """(place, rule), leftmost first."""
+        for place, letter in enumerate(word):
+            for rule in self.by_first.get(letter, ()):
+                if word[place : place + len(rule.word)] == rule.word:
+                    yield place, rule
+
+    def best(self, word: Word) -> int | None:
+        """The first group in rank that fits anywhere."""
+        if word not in self._best:
+            if len(self._best) > 50000:
+                self._best.clear()
+            self._best[word] = min((rule.group for _, rule in self._fitting(word)), default=None)
+        return self._best[word]
+
+    def reduce(self, p: Polynomial, alphabet: Alphabet, budget: Budget | None = None) -> tuple[Polynomial, list[Step]]:
+        """(the normal form, the steps that lead there).
+
+        Raises
+        ------
+        GaveUp
+            It grows beyond `WORDS` words, or takes more than the budget's rewrites.
+        """
+        budget = budget or Budget()
+        steps: list[Step] = []
+        while True:
+            groups = [group for word in p if (group := self.best(word)) is not None]
+            if not groups:
+                return p, steps
+            steps.append(self._apply(p, min(groups), alphabet, budget))
+            p = steps[-1].after
+
+    def _apply(self, p: Polynomial, group: int, alphabet: Alphabet, budget: Budget) -> Step:
+        """One equation, at every place."""
+        done: Polynomial = {}
+        uses: list[Use] = []
+        for start, x in p.items():
+            todo = [(start, x)]
+            while todo:
+                word, c = todo.pop()
+                found = next(((place, rule) for place, rule in self._fitting(word) if rule.group == group), None)
+                if found is None:
+                    add_to(done, word, c)
+                    continue
+                place, rule = found
+                left, right = word[:place], word[place + len(rule.word) :]
+                uses.append(Use(c * rule.factor, left, rule.equation, right, rule.word, rule.factor > 0))
+                todo += [(left + w + right, c * y) for w, y in reversed(rule.to)]
+                budget.rewrites -= 1
+                if budget.rewrites < 0 or len(todo) + len(done) > WORDS:
+                    raise GaveUp
+        return Step(p, done, uses, alphabet)
+
+
+def normal_form(p: Polynomial, rules: Rules, alphabet: Alphabet) -> Polynomial:
+    """The normal form alone."""
+    return rules.reduce(p, alphabet)[0]
+
+
+# ---------------------------------------------------------------------- which rules
+@dataclass(frozen=True)
+class Setting:
+    """What decides on the rules: hypotheses, and which recursions the statement needs.
+
+    With `composite`, φMφ* is written by R; with `compliance`, Ω by Υ and S, else S by Υ, which then is like any other letter; with
+    `velocities`, a and b are written by Ṽ, V̄ and Ḣ.
+    """
+
+    hypotheses: frozenset[str] = frozenset()
+    composite: bool = False
+    compliance: bool = False
+    velocities: bool = False
+
+
+def chosen(setting: Setting) -> list[tuple[str, str]]:
+    """(word, equation) of a setting, by rank."""
+    facts: list[tuple[str, str]] = [(letter, text) for letter, text in _vanishing(setting)]
+    facts += [*_CANCELLING, *_RESOLVENTS, *_GAINS, *_ARTICULATED]
+    facts += _WITH_R if setting.composite else _WITHOUT_R
+    facts += _OPENING
+    facts += _VELOCITIES if setting.velocities else []
+    facts += _REST
+    facts += _COMPLIANCE if setting.compliance else _SIBLINGS
+    return facts
+
+
+def _vanishing(setting: Setting) -> list[tuple[str, str]]:
+    """(letter, equation) of what is zero."""
+    return [("J", "J = 0")] * ("J = 0" in setting.hypotheses) + [("S", "S = 0")] * ("serial chain" in setting.hypotheses)
+
+
+@lru_cache(maxsize=64)
+def rules_for(setting: Setting, marks: tuple[str, ...] = ("",)) -> Rules:
+    """The rules of a setting for the letters of one or more models. Shared: copy before adding."""
+    facts = theory()
+    rules = Rules()
+    for group, (text_word, text) in enumerate(chosen(setting)):
+        word = tuple(text_word.split())
+        equation = facts(text)
+        if word not in equation.difference:
+            equation = equation.transposed(facts.alphabet)
+        for letter, zero in _vanishing(setting):
+            if text != zero:
+                equation = corollary(equation, word, letter, zero)
+        for mark in marks:
+            _add_both(rules, equation, word, facts, mark, group)
+    return rules
+
+
+def _add_both(rules: Rules, equation: Equation, word: Word, facts: Theory, mark: str, group: int) -> None:
+    """A rule and its transpose, for the letters of one model."""
+    starred = facts.alphabet.star_word(word)
+    pairs = [(equation, word)] + ([(equation.transposed(facts.alphabet), starred)] if starred != word else [])
+    for e, w in pairs:
+        rules.add(rule_from(e.copied(mark), tuple(of_model(x, mark) for x in w), group))
+
+
+@cache
+def corollary(equation: Equation, word: Word, letter: str, zero: str) -> Equation:
+    """What an equation says where a letter is zero: H G = I, of H G = I − J D⁻¹. Itself where the letter does not occur."""
+    facts = theory()
+    _, _, rest, sign = solved(equation, word)
+    gone = [(w, c, w.index(letter)) for w, c in rest.items() if letter in w]
+    if not gone or letter in word:
+        return equation
+    a, kept = facts.alphabet, {w: c for w, c in rest.items() if letter not in w}
+    uses = [Use(c, w[:at], facts(zero), w[at + 1 :], (letter,)) for w, c, at in gone]
+    steps = [Step({word: ONE}, rest, [Use(Fraction(sign), (), equation, (), word, sign > 0)], a), Step(rest, kept, uses, a)]
+    return Equation("lemma", f"{a.word_text(word)} = {a.text(kept)}", {word: ONE}, kept, steps=numbered(steps))
+
+
+def overlaps(first: Sequence[str], second: Sequence[str]) -> Iterable[int]:
+    """The lengths by which a word's end may lie over another's beginning."""
+    return (k for k in range(1, min(len(first), len(second))) if tuple(first[-k:]) == tuple(second[:k]))

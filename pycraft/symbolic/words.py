@@ -1,0 +1,256 @@
+"""Words: products of letters; and sums of words with exact coefficients, the ring in which proofs are written.
+
+A letter is a string: a name, then what is done to it: "φ", "φ*", "D⁻¹", "φ⁻*". A word is a tuple of letters, the empty one is I. A
+polynomial maps words to fractions; the zero operator is the empty polynomial. Products do not commute.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache, lru_cache
+from typing import Any
+
+from .. import _core
+
+Word = tuple[str, ...]
+Polynomial = dict[Word, Fraction]
+
+ONE = Fraction(1)
+FURTHER = "₂₃₄₅₆₇₈₉"
+"""Marks of the letters of a second model, a third, ..., in one statement."""
+_MARKS = ("⁻*", "⁻¹", "*")
+_TRANSPOSED = {"": "*", "*": "", "⁻¹": "⁻*", "⁻*": "⁻¹"}
+_INVERTED = {"": "⁻¹", "⁻¹": "", "*": "⁻*", "⁻*": "*"}
+
+
+# ---------------------------------------------------------------------- arithmetic
+def add_to(p: Polynomial, word: Word, c: Fraction) -> None:
+    """p += c word, in place; what becomes zero is dropped."""
+    total = p.get(word, 0) + c
+    if total:
+        p[word] = Fraction(total)
+    else:
+        p.pop(word, None)
+
+
+def combine(*parts: tuple[Fraction | int, Polynomial]) -> Polynomial:
+    """Σ c p."""
+    total: Polynomial = {}
+    for c, p in parts:
+        for word, x in p.items():
+            add_to(total, word, c * x)
+    return total
+
+
+def times(p: Polynomial, q: Polynomial) -> Polynomial:
+    """p q."""
+    product: Polynomial = {}
+    for u, x in p.items():
+        for w, y in q.items():
+            add_to(product, u + w, x * y)
+    return product
+
+
+def framed(left: Word, p: Polynomial, right: Word) -> Polynomial:
+    """left p right, between two words."""
+    return {left + word + right: c for word, c in p.items()}
+
+
+# ---------------------------------------------------------------------- letters
+@dataclass(frozen=True)
+class Letter:
+    """What a name stands for.
+
+    Attributes
+    ----------
+    text, latex : how it is shown
+    symmetric : whether it is its own transpose
+    expression : the pycraft expression, where one is known; `ascii` names it in the operator set of any model
+    shape : "diagonal" by bodies, "down" (strictly, towards the children), "unit" (down, with I on the diagonal), "siblings", or "full"
+    word : of a letter that stands for the diagonal blocks of a word
+    """
+
+    name: str
+    text: str
+    latex: str
+    symmetric: bool = False
+    shape: str = "full"
+    ascii: str | None = None
+    expression: Any = None
+    word: Word = ()
+
+
+SYMMETRIC = ("M", "P", "R", "D", "J", "Υ", "S")
+_SHAPES = {
+    **dict.fromkeys(["H", "M", "J", "P", "P⁺", "D", "G", "τ", "τ̄", "R", "Υ", "Δ", "Δ_θ̇", "Ṽ", "V̄", "𝓑", "X", "Ḣ"], "diagonal"),
+    **dict.fromkeys(["E_φ", "E_ψ", "K", "φ̃", "ψ̃"], "down"),
+    **dict.fromkeys(["φ", "ψ"], "unit"),
+    "S": "siblings",
+}
+
+
+def shape_of(name: str) -> str:
+    """The shape of a letter of the table."""
+    return _SHAPES.get(name, "full")
+
+
+def sko_letters() -> dict[str, Letter]:
+    """The letters of the core's table that take no argument, and S, the siblings' part of E_ψ*ΥE_ψ."""
+    letters = {
+        text: Letter(text, text, latex, text in SYMMETRIC, shape_of(text), ascii)
+        for ascii, text, latex, *_ in _core.symbol_table()
+        if ascii not in ("B", "Jacobian", "Lambda", "Delta")
+    }
+    letters["S"] = Letter("S", "S", "S", True, "siblings")
+    return letters
+
+
+@cache
+def split(letter: str) -> tuple[str, str]:
+    """(name, mark)."""
+    for mark in _MARKS:
+        if letter.endswith(mark):
+            return letter[: -len(mark)], mark
+    return letter, ""
+
+
+@cache
+def inverse_of(letter: str) -> str:
+    """X⁻¹ of X."""
+    name, mark = split(letter)
+    return name + _INVERTED[mark]
+
+
+@cache
+def plain(letter: str) -> str:
+    """The name of a letter as the first model has it."""
+    return split(letter)[0].rstrip(FURTHER)
+
+
+@cache
+def of_model(letter: str, mark: str) -> str:
+    """The letter of a further model, given that of the first."""
+    name, done = split(letter)
+    return name + mark + done
+
+
+def inverted(letter: str) -> bool:
+    """Whether the letter is an inverse."""
+    return split(letter)[1] in ("⁻¹", "⁻*")
+
+
+class Alphabet:
+    """The letters of one problem: those of the table, and what a statement adds."""
+
+    def __init__(self, letters: Mapping[str, Letter] | None = None):
+        self.letters: dict[str, Letter] = dict(_sko() if letters is None else letters)
+        self._stars: dict[str, str] = {}
+
+    def add(self, letter: Letter) -> None:
+        self.letters[letter.name] = letter
+
+    def star(self, letter: str) -> str:
+        """X* of X: X itself where X is symmetric."""
+        found = self._stars.get(letter)
+        if found is None:
+            name, mark = split(letter)
+            known = self.letters.get(name)
+            found = letter if known is not None and known.symmetric else name + _TRANSPOSED[mark]
+            self._stars[letter] = found
+        return found
+
+    def star_word(self, word: Word) -> Word:
+        return tuple(self.star(x) for x in reversed(word))
+
+    def star_of(self, p: Polynomial) -> Polynomial:
+        """The transpose of a polynomial."""
+        starred: Polynomial = {}
+        for word, c in p.items():
+            add_to(starred, self.star_word(word), c)
+        return starred
+
+    def symmetric_letters(self, words: Iterable[Word]) -> list[str]:
+        """Names of the symmetric letters that occur."""
+        names = dict.fromkeys(split(x)[0] for word in words for x in word)
+        return [n for n in names if n in self.letters and self.letters[n].symmetric]
+
+    # ------------------------------------------------------------------ how words are shown
+    def letter_text(self, letter: str) -> str:
+        name, mark = split(letter)
+        known = self.letters.get(name)
+        text = known.text if known is not None else name
+        return text + mark
+
+    def letter_latex(self, letter: str) -> str:
+        name, mark = split(letter)
+        known = self.letters.get(name)
+        latex = known.latex if known is not None else name
+        if mark and "^" in latex:
+            latex = f"{{{latex}}}"
+        return latex + {"": "", "*": "^*", "⁻¹": "^{-1}", "⁻*": "^{-*}"}[mark]
+
+    def word_text(self, word: Word) -> str:
+        return " ".join(map(self.letter_text, word)) or "I"
+
+    def word_latex(self, word: Word) -> str:
+        return " ".join(map(self.letter_latex, word)) or "I"
+
+    def text(self, p: Polynomial) -> str:
+        """As the book prints it."""
+        return _sum(((c, self.word_text(w)) for w, c in p.items()), "−", " ")
+
+    def latex(self, p: Polynomial) -> str:
+        """LaTeX."""
+        return _sum(((c, self.word_latex(w)) for w, c in p.items()), "-", "\\,")
+
+
+@lru_cache(maxsize=1)
+def _sko() -> dict[str, Letter]:
+    return sko_letters()
+
+
+def _sum(terms: Iterable[tuple[Fraction, str]], minus: str, space: str) -> str:
+    text = ""
+    for c, word in terms:
+        size = "" if abs(c) == 1 else number(abs(c)) + space
+        sign = f" {minus} " if c < 0 else " + "
+        text += (sign if text else minus if c < 0 else "") + size + word
+    return text or "0"
+
+
+def number(c: Fraction) -> str:
+    """A coefficient: exactly, or as the shortest decimal that names its double."""
+    if c.denominator == 1:
+        return str(c.numerator)
+    if c.denominator <= 64:
+        return f"{c.numerator}/{c.denominator}" if c.denominator & (c.denominator - 1) else repr(float(c))
+    return repr(float(c)) if Fraction(float(c)) == c else f"{c.numerator}/{c.denominator}"
+
+
+# ---------------------------------------------------------------------- reading
+def parse(text: str) -> Polynomial:
+    """A sum of words whose letters stand apart: "φ K H ψ − 2 φ + I"."""
+    p: Polynomial = {}
+    sign, word, c, started = ONE, [], ONE, False
+    for token in [*text.split(), "+"]:
+        if token in ("+", "−", "-"):
+            if started:
+                add_to(p, tuple(word), sign * c)
+            sign, word, c, started = ONE if token == "+" else -ONE, [], ONE, False
+        elif re.fullmatch(r"\d+(/\d+)?", token):
+            c, started = c * Fraction(token), True
+        elif token == "I":
+            started = True
+        else:
+            word.append(token)
+            started = True
+    return p
+
+
+def parse_equation(text: str) -> tuple[Polynomial, Polynomial]:
+    """Both sides of "lhs = rhs"."""
+    left, right = text.split(" = ")
+    return parse(left), parse(right)
