@@ -354,6 +354,11 @@ class Operator:
         The transpose, the book's star: A: X→Y gives A.T: Y'→X'. Cost: none.
         """
     @property
+    def _state(self) -> typing.Any:
+        """
+        (q, v, precision) that it is bound to, None where it is not.
+        """
+    @property
     def batch(self) -> typing.Any:
         ...
     @property
@@ -476,6 +481,12 @@ class Scalar:
     def dot(self, vdot: typing.Any = None, *, frame: str = 'body') -> Scalar:
         """
         The time derivative along the model's velocity.
+        """
+    def gradient(self, over: str = 'coordinates') -> typing.Any:
+        """
+        All derivatives at once, as an array: over "coordinates" (nv,), or (B, nv) where a batch is bound. Of ln det(HφMφ*H* [+ J]) and
+        ln det D in three sweeps, O(N), and then also over "inertias", "geometry", "axes" (see
+        Multibody.log_determinant_gradient); of any other scalar one derivative after the other, O(N) each.
         """
     def latex(self) -> str:
         ...
@@ -617,6 +628,8 @@ class Sensitivities:
         ...
     def momentum(self, q: typing.Any, v: typing.Any, precision: str) -> tuple:
         ...
+    def momentum_rate(self, q: typing.Any, v: typing.Any, tau: typing.Any, precision: str) -> numpy.typing.NDArray[numpy.float64]:
+        ...
     def third_order(self, christoffel: bool, q: typing.Any, precision: str, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
         ...
 class Theorem:
@@ -666,6 +679,8 @@ class Theorem:
     def waiting(self) -> str:
         ...
 def _bind(operands: collections.abc.Sequence[Operator], q: typing.Any, v: typing.Any, form: str, refine: typing.SupportsInt | typing.SupportsIndex, precision: str) -> Binding:
+    ...
+def _binding(arg0: Operator) -> Binding:
     ...
 def _binding_from_parts(arg0: typing.SupportsInt | typing.SupportsIndex, arg1: typing.SupportsInt | typing.SupportsIndex, arg2: typing.SupportsInt | typing.SupportsIndex, arg3: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], arg4: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], arg5: str) -> Binding:
     ...

@@ -212,6 +212,42 @@ def operator_from_parts(kind: int, payload: Any, children: list[_core.Operator])
     return _core._make(name, children, payload if name == "scaled" else 1.0)
 
 
+# ---------------------------------------------------------------------- gradients
+def scalar_gradient(scalar: _core.Scalar, over: str = "coordinates") -> np.ndarray:
+    """All derivatives of a scalar expression, see `Scalar.gradient`."""
+    kind, value, operand, terms = scalar._parts()
+    if terms:
+        return (value if kind == _SCALED else 1.0) * sum(scalar_gradient(t, over) for t in terms)
+    if operand is None:  # a number in a sum
+        return np.zeros(())
+    models = {source.model for source in operand.sources if isinstance(source, _core.MultibodyOperators)}
+    if len(models) != 1:
+        what = "depends on two models: differentiate along one coordinate at a time" if models else "does not depend on a multibody model"
+        raise _core.EvaluationError(f"{scalar!r} has no gradient: it {what}")
+    model = models.pop()
+    if kind == _LOGDET and _is_mass_matrix(operand):
+        q, _, precision = operand._state or (model.q, None, "double")
+        return model.log_determinant_gradient(q, over, precision=precision)
+    if over != "coordinates":
+        raise _core.EvaluationError(f"gradient over {over!r} is there for ln det of the mass matrix and of D, not for {scalar!r}")
+    return np.stack([np.asarray(scalar.diff(i), float) for i in range(model.nv)], axis=-1) if model.nv else np.zeros(0)
+
+
+_LOGDET, _SCALED = 2, 5
+
+
+def _is_mass_matrix(operand: _core.Operator) -> bool:
+    """HφMφ*H*, with J where there is one, or D: what has the determinant of ℳ + J."""
+    source = next(s for s in operand.sources if isinstance(s, _core.MultibodyOperators))
+    letters = [source.symbol(name) for name in ("H", "phi", "M", "J", "D")]
+    if operand._state is not None:
+        binding = _core._binding(operand)
+        letters = [letter._bound(binding) for letter in letters]
+    H, phi, M, J, D = letters
+    whole = H @ phi @ M @ phi.T @ H.T + J
+    return len(operand.sources) == 1 and (operand == D or (operand.domain == H.codomain and _core.equal_by_theorems(operand, whole)))
+
+
 # ---------------------------------------------------------------------- block views
 class BlockView:
     """A dense operator cut into labelled blocks: rows and columns by body, hinge or node name.

@@ -265,6 +265,16 @@ void register_operators(py::module_& m) {
         return py::none();
       }, "A symbol's ASCII name; None for anything composed.")
       .def_property_readonly("batch", [](const Expression& e) -> py::object { return batch_of(e) < 0 ? py::object(py::none()) : py::cast(batch_of(e)); })
+      .def_property_readonly("_state", [](const Expression& e) -> py::object {
+        const auto all = contexts(e);
+        if (all.empty() || !all[0].binding) return py::none();
+        const Binding& b = *all[0].binding;
+        const auto shaped = [&](const std::vector<double>& x, int width) {
+          py::object a = to_numpy(x);
+          return b.batch < 0 ? a : a.attr("reshape")(b.batch, width);
+        };
+        return py::make_tuple(shaped(b.q, b.nq), shaped(b.v, b.nv), precision_name(b.precision));
+      }, "(q, v, precision) that it is bound to, None where it is not.")
       .def("check_current", &Expression::check_current, "Raises StaleOperatorError if a model's structure changed since this was made.")
       .def_property_readonly("sources", [](const Expression& e) {
         py::list all;

@@ -46,6 +46,11 @@ void register_scalars(py::module_& m) {
       .def("at", [](const Scalar& s, const py::args& args, const py::kwargs& kwargs) {
         return py::module_::import("pycraft.operators").attr("scalar_at")(s, *args, **kwargs);
       })
+      .def("gradient", [](const Scalar& s, const std::string& over) { return py::module_::import("pycraft.operators").attr("scalar_gradient")(s, over); },
+           py::arg("over") = "coordinates",
+           "All derivatives at once, as an array: over \"coordinates\" (nv,), or (B, nv) where a batch is bound. Of ln det(HφMφ*H* [+ J]) and\n"
+           "ln det D in three sweeps, O(N), and then also over \"inertias\", \"geometry\", \"axes\" (see\n"
+           "Multibody.log_determinant_gradient); of any other scalar one derivative after the other, O(N) each.")
       .def("operands", [](const Scalar& s) {
         py::list all;
         visit(s, [&](const Expression& e) { all.append(py::cast(e)); });

@@ -80,6 +80,13 @@ void register_sensitivities(py::module_& m) {
         return run(d, precision, {{&s.q, mb.nq()}, {&s.v, n}}, output(py::none(), s.batch, {n}), n, s.batch,
                    [](auto& w, auto in, auto* y) { w.kinetic_energy(in[0], in[1], y); });
       }, q, v, precision)
+      .def("momentum_rate", [](Calls& d, const py::object& q, const py::object& v, const py::object& tau, const std::string& precision) {
+        const Multibody& mb = d.model();
+        const int n = mb.nv();
+        const State s = state(mb, q, v, tau, "tau");
+        return run(d, precision, {{&s.q, mb.nq()}, {&s.v, n}, {&s.w, n}}, output(py::none(), s.batch, {n}), n, s.batch,
+                   [](auto& w, auto in, auto* y) { w.momentum_rate(in[0], in[1], in[2], y); });
+      }, q, v, py::arg("tau"), precision)
       .def("momentum", [](Calls& d, const py::object& q, const py::object& v, const std::string& precision) {
         const Multibody& mb = d.model();
         const int n = mb.nv();

@@ -115,6 +115,10 @@ void register_sources(py::module_& m) {
     b->batch = batch, b->nq = nq, b->nv = nv, b->q = std::move(q), b->v = std::move(v), b->precision = precision_from_name(precision);
     return b;
   });
+  m.def("_binding", [](const Expression& e) {
+    const auto all = contexts(e);
+    return all.empty() ? std::shared_ptr<Binding>() : std::const_pointer_cast<Binding>(all[0].binding);
+  });
   m.def("_bind", &make_binding, py::arg("operands"), py::arg("q"), py::arg("v"), py::arg("form"), py::arg("refine"), py::arg("precision"));
 
   declared<py::class_<SkoSource, std::shared_ptr<SkoSource>>>(m, "SkoSource")

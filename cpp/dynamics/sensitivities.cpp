@@ -141,6 +141,19 @@ void Sensitivities<S>::kinetic_energy(const S* q, const S* v, S* out) {
 }
 
 template <class S>
+void Sensitivities<S>::momentum_rate(const S* q, const S* v, const S* tau, S* out) {
+  // d(S_j·p)/dt = Ṡ_j·p + S_j·ṗ, and S_j·ṗ is what the hinge's force and gravity do: tau_j + S_j·(weight outboard).
+  frame_at(q, v, nullptr);
+  for (int k = 0; k < model_->bodies; ++k) {
+    int root = k;
+    while (model_->parent[root] >= 0) root = model_->parent[root];
+    const Vector6<S> field = motion_to_child(blocks_.pose[root], Vector6<S>{Vector3<S>::zero(), model_->gravity});
+    for (int j = model_->v_offset[k]; j < model_->v_offset[k] + model_->nv_of[k]; ++j)
+      out[j] = tau[j] + dot(frame_.twist_rate[j], frame_.B[k].momentum) + dot(frame_.twist[j], frame_.R[k] * field);
+  }
+}
+
+template <class S>
 void Sensitivities<S>::momentum(const S* q, const S* v, S* matrix, S* dq) {
   const int N = model_->nv;
   frame_at(q, v, nullptr);

@@ -24,6 +24,8 @@ class Sensitivities {
   void christoffel(const S* q, S* out);
   // ∂KE/∂q (nv); ∂KE/∂v is ℳv. Rotors do not depend on q.
   void kinetic_energy(const S* q, const S* v, S* out);
+  // d(ℳθ̇)/dt under the forces tau: T + Ḣp - HV̄p, p = φMV, gravity included (nv).
+  void momentum_rate(const S* q, const S* v, const S* tau, S* out);
   // Momentum about the world's origin in world axes: the matrix A (6 x nv), h = A v, and ∂h/∂q (6 x nv).
   void momentum(const S* q, const S* v, S* matrix, S* dq);
   // d/dt of the node Jacobian (6 x nv), and ∂𝒥/∂q (6, nv, nv), both in the node's axes.

@@ -55,4 +55,7 @@ std::unique_ptr<Direction> coordinate_direction(const std::shared_ptr<MultibodyO
 std::unique_ptr<Direction> time_direction(const std::shared_ptr<MultibodyOperators>& source, const Expression& vdot);
 std::unique_ptr<Direction> parameter_direction(const Parameter& parameter);
 
+// Theorems of the calculus.
+std::vector<Theorem> calculus_theorems(const std::shared_ptr<MultibodyOperators>& source);
+
 }  // namespace pycraft

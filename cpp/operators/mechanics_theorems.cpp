@@ -1,6 +1,7 @@
 // Theorems that need mechanics: velocities and forces, innovations, Coriolis matrices, gravity, hybrid dynamics, the world frame.
-// Those whose sides need derivatives, loops or flexible bodies are listed as waiting.
+// Those that need loops or flexible bodies are listed as waiting; the calculus is in calculus_theorems.cpp.
 #include "operators/derived_operators.h"
+#include "operators/directions.h"
 
 namespace pycraft {
 
@@ -127,16 +128,10 @@ std::vector<Theorem> mechanics_theorems(const std::shared_ptr<MultibodyOperators
   state("#43 determinants of the partition", logdet(MM), logdet(MM_ff) + logdet(schur), no_hinge_diagonal, "soa.md #43");
   shown("ln det ℳ = ln det ℳ_ff + ln det(ℳ_pp - ℳ_pf(ℳ_ff)⁻¹ℳ_fp)", "\\ln\\det\\mathcal{M} = \\ln\\det\\mathcal{M}_{ff}+\\ln\\det(\\mathcal{M}_{pp}-\\mathcal{M}_{pf}\\mathcal{M}_{ff}^{-1}\\mathcal{M}_{fp})");
 
+  for (Theorem& t : calculus_theorems(source)) list.push_back(std::move(t));
+
   group = "Waiting";
-  const std::string derivatives = "derivatives of operators", loops = "loops", flexible = "flexible bodies";
-  wait("∂ℳ, ∂φ, ∂P, ∂D, ∂G, ∂K, ∂ψ, ∂R, ∂Υ by the tangent rule (#31, #36)", derivatives, "soa.md, Calculus");
-  wait("∂ ln det ℳ by coordinates, inertias, geometry, axes (#32-#35)", derivatives, "soa.md, Calculus");
-  wait("α = dV/dt (#11)", derivatives, "soa.md #11");
-  wait("Hamiltonian form (#16-#18)", derivatives, "soa.md #16");
-  wait("C is the Christoffel matrix (#22), diagonalised dynamics (#23-#24)", derivatives, "soa.md #22");
-  wait("derivatives of inverse dynamics (#25-#27)", derivatives, "soa.md #25");
-  wait("commutator of quasi-derivatives (#37)", derivatives, "soa.md #37");
-  wait("world-frame calculus (#53-#54), gravity as ∂U/∂θ (#56)", derivatives, "soa.md #53");
+  const std::string loops = "loops", flexible = "flexible bodies";
   wait("compound bodies: ℳ_C = X*ℳX, their accelerations and calculus (#60-#62)", loops, "soa.md #60");
   wait("tree augmentation (#63)", loops, "soa.md #63");
   wait("modal blocks and their calculus (F1-F8)", flexible, "verify_flexible.py");

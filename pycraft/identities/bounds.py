@@ -70,6 +70,8 @@ class Sizes:
                     return abs(operator.coefficient) * norms[0]
                 case "transpose":
                     return norms[0]
+                case "function":  # crm(x) and its like
+                    return 2 * norms[0]
         column = operator if operator.domain == _NUMBERS else operator.T
         return float(np.linalg.norm(self._bind(column).value(**self._vectors)))
 
@@ -108,6 +110,8 @@ class Sizes:
         elif base.kind in ("blockdiag", "sqrt"):
             inner = self.size(base.children[0])
             own = inner if base.kind == "blockdiag" else inner / max(self.norm(base), 1e-300)
+        elif base.kind == "function":  # linear in its operand: crm(x), lower½(X)
+            own = 2 * self.size(base.children[0])
         else:
             own = self.norm(base)
         return self._product(factors[:i]) * own * self._product(factors[i + 1 :])

@@ -82,6 +82,44 @@ class SensitivityCalls(DirectCalls):
         at_rest = self.inverse_dynamics(q, rest, rest, precision=precision)
         return slope, self.inverse_dynamics(q, rest, v, precision=precision) - at_rest
 
+    def hamiltonian_dynamics(self, q, p, tau, *, precision: str = "double") -> tuple[np.ndarray, np.ndarray]:
+        """The Hamiltonian form in O(N): v and ṗ of the generalized momenta p = (ℳ + J) v under the forces tau, gravity included.
+
+        ṗ = T + Ḣp - HV̄p of the bodies' momenta p = φMV, so that no derivative of ℳ is formed. Each (nv,) or (B, nv). SingularHingeError
+        as in forward dynamics.
+        """
+        p = np.asarray(p, float)
+        rest = np.zeros(p.shape)
+        v = self.forward_dynamics(q, rest, p, precision=precision) - self.forward_dynamics(q, rest, rest, precision=precision)
+        return v, self._sensitivities().momentum_rate(q, v, tau, precision)
+
+    def innovations(self, q, v, tau, *, precision: str = "double") -> tuple[np.ndarray, np.ndarray]:
+        """Innovations velocity ξ = [I+HφK]*v and innovations ε = [I-HψK](τ - 𝒞), each (nv,) or (B, nv): decoupled coordinates.
+
+        2 KE = ξ*Dξ and 2 × the acceleration energy's like: (τ-𝒞)*(ℳ+J)⁻¹(τ-𝒞) = ε*D⁻¹ε, both sums over hinges. O(N).
+        """
+        H, phi, K, psi, I = self.soa("H phi K psi I")  # type: ignore[attr-defined]
+        forces = np.asarray(tau, float) - self.bias_forces(q, v, precision=precision)
+        whole, inverse = (I + H @ phi @ K).T, I - H @ psi @ K
+        return whole.at(q, precision=precision) @ np.asarray(v, float), inverse.at(q, precision=precision) @ forces
+
+    def diagonalised_dynamics(self, q, v, tau, *, precision: str = "double") -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """η, S and m⁻¹τ' of η̇ + Sη = m⁻¹τ', m = [I+HφK]D^½, η = m*v, S skew, τ' = τ less gravity's forces: (nv,), (nv, nv), (nv,).
+
+        2 KE = η*η; S does no work. Cost O(N) for η and m⁻¹τ', O(N²) for S. One state.
+        """
+        H, phi, K, psi, M, D, I = self.soa("H phi K psi M D I")  # type: ignore[attr-defined]
+        cross, V_bar, V_tilde = self.soa("momentum_cross V_bar V_tilde")  # type: ignore[attr-defined]
+        root = D.sqrt()
+        m, inverse = (I + H @ phi @ K) @ root, root.inv() @ (I - H @ psi @ K)
+        J = phi.T @ H.T
+        C = H @ phi @ (M @ J.dot() + 0.5 * (cross + V_bar @ M + M @ V_tilde) @ J)
+        S = inverse @ C @ inverse.T - m.dot().T @ inverse.T
+        rest = np.zeros(self.nv)
+        forces = np.asarray(tau, float) - self.bias_forces(q, rest, precision=precision)
+        bound = {"precision": precision}
+        return m.T.at(q, v, **bound) @ np.asarray(v, float), S.at(q, v, **bound).dense(), inverse.at(q, v, **bound) @ forces
+
     def momentum(self, q, v, *, precision: str = "double") -> Momentum:
         """Momentum of all bodies about the world's origin, its matrix and its derivative. Cost O(N)."""
         matrix, dq = self._sensitivities().momentum(q, v, precision)

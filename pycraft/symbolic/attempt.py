@@ -1,4 +1,4 @@
-"""One attempt at a statement, under given hypotheses: normal forms of both sides, then both sides multiplied by what stands inverted in them."""
+"""One attempt at a statement, under given hypotheses: normal forms of both sides, then both sides times what stands inverted in them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .equations import NO_FRAME, Equation, Frame, Step, Use
 from .expand import Problem
 from .inverses import LocalRules
 from .rules import Setting
-from .words import Polynomial, Word, add_to, combine, inverse_of, inverted, plain, split
+from .words import ONE, Polynomial, Word, add_to, combine, inverse_of, inverted, plain, split
 
 ROUNDS = 4
 """How many inverses are cleared, one after the other."""
@@ -38,30 +38,50 @@ class Attempt(LocalRules):
 
     def run(self, lhs: Polynomial, rhs: Polynomial) -> Outcome:
         """Normal forms of both sides, cleared of inverses where that closes the gap. Raises GaveUp."""
-        p, left = self.reduce(lhs)
-        q, right = self.reduce(rhs)
+        p, left, q, right = self.rules.reduce_both(lhs, rhs, self.alphabet)
         first = at = Outcome(left, right, p, q)
         for _ in range(ROUNDS):
             found = None if at.closed else _end(combine((1, at.lhs), (-1, at.rhs)))
             if found is None:
                 break
             at = self._cleared(at, *found)
+        if not at.closed and self.problem.numbers:
+            return Outcome(*self._as_numbers(left, p, right, q))
         return at if at.closed else first
+
+    def _as_numbers(self, left: list[Step], p: Polynomial, right: list[Step], q: Polynomial) -> tuple:
+        """Both sides, where they are numbers: a number is its own transpose."""
+        a, made = self.alphabet, []
+        for steps, side in ((left, p), (right, q)):
+            out: Polynomial = {}
+            uses = []
+            for word, c in side.items():
+                star = a.star_word(word)
+                add_to(out, min(word, star), c)
+                if star < word:
+                    equation = Equation("structure", "a number is its own transpose", {word: ONE}, {star: ONE})
+                    equation.check = lambda w=word, s=star: a.star_word(w) == s and self.problem.numbers
+                    uses.append(Use(c, (), equation, (), word))
+            made.append(([*steps, Step(side, out, uses, a)] if uses else steps, out))
+        return made[0][0], made[1][0], made[0][1], made[1][1]
 
     def _cleared(self, at: Outcome, letter: str, on_left: bool) -> Outcome:
         """Both sides times X, where X⁻¹ stands at an end of a word of their difference: Y = X⁻¹(XY)."""
         X, (a, b) = inverse_of(letter), at.frame
         frame = ((*a, letter), b) if on_left else (a, (letter, *b))
         pair = self.pair(letter, X) if on_left else self.pair(X, letter)
-        sides = []
+        chains, sides = [], []
         for steps, p in ((at.left, at.lhs), (at.right, at.rhs)):
             times_x = {((X, *w) if on_left else (*w, X)): c for w, c in p.items()}
             uses = [Use(-c, *((a, pair, w + b) if on_left else (a + w, pair, b)), (), False) for w, c in p.items()]
             insert = Step(p, times_x, uses, self.alphabet, f"{pair.text}, read backwards", (at.frame, frame))
             opened = self._opened(X, times_x)
-            form, rest = self.reduce(opened[-1].after if opened else times_x)
-            sides.append(([*steps, insert, *(_in_frame(step, frame) for step in [*opened, *rest])], form))
-        return Outcome(sides[0][0], sides[1][0], sides[0][1], sides[1][1], frame)
+            chains.append([*steps, insert, *(_in_frame(step, frame) for step in opened)])
+            sides.append(opened[-1].after if opened else times_x)
+        p, left, q, right = self.rules.reduce_both(sides[0], sides[1], self.alphabet)
+        for chain, more in zip(chains, (left, right), strict=True):
+            chain += [_in_frame(step, frame) for step in more]
+        return Outcome(chains[0], chains[1], p, q, frame)
 
     def _opened(self, X: str, p: Polynomial) -> list[Step]:
         """X written as its operand, where it has one."""

@@ -1,9 +1,9 @@
 """Diagonal blocks of words, by what is known of their letters.
 
-A body's block row and column say where a letter leads on the tree: E_φ, E_ψ and K from a body to its children, φ and ψ to all outboard bodies
-and the body itself (with I there), their transposes back. So the diagonal blocks of a word are known without a number: all of it, where it
-leads from every body to itself alone, as ERE* does; nothing, where it never leads back, as φ̃R; the rest without φ and ψ, where these are
-all that moves.
+A body's block row and column say where a letter leads on the tree: E_φ, E_ψ and K from a body to its children, φ and ψ to all outboard
+bodies and the body itself (with I there), their transposes back. So the diagonal blocks of a word are known without a number: all of it,
+where it leads from every body to itself alone, as ERE* does; nothing, where it never leads back, as φ̃R; the rest without φ and ψ, where
+these are all that moves.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def _moves(letter: str, alphabet: Alphabet) -> str:
 
 def diagonal_blocks(word: Word, alphabet: Alphabet) -> Polynomial:
     """blockdiag(word), where the letters say what it is; else with a letter of its own for what they do not."""
-    parts = [((letter,), _moves(letter, alphabet)) for letter in word]
+    parts: list[tuple[Word, str]] = [((letter,), _moves(letter, alphabet)) for letter in word]
     parts = _closed(parts)
     head, tail = 0, len(parts)
     while head < tail and parts[head][1] == "diagonal":

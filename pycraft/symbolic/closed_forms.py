@@ -180,13 +180,16 @@ class ClosedForms:
         SingularHingeError, SingularOperatorError
             D(k), or what is inverted, is singular at every state.
         """
+        return self._value(expression, given or {}, self._simplify)
+
+    def _value(self, expression: Any, given: Mapping[str, Any], simplify: bool) -> Any:
         if isinstance(expression, str):
-            return getattr(self, expression)
+            return getattr(self, expression) if simplify == self._simplify else self._letters(expression).sympy(simplify)
         if isinstance(expression, _core.Scalar):
-            return self._scalar(expression, given or {})
+            return self._scalar(expression, given, simplify)
         if not isinstance(expression, _core.Operator):
             raise TypeError(f"closed forms are of operator expressions, not of {type(expression).__name__}")
-        return self._matrix(expression, given or {}).sympy(self._simplify)
+        return self._matrix(expression, given).sympy(simplify)
 
     def _matrix(self, expression: Any, given: Mapping[str, Any]) -> Matrix:
         expression.check_current()
@@ -197,7 +200,7 @@ class ClosedForms:
             raise _core.EvaluationError(f"{expression.text()} is said of no space: an I takes its space from an operator beside it")
         return made
 
-    def _scalar(self, scalar: Any, given: Mapping[str, Any]) -> Any:
+    def _scalar(self, scalar: Any, given: Mapping[str, Any], simplify: bool) -> Any:
         import sympy
 
         from .rational import exact
@@ -207,11 +210,11 @@ class ClosedForms:
         if name == "number":
             return exact(value)
         if name == "sum":
-            return sympy.Add(*(self._scalar(t, given) for t in terms))
+            return sympy.Add(*(self._scalar(t, given, simplify) for t in terms))
         if name == "scaled":
-            return exact(value) * self._scalar(terms[0], given)
+            return exact(value) * self._scalar(terms[0], given, simplify)
         matrix = self._matrix(operand, given)
-        show = lambda x: matrix.field.expression(x, self._simplify)  # noqa: E731
+        show = lambda x: matrix.field.expression(x, simplify)  # noqa: E731
         if name == "trace":
             return show(matrix.trace())
         if name == "logdet":
@@ -235,7 +238,10 @@ class ClosedForms:
     def _along(self, expression: Any, direction: Sequence[Any], given: Mapping[str, Any] | None) -> Any:
         import sympy
 
-        value = expression if isinstance(expression, sympy.MatrixBase | sympy.Expr) else self.evaluate(expression, given)
+        if isinstance(expression, sympy.MatrixBase | sympy.Expr):
+            value = sympy.expand_trig(expression)
+        else:
+            value = self._value(expression, given or {}, False)
         rates = self._letters.rates().sympy(False) * sympy.Matrix(direction)
         turned = lambda e: self._again(sum((e.diff(x) * r for x, r in zip(self.q, rates, strict=True)), sympy.S.Zero))  # noqa: E731
         return value.applyfunc(turned) if isinstance(value, sympy.MatrixBase) else turned(value)
@@ -249,7 +255,12 @@ class ClosedForms:
 
     # ------------------------------------------------------------------ numbers
     def at(
-        self, expression: Any, q: Any = None, v: Any = None, values: Mapping[Any, float] | None = None, given: Mapping[str, Any] | None = None
+        self,
+        expression: Any,
+        q: Any = None,
+        v: Any = None,
+        values: Mapping[Any, float] | None = None,
+        given: Mapping[str, Any] | None = None,
     ) -> np.ndarray:
         """The formulas' value at a state: float64 (codomain, domain), computed with 50 digits.
 
@@ -259,7 +270,9 @@ class ClosedForms:
         import sympy
 
         formula = expression if isinstance(expression, sympy.MatrixBase | sympy.Expr) else self.evaluate(expression, given)
-        state = dict(zip([*self.q, *self.v], [*_listed(self.model.q if q is None else q), *_listed(self.model.v if v is None else v)], strict=True))
+        state = dict(
+            zip([*self.q, *self.v], [*_listed(self.model.q if q is None else q), *_listed(self.model.v if v is None else v)], strict=True)
+        )
         numbers = self.parameters | state | dict(values or {})
         missing = sorted(map(str, formula.free_symbols - set(numbers)))
         if missing:
@@ -285,7 +298,7 @@ class ClosedForms:
         return made[cut[0], cut[1]]
 
     def __repr__(self) -> str:
-        known = f", parameters {', '.join(map(str, self.parameters))}" if self.parameters else ""
+        known = f"; parameters {', '.join(map(str, self.parameters))}" if self.parameters else ""
         return f"<closed forms of {self.model.name!r} in {', '.join(map(str, self.q))}{known}>"
 
 
@@ -304,8 +317,15 @@ def _symbols(model: Multibody, names: Sequence[Any] | str | None) -> tuple[tuple
     q = tuple(sympy.Symbol(x, real=True) if isinstance(x, str) else x for x in given)
     v = sympy.symbols(f"v1:{model.nv + 1}", real=True)
     if len({*q, *v}) < len(q) + len(v) or not all(isinstance(x, sympy.Symbol) for x in q):
-        raise _core.ModelError(f"names of coordinates are different symbols, and none of v1, ..., v{model.nv}: got {', '.join(map(str, q))}")
+        raise _core.ModelError(
+            f"names of coordinates are different symbols, and none of v1, ..., v{model.nv}: got {', '.join(map(str, q))}"
+        )
     return q, tuple(v)
+
+
+def _require_unbound(e: Any, binding: Any) -> None:
+    if binding is not None:
+        raise _core.EvaluationError(f"{e.text()} is bound to a state; closed forms are of expressions without .at(q)")
 
 
 class _Evaluation:
@@ -332,12 +352,24 @@ class _Evaluation:
 
     # ------------------------------------------------------------------ leaves
     def _symbol(self, e: Any) -> Matrix:
-        _, name, arguments, binding = e._parts()[1]
-        if binding is not None:
-            raise _core.EvaluationError(f"{e.text()} is bound to a state; closed forms are of expressions without .at(q)")
-        if name == "Delta":
+        _, name, numbers, nodes, _, binding = e._parts()[1]
+        _require_unbound(e, binding)
+        arguments = list(nodes) or list(numbers)
+        if len(arguments) == 1 and not nodes:
             return self._forms._letters(name, arguments[0])
-        return self._forms._letters(name, list(arguments)) if arguments else self._forms._letters(name)
+        return self._forms._letters(name, arguments) if arguments else self._forms._letters(name)
+
+    def _function(self, e: Any) -> Matrix:
+        """Block functions, which derivatives bring up: crm, crf, mcross of a vector, the lower triangle with half its diagonal."""
+        (x,) = self._children(e)
+        payload = e._parts()[1]
+        if payload is None:
+            made = self._blockwise(e.children[0], x, lambda block: block.lower_half())
+            if made is None:
+                raise _core.EvaluationError(f"{e.text()}: a lower half is taken body by body, of a block-diagonal operator")
+            return made
+        _require_unbound(e, payload[-1])
+        return self._forms._letters.function(payload[1], x)
 
     def _identity(self, e: Any) -> Any:
         from .rational import Matrix
@@ -392,9 +424,7 @@ class _Evaluation:
     def _sum(self, e: Any) -> Any:
         if e.domain is None:
             return sum(self.of(c) for c in e.children)
-        parts = [
-            self._number(x, e.domain.dimension) if c.domain is None else x for x, c in zip(self._children(e), e.children, strict=True)
-        ]
+        parts = [self._number(x, e.domain.dimension) if c.domain is None else x for x, c in zip(self._children(e), e.children, strict=True)]
         field = self._forms._field
         total = parts[0].lifted(field)
         for part in parts[1:]:

@@ -16,10 +16,11 @@ from .. import _core
 from .axioms import INVERTIBLE
 from .equations import Equation, Step, symmetries
 from .rules import WORDS, GaveUp
-from .words import FURTHER, ONE, Alphabet, Letter, Polynomial, combine, inverse_of, plain, shape_of, sko_letters, times
+from .words import FURTHER, ONE, Alphabet, Letter, Polynomial, combine, inverse_of, monomial, parse, plain, shape_of, sko_letters, times
 
 UNFOLDED = {"Jacobian": "𝒥 = B* φ* H*", "Lambda": "Λ = (B* Ω B)⁻¹"}
 """Symbols that are written out at once."""
+MASS_MATRIX = parse("H φ M φ* H*")
 _TABLE = {ascii: (text, latex) for ascii, text, latex, *_ in _core.symbol_table()}
 
 
@@ -58,7 +59,7 @@ class Spelling(Step):
     @property
     def says_something(self) -> bool:
         """Whether what was typed looks different."""
-        return self.expression.text() != self.alphabet.text(self.before) or bool(self.definitions)
+        return self.expression.text() != self.alphabet.text(self.before) or any(e.kind == "axiom" for e in self.definitions)
 
     def before_text(self) -> str:
         return super().before_text() if self.backwards else self.expression.text()
@@ -81,9 +82,10 @@ class Problem:
         self.opaque: list[Opaque] = []
         self.contexts: list[tuple[Any, Any]] = []  # (source, binding): the models at their states
         self.sides: list[Polynomial] = []
+        self.numbers = False  # whether both sides map R^1 to R^1
+        self._named_operands = 0
         self._leaves: dict[Any, str] = {}
         self._definitions: dict[str, Equation] = {}
-        self._transposed = False
         self._used: list[Equation] = []
 
     @property
@@ -103,12 +105,13 @@ class Problem:
         GaveUp
             More than `rules.WORDS` words.
         """
-        self._transposed, self._used = False, []
+        self._used = []
         p = self.words(expression)
-        uses = list(dict.fromkeys(self._used))
-        if self._transposed:
-            uses += symmetries(self.alphabet, p)
-        return Spelling(self, expression, p, uses)
+        return Spelling(self, expression, p, list(dict.fromkeys(self._used)))
+
+    def _star(self, p: Polynomial) -> Polynomial:
+        self._used += symmetries(self.alphabet, p)
+        return self.alphabet.star_of(p)
 
     # ------------------------------------------------------------------ by kind
     def words(self, e: Any, transposed: bool = False) -> Polynomial:
@@ -126,7 +129,6 @@ class Problem:
             case "product":
                 return self._product(self.words(f, transposed) for f in (reversed(e.children) if transposed else e.children))
             case "transpose":
-                self._transposed = True
                 return self.words(e.children[0], not transposed)
             case "inverse":
                 p = self._inverse(e.children[0])
@@ -134,7 +136,7 @@ class Problem:
                 return self.words(self._unfolded(e), transposed)
             case _:
                 p = {(self.letter(e),): ONE}
-        return self.alphabet.star_of(p) if transposed else p
+        return self._star(p) if transposed else p
 
     def _product(self, factors: Iterator[Polynomial]) -> Polynomial:
         p: Polynomial = {(): ONE}
@@ -155,8 +157,7 @@ class Problem:
                 c = 1 / Fraction(e.coefficient)
                 return {w: c * x for w, x in self._inverse(e.children[0]).items()}
             case "transpose":
-                self._transposed = True
-                return self.alphabet.star_of(self._inverse(e.children[0]))
+                return self._star(self._inverse(e.children[0]))
             case "product" if all(map(_square, e.children)):
                 return self._product(self._inverse(f) for f in reversed(e.children))
             case "symbol" if e.name in UNFOLDED:
@@ -228,15 +229,29 @@ class Problem:
         """The letter of something opaque."""
         key = (kind, e)
         if key not in self._leaves:
-            inner = self.words(operand) if kind != "inverse" or e.kind != "symbol" else {(self.letter(e),): ONE}
+            inner = self.words(operand) if kind != "inverse" or e.kind != "symbol" else monomial(self.letter(e))
             name = f"⟨{len(self.opaque) + 1}⟩"
-            text, latex = (f"({e.text()})", f"({e.latex()})") if kind == "inverse" else (e.text(), f"{{{e.latex()}}}")
+            text, latex = self._shown(inner, e) if kind == "inverse" else (e.text(), f"{{{e.latex()}}}")
             symmetric = kind == "blockdiag" and bool(e.is_symmetric)
             self.alphabet.add(Letter(name, text, latex, symmetric, "full" if kind == "inverse" else "diagonal", None, e))
-            definition = Equation("definition", f"{text} is written out", {(name,): ONE}, inner)
+            definition = Equation("definition", f"{text} = {self.alphabet.text(inner)}", monomial(name), inner)
             self.opaque.append(Opaque(name, kind, e, inner, definition))
             self._leaves[key] = name
-        return self._leaves[key]
+        found = self._leaves[key]
+        if kind == "inverse":
+            self._used.append(next(o.definition for o in self.opaque if o.name == found))
+        return found
+
+    def _shown(self, inner: Polynomial, e: Any) -> tuple[str, str]:
+        """How the operand of an inverse is called: ℳ where it is that, X₁, X₂, ... where its own text is long."""
+        if inner == MASS_MATRIX:
+            return "ℳ", "\\mathcal{M}"
+        text = self.alphabet.text(inner)
+        if len(text) <= 12:
+            return f"({text})", f"({self.alphabet.latex(inner)})"
+        self._named_operands += 1
+        number = str(self._named_operands)
+        return "X" + number.translate(str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")), f"X_{{{number}}}"
 
 
 def symbol_parts(e: Any) -> tuple[Any, str, list[Any], Any]:

@@ -1,7 +1,7 @@
 """What a statement adds to the rules: the letters that stand for inverses of sums, diagonal parts and square roots.
 
-X⁻¹ = Z where a candidate Z shows XZ = I and ZX = I: for X a single word, for X one of the operators whose inverse is known, for X an operator
-whose inverse stands elsewhere in the statement. Otherwise XX⁻¹ = I and X⁻¹X = I are rules, with X in its normal form.
+X⁻¹ = Z where a candidate Z shows XZ = I and ZX = I: for X a single word, for X one of the operators whose inverse is known, for X an
+operator whose inverse stands elsewhere in the statement. Otherwise XX⁻¹ = I and X⁻¹X = I are rules, with X in its normal form.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from .blocks import diagonal_part
 from .equations import Equation, Step, Use, chain_holds, numbered
 from .expand import Opaque, Problem
 from .rules import Rules, Setting, normal_form, rule_from, rules_for, weight
-from .words import ONE, Alphabet, Polynomial, Word, framed, inverse_of, inverted, of_model, parse, plain, split, times
+from .words import ONE, Alphabet, Polynomial, Word, combine, framed, inverse_of, inverted, monomial, of_model, parse, plain, split, times
 
 KNOWN_INVERSES = [
     ("I − E_φ", "φ"),
@@ -47,14 +47,13 @@ class LocalRules:
         self.problem, self.setting = problem, setting
         self.alphabet: Alphabet = problem.alphabet
         self.local: list[Equation] = []
-        own = bool(problem.opaque or extra)
-        base = rules_for(setting, problem.marks)
-        self.rules: Rules = base.copy()
+        self.rules: Rules = rules_for(setting, problem.marks).copy()
         blocks = Setting(setting.hypotheses, composite=True, compliance=True)
         self.block_rules = rules_for(blocks, problem.marks).copy() if any(o.kind == "blockdiag" for o in problem.opaque) else None
         self._rank = 0
         self._forms: list[tuple[str, Polynomial]] = []
         self._roots: list[tuple[Opaque, Polynomial, list[Step]]] = []
+        self._swept: list[tuple[str, str, Polynomial, list[Step]]] = []
         named = sorted({split(x)[0] for p in problem.polynomials() for w in p for x in w if inverted(x)})
         self.presupposed = {n for n in named if plain(n) not in _ALWAYS}
         for equation, word in extra:
@@ -62,9 +61,8 @@ class LocalRules:
         for name in named:
             if name not in theory().alphabet.letters:
                 self._add_pairs(name)
-        if own:
-            for opaque in problem.opaque:
-                {"inverse": self._inverse, "blockdiag": self._blocks, "sqrt": self._root}[opaque.kind](opaque)
+        for opaque in problem.opaque:
+            {"inverse": self._inverse, "blockdiag": self._blocks, "sqrt": self._root}[opaque.kind](opaque)
 
     def add(self, equation: Equation, word: Word, blocks: bool = True) -> None:
         """A rule and its transpose, before all that are there."""
@@ -138,12 +136,12 @@ class LocalRules:
         """The lemma X⁻¹ = Z, by XZ = I and ZX = I; None if these do not come out."""
         a, Y = self.alphabet, inverse_of(X)
         halves = []
-        for product, text in ((times(inner, z), "X Z = I"), (times(z, inner), "Z X = I")):
+        shown = a.letter_text(X)
+        for product, text in ((times(inner, z), f"{shown} Z = I"), (times(z, inner), f"Z {shown} = I")):
             form, steps = self.reduce(product)
             if form != _UNIT:
                 return None
-            where = f"X = {a.letter_text(X)}, Z = {a.text(z)}"
-            halves.append(Equation("lemma", f"{text}, {where}", product, _UNIT, steps=numbered(steps)))
+            halves.append(Equation("lemma", f"{text}, Z = {a.text(z)}", product, _UNIT, steps=numbered(steps)))
         first, second = framed((Y,), times(inner, z), ()), {(Y, X, *w): c for w, c in z.items()}
         pair = self.pair(Y, X)
         steps = [
@@ -171,13 +169,64 @@ class LocalRules:
         a = self.alphabet
         form, steps = self.block_rules.reduce(o.inner, a)
         value = diagonal_part(form, a)
-        if value == {(o.name,): ONE}:
+        if any(a.letters[split(x)[0]].word for w in value for x in w) and self._recursion(o):
             return
         text = f"{a.letters[o.name].text} = {a.text(value)}"
         note = "the diagonal blocks of each word, by where its letters lead on the tree"
         equation = Equation("structure", text, {(o.name,): ONE}, value, steps=numbered(steps), uses=[o.definition], note=note)
         equation.check = lambda: chain_holds(steps, o.inner, form) and diagonal_part(form, a) == value
         self.add(equation, (o.name,))
+
+    def _recursion(self, o: Opaque) -> bool:
+        """Y = X + E Y E* for Y = blockdiag(A X A*), A = (I-E)⁻¹ and X block diagonal; Y = Z where Z obeys the same. Whether Y is that."""
+        a, problem = self.alphabet, self.problem
+        factors = o.expression.children[0].children if o.expression.children[0].kind == "product" else []
+        if len(factors) < 3 or factors[0].name not in ("phi", "psi") or factors[0].T != factors[-1]:
+            return False
+        A = problem.letter(factors[0])
+        E = A.replace("φ", "E_φ").replace("ψ", "E_ψ")
+        X: Polynomial = {(): ONE}
+        for factor in factors[1:-1]:
+            X = times(X, problem.words(factor))
+        if diagonal_part(X, a) != X:
+            return False
+        form, steps = self.reduce(X)
+
+        def says(Z: str, its_steps: list[Step]) -> Equation:
+            equation = Equation("structure", f"{a.letters[o.name].text} = {a.letter_text(Z)}", {(o.name,): ONE}, {(Z,): ONE})
+            equation.steps, equation.note = [*steps, *its_steps], "both obey Y = X + E Y E*, which has one solution"
+            equation.check = lambda: chain_holds(steps, X, form) and (not its_steps or its_steps[-1].full()[1] == form)
+            return equation
+
+        for Z in (f"∂{x}{A[1:]}" for x in ("P", "R")):
+            if Z in a.letters:
+                rest, its_steps = self.reduce({(Z,): ONE, (E, Z, a.star(E)): -ONE})
+                if rest == form:
+                    self.add(says(Z, its_steps), (o.name,))
+                    return True
+        for Z, other, its_form, its_steps in self._swept:
+            if other == A and its_form == form:
+                self.add(says(Z, its_steps), (o.name,))
+                return True
+        self._swept.append((o.name, A, form, steps))
+        edge: Polynomial = {(E, o.name, a.star(E)): ONE}
+        text = f"{a.text(edge)} = Y − X, Y = {a.letters[o.name].text}"
+        equation = Equation("structure", text, edge, combine((1, monomial(o.name)), (-1, X)))
+        equation.note = "Y = X + E Y E*: φ = I + E φ, and what leads out to two children leads back to none"
+        equation.check = lambda: diagonal_part(X, a) == X
+        E_phi = A.replace("φ", "E_φ").replace("ψ", "E_φ")
+        self._add_solved(equation, (E_phi, o.name, a.star(E_phi)))
+        return True
+
+    def _add_solved(self, equation: Equation, lead: Word) -> None:
+        """The equation with its sides in normal form, as a rule for one of its words."""
+        a = self.alphabet
+        form, steps = self.reduce(equation.difference)
+        c = form[lead]
+        rest = {w: -x / c for w, x in form.items() if w != lead}
+        uses = [Use(1 / c, (), equation, (), lead)] + [u.between((), (), -1 / c) for step in steps for u in step.uses]
+        step = Step({lead: ONE}, rest, uses, a, f"{equation.text}, solved for {a.word_text(lead)}")
+        self.add(Equation("lemma", f"{a.word_text(lead)} = {a.text(rest)}", {lead: ONE}, rest, steps=numbered([step])), lead)
 
     def _root(self, o: Opaque) -> None:
         """LL* = A of L = A^½; L⁻¹A = L* where A is one word."""
@@ -188,7 +237,7 @@ class LocalRules:
             if its_form == form:
                 same = Equation("structure", f"{text} = {a.letters[other.name].text}", {(L,): ONE}, {(other.name,): ONE})
                 same.steps, same.note = [*steps, *its_steps], "roots of equal operators"
-                same.check = lambda: chain_holds(steps, o.inner, form) and chain_holds(its_steps, other.inner, form)
+                same.check = lambda i=other.inner, s=its_steps: chain_holds(steps, o.inner, form) and chain_holds(s, i, form)
                 self.add(same, (L,))
                 return
         self._roots.append((o, form, steps))
@@ -207,7 +256,7 @@ class LocalRules:
             whole: Polynomial = {(Y, L, star): 1 / c}
             chain.append(Step(inner, whole, [Use(-1 / c, (Y,), square, (), (), False)], a))
             chain.append(Step(whole, {(star,): 1 / c}, [Use(1 / c, (), self.pair(Y, L), (star,), (Y, L))], a))
-            lhs, rhs = {(Y, *word): ONE}, {(star,): 1 / c}
+            lhs, rhs = monomial(Y, *word), monomial(star, c=1 / c)
             self.add(Equation("lemma", f"{a.text(lhs)} = {a.text(rhs)}", lhs, rhs, steps=numbered(chain)), (Y, *word))
 
 

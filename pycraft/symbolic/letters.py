@@ -86,13 +86,13 @@ class Letters:
         return Matrix.of(self.field, entries, columns)
 
     def _skew(self, u: Matrix) -> Matrix:
-        x, y, z = (row.get(0, self.field.zero) for row in u.rows)
+        x, y, z = (row.get(0, u.field.zero) for row in u.rows)
         rows = [{1: -z, 2: y}, {0: z, 2: -x}, {0: -y, 1: x}]
-        return Matrix(self.field, [{j: e for j, e in row.items() if e} for row in rows], 3)
+        return Matrix(u.field, [{j: e for j, e in row.items() if e} for row in rows], 3)
 
     def _blocks(self, a: Matrix | None, b: Matrix | None, c: Matrix | None, d: Matrix | None) -> Matrix:
         """[[a, b], [c, d]] of (3, 3) blocks, zero where None."""
-        made = Matrix.zeros(self.field, 6, 6)
+        made = Matrix.zeros(next(x.field for x in (a, b, c, d) if x is not None), 6, 6)
         for i, j, block in ((0, 0, a), (0, 3, b), (3, 0, c), (3, 3, d)):
             if block is not None:
                 made.place(slice(i, i + 3), slice(j, j + 3), block)
@@ -172,6 +172,7 @@ class Letters:
     def _kinematics(self) -> list[tuple[Pose, list[Matrix]]]:
         """Of each body: its pose in its parent, and the rows of H of each subhinge, carried to the body's frame."""
         at, made = 0, []
+        self._steps: list[list[Pose]] = []
         for body in self.parameters.bodies:
             steps, rows = [], []
             for s in body["subhinges"]:
@@ -182,6 +183,7 @@ class Letters:
                 later = reduce(self._compose, steps[j + 1 :], self._still())
                 rows.append(self._rows(s) @ self._phi(later))
             made.append((reduce(self._compose, steps, placement), rows))
+            self._steps.append(steps)
         return made
 
     # ------------------------------------------------------------------ letters
@@ -204,7 +206,7 @@ class Letters:
 
     def _each(self, make: Callable[[Matrix], Matrix], x: Matrix) -> Matrix:
         """Block diagonal of make(x(k))."""
-        return self._diagonal([make(x.block(s, slice(0, 1))) for s in self.states])
+        return Matrix.diagonal(x.field, [make(x.block(s, slice(0, 1))) for s in self.states])
 
     def _identity(self) -> Matrix:
         return Matrix.identity(self.field, 6 * len(self.parents))
@@ -319,8 +321,57 @@ class Letters:
         B = self("B", names)
         return (B.T @ self("Omega") @ B).inverse()
 
-    def _Delta(self, coordinate: int) -> Matrix:
-        return self._each(self._crf, self("H").T.block(slice(0, 6 * len(self.parents)), slice(coordinate, coordinate + 1)))
+    def _twist(self, direction: int | Sequence[int]) -> Matrix:
+        """h, stacked: the twist of a coordinate, or (k, p, c): component c in the axes before subhinge p of body k; in the body's axes."""
+        if isinstance(direction, int):
+            return self("H").T.block(slice(0, 6 * len(self.parents)), slice(direction, direction + 1))
+        k, position, component = direction
+        made = Matrix.zeros(self.field, 6 * len(self.parents), 1)
+        unit = Matrix.identity(self.field, 6).block(slice(0, 6), slice(component, component + 1))
+        made.place(self.states[k], slice(0, 1), self._phi(reduce(self._compose, self._steps[k][position:], self._still())).T @ unit)
+        return made
+
+    def _Delta(self, direction: int | Sequence[int]) -> Matrix:
+        return self._each(self._crf, self("h", direction))
+
+    def _Pi(self, which: int | Sequence[int]) -> Matrix:
+        """Π: ones at one coordinate, or at those of subhinges first to last of hinge k (-1: of all), (k, first, last)."""
+        chosen = [which]
+        if not isinstance(which, int):
+            body, first, last = which
+            chosen = []
+            for k, ((_, parts), t) in enumerate(zip(self._hinges, self.coordinates, strict=True)):
+                ends = list(accumulate((len(p.rows) for p in parts), initial=t.start))
+                if body in (-1, k):
+                    chosen += range(ends[min(first, len(parts))], ends[min(last, len(parts))])
+        rows = [{i: self.field.one} if i in chosen else {} for i in range(len(self.v))]
+        return Matrix(self.field, rows, len(self.v))
+
+    def _dM(self, arguments: Sequence[int]) -> Matrix:
+        """∂M by mass, centre of mass (3) and inertia (xx xy xz yy yz zz) of one body, one after the other: (k, parameter, ...)."""
+        k, *parameters = arguments
+        m, *c = sympy.symbols("m c:3", cls=sympy.Dummy)
+        inertia = sympy.symbols("i:6", cls=sympy.Dummy)
+        xx, xy, xz, yy, yz, zz = inertia
+        skew = sympy.Matrix([[0, -c[2], c[1]], [c[2], 0, -c[0]], [-c[1], c[0], 0]])
+        body = self.parameters.bodies[k]
+        block = sympy.Matrix([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) - m * skew * skew
+        full = sympy.Matrix(sympy.BlockMatrix([[block, m * skew], [-m * skew, m * sympy.eye(3)]]))
+        for p in parameters:
+            full = full.diff([m, *c, *inertia][p])
+        of = body["inertia"]
+        values = [body["mass"], *body["com"], of[0][0], of[0][1], of[0][2], of[1][1], of[1][2], of[2][2]]
+        full = full.subs(dict(zip([m, *c, *inertia], values, strict=True)))
+        made = self._zeros("s", "s")
+        made.place(self.states[k], self.states[k], self._matrix(full.tolist()))
+        return made
+
+    def function(self, name: str, x: Matrix) -> Matrix:
+        """crm, crf or mcross of every body's part of a stacked vector."""
+        makers = {"crm": self._crm, "crf": self._crf, "mcross": self._momentum}
+        if name not in makers:
+            raise _core.EvaluationError(f"the function {name!r} has no closed form here")
+        return self._each(makers[name], x)
 
     def _theta_dot(self) -> Matrix:
         return self._matrix([[x] for x in self.v], 1)
@@ -388,6 +439,9 @@ LETTERS: dict[str, Callable[..., Matrix]] = {
     "Jacobian": lambda o, names: o("B", names).T @ o("phi").T @ o("H").T,
     "Lambda": Letters._Lambda,
     "Delta": Letters._Delta,
+    "h": Letters._twist,  # this and the next two come up in derivatives
+    "Pi": Letters._Pi,
+    "dM": Letters._dM,
     "theta_dot": Letters._theta_dot,
     "H_dot": Letters._H_dot,
     "Delta_theta_dot": lambda o: o._each(o._crf, o("H").T @ o("theta_dot")),

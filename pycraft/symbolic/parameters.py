@@ -33,7 +33,9 @@ class Parameters:
 
     def __init__(self, description: Mapping[str, Any], given: str | Mapping[Any, Any] = "numeric"):
         if isinstance(given, str) and given not in ("numeric", "symbolic"):
-            raise _core.ModelError(f"parameters={given!r}: there are 'numeric', 'symbolic', or a mapping such as {{('upper', 'mass'): 'm1'}}")
+            raise _core.ModelError(
+                f"parameters={given!r}: there are 'numeric', 'symbolic', or a mapping such as {{('upper', 'mass'): 'm1'}}"
+            )
         self.values: dict[sympy.Symbol, float] = {}
         self._pairs: list[tuple[sympy.Expr, float]] = []  # an expression, and the number that it stands for
         self.bodies = [_exact_body(body) for body in description["bodies"]]

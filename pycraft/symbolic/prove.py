@@ -1,29 +1,27 @@
 """`prove`: one side of a statement derived from the other, from what the operators are defined to be.
 
-Both sides are brought to a normal form by rules that are axioms or proved from them (`axioms`), and one chain of steps leads from side to side.
-First without a hypothesis, then under those that may matter, fewest first. Every step is checked by multiplying it out (`equations`), whatever
-search found it. If the normal forms differ, no proof was found, and nothing is said about the statement.
+Both sides are brought to a normal form by rules that are axioms or proved from them (`axioms`), and one chain of steps leads from side to
+side: first without a hypothesis, then under those that may matter, fewest first. Every step is checked by multiplying it out
+(`equations`), whatever search found it. If the normal forms differ, no proof was found, and nothing is said about the statement.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable
-from fractions import Fraction
+from collections.abc import Iterator
 from typing import Any
 
 from .. import _core
 from ..identities.checker import with_spaces
 from ..identities.parse import Statement, Statements
 from .attempt import Attempt, Outcome
-from .axioms import joined
 from .completion import complete
-from .derivation import DerivativeProblem, derivative
-from .equations import Equation
-from .expand import Problem
+from .derivation import DerivativeProblem
+from .derivative import derivative
+from .equations import Equation, joined
 from .proof import Proof, example
 from .rules import GaveUp, Setting
-from .words import FURTHER, Polynomial, Word, split
+from .words import ONE, Polynomial, Word, plain
 
 
 def prove(lhs: Any, rhs: Any = None, model: Any = None) -> Proof:
@@ -31,23 +29,26 @@ def prove(lhs: Any, rhs: Any = None, model: Any = None) -> Proof:
 
     Parameters
     ----------
-    lhs, rhs : expressions of one model, or a statement as text and, in the second place, its model
+    lhs, rhs : expressions of one model; or a statement as text and, in the second place, its model
     model : Multibody or OperatorSet: what text is read on, and where the steps are evaluated. Text without a model is read on a small tree.
 
     Returns
     -------
     Proof
-        True if a derivation was found: its steps, hypotheses, lemmas and residuals. Else false, with both normal forms: nothing is then said
-        about the statement; `pycraft.check` and `Proof.search_counterexample` look at it numerically.
+        True if a derivation was found: its steps, hypotheses, lemmas and residuals. Else false, with both normal forms: nothing is then
+        said about the statement; `pycraft.check` and `Proof.search_counterexample` look at it numerically.
 
     Raises
     ------
     ParseError, SpaceError
         The text does not read as a statement; the sides do not act between the same spaces.
+    EvaluationError
+        There is only one side.
 
     Notes
     -----
-    Costs milliseconds, whatever the size of the model; no number decides anything. Traces, determinants and norms are outside.
+    Cost: milliseconds to a few tenths of a second, whatever the size of the model; no number decides anything. Traces, determinants and
+    norms are outside.
 
     Examples
     --------
@@ -60,16 +61,17 @@ def prove(lhs: Any, rhs: Any = None, model: Any = None) -> Proof:
     >>> bool(proof), proof.hypotheses
     (True, ['J = 0'])
     """
-    if isinstance(lhs, str):
-        if rhs is not None and model is None:
-            model, rhs = rhs, None
-        if isinstance(rhs, str):
-            lhs, rhs = f"{lhs} == {rhs}", None
-        read = _read(lhs, model)
-    else:
+    if not isinstance(lhs, str):
         if rhs is None:
             raise _core.EvaluationError("a statement has two sides: prove(lhs, rhs), or prove(text, model)")
-        read = Statement(*_sides(lhs, rhs), f"{_text(lhs)} == {_text(rhs)}", "expressions")
+        return _prove(Statement(*_sides(lhs, rhs), "", "expressions"), model)
+    if isinstance(rhs, str):
+        lhs = f"{lhs} == {rhs}"
+    elif rhs is not None and model is None:
+        model = rhs
+    read = Statements(_operators(model if model is not None else example())).read(lhs)
+    if read.rhs is None:
+        raise _core.EvaluationError(f"{lhs!r} has one side; a statement is lhs == rhs")
     return _prove(read, model)
 
 
@@ -78,171 +80,137 @@ def prove_derivative(expression: Any, rhs: Any, coordinate: int | str) -> Proof:
 
     Parameters
     ----------
-    expression, rhs : as for `prove`; rhs may hold `derivative(X, i)` of any operator X
+    expression : an operator expression
+    rhs : an expression; it may hold `derivative(X, i)` of any operator X
     coordinate : the coordinate i, by number or name
 
     Returns
     -------
     Proof
-        With "constant H" and "single-DOF hinges" among its hypotheses where a step uses them.
+        As from `prove`, with "constant H" and "single-DOF hinges" among its hypotheses where a step uses them.
+
+    Raises
+    ------
+    ModelError
+        There is no such coordinate.
 
     Examples
     --------
     >>> import pycraft as pc
     >>> from pycraft.symbolic import prove_derivative
-    >>> arm = pc.chain(3)
-    >>> phi, phi_tilde = arm.soa("phi phi_tilde")
-    >>> bool(prove_derivative(phi, phi_tilde @ arm.soa.Delta(1) @ phi, 1))
+    >>> soa = pc.chain(3).soa
+    >>> bool(prove_derivative(soa.phi, soa.phi_tilde @ soa.Delta(1) @ soa.phi, 1))
     True
     """
     return prove(derivative(expression, coordinate), rhs)
 
 
 # ---------------------------------------------------------------------- reading
-def _read(text: str, model: Any) -> Statement:
-    operators = getattr(model if model is not None else example([]), "soa", model)
-    read = Statements(operators).read(text)
-    if read.rhs is None:
-        raise _core.EvaluationError(f"{text!r} has one side; a statement is lhs == rhs")
-    return read
+def _operators(model: Any) -> Any:
+    return getattr(model, "soa", model)
 
 
 def _sides(lhs: Any, rhs: Any) -> tuple[Any, Any]:
-    for one, other in ((lhs, rhs), (rhs, lhs)):
-        if isinstance(one, (int, float)) and one == 0 and isinstance(other, _core.Operator) and other.domain is not None:
-            zero = _core.zero(other.domain, other.codomain)
-            return (zero, other) if one is lhs else (other, zero)
-    if isinstance(lhs, _core.Operator) and isinstance(rhs, _core.Operator):
-        lhs, rhs = with_spaces(lhs, rhs)
-        lhs - rhs  # raises where the spaces differ
-    return lhs, rhs
-
-
-def _text(side: Any) -> str:
-    return side.text() if hasattr(side, "text") else str(side)
+    """Both sides with the spaces of each other; a 0 takes them too. Raises SpaceError where they differ."""
+    sides = [lhs, rhs]
+    for i, other in ((0, rhs), (1, lhs)):
+        domain = getattr(other, "domain", None)
+        if domain is not None and isinstance(sides[i], (int, float)) and sides[i] == 0:
+            sides[i] = _core.zero(domain, other.codomain)
+        elif domain is not None and isinstance(sides[i], _core.Operator) and sides[i].domain is None:
+            sides[i] = sides[i] @ _core.identity(domain)
+    if all(isinstance(s, _core.Operator) for s in sides):
+        left, right = with_spaces(*sides)
+        left - right  # raises where the spaces differ
+        return sides[0], sides[1]
+    spaces = [(getattr(s, "domain", None), getattr(s, "codomain", None)) for s in sides]
+    if all(domain is not None for domain, _ in spaces) and spaces[0] != spaces[1]:
+        raise _core.SpaceError(f"{sides[0].text()} and {sides[1].text()} do not act between the same spaces")
+    return sides[0], sides[1]
 
 
 # ---------------------------------------------------------------------- search
 def _prove(read: Statement, model: Any) -> Proof:
-    statement = f"{_text(read.lhs)} = {_text(read.rhs)}"
-    scalars = [side for side in (read.lhs, read.rhs) if isinstance(side, _core.Scalar) or isinstance(side, (int, float))]
     problem = DerivativeProblem()
-    if scalars:
-        note = "traces, determinants and norms are not sums of words"
-        return Proof(statement, problem.alphabet, [], found=False, note=note, read=read)
+    for side in (read.lhs, read.rhs):
+        if not hasattr(side, "kind"):
+            lhs, rhs = (s if hasattr(s, "latex") else _core.scalar(float(s)) for s in (read.lhs, read.rhs))
+            shown = Statement(lhs, rhs, read.text, read.reading)
+            return Proof.of_statement(shown, problem, [], [], ({}, {}), "traces, determinants and norms are no sums of words")
     try:
-        p, first = problem.expand(read.lhs)
-        q, second = problem.expand(read.rhs)
+        left, right = problem.expand(read.lhs), problem.expand(read.rhs)
     except GaveUp:
-        return Proof(statement, problem.alphabet, [], found=False, note="too many words", read=read)
-    problem.sides = [p, q]
-    latex = f"{read.lhs.latex()} = {read.rhs.latex()}"
-    nearest: tuple[Polynomial, Polynomial] = (p, q)
+        return Proof.of_statement(read, problem, [], [], ({}, {}), "too many words")
+    p, q = problem.sides = [left.before, right.before]
+    problem.numbers = all(space is not None and space.name == "R^1" for space in (read.lhs.domain, read.lhs.codomain))
+    nearest: tuple[Polynomial, Polynomial] | None = None
     for attempt, outcome in _attempts(problem, p, q):
-        if not outcome.closed:
-            if nearest == (p, q):
-                nearest = (outcome.lhs, outcome.rhs)
-            continue
-        steps = joined([first, *outcome.left], [second, *outcome.right], p, q, problem.alphabet)
-        assert steps is not None
-        proof = Proof(
-            statement, problem.alphabet, steps, (outcome.lhs, outcome.rhs), latex=latex, sides=(read.lhs, read.rhs),
-            contexts=problem.contexts, presupposes=_presupposed(problem, attempt), read=read, claim=(p, q),
-        )  # fmt: skip
-        proof.model = model if model is not None else _model_of(problem)
-        proof.verify_if_possible()
-        return proof
-    return Proof(statement, problem.alphabet, [], nearest, latex=latex, found=False, read=read)
+        if outcome.closed:
+            steps = joined(outcome.left, outcome.right, p, q, problem.alphabet) or []
+            typed = ([left] if left.says_something else []), ([right.reversed()] if right.says_something else [])
+            proof = Proof.of_statement(read, problem, [left, right], [*typed[0], *steps, *typed[1]], (outcome.lhs, outcome.rhs))
+            proof.presupposes = [_inverse_text(problem, name) for name in sorted(attempt.presupposed)]
+            proof.verify_where_possible(_operators(model) if model is not None else _operators_of(problem))
+            return proof
+        nearest = nearest or (outcome.lhs, outcome.rhs)
+    return Proof.of_statement(read, problem, [left, right], [], nearest or (p, q))
 
 
-def _attempts(problem: Problem, p: Polynomial, q: Polynomial) -> Iterable[tuple[Attempt, Outcome]]:
-    """Attempts under more and more hypotheses; then again, completed."""
-    prepared: list[Attempt] = []
+def _attempts(problem: DerivativeProblem, p: Polynomial, q: Polynomial) -> Iterator[tuple[Attempt, Outcome]]:
+    """Attempts under more and more hypotheses; then again, with completed rules."""
+    made: list[Attempt] = []
     for setting, extra in _settings(problem):
         try:
-            attempt = Attempt(problem, setting)
-            attempt.prepare(extra)
-            outcome = attempt.run(p, q)
+            made.append(Attempt(problem, setting, extra))
+            yield made[-1], made[-1].run(p, q)
         except GaveUp:
             continue
-        prepared.append(attempt)
-        yield attempt, outcome
-    for attempt in prepared:
-        if not attempt.local:
-            continue
+    for attempt in made:
         try:
-            if complete(attempt):
+            if attempt.local and complete(attempt):
                 yield attempt, attempt.run(p, q)
         except GaveUp:
             continue
 
 
-def _settings(problem: Problem) -> Iterable[tuple[Setting, list[tuple[Equation, Word]]]]:
+def _settings(problem: DerivativeProblem) -> Iterator[tuple[Setting, list[tuple[Equation, Word]]]]:
     """Settings by the number of hypotheses, with the rules that they add."""
-    names = {split(x)[0].rstrip(FURTHER) for p in problem.polynomials() for word in p for x in word}
-    plain, of_hypothesis = problem.derivative_rules()
-    deltas = [n for n, known in problem.alphabet.letters.items() if known.expression is not None and _is_delta(known.expression)]
-    possible = ["J = 0"]
-    if "Υ" in names:
-        possible.append("serial chain")
-    if deltas:
-        possible.append("single-DOF hinges")
-    if of_hypothesis:
-        possible.append("constant H")
-    composite, velocities = "R" in names or "∂R" in names, bool(names & {"Ṽ", "V̄", "Ḣ"})
+    rules, constant = problem.derivative_rules()
+    letters = {x for p in problem.polynomials() for word in p for x in word}
+    names = {plain(x).removeprefix("∂") for x in letters}
+    deltas = [n for n, known in problem.alphabet.letters.items() if getattr(known.expression, "name", "") in ("Delta", "Delta_theta_dot")]
+    possible = ["J = 0"] * ("J⁻¹" not in letters) + ["serial chain"] * ("Υ" in names)
+    if "Ḣ" in names:
+        constant.append((Equation("hypothesis", "Ḣ = 0", {("Ḣ",): ONE}, {}, hypothesis="constant H"), ("Ḣ",)))
+    possible += ["single-DOF hinges"] * bool(deltas) + ["constant H"] * bool(constant)
+    composite, velocities = "R" in names, bool(names & {"Ṽ", "V̄", "Ḣ"})
     for size in range(len(possible) + 1):
         for chosen in itertools.combinations(possible, size):
-            extra = list(plain)
-            if "single-DOF hinges" in chosen:
-                extra += [_no_delta(name) for name in deltas]
-            if "constant H" in chosen:
-                extra += of_hypothesis
+            extra = list(rules) + constant * ("constant H" in chosen)
+            extra += [_no_delta(problem, n) for n in deltas if "single-DOF hinges" in chosen]
             yield Setting(frozenset(chosen), composite, "serial chain" in chosen, velocities), extra
 
 
-def _is_delta(e: Any) -> bool:
-    return getattr(e, "kind", "") == "symbol" and e.name in ("Delta", "Delta_theta_dot")
-
-
-def _no_delta(name: str) -> tuple[Equation, Word]:
+def _no_delta(problem: DerivativeProblem, name: str) -> tuple[Equation, Word]:
     """HΔ = 0 where the axes at Δ's body are one: h*crf(h) = 0."""
     word = ("H", name)
-    return Equation({word: Fraction(1)}, {}, "hypothesis", f"H {name} = 0", hypothesis="single-DOF hinges"), word
+    text = f"{problem.alphabet.word_text(word)} = 0"
+    return Equation("hypothesis", text, {word: ONE}, {}, hypothesis="single-DOF hinges"), word
 
 
-def _presupposed(problem: Problem, attempt: Attempt) -> list[str]:
-    """Inverses that the statement names and no lemma shows to exist."""
-    return [f"{problem.alphabet.letter_text(n)}⁻¹" for n in attempt.inverted_letters() if n not in attempt.shown_inverses]
+def _inverse_text(problem: DerivativeProblem, name: str) -> str:
+    """The inverse of a letter as it was typed."""
+    operand = next((o.expression.text() for o in problem.opaque if o.name == name and o.kind == "inverse"), None)
+    return f"{problem.alphabet.letter_text(name)}⁻¹" if operand is None else f"({operand})⁻¹"
 
 
-def _model_of(problem: Problem) -> Any:
-    """The model that the letters belong to."""
+def _operators_of(problem: DerivativeProblem) -> Any:
+    """The operators of the model that the letters belong to; None where its states cannot be drawn."""
     from ..operators import OperatorSet
 
-    for source, _ in problem.contexts:
-        return OperatorSet(source, _python_model(source))
+    for source, _ in problem.contexts[:1]:
+        model = getattr(source, "model", None)
+        return OperatorSet(source, model if hasattr(model, "random_state") else None)
     return None
 
 
-def _python_model(source: Any) -> Any:
-    """Something with random states: the core's model behind a source."""
-    return _Core(source.model) if hasattr(source, "model") else None
-
-
-class _Core:
-    """States of a model of the core."""
-
-    def __init__(self, model: Any):
-        self._model = model
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._model, name)
-
-    def random_state(self, seed: int) -> Any:
-        import numpy as np
-
-        from ..models.state import State
-
-        rng = np.random.default_rng(seed)
-        q = np.array(self._model.integrate(self._model.zero_q(), rng.uniform(-1, 1, self._model.nv)))
-        return State(q, rng.uniform(-1, 1, self._model.nv))

@@ -65,16 +65,17 @@ class Rationals:
         ring = self.field.ring
         # index of a generator → what its square is, in the ring
         self._squares: dict[int, Any] = {}
-        below: dict[int, Any] = {}
+        self._roots: dict[int, tuple[Any, Any]] = {}  # of a root's generator r: whole w and denominator d of the root r w/d
         self._angles: dict[int, sympy.Expr] = {}
         for i, atom in enumerate(self.atoms):
             if isinstance(atom, sympy.tan):
                 self._angles[i] = 2 * atom.args[0]
             elif isinstance(atom, sympy.Pow):  # a root √(n/d) is r/d with r² = nd
                 inside = self.element(atom.base)
-                self._squares[i] = inside.numer * inside.denom
-                self._gens[atom] = self.field.gens[i] / self.field.raw_new(inside.denom, ring.one)
-                below[i] = inside.denom
+                square, whole = self._without_squares(inside.numer * inside.denom)
+                self._squares[i] = square
+                self._gens[atom] = self.field.gens[i] * whole / self.field.raw_new(inside.denom, ring.one)
+                self._roots[i] = whole, inside.denom
         of_atom = dict(zip(self.atoms, ring.gens, strict=False))
         for w, *u in self._unit:
             self._squares[self.atoms.index(w)] = 1 - sum(of_atom[x] ** 2 for x in u)
@@ -88,9 +89,15 @@ class Rationals:
             names[i]: sympy.sin(angle) for i, angle in self._angles.items()
         }
         self._shown_atoms |= {c: sympy.cos(angle) for c, angle in zip(cosines, self._angles.values(), strict=True)}
-        for i, denominator in below.items():
-            if denominator != 1:
-                self._shown_atoms[names[i]] = self.expression(self.field.raw_new(denominator, ring.one), False) * self.atoms[i]
+
+    def _without_squares(self, p: Any) -> tuple[Any, Any]:
+        """(f, w) with p = f w², w of factors 1 + t², which are positive."""
+        whole = self.field.ring.one
+        for i in self._angles:
+            over = 1 + self.field.ring.gens[i] ** 2
+            while not p.rem(over**2):
+                p, whole = p.exquo(over**2), whole * over
+        return p, whole
 
     def extended(self, expressions: Iterable[sympy.Expr]) -> Rationals:
         """The field with more generators, itself where there is nothing new; `lift` brings elements there."""
@@ -131,7 +138,7 @@ class Rationals:
             return made
         if e.is_Pow and e.exp.is_Integer:
             return self.reduce(self.element(e.base) ** int(e.exp))
-        if e.is_Pow and e.exp.is_Rational and e.base.is_Rational:
+        if e.is_Pow and e.exp.is_Rational and e.base.is_Rational and not (e.base.is_Integer and e.exp == sympy.Rational(1, 2)):
             return self.element(_root(e))
         if e.is_Pow and e.exp.is_Rational and e.exp.q == 2 and sympy.sqrt(e.base) in self._gens:
             return self.reduce(self._gens[sympy.sqrt(e.base)] ** e.exp.p)
@@ -146,6 +153,12 @@ class Rationals:
         if not self._squares:
             return f
         numerator, denominator = _replace(f.numer, self._squares), _replace(f.denom, self._squares)
+        for i in self._roots:  # no root below the line: (a + br)(a - br) = a² - b²r²
+            if any(m[i] for m in denominator):
+                conjugate = self.field.ring.from_dict({m: -c if m[i] else c for m, c in denominator.items()})
+                if all(m[i] for m in denominator):
+                    conjugate = self.field.ring.gens[i]
+                numerator, denominator = (_replace(p * conjugate, self._squares) for p in (numerator, denominator))
         if numerator is f.numer and denominator is f.denom:
             return f
         if not denominator:
@@ -209,7 +222,11 @@ class Rationals:
         """
         ring = self._shown_ring
         pad = (0,) * len(self._angles)
-        parts = [ring.from_dict({m + pad: c for m, c in p.items()}) for p in (f.numer, f.denom)]
+        both: tuple[Any, Any] = (f.numer, f.denom)
+        for i, (whole, denominator) in self._roots.items():  # what is shown is the root r w/d
+            if any(m[i] for p in both for m in p):
+                both = _spread(both[0], i, denominator, whole).cancel(_spread(both[1], i, denominator, whole))
+        parts = [ring.from_dict({m + pad: c for m, c in p.items()}) for p in both]
         for i, (s, c) in self._trigonometric.items():
             degree = max(p.degree(s) for p in parts)
             if degree <= 0:
@@ -244,7 +261,37 @@ class Rationals:
                 candidates += [_angle_sums(c) for c in candidates]
         else:
             candidates = [c.xreplace(self._shown_atoms) for c in candidates]
-        return min(candidates, key=lambda e: (sympy.count_ops(e), len(str(e))))
+        candidates += [_without_minus(c) for c in candidates]
+        return min(candidates, key=_burden)
+
+
+def _burden(e: sympy.Expr) -> tuple[int, int, int]:
+    """What makes a form the longer one: operations, letters, minus signs that open a sum."""
+    text = str(e)
+    return sympy.count_ops(e), len(text), text.count("(-")
+
+
+def _without_minus(e: sympy.Expr) -> sympy.Expr:
+    """A minus sign in front taken into a sum that is a factor."""
+    number, rest = e.as_coeff_Mul()
+    if number.is_negative:
+        factors = list(sympy.Mul.make_args(rest))
+        for i, factor in enumerate(factors):
+            if factor.is_Add or factor.is_Pow and factor.exp == -1 and factor.base.is_Add:
+                turned = sympy.Add(*(-a for a in (factor if factor.is_Add else factor.base).args))
+                factors[i] = turned if factor.is_Add else 1 / turned
+                return sympy.Mul(-number, *factors)
+    return e
+
+
+def _spread(p: Any, i: int, denominator: Any, whole: Any) -> Any:
+    """Times w, with r replaced by d times itself: r w/d goes to r, 1 to 1, up to the factor w of both parts of a fraction."""
+    ring = p.ring
+    made = ring.zero
+    for with_root in (False, True):
+        part = ring.from_dict({m: c for m, c in p.items() if bool(m[i]) == with_root})
+        made += part * (denominator if with_root else whole)
+    return made
 
 
 def _degrees(p: Any) -> int:
@@ -255,8 +302,8 @@ def _angle_sums(e: sympy.Expr) -> sympy.Expr:
     """Products of sines and cosines gathered into those of sums of angles, where that makes it shorter."""
     from sympy.simplify.fu import TR8, TR10i
 
-    forms = [TR10i(e), TR8(e)]
-    return min(forms, key=sympy.count_ops)
+    forms = [form for form in (TR10i(e), TR8(e)) if not form.has(sympy.pi)]
+    return min(forms, key=sympy.count_ops, default=e)
 
 
 def _collect(e: sympy.Expr, atoms: dict[sympy.Expr, None]) -> None:
@@ -470,6 +517,12 @@ class Matrix:
             return self.eliminated(Matrix.zeros(self.field, len(self.rows), 0))[1]
         except _core.SingularOperatorError:
             return self.field.zero
+
+    def lower_half(self) -> Matrix:
+        """The lower triangle with half the diagonal."""
+        half = self.field.one / 2
+        rows = [{j: self.field.reduce(half * x) if j == i else x for j, x in row.items() if j <= i} for i, row in enumerate(self.rows)]
+        return Matrix(self.field, rows, self.columns)
 
     def trace(self) -> Any:
         total = self.field.zero

@@ -1,13 +1,13 @@
 """The normal form: which equations are read in which direction, and how a polynomial is brought there, step by step.
 
-A rule replaces a word by lighter or shorter ones (`weight`), so that every chain of rules ends. In each step one equation is applied wherever
-it fits, the one that stands first in the list before all others: hypotheses, what cancels, then what makes words short, then what opens
-abbreviations.
+A rule replaces a word by lighter or shorter ones (`weight`), so that every chain of rules ends. In each step one equation is applied
+wherever it fits, the one that stands first in the list before all others: hypotheses, what cancels, what makes words short, what opens
+abbreviations, then the recursions.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cache, lru_cache
@@ -146,10 +146,11 @@ class Rules:
         self._best.clear()
 
     def add_equation(self, equation: Equation, word: Word, alphabet: Alphabet, group: int) -> None:
-        """Its rule and its transpose's."""
-        self.add(rule_from(equation, word, group))
+        """Its rule, and its transpose's where the two do not lead in a circle."""
+        rule = rule_from(equation, word, group)
+        self.add(rule)
         star = alphabet.star_word(word)
-        if star != word:
+        if star != word and all(w != star for w, _ in rule.to):
             self.add(rule_from(equation.transposed(alphabet), star, group))
 
     def all(self) -> list[Rule]:
@@ -184,15 +185,33 @@ class Rules:
             groups = [group for word in p if (group := self.best(word)) is not None]
             if not groups:
                 return p, steps
-            steps.append(self._apply(p, min(groups), alphabet, budget))
+            steps.append(self._apply(p, p, min(groups), alphabet, budget))
             p = steps[-1].after
 
-    def _apply(self, p: Polynomial, group: int, alphabet: Alphabet, budget: Budget) -> Step:
-        """One equation, at every place."""
+    def reduce_both(self, p: Polynomial, q: Polynomial, alphabet: Alphabet) -> tuple[Polynomial, list[Step], Polynomial, list[Step]]:
+        """(p, its steps, q, its steps), reduced where the two differ, and equal if their normal forms are. Raises GaveUp."""
+        budget = Budget()
+        sides = [p, q]
+        steps: tuple[list[Step], list[Step]] = ([], [])
+        while True:
+            differing = [{w for w, c in one.items() if other.get(w) != c} for one, other in (sides, sides[::-1])]
+            groups = [group for words in differing for word in words if (group := self.best(word)) is not None]
+            if not groups:
+                return sides[0], steps[0], sides[1], steps[1]
+            for i in (0, 1):
+                step = self._apply(sides[i], differing[i], min(groups), alphabet, budget)
+                if step.uses:
+                    steps[i].append(step)
+                    sides[i] = step.after
+
+    def _apply(self, p: Polynomial, where: Container[Word], group: int, alphabet: Alphabet, budget: Budget) -> Step:
+        """One equation, at every place in these words."""
         done: Polynomial = {}
         uses: list[Use] = []
         for start, x in p.items():
             todo = [(start, x)]
+            if start not in where:
+                add_to(done, *todo.pop())
             while todo:
                 word, c = todo.pop()
                 found = next(((place, rule) for place, rule in self._fitting(word) if rule.group == group), None)
@@ -232,10 +251,10 @@ class Setting:
 def chosen(setting: Setting) -> list[tuple[str, str]]:
     """(word, equation) of a setting, by rank."""
     facts: list[tuple[str, str]] = [(letter, text) for letter, text in _vanishing(setting)]
-    facts += [*_CANCELLING, *_RESOLVENTS, *_GAINS, *_ARTICULATED]
-    facts += _WITH_R if setting.composite else _WITHOUT_R
-    facts += _OPENING
+    facts += [*_CANCELLING, *_RESOLVENTS, *_GAINS, *_OPENING]
     facts += _VELOCITIES if setting.velocities else []
+    facts += _ARTICULATED
+    facts += _WITH_R if setting.composite else _WITHOUT_R
     facts += _REST
     facts += _COMPLIANCE if setting.compliance else _SIBLINGS
     return facts

@@ -36,6 +36,11 @@ def add_to(p: Polynomial, word: Word, c: Fraction) -> None:
         p.pop(word, None)
 
 
+def monomial(*letters: str, c: Fraction = ONE) -> Polynomial:
+    """c times one word."""
+    return {letters: c}
+
+
 def combine(*parts: tuple[Fraction | int, Polynomial]) -> Polynomial:
     """Σ c p."""
     total: Polynomial = {}
@@ -234,7 +239,8 @@ def number(c: Fraction) -> str:
 def parse(text: str) -> Polynomial:
     """A sum of words whose letters stand apart: "φ K H ψ − 2 φ + I"."""
     p: Polynomial = {}
-    sign, word, c, started = ONE, [], ONE, False
+    word: list[str] = []
+    sign, c, started = ONE, ONE, False
     for token in [*text.split(), "+"]:
         if token in ("+", "−", "-"):
             if started:
