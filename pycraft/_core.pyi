@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Binding', 'Dynamics', 'Error', 'EvaluationError', 'MatrixTree', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'Scalar', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'Theorem', 'blockdiag', 'constant', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'identity', 'operators_of', 'residual', 'scalar', 'symbol_table', 'theorems', 'time_apply', 'time_dynamics', 'vector', 'zero']
+__all__: list[str] = ['Binding', 'Dynamics', 'Error', 'EvaluationError', 'MatrixTree', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'Scalar', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'Theorem', 'blockdiag', 'constant', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'identity', 'operators_of', 'residual', 'scalar', 'step_kinds', 'symbol_table', 'theorems', 'time_apply', 'time_dynamics', 'vector', 'zero']
 
 class Error(Exception): ...
 class SpaceError(Error, TypeError): ...
@@ -33,9 +33,17 @@ class Space:
     def __repr__(self) -> str:
         ...
     @property
+    def _owner(self) -> int:
+        ...
+    @property
     def blocks(self) -> list:
         """
         List of (label, slice, body number) in the order of a vector's entries; body -1 for none.
+        """
+    @property
+    def bodies(self) -> int:
+        """
+        Number of bodies that it is cut into; 0 for R^n.
         """
     @property
     def dimension(self) -> int:
@@ -255,6 +263,11 @@ class Operator:
         ...
     def _repr_latex_(self) -> str:
         ...
+    def algorithm(self, language: str = 'text', request: str = 'apply') -> typing.Any:
+        """
+        The plan written out as the textbook recursion: language "text", "latex", or "python" (NumPy alone) and "cpp" (Eigen alone),
+        source that runs by itself. See pycraft.algorithm.
+        """
     def at(self, q: typing.Any = None, v: typing.Any = None, *, form: str = 'fast', refine: typing.SupportsInt | typing.SupportsIndex = 0, precision: str = 'double') -> Operator:
         """
         The same expression bound to a state: q (nq,) or a batch (B, nq), v likewise (zero if left out); q=None takes the model's present
@@ -453,6 +466,10 @@ class Scalar:
         ...
     def _repr_latex_(self) -> str:
         ...
+    def algorithm(self, language: str = 'text') -> typing.Any:
+        """
+        The recursion that computes it: "text", "latex", "python" or "cpp". See pycraft.algorithm.
+        """
     def at(self, *args, **kwargs) -> typing.Any:
         ...
     def bound(self, arg0: Binding) -> Scalar:
@@ -489,6 +506,10 @@ class Plan:
         ...
     def __str__(self) -> str:
         ...
+    def numbers(self, context: typing.SupportsInt | typing.SupportsIndex, name: str, arguments: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] = [], state: typing.SupportsInt | typing.SupportsIndex = 0) -> typing.Any:
+        """
+        A symbol's numbers at a context's state: a vector, or one block per body; `state` picks one of a batch.
+        """
     @property
     def flops(self) -> float:
         """
@@ -511,6 +532,11 @@ class Plan:
     def passes(self) -> PassCounts:
         """
         Counters of the last run.
+        """
+    @property
+    def program(self) -> dict:
+        """
+        The plan as plain data: contexts, registers and steps in dictionaries; pycraft.algorithm writes them out.
         """
     @property
     def run_notes(self) -> list[str]:
@@ -707,6 +733,10 @@ def residual(a: typing.Any, b: typing.Any, vectors: collections.abc.Mapping[str,
     """
 def scalar(value: typing.SupportsFloat | typing.SupportsIndex) -> Scalar:
     ...
+def step_kinds() -> list[str]:
+    """
+    The kinds of steps that plans are made of.
+    """
 def symbol_table() -> list:
     """
     Every operator: (ASCII, Unicode, LaTeX, domain, codomain, meaning).

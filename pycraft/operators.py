@@ -354,3 +354,10 @@ class Explanation(str):
 def explain(operator: _core.Operator, request: str = "apply") -> Explanation:
     """The plan of an expression as a table of steps, tiers and costs; after a run, with what the run reported."""
     return Explanation(str(operator.plan(request)))
+
+
+def algorithm(expression: _core.Operator | _core.Scalar, language: str = "text", request: str = "apply"):
+    """The recursion that an expression's plan stands for, see `pycraft.algorithm`."""
+    from .algorithm import algorithm as written
+
+    return written(expression, language, request)

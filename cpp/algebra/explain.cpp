@@ -40,6 +40,52 @@ std::string quantity(double x, const char* unit) {
 
 }  // namespace
 
+const char* step_kind_name(StepKind kind) {
+  switch (kind) {
+    case StepKind::values: return "values";
+    case StepKind::gather: return "gather";
+    case StepKind::scatter: return "scatter";
+    case StepKind::apply_symbol: return "apply_symbol";
+    case StepKind::apply_blocks: return "apply_blocks";
+    case StepKind::apply_constant: return "apply_constant";
+    case StepKind::apply_column: return "apply_column";
+    case StepKind::apply_external: return "apply_external";
+    case StepKind::combine: return "combine";
+    case StepKind::vector_symbol: return "vector_symbol";
+    case StepKind::zero: return "zero";
+    case StepKind::load_blocks: return "load_blocks";
+    case StepKind::identity_blocks: return "identity_blocks";
+    case StepKind::multiply_blocks: return "multiply_blocks";
+    case StepKind::combine_blocks: return "combine_blocks";
+    case StepKind::transpose_blocks: return "transpose_blocks";
+    case StepKind::invert_blocks: return "invert_blocks";
+    case StepKind::root_blocks: return "root_blocks";
+    case StepKind::function_blocks: return "function_blocks";
+    case StepKind::congruence_blocks: return "congruence_blocks";
+    case StepKind::lyapunov_blocks: return "lyapunov_blocks";
+    case StepKind::factor: return "factor";
+    case StepKind::solve: return "solve";
+    case StepKind::selected_blocks: return "selected_blocks";
+    case StepKind::mass_matrix: return "mass_matrix";
+    case StepKind::mass_matrix_solve: return "mass_matrix_solve";
+    case StepKind::mass_matrix_dense: return "mass_matrix_dense";
+    case StepKind::dense_factor: return "dense_factor";
+    case StepKind::dense_solve: return "dense_solve";
+    case StepKind::blocks_of_dense: return "blocks_of_dense";
+    case StepKind::gather_blocks: return "gather_blocks";
+    case StepKind::diagonal_of_blocks: return "diagonal_of_blocks";
+    case StepKind::trace_of_blocks: return "trace_of_blocks";
+    case StepKind::logdet_of_blocks: return "logdet_of_blocks";
+    case StepKind::logdet_of_D: return "logdet_of_D";
+    case StepKind::logdet_of_factor: return "logdet_of_factor";
+    case StepKind::logdet_of_dense: return "logdet_of_dense";
+    case StepKind::norm_of_vector: return "norm_of_vector";
+    case StepKind::root_of_trace: return "root_of_trace";
+    case StepKind::combine_scalars: return "combine_scalars";
+  }
+  return "";
+}
+
 std::string explain(const Plan& plan) {
   static const char* tiers[] = {"values", "kernel", "sweep", "elimination", "dense"};
   static const char* requests[] = {"applied to a vector", "as a matrix", "its diagonal blocks", "its diagonal", "its trace", "its ln|det|", "its norm"};

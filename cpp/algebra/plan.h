@@ -57,6 +57,8 @@ enum class StepKind {
   root_of_trace,     // norm from tr(X*X)
   combine_scalars
 };
+constexpr int step_kinds = static_cast<int>(StepKind::combine_scalars) + 1;
+const char* step_kind_name(StepKind kind);
 
 enum class RegisterKind { vector, blocks, factor, dense, scalar };
 

@@ -238,6 +238,11 @@ void register_operators(py::module_& m) {
       .def_property_readonly("is_lower_triangular", [](const Expression& e) { return is_lower_triangular(e); }, "By blocks: φ* and ψ* are. Known by rule.")
       .def("explain", [](const Expression& e, const std::string& request) { return py::module_::import("pycraft.operators").attr("explain")(e, request); },
            py::arg("request") = "apply", "The plan as a table: steps, tiers, cost; shown when it is the last line of a cell.")
+      .def("algorithm", [](const Expression& e, const std::string& language, const std::string& request) {
+        return py::module_::import("pycraft.operators").attr("algorithm")(e, language, request);
+      }, py::arg("language") = "text", py::arg("request") = "apply",
+           "The plan written out as the textbook recursion: language \"text\", \"latex\", or \"python\" (NumPy alone) and \"cpp\" (Eigen alone),\n"
+           "source that runs by itself. See pycraft.algorithm.")
       .def("blocks", [](const Expression& e, const std::string& order) { return py::module_::import("pycraft.operators").attr("block_view")(e, order); },
            py::arg("order") = "base-to-tip", "A labelled block view of the dense form; order=\"tip-to-base\" shows the book's triangles.")
       .def("plan", [](const Expression& e, const std::string& request, bool rules) {

@@ -74,6 +74,9 @@ void register_scalars(py::module_& m) {
       .def("__ge__", [](const Scalar& a, double b) { return single(a) >= b; })
       .def("__eq__", [](const Scalar& a, const Scalar& b) { return a == b; })
       .def("__hash__", [](const Scalar& a) { return std::hash<std::string>()(show(a)); })
+      .def("algorithm", [](const Scalar& a, const std::string& language) {
+        return py::module_::import("pycraft.operators").attr("algorithm")(a, language);
+      }, py::arg("language") = "text", "The recursion that computes it: \"text\", \"latex\", \"python\" or \"cpp\". See pycraft.algorithm.")
       .def("text", [](const Scalar& a) { return show(a); })
       .def("latex", [](const Scalar& a) { return show(a, Style::latex); })
       .def("_repr_latex_", [](const Scalar& a) { return "$" + show(a, Style::latex) + "$"; })

@@ -1,0 +1,399 @@
+"""Recursions as a book writes them: in text with Unicode letters, and in LaTeX."""
+
+from __future__ import annotations
+
+import re
+
+from .formulas import (
+    Assembled,
+    At,
+    CompositeAssembly,
+    Cut,
+    DiagonalPart,
+    Elimination,
+    Equation,
+    Function,
+    HingeRow,
+    Identity,
+    Inverse,
+    InverseBlock,
+    Item,
+    Letter,
+    MadeDense,
+    Node,
+    Once,
+    Operator,
+    Part,
+    Product,
+    Quantity,
+    Selected,
+    Solution,
+    Sweep,
+    System,
+    SystemLogdet,
+    Term,
+    Transposed,
+    product,
+)
+
+_PLACES = {
+    "k": {"k": "k", "p": "p", "c": "c"},
+    "pk": {"k": "p,k", "c": "k,c"},
+    "kp": {"k": "k,p", "c": "c,k"},
+    "kk": {"k": "k,k", "p": "p,p", "c": "c,c"},
+    "kb": {"k": "k,b", "p": "p,b"},
+    "bk": {"k": "b,k", "p": "b,p"},
+    "bb": {"": "b,b"},
+}
+Line = tuple[int, str]  # depth, text
+
+
+def pass_words(direction: int) -> str:
+    """How a pass is announced."""
+    return {-1: "for k from tip to base:", 1: "for k from base to tip:", 0: "for every body k:"}[direction]
+
+
+def system_passes(system: System) -> list[Item]:
+    """Block elimination of T s = b, leaves to root, as equations; with the border b where there is one."""
+    L = _Local(system)
+    A, U, T, up, down = L("A", "k"), L("U", "k"), L("T", "kk"), L("T", "pk"), L("T", "kp")
+    up_child = At(up, "c")
+    passes: list[Item] = []
+    equations = [
+        Equation(A, (Term(At(T)), Term(product(up_child, At(U, "c")), -1.0, "c"))),
+        Equation(U, (Term(product(Inverse(At(A)), At(down))),)),
+    ]
+    if not system.border:
+        return [Sweep(system.tree, -1, equations)]
+    X, Y, right, below, S = L("X", "k"), L("Y", "k"), L("T", "kb"), L("T", "bk"), L("S", "")
+    equations += [
+        Equation(X, (Term(product(Inverse(At(A)), At(right))), Term(product(Inverse(At(A)), up_child, At(X, "c")), -1.0, "c"))),
+        Equation(Y, (Term(At(below)), Term(product(At(Y, "c"), At(U, "c")), -1.0, "c"))),
+    ]
+    passes.append(Sweep(system.tree, -1, equations))
+    corner = Term(At(L("T", "bb"), ""))
+    passes.append(Once(Equation(S, (corner, Term(product(At(Y), At(X)), -1.0, "bodies")))))
+    return passes
+
+
+def solution_passes(system: System) -> list[Item]:
+    """T s = b by the factors: leaves to root, root to leaves."""
+    L = _Local(system)
+    A, U, r, s, b, up = L("A", "k"), L("U", "k"), L("r", "k"), L("s", "k"), L("b", "k"), L("T", "pk")
+    carried = Term(product(At(up, "c"), Inverse(At(A, "c")), At(r, "c")), -1.0, "c")
+    own, parent = Term(product(Inverse(At(A)), At(r))), Term(product(At(U), At(s, "p")), -1.0, "p")
+    gather = Sweep(system.tree, -1, [Equation(r, (Term(At(b)), carried))])
+    if not system.border:
+        return [gather, Sweep(system.tree, 1, [Equation(s, (own, parent))])]
+    X, Y, S, edge, b_edge = L("X", "k"), L("Y", "k"), L("S", ""), L("s_b", ""), L("b_b", "")
+    rest = Term(product(Inverse(At(S, "")), At(Y), Inverse(At(A)), At(r)), -1.0, "bodies")
+    return [
+        gather,
+        Once(Equation(edge, (Term(product(Inverse(At(S, "")), At(b_edge, ""))), rest))),
+        Sweep(system.tree, 1, [Equation(s, (own, Term(product(At(X), At(edge, "")), -1.0), parent))]),
+    ]
+
+
+def selected_passes(item: Selected) -> list[Item]:
+    """The diagonal blocks of the inverse, base to tip."""
+    system = item.system
+    L = _Local(system)
+    A, U, N, Z, up = L("A", "k"), L("U", "k"), L("N", "k"), L("Z", "kk", number=item.quantity.number), L("T", "pk")
+    shifted = Equation(N, (Term(product(At(up), Inverse(At(A))), over="p"),))
+    own = [Term(Inverse(At(A))), Term(product(At(U), At(Z, "p"), At(N)), over="p")]
+    if not system.border:
+        return [Sweep(system.tree, 1, [shifted, Equation(Z, tuple(own))])]
+    X, Y, F, S = L("X", "k"), L("Y", "k"), L("F", "k"), L("S", "")
+    right, below = L("Z", "kb", number=item.quantity.number), L("Z", "bk", number=item.quantity.number)
+    corner = Inverse(At(S, ""))
+    equations = [
+        shifted,
+        Equation(F, (Term(product(At(U), At(right, "p")), over="p"), Term(product(At(X), corner)))),
+        Equation(
+            Z,
+            (
+                Term(Inverse(At(A))),
+                Term(product(At(U), At(Z, "p"), At(N)), over="p"),
+                Term(product(At(X), At(below, "p"), At(N)), over="p"),
+                Term(product(At(F), At(Y), Inverse(At(A)))),
+            ),
+        ),
+        Equation(right, (Term(At(F), -1.0),)),
+        Equation(below, (Term(product(At(below, "p"), At(N)), -1.0, "p"), Term(product(corner, At(Y), Inverse(At(A))), -1.0))),
+    ]
+    return [Sweep(system.tree, 1, equations)]
+
+
+class _Local:
+    """Letters of a system's blocks; one quantity per letter and way of writing."""
+
+    def __init__(self, system: System):
+        self._number = system.quantity.number
+        self._tree = system.tree
+
+    def __call__(self, name: str, indices: str, number: int | None = None) -> Quantity:
+        texts = {"s": ("σ", "\\sigma"), "s_b": ("σ_b", "\\sigma_{b}"), "b_b": ("b_b", "b_{b}")}
+        text, latex = texts.get(name, (name, name))
+        number = self._number if number is None else number
+        return Quantity(name, Letter(name, text, latex), number, "blocks" if indices else "matrix", self._tree, indices=indices or "k")
+
+
+# ---------------------------------------------------------------------- text
+class Text:
+    """Formulas and passes in Unicode."""
+
+    join, minus, child_sum, body_sum, quote = " ", "-", "Σ_c ", "Σ_k ", ""
+
+    # ------------------------------------------------------------------ letters
+    def letter(self, quantity: Quantity, marks: str = "") -> str:
+        """The letter with its number and marks: "+", "*", "-1"."""
+        letter = quantity.letter
+        base = letter.text
+        if quantity.number:
+            subscript = "".join("₀₁₂₃₄₅₆₇₈₉"[int(d)] for d in str(quantity.number))
+            base += subscript
+        base += "⁺" if letter.plus else ""
+        return base + marks.replace("-1", "⁻¹").replace("⁻¹*", "⁻*")
+
+    def place(self, quantity: Quantity, at: str) -> str:
+        """(k), (p,k), ...; nothing for the whole."""
+        where = _PLACES[quantity.indices].get(at, "")
+        return f"({where})" if where else ""
+
+    def number(self, x: float) -> str:
+        """A coefficient."""
+        return f"{x:.12g}"
+
+    # ------------------------------------------------------------------ formulas
+    def node(self, node: Node, marks: str = "") -> str:
+        """A formula; `marks` are the star and the inverse that stand behind it."""
+        if isinstance(node, Transposed):
+            return self.node(node.inner, marks + "*")
+        if isinstance(node, Inverse):
+            return self.node(node.inner, "-1" + marks)
+        if isinstance(node, At):
+            return self.letter(node.quantity, marks) + self.place(node.quantity, node.at)
+        if isinstance(node, Product):
+            if not node.factors:
+                return "1"
+            inner = self.join.join(self.node(factor) for factor in node.factors)
+            return self.marked(inner, marks) if marks else inner
+        plain = self.plain(node)
+        return self.marked(plain, marks) if marks else plain
+
+    def marked(self, inner: str, marks: str) -> str:
+        """(inner)*, (inner)⁻¹."""
+        return f"({inner})" + marks.replace("-1", "⁻¹")
+
+    def plain(self, node: Node) -> str:
+        """A formula that is no letter and no product."""
+        if isinstance(node, Identity):
+            return "I"
+        if isinstance(node, Function):
+            return self.function(node.name, self.node(node.inner))
+        if isinstance(node, HingeRow):
+            return self.hinge_row(node)
+        if isinstance(node, Part):
+            where = "(k,·)" if node.axis == 0 else "(·,k)"
+            return self.letter(node.quantity, "*" if node.transposed else "") + where
+        if isinstance(node, DiagonalPart):
+            return self.letter(node.quantity) + "(k,k)"
+        if isinstance(node, Assembled):
+            return self.function("blockdiag", self.letter(node.quantity))
+        if isinstance(node, SystemLogdet):
+            L = _Local(node.system)
+            pivots = self.body_sum + self.function("logdet", self.node(At(L("A", "k"))))
+            return pivots + (" + " + self.function("logdet", self.letter(L("S", ""))) if node.system.border else "")
+        if isinstance(node, InverseBlock):
+            return f"{self.letter(node.quantity)}(k,k)[s{node.state + 1}, b{node.equation + 1}]"
+        assert isinstance(node, MadeDense)
+        return self.letter(node.operator.quantity) + self.join + "I"
+
+    def hinge_row(self, node: HingeRow) -> str:
+        """Row j of H(k) as a column."""
+        return f"{self.letter(node.quantity)}*(k)[{node.row + 1}]"
+
+    def function(self, name: str, inner: str) -> str:
+        """A named function of a formula."""
+        shapes = {
+            "trace": "tr {}",
+            "logdet": "ln|det {}|",
+            "norm": "‖{}‖",
+            "square_root": "√{}",
+            "diagonal": "diag {}",
+            "root": "chol({})",
+            "blockdiag": "blockdiag {}",
+        }
+        return shapes.get(name, name + "({})").format(inner)
+
+    def terms(self, terms: tuple[Term, ...]) -> str:
+        """A sum; sums over children and bodies come last."""
+        text = ""
+        ordered = sorted(terms, key=lambda t: t.over in ("c", "bodies"))
+        for term in ordered:
+            size = abs(term.coefficient)
+            negative = term.coefficient < 0
+            text += (f" {self.minus} " if text else self.minus) if negative else (" + " if text else "")
+            text += {"c": self.child_sum, "bodies": self.body_sum}.get(term.over, "")
+            if term.node == Product(()):
+                text += self.number(size)
+            else:
+                text += (self.number(size) + self.join if size != 1 else "") + self.node(term.node)
+        return text or "0"
+
+    def equation(self, equation: Equation) -> str:
+        """target = sum."""
+        target = equation.target
+        at = "k" if target.kind == "blocks" else ""
+        only = [term.body for term in equation.terms if term.body is not None]
+        where = self.only_at(only[0]) if only else ""
+        return f"{self.letter(target)}{self.place(target, at)} = {self.terms(equation.terms)}{where}"
+
+    def only_at(self, body: int) -> str:
+        """Says that a block is there at one body alone."""
+        return f" for k = {body}, else 0"
+
+    # ------------------------------------------------------------------ passes
+    def items(self, items: list[Item]) -> list[Line]:
+        """The lines of a recursion."""
+        lines: list[Line] = []
+        for item in items:
+            lines += self.item(item)
+        return lines
+
+    def words(self, text: str) -> str:
+        """Words between formulas."""
+        return text
+
+    def item(self, item: Item) -> list[Line]:
+        """The lines of one pass."""
+        if isinstance(item, Sweep):
+            return [(0, self.words(pass_words(item.direction))), *((1, self.equation(e)) for e in item.equations)]
+        if isinstance(item, Once):
+            return [(0, self.whole(item.equation))]
+        if isinstance(item, Elimination):
+            return self.elimination(item.system)
+        if isinstance(item, Solution):
+            return self.solution(item)
+        if isinstance(item, Selected):
+            return [(0, self.words("diagonal blocks of the inverse")), *self.items(selected_passes(item))]
+        if isinstance(item, CompositeAssembly):
+            return self.composite(item)
+        return self.operator(item)
+
+    def whole(self, equation: Equation) -> str:
+        """An equation of the whole: blocks are written without (k)."""
+        return f"{self.letter(equation.target)} = {self.terms(equation.terms)}"
+
+    def elimination(self, system: System) -> list[Line]:
+        """The equations of a realization and their elimination."""
+        T, s, b = (self.letter(_Local(system)(name, "k")) for name in "Tsb")
+        lines = [(0, self.words("equations of the realization,") + f" {T}{self.join}{s} = {b}:")]
+        lines += [(1, self.relation(system, i)) for i in range(len(system.relations))]
+        lines.append((0, self.words("eliminated from the leaves to the root, T the blocks of these equations body by body")))
+        return lines + self.items(system_passes(system))
+
+    def relation(self, system: System, i: int) -> str:
+        """Equation i of a realization."""
+        terms = []
+        for term, j in system.relations[i]:
+            state = system.states[j]
+            at = {"c": "c", "p": "p"}.get(term.over, "k") if state.kind == "blocks" else ""
+            terms.append(Term(product(term.node, At(state, at)), term.coefficient, term.over))
+        return f"{self.terms(tuple(terms))} = {self.input_side(system, i)}"
+
+    def input_equation(self, item: Solution, i: int) -> str:
+        """The right-hand side of equation i."""
+        return f"{self.input_side(item.system, i)} = {self.terms(item.inputs[i])}"
+
+    def input_side(self, system: System, i: int) -> str:
+        """b_i(k)."""
+        cut = system.cuts[i]
+        return self.subscripted("b", i + 1) + ("(k)" if isinstance(cut, Cut) else "")
+
+    def subscripted(self, name: str, i: int) -> str:
+        """b₁."""
+        return name + "".join("₀₁₂₃₄₅₆₇₈₉"[int(d)] for d in str(i))
+
+    def solution(self, item: Solution) -> list[Line]:
+        """One solve with the factors."""
+        lines = [(0, self.words("solved for"))]
+        lines += [(1, self.input_equation(item, i)) for i, terms in enumerate(item.inputs) if terms]
+        return lines + self.items(solution_passes(item.system))
+
+    def composite(self, item: CompositeAssembly) -> list[Line]:
+        """The composite-body assembly of ℳ."""
+        f, H, R, E = "f", self.letter(item.H), self.letter(item.R), self.letter(item.E)
+        A, j = self.letter(item.target), self.join
+        own = f" + {self.letter(item.J)}(k)" if item.J else ""
+        return [
+            (0, self.words("for every body k:")),
+            (1, f"{f} = {R}(k){j}{self.letter(item.H, '*')}(k)"),
+            (1, f"{A}(k,k) = {H}(k){j}{f}{own}"),
+            (1, self.words("for c = k and then its ancestors, p the parent of c:")),
+            (2, f"{f} = {E}(p,c){j}{f}"),
+            (2, f"{A}(p,k) = {H}(p){j}{f}, {self.letter(item.target, '*')}(p,k) = {A}(k,p)"),
+        ]
+
+    def operator(self, item: Operator) -> list[Line]:
+        """A recursion inside a recursion."""
+        x = item.program.inputs[0]
+        title = f"{self.letter(item.program.result)} = {self.letter(item.quantity)}{self.join}{self.letter(x)}"
+        lines = [(0, self.words("column by column,") + f" {title}:")]
+        return lines + [(depth + 1, line) for depth, line in self.items(item.program.items)]
+
+
+# ---------------------------------------------------------------------- LaTeX
+class Latex(Text):
+    """The same in LaTeX."""
+
+    join, child_sum, body_sum = "\\,", "\\sum_{c} ", "\\sum_{k} "
+
+    def letter(self, quantity: Quantity, marks: str = "") -> str:
+        letter = quantity.letter
+        base = letter.latex
+        if quantity.number or marks or letter.plus:
+            base = "{" + base + "}" if "_" in base or "^" in base else base
+        if quantity.number:
+            base += f"_{{{quantity.number}}}"
+        upper = ("+" if letter.plus else "") + marks
+        return base + (f"^{{{upper}}}" if upper else "")
+
+    def marked(self, inner: str, marks: str) -> str:
+        return f"\\left({inner}\\right)^{{{marks}}}"
+
+    def number(self, x: float) -> str:
+        mantissa, _, exponent = f"{x:.12g}".partition("e")
+        return f"{mantissa}\\cdot 10^{{{int(exponent)}}}" if exponent else mantissa
+
+    def plain(self, node: Node) -> str:
+        if isinstance(node, Part):
+            where = "(k,\\cdot)" if node.axis == 0 else "(\\cdot,k)"
+            return self.letter(node.quantity, "*" if node.transposed else "") + where
+        if isinstance(node, InverseBlock):
+            return f"{self.letter(node.quantity)}(k,k)_{{s_{{{node.state + 1}}},\\,b_{{{node.equation + 1}}}}}"
+        return super().plain(node)
+
+    def hinge_row(self, node: HingeRow) -> str:
+        return f"{self.letter(node.quantity, '*')}_{{{node.row + 1}}}(k)"
+
+    def function(self, name: str, inner: str) -> str:
+        shapes = {
+            "trace": "\\operatorname{{tr}} {}",
+            "logdet": "\\ln\\left|\\det {}\\right|",
+            "norm": "\\left\\Vert {} \\right\\Vert",
+            "square_root": "\\sqrt{{{}}}",
+            "diagonal": "\\operatorname{{diag}} {}",
+            "root": "\\operatorname{{chol}}\\left({}\\right)",
+            "blockdiag": "\\operatorname{{blockdiag}} {}",
+        }
+        return shapes.get(name, "\\operatorname{{" + name.replace("_", "\\_") + "}}\\left({}\\right)").format(inner)
+
+    def only_at(self, body: int) -> str:
+        return f"\\text{{ for }} k = {body}\\text{{, else }} 0"
+
+    def subscripted(self, name: str, i: int) -> str:
+        return f"{name}_{{{i}}}"
+
+    def words(self, text: str) -> str:
+        return "\\text{" + re.sub(r"\b([kcpT])\b", r"$\1$", text) + " }"
