@@ -1,5 +1,5 @@
-"""True identities outside the catalogue: a random sum of words in which axioms and lemmas are applied at random places in random directions,
-written as two expressions with random brackets, transposes and inverses around them. Each is true by construction.
+"""True identities outside the catalogue: a random sum of words in which axioms and lemmas are applied at random places in random
+directions, written as two expressions with random brackets, transposes and inverses around them. Each is true by construction.
 """
 
 import functools
@@ -122,7 +122,8 @@ def identity_pair(rng, soa, hypotheses=()):
     """(lhs, rhs): two expressions that are equal under the hypotheses."""
     rules = rewrites(hypotheses)
     kind = rng.random()
-    codomain, domain = ("Θ", "Θ") if kind < 0.2 else [("F", "F"), ("F", "V"), ("Θ", "F"), ("F", "Θ"), ("V", "F"), ("Θ", "Θ")][rng.integers(6)]
+    ends = [("F", "F"), ("F", "V"), ("Θ", "F"), ("F", "Θ"), ("V", "F"), ("Θ", "Θ")]
+    codomain, domain = ends[-1] if kind < 0.2 else ends[rng.integers(6)]
     p = {}
     for _ in range(rng.integers(1, 4)):
         add_to(p, random_word(rng, codomain, domain, rng.integers(1, 6)), COEFFICIENTS[rng.integers(len(COEFFICIENTS))])

@@ -271,8 +271,8 @@ def mutations(text):
         yield f"{lhs} = {rhs.replace('+', '−', 1)}"
     tokens = rhs.split(" ")
     for i, token in enumerate(tokens):
-        exchanged = {"G": "K", "K": "G", "P": "R", "R": "P", "E_φ": "E_ψ", "E_ψ": "E_φ", "E_φ*": "E_ψ*", "E_ψ*": "E_φ*", "ψ": "φ", "τ": "τ̄"}
-        if token in exchanged and {token, exchanged[token]} != {"τ", "τ̄"}:
+        exchanged = {"G": "K", "K": "G", "P": "R", "R": "P", "E_φ": "E_ψ", "E_ψ": "E_φ", "E_φ*": "E_ψ*", "E_ψ*": "E_φ*", "ψ": "φ"}
+        if token in exchanged:
             yield f"{lhs} = {' '.join([*tokens[:i], exchanged[token], *tokens[i + 1 :]])}"
 
 

@@ -53,7 +53,7 @@ class Attempt(LocalRules):
         return at if at.closed else first
 
     def _turned(self, p: Polynomial, like: Polynomial | None = None) -> list[Step]:
-        """Words that are numbers transposed: where the transpose stands in `like`, or, without it, to the one of the two that comes first."""
+        """Words that are numbers transposed: where the transpose stands in `like`; without it, to what comes first of the two."""
         a = self.alphabet
         out: Polynomial = {}
         uses = []

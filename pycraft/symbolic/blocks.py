@@ -8,7 +8,6 @@ these are all that moves.
 
 from __future__ import annotations
 
-
 from .words import ONE, Alphabet, Letter, Polynomial, Word, add_to, plain, split
 
 _STEPS = {"E_φ", "E_ψ", "K"}

@@ -17,7 +17,23 @@ from .. import _core
 from .axioms import INVERTIBLE
 from .equations import Equation, Step, symmetries
 from .rules import WORDS, GaveUp
-from .words import FURTHER, ONE, Alphabet, Letter, Number, Polynomial, combine, inverse_of, monomial, parse, plain, ratio, shape_of, sko_letters, times
+from .words import (
+    FURTHER,
+    ONE,
+    Alphabet,
+    Letter,
+    Number,
+    Polynomial,
+    combine,
+    inverse_of,
+    monomial,
+    parse,
+    plain,
+    ratio,
+    shape_of,
+    sko_letters,
+    times,
+)
 
 UNFOLDED = {"Jacobian": "𝒥 = B* φ* H*", "Lambda": "Λ = (B* Ω B)⁻¹"}
 """Symbols that are written out at once."""

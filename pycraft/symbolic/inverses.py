@@ -74,6 +74,7 @@ class LocalRules:
         self.presupposed = {n for n in named if plain(n) not in _ALWAYS}
         for equation, word in extra:
             self.add(equation, word)
+        self.inverted = {inverse_of(n) for n in named}
         for name in named:
             if name not in theory().alphabet.letters:
                 self._add_pairs(name)
@@ -265,16 +266,38 @@ class LocalRules:
         ((word, c),) = form.items()
         if all(plain(x) in _ALWAYS for x in word):
             self.presupposed.discard(L)
+        letters = {x for p in self.problem.polynomials() for w in p for x in w}
         Y = inverse_of(L)
-        if any(Y in w or a.star(Y) in w for p in self.problem.polynomials() for w in p):
-            scale = ratio(1, c)
-            chain = [step.reversed().between((Y,), (), scale) for step in reversed(steps)]
-            inner = {w: x * scale for w, x in framed((Y,), o.inner, ()).items()}
-            whole = monomial(Y, L, star, c=scale)
-            chain.append(Step(inner, whole, [Use(-scale, (Y,), square, (), (), False)], a))
-            chain.append(Step(whole, monomial(star, c=scale), [Use(scale, (), self.pair(Y, L), (star,), (Y, L))], a))
-            lhs, rhs = monomial(Y, *word), monomial(star, c=scale)
-            self.add(Equation("lemma", f"{a.text(lhs)} = {a.text(rhs)}", lhs, rhs, steps=numbered(chain)), (Y, *word))
+        if Y in letters or a.star(Y) in letters:
+            self._root_inverted(Y, L, word, c, square, steps)
+        if len(word) == 1 and inverse_of(word[0]) in letters:
+            self._root_meets_inverse(Y, L, word[0], c, square, steps)
+
+    def _root_inverted(self, Y: str, L: str, word: Word, c: Number, square: Equation, steps: list[Step]) -> None:
+        """L⁻¹A = L*, Y being L⁻¹ and c times the word A."""
+        a, scale, star = self.alphabet, ratio(1, c), self.alphabet.star(L)
+        chain = [step.reversed().between((Y,), (), scale) for step in reversed(steps)]
+        inner = {w: x * scale for w, x in framed((Y,), square.rhs, ()).items()}
+        whole = monomial(Y, L, star, c=scale)
+        chain.append(Step(inner, whole, [Use(-scale, (Y,), square, (), (), False)], a))
+        chain.append(Step(whole, monomial(star, c=scale), [Use(scale, (), self.pair(Y, L), (star,), (Y, L))], a))
+        lhs, rhs = monomial(Y, *word), monomial(star, c=scale)
+        self.add(Equation("lemma", f"{a.text(lhs)} = {a.text(rhs)}", lhs, rhs, steps=numbered(chain)), (Y, *word))
+
+    def _root_meets_inverse(self, Y: str, L: str, x: str, c: Number, square: Equation, steps: list[Step]) -> None:
+        """L*x⁻¹ = c L⁻¹, Y being L⁻¹ and c times the letter x A."""
+        a, star, inverse = self.alphabet, self.alphabet.star(L), inverse_of(x)
+        lhs, whole, rhs = monomial(star, inverse), monomial(Y, L, star, inverse), monomial(Y, c=c)
+        inner = framed((Y,), square.rhs, (inverse,))
+        chain = [
+            Step(lhs, whole, [Use(-ONE, (), self.pair(Y, L), (star, inverse), (), False)], a),
+            Step(whole, inner, [Use(ONE, (Y,), square, (inverse,), (L, star))], a),
+            *(step.between((Y,), (inverse,)) for step in steps),
+            Step(monomial(Y, x, inverse, c=c), rhs, [Use(c, (Y,), self.pair(x, inverse), (), (x, inverse))], a),
+        ]
+        self.add(Equation("lemma", f"{a.text(lhs)} = {a.text(rhs)}", lhs, rhs, steps=numbered(chain)), (star, inverse))
+        if Y not in self.inverted:
+            self._add_pairs(L)
 
 
 def _scaled(p: Polynomial) -> tuple[tuple, Number]:

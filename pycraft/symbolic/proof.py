@@ -162,8 +162,8 @@ class Proof:
         Returns
         -------
         float
-            The worst residual, relative to the largest term of its step; every `step.residual` is set. Steps that use a hypothesis which the
-            model does not meet have large ones, and `unmet` names it.
+            The worst residual, relative to the largest term of its step; every `step.residual` is set. Steps that use a hypothesis which
+            the model does not meet have large ones, and `unmet` names it.
 
         Raises
         ------

@@ -7,7 +7,7 @@ abbreviations, then the recursions.
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
 
@@ -83,16 +83,17 @@ _WEIGHTS = {
     **{"D": 0, "J": 0, "K": 1, "H": 1, "G": 2, "P": 3, "R": 3, "M": 5, "E_φ": 3, "φ": 1, "ψ": 1, "Υ": 3, "S": 22},
     **{"φ̃": 9, "ψ̃": 9, "τ": 9, "τ̄": 9, "P⁺": 19, "E_ψ": 9, "Ω": 19, "V": 9, "a": 19, "b": 29},
 }
+_HEAVY = {"∂": 40, "‹": 30}
 _INVERSE_WEIGHTS = {"D": 0, "φ": 9, "ψ": 19}
 
 
 @cache
 def letter_weight(letter: str) -> int:
-    """What a letter weighs. Derivatives are heavy: the rules write them by Δ."""
+    """What a letter weighs. Derivatives are heavy: the rules write them by Δ; so is what only the statement knows, a user's constant."""
     name = plain(letter)
-    if inverted(letter):
-        return _INVERSE_WEIGHTS.get(name, 1)
-    return _WEIGHTS.get(name, 40 if name.startswith("∂") else 1)
+    if name[0] in _HEAVY:
+        return _HEAVY[name[0]]
+    return (_INVERSE_WEIGHTS if inverted(letter) else _WEIGHTS).get(name, 1)
 
 
 def weight(word: Word) -> tuple[int, int, Word]:
@@ -132,16 +133,21 @@ class GaveUp(Exception):
 
 @dataclass
 class Rules:
-    """Rules by the first letter of the word that they replace."""
+    """Rules by the first letter of the word that they replace, in all and by group."""
 
     by_first: dict[str, list[Rule]] = field(default_factory=dict)
+    _groups: dict[int, dict[str, list[Rule]]] = field(default_factory=dict)
     _best: dict[Word, int | None] = field(default_factory=dict)
 
     def copy(self) -> Rules:
-        return Rules({k: list(v) for k, v in self.by_first.items()})
+        copied = Rules()
+        for rule in self.all():
+            copied.add(rule)
+        return copied
 
     def add(self, rule: Rule) -> None:
         self.by_first.setdefault(rule.word[0], []).append(rule)
+        self._groups.setdefault(rule.group, {}).setdefault(rule.word[0], []).append(rule)
         self._best.clear()
 
     def add_equation(self, equation: Equation, word: Word, alphabet: Alphabet, group: int) -> None:
@@ -155,19 +161,12 @@ class Rules:
     def all(self) -> list[Rule]:
         return [rule for rules in self.by_first.values() for rule in rules]
 
-    def _fitting(self, word: Word) -> Iterable[tuple[int, Rule]]:
-        """(place, rule), leftmost first."""
-        for place, letter in enumerate(word):
-            for rule in self.by_first.get(letter, ()):
-                if word[place : place + len(rule.word)] == rule.word:
-                    yield place, rule
-
     def best(self, word: Word) -> int | None:
         """The first group in rank that fits anywhere."""
         if word not in self._best:
             if len(self._best) > 50000:
                 self._best.clear()
-            self._best[word] = min((rule.group for _, rule in self._fitting(word)), default=None)
+            self._best[word] = min((rule.group for _, rule in _fitting(word, self.by_first)), default=None)
         return self._best[word]
 
     def reduce(self, p: Polynomial, alphabet: Alphabet, budget: Budget | None = None) -> tuple[Polynomial, list[Step]]:
@@ -207,13 +206,14 @@ class Rules:
         """One equation, at every place in these words."""
         done: Polynomial = {}
         uses: list[Use] = []
+        rules = self._groups[group]
         for start, x in p.items():
             todo = [(start, x)]
             if start not in where:
                 add_to(done, *todo.pop())
             while todo:
                 word, c = todo.pop()
-                found = next(((place, rule) for place, rule in self._fitting(word) if rule.group == group), None)
+                found = next(_fitting(word, rules), None)
                 if found is None:
                     add_to(done, word, c)
                     continue
@@ -225,6 +225,14 @@ class Rules:
                 if budget.rewrites < 0 or len(todo) + len(done) > WORDS:
                     raise GaveUp
         return Step(p, done, uses, alphabet)
+
+
+def _fitting(word: Word, rules: dict[str, list[Rule]]) -> Iterator[tuple[int, Rule]]:
+    """(place, rule) of what fits, leftmost first."""
+    for place, letter in enumerate(word):
+        for rule in rules.get(letter, ()):
+            if word[place : place + len(rule.word)] == rule.word:
+                yield place, rule
 
 
 def normal_form(p: Polynomial, rules: Rules, alphabet: Alphabet) -> Polynomial:

@@ -227,7 +227,7 @@ def _sko() -> dict[str, Letter]:
 def _sum(terms: Iterable[tuple[Number, str]], minus: str, space: str) -> str:
     text = ""
     for c, word in terms:
-        size = "" if abs(c) == 1 else number(abs(c)) + space
+        size = "" if c in (1, -1) else number(c if c > 0 else -c) + space
         sign = f" {minus} " if c < 0 else " + "
         text += (sign if text else minus if c < 0 else "") + size + word
     return text or "0"

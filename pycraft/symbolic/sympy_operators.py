@@ -1,0 +1,259 @@
+r"""Operators as SymPy matrix expressions: the classes that the bridge (`sympy_bridge`) makes.
+
+A letter is an `OperatorSymbol`, a SymPy `MatrixSymbol` that prints as the book does; sums, products, inverses and powers are SymPy's own
+`MatAdd`, `MatMul`, `Inverse`, `MatPow`, so `expand`, `doit`, `subs`, `.T` and the printers work on them. The star is `Star`, a
+`Transpose` printed \(A^*\). Spaces become symbolic dimensions; a space and its dual share one, so that transposes fit.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+from typing import Any
+
+import sympy
+from sympy.core.symbol import Str
+from sympy.matrices.expressions import Identity, MatrixExpr, MatrixSymbol, Transpose, ZeroMatrix
+from sympy.printing.precedence import PRECEDENCE
+from sympy.printing.pretty.stringpict import prettyForm
+
+from .. import _core
+
+# What only exists in this process: constants, vectors, letters bound to a state, by the token in the symbol's arguments.
+_KEPT: dict[str, _core.Operator] = {}
+_TOKENS = itertools.count(1)
+
+
+def _shaped(cls: type, *args: Any) -> Any:
+    return sympy.Basic.__new__(cls, *(Str(a) if isinstance(a, str) else sympy.sympify(a) for a in args))
+
+
+class OperatorSymbol(MatrixSymbol):
+    """A letter, vector or constant. `.operator(operators)` is the pycraft operator: letters by name, the others as they were given."""
+
+    def __new__(cls, name: Any, rows: Any, columns: Any, token: Any = "", latex: Any = "", text: Any = "") -> OperatorSymbol:
+        return _shaped(cls, *(str(x) if isinstance(x, Str) else x for x in (name, rows, columns, token, latex, text)))
+
+    @property
+    def token(self) -> str:
+        return self.args[3].name
+
+    def operator(self, operators: Any) -> _core.Operator:
+        """The operator of the set `operators` (or what was kept) that this symbol stands for."""
+        said = json.loads(self.token) if self.token else {"name": self.name}
+        if "kept" in said:
+            if self.token not in _KEPT:
+                raise _core.EvaluationError(
+                    f"{self.name} was made in another process: a constant or vector is known only where it was made"
+                )
+            return _KEPT[self.token]
+        if said.get("numbers") or said.get("nodes"):
+            return operators._source._symbol_again(said["name"], said["numbers"], said["nodes"], said["text"])
+        return operators._source._symbol_again(said["name"], [], [], "")
+
+    def _eval_transpose(self) -> Star:
+        return Star(self)
+
+    def _latex(self, printer: Any) -> str:
+        return self.args[4].name or printer._print_MatrixSymbol(self)
+
+    def _pretty(self, printer: Any) -> prettyForm:
+        return prettyForm(self.args[5].name or self.name)
+
+    def _sympystr(self, printer: Any) -> str:
+        return self.name
+
+    _sympyrepr = _sympystr
+
+
+def symbol_of(e: _core.Operator, name: str, rows: Any, columns: Any) -> OperatorSymbol:
+    """The symbol of a leaf: a letter that can be found again by name, or an operator that is kept."""
+    kind, payload = e.kind, e._parts()[1] if e.kind == "symbol" else None
+    if kind == "symbol" and payload[-1] is None:  # not bound to a state
+        _, letter, numbers, nodes, text, _ = payload
+        token = json.dumps({"name": letter, "numbers": list(numbers), "nodes": list(nodes), "text": text})
+    else:
+        token = next((t for t, kept in _KEPT.items() if kept is e or type(kept) is type(e) and kept == e), "")
+        if not token:
+            token = json.dumps({"kept": next(_TOKENS)})
+            _KEPT[token] = e
+    return OperatorSymbol(name, rows, columns, token, e.latex(), e.text())
+
+
+class Star(Transpose):
+    """The book's transpose: printed with a star."""
+
+    def _latex(self, printer: Any) -> str:
+        inside = printer.parenthesize(self.arg, PRECEDENCE["Pow"])
+        return rf"\left({inside}\right)^{{*}}" if "^" in inside and not inside.startswith(r"\left(") else f"{{{inside}}}^{{*}}"
+
+    def _pretty(self, printer: Any) -> prettyForm:
+        inside = printer._print(self.arg)
+        return prettyForm(*inside.parens() if self.arg.args and not isinstance(self.arg, OperatorSymbol) else inside) ** prettyForm("*")
+
+
+class Unit(Identity):
+    """I: of a space that is said ("F", ...), or of the one that fits."""
+
+    def __new__(cls, dimension: Any, token: Any = "") -> Unit:
+        return _shaped(cls, dimension, str(token))
+
+    @property
+    def token(self) -> str:
+        return self.args[1].name
+
+    def _eval_transpose(self) -> Unit:
+        return self
+
+    def _latex(self, printer: Any) -> str:
+        return "I"
+
+    def _pretty(self, printer: Any) -> prettyForm:
+        return prettyForm("I")
+
+    def _sympystr(self, printer: Any) -> str:
+        return "I"
+
+
+class Zero(ZeroMatrix):
+    """A zero operator with its spaces."""
+
+    def __new__(cls, rows: Any, columns: Any, token: Any = "") -> Zero:
+        return _shaped(cls, rows, columns, str(token))
+
+    @property
+    def token(self) -> str:
+        return self.args[2].name
+
+    def _latex(self, printer: Any) -> str:
+        return "0"
+
+
+def keep(e: _core.Operator) -> str:
+    """A token by which an operator is found again in this process."""
+    token = json.dumps({"kept": next(_TOKENS)})
+    _KEPT[token] = e
+    return token
+
+
+def kept(token: str) -> _core.Operator | None:
+    return _KEPT.get(token)
+
+
+class _Function(MatrixExpr):
+    """A function of an operator, of the shape of its argument."""
+
+    def __new__(cls, arg: Any) -> Any:
+        return _shaped(cls, arg)
+
+    @property
+    def arg(self) -> Any:
+        return self.args[0]
+
+    @property
+    def shape(self) -> Any:
+        return self.arg.shape
+
+    def _entry(self, i: Any, j: Any, **kwargs: Any) -> Any:
+        return sympy.MatrixElement(self, i, j)
+
+    def _written(self, printer: Any) -> str:
+        return printer._print(self.arg)
+
+
+class BlockDiagonal(_Function):
+    """The diagonal blocks of an operator, body by body."""
+
+    def _eval_transpose(self) -> BlockDiagonal:
+        return BlockDiagonal(sympy.transpose(self.arg))
+
+    def _latex(self, printer: Any) -> str:
+        return rf"\operatorname{{blockdiag}}\left({self._written(printer)}\right)"
+
+    def _sympystr(self, printer: Any) -> str:
+        return f"blockdiag({self._written(printer)})"
+
+
+class Root(_Function):
+    """L with A = LL*, body by body."""
+
+    def _eval_transpose(self) -> Star:
+        return Star(self)
+
+    def _latex(self, printer: Any) -> str:
+        inside = self._written(printer)
+        return f"{{{inside}}}^{{1/2}}" if isinstance(self.arg, OperatorSymbol) and "^" not in inside else rf"\left({inside}\right)^{{1/2}}"
+
+    def _sympystr(self, printer: Any) -> str:
+        return f"sqrt({self._written(printer)})"
+
+
+class BlockFunction(MatrixExpr):
+    """A function that derivatives bring up: crm, crf, mcross of a vector, the lower half of a block-diagonal operator."""
+
+    def __new__(cls, name: Any, arg: Any, dimension: Any, token: Any = "") -> Any:
+        return _shaped(cls, str(name), arg, dimension, str(token))
+
+    @property
+    def arg(self) -> Any:
+        return self.args[1]
+
+    @property
+    def token(self) -> str:
+        return self.args[3].name
+
+    @property
+    def shape(self) -> Any:
+        return self.args[2], self.args[2]
+
+    def _eval_transpose(self) -> Star:
+        return Star(self)
+
+    def _entry(self, i: Any, j: Any, **kwargs: Any) -> Any:
+        return sympy.MatrixElement(self, i, j)
+
+    def _latex(self, printer: Any) -> str:
+        name = self.args[0].name
+        shown = r"\operatorname{lower}_{1/2}" if name == "lower_half" else rf"\operatorname{{{name}}}"
+        return rf"{shown}\left({printer._print(self.arg)}\right)"
+
+    def _sympystr(self, printer: Any) -> str:
+        return f"{self.args[0].name}({printer._print(self.arg)})"
+
+
+class _Reduction(sympy.Expr):
+    """A number that an operator has."""
+
+    is_commutative = True
+    is_real = True
+
+    def __new__(cls, arg: Any) -> Any:
+        return _shaped(cls, arg)
+
+    @property
+    def arg(self) -> Any:
+        return self.args[0]
+
+    def _sympystr(self, printer: Any) -> str:
+        return f"{type(self).__name__}({printer._print(self.arg)})"
+
+
+class Tr(_Reduction):
+    """The trace."""
+
+    def _latex(self, printer: Any) -> str:
+        return rf"\operatorname{{tr}}\left({printer._print(self.arg)}\right)"
+
+
+class LogDet(_Reduction):
+    """ln|det A|."""
+
+    def _latex(self, printer: Any) -> str:
+        return rf"\ln\det\left({printer._print(self.arg)}\right)"
+
+
+class Norm(_Reduction):
+    """The Frobenius norm."""
+
+    def _latex(self, printer: Any) -> str:
+        return rf"\left\Vert{{{printer._print(self.arg)}}}\right\Vert"

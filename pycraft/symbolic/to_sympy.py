@@ -1,0 +1,94 @@
+"""From operator expressions to SymPy: one rule per kind of node."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import sympy
+from sympy.matrices.expressions import Inverse, MatAdd, MatMul
+
+from .. import _core
+from .sympy_operators import BlockDiagonal, BlockFunction, LogDet, Norm, Root, Star, Tr, Unit, Zero, keep, symbol_of
+
+_SCALARS = ("number", "trace", "logdet", "norm", "sum", "scaled")
+# A space and its dual have one dimension: names by the space.
+_DIMENSIONS = {"Θ": "N", "V": "n", "F": "n", "W": "n"}
+
+
+def number(x: float) -> sympy.Expr:
+    """A double as the shortest exact number: whole, a fraction with a denominator up to 1000, or a Float of 53 bits."""
+    near = Fraction(x).limit_denominator(1000)
+    if float(near) == x:
+        return sympy.Rational(near.numerator, near.denominator)
+    return sympy.Float(x, precision=53)
+
+
+def dimension(space: _core.Space | None) -> sympy.Expr:
+    """The symbol for a space's dimension; numbers stay numbers for a user's own R^n."""
+    if space is None:
+        return sympy.Symbol("d", integer=True, positive=True)
+    name = space.name
+    if name in _DIMENSIONS:
+        return sympy.Symbol(_DIMENSIONS[name], integer=True, positive=True)
+    if name.startswith("Nodes"):
+        return sympy.Symbol("n" + name[len("NodesV") :], integer=True, positive=True)
+    return sympy.Integer(space.dimension)
+
+
+def operator(e: _core.Operator) -> Any:
+    """The matrix expression of an operator expression."""
+    return _of(e, dimension(e.domain))
+
+
+def _of(e: _core.Operator, fits: sympy.Expr) -> Any:
+    """`fits`: the dimension that an I without a space has here."""
+    kind, children = e.kind, e.children
+    if kind in ("symbol", "vector", "constant", "external"):
+        name = e.name if kind == "vector" else e.text() if kind in ("constant", "external") else _ascii(e)
+        return symbol_of(e, name, dimension(e.codomain), dimension(e.domain))
+    if kind == "identity":
+        return Unit(fits) if e.domain is None else Unit(dimension(e.domain), keep(e))
+    if kind == "zero":
+        return Zero(dimension(e.codomain), dimension(e.domain), keep(e))
+    if kind == "sum":
+        return MatAdd(*(_of(c, fits) for c in children))
+    if kind == "product":
+        made: list[Any] = []
+        for child in reversed(children):  # from the right: what an I stands before says its space
+            if child.domain is not None:
+                made.insert(0, _of(child, dimension(child.domain)))
+                fits = dimension(child.codomain)
+            else:
+                made.insert(0, _of(child, fits))
+        return MatMul(*made)
+    if kind == "scaled":
+        return MatMul(number(e.coefficient), _of(children[0], fits))
+    if kind == "function":
+        payload = e._parts()[1]
+        name = "lower_half" if payload is None else payload[1]
+        token = keep(e) if payload is not None and payload[-1] is not None else ""
+        return BlockFunction(name, _of(children[0], dimension(children[0].domain)), dimension(e.domain), token)
+    rules = {"transpose": Star, "inverse": Inverse, "blockdiag": BlockDiagonal, "sqrt": Root}
+    if kind not in rules:
+        raise _core.EvaluationError(f"{e.text()}: an expression of kind {kind!r} has no SymPy form")
+    return rules[kind](_of(children[0], fits))
+
+
+def _ascii(e: _core.Operator) -> str:
+    """A letter's name with its arguments: B(tool)."""
+    _, name, numbers, nodes, text, _ = e._parts()[1]
+    return f"{name}({text})" if numbers or nodes else name
+
+
+def scalar(s: _core.Scalar) -> Any:
+    """The SymPy expression of a scalar expression, sums and multiples unevaluated."""
+    kind, value, operand, terms = s._parts()
+    name = _SCALARS[kind]
+    if name == "number":
+        return number(value)
+    if name == "sum":
+        return sympy.Add(*(scalar(t) for t in terms), evaluate=False)
+    if name == "scaled":
+        return sympy.Mul(number(value), scalar(terms[0]), evaluate=False)
+    return {"trace": Tr, "logdet": LogDet, "norm": Norm}[name](operator(operand))
