@@ -290,10 +290,10 @@ class Operator:
         """
         The diagonal entries (n,), or (B, n). Cost O(N).
         """
-    def diff(self, *args, frame: str = 'body') -> Operator:
+    def diff(self, *args, frame: str = 'body') -> typing.Any:
         """
         The derivative along a coordinate (its name or number), along a parameter (body.symbol("mass"), hinge.symbol("axis", 0), ...), or
-        along several in turn: diff(i, j) is ∂_j(∂_i ·). An expression again, by rule, evaluated by sweeps; zero by structure is the zero
+        along several in turn: diff(i, j) is ∂_j(∂_i ·), and diff([i, j]) the list of both. An expression again, by rule, evaluated by sweeps; zero by structure is the zero
         operator. On ball and free hinges coordinates are quasi-velocities, along which derivatives do not commute.
         frame="world": of the operator as resolved in world axes, given in body axes; spaces and shape are the operator's own.
         """
@@ -474,7 +474,7 @@ class Scalar:
         ...
     def bound(self, arg0: Binding) -> Scalar:
         ...
-    def diff(self, *args, frame: str = 'body') -> Scalar:
+    def diff(self, *args, frame: str = 'body') -> typing.Any:
         """
         The derivative along a coordinate or a parameter, as a scalar expression.
         """
@@ -616,19 +616,19 @@ class Sensitivities:
         ...
     def dynamics(self, forward: bool, q: typing.Any, v: typing.Any, vdot: typing.Any, precision: str) -> tuple:
         ...
+    def hamiltonian(self, q: typing.Any, p: typing.Any, tau: typing.Any, precision: str) -> tuple:
+        ...
     def inertial_regressor(self, q: typing.Any, v: typing.Any, vdot: typing.Any, precision: str) -> numpy.typing.NDArray[numpy.float64]:
         ...
     def jacobian_derivative(self, frame: str, q: typing.Any, precision: str) -> numpy.typing.NDArray[numpy.float64]:
         ...
     def jacobian_rate(self, frame: str, q: typing.Any, v: typing.Any, precision: str) -> numpy.typing.NDArray[numpy.float64]:
         ...
-    def kinetic_energy(self, q: typing.Any, v: typing.Any, precision: str) -> numpy.typing.NDArray[numpy.float64]:
+    def kinetic_energy(self, q: typing.Any, v: typing.Any, precision: str) -> tuple:
         ...
     def log_determinant(self, over: str, q: typing.Any, precision: str) -> numpy.typing.NDArray[numpy.float64]:
         ...
     def momentum(self, q: typing.Any, v: typing.Any, precision: str) -> tuple:
-        ...
-    def momentum_rate(self, q: typing.Any, v: typing.Any, tau: typing.Any, precision: str) -> numpy.typing.NDArray[numpy.float64]:
         ...
     def third_order(self, christoffel: bool, q: typing.Any, precision: str, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
         ...

@@ -235,6 +235,7 @@ def test_what_is_zero_by_structure_is_the_zero_operator():
     assert MM.diff("hinge1").kind == "sum" and MM.dot().kind == "sum" and H.dot().kind == "zero"
     assert pc.constant(np.eye(3), arm.soa.Theta, arm.soa.Theta).diff(1).kind == "zero"
     assert (arm.soa.I @ MM).diff(2).domain == arm.soa.Theta
+    assert MM.diff([1, "hinge2"]) == [MM.diff(1), MM.diff(2)] and MM.diff([]) == []
 
 
 def test_no_plan_of_a_derivative_is_dense(model):
@@ -341,6 +342,10 @@ def test_errors_name_what_is_wrong(model):
         (pc.EvaluationError, "frame 'moon'", lambda: MM.diff(1, frame="moon")),
         (pc.ModelError, "has no parameter 'colour'", lambda: model.bodies["body1"].symbol("colour")),
         (pc.ModelError, "has no parameter 'pitch'", lambda: model.hinges["hinge1"].symbol("pitch")),
+        (pc.ModelError, "no component is called 'w'; there are x, y, z, or 0 to 2", lambda: model.bodies["body1"].symbol("com", "w")),
+        (pc.ModelError, "no component is called 'yz'", lambda: model.bodies["body1"].symbol("inertia", "x", "yz")),
+        (pc.ModelError, "no component is called 9; there are rx", lambda: model.hinges["hinge1"].symbol("placement", 9)),
+        (pc.ModelError, "no component is called 2; there are 0, 1", lambda: model.hinges["hinge1"].symbol("rotor_inertia", 2)),
         (pc.ModelError, "has 2 subhinges, none with number 2", lambda: model.hinges["hinge1"].symbol("axis", 0, 2)),
     ]:
         with pytest.raises(error, match=text):

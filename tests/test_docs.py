@@ -42,6 +42,13 @@ def test_the_readme_example_runs():
     assert names["MM"].shape == (7, 7)
 
 
+@pytest.mark.parametrize("page", ["sensitivities"])
+def test_the_pages_run(page):
+    options = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
+    result = doctest.testfile(str(ROOT / "docs" / f"{page}.md"), module_relative=False, optionflags=options)
+    assert result.failed == 0 and result.attempted > 20
+
+
 def test_public_names_have_docstrings():
     for name in pycraft.__all__:
         assert getattr(pycraft, name).__doc__, name

@@ -306,7 +306,7 @@ SETTINGS = [Setting(frozenset(h), composite) for h in ((), (J0,)) for composite 
 
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 def test_the_normal_form_does_not_depend_on_where_one_begins(setting):
-    """All overlaps of rules resolve, so that the rules decide what follows from the axioms; every rule lowers the order, so that they end."""
+    """All overlaps of rules resolve, so that they decide what follows from the axioms; all lower the order, so that they end."""
     rules, alphabet = rules_for(setting), theory().alphabet
     count = 0
     for first in rules.all():
@@ -606,7 +606,7 @@ def test_a_proof_reads_well(arm):
     proof = prove("HψMψ*H* == D", tree(rotor_inertia=False))
     text = str(proof)
     residual = text.rsplit(" ", 1)[1]
-    assert text == f"""H ψ M ψ* H* = D
+    expected = f"""H ψ M ψ* H* = D
   proved where J = 0
       H ψ M ψ* H*
    1. = H ψ P H* + H P ψ* H* − H P H*   [ψ M ψ* = ψ P + P ψ* − P]
@@ -616,6 +616,7 @@ def test_a_proof_reads_well(arm):
    5. = D                               [H G = I, at 2 places]
   rests on {"; ".join(proof.axioms)}
   largest residual of a step at a random state: {residual}"""
+    assert text == expected
     first = proof.steps[0]
     assert first.before_text() == "H ψ M ψ* H*" and first.reason == "ψ M ψ* = ψ P + P ψ* − P" and first.kind == "lemma"
     assert first.positions == [("H ψ M ψ* H*", 1, "ψ M ψ*")] and repr(first).endswith("[ψ M ψ* = ψ P + P ψ* − P]")

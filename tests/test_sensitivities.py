@@ -117,6 +117,22 @@ def test_energy_and_momentum(case):
     assert_close(h.value[3:], moving, 1e-9)
 
 
+def test_small_velocities_under_gravity_lose_nothing():
+    arm = pc.robots.panda()
+    arm.gravity = (0, 0, -9.81)
+    state = arm.random_state(0)
+    v = 1e-12 * state.v
+    p = arm.mass_matrix(state.q) @ v
+    momenta = arm.kinetic_energy_derivatives(state.q, v)[1]
+    assert np.abs(momenta - p).max() <= 1e-14 * np.abs(p).max()
+    velocity = arm.hamiltonian_dynamics(state.q, p, p)[0]
+    assert np.abs(velocity - v).max() <= 1e-11 * np.abs(v).max()
+    assert np.array_equal(arm.mass_matrix(state), arm.mass_matrix(state.q))  # a State stands for its q
+    assert np.array_equal(arm.bias_forces(state, state), arm.bias_forces(state.q, state.v))
+    V = np.stack([state.v, v])
+    assert np.allclose(arm.coriolis_matrix(state.q, V, form="skew")[0], arm.coriolis_matrix(state.q, state.v, form="skew"))
+
+
 def test_jacobians(case):
     m, q, v, _, _ = case
     for frame in ("tip", list(m.bodies)[0]):

@@ -46,7 +46,8 @@ struct Argument {
 
 inline Argument argument(const py::object& given, int width, const char* what, const Multibody& model) {
   Argument a;
-  a.array = numbers(given, what);
+  // a State stands for its q and its v
+  a.array = numbers(what[1] == 0 && py::hasattr(given, "q") && py::hasattr(given, "v") ? py::object(given.attr(what)) : given, what);
   if (a.array.ndim() < 1 || a.array.ndim() > 2 || a.array.shape(a.array.ndim() - 1) != width)
     throw ModelError(std::string(what) + " of '" + model.name() + "' takes " + std::to_string(width) + " numbers, or (B, " + std::to_string(width) + ") for a batch");
   if (a.array.ndim() == 2) {

@@ -57,7 +57,7 @@ int coordinate_of(const MultibodyOperators& model, const py::object& direction) 
 }
 
 template <class T>
-T diff(const T& operand, const py::args& directions, const std::string& frame) {
+T diff_in_turn(const T& operand, const py::args& directions, const std::string& frame) {
   if (frame != "body" && frame != "world") throw EvaluationError("frame '" + frame + "': derivatives are taken in \"body\" or \"world\" axes");
   if (directions.empty()) throw EvaluationError("diff takes a coordinate's name or number, or a parameter; for the time derivative there is dot()");
   T result = operand;
@@ -77,6 +77,16 @@ T diff(const T& operand, const py::args& directions, const std::string& frame) {
     result = along(result, *coordinate_direction(model, coordinate_of(*model, direction)), frame == "world");
   }
   return result;
+}
+
+// diff([i, j]) is a list.
+template <class T>
+py::object diff(const T& operand, const py::args& directions, const std::string& frame) {
+  if (directions.size() != 1 || !(py::isinstance<py::list>(directions[0]) || py::isinstance<py::tuple>(directions[0])))
+    return py::cast(diff_in_turn(operand, directions, frame));
+  py::list all;
+  for (const auto& direction : directions[0]) all.append(py::cast(diff_in_turn(operand, py::args(py::make_tuple(direction)), frame)));
+  return std::move(all);
 }
 
 template <class T>
@@ -101,7 +111,7 @@ T time_derivative(const T& operand, const py::object& vdot, const std::string& f
 void register_calculus(py::module_& m) {
   const char* diff_text =
       "The derivative along a coordinate (its name or number), along a parameter (body.symbol(\"mass\"), hinge.symbol(\"axis\", 0), ...), or\n"
-      "along several in turn: diff(i, j) is ∂_j(∂_i ·). An expression again, by rule, evaluated by sweeps; zero by structure is the zero\n"
+      "along several in turn: diff(i, j) is ∂_j(∂_i ·), and diff([i, j]) the list of both. An expression again, by rule, evaluated by sweeps; zero by structure is the zero\n"
       "operator. On ball and free hinges coordinates are quasi-velocities, along which derivatives do not commute.\n"
       "frame=\"world\": of the operator as resolved in world axes, given in body axes; spaces and shape are the operator's own.";
   const char* dot_text =

@@ -77,16 +77,18 @@ void register_sensitivities(py::module_& m) {
         const Multibody& mb = d.model();
         const int n = mb.nv();
         const State s = state(mb, q, v, py::none(), "");
-        return run(d, precision, {{&s.q, mb.nq()}, {&s.v, n}}, output(py::none(), s.batch, {n}), n, s.batch,
-                   [](auto& w, auto in, auto* y) { w.kinetic_energy(in[0], in[1], y); });
+        const auto all = run(d, precision, {{&s.q, mb.nq()}, {&s.v, n}}, output(py::none(), s.batch, {2 * n}), 2 * n, s.batch,
+                             [n](auto& w, auto in, auto* y) { w.kinetic_energy(in[0], in[1], y, y + n); });
+        return cut(all, s.batch, {{n}, {n}});
       }, q, v, precision)
-      .def("momentum_rate", [](Calls& d, const py::object& q, const py::object& v, const py::object& tau, const std::string& precision) {
+      .def("hamiltonian", [](Calls& d, const py::object& q, const py::object& p, const py::object& tau, const std::string& precision) {
         const Multibody& mb = d.model();
         const int n = mb.nv();
-        const State s = state(mb, q, v, tau, "tau");
-        return run(d, precision, {{&s.q, mb.nq()}, {&s.v, n}, {&s.w, n}}, output(py::none(), s.batch, {n}), n, s.batch,
-                   [](auto& w, auto in, auto* y) { w.momentum_rate(in[0], in[1], in[2], y); });
-      }, q, v, py::arg("tau"), precision)
+        const State s = state(mb, q, p, tau, "tau");
+        const auto all = run(d, precision, {{&s.q, mb.nq()}, {&s.v, n}, {&s.w, n}}, output(py::none(), s.batch, {2 * n}), 2 * n, s.batch,
+                             [n](auto& w, auto in, auto* y) { w.hamiltonian(in[0], in[1], in[2], y, y + n); });
+        return cut(all, s.batch, {{n}, {n}});
+      }, q, py::arg("p"), py::arg("tau"), precision)
       .def("momentum", [](Calls& d, const py::object& q, const py::object& v, const std::string& precision) {
         const Multibody& mb = d.model();
         const int n = mb.nv();

@@ -135,21 +135,29 @@ void Sensitivities<S>::christoffel(const S* q, S* out) {
 }
 
 template <class S>
-void Sensitivities<S>::kinetic_energy(const S* q, const S* v, S* out) {
+void Sensitivities<S>::kinetic_energy(const S* q, const S* v, S* dq, S* dv) {
   frame_at(q, v, nullptr);
-  for (int k = 0; k < model_->nv; ++k) out[k] = dot(frame_.psi_dot[k], frame_.B[frame_.body_of[k]].momentum);
+  for (int k = 0; k < model_->nv; ++k) {
+    const Vector6<S>& momentum = frame_.B[frame_.body_of[k]].momentum;
+    dq[k] = dot(frame_.psi_dot[k], momentum);
+    dv[k] = dot(frame_.twist[k], momentum) + model_->rotor_inertia[k] * v[k];
+  }
 }
 
 template <class S>
-void Sensitivities<S>::momentum_rate(const S* q, const S* v, const S* tau, S* out) {
+void Sensitivities<S>::hamiltonian(const S* q, const S* p, const S* tau, S* v, S* p_rate) {
+  kinematics(*model_, q, blocks_);
+  articulated_inertia_tip_to_base(tree_, blocks_);
+  scratch_.resize(std::max(scratch_.size(), size_t(6) * model_->bodies));
+  mass_matrix_inverse_apply(tree_, blocks_, p, v, 1, scratch_.data());
+  frame_.fill(*model_, blocks_, v, nullptr);
   // d(S_j·p)/dt = Ṡ_j·p + S_j·ṗ, and S_j·ṗ is what the hinge's force and gravity do: tau_j + S_j·(weight outboard).
-  frame_at(q, v, nullptr);
   for (int k = 0; k < model_->bodies; ++k) {
     int root = k;
     while (model_->parent[root] >= 0) root = model_->parent[root];
     const Vector6<S> field = motion_to_child(blocks_.pose[root], Vector6<S>{Vector3<S>::zero(), model_->gravity});
     for (int j = model_->v_offset[k]; j < model_->v_offset[k] + model_->nv_of[k]; ++j)
-      out[j] = tau[j] + dot(frame_.twist_rate[j], frame_.B[k].momentum) + dot(frame_.twist[j], frame_.R[k] * field);
+      p_rate[j] = tau[j] + dot(frame_.twist_rate[j], frame_.B[k].momentum) + dot(frame_.twist[j], frame_.R[k] * field);
   }
 }
 

@@ -22,10 +22,11 @@ class Sensitivities {
   void mass_matrix(const S* q, S* out);
   // Γ(i, j, k) of Koszul's formula, with the brackets of quasi-velocities: Σ Γ(i,j,k) v_j v_k = C v without gravity. (nv, nv, nv).
   void christoffel(const S* q, S* out);
-  // ∂KE/∂q (nv); ∂KE/∂v is ℳv. Rotors do not depend on q.
-  void kinetic_energy(const S* q, const S* v, S* out);
-  // d(ℳθ̇)/dt under the forces tau: T + Ḣp - HV̄p, p = φMV, gravity included (nv).
-  void momentum_rate(const S* q, const S* v, const S* tau, S* out);
+  // ∂KE/∂q and ∂KE/∂v = (ℳ + J) v, each (nv). Rotors do not depend on q.
+  void kinetic_energy(const S* q, const S* v, S* dq, S* dv);
+  // Hamilton's equations: v = (ℳ + J)⁻¹p and ṗ = T + Ḣp - HV̄p of the bodies' momenta φMV, gravity included, each (nv).
+  // SingularHingeError as in forward dynamics.
+  void hamiltonian(const S* q, const S* p, const S* tau, S* v, S* p_rate);
   // Momentum about the world's origin in world axes: the matrix A (6 x nv), h = A v, and ∂h/∂q (6 x nv).
   void momentum(const S* q, const S* v, S* matrix, S* dq);
   // d/dt of the node Jacobian (6 x nv), and ∂𝒥/∂q (6, nv, nv), both in the node's axes.

@@ -169,7 +169,8 @@ class MechanicsDirection : public Direction {
   MechanicsLetters letters(const Symbol& s) const {
     if (s.source == source_) return {source_, s.binding};
     if (const auto derived = std::dynamic_pointer_cast<DerivedOperators>(s.source); derived && derived->base() == source_) return {source_, s.binding};
-    throw EvaluationError("'" + s.source->name() + "' is not the model that this derivative is taken of, '" + source_->name() + "'");
+    throw EvaluationError("'" + s.source->name() + "' is not the model that this derivative is taken of" +
+                          (s.source->name() == source_->name() ? ": another of that name is" : ", '" + source_->name() + "'"));
   }
   static bool is_world(const Symbol& s) { return std::dynamic_pointer_cast<WorldFrame>(s.source) != nullptr; }
 

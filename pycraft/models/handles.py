@@ -17,8 +17,13 @@ Vector = Sequence[float] | np.ndarray
 _TWIST = ("rx", "ry", "rz", "x", "y", "z")
 
 
-def _component(i: int | str) -> int:
-    return "xyz".index(i) if isinstance(i, str) else range(3)[i]
+def _component(i: int | str, names: Sequence[str] = ("x", "y", "z")) -> int:
+    """The number of a component given by its name or number."""
+    if isinstance(i, str) and i in names:
+        return list(names).index(i)
+    if not isinstance(i, str) and -len(names) <= int(i) < len(names):
+        return int(i) % len(names)
+    raise _core.ModelError(f"no component is called {i!r}; there are {', '.join(names)}, or 0 to {len(names) - 1}")
 
 
 class Body:
@@ -147,10 +152,11 @@ class Hinge:
         """
         k, source = self._index(), self._model.soa._source
         if name == "rotor_inertia":
-            coordinate = range(self._model.nv)[self.v_slice][int(component)]
-            return _core._rotor_parameter(source, coordinate, f"{self.name}.rotor_inertia[{int(component)}]")
+            own = range(self._model.nv)[self.v_slice]
+            c = _component(component, [str(j) for j in range(len(own))])
+            return _core._rotor_parameter(source, own[c], f"{self.name}.rotor_inertia[{c}]")
         if name == "placement":
-            c = _TWIST.index(component) if isinstance(component, str) else int(component)
+            c = _component(component, _TWIST)
             return _core._twist_parameter(source, [(k, 0, np.eye(6)[c])], f"{self.name}.placement.{_TWIST[c]}")
         if name not in ("axis", "point"):
             raise _core.ModelError(f"hinge {self.name!r} has no parameter {name!r}; there are placement, axis, point, rotor_inertia")

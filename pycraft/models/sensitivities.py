@@ -72,15 +72,14 @@ class SensitivityCalls(DirectCalls):
             H, phi, M, turning, H_dot, cross = self.soa("H phi M Delta_theta_dot H_dot momentum_cross")  # type: ignore[attr-defined]
             J = phi.T @ H.T
             J_dot = phi.T @ (turning.T @ self.soa.phi_tilde.T @ H.T + H_dot.T)  # type: ignore[attr-defined]
-            return (H @ phi @ (M @ J_dot + cross @ J)).at(q, v, precision=precision).dense()
+            C = H @ phi @ (M @ J_dot + cross @ J)
+            many = np.broadcast_shapes(np.shape(q)[:-1], np.shape(v)[:-1])  # one of them may be shared by the batch
+            return C.at(np.broadcast_to(q, (*many, self.nq)), np.broadcast_to(v, (*many, self.nv)), precision=precision).dense()
         raise _core.EvaluationError(f"form {form!r} of the Coriolis matrix is not there; there are 'christoffel' and 'skew'")
 
     def kinetic_energy_derivatives(self, q, v, *, precision: str = "double") -> tuple[np.ndarray, np.ndarray]:
         """∂KE/∂q and ∂KE/∂v = (ℳ + J) v, each (nv,) or (B, nv). Cost O(N)."""
-        slope = self._sensitivities().kinetic_energy(q, v, precision)
-        rest = np.zeros_like(slope)
-        at_rest = self.inverse_dynamics(q, rest, rest, precision=precision)
-        return slope, self.inverse_dynamics(q, rest, v, precision=precision) - at_rest
+        return self._sensitivities().kinetic_energy(q, v, precision)
 
     def hamiltonian_dynamics(self, q, p, tau, *, precision: str = "double") -> tuple[np.ndarray, np.ndarray]:
         """The Hamiltonian form in O(N): v and ṗ of the generalized momenta p = (ℳ + J) v under the forces tau, gravity included.
@@ -88,10 +87,7 @@ class SensitivityCalls(DirectCalls):
         ṗ = T + Ḣp - HV̄p of the bodies' momenta p = φMV, so that no derivative of ℳ is formed. Each (nv,) or (B, nv). SingularHingeError
         as in forward dynamics.
         """
-        p = np.asarray(p, float)
-        rest = np.zeros(p.shape)
-        v = self.forward_dynamics(q, rest, p, precision=precision) - self.forward_dynamics(q, rest, rest, precision=precision)
-        return v, self._sensitivities().momentum_rate(q, v, tau, precision)
+        return self._sensitivities().hamiltonian(q, p, tau, precision)
 
     def innovations(self, q, v, tau, *, precision: str = "double") -> tuple[np.ndarray, np.ndarray]:
         """Innovations velocity ξ = [I+HφK]*v and innovations ε = [I-HψK](τ - 𝒞), each (nv,) or (B, nv): decoupled coordinates.
@@ -126,11 +122,11 @@ class SensitivityCalls(DirectCalls):
         return Momentum(np.einsum("...ij,...j->...i", matrix, np.asarray(v, float)), matrix, dq)
 
     def jacobian_dot(self, frame: str, q, v, *, precision: str = "double") -> np.ndarray:
-        """Time derivative (6, nv) or (B, 6, nv) of `jacobian(frame, q)` along v, in the same axes. Cost O(depth)."""
+        """Time derivative (6, nv) or (B, 6, nv) of `jacobian(frame, q)` along v, in the same axes. Cost O(N)."""
         return self._sensitivities().jacobian_rate(frame, q, v, precision)
 
     def jacobian_derivative(self, frame: str, q, *, precision: str = "double") -> np.ndarray:
-        """The kinematic Hessian ∂𝒥/∂q, (6, nv, nv) or (B, 6, nv, nv), of `jacobian(frame, q)` in its own axes, derivative last."""
+        """The kinematic Hessian ∂𝒥/∂q, (6, nv, nv) or (B, 6, nv, nv), of `jacobian(frame, q)` in its own axes, derivative last. O(N + depth²)."""
         return self._sensitivities().jacobian_derivative(frame, q, precision)
 
     def inertial_regressor(self, q, v, vdot, *, precision: str = "double") -> np.ndarray:

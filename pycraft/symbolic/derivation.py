@@ -152,4 +152,3 @@ class DerivativeProblem(Problem):
         source, binding = self.contexts[0]
         symbol = source.symbol("Delta", coordinate=self.index)
         return self.letter(symbol if binding is None else symbol._bound(binding))
-

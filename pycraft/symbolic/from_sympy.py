@@ -13,7 +13,18 @@ from sympy.matrices.expressions.matexpr import MatrixExpr
 
 from .. import _core
 from ..operators import OperatorSet
-from .sympy_operators import BlockDiagonal, BlockFunction, LogDet, Norm, OperatorSymbol, Root, Tr, Unit, Zero, kept
+from .sympy_operators import (
+    BlockDiagonal,
+    BlockFunction,
+    OperatorLogDet,
+    OperatorNorm,
+    OperatorSymbol,
+    OperatorTrace,
+    OperatorUnit,
+    OperatorZero,
+    Root,
+    kept,
+)
 
 
 class Reader:
@@ -46,11 +57,11 @@ class Reader:
     def _operator(self, e: Any) -> _core.Operator | None:
         if isinstance(e, OperatorSymbol):
             return e.operator(self._operators)
-        if isinstance(e, Unit):
+        if isinstance(e, OperatorUnit):
             return (kept(e.token) if e.token else None) or _core.identity()
         if isinstance(e, Identity):
             return _core.identity()
-        if isinstance(e, Zero):
+        if isinstance(e, OperatorZero):
             return kept(e.token)
         if isinstance(e, ZeroMatrix):
             return None
@@ -83,10 +94,11 @@ class Reader:
 
     def _product(self, e: Any) -> _core.Operator | None:
         numbers = [a for a in e.args if not getattr(a, "is_Matrix", False)]
-        matrices = [self._operator(a) for a in e.args if getattr(a, "is_Matrix", False)]
-        if any(m is None for m in matrices):
+        found = [self._operator(a) for a in e.args if getattr(a, "is_Matrix", False)]
+        matrices = [m for m in found if m is not None]
+        if len(matrices) < len(found):
             return None
-        made = reduce(matmul, matrices)  # type: ignore[arg-type]
+        made: _core.Operator = reduce(matmul, matrices)
         return made if not numbers else self._number(sympy.Mul(*numbers)) * made
 
     def _power(self, e: Any) -> _core.Operator:
@@ -104,7 +116,7 @@ class Reader:
         inside, name = self._nonzero(e.arg), e.args[0].name
         if name == "lower_half":
             return _core._make("function", [inside], 1.0)
-        return _core._function(self._operators._source, name, None, inside)
+        return _core._function(self._operators._source, name, None, inside)  # type: ignore[arg-type]
 
     # ------------------------------------------------------------------ numbers and scalars
     def _number(self, x: Any) -> float:
@@ -116,12 +128,12 @@ class Reader:
 
     def _scalar(self, e: Any) -> Any:
         """A float, or a scalar expression."""
-        if isinstance(e, Tr | LogDet | Norm):
+        if isinstance(e, OperatorTrace | OperatorLogDet | OperatorNorm):
             inside = self._nonzero(e.arg)
-            return {Tr: inside.trace, LogDet: inside.logdet, Norm: inside.norm}[type(e)]()
+            return {OperatorTrace: inside.trace, OperatorLogDet: inside.logdet, OperatorNorm: inside.norm}[type(e)]()
         if isinstance(e, sympy.Trace):
             return self._nonzero(e.arg).trace()
-        if not e.has(Tr, LogDet, Norm, sympy.Trace):
+        if not e.has(OperatorTrace, OperatorLogDet, OperatorNorm, sympy.Trace):
             return self._number(e)
         if e.is_Add:
             return reduce(add, map(self._scalar, e.args))

@@ -212,5 +212,3 @@ def _operators_of(problem: DerivativeProblem) -> Any:
         model = getattr(source, "model", None)
         return OperatorSet(source, model if hasattr(model, "random_state") else None)
     return None
-
-

@@ -16,7 +16,7 @@ from ..operators import OperatorSet
 
 
 def parse(text: str, model: Any, **names: _core.Operator) -> Any:
-    """An operator (or scalar) expression from text: Python's spelling, the book's, or LaTeX.
+    r"""An operator (or scalar) expression from text: Python's spelling, the book's, or LaTeX.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def parse(text: str, model: Any, **names: _core.Operator) -> Any:
 
 
 def to_sympy(expression: Any) -> Any:
-    """An operator or scalar expression as a SymPy expression that prints as the book does.
+    r"""An operator or scalar expression as a SymPy expression that prints as the book does.
 
     Parameters
     ----------
@@ -70,9 +70,9 @@ def to_sympy(expression: Any) -> Any:
     >>> soa = pc.chain(3).soa
     >>> e = (soa.I + soa.H @ soa.phi @ soa.K) @ soa.D
     >>> print(sympy.latex(to_sympy(e)))
-    \\left(I + H \\phi \\mathcal{K}\\right) \\mathcal{D}
+    \left(I + H \phi \mathcal{K}\right) \mathcal{D}
     >>> from_sympy(sympy.expand(to_sympy(e)), soa)
-    <D + H φ K D : Θ (3) → Θ (3)>
+    <H φ K D + D : Θ (3) → Θ (3)>
     """
     from .to_sympy import operator, scalar
 

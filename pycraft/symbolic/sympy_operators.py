@@ -13,7 +13,7 @@ from typing import Any
 
 import sympy
 from sympy.core.symbol import Str
-from sympy.matrices.expressions import Identity, MatrixExpr, MatrixSymbol, Transpose, ZeroMatrix
+from sympy.matrices.expressions import Identity, MatAdd, MatMul, MatrixExpr, MatrixSymbol, Transpose, ZeroMatrix
 from sympy.printing.precedence import PRECEDENCE
 from sympy.printing.pretty.stringpict import prettyForm
 
@@ -21,6 +21,7 @@ from .. import _core
 
 # What only exists in this process: constants, vectors, letters bound to a state, by the token in the symbol's arguments.
 _KEPT: dict[str, _core.Operator] = {}
+_TOKEN_OF: dict[_core.Operator, str] = {}
 _TOKENS = itertools.count(1)
 
 
@@ -68,15 +69,12 @@ class OperatorSymbol(MatrixSymbol):
 
 def symbol_of(e: _core.Operator, name: str, rows: Any, columns: Any) -> OperatorSymbol:
     """The symbol of a leaf: a letter that can be found again by name, or an operator that is kept."""
-    kind, payload = e.kind, e._parts()[1] if e.kind == "symbol" else None
-    if kind == "symbol" and payload[-1] is None:  # not bound to a state
+    payload: Any = e._parts()[1] if e.kind == "symbol" else None
+    if payload is not None and payload[-1] is None:  # a letter, not bound to a state
         _, letter, numbers, nodes, text, _ = payload
         token = json.dumps({"name": letter, "numbers": list(numbers), "nodes": list(nodes), "text": text})
     else:
-        token = next((t for t, kept in _KEPT.items() if kept is e or type(kept) is type(e) and kept == e), "")
-        if not token:
-            token = json.dumps({"kept": next(_TOKENS)})
-            _KEPT[token] = e
+        token = keep(e)
     return OperatorSymbol(name, rows, columns, token, e.latex(), e.text())
 
 
@@ -92,17 +90,39 @@ class Star(Transpose):
         return prettyForm(*inside.parens() if self.arg.args and not isinstance(self.arg, OperatorSymbol) else inside) ** prettyForm("*")
 
 
-class Unit(Identity):
+class OperatorSum(MatAdd):
+    """A sum that prints its terms in the order in which they were typed."""
+
+    def _joined(self, printer: Any) -> str:
+        terms = [printer._print(a) for a in self.args]
+        return terms[0] + "".join(f" - {t[1:].lstrip()}" if t.startswith("-") else f" + {t}" for t in terms[1:])
+
+    _latex = _joined
+    _sympystr = _joined
+
+
+class OperatorProduct(MatMul):
+    """A product with at most one number in front, that prints as it was typed."""
+
+    def _latex(self, printer: Any) -> str:
+        number, *matrices = self.args if not self.args[0].is_Matrix else (sympy.S.One, *self.args)
+        opened = matrices[0].args[0] if len(matrices) == 1 and isinstance(matrices[0], MatMul) else sympy.S.NegativeOne
+        alone = opened.is_Matrix or number == -1 and opened.is_positive
+        shown = " ".join(printer._print(m) if alone else printer.parenthesize(m, PRECEDENCE["Mul"]) for m in matrices)
+        return shown if number == 1 else f"-{shown}" if number == -1 else rf"{printer._print(number)}\,{shown}"
+
+
+class OperatorUnit(Identity):
     """I: of a space that is said ("F", ...), or of the one that fits."""
 
-    def __new__(cls, dimension: Any, token: Any = "") -> Unit:
+    def __new__(cls, dimension: Any, token: Any = "") -> OperatorUnit:
         return _shaped(cls, dimension, str(token))
 
     @property
     def token(self) -> str:
         return self.args[1].name
 
-    def _eval_transpose(self) -> Unit:
+    def _eval_transpose(self) -> OperatorUnit:
         return self
 
     def _latex(self, printer: Any) -> str:
@@ -115,10 +135,10 @@ class Unit(Identity):
         return "I"
 
 
-class Zero(ZeroMatrix):
+class OperatorZero(ZeroMatrix):
     """A zero operator with its spaces."""
 
-    def __new__(cls, rows: Any, columns: Any, token: Any = "") -> Zero:
+    def __new__(cls, rows: Any, columns: Any, token: Any = "") -> OperatorZero:
         return _shaped(cls, rows, columns, str(token))
 
     @property
@@ -130,10 +150,11 @@ class Zero(ZeroMatrix):
 
 
 def keep(e: _core.Operator) -> str:
-    """A token by which an operator is found again in this process."""
-    token = json.dumps({"kept": next(_TOKENS)})
-    _KEPT[token] = e
-    return token
+    """A token by which an operator is found again in this process: the same for equal operators."""
+    if e not in _TOKEN_OF:
+        token = _TOKEN_OF[e] = json.dumps({"kept": next(_TOKENS)})
+        _KEPT[token] = e
+    return _TOKEN_OF[e]
 
 
 def kept(token: str) -> _core.Operator | None:
@@ -235,24 +256,24 @@ class _Reduction(sympy.Expr):
         return self.args[0]
 
     def _sympystr(self, printer: Any) -> str:
-        return f"{type(self).__name__}({printer._print(self.arg)})"
+        return f"{type(self).__name__.removeprefix('Operator').lower()}({printer._print(self.arg)})"
 
 
-class Tr(_Reduction):
+class OperatorTrace(_Reduction):
     """The trace."""
 
     def _latex(self, printer: Any) -> str:
         return rf"\operatorname{{tr}}\left({printer._print(self.arg)}\right)"
 
 
-class LogDet(_Reduction):
+class OperatorLogDet(_Reduction):
     """ln|det A|."""
 
     def _latex(self, printer: Any) -> str:
         return rf"\ln\det\left({printer._print(self.arg)}\right)"
 
 
-class Norm(_Reduction):
+class OperatorNorm(_Reduction):
     """The Frobenius norm."""
 
     def _latex(self, printer: Any) -> str:

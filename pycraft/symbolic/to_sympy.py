@@ -6,10 +6,24 @@ from fractions import Fraction
 from typing import Any
 
 import sympy
-from sympy.matrices.expressions import Inverse, MatAdd, MatMul
+from sympy.matrices.expressions import Inverse
 
 from .. import _core
-from .sympy_operators import BlockDiagonal, BlockFunction, LogDet, Norm, Root, Star, Tr, Unit, Zero, keep, symbol_of
+from .sympy_operators import (
+    BlockDiagonal,
+    BlockFunction,
+    OperatorLogDet,
+    OperatorNorm,
+    OperatorProduct,
+    OperatorSum,
+    OperatorTrace,
+    OperatorUnit,
+    OperatorZero,
+    Root,
+    Star,
+    keep,
+    symbol_of,
+)
 
 _SCALARS = ("number", "trace", "logdet", "norm", "sum", "scaled")
 # A space and its dual have one dimension: names by the space.
@@ -48,11 +62,11 @@ def _of(e: _core.Operator, fits: sympy.Expr) -> Any:
         name = e.name if kind == "vector" else e.text() if kind in ("constant", "external") else _ascii(e)
         return symbol_of(e, name, dimension(e.codomain), dimension(e.domain))
     if kind == "identity":
-        return Unit(fits) if e.domain is None else Unit(dimension(e.domain), keep(e))
+        return OperatorUnit(fits) if e.domain is None else OperatorUnit(dimension(e.domain), keep(e))
     if kind == "zero":
-        return Zero(dimension(e.codomain), dimension(e.domain), keep(e))
+        return OperatorZero(dimension(e.codomain), dimension(e.domain), keep(e))
     if kind == "sum":
-        return MatAdd(*(_of(c, fits) for c in children))
+        return OperatorSum(*(_of(c, fits) for c in children))
     if kind == "product":
         made: list[Any] = []
         for child in reversed(children):  # from the right: what an I stands before says its space
@@ -61,9 +75,9 @@ def _of(e: _core.Operator, fits: sympy.Expr) -> Any:
                 fits = dimension(child.codomain)
             else:
                 made.insert(0, _of(child, fits))
-        return MatMul(*made)
+        return OperatorProduct(*made)
     if kind == "scaled":
-        return MatMul(number(e.coefficient), _of(children[0], fits))
+        return OperatorProduct(number(e.coefficient), _of(children[0], fits))
     if kind == "function":
         payload = e._parts()[1]
         name = "lower_half" if payload is None else payload[1]
@@ -88,7 +102,9 @@ def scalar(s: _core.Scalar) -> Any:
     if name == "number":
         return number(value)
     if name == "sum":
-        return sympy.Add(*(scalar(t) for t in terms), evaluate=False)
+        first = scalar(terms[0])
+        opened = first.args if first.is_Add else (first,)
+        return sympy.Add(*opened, *(scalar(t) for t in terms[1:]), evaluate=False)
     if name == "scaled":
         return sympy.Mul(number(value), scalar(terms[0]), evaluate=False)
-    return {"trace": Tr, "logdet": LogDet, "norm": Norm}[name](operator(operand))
+    return {"trace": OperatorTrace, "logdet": OperatorLogDet, "norm": OperatorNorm}[name](operator(operand))
