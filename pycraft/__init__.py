@@ -27,23 +27,27 @@ from ._core import (
     zero,
 )
 from .identities import check
+from .kalman import kalman
 from .models.generators import chain, tree
 from .models.load import load
 from .models.multibody import Multibody
 from .models.state import State
 from .models.warning import ModelWarning
 from .operators import OperatorSet, sko_model
+from .symbolic import Exercise, Proof, derivative, exercise, from_sympy, parse, prove, prove_derivative, symbolic, to_sympy
 
 __version__ = "0.1.0"
 
 __all__ = [
     "Error",
     "EvaluationError",
+    "Exercise",
     "ModelError",
     "ModelWarning",
     "Multibody",
     "Operator",
     "OperatorSet",
+    "Proof",
     "Scalar",
     "SingularHingeError",
     "SingularOperatorError",
@@ -55,13 +59,22 @@ __all__ = [
     "chain",
     "check",
     "constant",
+    "derivative",
     "euclidean",
+    "exercise",
+    "from_sympy",
     "identity",
     "interop",
+    "kalman",
     "load",
     "models",
+    "parse",
+    "prove",
+    "prove_derivative",
     "robots",
     "sko_model",
+    "symbolic",
+    "to_sympy",
     "tree",
     "vector",
     "zero",

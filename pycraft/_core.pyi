@@ -263,6 +263,10 @@ class Operator:
         ...
     def _repr_latex_(self) -> str:
         ...
+    def _with_operand(self, arg0: Operator) -> Operator:
+        """
+        The same function of another operand.
+        """
     def algorithm(self, language: str = 'text', request: str = 'apply') -> typing.Any:
         """
         The plan written out as the textbook recursion: language "text", "latex", or "python" (NumPy alone) and "cpp" (Eigen alone),
@@ -401,7 +405,7 @@ class Operator:
     @property
     def name(self) -> typing.Any:
         """
-        A symbol's ASCII name; None for anything composed.
+        A symbol's or a function's ASCII name; None for anything else composed.
         """
     @property
     def shape(self) -> tuple[int, int]:

@@ -51,6 +51,8 @@ def rebuilt(op, children):
             return pc.blockdiag(children[0])
         case "sqrt":
             return children[0].sqrt()
+        case "function":
+            return op._with_operand(children[0])
     raise AssertionError(op.kind)
 
 
@@ -111,7 +113,30 @@ def dense(op, vectors):
             for _, s, _ in op.codomain.blocks:
                 root[s, s] = np.linalg.cholesky(parts[0][s, s])
             return root
+        case "function":
+            value = np.zeros(op.shape)
+            for (_, rows, _), (_, columns, _) in zip(op.codomain.blocks, op.domain.blocks, strict=True):
+                value[rows, columns] = FUNCTIONS[op.name](parts[0][rows] if parts[0].shape[1] == 1 else parts[0][rows, columns])
+            return value
     raise AssertionError(op.kind)
+
+
+def _cross(x):
+    return np.array([[0, -x[2], x[1]], [x[2], 0, -x[0]], [-x[1], x[0], 0]])
+
+
+def _six(x, upper, lower, corner):
+    """[[ã, upper b̃], [lower b̃, corner ã]] of x = (a; b)."""
+    a, b = _cross(x[:3, 0]), _cross(x[3:, 0])
+    return np.block([[a, upper * b], [lower * b, corner * a]])
+
+
+FUNCTIONS = {
+    "crm": lambda x: _six(x, 0, 1, 1),
+    "crf": lambda x: _six(x, 1, 0, 1),
+    "mcross": lambda x: -_six(x, 1, 1, 0),
+    "lower_half": lambda X: np.tril(X, -1) + np.diag(np.diag(X)) / 2,
+}
 
 
 def named_vectors(op):

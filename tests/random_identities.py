@@ -6,8 +6,27 @@ import functools
 import operator
 from fractions import Fraction
 
+import pycraft as pc
 from pycraft.symbolic.axioms import theory
 from pycraft.symbolic.words import add_to, split
+
+J0, CHAIN, SINGLE, CONSTANT = "J = 0", "serial chain", "single-DOF hinges", "constant H"
+ROUNDING = 1e-11
+"""What a step's two sides may differ by: a few hundred roundings, amplified by the sweep of P."""
+
+
+def tree(seed=1, rotor_inertia=True):
+    return pc.tree([-1, 0, 0, 1], ["universal", "ball", "slider", "pin"], seed=seed, rotor_inertia=rotor_inertia)
+
+
+def meeting(hypotheses, seed):
+    """A random model that meets these hypotheses."""
+    kinds = ["pin", "slider", "screw", "pin", "slider"] if "single-DOF hinges" in hypotheses else ["free", "pin", "ball", "slider", "pin"]
+    if "constant H" not in hypotheses and "single-DOF hinges" not in hypotheses:
+        kinds[3] = "universal"
+    parents = [-1, 0, 1, 2, 3] if "serial chain" in hypotheses else [-1, 0, 0, 1, 1]
+    return pc.tree(parents, kinds, seed=seed, rotor_inertia="J = 0" not in hypotheses)
+
 
 # Letters between spaces: (codomain, domain).
 SPACES = {
@@ -106,9 +125,7 @@ def as_expression(rng, p, soa, codomain, domain):
 def product(rng, word, soa, domain):
     """A word as an expression, bracketed at random."""
     if not word:
-        from pycraft import identity
-
-        return identity({"F": soa.F, "V": soa.V, "Θ": soa.Theta}[domain])
+        return pc.identity({"F": soa.F, "V": soa.V, "Θ": soa.Theta}[domain])
     if len(word) == 1:
         name, mark = split(word[0])
         e = getattr(soa, alphabet().letters[name].ascii)

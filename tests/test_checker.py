@@ -72,7 +72,9 @@ def test_every_theorem_holds_where_its_hypotheses_are_met(name):
             assert finding.verdict in ("holds", "waiting"), (finding.name, finding.verdict, finding.residual, finding.bound)
             if finding.verdict == "holds":
                 assert (
-                    finding.residual <= finding.bound <= 1.0
+                    finding.residual <= finding.bound
+                    # norms multiplied through a long derivative bound little in double: there the wider scalar decides
+                    and (finding.bound <= 1.0 or "alculus" in finding.group)
                     and finding.wide_residual <= finding.wide_bound < 1e-6
                     and finding.states == 2
                 )
@@ -83,7 +85,9 @@ def test_every_theorem_holds_where_its_hypotheses_are_met(name):
 def test_on_a_branched_tree_only_the_decomposition_of_omega_is_expected_to_fail():
     model = branched()
     report = model.soa.check(states=2)
-    assert unmet(report) == {"Ω decomposed by Υ": ["serial chain"]}
+    several = {"∂ℳ": ["constant H"], "∂ℳ, single-DOF form": ["single-DOF hinges"], "#22 C is the Christoffel matrix": ["single-DOF hinges"]}
+    found = unmet(report)
+    assert found.pop("Ω decomposed by Υ") == ["serial chain"] and found.items() <= several.items()
     on_path = next(f for f in report.findings if f.name == "Ω decomposed by Υ, blocks on one path")
     assert on_path.verdict == "holds" and on_path.hypotheses == []
 
@@ -94,6 +98,8 @@ def test_with_rotor_inertia_what_needs_j_zero_is_expected_to_fail():
     assert {name: hypotheses for name, hypotheses in found.items() if hypotheses != ["J = 0"]}.keys() <= {
         "Ω decomposed by Υ",
         "#58 two-filter form",
+        "∂ℳ",
+        "∂ℳ, single-DOF form",
     }
     assert found["Ω decomposed by Υ"] == ["serial chain"]
     assert set(found) >= NEED_J_ZERO, NEED_J_ZERO - set(found)
@@ -146,12 +152,20 @@ def held(lhs, rhs, model):
 
 
 def for_theorem(theorem):
-    """A model on which the theorem's hypotheses hold and everything else that may be false is."""
+    """A model on which the theorem's hypotheses hold and everything else that may be false is; it moves."""
     needs = set(theorem.hypotheses)
     rotor = "J = 0" not in needs
     if "serial chain" in needs:
-        return pc.tree(range(-1, 4), ["free", "pin", "ball", "universal", "slider"], seed=6, rotor_inertia=rotor)
-    return branched(rotor)
+        model = pc.tree(range(-1, 4), ["free", "pin", "ball", "universal", "slider"], seed=6, rotor_inertia=rotor)
+    elif "single-DOF hinges" in needs:
+        model = pc.tree([-1, 0, 1, 1, 0], ["pin", "screw", "pin", "slider", "pin"], seed=6, rotor_inertia=rotor)
+    elif "constant H" in needs:
+        model = pc.tree([-1, 0, 1, 1, 0], ["free", "pin", "ball", "slider", "screw"], seed=6, rotor_inertia=rotor)
+    else:
+        return branched(rotor)
+    state = model.random_state(6)
+    model.q, model.v = state.q, state.v
+    return model
 
 
 THEOREMS = [t.name for t in statements(branched().soa.theorems())]
@@ -210,7 +224,10 @@ def test_one_letter_exchanged(name, theorems):
         pytest.skip("scalars: see test_scalar_statements_with_a_letter_exchanged")
     lhs, rhs = (side @ pc.identity(other.domain) if side.domain is None else side for side, other in ((lhs, rhs), (rhs, lhs)))
     tried = 0
-    for what, changed, other in [*((w, c, rhs) for w, c in exchanges(lhs)), *((w, c, lhs) for w, c in exchanges(rhs))]:
+    all_of_them = [*((w, c, rhs) for w, c in exchanges(lhs)), *((w, c, lhs) for w, c in exchanges(rhs))]
+    if len(all_of_them) > 40:  # derivatives are long, and each letter stands in them many times
+        all_of_them = [all_of_them[i] for i in np.random.default_rng(0).permutation(len(all_of_them))[:40]]
+    for what, changed, other in all_of_them:
         try:
             apart = difference(changed, other) if other.kind != "zero" else np.abs(changed.dense()).max()
         except np.linalg.LinAlgError:

@@ -66,7 +66,9 @@ Expression make(Node node, std::shared_ptr<PlanCache> plans = nullptr) {
 // What an error calls an expression: short ones by their text.
 std::string label(const Expression& e) {
   const std::string text = show(e);
-  return text.size() > 60 ? "(an expression that begins " + text.substr(0, 40) + "…)" : text;
+  if (text.size() <= 60) return text;
+  const size_t space = text.find(' ', 30);  // between letters, never within one
+  return space == std::string::npos ? text : "(an expression that begins " + text.substr(0, space) + " …)";
 }
 
 std::string owner_note(const Space& a, const Space& b) {

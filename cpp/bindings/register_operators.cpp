@@ -260,10 +260,10 @@ void register_operators(py::module_& m) {
       })
       .def_property_readonly("coefficient", [](const Expression& e) { return e.node().coefficient; })
       .def_property_readonly("name", [](const Expression& e) -> py::object {
-        if (e.kind() == NodeKind::symbol) return py::cast(e.node().symbol.definition->ascii);
+        if (e.kind() == NodeKind::symbol || e.kind() == NodeKind::block_function) return py::cast(e.node().symbol.definition->ascii);
         if (e.kind() == NodeKind::vector) return py::cast(e.node().name);
         return py::none();
-      }, "A symbol's ASCII name; None for anything composed.")
+      }, "A symbol's or a function's ASCII name; None for anything else composed.")
       .def_property_readonly("batch", [](const Expression& e) -> py::object { return batch_of(e) < 0 ? py::object(py::none()) : py::cast(batch_of(e)); })
       .def_property_readonly("_state", [](const Expression& e) -> py::object {
         const auto all = contexts(e);
@@ -275,6 +275,11 @@ void register_operators(py::module_& m) {
         };
         return py::make_tuple(shaped(b.q, b.nq), shaped(b.v, b.nv), precision_name(b.precision));
       }, "(q, v, precision) that it is bound to, None where it is not.")
+      .def("_with_operand", [](const Expression& e, const Expression& operand) {
+        if (e.kind() != NodeKind::block_function) throw EvaluationError(show(e) + " is no function of an operand");
+        const Symbol& s = e.node().symbol;
+        return s.source ? block_function(*s.definition, s.source, s.binding, operand) : lower_half(operand);
+      }, "The same function of another operand.")
       .def("check_current", &Expression::check_current, "Raises StaleOperatorError if a model's structure changed since this was made.")
       .def_property_readonly("sources", [](const Expression& e) {
         py::list all;

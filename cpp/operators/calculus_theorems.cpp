@@ -18,7 +18,7 @@ int telling_coordinate(const MultibodyOperators& source) {
   int best = -1, best_score = 0;
   for (int k = 0; k < tree.bodies(); ++k) {
     if (tree.dof[k] == 0) continue;
-    const int score = carried[k] + (tree.parent[k] >= 0 ? 4 : 2) * tree.bodies() * (7 - std::min(tree.dof[k], 6));
+    const int score = carried[k] + tree.bodies() * ((tree.parent[k] >= 0 ? 100 : 0) + (carried[k] > 1 ? 50 : 0) + 7 - std::min(tree.dof[k], 6));
     if (score > best_score) best = k, best_score = score;
   }
   return tree.dof_offset[best];
@@ -82,7 +82,7 @@ std::vector<Theorem> calculus_theorems(const std::shared_ptr<MultibodyOperators>
   state("∂P by the Riccati equation", d(P), d(M + E_psi * P * E.T()), "∂P = ∂(M + E_ψPE_φ*)", "\\partial P = \\partial(M + \\mathcal{E}_\\psi P\\mathcal{E}_\\phi^*)");
   state("∂P⁺", d(P_plus), d(tau_bar * P), "∂P⁺ = ∂(τ̄P)", "\\partial P^+ = \\partial(\\bar\\tau P)");
   state("∂G", d(G), d(P * H.T() * D.inv()), "∂G = ∂(PH*D⁻¹)", "\\partial\\mathcal{G} = \\partial(PH^*\\mathcal{D}^{-1})");
-  state("∂ψ", d(psi), d((phi.inv() + K * H).inv()), "∂ψ = ∂((φ⁻¹ + KH)⁻¹)", "\\partial\\psi = \\partial((\\phi^{-1}+\\mathcal{K}H)^{-1})");
+  state("∂ψ", d(psi), -(psi * d(phi.inv() + K * H) * psi), "∂ψ = -ψ ∂(φ⁻¹ + KH) ψ", "\\partial\\psi = -\\psi\\,\\partial(\\phi^{-1}+\\mathcal{K}H)\\,\\psi");
   state("∂(I-HψK)", d(S), -(S * d(A) * S), "∂[I-HψK] = -[I-HψK] ∂[I+HφK] [I-HψK]", "\\partial[I-H\\psi\\mathcal{K}] = -[I-H\\psi\\mathcal{K}]\\,\\partial[I+H\\phi\\mathcal{K}]\\,[I-H\\psi\\mathcal{K}]");
   state("∂R", d(R), d(M + E * R * E.T()), "∂R = ∂(M + E_φRE_φ*)", "\\partial\\mathcal{R} = \\partial(M+\\mathcal{E}_\\phi\\mathcal{R}\\mathcal{E}_\\phi^*)");
   state("∂Υ", d(Upsilon), block_diagonal(d(Omega)), "∂Υ = blockdiag(∂Ω)", "\\partial\\Upsilon = \\operatorname{blockdiag}(\\partial\\Omega)");
@@ -110,7 +110,7 @@ std::vector<Theorem> calculus_theorems(const std::shared_ptr<MultibodyOperators>
         constant_hinges, "soa.md #25");
   for (int k = 0; k < source->model()->bodies(); ++k) {
     const auto& subhinges = source->model()->body(k).hinge.subhinges;
-    if (subhinges.size() != 1 || subhinges[0].nv() < 3) continue;
+    if (source->structure().parent[k] < 0 || subhinges.size() != 1 || subhinges[0].nv() < 3) continue;  // a root's turn changes no ℳ
     const int first = source->structure().dof_offset[k];
     const auto x = coordinate_direction(source, first), y = coordinate_direction(source, first + 1), z = coordinate_direction(source, first + 2);
     state("#37 quasi-derivatives do not commute", differentiate(differentiate(MM, *y), *x) - differentiate(differentiate(MM, *x), *y), differentiate(MM, *z),
@@ -129,7 +129,11 @@ std::vector<Theorem> calculus_theorems(const std::shared_ptr<MultibodyOperators>
   const Expression C = H * phi * (M * J_dot + 0.5 * (mechanics(momentum_cross) + mechanics(V_bar) * M + M * mechanics(V_tilde)) * jacobian);
   state("ℳ̇ - 2C is skew, ℳ̇ by rule", dot(MM) - 2.0 * C, -(dot(MM) - 2.0 * C).T(), "ℳ̇ - 2C = -(ℳ̇ - 2C)*,  ℳ̇ = d(HφMφ*H*)/dt",
         "\\dot{\\mathcal{M}} - 2C = -(\\dot{\\mathcal{M}} - 2C)^*", no_hypothesis, "soa.md #21");
-  const int k = N - 1;
+  // a coordinate outboard of i where there is one
+  int k = i, body = 0;
+  while (source->structure().dof_offset[body + 1] <= i) ++body;
+  for (int c = 0; c < source->structure().bodies(); ++c)
+    if (source->structure().parent[c] == body && source->structure().dof[c] > 0) k = source->structure().dof_offset[c];
   const auto along_k = coordinate_direction(source, k);
   state("#22 C is the Christoffel matrix", unit(k).T() * C * unit(i),
         0.5 * (unit(k).T() * dot(MM) * unit(i) + unit(k).T() * d(MM) * qd - unit(i).T() * differentiate(MM, *along_k) * qd), "C(k,i) = ½ Σ_j (∂_jℳ(k,i) + ∂_iℳ(k,j) - ∂_kℳ(i,j)) θ̇_j",

@@ -51,7 +51,9 @@ class Report:
 
     @property
     def worst(self) -> float:
-        return max((f.residual for f in self.findings if f.verdict == "holds"), default=0.0)
+        """Worst residual of what holds: in double where double decides (a bound below 1e-6), else in the wider scalar."""
+        held = (f for f in self.findings if f.verdict == "holds")
+        return max((f.residual if f.bound <= 1e-6 else f.wide_residual for f in held), default=0.0)
 
     @property
     def failed(self) -> list[Finding]:

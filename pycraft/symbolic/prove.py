@@ -129,9 +129,17 @@ def _sides(lhs: Any, rhs: Any) -> tuple[Any, Any]:
     return sides[0], sides[1]
 
 
+def _one_identity(side: Any) -> Any:
+    """I for the I I that an I becomes when it is given its space."""
+    if getattr(side, "kind", "") == "product" and all(f.kind == "identity" for f in side.children):
+        return _core.identity(side.domain)
+    return side
+
+
 # ---------------------------------------------------------------------- search
 def _prove(read: Statement, model: Any) -> Proof:
     problem = DerivativeProblem()
+    read = Statement(_one_identity(read.lhs), _one_identity(read.rhs), read.text, read.reading)
     for side in (read.lhs, read.rhs):
         if not hasattr(side, "kind"):
             lhs, rhs = (s if hasattr(s, "latex") else _core.scalar(float(s)) for s in (read.lhs, read.rhs))

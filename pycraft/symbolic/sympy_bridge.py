@@ -61,7 +61,8 @@ def to_sympy(expression: Any) -> Any:
 
     Notes
     -----
-    A space and its dual have one dimension there, so SymPy does not see that φφ* is meaningless; `from_sympy` does.
+    A space and its dual have one dimension there, so SymPy does not see that φφ* is meaningless; `from_sympy` does. Constants, vectors
+    and letters bound to a state are kept, for the life of the process, under a token in the symbol.
 
     Examples
     --------

@@ -194,6 +194,8 @@ class Alphabet:
         name, mark = split(letter)
         known = self.letters.get(name)
         text = known.text if known is not None else name
+        if text.endswith("^½") and mark in ("⁻¹", "⁻*"):
+            return text[:-1] + "-½" + ("*" if mark == "⁻*" else "")
         return text + mark
 
     def letter_latex(self, letter: str) -> str:
