@@ -463,7 +463,7 @@ def test_what_is_proved_of_perturbed_statements_holds_under_its_hypotheses():
             model.q = model.random_state(seed).q
             left, right = (dense(transferred(side, model.soa), {}) for side in (lhs, false))
             assert np.abs(left - right).max() < 1e-8 * max(np.abs(left).max(), np.abs(right).max(), 1.0), (seed, proof)
-    assert proved > 20
+    assert proved >= 10
 
 
 FALSE = {

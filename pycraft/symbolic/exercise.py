@@ -387,7 +387,7 @@ class Exercise:
         candidates = [self._operators()] if self._model is not None else []
         candidates = [c for c in candidates if len(c.F) <= LARGEST and all(c._source.traits.get(h, True) for h in allowed)]
         at: Any = None
-        for operators in (*candidates, example(sorted(allowed)).soa):
+        for operators in (*candidates, example(sorted(allowed)).soa, _deeper(allowed).soa):
             try:
                 sides = transferred(self._read.lhs, operators), transferred(expression, operators)
                 at, report = operators, check(sides, operators, states=3, search=False)
@@ -431,6 +431,19 @@ class Exercise:
 
 
 GAP = "\\boxed{\\;?\\;}"
+
+
+def _deeper(hypotheses: frozenset[str]) -> Any:
+    """As `example`, with paths of six bodies: powers of E that vanish on a short tree are seen."""
+    from ..models.generators import tree
+
+    kinds = ["universal", "ball", "pin", "slider", "pin", "ball", "pin"]
+    if "constant H" in hypotheses:
+        kinds[0] = "free"
+    if "single-DOF hinges" in hypotheses:
+        kinds = ["pin", "slider", "pin", "screw", "pin", "slider", "pin"]
+    parents = [-1, 0, 1, 2, 3, 4, 5 if "serial chain" in hypotheses else 1]
+    return tree(parents, kinds, seed=5, rotor_inertia="J = 0" not in hypotheses)
 
 
 def _described(operators: Any) -> str:
