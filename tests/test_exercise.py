@@ -179,6 +179,14 @@ def test_the_siblings_are_missed_on_a_tree():
     assert judgement.proof and judgement.proof.hypotheses == ["serial chain"]
 
 
+def test_what_is_false_on_deep_trees_alone_is_refuted():
+    """The two terms cancel wherever no path has more than three bodies."""
+    task = exercise("φK[I-HψK] = ψK")
+    judgement = task.answer("φK + φE_ψφK - φEψK")
+    assert pc.check("φK + φE_ψφK - φEψK == ψK", example().soa, search=False)
+    assert judgement.verdict == "wrong" and "tree of 7" in judgement.text
+
+
 def test_numbers_alone_are_never_enough():
     """On one body every line of this is true in numbers: K = 0 there. It is the axioms that must say so."""
     one = pc.chain(1)

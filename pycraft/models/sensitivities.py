@@ -74,7 +74,8 @@ class SensitivityCalls(DirectCalls):
             J_dot = phi.T @ (turning.T @ self.soa.phi_tilde.T @ H.T + H_dot.T)  # type: ignore[attr-defined]
             C = H @ phi @ (M @ J_dot + cross @ J)
             many = np.broadcast_shapes(np.shape(q)[:-1], np.shape(v)[:-1])  # one of them may be shared by the batch
-            return C.at(np.broadcast_to(q, (*many, self.nq)), np.broadcast_to(v, (*many, self.nv)), precision=precision).dense()
+            states = np.broadcast_to(q, (*many, np.shape(q)[-1])), np.broadcast_to(v, (*many, self.nv))
+            return C.at(*states, precision=precision).dense()
         raise _core.EvaluationError(f"form {form!r} of the Coriolis matrix is not there; there are 'christoffel' and 'skew'")
 
     def kinetic_energy_derivatives(self, q, v, *, precision: str = "double") -> tuple[np.ndarray, np.ndarray]:
@@ -126,7 +127,7 @@ class SensitivityCalls(DirectCalls):
         return self._sensitivities().jacobian_rate(frame, q, v, precision)
 
     def jacobian_derivative(self, frame: str, q, *, precision: str = "double") -> np.ndarray:
-        """The kinematic Hessian ∂𝒥/∂q, (6, nv, nv) or (B, 6, nv, nv), of `jacobian(frame, q)` in its own axes, derivative last. O(N + depth²)."""
+        """The kinematic Hessian ∂𝒥/∂q of `jacobian(frame, q)` in its own axes, (6, nv, nv) or (B, 6, nv, nv). Cost O(N + depth²)."""
         return self._sensitivities().jacobian_derivative(frame, q, precision)
 
     def inertial_regressor(self, q, v, vdot, *, precision: str = "double") -> np.ndarray:

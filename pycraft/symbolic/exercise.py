@@ -434,7 +434,7 @@ GAP = "\\boxed{\\;?\\;}"
 
 
 def _deeper(hypotheses: frozenset[str]) -> Any:
-    """As `example`, with paths of six bodies: powers of E that vanish on a short tree are seen."""
+    """As `example`, with a path of six bodies or more: powers of E_φ that vanish on a short tree are seen."""
     from ..models.generators import tree
 
     kinds = ["universal", "ball", "pin", "slider", "pin", "ball", "pin"]
