@@ -18,6 +18,6 @@ SLOW = {
 
 def pytest_collection_modifyitems(items):
     for item in items:
-        slow = SLOW.get(item.module.__name__)
+        slow = SLOW.get(item.path.stem)
         if slow and slow(item):
             item.add_marker(pytest.mark.slow)
