@@ -25,7 +25,7 @@ from pycraft.algorithm import LANGUAGES
 from pycraft.algorithm.steps import WRITERS
 
 _made = {}
-_executed = set()  # kinds of steps whose emitted source ran in this session
+_executed = set()  # kinds of steps whose emitted source ran in this run
 
 
 def letters_and_constants(rotor_inertia):
