@@ -338,6 +338,7 @@ def test_errors_name_what_is_wrong(model):
         (TypeError, "diff takes a coordinate's name or number", lambda: MM.diff(1.5)),
         (pc.EvaluationError, r"needs the accelerations: .dot\(vdot=...\)", lambda: V_bar.dot()),
         (pc.ModelError, "vdot of 'tree of 10' takes", lambda: V_bar.dot(vdot=[1.0])),
+        (pc.ModelError, r"coordinate 'hinge1\[0\]' is not a finite number", lambda: V_bar.dot(vdot=[0, np.nan] + [0] * (model.nv - 2))),
         (pc.SpaceError, "vdot: the accelerations are a vector of", lambda: V_bar.dot(vdot=pc.vector("a", model.soa.V))),
         (pc.EvaluationError, "frame 'moon'", lambda: MM.diff(1, frame="moon")),
         (pc.ModelError, "has no parameter 'colour'", lambda: model.bodies["body1"].symbol("colour")),

@@ -1,4 +1,6 @@
 // Derivatives of operators and scalars: along coordinates, time and parameters.
+#include <cmath>
+
 #include "algebra/differentiate.h"
 #include "algebra/errors.h"
 #include "bindings/bindings.h"
@@ -101,6 +103,9 @@ T time_derivative(const T& operand, const py::object& vdot, const std::string& f
     const Array a = numbers(vdot, "vdot");
     if (a.ndim() != 1 || a.shape(0) != model->nv())
       throw ModelError("vdot of '" + model->name() + "' takes " + std::to_string(model->nv()) + " numbers, or a vector of " + model->theta().description());
+    for (py::ssize_t i = 0; i < a.size(); ++i)
+      if (!std::isfinite(a.data()[i]))
+        throw ModelError("vdot of '" + model->name() + "': coordinate '" + model->structure().coordinate_names[i] + "' is not a finite number");
     accelerations = constant(std::vector<double>(a.data(), a.data() + a.size()), Space::euclidean(1), model->theta(), "θ̈");
   }
   return along(operand, *time_direction(model, accelerations), frame == "world");
