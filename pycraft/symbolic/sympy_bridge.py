@@ -75,7 +75,7 @@ def to_sympy(expression: Any) -> Any:
     >>> from_sympy(sympy.expand(to_sympy(e)), soa)
     <H φ K D + D : Θ (3) → Θ (3)>
     """
-    from .to_sympy import operator, scalar
+    from .sympy_writer import operator, scalar
 
     if isinstance(expression, _core.Scalar):
         return scalar(expression)
@@ -109,7 +109,7 @@ def from_sympy(expression: Any, model: Any, values: Mapping[Any, float] | None =
     SpaceError
         A product or sum whose spaces do not meet.
     """
-    from .from_sympy import Reader
+    from .sympy_reader import Reader
 
     return Reader(_operators(model), values or {}, like).read(expression)
 
