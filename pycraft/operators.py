@@ -178,9 +178,18 @@ def exact_numbers(parts: list[list[float]], shape: Sequence[int]) -> np.ndarray:
     return out.reshape(tuple(shape))
 
 
-def scalar_at(scalar: _core.Scalar, q=None, v=None, *, form: str = "fast", refine: int = 0, precision: str = "double") -> _core.Scalar:
+def scalar_at(
+    scalar: _core.Scalar,
+    q=None,
+    v=None,
+    *,
+    form: str = "fast",
+    refine: int | str = 0,
+    residual: str = "same",
+    precision: str | int = "double",
+) -> _core.Scalar:
     """The same scalar bound to a state, as Operator.at."""
-    return scalar.bound(_core._bind(scalar.operands(), q, v, form, refine, precision))
+    return scalar.bound(_core._bind(scalar.operands(), q, v, form, refine, residual, precision))
 
 
 def operator_from_parts(kind: int, payload: Any, children: list[_core.Operator]) -> _core.Operator:

@@ -115,8 +115,9 @@ AggregatedTree::AggregatedTree(std::shared_ptr<SkoSource> base)
   share_coordinates_with(*base_);
 }
 
-std::unique_ptr<SkoValues<double>> AggregatedTree::make_values(double) const { return std::make_unique<AggregatedValues<double>>(*this); }
-std::unique_ptr<SkoValues<Extended>> AggregatedTree::make_values(Extended) const { return std::make_unique<AggregatedValues<Extended>>(*this); }
-std::unique_ptr<SkoValues<Quad>> AggregatedTree::make_values(Quad) const { return std::make_unique<AggregatedValues<Quad>>(*this); }
+#define PYCRAFT_MAKE_VALUES(S) \
+  std::unique_ptr<SkoValues<S>> AggregatedTree::make_values(S) const { return std::make_unique<AggregatedValues<S>>(*this); }
+PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_MAKE_VALUES)
+#undef PYCRAFT_MAKE_VALUES
 
 }  // namespace pycraft

@@ -29,9 +29,7 @@ class AggregatedTree final : public SkoSource {
   void check_state(const double* q, size_t nq, const double* v, size_t nv) const override { base_->check_state(q, nq, v, nv); }
   std::shared_ptr<const StateData> state() const override { return base_->state(); }
   std::uint64_t parameters() const override { return base_->parameters(); }
-  std::unique_ptr<SkoValues<double>> make_values(double) const override;
-  std::unique_ptr<SkoValues<Extended>> make_values(Extended) const override;
-  std::unique_ptr<SkoValues<Quad>> make_values(Quad) const override;
+  PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_OVERRIDE_MAKE_VALUES)
 
  private:
   std::shared_ptr<SkoSource> base_;

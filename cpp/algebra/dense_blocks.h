@@ -3,12 +3,14 @@
 #pragma once
 
 #include <algorithm>
+#include <memory>
 #include <vector>
 
 #include "algebra/errors.h"
 #include "algebra/small_cholesky.h"
 #include "algebra/small_matrix.h"
 #include "algebra/structure.h"
+#include "algebra/sweeps/factored_inertia.h"
 #include "algebra/sweeps/singular_pivot.h"
 #include "algebra/symbol.h"
 
@@ -40,6 +42,9 @@ class DenseBlocks {
     work_.resize(std::max(4 * s_max * s_max + n_max * s_max, 2 * n_max));
     error_work_.resize(3 * s_max * s_max);
   }
+
+  Form form = Form::fast;
+  bool keep_inertias = true, with_bias = false;  // blocks of any size always keep P and P⁺, and know no bias
 
   S* edge(int k) { return E.data() + at_[k].e; }
   S* hinge_map(int k) { return H.data() + at_[k].h; }
@@ -151,9 +156,18 @@ class DenseBlocks {
   }
 
   // ---------------------------------------------------------------- articulated inertia (sweeps/articulated_inertia.h)
-  void start_articulated(int k) { std::copy_n(mass(k), tree_.size[k] * tree_.size[k], P.data() + at_[k].m); }
+  void start_articulated(int k) {
+    if (form == Form::fast) {
+      std::copy_n(mass(k), tree_.size[k] * tree_.size[k], P.data() + at_[k].m);
+      return;
+    }
+    if (!factors_) factors_ = std::make_unique<FactoredInertia<S>>(tree_);
+    factors_->start(k);
+    add_factors(mass(k), tree_.size[k], [&](const S& w, auto u) { factors_->add(k, w, S(0), u); });
+  }
   // D, G, P⁺ of body k. Always in doubt: blocks of any size have no cheap bound on their rounding.
   bool eliminate_hinge(int k) {
+    if (form != Form::fast) return eliminate_hinge_of_factors(k);
     const int s = tree_.size[k], n = tree_.dof[k];
     const S* h = hinge_map(k);
     S *p = P.data() + at_[k].m, *plus = Pplus.data() + at_[k].m, *d = D.data() + at_[k].d, *l = L.data() + at_[k].d, *g = G.data() + at_[k].h;
@@ -174,7 +188,16 @@ class DenseBlocks {
     back_substitute(l, n, g, s);                          // G* = D⁻¹HP
     return true;
   }
-  void articulated_to_parent(int k) { congruence_add(k, Pplus.data() + at_[k].m, P.data() + at_[tree_.parent[k]].m); }
+  void articulated_to_parent(int k) {
+    const int p = tree_.parent[k], s = tree_.size[k];
+    if (form == Form::fast) return congruence_add(k, Pplus.data() + at_[k].m, P.data() + at_[p].m);
+    for (int r = tree_.dof[k]; r < factors_->pivots(); ++r)
+      factors_->add(p, factors_->weight(r), S(0), [&](int i) {
+        S sum = S(0);
+        for (int a = 0; a < s; ++a) sum += edge(k)[i * s + a] * factors_->U(a, r);
+        return sum;
+      });
+  }
   // ---------------------------------------------------------------- error bound (sweeps/singular_pivot.h)
   void start_error(int k) { std::copy_n(mass(k), tree_.size[k] * tree_.size[k], X.data() + at_[k].m); }
   void check_pivots(int k) {
@@ -185,7 +208,7 @@ class DenseBlocks {
       for (int a = 0; a < s; ++a)
         for (int b = 0; b < s; ++b) x[j] += hinge_map(k)[j * s + a] * X[at_[k].m + a * s + b] * hinge_map(k)[j * s + b];
     }
-    require_pivots(tree_, k, L.data() + at_[k].d, pivots_.data() + tree_.dof_offset[k], x);
+    require_pivots(tree_, k, L.data() + at_[k].d, pivots_.data() + tree_.dof_offset[k], x, rounding_bound<S>(form));
   }
   void error_to_parent(int k) {
     const int s = tree_.size[k];
@@ -231,6 +254,56 @@ class DenseBlocks {
     size_t e, h, m, d;
   };
   const S* gain(int k) const { return G.data() + at_[k].h; }  // G*, n x s
+  // add(w, u) for the factors of a positive semidefinite matrix.
+  template <class Add>
+  void add_factors(const S* A, int n, Add&& add) {
+    factor_work_.resize(std::max(factor_work_.size(), size_t(2 * n + 1) * n));
+    S *U = factor_work_.data(), *w = U + n * n;
+    semidefinite_factors(A, n, U, w, w + n);
+    for (int r = 0; r < n; ++r)
+      if (!(w[r] == S(0))) add(w[r], [u = U + r * n](int i) { return u[i]; });
+  }
+  bool eliminate_hinge_of_factors(int k) {
+    using std::sqrt;
+    const int s = tree_.size[k], n = tree_.dof[k], m = factors_->columns(k);
+    S *p = P.data() + at_[k].m, *plus = Pplus.data() + at_[k].m, *d = D.data() + at_[k].d, *l = L.data() + at_[k].d, *g = G.data() + at_[k].h;
+    S* pivots = pivots_.data() + tree_.dof_offset[k];
+    for (int i = 0; i < s; ++i)
+      for (int j = 0; j <= i; ++j) p[i * s + j] = p[j * s + i] = factors_->inertia(k, i, j);
+    for (int j = 0; j < n; ++j) {
+      S* row = factors_->hinge_row(k, j);
+      std::fill_n(row, m, S(0));
+      for (int i = 0; i < s; ++i) {
+        const S *body = factors_->body_row(k, i), h = hinge_map(k)[j * s + i];
+        if (!(h == S(0)))
+          for (int c = 0; c < m; ++c) row[c] += h * body[c];
+      }
+    }
+    add_factors(hinge_diagonal(k), n, [&](const S& w, auto u) { factors_->add_rotor(k, w, u); });
+    none_.assign(s, 0);
+    factors_->eliminate(k, form, none_.data(), false);
+    for (int j = 0; j < n; ++j) {
+      const S root = sqrt(factors_->weight(j));
+      pivots[j] = factors_->weight(j) * factors_->lower(j, j) * factors_->lower(j, j);
+      if (!(pivots[j] > S(0))) throw_singular_hinge(tree_, k, j, to_double(pivots[j]), 0.0);
+      for (int i = 0; i < n; ++i) l[i * n + j] = i < j ? S(0) : S(factors_->lower(i, j) * root);
+    }
+    std::fill_n(d, n * n, S(0));
+    multiply_transposed_add(l, l, d, n, n, n);
+    for (int j = n - 1; j >= 0; --j)  // G* = L₁⁻* L₂*
+      for (int i = 0; i < s; ++i) {
+        S sum = factors_->against(i, j);
+        for (int a = j + 1; a < n; ++a) sum -= factors_->lower(a, j) * g[a * s + i];
+        g[j * s + i] = sum / factors_->lower(j, j);
+      }
+    for (int i = 0; i < s; ++i)
+      for (int j = 0; j <= i; ++j) {
+        S sum = S(0);
+        for (int r = n; r < factors_->pivots(); ++r) sum += factors_->U(i, r) * factors_->weight(r) * factors_->U(j, r);
+        plus[i * s + j] = plus[j * s + i] = sum;
+      }
+    return n > 0;
+  }
   const std::vector<S>& square(int id) const {
     switch (id) {
       case SymbolId::M: return M;
@@ -257,7 +330,9 @@ class DenseBlocks {
 
   const SkoStructure& tree_;
   std::vector<Offsets> at_;
-  std::vector<S> E, H, G, M, P, Pplus, R, Y, X, J, D, L, pivots_, work_, error_work_;
+  std::vector<S> E, H, G, M, P, Pplus, R, Y, X, J, D, L, pivots_, work_, error_work_, factor_work_;
+  std::vector<int> none_;
+  std::unique_ptr<FactoredInertia<S>> factors_;
 };
 
 }  // namespace pycraft

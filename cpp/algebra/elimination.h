@@ -20,6 +20,7 @@
 
 #include "algebra/errors.h"
 #include "algebra/realization.h"
+#include "algebra/refinement.h"
 #include "algebra/small_lu.h"
 #include "algebra/small_matrix.h"
 #include "algebra/values.h"
@@ -56,11 +57,24 @@ class TreeElimination {
   // False where a solution loses more than `tolerated` and the operator is too large for one front: note() says where, and a wider
   // scalar may decide.
   template <class Blocks, class Values>
-  bool factor(Blocks&& blocks, Values&& values, S tolerated = S(1e7) * epsilon<S>());
+  bool factor(Blocks&& blocks, Values&& values, S tolerated = std::min(S(S(1e7) * epsilon<S>()), S(1e-2)));
 
-  // y = operator x, m columns.
+  // y = operator x, m columns, with one step of refinement or more. residual(x, s, r): r = b(x) - A s in a wider scalar.
   template <class T, class Blocks>
-  void solve(const T* x, T* y, int m, Blocks&& blocks);
+  void solve(const T* x, T* y, int m, Blocks&& blocks, const Refinement& how) {
+    solve(x, y, m, blocks, how, [&](const T*, const S* s, S* r) {
+      std::copy_n(residual_.data(), (total_ + border_) * m, r);
+      subtract_product(s, r, m);
+    });
+  }
+  template <class T, class Blocks, class Residual>
+  void solve(const T* x, T* y, int m, Blocks&& blocks, const Refinement& how, Residual&& residual);
+
+  // The system of a narrower elimination, its bodies merged as there, not factored: for residuals.
+  template <class T, class Blocks, class Values>
+  void assemble_as(const TreeElimination<T>& narrow, Blocks&& blocks, Values&& values);
+  template <class T, class U, class Blocks>
+  void residual(const T* x, const U* s, U* r, int m, Blocks&& blocks);
 
   // Diagonal blocks of the operator (inputs and outputs local).
   template <class T>
@@ -71,6 +85,8 @@ class TreeElimination {
   bool dense() const { return dense_; }
 
  private:
+  template <class T>
+  friend class TreeElimination;
   struct Front {
     std::vector<int> bodies;                  // eliminated together, the topmost first
     int parent = -1;                          // front
@@ -96,6 +112,8 @@ class TreeElimination {
   void add_block(Place row, Place column, const S* block, int r, int c, S factor);
   template <class Blocks, class Values>
   void assemble(Blocks&& blocks, Values&& values);
+  template <class T, class Blocks>
+  void right_hand_side(const T* x, int m, Blocks&& blocks);
   void subtract_product(const S* s, S* r, int m) const;   // r -= T s
   void solve_system(S* b, int m);
   void selected_fronts();                                  // Z(k,k), Z(k,b), Z(b,k) of every front

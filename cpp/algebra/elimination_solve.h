@@ -185,14 +185,9 @@ void TreeElimination<S>::subtract_product(const S* s, S* r, int m) const {
 
 template <class S>
 template <class T, class Blocks>
-void TreeElimination<S>::solve(const T* x, T* y, int m, Blocks&& blocks) {
-  const size_t size = (total_ + border_) * m;
-  rhs_.assign(size, S(0));
-  size_t largest = border_;
-  for (const Front& f : fronts_) largest = std::max(largest, size_t(f.n));
-  if (work_.size() < largest * m) work_.resize(largest * m);
+void TreeElimination<S>::right_hand_side(const T* x, int m, Blocks&& blocks) {
+  rhs_.assign((total_ + border_) * m, S(0));
   const auto at = [&](Place p, int i) { return ((p.front < 0 ? total_ : fronts_[p.front].vector) + p.position + i) * m; };
-  // right-hand side from the input
   for (const Realization::Term& t : r_->inputs) {
     if (!r_->domain.belongs_to_bodies()) {
       for (int i = 0; i < r_->domain.dimension(); ++i)
@@ -214,14 +209,44 @@ void TreeElimination<S>::solve(const T* x, T* y, int m, Blocks&& blocks) {
       });
     }
   }
+}
+
+template <class S>
+template <class T, class Blocks, class Values>
+void TreeElimination<S>::assemble_as(const TreeElimination<T>& narrow, Blocks&& blocks, Values&& values) {
+  merged_with_parent_ = narrow.merged_with_parent_;
+  lay_out(narrow.dense_);
+  assemble(blocks, values);
+}
+
+template <class S>
+template <class T, class U, class Blocks>
+void TreeElimination<S>::residual(const T* x, const U* s, U* r, int m, Blocks&& blocks) {
+  right_hand_side(x, m, blocks);
+  convert(s, rhs_.size(), product_);
+  subtract_product(product_.data(), rhs_.data(), m);
+  for (size_t i = 0; i < rhs_.size(); ++i) r[i] = static_cast<U>(rhs_[i]);
+}
+
+template <class S>
+template <class T, class Blocks, class Residual>
+void TreeElimination<S>::solve(const T* x, T* y, int m, Blocks&& blocks, const Refinement& how, Residual&& residual) {
+  const size_t size = (total_ + border_) * m;
+  size_t largest = border_;
+  for (const Front& f : fronts_) largest = std::max(largest, size_t(f.n));
+  if (work_.size() < largest * m) work_.resize(largest * m);
+  const auto at = [&](Place p, int i) { return ((p.front < 0 ? total_ : fronts_[p.front].vector) + p.position + i) * m; };
+  right_hand_side(x, m, blocks);
   residual_ = rhs_;
   solve_system(rhs_.data(), m);
-  // One step of refinement on the system itself; further ones while the correction is large and shrinks.
+  // One step of refinement on the system itself; further ones where they are asked for, or while the correction is large and shrinks.
   using std::abs;
+  const int asked = how.steps == Refinement::automatic ? most_corrections : how.steps;
+  const S enough = how.steps ? epsilon<S>() : std::min(S(S(1e6) * epsilon<S>()), S(1e-3));
   S last = S(-1);
-  for (int step = 0; step < 4; ++step) {
-    product_ = residual_;
-    subtract_product(rhs_.data(), product_.data(), m);
+  product_.resize(size);
+  for (int step = 0; step < std::max(asked, 4); ++step) {
+    residual(x, rhs_.data(), product_.data());
     solve_system(product_.data(), m);
     S correction = S(0), solution = S(0);
     for (size_t i = 0; i < size; ++i) {
@@ -230,7 +255,7 @@ void TreeElimination<S>::solve(const T* x, T* y, int m, Blocks&& blocks) {
     }
     if (step && !(correction < last / S(2))) break;
     for (size_t i = 0; i < size; ++i) rhs_[i] += product_[i];
-    if (!(correction > S(1e6) * epsilon<S>() * solution)) break;
+    if (!(correction > enough * solution)) break;
     last = correction;
   }
   // output

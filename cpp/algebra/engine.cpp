@@ -79,7 +79,10 @@ void ExecutionPool::run_at(const Inputs& inputs, bool expansions, Result& result
       held[c] = context.binding->template values<S>(context.source, plan.groups[c]);
     } else {
       context.source->check_current();
-      if (!w.own_values[c]) w.own_values[c] = context.source->make_values(S());
+      if (!w.own_values[c]) {
+        w.own_values[c] = context.source->make_values(S());
+        w.own_values[c]->use(context.binding->arithmetic.form);
+      }
       values[c] = w.own_values[c].get();
       continue;
     }
@@ -122,6 +125,7 @@ void ExecutionPool::run_at(const Inputs& inputs, bool expansions, Result& result
       w.generations[c] = values[c]->generation();
     }
     if (values.empty()) fresh = !w.ran;
+    w.state = b;
     w.ran = true;
     for (const auto& [name, r] : plan.vectors) {
       const std::vector<double>& given = inputs.vectors.at(name);
@@ -203,11 +207,7 @@ void ExecutionPool::run_at(const Inputs& inputs, bool expansions, Result& result
 }
 
 void ExecutionPool::run(const Inputs& inputs, bool expansions, Result& result) {
-  switch (plan_->precision) {
-    case Precision::double_: return run_at<double>(inputs, expansions, result);
-    case Precision::extended: return run_at<Extended>(inputs, expansions, result);
-    case Precision::quad: return run_at<Quad>(inputs, expansions, result);
-  }
+  at_precision(plan_->precision, [&]<class S>(S) { run_at<S>(inputs, expansions, result); });
 }
 
 std::shared_ptr<ExecutionPool> PlanCache::find_or_make(const Expression& e, Request request, const PlanOptions& options) {

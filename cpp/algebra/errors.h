@@ -23,6 +23,11 @@ struct EvaluationError : Error {
 };
 // D(k) singular at the rounding bound of the form in use. (ArithmeticError)
 struct SingularHingeError : Error {
+  SingularHingeError(const std::string& text, int at) : Error(text), coordinate(at) {}
+  int coordinate;  // its number in the model
+};
+// Iterative refinement that does not contract. (ArithmeticError)
+struct RefinementError : Error {
   using Error::Error;
 };
 // Any other inverse that does not exist numerically. (ArithmeticError)

@@ -93,7 +93,7 @@ std::string explain(const Plan& plan) {
   out << plan.text << "\n" << requests[static_cast<int>(plan.request)];
   if (plan.domain) out << ", from " << plan.domain.description() << " to " << plan.codomain.description();
   if (plan.batched) out << ", at " << plan.batch << " states";
-  if (plan.precision != Precision::double_) out << ", in " << precision_name(plan.precision) << " precision";
+  if (plan.precision != Precision::double_) out << ", in " << precision_name(plan.precision) << (plan.precision < Precision::digits50 ? " precision" : " digits");
   out << "\n";
   for (const std::string& note : plan.notes) out << "  by " << note << "\n";
   size_t widest = 20;

@@ -71,8 +71,9 @@ void MatrixTree::check_state(const double*, size_t nq, const double*, size_t nv)
   if (nq || nv) throw ModelError("'" + name() + "' is a tree of constant matrices and has no state");
 }
 
-std::unique_ptr<SkoValues<double>> MatrixTree::make_values(double) const { return std::make_unique<MatrixTreeValues<double>>(*this); }
-std::unique_ptr<SkoValues<Extended>> MatrixTree::make_values(Extended) const { return std::make_unique<MatrixTreeValues<Extended>>(*this); }
-std::unique_ptr<SkoValues<Quad>> MatrixTree::make_values(Quad) const { return std::make_unique<MatrixTreeValues<Quad>>(*this); }
+#define PYCRAFT_MAKE_VALUES(S) \
+  std::unique_ptr<SkoValues<S>> MatrixTree::make_values(S) const { return std::make_unique<MatrixTreeValues<S>>(*this); }
+PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_MAKE_VALUES)
+#undef PYCRAFT_MAKE_VALUES
 
 }  // namespace pycraft

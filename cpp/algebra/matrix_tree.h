@@ -22,9 +22,7 @@ class MatrixTree final : public SkoSource {
   void check_state(const double* q, size_t nq, const double* v, size_t nv) const override;
   std::shared_ptr<const StateData> state() const override { return state_; }
   std::uint64_t parameters() const override { return 0; }
-  std::unique_ptr<SkoValues<double>> make_values(double) const override;
-  std::unique_ptr<SkoValues<Extended>> make_values(Extended) const override;
-  std::unique_ptr<SkoValues<Quad>> make_values(Quad) const override;
+  PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_OVERRIDE_MAKE_VALUES)
 
   std::vector<std::vector<double>> E, H, M, J;
 

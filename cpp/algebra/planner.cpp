@@ -206,7 +206,7 @@ Plan Planner::plan(const Expression& typed, Request request) {
   }
   bool first = true;
   for (const Context& c : plan_.contexts) {
-    const Precision p = c.binding ? c.binding->precision : Precision::double_;
+    const Precision p = c.binding ? c.binding->arithmetic.precision : Precision::double_;
     if (!c.binding) continue;
     if (!first && p != plan_.precision) throw EvaluationError("two precisions in one expression: bind all of it with one .at(..., precision=...)");
     plan_.precision = p;

@@ -21,9 +21,9 @@ class Prototype final : public SkoSource {
   void check_state(const double*, size_t, const double*, size_t) const override {}
   std::shared_ptr<const StateData> state() const override { return std::make_shared<StateData>(); }
   std::uint64_t parameters() const override { return 0; }
-  std::unique_ptr<SkoValues<double>> make_values(double) const override { return nullptr; }
-  std::unique_ptr<SkoValues<Extended>> make_values(Extended) const override { return nullptr; }
-  std::unique_ptr<SkoValues<Quad>> make_values(Quad) const override { return nullptr; }
+#define PYCRAFT_NO_VALUES(S) std::unique_ptr<SkoValues<S>> make_values(S) const override { return nullptr; }
+  PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_NO_VALUES)
+#undef PYCRAFT_NO_VALUES
 
  private:
   static SkoStructure skeleton() {

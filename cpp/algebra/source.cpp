@@ -7,18 +7,6 @@
 
 namespace pycraft {
 
-const char* precision_name(Precision precision) {
-  static const char* names[] = {"double", "extended", "quad"};
-  return names[static_cast<int>(precision)];
-}
-
-Precision precision_from_name(const std::string& name) {
-  for (const Precision p : {Precision::double_, Precision::extended, Precision::quad})
-    if (name == precision_name(p)) return p;
-  if (name == "single") throw EvaluationError("precision 'single' is not there yet; there are 'double', 'extended' and 'quad'");
-  throw EvaluationError("no precision is called '" + name + "'; there are 'double', 'extended' and 'quad'");
-}
-
 namespace {
 
 // Which sources are alive: a space may outlive the model it belongs to.
@@ -95,9 +83,9 @@ std::shared_ptr<SkoValues<S>> SkoSource::current_values(unsigned groups) {
   return values;
 }
 
-template std::shared_ptr<SkoValues<double>> SkoSource::current_values<double>(unsigned);
-template std::shared_ptr<SkoValues<Extended>> SkoSource::current_values<Extended>(unsigned);
-template std::shared_ptr<SkoValues<Quad>> SkoSource::current_values<Quad>(unsigned);
+#define PYCRAFT_INSTANTIATE(S) template std::shared_ptr<SkoValues<S>> SkoSource::current_values<S>(unsigned);
+PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_INSTANTIATE)
+#undef PYCRAFT_INSTANTIATE
 
 template <class S>
 std::shared_ptr<SkoValues<S>> Binding::values(const std::shared_ptr<SkoSource>& source, unsigned groups) const {
@@ -109,7 +97,10 @@ std::shared_ptr<SkoValues<S>> Binding::values(const std::shared_ptr<SkoSource>& 
     for (Entry<S>& e : known)
       if (e.source.lock() == source) {
         if (e.parameters != source->parameters()) {
-          if (e.values.use_count() > 1) e.values = source->make_values(S());
+          if (e.values.use_count() > 1) {
+            e.values = source->make_values(S());
+            e.values->use(arithmetic.form);
+          }
           e.values->move_to(q.data(), v.data());
           e.parameters = source->parameters();
         }
@@ -117,6 +108,7 @@ std::shared_ptr<SkoValues<S>> Binding::values(const std::shared_ptr<SkoSource>& 
       }
     if (!found) {
       found = source->make_values(S());
+      found->use(arithmetic.form);
       found->move_to(q.data(), v.data());
       known.push_back({source, source->parameters(), found});
     }
@@ -125,8 +117,8 @@ std::shared_ptr<SkoValues<S>> Binding::values(const std::shared_ptr<SkoSource>& 
   return found;
 }
 
-template std::shared_ptr<SkoValues<double>> Binding::values<double>(const std::shared_ptr<SkoSource>&, unsigned) const;
-template std::shared_ptr<SkoValues<Extended>> Binding::values<Extended>(const std::shared_ptr<SkoSource>&, unsigned) const;
-template std::shared_ptr<SkoValues<Quad>> Binding::values<Quad>(const std::shared_ptr<SkoSource>&, unsigned) const;
+#define PYCRAFT_INSTANTIATE(S) template std::shared_ptr<SkoValues<S>> Binding::values<S>(const std::shared_ptr<SkoSource>&, unsigned) const;
+PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_INSTANTIATE)
+#undef PYCRAFT_INSTANTIATE
 
 }  // namespace pycraft

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "algebra/arithmetic.h"
 #include "algebra/space.h"
 #include "algebra/symbol.h"
 #include "spatial/scalar.h"
@@ -17,10 +18,6 @@ namespace pycraft {
 template <class S>
 class SkoValues;
 
-enum class Precision { double_, extended, quad };
-const char* precision_name(Precision precision);
-// Throws EvaluationError that lists the names there are.
-Precision precision_from_name(const std::string& name);
 
 // A state of a model: immutable once made, so that readers in several threads need no lock.
 struct StateData {
@@ -74,9 +71,9 @@ class SkoSource : public std::enable_shared_from_this<SkoSource> {
   virtual void check_state(const double* q, size_t nq, const double* v, size_t nv) const = 0;
   virtual std::shared_ptr<const StateData> state() const = 0;
   virtual std::uint64_t parameters() const = 0;  // grows with every change of a mass, a placement, ...
-  virtual std::unique_ptr<SkoValues<double>> make_values(double) const = 0;
-  virtual std::unique_ptr<SkoValues<Extended>> make_values(Extended) const = 0;
-  virtual std::unique_ptr<SkoValues<Quad>> make_values(Quad) const = 0;
+#define PYCRAFT_MAKE_VALUES(S) virtual std::unique_ptr<SkoValues<S>> make_values(S) const = 0;
+  PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_MAKE_VALUES)
+#undef PYCRAFT_MAKE_VALUES
 
   // The values at the model's present state with these groups computed.
   template <class S>
@@ -96,14 +93,15 @@ class SkoSource : public std::enable_shared_from_this<SkoSource> {
   PerScalar<ValueCache> caches_;
 };
 
+// What a source declares: make_values at every scalar.
+#define PYCRAFT_OVERRIDE_MAKE_VALUES(S) std::unique_ptr<SkoValues<S>> make_values(S) const override;
+
 // A state, or a batch of states, that an expression was bound to by .at(...), and the way to compute there.
 struct Binding {
   int batch = -1;            // -1: one state
   int nq = 0, nv = 0;
   std::vector<double> q, v;  // (batch, nq) and (batch, nv), row after row
-  std::string form = "fast";
-  int refine = 0;
-  Precision precision = Precision::double_;
+  Arithmetic arithmetic;
 
   // For one state: the cached values of this source.
   template <class S>

@@ -20,6 +20,7 @@ class TreeValues : public SkoValues<typename Blocks::Scalar> {
   template <class... Arguments>
   explicit TreeValues(const SkoStructure& tree, Arguments&&... arguments) : tree_(tree), blocks_(tree, std::forward<Arguments>(arguments)...) {}
 
+  void use(Form form) override { blocks_.form = form; }
   void apply(const Symbol& symbol, bool transposed, bool inverse, const S* x, S* y, int m) const override {
     const SymbolDefinition& d = *symbol.definition;
     if (d.pattern == Pattern::edges) {

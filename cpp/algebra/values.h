@@ -16,6 +16,9 @@ class SkoValues {
  public:
   virtual ~SkoValues() = default;
 
+  // The form of the articulated-inertia sweep; set before the first state.
+  virtual void use(Form form) = 0;
+
   // Moves to a state (null pointers where the source has none): nothing is computed yet.
   void move_to(const double* q, const double* v) {
     set_state(q, v);

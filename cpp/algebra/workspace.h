@@ -10,6 +10,7 @@
 #include "algebra/elimination.h"
 #include "algebra/engine.h"
 #include "algebra/errors.h"
+#include "algebra/refinement.h"
 #include "algebra/small_lu.h"
 #include "algebra/values.h"
 
@@ -137,9 +138,7 @@ class Workspace {
         return;
       }
       case StepKind::solve:
-        with_factors(s.in[0], [&](auto& factors) {
-          factors.solve(vectors_[s.in[1]].data(), vectors_[s.out].data(), width(s.in[1], m), [&](int r) -> const BlockStorage<S>& { return blocks_[r]; });
-        });
+        solve_realization(s, values, width(s.in[1], m));
         return;
       case StepKind::selected_blocks:
         with_factors(s.in[0], [&](auto& factors) { factors.selected(blocks_[s.out]); });
@@ -152,7 +151,7 @@ class Workspace {
         if (s.kind == StepKind::mass_matrix)
           values[s.context]->mass_matrix(s.flag, vectors_[s.in[0]].data(), vectors_[s.out].data(), w, scratch_.data());
         else
-          values[s.context]->mass_matrix_inverse(vectors_[s.in[0]].data(), vectors_[s.out].data(), w, scratch_.data());
+          solve_mass_matrix(s, values, w);
         return;
       }
       case StepKind::mass_matrix_dense:
@@ -307,6 +306,100 @@ class Workspace {
       f(*own);
   }
 
+  // ---- refinement, asked for by the binding of a context
+  Refinement refinement() const {
+    Refinement r;
+    for (const Context& c : plan_->contexts) {
+      if (!c.binding) continue;
+      const Refinement& own = c.binding->arithmetic.refinement;
+      r.wider |= own.wider;
+      r.steps = own.steps == Refinement::automatic || r.steps == Refinement::automatic ? Refinement::automatic : std::max(r.steps, own.steps);
+    }
+    return r;
+  }
+  // This plan one scalar up, at the state of these values: everything but the factors, where they serve solves alone.
+  void follow(const std::vector<SkoValues<S>*>& values) {
+    if (!wide_) wide_ = std::make_unique<Workspace<Wider<S>>>(plan_);
+    std::vector<std::uint64_t> now;
+    for (const SkoValues<S>* v : values) now.push_back(v->generation());
+    if (now == followed_) return;
+    followed_ = now;
+    wide_values_.resize(values.size());
+    wide_at_.clear();
+    for (size_t c = 0; c < values.size(); ++c) {
+      const SkoSource& source = *plan_->contexts[c].source;
+      const Binding* b = plan_->contexts[c].binding.get();
+      if (!wide_values_[c]) {
+        wide_values_[c] = source.make_values(Wider<S>());
+        if (b) wide_values_[c]->use(b->arithmetic.form);
+      }
+      if (b) {
+        const size_t at = b->batch < 0 ? 0 : size_t(state);
+        wide_values_[c]->move_to(b->q.data() + at * b->nq, b->v.data() + at * b->nv);
+      } else {
+        const auto now = source.state();
+        wide_values_[c]->move_to(now->q.data(), now->v.data());
+      }
+      wide_values_[c]->require(plan_->groups[c] | Group::kinematics);
+      wide_at_.push_back(wide_values_[c].get());
+    }
+    wide_->run_as(*this, wide_at_);
+  }
+  template <class T>
+  void run_as(const Workspace<T>& narrow, const std::vector<SkoValues<S>*>& values) {
+    PassCounts counts;
+    for (const Step& s : plan_->steps) {
+      if (s.out >= 0 && plan_->registers[s.out].kind == RegisterKind::vector) continue;
+      const bool solves_only = s.kind == StepKind::factor && std::none_of(plan_->steps.begin(), plan_->steps.end(), [&](const Step& t) {
+        return (t.kind == StepKind::selected_blocks || t.kind == StepKind::logdet_of_factor) && t.in[0] == s.out;
+      });
+      if (!solves_only) {
+        step(s, values, 1, counts);
+        continue;
+      }
+      auto& own = eliminations_[s.out].own;
+      if (!own) own = std::make_unique<TreeElimination<S>>(s.realization);
+      own->assemble_as(*narrow.eliminations_[s.out].own, [&](int r) -> const BlockStorage<S>& { return blocks_[r]; },
+                       [&](int c) -> const SkoValues<S>& { return *values[c]; });
+    }
+  }
+  void solve_realization(const Step& s, const std::vector<SkoValues<S>*>& values, int w) {
+    const Refinement how = refinement();
+    const S* x = vectors_[s.in[1]].data();
+    S* y = vectors_[s.out].data();
+    const auto blocks = [&](int r) -> const BlockStorage<S>& { return blocks_[r]; };
+    if (how.steps == 0 || !how.wider || eliminations_[s.in[0]].wide)
+      return with_factors(s.in[0], [&](auto& factors) { factors.solve(x, y, w, blocks, how); });
+    follow(values);
+    auto& wide = *wide_->eliminations_[s.in[0]].own;
+    eliminations_[s.in[0]].own->solve(x, y, w, blocks, how, [&](const S* b, const S* solution, S* r) {
+      wide.residual(b, solution, r, w, [&](int i) -> const BlockStorage<Wider<S>>& { return wide_->blocks_[i]; });
+    });
+  }
+  void solve_mass_matrix(const Step& s, const std::vector<SkoValues<S>*>& values, int w) {
+    const SkoValues<S>& own = *values[s.context];
+    const S* x = vectors_[s.in[0]].data();
+    S* y = vectors_[s.out].data();
+    own.mass_matrix_inverse(x, y, w, scratch_.data());
+    const Refinement how = refinement();
+    if (how.steps == 0) return;
+    const int n = plan_->registers[s.out].space.dimension();
+    const size_t size = size_t(n) * w;
+    if (how.wider) follow(values);
+    const auto residual = [&](const S* solution, S* r) {
+      if (how.wider) {
+        convert(solution, size, wide_x_);
+        wide_y_.resize(size), wide_scratch_.resize(std::max(wide_scratch_.size(), scratch_.size()));
+        wide_at_[s.context]->mass_matrix(true, wide_x_.data(), wide_y_.data(), w, wide_scratch_.data());
+        for (size_t i = 0; i < size; ++i) r[i] = static_cast<S>(Wider<S>(x[i]) - wide_y_[i]);
+      } else {
+        own.mass_matrix(true, solution, r, w, scratch_.data());
+        for (size_t i = 0; i < size; ++i) r[i] = x[i] - r[i];
+      }
+    };
+    refine(y, n, w, how, S(0), plan_->text, residual, [&](const S* r, S* d) { own.mass_matrix_inverse(r, d, w, scratch_.data()); }, refine_r_, refine_delta_, corrections);
+  }
+
   void apply_external_operator(const Step& s, int w) {
     if constexpr (std::is_same_v<S, double>) {
       const auto& f = s.transposed ? s.external->apply_transposed : s.external->apply;
@@ -324,6 +417,7 @@ class Workspace {
     std::vector<SkoValues<S>*> own;
     for (const Context& c : s.operand->contexts) own.push_back(values[std::find(plan_->contexts.begin(), plan_->contexts.end(), c) - plan_->contexts.begin()]);
     const int rows = s.operand->codomain.dimension(), columns = s.operand->domain.dimension();
+    w->state = state;
     A.resize(size_t(rows) * columns);
     for (int start = 0; start < columns; start += columns_at_a_time) {
       const int m = std::min(columns_at_a_time, columns - start);
@@ -487,12 +581,22 @@ class Workspace {
   std::vector<SmallLU<S>> dense_lu_;
   std::vector<std::pair<const Step*, std::unique_ptr<Workspace>>> operands_;
   SmallLU<S> lu_;
-  std::vector<S> gathered_, scratch_, block_, product_, magnitude_;
+  std::vector<S> gathered_, scratch_, block_, product_, magnitude_, refine_r_, refine_delta_;
   std::vector<std::string> notes_;
+  // one scalar up, for residuals
+  template <class T>
+  friend class Workspace;
+  std::unique_ptr<Workspace<Wider<S>>> wide_;
+  std::vector<std::unique_ptr<SkoValues<Wider<S>>>> wide_values_;
+  std::vector<SkoValues<Wider<S>>*> wide_at_;
+  std::vector<Wider<S>> wide_x_, wide_y_, wide_scratch_;
+  std::vector<std::uint64_t> followed_;
 
  public:
   std::vector<std::unique_ptr<SkoValues<S>>> own_values;  // of batched contexts
   bool ran = false;
+  int state = 0;                                          // of the batch
+  std::vector<double> corrections;                        // of the last refined solve, relative to the solution
   std::vector<std::uint64_t> generations;                 // of the values that blocks and factors were made from
 };
 

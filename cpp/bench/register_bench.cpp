@@ -4,6 +4,7 @@
 #include "algebra/errors.h"
 #include "bench/timing.h"
 #include "bindings/bindings.h"
+#include "dynamics/packed_dynamics.h"
 #include "dynamics/rigid_dynamics.h"
 #include "dynamics/sensitivities.h"
 
@@ -19,17 +20,66 @@ py::dict result(const Timing& t) {
   return d;
 }
 
-py::dict time_apply(const Expression& e, const Array& x, double seconds) {
+py::dict time_apply(const Expression& e, const Array& x, double seconds, bool rules) {
   Inputs inputs;
   inputs.x = x.data();
   inputs.columns = x.ndim() == 2 ? static_cast<int>(x.shape(1)) : 1;
-  const auto pool = prepare(e, Request::apply);
+  const auto pool = prepare(e, Request::apply, rules);
   Result r;
   Timing t;
   {
     py::gil_scoped_release release;
     t = time_calls([&] { pool->run(inputs, false, r); }, seconds);
   }
+  return result(t);
+}
+
+// One forward dynamics per state in rotation, in every way there is.
+py::dict time_forward(const std::shared_ptr<Multibody>& model, const Array& q, const Array& v, const Array& u, double seconds, Form form, const py::object& refine,
+                      const std::string& residual, Precision precision) {
+  const Solving how{form, refinement(refine, residual), OnSingular::raise};
+  const int K = static_cast<int>(q.shape(0)), nq = model->nq(), nv = model->nv();
+  const double *Q = q.data(), *V = v.data(), *U = u.data();
+  Timing t;
+  {
+    py::gil_scoped_release release;
+    at_precision(precision, [&]<class S>(S) {
+      RigidDynamics<S> w(*model);
+      std::vector<S> out(nv);
+      int k = 0;
+      t = time_calls([&] {
+        w.forward_dynamics(Q + size_t(k) * nq, V + size_t(k) * nv, U + size_t(k) * nv, out.data(), how);
+        k = (k + 1) % K;
+      }, seconds);
+    });
+  }
+  return result(t);
+}
+
+// Forward dynamics of a batch in packs, seconds per state; the number of states is a multiple of a pack's width.
+py::dict time_packs(const std::shared_ptr<Multibody>& model, const Array& q, const Array& v, const Array& u, double seconds, Form form, Precision precision) {
+  const int K = static_cast<int>(q.shape(0)), nq = model->nq(), nv = model->nv();
+  const double *Q = q.data(), *V = v.data(), *U = u.data();
+  std::vector<double> out(size_t(K) * nv);
+  Timing t;
+  const auto run = [&]<class T>(T) {
+    constexpr int width = PackedDynamics<T>::width;
+    if (K % width) throw EvaluationError("packs take a multiple of " + std::to_string(width) + " states");
+    PackedDynamics<T> w(*model);
+    t = time_calls([&] {
+      for (int b = 0; b < K; b += width)
+        if (!w.forward_dynamics(Q + size_t(b) * nq, nq, V + size_t(b) * nv, nv, U + size_t(b) * nv, nv, out.data() + size_t(b) * nv, form))
+          throw EvaluationError("a hinge of '" + model->name() + "' is in doubt: not a case for packs");
+    }, seconds);
+  };
+  {
+    py::gil_scoped_release release;
+    if (precision == Precision::single)
+      run(Single());
+    else
+      run(double());
+  }
+  t.minimum /= K, t.median /= K;
   return result(t);
 }
 
@@ -76,9 +126,14 @@ py::dict time_dynamics(const std::shared_ptr<Multibody>& model, const std::strin
 }  // namespace
 
 void register_bench(py::module_& m) {
-  m.def("time_apply", &time_apply, py::arg("operator"), py::arg("x"), py::arg("seconds") = 0.2, "Seconds per application: minimum, median, calls.");
+  m.def("time_apply", &time_apply, py::arg("operator"), py::arg("x"), py::arg("seconds") = 0.2, py::arg("rules") = true, "Seconds per application: minimum, median, calls.");
   m.def("time_dynamics", &time_dynamics, py::arg("model"), py::arg("call"), py::arg("q"), py::arg("v"), py::arg("u"), py::arg("seconds") = 0.2,
         "Seconds per direct call over a set of states in rotation: minimum, median, calls.");
+  m.def("time_forward", &time_forward, py::arg("model"), py::arg("q"), py::arg("v"), py::arg("u"), py::arg("seconds") = 0.2, py::arg("form") = Form::fast,
+        py::arg("refine") = 0, py::arg("residual") = "same", py::arg("precision") = Precision::double_,
+        "Seconds per forward dynamics over a set of states in rotation: minimum, median, calls.");
+  m.def("time_packs", &time_packs, py::arg("model"), py::arg("q"), py::arg("v"), py::arg("u"), py::arg("seconds") = 0.2, py::arg("form") = Form::fast,
+        py::arg("precision") = Precision::double_, "Seconds per state of a batch in packs: minimum, median, calls.");
 }
 
 }  // namespace pycraft

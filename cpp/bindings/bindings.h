@@ -63,9 +63,36 @@ int batch_of(const Expression& e);
 // The symbol of this name of a source; node operators take node names, Delta a coordinate.
 Expression source_symbol(const std::shared_ptr<SkoSource>& source, const std::string& name, const std::vector<std::string>& nodes, int coordinate);
 // A state, or a batch, for all models that occur unbound in the operands; q None takes the model's present state.
-std::shared_ptr<const Binding> make_binding(const std::vector<Expression>& operands, const py::object& q, const py::object& v, const std::string& form,
-                                            int refine, const std::string& precision);
+std::shared_ptr<const Binding> make_binding(const std::vector<Expression>& operands, const py::object& q, const py::object& v,
+                                            const Arithmetic& arithmetic);
+// refine: a number of corrections or "auto"; residual: "same" | "wider".
+Refinement refinement(const py::object& refine, const std::string& residual);
 // What an expression is pickled as.
 py::tuple parts(const Expression& e);
 
 }  // namespace pycraft
+
+// Precisions and forms are given by name; 50 and 100 are numbers of digits.
+namespace pybind11::detail {
+template <>
+struct type_caster<pycraft::Precision> {
+  PYBIND11_TYPE_CASTER(pycraft::Precision, const_name("str | int"));
+  bool load(handle source, bool) {
+    value = pycraft::precision_from_name(pybind11::str(source));
+    return true;
+  }
+  static handle cast(pycraft::Precision precision, return_value_policy, handle) {
+    const char* name = pycraft::precision_name(precision);
+    return precision >= pycraft::Precision::digits50 ? pybind11::int_(std::stoi(name)).release() : pybind11::str(name).release();
+  }
+};
+template <>
+struct type_caster<pycraft::Form> {
+  PYBIND11_TYPE_CASTER(pycraft::Form, const_name("str"));
+  bool load(handle source, bool) {
+    value = pycraft::form_from_name(pybind11::str(source));
+    return true;
+  }
+  static handle cast(pycraft::Form form, return_value_policy, handle) { return pybind11::str(pycraft::form_name(form)).release(); }
+};
+}  // namespace pybind11::detail

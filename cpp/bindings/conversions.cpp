@@ -92,6 +92,20 @@ Array real_array(const py::object& x) {
   return a;
 }
 
+Refinement refinement(const py::object& refine, const std::string& residual) {
+  Refinement r;
+  if (residual != "same" && residual != "wider")
+    throw EvaluationError("residual '" + residual + "' is not there; there are 'same' (the precision itself) and 'wider' (the next one up)");
+  r.wider = residual == "wider";
+  if (py::isinstance<py::str>(refine) && py::cast<std::string>(refine) == "auto") {
+    r.steps = Refinement::automatic;
+  } else {
+    if (!py::isinstance<py::int_>(refine) || (r.steps = py::cast<int>(refine)) < 0)
+      throw EvaluationError("refine=" + py::cast<std::string>(py::repr(refine)) + ": a number of corrections, 0, 1, 2, ..., or 'auto'");
+  }
+  return r;
+}
+
 int batch_of(const Expression& e) {
   for (const Context& c : contexts(e))
     if (c.binding && c.binding->batch >= 0) return c.binding->batch;

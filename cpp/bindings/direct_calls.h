@@ -91,10 +91,9 @@ inline void check_velocities(const Multibody& m, const Argument& v, int batch, c
 
 // Runs f(workspace, inputs..., out) state after state at the precision asked for.
 template <template <class> class Workspace, class F>
-py::array_t<double> run(DirectCalls<Workspace>& d, const std::string& precision, std::vector<std::pair<const Argument*, int>> in, py::array_t<double> out, int out_size, int batch, F f) {
+py::array_t<double> run(DirectCalls<Workspace>& d, Precision precision, std::vector<std::pair<const Argument*, int>> in, py::array_t<double> out, int out_size, int batch, F f) {
   const int states = batch < 0 ? 1 : batch;
   double* target = out.mutable_data();
-  const Precision p = precision_from_name(precision);
   std::vector<const double*> data;
   for (const auto& [a, _] : in) data.push_back(a->array.data());
   py::gil_scoped_release release;
@@ -120,11 +119,7 @@ py::array_t<double> run(DirectCalls<Workspace>& d, const std::string& precision,
       }
     });
   };
-  switch (p) {
-    case Precision::double_: run_in(double()); break;
-    case Precision::extended: run_in(Extended()); break;
-    case Precision::quad: run_in(Quad()); break;
-  }
+  at_precision(precision, run_in);
   return out;
 }
 

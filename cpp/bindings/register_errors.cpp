@@ -19,13 +19,14 @@ py::object make(py::module_& m, const char* name, const py::object& base, PyObje
 }  // namespace
 
 void register_errors(py::module_& m) {
-  static py::object error, space, model, evaluation, hinge, singular, stale;
+  static py::object error, space, model, evaluation, hinge, refinement, singular, stale;
   error = py::reinterpret_steal<py::object>(PyErr_NewExceptionWithDoc("pycraft.Error", "Base of every error that pycraft raises.", PyExc_Exception, nullptr));
   m.attr("Error") = error;
   space = make(m, "SpaceError", error, PyExc_TypeError, "Operators whose spaces do not meet.");
   model = make(m, "ModelError", error, PyExc_ValueError, "A model, a size or a number that makes no sense.");
   evaluation = make(m, "EvaluationError", error, PyExc_ValueError, "A value that cannot be computed as asked.");
   hinge = make(m, "SingularHingeError", error, PyExc_ArithmeticError, "D(k) is singular at the rounding bound of the form in use.");
+  refinement = make(m, "RefinementError", error, PyExc_ArithmeticError, "Iterative refinement that does not contract.");
   singular = make(m, "SingularOperatorError", error, PyExc_ArithmeticError, "An inverse that does not exist numerically.");
   stale = make(m, "StaleOperatorError", error, PyExc_RuntimeError, "An operator made before its model's structure changed.");
   py::register_exception_translator([](std::exception_ptr p) {
@@ -39,6 +40,8 @@ void register_errors(py::module_& m) {
       PyErr_SetString(evaluation.ptr(), e.what());
     } catch (const SingularHingeError& e) {
       PyErr_SetString(hinge.ptr(), e.what());
+    } catch (const RefinementError& e) {
+      PyErr_SetString(refinement.ptr(), e.what());
     } catch (const SingularOperatorError& e) {
       PyErr_SetString(singular.ptr(), e.what());
     } catch (const StaleOperatorError& e) {

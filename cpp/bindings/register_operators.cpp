@@ -139,10 +139,15 @@ py::object value(const Expression& e, const py::kwargs& vectors) {
     throw SpaceError(show(e) + " is an operator, not a vector; its entries are dense()");
   Inputs inputs;
   py::object dtype = py::none();
+  bool rules = true;
   for (const auto& [name, array] : vectors) {
     const std::string key = py::cast<std::string>(name);
     if (key == "dtype") {
       dtype = py::reinterpret_borrow<py::object>(array);
+      continue;
+    }
+    if (key == "rules") {
+      rules = py::cast<bool>(array);
       continue;
     }
     const Array a = real_array(py::reinterpret_borrow<py::object>(array));
@@ -153,7 +158,7 @@ py::object value(const Expression& e, const py::kwargs& vectors) {
   const bool objects = wants_objects(dtype);
   {
     py::gil_scoped_release release;
-    apply(e, inputs, r, true, objects);
+    apply(e, inputs, r, rules, objects);
   }
   std::vector<py::ssize_t> shape;
   if (batch >= 0) shape.push_back(batch);
@@ -176,11 +181,12 @@ void register_operators(py::module_& m) {
       .def_property_readonly("T", &Expression::T, "The transpose, the book's star: A: X→Y gives A.T: Y'→X'. Cost: none.")
       .def("inv", &Expression::inv, "The inverse, as an expression; how it is evaluated is the planner's business (see explain).")
       .def("sqrt", &square_root, "L with A = L L.T, body by body; for symmetric block-diagonal operators.")
-      .def("at", [](const Expression& e, const py::object& q, const py::object& v, const std::string& form, int refine, const std::string& precision) {
-        return e.at(make_binding({e}, q, v, form, refine, precision));
-      }, py::arg("q") = py::none(), py::arg("v") = py::none(), py::kw_only(), py::arg("form") = "fast", py::arg("refine") = 0, py::arg("precision") = "double",
+      .def("at", [](const Expression& e, const py::object& q, const py::object& v, Form form, const py::object& refine, const std::string& residual, Precision precision) {
+        return e.at(make_binding({e}, q, v, {form, refinement(refine, residual), precision}));
+      }, py::arg("q") = py::none(), py::arg("v") = py::none(), py::kw_only(), py::arg("form") = Form::fast, py::arg("refine") = 0, py::arg("residual") = "same", py::arg("precision") = Precision::double_,
          "The same expression bound to a state: q (nq,) or a batch (B, nq), v likewise (zero if left out); q=None takes the model's present\n"
-         "state. The innermost binding wins. precision: \"double\" or \"extended\".")
+         "state. The innermost binding wins. form: \"fast\", \"ud\" or \"square-root\", of the articulated-inertia sweep; refine: corrections of\n"
+         "what is solved, a number or \"auto\", with residual=\"same\" or \"wider\"; precision: \"single\", \"double\", \"extended\", \"quad\", 50, 100.")
       .def("_bound", [](const Expression& e, const std::shared_ptr<const Binding>& b) { return e.at(b); })
       // ---- arithmetic
       .def("__matmul__", [](const Expression& a, const py::object& b) -> py::object {
@@ -226,7 +232,7 @@ void register_operators(py::module_& m) {
         return dtype.is_none() ? a : a.attr("astype")(dtype);
       }, py::arg("dtype") = py::none(), py::arg("copy") = py::none())
       .def("diagonal", &diagonal, "The diagonal entries (n,), or (B, n). Cost O(N).")
-      .def("value", &value, "The value of a vector expression; named vectors (pycraft.vector) are given by name.")
+      .def("value", &value, "The value of a vector expression; named vectors (pycraft.vector) are given by name. rules=False evaluates what was typed.")
       .def("trace", [](const Expression& e) { return trace(e); }, "The trace, as a scalar expression. Cost O(N).")
       .def("logdet", [](const Expression& e) { return logdet(e); }, "ln|det|, as a scalar expression. Cost O(N); exact by structure where a theorem gives it.")
       .def("norm", [](const Expression& e) { return norm(e); }, "The Frobenius norm, as a scalar expression.")
@@ -273,7 +279,7 @@ void register_operators(py::module_& m) {
           py::object a = to_numpy(x);
           return b.batch < 0 ? a : a.attr("reshape")(b.batch, width);
         };
-        return py::make_tuple(shaped(b.q, b.nq), shaped(b.v, b.nv), precision_name(b.precision));
+        return py::make_tuple(shaped(b.q, b.nq), shaped(b.v, b.nv), b.arithmetic.precision);
       }, "(q, v, precision) that it is bound to, None where it is not.")
       .def("_with_operand", [](const Expression& e, const Expression& operand) {
         if (e.kind() != NodeKind::block_function) throw EvaluationError(show(e) + " is no function of an operand");

@@ -85,7 +85,7 @@ py::dict plan_as_data(const Plan& p) {
   d["domain"] = space_or_none(p.domain);
   d["codomain"] = space_or_none(p.codomain);
   d["notes"] = p.notes;
-  d["precision"] = precision_name(p.precision);
+  d["precision"] = p.precision;
   d["batch"] = p.batched ? p.batch : -1;
   d["columns_of_identity"] = p.columns_of_identity;
   d["input"] = p.input;
@@ -174,11 +174,14 @@ py::object numbers_of(const Plan& p, size_t context, const std::string& name, co
 void register_plans(py::module_& m) {
   m.def("epsilons", [] {
     py::dict d;
-    d["double"] = to_double(epsilon<double>());
-    d["extended"] = to_double(epsilon<Extended>());
-    d["quad"] = to_double(epsilon<Quad>());
+    for (const Precision p : precisions)
+      at_precision(p, [&]<class S>(S) { d[py::cast(p)] = to_double(epsilon<S>()); });
     return d;
   }, "Epsilon of each precision by name.");
+  m.def("precisions", [] { return std::vector<Precision>(std::begin(precisions), std::end(precisions)); }, "The precisions, from narrow to wide.");
+  m.def("forms", [] { return std::vector<Form>(std::begin(forms), std::end(forms)); }, "The forms of the articulated-inertia sweep.");
+  m.def("wider", [](Precision precision) { return precision == Precision::digits100 ? py::object(py::none()) : py::cast(precisions[static_cast<int>(precision) + 1]); },
+        py::arg("precision"), "The next wider precision, None for the widest.");
   m.def("step_kinds", [] {
     std::vector<std::string> names;
     for (int i = 0; i < step_kinds; ++i) names.push_back(step_kind_name(static_cast<StepKind>(i)));

@@ -50,7 +50,7 @@ void register_sensitivities(py::module_& m) {
   const py::arg q("q"), v("v"), precision("precision");
   py::class_<Calls>(m, "Sensitivities")
       .def(py::init<std::shared_ptr<Multibody>>())
-      .def("dynamics", [](Calls& d, bool forward, const py::object& q, const py::object& v, const py::object& vdot, const std::string& precision) {
+      .def("dynamics", [](Calls& d, bool forward, const py::object& q, const py::object& v, const py::object& vdot, Precision precision) {
         const Multibody& mb = d.model();
         const int nq = mb.nq(), n = mb.nv(), size = n * n * (forward ? 3 : 2);
         const State s = state(mb, q, v, vdot, "vdot");
@@ -62,7 +62,7 @@ void register_sensitivities(py::module_& m) {
         });
         return forward ? cut(all, s.batch, {{n, n}, {n, n}, {n, n}}) : cut(all, s.batch, {{n, n}, {n, n}});
       }, py::arg("forward"), q, v, py::arg("vdot"), precision)
-      .def("third_order", [](Calls& d, bool christoffel, const py::object& q, const std::string& precision, const py::object& out) {
+      .def("third_order", [](Calls& d, bool christoffel, const py::object& q, Precision precision, const py::object& out) {
         const Multibody& mb = d.model();
         const int n = mb.nv(), size = n * n * n;
         const State s = state(mb, q, py::none(), py::none(), "");
@@ -73,7 +73,7 @@ void register_sensitivities(py::module_& m) {
             w.mass_matrix(in[0], y);
         });
       }, py::arg("christoffel"), q, precision, py::arg("out"))
-      .def("kinetic_energy", [](Calls& d, const py::object& q, const py::object& v, const std::string& precision) {
+      .def("kinetic_energy", [](Calls& d, const py::object& q, const py::object& v, Precision precision) {
         const Multibody& mb = d.model();
         const int n = mb.nv();
         const State s = state(mb, q, v, py::none(), "");
@@ -81,7 +81,7 @@ void register_sensitivities(py::module_& m) {
                              [n](auto& w, auto in, auto* y) { w.kinetic_energy(in[0], in[1], y, y + n); });
         return cut(all, s.batch, {{n}, {n}});
       }, q, v, precision)
-      .def("hamiltonian", [](Calls& d, const py::object& q, const py::object& p, const py::object& tau, const std::string& precision) {
+      .def("hamiltonian", [](Calls& d, const py::object& q, const py::object& p, const py::object& tau, Precision precision) {
         const Multibody& mb = d.model();
         const int n = mb.nv();
         const State s = state(mb, q, p, tau, "tau");
@@ -89,7 +89,7 @@ void register_sensitivities(py::module_& m) {
                              [n](auto& w, auto in, auto* y) { w.hamiltonian(in[0], in[1], in[2], y, y + n); });
         return cut(all, s.batch, {{n}, {n}});
       }, q, py::arg("p"), py::arg("tau"), precision)
-      .def("momentum", [](Calls& d, const py::object& q, const py::object& v, const std::string& precision) {
+      .def("momentum", [](Calls& d, const py::object& q, const py::object& v, Precision precision) {
         const Multibody& mb = d.model();
         const int n = mb.nv();
         const State s = state(mb, q, v, py::none(), "");
@@ -97,7 +97,7 @@ void register_sensitivities(py::module_& m) {
                              [n](auto& w, auto in, auto* y) { w.momentum(in[0], in[1], y, y + 6 * n); });
         return cut(all, s.batch, {{6, n}, {6, n}});
       }, q, v, precision)
-      .def("jacobian_rate", [](Calls& d, const std::string& frame, const py::object& q, const py::object& v, const std::string& precision) {
+      .def("jacobian_rate", [](Calls& d, const std::string& frame, const py::object& q, const py::object& v, Precision precision) {
         const Multibody& mb = d.model();
         const Node node = mb.node(mb.node_index(frame));
         const int n = mb.nv();
@@ -105,7 +105,7 @@ void register_sensitivities(py::module_& m) {
         return run(d, precision, {{&s.q, mb.nq()}, {&s.v, n}}, output(py::none(), s.batch, {6, n}), 6 * n, s.batch,
                    [&](auto& w, auto in, auto* y) { w.jacobian_rate(node, in[0], in[1], y); });
       }, py::arg("frame"), q, v, precision)
-      .def("jacobian_derivative", [](Calls& d, const std::string& frame, const py::object& q, const std::string& precision) {
+      .def("jacobian_derivative", [](Calls& d, const std::string& frame, const py::object& q, Precision precision) {
         const Multibody& mb = d.model();
         const Node node = mb.node(mb.node_index(frame));
         const int n = mb.nv();
@@ -113,14 +113,14 @@ void register_sensitivities(py::module_& m) {
         return run(d, precision, {{&s.q, mb.nq()}}, output(py::none(), s.batch, {6, n, n}), 6 * n * n, s.batch,
                    [&](auto& w, auto in, auto* y) { w.jacobian_derivative(node, in[0], y); });
       }, py::arg("frame"), q, precision)
-      .def("inertial_regressor", [](Calls& d, const py::object& q, const py::object& v, const py::object& vdot, const std::string& precision) {
+      .def("inertial_regressor", [](Calls& d, const py::object& q, const py::object& v, const py::object& vdot, Precision precision) {
         const Multibody& mb = d.model();
         const int n = mb.nv(), size = n * 10 * mb.bodies();
         const State s = state(mb, q, v, vdot, "vdot");
         return run(d, precision, {{&s.q, mb.nq()}, {&s.v, n}, {&s.w, n}}, output(py::none(), s.batch, {n, 10 * mb.bodies()}), size, s.batch,
                    [](auto& w, auto in, auto* y) { w.inertial_regressor(in[0], in[1], in[2], y); });
       }, q, v, py::arg("vdot"), precision)
-      .def("log_determinant", [](Calls& d, const std::string& over, const py::object& q, const std::string& precision) {
+      .def("log_determinant", [](Calls& d, const std::string& over, const py::object& q, Precision precision) {
         const Multibody& mb = d.model();
         const int n = mb.nv(), bodies = mb.bodies();
         const State s = state(mb, q, py::none(), py::none(), "");

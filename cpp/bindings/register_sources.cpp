@@ -45,13 +45,10 @@ Expression source_symbol(const std::shared_ptr<SkoSource>& source, const std::st
   }
 }
 
-std::shared_ptr<const Binding> make_binding(const std::vector<Expression>& operands, const py::object& q_given, const py::object& v_given, const std::string& form,
-                                            int refine, const std::string& precision) {
-  if (form != "fast") throw EvaluationError("form '" + form + "' of the articulated-inertia sweep is not there; there is 'fast'");
-  if (refine != 0) throw EvaluationError("refine=" + std::to_string(refine) + ": refinement is not there yet; there is refine=0");
+std::shared_ptr<const Binding> make_binding(const std::vector<Expression>& operands, const py::object& q_given, const py::object& v_given,
+                                            const Arithmetic& arithmetic) {
   auto binding = std::make_shared<Binding>();
-  binding->form = form;
-  binding->precision = precision_from_name(precision);
+  binding->arithmetic = arithmetic;
   std::vector<std::shared_ptr<SkoSource>> sources;
   for (const Expression& e : operands)
     for (const Context& c : contexts(e))
@@ -108,18 +105,22 @@ void register_sources(py::module_& m) {
   declared<py::class_<Binding, std::shared_ptr<Binding>>>(m, "Binding")
       .def("__reduce__", [](const Binding& b) -> py::tuple {
         return py::make_tuple(py::module_::import("pycraft._core").attr("_binding_from_parts"),
-                              py::make_tuple(b.batch, b.nq, b.nv, b.q, b.v, precision_name(b.precision)));
+                              py::make_tuple(b.batch, b.nq, b.nv, b.q, b.v, b.arithmetic.precision, b.arithmetic.form, b.arithmetic.refinement.steps,
+                                             b.arithmetic.refinement.wider));
       });
-  m.def("_binding_from_parts", [](int batch, int nq, int nv, std::vector<double> q, std::vector<double> v, const std::string& precision) {
+  m.def("_binding_from_parts", [](int batch, int nq, int nv, std::vector<double> q, std::vector<double> v, Precision precision, Form form, int steps, bool wider) {
     auto b = std::make_shared<Binding>();
-    b->batch = batch, b->nq = nq, b->nv = nv, b->q = std::move(q), b->v = std::move(v), b->precision = precision_from_name(precision);
+    b->batch = batch, b->nq = nq, b->nv = nv, b->q = std::move(q), b->v = std::move(v), b->arithmetic = {form, {steps, wider}, precision};
     return b;
   });
   m.def("_binding", [](const Expression& e) {
     const auto all = contexts(e);
     return all.empty() ? std::shared_ptr<Binding>() : std::const_pointer_cast<Binding>(all[0].binding);
   });
-  m.def("_bind", &make_binding, py::arg("operands"), py::arg("q"), py::arg("v"), py::arg("form"), py::arg("refine"), py::arg("precision"));
+  m.def("_bind", [](const std::vector<Expression>& operands, const py::object& q, const py::object& v, Form form, const py::object& refine,
+                    const std::string& residual, Precision precision) { return make_binding(operands, q, v, {form, refinement(refine, residual), precision}); },
+        py::arg("operands"), py::arg("q"), py::arg("v"), py::arg("form") = Form::fast, py::arg("refine") = 0, py::arg("residual") = "same",
+        py::arg("precision") = Precision::double_);
 
   declared<py::class_<SkoSource, std::shared_ptr<SkoSource>>>(m, "SkoSource")
       .def_property_readonly("name", &SkoSource::name)

@@ -1,6 +1,9 @@
 #include "dynamics/rigid_dynamics.h"
 
 #include "algebra/sweeps/articulated_inertia.h"
+#include "algebra/small_cholesky.h"
+#include "algebra/small_matrix.h"
+#include "algebra/sweeps/composite_inertia.h"
 #include "algebra/sweeps/mass_matrix.h"
 #include "recursions/articulated_body.h"
 #include "recursions/composite_mass_matrix.h"
@@ -11,13 +14,90 @@ namespace pycraft {
 
 template <class S>
 RigidDynamics<S>::RigidDynamics(const Multibody& model)
-    : tree_(model.structure()), model_(model.compiled<S>()), blocks_(tree_), alpha_(tree_.bodies()), force_(tree_.bodies()), zero_(tree_.coordinates(), S(0)) {}
+    : source_(model), tree_(model.structure()), model_(model.compiled<S>()), blocks_(tree_), alpha_(tree_.bodies()), force_(tree_.bodies()) {}
 
 template <class S>
-void RigidDynamics<S>::forward_dynamics(const S* q, const S* v, const S* tau, S* vdot) {
-  kinematics(*model_, q, blocks_);
-  velocities_base_to_tip(*model_, blocks_.pose.data(), blocks_.H.data(), v, velocities_);
-  articulated_body(tree_, *model_, blocks_, velocities_, tau, vdot, force_, alpha_);
+template <class T>
+void RigidDynamics<S>::set_state(const T* q, const T* v) {
+  convert(q, model_->nq, q_);
+  convert(v, model_->nv, v_);
+  kinematics(*model_, q_.data(), blocks_);
+  velocities_base_to_tip(*model_, blocks_.pose.data(), blocks_.H.data(), v_.data(), velocities_);
+}
+
+template <class S>
+template <class T>
+void RigidDynamics<S>::forward_dynamics(const T* q, const T* v, const T* tau, S* vdot, const Solving& how) {
+  const int n = model_->nv;
+  set_state(q, v);
+  convert(tau, n, tau_);
+  blocks_.form = how.form;
+  S largest = S(0);
+  if (how.on_singular == OnSingular::minimum_norm) {
+    const auto added = with_every_hinge_regular([&] { largest = articulated_body(tree_, *model_, blocks_, velocities_, tau_.data(), vdot, force_, alpha_); });
+    if (!added.empty()) {
+      std::fill_n(vdot, n, S(0));
+      r_.resize(n);
+      newton_euler(*model_, blocks_, velocities_, vdot, r_.data(), alpha_, force_);
+      for (int i = 0; i < n; ++i) r_[i] = tau_[i] - r_[i];
+      articulated_inertia_tip_to_base(tree_, blocks_);
+      project_off_null_space(added, r_.data(), 1);
+      solve(r_.data(), vdot, 1);
+      return project_off_null_space(added, vdot, 1);
+    }
+  } else {
+    largest = articulated_body(tree_, *model_, blocks_, velocities_, tau_.data(), vdot, force_, alpha_);
+  }
+  corrections_.clear();
+  if (how.refinement.steps == 0) return;
+  if (how.refinement.wider) wider(q, v);
+  refine(vdot, n, 1, how.refinement, largest, "the forward dynamics of '" + source_.name() + "'",
+         [&](const S* x, S* r) {
+           if (!how.refinement.wider) return residual(tau, x, r);
+           convert(x, n, wide_x_), wide_r_.resize(n);
+           wider_->residual(tau, wide_x_.data(), wide_r_.data());
+           for (int i = 0; i < n; ++i) r[i] = static_cast<S>(wide_r_[i]);
+         },
+         [&](const S* r, S* d) { solve(r, d, 1); }, r_, delta_, corrections_);
+}
+
+template <class S>
+size_t RigidDynamics<S>::bytes(Form form) const {
+  const size_t n = tree_.bodies(), N = tree_.coordinates();
+  size_t scalars = n * (12 + 10 + 4 * 6 + 2 * 6 + 3) + N * (4 * 6 + 6);  // poses, inertias, velocities, forces and accelerations; H, G, Ḣ, ...
+  for (size_t k = 0; k < n; ++k) scalars += 2 * size_t(tree_.dof[k]) * tree_.dof[k];
+  scalars += form == Form::fast ? n * 2 * 21 : FactoredInertia<S>(tree_).scalars();
+  return scalars * sizeof(S);
+}
+
+template <class S>
+template <class T>
+void RigidDynamics<S>::residual(const T* tau, const S* vdot, S* r) {
+  newton_euler(*model_, blocks_, velocities_, vdot, r, alpha_, force_);
+  for (int i = 0; i < model_->nv; ++i) r[i] = S(tau[i]) - r[i];
+}
+
+template <class S>
+void RigidDynamics<S>::subtract_product(const S* x, S* r, int m) {
+  const size_t size = size_t(model_->nv) * m;
+  scratch_.resize(std::max(scratch_.size(), size_t(6) * model_->bodies * m));
+  tau_.resize(std::max(tau_.size(), size));
+  mass_matrix_apply(tree_, blocks_, true, x, tau_.data(), m, scratch_.data());
+  for (size_t i = 0; i < size; ++i) r[i] -= tau_[i];
+}
+
+template <class S>
+void RigidDynamics<S>::solve(const S* r, S* x, int m) {
+  scratch_.resize(std::max(scratch_.size(), size_t(6) * model_->bodies * m));
+  mass_matrix_inverse_apply(tree_, blocks_, r, x, m, scratch_.data());
+}
+
+template <class S>
+template <class T>
+RigidDynamics<Wider<S>>& RigidDynamics<S>::wider(const T* q, const T* v) {
+  if (!wider_) wider_ = std::make_unique<RigidDynamics<Wider<S>>>(source_);
+  wider_->set_state(q, v);
+  return *wider_;
 }
 
 template <class S>
@@ -34,17 +114,89 @@ void RigidDynamics<S>::mass_matrix(const S* q, S* out) {
 }
 
 template <class S>
-void RigidDynamics<S>::mass_matrix_inverse(const S* q, S* out) {
+void RigidDynamics<S>::mass_matrix_inverse(const double* q, S* out, const Solving& how) {
   const int N = model_->nv;
-  kinematics(*model_, q, blocks_);
-  articulated_inertia_tip_to_base(tree_, blocks_);
-  columns_.assign(size_t(N) * N, S(0));
+  const size_t size = size_t(N) * N;
+  convert(q, model_->nq, q_);
+  kinematics(*model_, q_.data(), blocks_);
+  blocks_.form = how.form;
+  columns_.assign(size, S(0));
   for (int i = 0; i < N; ++i) columns_[size_t(i) * N + i] = S(1);
-  scratch_.resize(size_t(6) * model_->bodies * N);
-  mass_matrix_inverse_apply(tree_, blocks_, columns_.data(), out, N, scratch_.data());
+  std::vector<std::pair<int, S>> added;
+  if (how.on_singular == OnSingular::minimum_norm)
+    added = with_every_hinge_regular([&] { articulated_inertia_tip_to_base(tree_, blocks_); });
+  else
+    articulated_inertia_tip_to_base(tree_, blocks_);
+  project_off_null_space(added, columns_.data(), N);
+  solve(columns_.data(), out, N);
+  project_off_null_space(added, out, N);
+  corrections_.clear();
+  if (how.refinement.steps != 0 && added.empty()) {
+    if (how.refinement.wider) {
+      std::vector<double> rest(N, 0.0);
+      wider(q, rest.data());
+    }
+    refine(out, N, N, how.refinement, S(0), "the mass matrix inverse of '" + source_.name() + "'",
+           [&](const S* x, S* r) {
+             if (!how.refinement.wider) {
+               std::copy_n(columns_.data(), size, r);
+               return subtract_product(x, r, N);
+             }
+             convert(x, size, wide_x_), convert(columns_.data(), size, wide_r_);
+             wider_->subtract_product(wide_x_.data(), wide_r_.data(), N);
+             for (size_t i = 0; i < size; ++i) r[i] = static_cast<S>(wide_r_[i]);
+           },
+           [&](const S* r, S* d) { solve(r, d, N); }, r_, delta_, corrections_);
+  }
   // Symmetric by meaning; the two triangles differ by rounding and the mean is the better of them.
   for (int i = 0; i < N; ++i)
     for (int j = 0; j < i; ++j) out[size_t(i) * N + j] = out[size_t(j) * N + i] = S(0.5) * (out[size_t(i) * N + j] + out[size_t(j) * N + i]);
+}
+
+// ---- singular hinges: ℳ + J n = 0 for some n with n_j ≠ 0, j the coordinate at fault. With an inertia s added to J(j) the matrix is
+// regular, and its solution x of forces b ⊥ n is one of the singular system: n*(ℳ + s e e*) x = s n_j x_j = n* b = 0.
+
+template <class S>
+template <class F>
+std::vector<std::pair<int, S>> RigidDynamics<S>::with_every_hinge_regular(F f) {
+  std::vector<std::pair<int, S>> added;
+  for (;;) {
+    try {
+      f();
+      return added;
+    } catch (const SingularHingeError& e) {
+      for (const auto& [j, _] : added)
+        if (j == e.coordinate) throw;
+      S inertia = S(1);  // any number will do: of the size of the mass that the hinge would move if all others were locked
+      composite_inertia_tip_to_base(tree_, blocks_);
+      for (int k = 0; k < model_->bodies; ++k)
+        if (e.coordinate >= tree_.dof_offset[k] && e.coordinate < tree_.dof_offset[k + 1]) {
+          const S locked = dot(blocks_.H[e.coordinate], blocks_.R[k] * blocks_.H[e.coordinate]);
+          if (locked > S(0)) inertia = locked;
+        }
+      added.emplace_back(e.coordinate, inertia);
+      blocks_.J[e.coordinate] += inertia;
+    }
+  }
+}
+
+// x <- x - N (N*N)⁻¹ N* x, N = (ℳ + J)⁻¹ e_j of the regularised matrix for every coordinate at fault.
+template <class S>
+void RigidDynamics<S>::project_off_null_space(const std::vector<std::pair<int, S>>& added, S* x, int m) {
+  const int n = model_->nv, z = static_cast<int>(added.size());
+  if (z == 0) return;
+  std::vector<S> unit(size_t(n) * z, S(0)), N(size_t(n) * z), gram(size_t(z) * z, S(0)), pivots(z), weights(size_t(z) * m);
+  for (int c = 0; c < z; ++c) unit[size_t(added[c].first) * z + c] = added[c].second;
+  solve(unit.data(), N.data(), z);
+  transposed_multiply_add(N.data(), N.data(), gram.data(), z, n, z);
+  if (cholesky_in_place(gram.data(), z, pivots.data()) < z) throw SingularOperatorError("the null space of '" + source_.name() + "' at its singular hinges is not resolved");
+  for (int pass = 0; pass < 2; ++pass) {  // twice is enough
+    std::fill(weights.begin(), weights.end(), S(0));
+    transposed_multiply_add(N.data(), x, weights.data(), z, n, m);
+    forward_substitute(gram.data(), z, weights.data(), m);
+    back_substitute(gram.data(), z, weights.data(), m);
+    multiply_add(N.data(), weights.data(), x, n, z, m, S(-1));
+  }
 }
 
 template <class S>
@@ -93,8 +245,12 @@ S RigidDynamics<S>::potential_energy(const S* q) {
   return energy;
 }
 
-template class RigidDynamics<double>;
-template class RigidDynamics<Extended>;
-template class RigidDynamics<Quad>;
+#define PYCRAFT_INSTANTIATE(S)     \
+  template class RigidDynamics<S>; \
+  template void RigidDynamics<S>::forward_dynamics(const double*, const double*, const double*, S*, const Solving&);
+PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_INSTANTIATE)
+#undef PYCRAFT_INSTANTIATE
+template void RigidDynamics<Extended>::forward_dynamics(const Extended*, const Extended*, const Extended*, Extended*, const Solving&);
+template void RigidDynamics<Quad>::forward_dynamics(const Quad*, const Quad*, const Quad*, Quad*, const Solving&);
 
 }  // namespace pycraft

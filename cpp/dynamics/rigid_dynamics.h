@@ -4,8 +4,10 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "algebra/refinement.h"
 #include "dynamics/workspace_pool.h"
 #include "model/multibody.h"
 #include "operators/rigid_blocks.h"
@@ -13,34 +15,70 @@
 
 namespace pycraft {
 
+enum class OnSingular { raise, minimum_norm };
+
+// How accelerations are solved for.
+struct Solving {
+  Form form = Form::fast;
+  Refinement refinement;
+  OnSingular on_singular = OnSingular::raise;
+};
+
 // Numbers of one model at one scalar.
 template <class S>
 class RigidDynamics {
  public:
   explicit RigidDynamics(const Multibody& model);
 
-  // Each takes one state; sizes are the caller's business (Multibody::check_q, check_v).
-  void forward_dynamics(const S* q, const S* v, const S* tau, S* vdot);
+  // Each takes one state; sizes are the caller's business (Multibody::check_q, check_v). States of forward dynamics are doubles, or S:
+  // what a narrower scalar rounds away, a wider residual sees.
+  template <class T>
+  void forward_dynamics(const T* q, const T* v, const T* tau, S* vdot, const Solving& how = {});
   void inverse_dynamics(const S* q, const S* v, const S* vdot, S* tau);   // vdot null: bias forces
-  void mass_matrix(const S* q, S* out);           // ℳ + J, full
-  void mass_matrix_inverse(const S* q, S* out);   // (ℳ + J)⁻¹, full; O(N) a column
+  void mass_matrix(const S* q, S* out);                                   // ℳ + J, full
+  void mass_matrix_inverse(const double* q, S* out, const Solving& how = {});  // (ℳ + J)⁻¹, full; O(N) a column
   void jacobian(const Node& node, const S* q, S* out);  // 6 x nv, node axes
   Pose<S> pose(const Node& node, const S* q);     // X_WN
   S kinetic_energy(const S* q, const S* v);       // with rotor inertia
   S potential_energy(const S* q);                 // -Σ m g·c, zero at the world's origin
 
+  // What forward dynamics in this form works in.
+  size_t bytes(Form form) const;
+
+  // |δ|/|x| of the corrections of the last refined call.
+  const std::vector<double>& corrections() const { return corrections_; }
+
  private:
+  template <class T>
+  friend class RigidDynamics;
+
+  template <class T>
+  void set_state(const T* q, const T* v);                 // kinematics and velocities
+  template <class T>
+  void residual(const T* tau, const S* vdot, S* r);       // tau - inverse dynamics, at the state that was set
+  void subtract_product(const S* x, S* r, int m);         // r -= (ℳ + J) x
+  void solve(const S* r, S* x, int m);                    // with the kept factors
+  template <class T>
+  RigidDynamics<Wider<S>>& wider(const T* q, const T* v);
+  template <class F>
+  std::vector<std::pair<int, S>> with_every_hinge_regular(F f);
+  void project_off_null_space(const std::vector<std::pair<int, S>>& added, S* x, int m);
+
+  const Multibody& source_;
   const SkoStructure tree_;
   std::shared_ptr<const CompiledModel<S>> model_;
   RigidBlocks<S> blocks_;
   Velocities<S> velocities_;
   std::vector<Vector6<S>> alpha_, force_;
-  std::vector<S> columns_, scratch_, zero_;
+  std::vector<S> q_, v_, tau_, columns_, scratch_, r_, delta_;
+  std::unique_ptr<RigidDynamics<Wider<S>>> wider_;
+  std::vector<Wider<S>> wide_x_, wide_r_;
+  std::vector<double> corrections_;
 };
 
-extern template class RigidDynamics<double>;
-extern template class RigidDynamics<Extended>;
-extern template class RigidDynamics<Quad>;
+#define PYCRAFT_INSTANTIATE(S) extern template class RigidDynamics<S>;
+PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_INSTANTIATE)
+#undef PYCRAFT_INSTANTIATE
 
 template <class S>
 using DynamicsPool = WorkspacePool<RigidDynamics<S>>;

@@ -294,8 +294,8 @@ void Sensitivities<S>::log_determinant(const S* q, S* coordinates, S* inertias, 
   }
 }
 
-template class Sensitivities<double>;
-template class Sensitivities<Extended>;
-template class Sensitivities<Quad>;
+#define PYCRAFT_INSTANTIATE(S) template class Sensitivities<S>;
+PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_INSTANTIATE)
+#undef PYCRAFT_INSTANTIATE
 
 }  // namespace pycraft

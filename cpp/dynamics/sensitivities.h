@@ -48,8 +48,8 @@ class Sensitivities {
   std::vector<S> work_, inverse_, scratch_;
 };
 
-extern template class Sensitivities<double>;
-extern template class Sensitivities<Extended>;
-extern template class Sensitivities<Quad>;
+#define PYCRAFT_INSTANTIATE(S) extern template class Sensitivities<S>;
+PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_INSTANTIATE)
+#undef PYCRAFT_INSTANTIATE
 
 }  // namespace pycraft

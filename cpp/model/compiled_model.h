@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "model/hinge.h"
+#include "model/inertia_factors.h"
 #include "spatial/rigid_inertia.h"
 
 namespace pycraft {
@@ -27,10 +28,36 @@ struct CompiledModel {
   std::vector<CompiledSubhinge<S>> subhinges;
   std::vector<Pose<S>> placement;
   std::vector<RigidInertia<S>> inertia;
+  std::vector<InertiaFactors<S>> inertia_factors;
   std::vector<S> rotor_inertia;               // per coordinate
   bool has_rotor_inertia = false;
   std::vector<int> aligned;                   // per coordinate: i where its row of H is exactly e_i at every q, else -1
   Vector3<S> gravity;
 };
+
+template <class S, class T>
+inline InertiaFactors<S> cast(const InertiaFactors<T>& f) {
+  InertiaFactors<S> g;
+  for (int i = 0; i < 6; ++i) g.column[i] = cast<S>(f.column[i]), g.weight[i] = S(f.weight[i]);
+  g.com = cast<S>(f.com);
+  std::copy_n(f.pivot, 3, g.pivot);
+  return g;
+}
+
+// The same model, every number in all lanes of a pack.
+template <class S, class T>
+CompiledModel<S> broadcast(const CompiledModel<T>& from) {
+  CompiledModel<S> to;
+  to.parameters = from.parameters, to.bodies = from.bodies, to.nq = from.nq, to.nv = from.nv;
+  to.parent = from.parent, to.q_offset = from.q_offset, to.v_offset = from.v_offset, to.nv_of = from.nv_of;
+  to.first_subhinge = from.first_subhinge, to.aligned = from.aligned, to.has_rotor_inertia = from.has_rotor_inertia;
+  for (const auto& h : from.subhinges) to.subhinges.push_back({h.kind, cast<S>(h.twist), cast<S>(h.axis), cast<S>(h.point), S(h.pitch)});
+  for (const auto& X : from.placement) to.placement.push_back(cast<S>(X));
+  for (const auto& M : from.inertia) to.inertia.push_back(cast<S>(M));
+  for (const auto& f : from.inertia_factors) to.inertia_factors.push_back(cast<S>(f));
+  to.rotor_inertia.assign(from.rotor_inertia.begin(), from.rotor_inertia.end());
+  to.gravity = cast<S>(from.gravity);
+  return to;
+}
 
 }  // namespace pycraft

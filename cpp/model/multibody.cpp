@@ -471,6 +471,7 @@ std::shared_ptr<const CompiledModel<S>> compile(const Multibody& model) {
     c->nv_of.push_back(b.hinge.nv());
     c->placement.push_back(renormalised<S>(b.hinge.placement));
     c->inertia.push_back(rigid_inertia(S(b.mass), cast<S>(b.com), cast<S>(b.inertia)));
+    c->inertia_factors.push_back(inertia_factors(S(b.mass), cast<S>(b.com), cast<S>(b.inertia)));
     for (size_t i = 0; i < b.hinge.subhinges.size(); ++i) {
       const Subhinge& h = b.hinge.subhinges[i];
       const Vector3<S> axis = renormalised<S>(h.axis), point = cast<S>(h.point);
@@ -514,9 +515,9 @@ std::shared_ptr<const CompiledModel<S>> Multibody::compiled() const {
   if (!kept || kept->parameters != parameters_) kept = compile<S>(*this);
   return kept;
 }
-template std::shared_ptr<const CompiledModel<double>> Multibody::compiled<double>() const;
-template std::shared_ptr<const CompiledModel<Extended>> Multibody::compiled<Extended>() const;
-template std::shared_ptr<const CompiledModel<Quad>> Multibody::compiled<Quad>() const;
+#define PYCRAFT_INSTANTIATE(S) template std::shared_ptr<const CompiledModel<S>> Multibody::compiled<S>() const;
+PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_INSTANTIATE)
+#undef PYCRAFT_INSTANTIATE
 
 std::shared_ptr<SkoSource> Multibody::operators() const { return operators_.lock(); }
 void Multibody::keep_operators(const std::shared_ptr<SkoSource>& source) { operators_ = source; }

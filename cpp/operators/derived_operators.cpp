@@ -52,6 +52,7 @@ class SubsetValues final : public DerivedValues<S> {
     RigidBlocks<S>& b = this->blocks_;
     b.pose = all.pose;
     b.inertia = all.inertia;
+    b.inertia_factors = all.inertia_factors;
     for (int k = 0; k < this->tree_.bodies(); ++k)
       for (int j = 0; j < this->tree_.dof[k]; ++j) {
         const int to = this->tree_.dof_offset[k] + j, from = this->whole_.dof_offset[k] + j;
@@ -74,17 +75,23 @@ class WorldValues final : public DerivedValues<S> {
   void derive(const RigidBlocks<S>& all) override {
     RigidBlocks<S>& b = this->blocks_;
     std::vector<Pose<S>> world(this->tree_.bodies());
+    factors_.resize(this->tree_.bodies());
+    b.inertia_factors = &factors_;
     for (int k = 0; k < this->tree_.bodies(); ++k) {
       const int p = this->tree_.parent[k];
       world[k] = p < 0 ? all.pose[k] : world[p] * all.pose[k];
       b.pose[k] = Pose<S>::identity();
       b.inertia[k] = to_parent(world[k], all.inertia[k]);
+      factors_[k] = to_parent(world[k], (*all.inertia_factors)[k]);
       for (int j = this->tree_.dof_offset[k]; j < this->tree_.dof_offset[k + 1]; ++j) {
         b.H[j] = motion_to_child(inverse(world[k]), all.H[j]);  // a row of HX⁻¹ is X⁻* h
         b.J[j] = all.J[j];
       }
     }
   }
+
+ private:
+  std::vector<InertiaFactors<S>> factors_;
 };
 
 }  // namespace
@@ -104,15 +111,17 @@ Traits DerivedOperators::traits() const {
 
 HingeSubset::HingeSubset(std::shared_ptr<MultibodyOperators> base, std::vector<char> kept)
     : DerivedOperators(kept_structure(base->structure(), kept), base->name() + ", some hinges", base), kept_(std::move(kept)) {}
-std::unique_ptr<SkoValues<double>> HingeSubset::make_values(double) const { return std::make_unique<SubsetValues<double>>(*this, base_->structure()); }
-std::unique_ptr<SkoValues<Extended>> HingeSubset::make_values(Extended) const { return std::make_unique<SubsetValues<Extended>>(*this, base_->structure()); }
-std::unique_ptr<SkoValues<Quad>> HingeSubset::make_values(Quad) const { return std::make_unique<SubsetValues<Quad>>(*this, base_->structure()); }
+#define PYCRAFT_MAKE_VALUES(S) \
+  std::unique_ptr<SkoValues<S>> HingeSubset::make_values(S) const { return std::make_unique<SubsetValues<S>>(*this, base_->structure()); }
+PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_MAKE_VALUES)
+#undef PYCRAFT_MAKE_VALUES
 
 WorldFrame::WorldFrame(std::shared_ptr<MultibodyOperators> base) : DerivedOperators(base->structure(), base->name() + ", world frame", base) {
   share_coordinates_with(*base_);
 }
-std::unique_ptr<SkoValues<double>> WorldFrame::make_values(double) const { return std::make_unique<WorldValues<double>>(*this); }
-std::unique_ptr<SkoValues<Extended>> WorldFrame::make_values(Extended) const { return std::make_unique<WorldValues<Extended>>(*this); }
-std::unique_ptr<SkoValues<Quad>> WorldFrame::make_values(Quad) const { return std::make_unique<WorldValues<Quad>>(*this); }
+#define PYCRAFT_MAKE_VALUES(S) \
+  std::unique_ptr<SkoValues<S>> WorldFrame::make_values(S) const { return std::make_unique<WorldValues<S>>(*this); }
+PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_MAKE_VALUES)
+#undef PYCRAFT_MAKE_VALUES
 
 }  // namespace pycraft

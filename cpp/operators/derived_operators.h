@@ -33,9 +33,7 @@ class HingeSubset final : public DerivedOperators {
  public:
   HingeSubset(std::shared_ptr<MultibodyOperators> base, std::vector<char> kept);
   const std::vector<char>& kept() const { return kept_; }
-  std::unique_ptr<SkoValues<double>> make_values(double) const override;
-  std::unique_ptr<SkoValues<Extended>> make_values(Extended) const override;
-  std::unique_ptr<SkoValues<Quad>> make_values(Quad) const override;
+  PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_OVERRIDE_MAKE_VALUES)
 
  private:
   std::vector<char> kept_;
@@ -45,9 +43,7 @@ class HingeSubset final : public DerivedOperators {
 class WorldFrame final : public DerivedOperators {
  public:
   explicit WorldFrame(std::shared_ptr<MultibodyOperators> base);
-  std::unique_ptr<SkoValues<double>> make_values(double) const override;
-  std::unique_ptr<SkoValues<Extended>> make_values(Extended) const override;
-  std::unique_ptr<SkoValues<Quad>> make_values(Quad) const override;
+  PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_OVERRIDE_MAKE_VALUES)
 };
 
 }  // namespace pycraft

@@ -31,9 +31,10 @@ Space MultibodyOperators::space(SpaceKind kind, const std::vector<int>& nodes) c
   return Space(kind, layout);
 }
 
-std::unique_ptr<SkoValues<double>> MultibodyOperators::make_values(double) const { return std::make_unique<RigidValues<double>>(structure(), *model_); }
-std::unique_ptr<SkoValues<Extended>> MultibodyOperators::make_values(Extended) const { return std::make_unique<RigidValues<Extended>>(structure(), *model_); }
-std::unique_ptr<SkoValues<Quad>> MultibodyOperators::make_values(Quad) const { return std::make_unique<RigidValues<Quad>>(structure(), *model_); }
+#define PYCRAFT_MAKE_VALUES(S) \
+  std::unique_ptr<SkoValues<S>> MultibodyOperators::make_values(S) const { return std::make_unique<RigidValues<S>>(structure(), *model_); }
+PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_MAKE_VALUES)
+#undef PYCRAFT_MAKE_VALUES
 
 std::shared_ptr<MultibodyOperators> operators_of(const std::shared_ptr<Multibody>& model) {
   if (auto known = std::static_pointer_cast<MultibodyOperators>(model->operators())) return known;
@@ -251,8 +252,8 @@ void RigidValues<S>::vector(const Symbol& symbol, S* out) const {
   }
 }
 
-template class RigidValues<double>;
-template class RigidValues<Extended>;
-template class RigidValues<Quad>;
+#define PYCRAFT_INSTANTIATE(S) template class RigidValues<S>;
+PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_INSTANTIATE)
+#undef PYCRAFT_INSTANTIATE
 
 }  // namespace pycraft

@@ -51,9 +51,7 @@ class MultibodyOperators final : public SkoSource {
   std::shared_ptr<const StateData> state() const override { return model_->state(); }
   std::uint64_t parameters() const override { return model_->parameters(); }
   Space space(SpaceKind kind, const std::vector<int>& arguments) const override;
-  std::unique_ptr<SkoValues<double>> make_values(double) const override;
-  std::unique_ptr<SkoValues<Extended>> make_values(Extended) const override;
-  std::unique_ptr<SkoValues<Quad>> make_values(Quad) const override;
+  PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_OVERRIDE_MAKE_VALUES)
 
  private:
   std::shared_ptr<Multibody> model_;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <memory>
 #include <vector>
 
 #include "algebra/small_cholesky.h"
@@ -10,6 +11,7 @@
 #include "algebra/sweeps/singular_pivot.h"
 #include "algebra/symbol.h"
 #include "model/compiled_model.h"
+#include "operators/rigid_factors.h"
 #include "spatial/articulated_inertia.h"
 
 namespace pycraft {
@@ -57,6 +59,11 @@ class RigidBlocks {
   std::vector<RigidInertia<S>> inertia;
   std::vector<S> J;                       // rotor inertia per coordinate
   std::vector<int> aligned;               // coordinate axis that a row of H is exactly, or -1
+  const std::vector<InertiaFactors<S>>* inertia_factors = nullptr;
+  // ---- how the articulated inertia is computed
+  Form form = Form::fast;
+  bool keep_inertias = true;              // P and P⁺ themselves are wanted (always there in the fast form)
+  bool with_bias = false;                 // factored forms: gyroscopic forces and Coriolis accelerations go with the columns
 
   // ---------------------------------------------------------------- applied to vectors
   void shift_add(int k, const S* x, S* y, int m) const {
@@ -207,65 +214,41 @@ class RigidBlocks {
 
   // ---------------------------------------------------------------- articulated inertia
   void start_articulated(int k) {
-    P[k] = articulated_inertia(inertia[k]);
+    if (form == Form::fast) {
+      P[k] = articulated_inertia(inertia[k]);
+    } else {
+      if (!factors_) factors_ = std::make_unique<RigidFactors<S>>(tree_);
+      factors_->start(k, (*inertia_factors)[k]);
+    }
     mass_[k] = inertia[k].mass;
     rotational_[k] = inertia[k].rotational.s[0] + inertia[k].rotational.s[3] + inertia[k].rotational.s[5];
     reach_[k] = S(0);
   }
   // D, G, P⁺ of body k; true where a pivot is so small that only the error sweep can tell whether it is noise.
   bool eliminate_hinge(int k) {
-    const int n = tree_.dof[k], f = first(k);
-    Pplus[k] = P[k];
-    if (n == 0) return false;
-    S *d = D.data() + d_[k], *l = L.data() + d_[k], *pivots = pivots_.data() + f;
-    for (int j = 0; j < n; ++j) G[f + j] = P[k] * H[f + j];  // PH*
-    for (int i = 0; i < n; ++i)
-      for (int j = 0; j <= i; ++j) d[i * n + j] = d[j * n + i] = dot(H[f + i], G[f + j]) + (i == j ? J[f + i] : S(0));
-    bool doubtful = false;
-    if (n == 1) {
-      pivots[0] = d[0];
-      if (!(d[0] > S(0))) throw_singular_hinge(tree_, k, 0, to_double(d[0]), 0.0);
-      W[f] = (S(1) / d[0]) * G[f];
-      // P - (PH*)(PH*)*/D, symmetric by construction
-      downdate(Pplus[k], G[f], W[f]);
-      G[f] = W[f];
+    if (form == Form::fast) {
+      eliminate_hinge_of_inertia(k);
     } else {
-      std::copy_n(d, n * n, l);
-      const int failed = cholesky_in_place(l, n, pivots);
-      if (failed < n) throw_singular_hinge(tree_, k, failed, to_double(pivots[failed]), 0.0);
-      for (int j = 0; j < n; ++j) W[f + j] = G[f + j];
-      for (int i = 0; i < n; ++i) {  // W = PH*L⁻*
-        for (int a = 0; a < i; ++a) W[f + i] = W[f + i] - l[i * n + a] * W[f + a];
-        W[f + i] = (S(1) / l[i * n + i]) * W[f + i];
-        subtract_square(Pplus[k], W[f + i]);
-      }
-      for (int i = n - 1; i >= 0; --i) {  // G = W L⁻¹
-        for (int a = i + 1; a < n; ++a) W[f + i] = W[f + i] - l[a * n + i] * W[f + a];
-        W[f + i] = (S(1) / l[i * n + i]) * W[f + i];
-      }
-      for (int j = 0; j < n; ++j) G[f + j] = W[f + j];
+      if (keep_inertias) P[k] = factors_->inertia(k);
+      const int f = first(k);
+      factors_->eliminate(k, form, H.data() + f, J.data() + f, aligned.data() + f, with_bias, G.data() + f, D.data() + d_[k], L.data() + d_[k], pivots_.data() + f);
+      if (keep_inertias) Pplus[k] = factors_->plus(k);
     }
-    // Of several coordinates a pivot inherits the errors of those before it, in the worst case over their own square roots.
-    using std::sqrt;
-    const S noise = S(tree_.bodies()) * rounding_bound<S>(), doubt = n == 1 ? noise : S(n * sqrt(noise));
-    for (int j = 0; j < n; ++j) {
-      if (aligned[f + j] >= 0 && no_hinge_diagonal(k)) annihilate(Pplus[k], aligned[f + j]);
-      const Vector6<S>& h = H[f + j];
-      const S inertia_bound = S(4) * (rotational_[k] + mass_[k] * reach_[k] * reach_[k]);
-      const S bound = dot(h.angular, h.angular) * inertia_bound + S(2) * dot(h.linear, h.linear) * mass_[k] + J[f + j];
-      doubtful |= !(pivots[j] > doubt * bound);
-    }
-    return doubtful;
+    return doubtful(k);
   }
   void articulated_to_parent(int k) {
     const int p = tree_.parent[k];
-    pycraft::add(P[p], to_parent(pose[k], Pplus[k]));
+    if (form == Form::fast)
+      pycraft::add(P[p], to_parent(pose[k], Pplus[k]));
+    else
+      factors_->to_parent(k, pose[k]);
     using std::abs;
     const Vector3<S>& l = pose[k].p;
     mass_[p] += mass_[k];
     rotational_[p] += rotational_[k];
-    reach_[p] = std::max(reach_[p], S(reach_[k] + abs(l[0]) + abs(l[1]) + abs(l[2])));
+    reach_[p] = maximum(reach_[p], S(reach_[k] + abs(l[0]) + abs(l[1]) + abs(l[2])));
   }
+  RigidFactors<S>& factors() { return *factors_; }
   // ---------------------------------------------------------------- error bound
   void start_error(int k) {
     X_.resize(tree_.bodies());
@@ -274,7 +257,7 @@ class RigidBlocks {
   void check_pivots(int k) {
     pivot_work_.resize(std::max(pivot_work_.size(), 2 * size_t(tree_.dof[k])));
     for (int j = first(k); j < last(k); ++j) pivot_work_[j - first(k)] = dot(H[j], X_[k] * H[j]) + J[j];
-    require_pivots(tree_, k, L.data() + d_[k], pivots_.data() + first(k), pivot_work_.data());
+    require_pivots(tree_, k, L.data() + d_[k], pivots_.data() + first(k), pivot_work_.data(), rounding_bound<S>(form));
   }
   void error_to_parent(int k) {
     ArticulatedInertia<S> plus = projected(X_[k], H, G, k);  // τ̄Xτ̄*
@@ -319,6 +302,55 @@ class RigidBlocks {
       default: return Y[k];
     }
   }
+  // D, G, P⁺ from P.
+  void eliminate_hinge_of_inertia(int k) {
+    const int n = tree_.dof[k], f = first(k);
+    Pplus[k] = P[k];
+    if (n == 0) return;
+    S *d = D.data() + d_[k], *l = L.data() + d_[k], *pivots = pivots_.data() + f;
+    for (int j = 0; j < n; ++j) G[f + j] = P[k] * H[f + j];  // PH*
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j <= i; ++j) d[i * n + j] = d[j * n + i] = dot(H[f + i], G[f + j]) + (i == j ? J[f + i] : S(0));
+    if (n == 1) {
+      pivots[0] = d[0];
+      if (!(d[0] > S(0))) throw_singular_hinge(tree_, k, 0, to_double(d[0]), 0.0);
+      W[f] = (S(1) / d[0]) * G[f];
+      // P - (PH*)(PH*)*/D, symmetric by construction
+      downdate(Pplus[k], G[f], W[f]);
+      G[f] = W[f];
+    } else {
+      std::copy_n(d, n * n, l);
+      const int failed = cholesky_in_place(l, n, pivots);
+      if (failed < n) throw_singular_hinge(tree_, k, failed, to_double(pivots[failed]), 0.0);
+      for (int j = 0; j < n; ++j) W[f + j] = G[f + j];
+      for (int i = 0; i < n; ++i) {  // W = PH*L⁻*
+        for (int a = 0; a < i; ++a) W[f + i] = W[f + i] - l[i * n + a] * W[f + a];
+        W[f + i] = (S(1) / l[i * n + i]) * W[f + i];
+        subtract_square(Pplus[k], W[f + i]);
+      }
+      for (int i = n - 1; i >= 0; --i) {  // G = W L⁻¹
+        for (int a = i + 1; a < n; ++a) W[f + i] = W[f + i] - l[a * n + i] * W[f + a];
+        W[f + i] = (S(1) / l[i * n + i]) * W[f + i];
+      }
+      for (int j = 0; j < n; ++j) G[f + j] = W[f + j];
+    }
+    for (int j = f; j < f + n; ++j)
+      if (aligned[j] >= 0 && no_hinge_diagonal(k)) annihilate(Pplus[k], aligned[j]);
+  }
+  // Whether a cheap bound on the error sweep's X leaves a pivot in doubt. Of several coordinates a pivot inherits the errors of those
+  // before it, in the worst case over their own square roots.
+  bool doubtful(int k) const {
+    using std::sqrt;
+    const int n = tree_.dof[k], f = first(k);
+    const S noise = S(tree_.bodies()) * rounding_bound<S>(form), doubt = n == 1 ? noise : S(n * sqrt(noise));
+    const S inertia_bound = S(4) * (rotational_[k] + mass_[k] * reach_[k] * reach_[k]);
+    bool doubtful = false;
+    for (int j = f; j < f + n; ++j) {
+      const Vector6<S>& h = H[j];
+      doubtful |= !(pivots_[j] > doubt * (dot(h.angular, h.angular) * inertia_bound + S(2) * dot(h.linear, h.linear) * mass_[k] + J[j]));
+    }
+    return doubtful;
+  }
   bool no_hinge_diagonal(int k) const {
     for (int j = first(k); j < last(k); ++j)
       if (!(J[j] == S(0))) return false;
@@ -351,6 +383,7 @@ class RigidBlocks {
   std::vector<S> pivots_, pivot_work_, mass_, rotational_, reach_;
   std::vector<Vector6<S>> W;
   std::vector<ArticulatedInertia<S>> X_;
+  std::unique_ptr<RigidFactors<S>> factors_;
 };
 
 }  // namespace pycraft

@@ -5,53 +5,71 @@
 //                 ε(k) = T(k) - H(k) z(k),   ν(k) = D(k)⁻¹ ε(k),   z⁺(k) = z(k) + G(k) ε(k)
 //   base to tip:  α⁺(k) = E(p,k)* α(p),   θ̈(k) = ν(k) - G(k)* α⁺(k),   α(k) = α⁺(k) + H(k)* θ̈(k) + a(k),   α(base) = -g
 //
+// In the factored forms P = C W C* and z = y - C W ρ*: of the forces that go with an inertia only accelerations ρ of its columns are kept,
+// so that a heavy body's do not drown a light one's. Per body ρ(k) = -b(k) in its own columns, ρ⁺ what is left of ρ - a*C beside the
+// hinge's rows, and
+//
+//   ε(k) = T(k) - H(k) y(k),   ν(k) = D(k)⁻¹ (ε(k) + HC W ρ*),   y⁺(k) = y(k) + G(k) ε(k)
+//
 // Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, the articulated-body forward dynamics algorithm. Cost O(N).
 #pragma once
 
 #include <vector>
 
-#include "algebra/sweeps/singular_pivot.h"
+#include "algebra/sweeps/articulated_inertia.h"
 #include "operators/rigid_blocks.h"
 #include "recursions/velocities.h"
 
 namespace pycraft {
 
-// z, alpha: scratch, one Vector6 per body. Throws SingularHingeError.
+// z, alpha: scratch, one Vector6 per body. Returns the largest of the terms that made up vdot. Throws SingularHingeError.
 template <class S>
-void articulated_body(const SkoStructure& tree, const CompiledModel<S>& model, RigidBlocks<S>& blocks, const Velocities<S>& velocities, const S* T,
-                      S* vdot, std::vector<Vector6<S>>& z, std::vector<Vector6<S>>& alpha) {
+S articulated_body(const SkoStructure& tree, const CompiledModel<S>& model, RigidBlocks<S>& blocks, const Velocities<S>& velocities, const S* T, S* vdot,
+                   std::vector<Vector6<S>>& z, std::vector<Vector6<S>>& alpha) {
+  const bool factored = blocks.form != Form::fast;
+  blocks.keep_inertias = false;
+  blocks.with_bias = factored;
   bool doubtful = false;
   for (int k = 0; k < model.bodies; ++k) {
     blocks.start_articulated(k);
-    z[k] = velocities.b[k];
+    z[k] = factored ? blocks.factors().start_bias(k, model.inertia_factors[k], velocities.V[k]) : velocities.b[k];
   }
   for (int k = model.bodies - 1; k >= 0; --k) {
     const int p = model.parent[k], first = model.v_offset[k], n = model.nv_of[k];
+    if (factored)
+      blocks.factors().add_acceleration(k, velocities.a[k]);
     doubtful |= blocks.eliminate_hinge(k);
-    Vector6<S> zk = z[k] + blocks.P[k] * velocities.a[k], plus = zk;
+    Vector6<S> zk = z[k];
+    if (!factored) zk = zk + blocks.P[k] * velocities.a[k];
+    Vector6<S> plus = zk;
     for (int j = first; j < first + n; ++j) {
       const S epsilon = T[j] - dot(blocks.H[j], zk);
       plus = plus + epsilon * blocks.G[j];
       vdot[j] = epsilon;
     }
     blocks.solve_D_in_place(k, vdot + first, 1);  // ν
+    for (int j = 0; j < n && factored; ++j) vdot[first + j] += blocks.factors().bias(k)[j];
     if (p >= 0) {
       blocks.articulated_to_parent(k);
       z[p] = z[p] + force_to_parent(blocks.pose[k], plus);
     }
   }
-  if (doubtful) check_pivots_tip_to_base(tree, blocks);
+  if (doubtful) articulated_inertia_tip_to_base(tree, blocks);  // once more, with the error bound beside it
+  S largest = S(0);
   const Vector6<S> base{Vector3<S>::zero(), -model.gravity};
   for (int k = 0; k < model.bodies; ++k) {
     const int p = model.parent[k], first = model.v_offset[k], n = model.nv_of[k];
     const Vector6<S> outboard = motion_to_child(blocks.pose[k], p < 0 ? base : alpha[p]);
     Vector6<S> acceleration = outboard + velocities.a[k];
     for (int j = first; j < first + n; ++j) {
+      using std::abs;
+      largest = maximum(largest, S(abs(vdot[j])));
       vdot[j] -= dot(blocks.G[j], outboard);
       acceleration = acceleration + vdot[j] * blocks.H[j];
     }
     alpha[k] = acceleration;
   }
+  return largest;
 }
 
 }  // namespace pycraft

@@ -16,6 +16,7 @@ void kinematics(const CompiledModel<S>& model, const S* q, RigidBlocks<S>& block
   std::copy(model.inertia.begin(), model.inertia.end(), blocks.inertia.begin());
   std::copy(model.rotor_inertia.begin(), model.rotor_inertia.end(), blocks.J.begin());
   std::copy(model.aligned.begin(), model.aligned.end(), blocks.aligned.begin());
+  blocks.inertia_factors = &model.inertia_factors;
 }
 
 }  // namespace pycraft

@@ -102,8 +102,10 @@ inline Vector6<S> log_pose(const Vector3<S>& w, const Vector3<S>& p) {
     c = (S(1) - a / (S(2) * b)) / y;
   } else {
     S power = S(1), factorial = S(24), sum = S(0);
-    for (int k = 1; k < 20; ++k) {
-      sum += (k % 2 ? S(1) : S(-1)) * power * S(2 * k) / factorial;
+    for (int k = 1; k < 40; ++k) {
+      const S next = sum + (k % 2 ? S(1) : S(-1)) * power * S(2 * k) / factorial;
+      if (next == sum) break;
+      sum = next;
       power *= y;
       factorial *= S(2 * k + 3) * S(2 * k + 4);
     }

@@ -8,14 +8,25 @@
 
 namespace pycraft {
 
+// Σ term(k), term(0) given, term(k) = -y term(k-1) / ((2k + m - 1)(2k + m)), to the last one that counts.
+template <class S>
+inline S alternating_series(S term, const S& y, int m) {
+  S sum = term;
+  for (int k = 1; k < 40; ++k) {
+    term *= -y / (S(2 * k + m - 1) * S(2 * k + m));
+    const S next = sum + term;
+    if (next == sum) break;
+    sum = next;
+  }
+  return sum;
+}
 // sin(x)/x.
 template <class S>
 inline S sinc(const S& x) {
   using std::abs;
   using std::sin;
-  if (abs(x) > S(1e-2)) return sin(x) / x;
-  const S y = x * x;  // the terms left out are below 1e-2^14/15! = 1e-40
-  return S(1) - y / S(6) * (S(1) - y / S(20) * (S(1) - y / S(42) * (S(1) - y / S(72) * (S(1) - y / S(110) * (S(1) - y / S(156))))));
+  if (abs(x) > S(0.0625)) return sin(x) / x;
+  return alternating_series(S(1), S(x * x), 1);
 }
 // (1 - cos x)/x², without cancellation.
 template <class S>
@@ -23,19 +34,13 @@ inline S cosc(const S& x) {
   const S half = sinc(x / S(2));
   return half * half / S(2);
 }
-// (x - sin x)/x³, without cancellation: the series below 1 (19 terms reach 1e-40 there).
+// (x - sin x)/x³, without cancellation.
 template <class S>
 inline S sincc(const S& x) {
   using std::abs;
   using std::sin;
   if (abs(x) > S(1)) return (x - sin(x)) / (x * x * x);
-  const S y = x * x;
-  S term = S(1) / S(6), sum = term;
-  for (int k = 2; k < 20; ++k) {
-    term *= -y / (S(2 * k) * S(2 * k + 1));
-    sum += term;
-  }
-  return sum;
+  return alternating_series(S(S(1) / S(6)), S(x * x), 3);
 }
 
 // exp(w~) = 1 + sinc|w| w~ + cosc|w| w~².

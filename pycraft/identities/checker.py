@@ -30,7 +30,7 @@ class BoundState:
     def bind(self, side: Any, precision: str) -> Any:
         if precision not in self._bindings:
             q, v = (None, None) if self.state is None else (self.state.q, self.state.v)
-            self._bindings[precision] = _core._bind([self._operators.E], q, v, "fast", 0, precision)
+            self._bindings[precision] = _core._bind([self._operators.E], q, v, precision=precision)
         binding = self._bindings[precision]
         return side.bound(binding) if isinstance(side, _core.Scalar) else side._bound(binding)
 

@@ -5,6 +5,8 @@
 //   G(k)  = P(k) H(k)* D(k)⁻¹
 //   P⁺(k) = P(k) - G(k) D(k) G(k)*                            (= τ̄P)
 //
+// in one of its forms: `fast` as it stands; `ud` and `square-root` in factors of P (factored_inertia.h).
+//
 // Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, the articulated-body chapter. Cost O(N).
 #pragma once
 
@@ -16,6 +18,8 @@ namespace pycraft {
 template <class Blocks>
 void articulated_inertia_tip_to_base(const SkoStructure& tree, Blocks& blocks) {
   bool doubtful = false;
+  blocks.keep_inertias = true;
+  blocks.with_bias = false;
   for (int k = 0; k < tree.bodies(); ++k) blocks.start_articulated(k);
   for (int k = tree.bodies() - 1; k >= 0; --k) {
     doubtful |= blocks.eliminate_hinge(k);

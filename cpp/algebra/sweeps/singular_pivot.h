@@ -14,15 +14,18 @@
 #include <cmath>
 #include <string>
 
+#include "algebra/arithmetic.h"
 #include "algebra/errors.h"
 #include "algebra/structure.h"
 #include "spatial/scalar.h"
 
 namespace pycraft {
 
+// Per unit of X. A factored form rounds its columns, whose squares P is.
 template <class S>
-inline S rounding_bound() {
-  return S(8) * epsilon<S>();
+inline S rounding_bound(Form form) {
+  const S column = S(64) * epsilon<S>();
+  return form == Form::fast ? S(8) * epsilon<S>() : S(column * column);
 }
 
 [[noreturn]] inline void throw_singular_hinge(const SkoStructure& tree, int k, int coordinate, double pivot, double bound) {
@@ -30,12 +33,13 @@ inline S rounding_bound() {
   std::snprintf(numbers, sizeof numbers, "D = %.3g, rounding bound %.3g", pivot, bound);
   throw SingularHingeError("hinge '" + tree.hinge_names[k] + "' of body '" + tree.body_names[k] + "' feels no inertia along coordinate '" +
                            tree.coordinate_names[tree.dof_offset[k] + coordinate] + "' (" + numbers +
-                           "): give the bodies it moves a mass, or the hinge a rotor inertia, or weld it");
+                           "): give the bodies it moves a mass, or the hinge a rotor inertia, or weld it",
+                           tree.dof_offset[k] + coordinate);
 }
 
 // Throws unless every pivot of body k's D = L L* stands out of its rounding. x: diagonal of H X H* + J, n numbers, overwritten, and n more.
 template <class S>
-void require_pivots(const SkoStructure& tree, int k, const S* L, const S* pivots, S* x) {
+void require_pivots(const SkoStructure& tree, int k, const S* L, const S* pivots, S* x, const S& per_unit) {
   using std::abs, std::sqrt;
   const int n = tree.dof[k];
   for (int i = 0; i < n; ++i) x[i] = sqrt(x[i]);
@@ -50,7 +54,7 @@ void require_pivots(const SkoStructure& tree, int k, const S* L, const S* pivots
       w[i] = sum / L[i * n + i];
       reach += abs(w[i]) * x[i];
     }
-    const S bound = rounding_bound<S>() * reach * reach;
+    const S bound = per_unit * reach * reach;
     if (!(pivots[j] > bound)) throw_singular_hinge(tree, k, j, to_double(pivots[j]), to_double(bound));
   }
 }

@@ -1,0 +1,243 @@
+// The factored forms of the Riccati sweep: what is carried from body to body are columns and weights, never P itself, so that digits
+// of a light part are not lost in the numbers of a heavy one.
+//
+//   P(k) = C W C*      columns: the body's own inertia in factors, and those of every child's P⁺, moved by E
+//
+// Rows of one array over these columns and, for a hinge-diagonal term J = Σ j w j*, one more column each:
+//
+//   A = [[H C, j], [C, 0], [ρ, 0]]
+//
+// are made orthogonal one after the other (A = L Q, Q W Q* = diag d, L lower triangular), the hinge's rows first:
+//
+//   D = L₁ d₁ L₁*,   G = L₂ L₁⁻¹,   P⁺ = U d₂ U*,  U the columns of L that belong to body rows
+//
+//   ud:           weighted Gram-Schmidt, L with a unit diagonal; no square roots, no pivots
+//   square-root:  W = 1, Householder reflections, columns heaviest first, d = 1
+//
+// The row ρ carries a force -C W ρ* as accelerations of the columns (recursions/articulated_body.h); operators do without it.
+// A row of the body that is a hinge's row, where J = 0, becomes exactly zero.
+//
+// Sources: C. L. Thornton, Triangular Covariance Factorizations for Kalman Filtering, 1976 (ud); A. J. Cox and N. J. Higham, Stability of
+// Householder QR factorization for weighted least squares problems, 1998 (order of the rows). Cost: about 1000 flops a link.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <vector>
+
+#include "algebra/arithmetic.h"
+#include "algebra/structure.h"
+
+namespace pycraft {
+
+template <class S>
+inline S ratio_or_zero(const S& x, const S& y) {
+  return y == S(0) ? S(0) : S(x / y);
+}
+
+// Σ x y with four sums in flight.
+template <class S>
+inline S dot_product(const S* x, const S* y, int n) {
+  S a = S(0), b = S(0), c = S(0), d = S(0);
+  int i = 0;
+  for (; i + 4 <= n; i += 4) {
+    a += x[i] * y[i];
+    b += x[i + 1] * y[i + 1];
+    c += x[i + 2] * y[i + 2];
+    d += x[i + 3] * y[i + 3];
+  }
+  for (; i < n; ++i) a += x[i] * y[i];
+  return (a + b) + (c + d);
+}
+
+// Rows A (given by their numbers) of m columns: the first `pivots` are made orthogonal in the weights w, the others relieved of them.
+// L: rows x pivots, unit lower; d: their weighted squares. A row of weight zero takes nothing from the others.
+template <class S>
+inline void weighted_gram_schmidt(S* A, int stride, const int* rows, int count, int pivots, int m, const S* w, S* weighted, S* L, S* d) {
+  for (int r = 0; r < pivots; ++r) {
+    S* a = A + rows[r] * stride;
+    for (int c = 0; c < m; ++c) weighted[c] = w[c] * a[c];
+    d[r] = dot_product(weighted, a, m);
+    for (int s = 0; s < r; ++s) L[s * pivots + r] = S(0);
+    L[r * pivots + r] = S(1);
+    for (int s = r + 1; s < count; ++s) {
+      S* b = A + rows[s] * stride;
+      const S f = ratio_or_zero(dot_product(weighted, b, m), d[r]);
+      L[s * pivots + r] = f;
+      for (int c = 0; c < m; ++c) b[c] -= f * a[c];
+    }
+  }
+}
+
+// The same with weights that are in the columns already, by reflections: A = L Q, Q* Q = 1.
+template <class S>
+inline void householder_lower(S* A, int stride, const int* rows, int count, int pivots, int m, S* L) {
+  using std::sqrt;
+  std::fill_n(L, count * pivots, S(0));
+  for (int r = 0; r < std::min(pivots, m); ++r) {
+    S* v = A + rows[r] * stride;
+    const S square = dot_product(v + r, v + r, m - r), norm = sqrt(square), head = v[r];
+    if (square > S(0)) {
+      v[r] = head < S(0) ? S(head - norm) : S(head + norm);
+      const S beta = S(2) / dot_product(v + r, v + r, m - r);
+      for (int s = r + 1; s < count; ++s) {
+        S* b = A + rows[s] * stride;
+        const S f = beta * dot_product(v + r, b + r, m - r);
+        for (int c = r; c < m; ++c) b[c] -= f * v[c];
+      }
+    }
+    L[r * pivots + r] = head < S(0) ? norm : S(-norm);
+    for (int s = r + 1; s < count; ++s) L[s * pivots + r] = A[rows[s] * stride + r];
+  }
+}
+
+// A = Σ w u u* of a positive semidefinite matrix (n x n), the largest diagonal entry first: u (n columns, as rows of U), w. What is
+// left when no diagonal entry is positive is rounding.
+template <class S>
+inline void semidefinite_factors(const S* given, int n, S* U, S* w, S* A) {
+  std::copy_n(given, n * n, A);
+  for (int r = 0; r < n; ++r) {
+    int pivot = 0;
+    for (int i = 1; i < n; ++i)
+      if (A[i * n + i] > A[pivot * n + pivot]) pivot = i;
+    w[r] = A[pivot * n + pivot];
+    S* u = U + r * n;
+    if (!(w[r] > S(0))) {
+      w[r] = S(0);
+      std::fill_n(u, n, S(0));
+      continue;
+    }
+    for (int i = 0; i < n; ++i) u[i] = A[i * n + pivot] / w[r];
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < n; ++j) A[i * n + j] -= w[r] * u[i] * u[j];
+    for (int i = 0; i < n; ++i) A[i * n + pivot] = A[pivot * n + i] = S(0);
+  }
+}
+
+template <class S>
+class FactoredInertia {
+ public:
+  explicit FactoredInertia(const SkoStructure& tree) : tree_(tree), at_(tree.bodies()), weight_at_(tree.bodies()), capacity_(tree.bodies()), count_(tree.bodies()) {
+    int rows = 0, widest = 0;
+    for (int k = 0; k < tree.bodies(); ++k) capacity_[k] = tree.size[k] + tree.dof[k];
+    for (int k = 0; k < tree.bodies(); ++k)
+      if (tree.parent[k] >= 0) capacity_[tree.parent[k]] += tree.size[k];
+    size_t at = 0, weights = 0;
+    for (int k = 0; k < tree.bodies(); ++k) {
+      at_[k] = at;
+      weight_at_[k] = weights;
+      rows = std::max(rows, tree.dof[k] + tree.size[k] + 1);
+      widest = std::max(widest, capacity_[k]);
+      at += size_t(tree.dof[k] + tree.size[k] + 1) * capacity_[k];
+      weights += capacity_[k];
+    }
+    A_.resize(at);
+    w_.resize(weights);
+    L_.resize(size_t(rows) * rows), d_.resize(rows), rows_.resize(rows), position_.resize(rows), source_.resize(rows);
+    weighted_.resize(widest), sorted_.resize(widest), order_.resize(widest);
+  }
+
+  size_t scalars() const { return A_.size() + w_.size() + L_.size() + d_.size() + weighted_.size() + sorted_.size(); }
+
+  // ---- columns of P(k)
+  void start(int k) { count_[k] = 0; }
+  // A column with its weight; element i of it is u(i).
+  template <class Column>
+  void add(int k, const S& weight, const S& rho, Column&& u) {
+    const int n = tree_.dof[k], s = tree_.size[k], c = count_[k]++, stride = capacity_[k];
+    S* A = A_.data() + at_[k] + c;
+    for (int i = 0; i < s; ++i) A[(n + i) * stride] = u(i);
+    A[(n + s) * stride] = rho;
+    w_[weight_at_[k] + c] = weight;
+  }
+  int columns(int k) const { return count_[k]; }
+  const S* body_row(int k, int i) const { return A_.data() + at_[k] + size_t(tree_.dof[k] + i) * capacity_[k]; }
+  S* bias_row(int k) { return A_.data() + at_[k] + size_t(tree_.dof[k] + tree_.size[k]) * capacity_[k]; }
+  S* hinge_row(int k, int j) { return A_.data() + at_[k] + size_t(j) * capacity_[k]; }
+  // Entry (i, j) of P(k), before the hinge is eliminated.
+  S inertia(int k, int i, int j) const {
+    const S *a = body_row(k, i), *b = body_row(k, j), *w = w_.data() + weight_at_[k];
+    S sum = S(0);
+    for (int c = 0; c < count_[k]; ++c) sum += w[c] * a[c] * b[c];
+    return sum;
+  }
+
+  // ---- the hinge: the caller fills hinge_row(k, j) with H C over columns(k), then adds the factors of J
+  template <class Column>
+  void add_rotor(int k, const S& weight, Column&& u) {
+    const int n = tree_.dof[k], s = tree_.size[k], c = count_[k]++, stride = capacity_[k];
+    S* A = A_.data() + at_[k] + c;
+    for (int j = 0; j < n; ++j) A[j * stride] = u(j);
+    for (int i = 0; i <= s; ++i) A[(n + i) * stride] = S(0);
+    w_[weight_at_[k] + c] = weight;
+  }
+  // is_hinge_row[i]: ±(j + 1) where row i of the body is ± the hinge's row j and J = 0, else 0. bias: the row ρ is in use.
+  void eliminate(int k, Form form, const int* is_hinge_row, bool bias) {
+    const int n = tree_.dof[k], s = tree_.size[k], m = count_[k], stride = capacity_[k];
+    S *A = A_.data() + at_[k], *w = w_.data() + weight_at_[k];
+    int count = 0;
+    for (int j = 0; j < n; ++j) rows_[count++] = j;
+    for (int i = 0; i < s; ++i) {
+      position_[i] = is_hinge_row[i] ? -1 : count;
+      source_[i] = is_hinge_row[i];
+      if (!is_hinge_row[i]) rows_[count++] = n + i;
+    }
+    pivots_ = count;
+    if (bias) rows_[count++] = n + s;
+    if (form == Form::ud) {
+      weighted_gram_schmidt(A, stride, rows_.data(), count, pivots_, m, w, weighted_.data(), L_.data(), d_.data());
+    } else {
+      heaviest_first(A, stride, n + s + 1, m, w);
+      householder_lower(A, stride, rows_.data(), count, pivots_, m, L_.data());
+      std::fill_n(d_.data(), pivots_, S(1));
+    }
+    bias_at_ = bias ? pivots_ : -1;
+  }
+
+  // ---- results of the last elimination, n its hinge's coordinates
+  int pivots() const { return pivots_; }
+  // D = L₁ d L₁*
+  S lower(int i, int j) const { return L_[i * pivots_ + j]; }
+  S weight(int j) const { return d_[j]; }
+  // Row i of the body against hinge row j: L₂.
+  S against(int i, int j) const {
+    if (position_[i] >= 0) return lower(position_[i], j);
+    const int row = std::abs(source_[i]) - 1;
+    return j > row ? S(0) : source_[i] > 0 ? lower(row, j) : S(-lower(row, j));
+  }
+  // P⁺ = U d U*: column r = n, ..., pivots() - 1, of weight(r).
+  S U(int i, int r) const { return position_[i] >= 0 ? lower(position_[i], r) : S(0); }
+  // ρ against row r, of the hinge or of the body.
+  S bias(int r) const { return bias_at_ >= 0 ? lower(bias_at_, r) : S(0); }
+
+ private:
+  // The columns scaled by the square roots of their weights, in the order of their size.
+  void heaviest_first(S* A, int stride, int rows, int m, const S* w) {
+    using std::abs, std::sqrt;
+    for (int c = 0; c < m; ++c) {
+      const S root = sqrt(w[c]);
+      S size = S(0);
+      for (int i = 0; i < rows; ++i) {
+        S& a = A[i * stride + c];
+        a *= root;
+        if (i + 1 < rows) size = std::max(size, S(abs(a)));
+      }
+      weighted_[c] = size;
+      order_[c] = c;
+    }
+    std::sort(order_.begin(), order_.begin() + m, [&](int a, int b) { return weighted_[a] > weighted_[b] || (weighted_[a] == weighted_[b] && a < b); });
+    for (int i = 0; i < rows; ++i) {
+      for (int c = 0; c < m; ++c) sorted_[c] = A[i * stride + order_[c]];
+      std::copy_n(sorted_.data(), m, A + i * stride);
+    }
+  }
+
+  const SkoStructure& tree_;
+  std::vector<size_t> at_, weight_at_;
+  std::vector<int> capacity_, count_, order_, rows_, position_, source_;  // position: of a body row among the rows of L
+  std::vector<S> A_, w_, L_, d_, weighted_, sorted_;
+  int pivots_ = 0, bias_at_ = -1;
+};
+
+}  // namespace pycraft
