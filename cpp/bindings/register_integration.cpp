@@ -24,12 +24,9 @@ using Integration = DirectCalls<Kinematics>;
 
 // Forward dynamics as the trajectory asks for it.
 template <class S>
-Accelerations<S> accelerations(const Multibody& model, const std::string& form, const py::object& refine) {
-  if (form != "fast") throw EvaluationError("form '" + form + "' of the articulated-inertia sweep is not there; there is 'fast'");
-  if (!refine.equal(py::int_(0)))
-    throw EvaluationError("refine=" + py::cast<std::string>(py::repr(refine)) + ": refinement is not there yet; there is refine=0");
+Accelerations<S> accelerations(const Multibody& model, const Solving& how) {
   auto workspace = std::make_shared<RigidDynamics<S>>(model);
-  return [workspace](const S* q, const S* v, const S* tau, S* vdot) { workspace->forward_dynamics(q, v, tau, vdot); };
+  return [workspace, how](const S* q, const S* v, const S* tau, S* vdot) { workspace->forward_dynamics(q, v, tau, vdot, how); };
 }
 
 // One state's numbers, or zeros for None.
@@ -42,11 +39,10 @@ std::vector<double> vector_of(const Multibody& mb, const py::object& given, cons
 
 template <class S>
 py::dict trajectory(const Multibody& mb, const std::vector<double>& q, const std::vector<double>& v, const std::vector<double>& times,
-                    const std::vector<double>& tau, const std::vector<double>& damping, const TrajectoryOptions& options, const std::string& form,
-                    const py::object& refine) {
+                    const std::vector<double>& tau, const std::vector<double>& damping, const TrajectoryOptions& options, const Solving& how) {
   const int nq = mb.nq(), nv = mb.nv();
   const auto model = mb.compiled<S>();
-  const Accelerations<S> function = accelerations<S>(mb, form, refine);
+  const Accelerations<S> function = accelerations<S>(mb, how);
   const auto wide = [](const std::vector<double>& x) { return std::vector<S>(x.begin(), x.end()); };
   const std::vector<S> q0 = wide(q), v0 = wide(v), force = wide(tau), friction = wide(damping);
   const auto count = static_cast<py::ssize_t>(times.size());
@@ -75,7 +71,7 @@ py::dict trajectory(const Multibody& mb, const std::vector<double>& q, const std
 void register_integration(py::module_& m) {
   py::class_<Integration>(m, "Integration", "Rates of configurations and trajectories of one model.")
       .def(py::init<std::shared_ptr<Multibody>>())
-      .def("configuration_rate", [](Integration& d, const py::object& q, const py::object& v, const std::string& precision, const py::object& out) {
+      .def("configuration_rate", [](Integration& d, const py::object& q, const py::object& v, Precision precision, const py::object& out) {
         const Multibody& mb = d.model();
         const int nq = mb.nq(), nv = mb.nv();
         const Argument a = argument(q, nq, "q", mb), b = argument(v, nv, "v", mb);
@@ -87,21 +83,23 @@ void register_integration(py::module_& m) {
       }, py::arg("q"), py::arg("v"), py::arg("precision"), py::arg("out"))
       .def("trajectory", [](Integration& d, const py::object& q, const py::object& v, const std::vector<double>& times, const py::object& tau,
                             const py::object& damping, const std::string& integrator, double rtol, double atol, double step, bool normalise,
-                            const std::string& precision, const std::string& form, const py::object& refine) {
+                            Precision precision, Form form, const py::object& refine) {
         const Multibody& mb = d.model();
+        const Solving how{form, refinement(refine, "same"), OnSingular::raise};
         const TrajectoryOptions options{integrator_from_name(integrator), rtol, atol, step, normalise};
         const Array q0 = numbers(q, "q"), v0 = numbers(v, "v");
         mb.check_q(q0.data(), q0.size());
         mb.check_v(v0.data(), v0.size(), "v");
         const std::vector<double> from_q(q0.data(), q0.data() + q0.size()), from_v(v0.data(), v0.data() + v0.size());
         const std::vector<double> force = vector_of(mb, tau, "tau"), friction = damping.is_none() ? std::vector<double>() : vector_of(mb, damping, "damping");
-        const auto at = [&]<class S>(S) { return trajectory<S>(mb, from_q, from_v, times, force, friction, options, form, refine); };
-        switch (precision_from_name(precision)) {
+        const auto at = [&]<class S>(S) { return trajectory<S>(mb, from_q, from_v, times, force, friction, options, how); };
+        switch (precision) {
           case Precision::double_: return at(double());
           case Precision::extended: return at(Extended());
           case Precision::quad: return at(Quad());
+          default: break;
         }
-        throw EvaluationError("trajectories are computed in precision 'double', 'extended' or 'quad', not '" + precision + "'");
+        throw EvaluationError("trajectories are computed in precision 'double', 'extended' or 'quad', not '" + std::string(precision_name(precision)) + "'");
       }, py::arg("q"), py::arg("v"), py::arg("times"), py::arg("tau"), py::arg("damping"), py::arg("integrator"), py::arg("rtol"), py::arg("atol"),
            py::arg("step"), py::arg("normalise"), py::arg("precision"), py::arg("form"), py::arg("refine"));
   m.def("integrators", [] {

@@ -28,14 +28,14 @@ void register_methods(py::module_& m) {
   py::class_<Methods>(m, "Methods", "Forward dynamics of one model by 'cholesky', 'ldl', 'conjugate-gradients' or 'inverse'.")
       .def(py::init<std::shared_ptr<Multibody>>())
       .def("forward_dynamics", [](Methods& d, const std::string& method, const py::object& q, const py::object& v, const py::object& tau,
-                                  const std::string& precision, const py::object& out) {
+                                  Precision precision, const py::object& out) {
         const Method by = method_from_name(method);
         const Multibody& mb = d.model();
         const MotionState s(mb, q, v, tau);
         return run(d, precision, s.arguments(mb), output(out, s.batch, {mb.nv()}), mb.nv(), s.batch,
                    [by](auto& w, auto in, auto* y) { w.forward_dynamics(by, in[0], in[1], in[2], y); });
       }, py::arg("method"), q, v, tau, precision, py::arg("out"), "Accelerations (nv,) or (B, nv).")
-      .def("conjugate_gradients", [](Methods& d, const py::object& q, const py::object& v, const py::object& tau, const std::string& precision) {
+      .def("conjugate_gradients", [](Methods& d, const py::object& q, const py::object& v, const py::object& tau, Precision precision) {
         const Multibody& mb = d.model();
         const int nv = mb.nv();
         const MotionState s(mb, q, v, tau);
@@ -48,15 +48,11 @@ void register_methods(py::module_& m) {
         const auto part = [&](const py::object& index) { return py::array_t<double>(py::object(all[py::make_tuple(py::ellipsis(), index)])); };
         return std::make_tuple(part(py::slice(0, nv, 1)), part(py::int_(nv)), part(py::int_(nv + 1)));
       }, q, v, tau, precision, "(accelerations, iterations, relative residuals), each per state.")
-      .def("memory", [](Methods& d, const std::string& method, const std::string& precision) {
+      .def("memory", [](Methods& d, const std::string& method, Precision precision) {
         const Method by = method_from_name(method);
         size_t bytes = 0;
         const auto measure = [&]<class S>(S) { d.template each<S>(1, [&](DynamicsMethods<S>& w, int) { bytes = w.memory(by); }); };
-        switch (precision_from_name(precision)) {
-          case Precision::double_: measure(double()); break;
-          case Precision::extended: measure(Extended()); break;
-          case Precision::quad: measure(Quad()); break;
-        }
+        at_precision(precision, measure);
         return bytes;
       }, py::arg("method"), precision, "Bytes that a method reads and writes at one evaluation.");
   m.def("methods", [] {

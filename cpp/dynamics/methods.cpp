@@ -127,8 +127,8 @@ size_t DynamicsMethods<S>::memory(Method method) const {
   return 0;
 }
 
-template class DynamicsMethods<double>;
-template class DynamicsMethods<Extended>;
-template class DynamicsMethods<Quad>;
+#define PYCRAFT_INSTANTIATE(S) template class DynamicsMethods<S>;
+PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_INSTANTIATE)
+#undef PYCRAFT_INSTANTIATE
 
 }  // namespace pycraft

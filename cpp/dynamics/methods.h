@@ -59,8 +59,8 @@ class DynamicsMethods {
   ConjugateGradients<S> gradients_;
 };
 
-extern template class DynamicsMethods<double>;
-extern template class DynamicsMethods<Extended>;
-extern template class DynamicsMethods<Quad>;
+#define PYCRAFT_EXTERN(S) extern template class DynamicsMethods<S>;
+PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_EXTERN)
+#undef PYCRAFT_EXTERN
 
 }  // namespace pycraft

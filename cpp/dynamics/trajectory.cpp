@@ -45,6 +45,8 @@ class Run {
     try {
       out(0, x_);
       if (times_.size() > 1) choose_stepper(out);
+    } catch (const RefinementError& e) {
+      rethrow_with_time(e);
     } catch (const SingularHingeError& e) {
       rethrow_with_time(e);
     } catch (const SingularOperatorError& e) {
