@@ -32,6 +32,8 @@ void register_multibody(py::module_& m);
 void register_dynamics(py::module_& m);
 void register_calculus(py::module_& m);
 void register_sensitivities(py::module_& m);
+void register_methods(py::module_& m);
+void register_integration(py::module_& m);
 void register_theorems(py::module_& m);
 void register_bench(py::module_& m);
 

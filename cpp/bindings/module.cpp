@@ -49,6 +49,8 @@ PYBIND11_MODULE(_core, m) {
   pycraft::register_plans(m);
   pycraft::register_dynamics(m);
   pycraft::register_sensitivities(m);
+  pycraft::register_methods(m);
+  pycraft::register_integration(m);
   pycraft::register_theorems(m);
   pycraft::register_bench(m);
 }

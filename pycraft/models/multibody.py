@@ -9,7 +9,7 @@ import numpy as np
 
 from .. import _core
 from .handles import Body, Hinge, Named, Node, Vector
-from .sensitivities import SensitivityCalls
+from .integration import IntegrationCalls
 from .state import State, random_state
 
 _Z = (0.0, 0.0, 1.0)
@@ -24,7 +24,7 @@ _DEFAULT_AXES: dict[str, tuple[tuple[float, float, float], ...]] = {
 }
 
 
-class Multibody(SensitivityCalls, _core.Multibody):
+class Multibody(IntegrationCalls, _core.Multibody):
     """A tree of bodies on hinges, with nodes, a state (`q`, `v`) and gravity (zero until it is set).
 
     Build one body by body, or load it (`pycraft.load`). Bodies are kept depth first, children in the order they were added, and

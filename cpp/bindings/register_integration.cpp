@@ -1,0 +1,112 @@
+// Rates of configurations, and trajectories.
+#include <chrono>
+
+#include "bindings/direct_calls.h"
+#include "dynamics/rigid_dynamics.h"
+#include "dynamics/trajectory.h"
+#include "recursions/configuration_rate.h"
+
+namespace pycraft {
+
+namespace {
+
+template <class S>
+class Kinematics {
+ public:
+  explicit Kinematics(const Multibody& model) : model_(model.compiled<S>()) {}
+  void rate(const S* q, const S* v, S* out) const { configuration_rate(*model_, q, v, out); }
+
+ private:
+  std::shared_ptr<const CompiledModel<S>> model_;
+};
+
+using Integration = DirectCalls<Kinematics>;
+
+// Forward dynamics as the trajectory asks for it.
+template <class S>
+Accelerations<S> accelerations(const Multibody& model, const Solving& how) {
+  auto workspace = std::make_shared<RigidDynamics<S>>(model);
+  return [workspace, how](const S* q, const S* v, const S* tau, S* vdot) { workspace->forward_dynamics(q, v, tau, vdot, how); };
+}
+
+// One state's numbers, or zeros for None.
+std::vector<double> vector_of(const Multibody& mb, const py::object& given, const char* what) {
+  if (given.is_none()) return std::vector<double>(mb.nv(), 0.0);
+  const Array a = numbers(given, what);
+  mb.check_v(a.data(), a.size(), what);
+  return {a.data(), a.data() + a.size()};
+}
+
+template <class S>
+py::dict trajectory(const Multibody& mb, const std::vector<double>& q, const std::vector<double>& v, const std::vector<double>& times,
+                    const std::vector<double>& tau, const std::vector<double>& damping, const TrajectoryOptions& options, const Solving& how) {
+  const int nq = mb.nq(), nv = mb.nv();
+  const auto model = mb.compiled<S>();
+  const Accelerations<S> function = accelerations<S>(mb, how);
+  const auto wide = [](const std::vector<double>& x) { return std::vector<S>(x.begin(), x.end()); };
+  const std::vector<S> q0 = wide(q), v0 = wide(v), force = wide(tau), friction = wide(damping);
+  const auto count = static_cast<py::ssize_t>(times.size());
+  py::array_t<double> all_q({count, py::ssize_t(nq)}), all_v({count, py::ssize_t(nv)});
+  double *to_q = all_q.mutable_data(), *to_v = all_v.mutable_data();
+  TrajectoryCost cost;
+  double seconds;
+  {
+    py::gil_scoped_release release;
+    const auto start = std::chrono::steady_clock::now();
+    cost = integrate_trajectory<S>(*model, function, q0.data(), v0.data(), times, force.data(), damping.empty() ? nullptr : friction.data(), options,
+                                   [&](int i, const S* at, const S* rate) {
+                                     for (int j = 0; j < nq; ++j) to_q[size_t(i) * nq + j] = to_double(at[j]);
+                                     for (int j = 0; j < nv; ++j) to_v[size_t(i) * nv + j] = to_double(rate[j]);
+                                   });
+    seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  }
+  py::dict d;
+  d["q"] = all_q, d["v"] = all_v;
+  d["evaluations"] = cost.evaluations, d["steps"] = cost.steps, d["rejected"] = cost.rejected, d["seconds"] = seconds;
+  return d;
+}
+
+}  // namespace
+
+void register_integration(py::module_& m) {
+  py::class_<Integration>(m, "Integration", "Rates of configurations and trajectories of one model.")
+      .def(py::init<std::shared_ptr<Multibody>>())
+      .def("configuration_rate", [](Integration& d, const py::object& q, const py::object& v, Precision precision, const py::object& out) {
+        const Multibody& mb = d.model();
+        const int nq = mb.nq(), nv = mb.nv();
+        const Argument a = argument(q, nq, "q", mb), b = argument(v, nv, "v", mb);
+        const int batch = common_batch({&a, &b});
+        check_states(mb, a, batch);
+        check_velocities(mb, b, batch, "v");
+        return run(d, precision, {{&a, nq}, {&b, nv}}, output(out, batch, {nq}), nq, batch,
+                   [](auto& w, auto in, auto* y) { w.rate(in[0], in[1], y); });
+      }, py::arg("q"), py::arg("v"), py::arg("precision"), py::arg("out"))
+      .def("trajectory", [](Integration& d, const py::object& q, const py::object& v, const std::vector<double>& times, const py::object& tau,
+                            const py::object& damping, const std::string& integrator, double rtol, double atol, double step, bool normalise,
+                            Precision precision, Form form, const py::object& refine) {
+        const Multibody& mb = d.model();
+        const Solving how{form, refinement(refine, "same"), OnSingular::raise};
+        const TrajectoryOptions options{integrator_from_name(integrator), rtol, atol, step, normalise};
+        const Array q0 = numbers(q, "q"), v0 = numbers(v, "v");
+        mb.check_q(q0.data(), q0.size());
+        mb.check_v(v0.data(), v0.size(), "v");
+        const std::vector<double> from_q(q0.data(), q0.data() + q0.size()), from_v(v0.data(), v0.data() + v0.size());
+        const std::vector<double> force = vector_of(mb, tau, "tau"), friction = damping.is_none() ? std::vector<double>() : vector_of(mb, damping, "damping");
+        const auto at = [&]<class S>(S) { return trajectory<S>(mb, from_q, from_v, times, force, friction, options, how); };
+        switch (precision) {
+          case Precision::double_: return at(double());
+          case Precision::extended: return at(Extended());
+          case Precision::quad: return at(Quad());
+          default: break;
+        }
+        throw EvaluationError("trajectories are computed in precision 'double', 'extended' or 'quad', not '" + std::string(precision_name(precision)) + "'");
+      }, py::arg("q"), py::arg("v"), py::arg("times"), py::arg("tau"), py::arg("damping"), py::arg("integrator"), py::arg("rtol"), py::arg("atol"),
+           py::arg("step"), py::arg("normalise"), py::arg("precision"), py::arg("form"), py::arg("refine"));
+  m.def("integrators", [] {
+    std::vector<std::string> names;
+    for (const Integrator i : integrators) names.push_back(integrator_name(i));
+    return names;
+  }, "The integrators that Integration has.");
+}
+
+}  // namespace pycraft

@@ -1,0 +1,65 @@
+// Forward dynamics by other methods than the articulated-body algorithm, for comparison.
+#include "bindings/direct_calls.h"
+#include "dynamics/methods.h"
+
+namespace pycraft {
+
+namespace {
+
+using Methods = DirectCalls<DynamicsMethods>;
+
+struct MotionState {
+  Argument q, v, tau;
+  int batch;
+  MotionState(const Multibody& mb, const py::object& given_q, const py::object& given_v, const py::object& given_tau)
+      : q(argument(given_q, mb.nq(), "q", mb)), v(argument(given_v, mb.nv(), "v", mb)), tau(argument(given_tau, mb.nv(), "tau", mb)),
+        batch(common_batch({&q, &v, &tau})) {
+    check_states(mb, q, batch);
+    check_velocities(mb, v, batch, "v");
+    check_velocities(mb, tau, batch, "tau");
+  }
+  std::vector<std::pair<const Argument*, int>> arguments(const Multibody& mb) const { return {{&q, mb.nq()}, {&v, mb.nv()}, {&tau, mb.nv()}}; }
+};
+
+}  // namespace
+
+void register_methods(py::module_& m) {
+  const py::arg q("q"), v("v"), tau("tau"), precision("precision");
+  py::class_<Methods>(m, "Methods", "Forward dynamics of one model by 'cholesky', 'ldl', 'conjugate-gradients' or 'inverse'.")
+      .def(py::init<std::shared_ptr<Multibody>>())
+      .def("forward_dynamics", [](Methods& d, const std::string& method, const py::object& q, const py::object& v, const py::object& tau,
+                                  Precision precision, const py::object& out) {
+        const Method by = method_from_name(method);
+        const Multibody& mb = d.model();
+        const MotionState s(mb, q, v, tau);
+        return run(d, precision, s.arguments(mb), output(out, s.batch, {mb.nv()}), mb.nv(), s.batch,
+                   [by](auto& w, auto in, auto* y) { w.forward_dynamics(by, in[0], in[1], in[2], y); });
+      }, py::arg("method"), q, v, tau, precision, py::arg("out"), "Accelerations (nv,) or (B, nv).")
+      .def("conjugate_gradients", [](Methods& d, const py::object& q, const py::object& v, const py::object& tau, Precision precision) {
+        const Multibody& mb = d.model();
+        const int nv = mb.nv();
+        const MotionState s(mb, q, v, tau);
+        const py::array_t<double> target = output(py::none(), s.batch, {nv + 2});
+        py::array_t<double> all = run(d, precision, s.arguments(mb), target, nv + 2, s.batch, [nv](auto& w, auto in, auto* y) {
+          w.forward_dynamics(Method::conjugate_gradients, in[0], in[1], in[2], y);
+          y[nv] = w.iterations();
+          y[nv + 1] = w.residual();
+        });
+        const auto part = [&](const py::object& index) { return py::array_t<double>(py::object(all[py::make_tuple(py::ellipsis(), index)])); };
+        return std::make_tuple(part(py::slice(0, nv, 1)), part(py::int_(nv)), part(py::int_(nv + 1)));
+      }, q, v, tau, precision, "(accelerations, iterations, relative residuals), each per state.")
+      .def("memory", [](Methods& d, const std::string& method, Precision precision) {
+        const Method by = method_from_name(method);
+        size_t bytes = 0;
+        const auto measure = [&]<class S>(S) { d.template each<S>(1, [&](DynamicsMethods<S>& w, int) { bytes = w.memory(by); }); };
+        at_precision(precision, measure);
+        return bytes;
+      }, py::arg("method"), precision, "Bytes that a method reads and writes at one evaluation.");
+  m.def("methods", [] {
+    std::vector<std::string> names;
+    for (const Method method : methods) names.push_back(method_name(method));
+    return names;
+  }, "The methods of forward dynamics that Methods has.");
+}
+
+}  // namespace pycraft

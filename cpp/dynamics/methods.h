@@ -1,0 +1,66 @@
+// Forward dynamics by methods other than the articulated-body algorithm, for comparison: (ℳ + J) θ̈ = T - 𝒞 with 𝒞 from Newton-Euler.
+//
+// method               how                                                                        cost
+// cholesky             ℳ + J by composite bodies, dense Cholesky factor                           O(N³)
+// ldl                  ℳ + J by composite bodies, L*DL in tree order without fill-in               O(N depth²)
+// conjugate-gradients  products (ℳ + J)x by two sweeps, Jacobi preconditioner                     O(N) an iteration
+// inverse              (ℳ + J)⁻¹ formed by the innovations factors, then times T - 𝒞              O(N²)
+//
+// No allocation after the first call of a method.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "dynamics/conjugate_gradients.h"
+#include "dynamics/dense_factors.h"
+#include "model/multibody.h"
+#include "operators/rigid_blocks.h"
+#include "recursions/velocities.h"
+
+namespace pycraft {
+
+enum class Method { cholesky, ldl, conjugate_gradients, inverse };
+inline constexpr Method methods[] = {Method::cholesky, Method::ldl, Method::conjugate_gradients, Method::inverse};
+const char* method_name(Method method);
+// Throws EvaluationError that lists the names there are.
+Method method_from_name(const std::string& name);
+
+template <class S>
+class DynamicsMethods {
+ public:
+  explicit DynamicsMethods(const Multibody& model);
+
+  // Throws SingularOperatorError that names the coordinate where a pivot of a factor is noise, or where conjugate gradients do not get the
+  // residual below sqrt(eps); SingularHingeError for `inverse`.
+  void forward_dynamics(Method method, const S* q, const S* v, const S* tau, S* vdot);
+
+  // Of the last call with conjugate gradients: iterations, and ‖T - 𝒞 - ℳθ̈‖/‖T - 𝒞‖ in the norm of the preconditioner.
+  int iterations() const { return gradients_.iterations; }
+  S residual() const { return gradients_.residual; }
+
+  // Bytes that a method reads and writes at one evaluation: kinematics, velocities, what it factors and its vectors.
+  size_t memory(Method method) const;
+
+ private:
+  void factor_and_solve(Method method, S* x);
+  void solve_by_gradients(const S* b, S* x);
+  void multiply_by_inverse(const S* b, S* x);
+  [[noreturn]] void refuse(Method method, const PivotFailure<S>& failure) const;
+
+  const SkoStructure tree_;
+  std::shared_ptr<const CompiledModel<S>> model_;
+  RigidBlocks<S> blocks_;
+  Velocities<S> velocities_;
+  TreeOrder order_;
+  std::vector<Vector6<S>> alpha_, force_;
+  std::vector<S> right_side_, work_, matrix_, identity_, scratch_;
+  ConjugateGradients<S> gradients_;
+};
+
+#define PYCRAFT_EXTERN(S) extern template class DynamicsMethods<S>;
+PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_EXTERN)
+#undef PYCRAFT_EXTERN
+
+}  // namespace pycraft

@@ -1,0 +1,130 @@
+// Methods of forward dynamics allocate nothing after the first call; rates of configurations against differences on the group, in quad.
+#define BOOST_TEST_MODULE methods
+#include <atomic>
+#include <boost/test/included/unit_test.hpp>
+#include <cstdlib>
+#include <new>
+#include <random>
+
+#include "dynamics/methods.h"
+#include "dynamics/rigid_dynamics.h"
+#include "dynamics/trajectory.h"
+#include "recursions/configuration_rate.h"
+
+namespace {
+std::atomic<long> allocations{0};
+}
+
+#if defined(__GLIBC__)
+extern "C" void* __libc_malloc(size_t);
+extern "C" void* malloc(size_t size) {
+  ++allocations;
+  return __libc_malloc(size);
+}
+#else
+void* operator new(size_t size) {
+  ++allocations;
+  if (void* p = std::malloc(size)) return p;
+  throw std::bad_alloc();
+}
+void operator delete(void* p) noexcept { std::free(p); }
+void operator delete(void* p, size_t) noexcept { std::free(p); }
+#endif
+
+using namespace pycraft;
+
+namespace {
+
+std::shared_ptr<Multibody> robot() {
+  auto mb = std::make_shared<Multibody>("robot");
+  const HingeKind kinds[] = {HingeKind::free, HingeKind::pin, HingeKind::ball, HingeKind::slider, HingeKind::screw, HingeKind::universal};
+  for (int k = 0; k < 6; ++k) {
+    Body b;
+    b.name = "body" + std::to_string(k);
+    b.mass = 1 + k;
+    b.com = {0.1, 0.2, 0.05};
+    b.inertia = {1, 0.1, 0, 1.2, 0, 0.9};
+    b.hinge.kind = kinds[k];
+    b.hinge.placement.p = {0.3, 0, 0.1};
+    std::vector<Vector3<double>> axes;
+    if (kinds[k] == HingeKind::pin || kinds[k] == HingeKind::slider || kinds[k] == HingeKind::screw) axes = {{0.6, 0, 0.8}};
+    if (kinds[k] == HingeKind::universal) axes = {{1, 0, 0}, {0, 1, 0}};
+    b.hinge.subhinges = subhinges_of(kinds[k], axes, {0.1, 0, 0.2}, 0.3, b.name);
+    mb->add_body(b, k == 0 ? "" : k == 4 ? "body1" : "body" + std::to_string(k - 1));
+  }
+  mb->set_gravity({0, 0, -9.81});
+  return mb;
+}
+
+std::vector<double> random_numbers(int n, int seed) {
+  std::mt19937 generator(seed);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  std::vector<double> x(n);
+  for (double& value : x) value = uniform(generator);
+  return x;
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(methods_do_not_allocate) {
+  const auto mb = robot();
+  const std::vector<double> q = mb->zero_q(), v = random_numbers(mb->nv(), 1), tau = random_numbers(mb->nv(), 2);
+  std::vector<double> out(mb->nv()), expected(mb->nv());
+  RigidDynamics<double>(*mb).forward_dynamics(q.data(), v.data(), tau.data(), expected.data());
+  DynamicsMethods<double> w(*mb);
+  for (const Method method : methods) {
+    w.forward_dynamics(method, q.data(), v.data(), tau.data(), out.data());
+    for (int i = 0; i < mb->nv(); ++i) BOOST_TEST(std::abs(out[i] - expected[i]) < 1e-11);
+    const long before = allocations;
+    w.forward_dynamics(method, q.data(), v.data(), tau.data(), out.data());
+    BOOST_TEST(allocations - before == 0, method_name(method));
+  }
+}
+
+// q moved by ±hv: the difference over 2h is q̇ up to h²|v|³ and eps/h of quad; with h = 1e-10 both are near 1e-20.
+BOOST_AUTO_TEST_CASE(rates_are_derivatives_on_the_group) {
+  const auto mb = robot();
+  const auto model = mb->compiled<Quad>();
+  for (int seed = 0; seed < 5; ++seed) {
+    const std::vector<double> q0 = random_numbers(mb->nq(), seed), v0 = random_numbers(mb->nv(), seed + 100);
+    const std::vector<Quad> q(q0.begin(), q0.end()), v(v0.begin(), v0.end());
+    std::vector<Quad> rate(q.size()), ahead(q.size()), behind(q.size()), step(v.size());
+    configuration_rate(*model, q.data(), v.data(), rate.data());
+    const Quad h = Quad(1e-10);
+    for (size_t i = 0; i < v.size(); ++i) step[i] = h * v[i];
+    move_configuration(*model, q.data(), step.data(), ahead.data());
+    for (Quad& s : step) s = -s;
+    move_configuration(*model, q.data(), step.data(), behind.data());
+    for (size_t i = 0; i < q.size(); ++i) BOOST_TEST(to_double(abs(Quad(rate[i] - (ahead[i] - behind[i]) / (2 * h)))) < 1e-18);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(moves_are_those_of_the_model) {
+  const auto mb = robot();
+  const std::vector<double> q = random_numbers(mb->nq(), 3), u = random_numbers(mb->nv(), 4);
+  std::vector<double> expected(q.size()), out = q;
+  mb->integrate(q.data(), u.data(), expected.data());
+  move_configuration(*mb->compiled<double>(), out.data(), u.data(), out.data());  // in place
+  for (size_t i = 0; i < q.size(); ++i) BOOST_TEST(std::abs(out[i] - expected[i]) < 1e-15);
+}
+
+// Accelerations may be anybody's: a harmonic oscillator has no model.
+BOOST_AUTO_TEST_CASE(accelerations_are_a_callable) {
+  const auto mb = std::make_shared<Multibody>("oscillator");
+  Body b;
+  b.name = "b";
+  b.mass = 1;
+  b.hinge.kind = HingeKind::slider;
+  b.hinge.subhinges = subhinges_of(HingeKind::slider, {{1, 0, 0}}, {0, 0, 0}, 0, "b");
+  mb->add_body(b, "");
+  const Accelerations<double> spring = [](const double* q, const double*, const double* tau, double* vdot) { vdot[0] = tau[0] - q[0]; };
+  const double q = 1, v = 0, tau = 0;
+  for (const Integrator integrator : integrators) {
+    double end = 0;
+    const TrajectoryOptions options{integrator, 1e-11, 1e-12, 1e-3, false};
+    const TrajectoryCost cost = integrate_trajectory<double>(*mb->compiled<double>(), spring, &q, &v, {0, 1}, &tau, nullptr, options,
+                                                             [&](int, const double* at, const double*) { end = at[0]; });
+    BOOST_TEST(std::abs(end - std::cos(1.0)) < 1e-9, integrator_name(integrator));
+    BOOST_TEST(cost.evaluations > 0);
+  }
+}

@@ -1,0 +1,1 @@
+"""What accuracy costs: trajectories, errors and times of the ways to compute."""
