@@ -27,6 +27,8 @@ from ._core import (
     vector,
     zero,
 )
+from .accuracy.table import accuracy
+from .accuracy.work_precision import work_precision
 from .identities import check
 from .kalman import kalman
 from .models.generators import chain, tree
@@ -57,6 +59,7 @@ __all__ = [
     "SpaceError",
     "StaleOperatorError",
     "State",
+    "accuracy",
     "blockdiag",
     "chain",
     "check",
@@ -79,5 +82,6 @@ __all__ = [
     "to_sympy",
     "tree",
     "vector",
+    "work_precision",
     "zero",
 ]

@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Binding', 'Dynamics', 'Error', 'EvaluationError', 'MatrixTree', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'Scalar', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'Theorem', 'blockdiag', 'constant', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'identity', 'operators_of', 'residual', 'scalar', 'step_kinds', 'symbol_table', 'theorems', 'time_apply', 'time_dynamics', 'vector', 'zero']
+__all__: list[str] = ['Binding', 'Dynamics', 'Error', 'EvaluationError', 'Integration', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'Scalar', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'Theorem', 'blockdiag', 'constant', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'identity', 'integrators', 'methods', 'operators_of', 'precisions', 'residual', 'scalar', 'step_kinds', 'symbol_table', 'theorems', 'time_apply', 'time_dynamics', 'time_forward', 'time_packs', 'vector', 'wider', 'zero']
 
 class Error(Exception): ...
 class SpaceError(Error, TypeError): ...
@@ -272,10 +272,11 @@ class Operator:
         The plan written out as the textbook recursion: language "text", "latex", or "python" (NumPy alone) and "cpp" (Eigen alone),
         source that runs by itself. See pycraft.algorithm.
         """
-    def at(self, q: typing.Any = None, v: typing.Any = None, *, form: str = 'fast', refine: typing.SupportsInt | typing.SupportsIndex = 0, precision: str = 'double') -> Operator:
+    def at(self, q: typing.Any = None, v: typing.Any = None, *, form: str = 'fast', refine: typing.Any = 0, residual: str = 'same', precision: str | int = 'double') -> Operator:
         """
         The same expression bound to a state: q (nq,) or a batch (B, nq), v likewise (zero if left out); q=None takes the model's present
-        state. The innermost binding wins. precision: "double" or "extended".
+        state. The innermost binding wins. form: "fast", "ud" or "square-root", of the articulated-inertia sweep; refine: corrections of
+        what is solved, a number or "auto", with residual="same" or "wider"; precision: "single", "double", "extended", "quad", 50, 100.
         """
     def blocks(self, order: str = 'base-to-tip') -> typing.Any:
         """
@@ -350,7 +351,7 @@ class Operator:
         """
     def value(self, **kwargs) -> typing.Any:
         """
-        The value of a vector expression; named vectors (pycraft.vector) are given by name.
+        The value of a vector expression; named vectors (pycraft.vector) are given by name. rules=False evaluates what was typed.
         """
     @property
     def T(self) -> Operator:
@@ -605,36 +606,72 @@ class Dynamics:
         ...
     def energy(self, q: typing.Any, v: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
         ...
-    def forward_dynamics(self, q: typing.Any, v: typing.Any, tau: typing.Any, form: str, refine: typing.SupportsInt | typing.SupportsIndex, precision: str, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+    def forward_dynamics(self, q: typing.Any, v: typing.Any, tau: typing.Any, form: str, refine: typing.Any, residual: str, precision: str | int, on_singular: str, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
         ...
-    def inverse_dynamics(self, q: typing.Any, v: typing.Any, vdot: typing.Any, precision: str, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+    def inverse_dynamics(self, q: typing.Any, v: typing.Any, vdot: typing.Any, precision: str | int, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
         ...
-    def jacobian(self, frame: str, q: typing.Any, precision: str, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+    def jacobian(self, frame: str, q: typing.Any, precision: str | int, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
         ...
-    def mass_matrix(self, q: typing.Any, inverse: bool, precision: str, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+    def mass_matrix(self, q: typing.Any, precision: str | int, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
         ...
+    def mass_matrix_inverse(self, q: typing.Any, form: str, refine: typing.Any, residual: str, precision: str | int, on_singular: str, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def memory(self, form: str, precision: str | int) -> int:
+        """
+        Bytes that one forward dynamics works in.
+        """
     def pose(self, frame: str, q: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def refinement(self, q: typing.Any, v: typing.Any, tau: typing.Any, form: str, refine: typing.Any, residual: str, precision: str | int) -> tuple[numpy.typing.NDArray[numpy.float64], list[float]]:
         ...
 class Sensitivities:
     def __init__(self, arg0: Multibody) -> None:
         ...
-    def dynamics(self, forward: bool, q: typing.Any, v: typing.Any, vdot: typing.Any, precision: str) -> tuple:
+    def dynamics(self, forward: bool, q: typing.Any, v: typing.Any, vdot: typing.Any, precision: str | int) -> tuple:
         ...
-    def hamiltonian(self, q: typing.Any, p: typing.Any, tau: typing.Any, precision: str) -> tuple:
+    def hamiltonian(self, q: typing.Any, p: typing.Any, tau: typing.Any, precision: str | int) -> tuple:
         ...
-    def inertial_regressor(self, q: typing.Any, v: typing.Any, vdot: typing.Any, precision: str) -> numpy.typing.NDArray[numpy.float64]:
+    def inertial_regressor(self, q: typing.Any, v: typing.Any, vdot: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
         ...
-    def jacobian_derivative(self, frame: str, q: typing.Any, precision: str) -> numpy.typing.NDArray[numpy.float64]:
+    def jacobian_derivative(self, frame: str, q: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
         ...
-    def jacobian_rate(self, frame: str, q: typing.Any, v: typing.Any, precision: str) -> numpy.typing.NDArray[numpy.float64]:
+    def jacobian_rate(self, frame: str, q: typing.Any, v: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
         ...
-    def kinetic_energy(self, q: typing.Any, v: typing.Any, precision: str) -> tuple:
+    def kinetic_energy(self, q: typing.Any, v: typing.Any, precision: str | int) -> tuple:
         ...
-    def log_determinant(self, over: str, q: typing.Any, precision: str) -> numpy.typing.NDArray[numpy.float64]:
+    def log_determinant(self, over: str, q: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
         ...
-    def momentum(self, q: typing.Any, v: typing.Any, precision: str) -> tuple:
+    def momentum(self, q: typing.Any, v: typing.Any, precision: str | int) -> tuple:
         ...
-    def third_order(self, christoffel: bool, q: typing.Any, precision: str, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+    def third_order(self, christoffel: bool, q: typing.Any, precision: str | int, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+class Methods:
+    """
+    Forward dynamics of one model by 'cholesky', 'ldl', 'conjugate-gradients' or 'inverse'.
+    """
+    def __init__(self, arg0: Multibody) -> None:
+        ...
+    def conjugate_gradients(self, q: typing.Any, v: typing.Any, tau: typing.Any, precision: str | int) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+        """
+        (accelerations, iterations, relative residuals), each per state.
+        """
+    def forward_dynamics(self, method: str, q: typing.Any, v: typing.Any, tau: typing.Any, precision: str | int, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Accelerations (nv,) or (B, nv).
+        """
+    def memory(self, method: str, precision: str | int) -> int:
+        """
+        Bytes that a method reads and writes at one evaluation.
+        """
+class Integration:
+    """
+    Rates of configurations and trajectories of one model.
+    """
+    def __init__(self, arg0: Multibody) -> None:
+        ...
+    def configuration_rate(self, q: typing.Any, v: typing.Any, precision: str | int, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def trajectory(self, q: typing.Any, v: typing.Any, times: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], tau: typing.Any, damping: typing.Any, integrator: str, rtol: typing.SupportsFloat | typing.SupportsIndex, atol: typing.SupportsFloat | typing.SupportsIndex, step: typing.SupportsFloat | typing.SupportsIndex, normalise: bool, precision: str | int, form: str, refine: typing.Any) -> dict:
         ...
 class Theorem:
     """
@@ -682,11 +719,11 @@ class Theorem:
     @property
     def waiting(self) -> str:
         ...
-def _bind(operands: collections.abc.Sequence[Operator], q: typing.Any, v: typing.Any, form: str, refine: typing.SupportsInt | typing.SupportsIndex, precision: str) -> Binding:
+def _bind(operands: collections.abc.Sequence[Operator], q: typing.Any, v: typing.Any, form: str = 'fast', refine: typing.Any = 0, residual: str = 'same', precision: str | int = 'double') -> Binding:
     ...
 def _binding(arg0: Operator) -> Binding:
     ...
-def _binding_from_parts(arg0: typing.SupportsInt | typing.SupportsIndex, arg1: typing.SupportsInt | typing.SupportsIndex, arg2: typing.SupportsInt | typing.SupportsIndex, arg3: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], arg4: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], arg5: str) -> Binding:
+def _binding_from_parts(arg0: typing.SupportsInt | typing.SupportsIndex, arg1: typing.SupportsInt | typing.SupportsIndex, arg2: typing.SupportsInt | typing.SupportsIndex, arg3: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], arg4: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], arg5: str | int, arg6: str, arg7: typing.SupportsInt | typing.SupportsIndex, arg8: bool) -> Binding:
     ...
 def _function(arg0: SkoSource, arg1: str, arg2: Binding, arg3: Operator) -> Operator:
     ...
@@ -725,12 +762,28 @@ def euclidean(dimension: typing.SupportsInt | typing.SupportsIndex) -> Space:
     """
 def external(product: typing.Any, transposed: typing.Any, domain: Space, codomain: Space, name: str) -> Operator:
     ...
+def forms() -> list[str]:
+    """
+    The forms of the articulated-inertia sweep.
+    """
 def identity(space: typing.Any = None) -> Operator:
     """
     I; without a space it takes that of the operator it is combined with.
     """
+def integrators() -> list[str]:
+    """
+    The integrators that Integration has.
+    """
+def methods() -> list[str]:
+    """
+    The methods of forward dynamics that Methods has.
+    """
 def operators_of(model: Multibody) -> MultibodyOperators:
     ...
+def precisions() -> list[str | int]:
+    """
+    The precisions, from narrow to wide.
+    """
 def residual(a: typing.Any, b: typing.Any, vectors: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]] = {}, on_one_path: bool = False, at_most: bool = False) -> tuple[float, float, float]:
     """
     Largest entries of a - b, a and b: both evaluated as typed, no theorem used, the difference taken at the bound precision.
@@ -749,7 +802,7 @@ def theorems(source: SkoSource) -> list[Theorem]:
     """
     Every theorem, stated on the letters of one model.
     """
-def time_apply(operator: Operator, x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2) -> dict:
+def time_apply(operator: Operator, x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2, rules: bool = True) -> dict:
     """
     Seconds per application: minimum, median, calls.
     """
@@ -757,11 +810,24 @@ def time_dynamics(model: Multibody, call: str, q: typing.Annotated[numpy.typing.
     """
     Seconds per direct call over a set of states in rotation: minimum, median, calls.
     """
+def time_forward(model: Multibody, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2, form: str = 'fast', refine: typing.Any = 0, residual: str = 'same', precision: str | int = 'double') -> dict:
+    """
+    Seconds per forward dynamics over a set of states in rotation: minimum, median, calls.
+    """
+def time_packs(model: Multibody, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2, form: str = 'fast', precision: str | int = 'double') -> dict:
+    """
+    Seconds per state of a batch in packs: minimum, median, calls.
+    """
 def vector(name: str, space: Space) -> Operator:
     """
     A named vector of a space: stands for an array that is given at the evaluation.
+    """
+def wider(precision: str | int) -> typing.Any:
+    """
+    The next wider precision, None for the widest.
     """
 def zero(domain: Space, codomain: Space) -> Operator:
     """
     The zero operator.
     """
+float128: bool = True

@@ -160,6 +160,43 @@ def _beside_pinocchio(name: str, robot: Any, q: np.ndarray, v: np.ndarray, u: np
     return figures
 
 
+# What a way to compute may cost over `fast` in double (quad: the compiler's own 128 bits, or the portable type).
+WAYS: dict[str, tuple[dict[str, Any], float]] = {
+    "fast + 1 refinement": ({"refine": 1}, 2.2),
+    "ud": ({"form": "ud"}, 3.5),
+    "square-root": ({"form": "square-root"}, 6.0),
+    "extended": ({"precision": "extended"}, 15.0 if _core.epsilons()["extended"] > 1e-25 else 80.0),
+    "quad": ({"precision": "quad"}, 160.0 if _core.float128 else 280.0),
+}
+
+
+def accuracy(seconds: float = 0.2) -> list[Figure]:
+    """What accuracy costs: forward dynamics in every way over `fast` in double, and batches in packs."""
+    from . import robots
+
+    figures = []
+    for name, model in (("panda", robots.panda()), ("g1", robots.g1()), ("chain of 100", chain(100, seed=1))):
+        q, v, u = _states(model)
+        exact = model.forward_dynamics(q, v, u, precision="quad")
+        fast = _core.time_forward(model, q, v, u, seconds)["median"]
+        for way, (options, bound) in WAYS.items():
+            error = np.abs(model.forward_dynamics(q, v, u, **options) - exact).max() / np.abs(exact).max()
+            if not error < 1e-6:
+                raise _core.EvaluationError(f"{way} of {name} is wrong in the run that times it: off by {error:.1e}")
+            own = _core.time_forward(model, q, v, u, seconds, **options)["median"]
+            figures.append(Figure(f"{name} ({model.nv} dof): {way} over fast", own / fast, "x", bound, f"{1e6 * own:.2f} us, error {error:.0e}"))
+        packs = {}
+        for form in ("fast", "ud"):
+            for precision in ("double", "single"):
+                packed = _core.time_packs(model, q, v, u, seconds, form, precision)["median"]
+                packs[form, precision] = packed
+                note = f"{1e6 * packed:.2f} us a state"
+                figures.append(Figure(f"{name}: {form} in packs, {precision}, over one by one in double", packed / fast, "x", None, note))
+            ratio = packs[form, "single"] / packs[form, "double"]
+            figures.append(Figure(f"{name}: {form} in batches, single over double", ratio, "x", 1.0))
+    return figures
+
+
 def run(seconds: float = 0.1) -> dict[str, list[Figure]]:
     """All figures, by heading."""
     return {
@@ -167,4 +204,5 @@ def run(seconds: float = 0.1) -> dict[str, list[Figure]]:
         "Expressions": [building()],
         "Direct calls": direct_calls(2 * seconds),
         "Sensitivities": sensitivities(2 * seconds),
+        "What accuracy costs": accuracy(2 * seconds),
     }

@@ -1,4 +1,4 @@
-"""The command line: pycraft tour | check | bench | peers | lab."""
+"""The command line: pycraft tour | check | accuracy | stability | bench | peers | lab."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def check(
     model: Model,
     states: Annotated[int, typer.Option(help="Random states beside the present one.")] = 3,
     seed: Annotated[int, typer.Option(help="Seed of the states.")] = 0,
-    precision: Annotated[str, typer.Option(help="The wider scalar: extended | quad.")] = "extended",
+    precision: Annotated[str, typer.Option(help="The wider scalar: extended | quad | 50 | 100 (digits).")] = "extended",
     json: Annotated[bool, typer.Option("--json", help="The report as JSON.")] = False,
     root: Root = "fixed",
     mimic: Mimic = "refuse",
@@ -73,10 +73,11 @@ def check(
 
     def run() -> Any:
         robot = load_model(model, root, mimic)
+        wide = int(precision) if precision.isdigit() else precision
         if json:
-            return robot.soa.check(states=states, seed=seed, precision=precision)
+            return robot.soa.check(states=states, seed=seed, precision=wide)
         with console.status("checking") as status:
-            return robot.soa.check(states=states, seed=seed, precision=precision, progress=lambda name: status.update(name))
+            return robot.soa.check(states=states, seed=seed, precision=wide, progress=lambda name: status.update(name))
 
     report = _guarded(run)
     if json:
@@ -106,6 +107,95 @@ def bench(seconds: Annotated[float, typer.Option(help="Seconds per figure.")] = 
             table.add_row(figure.name, f"{figure.value:.3g} {figure.unit}", bound, figure.note, style=style)
         console.print(table)
     raise typer.Exit(1 if missed else 0)
+
+
+@app.command()
+def accuracy(
+    model: Model,
+    integration: Annotated[bool, typer.Option("--integration", help="Integrators and tolerances instead of forms and precisions.")] = False,
+    seconds: Annotated[float, typer.Option(help="Seconds per figure.")] = 0.05,
+    duration: Annotated[float, typer.Option(help="Seconds of the motion that is integrated.")] = 1.0,
+    seed: Annotated[int, typer.Option(help="Seed of the states and forces.")] = 0,
+    csv: Annotated[Optional[Path], typer.Option(help="Write the rows as CSV.")] = None,  # noqa: UP045 - typer reads it
+    json: Annotated[Optional[Path], typer.Option(help="Write the rows as JSON.")] = None,  # noqa: UP045
+    plot: Annotated[Optional[Path], typer.Option(help="Draw error against time (PNG, SVG or PDF).")] = None,  # noqa: UP045
+    root: Root = "fixed",
+    mimic: Mimic = "refuse",
+) -> None:
+    """What accuracy costs on a model: error, time and memory of every form, refinement, precision and method; or of integrators."""
+    from .accuracy.table import accuracy as measure
+    from .accuracy.work_precision import work_precision
+
+    def run() -> Any:
+        robot = load_model(model, root, mimic)
+        with console.status("measuring") as status:
+
+            def progress(label: str) -> None:
+                status.update(label)
+
+            if not integration:
+                return measure(robot, seed=seed, seconds=seconds, progress=progress)
+            robot.gravity = robot.gravity if any(robot.gravity) else (0.0, 0.0, -9.81)
+            state = robot.random_state(seed)
+            return work_precision(robot, state.q, 0 * state.v, duration=duration, seconds=seconds, progress=progress)
+
+    table = _guarded(run)
+    console.print(table.table())
+    if csv:
+        table.to_csv(csv)
+    if json:
+        table.to_json(json)
+    if plot:
+        import matplotlib
+
+        matplotlib.use("Agg")
+        axes = table.plot()
+        figure = axes[0].figure if integration else axes.figure
+        figure.savefig(plot, dpi=150, bbox_inches="tight")
+    for path in (csv, json, plot):
+        if path:
+            console.print(f"wrote {path}", highlight=False)
+
+
+@app.command()
+def stability(
+    seeds: Annotated[int, typer.Option(help="Random instances a case.")] = 200,
+    steps: Annotated[int, typer.Option(help="Steps of each trajectory.")] = 1_000_000,
+    case: Annotated[str, typer.Option(help="Only cases whose name or family has this text.")] = "",
+    peers: Annotated[bool, typer.Option(help="Pinocchio, MuJoCo, Drake, as far as they are installed, side by side.")] = True,
+    output: Annotated[Optional[Path], typer.Option(help="Where to write the table (Markdown).")] = None,  # noqa: UP045 - typer reads it
+    csv: Annotated[Optional[Path], typer.Option(help="Write the rows as CSV.")] = None,  # noqa: UP045
+    json: Annotated[Optional[Path], typer.Option(help="Write the rows as JSON.")] = None,  # noqa: UP045
+) -> None:
+    """Run the hard cases over forms, refinements and precisions; exit status 1 if a bound does not hold."""
+    from .accuracy import stability as hard
+    from .accuracy.catalogue import catalogue
+    from .accuracy.stability_markdown import markdown
+
+    def run() -> Any:
+        chosen = [c for c in catalogue() if case.lower() in c.name.lower() or case.lower() in c.family.lower()]
+        if not chosen:
+            console.print(f"[bold red]error:[/] no hard case has {case!r} in its name or family", highlight=False)
+            raise typer.Exit(2)
+        with console.status("measuring") as status:
+            return hard.run(seeds, steps, cases=chosen, peers=peers, progress=lambda name: status.update(name))
+
+    results = _guarded(run)
+    if output:
+        output.parent.mkdir(parents=True, exist_ok=True)
+        output.write_text(markdown(results), encoding="utf-8")
+    else:
+        console.print(results.table())
+    if csv:
+        results.to_csv(csv)
+    if json:
+        results.to_json(json)
+    for path in (output, csv, json):
+        if path:
+            console.print(f"wrote {path}", highlight=False)
+    for row in results.failures:
+        console.print(f"[red]{row['case']}, {row['method']}: {row['failed']}[/]", highlight=False)
+    raise typer.Exit(0 if results else 1)
 
 
 @app.command()

@@ -37,7 +37,7 @@ def test_check_ends_with_one_where_a_theorem_fails(monkeypatch):
 def test_precision_that_is_not_there_is_named():
     result = runner.invoke(app, ["check", "panda", "--precision", "single"])
     assert result.exit_code == 2
-    assert "precision 'single' is not there yet" in result.output
+    assert "precision 'single' is not wider than double" in result.output
 
 
 def test_a_missing_file_is_an_error_not_a_traceback():

@@ -190,9 +190,9 @@ def test_wrong_arguments_by_their_text():
         ("batches of 2 and 3 states in one call", lambda: model.bias_forces(Q, np.zeros((3, nv)))),
         ("is not an array of numbers", lambda: model.mass_matrix("q")),
         ("no node or body of .* is called 'gripper'; there are", lambda: model.jacobian("gripper", q)),
-        ("form 'ud' .* there is 'fast'", lambda: model.forward_dynamics(q, v, v, form="ud")),
-        ("refine=1", lambda: model.forward_dynamics(q, v, v, refine=1)),
-        ("precision 'single' is not there yet", lambda: model.mass_matrix(q, precision="single")),
+        ("no form .* is called 'slow'", lambda: model.forward_dynamics(q, v, v, form="slow")),
+        ("refine=-1: a number of corrections", lambda: model.forward_dynamics(q, v, v, refine=-1)),
+        ("no precision is called 'half'", lambda: model.mass_matrix(q, precision="half")),
     ]:
         with pytest.raises(ValueError, match=error) as caught:
             call()

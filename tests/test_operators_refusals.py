@@ -166,10 +166,10 @@ def test_unknown_names(model):
         (KeyError, "no hinge of 'random40' is called 'nose'", lambda: model.hinges["nose"]),
         (
             pc.EvaluationError,
-            "precision 'single' is not there yet; there are 'double', 'extended' and 'quad'",
-            lambda: soa.M.at(model.q, precision="single"),
+            "no precision is called 'half'; there are 'single', 'double', 'extended', 'quad', and 50 and 100 digits",
+            lambda: soa.M.at(model.q, precision="half"),
         ),
-        (pc.EvaluationError, "form 'joseph' .* there is 'fast'", lambda: soa.P.at(model.q, form="joseph")),
+        (pc.EvaluationError, "no form .* is called 'joseph'; there are 'fast', 'ud' and 'square-root'", lambda: soa.P.at(model.q, form="joseph")),
         (pc.EvaluationError, "no plan is made for 'solve'; there are apply", lambda: soa.P.plan("solve")),
     ]:
         with pytest.raises(error, match=text):

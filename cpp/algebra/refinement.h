@@ -25,10 +25,10 @@ constexpr int most_corrections = 20;  // of "auto"
                         " of the solution (0.3 is the limit), so no digit of either is sure; take form=\"ud\", or a wider precision");
 }
 
-// x: n rows of m columns, with terms as large as `largest` that cancelled in it. residual(x, r) and solve(r, δ). corrections receives
-// |δ|/|x| of every step, the largest over the columns.
-template <class S, class Residual, class Solve>
-void refine(S* x, int n, int m, const Refinement& how, const S& largest, const std::string& what, Residual&& residual, Solve&& solve, std::vector<S>& r,
+// x: n rows of m columns, with terms as large as `largest` that cancelled in it. residual(x, r) and solve(r, δ); what() names the system.
+// corrections receives |δ|/|x| of every step, the largest over the columns.
+template <class S, class What, class Residual, class Solve>
+void refine(S* x, int n, int m, const Refinement& how, const S& largest, What&& what, Residual&& residual, Solve&& solve, std::vector<S>& r,
             std::vector<S>& delta, std::vector<double>& corrections) {
   using std::abs;
   const size_t size = size_t(n) * m;
@@ -54,7 +54,7 @@ void refine(S* x, int n, int m, const Refinement& how, const S& largest, const s
       if (!(ratio <= worst)) worst = ratio;
     }
     corrections.push_back(to_double(worst));
-    if (step == 0 && !(worst <= S(0.3))) throw_no_contraction(what, to_double(worst));
+    if (step == 0 && !(worst <= S(0.3))) throw_no_contraction(what(), to_double(worst));
     if (step > 0 && !(worst < last / S(2))) return;
     for (size_t i = 0; i < size; ++i) x[i] += delta[i];
     if (worst <= epsilon<S>()) return;

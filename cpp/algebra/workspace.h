@@ -397,7 +397,7 @@ class Workspace {
         for (size_t i = 0; i < size; ++i) r[i] = x[i] - r[i];
       }
     };
-    refine(y, n, w, how, S(0), plan_->text, residual, [&](const S* r, S* d) { own.mass_matrix_inverse(r, d, w, scratch_.data()); }, refine_r_, refine_delta_, corrections);
+    refine(y, n, w, how, S(0), [&] { return plan_->text; }, residual, [&](const S* r, S* d) { own.mass_matrix_inverse(r, d, w, scratch_.data()); }, refine_r_, refine_delta_, corrections);
   }
 
   void apply_external_operator(const Step& s, int w) {

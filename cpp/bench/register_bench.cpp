@@ -4,6 +4,7 @@
 #include "algebra/errors.h"
 #include "bench/timing.h"
 #include "bindings/bindings.h"
+#include "dynamics/methods.h"
 #include "dynamics/packed_dynamics.h"
 #include "dynamics/rigid_dynamics.h"
 #include "dynamics/sensitivities.h"
@@ -49,6 +50,28 @@ py::dict time_forward(const std::shared_ptr<Multibody>& model, const Array& q, c
       int k = 0;
       t = time_calls([&] {
         w.forward_dynamics(Q + size_t(k) * nq, V + size_t(k) * nv, U + size_t(k) * nv, out.data(), how);
+        k = (k + 1) % K;
+      }, seconds);
+    });
+  }
+  return result(t);
+}
+
+// The same by another method.
+py::dict time_method(const std::shared_ptr<Multibody>& model, const std::string& method, const Array& q, const Array& v, const Array& u, double seconds,
+                     Precision precision) {
+  const Method by = method_from_name(method);
+  const int K = static_cast<int>(q.shape(0)), nq = model->nq(), nv = model->nv();
+  Timing t;
+  {
+    py::gil_scoped_release release;
+    at_precision(precision, [&]<class S>(S) {
+      DynamicsMethods<S> w(*model);
+      std::vector<S> Q, V, U, out(nv);
+      convert(q.data(), size_t(K) * nq, Q), convert(v.data(), size_t(K) * nv, V), convert(u.data(), size_t(K) * nv, U);
+      int k = 0;
+      t = time_calls([&] {
+        w.forward_dynamics(by, Q.data() + size_t(k) * nq, V.data() + size_t(k) * nv, U.data() + size_t(k) * nv, out.data());
         k = (k + 1) % K;
       }, seconds);
     });
@@ -132,6 +155,8 @@ void register_bench(py::module_& m) {
   m.def("time_forward", &time_forward, py::arg("model"), py::arg("q"), py::arg("v"), py::arg("u"), py::arg("seconds") = 0.2, py::arg("form") = Form::fast,
         py::arg("refine") = 0, py::arg("residual") = "same", py::arg("precision") = Precision::double_,
         "Seconds per forward dynamics over a set of states in rotation: minimum, median, calls.");
+  m.def("time_method", &time_method, py::arg("model"), py::arg("method"), py::arg("q"), py::arg("v"), py::arg("u"), py::arg("seconds") = 0.2,
+        py::arg("precision") = Precision::double_, "Seconds per forward dynamics by a method of the mass matrix: minimum, median, calls.");
   m.def("time_packs", &time_packs, py::arg("model"), py::arg("q"), py::arg("v"), py::arg("u"), py::arg("seconds") = 0.2, py::arg("form") = Form::fast,
         py::arg("precision") = Precision::double_, "Seconds per state of a batch in packs: minimum, median, calls.");
 }

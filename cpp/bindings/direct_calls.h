@@ -89,6 +89,10 @@ inline void check_velocities(const Multibody& m, const Argument& v, int batch, c
   for (int b = 0; b < (v.stride ? batch : 1); ++b) m.check_v(v.array.data() + b * v.stride, m.nv(), what);
 }
 
+// Calls that stop at quad.
+template <template <class> class Workspace, class S>
+inline constexpr bool available_at = true;
+
 // Runs f(workspace, inputs..., out) state after state at the precision asked for.
 template <template <class> class Workspace, class F>
 py::array_t<double> run(DirectCalls<Workspace>& d, Precision precision, std::vector<std::pair<const Argument*, int>> in, py::array_t<double> out, int out_size, int batch, F f) {
@@ -119,7 +123,13 @@ py::array_t<double> run(DirectCalls<Workspace>& d, Precision precision, std::vec
       }
     });
   };
-  at_precision(precision, run_in);
+  const auto widest = [&]<class S>(S s) {
+    if constexpr (available_at<Workspace, S>)
+      run_in(s);
+    else
+      throw EvaluationError("this call computes in precision 'single' to 'quad'; operators, and forward dynamics, go to 100 digits");
+  };
+  at_precision(precision, widest);
   return out;
 }
 

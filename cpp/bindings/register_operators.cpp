@@ -249,6 +249,10 @@ void register_operators(py::module_& m) {
       }, py::arg("language") = "text", py::arg("request") = "apply",
            "The plan written out as the textbook recursion: language \"text\", \"latex\", or \"python\" (NumPy alone) and \"cpp\" (Eigen alone),\n"
            "source that runs by itself. See pycraft.algorithm.")
+      .def("certify", [](const py::object& self, const py::args& args, const py::kwargs& kwargs) {
+        return py::module_::import("pycraft.accuracy.certify").attr("certify_expression")(self, *args, **kwargs);
+      }, "The value with its measured error, condition, where digits are lost and what the next rung costs: see\n"
+         "pycraft.accuracy.certify.certify_expression.")
       .def("blocks", [](const Expression& e, const std::string& order) { return py::module_::import("pycraft.operators").attr("block_view")(e, order); },
            py::arg("order") = "base-to-tip", "A labelled block view of the dense form; order=\"tip-to-base\" shows the book's triangles.")
       .def("plan", [](const Expression& e, const std::string& request, bool rules) {

@@ -178,6 +178,11 @@ void register_plans(py::module_& m) {
       at_precision(p, [&]<class S>(S) { d[py::cast(p)] = to_double(epsilon<S>()); });
     return d;
   }, "Epsilon of each precision by name.");
+#if defined(PYCRAFT_FLOAT128)
+  m.attr("float128") = true;  // quad is the compiler's own type
+#else
+  m.attr("float128") = false;
+#endif
   m.def("precisions", [] { return std::vector<Precision>(std::begin(precisions), std::end(precisions)); }, "The precisions, from narrow to wide.");
   m.def("forms", [] { return std::vector<Form>(std::begin(forms), std::end(forms)); }, "The forms of the articulated-inertia sweep.");
   m.def("wider", [](Precision precision) { return precision == Precision::digits100 ? py::object(py::none()) : py::cast(precisions[static_cast<int>(precision) + 1]); },

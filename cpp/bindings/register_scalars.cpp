@@ -46,6 +46,9 @@ void register_scalars(py::module_& m) {
       .def("at", [](const Scalar& s, const py::args& args, const py::kwargs& kwargs) {
         return py::module_::import("pycraft.operators").attr("scalar_at")(s, *args, **kwargs);
       })
+      .def("certify", [](const py::object& self, const py::args& args, const py::kwargs& kwargs) {
+        return py::module_::import("pycraft.accuracy.certify").attr("certify_expression")(self, *args, **kwargs);
+      }, "The number with its measured error, where digits are lost and what the next rung costs.")
       .def("gradient", [](const Scalar& s, const std::string& over) { return py::module_::import("pycraft.operators").attr("scalar_gradient")(s, over); },
            py::arg("over") = "coordinates",
            "All derivatives at once, as an array: over \"coordinates\" (nv,), or (B, nv) where a batch is bound. Of ln det(HφMφ*H* [+ J]) and\n"

@@ -4,6 +4,11 @@
 
 namespace pycraft {
 
+template <>
+inline constexpr bool available_at<Sensitivities, Digits50> = false;
+template <>
+inline constexpr bool available_at<Sensitivities, Digits100> = false;
+
 namespace {
 
 using Calls = DirectCalls<Sensitivities>;

@@ -295,7 +295,7 @@ void Sensitivities<S>::log_determinant(const S* q, S* coordinates, S* inertias, 
 }
 
 #define PYCRAFT_INSTANTIATE(S) template class Sensitivities<S>;
-PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_INSTANTIATE)
+PYCRAFT_FOR_EACH_SCALAR_TO_QUAD(PYCRAFT_INSTANTIATE)
 #undef PYCRAFT_INSTANTIATE
 
 }  // namespace pycraft

@@ -49,7 +49,7 @@ class Sensitivities {
 };
 
 #define PYCRAFT_INSTANTIATE(S) extern template class Sensitivities<S>;
-PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_INSTANTIATE)
+PYCRAFT_FOR_EACH_SCALAR_TO_QUAD(PYCRAFT_INSTANTIATE)
 #undef PYCRAFT_INSTANTIATE
 
 }  // namespace pycraft

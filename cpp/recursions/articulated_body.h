@@ -36,8 +36,7 @@ S articulated_body(const SkoStructure& tree, const CompiledModel<S>& model, Rigi
   }
   for (int k = model.bodies - 1; k >= 0; --k) {
     const int p = model.parent[k], first = model.v_offset[k], n = model.nv_of[k];
-    if (factored)
-      blocks.factors().add_acceleration(k, velocities.a[k]);
+    if (factored) blocks.factors().add_acceleration(k, velocities.a[k]);
     doubtful |= blocks.eliminate_hinge(k);
     Vector6<S> zk = z[k];
     if (!factored) zk = zk + blocks.P[k] * velocities.a[k];
@@ -54,7 +53,10 @@ S articulated_body(const SkoStructure& tree, const CompiledModel<S>& model, Rigi
       z[p] = z[p] + force_to_parent(blocks.pose[k], plus);
     }
   }
-  if (doubtful) articulated_inertia_tip_to_base(tree, blocks);  // once more, with the error bound beside it
+  if (doubtful && factored)
+    articulated_inertia_tip_to_base(tree, blocks);  // once more, now with P for the error bound
+  else if (doubtful)
+    check_pivots_tip_to_base(tree, blocks);
   S largest = S(0);
   const Vector6<S> base{Vector3<S>::zero(), -model.gravity};
   for (int k = 0; k < model.bodies; ++k) {

@@ -6,6 +6,9 @@
 
 #include <cmath>
 #include <limits>
+#include <type_traits>
+
+#include "spatial/scalar.h"
 
 namespace pycraft {
 
@@ -77,6 +80,9 @@ struct Pack {
     return all;
   }
 };
+
+template <class T, int W>
+inline constexpr bool is_pack<Pack<T, W>> = true;
 
 }  // namespace pycraft
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <tuple>
+#include <type_traits>
 #include <vector>
 
 #if LDBL_MANT_DIG <= 53
@@ -38,7 +39,8 @@ using Quad = boost::multiprecision::number<boost::multiprecision::cpp_bin_float_
 using Digits50 = boost::multiprecision::number<boost::multiprecision::cpp_bin_float<50>, boost::multiprecision::et_off>;
 using Digits100 = boost::multiprecision::number<boost::multiprecision::cpp_bin_float<100>, boost::multiprecision::et_off>;
 
-// X(S) for every scalar, from narrow to wide.
+// X(S) for the scalars up to quad, and for every scalar, from narrow to wide.
+#define PYCRAFT_FOR_EACH_SCALAR_TO_QUAD(X) X(Single) X(double) X(Extended) X(Quad)
 #define PYCRAFT_FOR_EACH_SCALAR(X) X(Single) X(double) X(Extended) X(Quad) X(Digits50) X(Digits100)
 
 // One thing per scalar that the engine runs on: std::get<Thing<S>>(...).
@@ -72,6 +74,10 @@ struct WiderThan<Digits50> {
 };
 template <class S>
 using Wider = typename WiderThan<S>::type;
+
+// Whether S stands for several numbers at once, so that no two of them can be ordered.
+template <class S>
+inline constexpr bool is_pack = false;
 
 template <class S>
 inline S epsilon() {

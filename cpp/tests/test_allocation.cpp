@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <new>
 
+#include "dynamics/packed_dynamics.h"
 #include "dynamics/rigid_dynamics.h"
 #include "dynamics/sensitivities.h"
 #include "operators/multibody_operators.h"
@@ -97,6 +98,34 @@ BOOST_AUTO_TEST_CASE(pivots_in_doubt) {
   const std::vector<double> q = mb->zero_q(), v(mb->nv(), 0.3), tau(mb->nv(), 0.1);
   std::vector<double> out(mb->nv());
   BOOST_TEST(count([&] { w.forward_dynamics(q.data(), v.data(), tau.data(), out.data()); }) == 0);
+}
+
+BOOST_AUTO_TEST_CASE(forms_refinement_and_packs) {
+  const auto mb = robot();
+  constexpr int width = PackedDynamics<double>::width;
+  const int nq = mb->nq(), nv = mb->nv();
+  std::vector<double> q, v(size_t(width) * nv), tau(v.size(), 0.1), packed(v.size()), alone(nv);
+  for (int b = 0; b < width; ++b) {
+    const std::vector<double> zero = mb->zero_q();
+    std::vector<double> moved(nq);
+    for (int i = 0; i < nv; ++i) v[size_t(b) * nv + i] = 0.3 - 0.1 * b + 0.01 * i;
+    mb->integrate(zero.data(), v.data() + size_t(b) * nv, moved.data());
+    q.insert(q.end(), moved.begin(), moved.end());
+  }
+  RigidDynamics<double> w(*mb);
+  PackedDynamics<double> pack(*mb);
+  for (const Form form : forms) {
+    for (const Refinement refinement : {Refinement{0, false}, Refinement{2, false}, Refinement{Refinement::automatic, true}}) {
+      const Solving how{form, refinement, OnSingular::raise};
+      BOOST_TEST(count([&] { w.forward_dynamics(q.data(), v.data(), tau.data(), alone.data(), how); }) == 0, form_name(form));
+    }
+    if (form == Form::square_root) continue;
+    BOOST_TEST(count([&] { BOOST_TEST(pack.forward_dynamics(q.data(), nq, v.data(), nv, tau.data(), nv, packed.data(), form)); }) == 0, form_name(form));
+    for (int b = 0; b < width; ++b) {  // the same operations in the same order
+      w.forward_dynamics(q.data() + size_t(b) * nq, v.data() + size_t(b) * nv, tau.data(), alone.data(), Solving{form, {}, OnSingular::raise});
+      for (int i = 0; i < nv; ++i) BOOST_TEST(packed[size_t(b) * nv + i] == alone[i], boost::test_tools::tolerance(1e-12));
+    }
+  }
 }
 
 BOOST_AUTO_TEST_CASE(direct_calls) {

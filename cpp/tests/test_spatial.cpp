@@ -7,7 +7,7 @@
 #include "spatial/scalar.h"
 
 using namespace pycraft;
-using Scalars = std::tuple<double, Extended, Quad>;
+using Scalars = std::tuple<Single, double, Extended, Quad, Digits50, Digits100>;
 
 namespace {
 

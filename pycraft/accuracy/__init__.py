@@ -1,1 +1,1 @@
-"""What accuracy costs: trajectories, errors and times of the ways to compute."""
+"""What accuracy costs: certificates of values, the accuracy table of a model, work and precision of integration."""

@@ -182,7 +182,7 @@ def growth(lhs: Any, rhs: Any, sizes: Sizes) -> float:
     return sizes.amplification() if uses_riccati(lhs) or uses_riccati(rhs) else 1.0
 
 
-def relative_bound(lhs: Any, rhs: Any, sizes: Sizes, scale: float, precision: str) -> float:
+def relative_bound(lhs: Any, rhs: Any, sizes: Sizes, scale: float, precision: str | int) -> float:
     """The bound on |lhs - rhs| relative to `scale`, the larger side's largest entry."""
     size = sizes.size(lhs) + sizes.size(rhs)
     return CONSTANT * sizes.sweep() * EPSILON[precision] * max(1.0, size / max(scale, 1e-300)) * growth(lhs, rhs, sizes)

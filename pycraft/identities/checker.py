@@ -27,7 +27,7 @@ class BoundState:
         self._bindings: dict[str, Any] = {}
         self.sizes = Sizes(lambda e: self.bind(e, "double"), operators)
 
-    def bind(self, side: Any, precision: str) -> Any:
+    def bind(self, side: Any, precision: str | int) -> Any:
         if precision not in self._bindings:
             q, v = (None, None) if self.state is None else (self.state.q, self.state.v)
             self._bindings[precision] = _core._bind([self._operators.E], q, v, precision=precision)
@@ -119,7 +119,7 @@ def drawn_vectors(side: Any, rng: np.random.Generator, known: dict[str, np.ndarr
     return known
 
 
-def check_model(operators: Any, *, states: int = 3, seed: int = 0, precision: str = "extended", progress: Any = None) -> Report:
+def check_model(operators: Any, *, states: int = 3, seed: int = 0, precision: str | int = "extended", progress: Any = None) -> Report:
     """Check every theorem on the model of `operators`, at the present state and at `states` random ones.
 
     A theorem holds if its residual is below a derived bound (see `bounds`) in double and in a wider scalar, and falls with epsilon.
@@ -129,7 +129,7 @@ def check_model(operators: Any, *, states: int = 3, seed: int = 0, precision: st
     Parameters
     ----------
     states : random states, drawn from `seed`
-    precision : the wider scalar, "extended" or "quad"
+    precision : the wider scalar, "extended", "quad", 50 or 100 digits
     progress : called with each theorem's name, if given
     """
     _check_wider(precision)
@@ -142,7 +142,6 @@ def check_model(operators: Any, *, states: int = 3, seed: int = 0, precision: st
         BoundState(operators, s)
         for s in ([None] if model is None else [_present(model), *(model.random_state(rng) for _ in range(states))])
     ]
-    drawn[0].bind(operators.E, precision)  # raises by name where the precision is not there yet
     for theorem in operators.theorems():
         if progress is not None:
             progress(theorem.name)
@@ -151,10 +150,13 @@ def check_model(operators: Any, *, states: int = 3, seed: int = 0, precision: st
     return report
 
 
-def _check_wider(precision: str) -> None:
+def _check_wider(precision: str | int) -> None:
     """A residual must be seen to fall: double beside double shows nothing."""
-    if precision == "double":
-        raise _core.EvaluationError("precision 'double' is always taken; name the wider scalar: 'extended' or 'quad'")
+    names = list(_core.epsilons())
+    _core.wider(precision)  # raises where there is no such precision
+    wide = names[names.index("double") + 1 :]
+    if precision not in wide:
+        raise _core.EvaluationError(f"precision {precision!r} is not wider than double, in which every residual is taken; name {wide}")
 
 
 def _present(model: Any) -> Any:
@@ -164,7 +166,7 @@ def _present(model: Any) -> Any:
 
 
 def check_theorem(
-    theorem: _core.Theorem, unmet: list[str], states: list[BoundState], rng: np.random.Generator, precision: str = "extended"
+    theorem: _core.Theorem, unmet: list[str], states: list[BoundState], rng: np.random.Generator, precision: str | int = "extended"
 ) -> Finding:
     """One theorem at these states; `unmet` are those of its hypotheses that the model does not meet."""
     finding = Finding(
@@ -211,7 +213,7 @@ def evaluate(
     rhs: Any,
     states: list[BoundState],
     vectors: list[dict[str, np.ndarray]],
-    precision: str,
+    precision: str | int,
     on_one_path: bool = False,
     at_most: bool = False,
 ) -> Residuals:
@@ -242,7 +244,7 @@ def check(
     states: int = 20,
     seed: int = 0,
     search: bool = True,
-    precision: str = "extended",
+    precision: str | int = "extended",
     budget: float = 20.0,
 ) -> CheckReport:
     """Check a statement numerically: on a model over many seeded states, or on random trees.
@@ -256,7 +258,7 @@ def check(
         None: random trees of all hinge kinds, with and without rotor inertia (text only).
     states : how many states, drawn from `seed`
     search : when false, look for the smallest tree, hinge kinds and state that refute it, and for the hypothesis that would save it
-    precision : the scalar beside double in which residuals must fall, "extended" or "quad"
+    precision : the scalar beside double in which residuals must fall, "extended", "quad", 50 or 100 digits
     budget : seconds for that search
 
     Returns
@@ -301,7 +303,7 @@ def check(
     return report
 
 
-def run(read: Statement, operators: Any, states: int, seed: int, precision: str) -> Residuals:
+def run(read: Statement, operators: Any, states: int, seed: int, precision: str | int) -> Residuals:
     """The residuals of a statement on one model."""
     model = operators._model
     rng = np.random.default_rng(seed)

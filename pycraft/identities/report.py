@@ -27,7 +27,7 @@ class Finding:
     bound: float = 0.0
     wide_residual: float = 0.0
     wide_bound: float = 0.0
-    wide_precision: str = "extended"
+    wide_precision: str | int = "extended"
     states: int = 0
     seconds: float = 0.0
     note: str = ""

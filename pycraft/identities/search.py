@@ -122,7 +122,7 @@ def statement_text(read: Statement) -> str:
     return read.text if read.reading != "expressions" else f"{sides[0]} == {sides[1]}"
 
 
-def refutes(text: str, parents: list[int], kinds: list[str], rotor: bool, seed: int, precision: str, states: int = STATES) -> Any:
+def refutes(text: str, parents: list[int], kinds: list[str], rotor: bool, seed: int, precision: str | int, states: int = STATES) -> Any:
     """(q, residual) at the first refuting state, or None."""
     from .checker import BoundState, drawn_vectors, evaluate
 
@@ -144,7 +144,7 @@ def refutes(text: str, parents: list[int], kinds: list[str], rotor: bool, seed: 
     return None
 
 
-def smallest(text: str, *, seed: int = 0, precision: str = "extended", budget: float = 20.0, largest: int = 4) -> Counterexample | None:
+def smallest(text: str, *, seed: int = 0, precision: str | int = "extended", budget: float = 20.0, largest: int = 4) -> Counterexample | None:
     """The smallest refutation by (bodies, degrees of freedom), or None if the budget (seconds) ran out first."""
     begin = time.perf_counter()
     for tried, (parents, kinds, rotor) in enumerate(candidates(largest)):
@@ -184,7 +184,7 @@ _CLASSES: list[tuple[str, list[tuple[list[int], list[str], bool]]]] = [
 ]
 
 
-def saving_hypotheses(text: str, example: Counterexample, seed: int, precision: str) -> list[str]:
+def saving_hypotheses(text: str, example: Counterexample, seed: int, precision: str | int) -> list[str]:
     """Hypotheses under which no refutation was found on trees that meet only them; the weakest first, one is enough."""
     for name, models in _CLASSES:
         if all(refutes(text, parents, kinds, rotor, seed + 1, precision) is None for parents, kinds, rotor in models):
@@ -192,7 +192,7 @@ def saving_hypotheses(text: str, example: Counterexample, seed: int, precision: 
     return []
 
 
-def check_on_trees(text: str, *, states: int, seed: int, search: bool, precision: str, budget: float) -> CheckReport:
+def check_on_trees(text: str, *, states: int, seed: int, search: bool, precision: str | int, budget: float) -> CheckReport:
     """A statement on a family of random trees that between them meet and break every hypothesis."""
     from .checker import run
 

@@ -184,6 +184,15 @@ class Multibody(IntegrationCalls, _core.Multibody):
             self._soa = OperatorSet(_core.operators_of(self), self)
         return self._soa
 
+    def certify(self, q, v=None, tau=None, **options: Any) -> Any:
+        """Forward dynamics with its measured error, condition, refinement floor, where digits are lost, and what the next rung costs.
+
+        Options as in `forward_dynamics` (form, refine, residual, precision); see `pycraft.accuracy.certify.certify_dynamics`.
+        """
+        from ..accuracy.certify import certify_dynamics
+
+        return certify_dynamics(self, q, v, tau, **options)
+
     def warn(self) -> None:
         """Say, once, what is legal but worth a word: violated triangle inequalities, massless bodies on hinges."""
         from .warning import warn

@@ -185,13 +185,14 @@ class FactoredInertia {
     }
     pivots_ = count;
     if (bias) rows_[count++] = n + s;
-    if (form == Form::ud) {
-      weighted_gram_schmidt(A, stride, rows_.data(), count, pivots_, m, w, weighted_.data(), L_.data(), d_.data());
-    } else {
-      heaviest_first(A, stride, n + s + 1, m, w);
-      householder_lower(A, stride, rows_.data(), count, pivots_, m, L_.data());
-      std::fill_n(d_.data(), pivots_, S(1));
+    if constexpr (!is_pack<S>) {  // reflections take the heaviest column first, whichever that is
+      if (form == Form::square_root) {
+        heaviest_first(A, stride, n + s + 1, m, w);
+        householder_lower(A, stride, rows_.data(), count, pivots_, m, L_.data());
+        std::fill_n(d_.data(), pivots_, S(1));
+      }
     }
+    if (form == Form::ud) weighted_gram_schmidt(A, stride, rows_.data(), count, pivots_, m, w, weighted_.data(), L_.data(), d_.data());
     bias_at_ = bias ? pivots_ : -1;
   }
 

@@ -1,0 +1,200 @@
+"""Colours, and the pictures of accuracy: labels that keep clear of points and of each other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+COLOURS = {"single": "#8a8a8a", "double": "#1f4e79", "extended": "#c55a11", "quad": "#4d7c2a"}
+"""Of precisions; others take WIDE."""
+WIDE = "#6b3fa0"
+MARKERS = {"fast": "o", "ud": "s", "square-root": "D"}
+OTHERS = {"cholesky": "^", "ldl": "v", "conjugate-gradients": "P", "inverse": "X", "realization": "*"}
+SERIES = ("#1f4e79", "#c55a11", "#4d7c2a", "#6b3fa0", "#8a8a8a", "#a8324a", "#2a9d8f", "#b8860b")
+"""Of series that have no colour of their own."""
+WORTH = 3.0
+"""Points of a Pareto front are named where the error falls by this factor: less is the luck of a state."""
+BELOW = 0.5
+"""Errors of zero are drawn this factor below the smallest one that is not."""
+
+
+def axes_of(ax: Any, size: tuple[float, float] = (6.4, 4.0)) -> Any:
+    """The axes given, or new ones."""
+    if ax is not None:
+        return ax
+    import matplotlib.pyplot as plt
+
+    return plt.subplots(figsize=size, layout="constrained")[1]
+
+
+def above_zero(errors: Iterable[float]) -> np.ndarray:
+    """Errors for a logarithmic axis: an exact zero goes a little below the smallest error there is."""
+    errors = np.asarray(list(errors), float)
+    positive = errors[errors > 0]
+    return np.where(errors > 0, errors, BELOW * (positive.min() if positive.size else 1e-17))
+
+
+def time_axis(axis: Any) -> None:
+    """Ticks of a time axis with their units."""
+    from matplotlib.ticker import FuncFormatter
+
+    def text(seconds: float, _: int) -> str:
+        for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6), ("ns", 1e-9)):
+            if seconds >= 0.9999 * size:
+                return f"{seconds / size:g} {unit}"
+        return ""
+
+    axis.set_major_formatter(FuncFormatter(text))
+    axis.set_minor_formatter(FuncFormatter(lambda *_: ""))
+
+
+def place_labels(
+    ax: Any, labels: list[tuple[float, float, str]], keep_clear: Iterable[tuple[float, float]] = (), size: float = 7.5
+) -> None:
+    """Write a label beside each point (x, y, text): at the nearest place that covers neither another label nor a point."""
+    from matplotlib.transforms import Bbox
+
+    figure = ax.figure
+    figure.canvas.draw()
+    renderer = figure.canvas.get_renderer()
+    points = [ax.transData.transform(p) for p in [*keep_clear, *((x, y) for x, y, _ in labels)]]
+    frame = ax.get_window_extent(renderer)
+    taken: list[Any] = []
+    pixel = figure.dpi / 72
+    for x, y, text in labels:
+        best = None
+        for dx, dy, ha, va in _places():
+            note = ax.annotate(text, (x, y), (dx, dy), textcoords="offset points", ha=ha, va=va, fontsize=size)
+            box = note.get_window_extent(renderer)
+            inside = frame.x0 <= box.x0 and box.x1 <= frame.x1 and frame.y0 <= box.y0 and box.y1 <= frame.y1
+            padded = Bbox.from_extents(box.x0 - 2 * pixel, box.y0 - pixel, box.x1 + 2 * pixel, box.y1 + pixel)
+            clear = Bbox.from_extents(box.x0 - 3 * pixel, box.y0 - 3 * pixel, box.x1 + 3 * pixel, box.y1 + 3 * pixel)  # of markers
+            covered = sum(padded.overlaps(other) for other in taken) + sum(clear.contains(*p) for p in points)
+            score = (covered + 2 * (not inside), dx * dx + dy * dy)
+            note.remove()
+            if best is None or score[0] < best[0][0]:
+                best = (score, (dx, dy, ha, va), padded)
+            if score[0] == 0:
+                break
+        assert best is not None
+        dx, dy, ha, va = best[1]
+        far = abs(dx) + abs(dy) > 16
+        arrow = {"arrowstyle": "-", "lw": 0.5, "color": "0.5", "shrinkA": 0, "shrinkB": 3} if far else None
+        ax.annotate(text, (x, y), (dx, dy), textcoords="offset points", ha=ha, va=va, fontsize=size, arrowprops=arrow)
+        taken.append(best[2])
+
+
+def _places() -> list[tuple[float, float, str, str]]:
+    """Offsets in points with their alignment, nearest first."""
+    sides = [(6, "left"), (-6, "right")]
+    return [
+        (float(x * across), float(up), align, "center")
+        for reach in range(9)
+        for across in (1, 3)
+        for up in (9 * reach + 8, -9 * reach - 8)
+        for x, align in sides
+    ]
+
+
+def accuracy_plot(table: Any, ax: Any = None) -> Any:
+    """Error against time: colour the precision, marker the form or method, hollow unrefined; the Pareto front drawn, its steps named."""
+    from matplotlib.lines import Line2D
+
+    ax = axes_of(ax)
+    rows = [row for row in table if not row["refused"]]
+    if not rows:
+        ax.text(0.5, 0.5, "every way is refused", transform=ax.transAxes, ha="center")
+        return ax
+    times, errors = np.array([row["seconds"] for row in rows]), above_zero(row["error"] for row in rows)
+    for row, x, y in zip(rows, times, errors, strict=True):
+        colour = COLOURS.get(row["precision"], WIDE)
+        marker = MARKERS.get(row["form"]) or OTHERS.get(row["method"], "p")
+        ax.plot(x, y, marker, color=colour, ms=6, mfc=colour if row["refine"] else "none", mew=1.2, zorder=3)
+    front = sorted(((x, y, row) for row, x, y in zip(rows, times, errors, strict=True) if row["pareto"]), key=lambda point: point[:2])
+    ax.set(xscale="log", yscale="log", xlabel="time per evaluation", ylabel="relative error of the accelerations")
+    low, high = errors.min(), errors.max()
+    ax.set_xlim(times.min() / 1.6, times.max() * 2.2)
+    ax.set_ylim(low / 10 ** (0.06 * np.log10(10 * high / low)), high * 10 ** (0.10 * np.log10(10 * high / low)))
+    ax.step([x for x, _, _ in front], [y for _, y, _ in front], where="post", color="k", lw=0.8, alpha=0.6, zorder=2)
+    time_axis(ax.xaxis)
+    ax.set_title(table.title, fontsize="medium")
+    used: dict[str, list[Any]] = {"precision": [], "way": []}
+    for precision in dict.fromkeys(row["precision"] for row in sorted(rows, key=lambda r: -_width(r["precision"]))):
+        used["precision"].append(Line2D([], [], marker="o", ls="", color=COLOURS.get(precision, WIDE), label=_named(precision)))
+    for name, marker in {**MARKERS, **OTHERS}.items():
+        if any(name in (row["form"], row["method"]) for row in rows):
+            used["way"].append(Line2D([], [], marker=marker, ls="", color="k", mfc="none", label=name))
+    if any(row["refine"] for row in rows):
+        used["way"].append(Line2D([], [], marker="o", ls="", color="k", label="filled: refined"))
+    used["way"].append(Line2D([], [], color="k", lw=0.8, alpha=0.6, label="Pareto front"))
+    if len(rows) < len(table):
+        used["way"].append(Line2D([], [], ls="", label=f"refused: {len(table) - len(rows)} of {len(table)}"))
+    ax.legend(handles=[*used["precision"], *used["way"]], frameon=False, fontsize=7.5, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    place_labels(ax, [(x, y, _label(row)) for x, y, row in _steps(front)], [*zip(times, errors, strict=True), *_along(front)])
+    return ax
+
+
+def _steps(front: list[tuple[float, float, dict[str, Any]]]) -> list[tuple[float, float, dict[str, Any]]]:
+    """Of a front, fastest first, what is worth a name: where the error has fallen by WORTH since the last named."""
+    named: list[tuple[float, float, dict[str, Any]]] = []
+    for point in front:
+        if not named or WORTH * point[1] <= named[-1][1]:
+            named.append(point)
+    return named
+
+
+def _along(front: list[tuple[float, float, dict[str, Any]]], count: int = 24) -> list[tuple[float, float]]:
+    """Points along the line of a front, to keep labels off it."""
+    points: list[tuple[float, float]] = []
+    for (x, y, _), (next_x, next_y, _) in zip(front, front[1:], strict=False):
+        points += [(float(t), y) for t in np.geomspace(x, next_x, count)] + [(next_x, float(e)) for e in np.geomspace(y, next_y, count)]
+    return points
+
+
+def _width(precision: str) -> float:
+    from .rungs import epsilon
+
+    return epsilon(precision)
+
+
+def _named(precision: str) -> str:
+    from .rungs import precision_name
+
+    return precision_name(precision)
+
+
+def _label(row: dict[str, Any]) -> str:
+    return row["way"] + ("" if row["precision"] == "double" else f", {_named(row['precision'])}")
+
+
+def work_precision_plot(table: Any, axes: Any = None) -> Any:
+    """Two panels: error of the trajectory, drift of the energy, each against the time of a run; one line an integrator."""
+    if axes is None:
+        import matplotlib.pyplot as plt
+
+        axes = plt.subplots(1, 2, figsize=(9.0, 3.8), layout="constrained")[1]
+    rows = [row for row in table if not row["refused"]]
+    names = list(dict.fromkeys(row["integrator"] for row in rows))
+    for ax, key, label in ((axes[0], "error", "trajectory error (rad, m; rms)"), (axes[1], "drift", "energy drift, relative")):
+        for i, name in enumerate(names):
+            line = [row for row in rows if row["integrator"] == name and row[key] is not None]
+            if line:
+                dashes = "--" if name.startswith("scipy:") else "-"
+                style = dict(color=SERIES[i % len(SERIES)], marker="osD^vPX*"[i % 8], ls=dashes, ms=5, lw=1.1)
+                ax.plot([row["seconds"] for row in line], above_zero(row[key] for row in line), label=name, **style)
+        ax.set(xscale="log", yscale="log", xlabel="time of a run", ylabel=label)
+        time_axis(ax.xaxis)
+        if not any(row[key] is not None for row in rows):
+            ax.text(0.5, 0.5, "energy is not conserved here", transform=ax.transAxes, ha="center", color="0.4")
+    errors = [row["error"] for row in rows if row["error"]]
+    if table.reference_error > 0 and errors:
+        low, high = min(errors), max(errors)
+        bottom = min(low, table.reference_error) / 4
+        axes[0].axhspan(bottom, table.reference_error, color="0.9", zorder=0, label="below the reference's own error")
+        axes[0].set_ylim(bottom, 4 * high)
+    axes[0].set_title(table.title, fontsize="medium", loc="left")
+    handles, labels = axes[0].get_legend_handles_labels()
+    axes[1].legend(handles, labels, frameon=False, fontsize=7.5, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return axes

@@ -1,0 +1,108 @@
+"""Ways of computing, from cheap to accurate: form, refinement, precision and method, and the ladder that they make."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from .. import _core
+
+OTHER_METHODS = ("cholesky", "ldl", "conjugate-gradients", "inverse", "realization")
+"""Methods of forward dynamics beside the articulated-body algorithm; they have no forms."""
+
+REFERENCE = "quad"
+"""What values are measured against; what is as wide or wider is measured against the next wider precision."""
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One way of computing: what `forward_dynamics`, `at` and the timings take as keywords."""
+
+    form: str = "fast"
+    refine: int | str = 0
+    residual: str = "same"
+    precision: Any = "double"
+    method: str = "articulated"
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The keywords of `forward_dynamics`."""
+        return {"form": self.form, "refine": self.refine, "residual": self.residual, "precision": self.precision, "method": self.method}
+
+    @property
+    def binding(self) -> dict[str, Any]:
+        """The keywords of `expr.at`."""
+        return {"form": self.form, "refine": self.refine, "residual": self.residual, "precision": self.precision}
+
+    @property
+    def way(self) -> str:
+        """Form or method, and refinement: "fast + 1 refinement"."""
+        text = self.form if self.method == "articulated" else self.method
+        if self.refine == "auto":
+            text += " + refinement"
+        elif self.refine:
+            text += f" + {self.refine} refinement" + ("s" if self.refine != 1 else "")
+        return text + (", wider residual" if self.refine and self.residual != "same" else "")
+
+    @property
+    def label(self) -> str:
+        """The way, and the precision where it is not double: "ud, extended"."""
+        return self.way + ("" if self.precision == "double" else f", {precision_name(self.precision)}")
+
+
+LADDER = (
+    Rung("fast"),
+    Rung("fast", refine=1),
+    Rung("ud"),
+    Rung("ud", refine=1),
+    Rung("fast", precision="extended"),
+    Rung("fast", precision="quad"),
+)
+"""The ladder that users climb: each step costs more than the one before it."""
+
+
+def precision_name(precision: Any) -> str:
+    """ "double", "50 digits"."""
+    text = str(precision)
+    return f"{text} digits" if text.isdigit() else text
+
+
+def epsilon(precision: Any) -> float:
+    """Epsilon of a precision: the distance from one to the next number."""
+    known = _core.epsilons()
+    key = int(precision) if str(precision).isdigit() else precision
+    if key not in known:
+        raise _core.EvaluationError(f"precision {precision!r} is not there; there are {', '.join(map(repr, known))}")
+    return known[key]
+
+
+def wider(precision: Any) -> Any:
+    """The next wider precision, None above the widest."""
+    return _core.wider(precision)
+
+
+def reference_of(precision: Any) -> Any:
+    """What values of this precision are measured against: quad, or the next one that is wider by a hundred; None above the widest.
+
+    (Where long double has 113 bits, extended is as wide as quad.)
+    """
+    reference = REFERENCE if epsilon(precision) > epsilon(REFERENCE) else wider(precision)
+    while reference is not None and 100 * epsilon(reference) > epsilon(precision):
+        reference = wider(reference)
+    return reference
+
+
+def above(rung: Rung) -> list[Rung]:
+    """The steps of the ladder above a way of computing, lowest first."""
+    if epsilon(rung.precision) > epsilon("double"):
+        return [replace(rung, precision="double"), *LADDER[1:]]
+    if rung.method != "articulated":
+        return list(LADDER)
+    if epsilon(rung.precision) < epsilon("double"):
+        wide = [step for step in LADDER if epsilon(step.precision) < epsilon(rung.precision)]
+        higher = wider(rung.precision) if not wide else None
+        return wide + ([replace(rung, precision=higher, refine=0, residual="same")] if higher else [])
+    # A root-free and a square-root sweep stand side by side; more than one step of refinement is still refinement.
+    form = "ud" if rung.form == "square-root" else rung.form
+    place = LADDER.index(Rung(form, refine=1 if rung.refine else 0))
+    return list(LADDER[place + 1 :])

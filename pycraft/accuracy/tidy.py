@@ -1,0 +1,117 @@
+"""Tidy tables: a list of rows with named columns, and the ways out of it."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterator
+from html import escape
+from pathlib import Path
+from typing import Any, ClassVar
+
+
+class TidyTable:
+    """Rows as dictionaries with the same keys, one measurement each. Iterates over rows; `len`, indexing.
+
+    Ways out: `to_pandas()`, `to_csv(path)`, `to_json(path)`, `table()` for a terminal; shown as a table in a notebook.
+    """
+
+    columns: ClassVar[tuple[str, ...]] = ()
+    shown: ClassVar[dict[str, str]] = {}
+    """Columns of the displayed table: key and heading."""
+
+    def __init__(self, title: str, rows: list[dict[str, Any]], about: dict[str, Any] | None = None):
+        self.title, self.rows, self.about = title, rows, dict(about or {})
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        return iter(self.rows)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __getitem__(self, index: int) -> dict[str, Any]:
+        return self.rows[index]
+
+    # ------------------------------------------------------------------ ways out
+    def to_pandas(self) -> Any:
+        """The rows as a pandas data frame. Needs pandas."""
+        try:
+            import pandas
+        except ImportError:
+            raise ImportError("to_pandas() needs pandas: pip install pandas; to_csv() and to_json() need nothing") from None
+        return pandas.DataFrame(self.rows, columns=list(self.columns))
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write the rows as CSV, one column a key; what was not measured stays empty."""
+        with open(path, "w", newline="", encoding="utf-8") as file:
+            writer = csv.DictWriter(file, self.columns)
+            writer.writeheader()
+            writer.writerows(self.rows)
+
+    def to_json(self, path: str | Path | None = None) -> str:
+        """The title, what was measured and the rows as JSON text, written to `path` where one is given."""
+        text = json.dumps({"title": self.title, **self.about, "rows": self.rows}, indent=1, ensure_ascii=False)
+        if path is not None:
+            Path(path).write_text(text + "\n", encoding="utf-8")
+        return text
+
+    # ------------------------------------------------------------------ display
+    def cell(self, key: str, row: dict[str, Any]) -> str:
+        """The text of one cell of the displayed table."""
+        value = row[key]
+        return "" if value is None else str(value)
+
+    def style(self, row: dict[str, Any]) -> str:
+        """The style of a row in a terminal."""
+        return ""
+
+    def table(self) -> Any:
+        """The rows as a rich table."""
+        from rich.table import Table
+
+        table = Table(title=self.title, title_justify="left", box=None, pad_edge=False, header_style="bold")
+        for i, heading in enumerate(self.shown.values()):
+            table.add_column(heading, justify="right" if 0 < i < len(self.shown) - 1 else "left", no_wrap=True)
+        for row in self.rows:
+            table.add_row(*(self.cell(key, row) for key in self.shown), style=self.style(row))
+        return table
+
+    def __repr__(self) -> str:
+        from io import StringIO
+
+        from rich.console import Console
+
+        console = Console(file=StringIO(), width=140, color_system=None)
+        console.print(self.table())
+        return console.file.getvalue().rstrip()  # type: ignore[attr-defined]
+
+    def _repr_html_(self) -> str:
+        head = "".join(f"<th style='text-align:left'>{escape(heading)}</th>" for heading in self.shown.values())
+        body = "".join(
+            f"<tr style='{'font-weight:bold' if 'bold' in self.style(row) else ''}'>"
+            + "".join(f"<td style='text-align:left'>{escape(self.cell(key, row))}</td>" for key in self.shown)
+            + "</tr>"
+            for row in self.rows
+        )
+        return f"<p><b>{escape(self.title)}</b></p><table style='font-size:85%'><tr>{head}</tr>{body}</table>"
+
+
+def seconds_text(seconds: float | None) -> str:
+    """A time with its unit: 0.45 µs, 12 ms."""
+    if seconds is None:
+        return ""
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
+        if seconds >= size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds / 1e-9:.0f} ns"
+
+
+def refusal_text(reason: str, width: int = 48) -> str:
+    """Why a row has no numbers, cut to a width; the row itself has the whole text."""
+    text = f"refused: {reason}" if reason else ""
+    return text if len(text) <= width else text[: width - 1].rstrip() + "…"
+
+
+def error_text(error: float | None) -> str:
+    """An error in two figures."""
+    return "" if error is None else f"{error:.1e}"

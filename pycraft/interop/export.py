@@ -1,0 +1,270 @@
+"""A model handed to other packages as it is, built body by body, and their forward dynamics on our coordinates.
+
+What each package cannot hold it refuses, and the text of the refusal is kept: `PeerRefusal`. None of them is imported before a function
+here is called. Numbers go over unchanged: Pinocchio and Drake take them as they are; MuJoCo reads MJCF text with 17 digits, its
+compiler told to leave masses and inertias alone (it turns every inertia that is not diagonal into principal axes, though).
+
+A multi-coordinate hinge becomes Pinocchio's composite joint, or MuJoCo's several joints on one body, of the same subhinges in the same
+order about the same points, so that coordinates mean the same numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .. import _core
+from . import mujoco as convention
+
+if TYPE_CHECKING:
+    from ..models.multibody import Multibody
+
+Vector = np.ndarray
+_PINOCCHIO_BYTES = 64
+"""Pinocchio's work space a coordinate cubed, measured: it holds tensors for second derivatives."""
+_Q_SIZE, _V_SIZE = {"ball": 4, "free": 7}, {"ball": 3, "free": 6}
+
+
+class PeerRefusal(_core.ModelError):
+    """Another package does not take this model; the text says why, in the package's own words where it has some."""
+
+
+@dataclass(frozen=True)
+class Peer:
+    """Another package's forward dynamics of one model: `forward_dynamics(q, v, tau)` takes (nq,), (nv,), (nv,), ours, and gives (nv,).
+
+    `said` collects the warnings that it gives beside its values.
+    """
+
+    name: str
+    forward_dynamics: Callable[[Vector, Vector, Vector], Vector]
+    said: list[str] = field(default_factory=list)
+
+
+def _bodies(model: Multibody) -> list[dict[str, Any]]:
+    return model.description()["bodies"]
+
+
+# Pinocchio ------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class PinocchioModel:
+    """Pinocchio's model with the order of its numbers: `q[..., of_q]` and `v[..., of_v]` are Pinocchio's, quaternions made unit."""
+
+    model: Any
+    of_q: np.ndarray
+    of_v: np.ndarray
+    quaternions: tuple[int, ...]
+
+    def q(self, q: Vector) -> Vector:
+        """Pinocchio's configuration (nq,) of ours."""
+        out = np.asarray(q, float)[self.of_q]
+        for at in self.quaternions:
+            out[at : at + 4] /= np.linalg.norm(out[at : at + 4])
+        return out
+
+
+def to_pinocchio(model: Multibody) -> PinocchioModel:
+    """The model as a `pinocchio.Model` made joint by joint, with rotor inertias as armature and the same gravity.
+
+    Raises PeerRefusal for what Pinocchio refuses. All hinge kinds go over.
+    """
+    import pinocchio as pin
+
+    out = pin.Model()
+    joints: list[int] = []
+    placements: list[Any] = []  # of our body frame in Pinocchio's joint frame
+    of_q: list[int] = []
+    of_v: list[int] = []
+    quaternions, armature = [], []
+    at_q = at_v = 0
+    for body in _bodies(model):
+        hinge, parent = body["hinge"], body["parent"]
+        inboard = pin.SE3(np.asarray(hinge["placement"]["rotation"], float), np.asarray(hinge["placement"]["position"], float))
+        if parent >= 0:
+            inboard = placements[parent] * inboard
+        joint = joints[parent] if parent >= 0 else 0
+        point = np.zeros(3)
+        parts = []
+        for subhinge in hinge["subhinges"]:
+            moved = np.zeros(3)
+            if subhinge["kind"] not in ("slider", "free"):
+                moved = np.asarray(subhinge["point"], float) - point
+                point = point + moved
+            parts.append((_pinocchio_joint(subhinge), pin.SE3(np.eye(3), moved)))
+            size_q, size_v = _Q_SIZE.get(subhinge["kind"], 1), _V_SIZE.get(subhinge["kind"], 1)
+            own_q, own_v = np.arange(at_q, at_q + size_q), np.arange(at_v, at_v + size_v)
+            if subhinge["kind"] == "ball":
+                quaternions.append(at_q)
+                own_q = own_q[[1, 2, 3, 0]]
+            elif subhinge["kind"] == "free":
+                quaternions.append(at_q + 3)
+                own_q, own_v = own_q[[4, 5, 6, 1, 2, 3, 0]], own_v[[3, 4, 5, 0, 1, 2]]
+            of_q.extend(own_q)
+            of_v.extend(own_v)
+            at_q, at_v = at_q + size_q, at_v + size_v
+        outboard = pin.SE3(np.eye(3), -point)
+        if not parts:
+            outboard = inboard
+        elif len(parts) == 1:
+            joint = out.addJoint(joint, parts[0][0], inboard * parts[0][1], hinge["name"])
+        else:
+            composite = pin.JointModelComposite()
+            for part, placement in parts:
+                composite.addJoint(part, placement)
+            joint = out.addJoint(joint, composite, inboard, hinge["name"])
+        inertia = pin.Inertia(float(body["mass"]), np.asarray(body["com"], float), np.asarray(body["inertia"], float))
+        out.appendBodyToJoint(joint, inertia, outboard)
+        joints.append(joint)
+        placements.append(outboard)
+        armature.extend(hinge["rotor_inertia"])
+    out.armature = np.array(armature, float)[of_v]
+    out.gravity.linear = np.array(model.gravity, float)
+    return PinocchioModel(out, np.array(of_q, int), np.array(of_v, int), tuple(quaternions))
+
+
+def _pinocchio_joint(subhinge: dict[str, Any]) -> Any:
+    import pinocchio as pin
+
+    axis = np.asarray(subhinge["axis"], float)
+    match subhinge["kind"]:
+        case "pin":
+            return pin.JointModelRevoluteUnaligned(axis)
+        case "slider":
+            return pin.JointModelPrismaticUnaligned(axis)
+        case "screw":
+            return pin.JointModelHelicalUnaligned(axis, float(subhinge["pitch"]))
+        case "ball":
+            return pin.JointModelSpherical()
+        case _:
+            return pin.JointModelFreeFlyer()
+
+
+def pinocchio_peer(model: Multibody) -> Peer:
+    """Pinocchio's articulated-body algorithm (`aba`) on the model. Raises PeerRefusal where its work space takes over 2 GB."""
+    import pinocchio as pin
+
+    if _PINOCCHIO_BYTES * model.nv**3 > 2**31:
+        size = _PINOCCHIO_BYTES * model.nv**3 / 2**30
+        raise PeerRefusal(f"its work space of {model.nv} coordinates takes {size:.0f} GB, for derivatives that nobody asked for")
+    twin = to_pinocchio(model)
+    data = twin.model.createData()
+
+    def forward_dynamics(q: Vector, v: Vector, tau: Vector) -> Vector:
+        out = np.empty(model.nv)
+        out[twin.of_v] = pin.aba(twin.model, data, twin.q(q), np.asarray(v, float)[twin.of_v], np.asarray(tau, float)[twin.of_v])
+        return out
+
+    return Peer(f"Pinocchio {pin.__version__}", forward_dynamics)
+
+
+# MuJoCo ---------------------------------------------------------------------------------------------------------------
+
+_COMPILER = dict(
+    angle="radian", autolimits="false", boundmass="0", boundinertia="0", balanceinertia="false", inertiafromgeom="false",
+    settotalmass="-1", fusestatic="false",
+)  # fmt: skip
+_JOINTS = {"pin": "hinge", "slider": "slide", "ball": "ball"}
+
+
+def to_mjcf(model: Multibody) -> str:
+    """The model as MJCF text: bodies, joints, inertias with 17 digits, no geometry, contacts and constraints off.
+
+    Raises PeerRefusal for a screw, for a free hinge that is not alone on the base, and for rotor inertias that differ within a ball or
+    free hinge: MuJoCo has none of them.
+    """
+    from lxml import etree
+
+    root = etree.Element("mujoco", model=model.name)
+    etree.SubElement(root, "compiler", _COMPILER)
+    option = etree.SubElement(root, "option", gravity=_numbers(model.gravity))
+    etree.SubElement(option, "flag", constraint="disable", contact="disable")
+    elements: list[Any] = []
+    world = etree.SubElement(root, "worldbody")
+    for body in _bodies(model):
+        hinge, parent = body["hinge"], body["parent"]
+        rotation = np.asarray(hinge["placement"]["rotation"], float)
+        element = etree.SubElement(
+            elements[parent] if parent >= 0 else world, "body", name=body["name"], pos=_numbers(hinge["placement"]["position"])
+        )
+        if not np.array_equal(rotation, np.eye(3)):
+            element.set("quat", _numbers(convention._quaternion(rotation)))
+        inertia = np.asarray(body["inertia"], float)
+        inertial = etree.SubElement(element, "inertial", pos=_numbers(body["com"]), mass=repr(float(body["mass"])))
+        if np.count_nonzero(inertia - np.diag(np.diag(inertia))):
+            inertial.set("fullinertia", _numbers(inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]))
+        else:
+            inertial.set("diaginertia", _numbers(np.diag(inertia)))
+        at = 0
+        for i, subhinge in enumerate(hinge["subhinges"]):
+            size = _V_SIZE.get(subhinge["kind"], 1)
+            _mujoco_joint(element, hinge, i, subhinge, np.asarray(hinge["rotor_inertia"], float)[at : at + size], parent)
+            at += size
+        elements.append(element)
+    return etree.tostring(root, encoding="unicode")
+
+
+def _mujoco_joint(element: Any, hinge: dict, i: int, subhinge: dict, rotor: np.ndarray, parent: int) -> None:
+    from lxml import etree
+
+    name = hinge["name"] if len(hinge["subhinges"]) == 1 else f"{hinge['name']}[{i}]"
+    if subhinge["kind"] == "screw":
+        raise PeerRefusal(f"MuJoCo has no screw: hinge {hinge['name']!r}")
+    if np.any(rotor != rotor[:1]):
+        raise PeerRefusal(f"MuJoCo takes one armature for all coordinates of {subhinge['kind']} hinge {hinge['name']!r}, not {rotor}")
+    common = dict(name=name, armature=repr(float(rotor[0])))
+    if subhinge["kind"] == "free":
+        if parent >= 0 or len(hinge["subhinges"]) > 1:
+            raise PeerRefusal(f"MuJoCo has free joints on the base alone: hinge {hinge['name']!r}")
+        etree.SubElement(element, "joint", common, type="free")
+        return
+    joint = etree.SubElement(element, "joint", common, type=_JOINTS[subhinge["kind"]], pos=_numbers(subhinge["point"]))
+    if subhinge["kind"] != "ball":
+        joint.set("axis", _numbers(subhinge["axis"]))
+
+
+def _numbers(values: Any) -> str:
+    return " ".join(repr(float(x)) for x in np.ravel(values))
+
+
+def mujoco_peer(model: Multibody) -> Peer:
+    """MuJoCo's forward dynamics (`mj_forward`, constraints off) on the model. Raises PeerRefusal with the compiler's text."""
+    import mujoco
+
+    said: list[str] = []
+    mujoco.set_mju_user_warning(said.append)  # or they go to a file in the working directory; the compiler warns, too
+    try:
+        twin = mujoco.MjModel.from_xml_string(to_mjcf(model))
+    except ValueError as error:
+        raise PeerRefusal(" ".join(str(error).split())) from None
+    data = mujoco.MjData(twin)
+    turned = any(s["kind"] == "free" for body in _bodies(model) for s in body["hinge"]["subhinges"])
+
+    def forward_dynamics(q: Vector, v: Vector, tau: Vector) -> Vector:
+        data.qpos, data.qvel = convention.to_mujoco(model, q, v)
+        T = convention.velocity_map(model, q) if turned else None
+        data.qfrc_applied = tau if T is None else T @ tau
+        mujoco.set_mju_user_warning(said.append)  # it is the package's, not a model's
+        mujoco.mj_forward(twin, data)
+        if T is None:
+            return np.array(data.qacc)
+        return T.T @ (data.qacc - convention.acceleration_to_mujoco(model, q, v, np.zeros(model.nv)))
+
+    return Peer(f"MuJoCo {mujoco.__version__}", forward_dynamics, said)
+
+
+# All of them ----------------------------------------------------------------------------------------------------------
+
+
+def installed() -> dict[str, Callable[[Multibody], Peer]]:
+    """What makes a peer of a model, by the name of each package that can be imported: Pinocchio, MuJoCo, Drake."""
+    from importlib.util import find_spec
+
+    from .drake import drake_peer
+
+    makers = {"pinocchio": ("Pinocchio", pinocchio_peer), "mujoco": ("MuJoCo", mujoco_peer), "pydrake": ("Drake", drake_peer)}
+    return {name: make for module, (name, make) in makers.items() if find_spec(module) is not None}

@@ -1,0 +1,25 @@
+"""The catalogue of hard cases on a stated subset: 12 instances a case, chains of up to 64 rods, trajectories of 20,000 steps, no peers.
+
+The full run, 200 instances and a million steps with the installed packages side by side, is `pycraft stability`.
+"""
+
+import pytest
+
+from pycraft.accuracy import stability
+from pycraft.accuracy.catalogue import catalogue
+
+SEEDS, STEPS, SIZES = 12, 20_000, (2, 8, 16, 64)
+CASES = catalogue(SIZES)
+EVERYDAY = ("massless bodies and vanishing pivots", "configurations")
+
+
+def marked(case):
+    everyday = case.family in EVERYDAY or case.name in ("10 links, tip 1e+12", "16 rods stretched, T = ℳe₁", "heavy top: place after 1 s")
+    return pytest.param(case, id=case.name.replace(" ", "-"), marks=[] if everyday else [pytest.mark.slow])
+
+
+@pytest.mark.parametrize("case", [marked(case) for case in CASES])
+def test_every_bound_holds(case):
+    results = stability.run(SEEDS, STEPS, cases=[case], peers=False)
+    assert len(results) >= 1
+    assert not results.failures, [(row["method"], row["failed"], row["text"]) for row in results.failures]

@@ -1,0 +1,160 @@
+"""Work and precision: errors against closed forms, orders of convergence, energy, and a right-hand side of one's own."""
+
+import csv
+import json
+
+import matplotlib
+import numpy as np
+import pytest
+
+import pycraft as pc
+from pycraft.accuracy.work_precision import TOLERANCES, WorkPrecisionTable, trajectory_error, work_precision
+
+matplotlib.use("Agg")
+PERIOD = 2.367841947576
+"""Of a pendulum of 1 m and 1 kg, released horizontally under 9.81 m/s²: s (IFToMM benchmark problem)."""
+
+
+def pendulum():
+    model = pc.Multibody("pendulum")
+    model.add_body("bob", axis=(0, 0, 1), mass=1.0, com=(1, 0, 0), inertia=np.zeros((3, 3)))
+    model.gravity = (0, -9.81, 0)
+    return model
+
+
+@pytest.fixture(scope="module")
+def swing():
+    """One period, released horizontally: it ends where it began."""
+    integrators = ["dopri5", "fehlberg78", "rk4", "scipy:DOP853"]
+    return work_precision(pendulum(), [0.0], duration=PERIOD, integrators=integrators, steps=[0.04, 0.02, 0.01], seconds=0)
+
+
+def rows(table, integrator):
+    return [row for row in table if row["integrator"] == integrator]
+
+
+def test_the_reference_knows_its_error(swing):
+    assert swing.reference_error < 1e-12 and "extended" in swing.reference
+    model = pendulum()
+    end = model.integrate_ode([0.0], [0.0], [0.0, PERIOD], integrator="fehlberg78", rtol=1e-16, atol=1e-16, precision="extended").q[-1]
+    assert abs(end[0]) < 1e-11  # the period is given to 13 digits
+
+
+@pytest.mark.parametrize("integrator", ["dopri5", "fehlberg78", "scipy:DOP853"])
+def test_errors_fall_with_the_tolerance(swing, integrator):
+    found = rows(swing, integrator)
+    assert [row["tolerance"] for row in found] == list(TOLERANCES) and all(row["step"] is None and not row["refused"] for row in found)
+    errors, drifts = ([row[key] for row in found] for key in ("error", "drift"))
+    assert errors[-1] < 1e-8 and errors[0] > 1e3 * errors[-1] and drifts[-1] < 1e-8 and drifts[0] > 10 * drifts[-1]
+    assert all(a > b for a, b in zip(errors, errors[2:], strict=False))
+    evaluations = [row["evaluations"] for row in found]
+    assert evaluations == sorted(evaluations) and all(row["seconds"] > 0 for row in found)
+
+
+def test_errors_fall_with_the_order_of_the_method(swing):
+    errors = [row["error"] for row in rows(swing, "rk4")]
+    assert [row["step"] for row in rows(swing, "rk4")] == [0.04, 0.02, 0.01]
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert np.all(np.abs(orders - 4) < 0.5)
+
+
+def test_an_error_is_measured_against_the_truth(swing):
+    """Of a pendulum from the horizontal: θ(t) by the first integral, sampled at the same times."""
+    from scipy.special import ellipj
+
+    times = np.linspace(0, PERIOD, 9)
+    # sin(θ'/2) = sin(π/4) sn(K - ωt), θ' from the vertical; θ from the horizontal
+    from scipy.special import ellipk
+
+    m = 0.5
+    sn = ellipj(ellipk(m) - np.sqrt(9.81) * times, m)[0]
+    exact = 2 * np.arcsin(np.sqrt(m) * sn) - np.pi / 2
+    for row in rows(swing, "dopri5")[:3]:
+        run = pendulum().integrate_ode([0.0], [0.0], times, integrator="dopri5", rtol=row["tolerance"], atol=row["tolerance"])
+        assert row["error"] == pytest.approx(np.abs(run.q[:, 0] - exact).max(), rel=1e-3)
+
+
+def test_on_the_group():
+    """A free body turns and flies: quaternions compare by the rotation between them, whatever their sign."""
+    top = pc.tree([-1], ["free"], seed=3)
+    state = top.random_state(1)
+    table = work_precision(
+        top, state, duration=1.0, integrators=["dopri5", "rkmk4", "scipy:RK45"], tolerances=[1e-6], steps=[0.01], seconds=0
+    )
+    assert all(0 < row["error"] < 1e-3 and row["drift"] < 1e-3 for row in table)
+    q = np.array([state.q, top.integrate(state.q, 0.3 * np.ones(6))])
+    flipped = q.copy()
+    flipped[:, :4] *= -1
+    assert trajectory_error(top, q, flipped) < 1e-14
+    assert trajectory_error(top, q[:1], top.integrate(q[0], 0.1 * np.ones(6))[None]) == pytest.approx(0.1)
+
+
+def test_a_right_hand_side_of_ones_own():
+    """A damped pendulum passed as a callable: the energy is not conserved, and a scene's own may be given."""
+    model = pendulum()
+
+    def damped(t, q, v):
+        return model.forward_dynamics(q, v, -0.3 * v)
+
+    options = dict(duration=1.0, integrators=["scipy:RK45", "scipy:DOP853", "dopri5"], tolerances=[1e-4, 1e-8], seconds=0)
+    table = work_precision(model, [0.2], right_hand_side=damped, **options)
+    answered = [row for row in table if not row["refused"]]
+    assert [row["integrator"] for row in answered] == ["scipy:RK45"] * 2 + ["scipy:DOP853"] * 2
+    assert all(row["drift"] is None for row in answered) and answered[1]["error"] < 1e-2 * answered[0]["error"]
+    assert all("right-hand side" in row["refused"] for row in rows(table, "dopri5"))
+    unknown = work_precision(model, [0.2], right_hand_side=damped, integrators=["scipy:RK9"], tolerances=[1e-4], seconds=0)
+    assert "scipy:DOP853" in unknown[0]["refused"]
+    run = model.integrate_ode([0.2], [0.0], np.linspace(0, 1, 9), damping=[0.3], integrator="fehlberg78", rtol=1e-13, atol=1e-13)
+    own = work_precision(model, [0.2], right_hand_side=damped, energy=lambda q, v: 1.0, **options)
+    assert [row["drift"] for row in own if not row["refused"]] == [0.0] * 4
+    from pycraft.accuracy.work_precision import by_scipy
+
+    q = by_scipy(model, damped, np.array([0.2]), np.zeros(1), run.t, "scipy:DOP853", 1e-12)[0]
+    assert np.abs(q - run.q).max() < 1e-10
+
+
+def test_forces_do_work():
+    table = work_precision(pendulum(), [0.0], tau=[1.0], duration=0.5, integrators=["dopri5"], tolerances=[1e-6], seconds=0)
+    assert table[0]["drift"] is None and table[0]["error"] < 1e-4
+    assert "not conserved" in table.plot()[1].texts[0].get_text()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [(dict(duration=0.0), "duration=0"), (dict(integrators=["euler"]), "euler"), (dict(integrators=["scipy:RK9"]), "RK9")],
+)
+def test_wrong_arguments(options, words):
+    if "duration" in options:
+        with pytest.raises(pc.Error, match=words):
+            work_precision(pendulum(), [0.0], **options)
+    else:
+        table = work_precision(pendulum(), [0.0], tolerances=[1e-3], seconds=0, **options)
+        assert words in table[0]["refused"]
+
+
+def test_ways_out(swing, tmp_path):
+    swing.to_csv(tmp_path / "w.csv")
+    with open(tmp_path / "w.csv", newline="", encoding="utf-8") as file:
+        read = list(csv.DictReader(file))
+    assert [list(r) for r in read] == [list(WorkPrecisionTable.columns)] * len(swing)
+    assert [float(r["error"]) for r in read] == [row["error"] for row in swing]
+    data = json.loads(swing.to_json())
+    assert data["rows"] == swing.rows and data["reference_error"] == swing.reference_error and data["model"] == "pendulum"
+    for word in ("Integration of pendulum", "fehlberg78", "energy drift", "0.02 s", "1e-09"):
+        assert word in repr(swing) and word in swing._repr_html_()
+    best = swing.fastest(1e-6)
+    assert best["error"] <= 1e-6 and all(row["seconds"] >= best["seconds"] for row in swing if row["error"] <= 1e-6)
+    with pytest.raises(ValueError, match="at most 1e-30"):
+        swing.fastest(1e-30)
+
+
+def test_the_plot(swing):
+    import matplotlib.pyplot as plt
+
+    left, right = swing.plot()
+    for ax in (left, right):
+        assert ax.get_xscale() == ax.get_yscale() == "log" and ax.get_xlabel() and ax.get_ylabel()
+        assert {line.get_label() for line in ax.lines} == {"dopri5", "fehlberg78", "rk4", "scipy:DOP853"}
+    low, high = left.get_ylim()
+    assert low < swing.reference_error and high > max(row["error"] for row in swing)
+    plt.close(left.figure)
