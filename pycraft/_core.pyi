@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Binding', 'Dynamics', 'Error', 'EvaluationError', 'Integration', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'Scalar', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'Theorem', 'blockdiag', 'constant', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'identity', 'integrators', 'methods', 'operators_of', 'precisions', 'residual', 'scalar', 'step_kinds', 'symbol_table', 'theorems', 'time_apply', 'time_dynamics', 'time_forward', 'time_packs', 'vector', 'wider', 'zero']
+__all__: list[str] = ['Binding', 'Dynamics', 'Error', 'EvaluationError', 'Integration', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'Scalar', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'Theorem', 'blockdiag', 'constant', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'identity', 'integrators', 'methods', 'operators_of', 'precisions', 'residual', 'scalar', 'step_kinds', 'symbol_table', 'theorems', 'time_apply', 'time_dynamics', 'time_forward', 'time_method', 'time_packs', 'vector', 'wider', 'zero']
 
 class Error(Exception): ...
 class SpaceError(Error, TypeError): ...
@@ -282,6 +282,11 @@ class Operator:
         """
         A labelled block view of the dense form; order="tip-to-base" shows the book's triangles.
         """
+    def certify(self, *args, **kwargs) -> typing.Any:
+        """
+        The value with its measured error, condition, where digits are lost and what the next rung costs: see
+        pycraft.accuracy.certify.certify_expression.
+        """
     def check_current(self) -> None:
         """
         Raises StaleOperatorError if a model's structure changed since this was made.
@@ -479,6 +484,10 @@ class Scalar:
         ...
     def bound(self, arg0: Binding) -> Scalar:
         ...
+    def certify(self, *args, **kwargs) -> typing.Any:
+        """
+        The number with its measured error, where digits are lost and what the next rung costs.
+        """
     def diff(self, *args, frame: str = 'body') -> typing.Any:
         """
         The derivative along a coordinate or a parameter, as a scalar expression.
@@ -813,6 +822,10 @@ def time_dynamics(model: Multibody, call: str, q: typing.Annotated[numpy.typing.
 def time_forward(model: Multibody, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2, form: str = 'fast', refine: typing.Any = 0, residual: str = 'same', precision: str | int = 'double') -> dict:
     """
     Seconds per forward dynamics over a set of states in rotation: minimum, median, calls.
+    """
+def time_method(model: Multibody, method: str, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2, precision: str | int = 'double') -> dict:
+    """
+    Seconds per forward dynamics by a method of the mass matrix: minimum, median, calls.
     """
 def time_packs(model: Multibody, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2, form: str = 'fast', precision: str | int = 'double') -> dict:
     """

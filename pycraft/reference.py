@@ -1,8 +1,9 @@
 """The oracle: every operator of the algebra as a dense NumPy matrix, textbook-literal and slow.
 
 Each operator is the formula that its docstring states: matrices are formed, inverses are inverses, recursions are loops
-over bodies. The module imports NumPy and SciPy only, and nothing of the rest of the package, so agreement with it is
-evidence. Notation and results follow A. Jain, *Robot and Multibody Dynamics*, Springer 2011; `*` is the transpose.
+over bodies. The modules `reference` and `reference_...` import NumPy and SciPy only, and nothing of the rest of the
+package, so agreement with them is evidence. Notation and results follow A. Jain, *Robot and Multibody Dynamics*,
+Springer 2011; `*` is the transpose.
 
 Conventions: SI units and radians; spatial vectors are angular part first, about the body frame's origin, in body-frame
 components; the body frame is the outboard side of the body's hinge; parents come before children, generalized
@@ -33,16 +34,28 @@ Forms. The articulated-body inertia is carried from tip to base in one of the `F
 rounding; `form=` chooses it wherever it matters.
 """
 
-from functools import cached_property, partial, reduce
+from functools import cached_property
 from types import SimpleNamespace
 
 import numpy as np
-from scipy.linalg import expm
 
-Q_SIZE = {"pin": 1, "slider": 1, "screw": 1, "ball": 4, "free": 7}
-V_SIZE = {"pin": 1, "slider": 1, "screw": 1, "ball": 3, "free": 6}
-
-FORMS = ("fast", "joseph", "ud", "square-root")
+from .reference_forms import FORMS, articulated_inertia  # noqa: F401
+from .reference_numbers import converted, epsilon, in_doubles, inv, mpmath_context, smallest_singular_value
+from .reference_spatial import (  # noqa: F401
+    Q_SIZE,
+    V_SIZE,
+    crf,
+    crm,
+    force_transform,
+    hinge_kinematics,
+    hinge_sizes,
+    in_the_numbers_of,
+    pose,
+    skew,
+    spatial_inertia,
+    split,
+    subhinge_step,
+)
 
 # D(k) counts as singular where its smallest singular value, in units in which |H||R||H*| + |J| (D with all outboard hinges
 # locked and no cancellation) has a diagonal of ones, is at most SINGULAR eps. What rounding leaves of an exact zero is below 2 eps
@@ -51,203 +64,7 @@ FORMS = ("fast", "joseph", "ud", "square-root")
 SINGULAR = 16
 
 
-# Numbers --------------------------------------------------------------------------------------------------------------
-
-
-def mpmath_context(*arrays):
-    """The mpmath context (its functions and precision) of the numbers in the arrays; None where they hold NumPy's own numbers."""
-    objects = (x for array in arrays if array.dtype == object for x in array.flat)
-    return next((x.context for x in objects if hasattr(x, "context")), None)
-
-
-def converted(x, context):
-    """The array x in numbers of an mpmath context, exactly; x itself where that is None."""
-    return x if context is None else np.vectorize(context.convert, otypes=[object])(x)
-
-
-def in_doubles(x):
-    """The array x rounded to doubles where it holds mpmath numbers."""
-    return x.astype(float) if x.dtype == object else x
-
-
-def epsilon(x):
-    """The distance from one to the next number of the kind in the array x."""
-    context = mpmath_context(x)
-    return np.finfo(float).eps if context is None else context.eps
-
-
-def inv(A):
-    """A⁻¹; that of mpmath numbers by Gauss–Jordan elimination, the largest entry of a column its pivot. ArithmeticError if singular."""
-    if mpmath_context(A) is None:
-        return np.linalg.inv(in_doubles(A))
-    n, A = len(A), np.hstack([A, np.eye(len(A))])
-    for j in range(n):
-        i = j + np.argmax(abs(A[j:, j]))
-        A[[i, j]] = A[[j, i]]
-        A[j] = A[j] / A[j, j]
-        filled = A[j] != 0
-        for i in np.flatnonzero(A[:, j] != 0):
-            if i != j:
-                A[i, filled] = A[i, filled] - A[i, j] * A[j, filled]
-    return A[:, n:]
-
-
-def smallest_singular_value(A):
-    """σ_min of the square matrix A; of mpmath numbers 1/‖A⁻¹‖_F, which is below it by a factor √n at most."""
-    if mpmath_context(A) is None:
-        return np.linalg.svd(in_doubles(A), compute_uv=False).min()
-    try:
-        return 1 / (inv(A) ** 2).sum() ** 0.5
-    except ZeroDivisionError:
-        return 0
-
-
-def exponential(A):
-    """exp(A)."""
-    context = mpmath_context(A)
-    return expm(A) if context is None else np.array(context.expm(context.matrix(A.tolist())).tolist(), object)
-
-
-def in_the_numbers_of(q, description):
-    """The description in the numbers of q: doubles are exact, but for unit axes and orthogonal rotations, made so to the digits."""
-    context = mpmath_context(np.asarray(q))
-    if context is None:
-        return description
-
-    def number(x):
-        return converted(np.asarray(x, float), context)[()]
-
-    def subhinge(s):
-        axis = number(s["axis"])
-        return {**s, "axis": axis / (axis @ axis) ** 0.5, "point": number(s["point"]), "pitch": number(s["pitch"])}
-
-    def placed(x):
-        return {"rotation": rotation_from_quaternion(quaternion_from_rotation(number(x["rotation"]))), "position": number(x["position"])}
-
-    def hinge(h):
-        rotors, subhinges = number(h["rotor_inertia"]), [subhinge(s) for s in h["subhinges"]]
-        return {**h, "rotor_inertia": rotors, "placement": placed(h["placement"]), "subhinges": subhinges}
-
-    bodies = [{**b, "hinge": hinge(b["hinge"]), **{x: number(b[x]) for x in ("mass", "com", "inertia")}} for b in description["bodies"]]
-    nodes = [{**node, **placed(node)} for node in description["nodes"]]
-    return {**description, "gravity": number(description["gravity"]), "bodies": bodies, "nodes": nodes}
-
-
-# Spatial algebra ------------------------------------------------------------------------------------------------------
-
-
-def skew(u):
-    """ũ, (3, 3): ũ w = u × w."""
-    return np.array([[0, -u[2], u[1]], [u[2], 0, -u[0]], [-u[1], u[0], 0]])
-
-
-def crm(V):
-    """Ṽ, (6, 6), cross product of motions: [[ω̃, 0], [ṽ, ω̃]] for V = (ω; v)."""
-    return np.block([[skew(V[:3]), np.zeros((3, 3))], [skew(V[3:]), skew(V[:3])]])
-
-
-def crf(V):
-    """V̄, (6, 6), cross product of a motion and a force: [[ω̃, ṽ], [0, ω̃]] = −Ṽ*."""
-    return np.block([[skew(V[:3]), skew(V[3:])], [np.zeros((3, 3)), skew(V[:3])]])
-
-
-def pose(rotation, position):
-    """X, (4, 4): the frame with the given orientation and origin; X maps its coordinates to those of the reference."""
-    return np.block([[np.asarray(rotation), np.reshape(position, (3, 1))], [np.zeros((1, 3)), np.ones((1, 1))]])
-
-
-def force_transform(X):
-    """φ(p,k), (6, 6), carries forces from frame k to frame p: [[R, l̃R], [0, R]], X = (R, l) the pose of k in p."""
-    R, l = X[:3, :3], X[:3, 3]
-    return np.block([[R, skew(l) @ R], [np.zeros((3, 3)), R]])
-
-
-def rotation_from_quaternion(q):
-    """R(q), (3, 3): (w² − u·u)I + 2uu* + 2wũ of q/|q| = (w, u). Raises ValueError where |q| < 1e-8 or is not finite."""
-    norm = np.dot(q, q) ** 0.5
-    if not 1e-8 <= abs(norm) < np.inf:  # false for NaN, too
-        raise ValueError(f"the quaternion {np.array2string(np.asarray(q))} has no direction")
-    w, u = q[0] / norm, q[1:] / norm
-    return (w * w - u @ u) * np.eye(3) + 2 * np.outer(u, u) + 2 * w * skew(u)
-
-
-def quaternion_from_rotation(R):
-    """A quaternion of the rotation R, of any length, from the largest of its four squares: 4w² = 1 + tr R, 4x² = 1 + 2R₀₀ − tr R, ..."""
-    trace, (a, b, c) = np.trace(R), (R - R.T)[[2, 0, 1], [1, 2, 0]]
-    symmetric = R + R.T + (1 - trace) * np.eye(3)
-    i = np.argmax([trace, *np.diag(R)])
-    return np.array([1 + trace, a, b, c]) if i == 0 else np.array([(a, b, c)[i - 1], *symmetric[i - 1]])
-
-
-def spatial_inertia(body):
-    """M(k), (6, 6): [[𝓘 − m c̃c̃, m c̃], [−m c̃, m I]], 𝓘 about the centre of mass c, about the body frame's origin."""
-    m, c = body["mass"], skew(body["com"])
-    return np.block([[np.asarray(body["inertia"]) - m * c @ c, m * c], [-m * c, m * np.eye(3)]])
-
-
-# Hinges ---------------------------------------------------------------------------------------------------------------
-
-
-def subhinge_rows(subhinge):
-    """Rows of H of one subhinge, (n_v, 6), in the frame after its own step: axis a through the point c.
-
-    pin (a; c×a), slider (0; a), screw (a; c×a + pitch a), ball (e_i; c×e_i), free: the identity.
-    """
-    a, c = np.asarray(subhinge["axis"]), np.asarray(subhinge["point"])
-    return {
-        "pin": lambda: np.array([[*a, *np.cross(c, a)]]),
-        "slider": lambda: np.array([[0, 0, 0, *a]]),
-        "screw": lambda: np.array([[*a, *(np.cross(c, a) + subhinge["pitch"] * a)]]),
-        "ball": lambda: np.array([[*e, *np.cross(c, e)] for e in np.eye(3)]),
-        "free": lambda: np.eye(6),
-    }[subhinge["kind"]]()
-
-
-def subhinge_step(subhinge, q):
-    """Pose of the frame after the subhinge in the frame before it, (4, 4), at its coordinates q (Q_SIZE of its kind).
-
-    pin, slider, screw: exp(h q) on SE(3); ball: R(q) about the point c, which stays; free: (R(q₀..₃), q₄..₆).
-    """
-    if subhinge["kind"] == "free":
-        return pose(rotation_from_quaternion(q[:4]), q[4:])
-    if subhinge["kind"] == "ball":
-        R, c = rotation_from_quaternion(q), np.asarray(subhinge["point"])
-        return pose(R, c - R @ c)
-    (h,) = subhinge_rows(subhinge)
-    return exponential(np.block([[skew(h[:3]), h[3:, None]], [np.zeros((1, 4))]]) * q[0])
-
-
-def hinge_kinematics(body, q):
-    """X, (4, 4), the body frame in the parent's frame: placement · step₁(q₁) · step₂(q₂) · ..., and the rows of H(k).
-
-    One (n_v, 6) array of rows per subhinge, carried to the body frame: h_j' = φ*(later steps) h_j.
-    Raises ValueError, naming hinge and body, for a quaternion without direction.
-    """
-    hinge = body["hinge"]
-    pieces = split(q, [Q_SIZE[s["kind"]] for s in hinge["subhinges"]])
-    try:
-        steps = [subhinge_step(s, x) for s, x in zip(hinge["subhinges"], pieces, strict=True)]
-    except ValueError as error:
-        raise ValueError(f"hinge '{hinge['name']}' of body '{body['name']}': {error}") from None
-    X, rows = pose(**hinge["placement"]), []
-    for j, subhinge in enumerate(hinge["subhinges"]):
-        X = X @ steps[j]
-        later = reduce(np.matmul, steps[j + 1 :], np.eye(4))
-        rows.append(subhinge_rows(subhinge) @ force_transform(later))  # (φ*h)* = h*φ
-    return X, rows
-
-
-def split(x, sizes):
-    """The array x cut into consecutive pieces of the given sizes; ValueError unless they add up to its length."""
-    x, ends = np.asarray(x), np.cumsum(np.array(sizes, int))
-    if x.shape != (sum(sizes),):
-        raise ValueError(f"expected an array of shape ({sum(sizes)},), got {x.shape}")
-    return [x[end - size : end] for end, size in zip(ends, sizes, strict=True)]
-
-
-def hinge_sizes(description, table):
-    """Number of coordinates of each body's hinge: table is Q_SIZE (sums to nq) or V_SIZE (sums to nv)."""
-    return [sum(table[s["kind"]] for s in body["hinge"]["subhinges"]) for body in description["bodies"]]
+# The algebra over blocks of any size ----------------------------------------------------------------------------------
 
 
 def block_diagonal(blocks):
@@ -257,138 +74,6 @@ def block_diagonal(blocks):
     for k, block in enumerate(blocks):
         A[rows[k] : rows[k + 1], columns[k] : columns[k + 1]] = block
     return A
-
-
-# The articulated-body inertia, by form --------------------------------------------------------------------------------
-
-
-def unit_factors(A):
-    """U, w: A = U diag(w) U* with as many columns and weights w > 0 as A, symmetric and positive semidefinite, has rank.
-
-    LDL*, the next pivot the one that elimination left most of, as long as that is more than n eps of it. ArithmeticError where
-    a diagonal term turns negative instead: A is indefinite.
-    """
-    whole, columns, w = np.where(np.diag(A) > 0, np.diag(A), 1), [np.zeros((len(A), 0), A.dtype)], []
-    while (left := np.diag(A) / whole).max(initial=0) > len(A) * epsilon(A):
-        i = np.argmax(left)
-        columns.append(A[:, i : i + 1] / A[i, i])
-        w.append(A[i, i])
-        A = A - w[-1] * columns[-1] @ columns[-1].T
-    if left.min(initial=0) < -len(A) * epsilon(A):
-        raise ArithmeticError("an inertia is indefinite: only the forms 'fast' and 'joseph' take it")
-    return np.hstack(columns), np.array(w, A.dtype)
-
-
-def gram_schmidt(rows, w):
-    """U, d: U unit lower triangular, rows diag(w) rows* = U diag(d) U*; each row in turn leaves the later ones, weighted by w."""
-    rows, U, d = rows.copy(), np.eye(len(rows)).astype(rows.dtype), np.zeros(len(rows), rows.dtype)
-    for r in range(len(rows)):
-        d[r] = rows[r] * w @ rows[r]
-        for s in range(r + 1, len(rows)) if d[r] > 0 else ():
-            U[s, r] = rows[s] * w @ rows[r] / d[r]
-            rows[s] = rows[s] - U[s, r] * rows[r]
-    return U, d
-
-
-def lower_triangle(rows):
-    """L, (n, n): lower triangular with LL* = rows rows*, by Householder's reflections from the right."""
-    L = np.hstack([rows, np.zeros((len(rows), len(rows)), rows.dtype)])
-    for r in range(len(L)):
-        x = L[r, r:].copy()
-        x[0] += (x @ x) ** 0.5 * (1 if x[0] >= 0 else -1)
-        if x[0] != 0:
-            L[:, r:] = L[:, r:] - np.outer(L[:, r:] @ x, x) * (2 / (x @ x))
-    return L[:, : len(L)]
-
-
-def completion(H):
-    """N, C: rows N of the identity with [H; N][B, C] = I for some B: the coordinates without a pivot when H is eliminated."""
-    A, left, n = H.copy(), list(range(H.shape[1])), len(H)
-    for r in range(n):
-        left.remove(i := max(left, key=lambda j: abs(A[r, j])))
-        A[r + 1 :] = A[r + 1 :] - np.outer(A[r + 1 :, i] / A[r, i], A[r])
-    N = np.eye(H.shape[1]).astype(H.dtype)[left]
-    return N, inv(np.vstack([H, N]))[:, n:]
-
-
-def articulated_inertia(o, form="fast"):
-    """P, P_plus, D, D_inverse and G of the `Operators` o as a namespace, by the recursion from tip to base.
-
-    P(k) = M(k) + Σ_children E_φ(k,c) P⁺(c) E_φ*(k,c)      D(k) = H(k)P(k)H*(k) + J(k)
-    G(k) = P(k)H*(k)D⁻¹(k)                                 P⁺(k) = (I − G(k)H(k)) P(k)
-
-    Parameters
-    ----------
-    form : what is carried from body to body
-        fast: P⁺ = P − GDG*.
-        joseph: P⁺ = τ̄Pτ̄* + GJG*, τ̄ = I − GH: a sum of squares, no more accurate for it; an exhibit.
-        ud: U⁺ and w⁺ of P⁺ = U⁺ diag(w⁺) U⁺*. No difference of inertias is taken: see `factors_across_hinge`.
-        square-root: the same of P⁺ = LL*, w = 1.
-
-    Raises ArithmeticError, naming body and hinge, where no D⁻¹(k) exists (see `SINGULAR`), and where an inertia is indefinite and
-    the form needs its factors.
-    """
-    if form not in FORMS:
-        raise ValueError(f"form={form!r}: there are {', '.join(FORMS)}")
-    cross = inertia_across_hinge if form in ("fast", "joseph") else factors_across_hinge
-    shapes = {"P": o.M, "P_plus": o.M, "D": o.J, "D_inverse": o.J, "G": o.H.T}
-    made = {name: np.zeros(x.shape, np.result_type(o.E, o.H)) for name, x in shapes.items()}
-    carried = {}  # P⁺(k), or (U⁺(k), w⁺(k))
-    for k in reversed(range(len(o.parents))):
-        s, t = o.states[k], o.coordinates[k]
-        outboard = [(o.E[s, o.states[c]], carried[c]) for c, p in enumerate(o.parents) if p == k]
-        here, carried[k] = cross(o.M[s, s], outboard, o.H[t, s], o.J[t, t], form, partial(o.require_regular, k))
-        for name, where in {"P": (s, s), "P_plus": (s, s), "D": (t, t), "D_inverse": (t, t), "G": (s, t)}.items():
-            made[name][where] = here[name]
-    return SimpleNamespace(**{name: converted(x, mpmath_context(o.I)) for name, x in made.items()})
-
-
-def inertia_across_hinge(M, outboard, H, J, form, require_regular):
-    """The operators of one body, and P⁺, which is carried on: see `articulated_inertia`."""
-    P = M + sum(E @ P_plus @ E.T for E, P_plus in outboard)
-    D = H @ P @ H.T + J
-    require_regular(D)
-    G = P @ H.T @ inv(D)
-    tau_bar = np.eye(len(M)) - G @ H
-    P_plus = P - G @ D @ G.T if form == "fast" else tau_bar @ P @ tau_bar.T + G @ J @ G.T
-    P_plus = (P_plus + P_plus.T) / 2
-    return dict(P=P, P_plus=P_plus, D=D, D_inverse=inv(D), G=G), P_plus
-
-
-def factors_across_hinge(M, outboard, H, J, form, require_regular):
-    """The operators of one body, and (U⁺, w⁺) of P⁺ = U⁺ diag(w⁺) U⁺*, which is carried on: see `articulated_inertia`.
-
-    P = A diag(w) A* with the columns of M and of all children, A = [U_M, E_φ(k,c)U⁺(c), ...]; J = A_J diag(w_J) A_J*. The rows
-    [HA, A_J] first and [A, 0] after them are made orthogonal in the inner product diag(w, w_J), by weighted Gram–Schmidt (Bierman
-    and Thornton) or, with the weights' roots in A, by Householder's reflections, rows of A heaviest first:
-
-        [HA, A_J]   [U_D    0] [V_D]      D = U_D diag(d) U_D*      G = A diag(w) V_D* d⁻¹ U_D⁻¹
-        [ A,  0 ] = [GU_D  U⁺] [V⁺ ]      P⁺ = U⁺ diag(w⁺) U⁺*,  w⁺ the squares of the rows V⁺
-
-    Where J = 0, NA stands for A, N the rows of the identity that complete H to a basis, and [H; N]⁻¹ takes it back: HU⁺ = 0.
-    """
-    columns = [unit_factors(M), *[(E @ U, w) for E, (U, w) in outboard]]
-    A, w = np.hstack([U for U, _ in columns]), np.concatenate([w for _, w in columns])
-    A_J, w_J = unit_factors(J)
-    if form == "square-root":
-        A, A_J, w, w_J = A * w**0.5, A_J * w_J**0.5, np.ones(len(w)), np.ones(len(w_J))
-    n, hinge, weights = len(H), np.hstack([H @ A, A_J]), np.concatenate([w, w_J])
-    require_regular(root=lower_triangle(hinge * weights**0.5))
-    N, C = (np.eye(len(M)),) * 2 if len(w_J) else completion(H)
-    body = np.hstack([N @ A, np.zeros((len(N), len(w_J)), A.dtype)])
-    if form == "square-root":
-        order = np.argsort(-(body**2).sum(axis=1), kind="stable")
-        U, d = lower_triangle(np.vstack([hinge, body[order]])), np.ones(n + len(body))
-        U[n + order] = U[n:]
-    else:
-        U, d = gram_schmidt(np.vstack([hinge, body]), weights)
-    U_D_inverse, d_D, U_plus, w_plus = inv(U[:n, :n]), d[:n], C @ U[n:, n:], d[n:]
-    G = A * w @ (U_D_inverse @ H @ A).T / d_D @ U_D_inverse
-    D, D_inverse = hinge * weights @ hinge.T, U_D_inverse.T / d_D @ U_D_inverse
-    return dict(P=A * w @ A.T, P_plus=U_plus * w_plus @ U_plus.T, D=D, D_inverse=D_inverse, G=G), (U_plus, w_plus)
-
-
-# The algebra over blocks of any size ----------------------------------------------------------------------------------
 
 
 def symbol(formula, meaning):

@@ -1,4 +1,4 @@
-"""The oracle for tests, loaded from its file, and how closely results are compared with it.
+"""The oracle for tests, loaded from its files, and how closely results are compared with it.
 
 `reference` needs nothing of the rest of the package, so tests of it pass before the core is built.
 
@@ -8,15 +8,18 @@ error to add. Results behind an inverse are allowed that times its condition num
 eps/h to rounding and about h⁴ to truncation: with h = 1e-3 both are near 1e-12, and `DIFFERENCE` allows 10³ of it.
 """
 
-import importlib.util
+import importlib
 import pathlib
+import sys
+import types
 
 import numpy as np
 
-SOURCE = pathlib.Path(__file__).parents[1] / "pycraft" / "reference.py"
-specification = importlib.util.spec_from_file_location("pycraft_reference", SOURCE)
-reference = importlib.util.module_from_spec(specification)
-specification.loader.exec_module(reference)
+FOLDER = pathlib.Path(__file__).parents[1] / "pycraft"
+SOURCES = sorted(FOLDER.glob("reference*.py"))
+alone = sys.modules["pycraft_alone"] = types.ModuleType("pycraft_alone")  # the folder as a package without its __init__
+alone.__path__ = [str(FOLDER)]
+reference = importlib.import_module("pycraft_alone.reference")
 
 ROUNDING = 1e4 * np.finfo(float).eps
 DIFFERENCE = 1e-9

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from descriptions import KINDS, body, model, random_description, random_state, subhinge
 from numpy.linalg import cond, inv
-from oracle import ROUNDING, SOURCE, agree, reference
+from oracle import ROUNDING, SOURCES, agree, reference
 from scipy.linalg import block_diag
 
 TREE = [-1, 0, 0, 1, -1, 4, 5, 5, 3]
@@ -184,10 +184,11 @@ def test_wrong_arguments():
 
 
 def test_the_oracle_stands_alone():
-    nodes = ast.walk(ast.parse(SOURCE.read_text(encoding="utf-8")))
+    nodes = [node for source in SOURCES for node in ast.walk(ast.parse(source.read_text(encoding="utf-8")))]
     imports = [node for node in nodes if isinstance(node, ast.Import | ast.ImportFrom)]
-    roots = {(getattr(node, "module", None) or node.names[0].name).split(".")[0] for node in imports}
-    assert roots == {"functools", "types", "numpy", "scipy"}
-    assert all(getattr(node, "level", 0) == 0 for node in imports)
+    inside = {node.module for node in imports if getattr(node, "level", 0)}
+    outside = {(getattr(node, "module", None) or node.names[0].name).split(".")[0] for node in imports if not getattr(node, "level", 0)}
+    assert inside == {source.stem for source in SOURCES} - {"reference"}
+    assert outside == {"functools", "types", "numpy", "scipy"}
     results = doctest.testmod(reference)
     assert results.attempted > 0 and results.failed == 0

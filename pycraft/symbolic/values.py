@@ -42,7 +42,7 @@ class Values:
         self.alphabet, self.operators, self.state, self.seed = alphabet, operators, state, seed
         self._contexts = list(contexts)
         q, v = (None, None) if state is None else (state.q, state.v)
-        self._binding = _core._bind([operators.E], q, v, "fast", 0, "double")
+        self._binding = _core._bind([operators.E], q, v)
         self._values: dict[str, np.ndarray] = {}
         self._probes: dict[int, np.ndarray] = {}
         self._products: dict[Word, np.ndarray] = {}
