@@ -172,7 +172,7 @@ def exact_numbers(parts: list[list[float]], shape: Sequence[int]) -> np.ndarray:
     import mpmath
 
     out = np.empty(len(parts), dtype=object)
-    with mpmath.workprec(300):
+    with mpmath.workprec(512):  # eight doubles hold less
         for i, terms in enumerate(parts):
             out[i] = mpmath.fsum(terms)
     return out.reshape(tuple(shape))

@@ -163,16 +163,16 @@ class DenseBlocks {
     }
     if (!factors_) factors_ = std::make_unique<FactoredInertia<S>>(tree_);
     factors_->start(k);
-    add_factors(mass(k), tree_.size[k], [&](const S& w, auto u) { factors_->add(k, w, S(0), u); });
+    add_factors("M", k, mass(k), tree_.size[k], [&](const S& w, auto u) { factors_->add(k, w, S(0), u); });
   }
   // D, G, P⁺ of body k. Always in doubt: blocks of any size have no cheap bound on their rounding.
-  bool eliminate_hinge(int k) {
+  Pivots eliminate_hinge(int k) {
     if (form != Form::fast) return eliminate_hinge_of_factors(k);
     const int s = tree_.size[k], n = tree_.dof[k];
     const S* h = hinge_map(k);
     S *p = P.data() + at_[k].m, *plus = Pplus.data() + at_[k].m, *d = D.data() + at_[k].d, *l = L.data() + at_[k].d, *g = G.data() + at_[k].h;
     std::copy_n(p, s * s, plus);
-    if (n == 0) return false;
+    if (n == 0) return Pivots::sound;
     std::fill_n(g, n * s, S(0));
     multiply_add(h, p, g, n, s, s);  // HP, n x s
     std::copy_n(hinge_diagonal(k), n * n, d);
@@ -180,13 +180,12 @@ class DenseBlocks {
     symmetrise(d, n);
     std::copy_n(d, n * n, l);
     S* pivots = pivots_.data() + tree_.dof_offset[k];
-    const int failed = cholesky_in_place(l, n, pivots);
-    if (failed < n) throw_singular_hinge(tree_, k, failed, to_double(pivots[failed]), 0.0);
+    if (cholesky_in_place(l, n, pivots) < n) return Pivots::not_positive;
     forward_substitute(l, n, g, s);                       // L⁻¹HP
     transposed_multiply_add(g, g, plus, s, n, s, S(-1));  // P - (L⁻¹HP)*(L⁻¹HP)
     symmetrise(plus, s);
     back_substitute(l, n, g, s);                          // G* = D⁻¹HP
-    return true;
+    return Pivots::doubtful;
   }
   void articulated_to_parent(int k) {
     const int p = tree_.parent[k], s = tree_.size[k];
@@ -208,7 +207,7 @@ class DenseBlocks {
       for (int a = 0; a < s; ++a)
         for (int b = 0; b < s; ++b) x[j] += hinge_map(k)[j * s + a] * X[at_[k].m + a * s + b] * hinge_map(k)[j * s + b];
     }
-    require_pivots(tree_, k, L.data() + at_[k].d, pivots_.data() + tree_.dof_offset[k], x, rounding_bound<S>(form));
+    require_pivots(tree_, k, L.data() + at_[k].d, pivots_.data() + tree_.dof_offset[k], x, form);
   }
   void error_to_parent(int k) {
     const int s = tree_.size[k];
@@ -254,16 +253,17 @@ class DenseBlocks {
     size_t e, h, m, d;
   };
   const S* gain(int k) const { return G.data() + at_[k].h; }  // G*, n x s
-  // add(w, u) for the factors of a positive semidefinite matrix.
+  // add(w, u) for the factors of M(k) or J(k).
   template <class Add>
-  void add_factors(const S* A, int n, Add&& add) {
+  void add_factors(const char* letter, int k, const S* A, int n, Add&& add) {
     factor_work_.resize(std::max(factor_work_.size(), size_t(2 * n + 1) * n));
     S *U = factor_work_.data(), *w = U + n * n;
-    semidefinite_factors(A, n, U, w, w + n);
+    if (!semidefinite_factors(A, n, U, w, w + n))
+      throw EvaluationError(std::string(letter) + " of body '" + tree_.body_names[k] + "' is not positive semidefinite, so it has no factors: form=\"fast\" needs none");
     for (int r = 0; r < n; ++r)
       if (!(w[r] == S(0))) add(w[r], [u = U + r * n](int i) { return u[i]; });
   }
-  bool eliminate_hinge_of_factors(int k) {
+  Pivots eliminate_hinge_of_factors(int k) {
     using std::sqrt;
     const int s = tree_.size[k], n = tree_.dof[k], m = factors_->columns(k);
     S *p = P.data() + at_[k].m, *plus = Pplus.data() + at_[k].m, *d = D.data() + at_[k].d, *l = L.data() + at_[k].d, *g = G.data() + at_[k].h;
@@ -279,15 +279,15 @@ class DenseBlocks {
           for (int c = 0; c < m; ++c) row[c] += h * body[c];
       }
     }
-    add_factors(hinge_diagonal(k), n, [&](const S& w, auto u) { factors_->add_rotor(k, w, u); });
+    add_factors("J", k, hinge_diagonal(k), n, [&](const S& w, auto u) { factors_->add_rotor(k, w, u); });
     none_.assign(s, 0);
     factors_->eliminate(k, form, none_.data(), false);
     for (int j = 0; j < n; ++j) {
       const S root = sqrt(factors_->weight(j));
       pivots[j] = factors_->weight(j) * factors_->lower(j, j) * factors_->lower(j, j);
-      if (!(pivots[j] > S(0))) throw_singular_hinge(tree_, k, j, to_double(pivots[j]), 0.0);
       for (int i = 0; i < n; ++i) l[i * n + j] = i < j ? S(0) : S(factors_->lower(i, j) * root);
     }
+    if (std::any_of(pivots, pivots + n, [](const S& pivot) { return !(pivot > S(0)); })) return Pivots::not_positive;
     std::fill_n(d, n * n, S(0));
     multiply_transposed_add(l, l, d, n, n, n);
     for (int j = n - 1; j >= 0; --j)  // G* = L₁⁻* L₂*
@@ -302,7 +302,7 @@ class DenseBlocks {
         for (int r = n; r < factors_->pivots(); ++r) sum += factors_->U(i, r) * factors_->weight(r) * factors_->U(j, r);
         plus[i * s + j] = plus[j * s + i] = sum;
       }
-    return n > 0;
+    return n > 0 ? Pivots::doubtful : Pivots::sound;
   }
   const std::vector<S>& square(int id) const {
     switch (id) {

@@ -114,7 +114,7 @@ bool TreeElimination<S>::factor(Blocks&& blocks, Values&& values, S tolerated) {
   assemble(blocks, values);
   if (!eliminate()) throw SingularOperatorError(where + ", and so is the operator as a whole: it has no inverse at this state");
   growth_ = lost();
-  if (!(growth_ < S(0.3))) throw SingularOperatorError("the operator is singular to working precision at this state (" + where +
+  if (!(growth_ < S(1e-2))) throw SingularOperatorError("the operator is singular to working precision at this state (" + where +
                                                          "); a wider precision (.at(precision=\"quad\")) may decide");
   dense_ = true;
   note_ = "dense: " + where + "; eliminated as one block of " + std::to_string(total_) + " states";

@@ -18,18 +18,18 @@ namespace pycraft {
 
 constexpr int most_corrections = 20;  // of "auto"
 
-[[noreturn]] inline void throw_no_contraction(const std::string& what, double ratio) {
+[[noreturn]] inline void throw_no_contraction(const std::string& what, Form form, double ratio) {
   char number[32];
   std::snprintf(number, sizeof number, "%.2g", ratio);
   throw RefinementError("refinement of " + what + " does not contract: the first correction is " + number +
-                        " of the solution (0.3 is the limit), so no digit of either is sure; take form=\"ud\", or a wider precision");
+                        " of the solution (0.3 is the limit), so no digit of either is sure; take " + (form == Form::fast ? "form=\"ud\" or " : "") + "a wider precision");
 }
 
 // x: n rows of m columns, with terms as large as `largest` that cancelled in it. residual(x, r) and solve(r, δ); what() names the system.
 // corrections receives |δ|/|x| of every step, the largest over the columns.
 template <class S, class What, class Residual, class Solve>
-void refine(S* x, int n, int m, const Refinement& how, const S& largest, What&& what, Residual&& residual, Solve&& solve, std::vector<S>& r,
-            std::vector<S>& delta, std::vector<double>& corrections) {
+void refine(S* x, int n, int m, const Refinement& how, Form form, const S& largest, What&& what, Residual&& residual, Solve&& solve,
+            std::vector<S>& r, std::vector<S>& delta, std::vector<double>& corrections) {
   using std::abs;
   const size_t size = size_t(n) * m;
   r.resize(std::max(r.size(), size)), delta.resize(std::max(delta.size(), size));
@@ -54,7 +54,7 @@ void refine(S* x, int n, int m, const Refinement& how, const S& largest, What&& 
       if (!(ratio <= worst)) worst = ratio;
     }
     corrections.push_back(to_double(worst));
-    if (step == 0 && !(worst <= S(0.3))) throw_no_contraction(what(), to_double(worst));
+    if (step == 0 && !(worst <= S(0.3))) throw_no_contraction(what(), form, to_double(worst));
     if (step > 0 && !(worst < last / S(2))) return;
     for (size_t i = 0; i < size; ++i) x[i] += delta[i];
     if (worst <= epsilon<S>()) return;

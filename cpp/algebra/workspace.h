@@ -386,6 +386,8 @@ class Workspace {
     const int n = plan_->registers[s.out].space.dimension();
     const size_t size = size_t(n) * w;
     if (how.wider) follow(values);
+    const Binding* binding = plan_->contexts[s.context].binding.get();
+    const Form form = binding ? binding->arithmetic.form : Form::fast;
     const auto residual = [&](const S* solution, S* r) {
       if (how.wider) {
         convert(solution, size, wide_x_);
@@ -397,7 +399,8 @@ class Workspace {
         for (size_t i = 0; i < size; ++i) r[i] = x[i] - r[i];
       }
     };
-    refine(y, n, w, how, S(0), [&] { return plan_->text; }, residual, [&](const S* r, S* d) { own.mass_matrix_inverse(r, d, w, scratch_.data()); }, refine_r_, refine_delta_, corrections);
+    refine(y, n, w, how, form, S(0), [&] { return plan_->text; }, residual,
+           [&](const S* r, S* d) { own.mass_matrix_inverse(r, d, w, scratch_.data()); }, refine_r_, refine_delta_, corrections);
   }
 
   void apply_external_operator(const Step& s, int w) {

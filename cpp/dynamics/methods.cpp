@@ -86,10 +86,13 @@ void DynamicsMethods<S>::solve_by_gradients(const S* b, S* x) {
     }
   gradients_.solve(n, diagonal, b, x,
                    [&](const S* p, S* y) { mass_matrix_apply(tree_, blocks_, true, p, y, 1, scratch_.data()); });
-  if (gradients_.residual < sqrt(epsilon<S>())) return;
-  char numbers[160];
-  std::snprintf(numbers, sizeof numbers, "relative residual %.3g after %d iterations, of %d at most; it must fall below sqrt(eps) = %.3g",
-                to_double(gradients_.residual), gradients_.iterations, gradients_.most(n), to_double(S(sqrt(epsilon<S>()))));
+  const S widest = S(0.1) / epsilon<S>();
+  if (gradients_.residual < sqrt(epsilon<S>()) && gradients_.condition < widest) return;
+  char numbers[240];
+  std::snprintf(numbers, sizeof numbers,
+                "relative residual %.3g after %d iterations, of %d at most, condition %.3g or more; they must fall below sqrt(eps) = %.3g and 0.1/eps = %.3g",
+                to_double(gradients_.residual), gradients_.iterations, gradients_.most(n), to_double(gradients_.condition),
+                to_double(S(sqrt(epsilon<S>()))), to_double(widest));
   throw SingularOperatorError(std::string("method 'conjugate-gradients' does not converge on the mass matrix of ") + std::to_string(n) +
                               " coordinates (" + numbers + "): it is too ill-conditioned; " + remedy);
 }

@@ -51,7 +51,7 @@ void RigidDynamics<S>::forward_dynamics(const T* q, const T* v, const T* tau, S*
   corrections_.clear();
   if (how.refinement.steps == 0) return;
   if (how.refinement.wider) wider(q, v);
-  refine(vdot, n, 1, how.refinement, largest, [&] { return "the forward dynamics of '" + source_.name() + "'"; },
+  refine(vdot, n, 1, how.refinement, how.form, largest, [&] { return "the forward dynamics of '" + source_.name() + "'"; },
          [&](const S* x, S* r) {
            if (!how.refinement.wider) return residual(tau, x, r);
            convert(x, n, wide_x_), wide_r_.resize(n);
@@ -136,7 +136,7 @@ void RigidDynamics<S>::mass_matrix_inverse(const double* q, S* out, const Solvin
       std::vector<double> rest(N, 0.0);
       wider(q, rest.data());
     }
-    refine(out, N, N, how.refinement, S(0), [&] { return "the mass matrix inverse of '" + source_.name() + "'"; },
+    refine(out, N, N, how.refinement, how.form, S(0), [&] { return "the mass matrix inverse of '" + source_.name() + "'"; },
            [&](const S* x, S* r) {
              if (!how.refinement.wider) {
                std::copy_n(columns_.data(), size, r);

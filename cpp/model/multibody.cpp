@@ -341,7 +341,7 @@ void Multibody::check_q(const double* q, size_t size) const {
       if (!std::isfinite(at[i])) throw ModelError("q of hinge '" + h.name + "': entry " + std::to_string(i) + " is " + number(at[i]));
     for (const Subhinge& s : h.subhinges) {
       if (s.nq() >= 4) {
-        const double length = std::sqrt(at[0] * at[0] + at[1] * at[1] + at[2] * at[2] + at[3] * at[3]);
+        const double length = std::hypot(std::hypot(at[0], at[1]), std::hypot(at[2], at[3]));
         if (length < 1e-8)
           throw ModelError("q of hinge '" + h.name + "': its quaternion has length " + number(length) + " and no direction; (1, 0, 0, 0) is no rotation");
       }
@@ -399,8 +399,8 @@ void Multibody::integrate(const double* q, const double* dv, double* out) const 
         const Vector3<double> w{d[0], d[1], d[2]};
         Quaternion<double> q1 = q0 * exp_quaternion(w);
         // The product keeps |q0| up to rounding; over many steps rounding would walk, so the length is set to what it was.
-        const double want = std::sqrt(q0.w * q0.w + q0.x * q0.x + q0.y * q0.y + q0.z * q0.z);
-        const double have = std::sqrt(q1.w * q1.w + q1.x * q1.x + q1.y * q1.y + q1.z * q1.z);
+        const double want = std::hypot(std::hypot(q0.w, q0.x), std::hypot(q0.y, q0.z));
+        const double have = std::hypot(std::hypot(q1.w, q1.x), std::hypot(q1.y, q1.z));
         const double scale = want / have;
         if (s.nq() == 7) {
           const Vector3<double> moved = quaternion_rotation(q0) * screw_translation(w, {d[3], d[4], d[5]});
@@ -421,7 +421,7 @@ void Multibody::difference(const double* q0, const double* q1, double* out) cons
       if (s.nq() == 1) {
         d[0] = b[0] - a[0];
       } else {
-        const Quaternion<double> from{a[0], -a[1], -a[2], -a[3]}, to{b[0], b[1], b[2], b[3]};
+        const Quaternion<double> from = with_squares<double>({a[0], -a[1], -a[2], -a[3]}), to = with_squares<double>({b[0], b[1], b[2], b[3]});
         const Vector3<double> w = log_quaternion(from * to);
         Vector6<double> twist{w, {0, 0, 0}};
         if (s.nq() == 7) {

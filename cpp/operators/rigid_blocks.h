@@ -224,17 +224,19 @@ class RigidBlocks {
     rotational_[k] = inertia[k].rotational.s[0] + inertia[k].rotational.s[3] + inertia[k].rotational.s[5];
     reach_[k] = S(0);
   }
-  // D, G, P⁺ of body k; true where a pivot is so small that only the error sweep can tell whether it is noise.
-  bool eliminate_hinge(int k) {
+  // D, G, P⁺ of body k; doubtful where a pivot is so small that only the error sweep can tell whether it is noise.
+  Pivots eliminate_hinge(int k) {
     if (form == Form::fast) {
-      eliminate_hinge_of_inertia(k);
+      if (!eliminate_hinge_of_inertia(k)) return Pivots::not_positive;
     } else {
       if (keep_inertias) P[k] = factors_->inertia(k);
       const int f = first(k);
-      factors_->eliminate(k, form, H.data() + f, J.data() + f, aligned.data() + f, with_bias, G.data() + f, D.data() + d_[k], L.data() + d_[k], pivots_.data() + f);
+      if (!factors_->eliminate(k, form, H.data() + f, J.data() + f, aligned.data() + f, with_bias, G.data() + f, D.data() + d_[k], L.data() + d_[k],
+                               pivots_.data() + f))
+        return Pivots::not_positive;
       if (keep_inertias) Pplus[k] = factors_->plus(k);
     }
-    return doubtful(k);
+    return doubtful(k) ? Pivots::doubtful : Pivots::sound;
   }
   void articulated_to_parent(int k) {
     const int p = tree_.parent[k];
@@ -257,7 +259,7 @@ class RigidBlocks {
   void check_pivots(int k) {
     pivot_work_.resize(std::max(pivot_work_.size(), 2 * size_t(tree_.dof[k])));
     for (int j = first(k); j < last(k); ++j) pivot_work_[j - first(k)] = dot(H[j], X_[k] * H[j]) + J[j];
-    require_pivots(tree_, k, L.data() + d_[k], pivots_.data() + first(k), pivot_work_.data(), rounding_bound<S>(form));
+    require_pivots(tree_, k, L.data() + d_[k], pivots_.data() + first(k), pivot_work_.data(), form);
   }
   void error_to_parent(int k) {
     ArticulatedInertia<S> plus = projected(X_[k], H, G, k);  // τ̄Xτ̄*
@@ -302,26 +304,25 @@ class RigidBlocks {
       default: return Y[k];
     }
   }
-  // D, G, P⁺ from P.
-  void eliminate_hinge_of_inertia(int k) {
+  // D, G, P⁺ from P; false where a pivot is not positive.
+  bool eliminate_hinge_of_inertia(int k) {
     const int n = tree_.dof[k], f = first(k);
     Pplus[k] = P[k];
-    if (n == 0) return;
+    if (n == 0) return true;
     S *d = D.data() + d_[k], *l = L.data() + d_[k], *pivots = pivots_.data() + f;
     for (int j = 0; j < n; ++j) G[f + j] = P[k] * H[f + j];  // PH*
     for (int i = 0; i < n; ++i)
       for (int j = 0; j <= i; ++j) d[i * n + j] = d[j * n + i] = dot(H[f + i], G[f + j]) + (i == j ? J[f + i] : S(0));
     if (n == 1) {
       pivots[0] = d[0];
-      if (!(d[0] > S(0))) throw_singular_hinge(tree_, k, 0, to_double(d[0]), 0.0);
+      if (!(d[0] > S(0))) return false;
       W[f] = (S(1) / d[0]) * G[f];
       // P - (PH*)(PH*)*/D, symmetric by construction
       downdate(Pplus[k], G[f], W[f]);
       G[f] = W[f];
     } else {
       std::copy_n(d, n * n, l);
-      const int failed = cholesky_in_place(l, n, pivots);
-      if (failed < n) throw_singular_hinge(tree_, k, failed, to_double(pivots[failed]), 0.0);
+      if (cholesky_in_place(l, n, pivots) < n) return false;
       for (int j = 0; j < n; ++j) W[f + j] = G[f + j];
       for (int i = 0; i < n; ++i) {  // W = PH*L⁻*
         for (int a = 0; a < i; ++a) W[f + i] = W[f + i] - l[i * n + a] * W[f + a];
@@ -336,6 +337,7 @@ class RigidBlocks {
     }
     for (int j = f; j < f + n; ++j)
       if (aligned[j] >= 0 && no_hinge_diagonal(k)) annihilate(Pplus[k], aligned[j]);
+    return true;
   }
   // Whether a cheap bound on the error sweep's X leaves a pivot in doubt. Of several coordinates a pivot inherits the errors of those
   // before it, in the worst case over their own square roots.

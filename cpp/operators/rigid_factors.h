@@ -32,8 +32,9 @@ class RigidFactors {
   ArticulatedInertia<S> inertia(int k) const {
     return symmetric([&](int i, int j) { return factors_.inertia(k, i, j); });
   }
-  // G, D, its Cholesky factor L and pivots, and with bias the rates that C W ρ* gives the hinge; nv_of(k) of each.
-  void eliminate(int k, Form form, const Vector6<S>* H, const S* J, const int* aligned, bool with_bias, Vector6<S>* G, S* D, S* L, S* pivots) {
+  // G, D, its Cholesky factor L and pivots, and with bias the rates that C W ρ* gives the hinge; nv_of(k) of each. False, with L and pivots
+  // alone, where a pivot is not positive.
+  bool eliminate(int k, Form form, const Vector6<S>* H, const S* J, const int* aligned, bool with_bias, Vector6<S>* G, S* D, S* L, S* pivots) {
     using std::sqrt;
     const int n = tree_.dof[k], m = factors_.columns(k);
     bool rotor = false;
@@ -53,14 +54,14 @@ class RigidFactors {
       if (!(J[j] == S(0))) factors_.add_rotor(k, J[j], [j](int i) { return i == j ? S(1) : S(0); });
     factors_.eliminate(k, form, is_hinge_row, with_bias);
 
+    bool positive = true;
     for (int j = 0; j < n; ++j) {
       pivots[j] = factors_.weight(j) * factors_.lower(j, j) * factors_.lower(j, j);
-      if (!(pivots[j] > S(0))) throw_singular_hinge(tree_, k, j, to_double(pivots[j]), 0.0);
-    }
-    for (int j = 0; j < n; ++j) {
+      positive &= pivots[j] > S(0);
       const S root = sqrt(factors_.weight(j));
       for (int i = 0; i < n; ++i) L[i * n + j] = i < j ? S(0) : S(factors_.lower(i, j) * root);
     }
+    if (!positive) return false;
     for (int i = 0; i < n; ++i)
       for (int j = 0; j <= i; ++j) {
         S sum = S(0);
@@ -79,6 +80,7 @@ class RigidFactors {
       G[j] = scale * g;
       bias_[tree_.dof_offset[k] + j] = scale * bias;
     }
+    return true;
   }
   const S* bias(int k) const { return bias_.data() + tree_.dof_offset[k]; }
   // ---- of the body whose hinge was eliminated last

@@ -22,6 +22,15 @@
 
 namespace pycraft {
 
+// Throws SingularHingeError where a pivot of the bodies from `last` on is noise. Factored forms sweep once more, now with P for the bound.
+template <class S>
+void refuse_pivots(const SkoStructure& tree, RigidBlocks<S>& blocks, int last) {
+  if (blocks.form == Form::fast)
+    check_pivots_tip_to_base(tree, blocks, last);
+  else
+    articulated_inertia_tip_to_base(tree, blocks);
+}
+
 // z, alpha: scratch, one Vector6 per body. Returns the largest of the terms that made up vdot. Throws SingularHingeError.
 template <class S>
 S articulated_body(const SkoStructure& tree, const CompiledModel<S>& model, RigidBlocks<S>& blocks, const Velocities<S>& velocities, const S* T, S* vdot,
@@ -37,7 +46,9 @@ S articulated_body(const SkoStructure& tree, const CompiledModel<S>& model, Rigi
   for (int k = model.bodies - 1; k >= 0; --k) {
     const int p = model.parent[k], first = model.v_offset[k], n = model.nv_of[k];
     if (factored) blocks.factors().add_acceleration(k, velocities.a[k]);
-    doubtful |= blocks.eliminate_hinge(k);
+    const Pivots found = blocks.eliminate_hinge(k);
+    if (found == Pivots::not_positive) refuse_pivots(tree, blocks, k);
+    doubtful |= found == Pivots::doubtful;
     Vector6<S> zk = z[k];
     if (!factored) zk = zk + blocks.P[k] * velocities.a[k];
     Vector6<S> plus = zk;
@@ -53,10 +64,7 @@ S articulated_body(const SkoStructure& tree, const CompiledModel<S>& model, Rigi
       z[p] = z[p] + force_to_parent(blocks.pose[k], plus);
     }
   }
-  if (doubtful && factored)
-    articulated_inertia_tip_to_base(tree, blocks);  // once more, now with P for the error bound
-  else if (doubtful)
-    check_pivots_tip_to_base(tree, blocks);
+  if (doubtful) refuse_pivots(tree, blocks, 0);
   S largest = S(0);
   const Vector6<S> base{Vector3<S>::zero(), -model.gravity};
   for (int k = 0; k < model.bodies; ++k) {

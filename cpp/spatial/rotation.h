@@ -70,9 +70,20 @@ struct Quaternion {
   S w, x, y, z;
 };
 
+// q, divided by its largest component where squares of it might overflow or vanish.
+template <class S>
+inline Quaternion<S> with_squares(const Quaternion<S>& q) {
+  using std::abs;
+  const S square = q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z;
+  if (square > S(1e-20) && S(1e20) > square) return q;
+  const S scale = S(1) / maximum(maximum(S(abs(q.w)), S(abs(q.x))), maximum(S(abs(q.y)), S(abs(q.z))));
+  return {scale * q.w, scale * q.x, scale * q.y, scale * q.z};
+}
+
 // R(q/|q|): the quaternion is used normalised and never rewritten.
 template <class S>
-inline Matrix3<S> quaternion_rotation(const Quaternion<S>& q) {
+inline Matrix3<S> quaternion_rotation(const Quaternion<S>& given) {
+  const Quaternion<S> q = with_squares(given);
   const S s = S(2) / (q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z);
   const S xx = s * q.x * q.x, yy = s * q.y * q.y, zz = s * q.z * q.z, xy = s * q.x * q.y, xz = s * q.x * q.z, yz = s * q.y * q.z;
   const S wx = s * q.w * q.x, wy = s * q.w * q.y, wz = s * q.w * q.z;

@@ -22,7 +22,9 @@ void articulated_inertia_tip_to_base(const SkoStructure& tree, Blocks& blocks) {
   blocks.with_bias = false;
   for (int k = 0; k < tree.bodies(); ++k) blocks.start_articulated(k);
   for (int k = tree.bodies() - 1; k >= 0; --k) {
-    doubtful |= blocks.eliminate_hinge(k);
+    const Pivots found = blocks.eliminate_hinge(k);
+    if (found == Pivots::not_positive) check_pivots_tip_to_base(tree, blocks, k);
+    doubtful |= found == Pivots::doubtful;
     if (tree.parent[k] >= 0) blocks.articulated_to_parent(k);
   }
   if (doubtful) check_pivots_tip_to_base(tree, blocks);

@@ -28,18 +28,23 @@ inline S rounding_bound(Form form) {
   return form == Form::fast ? S(8) * epsilon<S>() : S(column * column);
 }
 
-[[noreturn]] inline void throw_singular_hinge(const SkoStructure& tree, int k, int coordinate, double pivot, double bound) {
+// What the elimination of a hinge found in the pivots of D(k).
+enum class Pivots { sound, doubtful, not_positive };
+
+[[noreturn]] inline void throw_singular_hinge(const SkoStructure& tree, int k, int coordinate, double pivot, double bound, Form form) {
   char numbers[96];
   std::snprintf(numbers, sizeof numbers, "D = %.3g, rounding bound %.3g", pivot, bound);
+  const std::string remedy = form == Form::fast ? "form=\"ud\" or a wider precision" : "a wider precision";
   throw SingularHingeError("hinge '" + tree.hinge_names[k] + "' of body '" + tree.body_names[k] + "' feels no inertia along coordinate '" +
                            tree.coordinate_names[tree.dof_offset[k] + coordinate] + "' (" + numbers +
-                           "): give the bodies it moves a mass, or the hinge a rotor inertia, or weld it",
+                           "): give the bodies it moves a mass, or the hinge a rotor inertia, or weld it; where it carries light bodies under heavy ones, take " +
+                           remedy,
                            tree.dof_offset[k] + coordinate);
 }
 
 // Throws unless every pivot of body k's D = L L* stands out of its rounding. x: diagonal of H X H* + J, n numbers, overwritten, and n more.
 template <class S>
-void require_pivots(const SkoStructure& tree, int k, const S* L, const S* pivots, S* x, const S& per_unit) {
+void require_pivots(const SkoStructure& tree, int k, const S* L, const S* pivots, S* x, Form form) {
   using std::abs, std::sqrt;
   const int n = tree.dof[k];
   for (int i = 0; i < n; ++i) x[i] = sqrt(x[i]);
@@ -54,16 +59,17 @@ void require_pivots(const SkoStructure& tree, int k, const S* L, const S* pivots
       w[i] = sum / L[i * n + i];
       reach += abs(w[i]) * x[i];
     }
-    const S bound = per_unit * reach * reach;
-    if (!(pivots[j] > bound)) throw_singular_hinge(tree, k, j, to_double(pivots[j]), to_double(bound));
+    const S bound = rounding_bound<S>(form) * reach * reach;
+    if (!(pivots[j] > bound)) throw_singular_hinge(tree, k, j, to_double(pivots[j]), to_double(bound), form);
   }
 }
 
-// Throws SingularHingeError at the first hinge whose pivot is noise.
+// Throws SingularHingeError at the first hinge whose pivot is noise; of bodies before `last` nothing is asked, so that a sweep that
+// has met a pivot that is not positive learns which one is to blame.
 template <class Blocks>
-void check_pivots_tip_to_base(const SkoStructure& tree, Blocks& blocks) {
+void check_pivots_tip_to_base(const SkoStructure& tree, Blocks& blocks, int last = 0) {
   for (int k = 0; k < tree.bodies(); ++k) blocks.start_error(k);
-  for (int k = tree.bodies() - 1; k >= 0; --k) {
+  for (int k = tree.bodies() - 1; k >= last; --k) {
     blocks.check_pivots(k);
     if (tree.parent[k] >= 0) blocks.error_to_parent(k);
   }
