@@ -184,7 +184,8 @@ def accuracy(seconds: float = 0.2) -> list[Figure]:
             if not error < 1e-6:
                 raise _core.EvaluationError(f"{way} of {name} is wrong in the run that times it: off by {error:.1e}")
             own = _core.time_forward(model, q, v, u, seconds, **options)["median"]
-            figures.append(Figure(f"{name} ({model.nv} dof): {way} over fast", own / fast, "x", bound, f"{1e6 * own:.2f} us, error {error:.0e}"))
+            measured = f"{1e6 * own:.2f} us, error {error:.0e}"
+            figures.append(Figure(f"{name} ({model.nv} dof): {way} over fast", own / fast, "x", bound, measured))
         packs = {}
         for form in ("fast", "ud"):
             for precision in ("double", "single"):

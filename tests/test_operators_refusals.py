@@ -169,7 +169,11 @@ def test_unknown_names(model):
             "no precision is called 'half'; there are 'single', 'double', 'extended', 'quad', and 50 and 100 digits",
             lambda: soa.M.at(model.q, precision="half"),
         ),
-        (pc.EvaluationError, "no form .* is called 'joseph'; there are 'fast', 'ud' and 'square-root'", lambda: soa.P.at(model.q, form="joseph")),
+        (
+            pc.EvaluationError,
+            "no form .* is called 'joseph'; there are 'fast', 'ud' and 'square-root'",
+            lambda: soa.P.at(model.q, form="joseph"),
+        ),
         (pc.EvaluationError, "no plan is made for 'solve'; there are apply", lambda: soa.P.plan("solve")),
     ]:
         with pytest.raises(error, match=text):

@@ -10,23 +10,25 @@ namespace pycraft {
 
 namespace {
 
-// Sums are taken in the widest scalar, so that a difference of two scalars keeps what the engine computed.
-Quad widened(const std::vector<double>& parts) {
-  Quad sum = 0;
-  for (auto p = parts.rbegin(); p != parts.rend(); ++p) sum += Quad(*p);
+using Widest = Digits100;
+
+// Sums are taken in it, so that a difference of two scalars keeps what the engine computed.
+Widest widened(const std::vector<double>& parts) {
+  Widest sum = 0;
+  for (auto p = parts.rbegin(); p != parts.rend(); ++p) sum += Widest(*p);
   return sum;
 }
 
-void add_scalar(const Scalar& s, Quad factor, std::vector<Quad>& total, int& batch, bool rules) {
+void add_scalar(const Scalar& s, Widest factor, std::vector<Widest>& total, int& batch, bool rules) {
   const auto& n = s.node();
   switch (n.kind) {
     case ScalarKind::number:
-      for (Quad& t : total) t += factor * Quad(n.value);
+      for (Widest& t : total) t += factor * Widest(n.value);
       return;
     case ScalarKind::sum:
       for (const Scalar& t : n.terms) add_scalar(t, factor, total, batch, rules);
       return;
-    case ScalarKind::scaled: add_scalar(n.terms[0], factor * Quad(n.value), total, batch, rules); return;
+    case ScalarKind::scaled: add_scalar(n.terms[0], factor * Widest(n.value), total, batch, rules); return;
     default: break;
   }
   const Request request = n.kind == ScalarKind::trace ? Request::trace : n.kind == ScalarKind::logdet ? Request::logdet : Request::norm;
@@ -34,7 +36,7 @@ void add_scalar(const Scalar& s, Quad factor, std::vector<Quad>& total, int& bat
   evaluate(n.operand, request, r, rules, true);
   if (r.batch >= 0) {
     if (batch >= 0 && batch != r.batch) throw EvaluationError("batches of different lengths in one scalar");
-    if (batch < 0) total.assign(r.batch, total.empty() ? Quad(0) : total[0]);
+    if (batch < 0) total.assign(r.batch, total.empty() ? Widest(0) : total[0]);
     batch = r.batch;
   }
   for (size_t i = 0; i < total.size(); ++i) total[i] += factor * widened(r.expansions[r.batch >= 0 ? i : 0]);
@@ -43,12 +45,12 @@ void add_scalar(const Scalar& s, Quad factor, std::vector<Quad>& total, int& bat
 }  // namespace
 
 std::vector<double> evaluate(const Scalar& s, int* batch, bool rules) {
-  std::vector<Quad> total(1, Quad(0));
+  std::vector<Widest> total(1, Widest(0));
   int b = -1;
-  add_scalar(s, Quad(1), total, b, rules);
+  add_scalar(s, Widest(1), total, b, rules);
   if (batch) *batch = b;
   std::vector<double> rounded;
-  for (const Quad& t : total) rounded.push_back(to_double(t));
+  for (const Widest& t : total) rounded.push_back(to_double(t));
   return rounded;
 }
 

@@ -290,7 +290,7 @@ class Workspace {
     }
     if (solved) return;
     const std::string reason = own->note();
-    if constexpr (!std::is_same_v<S, Quad>) {
+    if constexpr (std::numeric_limits<S>::digits < std::numeric_limits<Quad>::digits) {
       wide = std::make_unique<TreeElimination<Quad>>(s.realization);
       if (wide->factor(blocks, numbers, Quad(1e7) * Quad(epsilon<S>()))) return note("quad: " + reason + "; eliminated in quad precision");
     }

@@ -88,7 +88,7 @@ py::object diff(const T& operand, const py::args& directions, const std::string&
     return py::cast(diff_in_turn(operand, directions, frame));
   py::list all;
   for (const auto& direction : directions[0]) all.append(py::cast(diff_in_turn(operand, py::args(py::make_tuple(direction)), frame)));
-  return std::move(all);
+  return py::object(all);
 }
 
 template <class T>

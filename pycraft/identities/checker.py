@@ -24,7 +24,7 @@ class BoundState:
     def __init__(self, operators: Any, state: Any):
         self.state = state
         self._operators = operators
-        self._bindings: dict[str, Any] = {}
+        self._bindings: dict[str | int, Any] = {}
         self.sizes = Sizes(lambda e: self.bind(e, "double"), operators)
 
     def bind(self, side: Any, precision: str | int) -> Any:
@@ -38,7 +38,7 @@ class BoundState:
 class Residuals:
     """Worst residuals of one statement over states, in double and in a wider scalar."""
 
-    def __init__(self, wide: str = "extended"):
+    def __init__(self, wide: str | int = "extended"):
         self.wide = wide
         self.residual = self.bound = self.wide_residual = self.wide_bound = 0.0
         self.growth = 1.0

@@ -76,7 +76,7 @@ class Report:
         from rich.table import Table
         from rich.text import Text
 
-        wide = next((f.wide_precision for f in self.findings if f.states), "extended")
+        wide = next((str(f.wide_precision) for f in self.findings if f.states), "extended")
         table = Table(title=f"Theorems on {self.model}", title_justify="left", box=None, pad_edge=False, header_style="bold")
         for header, justify in (
             ("theorem", "left"),

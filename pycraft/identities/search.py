@@ -144,7 +144,9 @@ def refutes(text: str, parents: list[int], kinds: list[str], rotor: bool, seed: 
     return None
 
 
-def smallest(text: str, *, seed: int = 0, precision: str | int = "extended", budget: float = 20.0, largest: int = 4) -> Counterexample | None:
+def smallest(
+    text: str, *, seed: int = 0, precision: str | int = "extended", budget: float = 20.0, largest: int = 4
+) -> Counterexample | None:
     """The smallest refutation by (bodies, degrees of freedom), or None if the budget (seconds) ran out first."""
     begin = time.perf_counter()
     for tried, (parents, kinds, rotor) in enumerate(candidates(largest)):

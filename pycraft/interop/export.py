@@ -150,7 +150,7 @@ def pinocchio_peer(model: Multibody) -> Peer:
 
     if _PINOCCHIO_BYTES * model.nv**3 > 2**31:
         size = _PINOCCHIO_BYTES * model.nv**3 / 2**30
-        raise PeerRefusal(f"its work space of {model.nv} coordinates takes {size:.0f} GB, for derivatives that nobody asked for")
+        raise PeerRefusal(f"its work space of {model.nv} coordinates takes {size:.0f} GB (third-order tensors for derivatives)")
     twin = to_pinocchio(model)
     data = twin.model.createData()
 
