@@ -5,12 +5,22 @@ import pytest
 SLOW = {
     "test_symbolic": lambda item: "pendulum" not in item.nodeid,
     "test_notebooks": lambda item: "00_tour" not in item.nodeid and "02_" not in item.nodeid,
-    "test_checker": lambda item: item.originalname in ("test_one_letter_exchanged", "test_one_coefficient_off")
-    and any(sign in item.callspec.params["name"] for sign in "∂#"),
-    "test_calculus": lambda item: item.originalname in ("test_second_derivatives", "test_along_time", "test_along_parameters"),
+    "test_checker": lambda item: item.originalname == "test_with_rotor_inertia_what_needs_j_zero_is_expected_to_fail"
+    or (
+        item.originalname in ("test_one_letter_exchanged", "test_one_coefficient_off")
+        and any(sign in item.callspec.params["name"] for sign in "∂#")
+    ),
+    "test_calculus": lambda item: item.originalname in ("test_second_derivatives", "test_along_time", "test_along_parameters")
+    or (item.originalname == "test_along_every_coordinate" and item.callspec.params["name"] not in ("H", "E", "P", "D", "ℳ", "psi", "ℳ⁻¹")),
     "test_cli": lambda item: item.originalname == "test_tour" and "panda" not in item.nodeid,
     "test_prove": lambda item: item.originalname.startswith(("test_random", "test_nothing_false", "test_what_is_proved_of_perturbed")),
-    "test_algorithm": lambda item: "random" in item.originalname,
+    "test_algorithm": lambda item: "random" in item.originalname or item.name.endswith("-no rotors]"),
+    "test_docs": lambda item: item.originalname == "test_the_readme_example_runs",
+    "test_integration": lambda item: item.originalname == "test_tolerances_are_followed",
+    "test_refinement": lambda item: item.originalname == "test_forms_with_factors_need_no_refinement",
+    "test_singular_forms": lambda item: item.originalname == "test_heavy_tips" and item.callspec.params["ratio"] != 1e15,
+    "test_sko_random": lambda item: item.originalname == "test_every_theorem",
+    "test_statements": lambda item: item.originalname == "test_the_smallest_counterexample" and not item.callspec.params["rotor"],
     "test_sympy_bridge": lambda item: "random" in item.originalname,
     "test_properties": lambda item: item.originalname == "test_values_of_deeper_expressions",
 }
