@@ -3,17 +3,19 @@
 #   make test                   set up, then all tests, C++ and Python, that need no peer packages
 #   make test-peers             the same robots against Pinocchio and MuJoCo (extra [peers])
 #   make check                  the everyday subset, under three minutes
-#   make lab | bench | docs     JupyterLab in notebooks; the bounds measured
+#   make lab | bench            JupyterLab in notebooks; the bounds measured
+#   make stability              the catalogue of hard cases in full, beside the peers; writes tests/stability/table.md
 PYTHON ?= python3
 MODEL ?=
 BIN := .venv/bin
 JOBS ?= $(shell nproc 2>/dev/null || sysctl -n hw.ncpu)
+PARALLEL := -n $(JOBS) --dist worksteal
 
 SOURCES := $(shell find cpp pycraft -name '*.h' -o -name '*.cpp' -o -name '*.py' -o -name '*.in' -o -name '*.urdf') CMakeLists.txt pyproject.toml
 # What is compiled: a change in any of these rebuilds. Python sources are used where they lie.
 COMPILED := $(shell find cpp -name '*.h' -o -name '*.cpp' -o -name '*.in' -o -name '*.py') CMakeLists.txt pyproject.toml
 
-.PHONY: tour test test-cpp test-python test-peers check lab bench lint clean
+.PHONY: tour test test-cpp test-python test-peers check lab bench stability lint clean
 
 tour: .venv/installed
 	$(BIN)/pycraft tour $(MODEL)
@@ -25,14 +27,14 @@ test-cpp: .venv/installed
 	$(BIN)/ctest --test-dir build --output-on-failure -j $(JOBS)
 
 test-python: .venv/tested
-	$(BIN)/python -m pytest -m "not peers"
+	$(BIN)/python -m pytest $(PARALLEL) -m "not peers"
 
 check: .venv/tested
 	$(BIN)/ruff check pycraft tests
-	$(BIN)/python -m pytest -m "not peers and not slow" -x
+	$(BIN)/python -m pytest $(PARALLEL) -m "not peers and not slow" -x
 
 test-peers: .venv/peers
-	$(BIN)/python -m pytest -m peers
+	$(BIN)/python -m pytest $(PARALLEL) -m peers
 	$(BIN)/pycraft peers --output tests/peers/robots.md
 
 lab: .venv/lab
@@ -40,6 +42,9 @@ lab: .venv/lab
 
 bench: .venv/installed
 	$(BIN)/pycraft bench
+
+stability: .venv/peers
+	$(BIN)/pycraft stability --output tests/stability/table.md
 
 lint: .venv/tested
 	$(BIN)/ruff check pycraft tests

@@ -285,8 +285,13 @@ class Operator:
         """
     def certify(self, *args, **kwargs) -> typing.Any:
         """
-        The value with its measured error, condition, where digits are lost and what the next rung costs: see
-        pycraft.accuracy.certify.certify_expression.
+        certify(q=None, x=None, *, v=None, form="fast", refine=0, residual="same", precision="double", seed=0, seconds=0.02)
+
+        The value at one state, the dense form or the product with x, with its measured error, what rounding of q, v and x does,
+        condition, where digits are lost and what the next rung costs: a pycraft.accuracy.certificate.Certificate. q: (nq,) or a State,
+        the model's present state where left out; x: (n,) or (n, m); v: (nv,), zero where left out; form, refine, residual and precision
+        as in at; seed: of the signs by which the data are moved; seconds: spent on each timing. Raises EvaluationError where the
+        expression is bound already, ModelError for arrays of another shape and for a model without coordinates.
         """
     def check_current(self) -> None:
         """
@@ -487,7 +492,13 @@ class Scalar:
         ...
     def certify(self, *args, **kwargs) -> typing.Any:
         """
-        The number with its measured error, where digits are lost and what the next rung costs.
+        certify(q=None, *, v=None, form="fast", refine=0, residual="same", precision="double", seed=0, seconds=0.02)
+
+        The number at one state with its measured error, what rounding of q and v does, where digits are lost and what the next rung
+        costs: a pycraft.accuracy.certificate.Certificate. q: (nq,) or a State, the model's present state where left out; v: (nv,), zero
+        where left out; form, refine, residual and precision as in at; seed: of the signs by which the data are moved; seconds: spent
+        on each timing. Raises EvaluationError where it is bound already, ModelError for arrays of another shape and for a model
+        without coordinates.
         """
     def diff(self, *args, frame: str = 'body') -> typing.Any:
         """

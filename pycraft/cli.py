@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import warnings
 from pathlib import Path
 from typing import Annotated, Any, Optional
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, help="A workbench for the Spatial Operator Algebra over a multibody model.")
@@ -15,25 +17,36 @@ console = Console()
 if not console.is_terminal:  # a file or a pipe has no width of its own
     console = Console(width=140)
 
+MIMIC = ("refuse", "lock", "free")
 Model = Annotated[str, typer.Argument(help="A URDF or MJCF file, or the name of a robot that comes with the package (see pycraft.robots).")]
-Root = Annotated[str, typer.Option(help="fixed | free: a free hinge first.")]
-Mimic = Annotated[str, typer.Option(help="refuse | lock | free: what becomes of mimic joints.")]
+Root = Annotated[Optional[str], typer.Option(help="fixed | free: a free hinge first; fixed if left out, of a robot by name its own.")]  # noqa: UP045
+Mimic = Annotated[str, typer.Option(help="refuse | lock | free: what becomes of a file's mimic joints.")]
 
 
-def load_model(name: str, root: str = "fixed", mimic: str = "refuse") -> Any:
-    """A robot of the package by name, or a file."""
-    from . import robots
+def load_model(name: str, root: str | None = None, mimic: str = "refuse") -> Any:
+    """A robot of the package by name, or a file. ModelError, with the names of the robots, for what is neither."""
+    from . import _core, robots
     from .models.load import load
     from .models.warning import ModelWarning
 
-    if name in robots.names() and not Path(name).exists():
-        return getattr(robots, name)()
+    if mimic not in MIMIC:
+        raise _core.ModelError(f"mimic={mimic!r}: there are {', '.join(map(repr, MIMIC))}")
+    if name in robots.names() and not Path(name).is_file():  # none of them has a mimic joint
+        return getattr(robots, name)(**({} if root is None else {"root": root}))
+    if not Path(name).exists():
+        raise _core.ModelError(f"no file is called {name!r}, and no robot of the package; its robots are {', '.join(robots.names())}")
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", ModelWarning)
-        model = load(name, root=root, mimic=mimic)  # type: ignore[arg-type]
+        model = load(name, root=root or "fixed", mimic=mimic)
     for warning in caught:
-        console.print(f"[yellow]warning:[/] {warning.message}", highlight=False)
+        console.print(f"[yellow]warning:[/] {escape(str(warning.message))}", highlight=False)
     return model
+
+
+def fail(text: str, status: int = 2) -> None:
+    """End a command with an error's text."""
+    console.print(f"[bold red]error:[/] {escape(text)}", highlight=False)
+    raise typer.Exit(status)
 
 
 def _guarded(f: Any) -> Any:
@@ -43,14 +56,46 @@ def _guarded(f: Any) -> Any:
     try:
         return f()
     except _core.Error as error:
-        console.print(f"[bold red]error:[/] {error}", highlight=False)
-        raise typer.Exit(2) from None
+        return fail(str(error))
+
+
+def check_outputs(**paths: Path | None) -> None:
+    """Where files are to be written, before what goes into them is measured: the folder is there, a picture has a format."""
+    for option, path in paths.items():
+        if path is None:
+            continue
+        if path.is_dir():
+            fail(f"--{option} {path}: a folder; give a file in it")
+        if not path.absolute().parent.is_dir():
+            fail(f"--{option} {path}: there is no folder {path.parent}; make it first")
+        if not os.access(path if path.exists() else path.absolute().parent, os.W_OK):
+            fail(f"--{option} {path}: cannot be written")
+        if option == "plot":
+            from matplotlib.backend_bases import FigureCanvasBase
+
+            known = FigureCanvasBase.get_supported_filetypes()
+            if path.suffix.removeprefix(".").lower() not in known:
+                fail(f"--plot {path}: a picture has the extension of its format; there are {', '.join(sorted(known))}")
+
+
+def check_least(least: int, **counts: int) -> None:
+    """Numbers of options that have a least value."""
+    for option, count in counts.items():
+        if count < least:
+            fail(f"--{option} {count}: a whole number, {least} or more")
+
+
+def check_seconds(**durations: float | None) -> None:
+    """Seconds of options: finite, not negative."""
+    for option, given in durations.items():
+        if given is not None and not 0 <= given < float("inf"):
+            fail(f"--{option} {given}: a finite number of seconds, zero or more")
 
 
 @app.command()
 def tour(
     model: Annotated[Optional[str], typer.Argument(help="A URDF or MJCF file, or a robot's name; the Panda by default.")] = None,  # noqa: UP045 - typer reads it
-    root: Root = "fixed",
+    root: Root = None,
     mimic: Mimic = "refuse",
 ) -> None:
     """Load a real robot, type the book's formulas, factor, invert, and check the theorems."""
@@ -66,7 +111,7 @@ def check(
     seed: Annotated[int, typer.Option(help="Seed of the states.")] = 0,
     precision: Annotated[str, typer.Option(help="The wider scalar: extended | quad | 50 | 100 (digits).")] = "extended",
     json: Annotated[bool, typer.Option("--json", help="The report as JSON.")] = False,
-    root: Root = "fixed",
+    root: Root = None,
     mimic: Mimic = "refuse",
 ) -> None:
     """Check every theorem on a model; exit status 1 if one fails that should hold."""
@@ -93,6 +138,7 @@ def bench(seconds: Annotated[float, typer.Option(help="Seconds per figure.")] = 
     """Measure the bounds on speed; exit status 1 if one is missed."""
     from .bench import run
 
+    check_seconds(seconds=seconds)
     with console.status("measuring"):
         results = run(seconds)
     missed = 0
@@ -113,34 +159,73 @@ def bench(seconds: Annotated[float, typer.Option(help="Seconds per figure.")] = 
 def accuracy(
     model: Model,
     integration: Annotated[bool, typer.Option("--integration", help="Integrators and tolerances instead of forms and precisions.")] = False,
+    form: Annotated[Optional[list[str]], typer.Option(help="Only this form; may be repeated.")] = None,  # noqa: UP045 - typer reads it
+    precision: Annotated[Optional[list[str]], typer.Option(help="Only this precision; may be repeated.")] = None,  # noqa: UP045
+    method: Annotated[Optional[list[str]], typer.Option(help="Only this method, or integrator; may be repeated.")] = None,  # noqa: UP045
+    error: Annotated[Optional[float], typer.Option(help="Name the cheapest row whose error is at most this.")] = None,  # noqa: UP045
     seconds: Annotated[float, typer.Option(help="Seconds per figure.")] = 0.05,
-    duration: Annotated[float, typer.Option(help="Seconds of the motion that is integrated.")] = 1.0,
+    duration: Annotated[Optional[float], typer.Option(help="Seconds of the motion that is integrated; 1 if left out.")] = None,  # noqa: UP045
     seed: Annotated[int, typer.Option(help="Seed of the states and forces.")] = 0,
-    csv: Annotated[Optional[Path], typer.Option(help="Write the rows as CSV.")] = None,  # noqa: UP045 - typer reads it
+    csv: Annotated[Optional[Path], typer.Option(help="Write the rows as CSV.")] = None,  # noqa: UP045
     json: Annotated[Optional[Path], typer.Option(help="Write the rows as JSON.")] = None,  # noqa: UP045
     plot: Annotated[Optional[Path], typer.Option(help="Draw error against time (PNG, SVG or PDF).")] = None,  # noqa: UP045
-    root: Root = "fixed",
+    root: Root = None,
     mimic: Mimic = "refuse",
 ) -> None:
-    """What accuracy costs on a model: error, time and memory of every form, refinement, precision and method; or of integrators."""
+    """What accuracy costs on a model: error, time and memory of every form, refinement, precision and method; or of integrators.
+
+    Exit status 1 where every row is refused, or none reaches --error.
+    """
     from .accuracy.table import accuracy as measure
-    from .accuracy.work_precision import work_precision
+    from .accuracy.work_precision import INTEGRATORS, work_precision
+
+    check_outputs(csv=csv, json=json, plot=plot)
+    check_least(0, seed=seed)
+    check_seconds(seconds=seconds, duration=duration)
+    if error is not None and not error > 0:
+        fail(f"--error {error}: a relative error, above zero")
+    if integration and (form or precision):
+        fail("--form and --precision belong to the table of forms; --integration has --method, an integrator")
+    if duration is not None and not integration:
+        fail("--duration belongs to --integration")
+    notes = []
 
     def run() -> Any:
         robot = load_model(model, root, mimic)
         with console.status("measuring") as status:
 
             def progress(label: str) -> None:
-                status.update(label)
+                status.update(escape(label))
 
             if not integration:
-                return measure(robot, seed=seed, seconds=seconds, progress=progress)
-            robot.gravity = robot.gravity if any(robot.gravity) else (0.0, 0.0, -9.81)
+                wide = [int(p) if p.isdigit() else p for p in precision or ()]
+                return measure(
+                    robot,
+                    forms=form or None,
+                    precisions=wide or None,
+                    methods=method or None,
+                    seed=seed,
+                    seconds=seconds,
+                    progress=progress,
+                )
+            if not any(robot.gravity):
+                robot.gravity = (0.0, 0.0, -9.81)
+                notes.append("the model has no gravity; taken as (0, 0, -9.81) m/s²")
             state = robot.random_state(seed)
-            return work_precision(robot, state.q, 0 * state.v, duration=duration, seconds=seconds, progress=progress)
+            notes.append(f"initial state: random, of seed {seed}, at rest; no generalized forces")
+            length = 1.0 if duration is None else duration
+            return work_precision(
+                robot, state.q, 0 * state.v, duration=length, integrators=method or INTEGRATORS, seconds=seconds, progress=progress
+            )
 
     table = _guarded(run)
     console.print(table.table())
+    if integration:
+        notes.append(f"reference: {table.reference}; its own error {table.reference_error:.1e}")
+    for note in notes:
+        console.print(escape(note), highlight=False)
+    for reason, labels in table.refusals.items():
+        console.print(f"[bold]refused:[/] {escape('; '.join(labels))}: {escape(reason)}", highlight=False)
     if csv:
         table.to_csv(csv)
     if json:
@@ -154,7 +239,18 @@ def accuracy(
         figure.savefig(plot, dpi=150, bbox_inches="tight")
     for path in (csv, json, plot):
         if path:
-            console.print(f"wrote {path}", highlight=False)
+            console.print(f"wrote {escape(str(path))}", highlight=False)
+    if all(row["refused"] for row in table):
+        fail("every row is refused", 1)
+    if error is not None:
+        try:
+            best = table.fastest(error)
+        except ValueError as none:
+            fail(str(none), 1)
+        console.print(
+            f"cheapest for {error:g}: {escape(table.label(best))}, error {best['error']:.1e}, {table.cell('seconds', best)}",
+            highlight=False,
+        )
 
 
 @app.command()
@@ -172,17 +268,18 @@ def stability(
     from .accuracy.catalogue import catalogue
     from .accuracy.stability_markdown import markdown
 
+    check_least(1, seeds=seeds, steps=steps)
+    check_outputs(output=output, csv=csv, json=json)
+
     def run() -> Any:
         chosen = [c for c in catalogue() if case.lower() in c.name.lower() or case.lower() in c.family.lower()]
         if not chosen:
-            console.print(f"[bold red]error:[/] no hard case has {case!r} in its name or family", highlight=False)
-            raise typer.Exit(2)
+            fail(f"no hard case has {case!r} in its name or family")
         with console.status("measuring") as status:
             return hard.run(seeds, steps, cases=chosen, peers=peers, progress=lambda name: status.update(name))
 
     results = _guarded(run)
     if output:
-        output.parent.mkdir(parents=True, exist_ok=True)
         output.write_text(markdown(results), encoding="utf-8")
     else:
         console.print(results.table())
@@ -192,9 +289,10 @@ def stability(
         results.to_json(json)
     for path in (output, csv, json):
         if path:
-            console.print(f"wrote {path}", highlight=False)
+            console.print(f"wrote {escape(str(path))}", highlight=False)
     for row in results.failures:
-        console.print(f"[red]{row['case']}, {row['method']}: {row['failed']}[/]", highlight=False)
+        text = f"{row['case']}, {row['method']}: {row['failed']}"
+        console.print(f"[red]{escape(text)}[/]", highlight=False)
     raise typer.Exit(0 if results else 1)
 
 
@@ -204,8 +302,12 @@ def peers(
     states: Annotated[int, typer.Option(help="Random states per robot.")] = 20,
     seed: Annotated[int, typer.Option(help="Seed of the states.")] = 0,
 ) -> None:
-    """Compare every robot of example-robot-data with Pinocchio (extra [peers])."""
+    """Compare every robot of example-robot-data with Pinocchio (extra \\[peers])."""
     from .interop.peers import compare_all, markdown
+
+    check_least(1, states=states)
+    check_least(0, seed=seed)
+    check_outputs(output=output)
 
     def run() -> Any:
         with console.status("comparing") as status:
@@ -214,7 +316,6 @@ def peers(
     results = _guarded(run)
     text = markdown(results, states)
     if output:
-        output.parent.mkdir(parents=True, exist_ok=True)
         output.write_text(text)
         console.print(f"wrote {output}")
     else:
@@ -228,7 +329,7 @@ def peers(
 
 @app.command()
 def lab() -> None:
-    """Open JupyterLab (extra [lab])."""
+    """Open JupyterLab (extra \\[lab])."""
     import subprocess
     import sys
 

@@ -1,6 +1,7 @@
 """The command line: what it prints, and how it ends."""
 
 import json
+from importlib import import_module
 
 import pytest
 from typer.testing import CliRunner
@@ -63,3 +64,73 @@ def test_bench_holds_its_bounds():
     assert {f.name for f in figures} >= {"phi", "psi*", "Upsilon", "MM^-1", "forward_dynamics"}
     assert all(f.value > 0 and f.bound == 1.5 for f in figures)
     assert building(200).value < 500
+
+
+# ---------------------------------------------------------------------- what is refused before anything is measured
+@pytest.fixture
+def nothing_measured(monkeypatch):
+    """Measuring is a failure."""
+    for module, name in (("table", "accuracy"), ("work_precision", "work_precision"), ("stability", "run")):
+        monkeypatch.setattr(import_module(f"pycraft.accuracy.{module}"), name, lambda *_, **__: pytest.fail("measured"))
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("accuracy panda --csv {tmp}/no/a.csv", "--csv {tmp}/no/a.csv: there is no folder"),
+        ("accuracy panda --json {tmp}", "--json {tmp}: a folder"),
+        ("accuracy panda --plot {tmp}/a.foo", "there are"),
+        ("accuracy panda --plot {tmp}/a", "a picture has the extension of its format"),
+        ("accuracy panda --seed -1", "--seed -1: a whole number, 0 or more"),
+        ("accuracy panda --seconds -1", "--seconds -1.0: a finite number of seconds"),
+        ("accuracy panda --seconds nan", "--seconds nan"),
+        ("accuracy panda --duration 2", "--duration belongs to --integration"),
+        ("accuracy panda --integration --duration inf", "--duration inf"),
+        ("accuracy panda --integration --form ud", "--form and --precision belong to the table of forms"),
+        ("accuracy panda --error 0", "--error 0.0: a relative error, above zero"),
+        ("accuracy panda --root sideways", "root='sideways': there are 'fixed', 'free'"),
+        ("accuracy panda --mimic sometimes", "mimic='sometimes': there are"),
+        ("accuracy pandaa", "its robots are puma560, panda"),
+        ("stability --seeds 0", "--seeds 0: a whole number, 1 or more"),
+        ("stability --seeds -1", "--seeds -1"),
+        ("stability --steps 0", "--steps 0"),
+        ("stability --output {tmp}/no/a.md", "there is no folder {tmp}/no"),
+        ("stability --case nowhere", "no hard case has 'nowhere'"),
+    ],
+)
+def test_options_are_checked_before_measuring(nothing_measured, tmp_path, command, words):
+    result = runner.invoke(app, command.format(tmp=tmp_path).split())
+    assert result.exit_code == 2, result.output
+    text = " ".join(result.output.split())
+    assert text.startswith("error:") and words.format(tmp=tmp_path) in text and not list(tmp_path.iterdir())
+
+
+QUICK = "--seconds 0 --method articulated --form fast --precision double"
+
+
+def test_the_accuracy_table_and_its_cheapest_row(tmp_path):
+    options = f"accuracy ur5 {QUICK} --error 1e-10 --csv {tmp_path}/a.csv --plot {tmp_path}/a.png"
+    result = runner.invoke(app, options.split())
+    assert result.exit_code == 0, result.output
+    assert "6 degrees of freedom" in result.output and "cheapest for 1e-10: fast" in result.output
+    assert {p.name for p in tmp_path.iterdir()} == {"a.csv", "a.png"}
+    result = runner.invoke(app, f"accuracy ur5 {QUICK} --root free --error 1e-40".split())
+    assert result.exit_code == 1 and "12 degrees of freedom" in result.output and "the best is" in result.output
+
+
+def test_every_row_refused():
+    result = runner.invoke(app, "accuracy ur5 --seconds 0 --method articulated --form ud --precision 100".split())
+    assert result.exit_code == 1
+    assert "refused: ud, 100 digits: nothing is wider than 100 digits to measure it against" in result.output
+
+
+def test_the_table_of_integrators_says_what_was_integrated():
+    result = runner.invoke(app, "accuracy panda --integration --seconds 0 --method dopri5 --duration 0.05 --seed 3".split())
+    assert result.exit_code == 0, result.output
+    for words in ("0.05 s, gravity (0, 0, -9.81) m/s²", "of seed 3, at rest", "reference: fehlberg78", "the model has no gravity"):
+        assert words in result.output
+
+
+def test_brackets_of_help_are_kept():
+    assert "(extra [peers])" in runner.invoke(app, ["peers", "--help"]).output
+    assert "[lab]" in runner.invoke(app, ["--help"]).output

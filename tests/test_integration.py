@@ -295,6 +295,9 @@ def test_gravity_and_forces_are_felt():
         (dict(times=[0, 1, 0.5], integrator="scipy:RK45"), "strictly increasing, or strictly decreasing"),
         (dict(times=[]), "times: a list of times"),
         (dict(times=[0, np.inf]), "times: entry 1 is inf"),
+        (dict(times=[0, np.inf], integrator="scipy:RK45"), "times: entry 1 is inf"),
+        (dict(rtol=np.nan, integrator="scipy:RK45"), "rtol=nan: a tolerance is a positive number"),
+        (dict(tau=[1.0, np.nan], integrator="scipy:RK45"), "tau of hinge 'lower': entry 0 is nan"),
         (dict(rtol=1e-20, atol=1e-20), "rtol=1e-20 and atol=1e-20 are below what the precision holds"),
         (dict(atol=0.0), "atol is positive"),
         (dict(normalise="always"), "normalise='always': there are 'never' and 'each step'"),
@@ -304,6 +307,7 @@ def test_gravity_and_forces_are_felt():
         (dict(q=[0, np.nan]), "q of hinge 'lower': entry 0 is nan"),
         (dict(precision="half"), "no precision is called 'half'"),
         (dict(form="slow"), "slow"),
+        (dict(refine=10**12), "refine=1000000000000: a number of corrections"),
     ],
 )
 def test_arguments_that_make_no_sense(options, text):

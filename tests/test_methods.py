@@ -185,6 +185,78 @@ def test_what_is_only_extreme_is_solved_in_quad(name, method):
     assert norm(solve(model, method, model.q, model.v, tau, "quad") - expected) <= 1e-12 * norm(expected)
 
 
+BATCH, SHORT = np.zeros((3, 2)), np.zeros((2, 2))
+
+
+@pytest.mark.parametrize("method", ["realization", "cholesky"])
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (dict(q=[0.0]), r"q of 'chain of 2 rods' takes 2 numbers, or \(B, 2\) for a batch"),
+        (dict(v=[0.0] * 3), "v of 'chain of 2 rods' takes 2 numbers"),
+        (dict(tau=[0.0] * 3), "tau of 'chain of 2 rods' takes 2 numbers"),
+        (dict(tau="x"), "tau is not an array of numbers"),
+        (dict(tau=[1j, 0]), "tau is complex; models take real numbers"),
+        (dict(q=BATCH, v=SHORT), "batches of 3 and 2 states in one call"),
+        (dict(q=BATCH, tau=SHORT), "batches of 3 and 2 states in one call"),
+        (dict(q=[0, np.nan]), "q of hinge 'hinge1': entry 0 is nan"),
+        (dict(tau=[0, np.nan]), "tau of hinge 'hinge1': entry 0 is nan"),
+        (dict(out=np.zeros(2, np.float32)), r"out= takes a writeable C-ordered float64 array of shape \(2\)"),
+        (dict(out=np.zeros(3)), r"out= takes .* of shape \(2\)"),
+        (dict(q=BATCH, out=np.zeros((2, 3)).T), r"out= takes .* of shape \(3, 2\)"),
+    ],
+)
+def test_the_realization_checks_its_arguments_as_the_others_do(method, arguments, words):
+    with pytest.raises(pc.ModelError, match=words):
+        pc.chain(2).forward_dynamics(**{"q": [0, 0], "v": [0, 0], "tau": [0, 0], "method": method, **arguments})
+
+
+def test_the_realization_of_a_batch():
+    model = pc.chain(3)
+    q = np.random.default_rng(0).uniform(-1, 1, (2, 3))
+    out = np.empty((2, 3))
+    assert model.forward_dynamics(q, np.zeros(3), np.ones(3), method="realization", out=out) is out
+    assert np.allclose(out, model.forward_dynamics(q, np.zeros(3), np.ones(3)))
+    assert model.forward_dynamics(q[:0], np.zeros(3), np.ones(3), method="realization").shape == (0, 3)
+    tip = pc.Multibody("tip")
+    tip.add_body("a", mass=1.0, com=(1, 0, 0))
+    tip.add_body("b", "a", mass=0.0, position=(1, 0, 0))
+    tip.take_warnings()
+    with pytest.raises(pc.Error, match=r"\(state 0 of a batch of 2\)"):
+        tip.forward_dynamics(np.zeros((2, 2)), [0, 0], [1, 1], method="realization")
+    empty = pc.Multibody("nothing")
+    assert empty.forward_dynamics([], [], [], method="realization").shape == (0,)
+    assert empty.forward_dynamics(np.zeros((4, 0)), [], [], method="realization").shape == (4, 0)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (dict(refine=True), "refine=True: a number of corrections"),
+        (dict(refine=10**12), "refine=1000000000000: a number of corrections, 0, 1, 2, ..., 1000, or 'auto'"),
+        (dict(refine=-1), "refine=-1"),
+        (dict(refine=1.0), "refine=1.0"),
+        (dict(refine=1, residual="wider", precision=100), "nothing is wider than 100 digits"),
+        (dict(method=3), "method=3: a name"),
+    ],
+)
+def test_options_that_make_no_sense(options, words):
+    model = pc.chain(2)
+    with pytest.raises(pc.EvaluationError, match=words):
+        model.forward_dynamics([0, 0], [0, 0], [1, 1], **options)
+    if "method" not in options:
+        with pytest.raises(pc.EvaluationError, match=words):
+            model.mass_matrix_inverse([0, 0], **options)
+        with pytest.raises(pc.EvaluationError, match=words):
+            model.refinement([0, 0], [0, 0], [1, 1], **options)
+
+
+def test_counts_of_numpy_are_numbers():
+    model = pc.chain(2)
+    expected = model.forward_dynamics([0.1, 0.2], [0, 0], [1, 1], refine=2)
+    assert np.array_equal(model.forward_dynamics([0.1, 0.2], [0, 0], [1, 1], refine=np.int64(2)), expected)
+
+
 def test_memory():
     model, long = pc.chain(10), pc.chain(20)
     for method in METHODS:

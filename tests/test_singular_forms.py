@@ -218,6 +218,117 @@ def test_a_wider_precision_solves_what_a_form_must_refuse():
     assert relative_error(arm.forward_dynamics(arm.q, [0, 0], T, precision="quad"), two_carriages(1e-3, 1e16, T)) <= 1e-12
 
 
+def rod_inertia(axis, mass, share):
+    """A rod of 1 m along a unit axis, with this share of mass · 1 m² about it."""
+    inertia = mass * ((np.eye(3) - np.outer(axis, axis)) / 12 + share * np.outer(axis, axis))
+    return (inertia + inertia.T) / 2
+
+
+def right_or_refused(arm, q, tau, form):
+    """Whether there is an answer; it has at least the first digit right."""
+    try:
+        got = arm.forward_dynamics(q, np.zeros(arm.nv), tau, form=form)
+    except pc.SingularHingeError:
+        return False
+    exact = arm.forward_dynamics(q, np.zeros(arm.nv), tau, form="ud", precision=50)
+    assert relative_error(got, exact) <= 0.5, f"{form}: {got} instead of {exact}"
+    return True
+
+
+@each_form
+@pytest.mark.parametrize("share", [0.0, 1e-17, 1e-16, 1e-15, 1e-14])
+def test_a_rod_about_its_own_axis_askew(share, form):
+    """H M H* is the rounding of M's entries, or little more: refused, or right, for any axis."""
+    answers = 0
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        axis = rng.normal(size=3)
+        axis /= np.linalg.norm(axis)
+        arm = pc.Multibody("rod")
+        arm.add_body("base", None, "pin", mass=1.0, axis=rng.normal(size=3), com=rng.normal(size=3), inertia=np.eye(3))
+        rod = dict(mass=1.0, com=0.5 * axis, inertia=rod_inertia(axis, 1.0, share))
+        arm.add_body("rod", "base", "pin", axis=axis, position=rng.normal(size=3), **rod)
+        answers += right_or_refused(arm, rng.normal(size=2), np.ones(2), form)
+    assert answers <= 6 if share == 0 else answers >= 54 if share == 1e-14 else True
+
+
+def nearly_dependent(rng):
+    """A tree of hinges that nearly undo each other: axes off by 1e-12 to 0.1, thin rods, massless links, masses from 1e-9 to 1e9."""
+    arm = pc.Multibody("nearly dependent")
+    axis, name = None, None
+    for k in range(rng.integers(2, 6)):
+        kind = str(rng.choice(["pin", "pin", "pin", "slider", "universal", "gimbal"]))
+        turned = rng.normal(size=3) if axis is None or rng.random() < 0.4 else axis + 10.0 ** rng.uniform(-12, -1) * rng.normal(size=3)
+        axis = turned / np.linalg.norm(turned)
+        mass, choice, options = 10.0 ** rng.uniform(-9, 9), rng.random(), {}
+        if choice > 0.6:
+            root = rng.normal(size=(3, 3))
+            options = dict(mass=mass, com=rng.normal(size=3), inertia=mass * (np.trace(root @ root.T) * np.eye(3) - root @ root.T))
+        elif choice > 0.25:
+            along = axis + 10.0 ** rng.uniform(-8, 0) * rng.normal(size=3)
+            along /= np.linalg.norm(along)
+            options = dict(mass=mass, com=0.5 * along, inertia=rod_inertia(along, mass, 10.0 ** rng.uniform(-16, -2)))
+        if kind in ("pin", "slider"):
+            options["axis"] = axis
+        position = rng.normal(size=3) if rng.random() < 0.6 else np.zeros(3)
+        arm.add_body(f"b{k}", name, kind, position=position, **options)
+        name = f"b{k}"
+    arm.take_warnings()
+    return arm
+
+
+@each_form
+def test_hinges_that_nearly_undo_each_other(form):
+    answers = 0
+    for seed in range(1500):
+        rng = np.random.default_rng(seed)
+        try:
+            arm = nearly_dependent(rng)
+        except pc.ModelError:  # an inertia beyond rounding
+            continue
+        q = rng.normal(size=arm.nv) * np.where(rng.random(arm.nv) < 0.6, 10.0 ** rng.uniform(-10, 0), 1.0)
+        answers += right_or_refused(arm, q, rng.normal(size=arm.nv), form)
+    assert answers > 750
+
+
+def test_what_leaves_the_range_of_its_numbers_is_no_result():
+    """Overflow raises and says so, in every form, method and batch; no hinge is blamed for it."""
+    arm = at_random_state(REGULAR["near its axis"]())
+    x = np.ones(arm.nv)
+    for form in FORMS:
+        for options in (dict(), dict(precision="single"), dict(refine=1)):
+            with pytest.raises(pc.Error, match="range|overflows"):
+                arm.forward_dynamics(arm.q, 1e160 * x, x, form=form, **options)
+    for method in ("cholesky", "ldl", "inverse", "realization"):
+        with pytest.raises(pc.Error, match="range|overflows|positive definite"):
+            arm.forward_dynamics(arm.q, 1e160 * x, x, method=method)
+    states = np.tile(arm.q, (9, 1)), np.tile(x, (9, 1)), np.tile(x, (9, 1))
+    states[1][7] *= 1e160
+    with pytest.raises(pc.EvaluationError, match="state 7 of a batch of 9"):
+        arm.forward_dynamics(*states)
+    with pytest.raises(pc.EvaluationError, match="range"):
+        arm.inverse_dynamics(arm.q, 1e160 * x, x)
+    with pytest.raises(pc.EvaluationError, match="range"):
+        (1e10 * arm.soa.M).at(arm.q) @ (1e308 * np.ones(6 * len(arm.bodies)))
+
+
+@pytest.mark.parametrize("at", [2, 8])
+@pytest.mark.parametrize("form", ["fast", "ud", "square-root"])
+def test_a_batch_names_the_state(form, at):
+    """Within a pack, and in what is left after the packs."""
+    arm = pc.Multibody("two pins")
+    arm.add_body("inner", None, "pin", mass=0.0, axis=(0, 0, 1))
+    arm.add_body("middle", "inner", "pin", mass=0.0, axis=(1, 0, 0))
+    arm.add_body("outer", "middle", "pin", mass=1.0, axis=(0, 0, 1), com=(0.3, 0.1, 0.2), inertia=np.eye(3))
+    arm.take_warnings()
+    q = np.full((9, 3), 0.7)
+    q[at, 1] = 0.0  # the axes of inner and outer fall in line
+    with pytest.raises(pc.SingularHingeError, match=f"'inner'.*state {at} of a batch of 9"):
+        arm.forward_dynamics(q, 0 * q, 0 * q, form=form)
+    with pytest.raises(pc.SingularHingeError, match=f"'inner'.*state {at} of a batch of 9"):
+        arm.soa.D.inv().at(q, form=form).dense()
+
+
 # ---------------------------------------------------------------------- minimum norm
 
 
@@ -286,6 +397,28 @@ def test_minimum_norm_is_the_pseudoinverse(name, form):
     wide = arm.mass_matrix_inverse(arm.q, form=form, on_singular="minimum-norm", precision="quad")
     assert np.abs(wide - exact).max() <= 4 * EPS * (1 + np.abs(exact).max())
     assert np.abs(inverse - np.linalg.pinv(MM, rcond=1e-10, hermitian=True)).max() <= 1e4 * EPS * condition * (1 + np.abs(exact).max())
+
+
+@each_form
+@pytest.mark.parametrize("residual", ["same", "wider"])
+def test_minimum_norm_takes_refinement(residual, form):
+    """At a singular state too: a heavy tip beyond a hinge that feels nothing."""
+    rng = np.random.default_rng(1)
+    axes = [axis / np.linalg.norm(axis) for axis in rng.normal(size=(8, 3))]
+    masses = [1.0] * 7 + [1e8]
+    made = [
+        body(f"b{k}", k - 1, [subhinge("pin", axis)], mass, [0.3, 0.1, 0], mass * np.eye(3), position=[0.5, 0, 0.2])
+        for k, (axis, mass) in enumerate(zip(axes, masses, strict=True))
+    ]
+    made.append(body("b8", 0, [subhinge("pin", [1, 0, 0])], 0.0, position=[0, 1, 0]))
+    arm = at_random_state(model(made, (0, 0, -9.8)))
+    tau = np.random.default_rng(2).normal(size=arm.nv)
+    exact = np.asarray(least_squares(arm, arm.q, arm.v, tau), float)
+    error = {}
+    for steps in (0, "auto"):
+        options = {"refine": steps, "residual": residual if steps else "same", "on_singular": "minimum-norm"}
+        error[steps] = relative_error(arm.forward_dynamics(arm.q, arm.v, tau, form=form, **options), exact)
+    assert error["auto"] <= 1e-13 and (form != "fast" or error[0] >= 100 * error["auto"]), error
 
 
 @each_form

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import pycraft as pc
+from pycraft.accuracy.trajectory import integrate_by_scipy
 from pycraft.accuracy.work_precision import TOLERANCES, WorkPrecisionTable, trajectory_error, work_precision
 
 matplotlib.use("Agg")
@@ -102,15 +103,11 @@ def test_a_right_hand_side_of_ones_own():
     assert [row["integrator"] for row in answered] == ["scipy:RK45"] * 2 + ["scipy:DOP853"] * 2
     assert all(row["drift"] is None for row in answered) and answered[1]["error"] < 1e-2 * answered[0]["error"]
     assert all("right-hand side" in row["refused"] for row in rows(table, "dopri5"))
-    unknown = work_precision(model, [0.2], right_hand_side=damped, integrators=["scipy:RK9"], tolerances=[1e-4], seconds=0)
-    assert "scipy:DOP853" in unknown[0]["refused"]
     run = model.integrate_ode([0.2], [0.0], np.linspace(0, 1, 9), damping=[0.3], integrator="fehlberg78", rtol=1e-13, atol=1e-13)
     own = work_precision(model, [0.2], right_hand_side=damped, energy=lambda q, v: 1.0, **options)
     assert [row["drift"] for row in own if not row["refused"]] == [0.0] * 4
-    from pycraft.accuracy.work_precision import by_scipy
-
-    q = by_scipy(model, damped, np.array([0.2]), np.zeros(1), run.t, "scipy:DOP853", 1e-12)[0]
-    assert np.abs(q - run.q).max() < 1e-10
+    by_scipy = integrate_by_scipy(damped, model.configuration_rate, np.array([0.2]), np.zeros(1), run.t, "DOP853", 1e-12, 1e-12, None)
+    assert np.abs(by_scipy.q - run.q).max() < 1e-10 and by_scipy.evaluations > 20
 
 
 def test_forces_do_work():
@@ -119,17 +116,70 @@ def test_forces_do_work():
     assert "not conserved" in table.plot()[1].texts[0].get_text()
 
 
+def resting(t, q, v):
+    return np.zeros(1)
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
-    [(dict(duration=0.0), "duration=0"), (dict(integrators=["euler"]), "euler"), (dict(integrators=["scipy:RK9"]), "RK9")],
+    [
+        (dict(duration=0.0), "duration=0"),
+        (dict(duration=np.inf), "duration=inf: a positive, finite number of seconds"),
+        (dict(duration="1"), "duration='1'"),
+        (dict(integrators=["euler"]), "integrator 'euler' is not there; there are 'dopri5'.*'scipy:RK45'"),
+        (dict(integrators="scipy:RK9"), "integrator 'scipy:RK9' is not there"),
+        (dict(integrators=[]), "integrators is empty"),
+        (dict(tolerances=[]), "tolerances is empty"),
+        (dict(tolerances=0.0), "tolerances: 0.0 is not a positive, finite tolerance"),
+        (dict(tolerances=[1e-3, np.nan]), "tolerances: nan is not"),
+        (dict(steps=[-0.1]), "steps: -0.1 is not a positive"),
+        (dict(seconds=-1), "seconds=-1"),
+        (dict(form="slow"), "form 'slow' is not there"),
+        (dict(refine=-1), "refine=-1"),
+        (dict(q=[np.nan]), "q of hinge 'bob': entry 0 is nan"),
+        (dict(q=[0.0, 1.0]), "q of 'pendulum' takes 1 numbers"),
+        (dict(q=[[0.0], [1.0]]), "from one state of 'pendulum', not from a batch"),
+        (dict(tau=[1.0, 2.0]), "tau of 'pendulum' takes 1 numbers"),
+        (dict(right_hand_side=3), "right_hand_side: a function is called, not 3"),
+        (dict(right_hand_side=lambda t, q, v: np.zeros(2)), r"right_hand_side\(0, q, v\) has shape \(2,\)"),
+        (dict(right_hand_side=lambda t, q, v: np.array([np.nan])), "is nan at coordinate 'bob'"),
+        (dict(energy=lambda q, v: np.nan), "energy.* is nan at the initial state"),
+        (dict(energy=1.0), "energy: a function is called, not 1.0"),
+    ],
 )
 def test_wrong_arguments(options, words):
-    if "duration" in options:
-        with pytest.raises(pc.Error, match=words):
-            work_precision(pendulum(), [0.0], **options)
-    else:
-        table = work_precision(pendulum(), [0.0], tolerances=[1e-3], seconds=0, **options)
-        assert words in table[0]["refused"]
+    """Before anything is measured."""
+    with pytest.raises(pc.Error, match=words):
+        work_precision(pendulum(), **{"q": [0.0], "progress": lambda _: pytest.fail("measured"), **options})
+
+
+def test_what_is_no_model():
+    with pytest.raises(TypeError, match="work_precision takes a model"):
+        work_precision("panda", [0.0])
+    with pytest.raises(pc.ModelError, match="'nothing' has no coordinates"):
+        work_precision(pc.Multibody("nothing"), [])
+
+
+def test_energy_that_is_lost_on_the_way_is_told():
+    energies = iter([1.0, 1.0, np.nan, *[1.0] * 20])
+    table = work_precision(
+        pendulum(), [0.0], duration=0.2, energy=lambda q, v: next(energies), integrators="dopri5", tolerances=1e-4, seconds=0
+    )
+    assert len(table) == 1 and "energy(q, v) is nan along the motion" in table[0]["refused"]
+    with pytest.raises(ValueError, match="every one is refused"):
+        table.fastest(1)
+
+
+def test_the_picture_of_nothing():
+    table = work_precision(pendulum(), [0.0], right_hand_side=resting, duration=0.2, integrators="dopri5", tolerances=1e-4, seconds=0)
+    left, right = table.plot()
+    assert not left.axison and not right.axison and "takes no right-hand side" in left.texts[0].get_text()
+    assert "dopri5 at 1e-04" in sum(table.refusals.values(), [])
+
+
+def test_the_title_and_what_is_kept_with_it(swing):
+    assert swing.title == f"Integration of pendulum, {PERIOD:g} s, gravity (0, -9.81, 0) m/s², from rest"
+    assert swing.about["gravity"] == [0, -9.81, 0] and swing.about["q"] == [0] and swing.about["v"] == [0]
 
 
 def test_ways_out(swing, tmp_path):

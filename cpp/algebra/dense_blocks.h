@@ -163,7 +163,8 @@ class DenseBlocks {
     }
     if (!factors_) factors_ = std::make_unique<FactoredInertia<S>>(tree_);
     factors_->start(k);
-    add_factors("M", k, mass(k), tree_.size[k], [&](const S& w, auto u) { factors_->add(k, w, S(0), u); });
+    uncertain_.resize(tree_.bodies());
+    uncertain_[k] = add_factors("M", k, mass(k), tree_.size[k], [&](const S& w, auto u) { factors_->add(k, w, S(0), u); });
   }
   // D, G, P⁺ of body k. Always in doubt: blocks of any size have no cheap bound on their rounding.
   Pivots eliminate_hinge(int k) {
@@ -198,7 +199,14 @@ class DenseBlocks {
       });
   }
   // ---------------------------------------------------------------- error bound (sweeps/singular_pivot.h)
-  void start_error(int k) { std::copy_n(mass(k), tree_.size[k] * tree_.size[k], X.data() + at_[k].m); }
+  void start_error(int k) {
+    const int s = tree_.size[k];
+    S* x = X.data() + at_[k].m;
+    std::fill_n(x, s * s, S(0));
+    // What factors of M(k) took for rounding, in units of the bound.
+    const S left = form != Form::fast && uncertain_[k] ? S(S(8 * s) * epsilon<S>() / rounding_bound<S>(form)) : S(0);
+    for (int i = 0; i < s; ++i) x[i * s + i] = P[at_[k].m + i * s + i] + left * mass(k)[i * s + i];
+  }
   void check_pivots(int k) {
     const int s = tree_.size[k], n = tree_.dof[k];
     S* x = work_.data();
@@ -213,11 +221,17 @@ class DenseBlocks {
     const int s = tree_.size[k];
     S *bar = error_work_.data(), *t = bar + s * s, *plus = t + s * s;
     std::fill_n(bar, 3 * s * s, S(0));
-    // Entries of P round at sqrt(P(i,i) P(j,j)), whatever cancels when it moves on: the diagonal, not P.
     for (int i = 0; i < s; ++i) bar[i * s + i] = S(1), plus[i * s + i] = P[at_[k].m + i * s + i];
     transposed_multiply_add(gain(k), hinge_map(k), bar, s, tree_.dof[k], s, S(-1));
     multiply_add(bar, X.data() + at_[k].m, t, s, s, s);
     multiply_transposed_add(t, bar, plus, s, s, s);
+    for (int j = 0; j < tree_.dof[k]; ++j) {
+      const S *h = hinge_map(k) + j * s, *g = gain(k) + j * s;
+      S square = hinge_diagonal(k)[j * tree_.dof[k] + j];
+      for (int a = 0; a < s; ++a) square += h[a] * h[a] * P[at_[k].m + a * s + a];
+      for (int a = 0; a < s; ++a)
+        for (int b = 0; b < s; ++b) plus[a * s + b] += square * g[a] * g[b];
+    }
     congruence_add(k, plus, X.data() + at_[tree_.parent[k]].m);
   }
 
@@ -253,15 +267,16 @@ class DenseBlocks {
     size_t e, h, m, d;
   };
   const S* gain(int k) const { return G.data() + at_[k].h; }  // G*, n x s
-  // add(w, u) for the factors of M(k) or J(k).
+  // add(w, u) for the factors of M(k) or J(k); whether they leave out what may be rounding.
   template <class Add>
-  void add_factors(const char* letter, int k, const S* A, int n, Add&& add) {
+  bool add_factors(const char* letter, int k, const S* A, int n, Add&& add) {
     factor_work_.resize(std::max(factor_work_.size(), size_t(2 * n + 1) * n));
     S *U = factor_work_.data(), *w = U + n * n;
-    if (!semidefinite_factors(A, n, U, w, w + n))
+    if (!semidefinite_factors(A, n, S(S(8 * n) * epsilon<S>()), U, w, w + n))
       throw EvaluationError(std::string(letter) + " of body '" + tree_.body_names[k] + "' is not positive semidefinite, so it has no factors: form=\"fast\" needs none");
     for (int r = 0; r < n; ++r)
       if (!(w[r] == S(0))) add(w[r], [u = U + r * n](int i) { return u[i]; });
+    return std::any_of(w + n, w + n + n * n, [](const S& x) { return !(x == S(0)); });
   }
   Pivots eliminate_hinge_of_factors(int k) {
     using std::sqrt;
@@ -333,6 +348,7 @@ class DenseBlocks {
   std::vector<S> E, H, G, M, P, Pplus, R, Y, X, J, D, L, pivots_, work_, error_work_, factor_work_;
   std::vector<int> none_;
   std::unique_ptr<FactoredInertia<S>> factors_;
+  std::vector<char> uncertain_;
 };
 
 }  // namespace pycraft

@@ -49,6 +49,14 @@ std::vector<std::string> ExecutionPool::run_notes() const {
   return impl_->notes;
 }
 
+[[noreturn]] static void throw_beyond_range(const Plan& plan, const Inputs& inputs) {
+  const size_t given = inputs.x ? size_t(plan.domain.dimension()) * inputs.columns * (inputs.batched ? plan.batch : 1) : 0;
+  bool finite = std::all_of(inputs.x, inputs.x + given, [](double x) { return std::isfinite(x); });
+  for (const auto& [_, x] : inputs.vectors) finite &= std::all_of(x.begin(), x.end(), [](double y) { return std::isfinite(y); });
+  if (!finite) throw EvaluationError("the vector that '" + plan.text + "' is applied to has an entry that is no finite number");
+  throw EvaluationError("the value of '" + plan.text + "' is beyond the range of its numbers: take other units, or a wider precision (.at(precision=\"extended\"))");
+}
+
 template <class S>
 void ExecutionPool::run_at(const Inputs& inputs, bool expansions, Result& result) {
   const Plan& plan = *plan_;
@@ -92,8 +100,10 @@ void ExecutionPool::run_at(const Inputs& inputs, bool expansions, Result& result
   const Register* out = plan.output >= 0 ? &plan.registers[plan.output] : nullptr;
   const bool identity_columns = plan.columns_of_identity;
   result.batch = plan.batched ? states : (inputs.batched ? -2 : -1);
+  bool in_range = true;
   const auto store = [&](size_t at, const S& value) {
     result.values[at] = to_double(value);
+    in_range &= std::isfinite(result.values[at]);
     if (expansions) result.expansions[at] = expansion(value);
   };
   const auto shape = [&](int rows, int columns) {
@@ -110,7 +120,7 @@ void ExecutionPool::run_at(const Inputs& inputs, bool expansions, Result& result
       throw EvaluationError("the vector '" + name + "' has " + std::to_string(given->second.size()) + " entries; it lies in " +
                             plan.registers[r].space.description());
   }
-  for (int b = 0; b < states; ++b) {
+  const auto run_state = [&](int b) {
     for (size_t c = 0; c < plan.contexts.size(); ++c) {
       const Context& context = plan.contexts[c];
       if (!context.binding || context.binding->batch < 0) continue;
@@ -161,7 +171,7 @@ void ExecutionPool::run_at(const Inputs& inputs, bool expansions, Result& result
       using std::sqrt;
       if (is_norm) store(b, sqrt(squares));
       if (is_trace) store(b, sum);
-      continue;
+      return;
     }
     const int m = inputs.columns;
     if (plan.input >= 0) {
@@ -196,7 +206,12 @@ void ExecutionPool::run_at(const Inputs& inputs, bool expansions, Result& result
         if (b == 0) shape(1, 1);
         store(b, w.scalar(plan.output));
     }
-  }
+  };
+  for (int b = 0; b < states; ++b)
+    naming_state(b, plan.batched ? states : 1, [&] {
+      run_state(b);
+      if (!in_range) throw_beyond_range(plan, inputs);
+    });
   if (states == 0) shape(plan.request == Request::trace || plan.request == Request::logdet || plan.request == Request::norm ? 1 : n_out,
                          plan.request == Request::dense ? n_in : inputs.columns);
   held.clear();

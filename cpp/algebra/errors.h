@@ -39,4 +39,22 @@ struct StaleOperatorError : Error {
   using Error::Error;
 };
 
+// f(), its errors telling which state of a batch they come from.
+template <class F>
+void naming_state(int state, int states, F&& f) {
+  if (states < 2) return f();
+  const auto named = [&](const Error& e) { return e.what() + (" (state " + std::to_string(state) + " of a batch of " + std::to_string(states) + ")"); };
+  try {
+    f();
+  } catch (const SingularHingeError& e) {
+    throw SingularHingeError(named(e), e.coordinate);
+  } catch (const SingularOperatorError& e) {
+    throw SingularOperatorError(named(e));
+  } catch (const RefinementError& e) {
+    throw RefinementError(named(e));
+  } catch (const EvaluationError& e) {
+    throw EvaluationError(named(e));
+  }
+}
+
 }  // namespace pycraft

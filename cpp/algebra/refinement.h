@@ -25,7 +25,8 @@ constexpr int most_corrections = 20;  // of "auto"
                         " of the solution (0.3 is the limit), so no digit of either is sure; take " + (form == Form::fast ? "form=\"ud\" or " : "") + "a wider precision");
 }
 
-// x: n rows of m columns, with terms as large as `largest` that cancelled in it. residual(x, r) and solve(r, δ); what() names the system.
+// x: n rows of m columns, with terms as large as `largest` that cancelled in it: a solution that is nothing but their rounding is not
+// refused. residual(x, r) and solve(r, δ); what() names the system.
 // corrections receives |δ|/|x| of every step, the largest over the columns.
 template <class S, class What, class Residual, class Solve>
 void refine(S* x, int n, int m, const Refinement& how, Form form, const S& largest, What&& what, Residual&& residual, Solve&& solve,
@@ -39,7 +40,7 @@ void refine(S* x, int n, int m, const Refinement& how, Form form, const S& large
   for (int step = 0; step < steps; ++step) {
     residual(x, r.data());
     solve(r.data(), delta.data());
-    S worst = S(0);
+    S worst = S(0), sure = S(0);
     for (int c = 0; c < m; ++c) {
       S correction = S(0), solution = S(0);
       for (size_t i = c; i < size; i += m) {
@@ -48,13 +49,15 @@ void refine(S* x, int n, int m, const Refinement& how, Form form, const S& large
         if (!(y <= solution)) solution = y;
       }
       if (correction == S(0)) continue;
-      // what cancelled in the solution has left its own rounding
-      const S scale = maximum(solution, S(S(1e3) * epsilon<S>() * largest));
-      const S ratio = correction / scale;
+      const S ratio = correction / maximum(solution, correction);
       if (!(ratio <= worst)) worst = ratio;
+      // what cancelled in the solution has left its own rounding, which no form would do better
+      const S judged = correction / maximum(solution, S(S(1e3) * epsilon<S>() * largest));
+      if (!(judged <= sure)) sure = judged;
     }
+    if (!std::isfinite(to_double(sure))) throw EvaluationError(what() + " overflows: a residual is beyond the range of its numbers; take other units, or a wider precision");
     corrections.push_back(to_double(worst));
-    if (step == 0 && !(worst <= S(0.3))) throw_no_contraction(what(), form, to_double(worst));
+    if (step == 0 && !(sure <= S(0.3))) throw_no_contraction(what(), form, to_double(sure));
     if (step > 0 && !(worst < last / S(2))) return;
     for (size_t i = 0; i < size; ++i) x[i] += delta[i];
     if (worst <= epsilon<S>()) return;

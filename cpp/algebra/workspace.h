@@ -307,6 +307,7 @@ class Workspace {
   }
 
   // ---- refinement, asked for by the binding of a context
+  // Of what spans several bindings: the most that one of them asks for.
   Refinement refinement() const {
     Refinement r;
     for (const Context& c : plan_->contexts) {
@@ -381,13 +382,12 @@ class Workspace {
     const S* x = vectors_[s.in[0]].data();
     S* y = vectors_[s.out].data();
     own.mass_matrix_inverse(x, y, w, scratch_.data());
-    const Refinement how = refinement();
-    if (how.steps == 0) return;
+    const Binding* binding = plan_->contexts[s.context].binding.get();
+    if (!binding || binding->arithmetic.refinement.steps == 0) return;
+    const Refinement& how = binding->arithmetic.refinement;
     const int n = plan_->registers[s.out].space.dimension();
     const size_t size = size_t(n) * w;
     if (how.wider) follow(values);
-    const Binding* binding = plan_->contexts[s.context].binding.get();
-    const Form form = binding ? binding->arithmetic.form : Form::fast;
     const auto residual = [&](const S* solution, S* r) {
       if (how.wider) {
         convert(solution, size, wide_x_);
@@ -399,7 +399,7 @@ class Workspace {
         for (size_t i = 0; i < size; ++i) r[i] = x[i] - r[i];
       }
     };
-    refine(y, n, w, how, form, S(0), [&] { return plan_->text; }, residual,
+    refine(y, n, w, how, binding->arithmetic.form, S(0), [&] { return plan_->text; }, residual,
            [&](const S* r, S* d) { own.mass_matrix_inverse(r, d, w, scratch_.data()); }, refine_r_, refine_delta_, corrections);
   }
 

@@ -13,6 +13,12 @@ namespace pycraft {
 
 namespace {
 
+int states_of(const Array& q) {
+  if (q.ndim() != 2 || q.shape(0) == 0) throw EvaluationError("a time takes at least one state: q of shape (states, nq)");
+  return static_cast<int>(q.shape(0));
+}
+
+
 py::dict result(const Timing& t) {
   py::dict d;
   d["minimum"] = t.minimum;
@@ -39,7 +45,7 @@ py::dict time_apply(const Expression& e, const Array& x, double seconds, bool ru
 py::dict time_forward(const std::shared_ptr<Multibody>& model, const Array& q, const Array& v, const Array& u, double seconds, Form form, const py::object& refine,
                       const std::string& residual, Precision precision) {
   const Solving how{form, refinement(refine, residual), OnSingular::raise};
-  const int K = static_cast<int>(q.shape(0)), nq = model->nq(), nv = model->nv();
+  const int K = states_of(q), nq = model->nq(), nv = model->nv();
   const double *Q = q.data(), *V = v.data(), *U = u.data();
   Timing t;
   {
@@ -61,7 +67,7 @@ py::dict time_forward(const std::shared_ptr<Multibody>& model, const Array& q, c
 py::dict time_method(const std::shared_ptr<Multibody>& model, const std::string& method, const Array& q, const Array& v, const Array& u, double seconds,
                      Precision precision) {
   const Method by = method_from_name(method);
-  const int K = static_cast<int>(q.shape(0)), nq = model->nq(), nv = model->nv();
+  const int K = states_of(q), nq = model->nq(), nv = model->nv();
   Timing t;
   {
     py::gil_scoped_release release;
@@ -81,7 +87,7 @@ py::dict time_method(const std::shared_ptr<Multibody>& model, const std::string&
 
 // Forward dynamics of a batch in packs, seconds per state; the number of states is a multiple of a pack's width.
 py::dict time_packs(const std::shared_ptr<Multibody>& model, const Array& q, const Array& v, const Array& u, double seconds, Form form, Precision precision) {
-  const int K = static_cast<int>(q.shape(0)), nq = model->nq(), nv = model->nv();
+  const int K = states_of(q), nq = model->nq(), nv = model->nv();
   const double *Q = q.data(), *V = v.data(), *U = u.data();
   std::vector<double> out(size_t(K) * nv);
   Timing t;
@@ -110,7 +116,7 @@ py::dict time_packs(const std::shared_ptr<Multibody>& model, const Array& q, con
 py::dict time_dynamics(const std::shared_ptr<Multibody>& model, const std::string& call, const Array& q, const Array& v, const Array& u, double seconds) {
   RigidDynamics<double> w(*model);
   Sensitivities<double> s(*model);
-  const int K = static_cast<int>(q.shape(0)), nq = model->nq(), nv = model->nv();
+  const int K = states_of(q), nq = model->nq(), nv = model->nv();
   const size_t square = size_t(nv) * nv;
   std::vector<double> out(std::max(3 * square, size_t(6) * nv));
   int k = 0;

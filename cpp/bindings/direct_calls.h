@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,12 +20,12 @@ class DirectCalls {
   explicit DirectCalls(std::shared_ptr<Multibody> model) : model_(std::move(model)) {}
   const Multibody& model() const { return *model_; }
 
-  // Calls f(workspace, b) for every state of the batch.
+  // Calls f(workspace, b) for the states from, ..., to - 1 of a batch.
   template <class S, class F>
-  void each(int batch, F f) {
+  void each(int from, int to, int states, F f) {
     std::get<Pool<S>>(pools_).with(*model_, [&](Workspace<S>& w) {
-      for (int b = 0; b < batch; ++b) {
-        f(w, b);
+      for (int b = from; b < to; ++b) {
+        naming_state(b, states, [&] { f(w, b); });
         if (b % 256 == 255) check_interrupt();
       }
     });
@@ -89,6 +90,16 @@ inline void check_velocities(const Multibody& m, const Argument& v, int batch, c
   for (int b = 0; b < (v.stride ? batch : 1); ++b) m.check_v(v.array.data() + b * v.stride, m.nv(), what);
 }
 
+inline bool all_finite(const double* x, size_t n) {
+  return std::all_of(x, x + n, [](double y) { return std::isfinite(y); });
+}
+// What left the range of its numbers is no result.
+inline void require_finite(const double* x, size_t n, const Multibody& model) {
+  if (!all_finite(x, n))
+    throw EvaluationError("a result for '" + model.name() +
+                          "' is beyond the range of its numbers: the state, the forces or the masses are too large or too small; take other units, or a wider precision");
+}
+
 // Calls that stop at quad.
 template <template <class> class Workspace, class S>
 inline constexpr bool available_at = true;
@@ -105,7 +116,7 @@ py::array_t<double> run(DirectCalls<Workspace>& d, Precision precision, std::vec
     std::vector<std::vector<S>> wide(in.size());
     std::vector<const S*> at(in.size());
     std::vector<S> result(out_size);
-    d.template each<S>(states, [&](Workspace<S>& w, int b) {
+    d.template each<S>(0, states, states, [&](Workspace<S>& w, int b) {
       for (size_t i = 0; i < in.size(); ++i) {
         const double* from = data[i] + b * in[i].first->stride;
         if constexpr (std::is_same_v<S, double>) {
@@ -121,6 +132,7 @@ py::array_t<double> run(DirectCalls<Workspace>& d, Precision precision, std::vec
         f(w, at.data(), result.data());
         for (int i = 0; i < out_size; ++i) target[size_t(b) * out_size + i] = to_double(result[i]);
       }
+      require_finite(target + size_t(b) * out_size, out_size, d.model());
     });
   };
   const auto widest = [&]<class S>(S s) {

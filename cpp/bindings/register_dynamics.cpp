@@ -44,14 +44,14 @@ void run_forward(Dynamics& d, const Forces& in, const Solving& how, double* out)
   const auto at = [](const Argument& a, int b) { return a.array.data() + b * a.stride; };
   std::vector<S> vdot(nv);
   const auto one_by_one = [&](int from, int to) {
-    d.each<S>(to - from, [&](RigidDynamics<S>& w, int i) {
-      const int b = from + i;
+    d.each<S>(from, to, states, [&](RigidDynamics<S>& w, int b) {
       if constexpr (std::is_same_v<S, double>) {
         w.forward_dynamics(at(in.q, b), at(in.v, b), at(in.tau, b), out + size_t(b) * nv, how);
       } else {
         w.forward_dynamics(at(in.q, b), at(in.v, b), at(in.tau, b), vdot.data(), how);
         for (int j = 0; j < nv; ++j) out[size_t(b) * nv + j] = to_double(vdot[j]);
       }
+      require_finite(out + size_t(b) * nv, nv, d.model());
     });
   };
   int b = 0;
@@ -60,7 +60,9 @@ void run_forward(Dynamics& d, const Forces& in, const Solving& how, double* out)
     if (states >= width && how.form != Form::square_root && how.refinement.steps == 0 && how.on_singular == OnSingular::raise)
       d.packed<S>([&](PackedDynamics<S>& w) {
         for (; b + width <= states; b += width) {
-          if (!w.forward_dynamics(at(in.q, b), in.q.stride, at(in.v, b), in.v.stride, at(in.tau, b), in.tau.stride, out + size_t(b) * nv, how.form))
+          double* to = out + size_t(b) * nv;
+          if (!w.forward_dynamics(at(in.q, b), in.q.stride, at(in.v, b), in.v.stride, at(in.tau, b), in.tau.stride, to, how.form) ||
+              !all_finite(to, size_t(width) * nv))
             one_by_one(b, b + width);
           if (b % 1024 == 0) check_interrupt();
         }
@@ -93,11 +95,12 @@ void register_dynamics(py::module_& m) {
         std::vector<double> corrections;
         at_precision(precision, [&]<class S>(S) {
           std::vector<S> vdot(d.model().nv());
-          d.each<S>(1, [&](RigidDynamics<S>& w, int) {
+          d.each<S>(0, 1, 1, [&](RigidDynamics<S>& w, int) {
             w.forward_dynamics(in.q.array.data(), in.v.array.data(), in.tau.array.data(), vdot.data(), how);
             corrections = w.corrections();
           });
           for (size_t j = 0; j < vdot.size(); ++j) value.mutable_data()[j] = to_double(vdot[j]);
+          require_finite(value.data(), vdot.size(), d.model());
         });
         return py::make_tuple(value, corrections);
       }, py::arg("q"), py::arg("v"), py::arg("tau"), py::arg("form"), py::arg("refine"), py::arg("residual"), py::arg("precision"))
@@ -113,9 +116,11 @@ void register_dynamics(py::module_& m) {
         py::gil_scoped_release release;
         at_precision(precision, [&]<class S>(S) {
           std::vector<S> inverse(size_t(nv) * nv);
-          d.each<S>(a.batch < 0 ? 1 : a.batch, [&](RigidDynamics<S>& w, int b) {
+          const int states = a.batch < 0 ? 1 : a.batch;
+          d.each<S>(0, states, states, [&](RigidDynamics<S>& w, int b) {
             w.mass_matrix_inverse(a.array.data() + b * a.stride, inverse.data(), how);
             for (size_t i = 0; i < inverse.size(); ++i) target[b * inverse.size() + i] = to_double(inverse[i]);
+            require_finite(target + b * inverse.size(), inverse.size(), d.model());
           });
         });
         return result;

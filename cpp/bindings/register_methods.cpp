@@ -51,7 +51,7 @@ void register_methods(py::module_& m) {
       .def("memory", [](Methods& d, const std::string& method, Precision precision) {
         const Method by = method_from_name(method);
         size_t bytes = 0;
-        const auto measure = [&]<class S>(S) { d.template each<S>(1, [&](DynamicsMethods<S>& w, int) { bytes = w.memory(by); }); };
+        const auto measure = [&]<class S>(S) { d.template each<S>(0, 1, 1, [&](DynamicsMethods<S>& w, int) { bytes = w.memory(by); }); };
         at_precision(precision, measure);
         return bytes;
       }, py::arg("method"), precision, "Bytes that a method reads and writes at one evaluation.");

@@ -251,8 +251,12 @@ void register_operators(py::module_& m) {
            "source that runs by itself. See pycraft.algorithm.")
       .def("certify", [](const py::object& self, const py::args& args, const py::kwargs& kwargs) {
         return py::module_::import("pycraft.accuracy.certify").attr("certify_expression")(self, *args, **kwargs);
-      }, "The value with its measured error, condition, where digits are lost and what the next rung costs: see\n"
-         "pycraft.accuracy.certify.certify_expression.")
+      }, "certify(q=None, x=None, *, v=None, form=\"fast\", refine=0, residual=\"same\", precision=\"double\", seed=0, seconds=0.02)\n\n"
+         "The value at one state, the dense form or the product with x, with its measured error, what rounding of q, v and x does,\n"
+         "condition, where digits are lost and what the next rung costs: a pycraft.accuracy.certificate.Certificate. q: (nq,) or a State,\n"
+         "the model's present state where left out; x: (n,) or (n, m); v: (nv,), zero where left out; form, refine, residual and precision\n"
+         "as in at; seed: of the signs by which the data are moved; seconds: spent on each timing. Raises EvaluationError where the\n"
+         "expression is bound already, ModelError for arrays of another shape and for a model without coordinates.")
       .def("blocks", [](const Expression& e, const std::string& order) { return py::module_::import("pycraft.operators").attr("block_view")(e, order); },
            py::arg("order") = "base-to-tip", "A labelled block view of the dense form; order=\"tip-to-base\" shows the book's triangles.")
       .def("plan", [](const Expression& e, const std::string& request, bool rules) {

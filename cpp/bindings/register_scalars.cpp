@@ -48,7 +48,12 @@ void register_scalars(py::module_& m) {
       })
       .def("certify", [](const py::object& self, const py::args& args, const py::kwargs& kwargs) {
         return py::module_::import("pycraft.accuracy.certify").attr("certify_expression")(self, *args, **kwargs);
-      }, "The number with its measured error, where digits are lost and what the next rung costs.")
+      }, "certify(q=None, *, v=None, form=\"fast\", refine=0, residual=\"same\", precision=\"double\", seed=0, seconds=0.02)\n\n"
+         "The number at one state with its measured error, what rounding of q and v does, where digits are lost and what the next rung\n"
+         "costs: a pycraft.accuracy.certificate.Certificate. q: (nq,) or a State, the model's present state where left out; v: (nv,), zero\n"
+         "where left out; form, refine, residual and precision as in at; seed: of the signs by which the data are moved; seconds: spent\n"
+         "on each timing. Raises EvaluationError where it is bound already, ModelError for arrays of another shape and for a model\n"
+         "without coordinates.")
       .def("gradient", [](const Scalar& s, const std::string& over) { return py::module_::import("pycraft.operators").attr("scalar_gradient")(s, over); },
            py::arg("over") = "coordinates",
            "All derivatives at once, as an array: over \"coordinates\" (nv,), or (B, nv) where a batch is bound. Of ln det(HφMφ*H* [+ J]) and\n"

@@ -24,6 +24,7 @@ def stubs() -> str:
         subprocess.run([sys.executable, "-m", "pybind11_stubgen", "pycraft._core", "-o", folder, "--exit-code"], check=True, capture_output=True)
         text = (Path(folder) / "pycraft" / "_core.pyi").read_text()
     # The exceptions live in the core but call themselves pycraft's.
+    text = re.sub(r"[ \t]+$", "", text, flags=re.MULTILINE)
     text = re.sub(r"from pycraft import \w+Error\n|from pycraft import Error\n", "", text)
     text = text.replace("class Space:", ERRORS + "class Space:", 1)
     # Comparison with anything is allowed and false.

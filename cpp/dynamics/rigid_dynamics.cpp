@@ -33,32 +33,41 @@ void RigidDynamics<S>::forward_dynamics(const T* q, const T* v, const T* tau, S*
   convert(tau, n, tau_);
   blocks_.form = how.form;
   S largest = S(0);
-  if (how.on_singular == OnSingular::minimum_norm) {
-    const auto added = with_every_hinge_regular([&] { largest = articulated_body(tree_, *model_, blocks_, velocities_, tau_.data(), vdot, force_, alpha_); });
-    if (!added.empty()) {
-      std::fill_n(vdot, n, S(0));
-      r_.resize(n);
-      newton_euler(*model_, blocks_, velocities_, vdot, r_.data(), alpha_, force_);
-      for (int i = 0; i < n; ++i) r_[i] = tau_[i] - r_[i];
-      articulated_inertia_tip_to_base(tree_, blocks_);
-      project_off_null_space(added, r_.data(), 1);
-      solve(r_.data(), vdot, 1);
-      return project_off_null_space(added, vdot, 1);
+  std::vector<std::pair<int, S>> added;
+  const auto sweep = [&] { largest = articulated_body(tree_, *model_, blocks_, velocities_, tau_.data(), vdot, force_, alpha_); };
+  if (how.on_singular == OnSingular::minimum_norm)
+    added = with_every_hinge_regular(sweep);
+  else
+    sweep();
+  const auto solve_regular = [&](const S* r, S* x) {
+    solve(r, x, 1);
+    project_off_null_space(added, x, 1);
+  };
+  const auto residual_at = [&](const S* x, S* r) {
+    if (how.refinement.wider) {
+      convert(x, n, wide_x_), wide_r_.resize(n);
+      wider_->residual(tau, wide_x_.data(), wide_r_.data());
+      for (int i = 0; i < n; ++i) r[i] = static_cast<S>(wide_r_[i]);
+    } else {
+      residual(tau, x, r);
+      for (const auto& [j, inertia] : added) r[j] += inertia * x[j];
     }
-  } else {
-    largest = articulated_body(tree_, *model_, blocks_, velocities_, tau_.data(), vdot, force_, alpha_);
-  }
+    project_off_null_space(added, r, 1);
+  };
   corrections_.clear();
-  if (how.refinement.steps == 0) return;
-  if (how.refinement.wider) wider(q, v);
-  refine(vdot, n, 1, how.refinement, how.form, largest, [&] { return "the forward dynamics of '" + source_.name() + "'"; },
-         [&](const S* x, S* r) {
-           if (!how.refinement.wider) return residual(tau, x, r);
-           convert(x, n, wide_x_), wide_r_.resize(n);
-           wider_->residual(tau, wide_x_.data(), wide_r_.data());
-           for (int i = 0; i < n; ++i) r[i] = static_cast<S>(wide_r_[i]);
-         },
-         [&](const S* r, S* d) { solve(r, d, 1); }, r_, delta_, corrections_);
+  if (how.refinement.steps != 0 && how.refinement.wider) wider(q, v);
+  if (!added.empty()) {
+    articulated_inertia_tip_to_base(tree_, blocks_);
+    std::fill_n(vdot, n, S(0));
+    r_.resize(n);
+    newton_euler(*model_, blocks_, velocities_, vdot, r_.data(), alpha_, force_);
+    for (int i = 0; i < n; ++i) r_[i] = tau_[i] - r_[i];
+    project_off_null_space(added, r_.data(), 1);
+    solve_regular(r_.data(), vdot);
+  }
+  if (how.refinement.steps != 0)
+    refine(vdot, n, 1, how.refinement, how.form, largest, [&] { return "the forward dynamics of '" + source_.name() + "'"; }, residual_at, solve_regular,
+           r_, delta_, corrections_);
 }
 
 template <class S>
@@ -131,22 +140,30 @@ void RigidDynamics<S>::mass_matrix_inverse(const double* q, S* out, const Solvin
   solve(columns_.data(), out, N);
   project_off_null_space(added, out, N);
   corrections_.clear();
-  if (how.refinement.steps != 0 && added.empty()) {
+  if (how.refinement.steps != 0) {
     if (how.refinement.wider) {
       std::vector<double> rest(N, 0.0);
       wider(q, rest.data());
     }
     refine(out, N, N, how.refinement, how.form, S(0), [&] { return "the mass matrix inverse of '" + source_.name() + "'"; },
            [&](const S* x, S* r) {
-             if (!how.refinement.wider) {
+             if (how.refinement.wider) {
+               convert(x, size, wide_x_), convert(columns_.data(), size, wide_r_);
+               wider_->subtract_product(wide_x_.data(), wide_r_.data(), N);
+               for (size_t i = 0; i < size; ++i) r[i] = static_cast<S>(wide_r_[i]);
+             } else {
                std::copy_n(columns_.data(), size, r);
-               return subtract_product(x, r, N);
+               subtract_product(x, r, N);
+               for (const auto& [j, inertia] : added)
+                 for (int c = 0; c < N; ++c) r[size_t(j) * N + c] += inertia * x[size_t(j) * N + c];
              }
-             convert(x, size, wide_x_), convert(columns_.data(), size, wide_r_);
-             wider_->subtract_product(wide_x_.data(), wide_r_.data(), N);
-             for (size_t i = 0; i < size; ++i) r[i] = static_cast<S>(wide_r_[i]);
+             project_off_null_space(added, r, N);
            },
-           [&](const S* r, S* d) { solve(r, d, N); }, r_, delta_, corrections_);
+           [&](const S* r, S* d) {
+             solve(r, d, N);
+             project_off_null_space(added, d, N);
+           },
+           r_, delta_, corrections_);
   }
   // Symmetric by meaning; the two triangles differ by rounding and the mean is the better of them.
   for (int i = 0; i < N; ++i)

@@ -4,6 +4,10 @@
 //   (c × e; e) of weight m,   (l; 0) of weight d,   I_c = Σ d l l*
 #pragma once
 
+#include <algorithm>
+#include <limits>
+#include <type_traits>
+
 #include "algebra/sweeps/factored_inertia.h"
 #include "spatial/pose.h"
 #include "spatial/symmetric3.h"
@@ -15,25 +19,36 @@ struct InertiaFactors {
   Vector6<S> column[6];
   S weight[6];
   Vector3<S> com;
-  int pivot[3];  // row of the unit entry of each column of I_c
+  int pivot[3];        // row of the unit entry of each column of I_c
+  S uncertain = S(0);  // moment about the centre that was taken for rounding
 };
 
+// The moments about the centre are factored in quad precision, or in S where that is wider: what is left of a small one is right to the
+// digits of S. One that may be no more than the rounding of the doubles given counts as zero, and as uncertain; so does a negative one
+// that the model let pass.
 template <class S>
-inline InertiaFactors<S> inertia_factors(const S& mass, const Vector3<S>& com, const Symmetric3<S>& about_com) {
+inline InertiaFactors<S> inertia_factors(double mass, const Vector3<double>& com, const Symmetric3<double>& about_com) {
+  using Exact = std::conditional_t<(std::numeric_limits<S>::digits < std::numeric_limits<Quad>::digits), Quad, S>;
   InertiaFactors<S> f;
-  f.com = com;
+  f.com = {S(com[0]), S(com[1]), S(com[2])};
   for (int i = 0; i < 3; ++i) {
     Vector3<S> e = Vector3<S>::zero();
     e[i] = S(1);
-    f.column[i] = {cross(com, e), e};
-    f.weight[i] = mass;
+    f.column[i] = {cross(f.com, e), e};
+    f.weight[i] = S(mass);
   }
-  const Matrix3<S> I = full(about_com);
-  S U[9], work[9];
-  semidefinite_factors(I.m, 3, U, f.weight + 3, work);
+  Exact I[9], U[9], w[3], work[9];
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) I[3 * i + j] = Exact(about_com(i, j));
+  const Exact rounding = Exact(2) * Exact(std::min(to_double(epsilon<S>()), epsilon<double>()));
+  semidefinite_factors(I, 3, rounding, U, w, work);
+  Exact left = Exact(0);  // no entry of what is left exceeds its largest diagonal entry by much
+  for (const Exact& x : work) left = maximum(left, Exact(x < Exact(0) ? Exact(-x) : x));
+  f.uncertain = static_cast<S>(Exact(3) * left);
   for (int r = 0; r < 3; ++r) {
-    f.column[3 + r] = {{U[3 * r], U[3 * r + 1], U[3 * r + 2]}, Vector3<S>::zero()};
-    f.pivot[r] = U[3 * r] == S(1) ? 0 : U[3 * r + 1] == S(1) ? 1 : 2;
+    f.weight[3 + r] = static_cast<S>(w[r]);
+    f.column[3 + r] = {{static_cast<S>(U[3 * r]), static_cast<S>(U[3 * r + 1]), static_cast<S>(U[3 * r + 2])}, Vector3<S>::zero()};
+    f.pivot[r] = U[3 * r] == Exact(1) ? 0 : U[3 * r + 1] == Exact(1) ? 1 : 2;
   }
   return f;
 }

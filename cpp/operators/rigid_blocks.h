@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <vector>
 
@@ -44,7 +45,8 @@ class RigidBlocks {
     J.resize(N);
     pivots_.resize(N);
     aligned.assign(N, -1);
-    mass_.resize(n), rotational_.resize(n), reach_.resize(n);
+    mass_.resize(n), rotational_.resize(n), reach_.resize(n), error_.resize(n), growth_.resize(n);
+    for (int dof : tree.dof) pivot_work_.resize(std::max(pivot_work_.size(), 3 * size_t(dof)));
     size_t d = 0;
     for (size_t k = 0; k < n; ++k) {
       d_.push_back(d);
@@ -221,8 +223,9 @@ class RigidBlocks {
       factors_->start(k, (*inertia_factors)[k]);
     }
     mass_[k] = inertia[k].mass;
-    rotational_[k] = inertia[k].rotational.s[0] + inertia[k].rotational.s[3] + inertia[k].rotational.s[5];
+    rotational_[k] = inertia[k].rotational.s[0] + inertia[k].rotational.s[3] + inertia[k].rotational.s[5] + uncertain(k);
     reach_[k] = S(0);
+    error_[k] = S(0), growth_[k] = S(1);
   }
   // D, G, P⁺ of body k; doubtful where a pivot is so small that only the error sweep can tell whether it is noise.
   Pivots eliminate_hinge(int k) {
@@ -249,22 +252,24 @@ class RigidBlocks {
     mass_[p] += mass_[k];
     rotational_[p] += rotational_[k];
     reach_[p] = maximum(reach_[p], S(reach_[k] + abs(l[0]) + abs(l[1]) + abs(l[2])));
+    error_[p] = maximum(error_[p], error_[k]), growth_[p] = maximum(growth_[p], growth_[k]);
   }
   RigidFactors<S>& factors() { return *factors_; }
   // ---------------------------------------------------------------- error bound
   void start_error(int k) {
     X_.resize(tree_.bodies());
-    X_[k] = articulated_inertia(inertia[k]);
+    X_[k] = diagonal_part(P[k]);
+    for (int i = 0; i < 3; ++i) X_[k].A(i, i) += uncertain(k);
   }
   void check_pivots(int k) {
-    pivot_work_.resize(std::max(pivot_work_.size(), 2 * size_t(tree_.dof[k])));
     for (int j = first(k); j < last(k); ++j) pivot_work_[j - first(k)] = dot(H[j], X_[k] * H[j]) + J[j];
     require_pivots(tree_, k, L.data() + d_[k], pivots_.data() + first(k), pivot_work_.data(), form);
   }
   void error_to_parent(int k) {
     ArticulatedInertia<S> plus = projected(X_[k], H, G, k);  // τ̄Xτ̄*
-    // Entries of P round at sqrt(P(i,i) P(j,j)), whatever cancels when it moves on: the diagonal, not P.
-    for (int i = 0; i < 3; ++i) plus.A(i, i) += P[k].A(i, i), plus.C(i, i) += P[k].C(i, i);
+    const ArticulatedInertia<S> own = diagonal_part(P[k]);
+    for (int j = first(k); j < last(k); ++j) add_symmetric_product(plus, (S(0.5) * (dot(H[j], own * H[j]) + J[j])) * G[j], G[j]);
+    pycraft::add(plus, own);
     pycraft::add(X_[tree_.parent[k]], to_parent(pose[k], plus));
   }
 
@@ -339,19 +344,42 @@ class RigidBlocks {
       if (aligned[j] >= 0 && no_hinge_diagonal(k)) annihilate(Pplus[k], aligned[j]);
     return true;
   }
-  // Whether a cheap bound on the error sweep's X leaves a pivot in doubt. Of several coordinates a pivot inherits the errors of those
-  // before it, in the worst case over their own square roots.
-  bool doubtful(int k) const {
-    using std::sqrt;
+  // Whether a pivot may be noise, so that the error sweep must tell. Two things make noise: what a hinge carries rounds at its composite
+  // inertia, not at the pivot, and light pivots y² » D enlarge what was there. The first is added up, the second multiplied, from the
+  // tips; of ratios y²/D only what exceeds 16 counts, or long chains of oblique axes would all be in doubt. Up to the fifth root of
+  // the rounding bound's inverse no product is; a machine of coordinate axes has y² = D, and pays for the first alone.
+  bool doubtful(int k) {
     const int n = tree_.dof[k], f = first(k);
-    const S noise = S(tree_.bodies()) * rounding_bound<S>(form), doubt = n == 1 ? noise : S(n * sqrt(noise));
+    if (n == 0) return false;
+    S *own = pivot_work_.data(), *carried = own + n, *w = carried + n;
     const S inertia_bound = S(4) * (rotational_[k] + mass_[k] * reach_[k] * reach_[k]);
-    bool doubtful = false;
-    for (int j = f; j < f + n; ++j) {
-      const Vector6<S>& h = H[j];
-      doubtful |= !(pivots_[j] > doubt * (dot(h.angular, h.angular) * inertia_bound + S(2) * dot(h.linear, h.linear) * mass_[k] + J[j]));
+    for (int i = 0; i < n; ++i) {
+      const Vector6<S>& h = H[f + i];
+      carried[i] = dot(h.angular, h.angular) * inertia_bound + S(2) * dot(h.linear, h.linear) * mass_[k] + J[f + i];
+      own[i] = aligned[f + i] >= 0 ? D[d_[k] + i * n + i] : S(own_rounding(k, h) + J[f + i]);
     }
-    return doubtful;
+    S fresh = S(0), grown = S(1);
+    for (int j = 0; j < n; ++j) {
+      const S inverse = S(1) / pivots_[f + j];
+      fresh = maximum(fresh, S(inverse * pivot_reach(L.data() + d_[k], n, j, carried, w)));
+      grown = maximum(grown, S(inverse * pivot_reach(L.data() + d_[k], n, j, own, w)));
+    }
+    error_[k] += rounding_bound<S>(form) * fresh;
+    growth_[k] *= maximum(S(1), S(grown / S(16)));
+    return !(largest_growth(form) > growth_[k] && S(1) > S(tree_.bodies()) * error_[k] * growth_[k]);
+  }
+  // In units of the rounding bound: what factors of the body's inertia leave out. The plain form rounds at more than that.
+  S uncertain(int k) const { return form == Form::fast ? S(0) : S((*inertia_factors)[k].uncertain / rounding_bound<S>(form)); }
+  static S largest_growth(Form form) {
+    static const S growth[] = {of_fifth_root(Form::fast), of_fifth_root(Form::ud), of_fifth_root(Form::square_root)};
+    return growth[static_cast<int>(form)];
+  }
+  static S of_fifth_root(Form form) { return S(std::pow(double(to_double(rounding_bound<S>(form))), -0.2)); }
+  // Σ h(i)² P(i,i)
+  S own_rounding(int k, const Vector6<S>& h) const {
+    S sum = S(0);
+    for (int i = 0; i < 6; ++i) sum += h[i] * h[i] * (form == Form::fast ? P[k](i, i) : factors_->diagonal(i));
+    return sum;
   }
   bool no_hinge_diagonal(int k) const {
     for (int j = first(k); j < last(k); ++j)
@@ -382,7 +410,7 @@ class RigidBlocks {
 
   const SkoStructure& tree_;
   std::vector<size_t> d_;
-  std::vector<S> pivots_, pivot_work_, mass_, rotational_, reach_;
+  std::vector<S> pivots_, pivot_work_, mass_, rotational_, reach_, error_, growth_;  // error, growth: of what a body carries
   std::vector<Vector6<S>> W;
   std::vector<ArticulatedInertia<S>> X_;
   std::unique_ptr<RigidFactors<S>> factors_;

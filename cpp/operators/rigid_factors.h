@@ -1,6 +1,7 @@
 // The factored forms of the articulated-inertia sweep on rigid bodies: algebra/sweeps/factored_inertia.h with columns of six.
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "algebra/sweeps/factored_inertia.h"
@@ -32,11 +33,15 @@ class RigidFactors {
   ArticulatedInertia<S> inertia(int k) const {
     return symmetric([&](int i, int j) { return factors_.inertia(k, i, j); });
   }
+  // Entry (i, i) of P(k), of the body whose hinge was eliminated last and has a row that is no coordinate axis.
+  const S& diagonal(int i) const { return diagonal_[i]; }
   // G, D, its Cholesky factor L and pivots, and with bias the rates that C W ρ* gives the hinge; nv_of(k) of each. False, with L and pivots
   // alone, where a pivot is not positive.
   bool eliminate(int k, Form form, const Vector6<S>* H, const S* J, const int* aligned, bool with_bias, Vector6<S>* G, S* D, S* L, S* pivots) {
     using std::sqrt;
     const int n = tree_.dof[k], m = factors_.columns(k);
+    if (std::any_of(aligned, aligned + n, [](int axis) { return axis < 0; }))
+      for (int i = 0; i < 6; ++i) diagonal_[i] = factors_.inertia(k, i, i);
     bool rotor = false;
     for (int j = 0; j < n; ++j) rotor |= !(J[j] == S(0));
     int is_hinge_row[6] = {0, 0, 0, 0, 0, 0};
@@ -115,6 +120,7 @@ class RigidFactors {
   const SkoStructure& tree_;
   FactoredInertia<S> factors_;
   std::vector<S> bias_;
+  S diagonal_[6];
 };
 
 }  // namespace pycraft

@@ -30,6 +30,12 @@ inline Vector6<S> operator*(const ArticulatedInertia<S>& P, const Vector6<S>& V)
   return {P.A * V.angular + P.B * V.linear, transpose_times(P.B, V.angular) + P.C * V.linear};
 }
 template <class S>
+inline ArticulatedInertia<S> diagonal_part(const ArticulatedInertia<S>& P) {
+  ArticulatedInertia<S> Q = ArticulatedInertia<S>::zero();
+  for (int i = 0; i < 3; ++i) Q.A(i, i) = P.A(i, i), Q.C(i, i) = P.C(i, i);
+  return Q;
+}
+template <class S>
 inline void add(ArticulatedInertia<S>& P, const ArticulatedInertia<S>& Q) {
   for (int i = 0; i < 6; ++i) P.A.s[i] += Q.A.s[i], P.C.s[i] += Q.C.s[i];
   for (int i = 0; i < 9; ++i) P.B.m[i] += Q.B.m[i];

@@ -215,6 +215,15 @@ def _top_cases() -> list[Case]:
             (at_most(methods, "worst", "5e-12", 5e-12),),
             TOP,
         ),
+        _case(
+            "heavy top: drift of the angular momentum about the vertical over 1 s",
+            hard,
+            "relative drift",
+            "conserved",
+            partial(_top, 3),
+            (at_most(methods, "worst", "5e-12", 5e-12),),
+            TOP,
+        ),
     ]
 
 
@@ -224,13 +233,19 @@ def _top(which: int, seeds: Iterable[int], steps: int) -> dict[str, np.ndarray]:
     for integrator in ("rkmk4", *ADAPTIVE):
         q, v = _top_motion(integrator)
         energy = model.kinetic_energy(q, v) + model.potential_energy(q)
+        upward = np.array([_turned(at, ABOUT_ITS_POINT * rate)[2] for at, rate in zip(q, v, strict=True)])
         errors = (
             np.abs(_turned(q[-1], np.array([0.0, 1.0, 0.0])) - PLACE).max(),
             abs(energy[0] / ENERGY - 1),
             np.abs(energy / energy[0] - 1).max(),
+            np.abs(upward / upward[0] - 1).max(),
         )
         out[integrator] = np.array([errors[which]])
     return out
+
+
+ABOUT_ITS_POINT = np.array([15.234375, 0.46875, 15.234375])
+"""Principal moments of the heavy top about its fixed point, kg m²."""
 
 
 def _heavy_top() -> Multibody:

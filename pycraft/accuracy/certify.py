@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
 
-import mpmath
 import numpy as np
 
 from .. import _core
-from ..identities.bounds import uses_riccati
-from .certificate import Certificate, HingeLoss, NextRung
-from .exact import BITS, EXACT, dynamics_error, exact_dynamics, relative_error
+from .certificate import Certificate, NextRung, counted, rounding_level
+from .exact import EXACT, dynamics_error, exact_dynamics, relative_error
 from .floor import refinement_floor
+from .inputs import Data, applied_to, check, check_coordinates, input_errors, vector
+from .locator import condition_estimate, hinge_losses, runs_articulated_sweep
 from .rungs import Rung, above, epsilon, precision_name, reference_of
+from .tidy import error_text
 from .timing import time_forward_dynamics
 
-DRAWS = 4
-"""Draws of signs for the error that rounded coordinates make; the largest counts."""
+STEP_UP = 2.0
+"""A rung is a step up where its error is smaller by this factor."""
 
 
 def certify_dynamics(
@@ -33,6 +35,8 @@ def certify_dynamics(
     precision: Any = "double",
     seed: int = 0,
     seconds: float = 0.02,
+    method: str = "articulated",
+    on_singular: str = "raise",
 ) -> Certificate:
     """Forward dynamics at one state, certified: see `Certificate` for what is measured.
 
@@ -41,12 +45,25 @@ def certify_dynamics(
     q : (nq,) or a State, whose v is taken then
     v, tau : (nv,), zero where left out
     form, refine, residual, precision : as in `forward_dynamics`
-    seed : of the signs by which coordinates are moved
+    seed : of the signs by which q, v and tau are moved, 0 or above
     seconds : spent on each timing
+    method, on_singular : no other than these; certificates are of the articulated method, and of what it answers
 
-    Cost: a few evaluations in quad precision, O(N); the floor, up to 400 coordinates, O(N²).
+    Returns
+    -------
+    Certificate
+        Its value is the accelerations (nv,).
 
-    Raises what `forward_dynamics` raises: there is no certificate of a value that is refused.
+    Cost: a dozen evaluations in quad precision, O(N); the floor, up to 400 coordinates, O(N²).
+
+    Raises
+    ------
+    ModelError
+        An array of another shape; a model without coordinates.
+    EvaluationError
+        A form, precision or seed that is not there; another method.
+    ArithmeticError
+        What `forward_dynamics` raises: there is no certificate of a value that is refused.
 
     Examples
     --------
@@ -57,31 +74,41 @@ def certify_dynamics(
     >>> certificate.error < 1e-12, certificate.reference
     (True, 'quad')
     """
+    check(seed, method=method, on_singular=on_singular)
+    check_coordinates(model)
     if v is None and hasattr(q, "v"):
         v = q.v
-    q = _one_state(model, getattr(q, "q", q))
-    v, tau = (np.zeros(model.nv) if x is None else np.asarray(x, float) for x in (v, tau))
+    data = {"q": vector(model, "q", getattr(q, "q", q), model.nq)}
+    for name, value in (("v", v), ("tau", tau)):
+        data[name] = np.zeros(model.nv) if value is None else vector(model, name, value, model.nv)
+    q, v, tau = data.values()
     rung = Rung(form, refine, residual, precision)
+    steps = above(rung)
     returned = model.forward_dynamics(q, v, tau, **rung.options)
-
-    def exact(at: np.ndarray, precision: Any) -> Any:
-        return exact_dynamics(model, at, v, tau, precision)
 
     def error(step: Rung, truth: Any) -> float:
         value = returned if step == rung else model.forward_dynamics(q, v, tau, **step.options)
         return dynamics_error(model, q, v, tau, step, value, truth)
 
-    def time(step: Rung) -> float:
-        return time_forward_dynamics(model, q, v, tau, seconds, **step.options)["minimum"]
-
+    notes = {name: f"{name} is zero, and exact" for name, value in (("v", v), ("tau", tau)) if not value.any()}
     soa = model.soa
     H, phi, M, J = soa("H phi M J")
-    notes: dict[str, str] = {}
-    floor = _noted(notes, "floor", lambda: refinement_floor(model, q, v, returned, rung))
-    return _certificate(
-        f"forward dynamics of {model.name}, {model.nv} degrees of freedom", returned, rung, exact, error, time, (model, q, seed),
-        (H @ phi @ M @ phi.T @ H.T + J, "ℳ + J"), [soa._source], (q, v), floor, notes, above(rung),
-    )  # fmt: skip
+    return _certificate(_Measured(
+        what=f"forward dynamics of {model.name}, {counted(model.nv, 'degree of freedom', 'degrees of freedom')}",
+        value=returned,
+        rung=rung,
+        steps=steps,
+        data=data,
+        seed=seed,
+        exact=lambda at, wide: exact_dynamics(model, at["q"], at["v"], at["tau"], wide),
+        error=error,
+        time=lambda step: time_forward_dynamics(model, q, v, tau, seconds, **step.options)["minimum"],
+        state=(q, v),
+        square=(H @ phi @ M @ phi.T @ H.T + J, "ℳ + J"),
+        sources=[soa._source],
+        floor=lambda: refinement_floor(model, q, v, returned, rung),
+        notes=notes,
+    ))  # fmt: skip
 
 
 def certify_expression(
@@ -96,6 +123,8 @@ def certify_expression(
     precision: Any = "double",
     seed: int = 0,
     seconds: float = 0.02,
+    method: str = "articulated",
+    on_singular: str = "raise",
 ) -> Certificate:
     """An expression's value at one state, certified: of an operator the dense form, or its product with x; of a scalar the number.
 
@@ -105,9 +134,22 @@ def certify_expression(
     q : (nq,) or a State; the model's present state where left out
     x : (n,) or (n, m), what the operator is applied to; its dense form where left out
     v : (nv,), zero where left out
-    form, refine, residual, precision, seed, seconds : as in `certify_dynamics`
+    form, refine, residual, precision : as in `expr.at`
+    seed : of the signs by which q, v and x are moved, 0 or above
+    seconds : spent on each timing
+    method, on_singular : no other than these; certificates are of the articulated method, and of what it answers
 
-    A scalar, and x @ in a precision of double or below, is measured as it is returned, rounded to double.
+    A scalar, and x @ in a precision of double or below, is measured as it is returned, rounded to double. Where the plan has no
+    articulated sweep there is no locator, and the form says nothing.
+
+    Raises
+    ------
+    ModelError
+        An array of another shape; a model without coordinates.
+    EvaluationError
+        An expression that is bound already; a form, precision or seed that is not there; another method; x beside a scalar.
+    ArithmeticError
+        What the evaluation raises.
 
     Examples
     --------
@@ -119,175 +161,164 @@ def certify_expression(
     >>> certify_expression(MM.logdet(), arm.random_state(0)).error < 1e-13
     True
     """
-    operands = expr.operands() if isinstance(expr, _core.Scalar) else [expr]
+    check(seed, method=method, on_singular=on_singular)
+    scalar = isinstance(expr, _core.Scalar)
+    operands = expr.operands() if scalar else [expr]
     if any(_bound(operand) for operand in operands):
         raise _core.EvaluationError(f"{expr.text()} is bound to a state already; certify the expression itself: expr.certify(q)")
-    if x is not None and isinstance(expr, _core.Scalar):
+    if x is not None and scalar:
         raise _core.EvaluationError(f"{expr.text()} is a number: there is nothing to apply to x")
-    if v is None and hasattr(q, "v"):
-        v = q.v
     sources = list({id(s): s for operand in operands for s in operand.sources}.values())
     models = [s.model for s in sources if isinstance(s, _core.MultibodyOperators)]
-    if q is None and models:
-        q, v = np.array(models[0].q), np.array(models[0].v) if v is None else v
-    elif models:
-        q = _one_state(models[0], getattr(q, "q", q))
-    rung = Rung(form, refine, residual, precision)
-    whole = expr
+    for model in models:
+        check_coordinates(model)
+    if any(0 in operand.shape for operand in operands):
+        raise _core.EvaluationError(f"{expr.text()} has no entries: nothing to certify")
+    data: Data = {}
+    if v is None and hasattr(q, "v"):
+        v = q.v
+    if models:
+        if q is None:
+            q, v = np.array(models[0].q), np.array(models[0].v) if v is None else v
+        q = vector(models[0], "q", getattr(q, "q", q), models[0].nq)
+        v = None if v is None else vector(models[0], "v", v, models[0].nv)
+        if len(models) == 1:
+            data = {"q": q} if v is None else {"q": q, "v": v}
     if x is not None:
-        columns = np.asarray(x, float).reshape(len(x), -1)
-        whole = expr @ _core.constant(columns, _core.euclidean(columns.shape[1]), expr.domain, "x")
+        data["x"] = applied_to(expr, x)
+    rung = Rung(form, refine, residual, precision)
+    articulated = runs_articulated_sweep(expr, "dense" if x is None else "apply")
+    steps = _steps(rung, articulated, any(_has_inverse(operand) for operand in operands))
 
-    def bind(what: Any, at: Any, step: Rung) -> Any:
-        return what.at(at, v, **step.binding)
-
-    def in_full(at: Any, step: Rung) -> Any:
+    def in_full(at: Data, step: Rung) -> Any:
         """The value before it is rounded to double, where there is more of it."""
-        bound = bind(whole, at, step)
-        if isinstance(expr, _core.Scalar):
-            return float(bound)
-        return bound.dense(dtype=object)
+        whole = expr
+        if x is not None:
+            columns = at["x"].reshape(len(at["x"]), -1)
+            whole = expr @ _core.constant(columns, _core.euclidean(columns.shape[1]), expr.domain, "x")
+        bound = whole.at(at.get("q", q), at.get("v", v), **step.binding)
+        return float(bound) if scalar else bound.dense(dtype=object)
 
     def as_returned(step: Rung) -> Any:
-        if isinstance(expr, _core.Scalar):
-            return float(bind(expr, q, step))
-        return bind(expr, q, step).dense() if x is None else bind(expr, q, step) @ np.asarray(x, float)
+        bound = expr.at(q, v, **step.binding)
+        if scalar:
+            return float(bound)
+        return bound.dense() if x is None else bound @ data["x"]
 
-    def error(step: Rung, truth: Any) -> float:
-        return relative_error(in_full(q, step), truth)
-
-    def time(step: Rung) -> float:
-        return _seconds(lambda: as_returned(step), seconds)
-
-    square = operands[0] if len(operands) == 1 and operands[0].domain == operands[0].codomain else None
     notes = {"floor": "is there for forward dynamics"}
-    steps = above(rung) if any(_has_inverse(o) for o in operands) else [s for s in above(rung) if not s.refine]
-    articulated = uses_riccati(expr) or any(_has_inverse(o) for o in operands) or (isinstance(expr, _core.Scalar) and square is not None)
-    return _certificate(
-        expr.text(), as_returned(rung), rung, lambda at, wide: in_full(at, Rung(EXACT, precision=wide)), error, time,
-        (models[0], q, seed) if len(models) == 1 else None, (square, square.text()) if square is not None else None,
-        sources if articulated else [], (q, v), None, notes, steps,
-    )  # fmt: skip
+    notes |= {name: f"{name} is zero, and exact" for name in ("v", "x") if name in data and not data[name].any()}
+    if "q" not in data:
+        notes["input_error"] = "q is moved where it has the coordinates of one model"
+    if not articulated:
+        notes["locator"] = "the plan has no articulated sweep: no D(k) is used, and no form matters"
+    square = operands[0] if len(operands) == 1 and operands[0].domain == operands[0].codomain else None
+    return _certificate(_Measured(
+        what=expr.text(),
+        value=as_returned(rung),
+        rung=rung,
+        steps=steps,
+        data=data,
+        seed=seed,
+        exact=lambda at, wide: in_full(at, Rung(EXACT, precision=wide)),
+        error=lambda step, truth: relative_error(in_full(data, step), truth),
+        time=lambda step: _seconds(lambda: as_returned(step), seconds),
+        state=(q, v),
+        square=None if square is None else (square, square.text()),
+        sources=sources if articulated else [],
+        floor=None,
+        notes=notes,
+    ))  # fmt: skip
 
 
 # ---------------------------------------------------------------------- the parts of a certificate
-def _certificate(
-    what: str, returned: Any, rung: Rung, exact: Callable[[Any, Any], Any], error: Callable[[Rung, Any], float],
-    time: Callable[[Rung], float], moved: tuple[Any, np.ndarray, int] | None, square: tuple[_core.Operator, str] | None,
-    sources: list[_core.SkoSource], state: tuple[Any, Any], floor: float | None, notes: dict[str, str], steps: list[Rung],
-) -> Certificate:  # fmt: skip
-    reference = reference_of(rung.precision)
+@dataclass(frozen=True)
+class _Measured:
+    """What a certificate is made of: a value, and how to have it in another precision, of other data or in another way."""
+
+    what: str
+    value: Any
+    rung: Rung
+    steps: list[Rung]
+    data: Data
+    seed: int
+    exact: Callable[[Data, Any], Any]
+    """The value of data in a wider precision."""
+    error: Callable[[Rung, Any], float]
+    """The error of a way of computing, against the exact value."""
+    time: Callable[[Rung], float]
+    state: tuple[Any, Any]
+    square: tuple[_core.Operator, str] | None
+    """The operator whose condition is told, and its name."""
+    sources: list[_core.SkoSource]
+    """The trees whose D(k) are used."""
+    floor: Callable[[], float] | None
+    notes: dict[str, str]
+
+
+def _certificate(m: _Measured) -> Certificate:
+    reference = reference_of(m.rung.precision)
     if reference is None:
-        raise _core.EvaluationError(f"nothing is wider than {precision_name(rung.precision)} to measure its error against")
-    truth = exact(state[0], reference)
-    locator = [loss for source in sources for loss in hinge_losses(source, *state, rung, reference)]
-    if square is None:
-        notes["condition"] = "is there for square operators"
-        condition = None
+        raise _core.EvaluationError(f"nothing is wider than {precision_name(m.rung.precision)} to measure its error against")
+    truth = m.exact(m.data, reference)
+    error = m.error(m.rung, truth)
+    locator = [loss for source in m.sources for loss in hinge_losses(source, *m.state, m.rung, reference)]
+    condition = None
+    if m.square is None:
+        m.notes["condition"] = "is there for square operators"
     else:
-        condition = _noted(notes, "condition", lambda: condition_estimate(square[0].at(*state, form=EXACT, precision=reference)))
-    if moved is None:
-        notes["input_error"] = "is there for the coordinates of one model"
+        bound = m.square[0].at(*m.state, form=EXACT, precision=reference)
+        condition = _noted(m.notes, "condition", lambda: condition_estimate(bound))
     return Certificate(
-        what=what,
-        rung=rung,
-        value=returned,
-        error=error(rung, truth),
+        what=m.what,
+        rung=m.rung,
+        value=m.value,
+        error=error,
         reference=precision_name(reference),
         condition=condition,
-        condition_of=square[1] if square else "",
-        input_error=None if moved is None else _input_error(*moved, truth, lambda at: exact(at, reference)),
-        floor=floor,
+        condition_of=m.square[1] if m.square else "",
+        input_errors=input_errors(m.data, m.seed, truth, lambda at: m.exact(at, reference)),
+        floor=None if m.floor is None else _noted(m.notes, "floor", m.floor),
         locator=sorted(locator, key=lambda loss: -loss.error),
-        next_rung=_next(rung, steps, error, time, truth, exact, state[0]),
-        notes=notes,
+        next_rung=_next(m, error, truth),
+        notes=m.notes,
     )
 
 
-def _next(rung: Rung, steps: list[Rung], error: Callable, time: Callable, truth: Any, exact: Callable, q: Any) -> NextRung | None:
-    """The next rung that answers, measured; rungs that refuse on the way are told."""
-    refused = {}
-    for step in steps:
+def _next(m: _Measured, error: float, truth: Any) -> NextRung | None:
+    """The next rung that is a step up, measured; rungs that refuse on the way, or are no better, are told. None with a note."""
+    if error <= rounding_level(m.rung.precision):
+        m.notes["next_rung"] = "none is needed: the value is right to rounding"
+        return None
+    refused: dict[str, str] = {}
+    passed: dict[str, float] = {}
+    truths = {reference_of(m.rung.precision): truth}
+    for step in m.steps:
         reference = reference_of(step.precision)
         if reference is None:
             break
         try:
-            found = error(step, truth if reference == reference_of(rung.precision) else exact(q, reference))
+            if reference not in truths:
+                truths[reference] = m.exact(m.data, reference)
+            found = m.error(step, truths[reference])
         except (ArithmeticError, _core.Error) as reason:
             refused[step.label] = str(reason)
             continue
-        return NextRung(step, found, precision_name(reference), time(step) / time(rung), refused)
+        if STEP_UP * found <= error:
+            return NextRung(step, found, precision_name(reference), m.time(step) / m.time(m.rung), refused, passed)
+        passed[step.label] = found
+    tried = [f"{label} {error_text(found)}" for label, found in passed.items()] + [f"{label} refuses" for label in refused]
+    m.notes["next_rung"] = "none above halves the error" + (f": {', '.join(tried)}" if tried else "")
     return None
 
 
-def _input_error(model: Any, q: np.ndarray, seed: int, truth: Any, exact: Callable[[np.ndarray], Any]) -> float:
-    """The value's relative change when every coordinate moves by half a unit in its last place.
-
-    Half a unit is no double: coordinates move by a whole one, and the change, small against the value, is halved.
-    """
-    rng = np.random.default_rng(seed)
-    signs = rng.choice([-1.0, 1.0], (DRAWS, q.size))
-    return max(relative_error(exact(np.nextafter(q, np.copysign(np.inf, s))), truth) for s in signs) / 2
-
-
-def condition_estimate(operator: _core.Operator) -> float:
-    """1-norm condition number of a square operator, estimated from products and solves, none of them dense.
-
-    SciPy's block 1-norm estimator (Higham and Tisseur 2000): a lower bound that is rarely off by more than a small factor.
-    """
-    from scipy.sparse.linalg import onenormest
-
-    from ..interop.scipy import to_scipy
-
-    columns = min(4, operator.shape[0])
-    return float(onenormest(to_scipy(operator), t=columns) * onenormest(to_scipy(operator.inv()), t=columns))
-
-
-def hinge_losses(source: _core.SkoSource, q: Any, v: Any, rung: Rung, reference: Any) -> Iterator[HingeLoss]:
-    """Relative error of each D(k), in the form and precision used, against the wider one: a locator of lost digits, and no proof.
-
-    The error of D(k) is ‖L⁻¹δD L⁻*‖₂ with D = LL*: of a hinge of several coordinates in different units, too. What a wrong D(k) does
-    to the result depends on the rest of the model; and digits may be lost in the other sweeps as well.
-    """
-    D = source.symbol("D")
-    sizes = [n for n in source.dof if n]
-    names = [name for name, n in zip(getattr(source, "hinge_names", source.body_names), source.dof, strict=True) if n]
-    if not sizes:
-        return
-    width = max(sizes)
-    ones = np.vstack([np.eye(n, width) for n in sizes])  # one column for all the first coordinates of hinges, one for all the second
-    columns = D @ _core.constant(ones, _core.euclidean(width), D.domain, "1")
-    used = columns.at(q, v, form=rung.form, precision=rung.precision).dense(dtype=object)
-    exact = columns.at(q, v, form=EXACT, precision=reference).dense(dtype=object)
-    start = 0
-    for name, n in zip(names, sizes, strict=True):
-        block = slice(start, start + n)
-        error = _block_error(used[block, :n], exact[block, :n])
-        yield HingeLoss(name, error, max(0.0, float(np.log10(error / (epsilon(rung.precision) / 2)))) if error else 0.0)
-        start += n
-
-
-def _block_error(used: np.ndarray, exact: np.ndarray) -> float:
-    with mpmath.workprec(BITS):
-        off, size = mpmath.matrix((used - exact).tolist()), mpmath.matrix(exact.tolist())
-        if exact.size == 1:
-            return float(abs(off[0] / size[0])) if size[0] else float("inf") if off[0] else 0.0
-        try:
-            root = mpmath.cholesky((size + size.T) / 2)
-        except ValueError:  # not positive definite
-            return relative_error(used, exact)
-        scaled = mpmath.inverse(root) * off * mpmath.inverse(root).T
-    return float(np.linalg.norm(np.array(scaled.tolist(), float), 2))
+def _steps(rung: Rung, articulated: bool, inverse: bool) -> list[Rung]:
+    """The steps above that change an expression's value: of form where the sweep runs, of refinement where there is an inverse."""
+    steps = [step for step in above(rung) if inverse or not step.refine]
+    same = epsilon(rung.precision)
+    return [step for step in steps if articulated or step.form == rung.form or epsilon(step.precision) < same]
 
 
 # ---------------------------------------------------------------------- small things
-def _one_state(model: Any, q: Any) -> np.ndarray:
-    q = np.array(q, float)
-    if q.shape != (model.nq,):
-        raise _core.ModelError(f"a certificate is of one state: q of {model.name!r} takes {model.nq} numbers, not an array {q.shape}")
-    return q
-
-
 def _bound(operator: Any) -> bool:
     return operator._state is not None or any(_bound(child) for child in operator.children)
 
@@ -296,13 +327,17 @@ def _has_inverse(operator: Any) -> bool:
     return operator.kind == "inverse" or any(_has_inverse(child) for child in operator.children)
 
 
-def _noted(notes: dict[str, str], name: str, measure: Callable[[], float | None]) -> float | None:
+def _noted(notes: dict[str, str], name: str, measure: Callable[[], float]) -> float | None:
     """A number, or None and the reason why there is none."""
     try:
-        return measure()
+        found = measure()
     except (ArithmeticError, _core.Error) as reason:
         notes[name] = str(reason)
         return None
+    if np.isnan(found):
+        notes[name] = "is no number at this state"
+        return None
+    return found
 
 
 def _seconds(evaluate: Callable[[], Any], budget: float) -> float:

@@ -19,30 +19,50 @@ from .exact import EXACT
 from .rungs import Rung, epsilon, wider
 
 LARGEST = 400
-"""Coordinates up to which the floor is computed: it needs two dense maps, (nv, 6n)."""
+"""Coordinates up to which a certificate has a floor: it needs two dense maps, (nv, 6n)."""
 
 
 def refinement_floor(model: Any, q: np.ndarray, v: np.ndarray, vdot: np.ndarray, rung: Rung) -> float:
     """The floor at a state with accelerations vdot (nv,). Cost O(N²) in extended precision.
 
-    Raises EvaluationError above LARGEST coordinates.
+    Raises EvaluationError above LARGEST coordinates, and where the floor is no number.
     """
     if model.nv > LARGEST:
-        raise _core.EvaluationError(f"the floor needs dense maps, and is computed up to {LARGEST} coordinates")
+        raise _core.EvaluationError(f"needs dense maps, and is computed up to {LARGEST} coordinates")
     residual = rung.precision if rung.residual == "same" else wider(rung.precision) or rung.precision
-    soa = model.soa
+    with np.errstate(all="ignore"):
+        units = float(_units(model, q, v, np.asarray(vdot, float)[None], form=EXACT, precision="extended")[0])
+    if not np.isfinite(units):
+        raise _core.EvaluationError("is relative to the accelerations, and they are zero or out of range")
+    return max(epsilon(residual) / 2 * units, epsilon(rung.precision) / 2)
+
+
+def floors(model: Any, q: np.ndarray, vdots: np.ndarray) -> np.ndarray:
+    """The floors (B,), in units of u, of states q (B, nq) at rest with accelerations vdots (B, nv). Equal neighbours share their maps.
+
+    Cost O(N²) for the two dense maps of a state, O(N²) for each of its accelerations, in double precision.
+    """
+    rest = np.zeros(model.nv)
+    changes = [0, *(np.flatnonzero(np.any(q[1:] != q[:-1], axis=1)) + 1), len(q)]
+    return np.concatenate([_units(model, q[a], rest, vdots[a:b]) for a, b in zip(changes, changes[1:], strict=False)])
+
+
+def _units(model: Any, q: np.ndarray, v: np.ndarray, vdots: np.ndarray, **binding: Any) -> np.ndarray:
+    """‖ |ℳ⁻¹HφMφ*| |α| + |ℳ⁻¹Hφ| (|M||α| + |f|) ‖ / ‖θ̈‖ (B,) for accelerations vdots (B, nv) at one state; 0 where all is zero."""
+    soa, n, count = model.soa, model._size, len(vdots)
     H, phi, M, J, a, b, a0 = soa("H phi M J a b gravity_base")
-    accelerations = _core.constant(np.asarray(vdot, float)[:, None], _core.euclidean(1), soa.Theta, "θ̈")
 
     def at(operator: _core.Operator) -> np.ndarray:
-        return operator.at(q, v, form=EXACT, precision="extended").dense()
+        return operator.at(q, v, **binding).dense()
 
-    motion = phi.T @ (H.T @ accelerations + a + a0)
-    alpha, force = np.abs(at(motion)[:, 0]), np.abs(at(phi @ (M @ motion + b))[:, 0])
-    inertias = np.abs(at(M @ _core.constant(np.tile(np.eye(6), (model._size, 1)), _core.euclidean(6), soa.V, "1")))
-    pushed = np.einsum("kij,kj->ki", inertias.reshape(-1, 6, 6), alpha.reshape(-1, 6)).ravel() + force
+    columns = _core.euclidean(count)
+    accelerations = _core.constant(np.ascontiguousarray(vdots.T), columns, soa.Theta, "θ̈")
+    each = _core.constant(np.ones((1, count)), columns, _core.euclidean(1), "1")  # the same bias at all of them
+    motion = phi.T @ (H.T @ accelerations + (a + a0) @ each)
+    alpha, force = np.abs(at(motion)), np.abs(at(phi @ (M @ motion + b @ each)))
+    inertias = np.abs(at(M @ _core.constant(np.tile(np.eye(6), (n, 1)), _core.euclidean(6), soa.V, "1")))
+    pushed = np.einsum("kij,kjb->kib", inertias.reshape(-1, 6, 6), alpha.reshape(n, 6, count)).reshape(6 * n, count) + force
     inverse = (H @ phi @ M @ phi.T @ H.T + J).inv()
     rounding = np.abs(at(inverse @ H @ phi @ M @ phi.T)) @ alpha + np.abs(at(inverse @ H @ phi)) @ pushed
-    size = float(np.linalg.norm(vdot))
-    u = epsilon(residual) / 2
-    return max(u * float(np.linalg.norm(rounding)) / size if size else 0.0, epsilon(rung.precision) / 2)
+    norms, sizes = np.linalg.norm(rounding, axis=0), np.linalg.norm(vdots, axis=1)
+    return np.divide(norms, sizes, out=np.zeros(count), where=(sizes != 0) | (norms != 0))

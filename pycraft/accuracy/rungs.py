@@ -7,6 +7,9 @@ from typing import Any
 
 from .. import _core
 
+FORMS = ("fast", "ud", "square-root")
+"""Forms of the articulated-inertia sweep."""
+
 OTHER_METHODS = ("cholesky", "ldl", "conjugate-gradients", "inverse", "realization")
 """Methods of forward dynamics beside the articulated-body algorithm; they have no forms."""
 
@@ -60,6 +63,11 @@ LADDER = (
 )
 """The ladder that users climb: each step costs more than the one before it."""
 
+WIDER_RESIDUAL = Rung("fast", refine=1, residual="wider")
+
+CLIMB = (*LADDER[:4], WIDER_RESIDUAL, *LADDER[4:])
+"""The steps among which a certificate looks for the next one that helps: where forces cancel, a wider residual lowers the floor."""
+
 
 def precision_name(precision: Any) -> str:
     """ "double", "50 digits"."""
@@ -93,16 +101,25 @@ def reference_of(precision: Any) -> Any:
 
 
 def above(rung: Rung) -> list[Rung]:
-    """The steps of the ladder above a way of computing, lowest first."""
+    """The steps above a way of computing, lowest first. Raises EvaluationError for a form that is not there."""
+    check_form(rung.form)
     if epsilon(rung.precision) > epsilon("double"):
-        return [replace(rung, precision="double"), *LADDER[1:]]
+        return [replace(rung, precision="double"), *CLIMB[1:]]
     if rung.method != "articulated":
-        return list(LADDER)
+        return list(CLIMB)
     if epsilon(rung.precision) < epsilon("double"):
-        wide = [step for step in LADDER if epsilon(step.precision) < epsilon(rung.precision)]
+        wide = [step for step in CLIMB if epsilon(step.precision) < epsilon(rung.precision)]
         higher = wider(rung.precision) if not wide else None
         return wide + ([replace(rung, precision=higher, refine=0, residual="same")] if higher else [])
+    if rung.refine and rung.residual == "wider":
+        return list(CLIMB[CLIMB.index(WIDER_RESIDUAL) + 1 :])
     # A root-free and a square-root sweep stand side by side; more than one step of refinement is still refinement.
     form = "ud" if rung.form == "square-root" else rung.form
-    place = LADDER.index(Rung(form, refine=1 if rung.refine else 0))
-    return list(LADDER[place + 1 :])
+    return list(CLIMB[CLIMB.index(Rung(form, refine=1 if rung.refine else 0)) + 1 :])
+
+
+def check_form(form: Any) -> None:
+    """EvaluationError where there is no such form."""
+    if form not in FORMS:
+        known = "'fast', 'ud' and 'square-root'"
+        raise _core.EvaluationError(f"no form of the articulated-inertia sweep is called {form!r}; there are {known}")

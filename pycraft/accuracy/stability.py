@@ -17,7 +17,8 @@ import numpy as np
 from .. import _core
 from ..models.generators import chain
 from .catalogue import EITHER, REFUSED, SIZES, SOLVED, Bound, Case, DynamicsCase, Measured, MeasuredCase, Sample, catalogue, quantile
-from .floors import floors
+from .exact import EXACT
+from .floor import floors
 from .rungs import Rung, epsilon
 from .stability_table import Stability, row
 
@@ -135,11 +136,12 @@ def exists(rung: Rung) -> bool:
 
 
 def _reference(sample: Sample) -> np.ndarray:
-    """Accelerations (B, nv) in quad precision, in 100 digits where it refuses, NaN where both do."""
-    exact = _each(sample, lambda s: s.model.forward_dynamics(s.q, s.v, s.tau, precision="quad"), [])
+    """Accelerations (B, nv) in quad precision, in 100 digits where it refuses, NaN where both do; in the form whose error does not grow
+    with the mass ratio."""
+    exact = _each(sample, lambda s: s.model.forward_dynamics(s.q, s.v, s.tau, form=EXACT, precision="quad"), [])
     for i in np.flatnonzero(np.isnan(exact).any(axis=1)):
         state = Sample(sample.model, sample.q[i : i + 1], sample.v[i : i + 1], sample.tau[i : i + 1])
-        exact[i] = _each(state, lambda s: s.model.forward_dynamics(s.q, s.v, s.tau, precision=100), [])[0]
+        exact[i] = _each(state, lambda s: s.model.forward_dynamics(s.q, s.v, s.tau, form=EXACT, precision=100), [])[0]
     return exact
 
 

@@ -6,12 +6,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
+import mpmath
 import numpy as np
 
 from .. import _core
-from .exact import dynamics_error, exact_dynamics
-from .rungs import LADDER, OTHER_METHODS, Rung, epsilon, precision_name, reference_of
-from .tidy import TidyTable, error_text, refusal_text, seconds_text
+from ..models.realization import motion_state
+from .arguments import METHODS, checked_model, checked_names, checked_precisions, checked_refinements, checked_seconds
+from .exact import BITS, dynamics_error, exact_dynamics
+from .rungs import LADDER, Rung, epsilon, precision_name, reference_of
+from .tidy import TidyTable, bytes_text, error_text, refusal_text, seconds_text
 from .timing import time_forward_dynamics, workspace_bytes
 
 STATES = 5
@@ -22,17 +25,20 @@ class AccuracyTable(TidyTable):
     """Rows of `accuracy`, cheapest first, refused ones last.
 
     Each row is a dictionary: "way" (form or method and refinement), "form", "refine", "residual", "precision", "method", "error" (relative,
-    the largest over the states), "median_error", "reference" (what errors are measured against), "seconds" (per evaluation), "cost" (the
-    time over that of `fast` in double, where that is not refused), "bytes" (of the workspace), "states" (how many), "pareto" (no other
-    row is both faster and more accurate), "refused" (the reason, where there is one; then there is no error).
+    2-norm, the largest over the states), "median_error", "component" (the largest relative error of one acceleration, |δ_i| / |x_i|, as
+    returned in double), "rounded" (whether "error" is that of values rounded to double, though the precision is wider), "reference"
+    (what errors are measured against), "seconds" (per evaluation), "cost" (the time over that of `fast` in double, where that is not
+    refused), "bytes" (of the workspace), "states" (how many), "pareto" (no other row is both faster and more accurate), "refused" (the
+    reason, where there is one; then there is no error).
     """
 
     columns = (
-        "way", "form", "refine", "residual", "precision", "method", "error", "median_error", "reference", "seconds", "cost", "bytes",
-        "states", "pareto", "refused",
+        "way", "form", "refine", "residual", "precision", "method", "error", "median_error", "component", "rounded", "reference", "seconds",
+        "cost", "bytes", "states", "pareto", "refused",
     )  # fmt: skip
     shown = {
-        "way": "way", "precision": "precision", "error": "error", "seconds": "time", "cost": "of fast", "bytes": "bytes", "refused": "",
+        "way": "way", "precision": "precision", "error": "error", "component": "component", "seconds": "time",
+        "cost": "time / fast", "bytes": "workspace", "refused": "",
     }  # fmt: skip
 
     @property
@@ -56,8 +62,10 @@ class AccuracyTable(TidyTable):
         return accuracy_plot(self, ax)
 
     def cell(self, key: str, row: dict[str, Any]) -> str:
-        if key == "error":
-            return error_text(row["error"])
+        if key in ("error", "component"):
+            return error_text(row[key])
+        if key == "bytes":
+            return bytes_text(row["bytes"])
         if key == "seconds":
             return seconds_text(row["seconds"])
         if key == "cost":
@@ -65,8 +73,12 @@ class AccuracyTable(TidyTable):
         if key == "precision":
             return precision_name(row["precision"])
         if key == "refused":
-            return refusal_text(row["refused"]) or ("Pareto front" if row["pareto"] else "")
+            notes = ["Pareto front"] * bool(row["pareto"]) + ["rounded to double"] * bool(row["rounded"])
+            return refusal_text(row["refused"], 32) or ", ".join(notes)
         return super().cell(key, row)
+
+    def label(self, row: dict[str, Any]) -> str:
+        return row["way"] + ("" if row["precision"] == "double" else f", {precision_name(row['precision'])}")
 
     def style(self, row: dict[str, Any]) -> str:
         return "dim" if row["refused"] else "bold" if row["pareto"] else ""
@@ -78,10 +90,10 @@ def accuracy(
     v: Any = None,
     tau: Any = None,
     *,
-    forms: Sequence[str] | None = None,
-    refinements: Sequence[int | str | tuple[int | str, str]] | None = None,
-    precisions: Sequence[Any] | None = None,
-    methods: Sequence[str] | None = None,
+    forms: str | Sequence[str] | None = None,
+    refinements: int | str | tuple[int | str, str] | Sequence[int | str | tuple[int | str, str]] | None = None,
+    precisions: str | int | Sequence[str | int] | None = None,
+    methods: str | Sequence[str] | None = None,
     seed: int = 0,
     seconds: float = 0.1,
     progress: Callable[[str], None] | None = None,
@@ -92,10 +104,11 @@ def accuracy(
     ----------
     model : Multibody
     q, v, tau : (nq,), (nv,), (nv,), each with an optional leading batch axis
-        The states. Left out: q five random states (v with them), v zero, tau drawn from a standard normal distribution.
+        The states: rad, m and their rates; N m, N. Left out: q five random states (v with them), v zero, tau drawn from a standard normal
+        distribution.
     forms : of the articulated-inertia sweep; all that there are
     refinements : of 0, 1, ..., "auto", and pairs with the residual: (1, "wider")
-        0, 1 and (1, "wider") in single and double precision, 0 beyond.
+        0, 1 and (1, "wider") in single and double precision, 0 and 1 in extended, 0 beyond.
     precisions : "single", "double", "extended", "quad", 50, 100
         The first four; single and double for the other methods.
     methods : "articulated" and those of `forward_dynamics`; all of them
@@ -103,12 +116,23 @@ def accuracy(
     seconds : spent on the timing of each row
     progress : called with the label of each row before it is measured
 
-    Every combination of what is given is a row; forms and refinements belong to the articulated method. Errors are relative, in the
-    2-norm of the accelerations, against quad precision; those of quad itself, and of what is wider, against the next wider precision.
+    Every combination of what is given is a row (a single name or number stands for a list of one); forms and refinements belong to the
+    articulated method. Errors are relative, in the 2-norm of the accelerations, against quad precision; those of quad itself, and of what
+    is wider, against the next wider precision. A 2-norm over rad/s² and m/s² is blind to a small component that is wrong; "component" is
+    not.
     In precisions wider than double results are rounded to double when they are returned: the error there is the correction that a residual
-    in the next wider precision makes, but for refined values and other methods, which show their rounding to double.
+    in the next wider precision makes, but for refined values and other methods, whose rows show their rounding to double and say so.
     Times are the least of many calls of one state from C++, in rotation over the states. A way that raises at one of the states is
     refused as a whole.
+
+    Raises
+    ------
+    TypeError
+        What is given is no model.
+    ModelError
+        A model without coordinates, no state, states of the wrong shape or not finite.
+    EvaluationError
+        A form, refinement, precision or method that is not there; an empty list; seconds or seed below zero.
 
     Examples
     --------
@@ -118,6 +142,8 @@ def accuracy(
     >>> table.fastest(1e-10)["way"], table.fastest(1e-25)["precision"]
     ('fast', 'quad')
     """
+    checked_model(model, "accuracy")
+    seconds = checked_seconds(seconds)
     q, v, tau = _states(model, q, v, tau, seed)
     rungs = _product(forms, refinements, precisions, methods)
     exact: dict[Any, list[np.ndarray]] = {}
@@ -140,7 +166,9 @@ def accuracy(
     rows.sort(key=lambda row: (bool(row["refused"]), row["seconds"] or 0.0))
     which = f"{len(q)} states" if len(q) > 1 else "one state"
     title = f"Forward dynamics of {model.name}, {model.nv} degrees of freedom, {which}"
-    return AccuracyTable(title, rows, {"model": model.name, "nv": model.nv, "states": len(q), "seed": seed})
+    return AccuracyTable(
+        title, rows, {"model": model.name, "nv": model.nv, "states": len(q), "seed": seed, "gravity": [float(g) for g in model.gravity]}
+    )
 
 
 def _row(model: Any, q: Any, v: Any, tau: Any, rung: Rung, truth: Callable, seconds: float) -> dict[str, Any]:
@@ -148,7 +176,7 @@ def _row(model: Any, q: Any, v: Any, tau: Any, rung: Rung, truth: Callable, seco
     articulated = rung.method == "articulated"
     row |= {"way": rung.way, "form": rung.form if articulated else "", "refine": rung.refine, "method": rung.method}
     row |= {"residual": rung.residual if rung.refine else "", "precision": str(rung.precision)}
-    row |= {"states": len(q), "pareto": False, "refused": ""}
+    row |= {"states": len(q), "pareto": False, "rounded": False, "refused": ""}
     reference = reference_of(rung.precision)
     try:
         values = [model.forward_dynamics(*state, **rung.options) for state in zip(q, v, tau, strict=True)]
@@ -159,9 +187,19 @@ def _row(model: Any, q: Any, v: Any, tau: Any, rung: Rung, truth: Callable, seco
     if reference is None:
         reason = f"nothing is wider than {precision_name(rung.precision)} to measure it against"
         return row | {"refused": reason, "seconds": None, "bytes": None}
-    states = zip(q, v, tau, values, truth(reference), strict=True)
+    states = list(zip(q, v, tau, values, truth(reference), strict=True))
     errors = [dynamics_error(model, at, rate, force, rung, value, exact) for at, rate, force, value, exact in states]
-    return row | {"error": max(errors), "median_error": float(np.median(errors)), "reference": precision_name(reference)}
+    row |= {"error": max(errors), "median_error": float(np.median(errors)), "reference": precision_name(reference)}
+    row["component"] = max(largest_component(value, exact) for *_, value, exact in states)
+    row["rounded"] = epsilon(rung.precision) < epsilon("double") and bool(rung.refine or not articulated)
+    return row
+
+
+def largest_component(value: np.ndarray, exact: np.ndarray) -> float:
+    """max |δ_i| / |x_i| of values (n,) against exact ones, mpmath numbers; infinite where one is not zero and should be."""
+    with mpmath.workprec(BITS):
+        off = [abs(mpmath.mpf(float(x)) - e) for x, e in zip(value, exact, strict=True)]
+        return max(float(d / abs(e)) if e else float("inf") if d else 0.0 for d, e in zip(off, exact, strict=True))
 
 
 def mark_pareto(rows: list[dict[str, Any]]) -> None:
@@ -173,41 +211,47 @@ def mark_pareto(rows: list[dict[str, Any]]) -> None:
 
 
 def _product(forms: Any, refinements: Any, precisions: Any, methods: Any) -> list[Rung]:
-    """The rows: what is given with everything, else the defaults that `accuracy` documents."""
-    known = _core.forms()
-    for form in forms or ():
-        if form not in known:
-            raise _core.EvaluationError(f"form {form!r} is not there; there are {', '.join(known)}")
+    """The rows: what is given with everything, else the defaults that `accuracy` documents. Every name is checked here, and once."""
+    ways = list(METHODS) if methods is None else checked_names(methods, "methods", "method", METHODS)
+    shapes = list(_core.forms()) if forms is None else checked_names(forms, "forms", "form", _core.forms())
+    widths = None if precisions is None else checked_precisions(precisions)
+    steps = None if refinements is None else checked_refinements(refinements)
     rungs: list[Rung] = []
-    for method in methods if methods is not None else ("articulated", *OTHER_METHODS):
-        articulated = method == "articulated"
-        widths = precisions if precisions is not None else ("single", "double", "extended", "quad") if articulated else ("single", "double")
-        for precision in widths:
-            narrow = epsilon(precision) >= epsilon("double")
-            steps = refinements if refinements is not None else (0, 1, (1, "wider")) if narrow and articulated else (0,)
-            for form in (forms if forms is not None else known) if articulated else ("fast",):
-                for step in steps:
-                    refine, residual = step if isinstance(step, tuple) else (step, "same")
-                    rungs.append(Rung(form, refine, residual, precision, method))
-    return rungs
+    for method in ways:
+        if method != "articulated":
+            rungs += [Rung(precision=precision, method=method) for precision in widths or ("single", "double")]
+            continue
+        for precision in widths or ("single", "double", "extended", "quad"):
+            usual = _usual_refinements(precision) if steps is None else steps
+            rungs += [Rung(form, refine, residual, precision) for form in shapes for refine, residual in usual]
+    return list(dict.fromkeys(rungs))
+
+
+def _usual_refinements(precision: Any) -> list[tuple[int | str, str]]:
+    """Refinements that are measured where none is asked for."""
+    if epsilon(precision) >= epsilon("double"):
+        return [(0, "same"), (1, "same"), (1, "wider")]
+    return [(0, "same"), (1, "same")] if str(precision) == "extended" else [(0, "same")]
 
 
 def _states(model: Any, q: Any, v: Any, tau: Any, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """States (B, nq), (B, nv), (B, nv), drawn where none is given, checked."""
+    if not isinstance(seed, (int, np.integer)) or seed < 0:
+        raise _core.EvaluationError(f"seed={seed!r}: a whole number, zero or more")
     if v is None and hasattr(q, "v"):
         v = q.v
-    q = getattr(q, "q", q)
     if q is None:
         drawn = [model.random_state(np.random.default_rng([seed, i])) for i in range(STATES)]
         q, v = np.array([s.q for s in drawn]), np.array([s.v for s in drawn]) if v is None else v
-    q = np.atleast_2d(np.asarray(q, float))
-    v = np.atleast_2d(np.zeros(model.nv) if v is None else np.asarray(v, float))
-    tau = np.atleast_2d(np.random.default_rng(seed).normal(size=(len(q), model.nv)) if tau is None else np.asarray(tau, float))
-    count = max(len(q), len(v), len(tau))
-    for name, array, width in (("q", q, model.nq), ("v", v, model.nv), ("tau", tau, model.nv)):
-        if array.shape not in ((1, width), (count, width)):
-            takes = f"takes {width} numbers, or ({count}, {width}) as the others, not an array {array.shape}"
-            raise _core.ModelError(f"{name} of {model.name!r} {takes}")
-    return tuple(np.ascontiguousarray(np.broadcast_to(a, (count, a.shape[1]))) for a in (q, v, tau))  # type: ignore[return-value]
+    v = np.zeros(model.nv) if v is None else v
+    q, v = (x[0] if np.ndim(x) == 2 and len(x) == 1 else x for x in (getattr(q, "q", q), getattr(v, "v", v)))
+    *_, drawn_for = motion_state(model, q, v, np.zeros(model.nv))
+    if tau is None:
+        tau = np.random.default_rng(seed).normal(size=(*(drawn_for or (1,)), model.nv))
+    q, v, tau, batch = motion_state(model, q, v, tau[0] if np.ndim(tau) == 2 and len(tau) == 1 else tau)
+    if batch == (0,):
+        raise _core.ModelError(f"no state given: the arrays of {model.name!r} have no rows")
+    return tuple(np.ascontiguousarray(np.broadcast_to(a, (*(batch or (1,)), a.shape[-1]))) for a in (q, v, tau))  # type: ignore[return-value]
 
 
 def ladder(table: AccuracyTable) -> list[dict[str, Any]]:

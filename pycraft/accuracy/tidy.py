@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 from collections.abc import Iterator
 from html import escape
 from pathlib import Path
@@ -49,8 +50,9 @@ class TidyTable:
             writer.writerows(self.rows)
 
     def to_json(self, path: str | Path | None = None) -> str:
-        """The title, what was measured and the rows as JSON text, written to `path` where one is given."""
-        text = json.dumps({"title": self.title, **self.about, "rows": self.rows}, indent=1, ensure_ascii=False)
+        """The title, what was measured and the rows as JSON text, written to `path` where one is given. What is not finite is null."""
+        rows = [{key: None if isinstance(x, float) and not math.isfinite(x) else x for key, x in row.items()} for row in self.rows]
+        text = json.dumps({"title": self.title, **self.about, "rows": rows}, indent=1, ensure_ascii=False)
         if path is not None:
             Path(path).write_text(text + "\n", encoding="utf-8")
         return text
@@ -65,15 +67,29 @@ class TidyTable:
         """The style of a row in a terminal."""
         return ""
 
+    def label(self, row: dict[str, Any]) -> str:
+        """What a row is called."""
+        return self.cell(next(iter(self.shown)), row)
+
+    @property
+    def refusals(self) -> dict[str, list[str]]:
+        """Each reason of a refusal, in full, with the names of the rows that it refuses."""
+        found: dict[str, list[str]] = {}
+        for row in self.rows:
+            if row.get("refused"):
+                found.setdefault(row["refused"], []).append(self.label(row))
+        return found
+
     def table(self) -> Any:
         """The rows as a rich table."""
+        from rich.markup import escape as plain
         from rich.table import Table
 
-        table = Table(title=self.title, title_justify="left", box=None, pad_edge=False, header_style="bold")
+        table = Table(title=plain(self.title), title_justify="left", box=None, pad_edge=False, header_style="bold")
         for i, heading in enumerate(self.shown.values()):
             table.add_column(heading, justify="right" if 0 < i < len(self.shown) - 1 else "left", no_wrap=True)
         for row in self.rows:
-            table.add_row(*(self.cell(key, row) for key in self.shown), style=self.style(row))
+            table.add_row(*(plain(self.cell(key, row)) for key in self.shown), style=self.style(row))
         return table
 
     def __repr__(self) -> str:
@@ -115,3 +131,10 @@ def refusal_text(reason: str, width: int = 48) -> str:
 def error_text(error: float | None) -> str:
     """An error in two figures."""
     return "" if error is None else f"{error:.1e}"
+
+
+def bytes_text(count: int | None) -> str:
+    """A size with its unit: 640 B, 5.3 kB."""
+    if count is None:
+        return ""
+    return f"{count} B" if count < 1000 else f"{count / 1000:.1f} kB"

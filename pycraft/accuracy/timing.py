@@ -22,8 +22,13 @@ def time_forward_dynamics(
     precision: str | int = "double",
     method: str = "articulated",
 ) -> dict[str, float]:
-    """Seconds per call over the states q (K, nq), v (K, nv), tau (K, nv) in rotation: `minimum`, `median`, `calls`."""
+    """Seconds per call over the states q (K, nq), v (K, nv), tau (K, nv) in rotation: `minimum`, `median`, `calls`.
+
+    `seconds` is what the measurement may take; options as `forward_dynamics` has them, and what it raises. ModelError without a state.
+    """
     q, v, tau = (np.atleast_2d(x) for x in (q, v, tau))
+    if not len(q):
+        raise _core.ModelError(f"no state given: a time of {model.name!r} takes one at least")
     if method == "articulated":
         return _core.time_forward(model, q, v, tau, seconds, form, refine, residual, precision)
     if method != "realization":
@@ -35,13 +40,18 @@ def time_forward_dynamics(
 
 
 def workspace_bytes(model: Any, *, precision: str | int = "double", form: str = "fast", method: str = "articulated") -> int:
-    """Bytes that one forward dynamics works in."""
+    """Bytes that one forward dynamics works in.
+
+    As the core tells them; but "realization" is planned in doubles, and grown by the size of the precision's scalar over that of a
+    double, which is the ratio of the articulated method's workspaces.
+    """
     if method == "articulated":
         return model._calls().memory(form, precision)
     if method != "realization":
         return _core.Methods(model).memory(method, precision)
-    digits = {"single": 4, "double": 8, "extended": 16, "quad": 16, "50": 32, "100": 56}[str(precision)]
-    return int(_mass_matrix(model).inv().plan(rules=False).memory) * digits // 8
+    calls = model._calls()
+    scalar = calls.memory(form, precision) / calls.memory(form, "double")
+    return round(int(_mass_matrix(model).inv().plan(rules=False).memory) * scalar)
 
 
 def _mass_matrix(model: Any) -> _core.Operator:

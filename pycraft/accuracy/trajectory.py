@@ -44,7 +44,7 @@ def integrator_names() -> list[str]:
 
 
 def integrate_by_scipy(
-    accelerations: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    accelerations: Callable[[float, np.ndarray, np.ndarray], np.ndarray],
     rate: Callable[[np.ndarray, np.ndarray], np.ndarray],
     q: np.ndarray,
     v: np.ndarray,
@@ -54,9 +54,10 @@ def integrate_by_scipy(
     atol: float,
     step: float | None,
 ) -> Trajectory:
-    """q̇ = rate(q, v), v̇ = accelerations(q, v) by one of SciPy's solvers, interpolated by it to the times.
+    """q̇ = rate(q, v), v̇ = accelerations(t, q, v) by one of SciPy's solvers (a name of SCIPY), interpolated by it to the times.
 
-    Raises EvaluationError that names the time where the solver gives up or the state is no longer finite.
+    q (nq,), v (nv,) at times[0]; times (T,) s; rtol, atol per component of the error of a step; step s, the first one, chosen by the solver
+    where it is None. Raises EvaluationError that names the time where the solver gives up or the state is no longer finite.
     """
     began, nq = perf_counter(), len(q)
     count, steps = 0, 0
@@ -65,7 +66,7 @@ def integrate_by_scipy(
         nonlocal count
         count += 1
         try:
-            return np.concatenate([rate(x[:nq], x[nq:]), accelerations(x[:nq], x[nq:])])
+            return np.concatenate([rate(x[:nq], x[nq:]), accelerations(t, x[:nq], x[nq:])])
         except _core.Error as error:
             raise type(error)(f"{error}; integrating, at t = {t:.6g} s") from error
 

@@ -8,6 +8,10 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from .realization import by_realization
+
+MOST_CORRECTIONS = 1000
+"""Of a refinement: what has not converged by then does not."""
 
 
 def cached(model: Any, name: str, make: Callable[[Any], Any]) -> Any:
@@ -24,23 +28,29 @@ def by_method(model: Any, method: str, q, v, tau, precision: str | int, out) -> 
     return cached(model, "_methods", _core.Methods).forward_dynamics(method, q, v, tau, precision, out)
 
 
-def by_realization(model: Any, q, v, tau, precision: str | int, out) -> np.ndarray:
-    """Forward dynamics as (HφMφ*H* + J)⁻¹ (T - Hφ(Mφ*(a + a₀) + b)) evaluated as typed, no theorem used: realization and elimination."""
-    H, phi, M, J, a, b, base = model.soa("H phi M J a b gravity_base")
-    T = _core.vector("T", model.soa.Theta)
-    formula = (H @ phi @ M @ phi.T @ H.T + J).inv() @ (T - H @ phi @ (M @ phi.T @ (a + base) + b))
-    shapes = [np.asarray(x, float) for x in (getattr(q, "q", q), getattr(v, "v", v), tau)]
-    batch = np.broadcast_shapes(*(x.shape[:-1] for x in shapes))
-    result = np.empty((*batch, model.nv)) if out is None else out
-    states = [np.broadcast_to(x, (*batch, x.shape[-1])).reshape(-1, x.shape[-1]) for x in shapes]
-    flat = result.reshape(-1, model.nv)
-    for i in range(len(flat)):
-        flat[i] = formula.at(states[0][i], states[1][i], precision=precision).value(rules=False, T=states[2][i])
-    return result
+def checked_refinement(refine: Any, residual: str, precision: str | int) -> int | str:
+    """`refine` as the core takes it: a number of corrections or "auto". Raises EvaluationError for anything else, for a number that is
+    none of corrections (True, 10**12), and for a wider residual where nothing is wider."""
+    if refine == "auto" and isinstance(refine, str):
+        steps: int | str = refine
+    elif isinstance(refine, (int, np.integer)) and not isinstance(refine, bool) and 0 <= refine <= MOST_CORRECTIONS:
+        steps = int(refine)
+    else:
+        raise _core.EvaluationError(f"refine={refine!r}: a number of corrections, 0, 1, 2, ..., {MOST_CORRECTIONS}, or 'auto'")
+    if steps and residual == "wider" and str(precision) == "100":
+        raise _core.EvaluationError("residual='wider': nothing is wider than 100 digits; there is residual='same'")
+    return steps
 
 
 class DirectCalls:
-    """Forward and inverse dynamics, mass matrix, Jacobians, energies. Each takes one state or a leading batch axis."""
+    """Forward and inverse dynamics, mass matrix, Jacobians, energies.
+
+    Each takes one state or a leading batch axis (B, ...), an argument of one state beside a batch standing for all; q may be a State. SI
+    units and radians. Generalized velocities of ball and free hinges are in the axes of the body that the hinge moves, angular first.
+    Results are float64, in `out` (writeable, C-ordered) where one is given. Everywhere a ModelError names an argument of the wrong shape
+    or with an entry that is not finite, and EvaluationError an unknown option, and a result beyond the range of its numbers; errors at a
+    state of a batch tell which.
+    """
 
     nv: int
 
@@ -61,20 +71,21 @@ class DirectCalls:
         on_singular: str = "raise",
         out=None,
     ) -> np.ndarray:
-        """Accelerations (nv,) or (B, nv) under generalized forces tau, gravity included: articulated-body algorithm, O(N).
-
-        Each argument has one state or a leading batch axis; batches of the forms "fast" and "ud" run in packs.
+        """Accelerations v̇ under generalized forces, gravity included: articulated-body algorithm, O(N).
 
         Parameters
         ----------
+        q, v, tau : (nq,), (nv,), (nv,), each with an optional leading batch axis
+            Coordinates (rad, m), velocities (rad/s, m/s), generalized forces (N m, N). Batches of the forms "fast" and "ud" run in packs.
         form : {"fast", "ud", "square-root"}
             How the articulated inertia is carried: as P, as U diag(w) U*, as L L*. The factored forms keep the digits of light bodies
-            beside heavy ones; they cost about three and five times as much.
+            beside heavy ones; they cost about three and four times as much.
         refine : int or "auto"
             Corrections by the residual of inverse dynamics, with gravity and Coriolis terms inside the sweep; "auto" takes them as long
             as they shrink.
         residual : {"same", "wider"}
-            The residual at the precision itself, or in the next wider one.
+            The residual of a refinement at the precision itself, or in the next wider one. Without refinement nothing has a residual, and
+            this changes nothing.
         precision : {"single", "double", "extended", "quad", 50, 100}
             The scalar of the whole computation; results are rounded to double.
         method : {"articulated", "cholesky", "ldl", "conjugate-gradients", "inverse", "realization"}
@@ -84,15 +95,34 @@ class DirectCalls:
             What becomes of a hinge that feels no inertia: an error that names it, or the accelerations of least norm among those that
             fit the forces best.
 
+        Returns
+        -------
+        (nv,) or (B, nv), rad/s² and m/s²
+
         Raises
         ------
         SingularHingeError
             D(k) is singular at the rounding bound of the form in use.
+        SingularOperatorError
+            Of the other methods: the mass matrix is not positive definite to rounding.
         RefinementError
             The first correction is more than 0.3 of the solution.
+
+        Source: articulated-body forward dynamics by the operator factorization of the mass matrix [Jain 2011].
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> arm = pc.chain(2)
+        >>> arm.forward_dynamics([0, 0], [0, 0], [1, 0]).round(3).tolist()
+        [1.714, -4.286]
         """
+        if type(refine) is not int or refine:
+            refine = checked_refinement(refine, residual, precision)
         if method == "articulated":
             return self._calls().forward_dynamics(q, v, tau, form, refine, residual, precision, on_singular, out)
+        if not isinstance(method, str):
+            raise _core.EvaluationError(f"method={method!r}: a name, 'articulated', 'cholesky', ...")
         if form != "fast" or refine != 0 or residual != "same" or on_singular != "raise":
             raise _core.EvaluationError(
                 f"method {method!r} has no form, no refinement and no other answer to singular hinges; those are the articulated method's"
@@ -102,21 +132,55 @@ class DirectCalls:
     def refinement(
         self, q, v, tau, *, form: str = "fast", refine: int | str = "auto", residual: str = "same", precision: str | int = "double"
     ) -> dict[str, Any]:
-        """Forward dynamics of one state with its corrections: `value` (nv,), `steps`, and `corrections`, the norm of each correction
-        relative to the solution. The first estimates the error before, the last the error that is left."""
-        value, corrections = self._calls().refinement(q, v, tau, form, refine, residual, precision)
+        """Forward dynamics of one state with its corrections; arguments and errors as `forward_dynamics` has them.
+
+        `value` (nv,), rad/s² and m/s²; `steps`, how many corrections were made; `corrections`, of each |correction| / max(|solution|,
+        |correction|), so at most 1. The first estimates the error before, the last the error that is left. O(N) a correction. ModelError
+        for a batch, which has as many corrections as states.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> found = pc.chain(2).refinement([0, 0], [0, 0], [1, 0], refine=1)
+        >>> found["steps"], found["corrections"][0] < 1e-14
+        (1, True)
+        """
+        value, corrections = self._calls().refinement(q, v, tau, form, checked_refinement(refine, residual, precision), residual, precision)
         return {"value": value, "steps": len(corrections), "corrections": corrections}
 
     def inverse_dynamics(self, q, v, vdot, *, precision: str | int = "double", out=None) -> np.ndarray:
-        """Generalized forces (nv,) or (B, nv) for the accelerations vdot, gravity and rotor inertia included: Newton-Euler, O(N)."""
+        """Generalized forces (nv,) or (B, nv), N m and N, for the accelerations vdot, gravity and rotor inertia included.
+
+        Newton-Euler, O(N) [Jain 2011, inverse dynamics]. In precision "single" to "quad".
+        """
         return self._calls().inverse_dynamics(q, v, vdot, precision, out)
 
     def bias_forces(self, q, v, *, precision: str | int = "double", out=None) -> np.ndarray:
-        """Coriolis, gyroscopic and gravity forces 𝒞 (nv,) or (B, nv): inverse dynamics at zero acceleration. O(N)."""
+        """Coriolis, gyroscopic and gravity forces 𝒞 (nv,) or (B, nv), N m and N: inverse dynamics at zero acceleration. O(N).
+
+        The equations of motion are ℳ(q) v̇ + 𝒞(q, v) = τ [Jain 2011]. In precision "single" to "quad".
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> arm = pc.chain(2)
+        >>> arm.bias_forces([0, 0], [1, 1]).tolist()  # no gravity, stretched: nothing
+        [0.0, 0.0]
+        """
         return self._calls().inverse_dynamics(q, v, None, precision, out)
 
     def mass_matrix(self, q, *, precision: str | int = "double", out=None) -> np.ndarray:
-        """The mass matrix of the equations of motion, HφMφ*H* + J, full symmetric (nv, nv) or (B, nv, nv): composite bodies."""
+        """The mass matrix ℳ + J = HφMφ*H* + J of the equations of motion, full symmetric (nv, nv) or (B, nv, nv).
+
+        Rotor inertia J included. kg m² between angles, kg m and kg where travels take part. Composite bodies, O(N²) [Jain 2011]. In
+        precision "single" to "quad".
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> pc.chain(2).mass_matrix([0, 0]).round(4).tolist()
+        [[2.6667, 0.8333], [0.8333, 0.3333]]
+        """
         return self._calls().mass_matrix(q, precision, out)
 
     def mass_matrix_inverse(
@@ -130,23 +194,71 @@ class DirectCalls:
         on_singular: str = "raise",
         out=None,
     ) -> np.ndarray:
-        """The inverse of mass_matrix, full symmetric, by the innovations factors: O(N) a column. Options as in forward_dynamics;
-        on_singular="minimum-norm" gives the pseudoinverse."""
+        """The inverse of `mass_matrix`, full symmetric (nv, nv) or (B, nv, nv), by the innovations factors: O(N) a column.
+
+        (ℳ + J)⁻¹ = [I - HψK]* D⁻¹ [I - HψK] [Jain 2011]. Options and errors as in forward_dynamics; on_singular="minimum-norm" gives the
+        pseudoinverse.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> pc.chain(2).mass_matrix_inverse([0, 0]).round(3).tolist()
+        [[1.714, -4.286], [-4.286, 13.714]]
+        """
+        if type(refine) is not int or refine:
+            refine = checked_refinement(refine, residual, precision)
         return self._calls().mass_matrix_inverse(q, form, refine, residual, precision, on_singular, out)
 
     def jacobian(self, frame: str, q, *, precision: str | int = "double", out=None) -> np.ndarray:
-        """Jacobian (6, nv) or (B, 6, nv) of a body's or node's spatial velocity: its own axes, about its origin, angular first."""
+        """Jacobian (6, nv) or (B, 6, nv) of the spatial velocity of a body or node, by its name: O(N).
+
+        J v is the velocity (angular rad/s, then linear m/s) of the frame against the world, in the frame's own axes, about its origin.
+        ModelError where no body or node has the name. In precision "single" to "quad".
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> arm = pc.chain(2)
+        >>> arm.jacobian("body1", [0, 0])[[2, 4]].tolist()  # the second body: turning about z, moving along y
+        [[1.0, 1.0], [1.0, 0.0]]
+        """
         return self._calls().jacobian(frame, q, precision, out)
 
     def pose(self, frame: str, q) -> np.ndarray:
-        """Pose (4, 4) or (B, 4, 4) of a body or node in the world."""
+        """Pose (4, 4) or (B, 4, 4) of a body or node, by its name, in the world: its axes as columns, its origin in metres. O(N).
+
+        ModelError where no body or node has the name.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> pc.chain(2).pose("body1", [0, 0])[:3, 3].tolist()
+        [1.0, 0.0, 0.0]
+        """
         return self._calls().pose(frame, q)
 
     def kinetic_energy(self, q, v) -> np.ndarray:
-        """½ v·(ℳ + J)v, in joules. O(N)."""
+        """½ v·(ℳ + J)v, in joules, a number or (B,). O(N).
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> round(float(pc.chain(2).kinetic_energy([0, 0], [1, 0])), 4)
+        1.3333
+        """
         return self._calls().energy(q, v)[..., 0]
 
     def potential_energy(self, q) -> np.ndarray:
-        """Energy in the uniform gravity field, zero with the centre of mass at the world's origin, in joules. O(N)."""
+        """Energy -m g·c in the uniform gravity field, zero with the centre of mass c at the world's origin. Joules, a number or (B,). O(N).
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> arm = pc.chain(1)
+        >>> arm.gravity = (-9.81, 0, 0)
+        >>> round(float(arm.potential_energy([0])), 4)  # 1 kg, 0.5 m up
+        4.905
+        """
+        q = getattr(q, "q", q)
         shape = np.shape(q)[:-1] + (self.nv,)
         return self._calls().energy(q, np.zeros(shape))[..., 1]

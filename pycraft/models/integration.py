@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import _core
-from .direct_calls import cached
+from .direct_calls import cached, checked_refinement
+from .realization import checked_forces
 from .sensitivities import SensitivityCalls
 
 if TYPE_CHECKING:
@@ -89,12 +90,16 @@ class IntegrationCalls(SensitivityCalls):
 
         if integrator not in integrator_names():
             raise _core.EvaluationError(f"no integrator is called {integrator!r}; there are {', '.join(map(repr, integrator_names()))}")
+        refine = checked_refinement(refine, "same", precision)
         if normalise not in ("never", "each step"):
             raise _core.EvaluationError(f"normalise={normalise!r}: there are 'never' and 'each step'")
         q, v = np.array(getattr(q, "q", q), float), np.array(getattr(v, "v", v), float)
         times = np.atleast_1d(np.array(times, float))
         if times.ndim != 1 or not times.size:
             raise _core.EvaluationError(f"times: a list of times in seconds, not an array of shape {times.shape}")
+        if not np.isfinite(times).all():
+            at = int(np.argmin(np.isfinite(times)))
+            raise _core.EvaluationError(f"times: entry {at} is {times[at]:g}; times are finite numbers of seconds")
         if step is not None and not step > 0:
             raise _core.EvaluationError(f"step={step}: a step is a positive number of seconds")
         if not integrator.startswith("scipy:"):
@@ -105,16 +110,20 @@ class IntegrationCalls(SensitivityCalls):
             return Trajectory(times, run["q"], run["v"], run["evaluations"], run["seconds"], run["steps"], run["rejected"])
         if normalise != "never":
             raise _core.EvaluationError(f"integrator {integrator!r} has no normalise={normalise!r}; there is 'never'")
+        for name, tolerance in (("rtol", rtol), ("atol", atol)):
+            if not 0 <= tolerance < np.inf:
+                raise _core.EvaluationError(f"{name}={tolerance:g}: a tolerance is a positive number")
         increments = np.diff(times)
-        if not np.isfinite(times).all() or not ((increments > 0).all() or (increments < 0).all()):
+        if not ((increments > 0).all() or (increments < 0).all()):
             raise _core.EvaluationError("times are strictly increasing, or strictly decreasing")
         self._integration().configuration_rate(q, v, "double", None)  # checks both
         forces, friction = (np.zeros(self.nv) if x is None else np.asarray(x, float) for x in (tau, damping))
         for name, x in (("tau", forces), ("damping", friction)):
             if x.shape != (self.nv,):
                 raise _core.ModelError(f"{name} of {self.name!r} takes {self.nv} numbers, not an array of shape {x.shape}")
+            checked_forces(self, x, name)
 
-        def accelerations(q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        def accelerations(_: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
             return self.forward_dynamics(q, v, forces - friction * v, form=form, refine=refine, precision=precision)
 
         return integrate_by_scipy(accelerations, self.configuration_rate, q, v, times, integrator.removeprefix("scipy:"), rtol, atol, step)

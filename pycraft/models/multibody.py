@@ -185,9 +185,21 @@ class Multibody(IntegrationCalls, _core.Multibody):
         return self._soa
 
     def certify(self, q, v=None, tau=None, **options: Any) -> Any:
-        """Forward dynamics with its measured error, condition, refinement floor, where digits are lost, and what the next rung costs.
+        """Forward dynamics with its measured error, what rounding of q, v and tau does, condition, floor of refinement, where digits are
+        lost, and what the next rung costs: a `pycraft.accuracy.certificate.Certificate`.
 
-        Options as in `forward_dynamics` (form, refine, residual, precision); see `pycraft.accuracy.certify.certify_dynamics`.
+        Parameters
+        ----------
+        q : (nq,) or a State, whose v is taken then
+        v, tau : (nv,), zero where left out
+        form, refine, residual, precision : of the value that is certified, as in `forward_dynamics`
+        seed : int
+            Of the signs by which q, v and tau are moved, 0 or above.
+        seconds : float
+            Spent on each timing, 0.02 where left out.
+
+        Raises what `forward_dynamics` raises, and ModelError for a model without coordinates. Cost: a dozen evaluations in quad
+        precision, O(N); the floor, up to 400 coordinates, O(N²).
         """
         from ..accuracy.certify import certify_dynamics
 

@@ -93,12 +93,12 @@ inline void householder_lower(S* A, int stride, const int* rows, int count, int 
 }
 
 // A = Σ w u u* of a positive semidefinite matrix (n x n), the largest diagonal entry first: u (n columns, as rows of U), w. A diagonal entry
-// that has cancelled to the rounding of its own first value is zero: the numbers given say no more. False where what is left then is
-// not zero, which is where A has a negative eigenvalue.
+// that has cancelled to `rounding` of its own first value is zero: the numbers given say no more. False where what is left then is
+// not zero to the digits of a double, which is where A has a negative eigenvalue.
 template <class S>
-inline bool semidefinite_factors(const S* given, int n, S* U, S* w, S* A) {
+inline bool semidefinite_factors(const S* given, int n, const S& rounding, S* U, S* w, S* A) {
   using std::abs, std::sqrt;
-  const S rounding = S(8 * n) * epsilon<S>();
+  const S given_rounding = maximum(rounding, S(S(8 * n) * S(epsilon<double>())));
   std::copy_n(given, n * n, A);
   std::fill_n(w, n, S(0));
   std::fill_n(U, n * n, S(0));
@@ -116,7 +116,7 @@ inline bool semidefinite_factors(const S* given, int n, S* U, S* w, S* A) {
   }
   for (int i = 0; i < n; ++i)
     for (int j = 0; j < n; ++j)
-      if (!(abs(A[i * n + j]) <= rounding * sqrt(given[i * n + i]) * sqrt(given[j * n + j]))) return false;
+      if (!(abs(A[i * n + j]) <= given_rounding * sqrt(given[i * n + i]) * sqrt(given[j * n + j]))) return false;
   return true;
 }
 

@@ -1,14 +1,15 @@
 // When D(k) counts as singular: never by luck, but by comparison with the rounding bound of the sweep that made it.
 //
-// The downdate P⁺ = P - GDG* rounds at the size of P, and an error δP of P passes the hinge as τ̄ δP τ̄*. So the errors of the plain
-// form are bounded by a small multiple of eps times X, where, tip to base,
+// Entries of P(k) round at sqrt(P(i,i) P(j,j)), whatever cancels in them, and so does the downdate; D = HPH* + J and PH* round at
+// y(i) = (Σ_a H(i,a)² P(a,a) + J(i,i))^½. An error δP passes the hinge as τ̄ δP τ̄*, one of D as G δD G*. So the errors of the plain form
+// are bounded by a small multiple of eps times X, where, tip to base,
 //
-//   X⁺(c) = diag P(c) + τ̄(c) X(c) τ̄(c)*,     X(k) = M(k) + Σ_{children c} E(k,c) X⁺(c) E(k,c)*,
+//   X(k)  = diag P(k) + Σ_{children c} E(k,c) X⁺(c) E(k,c)*,     X⁺(c) = diag P(c) + τ̄(c) X(c) τ̄(c)* + G(c) diag(y²) G(c)*
 //
 // bound D's own error entry by entry: |δD(i,j)| <= rounding_bound · x(i) x(j), x(i)² = (H X H* + J)(i,i). Pivot j of D(k) is the Schur
-// complement w* D w, w = (-D₁₁⁻¹ D₁ⱼ, 1), so its error is at most rounding_bound · (Σ |w(i)| x(i))²; at or below that it is noise, and no
-// digit of D⁻¹ would be right.
-// The sweep costs as much again as P's own; block policies run it only where a cheap bound on X leaves a doubt.
+// complement w* D w, w = (-D₁₁⁻¹ D₁ⱼ, 1), so its error is at most rounding_bound · (j + 1) Σ w(i)² x(i)²; at or below that it is noise,
+// and no digit of D⁻¹ would be right.
+// The sweep costs as much again as P's own; block policies run it only where an estimate of X leaves a doubt.
 #pragma once
 
 #include <cmath>
@@ -32,6 +33,9 @@ inline S rounding_bound(Form form) {
 enum class Pivots { sound, doubtful, not_positive };
 
 [[noreturn]] inline void throw_singular_hinge(const SkoStructure& tree, int k, int coordinate, double pivot, double bound, Form form) {
+  if (!std::isfinite(pivot) || !std::isfinite(bound))
+    throw EvaluationError("the articulated inertia of body '" + tree.body_names[k] +
+                          "' overflows: its masses, lengths or velocities are beyond the range of this precision; take other units or a wider precision");
   char numbers[96];
   std::snprintf(numbers, sizeof numbers, "D = %.3g, rounding bound %.3g", pivot, bound);
   const std::string remedy = form == Form::fast ? "form=\"ud\" or a wider precision" : "a wider precision";
@@ -42,24 +46,26 @@ enum class Pivots { sound, doubtful, not_positive };
                            tree.dof_offset[k] + coordinate);
 }
 
-// Throws unless every pivot of body k's D = L L* stands out of its rounding. x: diagonal of H X H* + J, n numbers, overwritten, and n more.
+// (j + 1) Σ_i w(i)² squares(i), w = (-D₁₁⁻¹ D₁ⱼ, 1) for D = L L*; w: n numbers of scratch.
 template <class S>
-void require_pivots(const SkoStructure& tree, int k, const S* L, const S* pivots, S* x, Form form) {
-  using std::abs, std::sqrt;
+inline S pivot_reach(const S* L, int n, int j, const S* squares, S* w) {
+  S sum = squares[j];
+  for (int back = 1; back <= j; ++back) {  // L₁₁* w₁ = -L(j, ·)*
+    const int i = j - back;
+    S solved = -L[j * n + i];
+    for (int a = i + 1; a < j; ++a) solved -= L[a * n + i] * w[a];
+    w[i] = solved / L[i * n + i];
+    sum += w[i] * w[i] * squares[i];
+  }
+  return S(j + 1) * sum;
+}
+
+// Throws unless every pivot of body k's D = L L* stands out of its rounding. squares: x(i)², n numbers, and n more of scratch.
+template <class S>
+void require_pivots(const SkoStructure& tree, int k, const S* L, const S* pivots, S* squares, Form form) {
   const int n = tree.dof[k];
-  for (int i = 0; i < n; ++i) x[i] = sqrt(x[i]);
-  S* w = x + n;
   for (int j = 0; j < n; ++j) {
-    // L₁₁* w₁ = -L(j, ·)*
-    S reach = x[j];
-    for (int back = 1; back <= j; ++back) {
-      const int i = j - back;
-      S sum = -L[j * n + i];
-      for (int a = i + 1; a < j; ++a) sum -= L[a * n + i] * w[a];
-      w[i] = sum / L[i * n + i];
-      reach += abs(w[i]) * x[i];
-    }
-    const S bound = rounding_bound<S>(form) * reach * reach;
+    const S bound = rounding_bound<S>(form) * pivot_reach(L, n, j, squares, squares + n);
     if (!(pivots[j] > bound)) throw_singular_hinge(tree, k, j, to_double(pivots[j]), to_double(bound), form);
   }
 }

@@ -1,0 +1,75 @@
+"""Forward dynamics by the formula of the equations of motion as typed: every operator realized, the mass matrix eliminated."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+
+
+def by_realization(model: Any, q, v, tau, precision: str | int, out) -> np.ndarray:
+    """Accelerations (nv,) or (B, nv) as (HφMφ*H* + J)⁻¹ (T - Hφ(Mφ*(a + a₀) + b)) evaluated as typed, no theorem used.
+
+    Equations of motion [Jain 2011, forward dynamics by the mass matrix], realized and eliminated: O(N³). Takes and refuses what the other
+    direct calls do; an error at one state of a batch says which.
+    """
+    q, v, tau, batch = motion_state(model, q, v, tau)
+    result = output(out, (*batch, model.nv))
+    if not model.nv:
+        return result
+    H, phi, M, J, a, b, base = model.soa("H phi M J a b gravity_base")
+    T = _core.vector("T", model.soa.Theta)
+    formula = (H @ phi @ M @ phi.T @ H.T + J).inv() @ (T - H @ phi @ (M @ phi.T @ (a + base) + b))
+    states = [np.broadcast_to(x, (*batch, x.shape[-1])).reshape(-1, x.shape[-1]) for x in (q, v, tau)]
+    flat = result.reshape(-1, model.nv)
+    for i in range(len(flat)):
+        try:
+            flat[i] = formula.at(states[0][i], states[1][i], precision=precision).value(rules=False, T=states[2][i])
+        except _core.Error as error:
+            raise type(error)(f"{error} (state {i} of a batch of {len(flat)})" if batch else str(error)) from None
+    return result
+
+
+def motion_state(model: Any, q: Any, v: Any, tau: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[int, ...]]:
+    """q (nq,), v (nv,), tau (nv,), each with an optional leading batch axis, as arrays, and the shape of the batch: () or (B,).
+
+    Raises ModelError, in the words of the core's direct calls, for wrong shapes, batches that differ and entries that are not finite.
+    """
+    q, v = getattr(q, "q", q), getattr(v, "v", v)
+    model._integration().configuration_rate(q, v, "double", None)  # the core's own checks of q and v
+    q, v, tau = np.asarray(q, float), np.asarray(v, float), checked_forces(model, tau)
+    sizes = [x.shape[0] for x in (q, v, tau) if x.ndim == 2]
+    for size in sizes[1:]:
+        if size != sizes[0]:
+            raise _core.ModelError(f"batches of {sizes[0]} and {size} states in one call")
+    return q, v, tau, tuple(sizes[:1])
+
+
+def checked_forces(model: Any, tau: Any, name: str = "tau") -> np.ndarray:
+    """Generalized forces (nv,) or (B, nv) as an array; a ModelError names what is wrong with them, as the core's direct calls do."""
+    nv = model.nv
+    if np.iscomplexobj(tau):
+        raise _core.ModelError(f"{name} is complex; models take real numbers")
+    try:
+        forces = np.asarray(tau, float)
+    except (TypeError, ValueError):
+        raise _core.ModelError(f"{name} is not an array of numbers") from None
+    if forces.ndim not in (1, 2) or forces.shape[-1] != nv:
+        raise _core.ModelError(f"{name} of {model.name!r} takes {nv} numbers, or (B, {nv}) for a batch")
+    if not np.isfinite(forces).all():
+        at = tuple(int(i) for i in np.argwhere(~np.isfinite(forces))[0])
+        hinge = next(h for h in model.hinges.values() if h.v_slice.start <= at[-1] < h.v_slice.stop)
+        raise _core.ModelError(f"{name} of hinge {hinge.name!r}: entry {at[-1] - hinge.v_slice.start} is {forces[at]}")
+    return forces
+
+
+def output(out: Any, shape: tuple[int, ...]) -> np.ndarray:
+    """The array that a result is written to: `out` where it fits, a new one where it is None."""
+    if out is None:
+        return np.empty(shape)
+    fits = isinstance(out, np.ndarray) and out.dtype == np.float64 and out.flags.c_contiguous and out.flags.writeable
+    if not fits or out.shape != shape:
+        raise _core.ModelError(f"out= takes a writeable C-ordered float64 array of shape ({', '.join(map(str, shape))})")
+    return out
