@@ -249,7 +249,8 @@ def test_a_rod_about_its_own_axis_askew(share, form):
         rod = dict(mass=1.0, com=0.5 * axis, inertia=rod_inertia(axis, 1.0, share))
         arm.add_body("rod", "base", "pin", axis=axis, position=rng.normal(size=3), **rod)
         answers += right_or_refused(arm, rng.normal(size=2), np.ones(2), form)
-    assert answers <= 6 if share == 0 else answers >= 54 if share == 1e-14 else True
+    # Factors know the rounding of the inertia's entries as an inertia where it exceeds 2 eps of them; the plain form never does.
+    assert answers <= (6 if form == "fast" else 30) if share == 0 else answers >= 54 if share == 1e-14 else True
 
 
 def nearly_dependent(rng):
