@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Binding', 'Dynamics', 'Error', 'EvaluationError', 'Integration', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'Scalar', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'Theorem', 'blockdiag', 'constant', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'identity', 'integrators', 'methods', 'operators_of', 'precisions', 'residual', 'scalar', 'step_kinds', 'symbol_table', 'theorems', 'time_apply', 'time_dynamics', 'time_forward', 'time_method', 'time_packs', 'vector', 'wider', 'zero']
+__all__: list[str] = ['Binding', 'Dynamics', 'Error', 'EvaluationError', 'Integration', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'Scalar', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'Theorem', 'blockdiag', 'checked_refinement', 'constant', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'identity', 'integrators', 'methods', 'operators_of', 'precisions', 'residual', 'scalar', 'step_kinds', 'symbol_table', 'theorems', 'time_apply', 'time_dynamics', 'time_forward', 'time_method', 'time_packs', 'vector', 'wider', 'zero']
 
 class Error(Exception): ...
 class SpaceError(Error, TypeError): ...
@@ -763,6 +763,10 @@ def _twist_parameter(arg0: MultibodyOperators, arg1: collections.abc.Sequence[tu
 def blockdiag(operator: Operator) -> Operator:
     """
     The operator's diagonal blocks, body by body, zero elsewhere.
+    """
+def checked_refinement(refine: typing.Any, residual: str, precision: str | int) -> typing.Any:
+    """
+    The number of corrections, or 'auto'; EvaluationError for anything else.
     """
 def constant(array: typing.Any, domain: typing.Any, codomain: typing.Any, name: str = 'C') -> Operator:
     """

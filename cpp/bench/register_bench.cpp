@@ -44,7 +44,7 @@ py::dict time_apply(const Expression& e, const Array& x, double seconds, bool ru
 // One forward dynamics per state in rotation, in every way there is.
 py::dict time_forward(const std::shared_ptr<Multibody>& model, const Array& q, const Array& v, const Array& u, double seconds, Form form, const py::object& refine,
                       const std::string& residual, Precision precision) {
-  const Solving how{form, refinement(refine, residual), OnSingular::raise};
+  const Solving how{form, refinement(refine, residual, precision), OnSingular::raise};
   const int K = states_of(q), nq = model->nq(), nv = model->nv();
   const double *Q = q.data(), *V = v.data(), *U = u.data();
   Timing t;

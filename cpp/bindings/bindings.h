@@ -68,7 +68,7 @@ Expression source_symbol(const std::shared_ptr<SkoSource>& source, const std::st
 std::shared_ptr<const Binding> make_binding(const std::vector<Expression>& operands, const py::object& q, const py::object& v,
                                             const Arithmetic& arithmetic);
 // refine: a number of corrections or "auto"; residual: "same" | "wider".
-Refinement refinement(const py::object& refine, const std::string& residual);
+Refinement refinement(const py::object& refine, const std::string& residual, Precision precision);
 // What an expression is pickled as.
 py::tuple parts(const Expression& e);
 

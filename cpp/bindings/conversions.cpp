@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cstring>
 
 #include "algebra/errors.h"
@@ -92,7 +93,9 @@ Array real_array(const py::object& x) {
   return a;
 }
 
-Refinement refinement(const py::object& refine, const std::string& residual) {
+constexpr int most_steps = 1000;  // what has not converged by then does not
+
+Refinement refinement(const py::object& refine, const std::string& residual, Precision precision) {
   Refinement r;
   if (residual != "same" && residual != "wider")
     throw EvaluationError("residual '" + residual + "' is not there; there are 'same' (the precision itself) and 'wider' (the next one up)");
@@ -100,9 +103,14 @@ Refinement refinement(const py::object& refine, const std::string& residual) {
   if (py::isinstance<py::str>(refine) && py::cast<std::string>(refine) == "auto") {
     r.steps = Refinement::automatic;
   } else {
-    if (!py::isinstance<py::int_>(refine) || (r.steps = py::cast<int>(refine)) < 0)
-      throw EvaluationError("refine=" + py::cast<std::string>(py::repr(refine)) + ": a number of corrections, 0, 1, 2, ..., or 'auto'");
+    const bool whole = PyIndex_Check(refine.ptr()) && !py::isinstance<py::bool_>(refine);
+    const py::ssize_t steps = whole ? PyNumber_AsSsize_t(refine.ptr(), nullptr) : -1;  // clipped to its range
+    r.steps = static_cast<int>(std::clamp<py::ssize_t>(steps, -1, most_steps + 1));
+    if (r.steps < 0 || r.steps > most_steps)
+      throw EvaluationError("refine=" + py::cast<std::string>(py::repr(refine)) + ": a number of corrections, 0, 1, 2, ..., " + std::to_string(most_steps) + ", or 'auto'");
   }
+  if (r.wider && r.steps != 0 && precision == Precision::digits100)
+    throw EvaluationError("residual 'wider': nothing is wider than 100 digits; there is residual 'same'");
   return r;
 }
 

@@ -74,12 +74,16 @@ void run_forward(Dynamics& d, const Forces& in, const Solving& how, double* out)
 }  // namespace
 
 void register_dynamics(py::module_& m) {
+  m.def("checked_refinement", [](const py::object& refine, const std::string& residual, Precision precision) {
+    const int steps = refinement(refine, residual, precision).steps;
+    return steps == Refinement::automatic ? py::object(py::str("auto")) : py::object(py::int_(steps));
+  }, py::arg("refine"), py::arg("residual"), py::arg("precision"), "The number of corrections, or 'auto'; EvaluationError for anything else.");
   py::class_<Dynamics>(m, "Dynamics")
       .def(py::init<std::shared_ptr<Multibody>>())
       .def("forward_dynamics", [](Dynamics& d, const py::object& q, const py::object& v, const py::object& tau, Form form, const py::object& refine,
                                   const std::string& residual, Precision precision, const std::string& on_singular, const py::object& out) {
         const Forces in(d.model(), q, v, tau);
-        const Solving how{form, refinement(refine, residual), on_singular_from_name(on_singular)};
+        const Solving how{form, refinement(refine, residual, precision), on_singular_from_name(on_singular)};
         py::array_t<double> result = output(out, in.batch, {d.model().nv()});
         double* target = result.mutable_data();
         py::gil_scoped_release release;
@@ -90,7 +94,7 @@ void register_dynamics(py::module_& m) {
                             const std::string& residual, Precision precision) {
         const Forces in(d.model(), q, v, tau);
         if (in.batch >= 0) throw ModelError("the corrections of a refinement are those of one state; a batch has as many as states");
-        const Solving how{form, refinement(refine, residual), OnSingular::raise};
+        const Solving how{form, refinement(refine, residual, precision), OnSingular::raise};
         py::array_t<double> value = output(py::none(), -1, {d.model().nv()});
         std::vector<double> corrections;
         at_precision(precision, [&]<class S>(S) {
@@ -110,7 +114,7 @@ void register_dynamics(py::module_& m) {
         const int nv = mb.nv();
         const Argument a = argument(q, mb.nq(), "q", mb);
         check_states(mb, a, a.batch);
-        const Solving how{form, refinement(refine, residual), on_singular_from_name(on_singular)};
+        const Solving how{form, refinement(refine, residual, precision), on_singular_from_name(on_singular)};
         py::array_t<double> result = output(out, a.batch, {nv, nv});
         double* target = result.mutable_data();
         py::gil_scoped_release release;

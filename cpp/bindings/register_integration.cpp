@@ -85,7 +85,7 @@ void register_integration(py::module_& m) {
                             const py::object& damping, const std::string& integrator, double rtol, double atol, double step, bool normalise,
                             Precision precision, Form form, const py::object& refine) {
         const Multibody& mb = d.model();
-        const Solving how{form, refinement(refine, "same"), OnSingular::raise};
+        const Solving how{form, refinement(refine, "same", precision), OnSingular::raise};
         const TrajectoryOptions options{integrator_from_name(integrator), rtol, atol, step, normalise};
         const Array q0 = numbers(q, "q"), v0 = numbers(v, "v");
         mb.check_q(q0.data(), q0.size());

@@ -182,7 +182,7 @@ void register_operators(py::module_& m) {
       .def("inv", &Expression::inv, "The inverse, as an expression; how it is evaluated is the planner's business (see explain).")
       .def("sqrt", &square_root, "L with A = L L.T, body by body; for symmetric block-diagonal operators.")
       .def("at", [](const Expression& e, const py::object& q, const py::object& v, Form form, const py::object& refine, const std::string& residual, Precision precision) {
-        return e.at(make_binding({e}, q, v, {form, refinement(refine, residual), precision}));
+        return e.at(make_binding({e}, q, v, {form, refinement(refine, residual, precision), precision}));
       }, py::arg("q") = py::none(), py::arg("v") = py::none(), py::kw_only(), py::arg("form") = Form::fast, py::arg("refine") = 0, py::arg("residual") = "same", py::arg("precision") = Precision::double_,
          "The same expression bound to a state: q (nq,) or a batch (B, nq), v likewise (zero if left out); q=None takes the model's present\n"
          "state. The innermost binding wins. form: \"fast\", \"ud\" or \"square-root\", of the articulated-inertia sweep; refine: corrections of\n"

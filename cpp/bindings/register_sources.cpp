@@ -118,7 +118,7 @@ void register_sources(py::module_& m) {
     return all.empty() ? std::shared_ptr<Binding>() : std::const_pointer_cast<Binding>(all[0].binding);
   });
   m.def("_bind", [](const std::vector<Expression>& operands, const py::object& q, const py::object& v, Form form, const py::object& refine,
-                    const std::string& residual, Precision precision) { return make_binding(operands, q, v, {form, refinement(refine, residual), precision}); },
+                    const std::string& residual, Precision precision) { return make_binding(operands, q, v, {form, refinement(refine, residual, precision), precision}); },
         py::arg("operands"), py::arg("q"), py::arg("v"), py::arg("form") = Form::fast, py::arg("refine") = 0, py::arg("residual") = "same",
         py::arg("precision") = Precision::double_);
 

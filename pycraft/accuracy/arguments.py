@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..models.direct_calls import checked_refinement
 from .rungs import OTHER_METHODS, epsilon
 
 METHODS = ("articulated", *OTHER_METHODS)
@@ -66,7 +65,7 @@ def checked_refinements(given: Any) -> list[tuple[int | str, str]]:
         refine, residual = one if isinstance(one, (tuple, list)) else (one, "same")
         if residual not in RESIDUALS:
             raise _core.EvaluationError(f"refinements: residual {residual!r} of {one!r} is not there; there are 'same' and 'wider'")
-        found.append((checked_refinement(refine, residual, "double"), residual))
+        found.append((_core.checked_refinement(refine, residual, "double"), residual))
     return found
 
 

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..models.direct_calls import checked_refinement
 from ..models.realization import checked_forces
 from .arguments import checked_model, checked_names, checked_positive, checked_seconds
 from .tidy import TidyTable, error_text, refusal_text, seconds_text
@@ -151,7 +150,7 @@ def work_precision(
     ([True, True], True)
     """
     checked_model(model, "work_precision")
-    seconds, refine = checked_seconds(seconds), checked_refinement(refine, "same", "double")
+    seconds, refine = checked_seconds(seconds), _core.checked_refinement(refine, "same", "double")
     q, v, tau = _initial(model, q, v, tau)
     if not isinstance(duration, (int, float, np.number)) or not 0 < duration < np.inf:
         raise _core.EvaluationError(f"duration={duration!r}: a positive, finite number of seconds")

@@ -10,9 +10,6 @@ import numpy as np
 from .. import _core
 from .realization import by_realization
 
-MOST_CORRECTIONS = 1000
-"""Of a refinement: what has not converged by then does not."""
-
 
 def cached(model: Any, name: str, make: Callable[[Any], Any]) -> Any:
     """What is made of a model at the first call and kept on it."""
@@ -26,20 +23,6 @@ def by_method(model: Any, method: str, q, v, tau, precision: str | int, out) -> 
     if method == "realization":
         return by_realization(model, q, v, tau, precision, out)
     return cached(model, "_methods", _core.Methods).forward_dynamics(method, q, v, tau, precision, out)
-
-
-def checked_refinement(refine: Any, residual: str, precision: str | int) -> int | str:
-    """`refine` as the core takes it: a number of corrections or "auto". Raises EvaluationError for anything else, for a number that is
-    none of corrections (True, 10**12), and for a wider residual where nothing is wider."""
-    if refine == "auto" and isinstance(refine, str):
-        steps: int | str = refine
-    elif isinstance(refine, (int, np.integer)) and not isinstance(refine, bool) and 0 <= refine <= MOST_CORRECTIONS:
-        steps = int(refine)
-    else:
-        raise _core.EvaluationError(f"refine={refine!r}: a number of corrections, 0, 1, 2, ..., {MOST_CORRECTIONS}, or 'auto'")
-    if steps and residual == "wider" and str(precision) == "100":
-        raise _core.EvaluationError("residual='wider': nothing is wider than 100 digits; there is residual='same'")
-    return steps
 
 
 class DirectCalls:
@@ -117,8 +100,6 @@ class DirectCalls:
         >>> arm.forward_dynamics([0, 0], [0, 0], [1, 0]).round(3).tolist()
         [1.714, -4.286]
         """
-        if type(refine) is not int or refine:
-            refine = checked_refinement(refine, residual, precision)
         if method == "articulated":
             return self._calls().forward_dynamics(q, v, tau, form, refine, residual, precision, on_singular, out)
         if not isinstance(method, str):
@@ -145,7 +126,7 @@ class DirectCalls:
         >>> found["steps"], found["corrections"][0] < 1e-14
         (1, True)
         """
-        value, corrections = self._calls().refinement(q, v, tau, form, checked_refinement(refine, residual, precision), residual, precision)
+        value, corrections = self._calls().refinement(q, v, tau, form, refine, residual, precision)
         return {"value": value, "steps": len(corrections), "corrections": corrections}
 
     def inverse_dynamics(self, q, v, vdot, *, precision: str | int = "double", out=None) -> np.ndarray:
@@ -205,8 +186,6 @@ class DirectCalls:
         >>> pc.chain(2).mass_matrix_inverse([0, 0]).round(3).tolist()
         [[1.714, -4.286], [-4.286, 13.714]]
         """
-        if type(refine) is not int or refine:
-            refine = checked_refinement(refine, residual, precision)
         return self._calls().mass_matrix_inverse(q, form, refine, residual, precision, on_singular, out)
 
     def jacobian(self, frame: str, q, *, precision: str | int = "double", out=None) -> np.ndarray:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import _core
-from .direct_calls import cached, checked_refinement
+from .direct_calls import cached
 from .realization import checked_forces
 from .sensitivities import SensitivityCalls
 
@@ -90,7 +90,7 @@ class IntegrationCalls(SensitivityCalls):
 
         if integrator not in integrator_names():
             raise _core.EvaluationError(f"no integrator is called {integrator!r}; there are {', '.join(map(repr, integrator_names()))}")
-        refine = checked_refinement(refine, "same", precision)
+        refine = _core.checked_refinement(refine, "same", precision)
         if normalise not in ("never", "each step"):
             raise _core.EvaluationError(f"normalise={normalise!r}: there are 'never' and 'each step'")
         q, v = np.array(getattr(q, "q", q), float), np.array(getattr(v, "v", v), float)
