@@ -346,8 +346,8 @@ class RigidBlocks {
   }
   // Whether a pivot may be noise, so that the error sweep must tell. Two things make noise: what a hinge carries rounds at its composite
   // inertia, not at the pivot, and light pivots y² » D enlarge what was there. The first is added up, the second multiplied, from the
-  // tips; of ratios y²/D only what exceeds 16 counts, or long chains of oblique axes would all be in doubt. Up to the fifth root of
-  // the rounding bound's inverse no product is; a machine of coordinate axes has y² = D, and pays for the first alone.
+  // tips; of ratios y²/D only what exceeds 16 counts, or long chains of oblique axes would all be in doubt, and only products above the
+  // fifth root of the rounding bound's inverse are. A machine of coordinate axes has y² = D.
   bool doubtful(int k) {
     const int n = tree_.dof[k], f = first(k);
     if (n == 0) return false;
