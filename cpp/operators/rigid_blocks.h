@@ -366,7 +366,7 @@ class RigidBlocks {
     }
     error_[k] += rounding_bound<S>(form) * fresh;
     growth_[k] *= maximum(S(1), S(grown / S(16)));
-    return !(largest_growth(form) > growth_[k] && S(1) > S(tree_.bodies()) * error_[k] * growth_[k]);
+    return !(largest_growth(form) > growth_[k] && S(1) > S(4) * error_[k] * growth_[k]);
   }
   // In units of the rounding bound: what factors of the body's inertia leave out. The plain form rounds at more than that.
   S uncertain(int k) const { return form == Form::fast ? S(0) : S((*inertia_factors)[k].uncertain / rounding_bound<S>(form)); }
