@@ -30,6 +30,7 @@ from ._core import (
 from .accuracy.table import accuracy
 from .accuracy.work_precision import work_precision
 from .identities import check
+from .interop import compare
 from .kalman import kalman
 from .models.generators import chain, tree
 from .models.load import load
@@ -63,6 +64,7 @@ __all__ = [
     "blockdiag",
     "chain",
     "check",
+    "compare",
     "constant",
     "derivative",
     "euclidean",
