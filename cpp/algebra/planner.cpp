@@ -89,6 +89,20 @@ void drop_unused(Plan& plan) {
   plan.steps.assign(kept.rbegin(), kept.rend());
 }
 
+// Of the symbols where one is bound, else of the leaves whose numbers hang on no state.
+Precision precision_of(const Expression& e) {
+  std::optional<Precision> symbols, leaves;
+  visit(e, [&](const Expression& x) {
+    const Symbol& s = x.node().symbol;
+    if (!s.binding) return;
+    auto& found = s.source ? symbols : leaves;
+    const Precision p = s.binding->arithmetic.precision;
+    if (s.source && found.value_or(p) != p) throw EvaluationError("two precisions in one expression: bind all of it with one .at(..., precision=...)");
+    found = p;
+  });
+  return symbols ? *symbols : leaves.value_or(Precision::double_);
+}
+
 }  // namespace
 
 Plan Planner::plan(const Expression& typed, Request request) {
@@ -195,23 +209,10 @@ Plan Planner::plan(const Expression& typed, Request request) {
   }
   drop_unused(plan_);
   emit_values();
-  for (const Context& c : plan_.contexts) {
-    if (!c.binding) continue;
-    if (c.binding->batch >= 0) {
-      if (plan_.batched && plan_.batch != c.binding->batch)
-        throw EvaluationError("batches of " + std::to_string(plan_.batch) + " and " + std::to_string(c.binding->batch) + " states in one expression");
-      plan_.batched = true;
-      plan_.batch = c.binding->batch;
-    }
-  }
-  bool first = true;
-  for (const Context& c : plan_.contexts) {
-    const Precision p = c.binding ? c.binding->arithmetic.precision : Precision::double_;
-    if (!c.binding) continue;
-    if (!first && p != plan_.precision) throw EvaluationError("two precisions in one expression: bind all of it with one .at(..., precision=...)");
-    plan_.precision = p;
-    first = false;
-  }
+  // Of what was typed: theorems may leave nothing in the plan that hangs on a state.
+  plan_.batch = batch_of(typed);
+  plan_.batched = plan_.batch >= 0;
+  plan_.precision = precision_of(typed);
   return std::move(plan_);
 }
 
