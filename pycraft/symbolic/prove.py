@@ -15,6 +15,7 @@ from typing import Any
 from .. import _core
 from ..identities.checker import with_spaces
 from ..identities.parse import ParseError, Statement, Statements
+from . import mechanics
 from .attempt import Attempt, Outcome
 from .completion import complete
 from .derivation import DerivativeProblem
@@ -219,7 +220,7 @@ def _settings(problem: DerivativeProblem) -> Iterator[tuple[Setting, list[tuple[
     if "Ḣ" in names:
         constant.append((Equation("hypothesis", "Ḣ = 0", {("Ḣ",): ONE}, {}, hypothesis="constant H"), ("Ḣ",)))
     possible += ["single-DOF hinges"] * bool(deltas) + ["constant H"] * bool(constant)
-    composite, velocities = "R" in names, bool(names & {"Ṽ", "V̄", "Ḣ"})
+    composite, velocities = "R" in names, bool(names & mechanics.NAMES)
     for size in range(len(possible) + 1):
         for chosen in itertools.combinations(possible, size):
             extra = list(rules) + constant * ("constant H" in chosen)
