@@ -48,7 +48,7 @@ DEFINITIONS = [
 HYPOTHESES = {"J = 0": "J = 0", "S = 0": "serial chain"}
 
 # What an inverse is. Where M⁻¹, P⁻¹, R⁻¹, J⁻¹, Υ⁻¹ stand in a statement, it presupposes that they exist.
-INVERTIBLE = ("φ", "ψ", "D", "M", "P", "R", "J", "Υ")
+INVERTIBLE = ("φ", "ψ", "X", "D", "M", "P", "R", "J", "Υ")
 INVERSES = [f"{x} {x}⁻¹ = I" for x in INVERTIBLE] + [f"{x}⁻¹ {x} = I" for x in INVERTIBLE]
 
 LEMMAS: list[tuple[str, list[tuple[str, str]]]] = [

@@ -21,6 +21,7 @@ from .walk import GaveUp, Walk, carried_out
 from .words import (
     FURTHER,
     ONE,
+    SHARED,
     Alphabet,
     Letter,
     Number,
@@ -103,6 +104,7 @@ class Problem:
         self.alphabet = Alphabet()
         self.opaque: list[Opaque] = []
         self.contexts: list[tuple[Any, Any]] = []  # (source, binding): the models at their states
+        self.relations: list[tuple[str, str, str]] = []  # (mark of a tree made of another, how, that one's mark)
         self.sides: list[Polynomial] = []
         self.numbers = False  # whether both sides map R^1 to R^1
         self._named_operands = 0
@@ -230,8 +232,13 @@ class Problem:
 
     def _symbol(self, e: Any) -> str:
         source, ascii, arguments, binding = symbol_parts(e)
-        mark = self._mark_of(source, binding)
         text, _ = _TABLE.get(ascii, (e.text(), ""))
+        made = source.derived_from
+        if made is not None and made[0] == "hinge subset" and text in SHARED:
+            source, made = made[1], None
+        mark = self._mark_of(source, binding)
+        if made is not None and (mark, made[0]) not in [(m, kind) for m, kind, _ in self.relations]:
+            self.relations.append((mark, made[0], self._mark_of(made[1], binding)))
         known = self.alphabet.letters.get(text + mark)
         if known is not None and known.ascii == ascii and not arguments:
             self.alphabet.add(Letter(known.name, known.text, known.latex, known.symmetric, known.shape, known.ascii, e))

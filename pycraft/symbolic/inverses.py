@@ -11,7 +11,7 @@ from functools import lru_cache
 
 from .axioms import theory
 from .blocks import diagonal_part
-from .equations import Equation, Step, Use, chain_holds, numbered
+from .equations import Equation, Step, Use, chain_holds, marked, numbered
 from .expand import Opaque, Problem
 from .presuppositions import (
     ALWAYS,
@@ -22,9 +22,11 @@ from .presuppositions import (
     is_regular_constant,
     is_triangular,
 )
+from .relations import in_world
 from .rules import Rules, Setting, normal_form, rule_from, rules_for, weight
 from .words import (
     ONE,
+    SHARED,
     Alphabet,
     Number,
     Polynomial,
@@ -34,7 +36,6 @@ from .words import (
     inverse_of,
     inverted,
     monomial,
-    of_model,
     parse,
     plain,
     ratio,
@@ -71,9 +72,10 @@ class LocalRules:
         self.problem, self.setting = problem, setting
         self.alphabet: Alphabet = problem.alphabet
         self.local: list[Equation] = []
-        self.rules: Rules = rules_for(setting, problem.marks).copy()
+        self.locked = tuple((mark, base) for mark, how, base in problem.relations if how == "hinge subset")
+        self.rules: Rules = rules_for(setting, problem.marks, self.locked).copy()
         blocks = Setting(setting.hypotheses, composite=True, compliance=True)
-        self.block_rules = rules_for(blocks, problem.marks).copy() if any(o.kind == "blockdiag" for o in problem.opaque) else None
+        self.block_rules = rules_for(blocks, problem.marks, self.locked).copy() if any(o.kind == "blockdiag" for o in problem.opaque) else None
         self._rank = 0
         self._forms: list[tuple[str, Polynomial]] = []
         self._roots: list[tuple[Opaque, Polynomial, list[Step]]] = []
@@ -86,12 +88,24 @@ class LocalRules:
         self._definite = {n for n, e in constants.items() if is_positive_constant(e)}
         for equation, word in extra:
             self.add(equation, word)
+        self._world_axes()
         self.inverted = {inverse_of(n) for n in named}
         for name in named:
             if name not in theory().alphabet.letters:
                 self._add_pairs(name)
         for opaque in problem.opaque:
             {"inverse": self._inverse, "blockdiag": self._blocks, "sqrt": self._root}[opaque.kind](opaque)
+
+    def _world_axes(self) -> None:
+        """Letters in world axes by those of their model."""
+        found = {
+            x.replace("*", "") if not inverted(x) else inverse_of(split(x)[0]) for p in self.problem.polynomials() for w in p for x in w
+        }
+        for mark, how, base in self.problem.relations:
+            for letter in sorted(found) if how == "world frame" else ():
+                equation = in_world(letter, mark, base)
+                if equation is not None:
+                    self.add(equation, (letter,))
 
     def add(self, equation: Equation, word: Word, blocks: bool = True) -> None:
         """A rule and its transpose, before all that are there."""
@@ -161,9 +175,10 @@ class LocalRules:
             if all(plain(x) in ("φ", "ψ", "D", "M", "P", "R", "Υ") or inverted(x) for x in word):
                 yield {tuple(inverse_of(x) for x in reversed(word)): ratio(1, c)}
         for mark in self.problem.marks:
-            key, scale = _scaled({tuple(_unmarked(x, mark) for x in w): c for w, c in form.items()})
+            base = dict(self.locked).get(mark, mark)
+            key, scale = _scaled({tuple(_unmarked(x, base if plain(x) in SHARED else mark) for x in w): c for w, c in form.items()})
             for z, its_scale in _known_inverses(self.setting).get(key, ()):
-                yield {tuple(of_model(x, mark) for x in w): ratio(c * its_scale, scale) for w, c in z.items()}
+                yield {marked(w, mark, base): ratio(c * its_scale, scale) for w, c in z.items()}
         key, scale = _scaled(form)
         for X, other in self._forms:
             for name, p in ((X, other), (self.alphabet.star(X), self.alphabet.star_of(other))):

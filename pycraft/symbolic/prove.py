@@ -220,7 +220,7 @@ def _settings(problem: DerivativeProblem) -> Iterator[tuple[Setting, list[tuple[
     if "Ḣ" in names:
         constant.append((Equation("hypothesis", "Ḣ = 0", {("Ḣ",): ONE}, {}, hypothesis="constant H"), ("Ḣ",)))
     possible += ["single-DOF hinges"] * bool(deltas) + ["constant H"] * bool(constant)
-    composite, velocities = "R" in names, bool(names & mechanics.NAMES)
+    composite, velocities = "R" in names or bool(problem.relations), bool(names & mechanics.NAMES)
     for size in range(len(possible) + 1):
         for chosen in itertools.combinations(possible, size):
             extra = list(rules) + constant * ("constant H" in chosen)

@@ -13,15 +13,15 @@ from functools import cache, lru_cache
 
 from . import mechanics
 from .axioms import Theory, solved, theory
-from .equations import Equation, Step, Use, numbered
+from .equations import Equation, Step, Use, marked, numbered
 from .walk import GaveUp
-from .words import ONE, Alphabet, Number, Polynomial, Word, add_to, inverted, of_model, plain, ratio
+from .words import ONE, Alphabet, Number, Polynomial, Word, add_to, inverted, plain, ratio
 
 WORDS, REWRITES = 2000, 12000
 """Sizes at which a reduction gives up."""
 
 # (the word that goes, the equation), in order of rank. Transposes are rules as well.
-_CANCELLING = [(f"{x} {x}⁻¹", f"{x} {x}⁻¹ = I") for x in ("D", "M", "P", "R", "J", "Υ")]
+_CANCELLING = [(f"{x} {x}⁻¹", f"{x} {x}⁻¹ = I") for x in ("D", "M", "P", "R", "J", "Υ", "X")] + [("X⁻¹ X", "X⁻¹ X = I")]
 _RESOLVENTS = [
     ("φ E_φ", "φ E_φ = φ − I"),
     ("E_φ φ", "E_φ φ = φ − I"),
@@ -271,8 +271,11 @@ def _vanishing(setting: Setting) -> list[tuple[str, str]]:
 
 
 @lru_cache(maxsize=64)
-def rules_for(setting: Setting, marks: tuple[str, ...] = ("",)) -> Rules:
-    """The rules of a setting for the letters of one or more models. Shared: copy before adding."""
+def rules_for(setting: Setting, marks: tuple[str, ...] = ("",), locked: tuple[tuple[str, str], ...] = ()) -> Rules:
+    """The rules of a setting for the letters of one or more models. The result is shared: copy before adding.
+
+    `locked` : (mark, that of its model) of the trees with hinges locked.
+    """
     facts = theory()
     rules = Rules()
     for group, (text_word, text) in enumerate(chosen(setting)):
@@ -284,16 +287,16 @@ def rules_for(setting: Setting, marks: tuple[str, ...] = ("",)) -> Rules:
             if text != zero:
                 equation = corollary(equation, word, letter, zero)
         for mark in marks:
-            _add_both(rules, equation, word, facts, mark, group)
+            _add_both(rules, equation, word, facts, (mark, dict(locked).get(mark, mark)), group)
     return rules
 
 
-def _add_both(rules: Rules, equation: Equation, word: Word, facts: Theory, mark: str, group: int) -> None:
+def _add_both(rules: Rules, equation: Equation, word: Word, facts: Theory, marks: tuple[str, str], group: int) -> None:
     """A rule and its transpose, for the letters of one model."""
     starred = facts.alphabet.star_word(word)
     pairs = [(equation, word)] + ([(equation.transposed(facts.alphabet), starred)] if starred not in equation.difference else [])
     for e, w in pairs:
-        rules.add(rule_from(e.copied(mark), tuple(of_model(x, mark) for x in w), group))
+        rules.add(rule_from(e.copied(*marks), marked(w, *marks), group))
 
 
 @cache

@@ -22,6 +22,8 @@ Polynomial = dict[Word, Number]
 ONE = 1
 FURTHER = "₂₃₄₅₆₇₈₉"
 """Marks of the letters of a second model, a third, ..., in one statement."""
+SHARED = ("E_φ", "φ", "φ̃", "M", "R")
+"""Letters that do not depend on which hinges move: of a tree with some locked they are those of its model."""
 _MARKS = ("⁻*", "⁻¹", "*")
 _TRANSPOSED = {"": "*", "*": "", "⁻¹": "⁻*", "⁻*": "⁻¹"}
 _INVERTED = {"": "⁻¹", "⁻¹": "", "*": "⁻*", "⁻*": "*"}
