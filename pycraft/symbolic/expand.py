@@ -106,6 +106,8 @@ class Problem:
         self.contexts: list[tuple[Any, Any]] = []  # (source, binding): the models at their states
         self.relations: list[tuple[str, str, str]] = []  # (mark of a tree made of another, how, that one's mark)
         self.sides: list[Polynomial] = []
+        self.of_one_model = False  # whether the statement was made of a model's expressions, and not read for all
+        self.scalars = False  # whether both sides are scalars: traces, determinants, norms
         self.numbers = False  # whether both sides map R^1 to R^1
         self._named_operands = 0
         self._leaves: dict[Any, str] = {}
@@ -156,7 +158,7 @@ class Problem:
             case "identity":
                 return {(): ONE}
             case "scaled":
-                c = _exact(e.coefficient)
+                c = exact(e.coefficient)
                 p = yield self._words(e.children[0], transposed)
                 return {w: c * x for w, x in p.items()} if c else {}
             case "sum":
@@ -194,11 +196,11 @@ class Problem:
             case "identity":
                 return {(): ONE}
             case "scaled" if e.coefficient:
-                c = ratio(1, _exact(e.coefficient))
+                c = ratio(1, exact(e.coefficient))
                 return {w: c * x for w, x in (yield self._inverse(e.children[0])).items()}
             case "transpose":
                 return self._star((yield self._inverse(e.children[0])))
-            case "product" if all(map(_square, e.children)):
+            case "product" if all(map(square, e.children)):
                 return (yield self._product(self._inverse(f) for f in reversed(e.children)))
             case "symbol" if e.name in UNFOLDED:
                 return (yield self._inverse(self._unfolded(e)))
@@ -222,6 +224,12 @@ class Problem:
     def letter(self, e: Any) -> str:
         """The letter that an expression is."""
         return carried_out(self._letter(e))
+
+    def operand(self, e: Any) -> str:
+        """The letter of what a determinant or norm is taken of: its own where it is one."""
+        return (
+            self.letter(e) if e.kind in ("symbol", "constant") and e.name not in UNFOLDED else carried_out(self._operand("operand", e, e))
+        )
 
     def _letter(self, e: Any) -> Walk:
         if e not in self._leaves:
@@ -281,14 +289,14 @@ class Problem:
             if len(self.opaque) == OPERANDS:
                 raise GaveUp
             name = f"⟨{len(self.opaque) + 1}⟩"
-            text, latex = self._shown(inner, e) if kind == "inverse" else (e.text(), f"{{{e.latex()}}}")
+            text, latex = self._shown(inner, e) if kind in ("inverse", "operand") else (e.text(), f"{{{e.latex()}}}")
             symmetric = kind == "blockdiag" and bool(e.is_symmetric)
-            self.alphabet.add(Letter(name, text, latex, symmetric, "full" if kind == "inverse" else "diagonal", None, e))
+            self.alphabet.add(Letter(name, text, latex, symmetric, "diagonal" if kind in ("blockdiag", "sqrt") else "full", None, e))
             definition = Equation("definition", f"{text} = {self.alphabet.text(inner)}", monomial(name), inner)
             self.opaque.append(Opaque(name, kind, e, inner, definition))
             self._leaves[key] = name
         found = self._leaves[key]
-        if kind == "inverse":
+        if kind in ("inverse", "operand"):
             self._used.append(next(o.definition for o in self.opaque if o.name == found))
         return found
 
@@ -314,7 +322,7 @@ def _same_state(a: Any, b: Any) -> bool:
     return a is b or a is not None and b is not None and a.__reduce__()[1] == b.__reduce__()[1]
 
 
-def _exact(coefficient: float) -> Number:
+def exact(coefficient: float) -> Number:
     if not math.isfinite(coefficient):
         raise _core.EvaluationError(f"a coefficient {coefficient} is no number to reckon with")
     return ratio(Fraction(coefficient), 1)
@@ -324,7 +332,7 @@ def _bound(symbol: Any, binding: Any) -> Any:
     return symbol if binding is None else symbol._bound(binding)
 
 
-def _square(factor: Any) -> bool:
+def square(factor: Any) -> bool:
     """Whether a factor is square by meaning: H may be square by accident."""
     domain, codomain = factor.domain, factor.codomain
     return domain is None or domain == codomain or domain.dual == codomain

@@ -22,7 +22,7 @@ from .presuppositions import (
     is_regular_constant,
     is_triangular,
 )
-from .relations import in_world
+from .relations import at_the_roots, in_world
 from .rules import Rules, Setting, normal_form, rule_from, rules_for, weight
 from .words import (
     ONE,
@@ -75,7 +75,8 @@ class LocalRules:
         self.locked = tuple((mark, base) for mark, how, base in problem.relations if how == "hinge subset")
         self.rules: Rules = rules_for(setting, problem.marks, self.locked).copy()
         blocks = Setting(setting.hypotheses, composite=True, compliance=True)
-        self.block_rules = rules_for(blocks, problem.marks, self.locked).copy() if any(o.kind == "blockdiag" for o in problem.opaque) else None
+        diagonal_parts = any(o.kind == "blockdiag" for o in problem.opaque)
+        self.block_rules = rules_for(blocks, problem.marks, self.locked).copy() if diagonal_parts else None
         self._rank = 0
         self._forms: list[tuple[str, Polynomial]] = []
         self._roots: list[tuple[Opaque, Polynomial, list[Step]]] = []
@@ -89,12 +90,17 @@ class LocalRules:
         for equation, word in extra:
             self.add(equation, word)
         self._world_axes()
+        source = problem.contexts[0][0] if problem.contexts else None
+        for name, e in constants.items():
+            for equation, word in at_the_roots(name, e, source) if getattr(e, "kind", "") == "constant" else ():
+                self.add(equation, word)
         self.inverted = {inverse_of(n) for n in named}
         for name in named:
             if name not in theory().alphabet.letters:
                 self._add_pairs(name)
         for opaque in problem.opaque:
-            {"inverse": self._inverse, "blockdiag": self._blocks, "sqrt": self._root}[opaque.kind](opaque)
+            if opaque.kind != "operand":
+                {"inverse": self._inverse, "blockdiag": self._blocks, "sqrt": self._root}[opaque.kind](opaque)
 
     def _world_axes(self) -> None:
         """Letters in world axes by those of their model."""
@@ -276,7 +282,9 @@ class LocalRules:
         """The equation with its sides in normal form, as a rule for one of its words."""
         a = self.alphabet
         form, steps = self.reduce(equation.difference)
-        c = form[lead]
+        c = form.get(lead)
+        if c is None:  # the letters are written by those of another tree
+            return
         rest = {w: ratio(-x, c) for w, x in form.items() if w != lead}
         uses = [Use(ratio(1, c), (), equation, (), lead)] + [u.between((), (), ratio(-1, c)) for step in steps for u in step.uses]
         step = Step({lead: ONE}, rest, uses, a, f"{equation.text}, solved for {a.word_text(lead)}")

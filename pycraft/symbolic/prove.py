@@ -7,6 +7,7 @@ side: first without a hypothesis, then under those that may matter, fewest first
 
 from __future__ import annotations
 
+import functools
 import itertools
 import re
 from collections.abc import Iterator
@@ -15,7 +16,7 @@ from typing import Any
 from .. import _core
 from ..identities.checker import with_spaces
 from ..identities.parse import ParseError, Statement, Statements
-from . import mechanics
+from . import mechanics, scalars
 from .attempt import Attempt, Outcome
 from .completion import complete
 from .derivation import DerivativeProblem
@@ -51,8 +52,7 @@ def prove(lhs: Any, rhs: Any = None, model: Any = None) -> Proof:
 
     Notes
     -----
-    Cost: milliseconds to a few tenths of a second, whatever the size of the model; no number decides anything. Traces, determinants and
-    norms are outside.
+    Cost: milliseconds to a few tenths of a second, whatever the size of the model; no number decides anything.
 
     Examples
     --------
@@ -153,17 +153,19 @@ def _one_identity(side: Any) -> Any:
 def _prove(read: Statement, model: Any) -> Proof:
     problem = DerivativeProblem()
     read = Statement(_one_identity(read.lhs), _one_identity(read.rhs), read.text, read.reading)
-    for side in (read.lhs, read.rhs):
-        if not hasattr(side, "kind"):
-            lhs, rhs = (s if hasattr(s, "latex") else _core.scalar(float(s)) for s in (read.lhs, read.rhs))
-            shown = Statement(lhs, rhs, read.text, read.reading)
-            return Proof.of_statement(shown, problem, [], [], ({}, {}), "traces, determinants and norms are no sums of words")
+    sides = [_core.scalar(float(side)) if isinstance(side, int | float) else side for side in (read.lhs, read.rhs)]
+    read = Statement(*sides, read.text, read.reading)
+    problem.scalars = not any(hasattr(side, "kind") for side in sides)
+    problem.of_one_model = read.reading == "expressions"
+    expand = problem.expand if not problem.scalars else functools.partial(scalars.expand, problem)
     try:
-        left, right = problem.expand(read.lhs), problem.expand(read.rhs)
+        left, right = expand(read.lhs), expand(read.rhs)
     except GaveUp:
         return Proof.of_statement(read, problem, [], [], ({}, {}), "it is too large: too many words, inverses or nodes")
     p, q = problem.sides = [left.before, right.before]
-    problem.numbers = all(space is not None and space.name == "R^1" for space in (read.lhs.domain, read.lhs.codomain))
+    problem.numbers = not problem.scalars and all(
+        space is not None and space.name == "R^1" for space in (read.lhs.domain, read.lhs.codomain)
+    )
     nearest: tuple[Polynomial, Polynomial] | None = None
     own, void = _operators(model) if model is not None else _operators_of(problem), ""
     for attempt, outcome in _attempts(problem, p, q):
