@@ -265,6 +265,49 @@ def joined(left: Sequence[Step], right: Sequence[Step], lhs: Polynomial, rhs: Po
     return numbered([*left, *backwards] or [Step(lhs, rhs, [], alphabet)])
 
 
+def opened(step: Step, equation: Equation | None = None) -> list[Step]:
+    """The step with the lemma that it uses carried out: that lemma's steps at its place. Itself where there is nothing to open.
+
+    With `equation`, the uses of that one are opened, wherever they stand; else a step with a single use is.
+    """
+    chosen = [u for u in step.uses if (equation is None or u.equation.root is equation) and u.equation.steps and u.equation.kind == "lemma"]
+    chosen += [u for u in step.uses if equation is not None and u.equation.root is equation and u not in chosen and _turned(u) is not None]
+    if not chosen or equation is None and len(step.uses) != 1:
+        return [step]
+    at, after = step.full()
+    made: list[Step] = []
+    for use in chosen:
+        own = use.equation.steps or _turned(use) or []
+        steps = own if use.forward else [s.reversed() for s in reversed(own)]
+        c = use.coefficient if use.forward else -use.coefficient
+        for s in steps:
+            s = s.between(use.left, use.right, c)
+            s.before, s.after = at, combine((1, at), (1, s.after), (-1, s.before))
+            s.alphabet, at = step.alphabet, s.after
+            made.append(s)
+    rest = [u for u in step.uses if u not in chosen]
+    if rest or at != after:
+        made.append(Step(at, after, rest, step.alphabet, step.title))
+    return made if all(s.holds() for s in made) else [step]
+
+
+def _turned(use: Use) -> list[Step] | None:
+    """The steps of a transposed lemma: those of the lemma, transposed. None where it has none."""
+    e = use.equation
+    if e.kind != "transpose" or e.source is None or e.source.kind != "lemma" or not e.source.steps:
+        return None
+    steps = []
+    for s in e.source.steps:
+        a = s.alphabet
+        uses = [
+            Use(u.coefficient, a.star_word(u.right), u.equation.transposed(a), a.star_word(u.left), a.star_word(u.word), u.forward)
+            for u in s.uses
+        ]
+        before, after = s.full()
+        steps.append(Step(a.star_of(before), a.star_of(after), uses, a, s.title))
+    return steps
+
+
 # ---------------------------------------------------------------------- what a proof rests on
 def foundations(equations: Iterable[Equation]) -> list[Equation]:
     """Everything that these rest on, themselves included, premises first.

@@ -14,6 +14,7 @@ from fractions import Fraction
 from typing import Any
 
 from .. import _core
+from . import factors
 from .axioms import INVERTIBLE
 from .equations import Equation, Step, symmetries
 from .rules import WORDS
@@ -288,7 +289,7 @@ class Problem:
             inner = yield self._words(operand)
             if len(self.opaque) == OPERANDS:
                 raise GaveUp
-            name = f"⟨{len(self.opaque) + 1}⟩"
+            name = self._factor(inner) or f"⟨{len(self.opaque) + 1}⟩"
             text, latex = self._shown(inner, e) if kind in ("inverse", "operand") else (e.text(), f"{{{e.latex()}}}")
             symmetric = kind == "blockdiag" and bool(e.is_symmetric)
             self.alphabet.add(Letter(name, text, latex, symmetric, "diagonal" if kind in ("blockdiag", "sqrt") else "full", None, e))
@@ -299,6 +300,14 @@ class Problem:
         if kind in ("inverse", "operand"):
             self._used.append(next(o.definition for o in self.opaque if o.name == found))
         return found
+
+    def _factor(self, inner: Polynomial) -> str:
+        """The name of A = I + HφK, where these words are that: the innovations factor of a model goes by one name."""
+        for mark in self.marks:
+            base = next((base for m, how, base in self.relations if m == mark and how == "hinge subset"), mark)
+            if inner == factors.of(factors.FACTOR, mark, base) and factors.name_of(mark) not in self.alphabet.letters:
+                return factors.name_of(mark)
+        return ""
 
     def _shown(self, inner: Polynomial, e: Any) -> tuple[str, str]:
         """How the operand of an inverse is called: ℳ where it is that, X₁, X₂, ... where its own text is long."""

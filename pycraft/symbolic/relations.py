@@ -17,7 +17,7 @@ from .axioms import AXIOMS, theory
 from .equations import Equation
 from .rules import Setting, normal_form, rules_for
 from .values import LARGEST
-from .words import ONE, Polynomial, Word, add_to, of_model, plain, split
+from .words import Polynomial, Word, add_to, monomial, of_model, plain, split
 
 _GIVEN = ("E_φ", "H", "M", "J")
 """Letters that a tree is made of; the axioms determine the others."""
@@ -37,7 +37,7 @@ def in_world(letter: str, mark: str, base: str) -> Equation | None:
         return None
     own = name + split(letter)[1]
     word = tuple(of_model(x, base) for x in _carried((own,)))
-    lhs, rhs = {(letter,): ONE}, {word: ONE}
+    lhs, rhs = monomial(letter), monomial(*word)
     if own in _GIVEN:
         return Equation("definition", f"{letter} = {' '.join(word)}", lhs, rhs)
     note = "the axioms of the letters in world axes are those of the model between X and X⁻¹, or X*"

@@ -10,7 +10,8 @@ A number is a polynomial whose words are ("tr", X, Y, ...), the trace of XY... u
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import functools
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,7 +24,7 @@ from .inverses import LocalRules
 from .presuppositions import is_triangular
 from .rules import Rule, weight
 from .walk import GaveUp
-from .words import ONE, Alphabet, Polynomial, Word, add_to, combine, inverted, of_model, parse, plain, ratio, split
+from .words import ONE, Alphabet, Polynomial, Word, add_to, combine, inverted, monomial, of_model, plain, ratio, split
 
 NUMBER: Word = ("1",)
 STEPS = 200
@@ -144,19 +145,19 @@ def _log_determinant(problem: Problem, e: Any) -> Polynomial:
         case "scaled" if e.coefficient:
             size = abs(exact(e.coefficient))
             space = trace_word((), problem.alphabet, e.codomain.name)[1]
-            more = {("ln", str(size), space): ONE} if size != 1 else {}
+            more = monomial("ln", str(size), space) if size != 1 else {}
             return combine((1, _log_determinant(problem, e.children[0])), (1, more))
         case "product" if all(map(square, e.children)):
             return combine(*((1, _log_determinant(problem, f)) for f in e.children))
         case "sqrt":
-            return {w: c / 2 for w, c in _log_determinant(problem, e.children[0]).items()}
+            return {w: ratio(c, 2) for w, c in _log_determinant(problem, e.children[0]).items()}
     return {("ln det", problem.operand(e)): ONE}
 
 
 # ---------------------------------------------------------------------- the normal form
 @dataclass
 class ScalarRules:
-    """What brings numbers to a normal form: the rules of an attempt inside traces, and what is known of diagonal blocks and determinants."""
+    """What brings numbers to a normal form: an attempt's rules inside traces; what is known of diagonal blocks and determinants."""
 
     local: LocalRules
 
@@ -223,7 +224,9 @@ class ScalarRules:
         elif word[0] == "norm":
             yield from self._same("norm", word[1])
 
-    def _fact(self, word: Word, by: Polynomial, note: str, check: Callable[[], bool], steps: list[Step] = [], uses: Any = ()) -> Equation:  # noqa: B006
+    def _fact(
+        self, word: Word, by: Polynomial, note: str, check: Callable[[], bool], steps: Sequence[Step] = (), uses: Sequence[Equation] = ()
+    ) -> Equation:
         text = f"{self.alphabet.word_text(word)} = {self.alphabet.text(by)}"
         made = Equation("structure", text, {word: ONE}, by, steps=list(steps), uses=list(uses), note=note)
         made.check = check
@@ -246,12 +249,12 @@ class ScalarRules:
                     word,
                     by,
                     "only diagonal blocks count, and the letters say which there are",
-                    lambda w=w, v=value: diagonal_blocks(w, a) == v,
+                    functools.partial(_has_diagonal, w, value, a),
                 )
         for w in self._rotations(word):
             name, mark = split(w[0])
             rest = w[1:]
-            if mark not in ("", "*") or rest and diagonal_blocks(rest, a) != {rest: ONE}:
+            if mark not in ("", "*") or not _is_diagonal(rest, a):
                 continue
             if plain(name) == "Υ":
                 added = name[len("Υ") :]
@@ -264,7 +267,7 @@ class ScalarRules:
             else:
                 continue
             by = trace_of({whole + rest: ONE}, a, space_of(w, a))
-            yield self._fact(word, by, note, lambda r=rest: not r or diagonal_blocks(r, a) == {r: ONE}, uses=uses)
+            yield self._fact(word, by, note, functools.partial(_is_diagonal, rest, a), uses=uses)
 
     def _determinant(self, word: Word) -> Iterator[Equation]:
         """ln|det| of what is triangular, of a product, of ℳ + J; else of the first operand that is equal to it."""
@@ -281,7 +284,7 @@ class ScalarRules:
                     word,
                     by,
                     "the determinant of a triangular operator is that of its diagonal",
-                    lambda q=q, w=way: is_triangular(q, a) and chain_holds(w, inner, q),
+                    functools.partial(_is_triangular, inner, q, way, a),
                     way,
                 )
             if len(q) == 1:
@@ -291,21 +294,20 @@ class ScalarRules:
                     for x in letters:
                         add_to(by, ("ln det", split(x)[0]), -ONE if inverted(x) else ONE)
                     yield self._fact(
-                        word, by, "the determinant of a product of square factors", lambda q=q, w=way: chain_holds(w, inner, q), way
+                        word, by, "the determinant of a product of square factors", functools.partial(chain_holds, way, inner, q), way
                     )
-        for mark in self.problem.marks:
-            if (found := self._factored(form, mark)) is not None:
-                product, way = found
-                check = lambda p=product, w=way: chain_holds(steps, inner, form) and chain_holds(w, p, form)  # noqa: E731
-                note = "[I+HφK] D [I+HφK]* is this operator, and det [I+HφK] = 1"
-                yield self._fact(word, {("ln det", of_model("D", mark)): ONE}, note, check, [*steps, *way])
+        found = self.local.factored(name, form, opaque.definition) if opaque is not None and form else None
+        if found is not None:
+            product, factor, mark, c = found
+            by = {("ln det", factor.name): 2 * ONE, ("ln det", of_model("D", mark)): ONE}
+            by |= {("ln", str(abs(c)), space): ONE} if abs(c) != 1 else {}
+            yield self._fact(word, by, "the determinant of a product of square factors", product.holds, uses=[product])
+        for factor in filter(None, self.local._factors.values()):
+            if factor.name == name:
+                words = factor.definition.rhs
+                note = "the determinant of a triangular operator is that of its diagonal"
+                yield self._fact(word, {}, note, functools.partial(is_triangular, words, a), uses=[factor.definition])
         yield from self._same("ln det", name)
-
-    def _factored(self, form: Polynomial, mark: str) -> tuple[Polynomial, list[Step]] | None:
-        """([I+HφK] D [I+HφK]*, the steps from it to this form); None if it is not that."""
-        product = {tuple(of_model(x, mark) for x in w): c for w, c in parse("D + H φ K D + D K* φ* H* + H φ K D K* φ* H*").items()}
-        its_form, steps = self.local.reduce(product)
-        return (product, steps) if its_form == form else None
 
     def _is_square(self, letter: str) -> bool:
         e = self.alphabet.letters[split(letter)[0]].expression
@@ -331,7 +333,7 @@ class ScalarRules:
                     if len(ratios) == 1 and (size := abs(ratios.pop())) and (kind == "norm" or size == 1):
                         yield self._fact(
                             (kind, name),
-                            {(kind, other): size},
+                            monomial(kind, other, c=size),
                             "operators that are equal up to a factor and a star",
                             check,
                             [*steps, *its_steps],
@@ -339,3 +341,15 @@ class ScalarRules:
                         return
         if (kind, name) not in [(k, n) for k, n, *_ in self._forms]:
             self._forms.append((kind, name, inner, form, steps))
+
+
+def _is_diagonal(word: Word, alphabet: Alphabet) -> bool:
+    return not word or diagonal_blocks(word, alphabet) == {word: ONE}
+
+
+def _has_diagonal(word: Word, value: Polynomial, alphabet: Alphabet) -> bool:
+    return diagonal_blocks(word, alphabet) == value
+
+
+def _is_triangular(inner: Polynomial, form: Polynomial, steps: Sequence[Step], alphabet: Alphabet) -> bool:
+    return is_triangular(form, alphabet) and chain_holds(steps, inner, form)
