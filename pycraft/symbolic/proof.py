@@ -18,6 +18,9 @@ from .words import Alphabet, Polynomial, combine
 HYPOTHESES = ("J = 0", "serial chain", "single-DOF hinges", "constant H")
 """Names of the hypotheses that a proof may have, as models' traits name them."""
 
+COUNTED = "the coordinates of this model"
+"""The note of an equation that says how many coordinates one model has."""
+
 
 class Proof:
     """What `prove` found: true as a condition if there is a derivation, all of whose steps were multiplied out once more.
@@ -213,6 +216,9 @@ class Proof:
         """Residuals at a random state of the model at hand; of an example where that is large, or fails a hypothesis."""
         self._model = operators
         unmet = [] if operators is None else _unmet(self.hypotheses, operators)
+        if unmet and any(e.note == COUNTED for e in self.rests_on):  # a number that belongs to the model at hand
+            self.unmet = unmet
+            return
         candidates: list[Any] = [example(self.hypotheses)] if operators is None or unmet or len(operators.F) > LARGEST else [operators]
         for candidate in candidates:
             try:

@@ -7,7 +7,8 @@ them, since the axioms are the same equations again between X's.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import functools
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -100,14 +101,16 @@ def at_the_roots(letter: str, e: Any, source: Any) -> Iterator[tuple[Equation, W
         return
     inner = [s for (_, s, _), parent in zip(space.blocks, source.parents, strict=True) if parent >= 0]
     X = np.asarray(e.dense())
-    if not all(np.all(X[:, s] == 0) for s in inner):
+    if not _is_zero(X, inner):
         return
     for B in ((), ("M",), ("P",), ("R",)) if space == source.F else ((),):
         for x in ("φ*", "ψ*") if bool(B) == (space == source.F) else ():
             word, rest = (letter, *B, x), (letter, *B)
             text = f"{e.text()} {' '.join((*B, x))} = {' '.join((e.text(), *B))}"
             note = f"{e.text()} is zero but at bodies on the base"
-            yield (
-                Equation("structure", text, {word: ONE}, {rest: ONE}, note=note, check=lambda: not any(X[:, s].any() for s in inner)),
-                word,
-            )
+            empty = functools.partial(_is_zero, X, inner)
+            yield Equation("structure", text, monomial(*word), monomial(*rest), note=note, check=empty), word
+
+
+def _is_zero(X: np.ndarray, columns: Sequence[slice]) -> bool:
+    return not any(X[:, s].any() for s in columns)

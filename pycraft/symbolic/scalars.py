@@ -24,7 +24,7 @@ from .inverses import LocalRules
 from .presuppositions import is_triangular
 from .rules import Rule, weight
 from .walk import GaveUp
-from .words import ONE, Alphabet, Polynomial, Word, add_to, combine, inverted, monomial, of_model, plain, ratio, split
+from .words import ONE, Alphabet, Number, Polynomial, Word, add_to, combine, inverted, monomial, of_model, plain, ratio, split
 
 NUMBER: Word = ("1",)
 STEPS = 200
@@ -329,8 +329,9 @@ class ScalarRules:
             for p in (its_form, a.star_of(its_form)):
                 if form and p and p.keys() == form.keys():
                     check = lambda i=its_inner, f=its_form, s=its_steps: chain_holds(steps, inner, form) and chain_holds(s, i, f)  # noqa: E731
-                    ratios = {ratio(c, p[w]) for w, c in form.items()}
-                    if len(ratios) == 1 and (size := abs(ratios.pop())) and (kind == "norm" or size == 1):
+                    ratios: set[Number] = {ratio(c, p[w]) for w, c in form.items()}
+                    size = max(c if c > 0 else -c for c in ratios)
+                    if len(ratios) == 1 and (kind == "norm" or size == 1):
                         yield self._fact(
                             (kind, name),
                             monomial(kind, other, c=size),

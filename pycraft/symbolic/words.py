@@ -250,7 +250,7 @@ def _sum(terms: Iterable[tuple[Number, str]], minus: str, space: str) -> str:
     for c, word in terms:
         size = "" if c in (1, -1) else number(c if c > 0 else -c) + space
         if word == "1":
-            size, word = number(abs(c)), ""
+            size, word = number(c if c > 0 else -c), ""
         sign = f" {minus} " if c < 0 else " + "
         text += (sign if text else minus if c < 0 else "") + size + word
     return text or "0"
