@@ -19,13 +19,14 @@ from ..identities.parse import Statement, Statements
 from .attempt import Attempt
 from .axioms import AXIOMS, DEFINITIONS, INVERSES, find, replaced_everywhere, solved, theory
 from .derivation import DerivativeProblem
-from .equations import Equation, Step, chain_holds, foundations
-from .proof import Proof, _escaped, _reason_latex, example, examples
+from .equations import Equation, Step, chain_holds, foundations, opened
+from .proof import Proof, example, examples
 from .prove import _operators, _settings, prove
 from .rules import corollary
+from .shown import escaped, reason_latex
 from .values import LARGEST, NoValue, transferred
 from .walk import GaveUp
-from .words import ONE, Alphabet, Polynomial, Word, combine, framed, number, of_model, plain, ratio, split
+from .words import ONE, Alphabet, Polynomial, Word, combine, number, of_model, plain, ratio, split
 
 ACCEPTED = ("right", "another road")
 _SAYS = {
@@ -112,6 +113,8 @@ def exercise(theorem: Any, model: Any = None, blank: int | Sequence[int] | None 
         lhs, rhs = theorem
         read, name = Statement(lhs, rhs, "", "expressions"), ""
     proof = prove(read.lhs, read.rhs, model)
+    if not isinstance(read.lhs, _core.Operator):
+        raise _core.EvaluationError(f"there is no proof to leave a line out of: {name or proof.statement} is said of numbers")
     if not proof:
         said = f"{name}: {proof.statement}" if name else proof.statement
         raise _core.EvaluationError(f"there is no proof to leave a line out of: {said}\n  {str(proof).partition(chr(10))[2].strip()}")
@@ -152,9 +155,9 @@ class Exercise:
         self.steps = list(proof.steps)
         gaps = self._gaps()
         if blank is None and not gaps:
-            opened = [step for s in proof.steps for step in _opened(s)]
-            if chain_holds(opened, *self._ends(proof.steps)):
-                self.steps = opened
+            longer = [step for s in proof.steps for step in opened(s)]
+            if chain_holds(longer, *self._ends(proof.steps)):
+                self.steps = longer
             gaps = self.gaps()
         if blank is None:
             blank = random.Random(seed).choice(gaps)
@@ -276,11 +279,11 @@ class Exercise:
         rows = [f"& {self.steps[0].before_latex()}"]
         for i, step in enumerate(self.steps, 1):
             gap = i in self.blanks
-            rows.append(f"={{}}& {GAP if gap else step.after_latex()} && \\text{{({i})}}\\;{'' if gap else _reason_latex(step)}")
+            rows.append(f"={{}}& {GAP if gap else step.after_latex()} && \\text{{({i})}}\\;{'' if gap else reason_latex(step)}")
         return "\\begin{aligned}" + "\\\\\n".join(rows) + "\\end{aligned}"
 
     def _repr_latex_(self) -> str:
-        where = f"\\quad\\text{{where {_escaped(' and '.join(self.proof.hypotheses))}}}" if self.proof.hypotheses else ""
+        where = f"\\quad\\text{{where {escaped(' and '.join(self.proof.hypotheses))}}}" if self.proof.hypotheses else ""
         claim = f"{self.steps[0].before_latex()} = {GAP}" if self._end_is_open else self.proof._latex
         return f"$$\\begin{{gathered}}{claim}{where}\\\\ {self.latex()}\\end{{gathered}}$$"
 
@@ -330,7 +333,8 @@ class Exercise:
         problem.sides = [*problem.sides, given]
         lines = self._polynomials()
         copied = expression.text() == self.lines[self.blank - 1]
-        if given == lines[self.blank] and not copied:
+        typed = expression.text() == self.steps[self.blank - 1].after_text()
+        if (given == lines[self.blank] or typed) and not copied:
             return Judgement("right", _by(self.steps[self.blank - 1]), proof=prove(self._read.lhs, expression, self._model))
         on_page = next((i for i, p in enumerate(lines) if p == given and i not in self.blanks), None)
         if on_page is not None:
@@ -505,23 +509,6 @@ def _changed(word: Word, alphabet: Alphabet) -> Iterator[tuple[Word, str]]:
 
 
 # ---------------------------------------------------------------------- steps
-def _opened(step: Step) -> list[Step]:
-    """A step that uses one lemma, as the steps of that lemma's proof; else itself."""
-    if len(step.uses) != 1 or step.uses[0].equation.kind != "lemma" or not step.uses[0].equation.steps:
-        return [step]
-    use = step.uses[0]
-    steps = [s if use.forward else s.reversed() for s in (use.equation.steps if use.forward else reversed(use.equation.steps))]
-    c = use.coefficient if use.forward else -use.coefficient
-    before, after = step.full()
-    rest = combine((1, before), (-c, framed(use.left, steps[0].full()[0], use.right)))
-    opened = []
-    for s in steps:
-        s = s.between(use.left, use.right, c)
-        s.before, s.after, s.alphabet = combine((1, rest), (1, s.before)), combine((1, rest), (1, s.after)), step.alphabet
-        opened.append(s)
-    return opened if opened[0].before == before and opened[-1].after == after else [step]
-
-
 def _candidates(problem: DerivativeProblem, allowed: frozenset[str], steps: Sequence[Step]) -> Iterator[tuple[Equation, Word]]:
     """(equation, word) of what one step may use: this derivation's equations, axioms, lemmas, and what those say under the hypotheses."""
     facts = theory()
