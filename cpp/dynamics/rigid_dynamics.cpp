@@ -22,7 +22,7 @@ void RigidDynamics<S>::set_state(const T* q, const T* v) {
   convert(q, model_->nq, q_);
   convert(v, model_->nv, v_);
   kinematics(*model_, q_.data(), blocks_);
-  velocities_base_to_tip(*model_, blocks_.pose.data(), blocks_.H.data(), v_.data(), velocities_);
+  point_accelerations_base_to_tip(*model_, blocks_.pose.data(), blocks_.H.data(), v_.data(), OwnTerms::absorbed, points_);
 }
 
 template <class S>
@@ -34,7 +34,7 @@ void RigidDynamics<S>::forward_dynamics(const T* q, const T* v, const T* tau, S*
   blocks_.form = how.form;
   S largest = S(0);
   std::vector<std::pair<int, S>> added;
-  const auto sweep = [&] { largest = articulated_body(tree_, *model_, blocks_, velocities_, tau_.data(), vdot, force_, alpha_); };
+  const auto sweep = [&] { largest = articulated_body(tree_, *model_, blocks_, points_, tau_.data(), vdot, force_, alpha_); };
   if (how.on_singular == OnSingular::minimum_norm)
     added = with_every_hinge_regular(sweep);
   else
@@ -60,7 +60,7 @@ void RigidDynamics<S>::forward_dynamics(const T* q, const T* v, const T* tau, S*
     articulated_inertia_tip_to_base(tree_, blocks_);
     std::fill_n(vdot, n, S(0));
     r_.resize(n);
-    newton_euler(*model_, blocks_, velocities_, vdot, r_.data(), alpha_, force_);
+    newton_euler(*model_, blocks_, points_, vdot, r_.data(), alpha_, force_);
     for (int i = 0; i < n; ++i) r_[i] = tau_[i] - r_[i];
     project_off_null_space(added, r_.data(), 1);
     solve_regular(r_.data(), vdot);
@@ -68,6 +68,8 @@ void RigidDynamics<S>::forward_dynamics(const T* q, const T* v, const T* tau, S*
   if (how.refinement.steps != 0)
     refine(vdot, n, 1, how.refinement, how.form, largest, [&] { return "the forward dynamics of '" + source_.name() + "'"; }, residual_at, solve_regular,
            r_, delta_, corrections_);
+  for (int i = 0; i < n; ++i) vdot[i] -= points_.absorbed[i];
+  project_off_null_space(added, vdot, 1);
 }
 
 template <class S>
@@ -82,7 +84,7 @@ size_t RigidDynamics<S>::bytes(Form form) const {
 template <class S>
 template <class T>
 void RigidDynamics<S>::residual(const T* tau, const S* vdot, S* r) {
-  newton_euler(*model_, blocks_, velocities_, vdot, r, alpha_, force_);
+  newton_euler(*model_, blocks_, points_, vdot, r, alpha_, force_);
   for (int i = 0; i < model_->nv; ++i) r[i] = S(tau[i]) - r[i];
 }
 
@@ -112,8 +114,8 @@ RigidDynamics<Wider<S>>& RigidDynamics<S>::wider(const T* q, const T* v) {
 template <class S>
 void RigidDynamics<S>::inverse_dynamics(const S* q, const S* v, const S* vdot, S* tau) {
   kinematics(*model_, q, blocks_);
-  velocities_base_to_tip(*model_, blocks_.pose.data(), blocks_.H.data(), v, velocities_);
-  newton_euler(*model_, blocks_, velocities_, vdot, tau, alpha_, force_);
+  point_accelerations_base_to_tip(*model_, blocks_.pose.data(), blocks_.H.data(), v, OwnTerms::kept, points_);
+  newton_euler(*model_, blocks_, points_, vdot, tau, alpha_, force_);
 }
 
 template <class S>

@@ -11,6 +11,7 @@
 #include "dynamics/workspace_pool.h"
 #include "model/multibody.h"
 #include "operators/rigid_blocks.h"
+#include "recursions/point_accelerations.h"
 #include "recursions/velocities.h"
 
 namespace pycraft {
@@ -53,9 +54,9 @@ class RigidDynamics {
   friend class RigidDynamics;
 
   template <class T>
-  void set_state(const T* q, const T* v);                 // kinematics and velocities
+  void set_state(const T* q, const T* v);                 // kinematics and what depends on velocities, for equations to be solved
   template <class T>
-  void residual(const T* tau, const S* vdot, S* r);       // tau - inverse dynamics, at the state that was set
+  void residual(const T* tau, const S* vdot, S* r);       // tau - inverse dynamics, at the state that was set; vdot with what hinges absorb
   void subtract_product(const S* x, S* r, int m);         // r -= (ℳ + J) x
   void solve(const S* r, S* x, int m);                    // with the kept factors
   template <class T>
@@ -68,7 +69,8 @@ class RigidDynamics {
   const SkoStructure tree_;
   std::shared_ptr<const CompiledModel<S>> model_;
   RigidBlocks<S> blocks_;
-  Velocities<S> velocities_;
+  Velocities<S> velocities_;      // of energies
+  PointAccelerations<S> points_;  // of equations of motion
   std::vector<Vector6<S>> alpha_, force_;
   std::vector<S> q_, v_, tau_, columns_, scratch_, r_, delta_;
   std::unique_ptr<RigidDynamics<Wider<S>>> wider_;

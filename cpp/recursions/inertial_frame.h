@@ -68,7 +68,6 @@ struct InertialFrame {
     }
   }
 
-  static int coordinates(SubhingeKind kind) { return kind == SubhingeKind::ball ? 3 : kind == SubhingeKind::free ? 6 : 1; }
   // On one path to the base: i's subhinge stands inboard of j's (bodies are numbered parents first, subhinges along them).
   bool inboard(int i, int j) const { return subhinge_of[i] < subhinge_of[j]; }
 
