@@ -42,6 +42,7 @@ inline InertiaFactors<S> cast(const InertiaFactors<T>& f) {
   InertiaFactors<S> g;
   for (int i = 0; i < 6; ++i) g.column[i] = cast<S>(f.column[i]), g.weight[i] = S(f.weight[i]);
   g.com = cast<S>(f.com);
+  g.uncertain = S(f.uncertain);
   std::copy_n(f.pivot, 3, g.pivot);
   return g;
 }

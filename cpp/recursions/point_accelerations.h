@@ -44,6 +44,12 @@ inline Vector3<S> components_along(const Vector3<S>* h, const Vector3<S>& a) {
   return {ratio_or_zero(dot(normal[0], a), volume), ratio_or_zero(dot(normal[1], a), volume), ratio_or_zero(dot(normal[2], a), volume)};
 }
 
+// b'
+template <class S>
+inline Vector6<S> gyroscopic_part(const RigidInertia<S>& M, const Vector3<S>& omega) {
+  return {cross(omega, M.rotational * omega), cross(omega, cross(omega, M.moment))};
+}
+
 template <class S>
 void point_accelerations_base_to_tip(const CompiledModel<S>& model, const Pose<S>* pose, const Vector6<S>* H, const S* v, OwnTerms own,
                                      PointAccelerations<S>& out) {
@@ -72,10 +78,9 @@ void point_accelerations_base_to_tip(const CompiledModel<S>& model, const Pose<S
       for (int i = 0; i < 3; ++i) out.absorbed[t[i]] = x[i];
       a.linear = Vector3<S>::zero();
     }
-    const RigidInertia<S>& M = model.inertia[k];
     out.angular_velocity[k] = omega;
     out.a[k] = a;
-    out.b[k] = {cross(omega, M.rotational * omega), cross(omega, cross(omega, M.moment))};
+    out.b[k] = gyroscopic_part(model.inertia[k], omega);
   }
 }
 
