@@ -184,17 +184,19 @@ void register_dynamics(py::module_& m) {
           y[15] = 1;
         });
       }, py::arg("frame"), py::arg("q"))
-      .def("energy", [](Dynamics& d, const py::object& q, const py::object& v) {
+      .def("energy", [](Dynamics& d, const py::object& q, const py::object& v, const py::object& datum) {
         const Multibody& mb = d.model();
+        const Vector3<double> origin = to_vector3(datum, "datum");
         const Argument a = argument(q, mb.nq(), "q", mb), b = argument(v, mb.nv(), "v", mb);
         const int batch = common_batch({&a, &b});
         check_states(mb, a, batch);
         check_velocities(mb, b, batch, "v");
-        return run(d, Precision::double_, {{&a, mb.nq()}, {&b, mb.nv()}}, output(py::none(), batch, {2}), 2, batch, [](auto& w, auto in, auto* y) {
+        return run(d, Precision::double_, {{&a, mb.nq()}, {&b, mb.nv()}}, output(py::none(), batch, {2}), 2, batch, [&](auto& w, auto in, auto* y) {
+          using S = std::remove_pointer_t<decltype(y)>;
           y[0] = w.kinetic_energy(in[0], in[1]);
-          y[1] = w.potential_energy(in[0]);
+          y[1] = w.potential_energy(in[0], cast<S>(origin));
         });
-      }, py::arg("q"), py::arg("v"));
+      }, py::arg("q"), py::arg("v"), py::arg("datum"));
 }
 
 }  // namespace pycraft

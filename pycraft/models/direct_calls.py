@@ -225,10 +225,13 @@ class DirectCalls:
         >>> round(float(pc.chain(2).kinetic_energy([0, 0], [1, 0])), 4)
         1.3333
         """
-        return self._calls().energy(q, v)[..., 0]
+        return self._calls().energy(q, v, (0.0, 0.0, 0.0))[..., 0]
 
-    def potential_energy(self, q) -> np.ndarray:
-        """Energy -m g·c in the uniform gravity field, zero with the centre of mass c at the world's origin. Joules, a number or (B,). O(N).
+    def potential_energy(self, q, *, datum=(0.0, 0.0, 0.0)) -> np.ndarray:
+        """Energy -m g·(c - datum) in the uniform gravity field, zero with the centre of mass c at the height of datum. Joules, a number or (B,).
+
+        Summed outboard to inboard and rounded once, so its error is that of a double of its size. Far from the datum, (3,) in the world's
+        axes, m, differences of energies are smaller than that: take a datum near the system. O(N).
 
         Examples
         --------
@@ -240,4 +243,4 @@ class DirectCalls:
         """
         q = getattr(q, "q", q)
         shape = np.shape(q)[:-1] + (self.nv,)
-        return self._calls().energy(q, np.zeros(shape))[..., 1]
+        return self._calls().energy(q, np.zeros(shape), datum)[..., 1]
