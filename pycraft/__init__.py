@@ -29,7 +29,7 @@ from ._core import (
 )
 from .accuracy.table import accuracy
 from .accuracy.work_precision import work_precision
-from .identities import check
+from .identities import UndecidedError, check, truth
 from .kalman import kalman
 from .models.generators import chain, tree
 from .models.load import load
@@ -59,6 +59,7 @@ __all__ = [
     "SpaceError",
     "StaleOperatorError",
     "State",
+    "UndecidedError",
     "accuracy",
     "blockdiag",
     "chain",
@@ -81,6 +82,7 @@ __all__ = [
     "symbolic",
     "to_sympy",
     "tree",
+    "truth",
     "vector",
     "work_precision",
     "zero",
