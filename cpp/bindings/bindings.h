@@ -60,8 +60,6 @@ bool wants_objects(const py::object& dtype);
 Array real_array(const py::object& x);                           // TypeError unless real numbers
 Array numbers(const py::handle& value, const char* what);       // ModelError unless real numbers
 
-// The batch an expression is bound to, -1 for none.
-int batch_of(const Expression& e);
 // The symbol of this name of a source; node operators take node names, Delta a coordinate.
 Expression source_symbol(const std::shared_ptr<SkoSource>& source, const std::string& name, const std::vector<std::string>& nodes, int coordinate);
 // A state, or a batch, for all models that occur unbound in the operands; q None takes the model's present state.

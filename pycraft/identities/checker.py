@@ -150,7 +150,7 @@ def check(
     >>> bool(pc.check("HψMψ*H* == D", pc.chain(4)))
     True
     """
-    from .search import statement_text
+    from .search import named_vectors, statement_text
 
     _check_wider(precision)
     text = statement if isinstance(statement, str) else f"{statement[0].text()} == {statement[1].text()}"
@@ -168,7 +168,8 @@ def check(
     found = run(read, operators, states, seed, precision)
     report = CheckReport.of(text, found, [operators._source.name])
     if found.verdict == FAILS and search:
-        _explain(report, statement_text(read), lambda: dict(operators._source.traits), seed=seed, precision=precision, budget=budget)
+        known: dict[str, Any] = dict(traits=lambda: dict(operators._source.traits), vectors=named_vectors(read))
+        _explain(report, statement_text(read), seed=seed, precision=precision, budget=budget, **known)
     return report
 
 
@@ -192,20 +193,20 @@ def _check_on_trees(text: str, *, states: int, seed: int, search: bool, precisio
         raise _core.EvaluationError(f"{text!r}: the inverses in it exist on none of the random trees")
     report = CheckReport.of(text, whole, names)
     if refuted is not None and search:
-        _explain(report, text, None, seed=seed, precision=precision, budget=budget, found=refuted)
+        _explain(report, text, seed=seed, precision=precision, budget=budget, found=refuted)
     return report
 
 
-def _explain(report: CheckReport, text: str, traits: Any, **options: Any) -> None:
+def _explain(report: CheckReport, text: str, **options: Any) -> None:
     """Under which hypotheses a false statement is true, and its most telling counterexample; nothing if it is of one model only."""
     from .truth import explained, saving
 
     try:
-        found, report.counterexample = explained(text, traits=traits, **options)
+        found, report.counterexample = explained(text, **options)
     except (_core.EvaluationError, _core.SpaceError, _core.ModelError):
         report.notes.append("it cannot be read on random trees: no smaller counterexample was looked for")
     else:
-        report.true_where = saving(found, traits)
+        report.true_where = saving(found, options.get("traits"))
 
 
 def run(read: Statement, operators: Any, states: int, seed: int, precision: str | int) -> Verdict:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -185,10 +186,29 @@ def respelled(text: str, spec: Spec) -> str:
     return re.sub(r"\bhinge(\d+)(\[\d+\])?", coordinate, text)
 
 
-def read_on(text: str, spec: Spec, model: Any) -> Statement | None:
-    """The statement on this model; None where it names what the model has not."""
+def named_vectors(read: Statement) -> dict[str, str]:
+    """The names of a statement's vectors and of the spaces that they lie in: its text says of neither."""
+    found: dict[str, str] = {}
+    todo = [read.lhs, read.rhs]
+    while todo:
+        side = todo.pop()
+        if isinstance(side, _core.Scalar):
+            todo += side.operands()
+        elif isinstance(side, _core.Operator):
+            todo += side.children
+            if side.kind == "vector":
+                found[side.name] = side.codomain.name
+    return found
+
+
+def read_on(text: str, spec: Spec, model: Any, vectors: Mapping[str, str] | None = None) -> Statement | None:
+    """The statement on this model; None where it names what the model has not. `vectors` names the spaces of the vectors in the text."""
+    spaces = {space.name: space for space in (model.soa.Theta, model.soa.V, model.soa.F)}
+    if not spaces.keys() >= set((vectors or {}).values()):
+        return None
+    named = {name: _core.vector(name, spaces[space]) for name, space in (vectors or {}).items()}
     try:
-        return Statements(model.soa).read(respelled(text, spec))
+        return Statements(model.soa, named).read(respelled(text, spec))
     except (_core.EvaluationError, _core.SpaceError, _core.ModelError):
         return None
 

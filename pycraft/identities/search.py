@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -19,10 +19,12 @@ import numpy as np
 
 from .. import _core
 from ..models.state import State
-from .family import DOF, HYPOTHESES, Spec, family, read_on
+from .family import DOF, HYPOTHESES, Spec, family, named_vectors, read_on
 from .judge import FAILS, BoundState, Verdict, judge, ladder
 from .parse import Statement
 from .tables import wrapped
+
+__all__ = ["Counterexample", "named_vectors", "refutation", "smallest", "statement_text"]
 
 STATES = 3
 KINDS = tuple(sorted(DOF, key=lambda kind: DOF[kind]))
@@ -110,20 +112,22 @@ def statement_text(read: Statement) -> str:
 
 
 # ---------------------------------------------------------------------- one model
-def judged(text: str, spec: Spec, states: int = 1, precision: str | int = "extended") -> Verdict | None:
+def judged(
+    text: str, spec: Spec, states: int = 1, precision: str | int = "extended", vectors: Mapping[str, str] | None = None
+) -> Verdict | None:
     """The verdict on a model: up to the first state that refutes. None where it has not what the statement names, or no inverse exists."""
     from .checker import drawn_vectors
 
     model = spec.model()
-    read = read_on(text, spec, model)
+    read = read_on(text, spec, model, vectors)
     if read is None or read.rhs is None:
         return None
     rng = np.random.default_rng(spec.seed)
     found = Verdict()
     for state in spec.states(model, states):
-        vectors = drawn_vectors(read.rhs, rng, drawn_vectors(read.lhs, rng, {}))
+        drawn = drawn_vectors(read.rhs, rng, drawn_vectors(read.lhs, rng, {}))
         try:
-            found.judgements.append(judge(read.lhs, read.rhs, BoundState(model.soa, state), vectors, precisions=ladder(precision)))
+            found.judgements.append(judge(read.lhs, read.rhs, BoundState(model.soa, state), drawn, precisions=ladder(precision)))
         except ArithmeticError:
             continue
         if found.judgements[-1].verdict == FAILS:
@@ -131,9 +135,11 @@ def judged(text: str, spec: Spec, states: int = 1, precision: str | int = "exten
     return found if found.judgements else None
 
 
-def refutation(text: str, spec: Spec, precision: str | int = "extended", states: int = STATES) -> Counterexample | None:
+def refutation(
+    text: str, spec: Spec, precision: str | int = "extended", states: int = STATES, vectors: Mapping[str, str] | None = None
+) -> Counterexample | None:
     """The first state of a model that refutes, or None."""
-    found = judged(text, spec, states, precision)
+    found = judged(text, spec, states, precision, vectors)
     if found is None or found.verdict != FAILS:
         return None
     return Counterexample(spec, found.shown.state, found.shown.decisive.residual, states=states)
@@ -164,7 +170,13 @@ def _smaller(spec: Spec) -> Iterator[Spec]:
 
 
 def shrunk(
-    text: str, found: Counterexample, allowed: Callable[[Spec], bool], precision: str | int, deadline: float, states: int = STATES
+    text: str,
+    found: Counterexample,
+    allowed: Callable[[Spec], bool],
+    precision: str | int,
+    deadline: float,
+    states: int = STATES,
+    vectors: Mapping[str, str] | None = None,
 ) -> Counterexample:
     """A refutation of which nothing can be taken away, among the models that are allowed."""
     smaller = True
@@ -173,7 +185,7 @@ def shrunk(
         for spec in _smaller(found.spec):
             if not any(map(DOF.get, spec.kinds)) or not allowed(spec):
                 continue
-            again = refutation(text, spec, precision, states)
+            again = refutation(text, spec, precision, states, vectors)
             if again is not None:
                 found, smaller = again, True
                 break
@@ -226,6 +238,7 @@ def smallest(
     found: Counterexample | None = None,
     meets: frozenset[str] = frozenset(),
     allowed: Callable[[Spec], bool] | None = None,
+    vectors: Mapping[str, str] | None = None,
 ) -> Counterexample | None:
     """The smallest refutation by (bodies, degrees of freedom), or None if none was found within the budget (seconds).
 
@@ -234,16 +247,22 @@ def smallest(
     found : a refutation to start from; one is looked for in the family of random trees if left out
     meets : hypotheses that the models must meet
     allowed : says of a model whether it may be tried, besides
+    vectors : the spaces of the vectors that the text names. One in a space that no other model has (of nodes, of a user's own)
+        is on its own model alone: None at once.
     """
+    if not {"Θ", "V", "F"}.issuperset((vectors or {}).values()):
+        return None
     deadline = time.perf_counter() + budget
 
     def fits(spec: Spec) -> bool:
         return meets <= spec.met and (allowed is None or allowed(spec))
 
     if found is None:
-        found = next((r for spec in family(1) if fits(spec) and (r := refutation(text, spec, precision)) is not None), None)
+        found = next(
+            (r for spec in family(1) if fits(spec) and (r := refutation(text, spec, precision, vectors=vectors)) is not None), None
+        )
     if found is not None:
-        found = shrunk(text, found, fits, precision, time.perf_counter() + budget / 2)
+        found = shrunk(text, found, fits, precision, time.perf_counter() + budget / 2, vectors=vectors)
     limit = (4, 24) if found is None else found.spec.size
     tried, first, complete = 0, None, True
     for spec in candidates(limit[0]):
@@ -254,14 +273,14 @@ def smallest(
             break
         if not fits(spec):
             continue
-        first = refutation(text, replace(spec, seed=seed), precision)
+        first = refutation(text, replace(spec, seed=seed), precision, vectors=vectors)
         if first is not None:
             break
         tried += 1
     result = first or found
     if result is not None:
         result.tried, result.exhausted, result.meets = tried, complete, meets
-        read = read_on(text, result.spec, result.model())
+        read = read_on(text, result.spec, result.model(), vectors)
         result.letters = frozenset() if read is None else _letters(read.lhs) | _letters(read.rhs)
     return result
 

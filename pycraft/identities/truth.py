@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from html import escape
 from typing import Any
@@ -138,7 +138,14 @@ def in_words(chosen: Iterable[str]) -> str:
     return " and ".join(says.get(h, h) for h in shown)
 
 
-def truth(statement: str, *, smallest_case: bool = True, precision: str | int = "extended", budget: float = 5.0) -> TruthMap:
+def truth(
+    statement: str,
+    *,
+    smallest_case: bool = True,
+    precision: str | int = "extended",
+    budget: float = 5.0,
+    vectors: Mapping[str, str] | None = None,
+) -> TruthMap:
     """The truth map of a statement: where it is true, over chains and trees, J, hinge kinds and bases.
 
     Parameters
@@ -147,6 +154,7 @@ def truth(statement: str, *, smallest_case: bool = True, precision: str | int = 
     smallest_case : look for the smallest case in each false cell
     precision : the first scalar beside double
     budget : seconds for the smallest cases, of all cells together
+    vectors : names of the vectors in the text, and of their spaces, "Θ", "V" or "F"
 
     Returns
     -------
@@ -165,25 +173,24 @@ def truth(statement: str, *, smallest_case: bool = True, precision: str | int = 
     'TRUE where J = 0'
     """
     begin = time.perf_counter()
-    depth = depth_for(statement)
-    cells = [_cell_truth(statement, cell, depth, precision) for cell in CELLS]
+    depth = depth_for(statement, vectors)
+    cells = [_cell_truth(statement, cell, depth, precision, vectors) for cell in CELLS]
     false = [c for c in cells if c.example is not None]
     deadline = time.perf_counter() + budget
     for i, found in enumerate(false if smallest_case else []):
         left = max(0.0, deadline - time.perf_counter()) / (len(false) - i)
-        found.example = smallest(
-            statement, precision=precision, budget=left, found=found.example, meets=found.cell.least, allowed=found.cell.holds
-        )
+        only: dict[str, Any] = dict(meets=found.cell.least, allowed=found.cell.holds, vectors=vectors)
+        found.example = smallest(statement, precision=precision, budget=left, found=found.example, **only)
     return TruthMap(statement, cells, time.perf_counter() - begin)
 
 
-def depth_for(statement: str) -> int:
+def depth_for(statement: str, vectors: Mapping[str, str] | None = None) -> int:
     """How deep the deep models must be for no product to vanish by its depth alone; raises ParseError where no model can be spoken of."""
     deepest = 0
     refused: Exception | None = None
     for spec in family(1):
         model = spec.model()
-        read = read_on(statement, spec, model)
+        read = read_on(statement, spec, model, vectors)
         if read is not None:
             if read.rhs is None:
                 raise _core.EvaluationError(f"{statement!r} has one side; a statement is lhs == rhs")
@@ -204,11 +211,11 @@ def _refusal(statement: str, model: Any) -> Exception | None:
     return None
 
 
-def _cell_truth(statement: str, cell: Cell, depth: int, precision: str | int) -> CellTruth:
+def _cell_truth(statement: str, cell: Cell, depth: int, precision: str | int, vectors: Mapping[str, str] | None) -> CellTruth:
     """The models of a cell up to the first that refutes."""
     found = []
     for spec in specs(cell, depth):
-        verdict = judged(statement, spec, 1, precision)
+        verdict = judged(statement, spec, 1, precision, vectors)
         if verdict is None:
             continue
         found.append(verdict.verdict)
@@ -238,11 +245,12 @@ def explained(
     budget: float = 5.0,
     found: Counterexample | None = None,
     traits: Callable[[], dict[str, bool]] | None = None,
+    vectors: Mapping[str, str] | None = None,
 ) -> tuple[TruthMap, Counterexample | None]:
     """(the truth map of a false statement, the case that tells most): the smallest of all where a hypothesis saves it; else the
     smallest that meets all hypotheses under which it still fails, so that it is not blamed on what the true formula does not hold for
     either."""
-    found_map = truth(statement, smallest_case=False, precision=precision)
+    found_map = truth(statement, smallest_case=False, precision=precision, vectors=vectors)
     saved = saving(found_map, traits)
     start: Counterexample | None = found
     meets: frozenset[str] = frozenset()
@@ -253,7 +261,7 @@ def explained(
             start, meets = strict[0].example, strict[0].cell.least
     if start is None:
         start = next((c.example for c in found_map.cells if c.example is not None), None)
-    example = smallest(statement, seed=seed, precision=precision, budget=budget, found=start, meets=meets)
+    example = smallest(statement, seed=seed, precision=precision, budget=budget, found=start, meets=meets, vectors=vectors)
     if example is not None:
         example.saved_by = [in_words(chosen) for chosen in saved]
     return found_map, example
