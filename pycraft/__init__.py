@@ -29,7 +29,7 @@ from ._core import (
 )
 from .accuracy.table import accuracy
 from .accuracy.work_precision import work_precision
-from .identities import check
+from .identities import UndecidedError, check, truth
 from .interop import compare
 from .kalman import kalman
 from .models.generators import chain, tree
@@ -68,6 +68,7 @@ __all__ = [
     "SpaceError",
     "StaleOperatorError",
     "State",
+    "UndecidedError",
     "accuracy",
     "blockdiag",
     "chain",
@@ -92,6 +93,7 @@ __all__ = [
     "symbolic",
     "to_sympy",
     "tree",
+    "truth",
     "vector",
     "work_precision",
     "worksheet",

@@ -109,12 +109,13 @@ def check(
     model: Model,
     states: Annotated[int, typer.Option(help="Random states beside the present one.")] = 3,
     seed: Annotated[int, typer.Option(help="Seed of the states.")] = 0,
-    precision: Annotated[str, typer.Option(help="The wider scalar: extended | quad | 50 | 100 (digits).")] = "extended",
+    precision: Annotated[str, typer.Option(help="The first scalar beside double: extended | quad | 50 | 100 (digits).")] = "extended",
+    full: Annotated[bool, typer.Option("--full", help="Every theorem, not the summary and the exceptions alone.")] = False,
     json: Annotated[bool, typer.Option("--json", help="The report as JSON.")] = False,
     root: Root = None,
     mimic: Mimic = "refuse",
 ) -> None:
-    """Check every theorem on a model; exit status 1 if one fails that should hold."""
+    """Check every theorem on a model; exit status 1 if one fails that should hold, 3 if one is undecided."""
 
     def run() -> Any:
         robot = load_model(model, root, mimic)
@@ -128,9 +129,9 @@ def check(
     if json:
         print(report.to_json())
     else:
-        console.print(report.table())
-        console.print(report.summary(), highlight=False)
-    raise typer.Exit(0 if report else 1)
+        console.print(report.summary(), highlight=False, markup=False)
+        console.print(report.table(full))
+    raise typer.Exit(report.status)
 
 
 @app.command()
