@@ -53,7 +53,8 @@ py::tuple cut(const py::array_t<double>& all, int batch, const std::vector<std::
 
 void register_sensitivities(py::module_& m) {
   const py::arg q("q"), v("v"), precision("precision");
-  py::class_<Calls>(m, "Sensitivities")
+  py::class_<Calls> sensitivities(m, "Sensitivities");
+  unpicklable(sensitivities)
       .def(py::init<std::shared_ptr<Multibody>>())
       .def("dynamics", [](Calls& d, bool forward, const py::object& q, const py::object& v, const py::object& vdot, Precision precision) {
         const Multibody& mb = d.model();

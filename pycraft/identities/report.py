@@ -77,7 +77,7 @@ class Report:
         from rich.text import Text
 
         wide = next((str(f.wide_precision) for f in self.findings if f.states), "extended")
-        table = Table(title=f"Theorems on {self.model}", title_justify="left", box=None, pad_edge=False, header_style="bold")
+        table = Table(title=Text(f"Theorems on {self.model}"), title_justify="left", box=None, pad_edge=False, header_style="bold")
         for header, justify in (
             ("theorem", "left"),
             ("hypotheses", "left"),
@@ -106,11 +106,11 @@ class Report:
             if not f.states:
                 reason = f"{', '.join(f.unmet)} not met, an inverse does not exist" if f.unmet else "an inverse does not exist"
                 text = f"waits for {f.note}" if f.verdict == "waiting" else f"{f.verdict}: {reason}"
-                table.add_row("  " + f.statement, hypotheses, "", "", "", Text(text, style=style[f.verdict]), "")
+                table.add_row(Text("  " + f.statement), hypotheses, "", "", "", Text(text, style=style[f.verdict]), "")
                 continue
             verdict = f.verdict + (f": {', '.join(f.unmet)} not met" if f.unmet else "")
             table.add_row(
-                "  " + f.statement,
+                Text("  " + f.statement),
                 hypotheses,
                 f"{f.residual:.1e}",
                 f"{f.wide_residual:.1e}" + ("q" if f.wide_precision == "quad" and wide != "quad" else ""),

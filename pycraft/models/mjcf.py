@@ -93,7 +93,7 @@ class _Reader:
             raise _core.ModelError(f"{self.path}: {error}") from None
         model.q = conventions.from_mujoco(model, m.qpos0, np.zeros(m.nv))[0]
         self._left_out()
-        return model, self.warnings + [f"{self.path}: {text}" for text in model.take_warnings()]
+        return model, self.warnings + [f"{self.path}: {text}" for _, text in model.take_warnings()]
 
     def _add_sites(self, model: Multibody) -> None:
         m, frames = self.m, set(self.bodies)

@@ -26,11 +26,11 @@ def random_state(model: Multibody, seed: int | np.random.Generator = 0) -> State
     the group (a normalised Gaussian quaternion), positions in ±1 m. Velocities uniform in ±1.
     """
     rng = np.random.default_rng(seed)
-    q = np.array(model.zero_q())
-    for hinge in model.hinges.values():
-        at = hinge.q_slice.start
-        limits = hinge.limits
-        for i, subhinge in enumerate(hinge.subhinges):
+    q, at = np.array(model.zero_q()), 0
+    for k in range(model._size):
+        hinge = model._body(k)["hinge"]
+        lower, upper = hinge["lower"], hinge["upper"]
+        for i, subhinge in enumerate(hinge["subhinges"]):
             if subhinge["kind"] in ("ball", "free"):
                 quaternion = rng.normal(size=4)
                 q[at : at + 4] = quaternion / np.linalg.norm(quaternion)
@@ -39,11 +39,14 @@ def random_state(model: Multibody, seed: int | np.random.Generator = 0) -> State
                 at += 4 if subhinge["kind"] == "ball" else 7
             else:
                 span = np.pi if subhinge["kind"] in ("pin", "screw") else 1.0
-                low, high = -span, span
-                if limits is not None and i < len(limits[0]):
-                    low, high = max(low, limits[0][i]), min(high, limits[1][i])
-                    if not low <= high:  # limits that lie beyond the span
-                        low, high = limits[0][i], limits[1][i]
-                q[at] = rng.uniform(low, high)
+                q[at] = rng.uniform(*_interval(span, lower[i], upper[i]) if len(lower) else (-span, span))
                 at += 1
     return State(q, rng.uniform(-1, 1, model.nv))
+
+
+def _interval(span: float, lower: float, upper: float) -> tuple[float, float]:
+    """What of ±span lies within the limits; where nothing does, the part of them nearest to zero, as wide as they and ±span allow."""
+    low, high = max(-span, lower), min(span, upper)
+    if low <= high:
+        return low, high
+    return (lower, min(upper, lower + 2 * span)) if lower > 0 else (max(lower, upper - 2 * span), upper)
