@@ -41,6 +41,14 @@ from .symbolic import Exercise, Proof, derivative, exercise, from_sympy, parse, 
 
 __version__ = "0.1.0"
 
+
+def cmake_dir() -> str:
+    """The folder of `pycraftConfig.cmake`, for C++ users: ``cmake -Dpycraft_DIR=...`` finds `pycraft::core` there."""
+    from pathlib import Path
+
+    return str(Path(_core.__file__).parent / "lib" / "cmake" / "pycraft")
+
+
 __all__ = [
     "Error",
     "EvaluationError",
@@ -63,6 +71,7 @@ __all__ = [
     "blockdiag",
     "chain",
     "check",
+    "cmake_dir",
     "constant",
     "derivative",
     "euclidean",

@@ -192,8 +192,10 @@ def scalar_at(
     return scalar.bound(_core._bind(scalar.operands(), q, v, form, refine, residual, precision))
 
 
-def operator_from_parts(kind: int, payload: Any, children: list[_core.Operator]) -> _core.Operator:
-    """An operator from what it was pickled as."""
+def operator_from_parts(
+    kind: int, payload: Any, children: list[_core.Operator], leaf_binding: _core.Binding | None = None
+) -> _core.Operator:
+    """An operator from what it was pickled as; `leaf_binding` of zeros, identities, constants and vectors."""
     name = (
         "symbol",
         "vector",
@@ -218,7 +220,8 @@ def operator_from_parts(kind: int, payload: Any, children: list[_core.Operator])
         source, function, binding = payload
         return _core._function(source, function, binding, children[0])
     if name in ("vector", "identity", "zero", "constant"):
-        return _core._leaf_from_parts(name, payload)
+        leaf = _core._leaf_from_parts(name, payload)
+        return leaf if leaf_binding is None else leaf._bound(leaf_binding)
     return _core._make(name, children, payload if name == "scaled" else 1.0)
 
 

@@ -49,7 +49,7 @@ def test_the_pages_run(page):
     assert result.failed == 0 and result.attempted > 20
 
 
-@pytest.mark.parametrize("page", ["symbolic", "kalman", "accuracy"])
+@pytest.mark.parametrize("page", ["symbolic", "kalman", "accuracy", "evaluation"])
 def test_the_blocks_of_a_page_run(page):
     names = {}
     blocks = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / f"{page}.md").read_text(), re.S)

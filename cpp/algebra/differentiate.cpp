@@ -191,7 +191,7 @@ Expression Differentiator::operator()(const Expression& e) { return state_->run(
 Expression differentiate(const Expression& e, const Direction& direction) {
   if (e.floating()) return e - e;
   e.check_current();
-  return lower(Differentiator(direction)(e), false);
+  return with_batch_of(e, lower(Differentiator(direction)(e), false));
 }
 
 Expression differentiate_in_world(const Expression& e, const Direction& direction) {
@@ -205,7 +205,7 @@ Expression differentiate_in_world(const Expression& e, const Direction& directio
     if (s == W.domain().dual()) return minus(star(W));
     return zero(s, s);
   };
-  return lower(plus({result, times({motion(e.codomain()), lower(e, false)}), minus(times({lower(e, false), motion(e.domain())}))}), false);
+  return with_batch_of(e, lower(plus({result, times({motion(e.codomain()), lower(e, false)}), minus(times({lower(e, false), motion(e.domain())}))}), false));
 }
 
 Scalar differentiate(const Scalar& a, const Direction& direction) {
@@ -215,8 +215,7 @@ Scalar differentiate(const Scalar& a, const Direction& direction) {
     case ScalarKind::trace: return trace(differentiate(n.operand, direction));
     case ScalarKind::logdet: {
       const Expression tangent = differentiate(n.operand, direction);
-      if (is_zero(tangent)) return number(0);
-      return trace(n.operand.inv() * tangent);
+      return trace(is_zero(tangent) ? tangent : n.operand.inv() * tangent);
     }
     case ScalarKind::norm: throw EvaluationError("the derivative of a norm is not there: differentiate the trace of A.T @ A");
     case ScalarKind::scaled: return n.value * differentiate(n.terms[0], direction);

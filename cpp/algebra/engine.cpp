@@ -74,8 +74,9 @@ void ExecutionPool::run_at(const Inputs& inputs, bool expansions, Result& result
   const int states = plan.batched ? plan.batch : 1;
   PassCounts counts;
 
-  thread_local std::vector<std::shared_ptr<SkoValues<S>>> held;
-  thread_local std::vector<SkoValues<S>*> values;
+  // Of this run alone: an operator from outside, or a signal's handler, may run another one on this thread before this one is over.
+  std::vector<std::shared_ptr<SkoValues<S>>>& held = w.held;
+  std::vector<SkoValues<S>*>& values = w.values;
   held.assign(plan.contexts.size(), nullptr);
   values.assign(plan.contexts.size(), nullptr);
   if (w.own_values.size() != plan.contexts.size()) w.own_values.resize(plan.contexts.size());

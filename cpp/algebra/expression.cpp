@@ -371,46 +371,64 @@ void visit(const Expression& e, const std::function<void(const Expression&)>& f)
 }
 
 Expression Expression::at(std::shared_ptr<const Binding> binding) const {
-  std::unordered_map<const Node*, Expression> done;
-  std::function<Expression(const Expression&)> walk = [&](const Expression& e) -> Expression {
-    auto found = done.find(e.get());
-    if (found != done.end()) return found->second;
-    Expression result = e;
-    if (e.kind() == NodeKind::symbol) {
-      if (!e.node().symbol.binding) {
-        Node n = e.node();
-        n.symbol.binding = binding;
-        result = make(std::move(n));
-      }
-    } else if (e.kind() == NodeKind::block_function) {
-      Node n = e.node();
-      if (!n.symbol.binding) n.symbol.binding = binding;
-      n.children[0] = walk(n.children[0]);
-      result = make(std::move(n));
-    } else if (!e.children().empty()) {
-      Node n = e.node();
-      bool changed = false;
-      for (Expression& c : n.children) {
-        Expression moved = walk(c);
-        changed |= moved.get() != c.get();
-        c = moved;
-      }
-      if (changed) result = make(std::move(n));
+  std::unordered_map<const Node*, Expression> moved;
+  each_from_below(*this, [&](const Expression& e) {
+    const bool binds = e.children().empty() || e.kind() == NodeKind::block_function;  // leaves without numbers, too: a batch is a batch
+    bool changed = binds && !e.node().symbol.binding;
+    for (const Expression& c : e.children()) changed |= moved.at(c.get()).get() != c.get();
+    if (!changed) {
+      moved.emplace(e.get(), e);
+      return;
     }
-    done.emplace(e.get(), result);
-    return result;
-  };
-  return walk(*this);
+    Node n = e.node();
+    if (binds && !n.symbol.binding) n.symbol.binding = binding;
+    for (Expression& c : n.children) c = moved.at(c.get());
+    moved.emplace(e.get(), make(std::move(n)));
+  });
+  return moved.at(get());
 }
 
 std::vector<Context> contexts(const Expression& e) {
   std::vector<Context> found;
   visit(e, [&](const Expression& x) {
-    if (x.kind() != NodeKind::symbol) return;
     const Context c{x.node().symbol.source, x.node().symbol.binding};
-    if (std::find(found.begin(), found.end(), c) == found.end()) found.push_back(c);
+    if (c.source && std::find(found.begin(), found.end(), c) == found.end()) found.push_back(c);
   });
   return found;
+}
+
+namespace {
+
+// Of the symbols where one is bound; else of the leaves whose numbers hang on no state.
+std::shared_ptr<const Binding> batch_binding(const Expression& e) {
+  std::shared_ptr<const Binding> of_symbols, of_leaves;
+  bool symbols_bound = false;
+  visit(e, [&](const Expression& x) {
+    const auto& b = x.node().symbol.binding;
+    if (!b) return;
+    const bool symbol = x.node().symbol.source != nullptr;
+    symbols_bound |= symbol;
+    if (b->batch < 0) return;
+    auto& found = symbol ? of_symbols : of_leaves;
+    if (symbol && found && found->batch != b->batch)
+      throw EvaluationError("batches of " + std::to_string(found->batch) + " and " + std::to_string(b->batch) + " states in one expression");
+    if (!found) found = b;
+  });
+  return symbols_bound ? of_symbols : of_leaves;
+}
+
+}  // namespace
+
+int batch_of(const Expression& e) {
+  const auto binding = batch_binding(e);
+  return binding ? binding->batch : -1;
+}
+
+Expression with_batch_of(const Expression& typed, const Expression& made) {
+  const auto binding = batch_binding(typed);
+  if (!binding || batch_of(made) >= 0) return made;
+  const Expression bound = zero(made.domain(), made.codomain()).at(binding);
+  return made.kind() == NodeKind::zero ? bound : made + bound;
 }
 
 void Expression::check_current() const {

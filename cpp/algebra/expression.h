@@ -5,6 +5,8 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <unordered_set>
+#include <utility>
 #include <vector>
 
 #include "algebra/space.h"
@@ -63,7 +65,7 @@ struct Expression::Node {
   Space domain, codomain;
   std::vector<Expression> children;
   double coefficient = 1;                       // scaled
-  Symbol symbol{};                              // symbol, block_function (the function, and whose)
+  Symbol symbol{};                              // symbol, block_function (the function, and whose); of every leaf: its binding
   std::string name;                             // vector
   std::shared_ptr<const ConstantData> constant;
   std::shared_ptr<const ExternalData> external;
@@ -118,13 +120,37 @@ Expression lower_half(const Expression& a);
 // An identity (or an expression made of identities alone) given its space.
 Expression with_space(const Expression& e, const Space& space);
 
-// Every distinct (source, binding) below, in order of appearance; throws StaleOperatorError for a stale one.
+// Every distinct (source, binding) below, in order of appearance.
 struct Context {
   std::shared_ptr<SkoSource> source;
   std::shared_ptr<const Binding> binding;
 };
 inline bool operator==(const Context& a, const Context& b) { return a.source == b.source && a.binding == b.binding; }
 std::vector<Context> contexts(const Expression& e);
+
+// The batch of states that e is bound to, -1 for none; throws EvaluationError for two batches. What `at` bound counts, also where no
+// number of it hangs on a state: the value of a batch is a batch, whatever theorems make of it.
+int batch_of(const Expression& e);
+// `made`, found equal to or derived from `typed`, bound to the same batch: by a zero that remembers it where nothing else is left of it.
+Expression with_batch_of(const Expression& typed, const Expression& made);
+
+// Calls f on every node below and including e, each once and after what is below it. Iterative: any depth, any sharing.
+template <class F>
+void each_from_below(const Expression& e, F f) {
+  std::unordered_set<const Expression::Node*> seen = {e.get()};
+  std::vector<std::pair<const Expression*, size_t>> path = {{&e, 0}};
+  while (!path.empty()) {
+    auto& [x, next] = path.back();
+    if (next < x->children().size()) {
+      const Expression& child = x->children()[next++];
+      if (seen.insert(child.get()).second) path.emplace_back(&child, 0);
+    } else {
+      const Expression& done = *x;
+      path.pop_back();
+      f(done);
+    }
+  }
+}
 
 // Calls f on every node below and including e, each once and before what is below it.
 void visit(const Expression& e, const std::function<void(const Expression&)>& f);

@@ -89,6 +89,33 @@ void drop_unused(Plan& plan) {
   plan.steps.assign(kept.rbegin(), kept.rend());
 }
 
+// The identity of a space's numbers as a map to its dual, W of ‖X‖² = tr(X* W X); none for spaces of nodes.
+std::optional<Expression> euclidean_weight(const Space& space) {
+  if (space == space.dual()) return identity(space);
+  if (!space.belongs_to_bodies()) return std::nullopt;
+  std::vector<std::vector<double>> blocks;
+  for (size_t k = 0; k < space.layout().of_body.size(); ++k) {
+    const size_t n = size_t(space.body_size(static_cast<int>(k)));
+    blocks.emplace_back(n * n, 0.0);
+    for (size_t i = 0; i < n; ++i) blocks.back()[i * n + i] = 1;
+  }
+  return constant_blocks(std::move(blocks), space, space.dual(), "I");
+}
+
+// Of the symbols where one is bound, else of the leaves whose numbers hang on no state.
+Precision precision_of(const Expression& e) {
+  std::optional<Precision> symbols, leaves;
+  visit(e, [&](const Expression& x) {
+    const Symbol& s = x.node().symbol;
+    if (!s.binding) return;
+    auto& found = s.source ? symbols : leaves;
+    const Precision p = s.binding->arithmetic.precision;
+    if (s.source && found.value_or(p) != p) throw EvaluationError("two precisions in one expression: bind all of it with one .at(..., precision=...)");
+    found = p;
+  });
+  return symbols ? *symbols : leaves.value_or(Precision::double_);
+}
+
 }  // namespace
 
 Plan Planner::plan(const Expression& typed, Request request) {
@@ -173,8 +200,9 @@ Plan Planner::plan(const Expression& typed, Request request) {
     case Request::logdet: plan_.output = logdet(e); break;
     case Request::norm: {
       // Small or tall operators column by column; long ones as tr(X*X) over the tree.
-      if (e.domain().dimension() > 600 && bodies) {
-        const Expression square = lower(e.T() * e, false);
+      const std::optional<Expression> weight = e.domain().dimension() > 600 && bodies ? euclidean_weight(e.codomain()) : std::nullopt;
+      if (weight) {
+        const Expression square = lower(e.T() * *weight * e, false);
         std::string reason;
         if (is_block_diagonal(e) || build_realization(*this, square, true, reason)) {
           Step s{StepKind::root_of_trace};
@@ -195,23 +223,10 @@ Plan Planner::plan(const Expression& typed, Request request) {
   }
   drop_unused(plan_);
   emit_values();
-  for (const Context& c : plan_.contexts) {
-    if (!c.binding) continue;
-    if (c.binding->batch >= 0) {
-      if (plan_.batched && plan_.batch != c.binding->batch)
-        throw EvaluationError("batches of " + std::to_string(plan_.batch) + " and " + std::to_string(c.binding->batch) + " states in one expression");
-      plan_.batched = true;
-      plan_.batch = c.binding->batch;
-    }
-  }
-  bool first = true;
-  for (const Context& c : plan_.contexts) {
-    const Precision p = c.binding ? c.binding->arithmetic.precision : Precision::double_;
-    if (!c.binding) continue;
-    if (!first && p != plan_.precision) throw EvaluationError("two precisions in one expression: bind all of it with one .at(..., precision=...)");
-    plan_.precision = p;
-    first = false;
-  }
+  // Of what was typed: theorems may leave nothing in the plan that hangs on a state.
+  plan_.batch = batch_of(typed);
+  plan_.batched = plan_.batch >= 0;
+  plan_.precision = precision_of(typed);
   return std::move(plan_);
 }
 

@@ -36,7 +36,7 @@ Expression simplify(const Expression& e) {
   Expression best = e;
   for (const Expression& c : candidates)
     if (length(c) < length(best)) best = c;
-  return best;
+  return with_batch_of(e, best);
 }
 
 }  // namespace pycraft

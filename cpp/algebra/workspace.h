@@ -597,6 +597,8 @@ class Workspace {
 
  public:
   std::vector<std::unique_ptr<SkoValues<S>>> own_values;  // of batched contexts
+  std::vector<std::shared_ptr<SkoValues<S>>> held;        // of the others, during a run
+  std::vector<SkoValues<S>*> values;                      // of all, during a run
   bool ran = false;
   int state = 0;                                          // of the batch
   std::vector<double> corrections;                        // of the last refined solve, relative to the solution

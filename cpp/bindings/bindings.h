@@ -76,8 +76,6 @@ py::object part_of_state(const py::handle& given, const char* what);  // of a St
 std::vector<double> one_state(const py::handle& given, const char* what);  // q or v of one state
 std::string shape_text(const py::array& a);                     // how errors call what was given: "4", "an array (1, 3)"
 
-// The batch an expression is bound to, -1 for none.
-int batch_of(const Expression& e);
 // The symbol of this name of a source; node operators take node names, Delta a coordinate.
 Expression source_symbol(const std::shared_ptr<SkoSource>& source, const std::string& name, const std::vector<std::string>& nodes, int coordinate);
 // A state, or a batch, for all models that occur unbound in the operands; q None takes the model's present state.

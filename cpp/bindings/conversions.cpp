@@ -144,9 +144,13 @@ py::array_t<double> to_numpy(const std::vector<double>& v) {
 }
 
 py::object to_array(const Result& r, std::vector<py::ssize_t> shape) {
+  py::ssize_t entries = 1;
+  for (py::ssize_t n : shape) entries *= n;
+  if (entries != static_cast<py::ssize_t>(r.values.size()))  // never memory that nothing was written to
+    throw std::logic_error("a run gave " + std::to_string(r.values.size()) + " numbers where " + std::to_string(entries) + " were asked for");
   if (r.expansions.empty() || r.expansions.size() != r.values.size()) {
     py::array_t<double> a(shape);
-    if (!r.values.empty()) std::memcpy(a.mutable_data(), r.values.data(), r.values.size() * sizeof(double));
+    if (entries) std::memcpy(a.mutable_data(), r.values.data(), r.values.size() * sizeof(double));
     return a;
   }
   py::list parts;
@@ -180,12 +184,6 @@ Refinement refinement(const py::object& refine, const std::string& residual, Pre
   if (r.wider && r.steps != 0 && precision == Precision::digits100)
     throw EvaluationError("residual 'wider': nothing is wider than 100 digits; there is residual 'same'");
   return r;
-}
-
-int batch_of(const Expression& e) {
-  for (const Context& c : contexts(e))
-    if (c.binding && c.binding->batch >= 0) return c.binding->batch;
-  return -1;
 }
 
 bool wants_objects(const py::object& dtype) {

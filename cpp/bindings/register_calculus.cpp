@@ -41,8 +41,12 @@ Expression along(const Expression& e, const Direction& direction, bool world) {
   return world ? differentiate_in_world(e, direction) : differentiate(e, direction);
 }
 Scalar along(const Scalar& s, const Direction& direction, bool) { return differentiate(s, direction); }
-Expression nothing_of(const Expression& e) { return e.floating() ? e - e : zero(e.domain(), e.codomain()); }
-Scalar nothing_of(const Scalar&) { return number(0); }
+Expression nothing_of(const Expression& e) { return e.floating() ? e - e : with_batch_of(e, zero(e.domain(), e.codomain())); }
+Scalar nothing_of(const Scalar& s) {
+  for (const Expression& e : operands_of(s))
+    if (batch_of(e) >= 0) return trace(with_batch_of(e, zero(e.domain(), e.domain())));
+  return number(0);
+}
 
 int coordinate_of(const MultibodyOperators& model, const py::object& direction) {
   const auto& names = model.structure().coordinate_names;

@@ -68,7 +68,7 @@ py::tuple parts(const Expression& e) {
     case NodeKind::external: throw py::type_error("an operator from outside ('" + n.external->name + "') cannot be pickled");
     default: break;
   }
-  return py::make_tuple(static_cast<int>(n.kind), payload, py::cast(n.children));
+  return py::make_tuple(static_cast<int>(n.kind), payload, py::cast(n.children), n.symbol.source ? py::object(py::none()) : binding_of(n.symbol));
 }
 
 void register_pickling(py::module_& m) {

@@ -20,6 +20,25 @@ const SymbolDefinition& definition_named(const std::string& name) {
   throw EvaluationError("no operator is called '" + name + "'");
 }
 
+// Whose state an `at` binds: of the symbols that are not bound yet; where there are none, of the spaces of zeros, identities and
+// constants. `anything`: whether there is something to bind.
+std::vector<std::shared_ptr<SkoSource>> unbound_sources(const std::vector<Expression>& operands, bool& anything) {
+  std::vector<std::shared_ptr<SkoSource>> of_symbols, of_spaces;
+  const auto add = [](std::vector<std::shared_ptr<SkoSource>>& known, const std::shared_ptr<SkoSource>& s) {
+    if (s && std::find(known.begin(), known.end(), s) == known.end()) known.push_back(s);
+  };
+  for (const Expression& e : operands)
+    visit(e, [&](const Expression& x) {
+      const Symbol& s = x.node().symbol;
+      if (s.binding || !(x.children().empty() || s.source)) return;
+      anything = true;
+      if (s.source) return add(of_symbols, s.source);
+      if (!x.floating())
+        for (const Space& space : {x.domain(), x.codomain()}) add(of_spaces, source_owning(space));
+    });
+  return of_symbols.empty() ? of_spaces : of_symbols;
+}
+
 }  // namespace
 
 // A symbol as it was pickled: arguments are numbers, or the names of nodes.
@@ -49,11 +68,16 @@ std::shared_ptr<const Binding> make_binding(const std::vector<Expression>& opera
                                             const Arithmetic& arithmetic) {
   auto binding = std::make_shared<Binding>();
   binding->arithmetic = arithmetic;
-  std::vector<std::shared_ptr<SkoSource>> sources;
-  for (const Expression& e : operands)
-    for (const Context& c : contexts(e))
-      if (!c.binding && std::find(sources.begin(), sources.end(), c.source) == sources.end()) sources.push_back(c.source);
-  if (sources.empty()) return binding;  // nothing to bind
+  bool anything = false;
+  const auto sources = unbound_sources(operands, anything);
+  if (!anything) return binding;
+  if (sources.empty()) {  // between spaces R^n: only how many states there are counts
+    if (!q_given.is_none() && !py::hasattr(q_given, "q")) {
+      const Array a = real_array(q_given);
+      if (a.ndim() == 2) binding->batch = static_cast<int>(a.shape(0));
+    }
+    return binding;
+  }
   for (const auto& s : sources) s->check_current();
   int nq = 0, nv = 0;
   for (const auto& s : sources)
