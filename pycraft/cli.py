@@ -205,8 +205,8 @@ def accuracy(
     console.print(table.table())
     if integration:
         notes.append(f"reference: {table.reference}; its own error {table.reference_error:.1e}")
-    for note in notes:
-        console.print(escape(note), highlight=False)
+    for text in notes:
+        console.print(escape(text), highlight=False)
     for reason, labels in table.refusals.items():
         console.print(f"[bold]refused:[/] {escape('; '.join(labels))}: {escape(reason)}", highlight=False)
     if csv:
@@ -313,12 +313,12 @@ def peers(
 @app.command()
 def lab() -> None:
     """Open JupyterLab (extra \\[lab])."""
-    import importlib.util
     import subprocess
     import sys
 
-    if importlib.util.find_spec("jupyterlab") is None:
-        fail("JupyterLab is not installed: pip install pycraft-soa[lab]")
+    from .interop.packages import required
+
+    required("jupyterlab", "lab", "the lab needs")
     raise typer.Exit(subprocess.call([sys.executable, "-m", "jupyter", "lab"]))
 
 

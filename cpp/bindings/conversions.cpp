@@ -32,13 +32,14 @@ const char* refused_entries(const py::array& any) {
 // A value as an array of doubles, or null and the reason why it is none.
 Array real_numbers(const py::handle& value, const char*& why) {
   why = nullptr;
-  if (py::isinstance<Array>(value) && !py::hasattr(value, "mask")) return py::reinterpret_borrow<Array>(value);
+  const bool plain = Py_TYPE(value.ptr()) == py::detail::npy_api::get().PyArray_Type_;  // else it may be masked
+  if (py::isinstance<Array>(value) && (plain || !py::hasattr(value, "mask"))) return py::reinterpret_borrow<Array>(value);
   if (PyFloat_Check(value.ptr()) || PyLong_Check(value.ptr())) {
     const Array a = Array::ensure(value);
     if (!a) PyErr_Clear(), why = no_numbers;
     return a;
   }
-  if (py::hasattr(value, "mask") && py::isinstance<py::array>(value) && py::cast<bool>(py::bool_(value.attr("mask").attr("any")()))) {
+  if (!plain && py::isinstance<py::array>(value) && py::hasattr(value, "mask") && py::cast<bool>(py::bool_(value.attr("mask").attr("any")()))) {
     why = "has masked entries";
     return Array();
   }

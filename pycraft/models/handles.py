@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import _core
+from ..closed import Closed
 from .arguments import limit_pair, pose_parts
 
 if TYPE_CHECKING:
@@ -27,14 +28,19 @@ def _component(i: int | str, names: Sequence[str] = ("x", "y", "z")) -> int:
     raise _core.ModelError(f"no component is called {i!r}; there are {', '.join(names)}, or 0 to {len(names) - 1}")
 
 
-class Body:
+class Body(Closed):
     """A body of a model: `.mass` (kg), `.com` (3,) in the body frame (m), `.inertia` (3, 3) about the centre of mass (kg m²).
 
     The values can be set; each is checked (see `Multibody.add_body`). `.hinge` is the hinge that carries the body.
     """
 
     def __init__(self, model: Multibody, name: str):
-        self._model, self.name = model, name
+        self._model, self._name = model, name
+
+    @property
+    def name(self) -> str:
+        """The body's name in its model."""
+        return self._name
 
     def _data(self) -> dict[str, Any]:
         return self._model._body(self._model._body_index(self.name))
@@ -99,14 +105,19 @@ class Body:
         return f"<body {self.name!r}: {self.mass:g} kg on hinge {self.hinge.name!r} of {parent.name if parent else 'the base'!r}>"
 
 
-class Hinge:
+class Hinge(Closed):
     """A hinge: `.kind`, `.subhinges` (kind, axis, point, pitch of each), `.placement` (4, 4), `.q_slice`, `.v_slice`, `.rotor_inertia`.
 
     `.placement` is the pose of the hinge's inboard frame in the parent body's frame; `.limits` are (lower, upper) per coordinate, or None.
     """
 
     def __init__(self, model: Multibody, name: str):
-        self._model, self.name = model, name
+        self._model, self._name = model, name
+
+    @property
+    def name(self) -> str:
+        """The hinge's name in its model."""
+        return self._name
 
     def _index(self) -> int:
         return self._model._hinge_index(self.name)
@@ -196,11 +207,16 @@ class Hinge:
         )
 
 
-class Node:
+class Node(Closed):
     """A frame on a body, or on the base: `.body` (None for the base), `.pose` (4, 4) in the body's frame."""
 
     def __init__(self, model: Multibody, name: str):
-        self._model, self.name = model, name
+        self._model, self._name = model, name
+
+    @property
+    def name(self) -> str:
+        """The node's name in its model."""
+        return self._name
 
     def _data(self) -> dict[str, Any]:
         return self._model._node(self.name)

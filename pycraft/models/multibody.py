@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..closed import Closed
 from .arguments import limit_pair, listed, pose_parts, text
 from .handles import Body, Hinge, Named, Node, Vector
 from .integration import IntegrationCalls
-from .state import State, random_state
+from .state import State, at_state, random_state
 
 _Z = (0.0, 0.0, 1.0)
 _DEFAULT_AXES: dict[str, tuple[tuple[float, float, float], ...]] = {
@@ -25,7 +26,7 @@ _DEFAULT_AXES: dict[str, tuple[tuple[float, float, float], ...]] = {
 }
 
 
-class Multibody(IntegrationCalls, _core.Multibody):
+class Multibody(Closed, IntegrationCalls, _core.Multibody):
     """A tree of bodies on hinges, with nodes, a state (`q`, `v`) and gravity (zero until it is set).
 
     Build one body by body, or load it (`pycraft.load`). Bodies are kept depth first, children in the order they were added, and
@@ -53,8 +54,9 @@ class Multibody(IntegrationCalls, _core.Multibody):
     def __init__(self, name: str = "multibody", *, welds: str = "lump", strict: bool = False):
         if welds not in ("lump", "keep"):
             raise _core.ModelError(f"welds={welds!r}: there are 'lump' and 'keep'")
-        super().__init__(name, welds == "keep", strict)
+        super().__init__(text(name, "a model"), welds == "keep", strict)
         self._soa = None
+        self._left_aside: dict[str, np.ndarray] = {}
 
     # ------------------------------------------------------------------ structure
     def add_body(
@@ -176,14 +178,13 @@ class Multibody(IntegrationCalls, _core.Multibody):
             self._soa = OperatorSet(_core.operators_of(self), self)
         return self._soa
 
-    def certify(self, q, v=None, tau=None, **options: Any) -> Any:
+    def certify(self, q=None, v=None, tau=None, **options: Any) -> Any:
         """Forward dynamics with its measured error, what rounding of q, v and tau does, condition, floor of refinement, where digits are
         lost, and what the next rung costs: a `pycraft.accuracy.certificate.Certificate`.
 
         Parameters
         ----------
-        q : (nq,) or a State, whose v is taken then
-        v, tau : (nv,), zero where left out
+        q, v, tau : (nq,), (nv,), (nv,), by the rule of `forward_dynamics`
         form, refine, residual, precision : of the value that is certified, as in `forward_dynamics`
         seed : int
             Of the signs by which q, v and tau are moved, 0 or above.
@@ -195,7 +196,7 @@ class Multibody(IntegrationCalls, _core.Multibody):
         """
         from ..accuracy.certify import certify_dynamics
 
-        return certify_dynamics(self, q, v, tau, **options)
+        return certify_dynamics(self, *at_state(self, q, v), tau, **options)
 
     def warn(self) -> None:
         """Say, once, what is legal but worth a word: violated triangle inequalities, massless bodies on hinges."""
@@ -245,18 +246,34 @@ class Multibody(IntegrationCalls, _core.Multibody):
             model.q, model.v = data["q"], data["v"]
         return model
 
+    @property
+    def left_aside(self) -> dict[str, np.ndarray]:
+        """What the model's file says beside the model, by name; empty for a model that was not loaded.
+
+        "gravity" (3,), m/s²; per coordinate (nv,), NaN where the file has none: "damping", "friction", "stiffness", and "effort limit",
+        "velocity limit". `integrate_ode(..., damping=np.nan_to_num(arm.left_aside["damping"]))` takes the first of these.
+        """
+        return dict(self._left_aside)
+
     def __reduce__(self):
-        return Multibody.from_description, (self.description(),)
+        return _again, (self.description(), self._left_aside)
 
     def __copy__(self) -> Multibody:
-        return Multibody.from_description(self.description())
+        return _again(self.description(), self._left_aside)
 
     def __deepcopy__(self, memo) -> Multibody:
-        memo[id(self)] = copy = Multibody.from_description(self.description())
+        memo[id(self)] = copy = _again(self.description(), self._left_aside)
         return copy
 
     def __repr__(self) -> str:
         return f"<multibody {self.name!r}: {self._size} bodies, {self.nv} degrees of freedom>"
+
+
+def _again(description: Mapping[str, Any], left_aside: Mapping[str, np.ndarray]) -> Multibody:
+    """A copy of a model from its description and what its file said beside it."""
+    model = Multibody.from_description(description)
+    model._left_aside = dict(left_aside)
+    return model
 
 
 def _frame_name(frame: str | Body | Node | None) -> str:

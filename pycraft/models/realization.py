@@ -38,7 +38,6 @@ def motion_state(model: Any, q: Any, v: Any, tau: Any) -> tuple[np.ndarray, np.n
 
     Raises ModelError, in the words of the core's direct calls, for wrong shapes, batches that differ and entries that are not finite.
     """
-    q, v = getattr(q, "q", q), getattr(v, "v", v)
     model._integration().configuration_rate(q, v, "double", None)  # the core's own checks of q and v
     q, v, tau = np.asarray(q, float), np.asarray(v, float), checked_forces(model, tau)
     sizes = [x.shape[0] for x in (q, v, tau) if x.ndim == 2]

@@ -3,20 +3,39 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from ..closed import Closed
 
 if TYPE_CHECKING:
     from .multibody import Multibody
 
 
 @dataclass
-class State:
-    """Generalized coordinates `q` (nq,) and velocities `v` (nv,) of a model. Anything that takes q takes a State."""
+class State(Closed):
+    """Generalized coordinates `q` (nq,) and velocities `v` (nv,) of a model.
 
+    Anything that takes q takes a State, and then its v with it.
+    """
+
+    __slots__ = ("q", "v")
     q: np.ndarray
     v: np.ndarray
+
+
+def at_state(model: Multibody, q: Any = None, v: Any = None) -> tuple[Any, Any]:
+    """The q and v that a call means, by the one rule of direct calls and of `Operator.at`.
+
+    Without q the model's present state, v with it unless it is given; of a State its q, and its v unless one is given; beside an array q
+    zero velocities where v is left out.
+    """
+    if q is None:
+        return model.q, model.v if v is None else getattr(v, "v", v)
+    if not isinstance(q, np.ndarray) and hasattr(q, "q") and hasattr(q, "v"):
+        return q.q, q.v if v is None else getattr(v, "v", v)
+    return q, np.zeros(model.nv) if v is None else getattr(v, "v", v)
 
 
 def random_state(model: Multibody, seed: int | np.random.Generator = 0) -> State:

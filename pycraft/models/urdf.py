@@ -8,9 +8,10 @@ ball, spherical             ball      quaternion (w, x, y, z); not in the specif
 floating                    free      quaternion, position
 fixed                       weld      none
 
-Visuals, collision shapes, materials, transmissions, gazebo blocks and the dynamics element (damping and friction are
-effects) are not read. One element is our own, inside a joint: `<pycraft rotor_inertia="1.14"/>`, one value per coordinate
-in kg m² or kg as seen at the joint; other readers pass over it.
+Visuals, collision shapes, materials, transmissions and gazebo blocks are not read. Damping, friction and bounds on
+efforts and velocities are effects: they are in `Multibody.left_aside`. One element is our own, inside a joint:
+`<pycraft rotor_inertia="1.14"/>`, one value per coordinate in kg m² or kg as seen at the joint; other readers pass over
+it.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from urllib.parse import unquote
 import numpy as np
 
 from .. import _core
+from .left_aside import by_coordinate
 from .multibody import Multibody
 from .rotations import rotation_about
 from .urdf_elements import Elements, Joint, Link
@@ -41,6 +43,7 @@ def read(file: XmlFile, *, root: str, mimic: str, welds: str, strict: bool) -> t
     _settle_mimics(file, elements.joints, mimic)
     tree = _Tree(file, elements.links, elements.joints)
     model = _build(tree, root, welds, strict)
+    model._left_aside = by_coordinate(model, elements.left_aside)
     return model, elements.warnings + [tree.with_line(body, text) for body, text in model.take_warnings()]
 
 

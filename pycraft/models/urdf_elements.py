@@ -28,6 +28,13 @@ _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _IDENTITY, _ZERO, _X = np.eye(3), np.zeros(3), np.array([1.0, 0.0, 0.0])
 for _constant in (_IDENTITY, _ZERO, _X):
     _constant.setflags(write=False)
+# Of a joint: element, attribute, what it is called in Multibody.left_aside.
+_LEFT_ASIDE = (
+    ("dynamics", "damping", "damping"),
+    ("dynamics", "friction", "friction"),
+    ("limit", "effort", "effort limit"),
+    ("limit", "velocity", "velocity limit"),
+)
 _EXPAND = "expand the file first: xacro file.xacro > file.urdf"
 
 
@@ -90,6 +97,7 @@ class Elements:
     def __init__(self, file: XmlFile, follow: bool):
         self.file, self.follow = file, follow
         self.warnings: list[str] = []
+        self.left_aside: dict[str, dict[str, float]] = {}  # numbers by quantity and joint
         self._refuse_xacro()
         self.links = {link.name: link for link in self._named("link", self._link)}
         if not self.links:
@@ -152,6 +160,8 @@ class Elements:
         if kind not in HINGES:
             raise self.file.error(element, f"joint {name!r} has the type {kind!r}; there are {', '.join(HINGES)}")
         hinge = HINGES[kind]
+        if hinge != "weld":
+            self._leave_aside(name, element)
         rotation, position = self._origin(element, element)
         return Joint(
             name,
@@ -166,6 +176,15 @@ class Elements:
             self._rotor_inertia(element, hinge),
             self._mimic(element, hinge),
         )
+
+    def _leave_aside(self, name: str, element: Element) -> None:
+        """What the file says of a joint that a model does not have: numbers above zero of damping, friction and bounds."""
+        for tag, attribute, quantity in _LEFT_ASIDE:
+            inner = self.file.child(element, tag)
+            if inner is not None and inner.get(attribute) is not None:
+                number = self.file.number(inner, attribute, element, infinite=True)
+                if number > 0:
+                    self.left_aside.setdefault(quantity, {})[name] = number
 
     def _end(self, end: str, element: Element) -> str:
         inner = self.file.required(element, end, element, f'write <{end} link="..."/>')

@@ -19,15 +19,17 @@ from oracle import reference  # noqa: E402
 import pycraft as pc  # noqa: E402
 
 ANYTHING = [
-    None, True, 0, 1, -1, 3.5, -0.0, 1e300, -1e300, 5e-324, np.nan, np.inf, -np.inf, 10**400, 2**40, -(2**70), 1j, np.complex64(1 + 2j),
-    "", "3", "1.5", "body0", "no such", "a\x00b", "ü", b"1", [], [[]], {}, set(), object(), (1,), [1, 2], [1, 2, 3], [1, 2, 3, 4], ["1", "2", "3"],
-    [1, "2", 3], [1, None, 3], [1, 2j, 3], [[1, 2, 3]], [[1], [2], [3]], [1, [2, 3]], np.datetime64("2020-01-01"), np.timedelta64(3, "s"),
-    np.array(["2020-01-01"] * 3, "datetime64[D]"), np.array([1, 2, 3], "timedelta64[s]"), np.zeros(3, bool), np.zeros((3, 3)), np.eye(3), np.eye(4),
-    2 * np.eye(3), 1.1 * np.eye(4), -np.eye(3), np.diag([1.0, 1, -1]), np.diag([1.0, 1, -1, 1]), np.full((3, 3), np.nan), np.full((4, 4), np.inf),
-    np.eye(3, 4), np.eye(4)[:3], np.eye(3)[None], np.triu(np.ones((3, 3))), np.eye(4) + np.eye(4, k=-1), np.array([1, 2, 3], object),
-    np.array(["a", 1, None], object), np.array([1 + 1j, 0, 0]), np.ma.masked_array([1.0, 2, 3], [0, 1, 0]), np.matrix([[1.0, 2, 3]]), np.zeros((0,)),
-    np.zeros((0, 3)), np.zeros((2, 2, 2)), [{}], [{"kind": 3}], [{"kind": "pin"}], [{"kind": "pin", "axes": 3}], ["pin"], (-1, 1), (1, -1), (np.nan, 1),
-    (np.inf, np.inf), (-np.inf, -np.inf), ([-1, -1], [1, 1]), ([-1], [1, 1]), lambda: 0, slice(3), "weld", "pin", "ball", "custom",
+    None, True, 0, 1, -1, 3.5, -0.0, 1e300, -1e300, 5e-324, np.nan, np.inf, -np.inf, 10**400, 2**40, -(2**70), 1j, np.complex64(1 +
+    2j), "", "3", "1.5", "body0", "no such", "a\x00b", "ü", b"1", [], [[]], {}, set(), object(), (1,), [1, 2], [1, 2, 3], [1, 2, 3,
+    4], ["1", "2", "3"], [1, "2", 3], [1, None, 3], [1, 2j, 3], [[1, 2, 3]], [[1], [2], [3]], [1, [2, 3]],
+    np.datetime64("2020-01-01"), np.timedelta64(3, "s"), np.array(["2020-01-01"] * 3, "datetime64[D]"), np.array([1, 2, 3],
+    "timedelta64[s]"), np.zeros(3, bool), np.zeros((3, 3)), np.eye(3), np.eye(4), 2 * np.eye(3), 1.1 * np.eye(4), -np.eye(3),
+    np.diag([1.0, 1, -1]), np.diag([1.0, 1, -1, 1]), np.full((3, 3), np.nan), np.full((4, 4), np.inf), np.eye(3, 4), np.eye(4)[:3],
+    np.eye(3)[None], np.triu(np.ones((3, 3))), np.eye(4) + np.eye(4, k=-1), np.array([1, 2, 3], object), np.array(["a", 1, None],
+    object), np.array([1 + 1j, 0, 0]), np.ma.masked_array([1.0, 2, 3], [0, 1, 0]), np.matrix([[1.0, 2, 3]]), np.zeros((0,)),
+    np.zeros((0, 3)), np.zeros((2, 2, 2)), [{}], [{"kind": 3}], [{"kind": "pin"}], [{"kind": "pin", "axes": 3}], ["pin"], (-1, 1), (1,
+    -1), (np.nan, 1), (np.inf, np.inf), (-np.inf, -np.inf), ([-1, -1], [1, 1]), ([-1], [1, 1]), lambda: 0, slice(3), "weld", "pin",
+    "ball", "custom",
 ]  # fmt: skip
 
 ADDED = [
@@ -71,14 +73,17 @@ def entries(model, rng):
             options[str(rng.choice(ADDED))] = strange()
         model.add_body(options.pop("name"), **options)
 
+    def node():
+        options = {k: strange() for k in rng.choice(["position", "rotation", "placement"], int(rng.integers(3)), False)}
+        model.add_node(strange() if rng.random() < 0.2 else "tip", strange() if rng.random() < 0.3 else "body0", **options)
+
     def set_on(target, name):
         value = strange()
         setattr(target, name, value)
 
     return {
         "add_body": add,
-        "add_node": lambda: model.add_node(strange() if rng.random() < 0.2 else "tip", strange() if rng.random() < 0.3 else "body0",
-                                           **{k: strange() for k in rng.choice(["position", "rotation", "placement"], int(rng.integers(3)), False)}),
+        "add_node": node,
         "remove_body": lambda: model.remove_body(strange()),
         "mass": lambda: set_on(any_body(), "mass"),
         "com": lambda: set_on(any_body(), "com"),

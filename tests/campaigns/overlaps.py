@@ -106,7 +106,7 @@ def one_round(rng, model, name):
     return None
 
 
-def run(seeds, rounds=len(CALLS) * 4):
+def run(seeds, rounds=36):
     """What is wrong, one line each."""
     wrong = []
     for seed in seeds:
