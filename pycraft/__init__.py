@@ -48,6 +48,7 @@ from .accuracy.table import accuracy
 from .accuracy.work_precision import work_precision
 from .bare_trees import sko_model
 from .identities import check
+from .interop import compare
 from .kalman import kalman
 from .models.generators import chain, tree
 from .models.load import load
@@ -89,6 +90,7 @@ __all__ = [
     "blockdiag",
     "chain",
     "check",
+    "compare",
     "cmake_dir",
     "constant",
     "derivative",
