@@ -78,13 +78,15 @@ void register_dynamics(py::module_& m) {
     const int steps = refinement(refine, residual, precision).steps;
     return steps == Refinement::automatic ? py::object(py::str("auto")) : py::object(py::int_(steps));
   }, py::arg("refine"), py::arg("residual"), py::arg("precision"), "The number of corrections, or 'auto'; EvaluationError for anything else.");
-  py::class_<Dynamics>(m, "Dynamics")
+  py::class_<Dynamics> dynamics(m, "Dynamics");
+  unpicklable(dynamics)
       .def(py::init<std::shared_ptr<Multibody>>())
       .def("forward_dynamics", [](Dynamics& d, const py::object& q, const py::object& v, const py::object& tau, Form form, const py::object& refine,
                                   const std::string& residual, Precision precision, const std::string& on_singular, const py::object& out) {
-        const Forces in(d.model(), q, v, tau);
+        Forces in(d.model(), q, v, tau);
         const Solving how{form, refinement(refine, residual, precision), on_singular_from_name(on_singular)};
         py::array_t<double> result = output(out, in.batch, {d.model().nv()});
+        for (Argument* a : {&in.q, &in.v, &in.tau}) keep_apart(*a, result);
         double* target = result.mutable_data();
         py::gil_scoped_release release;
         at_precision(precision, [&]<class S>(S) { run_forward<S>(d, in, how, target); });

@@ -74,7 +74,8 @@ void forward(Calls& d, const State& s, const Solving& how, Precision precision, 
 
 void register_sensitivities(py::module_& m) {
   const py::arg q("q"), v("v"), precision("precision");
-  py::class_<Calls>(m, "Sensitivities")
+  py::class_<Calls> sensitivities(m, "Sensitivities");
+  unpicklable(sensitivities)
       .def(py::init<std::shared_ptr<Multibody>>())
       .def("inverse_dynamics", [](Calls& d, const py::object& q, const py::object& v, const py::object& vdot, Precision precision) {
         const Multibody& mb = d.model();
