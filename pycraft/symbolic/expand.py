@@ -110,6 +110,7 @@ class Problem:
         self.of_one_model = False  # whether the statement was made of a model's expressions, and not read for all
         self.unknown: set[str] = set()  # names of constants whose numbers are of no account
         self.assumed: list[tuple[Equation, str]] = []  # hypotheses of the user's; a letter that one says to be definite
+        self.determinants: set[str] = set()  # letters of which ln|det| is taken: that they are regular is presupposed
         self.scalars = False  # whether both sides are scalars: traces, determinants, norms
         self.numbers = False  # whether both sides map R^1 to R^1
         self._named_operands = 0

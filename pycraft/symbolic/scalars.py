@@ -151,7 +151,9 @@ def _log_determinant(problem: Problem, e: Any) -> Polynomial:
             return combine(*((1, _log_determinant(problem, f)) for f in e.children))
         case "sqrt":
             return {w: ratio(c, 2) for w, c in _log_determinant(problem, e.children[0]).items()}
-    return {("ln det", problem.operand(e)): ONE}
+    name = problem.operand(e)
+    problem.determinants.add(name)
+    return {("ln det", name): ONE}
 
 
 # ---------------------------------------------------------------------- the normal form
