@@ -131,19 +131,14 @@ def judge(
     amplified = 1.0
     for precision in precisions or ladder():
         try:
-            difference, left, right = _core.residual(at.bind(lhs, precision), at.bind(rhs, precision), values, on_one_path, at_most)
-            if difference == left == right == 0 and isinstance(lhs, _core.Operator):  # zeros, of which there is no rounding to bound
-                found.zero = not said_zero and not any(t.residual for t in found.taken)
-                found.taken.append(Taken(precision, 0.0, 0.0))
-            else:
-                taken, zero, amplified = scales.taken((difference, left, right), precision)
-                found.zero = zero and not said_zero
-                found.taken.append(taken)
+            entries = _core.residual(at.bind(lhs, precision), at.bind(rhs, precision), values, on_one_path, at_most)
+            found.taken, zero, amplified = scales.taken(precision, entries)
         except (_core.SingularOperatorError, _core.SingularHingeError) as error:
             refusal = error
             if len(found.taken) == 0 and precision == "quad":  # what three scalars refuse is singular
                 break
             continue
+        found.zero = zero and not said_zero
         found.verdict = decided(found.taken, amplified)
         if found.verdict != UNDECIDED:
             return found
@@ -155,28 +150,43 @@ def judge(
 
 
 class Scales:
-    """What a difference of two sides is relative to, and how large rounding can make it; computed once for all precisions."""
+    """What a difference of two sides is relative to, and how large rounding can make it; norms are shared by all precisions."""
 
     def __init__(self, lhs: Any, rhs: Any, at: BoundState, values: dict[str, list[float]]):
         self._lhs, self._rhs, self._at, self._values = lhs, rhs, at, values
         self._made: dict[str | int, Roundings] = {}
+        self._entries: list[tuple[str | int, float, float]] = []
 
-    def taken(self, entries: tuple[float, float, float], precision: str | int) -> tuple[Taken, bool, float]:
-        """(the residual and its bound, whether the sides are nothing but rounding, the growth), from the entries of lhs - rhs, lhs, rhs."""
-        made = self._roundings("double", precision == "double" or precision == "extended")
-        if (
-            made is None
-            or precision not in ("double", "extended")
-            and made.bound(made.size / max(*entries[1:], 1e-300), "double") > ROUNDING_NORMS
-        ):
+    def taken(self, precision: str | int, entries: tuple[float, float, float]) -> tuple[list[Taken], bool, float]:
+        """(the residuals in all precisions so far, whether both sides are rounding, the growth), with the entries of lhs - rhs, lhs, rhs.
+
+        A side that is zero is rounding, and falls with epsilon. Where both fall, the difference is relative to what they are rounding of:
+        the largest of entry over epsilon.
+        """
+        made = self._roundings("double", precision in ("double", "extended"))
+        sides = max(entries[1:])
+        trusted = made is not None and made.bound(made.size / max(sides, 1e-300), "double") <= ROUNDING_NORMS
+        if not trusted and precision not in ("double", "extended"):
             made = self._roundings(precision, True)
         assert made is not None
-        scale = max(*entries[1:], made.terms)
-        zero = made.terms == 0 and scale <= made.bound(1.0, precision) * made.size
-        if zero:
-            scale = made.size
-        relative = entries[0] / scale if scale > 0 else entries[0]
-        return Taken(precision, relative, made.bound(made.size / max(scale, 1e-300), precision)), zero, made.growth
+        self._entries.append((precision, entries[0], sides))
+        vanishing = made.terms == 0 and self._sides_fall()
+        common = max(size / EPSILON[p] for p, _, size in self._entries) if vanishing else 0.0
+        found = []
+        for p, difference, size in self._entries:
+            scale = common or max(size, made.terms)
+            bound = made.bound(1.0 if common else made.size / max(scale, 1e-300), p) if scale > 0 else 0.0
+            found.append(Taken(p, difference / scale if scale > 0 else difference, bound))
+        return found, vanishing, made.growth
+
+    def _sides_fall(self) -> bool:
+        """Whether both sides are zero, or were rounding in the last two precisions."""
+        if not any(size for *_, size in self._entries):
+            return True
+        if len(self._entries) < 2:
+            return False
+        (narrow, _, before), (wide, _, after) = self._entries[-2:]
+        return after <= SCATTER * EPSILON[wide] / EPSILON[narrow] * before
 
     def _roundings(self, precision: str | int, needed: bool) -> Roundings | None:
         """By norms in this precision; None where an inverse is refused in it, and they are not needed."""
