@@ -35,6 +35,8 @@ test-python: .venv/tested
 
 check: .venv/tested
 	$(BIN)/ruff check pycraft tests
+	$(BIN)/cmake --build build --target test_allocation -j $(JOBS)
+	build/test_allocation
 	$(BIN)/python -m pytest $(PARALLEL) -m "not peers and not slow" -x
 
 test-peers: .venv/peers
