@@ -3,7 +3,8 @@
 Of a true statement the residual is rounding, and falls with epsilon. Of a false one it stays where it is. So
 
 - *holds*: the residual is below its derived bound (`bounds`) in a scalar in which that bound is at most `DECIDES`, and has fallen there
-  with epsilon, or is exactly zero. Where it falls twice running, to below `DECIDES`, it need not be below the bound;
+  with epsilon, or is exactly zero. Where it falls twice running, to below `DECIDES`, it need not be below the bound; where it falls three
+  times running, its own fall is a bound, and takes the place of a derived one that decides nothing;
 - *fails*: it is the same in three scalars running, above its bound in the widest of them;
 - *undecided*: neither, up to the widest scalar.
 
@@ -14,7 +15,7 @@ be explained by nothing else, it fails. A scalar in which an inverse is refused 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,8 @@ SCATTER = 64.0
 """How far from the ratio of the epsilons the fall of a residual may be: a residual is one number and scatters."""
 STAYS = 0.5
 """A residual that keeps this part of itself from one scalar to the next has not fallen."""
+RUNNING = 3
+"""So many falls running are no chance: each is by the ratio of two epsilons, 2000 and more."""
 ROUNDING_NORMS = 1e-3
 """A bound above this in double: the norms that it is made of are rounding themselves, and are taken again in quad."""
 HOLDS, FAILS, UNDECIDED = "holds", "fails", "undecided"
@@ -141,12 +144,20 @@ def judge(
         found.zero = zero and not said_zero
         found.verdict = decided(found.taken, amplified)
         if found.verdict != UNDECIDED:
-            return found
+            break
     if not found.taken:
         assert refusal is not None
         raise refusal
-    found.verdict = decided(found.taken, amplified, last=True)
+    if found.verdict == UNDECIDED:
+        found.verdict = decided(found.taken, amplified, last=True)
+    if found.verdict == HOLDS and found.decisive.bound > DECIDES:
+        found.taken[-1] = replace(found.decisive, bound=seen_bound(found.taken))
     return found
+
+
+def seen_bound(taken: list[Taken]) -> float:
+    """The bound that a fall through several scalars is: their largest residual over epsilon, in the widest, with room for scatter."""
+    return SCATTER * taken[-1].epsilon * max(t.residual / t.epsilon for t in taken)
 
 
 class Scales:
@@ -206,9 +217,11 @@ def decided(taken: list[Taken], amplified: float = 1.0, *, last: bool = False) -
         return UNDECIDED
     wide = taken[-1]
     pairs = list(zip(taken[:-1], taken[1:], strict=True))
-    falls = [_falls(n, w, amplified) for n, w in pairs]
+    falls = [_falls(taken[:i], taken[i], amplified) for i in range(1, len(taken))]
     explained = wide.residual <= wide.bound
     if max(wide.residual, wide.bound) <= DECIDES and falls[-1] and (explained or len(falls) > 1 and falls[-2]):
+        return HOLDS
+    if len(falls) >= RUNNING and all(falls[-RUNNING:]) and wide.residual <= DECIDES:
         return HOLDS
     stays = [STAYS * n.residual <= w.residual and w.residual > 0 and not f for (n, w), f in zip(pairs, falls, strict=True)]
     if all(stays[-2:]) and (len(stays) > 1 and not explained or last):
@@ -216,12 +229,13 @@ def decided(taken: list[Taken], amplified: float = 1.0, *, last: bool = False) -
     return UNDECIDED
 
 
-def _falls(narrow: Taken, wide: Taken, amplified: float) -> bool:
-    """A residual in the narrow scalar may be small by luck: where the sweep amplifies roundings, the wider one need not be as lucky."""
+def _falls(narrower: list[Taken], wide: Taken, amplified: float) -> bool:
+    """Whether a residual has fallen with epsilon. A narrower one may be small, or zero, by luck: the largest of them over epsilon counts,
+    and where the sweep amplifies roundings, what it makes of one."""
     if wide.residual == 0:
         return True
-    scatter = max(SCATTER * max(narrow.residual, narrow.epsilon), CONSTANT * amplified * narrow.epsilon)
-    return wide.residual <= wide.epsilon / narrow.epsilon * scatter
+    seen = max([1.0, *(t.residual / t.epsilon for t in narrower)])
+    return wide.residual <= wide.epsilon * max(SCATTER * seen, CONSTANT * amplified)
 
 
 @dataclass
