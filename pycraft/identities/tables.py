@@ -94,7 +94,7 @@ def text_of(renderable: Any, width: int = WIDTH) -> str:
     """What a terminal of this width shows, without colors."""
     from rich.console import Console
 
-    console = Console(file=StringIO(), width=width, color_system=None)
+    console = Console(file=StringIO(), width=width, color_system=None, force_jupyter=False)
     console.print(renderable)
     return "\n".join(line.rstrip() for line in console.file.getvalue().splitlines()).strip("\n")  # type: ignore[attr-defined]
 
