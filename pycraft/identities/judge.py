@@ -234,7 +234,7 @@ def _falls(narrower: list[Taken], wide: Taken, amplified: float) -> bool:
     and where the sweep amplifies roundings, what it makes of one."""
     if wide.residual == 0:
         return True
-    seen = max([1.0, *(t.residual / t.epsilon for t in narrower)])
+    seen = max([1.0, *(t.residual / t.epsilon for t in narrower if np.isfinite(t.residual))])
     return wide.residual <= wide.epsilon * max(SCATTER * seen, CONSTANT * amplified)
 
 
