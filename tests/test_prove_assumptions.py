@@ -139,6 +139,7 @@ def test_the_books_derivatives_are_typed_with_their_diagonal_blocks():
     Delta, dP, dR = model.soa.Delta(i), derivative(P, i), derivative(R, i)
     inside = tau_bar @ dP @ tau_bar.T + Delta @ P_plus
     proof = prove_derivative(P, (E @ (inside + P_plus @ Delta.T) @ E.T).blockdiag(), i)
+    assert proof.worst < ROUNDING
     assert proof and proof.hypotheses == [CONSTANT] and "blockdiag(E_φ (τ̄ ∂P τ̄*" in proof.statement
     assert not prove_derivative(P, (E @ inside @ E.T).blockdiag(), i)
     assert prove_derivative(R, (E @ (dR + Delta @ R + R @ Delta.T) @ E.T).blockdiag(), i).hypotheses == []

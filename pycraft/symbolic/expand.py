@@ -298,9 +298,9 @@ class Problem:
             name = self._factor(inner) or f"⟨{len(self.opaque) + 1}⟩"
             text, latex = self._shown(inner, e) if kind in ("inverse", "operand") else (e.text(), f"{{{e.latex()}}}")
             symmetric = kind == "blockdiag" and bool(e.is_symmetric)
-            self.alphabet.add(
-                Letter(name, text, latex, symmetric, "diagonal" if kind in ("blockdiag", "sqrt", "half") else "full", None, e)
-            )
+            shape = "diagonal" if kind in ("blockdiag", "sqrt", "half") else "full"
+            known = e.written_out() if hasattr(e, "written_out") else e  # of a formula with derivatives, what it is
+            self.alphabet.add(Letter(name, text, latex, symmetric, shape, None, known))
             definition = Equation("definition", f"{text} = {self.alphabet.text(inner)}", monomial(name), inner)
             self.opaque.append(Opaque(name, kind, e, inner, definition))
             self._leaves[key] = name
