@@ -322,7 +322,7 @@ class LocalRules:
         a, known = self.alphabet, self.alphabet.letters[o.name]
         name = f"{o.name}form"
         latex = f"\\operatorname{{blockdiag}}({a.latex(form)})"
-        a.add(Letter(name, f"blockdiag({a.text(form)})", latex, known.symmetric, "diagonal", None, o.expression))
+        a.add(Letter(name, f"blockdiag({a.text(form)})", latex, known.symmetric, "diagonal", None, known.expression))
         text = f"{a.text(o.inner)} = {a.text(form)}"
         inside = Equation("structure", text, {(o.name,): ONE}, {(name,): ONE}, steps=numbered(list(steps)), uses=[o.definition])
         inside.check = lambda: chain_holds(steps, o.inner, form)

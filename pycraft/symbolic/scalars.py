@@ -151,7 +151,9 @@ def _log_determinant(problem: Problem, e: Any) -> Polynomial:
             return combine(*((1, _log_determinant(problem, f)) for f in e.children))
         case "sqrt":
             return {w: ratio(c, 2) for w, c in _log_determinant(problem, e.children[0]).items()}
-    return {("ln det", problem.operand(e)): ONE}
+    name = problem.operand(e)
+    problem.determinants.add(name)
+    return {("ln det", name): ONE}
 
 
 # ---------------------------------------------------------------------- the normal form
@@ -163,12 +165,19 @@ class ScalarRules:
 
     def __post_init__(self) -> None:
         self.problem, self.alphabet = self.local.problem, self.local.alphabet
+        # X⁻* = X⁻¹, by X⁻*: inside a trace, which is that of its transpose, no rule for one of the two would end
+        self._symmetric = {
+            letter: e
+            for e in self.local.local
+            for (letter, *more) in e.lhs
+            if not more and e.kind == "lemma" and e.rhs == monomial(self.alphabet.star(letter))
+        }
         self._forms: list[tuple[str, str, Polynomial, Polynomial, list[Step]]] = []
 
     def reduce(self, p: Polynomial) -> tuple[Polynomial, list[Step]]:
         """(the normal form, the steps to it). Raises GaveUp."""
         steps: list[Step] = []
-        while (step := self._inside(p) or self._between(p)) is not None:
+        while (step := self._turned(p) or self._inside(p) or self._between(p)) is not None:
             steps.append(step)
             p = step.after
             if len(steps) > STEPS:
@@ -176,6 +185,22 @@ class ScalarRules:
         return p, steps
 
     # ------------------------------------------------------------------ inside a trace
+    def _turned(self, p: Polynomial) -> Step | None:
+        """Each trace by the first of its rotations and its transpose's in which symmetric inverses are written without a star."""
+        a, after, uses = self.alphabet, dict(p), []
+        for word in [w for w in p if w[0] == "tr" and any(x in self._symmetric or a.star(x) in self._symmetric for x in w[1:])]:
+            best, turned = min((tuple(a.star(x) if x in self._symmetric else x for x in w), w) for w in self._rotations(word))
+            made, c = trace_word(best, a, ""), p[word]
+            if made == word:
+                continue
+            space = space_of(turned, a)
+            for i, letter in enumerate(turned):
+                if letter in self._symmetric:
+                    uses.append(TraceUse(c, best[:i], self._symmetric[letter], turned[i + 1 :], (letter,), True, space))
+            after.pop(word)
+            add_to(after, made, c)
+        return ScalarStep(p, after, list(uses), a) if uses or after != p else None
+
     def _inside(self, p: Polynomial) -> Step | None:
         """One equation of operators, in every trace where it fits."""
         fitting = {word: found for word in p if word[0] == "tr" and (found := min(self._places(word), key=lambda f: f[0], default=None))}
@@ -199,6 +224,8 @@ class ScalarRules:
             return
         for turned in self._rotations(word):
             for rule in self.local.rules.by_first.get(turned[0], ()):
+                if rule.word[0] in self._symmetric and len(rule.word) == 1:
+                    continue
                 if turned[: len(rule.word)] == rule.word and (rule.group < 0 or all(weight(w) < weight(rule.word) for w, _ in rule.to)):
                     yield rule.group, (), rule, turned[len(rule.word) :]
 
