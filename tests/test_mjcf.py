@@ -3,7 +3,6 @@
 Both sides compute sums of some tens of products; MuJoCo normalises its quaternions in between. `ROUNDING` (oracle.py) covers it.
 """
 
-import warnings
 from dataclasses import astuple
 
 import numpy as np
