@@ -100,7 +100,7 @@ def test_refused_rows_say_why():
         (dict(refinements=-1), "refine=-1: a number of corrections"),
         (dict(refinements=["x"]), "refine='x': a number of corrections"),
         (dict(refinements=True), "refine=True: a number of corrections"),
-        (dict(refinements=(1, "narrower")), "residual 'narrower' of .* is not there; there are 'same' and 'wider'"),
+        (dict(refinements=(1, "narrower")), "residual 'narrower' of .* is not there; there are 'same', 'gather' and 'wider'"),
         (dict(refinements=[(1, "wider", 2)]), "neither a number of corrections nor a pair"),
         (dict(forms=[]), "forms is empty"),
         (dict(methods=[]), "methods is empty"),

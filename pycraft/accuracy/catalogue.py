@@ -25,7 +25,8 @@ REFINEMENTS: tuple[dict[str, Any], ...] = (
     {"refine": "auto"},
     {"refine": "auto", "residual": "wider"},
 )
-DOUBLE = tuple(Rung(form, **refinement) for form in FORMS for refinement in REFINEMENTS)
+GATHERED = tuple(Rung(form, refine="auto", residual="gather") for form in ("fast", "ud"))
+DOUBLE = tuple(Rung(form, **refinement) for form in FORMS for refinement in REFINEMENTS) + GATHERED
 OTHER_PRECISIONS = (
     Rung("fast", precision="single"),
     Rung("fast", refine="auto", residual="wider", precision="single"),
