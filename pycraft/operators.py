@@ -1,9 +1,8 @@
-"""The operator set of a model (`soa.phi`, `soa.H`, ...), block views, and how expressions evaluate and display in Python."""
+"""The operator set of a model (`soa.phi`, `soa.H`, ...), and how expressions evaluate and display in Python."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from html import escape
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -260,100 +259,6 @@ def _is_mass_matrix(operand: _core.Operator) -> bool:
     H, phi, M, J, D = letters
     whole = H @ phi @ M @ phi.T @ H.T + J
     return len(operand.sources) == 1 and (operand == D or (operand.domain == H.codomain and _core.equal_by_theorems(operand, whole)))
-
-
-# ---------------------------------------------------------------------- block views
-class BlockView:
-    """A dense operator cut into labelled blocks: rows and columns by body, hinge or node name.
-
-    `view["link2", "link3"]` is the block in that row and column; `view.rows`, `view.columns` are the labels. With
-    `order="tip-to-base"` the last body comes first, so that φ is lower triangular as in the book. Shown in a notebook as a table whose
-    cells are shaded by the logarithm of the block's largest entry.
-    """
-
-    def __init__(self, values: np.ndarray, rows: list[tuple[str, slice]], columns: list[tuple[str, slice]], title: str):
-        self.values, self.title = values, title
-        self._rows, self._columns = dict(rows), dict(columns)
-
-    @property
-    def rows(self) -> list[str]:
-        return list(self._rows)
-
-    @property
-    def columns(self) -> list[str]:
-        return list(self._columns)
-
-    def __getitem__(self, key: tuple[str, str]) -> np.ndarray:
-        row, column = key
-        for name, known in ((row, self._rows), (column, self._columns)):
-            if name not in known:
-                raise KeyError(f"no block row or column is called {name!r}; there are {', '.join(known)}")
-        return self.values[self._rows[row], self._columns[column]]
-
-    def __iter__(self) -> Iterator[tuple[str, str]]:
-        return ((r, c) for r in self._rows for c in self._columns)
-
-    def norms(self) -> np.ndarray:
-        """The largest entry of each block, (rows, columns)."""
-        return np.array([[np.abs(b).max() if (b := self[r, c]).size else 0.0 for c in self._columns] for r in self._rows]).reshape(
-            len(self._rows), len(self._columns)
-        )
-
-    def __repr__(self) -> str:
-        norms = self.norms()
-        width = max([len(c) for c in self._columns] + [7]) + 2
-        left = max([len(r) for r in self._rows] + [0]) + 2
-        limit = 12
-        names = list(self._columns)[:limit]
-        lines = [
-            self.title,
-            " " * left + "".join(f"{c:>{width}}" for c in names) + (" ..." if len(self._columns) > limit else ""),
-        ]
-        for i, r in enumerate(list(self._rows)[:limit]):
-            lines.append(f"{r:<{left}}" + "".join(f"{'·' if x == 0 else format(x, '.2g'):>{width}}" for x in norms[i, :limit]))
-        if len(self._rows) > limit:
-            lines.append("...")
-        return "\n".join(lines)
-
-    def _repr_html_(self) -> str:
-        norms = self.norms()
-        limit = 40
-        top = norms.max() if norms.size else 1.0
-        head = "".join(f"<th style='writing-mode:vertical-rl'>{escape(c)}</th>" for c in self.columns[:limit])
-        body = []
-        for i, r in enumerate(self.rows[:limit]):
-            cells = []
-            for x in norms[i, :limit]:
-                depth = 0.0 if x == 0 else max(0.15, 1 + np.log10(x / top) / 8)
-                ink = "#fff" if depth > 0.6 else "#222"
-                text = "" if x == 0 else f"{x:.2g}"
-                cells.append(
-                    f"<td style='background:rgba(31,78,121,{depth:.2f});color:{ink};text-align:center;padding:2px 6px'>{text}</td>"
-                )
-            body.append(f"<tr><th style='text-align:left'>{escape(r)}</th>{''.join(cells)}</tr>")
-        more = "" if max(norms.shape) <= limit else f"<caption>first {limit} of {norms.shape[0]} x {norms.shape[1]} blocks</caption>"
-        table = f"<table style='border-collapse:collapse;font-size:80%'>{more}<tr><th></th>{head}</tr>{''.join(body)}</table>"
-        return f"<p>{escape(self.title)}</p>{table}"
-
-
-def block_view(operator: _core.Operator, order: str = "base-to-tip") -> BlockView:
-    """The operator's dense form as labelled blocks."""
-    if order not in ("base-to-tip", "tip-to-base"):
-        raise _core.EvaluationError(f"order={order!r}: there are 'base-to-tip' and 'tip-to-base'")
-    values = operator.dense()
-    if values.ndim == 3:
-        raise _core.EvaluationError("blocks() shows one state; bind one with .at(q)")
-
-    def labels(space: _core.Space) -> list[tuple[str, slice]]:
-        blocks = [(label or str(i), where) for i, (label, where, _) in enumerate(space.blocks)]
-        return blocks if order == "base-to-tip" else blocks[::-1]
-
-    return BlockView(
-        values,
-        labels(operator.codomain),
-        labels(operator.domain),
-        f"{operator.text()} : {operator.domain.name} → {operator.codomain.name}",
-    )
 
 
 class Explanation(str):

@@ -316,6 +316,13 @@ def test_scalars_are_expressions(letters):
     assert trace == MM.op.trace() and hash(trace) == hash(MM.op.trace()) and trace != logdet
 
 
+def test_norms_of_long_operators():
+    """Above 600 columns as the root of a trace over the tree: between dual spaces and into nodes too."""
+    soa = pc.chain(101).soa
+    for operator in (soa.phi, soa.M @ soa.phi.T, soa.H @ soa.phi, soa.B(["body100"]).T @ soa.phi.T):
+        assert float(operator.norm()) == pytest.approx(np.linalg.norm(operator.dense()), rel=1e-12), operator.text()
+
+
 def test_scalars_of_a_batch(model):
     Q, _ = uniform_batch(model, 3, 4)
     H, phi, M = model.soa("H phi M")

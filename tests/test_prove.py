@@ -332,7 +332,7 @@ def test_a_tampered_proof_does_not_recheck(arm):
         assert not broken.recheck()
     whole = prove("φKHψ = φ - ψ", arm)
     whole.steps[0].uses[0].equation = Equation("lemma", "φ K H ψ = φ − ψ", *parse_equation("φ K H ψ = φ − ψ"))  # a lemma without a proof
-    whole._rests_on = foundations(e for s in whole.steps for e in s.premises())
+    whole.rests_on = foundations(e for s in whole.steps for e in s.premises())
     assert not whole.recheck()
 
 

@@ -89,6 +89,19 @@ void drop_unused(Plan& plan) {
   plan.steps.assign(kept.rbegin(), kept.rend());
 }
 
+// The identity of a space's numbers as a map to its dual, W of ‖X‖² = tr(X* W X); none for spaces of nodes.
+std::optional<Expression> euclidean_weight(const Space& space) {
+  if (space == space.dual()) return identity(space);
+  if (!space.belongs_to_bodies()) return std::nullopt;
+  std::vector<std::vector<double>> blocks;
+  for (size_t k = 0; k < space.layout().of_body.size(); ++k) {
+    const size_t n = size_t(space.body_size(static_cast<int>(k)));
+    blocks.emplace_back(n * n, 0.0);
+    for (size_t i = 0; i < n; ++i) blocks.back()[i * n + i] = 1;
+  }
+  return constant_blocks(std::move(blocks), space, space.dual(), "I");
+}
+
 // Of the symbols where one is bound, else of the leaves whose numbers hang on no state.
 Precision precision_of(const Expression& e) {
   std::optional<Precision> symbols, leaves;
@@ -187,8 +200,9 @@ Plan Planner::plan(const Expression& typed, Request request) {
     case Request::logdet: plan_.output = logdet(e); break;
     case Request::norm: {
       // Small or tall operators column by column; long ones as tr(X*X) over the tree.
-      if (e.domain().dimension() > 600 && bodies) {
-        const Expression square = lower(e.T() * e, false);
+      const std::optional<Expression> weight = e.domain().dimension() > 600 && bodies ? euclidean_weight(e.codomain()) : std::nullopt;
+      if (weight) {
+        const Expression square = lower(e.T() * *weight * e, false);
         std::string reason;
         if (is_block_diagonal(e) || build_realization(*this, square, true, reason)) {
           Step s{StepKind::root_of_trace};

@@ -257,7 +257,7 @@ void register_operators(py::module_& m) {
          "the model's present state where left out; x: (n,) or (n, m); v: (nv,), zero where left out; form, refine, residual and precision\n"
          "as in at; seed: of the signs by which the data are moved; seconds: spent on each timing. Raises EvaluationError where the\n"
          "expression is bound already, ModelError for arrays of another shape and for a model without coordinates.")
-      .def("blocks", [](const Expression& e, const std::string& order) { return py::module_::import("pycraft.operators").attr("block_view")(e, order); },
+      .def("blocks", [](const Expression& e, const std::string& order) { return py::module_::import("pycraft.block_view").attr("block_view")(e, order); },
            py::arg("order") = "base-to-tip", "A labelled block view of the dense form; order=\"tip-to-base\" shows the book's triangles.")
       .def("plan", [](const Expression& e, const std::string& request, bool rules) {
         static const std::pair<const char*, Request> names[] = {{"apply", Request::apply}, {"dense", Request::dense}, {"diagonal", Request::diagonal},

@@ -204,8 +204,8 @@ void RigidDynamics<S>::mass_matrix_inverse(const double* q, S* out, const Solvin
   if (how.refinement.steps != 0) {
     if (how.refinement.gathers_wider()) gather_wider();
     if (how.refinement.wider()) {
-      std::vector<double> rest(N, 0.0);
-      wider(q, rest.data());
+      rest_.assign(N, 0.0);
+      wider(q, rest_.data());
     }
     refine(out, N, N, how.refinement, how.form, S(0), [&] { return "the mass matrix inverse of '" + source_.name() + "'"; },
            [&](const S* x, S* r) {
@@ -320,11 +320,11 @@ S RigidDynamics<S>::kinetic_energy(const S* q, const S* v) {
 template <class S>
 S RigidDynamics<S>::potential_energy(const S* q) {
   kinematics(*model_, q, blocks_);
-  std::vector<Pose<S>> world(model_->bodies);
+  world_.resize(model_->bodies);
   S energy = S(0);
   for (int k = 0; k < model_->bodies; ++k) {
-    world[k] = model_->parent[k] < 0 ? blocks_.pose[k] : world[model_->parent[k]] * blocks_.pose[k];
-    const Vector3<S> moment = world[k].R * model_->inertia[k].moment + model_->inertia[k].mass * world[k].p;
+    world_[k] = model_->parent[k] < 0 ? blocks_.pose[k] : world_[model_->parent[k]] * blocks_.pose[k];
+    const Vector3<S> moment = world_[k].R * model_->inertia[k].moment + model_->inertia[k].mass * world_[k].p;
     energy -= dot(model_->gravity, moment);
   }
   return energy;

@@ -78,6 +78,8 @@ class RigidDynamics {
   RigidBlocks<S> blocks_;
   Velocities<S> velocities_;
   std::vector<Vector6<S>> alpha_, force_;
+  std::vector<Pose<S>> world_;   // X_WB of every body
+  std::vector<double> rest_;     // v = 0
   std::vector<S> q_, v_, tau_, columns_, scratch_, r_;
   std::unique_ptr<RigidDynamics<Wider<S>>> wider_;
   std::shared_ptr<const CompiledModel<Wider<S>>> wide_model_;

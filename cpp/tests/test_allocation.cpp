@@ -1,35 +1,16 @@
-// A run of the engine, and a direct call, allocate nothing after the first. Counted by replacing operator new and, on glibc, malloc.
+// A run of the engine, of every kind of step, and every direct call allocate nothing after the first.
 #define BOOST_TEST_MODULE allocation
-#include <atomic>
 #include <boost/test/included/unit_test.hpp>
-#include <cstdlib>
-#include <new>
+#include <cmath>
+#include <set>
 
 #include "dynamics/packed_dynamics.h"
 #include "dynamics/rigid_dynamics.h"
 #include "dynamics/sensitivities.h"
+#include "operators/directions.h"
 #include "operators/multibody_operators.h"
+#include "allocations.h"
 #include "random_tree.h"
-
-namespace {
-std::atomic<long> allocations{0};
-}
-
-#if defined(__GLIBC__)
-extern "C" void* __libc_malloc(size_t);
-extern "C" void* malloc(size_t size) {
-  ++allocations;
-  return __libc_malloc(size);
-}
-#else
-void* operator new(size_t size) {
-  ++allocations;
-  if (void* p = std::malloc(size)) return p;
-  throw std::bad_alloc();
-}
-void operator delete(void* p) noexcept { std::free(p); }
-void operator delete(void* p, size_t) noexcept { std::free(p); }
-#endif
 
 using namespace pycraft;
 using namespace pycraft::testing;
@@ -57,37 +38,74 @@ std::shared_ptr<Multibody> robot() {
   return mb;
 }
 
-template <class F>
-long count(F f) {
-  f(), f();
-  const long before = allocations;
-  f();
-  return allocations - before;
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(counting_counts) {
+  if (allocations_are_counted) BOOST_TEST(allocations_of([] { std::vector<double>(100).swap(*std::make_unique<std::vector<double>>()); }) > 0);
+}
+
+namespace {
+
+// Every request of one expression; the kinds of steps that ran are noted.
+void check_runs(const Expression& e, std::set<StepKind>& seen, bool rules = true) {
+  const bool square = e.domain().dimension() == e.codomain().dimension();
+  for (const Request request : {Request::apply, Request::dense, Request::block_diagonal, Request::diagonal, Request::trace, Request::logdet, Request::norm})
+    for (int columns : {1, 3}) {
+      if (!square && request != Request::apply && request != Request::dense && request != Request::norm) continue;
+      if (request != Request::apply && columns > 1) continue;
+      const std::vector<double> x(size_t(e.domain().dimension()) * columns, 0.5);
+      Inputs inputs;
+      if (request == Request::apply) inputs.x = x.data(), inputs.columns = columns;
+      Result r;
+      std::shared_ptr<ExecutionPool> pool;
+      try {
+        pool = prepare(e, request, rules);
+        pool->run(inputs, false, r);
+      } catch (const Error&) {  // no trace of what maps a space to another, no ln det of what is singular
+        continue;
+      }
+      for (const Step& step : pool->plan().steps) seen.insert(step.kind);
+      BOOST_TEST(allocations_of([&] { pool->run(inputs, false, r); }) == 0, show(e) << ", request " << int(request) << "\n" << explain(pool->plan()));
+    }
+}
+
+Expression dense_constant(const Space& domain, const Space& codomain) {
+  std::vector<double> entries(size_t(domain.dimension()) * codomain.dimension());
+  for (size_t i = 0; i < entries.size(); ++i) entries[i] = std::sin(double(i) * double(i));  // of full rank
+  return constant(entries, domain, codomain, "C");
 }
 
 }  // namespace
 
-BOOST_AUTO_TEST_CASE(counting_counts) {
-  BOOST_TEST(count([] { std::vector<double>(100).swap(*std::make_unique<std::vector<double>>()); }) > 0);
-}
-
 BOOST_AUTO_TEST_CASE(runs_of_plans) {
   const auto mb = robot();
-  const Letters o(operators_of(mb));
+  mb->set_v(std::vector<double>(mb->nv(), 0.3));
+  mb->set_gravity({0, 0, -9.81});
+  const auto source = operators_of(mb);
+  const Letters o(source);
   const Expression MM = o.H * o.phi * o.M * o.phi.T() * o.H.T();
   const Letters m(random_tree(1, {-1, 0, 1, 1, 0, 4, -1}));
   const Expression MMm = m.H * m.phi * m.M * m.phi.T() * m.H.T();
+  std::vector<int> chain(150);
+  for (int k = 0; k < 150; ++k) chain[k] = k - 1;
+  const Expression long_phi = Letters(random_tree(2, chain)).phi;
+  const Expression C = dense_constant(MM.domain(), MM.codomain()), I = identity(MM.domain());
+  const auto mechanics = [&](MechanicsSymbolId id) { return mechanics_operator(id, source); };
+  const Expression crf_V = mechanics(pycraft::V_bar), a = mechanics(coriolis_acceleration), b = mechanics(gyroscopic_force);
+  auto twice = std::make_shared<ExternalData>();
+  const int n = MM.domain().dimension();
+  twice->apply = twice->apply_transposed = [n](const double* x, double* y, int columns) {
+    for (int i = 0; i < n * columns; ++i) y[i] = 2 * x[i];
+  };
+  std::set<StepKind> seen;
   for (const Expression& e : {o.phi, o.psi.T(), o.K, o.Omega, o.D.inv(), o.tau_bar, MM, MM.inv(), (MM + 0.1 * o.I).inv(), block_diagonal(o.Omega), (MM.inv() + 0.01 * o.D).inv(),
-                              MMm, MMm.inv(), m.psi, (MMm + 0.1 * m.I).inv()})
-    for (int columns : {1, 3}) {
-      const auto pool = prepare(e, Request::apply);
-      const std::vector<double> x(size_t(e.domain().dimension()) * columns, 0.5);
-      Inputs inputs;
-      inputs.x = x.data();
-      inputs.columns = columns;
-      Result r;
-      BOOST_TEST(count([&] { pool->run(inputs, false, r); }) == 0, show(e));
-    }
+                              MMm, MMm.inv(), m.psi, (MMm + 0.1 * m.I).inv(), square_root(o.D), lower_half(o.D), zero(MM.domain(), MM.codomain()), C * MM, (dense_constant(o.phi.domain(), o.phi.codomain()) + o.phi).inv(),
+                              block_diagonal((C + MM).inv()), block_diagonal(o.phi * o.M * o.phi.T()), block_diagonal(o.psi.T() * o.Upsilon * o.psi), 2 * I - MM, (o.D + 0.1 * I).inv(),
+                              MM.inv() + external(twice, MM.domain(), MM.codomain()), crf_V * o.phi, o.M * a + b, a * a.T(), block_diagonal(o.E * o.M * o.E.T()),
+                              block_diagonal((MM + 0.1 * o.I).inv()), o.phi * o.M, long_phi, differentiate(MM, *coordinate_direction(source, 2)), differentiate(MM.inv(), *coordinate_direction(source, 2))})
+    for (const bool rules : {true, false}) check_runs(e, seen, rules);
+  for (int kind = 0; kind < step_kinds; ++kind)
+    BOOST_TEST(seen.count(StepKind(kind)) == 1, "no run had a step " << step_kind_name(StepKind(kind)));
 }
 
 // A tip so light that only the error sweep can tell whether its pivots are noise.
@@ -97,7 +115,7 @@ BOOST_AUTO_TEST_CASE(pivots_in_doubt) {
   RigidDynamics<double> w(*mb);
   const std::vector<double> q = mb->zero_q(), v(mb->nv(), 0.3), tau(mb->nv(), 0.1);
   std::vector<double> out(mb->nv());
-  BOOST_TEST(count([&] { w.forward_dynamics(q.data(), v.data(), tau.data(), out.data()); }) == 0);
+  BOOST_TEST(allocations_of([&] { w.forward_dynamics(q.data(), v.data(), tau.data(), out.data()); }) == 0);
 }
 
 BOOST_AUTO_TEST_CASE(forms_refinement_and_packs) {
@@ -115,12 +133,12 @@ BOOST_AUTO_TEST_CASE(forms_refinement_and_packs) {
   RigidDynamics<double> w(*mb);
   PackedDynamics<double> pack(*mb);
   for (const Form form : forms) {
-    for (const Refinement refinement : {Refinement{0, false}, Refinement{2, false}, Refinement{Refinement::automatic, true}}) {
+    for (const Refinement refinement : {Refinement{0}, Refinement{2}, Refinement{2, ResidualPrecision::gather}, Refinement{Refinement::automatic, ResidualPrecision::wider}}) {
       const Solving how{form, refinement, OnSingular::raise};
-      BOOST_TEST(count([&] { w.forward_dynamics(q.data(), v.data(), tau.data(), alone.data(), how); }) == 0, form_name(form));
+      BOOST_TEST(allocations_of([&] { w.forward_dynamics(q.data(), v.data(), tau.data(), alone.data(), how); }) == 0, form_name(form));
     }
     if (form == Form::square_root) continue;
-    BOOST_TEST(count([&] { BOOST_TEST(pack.forward_dynamics(q.data(), nq, v.data(), nv, tau.data(), nv, packed.data(), form)); }) == 0, form_name(form));
+    BOOST_TEST(allocations_of([&] { BOOST_TEST(pack.forward_dynamics(q.data(), nq, v.data(), nv, tau.data(), nv, packed.data(), form)); }) == 0, form_name(form));
     for (int b = 0; b < width; ++b) {  // the same operations in the same order
       w.forward_dynamics(q.data() + size_t(b) * nq, v.data() + size_t(b) * nv, tau.data(), alone.data(), Solving{form, {}, OnSingular::raise});
       for (int i = 0; i < nv; ++i) BOOST_TEST(packed[size_t(b) * nv + i] == alone[i], boost::test_tools::tolerance(1e-12));
@@ -130,16 +148,40 @@ BOOST_AUTO_TEST_CASE(forms_refinement_and_packs) {
 
 BOOST_AUTO_TEST_CASE(direct_calls) {
   const auto mb = robot();
+  mb->set_gravity({0, 0, -9.81});
+  mb->set_rotor_inertia(1, {0.3});
+  mb->add_node("tool", "body5", Pose<double>::identity());
+  const size_t n = size_t(mb->nv());
+  const std::vector<double> q = mb->zero_q(), v(n, 0.3), tau(n, 0.1);
+  std::vector<double> out(n * n * n), dq(n * n * n), dv(n * n), dtau(n * n);
+  const Node tool = mb->node(mb->node_index("tool"));
+  const auto quiet = [](auto f, const char* name) { BOOST_TEST(allocations_of(f) == 0, name); };
+
   RigidDynamics<double> w(*mb);
-  const std::vector<double> q = mb->zero_q(), v(mb->nv(), 0.3), tau(mb->nv(), 0.1);
-  std::vector<double> out(size_t(mb->nv()) * mb->nv());
-  BOOST_TEST(count([&] { w.forward_dynamics(q.data(), v.data(), tau.data(), out.data()); }) == 0);
-  BOOST_TEST(count([&] { w.inverse_dynamics(q.data(), v.data(), tau.data(), out.data()); }) == 0);
-  BOOST_TEST(count([&] { w.mass_matrix(q.data(), out.data()); }) == 0);
-  BOOST_TEST(count([&] { w.mass_matrix_inverse(q.data(), out.data()); }) == 0);
+  quiet([&] { w.forward_dynamics(q.data(), v.data(), tau.data(), out.data()); }, "forward dynamics");
+  quiet([&] { w.inverse_dynamics(q.data(), v.data(), tau.data(), out.data()); }, "inverse dynamics");
+  quiet([&] { w.inverse_dynamics(q.data(), v.data(), nullptr, out.data()); }, "bias forces");
+  quiet([&] { w.mass_matrix(q.data(), out.data()); }, "mass matrix");
+  for (const Form form : forms)
+    for (const Refinement refinement : {Refinement{0}, Refinement{2}, Refinement{1, ResidualPrecision::gather}, Refinement{1, ResidualPrecision::wider}})
+      quiet([&] { w.mass_matrix_inverse(q.data(), out.data(), Solving{form, refinement, OnSingular::raise}); }, "mass matrix inverse");
+  quiet([&] { w.jacobian(tool, q.data(), out.data()); }, "jacobian");
+  quiet([&] { out[0] = w.pose(tool, q.data()).p[0]; }, "pose");
+  quiet([&] { out[0] = w.kinetic_energy(q.data(), v.data()); }, "kinetic energy");
+  quiet([&] { out[0] = w.potential_energy(q.data()); }, "potential energy");
+
   Sensitivities<double> s(*mb);
-  std::vector<double> dq(out), dv(out), dtau(out);
-  BOOST_TEST(count([&] { s.inverse_dynamics(q.data(), v.data(), tau.data(), dq.data(), dv.data()); }) == 0);
-  BOOST_TEST(count([&] { s.forward_dynamics(q.data(), v.data(), tau.data(), dq.data(), dv.data(), dtau.data()); }) == 0);
-  BOOST_TEST(count([&] { s.log_determinant(q.data(), dq.data(), nullptr, nullptr, nullptr); }) == 0);
+  quiet([&] { s.inverse_dynamics(q.data(), v.data(), tau.data(), dq.data(), dv.data()); }, "derivatives of inverse dynamics");
+  quiet([&] { s.forward_dynamics(q.data(), v.data(), tau.data(), dq.data(), dv.data(), dtau.data()); }, "derivatives of forward dynamics");
+  quiet([&] { s.mass_matrix(q.data(), out.data()); }, "derivative of the mass matrix");
+  quiet([&] { s.christoffel(q.data(), out.data()); }, "Christoffel symbols");
+  quiet([&] { s.kinetic_energy(q.data(), v.data(), dq.data(), dv.data()); }, "derivatives of the kinetic energy");
+  quiet([&] { s.hamiltonian(q.data(), v.data(), tau.data(), dq.data(), dv.data()); }, "Hamilton's equations");
+  quiet([&] { s.momentum(q.data(), v.data(), out.data(), dq.data()); }, "momentum");
+  quiet([&] { s.jacobian_rate(tool, q.data(), v.data(), out.data()); }, "rate of the Jacobian");
+  std::vector<double> wide(6 * n * n + 10 * n * size_t(mb->bodies()));
+  quiet([&] { s.jacobian_derivative(tool, q.data(), wide.data()); }, "derivative of the Jacobian");
+  quiet([&] { s.inertial_regressor(q.data(), v.data(), tau.data(), wide.data()); }, "regressor");
+  std::vector<double> inertias(10 * size_t(mb->bodies())), geometry(6 * size_t(mb->bodies())), axes(6 * n);
+  quiet([&] { s.log_determinant(q.data(), dq.data(), inertias.data(), geometry.data(), axes.data()); }, "gradient of the log determinant");
 }

@@ -1,37 +1,16 @@
 // Methods of forward dynamics allocate nothing after the first call; rates of configurations against differences on the group, in quad.
 #define BOOST_TEST_MODULE methods
-#include <atomic>
 #include <boost/test/included/unit_test.hpp>
-#include <cstdlib>
-#include <new>
 #include <random>
 
 #include "dynamics/methods.h"
 #include "dynamics/rigid_dynamics.h"
 #include "dynamics/trajectory.h"
 #include "recursions/configuration_rate.h"
-
-namespace {
-std::atomic<long> allocations{0};
-}
-
-#if defined(__GLIBC__)
-extern "C" void* __libc_malloc(size_t);
-extern "C" void* malloc(size_t size) {
-  ++allocations;
-  return __libc_malloc(size);
-}
-#else
-void* operator new(size_t size) {
-  ++allocations;
-  if (void* p = std::malloc(size)) return p;
-  throw std::bad_alloc();
-}
-void operator delete(void* p) noexcept { std::free(p); }
-void operator delete(void* p, size_t) noexcept { std::free(p); }
-#endif
+#include "allocations.h"
 
 using namespace pycraft;
+using namespace pycraft::testing;
 
 namespace {
 
@@ -73,11 +52,8 @@ BOOST_AUTO_TEST_CASE(methods_do_not_allocate) {
   RigidDynamics<double>(*mb).forward_dynamics(q.data(), v.data(), tau.data(), expected.data());
   DynamicsMethods<double> w(*mb);
   for (const Method method : methods) {
-    w.forward_dynamics(method, q.data(), v.data(), tau.data(), out.data());
+    BOOST_TEST(allocations_of([&] { w.forward_dynamics(method, q.data(), v.data(), tau.data(), out.data()); }) == 0, method_name(method));
     for (int i = 0; i < mb->nv(); ++i) BOOST_TEST(std::abs(out[i] - expected[i]) < 1e-11);
-    const long before = allocations;
-    w.forward_dynamics(method, q.data(), v.data(), tau.data(), out.data());
-    BOOST_TEST(allocations - before == 0, method_name(method));
   }
 }
 
@@ -106,6 +82,32 @@ BOOST_AUTO_TEST_CASE(moves_are_those_of_the_model) {
   mb->integrate(q.data(), u.data(), expected.data());
   move_configuration(*mb->compiled<double>(), out.data(), u.data(), out.data());  // in place
   for (size_t i = 0; i < q.size(); ++i) BOOST_TEST(std::abs(out[i] - expected[i]) < 1e-15);
+}
+
+// Steps of a trajectory allocate nothing: twice the time, the same count.
+BOOST_AUTO_TEST_CASE(steps_do_not_allocate) {
+  const auto mb = robot();
+  const auto model = mb->compiled<double>();
+  const std::vector<double> q = mb->zero_q(), v = random_numbers(mb->nv(), 5), tau = random_numbers(mb->nv(), 6), damping(mb->nv(), 0.1);
+  RigidDynamics<double> w(*mb);
+  const Accelerations<double> fall = [&](const double* at, const double* moving, const double* forces, double* vdot) {
+    w.forward_dynamics(at, moving, forces, vdot);
+  };
+  for (const Integrator integrator : integrators) {
+    long counts[2], steps[2];
+    for (const int twice : {0, 1}) {
+      const std::vector<double> times{0, 0.02 * (1 + twice)};
+      const TrajectoryOptions options{integrator, 1e-8, 1e-8, 1e-3, true};
+      TrajectoryCost cost;
+      counts[twice] = allocations_of([&] {
+        cost = integrate_trajectory<double>(*model, fall, q.data(), v.data(), times, tau.data(), damping.data(), options, [](int, const double*, const double*) {});
+      });
+      steps[twice] = cost.steps;
+    }
+    BOOST_TEST(steps[1] > steps[0], integrator_name(integrator));
+    const long of_boost = integrator == Integrator::bulirsch_stoer ? 2 : 0;  // a step of Boost.Odeint's own keeps two arrays of 9 numbers
+    BOOST_TEST(counts[1] - counts[0] <= of_boost * (steps[1] - steps[0]), integrator_name(integrator));
+  }
 }
 
 // Accelerations may be anybody's: a harmonic oscillator has no model.

@@ -299,7 +299,9 @@ def check(
         undecided=residuals.verdict == "undecided",
     )
     if not report.held and search:
-        report.counterexample = searching.smallest(searching.statement_text(read), seed=seed, precision=precision, budget=budget)
+        report.counterexample = searching.smallest(
+            searching.statement_text(read), seed=seed, precision=precision, budget=budget, vectors=searching.named_vectors(read)
+        )
     return report
 
 

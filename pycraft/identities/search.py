@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -122,21 +122,47 @@ def statement_text(read: Statement) -> str:
     return read.text if read.reading != "expressions" else f"{sides[0]} == {sides[1]}"
 
 
-def refutes(text: str, parents: list[int], kinds: list[str], rotor: bool, seed: int, precision: str | int, states: int = STATES) -> Any:
+def named_vectors(read: Statement) -> dict[str, str]:
+    """The names of a statement's vectors and of the spaces that they lie in: its text says of neither."""
+    found: dict[str, str] = {}
+    todo = [read.lhs, read.rhs]
+    while todo:
+        side = todo.pop()
+        if isinstance(side, _core.Scalar):
+            todo += side.operands()
+        elif isinstance(side, _core.Operator):
+            todo += side.children
+            if side.kind == "vector":
+                found[side.name] = side.codomain.name
+    return found
+
+
+def refutes(
+    text: str,
+    parents: list[int],
+    kinds: list[str],
+    rotor: bool,
+    seed: int,
+    precision: str | int,
+    states: int = STATES,
+    vectors: Mapping[str, str] | None = None,
+) -> Any:
     """(q, residual) at the first refuting state, or None."""
     from .checker import BoundState, drawn_vectors, evaluate
 
     model = tree(parents, kinds, seed=seed, rotor_inertia=rotor, welds="keep")
     try:
-        read = Statements(model.soa).read(text)
+        spaces = {space.name: space for space in (model.soa.Theta, model.soa.V, model.soa.F)}
+        named = {name: _core.vector(name, spaces[space]) for name, space in (vectors or {}).items()}
+        read = Statements(model.soa, named).read(text)
     except (_core.EvaluationError, _core.SpaceError, _core.ModelError):
         return None
     rng = np.random.default_rng(seed)
     for _ in range(states):
         state = model.random_state(rng)
-        vectors = drawn_vectors(read.rhs, rng, drawn_vectors(read.lhs, rng, {}))
+        drawn = drawn_vectors(read.rhs, rng, drawn_vectors(read.lhs, rng, {}))
         try:
-            residuals = evaluate(read.lhs, read.rhs, [BoundState(model.soa, state)], [vectors], precision)
+            residuals = evaluate(read.lhs, read.rhs, [BoundState(model.soa, state)], [drawn], precision)
         except ArithmeticError:
             continue
         if residuals.verdict == "fails":
@@ -145,16 +171,28 @@ def refutes(text: str, parents: list[int], kinds: list[str], rotor: bool, seed: 
 
 
 def smallest(
-    text: str, *, seed: int = 0, precision: str | int = "extended", budget: float = 20.0, largest: int = 4
+    text: str,
+    *,
+    seed: int = 0,
+    precision: str | int = "extended",
+    budget: float = 20.0,
+    largest: int = 4,
+    vectors: Mapping[str, str] | None = None,
 ) -> Counterexample | None:
-    """The smallest refutation by (bodies, degrees of freedom), or None if the budget (seconds) ran out first."""
+    """The smallest refutation by (bodies, degrees of freedom), or None if the budget (seconds) ran out first.
+
+    `vectors` names the spaces of the vectors in the text. One in a space that no other model has (of nodes, of a user's own) is on its
+    own model alone: None at once.
+    """
+    if not {"Θ", "V", "F"}.issuperset((vectors or {}).values()):
+        return None
     begin = time.perf_counter()
     for tried, (parents, kinds, rotor) in enumerate(candidates(largest)):
-        found = refutes(text, parents, kinds, rotor, seed, precision)
+        found = refutes(text, parents, kinds, rotor, seed, precision, vectors=vectors)
         if found is not None:
             q, residual = found
             example = Counterexample(parents, kinds, rotor, seed, q, residual, tried, STATES)
-            example.saved_by = saving_hypotheses(text, example, seed, precision)
+            example.saved_by = saving_hypotheses(text, example, seed, precision, vectors)
             return example
         if time.perf_counter() - begin > budget:
             return None
@@ -186,10 +224,12 @@ _CLASSES: list[tuple[str, list[tuple[list[int], list[str], bool]]]] = [
 ]
 
 
-def saving_hypotheses(text: str, example: Counterexample, seed: int, precision: str | int) -> list[str]:
+def saving_hypotheses(
+    text: str, example: Counterexample, seed: int, precision: str | int, vectors: Mapping[str, str] | None = None
+) -> list[str]:
     """Hypotheses under which no refutation was found on trees that meet only them; the weakest first, one is enough."""
     for name, models in _CLASSES:
-        if all(refutes(text, parents, kinds, rotor, seed + 1, precision) is None for parents, kinds, rotor in models):
+        if all(refutes(text, parents, kinds, rotor, seed + 1, precision, vectors=vectors) is None for parents, kinds, rotor in models):
             return [name]
     return []
 

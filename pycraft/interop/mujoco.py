@@ -143,6 +143,54 @@ def acceleration_to_mujoco(model: Multibody, q, v, vdot) -> np.ndarray:
     return velocity_map(model, q) @ vdot
 
 
+def name_of(compiled_model: Any) -> str:
+    """The name of an MjModel: the first of its names."""
+    return bytes(compiled_model.names).split(b"\0", 1)[0].decode() or "model"
+
+
+def joint_names(hinge: Any) -> list[str]:
+    """What a hinge's joints are called in MuJoCo, one for each subhinge."""
+    return [hinge.name] if len(hinge.subhinges) == 1 else [f"{hinge.name}[{i}]" for i in range(len(hinge.subhinges))]
+
+
+def order(model: Multibody, compiled_model: Any) -> tuple[np.ndarray, np.ndarray, dict[str, int]]:
+    """Where the numbers of `to_mujoco` stand in the MjModel's qpos (nq,) and qvel (nv,), and the first joint of every hinge by name.
+
+    Hinges are matched by the name of their first joint, else by the name of the body. Raises ModelError for what only one of the two
+    has, and where the coordinates of a match differ in number.
+    """
+    import mujoco
+
+    of_joint, of_body = (
+        {mujoco.mj_id2name(compiled_model, kind, i) or f"{what}{i}": i for i in range(count)}
+        for kind, what, count in (
+            (mujoco.mjtObj.mjOBJ_JOINT, "joint", compiled_model.njnt),
+            (mujoco.mjtObj.mjOBJ_BODY, "body", compiled_model.nbody),
+        )
+    )
+    q, v, first = [], [], {}
+    taken = 0
+    for hinge in model.hinges.values():
+        size = hinge.v_slice.stop - hinge.v_slice.start
+        if size == 0:
+            continue
+        joint = next((of_joint[name] for name in (hinge.name, f"{hinge.name}[0]") if name in of_joint), None)
+        body = compiled_model.jnt_bodyid[joint] if joint is not None else of_body.get(hinge.body.name)
+        if body is None or compiled_model.body_jntnum[body] == 0:
+            raise _core.ModelError(f"hinge {hinge.name!r} of {model.name!r} has no joint in MuJoCo's model, and its body no joints")
+        if compiled_model.body_dofnum[body] != size:
+            text = f"hinge {hinge.name!r} has {compiled_model.body_dofnum[body]} velocities in MuJoCo and {size} here"
+            raise _core.ModelError(text)
+        first[hinge.name] = int(compiled_model.body_jntadr[body])
+        q.append(compiled_model.jnt_qposadr[first[hinge.name]] + np.arange(hinge.q_slice.stop - hinge.q_slice.start))
+        v.append(compiled_model.body_dofadr[body] + np.arange(size))
+        taken += int(compiled_model.body_jntnum[body])
+    if taken != compiled_model.njnt:
+        raise _core.ModelError(f"MuJoCo's model has {compiled_model.njnt} joints, of which {taken} have a hinge in {model.name!r}")
+    none = np.arange(0)
+    return np.concatenate([none, *q]), np.concatenate([none, *v]), first
+
+
 # Quaternions (w, x, y, z) with leading axes ---------------------------------------------------------------------------
 
 

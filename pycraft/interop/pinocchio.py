@@ -40,38 +40,108 @@ class Coordinates:
 
     model: Multibody
     pin_model: Any
-    joints: list[tuple[str, str, slice, slice, int, int, int]]
+    joints: list[tuple[int, str, slice, slice]]
 
     def q(self, q: np.ndarray) -> np.ndarray:
         """A configuration (nq,) in Pinocchio's order."""
         out = np.zeros(self.pin_model.nq)
-        for _, kind, q_slice, _, at, nq, _ in self.joints:
-            own = q[q_slice]
-            if kind == "free":
-                out[at : at + 7] = [*own[4:7], *_unit(own[[1, 2, 3, 0]])]
-            elif kind == "ball":
-                out[at : at + 4] = _unit(own[[1, 2, 3, 0]])
-            elif kind == "planar":
-                out[at : at + 4] = [own[0], own[1], np.cos(own[2]), np.sin(own[2])]
-            elif nq == 2:
-                out[at : at + 2] = [np.cos(own[0]), np.sin(own[0])]
-            else:
-                out[at] = own[0]
+        for joint, _, q_slice, _ in self.joints:
+            at = self.pin_model.joints[joint].idx_q
+            for part, own in self._parts(joint, q[q_slice], _OWN_Q):
+                numbers = _configuration(part, own)
+                out[at : at + len(numbers)] = numbers
+                at += len(numbers)
         return out
 
     def velocities(self, q: np.ndarray) -> np.ndarray:
         """S (nv, nv): velocities of the model to Pinocchio's."""
+        return self._by_joint(q, lambda part, own: _velocity_block(part, own))
+
+    def velocity_rate(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Ṡ (nv, nv) at velocity v: zero but for planar joints, whose velocity Pinocchio gives in the body's axes."""
+        rate = np.zeros((self.pin_model.nv, self.model.nv))
+        if any("Planar" in name for name in self.said_names()):
+            for joint, _, q_slice, v_slice in self.joints:
+                if "Planar" in _shortname(self.pin_model.joints[joint]):
+                    c, s = np.cos(q[q_slice][2]), np.sin(q[q_slice][2])
+                    at = self.pin_model.joints[joint].idx_v
+                    rate[at : at + 2, v_slice.start : v_slice.start + 2] = v[v_slice][2] * np.array([[-s, c], [-c, -s]])
+        return rate
+
+    def joint_numbers(self) -> list[tuple[str, int]]:
+        """Hinges with their joint's number in Pinocchio, in Pinocchio's order."""
+        return [(name, joint) for joint, name, _, _ in self.joints]
+
+    def said_names(self) -> set[str]:
+        """The kinds of Pinocchio's joints."""
+        return {_shortname(part) for joint, *_ in self.joints for part in _components(self.pin_model.joints[joint])}
+
+    def said(self) -> list[str]:
+        """In what Pinocchio writes the coordinates of single joints otherwise."""
+        found = []
+        if any("Planar" in name for name in self.said_names()):
+            found.append("planar: (x, y, angle) here; (x, y, cos, sin) there, velocities in the body's axes")
+        if any(_unbounded(name) for name in self.said_names()):
+            found.append("continuous: one angle here, its cosine and sine there")
+        return found
+
+    def _parts(self, joint: int, own: np.ndarray, sizes: dict[str, int]) -> Any:
+        at = 0
+        for part in _components(self.pin_model.joints[joint]):
+            size = sizes.get(_shortname(part), 1)
+            yield part, own[at : at + size]
+            at += size
+
+    def _by_joint(self, q: np.ndarray, block: Any) -> np.ndarray:
         S = np.zeros((self.pin_model.nv, self.model.nv))
-        for _, kind, q_slice, v_slice, _, _, at in self.joints:
-            n = v_slice.stop - v_slice.start
-            block = np.eye(n)
-            if kind == "free":
-                block = np.eye(6)[_SWAP]
-            elif kind == "planar":  # Pinocchio's planar velocity is in the body's axes
-                c, s = np.cos(q[q_slice][2]), np.sin(q[q_slice][2])
-                block = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
-            S[at : at + n, v_slice] = block
+        for joint, _, q_slice, v_slice in self.joints:
+            row, column = self.pin_model.joints[joint].idx_v, v_slice.start
+            for part, own in self._parts(joint, q[q_slice], _OWN_Q):
+                B = block(part, own)
+                S[row : row + len(B), column : column + len(B)] = B
+                row, column = row + len(B), column + len(B)
         return S
+
+
+_OWN_Q = {"JointModelFreeFlyer": 7, "JointModelSpherical": 4, "JointModelPlanar": 3}
+"""Numbers of q here by Pinocchio's kind of joint; one where it is not listed."""
+_VELOCITIES = {"JointModelFreeFlyer": 6, "JointModelSpherical": 3, "JointModelPlanar": 3}
+
+
+def _shortname(joint: Any) -> str:
+    return joint.shortname()
+
+
+def _components(joint: Any) -> list[Any]:
+    """The joints of a composite one, in order; of any other, itself."""
+    return list(joint.extract().joints) if _shortname(joint) == "JointModelComposite" else [joint]
+
+
+def _unbounded(name: str) -> bool:
+    return name.startswith("JointModelRUB") or "Unbounded" in name
+
+
+def _configuration(joint: Any, own: np.ndarray) -> list[float]:
+    """Our numbers of one simple joint as Pinocchio writes them."""
+    name = _shortname(joint)
+    if name == "JointModelFreeFlyer":
+        return [*own[4:7], *_unit(own[[1, 2, 3, 0]])]
+    if name == "JointModelSpherical":
+        return list(_unit(own[[1, 2, 3, 0]]))
+    if name == "JointModelPlanar":
+        return [own[0], own[1], np.cos(own[2]), np.sin(own[2])]
+    return [np.cos(own[0]), np.sin(own[0])] if _unbounded(name) else [own[0]]
+
+
+def _velocity_block(joint: Any, own: np.ndarray) -> np.ndarray:
+    """S of one simple joint."""
+    name = _shortname(joint)
+    if name == "JointModelFreeFlyer":
+        return np.eye(6)[_SWAP]
+    if name == "JointModelPlanar":
+        c, s = np.cos(own[2]), np.sin(own[2])
+        return np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+    return np.eye(_VELOCITIES.get(name, 1))
 
 
 def _unit(quaternion: np.ndarray) -> np.ndarray:
@@ -93,8 +163,8 @@ def coordinates(model: Multibody, pin_model: Any) -> Coordinates:
             raise _core.ModelError(
                 f"joint {name!r} has {joint.nv} velocities in Pinocchio and {hinge.v_slice.stop - hinge.v_slice.start} here"
             )
-        joints.append((own, hinge.kind, hinge.q_slice, hinge.v_slice, joint.idx_q, joint.nq, joint.idx_v))
-    missing = {name for name in hinges if hinges[name].v_slice.stop > hinges[name].v_slice.start} - {j[0] for j in joints}
+        joints.append((j, own, hinge.q_slice, hinge.v_slice))
+    missing = {name for name in hinges if hinges[name].v_slice.stop > hinges[name].v_slice.start} - {name for _, name, *_ in joints}
     if missing:
         raise _core.ModelError(f"hinges {', '.join(sorted(missing))} of {model.name!r} have no joint in Pinocchio's model")
     return Coordinates(model, pin_model, joints)

@@ -13,7 +13,7 @@ from .words import ONE, Alphabet, Letter, Polynomial, Word, add_to, plain, split
 _STEPS = {"E_φ", "E_ψ", "K"}
 
 
-def _moves(letter: str, alphabet: Alphabet) -> str:
+def moves(letter: str, alphabet: Alphabet) -> str:
     """diagonal, step, step*, down, down*, unit, unit*, siblings or full."""
     name, mark = split(letter)
     known = alphabet.letters.get(name)
@@ -29,7 +29,7 @@ def _moves(letter: str, alphabet: Alphabet) -> str:
 
 def diagonal_blocks(word: Word, alphabet: Alphabet) -> Polynomial:
     """blockdiag(word), where the letters say what it is; else with a letter of its own for what they do not."""
-    parts: list[tuple[Word, str]] = [((letter,), _moves(letter, alphabet)) for letter in word]
+    parts: list[tuple[Word, str]] = [((letter,), moves(letter, alphabet)) for letter in word]
     parts = _closed(parts)
     head, tail = 0, len(parts)
     while head < tail and parts[head][1] == "diagonal":
@@ -39,15 +39,15 @@ def diagonal_blocks(word: Word, alphabet: Alphabet) -> Polynomial:
     left, inner, right = _join(parts[:head]), parts[head:tail], _join(parts[tail:])
     if not inner:
         return {left + right: ONE}
-    moves = [m for _, m in inner if m != "diagonal"]
+    ways = [m for _, m in inner if m != "diagonal"]
     for star in ("", "*"):
-        if all(m in ("step" + star, "down" + star, "unit" + star) for m in moves):
-            if any(m != "unit" + star for m in moves):
+        if all(m in ("step" + star, "down" + star, "unit" + star) for m in ways):
+            if any(m != "unit" + star for m in ways):
                 return {}
             return {left + _join([p for p in inner if p[1] == "diagonal"]) + right: ONE}
-    if moves.count("siblings") == 1:
-        at = moves.index("siblings")
-        if all(m.endswith("*") for m in moves[:at]) and all(m in ("step", "down", "unit") for m in moves[at + 1 :]):
+    if ways.count("siblings") == 1:
+        at = ways.index("siblings")
+        if all(m.endswith("*") for m in ways[:at]) and all(m in ("step", "down", "unit") for m in ways[at + 1 :]):
             return {}
     return {(*left, _own_letter(_join(inner), alphabet), *right): ONE}
 

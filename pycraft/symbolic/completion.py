@@ -11,7 +11,8 @@ from collections.abc import Iterator
 from .attempt import Attempt
 from .axioms import theory
 from .equations import Equation, Step, Use, numbered
-from .rules import Budget, GaveUp, Rule, overlaps, weight
+from .rules import Budget, Rule, overlaps, weight
+from .walk import GaveUp
 from .words import ONE, Polynomial, Word, add_to, combine, ratio, split
 
 RULES, LENGTH, REWRITES = 24, 14, 1500

@@ -13,6 +13,7 @@ from .. import _core
 from .axioms import replaced_everywhere, solved, theory
 from .equations import Equation, Step, joined
 from .expand import Problem
+from .walk import Walk
 from .words import ONE, Alphabet, Letter, Polynomial, Word, add_to, inverse_of, inverted, parse, parse_equation, split
 
 # As in `axioms`: what stands above, and d(...), the derivative of an equation.
@@ -115,12 +116,12 @@ class DerivativeProblem(Problem):
         self.index: int | None = None
         self._derivatives: Derivatives | None = None
 
-    def words(self, e: Any, transposed: bool = False) -> Polynomial:
+    def _words(self, e: Any, transposed: bool = False) -> Walk:
         if e.kind != "derivative":
-            return super().words(e, transposed)
+            return (yield super()._words(e, transposed))
         if self.index is not None and self.index != e.index:
             raise _core.EvaluationError("a statement holds derivatives along one coordinate")
-        p = super().words(e.children[0])
+        p = yield super()._words(e.children[0])
         if self._derivatives is None:
             self.index, self._derivatives = e.index, Derivatives(self.alphabet)
         p = differentiated(p)

@@ -19,10 +19,11 @@ from .attempt import Attempt
 from .axioms import AXIOMS, DEFINITIONS, INVERSES, find, replaced_everywhere, solved, theory
 from .derivation import DerivativeProblem
 from .equations import Equation, Step, chain_holds, foundations
-from .proof import Proof, _escaped, _reason_latex, example
+from .proof import Proof, _escaped, _reason_latex, example, examples
 from .prove import _operators, _settings, prove
-from .rules import GaveUp, corollary
+from .rules import corollary
 from .values import LARGEST, NoValue, transferred
+from .walk import GaveUp
 from .words import ONE, Alphabet, Polynomial, Word, combine, framed, number, of_model, plain, ratio, split
 
 ACCEPTED = ("right", "another road")
@@ -299,6 +300,8 @@ class Exercise:
             return Judgement("no step", f"this is {'the left side' if on_page == 0 else f'line {on_page}'} written again")
         allowed = frozenset(self.proof.hypotheses)
         found = self._proved(expression, allowed)
+        if found and (void := found.void_where(sorted(allowed), self._operators())):
+            return Judgement("wrong", void)
         if found and allowed >= {*found.hypotheses}:
             return self._accepted(problem, lines, given, found)
         return self._refused(problem, expression, given, found, allowed)
@@ -359,6 +362,8 @@ class Exercise:
         self, problem: DerivativeProblem, expression: Any, given: Polynomial, found: Proof | None, allowed: frozenset[str]
     ) -> Judgement:
         """Wrong if numbers refute it, and why; else unproved."""
+        if void := self._void(problem, expression, allowed):
+            return Judgement("wrong", void)
         residual, model = self._off(expression, allowed)
         if residual is None:
             proved = "no proof was found" if found is None else f"a proof was found only where {' and '.join(found.hypotheses)}"
@@ -382,12 +387,18 @@ class Exercise:
             missed = [] if slip else [e.text for e in self.steps[self.blank - 1].equations]
         return Judgement("wrong", text, residual, model, missed, found)
 
+    def _void(self, problem: DerivativeProblem, expression: Any, allowed: frozenset[str]) -> str:
+        """Why an inverse or a root of the line exists nowhere under the theorem's hypotheses; empty if nothing says so."""
+        claim = Proof.of_statement(Statement(expression, expression, "", "expressions"), problem, [], [], ({}, {}))
+        claim.takes_for_granted([o.name for o in problem.opaque if o.kind == "inverse"])
+        return claim.void_where(sorted(allowed), self._operators())
+
     def _off(self, expression: Any, allowed: frozenset[str]) -> tuple[float | None, Any]:
         """(residual, model) where the line is refuted, under the theorem's hypotheses; (None, the last model) if nowhere."""
         candidates = [self._operators()] if self._model is not None else []
         candidates = [c for c in candidates if len(c.F) <= LARGEST and all(c._source.traits.get(h, True) for h in allowed)]
         at: Any = None
-        for operators in (*candidates, example(sorted(allowed)).soa, _deeper(allowed).soa):
+        for operators in (*candidates, *(model.soa for model in examples(sorted(allowed)))):
             try:
                 sides = transferred(self._read.lhs, operators), transferred(expression, operators)
                 at, report = operators, check(sides, operators, states=3, search=False)
@@ -431,19 +442,6 @@ class Exercise:
 
 
 GAP = "\\boxed{\\;?\\;}"
-
-
-def _deeper(hypotheses: frozenset[str]) -> Any:
-    """As `example`, with a path of six bodies or more: powers of E_φ that vanish on a short tree are seen."""
-    from ..models.generators import tree
-
-    kinds = ["universal", "ball", "pin", "slider", "pin", "ball", "pin"]
-    if "constant H" in hypotheses:
-        kinds[0] = "free"
-    if "single-DOF hinges" in hypotheses:
-        kinds = ["pin", "slider", "pin", "screw", "pin", "slider", "pin"]
-    parents = [-1, 0, 1, 2, 3, 4, 5 if "serial chain" in hypotheses else 1]
-    return tree(parents, kinds, seed=5, rotor_inertia="J = 0" not in hypotheses)
 
 
 def _described(operators: Any) -> str:

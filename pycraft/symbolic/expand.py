@@ -16,7 +16,8 @@ from typing import Any
 from .. import _core
 from .axioms import INVERTIBLE
 from .equations import Equation, Step, symmetries
-from .rules import WORDS, GaveUp
+from .rules import WORDS
+from .walk import GaveUp, Walk, carried_out
 from .words import (
     FURTHER,
     ONE,
@@ -24,7 +25,7 @@ from .words import (
     Letter,
     Number,
     Polynomial,
-    combine,
+    add_to,
     inverse_of,
     monomial,
     parse,
@@ -37,6 +38,10 @@ from .words import (
 
 UNFOLDED = {"Jacobian": "𝒥 = B* φ* H*", "Lambda": "Λ = (B* Ω B)⁻¹"}
 """Symbols that are written out at once."""
+LENGTH = 200
+"""Letters of a word at which writing out gives up."""
+OPERANDS = 40
+"""Inverses of sums, diagonal parts and roots in a statement at which writing it out gives up."""
 MASS_MATRIX = parse("H φ M φ* H*")
 _TABLE = {ascii: (text, latex) for ascii, text, latex, *_ in _core.symbol_table()}
 
@@ -132,7 +137,17 @@ class Problem:
 
     # ------------------------------------------------------------------ by kind
     def words(self, e: Any, transposed: bool = False) -> Polynomial:
-        """The expression, or its transpose, as a polynomial."""
+        """The expression, or its transpose, as a polynomial.
+
+        Raises
+        ------
+        GaveUp
+            Beyond `walk.NODES` nodes, `OPERANDS` inverses, `rules.WORDS` words, or words of `LENGTH` letters.
+        """
+        return carried_out(self._words(e, transposed))
+
+    def _words(self, e: Any, transposed: bool = False) -> Walk:
+        """As `words`: yields a walk for each part, and is sent what it comes to, so that no depth is too deep."""
         match e.kind:
             case "zero":
                 return {}
@@ -140,50 +155,56 @@ class Problem:
                 return {(): ONE}
             case "scaled":
                 c = _exact(e.coefficient)
-                return {w: c * x for w, x in self.words(e.children[0], transposed).items()} if c else {}
+                p = yield self._words(e.children[0], transposed)
+                return {w: c * x for w, x in p.items()} if c else {}
             case "sum":
-                return combine(*((1, self.words(c, transposed)) for c in e.children))
+                total: Polynomial = {}
+                for child in e.children:
+                    for word, c in (yield self._words(child, transposed)).items():
+                        add_to(total, word, c)
+                return total
             case "product":
-                return self._product(self.words(f, transposed) for f in (reversed(e.children) if transposed else e.children))
+                factors = reversed(e.children) if transposed else e.children
+                return (yield self._product(self._words(f, transposed) for f in factors))
             case "transpose":
-                return self.words(e.children[0], not transposed)
+                return (yield self._words(e.children[0], not transposed))
             case "inverse":
-                p = self._inverse(e.children[0])
+                p = yield self._inverse(e.children[0])
             case "symbol" if e.name in UNFOLDED:
-                return self.words(self._unfolded(e), transposed)
+                return (yield self._words(self._unfolded(e), transposed))
             case _:
-                p = {(self.letter(e),): ONE}
+                p = {((yield self._letter(e)),): ONE}
         return self._star(p) if transposed else p
 
-    def _product(self, factors: Iterator[Polynomial]) -> Polynomial:
+    def _product(self, factors: Iterator[Walk]) -> Walk:
         p: Polynomial = {(): ONE}
         for factor in factors:
-            p = times(p, factor)
-            if len(p) > WORDS:
+            p = times(p, (yield factor))
+            if len(p) > WORDS or any(len(word) > LENGTH for word in p):
                 raise GaveUp
         return p
 
-    def _inverse(self, e: Any) -> Polynomial:
+    def _inverse(self, e: Any) -> Walk:
         """The words of e⁻¹."""
         match e.kind:
             case "inverse":
-                return self.words(e.children[0])
+                return (yield self._words(e.children[0]))
             case "identity":
                 return {(): ONE}
             case "scaled" if e.coefficient:
                 c = ratio(1, _exact(e.coefficient))
-                return {w: c * x for w, x in self._inverse(e.children[0]).items()}
+                return {w: c * x for w, x in (yield self._inverse(e.children[0])).items()}
             case "transpose":
-                return self._star(self._inverse(e.children[0]))
+                return self._star((yield self._inverse(e.children[0])))
             case "product" if all(map(_square, e.children)):
-                return self._product(self._inverse(f) for f in reversed(e.children))
+                return (yield self._product(self._inverse(f) for f in reversed(e.children)))
             case "symbol" if e.name in UNFOLDED:
-                return self._inverse(self._unfolded(e))
-            case "symbol" if plain(self.letter(e)) not in INVERTIBLE:
-                return {(inverse_of(self._operand("inverse", e, e)),): ONE}
-            case "sum" | "product" | "scaled":
-                return {(inverse_of(self._operand("inverse", e, e)),): ONE}
-        return {(inverse_of(self.letter(e)),): ONE}
+                return (yield self._inverse(self._unfolded(e)))
+            case "symbol" if plain(letter := (yield self._letter(e))) in INVERTIBLE:
+                return {(inverse_of(letter),): ONE}
+            case "symbol" | "sum" | "product" | "scaled":
+                return {(inverse_of((yield self._operand("inverse", e, e))),): ONE}
+        return {(inverse_of((yield self._letter(e))),): ONE}
 
     def _unfolded(self, e: Any) -> Any:
         """𝒥 and Λ by their definitions."""
@@ -198,9 +219,12 @@ class Problem:
     # ------------------------------------------------------------------ letters
     def letter(self, e: Any) -> str:
         """The letter that an expression is."""
+        return carried_out(self._letter(e))
+
+    def _letter(self, e: Any) -> Walk:
         if e not in self._leaves:
             if e.kind in ("blockdiag", "sqrt"):
-                return self._operand(e.kind, e, e.children[0])
+                return (yield self._operand(e.kind, e, e.children[0]))
             self._leaves[e] = self._symbol(e) if e.kind == "symbol" else self._other(e)
         return self._leaves[e]
 
@@ -242,11 +266,13 @@ class Problem:
         self.alphabet.add(Letter(name, letter.text, letter.latex, letter.symmetric, letter.shape, letter.ascii, letter.expression))
         return name
 
-    def _operand(self, kind: str, e: Any, operand: Any) -> str:
+    def _operand(self, kind: str, e: Any, operand: Any) -> Walk:
         """The letter of something opaque."""
         key = (kind, e)
         if key not in self._leaves:
-            inner = self.words(operand) if kind != "inverse" or e.kind != "symbol" else monomial(self.letter(e))
+            inner = yield self._words(operand)
+            if len(self.opaque) == OPERANDS:
+                raise GaveUp
             name = f"⟨{len(self.opaque) + 1}⟩"
             text, latex = self._shown(inner, e) if kind == "inverse" else (e.text(), f"{{{e.latex()}}}")
             symmetric = kind == "blockdiag" and bool(e.is_symmetric)

@@ -13,6 +13,15 @@ from .axioms import theory
 from .blocks import diagonal_part
 from .equations import Equation, Step, Use, chain_holds, numbered
 from .expand import Opaque, Problem
+from .presuppositions import (
+    ALWAYS,
+    Void,
+    inverses_used,
+    is_positive_constant,
+    is_positive_definite,
+    is_regular_constant,
+    is_triangular,
+)
 from .rules import Rules, Setting, normal_form, rule_from, rules_for, weight
 from .words import (
     ONE,
@@ -45,8 +54,6 @@ KNOWN_INVERSES = [
 """Pairs X, Z with XZ = ZX = I: candidates only, each is proved where it is used."""
 
 _UNIT: Polynomial = {(): ONE}
-_ALWAYS = ("φ", "ψ", "D")
-"""Letters that have an inverse on every tree with regular hinges."""
 
 
 class LocalRules:
@@ -56,7 +63,8 @@ class LocalRules:
     ----------
     rules : for normal forms; `block_rules` for operands of blockdiag, which need the recursions of R and Υ
     local : the equations added
-    presupposed : names of letters whose inverse the proof takes to exist
+    regular : letters that have an inverse
+    needs : of letters that have one where others have, which these are
     """
 
     def __init__(self, problem: Problem, setting: Setting, extra: list[tuple[Equation, Word]]):
@@ -71,7 +79,11 @@ class LocalRules:
         self._roots: list[tuple[Opaque, Polynomial, list[Step]]] = []
         self._swept: list[tuple[str, str, Polynomial, list[Step]]] = []
         named = sorted({split(x)[0] for p in problem.polynomials() for w in p for x in w if inverted(x)})
-        self.presupposed = {n for n in named if plain(n) not in _ALWAYS}
+        self.regular = {n for n in named if plain(n) in ALWAYS}
+        self.needs: dict[str, set[str]] = {}
+        constants = {n: known.expression for n, known in self.alphabet.letters.items() if known.expression is not None}
+        self.regular |= {n for n in named if is_regular_constant(constants.get(n))}
+        self._definite = {n for n, e in constants.items() if is_positive_constant(e)}
         for equation, word in extra:
             self.add(equation, word)
         self.inverted = {inverse_of(n) for n in named}
@@ -111,12 +123,13 @@ class LocalRules:
         X, a = o.name, self.alphabet
         form, steps = self.reduce(o.inner)
         if not form:
-            return
+            where = f" where {' and '.join(sorted(self.setting.hypotheses))}" if self.setting.hypotheses else ""
+            raise Void(f"{o.expression.text()} = 0{where}, which has no inverse")
+        self._by_structure(X, o.inner, form, steps)
         for z in self._candidates(form):
             lemma = self._inverse_is(X, o.inner, z, o.definition)
             if lemma is not None:
-                self.presupposed.discard(X)
-                self.presupposed |= {split(x)[0] for w in z for x in w if inverted(x) and plain(x) not in _ALWAYS}
+                self.needs[X] = inverses_used([lemma.steps[0].uses[0].equation, *lemma.uses])
                 self.add(lemma, (inverse_of(X),))
                 return
         lead = max(form, key=weight)
@@ -131,6 +144,15 @@ class LocalRules:
                 for rules in filter(None, (self.rules, self.block_rules)):
                     rules.add(rule_from(lemma, (inverse_of(a.star(X)),), self._rank))
         self._forms.append((X, form))
+
+    def _by_structure(self, X: str, inner: Polynomial, form: Polynomial, steps: list[Step]) -> None:
+        """X regular, where its words say so: as they were written, or in normal form."""
+        for p, premises in ((inner, ()), (form, [e for step in steps for e in step.premises()])):
+            definite = is_positive_definite(p, self.alphabet, self.setting.hypotheses, self._definite)
+            if definite or is_triangular(p, self.alphabet):
+                self._definite |= {X} if definite else set()
+                self.needs[X] = inverses_used(premises) | {split(x)[0] for w in p for x in w if inverted(x)} - {*ALWAYS}
+                return
 
     def _candidates(self, form: Polynomial) -> Iterator[Polynomial]:
         """What may be the inverse of an operator with this normal form."""
@@ -264,8 +286,8 @@ class LocalRules:
         if len(form) != 1:
             return
         ((word, c),) = form.items()
-        if all(plain(x) in _ALWAYS for x in word):
-            self.presupposed.discard(L)
+        if all(plain(x) in ALWAYS for x in word):
+            self.regular.add(L)
         letters = {x for p in self.problem.polynomials() for w in p for x in w}
         Y = inverse_of(L)
         if Y in letters or a.star(Y) in letters:

@@ -6,9 +6,11 @@ import copy
 from collections.abc import Sequence
 from typing import Any
 
+from ..models.generators import tree
 from .derivative import Formula
 from .equations import Equation, Step, chain_holds, foundations, numbered
-from .expand import Problem, Spelling
+from .expand import Opaque, Problem, Spelling
+from .presuppositions import nowhere
 from .values import LARGEST, NoValue, Values
 from .words import Alphabet, Polynomial, combine
 
@@ -24,7 +26,8 @@ class Proof:
     statement : as text
     steps : numbered, from the left side to the right: `.before_text()`, `.after_text()`, the same in LaTeX, `.before` and `.after` as
         polynomials, `.reason` (the axiom or lemma), `.positions`, `.residual`
-    presupposes : inverses that the statement names and that nothing here shows to exist
+    presupposes : inverses that the proof uses and that nothing here shows to exist; each exists on some model that meets the hypotheses
+    rests_on : every equation that it uses, with all that those use, premises first
     unmet : hypotheses of the proof that the model at hand does not meet
     note : why nothing was tried, if so
 
@@ -53,8 +56,10 @@ class Proof:
         self.presupposes: list[str] = []
         self.unmet: list[str] = []
         self._alphabet, self._forms, self._claim = alphabet, normal_forms, claim
-        self._rests_on = [e for e in foundations(p for s in self.steps for p in s.premises()) if e is not claim]
+        self.rests_on = [e for e in foundations(p for s in self.steps for p in s.premises()) if e is not claim]
         self._spellings: list[Spelling] = []
+        self._inverted: list[str] = []
+        self._opaque: list[Opaque] = []
         self._contexts: list[tuple[Any, Any]] = []
         self._read: Any = None
         self._model: Any = None
@@ -67,8 +72,9 @@ class Proof:
         """The proof of a statement that was read; none found if there are no steps."""
         statement, latex = (f"{getattr(read.lhs, how)()} = {getattr(read.rhs, how)()}" for how in ("text", "latex"))
         proof = cls(statement, latex, problem.alphabet, steps, forms, note=note)
+        proof._opaque = list(problem.opaque)
         proof._spellings, proof._contexts, proof._read = list(spellings), list(problem.contexts), read
-        proof._rests_on = foundations([*proof._rests_on, *(e for s in spellings for e in s.premises())]) if steps else []
+        proof.rests_on = foundations([*proof.rests_on, *(e for s in spellings for e in s.premises())]) if steps else []
         proof._found = proof.recheck()
         return proof
 
@@ -79,7 +85,7 @@ class Proof:
         own = steps[0].alphabet if steps else alphabet
         latex = f"{own.latex(lemma.lhs)} = {own.latex(lemma.rhs)}"
         proof = cls(lemma.text, latex, own, steps, (lemma.lhs, lemma.rhs), claim=lemma, note=lemma.note)
-        proof._rests_on = foundations([lemma])[:-1]
+        proof.rests_on = foundations([lemma])[:-1]
         proof._found = proof.recheck()
         return proof
 
@@ -89,26 +95,26 @@ class Proof:
     def recheck(self) -> bool:
         """Whether every step, and every step of every lemma, follows from the equations that it names: exact, and nothing is searched."""
         if self._claim is not None:
-            return self._claim.holds() and all(e.holds() for e in self._rests_on)
+            return self._claim.holds() and all(e.holds() for e in self.rests_on)
         if not self.steps:
             return False
         first, last = self.steps[0].full()[0], self.steps[-1].full()[1]
         if self._spellings:
             first, last = (s.before for s in self._spellings)
         spelled = all(s.holds() for s in self._spellings)
-        return spelled and chain_holds(self.steps, first, last) and all(e.holds() for e in self._rests_on)
+        return spelled and chain_holds(self.steps, first, last) and all(e.holds() for e in self.rests_on)
 
     # ------------------------------------------------------------------ what it rests on
     @property
     def hypotheses(self) -> list[str]:
         """Names of the hypotheses that steps or their lemmas use."""
-        used = {e.hypothesis for e in self._rests_on if e.kind == "hypothesis"}
+        used = {e.hypothesis for e in self.rests_on if e.kind == "hypothesis"}
         return [name for name in HYPOTHESES if name in used]
 
     @property
     def axioms(self) -> list[str]:
         """Texts of the axioms that it rests on, those of its lemmas included."""
-        return list(dict.fromkeys(e.text for e in self._rests_on if e.kind == "axiom"))
+        return list(dict.fromkeys(e.text for e in self.rests_on if e.kind == "axiom"))
 
     @property
     def lemmas(self) -> list[Proof]:
@@ -118,7 +124,28 @@ class Proof:
 
     def all_lemmas(self) -> list[Proof]:
         """Those lemmas and the lemmas of their proofs, each before what cites it."""
-        return [Proof.of_lemma(e, self._alphabet) for e in self._rests_on if e.kind in ("lemma", "structure")]
+        return [Proof.of_lemma(e, self._alphabet) for e in self.rests_on if e.kind in ("lemma", "structure")]
+
+    # ------------------------------------------------------------------ what it takes for granted
+    def takes_for_granted(self, letters: Sequence[str]) -> None:
+        """The inverses of these letters are presuppositions, and the square roots that the statement holds."""
+        self._inverted = list(letters)
+        self.presupposes = [self._inverse_text(name) for name in letters]
+
+    def _inverse_text(self, name: str) -> str:
+        """The inverse of a letter as it was typed."""
+        typed = next((o.expression.text() for o in self._opaque if o.name == name and o.kind == "inverse"), None)
+        return f"{self._alphabet.letter_text(name)}⁻¹" if typed is None else f"({typed})⁻¹"
+
+    def void_where(self, hypotheses: Sequence[str], operators: Any = None) -> str:
+        """Why the proof says nothing under these hypotheses: an inverse or a root in it exists on no model that was tried. Else empty."""
+        roots = [o.name for o in self._opaque if o.kind == "sqrt"]
+        name = nowhere(self._inverted, roots, self._alphabet, hypotheses, self._contexts, operators)
+        if not name:
+            return ""
+        shown = self._inverse_text(name) if name in self._inverted else self._alphabet.letter_text(name)
+        where = f" where {' and '.join(hypotheses)}" if hypotheses else ""
+        return f"it takes {shown}, which exists on no model that was tried{where}"
 
     # ------------------------------------------------------------------ where the two sides stand
     @property
@@ -144,11 +171,11 @@ class Proof:
         pycraft.identities.search.Counterexample or None
             None also for derivatives, and for constants, which belong to their own model.
         """
-        from ..identities.search import smallest, statement_text
+        from ..identities.search import named_vectors, smallest, statement_text
 
         if self._read is None or any(isinstance(side, Formula) for side in (self._read.lhs, self._read.rhs)):
             return None
-        return smallest(statement_text(self._read), seed=seed, budget=budget)
+        return smallest(statement_text(self._read), seed=seed, budget=budget, vectors=named_vectors(self._read))
 
     # ------------------------------------------------------------------ numbers
     def verify(self, model: Any = None, seed: int = 0) -> float:
@@ -280,8 +307,6 @@ def _unmet(hypotheses: Sequence[str], operators: Any) -> list[str]:
 
 def example(hypotheses: Sequence[str] = ()) -> Any:
     """A small random model that meets these hypotheses, and fails the others."""
-    from ..models.generators import tree
-
     kinds = ["universal", "ball", "pin", "slider"]
     if "constant H" in hypotheses:
         kinds = ["free", "ball", "pin", "slider"]
@@ -290,4 +315,19 @@ def example(hypotheses: Sequence[str] = ()) -> Any:
     return tree([-1, 0, 1, 2] if "serial chain" in hypotheses else [-1, 0, 0, 1], kinds, seed=3, rotor_inertia="J = 0" not in hypotheses)
 
 
-__all__ = ["HYPOTHESES", "NoValue", "Proof", "example"]
+def examples(hypotheses: Sequence[str] = ()) -> list[Any]:
+    """Small random models that meet these hypotheses: `example`; a path of six bodies or more, on which powers of E_φ that vanish on
+    a short one are seen; one whose hinges are all free, where H, Υ and compliances of several nodes are regular."""
+    kinds = ["universal", "ball", "pin", "slider", "pin", "ball", "pin"]
+    if "constant H" in hypotheses:
+        kinds[0] = "free"
+    if "single-DOF hinges" in hypotheses:
+        kinds = ["pin", "slider", "pin", "screw", "pin", "slider", "pin"]
+    chain, rotors = "serial chain" in hypotheses, "J = 0" not in hypotheses
+    made = [example(hypotheses), tree([-1, 0, 1, 2, 3, 4, 5 if chain else 1], kinds, seed=5, rotor_inertia=rotors)]
+    if "single-DOF hinges" not in hypotheses:
+        made.append(tree([-1, 0, 1 if chain else 0, 2 if chain else 1], ["free"] * 4, seed=7, rotor_inertia=rotors))
+    return made
+
+
+__all__ = ["HYPOTHESES", "NoValue", "Proof", "example", "examples"]

@@ -8,20 +8,23 @@ side: first without a hypothesis, then under those that may matter, fewest first
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Iterator
 from typing import Any
 
 from .. import _core
 from ..identities.checker import with_spaces
-from ..identities.parse import Statement, Statements
+from ..identities.parse import ParseError, Statement, Statements
 from .attempt import Attempt, Outcome
 from .completion import complete
 from .derivation import DerivativeProblem
 from .derivative import derivative
 from .equations import Equation, joined
+from .presuppositions import Void, inverses_used, presupposed
 from .proof import Proof, example
-from .rules import GaveUp, Setting
-from .words import ONE, Polynomial, Word, plain
+from .rules import Setting
+from .walk import GaveUp
+from .words import ONE, Polynomial, Word, inverted, plain, split
 
 
 def prove(lhs: Any, rhs: Any = None, model: Any = None) -> Proof:
@@ -69,7 +72,16 @@ def prove(lhs: Any, rhs: Any = None, model: Any = None) -> Proof:
         lhs = f"{lhs} == {rhs}"
     elif rhs is not None and model is None:
         model = rhs
-    read = Statements(_operators(model if model is not None else example())).read(lhs)
+    operators = _operators(model if model is not None else example())
+    # N stays the trace of I: what is proved is said of every model, so the number of one model's coordinates must not enter.
+    try:
+        read = Statements(operators, {"N": _core.identity(operators.Theta).trace()}).read(lhs)
+    except ParseError as error:
+        if re.search(r"\bN\b", lhs):
+            raise ParseError(
+                f"{error}\nN, the number of coordinates, differs from model to model: in a proof it stands beside scalars"
+            ) from None
+        raise
     if read.rhs is None:
         raise _core.EvaluationError(f"{lhs!r} has one side; a statement is lhs == rhs")
     return _prove(read, model)
@@ -148,29 +160,45 @@ def _prove(read: Statement, model: Any) -> Proof:
     try:
         left, right = problem.expand(read.lhs), problem.expand(read.rhs)
     except GaveUp:
-        return Proof.of_statement(read, problem, [], [], ({}, {}), "too many words")
+        return Proof.of_statement(read, problem, [], [], ({}, {}), "it is too large: too many words, inverses or nodes")
     p, q = problem.sides = [left.before, right.before]
     problem.numbers = all(space is not None and space.name == "R^1" for space in (read.lhs.domain, read.lhs.codomain))
     nearest: tuple[Polynomial, Polynomial] | None = None
+    own, void = _operators(model) if model is not None else _operators_of(problem), ""
     for attempt, outcome in _attempts(problem, p, q):
-        if outcome.closed:
-            steps = joined(outcome.left, outcome.right, p, q, problem.alphabet) or []
-            typed = ([left] if left.says_something else []), ([right.reversed()] if right.says_something else [])
-            proof = Proof.of_statement(read, problem, [left, right], [*typed[0], *steps, *typed[1]], (outcome.lhs, outcome.rhs))
-            proof.presupposes = [_inverse_text(problem, name) for name in sorted(attempt.presupposed)]
-            proof.verify_where_possible(_operators(model) if model is not None else _operators_of(problem))
-            return proof
-        nearest = nearest or (outcome.lhs, outcome.rhs)
-    return Proof.of_statement(read, problem, [left, right], [], nearest or (p, q))
+        if attempt is None or isinstance(outcome, Void):
+            void = void or str(outcome)
+            continue
+        if not outcome.closed:
+            nearest = nearest or (outcome.lhs, outcome.rhs)
+            continue
+        steps = joined(outcome.left, outcome.right, p, q, problem.alphabet) or []
+        typed = ([left] if left.says_something else []), ([right.reversed()] if right.says_something else [])
+        proof = Proof.of_statement(read, problem, [left, right], [*typed[0], *steps, *typed[1]], (outcome.lhs, outcome.rhs))
+        proof.takes_for_granted(_presupposed(attempt, proof))
+        if impossible := proof.void_where(proof.hypotheses, own):
+            void = void or impossible
+            continue
+        proof.verify_where_possible(own)
+        return proof
+    return Proof.of_statement(read, problem, [left, right], [], nearest or (p, q), void)
 
 
-def _attempts(problem: DerivativeProblem, p: Polynomial, q: Polynomial) -> Iterator[tuple[Attempt, Outcome]]:
-    """Attempts under more and more hypotheses; then again, with completed rules."""
+def _presupposed(attempt: Attempt, proof: Proof) -> list[str]:
+    """The letters whose inverses the statement or its proof takes for granted."""
+    stated = {split(x)[0] for p in attempt.problem.polynomials() for w in p for x in w if inverted(x)}
+    return presupposed(stated | inverses_used(proof.rests_on), attempt.regular, attempt.needs)
+
+
+def _attempts(problem: DerivativeProblem, p: Polynomial, q: Polynomial) -> Iterator[tuple[Attempt | None, Outcome | Void]]:
+    """Attempts under more and more hypotheses; then again, with completed rules. Where one inverts zero, that is its outcome."""
     made: list[Attempt] = []
     for setting, extra in _settings(problem):
         try:
             made.append(Attempt(problem, setting, extra))
             yield made[-1], made[-1].run(p, q)
+        except Void as void:
+            yield None, void
         except GaveUp:
             continue
     for attempt in made:
@@ -204,12 +232,6 @@ def _no_delta(problem: DerivativeProblem, name: str) -> tuple[Equation, Word]:
     word = ("H", name)
     text = f"{problem.alphabet.word_text(word)} = 0"
     return Equation("hypothesis", text, {word: ONE}, {}, hypothesis="single-DOF hinges"), word
-
-
-def _inverse_text(problem: DerivativeProblem, name: str) -> str:
-    """The inverse of a letter as it was typed."""
-    operand = next((o.expression.text() for o in problem.opaque if o.name == name and o.kind == "inverse"), None)
-    return f"{problem.alphabet.letter_text(name)}⁻¹" if operand is None else f"({operand})⁻¹"
 
 
 def _operators_of(problem: DerivativeProblem) -> Any:

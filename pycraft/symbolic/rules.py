@@ -13,6 +13,7 @@ from functools import cache, lru_cache
 
 from .axioms import Theory, solved, theory
 from .equations import Equation, Step, Use, numbered
+from .walk import GaveUp
 from .words import ONE, Alphabet, Number, Polynomial, Word, add_to, inverted, of_model, plain, ratio
 
 WORDS, REWRITES = 2000, 12000
@@ -125,10 +126,6 @@ class Budget:
     """How many rewrites may still be spent; the same input spends the same."""
 
     rewrites: int = REWRITES
-
-
-class GaveUp(Exception):
-    """A reduction outgrew its limits."""
 
 
 @dataclass

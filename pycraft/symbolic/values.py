@@ -16,6 +16,7 @@ import numpy as np
 from .. import _core
 from .equations import Step
 from .expand import symbol_parts
+from .walk import Walk, carried_out
 from .words import FURTHER, Alphabet, Word, split
 
 PROBES = 3
@@ -159,7 +160,13 @@ def transferred(e: Any, operators: Any) -> Any:
     NoValue
         It holds a constant or something external, which belongs to its own model's spaces.
     """
-    children = [transferred(c, operators) for c in e.children]
+    return carried_out(_transferred(e, operators))
+
+
+def _transferred(e: Any, operators: Any) -> Walk:
+    children = []
+    for child in e.children:
+        children.append((yield _transferred(child, operators)))
     match e.kind:
         case "symbol":
             _, name, arguments, _ = symbol_parts(e)

@@ -1,0 +1,110 @@
+"""The words of statements: operators by their typed names, functions, powers; and the errors of text that cannot be read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from difflib import get_close_matches
+from typing import Any
+
+from .. import _core
+from .spelling import Spelled
+
+SCALARS = {
+    "trace": lambda x: x.trace(),
+    "tr": lambda x: x.trace(),
+    "Tr": lambda x: x.trace(),
+    "logdet": lambda x: x.logdet(),
+    "norm": lambda x: x.norm(),
+}
+FUNCTIONS = {
+    **SCALARS,
+    "inv": lambda x: x.inv(),
+    **dict.fromkeys(("blockdiag", "blkdiag", "bdiag"), _core.blockdiag),
+    "sqrt": lambda x: x.sqrt(),
+    "transpose": lambda x: x.T,
+}
+WITH_ARGUMENTS = ("B", "Jacobian", "Lambda", "Delta")
+LARGEST_POWER = 1000
+
+# Symbols in the order of the core's table: (ascii, unicode, latex, domain, codomain, meaning).
+_TABLE = _core.symbol_table()
+_NAMES = {entry[0] for entry in _TABLE}
+# What stands for a letter in ASCII where its own name is another: X, V; E_phi; and names typed without their underscores: taubar, Epsi.
+_ALIASES = {
+    **{shown: name for name, shown, *_ in _TABLE if shown != name and shown.isascii()},
+    **{name.replace("_", ""): name for name in _NAMES if "_" in name},
+    "E_phi": "E",
+    "Ephi": "E",
+}
+
+
+class ParseError(_core.EvaluationError):
+    """A statement that cannot be read, or that can be read in two ways."""
+
+
+class Misread(ParseError):
+    """What one reading stumbles over, at character `at` of the spelled text."""
+
+    def __init__(self, message: str, at: int):
+        super().__init__(message)
+        self.message = message
+        self.at = at
+
+    def place(self, source: Spelled) -> str:
+        """The typed line and a caret below the place, indented."""
+        return "".join(f"\n    {line}" for line in source.place(self.at).split("\n"))
+
+
+class Vocabulary:
+    """The operators of one model by every name that is typed for them, ℳ, I, N, and what the caller adds."""
+
+    def __init__(self, operators: Any, extra: Mapping[str, Any] | None = None):
+        H, phi, M = operators("H phi M")
+        self._own = {"MM": H @ phi @ M @ phi.T @ H.T, "I": operators.I, "N": operators.Theta.dimension, **(extra or {})}
+        self._operators = operators
+
+    @property
+    def names(self) -> set[str]:
+        """Names that stand alone, without arguments."""
+        return {*(_NAMES - set(WITH_ARGUMENTS)), *_ALIASES, *self._own}
+
+    def operator(self, name: str) -> Any:
+        if name in self._own:
+            return self._own[name]
+        if name in WITH_ARGUMENTS:
+            raise ParseError(needs_arguments(name))
+        if name not in _NAMES and name not in _ALIASES:
+            raise ParseError(self.unknown(name))
+        return getattr(self._operators, _ALIASES.get(name, name))
+
+    def indexed(self, name: str, arguments: list[str]) -> Any:
+        arguments = [a.strip().strip("'\"") for a in arguments]
+        if name == "Delta":
+            return self._operators.Delta(int(arguments[0]) if arguments[0].isdigit() else arguments[0])
+        return getattr(self._operators, name)(arguments)
+
+    def unknown(self, name: str) -> str:
+        """What to say of a name that stands for nothing."""
+        if name == "det":
+            return "a determinant is read by its logarithm: ln det A"
+        if name.startswith("\\"):
+            return f"the command {name} is not known here"
+        near = get_close_matches(name, [*self.names, *WITH_ARGUMENTS, *FUNCTIONS], cutoff=0.7)
+        return f"no operator is called {name!r}" + (f"; the nearest names are {', '.join(near)}" if near else "")
+
+
+def needs_arguments(name: str) -> str:
+    return f"{name} needs its arguments, as in {name}({'hinge' if name == 'Delta' else 'body'})"
+
+
+def power(base: Any, exponent: Any) -> Any:
+    """base to a whole power.
+
+    Raises
+    ------
+    ParseError
+        The exponent is no whole number, or beyond 1000.
+    """
+    if not isinstance(exponent, (int, float)) or not abs(exponent) <= LARGEST_POWER or exponent != int(exponent):
+        raise ParseError(f"a power is a whole number up to {LARGEST_POWER}")
+    return base ** int(exponent)

@@ -1,0 +1,29 @@
+"""Walks through expressions of any depth: generators that yield a walk for each part and are sent what it comes to."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from typing import Any
+
+NODES = 200_000
+"""Nodes at which a walk gives up: an expression may share its parts, and is then larger than it looks."""
+Walk = Generator[Any, Any, Any]
+
+
+class GaveUp(Exception):
+    """A derivation outgrew its limits."""
+
+
+def carried_out(walk: Walk) -> Any:
+    """What a walk comes to. Raises GaveUp beyond `NODES` parts."""
+    stack, sent, taken = [walk], None, 0
+    while stack:
+        try:
+            stack.append(stack[-1].send(sent))
+            sent, taken = None, taken + 1
+        except StopIteration as end:
+            stack.pop()
+            sent = end.value
+        if taken > NODES:
+            raise GaveUp
+    return sent

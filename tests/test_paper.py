@@ -1,0 +1,72 @@
+"""`pycraft check paper.tex`: every displayed equation is found, read, and given a verdict with its line."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+import pycraft as pc
+from pycraft.identities.paper import check_paper, equations
+
+PAPER = Path(__file__).parent / "data" / "paper.tex"
+
+
+@pytest.fixture(scope="module")
+def report():
+    return check_paper(PAPER, pc.tree([-1, 0], ["pin", "slider"], seed=1), states=2, search=False)
+
+
+def test_every_display_is_found_with_its_line(report):
+    found = [(e.line, e.verdict) for e in report.equations]
+    assert found == [
+        (9, "holds"),
+        (13, "holds"),
+        (14, "holds"),
+        (17, "fails"),
+        (20, "holds"),  # the chain over rows: both of its statements
+        (20, "fails"),
+        (24, "holds"),
+        (24, "holds"),
+        (27, "holds"),  # on a chain it does
+        (31, "not read"),
+        (32, "not read"),
+    ], repr(report)
+    lines = PAPER.read_text().split("\n")
+    for e in report.equations:
+        assert any(word in lines[e.line - 1] for word in ("\\M", "\\inv", "\\psi", "\\E", "\\Omega", "c^2", "\\int"))
+
+
+def test_the_report_tells_all(report):
+    assert not report and report.counts == {"holds": 7, "fails": 2, "not read": 2}
+    shown = repr(report)
+    assert "paper.tex:17: fails" in shown and "paper.tex:31: not read" in shown and "it has no equals sign" in shown
+    assert shown.endswith("11 equations: 2 fails, 7 holds, 2 not read")
+    assert [e["line"] for e in json.loads(report.to_json())["equations"]] == [e.line for e in report.equations]
+
+
+def test_what_is_not_read_shows_the_place(report):
+    note = next(e.note for e in report.equations if e.line == 31)
+    assert "no operator is called" in note and "^" in note.split("\n")[-1]
+
+
+def test_macros_comments_and_conditions():
+    source = "\n".join(
+        [
+            r"\newcommand\pair[2]{#1 #2^{*}}  % \[ not = this \]",
+            r"\newcommand{\loop}{\loop}",
+            r"\[ \pair{\phi}{\psi} = I, \quad \text{for all trees}, \qquad D = D \] costs 5\% \[ \loop = 0 \]",
+        ]
+    )
+    found = [(line, " ".join(text.split())) for line, text in equations(source)]
+    assert found[:2] == [(3, r"\phi \psi^{*} = I"), (3, "D = D")] and len(found) == 3
+
+
+def test_files_that_cannot_be_read(tmp_path):
+    with pytest.raises(pc.ModelError, match="No such file"):
+        check_paper(tmp_path / "none.tex")
+    (tmp_path / "latin.tex").write_bytes("\\[ é \\]".encode("latin-1"))
+    with pytest.raises(pc.ModelError, match="not text in UTF-8 at byte 3"):
+        check_paper(tmp_path / "latin.tex")
+    (tmp_path / "empty.tex").write_text("no equation here")
+    report = check_paper(tmp_path / "empty.tex")
+    assert not report and report.summary().endswith("0 equations; none is displayed")
