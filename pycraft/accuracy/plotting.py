@@ -173,7 +173,11 @@ def accuracy_plot(table: Any, ax: Any = None) -> Any:
     for name, marker in {**MARKERS, **OTHERS}.items():
         if any(name in (row["form"], row["method"]) for row in rows):
             used["way"].append(Line2D([], [], marker=marker, ls="", color="k", mfc="none", label=name))
-    for residual, text in (("same", "filled: refined"), ("gather", "left half: refined, wide gather"), ("wider", "half: refined, wider residual")):
+    for residual, text in (
+        ("same", "filled: refined"),
+        ("gather", "left half: refined, wide gather"),
+        ("wider", "half: refined, wider residual"),
+    ):
         if any(row["refine"] and (row["residual"] or "same") == residual for row in rows):
             used["way"].append(Line2D([], [], marker="o", ls="", color="k", **_filling(1, residual, "k"), label=text))
     used["way"].append(Line2D([], [], **{**RING, "ls": "-", "ms": 9}, color="k", lw=0.8, alpha=0.6, label="Pareto front"))

@@ -121,7 +121,11 @@ def above(rung: Rung) -> list[Rung]:
     if rung.refine and rung.residual == "wider":
         return list(CLIMB[CLIMB.index(WIDER_RESIDUAL) + 1 :])
     if rung.refine and rung.residual == "gather":
-        return [WIDER_RESIDUAL, *CLIMB[CLIMB.index(WIDER_RESIDUAL) + 1 :]] if rung.form != "fast" else list(CLIMB[CLIMB.index(WIDE_GATHER) + 1 :])
+        return (
+            [WIDER_RESIDUAL, *CLIMB[CLIMB.index(WIDER_RESIDUAL) + 1 :]]
+            if rung.form != "fast"
+            else list(CLIMB[CLIMB.index(WIDE_GATHER) + 1 :])
+        )
     # A root-free and a square-root sweep stand side by side; more than one step of refinement is still refinement.
     form = "ud" if rung.form == "square-root" else rung.form
     return list(CLIMB[CLIMB.index(Rung(form, refine=1 if rung.refine else 0)) + 1 :])
