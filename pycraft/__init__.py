@@ -38,7 +38,7 @@ from .models.multibody import Multibody
 from .models.state import State
 from .models.warning import ModelWarning
 from .operators import OperatorSet, sko_model
-from .symbolic import Exercise, Proof, derivative, exercise, from_sympy, parse, prove, prove_derivative, symbolic, to_sympy
+from .symbolic import Exercise, Proof, derivative, exercise, from_sympy, parse, prove, prove_derivative, symbolic, to_sympy, worksheet
 
 __version__ = "0.1.0"
 
@@ -72,8 +72,8 @@ __all__ = [
     "blockdiag",
     "chain",
     "check",
-    "compare",
     "cmake_dir",
+    "compare",
     "constant",
     "derivative",
     "euclidean",
@@ -94,5 +94,6 @@ __all__ = [
     "tree",
     "vector",
     "work_precision",
+    "worksheet",
     "zero",
 ]

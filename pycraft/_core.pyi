@@ -189,6 +189,11 @@ class SkoSource:
     def coordinate_names(self) -> list[str]:
         ...
     @property
+    def derived_from(self) -> typing.Any:
+        """
+        How this tree was made of a model's, "hinge subset" or "world frame", and that model's source; None for a model's own.
+        """
+    @property
     def dof(self) -> list[int]:
         ...
     @property

@@ -164,8 +164,7 @@ class Workspace {
         std::vector<S>& A = dense_[s.out];
         operand_as_matrix(s, values, A, counts);
         const int n = rows(s.out);
-        std::vector<S> magnitude(n, S(0));
-        if (!dense_lu_[s.out].factor(A.data(), n, magnitude.data())) throw SingularOperatorError(plan.text + ": singular at this state");
+        if (!dense_lu_[s.out].factor(A.data(), n, nullptr)) throw SingularOperatorError(plan.text + ": singular at this state");
         return;
       }
       case StepKind::dense_solve: {
@@ -221,19 +220,19 @@ class Workspace {
       }
       case StepKind::logdet_of_blocks: {
         const BlockStorage<S>& b = blocks_[s.in[0]];
-        S sum = S(0);
+        Magnitude<S> all;
         for (size_t k = 0; k < b.rows.size(); ++k) {
           factor_block(b, static_cast<int>(k), plan.registers[s.in[0]].space);
-          sum += lu_.log_abs_determinant();
+          all.multiply(lu_.determinant());
         }
-        scalars_[s.out] = sum;
+        scalars_[s.out] = all.log();
         return;
       }
       case StepKind::logdet_of_D: scalars_[s.out] = values[s.context]->log_determinant_of_D(); return;
-      case StepKind::logdet_of_factor: 
+      case StepKind::logdet_of_factor:
         with_factors(s.in[0], [&](const auto& factors) { scalars_[s.out] = static_cast<S>(factors.log_abs_determinant()); });
         return;
-      case StepKind::logdet_of_dense: scalars_[s.out] = dense_lu_[s.in[0]].log_abs_determinant(); return;
+      case StepKind::logdet_of_dense: scalars_[s.out] = dense_lu_[s.in[0]].determinant().log(); return;
       case StepKind::norm_of_vector: return;  // taken by the pool over all columns_at_a_times
       case StepKind::combine_scalars: {
         S sum = S(s.coefficients.back());
@@ -248,8 +247,7 @@ class Workspace {
 
   void factor_block(const BlockStorage<S>& b, int k, const Space& space) {
     block_.assign(b.at(k), b.at(k) + size_t(b.rows[k]) * b.columns[k]);
-    magnitude_.assign(b.rows[k], S(0));
-    if (!lu_.factor(block_.data(), b.rows[k], magnitude_.data()))
+    if (!lu_.factor(block_.data(), b.rows[k], nullptr))
       throw SingularOperatorError("block '" + space.layout().blocks[space.layout().of_body[k][0]].label + "' of a block-diagonal operator in " +
                                   plan_->text + " is singular: it has no inverse at this state");
   }

@@ -4,6 +4,7 @@
 #include "algebra/errors.h"
 #include "algebra/matrix_tree.h"
 #include "bindings/bindings.h"
+#include "operators/derived_operators.h"
 #include "operators/directions.h"
 
 namespace pycraft {
@@ -157,6 +158,11 @@ void register_sources(py::module_& m) {
       .def_property_readonly("body_names", [](const SkoSource& s) { return s.structure().body_names; })
       .def_property_readonly("hinge_names", [](const SkoSource& s) { return s.structure().hinge_names; })
       .def_property_readonly("coordinate_names", [](const SkoSource& s) { return s.structure().coordinate_names; })
+      .def_property_readonly("derived_from", [](const SkoSource& s) -> py::object {
+        const auto* derived = dynamic_cast<const DerivedOperators*>(&s);
+        if (derived == nullptr) return py::none();
+        return py::make_tuple(dynamic_cast<const WorldFrame*>(&s) != nullptr ? "world frame" : "hinge subset", derived->base());
+      }, "How this tree was made of a model's, \"hinge subset\" or \"world frame\", and that model's source; None for a model's own.")
       .def_property_readonly("traits", [](const SkoSource& s) {
         const Traits t = s.traits();
         py::dict d;

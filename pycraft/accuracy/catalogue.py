@@ -159,10 +159,19 @@ def quantile(errors: np.ndarray, share: float) -> float:
 
 def catalogue(sizes: Iterable[int] = SIZES) -> list[Case]:
     """Every case, the chains with these numbers of links; other cases larger than the largest are left out."""
-    from . import cases_chains, cases_configurations, cases_groups, cases_massless, cases_ratios, cases_trajectories, cases_units
+    from . import (
+        cases_chains,
+        cases_configurations,
+        cases_elimination,
+        cases_groups,
+        cases_massless,
+        cases_ratios,
+        cases_trajectories,
+        cases_units,
+    )
 
     sizes = sorted(sizes)
     cases: list[Case] = cases_chains.cases(sizes)
-    for module in (cases_ratios, cases_massless, cases_configurations, cases_units, cases_groups, cases_trajectories):
+    for module in (cases_ratios, cases_massless, cases_configurations, cases_units, cases_elimination, cases_groups, cases_trajectories):
         cases += [case for case in module.cases() if case.parameters.get("N", 0) <= max(sizes[-1], 10)]
     return cases

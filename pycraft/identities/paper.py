@@ -99,7 +99,7 @@ def check_paper(
     from .checker import check
 
     source = _read(Path(path))
-    found = []
+    found: list[Equation] = []
     for line, latex in equations(source):
         if progress is not None:
             progress(f"line {line}")
@@ -155,7 +155,8 @@ def _rows(body: str, line: int, macros: dict[str, tuple[int, str]]) -> Iterator[
     for piece in re.split(r"(\\\\(?:\[[^\]]*\])?)", body):
         if not piece.startswith("\\\\"):
             text = _plain(_expanded(piece, macros))
-            begins = re.match(r"(\s|\\label\{[^{}]*\}|\\begin\{[a-z]+\})*", piece).end()  # type: ignore[union-attr] - it always matches
+            before = re.match(r"(\s|\\label\{[^{}]*\}|\\begin\{[a-z]+\})*", piece)
+            begins = before.end() if before else 0
             start = line + body.count("\n", 0, at + begins)
             for part in _apart(text):
                 rows.append((start, part))

@@ -14,6 +14,7 @@ from fractions import Fraction
 from typing import Any
 
 from .. import _core
+from . import factors
 from .axioms import INVERTIBLE
 from .equations import Equation, Step, symmetries
 from .rules import WORDS
@@ -21,6 +22,7 @@ from .walk import GaveUp, Walk, carried_out
 from .words import (
     FURTHER,
     ONE,
+    SHARED,
     Alphabet,
     Letter,
     Number,
@@ -103,7 +105,10 @@ class Problem:
         self.alphabet = Alphabet()
         self.opaque: list[Opaque] = []
         self.contexts: list[tuple[Any, Any]] = []  # (source, binding): the models at their states
+        self.relations: list[tuple[str, str, str]] = []  # (mark of a tree made of another, how, that one's mark)
         self.sides: list[Polynomial] = []
+        self.of_one_model = False  # whether the statement was made of a model's expressions, and not read for all
+        self.scalars = False  # whether both sides are scalars: traces, determinants, norms
         self.numbers = False  # whether both sides map R^1 to R^1
         self._named_operands = 0
         self._leaves: dict[Any, str] = {}
@@ -154,7 +159,7 @@ class Problem:
             case "identity":
                 return {(): ONE}
             case "scaled":
-                c = _exact(e.coefficient)
+                c = exact(e.coefficient)
                 p = yield self._words(e.children[0], transposed)
                 return {w: c * x for w, x in p.items()} if c else {}
             case "sum":
@@ -192,11 +197,11 @@ class Problem:
             case "identity":
                 return {(): ONE}
             case "scaled" if e.coefficient:
-                c = ratio(1, _exact(e.coefficient))
+                c = ratio(1, exact(e.coefficient))
                 return {w: c * x for w, x in (yield self._inverse(e.children[0])).items()}
             case "transpose":
                 return self._star((yield self._inverse(e.children[0])))
-            case "product" if all(map(_square, e.children)):
+            case "product" if all(map(square, e.children)):
                 return (yield self._product(self._inverse(f) for f in reversed(e.children)))
             case "symbol" if e.name in UNFOLDED:
                 return (yield self._inverse(self._unfolded(e)))
@@ -221,6 +226,12 @@ class Problem:
         """The letter that an expression is."""
         return carried_out(self._letter(e))
 
+    def operand(self, e: Any) -> str:
+        """The letter of what a determinant or norm is taken of: its own where it is one."""
+        return (
+            self.letter(e) if e.kind in ("symbol", "constant") and e.name not in UNFOLDED else carried_out(self._operand("operand", e, e))
+        )
+
     def _letter(self, e: Any) -> Walk:
         if e not in self._leaves:
             if e.kind in ("blockdiag", "sqrt"):
@@ -230,8 +241,13 @@ class Problem:
 
     def _symbol(self, e: Any) -> str:
         source, ascii, arguments, binding = symbol_parts(e)
-        mark = self._mark_of(source, binding)
         text, _ = _TABLE.get(ascii, (e.text(), ""))
+        made = source.derived_from
+        if made is not None and made[0] == "hinge subset" and text in SHARED:
+            source, made = made[1], None
+        mark = self._mark_of(source, binding)
+        if made is not None and (mark, made[0]) not in [(m, kind) for m, kind, _ in self.relations]:
+            self.relations.append((mark, made[0], self._mark_of(made[1], binding)))
         known = self.alphabet.letters.get(text + mark)
         if known is not None and known.ascii == ascii and not arguments:
             self.alphabet.add(Letter(known.name, known.text, known.latex, known.symmetric, known.shape, known.ascii, e))
@@ -273,17 +289,25 @@ class Problem:
             inner = yield self._words(operand)
             if len(self.opaque) == OPERANDS:
                 raise GaveUp
-            name = f"⟨{len(self.opaque) + 1}⟩"
-            text, latex = self._shown(inner, e) if kind == "inverse" else (e.text(), f"{{{e.latex()}}}")
+            name = self._factor(inner) or f"⟨{len(self.opaque) + 1}⟩"
+            text, latex = self._shown(inner, e) if kind in ("inverse", "operand") else (e.text(), f"{{{e.latex()}}}")
             symmetric = kind == "blockdiag" and bool(e.is_symmetric)
-            self.alphabet.add(Letter(name, text, latex, symmetric, "full" if kind == "inverse" else "diagonal", None, e))
+            self.alphabet.add(Letter(name, text, latex, symmetric, "diagonal" if kind in ("blockdiag", "sqrt") else "full", None, e))
             definition = Equation("definition", f"{text} = {self.alphabet.text(inner)}", monomial(name), inner)
             self.opaque.append(Opaque(name, kind, e, inner, definition))
             self._leaves[key] = name
         found = self._leaves[key]
-        if kind == "inverse":
+        if kind in ("inverse", "operand"):
             self._used.append(next(o.definition for o in self.opaque if o.name == found))
         return found
+
+    def _factor(self, inner: Polynomial) -> str:
+        """The name of A = I + HφK, where these words are that: the innovations factor of a model goes by one name."""
+        for mark in self.marks:
+            base = next((base for m, how, base in self.relations if m == mark and how == "hinge subset"), mark)
+            if inner == factors.of(factors.FACTOR, mark, base) and factors.name_of(mark) not in self.alphabet.letters:
+                return factors.name_of(mark)
+        return ""
 
     def _shown(self, inner: Polynomial, e: Any) -> tuple[str, str]:
         """How the operand of an inverse is called: ℳ where it is that, X₁, X₂, ... where its own text is long."""
@@ -307,7 +331,7 @@ def _same_state(a: Any, b: Any) -> bool:
     return a is b or a is not None and b is not None and a.__reduce__()[1] == b.__reduce__()[1]
 
 
-def _exact(coefficient: float) -> Number:
+def exact(coefficient: float) -> Number:
     if not math.isfinite(coefficient):
         raise _core.EvaluationError(f"a coefficient {coefficient} is no number to reckon with")
     return ratio(Fraction(coefficient), 1)
@@ -317,7 +341,7 @@ def _bound(symbol: Any, binding: Any) -> Any:
     return symbol if binding is None else symbol._bound(binding)
 
 
-def _square(factor: Any) -> bool:
+def square(factor: Any) -> bool:
     """Whether a factor is square by meaning: H may be square by accident."""
     domain, codomain = factor.domain, factor.codomain
     return domain is None or domain == codomain or domain.dual == codomain

@@ -9,9 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import lru_cache
 
+from . import factors
 from .axioms import theory
 from .blocks import diagonal_part
-from .equations import Equation, Step, Use, chain_holds, numbered
+from .equations import Equation, Step, Use, chain_holds, marked, numbered
 from .expand import Opaque, Problem
 from .presuppositions import (
     ALWAYS,
@@ -22,10 +23,13 @@ from .presuppositions import (
     is_regular_constant,
     is_triangular,
 )
+from .relations import at_the_roots, in_world
 from .rules import Rules, Setting, normal_form, rule_from, rules_for, weight
 from .words import (
     ONE,
+    SHARED,
     Alphabet,
+    Letter,
     Number,
     Polynomial,
     Word,
@@ -34,7 +38,6 @@ from .words import (
     inverse_of,
     inverted,
     monomial,
-    of_model,
     parse,
     plain,
     ratio,
@@ -71,10 +74,13 @@ class LocalRules:
         self.problem, self.setting = problem, setting
         self.alphabet: Alphabet = problem.alphabet
         self.local: list[Equation] = []
-        self.rules: Rules = rules_for(setting, problem.marks).copy()
+        self.locked = tuple((mark, base) for mark, how, base in problem.relations if how == "hinge subset")
+        self.rules: Rules = rules_for(setting, problem.marks, self.locked).copy()
         blocks = Setting(setting.hypotheses, composite=True, compliance=True)
-        self.block_rules = rules_for(blocks, problem.marks).copy() if any(o.kind == "blockdiag" for o in problem.opaque) else None
+        diagonal_parts = any(o.kind == "blockdiag" for o in problem.opaque)
+        self.block_rules = rules_for(blocks, problem.marks, self.locked).copy() if diagonal_parts else None
         self._rank = 0
+        self._factors: dict[str, factors.Factor | None] = {}
         self._forms: list[tuple[str, Polynomial]] = []
         self._roots: list[tuple[Opaque, Polynomial, list[Step]]] = []
         self._swept: list[tuple[str, str, Polynomial, list[Step]]] = []
@@ -86,12 +92,29 @@ class LocalRules:
         self._definite = {n for n, e in constants.items() if is_positive_constant(e)}
         for equation, word in extra:
             self.add(equation, word)
+        self._world_axes()
+        source = problem.contexts[0][0] if problem.contexts else None
+        for name, e in constants.items():
+            for equation, word in at_the_roots(name, e, source) if getattr(e, "kind", "") == "constant" else ():
+                self.add(equation, word)
         self.inverted = {inverse_of(n) for n in named}
         for name in named:
             if name not in theory().alphabet.letters:
                 self._add_pairs(name)
         for opaque in problem.opaque:
-            {"inverse": self._inverse, "blockdiag": self._blocks, "sqrt": self._root}[opaque.kind](opaque)
+            if opaque.kind != "operand":
+                {"inverse": self._inverse, "blockdiag": self._blocks, "sqrt": self._root}[opaque.kind](opaque)
+
+    def _world_axes(self) -> None:
+        """Letters in world axes by those of their model."""
+        found = {
+            x.replace("*", "") if not inverted(x) else inverse_of(split(x)[0]) for p in self.problem.polynomials() for w in p for x in w
+        }
+        for mark, how, base in self.problem.relations:
+            for letter in sorted(found) if how == "world frame" else ():
+                equation = in_world(letter, mark, base)
+                if equation is not None:
+                    self.add(equation, (letter,))
 
     def add(self, equation: Equation, word: Word, blocks: bool = True) -> None:
         """A rule and its transpose, before all that are there."""
@@ -126,6 +149,8 @@ class LocalRules:
             where = f" where {' and '.join(sorted(self.setting.hypotheses))}" if self.setting.hypotheses else ""
             raise Void(f"{o.expression.text()} = 0{where}, which has no inverse")
         self._by_structure(X, o.inner, form, steps)
+        if self._by_factors(o, form):
+            return
         for z in self._candidates(form):
             lemma = self._inverse_is(X, o.inner, z, o.definition)
             if lemma is not None:
@@ -145,6 +170,43 @@ class LocalRules:
                     rules.add(rule_from(lemma, (inverse_of(a.star(X)),), self._rank))
         self._forms.append((X, form))
 
+    def factor(self, mark: str) -> factors.Factor | None:
+        """A = I + HφK of one model, with its inverse; None if that is not shown."""
+        if mark not in self._factors:
+            base = dict(self.locked).get(mark, mark)
+            context = self.problem.contexts[self.problem.marks.index(mark)] if self.problem.contexts else None
+            name, definition = factors.letter(self.alphabet, mark, base, context)
+            lemma = self._inverse_is(name, definition.rhs, factors.of(factors.INVERSE, mark, base), definition)
+            self._factors[mark] = None if lemma is None else factors.Factor(name, definition, lemma)
+        return self._factors[mark]
+
+    def factored(self, X: str, form: Polynomial, definition: Equation) -> tuple[Equation, factors.Factor, str, Number] | None:
+        """(X = c A D A*, A, the mark of its model, c) of a letter with this definition and normal form; None if it is not that."""
+        key, scale = _scaled(form)
+        for mark in self.problem.marks:
+            base = dict(self.locked).get(mark, mark)
+            product = self.reduce(factors.of(factors.PRODUCT, mark, base))[0]
+            its_key, its_scale = _scaled(product) if product else ((), ONE)
+            if its_key == key and (factor := self.factor(mark)) is not None:
+                c = ratio(scale, its_scale)
+                lemma = factors.factorization(X, c, definition, factor, mark, self.alphabet, self.reduce)
+                return None if lemma is None else (lemma, factor, mark, c)
+        return None
+
+    def _by_factors(self, o: Opaque, form: Polynomial) -> bool:
+        """X⁻¹ where X is ℳ + J, by its factors."""
+        found = self.factored(o.name, form, o.definition)
+        if found is None:
+            return False
+        product, factor, mark, c = found
+        self.needs[o.name] = inverses_used(factor.premises)
+        self.needs[factor.name] = self.needs[o.name]
+        whole = factors.inverse_of_product(o.name, c, product, factor, mark, self.alphabet, self.pair)
+        self.add(whole, (inverse_of(o.name),))
+        if factor.inverse not in self.local:
+            self.add(factor.inverse, (inverse_of(factor.name),))
+        return True
+
     def _by_structure(self, X: str, inner: Polynomial, form: Polynomial, steps: list[Step]) -> None:
         """X regular, where its words say so: as they were written, or in normal form."""
         for p, premises in ((inner, ()), (form, [e for step in steps for e in step.premises()])):
@@ -161,9 +223,10 @@ class LocalRules:
             if all(plain(x) in ("φ", "ψ", "D", "M", "P", "R", "Υ") or inverted(x) for x in word):
                 yield {tuple(inverse_of(x) for x in reversed(word)): ratio(1, c)}
         for mark in self.problem.marks:
-            key, scale = _scaled({tuple(_unmarked(x, mark) for x in w): c for w, c in form.items()})
+            base = dict(self.locked).get(mark, mark)
+            key, scale = _scaled({tuple(_unmarked(x, base if plain(x) in SHARED else mark) for x in w): c for w, c in form.items()})
             for z, its_scale in _known_inverses(self.setting).get(key, ()):
-                yield {tuple(of_model(x, mark) for x in w): ratio(c * its_scale, scale) for w, c in z.items()}
+                yield {marked(w, mark, base): ratio(c * its_scale, scale) for w, c in z.items()}
         key, scale = _scaled(form)
         for X, other in self._forms:
             for name, p in ((X, other), (self.alphabet.star(X), self.alphabet.star_of(other))):
@@ -210,11 +273,26 @@ class LocalRules:
         value = diagonal_part(form, a)
         if any(a.letters[split(x)[0]].word for w in value for x in w) and self._recursion(o):
             return
-        text = f"{a.letters[o.name].text} = {a.text(value)}"
+        name = o.name
+        if form != o.inner:  # first inside, then by blocks
+            name = self._written(o, form, steps)
+        text = f"{a.letters[name].text} = {a.text(value)}"
         note = "the diagonal blocks of each word, by where its letters lead on the tree"
-        equation = Equation("structure", text, {(o.name,): ONE}, value, steps=numbered(steps), uses=[o.definition], note=note)
-        equation.check = lambda: chain_holds(steps, o.inner, form) and diagonal_part(form, a) == value
-        self.add(equation, (o.name,))
+        equation = Equation("structure", text, {(name,): ONE}, value, note=note)
+        equation.check = lambda: diagonal_part(form, a) == value
+        self.add(equation, (name,))
+
+    def _written(self, o: Opaque, form: Polynomial, steps: list[Step]) -> str:
+        """The letter of blockdiag(the normal form), with the rule that blockdiag(X) is that."""
+        a, known = self.alphabet, self.alphabet.letters[o.name]
+        name = f"{o.name}form"
+        latex = f"\\operatorname{{blockdiag}}({a.latex(form)})"
+        a.add(Letter(name, f"blockdiag({a.text(form)})", latex, known.symmetric, "diagonal", None, o.expression))
+        text = f"{a.text(o.inner)} = {a.text(form)}"
+        inside = Equation("structure", text, {(o.name,): ONE}, {(name,): ONE}, steps=numbered(list(steps)), uses=[o.definition])
+        inside.check = lambda: chain_holds(steps, o.inner, form)
+        self.add(inside, (o.name,))
+        return name
 
     def _recursion(self, o: Opaque) -> bool:
         """Y = X + E Y E* for Y = blockdiag(A X A*), A = (I-E)⁻¹ and X block diagonal; Y = Z where Z obeys the same. Whether Y is that."""
@@ -261,7 +339,9 @@ class LocalRules:
         """The equation with its sides in normal form, as a rule for one of its words."""
         a = self.alphabet
         form, steps = self.reduce(equation.difference)
-        c = form[lead]
+        c = form.get(lead)
+        if c is None:  # the letters are written by those of another tree
+            return
         rest = {w: ratio(-x, c) for w, x in form.items() if w != lead}
         uses = [Use(ratio(1, c), (), equation, (), lead)] + [u.between((), (), ratio(-1, c)) for step in steps for u in step.uses]
         step = Step({lead: ONE}, rest, uses, a, f"{equation.text}, solved for {a.word_text(lead)}")

@@ -20,8 +20,8 @@ from .values import LARGEST, NoValue, Values
 from .walk import GaveUp
 from .words import Alphabet, Polynomial, Word, inverted, parse, plain, split
 
-ALWAYS = ("φ", "ψ", "D")
-"""Letters that have an inverse on every tree with regular hinges."""
+ALWAYS = ("φ", "ψ", "X", "D")
+"""Letters that have an inverse on every tree with regular hinges; X are changes of frames."""
 SEMIDEFINITE = ("M", "P", "P⁺", "R", "J", "Υ", "Ω")
 SINGULAR = 1e-13
 """Ratio of the smallest singular value to the largest below which an operator of a small model of ordinary bodies counts as singular."""

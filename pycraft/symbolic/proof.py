@@ -11,11 +11,15 @@ from .derivative import Formula
 from .equations import Equation, Step, chain_holds, foundations, numbered
 from .expand import Opaque, Problem, Spelling
 from .presuppositions import nowhere
+from .shown import FullProof, aligned, escaped, lines, page
 from .values import LARGEST, NoValue, Values
 from .words import Alphabet, Polynomial, combine
 
 HYPOTHESES = ("J = 0", "serial chain", "single-DOF hinges", "constant H")
 """Names of the hypotheses that a proof may have, as models' traits name them."""
+
+COUNTED = "the coordinates of this model"
+"""The note of an equation that says how many coordinates one model has."""
 
 
 class Proof:
@@ -212,6 +216,9 @@ class Proof:
         """Residuals at a random state of the model at hand; of an example where that is large, or fails a hypothesis."""
         self._model = operators
         unmet = [] if operators is None else _unmet(self.hypotheses, operators)
+        if unmet and any(e.note == COUNTED for e in self.rests_on):  # a number that belongs to the model at hand
+            self.unmet = unmet
+            return
         candidates: list[Any] = [example(self.hypotheses)] if operators is None or unmet or len(operators.F) > LARGEST else [operators]
         for candidate in candidates:
             try:
@@ -232,11 +239,11 @@ class Proof:
         title = f"{self.statement}\n  proved" + (f" where {' and '.join(self.hypotheses)}" if self.hypotheses else ", no hypothesis")
         title += f"; presupposes {', '.join(self.presupposes)}" if self.presupposes else ""
         title += f"; not met by the model at hand: {' and '.join(self.unmet)}" if self.unmet else ""
-        lines = [title, *_lines(self.steps)]
-        lines += [f"  {self.note}"] if self.note else []
-        lines += [f"  rests on {'; '.join(self.axioms)}"] if self.axioms else []
-        lines += [f"  largest residual of a step at a random state: {self.worst:.1e}"] if self.worst is not None else []
-        return "\n".join(lines)
+        shown = [title, *lines(self.steps)]
+        shown += [f"  {self.note}"] if self.note else []
+        shown += [f"  rests on {'; '.join(self.axioms)}"] if self.axioms else []
+        shown += [f"  largest residual of a step at a random state: {self.worst:.1e}"] if self.worst is not None else []
+        return "\n".join(shown)
 
     def _reason(self) -> str:
         if self.note:
@@ -247,58 +254,26 @@ class Proof:
     def __repr__(self) -> str:
         return str(self)
 
-    def text(self) -> str:
-        """The proof with the proofs of all its lemmas, down to the axioms, each before it is used."""
-        return "\n\n".join([*map(str, self.all_lemmas() if self else []), str(self)])
-
     def latex(self) -> str:
         """The chain of steps as an aligned display, or both normal forms."""
         if not self:
-            return " \\ne ".join(self._alphabet.latex(p) for p in self._forms) if not self.note else f"\\text{{{_escaped(self.note)}}}"
-        rows = [f"& {self.steps[0].before_latex()}" if self.steps else ""]
-        rows += [f"={{}}& {s.after_latex()} && \\text{{({s.number})}}\\;{_reason_latex(s)}" for s in self.steps]
-        return "\\begin{aligned}" + "\\\\\n".join(rows) + "\\end{aligned}"
+            return " \\ne ".join(self._alphabet.latex(p) for p in self._forms) if not self.note else f"\\text{{{escaped(self.note)}}}"
+        return aligned(self.steps)
+
+    def full(self) -> FullProof:
+        """The proof with the derivations of all its lemmas, down to the axioms, numbered, each before what cites it.
+
+        It prints as text, as HTML in notebooks, and has `.latex()`.
+        """
+        return FullProof(self)
+
+    def _repr_html_(self) -> str:
+        return page(self)
 
     def _repr_latex_(self) -> str:
         where = f" where {' and '.join(self.hypotheses)}" if self.hypotheses else ""
         verdict = f"proved{where}: " if self else "no proof found; normal forms of both sides: " if not self.note else "no proof found: "
-        return f"$$\\begin{{gathered}}{self._latex}\\\\ \\text{{{_escaped(verdict)}}}\\\\ {self.latex()}\\end{{gathered}}$$"
-
-
-def _lines(steps: Sequence[Step]) -> list[str]:
-    """The chain, one step a line, reasons in a column."""
-    if not steps:
-        return []
-    rows = [("", steps[0].before_text(), "")]
-    rows += [(f"{s.number}.", f"= {s.after_text()}", f"[{s.reason}]") for s in steps]
-    width = min(76, max(len(middle) for _, middle, _ in rows))
-    lines = []
-    for number, middle, reason in rows:
-        line = f"  {number:>3} {middle}"
-        if reason:
-            line = f"{line:<{width + 6}}   {reason}" if len(middle) <= width else f"{line}\n{'':>{width + 6}}   {reason}"
-        lines.append(line)
-    return lines
-
-
-def _reason_latex(step: Step) -> str:
-    if step.title or not step.uses:
-        return f"\\text{{{_escaped(step.reason)}}}"
-    latex = step.alphabet.latex
-    return ";\\;".join(f"{latex(e.lhs)} = {latex(e.rhs)}" for e in step.equations)
-
-
-def _escaped(text: str) -> str:
-    """Plain text for LaTeX's \\text: letters of the algebra as mathematics."""
-    for a, b in _MATHEMATICS:
-        text = text.replace(a, b)
-    return text
-
-
-_MATHEMATICS = [
-    *(("\\", ""), ("_", "\\_"), ("⁻¹", "$^{-1}$"), ("*", "$^*$"), ("φ", "$\\phi$"), ("ψ", "$\\psi$"), ("Ω", "$\\Omega$")),
-    *(("ℳ", "$\\mathcal{M}$"), ("𝒥", "$\\mathcal{J}$"), ("Λ", "$\\Lambda$"), ("Υ", "$\\Upsilon$"), ("∂", "$\\partial$")),
-]
+        return f"$$\\begin{{gathered}}{self._latex}\\\\ \\text{{{escaped(verdict)}}}\\\\ {self.latex()}\\end{{gathered}}$$"
 
 
 def _unmet(hypotheses: Sequence[str], operators: Any) -> list[str]:

@@ -7,6 +7,7 @@ side: first without a hypothesis, then under those that may matter, fewest first
 
 from __future__ import annotations
 
+import functools
 import itertools
 import re
 from collections.abc import Iterator
@@ -15,16 +16,17 @@ from typing import Any
 from .. import _core
 from ..identities.checker import with_spaces
 from ..identities.parse import ParseError, Statement, Statements
+from . import mechanics, scalars
 from .attempt import Attempt, Outcome
 from .completion import complete
 from .derivation import DerivativeProblem
 from .derivative import derivative
-from .equations import Equation, joined
+from .equations import Equation, Step, joined, numbered, opened
 from .presuppositions import Void, inverses_used, presupposed
 from .proof import Proof, example
 from .rules import Setting
 from .walk import GaveUp
-from .words import ONE, Polynomial, Word, inverted, plain, split
+from .words import ONE, Alphabet, Polynomial, Word, combine, inverted, plain, split
 
 
 def prove(lhs: Any, rhs: Any = None, model: Any = None) -> Proof:
@@ -50,8 +52,7 @@ def prove(lhs: Any, rhs: Any = None, model: Any = None) -> Proof:
 
     Notes
     -----
-    Cost: milliseconds to a few tenths of a second, whatever the size of the model; no number decides anything. Traces, determinants and
-    norms are outside.
+    Cost: milliseconds to a few tenths of a second, whatever the size of the model; no number decides anything.
 
     Examples
     --------
@@ -152,17 +153,19 @@ def _one_identity(side: Any) -> Any:
 def _prove(read: Statement, model: Any) -> Proof:
     problem = DerivativeProblem()
     read = Statement(_one_identity(read.lhs), _one_identity(read.rhs), read.text, read.reading)
-    for side in (read.lhs, read.rhs):
-        if not hasattr(side, "kind"):
-            lhs, rhs = (s if hasattr(s, "latex") else _core.scalar(float(s)) for s in (read.lhs, read.rhs))
-            shown = Statement(lhs, rhs, read.text, read.reading)
-            return Proof.of_statement(shown, problem, [], [], ({}, {}), "traces, determinants and norms are no sums of words")
+    sides = [_core.scalar(float(side)) if isinstance(side, int | float) else side for side in (read.lhs, read.rhs)]
+    read = Statement(sides[0], sides[1], read.text, read.reading)
+    problem.scalars = not any(hasattr(side, "kind") for side in sides)
+    problem.of_one_model = read.reading == "expressions"
+    expand = problem.expand if not problem.scalars else functools.partial(scalars.expand, problem)
     try:
-        left, right = problem.expand(read.lhs), problem.expand(read.rhs)
+        left, right = expand(read.lhs), expand(read.rhs)
     except GaveUp:
         return Proof.of_statement(read, problem, [], [], ({}, {}), "it is too large: too many words, inverses or nodes")
     p, q = problem.sides = [left.before, right.before]
-    problem.numbers = all(space is not None and space.name == "R^1" for space in (read.lhs.domain, read.lhs.codomain))
+    problem.numbers = not problem.scalars and all(
+        space is not None and space.name == "R^1" for space in (read.lhs.domain, read.lhs.codomain)
+    )
     nearest: tuple[Polynomial, Polynomial] | None = None
     own, void = _operators(model) if model is not None else _operators_of(problem), ""
     for attempt, outcome in _attempts(problem, p, q):
@@ -173,6 +176,7 @@ def _prove(read: Statement, model: Any) -> Proof:
             nearest = nearest or (outcome.lhs, outcome.rhs)
             continue
         steps = joined(outcome.left, outcome.right, p, q, problem.alphabet) or []
+        steps = _without_the_claim(steps, combine((1, p), (-1, q)), problem.alphabet)
         typed = ([left] if left.says_something else []), ([right.reversed()] if right.says_something else [])
         proof = Proof.of_statement(read, problem, [left, right], [*typed[0], *steps, *typed[1]], (outcome.lhs, outcome.rhs))
         proof.takes_for_granted(_presupposed(attempt, proof))
@@ -182,6 +186,17 @@ def _prove(read: Statement, model: Any) -> Proof:
         proof.verify_where_possible(own)
         return proof
     return Proof.of_statement(read, problem, [left, right], [], nearest or (p, q), void)
+
+
+def _without_the_claim(steps: list[Step], claim: Polynomial, alphabet: Alphabet) -> list[Step]:
+    """The chain with every lemma that is the claim itself opened: a proof argues for it, and does not cite it."""
+    said = [claim, alphabet.star_of(claim)]
+    said += [combine((-1, p)) for p in said]
+    made: list[Step] = []
+    for step in steps:
+        itself = next((e for e in step.equations if e.kind == "lemma" and e.difference in said), None)
+        made += [step] if itself is None else opened(step, itself)
+    return numbered(made)
 
 
 def _presupposed(attempt: Attempt, proof: Proof) -> list[str]:
@@ -216,10 +231,10 @@ def _settings(problem: DerivativeProblem) -> Iterator[tuple[Setting, list[tuple[
     names = {plain(x).removeprefix("∂") for x in letters}
     deltas = [n for n, known in problem.alphabet.letters.items() if getattr(known.expression, "name", "") in ("Delta", "Delta_theta_dot")]
     possible = ["J = 0"] * ("J⁻¹" not in letters) + ["serial chain"] * ("Υ" in names)
-    if "Ḣ" in names:
+    if names & {"Ḣ", "a"}:
         constant.append((Equation("hypothesis", "Ḣ = 0", {("Ḣ",): ONE}, {}, hypothesis="constant H"), ("Ḣ",)))
     possible += ["single-DOF hinges"] * bool(deltas) + ["constant H"] * bool(constant)
-    composite, velocities = "R" in names, bool(names & {"Ṽ", "V̄", "Ḣ"})
+    composite, velocities = "R" in names or bool(problem.relations), bool(names & mechanics.NAMES)
     for size in range(len(possible) + 1):
         for chosen in itertools.combinations(possible, size):
             extra = list(rules) + constant * ("constant H" in chosen)
