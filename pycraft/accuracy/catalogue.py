@@ -166,12 +166,13 @@ def catalogue(sizes: Iterable[int] = SIZES) -> list[Case]:
         cases_groups,
         cases_massless,
         cases_ratios,
+        cases_refinement,
         cases_trajectories,
         cases_units,
     )
 
     sizes = sorted(sizes)
     cases: list[Case] = cases_chains.cases(sizes)
-    for module in (cases_ratios, cases_massless, cases_configurations, cases_units, cases_elimination, cases_groups, cases_trajectories):
+    for module in (cases_ratios, cases_refinement, cases_massless, cases_configurations, cases_units, cases_elimination, cases_groups, cases_trajectories):
         cases += [case for case in module.cases() if case.parameters.get("N", 0) <= max(sizes[-1], 10)]
     return cases
