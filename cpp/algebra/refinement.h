@@ -6,8 +6,8 @@
 // rounding may have made is known, along δ itself (algebra/sweeps/residual_rounding.h), and decides:
 //
 //   - a δ of which half or more may be rounding is not applied, as x may be better than the residual can tell;
-//   - a first δ above 0.3 of the solution that is no rounding is refused, for nothing is known then; so is one that is small beside
-//     terms that cancelled in the solution, unless the next correction is;
+//   - a first δ above 0.3 of the solution is refused, for nothing is known then; unless it is small beside terms that cancelled in the
+//     solution, and rounding, or followed by a correction that is small;
 //   - corrections that do not halve end it, and are refused where they are above 0.3 of the solution.
 //
 // The correction left over, or the floor where that is larger, is the estimate of the error. A residual in a wider scalar lowers the floor.
@@ -93,10 +93,10 @@ void refine(S* x, int n, int m, const Refinement& how, Form form, const S& large
       if (!work.open[c]) continue;
       const S length = work.length[c], correction = largest_of(delta, c), solution = largest_of(x, c);
       const bool large = correction > limit * solution;
-      work.open[c] = length > S(2) * work.rounding[c];
-      if (!work.open[c]) continue;
       if (step == 0 && correction > limit * maximum(solution, S(S(1e3) * epsilon<S>() * largest)))
         throw_no_contraction(what(), form, to_double(S(correction / solution)));
+      work.open[c] = length > S(2) * work.rounding[c];
+      if (!work.open[c]) continue;
       if (step > 0 && !(length < work.last[c] / S(2))) {
         if (large) throw_no_contraction(what(), form, to_double(S(correction / solution)));
         work.open[c] = 0;

@@ -90,7 +90,7 @@ class DirectCalls:
         SingularOperatorError
             Of the other methods: the mass matrix is not positive definite to rounding.
         RefinementError
-            The first correction is more than 0.3 of the solution and no rounding of the residual, or the corrections do not shrink.
+            The first correction is more than 0.3 of the solution, or the corrections do not shrink.
 
         Source: articulated-body forward dynamics by the operator factorization of the mass matrix [Jain 2011].
 
