@@ -53,7 +53,7 @@ def test_errors_are_true(measured):
 def test_the_table_has_every_combination(measured):
     _, _, table = measured
     forms = pc._core.forms()
-    narrow, wide, others = 2 * 3 * len(forms), (2 + 1) * len(forms), 2 * len(OTHER_METHODS)
+    narrow, wide, others = 2 * 4 * len(forms), (2 + 1) * len(forms), 2 * len(OTHER_METHODS)
     assert len(table) == narrow + wide + others
     assert [r["way"] for r in ladder(table)] == [step.way for step in LADDER]
     times = [r["seconds"] for r in table if not r["refused"]]

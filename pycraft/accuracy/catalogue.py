@@ -173,6 +173,16 @@ def catalogue(sizes: Iterable[int] = SIZES) -> list[Case]:
 
     sizes = sorted(sizes)
     cases: list[Case] = cases_chains.cases(sizes)
-    for module in (cases_ratios, cases_refinement, cases_massless, cases_configurations, cases_units, cases_elimination, cases_groups, cases_trajectories):
+    modules = (
+        cases_ratios,
+        cases_refinement,
+        cases_massless,
+        cases_configurations,
+        cases_units,
+        cases_elimination,
+        cases_groups,
+        cases_trajectories,
+    )
+    for module in modules:
         cases += [case for case in module.cases() if case.parameters.get("N", 0) <= max(sizes[-1], 10)]
     return cases

@@ -160,8 +160,9 @@ def trial(seed, forms=FORMS, ways=WAYS):
                 yield dict(seed=seed, family=family, n=multibody.nv, form=form, **way, unrefined=unrefined, size=size, refused=True)
                 continue
             value = found["value"]
-            yield dict(seed=seed, family=family, n=multibody.nv, form=form, **way, unrefined=unrefined, size=size, refused=False,
-                       refined=length(value - exact), reported=found["error"] * length(value), corrections=found["corrections"])  # fmt: skip
+            yield dict(seed=seed, family=family, n=multibody.nv, form=form, **way, unrefined=unrefined, size=size,
+                       refused=False, refined=length(value - exact), reported=found["error"] * length(value),
+                       corrections=found["corrections"])  # fmt: skip
 
 
 def solves(seed, forms=FORMS, ways=WAYS, largest=20):
@@ -184,8 +185,8 @@ def solves(seed, forms=FORMS, ways=WAYS, largest=20):
                     refined = length(op.at(q, form=form, **way) @ x - exact)
                 except pc.RefinementError:
                     continue
-                yield dict(seed=seed, family=f"{name} {family}", n=multibody.nv, form=form, **way, unrefined=unrefined, refined=refined, refused=False,
-                           reported=np.inf, size=length(exact))  # fmt: skip
+                yield dict(seed=seed, family=f"{name} {family}", n=multibody.nv, form=form, **way, unrefined=unrefined,
+                           refined=refined, refused=False, reported=np.inf, size=length(exact))  # fmt: skip
 
 
 def faults(row):
