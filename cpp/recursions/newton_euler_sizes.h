@@ -1,14 +1,14 @@
 // The sizes of what inverse dynamics adds up, body by body and entry by entry: what the rounding of a residual τ - (ℳθ̈ + 𝒞) is made of,
-// see algebra/sweeps/residual_rounding.h. Every product is that of newton_euler and velocities with absolute values, |·|. With u a unit of
-// rounding, velocities are off by u dV, base to tip
+// see algebra/sweeps/residual_rounding.h. Every product is that of newton_euler and point_accelerations with absolute values, |·|. With u a
+// unit of rounding, angular velocities are off by u dω, base to tip
 //
-//   dV(k) = |E*| (dV(p) + |V(p)|) + |V(k)| + |H*||θ̇|
+//   dω(k) = |R*| (dω(p) + |ω(p)|) + |ω(k)| + |h_ω||θ̇|
 //
-// and so, besides their own rounding, a = ṼH*θ̇ and b = V̄MV by
+// and a' and b' are with W = |ω| + dω, (w; u) the hinge's relative twist and l from the parent's origin
 //
-//   da = (|V| + dV)~ |H*θ̇|,    db = (|V| + dV)¯ |MV| + |V|¯ |M| (|V| + dV)
+//   da' = (W × |w|;  W(p) × (W(p) × |l|) + 2 W × |u|),    db' = (W × |I| W;  W × (W × |h|))
 //
-// Poses and velocities are those that the solution was computed with, and no residual sees their rounding. In one scalar the forces' own
+// Poses and angular velocities are those that the solution was computed with, and no residual sees their rounding. In one scalar the forces' own
 // is as large; where forces are gathered in a wider one it counts if `shared`: for the error of a value, and not for the question whether
 // a correction makes it a better solution of the same equations.
 //
@@ -21,7 +21,7 @@
 
 #include "algebra/sweeps/residual_rounding.h"
 #include "operators/rigid_blocks.h"
-#include "recursions/velocities.h"
+#include "recursions/point_accelerations.h"
 
 namespace pycraft {
 
@@ -70,20 +70,12 @@ template <class S>
 inline Vector6<S> pushed(const RigidInertia<S>& M, const Vector6<S>& V) {
   return {M.rotational * V.angular + crossed(M.moment, V.linear), M.mass * V.linear + crossed(M.moment, V.angular)};
 }
-template <class S>
-inline Vector6<S> motion_crossed(const Vector6<S>& V, const Vector6<S>& x) {
-  return {crossed(V.angular, x.angular), crossed(V.angular, x.linear) + crossed(V.linear, x.angular)};
-}
-template <class S>
-inline Vector6<S> force_crossed(const Vector6<S>& V, const Vector6<S>& f) {
-  return {crossed(V.angular, f.angular) + crossed(V.linear, f.linear), crossed(V.angular, f.linear)};
-}
 
 }  // namespace sizes
 
 // alpha, f: of newton_euler at vdot. Numbers of a wider scalar T may be sized in a narrower S.
 template <class S, class T>
-void newton_euler_sizes(const SkoStructure& tree, const CompiledModel<T>& model, const RigidBlocks<T>& blocks, const Velocities<T>& velocities, const T* vdot,
+void newton_euler_sizes(const SkoStructure& tree, const CompiledModel<T>& model, const RigidBlocks<T>& blocks, const PointAccelerations<T>& points, const T* v, const T* vdot,
                         const S* tau, const std::vector<Vector6<T>>& alpha, const std::vector<Vector6<T>>& f, const RoundingUnits<S>& units, bool shared,
                         ResidualSizes<S>& out) {
   using std::abs;
@@ -94,21 +86,31 @@ void newton_euler_sizes(const SkoStructure& tree, const CompiledModel<T>& model,
   };
   const S carried = shared ? units.motion : units.force;
   const Vector6<S> base{Vector3<S>::zero(), size(model.gravity)};
-  S* off = out.g.data();  // dV
+  S* off = out.g.data();  // dω
   for (int k = 0; k < model.bodies; ++k) {
     const int p = model.parent[k], first = model.v_offset[k];
     const Pose<S> X = size(blocks.pose[k]);
     const RigidInertia<S> M = size(blocks.inertia[k]);
-    const Vector6<S> V = size(velocities.V[k]), relative = size(velocities.relative[k]);
-    Vector6<S> dV = V + relative, motion = size(alpha[k]) + size(velocities.a[k]);
-    if (p >= 0) dV = dV + sizes::motion_carried(X, size(velocities.V[p]) + load(off + 6 * p, 1, 0));
-    store(dV, off + 6 * k, 1, 0);
-    motion = motion + sizes::motion_carried(X, p < 0 ? base : size(alpha[p])) + sizes::motion_crossed(V + dV, relative);
-    for (int j = first; j < first + model.nv_of[k]; ++j) motion = motion + S(abs(static_cast<S>(vdot[j]))) * size(blocks.H[j]);
+    Vector6<S> motion = size(alpha[k]) + size(points.a[k]) + sizes::motion_carried(X, p < 0 ? base : size(alpha[p])), relative = Vector6<S>::zero();
+    for (int j = first; j < first + model.nv_of[k]; ++j) {
+      const Vector6<S> h = size(blocks.H[j]);
+      motion = motion + S(abs(static_cast<S>(vdot[j]))) * h;
+      relative = relative + S(abs(static_cast<S>(v[j]))) * h;
+    }
+    const Vector3<S> own = size(points.angular_velocity[k]);
+    Vector3<S> spin = own + own + relative.angular;  // W
+    if (p >= 0) {
+      const Vector3<S> parents = size(points.angular_velocity[p]) + Vector3<S>{off[3 * p], off[3 * p + 1], off[3 * p + 2]};
+      spin = spin + transpose_times(X.R, parents);
+      motion.linear = motion.linear + transpose_times(X.R, sizes::crossed(parents, sizes::crossed(parents, X.p)));
+    }
+    for (int i = 0; i < 3; ++i) off[3 * k + i] = spin[i] - own[i];
+    motion.angular = motion.angular + sizes::crossed(spin, relative.angular);
+    motion.linear = motion.linear + S(2) * sizes::crossed(spin, relative.linear);
     store(units.motion * motion, out.motion.data() + tree.offset[k], 1, 0);
-    const Vector6<S> own = S(2) * sizes::pushed(M, size(alpha[k])) + size(velocities.b[k]) + size(f[k]);
-    const Vector6<S> gyroscopic = sizes::force_crossed(V + dV, size(blocks.inertia[k] * velocities.V[k])) + sizes::force_crossed(V, sizes::pushed(M, V + dV));
-    store(units.force * own + carried * gyroscopic, out.force.data() + tree.offset[k], 1, 0);
+    const Vector6<S> force = S(2) * sizes::pushed(M, size(alpha[k])) + size(points.b[k]) + size(f[k]);
+    const Vector6<S> gyroscopic{sizes::crossed(spin, M.rotational * spin), sizes::crossed(spin, sizes::crossed(spin, M.moment))};
+    store(units.force * force + carried * gyroscopic, out.force.data() + tree.offset[k], 1, 0);
   }
   for (int k = model.bodies - 1; k >= 0; --k) {
     const Vector6<S> total = size(f[k]);
