@@ -149,29 +149,6 @@ class DenseBlocks {
       default: std::copy_n(square(id).data() + at_[k].m, s * s, out);
     }
   }
-  // ---------------------------------------------------------------- forces in a wider scalar T
-  template <class T>
-  void inertia_wide(int k, const S* a, T* f, int m) const {
-    std::fill_n(f, tree_.size[k] * m, T(0));
-    multiply_add_wide(M.data() + at_[k].m, a, f, tree_.size[k], tree_.size[k], m);
-  }
-  template <class T>
-  void shift_add_wide(int k, const T* x, T* y, int m) const {
-    multiply_add_wide(edge(k), x, y, tree_.size[tree_.parent[k]], tree_.size[k], m);
-  }
-  // r = b - H f - J x
-  template <class T>
-  void residual_wide(int k, const T* f, const S* x, const S* b, S* r, int m) const {
-    const int n = tree_.dof[k], s = tree_.size[k];
-    for (int i = 0; i < n; ++i)
-      for (int c = 0; c < m; ++c) {
-        T sum = T(b[i * m + c]);
-        for (int a = 0; a < s; ++a) sum -= T(hinge_map(k)[i * s + a]) * f[a * m + c];
-        for (int j = 0; j < n; ++j) sum -= T(J[at_[k].d + i * n + j]) * T(x[j * m + c]);
-        r[i * m + c] = static_cast<S>(sum);
-      }
-  }
-
   // ---------------------------------------------------------------- sizes of what residuals add up (sweeps/residual_rounding.h)
   void motion_sizes(int k, const S* parent, const S* x, const S* a, S* out, int m) const {
     using std::abs;
@@ -315,13 +292,6 @@ class DenseBlocks {
     size_t e, h, m, d;
   };
   const S* gain(int k) const { return G.data() + at_[k].h; }  // G*, n x s
-  // y (r x m) += A x, A (r x n)
-  template <class U, class T>
-  static void multiply_add_wide(const S* A, const U* x, T* y, int r, int n, int m) {
-    for (int i = 0; i < r; ++i)
-      for (int k = 0; k < n; ++k)
-        for (int c = 0; c < m; ++c) y[i * m + c] += T(A[i * n + k]) * T(x[k * m + c]);
-  }
   // out (r x m) += |A| |x|, A (r x n); transposed: |A*| |x|, A (n x r)
   template <bool transposed>
   static void add_sizes(const S* A, const S* x, S* out, int r, int n, int m) {

@@ -385,11 +385,12 @@ class Workspace {
     const Refinement& how = binding->arithmetic.refinement;
     const int n = plan_->registers[s.out].space.dimension();
     const size_t size = size_t(n) * w;
-    if (how.wider()) follow(values);
+    // Forces alone are gathered wider by direct calls, which know the inertias in wider numbers; here all of the residual is.
+    const bool wider = how.residual != ResidualPrecision::same;
+    const S unit = wider ? static_cast<S>(epsilon<Wider<S>>()) : epsilon<S>();
+    if (wider) follow(values);
     const auto residual = [&](const S* solution, S* r) {
-      if (how.gathers_wider()) {
-        own.mass_matrix_residual(solution, x, r, w, scratch_.data(), wide_scratch_);
-      } else if (how.wider()) {
+      if (wider) {
         convert(solution, size, wide_x_);
         wide_y_.resize(size), wide_scratch_.resize(std::max(wide_scratch_.size(), scratch_.size()));
         wide_at_[s.context]->mass_matrix(true, wide_x_.data(), wide_y_.data(), w, wide_scratch_.data());
@@ -402,7 +403,7 @@ class Workspace {
     refine(y, n, w, how, binding->arithmetic.form, S(0), [&] { return plan_->text; }, residual,
            [&](const S* r, S* d) { own.mass_matrix_inverse(r, d, w, scratch_.data()); },
            [&](const S* direction, S* rounding) {
-             own.mass_matrix_rounding(y, x, direction, units_of<S>(how), rounding, w, sizes_);
+             own.mass_matrix_rounding(y, x, direction, {unit, unit}, rounding, w, sizes_);
            },
            refinement_);
   }
