@@ -21,7 +21,21 @@ bool ends_with(const std::vector<Expression>& factors, size_t end, const std::ve
 // [I-HψK]Hφ -> Hψ and φ*H*[I-HψK]* -> ψ*H* (the theorem "[I-HψK]Hφ = Hψ") beside the factors of ℳ⁻¹, which a product such as ℳ⁻¹𝒥* or
 // 𝒥ℳ⁻¹ has: φ gathers what [I-HψK] takes back, and the difference loses digits that ψ never meets. A solve that is to be refined stays one.
 std::vector<Expression> gathered_by_psi(const std::vector<Expression>& factors) {
-  std::vector<Expression> out = factors;
+  std::vector<Expression> out;
+  for (const Expression& f : factors) {
+    bool transposed = false;
+    const Symbol* symbol = letter_of(f, transposed);
+    if (!symbol || symbol->definition->pattern != Pattern::compound) {
+      out.push_back(f);
+      continue;
+    }
+    const Expression typed = symbol->definition->expand(*symbol), spelled = lower(transposed ? typed.T() : typed, true);  // 𝒥 = B*φ*H*
+    if (spelled.kind() == NodeKind::product)
+      out.insert(out.end(), spelled.children().begin(), spelled.children().end());
+    else
+      out.push_back(f);
+  }
+  bool changed = false;
   const auto letter = [](const Expression& e, SymbolId id, bool starred) {
     bool transposed = false;
     const Symbol* symbol = letter_of(e, transposed);
@@ -39,10 +53,11 @@ std::vector<Expression> gathered_by_psi(const std::vector<Expression>& factors) 
     Expression psi = make_symbol(SymbolId::psi, h->source);
     if (h->binding) psi = psi.at(h->binding);
     out.erase(out.begin() + i + 2);
+    changed = true;
     out[i] = starred ? lower(psi.T(), false) : hinge;
     out[i + 1] = starred ? hinge : psi;
   }
-  return out;
+  return changed ? out : factors;
 }
 
 }  // namespace
