@@ -1,8 +1,8 @@
 // The sizes of what inverse dynamics adds up, body by body and entry by entry: what the rounding of a residual τ - (ℳθ̈ + 𝒞) is made of,
 // see algebra/sweeps/residual_rounding.h. Every product is that of newton_euler and point_accelerations with absolute values, |·|. With u a
-// unit of rounding, angular velocities are off by u dω, base to tip
+// unit of rounding, angular velocities are off by u dω in any direction, base to tip
 //
-//   dω(k) = |R*| (dω(p) + |ω(p)|) + |ω(k)| + |h_ω||θ̇|
+//   dω(k) = dω(p) + ‖ω(k)‖ + ‖ω(p)‖ + Σ ‖h_ω‖|θ̇|
 //
 // and a' and b' are with W = |ω| + dω, (w; u) the hinge's relative twist and l from the parent's origin
 //
@@ -98,13 +98,13 @@ void newton_euler_sizes(const SkoStructure& tree, const CompiledModel<T>& model,
       relative = relative + S(abs(static_cast<S>(v[j]))) * h;
     }
     const Vector3<S> own = size(points.angular_velocity[k]);
-    Vector3<S> spin = own + own + relative.angular;  // W
+    off[k] = norm(own) + norm(relative.angular);
     if (p >= 0) {
-      const Vector3<S> parents = size(points.angular_velocity[p]) + Vector3<S>{off[3 * p], off[3 * p + 1], off[3 * p + 2]};
-      spin = spin + transpose_times(X.R, parents);
+      const Vector3<S> above = size(points.angular_velocity[p]), parents = above + Vector3<S>{off[p], off[p], off[p]};
+      off[k] += off[p] + norm(above);
       motion.linear = motion.linear + transpose_times(X.R, sizes::crossed(parents, sizes::crossed(parents, X.p)));
     }
-    for (int i = 0; i < 3; ++i) off[3 * k + i] = spin[i] - own[i];
+    const Vector3<S> spin = own + Vector3<S>{off[k], off[k], off[k]};  // W
     motion.angular = motion.angular + sizes::crossed(spin, relative.angular);
     motion.linear = motion.linear + S(2) * sizes::crossed(spin, relative.linear);
     store(units.motion * motion, out.motion.data() + tree.offset[k], 1, 0);
