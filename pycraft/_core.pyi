@@ -290,7 +290,7 @@ class Operator:
         """
         The same expression bound to a state: q (nq,) or a batch (B, nq), v likewise (zero if left out); q=None takes the model's present
         state. The innermost binding wins. form: "fast", "ud" or "square-root", of the articulated-inertia sweep; refine: corrections of
-        what is solved, a number or "auto", with residual="same" or "wider"; precision: "single", "double", "extended", "quad", 50, 100.
+        what is solved, a number or "auto", with residual="same", "gather" or "wider"; precision: "single", "double", "extended", "quad", 50, 100.
         """
     def blocks(self, order: str = 'base-to-tip') -> typing.Any:
         """
@@ -775,7 +775,7 @@ def _bind(operands: collections.abc.Sequence[Operator], q: typing.Any, v: typing
     ...
 def _binding(arg0: Operator) -> Binding:
     ...
-def _binding_from_parts(arg0: typing.SupportsInt | typing.SupportsIndex, arg1: typing.SupportsInt | typing.SupportsIndex, arg2: typing.SupportsInt | typing.SupportsIndex, arg3: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], arg4: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], arg5: str | int, arg6: str, arg7: typing.SupportsInt | typing.SupportsIndex, arg8: bool) -> Binding:
+def _binding_from_parts(arg0: typing.SupportsInt | typing.SupportsIndex, arg1: typing.SupportsInt | typing.SupportsIndex, arg2: typing.SupportsInt | typing.SupportsIndex, arg3: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], arg4: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], arg5: str | int, arg6: str, arg7: typing.SupportsInt | typing.SupportsIndex, arg8: typing.SupportsInt | typing.SupportsIndex) -> Binding:
     ...
 def _function(arg0: SkoSource, arg1: str, arg2: Binding, arg3: Operator) -> Operator:
     ...

@@ -18,6 +18,48 @@ bool ends_with(const std::vector<Expression>& factors, size_t end, const std::ve
   return true;
 }
 
+// [I-HψK]Hφ -> Hψ and φ*H*[I-HψK]* -> ψ*H* (the theorem "[I-HψK]Hφ = Hψ") beside the factors of ℳ⁻¹, which a product such as ℳ⁻¹𝒥* or
+// 𝒥ℳ⁻¹ has: φ gathers what [I-HψK] takes back, and the difference loses digits that ψ never meets. A solve that is to be refined stays one.
+std::vector<Expression> gathered_by_psi(const std::vector<Expression>& factors) {
+  std::vector<Expression> out;
+  for (const Expression& f : factors) {
+    bool transposed = false;
+    const Symbol* symbol = letter_of(f, transposed);
+    if (!symbol || symbol->definition->pattern != Pattern::compound) {
+      out.push_back(f);
+      continue;
+    }
+    const Expression typed = symbol->definition->expand(*symbol), spelled = lower(transposed ? typed.T() : typed, true);  // 𝒥 = B*φ*H*
+    if (spelled.kind() == NodeKind::product)
+      out.insert(out.end(), spelled.children().begin(), spelled.children().end());
+    else
+      out.push_back(f);
+  }
+  bool changed = false;
+  const auto letter = [](const Expression& e, SymbolId id, bool starred) {
+    bool transposed = false;
+    const Symbol* symbol = letter_of(e, transposed);
+    return symbol && transposed == starred && symbol->definition->id == id ? symbol : nullptr;
+  };
+  for (size_t i = 0; i + 2 < out.size(); ++i) {
+    const bool starred = letter(out[i], SymbolId::phi, true);
+    const Symbol* h = letter(out[i + 1], SymbolId::H, starred);
+    if (!h || !(starred || letter(out[i + 2], SymbolId::phi, false)) || out[starred ? i + 2 : i].kind() != NodeKind::sum) continue;
+    if (h->binding && h->binding->arithmetic.refinement.steps != 0) continue;
+    const std::vector<Expression> inverse = kernels_of(*h).mass_matrix_inverse;
+    const Expression& resolvent = starred ? out[i].children()[0] : out[i + 2];
+    if (!same_model(resolvent.node().symbol, *h) || inverse.size() != 3 || out[starred ? i + 2 : i] != inverse[starred ? 0 : 2]) continue;
+    const Expression hinge = out[i + 1];
+    Expression psi = make_symbol(SymbolId::psi, h->source);
+    if (h->binding) psi = psi.at(h->binding);
+    out.erase(out.begin() + i + 2);
+    changed = true;
+    out[i] = starred ? lower(psi.T(), false) : hinge;
+    out[i + 1] = starred ? hinge : psi;
+  }
+  return changed ? out : factors;
+}
+
 }  // namespace
 
 int Planner::apply(const Expression& e, int x) {
@@ -120,7 +162,8 @@ int Planner::apply(const Expression& e, int x) {
   return y;
 }
 
-int Planner::apply_product(const std::vector<Expression>& factors, int x, const Expression&) {
+int Planner::apply_product(const std::vector<Expression>& typed, int x, const Expression&) {
+  const std::vector<Expression> factors = options_.rules ? gathered_by_psi(typed) : typed;
   size_t end = factors.size();
   while (end > 0) {
     // A run of factors with a kernel of its own?

@@ -311,7 +311,7 @@ class Workspace {
     for (const Context& c : plan_->contexts) {
       if (!c.binding) continue;
       const Refinement& own = c.binding->arithmetic.refinement;
-      r.wider |= own.wider;
+      r.residual = std::max(r.residual, own.residual);
       r.steps = own.steps == Refinement::automatic || r.steps == Refinement::automatic ? Refinement::automatic : std::max(r.steps, own.steps);
     }
     return r;
@@ -367,7 +367,7 @@ class Workspace {
     const S* x = vectors_[s.in[1]].data();
     S* y = vectors_[s.out].data();
     const auto blocks = [&](int r) -> const BlockStorage<S>& { return blocks_[r]; };
-    if (how.steps == 0 || !how.wider || eliminations_[s.in[0]].wide)
+    if (how.steps == 0 || how.residual == ResidualPrecision::same || eliminations_[s.in[0]].wide)
       return with_factors(s.in[0], [&](auto& factors) { factors.solve(x, y, w, blocks, how); });
     follow(values);
     auto& wide = *wide_->eliminations_[s.in[0]].own;
@@ -385,9 +385,12 @@ class Workspace {
     const Refinement& how = binding->arithmetic.refinement;
     const int n = plan_->registers[s.out].space.dimension();
     const size_t size = size_t(n) * w;
-    if (how.wider) follow(values);
+    // Forces alone are gathered wider by direct calls, which know the inertias in wider numbers; here all of the residual is.
+    const bool wider = how.residual != ResidualPrecision::same;
+    const S unit = wider ? static_cast<S>(epsilon<Wider<S>>()) : epsilon<S>();
+    if (wider) follow(values);
     const auto residual = [&](const S* solution, S* r) {
-      if (how.wider) {
+      if (wider) {
         convert(solution, size, wide_x_);
         wide_y_.resize(size), wide_scratch_.resize(std::max(wide_scratch_.size(), scratch_.size()));
         wide_at_[s.context]->mass_matrix(true, wide_x_.data(), wide_y_.data(), w, wide_scratch_.data());
@@ -398,7 +401,11 @@ class Workspace {
       }
     };
     refine(y, n, w, how, binding->arithmetic.form, S(0), [&] { return plan_->text; }, residual,
-           [&](const S* r, S* d) { own.mass_matrix_inverse(r, d, w, scratch_.data()); }, refine_r_, refine_delta_, corrections);
+           [&](const S* r, S* d) { own.mass_matrix_inverse(r, d, w, scratch_.data()); },
+           [&](const S* direction, S* rounding) {
+             own.mass_matrix_rounding(y, x, direction, {unit, unit}, rounding, w, sizes_);
+           },
+           refinement_);
   }
 
   void apply_external_operator(const Step& s, int w) {
@@ -582,7 +589,9 @@ class Workspace {
   std::vector<SmallLU<S>> dense_lu_;
   std::vector<std::pair<const Step*, std::unique_ptr<Workspace>>> operands_;
   SmallLU<S> lu_;
-  std::vector<S> gathered_, scratch_, block_, product_, magnitude_, refine_r_, refine_delta_;
+  std::vector<S> gathered_, scratch_, block_, product_, magnitude_;
+  RefinementWork<S> refinement_;
+  ResidualSizes<S> sizes_;
   std::vector<std::string> notes_;
   // one scalar up, for residuals
   template <class T>
@@ -599,7 +608,6 @@ class Workspace {
   std::vector<SkoValues<S>*> values;                      // of all, during a run
   bool ran = false;
   int state = 0;                                          // of the batch
-  std::vector<double> corrections;                        // of the last refined solve, relative to the solution
   std::vector<std::uint64_t> generations;                 // of the values that blocks and factors were made from
 };
 
