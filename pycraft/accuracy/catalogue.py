@@ -165,6 +165,7 @@ def catalogue(sizes: Iterable[int] = SIZES) -> list[Case]:
         cases_elimination,
         cases_groups,
         cases_massless,
+        cases_motion,
         cases_ratios,
         cases_refinement,
         cases_trajectories,
@@ -181,6 +182,7 @@ def catalogue(sizes: Iterable[int] = SIZES) -> list[Case]:
         cases_units,
         cases_elimination,
         cases_groups,
+        cases_motion,
         cases_trajectories,
     )
     for module in modules:

@@ -269,8 +269,8 @@ class DirectCalls:
     def potential_energy(self, q=None, *, datum=(0.0, 0.0, 0.0)) -> np.ndarray:
         """Energy -m g·(c - datum) in the uniform gravity field, c the centre of mass. Joules, a number or (B,).
 
-        Summed outboard to inboard and rounded once, so its error is that of a double of its size. Far from the datum, (3,) in the world's
-        axes, m, differences of energies are smaller than that: take a datum near the system. O(N).
+        A number or (B,). Summed outboard to inboard and rounded once, so its error is that of a double of its size. Far from the datum,
+        (3,) in the world's axes, m, differences of energies are smaller than that: take a datum near the system. O(N).
 
         Examples
         --------
