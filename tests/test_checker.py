@@ -65,9 +65,7 @@ def test_every_theorem_holds_where_its_hypotheses_are_met(name):
     traits = report.traits
     for finding in report.findings:
         for hypothesis in finding.hypotheses:
-            assert (hypothesis in finding.unmet) == (
-                not traits.get(hypothesis, name.startswith("branched"))
-            ) or hypothesis == "free root"
+            assert (hypothesis in finding.unmet) == (not traits.get(hypothesis, name.startswith("branched"))) or hypothesis == "free root"
         if not finding.unmet:
             assert finding.verdict in ("holds", "waiting"), (finding.name, finding.verdict, finding.residual, finding.bound)
             if finding.verdict == "holds":
@@ -235,9 +233,7 @@ def test_one_letter_exchanged(name, theorems):
         if apart > 1e-7:
             tried += 1
             try:
-                assert not held(changed, other, model), (
-                    f"{what}: {changed.text()} = {other.text()}, off by {apart:.1e}"
-                )
+                assert not held(changed, other, model), f"{what}: {changed.text()} = {other.text()}, off by {apart:.1e}"
             except pc.SingularOperatorError:
                 continue  # an inverse that exists only by the noise of dense NumPy
         elif apart < 1e-11:

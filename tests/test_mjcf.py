@@ -248,9 +248,7 @@ def floating(placed):
     model.add_body("first", None, "free", mass=1, inertia=inertia)
     model.add_body("arm", "first", "ball", mass=1, inertia=inertia)
     rotation = np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]]) if placed else np.eye(3)
-    model.add_body(
-        "second", None, "free", mass=1, inertia=inertia, rotation=rotation, position=(1, 2, 3) if placed else (0, 0, 0)
-    )
+    model.add_body("second", None, "free", mass=1, inertia=inertia, rotation=rotation, position=(1, 2, 3) if placed else (0, 0, 0))
     return model
 
 
