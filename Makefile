@@ -35,6 +35,8 @@ test-python: .venv/tested
 
 check: .venv/tested
 	$(BIN)/ruff check pycraft tests
+	$(BIN)/cmake --build build --target test_allocation -j $(JOBS)
+	build/test_allocation
 	$(BIN)/python -m pytest $(PARALLEL) -m "not peers and not slow" -x
 
 test-peers: .venv/peers
@@ -69,7 +71,7 @@ wheel: .venv/installed
 	$(BIN)/auditwheel show dist/*.whl
 
 lab: .venv/lab
-	$(BIN)/jupyter lab --notebook-dir=notebooks
+	$(BIN)/jupyter lab --notebook-dir=. --LabApp.default_url=/lab/tree/notebooks/00_tour.ipynb
 
 bench: .venv/installed
 	$(BIN)/pycraft bench

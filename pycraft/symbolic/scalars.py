@@ -163,12 +163,19 @@ class ScalarRules:
 
     def __post_init__(self) -> None:
         self.problem, self.alphabet = self.local.problem, self.local.alphabet
+        # X⁻* = X⁻¹, by X⁻*: inside a trace, which is that of its transpose, no rule for one of the two would end
+        self._symmetric = {
+            letter: e
+            for e in self.local.local
+            for (letter, *more) in e.lhs
+            if not more and e.kind == "lemma" and e.rhs == monomial(self.alphabet.star(letter))
+        }
         self._forms: list[tuple[str, str, Polynomial, Polynomial, list[Step]]] = []
 
     def reduce(self, p: Polynomial) -> tuple[Polynomial, list[Step]]:
         """(the normal form, the steps to it). Raises GaveUp."""
         steps: list[Step] = []
-        while (step := self._inside(p) or self._between(p)) is not None:
+        while (step := self._turned(p) or self._inside(p) or self._between(p)) is not None:
             steps.append(step)
             p = step.after
             if len(steps) > STEPS:
@@ -176,18 +183,33 @@ class ScalarRules:
         return p, steps
 
     # ------------------------------------------------------------------ inside a trace
+    def _turned(self, p: Polynomial) -> Step | None:
+        """Each trace by the first of its rotations and its transpose's in which symmetric inverses are written without a star."""
+        a, after, uses = self.alphabet, dict(p), []
+        for word in [w for w in p if w[0] == "tr" and any(x in self._symmetric or a.star(x) in self._symmetric for x in w[1:])]:
+            best, turned = min((tuple(a.star(x) if x in self._symmetric else x for x in w), w) for w in self._rotations(word))
+            made, c = trace_word(best, a, ""), p[word]
+            if made == word:
+                continue
+            space = space_of(turned, a)
+            for i, letter in enumerate(turned):
+                if letter in self._symmetric:
+                    uses.append(TraceUse(c, best[:i], self._symmetric[letter], turned[i + 1 :], (letter,), True, space))
+            after.pop(word)
+            add_to(after, made, c)
+        return ScalarStep(p, after, list(uses), a) if uses or after != p else None
+
     def _inside(self, p: Polynomial) -> Step | None:
         """One equation of operators, in every trace where it fits."""
         fitting = {word: found for word in p if word[0] == "tr" and (found := min(self._places(word), key=lambda f: f[0], default=None))}
         if not fitting:
             return None
         group = min(found[0] for found in fitting.values())
-        after = dict(p)
+        chosen = {word: found for word, found in fitting.items() if found[0] == group}
+        after = {word: c for word, c in p.items() if word not in chosen}
         uses: list[Use] = []
-        for word, (rank, left, rule, right) in fitting.items():
-            if rank != group:
-                continue
-            c = after.pop(word)
+        for word, (_, left, rule, right) in chosen.items():
+            c = p[word]
             space = space_of(left + rule.word, self.alphabet)
             uses.append(TraceUse(c * rule.factor, left, rule.equation, right, rule.word, rule.factor > 0, space))
             for w, x in trace_of({left + w + right: x for w, x in rule.to}, self.alphabet, space).items():
@@ -200,6 +222,8 @@ class ScalarRules:
             return
         for turned in self._rotations(word):
             for rule in self.local.rules.by_first.get(turned[0], ()):
+                if rule.word[0] in self._symmetric and len(rule.word) == 1:
+                    continue
                 if turned[: len(rule.word)] == rule.word and (rule.group < 0 or all(weight(w) < weight(rule.word) for w, _ in rule.to)):
                     yield rule.group, (), rule, turned[len(rule.word) :]
 
