@@ -121,9 +121,7 @@ def rule_names(text):
     return [(m.start(), m.group(1)) for m in re.finditer(pattern, text, re.M) if m.group(1) not in ("if", "switch", "return")]
 
 
-POINTERS = re.compile(
-    r"\s*(?:tree\w*\.|model\.\w+_offset|at_|d_\b|f\b|first\b|size_t|1\b|static_cast)"
-)  # steps of pointers and indices
+POINTERS = re.compile(r"\s*(?:tree\w*\.|model\.\w+_offset|at_|d_\b|f\b|first\b|size_t|1\b|static_cast)")  # steps of pointers and indices
 BOOKKEEPING = {"DenseBlocks", "RigidBlocks", "resize", "throw_singular_hinge"}
 PAIRS = [
     ("force_to_parent", "motion_to_child"), ("cross_motion", "cross_force"), ("shift_add", "shift_transposed_add"),
@@ -142,9 +140,7 @@ def sites(file):
         line, column = text.count("\n", 0, begin) + 1, begin - text.rfind("\n", 0, begin)
         rule = next((name for at, name in reversed(names) if at <= begin), "")
         if rule and rule not in BOOKKEEPING:
-            found.append(
-                Mutation(file, line, column, rule, begin, end, text[begin:end], after, text.splitlines()[line - 1].strip())
-            )
+            found.append(Mutation(file, line, column, rule, begin, end, text[begin:end], after, text.splitlines()[line - 1].strip()))
 
     for m in re.finditer(r"(?<=[\w)\]] )([+-])(?= [\w(*~])", code):  # a + b
         if not POINTERS.match(code, m.end()) and not code[: m.start()].rstrip().endswith(("data()", "begin()")):
@@ -275,9 +271,7 @@ class Copy:
         finally:
             path.write_text(original, encoding="utf-8")
         red = re.search(r"^(?:FAILED|ERROR) (.*?)(?: - .*)?$", output, re.M)
-        verdict = (
-            {"verdict": "survived", "by": ""} if passed else {"verdict": "killed", "by": red.group(1) if red else output[-200:]}
-        )
+        verdict = {"verdict": "survived", "by": ""} if passed else {"verdict": "killed", "by": red.group(1) if red else output[-200:]}
         return verdict | {"seconds": time.perf_counter() - begin}
 
 
@@ -345,9 +339,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--sample", type=int, help="so many mutations, drawn from the seed")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument(
-        "--one-per-rule", action="store_true", help="one mutation of every function and theorem, drawn from the seed"
-    )
+    parser.add_argument("--one-per-rule", action="store_true", help="one mutation of every function and theorem, drawn from the seed")
     parser.add_argument("--only", default="", help="mutations whose file or rule has this in its name")
     parser.add_argument("--list", action="store_true", help="show the mutations and stop")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="compilers at once")
@@ -373,9 +365,7 @@ def main():
                     continue
                 try:
                     result = copy.try_one(m, left_out, options.tests)
-                    (options.results / f"{m.key}.json").write_text(
-                        json.dumps(asdict(m) | result, ensure_ascii=False), encoding="utf-8"
-                    )
+                    (options.results / f"{m.key}.json").write_text(json.dumps(asdict(m) | result, ensure_ascii=False), encoding="utf-8")
                     show(f"{result['verdict']:<17} {m.file}:{m.line} {m.rule}: {m.shown[:60]} ({result['seconds']:.0f} s)")
                 finally:
                     (options.results / f"{m.key}.claim").unlink(missing_ok=True)

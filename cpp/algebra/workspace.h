@@ -4,12 +4,14 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "algebra/elimination.h"
 #include "algebra/engine.h"
 #include "algebra/errors.h"
+#include "algebra/gram_factors.h"
 #include "algebra/refinement.h"
 #include "algebra/small_lu.h"
 #include "algebra/values.h"
@@ -26,6 +28,7 @@ class Workspace {
                                                          scalars_(plan_->registers.size(), S(0)), dense_(plan_->registers.size()) {
     eliminations_.resize(plan_->registers.size());
     dense_lu_.resize(plan_->registers.size());
+    gram_.resize(plan_->registers.size());
     for (size_t r = 0; r < plan_->registers.size(); ++r) {
       const Register& reg = plan_->registers[r];
       if (reg.kind == RegisterKind::blocks) blocks_[r].shape(reg.space, reg.columns);
@@ -160,6 +163,7 @@ class Workspace {
         values[s.context]->mass_matrix_dense(s.flag, dense_[s.out].data());
         return;
       case StepKind::dense_factor: {
+        if (s.flag) return factor_gram(s, values, counts);
         ++counts.dense;
         std::vector<S>& A = dense_[s.out];
         operand_as_matrix(s, values, A, counts);
@@ -170,6 +174,7 @@ class Workspace {
       case StepKind::dense_solve: {
         const int w = width(s.in[1], m);
         vectors_[s.out] = vectors_[s.in[1]];
+        if (gram_[s.in[0]]) return gram_[s.in[0]]->solve(vectors_[s.out].data(), w);
         scratch_.resize(std::max(scratch_.size(), vectors_[s.out].size()));
         dense_lu_[s.in[0]].solve(vectors_[s.out].data(), w, scratch_.data());
         return;
@@ -232,7 +237,9 @@ class Workspace {
       case StepKind::logdet_of_factor:
         with_factors(s.in[0], [&](const auto& factors) { scalars_[s.out] = static_cast<S>(factors.log_abs_determinant()); });
         return;
-      case StepKind::logdet_of_dense: scalars_[s.out] = dense_lu_[s.in[0]].determinant().log(); return;
+      case StepKind::logdet_of_dense:
+        scalars_[s.out] = (gram_[s.in[0]] ? gram_[s.in[0]]->determinant() : dense_lu_[s.in[0]].determinant()).log();
+        return;
       case StepKind::norm_of_vector: return;  // taken by the pool over all columns_at_a_times
       case StepKind::combine_scalars: {
         S sum = S(s.coefficients.back());
@@ -241,6 +248,16 @@ class Workspace {
         return;
       }
     }
+  }
+
+  void factor_gram(const Step& s, const std::vector<SkoValues<S>*>& values, PassCounts& counts) {
+    ++counts.kernels;
+    operand_as_matrix(s, values, dense_[s.out], counts);
+    if (!gram_[s.out]) gram_[s.out].emplace();
+    const int rows = s.operand->codomain.dimension(), columns = s.operand->domain.dimension();
+    if (!gram_[s.out]->factor(dense_[s.out], rows, columns))
+      throw SingularOperatorError(plan_->text + " is singular at this state: " + std::to_string(rows) + " coordinates do not move its " +
+                                  std::to_string(columns) + " rows independently, to working precision");
   }
 
   int width(int r, int m) const { return plan_->registers[r].wide ? m : 1; }
@@ -587,6 +604,7 @@ class Workspace {
   };
   std::vector<Factors> eliminations_;
   std::vector<SmallLU<S>> dense_lu_;
+  std::vector<std::optional<GramFactors<S>>> gram_;
   std::vector<std::pair<const Step*, std::unique_ptr<Workspace>>> operands_;
   SmallLU<S> lu_;
   std::vector<S> gathered_, scratch_, block_, product_, magnitude_;
