@@ -108,6 +108,8 @@ class Problem:
         self.relations: list[tuple[str, str, str]] = []  # (mark of a tree made of another, how, that one's mark)
         self.sides: list[Polynomial] = []
         self.of_one_model = False  # whether the statement was made of a model's expressions, and not read for all
+        self.unknown: set[str] = set()  # names of constants whose numbers are of no account
+        self.assumed: list[tuple[Equation, str]] = []  # hypotheses of the user's; a letter that one says to be definite
         self.scalars = False  # whether both sides are scalars: traces, determinants, norms
         self.numbers = False  # whether both sides map R^1 to R^1
         self._named_operands = 0
@@ -122,7 +124,8 @@ class Problem:
 
     def polynomials(self) -> list[Polynomial]:
         """What the statement is made of: both sides, and the operands of the letters that it adds."""
-        return [*self.sides, *(o.inner for o in self.opaque)]
+        assumed = [p for equation, _ in self.assumed for p in (equation.lhs, equation.rhs)]
+        return [*self.sides, *(o.inner for o in self.opaque), *assumed]
 
     def expand(self, expression: Any) -> Spelling:
         """The expression in words, as the step that says so.
@@ -234,8 +237,8 @@ class Problem:
 
     def _letter(self, e: Any) -> Walk:
         if e not in self._leaves:
-            if e.kind in ("blockdiag", "sqrt"):
-                return (yield self._operand(e.kind, e, e.children[0]))
+            if e.kind in ("blockdiag", "sqrt") or e.kind == "function" and e.name == "lower_half":
+                return (yield self._operand("half" if e.kind == "function" else e.kind, e, e.children[0]))
             self._leaves[e] = self._symbol(e) if e.kind == "symbol" else self._other(e)
         return self._leaves[e]
 
@@ -272,6 +275,8 @@ class Problem:
     def _other(self, e: Any) -> str:
         """Vectors, constants, others' operators: letters of which nothing is known but what their kind says."""
         vector = e.kind == "vector"
+        if e.kind == "constant" and e.name in self.unknown:
+            return self._named(f"‹{e.text()}›", Letter("", e.text(), e.latex(), False, "full", None, e))
         shape = "diagonal" if not vector and e.is_block_diagonal else "full"
         return self._named(f"‹{e.text()}›", Letter("", e.text(), e.latex(), not vector and bool(e.is_symmetric), shape, None, e))
 
@@ -292,7 +297,9 @@ class Problem:
             name = self._factor(inner) or f"⟨{len(self.opaque) + 1}⟩"
             text, latex = self._shown(inner, e) if kind in ("inverse", "operand") else (e.text(), f"{{{e.latex()}}}")
             symmetric = kind == "blockdiag" and bool(e.is_symmetric)
-            self.alphabet.add(Letter(name, text, latex, symmetric, "diagonal" if kind in ("blockdiag", "sqrt") else "full", None, e))
+            self.alphabet.add(
+                Letter(name, text, latex, symmetric, "diagonal" if kind in ("blockdiag", "sqrt", "half") else "full", None, e)
+            )
             definition = Equation("definition", f"{text} = {self.alphabet.text(inner)}", monomial(name), inner)
             self.opaque.append(Opaque(name, kind, e, inner, definition))
             self._leaves[key] = name

@@ -23,7 +23,7 @@ from .presuppositions import (
     is_regular_constant,
     is_triangular,
 )
-from .relations import at_the_roots, in_world
+from .relations import at_the_roots, compliance_facts, in_world
 from .rules import Rules, Setting, normal_form, rule_from, rules_for, weight
 from .words import (
     ONE,
@@ -41,6 +41,7 @@ from .words import (
     parse,
     plain,
     ratio,
+    root_of,
     split,
     times,
 )
@@ -87,11 +88,14 @@ class LocalRules:
         named = sorted({split(x)[0] for p in problem.polynomials() for w in p for x in w if inverted(x)})
         self.regular = {n for n in named if plain(n) in ALWAYS}
         self.needs: dict[str, set[str]] = {}
-        constants = {n: known.expression for n, known in self.alphabet.letters.items() if known.expression is not None}
+        letters = self.alphabet.letters.items()
+        constants = {n: x.expression for n, x in letters if x.expression is not None and x.text not in problem.unknown}
         self.regular |= {n for n in named if is_regular_constant(constants.get(n))}
         self._definite = {n for n, e in constants.items() if is_positive_constant(e)}
         for equation, word in extra:
             self.add(equation, word)
+        for equation, name in problem.assumed:
+            self._assume(equation, name)
         self._world_axes()
         source = problem.contexts[0][0] if problem.contexts else None
         for name, e in constants.items():
@@ -101,9 +105,39 @@ class LocalRules:
         for name in named:
             if name not in theory().alphabet.letters:
                 self._add_pairs(name)
+        for equation, word in compliance_facts(problem, setting.hypotheses):
+            self.add(equation, word)
+        kinds = {"inverse": self._inverse, "blockdiag": self._blocks, "sqrt": self._root, "half": self._half}
         for opaque in problem.opaque:
             if opaque.kind != "operand":
-                {"inverse": self._inverse, "blockdiag": self._blocks, "sqrt": self._root}[opaque.kind](opaque)
+                kinds[opaque.kind](opaque)
+
+    def _assume(self, equation: Equation, name: str) -> None:
+        """A hypothesis of the user's as a rule; of X > 0, X* = X, and that X has an inverse."""
+        if name:
+            self.regular.add(name)
+            self._definite.add(name)
+        form = normal_form(equation.difference, self.rules, self.alphabet)
+        if not form:
+            return
+        lead = max(form, key=weight)
+        c, p = form[lead], equation.difference
+        reduced, steps = self.reduce(p)
+        rest = {w: ratio(-x, c) for w, x in reduced.items() if w != lead}
+        uses = [Use(ratio(1, c), (), equation, (), lead)] + [u.between((), (), ratio(-1, c)) for s in steps for u in s.uses]
+        step = Step({lead: ONE}, rest, uses, self.alphabet)
+        solved = Equation(
+            "lemma", f"{self.alphabet.word_text(lead)} = {self.alphabet.text(rest)}", {lead: ONE}, rest, steps=numbered([step])
+        )
+        if rest == equation.rhs and {lead: ONE} == equation.lhs:
+            solved = equation
+        self.local.append(solved)
+        self._rank -= 1
+        for rules in filter(None, (self.rules, self.block_rules)):
+            rules.add(rule_from(solved, lead, self._rank))
+            star = self.alphabet.star_word(lead)
+            if star not in solved.difference:
+                rules.add(rule_from(solved.transposed(self.alphabet), star, self._rank))
 
     def _world_axes(self) -> None:
         """Letters in world axes by those of their model."""
@@ -270,7 +304,8 @@ class LocalRules:
         assert self.block_rules is not None
         a = self.alphabet
         form, steps = self.block_rules.reduce(o.inner, a)
-        value = diagonal_part(form, a)
+        chain = "serial chain" in self.setting.hypotheses
+        value = diagonal_part(form, a, chain)
         if any(a.letters[split(x)[0]].word for w in value for x in w) and self._recursion(o):
             return
         name = o.name
@@ -278,8 +313,8 @@ class LocalRules:
             name = self._written(o, form, steps)
         text = f"{a.letters[name].text} = {a.text(value)}"
         note = "the diagonal blocks of each word, by where its letters lead on the tree"
-        equation = Equation("structure", text, {(name,): ONE}, value, note=note)
-        equation.check = lambda: diagonal_part(form, a) == value
+        equation = Equation("structure", text, {(name,): ONE}, value, note=note, uses=[theory()("S = 0")] * chain)
+        equation.check = lambda: diagonal_part(form, a, chain) == value
         self.add(equation, (name,))
 
     def _written(self, o: Opaque, form: Polynomial, steps: list[Step]) -> str:
@@ -359,6 +394,9 @@ class LocalRules:
                 same.check = lambda i=other.inner, s=its_steps: chain_holds(steps, o.inner, form) and chain_holds(s, i, form)
                 self.add(same, (L,))
                 return
+            if (multiple := self._multiple(o, form, steps, other, its_form, its_steps)) is not None:
+                self.add(multiple, (L,))
+                return
         self._roots.append((o, form, steps))
         star = a.star(L)
         square = Equation("definition", f"{text} ({text})* = {a.text(o.inner)}", {(L, star): ONE}, o.inner)
@@ -374,6 +412,40 @@ class LocalRules:
             self._root_inverted(Y, L, word, c, square, steps)
         if len(word) == 1 and inverse_of(word[0]) in letters:
             self._root_meets_inverse(Y, L, word[0], c, square, steps)
+
+    def _multiple(
+        self, o: Opaque, form: Polynomial, steps: list[Step], other: Opaque, its_form: Polynomial, its_steps: list[Step]
+    ) -> Equation | None:
+        """√(c²A) = c √A, c a fraction; None if the operands are not such multiples."""
+        if not form or not its_form:
+            return None
+        (key, scale), (its_key, its_scale) = _scaled(form), _scaled(its_form)
+        c = root_of(ratio(scale, its_scale)) if key == its_key else None
+        if c is None:
+            return None
+        a = self.alphabet
+        text = f"{a.letters[o.name].text} = {a.text({(other.name,): c})}"
+        made = Equation(
+            "structure", text, {(o.name,): ONE}, {(other.name,): c}, note="a root of a positive multiple is that multiple's root"
+        )
+        made.steps = [*steps, *its_steps]
+        made.check = lambda: chain_holds(steps, o.inner, form) and chain_holds(its_steps, other.inner, its_form)
+        return made
+
+    def _half(self, o: Opaque) -> None:
+        """T + T* = X for the lower half T of a symmetric X, half of the diagonal included."""
+        a, T = self.alphabet, o.name
+        form, steps = self.reduce(o.inner)
+        if a.star_of(form) != form:
+            return
+        text = f"{a.letters[T].text} + ({a.letters[T].text})* = {a.text(form)}"
+        whole = Equation("structure", text, {(T,): ONE, (a.star(T),): ONE}, form, steps=list(steps), uses=[o.definition])
+        whole.note = "the halves of a symmetric operator are each other's transpose"
+        whole.check = lambda: chain_holds(steps, o.inner, form) and a.star_of(form) == form
+        self.local.append(whole)
+        self._rank -= 1
+        for rules in filter(None, (self.rules, self.block_rules)):
+            rules.add(rule_from(whole, (a.star(T),), self._rank))
 
     def _root_inverted(self, Y: str, L: str, word: Word, c: Number, square: Equation, steps: list[Step]) -> None:
         """L⁻¹A = L*, Y being L⁻¹ and c times the word A."""

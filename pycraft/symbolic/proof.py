@@ -112,8 +112,8 @@ class Proof:
     @property
     def hypotheses(self) -> list[str]:
         """Names of the hypotheses that steps or their lemmas use."""
-        used = {e.hypothesis for e in self.rests_on if e.kind == "hypothesis"}
-        return [name for name in HYPOTHESES if name in used]
+        used = dict.fromkeys(e.hypothesis for e in self.rests_on if e.kind == "hypothesis" and e.hypothesis)
+        return [*(name for name in HYPOTHESES if name in used), *(name for name in used if name not in HYPOTHESES)]
 
     @property
     def axioms(self) -> list[str]:
@@ -131,10 +131,13 @@ class Proof:
         return [Proof.of_lemma(e, self._alphabet) for e in self.rests_on if e.kind in ("lemma", "structure")]
 
     # ------------------------------------------------------------------ what it takes for granted
-    def takes_for_granted(self, letters: Sequence[str]) -> None:
-        """The inverses of these letters are presuppositions, and the square roots that the statement holds."""
-        self._inverted = list(letters)
+    def takes_for_granted(self, letters: Sequence[str], assumed: Sequence[tuple[Equation, str]] = ()) -> None:
+        """The inverses of these letters are presuppositions; those that the user assumes to exist are hypotheses."""
         self.presupposes = [self._inverse_text(name) for name in letters]
+        given = [(equation, name) for equation, name in assumed if name]
+        self._inverted = [*letters, *(name for _, name in given)]
+        if given and any(e.kind == "inverse" for e in self.rests_on):
+            self.rests_on += [equation for equation, _ in given if equation not in self.rests_on]
 
     def _inverse_text(self, name: str) -> str:
         """The inverse of a letter as it was typed."""
@@ -219,10 +222,14 @@ class Proof:
         if unmet and any(e.note == COUNTED for e in self.rests_on):  # a number that belongs to the model at hand
             self.unmet = unmet
             return
-        candidates: list[Any] = [example(self.hypotheses)] if operators is None or unmet or len(operators.F) > LARGEST else [operators]
-        for candidate in candidates:
+        if set(self.hypotheses) - {*HYPOTHESES}:  # no model is known that meets what was assumed
+            self.unmet = unmet
+            return
+        own = [] if operators is None or unmet or len(operators.F) > LARGEST else [operators]
+        for candidate in (*own, *examples(self.hypotheses)):
             try:
                 self.verify(candidate)
+                break
             except (ArithmeticError, ValueError, TypeError):
                 continue
         self.unmet = unmet

@@ -8,17 +8,18 @@ them, since the axioms are the same equations again between X's.
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from .axioms import AXIOMS, theory
+from .blocks import diagonal_part
 from .equations import Equation
 from .rules import Setting, normal_form, rules_for
 from .values import LARGEST
-from .words import Polynomial, Word, add_to, monomial, of_model, plain, split
+from .words import Polynomial, Word, add_to, monomial, of_model, parse, plain, split
 
 _GIVEN = ("E_φ", "H", "M", "J")
 """Letters that a tree is made of; the axioms determine the others."""
@@ -114,3 +115,39 @@ def at_the_roots(letter: str, e: Any, source: Any) -> Iterator[tuple[Equation, W
 
 def _is_zero(X: np.ndarray, columns: Sequence[slice]) -> bool:
     return not any(X[:, s].any() for s in columns)
+
+
+def compliance_facts(problem: Any, hypotheses: Iterable[str]) -> Iterator[tuple[Equation, Word]]:
+    """What the diagonal blocks of Ω give beside words: ΥG = H*D⁻¹ where J = 0, and B*ΩB = B*ΥB of nodes on one body."""
+    letters = {x for p in problem.polynomials() for word in p for x in word}
+    marks = [mark for mark in problem.marks if of_model("Υ", mark) in letters]
+    for mark in marks if "J = 0" in hypotheses else ():
+        lhs, rhs = (tuple(of_model(x, mark) for x in word) for word in (("Υ", "G"), ("H*", "D⁻¹")))
+        note = "Υ = blockdiag(E_ψ*ΥE_ψ) + H*D⁻¹H, and blockdiag(X) B = blockdiag(X B) for B = PH*, with E_ψPH* = KJ = 0"
+        uses = [theory()(text) for text in ("Υ = E_ψ* Υ E_ψ − S + H* D⁻¹ H", "E_ψ P H* = K J", "J = 0")]
+        text = f"{' '.join(lhs)} = {' '.join(rhs)}"
+        yield Equation("structure", text, monomial(*lhs), monomial(*rhs), uses=uses, note=note, check=_nothing_along_the_hinge), lhs
+    for name, known in problem.alphabet.letters.items():
+        e = known.expression
+        if getattr(e, "kind", "") != "symbol" or e.name != "B" or len(symbol_nodes(e)) != 1 or not marks:
+            continue
+        star, mark = problem.alphabet.star(name), marks[0]
+        whole = (star, *(of_model(x, mark) for x in ("ψ*", "H*", "D⁻¹", "H", "ψ")), name)
+        inner = (star, of_model("Υ", mark), name)
+        text = f"{known.text}* Ω {known.text} = {known.text}* Υ {known.text}"
+        lemma = theory()("ψ* H* D⁻¹ H ψ = ψ* Υ + Υ ψ − Υ + ψ* S ψ")
+        note = "of one body's node only that body's block of Ω counts, and Υ = blockdiag(Ω)"
+        yield Equation("structure", text, monomial(*whole), monomial(*inner), uses=[lemma], note=note, check=_blocks_of_compliance), whole
+
+
+def symbol_nodes(e: Any) -> Sequence[str]:
+    """The nodes that a symbol is of."""
+    return e._parts()[1][3]
+
+
+def _nothing_along_the_hinge() -> bool:
+    return not normal_form(parse("E_ψ P H*"), rules_for(Setting(frozenset({"J = 0"}))), theory().alphabet)
+
+
+def _blocks_of_compliance() -> bool:
+    return diagonal_part(parse("ψ* Υ + Υ ψ − Υ + ψ* S ψ"), theory().alphabet) == parse("Υ")

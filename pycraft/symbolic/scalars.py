@@ -182,12 +182,11 @@ class ScalarRules:
         if not fitting:
             return None
         group = min(found[0] for found in fitting.values())
-        after = dict(p)
+        chosen = {word: found for word, found in fitting.items() if found[0] == group}
+        after = {word: c for word, c in p.items() if word not in chosen}
         uses: list[Use] = []
-        for word, (rank, left, rule, right) in fitting.items():
-            if rank != group:
-                continue
-            c = after.pop(word)
+        for word, (_, left, rule, right) in chosen.items():
+            c = p[word]
             space = space_of(left + rule.word, self.alphabet)
             uses.append(TraceUse(c * rule.factor, left, rule.equation, right, rule.word, rule.factor > 0, space))
             for w, x in trace_of({left + w + right: x for w, x in rule.to}, self.alphabet, space).items():

@@ -18,9 +18,11 @@ from .. import _core
 from .equations import Step
 from .expand import symbol_parts
 from .walk import Walk, carried_out
-from .words import FURTHER, NUMBERS, Alphabet, Polynomial, Word, split
+from .words import FURTHER, NUMBERS, Alphabet, Polynomial, Word, inverse_of, split
 
 PROBES = 3
+SINGULAR = 1e-13
+"""Ratio of the smallest singular value to the largest below which an operator of a small model of ordinary bodies counts as singular."""
 LARGEST = 600
 """Entries of a body vector up to which steps are checked without being asked."""
 
@@ -60,6 +62,8 @@ class Values:
                     value = np.linalg.inv(value)
                 except np.linalg.LinAlgError as error:
                     raise NoValue(f"{self.alphabet.letter_text(letter)}: {error}") from None
+                if is_singular(self.letter(inverse_of(letter))):
+                    raise NoValue(f"{self.alphabet.letter_text(letter)} does not exist on this model")
             self._values[letter] = value.T if mark in ("*", "⁻*") else value
         return self._values[letter]
 
@@ -179,6 +183,12 @@ class Values:
             return (size := float(np.linalg.norm(factors[0]))), size
         product, bound = (functools.reduce(operator.matmul, x) for x in (factors, [np.abs(f) for f in factors]))
         return float(np.trace(product)), float(np.trace(bound))
+
+
+def is_singular(X: np.ndarray) -> bool:
+    """Whether a matrix of ordinary numbers has no inverse: its smallest singular value is rounding beside its largest."""
+    values = np.linalg.svd(X, compute_uv=False) if np.isfinite(X).all() else np.zeros(1)
+    return values.size > 0 and not values[-1] > SINGULAR * values[0]
 
 
 def _largest(x: Any) -> float:

@@ -6,6 +6,7 @@ polynomial maps words to fractions; the zero operator is the empty polynomial. P
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -36,6 +37,15 @@ def ratio(a: Number, b: Number) -> Number:
     """a / b, exactly."""
     quotient = Fraction(a) / b
     return quotient.numerator if quotient.denominator == 1 else quotient
+
+
+def root_of(c: Number) -> Number | None:
+    """√c where it is a fraction, else None."""
+    above, below = Fraction(c).numerator, Fraction(c).denominator
+    if above <= 0:
+        return None
+    up, down = math.isqrt(above), math.isqrt(below)
+    return ratio(up, down) if up * up == above and down * down == below else None
 
 
 def add_to(p: Polynomial, word: Word, c: Number) -> None:
