@@ -22,8 +22,8 @@ class Mutant:
 
     @property
     def key(self):
-        """A name that stays the same while the line and its rule do."""
-        text = f"{self.file}|{self.rule}|{self.shown}|{self.change}|{self.before}|{self.after}"
+        """A short name of this change of this text."""
+        text = f"{self.file}|{self.begin}|{self.rule}|{self.shown}|{self.change}|{self.before}|{self.after}"
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
     @property
