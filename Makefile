@@ -73,7 +73,7 @@ wheel: .venv/installed
 	$(BIN)/auditwheel show dist/*.whl
 
 lab: .venv/lab
-	$(BIN)/jupyter lab --notebook-dir=notebooks
+	$(BIN)/jupyter lab --notebook-dir=. --LabApp.default_url=/lab/tree/notebooks/00_tour.ipynb
 
 bench: .venv/installed
 	$(BIN)/pycraft bench

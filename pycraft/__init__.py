@@ -1,4 +1,21 @@
-"""PyCraft: an interactive workbench for the Spatial Operator Algebra over a DARTS-style multibody model."""
+"""PyCraft: an interactive workbench for the Spatial Operator Algebra over a DARTS-style multibody model.
+
+What to type::
+
+    >>> import pycraft as pc
+    >>> arm = pc.robots.panda()                  # or pc.load("arm.urdf"), pc.chain(10), pc.Multibody("mine") built body by body
+    >>> arm.q = arm.random_state(seed=0).q
+    >>> H, phi, M, D, K, psi, I = arm.soa("H phi M D K psi I")
+    >>> MM = H @ phi @ M @ phi.T @ H.T           # typed as on paper; nothing is computed yet
+    >>> MM.inv() @ [1, 0, 0, 0, 0, 0, 0]         # O(N): the theorems find [I-HψK]* D⁻¹ [I-HψK]  # doctest: +SKIP
+    >>> MM.inv().explain()                       # how, and what it costs  # doctest: +SKIP
+    >>> pc.check("inv(psi) == inv(phi) + K*H", arm)        # is it true?  # doctest: +SKIP
+    >>> pc.prove("inv(MM) == (I - H*psi*K).T * inv(D) * (I - H*psi*K)", arm)   # and why?  # doctest: +SKIP
+    >>> arm.forward_dynamics().shape             # numbers and no algebra, at the present state
+    (7,)
+
+`arm.soa?` lists the operators, docs/notation.md their letters; `pc.Multibody` has the direct calls; on the command line, `pycraft tour`.
+"""
 
 import importlib.util
 import pkgutil
@@ -29,7 +46,8 @@ from ._core import (
 )
 from .accuracy.table import accuracy
 from .accuracy.work_precision import work_precision
-from .identities import check
+from .bare_trees import sko_model
+from .identities import UndecidedError, check, truth
 from .interop import compare
 from .kalman import kalman
 from .models.generators import chain, tree
@@ -37,7 +55,7 @@ from .models.load import load
 from .models.multibody import Multibody
 from .models.state import State
 from .models.warning import ModelWarning
-from .operators import OperatorSet, sko_model
+from .operators import OperatorSet
 from .symbolic import Exercise, Proof, derivative, exercise, from_sympy, parse, prove, prove_derivative, symbolic, to_sympy, worksheet
 
 __version__ = "0.1.0"
@@ -68,6 +86,7 @@ __all__ = [
     "SpaceError",
     "StaleOperatorError",
     "State",
+    "UndecidedError",
     "accuracy",
     "blockdiag",
     "chain",
@@ -92,6 +111,7 @@ __all__ = [
     "symbolic",
     "to_sympy",
     "tree",
+    "truth",
     "vector",
     "work_precision",
     "worksheet",

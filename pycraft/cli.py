@@ -8,14 +8,18 @@ from pathlib import Path
 from typing import Annotated, Any, Optional
 
 import typer
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-app = typer.Typer(add_completion=False, no_args_is_help=True, help="A workbench for the Spatial Operator Algebra over a multibody model.")
-console = Console()
-if not console.is_terminal:  # a file or a pipe has no width of its own
-    console = Console(width=140)
+from .terminal import Commands, console, diagnostics, fail, note
+
+app = typer.Typer(
+    cls=Commands,
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    help="A workbench for the Spatial Operator Algebra over a multibody model.",
+)
 
 MIMIC = ("refuse", "lock", "free")
 Model = Annotated[str, typer.Argument(help="A URDF or MJCF file, or the name of a robot that comes with the package (see pycraft.robots).")]
@@ -39,24 +43,8 @@ def load_model(name: str, root: str | None = None, mimic: str = "refuse") -> Any
         warnings.simplefilter("always", ModelWarning)
         model = load(name, root=root or "fixed", mimic=mimic)
     for warning in caught:
-        console.print(f"[yellow]warning:[/] {escape(str(warning.message))}", highlight=False)
+        note(f"warning: {warning.message}")
     return model
-
-
-def fail(text: str, status: int = 2) -> None:
-    """End a command with an error's text."""
-    console.print(f"[bold red]error:[/] {escape(text)}", highlight=False)
-    raise typer.Exit(status)
-
-
-def _guarded(f: Any) -> Any:
-    """Errors of the package end a command with their text, not with a traceback."""
-    from . import _core
-
-    try:
-        return f()
-    except _core.Error as error:
-        return fail(str(error))
 
 
 def check_outputs(**paths: Path | None) -> None:
@@ -101,7 +89,7 @@ def tour(
     """Load a real robot, type the book's formulas, factor, invert, and check the theorems."""
     from .tour import run
 
-    _guarded(lambda: run(load_model(model or "panda", root, mimic), console))
+    run(load_model(model or "panda", root, mimic), console)
 
 
 @app.command()
@@ -109,28 +97,38 @@ def check(
     model: Model,
     states: Annotated[int, typer.Option(help="Random states beside the present one.")] = 3,
     seed: Annotated[int, typer.Option(help="Seed of the states.")] = 0,
-    precision: Annotated[str, typer.Option(help="The wider scalar: extended | quad | 50 | 100 (digits).")] = "extended",
+    precision: Annotated[str, typer.Option(help="The first scalar beside double: extended | quad | 50 | 100 (digits).")] = "extended",
+    full: Annotated[bool, typer.Option("--full", help="Every theorem, not the summary and the exceptions alone.")] = False,
     json: Annotated[bool, typer.Option("--json", help="The report as JSON.")] = False,
     root: Root = None,
     mimic: Mimic = "refuse",
 ) -> None:
-    """Check every theorem on a model; exit status 1 if one fails that should hold."""
+    """Check every theorem on a model, or the displayed equations of a LaTeX paper (a .tex file, on random trees).
 
-    def run() -> Any:
-        robot = load_model(model, root, mimic)
-        wide = int(precision) if precision.isdigit() else precision
-        if json:
-            return robot.soa.check(states=states, seed=seed, precision=wide)
-        with console.status("checking") as status:
-            return robot.soa.check(states=states, seed=seed, precision=wide, progress=lambda name: status.update(name))
-
-    report = _guarded(run)
+    Exit status 1 if something fails that should hold, 3 if something is undecided.
+    """
+    check_least(0, states=states, seed=seed)
+    wide = int(precision) if precision.isdecimal() else precision
+    if model.endswith(".tex"):
+        _check_paper(model, states, seed, json)
+    robot = load_model(model, root, mimic)
+    with diagnostics.status("checking") as status:
+        report = robot.soa.check(states=states, seed=seed, precision=wide, progress=lambda name: status.update(escape(name)))
     if json:
         print(report.to_json())
     else:
-        console.print(report.table())
-        console.print(report.summary(), highlight=False)
-    raise typer.Exit(0 if report else 1)
+        console.print(report.summary(), markup=False, highlight=False)
+        console.print(report.table(full))
+    raise typer.Exit(report.status)
+
+
+def _check_paper(path: str, states: int, seed: int, json: bool) -> None:
+    from .identities.paper import check_paper
+
+    with diagnostics.status("reading") as status:
+        report = check_paper(path, states=max(states, 1), seed=seed, progress=status.update)
+    print(report.to_json() if json else report)
+    raise typer.Exit(report.status)
 
 
 @app.command()
@@ -139,7 +137,7 @@ def bench(seconds: Annotated[float, typer.Option(help="Seconds per figure.")] = 
     from .bench import run
 
     check_seconds(seconds=seconds)
-    with console.status("measuring"):
+    with diagnostics.status("measuring"):
         results = run(seconds)
     missed = 0
     for heading, figures in results.items():
@@ -192,7 +190,7 @@ def accuracy(
 
     def run() -> Any:
         robot = load_model(model, root, mimic)
-        with console.status("measuring") as status:
+        with diagnostics.status("measuring") as status:
 
             def progress(label: str) -> None:
                 status.update(escape(label))
@@ -218,12 +216,12 @@ def accuracy(
                 robot, state.q, 0 * state.v, duration=length, integrators=method or INTEGRATORS, seconds=seconds, progress=progress
             )
 
-    table = _guarded(run)
+    table = run()
     console.print(table.table())
     if integration:
         notes.append(f"reference: {table.reference}; its own error {table.reference_error:.1e}")
-    for note in notes:
-        console.print(escape(note), highlight=False)
+    for text in notes:
+        console.print(escape(text), highlight=False)
     for reason, labels in table.refusals.items():
         console.print(f"[bold]refused:[/] {escape('; '.join(labels))}: {escape(reason)}", highlight=False)
     if csv:
@@ -239,7 +237,7 @@ def accuracy(
         figure.savefig(plot, dpi=150, bbox_inches="tight")
     for path in (csv, json, plot):
         if path:
-            console.print(f"wrote {escape(str(path))}", highlight=False)
+            note(f"wrote {path}")
     if all(row["refused"] for row in table):
         fail("every row is refused", 1)
     if error is not None:
@@ -275,10 +273,10 @@ def stability(
         chosen = [c for c in catalogue() if case.lower() in c.name.lower() or case.lower() in c.family.lower()]
         if not chosen:
             fail(f"no hard case has {case!r} in its name or family")
-        with console.status("measuring") as status:
-            return hard.run(seeds, steps, cases=chosen, peers=peers, progress=lambda name: status.update(name))
+        with diagnostics.status("measuring") as status:
+            return hard.run(seeds, steps, cases=chosen, peers=peers, progress=lambda name: status.update(escape(name)))
 
-    results = _guarded(run)
+    results = run()
     if output:
         output.write_text(markdown(results), encoding="utf-8")
     else:
@@ -289,7 +287,7 @@ def stability(
         results.to_json(json)
     for path in (output, csv, json):
         if path:
-            console.print(f"wrote {escape(str(path))}", highlight=False)
+            note(f"wrote {path}")
     for row in results.failures:
         text = f"{row['case']}, {row['method']}: {row['failed']}"
         console.print(f"[red]{escape(text)}[/]", highlight=False)
@@ -310,20 +308,20 @@ def peers(
     check_outputs(output=output)
 
     def run() -> Any:
-        with console.status("comparing") as status:
-            return compare_all(states, seed, lambda name: status.update(name))
+        with diagnostics.status("comparing") as status:
+            return compare_all(states, seed, lambda name: status.update(escape(name)))
 
-    results = _guarded(run)
+    results = run()
     text = markdown(results, states)
     if output:
-        output.write_text(text)
-        console.print(f"wrote {output}")
+        output.write_text(text, encoding="utf-8")
+        note(f"wrote {output}")
     else:
-        console.print(text, highlight=False)
+        console.print(text, markup=False, highlight=False)
     failed = [r for r in results if not r.refused and not r.passed]
     for r in failed:
         worst = max(r.ratio, key=lambda k: r.ratio[k])
-        console.print(f"[red]{r.robot} ({r.root}): {worst} is {r.ratio[worst]:.1f} times its bound[/]")
+        console.print(f"{r.robot} ({r.root}): {worst} is {r.ratio[worst]:.1f} times its bound", style="red", markup=False, highlight=False)
     raise typer.Exit(1 if failed else 0)
 
 
@@ -333,6 +331,9 @@ def lab() -> None:
     import subprocess
     import sys
 
+    from .interop.packages import required
+
+    required("jupyterlab", "lab", "the lab needs")
     raise typer.Exit(subprocess.call([sys.executable, "-m", "jupyter", "lab"]))
 
 

@@ -21,7 +21,8 @@ import numpy as np
 from scipy.linalg import solve_discrete_lyapunov
 
 from . import _core
-from .operators import OperatorSet, sko_model
+from .bare_trees import sko_model
+from .operators import OperatorSet
 
 _Answer = TypeVar("_Answer")
 

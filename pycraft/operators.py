@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
 from . import _core
+from .closed import Closed
 
 _NAMES = {entry[0]: entry for entry in _core.symbol_table()}
 _NODE_OPERATORS = ("B", "Jacobian", "Lambda")
 _PLAIN = tuple(name for name in _NAMES if name not in (*_NODE_OPERATORS, "Delta"))
 _SPACES = ("Theta", "V", "F")
+_COMPOSED: dict[str, Callable[[Any], _core.Operator]] = {
+    "MM": lambda soa: soa.H @ soa.phi @ soa.M @ soa.phi.T @ soa.H.T,
+    "MM_inv": lambda soa: soa.MM.inv(),
+}
 
 
-class OperatorSet:
+class OperatorSet(Closed):
     """The spatial operators of one model.
 
     Attributes are the book's letters in ASCII: ``E phi phi_tilde H M J R P P_plus D G K tau tau_bar E_psi psi psi_tilde Upsilon Omega``,
-    ``I`` the identity, the velocity-dependent ``Delta_theta_dot V_tilde V_bar momentum_cross H_dot``, the vectors ``theta_dot velocity a
+    ``I`` the identity, ``MM = H φ M φ* H*`` and its inverse ``MM_inv`` (where hinges have rotor inertias, the equations of motion have
+    ``MM + J``), the velocity-dependent ``Delta_theta_dot V_tilde V_bar momentum_cross H_dot``, the vectors ``theta_dot velocity a
     b gravity_field gravity_base``, and ``X_world``. With arguments: ``B(names)``, ``Jacobian(names)``, ``Lambda(names)`` of nodes,
     ``Delta(coordinate)``. Spaces: ``Theta``, ``V``, ``F``, ``NodesV(names)``, ``NodesF(names)``. Calling the set with a string of names
     returns a tuple.
@@ -55,6 +61,10 @@ class OperatorSet:
             raise AttributeError(name)
         if name == "I":
             return _core.identity()
+        if name in _COMPOSED:
+            if name not in self._made:
+                self._made[name] = _COMPOSED[name](self)
+            return self._made[name]
         if name in _SPACES:
             return getattr(self._source, name)
         if name in _NODE_OPERATORS or name == "Delta":
@@ -67,11 +77,14 @@ class OperatorSet:
                     raise AttributeError(str(error)) from None
             return self._made[name]
         raise AttributeError(
-            f"no operator is called {name!r}; there are {', '.join(_NAMES)}, I, and the spaces Theta, V, F, NodesV, NodesF"
+            f"no operator is called {name!r}; there are {', '.join((*_NAMES, *_COMPOSED))}, I, and the spaces Theta, V, F, NodesV, NodesF"
         )
 
     def __dir__(self) -> Iterable[str]:
-        return [*super().__dir__(), *_NAMES, "I", *_SPACES]
+        return [*super().__dir__(), *_NAMES, "I", *_COMPOSED, *_SPACES]
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return [*_NAMES, "I", *_COMPOSED]
 
     def NodesV(self, names: str | Sequence[str]) -> _core.Space:
         """Stacked motions of these nodes, six numbers each."""
@@ -109,8 +122,19 @@ class _WithArguments:
         self._operators, self._name = operators, name
         self.__doc__ = _NAMES[name][-1]
 
-    def __call__(self, argument: str | int | Sequence[str]) -> _core.Operator:
+    def __call__(self, argument: str | int | Sequence[str], directions: Any = None) -> _core.Operator:
+        """The operator of these nodes (or, of Delta, along this coordinate).
+
+        Lambda alone takes `directions`: the rows of C (k, 6 m), on the m nodes' motions stacked, angular first in each node's axes; for
+        one node also names among "rx", "ry", "rz", "x", "y", "z". Then it is (C B*ΩB C*)⁻¹: R^k → R^k, what resists motion along them
+        alone. It has a value where B*ΩB is singular, as for an arm of fewer than six hinges, if no motion along the directions is
+        impossible.
+        """
         source = self._operators._source
+        if directions is not None:
+            if self._name != "Lambda":
+                raise _core.EvaluationError(f"{self._name} takes no directions; Lambda does")
+            return _directed_inertia(self._operators, _listed(argument), directions)  # type: ignore[arg-type]
         if self._name != "Delta":
             return source.symbol(self._name, nodes=_listed(argument))  # type: ignore[arg-type]
         if isinstance(argument, str):
@@ -124,45 +148,30 @@ class _WithArguments:
         return f"<{self._name}: {_NAMES[self._name][-1]}>"
 
 
+_TWIST = ("rx", "ry", "rz", "x", "y", "z")
+
+
+def _directed_inertia(soa: OperatorSet, nodes: list[str], directions: Any) -> _core.Operator:
+    """(C B*ΩB C*)⁻¹ for the rows C of directions, or their names."""
+    named = [directions] if isinstance(directions, str) else directions
+    if all(isinstance(d, str) for d in named):
+        if len(nodes) != 1 or not set(named) <= set(_TWIST) or len(set(named)) < len(named):
+            text = f"of one node, different ones of {', '.join(_TWIST)}; of several, rows (k, 6 m)"
+            raise _core.EvaluationError(f"directions {named!r}: {text}")
+        rows = np.eye(6)[[_TWIST.index(d) for d in named]]
+    else:
+        rows = np.atleast_2d(np.asarray(directions, float))
+    if rows.ndim != 2 or rows.shape[1] != 6 * len(nodes) or not len(rows):
+        raise _core.EvaluationError(f"directions of {len(nodes)} nodes: rows (k, {6 * len(nodes)}), not {np.shape(directions)}")
+    if np.linalg.matrix_rank(rows) < len(rows):
+        raise _core.EvaluationError(f"directions: the {len(rows)} rows are linearly dependent; leave out what the others say")
+    B = soa.B(nodes)
+    C = _core.constant(rows, B.domain.dual, len(rows), "C")
+    return (C @ B.T @ soa.Omega @ B @ C.T).inv()
+
+
 def _listed(names: str | Sequence[str]) -> list[str]:
     return [names] if isinstance(names, str) else list(names)
-
-
-def sko_model(
-    parents: Sequence[int],
-    E: Sequence[np.ndarray | None],
-    H: Sequence[np.ndarray],
-    M: Sequence[np.ndarray],
-    J: Sequence[np.ndarray] | None = None,
-    *,
-    names: Sequence[str] | None = None,
-    name: str = "SKO model",
-) -> OperatorSet:
-    """The operators of a bare tree of matrices: the algebra without any mechanics, blocks of any size per body.
-
-    Parameters
-    ----------
-    parents : parents before children, -1 for the base
-    E : (s_parent, s_k) block of each body, None for roots
-    H, M, J : (n_k, s_k), symmetric (s_k, s_k), symmetric (n_k, n_k); J zero if left out
-    names : body names
-
-    Examples
-    --------
-    >>> import numpy as np, pycraft as pc
-    >>> soa = pc.sko_model([-1, 0], [None, np.eye(2)], [np.eye(1, 2)] * 2, [np.eye(2)] * 2)
-    >>> (soa.H @ soa.phi @ soa.M @ soa.phi.T @ soa.H.T).dense()
-    array([[2., 1.],
-           [1., 1.]])
-    """
-    n = len(parents)
-    H = [np.asarray(h, float).reshape(-1, np.asarray(m).shape[0]) for h, m in zip(H, M, strict=True)]
-    flat = lambda blocks: [[] if b is None else [float(x) for x in np.asarray(b, float).ravel()] for b in blocks]  # noqa: E731
-    source = _core.MatrixTree(
-        list(map(int, parents)), [np.asarray(m).shape[0] for m in M], [h.shape[0] for h in H], flat(E), flat(H), flat(M),
-        flat(J) if J is not None else [], list(names) if names is not None else [f"body{k}" for k in range(n)], name,
-    )  # fmt: skip
-    return OperatorSet(source)
 
 
 # ---------------------------------------------------------------------- what the core asks for
@@ -240,7 +249,7 @@ def scalar_gradient(scalar: _core.Scalar, over: str = "coordinates") -> np.ndarr
     model: Any = models.pop()
     if kind == _LOGDET and _is_mass_matrix(operand):
         q, _, precision = operand._state or (model.q, None, "double")
-        return model.log_determinant_gradient(q, over, precision=precision)
+        return _core.Sensitivities(model).log_determinant(over, q, precision)  # not the model's own: its Python face may be gone
     if over != "coordinates":
         raise _core.EvaluationError(f"gradient over {over!r} is there for ln det of the mass matrix and of D, not for {scalar!r}")
     return np.stack([np.asarray(scalar.diff(i), float) for i in range(model.nv)], axis=-1) if model.nv else np.zeros(0)

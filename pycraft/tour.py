@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from rich.console import Console
+from rich.markup import escape
 from rich.padding import Padding
 from rich.table import Table
 from rich.tree import Tree
@@ -46,22 +47,18 @@ class Say:
 
     def heading(self, text: str) -> None:
         self._number += 1
-        self.console.print(f"\n[bold]{self._number}. {text}[/]", highlight=False)
+        self.console.print(f"\n{self._number}. {text}", style="bold", markup=False, highlight=False)
 
     def text(self, text: str) -> None:
-        self.console.print(Padding(text, (0, 0, 0, 3)), highlight=False)
+        self.console.print(Padding(escape(text), (0, 0, 0, 3)), highlight=False)
 
     def code(self, code: str, result: str = "") -> None:
-        self.console.print(Padding(f"[cyan]>>> {_escaped(code)}[/]", (0, 0, 0, 3)), highlight=False)
+        self.console.print(Padding(f"[cyan]>>> {escape(code)}[/]", (0, 0, 0, 3)), highlight=False)
         if result:
-            self.console.print(Padding(_escaped(result), (0, 0, 0, 3)), highlight=False, soft_wrap=True)
+            self.console.print(Padding(escape(result), (0, 0, 0, 3)), highlight=False, soft_wrap=True)
 
     def show(self, thing: Any) -> None:
         self.console.print(Padding(thing, (0, 0, 0, 3)))
-
-
-def _escaped(text: str) -> str:
-    return text.replace("[", "\\[")
 
 
 def _numbers(values: np.ndarray, limit: int = 7) -> str:
@@ -78,7 +75,7 @@ def _show_model(robot: Any, say: Say) -> None:
         f"{robot.name}: {len(robot.bodies)} bodies, {robot.nv} degrees of freedom, "
         f"{sum(b.mass for b in robot.bodies.values()):.4g} kg that move"
     )
-    root = Tree(f"[bold]{robot.name}[/] (base)")
+    root = Tree(f"[bold]{escape(robot.name)}[/] (base)")
     branches: dict[str | None, Tree] = {None: root}
     for i, body in enumerate(robot.bodies.values()):
         if i == 40:
@@ -87,7 +84,7 @@ def _show_model(robot: Any, say: Say) -> None:
         parent = body.parent
         hinge = body.hinge
         branch = branches.get(parent.name if parent else None, root)
-        branches[body.name] = branch.add(f"{body.name}  [dim]{hinge.kind} '{hinge.name}', {body.mass:.4g} kg[/]")
+        branches[body.name] = branch.add(f"{escape(body.name)}  [dim]{hinge.kind} '{escape(hinge.name)}', {body.mass:.4g} kg[/]")
     say.show(root)
 
 

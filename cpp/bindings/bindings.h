@@ -44,6 +44,16 @@ Class declared(py::module_& m, const char* name) {
   return py::reinterpret_borrow<Class>(m.attr(name));
 }
 
+// Pickling and copying are refused by name: what holds plans and workspaces is made anew where it is wanted. (Without it the old pickle
+// protocols make an object with nothing behind it.)
+template <class Class>
+Class& unpicklable(Class& c) {
+  c.def("__reduce__", [](const py::object& self) -> py::tuple {
+    throw py::type_error("a " + std::string(py::str(py::type::of(self).attr("__name__"))) + " cannot be pickled or copied; make it anew where it is wanted");
+  });
+  return c;
+}
+
 // ---- conversions
 Vector3<double> to_vector3(const py::handle& value, const char* what);
 Matrix3<double> to_matrix3(const py::handle& value, const char* what);
@@ -56,9 +66,15 @@ py::array_t<double> to_numpy(const std::vector<double>& v);
 py::object to_array(const Result& result, std::vector<py::ssize_t> shape);
 bool wants_objects(const py::object& dtype);
 
-// An array of real numbers; complex ones and anything else are refused.
+// An array of real numbers. Complex numbers, text, dates and masked entries are refused: NumPy would cast them in silence.
 Array real_array(const py::object& x);                           // TypeError unless real numbers
 Array numbers(const py::handle& value, const char* what);       // ModelError unless real numbers
+double one_number(const py::handle& value, const char* what);       // one of them
+int clipped(const py::handle& whole);                           // a Python integer, the nearest that an int holds; no overflow
+std::vector<double> list_of_numbers(const py::handle& value, const char* what);  // one, or a list of them
+py::object part_of_state(const py::handle& given, const char* what);  // of a State its q or v, by the first letter of what; else what is given
+std::vector<double> one_state(const py::handle& given, const char* what);  // q or v of one state
+std::string shape_text(const py::array& a);                     // how errors call what was given: "4", "an array (1, 3)"
 
 // The symbol of this name of a source; node operators take node names, Delta a coordinate.
 Expression source_symbol(const std::shared_ptr<SkoSource>& source, const std::string& name, const std::vector<std::string>& nodes, int coordinate);
@@ -67,7 +83,9 @@ std::shared_ptr<const Binding> make_binding(const std::vector<Expression>& opera
                                             const Arithmetic& arithmetic);
 // refine: a number of corrections or "auto"; residual: "same" | "wider".
 Refinement refinement(const py::object& refine, const std::string& residual, Precision precision);
-// What an expression is pickled as.
+// What a space and an expression are pickled as.
+py::tuple space_parts(const Space& space);
+Space space_from_parts(const py::tuple& parts);
 py::tuple parts(const Expression& e);
 
 }  // namespace pycraft

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cstring>
+#include <limits>
 
 #include "algebra/errors.h"
 #include "bindings/bindings.h"
@@ -8,37 +9,108 @@ namespace pycraft {
 
 namespace {
 
-// Casting complex to real would drop the imaginary part: a complex step would come back as zero.
-bool is_complex(const py::handle& x) {
-  if (PyFloat_Check(x.ptr()) || PyLong_Check(x.ptr())) return false;
-  if (PyComplex_Check(x.ptr())) return true;
-  if (py::isinstance<py::array_t<double>>(x)) return false;
-  const py::array any = py::array::ensure(x);
-  if (!any) PyErr_Clear();
-  return any && any.dtype().kind() == 'c';
+constexpr const char* complex_numbers = "is complex";
+constexpr const char* no_numbers = "is not an array of numbers";
+
+// What NumPy would turn into a double in silence: an imaginary part dropped (a complex step would come back as zero), text read as a
+// number, dates counted. Null where the entries of an object array are real numbers.
+const char* refused_entries(const py::array& any) {
+  const char kind = any.dtype().kind();
+  if (kind == 'c') return complex_numbers;
+  if (std::strchr("biuf", kind)) return nullptr;
+  if (kind != 'O') return no_numbers;
+  for (const py::handle& item : any.attr("ravel")()) {
+    if (PyUnicode_Check(item.ptr()) || PyBytes_Check(item.ptr())) return no_numbers;
+    if (PyComplex_Check(item.ptr())) return complex_numbers;
+    if (py::hasattr(item, "dtype"))
+      if (const py::array entry = py::array::ensure(item); entry && entry.dtype().kind() != 'O')
+        if (const char* why = refused_entries(entry)) return why;
+  }
+  return nullptr;
+}
+
+// A value as an array of doubles, or null and the reason why it is none.
+Array real_numbers(const py::handle& value, const char*& why) {
+  why = nullptr;
+  const bool plain = Py_TYPE(value.ptr()) == py::detail::npy_api::get().PyArray_Type_;  // else it may be masked
+  if (py::isinstance<Array>(value) && (plain || !py::hasattr(value, "mask"))) return py::reinterpret_borrow<Array>(value);
+  if (PyFloat_Check(value.ptr()) || PyLong_Check(value.ptr())) {
+    const Array a = Array::ensure(value);
+    if (!a) PyErr_Clear(), why = no_numbers;
+    return a;
+  }
+  if (!plain && py::isinstance<py::array>(value) && py::hasattr(value, "mask") && py::cast<bool>(py::bool_(value.attr("mask").attr("any")()))) {
+    why = "has masked entries";
+    return Array();
+  }
+  const py::array any = py::array::ensure(value);
+  if (!any) {
+    PyErr_Clear();
+    why = no_numbers;
+    return Array();
+  }
+  if ((why = refused_entries(any))) return Array();
+  const Array a = Array::ensure(any);
+  if (!a) PyErr_Clear(), why = no_numbers;
+  return a;
 }
 
 }  // namespace
 
 Array numbers(const py::handle& value, const char* what) {
-  if (is_complex(value)) throw ModelError(std::string(what) + " is complex; models take real numbers");
-  Array a = Array::ensure(value);
-  if (!a) {
-    PyErr_Clear();
-    throw ModelError(std::string(what) + " is not an array of numbers");
-  }
+  const char* why;
+  const Array a = real_numbers(value, why);
+  if (why) throw ModelError(std::string(what) + " " + why + (why == complex_numbers ? "; models take real numbers" : ""));
   return a;
+}
+
+double one_number(const py::handle& value, const char* what) {
+  const Array a = numbers(value, what);
+  if (a.ndim() != 0) throw ModelError(std::string(what) + " takes one number, not an array of " + std::to_string(a.size()));
+  return *a.data();
+}
+
+int clipped(const py::handle& whole) {
+  constexpr py::ssize_t most = std::numeric_limits<int>::max();
+  const py::ssize_t n = PyNumber_AsSsize_t(whole.ptr(), nullptr);
+  if (n == -1 && PyErr_Occurred()) throw py::error_already_set();
+  return static_cast<int>(std::clamp<py::ssize_t>(n, -most, most));
+}
+
+std::vector<double> list_of_numbers(const py::handle& value, const char* what) {
+  const Array a = numbers(value, what);
+  if (a.ndim() > 1) throw ModelError(std::string(what) + " takes a number or a list of numbers, not an array of " + std::to_string(a.ndim()) + " dimensions");
+  return {a.data(), a.data() + a.size()};
+}
+
+std::vector<double> one_state(const py::handle& given, const char* what) {
+  const Array a = numbers(part_of_state(given, what), what);
+  if (a.ndim() != 1) throw ModelError(std::string(what) + " is a list of numbers, one state, not " + shape_text(a));
+  return {a.data(), a.data() + a.size()};
+}
+
+py::object part_of_state(const py::handle& given, const char* what) {
+  if (!py::isinstance<py::array>(given) && py::hasattr(given, "q") && py::hasattr(given, "v")) return given.attr(what[0] == 'q' ? "q" : "v");
+  return py::reinterpret_borrow<py::object>(given);
+}
+
+std::string shape_text(const py::array& a) {
+  if (a.ndim() == 0) return "one number";
+  if (a.ndim() == 1) return std::to_string(a.size());
+  std::string text;
+  for (py::ssize_t i = 0; i < a.ndim(); ++i) text += (i ? ", " : "an array (") + std::to_string(a.shape(i));
+  return text + ")";
 }
 
 Vector3<double> to_vector3(const py::handle& value, const char* what) {
   const Array a = numbers(value, what);
-  if (a.size() != 3) throw ModelError(std::string(what) + " takes 3 numbers, not " + std::to_string(a.size()));
+  if (a.ndim() != 1 || a.size() != 3) throw ModelError(std::string(what) + " takes 3 numbers, not " + shape_text(a));
   return {a.data()[0], a.data()[1], a.data()[2]};
 }
 
 Matrix3<double> to_matrix3(const py::handle& value, const char* what) {
   const Array a = numbers(value, what);
-  if (a.ndim() != 2 || a.shape(0) != 3 || a.shape(1) != 3) throw ModelError(std::string(what) + " takes a 3 x 3 matrix");
+  if (a.ndim() != 2 || a.shape(0) != 3 || a.shape(1) != 3) throw ModelError(std::string(what) + " takes a 3 x 3 matrix, not " + shape_text(a));
   Matrix3<double> A;
   std::memcpy(A.m, a.data(), sizeof A.m);
   return A;
@@ -88,12 +160,10 @@ py::object to_array(const Result& r, std::vector<py::ssize_t> shape) {
 }
 
 Array real_array(const py::object& x) {
-  if (is_complex(x)) throw py::type_error("operators act on real arrays; apply them to the real and imaginary parts");
-  Array a = Array::ensure(x);
-  if (!a) {
-    PyErr_Clear();
-    throw py::type_error("an operator is applied to an array of numbers, not to this");
-  }
+  const char* why;
+  const Array a = real_numbers(x, why);
+  if (why == complex_numbers) throw py::type_error("operators act on real arrays; apply them to the real and imaginary parts");
+  if (why) throw py::type_error(std::string("an operator is applied to an array of numbers; this ") + why);
   return a;
 }
 
@@ -108,8 +178,7 @@ Refinement refinement(const py::object& refine, const std::string& residual, Pre
     r.steps = Refinement::automatic;
   } else {
     const bool whole = PyIndex_Check(refine.ptr()) && !py::isinstance<py::bool_>(refine);
-    const py::ssize_t steps = whole ? PyNumber_AsSsize_t(refine.ptr(), nullptr) : -1;  // clipped to its range
-    r.steps = static_cast<int>(std::clamp<py::ssize_t>(steps, -1, most_steps + 1));
+    r.steps = whole ? clipped(refine) : -1;
     if (r.steps < 0 || r.steps > most_steps)
       throw EvaluationError("refine=" + py::cast<std::string>(py::repr(refine)) + ": a number of corrections, 0, 1, 2, ..., " + std::to_string(most_steps) + ", or 'auto'");
   }

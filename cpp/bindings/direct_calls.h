@@ -47,8 +47,7 @@ struct Argument {
 
 inline Argument argument(const py::object& given, int width, const char* what, const Multibody& model) {
   Argument a;
-  // a State stands for its q and its v
-  a.array = numbers(what[1] == 0 && py::hasattr(given, "q") && py::hasattr(given, "v") ? py::object(given.attr(what)) : given, what);
+  a.array = numbers(what[1] == 0 ? part_of_state(given, what) : given, what);
   if (a.array.ndim() < 1 || a.array.ndim() > 2 || a.array.shape(a.array.ndim() - 1) != width)
     throw ModelError(std::string(what) + " of '" + model.name() + "' takes " + std::to_string(width) + " numbers, or (B, " + std::to_string(width) + ") for a batch");
   if (a.array.ndim() == 2) {
@@ -56,6 +55,13 @@ inline Argument argument(const py::object& given, int width, const char* what, c
     a.stride = width;
   }
   return a;
+}
+
+// An argument in the memory that the result is written to would change while it is read: it is copied first.
+inline void keep_apart(Argument& a, const py::array_t<double>& out) {
+  const double *from = a.array.data(), *to = out.data();
+  if (!a.array || from >= to + out.size() || to >= from + a.array.size()) return;
+  a.array = Array(std::vector<py::ssize_t>(a.array.shape(), a.array.shape() + a.array.ndim()), from);
 }
 
 inline int common_batch(std::initializer_list<const Argument*> arguments) {
@@ -72,7 +78,8 @@ inline int common_batch(std::initializer_list<const Argument*> arguments) {
 inline py::array_t<double> output(const py::object& out, int batch, std::vector<py::ssize_t> shape) {
   if (batch >= 0) shape.insert(shape.begin(), batch);
   if (out.is_none()) return py::array_t<double>(shape);
-  const bool fits = py::isinstance<py::array_t<double>>(out) && (py::cast<py::array>(out).flags() & py::array::c_style) && py::cast<py::array>(out).writeable() &&
+  constexpr int aligned = py::detail::npy_api::NPY_ARRAY_ALIGNED_;
+  const bool fits = py::isinstance<py::array_t<double>>(out) && (py::cast<py::array>(out).flags() & aligned) && (py::cast<py::array>(out).flags() & py::array::c_style) && py::cast<py::array>(out).writeable() &&
                     py::cast<py::array>(out).ndim() == static_cast<py::ssize_t>(shape.size()) &&
                     std::equal(shape.begin(), shape.end(), py::cast<py::array>(out).shape());
   if (!fits) {
@@ -101,6 +108,7 @@ inline void require_finite(const double* x, size_t n, const Multibody& model) {
 }
 
 // Calls that stop at quad.
+inline constexpr const char* to_quad = "this call computes in precision 'single' to 'quad'; operators, and forward dynamics, go to 100 digits";
 template <template <class> class Workspace, class S>
 inline constexpr bool available_at = true;
 
@@ -109,8 +117,11 @@ template <template <class> class Workspace, class F>
 py::array_t<double> run(DirectCalls<Workspace>& d, Precision precision, std::vector<std::pair<const Argument*, int>> in, py::array_t<double> out, int out_size, int batch, F f) {
   const int states = batch < 0 ? 1 : batch;
   double* target = out.mutable_data();
+  std::vector<Argument> own;
+  own.reserve(in.size());
+  for (const auto& [a, _] : in) keep_apart(own.emplace_back(*a), out);
   std::vector<const double*> data;
-  for (const auto& [a, _] : in) data.push_back(a->array.data());
+  for (const Argument& a : own) data.push_back(a.array.data());
   py::gil_scoped_release release;
   const auto run_in = [&]<class S>(S) {
     std::vector<std::vector<S>> wide(in.size());
@@ -139,7 +150,7 @@ py::array_t<double> run(DirectCalls<Workspace>& d, Precision precision, std::vec
     if constexpr (available_at<Workspace, S>)
       run_in(s);
     else
-      throw EvaluationError("this call computes in precision 'single' to 'quad'; operators, and forward dynamics, go to 100 digits");
+      throw EvaluationError(to_quad);
   };
   at_precision(precision, widest);
   return out;

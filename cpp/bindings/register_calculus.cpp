@@ -51,7 +51,7 @@ Scalar nothing_of(const Scalar& s) {
 int coordinate_of(const MultibodyOperators& model, const py::object& direction) {
   const auto& names = model.structure().coordinate_names;
   if (!py::isinstance<py::str>(direction)) {
-    const int i = direction.cast<int>();
+    const int i = clipped(direction);
     return i < 0 ? i + static_cast<int>(names.size()) : i;
   }
   const auto name = direction.cast<std::string>();
@@ -135,7 +135,16 @@ void register_calculus(py::module_& m) {
 
   py::class_<Parameter>(m, "Parameter", "What diff() takes beside a coordinate: a mass property, a rotor inertia, a placement, a hinge axis.")
       .def_readonly("name", &Parameter::name)
-      .def("__repr__", [](const Parameter& p) { return "<parameter " + p.name + ">"; });
+      .def("__repr__", [](const Parameter& p) { return "<parameter " + p.name + ">"; })
+      .def("__reduce__", [](const Parameter& p) -> py::tuple {
+        p.source->check_current();
+        const py::module_ core = py::module_::import("pycraft._core");
+        if (p.rotor >= 0) return py::make_tuple(core.attr("_rotor_parameter"), py::make_tuple(p.source, p.rotor, p.name));
+        if (p.twists.empty()) return py::make_tuple(core.attr("_inertia_parameter"), py::make_tuple(p.source, p.inertia_body, static_cast<int>(p.inertia), p.name));
+        py::list twists;
+        for (const InsertedTwist& t : p.twists) twists.append(py::make_tuple(t.body, t.position, std::vector<double>(t.twist, t.twist + 6)));
+        return py::make_tuple(core.attr("_twist_parameter"), py::make_tuple(p.source, twists, p.name));
+      });
   m.def("_inertia_parameter", [](const std::shared_ptr<MultibodyOperators>& source, int body, int which, const std::string& name) {
     Parameter p{source, name, {}, body, static_cast<InertiaParameter>(which), -1};
     return p;

@@ -14,7 +14,10 @@ void require_finite(const Array& a, const std::string& name) {
 }
 
 Expression constant_operator(const py::object& given, const py::object& domain, const py::object& codomain, const std::string& name) {
-  const auto space = [](const py::object& s) { return py::isinstance<py::int_>(s) ? Space::euclidean(s.cast<int>()) : s.cast<Space>(); };
+  const auto space = [](const py::object& s) { 
+    if (py::isinstance<Space>(s)) return s.cast<Space>();
+    return py::module_::import("pycraft._core").attr("euclidean")(s).cast<Space>();
+  };
   const Space in = space(domain), out = space(codomain);
   if (py::isinstance<py::list>(given) && py::len(given) > 0 && py::isinstance<py::array>(py::list(given)[0]) && in.belongs_to_bodies() &&
       py::len(given) == in.layout().of_body.size()) {
@@ -67,15 +70,19 @@ struct Callable {
 Expression external_operator(const py::object& product, const py::object& transposed, const Space& domain, const Space& codomain, const std::string& name) {
   auto data = std::make_shared<ExternalData>();
   data->name = name;
-  const auto wrap = [](const py::object& f, int in, int out) -> std::function<void(const double*, double*, int)> {
+  const auto wrap = [&name](const py::object& f, int in, int out) -> std::function<void(const double*, double*, int)> {
     if (f.is_none()) return nullptr;
     auto held = std::make_shared<Callable>(f);
-    return [held, in, out](const double* x, double* y, int m) {
+    return [held, in, out, name](const double* x, double* y, int m) {
       py::gil_scoped_acquire gil;
       py::array_t<double> a({static_cast<py::ssize_t>(in), static_cast<py::ssize_t>(m)});
       std::copy_n(x, size_t(in) * m, a.mutable_data());
-      const Array r = Array::ensure(held->f(a));
-      if (!r || r.size() != py::ssize_t(out) * m) throw EvaluationError("an operator from outside returned an array of the wrong shape");
+      const std::string what = "the result of '" + name + "', an operator from outside,";
+      const Array r = numbers(held->f(a), what.c_str());
+      const bool fits = (r.ndim() == 2 && r.shape(0) == out && r.shape(1) == m) || (r.ndim() == 1 && m == 1 && r.shape(0) == out);
+      if (!fits)
+        throw EvaluationError(what + " is " + shape_text(r) + "; of an array (" + std::to_string(in) + ", " + std::to_string(m) + ") it is (" + std::to_string(out) +
+                              ", " + std::to_string(m) + ")");
       std::copy_n(r.data(), r.size(), y);
     };
   };

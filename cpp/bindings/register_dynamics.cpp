@@ -78,13 +78,15 @@ void register_dynamics(py::module_& m) {
     const int steps = refinement(refine, residual, precision).steps;
     return steps == Refinement::automatic ? py::object(py::str("auto")) : py::object(py::int_(steps));
   }, py::arg("refine"), py::arg("residual"), py::arg("precision"), "The number of corrections, or 'auto'; EvaluationError for anything else.");
-  py::class_<Dynamics>(m, "Dynamics")
+  py::class_<Dynamics> dynamics(m, "Dynamics");
+  unpicklable(dynamics)
       .def(py::init<std::shared_ptr<Multibody>>())
       .def("forward_dynamics", [](Dynamics& d, const py::object& q, const py::object& v, const py::object& tau, Form form, const py::object& refine,
                                   const std::string& residual, Precision precision, const std::string& on_singular, const py::object& out) {
-        const Forces in(d.model(), q, v, tau);
+        Forces in(d.model(), q, v, tau);
         const Solving how{form, refinement(refine, residual, precision), on_singular_from_name(on_singular)};
         py::array_t<double> result = output(out, in.batch, {d.model().nv()});
+        for (Argument* a : {&in.q, &in.v, &in.tau}) keep_apart(*a, result);
         double* target = result.mutable_data();
         py::gil_scoped_release release;
         at_precision(precision, [&]<class S>(S) { run_forward<S>(d, in, how, target); });
@@ -184,17 +186,19 @@ void register_dynamics(py::module_& m) {
           y[15] = 1;
         });
       }, py::arg("frame"), py::arg("q"))
-      .def("energy", [](Dynamics& d, const py::object& q, const py::object& v) {
+      .def("energy", [](Dynamics& d, const py::object& q, const py::object& v, const py::object& datum) {
         const Multibody& mb = d.model();
+        const Vector3<double> origin = to_vector3(datum, "datum");
         const Argument a = argument(q, mb.nq(), "q", mb), b = argument(v, mb.nv(), "v", mb);
         const int batch = common_batch({&a, &b});
         check_states(mb, a, batch);
         check_velocities(mb, b, batch, "v");
-        return run(d, Precision::double_, {{&a, mb.nq()}, {&b, mb.nv()}}, output(py::none(), batch, {2}), 2, batch, [](auto& w, auto in, auto* y) {
+        return run(d, Precision::double_, {{&a, mb.nq()}, {&b, mb.nv()}}, output(py::none(), batch, {2}), 2, batch, [&](auto& w, auto in, auto* y) {
+          using S = std::remove_pointer_t<decltype(y)>;
           y[0] = w.kinetic_energy(in[0], in[1]);
-          y[1] = w.potential_energy(in[0]);
+          y[1] = w.potential_energy(in[0], cast<S>(origin));
         });
-      }, py::arg("q"), py::arg("v"));
+      }, py::arg("q"), py::arg("v"), py::arg("datum"));
 }
 
 }  // namespace pycraft

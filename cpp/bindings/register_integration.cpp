@@ -69,7 +69,8 @@ py::dict trajectory(const Multibody& mb, const std::vector<double>& q, const std
 }  // namespace
 
 void register_integration(py::module_& m) {
-  py::class_<Integration>(m, "Integration", "Rates of configurations and trajectories of one model.")
+  py::class_<Integration> integration(m, "Integration", "Rates of configurations and trajectories of one model.");
+  unpicklable(integration)
       .def(py::init<std::shared_ptr<Multibody>>())
       .def("configuration_rate", [](Integration& d, const py::object& q, const py::object& v, Precision precision, const py::object& out) {
         const Multibody& mb = d.model();

@@ -25,7 +25,8 @@ struct MotionState {
 
 void register_methods(py::module_& m) {
   const py::arg q("q"), v("v"), tau("tau"), precision("precision");
-  py::class_<Methods>(m, "Methods", "Forward dynamics of one model by 'cholesky', 'ldl', 'conjugate-gradients' or 'inverse'.")
+  py::class_<Methods> methods_class(m, "Methods", "Forward dynamics of one model by 'cholesky', 'ldl', 'conjugate-gradients' or 'inverse'.");
+  unpicklable(methods_class)
       .def(py::init<std::shared_ptr<Multibody>>())
       .def("forward_dynamics", [](Methods& d, const std::string& method, const py::object& q, const py::object& v, const py::object& tau,
                                   Precision precision, const py::object& out) {

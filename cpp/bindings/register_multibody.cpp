@@ -15,23 +15,42 @@ py::dict subhinge_dict(const Subhinge& s) {
   return d;
 }
 
+py::dict node_dict(const Node& n) {
+  py::dict d;
+  d["name"] = n.name;
+  d["body"] = n.body;
+  d["rotation"] = to_numpy(n.pose.R);
+  d["position"] = to_numpy(n.pose.p);
+  return d;
+}
+
+// A subhinge from a mapping with "kind", and "axis", "point", "pitch" as far as the kind has them.
 Subhinge subhinge_from(const py::handle& item, const std::string& hinge) {
-  const py::dict d = py::cast<py::dict>(item);
-  Subhinge s;
-  s.kind = subhinge_kind_from_name(py::cast<std::string>(d["kind"]));
+  const std::string name = "hinge '" + hinge + "'";
+  if (!py::isinstance<py::dict>(item))
+    throw ModelError(name + ": a subhinge is a dict with kind, axis, point and pitch, not " + std::string(py::repr(item)).substr(0, 80));
+  const py::dict d = py::reinterpret_borrow<py::dict>(item);
+  for (const auto& [key, _] : d) {
+    const std::string text = py::str(key);
+    if (text != "kind" && text != "axis" && text != "point" && text != "pitch")
+      throw ModelError(name + ": a subhinge has no '" + text + "'; there are kind, axis, point, pitch");
+  }
+  if (!d.contains("kind") || !py::isinstance<py::str>(d["kind"]))
+    throw ModelError(name + ": a subhinge says its kind, one of pin, slider, screw, ball, free: {\"kind\": \"pin\"}");
+  const SubhingeKind kind = subhinge_kind_from_name(py::cast<std::string>(d["kind"]));
   Vector3<double> axis{0, 0, 1}, point{0, 0, 0};
   double pitch = 0;
-  if (d.contains("axis")) axis = to_vector3(d["axis"], ("axis of hinge '" + hinge + "'").c_str());
-  if (d.contains("point")) point = to_vector3(d["point"], ("point of hinge '" + hinge + "'").c_str());
-  if (d.contains("pitch")) pitch = py::cast<double>(d["pitch"]);
-  switch (s.kind) {  // the checks of the one-subhinge kinds serve here too
-    case SubhingeKind::pin: return subhinges_of(HingeKind::pin, {axis}, point, 0, hinge)[0];
-    case SubhingeKind::slider: return subhinges_of(HingeKind::slider, {axis}, point, 0, hinge)[0];
+  if (d.contains("axis")) axis = to_vector3(d["axis"], ("axis of " + name).c_str());
+  if (d.contains("point")) point = to_vector3(d["point"], ("point of " + name).c_str());
+  if (d.contains("pitch")) pitch = one_number(d["pitch"], ("pitch of " + name).c_str());
+  switch (kind) {  // the checks of the one-subhinge kinds serve here too
+    case SubhingeKind::pin: return subhinges_of(HingeKind::pin, {axis}, point, pitch, hinge)[0];
+    case SubhingeKind::slider: return subhinges_of(HingeKind::slider, {axis}, point, pitch, hinge)[0];
     case SubhingeKind::screw: return subhinges_of(HingeKind::screw, {axis}, point, pitch, hinge)[0];
-    case SubhingeKind::ball: return subhinges_of(HingeKind::ball, {}, point, 0, hinge)[0];
-    case SubhingeKind::free: return subhinges_of(HingeKind::free, {}, point, 0, hinge)[0];
+    case SubhingeKind::ball: return subhinges_of(HingeKind::ball, {}, point, pitch, hinge)[0];
+    case SubhingeKind::free: return subhinges_of(HingeKind::free, {}, point, pitch, hinge)[0];
   }
-  return s;
+  throw ModelError(name + " has a subhinge of no kind");
 }
 
 Pose<double> pose_from(const py::object& rotation, const py::object& position, const std::string& what) {
@@ -54,32 +73,29 @@ void register_multibody(py::module_& m) {
       .def_property_readonly("_size", &Multibody::bodies)
       .def("_add_body",
            [](Multibody& mb, const std::string& name, const std::string& parent, const std::string& hinge, const std::string& hinge_name,
-              const std::vector<py::object>& axes, const py::object& point, double pitch, const py::object& subhinges, const py::object& rotation,
-              const py::object& position, double mass, const py::object& com, const py::object& inertia, const std::vector<double>& rotor_inertia,
-              const std::vector<double>& lower, const std::vector<double>& upper) {
+              const std::vector<py::object>& axes, const py::object& point, const py::object& pitch, const py::object& subhinges, const py::object& rotation,
+              const py::object& position, const py::object& mass, const py::object& com, const py::object& inertia, const py::object& rotor_inertia,
+              const py::object& lower, const py::object& upper) {
              Body b;
              b.name = name;
-             b.mass = mass;
+             b.mass = one_number(mass, ("mass of body '" + name + "'").c_str());
              if (!com.is_none()) b.com = to_vector3(com, ("centre of mass of body '" + name + "'").c_str());
              if (!inertia.is_none()) b.inertia = to_symmetric3(inertia, ("inertia of body '" + name + "'").c_str());
-             b.hinge.name = hinge_name;
+             b.hinge.name = hinge_name.empty() ? name : hinge_name;
+             const std::string shown = "hinge '" + b.hinge.name + "'";
              b.hinge.kind = hinge_kind_from_name(hinge);
-             const std::string shown = hinge_name.empty() ? name : hinge_name;
-             if (b.hinge.kind == HingeKind::custom) {
-               if (subhinges.is_none()) throw ModelError("hinge '" + shown + "' of kind 'custom' takes its subhinges one by one: subhinges=[...]");
-               for (const auto& item : py::cast<py::list>(subhinges)) b.hinge.subhinges.push_back(subhinge_from(item, shown));
-             } else if (!subhinges.is_none()) {
-               for (const auto& item : py::cast<py::list>(subhinges)) b.hinge.subhinges.push_back(subhinge_from(item, shown));
+             if (!subhinges.is_none()) {
+               for (const auto& item : subhinges) b.hinge.subhinges.push_back(subhinge_from(item, b.hinge.name));
              } else {
                std::vector<Vector3<double>> directions;
-               for (const py::object& a : axes) directions.push_back(to_vector3(a, ("axis of hinge '" + shown + "'").c_str()));
-               const Vector3<double> at = point.is_none() ? Vector3<double>{0, 0, 0} : to_vector3(point, ("point of hinge '" + shown + "'").c_str());
-               b.hinge.subhinges = subhinges_of(b.hinge.kind, directions, at, pitch, shown);
+               for (const py::object& a : axes) directions.push_back(to_vector3(a, ("axis of " + shown).c_str()));
+               const Vector3<double> at = point.is_none() ? Vector3<double>{0, 0, 0} : to_vector3(point, ("point of " + shown).c_str());
+               b.hinge.subhinges = subhinges_of(b.hinge.kind, directions, at, one_number(pitch, ("pitch of " + shown).c_str()), b.hinge.name);
              }
-             b.hinge.placement = pose_from(rotation, position, "the placement of hinge '" + shown + "'");
-             b.hinge.rotor_inertia = rotor_inertia;
-             b.hinge.lower = lower;
-             b.hinge.upper = upper;
+             b.hinge.placement = pose_from(rotation, position, "the placement of " + shown);
+             if (!rotor_inertia.is_none()) b.hinge.rotor_inertia = list_of_numbers(rotor_inertia, ("rotor inertia of " + shown).c_str());
+             if (!lower.is_none()) b.hinge.lower = list_of_numbers(lower, ("lower limit of " + shown).c_str());
+             if (!upper.is_none()) b.hinge.upper = list_of_numbers(upper, ("upper limit of " + shown).c_str());
              mb.add_body(std::move(b), parent);
            },
            py::arg("name"), py::arg("parent"), py::arg("hinge"), py::arg("hinge_name"), py::arg("axes"), py::arg("point"), py::arg("pitch"),
@@ -120,15 +136,13 @@ void register_multibody(py::module_& m) {
       })
       .def("_nodes", [](const Multibody& mb) {
         py::list nodes;
-        for (const Node& n : mb.nodes()) {
-          py::dict d;
-          d["name"] = n.name;
-          d["body"] = n.body;
-          d["rotation"] = to_numpy(n.pose.R);
-          d["position"] = to_numpy(n.pose.p);
-          nodes.append(d);
-        }
+        for (const Node& n : mb.nodes()) nodes.append(node_dict(n));
         return nodes;
+      })
+      .def("_node", [](const Multibody& mb, const std::string& name) {
+        const int i = mb.node_index(name);
+        if (i >= static_cast<int>(mb.nodes().size())) throw ModelError("'" + name + "' is a body of '" + mb.name() + "', not a node; bodies are in bodies[...]");
+        return node_dict(mb.nodes()[i]);
       })
       .def("_slices", [](const Multibody& mb, int k) {
         const Hinge& h = mb.body(k).hinge;
@@ -144,15 +158,21 @@ void register_multibody(py::module_& m) {
       })
       .def_property_readonly("coordinate_names", [](const Multibody& mb) { return mb.structure().coordinate_names; },
                              "One per generalized velocity: the hinge's name, or \"hinge[j]\" where it has several.")
-      .def("_set_mass_properties", [](Multibody& mb, int k, double mass, const py::object& com, const py::object& inertia) {
+      .def("_set_mass_properties", [](Multibody& mb, int k, const py::object& mass, const py::object& com, const py::object& inertia) {
         const std::string name = mb.body(k).name;
-        mb.set_mass_properties(k, mass, to_vector3(com, ("centre of mass of body '" + name + "'").c_str()),
+        mb.set_mass_properties(k, one_number(mass, ("mass of body '" + name + "'").c_str()), to_vector3(com, ("centre of mass of body '" + name + "'").c_str()),
                                to_symmetric3(inertia, ("inertia of body '" + name + "'").c_str()));
       })
       .def("_set_placement", [](Multibody& mb, int k, const py::object& rotation, const py::object& position) {
         mb.set_placement(k, pose_from(rotation, position, "the placement of hinge '" + mb.body(k).hinge.name + "'"));
       })
-      .def("_set_rotor_inertia", &Multibody::set_rotor_inertia)
+      .def("_set_rotor_inertia", [](Multibody& mb, int k, const py::object& values) {
+        mb.set_rotor_inertia(k, list_of_numbers(values, ("rotor inertia of hinge '" + mb.body(k).hinge.name + "'").c_str()));
+      })
+      .def("_set_limits", [](Multibody& mb, int k, const py::object& lower, const py::object& upper) {
+        const std::string name = " limit of hinge '" + mb.body(k).hinge.name + "'";
+        mb.set_limits(k, list_of_numbers(lower, ("lower" + name).c_str()), list_of_numbers(upper, ("upper" + name).c_str()));
+      })
       .def_property("gravity", [](const Multibody& mb) { return to_numpy(mb.gravity()); },
                     [](Multibody& mb, const py::object& g) { mb.set_gravity(to_vector3(g, "gravity")); },
                     "Gravity acceleration in world axes, m/s²; zero until it is set.")
@@ -161,8 +181,7 @@ void register_multibody(py::module_& m) {
         a.attr("setflags")(py::arg("write") = false);
         return a;
       }, [](Multibody& mb, const py::object& given) {
-        const Array q = numbers(given, "q");
-        mb.set_q(std::vector<double>(q.data(), q.data() + q.size()));
+        mb.set_q(one_state(given, "q"));
       },
          "Generalized coordinates (nq,): copied in when set, read-only when read.")
       .def_property("v", [](const Multibody& mb) {
@@ -170,13 +189,12 @@ void register_multibody(py::module_& m) {
         a.attr("setflags")(py::arg("write") = false);
         return a;
       }, [](Multibody& mb, const py::object& given) {
-        const Array v = numbers(given, "v");
-        mb.set_v(std::vector<double>(v.data(), v.data() + v.size()));
+        mb.set_v(one_state(given, "v"));
       },
          "Generalized velocities (nv,): copied in when set, read-only when read.")
       .def("zero_q", [](const Multibody& mb) { return to_numpy(mb.zero_q()); }, "All coordinates zero, quaternions (1, 0, 0, 0).")
       .def("integrate", [](const Multibody& mb, const py::object& at, const py::object& along) {
-        const Array q = numbers(at, "q"), dv = numbers(along, "dv");
+        const std::vector<double> q = one_state(at, "q"), dv = one_state(along, "dv");
         mb.check_q(q.data(), q.size());
         mb.check_v(dv.data(), dv.size(), "dv");
         std::vector<double> out(mb.nq());
@@ -184,7 +202,7 @@ void register_multibody(py::module_& m) {
         return to_numpy(out);
       }, py::arg("q"), py::arg("dv"), "q moved along the velocity dv for unit time: on the group for ball and free hinges (exponential of the body twist).")
       .def("difference", [](const Multibody& mb, const py::object& from, const py::object& to) {
-        const Array q0 = numbers(from, "q0"), q1 = numbers(to, "q1");
+        const std::vector<double> q0 = one_state(from, "q0"), q1 = one_state(to, "q1");
         mb.check_q(q0.data(), q0.size());
         mb.check_q(q1.data(), q1.size());
         std::vector<double> out(mb.nv());
@@ -192,7 +210,7 @@ void register_multibody(py::module_& m) {
         return to_numpy(out);
       }, py::arg("q0"), py::arg("q1"), "The velocity dv with integrate(q0, dv) = q1.")
       .def("check_q", [](const Multibody& mb, const py::object& given) {
-        const Array q = numbers(given, "q");
+        const std::vector<double> q = one_state(given, "q");
         mb.check_q(q.data(), q.size());
       })
       .def("take_warnings", &Multibody::take_warnings)

@@ -12,10 +12,13 @@ py::object source_of(const Symbol& s) { return py::cast(s.source); }
 
 py::object binding_of(const Symbol& s) { return s.binding ? py::cast(std::const_pointer_cast<Binding>(s.binding)) : py::none(); }
 
+}  // namespace
+
 // A space as its model and kind, so that it can be pickled and found again.
 py::tuple space_parts(const Space& s) {
   if (s.kind() == SpaceKind::Euclidean) return py::make_tuple(py::none(), static_cast<int>(s.kind()), s.dimension(), py::list());
   const auto source = source_owning(s);
+  if (!source) throw StaleOperatorError("the model of " + s.description() + " is gone; a space is pickled and copied with its model");
   py::list names;
   for (const auto& b : s.layout().blocks)
     if (!s.layout().nodes.empty()) names.append(b.label);
@@ -34,8 +37,6 @@ Space space_from_parts(const py::tuple& t) {
   if (kind == SpaceKind::Whitened) return Space(kind, source->forces().layout_pointer());
   return source->space(kind, {});
 }
-
-}  // namespace
 
 py::tuple parts(const Expression& e) {
   const auto& n = e.node();

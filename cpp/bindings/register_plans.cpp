@@ -192,7 +192,8 @@ void register_plans(py::module_& m) {
     for (int i = 0; i < step_kinds; ++i) names.push_back(step_kind_name(static_cast<StepKind>(i)));
     return names;
   }, "The kinds of steps that plans are made of.");
-  py::class_<PassCounts>(m, "PassCounts", "What the last run of a plan executed.")
+  py::class_<PassCounts> counts(m, "PassCounts", "What the last run of a plan executed.");
+  unpicklable(counts)
       .def_readonly("values", &PassCounts::values)
       .def_readonly("gathers", &PassCounts::gathers)
       .def_readonly("scatters", &PassCounts::scatters)
@@ -203,7 +204,8 @@ void register_plans(py::module_& m) {
         return "<passes: " + std::to_string(c.kernels) + " kernels, " + std::to_string(c.gathers) + " gathers, " + std::to_string(c.scatters) +
                " scatters, " + std::to_string(c.eliminations) + " eliminations, " + std::to_string(c.dense) + " dense>";
       });
-  declared<py::class_<ExecutionPool, std::shared_ptr<ExecutionPool>>>(m, "Plan")
+  auto plan = declared<py::class_<ExecutionPool, std::shared_ptr<ExecutionPool>>>(m, "Plan");
+  unpicklable(plan)
       .def("__str__",
            [](const ExecutionPool& p) {
              std::string text = explain(p.plan());

@@ -1,7 +1,7 @@
 #include <cmath>
 
+#include "algebra/errors.h"
 #include "algebra/scalar_expression.h"
-
 #include "bindings/bindings.h"
 
 namespace pycraft {
@@ -17,6 +17,17 @@ py::object value(const Scalar& s) {
   }
   if (batch < 0) return py::float_(v[0]);
   return to_numpy(v);
+}
+
+// What stands behind a scalar's formula where it is shown: its value, or how many it has; nothing where it has none at present.
+std::string shown_value(const Scalar& s, const char* equals) {
+  try {
+    const py::object v = value(s);
+    if (!py::isinstance<py::float_>(v)) return ", at " + std::to_string(py::len(v)) + " states";
+    return equals + std::string(py::str(v.attr("__format__")(".12g")));
+  } catch (const Error&) {
+    return "";
+  }
 }
 
 // A number beside a scalar; anything else is refused: an operator or another scalar would have to be frozen at the present state.
@@ -87,8 +98,8 @@ void register_scalars(py::module_& m) {
       }, py::arg("language") = "text", "The recursion that computes it: \"text\", \"latex\", \"python\" or \"cpp\". See pycraft.algorithm.")
       .def("text", [](const Scalar& a) { return show(a); })
       .def("latex", [](const Scalar& a) { return show(a, Style::latex); })
-      .def("_repr_latex_", [](const Scalar& a) { return "$" + show(a, Style::latex) + "$"; })
-      .def("__repr__", [](const Scalar& a) { return "<scalar " + show(a) + ">"; })
+      .def("_repr_latex_", [](const Scalar& a) { return "$" + show(a, Style::latex) + shown_value(a, " = ") + "$"; })
+      .def("__repr__", [](const Scalar& a) { return "<scalar " + show(a) + shown_value(a, " = ") + ">"; })
       .def("_parts", [](const Scalar& a) {
         const auto& n = a.node();
         return py::make_tuple(static_cast<int>(n.kind), n.value, n.operand ? py::cast(n.operand) : py::none(), py::cast(n.terms));

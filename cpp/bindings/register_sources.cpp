@@ -84,22 +84,18 @@ std::shared_ptr<const Binding> make_binding(const std::vector<Expression>& opera
   for (const auto& s : sources)
     if (s->nq() || s->nv()) nq = s->nq(), nv = s->nv();
   if (q_given.is_none()) {
-    for (const auto& s : sources)
-      if (s->nq() || s->nv()) {
-        const auto now = s->state();
-        binding->q = now->q;
-        binding->v = now->v;
-      }
-    if (sources.size() > 1)
-      for (const auto& s : sources)
-        if (s->nq() && (s->nq() != nq)) throw EvaluationError("operators of two models: bind each with its own .at(q)");
-  } else {
-    py::object q = q_given, v = v_given;
-    if (py::hasattr(q, "q") && py::hasattr(q, "v")) {
-      v = q.attr("v");
-      q = q.attr("q");
+    bool taken = false;
+    for (const auto& s : sources) {
+      if (!s->nq() && !s->nv()) continue;
+      const auto now = s->state();
+      const std::vector<double> v = v_given.is_none() ? now->v : one_state(v_given, "v");
+      if (taken && (binding->q != now->q || binding->v != v)) throw EvaluationError("operators of two models: bind each with its own .at(q)");
+      binding->q = now->q, binding->v = v, taken = true;
+      s->check_state(binding->q.data(), binding->q.size(), binding->v.data(), binding->v.size());
     }
-    const Array a = real_array(q);
+  } else {
+    const py::object v = v_given.is_none() && py::hasattr(q_given, "q") && py::hasattr(q_given, "v") ? py::object(q_given.attr("v")) : part_of_state(v_given, "v");
+    const Array a = numbers(part_of_state(q_given, "q"), "q");
     if (a.ndim() != 1 && a.ndim() != 2) throw ModelError("a state is an array (nq,), a batch of states (B, nq)");
     const py::ssize_t width = a.shape(a.ndim() - 1);
     binding->batch = a.ndim() == 2 ? static_cast<int>(a.shape(0)) : -1;
@@ -107,7 +103,7 @@ std::shared_ptr<const Binding> make_binding(const std::vector<Expression>& opera
     binding->q.assign(a.data(), a.data() + a.size());
     binding->v.assign(size_t(states) * nv, 0.0);
     if (!v.is_none()) {
-      const Array w = real_array(v);
+      const Array w = numbers(v, "v");
       if (w.ndim() == 1 && w.shape(0) == nv) {
         for (int b = 0; b < states; ++b) std::copy_n(w.data(), nv, binding->v.begin() + size_t(b) * nv);
       } else if (w.ndim() == 2 && w.shape(0) == binding->batch && w.shape(1) == nv) {
@@ -147,7 +143,8 @@ void register_sources(py::module_& m) {
         py::arg("operands"), py::arg("q"), py::arg("v"), py::arg("form") = Form::fast, py::arg("refine") = 0, py::arg("residual") = "same",
         py::arg("precision") = Precision::double_);
 
-  declared<py::class_<SkoSource, std::shared_ptr<SkoSource>>>(m, "SkoSource")
+  auto any_source = declared<py::class_<SkoSource, std::shared_ptr<SkoSource>>>(m, "SkoSource");
+  unpicklable(any_source)
       .def_property_readonly("name", &SkoSource::name)
       .def_property_readonly("Theta", &SkoSource::theta)
       .def_property_readonly("V", &SkoSource::motions)
@@ -179,6 +176,7 @@ void register_sources(py::module_& m) {
   py::class_<MultibodyOperators, SkoSource, std::shared_ptr<MultibodyOperators>>(m, "MultibodyOperators", "The operators' source of a multibody model.")
       .def_property_readonly("model", [](const MultibodyOperators& s) { return s.model(); })
       .def("__reduce__", [](const MultibodyOperators& s) -> py::tuple {
+        s.check_current();  // else its copy would be of the model as it is now
         return py::make_tuple(py::module_::import("pycraft._core").attr("operators_of"), py::make_tuple(py::cast(s.model())));
       });
   m.def("operators_of", &operators_of, py::arg("model"));

@@ -1,7 +1,9 @@
 #include "algebra/space.h"
 
 #include <cstdint>
+#include <limits>
 
+#include "algebra/errors.h"
 #include "bindings/bindings.h"
 
 namespace pycraft {
@@ -26,8 +28,16 @@ void register_spaces(py::module_& m) {
       .def("__eq__", [](const Space& a, const Space& b) { return a == b; })
       .def("__eq__", [](const Space&, const py::object&) { return py::reinterpret_borrow<py::object>(Py_NotImplemented); })
       .def("__hash__", [](const Space& s) { return py::hash(py::make_tuple(static_cast<int>(s.kind()), s.dimension())); })
+      .def("__reduce__", [](const Space& s) -> py::tuple {
+        return py::make_tuple(py::module_::import("pycraft._core").attr("_space_from_parts"), py::make_tuple(space_parts(s)));
+      })
       .def("__repr__", [](const Space& s) { return "<space " + s.description() + ">"; });
-  m.def("euclidean", &Space::euclidean, py::arg("dimension"), "R^n, a space of a user's own: self-dual, cut into no bodies.");
+  m.def("_space_from_parts", &space_from_parts);
+  m.def("euclidean", [](const py::object& dimension) {
+    const int n = PyIndex_Check(dimension.ptr()) ? clipped(dimension) : -1;
+    if (n < 0 || n == std::numeric_limits<int>::max()) throw SpaceError("euclidean(" + std::string(py::repr(dimension)) + "): the dimension is a whole number, zero or more");
+    return Space::euclidean(n);
+  }, py::arg("dimension"), "R^n, a space of a user's own: self-dual, cut into no bodies.");
 }
 
 }  // namespace pycraft

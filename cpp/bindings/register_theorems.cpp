@@ -37,7 +37,22 @@ void register_theorems(py::module_& m) {
         const auto text = [](const Side& s) { return std::holds_alternative<Expression>(s) ? show(std::get<Expression>(s)) : show(std::get<Scalar>(s)); };
         return t.waiting.empty() ? text(t.lhs) + (t.at_most ? " ≤ " : " = ") + text(t.rhs) : t.name;
       })
+      .def("__reduce__", [side](const Theorem& t) -> py::tuple {
+        const bool waits = !t.waiting.empty();
+        return py::make_tuple(py::module_::import("pycraft._core").attr("_theorem_from_parts"),
+                              py::make_tuple(t.name, t.group, waits ? py::none() : side(t.lhs), waits ? py::none() : side(t.rhs), t.hypotheses, t.source,
+                                             static_cast<int>(t.use), t.on_one_path, t.at_most, t.waiting, t.text, t.latex));
+      })
       .def("__repr__", [](const Theorem& t) { return "<theorem " + t.name + ">"; });
+  m.def("_theorem_from_parts", [](std::string name, std::string group, const py::object& lhs, const py::object& rhs, unsigned hypotheses, std::string source,
+                                  int use, bool on_one_path, bool at_most, std::string waiting, std::string text, std::string latex) {
+    const auto given = [](const py::object& s) -> Side {
+      if (s.is_none()) return Expression();
+      return py::isinstance<Scalar>(s) ? Side(s.cast<Scalar>()) : Side(s.cast<Expression>());
+    };
+    return Theorem{std::move(name), std::move(group), given(lhs), given(rhs), hypotheses, std::move(source), static_cast<Use>(use), on_one_path, at_most,
+                   std::move(waiting), std::move(text), std::move(latex)};
+  });
   m.def("theorems", [](const std::shared_ptr<SkoSource>& source) {
     std::vector<Theorem> all = sko_theorems(source);
     if (const auto mechanics = std::dynamic_pointer_cast<MultibodyOperators>(source)) {

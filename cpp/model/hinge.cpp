@@ -61,10 +61,15 @@ std::vector<Subhinge> subhinges_of(HingeKind kind, const std::vector<Vector3<dou
   for (int i = 0; i < 3; ++i)
     if (!std::isfinite(point[i])) throw ModelError("hinge '" + hinge + "': its point has an entry that is not a number");
   if (!std::isfinite(pitch)) throw ModelError("hinge '" + hinge + "': its pitch is not a number");
+  const auto has_no = [&](const char* what, bool given_all_the_same) {
+    if (given_all_the_same) throw ModelError("hinge '" + hinge + "' of kind '" + hinge_kind_name(kind) + "' has no " + what + "; leave it out");
+  };
+  has_no("pitch", pitch != 0 && kind != HingeKind::screw);
+  has_no("point", (kind == HingeKind::weld || kind == HingeKind::free) && norm(point) != 0);
   std::vector<Vector3<double>> axes;
   for (const Vector3<double>& a : given) axes.push_back(unit(a, hinge));
   switch (kind) {
-    case HingeKind::weld: return {};
+    case HingeKind::weld: need(0); return {};
     case HingeKind::pin: need(1); return {{SubhingeKind::pin, axes[0], point}};
     case HingeKind::slider: need(1); return {{SubhingeKind::slider, axes[0], point}};
     case HingeKind::screw: need(1); return {{SubhingeKind::screw, axes[0], point, pitch}};

@@ -1,22 +1,16 @@
 #include "model/multibody.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <functional>
 
 #include "algebra/errors.h"
+#include "model/checks.h"
 #include "model/compiled_model.h"
 
 namespace pycraft {
 
 namespace {
-
-std::string number(double x) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%.6g", x);
-  return buffer;
-}
 
 template <class Names>
 [[noreturn]] void throw_unknown(const char* what, const std::string& name, const std::string& model, const Names& known) {
@@ -62,22 +56,9 @@ void Multibody::add_body(Body body, const std::string& parent) {
   if (hinge_numbers_.count(body.hinge.name))
     throw ModelError("'" + name_ + "' has a hinge called '" + body.hinge.name + "' already; give every hinge a name of its own");
   const Node onto = find_frame(parent);
-  for (int i = 0; i < 9; ++i)
-    if (!std::isfinite(body.hinge.placement.R.m[i]) || (i < 3 && !std::isfinite(body.hinge.placement.p[i])))
-      throw ModelError("hinge '" + body.hinge.name + "': its placement has an entry that is not a number");
-  const Matrix3<double> gram = transpose(body.hinge.placement.R) * body.hinge.placement.R;
-  for (int i = 0; i < 9; ++i)
-    if (std::abs(gram.m[i] - (i % 4 == 0)) > 1e-6)
-      throw ModelError("hinge '" + body.hinge.name + "': the rotation of its placement is not orthogonal (off by " + number(std::abs(gram.m[i] - (i % 4 == 0))) + ")");
-  if (determinant(body.hinge.placement.R) < 0) throw ModelError("hinge '" + body.hinge.name + "': the rotation of its placement is a reflection");
-  const int nv = body.hinge.nv();
-  if (body.hinge.rotor_inertia.empty()) body.hinge.rotor_inertia.assign(nv, 0.0);
-  if (static_cast<int>(body.hinge.rotor_inertia.size()) != nv)
-    throw ModelError("hinge '" + body.hinge.name + "' has " + std::to_string(nv) + " coordinates and " + std::to_string(body.hinge.rotor_inertia.size()) +
-                     " rotor inertias");
-  for (double j : body.hinge.rotor_inertia)
-    if (!(j >= 0) || !std::isfinite(j)) throw ModelError("hinge '" + body.hinge.name + "': rotor inertia " + number(j) + " is not a nonnegative number");
-  check_mass_properties(body.name, body.mass, body.com, body.inertia);
+  body.hinge = checked_hinge(std::move(body.hinge));
+  check_coordinate_names(body.hinge);
+  note(body.name, check_mass_properties(body.name, body.mass, body.com, body.inertia));
   body.hinge.placement = onto.pose * body.hinge.placement;
   body.parent = onto.body;
   if (body.hinge.subhinges.empty() && !keep_welds_) {
@@ -88,6 +69,33 @@ void Multibody::add_body(Body body, const std::string& parent) {
   body_numbers_[body.name] = bodies();
   hinge_numbers_[body.hinge.name] = bodies();
   bodies_.push_back(std::move(body));
+}
+
+// Coordinates are called "hinge", or "hinge[j]" where there are several: two hinges must not come to the same name.
+void Multibody::check_coordinate_names(const Hinge& hinge) const {
+  const auto refuse = [&](const std::string& other, const std::string& coordinate) {
+    throw ModelError("a coordinate of hinge '" + hinge.name + "' would be called '" + coordinate + "', as one of hinge '" + other + "' is; rename one");
+  };
+  const auto count = [&](const std::string& name) {
+    const auto found = hinge_numbers_.find(name);
+    return found == hinge_numbers_.end() ? 0 : bodies_[found->second].hinge.nv();
+  };
+  const int nv = hinge.nv();
+  for (int j = 0; nv > 1 && j < nv; ++j)
+    if (const std::string name = hinge.name + "[" + std::to_string(j) + "]"; count(name) == 1) refuse(name, name);
+  const size_t bracket = hinge.name.rfind('[');
+  if (nv != 1 || bracket == std::string::npos) return;
+  const std::string other = hinge.name.substr(0, bracket);
+  const int coordinates = count(other);
+  for (int j = 0; coordinates > 1 && j < coordinates; ++j)
+    if (hinge.name == other + "[" + std::to_string(j) + "]") refuse(other, hinge.name);
+}
+
+// Says later what is legal but worth a word; in a strict model it is an error.
+void Multibody::note(const std::string& body, const std::string& text) {
+  if (text.empty()) return;
+  if (strict_) throw ModelError(text);
+  warnings_.emplace_back(body, text);
 }
 
 // A welded body becomes part of the body that moves it, and a node.
@@ -101,9 +109,12 @@ void Multibody::lump(const Body& body, const Node& onto) {
     Symmetric3<long double> about = sum.rotational;
     const Symmetric3<long double> point = point_inertia(com);
     for (int i = 0; i < 6; ++i) about.s[i] -= sum.mass * point.s[i];
+    const Vector3<double> new_com = cast<double>(com);
+    const Symmetric3<double> new_inertia = cast<double>(about);
+    check_mass_properties(b.name + "' with '" + body.name, static_cast<double>(sum.mass), new_com, new_inertia);
     b.mass = static_cast<double>(sum.mass);
-    b.com = cast<double>(com);
-    b.inertia = cast<double>(about);
+    b.com = new_com;
+    b.inertia = new_inertia;
     ++parameters_;
   }
   node_numbers_[body.name] = static_cast<int>(nodes_.size());
@@ -128,10 +139,9 @@ void Multibody::remove_body(const std::string& name) {
 void Multibody::add_node(const std::string& name, const std::string& body, const Pose<double>& pose) {
   check_new_name(name, "node");
   const Node onto = find_frame(body);
-  for (int i = 0; i < 9; ++i)
-    if (!std::isfinite(pose.R.m[i]) || (i < 3 && !std::isfinite(pose.p[i]))) throw ModelError("node '" + name + "': its pose has an entry that is not a number");
+  const Pose<double> checked = checked_pose(pose, "node '" + name + "'");
   node_numbers_[name] = static_cast<int>(nodes_.size());
-  nodes_.push_back({name, onto.body, onto.pose * pose});
+  nodes_.push_back({name, onto.body, onto.pose * checked});
 }
 
 void Multibody::structure_changed(const std::string& reason) {
@@ -251,58 +261,31 @@ SkoStructure Multibody::structure() const {
 
 // ------------------------------------------------------------------ parameters
 
-void Multibody::check_mass_properties(const std::string& body, double mass, const Vector3<double>& com, const Symmetric3<double>& inertia) {
-  if (!std::isfinite(mass)) throw ModelError("body '" + body + "': its mass is " + number(mass));
-  if (mass < 0) throw ModelError("body '" + body + "': its mass is " + number(mass) + " kg; a mass is not negative");
-  for (int i = 0; i < 3; ++i)
-    if (!std::isfinite(com[i])) throw ModelError("body '" + body + "': its centre of mass has an entry that is " + number(com[i]));
-  double largest = 0;
-  for (double x : inertia.s) {
-    if (!std::isfinite(x)) throw ModelError("body '" + body + "': its inertia has an entry that is " + number(x));
-    largest = std::max(largest, std::abs(x));
-  }
-  if (largest == 0) return;
-  Eigen::Matrix3d A;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) A(i, j) = inertia(i, j);
-  const Eigen::Vector3d moments = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(A, Eigen::EigenvaluesOnly).eigenvalues();
-  // Published numbers carry rounding: a negative moment within 1e-12 of the largest entry, or of a point mass of 30 nm, is that.
-  const double rounding = 1e-12 * largest + 1e-15 * mass;
-  if (moments[0] < -rounding)
-    throw ModelError("body '" + body + "': its inertia has the principal moment " + number(moments[0]) + " kg m²; an inertia is positive semidefinite");
-  const double violation = moments[2] - moments[0] - moments[1];
-  if (violation > 1e-9 * largest + rounding) {
-    const std::string text = "body '" + body + "': its principal moments " + number(moments[0]) + ", " + number(moments[1]) + ", " + number(moments[2]) +
-                             " kg m² violate the triangle inequality by " + number(violation) + "; no distribution of mass has them";
-    if (strict_) throw ModelError(text);
-    warnings_.push_back(text);
-  }
-}
-
 void Multibody::set_mass_properties(int k, double mass, const Vector3<double>& com, const Symmetric3<double>& inertia) {
-  check_mass_properties(body(k).name, mass, com, inertia);
+  note(body(k).name, check_mass_properties(body(k).name, mass, com, inertia));
   bodies_[k].mass = mass;
   bodies_[k].com = com;
   bodies_[k].inertia = inertia;
   ++parameters_;
 }
 void Multibody::set_placement(int k, const Pose<double>& placement) {
-  settled();
-  bodies_[k].hinge.placement = placement;
+  const Pose<double> checked = checked_pose(placement, "the placement of hinge '" + body(k).hinge.name + "'");
+  bodies_[k].hinge.placement = checked;
   ++parameters_;
 }
 void Multibody::set_rotor_inertia(int k, const std::vector<double>& values) {
-  const Hinge& h = body(k).hinge;
-  if (static_cast<int>(values.size()) != h.nv())
-    throw ModelError("hinge '" + h.name + "' has " + std::to_string(h.nv()) + " coordinates, not " + std::to_string(values.size()) + " rotor inertias");
-  for (double j : values)
-    if (!(j >= 0) || !std::isfinite(j)) throw ModelError("hinge '" + h.name + "': rotor inertia " + number(j) + " is not a nonnegative number");
-  bodies_[k].hinge.rotor_inertia = values;
+  std::vector<double> checked = checked_rotor_inertia(body(k).hinge, values);
+  bodies_[k].hinge.rotor_inertia = std::move(checked);
   ++parameters_;
+}
+void Multibody::set_limits(int k, const std::vector<double>& lower, const std::vector<double>& upper) {
+  check_limits(body(k).hinge, lower, upper);
+  bodies_[k].hinge.lower = lower;
+  bodies_[k].hinge.upper = upper;
 }
 void Multibody::set_gravity(const Vector3<double>& g) {
   for (int i = 0; i < 3; ++i)
-    if (!std::isfinite(g[i])) throw ModelError("gravity of '" + name_ + "' has an entry that is " + number(g[i]));
+    if (!std::isfinite(g[i])) throw ModelError("gravity of '" + name_ + "' has an entry that is " + short_number(g[i]));
   gravity_ = g;
   ++parameters_;
 }
@@ -312,13 +295,13 @@ bool Multibody::has_rotor_inertia() const {
   });
 }
 
-std::vector<std::string> Multibody::take_warnings() {
+std::vector<std::pair<std::string, std::string>> Multibody::take_warnings() {
   settled();
-  std::vector<std::string> all = std::move(warnings_);
+  auto all = std::move(warnings_);
   warnings_.clear();
   for (const Body& b : bodies_)
     if (b.hinge.nv() > 0 && b.mass == 0 && std::all_of(b.inertia.s, b.inertia.s + 6, [](double x) { return x == 0; }) && said_massless_.insert(b.name).second)
-      all.push_back("body '" + b.name + "' on hinge '" + b.hinge.name +
+      all.emplace_back(b.name, "body '" + b.name + "' on hinge '" + b.hinge.name +
                     "' has no mass: what needs D⁻¹ (forward dynamics, ℳ⁻¹) works only where the bodies outboard give the hinge inertia");
   return all;
 }
@@ -338,12 +321,12 @@ void Multibody::check_q(const double* q, size_t size) const {
     const Hinge& h = bodies_[k].hinge;
     const double* at = q + q_offset_[k];
     for (int i = 0; i < h.nq(); ++i)
-      if (!std::isfinite(at[i])) throw ModelError("q of hinge '" + h.name + "': entry " + std::to_string(i) + " is " + number(at[i]));
+      if (!std::isfinite(at[i])) throw ModelError("q of hinge '" + h.name + "': entry " + std::to_string(i) + " is " + short_number(at[i]));
     for (const Subhinge& s : h.subhinges) {
       if (s.nq() >= 4) {
         const double length = std::hypot(std::hypot(at[0], at[1]), std::hypot(at[2], at[3]));
         if (length < 1e-8)
-          throw ModelError("q of hinge '" + h.name + "': its quaternion has length " + number(length) + " and no direction; (1, 0, 0, 0) is no rotation");
+          throw ModelError("q of hinge '" + h.name + "': its quaternion has length " + short_number(length) + " and no direction; (1, 0, 0, 0) is no rotation");
       }
       at += s.nq();
     }
@@ -356,7 +339,7 @@ void Multibody::check_v(const double* v, size_t size, const char* what) const {
   for (int k = 0; k < bodies(); ++k)
     for (int i = v_offset_[k]; i < v_offset_[k + 1]; ++i)
       if (!std::isfinite(v[i]))
-        throw ModelError(std::string(what) + " of hinge '" + bodies_[k].hinge.name + "': entry " + std::to_string(i - v_offset_[k]) + " is " + number(v[i]));
+        throw ModelError(std::string(what) + " of hinge '" + bodies_[k].hinge.name + "': entry " + std::to_string(i - v_offset_[k]) + " is " + short_number(v[i]));
 }
 
 void Multibody::set_q(const std::vector<double>& q) {
@@ -454,6 +437,21 @@ Pose<S> renormalised(const Pose<double>& X) {
   return {quaternion_rotation(q), wide.p};
 }
 
+// Coordinates of a hinge that move its body along any line whatever the others are, numbered from `first`: a free subhinge's, or three
+// sliders'. None where one of them has a rotor, whose inertia a change of the body's velocity does not share.
+std::array<int, 3> translations(const Hinge& hinge, int first) {
+  std::vector<int> found;
+  int j = 0;
+  for (const Subhinge& h : hinge.subhinges) {
+    if (h.kind == SubhingeKind::slider) found.push_back(j);
+    if (h.kind == SubhingeKind::free) found.insert(found.end(), {j + 3, j + 4, j + 5});
+    j += h.nv();
+  }
+  const bool driven = std::any_of(found.begin(), found.end(), [&](int i) { return hinge.rotor_inertia[i] != 0; });
+  if (found.size() != 3 || driven) return {-1, -1, -1};
+  return {first + found[0], first + found[1], first + found[2]};
+}
+
 template <class S>
 std::shared_ptr<const CompiledModel<S>> compile(const Multibody& model) {
   auto c = std::make_shared<CompiledModel<S>>();
@@ -497,6 +495,7 @@ std::shared_ptr<const CompiledModel<S>> compile(const Multibody& model) {
       }
     }
     c->first_subhinge.push_back(static_cast<int>(c->subhinges.size()));
+    c->translations.push_back(translations(b.hinge, c->v_offset.back()));
     for (double j : b.hinge.rotor_inertia) {
       c->rotor_inertia.push_back(S(j));
       c->has_rotor_inertia |= j != 0;

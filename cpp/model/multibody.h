@@ -8,6 +8,7 @@
 #include <set>
 #include <string>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "algebra/source.h"
@@ -68,7 +69,8 @@ class Multibody : public std::enable_shared_from_this<Multibody> {
   std::uint64_t parameters() const { return parameters_; }
   void set_mass_properties(int body, double mass, const Vector3<double>& com, const Symmetric3<double>& inertia);
   void set_placement(int body, const Pose<double>& placement);
-  void set_rotor_inertia(int body, const std::vector<double>& values);
+  void set_rotor_inertia(int body, const std::vector<double>& values);  // one stands for all coordinates
+  void set_limits(int body, const std::vector<double>& lower, const std::vector<double>& upper);  // empty: none
   Vector3<double> gravity() const { return gravity_; }
   void set_gravity(const Vector3<double>& g);
   bool has_rotor_inertia() const;
@@ -84,8 +86,8 @@ class Multibody : public std::enable_shared_from_this<Multibody> {
   void integrate(const double* q, const double* dv, double* out) const;          // q moved by the velocity dv for unit time
   void difference(const double* q0, const double* q1, double* out) const;        // dv with integrate(q0, dv) = q1
 
-  // What is legal but worth a word: triangle inequalities, massless bodies on hinges. Said once.
-  std::vector<std::string> take_warnings();
+  // What is legal but worth a word, and of which body: triangle inequalities, massless bodies on hinges. Said once.
+  std::vector<std::pair<std::string, std::string>> take_warnings();
 
   // ---- the numbers in flat arrays of one scalar, for kernels; rebuilt when parameters changed
   template <class S>
@@ -96,8 +98,8 @@ class Multibody : public std::enable_shared_from_this<Multibody> {
   void keep_operators(const std::shared_ptr<SkoSource>& source);
 
  private:
-  // Throws for what cannot be, warns of what should not; names the body.
-  void check_mass_properties(const std::string& body, double mass, const Vector3<double>& com, const Symmetric3<double>& inertia);
+  void note(const std::string& body, const std::string& text);
+  void check_coordinate_names(const Hinge& hinge) const;
   void check_new_name(const std::string& name, const char* what) const;
   Node find_frame(const std::string& name) const;   // a node, or a body's own frame
   void lump(const Body& body, const Node& onto);
@@ -116,7 +118,7 @@ class Multibody : public std::enable_shared_from_this<Multibody> {
   std::shared_ptr<const StateData> state_;
   mutable std::mutex mutex_;
   std::uint64_t parameters_ = 1;
-  std::vector<std::string> warnings_;
+  std::vector<std::pair<std::string, std::string>> warnings_;
   std::set<std::string> said_massless_;
   std::unordered_map<std::string, std::pair<std::vector<double>, std::vector<double>>> carried_;  // q, v by hinge, across an edit
   std::atomic<bool> settled_{true};

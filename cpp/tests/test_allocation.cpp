@@ -172,7 +172,9 @@ BOOST_AUTO_TEST_CASE(direct_calls) {
 
   Sensitivities<double> s(*mb);
   quiet([&] { s.inverse_dynamics(q.data(), v.data(), tau.data(), dq.data(), dv.data()); }, "derivatives of inverse dynamics");
-  quiet([&] { s.forward_dynamics(q.data(), v.data(), tau.data(), dq.data(), dv.data(), dtau.data()); }, "derivatives of forward dynamics");
+  for (const Form form : forms)
+    quiet([&] { s.forward_dynamics(q.data(), v.data(), tau.data(), Solving{form, {}, OnSingular::raise}, dq.data(), dv.data(), dtau.data()); },
+          "derivatives of forward dynamics");
   quiet([&] { s.mass_matrix(q.data(), out.data()); }, "derivative of the mass matrix");
   quiet([&] { s.christoffel(q.data(), out.data()); }, "Christoffel symbols");
   quiet([&] { s.kinetic_energy(q.data(), v.data(), dq.data(), dv.data()); }, "derivatives of the kinetic energy");

@@ -51,6 +51,11 @@ class PaperReport:
         return any(e.verdict == "holds" for e in self.equations) and not any(e.verdict in ("fails", "undecided") for e in self.equations)
 
     @property
+    def status(self) -> int:
+        """Exit status of a command: 0 if all that was read holds, 1 if something fails or nothing was read, 3 if something is undecided."""
+        return 0 if self else 3 if "undecided" in self.counts and "fails" not in self.counts else 1
+
+    @property
     def counts(self) -> dict[str, int]:
         found: dict[str, int] = {}
         for e in self.equations:

@@ -18,13 +18,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from .. import _core
+from .packages import required
 
 if TYPE_CHECKING:
     from ..models.multibody import Multibody
-
-
-class MissingPackageError(_core.Error, ImportError):
-    """A package that only one extra needs is not installed."""
 
 
 def compiled(path: str) -> Any:
@@ -37,11 +34,7 @@ def compiled(path: str) -> Any:
     ModelError
         What MuJoCo refuses, in its words.
     """
-    try:
-        import mujoco
-    except ImportError:
-        text = f"{path}: MJCF files are read by the package mujoco, which is not installed: pip install pycraft-soa[mjcf]"
-        raise MissingPackageError(text) from None
+    mujoco = required("mujoco", "mjcf", f"{path}: MJCF files are read by")
     try:
         return mujoco.MjSpec.from_file(path).compile()
     except ValueError as error:

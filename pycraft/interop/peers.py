@@ -17,6 +17,7 @@ import numpy as np
 
 from .. import _core
 from . import pinocchio as convention
+from .packages import required
 
 GRAVITY = (0.0, 0.0, -9.81)
 QUANTITIES = ("mass matrix", "inverse dynamics", "Jacobians", "inverse", "forward dynamics")
@@ -45,7 +46,7 @@ class Comparison:
 
 def robot_files() -> list[Path]:
     """Every URDF file that the installed example-robot-data ships."""
-    import pinocchio  # its prefix holds the data
+    pinocchio = required("pinocchio", "peers", "comparison with Pinocchio needs")  # its prefix holds the data
 
     for folder in [Path(p) for p in map(str, _prefixes(pinocchio))]:
         if (folder / "share" / "example-robot-data" / "robots").is_dir():
@@ -98,7 +99,7 @@ def compare(path: Path, root: str, states: int = 20, seed: int = 0) -> Compariso
 
 def _compare_at(result: Comparison, model: Any, twin: convention.Coordinates, state: Any, rng: np.random.Generator) -> None:
     """All quantities at one state."""
-    import pinocchio
+    pinocchio = required("pinocchio", "peers", "comparison with Pinocchio needs")
 
     pin_model = twin.pin_model
     data = pin_model.createData()

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import _core
+from .packages import required
 
 if TYPE_CHECKING:
     from ..models.multibody import Multibody
@@ -22,7 +23,7 @@ _SWAP = np.array([3, 4, 5, 0, 1, 2])
 
 def build(path: str, root: str = "fixed") -> Any:
     """Pinocchio's model of a URDF file, with a free flyer for root="free"."""
-    import pinocchio
+    pinocchio = required("pinocchio", "peers", "comparison with Pinocchio needs")
 
     return (
         pinocchio.buildModelFromUrdf(str(path), pinocchio.JointModelFreeFlyer())
@@ -172,7 +173,7 @@ def coordinates(model: Multibody, pin_model: Any) -> Coordinates:
 
 def jacobian(pin_model: Any, data: Any, q: np.ndarray, frame: str) -> np.ndarray:
     """Pinocchio's Jacobian of a link frame, in its own axes, rows brought to angular-first order."""
-    import pinocchio
+    pinocchio = required("pinocchio", "peers", "comparison with Pinocchio needs")
 
     index = pin_model.getFrameId(frame, pinocchio.FrameType.BODY)
     return pinocchio.computeFrameJacobian(pin_model, data, q, index, pinocchio.ReferenceFrame.LOCAL)[_SWAP]
@@ -180,7 +181,7 @@ def jacobian(pin_model: Any, data: Any, q: np.ndarray, frame: str) -> np.ndarray
 
 def derivative_calls(robot: str, floating: bool) -> dict[str, Any]:
     """Pinocchio's derivatives of inverse and forward dynamics on a shipped robot, as calls without arguments, to be timed."""
-    import pinocchio
+    pinocchio = required("pinocchio", "peers", "comparison with Pinocchio needs")
 
     with as_file(files("pycraft.models") / "robots" / f"{robot}.urdf") as path:
         model = build(str(path), "free" if floating else "fixed")

@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from .realization import by_realization
+from .jacobians import resolved_jacobian
+from .realization import by_realization, output
+from .state import at_state
 
 
 def cached(model: Any, name: str, make: Callable[[Any], Any]) -> Any:
@@ -28,11 +30,12 @@ def by_method(model: Any, method: str, q, v, tau, precision: str | int, out) -> 
 class DirectCalls:
     """Forward and inverse dynamics, mass matrix, Jacobians, energies.
 
-    Each takes one state or a leading batch axis (B, ...), an argument of one state beside a batch standing for all; q may be a State. SI
-    units and radians. Generalized velocities of ball and free hinges are in the axes of the body that the hinge moves, angular first.
-    Results are float64, in `out` (writeable, C-ordered) where one is given. Everywhere a ModelError names an argument of the wrong shape
-    or with an entry that is not finite, and EvaluationError an unknown option, and a result beyond the range of its numbers; errors at a
-    state of a batch tell which.
+    Each takes one state or a leading batch axis (B, ...), an argument of one state beside a batch standing for all. q may be a State,
+    which brings its v; without q it is the model's present state, `arm.q` and `arm.v`, as for expressions; beside an array q,
+    velocities, forces and accelerations that are left out are zero. SI units and radians. Generalized velocities of ball and free
+    hinges are in the axes of the body that the hinge moves, angular first. Results are float64, in `out` (writeable, C-ordered) where
+    one is given. Everywhere a ModelError names an argument of the wrong shape or with an entry that is not finite, and EvaluationError
+    an unknown option, and a result beyond the range of its numbers; errors at a state of a batch tell which.
     """
 
     nv: int
@@ -42,9 +45,9 @@ class DirectCalls:
 
     def forward_dynamics(
         self,
-        q,
-        v,
-        tau,
+        q=None,
+        v=None,
+        tau=None,
         *,
         form: str = "fast",
         refine: int | str = 0,
@@ -100,6 +103,8 @@ class DirectCalls:
         >>> arm.forward_dynamics([0, 0], [0, 0], [1, 0]).round(3).tolist()
         [1.714, -4.286]
         """
+        q, v = at_state(self, q, v)
+        tau = np.zeros(self.nv) if tau is None else tau
         if method == "articulated":
             return self._calls().forward_dynamics(q, v, tau, form, refine, residual, precision, on_singular, out)
         if not isinstance(method, str):
@@ -111,7 +116,15 @@ class DirectCalls:
         return by_method(self, method, q, v, tau, precision, out)
 
     def refinement(
-        self, q, v, tau, *, form: str = "fast", refine: int | str = "auto", residual: str = "same", precision: str | int = "double"
+        self,
+        q=None,
+        v=None,
+        tau=None,
+        *,
+        form: str = "fast",
+        refine: int | str = "auto",
+        residual: str = "same",
+        precision: str | int = "double",
     ) -> dict[str, Any]:
         """Forward dynamics of one state with its corrections; arguments and errors as `forward_dynamics` has them.
 
@@ -126,17 +139,20 @@ class DirectCalls:
         >>> found["steps"], found["corrections"][0] < 1e-14
         (1, True)
         """
+        q, v = at_state(self, q, v)
+        tau = np.zeros(self.nv) if tau is None else tau
         value, corrections = self._calls().refinement(q, v, tau, form, refine, residual, precision)
         return {"value": value, "steps": len(corrections), "corrections": corrections}
 
-    def inverse_dynamics(self, q, v, vdot, *, precision: str | int = "double", out=None) -> np.ndarray:
+    def inverse_dynamics(self, q=None, v=None, vdot=None, *, precision: str | int = "double", out=None) -> np.ndarray:
         """Generalized forces (nv,) or (B, nv), N m and N, for the accelerations vdot, gravity and rotor inertia included.
 
         Newton-Euler, O(N) [Jain 2011, inverse dynamics]. In precision "single" to "quad".
         """
+        q, v = at_state(self, q, v)
         return self._calls().inverse_dynamics(q, v, vdot, precision, out)
 
-    def bias_forces(self, q, v, *, precision: str | int = "double", out=None) -> np.ndarray:
+    def bias_forces(self, q=None, v=None, *, precision: str | int = "double", out=None) -> np.ndarray:
         """Coriolis, gyroscopic and gravity forces 𝒞 (nv,) or (B, nv), N m and N: inverse dynamics at zero acceleration. O(N).
 
         The equations of motion are ℳ(q) v̇ + 𝒞(q, v) = τ [Jain 2011]. In precision "single" to "quad".
@@ -148,9 +164,10 @@ class DirectCalls:
         >>> arm.bias_forces([0, 0], [1, 1]).tolist()  # no gravity, stretched: nothing
         [0.0, 0.0]
         """
+        q, v = at_state(self, q, v)
         return self._calls().inverse_dynamics(q, v, None, precision, out)
 
-    def mass_matrix(self, q, *, precision: str | int = "double", out=None) -> np.ndarray:
+    def mass_matrix(self, q=None, *, precision: str | int = "double", out=None) -> np.ndarray:
         """The mass matrix ℳ + J = HφMφ*H* + J of the equations of motion, full symmetric (nv, nv) or (B, nv, nv).
 
         Rotor inertia J included. kg m² between angles, kg m and kg where travels take part. Composite bodies, O(N²) [Jain 2011]. In
@@ -162,11 +179,11 @@ class DirectCalls:
         >>> pc.chain(2).mass_matrix([0, 0]).round(4).tolist()
         [[2.6667, 0.8333], [0.8333, 0.3333]]
         """
-        return self._calls().mass_matrix(q, precision, out)
+        return self._calls().mass_matrix(at_state(self, q)[0], precision, out)
 
     def mass_matrix_inverse(
         self,
-        q,
+        q=None,
         *,
         form: str = "fast",
         refine: int | str = 0,
@@ -186,13 +203,21 @@ class DirectCalls:
         >>> pc.chain(2).mass_matrix_inverse([0, 0]).round(3).tolist()
         [[1.714, -4.286], [-4.286, 13.714]]
         """
-        return self._calls().mass_matrix_inverse(q, form, refine, residual, precision, on_singular, out)
+        return self._calls().mass_matrix_inverse(at_state(self, q)[0], form, refine, residual, precision, on_singular, out)
 
-    def jacobian(self, frame: str, q, *, precision: str | int = "double", out=None) -> np.ndarray:
+    def jacobian(
+        self, frame: str, q=None, *, axes: str = "body", relative_to: str | None = None, precision: str | int = "double", out=None
+    ) -> np.ndarray:
         """Jacobian (6, nv) or (B, 6, nv) of the spatial velocity of a body or node, by its name: O(N).
 
-        J v is the velocity (angular rad/s, then linear m/s) of the frame against the world, in the frame's own axes, about its origin.
-        ModelError where no body or node has the name. In precision "single" to "quad".
+        J v is the velocity (angular rad/s, then linear m/s) of the frame against `relative_to`, a body or node by its name, the world
+        where left out. Axes and the point whose linear velocity it is:
+
+        "body"     the frame's own axes, its origin
+        "aligned"  the axes of `relative_to`, the frame's origin
+        "world"    the axes of `relative_to`, the point of the frame that is at its origin
+
+        ModelError where no body or node has the name, EvaluationError for other axes. In precision "single" to "quad".
 
         Examples
         --------
@@ -200,10 +225,20 @@ class DirectCalls:
         >>> arm = pc.chain(2)
         >>> arm.jacobian("body1", [0, 0])[[2, 4]].tolist()  # the second body: turning about z, moving along y
         [[1.0, 1.0], [1.0, 0.0]]
+        >>> arm.jacobian("body1", [0, 0], relative_to="body0")[[2, 4]].tolist()  # against the first body: turning alone
+        [[0.0, 1.0], [0.0, 0.0]]
         """
-        return self._calls().jacobian(frame, q, precision, out)
+        q = at_state(self, q)[0]
+        if axes == "body" and relative_to is None:
+            return self._calls().jacobian(frame, q, precision, out)
+        result = resolved_jacobian(self, frame, q, axes, relative_to, precision)
+        if out is None:
+            return result
+        out = output(out, result.shape)
+        out[...] = result
+        return out
 
-    def pose(self, frame: str, q) -> np.ndarray:
+    def pose(self, frame: str, q=None) -> np.ndarray:
         """Pose (4, 4) or (B, 4, 4) of a body or node, by its name, in the world: its axes as columns, its origin in metres. O(N).
 
         ModelError where no body or node has the name.
@@ -214,9 +249,9 @@ class DirectCalls:
         >>> pc.chain(2).pose("body1", [0, 0])[:3, 3].tolist()
         [1.0, 0.0, 0.0]
         """
-        return self._calls().pose(frame, q)
+        return self._calls().pose(frame, at_state(self, q)[0])
 
-    def kinetic_energy(self, q, v) -> np.ndarray:
+    def kinetic_energy(self, q=None, v=None) -> np.ndarray:
         """½ v·(ℳ + J)v, in joules, a number or (B,). O(N).
 
         Examples
@@ -225,10 +260,13 @@ class DirectCalls:
         >>> round(float(pc.chain(2).kinetic_energy([0, 0], [1, 0])), 4)
         1.3333
         """
-        return self._calls().energy(q, v)[..., 0]
+        return self._calls().energy(*at_state(self, q, v), (0.0, 0.0, 0.0))[..., 0]
 
-    def potential_energy(self, q) -> np.ndarray:
-        """Energy -m g·c in the uniform gravity field, zero with the centre of mass c at the world's origin. Joules, a number or (B,). O(N).
+    def potential_energy(self, q=None, *, datum=(0.0, 0.0, 0.0)) -> np.ndarray:
+        """Energy -m g·(c - datum) in the uniform gravity field, c the centre of mass. Joules, a number or (B,).
+
+        Summed outboard to inboard and rounded once, so its error is that of a double of its size. Far from the datum, (3,) in the world's
+        axes, m, differences of energies are smaller than that: take a datum near the system. O(N).
 
         Examples
         --------
@@ -238,6 +276,5 @@ class DirectCalls:
         >>> round(float(arm.potential_energy([0])), 4)  # 1 kg, 0.5 m up
         4.905
         """
-        q = getattr(q, "q", q)
-        shape = np.shape(q)[:-1] + (self.nv,)
-        return self._calls().energy(q, np.zeros(shape))[..., 1]
+        q, _ = at_state(self, q)
+        return self._calls().energy(q, np.zeros((*np.shape(q)[:-1], self.nv)), datum)[..., 1]

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import _core
+from ..closed import Closed
+from .arguments import limit_pair, pose_parts
 
 if TYPE_CHECKING:
     from .multibody import Multibody
@@ -26,21 +28,26 @@ def _component(i: int | str, names: Sequence[str] = ("x", "y", "z")) -> int:
     raise _core.ModelError(f"no component is called {i!r}; there are {', '.join(names)}, or 0 to {len(names) - 1}")
 
 
-class Body:
+class Body(Closed):
     """A body of a model: `.mass` (kg), `.com` (3,) in the body frame (m), `.inertia` (3, 3) about the centre of mass (kg m²).
 
     The values can be set; each is checked (see `Multibody.add_body`). `.hinge` is the hinge that carries the body.
     """
 
     def __init__(self, model: Multibody, name: str):
-        self._model, self.name = model, name
+        self._model, self._name = model, name
+
+    @property
+    def name(self) -> str:
+        """The body's name in its model."""
+        return self._name
 
     def _data(self) -> dict[str, Any]:
         return self._model._body(self._model._body_index(self.name))
 
     def _set(self, **changed: Any) -> None:
         data = self._data() | changed
-        self._model._set_mass_properties(self._model._body_index(self.name), float(data["mass"]), data["com"], data["inertia"])
+        self._model._set_mass_properties(self._model._body_index(self.name), data["mass"], data["com"], data["inertia"])
 
     @property
     def mass(self) -> float:
@@ -98,14 +105,19 @@ class Body:
         return f"<body {self.name!r}: {self.mass:g} kg on hinge {self.hinge.name!r} of {parent.name if parent else 'the base'!r}>"
 
 
-class Hinge:
+class Hinge(Closed):
     """A hinge: `.kind`, `.subhinges` (kind, axis, point, pitch of each), `.placement` (4, 4), `.q_slice`, `.v_slice`, `.rotor_inertia`.
 
     `.placement` is the pose of the hinge's inboard frame in the parent body's frame; `.limits` are (lower, upper) per coordinate, or None.
     """
 
     def __init__(self, model: Multibody, name: str):
-        self._model, self.name = model, name
+        self._model, self._name = model, name
+
+    @property
+    def name(self) -> str:
+        """The hinge's name in its model."""
+        return self._name
 
     def _index(self) -> int:
         return self._model._hinge_index(self.name)
@@ -130,8 +142,8 @@ class Hinge:
 
     @placement.setter
     def placement(self, pose: np.ndarray) -> None:
-        pose = np.asarray(pose, float)
-        self._model._set_placement(self._index(), pose[:3, :3], pose[:3, 3])
+        rotation, position = pose_parts(f"hinge {self.name!r}", None, None, pose)
+        self._model._set_placement(self._index(), rotation, position)
 
     @property
     def rotor_inertia(self) -> np.ndarray:
@@ -140,8 +152,7 @@ class Hinge:
 
     @rotor_inertia.setter
     def rotor_inertia(self, value: float | Vector) -> None:
-        values = np.broadcast_to(np.asarray(value, float), self.rotor_inertia.shape)
-        self._model._set_rotor_inertia(self._index(), [float(x) for x in values])
+        self._model._set_rotor_inertia(self._index(), value)
 
     def symbol(self, name: str, component: int | str = 0, subhinge: int = 0) -> _core.Parameter:
         """A parameter of the hinge as what `diff` takes.
@@ -173,6 +184,11 @@ class Hinge:
         data = self._data()
         return (data["lower"], data["upper"]) if len(data["lower"]) else None
 
+    @limits.setter
+    def limits(self, limits: tuple[float | Vector, float | Vector] | None) -> None:
+        lower, upper = limit_pair(f"hinge {self.name!r}", limits)
+        self._model._set_limits(self._index(), () if lower is None else lower, () if upper is None else upper)
+
     @property
     def q_slice(self) -> slice:
         return self._model._slices(self._index())[0]
@@ -191,14 +207,19 @@ class Hinge:
         )
 
 
-class Node:
+class Node(Closed):
     """A frame on a body, or on the base: `.body` (None for the base), `.pose` (4, 4) in the body's frame."""
 
     def __init__(self, model: Multibody, name: str):
-        self._model, self.name = model, name
+        self._model, self._name = model, name
+
+    @property
+    def name(self) -> str:
+        """The node's name in its model."""
+        return self._name
 
     def _data(self) -> dict[str, Any]:
-        return next(node for node in self._model._nodes() if node["name"] == self.name)
+        return self._model._node(self.name)
 
     @property
     def body(self) -> Body | None:
@@ -216,25 +237,35 @@ class Node:
 
 
 class Named(Mapping):
-    """Handles by name, in the model's order."""
+    """Handles by name, in the model's order. Keys complete after `[` in IPython and notebooks."""
 
-    def __init__(self, names: Sequence[str], make: Callable[[str], Any], find: Callable[[str], Any]):
+    def __init__(self, names: Callable[[], Sequence[str]], make: Callable[[str], Any], find: Callable[[str], Any]):
         self._names, self._make, self._find = names, make, find
 
     def __getitem__(self, name: str) -> Any:
-        if name not in self._names:
-            try:
-                self._find(name)  # raises with the names there are
-            except _core.ModelError as error:
-                raise KeyError(str(error)) from None
-            raise KeyError(name)
+        if not isinstance(name, str):
+            raise KeyError(f"by name, not by {name!r}")
+        try:
+            self._find(name)  # raises with the names there are
+        except _core.ModelError as error:
+            raise KeyError(str(error)) from None
         return self._make(name)
 
+    def __contains__(self, name: object) -> bool:
+        try:
+            self[name]  # type: ignore[index] - anything may be asked for
+        except KeyError:
+            return False
+        return True
+
     def __iter__(self) -> Iterator[str]:
-        return iter(self._names)
+        return iter(self._names())
 
     def __len__(self) -> int:
-        return len(self._names)
+        return len(self._names())
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return list(self._names())
 
     def __repr__(self) -> str:
-        return "{" + ", ".join(self._names) + "}"
+        return "{" + ", ".join(self._names()) + "}"

@@ -10,6 +10,7 @@ from .. import _core
 from .direct_calls import cached
 from .realization import checked_forces
 from .sensitivities import SensitivityCalls
+from .state import at_state
 
 if TYPE_CHECKING:
     from ..accuracy.trajectory import Trajectory
@@ -24,12 +25,13 @@ class IntegrationCalls(SensitivityCalls):
     def _integration(self) -> _core.Integration:
         return cached(self, "_trajectories", _core.Integration)
 
-    def configuration_rate(self, q, v, *, precision: str = "double", out=None) -> np.ndarray:
+    def configuration_rate(self, q=None, v=None, *, precision: str = "double", out=None) -> np.ndarray:
         """Rates q̇ (nq,) or (B, nq) of the coordinates at the velocities v. O(N).
 
         Pins, sliders, screws: v itself. Ball: ½ q⊗(0, ω), ω in the body's axes. Free: that, and the linear velocity turned into the axes of
         the position, R(q/|q|) v. A quaternion's rate is orthogonal to it: its length stays, and is not pulled to one.
         """
+        q, v = at_state(self, q, v)
         return self._integration().configuration_rate(q, v, precision, out)
 
     def integrate_ode(
@@ -53,7 +55,7 @@ class IntegrationCalls(SensitivityCalls):
 
         Parameters
         ----------
-        q, v : (nq,), (nv,) at times[0]; q may be a State
+        q, v : (nq,), (nv,) at times[0]; q may be a State, which brings its v where v is None; None for the model's present state
         times : (T,) s, strictly increasing or strictly decreasing
         tau, damping : (nv,) constant generalized forces, and viscous damping coefficients; zero by default
         integrator : {"dopri5", "cash-karp54", "fehlberg78", "bulirsch-stoer", "rk4", "rkmk4", "scipy:RK45", "scipy:DOP853", ...}
@@ -93,7 +95,7 @@ class IntegrationCalls(SensitivityCalls):
         refine = _core.checked_refinement(refine, "same", precision)
         if normalise not in ("never", "each step"):
             raise _core.EvaluationError(f"normalise={normalise!r}: there are 'never' and 'each step'")
-        q, v = np.array(getattr(q, "q", q), float), np.array(getattr(v, "v", v), float)
+        q, v = at_state(self, q, v)
         times = np.atleast_1d(np.array(times, float))
         if times.ndim != 1 or not times.size:
             raise _core.EvaluationError(f"times: a list of times in seconds, not an array of shape {times.shape}")
@@ -117,6 +119,7 @@ class IntegrationCalls(SensitivityCalls):
         if not ((increments > 0).all() or (increments < 0).all()):
             raise _core.EvaluationError("times are strictly increasing, or strictly decreasing")
         self._integration().configuration_rate(q, v, "double", None)  # checks both
+        q, v = np.array(q, float), np.array(v, float)
         forces, friction = (np.zeros(self.nv) if x is None else np.asarray(x, float) for x in (tau, damping))
         for name, x in (("tau", forces), ("damping", friction)):
             if x.shape != (self.nv,):

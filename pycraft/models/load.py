@@ -5,8 +5,11 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 
+import numpy as np
+
 from .. import _core
 from . import urdf
+from .left_aside import told
 from .multibody import Multibody
 from .warning import warn
 from .xml_file import XmlFile
@@ -21,12 +24,15 @@ def load(
     welds: str = "lump",
     package_dirs: Sequence[str | os.PathLike[str]] = (),
     strict: bool = False,
+    *,
+    gravity: str | Sequence[float] | None = None,
 ) -> Multibody:
     """The model of a URDF or MJCF file (which of the two, its root element says).
 
     Hinges carry the file's joint names, bodies its link names, the model the robot's name. Children come in the order of
     their joint elements, depth first. Gravity is zero until it is set, also where the file gives it; damping, friction,
-    motors and contacts are effects and are not read.
+    springs and bounds on efforts and velocities are effects: a warning tells which of them the file has, and
+    `Multibody.left_aside` has their numbers. Motors and contacts are not read.
 
     Parameters
     ----------
@@ -45,12 +51,14 @@ def load(
         `pycraft.models.urdf.resolve_package`.
     strict : bool
         An inertia that violates the triangle inequality is an error instead of a warning.
+    gravity : (3,) m/s², or "file"
+        The model's gravity; "file": what an MJCF file says. Zero where left out.
 
     Warns
     -----
     ModelWarning
         Once each, with file and line: inertias that violate the triangle inequality, massless bodies on hinges, limits
-        that are the wrong way round; constraints of an MJCF file that are left out.
+        that are the wrong way round; constraints of an MJCF file that are left out. Once for a file: what is left aside.
 
     Raises
     ------
@@ -65,6 +73,18 @@ def load(
     >>> arm = pc.load("arm.urdf")  # doctest: +SKIP
     """
     model, words = read(path, root=root, mimic=mimic, welds=welds, package_dirs=package_dirs, strict=strict)
+    if isinstance(gravity, str):
+        if gravity != "file":
+            raise _core.ModelError(f"gravity={gravity!r}: three numbers in m/s², or 'file'")
+        if "gravity" not in model.left_aside:
+            text = "gravity='file', and the file says none; a URDF file never does: give three numbers"
+            raise _core.ModelError(f"{os.fsdecode(path)}: {text}")
+        model.gravity = model._left_aside.pop("gravity")
+    elif gravity is not None:
+        model.gravity = gravity
+        model._left_aside.pop("gravity", None)
+    if text := told(model.left_aside, model):
+        words = [*words, f"{os.fsdecode(path)}: {text}"]
     for text in words:
         warn(text)
     return model
@@ -85,10 +105,12 @@ def read(
             raise _core.ModelError(f"{option}={value!r}: there are {', '.join(map(repr, _OPTIONS[option]))}")
     file = XmlFile(path)
     if file.root_name == "robot":
-        return urdf.read(file, root=root, mimic=mimic, welds=welds, strict=strict)
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite then is refused, with its line
+            return urdf.read(file, root=root, mimic=mimic, welds=welds, strict=strict)
     if file.root_name == "mujoco":
         from . import mjcf  # its package is an extra
 
-        return mjcf.read(file, root=root, welds=welds, strict=strict)
+        with np.errstate(over="ignore", invalid="ignore"):
+            return mjcf.read(file, root=root, welds=welds, strict=strict)
     text = f"<{file.root_name}> is the root element of no format that is read; there are <robot> (URDF) and <mujoco> (MJCF)"
     raise file.error(file.root, text)

@@ -15,8 +15,9 @@ a name is a node, with "_site" added where a body has its name already.
 Coordinates are MuJoCo's numbers: a joint's `ref` goes into the placement of its hinge, and the model's state is MuJoCo's qpos0.
 `pycraft.interop.mujoco` has the order and the velocities of free hinges. `armature` is the rotor inertia.
 
-Not read, as they are effects: gravity (zero until it is set), springs, damping and friction of joints, actuators, contacts,
-fluid forces. Equality constraints, tendons and flexes are left out with a warning that names them.
+Not in the model, as they are effects: gravity (zero until it is set), springs, damping and friction of joints, which
+are in `Multibody.left_aside`; actuators, contacts and fluid forces, which are not read. Equality constraints, tendons
+and flexes are left out with a warning that names them.
 """
 
 from __future__ import annotations
@@ -53,7 +54,11 @@ def read(file: XmlFile, *, root: str, welds: str, strict: bool) -> tuple[Multibo
     """
     if root == "free":
         raise file.error(file.root, 'root="free" is for URDF files; in an MJCF file give the body a <freejoint name="root"/>')
-    return _Reader(conventions.compiled(file.path), file).model(welds, strict)
+    try:
+        return _Reader(conventions.compiled(file.path), file).model(welds, strict)
+    except UnicodeDecodeError as error:  # MuJoCo hands names on as bytes
+        text = f"a name is not in UTF-8 ({error.reason}), which is how MuJoCo reads files whatever they declare; convert the file"
+        raise file.error(file.root, text) from None
 
 
 class _Reader:
@@ -93,7 +98,8 @@ class _Reader:
             raise _core.ModelError(f"{self.path}: {error}") from None
         model.q = conventions.from_mujoco(model, m.qpos0, np.zeros(m.nv))[0]
         self._left_out()
-        return model, self.warnings + [f"{self.path}: {text}" for text in model.take_warnings()]
+        model._left_aside = self._left_aside(model)
+        return model, self.warnings + [f"{self.path}: {text}" for _, text in model.take_warnings()]
 
     def _add_sites(self, model: Multibody) -> None:
         m, frames = self.m, set(self.bodies)
@@ -172,7 +178,21 @@ class _Reader:
                 C = _pose(np.eye(3), -reference * axis) @ C
         return placement @ C if not np.array_equal(C, np.eye(4)) else placement, subhinges
 
-    # ------------------------------------------------------------------ what is not a tree of bodies
+    # ------------------------------------------------------------------ what a model does not have
+    def _left_aside(self, model: Multibody) -> dict[str, np.ndarray]:
+        """Gravity, and per coordinate damping, friction and stiffness, where the file has any: see `Multibody.left_aside`."""
+        m, left = self.m, {}
+        if np.any(m.opt.gravity):
+            left["gravity"] = np.array(m.opt.gravity)
+        order = conventions.permutation(model)[1]
+        stiffness = m.jnt_stiffness[m.dof_jntid]
+        for quantity, numbers in (("damping", m.dof_damping), ("friction", m.dof_frictionloss), ("stiffness", stiffness)):
+            if np.any(numbers):
+                values = np.full(m.nv, np.nan)
+                values[order] = np.where(np.asarray(numbers) != 0, numbers, np.nan)
+                left[quantity] = values
+        return left
+
     def _left_out(self) -> None:
         m = self.m
         constraints = [self._equality(e) for e in range(m.neq)]

@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..closed import Closed
+from .arguments import limit_pair, listed, pose_parts, text
 from .handles import Body, Hinge, Named, Node, Vector
 from .integration import IntegrationCalls
-from .state import State, random_state
+from .state import State, at_state, random_state
 
 _Z = (0.0, 0.0, 1.0)
 _DEFAULT_AXES: dict[str, tuple[tuple[float, float, float], ...]] = {
@@ -24,7 +26,7 @@ _DEFAULT_AXES: dict[str, tuple[tuple[float, float, float], ...]] = {
 }
 
 
-class Multibody(IntegrationCalls, _core.Multibody):
+class Multibody(Closed, IntegrationCalls, _core.Multibody):
     """A tree of bodies on hinges, with nodes, a state (`q`, `v`) and gravity (zero until it is set).
 
     Build one body by body, or load it (`pycraft.load`). Bodies are kept depth first, children in the order they were added, and
@@ -52,14 +54,15 @@ class Multibody(IntegrationCalls, _core.Multibody):
     def __init__(self, name: str = "multibody", *, welds: str = "lump", strict: bool = False):
         if welds not in ("lump", "keep"):
             raise _core.ModelError(f"welds={welds!r}: there are 'lump' and 'keep'")
-        super().__init__(name, welds == "keep", strict)
+        super().__init__(text(name, "a model"), welds == "keep", strict)
         self._soa = None
+        self._left_aside: dict[str, np.ndarray] = {}
 
     # ------------------------------------------------------------------ structure
     def add_body(
         self,
         name: str,
-        parent: str | Body | None = None,
+        parent: str | Body | Node | None = None,
         hinge: str = "pin",
         *,
         axis: Vector | None = None,
@@ -82,7 +85,7 @@ class Multibody(IntegrationCalls, _core.Multibody):
         Parameters
         ----------
         name : str
-        parent : name of a body or node, a Body, or None for the base
+        parent : name of a body or node, a Body or Node, or None for the base
         hinge : {"weld", "pin", "slider", "screw", "universal", "gimbal", "cylindrical", "planar", "ball", "free", "custom"}
         axis, axes : (3,) or a list of them
             Directions in the hinge's frame; z by default (x, y for a universal, x, y, z for a gimbal hinge). A planar hinge's axis is
@@ -92,81 +95,72 @@ class Multibody(IntegrationCalls, _core.Multibody):
         pitch : float
             Of a screw, metres per radian.
         subhinges : list of dicts with "kind", "axis", "point", "pitch"
-            Of a custom hinge: any sequence of pin, slider, screw, ball, free.
+            Of a custom hinge, and of no other: any sequence of pin, slider, screw, ball, free.
         position, rotation, or placement : (3,), (3, 3), (4, 4)
-            Pose of the hinge's inboard frame in the parent's frame.
+            Pose of the hinge's inboard frame in the parent's frame. A rotation that is orthogonal to six digits only is taken for the
+            nearest one.
         mass, com, inertia : kg, (3,) m in the body frame, (3, 3) kg m² about the centre of mass in the body's axes
         rotor_inertia : float or (n,)
             Reflected inertia of rotors along the hinge's coordinates: the hinge-diagonal term J.
         limits : (lower, upper)
-            Kept for drawing random states; nothing enforces them.
+            One of each a subhinge, -inf and inf where there is none. Kept for drawing random states; nothing enforces them.
         hinge_name : str
             The body's name by default.
 
         Raises
         ------
         ModelError
-            A name that is taken or unknown, an axis of zero length, a negative or non-finite mass, an inertia that is not symmetric
-            positive semidefinite: names body or hinge and number, and leaves the model as it was.
+            A name that is taken or unknown, an axis of zero length, a pose that is none, a negative or non-finite mass, an inertia that
+            is not symmetric positive semidefinite, limits the wrong way round: names body or hinge and number, and leaves the model as
+            it was.
         """
-        if isinstance(parent, Body):
-            parent = parent.name
-        if placement is not None:
-            placement = np.asarray(placement, float)
-            if placement.shape != (4, 4):
-                raise _core.ModelError(f"placement of body {name!r} takes a (4, 4) pose, not an array {placement.shape}")
-            rotation, position = placement[:3, :3], placement[:3, 3]
         if axis is not None and axes is not None:
             raise _core.ModelError(f"body {name!r}: give axis or axes, not both")
-        directions = [axis] if axis is not None else list(axes) if axes is not None else list(_DEFAULT_AXES.get(hinge, ()))
-        count = None
-        if rotor_inertia is not None:
-            rotor = np.atleast_1d(np.asarray(rotor_inertia, float))
-            if rotor.size == 1:
-                count = {
-                    "pin": 1,
-                    "slider": 1,
-                    "screw": 1,
-                    "universal": 2,
-                    "cylindrical": 2,
-                    "gimbal": 3,
-                    "planar": 3,
-                    "ball": 3,
-                    "free": 6,
-                }.get(hinge)
-                if hinge == "custom" and subhinges is not None:
-                    count = sum({"ball": 3, "free": 6}.get(s["kind"], 1) for s in subhinges)
-            rotor = np.full(count, rotor[0]) if count else rotor
-        lower, upper = (np.atleast_1d(np.asarray(x, float)) for x in limits) if limits is not None else ((), ())
+        if subhinges is not None and hinge != "custom":
+            raise _core.ModelError(f"body {name!r}: subhinges belong to a hinge of kind 'custom', not {hinge!r}")
+        if hinge == "custom" and (subhinges is None or not (axis is axes is point is None)):
+            raise _core.ModelError(
+                f"body {name!r}: a custom hinge takes subhinges=[...], each with its kind, axis and point, and nothing beside"
+            )
+        rotation, position = pose_parts(f"body {name!r}", rotation, position, placement)
+        directions = [axis] if axis is not None else axes if axes is not None else _DEFAULT_AXES.get(hinge, ())
+        lower, upper = limit_pair(f"body {name!r}", limits)
         self._add_body(
-            name, parent or "", hinge, hinge_name or "", directions, point, float(pitch),
-            list(subhinges) if subhinges is not None else None,
-            rotation, position, float(mass), com, inertia, [float(x) for x in rotor] if rotor_inertia is not None else [],
-            [float(x) for x in lower], [float(x) for x in upper],
+            text(name, "a body"), _frame_name(parent), text(hinge, "the kind of a hinge"), text(hinge_name or "", "a hinge"),
+            listed(directions, f"axes of body {name!r}"), point, pitch,
+            None if subhinges is None else listed(subhinges, f"subhinges of body {name!r}"),
+            rotation, position, mass, com, inertia, rotor_inertia, lower, upper,
         )  # fmt: skip
         return Body(self, name)
 
     def add_node(
-        self, name: str, body: str | Body | None = None, *, position: Vector | None = None, rotation: np.ndarray | None = None
+        self,
+        name: str,
+        body: str | Body | Node | None = None,
+        *,
+        position: Vector | None = None,
+        rotation: np.ndarray | None = None,
+        placement: np.ndarray | None = None,
     ) -> Node:
-        """Add a frame on a body, on a node, or on the base (None). It invalidates no operator."""
-        self._add_node(name, body.name if isinstance(body, Body) else body or "", rotation, position)
+        """Add a frame on a body, on a node, or on the base (None), at a pose given as for `add_body`. It invalidates no operator."""
+        rotation, position = pose_parts(f"node {name!r}", rotation, position, placement)
+        self._add_node(text(name, "a node"), _frame_name(body), rotation, position)
         return Node(self, name)
 
     @property
     def bodies(self) -> Mapping[str, Body]:
         """The bodies by name, in the model's order."""
-        return Named(self._names()[0], lambda name: Body(self, name), self._body_index)
+        return Named(lambda: self._names()[0], lambda name: Body(self, name), self._body_index)
 
     @property
     def hinges(self) -> Mapping[str, Hinge]:
         """The hinges by name, in the bodies' order."""
-        return Named(self._names()[1], lambda name: Hinge(self, name), self._hinge_index)
+        return Named(lambda: self._names()[1], lambda name: Hinge(self, name), self._hinge_index)
 
     @property
     def nodes(self) -> Mapping[str, Node]:
         """The nodes by name: welded links, and frames that were added."""
-        return Named([node["name"] for node in self._nodes()], lambda name: Node(self, name), self._node_index)
+        return Named(lambda: [node["name"] for node in self._nodes()], lambda name: Node(self, name), self._node)
 
     # ------------------------------------------------------------------ state
     def random_state(self, seed: int | np.random.Generator = 0) -> State:
@@ -184,14 +178,13 @@ class Multibody(IntegrationCalls, _core.Multibody):
             self._soa = OperatorSet(_core.operators_of(self), self)
         return self._soa
 
-    def certify(self, q, v=None, tau=None, **options: Any) -> Any:
+    def certify(self, q=None, v=None, tau=None, **options: Any) -> Any:
         """Forward dynamics with its measured error, what rounding of q, v and tau does, condition, floor of refinement, where digits are
         lost, and what the next rung costs: a `pycraft.accuracy.certificate.Certificate`.
 
         Parameters
         ----------
-        q : (nq,) or a State, whose v is taken then
-        v, tau : (nv,), zero where left out
+        q, v, tau : (nq,), (nv,), (nv,), by the rule of `forward_dynamics`
         form, refine, residual, precision : of the value that is certified, as in `forward_dynamics`
         seed : int
             Of the signs by which q, v and tau are moved, 0 or above.
@@ -203,14 +196,14 @@ class Multibody(IntegrationCalls, _core.Multibody):
         """
         from ..accuracy.certify import certify_dynamics
 
-        return certify_dynamics(self, q, v, tau, **options)
+        return certify_dynamics(self, *at_state(self, q, v), tau, **options)
 
     def warn(self) -> None:
         """Say, once, what is legal but worth a word: violated triangle inequalities, massless bodies on hinges."""
         from .warning import warn
 
-        for text in self.take_warnings():
-            warn(text)
+        for _, words in self.take_warnings():
+            warn(words)
 
     # ------------------------------------------------------------------ copies
     def description(self) -> dict[str, Any]:
@@ -220,39 +213,74 @@ class Multibody(IntegrationCalls, _core.Multibody):
     @classmethod
     def from_description(cls, description: Mapping[str, Any]) -> Multibody:
         """The model that `description()` describes. A body with no subhinges stays a body if welds are kept; parents are indices."""
-        data = dict(description)
+        try:
+            return cls._described(description)
+        except (KeyError, IndexError, TypeError) as error:
+            if isinstance(error, _core.Error):
+                raise
+            what = f"{error} is missing" if isinstance(error, KeyError) else str(error)
+            raise _core.ModelError(f"not a model's description: {what}; `description()` of a model shows what one has") from None
+
+    @classmethod
+    def _described(cls, data: Mapping[str, Any]) -> Multibody:
         keeps = data.get("welds") == "keep" or any(not body["hinge"]["subhinges"] for body in data["bodies"])
         model = cls(data.get("name", "multibody"), welds="keep" if keeps else "lump", strict=bool(data.get("strict", False)))
         names = [body["name"] for body in data["bodies"]]
+
+        def frame(number: int) -> str:
+            if not -1 <= number < len(names):
+                raise _core.ModelError(f"a description of {len(names)} bodies speaks of number {number}; -1 is the base")
+            return names[number] if number >= 0 else ""
+
         for body in data["bodies"]:
             hinge = body["hinge"]
             model._add_body(
-                body["name"], names[body["parent"]] if body["parent"] >= 0 else "", hinge.get("kind", "custom"), hinge["name"],
-                [], None, 0.0,
-                [dict(s) for s in hinge["subhinges"]], np.asarray(hinge["placement"]["rotation"], float),
-                np.asarray(hinge["placement"]["position"], float), float(body["mass"]), body["com"], np.asarray(body["inertia"], float),
-                [float(x) for x in hinge.get("rotor_inertia", [])], [float(x) for x in hinge.get("lower", [])],
-                [float(x) for x in hinge.get("upper", [])],
+                body["name"], frame(body["parent"]), hinge.get("kind", "custom"), hinge["name"], [], None, 0.0,
+                [dict(s) for s in hinge["subhinges"]], hinge["placement"]["rotation"], hinge["placement"]["position"],
+                body["mass"], body["com"], body["inertia"], hinge.get("rotor_inertia"), hinge.get("lower"), hinge.get("upper"),
             )  # fmt: skip
         for node in data.get("nodes", []):
-            model._add_node(node["name"], names[node["body"]] if node["body"] >= 0 else "", node["rotation"], node["position"])
+            model._add_node(node["name"], frame(node["body"]), node["rotation"], node["position"])
         model.gravity = data.get("gravity", (0, 0, 0))
         if "q" in data:
             model.q, model.v = data["q"], data["v"]
         return model
 
+    @property
+    def left_aside(self) -> dict[str, np.ndarray]:
+        """What the model's file says beside the model, by name; empty for a model that was not loaded.
+
+        "gravity" (3,), m/s²; per coordinate (nv,), NaN where the file has none: "damping", "friction", "stiffness", and "effort limit",
+        "velocity limit". `integrate_ode(..., damping=np.nan_to_num(arm.left_aside["damping"]))` takes the first of these.
+        """
+        return dict(self._left_aside)
+
     def __reduce__(self):
-        return Multibody.from_description, (self.description(),)
+        return _again, (self.description(), self._left_aside)
 
     def __copy__(self) -> Multibody:
-        return Multibody.from_description(self.description())
+        return _again(self.description(), self._left_aside)
 
     def __deepcopy__(self, memo) -> Multibody:
-        memo[id(self)] = copy = Multibody.from_description(self.description())
+        memo[id(self)] = copy = _again(self.description(), self._left_aside)
         return copy
 
     def __repr__(self) -> str:
         return f"<multibody {self.name!r}: {self._size} bodies, {self.nv} degrees of freedom>"
+
+
+def _again(description: Mapping[str, Any], left_aside: Mapping[str, np.ndarray]) -> Multibody:
+    """A copy of a model from its description and what its file said beside it."""
+    model = Multibody.from_description(description)
+    model._left_aside = dict(left_aside)
+    return model
+
+
+def _frame_name(frame: str | Body | Node | None) -> str:
+    """The name of the body or node that something is put on; empty for the base."""
+    if frame is None:
+        return ""
+    return frame.name if isinstance(frame, (Body, Node)) else text(frame, "a parent")
 
 
 def describe(model: _core.Multibody) -> dict[str, Any]:

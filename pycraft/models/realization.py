@@ -16,19 +16,20 @@ def by_realization(model: Any, q, v, tau, precision: str | int, out) -> np.ndarr
     direct calls do; an error at one state of a batch says which.
     """
     q, v, tau, batch = motion_state(model, q, v, tau)
-    result = output(out, (*batch, model.nv))
+    result = output(out, (*batch, model.nv))  # filled at the end: it may lie in the memory of q, v or tau
     if not model.nv:
         return result
     H, phi, M, J, a, b, base = model.soa("H phi M J a b gravity_base")
     T = _core.vector("T", model.soa.Theta)
     formula = (H @ phi @ M @ phi.T @ H.T + J).inv() @ (T - H @ phi @ (M @ phi.T @ (a + base) + b))
     states = [np.broadcast_to(x, (*batch, x.shape[-1])).reshape(-1, x.shape[-1]) for x in (q, v, tau)]
-    flat = result.reshape(-1, model.nv)
+    flat = np.empty((len(states[0]), model.nv))
     for i in range(len(flat)):
         try:
             flat[i] = formula.at(states[0][i], states[1][i], precision=precision).value(rules=False, T=states[2][i])
         except _core.Error as error:
             raise type(error)(f"{error} (state {i} of a batch of {len(flat)})" if batch else str(error)) from None
+    result[...] = flat.reshape(result.shape)
     return result
 
 
@@ -37,7 +38,6 @@ def motion_state(model: Any, q: Any, v: Any, tau: Any) -> tuple[np.ndarray, np.n
 
     Raises ModelError, in the words of the core's direct calls, for wrong shapes, batches that differ and entries that are not finite.
     """
-    q, v = getattr(q, "q", q), getattr(v, "v", v)
     model._integration().configuration_rate(q, v, "double", None)  # the core's own checks of q and v
     q, v, tau = np.asarray(q, float), np.asarray(v, float), checked_forces(model, tau)
     sizes = [x.shape[0] for x in (q, v, tau) if x.ndim == 2]

@@ -8,27 +8,28 @@ ball, spherical             ball      quaternion (w, x, y, z); not in the specif
 floating                    free      quaternion, position
 fixed                       weld      none
 
-Visuals, collision shapes, materials, transmissions, gazebo blocks and the dynamics element (damping and friction are
-effects) are not read. One element is our own, inside a joint: `<pycraft rotor_inertia="1.14"/>`, one value per coordinate
-in kg m² or kg as seen at the joint; other readers pass over it.
+Visuals, collision shapes, materials, transmissions and gazebo blocks are not read. Damping, friction and bounds on
+efforts and velocities are effects: they are in `Multibody.left_aside`. One element is our own, inside a joint:
+`<pycraft rotor_inertia="1.14"/>`, one value per coordinate in kg m² or kg as seen at the joint; other readers pass over
+it.
 """
 
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterable, Iterator
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
 
 from .. import _core
+from .left_aside import by_coordinate
 from .multibody import Multibody
 from .rotations import rotation_about
 from .urdf_elements import Elements, Joint, Link
-from .xml_file import XmlFile, label
+from .xml_file import XmlFile, abbreviated, label
 
 _CUT = "a model is a tree: take one joint out"
 
@@ -42,7 +43,8 @@ def read(file: XmlFile, *, root: str, mimic: str, welds: str, strict: bool) -> t
     _settle_mimics(file, elements.joints, mimic)
     tree = _Tree(file, elements.links, elements.joints)
     model = _build(tree, root, welds, strict)
-    return model, elements.warnings + [tree.with_line(text) for text in model.take_warnings()]
+    model._left_aside = by_coordinate(model, elements.left_aside)
+    return model, elements.warnings + [tree.with_line(body, text) for body, text in model.take_warnings()]
 
 
 # Mimic joints ---------------------------------------------------------------------------------------------------------
@@ -52,13 +54,15 @@ def _settle_mimics(file: XmlFile, joints: dict[str, Joint], mimic: str) -> None:
     """Refuse joints that follow others, or weld them where they stand when the joint they follow is at zero."""
     followers = {joint: joint.mimic for joint in joints.values() if joint.mimic}
     if followers and mimic == "refuse":
-        pairs = ", ".join(f"{j.name!r} follows {m.follows!r} (line {m.element.sourceline})" for j, m in followers.items())
+        pairs = abbreviated(f"{j.name!r} follows {m.follows!r} (line {m.element.sourceline})" for j, m in followers.items())
         raise file.error(
             next(iter(followers.values())).element,
             f"mimic joints are not coupled to the joints they follow: {pairs}; "
             'load with mimic="lock" to weld them at their offsets, or with mimic="free" to have them move on their own',
         )
-    positions = {joint.name: _locked_at(file, joints, joint, []) for joint in followers}
+    positions: dict[str, float] = {}
+    for joint in followers:
+        _lock(file, joints, joint, positions)
     for joint in followers:
         axis = joint.axis / np.linalg.norm(joint.axis)
         if joint.kind == "pin":
@@ -68,21 +72,26 @@ def _settle_mimics(file: XmlFile, joints: dict[str, Joint], mimic: str) -> None:
         joint.kind, joint.limits, joint.rotor_inertia = "weld", None, None
 
 
-def _locked_at(file: XmlFile, joints: dict[str, Joint], joint: Joint, before: list[str]) -> float:
-    """Where a locked joint stands; one that follows a locked joint follows it to where that stands."""
-    if not joint.mimic:
-        return 0.0
-    element, follows, remedy = joint.mimic.element, joint.mimic.follows, 'load with mimic="free"'
-    if follows not in joints:
-        text = f"{label(joint.element)} follows {follows!r}, and no joint has this name; correct it, or {remedy}"
-        raise file.error(element, text)
-    if joint.name in before:
-        circle = " → ".join([*before, joint.name])
-        raise file.error(element, f"joints follow each other in a circle: {circle}; correct them, or {remedy}")
-    if joint.kind not in ("pin", "slider"):
-        kind = joint.element.get("type")
-        raise file.error(element, f"{label(joint.element)} of type {kind!r} has no single coordinate that could follow; {remedy}")
-    return joint.mimic.multiplier * _locked_at(file, joints, joints[follows], [*before, joint.name]) + joint.mimic.offset
+def _lock(file: XmlFile, joints: dict[str, Joint], joint: Joint, positions: dict[str, float]) -> None:
+    """Where a locked joint stands, and those that it follows: one that follows a locked joint follows it to where that stands."""
+    waiting: dict[str, Joint] = {}  # in order: each follows the next
+    while joint.mimic and joint.name not in positions:
+        element, follows, remedy = joint.mimic.element, joint.mimic.follows, 'load with mimic="free"'
+        if follows not in joints:
+            text = f"{label(joint.element)} follows {follows!r}, and no joint has this name; correct it, or {remedy}"
+            raise file.error(element, text)
+        if joint.name in waiting:
+            circle = abbreviated([*waiting, joint.name], " → ")
+            raise file.error(element, f"joints follow each other in a circle: {circle}; correct them, or {remedy}")
+        if joint.kind not in ("pin", "slider"):
+            kind = joint.element.get("type")
+            raise file.error(element, f"{label(joint.element)} of type {kind!r} has no single coordinate that could follow; {remedy}")
+        waiting[joint.name] = joint
+        joint = joints[follows]
+    position = positions.get(joint.name, 0.0)
+    for follower in reversed(waiting.values()):
+        assert follower.mimic
+        position = positions[follower.name] = follower.mimic.multiplier * position + follower.mimic.offset
 
 
 # The tree -------------------------------------------------------------------------------------------------------------
@@ -107,7 +116,7 @@ class _Tree:
     def _root(self) -> str:
         roots = [link for link in self.links.values() if link.name not in self.inboard]
         if len(roots) > 1:
-            names = ", ".join(f"{link.name!r} (line {link.element.sourceline})" for link in roots)
+            names = abbreviated(f"{link.name!r} (line {link.element.sourceline})" for link in roots)
             text = f"{len(roots)} links have no parent: {names}; join them to one root by fixed joints"
             raise self.file.error(roots[1].element, text)
         reached = set(self.depth_first(roots[0].name)) if roots else set()
@@ -126,30 +135,33 @@ class _Tree:
 
     def _loop(self, name: str) -> Exception:
         """The error for a link that no root carries: going inboard from it ends in a loop, which is named."""
-        path: list[str] = []
+        path: dict[str, None] = {}  # in order
         while name not in path:
-            path.append(name)
+            path[name] = None
             name = self.inboard[name].parent
-        cycle = [name, *reversed(path[path.index(name) :])]
+        walked = list(path)
+        cycle = [name, *reversed(walked[walked.index(name) :])]
         joints = [self.inboard[link] for link in cycle[1:]]
-        names = ", ".join(f"{joint.name!r} (line {joint.element.sourceline})" for joint in joints)
-        return self.file.error(joints[0].element, f"the links {' → '.join(cycle)} are a loop, by the joints {names}; {_CUT}")
+        names = abbreviated(f"{joint.name!r} (line {joint.element.sourceline})" for joint in joints)
+        text = f"the links {abbreviated(cycle, ' → ')} are a loop, by the joints {names}; {_CUT}"
+        return self.file.error(joints[0].element, text)
 
-    def with_line(self, text: str) -> str:
+    def with_line(self, body: str, text: str) -> str:
         """A warning of the core's about a body, with the line of its link."""
-        body = re.match(r"body '(.*?)'", text)
-        link = self.links.get(body[1]) if body else None
+        link = self.links.get(body)
         return f"{self.file.at(link.element) if link else self.file.path}: {text}"
 
-    def located(self, text: str, link: str) -> Exception:
+    def located(self, text: str, link: str, hinge: str) -> Exception:
         """What the core refuses about a link or the joint that carries it, with the element it comes from."""
         owner, at = self.links[link].element, None
-        if text.startswith("hinge") and link in self.inboard:
+        about_hinge = f"hinge '{hinge}'" in text
+        if about_hinge and link in self.inboard:
             owner = self.inboard[link].element
             at = self.file.child(owner, "pycraft") if "rotor" in text else None
         elif (inertial := self.file.child(owner, "inertial")) is not None:
             at = self.file.child(inertial, "mass" if "its mass" in text else "inertia")
-        text = re.sub("^(body|hinge) '.*?'", label(owner), text)  # the file's words for the core's
+        for words in (f"body '{link}'", f"hinge '{hinge}'"):
+            text = text.replace(words, label(owner), 1)  # the file's words for the core's
         return self.file.error(at if at is not None else owner, text)
 
 
@@ -161,10 +173,10 @@ def _build(tree: _Tree, root: str, welds: str, strict: bool) -> Multibody:
     model = Multibody(file.root.get("name") or Path(file.path).stem, welds=welds, strict=strict)
     for name in tree.depth_first(tree.root):
         link, joint = tree.links[name], tree.inboard.get(name)
+        hinge = joint.name if joint else "root" if "root" not in joints else f"root of {name}"
         body: dict[str, Any] = dict(mass=link.mass, com=link.com, inertia=link.inertia)
         try:
             if joint is None:
-                hinge = "root" if "root" not in joints else f"root of {name}"
                 model.add_body(name, None, "free" if root == "free" else "weld", hinge_name=hinge, **body)
                 continue
             model.add_body(
@@ -172,7 +184,7 @@ def _build(tree: _Tree, root: str, welds: str, strict: bool) -> Multibody:
                 joint.parent,
                 joint.kind,
                 axis=joint.axis if joint.kind in ("pin", "slider", "planar") else None,
-                hinge_name=joint.name,
+                hinge_name=hinge,
                 rotation=joint.rotation,
                 position=joint.position,
                 limits=joint.limits,
@@ -180,7 +192,7 @@ def _build(tree: _Tree, root: str, welds: str, strict: bool) -> Multibody:
                 **body,
             )
         except _core.ModelError as error:
-            raise tree.located(str(error), name) from None
+            raise tree.located(str(error), name, hinge) from None
     return model
 
 
@@ -197,24 +209,36 @@ def resolve_package(uri: str, urdf_path: str | os.PathLike[str], package_dirs: I
     urdf_path : path of the URDF file
     package_dirs : folders
         Where packages lie: folders that hold a folder `name` or are called so themselves. Tried first and in order; then
-        the folders above the URDF file, from the nearest up.
+        the folders above the URDF file, from the nearest up, the root of the file system not among them.
 
     Raises
     ------
     ModelError
-        A file that is nowhere: names the URI and the folders tried.
+        A file that is nowhere: names the URI and the folders tried. A package:// name that leads out of its package.
     """
+    urdf_path = os.fsdecode(urdf_path)
     above = Path(urdf_path).absolute().parent
     if uri.startswith("package://"):
         package, _, rest = uri.removeprefix("package://").partition("/")
-        folders = [*(Path(folder).absolute() for folder in package_dirs), above, *above.parents]
+        inside = PurePosixPath(rest)
+        if package in ("", ".", "..") or inside.is_absolute() or ".." in inside.parts:
+            raise _core.ModelError(f"{urdf_path}: {uri!r} leads out of a package; write package://name/path within it")
+        climbed = [folder for folder in (above, *above.parents) if folder.parent != folder]  # not the root of the file system
+        folders = [*(Path(os.fsdecode(folder)).absolute() for folder in package_dirs), *climbed]
         tried = [place for folder in folders for place in (folder / package, *([folder] if folder.name == package else []))]
-        found, remedy = [place / rest for place in tried], f"give the folder that holds {package!r} in package_dirs"
+        found, remedy = [place / inside for place in tried], f"give the folder that holds {package!r} in package_dirs"
     else:
         name = unquote(uri.removeprefix("file://")) if uri.startswith("file://") else uri
         tried, found, remedy = [above], [above / name], "a name without package:// is relative to the URDF file"
     for path in found:
-        if path.exists():
+        if _exists(path):
             return path
     places = ", ".join(map(str, tried[:6])) + (", ..." if len(tried) > 6 else "")
-    raise _core.ModelError(f"{os.fspath(urdf_path)}: {uri!r} is not found in {places}; {remedy}")
+    raise _core.ModelError(f"{urdf_path}: {uri!r} is not found in {places}; {remedy}")
+
+
+def _exists(path: Path) -> bool:
+    try:
+        return path.exists()
+    except (OSError, ValueError):  # a NUL in it, too long a name
+        return False

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import TypeVar
@@ -10,7 +11,7 @@ from typing import TypeVar
 import numpy as np
 
 from .rotations import rotation_from_quaternion, rotation_from_rpy, turned_inertia
-from .xml_file import Element, XmlFile, label
+from .xml_file import Element, XmlFile, label, local_name
 
 HINGES = {
     "revolute": "pin",
@@ -24,6 +25,16 @@ HINGES = {
 }
 _COORDINATES = {"pin": 1, "slider": 1, "weld": 0, "free": 6, "planar": 3, "ball": 3}
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+_IDENTITY, _ZERO, _X = np.eye(3), np.zeros(3), np.array([1.0, 0.0, 0.0])
+for _constant in (_IDENTITY, _ZERO, _X):
+    _constant.setflags(write=False)
+# Of a joint: element, attribute, what it is called in Multibody.left_aside.
+_LEFT_ASIDE = (
+    ("dynamics", "damping", "damping"),
+    ("dynamics", "friction", "friction"),
+    ("limit", "effort", "effort limit"),
+    ("limit", "velocity", "velocity limit"),
+)
 _EXPAND = "expand the file first: xacro file.xacro > file.urdf"
 
 
@@ -34,7 +45,7 @@ class Link:
     name: str
     element: Element
     mass: float = 0.0
-    com: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    com: np.ndarray = field(default_factory=lambda: _ZERO)
     inertia: np.ndarray = field(default_factory=lambda: np.zeros((3, 3)))
 
 
@@ -86,6 +97,7 @@ class Elements:
     def __init__(self, file: XmlFile, follow: bool):
         self.file, self.follow = file, follow
         self.warnings: list[str] = []
+        self.left_aside: dict[str, dict[str, float]] = {}  # numbers by quantity and joint
         self._refuse_xacro()
         self.links = {link.name: link for link in self._named("link", self._link)}
         if not self.links:
@@ -93,12 +105,14 @@ class Elements:
         self.joints = {joint.name: joint for joint in self._named("joint", self._joint)}
 
     def _refuse_xacro(self) -> None:
-        for element in self.file.root.iter("*"):
-            if "xacro" in element.tag:
-                raise self.file.error(element, f"<{element.tag.split('}')[-1]}> is a xacro macro; {_EXPAND}")
-            for name, value in element.attrib.items():
-                if "${" in value or "$(" in value:
-                    raise self.file.error(element, f'{label(element)}: {name}="{value}" is a xacro expression; {_EXPAND}')
+        # In libxml2: to list the attributes of an element one by one takes time by the square of their number.
+        macros = "//*[contains(name(), 'xacro') or contains(namespace-uri(), 'xacro')]"
+        expressions = "//@*[contains(., '${') or contains(., '$(')]"
+        for found in self.file.root.xpath(f"({macros} | {expressions})[1]"):
+            if not isinstance(found, str):
+                raise self.file.error(found, f"<{local_name(found)}> is a xacro macro; {_EXPAND}")
+            element = found.getparent()
+            raise self.file.error(element, f'{label(element)}: {found.attrname}="{found}" is a xacro expression; {_EXPAND}')
 
     def _named(self, kind: str, read: Callable[[str, Element], T]) -> Iterator[T]:
         """The root's elements of one kind, read one by one; ModelError where two have the same name."""
@@ -114,10 +128,11 @@ class Elements:
         """Rotation and position that an <origin> gives; the identity where there is none."""
         origin = self.file.child(parent, "origin")
         if origin is None:
-            return np.eye(3), np.zeros(3)
-        position = self.file.numbers(origin, "xyz", 3, owner, np.zeros(3))
+            return _IDENTITY, _ZERO
+        position = self.file.numbers(origin, "xyz", 3, owner, _ZERO)
         if origin.get("quat_xyzw") is None:
-            return rotation_from_rpy(self.file.numbers(origin, "rpy", 3, owner, np.zeros(3))), position
+            angles = self.file.numbers(origin, "rpy", 3, owner, _ZERO)
+            return rotation_from_rpy(angles) if angles.any() else _IDENTITY, position
         if origin.get("rpy") is not None:
             raise self.file.error(origin, f"{label(owner)}: <origin> has rpy and quat_xyzw; give one of them")
         quaternion = self.file.numbers(origin, "quat_xyzw", 4, owner)
@@ -135,7 +150,9 @@ class Elements:
         rotation, com = self._origin(inertial, element)
         xx, xy, xz, yy, yz, zz = (self.file.number(inertia, moment, element) for moment in _MOMENTS)
         moments = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        return Link(name, element, self.file.number(mass, "value", element), com, turned_inertia(rotation, moments))
+        if rotation is not _IDENTITY:
+            moments = turned_inertia(rotation, moments)
+        return Link(name, element, self.file.number(mass, "value", element), com, moments)
 
     # ------------------------------------------------------------------ joints
     def _joint(self, name: str, element: Element) -> Joint:
@@ -143,6 +160,8 @@ class Elements:
         if kind not in HINGES:
             raise self.file.error(element, f"joint {name!r} has the type {kind!r}; there are {', '.join(HINGES)}")
         hinge = HINGES[kind]
+        if hinge != "weld":
+            self._leave_aside(name, element)
         rotation, position = self._origin(element, element)
         return Joint(
             name,
@@ -158,23 +177,32 @@ class Elements:
             self._mimic(element, hinge),
         )
 
+    def _leave_aside(self, name: str, element: Element) -> None:
+        """What the file says of a joint that a model does not have: numbers above zero of damping, friction and bounds."""
+        for tag, attribute, quantity in _LEFT_ASIDE:
+            inner = self.file.child(element, tag)
+            if inner is not None and inner.get(attribute) is not None:
+                number = self.file.number(inner, attribute, element, infinite=True)
+                if number > 0:
+                    self.left_aside.setdefault(quantity, {})[name] = number
+
     def _end(self, end: str, element: Element) -> str:
         inner = self.file.required(element, end, element, f'write <{end} link="..."/>')
         link = self.file.text(inner, "link", element)
         if link not in self.links:
-            near = difflib.get_close_matches(link, self.links, 3) or list(self.links)[:6]
+            near = (difflib.get_close_matches(link, self.links, 3) if len(link) < 200 else []) or list(self.links)[:6]
             names = ", ".join(near) + (", ..." if len(near) < len(self.links) else "")
             remedy = f'add <link name="{link}"/> or correct the name (there are {names})'
             raise self.file.error(inner, f"{label(element)} has the {end} {link!r}, and no link has this name; {remedy}")
         return link
 
     def _axis(self, element: Element, hinge: str) -> np.ndarray:
-        axis, default = self.file.child(element, "axis"), np.array([1.0, 0.0, 0.0])
+        axis = self.file.child(element, "axis")
         if axis is None or hinge not in ("pin", "slider", "planar"):
-            return default  # a zero axis is common in joints that have none
-        direction = self.file.numbers(axis, "xyz", 3, element, default)
-        if not np.linalg.norm(direction) > 1e-12:
-            length = np.linalg.norm(direction)
+            return _X  # a zero axis is common in joints that have none
+        direction = self.file.numbers(axis, "xyz", 3, element, _X)
+        length = math.hypot(*direction)
+        if not length > 1e-12:
             raise self.file.error(axis, f"{label(element)}: its axis has length {length:g}; give a direction")
         return direction
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import TypeAlias
 
 import numpy as np
@@ -34,32 +34,39 @@ class XmlFile:
     """
 
     def __init__(self, path: str | os.PathLike[str]):
-        self.path = os.fspath(path)
+        self.path = os.fsdecode(path)
         try:
             with open(self.path, "rb") as file:
                 data = file.read()
         except OSError as error:
             raise _core.ModelError(f"{self.path}: cannot be read: {error.strerror or error}") from None
-        self.root = self._parse(data)
-        self.root_name = etree.QName(self.root).localname
-        self._space = etree.QName(self.root).namespace
+        except ValueError as error:  # a NUL in the path
+            raise _core.ModelError(f"{self.path!r}: cannot be read: {error}") from None
+        self.root, parser = self._parse(data)
+        self.root_name, self._space = local_name(self.root), _namespace(self.root)
+        self._tags: dict[str, str] = {}
         dtd = self.root.getroottree().docinfo.internalDTD
         entities = [entity.name for entity in dtd.iterentities()] if dtd is not None else []
         if entities:
             text = f"the file declares entities ({', '.join(entities)}), which are not expanded; write their text out"
             raise self.error(self.root, text)
+        for entry in parser.error_log:  # only a warning where a DOCTYPE speaks of declarations elsewhere; nothing is put in their place
+            if "UNDECLARED_ENTITY" in entry.type_name:
+                text = f"{entry.message}: entities are not expanded; write its text out"
+                raise _core.ModelError(f"{self.path}:{entry.line}: {text}")
 
-    def _parse(self, data: bytes) -> Element:
+    def _parse(self, data: bytes) -> tuple[Element, etree.XMLParser]:
         # Files come from anywhere: nothing is fetched, no entity is expanded, the parser's limits on depth and size stay.
         options = dict(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
         options |= dict(remove_comments=True, remove_pis=True)
         parser = etree.XMLParser(**options)
         try:
-            return etree.fromstring(data, parser)
+            return etree.fromstring(data, parser), parser
         except etree.XMLSyntaxError as error:
             # Old files use prefixes such as <controller:gazebo_ros> without declaring them, in parts that are not read.
             if len(parser.error_log) and all(entry.domain_name == "NAMESPACE" for entry in parser.error_log):
-                return etree.fromstring(data, etree.XMLParser(recover=True, **options))
+                parser = etree.XMLParser(recover=True, **options)
+                return etree.fromstring(data, parser), parser
             line = f":{error.lineno}" if error.lineno else ""
             raise _core.ModelError(f"{self.path}{line}: not well-formed XML: {error.msg}") from None
 
@@ -75,7 +82,10 @@ class XmlFile:
     # ------------------------------------------------------------------ elements
     def children(self, element: Element, name: str) -> Iterator[Element]:
         """Children of that name, in the root's namespace (if it has one)."""
-        return element.iterchildren(f"{{{self._space}}}{name}" if self._space else name)
+        tag = self._tags.get(name)
+        if tag is None:
+            tag = self._tags[name] = f"{{{self._space}}}{name}" if self._space else name
+        return element.iterchildren(tag)
 
     def child(self, element: Element, name: str) -> Element | None:
         """The one child of that name, None if there is none; ModelError if there are several: which one counts is not clear."""
@@ -98,7 +108,7 @@ class XmlFile:
         value = (element.get(attribute) or "").strip()
         if not value:
             of = f" of {label(owner)}" if owner is not None else ""
-            tag = etree.QName(element).localname
+            tag = local_name(element)
             raise self.error(element, f'<{tag}>{of} has no {attribute}; give it one: {attribute}="..."')
         return value
 
@@ -125,37 +135,73 @@ class XmlFile:
         ModelError
             A wrong count, or a word that is no finite number: says file, line, owner, element, attribute and the word.
         """
-        where = f"{label(owner)}: <{etree.QName(element).localname}> {attribute}"
         value = element.get(attribute)
-        if value is None:
-            if default is not None:
-                return default
-            raise self.error(element, f"{where} is missing; write it")
-        words = value.split()
-        many = "numbers separated by blanks"
-        wanted = "one number" if count == 1 else many if count is None else f"{count} {many}"
-        if not words or count not in (None, len(words)):
-            raise self.error(element, f'{where}="{value}" has {len(words)} values; write {wanted}')
-        return np.array([self._number(element, where, value, word, wanted, infinite) for word in words])
+        if value is None and default is not None:
+            return default
+        return np.array(self._floats(element, attribute, value, count, owner, infinite))
 
     def number(self, element: Element, attribute: str, owner: Element, default: float | None = None, infinite: bool = False) -> float:
         """One number of an attribute: see `numbers`."""
-        fallback = None if default is None else np.array([default])
-        return float(self.numbers(element, attribute, 1, owner, fallback, infinite)[0])
+        value = element.get(attribute)
+        if value is None and default is not None:
+            return default
+        return self._floats(element, attribute, value, 1, owner, infinite)[0]
 
-    def _number(self, element: Element, where: str, value: str, word: str, wanted: str, infinite: bool) -> float:
-        try:
-            number = float(word) if "_" not in word else None  # Python alone reads 1_000 as a number
-        except ValueError:
-            number = None
-        if number is None:
-            raise self.error(element, f'{where}="{value}": {word!r} is not a number; write {wanted}, with a decimal point')
-        if math.isnan(number) or (math.isinf(number) and not infinite):
-            raise self.error(element, f'{where}="{value}": {word!r} is not a finite number; write {wanted}')
-        return number
+    def _floats(
+        self, element: Element, attribute: str, value: str | None, count: int | None, owner: Element, infinite: bool
+    ) -> list[float]:
+        words = value.split() if value is not None else []
+        if words and count in (None, len(words)):
+            numbers = [_float(word) for word in words]
+            if not any(map(math.isnan if infinite else _is_not_finite, numbers)):
+                return numbers
+        raise self._no_numbers(element, attribute, value, words, count, owner, infinite)
+
+    def _no_numbers(
+        self, element: Element, attribute: str, value: str | None, words: list[str], count: int | None, owner: Element, infinite: bool
+    ) -> Exception:
+        """What is wrong with an attribute that is not so many numbers."""
+        where = f"{label(owner)}: <{local_name(element)}> {attribute}"
+        if value is None:
+            return self.error(element, f"{where} is missing; write it")
+        many = "numbers separated by blanks"
+        wanted = "one number" if count == 1 else many if count is None else f"{count} {many}"
+        if not words or count not in (None, len(words)):
+            return self.error(element, f'{where}="{value}" has {len(words)} values; write {wanted}')
+        word = next(word for word in words if math.isnan(_float(word)) or (math.isinf(_float(word)) and not infinite))
+        if math.isinf(_float(word)) or word.strip("+-").lower() == "nan":
+            return self.error(element, f'{where}="{value}": {word!r} is not a finite number; write {wanted}')
+        return self.error(element, f'{where}="{value}": {word!r} is not a number; write {wanted}, with a decimal point')
+
+
+def _is_not_finite(x: float) -> bool:
+    return not math.isfinite(x)
+
+
+def _float(word: str) -> float:
+    """The number that a word is; NaN for none. Digits of other scripts and 1_000 are numbers to Python alone."""
+    try:
+        return float(word) if word.isascii() and "_" not in word else math.nan
+    except ValueError:
+        return math.nan
+
+
+def local_name(element: Element) -> str:
+    """The tag without its namespace. (QName refuses what a prefix that was never declared leaves in a tag.)"""
+    return element.tag.rpartition("}")[2]
+
+
+def _namespace(element: Element) -> str:
+    return element.tag[1:].partition("}")[0] if element.tag.startswith("{") else ""
+
+
+def abbreviated(items: Iterable[str], between: str = ", ", most: int = 12) -> str:
+    """A list for an error: in full if it is short, else its beginning and how many there are."""
+    items = list(items)
+    return between.join(items if len(items) <= most else [*items[:most], f"... ({len(items)} in all)"])
 
 
 def label(element: Element) -> str:
     """How errors call an element: link 'forearm', joint 'elbow', or <robot> where it has no name."""
-    name, kind = element.get("name"), etree.QName(element).localname
+    name, kind = element.get("name"), local_name(element)
     return f"{kind} {name!r}" if name else f"<{kind}>"

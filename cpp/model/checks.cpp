@@ -1,0 +1,144 @@
+#include "model/checks.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "algebra/errors.h"
+
+namespace pycraft {
+
+namespace {
+
+constexpr double given_digits = 1e-6;  // a rotation with fewer right digits is none
+constexpr double rounding = 1e-14;     // products of a few rotations stay below; what does is left to the last bit
+
+double off_orthogonal(const Matrix3<double>& R) {
+  const Matrix3<double> gram = transpose(R) * R;
+  double off = 0;
+  for (int i = 0; i < 9; ++i) off = std::max(off, std::abs(gram.m[i] - (i % 4 == 0)));
+  return off;
+}
+
+// The orthogonal factor of the polar decomposition.
+Matrix3<double> nearest_rotation(const Matrix3<double>& R) {
+  using Matrix = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+  const Eigen::JacobiSVD<Matrix, Eigen::ComputeFullU | Eigen::ComputeFullV> svd{Eigen::Map<const Matrix>(R.m)};
+  Matrix3<double> nearest;
+  Eigen::Map<Matrix>(nearest.m) = svd.matrixU() * svd.matrixV().transpose();
+  return nearest;
+}
+
+// The subhinges that a kind has; a custom hinge has any.
+std::vector<SubhingeKind> sequence(HingeKind kind) {
+  using enum SubhingeKind;
+  switch (kind) {
+    case HingeKind::pin: return {pin};
+    case HingeKind::slider: return {slider};
+    case HingeKind::screw: return {screw};
+    case HingeKind::universal: return {pin, pin};
+    case HingeKind::gimbal: return {pin, pin, pin};
+    case HingeKind::cylindrical: return {pin, slider};
+    case HingeKind::planar: return {slider, slider, pin};
+    case HingeKind::ball: return {ball};
+    case HingeKind::free: return {free};
+    case HingeKind::weld:
+    case HingeKind::custom: return {};
+  }
+  return {};
+}
+
+std::string listed(const std::vector<SubhingeKind>& kinds) {
+  std::string text;
+  for (SubhingeKind kind : kinds) text += (text.empty() ? "" : ", ") + std::string(subhinge_kind_name(kind));
+  return text.empty() ? "none" : text;
+}
+
+}  // namespace
+
+std::string short_number(double x) {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%.6g", x);
+  return buffer;
+}
+
+Pose<double> checked_pose(const Pose<double>& pose, const std::string& what) {
+  for (int i = 0; i < 9; ++i)
+    if (!std::isfinite(pose.R.m[i]) || (i < 3 && !std::isfinite(pose.p[i]))) throw ModelError(what + " has an entry that is not a number");
+  const double off = off_orthogonal(pose.R);
+  if (!(off <= given_digits))
+    throw ModelError("the rotation of " + what + " is not orthogonal (off by " + short_number(off) + "); its columns are three unit vectors at right angles");
+  if (determinant(pose.R) < 0) throw ModelError("the rotation of " + what + " is a reflection; its columns are a right-handed frame");
+  return off <= rounding ? pose : Pose<double>{nearest_rotation(pose.R), pose.p};
+}
+
+std::vector<double> checked_rotor_inertia(const Hinge& hinge, std::vector<double> values) {
+  const int nv = hinge.nv();
+  if (values.empty()) values.assign(nv, 0.0);
+  if (values.size() == 1 && nv > 1) values.assign(nv, values[0]);
+  if (static_cast<int>(values.size()) != nv)
+    throw ModelError("hinge '" + hinge.name + "' has " + std::to_string(nv) + " coordinates and " + std::to_string(values.size()) + " rotor inertias");
+  for (double j : values)
+    if (!(j >= 0) || !std::isfinite(j)) throw ModelError("hinge '" + hinge.name + "': rotor inertia " + short_number(j) + " is not a nonnegative number");
+  return values;
+}
+
+void check_limits(const Hinge& hinge, const std::vector<double>& lower, const std::vector<double>& upper) {
+  if (lower.empty() && upper.empty()) return;
+  const std::string name = "hinge '" + hinge.name + "'";
+  const size_t count = hinge.subhinges.size();
+  if (lower.size() != count || upper.size() != count)
+    throw ModelError(name + " takes " + std::to_string(count) + " lower and " + std::to_string(count) + " upper limits, one a subhinge (" +
+                     hinge_kind_name(hinge.kind) + "), not " + std::to_string(lower.size()) + " and " + std::to_string(upper.size()));
+  for (size_t i = 0; i < count; ++i) {
+    const std::string pair = "(" + short_number(lower[i]) + ", " + short_number(upper[i]) + ")";
+    if (!(lower[i] < std::numeric_limits<double>::infinity()) || !(upper[i] > -std::numeric_limits<double>::infinity()))
+      throw ModelError(name + ": limits " + pair + " leave no position; a side without a limit is -inf below, inf above");
+    if (lower[i] > upper[i]) throw ModelError(name + ": limits " + pair + " are the wrong way round; give (lower, upper)");
+    if (hinge.subhinges[i].nq() > 1 && (std::isfinite(lower[i]) || std::isfinite(upper[i])))
+      throw ModelError(name + ": limits " + pair + " of a " + subhinge_kind_name(hinge.subhinges[i].kind) +
+                       " subhinge; only one coordinate has limits, give it (-inf, inf)");
+  }
+}
+
+Hinge checked_hinge(Hinge hinge) {
+  const std::vector<SubhingeKind> wanted = sequence(hinge.kind);
+  std::vector<SubhingeKind> given;
+  for (const Subhinge& s : hinge.subhinges) given.push_back(s.kind);
+  if (hinge.kind != HingeKind::custom && given != wanted)
+    throw ModelError("hinge '" + hinge.name + "' of kind '" + hinge_kind_name(hinge.kind) + "' has the subhinges " + listed(wanted) + ", not " + listed(given) +
+                     "; a hinge of your own is of kind 'custom'");
+  hinge.placement = checked_pose(hinge.placement, "the placement of hinge '" + hinge.name + "'");
+  hinge.rotor_inertia = checked_rotor_inertia(hinge, std::move(hinge.rotor_inertia));
+  check_limits(hinge, hinge.lower, hinge.upper);
+  return hinge;
+}
+
+std::string check_mass_properties(const std::string& body, double mass, const Vector3<double>& com, const Symmetric3<double>& inertia) {
+  if (!std::isfinite(mass)) throw ModelError("body '" + body + "': its mass is " + short_number(mass));
+  if (mass < 0) throw ModelError("body '" + body + "': its mass is " + short_number(mass) + " kg; a mass is not negative");
+  for (int i = 0; i < 3; ++i)
+    if (!std::isfinite(com[i])) throw ModelError("body '" + body + "': its centre of mass has an entry that is " + short_number(com[i]));
+  double largest = 0;
+  for (double x : inertia.s) {
+    if (!std::isfinite(x)) throw ModelError("body '" + body + "': its inertia has an entry that is " + short_number(x));
+    largest = std::max(largest, std::abs(x));
+  }
+  if (largest == 0) return "";
+  Eigen::Matrix3d A;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) A(i, j) = inertia(i, j);
+  const Eigen::Vector3d moments = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(A, Eigen::EigenvaluesOnly).eigenvalues();
+  // Published numbers carry rounding: a negative moment within 1e-12 of the largest entry, or of a point mass of 30 nm, is that.
+  const double printed = 1e-12 * largest + 1e-15 * mass;
+  if (moments[0] < -printed)
+    throw ModelError("body '" + body + "': its inertia has the principal moment " + short_number(moments[0]) + " kg m²; an inertia is positive semidefinite");
+  const double violation = moments[2] - moments[0] - moments[1];
+  if (violation <= 1e-9 * largest + printed) return "";
+  return "body '" + body + "': its principal moments " + short_number(moments[0]) + ", " + short_number(moments[1]) + ", " + short_number(moments[2]) +
+         " kg m² violate the triangle inequality by " + short_number(violation) + "; no distribution of mass has them";
+}
+
+}  // namespace pycraft

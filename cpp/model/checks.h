@@ -1,0 +1,28 @@
+// What a model's parts must be, checked in one place for everything that takes them: bodies being added, setters, descriptions, files.
+// Each throws a ModelError that names the body, hinge or node, the number, and what would do.
+#pragma once
+
+#include <string>
+
+#include "model/multibody.h"
+
+namespace pycraft {
+
+// Up to six digits, for errors.
+std::string short_number(double x);
+
+// The pose, its rotation brought to the nearest orthogonal matrix where it is one to six digits only. `what` names it: "node 'tip'". Throws
+// for entries that are not finite, scalings, shears and reflections.
+Pose<double> checked_pose(const Pose<double>& pose, const std::string& what);
+
+// The hinge with everything settled that it leaves open: one rotor inertia stands for all coordinates, none is zeros. Throws for subhinges
+// that are not those of its kind, rotor inertias and limits of another number or out of order.
+Hinge checked_hinge(Hinge hinge);
+std::vector<double> checked_rotor_inertia(const Hinge& hinge, std::vector<double> values);
+// One pair a subhinge, lower ≤ upper; -inf and inf are no limit.
+void check_limits(const Hinge& hinge, const std::vector<double>& lower, const std::vector<double>& upper);
+
+// Finite, a mass that is not negative, an inertia that is positive semidefinite. Returns what is wrong with the triangle inequality, or "".
+std::string check_mass_properties(const std::string& body, double mass, const Vector3<double>& com, const Symmetric3<double>& inertia);
+
+}  // namespace pycraft

@@ -1,0 +1,52 @@
+"""Jacobians in other axes, about other points, against other frames than the core's: see `DirectCalls.jacobian`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+
+AXES = ("body", "aligned", "world")
+
+
+def resolved_jacobian(model: Any, frame: str, q: Any, axes: str, relative_to: str | None, precision: str | int) -> np.ndarray:
+    """J (6, nv) or (B, 6, nv), of the velocity (ω; v) of `frame` (f) against `relative_to` (o).
+
+    With R, p the pose of f in o, and the core's 𝒥_f and 𝒥_o, each in its own axes about its own origin:
+
+      body     𝒥 = 𝒥_f - (R* ω_o; R* (v_o + ω_o × p))        what o carries along is taken off
+      aligned  (R ω; R v) of it
+      world    (R ω; R v + p × R ω)
+
+    O(N). Raises EvaluationError for axes that are not there.
+    """
+    if axes not in AXES:
+        raise _core.EvaluationError(f"axes={axes!r} of a Jacobian: there are {', '.join(map(repr, AXES))}")
+    calls = model._calls()
+    J = calls.jacobian(frame, q, precision, None)
+    X = calls.pose(frame, q)
+    R, p = X[..., :3, :3], X[..., :3, 3]
+    if relative_to is not None:
+        J_o, X_o = calls.jacobian(relative_to, q, precision, None), calls.pose(relative_to, q)
+        R_o = np.swapaxes(X_o[..., :3, :3], -1, -2)
+        R, p = R_o @ R, np.einsum("...ij,...j->...i", R_o, p - X_o[..., :3, 3])
+        carried = J_o[..., 3:, :] - _cross(p, J_o[..., :3, :])
+        J = J - _turned(np.swapaxes(R, -1, -2), np.concatenate([J_o[..., :3, :], carried], axis=-2))
+    if axes == "body":
+        return J
+    J = _turned(R, J)
+    if axes == "world":
+        J[..., 3:, :] += _cross(p, J[..., :3, :])
+    return J
+
+
+def _turned(R: np.ndarray, J: np.ndarray) -> np.ndarray:
+    """(R ω; R v) of every column."""
+    return np.concatenate([R @ J[..., :3, :], R @ J[..., 3:, :]], axis=-2)
+
+
+def _cross(p: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """p × each column, (..., 3) and (..., 3, n)."""
+    return np.cross(p[..., None, :], np.swapaxes(columns, -1, -2)).swapaxes(-1, -2)

@@ -1,0 +1,126 @@
+"""Damaged and hostile model files: a ModelError that names the file, or a model; never an exception of another kind, never a hang.
+
+`python tests/campaigns/loaders.py --seeds 2000`. A round writes a random robot as URDF or MJCF and damages it: bytes, attributes, names
+full of quotes, brackets and escapes, entities, prefixes, numbers that are none, elements moved, doubled and lost.
+"""
+
+import argparse
+import sys
+import tempfile
+import time
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+import pycraft as pc  # noqa: E402
+
+SECONDS = 5.0  # for files of a few hundred bytes
+NAMES = [
+    "a", "b b", r"\1\g<0>", "(?P<", "'", "[red]", "[/bold]", "%s {0}", "ä", "日本", "a/b", "..", "x" * 300, "hinge 'a'", "body 'b'",
+    "*", "-", "0", "a[0]", "&amp;", "&#65;", "root", "world",
+]  # fmt: skip
+NUMBERS = [
+    "0", "1", "-1", "1e-300", "1e308", "1e999", "nan", "inf", "-inf", "1_0", "١", "0x10", "", " ", "1,0", "1 2", "1&nope;0",
+    "${x}", "$(x)", "--1", "1e", "true",
+]  # fmt: skip
+INSERTS = [
+    "<!DOCTYPE robot SYSTEM 'x.dtd'>", "<!DOCTYPE robot [<!ENTITY a 'b'>]>", "&nope;", "<foo:bar/>", "<foo:robot>", "</robot>",
+    "<link/>", "<joint/>", "<mimic joint='a'/>", "<!--", "]]>", "<![CDATA[", "\x00", "\xff",
+    "<?xml version='1.0' encoding='utf-16'?>", "<a:b:c/>", "<inertial/>", "<axis xyz='0 0 0'/>", "<dynamics damping='x'/>",
+    "<limit lower='1' upper='-1' effort='inf' velocity='nan'/>", "<origin rpy='1 2'/>", "<pycraft rotor_inertia='-1'/>",
+]  # fmt: skip
+MOMENTS = {"ixx": 1, "ixy": 0, "ixz": 0, "iyy": 1, "iyz": 0, "izz": 1}
+KINDS = ["revolute", "continuous", "prismatic", "fixed", "floating", "planar", "ball", "spherical", "knee"]
+
+
+def urdf(rng):
+    """A URDF file, mostly right."""
+    n = int(rng.integers(1, 6))
+    odd = lambda usual, strange, p: str(rng.choice(strange)) if rng.random() < p else usual  # noqa: E731
+    number = lambda x: odd(str(x), NUMBERS, 0.02)  # noqa: E731
+    names = [odd(f"l{k}", NAMES, 0.15) for k in range(n)]
+    quoted = [name.replace("<", "&lt;").replace('"', "&quot;") for name in names]
+    lines = [f'<robot name="{odd("r", NAMES, 0.1)}">'.replace("<(", "(")]
+    for name in quoted:
+        moments = " ".join(
+            f'{m}="{number(v)}"' for m, v in zip(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), (1, 0, 0, 1, 0, 1), strict=True)
+        )
+        lines.append(f'<link name="{name}"><inertial><mass value="{number(1)}"/><inertia {moments}/></inertial></link>')
+    for k in range(1, n):
+        parent = quoted[int(rng.integers(n)) if rng.random() < 0.05 else int(rng.integers(k))]
+        mimic = f'<mimic joint="{odd(f"j{k - 1}", NAMES, 0.1)}"/>' if rng.random() < 0.05 else ""
+        lines.append(
+            f'<joint name="{odd(f"j{k}", NAMES, 0.15)}" type="{rng.choice(KINDS)}"><parent link="{parent}"/><child link="{quoted[k]}"/>'
+            f'<origin xyz="{number(0)} 0 1" rpy="0 {number(0)} 0"/><axis xyz="0 0 {number(1)}"/>'
+            f'<limit lower="{number(-1)}" upper="1"/>{mimic}</joint>'
+        )
+    return "\n".join([*lines, "</robot>"])
+
+
+def mjcf(rng):
+    """An MJCF file, mostly right."""
+    name = lambda usual: str(rng.choice(NAMES)).replace("<", "&lt;").replace('"', "&quot;") if rng.random() < 0.2 else usual  # noqa: E731
+    joints = "".join(
+        f'<joint name="{name(f"j{i}")}" type="{rng.choice(["hinge", "slide", "ball", "free"])}"/>' for i in range(int(rng.integers(3)))
+    )
+    size = rng.choice(NUMBERS) if rng.random() < 0.2 else "1"
+    return f'<mujoco model="{name("m")}"><worldbody><body name="{name("b")}">{joints}<geom size="{size}"/></body></worldbody></mujoco>'
+
+
+def damaged(rng, text):
+    """The bytes of a file, most of them left as they are."""
+    for _ in range(int(rng.integers(0, 3))):
+        at = int(rng.integers(len(text) + 1))
+        kind = int(rng.integers(4))
+        length = int(rng.integers(1, 30))
+        if kind == 0:
+            text = text[:at] + str(rng.choice(INSERTS)) + text[at:]
+        elif kind == 1:
+            text = text[:at] + text[at + length :]
+        elif kind == 2:
+            text = text[:at] + text[at : at + length] + text[at:]
+        else:
+            text = text[:at] + chr(int(rng.integers(1, 500))) + text[at + 1 :]
+    return text.encode("latin-1" if rng.random() < 0.1 else "utf-8", errors="replace")
+
+
+def one_round(seed, folder):
+    """None, or what is wrong with the reading of one file."""
+    rng = np.random.default_rng(seed)
+    xml = rng.random() < 0.25
+    path = Path(folder) / "robot.xml"
+    path.write_bytes(damaged(rng, mjcf(rng) if xml else urdf(rng)))
+    options = {"mimic": str(rng.choice(["refuse", "lock", "free"])), "welds": str(rng.choice(["lump", "keep"]))}
+    if not xml:
+        options["root"] = str(rng.choice(["fixed", "free"]))
+    begin = time.perf_counter()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", pc.ModelWarning)
+            model = pc.load(path, **options)
+            model.random_state(0)
+            model.mass_matrix(model.q)
+    except pc.Error as error:
+        if isinstance(error, pc.ModelError) and str(path) not in str(error):
+            return f"seed {seed}: the file is not named: {error}"
+    except Exception as error:
+        return f"seed {seed}: {type(error).__name__}: {str(error)[:200]}"
+    seconds = time.perf_counter() - begin
+    return f"seed {seed}: {seconds:.1f} s" if seconds > SECONDS else None
+
+
+def run(seeds):
+    """What is wrong, one line each."""
+    with tempfile.TemporaryDirectory() as folder:
+        return [text for seed in seeds if (text := one_round(seed, folder))]
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seeds", type=int, default=2000)
+    found = run(range(parser.parse_args().seeds))
+    print("\n".join(found[:40]))
+    sys.exit(f"{len(found)} wrong" if found else 0)
