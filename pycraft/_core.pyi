@@ -664,7 +664,7 @@ class Dynamics:
         """
     def pose(self, frame: str, q: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
         ...
-    def refinement(self, q: typing.Any, v: typing.Any, tau: typing.Any, form: str, refine: typing.Any, residual: str, precision: str | int) -> tuple[numpy.typing.NDArray[numpy.float64], list[float]]:
+    def refinement(self, q: typing.Any, v: typing.Any, tau: typing.Any, form: str, refine: typing.Any, residual: str, precision: str | int) -> tuple[numpy.typing.NDArray[numpy.float64], list[float], typing.Any]:
         ...
 class Sensitivities:
     def __init__(self, arg0: Multibody) -> None:
