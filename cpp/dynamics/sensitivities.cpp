@@ -84,7 +84,11 @@ void Sensitivities<S>::forward_dynamics(const double* q, const double* v, const 
   convert(q, model_->nq, q_), convert(v, N, v_);
   rates_.resize(N), work_.resize(3 * square), solution_.resize(3 * square);
   dynamics_->forward_dynamics_of_points(q, v, tau, rates_.data(), how);
-  frame_at(q_.data(), v_.data(), rates_.data(), OwnTerms::absorbed);
+  kinematics(*model_, q_.data(), blocks_);
+  point_accelerations_base_to_tip(*model_, blocks_.pose.data(), blocks_.H.data(), v_.data(), OwnTerms::absorbed, points_);
+  for (int k = 0; k < model_->bodies; ++k)  // of what hinges absorb, the frame knows that of free roots
+    for (int j = model_->v_offset[k]; j < model_->v_offset[k] + model_->nv_of[k] && !frame_.floats(*model_, k); ++j) rates_[j] -= points_.absorbed[j];
+  frame_.fill(*model_, blocks_, v_.data(), rates_.data(), OwnTerms::absorbed);
   // Columns: ∂T/∂q, ∂T/∂v, 1.
   differentiate_forces(work_.data(), work_.data() + N, 3 * N);
   for (int i = 0; i < N; ++i)

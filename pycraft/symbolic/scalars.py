@@ -368,7 +368,7 @@ class ScalarRules:
                 schur = self.local.reduce(combine((1, block(second, second)), (-1, coupling)))[0]
                 for o in self.problem.opaque:
                     if o.kind == "operand" and self.local.reduce(o.inner)[0] == schur:
-                        by = {("ln det", blocks[0].name): ONE, ("ln det", o.name): ONE}
+                        by = monomial("ln det", blocks[0].name) | monomial("ln det", o.name)
                         uses = [z.definition, o.definition, blocks[0].definition]
                         premises = [theory()("J = 0")] if "J = 0" in self.local.setting.hypotheses else []
                         note = "the determinant of a partitioned operator: of one block, and of the other's Schur complement"
