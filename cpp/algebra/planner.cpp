@@ -148,6 +148,7 @@ Plan Planner::plan(const Expression& typed, Request request) {
   plan_.request = request;
   plan_.text = show(typed);
   typed.check_current();
+  more_digits_ = precision_of(typed) > Precision::double_;
   Expression e = lower(typed, false);
   if (options_.rules) e = optimise(e, plan_.notes);
   plan_.domain = e.domain();

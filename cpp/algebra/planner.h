@@ -64,6 +64,7 @@ class Planner {
   double vector_bytes(const Space& space) const { return 8.0 * space.dimension(); }
 
   PlanOptions options_;
+  bool more_digits_ = false;         // bound to a precision above double
   Plan plan_;
   std::unordered_map<Expression, int, ExpressionHash> ids_;
   std::map<std::pair<int, int>, int> vector_memo_;

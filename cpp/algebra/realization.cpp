@@ -7,6 +7,7 @@
 #include "algebra/lower.h"
 #include "algebra/planner.h"
 #include "algebra/properties.h"
+#include "algebra/small_lu.h"
 #include "algebra/source.h"
 
 namespace pycraft {
@@ -27,13 +28,32 @@ struct Signal {
   std::vector<SignalTerm> terms;
 };
 
-// C = left · right with `rank` columns in the middle, exact to rounding; by elimination with complete pivoting, up to rank 16.
+// C = C(:,J) C(I,J)⁻¹ C(I,:) with r rows I and columns J, up to 16: entries of C alone, so that no digit is lost before the run. The rows and
+// columns are found by elimination with complete pivoting in double precision.
 struct LowRank {
   int rank;
-  std::shared_ptr<const ConstantData> left, right;
+  std::shared_ptr<const ConstantData> columns, core, rows;
 };
 
-std::optional<LowRank> low_rank_factors(const ConstantData& c, int rows, int columns) {
+// Whether that holds in the widest digits, and not to the rounding of a double only.
+bool exactly(const LowRank& factors, const std::vector<double>& C, int rows, int columns) {
+  using Widest = Digits100;
+  const int r = factors.rank;
+  std::vector<Widest> core(factors.core->dense.begin(), factors.core->dense.end()), X(factors.rows->dense.begin(), factors.rows->dense.end()), work(size_t(r) * columns);
+  SmallLU<Widest> lu;
+  if (r > 0 && !lu.factor(core.data(), r, nullptr)) return false;
+  if (r > 0) lu.solve(X.data(), columns, work.data());
+  const Widest tolerance = Widest(1e-80) * Widest(std::abs(*std::max_element(C.begin(), C.end(), [](double a, double b) { return std::abs(a) < std::abs(b); })));
+  for (int i = 0; i < rows; ++i)
+    for (int j = 0; j < columns; ++j) {
+      Widest rest = C[size_t(i) * columns + j];
+      for (int a = 0; a < r; ++a) rest -= Widest(factors.columns->dense[size_t(i) * r + a]) * X[size_t(a) * columns + j];
+      if (abs(rest) > tolerance) return false;
+    }
+  return true;
+}
+
+std::optional<LowRank> low_rank_factors(const ConstantData& c, int rows, int columns, bool more_digits) {
   constexpr int limit = 16;
   std::vector<double> rest = c.dense;
   const auto largest = [&] {
@@ -41,26 +61,28 @@ std::optional<LowRank> low_rank_factors(const ConstantData& c, int rows, int col
   };
   if (rest.empty()) return std::nullopt;
   const double tolerance = std::max(rows, columns) * epsilon<double>() * std::abs(rest[largest()]);
-  std::vector<std::vector<double>> u, v;
+  std::vector<int> I, J;
   for (size_t at = largest(); std::abs(rest[at]) > tolerance; at = largest()) {
-    if (static_cast<int>(u.size()) == std::min(limit, std::min(rows, columns) - 1)) return std::nullopt;
-    const size_t i = at / columns, j = at % columns;
-    std::vector<double> column(rows), row(rest.begin() + i * columns, rest.begin() + (i + 1) * columns);
-    for (int a = 0; a < rows; ++a) column[a] = rest[a * columns + j] / rest[at];
-    for (int a = 0; a < rows; ++a)
-      for (int b = 0; b < columns; ++b) rest[a * columns + b] -= column[a] * row[b];
-    u.push_back(std::move(column));
-    v.push_back(std::move(row));
+    if (static_cast<int>(I.size()) == std::min(limit, std::min(rows, columns) - 1)) return std::nullopt;
+    const int i = static_cast<int>(at / columns), j = static_cast<int>(at % columns);
+    I.push_back(i), J.push_back(j);
+    const std::vector<double> row(rest.begin() + size_t(i) * columns, rest.begin() + size_t(i + 1) * columns);
+    for (int a = 0; a < rows; ++a) {
+      const double f = rest[size_t(a) * columns + j] / row[j];
+      for (int b = 0; b < columns; ++b) rest[size_t(a) * columns + b] -= f * row[b];
+    }
   }
-  const int rank = static_cast<int>(u.size());
-  auto left = std::make_shared<ConstantData>(), right = std::make_shared<ConstantData>();
-  left->name = right->name = c.name;
-  left->dense.resize(rows * rank);
-  for (int r = 0; r < rank; ++r) {
-    for (int a = 0; a < rows; ++a) left->dense[a * rank + r] = u[r][a];
-    right->dense.insert(right->dense.end(), v[r].begin(), v[r].end());
-  }
-  return LowRank{rank, left, right};
+  const auto part = [&](const std::vector<int>* of_rows, const std::vector<int>* of_columns) {
+    auto made = std::make_shared<ConstantData>();
+    made->name = c.name;
+    for (int a = 0; a < (of_rows ? static_cast<int>(of_rows->size()) : rows); ++a)
+      for (int b = 0; b < (of_columns ? static_cast<int>(of_columns->size()) : columns); ++b)
+        made->dense.push_back(c.dense[size_t(of_rows ? (*of_rows)[a] : a) * columns + (of_columns ? (*of_columns)[b] : b)]);
+    return made;
+  };
+  const LowRank factors{static_cast<int>(I.size()), part(nullptr, &J), part(&I, &J), part(&I, nullptr)};
+  if (more_digits && !exactly(factors, c.dense, rows, columns)) return std::nullopt;
+  return factors;
 }
 
 }  // namespace
@@ -299,14 +321,14 @@ class RealizationBuilder {
     materialise(s);
     if (!in && !out) {  // of low rank: through R^r
       const int rows = (transposed ? e.domain() : e.codomain()).dimension(), columns = (transposed ? e.codomain() : e.domain()).dimension();
-      const auto factors = low_rank_factors(*constant, rows, columns);
+      const auto factors = low_rank_factors(*constant, rows, columns, planner_.more_digits_);
       if (!factors) return refuse("the constant " + constant->name + " is a full matrix between tree spaces");
-      const int middle = new_state(Space::euclidean(factors->rank));
-      r_->terms.push_back({middle, middle, 1.0});
-      r_->border_terms.push_back({middle, s.terms[0].state, -1.0, transposed ? factors->left : factors->right, transposed});
+      const int middle = new_state(Space::euclidean(factors->rank));  // C(I,J) middle = C(I,:) s
+      r_->border_terms.push_back({middle, middle, 1.0, factors->core, transposed});
+      r_->border_terms.push_back({middle, s.terms[0].state, -1.0, transposed ? factors->columns : factors->rows, transposed});
       const int row = new_state(y.space);
       r_->terms.push_back({row, row, 1.0});
-      r_->border_terms.push_back({row, middle, -1.0, transposed ? factors->right : factors->left, transposed});
+      r_->border_terms.push_back({row, middle, -1.0, transposed ? factors->rows : factors->columns, transposed});
       y.terms = {{row}};
       return true;
     }
