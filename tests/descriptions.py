@@ -66,6 +66,8 @@ def random_subhinges(kind, rng):
     def draw(subhinge_kind, axis=None, point=None):
         axis = random_unit(rng) if axis is None else axis
         point = 0.3 * rng.normal(size=3) if point is None else point
+        if subhinge_kind == "free":
+            point = np.zeros(3)  # it turns about no point
         return subhinge(subhinge_kind, axis, point, 0.2 * rng.normal() if subhinge_kind == "screw" else 0.0)
 
     if kind == "cylindrical":

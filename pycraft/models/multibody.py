@@ -52,7 +52,7 @@ class Multibody(Closed, IntegrationCalls, _core.Multibody):
     """
 
     def __init__(self, name: str = "multibody", *, welds: str = "lump", strict: bool = False):
-        if welds not in ("lump", "keep"):
+        if not isinstance(welds, str) or welds not in ("lump", "keep"):
             raise _core.ModelError(f"welds={welds!r}: there are 'lump' and 'keep'")
         super().__init__(text(name, "a model"), welds == "keep", strict)
         self._soa = None
@@ -132,6 +132,10 @@ class Multibody(Closed, IntegrationCalls, _core.Multibody):
             rotation, position, mass, com, inertia, rotor_inertia, lower, upper,
         )  # fmt: skip
         return Body(self, name)
+
+    def remove_body(self, name: str | Body) -> None:
+        """Remove a body with everything outboard of it. Operators made before are stale; q and v are carried over by hinge name."""
+        super().remove_body(name.name if isinstance(name, Body) else text(name, "a body"))
 
     def add_node(
         self,
