@@ -47,7 +47,7 @@ from ._core import (
 from .accuracy.table import accuracy
 from .accuracy.work_precision import work_precision
 from .bare_trees import sko_model
-from .identities import check
+from .identities import UndecidedError, check, truth
 from .interop import compare
 from .kalman import kalman
 from .models.generators import chain, tree
@@ -56,7 +56,7 @@ from .models.multibody import Multibody
 from .models.state import State
 from .models.warning import ModelWarning
 from .operators import OperatorSet
-from .symbolic import Exercise, Proof, derivative, exercise, from_sympy, parse, prove, prove_derivative, symbolic, to_sympy
+from .symbolic import Exercise, Proof, derivative, exercise, from_sympy, parse, prove, prove_derivative, symbolic, to_sympy, worksheet
 
 __version__ = "0.1.0"
 
@@ -86,12 +86,13 @@ __all__ = [
     "SpaceError",
     "StaleOperatorError",
     "State",
+    "UndecidedError",
     "accuracy",
     "blockdiag",
     "chain",
     "check",
-    "compare",
     "cmake_dir",
+    "compare",
     "constant",
     "derivative",
     "euclidean",
@@ -110,7 +111,9 @@ __all__ = [
     "symbolic",
     "to_sympy",
     "tree",
+    "truth",
     "vector",
     "work_precision",
+    "worksheet",
     "zero",
 ]

@@ -1,66 +1,12 @@
 """
 The compiled core of pycraft: operators, planner, engine and model. Use it through the package pycraft.
 """
-
 from __future__ import annotations
 import collections.abc
 import numpy
 import numpy.typing
 import typing
-
-__all__: list[str] = [
-    "Binding",
-    "Dynamics",
-    "Error",
-    "EvaluationError",
-    "Integration",
-    "MatrixTree",
-    "Methods",
-    "ModelError",
-    "Multibody",
-    "MultibodyOperators",
-    "Operator",
-    "Parameter",
-    "PassCounts",
-    "Plan",
-    "RefinementError",
-    "Scalar",
-    "Sensitivities",
-    "SingularHingeError",
-    "SingularOperatorError",
-    "SkoSource",
-    "Space",
-    "SpaceError",
-    "StaleOperatorError",
-    "Theorem",
-    "blockdiag",
-    "checked_refinement",
-    "constant",
-    "epsilons",
-    "equal_by_theorems",
-    "euclidean",
-    "external",
-    "float128",
-    "forms",
-    "identity",
-    "integrators",
-    "methods",
-    "operators_of",
-    "precisions",
-    "residual",
-    "scalar",
-    "step_kinds",
-    "symbol_table",
-    "theorems",
-    "time_apply",
-    "time_dynamics",
-    "time_forward",
-    "time_method",
-    "time_packs",
-    "vector",
-    "wider",
-    "zero",
-]
+__all__: list[str] = ['Binding', 'Dynamics', 'Error', 'EvaluationError', 'Integration', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'Scalar', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'Theorem', 'blockdiag', 'checked_refinement', 'constant', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'identity', 'integrators', 'methods', 'operators_of', 'precisions', 'residual', 'scalar', 'step_kinds', 'symbol_table', 'theorems', 'time_apply', 'time_dynamics', 'time_forward', 'time_method', 'time_packs', 'vector', 'wider', 'zero']
 
 class Error(Exception): ...
 class SpaceError(Error, TypeError): ...
@@ -70,21 +16,28 @@ class SingularHingeError(Error, ArithmeticError): ...
 class SingularOperatorError(Error, ArithmeticError): ...
 class RefinementError(Error, ArithmeticError): ...
 class StaleOperatorError(Error, RuntimeError): ...
-
 class Space:
     """
     A space that operators map between: Θ generalized coordinates, V and F stacked body motions and forces (dual), NodesV and
     NodesF those of nodes (dual), R^n a user's own. Spaces compare by kind, model and blocks, never by size alone.
     """
     @typing.overload
-    def __eq__(self, arg0: object) -> bool: ...
+    def __eq__(self, arg0: object) -> bool:
+        ...
     @typing.overload
-    def __eq__(self, arg0: typing.Any) -> typing.Any: ...
-    def __hash__(self) -> int: ...
-    def __len__(self) -> int: ...
-    def __repr__(self) -> str: ...
+    def __eq__(self, arg0: typing.Any) -> typing.Any:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __len__(self) -> int:
+        ...
+    def __reduce__(self) -> tuple:
+        ...
+    def __repr__(self) -> str:
+        ...
     @property
-    def _owner(self) -> int: ...
+    def _owner(self) -> int:
+        ...
     @property
     def blocks(self) -> list:
         """
@@ -96,57 +49,52 @@ class Space:
         Number of bodies that it is cut into; 0 for R^n.
         """
     @property
-    def dimension(self) -> int: ...
+    def dimension(self) -> int:
+        ...
     @property
-    def dual(self) -> Space: ...
+    def dual(self) -> Space:
+        ...
     @property
-    def name(self) -> str: ...
-
+    def name(self) -> str:
+        ...
 class Multibody:
     """
     A multibody model in the core; pycraft.Multibody is its Python face.
     """
-    def __init__(self, name: str = "multibody", keep_welds: bool = False, strict: bool = False) -> None: ...
-    def __reduce__(self) -> tuple: ...
-    def _add_body(
-        self,
-        name: str,
-        parent: str,
-        hinge: str,
-        hinge_name: str,
-        axes: collections.abc.Sequence[typing.Any],
-        point: typing.Any,
-        pitch: typing.SupportsFloat | typing.SupportsIndex,
-        subhinges: typing.Any,
-        rotation: typing.Any,
-        position: typing.Any,
-        mass: typing.SupportsFloat | typing.SupportsIndex,
-        com: typing.Any,
-        inertia: typing.Any,
-        rotor_inertia: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-        lower: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-        upper: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-    ) -> None: ...
-    def _add_node(self, arg0: str, arg1: str, arg2: typing.Any, arg3: typing.Any) -> None: ...
-    def _body(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> dict: ...
-    def _body_index(self, arg0: str) -> int: ...
-    def _hinge_index(self, arg0: str) -> int: ...
-    def _names(self) -> tuple[list[str], list[str]]: ...
-    def _node_index(self, arg0: str) -> int: ...
-    def _nodes(self) -> list: ...
-    def _set_mass_properties(
-        self,
-        arg0: typing.SupportsInt | typing.SupportsIndex,
-        arg1: typing.SupportsFloat | typing.SupportsIndex,
-        arg2: typing.Any,
-        arg3: typing.Any,
-    ) -> None: ...
-    def _set_placement(self, arg0: typing.SupportsInt | typing.SupportsIndex, arg1: typing.Any, arg2: typing.Any) -> None: ...
-    def _set_rotor_inertia(
-        self, arg0: typing.SupportsInt | typing.SupportsIndex, arg1: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]
-    ) -> None: ...
-    def _slices(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> tuple[slice, slice]: ...
-    def check_q(self, arg0: typing.Any) -> None: ...
+    def __init__(self, name: str = 'multibody', keep_welds: bool = False, strict: bool = False) -> None:
+        ...
+    def __reduce__(self) -> tuple:
+        ...
+    def _add_body(self, name: str, parent: str, hinge: str, hinge_name: str, axes: collections.abc.Sequence[typing.Any], point: typing.Any, pitch: typing.Any, subhinges: typing.Any, rotation: typing.Any, position: typing.Any, mass: typing.Any, com: typing.Any, inertia: typing.Any, rotor_inertia: typing.Any, lower: typing.Any, upper: typing.Any) -> None:
+        ...
+    def _add_node(self, arg0: str, arg1: str, arg2: typing.Any, arg3: typing.Any) -> None:
+        ...
+    def _body(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> dict:
+        ...
+    def _body_index(self, arg0: str) -> int:
+        ...
+    def _hinge_index(self, arg0: str) -> int:
+        ...
+    def _names(self) -> tuple[list[str], list[str]]:
+        ...
+    def _node(self, arg0: str) -> dict:
+        ...
+    def _node_index(self, arg0: str) -> int:
+        ...
+    def _nodes(self) -> list:
+        ...
+    def _set_limits(self, arg0: typing.SupportsInt | typing.SupportsIndex, arg1: typing.Any, arg2: typing.Any) -> None:
+        ...
+    def _set_mass_properties(self, arg0: typing.SupportsInt | typing.SupportsIndex, arg1: typing.Any, arg2: typing.Any, arg3: typing.Any) -> None:
+        ...
+    def _set_placement(self, arg0: typing.SupportsInt | typing.SupportsIndex, arg1: typing.Any, arg2: typing.Any) -> None:
+        ...
+    def _set_rotor_inertia(self, arg0: typing.SupportsInt | typing.SupportsIndex, arg1: typing.Any) -> None:
+        ...
+    def _slices(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> tuple[slice, slice]:
+        ...
+    def check_q(self, arg0: typing.Any) -> None:
+        ...
     def difference(self, q0: typing.Any, q1: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
         """
         The velocity dv with integrate(q0, dv) = q1.
@@ -159,13 +107,15 @@ class Multibody:
         """
         Removes a body with everything outboard of it. Operators made before are stale; q and v are carried over by hinge name.
         """
-    def take_warnings(self) -> list[str]: ...
+    def take_warnings(self) -> list[tuple[str, str]]:
+        ...
     def zero_q(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         All coordinates zero, quaternions (1, 0, 0, 0).
         """
     @property
-    def _size(self) -> int: ...
+    def _size(self) -> int:
+        ...
     @property
     def coordinate_names(self) -> list[str]:
         """
@@ -177,13 +127,17 @@ class Multibody:
         Gravity acceleration in world axes, m/s²; zero until it is set.
         """
     @gravity.setter
-    def gravity(self, arg1: typing.Any) -> None: ...
+    def gravity(self, arg1: typing.Any) -> None:
+        ...
     @property
-    def has_rotor_inertia(self) -> bool: ...
+    def has_rotor_inertia(self) -> bool:
+        ...
     @property
-    def keeps_welds(self) -> bool: ...
+    def keeps_welds(self) -> bool:
+        ...
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        ...
     @property
     def nq(self) -> int:
         """
@@ -200,120 +154,145 @@ class Multibody:
         Generalized coordinates (nq,): copied in when set, read-only when read.
         """
     @q.setter
-    def q(self, arg1: typing.Any) -> None: ...
+    def q(self, arg1: typing.Any) -> None:
+        ...
     @property
-    def strict(self) -> bool: ...
+    def strict(self) -> bool:
+        ...
     @property
     def v(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         Generalized velocities (nv,): copied in when set, read-only when read.
         """
     @v.setter
-    def v(self, arg1: typing.Any) -> None: ...
-
+    def v(self, arg1: typing.Any) -> None:
+        ...
 class SkoSource:
     """
     Where the blocks of operators come from: a model, or a bare tree of matrices.
     """
-    def _symbol_again(
-        self,
-        arg0: str,
-        arg1: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
-        arg2: collections.abc.Sequence[str],
-        arg3: str,
-    ) -> Operator: ...
-    def check_current(self) -> None: ...
-    def nodes_space(self, arg0: collections.abc.Sequence[str], arg1: bool) -> Space: ...
-    def symbol(
-        self, name: str, nodes: collections.abc.Sequence[str] = [], coordinate: typing.SupportsInt | typing.SupportsIndex = -1
-    ) -> Operator: ...
+    def __reduce__(self) -> tuple:
+        ...
+    def _symbol_again(self, arg0: str, arg1: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], arg2: collections.abc.Sequence[str], arg3: str) -> Operator:
+        ...
+    def check_current(self) -> None:
+        ...
+    def nodes_space(self, arg0: collections.abc.Sequence[str], arg1: bool) -> Space:
+        ...
+    def symbol(self, name: str, nodes: collections.abc.Sequence[str] = [], coordinate: typing.SupportsInt | typing.SupportsIndex = -1) -> Operator:
+        ...
     @property
-    def F(self) -> Space: ...
+    def F(self) -> Space:
+        ...
     @property
-    def Theta(self) -> Space: ...
+    def Theta(self) -> Space:
+        ...
     @property
-    def V(self) -> Space: ...
+    def V(self) -> Space:
+        ...
     @property
-    def body_names(self) -> list[str]: ...
+    def body_names(self) -> list[str]:
+        ...
     @property
-    def coordinate_names(self) -> list[str]: ...
+    def coordinate_names(self) -> list[str]:
+        ...
     @property
-    def dof(self) -> list[int]: ...
+    def derived_from(self) -> typing.Any:
+        """
+        How this tree was made of a model's, "hinge subset" or "world frame", and that model's source; None for a model's own.
+        """
     @property
-    def hinge_names(self) -> list[str]: ...
+    def dof(self) -> list[int]:
+        ...
     @property
-    def name(self) -> str: ...
+    def hinge_names(self) -> list[str]:
+        ...
     @property
-    def parents(self) -> list[int]: ...
+    def name(self) -> str:
+        ...
     @property
-    def sizes(self) -> list[int]: ...
+    def parents(self) -> list[int]:
+        ...
     @property
-    def traits(self) -> dict: ...
-
+    def sizes(self) -> list[int]:
+        ...
+    @property
+    def traits(self) -> dict:
+        ...
 class Binding:
     """
     A state, or a batch of them, that an expression is bound to.
     """
-    def __reduce__(self) -> tuple: ...
-
+    def __reduce__(self) -> tuple:
+        ...
 class Operator:
     """
     An operator expression: what was typed, as data. It holds no numbers and computes nothing until it is applied to an array
     (`op @ x`) or asked for one (`dense()`, `diagonal()`, `trace()`, ...). Then rules, planner and engine evaluate it by sweeps
     over the tree.
     """
-
     __array_priority__: typing.ClassVar[float] = 1000.0
     __array_ufunc__ = None
-    def __add__(self, arg0: typing.Any) -> typing.Any: ...
-    def __array__(self, dtype: typing.Any = None, copy: typing.Any = None) -> typing.Any: ...
+    def __add__(self, arg0: typing.Any) -> typing.Any:
+        ...
+    def __array__(self, dtype: typing.Any = None, copy: typing.Any = None) -> typing.Any:
+        ...
     def __eq__(self, arg0: typing.Any) -> typing.Any:
         """
         Structural equality after flattening sums and products: a bool, no numbers. Equality by value is pycraft.check.
         """
-    def __hash__(self) -> int: ...
-    def __matmul__(self, arg0: typing.Any) -> typing.Any: ...
-    def __mul__(self, arg0: typing.Any) -> typing.Any: ...
-    def __neg__(self) -> Operator: ...
-    def __pos__(self) -> Operator: ...
-    def __pow__(self, arg0: typing.Any) -> typing.Any: ...
-    def __radd__(self, arg0: typing.Any) -> typing.Any: ...
-    def __reduce__(self) -> tuple: ...
-    def __repr__(self) -> str: ...
-    def __rmatmul__(self, arg0: typing.Any) -> typing.Any: ...
-    def __rmul__(self, arg0: typing.Any) -> typing.Any: ...
-    def __rsub__(self, arg0: typing.Any) -> typing.Any: ...
-    def __str__(self) -> str: ...
-    def __sub__(self, arg0: typing.Any) -> typing.Any: ...
-    def __truediv__(self, arg0: typing.Any) -> typing.Any: ...
-    def _bound(self, arg0: Binding) -> Operator: ...
-    def _parts(self) -> tuple: ...
-    def _repr_latex_(self) -> str: ...
+    def __hash__(self) -> int:
+        ...
+    def __matmul__(self, arg0: typing.Any) -> typing.Any:
+        ...
+    def __mul__(self, arg0: typing.Any) -> typing.Any:
+        ...
+    def __neg__(self) -> Operator:
+        ...
+    def __pos__(self) -> Operator:
+        ...
+    def __pow__(self, arg0: typing.Any) -> typing.Any:
+        ...
+    def __radd__(self, arg0: typing.Any) -> typing.Any:
+        ...
+    def __reduce__(self) -> tuple:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __rmatmul__(self, arg0: typing.Any) -> typing.Any:
+        ...
+    def __rmul__(self, arg0: typing.Any) -> typing.Any:
+        ...
+    def __rsub__(self, arg0: typing.Any) -> typing.Any:
+        ...
+    def __str__(self) -> str:
+        ...
+    def __sub__(self, arg0: typing.Any) -> typing.Any:
+        ...
+    def __truediv__(self, arg0: typing.Any) -> typing.Any:
+        ...
+    def _bound(self, arg0: Binding) -> Operator:
+        ...
+    def _parts(self) -> tuple:
+        ...
+    def _repr_latex_(self) -> str:
+        ...
     def _with_operand(self, arg0: Operator) -> Operator:
         """
         The same function of another operand.
         """
-    def algorithm(self, language: str = "text", request: str = "apply") -> typing.Any:
+    def algorithm(self, language: str = 'text', request: str = 'apply') -> typing.Any:
         """
         The plan written out as the textbook recursion: language "text", "latex", or "python" (NumPy alone) and "cpp" (Eigen alone),
         source that runs by itself. See pycraft.algorithm.
         """
-    def at(
-        self,
-        q: typing.Any = None,
-        v: typing.Any = None,
-        *,
-        form: str = "fast",
-        refine: typing.Any = 0,
-        residual: str = "same",
-        precision: str | int = "double",
-    ) -> Operator:
+    def at(self, q: typing.Any = None, v: typing.Any = None, *, form: str = 'fast', refine: typing.Any = 0, residual: str = 'same', precision: str | int = 'double') -> Operator:
         """
         The same expression bound to a state: q (nq,) or a batch (B, nq), v likewise (zero if left out); q=None takes the model's present
         state. The innermost binding wins. form: "fast", "ud" or "square-root", of the articulated-inertia sweep; refine: corrections of
-        what is solved, a number or "auto", with residual="same" or "wider"; precision: "single", "double", "extended", "quad", 50, 100.
+        what is solved, a number or "auto", with residual="same", "gather" or "wider"; precision: "single", "double", "extended", "quad", 50, 100.
         """
-    def blocks(self, order: str = "base-to-tip") -> typing.Any:
+    def blocks(self, order: str = 'base-to-tip') -> typing.Any:
         """
         A labelled block view of the dense form; order="tip-to-base" shows the book's triangles.
         """
@@ -340,19 +319,19 @@ class Operator:
         """
         The diagonal entries (n,), or (B, n). Cost O(N).
         """
-    def diff(self, *args, frame: str = "body") -> typing.Any:
+    def diff(self, *args, frame: str = 'body') -> typing.Any:
         """
         The derivative along a coordinate (its name or number), along a parameter (body.symbol("mass"), hinge.symbol("axis", 0), ...), or
         along several in turn: diff(i, j) is ∂_j(∂_i ·), and diff([i, j]) the list of both. An expression again, by rule, evaluated by sweeps; zero by structure is the zero
         operator. On ball and free hinges coordinates are quasi-velocities, along which derivatives do not commute.
         frame="world": of the operator as resolved in world axes, given in body axes; spaces and shape are the operator's own.
         """
-    def dot(self, vdot: typing.Any = None, *, frame: str = "body") -> Operator:
+    def dot(self, vdot: typing.Any = None, *, frame: str = 'body') -> Operator:
         """
         The time derivative along the model's velocity v; what depends on v itself needs the accelerations: vdot, an array (nv,) or a
         vector of Θ. EvaluationError without them.
         """
-    def explain(self, request: str = "apply") -> typing.Any:
+    def explain(self, request: str = 'apply') -> typing.Any:
         """
         The plan as a table: steps, tiers, cost; shown when it is the last line of a cell.
         """
@@ -360,7 +339,8 @@ class Operator:
         """
         The inverse, as an expression; how it is evaluated is the planner's business (see explain).
         """
-    def latex(self) -> str: ...
+    def latex(self) -> str:
+        ...
     def logdet(self) -> Scalar:
         """
         ln|det|, as a scalar expression. Cost O(N); exact by structure where a theorem gives it.
@@ -369,7 +349,7 @@ class Operator:
         """
         The Frobenius norm, as a scalar expression.
         """
-    def plan(self, request: str = "apply", rules: bool = True) -> Plan:
+    def plan(self, request: str = 'apply', rules: bool = True) -> Plan:
         """
         The plan: what is run, step by step, with its cost.
         """
@@ -408,13 +388,17 @@ class Operator:
         (q, v, precision) that it is bound to, None where it is not.
         """
     @property
-    def batch(self) -> typing.Any: ...
+    def batch(self) -> typing.Any:
+        ...
     @property
-    def children(self) -> list[Operator]: ...
+    def children(self) -> list[Operator]:
+        ...
     @property
-    def codomain(self) -> typing.Any: ...
+    def codomain(self) -> typing.Any:
+        ...
     @property
-    def coefficient(self) -> float: ...
+    def coefficient(self) -> float:
+        ...
     @property
     def domain(self) -> typing.Any:
         """
@@ -441,57 +425,84 @@ class Operator:
         By blocks, parents before children: φ and ψ are. Known by rule.
         """
     @property
-    def kind(self) -> str: ...
+    def kind(self) -> str:
+        ...
     @property
     def name(self) -> typing.Any:
         """
         A symbol's or a function's ASCII name; None for anything else composed.
         """
     @property
-    def shape(self) -> tuple[int, int]: ...
+    def shape(self) -> tuple[int, int]:
+        ...
     @property
-    def sources(self) -> list: ...
-
+    def sources(self) -> list:
+        ...
 class Scalar:
     """
     A scalar made of operators (trace, ln|det|, norm and their sums): an expression, evaluated by float() or numpy.asarray.
     """
-
     __array_ufunc__ = None
-    def __abs__(self) -> float: ...
+    def __abs__(self) -> float:
+        ...
     @typing.overload
-    def __add__(self, arg0: Scalar) -> Scalar: ...
+    def __add__(self, arg0: Scalar) -> Scalar:
+        ...
     @typing.overload
-    def __add__(self, arg0: typing.Any) -> Scalar: ...
-    def __array__(self, dtype: typing.Any = None, copy: typing.Any = None) -> typing.Any: ...
-    def __eq__(self, arg0: object) -> bool: ...
-    def __float__(self) -> float: ...
-    def __format__(self, arg0: str) -> typing.Any: ...
-    def __ge__(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> bool: ...
-    def __gt__(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> bool: ...
-    def __hash__(self) -> int: ...
-    def __le__(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> bool: ...
-    def __lt__(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> bool: ...
-    def __mul__(self, arg0: typing.Any) -> Scalar: ...
-    def __neg__(self) -> Scalar: ...
-    def __radd__(self, arg0: typing.Any) -> Scalar: ...
-    def __reduce__(self) -> tuple: ...
-    def __repr__(self) -> str: ...
-    def __rmul__(self, arg0: typing.Any) -> Scalar: ...
-    def __rsub__(self, arg0: typing.Any) -> Scalar: ...
+    def __add__(self, arg0: typing.Any) -> Scalar:
+        ...
+    def __array__(self, dtype: typing.Any = None, copy: typing.Any = None) -> typing.Any:
+        ...
+    def __eq__(self, arg0: object) -> bool:
+        ...
+    def __float__(self) -> float:
+        ...
+    def __format__(self, arg0: str) -> typing.Any:
+        ...
+    def __ge__(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> bool:
+        ...
+    def __gt__(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> bool:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __le__(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> bool:
+        ...
+    def __lt__(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> bool:
+        ...
+    def __mul__(self, arg0: typing.Any) -> Scalar:
+        ...
+    def __neg__(self) -> Scalar:
+        ...
+    def __radd__(self, arg0: typing.Any) -> Scalar:
+        ...
+    def __reduce__(self) -> tuple:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __rmul__(self, arg0: typing.Any) -> Scalar:
+        ...
+    def __rsub__(self, arg0: typing.Any) -> Scalar:
+        ...
     @typing.overload
-    def __sub__(self, arg0: Scalar) -> Scalar: ...
+    def __sub__(self, arg0: Scalar) -> Scalar:
+        ...
     @typing.overload
-    def __sub__(self, arg0: typing.Any) -> Scalar: ...
-    def __truediv__(self, arg0: typing.Any) -> Scalar: ...
-    def _parts(self) -> tuple[int, float, typing.Any, typing.Any]: ...
-    def _repr_latex_(self) -> str: ...
-    def algorithm(self, language: str = "text") -> typing.Any:
+    def __sub__(self, arg0: typing.Any) -> Scalar:
+        ...
+    def __truediv__(self, arg0: typing.Any) -> Scalar:
+        ...
+    def _parts(self) -> tuple[int, float, typing.Any, typing.Any]:
+        ...
+    def _repr_latex_(self) -> str:
+        ...
+    def algorithm(self, language: str = 'text') -> typing.Any:
         """
         The recursion that computes it: "text", "latex", "python" or "cpp". See pycraft.algorithm.
         """
-    def at(self, *args, **kwargs) -> typing.Any: ...
-    def bound(self, arg0: Binding) -> Scalar: ...
+    def at(self, *args, **kwargs) -> typing.Any:
+        ...
+    def bound(self, arg0: Binding) -> Scalar:
+        ...
     def certify(self, *args, **kwargs) -> typing.Any:
         """
         certify(q=None, *, v=None, form="fast", refine=0, residual="same", precision="double", seed=0, seconds=0.02)
@@ -502,41 +513,41 @@ class Scalar:
         on each timing. Raises EvaluationError where it is bound already, ModelError for arrays of another shape and for a model
         without coordinates.
         """
-    def diff(self, *args, frame: str = "body") -> typing.Any:
+    def diff(self, *args, frame: str = 'body') -> typing.Any:
         """
         The derivative along a coordinate or a parameter, as a scalar expression.
         """
-    def dot(self, vdot: typing.Any = None, *, frame: str = "body") -> Scalar:
+    def dot(self, vdot: typing.Any = None, *, frame: str = 'body') -> Scalar:
         """
         The time derivative along the model's velocity.
         """
-    def gradient(self, over: str = "coordinates") -> typing.Any:
+    def gradient(self, over: str = 'coordinates') -> typing.Any:
         """
         All derivatives at once, as an array: over "coordinates" (nv,), or (B, nv) where a batch is bound. Of ln det(HφMφ*H* [+ J]) and
         ln det D in three sweeps, O(N), and then also over "inertias", "geometry", "axes" (see
         Multibody.log_determinant_gradient); of any other scalar one derivative after the other, O(N) each.
         """
-    def latex(self) -> str: ...
-    def operands(self) -> list: ...
-    def text(self) -> str: ...
+    def latex(self) -> str:
+        ...
+    def operands(self) -> list:
+        ...
+    def text(self) -> str:
+        ...
     def value(self) -> typing.Any:
         """
         The number; with a batch bound, an array (batch,).
         """
-
 class Plan:
     """
     A plan: what an expression becomes before any number is touched. `str(plan)` is the table that explain() shows.
     """
-    def __repr__(self) -> str: ...
-    def __str__(self) -> str: ...
-    def numbers(
-        self,
-        context: typing.SupportsInt | typing.SupportsIndex,
-        name: str,
-        arguments: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] = [],
-        state: typing.SupportsInt | typing.SupportsIndex = 0,
-    ) -> typing.Any:
+    def __reduce__(self) -> tuple:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __str__(self) -> str:
+        ...
+    def numbers(self, context: typing.SupportsInt | typing.SupportsIndex, name: str, arguments: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] = [], state: typing.SupportsInt | typing.SupportsIndex = 0) -> typing.Any:
         """
         A symbol's numbers at a context's state: a vector, or one block per body; `state` picks one of a batch.
         """
@@ -546,7 +557,8 @@ class Plan:
         Floating-point operations, for one column.
         """
     @property
-    def has_dense_step(self) -> bool: ...
+    def has_dense_step(self) -> bool:
+        ...
     @property
     def memory(self) -> float:
         """
@@ -568,127 +580,130 @@ class Plan:
         The plan as plain data: contexts, registers and steps in dictionaries; pycraft.algorithm writes them out.
         """
     @property
-    def run_notes(self) -> list[str]: ...
+    def run_notes(self) -> list[str]:
+        ...
     @property
     def steps(self) -> list:
         """
         The steps as dictionaries: text, tier, flops, memory.
         """
-
 class MultibodyOperators(SkoSource):
     """
     The operators' source of a multibody model.
     """
-    def __reduce__(self) -> tuple: ...
+    def __reduce__(self) -> tuple:
+        ...
     @property
-    def model(self) -> Multibody: ...
-
+    def model(self) -> Multibody:
+        ...
 class MatrixTree(SkoSource):
     """
     A tree whose blocks E, H, M, J are given as matrices of any size.
     """
-    def __init__(
-        self,
-        parents: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
-        sizes: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
-        dof: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
-        E: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]],
-        H: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]],
-        M: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]],
-        J: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]],
-        names: collections.abc.Sequence[str],
-        name: str,
-    ) -> None: ...
-    def __reduce__(self) -> tuple: ...
-
+    def __init__(self, parents: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], sizes: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], dof: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], E: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]], H: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]], M: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]], J: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]], names: collections.abc.Sequence[str], name: str) -> None:
+        ...
+    def __reduce__(self) -> tuple:
+        ...
 class Parameter:
     """
     What diff() takes beside a coordinate: a mass property, a rotor inertia, a placement, a hinge axis.
     """
-    def __repr__(self) -> str: ...
+    def __reduce__(self) -> tuple:
+        ...
+    def __repr__(self) -> str:
+        ...
     @property
-    def name(self) -> str: ...
-
+    def name(self) -> str:
+        ...
 class PassCounts:
     """
     What the last run of a plan executed.
     """
-    def __repr__(self) -> str: ...
+    def __reduce__(self) -> tuple:
+        ...
+    def __repr__(self) -> str:
+        ...
     @property
-    def dense(self) -> int: ...
+    def dense(self) -> int:
+        ...
     @property
-    def eliminations(self) -> int: ...
+    def eliminations(self) -> int:
+        ...
     @property
-    def gathers(self) -> int: ...
+    def gathers(self) -> int:
+        ...
     @property
-    def kernels(self) -> int: ...
+    def kernels(self) -> int:
+        ...
     @property
-    def scatters(self) -> int: ...
+    def scatters(self) -> int:
+        ...
     @property
-    def values(self) -> int: ...
-
+    def values(self) -> int:
+        ...
 class Dynamics:
-    def __init__(self, arg0: Multibody) -> None: ...
-    def energy(self, q: typing.Any, v: typing.Any) -> numpy.typing.NDArray[numpy.float64]: ...
-    def forward_dynamics(
-        self,
-        q: typing.Any,
-        v: typing.Any,
-        tau: typing.Any,
-        form: str,
-        refine: typing.Any,
-        residual: str,
-        precision: str | int,
-        on_singular: str,
-        out: typing.Any,
-    ) -> numpy.typing.NDArray[numpy.float64]: ...
-    def inverse_dynamics(
-        self, q: typing.Any, v: typing.Any, vdot: typing.Any, precision: str | int, out: typing.Any
-    ) -> numpy.typing.NDArray[numpy.float64]: ...
-    def jacobian(self, frame: str, q: typing.Any, precision: str | int, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]: ...
-    def mass_matrix(self, q: typing.Any, precision: str | int, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]: ...
-    def mass_matrix_inverse(
-        self, q: typing.Any, form: str, refine: typing.Any, residual: str, precision: str | int, on_singular: str, out: typing.Any
-    ) -> numpy.typing.NDArray[numpy.float64]: ...
+    def __init__(self, arg0: Multibody) -> None:
+        ...
+    def __reduce__(self) -> tuple:
+        ...
+    def energy(self, q: typing.Any, v: typing.Any, datum: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def forward_dynamics(self, q: typing.Any, v: typing.Any, tau: typing.Any, form: str, refine: typing.Any, residual: str, precision: str | int, on_singular: str, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def inverse_dynamics(self, q: typing.Any, v: typing.Any, vdot: typing.Any, precision: str | int, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def jacobian(self, frame: str, q: typing.Any, precision: str | int, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def mass_matrix(self, q: typing.Any, precision: str | int, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def mass_matrix_inverse(self, q: typing.Any, form: str, refine: typing.Any, residual: str, precision: str | int, on_singular: str, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+        ...
     def memory(self, form: str, precision: str | int) -> int:
         """
         Bytes that one forward dynamics works in.
         """
-    def pose(self, frame: str, q: typing.Any) -> numpy.typing.NDArray[numpy.float64]: ...
-    def refinement(
-        self, q: typing.Any, v: typing.Any, tau: typing.Any, form: str, refine: typing.Any, residual: str, precision: str | int
-    ) -> tuple[numpy.typing.NDArray[numpy.float64], list[float]]: ...
-
+    def pose(self, frame: str, q: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def refinement(self, q: typing.Any, v: typing.Any, tau: typing.Any, form: str, refine: typing.Any, residual: str, precision: str | int) -> tuple[numpy.typing.NDArray[numpy.float64], list[float]]:
+        ...
 class Sensitivities:
-    def __init__(self, arg0: Multibody) -> None: ...
-    def dynamics(self, forward: bool, q: typing.Any, v: typing.Any, vdot: typing.Any, precision: str | int) -> tuple: ...
-    def hamiltonian(self, q: typing.Any, p: typing.Any, tau: typing.Any, precision: str | int) -> tuple: ...
-    def inertial_regressor(
-        self, q: typing.Any, v: typing.Any, vdot: typing.Any, precision: str | int
-    ) -> numpy.typing.NDArray[numpy.float64]: ...
-    def jacobian_derivative(self, frame: str, q: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]: ...
-    def jacobian_rate(self, frame: str, q: typing.Any, v: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]: ...
-    def kinetic_energy(self, q: typing.Any, v: typing.Any, precision: str | int) -> tuple: ...
-    def log_determinant(self, over: str, q: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]: ...
-    def momentum(self, q: typing.Any, v: typing.Any, precision: str | int) -> tuple: ...
-    def third_order(
-        self, christoffel: bool, q: typing.Any, precision: str | int, out: typing.Any
-    ) -> numpy.typing.NDArray[numpy.float64]: ...
-
+    def __init__(self, arg0: Multibody) -> None:
+        ...
+    def __reduce__(self) -> tuple:
+        ...
+    def forward_dynamics(self, q: typing.Any, v: typing.Any, tau: typing.Any, form: str, refine: typing.Any, residual: str, precision: str | int) -> tuple:
+        ...
+    def hamiltonian(self, q: typing.Any, p: typing.Any, tau: typing.Any, precision: str | int) -> tuple:
+        ...
+    def inertial_regressor(self, q: typing.Any, v: typing.Any, vdot: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def inverse_dynamics(self, q: typing.Any, v: typing.Any, vdot: typing.Any, precision: str | int) -> tuple:
+        ...
+    def jacobian_derivative(self, frame: str, q: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def jacobian_rate(self, frame: str, q: typing.Any, v: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def kinetic_energy(self, q: typing.Any, v: typing.Any, precision: str | int) -> tuple:
+        ...
+    def log_determinant(self, over: str, q: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def momentum(self, q: typing.Any, v: typing.Any, precision: str | int) -> tuple:
+        ...
+    def third_order(self, christoffel: bool, q: typing.Any, precision: str | int, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+        ...
 class Methods:
     """
     Forward dynamics of one model by 'cholesky', 'ldl', 'conjugate-gradients' or 'inverse'.
     """
-    def __init__(self, arg0: Multibody) -> None: ...
-    def conjugate_gradients(
-        self, q: typing.Any, v: typing.Any, tau: typing.Any, precision: str | int
-    ) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+    def __init__(self, arg0: Multibody) -> None:
+        ...
+    def __reduce__(self) -> tuple:
+        ...
+    def conjugate_gradients(self, q: typing.Any, v: typing.Any, tau: typing.Any, precision: str | int) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
         """
         (accelerations, iterations, relative residuals), each per state.
         """
-    def forward_dynamics(
-        self, method: str, q: typing.Any, v: typing.Any, tau: typing.Any, precision: str | int, out: typing.Any
-    ) -> numpy.typing.NDArray[numpy.float64]:
+    def forward_dynamics(self, method: str, q: typing.Any, v: typing.Any, tau: typing.Any, precision: str | int, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
         """
         Accelerations (nv,) or (B, nv).
         """
@@ -696,272 +711,187 @@ class Methods:
         """
         Bytes that a method reads and writes at one evaluation.
         """
-
 class Integration:
     """
     Rates of configurations and trajectories of one model.
     """
-    def __init__(self, arg0: Multibody) -> None: ...
-    def configuration_rate(
-        self, q: typing.Any, v: typing.Any, precision: str | int, out: typing.Any
-    ) -> numpy.typing.NDArray[numpy.float64]: ...
-    def trajectory(
-        self,
-        q: typing.Any,
-        v: typing.Any,
-        times: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-        tau: typing.Any,
-        damping: typing.Any,
-        integrator: str,
-        rtol: typing.SupportsFloat | typing.SupportsIndex,
-        atol: typing.SupportsFloat | typing.SupportsIndex,
-        step: typing.SupportsFloat | typing.SupportsIndex,
-        normalise: bool,
-        precision: str | int,
-        form: str,
-        refine: typing.Any,
-    ) -> dict: ...
-
+    def __init__(self, arg0: Multibody) -> None:
+        ...
+    def __reduce__(self) -> tuple:
+        ...
+    def configuration_rate(self, q: typing.Any, v: typing.Any, precision: str | int, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def trajectory(self, q: typing.Any, v: typing.Any, times: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], tau: typing.Any, damping: typing.Any, integrator: str, rtol: typing.SupportsFloat | typing.SupportsIndex, atol: typing.SupportsFloat | typing.SupportsIndex, step: typing.SupportsFloat | typing.SupportsIndex, normalise: bool, precision: str | int, form: str, refine: typing.Any) -> dict:
+        ...
 class Theorem:
     """
     A theorem as data: both sides as expressions, its hypotheses, its source.
     """
-    def __repr__(self) -> str: ...
+    def __reduce__(self) -> tuple:
+        ...
+    def __repr__(self) -> str:
+        ...
     def unmet(self, arg0: SkoSource) -> list[str]:
         """
         Hypotheses that the model does not meet.
         """
     @property
-    def at_most(self) -> bool: ...
+    def at_most(self) -> bool:
+        ...
     @property
-    def group(self) -> str: ...
+    def group(self) -> str:
+        ...
     @property
-    def hypotheses(self) -> list[str]: ...
+    def hypotheses(self) -> list[str]:
+        ...
     @property
-    def latex(self) -> str: ...
+    def latex(self) -> str:
+        ...
     @property
-    def lhs(self) -> typing.Any: ...
+    def lhs(self) -> typing.Any:
+        ...
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        ...
     @property
-    def on_one_path(self) -> bool: ...
+    def on_one_path(self) -> bool:
+        ...
     @property
-    def rhs(self) -> typing.Any: ...
+    def rhs(self) -> typing.Any:
+        ...
     @property
-    def source(self) -> str: ...
+    def source(self) -> str:
+        ...
     @property
-    def text(self) -> str: ...
+    def text(self) -> str:
+        ...
     @property
-    def use(self) -> str: ...
+    def use(self) -> str:
+        ...
     @property
-    def waiting(self) -> str: ...
-
-def _bind(
-    operands: collections.abc.Sequence[Operator],
-    q: typing.Any,
-    v: typing.Any,
-    form: str = "fast",
-    refine: typing.Any = 0,
-    residual: str = "same",
-    precision: str | int = "double",
-) -> Binding: ...
-def _binding(arg0: Operator) -> Binding: ...
-def _binding_from_parts(
-    arg0: typing.SupportsInt | typing.SupportsIndex,
-    arg1: typing.SupportsInt | typing.SupportsIndex,
-    arg2: typing.SupportsInt | typing.SupportsIndex,
-    arg3: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-    arg4: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-    arg5: str | int,
-    arg6: str,
-    arg7: typing.SupportsInt | typing.SupportsIndex,
-    arg8: bool,
-) -> Binding: ...
-def _function(arg0: SkoSource, arg1: str, arg2: Binding, arg3: Operator) -> Operator: ...
-def _inertia_parameter(
-    arg0: MultibodyOperators, arg1: typing.SupportsInt | typing.SupportsIndex, arg2: typing.SupportsInt | typing.SupportsIndex, arg3: str
-) -> Parameter: ...
-def _leaf_from_parts(arg0: str, arg1: typing.Any) -> Operator: ...
-def _make(arg0: str, arg1: collections.abc.Sequence[Operator], arg2: typing.SupportsFloat | typing.SupportsIndex) -> Operator: ...
-def _rotor_parameter(arg0: MultibodyOperators, arg1: typing.SupportsInt | typing.SupportsIndex, arg2: str) -> Parameter: ...
-def _scalar_from_parts(
-    arg0: typing.SupportsInt | typing.SupportsIndex,
-    arg1: typing.SupportsFloat | typing.SupportsIndex,
-    arg2: typing.Any,
-    arg3: collections.abc.Sequence[Scalar],
-) -> Scalar: ...
-def _twist_parameter(
-    arg0: MultibodyOperators,
-    arg1: collections.abc.Sequence[
-        tuple[
-            typing.SupportsInt | typing.SupportsIndex,
-            typing.SupportsInt | typing.SupportsIndex,
-            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-        ]
-    ],
-    arg2: str,
-) -> Parameter: ...
+    def waiting(self) -> str:
+        ...
+def _bind(operands: collections.abc.Sequence[Operator], q: typing.Any, v: typing.Any, form: str = 'fast', refine: typing.Any = 0, residual: str = 'same', precision: str | int = 'double') -> Binding:
+    ...
+def _binding(arg0: Operator) -> Binding:
+    ...
+def _binding_from_parts(arg0: typing.SupportsInt | typing.SupportsIndex, arg1: typing.SupportsInt | typing.SupportsIndex, arg2: typing.SupportsInt | typing.SupportsIndex, arg3: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], arg4: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], arg5: str | int, arg6: str, arg7: typing.SupportsInt | typing.SupportsIndex, arg8: typing.SupportsInt | typing.SupportsIndex) -> Binding:
+    ...
+def _function(arg0: SkoSource, arg1: str, arg2: Binding, arg3: Operator) -> Operator:
+    ...
+def _inertia_parameter(arg0: MultibodyOperators, arg1: typing.SupportsInt | typing.SupportsIndex, arg2: typing.SupportsInt | typing.SupportsIndex, arg3: str) -> Parameter:
+    ...
+def _leaf_from_parts(arg0: str, arg1: typing.Any) -> Operator:
+    ...
+def _make(arg0: str, arg1: collections.abc.Sequence[Operator], arg2: typing.SupportsFloat | typing.SupportsIndex) -> Operator:
+    ...
+def _rotor_parameter(arg0: MultibodyOperators, arg1: typing.SupportsInt | typing.SupportsIndex, arg2: str) -> Parameter:
+    ...
+def _scalar_from_parts(arg0: typing.SupportsInt | typing.SupportsIndex, arg1: typing.SupportsFloat | typing.SupportsIndex, arg2: typing.Any, arg3: collections.abc.Sequence[Scalar]) -> Scalar:
+    ...
+def _space_from_parts(arg0: tuple) -> Space:
+    ...
+def _theorem_from_parts(arg0: str, arg1: str, arg2: typing.Any, arg3: typing.Any, arg4: typing.SupportsInt | typing.SupportsIndex, arg5: str, arg6: typing.SupportsInt | typing.SupportsIndex, arg7: bool, arg8: bool, arg9: str, arg10: str, arg11: str) -> Theorem:
+    ...
+def _twist_parameter(arg0: MultibodyOperators, arg1: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]], arg2: str) -> Parameter:
+    ...
 def blockdiag(operator: Operator) -> Operator:
     """
     The operator's diagonal blocks, body by body, zero elsewhere.
     """
-
 def checked_refinement(refine: typing.Any, residual: str, precision: str | int) -> typing.Any:
     """
     The number of corrections, or 'auto'; EvaluationError for anything else.
     """
-
-def constant(array: typing.Any, domain: typing.Any, codomain: typing.Any, name: str = "C") -> Operator:
+def constant(array: typing.Any, domain: typing.Any, codomain: typing.Any, name: str = 'C') -> Operator:
     """
     An array as an operator from `domain` to `codomain` (spaces, or a size n for R^n): a matrix, one diagonal, or a list of one block per
     body. What is block diagonal over the bodies is kept so; what has low rank is found when a plan needs it.
     """
-
 def epsilons() -> dict:
     """
     Epsilon of each precision by name.
     """
-
 def equal_by_theorems(a: Operator, b: Operator) -> bool:
     """
     Whether the rewriting theorems bring both to the same normal form.
     """
-
-def euclidean(dimension: typing.SupportsInt | typing.SupportsIndex) -> Space:
+def euclidean(dimension: typing.Any) -> Space:
     """
     R^n, a space of a user's own: self-dual, cut into no bodies.
     """
-
-def external(product: typing.Any, transposed: typing.Any, domain: Space, codomain: Space, name: str) -> Operator: ...
+def external(product: typing.Any, transposed: typing.Any, domain: Space, codomain: Space, name: str) -> Operator:
+    ...
 def forms() -> list[str]:
     """
     The forms of the articulated-inertia sweep.
     """
-
 def identity(space: typing.Any = None) -> Operator:
     """
     I; without a space it takes that of the operator it is combined with.
     """
-
 def integrators() -> list[str]:
     """
     The integrators that Integration has.
     """
-
 def methods() -> list[str]:
     """
     The methods of forward dynamics that Methods has.
     """
-
-def operators_of(model: Multibody) -> MultibodyOperators: ...
+def operators_of(model: Multibody) -> MultibodyOperators:
+    ...
 def precisions() -> list[str | int]:
     """
     The precisions, from narrow to wide.
     """
-
-def residual(
-    a: typing.Any,
-    b: typing.Any,
-    vectors: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]] = {},
-    on_one_path: bool = False,
-    at_most: bool = False,
-) -> tuple[float, float, float]:
+def residual(a: typing.Any, b: typing.Any, vectors: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]] = {}, on_one_path: bool = False, at_most: bool = False) -> tuple[float, float, float]:
     """
     Largest entries of a - b, a and b: both evaluated as typed, no theorem used, the difference taken at the bound precision.
     """
-
-def scalar(value: typing.SupportsFloat | typing.SupportsIndex) -> Scalar: ...
+def scalar(value: typing.SupportsFloat | typing.SupportsIndex) -> Scalar:
+    ...
 def step_kinds() -> list[str]:
     """
     The kinds of steps that plans are made of.
     """
-
 def symbol_table() -> list:
     """
     Every operator: (ASCII, Unicode, LaTeX, domain, codomain, meaning).
     """
-
 def theorems(source: SkoSource) -> list[Theorem]:
     """
     Every theorem, stated on the letters of one model.
     """
-
-def time_apply(
-    operator: Operator,
-    x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2,
-    rules: bool = True,
-) -> dict:
+def time_apply(operator: Operator, x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2, rules: bool = True) -> dict:
     """
     Seconds per application: minimum, median, calls.
     """
-
-def time_dynamics(
-    model: Multibody,
-    call: str,
-    q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2,
-) -> dict:
+def time_dynamics(model: Multibody, call: str, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2) -> dict:
     """
     Seconds per direct call over a set of states in rotation: minimum, median, calls.
     """
-
-def time_forward(
-    model: Multibody,
-    q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2,
-    form: str = "fast",
-    refine: typing.Any = 0,
-    residual: str = "same",
-    precision: str | int = "double",
-) -> dict:
+def time_forward(model: Multibody, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2, form: str = 'fast', refine: typing.Any = 0, residual: str = 'same', precision: str | int = 'double') -> dict:
     """
     Seconds per forward dynamics over a set of states in rotation: minimum, median, calls.
     """
-
-def time_method(
-    model: Multibody,
-    method: str,
-    q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2,
-    precision: str | int = "double",
-) -> dict:
+def time_method(model: Multibody, method: str, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2, precision: str | int = 'double') -> dict:
     """
     Seconds per forward dynamics by a method of the mass matrix: minimum, median, calls.
     """
-
-def time_packs(
-    model: Multibody,
-    q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2,
-    form: str = "fast",
-    precision: str | int = "double",
-) -> dict:
+def time_packs(model: Multibody, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2, form: str = 'fast', precision: str | int = 'double') -> dict:
     """
     Seconds per state of a batch in packs: minimum, median, calls.
     """
-
 def vector(name: str, space: Space) -> Operator:
     """
     A named vector of a space: stands for an array that is given at the evaluation.
     """
-
 def wider(precision: str | int) -> typing.Any:
     """
     The next wider precision, None for the widest.
     """
-
 def zero(domain: Space, codomain: Space) -> Operator:
     """
     The zero operator.
     """
-
 float128: bool = True

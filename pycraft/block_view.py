@@ -14,7 +14,7 @@ ENTRIES = 12
 BLOCKS = 40
 """Blocks a row or column of the HTML table; the text shows as many columns as fit."""
 WIDTH = 100
-LEGEND = "largest entry of each block, with its sign; · is an exact zero"
+LEGEND = "largest entry of each block, with its sign"
 
 
 class BlockView:
@@ -84,7 +84,7 @@ class BlockView:
         counts = ((len(rows) - BLOCKS, "rows"), (len(columns) - shown, "columns"))
         left_out = [f"{more} more {what}" for more, what in counts if more > 0]
         if max(self.values.shape, default=0) > ENTRIES:
-            left_out.insert(0, LEGEND)
+            left_out.insert(0, f"{LEGEND}; · is an exact zero")
         return "\n".join([*lines, "; ".join(left_out)] if left_out else lines)
 
     def _repr_html_(self) -> str:
@@ -97,11 +97,11 @@ class BlockView:
             + "</tr>"
             for i, r in enumerate(rows[:BLOCKS])
         )
-        notes = [LEGEND] if max(self.values.shape, default=0) > ENTRIES else []
+        notes = [f"{LEGEND}; blank is an exact zero"] if max(self.values.shape, default=0) > ENTRIES else []
         if max(len(rows), len(columns)) > BLOCKS:
             notes.append(f"the first {BLOCKS} of {len(rows)} × {len(columns)} blocks")
         caption = f"<div style='font-size:80%'>{escape('; '.join(notes))}</div>" if notes else ""
-        table = f"<table style='border-collapse:collapse;font-size:80%'><tr><th></th>{head}</tr>{body}</table>"
+        table = f"<table style='border-collapse:collapse;font-size:80%;color:inherit'><tr><th></th>{head}</tr>{body}</table>"
         return f"<p>{escape(self.title)}</p><div style='overflow-x:auto;max-width:100%'>{table}</div>{caption}"
 
 

@@ -97,23 +97,38 @@ def check(
     model: Model,
     states: Annotated[int, typer.Option(help="Random states beside the present one.")] = 3,
     seed: Annotated[int, typer.Option(help="Seed of the states.")] = 0,
-    precision: Annotated[str, typer.Option(help="The wider scalar: extended | quad | 50 | 100 (digits).")] = "extended",
+    precision: Annotated[str, typer.Option(help="The first scalar beside double: extended | quad | 50 | 100 (digits).")] = "extended",
+    full: Annotated[bool, typer.Option("--full", help="Every theorem, not the summary and the exceptions alone.")] = False,
     json: Annotated[bool, typer.Option("--json", help="The report as JSON.")] = False,
     root: Root = None,
     mimic: Mimic = "refuse",
 ) -> None:
-    """Check every theorem on a model; exit status 1 if one fails that should hold."""
+    """Check every theorem on a model, or the displayed equations of a LaTeX paper (a .tex file, on random trees).
+
+    Exit status 1 if something fails that should hold, 3 if something is undecided.
+    """
     check_least(0, states=states, seed=seed)
-    robot = load_model(model, root, mimic)
     wide = int(precision) if precision.isdecimal() else precision
+    if model.endswith(".tex"):
+        _check_paper(model, states, seed, json)
+    robot = load_model(model, root, mimic)
     with diagnostics.status("checking") as status:
         report = robot.soa.check(states=states, seed=seed, precision=wide, progress=lambda name: status.update(escape(name)))
     if json:
         print(report.to_json())
     else:
-        console.print(report.table())
         console.print(report.summary(), markup=False, highlight=False)
-    raise typer.Exit(0 if report else 1)
+        console.print(report.table(full))
+    raise typer.Exit(report.status)
+
+
+def _check_paper(path: str, states: int, seed: int, json: bool) -> None:
+    from .identities.paper import check_paper
+
+    with diagnostics.status("reading") as status:
+        report = check_paper(path, states=max(states, 1), seed=seed, progress=status.update)
+    print(report.to_json() if json else report)
+    raise typer.Exit(report.status)
 
 
 @app.command()

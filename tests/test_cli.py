@@ -14,7 +14,7 @@ runner = CliRunner()
 def test_check_passes_on_a_robot():
     result = runner.invoke(app, ["check", "ur5", "--states", "1"])
     assert result.exit_code == 0, result.output
-    assert "ur5" in result.output.lower() and "worst residual of what holds" in result.output
+    assert "ur5" in result.output.lower() and "largest residual of what holds" in result.output
 
 
 def test_check_as_json():
@@ -29,10 +29,21 @@ def test_check_as_json():
 
 
 def test_check_ends_with_one_where_a_theorem_fails(monkeypatch):
-    from pycraft.identities.report import Report
+    from pycraft.identities.report import Finding, Report
+    from pycraft.operators import OperatorSet
 
-    monkeypatch.setattr(Report, "__bool__", lambda self: False)
-    assert runner.invoke(app, ["check", "panda", "--states", "1"]).exit_code == 1
+    made = Report("arm", {}, [Finding("a", "group", "a = b", "a = b", [], [], "holds")])
+    monkeypatch.setattr(OperatorSet, "check", lambda self, **_: made)
+    for verdict, status in [("holds", 0), ("expected to fail", 0), ("fails", 1), ("undecided", 3)]:
+        made.findings[0].verdict = verdict
+        for options in ([], ["--full"], ["--json"]):
+            result = runner.invoke(app, ["check", "panda", *options])
+            assert result.exit_code == status and verdict in result.output + " holds", (verdict, options)
+
+
+def test_check_shows_the_exceptions_and_all_by_full():
+    short, full = (runner.invoke(app, ["check", "puma560", "--states", "0", *more]).output for more in ([], ["--full"]))
+    assert "φ = I + E_φ φ" not in short and "φ = I + E_φ φ" in full and short.splitlines()[0] == full.splitlines()[0]
 
 
 def test_precision_that_is_not_there_is_named():

@@ -224,18 +224,14 @@ def test_steps_are_constant_and_cost_grows_as_the_bodies(name, chains):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["shifted", "nested shifts", "rank two"])
 def test_a_stretched_chain_of_thousands_is_solved(name, chains):
-    """Elimination body by body loses up to 21 digits there, and 5000 bodies are too many for one front: it goes on in quad."""
+    """Pivots of the states' own equations: in double precision, body by body, as good as the elimination in quad precision."""
     o, arm = chains[5000]
-    op = GROWTH[name](o, bare_constants(o, 5000)).op
     arm.q = np.full(5000, 0.01)
+    op = GROWTH[name](o, bare_constants(o, 5000)).op
     x = np.ones(op.shape[1])
-    y = op @ x
-    forward, z = op.inv(), x
-    for _ in range(3):  # power iteration
-        z = forward @ z
-        size, z = np.linalg.norm(z), z / np.linalg.norm(z)
-    assert np.linalg.norm(forward @ y - x) <= 5000 * np.finfo(float).eps * size * np.linalg.norm(y)
-    assert any(note.startswith("quad: ") for note in op.plan().run_notes), op.plan()
+    y, exact = op @ x, op.at(arm.q, precision="quad") @ x
+    assert np.linalg.norm(y - exact) <= 5000 * np.finfo(float).eps * np.linalg.norm(exact)
+    assert op.plan().run_notes == [], op.plan()
 
 
 # ---------------------------------------------------------------------- what does go dense, and says so
@@ -306,9 +302,7 @@ def test_explain_is_a_table():
 @pytest.mark.parametrize("seed", range(40))
 def test_rules_never_change_a_result(seed):
     rng = np.random.default_rng(seed)
-    model = random_tree(
-        rng, int(rng.integers(1, 6)), kinds=["pin", "slider", "screw", "universal", "ball", "free", "planar", "weld"]
-    )
+    model = random_tree(rng, int(rng.integers(1, 6)), kinds=["pin", "slider", "screw", "universal", "ball", "free", "planar", "weld"])
     letters = letters_of(model)
     domain, codomain = (str(s) for s in rng.choice(list("TVF"), 2))
     formula = draw(seeded(rng), letters, domain, codomain, 3)
@@ -322,9 +316,7 @@ def test_rules_never_change_a_result(seed):
 @pytest.mark.parametrize("seed", range(2000, 2400))
 def test_rules_never_change_a_result_of_deep_expressions(seed):
     rng = np.random.default_rng(seed)
-    model = random_tree(
-        rng, int(rng.integers(1, 7)), kinds=["pin", "slider", "screw", "universal", "ball", "free", "planar", "weld"]
-    )
+    model = random_tree(rng, int(rng.integers(1, 7)), kinds=["pin", "slider", "screw", "universal", "ball", "free", "planar", "weld"])
     letters = letters_of(model)
     domain, codomain = (str(s) for s in rng.choice(list("TVF"), 2))
     formula = draw(seeded(rng), letters, domain, codomain, 6)

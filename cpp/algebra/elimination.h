@@ -3,9 +3,12 @@
 //
 //   U(k) = A(k,k)⁻¹ [A(k,p) A(k,b)],     [A(p,p) A(p,b); A(b,p) A(b,b)] -= [A(p,k); A(b,k)] U(k)
 //
-// A singular pivot block is merged with its parent's (the re-ordering attempt). Pivoting is within a block only, and an expression that
-// hides a well-conditioned operator behind large terms that cancel can make the elimination unstable: after every factorization a solve
-// with a known solution measures what was lost, and where that is more than seven digits, fronts are merged two by two, and again, until
+// Within a block, rows are compared in the powers of two of an equilibration (equilibration.h), and a state's own equation is taken unless
+// another is ten times larger there: so the units of the model decide nothing, to the bit, and resolvents are eliminated by their own
+// recursions, which do not lose what an elimination in another order does along a chain. A pivot that is rounding next to what was added
+// up in its entry counts as zero. A singular pivot block is merged with its parent's (the re-ordering attempt). An expression that hides a
+// well-conditioned operator behind large terms that cancel can make the elimination unstable: after every factorization a solve with a known
+// solution, every state of it of the size that it takes in a solve, measures what was lost, and where that is more than seven digits, fronts are merged two by two, and again, until
 // it is not. When everything is one front the elimination is dense, and the caller says so; a model too large for that is eliminated in
 // a wider scalar (the caller's business: blocks and values may be narrower than S). Diagonal blocks of the inverse come base to tip:
 //
@@ -95,6 +98,7 @@ class TreeElimination {
     std::vector<int> columns, rows;           // states and equations of the parent front that edges join to this one
     std::vector<int> column_index, row_index; // their numbers by position in the parent front; -1 for the others
     size_t vector = 0;                        // offset of its states in a solution
+    size_t sizes = 0;                         // offset of the sizes of A(k,k)'s entries
     int width() const { return static_cast<int>(columns.size()); }
     int height() const { return static_cast<int>(rows.size()); }
   };
@@ -104,6 +108,8 @@ class TreeElimination {
 
   void lay_out(bool one_front);
   bool eliminate();
+  void join_scales();
+  void take_units(const S* solution);
   S lost();                                                // relative error of a solve whose solution is known
   void coarsen();                                          // every other front merged into its parent
   S growth_ = S(0);
@@ -125,8 +131,9 @@ class TreeElimination {
   std::vector<std::vector<Place>> state_at_, equation_at_;   // of state j at body k; Euclidean: one entry
   int border_ = 0;
   size_t total_ = 0;
-  std::vector<S> A_, original_, magnitude_;                  // all matrices, factored and as assembled; rows' largest entries
-  std::vector<S> border_matrix_, border_original_, border_magnitude_;
+  std::vector<S> A_, original_, sizes_;                      // all matrices, factored and as assembled; the largest that went into each entry of A(k,k)
+  std::vector<S> border_matrix_, border_original_, border_sizes_;
+  std::vector<int> unit_, row_scale_, shift_, over_size_;    // binary exponents of each state's unit and each equation's scale; work
   std::vector<SmallLU<S>> lu_;
   SmallLU<S> border_lu_;
   std::vector<S> rhs_, residual_, work_, block_, edge_, product_, left_, right_, output_, Z_, z_border_;

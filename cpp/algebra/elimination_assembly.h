@@ -103,7 +103,7 @@ void TreeElimination<S>::lay_out(bool one_front) {
       }
     }
   }
-  size_t at = 0;
+  size_t at = 0, sizes = 0;
   total_ = 0;
   for (Front& f : fronts_) {
     f.matrix = at;
@@ -111,10 +111,12 @@ void TreeElimination<S>::lay_out(bool one_front) {
     f.over = f.across + size_t(f.n) * (f.width() + border_);
     at = f.over + size_t(f.height() + border_) * f.n;
     f.vector = total_;
+    f.sizes = sizes;
     total_ += f.n;
+    sizes += size_t(f.n) * f.n;
   }
   A_.resize(at);
-  magnitude_.resize(total_);
+  sizes_.resize(sizes);
   lu_.resize(fronts_.size());
   border_matrix_.resize(size_t(border_) * border_);
 }
@@ -244,14 +246,9 @@ void TreeElimination<S>::assemble(Blocks&& blocks, Values&& values) {
   }
   using std::abs;
   for (const Front& f : fronts_)
-    for (int i = 0; i < f.n; ++i) {
-      S largest = S(0);
-      for (int j = 0; j < f.n; ++j) largest = std::max(largest, S(abs(A_[f.matrix + size_t(i) * f.n + j])));
-      magnitude_[f.vector + i] = largest;
-    }
-  border_magnitude_.assign(border_, S(0));
-  for (int i = 0; i < border_; ++i)
-    for (int j = 0; j < border_; ++j) border_magnitude_[i] = std::max(border_magnitude_[i], S(abs(border_matrix_[size_t(i) * border_ + j])));
+    for (size_t i = 0; i < size_t(f.n) * f.n; ++i) sizes_[f.sizes + i] = abs(A_[f.matrix + i]);
+  border_sizes_.resize(border_matrix_.size());
+  for (size_t i = 0; i < border_matrix_.size(); ++i) border_sizes_[i] = abs(border_matrix_[i]);
   original_ = A_;
   border_original_ = border_matrix_;
 }

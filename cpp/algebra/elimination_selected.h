@@ -84,10 +84,10 @@ void TreeElimination<S>::selected(BlockStorage<T>& out) {
 
 template <class S>
 S TreeElimination<S>::log_abs_determinant() const {
-  S sum = S(0);
-  for (const SmallLU<S>& lu : lu_) sum += lu.log_abs_determinant();
-  if (border_) sum += border_lu_.log_abs_determinant();
-  return sum;
+  Magnitude<S> all;
+  for (const SmallLU<S>& lu : lu_) all.multiply(lu.determinant());
+  if (border_) all.multiply(border_lu_.determinant());
+  return all.log();
 }
 
 }  // namespace pycraft

@@ -15,7 +15,7 @@ bool TreeElimination<S>::eliminate() {
     const int across = f.width() + border_;
     S *U = A_.data() + f.across, *over = A_.data() + f.over;
     failed_ = k;
-    if (!lu_[k].factor(A_.data() + f.matrix, f.n, magnitude_.data() + f.vector)) return false;
+    if (!lu_[k].factor(A_.data() + f.matrix, f.n, sizes_.data() + f.sizes)) return false;
     work_.resize(std::max(work_.size(), size_t(f.n) * std::max(across, 1)));
     lu_[k].solve(U, across, work_.data());
     // Schur complement in the parent and the border
@@ -29,40 +29,110 @@ bool TreeElimination<S>::eliminate() {
         const bool parent_column = j < f.width();
         if (parent_row && parent_column) {
           A_[p->matrix + size_t(f.rows[i]) * p->n + f.columns[j]] -= update;
-          S& magnitude = magnitude_[p->vector + f.rows[i]];
-          magnitude = std::max(magnitude, S(abs(update)));
+          S& size = sizes_[p->sizes + size_t(f.rows[i]) * p->n + f.columns[j]];
+          size = std::max(size, S(abs(update)));
         } else if (parent_row) {
           A_[p->across + size_t(f.rows[i]) * (p->width() + border_) + p->width() + (j - f.width())] -= update;
         } else if (parent_column) {
           A_[p->over + size_t(p->height() + (i - f.height())) * p->n + f.columns[j]] -= update;
         } else {
-          border_matrix_[size_t(i - f.height()) * border_ + (j - f.width())] -= update;
-          S& magnitude = border_magnitude_[i - f.height()];
-          magnitude = std::max(magnitude, S(abs(update)));
+          const size_t at = size_t(i - f.height()) * border_ + (j - f.width());
+          border_matrix_[at] -= update;
+          border_sizes_[at] = std::max(border_sizes_[at], S(abs(update)));
         }
       }
     }
   }
   failed_ = -1;
-  return border_ == 0 || border_lu_.factor(border_matrix_.data(), border_, border_magnitude_.data());
+  return border_ == 0 || border_lu_.factor(border_matrix_.data(), border_, border_sizes_.data());
 }
 
+// The scales of a front are free against those of its parent and of the border: chosen, root to leaves, so that the blocks that couple
+// them are alike in size.
+template <class S>
+void TreeElimination<S>::join_scales() {
+  using std::abs, std::ilogb;
+  constexpr int none = std::numeric_limits<int>::min();
+  unit_.resize(total_ + border_);
+  row_scale_.resize(total_ + border_);
+  const auto take = [&](const Equilibration& scales, size_t at, int n) {
+    for (int i = 0; i < n; ++i) {
+      unit_[at + i] = scales.column(i) - shift_[scales.part_of_column(i)];
+      row_scale_[at + i] = scales.row(i) + shift_[scales.part_of_row(i)];
+    }
+  };
+  if (border_) {
+    shift_.assign(border_lu_.scales().parts(), 0);
+    take(border_lu_.scales(), total_, border_);
+  }
+  for (size_t k = 0; k < fronts_.size(); ++k) {
+    const Front& f = fronts_[k];
+    const Equilibration& scales = lu_[k].scales();
+    const int across = f.width() + border_;
+    shift_.assign(scales.parts(), none), over_size_.assign(scales.parts(), none);
+    const auto outside = [&](int j, const std::vector<int>& touched) {
+      const int inside = static_cast<int>(touched.size());
+      return j < inside ? fronts_[f.parent].vector + touched[j] : total_ + (j - inside);
+    };
+    for (int i = 0; i < f.n; ++i)
+      for (int j = 0; j < across; ++j)
+        if (const S a = abs(original_[f.across + size_t(i) * across + j]); a > S(0)) {
+          int& size = shift_[scales.part_of_row(i)];
+          size = std::max(size, static_cast<int>(ilogb(a)) + scales.row(i) + unit_[outside(j, f.columns)]);
+        }
+    for (int i = 0; i < f.height() + border_; ++i)
+      for (int j = 0; j < f.n; ++j)
+        if (const S a = abs(original_[f.over + size_t(i) * f.n + j]); a > S(0)) {
+          int& size = over_size_[scales.part_of_column(j)];
+          size = std::max(size, static_cast<int>(ilogb(a)) + row_scale_[outside(i, f.rows)] + scales.column(j));
+        }
+    for (size_t part = 0; part < shift_.size(); ++part) {
+      const int a = shift_[part], o = over_size_[part];
+      shift_[part] = a != none && o != none ? (o - a) >> 1 : o != none ? o : a != none ? -a : 0;
+    }
+    take(scales, f.vector, f.n);
+  }
+}
+
+// The unit of a state at a body becomes the size that it takes in a solution.
+template <class S>
+void TreeElimination<S>::take_units(const S* solution) {
+  using std::abs, std::ilogb, std::ldexp;
+  for (size_t j = 0; j < r_->states.size(); ++j)
+    for (size_t k = 0; k < state_at_[j].size(); ++k) {
+      const Place p = state_at_[j][k];
+      const size_t first = (p.front < 0 ? total_ : fronts_[p.front].vector) + p.position;
+      const size_t end = first + (r_->states[j].belongs_to_bodies() ? r_->states[j].body_size(static_cast<int>(k)) : r_->states[j].dimension());
+      S largest = S(0);
+      for (size_t i = first; i < end; ++i) largest = std::max(largest, S(ldexp(S(abs(solution[i])), -unit_[i])));
+      if (!(largest > S(0))) continue;
+      const int size = static_cast<int>(ilogb(largest));
+      for (size_t i = first; i < end; ++i) unit_[i] += size;
+    }
+}
+
+// A solution of natural size in all states, for scattered signs on the right side; then the same once more from the product with it.
 template <class S>
 S TreeElimination<S>::lost() {
-  using std::abs;
+  using std::abs, std::ldexp;
+  join_scales();
   const size_t size = total_ + border_;
-  rhs_.assign(size, S(0));
-  residual_.resize(size);
-  for (size_t i = 0; i < size; ++i) residual_[i] = (i * 2654435761u >> 7) & 1 ? S(1) : S(-1);  // scattered signs
-  subtract_product(residual_.data(), rhs_.data(), 1);
-  for (S& b : rhs_) b = -b;
+  constexpr int furthest = std::numeric_limits<S>::max_exponent / 2;
   size_t largest = border_;
   for (const Front& f : fronts_) largest = std::max(largest, size_t(f.n));
   if (work_.size() < largest) work_.resize(largest);
+  residual_.resize(size);
+  for (size_t i = 0; i < size; ++i)
+    residual_[i] = ldexp((i * 2654435761u >> 7) & 1 ? S(1) : S(-1), std::clamp(-row_scale_[i], -furthest, furthest));
+  solve_system(residual_.data(), 1);
+  take_units(residual_.data());
+  rhs_.assign(size, S(0));
+  subtract_product(residual_.data(), rhs_.data(), 1);
+  for (S& b : rhs_) b = -b;
   solve_system(rhs_.data(), 1);
   S error = S(0);
   for (size_t i = 0; i < size; ++i) {
-    const S e = abs(rhs_[i] - residual_[i]);
+    const S e = ldexp(S(abs(S(rhs_[i] - residual_[i]))), -unit_[i]);
     if (!(e <= error)) error = e;
   }
   return error;
@@ -240,7 +310,7 @@ void TreeElimination<S>::solve(const T* x, T* y, int m, Blocks&& blocks, const R
   residual_ = rhs_;
   solve_system(rhs_.data(), m);
   // One step of refinement on the system itself; further ones where they are asked for, or while the correction is large and shrinks.
-  using std::abs;
+  using std::abs, std::ldexp;
   const int asked = how.steps == Refinement::automatic ? most_corrections : how.steps;
   const S enough = how.steps ? epsilon<S>() : std::min(S(S(1e6) * epsilon<S>()), S(1e-3));
   S last = S(-1);
@@ -249,10 +319,11 @@ void TreeElimination<S>::solve(const T* x, T* y, int m, Blocks&& blocks, const R
     residual(x, rhs_.data(), product_.data());
     solve_system(product_.data(), m);
     S correction = S(0), solution = S(0);
-    for (size_t i = 0; i < size; ++i) {
-      correction = std::max(correction, S(abs(product_[i])));
-      solution = std::max(solution, S(abs(rhs_[i])));
-    }
+    for (size_t i = 0; i < total_ + border_; ++i)
+      for (int c = 0; c < m; ++c) {
+        correction = std::max(correction, S(ldexp(S(abs(product_[i * m + c])), -unit_[i])));
+        solution = std::max(solution, S(ldexp(S(abs(rhs_[i * m + c])), -unit_[i])));
+      }
     if (step && !(correction < last / S(2))) break;
     for (size_t i = 0; i < size; ++i) rhs_[i] += product_[i];
     if (!(correction > enough * solution)) break;

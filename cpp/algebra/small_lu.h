@@ -1,53 +1,74 @@
-// LU with row scaling and partial pivoting, in place, any scalar, no allocation after the first use. The pivot blocks of the tree
-// elimination are of the size of a body's states (10 to 60): too small for a blocked method. (Eigen's decomposition allocates its
-// permutation anew and has no test for pivots that are noise.)
+// LU with partial pivoting, in place, any scalar, no allocation after the first use. Rows and columns are compared in the powers of two of
+// an equilibration, so that the units of states and equations decide about no pivot; the numbers themselves are left as they are. The pivot
+// blocks of the tree elimination are of the size of a body's states (10 to 60): too small for a blocked method. (Eigen's decomposition
+// allocates its permutation anew and has no test for pivots that are noise.)
 #pragma once
 
 #include <cmath>
 #include <vector>
 
+#include "algebra/equilibration.h"
 #include "spatial/scalar.h"
 
 namespace pycraft {
 
+// |x| of a product of many factors: a mantissa and a binary exponent, so that no product leaves the range and one logarithm is taken.
+template <class S>
+struct Magnitude {
+  S mantissa = S(1);
+  long exponent = 0;
+  void multiply(const S& factor) {
+    using std::frexp;
+    int shift = 0;
+    mantissa = frexp(S(mantissa * factor), &shift);
+    exponent += shift;
+  }
+  void multiply(const Magnitude& other) {
+    multiply(other.mantissa);
+    exponent += other.exponent;
+  }
+  S log() const {
+    using std::log;
+    return S(log(mantissa)) + S(exponent) * S(log(S(2)));
+  }
+};
+
 template <class S>
 class SmallLU {
  public:
-  // Factors the n x n row-major matrix A in place; it must stay where it is. magnitude[j]: the largest number that went into column j
-  // of the scaled rows, so that a pivot below 4 n eps of it is noise. False if the matrix counts as singular.
-  bool factor(S* A, int n, const S* row_magnitude) {
-    using std::abs;
+  // Factors the n x n row-major matrix A in place; it must stay where it is. sizes: the largest number that went into each entry, so that a
+  // pivot below 4 n eps of them is noise; null where nothing was added up in A. False if the matrix counts as singular.
+  bool factor(S* A, int n, const S* sizes) {
+    using std::abs, std::ldexp;
     A_ = A;
     n_ = n;
     rows_.resize(n);
-    scale_.resize(n);
     column_.assign(n, S(0));
-    sign_ = 1;
-    log_abs_det_ = S(0);
+    determinant_ = {};
+    sizes_.resize(size_t(n) * n);
+    for (size_t i = 0; i < sizes_.size(); ++i) sizes_[i] = maximum(S(abs(A[i])), sizes ? sizes[i] : S(0));
+    if (!scales_.find(sizes_.data(), n)) return false;
+    row_factor_.resize(n);
     for (int i = 0; i < n; ++i) {
       rows_[i] = i;
-      S largest = row_magnitude[i];
-      for (int j = 0; j < n; ++j) largest = std::max(largest, S(abs(A[i * n + j])));
-      if (!(largest > S(0))) return false;
-      scale_[i] = S(1) / largest;
-      for (int j = 0; j < n; ++j) column_[j] = std::max(column_[j], S(abs(A[i * n + j]) * scale_[i]));
+      row_factor_[i] = ldexp(S(1), scales_.row(i));
     }
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < n; ++j) column_[j] = maximum(column_[j], S(sizes_[size_t(i) * n + j] * row_factor_[i]));
     for (int k = 0; k < n; ++k) {
-      int best = k;
+      // The state's own equation, unless another one is much larger: the recursions that the equations stand for are stable as they are.
+      int best = k, own = k;
       S largest = S(-1);
       for (int i = k; i < n; ++i) {
-        const S candidate = abs(A[rows_[i] * n + k]) * scale_[rows_[i]];
+        const S candidate = abs(A[rows_[i] * n + k]) * row_factor_[rows_[i]];
         if (candidate > largest) largest = candidate, best = i;
+        if (rows_[i] == k) own = i;
       }
+      if (rows_[own] == k && abs(A[k * n + k]) * row_factor_[k] > S(0.1) * largest) best = own;
       if (!(largest > S(4 * n) * epsilon<S>() * column_[k])) return false;
-      if (best != k) {
-        std::swap(rows_[k], rows_[best]);
-        sign_ = -sign_;
-      }
+      std::swap(rows_[k], rows_[best]);
       const S* pivot_row = A + rows_[k] * n;
-      using std::log;
-      log_abs_det_ += log(S(abs(pivot_row[k])));
-      if (pivot_row[k] < S(0)) sign_ = -sign_;
+      determinant_.multiply(abs(pivot_row[k]));
       const S inverse = S(1) / pivot_row[k];
       for (int i = k + 1; i < n; ++i) {
         S* row = A + rows_[i] * n;
@@ -80,14 +101,16 @@ class SmallLU {
     }
   }
 
-  S log_abs_determinant() const { return log_abs_det_; }
+  const Magnitude<S>& determinant() const { return determinant_; }
+  const Equilibration& scales() const { return scales_; }
 
  private:
   S* A_ = nullptr;
-  int n_ = 0, sign_ = 1;
+  int n_ = 0;
   std::vector<int> rows_;
-  std::vector<S> scale_, column_;
-  S log_abs_det_ = S(0);
+  std::vector<S> column_, sizes_, row_factor_;
+  Equilibration scales_;
+  Magnitude<S> determinant_;
 };
 
 }  // namespace pycraft

@@ -135,7 +135,7 @@ std::vector<Theorem> sko_theorems(const std::shared_ptr<SkoSource>& source) {
   state("ln det (ℳ+J) = Σ ln det D(k)", logdet(MM + J), logdet(D), no_hypothesis, check, extended);
   const Expression W = square_root(D).inv() * H * psi * square_root(M);
   state("#1 D^-½HψM^½ is a co-isometry", W * W.T(), I, no_hinge_diagonal, check, "soa.md #1");
-  state("#2 Newton-Euler to innovations is a QR", H * phi * square_root(M), A * square_root(D) * W, no_hinge_diagonal, check, "soa.md #2");
+  state("#2 Newton-Euler to innovations is a QR", H * phi * square_root(M), A * square_root(D) * W, no_hypothesis, check, "soa.md #2");
   state("#6 φ*H*ℳ⁻¹ by the factors", phi.T() * H.T() * (MM + J).inv(), psi.T() * H.T() * D.inv() * S, no_hypothesis, check, "soa.md #6");
   state("#7 ℳ⁻¹HφMφ* by the factors", (MM + J).inv() * H * phi * M * phi.T(), K.T() * psi.T() + S.T() * D.inv() * H * psi * P, no_hypothesis, check, "soa.md #7");
 

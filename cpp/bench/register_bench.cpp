@@ -138,11 +138,7 @@ py::dict time_dynamics(const std::shared_ptr<Multibody>& model, const std::strin
   } else if (call == "inverse_dynamics_derivatives") {
     run([&](auto a, auto b, auto c) { s.inverse_dynamics(a, b, c, out.data(), out.data() + square); });
   } else if (call == "forward_dynamics_derivatives") {  // the accelerations and their derivatives
-    std::vector<double> vdot(nv);
-    run([&](auto a, auto b, auto c) {
-      w.forward_dynamics(a, b, c, vdot.data());
-      s.forward_dynamics(a, b, vdot.data(), out.data(), out.data() + square, out.data() + 2 * square);
-    });
+    run([&](auto a, auto b, auto c) { s.forward_dynamics(a, b, c, Solving(), out.data(), out.data() + square, out.data() + 2 * square); });
   } else if (call == "log_determinant_gradient") {
     run([&](auto a, auto, auto) { s.log_determinant(a, out.data(), nullptr, nullptr, nullptr); });
   } else {

@@ -108,6 +108,7 @@ inline void require_finite(const double* x, size_t n, const Multibody& model) {
 }
 
 // Calls that stop at quad.
+inline constexpr const char* to_quad = "this call computes in precision 'single' to 'quad'; operators, and forward dynamics, go to 100 digits";
 template <template <class> class Workspace, class S>
 inline constexpr bool available_at = true;
 
@@ -149,7 +150,7 @@ py::array_t<double> run(DirectCalls<Workspace>& d, Precision precision, std::vec
     if constexpr (available_at<Workspace, S>)
       run_in(s);
     else
-      throw EvaluationError("this call computes in precision 'single' to 'quad'; operators, and forward dynamics, go to 100 digits");
+      throw EvaluationError(to_quad);
   };
   at_precision(precision, widest);
   return out;

@@ -49,6 +49,27 @@ py::tuple cut(const py::array_t<double>& all, int batch, const std::vector<std::
   return parts;
 }
 
+// ∂v̇/∂q, ∂v̇/∂v, ∂v̇/∂τ one after the other, from the doubles of the states: what a narrower scalar rounds away, a wider residual sees.
+void forward(Calls& d, const State& s, const Solving& how, Precision precision, double* out) {
+  const size_t n = d.model().nv(), square = n * n;
+  const int states = s.batch < 0 ? 1 : s.batch;
+  const auto at = [](const Argument& a, int b) { return a.array.data() + b * a.stride; };
+  py::gil_scoped_release release;
+  at_precision(precision, [&]<class S>(S) {
+    if constexpr (!available_at<Sensitivities, S>) {
+      throw EvaluationError(to_quad);
+    } else {
+      std::vector<S> y(3 * square);
+      d.each<S>(0, states, states, [&](Sensitivities<S>& w, int b) {
+        w.forward_dynamics(at(s.q, b), at(s.v, b), at(s.w, b), how, y.data(), y.data() + square, y.data() + 2 * square);
+        double* to = out + b * 3 * square;
+        std::transform(y.begin(), y.end(), to, [](const S& x) { return to_double(x); });
+        require_finite(to, 3 * square, d.model());
+      });
+    }
+  });
+}
+
 }  // namespace
 
 void register_sensitivities(py::module_& m) {
@@ -56,18 +77,24 @@ void register_sensitivities(py::module_& m) {
   py::class_<Calls> sensitivities(m, "Sensitivities");
   unpicklable(sensitivities)
       .def(py::init<std::shared_ptr<Multibody>>())
-      .def("dynamics", [](Calls& d, bool forward, const py::object& q, const py::object& v, const py::object& vdot, Precision precision) {
+      .def("inverse_dynamics", [](Calls& d, const py::object& q, const py::object& v, const py::object& vdot, Precision precision) {
         const Multibody& mb = d.model();
-        const int nq = mb.nq(), n = mb.nv(), size = n * n * (forward ? 3 : 2);
+        const int nq = mb.nq(), n = mb.nv(), size = 2 * n * n;
         const State s = state(mb, q, v, vdot, "vdot");
-        const auto all = run(d, precision, {{&s.q, nq}, {&s.v, n}, {&s.w, n}}, output(py::none(), s.batch, {size}), size, s.batch, [n, forward](auto& w, auto in, auto* y) {
-          if (forward)
-            w.forward_dynamics(in[0], in[1], in[2], y, y + n * n, y + 2 * n * n);
-          else
-            w.inverse_dynamics(in[0], in[1], in[2], y, y + n * n);
-        });
-        return forward ? cut(all, s.batch, {{n, n}, {n, n}, {n, n}}) : cut(all, s.batch, {{n, n}, {n, n}});
-      }, py::arg("forward"), q, v, py::arg("vdot"), precision)
+        const auto all = run(d, precision, {{&s.q, nq}, {&s.v, n}, {&s.w, n}}, output(py::none(), s.batch, {size}), size, s.batch,
+                             [n](auto& w, auto in, auto* y) { w.inverse_dynamics(in[0], in[1], in[2], y, y + n * n); });
+        return cut(all, s.batch, {{n, n}, {n, n}});
+      }, q, v, py::arg("vdot"), precision)
+      .def("forward_dynamics", [](Calls& d, const py::object& q, const py::object& v, const py::object& tau, Form form, const py::object& refine,
+                                  const std::string& residual, Precision precision) {
+        const Multibody& mb = d.model();
+        const int n = mb.nv(), size = 3 * n * n;
+        const State s = state(mb, q, v, tau, "tau");
+        const Solving how{form, refinement(refine, residual, precision), OnSingular::raise};
+        py::array_t<double> all = output(py::none(), s.batch, {size});
+        forward(d, s, how, precision, all.mutable_data());
+        return cut(all, s.batch, {{n, n}, {n, n}, {n, n}});
+      }, q, v, py::arg("tau"), py::arg("form"), py::arg("refine"), py::arg("residual"), precision)
       .def("third_order", [](Calls& d, bool christoffel, const py::object& q, Precision precision, const py::object& out) {
         const Multibody& mb = d.model();
         const int n = mb.nv(), size = n * n * n;

@@ -4,6 +4,7 @@
 #include "algebra/errors.h"
 #include "algebra/matrix_tree.h"
 #include "bindings/bindings.h"
+#include "operators/derived_operators.h"
 #include "operators/directions.h"
 
 namespace pycraft {
@@ -126,11 +127,11 @@ void register_sources(py::module_& m) {
       .def("__reduce__", [](const Binding& b) -> py::tuple {
         return py::make_tuple(py::module_::import("pycraft._core").attr("_binding_from_parts"),
                               py::make_tuple(b.batch, b.nq, b.nv, b.q, b.v, b.arithmetic.precision, b.arithmetic.form, b.arithmetic.refinement.steps,
-                                             b.arithmetic.refinement.wider));
+                                             static_cast<int>(b.arithmetic.refinement.residual)));
       });
-  m.def("_binding_from_parts", [](int batch, int nq, int nv, std::vector<double> q, std::vector<double> v, Precision precision, Form form, int steps, bool wider) {
+  m.def("_binding_from_parts", [](int batch, int nq, int nv, std::vector<double> q, std::vector<double> v, Precision precision, Form form, int steps, int residual) {
     auto b = std::make_shared<Binding>();
-    b->batch = batch, b->nq = nq, b->nv = nv, b->q = std::move(q), b->v = std::move(v), b->arithmetic = {form, {steps, wider}, precision};
+    b->batch = batch, b->nq = nq, b->nv = nv, b->q = std::move(q), b->v = std::move(v), b->arithmetic = {form, {steps, residual_precisions[residual]}, precision};
     return b;
   });
   m.def("_binding", [](const Expression& e) {
@@ -154,6 +155,11 @@ void register_sources(py::module_& m) {
       .def_property_readonly("body_names", [](const SkoSource& s) { return s.structure().body_names; })
       .def_property_readonly("hinge_names", [](const SkoSource& s) { return s.structure().hinge_names; })
       .def_property_readonly("coordinate_names", [](const SkoSource& s) { return s.structure().coordinate_names; })
+      .def_property_readonly("derived_from", [](const SkoSource& s) -> py::object {
+        const auto* derived = dynamic_cast<const DerivedOperators*>(&s);
+        if (derived == nullptr) return py::none();
+        return py::make_tuple(dynamic_cast<const WorldFrame*>(&s) != nullptr ? "world frame" : "hinge subset", derived->base());
+      }, "How this tree was made of a model's, \"hinge subset\" or \"world frame\", and that model's source; None for a model's own.")
       .def_property_readonly("traits", [](const SkoSource& s) {
         const Traits t = s.traits();
         py::dict d;

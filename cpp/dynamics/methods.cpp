@@ -35,17 +35,19 @@ DynamicsMethods<S>::DynamicsMethods(const Multibody& model)
 template <class S>
 void DynamicsMethods<S>::forward_dynamics(Method method, const S* q, const S* v, const S* tau, S* vdot) {
   kinematics(*model_, q, blocks_);
-  velocities_base_to_tip(*model_, blocks_.pose.data(), blocks_.H.data(), v, velocities_);
-  newton_euler(*model_, blocks_, velocities_, static_cast<const S*>(nullptr), right_side_.data(), alpha_, force_);  // 𝒞
+  point_accelerations_base_to_tip(*model_, blocks_.pose.data(), blocks_.H.data(), v, OwnTerms::absorbed, points_);
+  newton_euler(*model_, blocks_, points_, static_cast<const S*>(nullptr), right_side_.data(), alpha_, force_);  // 𝒞
   for (int i = 0; i < model_->nv; ++i) right_side_[i] = tau[i] - right_side_[i];
   switch (method) {
     case Method::cholesky:
     case Method::ldl:
       std::copy(right_side_.begin(), right_side_.end(), vdot);
-      return factor_and_solve(method, vdot);
-    case Method::conjugate_gradients: return solve_by_gradients(right_side_.data(), vdot);
-    case Method::inverse: return multiply_by_inverse(right_side_.data(), vdot);
+      factor_and_solve(method, vdot);
+      break;
+    case Method::conjugate_gradients: solve_by_gradients(right_side_.data(), vdot); break;
+    case Method::inverse: multiply_by_inverse(right_side_.data(), vdot); break;
   }
+  for (int i = 0; i < model_->nv; ++i) vdot[i] -= points_.absorbed[i];
 }
 
 template <class S>

@@ -17,7 +17,7 @@
 #include "dynamics/dense_factors.h"
 #include "model/multibody.h"
 #include "operators/rigid_blocks.h"
-#include "recursions/velocities.h"
+#include "recursions/point_accelerations.h"
 
 namespace pycraft {
 
@@ -52,7 +52,7 @@ class DynamicsMethods {
   const SkoStructure tree_;
   std::shared_ptr<const CompiledModel<S>> model_;
   RigidBlocks<S> blocks_;
-  Velocities<S> velocities_;
+  PointAccelerations<S> points_;
   TreeOrder order_;
   std::vector<Vector6<S>> alpha_, force_;
   std::vector<S> right_side_, work_, matrix_, identity_, scratch_;

@@ -23,15 +23,15 @@ bool PackedDynamics<T>::forward_dynamics(const double* q, size_t q_stride, const
   load(v, v_stride, model_.nv, v_);
   load(tau, tau_stride, model_.nv, tau_);
   kinematics(model_, q_.data(), blocks_);
-  velocities_base_to_tip(model_, blocks_.pose.data(), blocks_.H.data(), v_.data(), velocities_);
+  point_accelerations_base_to_tip(model_, blocks_.pose.data(), blocks_.H.data(), v_.data(), OwnTerms::absorbed, points_);
   blocks_.form = form;
   try {
-    articulated_body(tree_, model_, blocks_, velocities_, tau_.data(), vdot_.data(), force_, alpha_);
+    articulated_body(tree_, model_, blocks_, points_, tau_.data(), vdot_.data(), force_, alpha_);
   } catch (const SingularHingeError&) {
     return false;
   }
   for (int b = 0; b < width; ++b)
-    for (int i = 0; i < model_.nv; ++i) vdot[size_t(b) * model_.nv + i] = vdot_[i].v[b];
+    for (int i = 0; i < model_.nv; ++i) vdot[size_t(b) * model_.nv + i] = vdot_[i].v[b] - points_.absorbed[i].v[b];
   return true;
 }
 

@@ -6,7 +6,7 @@
 #include "algebra/arithmetic.h"
 #include "model/multibody.h"
 #include "operators/rigid_blocks.h"
-#include "recursions/velocities.h"
+#include "recursions/point_accelerations.h"
 #include "spatial/pack.h"
 
 namespace pycraft {
@@ -29,7 +29,7 @@ class PackedDynamics {
   const SkoStructure tree_;
   CompiledModel<S> model_;
   RigidBlocks<S> blocks_;
-  Velocities<S> velocities_;
+  PointAccelerations<S> points_;
   std::vector<Vector6<S>> alpha_, force_;
   std::vector<S> q_, v_, tau_, vdot_;
 };

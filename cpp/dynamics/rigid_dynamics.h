@@ -8,9 +8,11 @@
 #include <vector>
 
 #include "algebra/refinement.h"
+#include "algebra/sweeps/residual_rounding.h"
 #include "dynamics/workspace_pool.h"
 #include "model/multibody.h"
 #include "operators/rigid_blocks.h"
+#include "recursions/point_accelerations.h"
 #include "recursions/velocities.h"
 
 namespace pycraft {
@@ -22,6 +24,7 @@ struct Solving {
   Form form = Form::fast;
   Refinement refinement;
   OnSingular on_singular = OnSingular::raise;
+  bool estimate = false;  // of a refined value: how far it is off
 };
 
 // Numbers of one model at one scalar.
@@ -34,48 +37,67 @@ class RigidDynamics {
   // what a narrower scalar rounds away, a wider residual sees.
   template <class T>
   void forward_dynamics(const T* q, const T* v, const T* tau, S* vdot, const Solving& how = {});
+  // The same but θ̈ + x, before x is taken off that hinges absorb (recursions/point_accelerations.h): of the size of accelerations, however
+  // fast the whole travels. Returns the inertias that were added to singular hinges.
+  using AddedInertias = std::vector<std::pair<int, S>>;
+  template <class T>
+  AddedInertias forward_dynamics_of_points(const T* q, const T* v, const T* tau, S* vdot, const Solving& how = {});
   void inverse_dynamics(const S* q, const S* v, const S* vdot, S* tau);   // vdot null: bias forces
   void mass_matrix(const S* q, S* out);                                   // ℳ + J, full
   void mass_matrix_inverse(const double* q, S* out, const Solving& how = {});  // (ℳ + J)⁻¹, full; O(N) a column
+  void mass_matrix_solve(const double* q, const S* right, int m, S* out, const Solving& how = {});  // (ℳ + J)⁻¹ of m columns
   void jacobian(const Node& node, const S* q, S* out);  // 6 x nv, node axes
   Pose<S> pose(const Node& node, const S* q);     // X_WN
   S kinetic_energy(const S* q, const S* v);       // with rotor inertia
-  S potential_energy(const S* q);                 // -Σ m g·c, zero at the world's origin
+  S potential_energy(const S* q, const Vector3<S>& datum = Vector3<S>::zero());  // -Σ m g·(c - datum), datum a point in the world
 
   // What forward dynamics in this form works in.
   size_t bytes(Form form) const;
 
   // |δ|/|x| of the corrections of the last refined call.
-  const std::vector<double>& corrections() const { return corrections_; }
+  const std::vector<double>& corrections() const { return refinement_.corrections; }
+  // Of the last refined forward dynamics that was asked to estimate it: |x - exact|/|x|, 2-norms.
+  double estimated_error() const { return estimated_error_; }
 
  private:
   template <class T>
   friend class RigidDynamics;
 
   template <class T>
-  void set_state(const T* q, const T* v);                 // kinematics and velocities
+  void set_state(const T* q, const T* v);                 // kinematics and what depends on velocities, for equations to be solved
   template <class T>
-  void residual(const T* tau, const S* vdot, S* r);       // tau - inverse dynamics, at the state that was set
+  void residual(const T* tau, const S* vdot, S* r);       // tau - inverse dynamics, at the state that was set; vdot with what hinges absorb
   void subtract_product(const S* x, S* r, int m);         // r -= (ℳ + J) x
   void solve(const S* r, S* x, int m);                    // with the kept factors
   template <class T>
   RigidDynamics<Wider<S>>& wider(const T* q, const T* v);
+  template <class T>
+  void size_residual(const RigidDynamics<T>& formed, const T* vdot, const Refinement& how, bool shared);  // of the one that was formed last
+  S length(const S* x) const;   // 2-norm of nv numbers
+  void gather_wider();  // from now on forces can be
+  S floor(const S* direction);  // the most that rounding of that residual can make of a correction
   template <class F>
-  std::vector<std::pair<int, S>> with_every_hinge_regular(F f);
-  void project_off_null_space(const std::vector<std::pair<int, S>>& added, S* x, int m);
+  AddedInertias with_every_hinge_regular(F f);
+  void project_off_null_space(const AddedInertias& added, S* x, int m);
 
   const Multibody& source_;
   const SkoStructure tree_;
   std::shared_ptr<const CompiledModel<S>> model_;
   RigidBlocks<S> blocks_;
-  Velocities<S> velocities_;
+  Velocities<S> velocities_;      // of energies
+  PointAccelerations<S> points_;  // of equations of motion
   std::vector<Vector6<S>> alpha_, force_;
   std::vector<Pose<S>> world_;   // X_WB of every body
   std::vector<double> rest_;     // v = 0
-  std::vector<S> q_, v_, tau_, columns_, scratch_, r_, delta_;
+  std::vector<S> q_, v_, tau_, columns_, scratch_, r_;
   std::unique_ptr<RigidDynamics<Wider<S>>> wider_;
+  std::shared_ptr<const CompiledModel<Wider<S>>> wide_model_;
+  std::vector<Vector6<Wider<S>>> wide_force_;
   std::vector<Wider<S>> wide_x_, wide_r_;
-  std::vector<double> corrections_;
+  RefinementWork<S> refinement_;
+  ResidualSizes<S> sizes_;
+  S left_ = S(0);
+  double estimated_error_ = 0;
 };
 
 #define PYCRAFT_INSTANTIATE(S) extern template class RigidDynamics<S>;

@@ -5,62 +5,128 @@
 #include "algebra/sweeps/articulated_inertia.h"
 #include "algebra/sweeps/upsilon.h"
 #include "recursions/kinematics.h"
+#include "recursions/newton_euler.h"
 
 namespace pycraft {
 
-template <class S>
-Sensitivities<S>::Sensitivities(const Multibody& model)
-    : tree_(model.structure()), model_(model.compiled<S>()), blocks_(tree_), frame_(*model_) {}
+namespace {
 
 template <class S>
-void Sensitivities<S>::frame_at(const S* q, const S* v, const S* vdot) {
+Vector6<S> uniform(const Vector3<S>& linear) {
+  return {Vector3<S>::zero(), linear};
+}
+
+}  // namespace
+
+template <class S>
+Sensitivities<S>::Sensitivities(const Multibody& model)
+    : source_(model), tree_(model.structure()), model_(model.compiled<S>()), blocks_(tree_), frame_(*model_), outboard_(model_->nv), alpha_(model_->bodies),
+      force_(model_->bodies) {}
+
+template <class S>
+void Sensitivities<S>::frame_at(const S* q, const S* v, const S* vdot, OwnTerms own) {
   kinematics(*model_, q, blocks_);
-  frame_.fill(*model_, blocks_, v, vdot);
+  frame_.fill(*model_, blocks_, v, vdot, own);
+}
+
+template <class S>
+void Sensitivities<S>::twists_about(int body) {
+  Vector3<S> l = Vector3<S>::zero();
+  for (int a = body; a >= 0; a = model_->parent[a]) {
+    for (int i = model_->v_offset[a]; i < model_->v_offset[a] + model_->nv_of[a]; ++i) outboard_[i] = motion_outboard(l, frame_.twist[i]);
+    l = l + frame_.arm[a];
+  }
 }
 
 template <class S>
 void Sensitivities<S>::inverse_dynamics(const S* q, const S* v, const S* vdot, S* dq, S* dv) {
+  frame_at(q, v, vdot, OwnTerms::kept);
+  differentiate_forces(dq, dv, model_->nv);
+}
+
+template <class S>
+void Sensitivities<S>::differentiate_forces(S* dq, S* dv, int stride) {
   const CompiledModel<S>& m = *model_;
   const int N = m.nv;
-  frame_at(q, v, vdot);
-  std::fill_n(dq, size_t(N) * N, S(0));
-  std::fill_n(dv, size_t(N) * N, S(0));
+  for (int k = 0; k < N; ++k) std::fill_n(dq + size_t(k) * stride, N, S(0)), std::fill_n(dv + size_t(k) * stride, N, S(0));
   for (int k = 0; k < N; ++k) {
     const int c = frame_.body_of[k];
     const RigidInertia<S>& R = frame_.R[c];
     const MomentumRate<S>& B = frame_.B[c];
     const Vector6<S>& s = frame_.twist[k];
-    const Vector6<S> along_v = R * (frame_.twist_rate[k] + frame_.psi_dot[k]) + B * s;
-    const Vector6<S> along_q = R * frame_.psi_ddot[k] + B * frame_.psi_dot[k] + cross_force(s, frame_.force[c]);
-    const Vector6<S> Rs = R * s, Bs = transpose_times(B, s);  // row k of what is inboard of it
-    on_path(m, c, [&](int i) {
-      dv[size_t(i) * N + k] = dot(frame_.twist[i], along_v);
-      dv[size_t(k) * N + i] = dot(Rs, frame_.twist_rate[i] + frame_.psi_dot[i]) + dot(Bs, frame_.twist[i]);
-      const S outboard = dot(Rs, frame_.psi_ddot[i]) + dot(Bs, frame_.psi_dot[i]);  // row k, moved by i at or inboard of it
-      if (frame_.inboard(i, k)) {
-        dq[size_t(i) * N + k] = dot(frame_.twist[i], along_q);
-        dq[size_t(k) * N + i] = outboard;
-      } else if (frame_.subhinge_of[i] == frame_.subhinge_of[k]) {
-        dq[size_t(k) * N + i] = outboard;
+    Vector6<S> along_v = R * (frame_.twist_rate[k] + frame_.psi_dot[k]) + B * s;
+    Vector6<S> along_q = R * frame_.psi_ddot[k] + B * frame_.psi_dot[k] + cross_force(s, frame_.force[c]);
+    Vector6<S> Rs = R * s;  // with Bs, row k of what is inboard of it
+    const Vector3<S> Bs = couple(B, s);
+    for (int a = c; a >= 0; a = m.parent[a]) {
+      for (int i = m.v_offset[a]; i < m.v_offset[a] + m.nv_of[a]; ++i) {
+        dv[size_t(i) * stride + k] = dot(frame_.twist[i], along_v);
+        dv[size_t(k) * stride + i] = dot(Rs, frame_.twist_rate[i] + frame_.psi_dot[i]) + dot(Bs, frame_.twist[i].angular);
+        const S outboard = dot(Rs, frame_.psi_ddot[i]) + dot(Bs, frame_.psi_dot[i].angular);  // row k, moved by i at or inboard of it
+        if (frame_.inboard(i, k)) {
+          dq[size_t(i) * stride + k] = dot(frame_.twist[i], along_q);
+          dq[size_t(k) * stride + i] = outboard;
+        } else if (frame_.subhinge_of[i] == frame_.subhinge_of[k]) {
+          dq[size_t(k) * stride + i] = outboard;
+        }
       }
-    });
+      for (Vector6<S>* f : {&along_v, &along_q, &Rs}) *f = force_inboard(frame_.arm[a], *f);
+    }
   }
 }
 
 template <class S>
-void Sensitivities<S>::forward_dynamics(const S* q, const S* v, const S* vdot, S* dq, S* dv, S* dtau) {
+void Sensitivities<S>::forward_dynamics(const double* q, const double* v, const double* tau, const Solving& how, S* dq, S* dv, S* dtau) {
   const int N = model_->nv;
-  work_.resize(2 * size_t(N) * N);
-  S *tq = work_.data(), *tv = tq + size_t(N) * N;
-  inverse_dynamics(q, v, vdot, tq, tv);
-  articulated_inertia_tip_to_base(tree_, blocks_);
-  inverse_.assign(size_t(N) * N, S(0));
-  for (int i = 0; i < N; ++i) inverse_[size_t(i) * N + i] = S(1);
-  scratch_.resize(size_t(6) * model_->bodies * N);
-  mass_matrix_inverse_apply(tree_, blocks_, inverse_.data(), dtau, N, scratch_.data());
-  mass_matrix_inverse_apply(tree_, blocks_, tq, dq, N, scratch_.data());
-  mass_matrix_inverse_apply(tree_, blocks_, tv, dv, N, scratch_.data());
-  for (size_t i = 0; i < size_t(N) * N; ++i) dq[i] = -dq[i], dv[i] = -dv[i];
+  const size_t square = size_t(N) * N;
+  if (how.form != Form::fast && differentiate_sweep(q, v, tau, how, dq, dv, dtau)) return;
+  if (!dynamics_) dynamics_ = std::make_unique<RigidDynamics<S>>(source_);
+  convert(q, model_->nq, q_), convert(v, N, v_);
+  rates_.resize(N), work_.resize(3 * square), solution_.resize(3 * square);
+  dynamics_->forward_dynamics_of_points(q, v, tau, rates_.data(), how);
+  frame_at(q_.data(), v_.data(), rates_.data(), OwnTerms::absorbed);
+  // Columns: ∂T/∂q, ∂T/∂v, 1.
+  differentiate_forces(work_.data(), work_.data() + N, 3 * N);
+  for (int i = 0; i < N; ++i)
+    for (int j = 0; j < N; ++j) work_[size_t(i) * 3 * N + 2 * N + j] = S(i == j ? 1 : 0);
+  dynamics_->mass_matrix_solve(q, work_.data(), 3 * N, solution_.data(), how);
+  for (int i = 0; i < N; ++i)
+    for (int j = 0; j < N; ++j) {
+      const S *row = solution_.data() + size_t(i) * 3 * N, *column = solution_.data() + size_t(j) * 3 * N;
+      dq[size_t(i) * N + j] = -row[j];
+      dv[size_t(i) * N + j] = -row[N + j];
+      dtau[size_t(i) * N + j] = S(0.5) * (row[2 * N + j] + column[2 * N + i]);
+    }
+  differentiate_absorbed(dv);
+}
+
+// What free roots absorb: x = ω × v of the linear coordinates.
+template <class S>
+void Sensitivities<S>::differentiate_absorbed(S* dv) {
+  const int N = model_->nv;
+  for (int k = 0; k < model_->bodies; ++k) {
+    if (!frame_.floats(*model_, k)) continue;
+    const int first = model_->v_offset[k];
+    const S* v = v_.data() + first;
+    const Matrix3<S> turning = skew(Vector3<S>{v[0], v[1], v[2]}), moving = skew(Vector3<S>{v[3], v[4], v[5]});
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) {
+        dv[size_t(first + 3 + i) * N + first + j] += moving(i, j);
+        dv[size_t(first + 3 + i) * N + first + 3 + j] -= turning(i, j);
+      }
+  }
+}
+
+// By the derivative of the sweep itself, which keeps the digits of a factored form: of forces that are differentiated first, those of a heavy
+// body would hide a light one's. It is the sweep of `ud` for both: reflections would pass over a row that is zero here and not beside it.
+// Its own result is not refined; (ℳ + J)⁻¹ is, as asked.
+template <class S>
+bool Sensitivities<S>::differentiate_sweep(const double* q, const double* v, const double* tau, const Solving& how, S* dq, S* dv, S* dtau) {
+  if (!tangents_) tangents_ = std::make_unique<TangentDynamics<S>>(source_);
+  if (!tangents_->forward_dynamics(q, v, tau, Form::ud, dq, dv)) return false;
+  if (!dynamics_) dynamics_ = std::make_unique<RigidDynamics<S>>(source_);
+  dynamics_->mass_matrix_inverse(q, dtau, how);
+  return true;
 }
 
 template <class S>
@@ -73,37 +139,40 @@ void Sensitivities<S>::mass_matrix(const S* q, S* out) {
     out[(size_t(i) * N + j) * N + k] = value;
     out[(size_t(j) * N + i) * N + k] = value;
   };
-  // ℳ(i,j) = S_i* R S_j, R of the outboard one, j. What moves both along changes nothing.
-  for (int j = 0; j < N; ++j) {
-    const int b = frame_.body_of[j];
-    const Vector6<S> momentum = frame_.R[b] * frame_.twist[j];
-    // k between: R and S_j move, S_i stays
-    on_path(m, b, [&](int k) {
-      if (frame_.subhinge_of[k] > frame_.subhinge_of[j]) return;
-      const Vector6<S> moved = cross_force(frame_.twist[k], momentum);
-      on_path(m, b, [&](int i) {
-        if (frame_.inboard(i, k)) put(i, j, k, dot(frame_.twist[i], moved));
+  // ℳ(i,j) = S_i* R S_j, R of the outboard one, about whose origin all is taken. What moves both along changes nothing.
+  for (int b = 0; b < m.bodies; ++b) {
+    const RigidInertia<S>& R = frame_.R[b];
+    const int first = m.v_offset[b], last = first + m.nv_of[b];
+    if (first < last) twists_about(b);
+    for (int j = first; j < last; ++j) {
+      const Vector6<S> momentum = R * frame_.twist[j];
+      // k between: R and S_j move, S_i stays
+      on_path(m, b, [&](int k) {
+        if (frame_.subhinge_of[k] > frame_.subhinge_of[j]) return;
+        const Vector6<S> moved = cross_force(outboard_[k], momentum);
+        on_path(m, frame_.body_of[k], [&](int i) {
+          if (frame_.inboard(i, k)) put(i, j, k, dot(outboard_[i], moved));
+        });
       });
-    });
-  }
-  // k outboard of both: R alone moves, by crf(S_k) R_k - R_k crm(S_k)
-  for (int k = 0; k < N; ++k) {
-    const int c = frame_.body_of[k];
-    const RigidInertia<S>& R = frame_.R[c];
-    const Vector6<S>& s = frame_.twist[k];
-    on_path(m, c, [&](int j) {
-      if (!frame_.inboard(j, k)) return;
-      const Vector6<S> moved = cross_force(s, R * frame_.twist[j]) - R * cross_motion(s, frame_.twist[j]);
-      on_path(m, frame_.body_of[j], [&](int i) {
-        if (frame_.inboard(i, k) && frame_.subhinge_of[i] <= frame_.subhinge_of[j]) put(i, j, k, dot(frame_.twist[i], moved));
+    }
+    // k outboard of both: R alone moves, by crf(S_k) R_k - R_k crm(S_k)
+    for (int k = first; k < last; ++k) {
+      const Vector6<S>& s = frame_.twist[k];
+      on_path(m, b, [&](int j) {
+        if (!frame_.inboard(j, k)) return;
+        const Vector6<S> moved = cross_force(s, R * outboard_[j]) - R * cross_motion(s, outboard_[j]);
+        on_path(m, frame_.body_of[j], [&](int i) {
+          if (frame_.inboard(i, k) && frame_.subhinge_of[i] <= frame_.subhinge_of[j]) put(i, j, k, dot(outboard_[i], moved));
+        });
       });
-    });
+    }
   }
 }
 
 template <class S>
 void Sensitivities<S>::christoffel(const S* q, S* out) {
-  const int N = model_->nv;
+  const CompiledModel<S>& m = *model_;
+  const int N = m.nv;
   const size_t n = N;
   work_.resize(n * n * n);
   S* d = work_.data();
@@ -113,34 +182,42 @@ void Sensitivities<S>::christoffel(const S* q, S* out) {
     for (int j = 0; j < N; ++j)
       for (int k = 0; k < N; ++k) out[(size_t(i) * n + j) * n + k] = (D(i, j, k) + D(i, k, j) - D(j, k, i)) / S(2);
   // Brackets: [∂_a, ∂_b] is ∂ along S_a × S_b within one ball or free subhinge, whose twists span it; its momentum pairs with S_c.
+  const auto add = [&](int a, int b, int c, const S& pairing) {  // of c on one path with a
+    const S g = pairing / S(2);
+    out[(size_t(c) * n + b) * n + a] += g;  // [X, Y], Z with X = a, Y = b
+    out[(size_t(b) * n + c) * n + a] -= g;  // [X, Z], Y with X = a, Z = b
+    out[(size_t(b) * n + a) * n + c] -= g;  // [Y, Z], X with Y = a, Z = b
+  };
+  std::vector<Vector6<S>>& carried = alpha_;  // the bracket about the origins of the bodies outboard
   for (int a = 0; a < N; ++a)
     for (int b = 0; b < N; ++b) {
       if (a == b || frame_.subhinge_of[a] != frame_.subhinge_of[b]) continue;
-      const Vector6<S> bracket = cross_motion(frame_.twist[a], frame_.twist[b]);
-      for (int c = 0; c < N; ++c) {
-        // g([∂_a, ∂_b], ∂_c): on one path only; R of the outboard of the two
-        const int x = frame_.body_of[a], y = frame_.body_of[c];
-        int deep = -1;
-        for (int e = x; e >= 0 && deep < 0; e = model_->parent[e])
-          if (e == y) deep = x;
-        for (int e = y; e >= 0 && deep < 0; e = model_->parent[e])
-          if (e == x) deep = y;
-        if (deep < 0) continue;
-        const S g = dot(frame_.twist[c], frame_.R[deep] * bracket) / S(2);
-        out[(size_t(c) * n + b) * n + a] += g;  // [X, Y], Z with X = a, Y = b
-        out[(size_t(b) * n + c) * n + a] -= g;  // [X, Z], Y with X = a, Z = b
-        out[(size_t(b) * n + a) * n + c] -= g;  // [Y, Z], X with Y = a, Z = b
+      const int body = frame_.body_of[a];
+      carried[body] = cross_motion(frame_.twist[a], frame_.twist[b]);
+      Vector6<S> momentum = frame_.R[body] * carried[body];
+      for (int e = body; e >= 0; e = m.parent[e]) {
+        for (int c = m.v_offset[e]; c < m.v_offset[e] + m.nv_of[e]; ++c) add(a, b, c, dot(frame_.twist[c], momentum));
+        momentum = force_inboard(frame_.arm[e], momentum);
+      }
+      for (int e = body + 1; e < m.bodies && m.parent[e] >= body; ++e) {  // depth first: its subtree follows it
+        carried[e] = motion_outboard(frame_.arm[e], carried[m.parent[e]]);
+        const Vector6<S> outer = frame_.R[e] * carried[e];
+        for (int c = m.v_offset[e]; c < m.v_offset[e] + m.nv_of[e]; ++c) add(a, b, c, dot(frame_.twist[c], outer));
       }
     }
 }
 
+// With the momentum of the bodies as it is seen from the frame, (n; f), and R(0; u) = (h × u; m u) of what it does not see:
+// KE = KE' + u·f + m|u|²/2.
 template <class S>
 void Sensitivities<S>::kinetic_energy(const S* q, const S* v, S* dq, S* dv) {
   frame_at(q, v, nullptr);
   for (int k = 0; k < model_->nv; ++k) {
-    const Vector6<S>& momentum = frame_.B[frame_.body_of[k]].momentum;
-    dq[k] = dot(frame_.psi_dot[k], momentum);
-    dv[k] = dot(frame_.twist[k], momentum) + model_->rotor_inertia[k] * v[k];
+    const int c = frame_.body_of[k];
+    const Vector6<S>&momentum = frame_.B[c].momentum, &s = frame_.twist[k];
+    const Vector3<S> change = cross_force(s, momentum).linear + (frame_.R[c] * frame_.psi_dot[k]).linear;
+    dq[k] = dot(frame_.psi_dot[k], momentum) + dot(frame_.travel[c], change);
+    dv[k] = dot(s, momentum) + dot(s, frame_.R[c] * uniform(frame_.travel[c])) + model_->rotor_inertia[k] * v[k];
   }
 }
 
@@ -151,16 +228,24 @@ void Sensitivities<S>::hamiltonian(const S* q, const S* p, const S* tau, S* v, S
   scratch_.resize(std::max(scratch_.size(), size_t(6) * model_->bodies));
   mass_matrix_inverse_apply(tree_, blocks_, p, v, 1, scratch_.data());
   frame_.fill(*model_, blocks_, v, nullptr);
-  // d(S_j·p)/dt = Ṡ_j·p + S_j·ṗ, and S_j·ṗ is what the hinge's force and gravity do: tau_j + S_j·(weight outboard).
+  // d(S_j·p)/dt = Ṡ_j·p + S_j·ṗ, and S_j·ṗ is what the hinge's force and gravity do: tau_j + S_j·(weight outboard). Of Ṡ_j·p, with u in
+  // both, what multiplies u twice is (u × s)·mu = 0.
   for (int k = 0; k < model_->bodies; ++k) {
-    int root = k;
-    while (model_->parent[root] >= 0) root = model_->parent[root];
-    const Vector6<S> field = motion_to_child(blocks_.pose[root], Vector6<S>{Vector3<S>::zero(), model_->gravity});
+    const Vector6<S> travel = uniform(frame_.travel[k]), field = uniform(gravity_at(k));
+    const Vector6<S>& momentum = frame_.B[k].momentum;
     for (int j = model_->v_offset[k]; j < model_->v_offset[k] + model_->nv_of[k]; ++j)
-      p_rate[j] = tau[j] + dot(frame_.twist_rate[j], frame_.B[k].momentum) + dot(frame_.twist[j], frame_.R[k] * field);
+      p_rate[j] = tau[j] + dot(frame_.twist_rate[j], momentum) + dot(frame_.twist_rate[j], frame_.R[k] * travel) +
+                  dot(cross_motion(travel, frame_.twist[j]), momentum) + dot(frame_.twist[j], frame_.R[k] * field);
   }
 }
 
+template <class S>
+Vector3<S> Sensitivities<S>::gravity_at(int k) const {
+  while (model_->parent[k] >= 0) k = model_->parent[k];
+  return transpose_times(blocks_.pose[k].R, model_->gravity);
+}
+
+// The change of what the frame sees, and of (h × u; m u): ∂h × u.
 template <class S>
 void Sensitivities<S>::momentum(const S* q, const S* v, S* matrix, S* dq) {
   const int N = model_->nv;
@@ -169,9 +254,12 @@ void Sensitivities<S>::momentum(const S* q, const S* v, S* matrix, S* dq) {
     const int c = frame_.body_of[k];
     int root = c;
     while (model_->parent[root] >= 0) root = model_->parent[root];
-    const Vector6<S> column = force_to_parent(blocks_.pose[root], frame_.R[c] * frame_.twist[k]);
-    const Vector6<S> change =
-        force_to_parent(blocks_.pose[root], cross_force(frame_.twist[k], frame_.B[c].momentum) + frame_.R[c] * frame_.psi_dot[k]);
+    const RigidInertia<S>& R = frame_.R[c];
+    const Vector6<S>& s = frame_.twist[k];
+    Vector6<S> changed = cross_force(s, frame_.B[c].momentum) + R * frame_.psi_dot[k];
+    changed.angular = changed.angular + cross(cross(s.angular, R.moment) + R.mass * s.linear, frame_.travel[c]);
+    const auto in_world = [&](const Vector6<S>& f) { return force_to_parent(blocks_.pose[root], force_inboard(frame_.origin[c], f)); };
+    const Vector6<S> column = in_world(R * s), change = in_world(changed);
     for (int i = 0; i < 6; ++i) matrix[size_t(i) * N + k] = column[i], dq[size_t(i) * N + k] = change[i];
   }
 }
@@ -182,12 +270,17 @@ void Sensitivities<S>::jacobian_rate(const Node& node, const S* q, const S* v, S
   frame_at(q, v, nullptr);
   std::fill_n(out, size_t(6) * N, S(0));
   if (node.body < 0) return;
-  const Pose<S> X = frame_.pose[node.body] * cast<S>(node.pose);
+  const Pose<S> X = node_in_axes(node);
   // column j in the node's axes moves with what is outboard of j: S_j × (V - V_s)
-  on_path(*model_, node.body, [&](int j) {
-    const Vector6<S> column = motion_to_child(X, frame_.twist_rate[j] - cross_motion(frame_.V[node.body], frame_.twist[j]));
-    for (int i = 0; i < 6; ++i) out[size_t(i) * N + j] = column[i];
-  });
+  Vector3<S> l = Vector3<S>::zero();
+  for (int a = node.body; a >= 0; a = model_->parent[a]) {
+    for (int j = model_->v_offset[a]; j < model_->v_offset[a] + model_->nv_of[a]; ++j) {
+      const Vector6<S> rate = motion_outboard(l, frame_.twist_rate[j]), twist = motion_outboard(l, frame_.twist[j]);
+      const Vector6<S> column = motion_to_child(X, rate - cross_motion(frame_.V[node.body], twist));
+      for (int i = 0; i < 6; ++i) out[size_t(i) * N + j] = column[i];
+    }
+    l = l + frame_.arm[a];
+  }
 }
 
 template <class S>
@@ -196,24 +289,34 @@ void Sensitivities<S>::jacobian_derivative(const Node& node, const S* q, S* out)
   frame_at(q, nullptr, nullptr);
   std::fill_n(out, size_t(6) * N * N, S(0));
   if (node.body < 0) return;
-  const Pose<S> X = frame_.pose[node.body] * cast<S>(node.pose);
+  const Pose<S> X = node_in_axes(node);
+  twists_about(node.body);
   on_path(*model_, node.body, [&](int j) {
     on_path(*model_, node.body, [&](int k) {
       if (!frame_.inboard(j, k)) return;
-      const Vector6<S> column = motion_to_child(X, cross_motion(frame_.twist[j], frame_.twist[k]));
+      const Vector6<S> column = motion_to_child(X, cross_motion(outboard_[j], outboard_[k]));
       for (int i = 0; i < 6; ++i) out[(size_t(i) * N + j) * N + k] = column[i];
     });
   });
+}
+
+// From its body's origin, in the frame's axes.
+template <class S>
+Pose<S> Sensitivities<S>::node_in_axes(const Node& node) const {
+  return Pose<S>{frame_.axes[node.body], Vector3<S>::zero()} * cast<S>(node.pose);
 }
 
 template <class S>
 void Sensitivities<S>::inertial_regressor(const S* q, const S* v, const S* vdot, S* out) {
   const CompiledModel<S>& m = *model_;
   const int columns = 10 * m.bodies;
-  frame_at(q, v, vdot);
+  kinematics(m, q, blocks_);
+  point_accelerations_base_to_tip(m, blocks_.pose.data(), blocks_.H.data(), v, OwnTerms::kept, points_);
+  rates_.resize(m.nv);
+  newton_euler(m, blocks_, points_, vdot, rates_.data(), alpha_, force_);
   std::fill_n(out, size_t(m.nv) * columns, S(0));
   for (int k = 0; k < m.bodies; ++k) {
-    const Vector6<S> V = motion_to_child(frame_.pose[k], frame_.V[k]), alpha = motion_to_child(frame_.pose[k], frame_.alpha[k]);
+    const Vector3<S>& omega = points_.angular_velocity[k];
     for (int p = 0; p < 10; ++p) {
       RigidInertia<S> unit = RigidInertia<S>::zero();
       if (p == 0)
@@ -222,7 +325,7 @@ void Sensitivities<S>::inertial_regressor(const S* q, const S* v, const S* vdot,
         unit.moment[p - 1] = S(1);
       else
         unit.rotational.s[p - 4] = S(1);
-      Vector6<S> f = unit * alpha + cross_force(V, unit * V);
+      Vector6<S> f = unit * alpha_[k] + gyroscopic_part(unit, omega);
       for (int a = k; a >= 0; a = m.parent[a]) {
         for (int i = m.v_offset[a]; i < m.v_offset[a] + m.nv_of[a]; ++i) out[size_t(i) * columns + 10 * k + p] = dot(blocks_.H[i], f);
         f = force_to_parent(blocks_.pose[a], f);

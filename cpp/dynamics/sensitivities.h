@@ -3,7 +3,12 @@
 // Source of the equations: recursions/inertial_frame.h; the same quantities as expressions: Operator.diff.
 #pragma once
 
+#include <memory>
+#include <vector>
+
 #include "algebra/sweeps/mass_matrix.h"
+#include "dynamics/rigid_dynamics.h"
+#include "dynamics/tangent_dynamics.h"
 #include "model/multibody.h"
 #include "recursions/inertial_frame.h"
 
@@ -16,8 +21,9 @@ class Sensitivities {
 
   // ∂T/∂q, ∂T/∂v (nv x nv), row the component of T. Rotor inertias add J to ∂T/∂v̇ = ℳ + J alone.
   void inverse_dynamics(const S* q, const S* v, const S* vdot, S* dq, S* dv);
-  // ∂v̇/∂q, ∂v̇/∂v, ∂v̇/∂T = (ℳ + J)⁻¹, at v̇ the forward dynamics of T. SingularHingeError as there.
-  void forward_dynamics(const S* q, const S* v, const S* vdot, S* dq, S* dv, S* dtau);
+  // ∂v̇/∂q, ∂v̇/∂v, ∂v̇/∂T = (ℳ + J)⁻¹ of forward dynamics, in its form: -(ℳ + J)⁻¹ ∂T at v̇, with its corrections, or in a factored form the
+  // derivative of the sweep. SingularHingeError as there.
+  void forward_dynamics(const double* q, const double* v, const double* tau, const Solving& how, S* dq, S* dv, S* dtau);
   // ∂ℳ/∂q, (nv, nv, nv).
   void mass_matrix(const S* q, S* out);
   // Γ(i, j, k) of Koszul's formula, with the brackets of quasi-velocities: Σ Γ(i,j,k) v_j v_k = C v without gravity. (nv, nv, nv).
@@ -39,13 +45,24 @@ class Sensitivities {
   void log_determinant(const S* q, S* coordinates, S* inertias, S* geometry, S* axes);
 
  private:
-  void frame_at(const S* q, const S* v, const S* vdot);
+  void frame_at(const S* q, const S* v, const S* vdot, OwnTerms own = OwnTerms::kept);
+  void twists_about(int body);  // of the coordinates on its path, about its origin: outboard_
+  void differentiate_forces(S* dq, S* dv, int stride);  // ∂T/∂q, ∂T/∂v in the frame that was filled
+  void differentiate_absorbed(S* dv);
+  bool differentiate_sweep(const double* q, const double* v, const double* tau, const Solving& how, S* dq, S* dv, S* dtau);
+  Vector3<S> gravity_at(int k) const;  // in the frame's axes
+  Pose<S> node_in_axes(const Node& node) const;
 
+  const Multibody& source_;
   const SkoStructure tree_;
   std::shared_ptr<const CompiledModel<S>> model_;
   RigidBlocks<S> blocks_;
   InertialFrame<S> frame_;
-  std::vector<S> work_, inverse_, scratch_;
+  PointAccelerations<S> points_;
+  std::vector<Vector6<S>> outboard_, alpha_, force_;
+  std::vector<S> q_, v_, rates_, work_, solution_, scratch_;
+  std::unique_ptr<RigidDynamics<S>> dynamics_;
+  std::unique_ptr<TangentDynamics<S>> tangents_;
 };
 
 #define PYCRAFT_INSTANTIATE(S) extern template class Sensitivities<S>;

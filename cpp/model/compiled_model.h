@@ -1,6 +1,7 @@
 // A model's numbers in flat arrays of one scalar, hinge types resolved once: what kernels read.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -31,6 +32,7 @@ struct CompiledModel {
   std::vector<InertiaFactors<S>> inertia_factors;
   std::vector<S> rotor_inertia;               // per coordinate
   bool has_rotor_inertia = false;
+  std::vector<std::array<int, 3>> translations;  // per body: coordinates that move it along any line, without rotor inertia; -1: none
   std::vector<int> aligned;                   // per coordinate: i where its row of H is exactly e_i at every q, else -1
   Vector3<S> gravity;
 };
@@ -40,6 +42,7 @@ inline InertiaFactors<S> cast(const InertiaFactors<T>& f) {
   InertiaFactors<S> g;
   for (int i = 0; i < 6; ++i) g.column[i] = cast<S>(f.column[i]), g.weight[i] = S(f.weight[i]);
   g.com = cast<S>(f.com);
+  g.uncertain = S(f.uncertain);
   std::copy_n(f.pivot, 3, g.pivot);
   return g;
 }
@@ -50,7 +53,7 @@ CompiledModel<S> broadcast(const CompiledModel<T>& from) {
   CompiledModel<S> to;
   to.parameters = from.parameters, to.bodies = from.bodies, to.nq = from.nq, to.nv = from.nv;
   to.parent = from.parent, to.q_offset = from.q_offset, to.v_offset = from.v_offset, to.nv_of = from.nv_of;
-  to.first_subhinge = from.first_subhinge, to.aligned = from.aligned, to.has_rotor_inertia = from.has_rotor_inertia;
+  to.first_subhinge = from.first_subhinge, to.aligned = from.aligned, to.translations = from.translations, to.has_rotor_inertia = from.has_rotor_inertia;
   for (const auto& h : from.subhinges) to.subhinges.push_back({h.kind, cast<S>(h.twist), cast<S>(h.axis), cast<S>(h.point), S(h.pitch)});
   for (const auto& X : from.placement) to.placement.push_back(cast<S>(X));
   for (const auto& M : from.inertia) to.inertia.push_back(cast<S>(M));

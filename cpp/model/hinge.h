@@ -21,13 +21,15 @@
 namespace pycraft {
 
 enum class SubhingeKind { pin, slider, screw, ball, free };
+// Velocity coordinates of one.
+constexpr int coordinates(SubhingeKind kind) { return kind == SubhingeKind::ball ? 3 : kind == SubhingeKind::free ? 6 : 1; }
 
 struct Subhinge {
   SubhingeKind kind;
   Vector3<double> axis{0, 0, 1}, point{0, 0, 0};
   double pitch = 0;
   int nq() const { return kind == SubhingeKind::ball ? 4 : kind == SubhingeKind::free ? 7 : 1; }
-  int nv() const { return kind == SubhingeKind::ball ? 3 : kind == SubhingeKind::free ? 6 : 1; }
+  int nv() const { return coordinates(kind); }
 };
 
 enum class HingeKind { weld, pin, slider, screw, universal, gimbal, cylindrical, planar, ball, free, custom };

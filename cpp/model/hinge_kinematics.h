@@ -75,8 +75,7 @@ inline void hinge_map_rate(const CompiledModel<S>& model, int k, const Vector6<S
   Vector6<S> later = Vector6<S>::zero();
   int j = model.nv_of[k];
   for (int i = model.first_subhinge[k + 1] - 1; i >= model.first_subhinge[k]; --i) {
-    const SubhingeKind kind = model.subhinges[i].kind;
-    const int n = kind == SubhingeKind::ball ? 3 : kind == SubhingeKind::free ? 6 : 1;
+    const int n = coordinates(model.subhinges[i].kind);
     j -= n;
     // (h* crf(u))* = crf(u)* h = -crm(u) h
     for (int a = j; a < j + n; ++a) rates[a] = S(-1) * cross_motion(later, rows[a]);

@@ -53,11 +53,11 @@ inline InertiaFactors<S> inertia_factors(double mass, const Vector3<double>& com
   return f;
 }
 
-// The gyroscopic force b = V¯ M V as -Σ w u ρ + rest: accelerations ρ of the columns, and what a direction without inertia feels.
+// The gyroscopic force b' = (ω × Iω; ω × (ω × h)) as -Σ w u ρ + rest: accelerations ρ of the columns, and what a direction without inertia
+// feels.
 template <class S>
-inline Vector6<S> gyroscopic_bias(const InertiaFactors<S>& f, const Vector6<S>& V, S* rho) {
-  const Vector3<S>& w = V.angular;
-  const Vector3<S> along = cross(w, V.linear + cross(w, f.com));  // ω × v of the centre of mass
+inline Vector6<S> gyroscopic_bias(const InertiaFactors<S>& f, const Vector3<S>& w, S* rho) {
+  const Vector3<S> along = cross(w, cross(w, f.com));  // centripetal, of the centre of mass
   for (int i = 0; i < 3; ++i) rho[i] = -along[i];
   Vector3<S> momentum = Vector3<S>::zero();
   for (int r = 3; r < 6; ++r) momentum = momentum + (f.weight[r] * dot(f.column[r].angular, w)) * f.column[r].angular;

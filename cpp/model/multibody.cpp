@@ -437,6 +437,21 @@ Pose<S> renormalised(const Pose<double>& X) {
   return {quaternion_rotation(q), wide.p};
 }
 
+// Coordinates of a hinge that move its body along any line whatever the others are, numbered from `first`: a free subhinge's, or three
+// sliders'. None where one of them has a rotor, whose inertia a change of the body's velocity does not share.
+std::array<int, 3> translations(const Hinge& hinge, int first) {
+  std::vector<int> found;
+  int j = 0;
+  for (const Subhinge& h : hinge.subhinges) {
+    if (h.kind == SubhingeKind::slider) found.push_back(j);
+    if (h.kind == SubhingeKind::free) found.insert(found.end(), {j + 3, j + 4, j + 5});
+    j += h.nv();
+  }
+  const bool driven = std::any_of(found.begin(), found.end(), [&](int i) { return hinge.rotor_inertia[i] != 0; });
+  if (found.size() != 3 || driven) return {-1, -1, -1};
+  return {first + found[0], first + found[1], first + found[2]};
+}
+
 template <class S>
 std::shared_ptr<const CompiledModel<S>> compile(const Multibody& model) {
   auto c = std::make_shared<CompiledModel<S>>();
@@ -480,6 +495,7 @@ std::shared_ptr<const CompiledModel<S>> compile(const Multibody& model) {
       }
     }
     c->first_subhinge.push_back(static_cast<int>(c->subhinges.size()));
+    c->translations.push_back(translations(b.hinge, c->v_offset.back()));
     for (double j : b.hinge.rotor_inertia) {
       c->rotor_inertia.push_back(S(j));
       c->has_rotor_inertia |= j != 0;

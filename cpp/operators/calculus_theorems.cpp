@@ -9,7 +9,8 @@ namespace pycraft {
 
 namespace {
 
-// A coordinate along which much changes: of a hinge with few of them, that is no root's and carries many bodies.
+// A coordinate along which much changes: of a hinge with few of them that carries many bodies, and whose parent is no root: where the
+// root is free, P⁺ and G of the root are 0 and I at every state.
 int telling_coordinate(const MultibodyOperators& source) {
   const SkoStructure& tree = source.structure();
   std::vector<int> carried(tree.bodies(), 1);
@@ -18,7 +19,9 @@ int telling_coordinate(const MultibodyOperators& source) {
   int best = -1, best_score = 0;
   for (int k = 0; k < tree.bodies(); ++k) {
     if (tree.dof[k] == 0) continue;
-    const int score = carried[k] + tree.bodies() * ((tree.parent[k] >= 0 ? 100 : 0) + (carried[k] > 1 ? 50 : 0) + 7 - std::min(tree.dof[k], 6));
+    const int parent = tree.parent[k];
+    const int place = parent < 0 ? 0 : tree.parent[parent] < 0 ? 100 : 125;
+    const int score = carried[k] + tree.bodies() * (place + (carried[k] > 1 ? 50 : 0) + 7 - std::min(tree.dof[k], 6));
     if (score > best_score) best = k, best_score = score;
   }
   return tree.dof_offset[best];
@@ -95,16 +98,16 @@ std::vector<Theorem> calculus_theorems(const std::shared_ptr<MultibodyOperators>
   const auto by_mass = parameter_direction(mass);
   state("#32 gradient of ln det ℳ by a mass", differentiate(logdet(MM + J), *by_mass), trace(Upsilon * differentiate(M, *by_mass)), "∂ ln det(ℳ+J) = tr(Υ∂M)",
         "\\partial\\ln\\det(\\mathcal{M}+J) = \\operatorname{tr}(\\Upsilon\\,\\partial M)", no_hypothesis, "soa.md #32");
-  const Expression p = phi * M * V;
+  const Expression p = phi * M * V, e = unit(several);
   const Expression outboard = function(force_cross, E.T() * V);
-  const Expression h = make_symbol(derivative_symbols()[direction_twist - first_derivative_symbol], source, {i}, source->structure().coordinate_names[i]);
-  state("#18 slope of the kinetic energy", 0.5 * d(V.T() * M * V), -(h.T() * outboard * p),
+  const Expression h = make_symbol(derivative_symbols()[direction_twist - first_derivative_symbol], source, {several}, source->structure().coordinate_names[several]);
+  state("#18 slope of the kinetic energy", 0.5 * differentiate(V.T() * M * V, *along_several), -(h.T() * outboard * p),
         "∂KE = -h*crf(E*V)p,  p = φMV", "\\partial KE = -h^*\\operatorname{crf}(\\mathcal{E}^*\\mathcal{V})p", constant_hinges, "soa.md #18");
   const Expression alpha = phi.T() * (H.T() * qdd + a), f = phi * (M * alpha + b);
-  const Expression dV = phi.T() * function(motion_cross, E.T() * V) * H.T() * unit(i);
-  const Expression dalpha = phi.T() * (function(motion_cross, E.T() * alpha) * H.T() * unit(i) - function(motion_cross, H.T() * qd) * dV);
-  state("#25 derivative of inverse dynamics", d(H * f),
-        H * phi_tilde * function(momentum_cross_of, f) * H.T() * unit(i) +
+  const Expression dV = phi.T() * function(motion_cross, E.T() * V) * H.T() * e;
+  const Expression dalpha = phi.T() * (function(motion_cross, E.T() * alpha) * H.T() * e - function(motion_cross, H.T() * qd) * dV);
+  state("#25 derivative of inverse dynamics", differentiate(H * f, *along_several),
+        H * phi_tilde * function(momentum_cross_of, f) * H.T() * e +
             H * phi * (M * dalpha + (mechanics(momentum_cross) + mechanics(V_bar) * M) * dV),
         "∂T = Hφ̃𝓕H*e + Hφ(M∂α + (𝓑+V̄M)∂V)", "\\partial T = H\\tilde\\phi\\mathscr{F}H^*e + H\\phi(M\\partial\\alpha+(\\mathscr{B}+\\bar{\\mathcal{V}}M)\\partial\\mathcal{V})",
         constant_hinges, "soa.md #25");
@@ -129,14 +132,14 @@ std::vector<Theorem> calculus_theorems(const std::shared_ptr<MultibodyOperators>
   const Expression C = H * phi * (M * J_dot + 0.5 * (mechanics(momentum_cross) + mechanics(V_bar) * M + M * mechanics(V_tilde)) * jacobian);
   state("ℳ̇ - 2C is skew, ℳ̇ by rule", dot(MM) - 2.0 * C, -(dot(MM) - 2.0 * C).T(), "ℳ̇ - 2C = -(ℳ̇ - 2C)*,  ℳ̇ = d(HφMφ*H*)/dt",
         "\\dot{\\mathcal{M}} - 2C = -(\\dot{\\mathcal{M}} - 2C)^*", no_hypothesis, "soa.md #21");
-  // a coordinate outboard of i where there is one
-  int k = i, body = 0;
-  while (source->structure().dof_offset[body + 1] <= i) ++body;
+  // a coordinate outboard of `many` where there is one
+  int k = many, body = 0;
+  while (source->structure().dof_offset[body + 1] <= many) ++body;
   for (int c = 0; c < source->structure().bodies(); ++c)
     if (source->structure().parent[c] == body && source->structure().dof[c] > 0) k = source->structure().dof_offset[c];
   const auto along_k = coordinate_direction(source, k);
-  state("#22 C is the Christoffel matrix", unit(k).T() * C * unit(i),
-        0.5 * (unit(k).T() * dot(MM) * unit(i) + unit(k).T() * d(MM) * qd - unit(i).T() * differentiate(MM, *along_k) * qd), "C(k,i) = ½ Σ_j (∂_jℳ(k,i) + ∂_iℳ(k,j) - ∂_kℳ(i,j)) θ̇_j",
+  state("#22 C is the Christoffel matrix", unit(k).T() * C * unit(many),
+        0.5 * (unit(k).T() * dot(MM) * unit(many) + unit(k).T() * differentiate(MM, *along_many) * qd - unit(many).T() * differentiate(MM, *along_k) * qd), "C(k,i) = ½ Σ_j (∂_jℳ(k,i) + ∂_iℳ(k,j) - ∂_kℳ(i,j)) θ̇_j",
         "C_{ki} = \\tfrac12\\sum_j(\\partial_j\\mathcal{M}_{ki}+\\partial_i\\mathcal{M}_{kj}-\\partial_k\\mathcal{M}_{ij})\\dot\\theta_j", single_dof, "soa.md #22");
   const Expression m = A * square_root(D), inverse_m = square_root(D).inv() * S, skew = inverse_m * C * inverse_m.T() - dot(m).T() * inverse_m.T();
   state("#23 diagonalised dynamics: S is skew", skew, -skew.T(), "S = m⁻¹Cm⁻* - ṁ*m⁻* = -S*,  m = [I+HφK]D^½",
@@ -148,7 +151,7 @@ std::vector<Theorem> calculus_theorems(const std::shared_ptr<MultibodyOperators>
   const Letters w(std::make_shared<WorldFrame>(source));
   const Expression X = mechanics(X_world);
   state("#53 ∂M'", d(w.M), d(X * M * X.T()), "∂M' = Δ'M' + M'Δ'*  of  M' = XMX*", "\\partial M' = \\Delta'M'+M'\\Delta'^*", no_hypothesis, "soa.md #53");
-  state("#53 ∂H'", d(w.H), d(H * X.inv()), "∂H' = -H'Δ'  of  H' = HX⁻¹", "\\partial H' = -H'\\Delta'", constant_hinges, "soa.md #53");
+  state("#53 ∂H'", d(w.H), d(H * X.inv()), "∂H' = ∂(HX⁻¹)", "\\partial H' = \\partial(HX^{-1})", no_hypothesis, "soa.md #53");
   state("#54 ∂P' and ∂P", d(w.P), X * differentiate_in_world(P, *along_i) * X.T(), "∂P' = X(∂P + ΔP + PΔ*)X*", "\\partial P' = X(\\partial P+\\hat\\Delta P+P\\hat\\Delta^*)X^*",
         no_hypothesis, "soa.md #54");
   return list;

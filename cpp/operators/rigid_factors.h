@@ -21,7 +21,7 @@ class RigidFactors {
     for (int c = 0; c < 6; ++c) factors_.add(k, own.weight[c], S(0), [&](int i) { return own.column[c][i]; });
   }
   // The gyroscopic force of body k as accelerations of its own columns, and what is left of it as a force.
-  Vector6<S> start_bias(int k, const InertiaFactors<S>& own, const Vector6<S>& V) { return gyroscopic_bias(own, V, factors_.bias_row(k)); }
+  Vector6<S> start_bias(int k, const InertiaFactors<S>& own, const Vector3<S>& omega) { return gyroscopic_bias(own, omega, factors_.bias_row(k)); }
   // ρ <- ρ - C* a
   void add_acceleration(int k, const Vector6<S>& a) {
     S* rho = factors_.bias_row(k);

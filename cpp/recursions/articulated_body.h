@@ -5,6 +5,8 @@
 //                 ε(k) = T(k) - H(k) z(k),   ν(k) = D(k)⁻¹ ε(k),   z⁺(k) = z(k) + G(k) ε(k)
 //   base to tip:  α⁺(k) = E(p,k)* α(p),   θ̈(k) = ν(k) - G(k)* α⁺(k),   α(k) = α⁺(k) + H(k)* θ̈(k) + a(k),   α(base) = -g
 //
+// with α, a and b those of points (recursions/point_accelerations.h): the equations are the same for these and for the book's.
+//
 // In the factored forms P = C W C* and z = y - C W ρ*: of the forces that go with an inertia only accelerations ρ of its columns are kept,
 // so that a heavy body's do not drown a light one's. Per body ρ(k) = -b(k) in its own columns, ρ⁺ what is left of ρ - a*C beside the
 // hinge's rows, and
@@ -18,7 +20,7 @@
 
 #include "algebra/sweeps/articulated_inertia.h"
 #include "operators/rigid_blocks.h"
-#include "recursions/velocities.h"
+#include "recursions/point_accelerations.h"
 
 namespace pycraft {
 
@@ -31,9 +33,10 @@ void refuse_pivots(const SkoStructure& tree, RigidBlocks<S>& blocks, int last) {
     articulated_inertia_tip_to_base(tree, blocks);
 }
 
-// z, alpha: scratch, one Vector6 per body. Returns the largest of the terms that made up vdot. Throws SingularHingeError.
+// z, alpha: scratch, one Vector6 per body. vdot is θ̈ + x where hinges absorb their own terms x. Returns the largest of the terms that made up
+// vdot. Throws SingularHingeError.
 template <class S>
-S articulated_body(const SkoStructure& tree, const CompiledModel<S>& model, RigidBlocks<S>& blocks, const Velocities<S>& velocities, const S* T, S* vdot,
+S articulated_body(const SkoStructure& tree, const CompiledModel<S>& model, RigidBlocks<S>& blocks, const PointAccelerations<S>& points, const S* T, S* vdot,
                    std::vector<Vector6<S>>& z, std::vector<Vector6<S>>& alpha) {
   const bool factored = blocks.form != Form::fast;
   blocks.keep_inertias = false;
@@ -41,16 +44,16 @@ S articulated_body(const SkoStructure& tree, const CompiledModel<S>& model, Rigi
   bool doubtful = false;
   for (int k = 0; k < model.bodies; ++k) {
     blocks.start_articulated(k);
-    z[k] = factored ? blocks.factors().start_bias(k, model.inertia_factors[k], velocities.V[k]) : velocities.b[k];
+    z[k] = factored ? blocks.factors().start_bias(k, model.inertia_factors[k], points.angular_velocity[k]) : points.b[k];
   }
   for (int k = model.bodies - 1; k >= 0; --k) {
     const int p = model.parent[k], first = model.v_offset[k], n = model.nv_of[k];
-    if (factored) blocks.factors().add_acceleration(k, velocities.a[k]);
+    if (factored) blocks.factors().add_acceleration(k, points.a[k]);
     const Pivots found = blocks.eliminate_hinge(k);
     if (found == Pivots::not_positive) refuse_pivots(tree, blocks, k);
     doubtful |= found == Pivots::doubtful;
     Vector6<S> zk = z[k];
-    if (!factored) zk = zk + blocks.P[k] * velocities.a[k];
+    if (!factored) zk = zk + blocks.P[k] * points.a[k];
     Vector6<S> plus = zk;
     for (int j = first; j < first + n; ++j) {
       const S epsilon = T[j] - dot(blocks.H[j], zk);
@@ -70,7 +73,7 @@ S articulated_body(const SkoStructure& tree, const CompiledModel<S>& model, Rigi
   for (int k = 0; k < model.bodies; ++k) {
     const int p = model.parent[k], first = model.v_offset[k], n = model.nv_of[k];
     const Vector6<S> outboard = motion_to_child(blocks.pose[k], p < 0 ? base : alpha[p]);
-    Vector6<S> acceleration = outboard + velocities.a[k];
+    Vector6<S> acceleration = outboard + points.a[k];
     for (int j = first; j < first + n; ++j) {
       using std::abs;
       largest = maximum(largest, S(abs(vdot[j])));

@@ -3,34 +3,57 @@
 //   base to tip:  α(k) = E(p,k)* α(p) + H(k)* θ̈(k) + a(k),   α(base) = -g
 //   tip to base:  f(k) = M(k) α(k) + b(k) + Σ_{children c} E(k,c) f(c),   T(k) = H(k) f(k) + J(k) θ̈(k)
 //
-// a, b from recursions/velocities.h. vdot may be null (zero): T is then the bias 𝒞 (Coriolis, gyroscopic and gravity forces).
+// with α, a and b those of points (recursions/point_accelerations.h): the equations are the same for these and for the book's. vdot is θ̈ + x
+// where hinges absorb their own terms x. It may be null (zero): T is then the bias 𝒞 (Coriolis, gyroscopic and gravity forces).
 // Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, the Newton-Euler inverse dynamics algorithm. Cost O(N).
 #pragma once
 
 #include <vector>
 
 #include "operators/rigid_blocks.h"
-#include "recursions/velocities.h"
+#include "recursions/point_accelerations.h"
 
 namespace pycraft {
 
 // alpha, f: scratch, one Vector6 per body; f holds the interbody forces afterwards (the hinge's on body k, in k's frame).
 template <class S>
-void newton_euler(const CompiledModel<S>& model, const RigidBlocks<S>& blocks, const Velocities<S>& velocities, const S* vdot, S* T,
+void newton_euler(const CompiledModel<S>& model, const RigidBlocks<S>& blocks, const PointAccelerations<S>& points, const S* vdot, S* T,
                   std::vector<Vector6<S>>& alpha, std::vector<Vector6<S>>& f) {
   const Vector6<S> base{Vector3<S>::zero(), -model.gravity};
   for (int k = 0; k < model.bodies; ++k) {
     const int p = model.parent[k], first = model.v_offset[k], n = model.nv_of[k];
-    Vector6<S> acceleration = motion_to_child(blocks.pose[k], p < 0 ? base : alpha[p]) + velocities.a[k];
+    Vector6<S> acceleration = motion_to_child(blocks.pose[k], p < 0 ? base : alpha[p]) + points.a[k];
     if (vdot)
       for (int j = first; j < first + n; ++j) acceleration = acceleration + vdot[j] * blocks.H[j];
     alpha[k] = acceleration;
-    f[k] = blocks.inertia[k] * acceleration + velocities.b[k];
+    f[k] = blocks.inertia[k] * acceleration + points.b[k];
   }
   for (int k = model.bodies - 1; k >= 0; --k) {
     const int p = model.parent[k], first = model.v_offset[k], n = model.nv_of[k];
     for (int j = first; j < first + n; ++j) T[j] = dot(blocks.H[j], f[k]) + (vdot ? blocks.J[j] * vdot[j] : S(0));
     if (p >= 0) f[p] = f[p] + force_to_parent(blocks.pose[k], f[k]);
+  }
+}
+
+// r = τ - T of the same equations, motions in S and forces gathered in a wider T: M α + b of inertias given in T. f in S as above.
+template <class S, class T, class U>
+void newton_euler_residual_gathered(const CompiledModel<S>& model, const RigidBlocks<S>& blocks, const PointAccelerations<S>& points, const S* vdot, const U* tau, S* r,
+                                    std::vector<Vector6<S>>& alpha, std::vector<Vector6<S>>& f, std::vector<Vector6<T>>& wide) {
+  const Vector6<S> base{Vector3<S>::zero(), -model.gravity};
+  wide.resize(model.bodies);
+  for (int k = 0; k < model.bodies; ++k) {
+    const int p = model.parent[k], first = model.v_offset[k], n = model.nv_of[k];
+    Vector6<S> acceleration = motion_to_child(blocks.pose[k], p < 0 ? base : alpha[p]) + points.a[k];
+    for (int j = first; j < first + n; ++j) acceleration = acceleration + vdot[j] * blocks.H[j];
+    alpha[k] = acceleration;
+    const RigidInertia<T>& M = (*blocks.wide_inertia)[k];
+    wide[k] = M * cast<T>(acceleration) + gyroscopic_part(M, cast<T>(points.angular_velocity[k]));
+  }
+  for (int k = model.bodies - 1; k >= 0; --k) {
+    const int p = model.parent[k], first = model.v_offset[k], n = model.nv_of[k];
+    f[k] = cast<S>(wide[k]);
+    for (int j = first; j < first + n; ++j) r[j] = static_cast<S>(T(tau[j]) - dot(cast<T>(blocks.H[j]), wide[k]) - T(blocks.J[j]) * T(vdot[j]));
+    if (p >= 0) wide[p] = wide[p] + force_to_parent(cast<T>(blocks.pose[k]), wide[k]);
   }
 }
 

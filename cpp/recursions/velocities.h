@@ -1,8 +1,12 @@
-// Velocities, base to tip, and the velocity-dependent terms of the equations of motion:
+// Velocities, base to tip, and the velocity-dependent terms of the equations of motion as the book's operators have them:
 //
 //   V(k) = E(p,k)* V(p) + H(k)* θ̇(k)
 //   a(k) = Ṽ(k) H(k)* θ̇(k) + Ḣ(k)* θ̇(k)        Coriolis acceleration (Ḣ: hinges of several subhinges only)
 //   b(k) = V̄(k) M(k) V(k)                        gyroscopic force
+//
+// Of V = V⁻ + H*θ̇, V⁻ = E*V(p), only V⁻ counts in a, as V_r × V_r = 0; and b = (ω × Iω + h × (ω × v); ω × (ω × h + m v)), as v × mv = 0 and
+// by Jacobi's identity: no square of a velocity is formed that cancels. Direct calls do without the rest of v too
+// (recursions/point_accelerations.h).
 //
 // Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, the equations-of-motion chapter. Cost O(N).
 #pragma once
@@ -37,11 +41,16 @@ void velocities_base_to_tip(const CompiledModel<S>& model, const Pose<S>* pose, 
     } else {
       for (int j = f; j < f + n; ++j) out.H_dot[j] = Vector6<S>::zero();
     }
-    const Vector6<S> V = p < 0 ? relative : motion_to_child(pose[k], out.V[p]) + relative;
-    out.V[k] = V;
-    out.relative[k] = relative;
-    out.a[k] = cross_motion(V, relative) + rate;
-    out.b[k] = cross_force(V, model.inertia[k] * V);
+    out.V[k] = out.relative[k] = relative;
+    out.a[k] = rate;
+    if (p >= 0) {
+      const Vector6<S> carried = motion_to_child(pose[k], out.V[p]);
+      out.V[k] = carried + relative;
+      out.a[k] = out.a[k] + cross_motion(carried, relative);
+    }
+    const RigidInertia<S>& M = model.inertia[k];
+    const Vector3<S>&omega = out.V[k].angular, &linear = out.V[k].linear;
+    out.b[k] = {cross(omega, M.rotational * omega) + cross(M.moment, cross(omega, linear)), cross(omega, cross(omega, M.moment) + M.mass * linear)};
   }
 }
 

@@ -97,7 +97,7 @@ class TidyTable:
 
         from rich.console import Console
 
-        console = Console(file=StringIO(), width=140, color_system=None)
+        console = Console(file=StringIO(), width=140, color_system=None, force_jupyter=False)
         console.print(self.table())
         return console.file.getvalue().rstrip()  # type: ignore[attr-defined]
 

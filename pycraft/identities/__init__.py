@@ -1,5 +1,7 @@
 """Theorems: the checker, a user's own statements, the search for counterexamples, reports. The theorems themselves are the core's."""
 
 from .checker import check, check_model
+from .judge import UndecidedError
+from .truth import TruthMap, truth
 
-__all__ = ["check", "check_model"]
+__all__ = ["TruthMap", "UndecidedError", "check", "check_model", "truth"]

@@ -8,8 +8,9 @@ through F₁…Fᵢ₋₁; so the product is off by at most
 with c the number of roundings that an entry meets in one sweep: six products a body, along a path of the tree. A resolvent φ rounds at
 every body of the sweep: ‖F₁…φ‖‖E‖‖φ…Fₘ‖. An inverse X⁻¹ passes the error of X on: ‖F₁…X⁻¹‖ size(X) ‖X⁻¹…Fₘ‖. A sum adds. Values of the
 Riccati sweep (P, D, G, K, ψ, Υ, Ω) carry that sweep's rounding: the downdate P⁺ = P - GDG* rounds at the size of P, so D(k) at that of
-H(M + EPE*)H* + J, the inertia it would have with the next hinges outboard locked; the largest ratio of that to D amplifies. Residuals are
-judged relative to the larger side.
+H(M + EPE*)H* + J, the inertia it would have with the next hinges outboard locked. Its terms may be larger than itself, far from the
+hinge; see `Sizes.amplification`. The largest ratio of that to D amplifies, in the frame in which each
+sweep is made. Residuals are judged relative to the larger side, numbers relative to their terms.
 """
 
 from __future__ import annotations
@@ -28,16 +29,18 @@ CONSTANT = 4.0
 
 _NUMBERS = _core.euclidean(1)
 """The domain of a vector."""
+_TRACE, _LOGDET, _SCALED = 1, 2, 5
+"""Kinds of scalar expressions, as the core numbers them."""
 _RICCATI = {"P", "P_plus", "D", "G", "K", "tau", "tau_bar", "E_psi", "psi", "psi_tilde", "Upsilon", "Omega", "Lambda"}
 
 
 class Sizes:
     """Norms of expressions at one state, remembered; and what rounding makes of them."""
 
-    def __init__(self, bind: Callable[[_core.Operator], _core.Operator], operators: Any):
-        self._bind, self._operators = bind, operators
+    def __init__(self, bind: Callable[[_core.Operator], _core.Operator]):
+        self._bind = bind
         self._norms: dict[Any, float] = {}
-        self._amplification: float | None = None
+        self._amplification: dict[Any, float] = {}
         self._vectors: dict[str, Any] = {}
 
     def give(self, vectors: dict[str, Any]) -> None:
@@ -104,7 +107,7 @@ class Sizes:
             own = self.size(base.children[0])
             return self._product(factors[: i + 1]) * own * self._product(factors[i:])
         elif base.name in ("phi", "psi", "phi_tilde", "psi_tilde"):
-            edge = self.norm(self._operators.E if base.name.startswith("phi") else self._operators.E_psi)
+            edge = self.norm(base.sources[0].symbol("E" if base.name.startswith("phi") else "E_psi"))
             # a bare resolvent: its own norm counts once for the sweep that made it
             return max(self._product(factors[: i + 1]) * edge * self._product(factors[i:]), self._product(factors))
         elif base.kind in ("blockdiag", "sqrt"):
@@ -126,25 +129,52 @@ class Sizes:
         if operand is None:
             if not terms:
                 return abs(value)
-            return (abs(value) if kind == 5 else 1.0) * sum(self._scalar(t) for t in terms)
-        if kind == 2:  # ln|det X| moves by tr(X⁻¹ δX)
+            return (abs(value) if kind == _SCALED else 1.0) * sum(self._scalar(t) for t in terms)
+        if kind == _LOGDET:  # ln|det X| moves by tr(X⁻¹ δX)
             return max(1.0, self.size(operand) * self.norm(operand.inv()))
         return self.size(operand)
 
-    def amplification(self) -> float:
-        """max over coordinates of diag(H(M + EPE*)H* + J) · diag(D⁻¹)."""
-        if self._amplification is None:
-            H, M, E, P, J, D = self._operators("H M E P J D")
-            locked, free = self._bind(H @ (M + E @ P @ E.T) @ H.T + J).diagonal(), self._bind(D.inv()).diagonal()
-            self._amplification = float(max([1.0, *(np.abs(locked) * np.abs(free))]))
-        return self._amplification
+    def terms(self, side: _core.Scalar) -> float:
+        """The size of what a number is a sum of: the diagonal of a trace, one for a logarithm, by which a relative error moves it."""
+        kind, value, operand, terms = side._parts()
+        if operand is None:
+            if not terms:
+                return abs(value)
+            return (abs(value) if kind == _SCALED else 1.0) * sum(self.terms(t) for t in terms)
+        if kind == _TRACE:
+            return float(self._diagonal(operand).sum())
+        if kind == _LOGDET:
+            return max(1.0, abs(float(self._bind(operand).logdet())))
+        return self.norm(operand)
 
-    def sweep(self) -> float:
-        """Roundings that an entry meets in one sweep: six products a body along the longest path to the base."""
-        depth: list[int] = []
-        for parent in self._operators._source.parents:
-            depth.append(depth[parent] + 1 if parent >= 0 else 1)
-        return 6.0 * max([1, *depth])
+    def amplification(self, source: Any) -> float:
+        """max over coordinates j of ((Σ_a |H(j,a)| √L(a,a))² + J(j,j)) D⁻¹(j,j), L = M + EPE*: the rounding of D over D."""
+        if source not in self._amplification:
+            H, M, E, P, J, D = (source.symbol(name) for name in ("H", "M", "E", "P", "J", "D"))
+            locked = np.sqrt(self._diagonal(M + E @ P @ E.T))
+            sizes = [where.stop - where.start for _, where, _ in M.codomain.blocks]
+            columns = np.zeros((len(locked), max(sizes, default=0)))  # entry a of every body in column a: H has one block in a row
+            columns[np.arange(len(locked)), [a for size in sizes for a in range(size)]] = 1
+            rows = np.abs(np.asarray(self._bind(H) @ columns, float))
+            largest = (columns * locked[:, None]).max(axis=0)
+            bodies = {body: where for _, where, body in M.codomain.blocks}
+            reach = rows @ largest  # where hinges are not numbered as the bodies are
+            for _, hinge, body in H.codomain.blocks if len(bodies) == len(H.codomain.blocks) else ():
+                reach[hinge] = rows[hinge, : bodies[body].stop - bodies[body].start] @ locked[bodies[body]]
+            felt = reach**2 + self._diagonal(J)
+            self._amplification[source] = float(max([1.0, *(felt * self._diagonal(D.inv()))]))
+        return self._amplification[source]
+
+    def _diagonal(self, operator: _core.Operator) -> np.ndarray:
+        return np.abs(np.asarray(self._bind(operator).diagonal(), float))
+
+
+def sweep(source: Any) -> float:
+    """Roundings that an entry meets in one sweep: six products a body along the longest path to the base."""
+    depth: list[int] = []
+    for parent in source.parents:
+        depth.append(depth[parent] + 1 if parent >= 0 else 1)
+    return 6.0 * max([1, *depth])
 
 
 def _has_vectors(operator: _core.Operator) -> bool:
@@ -168,21 +198,33 @@ def _norm(operator: _core.Operator) -> float:
     return float(np.linalg.norm(operator @ probes(n)) / np.sqrt(PROBES))
 
 
-def uses_riccati(side: Any) -> bool:
-    """Whether a side mentions a value that the Riccati sweep makes."""
+def sources(side: Any, riccati: bool = False) -> list[Any]:
+    """The models whose letters a side mentions; only values that the Riccati sweep makes, if `riccati`."""
     if isinstance(side, _core.Scalar):
-        return any(uses_riccati(e) for e in side.operands())
+        return [s for e in side.operands() for s in sources(e, riccati)]
     if not isinstance(side, _core.Operator):
-        return False
-    return (side.name in _RICCATI) or any(uses_riccati(c) for c in side.children)
+        return []
+    if not side.children:
+        return list(side.sources) if not riccati or side.name in _RICCATI else []
+    return [s for c in side.children for s in sources(c, riccati)]
 
 
-def growth(lhs: Any, rhs: Any, sizes: Sizes) -> float:
-    """What the Riccati sweep makes of its roundings, where a side mentions a value of it."""
-    return sizes.amplification() if uses_riccati(lhs) or uses_riccati(rhs) else 1.0
+class Roundings:
+    """What rounding can make of the difference of two sides, from norms at one state.
 
+    Attributes
+    ----------
+    size : the errors of both sides per unit of c · eps, without what the Riccati sweep makes of them
+    terms : of numbers, the size of what they are sums of; 0 of operators
+    growth : what the Riccati sweep makes of its roundings, 1 where no side mentions a value of it
+    """
 
-def relative_bound(lhs: Any, rhs: Any, sizes: Sizes, scale: float, precision: str | int) -> float:
-    """The bound on |lhs - rhs| relative to `scale`, the larger side's largest entry."""
-    size = sizes.size(lhs) + sizes.size(rhs)
-    return CONSTANT * sizes.sweep() * EPSILON[precision] * max(1.0, size / max(scale, 1e-300)) * growth(lhs, rhs, sizes)
+    def __init__(self, lhs: Any, rhs: Any, sizes: Sizes):
+        self.size = sizes.size(lhs) + sizes.size(rhs)
+        self.terms = max(sizes.terms(lhs), sizes.terms(rhs)) if isinstance(lhs, _core.Scalar) else 0.0
+        self.growth = max([1.0, *(sizes.amplification(s) for s in dict.fromkeys(sources(lhs, True) + sources(rhs, True)))])
+        self._sweep = max([6.0, *(sweep(s) for s in dict.fromkeys(sources(lhs) + sources(rhs)))])
+
+    def bound(self, relative_size: float, precision: str | int) -> float:
+        """The bound on |lhs - rhs| over a scale, `relative_size` the size over that scale."""
+        return CONSTANT * self._sweep * EPSILON[precision] * max(1.0, relative_size) * self.growth

@@ -51,6 +51,11 @@ class PaperReport:
         return any(e.verdict == "holds" for e in self.equations) and not any(e.verdict in ("fails", "undecided") for e in self.equations)
 
     @property
+    def status(self) -> int:
+        """Exit status of a command: 0 if all that was read holds, 1 if something fails or nothing was read, 3 if something is undecided."""
+        return 0 if self else 3 if "undecided" in self.counts and "fails" not in self.counts else 1
+
+    @property
     def counts(self) -> dict[str, int]:
         found: dict[str, int] = {}
         for e in self.equations:
@@ -99,7 +104,7 @@ def check_paper(
     from .checker import check
 
     source = _read(Path(path))
-    found = []
+    found: list[Equation] = []
     for line, latex in equations(source):
         if progress is not None:
             progress(f"line {line}")
@@ -155,7 +160,8 @@ def _rows(body: str, line: int, macros: dict[str, tuple[int, str]]) -> Iterator[
     for piece in re.split(r"(\\\\(?:\[[^\]]*\])?)", body):
         if not piece.startswith("\\\\"):
             text = _plain(_expanded(piece, macros))
-            begins = re.match(r"(\s|\\label\{[^{}]*\}|\\begin\{[a-z]+\})*", piece).end()  # type: ignore[union-attr] - it always matches
+            before = re.match(r"(\s|\\label\{[^{}]*\}|\\begin\{[a-z]+\})*", piece)
+            begins = before.end() if before else 0
             start = line + body.count("\n", 0, at + begins)
             for part in _apart(text):
                 rows.append((start, part))

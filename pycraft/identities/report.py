@@ -1,4 +1,4 @@
-"""Reports: the theorem table for people (rich) and for programs (JSON)."""
+"""Reports: what was found for every theorem (`soa.check`) and for a user's own statement (`pycraft.check`)."""
 
 from __future__ import annotations
 
@@ -6,14 +6,24 @@ import json
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from .judge import FAILS, HOLDS, UNDECIDED, UndecidedError, Verdict
+from .tables import WIDTH, findings_table, monospace, precision_text, text_of, wrapped
+
+OPEN = ("fails", "undecided", "undefined")
+"""Verdicts that say that something is wrong, or not known."""
+PASSED = ("holds", "expected to fail", "holds anyway", "waiting", "undefined")
+
 
 @dataclass
 class Finding:
-    """What was found for one theorem: worst residual in double and in the wider scalar, the bounds they are judged against, the verdict.
+    """What was found for one theorem: the verdict, and the residual and bound that it rests on.
 
-    Verdicts: "holds", "fails", "undecided" (the bound is above 1e-6 even in the wider scalar), "expected to fail" (outside its
-    hypotheses, and it does, or asks for an inverse that does not exist: then `note` says so and there is no residual), "holds anyway"
-    (outside its hypotheses, and it does not fail), "undefined" (an inverse in it does not exist), "waiting" (not evaluated yet).
+    Verdicts: "holds", "fails", "undecided" (no scalar up to the widest decides), "expected to fail" (outside its hypotheses, and it
+    does, or asks for an inverse that does not exist: then `note` says so and there is no residual), "holds anyway" (outside its
+    hypotheses, and it does not fail), "undefined" (an inverse in it does not exist), "waiting" (not evaluated yet).
+
+    `residual` and `bound` are the largest in double, `wide_residual` and `wide_bound` those of the deciding state in `wide_precision`,
+    the scalar that decided. They are relative to the larger side, of numbers to their terms.
     """
 
     name: str
@@ -32,14 +42,28 @@ class Finding:
     seconds: float = 0.0
     note: str = ""
 
+    def judged(self, found: Verdict) -> None:
+        """Take over what was found at some states."""
+        decisive = found.shown.decisive
+        self.verdict, self.states = found.verdict, found.states
+        self.residual, self.bound = found.residual, found.bound
+        self.wide_residual, self.wide_bound, self.wide_precision = decisive.residual, decisive.bound, decisive.precision
+        if found.zero:
+            self.note = "both sides are zero here"
+
     @property
     def passed(self) -> bool:
-        return self.verdict in ("holds", "expected to fail", "holds anyway", "waiting", "undecided", "undefined")
+        return self.verdict in PASSED
 
 
 @dataclass
 class Report:
-    """The findings on one model. True if nothing that should hold fails; `.worst` is the largest residual of what holds."""
+    """The findings on one model.
+
+    As a condition: true if all that should hold does, false if something fails that should hold; UndecidedError where nothing fails and
+    something is undecided. `.status` says the same as an exit status, 0, 1 or 3. Printed, it is the summary and the exceptions;
+    `.full()` has every theorem.
+    """
 
     model: str
     traits: dict[str, bool]
@@ -47,17 +71,27 @@ class Report:
     seconds: float = 0.0
 
     def __bool__(self) -> bool:
-        return all(f.passed for f in self.findings)
+        if self.undecided and not self.failed:
+            raise UndecidedError(f"{self.model}: undecided in every precision tried: {', '.join(f.name for f in self.undecided)}")
+        return not self.failed
+
+    @property
+    def status(self) -> int:
+        """0 where all that should hold does, 1 where something fails, 3 where nothing fails and something is undecided."""
+        return 1 if self.failed else 3 if self.undecided else 0
 
     @property
     def worst(self) -> float:
-        """Worst residual of what holds: in double where double decides (a bound below 1e-6), else in the wider scalar."""
-        held = (f for f in self.findings if f.verdict == "holds")
-        return max((f.residual if f.bound <= 1e-6 else f.wide_residual for f in held), default=0.0)
+        """The largest residual of what holds, in double."""
+        return max((f.residual for f in self.findings if f.verdict == HOLDS), default=0.0)
 
     @property
     def failed(self) -> list[Finding]:
-        return [f for f in self.findings if not f.passed]
+        return [f for f in self.findings if not f.passed and f.verdict != UNDECIDED]
+
+    @property
+    def undecided(self) -> list[Finding]:
+        return [f for f in self.findings if f.verdict == UNDECIDED]
 
     def counts(self) -> dict[str, int]:
         counts: dict[str, int] = {}
@@ -71,67 +105,24 @@ class Report:
             indent=1,
         )
 
-    def table(self):
-        """The findings as a rich table."""
-        from rich.table import Table
-        from rich.text import Text
-
-        wide = next((str(f.wide_precision) for f in self.findings if f.states), "extended")
-        table = Table(title=Text(f"Theorems on {self.model}"), title_justify="left", box=None, pad_edge=False, header_style="bold")
-        for header, justify in (
-            ("theorem", "left"),
-            ("hypotheses", "left"),
-            ("double", "right"),
-            (wide, "right"),
-            ("bound", "right"),
-            ("verdict", "left"),
-            ("ms", "right"),
-        ):
-            table.add_column(header, justify=justify, no_wrap=header in ("double", "bound", wide, "ms"), overflow="fold")
-        group = None
-        style = {
-            "holds": "green",
-            "fails": "bold red",
-            "undecided": "yellow",
-            "expected to fail": "cyan",
-            "holds anyway": "green",
-            "waiting": "dim",
-            "undefined": "yellow",
-        }
-        for f in self.findings:
-            if f.group != group:
-                group = f.group
-                table.add_row(Text(group, style="bold underline"))
-            hypotheses = Text(", ".join(f.hypotheses))
-            if not f.states:
-                reason = f"{', '.join(f.unmet)} not met, an inverse does not exist" if f.unmet else "an inverse does not exist"
-                text = f"waits for {f.note}" if f.verdict == "waiting" else f"{f.verdict}: {reason}"
-                table.add_row(Text("  " + f.statement), hypotheses, "", "", "", Text(text, style=style[f.verdict]), "")
-                continue
-            verdict = f.verdict + (f": {', '.join(f.unmet)} not met" if f.unmet else "")
-            table.add_row(
-                Text("  " + f.statement),
-                hypotheses,
-                f"{f.residual:.1e}",
-                f"{f.wide_residual:.1e}" + ("q" if f.wide_precision == "quad" and wide != "quad" else ""),
-                f"{f.bound:.0e}",
-                Text(verdict, style=style[f.verdict]),
-                f"{1e3 * f.seconds:.0f}",
-            )
-        return table
+    def table(self, full: bool = True) -> Any:
+        """The findings as a rich table; without `full` only those that do not simply hold."""
+        return findings_table([f for f in self.findings if full or f.verdict not in (HOLDS, "holds anyway")])
 
     def summary(self) -> str:
-        parts = [f"{n} {verdict}" for verdict, n in self.counts().items()]
-        return f"{self.model}: " + ", ".join(parts) + f"; worst residual of what holds {self.worst:.1e}; {self.seconds:.1f} s"
+        """How many of each verdict, in one or two lines; what is wrong comes first."""
+        counts = self.counts()
+        order = sorted(counts, key=lambda verdict: (verdict not in OPEN, verdict == "waiting", -counts[verdict]))
+        known = f"largest residual of what holds {self.worst:.1e} in double, {self.seconds:.1f} s"
+        return f"{self.model}: " + ", ".join(f"{counts[verdict]} {verdict}" for verdict in order) + f"\n{known}"
+
+    def full(self) -> str:
+        """Every theorem as text, in 80 columns."""
+        return f"{self.summary()}\n\n{text_of(self.table())}"
 
     def __repr__(self) -> str:
-        from io import StringIO
-
-        from rich.console import Console
-
-        console = Console(file=StringIO(), width=150, color_system=None)
-        console.print(self.table())
-        return console.file.getvalue() + "\n" + self.summary()  # type: ignore[attr-defined]
+        exceptions = text_of(self.table(full=False))
+        return f"{self.summary()}\n\n{exceptions}" if exceptions else self.summary()
 
     def _repr_html_(self) -> str:
         from html import escape
@@ -153,7 +144,7 @@ class Report:
             numbers = (
                 "<td></td><td></td><td></td>"
                 if not f.states
-                else f"<td>{f.residual:.1e}</td><td>{f.wide_residual:.1e}</td><td>{f.bound:.0e}</td>"
+                else f"<td>{f.residual:.1e}</td><td>{f.wide_residual:.1e} ({f.wide_precision})</td><td>{f.wide_bound:.0e}</td>"
             )
             note = f" ({escape(', '.join(f.unmet))} not met)" if f.unmet else f" ({escape(f.note)})" if f.note else ""
             rows.append(
@@ -161,38 +152,80 @@ class Report:
                 f"<td style='text-align:left'>{escape(', '.join(f.hypotheses))}</td>{numbers}"
                 f"<td style='text-align:left;color:{color[f.verdict]}'>{f.verdict}{note}</td></tr>"
             )
-        head = "<tr><th>theorem</th><th>hypotheses</th><th>double</th><th>extended</th><th>bound</th><th>verdict</th></tr>"
+        head = "<tr><th>theorem</th><th>hypotheses</th><th>double</th><th>decided</th><th>bound</th><th>verdict</th></tr>"
         return f"<p><b>{escape(self.summary())}</b></p><table style='font-size:85%'>{head}{''.join(rows)}</table>"
 
 
 @dataclass
 class CheckReport:
-    """The outcome of `pycraft.check`: true where the statement held at every state.
+    """The outcome of `pycraft.check`: true as a condition where the statement holds at every state, false where it fails at one.
 
-    `.counterexample` is the smallest refutation found of a false one.
+    Where neither is seen in the widest scalar, its `verdict` is "undecided" and as a condition it raises UndecidedError: what is not
+    decided is not true. `.counterexample` is the smallest refutation found of a false statement.
     """
 
     statement: str
-    held: bool
+    verdict: str
     worst: float
+    """The largest residual in double, relative."""
     bound: float
+    """The bound on it."""
     states: int
     models: list[str]
+    precision: str | int = "extended"
+    """The scalar that decided, the widest that was needed."""
+    residual: float = 0.0
+    residual_bound: float = 0.0
+    """The residual and the bound in that scalar, at the state that decided."""
     counterexample: Any = None
-    undecided: bool = False
+    true_where: list[frozenset[str]] = field(default_factory=list)
+    """Standard hypotheses under which a false statement is true, the weakest first; each set is enough."""
     notes: list[str] = field(default_factory=list)
 
+    @classmethod
+    def of(cls, statement: str, found: Verdict, models: list[str]) -> CheckReport:
+        """The report of a verdict."""
+        decisive = found.shown.decisive
+        report = cls(statement, found.verdict, found.residual, found.bound, found.states, models)
+        report.precision, report.residual, report.residual_bound = decisive.precision, decisive.residual, decisive.bound
+        if found.zero:
+            report.notes.append("both sides are zero at every state: nothing was compared")
+        return report
+
+    @property
+    def held(self) -> bool:
+        return self.verdict == HOLDS
+
+    @property
+    def undecided(self) -> bool:
+        return self.verdict == UNDECIDED
+
     def __bool__(self) -> bool:
+        if self.undecided:
+            raise UndecidedError(f"{self.statement} is undecided: in {self._decisive()}")
         return self.held
+
+    def _decisive(self) -> str:
+        return f"{precision_text(self.precision)} the residual is {self.residual:.1e} (bound {self.residual_bound:.0e})"
+
+    def _headline(self) -> str:
+        from .truth import in_words
+
+        if self.true_where:
+            said = ", or where ".join(in_words(chosen) for chosen in self.true_where)
+            return f"TRUE where {said}; FALSE elsewhere"
+        met = self.counterexample.meets if self.counterexample is not None else ()
+        return f"FALSE, also where {in_words(met)}" if met else "FALSE"
 
     def __repr__(self) -> str:
         on = self.models[0] if len(self.models) == 1 else f"{len(self.models)} models"
-        if self.held:
-            word = "undecided" if self.undecided else "holds"
-            text = f"{self.statement}\n  {word} on {on}, {self.states} states: "
-            text += f"worst relative residual {self.worst:.1e} (bound {self.bound:.0e})"
+        lines = [monospace(self.statement)]
+        if self.verdict == FAILS:
+            lines.append(f"  {self._headline()}")
+            lines.append(f"  worst relative residual {self.worst:.1e}; in {self._decisive()}")
+            lines += [repr(self.counterexample)] if self.counterexample is not None else []
         else:
-            text = f"{self.statement}\n  FALSE: relative residual {self.worst:.1e} (bound {self.bound:.0e})"
-            if self.counterexample is not None:
-                text += f"\n{self.counterexample}"
-        return text + "".join(f"\n  {note}" for note in self.notes)
+            lines.append(f"  {self.verdict.upper() if self.undecided else self.verdict} on {on}, {self.states} states")
+            lines.append(f"  worst relative residual {self.worst:.1e}, in {self._decisive()}")
+        lines += [f"  {note}" for note in self.notes]
+        return "\n".join(wrapped(line) if len(line) > WIDTH else line for part in lines for line in part.split("\n"))

@@ -1,81 +1,197 @@
-"""The smallest refutation of a false statement, and the hypothesis that would save it.
+"""The smallest refutation of a false statement.
 
-Models are tried in order of size: by bodies, then degrees of freedom. For a number of bodies every tree shape is tried with every
-choice of hinge kinds, without and then with rotor inertia, `STATES` seeded states each, so that the first refutation found is smallest by
-(bodies, degrees of freedom) among all that were tried. Welds count as kinds: they are kept, as bodies without a coordinate. Models of
-welds alone are left out, as they have no state.
+A refutation that was found is made smaller as long as it refutes: bodies are left out, hinges made simpler, rotor inertias taken away. Then
+everything that is smaller still is tried in order of (bodies, degrees of freedom): every tree shape with every choice of hinge kinds,
+without and then with rotor inertia, `STATES` seeded states each, so that the first refutation is the smallest among all that were tried.
+Welds count as kinds: they are kept, as bodies without a coordinate. Models of welds alone are left out, as they have no state. Models that
+have not what the statement names say nothing, and are passed over.
 """
 
 from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from .. import _core
-from ..models.generators import tree
-from .parse import Statement, Statements
-from .report import CheckReport
+from ..models.state import State
+from .family import DOF, HYPOTHESES, Spec, family, named_vectors, read_on
+from .judge import FAILS, BoundState, Verdict, judge, ladder
+from .parse import Statement
+from .tables import wrapped
+
+__all__ = ["Counterexample", "named_vectors", "refutation", "smallest", "statement_text"]
 
 STATES = 3
-DOF = {
-    "weld": 0,
-    "pin": 1,
-    "slider": 1,
-    "screw": 1,
-    "universal": 2,
-    "cylindrical": 2,
-    "gimbal": 3,
-    "planar": 3,
-    "ball": 3,
-    "custom": 3,
-    "free": 6,
-}
 KINDS = tuple(sorted(DOF, key=lambda kind: DOF[kind]))
 MOVING = tuple(kind for kind in KINDS if DOF[kind])
+_BY_SPEED = {"theta_dot", "velocity", "a", "b", "V_tilde", "V_bar", "momentum_cross", "H_dot", "Delta_theta_dot"}
+_BY_GRAVITY = {"a", "gravity_field", "gravity_base"}
 
 
 @dataclass
 class Counterexample:
     """The smallest model and state found at which a statement is false, and what was tried before."""
 
-    parents: list[int]
-    kinds: list[str]
-    rotor_inertia: bool
-    seed: int
-    q: np.ndarray
+    spec: Spec
+    state: State
     residual: float
-    tried: int
-    states: int
-    hypotheses: list[str] = field(default_factory=list)
+    tried: int = 0
+    """Smaller models that were tried."""
+    states: int = STATES
+    exhausted: bool = False
+    """Whether all smaller ones were tried."""
+    meets: frozenset[str] = frozenset()
+    """Hypotheses that all models tried had to meet."""
     saved_by: list[str] = field(default_factory=list)
-    exhausted: bool = True
+    letters: frozenset[str] = frozenset()
+
+    @property
+    def parents(self) -> list[int]:
+        return list(self.spec.parents)
+
+    @property
+    def kinds(self) -> list[str]:
+        return list(self.spec.kinds)
+
+    @property
+    def rotor_inertia(self) -> bool:
+        return self.spec.rotor_inertia
 
     @property
     def bodies(self) -> int:
-        return len(self.parents)
+        return len(self.spec.parents)
+
+    @property
+    def q(self) -> np.ndarray:
+        return self.state.q
+
+    @property
+    def v(self) -> np.ndarray:
+        return self.state.v
 
     def model(self) -> Any:
-        """The model, at the refuting state."""
-        model = tree(self.parents, self.kinds, seed=self.seed, rotor_inertia=self.rotor_inertia, welds="keep")
-        model.q = self.q
+        """The model, at the refuting state, with the gravity it was tried in."""
+        model = self.spec.model()
+        model.q, model.v = self.state.q, self.state.v
         return model
 
     def __repr__(self) -> str:
-        shape = "one body" if self.bodies == 1 else f"{self.bodies} bodies, parents {self.parents}"
-        text = f"  smallest counterexample: {shape}, hinges {', '.join(self.kinds)}{', with rotor inertia' if self.rotor_inertia else ''}"
         options = ", rotor_inertia=True" if self.rotor_inertia else ""
         options += ', welds="keep"' if "weld" in self.kinds else ""
-        text += f"\n    pc.tree({self.parents}, {self.kinds}, seed={self.seed}{options})"
-        text += f"\n    q = {np.array2string(self.q, precision=4, separator=', ')}, relative residual {self.residual:.1e}"
-        text += f"\n    every smaller tree shape and choice of hinge kinds was tried, {self.states} states each ({self.tried} models)"
-        if self.saved_by:
-            text += f"\n    it holds where {' and '.join(self.saved_by)}"
-        return text
+        shown = [("q", self.q)] + [("v", self.v)] * bool(self.letters & _BY_SPEED)
+        shown += [("gravity", np.asarray(self.model().gravity))] * bool(self.letters & _BY_GRAVITY)
+        numbers = [f"{name} = {np.array2string(x, precision=4, separator=', ', max_line_width=10**6)}" for name, x in shown]
+        lines = [
+            f"smallest counterexample: {self.spec}",
+            f"  pc.tree({self.parents}, {self.kinds}, seed={self.spec.seed}{options})",
+            *(f"  {line}" for line in numbers),
+            f"  relative residual {self.residual:.1e}",
+        ]
+        that = f" that meets {', '.join(h for h in HYPOTHESES if h in self.meets)}" if self.meets else ""
+        counted = f"{self.tried} models, {self.states} states each"
+        if self.exhausted:
+            lines += [f"  every smaller tree shape and choice of hinge kinds{that} was tried:", f"  {counted}"]
+        else:
+            lines.append("  no body of it can be left out and no hinge made simpler;")
+            lines += [f"  of what is smaller{that} not all was tried:", f"  {counted}"]
+        return "\n".join(wrapped(f"  {line}") for line in lines)
+
+
+def statement_text(read: Statement) -> str:
+    """The statement in Python's spelling, to be read on another model."""
+    sides = [
+        side if isinstance(side, (int, float)) else side.python() if isinstance(side, _core.Operator) else side.text()
+        for side in (read.lhs, read.rhs)
+    ]
+    return read.text if read.reading != "expressions" else f"{sides[0]} == {sides[1]}"
+
+
+# ---------------------------------------------------------------------- one model
+def judged(
+    text: str, spec: Spec, states: int = 1, precision: str | int = "extended", vectors: Mapping[str, str] | None = None
+) -> Verdict | None:
+    """The verdict on a model: up to the first state that refutes. None where it has not what the statement names, or no inverse exists."""
+    from .checker import drawn_vectors
+
+    model = spec.model()
+    read = read_on(text, spec, model, vectors)
+    if read is None or read.rhs is None:
+        return None
+    rng = np.random.default_rng(spec.seed)
+    found = Verdict()
+    for state in spec.states(model, states):
+        drawn = drawn_vectors(read.rhs, rng, drawn_vectors(read.lhs, rng, {}))
+        try:
+            found.judgements.append(judge(read.lhs, read.rhs, BoundState(model.soa, state), drawn, precisions=ladder(precision)))
+        except ArithmeticError:
+            continue
+        if found.judgements[-1].verdict == FAILS:
+            break
+    return found if found.judgements else None
+
+
+def refutation(
+    text: str, spec: Spec, precision: str | int = "extended", states: int = STATES, vectors: Mapping[str, str] | None = None
+) -> Counterexample | None:
+    """The first state of a model that refutes, or None."""
+    found = judged(text, spec, states, precision, vectors)
+    if found is None or found.verdict != FAILS:
+        return None
+    return Counterexample(spec, found.shown.state, found.shown.decisive.residual, states=states)
+
+
+# ---------------------------------------------------------------------- smaller
+def _without(spec: Spec, k: int) -> Spec:
+    """The model without body k, its children moved to its parent."""
+    parents = [spec.parents[k] if p == k else p for i, p in enumerate(spec.parents) if i != k]
+    kinds = tuple(kind for i, kind in enumerate(spec.kinds) if i != k)
+    return replace(spec, parents=tuple(p - (p > k) for p in parents), kinds=kinds)
+
+
+def _smaller(spec: Spec) -> Iterator[Spec]:
+    """One step smaller: halves first, then a body less, then a simpler hinge, then no rotor inertia."""
+    n = len(spec.parents)
+    if n > 3:
+        half = spec
+        for _ in range(n // 2):
+            half = _without(half, len(half.parents) - 1)
+        yield half
+    if n > 1:
+        yield from (_without(spec, k) for k in reversed(range(n)))
+    for k, kind in enumerate(spec.kinds):
+        yield from (replace(spec, kinds=(*spec.kinds[:k], simpler, *spec.kinds[k + 1 :])) for simpler in KINDS[: KINDS.index(kind)])
+    if spec.rotor_inertia:
+        yield replace(spec, rotor_inertia=False)
+
+
+def shrunk(
+    text: str,
+    found: Counterexample,
+    allowed: Callable[[Spec], bool],
+    precision: str | int,
+    deadline: float,
+    states: int = STATES,
+    vectors: Mapping[str, str] | None = None,
+) -> Counterexample:
+    """A refutation of which nothing can be taken away, among the models that are allowed."""
+    smaller = True
+    while smaller and time.perf_counter() < deadline:
+        smaller = False
+        for spec in _smaller(found.spec):
+            if not any(map(DOF.get, spec.kinds)) or not allowed(spec):
+                continue
+            again = refutation(text, spec, precision, states, vectors)
+            if again is not None:
+                found, smaller = again, True
+                break
+            if time.perf_counter() > deadline:
+                break
+    return found
 
 
 def shapes(n: int) -> Iterator[list[int]]:
@@ -99,7 +215,7 @@ def _canonical(parents: list[int]) -> Any:
     return form(-1)
 
 
-def candidates(largest: int) -> Iterator[tuple[list[int], list[str], bool]]:
+def candidates(largest: int) -> Iterator[Spec]:
     """Models by bodies, then degrees of freedom, then without before with rotor inertia."""
     for n in range(1, largest + 1):
         moving = (kinds for kinds in itertools.product(KINDS, repeat=n) if any(DOF[k] for k in kinds))
@@ -110,64 +226,7 @@ def candidates(largest: int) -> Iterator[tuple[list[int], list[str], bool]]:
             for rotor in (False, True):
                 for parents in forests:
                     for kinds in same_size:
-                        yield parents, list(kinds), rotor
-
-
-def statement_text(read: Statement) -> str:
-    """The statement in Python's spelling, to be read on another model."""
-    sides = [
-        side if isinstance(side, (int, float)) else side.python() if isinstance(side, _core.Operator) else side.text()
-        for side in (read.lhs, read.rhs)
-    ]
-    return read.text if read.reading != "expressions" else f"{sides[0]} == {sides[1]}"
-
-
-def named_vectors(read: Statement) -> dict[str, str]:
-    """The names of a statement's vectors and of the spaces that they lie in: its text says of neither."""
-    found: dict[str, str] = {}
-    todo = [read.lhs, read.rhs]
-    while todo:
-        side = todo.pop()
-        if isinstance(side, _core.Scalar):
-            todo += side.operands()
-        elif isinstance(side, _core.Operator):
-            todo += side.children
-            if side.kind == "vector":
-                found[side.name] = side.codomain.name
-    return found
-
-
-def refutes(
-    text: str,
-    parents: list[int],
-    kinds: list[str],
-    rotor: bool,
-    seed: int,
-    precision: str | int,
-    states: int = STATES,
-    vectors: Mapping[str, str] | None = None,
-) -> Any:
-    """(q, residual) at the first refuting state, or None."""
-    from .checker import BoundState, drawn_vectors, evaluate
-
-    model = tree(parents, kinds, seed=seed, rotor_inertia=rotor, welds="keep")
-    try:
-        spaces = {space.name: space for space in (model.soa.Theta, model.soa.V, model.soa.F)}
-        named = {name: _core.vector(name, spaces[space]) for name, space in (vectors or {}).items()}
-        read = Statements(model.soa, named).read(text)
-    except (_core.EvaluationError, _core.SpaceError, _core.ModelError):
-        return None
-    rng = np.random.default_rng(seed)
-    for _ in range(states):
-        state = model.random_state(rng)
-        drawn = drawn_vectors(read.rhs, rng, drawn_vectors(read.lhs, rng, {}))
-        try:
-            residuals = evaluate(read.lhs, read.rhs, [BoundState(model.soa, state)], [drawn], precision)
-        except ArithmeticError:
-            continue
-        if residuals.verdict == "fails":
-            return state.q, residuals.residual
-    return None
+                        yield Spec(tuple(parents), kinds, rotor)
 
 
 def smallest(
@@ -176,87 +235,60 @@ def smallest(
     seed: int = 0,
     precision: str | int = "extended",
     budget: float = 20.0,
-    largest: int = 4,
+    found: Counterexample | None = None,
+    meets: frozenset[str] = frozenset(),
+    allowed: Callable[[Spec], bool] | None = None,
     vectors: Mapping[str, str] | None = None,
 ) -> Counterexample | None:
-    """The smallest refutation by (bodies, degrees of freedom), or None if the budget (seconds) ran out first.
+    """The smallest refutation by (bodies, degrees of freedom), or None if none was found within the budget (seconds).
 
-    `vectors` names the spaces of the vectors in the text. One in a space that no other model has (of nodes, of a user's own) is on its
-    own model alone: None at once.
+    Parameters
+    ----------
+    found : a refutation to start from; one is looked for in the family of random trees if left out
+    meets : hypotheses that the models must meet
+    allowed : says of a model whether it may be tried, besides
+    vectors : the spaces of the vectors that the text names. One in a space that no other model has (of nodes, of a user's own)
+        is on its own model alone: None at once.
     """
     if not {"Θ", "V", "F"}.issuperset((vectors or {}).values()):
         return None
-    begin = time.perf_counter()
-    for tried, (parents, kinds, rotor) in enumerate(candidates(largest)):
-        found = refutes(text, parents, kinds, rotor, seed, precision, vectors=vectors)
-        if found is not None:
-            q, residual = found
-            example = Counterexample(parents, kinds, rotor, seed, q, residual, tried, STATES)
-            example.saved_by = saving_hypotheses(text, example, seed, precision, vectors)
-            return example
-        if time.perf_counter() - begin > budget:
-            return None
-    return None
+    deadline = time.perf_counter() + budget
+
+    def fits(spec: Spec) -> bool:
+        return meets <= spec.met and (allowed is None or allowed(spec))
+
+    if found is None:
+        found = next(
+            (r for spec in family(1) if fits(spec) and (r := refutation(text, spec, precision, vectors=vectors)) is not None), None
+        )
+    if found is not None:
+        found = shrunk(text, found, fits, precision, time.perf_counter() + budget / 2, vectors=vectors)
+    limit = (4, 24) if found is None else found.spec.size
+    tried, first, complete = 0, None, True
+    for spec in candidates(limit[0]):
+        if (*spec.size, spec.rotor_inertia) >= (*limit, found is not None and found.rotor_inertia):
+            break
+        if time.perf_counter() > deadline:
+            complete = False
+            break
+        if not fits(spec):
+            continue
+        first = refutation(text, replace(spec, seed=seed), precision, vectors=vectors)
+        if first is not None:
+            break
+        tried += 1
+    result = first or found
+    if result is not None:
+        result.tried, result.exhausted, result.meets = tried, complete, meets
+        read = read_on(text, result.spec, result.model(), vectors)
+        result.letters = frozenset() if read is None else _letters(read.lhs) | _letters(read.rhs)
+    return result
 
 
-_CLASSES: list[tuple[str, list[tuple[list[int], list[str], bool]]]] = [
-    ("J = 0", [([-1, 0, 0, 1], ["pin", "slider", "ball", "universal"], False), ([-1, 0, 1], ["free", "pin", "custom"], False)]),
-    (
-        "the tree is a serial chain",
-        [([-1, 0, 1, 2], ["pin", "slider", "ball", "universal"], True), ([-1, 0, 1], ["free", "pin", "custom"], True)],
-    ),
-    (
-        "every hinge has one degree of freedom",
-        [([-1, 0, 0, 1], ["pin", "slider", "screw", "pin"], True), ([-1, 0, 1, 1], ["slider", "pin", "pin", "pin"], True)],
-    ),
-    (
-        "H is constant",
-        [([-1, 0, 0, 1], ["pin", "ball", "free", "slider"], True), ([-1, 0, 1, 1], ["free", "pin", "ball", "pin"], True)],
-    ),
-    (
-        "the tree is a serial chain and J = 0",
-        [([-1, 0, 1, 2], ["pin", "slider", "ball", "universal"], False), ([-1, 0, 1], ["free", "pin", "custom"], False)],
-    ),
-    (
-        "every hinge has one degree of freedom and J = 0",
-        [([-1, 0, 0, 1], ["pin", "slider", "screw", "pin"], False), ([-1, 0, 1, 1], ["slider", "pin", "pin", "pin"], False)],
-    ),
-]
-
-
-def saving_hypotheses(
-    text: str, example: Counterexample, seed: int, precision: str | int, vectors: Mapping[str, str] | None = None
-) -> list[str]:
-    """Hypotheses under which no refutation was found on trees that meet only them; the weakest first, one is enough."""
-    for name, models in _CLASSES:
-        if all(refutes(text, parents, kinds, rotor, seed + 1, precision, vectors=vectors) is None for parents, kinds, rotor in models):
-            return [name]
-    return []
-
-
-def check_on_trees(text: str, *, states: int, seed: int, search: bool, precision: str | int, budget: float) -> CheckReport:
-    """A statement on a family of random trees that between them meet and break every hypothesis."""
-    from .checker import run
-
-    rng = np.random.default_rng(seed)
-    worst, bound, count, names = 0.0, 0.0, 0, []
-    held, undecided = True, False
-    for n in (1, 2, 3, 5, 8):
-        for rotor in (False, True):
-            parents = [-1] + [int(rng.integers(-1, k)) for k in range(1, n)]
-            kinds = [str(k) for k in rng.choice(MOVING, n)]
-            model = tree(parents, kinds, seed=int(rng.integers(2**31)), rotor_inertia=rotor)
-            read = Statements(model.soa).read(text)
-            if read.rhs is None:
-                raise _core.EvaluationError(f"{text!r} has one side; a statement is lhs == rhs")
-            residuals = run(read, model.soa, max(1, states // 10), seed, precision)
-            names.append(f"parents {parents}, {', '.join(kinds)}" + (", with rotor inertia" if rotor else ""))
-            count += residuals.states
-            if residuals.residual >= worst:
-                worst, bound = residuals.residual, residuals.bound
-            held &= residuals.verdict != "fails"
-            undecided |= residuals.verdict == "undecided"
-    report = CheckReport(text, held, worst, bound, count, names, undecided=undecided and held)
-    if not held and search:
-        report.counterexample = smallest(text, seed=seed, precision=precision, budget=budget)
-    return report
+def _letters(side: Any) -> frozenset[str]:
+    """Names of the letters of a side."""
+    if isinstance(side, _core.Scalar):
+        return frozenset().union(*(_letters(e) for e in side.operands()))
+    if not isinstance(side, _core.Operator):
+        return frozenset()
+    return frozenset({side.name}).union(*(_letters(c) for c in side.children))

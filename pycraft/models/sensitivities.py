@@ -41,16 +41,25 @@ class SensitivityCalls(DirectCalls):
         """∂T/∂q, ∂T/∂v and ∂T/∂v̇ = ℳ + J of T = inverse_dynamics(q, v, v̇), gravity included. Cost O(N · depth)."""
         q, v = at_state(self, q, v)
         vdot = np.zeros(self.nv) if vdot is None else vdot
-        dq, dv = self._sensitivities().dynamics(False, q, v, vdot, precision)
+        dq, dv = self._sensitivities().inverse_dynamics(q, v, vdot, precision)
         mass = self.mass_matrix(q, precision=precision)
         return DynamicsDerivatives(dq, dv, mass if mass.shape == dq.shape else np.broadcast_to(mass, dq.shape).copy())
 
-    def forward_dynamics_derivatives(self, q=None, v=None, tau=None, *, precision: str = "double") -> DynamicsDerivatives:
-        """∂v̇/∂q, ∂v̇/∂v and ∂v̇/∂τ = (ℳ + J)⁻¹ of v̇ = forward_dynamics(q, v, τ). Cost O(N²). Raises SingularHingeError as it does."""
+    def forward_dynamics_derivatives(
+        self, q=None, v=None, tau=None, *, form: str = "fast", refine: int | str = 0, residual: str = "same", precision: str = "double"
+    ) -> DynamicsDerivatives:
+        """∂v̇/∂q, ∂v̇/∂v and ∂v̇/∂τ = (ℳ + J)⁻¹ of v̇ = forward_dynamics(q, v, τ). Raises what it raises.
+
+        In the form "fast" -(ℳ + J)⁻¹ ∂T/∂q and -(ℳ + J)⁻¹ ∂T/∂v at v̇, accelerations and solutions refined as asked: O(N²). Forces of heavy
+        bodies hide a light one's there. The forms "ud" and "square-root" keep the digits that v̇ keeps: the sweep of "ud" is differentiated,
+        four directions at a time, in O(N²) as well, at about N times the cost of one; refinement acts on (ℳ + J)⁻¹ alone then. Where the
+        sweep has no derivative (P⁺ is singular at this very configuration, not beside it) the first way is taken with the form's inverse.
+
+        The free root's travel enters ∂v̇/∂v of its own linear accelerations and nothing else.
+        """
         q, v = at_state(self, q, v)
         tau = np.zeros(self.nv) if tau is None else tau
-        vdot = self.forward_dynamics(q, v, tau, precision=precision)
-        return DynamicsDerivatives(*self._sensitivities().dynamics(True, q, v, vdot, precision))
+        return DynamicsDerivatives(*self._sensitivities().forward_dynamics(q, v, tau, form, refine, residual, precision))
 
     def mass_matrix_derivative(self, q=None, *, precision: str = "double", out=None) -> np.ndarray:
         """∂ℳ/∂q, (nv, nv, nv) or (B, nv, nv, nv): entry (i, j, k) is ∂ℳ(i,j)/∂q_k. Cost O(N · depth²) beside the zeros."""

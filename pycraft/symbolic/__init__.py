@@ -12,3 +12,4 @@ from .prove import prove_derivative as prove_derivative
 from .sympy_bridge import from_sympy as from_sympy
 from .sympy_bridge import parse as parse
 from .sympy_bridge import to_sympy as to_sympy
+from .worksheet import worksheet as worksheet

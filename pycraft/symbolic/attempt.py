@@ -9,6 +9,7 @@ from .equations import NO_FRAME, Equation, Frame, Step, Use
 from .expand import Problem
 from .inverses import LocalRules
 from .rules import Setting
+from .scalars import ScalarRules
 from .words import ONE, Polynomial, Word, add_to, combine, inverse_of, inverted, plain, split
 
 ROUNDS = 4
@@ -38,6 +39,10 @@ class Attempt(LocalRules):
 
     def run(self, lhs: Polynomial, rhs: Polynomial) -> Outcome:
         """Normal forms of both sides, cleared of inverses where that closes the gap. Raises GaveUp."""
+        if self.problem.scalars:
+            scalars = ScalarRules(self)
+            (p, left), (q, right) = (scalars.reduce(side) for side in (lhs, rhs))
+            return Outcome(left, right, p, q)
         turned = self._turned(rhs, lhs) if self.problem.numbers else []
         p, left, q, right = self.rules.reduce_both(lhs, turned[-1].after if turned else rhs, self.alphabet)
         first = at = Outcome(left, [*turned, *right], p, q)

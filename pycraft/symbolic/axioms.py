@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections import deque
 from functools import lru_cache
 
+from . import mechanics
 from .equations import SYMMETRY, Equation, Step, Use, joined
 from .words import Alphabet, Polynomial, Word, add_to, parse, parse_equation
 
@@ -41,16 +42,13 @@ DEFINITIONS = [
     "φ̃ = φ − I",
     "ψ̃ = ψ − I",
     "P⁺ = τ̄ P",
-    "V = φ* H* θ̇",
-    "a = Ṽ H* θ̇ + Ḣ* θ̇",
-    "b = V̄ M V",
 ]
 
 # Under these alone.
 HYPOTHESES = {"J = 0": "J = 0", "S = 0": "serial chain"}
 
 # What an inverse is. Where M⁻¹, P⁻¹, R⁻¹, J⁻¹, Υ⁻¹ stand in a statement, it presupposes that they exist.
-INVERTIBLE = ("φ", "ψ", "D", "M", "P", "R", "J", "Υ")
+INVERTIBLE = ("φ", "ψ", "X", "D", "M", "P", "R", "J", "Υ")
 INVERSES = [f"{x} {x}⁻¹ = I" for x in INVERTIBLE] + [f"{x}⁻¹ {x} = I" for x in INVERTIBLE]
 
 LEMMAS: list[tuple[str, list[tuple[str, str]]]] = [
@@ -171,13 +169,19 @@ class Theory:
         self._equations: dict[str, Equation] = {}
         self._order: dict[str, int] = {}
         self._proving: list[str] = []
-        for kind, texts in (("axiom", AXIOMS), ("definition", DEFINITIONS), ("inverse", INVERSES)):
+        for kind, texts in (
+            ("axiom", AXIOMS),
+            ("axiom", mechanics.AXIOMS),
+            ("definition", DEFINITIONS),
+            ("definition", mechanics.DEFINITIONS),
+            ("inverse", INVERSES),
+        ):
             for text in texts:
                 self._declare(kind, text)
         for text, name in HYPOTHESES.items():
             self._declare("hypothesis", text, hypothesis=name)
         self._declare_symmetries()
-        self._lemmas = dict(LEMMAS)
+        self._lemmas = dict([*LEMMAS, *mechanics.LEMMAS])
         for text in self._lemmas:
             self._order[text] = len(self._order)
 

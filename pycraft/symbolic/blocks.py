@@ -8,6 +8,8 @@ these are all that moves.
 
 from __future__ import annotations
 
+import math
+
 from .words import ONE, Alphabet, Letter, Polynomial, Word, add_to, plain, split
 
 _STEPS = {"E_φ", "E_ψ", "K"}
@@ -27,8 +29,11 @@ def moves(letter: str, alphabet: Alphabet) -> str:
     return shape + mark
 
 
-def diagonal_blocks(word: Word, alphabet: Alphabet) -> Polynomial:
-    """blockdiag(word), where the letters say what it is; else with a letter of its own for what they do not."""
+def diagonal_blocks(word: Word, alphabet: Alphabet, chain: bool = False) -> Polynomial:
+    """blockdiag(word), where the letters say what it is; else with a letter of its own for what they do not.
+
+    On a serial chain (`chain`) how far a letter leads decides: K*ψ̃*ΥK never leads back, K*ΥK always does.
+    """
     parts: list[tuple[Word, str]] = [((letter,), moves(letter, alphabet)) for letter in word]
     parts = _closed(parts)
     head, tail = 0, len(parts)
@@ -49,7 +54,65 @@ def diagonal_blocks(word: Word, alphabet: Alphabet) -> Polynomial:
         at = ways.index("siblings")
         if all(m.endswith("*") for m in ways[:at]) and all(m in ("step", "down", "unit") for m in ways[at + 1 :]):
             return {}
+    if chain and (found := _by_levels(inner)) is not None:
+        return {left + w + right: c for w, c in found.items()}
+    if (opened := _towards_the_base(inner, alphabet)) is not None:
+        total: Polynomial = {}
+        for w, c in opened.items():
+            for v, x in diagonal_blocks(left + w + right, alphabet, chain).items():
+                add_to(total, v, c * x)
+        return total
     return {(*left, _own_letter(_join(inner), alphabet), *right): ONE}
+
+
+def _by_levels(parts: list[tuple[Word, str]]) -> Polynomial | None:
+    """Diagonal blocks on a chain, by how many bodies outward each letter leads; None where that does not say."""
+    low, high = 0.0, 0.0
+    for _, way in parts:
+        down, up = _LEVELS.get(way, (-math.inf, math.inf))
+        low, high = low + down, high + up
+    if low > 0 or high < 0:
+        return {}
+    if (low == 0 or high == 0) and not any(way in ("down", "down*") for _, way in parts):
+        return {_join([p for p in parts if not p[1].startswith("unit")]): ONE}
+    return None
+
+
+_LEVELS = {
+    **{"diagonal": (0, 0), "step": (1, 1), "step*": (-1, -1), "down": (1, math.inf), "down*": (-math.inf, -1)},
+    **{"unit": (0, math.inf), "unit*": (-math.inf, 0)},
+}
+
+
+def _towards_the_base(parts: list[tuple[Word, str]], alphabet: Alphabet) -> Polynomial | None:
+    """ψ*XK A, A leading down or nowhere, as ψ* blockdiag(E_ψ*XK) A, X block diagonal; and its transpose.
+
+    ψ* = I + ψ*E_ψ*: XKA leads down, and of E_ψ*XK the blocks between siblings count for nothing between ψ* and A. The word begins with
+    ψ*: of B*XKA, B* leading up, diagonal blocks may be left.
+    """
+    ways = [way for _, way in parts]
+    steps = [i for i, way in enumerate(ways) if way != "diagonal"]
+    if len(steps) < 2:
+        return None
+    j = steps[1]
+    if ways[0] == "unit*" and ways[j] == "step" and {*ways[j + 1 :]} <= {"step", "down", "unit", "diagonal"}:
+        inner, right = _join(parts[1 : j + 1]), _join(parts[j + 1 :])
+        return {(*parts[0][0], *outer, _own_letter((*edge, *inner), alphabet), *right): c for outer, edge, c in _edge(parts[0][0], "*")}
+    j = steps[-2]
+    if ways[-1] == "unit" and ways[j] == "step*" and {*ways[:j]} <= {"step*", "down*", "unit*", "diagonal"}:
+        left, inner = _join(parts[:j]), _join(parts[j:-1])
+        return {(*left, _own_letter((*inner, *edge), alphabet), *outer, *parts[-1][0]): c for outer, edge, c in _edge(parts[-1][0], "")}
+    return None
+
+
+def _edge(letter: Word, star: str) -> list[tuple[Word, Word, int]]:
+    """(H, K, ...) of the terms of E_ψ, or E_φ: what stands at its ends, what leads, and the sign."""
+    name = letter[0].removesuffix("*")
+    mark = name.removeprefix("ψ").removeprefix("φ")
+    edge: list[tuple[Word, Word, int]] = [((), (f"E_φ{mark}{star}",), 1)]
+    if name.startswith("ψ"):
+        edge.append(((f"H{mark}{star}",), (f"K{mark}{star}",), -1))
+    return edge
 
 
 def _closed(parts: list[tuple[Word, str]]) -> list[tuple[Word, str]]:
@@ -83,10 +146,10 @@ def _own_letter(word: Word, alphabet: Alphabet) -> str:
     return name if word == canonical else alphabet.star(name)
 
 
-def diagonal_part(p: Polynomial, alphabet: Alphabet) -> Polynomial:
-    """The diagonal blocks of a polynomial."""
+def diagonal_part(p: Polynomial, alphabet: Alphabet, chain: bool = False) -> Polynomial:
+    """The diagonal blocks of a polynomial; see `diagonal_blocks`."""
     total: Polynomial = {}
     for word, c in p.items():
-        for w, x in diagonal_blocks(word, alphabet).items():
+        for w, x in diagonal_blocks(word, alphabet, chain).items():
             add_to(total, w, c * x)
     return total

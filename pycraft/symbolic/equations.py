@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from .words import ONE, Alphabet, Number, Polynomial, Word, add_to, combine, framed, inverse_of, of_model
+from .words import ONE, SHARED, Alphabet, Number, Polynomial, Word, add_to, combine, framed, inverse_of, of_model, split
 
 Frame = tuple[Word, Word]
 NO_FRAME: Frame = ((), ())
@@ -47,7 +47,7 @@ class Equation:
     note: str = ""
     check: Callable[[], bool] | None = None
     _star: Equation | None = None
-    _copies: dict[str, Equation] = field(default_factory=dict)
+    _copies: dict[tuple[str, str], Equation] = field(default_factory=dict)
 
     @cached_property
     def difference(self) -> Polynomial:
@@ -64,15 +64,18 @@ class Equation:
             self._star.check = lambda: lhs == alphabet.star_of(self.lhs) and rhs == alphabet.star_of(self.rhs)
         return self._star
 
-    def copied(self, mark: str) -> Equation:
-        """The same equation with the letters of another model."""
-        if not mark:
+    def copied(self, mark: str, base: str | None = None) -> Equation:
+        """The same equation with the letters of another model; of a tree with hinges locked, those that it shares are its model's."""
+        base = mark if base is None else base
+        if not mark and not base:
             return self
-        if mark not in self._copies:
-            lhs, rhs = _marked(self.lhs, mark), _marked(self.rhs, mark)
-            self._copies[mark] = Equation("copy", self.text, lhs, rhs, hypothesis=self.hypothesis, source=self)
-            self._copies[mark].check = lambda: lhs == _marked(self.lhs, mark) and rhs == _marked(self.rhs, mark)
-        return self._copies[mark]
+        if (mark, base) not in self._copies:
+            carried = lambda p: {marked(word, mark, base): c for word, c in p.items()}  # noqa: E731
+            lhs, rhs = carried(self.lhs), carried(self.rhs)
+            made = Equation("copy", self.text, lhs, rhs, hypothesis=self.hypothesis, source=self)
+            made.check = lambda: lhs == carried(self.lhs) and rhs == carried(self.rhs)
+            self._copies[mark, base] = made
+        return self._copies[mark, base]
 
     @property
     def root(self) -> Equation:
@@ -111,8 +114,9 @@ def symmetries(alphabet: Alphabet, words: Iterable[Word]) -> list[Equation]:
     return [SYMMETRY[name] for name in alphabet.symmetric_letters(words) if name in SYMMETRY]
 
 
-def _marked(p: Polynomial, mark: str) -> Polynomial:
-    return {tuple(of_model(x, mark) for x in word): c for word, c in p.items()}
+def marked(word: Word, mark: str, base: str) -> Word:
+    """A word of the first model for another; letters that do not depend on which hinges move are those of `base`."""
+    return tuple(of_model(x, base if split(x)[0] in SHARED else mark) for x in word)
 
 
 @dataclass
@@ -259,6 +263,49 @@ def joined(left: Sequence[Step], right: Sequence[Step], lhs: Polynomial, rhs: Po
     if backwards:
         backwards[0].before = a  # the same terms in the same order
     return numbered([*left, *backwards] or [Step(lhs, rhs, [], alphabet)])
+
+
+def opened(step: Step, equation: Equation | None = None) -> list[Step]:
+    """The step with the lemma that it uses carried out: that lemma's steps at its place. Itself where there is nothing to open.
+
+    With `equation`, the uses of that one are opened, wherever they stand; else a step with a single use is.
+    """
+    chosen = [u for u in step.uses if (equation is None or u.equation.root is equation) and u.equation.steps and u.equation.kind == "lemma"]
+    chosen += [u for u in step.uses if equation is not None and u.equation.root is equation and u not in chosen and _turned(u) is not None]
+    if not chosen or equation is None and len(step.uses) != 1:
+        return [step]
+    at, after = step.full()
+    made: list[Step] = []
+    for use in chosen:
+        own = use.equation.steps or _turned(use) or []
+        steps = own if use.forward else [s.reversed() for s in reversed(own)]
+        c = use.coefficient if use.forward else -use.coefficient
+        for s in steps:
+            s = s.between(use.left, use.right, c)
+            s.before, s.after = at, combine((1, at), (1, s.after), (-1, s.before))
+            s.alphabet, at = step.alphabet, s.after
+            made.append(s)
+    rest = [u for u in step.uses if u not in chosen]
+    if rest or at != after:
+        made.append(Step(at, after, rest, step.alphabet, step.title))
+    return made if all(s.holds() for s in made) else [step]
+
+
+def _turned(use: Use) -> list[Step] | None:
+    """The steps of a transposed lemma: those of the lemma, transposed. None where it has none."""
+    e = use.equation
+    if e.kind != "transpose" or e.source is None or e.source.kind != "lemma" or not e.source.steps:
+        return None
+    steps = []
+    for s in e.source.steps:
+        a = s.alphabet
+        uses = [
+            Use(u.coefficient, a.star_word(u.right), u.equation.transposed(a), a.star_word(u.left), a.star_word(u.word), u.forward)
+            for u in s.uses
+        ]
+        before, after = s.full()
+        steps.append(Step(a.star_of(before), a.star_of(after), uses, a, s.title))
+    return steps
 
 
 # ---------------------------------------------------------------------- what a proof rests on

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import difflib
 import random
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,13 +19,14 @@ from ..identities.parse import Statement, Statements
 from .attempt import Attempt
 from .axioms import AXIOMS, DEFINITIONS, INVERSES, find, replaced_everywhere, solved, theory
 from .derivation import DerivativeProblem
-from .equations import Equation, Step, chain_holds, foundations
-from .proof import Proof, _escaped, _reason_latex, example, examples
+from .equations import Equation, Step, chain_holds, foundations, opened
+from .proof import Proof, example, examples
 from .prove import _operators, _settings, prove
 from .rules import corollary
+from .shown import escaped, reason_latex
 from .values import LARGEST, NoValue, transferred
 from .walk import GaveUp
-from .words import ONE, Alphabet, Polynomial, Word, combine, framed, number, of_model, plain, ratio, split
+from .words import ONE, Alphabet, Polynomial, Word, combine, number, of_model, plain, ratio, split
 
 ACCEPTED = ("right", "another road")
 _SAYS = {
@@ -67,20 +69,21 @@ class Judgement:
     __str__ = __repr__
 
 
-def exercise(theorem: Any, model: Any = None, blank: int | None = None, seed: int = 0) -> Exercise:
-    """A proof with one line left out, to be filled in.
+def exercise(theorem: Any, model: Any = None, blank: int | Sequence[int] | None = None, seed: int = 0) -> Exercise:
+    """A proof with one line left out, or several, to be filled in.
 
     Parameters
     ----------
     theorem : a name of the catalogue (`soa.theorems()`), a statement as text, or a pair (lhs, rhs) of expressions
     model : Multibody or OperatorSet on which text is read and numbers are taken; a small random tree if left out
-    blank : the number of the line to leave out, from 1; without it, one is drawn
+    blank : the number of the line to leave out, from 1, or several; without it, one is drawn
     seed : of that draw
 
     Returns
     -------
     Exercise
-        It prints the derivation with the gap; `.answer(line)`, `.hint(level)`, `.solution()`.
+        It prints the derivation with the gaps; `.answer(line)`, `.hint(level)`, `.solution()`; of several gaps `.answer({2: ..., 4: ...})`
+        judges each, and `.gap(4)` is the exercise at one of them.
 
     Raises
     ------
@@ -110,6 +113,8 @@ def exercise(theorem: Any, model: Any = None, blank: int | None = None, seed: in
         lhs, rhs = theorem
         read, name = Statement(lhs, rhs, "", "expressions"), ""
     proof = prove(read.lhs, read.rhs, model)
+    if not isinstance(read.lhs, _core.Operator):
+        raise _core.EvaluationError(f"there is no proof to leave a line out of: {name or proof.statement} is said of numbers")
     if not proof:
         said = f"{name}: {proof.statement}" if name else proof.statement
         raise _core.EvaluationError(f"there is no proof to leave a line out of: {said}\n  {str(proof).partition(chr(10))[2].strip()}")
@@ -135,28 +140,52 @@ def _read_theorem(text: str, model: Any) -> tuple[Any, str]:
 
 
 class Exercise:
-    """A derivation with a gap, see `exercise`.
+    """A derivation with a gap or several, see `exercise`.
 
     Attributes
     ----------
     proof : the whole proof
     steps : the derivation shown: the proof's, with lemmas opened where it has too few lines to leave one out
-    blank : the number of the line left out
+    blanks : the numbers of the lines left out
+    blank : the one that `answer`, `hint` and `solution` are about: the first, see `gap`
     """
 
-    def __init__(self, proof: Proof, model: Any = None, blank: int | None = None, seed: int = 0):
+    def __init__(self, proof: Proof, model: Any = None, blank: int | Sequence[int] | None = None, seed: int = 0):
         self.proof, self._model, self._read = proof, model, proof._read
         self.steps = list(proof.steps)
         gaps = self._gaps()
         if blank is None and not gaps:
-            opened = [step for s in proof.steps for step in _opened(s)]
-            if chain_holds(opened, *self._ends(proof.steps)):
-                self.steps = opened
-            gaps = self._gaps() or list(range(1, len(self.steps))) or [len(self.steps)]
-        if blank is not None and not 1 <= blank <= len(self.steps):
-            raise _core.EvaluationError(f"there is no line {blank} to leave out: the derivation has lines 1 to {len(self.steps)}")
-        self.blank: int = random.Random(seed).choice(gaps) if blank is None else blank
+            longer = [step for s in proof.steps for step in opened(s)]
+            if chain_holds(longer, *self._ends(proof.steps)):
+                self.steps = longer
+            gaps = self.gaps()
+        if blank is None:
+            blank = random.Random(seed).choice(gaps)
+        self._leave_out({blank} if isinstance(blank, int) else set(blank))
         self._read_text = Statements(self._operators(), self._abbreviations())
+
+    def _leave_out(self, blanks: set[int]) -> None:
+        if not blanks:
+            raise _core.EvaluationError("an exercise leaves out one line or more: blank=[] names none")
+        for line in blanks:
+            if not 1 <= line <= len(self.steps):
+                raise _core.EvaluationError(f"there is no line {line} to leave out: the derivation has lines 1 to {len(self.steps)}")
+        self.blanks: tuple[int, ...] = tuple(sorted(blanks))
+        self.blank = self.blanks[0]
+
+    def leaving_out(self, *blanks: int) -> Exercise:
+        """The same derivation with other lines left out, by their numbers as it is shown here; see `gaps`."""
+        other = copy(self)
+        other._leave_out(set(blanks))
+        return other
+
+    def gap(self, blank: int) -> Exercise:
+        """The exercise at one of its gaps; the others stay open."""
+        if blank not in self.blanks:
+            raise _core.EvaluationError(f"line {blank} is no gap of this exercise; its gaps are {', '.join(map(str, self.blanks))}")
+        other = copy(self)
+        other.blank = blank
+        return other
 
     # ------------------------------------------------------------------ lines
     @staticmethod
@@ -173,25 +202,34 @@ class Exercise:
                 lines = [p if step is None else step.after for p, step in zip(lines, replaced, strict=True)]
         return lines
 
+    def gaps(self) -> list[int]:
+        """Lines that can be left out: those that say something other than the line before and the line after; else any."""
+        return self._gaps() or list(range(1, len(self.steps))) or [len(self.steps)]
+
     def _gaps(self) -> list[int]:
-        """Lines that say something other than the line before and the line after."""
         lines = self._polynomials()
-        return [i for i in range(1, len(lines) - 1) if lines[i] not in (lines[i - 1], lines[i + 1])]
+        texts = [self.steps[0].before_text(), *(s.after_text() for s in self.steps)]
+        said = [(lines[i - 1], lines[i + 1]) for i in range(1, len(lines) - 1)]
+        return [i for i, beside in enumerate(said, 1) if lines[i] not in beside and texts[i] not in (texts[i - 1], texts[i + 1])]
 
     @property
     def lines(self) -> list[str]:
-        """The derivation line by line, from the left side; "?" for the gap."""
+        """The derivation line by line, from the left side; "?" for a gap."""
         texts = [self.steps[0].before_text(), *(s.after_text() for s in self.steps)]
-        return ["?" if i == self.blank else text for i, text in enumerate(texts)]
+        return ["?" if i in self.blanks else text for i, text in enumerate(texts)]
 
     @property
     def _last(self) -> bool:
         return self.blank == len(self.steps)
 
     @property
+    def _end_is_open(self) -> bool:
+        return self.blanks[-1] == len(self.steps)
+
+    @property
     def statement(self) -> str:
         """The theorem; its right side is a question where that is the line left out."""
-        return f"{self.lines[0]} = ?" if self._last else self.proof.statement
+        return f"{self.lines[0]} = ?" if self._end_is_open else self.proof.statement
 
     def _operators(self) -> Any:
         """Those that answers are read on."""
@@ -229,7 +267,7 @@ class Exercise:
         rows = [self.statement + where, f"      {lines[0]}"]
         for i, (line, step) in enumerate(zip(lines[1:], self.steps, strict=True), 1):
             shown = f"  {i:>2}. = {line}"
-            reason = "" if i == self.blank else f"[{step.reason}]"
+            reason = "" if i in self.blanks else f"[{step.reason}]"
             far = len(line) + 2 > width
             rows.append(f"{shown}\n{'':>{width + 9}}{reason}" if far and reason else f"{shown:<{width + 9}}{reason}".rstrip())
         return "\n".join(rows)
@@ -240,13 +278,13 @@ class Exercise:
         """The derivation as an aligned display, a box for the gap."""
         rows = [f"& {self.steps[0].before_latex()}"]
         for i, step in enumerate(self.steps, 1):
-            gap = i == self.blank
-            rows.append(f"={{}}& {GAP if gap else step.after_latex()} && \\text{{({i})}}\\;{'' if gap else _reason_latex(step)}")
+            gap = i in self.blanks
+            rows.append(f"={{}}& {GAP if gap else step.after_latex()} && \\text{{({i})}}\\;{'' if gap else reason_latex(step)}")
         return "\\begin{aligned}" + "\\\\\n".join(rows) + "\\end{aligned}"
 
     def _repr_latex_(self) -> str:
-        where = f"\\quad\\text{{where {_escaped(' and '.join(self.proof.hypotheses))}}}" if self.proof.hypotheses else ""
-        claim = f"{self.steps[0].before_latex()} = {GAP}" if self._last else self.proof._latex
+        where = f"\\quad\\text{{where {escaped(' and '.join(self.proof.hypotheses))}}}" if self.proof.hypotheses else ""
+        claim = f"{self.steps[0].before_latex()} = {GAP}" if self._end_is_open else self.proof._latex
         return f"$$\\begin{{gathered}}{claim}{where}\\\\ {self.latex()}\\end{{gathered}}$$"
 
     # ------------------------------------------------------------------ help
@@ -273,12 +311,14 @@ class Exercise:
         return f"{step.after_text()}   [{step.reason}]"
 
     # ------------------------------------------------------------------ judging
-    def answer(self, line: Any) -> Judgement:
-        """Judge a line: an expression, or text in Unicode, ASCII or LaTeX.
+    def answer(self, line: Any) -> Any:
+        """Judge a line: an expression, or text in Unicode, ASCII or LaTeX; of several gaps {number: line}, which gives {number: Judgement}.
 
         It is right if it is the line left out, or proved equal to the lines before and after, each by a single equation. Cost:
         milliseconds; where it is not accepted, a tenth of a second for the reasons.
         """
+        if isinstance(line, Mapping):
+            return {blank: self.gap(blank).answer(given) for blank, given in line.items()}
         try:
             expression = self._expression(line)
         except (_core.Error, NoValue) as error:
@@ -293,9 +333,10 @@ class Exercise:
         problem.sides = [*problem.sides, given]
         lines = self._polynomials()
         copied = expression.text() == self.lines[self.blank - 1]
-        if given == lines[self.blank] and not copied:
+        typed = expression.text() == self.steps[self.blank - 1].after_text()
+        if (given == lines[self.blank] or typed) and not copied:
             return Judgement("right", _by(self.steps[self.blank - 1]), proof=prove(self._read.lhs, expression, self._model))
-        on_page = next((i for i, p in enumerate(lines) if p == given and i != self.blank), None)
+        on_page = next((i for i, p in enumerate(lines) if p == given and i not in self.blanks), None)
         if on_page is not None:
             return Judgement("no step", f"this is {'the left side' if on_page == 0 else f'line {on_page}'} written again")
         allowed = frozenset(self.proof.hypotheses)
@@ -468,23 +509,6 @@ def _changed(word: Word, alphabet: Alphabet) -> Iterator[tuple[Word, str]]:
 
 
 # ---------------------------------------------------------------------- steps
-def _opened(step: Step) -> list[Step]:
-    """A step that uses one lemma, as the steps of that lemma's proof; else itself."""
-    if len(step.uses) != 1 or step.uses[0].equation.kind != "lemma" or not step.uses[0].equation.steps:
-        return [step]
-    use = step.uses[0]
-    steps = [s if use.forward else s.reversed() for s in (use.equation.steps if use.forward else reversed(use.equation.steps))]
-    c = use.coefficient if use.forward else -use.coefficient
-    before, after = step.full()
-    rest = combine((1, before), (-c, framed(use.left, steps[0].full()[0], use.right)))
-    opened = []
-    for s in steps:
-        s = s.between(use.left, use.right, c)
-        s.before, s.after, s.alphabet = combine((1, rest), (1, s.before)), combine((1, rest), (1, s.after)), step.alphabet
-        opened.append(s)
-    return opened if opened[0].before == before and opened[-1].after == after else [step]
-
-
 def _candidates(problem: DerivativeProblem, allowed: frozenset[str], steps: Sequence[Step]) -> Iterator[tuple[Equation, Word]]:
     """(equation, word) of what one step may use: this derivation's equations, axioms, lemmas, and what those say under the hypotheses."""
     facts = theory()

@@ -14,6 +14,7 @@ from fractions import Fraction
 from typing import Any
 
 from .. import _core
+from . import factors
 from .axioms import INVERTIBLE
 from .equations import Equation, Step, symmetries
 from .rules import WORDS
@@ -21,6 +22,7 @@ from .walk import GaveUp, Walk, carried_out
 from .words import (
     FURTHER,
     ONE,
+    SHARED,
     Alphabet,
     Letter,
     Number,
@@ -103,7 +105,13 @@ class Problem:
         self.alphabet = Alphabet()
         self.opaque: list[Opaque] = []
         self.contexts: list[tuple[Any, Any]] = []  # (source, binding): the models at their states
+        self.relations: list[tuple[str, str, str]] = []  # (mark of a tree made of another, how, that one's mark)
         self.sides: list[Polynomial] = []
+        self.of_one_model = False  # whether the statement was made of a model's expressions, and not read for all
+        self.unknown: set[str] = set()  # names of constants whose numbers are of no account
+        self.assumed: list[tuple[Equation, str]] = []  # hypotheses of the user's; a letter that one says to be definite
+        self.determinants: set[str] = set()  # letters of which ln|det| is taken: that they are regular is presupposed
+        self.scalars = False  # whether both sides are scalars: traces, determinants, norms
         self.numbers = False  # whether both sides map R^1 to R^1
         self._named_operands = 0
         self._leaves: dict[Any, str] = {}
@@ -117,7 +125,8 @@ class Problem:
 
     def polynomials(self) -> list[Polynomial]:
         """What the statement is made of: both sides, and the operands of the letters that it adds."""
-        return [*self.sides, *(o.inner for o in self.opaque)]
+        assumed = [p for equation, _ in self.assumed for p in (equation.lhs, equation.rhs)]
+        return [*self.sides, *(o.inner for o in self.opaque), *assumed]
 
     def expand(self, expression: Any) -> Spelling:
         """The expression in words, as the step that says so.
@@ -154,7 +163,7 @@ class Problem:
             case "identity":
                 return {(): ONE}
             case "scaled":
-                c = _exact(e.coefficient)
+                c = exact(e.coefficient)
                 p = yield self._words(e.children[0], transposed)
                 return {w: c * x for w, x in p.items()} if c else {}
             case "sum":
@@ -192,11 +201,11 @@ class Problem:
             case "identity":
                 return {(): ONE}
             case "scaled" if e.coefficient:
-                c = ratio(1, _exact(e.coefficient))
+                c = ratio(1, exact(e.coefficient))
                 return {w: c * x for w, x in (yield self._inverse(e.children[0])).items()}
             case "transpose":
                 return self._star((yield self._inverse(e.children[0])))
-            case "product" if all(map(_square, e.children)):
+            case "product" if all(map(square, e.children)):
                 return (yield self._product(self._inverse(f) for f in reversed(e.children)))
             case "symbol" if e.name in UNFOLDED:
                 return (yield self._inverse(self._unfolded(e)))
@@ -221,17 +230,28 @@ class Problem:
         """The letter that an expression is."""
         return carried_out(self._letter(e))
 
+    def operand(self, e: Any) -> str:
+        """The letter of what a determinant or norm is taken of: its own where it is one."""
+        return (
+            self.letter(e) if e.kind in ("symbol", "constant") and e.name not in UNFOLDED else carried_out(self._operand("operand", e, e))
+        )
+
     def _letter(self, e: Any) -> Walk:
         if e not in self._leaves:
-            if e.kind in ("blockdiag", "sqrt"):
-                return (yield self._operand(e.kind, e, e.children[0]))
+            if e.kind in ("blockdiag", "sqrt") or e.kind == "function" and e.name == "lower_half":
+                return (yield self._operand("half" if e.kind == "function" else e.kind, e, e.children[0]))
             self._leaves[e] = self._symbol(e) if e.kind == "symbol" else self._other(e)
         return self._leaves[e]
 
     def _symbol(self, e: Any) -> str:
         source, ascii, arguments, binding = symbol_parts(e)
-        mark = self._mark_of(source, binding)
         text, _ = _TABLE.get(ascii, (e.text(), ""))
+        made = source.derived_from
+        if made is not None and made[0] == "hinge subset" and text in SHARED:
+            source, made = made[1], None
+        mark = self._mark_of(source, binding)
+        if made is not None and (mark, made[0]) not in [(m, kind) for m, kind, _ in self.relations]:
+            self.relations.append((mark, made[0], self._mark_of(made[1], binding)))
         known = self.alphabet.letters.get(text + mark)
         if known is not None and known.ascii == ascii and not arguments:
             self.alphabet.add(Letter(known.name, known.text, known.latex, known.symmetric, known.shape, known.ascii, e))
@@ -256,6 +276,8 @@ class Problem:
     def _other(self, e: Any) -> str:
         """Vectors, constants, others' operators: letters of which nothing is known but what their kind says."""
         vector = e.kind == "vector"
+        if e.kind == "constant" and e.name in self.unknown:
+            return self._named(f"‹{e.text()}›", Letter("", e.text(), e.latex(), False, "full", None, e))
         shape = "diagonal" if not vector and e.is_block_diagonal else "full"
         return self._named(f"‹{e.text()}›", Letter("", e.text(), e.latex(), not vector and bool(e.is_symmetric), shape, None, e))
 
@@ -273,17 +295,27 @@ class Problem:
             inner = yield self._words(operand)
             if len(self.opaque) == OPERANDS:
                 raise GaveUp
-            name = f"⟨{len(self.opaque) + 1}⟩"
-            text, latex = self._shown(inner, e) if kind == "inverse" else (e.text(), f"{{{e.latex()}}}")
+            name = self._factor(inner) or f"⟨{len(self.opaque) + 1}⟩"
+            text, latex = self._shown(inner, e) if kind in ("inverse", "operand") else (e.text(), f"{{{e.latex()}}}")
             symmetric = kind == "blockdiag" and bool(e.is_symmetric)
-            self.alphabet.add(Letter(name, text, latex, symmetric, "full" if kind == "inverse" else "diagonal", None, e))
+            shape = "diagonal" if kind in ("blockdiag", "sqrt", "half") else "full"
+            known = e.written_out() if hasattr(e, "written_out") else e  # of a formula with derivatives, what it is
+            self.alphabet.add(Letter(name, text, latex, symmetric, shape, None, known))
             definition = Equation("definition", f"{text} = {self.alphabet.text(inner)}", monomial(name), inner)
             self.opaque.append(Opaque(name, kind, e, inner, definition))
             self._leaves[key] = name
         found = self._leaves[key]
-        if kind == "inverse":
+        if kind in ("inverse", "operand"):
             self._used.append(next(o.definition for o in self.opaque if o.name == found))
         return found
+
+    def _factor(self, inner: Polynomial) -> str:
+        """The name of A = I + HφK, where these words are that: the innovations factor of a model goes by one name."""
+        for mark in self.marks:
+            base = next((base for m, how, base in self.relations if m == mark and how == "hinge subset"), mark)
+            if inner == factors.of(factors.FACTOR, mark, base) and factors.name_of(mark) not in self.alphabet.letters:
+                return factors.name_of(mark)
+        return ""
 
     def _shown(self, inner: Polynomial, e: Any) -> tuple[str, str]:
         """How the operand of an inverse is called: ℳ where it is that, X₁, X₂, ... where its own text is long."""
@@ -307,7 +339,7 @@ def _same_state(a: Any, b: Any) -> bool:
     return a is b or a is not None and b is not None and a.__reduce__()[1] == b.__reduce__()[1]
 
 
-def _exact(coefficient: float) -> Number:
+def exact(coefficient: float) -> Number:
     if not math.isfinite(coefficient):
         raise _core.EvaluationError(f"a coefficient {coefficient} is no number to reckon with")
     return ratio(Fraction(coefficient), 1)
@@ -317,7 +349,7 @@ def _bound(symbol: Any, binding: Any) -> Any:
     return symbol if binding is None else symbol._bound(binding)
 
 
-def _square(factor: Any) -> bool:
+def square(factor: Any) -> bool:
     """Whether a factor is square by meaning: H may be square by accident."""
     domain, codomain = factor.domain, factor.codomain
     return domain is None or domain == codomain or domain.dual == codomain

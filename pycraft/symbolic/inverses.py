@@ -9,9 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import lru_cache
 
+from . import factors
 from .axioms import theory
 from .blocks import diagonal_part
-from .equations import Equation, Step, Use, chain_holds, numbered
+from .equations import Equation, Step, Use, chain_holds, marked, numbered
 from .expand import Opaque, Problem
 from .presuppositions import (
     ALWAYS,
@@ -22,10 +23,13 @@ from .presuppositions import (
     is_regular_constant,
     is_triangular,
 )
+from .relations import at_the_roots, compliance_facts, crosses_with_axes, in_world
 from .rules import Rules, Setting, normal_form, rule_from, rules_for, weight
 from .words import (
     ONE,
+    SHARED,
     Alphabet,
+    Letter,
     Number,
     Polynomial,
     Word,
@@ -34,10 +38,10 @@ from .words import (
     inverse_of,
     inverted,
     monomial,
-    of_model,
     parse,
     plain,
     ratio,
+    root_of,
     split,
     times,
 )
@@ -71,27 +75,80 @@ class LocalRules:
         self.problem, self.setting = problem, setting
         self.alphabet: Alphabet = problem.alphabet
         self.local: list[Equation] = []
-        self.rules: Rules = rules_for(setting, problem.marks).copy()
+        self.locked = tuple((mark, base) for mark, how, base in problem.relations if how == "hinge subset")
+        self.rules: Rules = rules_for(setting, problem.marks, self.locked).copy()
         blocks = Setting(setting.hypotheses, composite=True, compliance=True)
-        self.block_rules = rules_for(blocks, problem.marks).copy() if any(o.kind == "blockdiag" for o in problem.opaque) else None
+        diagonal_parts = any(o.kind == "blockdiag" for o in problem.opaque)
+        self.block_rules = rules_for(blocks, problem.marks, self.locked).copy() if diagonal_parts else None
         self._rank = 0
+        self._factors: dict[str, factors.Factor | None] = {}
         self._forms: list[tuple[str, Polynomial]] = []
         self._roots: list[tuple[Opaque, Polynomial, list[Step]]] = []
         self._swept: list[tuple[str, str, Polynomial, list[Step]]] = []
         named = sorted({split(x)[0] for p in problem.polynomials() for w in p for x in w if inverted(x)})
         self.regular = {n for n in named if plain(n) in ALWAYS}
         self.needs: dict[str, set[str]] = {}
-        constants = {n: known.expression for n, known in self.alphabet.letters.items() if known.expression is not None}
+        letters = self.alphabet.letters.items()
+        constants = {n: x.expression for n, x in letters if x.expression is not None and x.text not in problem.unknown}
         self.regular |= {n for n in named if is_regular_constant(constants.get(n))}
         self._definite = {n for n, e in constants.items() if is_positive_constant(e)}
         for equation, word in extra:
             self.add(equation, word)
+        for equation, name in problem.assumed:
+            self._assume(equation, name)
+        self._world_axes()
+        source = problem.contexts[0][0] if problem.contexts else None
+        for name, e in constants.items():
+            for equation, word in at_the_roots(name, e, source) if getattr(e, "kind", "") == "constant" else ():
+                self.add(equation, word)
         self.inverted = {inverse_of(n) for n in named}
         for name in named:
             if name not in theory().alphabet.letters:
                 self._add_pairs(name)
+        for equation, word in (*compliance_facts(problem, setting.hypotheses), *crosses_with_axes(problem)):
+            self.add(equation, word)
+        kinds = {"inverse": self._inverse, "blockdiag": self._blocks, "sqrt": self._root, "half": self._half}
         for opaque in problem.opaque:
-            {"inverse": self._inverse, "blockdiag": self._blocks, "sqrt": self._root}[opaque.kind](opaque)
+            if opaque.kind != "operand":
+                kinds[opaque.kind](opaque)
+
+    def _assume(self, equation: Equation, name: str) -> None:
+        """A hypothesis of the user's as a rule; of X > 0, X* = X, and that X has an inverse."""
+        if name:
+            self.regular.add(name)
+            self._definite.add(name)
+        form = normal_form(equation.difference, self.rules, self.alphabet)
+        if not form:
+            return
+        lead = max(form, key=weight)
+        c, p = form[lead], equation.difference
+        reduced, steps = self.reduce(p)
+        rest = {w: ratio(-x, c) for w, x in reduced.items() if w != lead}
+        uses = [Use(ratio(1, c), (), equation, (), lead)] + [u.between((), (), ratio(-1, c)) for s in steps for u in s.uses]
+        step = Step({lead: ONE}, rest, uses, self.alphabet)
+        solved = Equation(
+            "lemma", f"{self.alphabet.word_text(lead)} = {self.alphabet.text(rest)}", {lead: ONE}, rest, steps=numbered([step])
+        )
+        if rest == equation.rhs and {lead: ONE} == equation.lhs:
+            solved = equation
+        self.local.append(solved)
+        self._rank -= 1
+        for rules in filter(None, (self.rules, self.block_rules)):
+            rules.add(rule_from(solved, lead, self._rank))
+            star = self.alphabet.star_word(lead)
+            if star not in solved.difference:
+                rules.add(rule_from(solved.transposed(self.alphabet), star, self._rank))
+
+    def _world_axes(self) -> None:
+        """Letters in world axes by those of their model."""
+        found = {
+            x.replace("*", "") if not inverted(x) else inverse_of(split(x)[0]) for p in self.problem.polynomials() for w in p for x in w
+        }
+        for mark, how, base in self.problem.relations:
+            for letter in sorted(found) if how == "world frame" else ():
+                equation = in_world(letter, mark, base)
+                if equation is not None:
+                    self.add(equation, (letter,))
 
     def add(self, equation: Equation, word: Word, blocks: bool = True) -> None:
         """A rule and its transpose, before all that are there."""
@@ -126,6 +183,8 @@ class LocalRules:
             where = f" where {' and '.join(sorted(self.setting.hypotheses))}" if self.setting.hypotheses else ""
             raise Void(f"{o.expression.text()} = 0{where}, which has no inverse")
         self._by_structure(X, o.inner, form, steps)
+        if self._by_factors(o, form):
+            return
         for z in self._candidates(form):
             lemma = self._inverse_is(X, o.inner, z, o.definition)
             if lemma is not None:
@@ -145,6 +204,43 @@ class LocalRules:
                     rules.add(rule_from(lemma, (inverse_of(a.star(X)),), self._rank))
         self._forms.append((X, form))
 
+    def factor(self, mark: str) -> factors.Factor | None:
+        """A = I + HφK of one model, with its inverse; None if that is not shown."""
+        if mark not in self._factors:
+            base = dict(self.locked).get(mark, mark)
+            context = self.problem.contexts[self.problem.marks.index(mark)] if self.problem.contexts else None
+            name, definition = factors.letter(self.alphabet, mark, base, context)
+            lemma = self._inverse_is(name, definition.rhs, factors.of(factors.INVERSE, mark, base), definition)
+            self._factors[mark] = None if lemma is None else factors.Factor(name, definition, lemma)
+        return self._factors[mark]
+
+    def factored(self, X: str, form: Polynomial, definition: Equation) -> tuple[Equation, factors.Factor, str, Number] | None:
+        """(X = c A D A*, A, the mark of its model, c) of a letter with this definition and normal form; None if it is not that."""
+        key, scale = _scaled(form)
+        for mark in self.problem.marks:
+            base = dict(self.locked).get(mark, mark)
+            product = self.reduce(factors.of(factors.PRODUCT, mark, base))[0]
+            its_key, its_scale = _scaled(product) if product else ((), ONE)
+            if its_key == key and (factor := self.factor(mark)) is not None:
+                c = ratio(scale, its_scale)
+                lemma = factors.factorization(X, c, definition, factor, mark, self.alphabet, self.reduce)
+                return None if lemma is None else (lemma, factor, mark, c)
+        return None
+
+    def _by_factors(self, o: Opaque, form: Polynomial) -> bool:
+        """X⁻¹ where X is ℳ + J, by its factors."""
+        found = self.factored(o.name, form, o.definition)
+        if found is None:
+            return False
+        product, factor, mark, c = found
+        self.needs[o.name] = inverses_used(factor.premises)
+        self.needs[factor.name] = self.needs[o.name]
+        whole = factors.inverse_of_product(o.name, c, product, factor, mark, self.alphabet, self.pair)
+        self.add(whole, (inverse_of(o.name),))
+        if factor.inverse not in self.local:
+            self.add(factor.inverse, (inverse_of(factor.name),))
+        return True
+
     def _by_structure(self, X: str, inner: Polynomial, form: Polynomial, steps: list[Step]) -> None:
         """X regular, where its words say so: as they were written, or in normal form."""
         for p, premises in ((inner, ()), (form, [e for step in steps for e in step.premises()])):
@@ -161,9 +257,10 @@ class LocalRules:
             if all(plain(x) in ("φ", "ψ", "D", "M", "P", "R", "Υ") or inverted(x) for x in word):
                 yield {tuple(inverse_of(x) for x in reversed(word)): ratio(1, c)}
         for mark in self.problem.marks:
-            key, scale = _scaled({tuple(_unmarked(x, mark) for x in w): c for w, c in form.items()})
+            base = dict(self.locked).get(mark, mark)
+            key, scale = _scaled({tuple(_unmarked(x, base if plain(x) in SHARED else mark) for x in w): c for w, c in form.items()})
             for z, its_scale in _known_inverses(self.setting).get(key, ()):
-                yield {tuple(of_model(x, mark) for x in w): ratio(c * its_scale, scale) for w, c in z.items()}
+                yield {marked(w, mark, base): ratio(c * its_scale, scale) for w, c in z.items()}
         key, scale = _scaled(form)
         for X, other in self._forms:
             for name, p in ((X, other), (self.alphabet.star(X), self.alphabet.star_of(other))):
@@ -207,14 +304,30 @@ class LocalRules:
         assert self.block_rules is not None
         a = self.alphabet
         form, steps = self.block_rules.reduce(o.inner, a)
-        value = diagonal_part(form, a)
+        chain = "serial chain" in self.setting.hypotheses
+        value = diagonal_part(form, a, chain)
         if any(a.letters[split(x)[0]].word for w in value for x in w) and self._recursion(o):
             return
-        text = f"{a.letters[o.name].text} = {a.text(value)}"
+        name = o.name
+        if form != o.inner:  # first inside, then by blocks
+            name = self._written(o, form, steps)
+        text = f"{a.letters[name].text} = {a.text(value)}"
         note = "the diagonal blocks of each word, by where its letters lead on the tree"
-        equation = Equation("structure", text, {(o.name,): ONE}, value, steps=numbered(steps), uses=[o.definition], note=note)
-        equation.check = lambda: chain_holds(steps, o.inner, form) and diagonal_part(form, a) == value
-        self.add(equation, (o.name,))
+        equation = Equation("structure", text, {(name,): ONE}, value, note=note, uses=[theory()("S = 0")] * chain)
+        equation.check = lambda: diagonal_part(form, a, chain) == value
+        self.add(equation, (name,))
+
+    def _written(self, o: Opaque, form: Polynomial, steps: list[Step]) -> str:
+        """The letter of blockdiag(the normal form), with the rule that blockdiag(X) is that."""
+        a, known = self.alphabet, self.alphabet.letters[o.name]
+        name = f"{o.name}form"
+        latex = f"\\operatorname{{blockdiag}}({a.latex(form)})"
+        a.add(Letter(name, f"blockdiag({a.text(form)})", latex, known.symmetric, "diagonal", None, known.expression))
+        text = f"{a.text(o.inner)} = {a.text(form)}"
+        inside = Equation("structure", text, {(o.name,): ONE}, {(name,): ONE}, steps=numbered(list(steps)), uses=[o.definition])
+        inside.check = lambda: chain_holds(steps, o.inner, form)
+        self.add(inside, (o.name,))
+        return name
 
     def _recursion(self, o: Opaque) -> bool:
         """Y = X + E Y E* for Y = blockdiag(A X A*), A = (I-E)⁻¹ and X block diagonal; Y = Z where Z obeys the same. Whether Y is that."""
@@ -261,7 +374,9 @@ class LocalRules:
         """The equation with its sides in normal form, as a rule for one of its words."""
         a = self.alphabet
         form, steps = self.reduce(equation.difference)
-        c = form[lead]
+        c = form.get(lead)
+        if c is None:  # the letters are written by those of another tree
+            return
         rest = {w: ratio(-x, c) for w, x in form.items() if w != lead}
         uses = [Use(ratio(1, c), (), equation, (), lead)] + [u.between((), (), ratio(-1, c)) for step in steps for u in step.uses]
         step = Step({lead: ONE}, rest, uses, a, f"{equation.text}, solved for {a.word_text(lead)}")
@@ -279,6 +394,9 @@ class LocalRules:
                 same.check = lambda i=other.inner, s=its_steps: chain_holds(steps, o.inner, form) and chain_holds(s, i, form)
                 self.add(same, (L,))
                 return
+            if (multiple := self._multiple(o, form, steps, other, its_form, its_steps)) is not None:
+                self.add(multiple, (L,))
+                return
         self._roots.append((o, form, steps))
         star = a.star(L)
         square = Equation("definition", f"{text} ({text})* = {a.text(o.inner)}", {(L, star): ONE}, o.inner)
@@ -294,6 +412,40 @@ class LocalRules:
             self._root_inverted(Y, L, word, c, square, steps)
         if len(word) == 1 and inverse_of(word[0]) in letters:
             self._root_meets_inverse(Y, L, word[0], c, square, steps)
+
+    def _multiple(
+        self, o: Opaque, form: Polynomial, steps: list[Step], other: Opaque, its_form: Polynomial, its_steps: list[Step]
+    ) -> Equation | None:
+        """√(c²A) = c √A, c a fraction; None if the operands are not such multiples."""
+        if not form or not its_form:
+            return None
+        (key, scale), (its_key, its_scale) = _scaled(form), _scaled(its_form)
+        c = root_of(ratio(scale, its_scale)) if key == its_key else None
+        if c is None:
+            return None
+        a = self.alphabet
+        text = f"{a.letters[o.name].text} = {a.text({(other.name,): c})}"
+        made = Equation(
+            "structure", text, {(o.name,): ONE}, {(other.name,): c}, note="a root of a positive multiple is that multiple's root"
+        )
+        made.steps = [*steps, *its_steps]
+        made.check = lambda: chain_holds(steps, o.inner, form) and chain_holds(its_steps, other.inner, its_form)
+        return made
+
+    def _half(self, o: Opaque) -> None:
+        """T + T* = X for the lower half T of a symmetric X, half of the diagonal included."""
+        a, T = self.alphabet, o.name
+        form, steps = self.reduce(o.inner)
+        if a.star_of(form) != form:
+            return
+        text = f"{a.letters[T].text} + ({a.letters[T].text})* = {a.text(form)}"
+        whole = Equation("structure", text, {(T,): ONE, (a.star(T),): ONE}, form, steps=list(steps), uses=[o.definition])
+        whole.note = "the halves of a symmetric operator are each other's transpose"
+        whole.check = lambda: chain_holds(steps, o.inner, form) and a.star_of(form) == form
+        self.local.append(whole)
+        self._rank -= 1
+        for rules in filter(None, (self.rules, self.block_rules)):
+            rules.add(rule_from(whole, (a.star(T),), self._rank))
 
     def _root_inverted(self, Y: str, L: str, word: Word, c: Number, square: Equation, steps: list[Step]) -> None:
         """L⁻¹A = L*, Y being L⁻¹ and c times the word A."""

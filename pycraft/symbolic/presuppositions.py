@@ -16,15 +16,13 @@ import numpy as np
 
 from .blocks import moves
 from .equations import Equation, foundations
-from .values import LARGEST, NoValue, Values
+from .values import LARGEST, SINGULAR, NoValue, Values, is_singular
 from .walk import GaveUp
 from .words import Alphabet, Polynomial, Word, inverted, parse, plain, split
 
-ALWAYS = ("φ", "ψ", "D")
-"""Letters that have an inverse on every tree with regular hinges."""
+ALWAYS = ("φ", "ψ", "X", "D")
+"""Letters that have an inverse on every tree with regular hinges; X are changes of frames."""
 SEMIDEFINITE = ("M", "P", "P⁺", "R", "J", "Υ", "Ω")
-SINGULAR = 1e-13
-"""Ratio of the smallest singular value to the largest below which an operator of a small model of ordinary bodies counts as singular."""
 _MASS_MATRIX, _WITH_J = parse("H φ M φ* H*"), parse("H φ M φ* H* + J")
 
 
@@ -73,7 +71,7 @@ def _sign(word: Word, alphabet: Alphabet, definite: frozenset[str]) -> str:
 
 def is_regular_constant(e: Any) -> bool:
     """Whether a user's constant has an inverse, by its numbers."""
-    return _numbers(e) and e.shape[0] == e.shape[1] and not _singular(np.asarray(e.dense()))
+    return _numbers(e) and e.shape[0] == e.shape[1] and not is_singular(np.asarray(e.dense()))
 
 
 def is_positive_constant(e: Any) -> bool:
@@ -86,11 +84,6 @@ def is_positive_constant(e: Any) -> bool:
 
 def _numbers(e: Any) -> bool:
     return getattr(e, "kind", "") == "constant" and max(e.shape) <= LARGEST
-
-
-def _singular(X: np.ndarray) -> bool:
-    values = np.linalg.svd(X, compute_uv=False) if np.isfinite(X).all() else np.zeros(1)
-    return values.size > 0 and not values[-1] > SINGULAR * values[0]
 
 
 # ---------------------------------------------------------------------- of a proof
@@ -138,7 +131,7 @@ def _exists(name: str, values: Values, inverted: bool) -> bool | None:
     e = values.alphabet.letters[name].expression
     try:
         value = values.letter(name) if e is None or e.sources else np.asarray(e.dense(rules=False))
-        return not (inverted and _singular(value))
+        return not (inverted and is_singular(value))
     except NoValue:
         return None
     except ArithmeticError:

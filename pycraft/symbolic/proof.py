@@ -11,11 +11,15 @@ from .derivative import Formula
 from .equations import Equation, Step, chain_holds, foundations, numbered
 from .expand import Opaque, Problem, Spelling
 from .presuppositions import nowhere
+from .shown import FullProof, aligned, escaped, lines, page
 from .values import LARGEST, NoValue, Values
 from .words import Alphabet, Polynomial, combine
 
 HYPOTHESES = ("J = 0", "serial chain", "single-DOF hinges", "constant H")
 """Names of the hypotheses that a proof may have, as models' traits name them."""
+
+COUNTED = "the coordinates of this model"
+"""The note of an equation that says how many coordinates one model has."""
 
 
 class Proof:
@@ -59,6 +63,7 @@ class Proof:
         self.rests_on = [e for e in foundations(p for s in self.steps for p in s.premises()) if e is not claim]
         self._spellings: list[Spelling] = []
         self._inverted: list[str] = []
+        self._determinants: list[str] = []
         self._opaque: list[Opaque] = []
         self._contexts: list[tuple[Any, Any]] = []
         self._read: Any = None
@@ -72,7 +77,7 @@ class Proof:
         """The proof of a statement that was read; none found if there are no steps."""
         statement, latex = (f"{getattr(read.lhs, how)()} = {getattr(read.rhs, how)()}" for how in ("text", "latex"))
         proof = cls(statement, latex, problem.alphabet, steps, forms, note=note)
-        proof._opaque = list(problem.opaque)
+        proof._opaque, proof._determinants = list(problem.opaque), sorted(problem.determinants)
         proof._spellings, proof._contexts, proof._read = list(spellings), list(problem.contexts), read
         proof.rests_on = foundations([*proof.rests_on, *(e for s in spellings for e in s.premises())]) if steps else []
         proof._found = proof.recheck()
@@ -108,8 +113,8 @@ class Proof:
     @property
     def hypotheses(self) -> list[str]:
         """Names of the hypotheses that steps or their lemmas use."""
-        used = {e.hypothesis for e in self.rests_on if e.kind == "hypothesis"}
-        return [name for name in HYPOTHESES if name in used]
+        used = dict.fromkeys(e.hypothesis for e in self.rests_on if e.kind == "hypothesis" and e.hypothesis)
+        return [*(name for name in HYPOTHESES if name in used), *(name for name in used if name not in HYPOTHESES)]
 
     @property
     def axioms(self) -> list[str]:
@@ -127,10 +132,13 @@ class Proof:
         return [Proof.of_lemma(e, self._alphabet) for e in self.rests_on if e.kind in ("lemma", "structure")]
 
     # ------------------------------------------------------------------ what it takes for granted
-    def takes_for_granted(self, letters: Sequence[str]) -> None:
-        """The inverses of these letters are presuppositions, and the square roots that the statement holds."""
-        self._inverted = list(letters)
+    def takes_for_granted(self, letters: Sequence[str], assumed: Sequence[tuple[Equation, str]] = ()) -> None:
+        """The inverses of these letters are presuppositions; those that the user assumes to exist are hypotheses."""
         self.presupposes = [self._inverse_text(name) for name in letters]
+        given = [(equation, name) for equation, name in assumed if name]
+        self._inverted = [*letters, *(name for _, name in given)]
+        if given and any(e.kind == "inverse" for e in self.rests_on):
+            self.rests_on += [equation for equation, _ in given if equation not in self.rests_on]
 
     def _inverse_text(self, name: str) -> str:
         """The inverse of a letter as it was typed."""
@@ -138,12 +146,13 @@ class Proof:
         return f"{self._alphabet.letter_text(name)}⁻¹" if typed is None else f"({typed})⁻¹"
 
     def void_where(self, hypotheses: Sequence[str], operators: Any = None) -> str:
-        """Why the proof says nothing under these hypotheses: an inverse or a root in it exists on no model that was tried. Else empty."""
+        """Why the proof says nothing under these hypotheses: an inverse, a root or a ln|det| in it exists on no model tried. Else empty."""
         roots = [o.name for o in self._opaque if o.kind == "sqrt"]
-        name = nowhere(self._inverted, roots, self._alphabet, hypotheses, self._contexts, operators)
+        name = nowhere([*self._inverted, *self._determinants], roots, self._alphabet, hypotheses, self._contexts, operators)
         if not name:
             return ""
-        shown = self._inverse_text(name) if name in self._inverted else self._alphabet.letter_text(name)
+        text = self._alphabet.letter_text(name)
+        shown = self._inverse_text(name) if name in self._inverted else f"ln|det {text}|" if name in self._determinants else text
         where = f" where {' and '.join(hypotheses)}" if hypotheses else ""
         return f"it takes {shown}, which exists on no model that was tried{where}"
 
@@ -212,10 +221,17 @@ class Proof:
         """Residuals at a random state of the model at hand; of an example where that is large, or fails a hypothesis."""
         self._model = operators
         unmet = [] if operators is None else _unmet(self.hypotheses, operators)
-        candidates: list[Any] = [example(self.hypotheses)] if operators is None or unmet or len(operators.F) > LARGEST else [operators]
-        for candidate in candidates:
+        if unmet and any(e.note == COUNTED for e in self.rests_on):  # a number that belongs to the model at hand
+            self.unmet = unmet
+            return
+        if set(self.hypotheses) - {*HYPOTHESES}:  # no model is known that meets what was assumed
+            self.unmet = unmet
+            return
+        own = [] if operators is None or unmet or len(operators.F) > LARGEST else [operators]
+        for candidate in (*own, *examples(self.hypotheses)):
             try:
                 self.verify(candidate)
+                break
             except (ArithmeticError, ValueError, TypeError):
                 continue
         self.unmet = unmet
@@ -232,11 +248,11 @@ class Proof:
         title = f"{self.statement}\n  proved" + (f" where {' and '.join(self.hypotheses)}" if self.hypotheses else ", no hypothesis")
         title += f"; presupposes {', '.join(self.presupposes)}" if self.presupposes else ""
         title += f"; not met by the model at hand: {' and '.join(self.unmet)}" if self.unmet else ""
-        lines = [title, *_lines(self.steps)]
-        lines += [f"  {self.note}"] if self.note else []
-        lines += [f"  rests on {'; '.join(self.axioms)}"] if self.axioms else []
-        lines += [f"  largest residual of a step at a random state: {self.worst:.1e}"] if self.worst is not None else []
-        return "\n".join(lines)
+        shown = [title, *lines(self.steps)]
+        shown += [f"  {self.note}"] if self.note else []
+        shown += [f"  rests on {'; '.join(self.axioms)}"] if self.axioms else []
+        shown += [f"  largest residual of a step at a random state: {self.worst:.1e}"] if self.worst is not None else []
+        return "\n".join(shown)
 
     def _reason(self) -> str:
         if self.note:
@@ -247,58 +263,26 @@ class Proof:
     def __repr__(self) -> str:
         return str(self)
 
-    def text(self) -> str:
-        """The proof with the proofs of all its lemmas, down to the axioms, each before it is used."""
-        return "\n\n".join([*map(str, self.all_lemmas() if self else []), str(self)])
-
     def latex(self) -> str:
         """The chain of steps as an aligned display, or both normal forms."""
         if not self:
-            return " \\ne ".join(self._alphabet.latex(p) for p in self._forms) if not self.note else f"\\text{{{_escaped(self.note)}}}"
-        rows = [f"& {self.steps[0].before_latex()}" if self.steps else ""]
-        rows += [f"={{}}& {s.after_latex()} && \\text{{({s.number})}}\\;{_reason_latex(s)}" for s in self.steps]
-        return "\\begin{aligned}" + "\\\\\n".join(rows) + "\\end{aligned}"
+            return " \\ne ".join(self._alphabet.latex(p) for p in self._forms) if not self.note else f"\\text{{{escaped(self.note)}}}"
+        return aligned(self.steps)
+
+    def full(self) -> FullProof:
+        """The proof with the derivations of all its lemmas, down to the axioms, numbered, each before what cites it.
+
+        It prints as text, as HTML in notebooks, and has `.latex()`.
+        """
+        return FullProof(self)
+
+    def _repr_html_(self) -> str:
+        return page(self)
 
     def _repr_latex_(self) -> str:
         where = f" where {' and '.join(self.hypotheses)}" if self.hypotheses else ""
         verdict = f"proved{where}: " if self else "no proof found; normal forms of both sides: " if not self.note else "no proof found: "
-        return f"$$\\begin{{gathered}}{self._latex}\\\\ \\text{{{_escaped(verdict)}}}\\\\ {self.latex()}\\end{{gathered}}$$"
-
-
-def _lines(steps: Sequence[Step]) -> list[str]:
-    """The chain, one step a line, reasons in a column."""
-    if not steps:
-        return []
-    rows = [("", steps[0].before_text(), "")]
-    rows += [(f"{s.number}.", f"= {s.after_text()}", f"[{s.reason}]") for s in steps]
-    width = min(76, max(len(middle) for _, middle, _ in rows))
-    lines = []
-    for number, middle, reason in rows:
-        line = f"  {number:>3} {middle}"
-        if reason:
-            line = f"{line:<{width + 6}}   {reason}" if len(middle) <= width else f"{line}\n{'':>{width + 6}}   {reason}"
-        lines.append(line)
-    return lines
-
-
-def _reason_latex(step: Step) -> str:
-    if step.title or not step.uses:
-        return f"\\text{{{_escaped(step.reason)}}}"
-    latex = step.alphabet.latex
-    return ";\\;".join(f"{latex(e.lhs)} = {latex(e.rhs)}" for e in step.equations)
-
-
-def _escaped(text: str) -> str:
-    """Plain text for LaTeX's \\text: letters of the algebra as mathematics."""
-    for a, b in _MATHEMATICS:
-        text = text.replace(a, b)
-    return text
-
-
-_MATHEMATICS = [
-    *(("\\", ""), ("_", "\\_"), ("⁻¹", "$^{-1}$"), ("*", "$^*$"), ("φ", "$\\phi$"), ("ψ", "$\\psi$"), ("Ω", "$\\Omega$")),
-    *(("ℳ", "$\\mathcal{M}$"), ("𝒥", "$\\mathcal{J}$"), ("Λ", "$\\Lambda$"), ("Υ", "$\\Upsilon$"), ("∂", "$\\partial$")),
-]
+        return f"$$\\begin{{gathered}}{self._latex}\\\\ \\text{{{escaped(verdict)}}}\\\\ {self.latex()}\\end{{gathered}}$$"
 
 
 def _unmet(hypotheses: Sequence[str], operators: Any) -> list[str]:

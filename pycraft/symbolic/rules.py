@@ -8,19 +8,34 @@ abbreviations, then the recursions.
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
 
+from . import mechanics
 from .axioms import Theory, solved, theory
-from .equations import Equation, Step, Use, numbered
+from .equations import Equation, Step, Use, marked, numbered
 from .walk import GaveUp
-from .words import ONE, Alphabet, Number, Polynomial, Word, add_to, inverted, of_model, plain, ratio
+from .words import ONE, Alphabet, Number, Polynomial, Word, add_to, inverted, plain, ratio
 
 WORDS, REWRITES = 2000, 12000
-"""Sizes at which a reduction gives up."""
+"""Sizes at which a reduction gives up; `generous` allows for more."""
+_allowed: ContextVar[int] = ContextVar("allowed", default=1)
+
+
+@contextmanager
+def generous(times: int) -> Iterator[None]:
+    """Reductions of several times the size, inside the block."""
+    token = _allowed.set(times)
+    try:
+        yield
+    finally:
+        _allowed.reset(token)
+
 
 # (the word that goes, the equation), in order of rank. Transposes are rules as well.
-_CANCELLING = [(f"{x} {x}⁻¹", f"{x} {x}⁻¹ = I") for x in ("D", "M", "P", "R", "J", "Υ")]
+_CANCELLING = [(f"{x} {x}⁻¹", f"{x} {x}⁻¹ = I") for x in ("D", "M", "P", "R", "J", "Υ", "X")] + [("X⁻¹ X", "X⁻¹ X = I")]
 _RESOLVENTS = [
     ("φ E_φ", "φ E_φ = φ − I"),
     ("E_φ φ", "E_φ φ = φ − I"),
@@ -62,7 +77,6 @@ _OPENING = [
     ("P⁺", "P⁺ = P − G D G*"),
     ("E_ψ", "E_ψ = E_φ − K H"),
     ("Ω", "Ω = ψ* H* D⁻¹ H ψ"),
-    ("V", "V = φ* H* θ̇"),
 ]
 _REST = [
     ("ψ E_φ", "ψ E_φ = ψ − I + ψ K H"),
@@ -78,11 +92,11 @@ _COMPLIANCE = [
     ("E_φ* Υ ψ", "E_φ* Υ ψ = H* K* Υ ψ + E_φ* Υ − H* K* Υ + S ψ + Υ ψ − H* D⁻¹ H ψ"),
     ("φ* H* K* Υ ψ", "φ* H* K* Υ ψ = φ* H* K* Υ + φ* H* D⁻¹ H ψ − φ* Υ − Υ ψ + Υ − φ* S ψ"),
 ]
-_VELOCITIES = [("a", "a = Ṽ H* θ̇ + Ḣ* θ̇"), ("b", "b = V̄ M V")]
 
 _WEIGHTS = {
     **{"D": 0, "J": 0, "K": 1, "H": 1, "G": 2, "P": 3, "R": 3, "M": 5, "E_φ": 3, "φ": 1, "ψ": 1, "Υ": 3, "S": 22},
-    **{"φ̃": 9, "ψ̃": 9, "τ": 9, "τ̄": 9, "P⁺": 19, "E_ψ": 9, "Ω": 19, "V": 9, "a": 19, "b": 29},
+    **{"φ̃": 9, "ψ̃": 9, "τ": 9, "τ̄": 9, "P⁺": 19, "E_ψ": 9, "Ω": 19},
+    **mechanics.WEIGHTS,
 }
 _HEAVY = {"∂": 40, "‹": 30}
 _INVERSE_WEIGHTS = {"D": 0, "φ": 9, "ψ": 19}
@@ -125,7 +139,7 @@ def rule_from(equation: Equation, word: Word, group: int) -> Rule:
 class Budget:
     """How many rewrites may still be spent; the same input spends the same."""
 
-    rewrites: int = REWRITES
+    rewrites: int = field(default_factory=lambda: REWRITES * _allowed.get())
 
 
 @dataclass
@@ -219,7 +233,7 @@ class Rules:
                 uses.append(Use(c * rule.factor, left, rule.equation, right, rule.word, rule.factor > 0))
                 todo += [(left + w + right, c * y) for w, y in reversed(rule.to)]
                 budget.rewrites -= 1
-                if budget.rewrites < 0 or len(todo) + len(done) > WORDS:
+                if budget.rewrites < 0 or len(todo) + len(done) > WORDS * _allowed.get():
                     raise GaveUp
         return Step(p, done, uses, alphabet)
 
@@ -243,7 +257,7 @@ class Setting:
     """What decides on the rules: hypotheses, and which recursions the statement needs.
 
     With `composite`, φMφ* is written by R; with `compliance`, Ω by Υ and S, else S by Υ, which then is like any other letter; with
-    `velocities`, a and b are written by Ṽ, V̄ and Ḣ.
+    `velocities`, a and b are written by Ṽ, V̄ and Ḣ, with the rules of `mechanics`.
     """
 
     hypotheses: frozenset[str] = frozenset()
@@ -256,8 +270,8 @@ def chosen(setting: Setting) -> list[tuple[str, str]]:
     """(word, equation) of a setting, by rank."""
     facts: list[tuple[str, str]] = [(letter, text) for letter, text in _vanishing(setting)]
     facts += [(word, text) for word, text in _CANCELLING if word != "J J⁻¹" or "J = 0" not in setting.hypotheses]
-    facts += [*_RESOLVENTS, *_GAINS, *_OPENING]
-    facts += _VELOCITIES if setting.velocities else []
+    facts += [*_RESOLVENTS, *_GAINS, *_OPENING, *mechanics.ABBREVIATIONS]
+    facts += mechanics.VELOCITIES if setting.velocities else []
     facts += _ARTICULATED
     facts += _WITH_R if setting.composite else _WITHOUT_R
     facts += _REST
@@ -271,8 +285,11 @@ def _vanishing(setting: Setting) -> list[tuple[str, str]]:
 
 
 @lru_cache(maxsize=64)
-def rules_for(setting: Setting, marks: tuple[str, ...] = ("",)) -> Rules:
-    """The rules of a setting for the letters of one or more models. Shared: copy before adding."""
+def rules_for(setting: Setting, marks: tuple[str, ...] = ("",), locked: tuple[tuple[str, str], ...] = ()) -> Rules:
+    """The rules of a setting for the letters of one or more models. The result is shared: copy before adding.
+
+    `locked` : (mark, that of its model) of the trees with hinges locked.
+    """
     facts = theory()
     rules = Rules()
     for group, (text_word, text) in enumerate(chosen(setting)):
@@ -284,16 +301,16 @@ def rules_for(setting: Setting, marks: tuple[str, ...] = ("",)) -> Rules:
             if text != zero:
                 equation = corollary(equation, word, letter, zero)
         for mark in marks:
-            _add_both(rules, equation, word, facts, mark, group)
+            _add_both(rules, equation, word, facts, (mark, dict(locked).get(mark, mark)), group)
     return rules
 
 
-def _add_both(rules: Rules, equation: Equation, word: Word, facts: Theory, mark: str, group: int) -> None:
+def _add_both(rules: Rules, equation: Equation, word: Word, facts: Theory, marks: tuple[str, str], group: int) -> None:
     """A rule and its transpose, for the letters of one model."""
     starred = facts.alphabet.star_word(word)
-    pairs = [(equation, word)] + ([(equation.transposed(facts.alphabet), starred)] if starred != word else [])
+    pairs = [(equation, word)] + ([(equation.transposed(facts.alphabet), starred)] if starred not in equation.difference else [])
     for e, w in pairs:
-        rules.add(rule_from(e.copied(mark), tuple(of_model(x, mark) for x in w), group))
+        rules.add(rule_from(e.copied(*marks), marked(w, *marks), group))
 
 
 @cache

@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import operator
 from collections.abc import Sequence
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -17,9 +18,11 @@ from .. import _core
 from .equations import Step
 from .expand import symbol_parts
 from .walk import Walk, carried_out
-from .words import FURTHER, Alphabet, Word, split
+from .words import FURTHER, NUMBERS, Alphabet, Polynomial, Word, inverse_of, split
 
 PROBES = 3
+SINGULAR = 1e-13
+"""Ratio of the smallest singular value to the largest below which an operator of a small model of ordinary bodies counts as singular."""
 LARGEST = 600
 """Entries of a body vector up to which steps are checked without being asked."""
 
@@ -59,6 +62,8 @@ class Values:
                     value = np.linalg.inv(value)
                 except np.linalg.LinAlgError as error:
                     raise NoValue(f"{self.alphabet.letter_text(letter)}: {error}") from None
+                if is_singular(self.letter(inverse_of(letter))):
+                    raise NoValue(f"{self.alphabet.letter_text(letter)} does not exist on this model")
             self._values[letter] = value.T if mark in ("*", "⁻*") else value
         return self._values[letter]
 
@@ -120,6 +125,12 @@ class Values:
             e, index = self._expression(name[1:]), derived[0][1]
         return np.asarray(e.diff(index)._bound(self._binding).dense())
 
+    def dimension(self, space: str) -> int:
+        """Of a space that every model has. Raises NoValue."""
+        if space not in ("Θ", "V", "F"):
+            raise NoValue(f"a space {space} belongs to its own model")
+        return _space_named(space, self.operators).dimension
+
     # ------------------------------------------------------------------ words
     def word(self, word: Word) -> np.ndarray:
         """A word applied to the random vectors of its domain."""
@@ -136,6 +147,8 @@ class Values:
     def residual(self, step: Step) -> float:
         """|before - after| relative to the largest term of either side, or product of two factors in one. Raises NoValue."""
         before, after = step.full()
+        if any(word and word[0] in NUMBERS for word in [*before, *after]):
+            return self._between_numbers(before, after)
         n = next((self.letter(w[-1]).shape[1] for w in [*before, *after] if w), 1)
         total: Any = 0.0
         largest = 0.0
@@ -146,6 +159,36 @@ class Values:
                 largest = max(largest, abs(float(c)) * size)
                 total = total + sign * float(c) * (self.word(word) if word else rest)
         return _largest(total) / largest if largest else 0.0
+
+    def _between_numbers(self, before: Polynomial, after: Polynomial) -> float:
+        """As `residual`, of polynomials in traces, determinants and norms."""
+        total, largest = 0.0, 0.0
+        for sign, p in ((1.0, before), (-1.0, after)):
+            for word, c in p.items():
+                term, size = self._number(word)
+                total, largest = total + sign * float(c) * term, max(largest, abs(float(c)) * size)
+        return abs(total) / largest if largest else 0.0
+
+    def _number(self, word: Word) -> tuple[float, float]:
+        """(the number that a word stands for, the size of what is added up in it)."""
+        kind, *letters = word
+        if kind in ("1", "ln") or letters[0].startswith("I["):
+            n = 1.0 if kind == "1" else float(self.dimension(letters[-1][2:-1]))
+            return n * (float(np.log(float(Fraction(letters[0])))) if kind == "ln" else 1.0), n
+        factors = [self.letter(x) for x in letters]
+        if kind == "ln det":
+            found = float(np.linalg.slogdet(factors[0])[1])
+            return found, max(abs(found), float(len(factors[0])))
+        if kind == "norm":
+            return (size := float(np.linalg.norm(factors[0]))), size
+        product, bound = (functools.reduce(operator.matmul, x) for x in (factors, [np.abs(f) for f in factors]))
+        return float(np.trace(product)), float(np.trace(bound))
+
+
+def is_singular(X: np.ndarray) -> bool:
+    """Whether a matrix of ordinary numbers has no inverse: its smallest singular value is rounding beside its largest."""
+    values = np.linalg.svd(X, compute_uv=False) if np.isfinite(X).all() else np.zeros(1)
+    return values.size > 0 and not values[-1] > SINGULAR * values[0]
 
 
 def _largest(x: Any) -> float:
@@ -199,7 +242,11 @@ def _transferred(e: Any, operators: Any) -> Walk:
 
 def _space(space: Any, operators: Any) -> Any:
     if space.name in ("Θ", "V", "F"):
-        return getattr(operators, "Theta" if space.name == "Θ" else space.name)
+        return _space_named(space.name, operators)
     if space.name.startswith("R^"):
         return space
     raise NoValue(f"a space {space.name} belongs to its own model")
+
+
+def _space_named(name: str, operators: Any) -> Any:
+    return getattr(operators, "Theta" if name == "Θ" else name)

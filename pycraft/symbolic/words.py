@@ -6,8 +6,9 @@ polynomial maps words to fractions; the zero operator is the empty polynomial. P
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, lru_cache
@@ -22,6 +23,10 @@ Polynomial = dict[Word, Number]
 ONE = 1
 FURTHER = "₂₃₄₅₆₇₈₉"
 """Marks of the letters of a second model, a third, ..., in one statement."""
+SHARED = ("E_φ", "φ", "φ̃", "M", "R")
+"""Letters that do not depend on which hinges move: of a tree with some locked they are those of its model."""
+NUMBERS = ("tr", "ln det", "norm", "ln", "1")
+"""First letters of words that stand for numbers: see `scalars`."""
 _MARKS = ("⁻*", "⁻¹", "*")
 _TRANSPOSED = {"": "*", "*": "", "⁻¹": "⁻*", "⁻*": "⁻¹"}
 _INVERTED = {"": "⁻¹", "⁻¹": "", "*": "⁻*", "⁻*": "*"}
@@ -32,6 +37,15 @@ def ratio(a: Number, b: Number) -> Number:
     """a / b, exactly."""
     quotient = Fraction(a) / b
     return quotient.numerator if quotient.denominator == 1 else quotient
+
+
+def root_of(c: Number) -> Number | None:
+    """√c where it is a fraction, else None."""
+    above, below = Fraction(c).numerator, Fraction(c).denominator
+    if above <= 0:
+        return None
+    up, down = math.isqrt(above), math.isqrt(below)
+    return ratio(up, down) if up * up == above and down * down == below else None
 
 
 def add_to(p: Polynomial, word: Word, c: Number) -> None:
@@ -207,10 +221,25 @@ class Alphabet:
         return latex + {"": "", "*": "^*", "⁻¹": "^{-1}", "⁻*": "^{-*}"}[mark]
 
     def word_text(self, word: Word) -> str:
+        if word and word[0] in NUMBERS:
+            return self._number_shown(word, self.letter_text, "tr({})", "ln det({})", "‖{}‖", "ln {}")
         return " ".join(map(self.letter_text, word)) or "I"
 
     def word_latex(self, word: Word) -> str:
+        if word and word[0] in NUMBERS:
+            forms = "\\operatorname{{tr}}({})", "\\ln\\det({})", "\\Vert {} \\Vert", "\\ln {}"
+            return self._number_shown(word, self.letter_latex, *forms)
         return " ".join(map(self.letter_latex, word)) or "I"
+
+    def _number_shown(self, word: Word, shown: Callable[[str], str], trace: str, determinant: str, norm: str, logarithm: str) -> str:
+        """A word that stands for a number: see `scalars`."""
+        kind, *letters = word
+        if kind == "1":
+            return "1"
+        inside = " ".join(x if x.startswith("I[") else shown(x) for x in letters)
+        if kind == "ln":
+            return f"{trace.format(letters[1])} {logarithm.format(letters[0])}"
+        return {"tr": trace, "ln det": determinant, "norm": norm}[kind].format(inside)
 
     def text(self, p: Polynomial) -> str:
         """As the book prints it."""
@@ -230,6 +259,8 @@ def _sum(terms: Iterable[tuple[Number, str]], minus: str, space: str) -> str:
     text = ""
     for c, word in terms:
         size = "" if c in (1, -1) else number(c if c > 0 else -c) + space
+        if word == "1":
+            size, word = number(c if c > 0 else -c), ""
         sign = f" {minus} " if c < 0 else " + "
         text += (sign if text else minus if c < 0 else "") + size + word
     return text or "0"

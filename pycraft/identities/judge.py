@@ -1,0 +1,285 @@
+"""Whether a statement is true at a state: its residual is taken in wider and wider scalars until it is decided.
+
+Of a true statement the residual is rounding, and falls with epsilon. Of a false one it stays where it is. So
+
+- *holds*: the residual is below its derived bound (`bounds`) in a scalar in which that bound is at most `DECIDES`, and has fallen there
+  with epsilon, or is exactly zero. Where it falls twice running, to below `DECIDES`, it need not be below the bound; where it falls three
+  times running, its own fall is a bound, and takes the place of a derived one that decides nothing;
+- *fails*: it is the same in three scalars running, above its bound in the widest of them;
+- *undecided*: neither, up to the widest scalar.
+
+A bound says what rounding can do; no bound, however large, makes a residual true that does not fall: in the widest scalar, where it can
+be explained by nothing else, it fails. A scalar in which an inverse is refused as singular says nothing; the next one is asked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from .bounds import CONSTANT, EPSILON, Roundings, Sizes
+
+DECIDES = 1e-12
+"""A bound above this decides nothing: differences as small as the bound are not seen."""
+SCATTER = 64.0
+"""How far from the ratio of the epsilons the fall of a residual may be: a residual is one number and scatters."""
+STAYS = 0.5
+"""A residual that keeps this part of itself from one scalar to the next has not fallen."""
+RUNNING = 3
+"""So many falls running are no chance: each is by the ratio of two epsilons, 2000 and more."""
+ROUNDING_NORMS = 1e-3
+"""A bound above this in double: the norms that it is made of are rounding themselves, and are taken again in quad."""
+HOLDS, FAILS, UNDECIDED = "holds", "fails", "undecided"
+
+
+class UndecidedError(_core.EvaluationError):
+    """A verdict was asked of a statement that is neither seen to hold nor seen to fail in the widest scalar tried."""
+
+
+@dataclass(frozen=True)
+class Taken:
+    """The residual in one scalar, relative to the size of what it is a difference of, and its derived bound."""
+
+    precision: str | int
+    residual: float
+    bound: float
+
+    @property
+    def epsilon(self) -> float:
+        return EPSILON[self.precision]
+
+
+class BoundState:
+    """One state of one model: expressions are bound to it once per precision, so that all of them share its values."""
+
+    def __init__(self, operators: Any, state: Any):
+        self.state = state
+        self._operators = operators
+        self._bindings: dict[str | int, Any] = {}
+        self._sizes: dict[str | int, Sizes] = {}
+
+    def bind(self, side: Any, precision: str | int) -> Any:
+        if precision not in self._bindings:
+            q, v = (None, None) if self.state is None else (self.state.q, self.state.v)
+            self._bindings[precision] = _core._bind([self._operators.E], q, v, precision=precision)
+        binding = self._bindings[precision]
+        return side.bound(binding) if isinstance(side, _core.Scalar) else side._bound(binding)
+
+    def sizes(self, precision: str | int, values: dict[str, list[float]]) -> Sizes:
+        """Norms in one precision, shared by all statements at this state."""
+        if precision not in self._sizes:
+            self._sizes[precision] = Sizes(lambda e: self.bind(e, precision))
+        self._sizes[precision].give(values)
+        return self._sizes[precision]
+
+
+@dataclass
+class Judgement:
+    """One statement at one state: the residuals that were taken, and what they say."""
+
+    taken: list[Taken] = field(default_factory=list)
+    state: Any = None
+    verdict: str = UNDECIDED
+    zero: bool = False
+    """Whether both sides are zero, though neither is said to be: then the statement is true here, and says nothing."""
+
+    @property
+    def decisive(self) -> Taken:
+        """The scalar that decided: the last one tried."""
+        return self.taken[-1]
+
+    @property
+    def narrow(self) -> Taken:
+        return self.taken[0]
+
+
+def ladder(first: str | int = "extended", last: str | int = 100) -> list[str | int]:
+    """Double, then the scalars from `first` to `last`."""
+    names: list[str | int] = list(EPSILON)
+    return ["double", *names[names.index(first) : max(names.index(first), names.index(last)) + 1]]
+
+
+def judge(
+    lhs: Any,
+    rhs: Any,
+    at: BoundState,
+    vectors: dict[str, np.ndarray] | None = None,
+    *,
+    precisions: Iterable[str | int] | None = None,
+    on_one_path: bool = False,
+    at_most: bool = False,
+) -> Judgement:
+    """Judge lhs = rhs (lhs <= rhs, entry by entry, if `at_most`) at one state.
+
+    Parameters
+    ----------
+    vectors : values of the named vectors of the statement
+    precisions : double and wider ones, tried in this order until one decides; see `ladder`
+    on_one_path : only blocks (i, j) with i and j on one path to the base count
+
+    Raises
+    ------
+    SingularOperatorError, SingularHingeError
+        An inverse is refused in every precision that was tried.
+    """
+    values = {name: [float(x) for x in value] for name, value in (vectors or {}).items()}
+    found = Judgement(state=at.state)
+    scales = Scales(lhs, rhs, at, values)
+    said_zero = any(isinstance(side, _core.Operator) and side.kind == "zero" for side in (lhs, rhs))
+    refusal: Exception | None = None
+    amplified = 1.0
+    for precision in precisions or ladder():
+        try:
+            entries = _core.residual(at.bind(lhs, precision), at.bind(rhs, precision), values, on_one_path, at_most)
+            found.taken, zero, amplified = scales.taken(precision, entries)
+        except (_core.SingularOperatorError, _core.SingularHingeError) as error:
+            refusal = error
+            if len(found.taken) == 0 and precision == "quad":  # what three scalars refuse is singular
+                break
+            continue
+        found.zero = zero and not said_zero
+        found.verdict = decided(found.taken, amplified)
+        if found.verdict != UNDECIDED:
+            break
+    if not found.taken:
+        assert refusal is not None
+        raise refusal
+    if found.verdict == UNDECIDED:
+        found.verdict = decided(found.taken, amplified, last=True)
+    if found.verdict == HOLDS and found.decisive.bound > DECIDES:
+        found.taken[-1] = replace(found.decisive, bound=seen_bound(found.taken))
+    return found
+
+
+def seen_bound(taken: list[Taken]) -> float:
+    """The bound that a fall through several scalars is: their largest residual over epsilon, in the widest, with room for scatter."""
+    return SCATTER * taken[-1].epsilon * max(t.residual / t.epsilon for t in taken)
+
+
+class Scales:
+    """What a difference of two sides is relative to, and how large rounding can make it; norms are shared by all precisions."""
+
+    def __init__(self, lhs: Any, rhs: Any, at: BoundState, values: dict[str, list[float]]):
+        self._lhs, self._rhs, self._at, self._values = lhs, rhs, at, values
+        self._made: dict[str | int, Roundings] = {}
+        self._entries: list[tuple[str | int, float, float]] = []
+
+    def taken(self, precision: str | int, entries: tuple[float, float, float]) -> tuple[list[Taken], bool, float]:
+        """(the residuals in all precisions so far, whether both sides are rounding, the growth), with the entries of lhs - rhs, lhs, rhs.
+
+        A side that is zero is rounding, and falls with epsilon. Where both fall, the difference is relative to what they are rounding of:
+        the largest of entry over epsilon.
+        """
+        made = self._roundings("double", precision in ("double", "extended"))
+        sides = max(entries[1:])
+        trusted = made is not None and made.bound(made.size / max(sides, 1e-300), "double") <= ROUNDING_NORMS
+        if not trusted and precision not in ("double", "extended"):
+            made = self._roundings(precision, True)
+        assert made is not None
+        self._entries.append((precision, entries[0], sides))
+        vanishing = made.terms == 0 and self._sides_fall()
+        common = max(size / EPSILON[p] for p, _, size in self._entries) if vanishing else 0.0
+        found = []
+        for p, difference, size in self._entries:
+            scale = common or max(size, made.terms)
+            bound = made.bound(1.0 if common else made.size / max(scale, 1e-300), p) if scale > 0 else 0.0
+            found.append(Taken(p, difference / scale if scale > 0 else difference, bound))
+        return found, vanishing, made.growth
+
+    def _sides_fall(self) -> bool:
+        """Whether both sides are zero, or were rounding in the last two precisions."""
+        if not any(size for *_, size in self._entries):
+            return True
+        if len(self._entries) < 2:
+            return False
+        (narrow, _, before), (wide, _, after) = self._entries[-2:]
+        return after <= SCATTER * EPSILON[wide] / EPSILON[narrow] * before
+
+    def _roundings(self, precision: str | int, needed: bool) -> Roundings | None:
+        """By norms in this precision; None where an inverse is refused in it, and they are not needed."""
+        if precision not in self._made:
+            try:
+                self._made[precision] = Roundings(self._lhs, self._rhs, self._at.sizes(precision, self._values))
+            except (_core.SingularOperatorError, _core.SingularHingeError):
+                if needed:
+                    raise
+                return None
+        return self._made[precision]
+
+
+def decided(taken: list[Taken], amplified: float = 1.0, *, last: bool = False) -> str:
+    """The verdict on residuals in wider and wider scalars, as far as they go; `last` where none follows."""
+    if len(taken) < 2 or not np.isfinite(taken[-1].residual):
+        return UNDECIDED
+    wide = taken[-1]
+    pairs = list(zip(taken[:-1], taken[1:], strict=True))
+    falls = [_falls(taken[:i], taken[i], amplified) for i in range(1, len(taken))]
+    explained = wide.residual <= wide.bound
+    if max(wide.residual, wide.bound) <= DECIDES and falls[-1] and (explained or len(falls) > 1 and falls[-2]):
+        return HOLDS
+    if len(falls) >= RUNNING and all(falls[-RUNNING:]) and wide.residual <= DECIDES:
+        return HOLDS
+    stays = [STAYS * n.residual <= w.residual and w.residual > 0 and not f for (n, w), f in zip(pairs, falls, strict=True)]
+    if all(stays[-2:]) and (len(stays) > 1 and not explained or last):
+        return FAILS
+    return UNDECIDED
+
+
+def _falls(narrower: list[Taken], wide: Taken, amplified: float) -> bool:
+    """Whether a residual has fallen with epsilon. A narrower one may be small, or zero, by luck: the largest of them over epsilon counts,
+    and where the sweep amplifies roundings, what it makes of one."""
+    if wide.residual == 0:
+        return True
+    seen = max([1.0, *(t.residual / t.epsilon for t in narrower if np.isfinite(t.residual))])
+    return wide.residual <= wide.epsilon * max(SCATTER * seen, CONSTANT * amplified)
+
+
+@dataclass
+class Verdict:
+    """One statement over several states."""
+
+    judgements: list[Judgement] = field(default_factory=list)
+
+    @property
+    def verdict(self) -> str:
+        """ "fails" where it fails at a state, "holds" where it holds at all of them."""
+        found = {j.verdict for j in self.judgements}
+        return FAILS if FAILS in found else UNDECIDED if UNDECIDED in found else HOLDS
+
+    @property
+    def states(self) -> int:
+        return len(self.judgements)
+
+    @property
+    def zero(self) -> bool:
+        """Whether both sides were zero at every state."""
+        return all(j.zero for j in self.judgements)
+
+    @property
+    def shown(self) -> Judgement:
+        """The state that the verdict rests on: one where it is as bad, in the widest scalar, with the largest residual."""
+        of_that = [j for j in self.judgements if j.verdict == self.verdict]
+        return max(of_that, key=lambda j: (-j.decisive.epsilon, _order(j.decisive.residual)))
+
+    @property
+    def residual(self) -> float:
+        """The largest in double."""
+        return max((j.narrow.residual for j in self.judgements), key=_order, default=0.0)
+
+    @property
+    def bound(self) -> float:
+        """The largest in double."""
+        return max((j.narrow.bound for j in self.judgements), key=_order, default=0.0)
+
+
+def _order(x: float) -> float:
+    return x if np.isfinite(x) else np.inf
+
+
+def judge_states(lhs: Any, rhs: Any, states: Iterable[BoundState], vectors: Iterable[dict[str, np.ndarray]], **options: Any) -> Verdict:
+    """`judge` at each of these states."""
+    return Verdict([judge(lhs, rhs, at, values, **options) for at, values in zip(states, vectors, strict=True)])

@@ -1,0 +1,144 @@
+"""Reports in a terminal: 80 columns, symbols that a fixed-width font can show, what matters never cut."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+import unicodedata
+from collections.abc import Sequence
+from functools import lru_cache
+from io import StringIO
+from typing import Any
+
+from .. import _core
+
+WIDTH = 80
+STYLES = {
+    "holds": "green",
+    "fails": "bold red",
+    "undecided": "yellow",
+    "expected to fail": "cyan",
+    "holds anyway": "green",
+    "waiting": "dim",
+    "undefined": "yellow",
+}
+_ACCENTS = {"\u0303": "_tilde", "\u0304": "_bar", "\u0305": "_bar", "\u0307": "_dot", "\u0308": "_ddot", "\u0302": "_hat"}
+_ACCENTED = re.compile(f"(\\w)([{''.join(_ACCENTS)}])")
+
+
+@lru_cache(maxsize=1)
+def _letters() -> list[tuple[str, str]]:
+    """Letters that only a combining accent can write, and their ASCII names: the longest first."""
+    known = [(unicodedata.normalize("NFC", shown), name) for name, shown, *_ in _core.symbol_table()]
+    return sorted(((s, n) for s, n in known if any(unicodedata.combining(c) for c in s)), key=lambda e: -len(e[0]))
+
+
+def monospace(text: str) -> str:
+    """The text without combining accents, which terminals print over the next letter: φ̃ as phi_tilde, Ṽ in one character, p̈ as p_ddot.
+
+    It reads back as the same statement.
+    """
+    text = unicodedata.normalize("NFC", text)
+    if not any(map(unicodedata.combining, text)):
+        return text
+    for shown, name in _letters():
+        # A space where the name would run into its neighbours.
+        text = re.sub(rf"(?<=[^\W_]){re.escape(shown)}", f" {name}", text)
+        text = re.sub(rf"{re.escape(shown)}(?=[^\W_])", f"{name} ", text).replace(shown, name)
+    return _ACCENTED.sub(lambda found: found[1] + _ACCENTS[found[2]], text)
+
+
+def wrapped(line: str, width: int = WIDTH) -> str:
+    """A line broken to the width of a terminal, what follows two further in than its beginning."""
+    indent = " " * (len(line) - len(line.lstrip()))
+    broken = textwrap.wrap(line, width, initial_indent="", subsequent_indent=indent + "  ", break_long_words=False, break_on_hyphens=False)
+    return "\n".join(broken) or line
+
+
+def precision_text(precision: str | int) -> str:
+    """ "quad", "50 digits"."""
+    return f"{precision} digits" if str(precision).isdigit() else str(precision)
+
+
+def findings_table(findings: Sequence[Any]) -> Any:
+    """Theorems by group: statement, the residual and bound that decided and in which precision, the verdict."""
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 1, 0, 0))
+    table.add_column("theorem", overflow="fold", ratio=1)
+    for header, justify in (("residual", "right"), ("bound", "right"), ("in", "left"), ("verdict", "left")):
+        table.add_column(header, justify=justify, no_wrap=True, overflow="ignore")  # type: ignore[arg-type]
+    group = None
+    for f in findings:
+        if f.group != group:
+            group = f.group
+            table.add_row(Text(monospace(group), style="bold underline"))
+        statement = Text("  " + monospace(f.statement).replace("\n", " "))
+        if f.unmet:
+            statement.append(f"\n  needs {', '.join(f.unmet)}", style="dim")
+        elif f.verdict == "waiting":
+            statement.append(f"\n  waits for {f.note}", style="dim")
+        elif f.note and f.verdict != "holds":
+            statement.append(f"\n  {monospace(f.note)}", style="dim")
+        verdict = Text(f.verdict, style=STYLES[f.verdict])
+        if f.states:
+            numbers = (f"{f.wide_residual:.1e}", f"{f.wide_bound:.0e}", precision_text(f.wide_precision))
+        else:
+            numbers = ("", "", "no inverse" if f.verdict in ("expected to fail", "undefined") else "")
+        table.add_row(statement, *numbers, verdict)
+    return table
+
+
+def text_of(renderable: Any, width: int = WIDTH) -> str:
+    """What a terminal of this width shows, without colors."""
+    from rich.console import Console
+
+    console = Console(file=StringIO(), width=width, color_system=None, force_jupyter=False)
+    console.print(renderable)
+    return "\n".join(line.rstrip() for line in console.file.getvalue().splitlines()).strip("\n")  # type: ignore[attr-defined]
+
+
+_COLORS = {"true": "#2a7", "FALSE": "#c22", "undecided": "#c90", "not said": "#999"}
+
+
+def _grid(found: Any) -> tuple[list[tuple[str, str, str]], list[str], dict[Any, Any]]:
+    """(rows (shape, J, base), columns (hinges), cells by row and column) of a truth map."""
+    rows = list(dict.fromkeys((c.cell.shape, c.cell.J, c.cell.base) for c in found.cells))
+    columns = list(dict.fromkeys(c.cell.hinges for c in found.cells))
+    return rows, columns, {((c.cell.shape, c.cell.J, c.cell.base), c.cell.hinges): c for c in found.cells}
+
+
+def truth_html(found: Any) -> str:
+    """A truth map as an HTML table."""
+    from html import escape
+
+    rows, columns, cells = _grid(found)
+    head = "".join(f"<th>{escape(c)}</th>" for c in ("tree", "J", "base", *columns))
+    lines = []
+    for row in rows:
+        words = [(cells[row, column].word, _COLORS[cells[row, column].verdict]) for column in columns]
+        data = "".join(f"<td style='text-align:left;color:{color}'>{escape(word)}</td>" for word, color in words)
+        lines.append(f"<tr>{''.join(f'<th>{escape(name)}</th>' for name in row)}{data}</tr>")
+    return f"<table style='font-size:85%'><tr>{head}</tr>{''.join(lines)}</table>"
+
+
+def truth_plot(found: Any, ax: Any = None) -> Any:
+    """A truth map as a picture: one tile a cell, with the smallest case in each false one; returns the axes."""
+    import matplotlib.pyplot as plt
+
+    rows, columns, cells = _grid(found)
+    if ax is None:
+        _, ax = plt.subplots(figsize=(2.6 * len(columns) + 1.5, 0.5 * len(rows) + 1), layout="constrained")
+    for i, row in enumerate(rows):
+        for j, column in enumerate(columns):
+            cell = cells[row, column]
+            ax.add_patch(plt.Rectangle((j, i), 1, 1, facecolor=_COLORS[cell.verdict], alpha=0.25, edgecolor="white", linewidth=2))
+            ax.text(j + 0.5, i + 0.5, cell.word.replace(": ", ":\n"), ha="center", va="center", fontsize=7)
+    ax.set(xlim=(0, len(columns)), ylim=(len(rows), 0), title=f"{found.statement}\n{found.verdict}")
+    ax.set_xticks([j + 0.5 for j in range(len(columns))], columns)
+    ax.set_yticks([i + 0.5 for i in range(len(rows))], [", ".join(row) for row in rows])
+    ax.tick_params(length=0)
+    for side in ax.spines.values():
+        side.set_visible(False)
+    return ax

@@ -1,0 +1,267 @@
+"""Where a statement is true: its truth map over chains and trees, J, hinge kinds and bases, and the hypotheses that follow from it."""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from html import escape
+from typing import Any
+
+from .. import _core
+from .family import CELLS, CONSTANT, EVERY, HYPOTHESES, ONE, Cell, family, nilpotency, read_on, specs
+from .judge import FAILS, HOLDS, UNDECIDED
+from .parse import Statements
+from .search import Counterexample, judged, smallest
+from .tables import STYLES, monospace, text_of
+
+TRUE, FALSE, UNREAD = "true", "FALSE", "not said"
+_WORDS = {HOLDS: TRUE, FAILS: FALSE, UNDECIDED: UNDECIDED}
+
+
+@dataclass
+class CellTruth:
+    """What was found in one cell: "true", "FALSE", "undecided", or "not said" where no model has what the statement names."""
+
+    cell: Cell
+    verdict: str
+    models: int
+    example: Counterexample | None = None
+    """The smallest case that was found, of a false one."""
+
+    @property
+    def word(self) -> str:
+        """The verdict, with the smallest case of a false one."""
+        if self.example is None:
+            return self.verdict
+        kinds = self.example.kinds
+        runs = [(kind, len(list(group))) for kind, group in itertools.groupby(kinds)]
+        hinges = " ".join(kind if n == 1 else f"{n}×{kind}" for kind, n in runs)
+        chain = "serial chain" in self.example.spec.met
+        return f"{self.verdict}: {hinges}{'' if chain else f' on {self.example.parents}'}{', J' if self.example.rotor_inertia else ''}"
+
+
+@dataclass
+class TruthMap:
+    """Where a statement is true. As a condition: true where it is true in every cell. See `truth`.
+
+    Iterating gives the cells; `map[shape, J, hinges, base]` is one of them; `.where` the fewest hypotheses under which it is true.
+    """
+
+    statement: str
+    cells: list[CellTruth]
+    seconds: float = 0.0
+
+    def __iter__(self) -> Iterator[CellTruth]:
+        return iter(self.cells)
+
+    def __getitem__(self, key: tuple[str, str, str, str]) -> CellTruth:
+        return next(c for c in self.cells if c.cell == Cell(*key))
+
+    def __bool__(self) -> bool:
+        return all(c.verdict in (TRUE, UNREAD) for c in self.cells) and any(c.verdict == TRUE for c in self.cells)
+
+    @property
+    def where(self) -> list[frozenset[str]]:
+        """The sets of hypotheses, each without one to spare, under which it is true in every cell; [frozenset()] if it is true without."""
+        found: list[frozenset[str]] = []
+        for size in range(len(HYPOTHESES) + 1):
+            for chosen in map(frozenset, itertools.combinations(HYPOTHESES, size)):
+                meeting = [c for c in self.cells if chosen <= c.cell.least and c.verdict != UNREAD]
+                if any(smaller <= implied(chosen) for smaller in found) or not meeting:
+                    continue
+                if all(c.verdict == TRUE for c in meeting):
+                    found.append(chosen)
+        weaker = {chosen: -sum(chosen <= c.cell.least for c in self.cells) for chosen in found}
+        return sorted(found, key=lambda chosen: (len(chosen), weaker[chosen]))
+
+    @property
+    def verdict(self) -> str:
+        """The headline in words."""
+        where = self.where
+        if where == [frozenset()]:
+            return "TRUE on every model tried"
+        if where:
+            return "TRUE where " + ", or where ".join(in_words(chosen) for chosen in where)
+        if any(c.verdict == TRUE for c in self.cells):
+            return "FALSE under every standard hypothesis, true in some cells"
+        return "FALSE in every cell" if any(c.verdict == FALSE for c in self.cells) else "undecided"
+
+    def table(self) -> Any:
+        """The map as a rich table: a row for each shape, J and base, a column for the hinges."""
+        from rich.table import Table
+        from rich.text import Text
+
+        table = Table(box=None, pad_edge=False, header_style="bold")
+        for header in ("tree", "J", "base", ONE, CONSTANT, EVERY):
+            table.add_column(header, overflow="fold")
+        for shape, J, base in dict.fromkeys((c.cell.shape, c.cell.J, c.cell.base) for c in self.cells):
+            row = [self[shape, J, hinges, base] for hinges in (ONE, CONSTANT, EVERY)]
+            styles = {TRUE: STYLES["holds"], FALSE: STYLES["fails"], UNDECIDED: STYLES["undecided"], UNREAD: STYLES["waiting"]}
+            table.add_row(shape, J, base.removesuffix(" base"), *(Text(c.word, style=styles[c.verdict]) for c in row))
+        return table
+
+    def __repr__(self) -> str:
+        count = sum(c.models for c in self.cells)
+        head = f"{monospace(self.statement)}\n{self.verdict}\n{count} models, {self.seconds:.1f} s; in false cells the smallest case"
+        return f"{head}\n\n{text_of(self.table())}"
+
+    def _repr_html_(self) -> str:
+        from .tables import truth_html
+
+        return f"<p><b>{escape(self.statement)}</b><br>{escape(self.verdict)}</p>" + truth_html(self)
+
+    def plot(self, ax: Any = None) -> Any:
+        """The map as a picture: green where true, red where false with the smallest case; returns the axes."""
+        from .tables import truth_plot
+
+        return truth_plot(self, ax)
+
+
+def implied(chosen: frozenset[str]) -> frozenset[str]:
+    """The hypotheses with those that they imply: hinges of one coordinate have a constant H."""
+    return chosen | {"constant H"} if "single-DOF hinges" in chosen else chosen
+
+
+def in_words(chosen: Iterable[str]) -> str:
+    """Hypotheses as they are said."""
+    says = {
+        "serial chain": "the tree is a serial chain",
+        "constant H": "H is constant",
+        "single-DOF hinges": "every hinge has one degree of freedom",
+        "free root": "the root is free",
+    }
+    shown = [
+        h for h in HYPOTHESES if h in chosen and not (h == "constant H" and "single-DOF hinges" in chosen)
+    ]  # the one implies the other
+    return " and ".join(says.get(h, h) for h in shown)
+
+
+def truth(
+    statement: str,
+    *,
+    smallest_case: bool = True,
+    precision: str | int = "extended",
+    budget: float = 5.0,
+    vectors: Mapping[str, str] | None = None,
+) -> TruthMap:
+    """The truth map of a statement: where it is true, over chains and trees, J, hinge kinds and bases.
+
+    Parameters
+    ----------
+    statement : as text, see `check`. Names are those of random trees: "body0", "hinge0", "node0", ...
+    smallest_case : look for the smallest case in each false cell
+    precision : the first scalar beside double
+    budget : seconds for the smallest cases, of all cells together
+    vectors : names of the vectors in the text, and of their spaces, "Θ", "V" or "F"
+
+    Returns
+    -------
+    TruthMap
+        It prints as a table, shows as one in a notebook, `.plot()` draws it; `.where` are the fewest hypotheses under which it is true.
+
+    Raises
+    ------
+    ParseError
+        No model of the family has what the statement names, or it does not read as a statement.
+
+    Examples
+    --------
+    >>> import pycraft as pc
+    >>> pc.truth("HG == I", smallest_case=False).verdict
+    'TRUE where J = 0'
+    """
+    begin = time.perf_counter()
+    depth = depth_for(statement, vectors)
+    cells = [_cell_truth(statement, cell, depth, precision, vectors) for cell in CELLS]
+    false = [c for c in cells if c.example is not None]
+    deadline = time.perf_counter() + budget
+    for i, found in enumerate(false if smallest_case else []):
+        left = max(0.0, deadline - time.perf_counter()) / (len(false) - i)
+        only: dict[str, Any] = dict(meets=found.cell.least, allowed=found.cell.holds, vectors=vectors)
+        found.example = smallest(statement, precision=precision, budget=left, found=found.example, **only)
+    return TruthMap(statement, cells, time.perf_counter() - begin)
+
+
+def depth_for(statement: str, vectors: Mapping[str, str] | None = None) -> int:
+    """How deep the deep models must be for no product to vanish by its depth alone; raises ParseError where no model can be spoken of."""
+    deepest = 0
+    refused: Exception | None = None
+    for spec in family(1):
+        model = spec.model()
+        read = read_on(statement, spec, model, vectors)
+        if read is not None:
+            if read.rhs is None:
+                raise _core.EvaluationError(f"{statement!r} has one side; a statement is lhs == rhs")
+            deepest = max(nilpotency(read.lhs), nilpotency(read.rhs))
+            refused = None
+            break
+        refused = refused or _refusal(statement, model)
+    if refused is not None:
+        raise refused
+    return min(max(12, deepest + 2), 40)
+
+
+def _refusal(statement: str, model: Any) -> Exception | None:
+    try:
+        Statements(model.soa).read(statement)
+    except (_core.EvaluationError, _core.SpaceError, _core.ModelError) as error:
+        return error
+    return None
+
+
+def _cell_truth(statement: str, cell: Cell, depth: int, precision: str | int, vectors: Mapping[str, str] | None) -> CellTruth:
+    """The models of a cell up to the first that refutes."""
+    found = []
+    for spec in specs(cell, depth):
+        verdict = judged(statement, spec, 1, precision, vectors)
+        if verdict is None:
+            continue
+        found.append(verdict.verdict)
+        if verdict.verdict == FAILS:
+            shown = verdict.shown
+            return CellTruth(cell, FALSE, len(found), Counterexample(spec, shown.state, shown.decisive.residual))
+    if not found:
+        return CellTruth(cell, UNREAD, 0)
+    return CellTruth(cell, UNDECIDED if UNDECIDED in found else TRUE, len(found))
+
+
+def saving(found: TruthMap, traits: Callable[[], dict[str, bool]] | None = None) -> list[frozenset[str]]:
+    """The hypotheses under which a statement that was refuted is true; not those that the refuting model meets (`traits`)."""
+    met = {name for name, is_met in traits().items() if is_met} if traits is not None else set()
+    return [chosen for chosen in found.where if chosen and not chosen <= met]
+
+
+STRICTEST = frozenset({"J = 0", "serial chain", "constant H", "single-DOF hinges"})
+"""All standard hypotheses at once (but for a free root, which has six degrees of freedom)."""
+
+
+def explained(
+    statement: str,
+    *,
+    seed: int = 0,
+    precision: str | int = "extended",
+    budget: float = 5.0,
+    found: Counterexample | None = None,
+    traits: Callable[[], dict[str, bool]] | None = None,
+    vectors: Mapping[str, str] | None = None,
+) -> tuple[TruthMap, Counterexample | None]:
+    """(the truth map of a false statement, the case that tells most): the smallest of all where a hypothesis saves it; else the
+    smallest that meets all hypotheses under which it still fails, so that it is not blamed on what the true formula does not hold for
+    either."""
+    found_map = truth(statement, smallest_case=False, precision=precision, vectors=vectors)
+    saved = saving(found_map, traits)
+    start: Counterexample | None = found
+    meets: frozenset[str] = frozenset()
+    if not saved:
+        false = [c for c in found_map.cells if c.verdict == FALSE]
+        strict = [c for c in false if STRICTEST <= c.cell.least] or sorted(false, key=lambda c: -len(c.cell.least))[:1]
+        if strict:
+            start, meets = strict[0].example, strict[0].cell.least
+    if start is None:
+        start = next((c.example for c in found_map.cells if c.example is not None), None)
+    example = smallest(statement, seed=seed, precision=precision, budget=budget, found=start, meets=meets, vectors=vectors)
+    if example is not None:
+        example.saved_by = [in_words(chosen) for chosen in saved]
+    return found_map, example

@@ -1,0 +1,142 @@
+"""Proofs as text, HTML and LaTeX: a chain of steps with its reasons, and with the derivations of all lemmas unfolded."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from .equations import Step
+
+if TYPE_CHECKING:
+    from .proof import Proof
+
+WIDTH = 76
+_STYLE = (
+    "<style>.pycraft-proof{font-family:serif;max-width:60em}.pycraft-proof ol{margin:.2em 0 .8em;padding-left:2.5em}"
+    ".pycraft-proof li{display:list-item;overflow-wrap:anywhere}.pycraft-proof .reason{opacity:.7;margin-left:1.5em;font-size:.9em}</style>"
+)
+
+
+def lines(steps: Sequence[Step], cited: dict[str, int] | None = None) -> list[str]:
+    """The chain, one step a line, reasons in a column; with the numbers of the lemmas that are cited, where these are given."""
+    if not steps:
+        return []
+    rows = [("", steps[0].before_text(), "")]
+    rows += [(f"{s.number}.", f"= {s.after_text()}", f"[{reason(s, cited)}]") for s in steps]
+    width = min(WIDTH, max(len(middle) for _, middle, _ in rows))
+    made = []
+    for number, middle, why in rows:
+        line = f"  {number:>3} {middle}"
+        if why:
+            line = f"{line:<{width + 6}}   {why}" if len(middle) <= width else f"{line}\n{'':>{width + 6}}   {why}"
+        made.append(line)
+    return made
+
+
+def reason(step: Step, cited: dict[str, int] | None = None) -> str:
+    """The equations of a step, each with the number of the lemma that it is."""
+    if not cited or step.title or not step.uses:
+        return step.reason
+    found = step.reason
+    for equation in step.equations:
+        if equation.text in cited and equation.kind in ("lemma", "structure"):
+            found = found.replace(equation.text, f"{equation.text}, by ({cited[equation.text]})", 1)
+    return found
+
+
+def reason_latex(step: Step) -> str:
+    """The equations of a step as mathematics."""
+    if step.title or not step.uses:
+        return f"\\text{{{escaped(step.reason)}}}"
+    latex = step.alphabet.latex
+    return ";\\;".join(f"{latex(e.lhs)} = {latex(e.rhs)}" for e in step.equations)
+
+
+def aligned(steps: Sequence[Step]) -> str:
+    """The chain as an aligned display, each step on a line and its reason below it on the right where the line is long."""
+    rows = [f"& {steps[0].before_latex()}"] if steps else []
+    for s in steps:
+        why = f"&& \\text{{({s.number})}}\\;{reason_latex(s)}"
+        split = len(s.after_text()) > WIDTH
+        rows += [f"={{}}& {s.after_latex()}", f"& {why}"] if split else [f"={{}}& {s.after_latex()} {why}"]
+    return "\\begin{aligned}" + "\\\\\n".join(rows) + "\\end{aligned}"
+
+
+def escaped(text: str) -> str:
+    """Plain text for LaTeX's \\text: letters of the algebra as mathematics."""
+    for a, b in _MATHEMATICS:
+        text = text.replace(a, b)
+    return text
+
+
+_MATHEMATICS = [
+    *(("\\", ""), ("_", "\\_"), ("⁻¹", "$^{-1}$"), ("*", "$^*$"), ("φ", "$\\phi$"), ("ψ", "$\\psi$"), ("Ω", "$\\Omega$")),
+    *(("ℳ", "$\\mathcal{M}$"), ("𝒥", "$\\mathcal{J}$"), ("Λ", "$\\Lambda$"), ("Υ", "$\\Upsilon$"), ("∂", "$\\partial$")),
+]
+
+
+class FullProof:
+    """A proof with the derivations of its lemmas, each numbered and before what cites it, down to the axioms. See `Proof.full`."""
+
+    def __init__(self, proof: Proof):
+        self.proof = proof
+        self.lemmas = proof.all_lemmas() if proof else []
+        self._numbers = {lemma.statement: i for i, lemma in enumerate(self.lemmas, 1)}
+
+    def __len__(self) -> int:
+        """How many steps there are in all."""
+        return sum(len(p.steps) for p in (*self.lemmas, self.proof))
+
+    def __str__(self) -> str:
+        parts = []
+        for lemma in self.lemmas:
+            head = f"({self._numbers[lemma.statement]}) {lemma.statement}{where(lemma)}"
+            notes = [f"      {lemma.note}"] if lemma.note else []
+            parts.append("\n".join([head, *lines(lemma.steps, self._numbers), *notes]))
+        own = "\n".join([f"{self.proof.statement}{where(self.proof)}", *lines(self.proof.steps, self._numbers)])
+        return "\n\n".join([*parts, own if self.proof else str(self.proof)])
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        parts = [_section(p, self._numbers.get(p.statement), self._numbers) for p in self.lemmas]
+        return f'{_STYLE}<div class="pycraft-proof">{"".join(parts)}{_section(self.proof, None, self._numbers)}</div>'
+
+    def latex(self) -> str:
+        """Sections of aligned displays, one a lemma."""
+        made = []
+        for p in (*self.lemmas, self.proof):
+            number = self._numbers.get(p.statement)
+            title = f"\\text{{({number})}}\\quad " if number is not None and p is not self.proof else ""
+            made.append(f"{title}{p._latex}{_where_latex(p)}\\\\\n{aligned(p.steps)}")
+        return "\\begin{gathered}" + "\\\\[1ex]\n".join(made) + "\\end{gathered}"
+
+
+def where(proof: Proof) -> str:
+    """The hypotheses, as the end of a sentence."""
+    return f", where {' and '.join(proof.hypotheses)}" if proof.hypotheses else ""
+
+
+def _where_latex(proof: Proof) -> str:
+    return f"\\quad\\text{{where {escaped(' and '.join(proof.hypotheses))}}}" if proof.hypotheses else ""
+
+
+def page(proof: Proof) -> str:
+    """A proof alone, as HTML; its steps wrap."""
+    return f'{_STYLE}<div class="pycraft-proof">{_section(proof, None, {})}</div>'
+
+
+def _section(proof: Proof, number: int | None, cited: dict[str, int]) -> str:
+    """One proof: its statement, and its steps as a list."""
+    label = f"({number}) " if number is not None else ""
+    head = f"<b>{html.escape(label + proof.statement + where(proof))}</b>"
+    if not proof:
+        return f"<p>{head}<br>{html.escape(str(proof).partition(chr(10))[2].strip())}</p>"
+    first = f"<div>{html.escape(proof.steps[0].before_text())}</div>" if proof.steps else ""
+    items = "".join(
+        f'<li>= {html.escape(s.after_text())} <span class="reason">[{html.escape(reason(s, cited))}]</span></li>' for s in proof.steps
+    )
+    note = f"<div>{html.escape(proof.note)}</div>" if proof.note else ""
+    presupposed = f"<div>presupposes {html.escape(', '.join(proof.presupposes))}</div>" if proof.presupposes else ""
+    return f"<p>{head}</p>{first}<ol>{items}</ol>{note}{presupposed}"

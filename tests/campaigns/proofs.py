@@ -1,0 +1,181 @@
+"""Proofs against a hostile stream of statements: `python tests/campaigns/proofs.py --seeds N [--first K]`.
+
+For every seed a random true identity outside the catalogue (`random_identities`: axioms and lemmas applied at random to random words), said
+of operators, of inverses, traces, norms or determinants, must be proved; and a statement one step from it (a letter exchanged, a sign
+turned, a star dropped, a number changed, an inverse set around a part) must not be proved, unless dense NumPy finds it true on models that
+meet the hypotheses of the proof. Prints what was not found, and what was proved and is false; exits with 1 where anything false was.
+"""
+
+import argparse
+import functools
+import operator
+import sys
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent.parent))
+from perturbations import dense, exchanges, rebuilt  # noqa: E402
+from random_identities import J0, identity_pair, meeting, tree  # noqa: E402
+
+import pycraft as pc  # noqa: E402
+from pycraft.symbolic import prove  # noqa: E402
+from pycraft.symbolic.values import NoValue, transferred  # noqa: E402
+
+BOUND = 1e-7
+"""What a proved statement may be off by, relative to its sides, on small models: their condition is below 1e6."""
+
+
+@dataclass
+class Tally:
+    """What came of the statements."""
+
+    true: int = 0
+    proved: int = 0
+    perturbed: int = 0
+    proved_perturbed: int = 0
+    unproved: list = field(default_factory=list)
+    false_proofs: list = field(default_factory=list)
+
+
+def statement(seed):
+    """(lhs, rhs, kind, hypotheses) of a true statement of expressions on a small tree; kind says of what."""
+    rng = np.random.default_rng(seed)
+    hypotheses = (J0,) if seed % 3 == 0 else ()
+    soa = tree(seed % 7, rotor_inertia=not hypotheses).soa
+    for _ in range(20):
+        lhs, rhs = identity_pair(rng, soa, hypotheses)
+        if isinstance(lhs, pc.Operator) and isinstance(rhs, pc.Operator) and np.abs(dense(lhs, {})).max(initial=0.0) > 1e-9:
+            break
+    kind = ["operators", "operators", "trace", "norm", "determinant"][int(rng.integers(5))]
+    return lhs, rhs, kind, hypotheses
+
+
+def said(lhs, rhs, kind, soa):
+    """Both sides as what the statement is about; operators where the kind does not fit them."""
+    if kind == "trace" and lhs.domain == lhs.codomain:
+        return lhs.trace(), rhs.trace()
+    if kind == "norm":
+        return lhs.norm(), rhs.norm()
+    if kind == "determinant" and lhs.domain == lhs.codomain == soa.Theta:
+        return (soa.D + lhs.T @ lhs).logdet(), (soa.D + rhs.T @ rhs).logdet()
+    return lhs, rhs
+
+
+def nodes(e, path=()):
+    """(path, node) of every node."""
+    yield path, e
+    for i, child in enumerate(e.children):
+        yield from nodes(child, (*path, i))
+
+
+def replaced(e, path, by):
+    """The expression with another node at a path."""
+    if not path:
+        return by
+    children = list(e.children)
+    children[path[0]] = replaced(children[path[0]], path[1:], by)
+    return rebuilt(e, children)
+
+
+def perturbed(rng, e):
+    """The expression with one thing changed; None where that makes no sense."""
+    way = ["letter", "sum", "transpose", "scaled", "inverse"][int(rng.integers(5))]
+    try:
+        if way == "letter":
+            changed = [x for _, x in exchanges(e)]
+            return changed[rng.integers(len(changed))] if changed else None
+        if way == "inverse":  # X X⁻¹ around a square part: true where X is regular, void where it never is
+            spots = [x for x in nodes(e) if x[1].domain is not None and x[1].domain == x[1].codomain and x[1].kind != "identity"]
+            path, node = spots[rng.integers(len(spots))] if spots else (None, None)
+            return None if node is None else replaced(e, path, node @ node.inv())
+        spots = [x for x in nodes(e) if x[1].kind == way]
+        if not spots:
+            return None
+        path, node = spots[rng.integers(len(spots))]
+        if way == "sum":
+            i = rng.integers(len(node.children))
+            return replaced(e, path, functools.reduce(operator.add, [-c if j == i else c for j, c in enumerate(node.children)]))
+        return replaced(e, path, node.children[0] if way == "transpose" else 1.5 * node)
+    except (pc.SpaceError, pc.EvaluationError):
+        return None
+
+
+def number_of(side, operators):
+    """The value of a side on a model: an array, or a number, by dense NumPy."""
+    if isinstance(side, pc.Operator):
+        return dense(transferred(side, operators), {})
+    (operand,) = side.operands()
+    X = dense(transferred(operand, operators), {})
+    kind = side.text().partition("(")[0]
+    return np.array([np.trace(X) if kind == "trace" else np.linalg.slogdet(X)[1] if kind == "ln det" else np.linalg.norm(X)])
+
+
+def is_false(proof, lhs, rhs):
+    """Whether a proved statement fails on a model that meets its hypotheses and on which every inverse in it exists."""
+    for seed in (1, 2):
+        model = meeting(proof.hypotheses, seed)
+        model.q = model.random_state(seed).q
+        try:
+            left, right = (number_of(side, model.soa) for side in (lhs, rhs))
+        except (np.linalg.LinAlgError, NoValue, pc.Error):
+            continue
+        size = max(np.abs(left).max(initial=0.0), np.abs(right).max(initial=0.0), 1.0)
+        if np.isfinite(size) and size < 1e8 and not np.abs(left - right).max(initial=0.0) <= BOUND * size:
+            return True
+    return False
+
+
+def run(first, seeds, tally, seconds=float("inf")):
+    """Seeds first, first + 1, ..., until the time is over."""
+    begin = time.perf_counter()
+    for seed in range(first, first + seeds):
+        if time.perf_counter() - begin > seconds:
+            break
+        lhs, rhs, kind, hypotheses = statement(seed)
+        true = said(lhs, rhs, kind, _own(lhs))
+        proof = prove(*true)
+        tally.true += 1
+        tally.proved += bool(proof)
+        if not proof or not {*proof.hypotheses} <= {*hypotheses}:
+            tally.unproved.append(seed)
+        rng = np.random.default_rng([seed, 1])
+        for _ in range(3):
+            other = perturbed(rng, rhs)
+            if other is None or (other.domain, other.codomain) != (lhs.domain, lhs.codomain):
+                continue
+            false = said(lhs, other, kind, _own(lhs))
+            proof = prove(*false)
+            tally.perturbed += 1
+            tally.proved_perturbed += bool(proof)
+            if proof and is_false(proof, *false):
+                tally.false_proofs.append((seed, str(proof)))
+    return tally
+
+
+def _own(e):
+    """The letters of the model that an expression belongs to."""
+    from pycraft.operators import OperatorSet
+
+    source = e.sources[0]
+    return OperatorSet(source, source.model)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seeds", type=int, default=1000)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--seconds", type=float, default=float("inf"))
+    arguments = parser.parse_args()
+    tally = run(arguments.first, arguments.seeds, Tally(), arguments.seconds)
+    print(f"proved {tally.proved} of {tally.true} true statements; not found, or under more hypotheses: {tally.unproved}")
+    print(f"{tally.perturbed} perturbed statements, {tally.proved_perturbed} of them proved, {len(tally.false_proofs)} of these false")
+    for seed, text in tally.false_proofs:
+        print(f"seed {seed}: {text}")
+    return 1 if tally.false_proofs else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

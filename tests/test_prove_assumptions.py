@@ -1,0 +1,153 @@
+"""What may be assumed and defined in a proof, and statements of compliances, diagonal blocks, nodes and roots."""
+
+import pytest
+from random_identities import CHAIN, CONSTANT, J0, ROUNDING, SINGLE, meeting, tree
+
+import pycraft as pc
+from pycraft.symbolic import derivative, prove, prove_derivative
+
+# (text, what is assumed, the hypotheses of the proof, what it presupposes)
+ASSUMED = [
+    ("C : Θ → Θ; C = C*", ["C = C*"], ["C = C*"], 0),
+    ("C : Θ → Θ; inv(MM + C)* = inv(MM + C)", ["C = C*"], ["C = C*"], 1),
+    ("C : Θ → Θ; C D⁻¹ = D⁻¹ C", ["C D = D C"], ["C D = D C"], 0),
+    ("C : Θ → Θ; C inv(C) = I", ["C > 0"], ["C > 0"], 0),
+    ("C : Θ → Θ; inv(MM + J + C) (MM + J + C) = I", ["C > 0"], ["C > 0"], 0),
+    ("C : Θ → Θ; inv(C + D)* = inv(C + D)", ["C > 0"], ["C > 0"], 0),
+    ("X : V → Θ; K X = 0", ["G X = 0"], ["G X = 0"], 0),
+    ("X : V → Θ; X = 0", ["G X = 0"], [J0, "G X = 0"], 0),
+    ("X : V → Θ; τ̄ P H* D⁻¹ X = G X", ["J D⁻¹ X = X"], ["J D⁻¹ X = X"], 0),
+    ("J inv(J) D = D", ["J > 0"], ["J > 0"], 0),
+    ("HG = I", ["J = 0"], [J0], 0),
+    ("HψG = I", ["HG = I"], ["HG = I"], 0),
+    ("φ = I + Eφ", ["serial chain"], [], 0),
+]
+
+
+@pytest.mark.parametrize("text, assume, hypotheses, presupposed", ASSUMED)
+def test_what_is_assumed_is_used_and_said(text, assume, hypotheses, presupposed):
+    proof = prove(text, assume=assume)
+    assert proof, proof
+    assert proof.hypotheses == hypotheses and len(proof.presupposes) == presupposed and proof.recheck()
+    assert all(h in str(proof) for h in hypotheses)
+    if hypotheses and hypotheses != [J0]:
+        bare = prove(text)
+        assert not bare or bare.hypotheses == [J0] or bare.presupposes
+
+
+@pytest.mark.parametrize(
+    "text, assume, says",
+    [
+        ("φ = ψ", ["D = 0"], "D = 0, which is assumed, holds on no model"),
+        ("φ = ψ", ["H = 0"], "holds on no model"),
+        ("E_φ⁻¹ E_φ = I", ["E_φ > 0"], "(E_φ)⁻¹, which exists on no model"),
+        ("C : Θ → Θ; C = C*", [], "no proof found"),
+        ("C : Θ → Θ; C D = D C", ["C = C*"], "no proof found"),
+        ("X : V → F; X = 0", ["H X = 0"], "no proof found"),
+    ],
+)
+def test_what_cannot_be_or_does_not_help_proves_nothing(text, assume, says):
+    proof = prove(text, assume=assume)
+    assert not proof and says in str(proof)
+
+
+def test_letters_of_ones_own():
+    assert prove("x ∈ Θ; A := I + HφK; x*(MM + J)x = (A*x)* D A*x").worst < ROUNDING
+    assert not prove("x ∈ Θ; A := I + HφK; x*(MM + J)x = (A x)* D A x")
+    assert prove("A := I + HφK; B := A D A*; MM + J = B") and not prove("A := I + HψK; MM + J = A D A*")
+    woodbury = "inv(B + U W U*) = inv(B) - inv(B) U inv(inv(W) + U* inv(B) U) U* inv(B)"
+    proof = prove(f"U : R2 → Θ; W : R2 → R2; B := MM + J; {woodbury}")
+    assert proof and len(proof.presupposes) == 3 and proof.worst < 1e-9
+    assert not prove(f"U : R2 → Θ; W : R2 → R2; B := MM + J; {woodbury.replace('inv(inv(W)', 'inv(W')}")
+    arm = tree()
+    H, phi, K = arm.soa("H phi K")
+    assert prove("MM + J == A D A*", arm, define={"A": pc.identity(arm.soa.Theta) + H @ phi @ K})
+    assert prove("MM + J == A D A*", define={"A": "I + HφK"})
+    assert prove("T*MM*T == 0 + T*MM T", define={"T": "Θ"}) or prove("T*ℳT = T*ℳ*T", define={"T": "Θ"})
+
+
+@pytest.mark.parametrize(
+    "text, options, says",
+    [
+        ("A = I; φ = ψ", {}, "is no definition"),
+        ("2a := φ; φ = φ", {}, "no name for a letter"),
+        ("A := φ = ψ; A = A", {}, "is a statement"),
+        ("φ = φ", {"assume": ["φ"]}, "is assumed"),
+        ("φ = φ", {"assume": "J"}, "is assumed"),
+        ("A := H φ P; A A = A", {}, "cannot follow"),
+        ("φ", {}, "one side"),
+    ],
+)
+def test_what_does_not_read_is_said(text, options, says):
+    with pytest.raises((pc.EvaluationError, pc.SpaceError), match=says):
+        prove(text, **options)
+
+
+STATEMENTS = {
+    "ΥPH* = H*": [J0],
+    "ΥG = H*D⁻¹": [J0],
+    "blockdiag(inv(MM)) = D⁻¹ + K*ΥK": [J0, CHAIN],
+    "blockdiag(inv(MM + J)) = D⁻¹ + K*ΥK": [CHAIN],
+    "inv(Λ(body2)) = B(body2)*ΥB(body2)": [],
+    "Λ(body2) = inv(B(body2)*ΥB(body2))": [],
+    "sqrt(4*D) = 2*sqrt(D)": [],
+    "sqrt(D) = 4 sqrt(D/16)": [],
+    "blockdiag(ψ*ΥKHψ) = blockdiag(ψ* blockdiag(E*ΥK) Hψ) - blockdiag(ψ* H* blockdiag(K*ΥK) Hψ)": [],
+}
+
+
+@pytest.mark.parametrize("text", STATEMENTS)
+def test_statements_of_blocks_nodes_and_roots(text):
+    proof = prove(text)
+    assert proof, proof
+    assert proof.hypotheses == STATEMENTS[text] and proof.recheck()
+    assert proof.worst is not None and proof.worst < ROUNDING
+    if "Λ(" not in text:
+        assert proof.verify(meeting(proof.hypotheses, 2), 1) < ROUNDING
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "ΥPH* = H",
+        "ΥP = I",
+        "ΥG = 2 H*D⁻¹",
+        "blockdiag(inv(MM)) = D⁻¹ - K*ΥK",
+        "blockdiag(inv(MM)) = D⁻¹",
+        "inv(Λ(body2, body3)) = B(body2, body3)*ΥB(body2, body3)",
+        "sqrt(2*D) = 2*sqrt(D)",
+        "sqrt(4*D) = 4*sqrt(D)",
+        "blockdiag(φ*ΥEφ) = φ* blockdiag(E*ΥE) φ",
+    ],
+)
+def test_false_statements_of_blocks_nodes_and_roots(text):
+    try:
+        proof = prove(text)
+    except pc.SpaceError:
+        return
+    except pc.EvaluationError as error:
+        assert "does not read" in str(error)
+        return
+    assert not proof
+
+
+def test_the_books_derivatives_are_typed_with_their_diagonal_blocks():
+    """∂P = blockdiag(E(τ̄∂Pτ̄* + ΔP⁺ + P⁺Δ*)E*), ∂R likewise, and ∂V of a velocity."""
+    model = meeting([CONSTANT, SINGLE], 4)
+    i = 2
+    E, tau_bar, P_plus, P, R, phi, H, V, phi_tilde, theta_dot = model.soa("E tau_bar P_plus P R phi H velocity phi_tilde theta_dot")
+    Delta, dP, dR = model.soa.Delta(i), derivative(P, i), derivative(R, i)
+    inside = tau_bar @ dP @ tau_bar.T + Delta @ P_plus
+    proof = prove_derivative(P, (E @ (inside + P_plus @ Delta.T) @ E.T).blockdiag(), i)
+    assert proof.worst < ROUNDING
+    assert proof and proof.hypotheses == [CONSTANT] and "blockdiag(E_φ (τ̄ ∂P τ̄*" in proof.statement
+    assert not prove_derivative(P, (E @ inside @ E.T).blockdiag(), i)
+    assert prove_derivative(R, (E @ (dR + Delta @ R + R @ Delta.T) @ E.T).blockdiag(), i).hypotheses == []
+    assert prove_derivative(V, phi.T @ Delta.T @ phi_tilde.T @ H.T @ theta_dot, i).worst < ROUNDING
+    assert not prove_derivative(V, 2 * phi.T @ Delta.T @ phi_tilde.T @ H.T @ theta_dot, i)
+
+
+@pytest.mark.parametrize("text", ["logdet(E) - logdet(E) = 0", "logdet(E E) = 2 logdet(E)", "logdet(φ - ψ) = logdet(ψ - φ)"])
+def test_the_logarithm_of_a_determinant_presupposes_that_it_is_not_zero(text):
+    proof = prove(text)
+    assert not proof and "ln|det" in proof.note
