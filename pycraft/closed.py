@@ -20,8 +20,6 @@ class Closed:
         if not name.startswith("_") and kind.__module__.startswith("pycraft.") and not _settable(kind, name):
             names = {*dir(kind), *getattr(kind, "__dataclass_fields__", ())}
             known = sorted(n for n in names if not n.startswith("_") and _settable(kind, n))
-                n for n in {*dir(kind), *getattr(kind, "__dataclass_fields__", ())} if not n.startswith("_") and _settable(kind, n)
-            )
             raise UnknownAttributeError(f"{_called(self)} takes no {name!r}{_remedy(kind, name, known)}")
         super().__setattr__(name, value)
 
