@@ -49,7 +49,7 @@ def test_the_pages_run(page, examples):
     assert result.failed == 0 and result.attempted > examples
 
 
-@pytest.mark.parametrize("page", ["symbolic", "proofs", "kalman", "accuracy", "evaluation", "statements", "teaching"])
+@pytest.mark.parametrize("page", ["symbolic", "kalman", "accuracy", "evaluation", "statements", "teaching", "proofs"])
 def test_the_blocks_of_a_page_run(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names = {}

@@ -93,7 +93,7 @@ def test_diagonal_parts_of_words_are_those_of_numbers(model):
         ends = [("F", "F"), ("F", "V"), ("V", "F"), ("Θ", "Θ"), ("V", "V"), ("F", "Θ"), ("Θ", "F")][rng.integers(7)]
         word = random_word(rng, *ends, rng.integers(1, 6))
         whole = functools.reduce(operator.matmul, map(values.letter, word))
-        found = diagonal_blocks(word, alphabet)
+        found = diagonal_blocks(word, alphabet, model.soa._source.traits["serial chain"])
         known += not any(alphabet.letters[x.rstrip("*⁻¹")].word for w in found for x in w)
         got = sum(float(c) * functools.reduce(operator.matmul, map(values.letter, w)) for w, c in found.items() if w)
         got = got + float(found.get((), 0)) * np.eye(*whole.shape)

@@ -3,7 +3,8 @@
 Of a true statement the residual is rounding, and falls with epsilon. Of a false one it stays where it is. So
 
 - *holds*: the residual is below its derived bound (`bounds`) in a scalar in which that bound is at most `DECIDES`, and has fallen there
-  with epsilon, or is exactly zero. Where it falls twice running, to below `DECIDES`, it need not be below the bound;
+  with epsilon, or is exactly zero. Where it falls twice running, to below `DECIDES`, it need not be below the bound; where it falls three
+  times running, its own fall is a bound, and takes the place of a derived one that decides nothing;
 - *fails*: it is the same in three scalars running, above its bound in the widest of them;
 - *undecided*: neither, up to the widest scalar.
 
@@ -14,7 +15,7 @@ be explained by nothing else, it fails. A scalar in which an inverse is refused 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,8 @@ SCATTER = 64.0
 """How far from the ratio of the epsilons the fall of a residual may be: a residual is one number and scatters."""
 STAYS = 0.5
 """A residual that keeps this part of itself from one scalar to the next has not fallen."""
+RUNNING = 3
+"""So many falls running are no chance: each is by the ratio of two epsilons, 2000 and more."""
 ROUNDING_NORMS = 1e-3
 """A bound above this in double: the norms that it is made of are rounding themselves, and are taken again in quad."""
 HOLDS, FAILS, UNDECIDED = "holds", "fails", "undecided"
@@ -131,52 +134,70 @@ def judge(
     amplified = 1.0
     for precision in precisions or ladder():
         try:
-            difference, left, right = _core.residual(at.bind(lhs, precision), at.bind(rhs, precision), values, on_one_path, at_most)
-            if difference == left == right == 0 and isinstance(lhs, _core.Operator):  # zeros, of which there is no rounding to bound
-                found.zero = not said_zero and not any(t.residual for t in found.taken)
-                found.taken.append(Taken(precision, 0.0, 0.0))
-            else:
-                taken, zero, amplified = scales.taken((difference, left, right), precision)
-                found.zero = zero and not said_zero
-                found.taken.append(taken)
+            entries = _core.residual(at.bind(lhs, precision), at.bind(rhs, precision), values, on_one_path, at_most)
+            found.taken, zero, amplified = scales.taken(precision, entries)
         except (_core.SingularOperatorError, _core.SingularHingeError) as error:
             refusal = error
             if len(found.taken) == 0 and precision == "quad":  # what three scalars refuse is singular
                 break
             continue
+        found.zero = zero and not said_zero
         found.verdict = decided(found.taken, amplified)
         if found.verdict != UNDECIDED:
-            return found
+            break
     if not found.taken:
         assert refusal is not None
         raise refusal
-    found.verdict = decided(found.taken, amplified, last=True)
+    if found.verdict == UNDECIDED:
+        found.verdict = decided(found.taken, amplified, last=True)
+    if found.verdict == HOLDS and found.decisive.bound > DECIDES:
+        found.taken[-1] = replace(found.decisive, bound=seen_bound(found.taken))
     return found
 
 
+def seen_bound(taken: list[Taken]) -> float:
+    """The bound that a fall through several scalars is: their largest residual over epsilon, in the widest, with room for scatter."""
+    return SCATTER * taken[-1].epsilon * max(t.residual / t.epsilon for t in taken)
+
+
 class Scales:
-    """What a difference of two sides is relative to, and how large rounding can make it; computed once for all precisions."""
+    """What a difference of two sides is relative to, and how large rounding can make it; norms are shared by all precisions."""
 
     def __init__(self, lhs: Any, rhs: Any, at: BoundState, values: dict[str, list[float]]):
         self._lhs, self._rhs, self._at, self._values = lhs, rhs, at, values
         self._made: dict[str | int, Roundings] = {}
+        self._entries: list[tuple[str | int, float, float]] = []
 
-    def taken(self, entries: tuple[float, float, float], precision: str | int) -> tuple[Taken, bool, float]:
-        """(the residual and its bound, whether the sides are nothing but rounding, the growth), from the entries of lhs - rhs, lhs, rhs."""
-        made = self._roundings("double", precision == "double" or precision == "extended")
-        if (
-            made is None
-            or precision not in ("double", "extended")
-            and made.bound(made.size / max(*entries[1:], 1e-300), "double") > ROUNDING_NORMS
-        ):
+    def taken(self, precision: str | int, entries: tuple[float, float, float]) -> tuple[list[Taken], bool, float]:
+        """(the residuals in all precisions so far, whether both sides are rounding, the growth), with the entries of lhs - rhs, lhs, rhs.
+
+        A side that is zero is rounding, and falls with epsilon. Where both fall, the difference is relative to what they are rounding of:
+        the largest of entry over epsilon.
+        """
+        made = self._roundings("double", precision in ("double", "extended"))
+        sides = max(entries[1:])
+        trusted = made is not None and made.bound(made.size / max(sides, 1e-300), "double") <= ROUNDING_NORMS
+        if not trusted and precision not in ("double", "extended"):
             made = self._roundings(precision, True)
         assert made is not None
-        scale = max(*entries[1:], made.terms)
-        zero = made.terms == 0 and scale <= made.bound(1.0, precision) * made.size
-        if zero:
-            scale = made.size
-        relative = entries[0] / scale if scale > 0 else entries[0]
-        return Taken(precision, relative, made.bound(made.size / max(scale, 1e-300), precision)), zero, made.growth
+        self._entries.append((precision, entries[0], sides))
+        vanishing = made.terms == 0 and self._sides_fall()
+        common = max(size / EPSILON[p] for p, _, size in self._entries) if vanishing else 0.0
+        found = []
+        for p, difference, size in self._entries:
+            scale = common or max(size, made.terms)
+            bound = made.bound(1.0 if common else made.size / max(scale, 1e-300), p) if scale > 0 else 0.0
+            found.append(Taken(p, difference / scale if scale > 0 else difference, bound))
+        return found, vanishing, made.growth
+
+    def _sides_fall(self) -> bool:
+        """Whether both sides are zero, or were rounding in the last two precisions."""
+        if not any(size for *_, size in self._entries):
+            return True
+        if len(self._entries) < 2:
+            return False
+        (narrow, _, before), (wide, _, after) = self._entries[-2:]
+        return after <= SCATTER * EPSILON[wide] / EPSILON[narrow] * before
 
     def _roundings(self, precision: str | int, needed: bool) -> Roundings | None:
         """By norms in this precision; None where an inverse is refused in it, and they are not needed."""
@@ -196,9 +217,11 @@ def decided(taken: list[Taken], amplified: float = 1.0, *, last: bool = False) -
         return UNDECIDED
     wide = taken[-1]
     pairs = list(zip(taken[:-1], taken[1:], strict=True))
-    falls = [_falls(n, w, amplified) for n, w in pairs]
+    falls = [_falls(taken[:i], taken[i], amplified) for i in range(1, len(taken))]
     explained = wide.residual <= wide.bound
     if max(wide.residual, wide.bound) <= DECIDES and falls[-1] and (explained or len(falls) > 1 and falls[-2]):
+        return HOLDS
+    if len(falls) >= RUNNING and all(falls[-RUNNING:]) and wide.residual <= DECIDES:
         return HOLDS
     stays = [STAYS * n.residual <= w.residual and w.residual > 0 and not f for (n, w), f in zip(pairs, falls, strict=True)]
     if all(stays[-2:]) and (len(stays) > 1 and not explained or last):
@@ -206,12 +229,13 @@ def decided(taken: list[Taken], amplified: float = 1.0, *, last: bool = False) -
     return UNDECIDED
 
 
-def _falls(narrow: Taken, wide: Taken, amplified: float) -> bool:
-    """A residual in the narrow scalar may be small by luck: where the sweep amplifies roundings, the wider one need not be as lucky."""
+def _falls(narrower: list[Taken], wide: Taken, amplified: float) -> bool:
+    """Whether a residual has fallen with epsilon. A narrower one may be small, or zero, by luck: the largest of them over epsilon counts,
+    and where the sweep amplifies roundings, what it makes of one."""
     if wide.residual == 0:
         return True
-    scatter = max(SCATTER * max(narrow.residual, narrow.epsilon), CONSTANT * amplified * narrow.epsilon)
-    return wide.residual <= wide.epsilon / narrow.epsilon * scatter
+    seen = max([1.0, *(t.residual / t.epsilon for t in narrower if np.isfinite(t.residual))])
+    return wide.residual <= wide.epsilon * max(SCATTER * seen, CONSTANT * amplified)
 
 
 @dataclass

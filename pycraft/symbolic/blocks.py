@@ -85,25 +85,23 @@ _LEVELS = {
 
 
 def _towards_the_base(parts: list[tuple[Word, str]], alphabet: Alphabet) -> Polynomial | None:
-    """ψ*XK between what leads up and what leads down, as ψ* blockdiag(E_ψ*XK), X block diagonal; and its transpose.
+    """ψ*XK A, A leading down or nowhere, as ψ* blockdiag(E_ψ*XK) A, X block diagonal; and its transpose.
 
-    ψ* = I + ψ*E_ψ*: XK alone leads down, and of E_ψ*XK the blocks between siblings count for nothing between ψ* and ψ.
+    ψ* = I + ψ*E_ψ*: XKA leads down, and of E_ψ*XK the blocks between siblings count for nothing between ψ* and A. The word begins with
+    ψ*: of B*XKA, B* leading up, diagonal blocks may be left.
     """
-    ups, downs = {"step*", "down*", "unit*", "diagonal"}, {"step", "down", "unit", "diagonal"}
-    for i, (letter, way) in enumerate(parts):
-        j = i + 1
-        while j < len(parts) and parts[j][1] == "diagonal":
-            j += 1
-        if j == len(parts) or not {w for _, w in parts[:i]} <= ups or not {w for _, w in parts[j + 1 :]} <= downs:
-            continue
-        if way == "unit*" and parts[j][1] == "step":
-            edges = _edge(letter, "*")
-            left, right = _join(parts[: i + 1]), _join(parts[j + 1 :])
-            return {(*left, *outer, _own_letter((*inner, *_join(parts[i + 1 : j + 1])), alphabet), *right): c for outer, inner, c in edges}
-        if way == "step*" and parts[j][1] == "unit":
-            edges = _edge(parts[j][0], "")
-            left, right = _join(parts[:i]), _join(parts[j:])
-            return {(*left, _own_letter((*_join(parts[i:j]), *inner), alphabet), *outer, *right): c for outer, inner, c in edges}
+    ways = [way for _, way in parts]
+    steps = [i for i, way in enumerate(ways) if way != "diagonal"]
+    if len(steps) < 2:
+        return None
+    j = steps[1]
+    if ways[0] == "unit*" and ways[j] == "step" and {*ways[j + 1 :]} <= {"step", "down", "unit", "diagonal"}:
+        inner, right = _join(parts[1 : j + 1]), _join(parts[j + 1 :])
+        return {(*parts[0][0], *outer, _own_letter((*edge, *inner), alphabet), *right): c for outer, edge, c in _edge(parts[0][0], "*")}
+    j = steps[-2]
+    if ways[-1] == "unit" and ways[j] == "step*" and {*ways[:j]} <= {"step*", "down*", "unit*", "diagonal"}:
+        left, inner = _join(parts[:j]), _join(parts[j:-1])
+        return {(*left, _own_letter((*inner, *edge), alphabet), *outer, *parts[-1][0]): c for outer, edge, c in _edge(parts[-1][0], "")}
     return None
 
 

@@ -25,7 +25,7 @@ from .equations import Equation, Step, joined, numbered, opened
 from .presuppositions import Void, inverses_used, presupposed
 from .proof import Proof, example, examples
 from .reading import Assumption, assumptions, reading
-from .rules import Setting
+from .rules import Setting, generous
 from .values import Values
 from .walk import GaveUp
 from .words import ONE, Alphabet, Polynomial, Word, combine, inverted, plain, split
@@ -245,21 +245,46 @@ def _presupposed(attempt: Attempt, proof: Proof) -> list[str]:
     return presupposed(stated | inverses_used(proof.rests_on), attempt.regular, attempt.needs)
 
 
+GENEROUS, AGAIN = 6, 2
+"""How much larger a reduction may grow in the end, and under how many of the settings that had given up."""
+
+
 def _attempts(problem: DerivativeProblem, p: Polynomial, q: Polynomial) -> Iterator[tuple[Attempt | None, Outcome | Void]]:
-    """Attempts under more and more hypotheses; then again, with completed rules. Where one inverts zero, that is its outcome."""
+    """Attempts under more and more hypotheses; again, with completed rules; then with more room. The outcome of inverting zero is Void."""
     made: list[Attempt] = []
+    given_up: list[tuple[Setting, list[tuple[Equation, Word]]]] = []
     for setting, extra in _settings(problem):
         try:
             made.append(Attempt(problem, setting, extra))
-            yield made[-1], made[-1].run(p, q)
+            outcome = made[-1].run(p, q)
         except Void as void:
             yield None, void
-        except GaveUp:
             continue
+        except GaveUp:
+            given_up.append((setting, extra))
+            continue
+        if outcome.closed:  # fewer hypotheses may do, with more room
+            weaker = [tried for tried in given_up if tried[0].hypotheses < setting.hypotheses]
+            yield from _again(problem, weaker, p, q)
+            given_up = [tried for tried in given_up if tried not in weaker]
+        yield made[-1], outcome
     for attempt in made:
         try:
             if attempt.local and complete(attempt):
                 yield attempt, attempt.run(p, q)
+        except GaveUp:
+            continue
+    yield from _again(problem, given_up, p, q)
+
+
+def _again(problem: DerivativeProblem, settings: list[Any], p: Polynomial, q: Polynomial) -> Iterator[tuple[Attempt, Outcome]]:
+    """Attempts with more room."""
+    for setting, extra in settings[:AGAIN]:
+        try:
+            with generous(GENEROUS):
+                larger = Attempt(problem, setting, extra)
+                found = larger.run(p, q)
+            yield larger, found
         except GaveUp:
             continue
 

@@ -8,6 +8,8 @@ abbreviations, then the recursions.
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
 
@@ -18,7 +20,19 @@ from .walk import GaveUp
 from .words import ONE, Alphabet, Number, Polynomial, Word, add_to, inverted, plain, ratio
 
 WORDS, REWRITES = 2000, 12000
-"""Sizes at which a reduction gives up."""
+"""Sizes at which a reduction gives up; `generous` allows for more."""
+_allowed: ContextVar[int] = ContextVar("allowed", default=1)
+
+
+@contextmanager
+def generous(times: int) -> Iterator[None]:
+    """Reductions of several times the size, inside the block."""
+    token = _allowed.set(times)
+    try:
+        yield
+    finally:
+        _allowed.reset(token)
+
 
 # (the word that goes, the equation), in order of rank. Transposes are rules as well.
 _CANCELLING = [(f"{x} {x}⁻¹", f"{x} {x}⁻¹ = I") for x in ("D", "M", "P", "R", "J", "Υ", "X")] + [("X⁻¹ X", "X⁻¹ X = I")]
@@ -125,7 +139,7 @@ def rule_from(equation: Equation, word: Word, group: int) -> Rule:
 class Budget:
     """How many rewrites may still be spent; the same input spends the same."""
 
-    rewrites: int = REWRITES
+    rewrites: int = field(default_factory=lambda: REWRITES * _allowed.get())
 
 
 @dataclass
@@ -219,7 +233,7 @@ class Rules:
                 uses.append(Use(c * rule.factor, left, rule.equation, right, rule.word, rule.factor > 0))
                 todo += [(left + w + right, c * y) for w, y in reversed(rule.to)]
                 budget.rewrites -= 1
-                if budget.rewrites < 0 or len(todo) + len(done) > WORDS:
+                if budget.rewrites < 0 or len(todo) + len(done) > WORDS * _allowed.get():
                     raise GaveUp
         return Step(p, done, uses, alphabet)
 
