@@ -5,7 +5,7 @@ DOZEN = [
     "stale numbers of the present state",
     "stale numbers of a bound state",
     "plans for J = 0 kept",
-    "only the first model of a plan is looked at",
+    "a fraction read upside down",
     "∂P without G ∂J G*",
     "∂ blockdiag(AXA*) as if X were symmetric",
     "a coordinate moves its own twist",
