@@ -1,12 +1,13 @@
 # Every target makes what it needs in .venv. Needed beforehand: Python 3.10+ (with headers and venv), a C++20 compiler, make.
 #   make tour                   set up, then the main job on a real robot (MODEL=path.urdf for your own)
 #   make test                   set up, then all tests, C++ and Python, that need no peer packages
-#   make test-peers             the same robots against Pinocchio and MuJoCo (extra [peers])
+#   make test-peers             the same robots against Pinocchio and MuJoCo (extra [peers]), and a dozen mutants
 #   make check                  the everyday subset, under three minutes
 #   make lab | bench            JupyterLab in notebooks; the bounds measured
 #   make test-address | test-undefined | test-thread   the C++ tests under a sanitizer (GCC's or Clang's)
 #   make test-clang             the C++ tests built by Clang (needs clang++: apt install clang, or CLANG=/path/to/clang++)
 #   make wheel                  dist/*.whl for other machines: libquadmath inside, the glibc it needs in its name (Linux)
+#   make mutants                small wrong changes, which the tests must notice; writes tests/mutation.md (under an hour)
 #   make stability              the catalogue of hard cases in full, beside the peers; writes tests/stability/table.md
 PYTHON ?= python3
 MODEL ?=
@@ -18,7 +19,7 @@ SOURCES := $(shell find cpp pycraft -name '*.h' -o -name '*.cpp' -o -name '*.py'
 # What is compiled: a change in any of these rebuilds. Python sources are used where they lie.
 COMPILED := $(shell find cpp -name '*.h' -o -name '*.cpp' -o -name '*.in' -o -name '*.py') CMakeLists.txt pyproject.toml
 
-.PHONY: tour test test-cpp test-python test-peers check lab bench stability lint clean wheel \
+.PHONY: tour test test-cpp test-python test-peers check lab bench stability lint clean wheel mutants \
         test-address test-undefined test-thread test-clang
 
 tour: .venv/installed
@@ -41,6 +42,7 @@ check: .venv/tested
 
 test-peers: .venv/peers
 	$(BIN)/python -m pytest $(PARALLEL) -m peers
+	$(BIN)/python tests/mutation.py --dozen --jobs $(JOBS)
 	$(BIN)/pycraft peers --output tests/peers/robots.md
 
 # The C++ tests in build trees of their own. A sanitized test takes several times as long; -O1 keeps the build short.
@@ -75,6 +77,9 @@ lab: .venv/lab
 
 bench: .venv/installed
 	$(BIN)/pycraft bench
+
+mutants: .venv/tested
+	$(BIN)/python tests/mutation.py --jobs $(JOBS)
 
 stability: .venv/peers
 	$(BIN)/pycraft stability --output tests/stability/table.md

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from . import _core
-from .models.generators import chain
+from .models.generators import chain, tree
 
 SHORT, LONG = 100, 1000
 
@@ -163,11 +163,33 @@ def _beside_pinocchio(name: str, robot: Any, q: np.ndarray, v: np.ndarray, u: np
 # What a way to compute may cost over `fast` in double (quad: the compiler's own 128 bits, or the portable type).
 WAYS: dict[str, tuple[dict[str, Any], float]] = {
     "fast + 1 refinement": ({"refine": 1}, 2.2),
+    "fast + 1 refinement, wide gather": ({"refine": 1, "residual": "gather"}, 3.0),
     "ud": ({"form": "ud"}, 3.5),
     "square-root": ({"form": "square-root"}, 6.0),
     "extended": ({"precision": "extended"}, 15.0 if _core.epsilons()["extended"] > 1e-25 else 80.0),
     "quad": ({"precision": "quad"}, 160.0 if _core.float128 else 280.0),
 }
+
+
+UD_AT_WORST = 4.5
+"""`ud` over `fast` where every joint has one coordinate and little else to do, or the columns leave the cache."""
+
+
+def ud_at_worst(seconds: float) -> list[Figure]:
+    """`ud` over `fast` on sliders, stars, hinges of three subhinges and 2000 bodies."""
+    n = 50
+    models = {
+        "50 sliders": tree(range(-1, n - 1), ["slider"] * n),
+        "star of 50 pins": tree([-1] + [0] * (n - 1), ["pin"] * n),
+        "50 custom hinges": tree(range(-1, n - 1), ["custom"] * n),
+        "chain of 2000": chain(2000, seed=1),
+    }
+    figures = []
+    for name, model in models.items():
+        q, v, u = _states(model)
+        fast, own = (min(_core.time_forward(model, q, v, u, seconds, form=form)["minimum"] for _ in range(3)) for form in ("fast", "ud"))
+        figures.append(Figure(f"{name}: ud over fast", own / fast, "x", UD_AT_WORST, f"{1e6 * own:.1f} us"))
+    return figures
 
 
 def accuracy(seconds: float = 0.2) -> list[Figure]:
@@ -195,7 +217,7 @@ def accuracy(seconds: float = 0.2) -> list[Figure]:
                 figures.append(Figure(f"{name}: {form} in packs, {precision}, over one by one in double", packed / fast, "x", None, note))
             ratio = packs[form, "single"] / packs[form, "double"]
             figures.append(Figure(f"{name}: {form} in batches, single over double", ratio, "x", 1.0))
-    return figures
+    return figures + ud_at_worst(seconds)
 
 
 def run(seconds: float = 0.1) -> dict[str, list[Figure]]:

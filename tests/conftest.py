@@ -5,13 +5,20 @@ import pytest
 SLOW = {
     "test_symbolic": lambda item: "pendulum" not in item.nodeid,
     "test_notebooks": lambda item: "00_tour" not in item.nodeid and "02_" not in item.nodeid,
-    "test_checker": lambda item: item.originalname == "test_with_rotor_inertia_what_needs_j_zero_is_expected_to_fail"
-    or (
-        item.originalname in ("test_one_letter_exchanged", "test_one_coefficient_off")
-        and any(sign in item.callspec.params["name"] for sign in "∂#")
+    "test_checker": lambda item: (
+        item.originalname == "test_with_rotor_inertia_what_needs_j_zero_is_expected_to_fail"
+        or (
+            item.originalname in ("test_one_letter_exchanged", "test_one_coefficient_off")
+            and any(sign in item.callspec.params["name"] for sign in "∂#")
+        )
     ),
-    "test_calculus": lambda item: item.originalname in ("test_second_derivatives", "test_along_time", "test_along_parameters")
-    or (item.originalname == "test_along_every_coordinate" and item.callspec.params["name"] not in ("H", "E", "P", "D", "ℳ", "psi", "ℳ⁻¹")),
+    "test_calculus": lambda item: (
+        item.originalname in ("test_second_derivatives", "test_along_time", "test_along_parameters")
+        or (
+            item.originalname == "test_along_every_coordinate"
+            and item.callspec.params["name"] not in ("H", "E", "P", "D", "ℳ", "psi", "ℳ⁻¹")
+        )
+    ),
     "test_cli": lambda item: item.originalname == "test_tour" and "panda" not in item.nodeid,
     "test_prove": lambda item: item.originalname.startswith(("test_random", "test_nothing_false", "test_what_is_proved_of_perturbed")),
     "test_algorithm": lambda item: "random" in item.originalname or item.name.endswith("-no rotors]"),

@@ -19,17 +19,35 @@ def subhinge(kind, axis=(0, 0, 1), point=(0, 0, 0), pitch=0.0):
     return {"kind": kind, "axis": axis, "point": np.asarray(point, float), "pitch": float(pitch)}
 
 
-def body(name, parent, subhinges, mass=1.0, com=(0, 0, 0), inertia=((0, 0, 0),) * 3, position=(0, 0, 0),
-         rotation=((1, 0, 0), (0, 1, 0), (0, 0, 1)), rotor=None, kind="custom"):
+def body(
+    name,
+    parent,
+    subhinges,
+    mass=1.0,
+    com=(0, 0, 0),
+    inertia=((0, 0, 0),) * 3,
+    position=(0, 0, 0),
+    rotation=((1, 0, 0), (0, 1, 0), (0, 0, 1)),
+    rotor=None,
+    kind="custom",
+):
     """One body on a hinge named "<name>_hinge", placed in its parent by position and rotation; a point mass without inertia."""
     size = sum(V_SIZE[s["kind"]] for s in subhinges)
     hinge = {
-        "name": f"{name}_hinge", "kind": kind, "subhinges": list(subhinges),
+        "name": f"{name}_hinge",
+        "kind": kind,
+        "subhinges": list(subhinges),
         "placement": {"rotation": np.asarray(rotation, float), "position": np.asarray(position, float)},
         "rotor_inertia": np.zeros(size) if rotor is None else np.asarray(rotor, float),
     }
-    return {"name": name, "parent": parent, "mass": float(mass), "com": np.asarray(com, float),
-            "inertia": np.asarray(inertia, float), "hinge": hinge}
+    return {
+        "name": name,
+        "parent": parent,
+        "mass": float(mass),
+        "com": np.asarray(com, float),
+        "inertia": np.asarray(inertia, float),
+        "hinge": hinge,
+    }
 
 
 def model(bodies, gravity=(0, 0, 0), nodes=(), name="model"):
@@ -63,9 +81,12 @@ def random_inertia(rng, mass):
 
 def random_subhinges(kind, rng):
     """Subhinges of a hinge of a kind of `KINDS`, or of a sequence of subhinge kinds such as ("ball", "slider")."""
+
     def draw(subhinge_kind, axis=None, point=None):
         axis = random_unit(rng) if axis is None else axis
         point = 0.3 * rng.normal(size=3) if point is None else point
+        if subhinge_kind == "free":
+            point = np.zeros(3)  # it turns about no point
         return subhinge(subhinge_kind, axis, point, 0.2 * rng.normal() if subhinge_kind == "screw" else 0.0)
 
     if kind == "cylindrical":
@@ -140,7 +161,7 @@ def coordinate_rates(description, q, v):
     """q̇ (nq,) of the generalized velocities v: v itself; ball ½q⊗(0, ω); free that and the linear velocity turned by q."""
     rates, i, j = [np.zeros(0)], 0, 0
     for kind in (s["kind"] for s in subhinge_list(description)):
-        x, u = q[i:i + Q_SIZE[kind]], v[j:j + V_SIZE[kind]]
+        x, u = q[i : i + Q_SIZE[kind]], v[j : j + V_SIZE[kind]]
         i, j = i + Q_SIZE[kind], j + V_SIZE[kind]
         if kind in ("ball", "free"):
             rates.append(0.5 * quaternion_product(x[:4], np.array([0, *u[:3]])))

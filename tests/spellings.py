@@ -51,9 +51,7 @@ MASS_MATRIX = {
     "φ spelled as inverse": lambda o: o.H @ (o.I - o.E).inv() @ o.M @ (o.I - o.E).inv().T @ o.H.T,
     "φ spelled as I + φ̃": lambda o: o.H @ (o.I + o.phi_tilde) @ o.M @ (o.I + o.phi_tilde).T @ o.H.T,
     "by composite bodies": lambda o: o.H @ (o.R + o.phi_tilde @ o.R + o.R @ o.phi_tilde.T) @ o.H.T,
-    "by composite bodies, distributed": lambda o: (
-        o.H @ o.R @ o.H.T + o.H @ o.phi_tilde @ o.R @ o.H.T + o.H @ o.R @ o.phi_tilde.T @ o.H.T
-    ),
+    "by composite bodies, distributed": lambda o: o.H @ o.R @ o.H.T + o.H @ o.phi_tilde @ o.R @ o.H.T + o.H @ o.R @ o.phi_tilde.T @ o.H.T,
     "by composite bodies, in φ": lambda o: o.H @ (o.phi @ o.R + o.R @ o.phi.T - o.R) @ o.H.T,
     "halves": lambda o: 0.5 * o.MM + o.MM / 2,
     "scaled": lambda o: -3 * o.H @ o.phi @ o.M @ (2 * o.phi.T) @ o.H.T,
@@ -128,11 +126,7 @@ BORDERS = {
     "Schur complement": lambda o, c: (c.border.T @ (o.MM + o.J).inv() @ c.border).inv(),
     "Woodbury by hand": lambda o, c: (
         (o.MM + o.J).inv()
-        - (o.MM + o.J).inv()
-        @ c.border
-        @ (c.small + c.border.T @ (o.MM + o.J).inv() @ c.border).inv()
-        @ c.border.T
-        @ (o.MM + o.J).inv()
+        - (o.MM + o.J).inv() @ c.border @ (c.small + c.border.T @ (o.MM + o.J).inv() @ c.border).inv() @ c.border.T @ (o.MM + o.J).inv()
     ),
     "shifted and bordered": lambda o, c: (o.MM + 0.1 * o.I + 0.5 * c.border @ c.border.T).inv(),
 }

@@ -53,7 +53,7 @@ def test_errors_are_true(measured):
 def test_the_table_has_every_combination(measured):
     _, _, table = measured
     forms = pc._core.forms()
-    narrow, wide, others = 2 * 3 * len(forms), (2 + 1) * len(forms), 2 * len(OTHER_METHODS)
+    narrow, wide, others = 2 * 4 * len(forms), (2 + 1) * len(forms), 2 * len(OTHER_METHODS)
     assert len(table) == narrow + wide + others
     assert [r["way"] for r in ladder(table)] == [step.way for step in LADDER]
     times = [r["seconds"] for r in table if not r["refused"]]
@@ -100,7 +100,7 @@ def test_refused_rows_say_why():
         (dict(refinements=-1), "refine=-1: a number of corrections"),
         (dict(refinements=["x"]), "refine='x': a number of corrections"),
         (dict(refinements=True), "refine=True: a number of corrections"),
-        (dict(refinements=(1, "narrower")), "residual 'narrower' of .* is not there; there are 'same' and 'wider'"),
+        (dict(refinements=(1, "narrower")), "residual 'narrower' of .* is not there; there are 'same', 'gather' and 'wider'"),
         (dict(refinements=[(1, "wider", 2)]), "neither a number of corrections nor a pair"),
         (dict(forms=[]), "forms is empty"),
         (dict(methods=[]), "methods is empty"),

@@ -259,8 +259,10 @@ def test_the_next_rung_climbs_the_ladder():
     while steps := above(rung):
         rung = steps[0]
         names.append(rung.label)
-    assert names[:4] == ["fast + 1 refinement", "ud", "ud + 1 refinement", "fast + 1 refinement, wider residual"]
-    assert names[4:] == ["fast, extended", "fast, quad", "fast, 50 digits", "fast, 100 digits"]
+    assert names[:5] == [
+        "fast + 1 refinement", "fast + 1 refinement, wide gather", "ud", "ud + 1 refinement", "fast + 1 refinement, wider residual",
+    ]  # fmt: skip
+    assert names[5:] == ["fast, extended", "fast, quad", "fast, 50 digits", "fast, 100 digits"]
     assert above(Rung("ud", refine="auto", residual="wider"))[0].precision == "extended" and WIDER_RESIDUAL not in LADDER
     assert above(Rung("square-root"))[0] == above(Rung("ud"))[0]
     assert above(Rung(method="cholesky"))[0] == LADDER[0]

@@ -50,7 +50,7 @@ def test_json_stands_alone_on_stdout(odd):
 def test_names_that_look_like_markup(odd):
     done = pycraft("check", odd, "--states", "0")
     assert done.returncode == 0, done.stderr
-    assert "Theorems on [/bold] [red]x" in done.stdout and "[/bold] [red]x: " in done.stdout
+    assert "[/bold] [red]x: " in done.stdout
     assert "warning: " in done.stderr and "warning: " not in done.stdout
 
 
@@ -62,7 +62,7 @@ def test_tour_of_names_that_look_like_markup(odd):
 
 
 def test_an_ascii_terminal():
-    done = pycraft("check", "panda", "--states", "0", PYTHONIOENCODING="ascii", LC_ALL="C")
+    done = pycraft("check", "panda", "--states", "0", "--full", PYTHONIOENCODING="ascii", LC_ALL="C")
     assert done.returncode == 0, done.stderr
     assert done.stdout.isascii() and "\\u03c6" in done.stdout  # φ, escaped and not lost
 

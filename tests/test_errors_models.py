@@ -58,14 +58,12 @@ BAD = {
     "unknown link": (
         [BASE, ARM, joint(child="arms")],
         4,
-        "joint 'elbow' has the child 'arms', and no link has this name; "
-        'add <link name="arms"/> or correct the name (there are arm, ...)',
+        "joint 'elbow' has the child 'arms', and no link has this name; add <link name=\"arms\"/> or correct the name (there are arm, ...)",
     ),
     "two parents": (
         [BASE, ARM, '<link name="rod"/>', joint(), joint(name="a", child="rod"), joint(name="b", parent="rod")],
         9,
-        "link 'arm' has two parents, 'base' by joint 'elbow' (line 5) and 'rod' by joint 'b'; "
-        "a model is a tree: take one joint out",
+        "link 'arm' has two parents, 'base' by joint 'elbow' (line 5) and 'rod' by joint 'b'; a model is a tree: take one joint out",
     ),
     "loop": (
         [BASE, ARM, '<link name="rod"/>', joint(parent="rod"), joint(name="back", parent="arm", child="rod")],
@@ -94,8 +92,7 @@ BAD = {
     "word in xyz": (
         [BASE, ARM, joint('<origin xyz="0 0,5 0"/>')],
         5,
-        "joint 'elbow': <origin> xyz=\"0 0,5 0\": '0,5' is not a number; "
-        "write 3 numbers separated by blanks, with a decimal point",
+        "joint 'elbow': <origin> xyz=\"0 0,5 0\": '0,5' is not a number; write 3 numbers separated by blanks, with a decimal point",
     ),
     "two numbers in rpy": (
         [BASE, ARM, joint('<origin rpy="0 0"/>')],
@@ -238,9 +235,7 @@ def test_bad_mimic(tmp_path, mimic, kind, says):
 
 def test_a_joint_called_root_under_a_free_root(tmp_path):
     text = text_of(tmp_path / "r.urdf", robot(BASE, ARM, joint(name="root")), root="free")
-    assert text == (
-        ':4: joint \'root\' has the name of the free hinge that root="free" adds; rename it, or load with root="fixed"'
-    )
+    assert text == (':4: joint \'root\' has the name of the free hinge that root="free" adds; rename it, or load with root="fixed"')
 
 
 def test_a_violated_triangle_inequality_under_strict(tmp_path):
@@ -301,9 +296,7 @@ def test_not_a_robot(tmp_path, text, says):
 
 def test_xacro_file(tmp_path):
     text = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">\n<xacro:property name="l" value="1"/></robot>'
-    assert text_of(tmp_path / "arm.xacro", text) == (
-        ":2: <property> is a xacro macro; expand the file first: xacro file.xacro > file.urdf"
-    )
+    assert text_of(tmp_path / "arm.xacro", text) == (":2: <property> is a xacro macro; expand the file first: xacro file.xacro > file.urdf")
     path = tmp_path / "expanded.urdf"  # expanded files keep the declaration
     path.write_text('<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="a"/></robot>')
     assert pc.load(path).nv == 0

@@ -447,7 +447,7 @@ def test_the_innermost_binding_wins():
 THERE_ARE = {
     "form": ("cholesky", FORMS),
     "precision": ("double-double", ("single", "double", "extended", "quad", "50", "100")),
-    "residual": ("narrower", ("same", "wider")),
+    "residual": ("narrower", ("same", "gather", "wider")),
     "refine": ("sometimes", ("auto",)),
     "method": ("magic", ("articulated", "cholesky", "ldl", "conjugate-gradients", "inverse", "realization")),
     "on_singular": ("ignore", ("raise", "minimum-norm")),

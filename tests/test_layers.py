@@ -142,9 +142,7 @@ def test_peers_are_not_needed_to_import_the_package():
             if isinstance(node, ast.Import | ast.ImportFrom):
                 names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else [node.module or ""]
                 absolute = isinstance(node, ast.Import) or node.level == 0
-                assert not absolute or not any(name.split(".")[0] in PEERS for name in names), (
-                    f"{path.relative_to(ROOT)}:{node.lineno}"
-                )
+                assert not absolute or not any(name.split(".")[0] in PEERS for name in names), f"{path.relative_to(ROOT)}:{node.lineno}"
 
 
 def test_python_imports_point_one_way():
@@ -161,9 +159,7 @@ def test_python_imports_point_one_way():
             target = name.split(".")[1] if name.startswith("pycraft.") else ""
             if id(node) in top and first in above:
                 assert target not in above[first], f"{path.relative_to(ROOT)}:{node.lineno} imports {name}"
-            assert first == "cli.py" or target != "cli" or first == "__main__.py", (
-                f"{path.relative_to(ROOT)} imports the command line"
-            )
+            assert first == "cli.py" or target != "cli" or first == "__main__.py", f"{path.relative_to(ROOT)} imports the command line"
 
 
 def test_nothing_prints_but_the_command_line():

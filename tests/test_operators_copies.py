@@ -91,9 +91,7 @@ def test_new_nodes_invalidate_nothing():
     MM, B, J, own = letters.MM, letters.B(["node10", "node2"]), letters.Jacobian(["node5"]), letters.B(["body7"])
     before = B.op.dense()
     model.add_node("tip", "node10", position=(0, 0, 1))
-    model.add_body("sticker", "body7", "weld", position=(0, 1, 0)) if not model.keeps_welds else model.add_node(
-        "sticker", "body7"
-    )
+    model.add_body("sticker", "body7", "weld", position=(0, 1, 0)) if not model.keeps_welds else model.add_node("sticker", "body7")
     for formula in (MM, B, J, own):
         formula.assert_close(formula.op.dense())
     assert np.array_equal(before, B.op.dense()) and model.soa is letters.soa and B.op == model.soa.B(["node10", "node2"])
@@ -160,11 +158,7 @@ def test_models_copy(how):
     model = every_kind(rotor_inertia=True)
     model.add_body("arm", "body10", "pin", limits=([-1], [2]), mass=1.0, com=(1, 0, 0))
     twin = COPIES[how](model)
-    assert (
-        type(twin) is pc.Multibody
-        and repr(twin.description()) == repr(model.description())
-        and twin.hinges["arm"].limits[1] == [2]
-    )
+    assert type(twin) is pc.Multibody and repr(twin.description()) == repr(model.description()) and twin.hinges["arm"].limits[1] == [2]
     Q, V = uniform_batch(model, 2)
     assert np.array_equal(twin.forward_dynamics(Q, V, V), model.forward_dynamics(Q, V, V))
     assert np.array_equal(mass_matrix(twin).dense(), mass_matrix(model).dense())

@@ -165,9 +165,7 @@ def test_lumped_and_kept_welds_have_the_same_mass_matrix():
         expected = kept.mass_matrix(q)
         assert np.abs(lumped.mass_matrix(q) - expected).max() <= 48 * 7 * EPS * norm(expected)
         for frame in ("body1", "body3", "body5"):
-            assert np.abs(lumped.jacobian(frame, q) - kept.jacobian(frame, q)).max() <= 48 * 7 * EPS * norm(
-                kept.jacobian(frame, q)
-            )
+            assert np.abs(lumped.jacobian(frame, q) - kept.jacobian(frame, q)).max() <= 48 * 7 * EPS * norm(kept.jacobian(frame, q))
 
 
 # ---------------------------------------------------------------------- batches

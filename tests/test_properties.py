@@ -257,9 +257,7 @@ def test_python_reads_back_and_evaluates(model, data):
     """As Python reads it, by Python itself and by the parser: nothing is ambiguous in it."""
     formula = formula_of(data, letters_of(model), 2)
     soa = model.soa
-    names = {
-        name: getattr(soa, name) for name in "E phi phi_tilde H M J R P P_plus D G K tau tau_bar E_psi psi psi_tilde".split()
-    }
+    names = {name: getattr(soa, name) for name in "E phi phi_tilde H M J R P P_plus D G K tau tau_bar E_psi psi psi_tilde".split()}
     names |= {"Upsilon": soa.Upsilon, "Omega": soa.Omega, "I": soa.I, "blockdiag": pc.blockdiag}
     text = formula.op.python()
     same_value(eval(text, {"__builtins__": {}}, names), formula)
@@ -276,9 +274,7 @@ def test_every_letter_reads_back(name, style):
     letter = getattr(model.soa, name)
     for op in (letter, letter.T, 2 * letter, letter.T * 0.5):
         made = Statements(model.soa).read(getattr(op, style)()).lhs
-        assert made.domain == op.domain and np.array_equal(made.dense(), op.dense()), (
-            f"{getattr(op, style)()} reads as {made.text()}"
-        )
+        assert made.domain == op.domain and np.array_equal(made.dense(), op.dense()), f"{getattr(op, style)()} reads as {made.text()}"
 
 
 WITH_ARGUMENTS = {

@@ -1,10 +1,10 @@
 """What may be assumed and defined in a proof, and statements of compliances, diagonal blocks, nodes and roots."""
 
 import pytest
-from random_identities import CHAIN, J0, ROUNDING, meeting, tree
+from random_identities import CHAIN, CONSTANT, J0, ROUNDING, SINGLE, meeting, tree
 
 import pycraft as pc
-from pycraft.symbolic import prove
+from pycraft.symbolic import derivative, prove, prove_derivative
 
 # (text, what is assumed, the hypotheses of the proof, what it presupposes)
 ASSUMED = [
@@ -129,3 +129,25 @@ def test_false_statements_of_blocks_nodes_and_roots(text):
         assert "does not read" in str(error)
         return
     assert not proof
+
+
+def test_the_books_derivatives_are_typed_with_their_diagonal_blocks():
+    """∂P = blockdiag(E(τ̄∂Pτ̄* + ΔP⁺ + P⁺Δ*)E*), ∂R likewise, and ∂V of a velocity."""
+    model = meeting([CONSTANT, SINGLE], 4)
+    i = 2
+    E, tau_bar, P_plus, P, R, phi, H, V, phi_tilde, theta_dot = model.soa("E tau_bar P_plus P R phi H velocity phi_tilde theta_dot")
+    Delta, dP, dR = model.soa.Delta(i), derivative(P, i), derivative(R, i)
+    inside = tau_bar @ dP @ tau_bar.T + Delta @ P_plus
+    proof = prove_derivative(P, (E @ (inside + P_plus @ Delta.T) @ E.T).blockdiag(), i)
+    assert proof.worst < ROUNDING
+    assert proof and proof.hypotheses == [CONSTANT] and "blockdiag(E_φ (τ̄ ∂P τ̄*" in proof.statement
+    assert not prove_derivative(P, (E @ inside @ E.T).blockdiag(), i)
+    assert prove_derivative(R, (E @ (dR + Delta @ R + R @ Delta.T) @ E.T).blockdiag(), i).hypotheses == []
+    assert prove_derivative(V, phi.T @ Delta.T @ phi_tilde.T @ H.T @ theta_dot, i).worst < ROUNDING
+    assert not prove_derivative(V, 2 * phi.T @ Delta.T @ phi_tilde.T @ H.T @ theta_dot, i)
+
+
+@pytest.mark.parametrize("text", ["logdet(E) - logdet(E) = 0", "logdet(E E) = 2 logdet(E)", "logdet(φ - ψ) = logdet(ψ - φ)"])
+def test_the_logarithm_of_a_determinant_presupposes_that_it_is_not_zero(text):
+    proof = prove(text)
+    assert not proof and "ln|det" in proof.note

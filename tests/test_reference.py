@@ -117,6 +117,7 @@ def newton_euler(description, q, v, vdot):
     Poses are all that is taken from the oracle; partial velocities are their complex-step derivatives, accelerations the
     fourth-order differences of velocities along the motion.
     """
+
     def poses(x):
         o = reference.operators(description, x)
         return np.array([o.world_pose(k) for k in range(len(o.X))])
@@ -217,7 +218,7 @@ def subtree(description, q, k):
         elif b["parent"] in kept:
             kept[j] = len(bodies)
             bodies.append({**b, "parent": kept[b["parent"]]})
-            coordinates.append(q[offset:offset + size])
+            coordinates.append(q[offset : offset + size])
         offset += size
     return model(bodies), np.concatenate(coordinates)
 
@@ -253,7 +254,7 @@ def test_a_hinge_is_a_chain_of_massless_bodies_with_one_subhinge_each(descriptio
     for b in description["bodies"]:
         pieces, parent, rotors = b["hinge"]["subhinges"], last[b["parent"] + 1], b["hinge"]["rotor_inertia"]
         for j, s in enumerate(pieces[:-1]):
-            used, rotors = rotors[:V_SIZE[s["kind"]]], rotors[V_SIZE[s["kind"]]:]
+            used, rotors = rotors[: V_SIZE[s["kind"]]], rotors[V_SIZE[s["kind"]] :]
             placement = b["hinge"]["placement"] if j == 0 else {}
             bodies.append(body(f"{b['name']}_{j}", parent, [s], 0.0, rotor=used, **placement))
             parent = len(bodies) - 1

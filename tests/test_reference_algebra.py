@@ -41,29 +41,65 @@ def blocks(o, X):
 def test_identities(parents, seed, with_J):
     o = random_operators(list(parents), SIZES, COORDINATES, seed, with_J)
     E, phi, phi_tilde, H, M, J, R, P, P_plus, D, G, K, tau, tau_bar, E_psi, psi, psi_tilde, Upsilon, Omega = (
-        getattr(o, name) for name in NAMES)
+        getattr(o, name) for name in NAMES
+    )
     I, one, total = o.I, np.eye(len(D)), o.mass_matrix + J
     A, B = one + H @ phi @ K, one - H @ psi @ K
     tolerance = ROUNDING * max(cond(phi), cond(psi), cond(D))
     always = [
-        (phi, I + E @ phi), (phi_tilde, phi @ E), (phi_tilde, E @ phi), (o.mass_matrix, H @ phi @ M @ phi.T @ H.T),
-        (M, R - E @ R @ E.T), (phi @ M @ phi.T, R + phi_tilde @ R + R @ phi_tilde.T),
-        (M, P - blocks(o, E @ P_plus @ E.T)), (D, H @ P @ H.T + J), (G @ D, P @ H.T), (P_plus, tau_bar @ P),
-        (P_plus, tau_bar @ P @ tau_bar.T + G @ J @ G.T), (M, P - E_psi @ P @ E.T), (M, P - E_psi @ P @ E_psi.T - K @ J @ K.T),
-        (tau, G @ H), (tau_bar, I - G @ H), (K, E @ G), (E_psi, E @ tau_bar), (psi_tilde, psi - I),
-        (inv(psi), inv(phi) + K @ H), (inv(psi) @ phi, I + K @ H @ phi), (phi @ inv(psi), I + phi @ K @ H),
-        (inv(phi) @ psi, I - K @ H @ psi), (psi @ inv(phi), I - psi @ K @ H), (B @ H @ phi, H @ psi), (phi @ K @ B, psi @ K),
-        (A @ H @ psi, H @ phi), (psi @ K @ A, phi @ K), (A @ B, one), (o.innovations, B),
-        (total, A @ D @ A.T), (o.mass_matrix_inverse, inv(total)), (np.linalg.slogdet(total), np.linalg.slogdet(D)),
-        (Omega, phi.T @ H.T @ inv(total) @ H @ phi), (blocks(o, Omega), Upsilon), (np.linalg.det(A), 1.0),
-        (H @ psi @ M @ psi.T @ H.T + B @ J @ B.T, D), (tau @ P, P @ tau.T),
+        (phi, I + E @ phi),
+        (phi_tilde, phi @ E),
+        (phi_tilde, E @ phi),
+        (o.mass_matrix, H @ phi @ M @ phi.T @ H.T),
+        (M, R - E @ R @ E.T),
+        (phi @ M @ phi.T, R + phi_tilde @ R + R @ phi_tilde.T),
+        (M, P - blocks(o, E @ P_plus @ E.T)),
+        (D, H @ P @ H.T + J),
+        (G @ D, P @ H.T),
+        (P_plus, tau_bar @ P),
+        (P_plus, tau_bar @ P @ tau_bar.T + G @ J @ G.T),
+        (M, P - E_psi @ P @ E.T),
+        (M, P - E_psi @ P @ E_psi.T - K @ J @ K.T),
+        (tau, G @ H),
+        (tau_bar, I - G @ H),
+        (K, E @ G),
+        (E_psi, E @ tau_bar),
+        (psi_tilde, psi - I),
+        (inv(psi), inv(phi) + K @ H),
+        (inv(psi) @ phi, I + K @ H @ phi),
+        (phi @ inv(psi), I + phi @ K @ H),
+        (inv(phi) @ psi, I - K @ H @ psi),
+        (psi @ inv(phi), I - psi @ K @ H),
+        (B @ H @ phi, H @ psi),
+        (phi @ K @ B, psi @ K),
+        (A @ H @ psi, H @ phi),
+        (psi @ K @ A, phi @ K),
+        (A @ B, one),
+        (o.innovations, B),
+        (total, A @ D @ A.T),
+        (o.mass_matrix_inverse, inv(total)),
+        (np.linalg.slogdet(total), np.linalg.slogdet(D)),
+        (Omega, phi.T @ H.T @ inv(total) @ H @ phi),
+        (blocks(o, Omega), Upsilon),
+        (np.linalg.det(A), 1.0),
+        (H @ psi @ M @ psi.T @ H.T + B @ J @ B.T, D),
+        (tau @ P, P @ tau.T),
         (phi @ M @ psi.T, P + phi_tilde @ P + P @ psi_tilde.T),
-        ((I - Omega @ M) @ phi.T, psi.T - Omega @ P), (phi.T @ H.T @ o.mass_matrix_inverse, psi.T @ H.T @ inv(D) @ B),
+        ((I - Omega @ M) @ phi.T, psi.T - Omega @ P),
+        (phi.T @ H.T @ o.mass_matrix_inverse, psi.T @ H.T @ inv(D) @ B),
     ]
     without_J = [
-        (H @ G, one), (tau @ tau, tau), (H @ tau_bar, 0 * H), (H @ psi @ M @ psi.T @ H.T, D), (M, P - E_psi @ P @ E_psi.T),
-        (psi @ M @ psi.T, P + psi_tilde @ P + P @ psi_tilde.T), (H @ psi @ G, one), (A, H @ phi @ G),
-        (np.trace(Upsilon @ M), len(D)), (H @ phi @ M @ psi.T @ H.T, A @ D), (tau_bar @ P @ tau_bar.T, P_plus),
+        (H @ G, one),
+        (tau @ tau, tau),
+        (H @ tau_bar, 0 * H),
+        (H @ psi @ M @ psi.T @ H.T, D),
+        (M, P - E_psi @ P @ E_psi.T),
+        (psi @ M @ psi.T, P + psi_tilde @ P + P @ psi_tilde.T),
+        (H @ psi @ G, one),
+        (A, H @ phi @ G),
+        (np.trace(Upsilon @ M), len(D)),
+        (H @ phi @ M @ psi.T @ H.T, A @ D),
+        (tau_bar @ P @ tau_bar.T, P_plus),
         (Omega @ M @ Omega, Omega),
     ]
     for left, right in always if with_J else always + without_J:
@@ -83,7 +119,8 @@ def test_raw_blocks_give_the_rigid_model():
     o = reference.operators(description, q, v)
     s, t, E = o.states, o.coordinates, [None, *[o.E[o.states[p], o.states[k]] for k, p in enumerate(o.parents) if p >= 0]]
     raw = reference.sko_operators(
-        o.parents, E, [o.H[i, j] for i, j in zip(t, s, strict=True)], [o.M[j, j] for j in s], [o.J[i, i] for i in t])
+        o.parents, E, [o.H[i, j] for i, j in zip(t, s, strict=True)], [o.M[j, j] for j in s], [o.J[i, i] for i in t]
+    )
     for name in NAMES:
         assert np.array_equal(getattr(raw, name), getattr(o, name)), name
 
@@ -95,8 +132,22 @@ def every_result(description):
     """All that the oracle computes for a model, by name."""
     q, v = random_state(description, 0)
     o, names = reference.operators(description, q, v), [node["name"] for node in description["nodes"]]
-    attributes = [*NAMES, "I", "mass_matrix", "mass_matrix_inverse", "innovations", "H_dot", "Delta_theta_dot", "V", "V_tilde",
-                  "V_bar", "momentum_cross", "a_gravity", "a", "b"]
+    attributes = [
+        *NAMES,
+        "I",
+        "mass_matrix",
+        "mass_matrix_inverse",
+        "innovations",
+        "H_dot",
+        "Delta_theta_dot",
+        "V",
+        "V_tilde",
+        "V_bar",
+        "momentum_cross",
+        "a_gravity",
+        "a",
+        "b",
+    ]
     results = {name: getattr(o, name) for name in attributes}
     results |= {f"Delta({i})": o.Delta(i) for i in range(len(v))} | {"B": o.B(names), "Jacobian": o.Jacobian(names)}
     results["no nodes"] = o.Lambda([])

@@ -16,10 +16,13 @@ def test_planar_double_pendulum():
     ℳ = [[α + 2βc₂, δ + βc₂], [δ + βc₂, δ]], C = [[−βs₂θ̇₂, −βs₂(θ̇₁ + θ̇₂)], [βs₂θ̇₁, 0]]; gravity along −y.
     """
     (m1, m2), l1, (r1, r2), (I1, I2) = (2.0, 1.3), 0.8, (0.35, 0.45), (0.11, 0.07)
-    arm = model([
-        body("upper", -1, [subhinge("pin", Z)], m1, r1 * X, np.diag([0.05, 0.09, I1])),
-        body("lower", 0, [subhinge("pin", Z)], m2, r2 * X, np.diag([0.03, 0.06, I2]), position=l1 * X),
-    ], gravity=-GRAVITY * Y)
+    arm = model(
+        [
+            body("upper", -1, [subhinge("pin", Z)], m1, r1 * X, np.diag([0.05, 0.09, I1])),
+            body("lower", 0, [subhinge("pin", Z)], m2, r2 * X, np.diag([0.03, 0.06, I2]), position=l1 * X),
+        ],
+        gravity=-GRAVITY * Y,
+    )
     q, v, vdot = np.array([0.7, -1.1]), np.array([1.9, -0.6]), np.array([-2.3, 0.4])
     alpha, beta, delta = I1 + m1 * r1**2 + I2 + m2 * (l1**2 + r2**2), m2 * l1 * r2, I2 + m2 * r2**2
     mass_matrix = np.array([[alpha + 2 * beta * cos(q[1]), delta + beta * cos(q[1])], [delta + beta * cos(q[1]), delta]])
@@ -40,6 +43,7 @@ def test_planar_double_pendulum():
 
 def test_rotors_add_to_the_diagonal():
     """A rotor inertia is the hinge-diagonal J: ℳ + J in the equations of motion, ½θ̇*Jθ̇ in the energy, nothing in 𝒞."""
+
     def arm(rotor):
         pin = [subhinge("pin", Z)]
         return model([body(f"link{k}", k - 1, pin, 1.0, 0.5 * X, position=k * X, rotor=[rotor[k]]) for k in (0, 1)])
@@ -79,8 +83,7 @@ def test_spherical_pendulum_in_angles():
     pendulum = model([body("bob", -1, [subhinge("pin", Z), subhinge("pin", Y)], m, -l * Z)], -GRAVITY * Z)
     q, (phi_dot, theta_dot), (phi_ddot, theta_ddot) = np.array([0.4, 1.1]), (1.3, -0.8), (0.5, 2.1)
     s, c = sin(q[1]), cos(q[1])
-    T = [m * l**2 * (s**2 * phi_ddot + 2 * s * c * theta_dot * phi_dot),
-         m * l**2 * (theta_ddot - s * c * phi_dot**2) + m * GRAVITY * l * s]
+    T = [m * l**2 * (s**2 * phi_ddot + 2 * s * c * theta_dot * phi_dot), m * l**2 * (theta_ddot - s * c * phi_dot**2) + m * GRAVITY * l * s]
     agree(reference.mass_matrix(pendulum, q), m * l**2 * np.diag([s**2, 1]))
     agree(reference.inverse_dynamics(pendulum, q, [phi_dot, theta_dot], [phi_ddot, theta_ddot]), T)
     agree(reference.potential_energy(pendulum, q), -m * GRAVITY * l * c)

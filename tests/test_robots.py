@@ -64,7 +64,8 @@ def test_every_function_has_its_source_in_its_docstring():
 def test_agrees_with_the_oracle(name, seed):
     model = robot(name)
     model.gravity = (0.3, -0.2, -9.81)
-    description, (q, v) = model.description(), vars(model.random_state(seed)).values()
+    description, state = model.description(), model.random_state(seed)
+    q, v = state.q, state.v
     vdot = np.random.default_rng(seed).uniform(-1, 1, model.nv)
     rounding = 100 * len(model.bodies) * EPS
     mass_matrix = reference.mass_matrix(description, q)

@@ -45,9 +45,7 @@ def scaled(mass, length):
     for kind in ("pin", "ball", "universal", "slider"):
         axes = [subhinge("pin", random_unit(rng), length * rng.normal(size=3)) for _ in range(2)]
         subhinges = axes if kind == "universal" else [subhinge(kind, random_unit(rng), length * rng.normal(size=3))]
-        made.append(
-            (subhinges, dict(mass=mass, com=0.2 * length * rng.normal(size=3), inertia=length**2 * random_inertia(rng, mass)))
-        )
+        made.append((subhinges, dict(mass=mass, com=0.2 * length * rng.normal(size=3), inertia=length**2 * random_inertia(rng, mass))))
     return links(*made)
 
 
@@ -97,9 +95,7 @@ SINGULAR = {
         "b0",
     ),
     "sliders along one line": (
-        lambda: links(
-            ([subhinge("slider", SKEW)], dict(mass=0.0)), ([subhinge("slider", SKEW)], dict(mass=2.0, inertia=np.eye(3)))
-        ),
+        lambda: links(([subhinge("slider", SKEW)], dict(mass=0.0)), ([subhinge("slider", SKEW)], dict(mass=2.0, inertia=np.eye(3)))),
         "b0",
     ),
     "rod about its own axis": (lambda: links(([subhinge("pin", [1, 0, 0])], dict(mass=1.0, **ROD))), "b0"),

@@ -98,15 +98,14 @@ DIRECT = {
     "integrate_ode": lambda m: m.integrate_ode(q, v, [0, 0.01], integrator="rk4", step=0.01).q,
 }
 LETTERS = (
-    "E phi H M J R P P_plus D G K tau_bar psi Upsilon Omega V_bar momentum_cross X_world H_dot velocity a b "
-    "gravity_field gravity_base"
+    "E phi H M J R P P_plus D G K tau_bar psi Upsilon Omega V_bar momentum_cross X_world H_dot velocity a b gravity_field gravity_base"
 ).split()
 
 
 def expressions(model):
     """Made once of a model and asked again after the edit, as users do."""
     soa = model.soa
-    H, phi, M, J, D, I = soa("H phi M J D I")
+    H, phi, M, J, D, I, psi, G, tau_bar, P = soa("H phi M J D I psi G tau_bar P")
     MM = H @ phi @ M @ phi.T @ H.T
     made = {name: getattr(soa, name) for name in LETTERS}
     made |= {
@@ -117,6 +116,7 @@ def expressions(model):
         "∂ℳ": MM.diff(7),
         "∂(ℳ+J)⁻¹": (MM + J).inv().diff(8),
     }
+    made |= {"HψG": H @ psi @ G, "HG": H @ G, "τ̄Pτ̄*": tau_bar @ P @ tau_bar.T}  # where J = 0 theorems make other plans of them
     made |= {"∂D": D.diff(9), "𝒥": soa.Jacobian(["tool"]), "Λ": soa.Lambda(["tool"])}
     return made
 
@@ -181,18 +181,21 @@ def test_expressions_after_an_edit(edit):
 @pytest.mark.parametrize("which", ["first", "second", "both"])
 @pytest.mark.parametrize("bound", [False, True])
 def test_two_models_in_one_expression(edit, which, bound):
-    """ℳ₁⁻¹C(ℳ₂+J₂) through R^n: two contexts of one plan, either of them edited."""
+    """HψG(ℳ+J)⁻¹ of one model, C, and the same of the other, through R^n: two contexts of one plan, either of them edited.
+
+    Where J = 0, HψG = I: a plan that uses it must not outlive a rotor inertia of either model.
+    """
     pair = [robot(), robot()]
 
+    def side(model, state):
+        H, phi, M, J, psi, G = model.soa("H phi M J psi G")
+        made = H @ psi @ G @ (H @ phi @ M @ phi.T @ H.T + J).inv()
+        return made.at(state) if bound else made
+
     def through(a, b):
-        (H1, phi1, M1, J1), (H2, phi2, M2, J2) = a.soa("H phi M J"), b.soa("H phi M J")
-        n = a.nv
-        left = pc.constant(np.eye(n), pc.euclidean(n), a.soa.Theta)
-        right = pc.constant(np.eye(n), b.soa.Theta, pc.euclidean(n))
-        first, second = H1 @ phi1 @ M1 @ phi1.T @ H1.T + J1, H2 @ phi2 @ M2 @ phi2.T @ H2.T + J2
-        if bound:
-            first, second = first.at(q), second.at(Q[0])
-        return first.inv() @ left @ right @ second
+        left = pc.constant(np.eye(NV), pc.euclidean(NV), a.soa.Theta)
+        right = pc.constant(np.eye(NV), b.soa.Theta, pc.euclidean(NV))
+        return side(a, q) @ left @ right @ side(b, Q[0])
 
     e = through(*pair)
     before = e.dense()

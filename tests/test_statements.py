@@ -117,11 +117,7 @@ def test_ambiguous_text_shows_both_readings(model):
 def test_whole_powers_are_powers(model):
     """`**` is Python's power and nothing else: no name is transposed twice and multiplied by a number after it."""
     assert pc.check("tau**2 == tau", model, states=2)
-    assert (
-        pc.check("E@E@E@E == E**4", model, states=2)
-        and pc.check("τ² = τ", model, states=2)
-        and pc.check("tau^2 = tau", model, states=2)
-    )
+    assert pc.check("E@E@E@E == E**4", model, states=2) and pc.check("τ² = τ", model, states=2) and pc.check("tau^2 = tau", model, states=2)
 
 
 def test_what_cannot_be_read_says_why(model):

@@ -280,9 +280,7 @@ FINGERS = [
     *(link(name) for name in "abcd"),
     joint("leader", "a", "b"),
     joint("turn", "b", "c", inside='<axis xyz="0 0 2"/><mimic joint="leader" multiplier="-2" offset="0.3"/>'),
-    joint(
-        "slide", "c", "d", "prismatic", '<axis xyz="0 3 4"/><mimic joint="turn" multiplier="0.5"/><pycraft rotor_inertia="1"/>'
-    ),
+    joint("slide", "c", "d", "prismatic", '<axis xyz="0 3 4"/><mimic joint="turn" multiplier="0.5"/><pycraft rotor_inertia="1"/>'),
 ]
 
 

@@ -28,4 +28,16 @@ Form form_from_name(const std::string& name) {
                         (name == "joseph" ? "; 'joseph' is an exhibit of pycraft.reference" : ""));
 }
 
+const char* residual_precision_name(ResidualPrecision residual) {
+  static const char* names[] = {"same", "gather", "wider"};
+  return names[static_cast<int>(residual)];
+}
+
+ResidualPrecision residual_precision_from_name(const std::string& name) {
+  for (const ResidualPrecision r : residual_precisions)
+    if (name == residual_precision_name(r)) return r;
+  throw EvaluationError("residual '" + name + "' is not there; there are 'same' (the precision itself), 'gather' (forces are gathered in the next one up) "
+                        "and 'wider' (all of it is formed in the next one up)");
+}
+
 }  // namespace pycraft

@@ -32,11 +32,20 @@ inline constexpr Form forms[] = {Form::fast, Form::ud, Form::square_root};
 const char* form_name(Form form);
 Form form_from_name(const std::string& name);
 
-// Iterative refinement: the number of corrections, or as many as make them shrink; their residuals at the precision itself or one up.
+// What a residual is formed in: the precision itself; that, with the gather of forces to the base one precision up; all of it one up.
+// (Errors of motions do little harm: ℳ⁻¹HφM has norm 1 in the energy. Errors of forces are multiplied by ℳ⁻¹Hφ.)
+enum class ResidualPrecision { same, gather, wider };
+inline constexpr ResidualPrecision residual_precisions[] = {ResidualPrecision::same, ResidualPrecision::gather, ResidualPrecision::wider};
+const char* residual_precision_name(ResidualPrecision residual);
+ResidualPrecision residual_precision_from_name(const std::string& name);
+
+// Iterative refinement: the number of corrections, or as many as make them shrink, and what their residuals are formed in.
 struct Refinement {
   static constexpr int automatic = -1;
   int steps = 0;
-  bool wider = false;
+  ResidualPrecision residual = ResidualPrecision::same;
+  bool wider() const { return residual == ResidualPrecision::wider; }
+  bool gathers_wider() const { return residual == ResidualPrecision::gather; }
   bool operator==(const Refinement&) const = default;
 };
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <vector>
 
@@ -148,6 +149,25 @@ class DenseBlocks {
       default: std::copy_n(square(id).data() + at_[k].m, s * s, out);
     }
   }
+  // ---------------------------------------------------------------- sizes of what residuals add up (sweeps/residual_rounding.h)
+  void motion_sizes(int k, const S* parent, const S* x, const S* a, S* out, int m) const {
+    using std::abs;
+    for (int i = 0; i < tree_.size[k] * m; ++i) out[i] = abs(a[i]);
+    if (parent) add_sizes<true>(edge(k), parent, out, tree_.size[k], tree_.size[tree_.parent[k]], m);
+    add_sizes<true>(hinge_map(k), x, out, tree_.size[k], tree_.dof[k], m);
+  }
+  void inertia_sizes(int k, const S* a, S* out, int m) const {
+    std::fill_n(out, tree_.size[k] * m, S(0));
+    for (int twice = 0; twice < 2; ++twice) add_sizes<false>(M.data() + at_[k].m, a, out, tree_.size[k], tree_.size[k], m);
+  }
+  void shifted_force_sizes(int k, const S* f, S* out, int m) const {
+    add_sizes<false>(edge(k), f, out, tree_.size[tree_.parent[k]], tree_.size[k], m);
+  }
+  void coordinate_sizes(int k, const S* f, const S* x, S* out, int m) const {
+    std::fill_n(out, tree_.dof[k] * m, S(0));
+    add_sizes<false>(hinge_map(k), f, out, tree_.dof[k], tree_.size[k], m);
+    add_sizes<false>(J.data() + at_[k].d, x, out, tree_.dof[k], tree_.dof[k], m);
+  }
   S log_determinant_of_D() const {
     using std::log;
     S sum = S(0);
@@ -216,6 +236,11 @@ class DenseBlocks {
         for (int b = 0; b < s; ++b) x[j] += hinge_map(k)[j * s + a] * X[at_[k].m + a * s + b] * hinge_map(k)[j * s + b];
     }
     require_pivots(tree_, k, L.data() + at_[k].d, pivots_.data() + tree_.dof_offset[k], x, form);
+    for (int j = 0; j < n; ++j) {
+      x[j] = hinge_diagonal(k)[j * n + j];
+      for (int a = 0; a < s; ++a) x[j] += hinge_map(k)[j * s + a] * hinge_map(k)[j * s + a] * P[at_[k].m + a * s + a];
+    }
+    require_gain(tree_, k, L.data() + at_[k].d, pivots_.data() + tree_.dof_offset[k], x, form);
   }
   void error_to_parent(int k) {
     const int s = tree_.size[k];
@@ -267,6 +292,16 @@ class DenseBlocks {
     size_t e, h, m, d;
   };
   const S* gain(int k) const { return G.data() + at_[k].h; }  // G*, n x s
+  // out (r x m) += |A| |x|, A (r x n); transposed: |A*| |x|, A (n x r)
+  template <bool transposed>
+  static void add_sizes(const S* A, const S* x, S* out, int r, int n, int m) {
+    using std::abs;
+    for (int i = 0; i < r; ++i)
+      for (int k = 0; k < n; ++k) {
+        const S a = abs(transposed ? A[k * r + i] : A[i * n + k]);
+        for (int c = 0; c < m; ++c) out[i * m + c] += a * S(abs(x[k * m + c]));
+      }
+  }
   // add(w, u) for the factors of M(k) or J(k); whether they leave out what may be rounding.
   template <class Add>
   bool add_factors(const char* letter, int k, const S* A, int n, Add&& add) {

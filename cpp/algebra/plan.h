@@ -76,7 +76,7 @@ struct Step {
   std::vector<int> in;
   int context = -1;                         // which (source, binding)
   Symbol symbol{};                          // apply_symbol, load_blocks, vector_symbol, gather, scatter: its binding is dropped
-  bool transposed = false, inverted = false, flag = false;  // flag: with J (mass_matrix), strict
+  bool transposed = false, inverted = false, flag = false;  // flag: with J (mass_matrix); of X*X, the operand being X (dense_factor)
   unsigned groups = 0;                      // values
   std::vector<double> coefficients;
   std::shared_ptr<const ConstantData> constant;

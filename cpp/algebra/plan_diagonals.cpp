@@ -6,6 +6,7 @@
 #include "algebra/planner.h"
 #include "algebra/planning.h"
 #include "algebra/properties.h"
+#include "algebra/theorems.h"
 
 namespace pycraft {
 
@@ -72,6 +73,12 @@ std::optional<int> Planner::diagonal_by_structure(const Expression& e) {
       size_t j = f.size();
       while (j > i && is_block_diagonal(f[j - 1])) --j;
       if (j < i + 2) return std::nullopt;
+      if (const auto known = diagonal_by_theorem({f.begin() + i, f.begin() + j})) {
+        int r = *known;
+        if (i > 0) r = multiply_blocks(blocks(product_of(std::vector<Expression>(f.begin(), f.begin() + i))), r);
+        if (j < f.size()) r = multiply_blocks(r, blocks(product_of(std::vector<Expression>(f.begin() + j, f.end()))));
+        return r;
+      }
       bool left_t = false, right_t = false;
       const Symbol *left = letter_of(f[i], left_t), *right = letter_of(f[j - 1], right_t);
       if (!left || !right || left->definition != right->definition || !same_model(*left, *right) || left_t == right_t) return std::nullopt;
@@ -103,6 +110,26 @@ std::optional<int> Planner::diagonal_by_structure(const Expression& e) {
   }
 }
 
+// What the sweeps P, D, G (tip to base) and Υ (base to tip) say of the diagonal blocks of a product, O(N):
+//
+//   blockdiag([I-HψK]* D⁻¹ [I-HψK]) = D⁻¹ + K*ΥK: block (k,k) of K*ΩK sees Ω at k's parent alone
+//   blockdiag(ψ*H*D⁻¹Hψ) = blockdiag(φ*H* [I-HψK]* D⁻¹ [I-HψK] Hφ) = Υ
+//
+// Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, the operational-space chapter.
+std::optional<int> Planner::diagonal_by_theorem(const std::vector<Expression>& factors) {
+  if (!options_.rules) return std::nullopt;
+  bool transposed = false;
+  const Symbol* model = factors.size() == 3 ? innovations_model(factors.back()) : letter_of(factors.back(), transposed);
+  if (!model || transposed || !model->source) return std::nullopt;
+  const Letters o(model->source, model->binding);
+  const std::vector<Expression> inverse = kernels_of(*model).mass_matrix_inverse;
+  if (factors == inverse) return diagonal_by_structure(lower(o.D.inv() + o.G.T() * o.E.T() * o.Upsilon * o.E * o.G, false));
+  const Expression between = product_of(inverse);
+  for (const Expression& omega : {o.psi.T() * o.H.T() * o.D.inv() * o.H * o.psi, o.phi.T() * o.H.T() * between * o.H * o.phi})
+    if (factors == lower(omega, false).children()) return blocks(o.Upsilon);
+  return std::nullopt;
+}
+
 int Planner::diagonal_blocks(const Expression& e) {
   // Attempts that fail leave steps behind that nothing reads: drop_unused removes them.
   if (const auto r = diagonal_by_structure(e)) return *r;
@@ -127,9 +154,7 @@ int Planner::diagonal_blocks(const Expression& e) {
   }
   plan_.notes.push_back("dense: " + reason);
   Step s{StepKind::blocks_of_dense};
-  s.operand = std::make_shared<const Plan>(Planner(options_).plan(e, Request::apply));
-  for (size_t c = 0; c < s.operand->contexts.size(); ++c)
-    context_of(Symbol{nullptr, s.operand->contexts[c].source, s.operand->contexts[c].binding, {}, {}}, s.operand->groups[c]);
+  s.operand = plan_operand(e);
   s.flops = e.domain().dimension() * s.operand->flops();
   s.bytes = 8.0 * e.domain().dimension() * e.codomain().dimension();
   s.tier = 4;
@@ -161,6 +186,31 @@ std::optional<int> Planner::logdet_by_structure(const Expression& e) {
   return std::nullopt;
 }
 
+// ln|det| of the factors of a product, HφMφ*H* (whose determinant is D's where J = 0) taken together; none where another one is not square.
+std::optional<std::vector<int>> Planner::logdet_of_factors(const std::vector<Expression>& factors) {
+  const size_t kernel = 5;
+  const auto is_mass_matrix = [&](size_t at) {
+    if (!options_.rules || at + kernel > factors.size() || !is_symbol(factors[at], SymbolId::H)) return false;
+    const Symbol& model = factors[at].node().symbol;
+    const std::vector<Expression> run(factors.begin() + at, factors.begin() + at + kernel);
+    return !model.source->traits().hinge_diagonal && run == kernels_of(model).mass_matrix;
+  };
+  std::vector<Expression> parts;
+  for (size_t i = 0; i < factors.size();) {
+    if (is_mass_matrix(i)) {
+      const Symbol& model = factors[i].node().symbol;
+      parts.push_back(Letters(model.source, model.binding).D);
+      i += kernel;
+    } else {
+      if (factors[i].domain().dimension() != factors[i].codomain().dimension()) return std::nullopt;
+      parts.push_back(factors[i++]);
+    }
+  }
+  std::vector<int> registers;
+  for (const Expression& part : parts) registers.push_back(logdet(part));
+  return registers;
+}
+
 int Planner::logdet(const Expression& e) {
   const Register scalar{RegisterKind::scalar, {}, {}, nullptr, false};
   const auto combine = [&](std::vector<int> in, std::vector<double> c, const std::string& text, double constant) {
@@ -177,16 +227,31 @@ int Planner::logdet(const Expression& e) {
       return combine({logdet(e.children()[0])}, {1.0}, "ln det of a multiple", e.domain().dimension() * std::log(std::abs(e.node().coefficient)));
     case NodeKind::inverse: return combine({logdet(e.children()[0])}, {-1.0}, "ln det of an inverse", 0);
     case NodeKind::product: {
-      bool square = true;
-      for (const Expression& f : e.children()) square &= f.domain().dimension() == f.codomain().dimension();
-      if (!square) break;
-      std::vector<int> parts;
-      for (const Expression& f : e.children()) parts.push_back(logdet(f));
-      return combine(parts, std::vector<double>(parts.size(), 1.0), "ln det of a product", 0);
+      const auto parts = logdet_of_factors(e.children());
+      if (!parts) break;
+      if (parts->size() == 1) return parts->front();
+      return combine(*parts, std::vector<double>(parts->size(), 1.0), "ln det of a product", 0);
+    }
+    case NodeKind::sum: {  // ln det (ℳ + J) = ln det D
+      if (!options_.rules || e.children().size() != 2) break;
+      for (int i : {0, 1}) {
+        const Expression &product = e.children()[i], &rotors = e.children()[1 - i];
+        if (product.kind() != NodeKind::product || !is_symbol(rotors, SymbolId::J)) continue;
+        const Symbol& model = rotors.node().symbol;
+        if (product.children() == kernels_of(model).mass_matrix) return logdet(Letters(model.source, model.binding).D);
+      }
+      break;
     }
     default: break;
   }
   if (const auto r = logdet_by_structure(e)) return *r;
+  if (const auto root = gram_root(e)) {
+    Step s{StepKind::logdet_of_dense};
+    s.in = {factor_gram(e, *root)};
+    s.tier = 1;
+    s.text = "ln|det| from the factors of " + show(e);
+    return emit(std::move(s), scalar);
+  }
   // A sum, or a product of factors that are not square: the closed realization has its determinant over that of its own states.
   std::string reason;
   const auto system = build_realization(*this, e.inv(), false, reason);

@@ -4,6 +4,7 @@
 #include "algebra/planner.h"
 #include "algebra/planning.h"
 #include "algebra/properties.h"
+#include "algebra/theorems.h"
 
 namespace pycraft {
 
@@ -16,6 +17,48 @@ bool ends_with(const std::vector<Expression>& factors, size_t end, const std::ve
   for (size_t i = 0; i < tail.size(); ++i)
     if (factors[end - tail.size() + i] != tail[i]) return false;
   return true;
+}
+
+// [I-HψK]Hφ -> Hψ and φ*H*[I-HψK]* -> ψ*H* (the theorem "[I-HψK]Hφ = Hψ") beside the factors of ℳ⁻¹, which a product such as ℳ⁻¹𝒥* or
+// 𝒥ℳ⁻¹ has: φ gathers what [I-HψK] takes back, and the difference loses digits that ψ never meets. A solve that is to be refined stays one.
+std::vector<Expression> gathered_by_psi(const std::vector<Expression>& factors) {
+  std::vector<Expression> out;
+  for (const Expression& f : factors) {
+    bool transposed = false;
+    const Symbol* symbol = letter_of(f, transposed);
+    if (!symbol || symbol->definition->pattern != Pattern::compound) {
+      out.push_back(f);
+      continue;
+    }
+    const Expression typed = symbol->definition->expand(*symbol), spelled = lower(transposed ? typed.T() : typed, true);  // 𝒥 = B*φ*H*
+    if (spelled.kind() == NodeKind::product)
+      out.insert(out.end(), spelled.children().begin(), spelled.children().end());
+    else
+      out.push_back(f);
+  }
+  bool changed = false;
+  const auto letter = [](const Expression& e, SymbolId id, bool starred) {
+    bool transposed = false;
+    const Symbol* symbol = letter_of(e, transposed);
+    return symbol && transposed == starred && symbol->definition->id == id ? symbol : nullptr;
+  };
+  for (size_t i = 0; i + 2 < out.size(); ++i) {
+    const bool starred = letter(out[i], SymbolId::phi, true);
+    const Symbol* h = letter(out[i + 1], SymbolId::H, starred);
+    if (!h || !(starred || letter(out[i + 2], SymbolId::phi, false)) || out[starred ? i + 2 : i].kind() != NodeKind::sum) continue;
+    if (h->binding && h->binding->arithmetic.refinement.steps != 0) continue;
+    const std::vector<Expression> inverse = kernels_of(*h).mass_matrix_inverse;
+    const Expression& resolvent = starred ? out[i].children()[0] : out[i + 2];
+    if (!same_model(resolvent.node().symbol, *h) || inverse.size() != 3 || out[starred ? i + 2 : i] != inverse[starred ? 0 : 2]) continue;
+    const Expression hinge = out[i + 1];
+    Expression psi = make_symbol(SymbolId::psi, h->source);
+    if (h->binding) psi = psi.at(h->binding);
+    out.erase(out.begin() + i + 2);
+    changed = true;
+    out[i] = starred ? lower(psi.T(), false) : hinge;
+    out[i + 1] = starred ? hinge : psi;
+  }
+  return changed ? out : factors;
 }
 
 }  // namespace
@@ -120,7 +163,8 @@ int Planner::apply(const Expression& e, int x) {
   return y;
 }
 
-int Planner::apply_product(const std::vector<Expression>& factors, int x, const Expression&) {
+int Planner::apply_product(const std::vector<Expression>& typed, int x, const Expression&) {
+  const std::vector<Expression> factors = options_.rules ? gathered_by_psi(typed) : typed;
   size_t end = factors.size();
   while (end > 0) {
     // A run of factors with a kernel of its own?
@@ -352,6 +396,15 @@ int Planner::apply_inverse(const Expression& e, int x) {
     }
   }
   if (is_block_diagonal(inner)) return apply_blocks(blocks(e), false, x, show(e));
+  if (const auto root = gram_root(inner)) {
+    Step s{StepKind::dense_solve};
+    s.in = {factor_gram(inner, *root), x};
+    s.flops = 2.0 * inner.domain().dimension() * inner.domain().dimension();
+    s.bytes = vector_bytes(e.codomain());
+    s.tier = 1;
+    s.text = show(e) + " by its triangular factors";
+    return emit(std::move(s), {RegisterKind::vector, e.codomain(), {}, nullptr, plan_.registers[x].wide});
+  }
   return solve_realization(e, x);
 }
 
@@ -383,12 +436,56 @@ int Planner::solve_realization(const Expression& e, int x) {
   return emit(std::move(s), {RegisterKind::vector, e.codomain(), {}, nullptr, plan_.registers[x].wide});
 }
 
+// A plan of its own, whose values are computed with this one's.
+std::shared_ptr<const Plan> Planner::plan_operand(const Expression& operand) {
+  auto made = std::make_shared<const Plan>(Planner(options_).plan(operand, Request::apply));
+  for (size_t c = 0; c < made->contexts.size(); ++c)
+    context_of(Symbol{nullptr, made->contexts[c].source, made->contexts[c].binding, {}, {}}, made->groups[c]);
+  return made;
+}
+
+// L⁻¹HψB of B*ψ*H*D⁻¹HψB, D = LL*, in whatever spelling reads the same from D⁻¹ to both sides: of the operators of nodes and of R^n, whose
+// inverse is Λ and its like.
+std::optional<Expression> Planner::gram_root(const Expression& e) const {
+  const SpaceKind kind = e.domain().kind();
+  if (kind == SpaceKind::Theta || kind == SpaceKind::V || kind == SpaceKind::F) return std::nullopt;
+  if (!options_.rules || e.kind() != NodeKind::product) return std::nullopt;
+  const std::vector<Expression>& f = e.children();
+  const size_t middle = f.size() / 2;
+  if (f.size() % 2 == 0 || f[middle].kind() != NodeKind::inverse || !is_symbol(f[middle].children()[0], SymbolId::D)) return std::nullopt;
+  for (size_t i = 0; i < middle; ++i)
+    if (f[i] != lower(f[f.size() - 1 - i].T(), false)) return std::nullopt;
+  const Expression D = f[middle].children()[0];
+  const Letters o(D.node().symbol.source, D.node().symbol.binding);
+  std::vector<Expression> right{square_root(D).inv()};
+  size_t i = middle + 1;
+  if (i + 2 < f.size() && f[i] == kernels_of(D.node().symbol).mass_matrix_inverse.back() && f[i + 1] == o.H && f[i + 2] == o.phi) {
+    right.insert(right.end(), {o.H, o.psi});  // [I-HψK]Hφ = Hψ
+    i += 3;
+  }
+  right.insert(right.end(), f.begin() + i, f.end());
+  return product_of(right);
+}
+
+int Planner::factor_gram(const Expression& e, const Expression& root) {
+  const int key = id_of(e);
+  if (const auto known = block_memo_.find(key); known != block_memo_.end()) return known->second;
+  const double n = root.codomain().dimension(), r = root.domain().dimension();
+  Step f{StepKind::dense_factor};
+  f.flag = true;
+  f.operand = plan_operand(root);
+  f.flops = 2 * n * r * r + r * f.operand->flops();
+  f.bytes = 8 * (n * r + r * r);
+  f.tier = 1;
+  f.text = "X*X = " + show(e) + ": triangular factors of X = " + show(root);
+  return block_memo_[key] = emit(std::move(f), {RegisterKind::dense, e.codomain(), e.domain(), nullptr, false});
+}
+
 int Planner::solve_dense(const Expression& operand, int x, const std::string& reason) {
   plan_.notes.push_back("dense: " + reason);
   const double n = operand.domain().dimension();
   Step f{StepKind::dense_factor};
-  f.operand = std::make_shared<const Plan>(Planner(options_).plan(operand, Request::apply));
-  for (const Context& c : f.operand->contexts) context_of(Symbol{nullptr, c.source, c.binding, {}, {}}, f.operand->groups[&c - f.operand->contexts.data()]);
+  f.operand = plan_operand(operand);
   f.flops = 2 * n * n * n / 3 + n * f.operand->flops();
   f.bytes = 8 * n * n;
   f.tier = 4;

@@ -118,6 +118,31 @@ Precision precision_of(const Expression& e) {
 
 }  // namespace
 
+namespace {
+
+// Determinants, traces, diagonals and triangular factors have no residual that a solve would correct: refinement of them is the next
+// precision up.
+bool refined_by_precision(const Plan& plan) {
+  const bool asked = std::any_of(plan.contexts.begin(), plan.contexts.end(), [](const Context& c) { return c.binding && c.binding->arithmetic.refinement.steps != 0; });
+  if (!asked) return false;
+  const auto uses = [&](auto which) { return std::any_of(plan.steps.begin(), plan.steps.end(), which); };
+  if (uses([](const Step& s) { return s.kind == StepKind::apply_external || (s.operand && std::any_of(s.operand->steps.begin(), s.operand->steps.end(), [](const Step& o) { return o.kind == StepKind::apply_external; })); }))
+    return false;  // what comes from outside computes in double precision
+  switch (plan.request) {
+    case Request::block_diagonal:
+    case Request::diagonal:
+    case Request::trace:
+    case Request::logdet: return true;
+    default: return uses([](const Step& s) { return s.kind == StepKind::dense_factor && s.flag; });
+  }
+}
+
+Precision wider(Precision precision) {
+  return precision == Precision::digits100 ? precision : static_cast<Precision>(static_cast<int>(precision) + 1);
+}
+
+}  // namespace
+
 Plan Planner::plan(const Expression& typed, Request request) {
   plan_ = Plan{};
   plan_.request = request;
@@ -227,6 +252,10 @@ Plan Planner::plan(const Expression& typed, Request request) {
   plan_.batch = batch_of(typed);
   plan_.batched = plan_.batch >= 0;
   plan_.precision = precision_of(typed);
+  if (refined_by_precision(plan_)) {
+    plan_.precision = wider(plan_.precision);
+    plan_.notes.push_back("refinement: there is no solve to correct here, so all of it is computed one precision up");
+  }
   return std::move(plan_);
 }
 

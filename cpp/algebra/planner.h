@@ -42,6 +42,9 @@ class Planner {
   int column(const Expression& e);   // a vector expression as one column, whatever the run's width
   int solve_realization(const Expression& e, int x);
   int solve_dense(const Expression& operand, int x, const std::string& reason);
+  std::optional<Expression> gram_root(const Expression& e) const;
+  int factor_gram(const Expression& e, const Expression& root);
+  std::shared_ptr<const Plan> plan_operand(const Expression& operand);
 
   // ---- block registers of block-diagonal expressions
   int blocks(const Expression& e);
@@ -52,7 +55,9 @@ class Planner {
   // ---- structure
   std::optional<int> diagonal_by_structure(const Expression& e);   // block register of blockdiag(e), no elimination
   int diagonal_blocks(const Expression& e);
+  std::optional<int> diagonal_by_theorem(const std::vector<Expression>& factors);
   int logdet(const Expression& e);
+  std::optional<std::vector<int>> logdet_of_factors(const std::vector<Expression>& factors);
   std::optional<int> logdet_by_structure(const Expression& e);
 
   int id_of(const Expression& e);

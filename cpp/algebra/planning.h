@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "algebra/lower.h"
 #include "algebra/planner.h"
 
 namespace pycraft::planning {
@@ -17,6 +18,17 @@ inline const Symbol* letter_of(const Expression& e, bool& transposed) {
 }
 
 inline bool same_model(const Symbol& a, const Symbol& b) { return a.source == b.source && a.binding == b.binding; }
+
+// The model in whose innovations factor I - HψK this sum may be; null if none.
+inline const Symbol* innovations_model(const Expression& e) {
+  if (e.kind() != NodeKind::sum) return nullptr;
+  for (const Expression& t : e.children()) {
+    const Scaled part = split_scalar(t);
+    if (part.expression.kind() == NodeKind::product && is_symbol(part.expression.children()[0], SymbolId::H))
+      return &part.expression.children()[0].node().symbol;
+  }
+  return nullptr;
+}
 
 inline double block_entries(const Space& rows, const Space& columns) {
   double sum = 0;

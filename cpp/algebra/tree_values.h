@@ -62,6 +62,10 @@ class TreeValues : public SkoValues<typename Blocks::Scalar> {
     mass_matrix_apply(tree_, blocks_, with_hinge_diagonal, x, y, m, scratch);
   }
   void mass_matrix_inverse(const S* x, S* y, int m, S* scratch) const override { mass_matrix_inverse_apply(tree_, blocks_, x, y, m, scratch); }
+  void mass_matrix_rounding(const S* x, const S* b, const S* w, const RoundingUnits<S>& units, S* out, int m, ResidualSizes<S>& sizes) const override {
+    residual_sizes(tree_, blocks_, x, b, m, units, sizes);
+    rounding_along(tree_, blocks_, w, m, sizes, out);
+  }
   S log_determinant_of_D() const override { return blocks_.log_determinant_of_D(); }
 
   // ℳ(k,j) = H(k) R(k) φ*(k,j)...: column j of body k is carried from k to its ancestors only.

@@ -7,6 +7,7 @@
 #include <mutex>
 
 #include "algebra/source.h"
+#include "algebra/sweeps/residual_rounding.h"
 #include "algebra/symbol.h"
 
 namespace pycraft {
@@ -54,6 +55,8 @@ class SkoValues {
   // The fused kernels: y = HφMφ*H* x + J x if asked; y = [I-HψK]* D⁻¹ [I-HψK] x; HφMφ*H* as a dense matrix.
   virtual void mass_matrix(bool with_hinge_diagonal, const S* x, S* y, int columns, S* scratch) const = 0;
   virtual void mass_matrix_inverse(const S* x, S* y, int columns, S* scratch) const = 0;
+  // The most that rounding of a residual b - (HφMφ*H* + J) x, in these units, makes of a correction along w, column by column: sweeps/residual_rounding.h.
+  virtual void mass_matrix_rounding(const S* x, const S* b, const S* w, const RoundingUnits<S>& units, S* out, int columns, ResidualSizes<S>& sizes) const = 0;
   virtual void mass_matrix_dense(bool with_hinge_diagonal, S* out) const = 0;
   // ln det D(k) summed over the hinges.
   virtual S log_determinant_of_D() const = 0;

@@ -4,12 +4,14 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "algebra/elimination.h"
 #include "algebra/engine.h"
 #include "algebra/errors.h"
+#include "algebra/gram_factors.h"
 #include "algebra/refinement.h"
 #include "algebra/small_lu.h"
 #include "algebra/values.h"
@@ -26,6 +28,7 @@ class Workspace {
                                                          scalars_(plan_->registers.size(), S(0)), dense_(plan_->registers.size()) {
     eliminations_.resize(plan_->registers.size());
     dense_lu_.resize(plan_->registers.size());
+    gram_.resize(plan_->registers.size());
     for (size_t r = 0; r < plan_->registers.size(); ++r) {
       const Register& reg = plan_->registers[r];
       if (reg.kind == RegisterKind::blocks) blocks_[r].shape(reg.space, reg.columns);
@@ -160,6 +163,7 @@ class Workspace {
         values[s.context]->mass_matrix_dense(s.flag, dense_[s.out].data());
         return;
       case StepKind::dense_factor: {
+        if (s.flag) return factor_gram(s, values, counts);
         ++counts.dense;
         std::vector<S>& A = dense_[s.out];
         operand_as_matrix(s, values, A, counts);
@@ -170,6 +174,7 @@ class Workspace {
       case StepKind::dense_solve: {
         const int w = width(s.in[1], m);
         vectors_[s.out] = vectors_[s.in[1]];
+        if (gram_[s.in[0]]) return gram_[s.in[0]]->solve(vectors_[s.out].data(), w);
         scratch_.resize(std::max(scratch_.size(), vectors_[s.out].size()));
         dense_lu_[s.in[0]].solve(vectors_[s.out].data(), w, scratch_.data());
         return;
@@ -232,7 +237,9 @@ class Workspace {
       case StepKind::logdet_of_factor:
         with_factors(s.in[0], [&](const auto& factors) { scalars_[s.out] = static_cast<S>(factors.log_abs_determinant()); });
         return;
-      case StepKind::logdet_of_dense: scalars_[s.out] = dense_lu_[s.in[0]].determinant().log(); return;
+      case StepKind::logdet_of_dense:
+        scalars_[s.out] = (gram_[s.in[0]] ? gram_[s.in[0]]->determinant() : dense_lu_[s.in[0]].determinant()).log();
+        return;
       case StepKind::norm_of_vector: return;  // taken by the pool over all columns_at_a_times
       case StepKind::combine_scalars: {
         S sum = S(s.coefficients.back());
@@ -241,6 +248,16 @@ class Workspace {
         return;
       }
     }
+  }
+
+  void factor_gram(const Step& s, const std::vector<SkoValues<S>*>& values, PassCounts& counts) {
+    ++counts.kernels;
+    operand_as_matrix(s, values, dense_[s.out], counts);
+    if (!gram_[s.out]) gram_[s.out].emplace();
+    const int rows = s.operand->codomain.dimension(), columns = s.operand->domain.dimension();
+    if (!gram_[s.out]->factor(dense_[s.out], rows, columns))
+      throw SingularOperatorError(plan_->text + " is singular at this state: " + std::to_string(rows) + " coordinates do not move its " +
+                                  std::to_string(columns) + " rows independently, to working precision");
   }
 
   int width(int r, int m) const { return plan_->registers[r].wide ? m : 1; }
@@ -311,7 +328,7 @@ class Workspace {
     for (const Context& c : plan_->contexts) {
       if (!c.binding) continue;
       const Refinement& own = c.binding->arithmetic.refinement;
-      r.wider |= own.wider;
+      r.residual = std::max(r.residual, own.residual);
       r.steps = own.steps == Refinement::automatic || r.steps == Refinement::automatic ? Refinement::automatic : std::max(r.steps, own.steps);
     }
     return r;
@@ -367,7 +384,7 @@ class Workspace {
     const S* x = vectors_[s.in[1]].data();
     S* y = vectors_[s.out].data();
     const auto blocks = [&](int r) -> const BlockStorage<S>& { return blocks_[r]; };
-    if (how.steps == 0 || !how.wider || eliminations_[s.in[0]].wide)
+    if (how.steps == 0 || how.residual == ResidualPrecision::same || eliminations_[s.in[0]].wide)
       return with_factors(s.in[0], [&](auto& factors) { factors.solve(x, y, w, blocks, how); });
     follow(values);
     auto& wide = *wide_->eliminations_[s.in[0]].own;
@@ -385,9 +402,12 @@ class Workspace {
     const Refinement& how = binding->arithmetic.refinement;
     const int n = plan_->registers[s.out].space.dimension();
     const size_t size = size_t(n) * w;
-    if (how.wider) follow(values);
+    // Forces alone are gathered wider by direct calls, which know the inertias in wider numbers; here all of the residual is.
+    const bool wider = how.residual != ResidualPrecision::same;
+    const S unit = wider ? static_cast<S>(epsilon<Wider<S>>()) : epsilon<S>();
+    if (wider) follow(values);
     const auto residual = [&](const S* solution, S* r) {
-      if (how.wider) {
+      if (wider) {
         convert(solution, size, wide_x_);
         wide_y_.resize(size), wide_scratch_.resize(std::max(wide_scratch_.size(), scratch_.size()));
         wide_at_[s.context]->mass_matrix(true, wide_x_.data(), wide_y_.data(), w, wide_scratch_.data());
@@ -398,7 +418,11 @@ class Workspace {
       }
     };
     refine(y, n, w, how, binding->arithmetic.form, S(0), [&] { return plan_->text; }, residual,
-           [&](const S* r, S* d) { own.mass_matrix_inverse(r, d, w, scratch_.data()); }, refine_r_, refine_delta_, corrections);
+           [&](const S* r, S* d) { own.mass_matrix_inverse(r, d, w, scratch_.data()); },
+           [&](const S* direction, S* rounding) {
+             own.mass_matrix_rounding(y, x, direction, {unit, unit}, rounding, w, sizes_);
+           },
+           refinement_);
   }
 
   void apply_external_operator(const Step& s, int w) {
@@ -580,9 +604,12 @@ class Workspace {
   };
   std::vector<Factors> eliminations_;
   std::vector<SmallLU<S>> dense_lu_;
+  std::vector<std::optional<GramFactors<S>>> gram_;
   std::vector<std::pair<const Step*, std::unique_ptr<Workspace>>> operands_;
   SmallLU<S> lu_;
-  std::vector<S> gathered_, scratch_, block_, product_, magnitude_, refine_r_, refine_delta_;
+  std::vector<S> gathered_, scratch_, block_, product_, magnitude_;
+  RefinementWork<S> refinement_;
+  ResidualSizes<S> sizes_;
   std::vector<std::string> notes_;
   // one scalar up, for residuals
   template <class T>
@@ -599,7 +626,6 @@ class Workspace {
   std::vector<SkoValues<S>*> values;                      // of all, during a run
   bool ran = false;
   int state = 0;                                          // of the batch
-  std::vector<double> corrections;                        // of the last refined solve, relative to the solution
   std::vector<std::uint64_t> generations;                 // of the values that blocks and factors were made from
 };
 

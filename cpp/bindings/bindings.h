@@ -81,7 +81,7 @@ Expression source_symbol(const std::shared_ptr<SkoSource>& source, const std::st
 // A state, or a batch, for all models that occur unbound in the operands; q None takes the model's present state.
 std::shared_ptr<const Binding> make_binding(const std::vector<Expression>& operands, const py::object& q, const py::object& v,
                                             const Arithmetic& arithmetic);
-// refine: a number of corrections or "auto"; residual: "same" | "wider".
+// refine: a number of corrections or "auto"; residual: "same" | "gather" | "wider".
 Refinement refinement(const py::object& refine, const std::string& residual, Precision precision);
 // What a space and an expression are pickled as.
 py::tuple space_parts(const Space& space);

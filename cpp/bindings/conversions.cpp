@@ -171,9 +171,7 @@ constexpr int most_steps = 1000;  // what has not converged by then does not
 
 Refinement refinement(const py::object& refine, const std::string& residual, Precision precision) {
   Refinement r;
-  if (residual != "same" && residual != "wider")
-    throw EvaluationError("residual '" + residual + "' is not there; there are 'same' (the precision itself) and 'wider' (the next one up)");
-  r.wider = residual == "wider";
+  r.residual = residual_precision_from_name(residual);
   if (py::isinstance<py::str>(refine) && py::cast<std::string>(refine) == "auto") {
     r.steps = Refinement::automatic;
   } else {
@@ -182,8 +180,8 @@ Refinement refinement(const py::object& refine, const std::string& residual, Pre
     if (r.steps < 0 || r.steps > most_steps)
       throw EvaluationError("refine=" + py::cast<std::string>(py::repr(refine)) + ": a number of corrections, 0, 1, 2, ..., " + std::to_string(most_steps) + ", or 'auto'");
   }
-  if (r.wider && r.steps != 0 && precision == Precision::digits100)
-    throw EvaluationError("residual 'wider': nothing is wider than 100 digits; there is residual 'same'");
+  if (r.residual != ResidualPrecision::same && r.steps != 0 && precision == Precision::digits100)
+    throw EvaluationError("residual '" + residual + "': nothing is wider than 100 digits; there is residual 'same'");
   return r;
 }
 

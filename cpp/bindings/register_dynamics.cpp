@@ -96,19 +96,21 @@ void register_dynamics(py::module_& m) {
                             const std::string& residual, Precision precision) {
         const Forces in(d.model(), q, v, tau);
         if (in.batch >= 0) throw ModelError("the corrections of a refinement are those of one state; a batch has as many as states");
-        const Solving how{form, refinement(refine, residual, precision), OnSingular::raise};
+        const Solving how{form, refinement(refine, residual, precision), OnSingular::raise, true};
         py::array_t<double> value = output(py::none(), -1, {d.model().nv()});
         std::vector<double> corrections;
+        double error = 0;
         at_precision(precision, [&]<class S>(S) {
           std::vector<S> vdot(d.model().nv());
           d.each<S>(0, 1, 1, [&](RigidDynamics<S>& w, int) {
             w.forward_dynamics(in.q.array.data(), in.v.array.data(), in.tau.array.data(), vdot.data(), how);
             corrections = w.corrections();
+            error = w.estimated_error();
           });
           for (size_t j = 0; j < vdot.size(); ++j) value.mutable_data()[j] = to_double(vdot[j]);
           require_finite(value.data(), vdot.size(), d.model());
         });
-        return py::make_tuple(value, corrections);
+        return py::make_tuple(value, corrections, corrections.empty() ? py::object(py::none()) : py::object(py::float_(error)));
       }, py::arg("q"), py::arg("v"), py::arg("tau"), py::arg("form"), py::arg("refine"), py::arg("residual"), py::arg("precision"))
       .def("mass_matrix_inverse", [](Dynamics& d, const py::object& q, Form form, const py::object& refine, const std::string& residual, Precision precision,
                                      const std::string& on_singular, const py::object& out) {

@@ -189,7 +189,7 @@ void register_operators(py::module_& m) {
       }, py::arg("q") = py::none(), py::arg("v") = py::none(), py::kw_only(), py::arg("form") = Form::fast, py::arg("refine") = 0, py::arg("residual") = "same", py::arg("precision") = Precision::double_,
          "The same expression bound to a state: q (nq,) or a batch (B, nq), v likewise (zero if left out); q=None takes the model's present\n"
          "state. The innermost binding wins. form: \"fast\", \"ud\" or \"square-root\", of the articulated-inertia sweep; refine: corrections of\n"
-         "what is solved, a number or \"auto\", with residual=\"same\" or \"wider\"; precision: \"single\", \"double\", \"extended\", \"quad\", 50, 100.")
+         "what is solved, a number or \"auto\", with residual=\"same\", \"gather\" or \"wider\"; precision: \"single\", \"double\", \"extended\", \"quad\", 50, 100.")
       .def("_bound", [](const Expression& e, const std::shared_ptr<const Binding>& b) { return e.at(b); })
       // ---- arithmetic
       .def("__matmul__", [](const Expression& a, const py::object& b) -> py::object {

@@ -127,11 +127,11 @@ void register_sources(py::module_& m) {
       .def("__reduce__", [](const Binding& b) -> py::tuple {
         return py::make_tuple(py::module_::import("pycraft._core").attr("_binding_from_parts"),
                               py::make_tuple(b.batch, b.nq, b.nv, b.q, b.v, b.arithmetic.precision, b.arithmetic.form, b.arithmetic.refinement.steps,
-                                             b.arithmetic.refinement.wider));
+                                             static_cast<int>(b.arithmetic.refinement.residual)));
       });
-  m.def("_binding_from_parts", [](int batch, int nq, int nv, std::vector<double> q, std::vector<double> v, Precision precision, Form form, int steps, bool wider) {
+  m.def("_binding_from_parts", [](int batch, int nq, int nv, std::vector<double> q, std::vector<double> v, Precision precision, Form form, int steps, int residual) {
     auto b = std::make_shared<Binding>();
-    b->batch = batch, b->nq = nq, b->nv = nv, b->q = std::move(q), b->v = std::move(v), b->arithmetic = {form, {steps, wider}, precision};
+    b->batch = batch, b->nq = nq, b->nv = nv, b->q = std::move(q), b->v = std::move(v), b->arithmetic = {form, {steps, residual_precisions[residual]}, precision};
     return b;
   });
   m.def("_binding", [](const Expression& e) {

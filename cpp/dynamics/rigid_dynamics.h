@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "algebra/refinement.h"
+#include "algebra/sweeps/residual_rounding.h"
 #include "dynamics/workspace_pool.h"
 #include "model/multibody.h"
 #include "operators/rigid_blocks.h"
@@ -23,6 +24,7 @@ struct Solving {
   Form form = Form::fast;
   Refinement refinement;
   OnSingular on_singular = OnSingular::raise;
+  bool estimate = false;  // of a refined value: how far it is off
 };
 
 // Numbers of one model at one scalar.
@@ -53,7 +55,9 @@ class RigidDynamics {
   size_t bytes(Form form) const;
 
   // |δ|/|x| of the corrections of the last refined call.
-  const std::vector<double>& corrections() const { return corrections_; }
+  const std::vector<double>& corrections() const { return refinement_.corrections; }
+  // Of the last refined forward dynamics that was asked to estimate it: |x - exact|/|x|, 2-norms.
+  double estimated_error() const { return estimated_error_; }
 
  private:
   template <class T>
@@ -67,6 +71,11 @@ class RigidDynamics {
   void solve(const S* r, S* x, int m);                    // with the kept factors
   template <class T>
   RigidDynamics<Wider<S>>& wider(const T* q, const T* v);
+  template <class T>
+  void size_residual(const RigidDynamics<T>& formed, const T* vdot, const Refinement& how, bool shared);  // of the one that was formed last
+  S length(const S* x) const;   // 2-norm of nv numbers
+  void gather_wider();  // from now on forces can be
+  S floor(const S* direction);  // the most that rounding of that residual can make of a correction
   template <class F>
   AddedInertias with_every_hinge_regular(F f);
   void project_off_null_space(const AddedInertias& added, S* x, int m);
@@ -80,10 +89,15 @@ class RigidDynamics {
   std::vector<Vector6<S>> alpha_, force_;
   std::vector<Pose<S>> world_;   // X_WB of every body
   std::vector<double> rest_;     // v = 0
-  std::vector<S> q_, v_, tau_, columns_, scratch_, r_, delta_;
+  std::vector<S> q_, v_, tau_, columns_, scratch_, r_;
   std::unique_ptr<RigidDynamics<Wider<S>>> wider_;
+  std::shared_ptr<const CompiledModel<Wider<S>>> wide_model_;
+  std::vector<Vector6<Wider<S>>> wide_force_;
   std::vector<Wider<S>> wide_x_, wide_r_;
-  std::vector<double> corrections_;
+  RefinementWork<S> refinement_;
+  ResidualSizes<S> sizes_;
+  S left_ = S(0);
+  double estimated_error_ = 0;
 };
 
 #define PYCRAFT_INSTANTIATE(S) extern template class RigidDynamics<S>;

@@ -117,12 +117,13 @@ void Sensitivities<S>::differentiate_absorbed(S* dv) {
   }
 }
 
-// By the derivative of the sweep itself, which keeps the digits of the form: of forces that are differentiated first, those of a heavy body
-// would hide a light one's. The rates of the sweep's own result come with it, without refinement; (ℳ + J)⁻¹ is refined as asked.
+// By the derivative of the sweep itself, which keeps the digits of a factored form: of forces that are differentiated first, those of a heavy
+// body would hide a light one's. It is the sweep of `ud` for both: reflections would pass over a row that is zero here and not beside it.
+// Its own result is not refined; (ℳ + J)⁻¹ is, as asked.
 template <class S>
 bool Sensitivities<S>::differentiate_sweep(const double* q, const double* v, const double* tau, const Solving& how, S* dq, S* dv, S* dtau) {
   if (!tangents_) tangents_ = std::make_unique<TangentDynamics<S>>(source_);
-  if (!tangents_->forward_dynamics(q, v, tau, how.form, dq, dv)) return false;
+  if (!tangents_->forward_dynamics(q, v, tau, Form::ud, dq, dv)) return false;
   if (!dynamics_) dynamics_ = std::make_unique<RigidDynamics<S>>(source_);
   dynamics_->mass_matrix_inverse(q, dtau, how);
   return true;

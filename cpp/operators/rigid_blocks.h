@@ -62,6 +62,7 @@ class RigidBlocks {
   std::vector<S> J;                       // rotor inertia per coordinate
   std::vector<int> aligned;               // coordinate axis that a row of H is exactly, or -1
   const std::vector<InertiaFactors<S>>* inertia_factors = nullptr;
+  const std::vector<RigidInertia<Wider<S>>>* wide_inertia = nullptr;  // of the model one scalar up, where residuals need it
   // ---- how the articulated inertia is computed
   Form form = Form::fast;
   bool keep_inertias = true;              // P and P⁺ themselves are wanted (always there in the fast form)
@@ -207,6 +208,85 @@ class RigidBlocks {
       }
     }
   }
+  // ---------------------------------------------------------------- forces in a wider scalar T
+  template <class T>
+  void inertia_wide(int k, const S* a, T* f, int m) const {
+    const RigidInertia<T> M = wide_inertia ? cast<T>((*wide_inertia)[k]) : cast<T>(inertia[k]);
+    for (int c = 0; c < m; ++c) store(M * cast<T>(load(a, m, c)), f, m, c);
+  }
+  template <class T>
+  void shift_add_wide(int k, const T* x, T* y, int m) const {
+    const Pose<T> X = cast<T>(pose[k]);
+    for (int c = 0; c < m; ++c) add_to(force_to_parent(X, load(x, m, c)), y, m, c);
+  }
+  // r = b - H f - J x
+  template <class T>
+  void residual_wide(int k, const T* f, const S* x, const S* b, S* r, int m) const {
+    for (int c = 0; c < m; ++c)
+      for (int j = first(k); j < last(k); ++j) {
+        const size_t at = size_t(j - first(k)) * m + c;
+        r[at] = static_cast<S>(T(b[at]) - dot(cast<T>(H[j]), load(f, m, c)) - T(J[j]) * T(x[at]));
+      }
+  }
+
+  // ---------------------------------------------------------------- sizes of what residuals add up (algebra/sweeps/residual_rounding.h)
+  // Rotations mix the entries of a three-vector: each has the size of the whole.
+  void motion_sizes(int k, const S* parent, const S* x, const S* a, S* out, int m) const {
+    for (int c = 0; c < m; ++c) {
+      const Vector6<S> own = load(a, m, c);
+      S angular = magnitude(own.angular), linear = magnitude(own.linear);
+      if (parent) {
+        const Vector6<S> p = load(parent, m, c);
+        angular += magnitude(p.angular);
+        linear += magnitude(p.linear) + magnitude(pose[k].p) * magnitude(p.angular);
+      }
+      using std::abs;
+      for (int j = first(k); j < last(k); ++j) {
+        const S rate = abs(x[(j - first(k)) * m + c]);
+        angular += rate * magnitude(H[j].angular);
+        linear += rate * magnitude(H[j].linear);
+      }
+      store(alike(angular, linear), out, m, c);
+    }
+  }
+  void inertia_sizes(int k, const S* a, S* out, int m) const {  // of M a, twice: of its terms and of what they add up to
+    for (int c = 0; c < m; ++c) {
+      const Vector6<S> own = load(a, m, c);
+      store(S(2) * inertia_size(k, magnitude(own.angular), magnitude(own.linear)), out, m, c);
+    }
+  }
+  Vector6<S> inertia_size(int k, const S& angular, const S& linear) const {
+    const RigidInertia<S>& M = inertia[k];
+    S rotational = S(0);
+    using std::abs;
+    for (int i = 0; i < 3; ++i)
+      for (int j = i; j < 3; ++j) rotational = maximum(rotational, S(abs(M.rotational(i, j))));
+    const S moment = magnitude(M.moment);
+    return alike(rotational * angular + moment * linear, M.mass * linear + moment * angular);
+  }
+  void shifted_force_sizes(int k, const S* f, S* out, int m) const {
+    for (int c = 0; c < m; ++c) {
+      const Vector6<S> own = load(f, m, c);
+      const S linear = magnitude(own.linear);
+      add_to(alike(S(magnitude(own.angular) + magnitude(pose[k].p) * linear), linear), out, m, c);
+    }
+  }
+  void coordinate_sizes(int k, const S* f, const S* x, S* out, int m) const {
+    using std::abs;
+    for (int c = 0; c < m; ++c) {
+      const Vector6<S> own = load(f, m, c);
+      const S angular = magnitude(own.angular), linear = magnitude(own.linear);
+      for (int j = first(k); j < last(k); ++j)
+        out[(j - first(k)) * m + c] = magnitude(H[j].angular) * angular + magnitude(H[j].linear) * linear + J[j] * abs(x[(j - first(k)) * m + c]);
+    }
+  }
+  // Largest entry.
+  static S magnitude(const Vector3<S>& x) {
+    using std::abs;
+    return maximum(maximum(S(abs(x[0])), S(abs(x[1]))), S(abs(x[2])));
+  }
+  static Vector6<S> alike(const S& angular, const S& linear) { return {{angular, angular, angular}, {linear, linear, linear}}; }
+
   S log_determinant_of_D() const {
     using std::log;
     S sum = S(0);
@@ -264,6 +344,10 @@ class RigidBlocks {
   void check_pivots(int k) {
     for (int j = first(k); j < last(k); ++j) pivot_work_[j - first(k)] = dot(H[j], X_[k] * H[j]) + J[j];
     require_pivots(tree_, k, L.data() + d_[k], pivots_.data() + first(k), pivot_work_.data(), form);
+    const ArticulatedInertia<S> own = diagonal_part(P[k]);
+    for (int j = first(k); j < last(k); ++j)
+      pivot_work_[j - first(k)] = aligned[j] >= 0 ? D[d_[k] + (j - first(k)) * (tree_.dof[k] + 1)] : S(dot(H[j], own * H[j]) + J[j]);
+    require_gain(tree_, k, L.data() + d_[k], pivots_.data() + first(k), pivot_work_.data(), form);
   }
   void error_to_parent(int k) {
     ArticulatedInertia<S> plus = projected(X_[k], H, G, k);  // τ̄Xτ̄*
@@ -366,6 +450,7 @@ class RigidBlocks {
     }
     error_[k] += rounding_bound<S>(form) * fresh;
     growth_[k] *= maximum(S(1), S(grown / S(16)));
+    if (!(S(1) > gain_bound<S>(form) * grown)) return true;
     return !(largest_growth(form) > growth_[k] && S(1) > S(4) * error_[k] * growth_[k]);
   }
   // In units of the rounding bound: what factors of the body's inertia leave out. The plain form rounds at more than that.

@@ -133,7 +133,7 @@ BOOST_AUTO_TEST_CASE(forms_refinement_and_packs) {
   RigidDynamics<double> w(*mb);
   PackedDynamics<double> pack(*mb);
   for (const Form form : forms) {
-    for (const Refinement refinement : {Refinement{0, false}, Refinement{2, false}, Refinement{Refinement::automatic, true}}) {
+    for (const Refinement refinement : {Refinement{0}, Refinement{2}, Refinement{2, ResidualPrecision::gather}, Refinement{Refinement::automatic, ResidualPrecision::wider}}) {
       const Solving how{form, refinement, OnSingular::raise};
       BOOST_TEST(allocations_of([&] { w.forward_dynamics(q.data(), v.data(), tau.data(), alone.data(), how); }) == 0, form_name(form));
     }
@@ -163,7 +163,7 @@ BOOST_AUTO_TEST_CASE(direct_calls) {
   quiet([&] { w.inverse_dynamics(q.data(), v.data(), nullptr, out.data()); }, "bias forces");
   quiet([&] { w.mass_matrix(q.data(), out.data()); }, "mass matrix");
   for (const Form form : forms)
-    for (const Refinement refinement : {Refinement{0, false}, Refinement{2, false}, Refinement{1, true}})
+    for (const Refinement refinement : {Refinement{0}, Refinement{2}, Refinement{1, ResidualPrecision::gather}, Refinement{1, ResidualPrecision::wider}})
       quiet([&] { w.mass_matrix_inverse(q.data(), out.data(), Solving{form, refinement, OnSingular::raise}); }, "mass matrix inverse");
   quiet([&] { w.jacobian(tool, q.data(), out.data()); }, "jacobian");
   quiet([&] { out[0] = w.pose(tool, q.data()).p[0]; }, "pose");

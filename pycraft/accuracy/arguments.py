@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from .rungs import OTHER_METHODS, epsilon
+from .rungs import OTHER_METHODS, RESIDUALS, epsilon
 
 METHODS = ("articulated", *OTHER_METHODS)
-RESIDUALS = ("same", "wider")
 
 
 def checked_model(model: Any, caller: str) -> None:
@@ -64,7 +63,9 @@ def checked_refinements(given: Any) -> list[tuple[int | str, str]]:
             raise _core.EvaluationError(f"refinements: {one!r} is neither a number of corrections nor a pair of it and a residual")
         refine, residual = one if isinstance(one, (tuple, list)) else (one, "same")
         if residual not in RESIDUALS:
-            raise _core.EvaluationError(f"refinements: residual {residual!r} of {one!r} is not there; there are 'same' and 'wider'")
+            raise _core.EvaluationError(
+                f"refinements: residual {residual!r} of {one!r} is not there; there are 'same', 'gather' and 'wider'"
+            )
         found.append((_core.checked_refinement(refine, residual, "double"), residual))
     return found
 

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from .catalogue import EVERY_DOUBLE, REFINED_WIDER, UNREFINED, Bound, Measured
+from .catalogue import EVERY_DOUBLE, GATHERED, REFINED_WIDER, UNREFINED, Bound, Measured
 from .rungs import epsilon, wider
 
 
@@ -65,7 +65,14 @@ WIDER = Bound(
     lambda m: 10 * np.maximum(m.floors * epsilon(wider("double")) / 2, m.eps / 2),
 )
 
-FLOOR = (ONE, WIDER) + tuple(
+GATHER = Bound(
+    tuple(rung.label for rung in GATHERED),
+    "worst",
+    "unrefined / 300, where that exceeds 1e-12, or 100 eps √N",
+    lambda m: np.maximum(np.where(m.errors["fast"] > 1e-12, m.errors["fast"] / 300, np.inf), 100 * m.eps * np.sqrt(m.N)),
+)
+
+FLOOR = (ONE, WIDER, GATHER) + tuple(
     Bound((REFINED_WIDER[form],), "worst", "unrefined / 300, where that exceeds 1e-12", partial(_three_hundredth, form))
     for form in UNREFINED
 )

@@ -92,7 +92,7 @@ def _refused(name: str, hard: str, build: Build, fault: str) -> DynamicsCase:
 def _prismatic(light: float, heavy: float) -> DynamicsCase:
     """Two sliders in line: D inboard is `light`, a difference of numbers at `heavy`.
 
-    `fast` knows it to 8 eps heavy; `ud` works as with twice the digits.
+    `fast` knows it to 8 eps heavy; `ud` works as with twice the digits, as long as G has one: light above 4 eps heavy.
     """
     verdict: dict[str, str] = {}
     for rung in (rung for rung in RUNGS if rung.precision in _core.epsilons()):
@@ -101,6 +101,8 @@ def _prismatic(light: float, heavy: float) -> DynamicsCase:
             verdict[rung.label] = REFUSED if light < noise / 10 else SOLVED if light > 10 * noise else EITHER
         elif rung.form == "square-root" or rung.precision == "single":
             verdict[rung.label] = EITHER
+        else:
+            verdict[rung.label] = REFUSED if light < noise / 20 else SOLVED if light > 10 * noise else EITHER
     squared = Bound(("ud",), "worst", "1000 eps + 10 eps² heavy / light", lambda m: 1000 * m.eps + 10 * m.eps**2 * heavy / light)
     bounds: tuple[Bound, ...] = (squared, *WITHIN_PEERS)
     if light > 80 * epsilon("double") * heavy:

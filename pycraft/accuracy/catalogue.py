@@ -25,7 +25,8 @@ REFINEMENTS: tuple[dict[str, Any], ...] = (
     {"refine": "auto"},
     {"refine": "auto", "residual": "wider"},
 )
-DOUBLE = tuple(Rung(form, **refinement) for form in FORMS for refinement in REFINEMENTS)
+GATHERED = tuple(Rung(form, refine="auto", residual="gather") for form in ("fast", "ud"))
+DOUBLE = tuple(Rung(form, **refinement) for form in FORMS for refinement in REFINEMENTS) + GATHERED
 OTHER_PRECISIONS = (
     Rung("fast", precision="single"),
     Rung("fast", refine="auto", residual="wider", precision="single"),
@@ -164,13 +165,26 @@ def catalogue(sizes: Iterable[int] = SIZES) -> list[Case]:
         cases_elimination,
         cases_groups,
         cases_massless,
+        cases_motion,
         cases_ratios,
+        cases_refinement,
         cases_trajectories,
         cases_units,
     )
 
     sizes = sorted(sizes)
     cases: list[Case] = cases_chains.cases(sizes)
-    for module in (cases_ratios, cases_massless, cases_configurations, cases_units, cases_elimination, cases_groups, cases_trajectories):
+    modules = (
+        cases_ratios,
+        cases_refinement,
+        cases_massless,
+        cases_configurations,
+        cases_units,
+        cases_elimination,
+        cases_groups,
+        cases_motion,
+        cases_trajectories,
+    )
+    for module in modules:
         cases += [case for case in module.cases() if case.parameters.get("N", 0) <= max(sizes[-1], 10)]
     return cases

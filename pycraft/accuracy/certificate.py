@@ -50,7 +50,8 @@ class Certificate:
     error : float
         Relative error, measured against `reference`: 2-norm of the difference over that of the reference.
     reference : str
-        "quad" for a value in double, single or extended precision; the next wider precision for one in quad or more.
+        "quad" for a value in double, single or extended precision; the next wider precision for one in quad or more, and where the next
+        wider one shows that the reference itself is off by more than a tenth of the error.
     condition : float or None
         1-norm condition number, estimated, of `condition_of`: ℳ + J for forward dynamics, else the square operator itself.
     input_errors : dict
@@ -94,6 +95,8 @@ class Certificate:
             return "the value is right to rounding: no higher rung is needed"
         if self.input_error is None:
             return ""
+        if self.error == float("inf"):
+            return "the exact value is zero, and what is returned is rounding: no error relative to it is finite"
         if self.error <= self.input_error:
             names = [name for name, moved in self.input_errors.items() if moved >= self.error]
             exact = f"{_listed(names)} {'is' if len(names) == 1 else 'are'} exact"
@@ -110,7 +113,8 @@ class Certificate:
 
     def lines(self) -> list[tuple[str, str, str]]:
         """Name, number and remark of each line of the table."""
-        out = [("error", error_text(self.error), f"relative, measured against {self.reference}")]
+        against = f"relative, measured against {self.reference}"
+        out = [("error", error_text(self.error), f"{self.notes['error']}, by {self.reference}" if "error" in self.notes else against)]
         moved = "moved by half a unit in the last place of every number"
         data = [(error_text(error), self.notes.get(name, f"{name} {moved}")) for name, error in self.input_errors.items()]
         if "input_error" in self.notes:

@@ -54,6 +54,12 @@ def dynamics_error(model: Any, q: np.ndarray, v: np.ndarray, tau: np.ndarray, ru
     return relative_error(returned, truth)
 
 
+def magnitude(value: Any) -> float:
+    """2-norm (Frobenius of a matrix) of numbers that may be mpmath's."""
+    with mpmath.workprec(BITS):
+        return float(mpmath.sqrt(mpmath.fsum(mpmath.mpf(x) ** 2 for x in np.asarray(value, dtype=object).ravel())))
+
+
 def relative_error(value: Any, exact: Any) -> float:
     """2-norm of the difference over that of the exact value (Frobenius of a matrix); both may be mpmath numbers."""
     value, exact = np.asarray(value, dtype=object).ravel(), np.asarray(exact, dtype=object).ravel()

@@ -5,7 +5,8 @@ by u(|M(k)||α(k)| + |f(k)|). What these make of θ̈ after the correction by �
 
     floor = u ‖ |ℳ⁻¹HφMφ*| |α| + |ℳ⁻¹Hφ| (|M||α| + |f|) ‖ / ‖θ̈‖
 
-with u half an epsilon of the precision in which the residual is formed, and at least half an epsilon of the one in which θ̈ is kept.
+with u half an epsilon of the precision in which the residual is formed, and at least half an epsilon of the one in which θ̈ is kept. Where
+forces alone are gathered in a wider precision, the second term has its u. Velocities and poses are taken as they are.
 """
 
 from __future__ import annotations
@@ -29,9 +30,11 @@ def refinement_floor(model: Any, q: np.ndarray, v: np.ndarray, vdot: np.ndarray,
     """
     if model.nv > LARGEST:
         raise _core.EvaluationError(f"needs dense maps, and is computed up to {LARGEST} coordinates")
-    residual = rung.precision if rung.residual == "same" else wider(rung.precision) or rung.precision
+    above = wider(rung.precision) or rung.precision
+    residual = above if rung.residual == "wider" else rung.precision
+    forces = epsilon(above) / epsilon(rung.precision) if rung.residual == "gather" else 1.0
     with np.errstate(all="ignore"):
-        units = float(_units(model, q, v, np.asarray(vdot, float)[None], form=EXACT, precision="extended")[0])
+        units = float(_units(model, q, v, np.asarray(vdot, float)[None], forces, form=EXACT, precision="extended")[0])
     if not np.isfinite(units):
         raise _core.EvaluationError("is relative to the accelerations, and they are zero or out of range")
     return max(epsilon(residual) / 2 * units, epsilon(rung.precision) / 2)
@@ -47,8 +50,11 @@ def floors(model: Any, q: np.ndarray, vdots: np.ndarray) -> np.ndarray:
     return np.concatenate([_units(model, q[a], rest, vdots[a:b]) for a, b in zip(changes, changes[1:], strict=False)])
 
 
-def _units(model: Any, q: np.ndarray, v: np.ndarray, vdots: np.ndarray, **binding: Any) -> np.ndarray:
-    """‖ |ℳ⁻¹HφMφ*| |α| + |ℳ⁻¹Hφ| (|M||α| + |f|) ‖ / ‖θ̈‖ (B,) for accelerations vdots (B, nv) at one state; 0 where all is zero."""
+def _units(model: Any, q: np.ndarray, v: np.ndarray, vdots: np.ndarray, forces: float = 1.0, **binding: Any) -> np.ndarray:
+    """‖ |ℳ⁻¹HφMφ*| |α| + |ℳ⁻¹Hφ| (|M||α| + |f|) ‖ / ‖θ̈‖ (B,) for accelerations vdots (B, nv) at one state; 0 where all is zero.
+
+    forces : the unit of the forces over that of the motions, where they are gathered in a wider precision
+    """
     soa, n, count = model.soa, model._size, len(vdots)
     H, phi, M, J, a, b, a0 = soa("H phi M J a b gravity_base")
 
@@ -63,6 +69,6 @@ def _units(model: Any, q: np.ndarray, v: np.ndarray, vdots: np.ndarray, **bindin
     inertias = np.abs(at(M @ _core.constant(np.tile(np.eye(6), (n, 1)), _core.euclidean(6), soa.V, "1")))
     pushed = np.einsum("kij,kjb->kib", inertias.reshape(-1, 6, 6), alpha.reshape(n, 6, count)).reshape(6 * n, count) + force
     inverse = (H @ phi @ M @ phi.T @ H.T + J).inv()
-    rounding = np.abs(at(inverse @ H @ phi @ M @ phi.T)) @ alpha + np.abs(at(inverse @ H @ phi)) @ pushed
+    rounding = np.abs(at(inverse @ H @ phi @ M @ phi.T)) @ alpha + forces * np.abs(at(inverse @ H @ phi)) @ pushed
     norms, sizes = np.linalg.norm(rounding, axis=0), np.linalg.norm(vdots, axis=1)
     return np.divide(norms, sizes, out=np.zeros(count), where=(sizes != 0) | (norms != 0))

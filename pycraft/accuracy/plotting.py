@@ -142,7 +142,7 @@ def _places() -> list[tuple[float, float, str, str]]:
 
 
 def accuracy_plot(table: Any, ax: Any = None) -> Any:
-    """Error against time: colour the precision, marker the form or method, filled where refined, half with a wider residual.
+    """Error against time: colour the precision, marker the form or method, filled where refined, half with a wider residual or gather.
 
     The Pareto front is drawn, its points ringed, its steps named.
     """
@@ -173,7 +173,11 @@ def accuracy_plot(table: Any, ax: Any = None) -> Any:
     for name, marker in {**MARKERS, **OTHERS}.items():
         if any(name in (row["form"], row["method"]) for row in rows):
             used["way"].append(Line2D([], [], marker=marker, ls="", color="k", mfc="none", label=name))
-    for residual, text in (("same", "filled: refined"), ("wider", "half: refined, wider residual")):
+    for residual, text in (
+        ("same", "filled: refined"),
+        ("gather", "left half: refined, wide gather"),
+        ("wider", "half: refined, wider residual"),
+    ):
         if any(row["refine"] and (row["residual"] or "same") == residual for row in rows):
             used["way"].append(Line2D([], [], marker="o", ls="", color="k", **_filling(1, residual, "k"), label=text))
     used["way"].append(Line2D([], [], **{**RING, "ls": "-", "ms": 9}, color="k", lw=0.8, alpha=0.6, label="Pareto front"))
@@ -186,10 +190,11 @@ def accuracy_plot(table: Any, ax: Any = None) -> Any:
 
 
 def _filling(refine: Any, residual: str, colour: str) -> dict[str, Any]:
-    """Of a marker: hollow unrefined, filled refined, half filled with a wider residual."""
+    """Of a marker: hollow unrefined, filled refined, half filled with a wider residual, its left half with a wide gather."""
     if not refine:
         return {"mfc": "none"}
-    return {"mfc": colour, "mfcalt": "white", "fillstyle": "bottom"} if residual == "wider" else {"mfc": colour}
+    half = {"gather": "left", "wider": "bottom"}.get(residual)
+    return {"mfc": colour, "mfcalt": "white", "fillstyle": half} if half else {"mfc": colour}
 
 
 def _steps(front: list[tuple[float, float, dict[str, Any]]]) -> list[tuple[float, float, dict[str, Any]]]:

@@ -17,6 +17,12 @@ REFERENCE = "quad"
 """What values are measured against; what is as wide or wider is measured against the next wider precision."""
 
 
+RESIDUALS = ("same", "gather", "wider")
+"""What a residual of a refinement is formed in: the precision itself; that, but forces gathered one up; all one up."""
+
+RESIDUAL_TEXTS = {"same": "", "gather": ", wide gather", "wider": ", wider residual"}
+
+
 @dataclass(frozen=True)
 class Rung:
     """One way of computing: what `forward_dynamics`, `at` and the timings take as keywords."""
@@ -45,7 +51,7 @@ class Rung:
             text += " + refinement"
         elif self.refine:
             text += f" + {self.refine} refinement" + ("s" if self.refine != 1 else "")
-        return text + (", wider residual" if self.refine and self.residual != "same" else "")
+        return text + (RESIDUAL_TEXTS[self.residual] if self.refine else "")
 
     @property
     def label(self) -> str:
@@ -63,9 +69,10 @@ LADDER = (
 )
 """The ladder that users climb: each step costs more than the one before it."""
 
+WIDE_GATHER = Rung("fast", refine=1, residual="gather")
 WIDER_RESIDUAL = Rung("fast", refine=1, residual="wider")
 
-CLIMB = (*LADDER[:4], WIDER_RESIDUAL, *LADDER[4:])
+CLIMB = (*LADDER[:2], WIDE_GATHER, *LADDER[2:4], WIDER_RESIDUAL, *LADDER[4:])
 """The steps among which a certificate looks for the next one that helps: where forces cancel, a wider residual lowers the floor."""
 
 
@@ -113,6 +120,12 @@ def above(rung: Rung) -> list[Rung]:
         return wide + ([replace(rung, precision=higher, refine=0, residual="same")] if higher else [])
     if rung.refine and rung.residual == "wider":
         return list(CLIMB[CLIMB.index(WIDER_RESIDUAL) + 1 :])
+    if rung.refine and rung.residual == "gather":
+        return (
+            [WIDER_RESIDUAL, *CLIMB[CLIMB.index(WIDER_RESIDUAL) + 1 :]]
+            if rung.form != "fast"
+            else list(CLIMB[CLIMB.index(WIDE_GATHER) + 1 :])
+        )
     # A root-free and a square-root sweep stand side by side; more than one step of refinement is still refinement.
     form = "ud" if rung.form == "square-root" else rung.form
     return list(CLIMB[CLIMB.index(Rung(form, refine=1 if rung.refine else 0)) + 1 :])

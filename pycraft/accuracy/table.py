@@ -107,8 +107,8 @@ def accuracy(
         The states: rad, m and their rates; N m, N. Left out: q five random states (v with them), v zero, tau drawn from a standard normal
         distribution.
     forms : of the articulated-inertia sweep; all that there are
-    refinements : of 0, 1, ..., "auto", and pairs with the residual: (1, "wider")
-        0, 1 and (1, "wider") in single and double precision, 0 and 1 in extended, 0 beyond.
+    refinements : of 0, 1, ..., "auto", and pairs with the residual: (1, "gather"), (1, "wider")
+        0, 1, (1, "gather") and (1, "wider") in single and double precision, 0 and 1 in extended, 0 beyond.
     precisions : "single", "double", "extended", "quad", 50, 100
         The first four; single and double for the other methods.
     methods : "articulated" and those of `forward_dynamics`; all of them
@@ -230,7 +230,7 @@ def _product(forms: Any, refinements: Any, precisions: Any, methods: Any) -> lis
 def _usual_refinements(precision: Any) -> list[tuple[int | str, str]]:
     """Refinements that are measured where none is asked for."""
     if epsilon(precision) >= epsilon("double"):
-        return [(0, "same"), (1, "same"), (1, "wider")]
+        return [(0, "same"), (1, "same"), (1, "gather"), (1, "wider")]
     return [(0, "same"), (1, "same")] if str(precision) == "extended" else [(0, "same")]
 
 

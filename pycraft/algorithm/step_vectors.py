@@ -17,6 +17,7 @@ from .formulas import (
     Product,
     Quantity,
     Term,
+    Transposed,
     product,
     star,
 )
@@ -231,8 +232,14 @@ def _mass_matrix_dense(r: Recursion, step: Step) -> None:
 # ---------------------------------------------------------------------- dense matrices
 @writer("dense_factor")
 def _dense_factor(r: Recursion, step: Step) -> None:
-    """A, the operand made dense column by column; what solves with it factors it."""
-    r.values[step["out"]] = r.operator(step)
+    """A, the operand X made dense column by column, or X*X; what solves with it factors it."""
+    X = r.operator(step)
+    if not step["flag"]:
+        r.values[step["out"]] = X
+        return
+    A = r.book.new("A", "matrix", rows=X.columns, columns=X.columns)
+    r.once(A, Term(product(Transposed(At(X, "")), At(X, ""))))
+    r.values[step["out"]] = A
 
 
 @writer("dense_solve")

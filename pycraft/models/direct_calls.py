@@ -68,10 +68,11 @@ class DirectCalls:
             beside heavy ones; they cost about three and four times as much.
         refine : int or "auto"
             Corrections by the residual of inverse dynamics, with gravity and Coriolis terms inside the sweep; "auto" takes them as long
-            as they shrink.
-        residual : {"same", "wider"}
-            The residual of a refinement at the precision itself, or in the next wider one. Without refinement nothing has a residual, and
-            this changes nothing.
+            as they shrink. A correction that may be no more than the rounding of its residual is left out.
+        residual : {"same", "gather", "wider"}
+            The residual of a refinement at the precision itself; with the forces gathered in the next wider one, which is where stretched
+            chains lose their digits; or all of it in the next wider one. Without refinement nothing has a residual, and this changes
+            nothing.
         precision : {"single", "double", "extended", "quad", 50, 100}
             The scalar of the whole computation; results are rounded to double.
         method : {"articulated", "cholesky", "ldl", "conjugate-gradients", "inverse", "realization"}
@@ -92,7 +93,7 @@ class DirectCalls:
         SingularOperatorError
             Of the other methods: the mass matrix is not positive definite to rounding.
         RefinementError
-            The first correction is more than 0.3 of the solution.
+            The first correction is more than 0.3 of the solution, or the corrections do not shrink.
 
         Source: articulated-body forward dynamics by the operator factorization of the mass matrix [Jain 2011].
 
@@ -128,9 +129,12 @@ class DirectCalls:
     ) -> dict[str, Any]:
         """Forward dynamics of one state with its corrections; arguments and errors as `forward_dynamics` has them.
 
-        `value` (nv,), rad/s² and m/s²; `steps`, how many corrections were made; `corrections`, of each |correction| / max(|solution|,
-        |correction|), so at most 1. The first estimates the error before, the last the error that is left. O(N) a correction. ModelError
-        for a batch, which has as many corrections as states.
+        `value` (nv,), rad/s² and m/s²; `steps`, how many corrections were solved for; `corrections`, the largest entry of each over that
+        of the solution, or over its own where that is larger, so at most 1; `error`, None without a correction: the estimate of
+        ‖value - exact‖ / ‖value‖, 2-norms. That is the last correction, applied or left out, or the floor where it is larger: the most
+        that the rounding of velocities, poses, motions and forces in the residual can make of a correction. It may be far above the true
+        error, as where the value is better than any residual in this precision could tell; where accelerations cancel to nothing it is
+        above 1. O(N) a correction. ModelError for a batch, which has as many corrections as states.
 
         Examples
         --------
@@ -141,8 +145,8 @@ class DirectCalls:
         """
         q, v = at_state(self, q, v)
         tau = np.zeros(self.nv) if tau is None else tau
-        value, corrections = self._calls().refinement(q, v, tau, form, refine, residual, precision)
-        return {"value": value, "steps": len(corrections), "corrections": corrections}
+        value, corrections, error = self._calls().refinement(q, v, tau, form, refine, residual, precision)
+        return {"value": value, "steps": len(corrections), "corrections": corrections, "error": error}
 
     def inverse_dynamics(self, q=None, v=None, vdot=None, *, precision: str | int = "double", out=None) -> np.ndarray:
         """Generalized forces (nv,) or (B, nv), N m and N, for the accelerations vdot, gravity and rotor inertia included.
@@ -265,8 +269,8 @@ class DirectCalls:
     def potential_energy(self, q=None, *, datum=(0.0, 0.0, 0.0)) -> np.ndarray:
         """Energy -m g·(c - datum) in the uniform gravity field, c the centre of mass. Joules, a number or (B,).
 
-        Summed outboard to inboard and rounded once, so its error is that of a double of its size. Far from the datum, (3,) in the world's
-        axes, m, differences of energies are smaller than that: take a datum near the system. O(N).
+        A number or (B,). Summed outboard to inboard and rounded once, so its error is that of a double of its size. Far from the datum,
+        (3,) in the world's axes, m, differences of energies are smaller than that: take a datum near the system. O(N).
 
         Examples
         --------

@@ -42,6 +42,7 @@ _RULES = [
     ("∂K", "d(K = E_φ G)"),
     ("∂G", "∂G = ∂P H* D⁻¹ + P ∂H* D⁻¹ − G ∂D D⁻¹"),
     ("∂D", "d(D = H P H* + J)"),
+    ("∂V", "d(V = φ* H* θ̇)"),
     ("E_φ ∂P E_φ*", "E_φ ∂P E_φ* = ∂P − ∂M − ∂E_φ P E_φ* − E_φ P ∂E_φ* + ∂K D K* + K ∂D K* + K D ∂K*"),
     ("E_φ ∂R E_φ*", "E_φ ∂R E_φ* = ∂R − ∂M − ∂E_φ R E_φ* − E_φ R ∂E_φ*"),
 ]
@@ -137,7 +138,7 @@ class DerivativeProblem(Problem):
         edge: tuple[Polynomial, Polynomial] = ({("∂E_φ",): ONE}, {("E_φ", delta): ONE})
         rules: list[tuple[Equation, Word]] = [
             (Equation("axiom", f"∂E_φ = E_φ {self.alphabet.letter_text(delta)}", *edge), ("∂E_φ",)),
-            *((Equation("axiom", f"∂{x} = 0", parse(f"∂{x}"), {}), (f"∂{x}",)) for x in ("M", "J")),
+            *((Equation("axiom", f"∂{x} = 0", parse(f"∂{x}"), {}), (f"∂{x}",)) for x in ("M", "J", "θ̇")),
             *((d(text), tuple(word.split())) for word, text in _RULES),
         ]
         rules += [(derivative_of(o.definition), (f"∂{o.name}",)) for o in self.opaque if o.kind == "inverse"]

@@ -66,6 +66,31 @@ class Formula:
     def T(self) -> Formula:
         return Formula("transpose", [self])
 
+    def blockdiag(self) -> Formula:
+        """Its diagonal blocks."""
+        return Formula("blockdiag", [self])
+
+    @property
+    def is_symmetric(self) -> bool:
+        """Nothing is known of it."""
+        return False
+
+    def written_out(self) -> Any:
+        """The expression that it is, its derivatives by `diff`."""
+        parts = [c.written_out() if isinstance(c, Formula) else c for c in self.children]
+        match self.kind:
+            case "derivative":
+                return parts[0].diff(self.index)
+            case "sum":
+                return parts[0] + parts[1]
+            case "product":
+                return parts[0] @ parts[1]
+            case "transpose":
+                return parts[0].T
+            case "blockdiag":
+                return _core.blockdiag(parts[0])
+        return self.coefficient * parts[0]
+
     @property
     def domain(self) -> Any:
         """The space it acts on; None for an I that has none."""
@@ -107,6 +132,8 @@ class Formula:
                 return " ".join(closed)
             case "transpose":
                 return f"({parts[0]}){star}"
+            case "blockdiag":
+                return f"blockdiag({parts[0]})" if style == "text" else f"\\operatorname{{blockdiag}}({parts[0]})"
         sign = "−" if style == "text" else "-"
         return f"{sign}{closed[0]}" if self.coefficient == -1 else f"{self.coefficient:g} {closed[0]}"
 

@@ -110,6 +110,7 @@ class Problem:
         self.of_one_model = False  # whether the statement was made of a model's expressions, and not read for all
         self.unknown: set[str] = set()  # names of constants whose numbers are of no account
         self.assumed: list[tuple[Equation, str]] = []  # hypotheses of the user's; a letter that one says to be definite
+        self.determinants: set[str] = set()  # letters of which ln|det| is taken: that they are regular is presupposed
         self.scalars = False  # whether both sides are scalars: traces, determinants, norms
         self.numbers = False  # whether both sides map R^1 to R^1
         self._named_operands = 0
@@ -297,9 +298,9 @@ class Problem:
             name = self._factor(inner) or f"⟨{len(self.opaque) + 1}⟩"
             text, latex = self._shown(inner, e) if kind in ("inverse", "operand") else (e.text(), f"{{{e.latex()}}}")
             symmetric = kind == "blockdiag" and bool(e.is_symmetric)
-            self.alphabet.add(
-                Letter(name, text, latex, symmetric, "diagonal" if kind in ("blockdiag", "sqrt", "half") else "full", None, e)
-            )
+            shape = "diagonal" if kind in ("blockdiag", "sqrt", "half") else "full"
+            known = e.written_out() if hasattr(e, "written_out") else e  # of a formula with derivatives, what it is
+            self.alphabet.add(Letter(name, text, latex, symmetric, shape, None, known))
             definition = Equation("definition", f"{text} = {self.alphabet.text(inner)}", monomial(name), inner)
             self.opaque.append(Opaque(name, kind, e, inner, definition))
             self._leaves[key] = name

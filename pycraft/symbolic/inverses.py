@@ -23,7 +23,7 @@ from .presuppositions import (
     is_regular_constant,
     is_triangular,
 )
-from .relations import at_the_roots, compliance_facts, in_world
+from .relations import at_the_roots, compliance_facts, crosses_with_axes, in_world
 from .rules import Rules, Setting, normal_form, rule_from, rules_for, weight
 from .words import (
     ONE,
@@ -105,7 +105,7 @@ class LocalRules:
         for name in named:
             if name not in theory().alphabet.letters:
                 self._add_pairs(name)
-        for equation, word in compliance_facts(problem, setting.hypotheses):
+        for equation, word in (*compliance_facts(problem, setting.hypotheses), *crosses_with_axes(problem)):
             self.add(equation, word)
         kinds = {"inverse": self._inverse, "blockdiag": self._blocks, "sqrt": self._root, "half": self._half}
         for opaque in problem.opaque:
@@ -322,7 +322,7 @@ class LocalRules:
         a, known = self.alphabet, self.alphabet.letters[o.name]
         name = f"{o.name}form"
         latex = f"\\operatorname{{blockdiag}}({a.latex(form)})"
-        a.add(Letter(name, f"blockdiag({a.text(form)})", latex, known.symmetric, "diagonal", None, o.expression))
+        a.add(Letter(name, f"blockdiag({a.text(form)})", latex, known.symmetric, "diagonal", None, known.expression))
         text = f"{a.text(o.inner)} = {a.text(form)}"
         inside = Equation("structure", text, {(o.name,): ONE}, {(name,): ONE}, steps=numbered(list(steps)), uses=[o.definition])
         inside.check = lambda: chain_holds(steps, o.inner, form)

@@ -63,6 +63,7 @@ class Proof:
         self.rests_on = [e for e in foundations(p for s in self.steps for p in s.premises()) if e is not claim]
         self._spellings: list[Spelling] = []
         self._inverted: list[str] = []
+        self._determinants: list[str] = []
         self._opaque: list[Opaque] = []
         self._contexts: list[tuple[Any, Any]] = []
         self._read: Any = None
@@ -76,7 +77,7 @@ class Proof:
         """The proof of a statement that was read; none found if there are no steps."""
         statement, latex = (f"{getattr(read.lhs, how)()} = {getattr(read.rhs, how)()}" for how in ("text", "latex"))
         proof = cls(statement, latex, problem.alphabet, steps, forms, note=note)
-        proof._opaque = list(problem.opaque)
+        proof._opaque, proof._determinants = list(problem.opaque), sorted(problem.determinants)
         proof._spellings, proof._contexts, proof._read = list(spellings), list(problem.contexts), read
         proof.rests_on = foundations([*proof.rests_on, *(e for s in spellings for e in s.premises())]) if steps else []
         proof._found = proof.recheck()
@@ -145,12 +146,13 @@ class Proof:
         return f"{self._alphabet.letter_text(name)}⁻¹" if typed is None else f"({typed})⁻¹"
 
     def void_where(self, hypotheses: Sequence[str], operators: Any = None) -> str:
-        """Why the proof says nothing under these hypotheses: an inverse or a root in it exists on no model that was tried. Else empty."""
+        """Why the proof says nothing under these hypotheses: an inverse, a root or a ln|det| in it exists on no model tried. Else empty."""
         roots = [o.name for o in self._opaque if o.kind == "sqrt"]
-        name = nowhere(self._inverted, roots, self._alphabet, hypotheses, self._contexts, operators)
+        name = nowhere([*self._inverted, *self._determinants], roots, self._alphabet, hypotheses, self._contexts, operators)
         if not name:
             return ""
-        shown = self._inverse_text(name) if name in self._inverted else self._alphabet.letter_text(name)
+        text = self._alphabet.letter_text(name)
+        shown = self._inverse_text(name) if name in self._inverted else f"ln|det {text}|" if name in self._determinants else text
         where = f" where {' and '.join(hypotheses)}" if hypotheses else ""
         return f"it takes {shown}, which exists on no model that was tried{where}"
 

@@ -151,3 +151,22 @@ def _nothing_along_the_hinge() -> bool:
 
 def _blocks_of_compliance() -> bool:
     return diagonal_part(parse("ψ* Υ + Υ ψ − Υ + ψ* S ψ"), theory().alphabet) == parse("Υ")
+
+
+def crosses_with_axes(problem: Any) -> Iterator[tuple[Equation, Word]]:
+    """h_i* crf(y) = −y* Δ_i, of a coordinate's axis h_i and a vector y: crossing changes sign with the order, and Δ_i = crf(h_i) there."""
+    letters = list(problem.alphabet.letters.items())
+    symbols = [(name, x.expression) for name, x in letters if getattr(x.expression, "kind", "") == "symbol"]
+    for name, known in letters:
+        e = known.expression
+        if getattr(e, "kind", "") != "function" or e.name != "crf":
+            continue
+        y = problem.words(e.children[0])
+        for axis, h in symbols:
+            for delta, d in symbols if h.name == "h" else ():
+                if d.name != "Delta" or d._parts()[1][2] != h._parts()[1][2]:
+                    continue
+                a = problem.alphabet
+                star, lhs = a.star_of(y), (a.star(axis), name)
+                text = f"{a.word_text(lhs)} = −({a.text(star)}) {a.letter_text(delta)}"
+                yield Equation("axiom", text, monomial(*lhs), {(*w, delta): -c for w, c in star.items()}), lhs

@@ -19,12 +19,28 @@ from .. import _core
 from .axioms import theory
 from .blocks import diagonal_blocks
 from .equations import Equation, Step, Use, chain_holds
-from .expand import Problem, Spelling, exact, square
+from .expand import Opaque, Problem, Spelling, exact, square
 from .inverses import LocalRules
 from .presuppositions import is_triangular
 from .rules import Rule, weight
 from .walk import GaveUp
-from .words import ONE, Alphabet, Number, Polynomial, Word, add_to, combine, inverted, monomial, of_model, plain, ratio, split
+from .words import (
+    ONE,
+    Alphabet,
+    Number,
+    Polynomial,
+    Word,
+    add_to,
+    combine,
+    inverse_of,
+    inverted,
+    monomial,
+    of_model,
+    plain,
+    ratio,
+    split,
+    times,
+)
 
 NUMBER: Word = ("1",)
 STEPS = 200
@@ -151,7 +167,9 @@ def _log_determinant(problem: Problem, e: Any) -> Polynomial:
             return combine(*((1, _log_determinant(problem, f)) for f in e.children))
         case "sqrt":
             return {w: ratio(c, 2) for w, c in _log_determinant(problem, e.children[0]).items()}
-    return {("ln det", problem.operand(e)): ONE}
+    name = problem.operand(e)
+    problem.determinants.add(name)
+    return {("ln det", name): ONE}
 
 
 # ---------------------------------------------------------------------- the normal form
@@ -320,6 +338,7 @@ class ScalarRules:
                     yield self._fact(
                         word, by, "the determinant of a product of square factors", functools.partial(chain_holds, way, inner, q), way
                     )
+        yield from self._partitioned(word, inner)
         found = self.local.factored(name, form, opaque.definition) if opaque is not None and form else None
         if found is not None:
             product, factor, mark, c = found
@@ -332,6 +351,42 @@ class ScalarRules:
                 note = "the determinant of a triangular operator is that of its diagonal"
                 yield self._fact(word, {}, note, functools.partial(is_triangular, words, a), uses=[factor.definition])
         yield from self._same("ln det", name)
+
+    def _partitioned(self, word: Word, inner: Polynomial) -> Iterator[Equation]:
+        """ln|det H X H*| by two sets of hinges that are all of them together: that of one set's block and of its Schur complement."""
+        for first, second, base in self._halves():
+            H, H_star = of_model("H", base), of_model("H*", base)
+            if not inner or any(len(w) < 2 or w[0] != H or w[-1] != H_star for w in inner):
+                continue
+            rows = {mark: (of_model("H", mark), of_model("H*", mark)) for mark in (first, second)}
+            block = lambda i, j, r=rows: {(r[i][0], *w[1:-1], r[j][1]): c for w, c in inner.items()}  # noqa: E731
+            form = self.local.reduce(block(first, first))[0]
+            inverted_by = [o for o in self.problem.opaque if o.kind == "inverse" and self.local.reduce(o.inner)[0] == form]
+            blocks = [o for o in self.problem.opaque if o.kind == "operand" and self.local.reduce(o.inner)[0] == form]
+            for z in inverted_by[:1] if blocks else ():
+                coupling = times(times(block(second, first), monomial(inverse_of(z.name))), block(first, second))
+                schur = self.local.reduce(combine((1, block(second, second)), (-1, coupling)))[0]
+                for o in self.problem.opaque:
+                    if o.kind == "operand" and self.local.reduce(o.inner)[0] == schur:
+                        by = monomial("ln det", blocks[0].name) | monomial("ln det", o.name)
+                        uses = [z.definition, o.definition, blocks[0].definition]
+                        premises = [theory()("J = 0")] if "J = 0" in self.local.setting.hypotheses else []
+                        note = "the determinant of a partitioned operator: of one block, and of the other's Schur complement"
+                        complement = combine((1, block(second, second)), (-1, coupling))
+                        parts = [(block(first, first), z), (block(first, first), blocks[0]), (complement, o)]
+                        yield self._fact(word, by, note, functools.partial(self._equal, parts), uses=[*uses, *premises])
+
+    def _equal(self, pairs: Sequence[tuple[Polynomial, Opaque]]) -> bool:
+        """Whether operands have the normal forms of these words."""
+        return all(self.local.reduce(p)[0] == self.local.reduce(o.inner)[0] for p, o in pairs)
+
+    def _halves(self) -> Iterator[tuple[str, str, str]]:
+        """(mark, mark, the mark of their model) of two trees with hinges locked, each hinge in one of them."""
+        names = {mark: source.coordinate_names for mark, (source, _) in zip(self.problem.marks, self.problem.contexts, strict=False)}
+        for first, base in self.local.locked:
+            for second, other in self.local.locked:
+                if base == other and sorted([*names[first], *names[second]]) == sorted(names.get(base, [])):
+                    yield first, second, base
 
     def _is_square(self, letter: str) -> bool:
         e = self.alphabet.letters[split(letter)[0]].expression

@@ -12,6 +12,7 @@
 #pragma once
 
 #include <algorithm>
+#include <vector>
 
 #include "algebra/structure.h"
 
@@ -32,6 +33,26 @@ void mass_matrix_apply(const SkoStructure& tree, const Blocks& blocks, bool with
     blocks.hinge(k, fk, y + tree.dof_offset[k] * m, m);
     if (with_hinge_diagonal) blocks.hinge_diagonal_add(k, x + tree.dof_offset[k] * m, y + tree.dof_offset[k] * m, m);
     if (tree.parent[k] >= 0) blocks.shift_add(k, fk, alpha + tree.offset[tree.parent[k]] * m, m);
+  }
+}
+
+// r = b - (HφMφ*H* + J) x with motions in S and forces gathered in a wider T; scratch: dimension * m scalars.
+template <class Blocks, class S, class T>
+void mass_matrix_residual_gathered(const SkoStructure& tree, const Blocks& blocks, const S* x, const S* b, S* r, int m, S* scratch, std::vector<T>& forces) {
+  S* alpha = scratch;
+  forces.assign(std::max(forces.size(), static_cast<size_t>(tree.dimension()) * m), T(0));
+  std::fill_n(alpha, static_cast<size_t>(tree.dimension()) * m, S(0));
+  for (int k = 0; k < tree.bodies(); ++k) {
+    S* ak = alpha + tree.offset[k] * m;
+    if (tree.parent[k] >= 0) blocks.shift_transposed_add(k, alpha + tree.offset[tree.parent[k]] * m, ak, m);
+    blocks.hinge_transposed_add(k, x + tree.dof_offset[k] * m, ak, m);
+    blocks.inertia_wide(k, ak, forces.data() + tree.offset[k] * m, m);
+  }
+  for (int k = tree.bodies() - 1; k >= 0; --k) {
+    const T* fk = forces.data() + tree.offset[k] * m;
+    const int at = tree.dof_offset[k] * m;
+    blocks.residual_wide(k, fk, x + at, b + at, r + at, m);
+    if (tree.parent[k] >= 0) blocks.shift_add_wide(k, fk, forces.data() + tree.offset[tree.parent[k]] * m, m);
   }
 }
 

@@ -9,6 +9,11 @@
 // bound D's own error entry by entry: |δD(i,j)| <= rounding_bound · x(i) x(j), x(i)² = (H X H* + J)(i,i). Pivot j of D(k) is the Schur
 // complement w* D w, w = (-D₁₁⁻¹ D₁ⱼ, 1), so its error is at most rounding_bound · (j + 1) Σ w(i)² x(i)²; at or below that it is noise,
 // and no digit of D⁻¹ would be right.
+//
+// Factored forms round columns, and their D is good to (64 eps)². But G = PH*D⁻¹ is a first power: of HC and C, each right to eps of the
+// lengths y and P(a,a)^½ of its rows, a product that should vanish leaves eps y P(a,a)^½, and so G and with it the innovations are off by
+// eps y²/D of what they could be at all. At one no digit of what a motion of the parent makes of θ̈ would be right, however good D is.
+//
 // The sweep costs as much again as P's own; block policies run it only where an estimate of X leaves a doubt.
 #pragma once
 
@@ -66,6 +71,22 @@ void require_pivots(const SkoStructure& tree, int k, const S* L, const S* pivots
   const int n = tree.dof[k];
   for (int j = 0; j < n; ++j) {
     const S bound = rounding_bound<S>(form) * pivot_reach(L, n, j, squares, squares + n);
+    if (!(pivots[j] > bound)) throw_singular_hinge(tree, k, j, to_double(pivots[j]), to_double(bound), form);
+  }
+}
+
+// A pivot at or below `gain_bound` of its reach over y² leaves no digit of G in a factored form; the plain one is refused before.
+template <class S>
+inline S gain_bound(Form form) {
+  return form == Form::fast ? S(0) : S(S(4) * epsilon<S>());
+}
+
+// Throws unless every column of body k's G has a digit. squares: y(i)², n numbers, and n more of scratch.
+template <class S>
+void require_gain(const SkoStructure& tree, int k, const S* L, const S* pivots, S* squares, Form form) {
+  const int n = tree.dof[k];
+  for (int j = 0; j < n && form != Form::fast; ++j) {
+    const S bound = gain_bound<S>(form) * pivot_reach(L, n, j, squares, squares + n);
     if (!(pivots[j] > bound)) throw_singular_hinge(tree, k, j, to_double(pivots[j]), to_double(bound), form);
   }
 }

@@ -1,0 +1,142 @@
+"""A copy of the tree whose core has every mutant of C++ as a switch: one build of what includes a mutated file, the rest as built."""
+
+import concurrent.futures
+import json
+import os
+import pathlib
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+
+from . import switches
+
+
+def copy_of_tree(root, tree):
+    listed = ["git", "-C", str(root), "ls-files", "--cached", "--others", "--exclude-standard", "-z"]
+    for name in subprocess.run(listed, check=True, capture_output=True, text=True).stdout.split("\0"):
+        if name and (root / name).is_file():
+            (tree / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(root / name, tree / name)
+
+
+def dependent_objects(root, files):
+    """Objects of the ordinary build that were made from one of these files."""
+    ninja = shutil.which("ninja", path=str(pathlib.Path(sys.executable).parent)) or "ninja"
+    text = subprocess.run([ninja, "-C", str(root / "build"), "-t", "deps"], check=True, capture_output=True, text=True).stdout
+    found, build = set(), root / "build"
+    wanted = {str((root / f).resolve()) for f in files}
+    for block in text.split("\n\n"):
+        head, *rest = block.strip().splitlines() or [""]
+        if any(os.path.normpath(build / line.strip()) in wanted for line in rest):
+            found.add(head.split(":")[0])
+    return found
+
+
+class TestBuild:
+    """mutants: those of C++; numbers are their places in `self.mutants` (what does not compile is dropped)."""
+
+    def __init__(self, root, folder, mutants, jobs, optimisation="1", show=print):
+        self.root, self.folder, self.tree = root, pathlib.Path(folder), pathlib.Path(folder) / "tree"
+        self.jobs, self.optimisation, self.show = jobs, optimisation, show
+        self.dropped = []
+        copy_of_tree(root, self.tree)
+        self.mutants = without_overlaps(mutants)
+        self.originals = {m.file: (self.tree / m.file).read_text(encoding="utf-8") for m in self.mutants}
+        self.commands = {
+            c["output"].removeprefix(str(root / "build") + "/"): c for c in json.loads((root / "build/compile_commands.json").read_text())
+        }
+        self.objects = {o: root / "build" / o for o in self.commands if "pycraft_core.dir" in o or "_core.dir" in o}
+        self.write()
+        self.compile(sorted(dependent_objects(root, {m.file for m in self.mutants}) & self.objects.keys()))
+        self.link()
+
+    def write(self):
+        """The mutated files and the switches."""
+        by_file = {}
+        for number, m in enumerate(self.mutants):
+            by_file.setdefault(m.file, []).append((number, m))
+        for file, text in self.originals.items():
+            (self.tree / file).write_text(switches.instrumented(text, by_file.get(file, [])), encoding="utf-8")
+        (self.tree / "cpp/mutants.h").write_text(switches.header(len(self.mutants)), encoding="utf-8")
+
+    def compiled(self, obj, syntax_only=False):
+        """The compiler's complaint, or nothing."""
+        made = self.folder / "objects" / obj
+        made.parent.mkdir(parents=True, exist_ok=True)
+        command = shlex.split(self.commands[obj]["command"].replace(str(self.root / "cpp"), str(self.tree / "cpp")))
+        command[command.index("-o") + 1] = str(made)
+        command += [
+            f"-O{self.optimisation}",
+            "-w",
+            "-include",
+            str(self.tree / "cpp/mutants.h"),
+            *(["-fsyntax-only"] if syntax_only else []),
+        ]
+        run = subprocess.run(command, capture_output=True, text=True, cwd=self.root / "build")
+        self.objects[obj] = made
+        return run.stderr if run.returncode else ""
+
+    def compile(self, objects):
+        self.show(f"{len(self.mutants)} mutants of C++; {len(objects)} of {len(self.objects)} objects to compile")
+        for obj in [
+            o
+            for o in objects
+            if re.search(r"rigid_dynamics|sensitivities\.cpp|engine\.cpp|trajectory|methods\.cpp", o) and "register" not in o
+        ]:
+            while complaint := self.compiled(obj, syntax_only=True):
+                self.drop(complaint)
+        with concurrent.futures.ThreadPoolExecutor(self.jobs) as pool:
+            while objects:
+                complaints = list(pool.map(self.compiled, objects))
+                objects = [o for o, complaint in zip(objects, complaints, strict=True) if complaint]
+                if objects:
+                    self.drop("\n".join(complaints))
+
+    def drop(self, complaint):
+        """Mutants on lines that the compiler names: what does not compile is no mutant."""
+        named = set(re.findall(rf"{re.escape(str(self.tree))}/(cpp/[\w/.]+):(\d+)", complaint))
+        bad = [m for m in self.mutants if (m.file, str(m.line)) in named]
+        errors = re.findall(rf"{re.escape(str(self.tree))}/(cpp/[\w/.]+):(\d+):\d+: error", complaint)
+        exact = [m for m in bad if (m.file, str(m.line)) in set(errors)]
+        bad = exact or bad
+        if not bad:
+            raise SystemExit(f"the test build does not compile:\n{complaint[:3000]}")
+        for m in bad:
+            self.show(f"does not compile: {m.file}:{m.line} {m.change}")
+        self.dropped += bad
+        self.mutants = [m for m in self.mutants if m not in bad]
+        self.write()
+
+    def link(self):
+        core = next(p for p in (self.root / "build").glob("_core*.so"))
+        ninja = shutil.which("ninja", path=str(pathlib.Path(sys.executable).parent)) or "ninja"
+        last = subprocess.run(
+            [ninja, "-C", str(self.root / "build"), "-t", "commands", "_core"], check=True, capture_output=True, text=True
+        ).stdout
+        libraries = re.findall(r"libpycraft_core\.a([^&\n]*)", last.strip().splitlines()[-1])[-1]
+        target = self.tree / "pycraft" / core.name
+        command = [
+            "g++" if "g++" in last else "c++",
+            "-shared",
+            "-fPIC",
+            "-o",
+            str(target),
+            *map(str, self.objects.values()),
+            *shlex.split(libraries),
+        ]
+        run = subprocess.run(command, capture_output=True, text=True)
+        if run.returncode:
+            raise SystemExit(f"the test build does not link:\n{run.stderr[-2000:]}")
+
+
+def without_overlaps(mutants):
+    """Where two places overlap the one that was listed by hand stays."""
+    kept, taken = [], {}
+    for m in sorted(mutants, key=lambda m: not m.name):
+        spans = taken.setdefault(m.file, [])
+        if all(m.end <= begin or end <= m.begin or (m.begin == m.end) for begin, end in spans):
+            spans.append((m.begin, m.end))
+            kept.append(m)
+    return sorted(kept, key=lambda m: (m.file, m.begin))

@@ -1,0 +1,154 @@
+"""Which tests meet which mutants, and what became of them."""
+
+import concurrent.futures
+import hashlib
+import json
+import os
+import pathlib
+import pickle
+import subprocess
+import sys
+import time
+
+from . import building
+from .known import DOZEN_TESTS
+
+FIRST = 30  # tests of the first attempt: the quickest that touch a mutant
+SKIPPED_FILES = {"test_notebooks.py", "test_stubs.py", "test_cpp_users.py", "test_mutation.py", "test_layers.py"}
+RUN = """
+import sys
+sys.path.insert(0, sys.argv[1] + "/tests")
+import mutants.plugin, pytest
+sys.exit(pytest.main(sys.argv[2:], [mutants.plugin]))
+"""
+
+
+def digest(*parts):
+    h = hashlib.sha256()
+    for part in parts:
+        h.update(part if isinstance(part, bytes) else str(part).encode())
+    return h.hexdigest()[:16]
+
+
+def contents(root, *patterns):
+    return b"".join(path.read_bytes() for pattern in patterns for path in sorted(root.glob(pattern)))
+
+
+def kept_or_built(root, options, mutants, show):
+    """The test build of these sources and mutants; Python and tests are those of now."""
+    key = digest(contents(root, "cpp/**/*.h", "cpp/**/*.cpp"), [m.key for m in mutants], options.optimisation)
+    folder = options.folder / f"{'dozen' if options.dozen else 'build'}-{key}"
+    kept = folder / "build.pickle"
+    if kept.exists():
+        with open(kept, "rb") as file:
+            build = pickle.load(file)
+        building.copy_of_tree(root, build.tree)
+        return build
+    begin = time.perf_counter()
+    build = building.TestBuild(root, folder, mutants, options.jobs, options.optimisation, show)
+    show(f"built in {time.perf_counter() - begin:.0f} s")
+    build.show = None
+    with open(kept, "wb") as file:
+        pickle.dump(build, file)
+    return build
+
+
+def pytest_run(build, tests, seconds, **environment):
+    """(exit status, output); 124 where it did not end."""
+    values = {k: v for k, v in os.environ.items() if not k.startswith("PYCRAFT_MUTANT")}
+    values |= {"PYCRAFT_MUTANT_TREE": str(build.tree), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", **environment}
+    options = ["-q", "-p", "no:cacheprovider", "--tb=no", "-rfE", "-m", "not slow and not peers", "--import-mode=prepend"]
+    program = [sys.executable, "-c", RUN, str(build.tree), *options, *tests]
+    try:
+        run = subprocess.run(
+            program, cwd=build.tree, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=seconds, env=values
+        )
+    except subprocess.TimeoutExpired:
+        return 124, "no end"
+    return run.returncode, run.stdout
+
+
+def noted(build, options, show):
+    """What every everyday test touches, with its seconds; those that are red already are left out."""
+    begin, files = time.perf_counter(), sorted(p for p in (build.tree / "tests").glob("test_*.py") if p.name not in SKIPPED_FILES)
+    if options.dozen:
+        files = [p for p in files if p.name in DOZEN_TESTS]
+    python = contents(build.tree, "pycraft/**/*.py")
+
+    def one(path):
+        note = build.folder / f"{path.stem}.{digest(python, path.read_bytes())}.json"
+        if not note.exists():
+            status, output = pytest_run(build, [str(path.relative_to(build.tree))], 900, PYCRAFT_MUTANT_NOTES=str(note))
+            if not note.exists():
+                if status not in (0, 5):
+                    show(f"{path.name} does not run in the copy: {output[-300:]}")
+                return {}
+        return json.loads(note.read_text(encoding="utf-8"))
+
+    notes = {}
+    with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
+        for found in pool.map(one, files):
+            notes |= found
+    red = [name for name, t in notes.items() if not t["passed"]]
+    for name in red:
+        show(f"red without any mutant, left out: {name}")
+    show(f"{len(notes)} tests noted in {time.perf_counter() - begin:.0f} s")
+    return {name: t for name, t in notes.items() if t["passed"]}
+
+
+def touching(mutant, number, touched):
+    """The tests that execute a mutant."""
+    if not mutant.python:
+        return touched.get(str(number), [])
+    line = mutant.functions[0] if mutant.functions else None
+    by_function = touched.get(str((mutant.file, line)), []) if line else []
+    return by_function or touched["everything"]
+
+
+def tried(build, mutants, numbers, notes, options, show):
+    """Mutant's key -> verdict, the test that killed it, tests that ran, seconds."""
+    touched = {"everything": list(notes)}
+    for name, t in notes.items():
+        for place in t["touched"]:
+            touched.setdefault(place, []).append(name)
+    kills, results = {}, {}
+
+    def one(mutant):
+        tests = touching(mutant, numbers.get(mutant.key), touched)
+        if not tests:
+            return {"verdict": "not executed", "by": "", "tests": 0, "seconds": 0.0}
+        tests = sorted(tests, key=lambda name: (notes[name]["seconds"] + 0.02) / (1 + kills.get(name, 0)))
+        total, within = 0.0, []
+        for name in tests:
+            total += notes[name]["seconds"]
+            if total > options.budget:
+                break
+            within.append(name)
+        within = within or tests[:1]
+        environment = (
+            {"PYCRAFT_MUTANT_SOURCE": f"{mutant.file}:{mutant.begin}:{mutant.end}:{mutant.after}"}
+            if mutant.python
+            else {"PYCRAFT_MUTANT": str(numbers[mutant.key])}
+        )
+        begin = time.perf_counter()
+        for part in (within[:FIRST], within[FIRST:]):
+            if not part:
+                continue
+            arguments = pathlib.Path(build.folder / f"{mutant.key}.tests")
+            arguments.write_text("\n".join(part), encoding="utf-8")
+            status, output = pytest_run(build, ["-x", f"@{arguments}"], 5 * options.budget + 60, **environment)
+            if status:
+                red = next((line for line in output.splitlines() if line.startswith(("FAILED", "ERROR"))), "")
+                by = red.split(" - ")[0].removeprefix("FAILED ").removeprefix("ERROR ") or (
+                    "no end" if status == 124 else f"exit status {status}"
+                )
+                if by in notes:
+                    kills[by] = kills.get(by, 0) + 1
+                return {"verdict": "killed", "by": by, "tests": len(within), "seconds": time.perf_counter() - begin}
+        return {"verdict": "survived", "by": "", "tests": len(within), "of": len(tests), "seconds": time.perf_counter() - begin}
+
+    with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
+        for mutant, result in zip(mutants, pool.map(one, mutants), strict=True):
+            results[mutant.key] = result
+            show(f"{result['verdict']:<13} {mutant.file}:{mutant.line} {mutant.change}  [{result['by']}] ({result['seconds']:.0f} s)")
+    return results
