@@ -237,6 +237,14 @@ def operator_from_parts(
     return _core._make(name, children, payload if name == "scaled" else 1.0)
 
 
+def operator_from_nodes(nodes: list[tuple[int, Any, list[int], _core.Binding | None]]) -> _core.Operator:
+    """An operator from all its nodes, parts before what they are parts of."""
+    made: list[_core.Operator] = []
+    for kind, payload, children, leaf_binding in nodes:
+        made.append(operator_from_parts(kind, payload, [made[i] for i in children], leaf_binding))
+    return made[-1]
+
+
 # ---------------------------------------------------------------------- gradients
 def scalar_gradient(scalar: _core.Scalar, over: str = "coordinates") -> np.ndarray:
     """All derivatives of a scalar expression, see `Scalar.gradient`."""

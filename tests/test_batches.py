@@ -92,3 +92,17 @@ def test_an_empty_batch_is_empty(batch):
         e = make(model.soa).at(Q[:0], V[:0])
         assert e.dense().shape == (0, *e.shape) and np.asarray(e.trace()).shape == (0,)
         assert (e @ np.ones(e.shape[1])).shape == (0, e.shape[0])
+
+
+def test_what_one_state_asks_of_an_elimination_is_not_kept():
+    """N + N* + D - C: where C is D every pivot block but the first is zero and fronts are merged; at the states after it they are not."""
+    arm = pc.chain(6, seed=5)
+    H, E, G, D = arm.soa("H E G D")
+    bent = np.random.default_rng(0).uniform(-1, 1, (2, 6))
+    C = pc.constant(D.at(bent[0]).dense(), D.domain, D.codomain)
+    N = H @ E @ G
+    e = (N + N.T + D - C).inv()
+    Q, x = bent[[1, 0, 1, 0]], np.ones(6)
+    together = e.at(Q) @ x
+    for q, row in zip(Q, together, strict=True):
+        assert np.array_equal(e.at(q) @ x, row)

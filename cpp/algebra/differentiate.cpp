@@ -1,4 +1,5 @@
 #include "algebra/differentiate.h"
+#include "algebra/interrupt.h"
 
 #include <optional>
 #include <unordered_map>
@@ -38,6 +39,7 @@ struct Differentiator::State {
   Expression run(const Expression& e) {
     const auto found = done.find(e.get());
     if (found != done.end()) return found->second;
+    check_interrupt();
     Expression result = compute(e);
     done.emplace(e.get(), result);
     alive.push_back(e);
@@ -191,7 +193,9 @@ Expression Differentiator::operator()(const Expression& e) { return state_->run(
 Expression differentiate(const Expression& e, const Direction& direction) {
   if (e.floating()) return e - e;
   e.check_current();
-  return with_batch_of(e, lower(Differentiator(direction)(e), false));
+  Expression result;
+  with_stack_for(e.node().depth, [&] { result = with_batch_of(e, lower(Differentiator(direction)(e), false)); });
+  return result;
 }
 
 Expression differentiate_in_world(const Expression& e, const Direction& direction) {

@@ -1,7 +1,9 @@
 // How an expression is shown: as the book prints it (unicode, LaTeX) and as Python reads it back.
 #include <cmath>
 #include <cstdio>
+#include <iterator>
 
+#include "algebra/errors.h"
 #include "algebra/expression.h"
 
 namespace pycraft {
@@ -23,10 +25,6 @@ std::string number(double c, Style style) {
   return text;
 }
 
-std::string parenthesised(const std::string& text, Style style) {
-  return style == Style::latex ? "\\left(" + text + "\\right)" : "(" + text + ")";
-}
-
 std::string symbol_text(const Symbol& s, Style style) {
   const SymbolDefinition& d = *s.definition;
   if (s.argument_text.empty()) return style == Style::unicode ? d.unicode : style == Style::python ? d.ascii : d.latex;
@@ -40,93 +38,136 @@ std::string symbol_text(const Symbol& s, Style style) {
   return d.latex + "_{\\mathrm{" + escaped + "}}";
 }
 
-std::string render(const Expression& e, Style style, Level around);
+// A text still to be written: as it is, or an expression with what stands around it.
+struct Piece {
+  std::string text;
+  const Expression* expression = nullptr;
+  Level around = sum_level;
+};
 
-// A term of a sum with its sign taken out.
-std::string term(const Expression& e, Style style, bool& negative) {
-  negative = false;
-  if (e.kind() == NodeKind::scaled && e.node().coefficient < 0) {
-    negative = true;
-    const Expression& inner = e.children()[0];
-    const double c = -e.node().coefficient;
-    if (c == 1) return render(inner, style, product_level);
-    return number(c, style) + (style == Style::python ? "*" : style == Style::latex ? "\\," : " ") + render(inner, style, product_level);
-  }
-  return render(e, style, product_level);
-}
+// The pieces that one node is written with, its parts among them.
+class Spelling {
+ public:
+  Spelling(Style style, std::vector<Piece>& pieces) : style_(style), pieces_(pieces) {}
 
-std::string render(const Expression& e, Style style, Level around) {
-  const bool latex = style == Style::latex, python = style == Style::python;
-  const auto wrap = [&](const std::string& text, Level own) { return own < around ? parenthesised(text, style) : text; };
-  switch (e.kind()) {
-    case NodeKind::symbol: return symbol_text(e.node().symbol, style);
-    case NodeKind::vector: return e.node().name;
-    case NodeKind::identity: return "I";
-    case NodeKind::zero: return "0";
-    case NodeKind::constant: return e.node().constant->name;
-    case NodeKind::external: return e.node().external->name;
-    case NodeKind::sum: {
-      std::string text;
-      for (size_t i = 0; i < e.children().size(); ++i) {
-        bool negative;
-        const std::string part = term(e.children()[i], style, negative);
-        const char* minus = python || latex ? "-" : "−";
-        if (i == 0)
-          text = (negative ? minus : "") + part;
-        else
-          text += std::string(" ") + (negative ? minus : "+") + " " + part;
+  void operator()(const Expression& e, Level around) {
+    switch (e.kind()) {
+      case NodeKind::symbol: return write(symbol_text(e.node().symbol, style_));
+      case NodeKind::vector: return write(e.node().name);
+      case NodeKind::identity: return write("I");
+      case NodeKind::zero: return write("0");
+      case NodeKind::constant: return write(e.node().constant->name);
+      case NodeKind::external: return write(e.node().external->name);
+      case NodeKind::sum: return wrapped(around > sum_level, [&] { sum(e); });
+      case NodeKind::scaled:
+        if (e.node().coefficient < 0) return wrapped(around > sum_level, [&] { write(minus()), multiple(-e.node().coefficient, e.children()[0]); });
+        return wrapped(around > product_level, [&] {
+          write(number(e.node().coefficient, style_) + times());
+          part(e.children()[0], product_level);
+        });
+      case NodeKind::product:
+        return wrapped(around > product_level, [&] {
+          for (size_t i = 0; i < e.children().size(); ++i) {
+            if (i) write(python() ? " @ " : " ");
+            part(e.children()[i], postfix_level);
+          }
+        });
+      case NodeKind::transpose: return postfix(e.children()[0], ".T", "*", "*");
+      case NodeKind::inverse: {
+        const Expression& inner = e.children()[0];
+        if (inner.kind() == NodeKind::square_root && !python()) return postfix(inner.children()[0], "", "^-½", "-1/2");
+        return postfix(inner, ".inv()", "⁻¹", "-1");
       }
-      return wrap(text, sum_level);
-    }
-    case NodeKind::scaled: {
-      bool negative;
-      const double c = e.node().coefficient;
-      if (c < 0) {
-        const std::string part = term(e, style, negative);
-        return wrap((python || latex ? "-" : "−") + part, around > sum_level ? sum_level : around);
+      case NodeKind::square_root: return postfix(e.children()[0], ".sqrt()", "^½", "1/2");
+      case NodeKind::block_function: {
+        const SymbolDefinition& d = *e.node().symbol.definition;
+        return function(latex() ? d.latex : python() ? d.ascii : d.unicode, e.children()[0]);
       }
-      return wrap(number(c, style) + (python ? "*" : latex ? "\\," : " ") + render(e.children()[0], style, product_level), product_level);
-    }
-    case NodeKind::product: {
-      std::string text;
-      for (size_t i = 0; i < e.children().size(); ++i) {
-        const Expression& factor = e.children()[i];
-        const std::string part = render(factor, style, postfix_level);
-        text += (i ? (python ? " @ " : " ") : "") + part;
-      }
-      return wrap(text, product_level);
-    }
-    case NodeKind::transpose: {
-      const std::string inner = render(e.children()[0], style, postfix_level);
-      return python ? inner + ".T" : latex ? "{" + inner + "}^{*}" : inner + "*";
-    }
-    case NodeKind::inverse: {
-      if (e.children()[0].kind() == NodeKind::square_root && !python) {
-        const std::string base = render(e.children()[0].children()[0], style, postfix_level);
-        return latex ? "{" + base + "}^{-1/2}" : base + "^-½";
-      }
-      const std::string inner = render(e.children()[0], style, postfix_level);
-      return python ? inner + ".inv()" : latex ? "{" + inner + "}^{-1}" : inner + "⁻¹";
-    }
-    case NodeKind::square_root: {
-      const std::string inner = render(e.children()[0], style, postfix_level);
-      return python ? inner + ".sqrt()" : latex ? "{" + inner + "}^{1/2}" : inner + "^½";
-    }
-    case NodeKind::block_function: {
-      const SymbolDefinition& d = *e.node().symbol.definition;
-      const std::string inner = render(e.children()[0], style, sum_level);
-      return latex ? d.latex + "\\left(" + inner + "\\right)" : (python ? d.ascii : d.unicode) + "(" + inner + ")";
-    }
-    case NodeKind::block_diagonal: {
-      const std::string inner = render(e.children()[0], style, sum_level);
-      return latex ? "\\operatorname{blockdiag}\\left(" + inner + "\\right)" : "blockdiag(" + inner + ")";
+      case NodeKind::block_diagonal: return function(latex() ? "\\operatorname{blockdiag}" : "blockdiag", e.children()[0]);
     }
   }
-  return "";
+
+ private:
+  bool latex() const { return style_ == Style::latex; }
+  bool python() const { return style_ == Style::python; }
+  const char* minus() const { return style_ == Style::unicode ? "−" : "-"; }
+  const char* times() const { return python() ? "*" : latex() ? "\\," : " "; }
+
+  void write(std::string text) { pieces_.push_back({std::move(text)}); }
+  void part(const Expression& e, Level around) { pieces_.push_back({{}, &e, around}); }
+
+  template <class F>
+  void wrapped(bool parentheses, F inside) {
+    if (parentheses) write(latex() ? "\\left(" : "(");
+    inside();
+    if (parentheses) write(latex() ? "\\right)" : ")");
+  }
+  void multiple(double c, const Expression& e) {
+    if (c != 1) write(number(c, style_) + times());
+    part(e, product_level);
+  }
+  // Signs of terms stand between them.
+  void sum(const Expression& e) {
+    for (size_t i = 0; i < e.children().size(); ++i) {
+      const Expression& term = e.children()[i];
+      const bool negative = term.kind() == NodeKind::scaled && term.node().coefficient < 0;
+      if (i || negative) write(i == 0 ? minus() : std::string(" ") + (negative ? minus() : "+") + " ");
+      if (negative)
+        multiple(-term.node().coefficient, term.children()[0]);
+      else
+        part(term, product_level);
+    }
+  }
+  void postfix(const Expression& e, const char* in_python, const char* in_unicode, const char* exponent) {
+    if (latex()) write("{");
+    part(e, postfix_level);
+    write(latex() ? std::string("}^{") + exponent + "}" : python() ? in_python : in_unicode);
+  }
+  void function(const std::string& name, const Expression& operand) {
+    write(name + (latex() ? "\\left(" : "("));
+    part(operand, sum_level);
+    write(latex() ? "\\right)" : ")");
+  }
+
+  Style style_;
+  std::vector<Piece>& pieces_;
+};
+
+// Piece by piece from the left, until the text is longer than asked for; the rest is left out.
+std::string written(const Expression& e, Style style, size_t length, bool& cut) {
+  std::string text;
+  std::vector<Piece> todo = {{{}, &e, sum_level}}, pieces;
+  while (!todo.empty()) {
+    cut = text.size() > length;
+    if (cut) break;
+    const Piece next = std::move(todo.back());
+    todo.pop_back();
+    if (!next.expression) {
+      text += next.text;
+      continue;
+    }
+    pieces.clear();
+    Spelling(style, pieces)(*next.expression, next.around);
+    todo.insert(todo.end(), std::make_move_iterator(pieces.rbegin()), std::make_move_iterator(pieces.rend()));
+  }
+  return text;
 }
 
 }  // namespace
 
-std::string show(const Expression& e, Style style) { return render(e, style, sum_level); }
+std::string show(const Expression& e, Style style, size_t length) {
+  bool cut = false;
+  std::string text = written(e, style, length, cut);
+  return cut ? text + " …" : text;
+}
+
+std::string show_in_full(const Expression& e, Style style) {
+  bool cut = false;
+  std::string text = written(e, style, longest_text, cut);
+  if (cut)
+    throw EvaluationError("the text of this expression has more than " + std::to_string(longest_text) +
+                          " characters: parts of it occur many times over; its repr() shows how it begins");
+  return text;
+}
 
 }  // namespace pycraft

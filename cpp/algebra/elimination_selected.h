@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "algebra/elimination_assembly.h"
+#include "algebra/interrupt.h"
 
 namespace pycraft {
 
@@ -21,6 +22,7 @@ void TreeElimination<S>::selected_fronts() {
   std::vector<S> inverse, L, outer, UZ;
   for (size_t k = 0; k < fronts_.size(); ++k) {
     const Front& f = fronts_[k];
+    check_interrupt();
     const int n = f.n, w = f.width() + border_, h = f.height() + border_;
     inverse.assign(size_t(n) * n, S(0));
     for (int i = 0; i < n; ++i) inverse[size_t(i) * n + i] = S(1);

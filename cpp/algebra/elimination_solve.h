@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "algebra/elimination_assembly.h"
+#include "algebra/interrupt.h"
 
 namespace pycraft {
 
@@ -15,11 +16,13 @@ bool TreeElimination<S>::eliminate() {
     const int across = f.width() + border_;
     S *U = A_.data() + f.across, *over = A_.data() + f.over;
     failed_ = k;
+    check_interrupt();
     if (!lu_[k].factor(A_.data() + f.matrix, f.n, sizes_.data() + f.sizes)) return false;
     work_.resize(std::max(work_.size(), size_t(f.n) * std::max(across, 1)));
     lu_[k].solve(U, across, work_.data());
     // Schur complement in the parent and the border
     for (int i = 0; i < f.height() + border_; ++i) {
+      check_interrupt_at(i, f.n);
       const bool parent_row = i < f.height();
       const Front* p = f.parent >= 0 ? &fronts_[f.parent] : nullptr;
       for (int j = 0; j < across; ++j) {
@@ -157,6 +160,10 @@ bool TreeElimination<S>::factor(Blocks&& blocks, Values&& values, S tolerated) {
     return n;
   };
   std::string where = "the pivot block of the low-rank border is singular";
+  if (dense_ || std::find(merged_with_parent_.begin(), merged_with_parent_.end(), 1) != merged_with_parent_.end()) {
+    std::fill(merged_with_parent_.begin(), merged_with_parent_.end(), 0);  // what the last state asked for is no business of this one
+    lay_out(false);
+  }
   dense_ = false;
   for (int attempt = 0; attempt < elimination::merges; ++attempt) {
     assemble(blocks, values);
@@ -196,6 +203,7 @@ void TreeElimination<S>::solve_system(S* b, int m) {
   S* border = b + total_ * m;
   for (int k = static_cast<int>(fronts_.size()) - 1; k >= 0; --k) {
     const Front& f = fronts_[k];
+    check_interrupt_at(k, m);
     S* y = b + f.vector * m;
     lu_[k].solve(y, m, work_.data());
     for (int i = 0; i < f.height() + border_; ++i) {
@@ -209,6 +217,7 @@ void TreeElimination<S>::solve_system(S* b, int m) {
   if (border_) border_lu_.solve(border, m, work_.data());
   for (size_t k = 0; k < fronts_.size(); ++k) {
     const Front& f = fronts_[k];
+    check_interrupt_at(static_cast<int>(k), m);
     S* y = b + f.vector * m;
     const int across = f.width() + border_;
     const S* U = A_.data() + f.across;

@@ -1,8 +1,8 @@
 #include "algebra/engine.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
+#include <mutex>
 
 #include "algebra/errors.h"
 #include "algebra/workspace.h"
@@ -11,17 +11,26 @@ namespace pycraft {
 
 namespace {
 
-std::atomic<void (*)()> interrupt{nullptr};
+// No model of these contexts is edited while it lives.
+class InUse {
+ public:
+  explicit InUse(const std::vector<Context>& contexts) : contexts_(contexts) {
+    for (const Context& c : contexts_) entered_ = c.source->enter_use();
+  }
+  ~InUse() {
+    for (const Context& c : contexts_) c.source->leave_use(entered_);
+  }
+  InUse(const InUse&) = delete;
+
+ private:
+  const std::vector<Context>& contexts_;
+  unsigned entered_ = 0;
+};
 
 }  // namespace
 
-void set_interrupt_check(void (*check)()) { interrupt = check; }
-void check_interrupt() {
-  if (auto check = interrupt.load()) check();
-}
-
 struct ExecutionPool::Impl {
-  std::mutex mutex;
+  Mutex mutex;
   template <class S>
   using Free = std::vector<std::unique_ptr<Workspace<S>>>;
   PerScalar<Free> free;
@@ -41,11 +50,11 @@ bool ExecutionPool::current() const {
 }
 
 PassCounts ExecutionPool::last_counts() const {
-  std::lock_guard<std::mutex> lock(impl_->mutex);
+  std::lock_guard<Mutex> lock(impl_->mutex);
   return impl_->counts;
 }
 std::vector<std::string> ExecutionPool::run_notes() const {
-  std::lock_guard<std::mutex> lock(impl_->mutex);
+  std::lock_guard<Mutex> lock(impl_->mutex);
   return impl_->notes;
 }
 
@@ -62,7 +71,8 @@ void ExecutionPool::run_at(const Inputs& inputs, bool expansions, Result& result
   const Plan& plan = *plan_;
   std::unique_ptr<Workspace<S>> workspace;
   {
-    std::lock_guard<std::mutex> lock(impl_->mutex);
+    std::lock_guard<Mutex> lock(impl_->mutex);
+    if (impl_->mutex.abandoned()) leave_behind(impl_->free, impl_->notes);
     auto& free = std::get<Impl::Free<S>>(impl_->free);
     if (!free.empty()) {
       workspace = std::move(free.back());
@@ -75,9 +85,10 @@ void ExecutionPool::run_at(const Inputs& inputs, bool expansions, Result& result
   PassCounts counts;
 
   // Of this run alone: an operator from outside, or a signal's handler, may run another one on this thread before this one is over.
-  std::vector<std::shared_ptr<SkoValues<S>>>& held = w.held;
+  std::vector<ValuesInUse<S>>& held = w.held;
   std::vector<SkoValues<S>*>& values = w.values;
-  held.assign(plan.contexts.size(), nullptr);
+  held.clear();
+  held.resize(plan.contexts.size());
   values.assign(plan.contexts.size(), nullptr);
   if (w.own_values.size() != plan.contexts.size()) w.own_values.resize(plan.contexts.size());
   for (size_t c = 0; c < plan.contexts.size(); ++c) {
@@ -216,34 +227,58 @@ void ExecutionPool::run_at(const Inputs& inputs, bool expansions, Result& result
   if (states == 0) shape(plan.request == Request::trace || plan.request == Request::logdet || plan.request == Request::norm ? 1 : n_out,
                          plan.request == Request::dense ? n_in : inputs.columns);
   held.clear();
-  std::lock_guard<std::mutex> lock(impl_->mutex);
+  std::lock_guard<Mutex> lock(impl_->mutex);
   impl_->counts = counts;
   if (!w.notes().empty()) impl_->notes = w.notes();
   std::get<Impl::Free<S>>(impl_->free).push_back(std::move(workspace));
 }
 
-void ExecutionPool::run(const Inputs& inputs, bool expansions, Result& result) {
+bool ExecutionPool::run(const Inputs& inputs, bool expansions, Result& result) {
+  const InUse use(plan_->contexts);
+  if (!current()) return false;
   at_precision(plan_->precision, [&]<class S>(S) { run_at<S>(inputs, expansions, result); });
+  return true;
 }
 
+// The plan is made outside the lock: a signal's handler, called in between, may ask for the same one.
 std::shared_ptr<ExecutionPool> PlanCache::find_or_make(const Expression& e, Request request, const PlanOptions& options) {
-  std::lock_guard<std::mutex> lock(mutex_);
-  std::shared_ptr<ExecutionPool>& pool = pools_[{request, options.rules}];
-  if (!pool || !pool->current()) pool = std::make_shared<ExecutionPool>(make_plan(e, request, options));
-  return pool;
+  const std::pair<Request, bool> key{request, options.rules};
+  {
+    std::lock_guard<Mutex> lock(mutex_);
+    if (mutex_.abandoned()) leave_behind(pools_, of_inverse_);
+    const auto known = pools_.find(key);
+    if (known != pools_.end() && known->second->current()) return known->second;
+  }
+  const auto all = contexts(e);
+  const InUse use(all);
+  auto pool = std::make_shared<ExecutionPool>(make_plan(e, request, options));
+  std::lock_guard<Mutex> lock(mutex_);
+  std::shared_ptr<ExecutionPool>& kept = pools_[key];
+  if (!kept || !kept->current()) kept = pool;
+  return kept;
+}
+
+std::shared_ptr<PlanCache> PlanCache::of_inverse() {
+  std::lock_guard<Mutex> lock(mutex_);
+  if (mutex_.abandoned()) leave_behind(pools_, of_inverse_);
+  if (!of_inverse_) of_inverse_ = std::make_shared<PlanCache>();
+  return of_inverse_;
 }
 
 std::shared_ptr<ExecutionPool> prepare(const Expression& e, Request request, bool rules) {
   return e.node().plans->find_or_make(e, request, PlanOptions{rules});
 }
 
+void evaluate(const Expression& e, Request request, const Inputs& inputs, Result& result, bool rules, bool expansions) {
+  while (!prepare(e, request, rules)->run(inputs, expansions, result)) check_interrupt();
+}
+
 void apply(const Expression& e, const Inputs& inputs, Result& result, bool rules, bool expansions) {
-  prepare(e, Request::apply, rules)->run(inputs, expansions, result);
+  evaluate(e, Request::apply, inputs, result, rules, expansions);
 }
 
 void evaluate(const Expression& e, Request request, Result& result, bool rules, bool expansions) {
-  Inputs none;
-  prepare(e, request, rules)->run(none, expansions, result);
+  evaluate(e, request, Inputs{}, result, rules, expansions);
 }
 
 }  // namespace pycraft

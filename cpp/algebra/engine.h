@@ -5,18 +5,14 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
+#include "algebra/interrupt.h"
 #include "algebra/plan.h"
 #include "algebra/scalar_expression.h"
 
 namespace pycraft {
-
-// Called now and then during long runs; throws to stop one (the bindings ask Python for Ctrl-C here).
-void set_interrupt_check(void (*check)());
-void check_interrupt();
 
 // Numbers that leave the engine: doubles, or exact expansions of wider scalars.
 struct Result {
@@ -44,7 +40,8 @@ class ExecutionPool {
   ~ExecutionPool();
   const Plan& plan() const { return *plan_; }
   bool current() const;  // made for the models as they are now
-  void run(const Inputs& inputs, bool expansions, Result& result);
+  // False where the models changed since the plan was made: it is to be made anew.
+  bool run(const Inputs& inputs, bool expansions, Result& result);
   PassCounts last_counts() const;
   std::vector<std::string> run_notes() const;
 
@@ -58,6 +55,7 @@ class ExecutionPool {
 
 // ------------------------------------------------------------------ evaluation of expressions
 std::shared_ptr<ExecutionPool> prepare(const Expression& e, Request request, bool rules = true);
+void evaluate(const Expression& e, Request request, const Inputs& inputs, Result& result, bool rules = true, bool expansions = false);
 // y = e x
 void apply(const Expression& e, const Inputs& inputs, Result& result, bool rules = true, bool expansions = false);
 // dense, block_diagonal, diagonal, trace, logdet, norm

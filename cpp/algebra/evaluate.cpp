@@ -78,9 +78,9 @@ double largest_entry(const Expression& e, const std::map<std::string, std::vecto
     x = probes(e.domain().dimension());
     inputs.x = x.data();
     inputs.columns = probe_count;
-    prepare(e, Request::apply, false)->run(inputs, false, r);
+    evaluate(e, Request::apply, inputs, r, false);
   } else {
-    prepare(e, Request::dense, false)->run(inputs, false, r);
+    evaluate(e, Request::dense, inputs, r, false);
   }
   std::vector<int> row_body, column_body;
   const SkoStructure* tree = nullptr;

@@ -1,8 +1,8 @@
 #include "algebra/expression.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
+#include <map>
 #include <unordered_map>
 #include <unordered_set>
 
@@ -30,6 +30,11 @@ std::pair<double, const Expression*> scaling(const Node& n) {
   return {c, x};
 }
 
+// Spaces that are equal have the same.
+size_t hash_of(const Space& s) {
+  return s ? mix(mix(static_cast<size_t>(s.kind()), reinterpret_cast<size_t>(s.layout().owner)), s.dimension()) : 0;
+}
+
 size_t hash_of(const Node& n) {
   size_t h = mix(17, static_cast<size_t>(n.kind));
   switch (n.kind) {
@@ -37,8 +42,11 @@ size_t hash_of(const Node& n) {
       h = mix(mix(mix(h, n.symbol.definition->id), reinterpret_cast<size_t>(n.symbol.source.get())), reinterpret_cast<size_t>(n.symbol.binding.get()));
       for (int a : n.symbol.arguments) h = mix(h, a);
       return h;
-    case NodeKind::block_function: return mix(mix(h, n.symbol.definition->id), n.children[0].node().hash);
-    case NodeKind::vector: return mix(h, std::hash<std::string>()(n.name));
+    case NodeKind::block_function:
+      return mix(mix(mix(h, n.symbol.definition->id), reinterpret_cast<size_t>(n.symbol.source.get())), n.children[0].node().hash);
+    case NodeKind::vector: return mix(mix(h, std::hash<std::string>()(n.name)), hash_of(n.codomain));
+    case NodeKind::identity:
+    case NodeKind::zero: return mix(mix(h, hash_of(n.domain)), hash_of(n.codomain));
     case NodeKind::constant: return mix(h, reinterpret_cast<size_t>(n.constant.get()));
     case NodeKind::external: return mix(h, reinterpret_cast<size_t>(n.external.get()));
     case NodeKind::scaled: {
@@ -58,17 +66,16 @@ size_t hash_of(const Node& n) {
 
 Expression make(Node node, std::shared_ptr<PlanCache> plans = nullptr) {
   node.hash = hash_of(node);
+  node.depth = 1;
+  for (const Expression& c : node.children) node.depth = std::max(node.depth, 1 + c.node().depth);
   node.plans = plans ? std::move(plans) : std::make_shared<PlanCache>();
-  node.inverse_plans = nullptr;
   return Expression(std::make_shared<const Node>(std::move(node)));
 }
 
 // What an error calls an expression: short ones by their text.
 std::string label(const Expression& e) {
-  const std::string text = show(e);
-  if (text.size() <= 60) return text;
-  const size_t space = text.find(' ', 30);  // between letters, never within one
-  return space == std::string::npos ? text : "(an expression that begins " + text.substr(0, space) + " …)";
+  const std::string text = show(e, Style::unicode, 60);
+  return text.ends_with(" …") ? "(an expression that begins " + show(e, Style::unicode, 30) + ")" : text;
 }
 
 std::string owner_note(const Space& a, const Space& b) {
@@ -78,24 +85,8 @@ std::string owner_note(const Space& a, const Space& b) {
                 : " They belong to two different models, '" + x + "' and '" + y + "'.";
 }
 
-bool commute_free_equal(const std::vector<Expression>& a, const std::vector<Expression>& b) {
-  if (a.size() != b.size()) return false;
-  std::vector<char> used(b.size(), 0);
-  for (const Expression& x : a) {
-    bool found = false;
-    for (size_t j = 0; j < b.size() && !found; ++j)
-      if (!used[j] && x == b[j]) used[j] = found = true;
-    if (!found) return false;
-  }
-  return true;
-}
-
-}  // namespace
-
-bool operator==(const Expression& a, const Expression& b) {
-  if (a.get() == b.get()) return true;
-  if (!a || !b) return false;
-  const Node &x = a.node(), &y = b.node();
+// What two nodes are beside their parts; `pairs` gets the parts that must be equal.
+bool equal_but_for_parts(const Node& x, const Node& y, std::vector<std::pair<const Expression*, const Expression*>>& pairs) {
   if (x.hash != y.hash || x.kind != y.kind || x.children.size() != y.children.size()) return false;
   switch (x.kind) {
     case NodeKind::symbol: return x.symbol == y.symbol;
@@ -104,19 +95,63 @@ bool operator==(const Expression& a, const Expression& b) {
     case NodeKind::zero: return x.domain == y.domain && x.codomain == y.codomain;
     case NodeKind::constant: return x.constant == y.constant;
     case NodeKind::external: return x.external == y.external;
-    case NodeKind::sum: return commute_free_equal(x.children, y.children);
     case NodeKind::scaled: {
       const auto [c, s] = scaling(x);
       const auto [d, t] = scaling(y);
-      return c == d && *s == *t;
+      pairs.emplace_back(s, t);
+      return c == d;
+    }
+    case NodeKind::sum: {  // whatever the order: equal terms have equal hashes
+      const auto by_hash = [](const Node& n) {
+        std::vector<const Expression*> terms;
+        for (const Expression& c : n.children) terms.push_back(&c);
+        std::stable_sort(terms.begin(), terms.end(), [](auto* a, auto* b) { return a->node().hash < b->node().hash; });
+        return terms;
+      };
+      const auto a = by_hash(x), b = by_hash(y);
+      for (size_t i = 0; i < a.size(); ++i) pairs.emplace_back(a[i], b[i]);
+      return true;
     }
     case NodeKind::block_function:
       if (x.symbol.definition != y.symbol.definition || x.symbol.source != y.symbol.source) return false;
       break;
     default: break;
   }
-  for (size_t i = 0; i < x.children.size(); ++i)
-    if (x.children[i] != y.children[i]) return false;
+  for (size_t i = 0; i < x.children.size(); ++i) pairs.emplace_back(&x.children[i], &y.children[i]);
+  return true;
+}
+
+}  // namespace
+
+Parts::~Parts() {
+  thread_local std::vector<Expression>* leaving = nullptr;
+  if (empty()) return;
+  if (leaving) {
+    leaving->insert(leaving->end(), std::make_move_iterator(begin()), std::make_move_iterator(end()));
+    return;
+  }
+  std::vector<Expression> todo;
+  leaving = &todo;
+  todo.swap(*this);
+  while (!todo.empty()) {
+    const Expression last = std::move(todo.back());
+    todo.pop_back();
+  }
+  leaving = nullptr;
+}
+
+bool operator==(const Expression& a, const Expression& b) {
+  if (a.get() == b.get()) return true;
+  if (!a || !b || a.node().hash != b.node().hash) return false;
+  std::vector<std::pair<const Expression*, const Expression*>> todo = {{&a, &b}};
+  std::map<std::pair<const Node*, const Node*>, char> seen;
+  while (!todo.empty()) {
+    const auto [x, y] = todo.back();
+    todo.pop_back();
+    if (x->get() == y->get()) continue;
+    if (!x->children().empty() && !seen.try_emplace({x->get(), y->get()}).second) continue;  // compared, or about to be
+    if (!equal_but_for_parts(x->node(), y->node(), todo)) return false;
+  }
   return true;
 }
 
@@ -218,11 +253,27 @@ Expression external(std::shared_ptr<const ExternalData> data, const Space& domai
 
 Expression with_space(const Expression& e, const Space& space) {
   if (!e.floating()) return e;
-  Node n = e.node();
-  n.domain = n.codomain = space;
-  const bool transposed = n.kind == NodeKind::transpose;
-  for (Expression& c : n.children) c = with_space(c, transposed ? space.dual() : space);
-  return make(std::move(n));
+  // Every floating node in the space, and in its dual for what is below a transpose.
+  std::unordered_map<const Node*, std::pair<Expression, Expression>> made;
+  const Space dual = space.dual();
+  each_from_below(e, [&](const Expression& x) {
+    const auto in = [&](bool dual_space) {
+      if (!x.floating()) return x;
+      Node n = x.node();
+      n.domain = n.codomain = dual_space ? dual : space;
+      for (Expression& c : n.children) c = (dual_space != (n.kind == NodeKind::transpose)) ? made.at(c.get()).second : made.at(c.get()).first;
+      return make(std::move(n));
+    };
+    made.emplace(x.get(), std::make_pair(in(false), in(true)));
+  });
+  return made.at(e.get()).first;
+}
+
+// Sums and products are kept flat; a doubling repeated is soon larger than any memory.
+constexpr size_t most_parts = 1000000;
+[[noreturn]] static void throw_too_many_parts(const char* what, double parts) {
+  throw EvaluationError(std::string(what) + " of " + std::to_string(static_cast<long long>(parts)) + " parts: an expression is written out flat, up to " +
+                        std::to_string(most_parts) + "; evaluate a part of it, and go on with it as a constant");
 }
 
 Expression sum_of(std::vector<Expression> terms) {
@@ -256,6 +307,7 @@ Expression sum_of(std::vector<Expression> terms) {
       flat.push_back(term);
   }
   if (flat.size() == 1) return flat[0];
+  if (flat.size() > most_parts) throw_too_many_parts("a sum", double(flat.size()));
   return make(Node{NodeKind::sum, flat[0].domain(), flat[0].codomain(), std::move(flat)});
 }
 
@@ -281,6 +333,7 @@ Expression product_of(std::vector<Expression> factors) {
       flat.push_back(f);
   }
   if (flat.size() == 1) return flat[0];
+  if (flat.size() > most_parts) throw_too_many_parts("a product", double(flat.size()));
   const Space domain = flat.back().domain(), codomain = flat.front().codomain();
   return make(Node{NodeKind::product, domain, codomain, std::move(flat)});
 }
@@ -304,15 +357,7 @@ Expression Expression::T() const {
 Expression Expression::inv() const {
   if (!floating() && domain().dimension() != codomain().dimension())
     throw SpaceError(label(*this) + " maps " + domain().description() + " to " + codomain().description() + ": it is not square and has no inverse");
-  std::shared_ptr<PlanCache> plans;
-  {
-    static std::mutex mutex;
-    std::lock_guard<std::mutex> lock(mutex);
-    Node& self = const_cast<Node&>(node());
-    if (!self.inverse_plans) self.inverse_plans = std::make_shared<PlanCache>();
-    plans = self.inverse_plans;
-  }
-  return make(Node{NodeKind::inverse, codomain(), domain(), {*this}}, std::move(plans));
+  return make(Node{NodeKind::inverse, codomain(), domain(), {*this}}, node().plans->of_inverse());
 }
 
 Expression block_diagonal(const Expression& a) {
@@ -347,6 +392,7 @@ Expression lower_half(const Expression& a) {
 }
 
 Expression power(const Expression& a, int exponent) {
+  if (std::abs(double(exponent)) * std::max<size_t>(1, a.children().size()) > double(most_parts)) throw_too_many_parts("a power", std::abs(double(exponent)));
   if (!a.floating() && !(a.domain() == a.codomain()) && exponent != 1 && exponent != -1)
     throw SpaceError(label(a) + " maps " + a.domain().description() + " to " + a.codomain().description() + ": only a map of a space to itself has powers");
   if (exponent == 0) return a.floating() ? identity() : identity(a.domain());

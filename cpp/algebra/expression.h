@@ -2,6 +2,7 @@
 // immutable; constructors check spaces and never rewrite (semantics: what was typed is what is shown). Sums and products are kept flat.
 #pragma once
 
+#include <atomic>
 #include <functional>
 #include <memory>
 #include <string>
@@ -33,6 +34,19 @@ struct ExternalData {
   std::string name;
 };
 
+// A fact about a node that is found when it is first asked for; a copy of the node starts without it.
+class Found {
+ public:
+  Found() = default;
+  Found(const Found&) {}
+  Found& operator=(const Found&) { return value_ = -1, *this; }
+  int value() const { return value_.load(std::memory_order_relaxed); }  // -1: not known yet
+  void set(int value) const { value_.store(value, std::memory_order_relaxed); }
+
+ private:
+  mutable std::atomic<int> value_{-1};
+};
+
 class Expression {
  public:
   struct Node;
@@ -60,18 +74,31 @@ class Expression {
   std::shared_ptr<const Node> node_;
 };
 
+// The parts of a node. They go one after the other when it goes, not one within the other: any depth is taken apart.
+class Parts : public std::vector<Expression> {
+ public:
+  using std::vector<Expression>::vector;
+  Parts(std::vector<Expression> parts) : std::vector<Expression>(std::move(parts)) {}
+  Parts(const Parts&) = default;
+  Parts(Parts&&) = default;
+  Parts& operator=(const Parts&) = default;
+  Parts& operator=(Parts&&) = default;
+  ~Parts();
+};
+
 struct Expression::Node {
   NodeKind kind;
   Space domain, codomain;
-  std::vector<Expression> children;
+  Parts children;
   double coefficient = 1;                       // scaled
   Symbol symbol{};                              // symbol, block_function (the function, and whose); of every leaf: its binding
   std::string name;                             // vector
   std::shared_ptr<const ConstantData> constant;
   std::shared_ptr<const ExternalData> external;
   size_t hash = 0;
+  int depth = 1;                                // levels of nodes, this one included
   std::shared_ptr<PlanCache> plans;             // filled at the first evaluation; it holds no expression, so no cycle
-  std::shared_ptr<PlanCache> inverse_plans;     // of every inv() of this expression: `MM.inv() @ x` in a loop is planned once
+  Found triangles;                              // see properties.cpp
 };
 
 inline NodeKind Expression::kind() const { return node_->kind; }
@@ -156,7 +183,12 @@ void each_from_below(const Expression& e, F f) {
 void visit(const Expression& e, const std::function<void(const Expression&)>& f);
 
 // ------------------------------------------------------------------ how an expression is shown
+// A text is a tree, and grows with every repetition of a shared part: what is long ends in " …" soon after `shown` bytes.
 enum class Style { unicode, python, latex };
-std::string show(const Expression& e, Style style = Style::unicode);
+constexpr size_t shown = 400;
+std::string show(const Expression& e, Style style = Style::unicode, size_t length = shown);
+// In full; EvaluationError above this length.
+constexpr size_t longest_text = 10'000'000;
+std::string show_in_full(const Expression& e, Style style = Style::unicode);
 
 }  // namespace pycraft

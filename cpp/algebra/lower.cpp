@@ -6,6 +6,7 @@
 #include <unordered_map>
 
 #include "algebra/errors.h"
+#include "algebra/interrupt.h"
 #include "algebra/properties.h"
 #include "algebra/source.h"
 
@@ -120,17 +121,44 @@ class Lowering {
  public:
   explicit Lowering(bool expand) : expand_(expand) {}
 
-  Expression run(const Expression& e, bool t) {
-    auto& memo = t ? transposed_ : plain_;
-    const auto found = memo.find(e.get());
-    if (found != memo.end()) return found->second;
-    Expression result = compute(e, t);
-    memo.emplace(e.get(), result);
-    alive_.push_back(e);
-    return result;
+  // What is below comes first, so that nothing recurses; each node once as it is and once transposed.
+  Expression run(const Expression& root, bool transposed) {
+    std::vector<std::pair<Expression, bool>> todo = {{root, transposed}};
+    while (!todo.empty()) {
+      const auto [e, t] = todo.back();
+      auto& memo = t ? transposed_ : plain_;
+      if (memo.contains(e.get())) {
+        todo.pop_back();
+        continue;
+      }
+      const size_t before = todo.size();
+      const bool below = transposed_below(e, t);
+      const auto& done = below ? transposed_ : plain_;
+      for (const Expression& c : e.children())
+        if (!done.contains(c.get())) todo.emplace_back(c, below);
+      if (todo.size() > before) continue;
+      check_interrupt();
+      Expression result = compute(e, t);
+      memo.emplace(e.get(), std::move(result));
+      alive_.push_back(e);
+      todo.pop_back();
+    }
+    return (transposed ? transposed_ : plain_).at(root.get());
   }
 
+  // Of what is lowered already.
+  static Expression inverse_of(const Expression& lowered) { return invert(lowered); }
+
  private:
+  static bool transposed_below(const Expression& e, bool t) {
+    switch (e.kind()) {
+      case NodeKind::transpose: return !t;
+      case NodeKind::square_root:
+      case NodeKind::block_function: return false;
+      default: return t;
+    }
+  }
+
   Expression compute(const Expression& e, bool t) {
     const Space domain = t ? e.codomain().dual() : e.domain(), codomain = t ? e.domain().dual() : e.codomain();
     switch (e.kind()) {
@@ -183,7 +211,7 @@ class Lowering {
     return e;
   }
 
-  Expression invert(const Expression& e) {
+  static Expression invert(const Expression& e) {
     const Scaled s = split_scalar(e);
     if (s.expression.kind() == NodeKind::zero) throw SingularOperatorError("the zero operator has no inverse");
     Expression inverse;
@@ -227,5 +255,7 @@ Expression lower(const Expression& e, bool expand) {
   if (e.floating()) throw SpaceError("I has no space yet: combine it with an operator, or write I with a space");
   return Lowering(expand).run(e, false);
 }
+
+Expression lowered_inverse(const Expression& lowered) { return Lowering::inverse_of(lowered); }
 
 }  // namespace pycraft

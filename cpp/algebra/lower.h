@@ -19,6 +19,7 @@ Scaled split_scalar(const Expression& e);
 
 // Lowered sum and product.
 Expression lowered_sum(const std::vector<Expression>& terms, const Space& domain, const Space& codomain);
+Expression lowered_inverse(const Expression& lowered);
 Expression lowered_product(const std::vector<Expression>& factors, const Space& domain, const Space& codomain);
 
 }  // namespace pycraft

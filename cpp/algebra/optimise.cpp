@@ -1,7 +1,9 @@
 // What the theorems do for plans: recognise the forms that have kernels however they are spelled, invert by factors, let resolvents
 // meet their inverses. None of it changes a result; all of it changes the cost.
 #include <algorithm>
+#include <unordered_map>
 
+#include "algebra/interrupt.h"
 #include "algebra/lower.h"
 #include "algebra/planner.h"
 #include "algebra/polynomial.h"
@@ -26,22 +28,50 @@ double plan_flops(const Expression& e, bool rules) {
   return Planner({rules}).plan(e, Request::apply).flops();
 }
 
+// What is longer has no normal form that would be found in time, and no kernel of its own.
+constexpr size_t most_letters = 1000;
+
+// Nodes of the expression written out as a tree, as far as most_letters.
+size_t written_length(const Expression& e) {
+  size_t length = 0;
+  std::vector<const Expression*> todo = {&e};
+  while (!todo.empty() && length <= most_letters) {
+    const Expression& x = *todo.back();
+    todo.pop_back();
+    ++length;
+    for (const Expression& c : x.children()) todo.push_back(&c);
+  }
+  return length;
+}
+
 class Optimiser {
  public:
   explicit Optimiser(std::vector<std::string>& notes) : notes_(notes) {}
 
   Expression run(const Expression& e) {
+    const auto known = done_.find(e.get());
+    if (known != done_.end()) return known->second;
+    check_interrupt();
+    Expression better = compute(e);
+    done_.emplace(e.get(), better);
+    alive_.push_back(e);
+    return better;
+  }
+
+ private:
+  Expression compute(const Expression& e) {
     switch (e.kind()) {
       case NodeKind::inverse: {
         const Expression& inner = e.children()[0];
         if (inner.kind() == NodeKind::symbol || inner.kind() == NodeKind::transpose) return e;
-        if (!is_block_diagonal(inner)) {
+        if (!is_block_diagonal(inner) && written_length(inner) <= most_letters) {
           if (const auto known = invert_by_theorem(inner)) {
             note(known->theorem + ": (" + show(inner) + ")⁻¹ = " + show(known->inverse));
             return run_parts(known->inverse);
           }
         }
-        return lower(run(inner).inv(), false);
+        const Expression better = run(inner);
+        return better.get() == inner.get() ? e : lowered_inverse(better);
       }
       case NodeKind::sum:
       case NodeKind::product: return recognise(cancel(run_parts(e)));
@@ -49,7 +79,6 @@ class Optimiser {
     }
   }
 
- private:
   void note(const std::string& text) {
     if (std::find(notes_.begin(), notes_.end(), text) == notes_.end()) notes_.push_back(text);
   }
@@ -68,8 +97,12 @@ class Optimiser {
     switch (e.kind()) {
       case NodeKind::sum: return lowered_sum(parts, e.domain(), e.codomain());
       case NodeKind::product: return lowered_product(parts, e.domain(), e.codomain());
-      case NodeKind::scaled: return lower(e.node().coefficient * parts[0], false);
-      case NodeKind::block_diagonal: return lower(block_diagonal(parts[0]), false);
+      case NodeKind::scaled: return lowered_product({e.node().coefficient * parts[0]}, e.domain(), e.codomain());
+      case NodeKind::block_diagonal: {
+        if (is_block_diagonal(parts[0])) return parts[0];
+        const Scaled s = split_scalar(parts[0]);
+        return s.coefficient == 1 ? block_diagonal(s.expression) : s.coefficient * block_diagonal(s.expression);
+      }
       default: return square_root(parts[0]);
     }
   }
@@ -100,6 +133,7 @@ class Optimiser {
 
   // HφMφ*H* (+ J) in any spelling, and whatever the normal form makes cheaper.
   Expression recognise(const Expression& e) {
+    if (written_length(e) > most_letters) return e;
     const auto models = contexts(e);
     if (models.size() != 1 || !e.domain().belongs_to_bodies()) return e;
     bool resolvents = false;
@@ -142,6 +176,8 @@ class Optimiser {
   }
 
   std::vector<std::string>& notes_;
+  std::unordered_map<const Expression::Node*, Expression> done_;
+  std::vector<Expression> alive_;
 };
 
 }  // namespace

@@ -4,11 +4,11 @@
 
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
 #include "algebra/expression.h"
+#include "algebra/mutex.h"
 #include "algebra/source.h"
 
 namespace pycraft {
@@ -68,6 +68,7 @@ struct Register {
   Space columns;            // blocks, dense: columns
   std::shared_ptr<const Realization> realization;  // factor
   bool wide = false;        // vector with as many columns as the run has (else one)
+  int shared = -1;          // in the plan of an operand: the register of the whole plan that it stands for (factors of a dense matrix)
 };
 
 struct Step {
@@ -124,10 +125,13 @@ class ExecutionPool;
 class PlanCache {
  public:
   std::shared_ptr<ExecutionPool> find_or_make(const Expression& e, Request request, const PlanOptions& options);
+  // Of every inv() of the expression: `MM.inv() @ x` in a loop is planned once.
+  std::shared_ptr<PlanCache> of_inverse();
 
  private:
-  std::mutex mutex_;
+  Mutex mutex_;
   std::map<std::pair<Request, bool>, std::shared_ptr<ExecutionPool>> pools_;
+  std::shared_ptr<PlanCache> of_inverse_;
 };
 
 // The plan as a table.

@@ -13,6 +13,12 @@ namespace pycraft {
 using namespace planning;
 
 std::optional<int> Planner::diagonal_by_structure(const Expression& e) {
+  const int key = id_of(e);
+  if (const auto known = diagonal_memo_.find(key); known != diagonal_memo_.end()) return known->second;
+  return diagonal_memo_[key] = structural_diagonal(e);
+}
+
+std::optional<int> Planner::structural_diagonal(const Expression& e) {
   if (is_block_diagonal(e)) return blocks(e);
   switch (e.kind()) {
     case NodeKind::symbol:

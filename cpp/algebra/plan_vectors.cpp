@@ -1,4 +1,6 @@
 // Steps that apply an expression to a vector: recognised kernels, sweeps, blocks, eliminations.
+#include <algorithm>
+
 #include "algebra/errors.h"
 #include "algebra/lower.h"
 #include "algebra/planner.h"
@@ -481,16 +483,35 @@ int Planner::factor_gram(const Expression& e, const Expression& root) {
   return block_memo_[key] = emit(std::move(f), {RegisterKind::dense, e.codomain(), e.domain(), nullptr, false});
 }
 
-int Planner::solve_dense(const Expression& operand, int x, const std::string& reason) {
-  plan_.notes.push_back("dense: " + reason);
+// Of one operand the whole plan has the factors once, wherever they are needed.
+int Planner::dense_factor(const Expression& operand, const std::string& reason) {
+  if (whole_) return whole_->dense_factor(operand, reason);
+  const int key = id_of(operand);
+  if (const auto known = dense_memo_.find(key); known != dense_memo_.end()) return known->second;
+  if (std::find(plan_.notes.begin(), plan_.notes.end(), "dense: " + reason) == plan_.notes.end()) plan_.notes.push_back("dense: " + reason);
   const double n = operand.domain().dimension();
   Step f{StepKind::dense_factor};
-  f.operand = plan_operand(operand);
+  f.operand = std::make_shared<const Plan>(Planner(options_, *this).plan_lowered(operand));
+  for (size_t c = 0; c < f.operand->contexts.size(); ++c)
+    context_of(Symbol{nullptr, f.operand->contexts[c].source, f.operand->contexts[c].binding, {}, {}}, f.operand->groups[c]);
   f.flops = 2 * n * n * n / 3 + n * f.operand->flops();
   f.bytes = 8 * n * n;
   f.tier = 4;
   f.text = show(operand) + " made dense and factored: " + reason;
-  const int factor = emit(std::move(f), {RegisterKind::dense, operand.codomain(), operand.domain(), nullptr, false});
+  return dense_memo_[key] = emit(std::move(f), {RegisterKind::dense, operand.codomain(), operand.domain(), nullptr, false});
+}
+
+int Planner::solve_dense(const Expression& operand, int x, const std::string& reason) {
+  const double n = operand.domain().dimension();
+  int factor = dense_factor(operand, reason);
+  if (whole_) {
+    const auto [known, fresh] = imported_.try_emplace(factor, -1);
+    if (fresh) {
+      known->second = new_register(RegisterKind::dense, operand.codomain(), operand.domain(), false);
+      plan_.registers[known->second].shared = factor;
+    }
+    factor = known->second;
+  }
   if (x < 0) return factor;
   Step s{StepKind::dense_solve};
   s.in = {factor, x};

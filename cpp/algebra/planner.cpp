@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "algebra/errors.h"
+#include "algebra/interrupt.h"
 #include "algebra/lower.h"
 #include "algebra/planning.h"
 #include "algebra/properties.h"
@@ -19,6 +20,10 @@ int Planner::new_register(RegisterKind kind, const Space& rows, const Space& col
 }
 
 int Planner::emit(Step step, Register out) {
+  check_interrupt();
+  if (plan_.steps.size() >= most_steps)
+    throw EvaluationError("the plan of " + plan_.text + " takes more than " + std::to_string(most_steps) +
+                          " steps: parts of it are applied to many vectors; evaluate such a part, and go on with it as a constant");
   plan_.registers.push_back(std::move(out));
   step.out = static_cast<int>(plan_.registers.size()) - 1;
   step.symbol.binding = nullptr;  // the context holds it
@@ -78,6 +83,9 @@ void drop_unused(Plan& plan) {
   for (auto s = plan.steps.rbegin(); s != plan.steps.rend(); ++s) {
     if (s->out >= 0 && !needed[s->out]) continue;
     for (int r : s->in) needed[r] = 1;
+    if (s->operand)
+      for (const Register& r : s->operand->registers)
+        if (r.shared >= 0) needed[r.shared] = 1;
     if (s->realization) {
       for (const auto* terms : {&s->realization->terms, &s->realization->inputs, &s->realization->outputs})
         for (const Realization::Term& t : *terms)
@@ -247,8 +255,7 @@ Plan Planner::plan(const Expression& typed, Request request) {
       break;
     }
   }
-  drop_unused(plan_);
-  emit_values();
+  finish();
   // Of what was typed: theorems may leave nothing in the plan that hangs on a state.
   plan_.batch = batch_of(typed);
   plan_.batched = plan_.batch >= 0;
@@ -260,8 +267,27 @@ Plan Planner::plan(const Expression& typed, Request request) {
   return std::move(plan_);
 }
 
+void Planner::finish() {
+  drop_unused(plan_);
+  emit_values();
+}
+
+Plan Planner::plan_lowered(const Expression& e) {
+  plan_ = Plan{};
+  plan_.request = Request::apply;
+  plan_.text = show(e);
+  plan_.domain = e.domain();
+  plan_.codomain = e.codomain();
+  plan_.input = new_register(RegisterKind::vector, e.domain(), {}, true);
+  plan_.output = apply(e, plan_.input);
+  finish();
+  return std::move(plan_);
+}
+
 std::shared_ptr<const Plan> make_plan(const Expression& e, Request request, const PlanOptions& options) {
-  return std::make_shared<const Plan>(Planner(options).plan(e, request));
+  std::shared_ptr<const Plan> made;
+  with_stack_for(e.node().depth, [&] { made = std::make_shared<const Plan>(Planner(options).plan(e, request)); });
+  return made;
 }
 
 double Plan::flops() const {

@@ -19,11 +19,16 @@ class Planner {
  public:
   explicit Planner(const PlanOptions& options) : options_(options) {}
 
-  // The request as a plan.
+  // The request as a plan. Recurses as deep as the expression is nested (with_stack_for).
   Plan plan(const Expression& e, Request request);
 
  private:
   friend class RealizationBuilder;
+
+  // The operand of a dense factorization, lowered, for the plan of `whole`, which holds the factors of what is dense inside it.
+  Planner(const PlanOptions& options, Planner& whole) : options_(options), whole_(&whole) {}
+  Plan plan_lowered(const Expression& lowered);
+  void finish();
 
   // ---- steps and registers
   int new_register(RegisterKind kind, const Space& rows, const Space& columns, bool wide);
@@ -41,6 +46,7 @@ class Planner {
   int vector_value(const Expression& e);
   int column(const Expression& e);   // a vector expression as one column, whatever the run's width
   int solve_realization(const Expression& e, int x);
+  int dense_factor(const Expression& operand, const std::string& reason);   // a register of the whole plan
   int solve_dense(const Expression& operand, int x, const std::string& reason);
   std::optional<Expression> gram_root(const Expression& e) const;
   int factor_gram(const Expression& e, const Expression& root);
@@ -54,6 +60,7 @@ class Planner {
 
   // ---- structure
   std::optional<int> diagonal_by_structure(const Expression& e);   // block register of blockdiag(e), no elimination
+  std::optional<int> structural_diagonal(const Expression& e);     // the same, not remembered
   int diagonal_blocks(const Expression& e);
   std::optional<int> diagonal_by_theorem(const std::vector<Expression>& factors);
   int logdet(const Expression& e);
@@ -70,7 +77,14 @@ class Planner {
   std::map<std::pair<int, int>, int> vector_memo_;
   std::map<int, int> block_memo_;
   std::map<std::pair<int, int>, int> block_product_memo_;
+  std::map<int, std::optional<int>> diagonal_memo_;
+  Planner* whole_ = nullptr;                // null: this is the whole plan
+  std::map<int, int> dense_memo_;           // of the whole plan: factors by operand
+  std::map<int, int> imported_;             // of an operand's plan: its registers for those of the whole
 };
+
+// Steps of one plan; beyond it a shared part occurs too many times over.
+constexpr size_t most_steps = 200000;
 
 // ---------------------------------------------------------------- optimisation by theorems (optimise.cpp)
 // The cheapest expression that the theorems give for e: recognised forms, cancelled inverses, normal form if it costs less.

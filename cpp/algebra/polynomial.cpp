@@ -1,3 +1,4 @@
+#include "algebra/interrupt.h"
 #include "algebra/polynomial.h"
 
 #include <cmath>
@@ -11,7 +12,7 @@ namespace pycraft {
 
 namespace {
 
-constexpr size_t word_limit = 400, step_limit = 20000;
+constexpr size_t word_limit = 400, step_limit = 20000, visit_limit = 100000;
 
 struct Unfolded {
   const Symbol* symbol = nullptr;
@@ -85,7 +86,11 @@ class Normaliser {
  private:
   // Distributes products over sums; letters are interned.
   Polynomial expand(const Expression& e) {
-    if (overflow_) return {};
+    check_interrupt();
+    if (overflow_ || ++visited_ > visit_limit) {
+      overflow_ = true;
+      return {};
+    }
     switch (e.kind()) {
       case NodeKind::zero: return {};
       case NodeKind::identity: return {{Word{}, 1.0}};
@@ -155,6 +160,7 @@ class Normaliser {
     std::deque<std::pair<Word, double>> todo(p.begin(), p.end());
     Polynomial done;
     while (!todo.empty()) {
+      check_interrupt();
       if (++steps_ > step_limit || done.size() + todo.size() > word_limit) {
         overflow_ = true;
         return {};
@@ -209,7 +215,7 @@ class Normaliser {
   }
 
   Alphabet& alphabet_;
-  size_t steps_ = 0;
+  size_t steps_ = 0, visited_ = 0;
   bool overflow_ = false;
 };
 
@@ -217,7 +223,9 @@ class Normaliser {
 
 std::optional<Polynomial> normal_form(const Expression& e, Alphabet& alphabet) {
   // Compounds other than K are abbreviations; K is a letter of the normal form.
-  return Normaliser(alphabet).run(lower(e, false));
+  std::optional<Polynomial> found;
+  with_stack_for(e.node().depth, [&] { found = Normaliser(alphabet).run(lower(e, false)); });
+  return found;
 }
 
 Expression to_expression(const Polynomial& p, const Alphabet& alphabet, const Space& domain, const Space& codomain) {

@@ -17,7 +17,10 @@ const SymbolDefinition* edge_symbol(const Expression& e, bool& transposed) {
   return inner.node().symbol.definition;
 }
 
-unsigned triangles(const Expression& e) {
+unsigned triangles(const Expression& e);
+
+// From those of its parts.
+unsigned triangles_of_node(const Expression& e) {
   switch (e.kind()) {
     case NodeKind::symbol: {
       const SymbolDefinition& d = *e.node().symbol.definition;
@@ -64,6 +67,25 @@ unsigned triangles(const Expression& e) {
     }
   }
   return 0;
+}
+
+// Found once for each node.
+unsigned triangles(const Expression& e) {
+  const auto known = [](const Expression& x) { return x.node().triangles.value(); };
+  if (known(e) < 0) {
+    std::vector<const Expression*> todo = {&e};
+    while (!todo.empty()) {
+      const Expression& x = *todo.back();
+      const size_t before = todo.size();
+      if (known(x) < 0)
+        for (const Expression& c : x.children())
+          if (known(c) < 0) todo.push_back(&c);
+      if (todo.size() > before) continue;
+      todo.pop_back();
+      if (known(x) < 0) x.node().triangles.set(static_cast<int>(triangles_of_node(x)));
+    }
+  }
+  return static_cast<unsigned>(known(e));
 }
 
 }  // namespace

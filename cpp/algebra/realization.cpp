@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 
+#include "algebra/interrupt.h"
 #include "algebra/lower.h"
 #include "algebra/planner.h"
 #include "algebra/properties.h"
@@ -13,6 +15,10 @@
 namespace pycraft {
 
 namespace {
+
+// Rows of a pivot block. Beyond it, one inverse after the other made dense costs less than all of them in one elimination, unless the
+// model is large.
+int most_rows(const Space& domain) { return domain.dimension() <= 3000 ? 256 : 1024; }
 
 // A vector of the expression as it is known so far: Σ coefficient · left · (edge) · right · state. State -1 is the input.
 struct SignalTerm {
@@ -127,7 +133,13 @@ class RealizationBuilder {
   int new_state(const Space& space) {
     r_->states.push_back(space);
     r_->equations.push_back(space);
+    count_rows(space);
     return static_cast<int>(r_->states.size()) - 1;
+  }
+
+  void count_rows(const Space& space) {
+    const int bodies = r_->tree ? r_->tree->structure().bodies() : 1;
+    if (space.belongs_to_bodies()) rows_ += (space.dimension() + bodies - 1) / bodies;
   }
 
   // Adds f · signal to equation `row`.
@@ -164,18 +176,20 @@ class RealizationBuilder {
 
   // The same expression of the same signal is the same signal: shared parts of an expression share their states.
   bool apply(const Expression& e, const Signal& x, Signal& y) {
-    const int id = planner_.id_of(e);
-    for (const Known& k : known_)
-      if (k.expression == id && k.input == x.terms) {
+    check_interrupt();
+    std::vector<Known>& known = known_[{planner_.id_of(e), key_of(x)}];
+    for (const Known& k : known)
+      if (k.input == x.terms) {
         y = k.output;
         return true;
       }
     if (!compute(e, x, y)) return false;
-    known_.push_back({id, x.terms, y});
+    known.push_back({x.terms, y});
     return true;
   }
 
   bool compute(const Expression& e, const Signal& x, Signal& y) {
+    if (rows_ > most_rows(r_->domain)) return refuse("its realization has more than " + std::to_string(most_rows(r_->domain)) + " states on a body");
     y.space = e.codomain();
     y.terms.clear();
     switch (e.kind()) {
@@ -243,6 +257,7 @@ class RealizationBuilder {
       const int s = static_cast<int>(r_->states.size());
       r_->states.push_back(X.domain());
       r_->equations.push_back(X.codomain());
+      count_rows(X.domain());
       w.terms = {{s}};
       Signal image;
       if (!apply(X, w, image)) return false;
@@ -357,12 +372,17 @@ class RealizationBuilder {
   Planner& planner_;
   std::string& reason_;
   std::shared_ptr<Realization> r_;
+  int rows_ = 0;   // states on a body, about
   struct Known {
-    int expression;
     std::vector<SignalTerm> input;
     Signal output;
   };
-  std::vector<Known> known_;
+  std::map<std::pair<int, size_t>, std::vector<Known>> known_;  // by expression and a key of its input
+  static size_t key_of(const Signal& s) {
+    size_t key = s.terms.size();
+    for (const SignalTerm& t : s.terms) key = key * 1000003 + size_t(t.state + 2) * 31 + size_t(t.right + 2) * 7 + size_t(t.left + 2);
+    return key;
+  }
 };
 
 std::shared_ptr<const Realization> build_realization(Planner& planner, const Expression& e, bool local_ends, std::string& reason) {

@@ -6,6 +6,7 @@
 #include "algebra/lower.h"
 #include "algebra/theorems.h"
 #include "algebra/values.h"
+#include "algebra/without_interrupts.h"
 
 namespace pycraft {
 
@@ -106,6 +107,7 @@ struct InversePattern {
 
 const std::vector<InversePattern>& inverse_patterns() {
   static const std::vector<InversePattern> patterns = [] {
+    const WithoutInterrupts meanwhile;
     std::vector<InversePattern> list;
     const std::vector<Theorem> theorems = sko_theorems(prototype());
     const int j_code = letter_code(SymbolId::J, false, false);
@@ -131,6 +133,7 @@ const std::vector<InversePattern>& inverse_patterns() {
 
 const std::vector<Rule>& rewrite_rules() {
   static const std::vector<Rule> rules = [] {
+    const WithoutInterrupts meanwhile;
     std::vector<Rule> list;
     for (const Theorem& t : sko_theorems(prototype())) {
       if (t.use != Use::rewrite) continue;

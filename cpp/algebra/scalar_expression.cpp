@@ -1,5 +1,6 @@
 #include "algebra/scalar_expression.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 
@@ -18,6 +19,13 @@ void require_square(const Expression& e, const char* what) {
 
 }  // namespace
 
+Scalar::Scalar(Node node) {
+  for (const Scalar& t : node.terms) node.depth = std::max(node.depth, 1 + t.node().depth);
+  if (node.depth > most_levels)
+    throw EvaluationError("a scalar of sums within multiples within sums, " + std::to_string(node.depth) + " levels deep: evaluate a part of it, and go on with the number");
+  node_ = std::make_shared<const Node>(std::move(node));
+}
+
 Scalar number(double value) { return Scalar({ScalarKind::number, value, {}, {}}); }
 Scalar trace(const Expression& e) {
   require_square(e, "trace");
@@ -31,7 +39,16 @@ Scalar norm(const Expression& e) {
   if (e.floating()) throw SpaceError("norm of I: it has no space yet");
   return Scalar({ScalarKind::norm, 0, e, {}});
 }
-Scalar operator+(const Scalar& a, const Scalar& b) { return Scalar({ScalarKind::sum, 0, {}, {a, b}}); }
+Scalar operator+(const Scalar& a, const Scalar& b) {
+  std::vector<Scalar> terms;
+  for (const Scalar& s : {a, b}) {
+    if (s.node().kind == ScalarKind::sum)
+      terms.insert(terms.end(), s.node().terms.begin(), s.node().terms.end());
+    else
+      terms.push_back(s);
+  }
+  return Scalar({ScalarKind::sum, 0, {}, std::move(terms)});
+}
 Scalar operator*(double c, const Scalar& a) { return Scalar({ScalarKind::scaled, c, {}, {a}}); }
 Scalar operator-(const Scalar& a, const Scalar& b) { return a + -1.0 * b; }
 
@@ -57,6 +74,8 @@ void visit(const Scalar& a, const std::function<void(const Expression&)>& operan
   for (const Scalar& t : a.node().terms) visit(t, operands);
 }
 
+constexpr size_t longest_operand = 100000;
+
 std::string show(const Scalar& a, Style style) {
   const auto& n = a.node();
   const bool latex = style == Style::latex;
@@ -66,13 +85,13 @@ std::string show(const Scalar& a, Style style) {
     return std::string(buffer);
   };
   const auto call = [&](const char* plain, const char* tex) {
-    return latex ? std::string(tex) + "\\left(" + show(n.operand, style) + "\\right)" : std::string(plain) + "(" + show(n.operand, style) + ")";
+    return latex ? std::string(tex) + "\\left(" + show(n.operand, style, longest_operand) + "\\right)" : std::string(plain) + "(" + show(n.operand, style, longest_operand) + ")";
   };
   switch (n.kind) {
     case ScalarKind::number: return real(n.value);
     case ScalarKind::trace: return call("trace", "\\operatorname{tr}");
-    case ScalarKind::logdet: return style == Style::unicode ? "ln det(" + show(n.operand, style) + ")" : call("logdet", "\\ln\\det");
-    case ScalarKind::norm: return style == Style::unicode ? "‖" + show(n.operand, style) + "‖" : call("norm", "\\left\\Vert");
+    case ScalarKind::logdet: return style == Style::unicode ? "ln det(" + show(n.operand, style, longest_operand) + ")" : call("logdet", "\\ln\\det");
+    case ScalarKind::norm: return style == Style::unicode ? "‖" + show(n.operand, style, longest_operand) + "‖" : call("norm", "\\left\\Vert");
     case ScalarKind::sum: {
       std::string text = show(n.terms[0], style);
       for (size_t i = 1; i < n.terms.size(); ++i) {

@@ -17,9 +17,11 @@ class Scalar {
     ScalarKind kind;
     double value = 0;                // number; factor of scaled
     Expression operand;              // trace, logdet, norm
-    std::vector<Scalar> terms;       // sum, scaled
+    std::vector<Scalar> terms;       // sum (kept flat), scaled
+    int depth = 1;                   // levels of nodes
   };
-  explicit Scalar(Node node) : node_(std::make_shared<const Node>(std::move(node))) {}
+  explicit Scalar(Node node);        // EvaluationError above most_levels
+  static constexpr int most_levels = 1000;
   const Node& node() const { return *node_; }
 
  private:

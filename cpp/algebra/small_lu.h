@@ -4,10 +4,12 @@
 // allocates its permutation anew and has no test for pivots that are noise.)
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
 #include "algebra/equilibration.h"
+#include "algebra/interrupt.h"
 #include "spatial/scalar.h"
 
 namespace pycraft {
@@ -56,6 +58,7 @@ class SmallLU {
     for (int i = 0; i < n; ++i)
       for (int j = 0; j < n; ++j) column_[j] = maximum(column_[j], S(sizes_[size_t(i) * n + j] * row_factor_[i]));
     for (int k = 0; k < n; ++k) {
+      check_interrupt_at(k, n);
       // The state's own equation, unless another one is much larger: the recursions that the equations stand for are stable as they are.
       int best = k, own = k;
       S largest = S(-1);
@@ -83,6 +86,7 @@ class SmallLU {
   // x <- A⁻¹ x, m columns row-major; work: n * m.
   void solve(S* x, int m, S* work) const {
     for (int i = 0; i < n_; ++i) {
+      check_interrupt_at(i, n_);
       S* w = work + i * m;
       std::copy_n(x + rows_[i] * m, m, w);
       const S* row = A_ + rows_[i] * n_;
@@ -91,6 +95,7 @@ class SmallLU {
           for (int c = 0; c < m; ++c) w[c] -= row[k] * work[k * m + c];
     }
     for (int i = n_ - 1; i >= 0; --i) {
+      check_interrupt_at(i, n_);
       const S* row = A_ + rows_[i] * n_;
       S* xi = x + i * m;
       std::copy_n(work + i * m, m, xi);

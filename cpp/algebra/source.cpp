@@ -1,5 +1,7 @@
 #include "algebra/source.h"
 
+#include <algorithm>
+#include <mutex>
 #include <unordered_set>
 
 #include "algebra/errors.h"
@@ -11,7 +13,7 @@ namespace {
 
 // Which sources are alive: a space may outlive the model it belongs to.
 struct Alive {
-  std::mutex mutex;
+  Mutex mutex;
   std::unordered_set<const void*> sources;
 };
 Alive& alive() {
@@ -23,7 +25,7 @@ Alive& alive() {
 
 SkoSource::SkoSource(SkoStructure structure, std::string name) : structure_(std::move(structure)), name_(std::move(name)) {
   {
-    std::lock_guard<std::mutex> lock(alive().mutex);
+    std::lock_guard<Mutex> lock(alive().mutex);
     alive().sources.insert(this);
   }
   theta_layout_ = coordinate_layout(structure_, this, name_);
@@ -41,12 +43,12 @@ Space SkoSource::space(SpaceKind kind, const std::vector<int>&) const {
 }
 
 SkoSource::~SkoSource() {
-  std::lock_guard<std::mutex> lock(alive().mutex);
+  std::lock_guard<Mutex> lock(alive().mutex);
   alive().sources.erase(this);
 }
 
 std::shared_ptr<SkoSource> source_owning(const Space& space) {
-  std::lock_guard<std::mutex> lock(alive().mutex);
+  std::lock_guard<Mutex> lock(alive().mutex);
   if (!space || !alive().sources.count(space.layout().owner)) return nullptr;
   return const_cast<SkoSource*>(static_cast<const SkoSource*>(space.layout().owner))->weak_from_this().lock();
 }
@@ -61,63 +63,68 @@ void SkoSource::check_current() const {
     throw StaleOperatorError("this operator was made before '" + name_ + "' changed (" + stale_reason_ + "); take it anew from the model's soa");
 }
 
+namespace {
+
+// `kept` at this state: moved there where nobody reads it, else afresh; who still reads the old numbers keeps them.
 template <class S>
-std::shared_ptr<SkoValues<S>> SkoSource::current_values(unsigned groups) {
+void move_or_make(std::shared_ptr<SkoValues<S>>& kept, const SkoSource& source, Form form, const double* q, const double* v) {
+  if (!kept || !kept->unused() || !kept->askable()) {
+    kept = source.make_values(S());
+    kept->use(form);
+  }
+  kept->move_to(q, v);
+}
+
+}  // namespace
+
+template <class S>
+ValuesInUse<S> SkoSource::current_values(unsigned groups) {
   check_current();
   ValueCache<S>& c = std::get<ValueCache<S>>(caches_);
-  std::shared_ptr<SkoValues<S>> values;
+  ValuesInUse<S> values;
   {
-    std::lock_guard<std::mutex> lock(c.mutex);
+    std::lock_guard<Mutex> lock(c.mutex);
+    if (c.mutex.abandoned()) leave_behind(c.values, c.state);
     const std::shared_ptr<const StateData> now = state();
     const std::uint64_t version = parameters();
-    if (!c.values || c.state != now || c.parameters != version) {
-      // Somebody may still be reading the old numbers: they keep them, we start afresh.
-      if (!c.values || c.values.use_count() > 1) c.values = make_values(S());
-      c.values->move_to(now->q.data(), now->v.data());
+    if (!c.values || c.state != now || c.parameters != version || !c.values->askable()) {
+      c.state = nullptr;  // until the values are there
+      move_or_make(c.values, *this, Form::fast, now->q.data(), now->v.data());
       c.state = now;
       c.parameters = version;
     }
-    values = c.values;
+    values = ValuesInUse<S>(c.values);
   }
   values->require(groups);
   return values;
 }
 
-#define PYCRAFT_INSTANTIATE(S) template std::shared_ptr<SkoValues<S>> SkoSource::current_values<S>(unsigned);
+#define PYCRAFT_INSTANTIATE(S) template ValuesInUse<S> SkoSource::current_values<S>(unsigned);
 PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_INSTANTIATE)
 #undef PYCRAFT_INSTANTIATE
 
 template <class S>
-std::shared_ptr<SkoValues<S>> Binding::values(const std::shared_ptr<SkoSource>& source, unsigned groups) const {
+ValuesInUse<S> Binding::values(const std::shared_ptr<SkoSource>& source, unsigned groups) const {
   source->check_current();
-  std::shared_ptr<SkoValues<S>> found;
+  ValuesInUse<S> found;
   {
-    std::lock_guard<std::mutex> lock(mutex);
-    auto& known = std::get<std::vector<Entry<S>>>(entries);
-    for (Entry<S>& e : known)
-      if (e.source.lock() == source) {
-        if (e.parameters != source->parameters()) {
-          if (e.values.use_count() > 1) {
-            e.values = source->make_values(S());
-            e.values->use(arithmetic.form);
-          }
-          e.values->move_to(q.data(), v.data());
-          e.parameters = source->parameters();
-        }
-        found = e.values;
-      }
-    if (!found) {
-      found = source->make_values(S());
-      found->use(arithmetic.form);
-      found->move_to(q.data(), v.data());
-      known.push_back({source, source->parameters(), found});
+    std::lock_guard<Mutex> lock(mutex);
+    auto& known = std::get<Entries<S>>(entries);
+    if (mutex.abandoned()) leave_behind(known);
+    auto entry = std::find_if(known.begin(), known.end(), [&](const Entry<S>& e) { return e.source.lock() == source; });
+    if (entry == known.end()) entry = known.insert(known.end(), Entry<S>{source, 0, nullptr});
+    if (!entry->values || entry->parameters != source->parameters() || !entry->values->askable()) {
+      entry->parameters = 0;  // until the values are there; versions start at 1
+      move_or_make(entry->values, *source, arithmetic.form, q.data(), v.data());
+      entry->parameters = source->parameters();
     }
+    found = ValuesInUse<S>(entry->values);
   }
   found->require(groups);
   return found;
 }
 
-#define PYCRAFT_INSTANTIATE(S) template std::shared_ptr<SkoValues<S>> Binding::values<S>(const std::shared_ptr<SkoSource>&, unsigned) const;
+#define PYCRAFT_INSTANTIATE(S) template ValuesInUse<S> Binding::values<S>(const std::shared_ptr<SkoSource>&, unsigned) const;
 PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_INSTANTIATE)
 #undef PYCRAFT_INSTANTIATE
 

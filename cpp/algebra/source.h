@@ -4,11 +4,11 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
 #include "algebra/arithmetic.h"
+#include "algebra/mutex.h"
 #include "algebra/space.h"
 #include "algebra/symbol.h"
 #include "spatial/scalar.h"
@@ -17,7 +17,8 @@ namespace pycraft {
 
 template <class S>
 class SkoValues;
-
+template <class S>
+class ValuesInUse;
 
 // A state of a model: immutable once made, so that readers in several threads need no lock.
 struct StateData {
@@ -27,7 +28,7 @@ struct StateData {
 // The numerical blocks at one state, shared by all expressions that are evaluated there.
 template <class S>
 struct ValueCache {
-  std::mutex mutex;
+  Mutex mutex;
   std::shared_ptr<SkoValues<S>> values;
   std::shared_ptr<const StateData> state;
   std::uint64_t parameters = 0;
@@ -77,7 +78,11 @@ class SkoSource : public std::enable_shared_from_this<SkoSource> {
 
   // The values at the model's present state with these groups computed.
   template <class S>
-  std::shared_ptr<SkoValues<S>> current_values(unsigned groups);
+  ValuesInUse<S> current_values(unsigned groups);
+
+  // Between these the model is not edited (an edit raises); enter tells leave on which side of a fork it was.
+  virtual unsigned enter_use() const { return 0; }
+  virtual void leave_use(unsigned) const noexcept {}
 
  protected:
   // Derived models whose bodies, or coordinates, are those of another: their operators combine with its.
@@ -105,7 +110,7 @@ struct Binding {
 
   // For one state: the cached values of this source.
   template <class S>
-  std::shared_ptr<SkoValues<S>> values(const std::shared_ptr<SkoSource>& source, unsigned groups) const;
+  ValuesInUse<S> values(const std::shared_ptr<SkoSource>& source, unsigned groups) const;
 
   template <class S>
   struct Entry {
@@ -113,7 +118,7 @@ struct Binding {
     std::uint64_t parameters;
     std::shared_ptr<SkoValues<S>> values;
   };
-  mutable std::mutex mutex;
+  mutable Mutex mutex;
   template <class S>
   using Entries = std::vector<Entry<S>>;
   mutable PerScalar<Entries> entries;

@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "algebra/interrupt.h"
 #include "algebra/sweeps/articulated_inertia.h"
 #include "algebra/sweeps/composite_inertia.h"
 #include "algebra/sweeps/mass_matrix.h"
@@ -74,6 +75,7 @@ class TreeValues : public SkoValues<typename Blocks::Scalar> {
     std::fill_n(out, static_cast<size_t>(N) * N, S(0));
     std::vector<S> f, next, row, h;
     for (int k = 0; k < tree_.bodies(); ++k) {
+      check_interrupt_at(k, k);
       const int n = tree_.dof[k];
       if (n == 0) continue;
       // f = R(k) H(k)*, one column per coordinate

@@ -4,8 +4,12 @@
 
 #include <atomic>
 #include <cstdint>
+#include <memory>
 #include <mutex>
+#include <thread>
+#include <utility>
 
+#include "algebra/mutex.h"
 #include "algebra/source.h"
 #include "algebra/sweeps/residual_rounding.h"
 #include "algebra/symbol.h"
@@ -31,7 +35,8 @@ class SkoValues {
   // Computes the groups that are missing. Safe from several threads; afterwards reading is.
   void require(unsigned groups) {
     if ((ready_.load(std::memory_order_acquire) & groups) == groups) return;
-    std::lock_guard<std::mutex> lock(mutex_);
+    std::lock_guard<Mutex> lock(mutex_);
+    const Computing now(*this);
     unsigned ready = ready_.load();
     for (unsigned group : {unsigned(Group::kinematics), unsigned(Group::articulated), unsigned(Group::composite), unsigned(Group::compliance), unsigned(Group::velocities)}) {
       const unsigned wanted = groups & group & ~ready;
@@ -41,6 +46,12 @@ class SkoValues {
     }
     ready_.store(ready, std::memory_order_release);
   }
+
+  // Whether nobody reads them any more, so that they may move to another state.
+  bool unused() const { return users_.load(std::memory_order_acquire) == 0; }
+  // Whether this thread may ask for groups: not where it is in the midst of computing some (a signal's handler came between), nor where
+  // a fork left behind the thread that was.
+  bool askable() const { return computing_.load(std::memory_order_relaxed) != std::this_thread::get_id() && !mutex_.left_behind(); }
 
   // y = A x or A* x for a block-diagonal or edge symbol; inverse: y = A⁻¹ x (D only).
   virtual void apply(const Symbol& symbol, bool transposed, bool inverse, const S* x, S* y, int columns) const = 0;
@@ -70,9 +81,40 @@ class SkoValues {
     static std::atomic<std::uint64_t> counter{0};
     return ++counter;
   }
-  std::mutex mutex_;
+  struct Computing {
+    SkoValues& values;
+    explicit Computing(SkoValues& v) : values(v) { values.computing_ = std::this_thread::get_id(); }
+    ~Computing() { values.computing_ = std::thread::id(); }
+  };
+  template <class T>
+  friend class ValuesInUse;
+  Mutex mutex_;
+  std::atomic<std::thread::id> computing_{};
+  std::atomic<int> users_{0};
   std::atomic<unsigned> ready_{0};
   std::uint64_t generation_ = 0;
+};
+
+// Values that a run reads. As long as it holds them they stay at their state.
+template <class S>
+class ValuesInUse {
+ public:
+  ValuesInUse() = default;
+  explicit ValuesInUse(std::shared_ptr<SkoValues<S>> values) : values_(std::move(values)) { values_->users_.fetch_add(1, std::memory_order_relaxed); }
+  ValuesInUse(ValuesInUse&&) = default;
+  ValuesInUse& operator=(ValuesInUse&& other) {
+    std::swap(values_, other.values_);
+    return *this;
+  }
+  ~ValuesInUse() {
+    if (values_) values_->users_.fetch_sub(1, std::memory_order_release);
+  }
+  SkoValues<S>* get() const { return values_.get(); }
+  SkoValues<S>* operator->() const { return values_.get(); }
+  explicit operator bool() const { return values_ != nullptr; }
+
+ private:
+  std::shared_ptr<SkoValues<S>> values_;
 };
 
 }  // namespace pycraft

@@ -24,7 +24,8 @@ constexpr int columns_at_a_time = 64;
 template <class S>
 class Workspace {
  public:
-  explicit Workspace(std::shared_ptr<const Plan> plan) : plan_(std::move(plan)), vectors_(plan_->registers.size()), blocks_(plan_->registers.size()),
+  // of an operand's plan: `whole` holds the factors that it shares
+  explicit Workspace(std::shared_ptr<const Plan> plan, Workspace* whole = nullptr) : plan_(std::move(plan)), whole_(whole ? whole : this), vectors_(plan_->registers.size()), blocks_(plan_->registers.size()),
                                                          scalars_(plan_->registers.size(), S(0)), dense_(plan_->registers.size()) {
     eliminations_.resize(plan_->registers.size());
     dense_lu_.resize(plan_->registers.size());
@@ -36,7 +37,7 @@ class Workspace {
     for (const Step& s : plan_->steps)
       functions_of_vectors_ |= s.kind == StepKind::function_blocks && plan_->registers[s.in[0]].kind == RegisterKind::vector;
     for (const Step& s : plan_->steps)
-      if (s.operand) operands_.emplace_back(&s, std::make_unique<Workspace>(s.operand));
+      if (s.operand) operands_.emplace_back(&s, std::make_unique<Workspace>(s.operand, s.kind == StepKind::dense_factor && !s.flag ? whole_ : nullptr));
   }
 
   // Steps that make no vector (blocks, factors, scalars) run only where the values changed.
@@ -46,6 +47,7 @@ class Workspace {
       if (reg.kind == RegisterKind::vector) vectors_[r].resize(size_t(reg.space.dimension()) * (reg.wide ? columns : 1));
     }
     for (const Step& s : plan_->steps) {
+      check_interrupt();
       const bool per_column = s.out >= 0 && plan_->registers[s.out].kind == RegisterKind::vector;
       // a function of a vector, and what is made of it, may hang on a named vector
       if (!values_changed && !per_column && !functions_of_vectors_) continue;
@@ -176,7 +178,7 @@ class Workspace {
         vectors_[s.out] = vectors_[s.in[1]];
         if (gram_[s.in[0]]) return gram_[s.in[0]]->solve(vectors_[s.out].data(), w);
         scratch_.resize(std::max(scratch_.size(), vectors_[s.out].size()));
-        dense_lu_[s.in[0]].solve(vectors_[s.out].data(), w, scratch_.data());
+        dense_factors(s.in[0]).solve(vectors_[s.out].data(), w, scratch_.data());
         return;
       }
       case StepKind::blocks_of_dense: {
@@ -248,6 +250,11 @@ class Workspace {
         return;
       }
     }
+  }
+
+  SmallLU<S>& dense_factors(int r) {
+    const int shared = plan_->registers[r].shared;
+    return shared < 0 ? dense_lu_[r] : whole_->dense_lu_[shared];
   }
 
   void factor_gram(const Step& s, const std::vector<SkoValues<S>*>& values, PassCounts& counts) {
@@ -593,6 +600,7 @@ class Workspace {
   }
 
   std::shared_ptr<const Plan> plan_;
+  Workspace* whole_;
   std::vector<std::vector<S>> vectors_;
   std::vector<BlockStorage<S>> blocks_;
   bool functions_of_vectors_ = false;
@@ -622,7 +630,7 @@ class Workspace {
 
  public:
   std::vector<std::unique_ptr<SkoValues<S>>> own_values;  // of batched contexts
-  std::vector<std::shared_ptr<SkoValues<S>>> held;        // of the others, during a run
+  std::vector<ValuesInUse<S>> held;                       // of the others, during a run
   std::vector<SkoValues<S>*> values;                      // of all, during a run
   bool ran = false;
   int state = 0;                                          // of the batch

@@ -35,7 +35,7 @@ py::dict time_apply(const Expression& e, const Array& x, double seconds, bool ru
   Result r;
   Timing t;
   {
-    py::gil_scoped_release release;
+    ReleasedGil release;
     t = time_calls([&] { pool->run(inputs, false, r); }, seconds);
   }
   return result(t);
@@ -49,7 +49,7 @@ py::dict time_forward(const std::shared_ptr<Multibody>& model, const Array& q, c
   const double *Q = q.data(), *V = v.data(), *U = u.data();
   Timing t;
   {
-    py::gil_scoped_release release;
+    ReleasedGil release;
     at_precision(precision, [&]<class S>(S) {
       RigidDynamics<S> w(*model);
       std::vector<S> out(nv);
@@ -70,7 +70,7 @@ py::dict time_method(const std::shared_ptr<Multibody>& model, const std::string&
   const int K = states_of(q), nq = model->nq(), nv = model->nv();
   Timing t;
   {
-    py::gil_scoped_release release;
+    ReleasedGil release;
     at_precision(precision, [&]<class S>(S) {
       DynamicsMethods<S> w(*model);
       std::vector<S> Q, V, U, out(nv);
@@ -102,7 +102,7 @@ py::dict time_packs(const std::shared_ptr<Multibody>& model, const Array& q, con
     }, seconds);
   };
   {
-    py::gil_scoped_release release;
+    ReleasedGil release;
     if (precision == Precision::single)
       run(Single());
     else
@@ -122,7 +122,7 @@ py::dict time_dynamics(const std::shared_ptr<Multibody>& model, const std::strin
   int k = 0;
   const auto next = [&] { k = (k + 1) % K; };
   const double *Q = q.data(), *V = v.data(), *U = u.data();
-  py::gil_scoped_release release;
+  ReleasedGil release;
   Timing t;
   const auto run = [&](auto f) {
     t = time_calls([&] { f(Q + size_t(k) * nq, V + size_t(k) * nv, U + size_t(k) * nv), next(); }, seconds);

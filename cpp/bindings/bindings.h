@@ -44,6 +44,20 @@ Class declared(py::module_& m, const char* name) {
   return py::reinterpret_borrow<Class>(m.attr(name));
 }
 
+// The GIL, let go while the core computes. Once the interpreter ends, other threads start nothing any more (EvaluationError) and what
+// they run is stopped: no thread comes back to an interpreter that is gone.
+class ReleasedGil {
+ public:
+  ReleasedGil();
+  ~ReleasedGil();
+  ReleasedGil(const ReleasedGil&) = delete;
+
+ private:
+  unsigned entered_;
+  PyThreadState* state_;
+};
+void register_interrupts(py::module_& m);
+
 // Pickling and copying are refused by name: what holds plans and workspaces is made anew where it is wanted. (Without it the old pickle
 // protocols make an object with nothing behind it.)
 template <class Class>
@@ -86,7 +100,10 @@ Refinement refinement(const py::object& refine, const std::string& residual, Pre
 // What a space and an expression are pickled as.
 py::tuple space_parts(const Space& space);
 Space space_from_parts(const py::tuple& parts);
+// One node: (kind, payload, its parts as operators, the binding of a leaf that is no symbol).
 py::tuple parts(const Expression& e);
+// What an expression is pickled as: its nodes from below, parts by number, what is shared once.
+py::list all_parts(const Expression& e);
 
 }  // namespace pycraft
 

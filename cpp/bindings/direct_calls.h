@@ -26,7 +26,7 @@ class DirectCalls {
     std::get<Pool<S>>(pools_).with(*model_, [&](Workspace<S>& w) {
       for (int b = from; b < to; ++b) {
         naming_state(b, states, [&] { f(w, b); });
-        if (b % 256 == 255) check_interrupt();
+        if (b % 16 == 15) check_interrupt();
       }
     });
   }
@@ -122,7 +122,8 @@ py::array_t<double> run(DirectCalls<Workspace>& d, Precision precision, std::vec
   for (const auto& [a, _] : in) keep_apart(own.emplace_back(*a), out);
   std::vector<const double*> data;
   for (const Argument& a : own) data.push_back(a.array.data());
-  py::gil_scoped_release release;
+  const ModelInUse use(d.model());  // before the GIL goes: what was checked holds
+  ReleasedGil release;
   const auto run_in = [&]<class S>(S) {
     std::vector<std::vector<S>> wide(in.size());
     std::vector<const S*> at(in.size());

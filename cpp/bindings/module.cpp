@@ -3,15 +3,6 @@
 #include "bindings/bindings.h"
 #include "model/multibody.h"
 
-namespace {
-
-void check_signals() {
-  pybind11::gil_scoped_acquire gil;
-  if (PyErr_CheckSignals() != 0) throw pybind11::error_already_set();
-}
-
-}  // namespace
-
 namespace pycraft {
 
 void declare_types(py::module_& m) {
@@ -35,7 +26,7 @@ void declare_types(py::module_& m) {
 
 PYBIND11_MODULE(_core, m) {
   m.doc() = "The compiled core of pycraft: operators, planner, engine and model. Use it through the package pycraft.";
-  pycraft::set_interrupt_check(&check_signals);
+  pycraft::register_interrupts(m);
   pycraft::register_errors(m);
   pycraft::declare_types(m);
   pycraft::register_spaces(m);

@@ -88,7 +88,8 @@ void register_dynamics(py::module_& m) {
         py::array_t<double> result = output(out, in.batch, {d.model().nv()});
         for (Argument* a : {&in.q, &in.v, &in.tau}) keep_apart(*a, result);
         double* target = result.mutable_data();
-        py::gil_scoped_release release;
+        const ModelInUse use(d.model());
+        ReleasedGil release;
         at_precision(precision, [&]<class S>(S) { run_forward<S>(d, in, how, target); });
         return result;
       }, py::arg("q"), py::arg("v"), py::arg("tau"), py::arg("form"), py::arg("refine"), py::arg("residual"), py::arg("precision"), py::arg("on_singular"), py::arg("out"))
@@ -100,16 +101,21 @@ void register_dynamics(py::module_& m) {
         py::array_t<double> value = output(py::none(), -1, {d.model().nv()});
         std::vector<double> corrections;
         double error = 0;
-        at_precision(precision, [&]<class S>(S) {
-          std::vector<S> vdot(d.model().nv());
-          d.each<S>(0, 1, 1, [&](RigidDynamics<S>& w, int) {
-            w.forward_dynamics(in.q.array.data(), in.v.array.data(), in.tau.array.data(), vdot.data(), how);
-            corrections = w.corrections();
-            error = w.estimated_error();
+        double* target = value.mutable_data();
+        {
+          const ModelInUse use(d.model());
+          ReleasedGil release;
+          at_precision(precision, [&]<class S>(S) {
+            std::vector<S> vdot(d.model().nv());
+            d.each<S>(0, 1, 1, [&](RigidDynamics<S>& w, int) {
+              w.forward_dynamics(in.q.array.data(), in.v.array.data(), in.tau.array.data(), vdot.data(), how);
+              corrections = w.corrections();
+              error = w.estimated_error();
+            });
+            for (size_t j = 0; j < vdot.size(); ++j) target[j] = to_double(vdot[j]);
+            require_finite(target, vdot.size(), d.model());
           });
-          for (size_t j = 0; j < vdot.size(); ++j) value.mutable_data()[j] = to_double(vdot[j]);
-          require_finite(value.data(), vdot.size(), d.model());
-        });
+        }
         return py::make_tuple(value, corrections, corrections.empty() ? py::object(py::none()) : py::object(py::float_(error)));
       }, py::arg("q"), py::arg("v"), py::arg("tau"), py::arg("form"), py::arg("refine"), py::arg("residual"), py::arg("precision"))
       .def("mass_matrix_inverse", [](Dynamics& d, const py::object& q, Form form, const py::object& refine, const std::string& residual, Precision precision,
@@ -121,7 +127,8 @@ void register_dynamics(py::module_& m) {
         const Solving how{form, refinement(refine, residual, precision), on_singular_from_name(on_singular)};
         py::array_t<double> result = output(out, a.batch, {nv, nv});
         double* target = result.mutable_data();
-        py::gil_scoped_release release;
+        const ModelInUse use(d.model());
+        ReleasedGil release;
         at_precision(precision, [&]<class S>(S) {
           std::vector<S> inverse(size_t(nv) * nv);
           const int states = a.batch < 0 ? 1 : a.batch;

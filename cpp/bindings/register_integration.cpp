@@ -51,7 +51,8 @@ py::dict trajectory(const Multibody& mb, const std::vector<double>& q, const std
   TrajectoryCost cost;
   double seconds;
   {
-    py::gil_scoped_release release;
+    const ModelInUse use(mb);
+    ReleasedGil release;
     const auto start = std::chrono::steady_clock::now();
     cost = integrate_trajectory<S>(*model, function, q0.data(), v0.data(), times, force.data(), damping.empty() ? nullptr : friction.data(), options,
                                    [&](int i, const S* at, const S* rate) {

@@ -76,7 +76,7 @@ py::object apply_to_array(Expression e, const py::object& given) {
   }
   Result r;
   {
-    py::gil_scoped_release release;
+    ReleasedGil release;
     with_remedy(e, [&] { apply(e, inputs, r); });
   }
   std::vector<py::ssize_t> shape;
@@ -126,7 +126,7 @@ py::object dense(const Expression& e, const py::object& dtype, bool rules) {
   const bool objects = wants_objects(dtype);
   Result r;
   {
-    py::gil_scoped_release release;
+    ReleasedGil release;
     with_remedy(e, [&] { evaluate(e, Request::dense, r, rules, objects); });
   }
   std::vector<py::ssize_t> shape;
@@ -141,7 +141,7 @@ py::object diagonal(const Expression& e) {
   const int batch = batch_of(e);
   Result r;
   {
-    py::gil_scoped_release release;
+    ReleasedGil release;
     with_remedy(e, [&] { evaluate(e, Request::diagonal, r); });
   }
   std::vector<py::ssize_t> shape;
@@ -174,7 +174,7 @@ py::object value(const Expression& e, const py::kwargs& vectors) {
   Result r;
   const bool objects = wants_objects(dtype);
   {
-    py::gil_scoped_release release;
+    ReleasedGil release;
     with_remedy(e, [&] { apply(e, inputs, r, rules, objects); });
   }
   std::vector<py::ssize_t> shape;
@@ -257,7 +257,10 @@ void register_operators(py::module_& m) {
       .def("logdet", [](const Expression& e) { return logdet(e); }, "ln|det|, as a scalar expression. Cost O(N); exact by structure where a theorem gives it.")
       .def("norm", [](const Expression& e) { return norm(e); }, "The Frobenius norm, as a scalar expression.")
       // ---- algebra
-      .def("simplify", &simplify, "The shortest expression that the rewriting theorems find equal to this one.")
+      .def("simplify", [](const Expression& e) {
+        ReleasedGil release;
+        return simplify(e);
+      }, "The shortest expression that the rewriting theorems find equal to this one.")
       .def_property_readonly("is_symmetric", &is_symmetric, "Known by rule, no number looked at.")
       .def_property_readonly("is_block_diagonal", [](const Expression& e) { return is_block_diagonal(e); }, "Known by rule.")
       .def_property_readonly("is_upper_triangular", [](const Expression& e) { return is_upper_triangular(e); }, "By blocks, parents before children: φ and ψ are. Known by rule.")
@@ -284,7 +287,10 @@ void register_operators(py::module_& m) {
                                                                 {"blockdiag", Request::block_diagonal}, {"trace", Request::trace},
                                                                 {"logdet", Request::logdet}, {"norm", Request::norm}};
         for (const auto& [name, r] : names)
-          if (request == name) return prepare(e, r, rules);
+          if (request == name) {
+            ReleasedGil release;
+            return prepare(e, r, rules);
+          }
         throw EvaluationError("no plan is made for '" + request + "'; there are apply, dense, diagonal, blockdiag, trace, logdet, norm");
       }, py::arg("request") = "apply", py::arg("rules") = true, "The plan: what is run, step by step, with its cost.")
       .def_property_readonly("children", [](const Expression& e) { return e.children(); })
@@ -321,20 +327,22 @@ void register_operators(py::module_& m) {
         return all;
       })
       // ---- text
-      .def("text", [](const Expression& e) { return show(e); }, "As the book prints it, in Unicode.")
-      .def("latex", [](const Expression& e) { return show(e, Style::latex); })
-      .def("python", [](const Expression& e) { return show(e, Style::python); }, "As Python reads it.")
-      .def("__str__", [](const Expression& e) { return show(e); })
+      .def("text", [](const Expression& e) { return show_in_full(e); }, "As the book prints it, in Unicode; EvaluationError beyond ten million characters.")
+      .def("latex", [](const Expression& e) { return show_in_full(e, Style::latex); })
+      .def("python", [](const Expression& e) { return show_in_full(e, Style::python); }, "As Python reads it.")
+      .def("__str__", [](const Expression& e) { return show(e, Style::unicode, 100000); })
       .def("__repr__", [](const Expression& e) {
-        std::string text = show(e);
-        if (text.size() > 400) text = text.substr(0, text.find(' ', 300)) + " …";
+        const std::string text = show(e);
         if (e.floating()) return "<" + text + ">";
         return "<" + text + " : " + e.domain().description() + " → " + e.codomain().description() + ">";
       })
-      .def("_repr_latex_", [](const Expression& e) { return "$\\displaystyle " + show(e, Style::latex) + "$"; })
+      .def("_repr_latex_", [](const Expression& e) -> py::object {
+        const std::string text = show(e, Style::latex, 20000);  // half a formula is no LaTeX: what is longer shows as its repr
+        return text.ends_with(" …") ? py::object(py::none()) : py::cast("$\\displaystyle " + text + "$");
+      })
       .def("_parts", &parts)
       .def("__reduce__", [](const Expression& e) -> py::tuple {
-        return py::make_tuple(py::module_::import("pycraft.operators").attr("operator_from_parts"), parts(e));
+        return py::make_tuple(py::module_::import("pycraft.operators").attr("operator_from_nodes"), py::make_tuple(all_parts(e)));
       });
 
   m.def("identity", [](const py::object& space) { return space.is_none() ? identity() : identity(space.cast<Space>()); }, py::arg("space") = py::none(),
@@ -342,7 +350,10 @@ void register_operators(py::module_& m) {
   m.def("zero", &zero, py::arg("domain"), py::arg("codomain"), "The zero operator.");
   m.def("vector", &make_vector, py::arg("name"), py::arg("space"), "A named vector of a space: stands for an array that is given at the evaluation.");
   m.def("blockdiag", &block_diagonal, py::arg("operator"), "The operator's diagonal blocks, body by body, zero elsewhere.");
-  m.def("equal_by_theorems", &equal_by_theorems, py::arg("a"), py::arg("b"), "Whether the rewriting theorems bring both to the same normal form.");
+  m.def("equal_by_theorems", [](const Expression& a, const Expression& b) {
+    ReleasedGil release;
+    return equal_by_theorems(a, b);
+  }, py::arg("a"), py::arg("b"), "Whether the rewriting theorems bring both to the same normal form.");
 }
 
 }  // namespace pycraft

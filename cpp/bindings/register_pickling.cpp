@@ -1,4 +1,6 @@
 // Expressions as plain parts and back: pickling, copying.
+#include <unordered_map>
+
 #include "algebra/errors.h"
 #include "bindings/bindings.h"
 #include "operators/directions.h"
@@ -38,7 +40,8 @@ Space space_from_parts(const py::tuple& t) {
   return source->space(kind, {});
 }
 
-py::tuple parts(const Expression& e) {
+// (kind, payload, the binding of a leaf that is no symbol)
+static py::tuple parts_of_node(const Expression& e) {
   const auto& n = e.node();
   py::object payload = py::none();
   switch (n.kind) {
@@ -68,7 +71,25 @@ py::tuple parts(const Expression& e) {
     case NodeKind::external: throw py::type_error("an operator from outside ('" + n.external->name + "') cannot be pickled");
     default: break;
   }
-  return py::make_tuple(static_cast<int>(n.kind), payload, py::cast(n.children), n.symbol.source ? py::object(py::none()) : binding_of(n.symbol));
+  return py::make_tuple(static_cast<int>(n.kind), payload, n.symbol.source ? py::object(py::none()) : binding_of(n.symbol));
+}
+
+py::tuple parts(const Expression& e) {
+  const py::tuple own = parts_of_node(e);
+  return py::make_tuple(own[0], own[1], py::cast(e.children()), own[2]);
+}
+
+py::list all_parts(const Expression& e) {
+  py::list all;
+  std::unordered_map<const Expression::Node*, py::ssize_t> number;
+  each_from_below(e, [&](const Expression& x) {
+    const py::tuple own = parts_of_node(x);
+    py::list children;
+    for (const Expression& c : x.children()) children.append(number.at(c.get()));
+    number.emplace(x.get(), static_cast<py::ssize_t>(number.size()));
+    all.append(py::make_tuple(own[0], own[1], children, own[2]));
+  });
+  return all;
 }
 
 void register_pickling(py::module_& m) {

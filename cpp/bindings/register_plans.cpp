@@ -106,6 +106,7 @@ py::dict plan_as_data(const Plan& p) {
     t["space"] = space_or_none(r.space);
     t["columns"] = space_or_none(r.columns);
     t["wide"] = r.wide;
+    t["shared"] = r.shared;
     registers.append(t);
   }
   for (const Step& s : p.steps) {
@@ -125,15 +126,16 @@ py::dict plan_as_data(const Plan& p) {
   return d;
 }
 
-std::shared_ptr<SkoValues<double>> values_at(const Context& c, unsigned groups, int state) {
+ValuesInUse<double> values_at(const Context& c, unsigned groups, int state) {
   if (!c.binding) return c.source->current_values<double>(groups);
   if (c.binding->batch < 0) return c.binding->values<double>(c.source, groups);
   if (state < 0 || state >= c.binding->batch)
     throw EvaluationError("state " + std::to_string(state) + " of a batch of " + std::to_string(c.binding->batch));
   std::shared_ptr<SkoValues<double>> values = c.source->make_values(double());
+  values->use(c.binding->arithmetic.form);
   values->move_to(c.binding->q.data() + size_t(state) * c.binding->nq, c.binding->v.data() + size_t(state) * c.binding->nv);
   values->require(groups);
-  return values;
+  return ValuesInUse<double>(std::move(values));
 }
 
 // The numbers of a symbol at a context's state: a vector, or one block per body (None where an edge symbol has none).

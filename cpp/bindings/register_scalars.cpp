@@ -12,7 +12,7 @@ py::object value(const Scalar& s) {
   int batch = -1;
   std::vector<double> v;
   {
-    py::gil_scoped_release release;
+    ReleasedGil release;
     v = evaluate(s, &batch);
   }
   if (batch < 0) return py::float_(v[0]);

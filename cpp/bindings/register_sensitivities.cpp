@@ -54,7 +54,8 @@ void forward(Calls& d, const State& s, const Solving& how, Precision precision, 
   const size_t n = d.model().nv(), square = n * n;
   const int states = s.batch < 0 ? 1 : s.batch;
   const auto at = [](const Argument& a, int b) { return a.array.data() + b * a.stride; };
-  py::gil_scoped_release release;
+  const ModelInUse use(d.model());
+  ReleasedGil release;
   at_precision(precision, [&]<class S>(S) {
     if constexpr (!available_at<Sensitivities, S>) {
       throw EvaluationError(to_quad);

@@ -28,13 +28,13 @@ void register_theorems(py::module_& m) {
       .def_property_readonly("latex", [](const Theorem& t) {
         if (!t.latex.empty()) return t.latex;
         const auto tex = [](const Side& s) {
-          return std::holds_alternative<Expression>(s) ? show(std::get<Expression>(s), Style::latex) : show(std::get<Scalar>(s), Style::latex);
+          return std::holds_alternative<Expression>(s) ? show_in_full(std::get<Expression>(s), Style::latex) : show(std::get<Scalar>(s), Style::latex);
         };
         return t.waiting.empty() ? tex(t.lhs) + (t.at_most ? " \\le " : " = ") + tex(t.rhs) : "\\text{" + t.name + "}";
       })
       .def_property_readonly("text", [](const Theorem& t) {
         if (!t.text.empty()) return t.text;
-        const auto text = [](const Side& s) { return std::holds_alternative<Expression>(s) ? show(std::get<Expression>(s)) : show(std::get<Scalar>(s)); };
+        const auto text = [](const Side& s) { return std::holds_alternative<Expression>(s) ? show_in_full(std::get<Expression>(s)) : show(std::get<Scalar>(s)); };
         return t.waiting.empty() ? text(t.lhs) + (t.at_most ? " ≤ " : " = ") + text(t.rhs) : t.name;
       })
       .def("__reduce__", [side](const Theorem& t) -> py::tuple {
@@ -65,11 +65,11 @@ void register_theorems(py::module_& m) {
     Residual r;
     if (py::isinstance<Scalar>(a)) {
       const Scalar x = a.cast<Scalar>(), y = b.cast<Scalar>();
-      py::gil_scoped_release release;
+      ReleasedGil release;
       r = residual(x, y);
     } else {
       const Expression x = a.cast<Expression>(), y = b.cast<Expression>();
-      py::gil_scoped_release release;
+      ReleasedGil release;
       r = residual(x, y, vectors, on_one_path, at_most);
     }
     return py::make_tuple(r.difference, r.left, r.right);

@@ -16,6 +16,7 @@
 #include <cmath>
 #include <vector>
 
+#include "algebra/interrupt.h"
 #include "spatial/scalar.h"
 
 namespace pycraft {
@@ -79,6 +80,7 @@ class ConjugateGradients {
     }
     S lowest = rz;
     for (int waited = 0; waited < patience && iterations < most(n); ++waited) {
+      check_interrupt();
       apply(p_.data(), product_.data());
       S curvature = S(0), scale = S(0);
       for (int i = 0; i < n; ++i) curvature += p_[i] * product_[i], scale += d[i] * p_[i] * p_[i];

@@ -18,6 +18,7 @@
 #include <cmath>
 #include <vector>
 
+#include "algebra/interrupt.h"
 #include "algebra/structure.h"
 #include "spatial/scalar.h"
 
@@ -50,6 +51,7 @@ PivotFailure<S> cholesky_upper(S* A, int n, S* work) {
   S *diagonal = work, *w = work + n;
   for (int i = 0; i < n; ++i) diagonal[i] = A[size_t(i) * n + i];
   for (int k = 0; k < n; ++k) {
+    check_interrupt_at(k, n - k);
     S* row = A + size_t(k) * n;
     const S least = pivot_rounding<S>() * diagonal[k];
     if (!(row[k] > least)) return {k, row[k], least};
@@ -66,6 +68,7 @@ PivotFailure<S> cholesky_upper(S* A, int n, S* work) {
   for (int k = 0; k < n; ++k) {
     const S root = A[size_t(k) * n + k], pivot = root * root;
     if (!in_doubt(pivot, diagonal[k])) continue;
+    check_interrupt_at(k, k);
     S reach = sqrt(diagonal[k]);
     w[k] = S(1);
     for (int j = k - 1; j >= 0; --j) {  // U₁w = e_k

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "algebra/engine.h"
+#include "algebra/interrupt.h"
 #include "dynamics/trajectory.h"
 #include "recursions/configuration_rate.h"
 
@@ -22,7 +22,8 @@ class EquationsOfMotion {
     accelerate(x.data(), x.data() + model_.nq, rate.data() + model_.nq);
   }
   void accelerate(const S* q, const S* v, S* vdot) {
-    if (++evaluations % 256 == 0) check_interrupt();
+    ++evaluations;
+    check_interrupt();
     if (damping_)
       for (int i = 0; i < model_.nv; ++i) force_[i] = tau_[i] - damping_[i] * v[i];
     accelerations_(q, v, force_.data(), vdot);

@@ -1,3 +1,4 @@
+#include "algebra/interrupt.h"
 #include "dynamics/methods.h"
 
 #include <cstdio>
@@ -110,6 +111,7 @@ void DynamicsMethods<S>::multiply_by_inverse(const S* b, S* x) {
   articulated_inertia_tip_to_base(tree_, blocks_);
   mass_matrix_inverse_apply(tree_, blocks_, identity_.data(), matrix_.data(), n, scratch_.data());
   for (int i = 0; i < n; ++i) {
+    check_interrupt_at(i, n);
     S sum = S(0);
     for (int j = 0; j < n; ++j) sum += matrix_[size_t(i) * n + j] * b[j];
     x[i] = sum;

@@ -15,9 +15,11 @@ class WorkspacePool {
  public:
   template <class F>
   void with(const Multibody& model, F f) {
+    const ModelInUse use(model);
     std::unique_ptr<Workspace> workspace;
     {
-      std::lock_guard<std::mutex> lock(mutex_);
+      std::lock_guard<Mutex> lock(mutex_);
+      if (mutex_.abandoned()) leave_behind(free_);
       if (version_ != model.parameters()) {
         free_.clear();
         version_ = model.parameters();
@@ -30,12 +32,12 @@ class WorkspacePool {
     if (!workspace) workspace = std::make_unique<Workspace>(model);
     const auto version = model.parameters();
     f(*workspace);
-    std::lock_guard<std::mutex> lock(mutex_);
+    std::lock_guard<Mutex> lock(mutex_);
     if (version == version_) free_.push_back(std::move(workspace));
   }
 
  private:
-  std::mutex mutex_;
+  Mutex mutex_;
   std::uint64_t version_ = 0;
   std::vector<std::unique_ptr<Workspace>> free_;
 };

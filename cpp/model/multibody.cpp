@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <mutex>
 
 #include "algebra/errors.h"
 #include "model/checks.h"
@@ -33,6 +34,11 @@ Multibody::Multibody(std::string name, bool keep_welds, bool strict) : name_(std
   state_ = std::make_shared<StateData>();
 }
 
+Multibody::Edit::Edit(Multibody& model) : use_(model.use_) {
+  if (!use_.try_edit())
+    throw ModelError("'" + model.name_ + "' is being evaluated, in another thread or by a call that this edit is made from: edit it when that is over");
+}
+
 // ------------------------------------------------------------------ structure
 
 void Multibody::check_new_name(const std::string& name, const char* what) const {
@@ -51,6 +57,7 @@ Node Multibody::find_frame(const std::string& name) const {
 }
 
 void Multibody::add_body(Body body, const std::string& parent) {
+  const Edit edit(*this);
   check_new_name(body.name, "body");
   if (body.hinge.name.empty()) body.hinge.name = body.name;
   if (hinge_numbers_.count(body.hinge.name))
@@ -122,6 +129,7 @@ void Multibody::lump(const Body& body, const Node& onto) {
 }
 
 void Multibody::remove_body(const std::string& name) {
+  const Edit edit(*this);
   settle();
   const int first = body_index(name);
   structure_changed("body '" + name + "' was removed");
@@ -137,6 +145,7 @@ void Multibody::remove_body(const std::string& name) {
 }
 
 void Multibody::add_node(const std::string& name, const std::string& body, const Pose<double>& pose) {
+  const Edit edit(*this);
   check_new_name(name, "node");
   const Node onto = find_frame(body);
   const Pose<double> checked = checked_pose(pose, "node '" + name + "'");
@@ -158,7 +167,7 @@ void Multibody::structure_changed(const std::string& reason) {
 
 const Multibody& Multibody::settled() const {
   if (!settled_.load(std::memory_order_acquire)) {
-    std::lock_guard<std::mutex> lock(mutex_);
+    std::lock_guard<Mutex> lock(mutex_);
     if (!settled_.load()) const_cast<Multibody*>(this)->settle();
   }
   return *this;
@@ -262,6 +271,7 @@ SkoStructure Multibody::structure() const {
 // ------------------------------------------------------------------ parameters
 
 void Multibody::set_mass_properties(int k, double mass, const Vector3<double>& com, const Symmetric3<double>& inertia) {
+  const Edit edit(*this);
   note(body(k).name, check_mass_properties(body(k).name, mass, com, inertia));
   bodies_[k].mass = mass;
   bodies_[k].com = com;
@@ -269,27 +279,32 @@ void Multibody::set_mass_properties(int k, double mass, const Vector3<double>& c
   ++parameters_;
 }
 void Multibody::set_placement(int k, const Pose<double>& placement) {
+  const Edit edit(*this);
   const Pose<double> checked = checked_pose(placement, "the placement of hinge '" + body(k).hinge.name + "'");
   bodies_[k].hinge.placement = checked;
   ++parameters_;
 }
 void Multibody::set_rotor_inertia(int k, const std::vector<double>& values) {
+  const Edit edit(*this);
   std::vector<double> checked = checked_rotor_inertia(body(k).hinge, values);
   bodies_[k].hinge.rotor_inertia = std::move(checked);
   ++parameters_;
 }
 void Multibody::set_limits(int k, const std::vector<double>& lower, const std::vector<double>& upper) {
+  const Edit edit(*this);
   check_limits(body(k).hinge, lower, upper);
   bodies_[k].hinge.lower = lower;
   bodies_[k].hinge.upper = upper;
 }
 void Multibody::set_gravity(const Vector3<double>& g) {
+  const Edit edit(*this);
   for (int i = 0; i < 3; ++i)
     if (!std::isfinite(g[i])) throw ModelError("gravity of '" + name_ + "' has an entry that is " + short_number(g[i]));
   gravity_ = g;
   ++parameters_;
 }
 bool Multibody::has_rotor_inertia() const {
+  settled();
   return std::any_of(bodies_.begin(), bodies_.end(), [](const Body& b) {
     return std::any_of(b.hinge.rotor_inertia.begin(), b.hinge.rotor_inertia.end(), [](double j) { return j != 0; });
   });
@@ -310,7 +325,7 @@ std::vector<std::pair<std::string, std::string>> Multibody::take_warnings() {
 
 std::shared_ptr<const StateData> Multibody::state() const {
   settled();
-  std::lock_guard<std::mutex> lock(mutex_);
+  std::lock_guard<Mutex> lock(mutex_);
   return state_;
 }
 
@@ -346,7 +361,7 @@ void Multibody::set_q(const std::vector<double>& q) {
   check_q(q.data(), q.size());
   auto next = std::make_shared<StateData>();
   next->q = q;
-  std::lock_guard<std::mutex> lock(mutex_);
+  std::lock_guard<Mutex> lock(mutex_);
   next->v = state_->v;
   state_ = next;
 }
@@ -354,12 +369,13 @@ void Multibody::set_v(const std::vector<double>& v) {
   check_v(v.data(), v.size(), "v");
   auto next = std::make_shared<StateData>();
   next->v = v;
-  std::lock_guard<std::mutex> lock(mutex_);
+  std::lock_guard<Mutex> lock(mutex_);
   next->q = state_->q;
   state_ = next;
 }
 
 std::vector<double> Multibody::zero_q() const {
+  settled();
   std::vector<double> q;
   for (int k = 0; k < bodies(); ++k)
     for (const Subhinge& s : body(k).hinge.subhinges) {
@@ -371,6 +387,7 @@ std::vector<double> Multibody::zero_q() const {
 }
 
 void Multibody::integrate(const double* q, const double* dv, double* out) const {
+  settled();
   for (int k = 0; k < bodies(); ++k) {
     const double *x = q + q_offset_[k], *d = dv + v_offset_[k];
     double* y = out + q_offset_[k];
@@ -397,6 +414,7 @@ void Multibody::integrate(const double* q, const double* dv, double* out) const 
 }
 
 void Multibody::difference(const double* q0, const double* q1, double* out) const {
+  settled();
   for (int k = 0; k < bodies(); ++k) {
     const double *a = q0 + q_offset_[k], *b = q1 + q_offset_[k];
     double* d = out + v_offset_[k];
@@ -508,8 +526,10 @@ std::shared_ptr<const CompiledModel<S>> compile(const Multibody& model) {
 
 template <class S>
 std::shared_ptr<const CompiledModel<S>> Multibody::compiled() const {
+  const ModelInUse use(*this);  // settled once, it stays so: what follows takes no lock of its own
   settled();
-  std::lock_guard<std::mutex> lock(mutex_);
+  std::lock_guard<Mutex> lock(mutex_);
+  if (mutex_.abandoned()) leave_behind(compiled_);
   auto& kept = std::get<std::shared_ptr<const CompiledModel<S>>>(compiled_);
   if (!kept || kept->parameters != parameters_) kept = compile<S>(*this);
   return kept;
@@ -518,7 +538,13 @@ std::shared_ptr<const CompiledModel<S>> Multibody::compiled() const {
 PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_INSTANTIATE)
 #undef PYCRAFT_INSTANTIATE
 
-std::shared_ptr<SkoSource> Multibody::operators() const { return operators_.lock(); }
-void Multibody::keep_operators(const std::shared_ptr<SkoSource>& source) { operators_ = source; }
+std::shared_ptr<SkoSource> Multibody::operators() const {
+  std::lock_guard<Mutex> lock(mutex_);
+  return operators_.lock();
+}
+void Multibody::keep_operators(const std::shared_ptr<SkoSource>& source) {
+  std::lock_guard<Mutex> lock(mutex_);
+  operators_ = source;
+}
 
 }  // namespace pycraft

@@ -4,13 +4,13 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <set>
 #include <string>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
+#include "algebra/mutex.h"
 #include "algebra/source.h"
 #include "model/hinge.h"
 #include "spatial/rigid_inertia.h"
@@ -36,6 +36,7 @@ struct Node {
 template <class S>
 struct CompiledModel;
 
+// Evaluations read the model from any number of threads; structure and parameters are edited by one thread while nobody evaluates.
 class Multibody : public std::enable_shared_from_this<Multibody> {
  public:
   // keep_welds: a body on a weld stays a body with no coordinates; else it is lumped into the body that moves it and becomes a node.
@@ -93,11 +94,25 @@ class Multibody : public std::enable_shared_from_this<Multibody> {
   template <class S>
   std::shared_ptr<const CompiledModel<S>> compiled() const;
 
+  // Between these, evaluations, nothing is edited: an edit raises ModelError. Evaluations of several threads and setting q and v are no edits.
+  unsigned enter_use() const { return use_.enter(); }
+  void leave_use(unsigned entered) const noexcept { use_.leave(entered); }
+
   // The operators made for this structure; told when it changes.
   std::shared_ptr<SkoSource> operators() const;
   void keep_operators(const std::shared_ptr<SkoSource>& source);
 
  private:
+  // An edit in progress: nobody evaluates meanwhile. Throws where somebody does.
+  class Edit {
+   public:
+    explicit Edit(Multibody& model);
+    ~Edit() { use_.end_edit(); }
+    Edit(const Edit&) = delete;
+
+   private:
+    UseCount& use_;
+  };
   void note(const std::string& body, const std::string& text);
   void check_coordinate_names(const Hinge& hinge) const;
   void check_new_name(const std::string& name, const char* what) const;
@@ -116,7 +131,8 @@ class Multibody : public std::enable_shared_from_this<Multibody> {
   std::vector<int> q_offset_, v_offset_;    // one longer than bodies
   Vector3<double> gravity_{0, 0, 0};
   std::shared_ptr<const StateData> state_;
-  mutable std::mutex mutex_;
+  mutable Mutex mutex_;
+  mutable UseCount use_;
   std::uint64_t parameters_ = 1;
   std::vector<std::pair<std::string, std::string>> warnings_;
   std::set<std::string> said_massless_;
@@ -126,6 +142,18 @@ class Multibody : public std::enable_shared_from_this<Multibody> {
   template <class S>
   using CompiledPointer = std::shared_ptr<const CompiledModel<S>>;
   mutable PerScalar<CompiledPointer> compiled_;
+};
+
+// An evaluation: as long as it lives the model is not edited.
+class ModelInUse {
+ public:
+  explicit ModelInUse(const Multibody& model) : model_(model), entered_(model.enter_use()) {}
+  ~ModelInUse() { model_.leave_use(entered_); }
+  ModelInUse(const ModelInUse&) = delete;
+
+ private:
+  const Multibody& model_;
+  unsigned entered_;
 };
 
 }  // namespace pycraft

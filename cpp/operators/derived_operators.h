@@ -20,6 +20,8 @@ class DerivedOperators : public SkoSource {
   void check_state(const double* q, size_t nq, const double* v, size_t nv) const override { base_->check_state(q, nq, v, nv); }
   std::shared_ptr<const StateData> state() const override { return base_->state(); }
   std::uint64_t parameters() const override { return base_->parameters(); }
+  unsigned enter_use() const override { return base_->enter_use(); }
+  void leave_use(unsigned entered) const noexcept override { base_->leave_use(entered); }
   const Multibody& model() const { return *base_->model(); }
   const std::shared_ptr<MultibodyOperators>& base() const { return base_; }
 

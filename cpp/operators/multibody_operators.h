@@ -50,6 +50,8 @@ class MultibodyOperators final : public SkoSource {
   }
   std::shared_ptr<const StateData> state() const override { return model_->state(); }
   std::uint64_t parameters() const override { return model_->parameters(); }
+  unsigned enter_use() const override { return model_->enter_use(); }
+  void leave_use(unsigned entered) const noexcept override { model_->leave_use(entered); }
   Space space(SpaceKind kind, const std::vector<int>& arguments) const override;
   PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_OVERRIDE_MAKE_VALUES)
 

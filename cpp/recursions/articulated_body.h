@@ -18,6 +18,7 @@
 
 #include <vector>
 
+#include "algebra/interrupt.h"
 #include "algebra/sweeps/articulated_inertia.h"
 #include "operators/rigid_blocks.h"
 #include "recursions/point_accelerations.h"
@@ -47,6 +48,7 @@ S articulated_body(const SkoStructure& tree, const CompiledModel<S>& model, Rigi
     z[k] = factored ? blocks.factors().start_bias(k, model.inertia_factors[k], points.angular_velocity[k]) : points.b[k];
   }
   for (int k = model.bodies - 1; k >= 0; --k) {
+    check_interrupt_at(k);
     const int p = model.parent[k], first = model.v_offset[k], n = model.nv_of[k];
     if (factored) blocks.factors().add_acceleration(k, points.a[k]);
     const Pivots found = blocks.eliminate_hinge(k);

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 
+#include "algebra/interrupt.h"
 #include "algebra/sweeps/composite_inertia.h"
 #include "operators/rigid_blocks.h"
 
@@ -21,6 +22,7 @@ void composite_mass_matrix(const SkoStructure& tree, const CompiledModel<S>& mod
   std::fill_n(out, size_t(N) * N, S(0));
   for (int k = 0; k < model.bodies; ++k)
     for (int j = model.v_offset[k]; j < model.v_offset[k] + model.nv_of[k]; ++j) {
+      check_interrupt_at(k, k);
       Vector6<S> f = blocks.R[k] * blocks.H[j];
       for (int a = k; a >= 0; a = model.parent[a]) {
         const int first = model.v_offset[a], last = a == k ? j + 1 : first + model.nv_of[a];

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "algebra/interrupt.h"
 #include "model/compiled_model.h"
 #include "model/hinge_kinematics.h"
 #include "operators/rigid_blocks.h"
@@ -12,7 +13,10 @@ namespace pycraft {
 // Fills E (as poses), H, M, J of a rigid block policy. Cost O(N).
 template <class S>
 void kinematics(const CompiledModel<S>& model, const S* q, RigidBlocks<S>& blocks) {
-  for (int k = 0; k < model.bodies; ++k) blocks.pose[k] = hinge_kinematics(model, k, q, blocks.H.data() + model.v_offset[k]);
+  for (int k = 0; k < model.bodies; ++k) {
+    check_interrupt_at(k);
+    blocks.pose[k] = hinge_kinematics(model, k, q, blocks.H.data() + model.v_offset[k]);
+  }
   std::copy(model.inertia.begin(), model.inertia.end(), blocks.inertia.begin());
   std::copy(model.rotor_inertia.begin(), model.rotor_inertia.end(), blocks.J.begin());
   std::copy(model.aligned.begin(), model.aligned.end(), blocks.aligned.begin());

@@ -10,6 +10,7 @@
 
 #include <vector>
 
+#include "algebra/interrupt.h"
 #include "operators/rigid_blocks.h"
 #include "recursions/point_accelerations.h"
 
@@ -21,6 +22,7 @@ void newton_euler(const CompiledModel<S>& model, const RigidBlocks<S>& blocks, c
                   std::vector<Vector6<S>>& alpha, std::vector<Vector6<S>>& f) {
   const Vector6<S> base{Vector3<S>::zero(), -model.gravity};
   for (int k = 0; k < model.bodies; ++k) {
+    check_interrupt_at(k);
     const int p = model.parent[k], first = model.v_offset[k], n = model.nv_of[k];
     Vector6<S> acceleration = motion_to_child(blocks.pose[k], p < 0 ? base : alpha[p]) + points.a[k];
     if (vdot)

@@ -13,6 +13,7 @@
 
 #include <vector>
 
+#include "algebra/interrupt.h"
 #include "model/compiled_model.h"
 #include "model/hinge_kinematics.h"
 
@@ -32,6 +33,7 @@ template <class S>
 void velocities_base_to_tip(const CompiledModel<S>& model, const Pose<S>* pose, const Vector6<S>* H, const S* v, Velocities<S>& out) {
   out.resize(model.bodies, model.nv);
   for (int k = 0; k < model.bodies; ++k) {
+    check_interrupt_at(k);
     const int p = model.parent[k], f = model.v_offset[k], n = model.nv_of[k];
     Vector6<S> relative = Vector6<S>::zero(), rate = Vector6<S>::zero();
     for (int j = f; j < f + n; ++j) relative = relative + v[j] * H[j];

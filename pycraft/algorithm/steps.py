@@ -231,7 +231,11 @@ class Recursion:
     def operator(self, step: Step) -> Quantity:
         """The dense matrix of a step's operand."""
         quantity = self.book.new("X", "function")
-        program = Recursion(self.book, step["operand"], "w", self.vectors, nested=True).write()
+        nested = Recursion(self.book, step["operand"], "w", self.vectors, nested=True)
+        for i, register in enumerate(step["operand"]["registers"]):
+            if register["shared"] >= 0:  # a matrix of the whole plan
+                nested.values[i] = self.values[register["shared"]]
+        program = nested.write()
         program.items = fused(program.items)
         operator = Operator(quantity, step["operand"]["text"], program)
         self.program.items.append(operator)

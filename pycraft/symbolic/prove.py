@@ -22,6 +22,7 @@ from .completion import complete
 from .derivation import DerivativeProblem
 from .derivative import derivative
 from .equations import Equation, Step, joined, numbered, opened
+from .nesting import within_reach
 from .presuppositions import Void, inverses_used, presupposed
 from .proof import Proof, example, examples
 from .reading import Assumption, assumptions, reading
@@ -31,6 +32,7 @@ from .walk import GaveUp
 from .words import ONE, Alphabet, Polynomial, Word, combine, inverted, plain, split
 
 
+@within_reach("prove")
 def prove(lhs: Any, rhs: Any = None, model: Any = None, *, assume: Iterable[str] = (), define: Mapping[str, Any] | None = None) -> Proof:
     """Derive one side of a statement from the other, from the definitions of the operators.
 
@@ -90,6 +92,7 @@ def prove(lhs: Any, rhs: Any = None, model: Any = None, *, assume: Iterable[str]
     return _prove(read, model, assumptions(read_on, assume), read_on.unknown)
 
 
+@within_reach("prove")
 def prove_derivative(expression: Any, rhs: Any, coordinate: int | str) -> Proof:
     """Derive ∂(expression)/∂θ_i = rhs from the product rule and ∂E_φ = E_φΔ_i.
 

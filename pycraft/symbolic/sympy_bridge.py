@@ -13,8 +13,10 @@ from typing import Any
 from .. import _core
 from ..identities.parse import ParseError, Statements
 from ..operators import OperatorSet
+from .nesting import within_reach
 
 
+@within_reach("parse")
 def parse(text: str, model: Any, **names: _core.Operator) -> Any:
     r"""An operator (or scalar) expression from text: Python's spelling, the book's, or LaTeX.
 
@@ -45,6 +47,7 @@ def parse(text: str, model: Any, **names: _core.Operator) -> Any:
     return statement.lhs
 
 
+@within_reach("to_sympy")
 def to_sympy(expression: Any) -> Any:
     r"""An operator or scalar expression as a SymPy expression that prints as the book does.
 
@@ -84,6 +87,7 @@ def to_sympy(expression: Any) -> Any:
     raise TypeError(f"to_sympy takes operator and scalar expressions, not {type(expression).__name__}")
 
 
+@within_reach("from_sympy")
 def from_sympy(expression: Any, model: Any, values: Mapping[Any, float] | None = None, like: _core.Operator | None = None) -> Any:
     """The pycraft expression of a SymPy expression made of what `to_sympy` made.
 

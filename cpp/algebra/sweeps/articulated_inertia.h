@@ -10,6 +10,7 @@
 // Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, the articulated-body chapter. Cost O(N).
 #pragma once
 
+#include "algebra/interrupt.h"
 #include "algebra/structure.h"
 #include "algebra/sweeps/singular_pivot.h"
 
@@ -22,6 +23,7 @@ void articulated_inertia_tip_to_base(const SkoStructure& tree, Blocks& blocks) {
   blocks.with_bias = false;
   for (int k = 0; k < tree.bodies(); ++k) blocks.start_articulated(k);
   for (int k = tree.bodies() - 1; k >= 0; --k) {
+    check_interrupt_at(k);
     const Pivots found = blocks.eliminate_hinge(k);
     if (found == Pivots::not_positive) check_pivots_tip_to_base(tree, blocks, k);
     doubtful |= found == Pivots::doubtful;

@@ -14,6 +14,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "algebra/interrupt.h"
 #include "algebra/structure.h"
 
 namespace pycraft {
@@ -23,12 +24,14 @@ void mass_matrix_apply(const SkoStructure& tree, const Blocks& blocks, bool with
   S* alpha = scratch;
   std::fill_n(alpha, static_cast<size_t>(tree.dimension()) * m, S(0));
   for (int k = 0; k < tree.bodies(); ++k) {
+    check_interrupt_at(k, m);
     S* ak = alpha + tree.offset[k] * m;
     if (tree.parent[k] >= 0) blocks.shift_transposed_add(k, alpha + tree.offset[tree.parent[k]] * m, ak, m);
     blocks.hinge_transposed_add(k, x + tree.dof_offset[k] * m, ak, m);
   }
   for (int k = 0; k < tree.bodies(); ++k) blocks.inertia_in_place(k, alpha + tree.offset[k] * m, m);
   for (int k = tree.bodies() - 1; k >= 0; --k) {
+    check_interrupt_at(k, m);
     const S* fk = alpha + tree.offset[k] * m;
     blocks.hinge(k, fk, y + tree.dof_offset[k] * m, m);
     if (with_hinge_diagonal) blocks.hinge_diagonal_add(k, x + tree.dof_offset[k] * m, y + tree.dof_offset[k] * m, m);
@@ -61,6 +64,7 @@ void mass_matrix_inverse_apply(const SkoStructure& tree, const Blocks& blocks, c
   S* z = scratch;
   std::fill_n(z, static_cast<size_t>(tree.dimension()) * m, S(0));
   for (int k = tree.bodies() - 1; k >= 0; --k) {
+    check_interrupt_at(k, m);
     S *zk = z + tree.offset[k] * m, *yk = y + tree.dof_offset[k] * m;
     blocks.innovation(k, x + tree.dof_offset[k] * m, zk, yk, m);  // yk = ε, zk += Gε
     if (tree.parent[k] >= 0) blocks.shift_add(k, zk, z + tree.offset[tree.parent[k]] * m, m);
@@ -68,6 +72,7 @@ void mass_matrix_inverse_apply(const SkoStructure& tree, const Blocks& blocks, c
   }
   S* alpha = scratch;
   for (int k = 0; k < tree.bodies(); ++k) {
+    check_interrupt_at(k, m);
     S *ak = alpha + tree.offset[k] * m, *yk = y + tree.dof_offset[k] * m;
     std::fill_n(ak, tree.size[k] * m, S(0));
     if (tree.parent[k] >= 0) {

@@ -5,13 +5,17 @@
 // Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, the operational-space chapter. Cost O(N).
 #pragma once
 
+#include "algebra/interrupt.h"
 #include "algebra/structure.h"
 
 namespace pycraft {
 
 template <class Blocks>
 void upsilon_base_to_tip(const SkoStructure& tree, Blocks& blocks) {
-  for (int k = 0; k < tree.bodies(); ++k) blocks.compliance_from_parent(k, tree.parent[k]);
+  for (int k = 0; k < tree.bodies(); ++k) {
+    check_interrupt_at(k);
+    blocks.compliance_from_parent(k, tree.parent[k]);
+  }
 }
 
 }  // namespace pycraft
