@@ -127,7 +127,7 @@ class Multibody(Closed, IntegrationCalls, _core.Multibody):
         directions = [axis] if axis is not None else axes if axes is not None else _DEFAULT_AXES.get(hinge, ())
         lower, upper = limit_pair(f"body {name!r}", limits)
         self._add_body(
-            text(name, "a body"), _frame_name(parent), text(hinge, "the kind of a hinge"), "" if hinge_name is None else text(hinge_name, "a hinge"),
+            name, _frame_name(parent), hinge, "" if hinge_name is None else text(hinge_name, "a hinge"),
             listed(directions, f"axes of body {name!r}"), point, pitch,
             None if subhinges is None else listed(subhinges, f"subhinges of body {name!r}"),
             rotation, position, mass, com, inertia, rotor_inertia, lower, upper,
