@@ -10,7 +10,7 @@ What to type::
     >>> MM.inv() @ [1, 0, 0, 0, 0, 0, 0]         # O(N): the theorems find [I-HψK]* D⁻¹ [I-HψK]  # doctest: +SKIP
     >>> MM.inv().explain()                       # how, and what it costs  # doctest: +SKIP
     >>> pc.check("inv(psi) == inv(phi) + K*H", arm)        # is it true?  # doctest: +SKIP
-    >>> pc.prove("inv(MM) == (I - H*psi*K).T * inv(D) * (I - H*psi*K)", arm)   # and why?  # doctest: +SKIP
+    >>> pc.prove("inv(MM) == (I - H*psi*K).T * inv(D) * (I - H*psi*K)", model=arm)   # and why?  # doctest: +SKIP
     >>> arm.forward_dynamics().shape             # numbers and no algebra, at the present state
     (7,)
 

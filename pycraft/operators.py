@@ -171,7 +171,11 @@ def _directed_inertia(soa: OperatorSet, nodes: list[str], directions: Any) -> _c
 
 
 def _listed(names: str | Sequence[str]) -> list[str]:
-    return [names] if isinstance(names, str) else list(names)
+    listed = [names] if isinstance(names, str) else list(names) if isinstance(names, Iterable) else [names]
+    for name in listed:
+        if not isinstance(name, str):
+            raise _core.ModelError(f"nodes are called by their names, not by {name!r}")
+    return listed
 
 
 # ---------------------------------------------------------------------- what the core asks for

@@ -105,7 +105,7 @@ LETTERS = (
 def expressions(model):
     """Made once of a model and asked again after the edit, as users do."""
     soa = model.soa
-    H, phi, M, J, D, I, psi, G, tau_bar, P = soa("H phi M J D I psi G tau_bar P")
+    H, phi, M, J, D, I = soa("H phi M J D I")
     MM = H @ phi @ M @ phi.T @ H.T
     made = {name: getattr(soa, name) for name in LETTERS}
     made |= {
@@ -116,7 +116,6 @@ def expressions(model):
         "∂ℳ": MM.diff(7),
         "∂(ℳ+J)⁻¹": (MM + J).inv().diff(8),
     }
-    made |= {"HψG": H @ psi @ G, "HG": H @ G, "τ̄Pτ̄*": tau_bar @ P @ tau_bar.T}  # where J = 0 theorems make other plans of them
     made |= {"∂D": D.diff(9), "𝒥": soa.Jacobian(["tool"]), "Λ": soa.Lambda(["tool"])}
     return made
 

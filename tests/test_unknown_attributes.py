@@ -114,7 +114,7 @@ def test_mjcf_gravity_and_damping(tmp_path):
         np.testing.assert_array_equal(model.left_aside[name], [np.nan] * 6 + [number])
     with pytest.warns(pc.ModelWarning) as said:
         model = pc.load(path, gravity="file")
-    assert model.gravity.tolist() == [0, 1, -9] and "gravity" not in model.left_aside and "gravity" not in str(said[0].message)
+    assert model.gravity.tolist() == [0, 1, -9] and "gravity" not in model.left_aside and "left aside: gravity" not in str(said[0].message)
 
 
 def test_robots_of_the_package_load_silently(recwarn):

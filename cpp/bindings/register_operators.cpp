@@ -29,6 +29,20 @@ bool is_number(const py::object& x) {
 }
 bool is_array(const py::object& x) { return py::isinstance<py::array>(x) || py::isinstance<py::list>(x) || py::isinstance<py::tuple>(x); }
 
+// f(), its errors about an operational-space inertia without a value with what to do.
+template <class F>
+void with_remedy(const Expression& e, F f) {
+  try {
+    f();
+  } catch (const SingularOperatorError& error) {
+    bool of_nodes = false;
+    visit(e, [&](const Expression& x) { of_nodes |= x.kind() == NodeKind::symbol && x.node().symbol.definition->id == MechanicsSymbolId::Lambda; });
+    if (!of_nodes) throw;
+    throw SingularOperatorError(std::string(error.what()) + "; Λ is the inverse of B*ΩB, which has none where the nodes cannot move in every direction: take those " +
+                                "in which they can, Lambda(nodes, directions=[\"x\", ...])");
+  }
+}
+
 // y = e x
 py::object apply_to_array(Expression e, const py::object& given) {
   const Array x = real_array(given);
@@ -63,7 +77,7 @@ py::object apply_to_array(Expression e, const py::object& given) {
   Result r;
   {
     py::gil_scoped_release release;
-    apply(e, inputs, r);
+    with_remedy(e, [&] { apply(e, inputs, r); });
   }
   std::vector<py::ssize_t> shape;
   if (batch >= 0) shape.push_back(batch);
@@ -113,7 +127,7 @@ py::object dense(const Expression& e, const py::object& dtype, bool rules) {
   Result r;
   {
     py::gil_scoped_release release;
-    evaluate(e, Request::dense, r, rules, objects);
+    with_remedy(e, [&] { evaluate(e, Request::dense, r, rules, objects); });
   }
   std::vector<py::ssize_t> shape;
   if (batch >= 0) shape.push_back(batch);
@@ -128,7 +142,7 @@ py::object diagonal(const Expression& e) {
   Result r;
   {
     py::gil_scoped_release release;
-    evaluate(e, Request::diagonal, r);
+    with_remedy(e, [&] { evaluate(e, Request::diagonal, r); });
   }
   std::vector<py::ssize_t> shape;
   if (batch >= 0) shape.push_back(batch);
@@ -161,7 +175,7 @@ py::object value(const Expression& e, const py::kwargs& vectors) {
   const bool objects = wants_objects(dtype);
   {
     py::gil_scoped_release release;
-    apply(e, inputs, r, rules, objects);
+    with_remedy(e, [&] { apply(e, inputs, r, rules, objects); });
   }
   std::vector<py::ssize_t> shape;
   if (batch >= 0) shape.push_back(batch);

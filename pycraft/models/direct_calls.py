@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from .arguments import text
 from .jacobians import resolved_jacobian
 from .realization import by_realization, output
 from .state import at_state
@@ -106,7 +107,7 @@ class DirectCalls:
         """
         q, v = at_state(self, q, v)
         tau = np.zeros(self.nv) if tau is None else tau
-        if method == "articulated":
+        if isinstance(method, str) and method == "articulated":
             return self._calls().forward_dynamics(q, v, tau, form, refine, residual, precision, on_singular, out)
         if not isinstance(method, str):
             raise _core.EvaluationError(f"method={method!r}: a name, 'articulated', 'cholesky', ...")
@@ -232,8 +233,8 @@ class DirectCalls:
         >>> arm.jacobian("body1", [0, 0], relative_to="body0")[[2, 4]].tolist()  # against the first body: turning alone
         [[0.0, 1.0], [0.0, 0.0]]
         """
-        q = at_state(self, q)[0]
-        if axes == "body" and relative_to is None:
+        frame, q = text(frame, "a frame"), at_state(self, q)[0]
+        if relative_to is None and isinstance(axes, str) and axes == "body":
             return self._calls().jacobian(frame, q, precision, out)
         result = resolved_jacobian(self, frame, q, axes, relative_to, precision)
         if out is None:
@@ -253,7 +254,7 @@ class DirectCalls:
         >>> pc.chain(2).pose("body1", [0, 0])[:3, 3].tolist()
         [1.0, 0.0, 0.0]
         """
-        return self._calls().pose(frame, at_state(self, q)[0])
+        return self._calls().pose(text(frame, "a frame"), at_state(self, q)[0])
 
     def kinetic_energy(self, q=None, v=None) -> np.ndarray:
         """½ v·(ℳ + J)v, in joules, a number or (B,). O(N).

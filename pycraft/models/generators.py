@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from .arguments import listed
 from .multibody import Multibody
 
+_COORDINATES = {"universal": 2, "cylindrical": 2, "gimbal": 3, "planar": 3, "ball": 3, "custom": 3, "free": 6}  # of those with several
 KINDS = ("weld", "pin", "slider", "screw", "universal", "gimbal", "cylindrical", "planar", "ball", "free", "custom")
 
 
@@ -71,7 +73,12 @@ def tree(
     "custom" hinge here is pin, slider, pin. With `rotor_inertia` every coordinate has one. Bodies on welds are lumped into the bodies that
     move them and become nodes, unless `welds="keep"`.
     """
-    parents = [int(p) for p in parents]
+    try:
+        parents = [int(p) for p in parents]
+    except (TypeError, ValueError):
+        raise _core.ModelError(f"parents of a tree: a list of whole numbers, -1 for the base, not {parents!r}") from None
+    if not isinstance(kinds, str):
+        kinds = listed(kinds, "hinge kinds of a tree")
     kinds = [kinds] * len(parents) if isinstance(kinds, str) else list(kinds)
     if len(kinds) != len(parents):
         raise _core.ModelError(f"a tree of {len(parents)} bodies takes {len(parents)} hinge kinds, not {len(kinds)}")
@@ -97,21 +104,19 @@ def tree(
         inertia = 0.1 * spread @ spread.T + 0.05 * np.eye(3)
         # Second moments of a body are a positive definite matrix S; tr(S) 1 - S obeys the triangle inequality.
         inertia = np.trace(inertia) * np.eye(3) - inertia
+        options |= dict(
+            rotation=_orthogonal(rng), position=rng.uniform(-1, 1, 3), mass=rng.uniform(0.5, 3.0), com=rng.uniform(-0.2, 0.2, 3)
+        )
+        if rotor_inertia and kind != "weld":
+            options["rotor_inertia"] = rng.uniform(0.05, 0.5, _COORDINATES.get(kind, 1))
         model.add_body(
             f"body{k}",
             f"body{parent}" if parent >= 0 else None,
             kind,
             hinge_name=f"hinge{k}",
-            rotation=_orthogonal(rng),
-            position=rng.uniform(-1, 1, 3),
-            mass=rng.uniform(0.5, 3.0),
-            com=rng.uniform(-0.2, 0.2, 3),
             inertia=(inertia + inertia.T) / 2,
             **options,
         )
-        count = model.hinges[f"hinge{k}"].rotor_inertia.size if rotor_inertia and kind != "weld" else 0
-        if count:
-            model.hinges[f"hinge{k}"].rotor_inertia = rng.uniform(0.05, 0.5, count)
     return model
 
 

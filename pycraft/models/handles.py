@@ -9,7 +9,7 @@ import numpy as np
 
 from .. import _core
 from ..closed import Closed
-from .arguments import limit_pair, pose_parts
+from .arguments import limit_pair, pose_parts, text
 
 if TYPE_CHECKING:
     from .multibody import Multibody
@@ -23,7 +23,7 @@ def _component(i: int | str, names: Sequence[str] = ("x", "y", "z")) -> int:
     """The number of a component given by its name or number."""
     if isinstance(i, str) and i in names:
         return list(names).index(i)
-    if not isinstance(i, str) and -len(names) <= int(i) < len(names):
+    if isinstance(i, (int, np.integer)) and -len(names) <= i < len(names):
         return int(i) % len(names)
     raise _core.ModelError(f"no component is called {i!r}; there are {', '.join(names)}, or 0 to {len(names) - 1}")
 
@@ -82,23 +82,23 @@ class Body(Closed):
 
         Components are numbers 0, 1, 2 or "x", "y", "z", in the body's axes; the inertia is about the centre of mass.
         """
-        body = self._model._body_index(self.name)
+        body, name = self._model._body_index(self.name), text(name, "a parameter")
         if name == "mass":
-            which, text = 0, "mass"
+            which, label = 0, "mass"
         elif name == "com":
-            which, text = 1 + _component(i), f"com.{'xyz'[_component(i)]}"
+            which, label = 1 + _component(i), f"com.{'xyz'[_component(i)]}"
         elif name == "inertia":
             row, column = sorted((_component(i), _component(i if j is None else j)))
-            which, text = 4 + row * (5 - row) // 2 + column, f"inertia.{'xyz'[row]}{'xyz'[column]}"
+            which, label = 4 + row * (5 - row) // 2 + column, f"inertia.{'xyz'[row]}{'xyz'[column]}"
         else:
             raise _core.ModelError(f"body {self.name!r} has no parameter {name!r}; there are mass, com, inertia, and those of its hinge")
-        return _core._inertia_parameter(self._model.soa._source, body, which, f"{self.name}.{text}")
+        return _core._inertia_parameter(self._model.soa._source, body, which, f"{self.name}.{label}")
 
     @property
     def parent(self) -> Body | None:
         """The body inboard, None for the base."""
         k = self._data()["parent"]
-        return None if k < 0 else Body(self._model, self._model._names()[0][k])
+        return None if k < 0 else Body(self._model, self._model._body(k)["name"])
 
     def __repr__(self) -> str:
         parent = self.parent
@@ -199,7 +199,7 @@ class Hinge(Closed):
 
     @property
     def body(self) -> Body:
-        return Body(self._model, self._model._names()[0][self._index()])
+        return Body(self._model, self._model._body(self._index())["name"])
 
     def __repr__(self) -> str:
         return (
@@ -224,7 +224,7 @@ class Node(Closed):
     @property
     def body(self) -> Body | None:
         k = self._data()["body"]
-        return None if k < 0 else Body(self._model, self._model._names()[0][k])
+        return None if k < 0 else Body(self._model, self._model._body(k)["name"])
 
     @property
     def pose(self) -> np.ndarray:

@@ -22,7 +22,7 @@ def resolved_jacobian(model: Any, frame: str, q: Any, axes: str, relative_to: st
 
     O(N). Raises EvaluationError for axes that are not there.
     """
-    if axes not in AXES:
+    if not isinstance(axes, str) or axes not in AXES:
         raise _core.EvaluationError(f"axes={axes!r} of a Jacobian: there are {', '.join(map(repr, AXES))}")
     calls = model._calls()
     J = calls.jacobian(frame, q, precision, None)

@@ -52,7 +52,7 @@ class Multibody(Closed, IntegrationCalls, _core.Multibody):
     """
 
     def __init__(self, name: str = "multibody", *, welds: str = "lump", strict: bool = False):
-        if welds not in ("lump", "keep"):
+        if not isinstance(welds, str) or welds not in ("lump", "keep"):
             raise _core.ModelError(f"welds={welds!r}: there are 'lump' and 'keep'")
         super().__init__(text(name, "a model"), welds == "keep", strict)
         self._soa = None
@@ -114,6 +114,7 @@ class Multibody(Closed, IntegrationCalls, _core.Multibody):
             is not symmetric positive semidefinite, limits the wrong way round: names body or hinge and number, and leaves the model as
             it was.
         """
+        name, hinge = text(name, "a body"), text(hinge, "the kind of a hinge")
         if axis is not None and axes is not None:
             raise _core.ModelError(f"body {name!r}: give axis or axes, not both")
         if subhinges is not None and hinge != "custom":
@@ -126,12 +127,16 @@ class Multibody(Closed, IntegrationCalls, _core.Multibody):
         directions = [axis] if axis is not None else axes if axes is not None else _DEFAULT_AXES.get(hinge, ())
         lower, upper = limit_pair(f"body {name!r}", limits)
         self._add_body(
-            text(name, "a body"), _frame_name(parent), text(hinge, "the kind of a hinge"), text(hinge_name or "", "a hinge"),
+            name, _frame_name(parent), hinge, "" if hinge_name is None else text(hinge_name, "a hinge"),
             listed(directions, f"axes of body {name!r}"), point, pitch,
             None if subhinges is None else listed(subhinges, f"subhinges of body {name!r}"),
             rotation, position, mass, com, inertia, rotor_inertia, lower, upper,
         )  # fmt: skip
         return Body(self, name)
+
+    def remove_body(self, name: str | Body) -> None:
+        """Remove a body with everything outboard of it. Operators made before are stale; q and v are carried over by hinge name."""
+        super().remove_body(name.name if isinstance(name, Body) else text(name, "a body"))
 
     def add_node(
         self,

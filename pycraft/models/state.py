@@ -20,7 +20,6 @@ class State(Closed):
     Anything that takes q takes a State, and then its v with it.
     """
 
-    __slots__ = ("q", "v")
     q: np.ndarray
     v: np.ndarray
 

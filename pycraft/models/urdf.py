@@ -154,14 +154,14 @@ class _Tree:
     def located(self, text: str, link: str, hinge: str) -> Exception:
         """What the core refuses about a link or the joint that carries it, with the element it comes from."""
         owner, at = self.links[link].element, None
-        about_hinge = f"hinge '{hinge}'" in text
-        if about_hinge and link in self.inboard:
+        words = {"body": f"body '{link}'", "hinge": f"hinge '{hinge}'"}
+        named = min((k for k in words if words[k] in text), key=lambda k: text.find(words[k]), default="body")  # a name may hold the other
+        if named == "hinge" and link in self.inboard:
             owner = self.inboard[link].element
             at = self.file.child(owner, "pycraft") if "rotor" in text else None
         elif (inertial := self.file.child(owner, "inertial")) is not None:
             at = self.file.child(inertial, "mass" if "its mass" in text else "inertia")
-        for words in (f"body '{link}'", f"hinge '{hinge}'"):
-            text = text.replace(words, label(owner), 1)  # the file's words for the core's
+        text = text.replace(words[named], label(owner), 1)  # the file's words for the core's
         return self.file.error(at if at is not None else owner, text)
 
 

@@ -105,6 +105,8 @@ class Elements:
         self.joints = {joint.name: joint for joint in self._named("joint", self._joint)}
 
     def _refuse_xacro(self) -> None:
+        if not self.file.may_have_macros:
+            return
         # In libxml2: to list the attributes of an element one by one takes time by the square of their number.
         macros = "//*[contains(name(), 'xacro') or contains(namespace-uri(), 'xacro')]"
         expressions = "//@*[contains(., '${') or contains(., '$(')]"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import TypeAlias
 
 import numpy as np
@@ -44,7 +44,10 @@ class XmlFile:
             raise _core.ModelError(f"{self.path!r}: cannot be read: {error}") from None
         self.root, parser = self._parse(data)
         self.root_name, self._space = local_name(self.root), _namespace(self.root)
-        self._tags: dict[str, str] = {}
+        self._looked_into: Element | None = None
+        self._found: dict[str, list[Element]] = {}
+        # Expressions of macros may hide in any element and attribute; whether there can be any is seen from the bytes.
+        self.may_have_macros = not data.isascii() or any(mark in data for mark in (b"xacro", b"${", b"$(", b"&#", b"\x00"))
         dtd = self.root.getroottree().docinfo.internalDTD
         entities = [entity.name for entity in dtd.iterentities()] if dtd is not None else []
         if entities:
@@ -80,16 +83,17 @@ class XmlFile:
         return _core.ModelError(f"{self.at(element)}: {text}")
 
     # ------------------------------------------------------------------ elements
-    def children(self, element: Element, name: str) -> Iterator[Element]:
+    def children(self, element: Element, name: str) -> list[Element]:
         """Children of that name, in the root's namespace (if it has one)."""
-        tag = self._tags.get(name)
-        if tag is None:
-            tag = self._tags[name] = f"{{{self._space}}}{name}" if self._space else name
-        return element.iterchildren(tag)
+        if element is not self._looked_into:  # asked for one name after the other, of one element after the other
+            self._looked_into, self._found = element, {}
+            for child in element.iterchildren("*"):
+                self._found.setdefault(child.tag, []).append(child)
+        return self._found.get(f"{{{self._space}}}{name}" if self._space else name, [])
 
     def child(self, element: Element, name: str) -> Element | None:
         """The one child of that name, None if there is none; ModelError if there are several: which one counts is not clear."""
-        found = list(self.children(element, name))
+        found = self.children(element, name)
         if len(found) > 1:
             first = f"the first in line {found[0].sourceline}"
             raise self.error(found[1], f"{label(element)} has {len(found)} elements <{name}>, {first}; keep one")
@@ -152,8 +156,13 @@ class XmlFile:
     ) -> list[float]:
         words = value.split() if value is not None else []
         if words and count in (None, len(words)):
-            numbers = [_float(word) for word in words]
-            if not any(map(math.isnan if infinite else _is_not_finite, numbers)):
+            try:
+                numbers = list(map(float, words))
+            except ValueError:
+                numbers = [math.nan]
+            # Digits of other scripts and 1_000 are numbers to Python alone.
+            as_written = value is not None and value.isascii() and "_" not in value
+            if as_written and (all(map(math.isfinite, numbers)) or (infinite and not any(map(math.isnan, numbers)))):
                 return numbers
         raise self._no_numbers(element, attribute, value, words, count, owner, infinite)
 
@@ -174,12 +183,8 @@ class XmlFile:
         return self.error(element, f'{where}="{value}": {word!r} is not a number; write {wanted}, with a decimal point')
 
 
-def _is_not_finite(x: float) -> bool:
-    return not math.isfinite(x)
-
-
 def _float(word: str) -> float:
-    """The number that a word is; NaN for none. Digits of other scripts and 1_000 are numbers to Python alone."""
+    """The number that a word is; NaN for none."""
     try:
         return float(word) if word.isascii() and "_" not in word else math.nan
     except ValueError:

@@ -3,6 +3,7 @@
 An expression of C++ becomes `(switch ? wrong : right)`, a statement `if (switch) { wrong } else { right }`.
 """
 
+import ast
 import pathlib
 from dataclasses import dataclass
 
@@ -36,7 +37,7 @@ CPP = [
         "false",
     ),
     Change(
-        "only the first context of a plan is looked at",
+        "only the first model of a plan is looked at",
         "cpp/algebra/engine.cpp",
         "plan_->contexts[c].source->check_current();",
         "if (c > 0) return true;",
@@ -156,16 +157,37 @@ def found(root, changes):
             stale.append(c.name)
             continue
         begin = text.index(c.before)
-        after = c.after
+        after, functions = c.after, ()
         if c.file.endswith((".h", ".cpp")):
             after = f"if (PYCRAFT_MUTANT({{i}})) {{ {c.after} }} else {{ {c.before} }}" if c.statement else switched(c.before, c.after)
+        else:
+            functions = function_around(text, line_of(text, begin))
         mutants.append(
             Mutant(
-                c.file, line_of(text, begin), c.name, begin, begin + len(c.before), c.before, after, shown_line(text, begin), c.name, c.name
+                c.file,
+                line_of(text, begin),
+                c.name,
+                begin,
+                begin + len(c.before),
+                c.before,
+                after,
+                shown_line(text, begin),
+                c.name,
+                c.name,
+                functions,
             )
         )
     there = {m.name for m in mutants}
     return mutants, [name for name in stale if name not in there]
+
+
+def function_around(text, line):
+    """(first, last) line of the innermost function of Python there, as its code object counts them."""
+    found = ()
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.FunctionDef) and node.lineno <= line <= node.end_lineno:
+            found = max(found, (min([node.lineno, *(d.lineno for d in node.decorator_list)]), node.end_lineno))
+    return found
 
 
 def switched(before, after):

@@ -100,9 +100,10 @@ def touching(mutant, number, touched):
     """The tests that execute a mutant."""
     if not mutant.python:
         return touched.get(str(number), [])
-    line = mutant.functions[0] if mutant.functions else None
-    by_function = touched.get(str((mutant.file, line)), []) if line else []
-    return by_function or touched["everything"]
+    if mutant.functions and (found := touched.get(str((mutant.file, mutant.functions[0])), [])):
+        return found
+    of_file = {name for place, names in touched.items() if place.startswith(f"('{mutant.file}',") for name in names}
+    return list(of_file) or touched["everything"]
 
 
 def tried(build, mutants, numbers, notes, options, show):
