@@ -56,7 +56,20 @@ from .models.multibody import Multibody
 from .models.state import State
 from .models.warning import ModelWarning
 from .operators import OperatorSet
-from .symbolic import Exercise, Proof, derivative, exercise, from_sympy, parse, prove, prove_derivative, symbolic, to_sympy, worksheet
+from .symbolic import (
+    Exercise,
+    Proof,
+    derivative,
+    exercise,
+    from_sympy,
+    parse,
+    prove,
+    prove_derivative,
+    repair,
+    symbolic,
+    to_sympy,
+    worksheet,
+)
 
 __version__ = "0.1.0"
 
@@ -106,6 +119,7 @@ __all__ = [
     "parse",
     "prove",
     "prove_derivative",
+    "repair",
     "robots",
     "sko_model",
     "symbolic",

@@ -14,6 +14,7 @@ from rich.tree import Tree
 
 from . import _core
 from .identities.checker import check
+from .identities.tables import monospace
 from .models.generators import chain
 
 LARGEST_PICTURE = 24
@@ -50,12 +51,12 @@ class Say:
         self.console.print(f"\n{self._number}. {text}", style="bold", markup=False, highlight=False)
 
     def text(self, text: str) -> None:
-        self.console.print(Padding(escape(text), (0, 0, 0, 3)), highlight=False)
+        self.console.print(Padding(escape(monospace(text)), (0, 0, 0, 3)), highlight=False)
 
     def code(self, code: str, result: str = "") -> None:
-        self.console.print(Padding(f"[cyan]>>> {escape(code)}[/]", (0, 0, 0, 3)), highlight=False)
+        self.console.print(Padding(f"[cyan]>>> {escape(monospace(code))}[/]", (0, 0, 0, 3)), highlight=False)
         if result:
-            self.console.print(Padding(escape(result), (0, 0, 0, 3)), highlight=False, soft_wrap=True)
+            self.console.print(Padding(escape(monospace(result)), (0, 0, 0, 3)), highlight=False)
 
     def show(self, thing: Any) -> None:
         self.console.print(Padding(thing, (0, 0, 0, 3)))
@@ -184,8 +185,9 @@ def _show_theorems(robot: Any, soa: Any, say: Say) -> None:
     say.heading("Every theorem, checked on this robot")
     robot.v = robot.random_state(seed=1).v
     report = soa.check(states=1)
-    say.show(report.table())
     say.text(report.summary())
+    say.show(report.table(full=False))
+    say.text("Every one of them: soa.check().full(), or pycraft check --full.")
     say.heading("A conjecture, typed, tested and refuted")
     for statement in ("HψMψ*H* == D", "Ω = Υ + ψ̃*Υ + Υψ̃"):
         say.code(f'pc.check("{statement}")', repr(check(statement)))

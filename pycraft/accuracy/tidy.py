@@ -81,23 +81,28 @@ class TidyTable:
         return found
 
     def table(self) -> Any:
-        """The rows as a rich table."""
+        """The rows as a rich table: numbers are never cut, what stands before and after them is folded where the terminal is narrow."""
+        from rich.cells import cell_len
         from rich.markup import escape as plain
         from rich.table import Table
 
-        table = Table(title=plain(self.title), title_justify="left", box=None, pad_edge=False, header_style="bold")
-        for i, heading in enumerate(self.shown.values()):
-            table.add_column(heading, justify="right" if 0 < i < len(self.shown) - 1 else "left", no_wrap=True)
+        table = Table(title=plain(self.title), title_justify="left", box=None, pad_edge=False, header_style="bold", padding=(0, 1, 0, 0))
+        for i, (key, heading) in enumerate(self.shown.items()):
+            number = 0 < i < len(self.shown) - 1
+            texts = [*heading.split(), *(self.cell(key, row) for row in self.rows)]
+            least = max(map(cell_len, texts), default=1) if number else 12
+            table.add_column(heading, justify="right" if number else "left", min_width=least, overflow="fold")
         for row in self.rows:
             table.add_row(*(plain(self.cell(key, row)) for key in self.shown), style=self.style(row))
         return table
 
     def __repr__(self) -> str:
         from io import StringIO
+        from shutil import get_terminal_size
 
         from rich.console import Console
 
-        console = Console(file=StringIO(), width=140, color_system=None, force_jupyter=False)
+        console = Console(file=StringIO(), width=get_terminal_size((140, 24)).columns, color_system=None, force_jupyter=False)
         console.print(self.table())
         return console.file.getvalue().rstrip()  # type: ignore[attr-defined]
 

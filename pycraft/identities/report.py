@@ -114,15 +114,17 @@ class Report:
         counts = self.counts()
         order = sorted(counts, key=lambda verdict: (verdict not in OPEN, verdict == "waiting", -counts[verdict]))
         known = f"largest residual of what holds {self.worst:.1e} in double, {self.seconds:.1f} s"
-        return f"{self.model}: " + ", ".join(f"{counts[verdict]} {verdict}" for verdict in order) + f"\n{known}"
+        found = f"{self.model}: " + ", ".join(f"{counts[verdict]} {verdict}" for verdict in order)
+        return f"{wrapped(found)}\n{wrapped(known)}"
 
     def full(self) -> str:
         """Every theorem as text, in 80 columns."""
         return f"{self.summary()}\n\n{text_of(self.table())}"
 
     def __repr__(self) -> str:
-        exceptions = text_of(self.table(full=False))
-        return f"{self.summary()}\n\n{exceptions}" if exceptions else self.summary()
+        if all(f.verdict in (HOLDS, "holds anyway") for f in self.findings):
+            return self.summary()
+        return f"{self.summary()}\n\n{text_of(self.table(full=False))}"
 
     def _repr_html_(self) -> str:
         from html import escape

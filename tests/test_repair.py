@@ -1,0 +1,131 @@
+"""`repair`: the nearest true formulas to a wrong one, in words; and the syntax tree that it changes."""
+
+import numpy as np
+import pytest
+from wrong_formulas import WRONG
+
+import pycraft as pc
+from pycraft.identities.edits import changed
+from pycraft.identities.family import Spec
+from pycraft.identities.formula import DenseLetters, Misfit, evaluate, read_formula, residual, written_statement
+from pycraft.identities.parse import Statements
+from pycraft.symbolic.repair import nearest, small_models
+
+
+def letters(seed=5):
+    spec = Spec((-1, 0, 1), ("pin", "screw", "slider"), False, seed)
+    model = spec.model()
+    state = spec.states(model, 1)[0]
+    model.q, model.v = state.q, state.v
+    return model, DenseLetters(model)
+
+
+@pytest.fixture(scope="module")
+def models():
+    return small_models()
+
+
+def explained(text, words, models):
+    """The slip is among the five likeliest that lead to a formula true on small chains."""
+    near, tried = nearest(read_formula(text), models)
+    assert any(words in slip.words for _, slip in near[:5]), (text, [slip.words for _, slip in near[:8]])
+    assert tried >= 1 and all(residual(new, models[0]) < 1e-9 for new, _ in near)
+
+
+@pytest.mark.parametrize(("text", "words"), WRONG[::4])
+def test_some_wrong_formulas(text, words, models):
+    explained(text, words, models)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("text", "words"), WRONG)
+def test_wrong_formulas_of_the_field(text, words, models):
+    explained(text, words, models)
+
+
+def test_there_are_forty_of_them():
+    assert len(WRONG) >= 40 and len({text for text, _ in WRONG}) == len(WRONG)
+
+
+def test_the_true_one_is_the_nearest_and_proved():
+    found = pc.repair("ψ⁻¹ = φ⁻¹ - KH")
+    assert found[0].slip == "sign of K H" and found[0].where == [frozenset()] and found[0].proof and found.tried > 50
+    assert "proved" in repr(found) and "<ol>" in found._repr_html_() and max(map(len, repr(found).splitlines())) <= 80
+    book = pc.repair("D = HPH", most=1)
+    assert book[0].where == [{"J = 0"}] and "true where J = 0; proved" in repr(book)
+
+
+def test_a_true_formula_needs_none():
+    found = pc.repair("HψMψ*H* = D")
+    assert not len(found) and "needs no repair: TRUE where J = 0" in repr(found)
+
+
+def test_what_is_no_statement_is_said():
+    for text in ("HψMψ*H*", "D = ", "D = H?H", "D = (HP"):
+        with pytest.raises(pc.EvaluationError):
+            pc.repair(text)
+    assert "no true formula one change away" in repr(pc.repair("φMψ = Ωφ", budget=5))
+
+
+# ---------------------------------------------------------------------- the syntax tree
+
+
+TEXTS = [
+    "HψMψ*H* = D",
+    "H@psi@M@psi.T@H.T == D",
+    "inv(psi) == inv(phi) + K@H",
+    "ln det ℳ = ln det D",
+    "tr ΥM = N",
+    r"\mathcal{M} = H\phi M\phi^*H^*",
+    "ℳ⁻¹ = [I-HψK]* D⁻¹ [I-HψK]",
+    "φMφ* = R + φ̃R + Rφ̃*",
+    "-(E φ) = -φ + I",
+    "blockdiag(Ω) = Υ",
+    "τ² = τ",
+    "2 D D = D D + D D",
+    "sqrt(D) sqrt(D)* = D",
+    "velocity = φ* H* theta_dot",
+    "B(node1)* φ* H* = 𝒥(node1)",
+]
+
+
+@pytest.mark.parametrize("text", TEXTS)
+def test_a_formula_is_what_the_statement_is(text):
+    """Read as a tree, written, read as a statement: the same values; and the dense value is that of the expression."""
+    model, dense = letters()
+    formula = read_formula(text)
+    typed, again = Statements(model.soa).read(text), Statements(model.soa).read(written_statement(formula))
+    assert read_formula(written_statement(formula)) == formula and read_formula(written_statement(formula, shown=True)) == formula
+    for side, one, other in zip(formula, (typed.lhs, typed.rhs), (again.lhs, again.rhs), strict=True):
+        value = evaluate(side, dense)
+        values = [x if isinstance(x, float) else float(x) if isinstance(x, pc.Scalar) else x.dense() for x in (one, other)]
+        np.testing.assert_allclose(values[0], values[1], rtol=1e-12, atol=1e-12)
+        if value.domain != "any":
+            np.testing.assert_allclose(value.array, values[0], rtol=1e-9, atol=1e-9)
+    assert residual(formula, dense) < 1e-10
+
+
+def test_spaces_that_do_not_fit_are_seen():
+    """Where the tree says that spaces fit, the statement reads; where it says that they do not, it does not."""
+    model, dense = letters()
+    checked = 0
+    for text in ("HψMψ*H* = D", "ψ⁻¹ = φ⁻¹ + KH"):
+        for i, (formula, _) in enumerate(changed(read_formula(text))):
+            if i % 23:
+                continue
+            try:
+                residual(formula, dense)
+                fits = True
+            except Misfit:
+                fits = False
+            try:
+                read = Statements(model.soa).read(written_statement(formula))
+            except pc.Error:
+                read = None
+            if fits:
+                assert read is not None, written_statement(formula)
+            elif read is not None:  # fits, and an inverse does not exist
+                with pytest.raises((ArithmeticError, pc.Error)):
+                    [side.dense() for side in (read.lhs, read.rhs)]
+            checked += 1
+    assert checked > 40

@@ -1,0 +1,101 @@
+"""Tables in a terminal: 80 columns, nothing that matters cut, no accent that overprints, columns that align, exceptions first."""
+
+import unicodedata
+
+import pytest
+from rich.cells import cell_len
+
+import pycraft as pc
+from pycraft.accuracy.table import AccuracyTable
+from pycraft.identities.parse import Statements
+from pycraft.identities.report import Finding, Report
+from pycraft.identities.tables import monospace, precision_text, text_of, wrapped
+
+LONG = "ℳ_pp - ℳ_pf(ℳ_ff)⁻¹ℳ_fp = H_pY*MYH_p*,  Y = ψ_f* - Ω_fP_f and so on and on, in the blocks on one path to the base of φ̃"
+
+
+def report():
+    made = Report("arm", {"J = 0": True})
+    for i, verdict in enumerate(("holds", "fails", "undecided", "expected to fail", "holds anyway", "waiting", "undefined")):
+        finding = Finding(f"t{i}", f"group {i % 2}", f"{LONG} {i}", "x", ["J = 0"], [], verdict, 1e-16, 1e-13, 1e-33, 2e-30, 50)
+        finding.unmet = ["single-DOF hinges"] if verdict in ("expected to fail", "holds anyway") else []
+        finding.states, finding.note = (0, "loops") if verdict in ("waiting", "undefined") else (2, "")
+        made.findings.append(finding)
+    return made
+
+
+def fits(text, width=80):
+    for line in text.splitlines():
+        assert cell_len(line) <= width, line
+        assert not any(map(unicodedata.combining, unicodedata.normalize("NFC", line))), line
+    assert "…" not in text
+
+
+def test_the_report_of_theorems_fits():
+    made = report()
+    for text in (repr(made), made.full(), text_of(made.table())):
+        fits(text)
+    lines = made.full().splitlines()
+    numbers = [line for line in lines if "2e-30" in line]
+    assert len(numbers) == 5 and any(line.startswith("theorem") for line in lines)
+    for column in ("2e-30", "50 digits"):  # columns align, in cells and not in characters
+        assert len({cell_len(line[: line.index(column)]) for line in numbers}) == 1
+
+
+def test_the_summary_and_the_exceptions_come_first():
+    made = report()
+    assert repr(made).startswith("arm: 1 fails, 1 undecided, 1 undefined,")
+    assert f"{monospace(LONG)[:20]}" in repr(made) and "phi_tilde 0" not in repr(made) and "needs single-DOF hinges" in repr(made)
+    assert repr(made).count("waits for loops") == 1 and len(made.full()) > len(repr(made))
+    good = Report("arm", {}, [made.findings[0]])
+    assert repr(good) == good.summary() and "1 holds" in good.summary() and "50 digits" in good.full()
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("φMφ* = R + φ̃R + Rφ̃*", "φMφ* = R + phi_tilde R + R phi_tilde*"),
+        ("Hτ̄ = 0", "H tau_bar = 0"),
+        ("Ḣ = 0", "Ḣ = 0"),
+        ("Ṽ V", "Ṽ V"),
+        ("V̄M", "V_bar M"),
+        ("ℳ̇ - 2C", "ℳ_dot - 2C"),
+        ("ψ = φ", "ψ = φ"),
+    ],
+)
+def test_no_accent_overprints(text, shown):
+    found = monospace(text)
+    assert found == unicodedata.normalize("NFC", shown) and not any(map(unicodedata.combining, found))
+
+
+def test_every_letter_has_a_spelling_that_reads_back():
+    """What is shown in a terminal can be typed again."""
+    soa = pc.tree([-1, 0], ["ball", "universal"], seed=1).soa
+    for name, shown, *_ in pc._core.symbol_table():
+        if name in ("B", "Jacobian", "Lambda", "Delta"):
+            continue
+        typed = monospace(shown)
+        assert not any(map(unicodedata.combining, typed)), shown
+        assert Statements(soa).read(typed).lhs == getattr(soa, name), (name, typed)
+    for t in soa.theorems():
+        assert not any(map(unicodedata.combining, monospace(t.text))), t.text
+
+
+def test_reports_of_statements_fit():
+    arm = pc.tree([-1, 0, 0, 1], ["pin", "ball", "universal", "pin"], seed=1, rotor_inertia=True)
+    for text in ("HψMψ*H* = D", "φMφ* = R + φ̃R + Rφ̃*", "φ = φ̃ + φ̃"):
+        fits(repr(pc.check(text, arm, states=1)))
+    fits(wrapped("  " + "word " * 60))
+    assert precision_text(50) == "50 digits" and precision_text("quad") == "quad"
+
+
+def test_accuracy_tables_fit():
+    row = dict.fromkeys(AccuracyTable.columns) | {
+        "way": "square-root + 1 refinement, wider residual", "precision": "extended", "error": 1.2e-16, "component": 3.4e-15,
+        "seconds": 1.234e-6, "cost": 241.0, "bytes": 10400, "states": 5, "pareto": True, "rounded": False, "refused": "",
+    }  # fmt: skip
+    text = text_of(AccuracyTable("Forward dynamics", [row, row | {"precision": "100", "pareto": False}]).table())
+    fits(text)
+    for word in ("1.2e-16", "3.4e-15", "1.23 µs", "241 x", "10.4 kB", "extended", "100 digits"):
+        assert word in text, (word, text)
+    assert "".join("square-root + 1 refinement, wider residual".split())[:11] in text
