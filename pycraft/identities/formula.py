@@ -215,7 +215,7 @@ def _tokens() -> re.Pattern[str]:
     names = "|".join(re.escape(n) for n in sorted((set(SYMBOLS) - set(_INDEXED)) | {"X", "V"}, key=lambda n: (-len(n), n)))
     functions = "|".join(FUNCTIONS)
     return re.compile(
-        rf"\s*(?:(?P<number>\d+\.?\d*(?:[eE][+-]?\d+)?)|(?P<function>(?:{functions})\b|√)|(?P<indexed>(?:{'|'.join(_INDEXED)})\([^()]*\))"
+        rf"\s*(?:(?P<number>\d+\.?\d*(?:[eE][+-]?\d+)?)|(?P<function>(?:{functions})\b|√)|(?P<indexed>(?:{'|'.join(_INDEXED)})\s*\([^()]*\))"
         rf"|(?P<name>{names})|(?P<power>\^\s*-?\d+|\*\*\s*-?\d+)|(?P<star>\^\*|\^T|\.T|'|\*)|(?P<inverse>\.inv\(\))|(?P<root>\^½|\.sqrt\(\))"
         rf"|(?P<other>[-+()\[\]{{}}@·/]))"
     )
@@ -292,7 +292,7 @@ class _Book:
             return Letter({"X": "X_world", "V": "velocity"}.get(text, text))
         if kind == "indexed":
             name, _, arguments = text.partition("(")
-            return Letter(name, tuple(a.strip().strip("'\"") for a in arguments[:-1].split(",")))
+            return Letter(name.strip(), tuple(a.strip().strip("'\"") for a in arguments[:-1].split(",")))
         if kind == "function":
             if self._next()[1] not in ("(", "[", "{"):  # tr ΥM, ln det D: what follows; √D: the one factor
                 return _call("sqrt", self._postfix()) if text == "√" else _call(text, self._product())
