@@ -255,11 +255,7 @@ Plan Planner::plan(const Expression& typed, Request request) {
       break;
     }
   }
-<<<<<<< ours
   finish();
-=======
-  drop_unused(plan_);
-  emit_values();
   // A theorem may have used J = 0 and left nothing of a model: the plan hangs on it all the same.
   for (const Context& c : contexts(typed))
     if (std::none_of(plan_.contexts.begin(), plan_.contexts.end(), [&](const Context& known) { return known.source == c.source; })) {
@@ -267,7 +263,6 @@ Plan Planner::plan(const Expression& typed, Request request) {
       plan_.groups.push_back(0);
       plan_.hinge_diagonal.push_back(c.source->traits().hinge_diagonal);
     }
->>>>>>> theirs
   // Of what was typed: theorems may leave nothing in the plan that hangs on a state.
   plan_.batch = batch_of(typed);
   plan_.batched = plan_.batch >= 0;
