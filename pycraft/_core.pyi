@@ -275,7 +275,7 @@ class Operator:
         ...
     def _parts(self) -> tuple:
         ...
-    def _repr_latex_(self) -> str:
+    def _repr_latex_(self) -> typing.Any:
         ...
     def _with_operand(self, arg0: Operator) -> Operator:
         """
@@ -367,7 +367,7 @@ class Operator:
         """
     def text(self) -> str:
         """
-        As the book prints it, in Unicode.
+        As the book prints it, in Unicode; EvaluationError beyond ten million characters.
         """
     def trace(self) -> Scalar:
         """
