@@ -28,7 +28,8 @@ std::shared_ptr<Multibody> robot() {
     std::vector<Vector3<double>> axes;
     if (kinds[k] == HingeKind::pin || kinds[k] == HingeKind::slider || kinds[k] == HingeKind::screw) axes = {{0.6, 0, 0.8}};
     if (kinds[k] == HingeKind::universal) axes = {{1, 0, 0}, {0, 1, 0}};
-    b.hinge.subhinges = subhinges_of(kinds[k], axes, {0.1, 0, 0.2}, 0.3, b.name);
+    const bool free = kinds[k] == HingeKind::free, screw = kinds[k] == HingeKind::screw;
+    b.hinge.subhinges = subhinges_of(kinds[k], axes, free ? Vector3<double>{0, 0, 0} : Vector3<double>{0.1, 0, 0.2}, screw ? 0.3 : 0, b.name);
     mb->add_body(b, k == 0 ? "" : k == 4 ? "body1" : "body" + std::to_string(k - 1));
   }
   mb->set_gravity({0, 0, -9.81});

@@ -23,7 +23,7 @@ void in_parallel(F f) {
   for (std::thread& t : all) t.join();
 }
 
-std::shared_ptr<Multibody> chain(int bodies) {
+std::shared_ptr<Multibody> serial_chain(int bodies) {
   auto mb = std::make_shared<Multibody>("chain");
   for (int k = 0; k < bodies; ++k) {
     Body b;
@@ -74,7 +74,7 @@ BOOST_AUTO_TEST_CASE(one_expression_in_every_thread) {
 }
 
 BOOST_AUTO_TEST_CASE(a_state_that_changes_meanwhile) {
-  const auto mb = chain(5);
+  const auto mb = serial_chain(5);
   const Expression MM = mass_matrix(operators_of(mb));
   const std::vector<double> a(5, 0.3), b(5, -0.8);
   mb->set_q(a);
@@ -94,7 +94,7 @@ BOOST_AUTO_TEST_CASE(a_state_that_changes_meanwhile) {
 
 // An edit is made between evaluations or refused; whoever evaluates sees the model before or after it, and nothing in between.
 BOOST_AUTO_TEST_CASE(edits_beside_evaluations) {
-  const auto mb = chain(4);
+  const auto mb = serial_chain(4);
   const Expression MM = mass_matrix(operators_of(mb));
   DynamicsPool<double> pool;
   const std::vector<double> zero(4, 0.0), one(4, 1.0);
@@ -132,7 +132,7 @@ BOOST_AUTO_TEST_CASE(edits_beside_evaluations) {
 }
 
 BOOST_AUTO_TEST_CASE(an_edit_within_an_evaluation_is_refused) {
-  const auto mb = chain(2);
+  const auto mb = serial_chain(2);
   auto data = std::make_shared<ExternalData>();
   data->name = "L";
   data->apply = [&](const double* x, double* y, int m) {
@@ -148,7 +148,7 @@ BOOST_AUTO_TEST_CASE(an_edit_within_an_evaluation_is_refused) {
 
 BOOST_AUTO_TEST_CASE(the_first_look_after_an_edit_in_every_thread) {
   for (int round = 0; round < rounds; ++round) {
-    const auto mb = chain(3);
+    const auto mb = serial_chain(3);
     Body b;
     b.name = "late";
     b.mass = 1;
