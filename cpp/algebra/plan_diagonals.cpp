@@ -228,6 +228,9 @@ int Planner::logdet(const Expression& e) {
     return emit(std::move(s), scalar);
   };
   switch (e.kind()) {
+    case NodeKind::symbol:
+      if (e.node().symbol.definition->pattern == Pattern::compound) return logdet(lower(e, true));  // Λ
+      break;
     case NodeKind::identity: return combine({}, {}, "ln det I = 0", 0);
     case NodeKind::scaled:
       return combine({logdet(e.children()[0])}, {1.0}, "ln det of a multiple", e.domain().dimension() * std::log(std::abs(e.node().coefficient)));
