@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Binding', 'Dynamics', 'Error', 'EvaluationError', 'Integration', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'Scalar', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'Theorem', 'blockdiag', 'checked_refinement', 'constant', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'identity', 'integrators', 'methods', 'operators_of', 'precisions', 'residual', 'scalar', 'step_kinds', 'symbol_table', 'theorems', 'time_apply', 'time_dynamics', 'time_forward', 'time_method', 'time_packs', 'vector', 'wider', 'zero']
+__all__: list[str] = ['Binding', 'Dynamics', 'Error', 'EvaluationError', 'Integration', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'Scalar', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'Theorem', 'blockdiag', 'checked_refinement', 'constant', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'identity', 'integrators', 'methods', 'operators_of', 'precisions', 'real_array', 'residual', 'scalar', 'step_kinds', 'symbol_table', 'theorems', 'time_apply', 'time_dynamics', 'time_forward', 'time_method', 'time_packs', 'vector', 'wider', 'zero']
 
 class Error(Exception): ...
 class SpaceError(Error, TypeError): ...
@@ -843,6 +843,10 @@ def operators_of(model: Multibody) -> MultibodyOperators:
 def precisions() -> list[str | int]:
     """
     The precisions, from narrow to wide.
+    """
+def real_array(value: typing.Any, what: str) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    An array of doubles, or a ModelError that names `what`: complex numbers, text, dates, None and masked entries are none.
     """
 def residual(a: typing.Any, b: typing.Any, vectors: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]] = {}, on_one_path: bool = False, at_most: bool = False) -> tuple[float, float, float]:
     """

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from . import _core
+from .arguments import parents_of
 from .operators import OperatorSet
 
 
@@ -45,14 +46,8 @@ def sko_model(
     array([[2., 1.],
            [1., 1.]])
     """
-    try:
-        inboard = [int(p) for p in parents]
-    except (TypeError, ValueError):
-        raise _core.ModelError(f"parents of {name!r}: a list of whole numbers, -1 for the base, not {parents!r}") from None
+    inboard = parents_of(parents, repr(name))
     n = len(inboard)
-    for k, parent in enumerate(inboard):
-        if not -1 <= parent < k:
-            raise _core.ModelError(f"body {k} of {name!r} has parent {parent}; parents come before their children, -1 is the base")
     bodies = [f"body{k}" for k in range(n)] if names is None else _listed("names", names, n, name)
     if not all(isinstance(body, str) for body in bodies) or len(set(bodies)) != n:
         raise _core.ModelError(f"names of {name!r}: {n} different texts, not {bodies!r}")
@@ -84,23 +79,12 @@ def _listed(what: str, blocks: Any, count: int, name: str) -> list[Any]:
     return list(blocks)
 
 
-def _numbers(what: str, block: Any) -> np.ndarray:
-    try:
-        given = np.asarray(block)
-        numbers = np.asarray(given, float) if given.dtype.kind in "biuf" else None
-    except (TypeError, ValueError):
-        numbers = None
-    if numbers is None:
-        raise _core.ModelError(f"{what} is not an array of real numbers")
-    return numbers
-
-
 def _refuse(what: str, block: np.ndarray, wanted: str) -> _core.ModelError:
     return _core.ModelError(f"{what} has the shape {block.shape}; it takes {wanted}")
 
 
 def _square(what: str, block: Any, size: int | None = None) -> np.ndarray:
-    numbers = _numbers(what, block)
+    numbers = _core.real_array(block, what)
     if size == 1 and numbers.ndim == 0:
         numbers = numbers.reshape(1, 1)
     if numbers.ndim != 2 or numbers.shape[0] != numbers.shape[1] or size not in (None, len(numbers)):
@@ -109,7 +93,7 @@ def _square(what: str, block: Any, size: int | None = None) -> np.ndarray:
 
 
 def _rows(what: str, block: Any, size: int) -> np.ndarray:
-    numbers = _numbers(what, block)
+    numbers = _core.real_array(block, what)
     if numbers.ndim == 1 and numbers.size == size:
         numbers = numbers.reshape(1, size)
     if numbers.ndim != 2 or numbers.shape[1] != size:
@@ -125,7 +109,7 @@ def _edge(body: str, block: Any, parent: tuple[str, int] | None, size: int) -> n
         return np.empty((0, size))
     if block is None:
         raise _core.ModelError(f"{what} is missing; it takes ({parent[1]}, {size}), from it to its parent {parent[0]!r}")
-    numbers = _numbers(what, block)
+    numbers = _core.real_array(block, what)
     if numbers.shape != (parent[1], size):
         raise _refuse(what, numbers, f"({parent[1]}, {size}), from it to its parent {parent[0]!r}")
     return numbers

@@ -226,7 +226,7 @@ class StateSpace:
         _require_covariance(Q, "Q")
         _require_covariance(R, "R")
         noise = _symmetric(B @ Q @ np.swapaxes(B, -1, -2))
-        self.x0 = np.zeros(self.n) if x0 is None else np.asarray(x0, float).reshape(-1)
+        self.x0 = np.zeros(self.n) if x0 is None else _core.real_array(x0, "x0").reshape(-1)
         if self.x0.shape != (self.n,) or not np.isfinite(self.x0).all():
             raise _core.ModelError(f"x0 is {self.n} finite numbers, not an array {np.shape(x0)}")
         self.P0 = _stationary(A, noise) if P0 is None else _matrices(P0, "P0")
@@ -266,7 +266,7 @@ class StateSpace:
 
     # ------------------------------------------------------------------ stacked vectors, backward in time
     def _series(self, y: Any) -> np.ndarray:
-        made = np.asarray(y, float)
+        made = _core.real_array(y, "measurements")
         if made.ndim == 1 and self.m == 1:
             made = made[:, None]
         if made.ndim != 2 or made.shape[1] != self.m or np.isinf(made).any() or not len(made):
@@ -395,7 +395,7 @@ class StateSpace:
 # ---------------------------------------------------------------------- shapes and checks
 def _matrices(x: Any, name: str, rows: int | None = None) -> np.ndarray:
     """A matrix, or one per time step; a number is 1 x 1, and a vector for B one column."""
-    made = np.asarray(x, float)
+    made = _core.real_array(x, name)
     if made.ndim == 0:
         made = made.reshape(1, 1)
     if made.ndim == 1 and rows is not None and len(made) == rows:

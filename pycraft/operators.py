@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from . import _core
+from .arguments import clipped
 from .closed import Closed
 
 _NAMES = {entry[0]: entry for entry in _core.symbol_table()}
@@ -142,7 +143,7 @@ class _WithArguments:
             if argument not in names:
                 raise _core.ModelError(f"no coordinate of {source.name!r} is called {argument!r}; there are {', '.join(names[:12])}")
             argument = names.index(argument)
-        return source.symbol("Delta", coordinate=int(argument))  # type: ignore[arg-type]
+        return source.symbol("Delta", coordinate=clipped(argument, f"a coordinate of {source.name!r}"))
 
     def __repr__(self) -> str:
         return f"<{self._name}: {_NAMES[self._name][-1]}>"
@@ -160,7 +161,7 @@ def _directed_inertia(soa: OperatorSet, nodes: list[str], directions: Any) -> _c
             raise _core.EvaluationError(f"directions {named!r}: {text}")
         rows = np.eye(6)[[_TWIST.index(d) for d in named]]
     else:
-        rows = np.atleast_2d(np.asarray(directions, float))
+        rows = np.atleast_2d(_core.real_array(directions, "directions"))
     if rows.ndim != 2 or rows.shape[1] != 6 * len(nodes) or not len(rows):
         raise _core.EvaluationError(f"directions of {len(nodes)} nodes: rows (k, {6 * len(nodes)}), not {np.shape(directions)}")
     if np.linalg.matrix_rank(rows) < len(rows):

@@ -7,7 +7,6 @@ UNITS = "Λ and ln det of a shifted mass matrix in five systems of units keep 1e
 REFINEMENT = "the floor below which corrections are left out is above the error of a first solution: a step too few"
 GATHER = "expressions take residual='gather' as 'wider', and ℳ⁻¹𝒥* is planned with φ where J and 𝒥 meet"
 OVERLAP = "mass_matrix_inverse compared on inputs whose arrays overlap the result"
-ARGUMENTS = "arguments of some calls still meet foreign exceptions"
 TERMINAL = "tables in 80 columns wrap the words that the test looks for"
 CERTIFICATE = "certificates judge the ladder of before the new floor of refinement"
 PICKLES = "derivatives of operators on derived trees do not pickle"
@@ -29,10 +28,6 @@ OPEN = {
     "tests/test_singular_forms.py::test_carriages_that_fall_with_their_base": "accelerations of 1e-25 beside an exact zero",
     "tests/test_overlaps.py::test_a_part_of_the_campaign": OVERLAP,
     "tests/test_overlaps.py::test_the_campaign": OVERLAP,
-    "tests/test_arguments.py::test_a_part_of_the_campaign": ARGUMENTS,
-    "tests/test_arguments.py::test_the_campaign": ARGUMENTS,
-    "tests/test_arguments.py::test_a_rotation_of_seven_digits_becomes_the_nearest_one": ARGUMENTS,
-    "tests/test_arguments.py::test_results_of_operators_from_outside[None": ARGUMENTS,
     "tests/test_accuracy_table.py::test_rows_that_show_their_rounding_say_so": TERMINAL,
     "tests/test_accuracy_table.py::test_display": TERMINAL,
     "tests/test_work_precision.py::test_ways_out": TERMINAL,

@@ -223,6 +223,17 @@ def test_numbers_of_any_real_kind_are_taken():
         assert arm.q.tolist() == [0.5, 1.0]
 
 
+def test_none_is_no_number():
+    """NumPy reads None among numbers as NaN; a matrix of velocities for one state is none either."""
+    arm = pc.chain(2)
+    with pytest.raises(pc.ModelError, match="q is not an array of numbers"):
+        arm.mass_matrix([0.1, None])
+    with pytest.raises(pc.ModelError, match="v of 'chain of 2 rods' takes 2 numbers"):
+        arm.coriolis_matrix([0, 0], [0, 0, 0])
+    with pytest.raises(pc.ModelError, match="a chain of -1 bodies"):
+        pc.chain(-1)
+
+
 def test_two_coordinates_never_have_one_name():
     arm = pc.Multibody("arm")
     arm.add_body("a", hinge="universal", mass=1.0, inertia=np.eye(3), hinge_name="wrist")

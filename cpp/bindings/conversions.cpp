@@ -20,7 +20,7 @@ const char* refused_entries(const py::array& any) {
   if (std::strchr("biuf", kind)) return nullptr;
   if (kind != 'O') return no_numbers;
   for (const py::handle& item : any.attr("ravel")()) {
-    if (PyUnicode_Check(item.ptr()) || PyBytes_Check(item.ptr())) return no_numbers;
+    if (item.is_none() || PyUnicode_Check(item.ptr()) || PyBytes_Check(item.ptr())) return no_numbers;  // None would be NaN
     if (PyComplex_Check(item.ptr())) return complex_numbers;
     if (py::hasattr(item, "dtype"))
       if (const py::array entry = py::array::ensure(item); entry && entry.dtype().kind() != 'O')

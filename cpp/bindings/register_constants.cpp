@@ -94,6 +94,8 @@ Expression external_operator(const py::object& product, const py::object& transp
 }  // namespace
 
 void register_constants(py::module_& m) {
+  m.def("real_array", [](const py::object& value, const std::string& what) { return numbers(value, what.c_str()); }, py::arg("value"), py::arg("what"),
+        "An array of doubles, or a ModelError that names `what`: complex numbers, text, dates, None and masked entries are none.");
   m.def("constant", &constant_operator, py::arg("array"), py::arg("domain"), py::arg("codomain"), py::arg("name") = "C",
         "An array as an operator from `domain` to `codomain` (spaces, or a size n for R^n): a matrix, one diagonal, or a list of one block per\n"
         "body. What is block diagonal over the bodies is kept so; what has low rank is found when a plan needs it.");

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from .arguments import text
+from ..arguments import text
 from .jacobians import resolved_jacobian
 from .realization import by_realization, output
 from .state import at_state
@@ -281,5 +281,5 @@ class DirectCalls:
         >>> round(float(arm.potential_energy([0])), 4)  # 1 kg, 0.5 m up
         4.905
         """
-        q, _ = at_state(self, q)
-        return self._calls().energy(q, np.zeros((*np.shape(q)[:-1], self.nv)), datum)[..., 1]
+        q = _core.real_array(at_state(self, q)[0], "q")
+        return self._calls().energy(q, np.zeros((*q.shape[:-1], self.nv)), datum)[..., 1]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from .arguments import listed
+from ..arguments import LARGEST, listed, name_of, one_number, parents_of, seed_of, text, whole
 from .multibody import Multibody
 
 _COORDINATES = {"universal": 2, "cylindrical": 2, "gimbal": 3, "planar": 3, "ball": 3, "custom": 3, "free": 6}  # of those with several
@@ -36,9 +36,15 @@ def chain(
     >>> pc.chain(3).nv
     3
     """
+    n, kind = whole(n, "the number of bodies of a chain"), text(kind, "a hinge kind")
+    if not 0 <= n <= LARGEST // 6:
+        raise _core.ModelError(f"a chain of {n} bodies: a number from 0 to {LARGEST // 6}")
     if seed is not None:
-        return tree(range(-1, n - 1), [kind] * n, seed=seed, welds=welds, name=name or f"chain of {n}")
-    model = Multibody(name or f"chain of {n} rods", welds=welds)
+        return tree(range(-1, n - 1), [kind] * n, seed=seed, welds=welds, name=name_of(name, "a model", f"chain of {n}"))
+    model = Multibody(name_of(name, "a model", f"chain of {n} rods"), welds=welds)
+    mass, length = one_number(mass, "mass of a rod"), one_number(length, "length of a rod")
+    if not abs(length) < 1e150:
+        raise _core.ModelError(f"length of a rod: {length:g} m, whose square is no number")
     rod: dict[str, Any] = dict(mass=mass, com=(length / 2, 0, 0), inertia=np.diag([0.0, mass * length**2 / 12, mass * length**2 / 12]))
     for k in range(n):
         options: dict[str, Any] = {}
@@ -73,20 +79,15 @@ def tree(
     "custom" hinge here is pin, slider, pin. With `rotor_inertia` every coordinate has one. Bodies on welds are lumped into the bodies that
     move them and become nodes, unless `welds="keep"`.
     """
-    try:
-        parents = [int(p) for p in parents]
-    except (TypeError, ValueError):
-        raise _core.ModelError(f"parents of a tree: a list of whole numbers, -1 for the base, not {parents!r}") from None
+    parents = parents_of(parents, "a tree")
     if not isinstance(kinds, str):
         kinds = listed(kinds, "hinge kinds of a tree")
-    kinds = [kinds] * len(parents) if isinstance(kinds, str) else list(kinds)
+    kinds = [kinds] * len(parents) if isinstance(kinds, str) else [text(kind, "a hinge kind") for kind in kinds]
     if len(kinds) != len(parents):
         raise _core.ModelError(f"a tree of {len(parents)} bodies takes {len(parents)} hinge kinds, not {len(kinds)}")
-    rng = np.random.default_rng(seed)
-    model = Multibody(name or f"tree of {len(parents)}", welds=welds)
+    rng = seed_of(seed)
+    model = Multibody(name_of(name, "a model", f"tree of {len(parents)}"), welds=welds)
     for k, (parent, kind) in enumerate(zip(parents, kinds, strict=True)):
-        if not -1 <= parent < k:
-            raise _core.ModelError(f"body {k} of a tree has parent {parent}; parents come before their children, -1 is the base")
         options: dict[str, Any] = {}
         if kind == "custom":
             options["subhinges"] = [{"kind": s, "axis": _axis(rng), "point": rng.uniform(-0.2, 0.2, 3)} for s in ("pin", "slider", "pin")]

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import _core
+from ..arguments import limit_pair, pose_parts, text, whole
 from ..closed import Closed
-from .arguments import limit_pair, pose_parts, text
 
 if TYPE_CHECKING:
     from .multibody import Multibody
@@ -161,7 +161,7 @@ class Hinge(Closed):
         to 5), radians or metres; "axis": a subhinge's axis turned about component x, y or z of the axes before it, its point held;
         "point": that axis shifted along x, y or z; "rotor_inertia": of coordinate number `component` of the hinge.
         """
-        k, source = self._index(), self._model.soa._source
+        k, source, name = self._index(), self._model.soa._source, text(name, "a parameter")
         if name == "rotor_inertia":
             own = range(self._model.nv)[self.v_slice]
             c = _component(component, [str(j) for j in range(len(own))])
@@ -172,6 +172,7 @@ class Hinge(Closed):
         if name not in ("axis", "point"):
             raise _core.ModelError(f"hinge {self.name!r} has no parameter {name!r}; there are placement, axis, point, rotor_inertia")
         subhinges, c = self.subhinges, _component(component)
+        subhinge = whole(subhinge, f"a subhinge of hinge {self.name!r}")
         if not 0 <= subhinge < len(subhinges):
             raise _core.ModelError(f"hinge {self.name!r} has {len(subhinges)} subhinges, none with number {subhinge}")
         turn = np.eye(3)[c]

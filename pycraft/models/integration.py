@@ -96,7 +96,7 @@ class IntegrationCalls(SensitivityCalls):
         if normalise not in ("never", "each step"):
             raise _core.EvaluationError(f"normalise={normalise!r}: there are 'never' and 'each step'")
         q, v = at_state(self, q, v)
-        times = np.atleast_1d(np.array(times, float))
+        times = np.atleast_1d(np.array(_core.real_array(times, "times")))
         if times.ndim != 1 or not times.size:
             raise _core.EvaluationError(f"times: a list of times in seconds, not an array of shape {times.shape}")
         if not np.isfinite(times).all():
@@ -120,11 +120,12 @@ class IntegrationCalls(SensitivityCalls):
             raise _core.EvaluationError("times are strictly increasing, or strictly decreasing")
         self._integration().configuration_rate(q, v, "double", None)  # checks both
         q, v = np.array(q, float), np.array(v, float)
-        forces, friction = (np.zeros(self.nv) if x is None else np.asarray(x, float) for x in (tau, damping))
-        for name, x in (("tau", forces), ("damping", friction)):
+        given = {name: np.zeros(self.nv) if x is None else _core.real_array(x, name) for name, x in (("tau", tau), ("damping", damping))}
+        for name, x in given.items():
             if x.shape != (self.nv,):
                 raise _core.ModelError(f"{name} of {self.name!r} takes {self.nv} numbers, not an array of shape {x.shape}")
             checked_forces(self, x, name)
+        forces, friction = given.values()
 
         def accelerations(_: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
             return self.forward_dynamics(q, v, forces - friction * v, form=form, refine=refine, precision=precision)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..arguments import text
 
 AXES = ("body", "aligned", "world")
 
@@ -29,6 +30,7 @@ def resolved_jacobian(model: Any, frame: str, q: Any, axes: str, relative_to: st
     X = calls.pose(frame, q)
     R, p = X[..., :3, :3], X[..., :3, 3]
     if relative_to is not None:
+        relative_to = text(relative_to, "a frame")
         J_o, X_o = calls.jacobian(relative_to, q, precision, None), calls.pose(relative_to, q)
         R_o = np.swapaxes(X_o[..., :3, :3], -1, -2)
         R, p = R_o @ R, np.einsum("...ij,...j->...i", R_o, p - X_o[..., :3, 3])

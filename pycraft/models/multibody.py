@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..arguments import limit_pair, listed, pose_parts, text
 from ..closed import Closed
-from .arguments import limit_pair, listed, pose_parts, text
 from .handles import Body, Hinge, Named, Node, Vector
 from .integration import IntegrationCalls
 from .state import State, at_state, random_state

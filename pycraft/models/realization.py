@@ -50,12 +50,7 @@ def motion_state(model: Any, q: Any, v: Any, tau: Any) -> tuple[np.ndarray, np.n
 def checked_forces(model: Any, tau: Any, name: str = "tau") -> np.ndarray:
     """Generalized forces (nv,) or (B, nv) as an array; a ModelError names what is wrong with them, as the core's direct calls do."""
     nv = model.nv
-    if np.iscomplexobj(tau):
-        raise _core.ModelError(f"{name} is complex; models take real numbers")
-    try:
-        forces = np.asarray(tau, float)
-    except (TypeError, ValueError):
-        raise _core.ModelError(f"{name} is not an array of numbers") from None
+    forces = _core.real_array(tau, name)
     if forces.ndim not in (1, 2) or forces.shape[-1] != nv:
         raise _core.ModelError(f"{name} of {model.name!r} takes {nv} numbers, or (B, {nv}) for a batch")
     if not np.isfinite(forces).all():

@@ -11,7 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import _core
+from ..arguments import text
 from .direct_calls import DirectCalls, cached
+from .realization import checked_forces
 from .state import at_state
 
 
@@ -84,7 +86,7 @@ class SensitivityCalls(DirectCalls):
         q, v = at_state(self, q, v)
         if form == "christoffel":
             symbols = self.christoffel(q, precision=precision)
-            return np.einsum("...ijk,...k->...ij", symbols, np.asarray(v, float))
+            return np.einsum("...ijk,...k->...ij", symbols, checked_forces(self, v, "v"))
         if form == "skew":
             H, phi, M, turning, H_dot, cross = self.soa("H phi M Delta_theta_dot H_dot momentum_cross")  # type: ignore[attr-defined]
             J = phi.T @ H.T
@@ -116,7 +118,7 @@ class SensitivityCalls(DirectCalls):
         q, v = at_state(self, q, v)
         tau = np.zeros(self.nv) if tau is None else tau
         H, phi, K, psi, I = self.soa("H phi K psi I")  # type: ignore[attr-defined]
-        forces = np.asarray(tau, float) - self.bias_forces(q, v, precision=precision)
+        forces = checked_forces(self, tau) - self.bias_forces(q, v, precision=precision)
         whole, inverse = (I + H @ phi @ K).T, I - H @ psi @ K
         return whole.at(q, precision=precision) @ np.asarray(v, float), inverse.at(q, precision=precision) @ forces
 
@@ -135,7 +137,7 @@ class SensitivityCalls(DirectCalls):
         C = H @ phi @ (M @ J.dot() + 0.5 * (cross + V_bar @ M + M @ V_tilde) @ J)
         S = inverse @ C @ inverse.T - m.dot().T @ inverse.T
         rest = np.zeros(self.nv)
-        forces = np.asarray(tau, float) - self.bias_forces(q, rest, precision=precision)
+        forces = checked_forces(self, tau) - self.bias_forces(q, rest, precision=precision)
         bound = {"precision": precision}
         return m.T.at(q, v, **bound) @ np.asarray(v, float), S.at(q, v, **bound).dense(), inverse.at(q, v, **bound) @ forces
 
@@ -148,12 +150,12 @@ class SensitivityCalls(DirectCalls):
     def jacobian_dot(self, frame: str, q=None, v=None, *, precision: str = "double") -> np.ndarray:
         """Time derivative (6, nv) or (B, 6, nv) of `jacobian(frame, q)` along v, in the same axes. Cost O(N)."""
         q, v = at_state(self, q, v)
-        return self._sensitivities().jacobian_rate(frame, q, v, precision)
+        return self._sensitivities().jacobian_rate(text(frame, "a frame"), q, v, precision)
 
     def jacobian_derivative(self, frame: str, q=None, *, precision: str = "double") -> np.ndarray:
         """The kinematic Hessian ∂𝒥/∂q of `jacobian(frame, q)` in its own axes, (6, nv, nv) or (B, 6, nv, nv). Cost O(N + depth²)."""
         q, _ = at_state(self, q)
-        return self._sensitivities().jacobian_derivative(frame, q, precision)
+        return self._sensitivities().jacobian_derivative(text(frame, "a frame"), q, precision)
 
     def inertial_regressor(self, q=None, v=None, vdot=None, *, precision: str = "double") -> np.ndarray:
         """Y (nv, 10 n) or (B, nv, 10 n) with inverse_dynamics = Y π + J v̇, gravity included. Cost O(N · depth).

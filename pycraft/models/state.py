@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..arguments import seed_of
 from ..closed import Closed
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ class State(Closed):
     v: np.ndarray
 
 
-def at_state(model: Multibody, q: Any = None, v: Any = None) -> tuple[Any, Any]:
+def at_state(model: Any, q: Any = None, v: Any = None) -> tuple[Any, Any]:
     """The q and v that a call means, by the one rule of direct calls and of `Operator.at`.
 
     Without q the model's present state, v with it unless it is given; of a State its q, and its v unless one is given; beside an array q
@@ -43,7 +44,7 @@ def random_state(model: Multibody, seed: int | np.random.Generator = 0) -> State
     One-coordinate subhinges: uniform within the limits, else ±π for angles and ±1 m for travels. Ball and free: rotations uniform on
     the group (a normalised Gaussian quaternion), positions in ±1 m. Velocities uniform in ±1.
     """
-    rng = np.random.default_rng(seed)
+    rng = seed_of(seed)
     q, at = np.array(model.zero_q()), 0
     for k in range(model._size):
         hinge = model._body(k)["hinge"]

@@ -1,0 +1,99 @@
+"""What users give to models, taken apart before the core checks the numbers: poses, limits, names, lists."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from . import _core
+
+LARGEST = 2**31 - 1
+"""What the core's integers hold."""
+
+
+def text(name: Any, what: str) -> str:
+    """A name. ModelError where it is no text."""
+    if not isinstance(name, str):
+        raise _core.ModelError(f"{what} is called by a text, not by {name!r}")
+    return name
+
+
+def listed(items: Any, what: str) -> list[Any]:
+    """The items of a list. ModelError where it is none."""
+    if isinstance(items, (str, bytes, dict)) or not isinstance(items, Iterable):
+        raise _core.ModelError(f"{what}: a list, not {items!r}")
+    return list(items)
+
+
+def whole(value: Any, what: str) -> int:
+    """A whole number, of any kind that counts as one; 2.0 and True are none. ModelError where it is none."""
+    try:
+        if not isinstance(value, bool):
+            return operator.index(value)
+    except TypeError:
+        pass
+    raise _core.ModelError(f"{what}: a whole number, not {value!r}")
+
+
+def one_number(value: Any, what: str) -> float:
+    """A real number. ModelError where it is none."""
+    number = _core.real_array(value, what)
+    if number.ndim:
+        raise _core.ModelError(f"{what} takes one number, not an array {number.shape}")
+    return float(number)
+
+
+def clipped(value: Any, what: str) -> int:
+    """A whole number, the nearest one that the core's integers hold: it says what is wrong with one that is too large."""
+    return max(-LARGEST, min(whole(value, what), LARGEST))
+
+
+def name_of(name: Any, what: str, otherwise: str) -> str:
+    """A name, or another one where it is None."""
+    return otherwise if name is None else text(name, what)
+
+
+def seed_of(seed: Any) -> np.random.Generator:
+    """The random numbers of a seed, or of a generator given. ModelError where it is neither."""
+    if not isinstance(seed, np.random.Generator) and whole(seed, "seed") < 0:
+        raise _core.ModelError(f"seed: a whole number from 0 on, or a numpy.random.Generator, not {seed!r}")
+    return np.random.default_rng(seed)
+
+
+def parents_of(parents: Any, what: str) -> list[int]:
+    """For each body the number of its parent, smaller than its own, -1 for the base. `what` they belong to, for errors."""
+    if isinstance(parents, np.ndarray) and parents.ndim != 1:
+        raise _core.ModelError(f"parents of {what}: a list of whole numbers, not an array {parents.shape}")
+    inboard = [whole(p, f"parents of {what}") for p in listed(parents, f"parents of {what}")]
+    for k, parent in enumerate(inboard):
+        if not -1 <= parent < k:
+            raise _core.ModelError(f"body {k} of {what} has parent {parent}; parents come before their children, -1 is the base")
+    return inboard
+
+
+def pose_parts(what: str, rotation: Any, position: Any, placement: Any) -> tuple[Any, Any]:
+    """Rotation and position of a pose given as these two, None for none, or as a (4, 4) matrix. `what` it belongs to, for errors."""
+    if placement is None:
+        return rotation, position
+    if rotation is not None or position is not None:
+        raise _core.ModelError(f"{what}: give placement, or rotation and position, not both")
+    pose = _core.real_array(placement, f"placement of {what}")
+    if pose.shape != (4, 4):
+        raise _core.ModelError(f"placement of {what} takes a (4, 4) pose, not an array {pose.shape}")
+    if not np.array_equal(pose[3], (0, 0, 0, 1)):
+        raise _core.ModelError(f"placement of {what}: the last row of a pose is (0, 0, 0, 1), not {tuple(pose[3].tolist())}")
+    return pose[:3, :3], pose[:3, 3]
+
+
+def limit_pair(what: str, limits: Any) -> tuple[Any, Any]:
+    """Lower and upper limits of a pair, None for none. `what` they belong to, for errors."""
+    if limits is None:
+        return None, None
+    try:
+        lower, upper = limits
+    except (TypeError, ValueError):
+        raise _core.ModelError(f"limits of {what} are a pair (lower, upper), not {limits!r}") from None
+    return lower, upper
