@@ -9,7 +9,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from perturbations import dense, difference, exchanges, rebuilt
+from perturbations import dense, difference, exchanges, nodes, replaced
 from random_identities import CHAIN, CONSTANT, J0, ROUNDING, SINGLE, identity_pair, meeting, tree
 
 import pycraft as pc
@@ -403,21 +403,6 @@ def perturbed(rng, e):
         return replaced(e, path, node.children[0])
     except pc.SpaceError:
         return None
-
-
-def nodes(e, path=()):
-    """(path, node) of every node."""
-    yield path, e
-    for i, child in enumerate(e.children):
-        yield from nodes(child, (*path, i))
-
-
-def replaced(e, path, by):
-    if not path:
-        return by
-    children = list(e.children)
-    children[path[0]] = replaced(children[path[0]], path[1:], by)
-    return rebuilt(e, children)
 
 
 def test_nothing_false_is_proved():

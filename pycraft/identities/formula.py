@@ -49,7 +49,9 @@ class Number(Node):
 
 
 @dataclass(frozen=True)
-class Star(Node):
+class Suffixed(Node):
+    """What a suffix makes of one formula."""
+
     inner: Node
 
     @property
@@ -58,13 +60,13 @@ class Star(Node):
 
 
 @dataclass(frozen=True)
-class Power(Node):
-    inner: Node
-    exponent: int
+class Star(Suffixed):
+    """X*."""
 
-    @property
-    def children(self) -> tuple[Node, ...]:
-        return (self.inner,)
+
+@dataclass(frozen=True)
+class Power(Suffixed):
+    exponent: int
 
 
 @dataclass(frozen=True)

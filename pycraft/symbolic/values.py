@@ -223,6 +223,15 @@ def _transferred(e: Any, operators: Any) -> Walk:
             return _core.identity() if e.domain is None else _core.identity(_space(e.domain, operators))
         case "zero":
             return _core.zero(_space(e.domain, operators), _space(e.codomain, operators))
+    made = rebuilt(e, children) if children else None
+    if made is None:
+        raise NoValue(f"{e.text()} belongs to its own model")
+    return made
+
+
+def rebuilt(e: Any, children: Sequence[Any]) -> Any:
+    """The same node over other children; None for what is not made of them alone."""
+    match e.kind:
         case "sum":
             return functools.reduce(operator.add, children)
         case "product":
@@ -237,7 +246,7 @@ def _transferred(e: Any, operators: Any) -> Walk:
             return _core.blockdiag(children[0])
         case "sqrt":
             return children[0].sqrt()
-    raise NoValue(f"{e.text()} belongs to its own model")
+    return None
 
 
 def _space(space: Any, operators: Any) -> Any:

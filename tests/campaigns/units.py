@@ -18,18 +18,11 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import pycraft as pc  # noqa: E402
+from pycraft.accuracy.cases_elimination import UNITS  # noqa: E402
 
 LENGTHS = {"pin": (0,), "slider": (1,), "cylindrical": (0, 1), "ball": (0, 0, 0), "universal": (0, 0)}
 """Of each coordinate: the power of a length in it."""
 
-UNITS = {
-    "SI": (1.0, 1.0),
-    "milligrams and micrometres": (1e6, 1e6),
-    "MEMS in SI": (1e-12, 1e-6),
-    "molecules in SI": (3e-26, 1e-10),
-    "hair of a millimetre in SI": (1e-9, 1e-3),
-    "kilometres and gigatonnes in SI": (1e12, 1e3),
-}
 POWERS = ((4, 0), (40, 0), (-80, 0), (0, 21), (0, -33), (-84, -33), (20, 10))
 """Binary exponents of masses and lengths. Even ones of masses: the theorems' factors take the square root of D."""
 

@@ -36,13 +36,17 @@ def contents(root, *patterns):
 
 def kept_or_built(root, options, mutants, show):
     """The test build of these sources and mutants; Python and tests are those of now."""
-    key = digest(contents(root, "cpp/**/*.h", "cpp/**/*.cpp"), [m.key for m in mutants], options.optimisation)
+    core = [
+        f"cpp/{folder.name}/**/*.{kind}" for folder in sorted((root / "cpp").iterdir()) if folder.name != "tests" for kind in ("h", "cpp")
+    ]
+    key = digest(contents(root, *core), [m.key for m in mutants], options.optimisation)
     folder = options.folder / f"{'dozen' if options.dozen else 'build'}-{key}"
     kept = folder / "build.pickle"
     if kept.exists():
         with open(kept, "rb") as file:
             build = pickle.load(file)
         building.copy_of_tree(root, build.tree)
+        build.write()
         return build
     begin = time.perf_counter()
     build = building.TestBuild(root, folder, mutants, options.jobs, options.optimisation, show)
@@ -106,8 +110,19 @@ def touching(mutant, number, touched):
     return list(of_file) or touched["everything"]
 
 
+def passes(program, **environment):
+    try:
+        return subprocess.run([program], env=os.environ | environment, capture_output=True, timeout=60).returncode == 0
+    except subprocess.TimeoutExpired:
+        return False
+
+
 def tried(build, mutants, numbers, notes, options, show):
-    """Mutant's key -> verdict, the test that killed it, tests that ran, seconds."""
+    """Mutant's key -> verdict, the test that killed it, tests that ran, seconds. C++ meets the tests of its kernels first."""
+    kernels = building.kernels(build)
+    if not passes(kernels):
+        show(f"red without any mutant: {building.KERNELS}")
+        kernels = None
     touched = {"everything": list(notes)}
     for name, t in notes.items():
         for place in t["touched"]:
@@ -115,6 +130,8 @@ def tried(build, mutants, numbers, notes, options, show):
     kills, results = {}, {}
 
     def one(mutant):
+        if kernels and not mutant.python and not passes(kernels, PYCRAFT_MUTANT=str(numbers[mutant.key])):
+            return {"verdict": "killed", "by": building.KERNELS, "tests": 1, "seconds": 0.1}
         tests = touching(mutant, numbers.get(mutant.key), touched)
         if not tests:
             return {"verdict": "not executed", "by": "", "tests": 0, "seconds": 0.0}
