@@ -211,14 +211,14 @@ void Sensitivities<S>::christoffel(const S* q, S* out) {
     }
   // What shifts all that it carries, with nothing inboard that turns, changes no other coordinate's twist: Γ(·,·,k) = 0 exactly, so that the
   // speed of a base is not in C.
-  std::vector<bool> straight(m.bodies);  // nothing up to the body turns
+  straight_.resize(m.bodies);
   for (int e = 0; e < m.bodies; ++e) {
-    straight[e] = m.parent[e] < 0 || straight[m.parent[e]];
-    for (int k = m.v_offset[e]; straight[e] && k < m.v_offset[e] + m.nv_of[e];) {
+    straight_[e] = m.parent[e] < 0 || straight_[m.parent[e]];
+    for (int k = m.v_offset[e]; straight_[e] && k < m.v_offset[e] + m.nv_of[e];) {
       const int subhinge = frame_.subhinge_of[k];
       for (; k < m.v_offset[e] + m.nv_of[e] && frame_.subhinge_of[k] == subhinge; ++k)
         if (const Vector3<S>& w = frame_.twist[k].angular; !(w[0] == S(0) && w[1] == S(0) && w[2] == S(0)))
-          straight[e] = false;
+          straight_[e] = false;
         else
           for (size_t row = 0; row < n * n; ++row) out[row * n + k] = S(0);
     }
