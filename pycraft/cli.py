@@ -217,7 +217,7 @@ def accuracy(
             )
 
     table = run()
-    console.print(table.table())
+    console.print(table.table(console.width))
     if integration:
         notes.append(f"reference: {table.reference}; its own error {table.reference_error:.1e}")
     for text in notes:
@@ -280,7 +280,7 @@ def stability(
     if output:
         output.write_text(markdown(results), encoding="utf-8")
     else:
-        console.print(results.table())
+        console.print(results.table(console.width))
     if csv:
         results.to_csv(csv)
     if json:

@@ -12,13 +12,13 @@ from rich.console import Console
 from typer.core import TyperGroup
 
 from . import _core
+from .accuracy.tidy import terminal_width
 
-WIDTH_OF_PIPES = 140  # a file or a pipe has no width of its own
 REFUSED, INTERRUPTED, UNEXPECTED = 2, 130, 70  # exit statuses beside 0, and 1 for a check that does not pass
 
 console = Console()
 if not console.is_terminal:
-    console = Console(width=WIDTH_OF_PIPES)
+    console = Console(width=terminal_width())  # a file or a pipe has no width of its own
 diagnostics = Console(stderr=True)
 
 

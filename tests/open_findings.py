@@ -7,7 +7,6 @@ UNITS = "Λ and ln det of a shifted mass matrix in five systems of units keep 1e
 REFINEMENT = "the floor below which corrections are left out is above the error of a first solution: a step too few"
 GATHER = "expressions take residual='gather' as 'wider', and ℳ⁻¹𝒥* is planned with φ where J and 𝒥 meet"
 OVERLAP = "mass_matrix_inverse compared on inputs whose arrays overlap the result"
-TERMINAL = "tables in 80 columns wrap the words that the test looks for"
 CERTIFICATE = "certificates judge the ladder of before the new floor of refinement"
 PICKLES = "derivatives of operators on derived trees do not pickle"
 STATES = "one call each that does not follow the one rule of states and values yet"
@@ -28,9 +27,6 @@ OPEN = {
     "tests/test_singular_forms.py::test_carriages_that_fall_with_their_base": "accelerations of 1e-25 beside an exact zero",
     "tests/test_overlaps.py::test_a_part_of_the_campaign": OVERLAP,
     "tests/test_overlaps.py::test_the_campaign": OVERLAP,
-    "tests/test_accuracy_table.py::test_rows_that_show_their_rounding_say_so": TERMINAL,
-    "tests/test_accuracy_table.py::test_display": TERMINAL,
-    "tests/test_work_precision.py::test_ways_out": TERMINAL,
     "tests/test_certify.py::test_forces_that_cancel_are_data_too": CERTIFICATE,
     "tests/test_certify.py::test_a_rung_that_refuses_is_told": CERTIFICATE,
     "tests/test_certify_expressions.py::test_locator_and_forms_only_where_the_sweep_runs": CERTIFICATE,
@@ -45,7 +41,6 @@ OPEN = {
     "tests/test_interrupts.py::test_ctrl_c_within_a_second[sweeps in 100 digits": INTERRUPT,
     "tests/test_interrupts.py::test_ctrl_c_within_a_second[a Riccati sweep in 100 digits": INTERRUPT,
     "tests/test_interrupts.py::test_ctrl_c_within_a_second[one large state in 100 digits": INTERRUPT,
-    "tests/test_cli_options.py::test_every_figure_of_what_accuracy_costs_has_its_bound": "figures over all kinds have another column",
 }
 CRASHES = {
     "tests/test_checker.py::test_one_letter_exchanged[#64": "a letter of the grouped tree beside one of the robot's own ends the process",

@@ -94,8 +94,33 @@ def test_accuracy_tables_fit():
         "way": "square-root + 1 refinement, wider residual", "precision": "extended", "error": 1.2e-16, "component": 3.4e-15,
         "seconds": 1.234e-6, "cost": 241.0, "bytes": 10400, "states": 5, "pareto": True, "rounded": False, "refused": "",
     }  # fmt: skip
-    text = text_of(AccuracyTable("Forward dynamics", [row, row | {"precision": "100", "pareto": False}]).table())
+    table = AccuracyTable("Forward dynamics of something with a long name, 7 degrees of freedom, five states", [
+        row, row | {"precision": "100", "pareto": False}, row | {"way": "conjugate-gradients", "refused": "no mass at 'elbow'"},
+    ])  # fmt: skip
+    text = text_of(table.table(80))
     fits(text)
-    for word in ("1.2e-16", "3.4e-15", "1.23 µs", "241 x", "10.4 kB", "extended", "100 digits"):
+    words = ("1.2e-16", "3.4e-15", "1.23 µs", "241 x", "10.4 kB", "extended", "100 digits")
+    for word in (*words, "square-root + 1", "refused", "* Pareto front"):
         assert word in text, (word, text)
-    assert "".join("square-root + 1 refinement, wider residual".split())[:11] in text
+    assert "rounded" not in text and "conjugate-gradients" in text
+    assert "refused: no mass at 'elbow'" in text_of(table.table(160), 160)
+
+
+def test_tables_of_integrators_and_of_hard_cases_fit():
+    from pycraft.accuracy.stability_table import COLUMNS, Stability
+    from pycraft.accuracy.work_precision import WorkPrecisionTable
+
+    run = dict.fromkeys(WorkPrecisionTable.columns) | {
+        "integrator": "bulirsch-stoer", "tolerance": 1e-9, "error": 1e-13, "drift": 2e-13, "seconds": 1.234e-3,
+        "evaluations": 65536, "resolved": False, "refused": "",
+    }  # fmt: skip
+    text = text_of(WorkPrecisionTable("Integration", [run], {"reference": "x", "reference_error": 1e-12}).table(80))
+    fits(text)
+    assert "energy drift" in text and "< 1.0e-12" in text and "bulirsch-stoer" in text
+    row = dict.fromkeys(COLUMNS) | {
+        "case": "a wrist at its singularity, the middle link of 1e-06 kg", "method": "square-root + refinement, wider residual, extended",
+        "median": 1e-16, "p95": 2e-16, "worst": 3e-16, "refused": 2, "seeds": 20, "ratio": 1.5, "passed": False, "failed": "worst " * 9,
+    }  # fmt: skip
+    text = text_of(Stability([row, row | {"method": "fast", "passed": True}]).table(80))
+    fits(text)
+    assert text.count("a wrist at its singularity") == 1 and "! a bound does not hold" in text and "2 of 20" in text

@@ -55,6 +55,9 @@ class Stability(TidyTable):
         "case": "case", "method": "method", "median": "median", "p95": "95 %", "worst": "worst", "refused": "refused", "ratio": "of bound",
         "failed": "does not hold",
     }  # fmt: skip
+    short: ClassVar[dict[str, str]] = {"failed": ""}
+    legend: ClassVar[dict[str, str]] = {"!": "a bound does not hold"}
+    common: ClassVar[str] = "case"
 
     def __init__(self, rows: list[dict[str, Any]], about: dict[str, Any] | None = None):
         super().__init__("Hard cases", rows, about)
@@ -80,6 +83,9 @@ class Stability(TidyTable):
         if key == "refused":
             return f"{value} of {row['seeds']}" if value else ""
         return super().cell(key, row)
+
+    def marks(self, row: dict[str, Any]) -> str:
+        return "" if row["passed"] else "!"
 
     def style(self, row: dict[str, Any]) -> str:
         return "" if row["passed"] else "bold red"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 import mpmath
 import numpy as np
@@ -40,6 +40,8 @@ class AccuracyTable(TidyTable):
         "way": "way", "precision": "precision", "error": "error", "component": "component", "seconds": "time",
         "cost": "time / fast", "bytes": "workspace", "refused": "",
     }  # fmt: skip
+    short: ClassVar[dict[str, str]] = {"cost": "/ fast"}
+    legend: ClassVar[dict[str, str]] = {"*": "Pareto front", "°": "rounded to double"}
 
     @property
     def front(self) -> list[dict[str, Any]]:
@@ -76,6 +78,9 @@ class AccuracyTable(TidyTable):
             notes = ["Pareto front"] * bool(row["pareto"]) + ["rounded to double"] * bool(row["rounded"])
             return refusal_text(row["refused"], 32) or ", ".join(notes)
         return super().cell(key, row)
+
+    def marks(self, row: dict[str, Any]) -> str:
+        return "*" * bool(row["pareto"]) + "°" * bool(row["rounded"])
 
     def label(self, row: dict[str, Any]) -> str:
         return row["way"] + ("" if row["precision"] == "double" else f", {precision_name(row['precision'])}")

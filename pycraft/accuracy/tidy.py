@@ -5,10 +5,13 @@ from __future__ import annotations
 import csv
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from html import escape
 from pathlib import Path
+from shutil import get_terminal_size
 from typing import Any, ClassVar
+
+from rich.cells import cell_len
 
 
 class TidyTable:
@@ -20,6 +23,12 @@ class TidyTable:
     columns: ClassVar[tuple[str, ...]] = ()
     shown: ClassVar[dict[str, str]] = {}
     """Columns of the displayed table: key and heading."""
+    short: ClassVar[dict[str, str]] = {}
+    """Headings where a terminal is narrow."""
+    legend: ClassVar[dict[str, str]] = {}
+    """Signs for the last column where a terminal is narrow, see `marks`."""
+    common: ClassVar[str] = ""
+    """The column whose value stands in a line of its own above the rows that share it, where a terminal is narrow."""
 
     def __init__(self, title: str, rows: list[dict[str, Any]], about: dict[str, Any] | None = None):
         self.title, self.rows, self.about = title, rows, dict(about or {})
@@ -80,31 +89,60 @@ class TidyTable:
                 found.setdefault(row["refused"], []).append(self.label(row))
         return found
 
-    def table(self) -> Any:
-        """The rows as a rich table: numbers are never cut, what stands before and after them is folded where the terminal is narrow."""
-        from rich.cells import cell_len
+    def marks(self, row: dict[str, Any]) -> str:
+        """Signs of `legend` for what the last column of the table says in words, where a terminal is too narrow for these."""
+        return ""
+
+    def table(self, width: int | None = None) -> Any:
+        """The rows as a rich table for a terminal of this width (the present one's where left out): no number and no word is cut.
+
+        Where the whole does not fit: shorter headings, signs with a legend for the last column, a line for what rows have in common,
+        and names folded between words.
+        """
         from rich.markup import escape as plain
         from rich.table import Table
 
-        table = Table(title=plain(self.title), title_justify="left", box=None, pad_edge=False, header_style="bold", padding=(0, 1, 0, 0))
-        for i, (key, heading) in enumerate(self.shown.items()):
-            number = 0 < i < len(self.shown) - 1
-            texts = [*heading.split(), *(self.cell(key, row) for row in self.rows)]
-            least = max(map(cell_len, texts), default=1) if number else 12
-            table.add_column(heading, justify="right" if number else "left", min_width=least, overflow="fold")
-        for row in self.rows:
-            table.add_row(*(plain(self.cell(key, row)) for key in self.shown), style=self.style(row))
+        width = width or terminal_width()
+        titles = dict(self.shown)
+        cells = [[self.cell(key, row) for key in titles] for row in self.rows]
+        legend, heading_of = [], [""] * len(cells)
+        if sum(_widths(titles.values(), cells)) + len(titles) - 1 > width:
+            titles |= self.short
+            used = "".join(self.marks(row) for row in self.rows)
+            legend = [f"{sign} {text}" for sign, text in self.legend.items() if sign in used]
+            for row, texts in zip(self.rows, cells, strict=True):
+                texts[-1] = self.marks(row)
+                if isinstance(row.get("refused"), str) and row["refused"]:
+                    texts[list(titles).index("error")] = "refused"
+            if self.common:
+                at = list(titles).index(self.common)
+                heading_of = [texts.pop(at) for texts in cells]
+                del titles[self.common]
+        own = _widths(titles.values(), cells)
+        own[0] = max(12, min(own[0], width - sum(own[1:]) - len(own) + 1))
+        table = Table(title=plain(self.title), caption="; ".join(legend) or None, box=None, pad_edge=False, header_style="bold")
+        table.title_justify = table.caption_justify = "left"
+        table.padding = (0, 1, 0, 0)
+        table.min_width = min(width, cell_len(self.title))
+        for i, (heading, size) in enumerate(zip(titles.values(), own, strict=True)):
+            number = 0 < i < len(titles) - 1
+            table.add_column(heading, justify="right" if number else "left", width=size, no_wrap=number, overflow="fold")
+        for row, texts, heading, before in zip(self.rows, cells, heading_of, ["", *heading_of], strict=False):
+            if heading != before:
+                table.add_section()
+                table.add_row(plain(heading))
+            table.add_row(*map(plain, texts), style=self.style(row))
         return table
 
     def __repr__(self) -> str:
         from io import StringIO
-        from shutil import get_terminal_size
 
         from rich.console import Console
 
-        console = Console(file=StringIO(), width=get_terminal_size((140, 24)).columns, color_system=None, force_jupyter=False)
-        console.print(self.table())
-        return console.file.getvalue().rstrip()  # type: ignore[attr-defined]
+        width = terminal_width()
+        console = Console(file=StringIO(), width=width, color_system=None, force_jupyter=False)
+        console.print(self.table(width))
+        return "\n".join(line.rstrip() for line in console.file.getvalue().rstrip().split("\n"))  # type: ignore[attr-defined]
 
     def _repr_html_(self) -> str:
         head = "".join(f"<th style='text-align:left'>{escape(heading)}</th>" for heading in self.shown.values())
@@ -115,6 +153,16 @@ class TidyTable:
             for row in self.rows
         )
         return f"<p><b>{escape(self.title)}</b></p><table style='font-size:85%'><tr>{head}</tr>{body}</table>"
+
+
+def terminal_width() -> int:
+    """Of the terminal, or COLUMNS; 140 where there is neither."""
+    return get_terminal_size((140, 24)).columns
+
+
+def _widths(headings: Iterable[str], cells: list[list[str]]) -> list[int]:
+    """Of columns that hold their headings and texts in one line each."""
+    return [max(map(cell_len, texts)) for texts in zip(headings, *cells, strict=True)]
 
 
 def seconds_text(seconds: float | None) -> str:

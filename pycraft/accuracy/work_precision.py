@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -39,6 +39,7 @@ class WorkPrecisionTable(TidyTable):
         "integrator": "integrator", "tolerance": "tolerance or step", "error": "error (rad, m)", "drift": "energy drift", "seconds": "time",
         "evaluations": "evaluations", "refused": "",
     }  # fmt: skip
+    short: ClassVar[dict[str, str]] = {"tolerance": "tol., step"}
 
     @property
     def reference(self) -> str:
