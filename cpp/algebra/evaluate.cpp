@@ -85,7 +85,9 @@ double largest_entry(const Expression& e, const std::map<std::string, std::vecto
   std::vector<int> row_body, column_body;
   const SkoStructure* tree = nullptr;
   if (on_one_path) {
-    tree = &contexts(e).at(0).source->structure();
+    for (const Context& c : contexts(e))
+      if (cut_into_bodies_of(c.source->structure(), e.codomain()) && cut_into_bodies_of(c.source->structure(), e.domain())) tree = &c.source->structure();
+    if (!tree) throw SpaceError("blocks on one path of " + show(e) + ": " + e.domain().description() + " and " + e.codomain().description() + " are not cut into the bodies of one model");
     row_body.resize(r.rows), column_body.resize(r.columns);
     for (const auto& block : e.codomain().layout().blocks) std::fill_n(row_body.begin() + block.offset, block.size, block.body);
     for (const auto& block : e.domain().layout().blocks) std::fill_n(column_body.begin() + block.offset, block.size, block.body);

@@ -17,9 +17,6 @@ namespace {
 // Entries that dense() and numpy.asarray refuse to exceed: 512 MB.
 constexpr double dense_limit = 64e6;
 
-// Factors of a power: a product is kept as typed.
-constexpr int most_factors = 1000;
-
 py::object not_implemented() { return py::reinterpret_borrow<py::object>(Py_NotImplemented); }
 bool is_operator(const py::object& x) { return py::isinstance<Expression>(x); }
 bool is_number(const py::object& x) {
@@ -235,10 +232,7 @@ void register_operators(py::module_& m) {
       .def("__rsub__", [](const Expression& a, const py::object& b) { return add(a, b, -1, true); })
       .def("__pow__", [](const Expression& a, const py::object& n) -> py::object {
         if (!PyIndex_Check(n.ptr())) throw py::type_error("operator ** n takes a whole number; there is sqrt() for block-diagonal operators");
-        const int exponent = clipped(n);
-        if (std::abs(exponent) > most_factors)
-          throw EvaluationError("operator ** " + std::string(py::str(n)) + ": a power is a product of as many factors; exponents go to " + std::to_string(most_factors));
-        return py::cast(power(a, exponent));
+        return py::cast(power(a, clipped(n)));
       })
       .def("__eq__", [](const Expression& a, const py::object& b) -> py::object { return is_operator(b) ? py::cast(a == b.cast<Expression>()) : not_implemented(); },
            "Structural equality after flattening sums and products: a bool, no numbers. Equality by value is pycraft.check.")
