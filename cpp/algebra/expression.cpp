@@ -20,10 +20,10 @@ using Node = Expression::Node;
 size_t mix(size_t seed, size_t value) { return seed ^ (value * 0x9e3779b97f4a7c15ULL + 0x7f4a7c15ULL + (seed << 6) + (seed >> 2)); }
 
 // The number in front and what it scales. Signs move freely, -(2X) is (-2)X, as they round nothing.
-std::pair<double, const Expression*> scaling(const Node& n) {
-  double c = n.coefficient;
+std::pair<Coefficient, const Expression*> scaling(const Node& n) {
+  Coefficient c = n.coefficient;
   const Expression* x = &n.children[0];
-  while (x->kind() == NodeKind::scaled && (std::abs(c) == 1 || std::abs(x->node().coefficient) == 1)) {
+  while (x->kind() == NodeKind::scaled && (abs(c) == 1 || abs(x->node().coefficient) == 1)) {
     c *= x->node().coefficient;
     x = &x->children()[0];
   }
@@ -51,7 +51,7 @@ size_t hash_of(const Node& n) {
     case NodeKind::external: return mix(h, reinterpret_cast<size_t>(n.external.get()));
     case NodeKind::scaled: {
       const auto [c, x] = scaling(n);
-      return mix(mix(h, std::hash<double>()(c)), x->node().hash);
+      return mix(mix(h, CoefficientHash()(c)), x->node().hash);
     }
     case NodeKind::sum: {
       size_t total = 0;  // whatever the order
@@ -342,7 +342,7 @@ Expression operator-(const Expression& a) { return -1.0 * a; }
 Expression operator-(const Expression& a, const Expression& b) { return sum_of({a, -b}); }
 Expression operator*(const Expression& a, const Expression& b) { return product_of({a, b}); }
 
-Expression operator*(double c, const Expression& a) {
+Expression operator*(const Coefficient& c, const Expression& a) {
   Node n{NodeKind::scaled, a.domain(), a.codomain(), {a}};
   n.coefficient = c;
   return make(std::move(n));

@@ -1,6 +1,4 @@
 // Steps for diagonal blocks and determinants: by structure where the algebra gives them, else from an elimination.
-#include <cmath>
-
 #include "algebra/errors.h"
 #include "algebra/lower.h"
 #include "algebra/planner.h"
@@ -221,7 +219,7 @@ std::optional<std::vector<int>> Planner::logdet_of_factors(const std::vector<Exp
 
 int Planner::logdet(const Expression& e) {
   const Register scalar{RegisterKind::scalar, {}, {}, nullptr, false};
-  const auto combine = [&](std::vector<int> in, std::vector<double> c, const std::string& text, double constant) {
+  const auto combine = [&](std::vector<int> in, std::vector<Coefficient> c, const std::string& text, const Coefficient& constant) {
     Step s{StepKind::combine_scalars};
     s.in = std::move(in);
     s.coefficients = std::move(c);
@@ -235,13 +233,13 @@ int Planner::logdet(const Expression& e) {
       break;
     case NodeKind::identity: return combine({}, {}, "ln det I = 0", 0);
     case NodeKind::scaled:
-      return combine({logdet(e.children()[0])}, {1.0}, "ln det of a multiple", e.domain().dimension() * std::log(std::abs(e.node().coefficient)));
-    case NodeKind::inverse: return combine({logdet(e.children()[0])}, {-1.0}, "ln det of an inverse", 0);
+      return combine({logdet(e.children()[0])}, {1}, "ln det of a multiple", e.domain().dimension() * Coefficient::log_of_size(e.node().coefficient));
+    case NodeKind::inverse: return combine({logdet(e.children()[0])}, {-1}, "ln det of an inverse", 0);
     case NodeKind::product: {
       const auto parts = logdet_of_factors(e.children());
       if (!parts) break;
       if (parts->size() == 1) return parts->front();
-      return combine(*parts, std::vector<double>(parts->size(), 1.0), "ln det of a product", 0);
+      return combine(*parts, std::vector<Coefficient>(parts->size(), 1), "ln det of a product", 0);
     }
     case NodeKind::sum: {  // ln det (ℳ + J) = ln det D
       if (!options_.rules || e.children().size() != 2) break;
@@ -291,7 +289,7 @@ int Planner::logdet(const Expression& e) {
     s.text = "ln|det| from the pivots";
     parts.push_back(emit(std::move(s), scalar));
   }
-  return combine(parts, {1.0, -1.0}, "ln|det| of " + show(e), 0);
+  return combine(parts, {1, -1}, "ln|det| of " + show(e), 0);
 }
 
 }  // namespace pycraft

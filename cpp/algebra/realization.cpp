@@ -23,7 +23,7 @@ int most_rows(const Space& domain) { return domain.dimension() <= 3000 ? 256 : 1
 // A vector of the expression as it is known so far: Σ coefficient · left · (edge) · right · state. State -1 is the input.
 struct SignalTerm {
   int state;
-  double coefficient = 1;
+  Coefficient coefficient = 1;
   int right = -1, left = -1;
   Shift shift = Shift::none;
   int context = -1;

@@ -7,6 +7,7 @@ that model; what is applied is what was typed, no theorem used.
 from __future__ import annotations
 
 import functools
+import math
 import operator
 from collections.abc import Sequence
 from fractions import Fraction
@@ -18,7 +19,7 @@ from .. import _core
 from .equations import Step
 from .expand import symbol_parts
 from .walk import Walk, carried_out
-from .words import FURTHER, NUMBERS, Alphabet, Polynomial, Word, inverse_of, split
+from .words import FURTHER, NUMBERS, Alphabet, Polynomial, Word, factors_of, inverse_of, split
 
 PROBES = 3
 SINGULAR = 1e-13
@@ -172,6 +173,14 @@ class Values:
     def _number(self, word: Word) -> tuple[float, float]:
         """(the number that a word stands for, the size of what is added up in it)."""
         kind, *letters = word
+        if kind == "×":
+            parts = [self._number(w) for w in factors_of(word)]
+            return math.prod(x for x, _ in parts), math.prod(size for _, size in parts)
+        if kind == "1/":
+            if letters[0].startswith("⟨"):
+                raise NoValue(f"1/({letters[0][1:-1]}) is no word")
+            value, _ = self._number(tuple(letters))
+            return 1 / value, 1 / abs(value)
         if kind in ("1", "ln") or letters[0].startswith("I["):
             n = 1.0 if kind == "1" else float(self.dimension(letters[-1][2:-1]))
             return n * (float(np.log(float(Fraction(letters[0])))) if kind == "ln" else 1.0), n
