@@ -166,7 +166,7 @@ def check(
     else:
         read = Statement(*with_spaces(*statement), text, "expressions")
     found = run(read, operators, states, seed, precision)
-    report = CheckReport.of(text, found, [operators._source.name])
+    report = CheckReport.of(text, found, [operators._source.name], read.understood if isinstance(statement, str) else "")
     if found.verdict == FAILS and search:
         known: dict[str, Any] = dict(traits=lambda: dict(operators._source.traits), vectors=named_vectors(read))
         _explain(report, statement_text(read), seed=seed, precision=precision, budget=budget, **known)
@@ -176,7 +176,7 @@ def check(
 def _check_on_trees(text: str, *, states: int, seed: int, search: bool, precision: str | int, budget: float) -> CheckReport:
     """A statement on the family of random trees, one state each: as many models as states are asked for, and one of each cell."""
     from .family import family
-    from .search import Counterexample, judged
+    from .search import Counterexample, judged, understood
     from .truth import depth_for
 
     whole, names, refuted = Verdict(), [], None
@@ -191,7 +191,7 @@ def _check_on_trees(text: str, *, states: int, seed: int, search: bool, precisio
             refuted = Counterexample(spec, found.shown.state, found.shown.decisive.residual)
     if not names:
         raise _core.EvaluationError(f"{text!r}: the inverses in it exist on none of the random trees")
-    report = CheckReport.of(text, whole, names)
+    report = CheckReport.of(text, whole, names, understood(text))
     if refuted is not None and search:
         _explain(report, text, seed=seed, precision=precision, budget=budget, found=refuted)
     return report

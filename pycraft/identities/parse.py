@@ -179,7 +179,8 @@ def _balance(side: Any, other: Any) -> Any:
         if isinstance(side, (int, float)) and side == 0:
             return _core.zero(other.domain, other.codomain)
         if isinstance(side, _core.Operator) and side.domain is None:
-            return side @ _core.identity(other.domain)
+            own = _core.identity(other.domain)
+            return own if side.kind == "identity" else side @ own
     if isinstance(other, _core.Scalar) and isinstance(side, (int, float)):
         return _core.scalar(float(side))
     return side

@@ -111,6 +111,16 @@ def statement_text(read: Statement) -> str:
     return read.text if read.reading != "expressions" else f"{sides[0]} == {sides[1]}"
 
 
+def understood(text: str) -> str:
+    """How a text reads on a small tree, in the package's own letters; empty where it reads on a model of its own alone."""
+    spec = Spec((-1, 0), ("pin", "pin"), True, 1)
+    try:
+        read = read_on(text, spec, spec.model())
+    except _core.Error:
+        read = None
+    return "" if read is None else read.understood
+
+
 # ---------------------------------------------------------------------- one model
 def judged(
     text: str, spec: Spec, states: int = 1, precision: str | int = "extended", vectors: Mapping[str, str] | None = None
