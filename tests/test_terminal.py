@@ -37,9 +37,24 @@ def test_the_report_of_theorems_fits():
         fits(text)
     lines = made.full().splitlines()
     numbers = [line for line in lines if "2e-30" in line]
-    assert len(numbers) == 5 and any(line.startswith("theorem") for line in lines)
+    assert len(numbers) == 6 and "largest residual of what holds: 1.0e-33 in 50 digits, bound 2e-30" in numbers[0]
+    assert any(line.startswith("theorem") for line in lines)
     for column in ("2e-30", "50 digits"):  # columns align, in cells and not in characters
-        assert len({cell_len(line[: line.index(column)]) for line in numbers}) == 1
+        assert len({cell_len(line[: line.index(column)]) for line in numbers[1:]}) == 1
+    assert "undefined: an inverse in them does not exist here" in repr(made)
+
+
+def test_what_holds_shows_the_scalar_that_decided():
+    """Both sides of ΥM = ΥM are rounding of zero in double on a slider without a mass: no residual of 1, no bound above 1e-6, is shown."""
+    made = report()
+    made.findings[0].residual, made.findings[0].bound = 1.0, 5e9
+    assert made.worst == 1e-33
+    for text in (repr(made), made.full(), made._repr_html_()):
+        assert "1.0e+00" not in text and "5e+09" not in text
+    for text, shown in (("Epsi = E_phi taubar", "read as E_ψ = E_φ tau_bar"), ("HG = I - 0*D", "read as H G = I")):
+        found = repr(pc.check(text, pc.chain(2), states=1))
+        assert shown in found and "worst" not in found, found
+    assert "read as" not in repr(pc.check("D = HPH*", pc.chain(2), states=1))
 
 
 def test_the_summary_and_the_exceptions_come_first():

@@ -169,7 +169,7 @@ def check(
         found = run(read, operators, states, seed, precision)
     except _core.SingularOperatorError as error:
         return _without_inverse(text, statement_text(read), operators, precision, error, named_vectors(read))
-    report = CheckReport.of(text, found, [operators._source.name])
+    report = CheckReport.of(text, found, [operators._source.name], read.understood if isinstance(statement, str) else "")
     if found.verdict == FAILS and search:
         known: dict[str, Any] = dict(traits=lambda: dict(operators._source.traits), vectors=named_vectors(read))
         _explain(report, statement_text(read), seed=seed, precision=precision, budget=budget, **known)
@@ -196,7 +196,7 @@ def _without_inverse(text: str, to_read: str, operators: Any, precision: str | i
 def _check_on_trees(text: str, *, states: int, seed: int, search: bool, precision: str | int, budget: float) -> CheckReport:
     """A statement on the family of random trees, one state each: as many models as states are asked for, and one of each cell."""
     from .family import family
-    from .search import Counterexample, judged
+    from .search import Counterexample, judged, understood
     from .truth import depth_for
 
     whole, names, refuted = Verdict(), [], None
@@ -215,7 +215,7 @@ def _check_on_trees(text: str, *, states: int, seed: int, search: bool, precisio
             refuted = Counterexample(spec, found.shown.state, found.shown.decisive.residual)
     if not names:
         raise _core.EvaluationError(f"{text!r}: the inverses in it exist on none of the random trees")
-    report = CheckReport.of(text, whole, names)
+    report = CheckReport.of(text, whole, names, understood(text))
     if passed_over and not any(passed_over) and all(with_rotors):
         report.notes.append("said where J > 0: on models without rotor inertia an inverse in it does not exist")
     if refuted is not None and search:

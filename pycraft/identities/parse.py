@@ -187,7 +187,8 @@ def _balance(side: Any, other: Any) -> Any:
         if isinstance(side, Real) and side == 0:
             return _core.zero(other.domain, other.codomain)
         if isinstance(side, _core.Operator) and side.domain is None:
-            return side @ _core.identity(other.domain)
+            own = _core.identity(other.domain)
+            return own if side.kind == "identity" else side @ own
     if isinstance(other, _core.Scalar) and isinstance(side, Real):
         return _core.scalar(side)
     return side

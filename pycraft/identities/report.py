@@ -7,11 +7,13 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from .judge import FAILS, HOLDS, UNDECIDED, UndecidedError, Verdict
-from .tables import WIDTH, findings_table, monospace, precision_text, text_of, wrapped
+from .tables import WIDTH, findings_table, monospace, precision_text, read_as, text_of, wrapped
 
 UNDEFINED = "undefined"
 OPEN = ("fails", "undecided", "undefined")
 """Verdicts that say that something is wrong, or not known."""
+SHOWN = 1e-6
+"""Of what holds no residual is shown whose bound is larger."""
 PASSED = ("holds", "expected to fail", "holds anyway", "waiting", "undefined")
 
 
@@ -53,6 +55,11 @@ class Finding:
             self.note = "both sides are zero here"
 
     @property
+    def in_double(self) -> str:
+        """The residual in double, nothing where double says nothing: its bound is large, or both sides are zero but for rounding."""
+        return f"{self.residual:.1e}" if self.verdict == FAILS or self.residual <= self.bound <= SHOWN else ""
+
+    @property
     def passed(self) -> bool:
         return self.verdict in PASSED
 
@@ -83,8 +90,12 @@ class Report:
 
     @property
     def worst(self) -> float:
-        """The largest residual of what holds, in double."""
-        return max((f.residual for f in self.findings if f.verdict == HOLDS), default=0.0)
+        """The largest residual of what holds, in the scalar that decided."""
+        return max((f.wide_residual for f in self._held), default=0.0)
+
+    @property
+    def _held(self) -> list[Finding]:
+        return [f for f in self.findings if f.verdict == HOLDS]
 
     @property
     def failed(self) -> list[Finding]:
@@ -114,9 +125,15 @@ class Report:
         """How many of each verdict, in one or two lines; what is wrong comes first."""
         counts = self.counts()
         order = sorted(counts, key=lambda verdict: (verdict not in OPEN, verdict == "waiting", -counts[verdict]))
-        known = f"largest residual of what holds {self.worst:.1e} in double, {self.seconds:.1f} s"
+        known = f"{self.seconds:.1f} s"
+        if self._held:
+            worst = max(self._held, key=lambda f: f.wide_residual)
+            decided = f"{worst.wide_residual:.1e} in {precision_text(worst.wide_precision)}, bound {worst.wide_bound:.0e}"
+            known = f"largest residual of what holds: {decided}; {known}"
+        if "undefined" in counts:
+            known = f"undefined: an inverse in them does not exist here, so that nothing was checked\n{known}"
         found = f"{self.model}: " + ", ".join(f"{counts[verdict]} {verdict}" for verdict in order)
-        return f"{wrapped(found)}\n{wrapped(known)}"
+        return "\n".join(map(wrapped, (found, *known.split("\n"))))
 
     def full(self) -> str:
         """Every theorem as text, in 80 columns."""
@@ -147,7 +164,7 @@ class Report:
             numbers = (
                 "<td></td><td></td><td></td>"
                 if not f.states
-                else f"<td>{f.residual:.1e}</td><td>{f.wide_residual:.1e} ({f.wide_precision})</td><td>{f.wide_bound:.0e}</td>"
+                else f"<td>{f.in_double}</td><td>{f.wide_residual:.1e} ({f.wide_precision})</td><td>{f.wide_bound:.0e}</td>"
             )
             note = f" ({escape(', '.join(f.unmet))} not met)" if f.unmet else f" ({escape(f.note)})" if f.note else ""
             rows.append(
@@ -185,12 +202,14 @@ class CheckReport:
     true_where: list[frozenset[str]] = field(default_factory=list)
     """Standard hypotheses under which a false statement is true, the weakest first; each set is enough."""
     notes: list[str] = field(default_factory=list)
+    understood: str = ""
+    """How the text was read, in the package's own letters; empty where expressions were given."""
 
     @classmethod
-    def of(cls, statement: str, found: Verdict, models: list[str]) -> CheckReport:
+    def of(cls, statement: str, found: Verdict, models: list[str], understood: str = "") -> CheckReport:
         """The report of a verdict."""
         decisive = found.shown.decisive
-        report = cls(statement, found.verdict, found.residual, found.bound, found.states, models)
+        report = cls(statement, found.verdict, found.residual, found.bound, found.states, models, understood=understood)
         report.precision, report.residual, report.residual_bound = decisive.precision, decisive.residual, decisive.bound
         if found.zero:
             report.notes.append("both sides are zero at every state: nothing was compared")
@@ -225,15 +244,16 @@ class CheckReport:
 
     def __repr__(self) -> str:
         on = self.models[0] if len(self.models) == 1 else f"{len(self.models)} models"
-        lines = [monospace(self.statement)]
+        lines = [monospace(self.statement), *read_as(self.statement, self.understood)]
         if self.verdict == FAILS:
             lines.append(f"  {self._headline()}")
-            lines.append(f"  worst relative residual {self.worst:.1e}; in {self._decisive()}")
+            lines.append(f"  relative residual {self.worst:.1e} in double; in {self._decisive()}")
             lines += [repr(self.counterexample)] if self.counterexample is not None else []
         elif self.verdict == UNDEFINED:
             lines.append(f"  {self._headline()}")
         else:
             lines.append(f"  {self.verdict.upper() if self.undecided else self.verdict} on {on}, {self.states} states")
-            lines.append(f"  worst relative residual {self.worst:.1e}, in {self._decisive()}")
+            narrow = f"; in double {self.worst:.1e}" if self.worst <= self.bound <= SHOWN else ""
+            lines.append(f"  in {self._decisive()}{narrow}")
         lines += [f"  {note}" for note in self.notes]
         return "\n".join(wrapped(line) if len(line) > WIDTH else line for part in lines for line in part.split("\n"))

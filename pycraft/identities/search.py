@@ -128,6 +128,16 @@ def _side_text(side: Any) -> str:
     return re.sub(r"(?<![\w.])\d+(\.\d+)?(e[+-]?\d+)?(?=[* ])", exactly, text)
 
 
+def understood(text: str) -> str:
+    """How a text reads on a small tree, in the package's own letters; empty where it reads on a model of its own alone."""
+    spec = Spec((-1, 0), ("pin", "pin"), True, 1)
+    try:
+        read = read_on(text, spec, spec.model())
+    except _core.Error:
+        read = None
+    return "" if read is None else read.understood
+
+
 # ---------------------------------------------------------------------- one model
 def judged(
     text: str, spec: Spec, states: int = 1, precision: str | int = "extended", vectors: Mapping[str, str] | None = None

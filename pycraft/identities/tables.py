@@ -55,6 +55,12 @@ def wrapped(line: str, width: int = WIDTH) -> str:
     return "\n".join(broken) or line
 
 
+def read_as(text: str, understood: str) -> list[str]:
+    """A line that says how a text was read; none where it says so itself."""
+    plain = "".join(text.split()).replace("==", "=")
+    return [] if not understood or "".join(understood.split()) == plain else [f"  read as {monospace(understood)}"]
+
+
 def precision_text(precision: str | int) -> str:
     """ "quad", "50 digits"."""
     return f"{precision} digits" if str(precision).isdigit() else str(precision)

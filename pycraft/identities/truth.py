@@ -13,8 +13,8 @@ from .. import _core
 from .family import CELLS, CONSTANT, EVERY, HYPOTHESES, ONE, WITH_J, Cell, family, nilpotency, read_on, specs
 from .judge import FAILS, HOLDS, UNDECIDED
 from .parse import Statements
-from .search import Counterexample, judged, smallest
-from .tables import STYLES, monospace, text_of
+from .search import Counterexample, judged, smallest, understood
+from .tables import STYLES, monospace, read_as, text_of, wrapped
 
 TRUE, FALSE, UNREAD = "true", "FALSE", "not said"
 _WORDS = {HOLDS: TRUE, FAILS: FALSE, UNDECIDED: UNDECIDED}
@@ -52,6 +52,8 @@ class TruthMap:
     statement: str
     cells: list[CellTruth]
     seconds: float = 0.0
+    understood: str = ""
+    """How the text was read, in the package's own letters."""
 
     def __iter__(self) -> Iterator[CellTruth]:
         return iter(self.cells)
@@ -112,7 +114,8 @@ class TruthMap:
 
     def __repr__(self) -> str:
         count = sum(c.models for c in self.cells)
-        head = f"{monospace(self.statement)}\n{self.verdict}\n{count} models, {self.seconds:.1f} s; in false cells the smallest case"
+        lines = [monospace(self.statement), *read_as(self.statement, self.understood), *wrapped(self.verdict).split("\n")]
+        head = "\n".join([*lines, f"{count} models, {self.seconds:.1f} s; in false cells the smallest case"])
         return f"{head}\n\n{text_of(self.table())}"
 
     def _repr_html_(self) -> str:
@@ -189,7 +192,7 @@ def truth(
         left = max(0.0, deadline - time.perf_counter()) / (len(false) - i)
         only: dict[str, Any] = dict(meets=found.cell.least, allowed=found.cell.holds, vectors=vectors)
         found.example = smallest(statement, precision=precision, budget=left, found=found.example, **only)
-    return TruthMap(statement, cells, time.perf_counter() - begin)
+    return TruthMap(statement, cells, time.perf_counter() - begin, understood(statement))
 
 
 def depth_for(statement: str, vectors: Mapping[str, str] | None = None) -> int:
