@@ -13,6 +13,7 @@ CERTIFICATE = "certificates judge the ladder of before the new floor of refineme
 PICKLES = "derivatives of operators on derived trees do not pickle"
 STATES = "one call each that does not follow the one rule of states and values yet"
 PLANS = "traces of products with Ω, and shifted chains of thousands of bodies, still go by elimination"
+LOST = "an elimination that is stable for right sides in its own scales is taken for stable for any: silently wrong beside tiny pivots"
 INTERRUPT = "sweeps in 100 digits look at signals once a state, not once a body"
 
 OPEN = {
@@ -50,6 +51,7 @@ OPEN = {
     "tests/test_interrupts.py::test_ctrl_c_within_a_second[sweeps in 100 digits": INTERRUPT,
     "tests/test_interrupts.py::test_ctrl_c_within_a_second[a Riccati sweep in 100 digits": INTERRUPT,
     "tests/test_interrupts.py::test_ctrl_c_within_a_second[one large state in 100 digits": INTERRUPT,
+    "tests/test_eliminations.py::test_states_that_are_lost_as_a_whole_are_found": LOST,
     "tests/test_cli_options.py::test_every_figure_of_what_accuracy_costs_has_its_bound": "figures over all kinds have another column",
 }
 CRASHES = {

@@ -13,7 +13,7 @@ import time
 from . import building
 from .known import DOZEN_TESTS
 
-FIRST = 30  # tests of the first attempt: the quickest that touch a mutant
+FIRST = 30  # tests of the first attempt: quick ones that touch a mutant and little else
 SKIPPED_FILES = {"test_notebooks.py", "test_stubs.py", "test_cpp_users.py", "test_mutation.py", "test_layers.py"}
 RUN = """
 import sys
@@ -123,19 +123,38 @@ def tried(build, mutants, numbers, notes, options, show):
     if not passes(kernels):
         show(f"red without any mutant: {building.KERNELS}")
         kernels = None
+    python = contents(build.tree, "pycraft/**/*.py")
     touched = {"everything": list(notes)}
     for name, t in notes.items():
         for place in t["touched"]:
             touched.setdefault(place, []).append(name)
+    # A test that touches little is about what it touches.
+    price = {name: (t["seconds"] + 0.02) * len(t["touched"]) for name, t in notes.items()}
     kills, results = {}, {}
+    kept = build.folder / "killed.json"
+    killed = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else {}
+
+    def digest_of(by):
+        """Of the source and of the file of the test that killed: while they stay a mutant is not tried again."""
+        test = build.tree / by.split("::")[0]
+        return digest(python, test.read_bytes() if test.is_file() else b"")
 
     def one(mutant):
+        before = killed.get(mutant.key)
+        if before and before["digest"] == digest_of(before["by"]):
+            return before
+        found = attempt(mutant)
+        if found["verdict"] == "killed":
+            killed[mutant.key] = found | {"digest": digest_of(found["by"])}
+        return found
+
+    def attempt(mutant):
         if kernels and not mutant.python and not passes(kernels, PYCRAFT_MUTANT=str(numbers[mutant.key])):
             return {"verdict": "killed", "by": building.KERNELS, "tests": 1, "seconds": 0.1}
         tests = touching(mutant, numbers.get(mutant.key), touched)
         if not tests:
             return {"verdict": "not executed", "by": "", "tests": 0, "seconds": 0.0}
-        tests = sorted(tests, key=lambda name: (notes[name]["seconds"] + 0.02) / (1 + kills.get(name, 0)))
+        tests = sorted(tests, key=lambda name: price[name] / (1 + kills.get(name, 0)))
         total, within = 0.0, []
         for name in tests:
             total += notes[name]["seconds"]
@@ -154,7 +173,7 @@ def tried(build, mutants, numbers, notes, options, show):
                 continue
             arguments = pathlib.Path(build.folder / f"{mutant.key}.tests")
             arguments.write_text("\n".join(part), encoding="utf-8")
-            status, output = pytest_run(build, ["-x", f"@{arguments}"], 5 * options.budget + 60, **environment)
+            status, output = pytest_run(build, ["-x", f"@{arguments}"], 3 * options.budget + 40, **environment)
             if status:
                 red = next((line for line in output.splitlines() if line.startswith(("FAILED", "ERROR"))), "")
                 by = red.split(" - ")[0].removeprefix("FAILED ").removeprefix("ERROR ") or (
@@ -168,5 +187,6 @@ def tried(build, mutants, numbers, notes, options, show):
     with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
         for mutant, result in zip(mutants, pool.map(one, mutants), strict=True):
             results[mutant.key] = result
+            kept.write_text(json.dumps(dict(killed)), encoding="utf-8")
             show(f"{result['verdict']:<13} {mutant.file}:{mutant.line} {mutant.change}  [{result['by']}] ({result['seconds']:.0f} s)")
     return results
