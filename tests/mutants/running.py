@@ -2,6 +2,7 @@
 
 import concurrent.futures
 import hashlib
+import itertools
 import json
 import os
 import pathlib
@@ -11,9 +12,8 @@ import sys
 import time
 
 from . import building
-from .known import DOZEN_TESTS
+from .known import AREAS, DOZEN_TESTS
 
-FIRST = 30  # tests of the first attempt: quick ones that touch a mutant and little else
 SKIPPED_FILES = {"test_notebooks.py", "test_stubs.py", "test_cpp_users.py", "test_mutation.py", "test_layers.py"}
 RUN = """
 import sys
@@ -144,9 +144,14 @@ def tried(build, mutants, numbers, notes, options, show):
         if before and before["digest"] == digest_of(before["by"]):
             return before
         found = attempt(mutant)
-        if found["verdict"] == "killed":
+        if found["verdict"] == "killed" and found["by"] != "no end":
             killed[mutant.key] = found | {"digest": digest_of(found["by"])}
         return found
+
+    def affordable(tests):
+        """As many as the budget takes, from the first on."""
+        seconds = list(itertools.accumulate(notes[name]["seconds"] for name in tests))
+        return tests[: max(1, sum(t <= options.budget for t in seconds))]
 
     def attempt(mutant):
         if kernels and not mutant.python and not passes(kernels, PYCRAFT_MUTANT=str(numbers[mutant.key])):
@@ -155,25 +160,22 @@ def tried(build, mutants, numbers, notes, options, show):
         if not tests:
             return {"verdict": "not executed", "by": "", "tests": 0, "seconds": 0.0}
         tests = sorted(tests, key=lambda name: price[name] / (1 + kills.get(name, 0)))
-        total, within = 0.0, []
-        for name in tests:
-            total += notes[name]["seconds"]
-            if total > options.budget:
-                break
-            within.append(name)
-        within = within or tests[:1]
+        area = {f"tests/{name}" for name in AREAS.get(mutant.file, ())}
+        own = affordable([name for name in tests if name.split("::")[0] in area])
+        others = affordable([name for name in tests if name not in own])
+        within = own + others
         environment = (
             {"PYCRAFT_MUTANT_SOURCE": f"{mutant.file}:{mutant.begin}:{mutant.end}:{mutant.after}"}
             if mutant.python
             else {"PYCRAFT_MUTANT": str(numbers[mutant.key])}
         )
         begin = time.perf_counter()
-        for part in (within[:FIRST], within[FIRST:]):
+        for part in (own, others):
             if not part:
                 continue
             arguments = pathlib.Path(build.folder / f"{mutant.key}.tests")
             arguments.write_text("\n".join(part), encoding="utf-8")
-            status, output = pytest_run(build, ["-x", f"@{arguments}"], 3 * options.budget + 40, **environment)
+            status, output = pytest_run(build, ["-x", f"@{arguments}"], 6 * options.budget + 240, **environment)
             if status:
                 red = next((line for line in output.splitlines() if line.startswith(("FAILED", "ERROR"))), "")
                 by = red.split(" - ")[0].removeprefix("FAILED ").removeprefix("ERROR ") or (
