@@ -41,3 +41,29 @@ def test_small_pivot_blocks_of_a_regular_operator(share):
     dense = (N + N.T + D - C).dense()
     assert relative(op @ X, exact) <= 64 * np.finfo(float).eps * np.linalg.cond(dense)
     assert abs(float(op.logdet()) + np.linalg.slogdet(dense)[1]) <= 1e-12 * np.linalg.cond(dense)
+
+
+@pytest.mark.parametrize(("ratio", "seed"), [(1e-5, 1), (1e-7, 3), (1e-9, 2)])
+def test_states_that_are_lost_as_a_whole_are_found(ratio, seed):
+    """N + N* + Z, Z of the body k as small as ratioᵏ: well conditioned by N, and body by body each pivot is noise beside the next. What is
+    left of a state is zero or a few units of rounding, which the product with it gives back as it is."""
+    arm = pc.chain(6, seed=seed)
+    arm.q = np.random.default_rng(seed).uniform(-1, 1, 6)
+    H, E, G, D = arm.soa("H E G D")
+    N = H @ E @ G
+    Z = pc.constant(np.diag(ratio ** np.arange(1.0, 7.0)), D.domain, D.codomain)
+    op = (N + N.T + Z).inv()
+    assert np.linalg.cond((N + N.T + Z).dense()) < 100
+    assert relative(op @ X, op.at(arm.q, precision=50) @ X) <= 1e-13
+
+
+def test_every_state_of_a_batch_has_residuals_of_its_own():
+    arm = chain()
+    H, phi, M, I = arm.soa("H phi M I")  # noqa: E741
+    MM = H @ phi @ M @ phi.T @ H.T
+    Q = np.random.default_rng(1).uniform(-1, 1, (3, 6))
+    for op in ((MM + 0.1 * I).inv(), MM.inv()):
+        together = op.at(Q, precision="single", refine=2, residual="wider") @ X
+        for q, row in zip(Q, together, strict=True):
+            assert np.array_equal(op.at(q, precision="single", refine=2, residual="wider") @ X, row)
+            assert relative(row, op.at(q, precision=50) @ X) <= 2.0**-22

@@ -477,6 +477,9 @@ def test_what_nothing_moves_is_taken_out_of_a_long_solution(form):
     exact = np.asarray(least_squares(arm, q, v, tau), float)
     found = arm.forward_dynamics(q, v, tau, form=form, on_singular="minimum-norm")
     assert np.abs(found / exact - 1).max() <= 1e-6 and relative_error(found, exact) <= 1e-14
+    along = np.array([1.0, pitch])  # the inverse on what moves: along along*/(m |along|⁴)
+    inverse = arm.mass_matrix_inverse(q, form=form, on_singular="minimum-norm")
+    assert np.abs(inverse - np.outer(along, along) / (1.3 * (along @ along) ** 2)).max() <= 1e-14
 
 
 @each_form
