@@ -95,7 +95,8 @@ def test_ratios_are_exact(arm, digits):
         third, tenth = mpmath.mpf(1) / 3, mpmath.mpf(1) / 10
         whole = mpmath.matrix(np.asarray(D.at(arm.q, precision=digits).dense(dtype=object)).tolist())
         cases = [
-            (D / 3, third), (Fraction(1, 3) * D, third), (D / 3 + D / 3, 2 * third), ((3 * D).inv().inv() / 9, third), (D / Decimal(3), third),
+            (D / 3, third), (Fraction(1, 3) * D, third), (D / 3 + D / 3, 2 * third), ((3 * D).inv().inv() / 9, third),
+            (D / Decimal(3), third),
             (Decimal("0.1") * D, tenth), (D / 10, tenth), (0.1 * D, mpmath.mpf(0.1)), (10**30 * D, mpmath.mpf(10) ** 30),
             (D / 3.0, third), ((D / 7) * 7, mpmath.mpf(1)),
         ]  # fmt: skip
