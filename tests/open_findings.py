@@ -10,7 +10,6 @@ TERMINAL = "tables in 80 columns wrap the words that the test looks for"
 CERTIFICATE = "certificates judge the ladder of before the new floor of refinement"
 PICKLES = "derivatives of operators on derived trees do not pickle"
 STATES = "one call each that does not follow the one rule of states and values yet"
-PLANS = "shifted chains of thousands of bodies are eliminated in quad precision"
 
 OPEN = {
     "tests/test_refinement.py::test_each_correction_contracts_by_the_unrefined_error": REFINEMENT,
@@ -38,7 +37,6 @@ OPEN = {
     "tests/test_state_rules.py::test_every_direct_call_takes_a_state_or_the_models_own[hamiltonian_dynamics": STATES,
     "tests/test_state_rules.py::test_jacobians_of_batches_and_into_arrays": STATES,
     "tests/test_state_rules.py::test_a_scalar_shows_its_value": STATES,
-    "tests/test_plans.py::test_a_stretched_chain_of_thousands_is_solved": PLANS,
     "tests/test_cli_options.py::test_every_figure_of_what_accuracy_costs_has_its_bound": "figures over all kinds have another column",
 }
 CRASHES: dict[str, str] = {}
