@@ -4,8 +4,8 @@
 //   U(k) = A(k,k)⁻¹ [A(k,p) A(k,b)],     [A(p,p) A(p,b); A(b,p) A(b,b)] -= [A(p,k); A(b,k)] U(k)
 //
 // Within a block, rows are compared in the powers of two of an equilibration (equilibration.h), and a state's own equation is taken unless
-// another is ten times larger there: so the units of the model decide nothing, to the bit, and resolvents are eliminated by their own
-// recursions, which do not lose what an elimination in another order does along a chain. A pivot that is rounding next to what was added
+// another is ten times larger there, then the one that it is matched with: so the units of the model decide nothing, to the bit, and
+// resolvents are eliminated by their own recursions, which do not lose what an elimination in another order does along a chain. A pivot that is rounding next to what was added
 // up in its entry counts as zero. A singular pivot block is merged with its parent's (the re-ordering attempt). An expression that hides a
 // well-conditioned operator behind large terms that cancel can make the elimination unstable: after every factorization a solve with a known
 // solution, every state of it of the size that it takes in a solve, measures what was lost, and where that is more than seven digits, fronts are merged two by two, and again, until

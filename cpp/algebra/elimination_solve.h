@@ -165,12 +165,21 @@ bool TreeElimination<S>::factor(Blocks&& blocks, Values&& values, S tolerated) {
     lay_out(false);
   }
   dense_ = false;
+  note_.clear();
+  // In quad and wider, half of the digits are more than any double has: a model too large for one front makes do with them.
+  using std::sqrt;
+  const bool large = static_cast<int>(total_) + border_ > elimination::largest_dense, wide = std::numeric_limits<S>::digits >= std::numeric_limits<Quad>::digits;
+  const S half = large && wide ? maximum(tolerated, S(sqrt(epsilon<S>()))) : tolerated;
   for (int attempt = 0; attempt < elimination::merges; ++attempt) {
     assemble(blocks, values);
     if (eliminate()) {
       growth_ = lost();
       if (growth_ <= tolerated) return true;
       where = "elimination body by body loses " + elimination::digits(growth_) + " digits";
+      if (growth_ <= half) {
+        note_ = "digits: " + where;
+        return true;
+      }
       // One front, or one per root: nothing is left to merge.
       if (std::all_of(fronts_.begin(), fronts_.end(), [](const Front& f) { return f.parent < 0; }) || 2 * widest() > elimination::largest_merged_front) break;
       coarsen();
@@ -183,7 +192,7 @@ bool TreeElimination<S>::factor(Blocks&& blocks, Values&& values, S tolerated) {
     merged_with_parent_[f.bodies[0]] = 1;
     lay_out(false);
   }
-  if (static_cast<int>(total_) + border_ > elimination::largest_dense) {
+  if (large) {
     note_ = where + ", and with " + std::to_string(total_) + " states the operator is too large for a dense factorization";
     return false;
   }

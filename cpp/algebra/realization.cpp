@@ -117,6 +117,7 @@ class RealizationBuilder {
       if (!materialise(output)) return nullptr;
     for (const SignalTerm& t : output.terms) r_->outputs.push_back({-1, t.state, t.coefficient, t.right, t.left, t.shift, t.context});
     if (!check_sizes(tree)) return nullptr;
+    order_states();
     return r_;
   }
 
@@ -256,6 +257,7 @@ class RealizationBuilder {
       if (!same_cut(X.domain(), X.codomain())) return refuse(show(X) + " has no square blocks");
       Signal w{X.domain(), {}};
       const int s = static_cast<int>(r_->states.size());
+      implicit_.push_back(s);
       r_->states.push_back(X.domain());
       r_->equations.push_back(X.codomain());
       count_rows(X.domain());
@@ -364,6 +366,30 @@ class RealizationBuilder {
     return true;
   }
 
+  // States that their equations give explicitly (of resolvents and shifts) come before those of inverses, inner inverses before outer ones:
+  // the pivots of the former are ones, and what is left for an inverse is its Schur complement, D of the Riccati sweep where it is a mass
+  // matrix. In the order in which they were met, resolvents would be eliminated through an inverse that lacks what outboard bodies add.
+  void order_states() {
+    const int count = static_cast<int>(r_->states.size());
+    std::vector<int> order, at(count);
+    for (int s = 0; s < count; ++s)
+      if (std::find(implicit_.begin(), implicit_.end(), s) == implicit_.end()) order.push_back(s);
+    order.insert(order.end(), implicit_.rbegin(), implicit_.rend());
+    std::vector<Space> states, equations;
+    for (int i = 0; i < count; ++i) {
+      at[order[i]] = i;
+      states.push_back(r_->states[order[i]]);
+      equations.push_back(r_->equations[order[i]]);
+    }
+    r_->states = std::move(states), r_->equations = std::move(equations);
+    const auto move = [&](int& s) {
+      if (s >= 0) s = at[s];
+    };
+    for (auto* terms : {&r_->terms, &r_->inputs, &r_->outputs})
+      for (Realization::Term& t : *terms) move(t.row), move(t.column);
+    for (Realization::Border& t : r_->border_terms) move(t.row), move(t.column);
+  }
+
   bool check_sizes(const SkoStructure& tree) {
     for (const auto* spaces : {&r_->states, &r_->equations})
       for (const Space& s : *spaces)
@@ -375,6 +401,7 @@ class RealizationBuilder {
   std::string& reason_;
   std::shared_ptr<Realization> r_;
   int rows_ = 0;   // states on a body, about
+  std::vector<int> implicit_;   // states of inverses, outer ones first
   struct Known {
     std::vector<SignalTerm> input;
     Signal output;

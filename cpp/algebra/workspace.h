@@ -306,11 +306,11 @@ class Workspace {
     if (!own) own = std::make_unique<TreeElimination<S>>(s.realization);
     wide.reset();
     const bool solved = own->factor(blocks, numbers);
-    if (solved && own->dense()) {
-      ++counts.dense;
-      note(own->note());
+    if (solved) {
+      counts.dense += own->dense();
+      if (!own->note().empty()) note(own->note());
+      return;
     }
-    if (solved) return;
     const std::string reason = own->note();
     if constexpr (std::numeric_limits<S>::digits < std::numeric_limits<Quad>::digits) {
       wide = std::make_unique<TreeElimination<Quad>>(s.realization);
