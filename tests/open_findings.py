@@ -4,11 +4,8 @@ A key is the beginning of a test's name, file first. `CRASHES` are not run.
 """
 
 UNITS = "Λ and ln det of a shifted mass matrix in five systems of units keep 1e-11, not yet the 1e-12 of the bound"
-REFINEMENT = "the floor below which corrections are left out is above the error of a first solution: a step too few"
-GATHER = "expressions take residual='gather' as 'wider', and ℳ⁻¹𝒥* is planned with φ where J and 𝒥 meet"
 OVERLAP = "mass_matrix_inverse compared on inputs whose arrays overlap the result"
 TERMINAL = "tables in 80 columns wrap the words that the test looks for"
-CERTIFICATE = "certificates judge the ladder of before the new floor of refinement"
 PICKLES = "derivatives of operators on derived trees do not pickle"
 STATES = "one call each that does not follow the one rule of states and values yet"
 PLANS = "traces of products with Ω, and shifted chains of thousands of bodies, still go by elimination"
@@ -16,24 +13,11 @@ INTERRUPT = "sweeps in 100 digits look at signals once a state, not once a body"
 
 OPEN = {
     "tests/stability/test_hard_cases.py::test_every_bound_holds[arm-of-pins-and-sliders": UNITS,
-    "tests/test_refinement.py::test_each_correction_contracts_by_the_unrefined_error": REFINEMENT,
-    "tests/test_refinement.py::test_the_correction_is_the_error": REFINEMENT,
-    "tests/test_refinement.py::test_automatic_refinement_stops_when_corrections_no_longer_shrink": REFINEMENT,
-    "tests/test_refinement.py::test_batches_are_refined_state_by_state": REFINEMENT,
-    "tests/test_refinement.py::test_nothing_is_refined_where_nothing_is_solved": REFINEMENT,
-    "tests/test_refinement.py::test_a_hundred_links": REFINEMENT,
-    "tests/test_forms.py::test_pickles_keep_the_way_to_compute[refine]": REFINEMENT,
-    "tests/test_refinement_rounding.py::test_a_wide_gather_is_enough_for_a_stretched_chain": GATHER,
-    "tests/test_refinement_rounding.py::test_accelerations_of_forces_at_a_node_never_gather_by_phi": GATHER,
-    "tests/test_singular_forms.py::test_carriages_that_fall_with_their_base": "accelerations of 1e-25 beside an exact zero",
     "tests/test_overlaps.py::test_a_part_of_the_campaign": OVERLAP,
     "tests/test_overlaps.py::test_the_campaign": OVERLAP,
     "tests/test_accuracy_table.py::test_rows_that_show_their_rounding_say_so": TERMINAL,
     "tests/test_accuracy_table.py::test_display": TERMINAL,
     "tests/test_work_precision.py::test_ways_out": TERMINAL,
-    "tests/test_certify.py::test_forces_that_cancel_are_data_too": CERTIFICATE,
-    "tests/test_certify.py::test_a_rung_that_refuses_is_told": CERTIFICATE,
-    "tests/test_certify_expressions.py::test_locator_and_forms_only_where_the_sweep_runs": CERTIFICATE,
     "tests/test_pickling.py::test_every_protocol": PICKLES,
     "tests/test_pickling.py::test_copies": PICKLES,
     "tests/test_state_rules.py::test_every_direct_call_takes_a_state_or_the_models_own[hamiltonian_dynamics": STATES,
