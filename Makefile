@@ -8,6 +8,7 @@
 #   make test-clang             the C++ tests built by Clang (needs clang++: apt install clang, or CLANG=/path/to/clang++)
 #   make wheel                  dist/*.whl for other machines: libquadmath inside, the glibc it needs in its name (Linux)
 #   make mutants                small wrong changes, which the tests must notice; writes tests/mutation.md (under an hour)
+#   make campaigns              refinement against 5000 models made to break it (ten minutes of one core)
 #   make stability              the catalogue of hard cases in full, beside the peers; writes tests/stability/table.md
 PYTHON ?= python3
 MODEL ?=
@@ -19,7 +20,7 @@ SOURCES := $(shell find cpp pycraft -name '*.h' -o -name '*.cpp' -o -name '*.py'
 # What is compiled: a change in any of these rebuilds. Python sources are used where they lie.
 COMPILED := $(shell find cpp -name '*.h' -o -name '*.cpp' -o -name '*.in' -o -name '*.py') CMakeLists.txt pyproject.toml
 
-.PHONY: tour test test-cpp test-python test-peers check lab bench stability lint clean wheel mutants \
+.PHONY: tour test test-cpp test-python test-peers check lab bench stability campaigns lint clean wheel mutants \
         test-address test-undefined test-thread test-clang
 
 tour: .venv/installed
@@ -84,6 +85,9 @@ mutants: .venv/tested
 
 stability: .venv/peers
 	$(BIN)/pycraft stability --output tests/stability/table.md
+
+campaigns: .venv/tested
+	$(BIN)/python tests/campaigns/refinement.py --seeds 5000 --jobs $(JOBS) --verbose
 
 lint: .venv/tested
 	$(BIN)/ruff check pycraft tests

@@ -1,7 +1,6 @@
 """What the everyday subset leaves out besides the tests that mark themselves: what takes seconds and stands close to a quick test."""
 
 import pytest
-from open_findings import CRASHES, OPEN
 
 SLOW = {
     "test_symbolic": lambda item: "pendulum" not in item.nodeid,
@@ -39,7 +38,3 @@ def pytest_collection_modifyitems(items):
         slow = SLOW.get(item.path.stem)
         if slow and slow(item):
             item.add_marker(pytest.mark.slow)
-        for listed, run in ((OPEN, True), (CRASHES, False)):
-            for name, reason in listed.items():
-                if item.nodeid.startswith(name):
-                    item.add_marker(pytest.mark.xfail(reason=reason, strict=False, run=run))

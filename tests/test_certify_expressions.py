@@ -60,12 +60,12 @@ def test_data_of_an_expression(panda):
 
 
 def test_locator_and_forms_only_where_the_sweep_runs():
-    """ln det ℳ eliminates the realization and ℳx is Newton-Euler: no D(k), no form; the traces of ℳ⁻¹ and ln det D have both."""
+    """tr ℳ and ℳx are composite bodies and Newton-Euler: no D(k), no form; tr ℳ⁻¹ and ln det ℳ = ln det D have both."""
     model, q, _, _ = hard("tip 1e9")
     H, phi, M, D = model.soa("H phi M D")
     MM = H @ phi @ M @ phi.T @ H.T
-    without = [MM.logdet(), MM.trace(), 2 * MM.logdet() + 1, MM, H @ phi]
-    having = [MM.inv().trace(), D.logdet(), D.logdet() - MM.trace(), MM.inv(), D]
+    without = [MM.trace(), 2 * MM.trace() + 1, MM, H @ phi]
+    having = [MM.inv().trace(), MM.logdet(), 2 * MM.logdet() + 1, D.logdet(), D.logdet() - MM.trace(), MM.inv(), D]
     for expr in without:
         certificate = certify_expression(expr, q, seconds=0)
         assert not certificate.locator and "no articulated sweep" in repr(certificate)

@@ -178,7 +178,8 @@ def test_a_light_carriage_under_a_heavy_one(inner, outer, axis):
 @pytest.mark.parametrize("axis", [(1, 0, 0), SKEW], ids=["along x", "askew"])
 @pytest.mark.parametrize(("inner", "outer"), [(1e-3, 1e6), (1e-3, 1e9), (1e-3, 1e16), (1.0, 1e18), (1e-9, 1e9), (1e-9, 1e16)])
 def test_carriages_that_fall_with_their_base(inner, outer, axis, form):
-    """Gravity, and forces that leave none or little: at least a digit right, or refused."""
+    """Gravity, and forces that leave none or little: at least a digit right, or refused. Where the answer is exactly zero no digit is: what
+    is left then is rounding of gravity, of which all accelerations here are made."""
     arm = sliders(inner, outer, axis)
     arm.gravity = (0, 0, -9.81)
     for T in (np.zeros(2), np.array([3.0, -2.0])):
@@ -188,7 +189,7 @@ def test_carriages_that_fall_with_their_base(inner, outer, axis, form):
             assert inner / outer < 1e2 * EPS and (form == "fast" or axis == SKEW)
             continue
         exact = arm.forward_dynamics(arm.q, [0, 0], T, form="ud", precision=50)
-        assert np.linalg.norm(got - exact) <= 0.5 * np.linalg.norm(exact)
+        assert np.linalg.norm(got - exact) <= (0.5 * np.linalg.norm(exact) if exact.any() else EPS * 9.81)
 
 
 @each_form

@@ -152,20 +152,23 @@ class DenseBlocks {
   void motion_sizes(int k, const S* parent, const S* x, const S* a, S* out, int m) const {
     using std::abs;
     for (int i = 0; i < tree_.size[k] * m; ++i) out[i] = abs(a[i]);
-    if (parent) add_sizes<true>(edge(k), parent, out, tree_.size[k], tree_.size[tree_.parent[k]], m);
-    add_sizes<true>(hinge_map(k), x, out, tree_.size[k], tree_.dof[k], m);
+    if (parent) add_sizes<true>(edge(k), S(1), parent, out, tree_.size[k], tree_.size[tree_.parent[k]], m);
+    add_sizes<true>(hinge_map(k), S(1), x, out, tree_.size[k], tree_.dof[k], m);
   }
-  void inertia_sizes(int k, const S* a, S* out, int m) const {
+  template <class Units>
+  void inertia_sizes(int k, const S* a, const Units& u, S* out, int m) const {
     std::fill_n(out, tree_.size[k] * m, S(0));
-    for (int twice = 0; twice < 2; ++twice) add_sizes<false>(M.data() + at_[k].m, a, out, tree_.size[k], tree_.size[k], m);
+    add_sizes<false>(M.data() + at_[k].m, S(S(2) * u.force), a, out, tree_.size[k], tree_.size[k], m);
   }
-  void shifted_force_sizes(int k, const S* f, S* out, int m) const {
-    add_sizes<false>(edge(k), f, out, tree_.size[tree_.parent[k]], tree_.size[k], m);
+  template <class Units>
+  void shifted_force_sizes(int k, const S* f, const Units& u, S* out, int m) const {
+    add_sizes<false>(edge(k), u.motion, f, out, tree_.size[tree_.parent[k]], tree_.size[k], m);
   }
-  void coordinate_sizes(int k, const S* f, const S* x, S* out, int m) const {
+  template <class Units>
+  void coordinate_sizes(int k, const S* f, const S* x, const Units& u, S* out, int m) const {
     std::fill_n(out, tree_.dof[k] * m, S(0));
-    add_sizes<false>(hinge_map(k), f, out, tree_.dof[k], tree_.size[k], m);
-    add_sizes<false>(J.data() + at_[k].d, x, out, tree_.dof[k], tree_.dof[k], m);
+    add_sizes<false>(hinge_map(k), u.motion, f, out, tree_.dof[k], tree_.size[k], m);
+    add_sizes<false>(J.data() + at_[k].d, u.force, x, out, tree_.dof[k], tree_.dof[k], m);
   }
   S log_determinant_of_D() const {
     using std::log;
@@ -299,13 +302,13 @@ class DenseBlocks {
       }
     symmetrise(A, s);
   }
-  // out (r x m) += |A| |x|, A (r x n); transposed: |A*| |x|, A (n x r)
+  // out (r x m) += u |A| |x|, A (r x n); transposed: u |A*| |x|, A (n x r)
   template <bool transposed>
-  static void add_sizes(const S* A, const S* x, S* out, int r, int n, int m) {
+  static void add_sizes(const S* A, const S& u, const S* x, S* out, int r, int n, int m) {
     using std::abs;
     for (int i = 0; i < r; ++i)
       for (int k = 0; k < n; ++k) {
-        const S a = abs(transposed ? A[k * r + i] : A[i * n + k]);
+        const S a = u * S(abs(transposed ? A[k * r + i] : A[i * n + k]));
         for (int c = 0; c < m; ++c) out[i * m + c] += a * S(abs(x[k * m + c]));
       }
   }

@@ -128,8 +128,8 @@ Precision precision_of(const Expression& e) {
 
 namespace {
 
-// Determinants, traces, diagonals and triangular factors have no residual that a solve would correct: refinement of them is the next
-// precision up.
+// Determinants, traces, diagonals and triangular factors of what is solved have no residual that a solve would correct: refinement of
+// them is the next precision up. Of what is not solved there is none.
 bool refined_by_precision(const Plan& plan) {
   const bool asked = std::any_of(plan.contexts.begin(), plan.contexts.end(), [](const Context& c) { return c.binding && c.binding->arithmetic.refinement.steps != 0; });
   if (!asked) return false;
@@ -140,6 +140,8 @@ bool refined_by_precision(const Plan& plan) {
     case Request::block_diagonal:
     case Request::diagonal:
     case Request::trace:
+      return std::any_of(plan.groups.begin(), plan.groups.end(), [](unsigned g) { return (g & (Group::articulated | Group::compliance)) != 0; }) ||
+             uses([](const Step& s) { return s.kind == StepKind::factor || s.kind == StepKind::dense_factor || s.kind == StepKind::invert_blocks || s.operand; });
     case Request::logdet: return true;
     default: return uses([](const Step& s) { return s.kind == StepKind::dense_factor && s.flag; });
   }

@@ -5,7 +5,7 @@
 // It contracts by about the relative error of the first solution, down to the floor that the rounding of r leaves. So much of δ as that
 // rounding may have made is known, along δ itself (algebra/sweeps/residual_rounding.h), and decides:
 //
-//   - a δ of which half or more may be rounding is not applied, as x may be better than the residual can tell;
+//   - a δ that may be nothing but rounding is not applied, as x may be better than the residual can tell;
 //   - a first δ above 0.3 of the solution is refused, for nothing is known then; unless it is small beside terms that cancelled in the
 //     solution, and rounding, or followed by a correction that is small;
 //   - corrections that do not halve end it, and are refused where they are above 0.3 of the solution.
@@ -95,7 +95,7 @@ void refine(S* x, int n, int m, const Refinement& how, Form form, const S& large
       const bool large = correction > limit * solution;
       if (step == 0 && correction > limit * maximum(solution, S(S(1e3) * epsilon<S>() * largest)))
         throw_no_contraction(what(), form, to_double(S(correction / solution)));
-      work.open[c] = length > S(2) * work.rounding[c];
+      work.open[c] = length > work.rounding[c];
       if (!work.open[c]) continue;
       if (step > 0 && !(length < work.last[c] / S(2))) {
         if (large) throw_no_contraction(what(), form, to_double(S(correction / solution)));

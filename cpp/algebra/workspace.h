@@ -386,12 +386,14 @@ class Workspace {
                        [&](int c) -> const SkoValues<S>& { return *values[c]; });
     }
   }
+  // Residuals of eliminated systems are formed one scalar up, whatever was asked for: their own rounding is soon all that is left in
+  // those of the same scalar, no adjoint solve tells when, and beside the elimination they cost little.
   void solve_realization(const Step& s, const std::vector<SkoValues<S>*>& values, int w) {
     const Refinement how = refinement();
     const S* x = vectors_[s.in[1]].data();
     S* y = vectors_[s.out].data();
     const auto blocks = [&](int r) -> const BlockStorage<S>& { return blocks_[r]; };
-    if (how.steps == 0 || how.residual == ResidualPrecision::same || eliminations_[s.in[0]].wide)
+    if (how.steps == 0 || std::is_same_v<S, Wider<S>> || eliminations_[s.in[0]].wide)
       return with_factors(s.in[0], [&](auto& factors) { factors.solve(x, y, w, blocks, how); });
     follow(values);
     auto& wide = *wide_->eliminations_[s.in[0]].own;
@@ -406,15 +408,15 @@ class Workspace {
     own.mass_matrix_inverse(x, y, w, scratch_.data());
     const Binding* binding = plan_->contexts[s.context].binding.get();
     if (!binding || binding->arithmetic.refinement.steps == 0) return;
-    const Refinement& how = binding->arithmetic.refinement;
+    Refinement how = binding->arithmetic.refinement;
+    if (how.gathers_wider() && !own.gathers_wider()) how.residual = ResidualPrecision::wider;
     const int n = plan_->registers[s.out].space.dimension();
     const size_t size = size_t(n) * w;
-    // Forces alone are gathered wider by direct calls, which know the inertias in wider numbers; here all of the residual is.
-    const bool wider = how.residual != ResidualPrecision::same;
-    const S unit = wider ? static_cast<S>(epsilon<Wider<S>>()) : epsilon<S>();
-    if (wider) follow(values);
+    if (how.wider()) follow(values);
     const auto residual = [&](const S* solution, S* r) {
-      if (wider) {
+      if (how.gathers_wider()) {
+        own.gathered_residual(solution, x, r, w, scratch_.data(), wide_scratch_);
+      } else if (how.wider()) {
         convert(solution, size, wide_x_);
         wide_y_.resize(size), wide_scratch_.resize(std::max(wide_scratch_.size(), scratch_.size()));
         wide_at_[s.context]->mass_matrix(true, wide_x_.data(), wide_y_.data(), w, wide_scratch_.data());
@@ -427,7 +429,7 @@ class Workspace {
     refine(y, n, w, how, binding->arithmetic.form, S(0), [&] { return plan_->text; }, residual,
            [&](const S* r, S* d) { own.mass_matrix_inverse(r, d, w, scratch_.data()); },
            [&](const S* direction, S* rounding) {
-             own.mass_matrix_rounding(y, x, direction, {unit, unit}, rounding, w, sizes_);
+             own.mass_matrix_rounding(y, x, direction, units_of<S>(how), rounding, w, sizes_);
            },
            refinement_);
   }

@@ -57,7 +57,7 @@ typename RigidDynamics<S>::AddedInertias RigidDynamics<S>::forward_dynamics_of_p
   };
   const auto residual_at = [&](const S* x, S* r) {
     if (how.refinement.gathers_wider()) {
-      newton_euler_residual_gathered(*model_, blocks_, points_, x, tau, r, alpha_, force_, wide_force_);
+      newton_euler_residual_gathered(*model_, wide_model_->inertia, blocks_, points_, x, tau, r, alpha_, force_, wide_force_);
     } else if (how.refinement.wider()) {
       convert(x, n, wide_x_), wide_r_.resize(n);
       wider_->residual(tau, wide_x_.data(), wide_r_.data());
@@ -83,20 +83,20 @@ typename RigidDynamics<S>::AddedInertias RigidDynamics<S>::forward_dynamics_of_p
   }
   left_ = S(0);
   if (how.refinement.steps == 0) return added;
-  const auto size_at = [&](const S* x, bool shared) {
+  const auto size_at = [&](const S* x) {
     if (how.refinement.wider())
-      size_residual(*wider_, wide_x_.data(), how.refinement, shared);
+      size_residual(*wider_, wide_x_.data(), how.refinement);
     else
-      size_residual(*this, x, how.refinement, shared);
+      size_residual(*this, x, how.refinement);
   };
   refine(vdot, n, 1, how.refinement, how.form, largest, [&] { return "the forward dynamics of '" + source_.name() + "'"; }, residual_at, solve_regular,
          [&](const S* direction, S* out) {
-           size_at(vdot, false);
+           size_at(vdot);
            rounding_along(tree_, blocks_, direction, 1, sizes_, out);
          },
          refinement_);
   if (!how.estimate) return added;
-  size_at(vdot, true);
+  size_at(vdot);
   left_ = maximum(maximum(length(refinement_.delta.data()), floor(refinement_.delta.data())), S(epsilon<S>() / S(2) * length(vdot)));
   return added;
 }
@@ -111,14 +111,13 @@ S RigidDynamics<S>::length(const S* x) const {
 
 template <class S>
 template <class T>
-void RigidDynamics<S>::size_residual(const RigidDynamics<T>& formed, const T* vdot, const Refinement& how, bool shared) {
-  newton_euler_sizes(tree_, *formed.model_, formed.blocks_, formed.points_, formed.v_.data(), vdot, tau_.data(), formed.alpha_, formed.force_, units_of<S>(how), shared, sizes_);
+void RigidDynamics<S>::size_residual(const RigidDynamics<T>& formed, const T* vdot, const Refinement& how) {
+  newton_euler_sizes(tree_, *formed.model_, formed.blocks_, formed.points_, formed.v_.data(), vdot, tau_.data(), formed.alpha_, formed.force_, units_of<S>(how), sizes_);
 }
 
 template <class S>
 void RigidDynamics<S>::gather_wider() {
   if (!wide_model_) wide_model_ = source_.compiled<Wider<S>>();
-  blocks_.wide_inertia = &wide_model_->inertia;
 }
 
 // From the direction given, or any other, the worst signs along it and what they make are found in turn: each is at least as long as
@@ -235,7 +234,7 @@ void RigidDynamics<S>::mass_matrix_solve(const double* q, const S* right, int m,
     refine(out, N, m, how.refinement, how.form, S(0), [&] { return "the mass matrix inverse of '" + source_.name() + "'"; },
            [&](const S* x, S* r) {
              if (how.refinement.gathers_wider()) {
-               mass_matrix_residual_gathered(tree_, blocks_, x, columns_.data(), r, m, scratch_.data(), wide_r_);
+               mass_matrix_residual_gathered(tree_, blocks_, wide_model_->inertia, x, columns_.data(), r, m, scratch_.data(), wide_r_);
              } else if (how.refinement.wider()) {
                convert(x, size, wide_x_), convert(columns_.data(), size, wide_r_);
                wider_->subtract_product(wide_x_.data(), wide_r_.data(), m);

@@ -72,7 +72,7 @@ class RigidDynamics {
   template <class T>
   RigidDynamics<Wider<S>>& wider(const T* q, const T* v);
   template <class T>
-  void size_residual(const RigidDynamics<T>& formed, const T* vdot, const Refinement& how, bool shared);  // of the one that was formed last
+  void size_residual(const RigidDynamics<T>& formed, const T* vdot, const Refinement& how);  // of the one that was formed last
   S length(const S* x) const;   // 2-norm of nv numbers
   void gather_wider();  // from now on forces can be
   S floor(const S* direction);  // the most that rounding of that residual can make of a correction

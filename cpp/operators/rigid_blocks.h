@@ -14,6 +14,7 @@
 #include "model/compiled_model.h"
 #include "operators/rigid_factors.h"
 #include "spatial/articulated_inertia.h"
+#include "spatial/sizes.h"
 
 namespace pycraft {
 
@@ -62,7 +63,6 @@ class RigidBlocks {
   std::vector<S> J;                       // rotor inertia per coordinate
   std::vector<int> aligned;               // coordinate axis that a row of H is exactly, or -1
   const std::vector<InertiaFactors<S>>* inertia_factors = nullptr;
-  const std::vector<RigidInertia<Wider<S>>>* wide_inertia = nullptr;  // of the model one scalar up, where residuals need it
   // ---- how the articulated inertia is computed
   Form form = Form::fast;
   bool keep_inertias = true;              // P and P⁺ themselves are wanted (always there in the fast form)
@@ -207,11 +207,10 @@ class RigidBlocks {
       }
     }
   }
-  // ---------------------------------------------------------------- forces in a wider scalar T
+  // ---------------------------------------------------------------- forces in a wider scalar T, of inertias given in it
   template <class T>
-  void inertia_wide(int k, const S* a, T* f, int m) const {
-    const RigidInertia<T> M = wide_inertia ? cast<T>((*wide_inertia)[k]) : cast<T>(inertia[k]);
-    for (int c = 0; c < m; ++c) store(M * cast<T>(load(a, m, c)), f, m, c);
+  void inertia_wide(int k, const std::vector<RigidInertia<T>>& inertias, const S* a, T* f, int m) const {
+    for (int c = 0; c < m; ++c) store(inertias[k] * cast<T>(load(a, m, c)), f, m, c);
   }
   template <class T>
   void shift_add_wide(int k, const T* x, T* y, int m) const {
@@ -229,62 +228,44 @@ class RigidBlocks {
   }
 
   // ---------------------------------------------------------------- sizes of what residuals add up (algebra/sweeps/residual_rounding.h)
-  // Rotations mix the entries of a three-vector: each has the size of the whole.
+  // Poses and hinge maps are rounded as motions are, but for turns by right angles without travel, and axes of coordinates.
+  bool exact_pose(int k) const {
+    for (int j = first(k); j < last(k); ++j)
+      if (aligned[j] < 0 || aligned[j] > 2) return false;
+    return std::all_of(pose[k].R.m, pose[k].R.m + 9, [](const S& x) { return x == S(0) || x == S(1) || x == S(-1); });
+  }
   void motion_sizes(int k, const S* parent, const S* x, const S* a, S* out, int m) const {
+    using std::abs;
+    const Pose<S> X = sizes::of<S>(pose[k]);
     for (int c = 0; c < m; ++c) {
-      const Vector6<S> own = load(a, m, c);
-      S angular = magnitude(own.angular), linear = magnitude(own.linear);
-      if (parent) {
-        const Vector6<S> p = load(parent, m, c);
-        angular += magnitude(p.angular);
-        linear += magnitude(p.linear) + magnitude(pose[k].p) * magnitude(p.angular);
-      }
-      using std::abs;
+      Vector6<S> sum = sizes::of<S>(load(a, m, c));
+      if (parent) sum = sum + sizes::motion_carried(X, sizes::of<S>(load(parent, m, c)));
+      for (int j = first(k); j < last(k); ++j) sum = sum + S(abs(x[(j - first(k)) * m + c])) * sizes::of<S>(H[j]);
+      store(sum, out, m, c);
+    }
+  }
+  template <class Units>
+  void inertia_sizes(int k, const S* a, const Units& u, S* out, int m) const {  // of M a, twice: of its terms and of what they add up to
+    const RigidInertia<S> M = sizes::of<S>(inertia[k]);
+    for (int c = 0; c < m; ++c) store(S(S(2) * u.force) * sizes::pushed(M, sizes::of<S>(load(a, m, c))), out, m, c);
+  }
+  template <class Units>
+  void shifted_force_sizes(int k, const S* f, const Units& u, S* out, int m) const {
+    const Pose<S> X = sizes::of<S>(pose[k]);
+    const S& unit = exact_pose(k) ? u.force : u.motion;
+    for (int c = 0; c < m; ++c) add_to(unit * sizes::force_carried(X, sizes::of<S>(load(f, m, c))), out, m, c);
+  }
+  template <class Units>
+  void coordinate_sizes(int k, const S* f, const S* x, const Units& u, S* out, int m) const {
+    using std::abs;
+    for (int c = 0; c < m; ++c) {
+      const Vector6<S> size = sizes::of<S>(load(f, m, c));
       for (int j = first(k); j < last(k); ++j) {
-        const S rate = abs(x[(j - first(k)) * m + c]);
-        angular += rate * magnitude(H[j].angular);
-        linear += rate * magnitude(H[j].linear);
+        const size_t at = size_t(j - first(k)) * m + c;
+        out[at] = (aligned[j] >= 0 ? u.force : u.motion) * dot(sizes::of<S>(H[j]), size) + u.force * J[j] * S(abs(x[at]));
       }
-      store(alike(angular, linear), out, m, c);
     }
   }
-  void inertia_sizes(int k, const S* a, S* out, int m) const {  // of M a, twice: of its terms and of what they add up to
-    for (int c = 0; c < m; ++c) {
-      const Vector6<S> own = load(a, m, c);
-      store(S(2) * inertia_size(k, magnitude(own.angular), magnitude(own.linear)), out, m, c);
-    }
-  }
-  Vector6<S> inertia_size(int k, const S& angular, const S& linear) const {
-    const RigidInertia<S>& M = inertia[k];
-    S rotational = S(0);
-    using std::abs;
-    for (int i = 0; i < 3; ++i)
-      for (int j = i; j < 3; ++j) rotational = maximum(rotational, S(abs(M.rotational(i, j))));
-    const S moment = magnitude(M.moment);
-    return alike(rotational * angular + moment * linear, M.mass * linear + moment * angular);
-  }
-  void shifted_force_sizes(int k, const S* f, S* out, int m) const {
-    for (int c = 0; c < m; ++c) {
-      const Vector6<S> own = load(f, m, c);
-      const S linear = magnitude(own.linear);
-      add_to(alike(S(magnitude(own.angular) + magnitude(pose[k].p) * linear), linear), out, m, c);
-    }
-  }
-  void coordinate_sizes(int k, const S* f, const S* x, S* out, int m) const {
-    using std::abs;
-    for (int c = 0; c < m; ++c) {
-      const Vector6<S> own = load(f, m, c);
-      const S angular = magnitude(own.angular), linear = magnitude(own.linear);
-      for (int j = first(k); j < last(k); ++j)
-        out[(j - first(k)) * m + c] = magnitude(H[j].angular) * angular + magnitude(H[j].linear) * linear + J[j] * abs(x[(j - first(k)) * m + c]);
-    }
-  }
-  // Largest entry.
-  static S magnitude(const Vector3<S>& x) {
-    using std::abs;
-    return maximum(maximum(S(abs(x[0])), S(abs(x[1]))), S(abs(x[2])));
-  }
-  static Vector6<S> alike(const S& angular, const S& linear) { return {{angular, angular, angular}, {linear, linear, linear}}; }
 
   S log_determinant_of_D() const {
     using std::log;

@@ -40,8 +40,8 @@ void newton_euler(const CompiledModel<S>& model, const RigidBlocks<S>& blocks, c
 
 // r = τ - T of the same equations, motions in S and forces gathered in a wider T: M α + b of inertias given in T. f in S as above.
 template <class S, class T, class U>
-void newton_euler_residual_gathered(const CompiledModel<S>& model, const RigidBlocks<S>& blocks, const PointAccelerations<S>& points, const S* vdot, const U* tau, S* r,
-                                    std::vector<Vector6<S>>& alpha, std::vector<Vector6<S>>& f, std::vector<Vector6<T>>& wide) {
+void newton_euler_residual_gathered(const CompiledModel<S>& model, const std::vector<RigidInertia<T>>& inertias, const RigidBlocks<S>& blocks,
+                                    const PointAccelerations<S>& points, const S* vdot, const U* tau, S* r, std::vector<Vector6<S>>& alpha, std::vector<Vector6<S>>& f, std::vector<Vector6<T>>& wide) {
   const Vector6<S> base{Vector3<S>::zero(), -model.gravity};
   wide.resize(model.bodies);
   for (int k = 0; k < model.bodies; ++k) {
@@ -50,7 +50,7 @@ void newton_euler_residual_gathered(const CompiledModel<S>& model, const RigidBl
     Vector6<S> acceleration = motion_to_child(blocks.pose[k], p < 0 ? base : alpha[p]) + points.a[k];
     for (int j = first; j < first + n; ++j) acceleration = acceleration + vdot[j] * blocks.H[j];
     alpha[k] = acceleration;
-    const RigidInertia<T>& M = (*blocks.wide_inertia)[k];
+    const RigidInertia<T>& M = inertias[k];
     wide[k] = M * cast<T>(acceleration) + gyroscopic_part(M, cast<T>(points.angular_velocity[k]));
   }
   for (int k = model.bodies - 1; k >= 0; --k) {

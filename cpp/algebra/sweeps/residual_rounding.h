@@ -26,14 +26,15 @@
 
 namespace pycraft {
 
-// u of the motions and of the forces, which may be gathered in a wider scalar.
+// u of the motions and of the forces, which may be gathered in a wider scalar: half an epsilon, what one operation rounds. Poses and hinge
+// maps are rounded as motions are, and forces that are carried by them are off by as much in any scalar.
 template <class S>
 struct RoundingUnits {
   S motion, force;
 };
 template <class S>
 inline RoundingUnits<S> units_of(const Refinement& how) {
-  const S own = epsilon<S>(), up = static_cast<S>(epsilon<Wider<S>>());
+  const S own = epsilon<S>() / S(2), up = static_cast<S>(epsilon<Wider<S>>()) / S(2);
   return {how.wider() ? up : own, how.residual == ResidualPrecision::same ? own : up};
 }
 
@@ -64,22 +65,21 @@ void residual_sizes(const SkoStructure& tree, const Blocks& blocks, const S* x, 
     if (from) blocks.shift_transposed_add(k, from, row(alpha, k), m);
     blocks.hinge_transposed_add(k, xk, row(alpha, k), m);
     blocks.motion_sizes(k, from, xk, row(alpha, k), row(sizes.motion.data(), k), m);
-    blocks.inertia_sizes(k, row(alpha, k), row(sizes.force.data(), k), m);
+    blocks.inertia_sizes(k, row(alpha, k), units, row(sizes.force.data(), k), m);
     std::copy_n(row(alpha, k), size_t(tree.size[k]) * m, row(f, k));
     blocks.inertia_in_place(k, row(f, k), m);
   }
   for (int k = tree.bodies() - 1; k >= 0; --k) {
     S* coordinate = sizes.coordinate.data() + size_t(tree.dof_offset[k]) * m;
     const size_t at = size_t(tree.dof_offset[k]) * m;
-    blocks.coordinate_sizes(k, row(f, k), x + at, coordinate, m);
-    for (size_t i = 0; i < size_t(tree.dof[k]) * m; ++i) coordinate[i] += abs(b[at + i]);
+    blocks.coordinate_sizes(k, row(f, k), x + at, units, coordinate, m);
+    for (size_t i = 0; i < size_t(tree.dof[k]) * m; ++i) coordinate[i] += units.force * abs(b[at + i]);
     if (const int p = tree.parent[k]; p >= 0) {
       blocks.shift_add(k, row(f, k), row(f, p), m);
-      blocks.shifted_force_sizes(k, row(f, k), row(sizes.force.data(), p), m);
+      blocks.shifted_force_sizes(k, row(f, k), units, row(sizes.force.data(), p), m);
     }
   }
-  for (size_t i = 0; i < size_t(tree.dimension()) * m; ++i) sizes.motion[i] *= units.motion, sizes.force[i] *= units.force;
-  for (size_t i = 0; i < size_t(tree.coordinates()) * m; ++i) sizes.coordinate[i] *= units.force;
+  for (size_t i = 0; i < size_t(tree.dimension()) * m; ++i) sizes.motion[i] *= units.motion;
 }
 
 // u (Σ |e|* A + Σ |g|* F + Σ |y|* T) of every column of w: the most that rounding makes of the correction along w.
