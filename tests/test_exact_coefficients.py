@@ -102,16 +102,23 @@ def test_ratios_are_exact(arm, digits):
         ]  # fmt: skip
         for op, factor in cases:
             made = mpmath.matrix(np.asarray(op.at(arm.q, precision=digits).dense(dtype=object)).tolist())
-            wanted = factor * whole
-            assert mpmath.mnorm(made - wanted, mpmath.inf) <= mpmath.mpf(10) ** (2 - digits) * mpmath.mnorm(wanted, mpmath.inf), op
+            assert mpmath.mnorm(made - factor * whole, mpmath.inf) <= mpmath.mpf(10) ** (2 - digits) * mpmath.mnorm(
+                factor * whole, mpmath.inf
+            ), op
         n = arm.nv
         shift = (D / 3).logdet() - D.logdet()
         assert abs(mpmath.mpf(float(shift.at(arm.q, precision=digits))) + n * mpmath.log(3)) <= 2 * n * np.finfo(float).eps
 
 
 def test_what_text_says_is_decimal(arm):
-    typed = ["0.3 D = 0.1 D + 0.2 D", "0.3*D == 0.1*D + 0.2*D", "D/3 + 2/3 D = D", "1e-3 D = D/1000", r"\frac{1}{3} D = D/3"]
-    for text in [*typed, "tr(D)/3 = tr(D/3)"]:
+    for text in (
+        "0.3 D = 0.1 D + 0.2 D",
+        "0.3*D == 0.1*D + 0.2*D",
+        "D/3 + 2/3 D = D",
+        "1e-3 D = D/1000",
+        r"\frac{1}{3} D = D/3",
+        "tr(D)/3 = tr(D/3)",
+    ):
         assert pc.check(text, arm, states=2) and pc.prove(text, arm), text
     for text in ("0.3 D = 0.1 D + 0.20000000000000001 D", "D/3 = 0.3333333333333333 D"):
         assert not pc.check(text, arm, states=2, search=False) and not pc.prove(text, arm), text
