@@ -169,8 +169,8 @@ def _prove(read: Statement, model: Any, assumed: Sequence[Assumption] = (), unkn
     expand = problem.expand if not problem.scalars else functools.partial(scalars.expand, problem)
     try:
         left, right = expand(read.lhs), expand(read.rhs)
-    except Void as void:
-        return Proof.of_statement(read, problem, [], [], ({}, {}), str(void))
+    except Void as zero:
+        return Proof.of_statement(read, problem, [], [], ({}, {}), str(zero))
     except GaveUp:
         return Proof.of_statement(read, problem, [], [], ({}, {}), "it is too large: too many words, inverses or nodes")
     p, q = problem.sides = [left.before, right.before]

@@ -274,8 +274,8 @@ class Alphabet:
         if kind == "1":
             return "1"
         if kind in ("×", "1/") and not (letters and letters[0].startswith("⟨")):
-            inside = factors_of(word) if kind == "×" else [word[1:]]
-            parts = [self._number_shown(w, shown, trace, determinant, norm, logarithm) for w in inside]
+            numbers = factors_of(word) if kind == "×" else [word[1:]]
+            parts = [self._number_shown(w, shown, trace, determinant, norm, logarithm) for w in numbers]
             return " ".join(parts) if kind == "×" else f"1/{parts[0]}"
         if kind == "1/":
             return f"1/({letters[0][1:-1]})"
