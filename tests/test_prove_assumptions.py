@@ -151,3 +151,124 @@ def test_the_books_derivatives_are_typed_with_their_diagonal_blocks():
 def test_the_logarithm_of_a_determinant_presupposes_that_it_is_not_zero(text):
     proof = prove(text)
     assert not proof and "ln|det" in proof.note
+
+
+# ---------------------------------------------------------------------- cases
+@pytest.mark.parametrize(
+    "text, assume",
+    [
+        ("HψMψ*H* + [I-HψK]J[I-HψK]* = D", "J > 0 or J = 0"),
+        ("C : Θ → Θ; C J = J C", "C J⁻¹ = J⁻¹ C or J = 0"),
+        ("HG = I - J D⁻¹", "J regular or J = 0"),
+    ],
+)
+def test_cases_are_proved_one_by_one(text, assume):
+    proof = prove(text, assume=[assume])
+    assert proof and proof.recheck() and len(proof.cases) == 2 and all(proof.cases)
+    assert proof.hypotheses == [assume] and assume in str(proof) and "Where" in proof._repr_html_()
+
+
+@pytest.mark.parametrize(
+    "text, assume, where",
+    [
+        ("HG = I", "J > 0 or J = 0", "J > 0"),  # true in the second case only
+        ("J inv(J) D = D", "J > 0 or J = 0", "J = 0"),  # in which J⁻¹ does not exist
+        ("φ = ψ", "serial chain or J = 0", "serial chain"),
+    ],
+)
+def test_a_case_that_fails_is_named(text, assume, where):
+    proof = prove(text, assume=assume)
+    assert not proof and f"no proof found where {where}" in str(proof)
+
+
+# ---------------------------------------------------------------------- numbers
+@pytest.mark.parametrize(
+    "text, hypotheses",
+    [
+        ("tr(D) tr(M) = tr(M) tr(D)", []),
+        ("tr(ℳ) tr(ΥM) = tr(MΥ) tr(HφMφ*H*)", []),
+        ("tr(P) ln det(ℳ+J) = tr(P) ln det D", []),
+        ("tr(P)^2 ln det ℳ = tr(P) tr(P) ln det D", [J0]),
+        ("ln det ℳ/tr(P) = ln det D/tr(P)", [J0]),
+        ("norm(ψMψ*)/tr(D) - norm(P + ψ̃P + Pψ̃*)/tr(D) = 0", [J0]),
+        ("(tr(D) + tr(M)) (tr(D) - tr(M)) = tr(D)^2 - tr(M)^2", []),
+        ("1/(1/tr(D)) = tr(D)", []),
+    ],
+)
+def test_products_and_quotients_of_numbers(text, hypotheses):
+    proof = prove(text)
+    assert proof and proof.hypotheses == hypotheses and proof.recheck() and (proof.worst or 0) < ROUNDING, proof
+    assert pc.check(text, meeting(hypotheses, 1), states=2)
+
+
+@pytest.mark.parametrize(
+    "text", ["tr(D) tr(D) = tr(D D)", "tr(P)^2 = tr(P)", "1/tr(D) = tr(D⁻¹)", "tr(D)/tr(D) = 2", "1/(tr(D) - tr(D)) = 1/(tr(D) - tr(D))"]
+)
+def test_no_false_product_is_proved(text):
+    proof = prove(text)
+    assert not proof
+    if "- tr(D)" in text:
+        assert "reciprocal of zero" in str(proof)
+
+
+# ---------------------------------------------------------------------- derivatives in text
+@pytest.mark.parametrize(
+    "text, hypotheses",
+    [
+        ("∂E = E Δ_i", []),
+        ("∂ℳ = Hφ̃Δ_iφMφ*H* + Hφ M φ*Δ_i*φ̃*H*", [CONSTANT]),
+        ("∂ℳ = Hφ[Δ_iφM + Mφ*Δ_i*]φ*H*", [SINGLE, CONSTANT]),
+        ("∂P = blockdiag(E_φ(τ̄ ∂P τ̄* + Δ_iP⁺ + P⁺Δ_i*)E_φ*)", [CONSTANT]),
+        (r"\partial_i\psi = \psi\,\partial_i E_\psi\,\psi", []),
+        ("∂(ℳ⁻¹) = -ℳ⁻¹ ∂ℳ ℳ⁻¹", []),
+        ("∂_t φ = φ̃ Δ_θ̇ φ", []),
+        ("d/dt ℳ = Hφ̃Δ_θ̇φMφ*H* + Hφ M φ*Δ_θ̇*φ̃*H* + Ḣφ M φ*H* + HφMφ*Ḣ*", []),
+        ("d/dt(Dθ̇) = ∂_tD θ̇ + D θ̈", []),
+        ("∂_j∂_i φ = φ̃Δ_jφ̃Δ_iφ + φ̃Δ_iφ̃Δ_jφ", []),
+        ("∂_i∂_i φ = 2 φ̃Δ_iφ̃Δ_iφ + φ̃Δ_iΔ_iφ", []),
+        ("∂_j∂_i(ℳ⁻¹) = ℳ⁻¹∂_iℳℳ⁻¹∂_jℳℳ⁻¹ + ℳ⁻¹∂_jℳℳ⁻¹∂_iℳℳ⁻¹ - ℳ⁻¹∂_j∂_iℳ ℳ⁻¹", []),
+        pytest.param("∂_j∂_i D = H ∂_j∂_iP H*", [CONSTANT], marks=pytest.mark.slow),
+    ],
+)
+def test_derivatives_are_typed(text, hypotheses):
+    proof = prove(text)
+    assert proof and proof.hypotheses == hypotheses and proof.recheck() and (proof.worst or 0) < ROUNDING, proof
+    if len(text) < 60:
+        assert pc.check(text, meeting(hypotheses, 1), states=1)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "∂D = 0",
+        "∂φ = φΔ_iφ",
+        "∂_tH = 0",
+        *(
+            pytest.param(text, marks=pytest.mark.slow)
+            for text in (
+                "∂_tφ = φ̃Δ_iφ",
+                "∂_j∂_iφ = φ̃Δ_jφ̃Δ_iφ",
+                "∂_i∂_iφ = 2φ̃Δ_iφ̃Δ_iφ",
+                "∂_jφ = ∂_iφ",
+                "∂ℳ = Hφ̃Δ_iφMφ*H*",
+            )
+        ),
+    ],
+)
+def test_no_false_derivative_is_proved(text):
+    proof = prove(text)
+    assert not proof or proof.hypotheses == [CONSTANT] and text == "∂_tH = 0"
+
+
+@pytest.mark.parametrize(
+    "text, says",
+    [
+        ("∂_t∂_iφ = φ", "along time"),
+        ("∂∂∂φ = φ", "beyond the second"),
+        ("∂ ln det D = 0", "tr\\(X⁻¹∂X\\)"),
+        ("∂3 φ = φ", "not understood"),
+    ],
+)
+def test_derivatives_that_are_not_read(text, says):
+    with pytest.raises(pc.EvaluationError, match=says):
+        prove(text)

@@ -417,8 +417,8 @@ def evaluate(node: Node, letters: DenseLetters) -> Value:
     match node:
         case Letter():
             return letters.of(node)
-        case Number(value=value):
-            return Value(np.array(float(value)), None, None)
+        case Number(value=number):
+            return Value(np.array(float(number)), None, None)
         case Star(inner=inner):
             value = evaluate(inner, letters)
             if value.domain is None:

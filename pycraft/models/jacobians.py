@@ -53,7 +53,7 @@ def _turned(R: np.ndarray, J: np.ndarray) -> np.ndarray:
 
 def _moves(J: np.ndarray) -> np.ndarray:
     """Which coordinates (nv,) move the frame: columns off the path to the base are zero, the others never."""
-    return J.reshape(-1, J.shape[-1]).any(axis=0)
+    return np.asarray(J.reshape(-1, J.shape[-1]).any(axis=0))
 
 
 def _cross(p: np.ndarray, columns: np.ndarray) -> np.ndarray:

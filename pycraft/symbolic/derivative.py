@@ -21,7 +21,7 @@ class Formula:
 
     __array_ufunc__ = None
 
-    def __init__(self, kind: str, children: list[Any], coefficient: Any = 1.0, index: int = -1):
+    def __init__(self, kind: str, children: list[Any], coefficient: Any = 1.0, index: int | str = -1):
         self.kind, self.children, self.coefficient, self.index = kind, children, coefficient, index
         self.name = None
 
@@ -85,6 +85,9 @@ class Formula:
         parts = [c.written_out() if isinstance(c, Formula) else c for c in self.children]
         match self.kind:
             case "derivative":
+                if self.index == TIME:
+                    source = parts[0].sources[0]
+                    return parts[0].dot(vdot=_core.vector("vdot", source.Theta))
                 return parts[0].diff(self.index)
             case "sum":
                 return parts[0] + parts[1]
@@ -130,6 +133,7 @@ class Formula:
         closed = [f"({p})" if c.kind == "sum" or c.kind == "scaled" else p for c, p in zip(self.children, parts, strict=True)]
         match self.kind:
             case "derivative":
+                partial += "_t " if self.index == TIME else ""
                 return partial + (parts[0] if self.children[0].kind == "symbol" else f"({parts[0]})")
             case "sum":
                 return f"{parts[0]} + {parts[1]}".replace("+ −", "− ").replace("+ -", "- ")
@@ -154,12 +158,12 @@ def _number(c: Any) -> str:
 
 
 def derivative(expression: Any, coordinate: int | str) -> Formula:
-    """∂(expression)/∂θ_i, to be proved equal to something by `prove`.
+    """∂(expression)/∂θ_i, or d(expression)/dt, to be proved equal to something by `prove`.
 
     Parameters
     ----------
-    expression : an operator expression
-    coordinate : the coordinate i, by number or by name
+    expression : an operator expression, or such a derivative: a second one
+    coordinate : the coordinate i, by number or by name; "t" for time, along which θ̇ moves by the vector `vdot`
 
     Returns
     -------
@@ -169,8 +173,6 @@ def derivative(expression: Any, coordinate: int | str) -> Formula:
     ------
     ModelError
         There is no such coordinate.
-    EvaluationError
-        The expression is itself made of derivatives.
 
     Examples
     --------
@@ -180,8 +182,8 @@ def derivative(expression: Any, coordinate: int | str) -> Formula:
     >>> bool(prove(derivative(soa.D, 1), soa.H @ derivative(soa.P, 1) @ soa.H.T))
     True
     """
-    if isinstance(expression, Formula):
-        raise _core.EvaluationError("second derivatives are outside: prove takes first ones")
+    if coordinate == TIME:
+        return Formula("derivative", [expression], index=TIME)
     names = expression.sources[0].coordinate_names if expression.sources else []
     if isinstance(coordinate, str):
         if coordinate not in names:

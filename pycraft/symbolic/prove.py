@@ -19,9 +19,10 @@ from ..identities.parse import Statement
 from . import mechanics, scalars
 from .attempt import Attempt, Outcome
 from .axioms import theory
+from .cases import by_cases
 from .completion import complete
 from .derivation import DerivativeProblem
-from .derivative import derivative
+from .derivative import TIME, derivative
 from .equations import Equation, Step, joined, numbered, opened
 from .nesting import within_reach
 from .presuppositions import Void, inverses_used, presupposed
@@ -30,7 +31,7 @@ from .reading import Assumption, assumptions, reading
 from .rules import Setting, generous
 from .values import Values
 from .walk import GaveUp
-from .words import ONE, Alphabet, Polynomial, Word, combine, inverted, plain, split
+from .words import ONE, Alphabet, Polynomial, Word, combine, inverted, plain, split, underived
 
 
 @within_reach("prove")
@@ -43,6 +44,7 @@ def prove(lhs: Any, rhs: Any = None, model: Any = None, *, assume: Iterable[str]
     model : Multibody or OperatorSet: what text is read on, and where the steps are evaluated. Text without a model is read on a small tree.
     assume : what is taken for granted, as text: equations of operators ("G X = 0", "C = C*"), "X > 0" (symmetric and positive definite,
         hence with an inverse), or hypotheses by name ("J = 0", "serial chain", ...). Those that the proof uses are among its hypotheses.
+        "J > 0 or J = 0" is proved case by case.
     define : letters of one's own for the text, by name: expressions, text that reads as one, "Θ", "V" or "F" for a vector there, "Θ → V"
         for an operator of which nothing is known. In the text itself they stand before the statement:
         `x ∈ Θ; C : Θ → Θ; A := I + HφK; statement`.
@@ -90,7 +92,7 @@ def prove(lhs: Any, rhs: Any = None, model: Any = None, *, assume: Iterable[str]
     else:
         read = Statement(*_sides(lhs, rhs), "", "expressions")
         read_on = reading(_operators(model) if model is not None else _letters_of(read), define)
-    return _prove(read, model, assumptions(read_on, assume), read_on.unknown)
+    return by_cases(assume, lambda case: _prove(read, model, assumptions(read_on, case), read_on.unknown))
 
 
 @within_reach("prove")
@@ -167,8 +169,8 @@ def _prove(read: Statement, model: Any, assumed: Sequence[Assumption] = (), unkn
     expand = problem.expand if not problem.scalars else functools.partial(scalars.expand, problem)
     try:
         left, right = expand(read.lhs), expand(read.rhs)
-    except Void as void:
-        return Proof.of_statement(read, problem, [], [], ({}, {}), str(void))
+    except Void as zero:
+        return Proof.of_statement(read, problem, [], [], ({}, {}), str(zero))
     except GaveUp:
         return Proof.of_statement(read, problem, [], [], ({}, {}), "it is too large: too many words, inverses or nodes")
     p, q = problem.sides = [left.before, right.before]
@@ -299,11 +301,11 @@ def _settings(problem: DerivativeProblem) -> Iterator[tuple[Setting, list[tuple[
     """Settings by the number of hypotheses, with the rules that they add."""
     rules, constant = problem.derivative_rules()
     letters = {x for p in problem.polynomials() for word in p for x in word}
-    names = {plain(x).removeprefix("∂") for x in letters}
+    names = {underived(plain(x)) for x in letters}
     deltas = [n for n, known in problem.alphabet.letters.items() if getattr(known.expression, "name", "") in ("Delta", "Delta_theta_dot")]
     regular = {name for _, name in problem.assumed if name}
     possible = ["J = 0"] * ("J⁻¹" not in letters and "J" not in regular) + ["serial chain"] * ("Υ" in names)
-    if names & {"Ḣ", "a"}:
+    if names & {"Ḣ", "a"} or TIME in problem.alphabet.along.values():
         constant.append((Equation("hypothesis", "Ḣ = 0", {("Ḣ",): ONE}, {}, hypothesis="constant H"), ("Ḣ",)))
     possible += ["single-DOF hinges"] * bool(deltas) + ["constant H"] * bool(constant)
     composite, velocities = "R" in names or bool(problem.relations), bool(names & mechanics.NAMES)

@@ -102,7 +102,7 @@ class Reading:
         """An equation, "X > 0", or the name of a hypothesis. Raises ParseError."""
         if text in HYPOTHESES:
             return Assumption(text)
-        if (found := re.match(r"(.*?)\s*>\s*0$", text)) is not None:
+        if (found := re.match(r"(.*?)(?:\s*>\s*0|\s+regular)$", text)) is not None:
             return Assumption(text, self.read(found[1]).lhs, regular=True)
         read = self.read(text)
         if read.rhs is None or not isinstance(read.lhs, _core.Operator):

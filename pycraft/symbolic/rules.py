@@ -17,7 +17,7 @@ from . import mechanics
 from .axioms import Theory, solved, theory
 from .equations import Equation, Step, Use, marked, numbered
 from .walk import GaveUp
-from .words import ONE, Alphabet, Number, Polynomial, Word, add_to, inverted, plain, ratio
+from .words import FIRST, ONE, Alphabet, Number, Polynomial, Word, add_to, derivations, inverted, plain, ratio
 
 WORDS, REWRITES = 2000, 12000
 """Sizes at which a reduction gives up; `generous` allows for more."""
@@ -98,7 +98,7 @@ _WEIGHTS = {
     **{"φ̃": 9, "ψ̃": 9, "τ": 9, "τ̄": 9, "P⁺": 19, "E_ψ": 9, "Ω": 19},
     **mechanics.WEIGHTS,
 }
-_HEAVY = {"∂": 40, "‹": 30}
+_HEAVY = {"‹": 30}
 _INVERSE_WEIGHTS = {"D": 0, "φ": 9, "ψ": 19}
 
 
@@ -106,6 +106,8 @@ _INVERSE_WEIGHTS = {"D": 0, "φ": 9, "ψ": 19}
 def letter_weight(letter: str) -> int:
     """What a letter weighs. Derivatives are heavy: the rules write them by Δ; so is what only the statement knows, a user's constant."""
     name = plain(letter)
+    if name.startswith(FIRST):  # of second derivatives those of first ones are made
+        return 40 if len(derivations(name)[0]) == 1 else 200
     if name[0] in _HEAVY:
         return _HEAVY[name[0]]
     return (_INVERSE_WEIGHTS if inverted(letter) else _WEIGHTS).get(name, 1)

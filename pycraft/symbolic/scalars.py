@@ -43,6 +43,7 @@ from .words import (
     ratio,
     split,
     times,
+    underived,
 )
 
 STEPS = 200
@@ -99,7 +100,7 @@ def reciprocal_of(p: Polynomial) -> Polynomial | None:
 def space_of(word: Word, alphabet: Alphabet) -> str:
     """The space that a word's values lie in."""
     name, mark = split(word[0])
-    known = alphabet.letters[name.removeprefix("∂")]
+    known = alphabet.letters[underived(name)]
     if known.word:
         return space_of(alphabet.star_word(known.word) if mark == "*" else known.word, alphabet)
     if getattr(known.expression, "domain", None) is not None:

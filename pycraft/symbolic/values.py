@@ -19,7 +19,7 @@ from .. import _core
 from .equations import Step
 from .expand import symbol_parts
 from .walk import Walk, carried_out
-from .words import FURTHER, NUMBERS, Alphabet, Polynomial, Word, factors_of, inverse_of, split
+from .words import FURTHER, NUMBERS, Alphabet, Polynomial, Word, derivations, factors_of, inverse_of, split
 
 PROBES = 3
 SINGULAR = 1e-13
@@ -114,17 +114,16 @@ class Values:
         return np.asarray(e._bound(self._binding).dense(rules=False))
 
     def _derivative(self, name: str) -> np.ndarray:
-        """∂X along the coordinate that its letter names, by the core's rules."""
-        known = self.alphabet.letters[name]
-        if known.expression is not None:
-            e, index = known.expression
-            e = e if self._contexts else transferred(e, self.operators)
-        else:
-            derived = [k.expression for n, k in self.alphabet.letters.items() if n.startswith("∂") and k.expression is not None]
-            if not derived:
-                raise NoValue(f"{known.text} has no value")
-            e, index = self._expression(name[1:]), derived[0][1]
-        return np.asarray(e.diff(index)._bound(self._binding).dense())
+        """∂X along the coordinates, or time, that its marks stand for, by the core's rules."""
+        marks, inner = derivations(name)
+        e = self._expression(inner)
+        for mark in reversed(marks):
+            index = self.alphabet.along[mark]
+            e = e.dot(vdot=_core.vector("vdot", self.operators.Theta)) if index == "t" else e.diff(index)
+        if any(x.kind == "vector" for x in _parts(e)):
+            rng = np.random.default_rng([self.seed, *b"vdot"])
+            return np.asarray(e._bound(self._binding).value(vdot=rng.uniform(-1, 1, self.operators.Theta.dimension))).reshape(-1, 1)
+        return np.asarray(e._bound(self._binding).dense())
 
     def dimension(self, space: str) -> int:
         """Of a space that every model has. Raises NoValue."""
@@ -192,6 +191,14 @@ class Values:
             return (size := float(np.linalg.norm(factors[0]))), size
         product, bound = (functools.reduce(operator.matmul, x) for x in (factors, [np.abs(f) for f in factors]))
         return float(np.trace(product)), float(np.trace(bound))
+
+
+def _parts(e: Any) -> list[Any]:
+    """An expression and all below it."""
+    seen = [e]
+    for x in seen:
+        seen += [c for c in x.children if c not in seen]
+    return seen
 
 
 def is_singular(X: np.ndarray) -> bool:

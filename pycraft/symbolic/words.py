@@ -102,6 +102,25 @@ def factors_of(word: Word) -> list[Word]:
     return [tuple(f) for f in made]
 
 
+# ---------------------------------------------------------------------- derivatives
+FIRST, SECOND = "∂", "∂ⱼ"
+"""Marks of letters that are derivatives: along what a statement differentiates along first, and along what second; ∂ⱼ∂X is one of ∂X."""
+
+
+def derivations(name: str) -> tuple[list[str], str]:
+    """(the marks of derivatives, outermost first; the letter that they are of)."""
+    marks = []
+    while name.startswith(FIRST):
+        marks.append(SECOND if name.startswith(SECOND) else FIRST)
+        name = name[len(marks[-1]) :]
+    return marks, name
+
+
+def underived(name: str) -> str:
+    """The letter that a derivative is of; of any other itself."""
+    return derivations(name)[1]
+
+
 # ---------------------------------------------------------------------- letters
 @dataclass(frozen=True)
 class Letter:
@@ -191,6 +210,7 @@ class Alphabet:
     def __init__(self, letters: Mapping[str, Letter] | None = None):
         self.letters: dict[str, Letter] = dict(_sko() if letters is None else letters)
         self._stars: dict[str, str] = {}
+        self.along: dict[str, Any] = {}  # by the mark of a derivative, the coordinate or "t" that it is along
 
     def add(self, letter: Letter) -> None:
         self.letters[letter.name] = letter
@@ -254,8 +274,8 @@ class Alphabet:
         if kind == "1":
             return "1"
         if kind in ("×", "1/") and not (letters and letters[0].startswith("⟨")):
-            inside = factors_of(word) if kind == "×" else [word[1:]]
-            parts = [self._number_shown(w, shown, trace, determinant, norm, logarithm) for w in inside]
+            numbers = factors_of(word) if kind == "×" else [word[1:]]
+            parts = [self._number_shown(w, shown, trace, determinant, norm, logarithm) for w in numbers]
             return " ".join(parts) if kind == "×" else f"1/{parts[0]}"
         if kind == "1/":
             return f"1/({letters[0][1:-1]})"
