@@ -134,9 +134,14 @@ def _numbers(node: Node) -> Iterator[tuple[Node, Slip]]:
     """Changes of a whole side by a number."""
     if isinstance(node, (Sum, Number)):
         return
-    for value, name in ((2.0, "2"), (0.5, "½"), (-1.0, "-1")):
+    for value, name in (*_scales(node), (-1.0, "-1")):
         slip = Slip(f"sign of {_shown(node)}", 1.0) if value < 0 else Slip(f"factor {name} missing in {_shown(node)}", 2.5)
         yield total([(-1, node)]) if value < 0 else product(Number(value), node), slip
+
+
+def _scales(node: Node) -> tuple[tuple[float, str], ...]:
+    """Numbers that may be missing in a term; none where it has one, which may be one too many."""
+    return () if isinstance(node, Product) and any(isinstance(f, Number) for f in node.factors) else ((2.0, "2"), (0.5, "½"))
 
 
 def _of_letter(letter: Letter) -> Iterator[tuple[Node, Slip]]:
@@ -180,7 +185,7 @@ def _of_sum(node: Sum) -> Iterator[tuple[Node, Slip]]:
     for i, (sign, term) in enumerate(terms):
         flipped = [*terms[:i], (-sign, term), *terms[i + 1 :]]
         yield total(flipped), Slip(f"sign of {_shown(term)}", 1.0)
-        for value, name in ((2.0, "2"), (0.5, "½")):
+        for value, name in _scales(term):
             scaled = [*terms[:i], (sign, product(Number(value), term)), *terms[i + 1 :]]
             yield total(scaled), Slip(f"factor {name} missing in {_shown(term)}", 2.5)
         if len(terms) > 1:
