@@ -36,8 +36,9 @@ test-python: .venv/tested
 
 check: .venv/tested
 	$(BIN)/ruff check pycraft tests
-	$(BIN)/cmake --build build --target test_allocation -j $(JOBS)
+	$(BIN)/cmake --build build --target test_allocation test_kernels -j $(JOBS)
 	build/test_allocation
+	build/test_kernels
 	$(BIN)/python -m pytest $(PARALLEL) -m "not peers and not slow" -x
 
 test-peers: .venv/peers

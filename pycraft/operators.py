@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import reduce
+from operator import mul
 from typing import Any
 
 import numpy as np
@@ -252,7 +254,13 @@ def scalar_gradient(scalar: _core.Scalar, over: str = "coordinates") -> np.ndarr
     kind, value, operand, terms = scalar._parts()
     if terms:
         parts = [scalar_gradient(t, over) for t in terms]
-        return np.asarray((value if kind == _SCALED else 1.0) * sum(parts))
+        if kind in (_PRODUCT, _RECIPROCAL):
+            values = [np.asarray(t.value())[..., None] for t in terms]
+            if kind == _RECIPROCAL:
+                return np.asarray(-parts[0] / values[0] ** 2)
+            others = [reduce(mul, values[:i] + values[i + 1 :], 1.0) for i in range(len(terms))]
+            return np.asarray(sum(x * part for x, part in zip(others, parts, strict=True)))
+        return np.asarray((float(value) if kind == _SCALED else 1.0) * sum(parts))
     if operand is None:  # a number in a sum
         return np.zeros(())
     models = {source.model for source in operand.sources if isinstance(source, _core.MultibodyOperators)}
@@ -268,7 +276,7 @@ def scalar_gradient(scalar: _core.Scalar, over: str = "coordinates") -> np.ndarr
     return np.stack([np.asarray(scalar.diff(i), float) for i in range(model.nv)], axis=-1) if model.nv else np.zeros(0)
 
 
-_LOGDET, _SCALED = 2, 5
+_LOGDET, _SCALED, _PRODUCT, _RECIPROCAL = 2, 5, 6, 7
 
 
 def _is_mass_matrix(operand: _core.Operator) -> bool:

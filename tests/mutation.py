@@ -7,9 +7,11 @@
     python tests/mutation.py --list               what there is
 
 All mutants of C++ are switches of one build in a copy of the tree, those of Python spans replaced as a module is read: the tree itself is
-never touched. A first run notes what each everyday test touches and how long it takes; then each mutant meets the tests that touch it, the
-quickest first and those that have killed before, until one is red or --budget seconds are spent. Tests that are red without any mutant are
-left out. The copy and what was found are kept under build/mutation (or --folder) and taken up again while the sources stay as they are.
+never touched. A first run notes what each everyday test touches and how long it takes; then each mutant meets tests that touch it, quick
+ones that touch little else first and those that have killed before, until one is red or --budget seconds are spent; what is killed is
+tried again only where its source or the test has changed. Mutants of C++ meet cpp/tests/test_kernels.cpp before. Tests that are red
+without any mutant are left out. The copy and what was found are kept under build/mutation (or --folder) and taken up again while the
+sources stay as they are.
 Exit status 1 where a mutant survives that tests/mutants/known.py does not explain.
 """
 

@@ -3,12 +3,12 @@ by dense NumPy that says whether such a statement is false indeed.
 """
 
 import functools
-import operator
 
 import numpy as np
 from formulas import blocks_only
 
 import pycraft as pc
+from pycraft.symbolic import values
 
 EXCHANGED = {
     "E": "E_psi",
@@ -36,24 +36,25 @@ EXCHANGED = {
 
 def rebuilt(op, children):
     """The same node over other children."""
-    match op.kind:
-        case "sum":
-            return functools.reduce(operator.add, children)
-        case "product":
-            return functools.reduce(operator.matmul, children)
-        case "scaled":
-            return op.coefficient * children[0]
-        case "transpose":
-            return children[0].T
-        case "inverse":
-            return children[0].inv()
-        case "blockdiag":
-            return pc.blockdiag(children[0])
-        case "sqrt":
-            return children[0].sqrt()
-        case "function":
-            return op._with_operand(children[0])
-    raise AssertionError(op.kind)
+    made = op._with_operand(children[0]) if op.kind == "function" else values.rebuilt(op, children)
+    assert made is not None, op.kind
+    return made
+
+
+def nodes(e, path=()):
+    """(path, node) of every node."""
+    yield path, e
+    for i, child in enumerate(e.children):
+        yield from nodes(child, (*path, i))
+
+
+def replaced(e, path, by):
+    """The expression with another node at a path."""
+    if not path:
+        return by
+    children = list(e.children)
+    children[path[0]] = replaced(children[path[0]], path[1:], by)
+    return rebuilt(e, children)
 
 
 def exchanges(op):

@@ -15,7 +15,7 @@ STATES = 4
 @pytest.mark.parametrize("first", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in range(40, 400, 40))])
 def test_random_expressions(first):
     """Every request of expressions drawn at random, many of which theorems make independent of the state."""
-    found = [line for seed in range(first, first + 40) for line in batches.check(seed)[0]]
+    found = [line for seed in range(first, first + 40) for line in batches.check(seed)[1]]
     assert not found, "\n".join(found)
 
 
@@ -94,13 +94,14 @@ def test_an_empty_batch_is_empty(batch):
         assert (e @ np.ones(e.shape[1])).shape == (0, e.shape[0])
 
 
-def test_what_one_state_asks_of_an_elimination_is_not_kept():
+@pytest.mark.parametrize("seed", [0, 5])
+def test_what_one_state_asks_of_an_elimination_is_not_kept(seed):
     """N + N* + D - C: where C is D every pivot block but the first is zero and fronts are merged; at the states after it they are not."""
-    arm = pc.chain(6, seed=5)
+    arm = pc.chain(6, seed=seed)
     H, E, G, D = arm.soa("H E G D")
     bent = np.random.default_rng(0).uniform(-1, 1, (2, 6))
     C = pc.constant(D.at(bent[0]).dense(), D.domain, D.codomain)
-    N = H @ E @ G
+    N = H @ E @ G if seed else H @ E @ G @ D
     e = (N + N.T + D - C).inv()
     Q, x = bent[[1, 0, 1, 0]], np.ones(6)
     together = e.at(Q) @ x

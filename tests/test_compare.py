@@ -136,3 +136,42 @@ def test_every_hinge_of_mujoco():
     assert not report and "mass" in kinds_said(report)
     with pytest.raises(pc.ModelError, match="has no joint in MuJoCo's model"):
         pc.compare(tree(["pin", "slider"]), mujoco.MjModel.from_xml_string("<mujoco/>"))
+
+
+def two_links(turn=None, axis=(0.0, 1.0, 0.0), mass=2.0):
+    """A pin and a slider of the same motion, the last body's frame turned."""
+    model = pc.Multibody("two links")
+    turn = np.eye(3) if turn is None else turn
+    inertia = np.array([[0.5, 0.02, 0.01], [0.02, 0.4, 0.03], [0.01, 0.03, 0.3]])
+    model.add_body("upper", mass=1.0, axis=(0, 0, 1), com=(0.1, 0, 0.2), inertia=np.eye(3))
+    model.add_body(
+        "lower", "upper", axis=turn.T @ axis, position=(0.3, 0, 0.1), rotation=turn,
+        mass=mass, com=turn.T @ (0.1, 0.2, 0.3), inertia=turn.T @ inertia @ turn,
+    )  # fmt: skip
+    return model
+
+
+def test_a_frame_that_is_turned_is_a_convention():
+    turn = np.linalg.qr(np.random.default_rng(4).normal(size=(3, 3)))[0]
+    report = pc.compare(two_links(), two_links(turn * np.linalg.det(turn)))
+    assert report and kinds_said(report) == ["body frame"] and not report.differences[0].physical
+
+
+def test_small_differences_are_differences():
+    assert kinds_said(pc.compare(two_links(), two_links(mass=2.00001))) == ["mass"]
+    report = pc.compare(two_links(), two_links(axis=(1e-4, 1.0, 0.0)))
+    assert not report and kinds_said(report) == ["geometry"] and report.differences[0].physical
+
+
+def test_the_worst_of_all_states_is_reported():
+    heavier, lighter = two_links(mass=2.5), two_links()
+    for seed in range(6):
+        one, five = (pc.compare(lighter, heavier, states=states, seed=seed).in_common["mass matrix"] for states in (1, 5))
+        assert five >= one
+
+
+def test_what_they_are_is_shown_before_gravity_is_the_same():
+    other = two_links()
+    other.gravity = (0, 0, -9.81)
+    report = pc.compare(two_links(), other)
+    assert report and report.as_they_are["forward dynamics"] > 1e-3 > 1e-13 > report.in_common["forward dynamics"]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import pycraft as pc
+from pycraft.identities.bounds import Sizes
 from pycraft.identities.judge import FAILS, HOLDS, UNDECIDED, BoundState, Taken, Verdict, decided, judge, ladder
 from pycraft.identities.report import PASSED, CheckReport, Finding, Report
 
@@ -74,6 +75,8 @@ RULES = [
     (at(0.0, 5e-10, 1e-24, 0.0, 3e-91, bounds=[1e9] * 5), HOLDS),  # two of them zero by luck
     (at(1e-16, 1e-12, 1e-12, 1e-12), FAILS),
     (at(1e-9, 5e-13, 1e-27, 1e-44, bounds=[1e9] * 4), HOLDS),  # three falls running are a bound themselves
+    (at(1e-3, 1e-4, 1e-5), UNDECIDED),  # it falls, and not with epsilon
+    (at(1e-12, 1e-13, bounds=[1e-11, 1e-12]), UNDECIDED),
     (at(np.nan, np.nan, np.nan), UNDECIDED),
     (at(np.inf, 1e-3, 1e-3, 1e-3), FAILS),
 ]  # fmt: skip
@@ -82,6 +85,35 @@ RULES = [
 @pytest.mark.parametrize(("taken", "verdict"), RULES)
 def test_rules(taken, verdict):
     assert decided(taken) == verdict
+
+
+def test_what_a_sweep_amplifies_is_no_rise():
+    """Zero in double by luck, or nearly: the rounding of extended, amplified by a million, is above it and falls all the same."""
+    assert decided(at(1e-16, 1e-13, bounds=[1e-9, 1e-12])) == UNDECIDED
+    assert decided(at(1e-16, 1e-13, bounds=[1e-9, 1e-12]), 1e6) == HOLDS
+
+
+def test_norms_follow_the_vectors():
+    model = pc.chain(2)
+    x = pc.vector("x", model.soa.Theta)
+    sizes = Sizes(lambda e: e)
+    found = []
+    for factor in (1.0, 8.0):
+        sizes.give({"x": [3.0 * factor, 4.0 * factor]})
+        found.append(sizes.norm(x))
+    assert found == [5.0, 40.0]
+
+
+def test_theorems_are_judged_at_the_present_state_and_at_those_drawn():
+    model = pc.chain(2)
+    judged = [f.states for f in model.soa.check(states=2).findings if f.states]
+    assert judged and set(judged) == {3}
+    assert {f.states for f in model.soa.check(states=0).findings if f.states} == {1}
+
+
+def test_random_trees_follow_their_seed():
+    worst = {seed: pc.check("HψMψ*H* == D", search=False, seed=seed).worst for seed in (0, 1)}
+    assert worst[0] != worst[1] and worst[0] == pc.check("HψMψ*H* == D", search=False).worst
 
 
 def test_in_the_widest_scalar_no_bound_makes_it_true():

@@ -41,6 +41,34 @@ def test_a_singular_lane_is_found(gimbal, form, precision):
             gimbal.forward_dynamics(Q, V, TAU, form=form, precision=precision)
 
 
+@pytest.fixture(scope="module")
+def askew():
+    """The same gimbal on axes askew: at q₁ = 0 the outer ring's D is rounding, and positive."""
+    rng = np.random.default_rng(2)
+    first, second = (turn * np.linalg.det(turn) for turn in (np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(2)))
+    axis = rng.normal(size=3)
+    axis /= np.linalg.norm(axis)
+    model = pc.Multibody("askew gimbal")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", pc.ModelWarning)
+        model.add_body("outer", None, hinge="pin", axis=axis, rotation=first)
+        model.add_body("inner", "outer", hinge="pin", axis=second.T @ np.cross(axis, (1, 0, 0)), rotation=second)
+        model.add_body("rotor", "inner", hinge="pin", axis=second.T @ axis, mass=2.0, inertia=np.diag([0.4, 0.5, 0.1]))
+        assert model.nv == 3
+    return model
+
+
+@pytest.mark.parametrize("form", ["fast", "ud"])
+def test_a_lane_of_noise_is_found(askew, form):
+    """A positive pivot that is rounding passes for an inertia where it is not compared in its own lane."""
+    for lane in range(BATCH):
+        Q, V, TAU = states()
+        for angle in (0.3, -0.7, 1.1):
+            Q[lane, :2] = angle, 0.0
+            with pytest.raises(pc.SingularHingeError, match=f"'outer'(.|\n)*state {lane} of a batch of {BATCH}"):
+                askew.forward_dynamics(Q, V, TAU, form=form)
+
+
 @pytest.mark.parametrize("form", ["fast", "ud"])
 def test_other_lanes_are_as_if_alone(gimbal, form):
     """A singular lane, answered by least norm; the others bit for bit as one by one."""

@@ -444,6 +444,44 @@ def test_minimum_norm_takes_refinement(residual, form):
     assert error["auto"] <= 1e-13 and (form != "fast" or error[0] >= 100 * error["auto"]), error
 
 
+def coaxial():
+    """A wrist whose first and last pins turn about one axis at q₁ = 0: the direction that nothing moves is not a coordinate."""
+    made = [body("b0", -1, [subhinge("pin", [0, 0, 1])], 0.0), body("b1", 0, [subhinge("pin", [1, 0, 0])], 0.0)]
+    made.append(body("b2", 1, [subhinge("pin", [0, 0, 1])], 1.0, [0.3, 0.1, 0], np.eye(3)))
+    return at_random_state(model(made, (0.5, 0, -9.8)))
+
+
+@each_form
+@pytest.mark.parametrize("residual", ["same", "gather", "wider"])
+def test_refinement_sees_the_singular_model(residual, form):
+    """And not the one with the inertia that is added to solve it, which is not zero times the answer here."""
+    arm = coaxial()
+    q, v, tau = np.array([0.4, 0.0, 0.2]), np.array([0.3, -0.2, 0.5]), np.array([1.0, 2.0, 3.0])
+    exact = np.asarray(least_squares(arm, q, v, tau), float)
+    with mpmath.workdps(60):
+        inverse = np.asarray(pseudoinverse(reference.operators(arm.description(), q * mpmath.mpf(1)).mass_matrix), float)
+    options = {"form": form, "refine": 2, "residual": residual, "on_singular": "minimum-norm"}
+    assert relative_error(arm.forward_dynamics(q, v, tau, **options), exact) <= 1e-14
+    assert np.abs(arm.mass_matrix_inverse(q, **options) - inverse).max() <= 1e-14 * np.abs(inverse).max()
+
+
+@each_form
+def test_what_nothing_moves_is_taken_out_of_a_long_solution(form):
+    """A rod on a screw of small pitch on a massless slider: the solution of the regularised system is 1/pitch times as long as the
+    answer, and once it is projected, eps/pitch of it is left along the direction that nothing moves."""
+    pitch = 1.1e-6
+    made = [body("b0", -1, [subhinge("slider", [0, 0, 1])], 0.0)]
+    made.append(body("b1", 0, [subhinge("screw", [0, 0, 1], pitch=pitch)], 1.3, [0, 0, 0.25], np.diag([1.0, 1.0, 0])))
+    arm = at_random_state(model(made, (0, 0, -8.1)))
+    q, v, tau = np.array([0.3, -0.7]), np.zeros(2), np.array([3.1, 3.1 * pitch])
+    exact = np.asarray(least_squares(arm, q, v, tau), float)
+    found = arm.forward_dynamics(q, v, tau, form=form, on_singular="minimum-norm")
+    assert np.abs(found / exact - 1).max() <= 1e-6 and relative_error(found, exact) <= 1e-14
+    along = np.array([1.0, pitch])  # the inverse on what moves: along along*/(m |along|⁴)
+    inverse = arm.mass_matrix_inverse(q, form=form, on_singular="minimum-norm")
+    assert np.abs(inverse - np.outer(along, along) / (1.3 * (along @ along) ** 2)).max() <= 1e-14
+
+
 @each_form
 @pytest.mark.parametrize("name", ["inner body massless, outboard pin across", "massless tip with a rotor", "near its axis"])
 def test_minimum_norm_of_what_is_regular_is_the_answer(name, form):

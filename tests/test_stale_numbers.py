@@ -180,15 +180,16 @@ def test_expressions_after_an_edit(edit):
 @pytest.mark.parametrize("which", ["first", "second", "both"])
 @pytest.mark.parametrize("bound", [False, True])
 def test_two_models_in_one_expression(edit, which, bound):
-    """HψG(ℳ+J)⁻¹ of one model, C, and the same of the other, through R^n: two contexts of one plan, either of them edited.
+    """(ℳ+J)⁻¹ + ℳ⁻¹ of one model, C, and the same of the other, through R^n: two contexts of one plan, either of them edited.
 
-    Where J = 0, HψG = I: a plan that uses it must not outlive a rotor inertia of either model.
+    Where J = 0, ℳ⁻¹ is solved by the factors of (ℳ+J)⁻¹: a plan that does must not outlive a rotor inertia of either model.
     """
     pair = [robot(), robot()]
 
     def side(model, state):
-        H, phi, M, J, psi, G = model.soa("H phi M J psi G")
-        made = H @ psi @ G @ (H @ phi @ M @ phi.T @ H.T + J).inv()
+        H, phi, M, J = model.soa("H phi M J")
+        MM = H @ phi @ M @ phi.T @ H.T
+        made = (MM + J).inv() + MM.inv()
         return made.at(state) if bound else made
 
     def through(a, b):

@@ -16,6 +16,14 @@ def test_powers_of_two_change_no_bit(first):
     assert not wrong, wrong[:5]
 
 
+@pytest.mark.parametrize("first", [0, pytest.param(100, marks=pytest.mark.slow)])
+def test_powers_of_two_change_no_bit_of_a_motion(first):
+    """Direct calls in the fast form, any powers of two of mass, length and time: no square root of what has a unit is taken."""
+    count = 8 if first == 0 else 100
+    wrong = [(seed, *line) for seed in range(first, first + count) for line in units.differing_bits_in_motion(seed)]
+    assert not wrong, wrong[:5]
+
+
 @pytest.mark.parametrize("name", UNITS)
 @pytest.mark.parametrize("first", [0, pytest.param(100, marks=pytest.mark.slow)])
 def test_answers_are_right_in_any_units(name, first):

@@ -3,6 +3,7 @@
 import mpmath
 import numpy as np
 import pytest
+from campaigns import refusals
 from mechanisms import every_kind
 
 import pycraft as pc
@@ -204,3 +205,10 @@ def test_determinants_in_many_digits():
     with mpmath.workdps(60):
         exact = mpmath.log(mpmath.det(mpmath.matrix(np.asarray(MM.dense(dtype=object)).tolist())))
     assert abs(float(MM.logdet()) - float(exact)) <= 4 * EPS * abs(float(exact))
+
+
+@pytest.mark.parametrize("seeds", [range(6), pytest.param(range(100, 200), marks=pytest.mark.slow)], ids=["a part", "a hundred models"])
+def test_the_whole_refuses_where_a_product_does(seeds):
+    """See `campaigns.refusals`."""
+    counts, wrong = refusals.run(seeds)
+    assert counts["models"] == len(seeds) and not wrong, wrong

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "algebra/errors.h"
-#include "algebra/small_cholesky.h"
+#include "algebra/small_ldl.h"
 #include "algebra/small_matrix.h"
 #include "algebra/structure.h"
 #include "algebra/sweeps/factored_inertia.h"
@@ -102,8 +102,7 @@ class DenseBlocks {
   // y -= G* a
   void gain_transposed_subtract(int k, const S* a, S* y, int m) const { multiply_add(gain(k), a, y, tree_.dof[k], tree_.size[k], m, S(-1)); }
   void solve_D_in_place(int k, S* x, int m) const {
-    forward_substitute(L.data() + at_[k].d, tree_.dof[k], x, m);
-    back_substitute(L.data() + at_[k].d, tree_.dof[k], x, m);
+    ldl_solve(L.data() + at_[k].d, pivots_.data() + tree_.dof_offset[k], tree_.dof[k], x, m);
   }
   // y = A(k) x or A(k)* x of a block-diagonal symbol
   void apply(int id, bool transposed, int k, const S* x, S* y, int m) const {
@@ -201,11 +200,11 @@ class DenseBlocks {
     symmetrise(d, n);
     std::copy_n(d, n * n, l);
     S* pivots = pivots_.data() + tree_.dof_offset[k];
-    if (cholesky_in_place(l, n, pivots) < n) return Pivots::not_positive;
-    forward_substitute(l, n, g, s);                       // L⁻¹HP
-    transposed_multiply_add(g, g, plus, s, n, s, S(-1));  // P - (L⁻¹HP)*(L⁻¹HP)
-    symmetrise(plus, s);
-    back_substitute(l, n, g, s);                          // G* = D⁻¹HP
+    if (ldl_in_place(l, n, pivots) < n) return Pivots::not_positive;
+    forward_substitute(l, n, g, s);              // L⁻¹HP
+    add_squares(g, pivots, plus, n, s, S(-1));   // P - (L⁻¹HP)* d⁻¹ (L⁻¹HP)
+    divide_by_pivots(pivots, n, g, s);
+    back_substitute(l, n, g, s);                 // G* = D⁻¹HP
     return Pivots::doubtful;
   }
   void articulated_to_parent(int k) {
@@ -283,8 +282,7 @@ class DenseBlocks {
     }
     std::copy_n(hinge_map(k), n * s, t);
     forward_substitute(L.data() + at_[k].d, n, t, s);
-    transposed_multiply_add(t, t, y, s, n, s);                                 // + H*D⁻¹H
-    symmetrise(y, s);
+    add_squares(t, pivots_.data() + tree_.dof_offset[k], y, n, s, S(1));       // + H*D⁻¹H
   }
 
  private:
@@ -292,6 +290,15 @@ class DenseBlocks {
     size_t e, h, m, d;
   };
   const S* gain(int k) const { return G.data() + at_[k].h; }  // G*, n x s
+  // A (s x s) += f Σ a* a / d of the n rows a of t, symmetric.
+  static void add_squares(const S* t, const S* d, S* A, int n, int s, const S& f) {
+    for (int j = 0; j < n; ++j)
+      for (int a = 0; a < s; ++a) {
+        const S scaled = f * t[j * s + a] / d[j];
+        for (int b = 0; b <= a; ++b) A[a * s + b] += scaled * t[j * s + b];
+      }
+    symmetrise(A, s);
+  }
   // out (r x m) += |A| |x|, A (r x n); transposed: |A*| |x|, A (n x r)
   template <bool transposed>
   static void add_sizes(const S* A, const S* x, S* out, int r, int n, int m) {
@@ -314,7 +321,6 @@ class DenseBlocks {
     return std::any_of(w + n, w + n + n * n, [](const S& x) { return !(x == S(0)); });
   }
   Pivots eliminate_hinge_of_factors(int k) {
-    using std::sqrt;
     const int s = tree_.size[k], n = tree_.dof[k], m = factors_->columns(k);
     S *p = P.data() + at_[k].m, *plus = Pplus.data() + at_[k].m, *d = D.data() + at_[k].d, *l = L.data() + at_[k].d, *g = G.data() + at_[k].h;
     S* pivots = pivots_.data() + tree_.dof_offset[k];
@@ -333,13 +339,16 @@ class DenseBlocks {
     none_.assign(s, 0);
     factors_->eliminate(k, form, none_.data(), false);
     for (int j = 0; j < n; ++j) {
-      const S root = sqrt(factors_->weight(j));
       pivots[j] = factors_->weight(j) * factors_->lower(j, j) * factors_->lower(j, j);
-      for (int i = 0; i < n; ++i) l[i * n + j] = i < j ? S(0) : S(factors_->lower(i, j) * root);
+      for (int i = 0; i < n; ++i) l[i * n + j] = i < j ? S(0) : ratio_or_zero(factors_->lower(i, j), factors_->lower(j, j));
     }
     if (std::any_of(pivots, pivots + n, [](const S& pivot) { return !(pivot > S(0)); })) return Pivots::not_positive;
-    std::fill_n(d, n * n, S(0));
-    multiply_transposed_add(l, l, d, n, n, n);
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j <= i; ++j) {
+        S sum = S(0);
+        for (int a = 0; a <= j; ++a) sum += l[i * n + a] * pivots[a] * l[j * n + a];
+        d[i * n + j] = d[j * n + i] = sum;
+      }
     for (int j = n - 1; j >= 0; --j)  // G* = L₁⁻* L₂*
       for (int i = 0; i < s; ++i) {
         S sum = factors_->against(i, j);

@@ -198,11 +198,40 @@ Expression differentiate(const Expression& e, const Direction& direction) {
   return result;
 }
 
+Context model_of_spaces(const Expression& e) {
+  Context found;
+  visit(e, [&](const Expression& x) {
+    if (!x.children().empty() || x.floating()) return;
+    for (const Space& space : {x.domain(), x.codomain()})
+      if (!found.source) found = {source_owning(space), x.node().symbol.binding};
+  });
+  return found;
+}
+
+namespace {
+
+// y = x as numbers, for two spaces that are cut alike.
+Expression same_numbers(const Space& domain, const Space& codomain) {
+  const auto ones = [](int n) {
+    std::vector<double> block(size_t(n) * n, 0.0);
+    for (int i = 0; i < n; ++i) block[size_t(i) * n + i] = 1;
+    return block;
+  };
+  const size_t bodies = domain.belongs_to_bodies() ? domain.layout().of_body.size() : 0;
+  if (bodies == 0) return constant(ones(domain.dimension()), domain, codomain, "I");
+  std::vector<std::vector<double>> blocks;
+  for (size_t k = 0; k < bodies; ++k) blocks.push_back(ones(domain.body_size(static_cast<int>(k))));
+  return constant_blocks(std::move(blocks), domain, codomain, "I");
+}
+
+}  // namespace
+
 Expression differentiate_in_world(const Expression& e, const Direction& direction) {
   Expression result = differentiate(e, direction);
   const auto models = contexts(e);
-  if (models.empty()) return result;
-  const Symbol like{&sko_symbols()[SymbolId::E], models[0].source, models[0].binding, {}, {}};
+  const Context model = models.empty() ? model_of_spaces(e) : models[0];
+  if (!model.source) return result;
+  const Symbol like{&sko_symbols()[SymbolId::E], model.source, model.binding, {}, {}};
   const Expression W = direction.frame_motion(like);
   const auto motion = [&](const Space& s) -> Expression {
     if (s == W.domain()) return W;
@@ -221,7 +250,24 @@ Scalar differentiate(const Scalar& a, const Direction& direction) {
       const Expression tangent = differentiate(n.operand, direction);
       return trace(is_zero(tangent) ? tangent : n.operand.inv() * tangent);
     }
-    case ScalarKind::norm: throw EvaluationError("the derivative of a norm is not there: differentiate the trace of A.T @ A");
+    case ScalarKind::norm: {  // ∂‖A‖ = tr(A* ∂A) / ‖A‖, numbers taken as numbers: I between a space and its dual
+      const Expression tangent = differentiate(n.operand, direction);
+      const Expression& A = n.operand;
+      const Expression paired = A.codomain() == A.codomain().dual() ? A.T() * tangent : A.T() * same_numbers(A.codomain(), A.codomain().dual()) * tangent;
+      const Scalar product = trace(is_zero(tangent) ? with_batch_of(tangent, zero(paired.domain(), paired.codomain())) : paired);
+      return is_zero(tangent) ? product : product * reciprocal(a);
+    }
+    case ScalarKind::product: {
+      Scalar total = number(0);
+      for (size_t i = 0; i < n.terms.size(); ++i) {
+        Scalar term = differentiate(n.terms[i], direction);
+        for (size_t j = 0; j < n.terms.size(); ++j)
+          if (j != i) term = term * n.terms[j];
+        total = i ? total + term : term;
+      }
+      return total;
+    }
+    case ScalarKind::reciprocal: return -1 * (differentiate(n.terms[0], direction) * (a * a));
     case ScalarKind::scaled: return n.value * differentiate(n.terms[0], direction);
     case ScalarKind::sum: {
       Scalar total = differentiate(n.terms[0], direction);

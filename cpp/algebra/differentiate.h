@@ -54,4 +54,7 @@ Scalar differentiate(const Scalar& a, const Direction& direction);
 // The derivative as seen in world axes about the world's origin, in body axes: d(X_o A X_i⁻¹) = X_o (∂A + W_o A - A W_i) X_i⁻¹.
 Expression differentiate_in_world(const Expression& e, const Direction& direction);
 
+// Whose spaces the leaves of e map, where no letter of it says so: of constants, vectors, zeros and identities alone.
+Context model_of_spaces(const Expression& e);
+
 }  // namespace pycraft

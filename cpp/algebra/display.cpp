@@ -1,6 +1,5 @@
 // How an expression is shown: as the book prints it (unicode, LaTeX) and as Python reads it back.
-#include <cmath>
-#include <cstdio>
+#include <cstdlib>
 #include <iterator>
 
 #include "algebra/errors.h"
@@ -12,16 +11,17 @@ namespace {
 
 enum Level { sum_level, product_level, postfix_level };
 
-std::string number(double c, Style style) {
-  char buffer[40];
-  for (int digits = 6; digits <= 17; ++digits) {
-    std::snprintf(buffer, sizeof buffer, "%.*g", digits, c);
-    if (std::strtod(buffer, nullptr) == c) break;
-  }
-  std::string text = buffer;
-  const size_t e = text.find('e');
+std::string number(const Coefficient& c, Style style) {
+  std::string text = c.text();
+  const size_t e = text.find('e'), bar = text.find('/');
   if (style == Style::latex && e != std::string::npos)
     text = text.substr(0, e) + " \\cdot 10^{" + std::to_string(std::atoi(text.c_str() + e + 1)) + "}";
+  else if (style == Style::latex && bar != std::string::npos)
+    text = "\\frac{" + text.substr(0, bar) + "}{" + text.substr(bar + 1) + "}";
+  else if (style == Style::python && !c.is_double()) {
+    const auto [above, below] = c.as_ratio();
+    text = below == "1" ? above : "Fraction(" + above + ", " + below + ")";
+  }
   return text;
 }
 
@@ -102,7 +102,7 @@ class Spelling {
     inside();
     if (parentheses) write(latex() ? "\\right)" : ")");
   }
-  void multiple(double c, const Expression& e) {
+  void multiple(const Coefficient& c, const Expression& e) {
     if (c != 1) write(number(c, style_) + times());
     part(e, product_level);
   }

@@ -36,6 +36,8 @@ class Equilibration {
   }
   int row(int i) const { return row_[i]; }
   int column(int j) const { return column_[j]; }
+  // The row that column j is matched with.
+  int matched_row(int j) const { return row_of_[j]; }
   // Rows and columns that no entry joins have scales that are free against each other: the part that each belongs to.
   int parts() const { return parts_; }
   int part_of_row(int i) const { return row_part_[i]; }

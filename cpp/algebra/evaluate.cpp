@@ -19,38 +19,65 @@ Widest widened(const std::vector<double>& parts) {
   return sum;
 }
 
-void add_scalar(const Scalar& s, Widest factor, std::vector<Widest>& total, int& batch, bool rules) {
+// The value, or one for each state of a batch.
+struct Values {
+  std::vector<Widest> of = {Widest(0)};
+  int batch = -1;
+};
+
+// f(a, b), state by state; what has no batch is the same in each.
+template <class F>
+Values together(const Values& a, const Values& b, F f) {
+  if (a.batch >= 0 && b.batch >= 0 && a.batch != b.batch) throw EvaluationError("batches of different lengths in one scalar");
+  Values all{{}, std::max(a.batch, b.batch)};
+  const size_t states = all.batch < 0 ? 1 : all.batch;
+  for (size_t i = 0; i < states; ++i) all.of.push_back(f(a.of[a.batch < 0 ? 0 : i], b.of[b.batch < 0 ? 0 : i]));
+  return all;
+}
+
+Values values_of(const Scalar& s, bool rules) {
   const auto& n = s.node();
   switch (n.kind) {
-    case ScalarKind::number:
-      for (Widest& t : total) t += factor * Widest(n.value);
-      return;
+    case ScalarKind::number: return {{Widest(n.value)}};
     case ScalarKind::sum:
-      for (const Scalar& t : n.terms) add_scalar(t, factor, total, batch, rules);
-      return;
-    case ScalarKind::scaled: add_scalar(n.terms[0], factor * Widest(n.value), total, batch, rules); return;
+    case ScalarKind::product: {
+      const bool sum = n.kind == ScalarKind::sum;
+      Values all{{Widest(sum ? 0 : 1)}};
+      for (const Scalar& t : n.terms)
+        all = together(all, values_of(t, rules), [&](const Widest& x, const Widest& y) { return sum ? Widest(x + y) : Widest(x * y); });
+      return all;
+    }
+    case ScalarKind::scaled: {
+      Values all = values_of(n.terms[0], rules);
+      for (Widest& x : all.of) x *= Widest(n.value);
+      return all;
+    }
+    case ScalarKind::reciprocal: {
+      Values all = values_of(n.terms[0], rules);
+      for (size_t i = 0; i < all.of.size(); ++i)
+        naming_state(static_cast<int>(i), static_cast<int>(all.of.size()), [&] {
+          if (all.of[i] == 0) throw SingularOperatorError(show(n.terms[0]) + " is divided by, and is 0 here");
+          all.of[i] = 1 / all.of[i];
+        });
+      return all;
+    }
     default: break;
   }
   const Request request = n.kind == ScalarKind::trace ? Request::trace : n.kind == ScalarKind::logdet ? Request::logdet : Request::norm;
   Result r;
   evaluate(n.operand, request, r, rules, true);
-  if (r.batch >= 0) {
-    if (batch >= 0 && batch != r.batch) throw EvaluationError("batches of different lengths in one scalar");
-    if (batch < 0) total.assign(r.batch, total.empty() ? Widest(0) : total[0]);
-    batch = r.batch;
-  }
-  for (size_t i = 0; i < total.size(); ++i) total[i] += factor * widened(r.expansions[r.batch >= 0 ? i : 0]);
+  Values all{{}, r.batch};
+  for (size_t i = 0; i < (r.batch >= 0 ? size_t(r.batch) : 1); ++i) all.of.push_back(widened(r.expansions[i]));
+  return all;
 }
 
 }  // namespace
 
 std::vector<double> evaluate(const Scalar& s, int* batch, bool rules) {
-  std::vector<Widest> total(1, Widest(0));
-  int b = -1;
-  add_scalar(s, Widest(1), total, b, rules);
-  if (batch) *batch = b;
+  const Values all = values_of(s, rules);
+  if (batch) *batch = all.batch;
   std::vector<double> rounded;
-  for (const Widest& t : total) rounded.push_back(to_double(t));
+  for (const Widest& x : all.of) rounded.push_back(to_double(x));
   return rounded;
 }
 
@@ -85,7 +112,9 @@ double largest_entry(const Expression& e, const std::map<std::string, std::vecto
   std::vector<int> row_body, column_body;
   const SkoStructure* tree = nullptr;
   if (on_one_path) {
-    tree = &contexts(e).at(0).source->structure();
+    for (const Context& c : contexts(e))
+      if (cut_into_bodies_of(c.source->structure(), e.codomain()) && cut_into_bodies_of(c.source->structure(), e.domain())) tree = &c.source->structure();
+    if (!tree) throw SpaceError("blocks on one path of " + show(e) + ": " + e.domain().description() + " and " + e.codomain().description() + " are not cut into the bodies of one model");
     row_body.resize(r.rows), column_body.resize(r.columns);
     for (const auto& block : e.codomain().layout().blocks) std::fill_n(row_body.begin() + block.offset, block.size, block.body);
     for (const auto& block : e.domain().layout().blocks) std::fill_n(column_body.begin() + block.offset, block.size, block.body);

@@ -20,10 +20,10 @@ using Node = Expression::Node;
 size_t mix(size_t seed, size_t value) { return seed ^ (value * 0x9e3779b97f4a7c15ULL + 0x7f4a7c15ULL + (seed << 6) + (seed >> 2)); }
 
 // The number in front and what it scales. Signs move freely, -(2X) is (-2)X, as they round nothing.
-std::pair<double, const Expression*> scaling(const Node& n) {
-  double c = n.coefficient;
+std::pair<Coefficient, const Expression*> scaling(const Node& n) {
+  Coefficient c = n.coefficient;
   const Expression* x = &n.children[0];
-  while (x->kind() == NodeKind::scaled && (std::abs(c) == 1 || std::abs(x->node().coefficient) == 1)) {
+  while (x->kind() == NodeKind::scaled && (abs(c) == 1 || abs(x->node().coefficient) == 1)) {
     c *= x->node().coefficient;
     x = &x->children()[0];
   }
@@ -51,7 +51,7 @@ size_t hash_of(const Node& n) {
     case NodeKind::external: return mix(h, reinterpret_cast<size_t>(n.external.get()));
     case NodeKind::scaled: {
       const auto [c, x] = scaling(n);
-      return mix(mix(h, std::hash<double>()(c)), x->node().hash);
+      return mix(mix(h, CoefficientHash()(c)), x->node().hash);
     }
     case NodeKind::sum: {
       size_t total = 0;  // whatever the order
@@ -193,8 +193,7 @@ Expression constant(std::vector<double> dense, const Space& domain, const Space&
   data->symmetric = domain == codomain.dual();
   for (int i = 0; i < rows && data->symmetric; ++i)
     for (int j = 0; j < i && data->symmetric; ++j) data->symmetric = dense[i * columns + j] == dense[j * columns + i];
-  const bool trees = domain.belongs_to_bodies() && codomain.belongs_to_bodies() && domain.layout().of_body.size() == codomain.layout().of_body.size();
-  if (trees) {  // block diagonal over the bodies: every entry outside its body's block is zero
+  if (cut_alike(domain, codomain)) {  // block diagonal over the bodies: every entry outside its body's block is zero
     std::vector<int> row_body(rows), column_body(columns);
     for (const auto& b : codomain.layout().blocks) std::fill_n(row_body.begin() + b.offset, b.size, b.body);
     for (const auto& b : domain.layout().blocks) std::fill_n(column_body.begin() + b.offset, b.size, b.body);
@@ -223,7 +222,7 @@ Expression constant(std::vector<double> dense, const Space& domain, const Space&
 
 Expression constant_blocks(std::vector<std::vector<double>> blocks, const Space& domain, const Space& codomain, const std::string& name) {
   const size_t bodies = domain.layout().of_body.size();
-  if (!domain.belongs_to_bodies() || !codomain.belongs_to_bodies() || codomain.layout().of_body.size() != bodies || blocks.size() != bodies)
+  if (!cut_alike(domain, codomain) || blocks.size() != bodies)
     throw SpaceError("constant '" + name + "': " + std::to_string(blocks.size()) + " blocks do not fit " + domain.description() + " to " +
                      codomain.description() + "; give one block per body");
   auto data = std::make_shared<ConstantData>();
@@ -343,7 +342,7 @@ Expression operator-(const Expression& a) { return -1.0 * a; }
 Expression operator-(const Expression& a, const Expression& b) { return sum_of({a, -b}); }
 Expression operator*(const Expression& a, const Expression& b) { return product_of({a, b}); }
 
-Expression operator*(double c, const Expression& a) {
+Expression operator*(const Coefficient& c, const Expression& a) {
   Node n{NodeKind::scaled, a.domain(), a.codomain(), {a}};
   n.coefficient = c;
   return make(std::move(n));
@@ -362,8 +361,7 @@ Expression Expression::inv() const {
 
 Expression block_diagonal(const Expression& a) {
   if (a.floating()) return a;
-  if (!a.domain().belongs_to_bodies() || !a.codomain().belongs_to_bodies() ||
-      a.domain().layout().of_body.size() != a.codomain().layout().of_body.size())
+  if (!cut_alike(a.domain(), a.codomain()))
     throw SpaceError("blockdiag(" + label(a) + "): " + a.domain().description() + " and " + a.codomain().description() + " are not cut into the same bodies");
   return make(Node{NodeKind::block_diagonal, a.domain(), a.codomain(), {a}});
 }
@@ -392,7 +390,10 @@ Expression lower_half(const Expression& a) {
 }
 
 Expression power(const Expression& a, int exponent) {
-  if (std::abs(double(exponent)) * std::max<size_t>(1, a.children().size()) > double(most_parts)) throw_too_many_parts("a power", std::abs(double(exponent)));
+  constexpr int largest_exponent = 1000;
+  if (exponent > largest_exponent || exponent < -largest_exponent)
+    throw EvaluationError("a power of " + label(a) + " is a product of as many factors: exponents go to " + std::to_string(largest_exponent) +
+                          "; evaluate one, and go on with it as a constant");
   if (!a.floating() && !(a.domain() == a.codomain()) && exponent != 1 && exponent != -1)
     throw SpaceError(label(a) + " maps " + a.domain().description() + " to " + a.codomain().description() + ": only a map of a space to itself has powers");
   if (exponent == 0) return a.floating() ? identity() : identity(a.domain());

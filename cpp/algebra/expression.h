@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "algebra/coefficient.h"
 #include "algebra/space.h"
 #include "algebra/symbol.h"
 
@@ -90,7 +91,7 @@ struct Expression::Node {
   NodeKind kind;
   Space domain, codomain;
   Parts children;
-  double coefficient = 1;                       // scaled
+  Coefficient coefficient = 1;                  // scaled
   Symbol symbol{};                              // symbol, block_function (the function, and whose); of every leaf: its binding
   std::string name;                             // vector
   std::shared_ptr<const ConstantData> constant;
@@ -130,9 +131,9 @@ Expression operator+(const Expression& a, const Expression& b);
 Expression operator-(const Expression& a, const Expression& b);
 Expression operator-(const Expression& a);
 Expression operator*(const Expression& a, const Expression& b);
-Expression operator*(double c, const Expression& a);
-inline Expression operator*(const Expression& a, double c) { return c * a; }
-inline Expression operator/(const Expression& a, double c) { return (1 / c) * a; }
+Expression operator*(const Coefficient& c, const Expression& a);
+inline Expression operator*(const Expression& a, const Coefficient& c) { return c * a; }
+inline Expression operator/(const Expression& a, const Coefficient& c) { return (1 / c) * a; }
 Expression sum_of(std::vector<Expression> terms);
 Expression product_of(std::vector<Expression> factors);
 Expression block_diagonal(const Expression& a);

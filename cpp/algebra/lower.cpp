@@ -1,53 +1,13 @@
 #include "algebra/lower.h"
 
 #include <algorithm>
-#include <cmath>
-#include <cstdio>
 #include <unordered_map>
 
 #include "algebra/errors.h"
 #include "algebra/interrupt.h"
 #include "algebra/properties.h"
-#include "algebra/source.h"
 
 namespace pycraft {
-
-namespace {
-
-// Coefficients are doubles. Where a product, sum or reciprocal of them is none, and the run has more digits, it is left to the run.
-bool exact_product(double a, double b) { return std::fma(a, b, -(a * b)) == 0; }
-bool exact_reciprocal(double c) { return std::fma(1 / c, c, -1.0) == 0; }
-bool exact_sum(double a, double b) {
-  const double sum = a + b, from_b = sum - a;
-  return (a - (sum - from_b)) + (b - from_b) == 0;
-}
-
-bool has_more_digits(const std::vector<Expression>& parts) {
-  bool found = false;
-  for (const Expression& part : parts)
-    visit(part, [&](const Expression& e) {
-      const auto& binding = e.node().symbol.binding;
-      found |= binding && binding->arithmetic.precision > Precision::double_;
-    });
-  return found;
-}
-
-// c I as numbers of the user's: no coefficient, so that nothing multiplies it out.
-Expression multiple_of_identity(double c, const Space& space) {
-  char name[32];
-  std::snprintf(name, sizeof name, "%.12g I", c);
-  const auto block = [&](int n) {
-    std::vector<double> b(size_t(n) * n, 0.0);
-    for (int i = 0; i < n; ++i) b[size_t(i) * n + i] = c;
-    return b;
-  };
-  if (!space.belongs_to_bodies()) return constant(block(space.dimension()), space, space, name);
-  std::vector<std::vector<double>> blocks;
-  for (size_t k = 0; k < space.layout().of_body.size(); ++k) blocks.push_back(block(space.body_size(static_cast<int>(k))));
-  return constant_blocks(std::move(blocks), space, space, name);
-}
-
-}  // namespace
 
 Scaled split_scalar(const Expression& e) {
   Scaled s{1, e};
@@ -62,9 +22,9 @@ Expression lowered_sum(const std::vector<Expression>& terms, const Space& domain
   // Equal terms are collected, zeros dropped; the order of first appearance is kept.
   std::vector<Scaled> collected;
   std::unordered_map<Expression, size_t, ExpressionHash> place;
-  const auto add = [&](double c, const Expression& e) {
+  const auto add = [&](const Coefficient& c, const Expression& e) {
     const auto [found, fresh] = place.try_emplace(e, collected.size());
-    if (fresh || (!exact_sum(collected[found->second].coefficient, c) && has_more_digits(terms)))
+    if (fresh)
       collected.push_back({c, e});
     else
       collected[found->second].coefficient += c;
@@ -72,10 +32,7 @@ Expression lowered_sum(const std::vector<Expression>& terms, const Space& domain
   for (const Expression& t : terms) {
     const Scaled s = split_scalar(t);
     if (s.expression.kind() == NodeKind::zero) continue;
-    const bool distributes = s.expression.kind() == NodeKind::sum && (std::all_of(s.expression.children().begin(), s.expression.children().end(), [&](const Expression& inner) {
-      return exact_product(s.coefficient, split_scalar(inner).coefficient);
-    }) || !has_more_digits(terms));
-    if (distributes) {
+    if (s.expression.kind() == NodeKind::sum) {
       for (const Expression& inner : s.expression.children()) {
         const Scaled i = split_scalar(inner);
         add(s.coefficient * i.coefficient, i.expression);
@@ -92,17 +49,12 @@ Expression lowered_sum(const std::vector<Expression>& terms, const Space& domain
 }
 
 Expression lowered_product(const std::vector<Expression>& factors, const Space& domain, const Space& codomain) {
-  double c = 1;
+  Coefficient c = 1;
   std::vector<Expression> kept;
   for (const Expression& f : factors) {
-    Expression inner = f;
-    for (; inner.kind() == NodeKind::scaled; inner = inner.children()[0]) {
-      const double own = inner.node().coefficient;
-      if (exact_product(c, own) || !has_more_digits(factors))
-        c *= own;
-      else
-        kept.push_back(multiple_of_identity(own, f.codomain()));
-    }
+    const Scaled own = split_scalar(f);
+    c *= own.coefficient;
+    const Expression& inner = own.expression;
     if (inner.kind() == NodeKind::zero) return zero(domain, codomain);
     if (inner.kind() == NodeKind::identity) continue;
     if (inner.kind() == NodeKind::product)
@@ -233,8 +185,7 @@ class Lowering {
       inverse = s.expression.inv();
     }
     if (s.coefficient == 1) return inverse;
-    if (exact_reciprocal(s.coefficient) || !has_more_digits({e})) return (1 / s.coefficient) * inverse;
-    return lowered_product({multiple_of_identity(s.coefficient, inverse.codomain()).inv(), inverse}, inverse.domain(), inverse.codomain());
+    return (1 / s.coefficient) * inverse;
   }
 
   // H, G and their like map between spaces of bodies and of coordinates: square by accident (six coordinates a body), not by meaning.

@@ -12,7 +12,7 @@ Expression lower(const Expression& e, bool expand);
 
 // c · e, with e free of an outer scalar.
 struct Scaled {
-  double coefficient;
+  Coefficient coefficient;
   Expression expression;
 };
 Scaled split_scalar(const Expression& e);

@@ -154,15 +154,15 @@ class Optimiser {
         with_J[j] += 1;
         if (with_J[j] == 0) with_J.erase(j);
       }
-      const auto multiple = [&](const Polynomial& p) -> double {
+      const auto multiple = [&](const Polynomial& p) -> Coefficient {
         if (p.size() != form->size() || p.empty()) return 0;
-        const double f = form->begin()->second / p.begin()->second;
+        const Coefficient f = form->begin()->second / p.begin()->second;
         for (auto a = form->begin(), b = p.begin(); a != form->end(); ++a, ++b)
-          if (a->first != b->first || std::abs(a->second - f * b->second) > 1e-12 * std::abs(a->second)) return 0;
+          if (a->first != b->first || a->second != f * b->second) return 0;
         return f;
       };
-      if (const double f = multiple(*own); f != 0) return found(e, f == 1 ? mass_matrix : f * mass_matrix);
-      if (const double f = multiple(with_J); f != 0) return found(e, lower(f * (mass_matrix + o.J), false));
+      if (const Coefficient f = multiple(*own); f != 0) return found(e, f == 1 ? mass_matrix : f * mass_matrix);
+      if (const Coefficient f = multiple(with_J); f != 0) return found(e, lower(f * (mass_matrix + o.J), false));
     }
     const Expression normal = lower(to_expression(*form, alphabet, e.domain(), e.codomain()), false);
     if (normal == e || plan_flops(normal, false) >= plan_flops(e, false)) return e;

@@ -79,7 +79,7 @@ struct Step {
   Symbol symbol{};                          // apply_symbol, load_blocks, vector_symbol, gather, scatter: its binding is dropped
   bool transposed = false, inverted = false, flag = false;  // flag: with J (mass_matrix); of X*X, the operand being X (dense_factor)
   unsigned groups = 0;                      // values
-  std::vector<double> coefficients;
+  std::vector<Coefficient> coefficients;
   std::shared_ptr<const ConstantData> constant;
   std::shared_ptr<const ExternalData> external;
   std::shared_ptr<const Realization> realization;

@@ -1,6 +1,4 @@
 // Steps for diagonal blocks and determinants: by structure where the algebra gives them, else from an elimination.
-#include <cmath>
-
 #include "algebra/errors.h"
 #include "algebra/lower.h"
 #include "algebra/planner.h"
@@ -73,44 +71,40 @@ std::optional<int> Planner::structural_diagonal(const Expression& e) {
         }
         return r;
       }
-      // A φ X φ* B with A, X, B block diagonal: a Lyapunov sweep. A E* X E B: a step base to tip.
+      // blockdiag(A X B) = A blockdiag(X) B with A, B block diagonal.
       size_t i = 0;
       while (i < f.size() && is_block_diagonal(f[i])) ++i;
       size_t j = f.size();
       while (j > i && is_block_diagonal(f[j - 1])) --j;
-      if (j < i + 2) return std::nullopt;
-      if (const auto known = diagonal_by_theorem({f.begin() + i, f.begin() + j})) {
-        int r = *known;
-        if (i > 0) r = multiply_blocks(blocks(product_of(std::vector<Expression>(f.begin(), f.begin() + i))), r);
-        if (j < f.size()) r = multiply_blocks(r, blocks(product_of(std::vector<Expression>(f.begin() + j, f.end()))));
+      const auto part = [&](size_t from, size_t to) { return product_of(std::vector<Expression>(f.begin() + from, f.begin() + to)); };
+      if (i > 0 || j < f.size()) {
+        const auto inner = i < j ? diagonal_by_structure(part(i, j)) : std::nullopt;
+        if (!inner) return std::nullopt;
+        int r = *inner;
+        if (i > 0) r = multiply_blocks(blocks(part(0, i)), r);
+        if (j < f.size()) r = multiply_blocks(r, blocks(part(j, f.size())));
         return r;
       }
+      // φ X φ* with X block diagonal: a Lyapunov sweep. E* X E: a step base to tip.
+      if (const auto known = diagonal_by_theorem(f)) return known;
       bool left_t = false, right_t = false;
-      const Symbol *left = letter_of(f[i], left_t), *right = letter_of(f[j - 1], right_t);
+      const Symbol *left = letter_of(f.front(), left_t), *right = letter_of(f.back(), right_t);
       if (!left || !right || left->definition != right->definition || !same_model(*left, *right) || left_t == right_t) return std::nullopt;
       const bool edges = left->definition->pattern == Pattern::edges && left_t;
       if (left->definition->pattern != Pattern::resolvent && !edges) return std::nullopt;
-      for (size_t k = i + 1; k + 1 < j; ++k)
+      for (size_t k = 1; k + 1 < f.size(); ++k)
         if (!is_block_diagonal(f[k])) return std::nullopt;
-      int middle;
-      if (j == i + 2) {
-        middle = identity_blocks(f[i].domain(), f[j - 1].codomain());
-      } else {
-        middle = blocks(product_of(std::vector<Expression>(f.begin() + i + 1, f.begin() + j - 1)));
-      }
+      const int middle = f.size() == 2 ? identity_blocks(f[0].domain(), f[1].codomain()) : blocks(part(1, f.size() - 1));
       Step s{edges ? StepKind::congruence_blocks : StepKind::lyapunov_blocks};
       s.in = {middle};
       s.symbol = *left;
       s.transposed = left_t;
       s.context = context_of(*left, left->definition->groups);
       s.flops = group_flops(*left->source, Group::composite) * (left->definition->id == SymbolId::psi ? 2 : 1);
-      s.bytes = 8 * block_entries(f[i].codomain(), f[j - 1].domain());
-      s.text = "blocks: blockdiag(" + show(product_of(std::vector<Expression>(f.begin() + i, f.begin() + j))) + ")" +
+      s.bytes = 8 * block_entries(e.codomain(), e.domain());
+      s.text = "blocks: blockdiag(" + show(e) + ")" +
                (left_t ? " (base to tip)" : " (tip to base)");
-      int r = emit(std::move(s), {RegisterKind::blocks, f[i].codomain(), f[j - 1].domain(), nullptr, false});
-      if (i > 0) r = multiply_blocks(blocks(product_of(std::vector<Expression>(f.begin(), f.begin() + i))), r);
-      if (j < f.size()) r = multiply_blocks(r, blocks(product_of(std::vector<Expression>(f.begin() + j, f.end()))));
-      return r;
+      return emit(std::move(s), {RegisterKind::blocks, e.codomain(), e.domain(), nullptr, false});
     }
     default: return std::nullopt;
   }
@@ -139,6 +133,18 @@ std::optional<int> Planner::diagonal_by_theorem(const std::vector<Expression>& f
 int Planner::diagonal_blocks(const Expression& e) {
   // Attempts that fail leave steps behind that nothing reads: drop_unused removes them.
   if (const auto r = diagonal_by_structure(e)) return *r;
+  const Register out{RegisterKind::blocks, e.codomain(), e.domain(), nullptr, false};
+  const auto from_columns = [&](const std::string& how, int tier) {
+    Step s{StepKind::blocks_of_dense};
+    s.operand = plan_operand(e);
+    s.flops = e.domain().dimension() * s.operand->flops();
+    s.bytes = 8.0 * e.domain().dimension() * e.codomain().dimension();
+    s.tier = tier;
+    s.text = "blocks: blockdiag(" + show(e) + ") column by column" + how;
+    return emit(std::move(s), out);
+  };
+  const Expression spelled = lower(e, true);  // Λ and its like are as small as their nodes
+  if (spelled.kind() == NodeKind::inverse && gram_root(spelled.children()[0])) return from_columns(", by its triangular factors", 1);
   std::string reason;
   const auto realization = build_realization(*this, e, true, reason);
   if (realization) {
@@ -156,16 +162,10 @@ int Planner::diagonal_blocks(const Expression& e) {
     s.bytes = 8 * realization->entries();
     s.tier = 3;
     s.text = "blocks: blockdiag(" + show(e) + ") from the factors, root to leaves";
-    return emit(std::move(s), {RegisterKind::blocks, e.codomain(), e.domain(), nullptr, false});
+    return emit(std::move(s), out);
   }
   plan_.notes.push_back("dense: " + reason);
-  Step s{StepKind::blocks_of_dense};
-  s.operand = plan_operand(e);
-  s.flops = e.domain().dimension() * s.operand->flops();
-  s.bytes = 8.0 * e.domain().dimension() * e.codomain().dimension();
-  s.tier = 4;
-  s.text = "blocks: blockdiag(" + show(e) + ") column by column: " + reason;
-  return emit(std::move(s), {RegisterKind::blocks, e.codomain(), e.domain(), nullptr, false});
+  return from_columns(": " + reason, 4);
 }
 
 std::optional<int> Planner::logdet_by_structure(const Expression& e) {
@@ -219,7 +219,7 @@ std::optional<std::vector<int>> Planner::logdet_of_factors(const std::vector<Exp
 
 int Planner::logdet(const Expression& e) {
   const Register scalar{RegisterKind::scalar, {}, {}, nullptr, false};
-  const auto combine = [&](std::vector<int> in, std::vector<double> c, const std::string& text, double constant) {
+  const auto combine = [&](std::vector<int> in, std::vector<Coefficient> c, const std::string& text, const Coefficient& constant) {
     Step s{StepKind::combine_scalars};
     s.in = std::move(in);
     s.coefficients = std::move(c);
@@ -233,13 +233,13 @@ int Planner::logdet(const Expression& e) {
       break;
     case NodeKind::identity: return combine({}, {}, "ln det I = 0", 0);
     case NodeKind::scaled:
-      return combine({logdet(e.children()[0])}, {1.0}, "ln det of a multiple", e.domain().dimension() * std::log(std::abs(e.node().coefficient)));
-    case NodeKind::inverse: return combine({logdet(e.children()[0])}, {-1.0}, "ln det of an inverse", 0);
+      return combine({logdet(e.children()[0])}, {1}, "ln det of a multiple", e.domain().dimension() * Coefficient::log_of_size(e.node().coefficient));
+    case NodeKind::inverse: return combine({logdet(e.children()[0])}, {-1}, "ln det of an inverse", 0);
     case NodeKind::product: {
       const auto parts = logdet_of_factors(e.children());
       if (!parts) break;
       if (parts->size() == 1) return parts->front();
-      return combine(*parts, std::vector<double>(parts->size(), 1.0), "ln det of a product", 0);
+      return combine(*parts, std::vector<Coefficient>(parts->size(), 1), "ln det of a product", 0);
     }
     case NodeKind::sum: {  // ln det (ℳ + J) = ln det D
       if (!options_.rules || e.children().size() != 2) break;
@@ -289,7 +289,7 @@ int Planner::logdet(const Expression& e) {
     s.text = "ln|det| from the pivots";
     parts.push_back(emit(std::move(s), scalar));
   }
-  return combine(parts, {1.0, -1.0}, "ln|det| of " + show(e), 0);
+  return combine(parts, {1, -1}, "ln|det| of " + show(e), 0);
 }
 
 }  // namespace pycraft

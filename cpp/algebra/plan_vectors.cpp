@@ -218,7 +218,7 @@ int Planner::apply_product(const std::vector<Expression>& typed, int x, const Ex
 int Planner::apply_sum(const Expression& e, int x) {
   // ℳ + J in one kernel.
   std::vector<char> used(e.children().size(), 0);
-  std::vector<std::pair<double, int>> parts;
+  std::vector<std::pair<Coefficient, int>> parts;
   if (options_.rules)
     for (size_t i = 0; i < e.children().size(); ++i) {
       const Scaled a = split_scalar(e.children()[i]);

@@ -161,8 +161,7 @@ Plan Planner::plan(const Expression& typed, Request request) {
   if (options_.rules) e = optimise(e, plan_.notes);
   plan_.domain = e.domain();
   plan_.codomain = e.codomain();
-  const bool bodies = e.domain().belongs_to_bodies() && e.codomain().belongs_to_bodies() &&
-                      e.domain().layout().of_body.size() == e.codomain().layout().of_body.size();
+  const bool bodies = cut_alike(e.domain(), e.codomain());
   const auto apply_to_input = [&] {
     plan_.input = new_register(RegisterKind::vector, e.domain(), {}, true);
     plan_.output = apply(e, plan_.input);

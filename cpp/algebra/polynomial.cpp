@@ -1,7 +1,6 @@
 #include "algebra/interrupt.h"
 #include "algebra/polynomial.h"
 
-#include <cmath>
 #include <deque>
 
 #include "algebra/lower.h"
@@ -93,7 +92,7 @@ class Normaliser {
     }
     switch (e.kind()) {
       case NodeKind::zero: return {};
-      case NodeKind::identity: return {{Word{}, 1.0}};
+      case NodeKind::identity: return {{Word{}, 1}};
       case NodeKind::scaled: {
         Polynomial p = expand(e.children()[0]);
         for (auto& [w, c] : p) c *= e.node().coefficient;
@@ -106,7 +105,7 @@ class Normaliser {
         return p;
       }
       case NodeKind::product: {
-        Polynomial p = {{Word{}, 1.0}};
+        Polynomial p = {{Word{}, 1}};
         for (const Expression& f : e.children()) {
           const Polynomial q = expand(f);
           Polynomial r;
@@ -132,7 +131,7 @@ class Normaliser {
         if (u.symbol && u.inverted && u.symbol->definition->pattern == Pattern::resolvent) {
           const int l = alphabet_.letter(inner);
           const bool articulated_resolvent = u.symbol->definition->id == psi;
-          Polynomial p = {{Word{}, 1.0}};
+          Polynomial p = {{Word{}, 1}};
           const int edge = alphabet_.sibling(l, letter_code(E, u.transposed, false));
           add(p, {edge}, -1.0);
           if (articulated_resolvent) {  // ψ⁻¹ = I - E + KH
@@ -141,23 +140,21 @@ class Normaliser {
           }
           return p;
         }
-        return {{Word{alphabet_.letter(e)}, 1.0}};
+        return {{Word{alphabet_.letter(e)}, 1}};
       }
-      default: return {{Word{alphabet_.letter(e)}, 1.0}};
+      default: return {{Word{alphabet_.letter(e)}, 1}};
     }
   }
 
-  static void add(Polynomial& p, const Word& w, double c) {
+  static void add(Polynomial& p, const Word& w, const Coefficient& c) {
     const auto [place, fresh] = p.try_emplace(w, c);
     if (fresh) return;
-    const double before = place->second;
     place->second += c;
-    // What cancels up to rounding is gone: coefficients are sums of a few products of the user's numbers.
-    if (std::abs(place->second) <= 1e-12 * std::max(std::abs(before), std::abs(c))) p.erase(place);
+    if (place->second.is_zero()) p.erase(place);
   }
 
   Polynomial reduce(const Polynomial& p) {
-    std::deque<std::pair<Word, double>> todo(p.begin(), p.end());
+    std::deque<std::pair<Word, Coefficient>> todo(p.begin(), p.end());
     Polynomial done;
     while (!todo.empty()) {
       check_interrupt();
@@ -173,10 +170,10 @@ class Normaliser {
   }
 
   // Applies the first rule that fits, leftmost; true if the word was replaced (or vanished).
-  bool rewrite(const Word& word, double c, std::deque<std::pair<Word, double>>& todo) {
+  bool rewrite(const Word& word, const Coefficient& c, std::deque<std::pair<Word, Coefficient>>& todo) {
     for (int l : word)
       if (alphabet_.zero_letter(l)) return true;
-    const auto replace = [&](size_t at, size_t length, const Word& with, double x) {
+    const auto replace = [&](size_t at, size_t length, const Word& with, const Coefficient& x) {
       Word w(word.begin(), word.begin() + at);
       w.insert(w.end(), with.begin(), with.end());
       w.insert(w.end(), word.begin() + at + length, word.end());
@@ -254,7 +251,7 @@ bool equal_by_theorems(const Expression& left, const Expression& right) {
   if (!y || x->size() != y->size()) return false;
   for (const auto& [word, c] : *x) {
     const auto found = y->find(word);
-    if (found == y->end() || std::abs(found->second - c) > 1e-12 * std::max(std::abs(c), std::abs(found->second))) return false;
+    if (found == y->end() || found->second != c) return false;
   }
   return true;
 }

@@ -14,7 +14,7 @@ namespace pycraft {
 
 // Letters are numbered; a word is a product of letters, the empty word an identity.
 using Word = std::vector<int>;
-using Polynomial = std::map<Word, double>;
+using Polynomial = std::map<Word, Coefficient>;
 
 // The letters met so far: each an expression that lowering leaves whole.
 class Alphabet {

@@ -1,6 +1,7 @@
 #include "algebra/properties.h"
 
 #include "algebra/lower.h"
+#include "algebra/source.h"
 
 namespace pycraft {
 
@@ -10,11 +11,11 @@ enum Triangle : unsigned { upper = 1, lower_ = 2, both = 3 };
 
 unsigned flip(unsigned t) { return ((t & upper) ? lower_ : 0u) | ((t & lower_) ? upper : 0u); }
 
-const SymbolDefinition* edge_symbol(const Expression& e, bool& transposed) {
+const Symbol* edge_symbol(const Expression& e, bool& transposed) {
   transposed = e.kind() == NodeKind::transpose;
   const Expression& inner = transposed ? e.children()[0] : e;
   if (inner.kind() != NodeKind::symbol || inner.node().symbol.definition->pattern != Pattern::edges) return nullptr;
-  return inner.node().symbol.definition;
+  return &inner.node().symbol;
 }
 
 unsigned triangles(const Expression& e);
@@ -23,13 +24,17 @@ unsigned triangles(const Expression& e);
 unsigned triangles_of_node(const Expression& e) {
   switch (e.kind()) {
     case NodeKind::symbol: {
-      const SymbolDefinition& d = *e.node().symbol.definition;
+      const Symbol& symbol = e.node().symbol;
+      const SymbolDefinition& d = *symbol.definition;
+      // Blocks over other bodies than those of its spaces: of no known structure there.
+      if (d.pattern != Pattern::vector && !(cut_into_bodies_of(symbol.source->structure(), e.domain()) && cut_into_bodies_of(symbol.source->structure(), e.codomain())))
+        return 0;
       switch (d.pattern) {
         case Pattern::block_diagonal:
         case Pattern::function: return both;
         case Pattern::edges:
         case Pattern::resolvent: return upper;
-        case Pattern::compound: return triangles(lower(d.expand(e.node().symbol), true));
+        case Pattern::compound: return triangles(lower(d.expand(symbol), true));
         case Pattern::vector: return 0;
       }
       return 0;
@@ -38,7 +43,7 @@ unsigned triangles_of_node(const Expression& e) {
     case NodeKind::square_root:
     case NodeKind::block_function:
     case NodeKind::block_diagonal: return both;
-    case NodeKind::zero: return e.domain().belongs_to_bodies() && e.codomain().belongs_to_bodies() ? both : 0u;
+    case NodeKind::zero: return cut_alike(e.domain(), e.codomain()) ? both : 0u;
     case NodeKind::constant: return e.node().constant->blocks.empty() ? 0u : both;
     case NodeKind::vector:
     case NodeKind::external: return 0;
@@ -54,9 +59,9 @@ unsigned triangles_of_node(const Expression& e) {
       // E X E* with X block diagonal is block diagonal: every body has one parent.
       const auto& f = e.children();
       bool first_transposed = false, last_transposed = false;
-      const SymbolDefinition* first = edge_symbol(f.front(), first_transposed);
-      const SymbolDefinition* last = edge_symbol(f.back(), last_transposed);
-      if (f.size() >= 3 && first && first == last && !first_transposed && last_transposed) {
+      const Symbol* first = edge_symbol(f.front(), first_transposed);
+      const Symbol* last = edge_symbol(f.back(), last_transposed);
+      if (f.size() >= 3 && first && last && *first == *last && !first_transposed && last_transposed) {
         bool inner = true;
         for (size_t i = 1; i + 1 < f.size(); ++i) inner &= triangles(f[i]) == both;
         if (inner) return both;

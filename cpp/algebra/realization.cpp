@@ -23,7 +23,7 @@ int most_rows(const Space& domain) { return domain.dimension() <= 3000 ? 256 : 1
 // A vector of the expression as it is known so far: Σ coefficient · left · (edge) · right · state. State -1 is the input.
 struct SignalTerm {
   int state;
-  double coefficient = 1;
+  Coefficient coefficient = 1;
   int right = -1, left = -1;
   Shift shift = Shift::none;
   int context = -1;
@@ -245,7 +245,8 @@ class RealizationBuilder {
         case Pattern::compound: return apply(lower(e, true), x, y);
         case Pattern::edges: return shift(symbol, transposed, x, y);
         case Pattern::resolvent: return resolvent(symbol, transposed, x, y);
-        default: return refuse("the vector " + show(inner) + " in it is no tree operator");
+        case Pattern::vector: return refuse("the vector " + show(inner) + " in it is no tree operator");
+        default: return refuse(show(inner) + " has blocks over other bodies than those of its spaces");
       }
     }
     if (inner.kind() == NodeKind::constant) return border(inner.node().constant, transposed, e, x, y);
@@ -357,6 +358,7 @@ class RealizationBuilder {
   static bool tree_space(const Expression& e) { return e.domain().belongs_to_bodies() && e.codomain().belongs_to_bodies(); }
   static bool same_cut(const Space& a, const Space& b) {
     if (a.kind() == SpaceKind::Euclidean || b.kind() == SpaceKind::Euclidean) return a.dimension() == b.dimension() && a.kind() == b.kind();
+    if (!cut_alike(a, b)) return false;
     for (size_t k = 0; k < a.layout().of_body.size(); ++k)
       if (a.body_size(k) != b.body_size(k)) return false;
     return true;

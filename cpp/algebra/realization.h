@@ -20,7 +20,7 @@ struct Realization {
   // c · L(row body) · edge · R(column body), added to equation `row` at state `column`. left, right: block registers, -1 for identity.
   struct Term {
     int row, column;
-    double coefficient;
+    Coefficient coefficient;
     int right = -1, left = -1;
     Shift shift = Shift::none;
     int context = -1;       // whose E
@@ -32,7 +32,7 @@ struct Realization {
   std::vector<Term> outputs;           // C: row unused, local
   struct Border {                      // dense constants between bodies and border states
     int row, column;
-    double coefficient;
+    Coefficient coefficient;
     std::shared_ptr<const ConstantData> constant;
     bool transposed;
   };

@@ -1,7 +1,5 @@
 #include "algebra/rules.h"
 
-#include <cmath>
-
 #include "algebra/errors.h"
 #include "algebra/lower.h"
 #include "algebra/theorems.h"
@@ -75,7 +73,7 @@ Rule compile(const Expression& lhs, const Expression& rhs, const std::string& na
 }
 
 // A normal form whose letters are all of one model, by codes; with_J false: as on a model without hinge-diagonal term.
-using Pattern_ = std::map<std::vector<int>, double>;
+using Pattern_ = std::map<std::vector<int>, Coefficient>;
 std::optional<Pattern_> codes_of(const Polynomial& p, const Alphabet& alphabet) {
   Pattern_ pattern;
   for (const auto& [word, c] : p) {
@@ -90,11 +88,11 @@ std::optional<Pattern_> codes_of(const Polynomial& p, const Alphabet& alphabet) 
 }
 
 // f with a = f b.
-std::optional<double> ratio(const Pattern_& a, const Pattern_& b) {
+std::optional<Coefficient> ratio(const Pattern_& a, const Pattern_& b) {
   if (a.size() != b.size() || a.empty()) return std::nullopt;
-  const double f = a.begin()->second / b.begin()->second;
+  const Coefficient f = a.begin()->second / b.begin()->second;
   for (auto i = a.begin(), j = b.begin(); i != a.end(); ++i, ++j)
-    if (i->first != j->first || std::abs(i->second - f * j->second) > 1e-12 * std::abs(i->second)) return std::nullopt;
+    if (i->first != j->first || i->second != f * j->second) return std::nullopt;
   return f;
 }
 

@@ -11,7 +11,7 @@ namespace pycraft {
 
 struct Rule {
   std::vector<int> from;                                // letter codes
-  std::vector<std::pair<double, std::vector<int>>> to;  // sum of words
+  std::vector<std::pair<Coefficient, std::vector<int>>> to;  // sum of words
   std::string theorem;
 };
 

@@ -1,7 +1,6 @@
 #include "algebra/scalar_expression.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <cstdlib>
 
 #include "algebra/errors.h"
@@ -9,6 +8,8 @@
 namespace pycraft {
 
 namespace {
+
+constexpr size_t most_factors = 1000;
 
 void require_square(const Expression& e, const char* what) {
   if (e.floating()) throw SpaceError(std::string(what) + " of I: it has no space yet");
@@ -22,11 +23,11 @@ void require_square(const Expression& e, const char* what) {
 Scalar::Scalar(Node node) {
   for (const Scalar& t : node.terms) node.depth = std::max(node.depth, 1 + t.node().depth);
   if (node.depth > most_levels)
-    throw EvaluationError("a scalar of sums within multiples within sums, " + std::to_string(node.depth) + " levels deep: evaluate a part of it, and go on with the number");
+    throw EvaluationError("a scalar of sums within multiples and products within sums, " + std::to_string(node.depth) + " levels deep: evaluate a part of it, and go on with the number");
   node_ = std::make_shared<const Node>(std::move(node));
 }
 
-Scalar number(double value) { return Scalar({ScalarKind::number, value, {}, {}}); }
+Scalar number(const Coefficient& value) { return Scalar({ScalarKind::number, value, {}, {}}); }
 Scalar trace(const Expression& e) {
   require_square(e, "trace");
   return Scalar({ScalarKind::trace, 0, e, {}});
@@ -49,8 +50,43 @@ Scalar operator+(const Scalar& a, const Scalar& b) {
   }
   return Scalar({ScalarKind::sum, 0, {}, std::move(terms)});
 }
-Scalar operator*(double c, const Scalar& a) { return Scalar({ScalarKind::scaled, c, {}, {a}}); }
-Scalar operator-(const Scalar& a, const Scalar& b) { return a + -1.0 * b; }
+Scalar operator*(const Coefficient& c, const Scalar& a) { return Scalar({ScalarKind::scaled, c, {}, {a}}); }
+Scalar operator-(const Scalar& a, const Scalar& b) { return a + -1 * b; }
+
+// Flat; numbers in front of factors are one number in front of the product.
+Scalar operator*(const Scalar& a, const Scalar& b) {
+  Coefficient c = 1;
+  std::vector<Scalar> factors;
+  for (Scalar s : {a, b}) {
+    while (s.node().kind == ScalarKind::scaled) {
+      c *= s.node().value;
+      s = Scalar(s.node().terms[0]);
+    }
+    if (s.node().kind == ScalarKind::number)
+      c *= s.node().value;
+    else if (s.node().kind == ScalarKind::product)
+      factors.insert(factors.end(), s.node().terms.begin(), s.node().terms.end());
+    else
+      factors.push_back(s);
+  }
+  if (factors.size() > most_factors) throw EvaluationError("a product of more than " + std::to_string(most_factors) + " scalars: evaluate a part of it, and go on with the number");
+  if (factors.empty()) return number(c);
+  const Scalar product = factors.size() == 1 ? factors[0] : Scalar({ScalarKind::product, 0, {}, std::move(factors)});
+  return c == 1 ? product : c * product;
+}
+
+Scalar reciprocal(const Scalar& a) {
+  if (a.node().kind == ScalarKind::reciprocal) return a.node().terms[0];
+  if (a.node().kind == ScalarKind::number && !a.node().value.is_zero()) return number(1 / a.node().value);
+  return Scalar({ScalarKind::reciprocal, 0, {}, {a}});
+}
+
+Scalar power(const Scalar& a, int exponent) {
+  if (std::abs(double(exponent)) > double(most_factors)) throw EvaluationError("scalar ** " + std::to_string(exponent) + ": a power is a product of as many factors; exponents go to " + std::to_string(most_factors));
+  Scalar product = number(1);
+  for (int i = 0; i < std::abs(exponent); ++i) product = product * a;
+  return exponent < 0 ? reciprocal(product) : product;
+}
 
 bool operator==(const Scalar& a, const Scalar& b) {
   const auto &x = a.node(), &y = b.node();
@@ -76,37 +112,61 @@ void visit(const Scalar& a, const std::function<void(const Expression&)>& operan
 
 constexpr size_t longest_operand = 100000;
 
+// Written without parentheses: one letter, starred or not.
+static bool short_operand(const Expression& e) {
+  const Expression& inner = e.kind() == NodeKind::transpose || e.kind() == NodeKind::inverse ? e.children()[0] : e;
+  return inner.children().empty();
+}
+
 std::string show(const Scalar& a, Style style) {
   const auto& n = a.node();
   const bool latex = style == Style::latex;
-  const auto real = [](double x) {
-    char buffer[40];
-    std::snprintf(buffer, sizeof buffer, "%.12g", x);
-    return std::string(buffer);
+  const auto real = [&](const Coefficient& x) {
+    const std::string text = x.text();
+    const size_t bar = text.find('/');
+    return latex && bar != std::string::npos ? "\\frac{" + text.substr(0, bar) + "}{" + text.substr(bar + 1) + "}" : text;
   };
+  const auto operand = [&] { return show(n.operand, style, longest_operand); };
   const auto call = [&](const char* plain, const char* tex) {
-    return latex ? std::string(tex) + "\\left(" + show(n.operand, style, longest_operand) + "\\right)" : std::string(plain) + "(" + show(n.operand, style, longest_operand) + ")";
+    return latex ? std::string(tex) + "\\left(" + operand() + "\\right)" : std::string(plain) + "(" + operand() + ")";
+  };
+  const auto wrapped = [&](const Scalar& x, bool also_products) {
+    const ScalarKind kind = x.node().kind;
+    const bool wrap = kind == ScalarKind::sum || kind == ScalarKind::scaled || (also_products && (kind == ScalarKind::product || kind == ScalarKind::reciprocal));
+    const std::string text = show(x, style);
+    return wrap ? (latex ? "\\left(" + text + "\\right)" : "(" + text + ")") : text;
   };
   switch (n.kind) {
     case ScalarKind::number: return real(n.value);
-    case ScalarKind::trace: return call("trace", "\\operatorname{tr}");
-    case ScalarKind::logdet: return style == Style::unicode ? "ln det(" + show(n.operand, style, longest_operand) + ")" : call("logdet", "\\ln\\det");
-    case ScalarKind::norm: return style == Style::unicode ? "‖" + show(n.operand, style, longest_operand) + "‖" : call("norm", "\\left\\Vert");
+    case ScalarKind::trace: return call(style == Style::unicode ? "tr" : "trace", "\\operatorname{tr}");
+    case ScalarKind::logdet:
+      if (style != Style::unicode) return call("logdet", "\\ln\\det");
+      return short_operand(n.operand) ? "ln det " + operand() : "ln det(" + operand() + ")";
+    case ScalarKind::norm: return latex ? "\\left\\Vert " + operand() + " \\right\\Vert" : style == Style::unicode ? "‖" + operand() + "‖" : call("norm", "");
     case ScalarKind::sum: {
       std::string text = show(n.terms[0], style);
       for (size_t i = 1; i < n.terms.size(); ++i) {
         const auto& t = n.terms[i].node();
         const bool negative = t.kind == ScalarKind::scaled && t.value < 0;
         const Scalar term = negative ? (t.value == -1 ? t.terms[0] : -t.value * t.terms[0]) : n.terms[i];
-        text += (negative ? " - " : " + ") + show(term, style);
+        text += (negative ? " - " : " + ") + (negative && term.node().kind == ScalarKind::sum ? wrapped(term, false) : show(term, style));
       }
       return text;
     }
-    case ScalarKind::scaled: {
-      const std::string inner = show(n.terms[0], style);
-      const bool wrap = n.terms[0].node().kind == ScalarKind::sum;
-      return (n.value == -1 ? "-" : real(n.value) + (latex ? "\\," : " ")) + (wrap ? "(" + inner + ")" : inner);
+    case ScalarKind::scaled: return (n.value == -1 ? "-" : real(n.value) + (latex ? "\\," : " ")) + wrapped(n.terms[0], false);
+    case ScalarKind::product: {
+      std::string above, below;
+      for (const Scalar& t : n.terms) {
+        const bool divides = t.node().kind == ScalarKind::reciprocal;
+        std::string& text = divides ? below : above;
+        text += (text.empty() ? "" : latex ? "\\," : " ") + wrapped(divides ? t.node().terms[0] : t, true);
+      }
+      if (below.empty()) return above;
+      if (latex) return "\\frac{" + (above.empty() ? "1" : above) + "}{" + below + "}";
+      const bool several = std::count_if(n.terms.begin(), n.terms.end(), [](const Scalar& t) { return t.node().kind == ScalarKind::reciprocal; }) > 1;
+      return (above.empty() ? "1" : above) + "/" + (several ? "(" + below + ")" : below);
     }
+    case ScalarKind::reciprocal: return latex ? "\\frac{1}{" + show(n.terms[0], style) + "}" : "1/" + wrapped(n.terms[0], true);
   }
   return "";
 }

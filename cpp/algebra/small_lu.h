@@ -60,14 +60,18 @@ class SmallLU {
     for (int k = 0; k < n; ++k) {
       check_interrupt_at(k, n);
       // The state's own equation, unless another one is much larger: the recursions that the equations stand for are stable as they are.
-      int best = k, own = k;
+      // Else the one that the equilibration matched it with. Where units are free an entry that is rounding (a block of R that cancels)
+      // looks as large as any; what is matched takes part in the determinant, and such an entry does not.
+      int best = k, own = -1, matched = -1;
       S largest = S(-1);
       for (int i = k; i < n; ++i) {
         const S candidate = abs(A[rows_[i] * n + k]) * row_factor_[rows_[i]];
         if (candidate > largest) largest = candidate, best = i;
         if (rows_[i] == k) own = i;
+        if (rows_[i] == scales_.matched_row(k)) matched = i;
       }
-      if (rows_[own] == k && abs(A[k * n + k]) * row_factor_[k] > S(0.1) * largest) best = own;
+      for (int i : {matched, own})
+        if (i >= 0 && abs(A[rows_[i] * n + k]) * row_factor_[rows_[i]] > S(0.1) * largest) best = i;
       if (!(largest > S(4 * n) * epsilon<S>() * column_[k])) return false;
       std::swap(rows_[k], rows_[best]);
       const S* pivot_row = A + rows_[k] * n;

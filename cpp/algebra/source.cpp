@@ -1,7 +1,9 @@
 #include "algebra/source.h"
 
 #include <algorithm>
+#include <cstring>
 #include <mutex>
+#include <unordered_map>
 #include <unordered_set>
 
 #include "algebra/errors.h"
@@ -102,6 +104,57 @@ ValuesInUse<S> SkoSource::current_values(unsigned groups) {
 #define PYCRAFT_INSTANTIATE(S) template ValuesInUse<S> SkoSource::current_values<S>(unsigned);
 PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_INSTANTIATE)
 #undef PYCRAFT_INSTANTIATE
+
+namespace {
+
+// Bits, so that 0 and -0 are two states.
+bool same_numbers(const std::vector<double>& a, const std::vector<double>& b) {
+  return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0);
+}
+
+bool alike(const Binding& a, const Binding& b) {
+  return a.batch == b.batch && a.nq == b.nq && a.nv == b.nv && a.arithmetic == b.arithmetic && same_numbers(a.q, b.q) && same_numbers(a.v, b.v);
+}
+
+size_t hash_of(const Binding& b) {
+  size_t h = static_cast<size_t>(b.batch) * 31 + static_cast<size_t>(b.arithmetic.precision) * 7 + static_cast<size_t>(b.arithmetic.form);
+  for (const std::vector<double>* numbers : {&b.q, &b.v})
+    for (double x : *numbers) {
+      std::uint64_t bits;
+      std::memcpy(&bits, &x, sizeof bits);
+      h = (h ^ bits) * 0x9e3779b97f4a7c15ULL;
+      h ^= h >> 32;
+    }
+  return h;
+}
+
+struct KnownBindings {
+  Mutex mutex;
+  std::unordered_multimap<size_t, std::weak_ptr<const Binding>> all;
+  size_t swept_at = 64;  // how many there are when those that are gone are taken out
+};
+KnownBindings& known_bindings() {
+  static KnownBindings* const instance = new KnownBindings;  // never destroyed: bindings may go during the exit of the process
+  return *instance;
+}
+
+}  // namespace
+
+std::shared_ptr<const Binding> the_one_like(std::shared_ptr<const Binding> made) {
+  const size_t key = hash_of(*made);
+  KnownBindings& known = known_bindings();
+  std::lock_guard<Mutex> lock(known.mutex);
+  if (known.mutex.abandoned()) leave_behind(known.all);
+  const auto [first, last] = known.all.equal_range(key);
+  for (auto i = first; i != last; ++i)
+    if (auto found = i->second.lock(); found && alike(*found, *made)) return found;
+  if (known.all.size() >= known.swept_at) {
+    std::erase_if(known.all, [](const auto& entry) { return entry.second.expired(); });
+    known.swept_at = 2 * known.all.size() + 64;
+  }
+  known.all.emplace(key, made);
+  return made;
+}
 
 template <class S>
 ValuesInUse<S> Binding::values(const std::shared_ptr<SkoSource>& source, unsigned groups) const {

@@ -124,4 +124,8 @@ struct Binding {
   mutable PerScalar<Entries> entries;
 };
 
+// The binding there is already with this state and way to compute; this one where there is none. Two expressions bound alike are bound
+// to the same: they are equal, and share the numbers of the model there.
+std::shared_ptr<const Binding> the_one_like(std::shared_ptr<const Binding> made);
+
 }  // namespace pycraft

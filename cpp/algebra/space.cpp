@@ -27,6 +27,14 @@ std::shared_ptr<const SpaceLayout> coordinate_layout(const SkoStructure& s, cons
   return tree_layout(s.dof, s.dof_offset, s.hinge_names, owner, owner_name);
 }
 
+bool cut_alike(const Space& a, const Space& b) {
+  return a.belongs_to_bodies() && b.belongs_to_bodies() && a.layout().of_body.size() == b.layout().of_body.size();
+}
+
+bool cut_into_bodies_of(const SkoStructure& s, const Space& space) {
+  return space.belongs_to_bodies() && space.layout().of_body.size() == static_cast<size_t>(s.bodies());
+}
+
 Space Space::euclidean(int dimension) {
   auto layout = std::make_shared<SpaceLayout>();
   layout->blocks.push_back({-1, 0, dimension, ""});

@@ -54,6 +54,12 @@ class Space {
   std::shared_ptr<const SpaceLayout> layout_;
 };
 
+// Whether both are cut into blocks of as many bodies. Bodies grouped in pairs share the coordinates of the ungrouped model, and with them
+// the space Θ, which is cut as the ungrouped model is.
+bool cut_alike(const Space& a, const Space& b);
+// Whether a space is cut into the bodies of this structure.
+bool cut_into_bodies_of(const SkoStructure& structure, const Space& space);
+
 // The layouts of a structure's own spaces.
 std::shared_ptr<const SpaceLayout> body_layout(const SkoStructure& structure, const void* owner, const std::string& owner_name);
 std::shared_ptr<const SpaceLayout> coordinate_layout(const SkoStructure& structure, const void* owner, const std::string& owner_name);

@@ -134,10 +134,10 @@ std::vector<Theorem> sko_theorems(const std::shared_ptr<SkoSource>& source) {
   state("ln det ℳ = Σ ln det D(k)", logdet(MM), logdet(D), no_hinge_diagonal);
   state("ln det (ℳ+J) = Σ ln det D(k)", logdet(MM + J), logdet(D), no_hypothesis, check, extended);
   const Expression W = square_root(D).inv() * H * psi * square_root(M);
-  state("#1 D^-½HψM^½ is a co-isometry", W * W.T(), I, no_hinge_diagonal, check, "soa.md #1");
-  state("#2 Newton-Euler to innovations is a QR", H * phi * square_root(M), A * square_root(D) * W, no_hypothesis, check, "soa.md #2");
-  state("#6 φ*H*ℳ⁻¹ by the factors", phi.T() * H.T() * (MM + J).inv(), psi.T() * H.T() * D.inv() * S, no_hypothesis, check, "soa.md #6");
-  state("#7 ℳ⁻¹HφMφ* by the factors", (MM + J).inv() * H * phi * M * phi.T(), K.T() * psi.T() + S.T() * D.inv() * H * psi * P, no_hypothesis, check, "soa.md #7");
+  state("D^-½HψM^½ is a co-isometry", W * W.T(), I, no_hinge_diagonal, check, "soa.md #1");
+  state("Newton-Euler to innovations is a QR", H * phi * square_root(M), A * square_root(D) * W, no_hypothesis, check, "soa.md #2");
+  state("φ*H*ℳ⁻¹ by the factors", phi.T() * H.T() * (MM + J).inv(), psi.T() * H.T() * D.inv() * S, no_hypothesis, check, "soa.md #6");
+  state("ℳ⁻¹HφMφ* by the factors", (MM + J).inv() * H * phi * M * phi.T(), K.T() * psi.T() + S.T() * D.inv() * H * psi * P, no_hypothesis, check, "soa.md #7");
 
   group = "Operational space";
   state("Ω is ψ*H*D⁻¹Hψ", Omega, psi.T() * H.T() * D.inv() * H * psi, no_hypothesis, rewrite);
@@ -150,16 +150,16 @@ std::vector<Theorem> sko_theorems(const std::shared_ptr<SkoSource>& source) {
   list.back().text = "Ω = Υ + ψ̃* Υ + Υ ψ̃ in the blocks on one path to the base";
   list.back().latex = "[\\Omega = \\Upsilon + \\tilde\\psi^*\\Upsilon + \\Upsilon\\tilde\\psi]_{(i,j)\\text{ on one path to the base}}";
   const Expression siblings = E_psi.T() * Upsilon * E_psi - block_diagonal(E_psi.T() * Upsilon * E_psi);
-  state("#28 Ω decomposed with siblings", Omega, Upsilon + psi_tilde.T() * Upsilon + Upsilon * psi_tilde + psi.T() * siblings * psi, no_hypothesis, check,
+  state("Ω decomposed with siblings", Omega, Upsilon + psi_tilde.T() * Upsilon + Upsilon * psi_tilde + psi.T() * siblings * psi, no_hypothesis, check,
         "soa.md #28");
   list.back().text = "Ω = Υ + ψ̃*Υ + Υψ̃ + ψ*Sψ,  S = E_ψ*ΥE_ψ - blockdiag(E_ψ*ΥE_ψ)";
   list.back().latex = "\\Omega = \\Upsilon + \\tilde\\psi^*\\Upsilon + \\Upsilon\\tilde\\psi + \\psi^*S\\psi,\\quad S = \\mathcal{E}_\\psi^*\\Upsilon \\mathcal{E}_\\psi - \\operatorname{blockdiag}(\\cdot)";
-  state("#29 Lyapunov equation with siblings", Upsilon - E_psi.T() * Upsilon * E_psi + siblings, H.T() * D.inv() * H, no_hypothesis, check, "soa.md #29");
+  state("Lyapunov equation with siblings", Upsilon - E_psi.T() * Upsilon * E_psi + siblings, H.T() * D.inv() * H, no_hypothesis, check, "soa.md #29");
   list.back().text = "Υ - E_ψ*ΥE_ψ + S = H*D⁻¹H,  S = E_ψ*ΥE_ψ - blockdiag(E_ψ*ΥE_ψ)";
   list.back().latex = "\\Upsilon - \\mathcal{E}_\\psi^*\\Upsilon \\mathcal{E}_\\psi + S = H^*\\mathcal{D}^{-1}H,\\quad S = \\mathcal{E}_\\psi^*\\Upsilon \\mathcal{E}_\\psi - \\operatorname{blockdiag}(\\cdot)";
-  state("#3 ΩMΩ = Ω", Omega * M * Omega, Omega, no_hinge_diagonal, check, "soa.md #3");
-  state("#4 the bodies' shares add up to N", trace(Upsilon * M), number(source->structure().coordinates()), no_hinge_diagonal, check, "soa.md #4");
-  state("#5 (I-ΩM)φ* = ψ*-ΩP", (I - Omega * M) * phi.T(), psi.T() - Omega * P, no_hypothesis, check, "soa.md #5");
+  state("ΩMΩ = Ω", Omega * M * Omega, Omega, no_hinge_diagonal, check, "soa.md #3");
+  state("the bodies' shares add up to N", trace(Upsilon * M), number(source->structure().coordinates()), no_hinge_diagonal, check, "soa.md #4");
+  state("(I-ΩM)φ* = ψ*-ΩP", (I - Omega * M) * phi.T(), psi.T() - Omega * P, no_hypothesis, check, "soa.md #5");
 
   // #57: an error of the inertias, however the masses are graded: ‖x'-x‖_ℳ <= max_k ‖M^-½ δM M^-½‖ ‖x'‖_ℳ, x = ℳ⁻¹T, x' = ℳ'⁻¹T.
   std::vector<std::vector<double>> spread;
@@ -172,7 +172,7 @@ std::vector<Theorem> sko_theorems(const std::shared_ptr<SkoSource>& source) {
   const Expression root = square_root(M), C = constant_blocks(std::move(spread), root.domain(), root.domain(), "C");
   const Expression MM_prime = H * phi * (M + root * C * root.T()) * phi.T() * H.T(), T = make_vector("T", source->theta());
   const Expression error = (MM_prime.inv() - MM.inv()) * T, moved = MM_prime.inv() * T;
-  state("#57 perturbed inertias, relative error in the ℳ norm", error.T() * MM * error, (largest * largest) * moved.T() * MM * moved, no_hypothesis, check, "soa.md #57");
+  state("perturbed inertias, relative error in the ℳ norm", error.T() * MM * error, (largest * largest) * moved.T() * MM * moved, no_hypothesis, check, "soa.md #57");
   list.back().at_most = true;
   list.back().text = "‖x'-x‖_ℳ ≤ max_k ‖M^-½ δM M^-½‖ ‖x'‖_ℳ,  ℳx = ℳ'x' = T";
   list.back().latex = "\\Vert x'-x\\Vert_{\\mathcal{M}} \\le \\max_k \\Vert M_k^{-1/2}\\,\\delta M_k\\,M_k^{-1/2}\\Vert\\,\\Vert x'\\Vert_{\\mathcal{M}}";
@@ -191,10 +191,10 @@ std::vector<Theorem> sko_theorems(const std::shared_ptr<SkoSource>& source) {
     list.back().text = text;
     list.back().latex = latex;
   };
-  state("#58 two-filter form", Upsilon.inv(), P + other - other * H.T() * (H * other * H.T()).inv() * H * other, free_root | equal_blocks | no_hinge_diagonal, check, "soa.md #58");
+  state("two-filter form", Upsilon.inv(), P + other - other * H.T() * (H * other * H.T()).inv() * H * other, free_root | equal_blocks | no_hinge_diagonal, check, "soa.md #58");
   shown("Υ⁻¹ = P + S⁺,  S = (E*ΥE)⁻¹ - P⁺", "\\Upsilon^{-1} = P + S^{+},\\quad S = (\\mathcal{E}^*\\Upsilon \\mathcal{E})^{-1} - P^{+}");
   const Letters grouped(std::make_shared<AggregatedTree>(source));
-  state("#64 bodies grouped in pairs: the same mass matrix", grouped.H * grouped.phi * grouped.M * grouped.phi.T() * grouped.H.T(), MM, no_hypothesis, check,
+  state("bodies grouped in pairs: the same mass matrix", grouped.H * grouped.phi * grouped.M * grouped.phi.T() * grouped.H.T(), MM, no_hypothesis, check,
         "soa.md #64");
   shown("ℳ of bodies grouped in pairs = ℳ", "\\mathcal{M}_{\\text{pairs}} = \\mathcal{M}");
   return list;

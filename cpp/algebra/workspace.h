@@ -182,7 +182,7 @@ class Workspace {
         return;
       }
       case StepKind::blocks_of_dense: {
-        ++counts.dense;
+        ++(s.tier == 4 ? counts.dense : counts.kernels);
         std::vector<S> A;
         operand_as_matrix(s, values, A, counts);
         BlockStorage<S>& b = blocks_[s.out];

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "algebra/coefficient.h"
 #include "algebra/engine.h"
 #include "algebra/expression.h"
 #include "algebra/source.h"
@@ -76,6 +77,11 @@ py::array_t<double> to_numpy(const Vector3<double>& v);
 py::array_t<double> to_numpy(const Matrix3<double>& A);
 py::array_t<double> to_numpy(const std::vector<double>& v);
 
+// A number in front of an operator or a scalar: whole numbers, Fraction and Decimal exactly, a float as the double that it is. What is no
+// double comes back as a Fraction.
+Coefficient to_coefficient(const py::handle& value);
+py::object to_number(const Coefficient& c);
+
 // A run's numbers as an array of this shape; with expansions, an object array of mpmath numbers that lose nothing.
 py::object to_array(const Result& result, std::vector<py::ssize_t> shape);
 bool wants_objects(const py::object& dtype);
@@ -107,8 +113,17 @@ py::list all_parts(const Expression& e);
 
 }  // namespace pycraft
 
-// Precisions and forms are given by name; 50 and 100 are numbers of digits.
+// Coefficients are numbers; precisions and forms are given by name; 50 and 100 are numbers of digits.
 namespace pybind11::detail {
+template <>
+struct type_caster<pycraft::Coefficient> {
+  PYBIND11_TYPE_CASTER(pycraft::Coefficient, const_name("float | fractions.Fraction"));
+  bool load(handle source, bool) {
+    value = pycraft::to_coefficient(source);
+    return true;
+  }
+  static handle cast(const pycraft::Coefficient& c, return_value_policy, handle) { return pycraft::to_number(c).release(); }
+};
 template <>
 struct type_caster<pycraft::Precision> {
   PYBIND11_TYPE_CASTER(pycraft::Precision, const_name("str | int"));

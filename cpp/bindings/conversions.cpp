@@ -144,6 +144,43 @@ py::array_t<double> to_numpy(const std::vector<double>& v) {
   return a;
 }
 
+namespace {
+
+// A whole number in hexadecimal digits: its decimal ones Python writes up to a limit only.
+std::string digits_of(const py::handle& whole) { return py::str(py::module_::import("builtins").attr("hex")(whole)).cast<std::string>(); }
+
+py::object whole_number(const std::string& digits) { return py::module_::import("builtins").attr("int")(digits); }
+
+}  // namespace
+
+Coefficient to_coefficient(const py::handle& value) {
+  if (PyFloat_Check(value.ptr())) return PyFloat_AS_DOUBLE(value.ptr());
+  if (PyIndex_Check(value.ptr())) {
+    const py::object whole = py::reinterpret_steal<py::object>(PyNumber_Index(value.ptr()));
+    if (!whole) throw py::error_already_set();
+    int overflow = 0;
+    const long long small = PyLong_AsLongLongAndOverflow(whole.ptr(), &overflow);
+    if (!overflow && std::abs(small) <= (1LL << 53)) return static_cast<double>(small);
+    return Coefficient::ratio(digits_of(whole), "1");
+  }
+  if (py::hasattr(value, "as_integer_ratio")) {
+    py::tuple ratio;
+    try {
+      ratio = value.attr("as_integer_ratio")();
+    } catch (py::error_already_set&) {
+      throw EvaluationError("a coefficient " + std::string(py::str(value)) + " is no number to reckon with");
+    }
+    return Coefficient::ratio(digits_of(ratio[0]), digits_of(ratio[1]));
+  }
+  return py::float_(py::reinterpret_borrow<py::object>(value)).cast<double>();
+}
+
+py::object to_number(const Coefficient& c) {
+  if (c.is_double()) return py::float_(c.nearest());
+  const auto [above, below] = c.as_ratio();
+  return py::module_::import("fractions").attr("Fraction")(whole_number(above), whole_number(below));
+}
+
 py::object to_array(const Result& r, std::vector<py::ssize_t> shape) {
   py::ssize_t entries = 1;
   for (py::ssize_t n : shape) entries *= n;

@@ -17,7 +17,7 @@ std::shared_ptr<MultibodyOperators> mechanics_of(const std::shared_ptr<SkoSource
   return nullptr;
 }
 
-// The one model of an expression; null where it has none that moves.
+// The one model of an expression, else of the spaces of its constants; null where it has none that moves.
 std::shared_ptr<MultibodyOperators> model_of(const std::vector<Expression>& operands) {
   std::shared_ptr<MultibodyOperators> found;
   for (const Expression& e : operands)
@@ -27,6 +27,8 @@ std::shared_ptr<MultibodyOperators> model_of(const std::vector<Expression>& oper
         throw EvaluationError("operators of two models, '" + found->name() + "' and '" + own->name() + "': differentiate along a coordinate of either before they are combined");
       if (own) found = own;
     }
+  for (const Expression& e : operands)
+    if (!found && !e.floating()) found = mechanics_of(model_of_spaces(e).source);
   return found;
 }
 

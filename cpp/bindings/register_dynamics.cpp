@@ -122,10 +122,11 @@ void register_dynamics(py::module_& m) {
                                      const std::string& on_singular, const py::object& out) {
         const Multibody& mb = d.model();
         const int nv = mb.nv();
-        const Argument a = argument(q, mb.nq(), "q", mb);
+        Argument a = argument(q, mb.nq(), "q", mb);
         check_states(mb, a, a.batch);
         const Solving how{form, refinement(refine, residual, precision), on_singular_from_name(on_singular)};
         py::array_t<double> result = output(out, a.batch, {nv, nv});
+        keep_apart(a, result);
         double* target = result.mutable_data();
         const ModelInUse use(d.model());
         ReleasedGil release;

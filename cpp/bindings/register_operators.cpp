@@ -17,13 +17,11 @@ namespace {
 // Entries that dense() and numpy.asarray refuse to exceed: 512 MB.
 constexpr double dense_limit = 64e6;
 
-// Factors of a power: a product is kept as typed.
-constexpr int most_factors = 1000;
-
 py::object not_implemented() { return py::reinterpret_borrow<py::object>(Py_NotImplemented); }
 bool is_operator(const py::object& x) { return py::isinstance<Expression>(x); }
 bool is_number(const py::object& x) {
   if (PyFloat_Check(x.ptr()) || PyLong_Check(x.ptr())) return true;
+  if (py::hasattr(x, "as_integer_ratio")) return true;  // Fraction, Decimal
   if (!py::hasattr(x, "__float__") || !py::hasattr(x, "ndim") || x.attr("ndim").cast<int>() != 0) return false;
   return !py::hasattr(x, "dtype") || std::string("biuf").find(x.attr("dtype").attr("kind").cast<std::string>()) != std::string::npos;  // not complex
 }
@@ -97,7 +95,7 @@ py::object apply_from_left(const py::object& given, const Expression& e) {
 
 py::object multiply(const Expression& a, const py::object& b) {
   if (is_operator(b)) return py::cast(a * b.cast<Expression>());
-  if (is_number(b)) return py::cast(py::float_(b).cast<double>() * a);
+  if (is_number(b)) return py::cast(b.cast<Coefficient>() * a);
   if (is_array(b)) throw py::type_error("operator * array: `*` multiplies operators; apply an operator to an array with `@`");
   return not_implemented();
 }
@@ -214,18 +212,18 @@ void register_operators(py::module_& m) {
       .def("__rmatmul__", [](const Expression& a, const py::object& b) -> py::object { return is_array(b) ? apply_from_left(b, a) : not_implemented(); })
       .def("__mul__", &multiply)
       .def("__rmul__", [](const Expression& a, const py::object& b) -> py::object {
-        if (is_number(b)) return py::cast(py::float_(b).cast<double>() * a);
+        if (is_number(b)) return py::cast(b.cast<Coefficient>() * a);
         if (is_array(b)) throw py::type_error("array * operator: multiply an array and an operator with `@`");
         return not_implemented();
       })
       .def("__truediv__", [](const Expression& a, const py::object& b) -> py::object {
         if (!is_number(b)) return is_operator(b) ? throw SpaceError("operator / operator: multiply by inv() on the side you mean") : not_implemented();
-        const double c = py::float_(b).cast<double>();
-        if (c == 0) {
+        const auto c = b.cast<Coefficient>();
+        if (c.is_zero()) {
           PyErr_SetString(PyExc_ZeroDivisionError, "operator divided by zero");
           throw py::error_already_set();
         }
-        return py::cast((1 / c) * a);
+        return py::cast(a / c);
       })
       .def("__neg__", [](const Expression& a) { return -a; })
       .def("__pos__", [](const Expression& a) { return a; })
@@ -235,10 +233,7 @@ void register_operators(py::module_& m) {
       .def("__rsub__", [](const Expression& a, const py::object& b) { return add(a, b, -1, true); })
       .def("__pow__", [](const Expression& a, const py::object& n) -> py::object {
         if (!PyIndex_Check(n.ptr())) throw py::type_error("operator ** n takes a whole number; there is sqrt() for block-diagonal operators");
-        const int exponent = clipped(n);
-        if (std::abs(exponent) > most_factors)
-          throw EvaluationError("operator ** " + std::string(py::str(n)) + ": a power is a product of as many factors; exponents go to " + std::to_string(most_factors));
-        return py::cast(power(a, exponent));
+        return py::cast(power(a, clipped(n)));
       })
       .def("__eq__", [](const Expression& a, const py::object& b) -> py::object { return is_operator(b) ? py::cast(a == b.cast<Expression>()) : not_implemented(); },
            "Structural equality after flattening sums and products: a bool, no numbers. Equality by value is pycraft.check.")
@@ -298,7 +293,8 @@ void register_operators(py::module_& m) {
         static const char* names[] = {"symbol", "vector", "identity", "zero", "constant", "external", "sum", "product", "scaled", "transpose", "inverse", "blockdiag", "sqrt", "function"};
         return names[static_cast<int>(e.kind())];
       })
-      .def_property_readonly("coefficient", [](const Expression& e) { return e.node().coefficient; })
+      .def_property_readonly("coefficient", [](const Expression& e) { return e.node().coefficient; },
+                             "The number in front: a float where it is one exactly, else a Fraction.")
       .def_property_readonly("name", [](const Expression& e) -> py::object {
         if (e.kind() == NodeKind::symbol || e.kind() == NodeKind::block_function) return py::cast(e.node().symbol.definition->ascii);
         if (e.kind() == NodeKind::vector) return py::cast(e.node().name);

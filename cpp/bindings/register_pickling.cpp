@@ -64,7 +64,7 @@ static py::tuple parts_of_node(const Expression& e) {
     case NodeKind::vector: payload = py::make_tuple(n.name, space_parts(n.codomain)); break;
     case NodeKind::identity: payload = e.floating() ? py::object(py::none()) : py::object(space_parts(n.domain)); break;
     case NodeKind::zero: payload = py::make_tuple(space_parts(n.domain), space_parts(n.codomain)); break;
-    case NodeKind::scaled: payload = py::float_(n.coefficient); break;
+    case NodeKind::scaled: payload = py::cast(n.coefficient); break;
     case NodeKind::constant:
       payload = py::make_tuple(n.constant->dense, n.constant->blocks, space_parts(n.domain), space_parts(n.codomain), n.constant->name);
       break;
@@ -93,7 +93,7 @@ py::list all_parts(const Expression& e) {
 }
 
 void register_pickling(py::module_& m) {
-  m.def("_make", [](const std::string& kind, const std::vector<Expression>& children, double coefficient) {
+  m.def("_make", [](const std::string& kind, const std::vector<Expression>& children, const Coefficient& coefficient) {
     if (kind == "sum") return sum_of(children);
     if (kind == "product") return product_of(children);
     if (kind == "scaled") return coefficient * children[0];

@@ -30,11 +30,19 @@ std::string shown_value(const Scalar& s, const char* equals) {
   }
 }
 
-// A number beside a scalar; anything else is refused: an operator or another scalar would have to be frozen at the present state.
-double factor(const py::object& x) {
-  if (py::isinstance<Scalar>(x) || py::isinstance<Expression>(x))
-    throw py::type_error(std::string("a scalar expression is added to scalars and multiplied by numbers; for its value at the present state write float(...)"));
-  return py::float_(x).cast<double>();
+// A number beside a scalar; an operator is refused: the scalar would have to be frozen at the present state.
+Coefficient factor(const py::object& x) {
+  if (py::isinstance<Expression>(x))
+    throw py::type_error(std::string("a scalar expression is added to and multiplied by scalars and numbers, not operators; for its value at the present state write float(...)"));
+  return to_coefficient(x);
+}
+
+Scalar quotient(const Scalar& a, const Coefficient& c) {
+  if (c.is_zero()) {
+    PyErr_SetString(PyExc_ZeroDivisionError, "scalar divided by zero");
+    throw py::error_already_set();
+  }
+  return (1 / c) * a;
 }
 
 double single(const Scalar& s) {
@@ -82,10 +90,17 @@ void register_scalars(py::module_& m) {
       .def("__sub__", [](const Scalar& a, const Scalar& b) { return a - b; })
       .def("__sub__", [](const Scalar& a, const py::object& b) { return a - number(factor(b)); })
       .def("__rsub__", [](const Scalar& a, const py::object& b) { return number(factor(b)) - a; })
+      .def("__mul__", [](const Scalar& a, const Scalar& b) { return a * b; })
       .def("__mul__", [](const Scalar& a, const py::object& c) { return factor(c) * a; })
       .def("__rmul__", [](const Scalar& a, const py::object& c) { return factor(c) * a; })
-      .def("__truediv__", [](const Scalar& a, const py::object& c) { return (1 / factor(c)) * a; })
-      .def("__neg__", [](const Scalar& a) { return -1.0 * a; })
+      .def("__truediv__", [](const Scalar& a, const Scalar& b) { return a * reciprocal(b); })
+      .def("__truediv__", [](const Scalar& a, const py::object& c) { return quotient(a, factor(c)); })
+      .def("__rtruediv__", [](const Scalar& a, const py::object& c) { return number(factor(c)) * reciprocal(a); })
+      .def("__pow__", [](const Scalar& a, const py::object& n) {
+        if (!PyIndex_Check(n.ptr())) throw py::type_error("scalar ** n takes a whole number");
+        return power(a, clipped(n));
+      })
+      .def("__neg__", [](const Scalar& a) { return -1 * a; })
       .def("__abs__", [](const Scalar& a) { return std::abs(single(a)); })
       .def("__lt__", [](const Scalar& a, double b) { return single(a) < b; })
       .def("__le__", [](const Scalar& a, double b) { return single(a) <= b; })
@@ -102,12 +117,12 @@ void register_scalars(py::module_& m) {
       .def("__repr__", [](const Scalar& a) { return "<scalar " + show(a) + shown_value(a, " = ") + ">"; })
       .def("_parts", [](const Scalar& a) {
         const auto& n = a.node();
-        return py::make_tuple(static_cast<int>(n.kind), n.value, n.operand ? py::cast(n.operand) : py::none(), py::cast(n.terms));
+        return py::make_tuple(static_cast<int>(n.kind), to_number(n.value), n.operand ? py::cast(n.operand) : py::none(), py::cast(n.terms));
       })
       .def("__reduce__", [](const Scalar& a) -> py::tuple {
         return py::make_tuple(py::module_::import("pycraft._core").attr("_scalar_from_parts"), py::cast(a).attr("_parts")());
       });
-  m.def("_scalar_from_parts", [](int kind, double value, const py::object& operand, const std::vector<Scalar>& terms) {
+  m.def("_scalar_from_parts", [](int kind, const Coefficient& value, const py::object& operand, const std::vector<Scalar>& terms) {
     return Scalar({static_cast<ScalarKind>(kind), value, operand.is_none() ? Expression() : operand.cast<Expression>(), terms});
   });
   m.def("scalar", &number, py::arg("value"));

@@ -1,6 +1,7 @@
 // Where operators come from: multibody models, trees of matrices, and the states that expressions are bound to.
 #include <algorithm>
 
+#include "algebra/aggregated_tree.h"
 #include "algebra/errors.h"
 #include "algebra/matrix_tree.h"
 #include "bindings/bindings.h"
@@ -71,13 +72,13 @@ std::shared_ptr<const Binding> make_binding(const std::vector<Expression>& opera
   binding->arithmetic = arithmetic;
   bool anything = false;
   const auto sources = unbound_sources(operands, anything);
-  if (!anything) return binding;
+  if (!anything) return the_one_like(binding);
   if (sources.empty()) {  // between spaces R^n: only how many states there are counts
     if (!q_given.is_none() && !py::hasattr(q_given, "q")) {
       const Array a = real_array(q_given);
       if (a.ndim() == 2) binding->batch = static_cast<int>(a.shape(0));
     }
-    return binding;
+    return the_one_like(binding);
   }
   for (const auto& s : sources) s->check_current();
   int nq = 0, nv = 0;
@@ -119,7 +120,7 @@ std::shared_ptr<const Binding> make_binding(const std::vector<Expression>& opera
   }
   binding->nq = nq;
   binding->nv = nv;
-  return binding;
+  return the_one_like(binding);
 }
 
 void register_sources(py::module_& m) {
@@ -132,7 +133,7 @@ void register_sources(py::module_& m) {
   m.def("_binding_from_parts", [](int batch, int nq, int nv, std::vector<double> q, std::vector<double> v, Precision precision, Form form, int steps, int residual) {
     auto b = std::make_shared<Binding>();
     b->batch = batch, b->nq = nq, b->nv = nv, b->q = std::move(q), b->v = std::move(v), b->arithmetic = {form, {steps, residual_precisions[residual]}, precision};
-    return b;
+    return std::const_pointer_cast<Binding>(the_one_like(b));
   });
   m.def("_binding", [](const Expression& e) {
     const auto all = contexts(e);
@@ -144,7 +145,19 @@ void register_sources(py::module_& m) {
         py::arg("precision") = Precision::double_);
 
   auto any_source = declared<py::class_<SkoSource, std::shared_ptr<SkoSource>>>(m, "SkoSource");
-  unpicklable(any_source)
+  any_source
+      .def("__reduce__", [](const SkoSource& s) -> py::tuple {
+        const py::object made = py::module_::import("pycraft._core").attr("_derived_operators");
+        if (const auto* grouped = dynamic_cast<const AggregatedTree*>(&s)) {
+          grouped->base().check_current();
+          return py::make_tuple(made, py::make_tuple(std::const_pointer_cast<SkoSource>(grouped->base().shared_from_this()), "bodies in pairs"));
+        }
+        const auto* derived = dynamic_cast<const DerivedOperators*>(&s);
+        if (!derived) throw py::type_error("operators of '" + s.name() + "' cannot be pickled or copied; make them anew where they are wanted");
+        derived->base()->check_current();
+        const auto* subset = dynamic_cast<const HingeSubset*>(derived);
+        return py::make_tuple(made, py::make_tuple(derived->base(), subset ? py::cast(subset->kept()) : py::object(py::str("world frame"))));
+      })
       .def_property_readonly("name", &SkoSource::name)
       .def_property_readonly("Theta", &SkoSource::theta)
       .def_property_readonly("V", &SkoSource::motions)
@@ -180,6 +193,15 @@ void register_sources(py::module_& m) {
         return py::make_tuple(py::module_::import("pycraft._core").attr("operators_of"), py::make_tuple(py::cast(s.model())));
       });
   m.def("operators_of", &operators_of, py::arg("model"));
+  // how: "bodies in pairs", "world frame", or which hinges move
+  m.def("_derived_operators", [](const std::shared_ptr<SkoSource>& base, const py::object& how) -> std::shared_ptr<SkoSource> {
+    const std::string kind = py::isinstance<py::str>(how) ? how.cast<std::string>() : "hinges";
+    if (kind == "bodies in pairs") return std::make_shared<AggregatedTree>(base);
+    const auto model = std::dynamic_pointer_cast<MultibodyOperators>(base);
+    if (!model) throw EvaluationError("'" + base->name() + "' is no multibody model");
+    if (kind == "world frame") return std::make_shared<WorldFrame>(model);
+    return std::make_shared<HingeSubset>(model, how.cast<std::vector<char>>());
+  });
   py::class_<MatrixTree, SkoSource, std::shared_ptr<MatrixTree>>(m, "MatrixTree", "A tree whose blocks E, H, M, J are given as matrices of any size.")
       .def(py::init([](const std::vector<int>& parents, const std::vector<int>& sizes, const std::vector<int>& dof, std::vector<std::vector<double>> E,
                        std::vector<std::vector<double>> H, std::vector<std::vector<double>> M, std::vector<std::vector<double>> J,

@@ -1,7 +1,7 @@
 #include "dynamics/rigid_dynamics.h"
 
 #include "algebra/sweeps/articulated_inertia.h"
-#include "algebra/small_cholesky.h"
+#include "algebra/small_ldl.h"
 #include "algebra/small_matrix.h"
 #include "algebra/sweeps/composite_inertia.h"
 #include "algebra/sweeps/mass_matrix.h"
@@ -296,12 +296,11 @@ void RigidDynamics<S>::project_off_null_space(const AddedInertias& added, S* x, 
   for (int c = 0; c < z; ++c) unit[size_t(added[c].first) * z + c] = added[c].second;
   solve(unit.data(), N.data(), z);
   transposed_multiply_add(N.data(), N.data(), gram.data(), z, n, z);
-  if (cholesky_in_place(gram.data(), z, pivots.data()) < z) throw SingularOperatorError("the null space of '" + source_.name() + "' at its singular hinges is not resolved");
+  if (ldl_in_place(gram.data(), z, pivots.data()) < z) throw SingularOperatorError("the null space of '" + source_.name() + "' at its singular hinges is not resolved");
   for (int pass = 0; pass < 2; ++pass) {  // twice is enough
     std::fill(weights.begin(), weights.end(), S(0));
     transposed_multiply_add(N.data(), x, weights.data(), z, n, m);
-    forward_substitute(gram.data(), z, weights.data(), m);
-    back_substitute(gram.data(), z, weights.data(), m);
+    ldl_solve(gram.data(), pivots.data(), z, weights.data(), m);
     multiply_add(N.data(), weights.data(), x, n, z, m, S(-1));
   }
 }

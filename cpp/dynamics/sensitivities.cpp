@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "algebra/interrupt.h"
 #include "algebra/sweeps/articulated_inertia.h"
 #include "algebra/sweeps/upsilon.h"
 #include "recursions/kinematics.h"
@@ -51,6 +52,7 @@ void Sensitivities<S>::differentiate_forces(S* dq, S* dv, int stride) {
   for (int k = 0; k < N; ++k) std::fill_n(dq + size_t(k) * stride, N, S(0)), std::fill_n(dv + size_t(k) * stride, N, S(0));
   for (int k = 0; k < N; ++k) {
     const int c = frame_.body_of[k];
+    check_interrupt_at(k, c);
     const RigidInertia<S>& R = frame_.R[c];
     const MomentumRate<S>& B = frame_.B[c];
     const Vector6<S>& s = frame_.twist[k];
@@ -149,6 +151,7 @@ void Sensitivities<S>::mass_matrix(const S* q, S* out) {
     const int first = m.v_offset[b], last = first + m.nv_of[b];
     if (first < last) twists_about(b);
     for (int j = first; j < last; ++j) {
+      check_interrupt_at(j, b);
       const Vector6<S> momentum = R * frame_.twist[j];
       // k between: R and S_j move, S_i stays
       on_path(m, b, [&](int k) {
@@ -161,6 +164,7 @@ void Sensitivities<S>::mass_matrix(const S* q, S* out) {
     }
     // k outboard of both: R alone moves, by crf(S_k) R_k - R_k crm(S_k)
     for (int k = first; k < last; ++k) {
+      check_interrupt_at(k, b);
       const Vector6<S>& s = frame_.twist[k];
       on_path(m, b, [&](int j) {
         if (!frame_.inboard(j, k)) return;
@@ -183,8 +187,10 @@ void Sensitivities<S>::christoffel(const S* q, S* out) {
   mass_matrix(q, d);
   const auto D = [&](int i, int j, int k) -> const S& { return d[(size_t(i) * n + j) * n + k]; };
   for (int i = 0; i < N; ++i)
-    for (int j = 0; j < N; ++j)
+    for (int j = 0; j < N; ++j) {
+      check_interrupt_at(j, N);
       for (int k = 0; k < N; ++k) out[(size_t(i) * n + j) * n + k] = (D(i, j, k) + D(i, k, j) - D(j, k, i)) / S(2);
+    }
   // Brackets: [∂_a, ∂_b] is ∂ along S_a × S_b within one ball or free subhinge, whose twists span it; its momentum pairs with S_c.
   const auto add = [&](int a, int b, int c, const S& pairing) {  // of c on one path with a
     const S g = pairing / S(2);
@@ -196,6 +202,7 @@ void Sensitivities<S>::christoffel(const S* q, S* out) {
   for (int a = 0; a < N; ++a)
     for (int b = 0; b < N; ++b) {
       if (a == b || frame_.subhinge_of[a] != frame_.subhinge_of[b]) continue;
+      check_interrupt_at(a, m.bodies);
       const int body = frame_.body_of[a];
       carried[body] = cross_motion(frame_.twist[a], frame_.twist[b]);
       Vector6<S> momentum = frame_.R[body] * carried[body];
@@ -209,6 +216,20 @@ void Sensitivities<S>::christoffel(const S* q, S* out) {
         for (int c = m.v_offset[e]; c < m.v_offset[e] + m.nv_of[e]; ++c) add(a, b, c, dot(frame_.twist[c], outer));
       }
     }
+  // What shifts all that it carries, with nothing inboard that turns, changes no other coordinate's twist: Γ(·,·,k) = 0 exactly, so that the
+  // speed of a base is not in C.
+  straight_.resize(m.bodies);
+  for (int e = 0; e < m.bodies; ++e) {
+    straight_[e] = m.parent[e] < 0 || straight_[m.parent[e]];
+    for (int k = m.v_offset[e]; straight_[e] && k < m.v_offset[e] + m.nv_of[e];) {
+      const int subhinge = frame_.subhinge_of[k];
+      for (; k < m.v_offset[e] + m.nv_of[e] && frame_.subhinge_of[k] == subhinge; ++k)
+        if (const Vector3<S>& w = frame_.twist[k].angular; !(w[0] == S(0) && w[1] == S(0) && w[2] == S(0)))
+          straight_[e] = false;
+        else
+          for (size_t row = 0; row < n * n; ++row) out[row * n + k] = S(0);
+    }
+  }
 }
 
 // With the momentum of the bodies as it is seen from the frame, (n; f), and R(0; u) = (h × u; m u) of what it does not see:
@@ -218,6 +239,7 @@ void Sensitivities<S>::kinetic_energy(const S* q, const S* v, S* dq, S* dv) {
   frame_at(q, v, nullptr);
   for (int k = 0; k < model_->nv; ++k) {
     const int c = frame_.body_of[k];
+    check_interrupt_at(k);
     const Vector6<S>&momentum = frame_.B[c].momentum, &s = frame_.twist[k];
     const Vector3<S> change = cross_force(s, momentum).linear + (frame_.R[c] * frame_.psi_dot[k]).linear;
     dq[k] = dot(frame_.psi_dot[k], momentum) + dot(frame_.travel[c], change);
@@ -235,6 +257,7 @@ void Sensitivities<S>::hamiltonian(const S* q, const S* p, const S* tau, S* v, S
   // d(S_j·p)/dt = Ṡ_j·p + S_j·ṗ, and S_j·ṗ is what the hinge's force and gravity do: tau_j + S_j·(weight outboard). Of Ṡ_j·p, with u in
   // both, what multiplies u twice is (u × s)·mu = 0.
   for (int k = 0; k < model_->bodies; ++k) {
+    check_interrupt_at(k);
     const Vector6<S> travel = uniform(frame_.travel[k]), field = uniform(gravity_at(k));
     const Vector6<S>& momentum = frame_.B[k].momentum;
     for (int j = model_->v_offset[k]; j < model_->v_offset[k] + model_->nv_of[k]; ++j)
@@ -256,6 +279,7 @@ void Sensitivities<S>::momentum(const S* q, const S* v, S* matrix, S* dq) {
   frame_at(q, v, nullptr);
   for (int k = 0; k < N; ++k) {
     const int c = frame_.body_of[k];
+    check_interrupt_at(k, c);
     int root = c;
     while (model_->parent[root] >= 0) root = model_->parent[root];
     const RigidInertia<S>& R = frame_.R[c];
@@ -296,6 +320,7 @@ void Sensitivities<S>::jacobian_derivative(const Node& node, const S* q, S* out)
   const Pose<S> X = node_in_axes(node);
   twists_about(node.body);
   on_path(*model_, node.body, [&](int j) {
+    check_interrupt_at(j, j);
     on_path(*model_, node.body, [&](int k) {
       if (!frame_.inboard(j, k)) return;
       const Vector6<S> column = motion_to_child(X, cross_motion(outboard_[j], outboard_[k]));
@@ -320,6 +345,7 @@ void Sensitivities<S>::inertial_regressor(const S* q, const S* v, const S* vdot,
   newton_euler(m, blocks_, points_, vdot, rates_.data(), alpha_, force_);
   std::fill_n(out, size_t(m.nv) * columns, S(0));
   for (int k = 0; k < m.bodies; ++k) {
+    check_interrupt_at(k, k);
     const Vector3<S>& omega = points_.angular_velocity[k];
     for (int p = 0; p < 10; ++p) {
       RigidInertia<S> unit = RigidInertia<S>::zero();
@@ -345,6 +371,7 @@ void Sensitivities<S>::log_determinant(const S* q, S* coordinates, S* inertias, 
   articulated_inertia_tip_to_base(tree_, blocks_);
   upsilon_base_to_tip(tree_, blocks_);
   for (int k = 0; k < m.bodies; ++k) {
+    check_interrupt_at(k);
     const int p = m.parent[k], first = m.v_offset[k], last = first + m.nv_of[k];
     const ArticulatedInertia<S>& Y = blocks_.Y[k];
     if (inertias) {  // tr(Υ ∂M)

@@ -60,6 +60,7 @@ class Sensitivities {
   InertialFrame<S> frame_;
   PointAccelerations<S> points_;
   std::vector<Vector6<S>> outboard_, alpha_, force_;
+  std::vector<char> straight_;  // per body: nothing up to it turns
   std::vector<S> q_, v_, rates_, work_, solution_, scratch_;
   std::unique_ptr<RigidDynamics<S>> dynamics_;
   std::unique_ptr<TangentDynamics<S>> tangents_;

@@ -21,7 +21,7 @@ double off_orthogonal(const Matrix3<double>& R) {
   return off;
 }
 
-// The orthogonal factor of the polar decomposition, by Newton's iteration without an inverse [Higham 2008, Functions of Matrices, (8.20)]:
+// The orthogonal factor of the polar decomposition, by Newton's iteration without an inverse [N. Higham, Functions of Matrices, SIAM 2008, chapter 8]:
 // R ← R (3 I − R*R) / 2 squares what R is off, so that three steps from 1e-6 end at rounding.
 Matrix3<double> nearest_rotation(Matrix3<double> R) {
   for (int step = 0; step < 3; ++step) {

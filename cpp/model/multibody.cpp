@@ -6,6 +6,7 @@
 #include <mutex>
 
 #include "algebra/errors.h"
+#include "algebra/interrupt.h"
 #include "model/checks.h"
 #include "model/compiled_model.h"
 
@@ -480,6 +481,7 @@ std::shared_ptr<const CompiledModel<S>> compile(const Multibody& model) {
   c->gravity = cast<S>(model.gravity());
   c->first_subhinge.push_back(0);
   for (int k = 0; k < model.bodies(); ++k) {
+    check_interrupt_at(k);
     const Body& b = model.body(k);
     c->parent.push_back(b.parent);
     c->q_offset.push_back(model.q_offset(k));
@@ -528,10 +530,16 @@ template <class S>
 std::shared_ptr<const CompiledModel<S>> Multibody::compiled() const {
   const ModelInUse use(*this);  // settled once, it stays so: what follows takes no lock of its own
   settled();
-  std::lock_guard<Mutex> lock(mutex_);
-  if (mutex_.abandoned()) leave_behind(compiled_);
   auto& kept = std::get<std::shared_ptr<const CompiledModel<S>>>(compiled_);
-  if (!kept || kept->parameters != parameters_) kept = compile<S>(*this);
+  {
+    std::lock_guard<Mutex> lock(mutex_);
+    if (mutex_.abandoned()) leave_behind(compiled_);
+    if (kept && kept->parameters == parameters_) return kept;
+  }
+  // Outside the lock: a signal's handler, called in between, may ask for the same. Nobody edits the model meanwhile.
+  const std::shared_ptr<const CompiledModel<S>> made = compile<S>(*this);
+  std::lock_guard<Mutex> lock(mutex_);
+  if (!kept || kept->parameters != made->parameters) kept = made;
   return kept;
 }
 #define PYCRAFT_INSTANTIATE(S) template std::shared_ptr<const CompiledModel<S>> Multibody::compiled<S>() const;

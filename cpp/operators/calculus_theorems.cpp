@@ -92,21 +92,21 @@ std::vector<Theorem> calculus_theorems(const std::shared_ptr<MultibodyOperators>
   const Expression W = block_diagonal(E.T() * Upsilon * E);
   Scalar gradient = 2.0 * trace(P_plus * W * Delta_i);
   if (dH.kind() != NodeKind::zero) gradient = gradient + 2.0 * trace(dH * (I - P_plus * W) * G);
-  state("#35 gradient of ln det ℳ", differentiate(logdet(MM + J), *along_i), gradient, "∂ ln det(ℳ+J) = 2 tr(P⁺WΔ) + 2 tr(∂H(I-P⁺W)G),  W = blockdiag(E*ΥE)",
+  state("gradient of ln det ℳ", differentiate(logdet(MM + J), *along_i), gradient, "∂ ln det(ℳ+J) = 2 tr(P⁺WΔ) + 2 tr(∂H(I-P⁺W)G),  W = blockdiag(E*ΥE)",
         "\\partial\\ln\\det(\\mathcal{M}+J) = 2\\operatorname{tr}(P^+W\\Delta) + 2\\operatorname{tr}(\\partial H(I-P^+W)\\mathcal{G})", no_hypothesis, "soa.md #35");
   const Parameter mass{source, "mass", {}, source->structure().bodies() - 1, mass_of_body, -1};
   const auto by_mass = parameter_direction(mass);
-  state("#32 gradient of ln det ℳ by a mass", differentiate(logdet(MM + J), *by_mass), trace(Upsilon * differentiate(M, *by_mass)), "∂ ln det(ℳ+J) = tr(Υ∂M)",
+  state("gradient of ln det ℳ by a mass", differentiate(logdet(MM + J), *by_mass), trace(Upsilon * differentiate(M, *by_mass)), "∂ ln det(ℳ+J) = tr(Υ∂M)",
         "\\partial\\ln\\det(\\mathcal{M}+J) = \\operatorname{tr}(\\Upsilon\\,\\partial M)", no_hypothesis, "soa.md #32");
   const Expression p = phi * M * V, e = unit(several);
   const Expression outboard = function(force_cross, E.T() * V);
   const Expression h = make_symbol(derivative_symbols()[direction_twist - first_derivative_symbol], source, {several}, source->structure().coordinate_names[several]);
-  state("#18 slope of the kinetic energy", 0.5 * differentiate(V.T() * M * V, *along_several), -(h.T() * outboard * p),
+  state("slope of the kinetic energy", 0.5 * differentiate(V.T() * M * V, *along_several), -(h.T() * outboard * p),
         "∂KE = -h*crf(E*V)p,  p = φMV", "\\partial KE = -h^*\\operatorname{crf}(\\mathcal{E}^*\\mathcal{V})p", constant_hinges, "soa.md #18");
   const Expression alpha = phi.T() * (H.T() * qdd + a), f = phi * (M * alpha + b);
   const Expression dV = phi.T() * function(motion_cross, E.T() * V) * H.T() * e;
   const Expression dalpha = phi.T() * (function(motion_cross, E.T() * alpha) * H.T() * e - function(motion_cross, H.T() * qd) * dV);
-  state("#25 derivative of inverse dynamics", differentiate(H * f, *along_several),
+  state("derivative of inverse dynamics", differentiate(H * f, *along_several),
         H * phi_tilde * function(momentum_cross_of, f) * H.T() * e +
             H * phi * (M * dalpha + (mechanics(momentum_cross) + mechanics(V_bar) * M) * dV),
         "∂T = Hφ̃𝓕H*e + Hφ(M∂α + (𝓑+V̄M)∂V)", "\\partial T = H\\tilde\\phi\\mathscr{F}H^*e + H\\phi(M\\partial\\alpha+(\\mathscr{B}+\\bar{\\mathcal{V}}M)\\partial\\mathcal{V})",
@@ -116,15 +116,15 @@ std::vector<Theorem> calculus_theorems(const std::shared_ptr<MultibodyOperators>
     if (source->structure().parent[k] < 0 || subhinges.size() != 1 || subhinges[0].nv() < 3) continue;  // a root's turn changes no ℳ
     const int first = source->structure().dof_offset[k];
     const auto x = coordinate_direction(source, first), y = coordinate_direction(source, first + 1), z = coordinate_direction(source, first + 2);
-    state("#37 quasi-derivatives do not commute", differentiate(differentiate(MM, *y), *x) - differentiate(differentiate(MM, *x), *y), differentiate(MM, *z),
+    state("quasi-derivatives do not commute", differentiate(differentiate(MM, *y), *x) - differentiate(differentiate(MM, *x), *y), differentiate(MM, *z),
           "[∂_x, ∂_y]ℳ = ∂_zℳ about the axes of a ball or free hinge", "[\\partial_x,\\partial_y]\\mathcal{M} = \\partial_z\\mathcal{M}", no_hypothesis, "soa.md #37");
     break;
   }
 
   group = "Calculus along time";
-  state("#11 accelerations", dot(V), alpha, "dV/dt = φ*(H*θ̈ + a)", "\\dot{\\mathcal{V}} = \\phi^*(H^*\\ddot\\theta+\\mathfrak{a})", no_hypothesis, "soa.md #11");
-  state("#16 forces as rates of momentum", dot(p) + mechanics(V_bar) * p, f, "ṗ + V̄p = f,  p = φMV", "\\dot p + \\bar{\\mathcal{V}}p = f", no_hypothesis, "soa.md #16");
-  state("#17 Hamiltonian form", dot(MM * qd), H * f + mechanics(H_dot) * p - H * mechanics(V_bar) * p, "d(ℳθ̇)/dt = T + Ḣp - HV̄p",
+  state("accelerations", dot(V), alpha, "dV/dt = φ*(H*θ̈ + a)", "\\dot{\\mathcal{V}} = \\phi^*(H^*\\ddot\\theta+\\mathfrak{a})", no_hypothesis, "soa.md #11");
+  state("forces as rates of momentum", dot(p) + mechanics(V_bar) * p, f, "ṗ + V̄p = f,  p = φMV", "\\dot p + \\bar{\\mathcal{V}}p = f", no_hypothesis, "soa.md #16");
+  state("Hamiltonian form", dot(MM * qd), H * f + mechanics(H_dot) * p - H * mechanics(V_bar) * p, "d(ℳθ̇)/dt = T + Ḣp - HV̄p",
         "\\tfrac{d}{dt}(\\mathcal{M}\\dot\\theta) = T + \\dot Hp - H\\bar{\\mathcal{V}}p", no_hypothesis, "soa.md #17");
   const Expression jacobian = phi.T() * H.T(), J_dot = dot(jacobian);
   state("rate of the body Jacobian", J_dot, phi.T() * (mechanics(Delta_theta_dot).T() * phi_tilde.T() * H.T() + mechanics(H_dot).T()),
@@ -138,21 +138,21 @@ std::vector<Theorem> calculus_theorems(const std::shared_ptr<MultibodyOperators>
   for (int c = 0; c < source->structure().bodies(); ++c)
     if (source->structure().parent[c] == body && source->structure().dof[c] > 0) k = source->structure().dof_offset[c];
   const auto along_k = coordinate_direction(source, k);
-  state("#22 C is the Christoffel matrix", unit(k).T() * C * unit(many),
+  state("C is the Christoffel matrix", unit(k).T() * C * unit(many),
         0.5 * (unit(k).T() * dot(MM) * unit(many) + unit(k).T() * differentiate(MM, *along_many) * qd - unit(many).T() * differentiate(MM, *along_k) * qd), "C(k,i) = ½ Σ_j (∂_jℳ(k,i) + ∂_iℳ(k,j) - ∂_kℳ(i,j)) θ̇_j",
         "C_{ki} = \\tfrac12\\sum_j(\\partial_j\\mathcal{M}_{ki}+\\partial_i\\mathcal{M}_{kj}-\\partial_k\\mathcal{M}_{ij})\\dot\\theta_j", single_dof, "soa.md #22");
   const Expression m = A * square_root(D), inverse_m = square_root(D).inv() * S, skew = inverse_m * C * inverse_m.T() - dot(m).T() * inverse_m.T();
-  state("#23 diagonalised dynamics: S is skew", skew, -skew.T(), "S = m⁻¹Cm⁻* - ṁ*m⁻* = -S*,  m = [I+HφK]D^½",
+  state("diagonalised dynamics: S is skew", skew, -skew.T(), "S = m⁻¹Cm⁻* - ṁ*m⁻* = -S*,  m = [I+HφK]D^½",
         "S = m^{-1}Cm^{-*}-\\dot m^*m^{-*} = -S^*,\\quad m = [I+H\\phi\\mathcal{K}]\\mathcal{D}^{1/2}", no_hypothesis, "soa.md #23");
-  state("#24 diagonalised dynamics", dot(m.T() * qd) + skew * m.T() * qd, inverse_m * (H * f + J * qdd), "η̇ + Sη = m⁻¹T,  η = m*θ̇", "\\dot\\eta + S\\eta = m^{-1}T,\\quad \\eta = m^*\\dot\\theta",
+  state("diagonalised dynamics", dot(m.T() * qd) + skew * m.T() * qd, inverse_m * (H * f + J * qdd), "η̇ + Sη = m⁻¹T,  η = m*θ̇", "\\dot\\eta + S\\eta = m^{-1}T,\\quad \\eta = m^*\\dot\\theta",
         no_hypothesis, "soa.md #24");
 
   group = "World frame, calculus";
   const Letters w(std::make_shared<WorldFrame>(source));
   const Expression X = mechanics(X_world);
-  state("#53 ∂M'", d(w.M), d(X * M * X.T()), "∂M' = Δ'M' + M'Δ'*  of  M' = XMX*", "\\partial M' = \\Delta'M'+M'\\Delta'^*", no_hypothesis, "soa.md #53");
-  state("#53 ∂H'", d(w.H), d(H * X.inv()), "∂H' = ∂(HX⁻¹)", "\\partial H' = \\partial(HX^{-1})", no_hypothesis, "soa.md #53");
-  state("#54 ∂P' and ∂P", d(w.P), X * differentiate_in_world(P, *along_i) * X.T(), "∂P' = X(∂P + ΔP + PΔ*)X*", "\\partial P' = X(\\partial P+\\hat\\Delta P+P\\hat\\Delta^*)X^*",
+  state("∂M'", d(w.M), d(X * M * X.T()), "∂M' = Δ'M' + M'Δ'*  of  M' = XMX*", "\\partial M' = \\Delta'M'+M'\\Delta'^*", no_hypothesis, "soa.md #53");
+  state("∂H'", d(w.H), d(H * X.inv()), "∂H' = ∂(HX⁻¹)", "\\partial H' = \\partial(HX^{-1})", no_hypothesis, "soa.md #53");
+  state("∂P' and ∂P", d(w.P), X * differentiate_in_world(P, *along_i) * X.T(), "∂P' = X(∂P + ΔP + PΔ*)X*", "\\partial P' = X(\\partial P+\\hat\\Delta P+P\\hat\\Delta^*)X^*",
         no_hypothesis, "soa.md #54");
   return list;
 }

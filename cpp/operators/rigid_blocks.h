@@ -7,7 +7,7 @@
 #include <memory>
 #include <vector>
 
-#include "algebra/small_cholesky.h"
+#include "algebra/small_ldl.h"
 #include "algebra/structure.h"
 #include "algebra/sweeps/singular_pivot.h"
 #include "algebra/symbol.h"
@@ -132,8 +132,7 @@ class RigidBlocks {
       for (int c = 0; c < m; ++c) x[c] /= D[d_[k]];
       return;
     }
-    forward_substitute(L.data() + d_[k], n, x, m);
-    back_substitute(L.data() + d_[k], n, x, m);
+    ldl_solve(L.data() + d_[k], pivots_.data() + first(k), n, x, m);
   }
   void apply(int id, bool transposed, int k, const S* x, S* y, int m) const {
     const int n = tree_.dof[k];
@@ -372,14 +371,14 @@ class RigidBlocks {
     for (int i = 0; i < n; ++i) {  // L⁻¹H
       W[f + i] = H[f + i];
       for (int a = 0; a < i; ++a) W[f + i] = W[f + i] - L[d_[k] + i * n + a] * W[f + a];
-      W[f + i] = (S(1) / L[d_[k] + i * n + i]) * W[f + i];
-      add_symmetric_product(Y[k], S(0.5) * W[f + i], W[f + i]);
+      const Vector6<S> scaled = (S(1) / pivots_[f + i]) * W[f + i];
+      add_symmetric_product(Y[k], S(0.5) * scaled, W[f + i]);
     }
   }
 
   std::vector<ArticulatedInertia<S>> P, Pplus, R, Y;
   std::vector<Vector6<S>> G;   // columns of G, one per coordinate
-  std::vector<S> D, L;         // n_k x n_k per body: D(k) and its Cholesky factor
+  std::vector<S> D, L;         // n_k x n_k per body: D(k) and L of its factors LdL*, d the pivots
   size_t d_offset(int k) const { return d_[k]; }
 
  private:
@@ -411,18 +410,16 @@ class RigidBlocks {
       G[f] = W[f];
     } else {
       std::copy_n(d, n * n, l);
-      if (cholesky_in_place(l, n, pivots) < n) return false;
-      for (int j = 0; j < n; ++j) W[f + j] = G[f + j];
-      for (int i = 0; i < n; ++i) {  // W = PH*L⁻*
-        for (int a = 0; a < i; ++a) W[f + i] = W[f + i] - l[i * n + a] * W[f + a];
-        W[f + i] = (S(1) / l[i * n + i]) * W[f + i];
-        subtract_square(Pplus[k], W[f + i]);
+      if (ldl_in_place(l, n, pivots) < n) return false;
+      for (int i = 0; i < n; ++i) {  // W = PH*L⁻*d⁻¹
+        for (int a = 0; a < i; ++a) G[f + i] = G[f + i] - l[i * n + a] * G[f + a];
+        W[f + i] = (S(1) / pivots[i]) * G[f + i];
+        downdate(Pplus[k], G[f + i], W[f + i]);
       }
       for (int i = n - 1; i >= 0; --i) {  // G = W L⁻¹
         for (int a = i + 1; a < n; ++a) W[f + i] = W[f + i] - l[a * n + i] * W[f + a];
-        W[f + i] = (S(1) / l[i * n + i]) * W[f + i];
+        G[f + i] = W[f + i];
       }
-      for (int j = 0; j < n; ++j) G[f + j] = W[f + j];
     }
     for (int j = f; j < f + n; ++j)
       if (aligned[j] >= 0 && no_hinge_diagonal(k)) annihilate(Pplus[k], aligned[j]);
@@ -470,16 +467,6 @@ class RigidBlocks {
     for (int j = first(k); j < last(k); ++j)
       if (!(J[j] == S(0))) return false;
     return true;
-  }
-  // A - u w*, known to be symmetric (w a multiple of u).
-  static void downdate(ArticulatedInertia<S>& A, const Vector6<S>& u, const Vector6<S>& w) {
-    for (int i = 0; i < 3; ++i)
-      for (int j = i; j < 3; ++j) {
-        A.A(i, j) -= u.angular[i] * w.angular[j];
-        A.C(i, j) -= u.linear[i] * w.linear[j];
-      }
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) A.B(i, j) -= u.angular[i] * w.linear[j];
   }
   // (I - Σ b a*) A (I - Σ a b*) for the rows a, b of hinge k.
   ArticulatedInertia<S> projected(const ArticulatedInertia<S>& A, const std::vector<Vector6<S>>& a, const std::vector<Vector6<S>>& b, int k) const {

@@ -35,10 +35,9 @@ class RigidFactors {
   }
   // Entry (i, i) of P(k), of the body whose hinge was eliminated last and has a row that is no coordinate axis.
   const S& diagonal(int i) const { return diagonal_[i]; }
-  // G, D, its Cholesky factor L and pivots, and with bias the rates that C W ρ* gives the hinge; nv_of(k) of each. False, with L and pivots
+  // G, D, L and pivots d of its factors LdL*, and with bias the rates that C W ρ* gives the hinge; nv_of(k) of each. False, with L and pivots
   // alone, where a pivot is not positive.
   bool eliminate(int k, Form form, const Vector6<S>* H, const S* J, const int* aligned, bool with_bias, Vector6<S>* G, S* D, S* L, S* pivots) {
-    using std::sqrt;
     const int n = tree_.dof[k], m = factors_.columns(k);
     if (std::any_of(aligned, aligned + n, [](int axis) { return axis < 0; }))
       for (int i = 0; i < 6; ++i) diagonal_[i] = factors_.inertia(k, i, i);
@@ -63,8 +62,7 @@ class RigidFactors {
     for (int j = 0; j < n; ++j) {
       pivots[j] = factors_.weight(j) * factors_.lower(j, j) * factors_.lower(j, j);
       positive &= pivots[j] > S(0);
-      const S root = sqrt(factors_.weight(j));
-      for (int i = 0; i < n; ++i) L[i * n + j] = i < j ? S(0) : S(factors_.lower(i, j) * root);
+      for (int i = 0; i < n; ++i) L[i * n + j] = i < j ? S(0) : ratio_or_zero(factors_.lower(i, j), factors_.lower(j, j));
     }
     if (!positive) return false;
     for (int i = 0; i < n; ++i)

@@ -44,6 +44,7 @@ S articulated_body(const SkoStructure& tree, const CompiledModel<S>& model, Rigi
   blocks.with_bias = factored;
   bool doubtful = false;
   for (int k = 0; k < model.bodies; ++k) {
+    check_interrupt_at(k);
     blocks.start_articulated(k);
     z[k] = factored ? blocks.factors().start_bias(k, model.inertia_factors[k], points.angular_velocity[k]) : points.b[k];
   }
@@ -73,6 +74,7 @@ S articulated_body(const SkoStructure& tree, const CompiledModel<S>& model, Rigi
   S largest = S(0);
   const Vector6<S> base{Vector3<S>::zero(), -model.gravity};
   for (int k = 0; k < model.bodies; ++k) {
+    check_interrupt_at(k);
     const int p = model.parent[k], first = model.v_offset[k], n = model.nv_of[k];
     const Vector6<S> outboard = motion_to_child(blocks.pose[k], p < 0 ? base : alpha[p]);
     Vector6<S> acceleration = outboard + points.a[k];

@@ -6,8 +6,8 @@
 // free                 ½ q⊗(0, ω),  ṗ = R(q/|q|) v             the pose times exp(ω; v) on SE(3)
 //
 // ω and v are the body's own, so q̇ is orthogonal to q: the exact flow keeps a quaternion's length, whatever it is. Nothing pulls it back:
-// what an integrator makes of |q| is its own error, left to be seen. `move_configuration` keeps the length to rounding; over many moves that
-// walks, unless `scale_quaternions` sets the length to what it was at first.
+// what an integrator makes of |q| is its own error, left to be seen. `move_configuration` keeps the length to the rounding of one product;
+// over many moves that walks, unless `scale_quaternions` sets the length to what it was at first.
 // Cost O(N).
 #pragma once
 
@@ -39,7 +39,6 @@ void configuration_rate(const CompiledModel<S>& model, const S* q, const S* v, S
 // out = q moved by u; out may be q.
 template <class S>
 void move_configuration(const CompiledModel<S>& model, const S* q, const S* u, S* out) {
-  using std::sqrt;
   for (const CompiledSubhinge<S>& h : model.subhinges) {
     if (h.kind != SubhingeKind::ball && h.kind != SubhingeKind::free) {
       *out++ = *q++ + *u++;
@@ -51,10 +50,7 @@ void move_configuration(const CompiledModel<S>& model, const S* q, const S* u, S
       const Vector3<S> moved = quaternion_rotation(from) * screw_translation(w, Vector3<S>{u[3], u[4], u[5]});
       for (int i = 0; i < 3; ++i) out[4 + i] = q[4 + i] + moved[i];
     }
-    // The product keeps |q| up to rounding; it is set to what it was.
-    const S had = from.w * from.w + from.x * from.x + from.y * from.y + from.z * from.z;
-    const S has = to.w * to.w + to.x * to.x + to.y * to.y + to.z * to.z, scale = sqrt(S(had / has));
-    out[0] = scale * to.w, out[1] = scale * to.x, out[2] = scale * to.y, out[3] = scale * to.z;
+    out[0] = to.w, out[1] = to.x, out[2] = to.y, out[3] = to.z;
     const int nq = h.kind == SubhingeKind::free ? 7 : 4, nv = h.kind == SubhingeKind::free ? 6 : 3;
     q += nq, out += nq, u += nv;
   }

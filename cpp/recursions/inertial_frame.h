@@ -19,6 +19,7 @@
 
 #include <vector>
 
+#include "algebra/interrupt.h"
 #include "model/compiled_model.h"
 #include "model/hinge_kinematics.h"
 #include "operators/rigid_blocks.h"
@@ -111,6 +112,7 @@ struct InertialFrame {
   // are the accelerations θ̈ + x of free roots (recursions/point_accelerations.h), and rates do not depend on their travel at all.
   void fill(const CompiledModel<S>& model, const RigidBlocks<S>& blocks, const S* v, const S* vdot, OwnTerms own = OwnTerms::kept) {
     for (int k = 0; k < model.bodies; ++k) {
+      check_interrupt_at(k);
       place(model, blocks, k);
       move(model, k, v, vdot, own);
       const RigidInertia<S>& I = model.inertia[k];
@@ -118,12 +120,14 @@ struct InertialFrame {
       B[k] = momentum_rate(R[k], V[k]);
       force[k] = R[k] * alpha[k] + cross_force(V[k], B[k].momentum);
     }
-    for (int k = model.bodies - 1; k >= 0; --k)
+    for (int k = model.bodies - 1; k >= 0; --k) {
+      check_interrupt_at(k);
       if (const int p = model.parent[k]; p >= 0) {
         R[p] = R[p] + inertia_inboard(arm[k], R[k]);
         B[p] = B[p] + momentum_rate_inboard(arm[k], B[k]);
         force[p] = force[p] + force_inboard(arm[k], force[k]);
       }
+    }
   }
 
   // A root on one free subhinge whose own terms can be absorbed.

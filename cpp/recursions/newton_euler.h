@@ -31,6 +31,7 @@ void newton_euler(const CompiledModel<S>& model, const RigidBlocks<S>& blocks, c
     f[k] = blocks.inertia[k] * acceleration + points.b[k];
   }
   for (int k = model.bodies - 1; k >= 0; --k) {
+    check_interrupt_at(k);
     const int p = model.parent[k], first = model.v_offset[k], n = model.nv_of[k];
     for (int j = first; j < first + n; ++j) T[j] = dot(blocks.H[j], f[k]) + (vdot ? blocks.J[j] * vdot[j] : S(0));
     if (p >= 0) f[p] = f[p] + force_to_parent(blocks.pose[k], f[k]);
@@ -44,6 +45,7 @@ void newton_euler_residual_gathered(const CompiledModel<S>& model, const RigidBl
   const Vector6<S> base{Vector3<S>::zero(), -model.gravity};
   wide.resize(model.bodies);
   for (int k = 0; k < model.bodies; ++k) {
+    check_interrupt_at(k);
     const int p = model.parent[k], first = model.v_offset[k], n = model.nv_of[k];
     Vector6<S> acceleration = motion_to_child(blocks.pose[k], p < 0 ? base : alpha[p]) + points.a[k];
     for (int j = first; j < first + n; ++j) acceleration = acceleration + vdot[j] * blocks.H[j];
@@ -52,6 +54,7 @@ void newton_euler_residual_gathered(const CompiledModel<S>& model, const RigidBl
     wide[k] = M * cast<T>(acceleration) + gyroscopic_part(M, cast<T>(points.angular_velocity[k]));
   }
   for (int k = model.bodies - 1; k >= 0; --k) {
+    check_interrupt_at(k);
     const int p = model.parent[k], first = model.v_offset[k], n = model.nv_of[k];
     f[k] = cast<S>(wide[k]);
     for (int j = first; j < first + n; ++j) r[j] = static_cast<S>(T(tau[j]) - dot(cast<T>(blocks.H[j]), wide[k]) - T(blocks.J[j]) * T(vdot[j]));

@@ -21,6 +21,7 @@
 
 #include <vector>
 
+#include "algebra/interrupt.h"
 #include "model/compiled_model.h"
 #include "spatial/pose.h"
 
@@ -56,6 +57,7 @@ void point_accelerations_base_to_tip(const CompiledModel<S>& model, const Pose<S
   out.angular_velocity.resize(model.bodies), out.a.resize(model.bodies), out.b.resize(model.bodies);
   out.absorbed.assign(model.nv, S(0));
   for (int k = 0; k < model.bodies; ++k) {
+    check_interrupt_at(k);
     const int p = model.parent[k];
     const Pose<S>& X = pose[k];
     Vector3<S> omega = Vector3<S>::zero();  // W_i, then the body's

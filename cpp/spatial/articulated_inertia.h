@@ -40,16 +40,16 @@ inline void add(ArticulatedInertia<S>& P, const ArticulatedInertia<S>& Q) {
   for (int i = 0; i < 6; ++i) P.A.s[i] += Q.A.s[i], P.C.s[i] += Q.C.s[i];
   for (int i = 0; i < 9; ++i) P.B.m[i] += Q.B.m[i];
 }
-// P - w w*.
+// P - u w*, symmetric: w is a multiple of u.
 template <class S>
-inline void subtract_square(ArticulatedInertia<S>& P, const Vector6<S>& w) {
+inline void downdate(ArticulatedInertia<S>& P, const Vector6<S>& u, const Vector6<S>& w) {
   for (int i = 0; i < 3; ++i)
     for (int j = i; j < 3; ++j) {
-      P.A(i, j) -= w.angular[i] * w.angular[j];
-      P.C(i, j) -= w.linear[i] * w.linear[j];
+      P.A(i, j) -= u.angular[i] * w.angular[j];
+      P.C(i, j) -= u.linear[i] * w.linear[j];
     }
   for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) P.B(i, j) -= w.angular[i] * w.linear[j];
+    for (int j = 0; j < 3; ++j) P.B(i, j) -= u.angular[i] * w.linear[j];
 }
 // P + (u w* + w u*).
 template <class S>

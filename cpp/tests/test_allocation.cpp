@@ -11,34 +11,10 @@
 #include "operators/multibody_operators.h"
 #include "allocations.h"
 #include "random_tree.h"
+#include "robot.h"
 
 using namespace pycraft;
 using namespace pycraft::testing;
-
-namespace {
-
-std::shared_ptr<Multibody> robot() {
-  auto mb = std::make_shared<Multibody>("robot");
-  const HingeKind kinds[] = {HingeKind::free, HingeKind::pin, HingeKind::ball, HingeKind::slider, HingeKind::pin, HingeKind::universal};
-  for (int k = 0; k < 6; ++k) {
-    Body b;
-    b.name = "body" + std::to_string(k);
-    b.mass = 1 + k;
-    b.com = {0.1, 0.2, 0.05};
-    b.inertia = {1, 0.1, 0, 1.2, 0, 0.9};
-    b.hinge.kind = kinds[k];
-    b.hinge.name = "hinge" + std::to_string(k);
-    b.hinge.placement.p = {0.3, 0, 0.1};
-    std::vector<Vector3<double>> axes;
-    if (kinds[k] == HingeKind::pin || kinds[k] == HingeKind::slider) axes = {{0.6, 0, 0.8}};
-    if (kinds[k] == HingeKind::universal) axes = {{1, 0, 0}, {0, 1, 0}};
-    b.hinge.subhinges = subhinges_of(kinds[k], axes, {0, 0, 0}, 0, b.hinge.name);
-    mb->add_body(b, k == 0 ? "" : k == 4 ? "body1" : "body" + std::to_string(k - 1));
-  }
-  return mb;
-}
-
-}  // namespace
 
 BOOST_AUTO_TEST_CASE(counting_counts) {
   if (allocations_are_counted) BOOST_TEST(allocations_of([] { std::vector<double>(100).swap(*std::make_unique<std::vector<double>>()); }) > 0);

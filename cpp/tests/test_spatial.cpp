@@ -108,7 +108,7 @@ BOOST_AUTO_TEST_CASE_TEMPLATE(inertias_transform_as_operators, S, Scalars) {
     // a general symmetric one: P - w w*
     ArticulatedInertia<S> Q = P;
     const Vector6<S> w = draw.six();
-    subtract_square(Q, w);
+    downdate(Q, w, w);
     BOOST_TEST(relative(Q * V, P * V - dot(w, V) * w) < few);
     const Vector6<S> f = draw.six();
     BOOST_TEST(relative(to_parent(X, Q) * V, force_to_parent(X, Q * motion_to_child(X, V))) < few);

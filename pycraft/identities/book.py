@@ -5,25 +5,27 @@ The numbers in front of a product scale the whole of it: 2 D D is 2 (D D), as it
 
 from __future__ import annotations
 
-import operator
 import re
+from fractions import Fraction
 from functools import lru_cache, reduce
 from typing import Any
 
 from lark import Lark, Token, Transformer, exceptions
 
 from .. import _core
-from .vocabulary import FUNCTIONS, SCALARS, WITH_ARGUMENTS, Misread, ParseError, Vocabulary, needs_arguments, power
+from .vocabulary import FUNCTIONS, SCALARS, WITH_ARGUMENTS, Misread, ParseError, Vocabulary, decimal, needs_arguments, power
 
 _BOOK = r"""
 start: side (("==" | "=") side)?
 side: sum
 sum: (PLUS | MINUS)? term ((PLUS | MINUS) term)*
-term: (number* product | number+) ("/" NUMBER)?
+term: (number* product | number+) ("/" (NUMBER | postfix))?
 number: (NUMBER | NUMBER "/" NUMBER | "(" NUMBER "/" NUMBER ")") ("*" | _TIMES)?
 product: postfix (_TIMES? postfix)* -> product
        | (postfix _TIMES?)* SCALAR product -> scalar_of_product
+       | (postfix _TIMES?)* DERIVATIVE SCALAR product -> derivative_of_scalar
 postfix: atom suffix*
+       | DERIVATIVE postfix -> derivative
 suffix: (_STAR | "^*" | "^T" | ".T" | "'") -> star
       | ("^" EXPONENT | "**" POWER) -> power
       | ".inv()" -> inverse
@@ -36,6 +38,7 @@ atom: NAME -> name
     | "(" sum ")" -> group
     | "[" sum "]" -> group
     | "{" sum "}" -> group
+DERIVATIVE: /∂(_[ijt])?/
 PLUS: "+"
 MINUS: "-"
 _TIMES: "@" | "·"
@@ -116,6 +119,16 @@ def _parser(names: tuple[str, ...]) -> Lark:
     return Lark(grammar, parser="earley", lexer="dynamic")
 
 
+def _product(factors: list[Any]) -> Any:
+    """Operators by @, scalars by *."""
+    return reduce(lambda a, b: a @ b if _is_operator(a) and _is_operator(b) else a * b, factors)
+
+
+def _is_operator(x: Any) -> bool:
+    """Operators, and formulas with derivatives of them; no numbers."""
+    return hasattr(x, "codomain")
+
+
 class _Evaluate(Transformer):
     """From the syntax tree to expressions."""
 
@@ -142,7 +155,7 @@ class _Evaluate(Transformer):
             # A sign in front belongs to the number after it, as in Python: -2φ is (-2)φ, but ψ - 2φ is ψ - (2φ).
             if negative and total is None and numbers:
                 numbers, negative = [-numbers[0], *numbers[1:]], False
-            value = reduce(operator.matmul, operators) if operators else numbers.pop()
+            value = _product(operators) if operators else numbers.pop()
             for number in reversed(numbers):
                 value = number * value
             value = value if divisor is None else value / divisor
@@ -153,13 +166,19 @@ class _Evaluate(Transformer):
 
     def term(self, parts):
         """Numbers, operators, divisor: the numbers scale the whole product."""
-        divisor = float(parts.pop()) if isinstance(parts[-1], Token) else None
+        divisor = None
+        if isinstance(parts[-1], Token):
+            divisor = decimal(parts.pop())
+        elif len(parts) > 1 and not isinstance(parts[-1], list) and (isinstance(parts[-2], list) or not isinstance(parts[-1], Fraction)):
+            divisor = parts.pop()
         factors = parts.pop() if isinstance(parts[-1], list) else []
-        operators = [f for f in factors if isinstance(f, _core.Operator)]
-        return [*parts, *(f for f in factors if not isinstance(f, _core.Operator))], operators, divisor
+        operators = [f for f in factors if _is_operator(f)]
+        return [*parts, *(f for f in factors if not _is_operator(f))], operators, divisor
 
     def number(self, parts):
-        return float(parts[0]) / float(parts[1]) if len(parts) == 2 else float(parts[0])
+        if len(parts) == 2 and not decimal(parts[1]):
+            raise ParseError(f"{parts[0]}/{parts[1]} divides by zero")
+        return decimal(parts[0]) / decimal(parts[1]) if len(parts) == 2 else decimal(parts[0])
 
     def product(self, parts):
         return list(parts)
@@ -167,13 +186,21 @@ class _Evaluate(Transformer):
     def scalar_of_product(self, parts):
         """tr ΥM: the scalar of the whole product that follows."""
         *before, name, factors = parts
-        return [*before, SCALARS[str(name)](reduce(operator.matmul, factors))]
+        return [*before, SCALARS[str(name)](_product(factors))]
+
+    def derivative_of_scalar(self, parts):
+        """∂ ln det D: of the scalar of the whole product that follows."""
+        *before, direction, name, factors = parts
+        return [*before, self.derivative([direction, SCALARS[str(name)](_product(factors))])]
 
     def postfix(self, parts):
         value = parts[0]
         for suffix in parts[1:]:
             value = suffix(value)
         return value
+
+    def derivative(self, parts):
+        return self._vocabulary.derivative(parts[1], str(parts[0])[2:] or "i")
 
     def star(self, _):
         return lambda x: x.T

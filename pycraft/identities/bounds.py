@@ -16,6 +16,7 @@ sweep is made. Residuals are judged relative to the larger side, numbers relativ
 from __future__ import annotations
 
 from collections.abc import Callable
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -29,7 +30,7 @@ CONSTANT = 4.0
 
 _NUMBERS = _core.euclidean(1)
 """The domain of a vector."""
-_TRACE, _LOGDET, _SCALED = 1, 2, 5
+_TRACE, _LOGDET, _SCALED, _PRODUCT, _RECIPROCAL = 1, 2, 5, 6, 7
 """Kinds of scalar expressions, as the core numbers them."""
 _RICCATI = {"P", "P_plus", "D", "G", "K", "tau", "tau_bar", "E_psi", "psi", "psi_tilde", "Upsilon", "Omega", "Lambda"}
 
@@ -80,8 +81,8 @@ class Sizes:
 
     def size(self, side: Any) -> float:
         """The error of a side per unit of c · eps."""
-        if isinstance(side, (int, float)):
-            return abs(side)
+        if isinstance(side, Real):
+            return float(abs(side))
         if isinstance(side, _core.Scalar):
             return self._scalar(side)
         children = side.children
@@ -128,8 +129,14 @@ class Sizes:
         kind, value, operand, terms = side._parts()
         if operand is None:
             if not terms:
-                return abs(value)
-            return (abs(value) if kind == _SCALED else 1.0) * sum(self._scalar(t) for t in terms)
+                return float(abs(value))
+            own = [self._scalar(t) for t in terms]
+            if kind == _PRODUCT:
+                sizes = [self.terms(t) for t in terms]
+                return float(sum(x * np.prod(sizes[:i] + sizes[i + 1 :]) for i, x in enumerate(own)))
+            if kind == _RECIPROCAL:
+                return own[0] * self.terms(side) ** 2
+            return float(abs(value) if kind == _SCALED else 1.0) * sum(own)
         if kind == _LOGDET:  # ln|det X| moves by tr(X⁻¹ δX)
             return max(1.0, self.size(operand) * self.norm(operand.inv()))
         return self.size(operand)
@@ -139,8 +146,12 @@ class Sizes:
         kind, value, operand, terms = side._parts()
         if operand is None:
             if not terms:
-                return abs(value)
-            return (abs(value) if kind == _SCALED else 1.0) * sum(self.terms(t) for t in terms)
+                return float(abs(value))
+            if kind == _PRODUCT:
+                return float(np.prod([self.terms(t) for t in terms]))
+            if kind == _RECIPROCAL:
+                return 1 / max(abs(float(self._bind(terms[0]))), 1e-300)
+            return float(abs(value) if kind == _SCALED else 1.0) * sum(self.terms(t) for t in terms)
         if kind == _TRACE:
             return float(self._diagonal(operand).sum())
         if kind == _LOGDET:

@@ -11,7 +11,7 @@ import numpy as np
 from .. import _core
 from .judge import FAILS, BoundState, Verdict, judge_states, ladder
 from .parse import Statement, Statements, check_has_space
-from .report import CheckReport, Finding, Report
+from .report import UNDEFINED, CheckReport, Finding, Report
 
 
 def drawn_vectors(side: Any, rng: np.random.Generator, known: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -165,11 +165,31 @@ def check(
             raise _core.EvaluationError(f"{statement!r} has one side; a statement is lhs == rhs")
     else:
         read = Statement(*with_spaces(*statement), text, "expressions")
-    found = run(read, operators, states, seed, precision)
+    try:
+        found = run(read, operators, states, seed, precision)
+    except _core.SingularOperatorError as error:
+        return _without_inverse(text, statement_text(read), operators, precision, error, named_vectors(read))
     report = CheckReport.of(text, found, [operators._source.name], read.understood if isinstance(statement, str) else "")
     if found.verdict == FAILS and search:
         known: dict[str, Any] = dict(traits=lambda: dict(operators._source.traits), vectors=named_vectors(read))
         _explain(report, statement_text(read), seed=seed, precision=precision, budget=budget, **known)
+    return report
+
+
+def _without_inverse(text: str, to_read: str, operators: Any, precision: str | int, error: Exception, vectors: Any) -> CheckReport:
+    """The report of a statement with an inverse that does not exist here, if J > 0 is what it wants; else raises the error."""
+    from .truth import TRUE, UNREAD, truth
+
+    try:
+        found = truth(to_read, smallest_case=False, precision=precision, vectors=vectors)
+    except (_core.EvaluationError, _core.SpaceError, _core.ModelError):
+        raise error from None
+    if not found.needs_rotor_inertia:
+        raise error
+    report = CheckReport(text, UNDEFINED, 0.0, 0.0, 0, [operators._source.name])
+    if all(c.verdict in (TRUE, UNREAD) for c in found):
+        report.true_where = [frozenset({"J > 0"})]
+    report.notes.append(f"{error}: it is said of models with rotor inertia at every hinge (hinge.rotor_inertia)")
     return report
 
 
@@ -180,11 +200,15 @@ def _check_on_trees(text: str, *, states: int, seed: int, search: bool, precisio
     from .truth import depth_for
 
     whole, names, refuted = Verdict(), [], None
+    passed_over: list[bool] = []
+    with_rotors: list[bool] = []
     for spec in family(states, depth_for(text)):
         spec = replace(spec, seed=spec.seed + seed)
         found = judged(text, spec, 1, precision)
         if found is None:
+            passed_over.append(spec.rotor_inertia)
             continue
+        with_rotors.append(spec.rotor_inertia)
         names.append(str(spec))
         whole.judgements += found.judgements
         if found.verdict == FAILS and refuted is None:
@@ -192,6 +216,8 @@ def _check_on_trees(text: str, *, states: int, seed: int, search: bool, precisio
     if not names:
         raise _core.EvaluationError(f"{text!r}: the inverses in it exist on none of the random trees")
     report = CheckReport.of(text, whole, names, understood(text))
+    if passed_over and not any(passed_over) and all(with_rotors):
+        report.notes.append("said where J > 0: on models without rotor inertia an inverse in it does not exist")
     if refuted is not None and search:
         _explain(report, text, seed=seed, precision=precision, budget=budget, found=refuted)
     return report

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from fractions import Fraction
 
 from .formula import (
     Call,
@@ -134,14 +135,15 @@ def _numbers(node: Node) -> Iterator[tuple[Node, Slip]]:
     """Changes of a whole side by a number."""
     if isinstance(node, (Sum, Number)):
         return
-    for value, name in (*_scales(node), (-1.0, "-1")):
+    for value, name in (*_scales(node), (Fraction(-1), "-1")):
         slip = Slip(f"sign of {_shown(node)}", 1.0) if value < 0 else Slip(f"factor {name} missing in {_shown(node)}", 2.5)
         yield total([(-1, node)]) if value < 0 else product(Number(value), node), slip
 
 
-def _scales(node: Node) -> tuple[tuple[float, str], ...]:
+def _scales(node: Node) -> tuple[tuple[Fraction, str], ...]:
     """Numbers that may be missing in a term; none where it has one, which may be one too many."""
-    return () if isinstance(node, Product) and any(isinstance(f, Number) for f in node.factors) else ((2.0, "2"), (0.5, "½"))
+    has_one = isinstance(node, Product) and any(isinstance(f, Number) for f in node.factors)
+    return () if has_one else ((Fraction(2), "2"), (Fraction(1, 2), "½"))
 
 
 def _of_letter(letter: Letter) -> Iterator[tuple[Node, Slip]]:

@@ -10,6 +10,7 @@ import ast
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import lru_cache
 from typing import Any
 
@@ -17,7 +18,7 @@ import numpy as np
 
 from .. import _core
 from .spelling import spelled
-from .vocabulary import ParseError
+from .vocabulary import ParseError, decimal
 
 SYMBOLS = {name: shown for name, shown, *_ in _core.symbol_table()} | {"MM": "ℳ", "I": "I", "N": "N"}
 FUNCTIONS = ("inv", "blockdiag", "sqrt", "trace", "tr", "logdet", "norm")
@@ -45,11 +46,13 @@ class Letter(Node):
 
 @dataclass(frozen=True)
 class Number(Node):
-    value: float
+    value: Fraction
 
 
 @dataclass(frozen=True)
-class Star(Node):
+class Suffixed(Node):
+    """What a suffix makes of one formula."""
+
     inner: Node
 
     @property
@@ -58,13 +61,13 @@ class Star(Node):
 
 
 @dataclass(frozen=True)
-class Power(Node):
-    inner: Node
+class Star(Suffixed):
+    """X*."""
+
+
+@dataclass(frozen=True)
+class Power(Suffixed):
     exponent: int
-
-    @property
-    def children(self) -> tuple[Node, ...]:
-        return (self.inner,)
 
 
 @dataclass(frozen=True)
@@ -113,7 +116,7 @@ def product(*factors: Node) -> Node:
 def total(terms: list[tuple[int, Node]]) -> Node:
     """A sum, flat; a 0 where nothing is left."""
     if not terms:
-        return Number(0.0)
+        return Number(Fraction(0))
     flat: list[tuple[int, Node]] = []
     for sign, term in terms:
         flat += [(sign * s, t) for t, s in zip(term.terms, term.signs, strict=True)] if isinstance(term, Sum) else [(sign, term)]
@@ -180,7 +183,7 @@ def _python(source: str) -> Node:
 def _from_ast(node: ast.AST) -> Node:
     match node:
         case ast.Constant(value=int() | float() as value):
-            return Number(float(value))
+            return Number(decimal(str(value)))
         case ast.Name(id=name) if name in SYMBOLS:
             return Letter(name)
         case ast.UnaryOp(op=ast.USub(), operand=inner):
@@ -192,7 +195,7 @@ def _from_ast(node: ast.AST) -> Node:
         case ast.BinOp(left=left, op=ast.Mult() | ast.MatMult(), right=right):
             return product(_from_ast(left), _from_ast(right))
         case ast.BinOp(left=left, op=ast.Div(), right=ast.Constant(value=int() | float() as value)):
-            return product(Number(1 / value), _from_ast(left))
+            return product(Number(1 / decimal(str(value))), _from_ast(left))
         case ast.BinOp(left=left, op=ast.Pow(), right=right):
             return Power(_from_ast(left), int(ast.literal_eval(right)))
         case ast.Attribute(value=inner, attr="T"):
@@ -262,7 +265,7 @@ class _Book:
                 self._tokens.pop(0)
             elif text == "/":
                 self._tokens.pop(0)
-                factors.insert(0, Number(1 / float(self._tokens.pop(0)[1])))
+                factors.insert(0, Number(1 / decimal(self._tokens.pop(0)[1])))
             elif kind in ("number", "function", "indexed", "name") or text in ("(", "[", "{"):
                 factors.append(self._postfix())
             else:
@@ -287,7 +290,7 @@ class _Book:
     def _atom(self) -> Node:
         kind, text = self._tokens.pop(0)
         if kind == "number":
-            return Number(float(text))
+            return Number(decimal(text))
         if kind == "name":
             return Letter({"X": "X_world", "V": "velocity"}.get(text, text))
         if kind == "indexed":
@@ -317,7 +320,7 @@ def written(node: Node, shown: bool = False) -> str:
         case Letter(name=name, arguments=arguments):
             return (SYMBOLS[name] if shown else name) + (f"({', '.join(arguments)})" if arguments else "")
         case Number(value=value):
-            return f"{value:g}" if shown or value == float(f"{value:g}") else repr(value)
+            return _number(value)
         case Star(inner=inner):
             return _bracketed(inner, shown) + ("*" if shown else "^*")
         case Power(inner=inner, exponent=exponent):
@@ -333,6 +336,12 @@ def written(node: Node, shown: bool = False) -> str:
             ]
             return " ".join(pieces)
     raise AssertionError(node)
+
+
+def _number(value: Fraction) -> str:
+    """A decimal where that is it exactly, else a ratio."""
+    near = repr(float(value)).removesuffix(".0")
+    return near if Fraction(near) == value else str(value)
 
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -409,7 +418,7 @@ def evaluate(node: Node, letters: DenseLetters) -> Value:
         case Letter():
             return letters.of(node)
         case Number(value=value):
-            return Value(np.array(value), None, None)
+            return Value(np.array(float(value)), None, None)
         case Star(inner=inner):
             value = evaluate(inner, letters)
             if value.domain is None:
@@ -498,7 +507,7 @@ def residual(formula: Formula, letters: DenseLetters) -> float:
     Raises Misfit where spaces do not fit.
     """
     left, right = evaluate(formula[0], letters), evaluate(formula[1], letters)
-    said_zero = [side == Number(0.0) for side in formula]
+    said_zero = [side == Number(Fraction(0)) for side in formula]
     if not any(said_zero):
         both = _sum([left, right], (1, -1))
         size = max(np.abs(left.array).max(initial=0.0), np.abs(right.array).max(initial=0.0))

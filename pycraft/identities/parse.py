@@ -2,7 +2,8 @@
 
 Both readings are tried, Python's (``*`` and ``@`` multiply, ``.T`` transposes) and the book's (juxtaposition multiplies, a postfix ``*``
 transposes); the one whose names and spaces fit is taken. Where both fit and differ, the error shows both. In both ``**`` is Python's power.
-In the book's reading the numbers in front of a product scale the whole of it: 2 D D is 2 (D D), as it is shown.
+In the book's reading the numbers in front of a product scale the whole of it: 2 D D is 2 (D D), as it is shown. Numbers are what is
+typed: 0.3 is 3/10 and D/3 a third, exactly.
 """
 
 from __future__ import annotations
@@ -12,12 +13,14 @@ import operator
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from fractions import Fraction
+from numbers import Real
 from typing import Any
 
 from .. import _core
 from .book import read_book
 from .spelling import Spelled, spelled
-from .vocabulary import FUNCTIONS, WITH_ARGUMENTS, Misread, ParseError, Vocabulary, power
+from .vocabulary import FUNCTIONS, WITH_ARGUMENTS, Misread, ParseError, Vocabulary, decimal, power
 
 __all__ = ["ParseError", "Statement", "Statements", "check_has_space"]
 
@@ -40,8 +43,8 @@ class Statement:
 class Statements:
     """Reads statements on the letters of one model."""
 
-    def __init__(self, operators: Any, extra: Mapping[str, Any] | None = None):
-        self._vocabulary = Vocabulary(operators, extra)
+    def __init__(self, operators: Any, extra: Mapping[str, Any] | None = None, **options: Any):
+        self._vocabulary = Vocabulary(operators, extra, **options)
 
     def read(self, text: str) -> Statement:
         """The statement, by the one reading whose names and spaces fit.
@@ -85,33 +88,38 @@ class Statements:
     def _read_python(self, source: str) -> list[Any]:
         source = source.lstrip()
         try:
-            tree = ast.parse(_comparison(source), mode="eval").body
+            source = _comparison(source)
+            tree = ast.parse(source, mode="eval").body
         except (SyntaxError, ValueError) as error:  # ValueError: a NUL in the text
             raise ParseError(f"not understood at {source[max(0, (getattr(error, 'offset', 1) or 1) - 1) :][:12]!r}") from None
         if isinstance(tree, ast.Compare):
             if len(tree.ops) != 1 or not isinstance(tree.ops[0], ast.Eq):
                 raise ParseError("a statement is lhs == rhs")
-            return [self._evaluate(tree.left), self._evaluate(tree.comparators[0])]
-        return [self._evaluate(tree)]
+            return [self._evaluate(tree.left, source), self._evaluate(tree.comparators[0], source)]
+        return [self._evaluate(tree, source)]
 
-    def _evaluate(self, node: ast.AST) -> Any:
+    def _evaluate(self, node: ast.AST, source: str) -> Any:
         match node:
-            case ast.Constant(value=int() | float() as value):
-                return float(value)
+            case ast.Constant(value=int() as value):
+                return Fraction(value)
+            case ast.Constant(value=float()):
+                return decimal(ast.get_source_segment(source, node) or "")
+            case ast.Call(func=ast.Name(id="Fraction"), args=[ast.Constant(value=int() as a), ast.Constant(value=int() as b)]) if b:
+                return Fraction(a, b)
             case ast.Name(id=name):
                 return self._vocabulary.operator(name)
             case ast.UnaryOp(op=ast.USub(), operand=inner):
-                return -self._evaluate(inner)
+                return -self._evaluate(inner, source)
             case ast.BinOp(left=left, op=ast.Pow(), right=right):
-                return power(self._evaluate(left), self._evaluate(right))
+                return power(self._evaluate(left, source), self._evaluate(right, source))
             case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
-                return _combine(_BINARY[type(op)], self._evaluate(left), self._evaluate(right))
+                return _combine(_BINARY[type(op)], self._evaluate(left, source), self._evaluate(right, source))
             case ast.Attribute(value=inner, attr="T"):
-                return self._evaluate(inner).T
+                return self._evaluate(inner, source).T
             case ast.Call(func=ast.Attribute(value=inner, attr=("inv" | "sqrt" | "trace" | "logdet" | "norm") as method), args=[]):
-                return getattr(self._evaluate(inner), method)()
+                return getattr(self._evaluate(inner, source), method)()
             case ast.Call(func=ast.Name(id=name), args=[inner]) if name in FUNCTIONS:
-                return FUNCTIONS[name](self._evaluate(inner))
+                return FUNCTIONS[name](self._evaluate(inner, source))
             case ast.Call(func=ast.Name(id=name), args=arguments) if name in WITH_ARGUMENTS:
                 return self._vocabulary.indexed(name, [ast.unparse(a) for a in arguments])
         raise ParseError(f"{ast.unparse(node)!r} is no operator expression")
@@ -170,28 +178,32 @@ def _unscaled(side: _core.Operator) -> Any:
 
 
 def _text(side: Any) -> str:
-    return "" if side is None else side.text() if hasattr(side, "text") else f"{side:g}"
+    return "" if side is None else side.text() if hasattr(side, "text") else str(side)
 
 
 def _balance(side: Any, other: Any) -> Any:
     """0 and I take the spaces of the other side; numbers beside a scalar become scalars."""
-    if isinstance(other, _core.Operator) and other.domain is not None:
-        if isinstance(side, (int, float)) and side == 0:
+    if getattr(other, "domain", None) is not None:
+        if isinstance(side, Real) and side == 0:
             return _core.zero(other.domain, other.codomain)
         if isinstance(side, _core.Operator) and side.domain is None:
             own = _core.identity(other.domain)
             return own if side.kind == "identity" else side @ own
-    if isinstance(other, _core.Scalar) and isinstance(side, (int, float)):
-        return _core.scalar(float(side))
+    if isinstance(other, _core.Scalar) and isinstance(side, Real):
+        return _core.scalar(side)
     return side
 
 
 def _check_same_spaces(lhs: Any, rhs: Any) -> None:
-    if isinstance(lhs, _core.Operator) != isinstance(rhs, _core.Operator):
+    if hasattr(lhs, "codomain") != hasattr(rhs, "codomain"):
         raise _core.SpaceError(f"{_text(lhs)} and {_text(rhs)}: one is an operator, the other a number")
-    if isinstance(lhs, _core.Operator):
+    if isinstance(lhs, _core.Operator) and isinstance(rhs, _core.Operator):
         check_has_space(lhs, rhs)
         lhs - rhs  # raises where the spaces differ
+    elif hasattr(lhs, "codomain"):  # a formula with derivatives
+        for a, b in ((lhs.domain, rhs.domain), (lhs.codomain, rhs.codomain)):
+            if a is not None and b is not None and a != b:
+                raise _core.SpaceError(f"{_text(lhs)} and {_text(rhs)} do not act between the same spaces")
     elif not isinstance(lhs, _core.Scalar) and not isinstance(rhs, _core.Scalar):
         raise ParseError("a statement about numbers alone")
 

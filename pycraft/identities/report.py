@@ -9,6 +9,7 @@ from typing import Any
 from .judge import FAILS, HOLDS, UNDECIDED, UndecidedError, Verdict
 from .tables import WIDTH, findings_table, monospace, precision_text, read_as, text_of, wrapped
 
+UNDEFINED = "undefined"
 OPEN = ("fails", "undecided", "undefined")
 """Verdicts that say that something is wrong, or not known."""
 SHOWN = 1e-6
@@ -180,7 +181,8 @@ class CheckReport:
     """The outcome of `pycraft.check`: true as a condition where the statement holds at every state, false where it fails at one.
 
     Where neither is seen in the widest scalar, its `verdict` is "undecided" and as a condition it raises UndecidedError: what is not
-    decided is not true. `.counterexample` is the smallest refutation found of a false statement.
+    decided is not true. Where an inverse in it does not exist on the model and would where J > 0, it is "undefined", and false as a
+    condition. `.counterexample` is the smallest refutation found of a false statement.
     """
 
     statement: str
@@ -232,6 +234,8 @@ class CheckReport:
     def _headline(self) -> str:
         from .truth import in_words
 
+        if self.verdict == UNDEFINED:
+            return f"{'TRUE' if self.true_where else 'FALSE'} where J > 0; UNDEFINED here"
         if self.true_where:
             said = ", or where ".join(in_words(chosen) for chosen in self.true_where)
             return f"TRUE where {said}; FALSE elsewhere"
@@ -245,6 +249,8 @@ class CheckReport:
             lines.append(f"  {self._headline()}")
             lines.append(f"  relative residual {self.worst:.1e} in double; in {self._decisive()}")
             lines += [repr(self.counterexample)] if self.counterexample is not None else []
+        elif self.verdict == UNDEFINED:
+            lines.append(f"  {self._headline()}")
         else:
             lines.append(f"  {self.verdict.upper() if self.undecided else self.verdict} on {on}, {self.states} states")
             narrow = f"; in double {self.worst:.1e}" if self.worst <= self.bound <= SHOWN else ""

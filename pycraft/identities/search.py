@@ -10,9 +10,12 @@ have not what the statement names say nothing, and are passed over.
 from __future__ import annotations
 
 import itertools
+import re
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -104,11 +107,25 @@ class Counterexample:
 
 def statement_text(read: Statement) -> str:
     """The statement in Python's spelling, to be read on another model."""
-    sides = [
-        side if isinstance(side, (int, float)) else side.python() if isinstance(side, _core.Operator) else side.text()
-        for side in (read.lhs, read.rhs)
-    ]
-    return read.text if read.reading != "expressions" else f"{sides[0]} == {sides[1]}"
+    if read.reading != "expressions":
+        return read.text
+    return " == ".join(map(_side_text, (read.lhs, read.rhs)))
+
+
+def _side_text(side: Any) -> str:
+    """A side as text; doubles that are not the decimals that they are written as by their ratios."""
+    if isinstance(side, Real):
+        return str(Fraction(side))
+    in_python = isinstance(side, _core.Operator)
+
+    def exactly(found: re.Match[str]) -> str:
+        double = Fraction(float(found[0]))
+        if double == Fraction(found[0]):
+            return found[0]
+        return f"Fraction({double.numerator}, {double.denominator})" if in_python else f"({double.numerator}/{double.denominator})"
+
+    text = side.python() if in_python else side.text()
+    return re.sub(r"(?<![\w.])\d+(\.\d+)?(e[+-]?\d+)?(?=[* ])", exactly, text)
 
 
 def understood(text: str) -> str:

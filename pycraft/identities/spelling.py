@@ -98,6 +98,10 @@ _LAYOUT = _rules(
         (r"_\{\\(?:mathrm|text|textrm|mathit)\{((?:[^{}\\]|\\.)+)\}\}", _arguments),
         (r"\\(?:operatorname\*?|mathrm|text|textrm|textnormal|mathsf|mathit|mathbf)\s*\{\s*([A-Za-z]{2,})\s*\}", _word),
         (r"\\(?:ln|log)(?![A-Za-z])", " ln "),
+        (r"\\[tdc]?frac\s*\{\s*(?:\\mathrm\s*)?\{?\s*d\s*\}?\s*\}\s*\{\s*(?:\\mathrm\s*)?\{?\s*d\s*\}?\s*t\s*\}", " ∂_t "),
+        (r"\\[tdc]?frac\s*\{\s*\\partial\s*\}\s*\{\s*\\partial\s*\\theta\s*_\s*\{?\s*([ij])\s*\}?\s*\}", r" ∂_\1 "),
+        (r"\\partial(?![A-Za-z])", "∂"),
+        (r"\\ddot\s*\{?\s*\\theta(?![A-Za-z])\s*\}?", " θ\u0308 "),
         (r"\\(det|[Tt]r)(?![A-Za-z])", _word),
         (r"\\(?:stackrel|overset)\s*\{[^{}]*\}\s*\{\s*=\s*\}|\\(?:triangleq|equiv|coloneqq|doteq)(?![A-Za-z])", "="),
         (r"\\[tdc]?frac\s*(?:\{\s*(\d+)\s*\}|(\d))\s*(?:\{\s*(\d+)\s*\}|(\d))", lambda m: f"({m[1] or m[2]}/{m[3] or m[4]})"),
@@ -216,6 +220,12 @@ _UNICODE = _rules(
         ("|".join(map(re.escape, _VARIANTS)), lambda m: _VARIANTS[m[0]]),
         (r"_\s*\{\s*([^{}\s]+)\s*\}", r"_\1"),
         (r"a_0(?!\d)", "a₀"),
+        (r"θ\u0308", " vdot "),
+        (r"(?<![A-Za-z])d\s*/\s*dt(?![A-Za-z])", "∂_t"),
+        (r"∂\s*/\s*∂\s*θ\s*_\s*([ij])(?![A-Za-z])", r"∂_\1"),
+        (r"Δ\s*_\s*t(?!heta)|(?<![A-Za-z_])Delta_t(?![A-Za-z_])", " Delta_theta_dot "),
+        (r"Δ\s*_\s*([ij])", r" Delta(\1) "),
+        (r"(?<![A-Za-z_])Delta_([ij])(?![A-Za-z_])", r" Delta(\1) "),
     ]
 )
 _NAMES = _rules(

@@ -10,7 +10,7 @@ from html import escape
 from typing import Any
 
 from .. import _core
-from .family import CELLS, CONSTANT, EVERY, HYPOTHESES, ONE, Cell, family, nilpotency, read_on, specs
+from .family import CELLS, CONSTANT, EVERY, HYPOTHESES, ONE, WITH_J, Cell, family, nilpotency, read_on, specs
 from .judge import FAILS, HOLDS, UNDECIDED
 from .parse import Statements
 from .search import Counterexample, judged, smallest, understood
@@ -79,9 +79,17 @@ class TruthMap:
         return sorted(found, key=lambda chosen: (len(chosen), weaker[chosen]))
 
     @property
+    def needs_rotor_inertia(self) -> bool:
+        """Whether an inverse in it exists where J > 0, and on no model without rotor inertia."""
+        read = {c.cell.J for c in self.cells if c.verdict != UNREAD}
+        return read == {WITH_J}
+
+    @property
     def verdict(self) -> str:
         """The headline in words."""
         where = self.where
+        if where == [frozenset()] and self.needs_rotor_inertia:
+            return "TRUE where J > 0; elsewhere an inverse in it does not exist"
         if where == [frozenset()]:
             return "TRUE on every model tried"
         if where:

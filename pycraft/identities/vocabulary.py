@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from difflib import get_close_matches
+from fractions import Fraction
+from numbers import Real
 from typing import Any
 
 from .. import _core
+from .directions import COORDINATES, along, coordinates_meant
 from .spelling import Spelled
 
 SCALARS = {
@@ -19,7 +23,7 @@ SCALARS = {
 FUNCTIONS = {
     **SCALARS,
     "inv": lambda x: x.inv(),
-    **dict.fromkeys(("blockdiag", "blkdiag", "bdiag"), _core.blockdiag),
+    **dict.fromkeys(("blockdiag", "blkdiag", "bdiag"), lambda x: x.blockdiag() if hasattr(x, "blockdiag") else _core.blockdiag(x)),
     "sqrt": lambda x: x.sqrt(),
     "transpose": lambda x: x.T,
 }
@@ -56,11 +60,16 @@ class Misread(ParseError):
 
 
 class Vocabulary:
-    """The operators of one model by every name that is typed for them, ℳ, I, N, and what the caller adds."""
+    """The operators of one model by every name that is typed for them, ℳ, I, N, and what the caller adds.
 
-    def __init__(self, operators: Any, extra: Mapping[str, Any] | None = None):
+    `derive(x, "i" | "j" | "t", operators)` is what ∂ makes of an expression.
+    """
+
+    def __init__(self, operators: Any, extra: Mapping[str, Any] | None = None, derive: Callable[[Any, str, Any], Any] = along):
+        self._derive = derive
         H, phi, M = operators("H phi M")
-        self._own = {"MM": H @ phi @ M @ phi.T @ H.T, "I": operators.I, "N": operators.Theta.dimension, **(extra or {})}
+        self._own = {"MM": H @ phi @ M @ phi.T @ H.T, "I": operators.I, "N": operators.Theta.dimension}
+        self._own |= {"vdot": _core.vector("vdot", operators.Theta), **(extra or {})}
         self._operators = operators
 
     @property
@@ -79,9 +88,15 @@ class Vocabulary:
 
     def indexed(self, name: str, arguments: list[str]) -> Any:
         arguments = [a.strip().strip("'\"") for a in arguments]
+        if name == "Delta" and arguments[0] in COORDINATES and arguments[0] not in self._operators._source.coordinate_names:
+            return self._operators.Delta(coordinates_meant(self._operators)[COORDINATES.index(arguments[0])])
         if name == "Delta":
             return self._operators.Delta(int(arguments[0]) if arguments[0].isdigit() else arguments[0])
         return getattr(self._operators, name)(arguments)
+
+    def derivative(self, x: Any, direction: str) -> Any:
+        """∂x along the coordinate i or j, or along time."""
+        return self._derive(x, direction, self._operators)
 
     def unknown(self, name: str) -> str:
         """What to say of a name that stands for nothing."""
@@ -97,6 +112,20 @@ def needs_arguments(name: str) -> str:
     return f"{name} needs its arguments, as in {name}({'hinge' if name == 'Delta' else 'body'})"
 
 
+def decimal(text: str) -> Fraction:
+    """A number as it is typed: 0.3 is 3/10.
+
+    Raises
+    ------
+    ParseError
+        It is beyond the range of a double.
+    """
+    text = text.replace("_", "")
+    if not math.isfinite(near := float(text)) or near == 0 and any(c in "123456789" for c in text.lower().partition("e")[0]):
+        raise ParseError(f"the number {text} is beyond the range of a double, 1e-308 to 1e308")
+    return Fraction(text)
+
+
 def power(base: Any, exponent: Any) -> Any:
     """base to a whole power.
 
@@ -105,6 +134,6 @@ def power(base: Any, exponent: Any) -> Any:
     ParseError
         The exponent is no whole number, or beyond 1000.
     """
-    if not isinstance(exponent, (int, float)) or not abs(exponent) <= LARGEST_POWER or exponent != int(exponent):
+    if not isinstance(exponent, Real) or not abs(exponent) <= LARGEST_POWER or exponent != int(exponent):
         raise ParseError(f"a power is a whole number up to {LARGEST_POWER}")
     return base ** int(exponent)

@@ -26,7 +26,7 @@ def resolved_jacobian(model: Any, frame: str, q: Any, axes: str, relative_to: st
     if not isinstance(axes, str) or axes not in AXES:
         raise _core.EvaluationError(f"axes={axes!r} of a Jacobian: there are {', '.join(map(repr, AXES))}")
     calls = model._calls()
-    J = calls.jacobian(frame, q, precision, None)
+    J = core_f = calls.jacobian(frame, q, precision, None)
     X = calls.pose(frame, q)
     R, p = X[..., :3, :3], X[..., :3, 3]
     if relative_to is not None:
@@ -36,6 +36,8 @@ def resolved_jacobian(model: Any, frame: str, q: Any, axes: str, relative_to: st
         R, p = R_o @ R, np.einsum("...ij,...j->...i", R_o, p - X_o[..., :3, 3])
         carried = J_o[..., 3:, :] - _cross(p, J_o[..., :3, :])
         J = J - _turned(np.swapaxes(R, -1, -2), np.concatenate([J_o[..., :3, :], carried], axis=-2))
+        # a coordinate that moves both moves them as one body: exactly nothing, where the difference is rounding
+        J[..., _moves(core_f) & _moves(J_o)] = 0
     if axes == "body":
         return J
     J = _turned(R, J)
@@ -47,6 +49,11 @@ def resolved_jacobian(model: Any, frame: str, q: Any, axes: str, relative_to: st
 def _turned(R: np.ndarray, J: np.ndarray) -> np.ndarray:
     """(R ω; R v) of every column."""
     return np.concatenate([R @ J[..., :3, :], R @ J[..., 3:, :]], axis=-2)
+
+
+def _moves(J: np.ndarray) -> np.ndarray:
+    """Which coordinates (nv,) move the frame: columns off the path to the base are zero, the others never."""
+    return J.reshape(-1, J.shape[-1]).any(axis=0)
 
 
 def _cross(p: np.ndarray, columns: np.ndarray) -> np.ndarray:

@@ -16,12 +16,14 @@ def by_coordinate(model: Multibody, of_hinges: Mapping[str, Mapping[str, float]]
 
     A hinge that the model does not have (it was welded) is passed over, and so is a quantity that is left on none.
     """
-    arrays = {}
+    if not of_hinges:
+        return {}
+    arrays, slices = {}, {name: hinge.v_slice for name, hinge in model.hinges.items()}
     for quantity, numbers in of_hinges.items():
         values = np.full(model.nv, np.nan)
         for hinge, number in numbers.items():
-            if hinge in model.hinges:
-                values[model.hinges[hinge].v_slice] = number
+            if hinge in slices:
+                values[slices[hinge]] = number
         if not np.isnan(values).all():
             arrays[quantity] = values
     return arrays

@@ -102,13 +102,20 @@ class SensitivityCalls(DirectCalls):
         q, v = at_state(self, q, v)
         return self._sensitivities().kinetic_energy(q, v, precision)
 
-    def hamiltonian_dynamics(self, q, p, tau, *, precision: str = "double") -> tuple[np.ndarray, np.ndarray]:
+    def hamiltonian_dynamics(self, q=None, p=None, tau=None, *, precision: str = "double") -> tuple[np.ndarray, np.ndarray]:
         """The Hamiltonian form in O(N): v and ṗ of the generalized momenta p = (ℳ + J) v under the forces tau, gravity included.
+
+        Without p those of the state's v.
 
         ṗ = T + Ḣp - HV̄p of the bodies' momenta p = φMV, so that no derivative of ℳ is formed. Each (nv,) or (B, nv). SingularHingeError
         as in forward dynamics.
         """
-        return self._sensitivities().hamiltonian(at_state(self, q)[0], p, tau, precision)
+        q, v = at_state(self, q)
+        if p is None:
+            MM, J = self.soa("MM J")  # type: ignore[attr-defined]
+            p = (MM + J).at(q, precision=precision) @ np.asarray(v, float)
+        tau = np.zeros(self.nv) if tau is None else tau
+        return self._sensitivities().hamiltonian(q, p, tau, precision)
 
     def innovations(self, q=None, v=None, tau=None, *, precision: str = "double") -> tuple[np.ndarray, np.ndarray]:
         """Innovations velocity ξ = [I+HφK]*v and innovations ε = [I-HψK](τ - 𝒞), each (nv,) or (B, nv): decoupled coordinates.

@@ -149,6 +149,12 @@ class XmlFile:
         value = element.get(attribute)
         if value is None and default is not None:
             return default
+        try:  # most are one word, and a large file has millions
+            number = float(value)  # type: ignore[arg-type]
+        except (TypeError, ValueError):
+            number = math.nan
+        if math.isfinite(number) and value.isascii() and "_" not in value:  # type: ignore[union-attr]
+            return number
         return self._floats(element, attribute, value, 1, owner, infinite)[0]
 
     def _floats(

@@ -207,13 +207,17 @@ class ClosedForms:
         from .rational import exact
 
         kind, value, operand, terms = scalar._parts()
-        name = ("number", "trace", "logdet", "norm", "sum", "scaled")[kind]
+        name = ("number", "trace", "logdet", "norm", "sum", "scaled", "product", "reciprocal")[kind]
         if name == "number":
             return exact(value)
         if name == "sum":
             return sympy.Add(*(self._scalar(t, given, simplify) for t in terms))
         if name == "scaled":
             return exact(value) * self._scalar(terms[0], given, simplify)
+        if name == "product":
+            return sympy.Mul(*(self._scalar(t, given, simplify) for t in terms))
+        if name == "reciprocal":
+            return 1 / self._scalar(terms[0], given, simplify)
         matrix = self._matrix(operand, given)
         show = lambda x: matrix.field.expression(x, simplify)  # noqa: E731
         if name == "trace":

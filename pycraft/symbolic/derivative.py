@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+from numbers import Real
 from typing import Any
 
 from .. import _core
+
+TIME = "t"
+"""The direction of a derivative along time, where coordinates are numbers."""
 
 
 class Formula:
@@ -16,7 +21,7 @@ class Formula:
 
     __array_ufunc__ = None
 
-    def __init__(self, kind: str, children: list[Any], coefficient: float = 1.0, index: int = -1):
+    def __init__(self, kind: str, children: list[Any], coefficient: Any = 1.0, index: int = -1):
         self.kind, self.children, self.coefficient, self.index = kind, children, coefficient, index
         self.name = None
 
@@ -48,18 +53,18 @@ class Formula:
         return Formula("product", [other, self])
 
     def __mul__(self, other: Any) -> Formula:
-        return self._times(float(other)) if isinstance(other, (int, float)) else self @ other
+        return self._times(other) if isinstance(other, Real) else self @ other
 
     def __rmul__(self, other: Any) -> Formula:
-        return self._times(float(other)) if isinstance(other, (int, float)) else Formula("product", [other, self])
+        return self._times(other) if isinstance(other, Real) else Formula("product", [other, self])
 
-    def __truediv__(self, number: float) -> Formula:
-        return self._times(1.0 / number)
+    def __truediv__(self, number: Any) -> Formula:
+        return self._times(Fraction(1) / Fraction(number))
 
     def __neg__(self) -> Formula:
         return self._times(-1.0)
 
-    def _times(self, number: float) -> Formula:
+    def _times(self, number: Any) -> Formula:
         return Formula("scaled", [self], number)
 
     @property
@@ -135,13 +140,17 @@ class Formula:
             case "blockdiag":
                 return f"blockdiag({parts[0]})" if style == "text" else f"\\operatorname{{blockdiag}}({parts[0]})"
         sign = "−" if style == "text" else "-"
-        return f"{sign}{closed[0]}" if self.coefficient == -1 else f"{self.coefficient:g} {closed[0]}"
+        return f"{sign}{closed[0]}" if self.coefficient == -1 else f"{_number(self.coefficient)} {closed[0]}"
 
     def __repr__(self) -> str:
         return f"<{self.text()}>"
 
     def _repr_latex_(self) -> str:
         return f"${self.latex()}$"
+
+
+def _number(c: Any) -> str:
+    return f"{c:g}" if isinstance(c, float) else str(c)
 
 
 def derivative(expression: Any, coordinate: int | str) -> Formula:

@@ -11,6 +11,7 @@ import random
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
+from numbers import Real
 from typing import Any
 
 from .. import _core
@@ -356,7 +357,7 @@ class Exercise:
             if read.rhs is not None:
                 raise _core.EvaluationError(f"{text!r} is a statement: the line is one expression, equal to the line before")
             line = read.lhs
-        if isinstance(line, (int, float)) and line == 0:
+        if isinstance(line, Real) and line == 0:
             return _core.zero(lhs.domain, lhs.codomain)
         if not isinstance(line, _core.Operator):
             raise _core.EvaluationError(f"a line is an operator, not {line!r}")

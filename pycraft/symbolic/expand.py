@@ -1,7 +1,7 @@
 """Expressions written out as sums of words: products distributed, transposes and inverses carried to the letters.
 
-(AB)* = B*A*, (AB)⁻¹ = B⁻¹A⁻¹ for factors that are square by meaning, (A⁻¹)* = (A*)⁻¹, coefficients as exact fractions of the doubles that
-were typed. What is no product of letters (the inverse of a sum, a diagonal part, a square root) becomes a letter of its own that remembers
+(AB)* = B*A*, (AB)⁻¹ = B⁻¹A⁻¹ for factors that are square by meaning, (A⁻¹)* = (A*)⁻¹, coefficients as exact fractions of what
+was typed. What is no product of letters (the inverse of a sum, a diagonal part, a square root) becomes a letter of its own that remembers
 what stands inside it.
 """
 
@@ -339,8 +339,9 @@ def _same_state(a: Any, b: Any) -> bool:
     return a is b or a is not None and b is not None and a.__reduce__()[1] == b.__reduce__()[1]
 
 
-def exact(coefficient: float) -> Number:
-    if not math.isfinite(coefficient):
+def exact(coefficient: float | Fraction) -> Number:
+    """A coefficient as the number that it is."""
+    if isinstance(coefficient, float) and not math.isfinite(coefficient):
         raise _core.EvaluationError(f"a coefficient {coefficient} is no number to reckon with")
     return ratio(Fraction(coefficient), 1)
 

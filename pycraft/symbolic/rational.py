@@ -20,11 +20,12 @@ from sympy.polys.domains import ZZ
 from .. import _core
 
 
-def exact(x: float, simplest: bool = True) -> sympy.Expr:
-    """A double as an exact number: the fraction with a denominator up to 10⁶, or the root of one up to 1000, whose double it is.
-
-    Any other double is the binary fraction that it stands for.
+def exact(x: float | Fraction, simplest: bool = True) -> sympy.Expr:
+    """A Fraction as it is. A double as the fraction with a denominator up to 10⁶, or the root of one up to 1000, whose double it is; any
+    other as the binary fraction that it stands for.
     """
+    if isinstance(x, Fraction):
+        return sympy.Rational(x.numerator, x.denominator)
     x = float(x)
     if not np.isfinite(x):
         raise _core.ModelError(f"{x} has no exact form")

@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..identities.directions import COORDINATES, coordinates_meant
 from ..identities.parse import ParseError, Statement, Statements
+from .derivative import TIME, derivative
 from .proof import HYPOTHESES
 
 _SPACE = r"Θ|Theta|V|F|R\^?\d*"
@@ -65,7 +67,7 @@ class Reading:
             domain, codomain = self._space(found[1]), self._space(found[2])
             rng = np.random.default_rng([*name.encode()])
             return _core.constant(rng.uniform(-1, 1, (codomain.dimension, domain.dimension)), domain, codomain, name)
-        read = Statements(self.operators, self.extra).read(text)
+        read = Statements(self.operators, self.extra, derive=_formula).read(text)
         if read.rhs is not None:
             raise ParseError(f"{name} := {text} is a statement: a letter stands for one expression")
         return read.lhs
@@ -88,7 +90,7 @@ class Reading:
     def read(self, text: str) -> Statement:
         """Both sides. N stays the trace of I: what is proved is said of every model, so no model's number of coordinates may enter."""
         try:
-            return Statements(self.operators, {"N": _core.identity(self.operators.Theta).trace(), **self.extra}).read(text)
+            return Statements(self.operators, {"N": _core.identity(self.operators.Theta).trace(), **self.extra}, derive=_formula).read(text)
         except ParseError as error:
             if re.search(r"\bN\b", text) and "N" not in self.extra:
                 raise ParseError(
@@ -106,6 +108,13 @@ class Reading:
         if read.rhs is None or not isinstance(read.lhs, _core.Operator):
             raise ParseError(f"{text!r} is assumed: write an equation of operators, X > 0, or one of {', '.join(HYPOTHESES)}")
         return Assumption(text, read.lhs, read.rhs)
+
+
+def _formula(x: Any, direction: str, operators: Any) -> Any:
+    """∂x of what is proved of every model: a letter of its own, of which the product rule and ∂E_φ = E_φΔ_i speak."""
+    if isinstance(x, _core.Scalar):
+        raise _core.EvaluationError(f"∂({x.text()}): derivatives of operators are proved; that of ln det X is tr(X⁻¹∂X), of tr X tr(∂X)")
+    return derivative(x, TIME if direction == "t" else coordinates_meant(operators)[COORDINATES.index(direction)])
 
 
 def _parted(definition: str) -> tuple[str, str, str]:

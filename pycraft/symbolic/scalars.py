@@ -1,7 +1,8 @@
 """Traces, ln|det| and norms: numbers as sums of words, and the steps that bring them to a normal form.
 
 A number is a polynomial whose words are ("tr", X, Y, ...), the trace of XY... up to rotation and transposition, ("ln det", X),
-("norm", X) and ("1",). What holds of operators holds inside a trace, at any rotation; besides,
+("norm", X) and ("1",), their reciprocals ("1/", ...) and products ("×", ..., ";", ...). What holds of operators holds inside a trace, at
+any rotation; besides,
 
     tr X = tr blockdiag(X),    tr(blockdiag(X) B) = tr(X B) for B block diagonal,    tr(Υ B) = tr(Ω B),
     ln|det XY| = ln|det X| + ln|det Y| for square factors,    ln|det X*| = ln|det X|,    ln|det c I + strictly triangular| = n ln|c|,
@@ -11,7 +12,7 @@ A number is a polynomial whose words are ("tr", X, Y, ...), the trace of XY... u
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,10 +22,11 @@ from .blocks import diagonal_blocks
 from .equations import Equation, Step, Use, chain_holds
 from .expand import Opaque, Problem, Spelling, exact, square
 from .inverses import LocalRules
-from .presuppositions import is_triangular
-from .rules import Rule, weight
+from .presuppositions import Void, is_triangular
+from .rules import WORDS, Rule, weight
 from .walk import GaveUp
 from .words import (
+    NUMBER,
     ONE,
     Alphabet,
     Number,
@@ -32,6 +34,7 @@ from .words import (
     Word,
     add_to,
     combine,
+    factors_of,
     inverse_of,
     inverted,
     monomial,
@@ -42,10 +45,9 @@ from .words import (
     times,
 )
 
-NUMBER: Word = ("1",)
 STEPS = 200
 """Steps at which a reduction gives up."""
-_KINDS = ("number", "trace", "logdet", "norm", "sum", "scaled")
+_KINDS = ("number", "trace", "logdet", "norm", "sum", "scaled", "product", "reciprocal")
 _DUALS = {"F": "V", "V": "F", "NodesF": "NodesV", "NodesV": "NodesF"}
 _SPACES_OF = {ascii: (domain, codomain) for ascii, _, _, domain, codomain, *_ in _core.symbol_table()} | {"S": ("F", "V")}
 
@@ -65,6 +67,33 @@ def trace_of(p: Polynomial, alphabet: Alphabet, space: str) -> Polynomial:
     for word, c in p.items():
         add_to(total, trace_word(word, alphabet, space), c)
     return total
+
+
+def product_word(factors: Iterable[Word]) -> Word:
+    """The product of numbers, which commute."""
+    every = sorted(factors)
+    if len(every) < 2:
+        return every[0] if every else NUMBER
+    return ("×", *(x for i, f in enumerate(every) for x in ((";",) if i else ()) + f))
+
+
+def product_of(p: Polynomial, q: Polynomial) -> Polynomial:
+    """p q, of numbers."""
+    total: Polynomial = {}
+    for u, x in p.items():
+        for w, y in q.items():
+            add_to(total, product_word([*factors_of(u), *factors_of(w)]), x * y)
+    if len(total) > WORDS:
+        raise GaveUp
+    return total
+
+
+def reciprocal_of(p: Polynomial) -> Polynomial | None:
+    """1/p of one word; None of zero and of sums."""
+    if len(p) != 1:
+        return None
+    ((word, c),) = p.items()
+    return {product_word(w[1:] if w[0] == "1/" else ("1/", *w) for w in factors_of(word)): ratio(1, c)}
 
 
 def space_of(word: Word, alphabet: Alphabet) -> str:
@@ -91,13 +120,26 @@ class TraceUse(Use):
         return trace_of(words, alphabet, self.space)
 
 
+@dataclass
+class ProductUse(Use):
+    """c · others · (lhs - rhs) of one equation between numbers."""
+
+    others: Word = NUMBER
+
+    def difference(self) -> Polynomial:
+        return product_of(self.equation.difference, {self.others: ONE})
+
+
 class ScalarStep(Step):
     """A step between numbers: before - after is a sum of traces of equations and of equations between numbers, multiplied out exactly."""
 
     def holds(self) -> bool:
         left = combine((1, self.before), (-1, self.after))
         for use in self.uses:
-            difference = use.difference(self.alphabet) if isinstance(use, TraceUse) else use.equation.difference
+            if isinstance(use, TraceUse):
+                difference = use.difference(self.alphabet)
+            else:
+                difference = use.difference() if isinstance(use, ProductUse) else use.equation.difference
             for word, c in difference.items():
                 add_to(left, word, -use.coefficient * c)
         return not left
@@ -108,8 +150,11 @@ class ScalarStep(Step):
 
 
 def _negative(use: Use) -> Use:
-    made = TraceUse if isinstance(use, TraceUse) else Use
-    more = {"space": use.space} if isinstance(use, TraceUse) else {}
+    made, more = type(use), {}
+    if isinstance(use, TraceUse):
+        more = {"space": use.space}
+    elif isinstance(use, ProductUse):
+        more = {"others": use.others}
     return made(-use.coefficient, use.left, use.equation, use.right, use.word, not use.forward, **more)
 
 
@@ -140,6 +185,13 @@ def scalar_words(problem: Problem, e: Any) -> Polynomial:
             return combine(*((1, scalar_words(problem, part)) for part in parts))
         case "scaled":
             return {w: exact(value) * c for w, c in scalar_words(problem, parts[0]).items()}
+        case "product":
+            return functools.reduce(product_of, (scalar_words(problem, part) for part in parts))
+        case "reciprocal":
+            p = scalar_words(problem, parts[0])
+            if not p:
+                raise Void(f"1/({parts[0].text()}) is a reciprocal of zero")
+            return reciprocal_of(p) or {("1/", f"⟨{problem.alphabet.text(p)}⟩"): ONE}
         case "trace":
             return trace_of(problem.words(operand), problem.alphabet, operand.codomain.name)
         case "logdet":
@@ -189,16 +241,48 @@ class ScalarRules:
             if not more and e.kind == "lemma" and e.rhs == monomial(self.alphabet.star(letter))
         }
         self._forms: list[tuple[str, str, Polynomial, Polynomial, list[Step]]] = []
+        self._reduced: dict[Word, tuple[Polynomial, list[Step]]] = {}
 
     def reduce(self, p: Polynomial) -> tuple[Polynomial, list[Step]]:
         """(the normal form, the steps to it). Raises GaveUp."""
         steps: list[Step] = []
-        while (step := self._turned(p) or self._inside(p) or self._between(p)) is not None:
+        while (step := self._turned(p) or self._inside(p) or self._between(p) or self._factors_reduced(p)) is not None:
             steps.append(step)
             p = step.after
             if len(steps) > STEPS:
                 raise GaveUp
         return p, steps
+
+    # ------------------------------------------------------------------ products
+    def _factors_reduced(self, p: Polynomial) -> Step | None:
+        """One factor of products by its normal form, wherever it stands; a reciprocal by that of what it is of."""
+        for factor in sorted({f for word in p if word[0] in ("×", "1/") for f in factors_of(word)}):
+            inverse = factor[0] == "1/"
+            inner = factor[1:] if inverse else factor
+            if inverse and inner[0].startswith("⟨"):
+                continue
+            if inner not in self._reduced:
+                self._reduced[inner] = self.reduce({inner: ONE})
+            form, steps = self._reduced[inner]
+            if form == {inner: ONE}:
+                continue
+            if inverse and not form:
+                raise Void(f"1/({self.alphabet.word_text(inner)}) is a reciprocal of zero")
+            by = reciprocal_of(form) if inverse else form
+            if by is None:
+                continue
+            note = "a factor, reduced by itself"
+            equation = self._fact(factor, by, note, functools.partial(_factor_holds, factor, inner, by, form, steps), steps)
+            after, uses = dict(p), []
+            for word, c in p.items():
+                every = factors_of(word)
+                if factor in every:
+                    every.remove(factor)
+                    use = ProductUse(c, (), equation, (), factor, others=product_word(every))
+                    uses.append(use)
+                    after = combine((1, after), (-c, use.difference()))
+            return ScalarStep(p, after, list(uses), self.alphabet)
+        return None
 
     # ------------------------------------------------------------------ inside a trace
     def _turned(self, p: Polynomial) -> Step | None:
@@ -421,6 +505,12 @@ class ScalarRules:
                         return
         if (kind, name) not in [(k, n) for k, n, *_ in self._forms]:
             self._forms.append((kind, name, inner, form, steps))
+
+
+def _factor_holds(factor: Word, inner: Word, by: Polynomial, form: Polynomial, steps: Sequence[Step]) -> bool:
+    """Whether a factor is what it is said to be: its steps lead there; of a reciprocal, those of what it is of."""
+    wanted = form if factor == inner else reciprocal_of(form)
+    return by == wanted and chain_holds(steps, {inner: ONE}, form)
 
 
 def _is_diagonal(word: Word, alphabet: Alphabet) -> bool:

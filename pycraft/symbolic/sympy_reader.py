@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from fractions import Fraction
 from functools import reduce
-from operator import add, matmul
+from operator import add, matmul, mul
 from typing import Any
 
 import sympy
@@ -119,15 +120,16 @@ class Reader:
         return _core._function(self._operators._source, name, None, inside)  # type: ignore[arg-type]
 
     # ------------------------------------------------------------------ numbers and scalars
-    def _number(self, x: Any) -> float:
+    def _number(self, x: Any) -> float | Fraction:
+        """A ratio as it is, anything else as a double."""
         value = x.subs(self._values)
         if not value.is_number or not value.is_real:
             unknown = ", ".join(sorted(map(str, value.free_symbols))) or str(value)
             raise _core.EvaluationError(f"{unknown} is not a real number: give values={{{unknown}: ...}}")
-        return float(value)
+        return Fraction(int(value.p), int(value.q)) if value.is_Rational else float(value)
 
     def _scalar(self, e: Any) -> Any:
-        """A float, or a scalar expression."""
+        """A number, or a scalar expression."""
         if isinstance(e, OperatorTrace | OperatorLogDet | OperatorNorm):
             inside = self._nonzero(e.arg)
             return {OperatorTrace: inside.trace, OperatorLogDet: inside.logdet, OperatorNorm: inside.norm}[type(e)]()
@@ -138,8 +140,7 @@ class Reader:
         if e.is_Add:
             return reduce(add, map(self._scalar, e.args))
         if e.is_Mul:
-            factors = [self._scalar(a) for a in e.args]
-            scalars = [f for f in factors if isinstance(f, _core.Scalar)]
-            if len(scalars) == 1:
-                return reduce(lambda a, b: b * a, [f for f in factors if isinstance(f, float)], scalars[0])
-        raise _core.EvaluationError(f"{e}: scalar expressions are sums and multiples of traces, ln det and norms")
+            return reduce(mul, map(self._scalar, e.args))
+        if e.is_Pow and e.exp.is_Integer:
+            return self._scalar(e.base) ** int(e.exp)
+        raise _core.EvaluationError(f"{e}: scalar expressions are sums, products and whole powers of traces, ln det and norms")

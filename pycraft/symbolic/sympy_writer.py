@@ -25,16 +25,16 @@ from .sympy_operators import (
     symbol_of,
 )
 
-_SCALARS = ("number", "trace", "logdet", "norm", "sum", "scaled")
+_SCALARS = ("number", "trace", "logdet", "norm", "sum", "scaled", "product", "reciprocal")
 # A space and its dual have one dimension: names by the space.
 _DIMENSIONS = {"Θ": "N", "V": "n", "F": "n", "W": "n"}
 
 
-def number(x: float) -> sympy.Expr:
-    """A double as the shortest exact number: whole, a fraction with a denominator up to 1000, or a Float of 53 bits."""
-    near = Fraction(x).limit_denominator(1000)
-    if float(near) == x:
-        return sympy.Rational(near.numerator, near.denominator)
+def number(x: float | Fraction) -> sympy.Expr:
+    """A Fraction, and a double that is one with a denominator up to 1000, as it is; any other double as a Float of 53 bits."""
+    value = Fraction(x)
+    if isinstance(x, Fraction) or value.denominator <= 1000:
+        return sympy.Rational(value.numerator, value.denominator)
     return sympy.Float(x, precision=53)
 
 
@@ -107,4 +107,8 @@ def scalar(s: _core.Scalar) -> Any:
         return sympy.Add(*opened, *(scalar(t) for t in terms[1:]), evaluate=False)
     if name == "scaled":
         return sympy.Mul(number(value), scalar(terms[0]), evaluate=False)
+    if name == "product":
+        return sympy.Mul(*(scalar(t) for t in terms), evaluate=False)
+    if name == "reciprocal":
+        return sympy.Pow(scalar(terms[0]), -1, evaluate=False)
     return {"trace": OperatorTrace, "logdet": OperatorLogDet, "norm": OperatorNorm}[name](operator(operand))

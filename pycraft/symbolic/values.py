@@ -7,6 +7,7 @@ that model; what is applied is what was typed, no theorem used.
 from __future__ import annotations
 
 import functools
+import math
 import operator
 from collections.abc import Sequence
 from fractions import Fraction
@@ -18,7 +19,7 @@ from .. import _core
 from .equations import Step
 from .expand import symbol_parts
 from .walk import Walk, carried_out
-from .words import FURTHER, NUMBERS, Alphabet, Polynomial, Word, inverse_of, split
+from .words import FURTHER, NUMBERS, Alphabet, Polynomial, Word, factors_of, inverse_of, split
 
 PROBES = 3
 SINGULAR = 1e-13
@@ -172,6 +173,14 @@ class Values:
     def _number(self, word: Word) -> tuple[float, float]:
         """(the number that a word stands for, the size of what is added up in it)."""
         kind, *letters = word
+        if kind == "×":
+            parts = [self._number(w) for w in factors_of(word)]
+            return math.prod(x for x, _ in parts), math.prod(size for _, size in parts)
+        if kind == "1/":
+            if letters[0].startswith("⟨"):
+                raise NoValue(f"1/({letters[0][1:-1]}) is no word")
+            value, _ = self._number(tuple(letters))
+            return 1 / value, 1 / abs(value)
         if kind in ("1", "ln") or letters[0].startswith("I["):
             n = 1.0 if kind == "1" else float(self.dimension(letters[-1][2:-1]))
             return n * (float(np.log(float(Fraction(letters[0])))) if kind == "ln" else 1.0), n
@@ -223,6 +232,15 @@ def _transferred(e: Any, operators: Any) -> Walk:
             return _core.identity() if e.domain is None else _core.identity(_space(e.domain, operators))
         case "zero":
             return _core.zero(_space(e.domain, operators), _space(e.codomain, operators))
+    made = rebuilt(e, children) if children else None
+    if made is None:
+        raise NoValue(f"{e.text()} belongs to its own model")
+    return made
+
+
+def rebuilt(e: Any, children: Sequence[Any]) -> Any:
+    """The same node over other children; None for what is not made of them alone."""
+    match e.kind:
         case "sum":
             return functools.reduce(operator.add, children)
         case "product":
@@ -237,7 +255,7 @@ def _transferred(e: Any, operators: Any) -> Walk:
             return _core.blockdiag(children[0])
         case "sqrt":
             return children[0].sqrt()
-    raise NoValue(f"{e.text()} belongs to its own model")
+    return None
 
 
 def _space(space: Any, operators: Any) -> Any:

@@ -25,8 +25,9 @@ FURTHER = "₂₃₄₅₆₇₈₉"
 """Marks of the letters of a second model, a third, ..., in one statement."""
 SHARED = ("E_φ", "φ", "φ̃", "M", "R")
 """Letters that do not depend on which hinges move: of a tree with some locked they are those of its model."""
-NUMBERS = ("tr", "ln det", "norm", "ln", "1")
+NUMBERS = ("tr", "ln det", "norm", "ln", "1", "×", "1/")
 """First letters of words that stand for numbers: see `scalars`."""
+NUMBER: Word = ("1",)
 _MARKS = ("⁻*", "⁻¹", "*")
 _TRANSPOSED = {"": "*", "*": "", "⁻¹": "⁻*", "⁻*": "⁻¹"}
 _INVERTED = {"": "⁻¹", "⁻¹": "", "*": "⁻*", "⁻*": "*"}
@@ -83,6 +84,22 @@ def times(p: Polynomial, q: Polynomial) -> Polynomial:
 def framed(left: Word, p: Polynomial, right: Word) -> Polynomial:
     """left p right, between two words."""
     return {left + word + right: c for word, c in p.items()}
+
+
+# ---------------------------------------------------------------------- numbers
+def factors_of(word: Word) -> list[Word]:
+    """The numbers that a product of numbers is made of; of a number alone itself, of 1 none."""
+    if word == NUMBER:
+        return []
+    if word[0] != "×":
+        return [word]
+    made: list[list[str]] = [[]]
+    for letter in word[1:]:
+        if letter == ";":
+            made.append([])
+        else:
+            made[-1].append(letter)
+    return [tuple(f) for f in made]
 
 
 # ---------------------------------------------------------------------- letters
@@ -236,6 +253,12 @@ class Alphabet:
         kind, *letters = word
         if kind == "1":
             return "1"
+        if kind in ("×", "1/") and not (letters and letters[0].startswith("⟨")):
+            inside = factors_of(word) if kind == "×" else [word[1:]]
+            parts = [self._number_shown(w, shown, trace, determinant, norm, logarithm) for w in inside]
+            return " ".join(parts) if kind == "×" else f"1/{parts[0]}"
+        if kind == "1/":
+            return f"1/({letters[0][1:-1]})"
         inside = " ".join(x if x.startswith("I[") else shown(x) for x in letters)
         if kind == "ln":
             return f"{trace.format(letters[1])} {logarithm.format(letters[0])}"

@@ -5,7 +5,6 @@ and replaces some arguments by what does not belong there: text, dates, complex 
 scalings, objects, huge integers. Accepted values are read back and the mass matrix is that of the dense oracle.
 """
 
-import argparse
 import sys
 import warnings
 from pathlib import Path
@@ -17,6 +16,7 @@ from mechanisms import random_tree  # noqa: E402
 from oracle import reference  # noqa: E402
 
 import pycraft as pc  # noqa: E402
+from campaigns.command_line import listed, seeds  # noqa: E402
 
 ANYTHING = [
     None, True, 0, 1, -1, 3.5, -0.0, 1e300, -1e300, 5e-324, np.nan, np.inf, -np.inf, 10**400, 2**40, -(2**70), 1j, np.complex64(1 +
@@ -213,8 +213,4 @@ def run(seeds, rounds=90):
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seeds", type=int, default=200)
-    found = run(range(parser.parse_args().seeds))
-    print("\n".join(found[:60]))
-    sys.exit(f"{len(found)} wrong" if found else 0)
+    sys.exit(listed(run(seeds(__doc__, 200, first=False))))

@@ -7,7 +7,6 @@ asked of it at a batch of states must be what is asked at each state, to the las
     python tests/campaigns/batches.py --seeds 2000
 """
 
-import argparse
 import sys
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from mechanisms import random_tree, uniform_batch  # noqa: E402
 from random_formulas import draw, seeded  # noqa: E402
 
 import pycraft as pc  # noqa: E402
+from campaigns.command_line import seeds, tallied  # noqa: E402
 
 STATES = 3
 
@@ -128,7 +128,7 @@ def requests(e, rng, nv):
 
 
 def check(seed):
-    """The differences found at one seed, as text; and how many comparisons there were."""
+    """How many comparisons there were at one seed, and the differences, as text."""
     rng = np.random.default_rng(seed)
     model = random_tree(rng, int(rng.integers(1, 5)), kinds=["pin", "slider", "ball", "universal", "screw"])
     soa = model.soa
@@ -154,24 +154,8 @@ def check(seed):
             found.append(f"seed {seed}: {name} of {e.text()}: shape {together.shape} for {apart.shape}")
         elif together.tobytes() != apart.tobytes() and not np.array_equal(together, apart):  # -0.0 is 0.0
             found.append(f"seed {seed}: {name} of {e.text()}: off by {np.abs(together - apart).max():.2e}")
-    return found, compared
-
-
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seeds", type=int, default=500)
-    parser.add_argument("--first", type=int, default=0)
-    given = parser.parse_args()
-    found, compared = [], 0
-    for seed in range(given.first, given.first + given.seeds):
-        here, count = check(seed)
-        found += here
-        compared += count
-        for line in here:
-            print(line, flush=True)
-    print(f"{compared} comparisons of {given.seeds} expressions, {len(found)} differences")
-    return 1 if found else 0
+    return compared, found
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(tallied(seeds(__doc__, 500), check, "comparisons"))

@@ -4,7 +4,6 @@
 full of quotes, brackets and escapes, entities, prefixes, numbers that are none, elements moved, doubled and lost.
 """
 
-import argparse
 import sys
 import tempfile
 import time
@@ -16,6 +15,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import pycraft as pc  # noqa: E402
+from campaigns.command_line import listed, seeds  # noqa: E402
 
 SECONDS = 5.0  # for files of a few hundred bytes
 NAMES = [
@@ -119,8 +119,4 @@ def run(seeds):
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seeds", type=int, default=2000)
-    found = run(range(parser.parse_args().seeds))
-    print("\n".join(found[:40]))
-    sys.exit(f"{len(found)} wrong" if found else 0)
+    sys.exit(listed(run(seeds(__doc__, 2000, first=False))))

@@ -5,7 +5,6 @@ A round draws a model, a call with its options, one state or a batch (arguments 
 of the arguments anywhere in one buffer, so that they are the same memory, shifted, inside each other, side by side or apart.
 """
 
-import argparse
 import sys
 from pathlib import Path
 
@@ -15,6 +14,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from mechanisms import random_tree  # noqa: E402
 
 import pycraft as pc  # noqa: E402
+from campaigns.command_line import listed, seeds  # noqa: E402
 
 FORWARD = [
     {},
@@ -121,8 +121,4 @@ def run(seeds, rounds=36):
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seeds", type=int, default=200)
-    found = run(range(parser.parse_args().seeds))
-    print("\n".join(found[:40]))
-    sys.exit(f"{len(found)} wrong" if found else 0)
+    sys.exit(listed(run(seeds(__doc__, 200, first=False))))

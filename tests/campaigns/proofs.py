@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
-from perturbations import dense, exchanges, rebuilt  # noqa: E402
+from perturbations import dense, exchanges, nodes, replaced  # noqa: E402
 from random_identities import J0, identity_pair, meeting, tree  # noqa: E402
 
 import pycraft as pc  # noqa: E402
@@ -62,22 +62,6 @@ def said(lhs, rhs, kind, soa):
     if kind == "determinant" and lhs.domain == lhs.codomain == soa.Theta:
         return (soa.D + lhs.T @ lhs).logdet(), (soa.D + rhs.T @ rhs).logdet()
     return lhs, rhs
-
-
-def nodes(e, path=()):
-    """(path, node) of every node."""
-    yield path, e
-    for i, child in enumerate(e.children):
-        yield from nodes(child, (*path, i))
-
-
-def replaced(e, path, by):
-    """The expression with another node at a path."""
-    if not path:
-        return by
-    children = list(e.children)
-    children[path[0]] = replaced(children[path[0]], path[1:], by)
-    return rebuilt(e, children)
 
 
 def perturbed(rng, e):

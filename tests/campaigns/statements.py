@@ -8,7 +8,6 @@ what is inverted, it must not say that it fails. What lies between decides nothi
     python tests/campaigns/statements.py --seeds 2000
 """
 
-import argparse
 import sys
 from itertools import islice
 from pathlib import Path
@@ -22,6 +21,7 @@ from oracle import reference  # noqa: E402
 from wrong_formulas import TRUE  # noqa: E402
 
 import pycraft as pc  # noqa: E402
+from campaigns.command_line import seeds, tallied  # noqa: E402
 from pycraft.identities.edits import changed  # noqa: E402
 from pycraft.identities.formula import Misfit, Value, evaluate, read_formula, written_statement  # noqa: E402
 from pycraft.identities.judge import BoundState, judge_states  # noqa: E402
@@ -136,21 +136,5 @@ def run(seed, models=None):
     return judged, complaints
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seeds", type=int, default=500)
-    parser.add_argument("--first", type=int, default=0)
-    arguments = parser.parse_args()
-    judged, complaints = 0, []
-    for seed in range(arguments.first, arguments.first + arguments.seeds):
-        n, new = run(seed)
-        judged += n
-        complaints += new
-        for line in new:
-            print(line, flush=True)
-    print(f"{arguments.seeds} formulas, {judged} verdicts, {len(complaints)} complaints")
-    return 1 if complaints else 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(tallied(seeds(__doc__, 500), run, "verdicts"))

@@ -18,20 +18,89 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import pycraft as pc  # noqa: E402
+from pycraft.accuracy.cases_elimination import UNITS  # noqa: E402
 
 LENGTHS = {"pin": (0,), "slider": (1,), "cylindrical": (0, 1), "ball": (0, 0, 0), "universal": (0, 0)}
 """Of each coordinate: the power of a length in it."""
 
-UNITS = {
-    "SI": (1.0, 1.0),
-    "milligrams and micrometres": (1e6, 1e6),
-    "MEMS in SI": (1e-12, 1e-6),
-    "molecules in SI": (3e-26, 1e-10),
-    "hair of a millimetre in SI": (1e-9, 1e-3),
-    "kilometres and gigatonnes in SI": (1e12, 1e3),
-}
-POWERS = ((4, 0), (40, 0), (-80, 0), (0, 21), (0, -33), (-84, -33), (20, 10))
-"""Binary exponents of masses and lengths. Even ones of masses: the theorems' factors take the square root of D."""
+POWERS = ((4, 0), (1, 0), (-81, 0), (0, 21), (0, -33), (-84, -33), (21, 10))
+"""Binary exponents of masses and lengths."""
+TIMES = (0, 1, -7)
+"""Binary exponents of times, in turn."""
+
+
+class Moving:
+    """A random tree of every kind of hinge in motion, in units of `mass`, `length` and `time`."""
+
+    KINDS = {
+        "pin": (0,),
+        "slider": (1,),
+        "screw": (0,),
+        "cylindrical": (0, 1),
+        "universal": (0, 0),
+        "gimbal": (0, 0, 0),
+        "planar": (1, 1, 0),
+        "ball": (0, 0, 0),
+        "free": (0, 0, 0, 1, 1, 1),
+    }
+    """Of each velocity: the power of a length in it."""
+
+    def __init__(self, seed, mass=1.0, length=1.0, time=1.0):
+        rng = np.random.default_rng(seed)
+        self.mass, self.length, self.time = mass, length, time
+        self.model = pc.Multibody("moving")
+        own_powers = {}
+        for k in range(int(rng.integers(2, 8))):
+            kind = str(rng.choice(list(self.KINDS)))
+            points = rng.normal(size=(8, 3)) * 0.3
+            spread = points - points.mean(axis=0)
+            inertia = (np.sum(spread**2) * np.eye(3) - spread.T @ spread) / 8
+            parent, own = int(rng.integers(0, k)) if k else -1, np.array(self.KINDS[kind])
+            rotors = mass * length ** (2.0 - 2 * own) * rng.uniform(0, 0.2, len(own)) * (rng.random() < 0.3)
+            options = {"axis": rng.normal(size=3)} if kind in ("pin", "slider", "screw", "cylindrical") else {}
+            self.model.add_body(
+                f"body{k}",
+                f"body{parent}" if parent >= 0 else None,
+                kind,
+                position=length * rng.uniform(-1, 1, 3),
+                mass=mass * rng.uniform(0.1, 2),
+                com=length * rng.uniform(-0.3, 0.3, 3),
+                inertia=mass * length**2 * inertia,
+                rotor_inertia=rotors,
+                **options,
+                **({"pitch": 0.25 * length} if kind == "screw" else {}),
+            )
+            own_powers[f"body{k}"] = own, {"ball": np.zeros(4), "free": np.r_[np.zeros(4), np.ones(3)]}.get(kind, own)
+        n = self.model.nv
+        self.powers, positions = np.zeros(n), np.zeros(self.model.nq)
+        for name, hinge in self.model.hinges.items():
+            self.powers[hinge.v_slice], positions[hinge.q_slice] = own_powers[name]
+        self.rates = length**self.powers / time
+        self.q = rng.uniform(-1, 1, self.model.nq) * length**positions
+        self.v = rng.uniform(-1, 1, n) * self.rates
+        self.tau = rng.uniform(-1, 1, n) * mass * (length / time) ** 2 / length**self.powers
+        self.model.gravity = rng.uniform(-1, 1, 3) * length / time**2
+
+    def answers(self):
+        """Name -> a dimensionless array, for each direct call in the fast form."""
+        model, q, v, tau = self.model, self.q, self.v, self.tau
+        lengths, energy = self.length**self.powers, self.mass * (self.length / self.time) ** 2
+        accelerations, forces = lengths / self.time**2, energy / lengths
+        inertias = self.mass * self.length**2 / np.outer(lengths, lengths)
+        dq, dv, dtau = model.forward_dynamics_derivatives(q, v, tau)
+        return {
+            "forward dynamics": model.forward_dynamics(q, v, tau) / accelerations,
+            "forward dynamics of a batch": model.forward_dynamics(*(np.tile(x, (9, 1)) for x in (q, v, tau))) / accelerations,
+            "inverse dynamics": model.inverse_dynamics(q, v, 0.5 * v / self.time) / forces,
+            "bias forces": model.bias_forces(q, v) / forces,
+            "ℳ": model.mass_matrix(q) / inertias,
+            "ℳ⁻¹": model.mass_matrix_inverse(q) * inertias,
+            "∂θ̈/∂q": dq / np.outer(accelerations, 1 / lengths),
+            "∂θ̈/∂v": dv / np.outer(accelerations, 1 / self.rates),
+            "∂θ̈/∂τ": dtau / np.outer(accelerations, 1 / forces),
+            "ΥM": np.array(float((model.soa.Upsilon @ model.soa.M).at(q).trace())),
+            "[I-HψK]": (model.soa.I - model.soa.H @ model.soa.psi @ model.soa.K).at(q).dense() * np.outer(1 / forces, forces),
+        }
 
 
 class Drawn:
@@ -114,6 +183,17 @@ class Drawn:
         return {name: np.array([float(y) for y in value]) for name, value in results.items()}, np.linalg.cond(dense)
 
 
+def differing_bits_in_motion(seed):
+    """(exponents of mass, length and time, call) of every direct call in the fast form that is not the same to the bit."""
+    reference = Moving(seed).answers()
+    wrong = []
+    for i, (mass, length) in enumerate(POWERS):
+        powers = mass, length, TIMES[i % len(TIMES)]
+        answers = Moving(seed, *(2.0**p for p in powers)).answers()
+        wrong += [(*powers, name) for name, value in answers.items() if not np.array_equal(value, reference[name])]
+    return wrong
+
+
 def differing_bits(seed):
     """(masses' exponent, lengths' exponent, request) of every answer that is not the same to the bit.
 
@@ -149,6 +229,9 @@ def main():
         for mass, length, name in differing_bits(seed):
             wrong += 1
             print(f"seed {seed}: masses 2^{mass}, lengths 2^{length}: {name} is not the same")
+        for mass, length, time, name in differing_bits_in_motion(seed):
+            wrong += 1
+            print(f"seed {seed}: masses 2^{mass}, lengths 2^{length}, times 2^{time}: {name} is not the same")
         for units in UNITS:
             for name, error in worst_errors(seed, units).items():
                 if not error <= 1:

@@ -1,6 +1,7 @@
 """A copy of the tree whose core has every mutant of C++ as a switch: one build of what includes a mutated file, the rest as built."""
 
 import concurrent.futures
+import hashlib
 import json
 import os
 import pathlib
@@ -129,6 +130,27 @@ class TestBuild:
         run = subprocess.run(command, capture_output=True, text=True)
         if run.returncode:
             raise SystemExit(f"the test build does not link:\n{run.stderr[-2000:]}")
+
+
+KERNELS = "cpp/tests/test_kernels.cpp"
+
+
+def kernels(build):
+    """The C++ tests of small kernels, built with the switches: a program that ends with 0 where all pass."""
+    source = build.tree / KERNELS
+    made = build.folder / f"test_kernels-{hashlib.sha256(source.read_bytes()).hexdigest()[:12]}"
+    if made.exists():
+        return made
+    like = next(c["command"] for o, c in build.commands.items() if "/cpp/tests/" in o)
+    flags = shlex.split(like.replace(str(build.root / "cpp"), str(build.tree / "cpp")))
+    at = flags.index("-o")
+    flags[at : at + 4] = []  # -o object -c source
+    core = [str(path) for name, path in build.objects.items() if "pycraft_core.dir" in name]
+    command = [*flags, "-O1", "-w", "-include", str(build.tree / "cpp/mutants.h"), str(source), *core, "-o", str(made)]
+    run = subprocess.run([*command, "-lquadmath", "-lpthread"], capture_output=True, text=True, cwd=build.root / "build")
+    if run.returncode:
+        raise SystemExit(f"{KERNELS} does not build with the switches:\n{run.stderr[-2000:]}")
+    return made
 
 
 def without_overlaps(mutants):

@@ -26,9 +26,65 @@ DOZEN_TESTS = [
     "test_methods.py",
 ]
 
+# Whose tests are to notice a change of these sources: they are tried first.
+AREAS = {
+    "cpp/algebra/source.cpp": ["test_stale_numbers.py"],
+    "cpp/dynamics/workspace_pool.h": ["test_stale_numbers.py"],
+    "cpp/model/multibody.cpp": ["test_stale_numbers.py", "test_arguments.py"],
+    "cpp/algebra/engine.cpp": ["test_stale_numbers.py", "test_eliminations.py", "test_singular_forms.py"],
+    "cpp/algebra/workspace.h": ["test_eliminations.py", "test_refinement.py"],
+    "cpp/algebra/elimination_solve.h": ["test_eliminations.py", "test_units.py", "test_batches.py"],
+    "cpp/algebra/differentiate.cpp": ["test_calculus_rules.py"],
+    "cpp/operators/directions.cpp": ["test_calculus_rules.py"],
+    "cpp/dynamics/rigid_dynamics.cpp": ["test_singular_forms.py", "test_refinement.py", "test_galilean.py"],
+    "cpp/recursions/point_accelerations.h": ["test_galilean.py"],
+    "cpp/operators/rigid_blocks.h": ["test_singular_hinges.py", "test_refinement_rounding.py"],
+    "cpp/algebra/refinement.h": ["test_refinement.py", "test_refinement_rounding.py"],
+    "cpp/algebra/plan_diagonals.cpp": ["test_whole_inverse.py", "test_operators_algebra.py"],
+    "cpp/algebra/plan_vectors.cpp": ["test_plans.py", "test_operators_algebra.py", "test_refinement_rounding.py"],
+    "cpp/dynamics/methods.cpp": ["test_methods.py"],
+    "cpp/dynamics/trajectory.cpp": ["test_trajectory_steps.py", "test_integration.py"],
+    "cpp/dynamics/packed_dynamics.cpp": ["test_packs.py"],
+    "cpp/model/checks.cpp": ["test_arguments.py", "test_errors_models.py"],
+    "cpp/bindings/conversions.cpp": ["test_arguments.py"],
+    "cpp/bindings/direct_calls.h": ["test_overlaps.py"],
+    "cpp/algebra/interrupt.cpp": ["test_interrupts.py"],
+    "pycraft/identities/report.py": ["test_failing_reports.py", "test_judge.py", "test_terminal.py"],
+    "pycraft/identities/judge.py": ["test_judge.py"],
+    "pycraft/identities/checker.py": ["test_judge.py", "test_failing_reports.py"],
+    "pycraft/identities/bounds.py": ["test_judge.py"],
+    "pycraft/identities/book.py": ["test_readings.py"],
+    "pycraft/identities/parse.py": ["test_readings.py", "test_statements.py"],
+    "pycraft/identities/spelling.py": ["test_spellings.py", "test_readings.py"],
+    "pycraft/identities/truth.py": ["test_truth.py", "test_statements.py"],
+    "pycraft/identities/family.py": ["test_truth.py"],
+    "pycraft/identities/search.py": ["test_statements.py", "test_truth.py"],
+    "pycraft/identities/edits.py": ["test_repair.py"],
+    "pycraft/identities/paper.py": ["test_paper.py"],
+    "pycraft/symbolic/repair.py": ["test_repair.py"],
+    "pycraft/symbolic/worksheet.py": ["test_worksheet.py", "test_exercise.py"],
+    "pycraft/symbolic/presuppositions.py": ["test_prove_presuppositions.py", "test_prove_assumptions.py"],
+    "pycraft/symbolic/relations.py": ["test_prove_statements.py", "test_prove_assumptions.py", "test_prove_catalogue.py"],
+    "pycraft/interop/compare.py": ["test_compare.py"],
+    "pycraft/interop/twins.py": ["test_compare.py"],
+    "pycraft/models/rotations.py": ["test_urdf.py", "test_mjcf.py"],
+    "pycraft/models/xml_file.py": ["test_loaders_hostile.py", "test_urdf.py"],
+    "pycraft/bench.py": ["test_cli_options.py"],
+    "pycraft/cli.py": ["test_cli_options.py"],
+}
+
 # (file, change, part of the line): why no test can tell.
 EQUIVALENT = {
-    ("cpp/recursions/configuration_rate.h", "quaternions lose their length in a move", ""): "to rounding the same: sqrt(had / has) is 1",
+    (
+        "cpp/operators/rigid_blocks.h",
+        "pivot bound without its J",
+        "",
+    ): "a pivot is no smaller than its share of J: eps of that decides nothing",
+    (
+        "cpp/algebra/elimination_solve.h",
+        "a refinement of an elimination need only shrink",
+        "",
+    ): "corrections of rounding more, no digit else",
     ("pycraft/identities/book.py", "a sign bound to the whole sum", ""): "every term but the first has its sign before it",
 }
 

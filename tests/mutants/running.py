@@ -2,6 +2,7 @@
 
 import concurrent.futures
 import hashlib
+import itertools
 import json
 import os
 import pathlib
@@ -11,9 +12,8 @@ import sys
 import time
 
 from . import building
-from .known import DOZEN_TESTS
+from .known import AREAS, DOZEN_TESTS
 
-FIRST = 30  # tests of the first attempt: the quickest that touch a mutant
 SKIPPED_FILES = {"test_notebooks.py", "test_stubs.py", "test_cpp_users.py", "test_mutation.py", "test_layers.py"}
 RUN = """
 import sys
@@ -36,13 +36,17 @@ def contents(root, *patterns):
 
 def kept_or_built(root, options, mutants, show):
     """The test build of these sources and mutants; Python and tests are those of now."""
-    key = digest(contents(root, "cpp/**/*.h", "cpp/**/*.cpp"), [m.key for m in mutants], options.optimisation)
+    core = [
+        f"cpp/{folder.name}/**/*.{kind}" for folder in sorted((root / "cpp").iterdir()) if folder.name != "tests" for kind in ("h", "cpp")
+    ]
+    key = digest(contents(root, *core), [m.key for m in mutants], options.optimisation)
     folder = options.folder / f"{'dozen' if options.dozen else 'build'}-{key}"
     kept = folder / "build.pickle"
     if kept.exists():
         with open(kept, "rb") as file:
             build = pickle.load(file)
         building.copy_of_tree(root, build.tree)
+        build.write()
         return build
     begin = time.perf_counter()
     build = building.TestBuild(root, folder, mutants, options.jobs, options.optimisation, show)
@@ -106,38 +110,72 @@ def touching(mutant, number, touched):
     return list(of_file) or touched["everything"]
 
 
+def passes(program, **environment):
+    try:
+        return subprocess.run([program], env=os.environ | environment, capture_output=True, timeout=60).returncode == 0
+    except subprocess.TimeoutExpired:
+        return False
+
+
 def tried(build, mutants, numbers, notes, options, show):
-    """Mutant's key -> verdict, the test that killed it, tests that ran, seconds."""
+    """Mutant's key -> verdict, the test that killed it, tests that ran, seconds. C++ meets the tests of its kernels first."""
+    kernels = building.kernels(build)
+    if not passes(kernels):
+        show(f"red without any mutant: {building.KERNELS}")
+        kernels = None
+    python = contents(build.tree, "pycraft/**/*.py")
     touched = {"everything": list(notes)}
     for name, t in notes.items():
         for place in t["touched"]:
             touched.setdefault(place, []).append(name)
+    # A test that touches little is about what it touches.
+    price = {name: (t["seconds"] + 0.02) * len(t["touched"]) for name, t in notes.items()}
     kills, results = {}, {}
+    kept = build.folder / "killed.json"
+    killed = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else {}
+
+    def digest_of(by):
+        """Of the source and of the file of the test that killed: while they stay a mutant is not tried again."""
+        test = build.tree / by.split("::")[0]
+        return digest(python, test.read_bytes() if test.is_file() else b"")
 
     def one(mutant):
+        before = killed.get(mutant.key)
+        if before and before["digest"] == digest_of(before["by"]):
+            return before
+        found = attempt(mutant)
+        if found["verdict"] == "killed" and found["by"] != "no end":
+            killed[mutant.key] = found | {"digest": digest_of(found["by"])}
+        return found
+
+    def affordable(tests):
+        """As many as the budget takes, from the first on."""
+        seconds = list(itertools.accumulate(notes[name]["seconds"] for name in tests))
+        return tests[: max(1, sum(t <= options.budget for t in seconds))]
+
+    def attempt(mutant):
+        if kernels and not mutant.python and not passes(kernels, PYCRAFT_MUTANT=str(numbers[mutant.key])):
+            return {"verdict": "killed", "by": building.KERNELS, "tests": 1, "seconds": 0.1}
         tests = touching(mutant, numbers.get(mutant.key), touched)
         if not tests:
             return {"verdict": "not executed", "by": "", "tests": 0, "seconds": 0.0}
-        tests = sorted(tests, key=lambda name: (notes[name]["seconds"] + 0.02) / (1 + kills.get(name, 0)))
-        total, within = 0.0, []
-        for name in tests:
-            total += notes[name]["seconds"]
-            if total > options.budget:
-                break
-            within.append(name)
-        within = within or tests[:1]
+        tests = sorted(tests, key=lambda name: price[name] / (1 + kills.get(name, 0)))
+        area = {f"tests/{name}" for name in AREAS.get(mutant.file, ())}
+        own = affordable([name for name in tests if name.split("::")[0] in area])
+        others = affordable([name for name in tests if name not in own])
+        within = own + others
         environment = (
             {"PYCRAFT_MUTANT_SOURCE": f"{mutant.file}:{mutant.begin}:{mutant.end}:{mutant.after}"}
             if mutant.python
             else {"PYCRAFT_MUTANT": str(numbers[mutant.key])}
         )
         begin = time.perf_counter()
-        for part in (within[:FIRST], within[FIRST:]):
+        for part in (own, others):
             if not part:
                 continue
             arguments = pathlib.Path(build.folder / f"{mutant.key}.tests")
             arguments.write_text("\n".join(part), encoding="utf-8")
-            status, output = pytest_run(build, ["-x", f"@{arguments}"], 5 * options.budget + 60, **environment)
+            status, output = pytest_run(build, ["-x", f"@{arguments}"], 6 * options.budget + 240, **environment)
             if status:
                 red = next((line for line in output.splitlines() if line.startswith(("FAILED", "ERROR"))), "")
                 by = red.split(" - ")[0].removeprefix("FAILED ").removeprefix("ERROR ") or (
@@ -151,5 +189,6 @@ def tried(build, mutants, numbers, notes, options, show):
     with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
         for mutant, result in zip(mutants, pool.map(one, mutants), strict=True):
             results[mutant.key] = result
+            kept.write_text(json.dumps(dict(killed)), encoding="utf-8")
             show(f"{result['verdict']:<13} {mutant.file}:{mutant.line} {mutant.change}  [{result['by']}] ({result['seconds']:.0f} s)")
     return results

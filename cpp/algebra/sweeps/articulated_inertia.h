@@ -21,7 +21,10 @@ void articulated_inertia_tip_to_base(const SkoStructure& tree, Blocks& blocks) {
   bool doubtful = false;
   blocks.keep_inertias = true;
   blocks.with_bias = false;
-  for (int k = 0; k < tree.bodies(); ++k) blocks.start_articulated(k);
+  for (int k = 0; k < tree.bodies(); ++k) {
+    check_interrupt_at(k);
+    blocks.start_articulated(k);
+  }
   for (int k = tree.bodies() - 1; k >= 0; --k) {
     check_interrupt_at(k);
     const Pivots found = blocks.eliminate_hinge(k);

@@ -22,6 +22,7 @@
 
 #include "algebra/arithmetic.h"
 #include "algebra/errors.h"
+#include "algebra/interrupt.h"
 #include "algebra/structure.h"
 #include "spatial/scalar.h"
 
@@ -51,7 +52,7 @@ enum class Pivots { sound, doubtful, not_positive };
                            tree.dof_offset[k] + coordinate);
 }
 
-// (j + 1) Σ_i w(i)² squares(i), w = (-D₁₁⁻¹ D₁ⱼ, 1) for D = L L*; w: n numbers of scratch.
+// (j + 1) Σ_i w(i)² squares(i), w = (-D₁₁⁻¹ D₁ⱼ, 1) for D = L d L*, L with a unit diagonal; w: n numbers of scratch.
 template <class S>
 inline S pivot_reach(const S* L, int n, int j, const S* squares, S* w) {
   S sum = squares[j];
@@ -59,13 +60,13 @@ inline S pivot_reach(const S* L, int n, int j, const S* squares, S* w) {
     const int i = j - back;
     S solved = -L[j * n + i];
     for (int a = i + 1; a < j; ++a) solved -= L[a * n + i] * w[a];
-    w[i] = solved / L[i * n + i];
+    w[i] = solved;
     sum += w[i] * w[i] * squares[i];
   }
   return S(j + 1) * sum;
 }
 
-// Throws unless every pivot of body k's D = L L* stands out of its rounding. squares: x(i)², n numbers, and n more of scratch.
+// Throws unless every pivot of body k's D = L d L* stands out of its rounding. squares: x(i)², n numbers, and n more of scratch.
 template <class S>
 void require_pivots(const SkoStructure& tree, int k, const S* L, const S* pivots, S* squares, Form form) {
   const int n = tree.dof[k];
@@ -97,6 +98,7 @@ template <class Blocks>
 void check_pivots_tip_to_base(const SkoStructure& tree, Blocks& blocks, int last = 0) {
   for (int k = 0; k < tree.bodies(); ++k) blocks.start_error(k);
   for (int k = tree.bodies() - 1; k >= last; --k) {
+    check_interrupt_at(k);
     blocks.check_pivots(k);
     if (tree.parent[k] >= 0) blocks.error_to_parent(k);
   }

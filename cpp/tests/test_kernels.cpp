@@ -1,0 +1,218 @@
+// Small kernels on their own, by what they promise: packs, bounds of pivots, equilibration, small factorizations, moves of a configuration.
+#define BOOST_TEST_MODULE kernels
+#include <boost/test/included/unit_test.hpp>
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "algebra/equilibration.h"
+#include "algebra/gram_factors.h"
+#include "algebra/small_lu.h"
+#include "algebra/sweeps/singular_pivot.h"
+#include "recursions/configuration_rate.h"
+#include "spatial/pack.h"
+#include "robot.h"
+
+using namespace pycraft;
+using pycraft::testing::random_numbers;
+
+namespace {
+
+constexpr double eps = std::numeric_limits<double>::epsilon();
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(a_comparison_of_packs_holds_in_every_lane) {
+  using Four = Pack<double, 4>;
+  for (int lane = 0; lane < 4; ++lane) {
+    Four x(2.0), other(1.0);
+    BOOST_TEST((x > Four(1.0)));
+    BOOST_TEST((other == Four(1.0)));
+    x.v[lane] = 1.0;
+    other.v[lane] = 3.0;
+    BOOST_TEST(!(x > Four(1.0)));
+    BOOST_TEST(!(other == Four(1.0)));
+    x.v[lane] = std::numeric_limits<double>::quiet_NaN();
+    BOOST_TEST(!(x > Four(1.0)));
+  }
+  const Four q = ratio_or_zero(Four(3.0), [] { Four d(2.0); d.v[2] = 0; return d; }());
+  BOOST_TEST((q.v[1] == 1.5 && q.v[2] == 0.0));
+}
+
+// (j + 1) Σ w(i)² x(i)² with w = (-D₁₁⁻¹ D₁ⱼ, 1), solved here by Cramer's rule.
+BOOST_AUTO_TEST_CASE(the_reach_of_a_pivot) {
+  const double L[] = {2, 0, 0, 0.5, 1, 0, -1.5, 0.25, 3};  // D = L L*
+  const double squares[] = {3, 5, 7};
+  double D[9] = {}, work[3];
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      for (int a = 0; a < 3; ++a) D[3 * i + j] += L[3 * i + a] * L[3 * j + a];
+  BOOST_TEST(pivot_reach(L, 3, 0, squares, work) == 3.0);
+  const double w = -D[1] / D[0];
+  BOOST_TEST(std::abs(pivot_reach(L, 3, 1, squares, work) / (2 * (w * w * 3 + 5)) - 1) < 8 * eps);
+  const double det = D[0] * D[4] - D[1] * D[3], u = -(D[2] * D[4] - D[1] * D[5]) / det, v = -(D[0] * D[5] - D[3] * D[2]) / det;
+  BOOST_TEST(std::abs(pivot_reach(L, 3, 2, squares, work) / (3 * (u * u * 3 + v * v * 5 + 7)) - 1) < 32 * eps);
+}
+
+namespace {
+
+// |a(i,j)| 2^(r(i) + c(j)) < 2 everywhere, and n entries in rows and columns of their own are 1 or more.
+void check_scales(const std::vector<double>& A, int n) {
+  Equilibration scales;
+  std::vector<double> sizes(A);
+  for (double& x : sizes) x = std::abs(x);
+  BOOST_REQUIRE(scales.find(sizes.data(), n));
+  std::vector<std::vector<int>> large(n);
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j) {
+      const double scaled = std::ldexp(sizes[size_t(i) * n + j], scales.row(i) + scales.column(j));
+      BOOST_TEST(scaled < 2);
+      if (scaled >= 1) large[i].push_back(j);
+    }
+  std::vector<int> row_of(n, -1);
+  std::vector<char> seen;
+  const std::function<bool(int)> place = [&](int i) {
+    for (int j : large[i]) {
+      if (seen[j]) continue;
+      seen[j] = 1;
+      if (row_of[j] < 0 || place(row_of[j])) return row_of[j] = i, true;
+    }
+    return false;
+  };
+  int placed = 0;
+  for (int i = 0; i < n; ++i) seen.assign(n, 0), placed += place(i);
+  BOOST_TEST(placed == n);
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(equilibration_bounds_every_entry) {
+  for (int seed = 0; seed < 60; ++seed) {
+    const int n = 2 + seed % 7;
+    std::vector<double> A = random_numbers(n * n, seed), sizes = random_numbers(n * n, seed + 1000), holes = random_numbers(n * n, seed + 2000);
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < n; ++j) {
+        double& a = A[size_t(i) * n + j];
+        a = std::ldexp(a, static_cast<int>(80 * sizes[size_t(i) * n + j]));
+        if (i != j && holes[size_t(i) * n + j] > 0.2) a = 0;  // the diagonal is a matching: there is one
+      }
+    check_scales(A, n);
+  }
+  const std::vector<double> crossed = {1, 1e3, 0, 1e-9, 1, 1e6, 1e12, 0, 1};
+  check_scales(crossed, 3);
+  Equilibration scales;
+  const double singular[] = {1, 2, 0, 3, 4, 0, 5, 6, 0};
+  BOOST_TEST(!scales.find(singular, 3));
+}
+
+namespace {
+
+std::vector<double> times(const std::vector<double>& A, const std::vector<double>& x) {
+  const int n = static_cast<int>(x.size());
+  std::vector<double> y(n, 0.0);
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j) y[i] += A[size_t(i) * n + j] * x[j];
+  return y;
+}
+
+}  // namespace
+
+// Rows and columns times powers of two: every bit of the solution is the one before, times a power of two.
+BOOST_AUTO_TEST_CASE(units_change_no_bit_of_a_small_solve) {
+  for (int seed = 0; seed < 40; ++seed) {
+    const int n = 2 + seed % 6;
+    std::vector<double> A = random_numbers(n * n, seed), b = random_numbers(n, seed + 500);
+    for (int i = 0; i < n; ++i)  // sparse and graded, so that rows are exchanged
+      for (int j = 0; j < n; ++j)
+        if ((i + 2 * j + seed) % 3 == 0 && i != (j + 1) % n) A[size_t(i) * n + j] = i == j ? 0 : std::ldexp(A[size_t(i) * n + j], 20 - 7 * j);
+    const std::vector<double> r = random_numbers(n, seed + 900), c = random_numbers(n, seed + 901);
+    std::vector<double> scaled = A, right = b, work(n);
+    for (int i = 0; i < n; ++i) {
+      right[i] = std::ldexp(b[i], static_cast<int>(60 * r[i]));
+      for (int j = 0; j < n; ++j) scaled[size_t(i) * n + j] = std::ldexp(A[size_t(i) * n + j], static_cast<int>(60 * r[i]) + static_cast<int>(60 * c[j]));
+    }
+    const std::vector<double> whole = A;
+    SmallLU<double> lu, other;
+    BOOST_REQUIRE(lu.factor(A.data(), n, nullptr) == other.factor(scaled.data(), n, nullptr));
+    std::vector<double> x = b, y = right;
+    lu.solve(x.data(), 1, work.data());
+    other.solve(y.data(), 1, work.data());
+    for (int j = 0; j < n; ++j) BOOST_TEST(std::ldexp(y[j], static_cast<int>(60 * c[j])) == x[j]);
+    // The residual is rounding of the largest term, rows taken in their units.
+    const std::vector<double> back = times(whole, x);
+    double size = 0;
+    const auto row = [&](int i, double a) { return std::ldexp(std::abs(a), lu.scales().row(i)); };
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < n; ++j) size = std::max({size, row(i, whole[size_t(i) * n + j] * x[j]), row(i, b[i])});
+    for (int i = 0; i < n; ++i) BOOST_TEST(row(i, back[i] - b[i]) < 100 * n * eps * size);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(rows_are_exchanged_where_a_pivot_is_small) {
+  // Without, nothing of what the last two rows say would be left.
+  std::vector<double> A = {1e-17, 1, 1, 1, 1, 2, 1, 2, 1}, b = {2, 4, 4}, work(3);
+  SmallLU<double> lu;
+  BOOST_REQUIRE(lu.factor(A.data(), 3, nullptr));
+  lu.solve(b.data(), 1, work.data());
+  for (int i = 0; i < 3; ++i) BOOST_TEST(std::abs(b[i] - 1) < 16 * eps);
+  BOOST_TEST(std::abs(lu.determinant().log() - std::log(2.0)) < 4 * eps);  // |1·2 - 0|, but for 1e-17
+}
+
+BOOST_AUTO_TEST_CASE(what_is_left_of_larger_numbers_is_no_pivot) {
+  SmallLU<double> lu;
+  std::vector<double> A = {1, 1, 1, 1 + 2 * eps};
+  BOOST_TEST(!lu.factor(A.data(), 2, nullptr));
+  A = {1, 1, 1, 1 + 1e-12};
+  BOOST_TEST(lu.factor(A.data(), 2, nullptr));
+  A = {1e-16, 0, 0, 1};  // of numbers as large as 1, or of none
+  const double sizes[] = {1, 0, 0, 1};
+  BOOST_TEST(!lu.factor(A.data(), 2, sizes));
+  A = {1e-16, 0, 0, 1};
+  BOOST_TEST(lu.factor(A.data(), 2, nullptr));
+}
+
+BOOST_AUTO_TEST_CASE(factors_of_gram_matrices) {
+  // Läuchli's matrix: X*X = [[1 + e², 1], [1, 1 + e²]] is singular in double, X is not. (X*X)⁻¹ (1, -1)* = (1, -1)*/e².
+  const double e = 1e-9;
+  GramFactors<double> gram;
+  std::vector<double> X = {1, 1, e, 0, 0, e}, x = {1, -1};
+  BOOST_REQUIRE(gram.factor(X, 3, 2));
+  gram.solve(x.data(), 1);
+  BOOST_TEST((std::abs(x[0] * e * e - 1) < 1e-6 && std::abs(x[1] * e * e + 1) < 1e-6));
+  BOOST_TEST(std::abs(gram.determinant().log() - std::log(2 * e * e)) < 1e-6);
+  X = {1, 2, 3, 6, -1, -2};  // the second column is twice the first
+  BOOST_TEST(!gram.factor(X, 3, 2));
+  X = {1, 2};
+  BOOST_TEST(!gram.factor(X, 1, 2));  // fewer rows than columns
+  // Rows of 1e-12 and of 1e12: least squares of the light ones keeps its digits. X = [[h, h], [1, 2], [1, -1]], h large: X*X x = X* b for
+  // b = X (1, -1)* = (0, -1, 2)*.
+  const double h = 1e12;
+  X = {1, 2, h, h, 1, -1};
+  BOOST_REQUIRE(gram.factor(X, 3, 2));
+  x = {-1 + 2, -2 - 2};
+  gram.solve(x.data(), 1);
+  BOOST_TEST((std::abs(x[0] - 1) < 1e-3 && std::abs(x[1] + 1) < 1e-3), x[0] << ", " << x[1]);
+  const double determinant = std::pow(1.0 - 2, 2) * h * h + 2 * 2 * h * h + 9;  // Σ of squared minors: (1,h), (h,1), (1,1)
+  BOOST_TEST(std::abs(gram.determinant().log() - std::log(determinant)) < 1e-13);
+}
+
+// A move is a product of quaternions: |q| is kept, whatever it is.
+BOOST_AUTO_TEST_CASE(moves_keep_the_length_of_quaternions) {
+  CompiledModel<double> model;
+  model.subhinges.resize(1);
+  for (const SubhingeKind kind : {SubhingeKind::ball, SubhingeKind::free}) {
+    model.subhinges[0].kind = kind;
+    for (const double length : {1e-3, 1.0, 3.0, 1e160}) {
+      std::vector<double> q = {0.5, -0.5, 0.1, 0.7, 0, 0, 0};
+      const double own = std::sqrt(0.25 + 0.25 + 0.01 + 0.49);
+      for (int i = 0; i < 4; ++i) q[i] *= length / own;
+      for (int step = 0; step < 50; ++step) {
+        const std::vector<double> u = random_numbers(6, step);
+        move_configuration(model, q.data(), u.data(), q.data());
+      }
+      double squares = 0;
+      for (int i = 0; i < 4; ++i) squares += (q[i] / length) * (q[i] / length);
+      if (kind == SubhingeKind::ball || length < 1e100) BOOST_TEST(std::abs(std::sqrt(squares) - 1) < 50 * 4 * eps);
+    }
+  }
+}

@@ -1,0 +1,33 @@
+"""What the campaigns have in common as commands."""
+
+import argparse
+
+
+def seeds(document, count, first=True):
+    """The seeds that the command line asks for, `count` of them where it does not."""
+    parser = argparse.ArgumentParser(description=document, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seeds", type=int, default=count)
+    if first:
+        parser.add_argument("--first", type=int, default=0)
+    given = parser.parse_args()
+    begin = given.first if first else 0
+    return range(begin, begin + given.seeds)
+
+
+def tallied(seeds, each, words):
+    """Run `each(seed)`, (how many comparisons, what is wrong, line by line), show it, and sum up; the exit status."""
+    compared, wrong = 0, []
+    for seed in seeds:
+        count, lines = each(seed)
+        compared += count
+        wrong += lines
+        for line in lines:
+            print(line, flush=True)
+    print(f"{compared} {words}, {len(wrong)} wrong")
+    return 1 if wrong else 0
+
+
+def listed(wrong, most=40):
+    """Show what is wrong; the exit status."""
+    print("\n".join(wrong[:most]))
+    return f"{len(wrong)} wrong" if wrong else 0

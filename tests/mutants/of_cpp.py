@@ -1,0 +1,164 @@
+"""Changes of C++ by hand: file -> (name, what stands there, what is put there), and STATEMENT where they are statements."""
+
+STATEMENT = "statement"
+
+CHANGES = {
+    "cpp/spatial/pack.h": [
+        (
+            "a comparison of packs holds where any lane holds",
+            "all &= f(a.v[i], b.v[i]);",
+            "{ if (i == 0) all = false; all |= f(a.v[i], b.v[i]); }",
+            STATEMENT,
+        ),
+    ],
+    "cpp/algebra/source.cpp": [
+        ("stale numbers of the present state", "c.parameters != version", "false"),
+        ("stale numbers of a bound state", "entry->parameters != source->parameters()", "false"),
+    ],
+    "cpp/dynamics/workspace_pool.h": [("stale workspaces of direct calls", "version_ != model.parameters()", "version_ == 0")],
+    "cpp/model/multibody.cpp": [
+        ("compiled models outlive a parameter", "kept->parameters != parameters_", "false"),
+        ("a mass is no new version", "bodies_[k].inertia = inertia;\n  ++parameters_;", "bodies_[k].inertia = inertia;", STATEMENT),
+        (
+            "a placement is no new version",
+            "bodies_[k].hinge.placement = checked;\n  ++parameters_;",
+            "bodies_[k].hinge.placement = checked;",
+            STATEMENT,
+        ),
+        (
+            "a rotor inertia is no new version",
+            "bodies_[k].hinge.rotor_inertia = std::move(checked);\n  ++parameters_;",
+            "bodies_[k].hinge.rotor_inertia = std::move(checked);",
+            STATEMENT,
+        ),
+        ("gravity is no new version", "gravity_ = g;\n  ++parameters_;", "gravity_ = g;", STATEMENT),
+        ("limits are not checked when set", "check_limits(body(k).hinge, lower, upper);", ";", STATEMENT),
+    ],
+    "cpp/algebra/engine.cpp": [
+        ("plans for J = 0 kept", "plan_->contexts[c].source->traits().hinge_diagonal != plan_->hinge_diagonal[c]", "false"),
+        (
+            "only the first model of a plan is looked at",
+            "plan_->contexts[c].source->check_current();",
+            "if (c > 0) return true;",
+            STATEMENT,
+        ),
+        (
+            "blocks of a batch are those of its first state",
+            "fresh |= w.generations[c] != values[c]->generation();",
+            "fresh |= b == 0;",
+            STATEMENT,
+        ),
+        ("a workspace keeps the number of its first state", "w.state = b;", ";", STATEMENT),
+        ("what is out of range is returned", "in_range &= std::isfinite(result.values[at]);", ";", STATEMENT),
+    ],
+    "cpp/algebra/workspace.h": [
+        ("wider values of the state before", "if (now == followed_) return;", "if (!followed_.empty()) return;", STATEMENT),
+        ("indefinite blocks have a root", "pivot < -bound", "false"),
+    ],
+    "cpp/algebra/differentiate.cpp": [
+        ("∂P without G ∂J G*", "times({o.G, run(o.J), o.G.T()})", "zero(o.M.domain(), o.M.codomain())"),
+        ("∂ blockdiag(AXA*) as if X were symmetric", "times({bar, e, star(F)})", "star(times({F, e, star(bar)}))"),
+    ],
+    "cpp/operators/directions.cpp": [("a coordinate moves its own twist", "own.slot < at.slot) terms", "own.slot <= at.slot) terms")],
+    "cpp/dynamics/rigid_dynamics.cpp": [
+        ("minimum norm refined without the added inertia", "r[j] += inertia * x[j];", "(void)inertia;", STATEMENT),
+        ("projected once", "pass < 2", "pass < 1"),
+        (
+            "the wider residual rounded first",
+            "wider_->residual(tau, wide_x_.data(), wide_r_.data());",
+            "residual(tau, x, r); for (int i = 0; i < n; ++i) wide_r_[i] = Wider<S>(r[i]);",
+            STATEMENT,
+        ),
+        (
+            "the triangles of an inverse are left as they are",
+            "out[size_t(i) * N + j] = out[size_t(j) * N + i] = S(0.5) * (out[size_t(i) * N + j] + out[size_t(j) * N + i]);",
+            ";",
+            STATEMENT,
+        ),
+        ("a mass is carried without its place", "moment + carried[k].mass * X.p;", "moment;"),
+    ],
+    "cpp/recursions/point_accelerations.h": [
+        ("a hinge's own terms are never absorbed", "own == OwnTerms::absorbed && t[0] >= 0", "own != own && t[0] >= 0"),
+    ],
+    "cpp/algebra/sweeps/singular_pivot.h": [("pivot bound without its (j + 1)", "return S(j + 1) * sum;", "return sum;", STATEMENT)],
+    "cpp/operators/rigid_blocks.h": [
+        ("pivot bound without its J", "dot(H[j], X_[k] * H[j]) + J[j]", "dot(H[j], X_[k] * H[j])"),
+        ("rounding of a rotor's forces not counted", "J[j] * abs(x[(j - first(k)) * m + c])", "S(0)"),
+    ],
+    "cpp/algebra/elimination_solve.h": [
+        ("elimination with one refinement", "step < std::max(asked, 4)", "step < 1"),
+        ("digits lost by the elimination ignored", "growth_ <= tolerated", "true"),
+        (
+            "fronts are not brought to one scale",
+            "shift_[part] = a != none && o != none ? (o - a) >> 1 : o != none ? o : a != none ? -a : 0;",
+            "shift_[part] = 0;",
+        ),
+        ("units are not those of the solution", "unit_[i] += size;", ";", STATEMENT),
+        (
+            "what the last state merged stays merged",
+            "std::fill(merged_with_parent_.begin(), merged_with_parent_.end(), 0);",
+            ";",
+            STATEMENT,
+        ),
+        ("a refinement of an elimination need only shrink", "correction < last / S(2)", "correction < last"),
+    ],
+    "cpp/algebra/small_lu.h": [
+        ("rows are not exchanged", "S(0.1) * largest", "S(0) * largest"),
+        ("no pivot of an elimination is noise", "S(4 * n) * epsilon<S>() * column_[k]", "S(0)"),
+        ("noise is judged by what is left", "sizes ? sizes[i] : S(0)", "S(0)"),
+    ],
+    "cpp/algebra/equilibration.cpp": [
+        ("rows have no scale of their own", "row_[k] = -by_column_[f].exponent - column_[j];", "row_[k] = 0;", STATEMENT),
+        ("a longer path leaves the scales as they are", "v_[j] -= base - distance_[j];", ";", STATEMENT),
+    ],
+    "cpp/algebra/gram_factors.h": [
+        ("rows heaviest last", "return largest[a] > largest[b];", "return largest[a] < largest[b];", STATEMENT),
+        ("a dependent column is taken", "norm > S(16 * rows) * epsilon<S>() * S(sqrt(S(whole + below)))", "norm > S(0)"),
+        ("the factors' diagonal keeps its sign", "head < S(0) ? norm : S(-norm)", "norm"),
+    ],
+    "cpp/algebra/plan_diagonals.cpp": [
+        ("ln det of HφMφ*H* is that of D whatever J", "!model.source->traits().hinge_diagonal", "true"),
+        (
+            "ln det of a multiple of n dimensions as of one",
+            "e.domain().dimension() * std::log(std::abs(e.node().coefficient))",
+            "std::log(std::abs(e.node().coefficient))",
+        ),
+        ("the diagonal of any product is that of its factors", "if (!each) return std::nullopt;", ";", STATEMENT),
+    ],
+    "cpp/algebra/plan_vectors.cpp": [
+        ("a multiple of J is J", "b.coefficient != a.coefficient", "false"),
+        ("a solve that is refined is gathered by ψ", "h->binding && h->binding->arithmetic.refinement.steps != 0", "false"),
+    ],
+    "cpp/dynamics/methods.cpp": [
+        (
+            "conjugate gradients never refuse",
+            "gradients_.residual < sqrt(epsilon<S>()) && gradients_.condition < widest",
+            "true",
+        ),
+    ],
+    "cpp/recursions/configuration_rate.h": [
+        ("a move makes unit quaternions", "out[0] = to.w", "out[0] = to.w / sqrt(to.w * to.w + to.x * to.x + to.y * to.y + to.z * to.z)"),
+    ],
+    "cpp/dynamics/trajectory.cpp": [
+        ("the step after a cut step is the cut one", "cut && abs(tried) < abs(h) ? h : tried", "tried"),
+        ("lengths of quaternions walk", "scale_quaternions<S>(equations_.model(), lengths_.data(), x_.data());", ";", STATEMENT),
+    ],
+    "cpp/dynamics/packed_dynamics.cpp": [("a batch returns its first state's rows", "from[b * stride + i]", "from[i]")],
+    "cpp/model/checks.cpp": [
+        ("a rotation of two digits is taken", "off <= given_digits", "off <= 1e-2"),
+        ("a reflection is a rotation", "determinant(pose.R) < 0", "false"),
+        ("a rotation of seven digits is left so", "off <= rounding", "off <= given_digits"),
+        ("limits the wrong way round", "lower[i] > upper[i]", "false"),
+        ("a negative rotor inertia", "!(j >= 0) || !std::isfinite(j)", "!std::isfinite(j)"),
+        ("a triangle inequality of three digits", "violation <= 1e-9 * largest + printed", "violation <= 1e-3 * largest + printed"),
+    ],
+    "cpp/bindings/conversions.cpp": [
+        ("an inertia of three digits' symmetry", "1e-9 * largest", "1e-3 * largest"),
+        ("complex entries of lists lose their imaginary part", "if (PyComplex_Check(item.ptr())) return complex_numbers;", ";", STATEMENT),
+        ("a masked entry is read", 'why = "has masked entries";\n    return Array();', ";", STATEMENT),
+    ],
+    "cpp/bindings/direct_calls.h": [
+        ("only what begins where the result begins is copied", "from >= to + out.size() || to >= from + a.array.size()", "from != to"),
+    ],
+    "cpp/algebra/interrupt.cpp": [("signals are looked at once a minute", "now - last < pause", "now - last < 1000 * pause")],
+}

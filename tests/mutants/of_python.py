@@ -1,0 +1,190 @@
+"""Changes of Python by hand: file -> (name, what stands there, what is put there)."""
+
+CHANGES = {
+    "pycraft/identities/report.py": [
+        ("a report counts what fails as passed", 'PASSED = ("holds", ', 'PASSED = ("fails", "holds", '),
+        ("a report is always true", "        return not self.failed\n", "        return True\n"),
+        ("undecided reports end with 0", "return 1 if self.failed else 3 if self.undecided else 0", "return 1 if self.failed else 0"),
+        ("what is wrong comes last", '(verdict not in OPEN, verdict == "waiting"', '(verdict in OPEN, verdict == "waiting"'),
+    ],
+    "pycraft/identities/judge.py": [
+        ("undecided at a bound of 1", "DECIDES = 1e-12", "DECIDES = 1.0"),
+        ("the residual need not fall", " and falls[-1] and (", " and ("),
+        ("any bound explains a residual", "explained = wide.residual <= wide.bound", "explained = True"),
+        ("the fall of what holds is not its bound", "found.verdict == HOLDS and found.decisive.bound > DECIDES", "False"),
+        ("what stays need not stay", "STAYS = 0.5", "STAYS = 0.0"),
+        ("two falls running decide", "RUNNING = 3", "RUNNING = 2"),
+        (
+            "norms of double are always trusted",
+            "trusted = made is not None and made.bound(",
+            "trusted = made is not None and 0 * made.bound(",
+        ),
+        ("what has terms vanishes", "vanishing = made.terms == 0 and self._sides_fall()", "vanishing = self._sides_fall()"),
+        ("sides always fall", "return after <= SCATTER * EPSILON[wide] / EPSILON[narrow] * before", "return True"),
+        (
+            "undecided beside failing is undecided",
+            "FAILS if FAILS in found else UNDECIDED if UNDECIDED in found else HOLDS",
+            "UNDECIDED if UNDECIDED in found else FAILS if FAILS in found else HOLDS",
+        ),
+        ("the narrowest scalar is shown", "(-j.decisive.epsilon, _order", "(j.decisive.epsilon, _order"),
+        ("amplification is not counted", "max(SCATTER * seen, CONSTANT * amplified)", "SCATTER * seen"),
+        ("a fall may scatter by 64000", "SCATTER = 64.0", "SCATTER = 64000.0"),
+    ],
+    "pycraft/cli.py": [
+        ("check --json without its seed", "states=states, seed=seed, precision=wide, progress", "states=states, precision=wide, progress"),
+        ("bench exits with 0", "raise typer.Exit(1 if missed else 0)", "raise typer.Exit(0)"),
+        ("--mimic ignored", 'root=root or "fixed", mimic=mimic', 'root=root or "fixed", mimic="lock"'),
+        ("--root ignored", 'root=root or "fixed", mimic=mimic', 'root="fixed", mimic=mimic'),
+        ("stability --no-peers ignored", "cases=chosen, peers=peers", "cases=chosen, peers=True"),
+        ("stability --seeds ignored", "hard.run(seeds, steps", "hard.run(1, steps"),
+        ("peers --seed ignored", "compare_all(states, seed,", "compare_all(states, 0,"),
+        ("accuracy --seed ignored", "                    seed=seed,\n", "                    seed=0,\n"),
+    ],
+    "pycraft/bench.py": [
+        ("bench loses its bounds", "self.bound is None or self.value <= self.bound", "True"),
+    ],
+    "pycraft/identities/book.py": [
+        ("a divisor as a factor", "value / divisor", "value * divisor"),
+        ("a sign bound to the whole sum", "negative = False\n        return total", "pass\n        return total"),
+        ("a fraction read upside down", "float(parts[0]) / float(parts[1])", "float(parts[1]) / float(parts[0])"),
+        ("a star that does not transpose", "return lambda x: x.T", "return lambda x: x"),
+    ],
+    "pycraft/models/rotations.py": [
+        ("a quaternion's rotation with a sign wrong", "[1 - 2 * (y * y + z * z)", "[1 + 2 * (y * y + z * z)"),
+        ("an inertia turned the other way", "rotation @ inertia @ rotation.T", "rotation.T @ inertia @ rotation"),
+    ],
+    "pycraft/identities/checker.py": [
+        (
+            "what is undefined is expected to fail",
+            '"expected to fail" if unmet else "undefined", str(error)',
+            '"expected to fail", str(error)',
+        ),
+        ("double beside double", "if precision not in wide:", "if False:"),
+        (
+            "theorems are not checked at the present state",
+            "[None] if model is None else [_present(model), *(",
+            "[None] if model is None else [*(",
+        ),
+        ("the seed of random trees ignored", "seed=spec.seed + seed", "seed=spec.seed"),
+    ],
+    "pycraft/identities/bounds.py": [
+        (
+            "factors of a product are not counted",
+            "return len(children) * max(self._step(children, i) for i in range(len(children)))",
+            "return max(self._step(children, i) for i in range(len(children)))",
+        ),
+        ("norms of other vectors", "if vectors != self._vectors:", "if False:"),
+    ],
+    "pycraft/identities/parse.py": [
+        ("of two readings the first", "if len(found) == 2 and not (", "if False and not ("),
+        (
+            "readings differ by where a number stands",
+            "return a == b or _unscaled(a) == _unscaled(b) and _core.equal_by_theorems(a, b)",
+            "return a == b",
+        ),
+    ],
+    "pycraft/identities/spelling.py": [
+        ("an inverse transpose is an inverse", '" ^-1^* "', '" ^-1 "'),
+        ("accents move the caret", "sum(not unicodedata.combining(c) for c in self.typed[begin:origin])", "origin - begin"),
+        ("powers of ten upside down", 'r"\\1e\\2"', 'r"\\1e-\\2"'),
+    ],
+    "pycraft/identities/truth.py": [
+        (
+            "hypotheses do not imply each other",
+            "any(smaller <= implied(chosen) for smaller in found)",
+            "any(smaller <= chosen for smaller in found)",
+        ),
+        ("saved by what the model meets", "if chosen and not chosen <= met", "if chosen"),
+        ("deep models of twelve bodies", "return min(max(12, deepest + 2), 40)", "return 12"),
+        ("true where nothing was said", " and any(c.verdict == TRUE for c in self.cells)\n", "\n"),
+        ("the counterexample need not meet the hypotheses", "[c for c in false if STRICTEST <= c.cell.least] or ", ""),
+        ("undecided cells are true", "UNDECIDED if UNDECIDED in found else TRUE", "TRUE"),
+    ],
+    "pycraft/identities/family.py": [
+        ("no welds in the family", 'kinds[-2] = "weld"', "pass"),
+        ("no gravity in the family", "model.gravity = rng.uniform(1, 10, 3) * rng.choice([-1, 1], 3)", "pass"),
+        ("nodes at the bodies' origins", "position=rng.uniform(-1, 1, 3)", "position=(0, 0, 0)"),
+    ],
+    "pycraft/identities/edits.py": [
+        ("missing and too many exchanged", "star {'too many' if had else 'missing'}", "star {'missing' if had else 'too many'}"),
+        ("numbers are not turned over", "product(Number(1 / factor.value), *rest)", "product(Number(factor.value), *rest)"),
+        ("changes at several places come first", "cost=slip.cost + 0.25", "cost=slip.cost - 5"),
+    ],
+    "pycraft/symbolic/repair.py": [
+        ("close is a tenth", "_CLOSE = 1e-9", "_CLOSE = 1e-1"),
+        ("one small model is enough", "all(residual(new, other) < _CLOSE for other in models[1:])", "True"),
+        ("hypotheses are not ranked", "r.cost + 0.5 * len(r.where[0])", "r.cost"),
+        ("more repairs than asked for", "    del result.found[most:]\n", ""),
+        ("repairs in any order", "return sorted(near, key=lambda item: item[1].cost), tried", "return near, tried"),
+        ("what is true is repaired", "if own.where:", "if False:"),
+    ],
+    "pycraft/interop/compare.py": [
+        ("gravity is not made the same", "        common.gravity = there\n", ""),
+        ("rotor inertias are not made the same", "            common.hinges[name].rotor_inertia = theirs\n", ""),
+        ("frames of bodies are physical", 'kind != "body frame"', "True"),
+        ("bounds without the condition", '(condition if name == "forward dynamics" else 1)', "1"),
+        ("geometry at one state", "np.abs(frames[-1] - offset).max()", "np.abs(frames[0] - offset).max()"),
+        ("masses to two digits", "1e-9 * max(scale, 1e-300)", "1e-2 * max(scale, 1e-300)"),
+        ("as they are is in common", "(model.forward_dynamics(q, v, u), T @", "(common.forward_dynamics(q, v, u), T @"),
+        (
+            "the last state's difference",
+            "result.in_common[name] = max(result.in_common.get(name, 0.0), _relative(ours(), theirs))",
+            "result.in_common[name] = _relative(ours(), theirs)",
+        ),
+    ],
+    "pycraft/interop/twins.py": [
+        (
+            "armature in the other order",
+            "self.armature[model.hinges[name].v_slice] = hinge.rotor_inertia",
+            "self.armature[other.hinges[name].v_slice] = hinge.rotor_inertia",
+        ),
+        ("inertia seen from the other side", "R @ self.com + p, R @ self.inertia @ R.T", "R @ self.com + p, R.T @ self.inertia @ R"),
+    ],
+    "pycraft/symbolic/worksheet.py": [
+        ("worksheets ignore their seed", 'random.Random(f"{seed} {k}")', 'random.Random(f"{k}")'),
+        ("lines in a row are left out", "abs(line - other) == 1", "False"),
+        ("graded by the file's own questions", "        if sheet is None:\n", "        if True:\n"),
+        ("lines that only name are asked for", "return fit or task.gaps()", "return task.gaps()"),
+        ("the same for every student", 'random.Random(f"{seed} {k}")', 'random.Random(f"{seed}")'),
+    ],
+    "pycraft/identities/paper.py": [
+        ("chains of equalities by their ends", "zip(sides, sides[1:], strict=False)", "[(sides[0], sides[-1])]"),
+        ("comments are read", 're.sub(r"(?<!\\\\)%.*", "", source)', "source"),
+        ("macros of macros are left", "range(1000)", "range(1)"),
+        (
+            "undecided beside failing",
+            '3 if "undecided" in self.counts and "fails" not in self.counts else 1',
+            '3 if "undecided" in self.counts else 1',
+        ),
+        ("a paper of nothing is true", 'any(e.verdict == "holds" for e in self.equations) and not', "not"),
+        ("lines of the display", 'start = line + body.count("\\n", 0, at + begins)', "start = line"),
+        ("rows that begin with a minus stand alone", "[-+=·@]|", "[+=·@]|"),
+    ],
+    "pycraft/symbolic/presuppositions.py": [
+        ("semidefinite is definite", 'kind = "definite" if inverted(center[0]) else "semidefinite"', 'kind = "definite"'),
+        ("a zero diagonal is regular", "return sum(c for word, c in p.items() if ways[word] <= {unit}) != 0", "return True"),
+        ("inverses that exist nowhere", "if found and not any(found):", "if False:"),
+        (
+            "negative terms are definite",
+            "if any(c <= 0 or not signs[word] for word, c in p.items()):",
+            "if any(not signs[word] for word, c in p.items()):",
+        ),
+    ],
+    "pycraft/symbolic/relations.py": [
+        ("compliance along the hinge whatever J", 'for mark in marks if "J = 0" in hypotheses else ():', "for mark in marks:"),
+        ("every constant stands at the base", "    if not _is_zero(X, inner):\n        return\n", ""),
+        ("nodes on several bodies as on one", " or len(symbol_nodes(e)) != 1", ""),
+    ],
+    "pycraft/identities/search.py": [
+        ("one state a model", "STATES = 3", "STATES = 1"),
+        (
+            "children of a body left out",
+            "parents=tuple(p - (p > k) for p in parents)",
+            "parents=tuple(p - (p >= k and p > 0) for p in parents)",
+        ),
+    ],
+    "pycraft/models/xml_file.py": [
+        ("undeclared entities are dropped", 'if "UNDECLARED_ENTITY" in entry.type_name:', "if False:"),
+        ("entities are expanded", "resolve_entities=False", "resolve_entities=True"),
+    ],
+}
