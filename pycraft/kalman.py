@@ -18,7 +18,6 @@ from html import escape
 from typing import Any, TypeVar
 
 import numpy as np
-from scipy.linalg import solve_discrete_lyapunov
 
 from . import _core
 from .bare_trees import sko_model
@@ -451,6 +450,8 @@ def _stationary(A: np.ndarray, noise: np.ndarray) -> np.ndarray:
     """P = APA* + BQB* of a stable model that does not change with time."""
     if A.ndim == 3 or noise.ndim == 3 or np.abs(np.linalg.eigvals(A)).max() >= 1:
         raise _core.ModelError("P0 is needed: only a stable model that does not change with time has a stationary covariance")
+    from scipy.linalg import solve_discrete_lyapunov
+
     return _symmetric(solve_discrete_lyapunov(A, noise))
 
 

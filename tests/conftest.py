@@ -19,7 +19,9 @@ SLOW = {
             and item.callspec.params["name"] not in ("H", "E", "P", "D", "ℳ", "psi", "ℳ⁻¹")
         )
     ),
-    "test_cli": lambda item: item.originalname == "test_tour" and "panda" not in item.nodeid,
+    "test_cli": lambda item: item.originalname == "test_tour",
+    "test_reference": lambda item: any(f"[{name}" in item.nodeid for name in ("every kind", "sequences, rotors")),
+    "test_robots": lambda item: item.originalname == "test_agrees_with_the_oracle" and item.callspec.params["seed"],
     "test_prove": lambda item: item.originalname.startswith(("test_random", "test_nothing_false", "test_what_is_proved_of_perturbed")),
     "test_algorithm": lambda item: "random" in item.originalname or item.name.endswith("-no rotors]"),
     "test_docs": lambda item: item.originalname == "test_the_readme_example_runs",

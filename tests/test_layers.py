@@ -145,6 +145,19 @@ def test_peers_are_not_needed_to_import_the_package():
                 assert not absolute or not any(name.split(".")[0] in PEERS for name in names), f"{path.relative_to(ROOT)}:{node.lineno}"
 
 
+def test_what_takes_long_to_import_is_imported_where_it_is_used():
+    """SciPy, SymPy and Matplotlib are as long in coming as all of the package; every command would wait for them."""
+    for path in modules():
+        if path.name.startswith("reference") or path.relative_to(PYTHON).parts[0] == "symbolic":
+            continue
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        for node in tree.body:
+            named = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+            named += [node.module or ""] if isinstance(node, ast.ImportFrom) and not node.level else []
+            slow = {name.split(".")[0] for name in named} & {"scipy", "sympy", "matplotlib"}
+            assert not slow, f"{path.relative_to(ROOT)}:{node.lineno}"
+
+
 def test_python_imports_point_one_way():
     """models, operators ← identities, and nobody needs the command line."""
     above = {

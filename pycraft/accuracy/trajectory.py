@@ -8,12 +8,11 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from scipy import integrate
 
 from .. import _core
 
-SCIPY = {"RK45": integrate.RK45, "DOP853": integrate.DOP853, "Radau": integrate.Radau, "BDF": integrate.BDF, "LSODA": integrate.LSODA}
-"""SciPy's solvers by name; as integrators they are called "scipy:RK45" and so on."""
+SCIPY = ("RK45", "DOP853", "Radau", "BDF", "LSODA")
+"""SciPy's solvers; as integrators they are called "scipy:RK45" and so on."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +58,8 @@ def integrate_by_scipy(
     q (nq,), v (nv,) at times[0]; times (T,) s; rtol, atol per component of the error of a step; step s, the first one, chosen by the solver
     where it is None. Raises EvaluationError that names the time where the solver gives up or the state is no longer finite.
     """
+    from scipy import integrate
+
     began, nq = perf_counter(), len(q)
     count, steps = 0, 0
 
@@ -77,7 +78,7 @@ def integrate_by_scipy(
         options: dict[str, Any] = {"rtol": rtol, "atol": atol}
         if step is not None:
             options["first_step"] = step
-        run = SCIPY[solver](right_side, times[0], states[0].copy(), times[-1], **options)
+        run = getattr(integrate, solver)(right_side, times[0], states[0].copy(), times[-1], **options)
         direction = np.sign(times[-1] - times[0])
         while done < len(times):
             message = run.step()

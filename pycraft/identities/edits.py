@@ -135,9 +135,15 @@ def _numbers(node: Node) -> Iterator[tuple[Node, Slip]]:
     """Changes of a whole side by a number."""
     if isinstance(node, (Sum, Number)):
         return
-    for value, name in ((Fraction(2), "2"), (Fraction(1, 2), "½"), (Fraction(-1), "-1")):
+    for value, name in (*_scales(node), (Fraction(-1), "-1")):
         slip = Slip(f"sign of {_shown(node)}", 1.0) if value < 0 else Slip(f"factor {name} missing in {_shown(node)}", 2.5)
         yield total([(-1, node)]) if value < 0 else product(Number(value), node), slip
+
+
+def _scales(node: Node) -> tuple[tuple[Fraction, str], ...]:
+    """Numbers that may be missing in a term; none where it has one, which may be one too many."""
+    has_one = isinstance(node, Product) and any(isinstance(f, Number) for f in node.factors)
+    return () if has_one else ((Fraction(2), "2"), (Fraction(1, 2), "½"))
 
 
 def _of_letter(letter: Letter) -> Iterator[tuple[Node, Slip]]:
@@ -181,7 +187,7 @@ def _of_sum(node: Sum) -> Iterator[tuple[Node, Slip]]:
     for i, (sign, term) in enumerate(terms):
         flipped = [*terms[:i], (-sign, term), *terms[i + 1 :]]
         yield total(flipped), Slip(f"sign of {_shown(term)}", 1.0)
-        for value, name in ((Fraction(2), "2"), (Fraction(1, 2), "½")):
+        for value, name in _scales(term):
             scaled = [*terms[:i], (sign, product(Number(value), term)), *terms[i + 1 :]]
             yield total(scaled), Slip(f"factor {name} missing in {_shown(term)}", 2.5)
         if len(terms) > 1:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.sparse.linalg import LinearOperator
 
 from .. import _core
+
+if TYPE_CHECKING:
+    from scipy.sparse.linalg import LinearOperator
 
 
 def to_scipy(operator: _core.Operator) -> LinearOperator:
@@ -23,6 +25,8 @@ def to_scipy(operator: _core.Operator) -> LinearOperator:
     >>> info
     0
     """
+    from scipy.sparse.linalg import LinearOperator
+
     if operator.domain is None:
         raise _core.SpaceError("I has no space yet: combine it with an operator first")
     if operator.batch is not None:
@@ -51,6 +55,8 @@ def from_scipy(linear_operator: Any, domain: _core.Space, codomain: _core.Space,
     shape = (codomain.dimension, domain.dimension)
     if tuple(linear_operator.shape) != shape:
         raise _core.SpaceError(f"{name!r} has shape {tuple(linear_operator.shape)}; from {domain} to {codomain} it takes {shape}")
+    from scipy.sparse.linalg import LinearOperator
+
     if not isinstance(linear_operator, LinearOperator):
         dense = linear_operator.toarray() if hasattr(linear_operator, "toarray") else np.asarray(linear_operator, float)
         return _core.constant(dense, domain, codomain, name)

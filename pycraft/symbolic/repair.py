@@ -92,14 +92,14 @@ class Repairs:
         return f"<p>{escape(self.statement)}{escape(': ' + self.was_true if self.was_true else '')}</p><ol>{items}</ol>"
 
 
-def repair(statement: str, *, most: int = 3, budget: float = 20.0) -> Repairs:
+def repair(statement: str, *, most: int = 3, budget: float = 8.0) -> Repairs:
     """The true formulas nearest to a wrong one: one star, sign, tilde, letter, order, inverse, factor, number or term away.
 
     Parameters
     ----------
     statement : as text; its spaces need not fit. Names are those of random trees: "body0", "hinge0", "node0", ...
     most : formulas at most
-    budget : seconds
+    budget : seconds; three times as many where it found nothing
 
     Returns
     -------
@@ -135,7 +135,7 @@ def repair(statement: str, *, most: int = 3, budget: float = 20.0) -> Repairs:
         pass
     near, result.tried = nearest(formula, models)
     for new, slip in near:
-        if len(result.found) > most + 2 or time.perf_counter() - begin > budget:
+        if len(result.found) > most + 2 or time.perf_counter() - begin > (budget if result.found else 3 * budget):
             break
         source = written_statement(new)
         try:
