@@ -2,6 +2,7 @@
 
 import sys
 
+import numpy as np
 import pytest
 
 import pycraft as pc
@@ -315,3 +316,27 @@ def test_mjcf_without_its_package(tmp_path, monkeypatch):
 def test_mjcf_says_its_root_itself(tmp_path):
     text = text_of(tmp_path / "arm.xml", "<mujoco>\n<worldbody/></mujoco>", root="free")
     assert text == ':1: root="free" is for URDF files; in an MJCF file give the body a <freejoint name="root"/>'
+
+
+def test_how_exact_an_inertia_must_be():
+    """Symmetric to nine digits, or refused; the triangle inequality to nine digits, or warned of."""
+    model = pc.chain(1)
+    body = model.bodies["body0"]
+    askew = np.diag([1.0, 1.0, 1.5])
+    for off, refused in ((1e-6, True), (1e-11, False)):
+        askew[0, 1] = off
+        if refused:
+            with pytest.raises(pc.ModelError, match="is not symmetric"):
+                body.inertia = askew
+        else:
+            body.inertia = askew
+    model.take_warnings()
+    body.inertia = np.diag([1.0, 1.0, 2.0])
+    assert not model.take_warnings()
+    body.inertia = np.diag([1.0, 1.0, 2.0 + 1e-6])
+    assert ["triangle inequality" in str(said) for said in model.take_warnings()] == [True]
+
+
+def test_complex_entries_among_objects_are_refused_as_such():
+    with pytest.raises(pc.ModelError, match="complex"):
+        pc.chain(2).mass_matrix(np.array([0.1, 0.2j], object))

@@ -383,3 +383,27 @@ class At:
     def __getattr__(self, name):
         made = getattr(self._soa, name)
         return made.at(self._q) if isinstance(made, pc.Operator) and name != "I" else made
+
+
+@pytest.mark.parametrize("share", [2.0, 0.5, -1.0])
+def test_a_multiple_of_the_rotors_is_that_multiple(share):
+    """ℳ + J is one kernel; ℳ + cJ is not c = 1."""
+    arm = pc.tree([-1, 0, 0], ["pin", "ball", "slider"], seed=2, rotor_inertia=True)
+    H, phi, M, J = arm.soa("H phi M J")
+    MM = H @ phi @ M @ phi.T @ H.T
+    x = np.linspace(1, 2, arm.nv)
+    expected = MM.dense() @ x + share * (J.dense() @ x)
+    for op in (MM + share * J, share * J + MM, -(-share * J - MM)):
+        assert np.abs(op @ x - expected).max() <= 1e-14 * np.abs(expected).max()
+    assert np.abs((2 * MM + 2 * J) @ x - 2 * (MM + J).dense() @ x).max() <= 1e-13 * np.abs(expected).max()
+
+
+def test_a_solve_that_is_refined_stays_a_solve():
+    """ℳ⁻¹𝒥* goes by ψ where nothing is refined; a correction needs the solve itself."""
+    arm = pc.chain(4)
+    arm.add_node("tool", "body3", position=(1, 0, 0))
+    H, phi, M = arm.soa("H phi M")
+    op = (H @ phi @ M @ phi.T @ H.T).inv() @ arm.soa.Jacobian(["tool"]).T
+    solve = "[I-HψK]* D⁻¹ [I-HψK]"
+    q = arm.random_state(1).q
+    assert solve in str(op.at(q, refine=1).explain()) and solve not in str(op.at(q).explain())

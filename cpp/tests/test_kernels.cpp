@@ -7,6 +7,7 @@
 
 #include "algebra/equilibration.h"
 #include "algebra/gram_factors.h"
+#include "algebra/refinement.h"
 #include "algebra/small_lu.h"
 #include "algebra/sweeps/singular_pivot.h"
 #include "recursions/configuration_rate.h"
@@ -194,6 +195,44 @@ BOOST_AUTO_TEST_CASE(factors_of_gram_matrices) {
   BOOST_TEST((std::abs(x[0] - 1) < 1e-3 && std::abs(x[1] + 1) < 1e-3), x[0] << ", " << x[1]);
   const double determinant = std::pow(1.0 - 2, 2) * h * h + 2 * 2 * h * h + 9;  // Σ of squared minors: (1,h), (h,1), (1,1)
   BOOST_TEST(std::abs(gram.determinant().log() - std::log(determinant)) < 1e-13);
+}
+
+namespace {
+
+// x = b, solved with an error: δ = gain (b - x). What the rounding of the residual may make of δ: `rounding`.
+struct Corrected {
+  double x;
+  size_t corrections;
+};
+Corrected corrected(double x, double b, double gain, double largest = 0, double rounding = 0) {
+  RefinementWork<double> work;
+  refine(&x, 1, 1, Refinement{Refinement::automatic}, Form::fast, largest, [] { return std::string("a number"); },
+         [&](const double* at, double* r) { r[0] = b - at[0]; }, [&](const double* r, double* d) { d[0] = gain * r[0]; },
+         [&](const double*, double* out) { out[0] = rounding; }, work);
+  return {x, work.corrections.size()};
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(corrections_end_where_they_no_longer_halve) {
+  const Corrected slow = corrected(0.9, 1, 0.4), fast = corrected(0.9, 1, 0.6);  // the next is 0.6 of the last, and 0.4
+  BOOST_TEST((slow.corrections == 2 && std::abs(slow.x - 0.94) < 4 * eps), slow.corrections << " " << slow.x);
+  BOOST_TEST((fast.corrections > 10 && std::abs(fast.x - 1) < 1e-8), fast.corrections << " " << fast.x);
+}
+
+BOOST_AUTO_TEST_CASE(a_first_correction_above_three_tenths_is_refused) {
+  BOOST_TEST(corrected(1, 1.29, 1).x == 1.29);
+  BOOST_CHECK_THROW(corrected(1, 1.31, 1), RefinementError);
+  BOOST_CHECK_THROW(corrected(1, 1.8, 1), RefinementError);
+  // Unless it is rounding of terms that cancelled.
+  BOOST_TEST(corrected(1e-16, 3e-16, 1, 1.0).x == 3e-16);
+  BOOST_CHECK_THROW(corrected(1e-16, 3e-16, 1, 1e-4), RefinementError);
+  BOOST_CHECK_THROW(corrected(1e-16, 3e-16, 1), RefinementError);
+}
+
+BOOST_AUTO_TEST_CASE(what_may_be_rounding_is_not_applied) {
+  BOOST_TEST(corrected(1, 1.1, 1, 0, 0.2).x == 1);
+  BOOST_TEST(corrected(1, 1.1, 1, 0, 0.01).x == 1.1);
 }
 
 // A move is a product of quaternions: |q| is kept, whatever it is.

@@ -85,6 +85,13 @@ CHANGES = {
         ("pivot bound without its J", "dot(H[j], X_[k] * H[j]) + J[j]", "dot(H[j], X_[k] * H[j])"),
         ("rounding of a rotor's forces not counted", "J[j] * abs(x[(j - first(k)) * m + c])", "S(0)"),
     ],
+    "cpp/algebra/refinement.h": [
+        ("refinement refuses at 0.9", "S(0.3)", "S(0.9)"),
+        ("refinement goes on while corrections shrink", "length < work.last[c] / S(2)", "length < work.last[c]"),
+        ("what cancelled is not counted", "S(S(1e3) * epsilon<S>() * largest)", "S(0)"),
+        ("corrections of rounding are applied", "length > S(2) * work.rounding[c]", "true"),
+        ("corrections of rounding are applied", "length > work.rounding[c]", "true"),
+    ],
     "cpp/algebra/elimination_solve.h": [
         ("elimination with one refinement", "step < std::max(asked, 4)", "step < 1"),
         ("digits lost by the elimination ignored", "growth_ <= tolerated", "true"),
