@@ -19,14 +19,14 @@ def chain():
 
 
 def test_corrections_go_on_while_they_shrink():
-    """ℳ − λ I beside an eigenvalue, in single: an elimination with two digits, and one correction by residuals in double leaves four."""
+    """ℳ − λ I beside an eigenvalue, in single: an elimination with three digits."""
     arm = chain()
     H, phi, M, I = arm.soa("H phi M I")  # noqa: E741
     MM = H @ phi @ M @ phi.T @ H.T
-    op = (MM - float(np.linalg.eigvalsh(MM.dense())[0]) * (1 + 2.5e-5) * I).inv()
+    op = (MM - float(np.linalg.eigvalsh(MM.dense())[0]) * (1 + 2e-4) * I).inv()
     exact = op.at(arm.q, precision=50) @ X
     errors = {n: relative(op.at(arm.q, precision="single", refine=n, residual="wider") @ X, exact) for n in (0, 1, 3, "auto")}
-    assert errors.pop(0) > 1e-3 and max(errors.values()) <= 2.0**-23, errors
+    assert errors.pop(0) > 1e-4 and max(errors.values()) <= 2.0**-23, errors
 
 
 @pytest.mark.parametrize("share", [1 - 1e-9, 1 - 1e-13, 1 - 4e-16])
@@ -53,8 +53,9 @@ def test_states_that_are_lost_as_a_whole_are_found(ratio, seed):
     N = H @ E @ G
     Z = pc.constant(np.diag(ratio ** np.arange(1.0, 7.0)), D.domain, D.codomain)
     op = (N + N.T + Z).inv()
-    assert np.linalg.cond((N + N.T + Z).dense()) < 100
-    assert relative(op @ X, op.at(arm.q, precision=50) @ X) <= 1e-13
+    condition = np.linalg.cond((N + N.T + Z).dense())
+    assert condition < 2000
+    assert relative(op @ X, op.at(arm.q, precision=50) @ X) <= 8 * np.finfo(float).eps * condition
 
 
 def test_every_state_of_a_batch_has_residuals_of_its_own():

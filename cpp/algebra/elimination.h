@@ -111,6 +111,7 @@ class TreeElimination {
   void join_scales();
   void take_units(const S* solution);
   S lost();                                                // relative error of a solve whose solution is known
+  bool natural_sides_are_solved(S tolerated);              // to a backward error, row by row
   void coarsen();                                          // every other front merged into its parent
   S growth_ = S(0);
   template <class T>
@@ -120,7 +121,13 @@ class TreeElimination {
   void assemble(Blocks&& blocks, Values&& values);
   template <class T, class Blocks>
   void right_hand_side(const T* x, int m, Blocks&& blocks);
-  void subtract_product(const S* s, S* r, int m) const;   // r -= T s
+  template <class Term>
+  void over_products(const S* s, S* r, int m, Term&& term) const;  // term(r(i), T(i,j), s(j)) for every entry of T
+  void subtract_product(const S* s, S* r, int m) const {           // r -= T s
+    over_products(s, r, m, [](S& target, const S& entry, const S& x) { target -= entry * x; });
+  }
+  template <class F>
+  void of_one_kind(int state, F&& visit) const;            // visit(i) of all numbers of one state, over the bodies
   void solve_system(S* b, int m);
   void selected_fronts();                                  // Z(k,k), Z(k,b), Z(b,k) of every front
 
@@ -136,7 +143,7 @@ class TreeElimination {
   std::vector<int> unit_, row_scale_, shift_, over_size_;    // binary exponents of each state's unit and each equation's scale; work
   std::vector<SmallLU<S>> lu_;
   SmallLU<S> border_lu_;
-  std::vector<S> rhs_, residual_, work_, block_, edge_, product_, left_, right_, output_, Z_, z_border_;
+  std::vector<S> rhs_, residual_, probe_, solution_, backward_, work_, block_, edge_, product_, left_, right_, output_, Z_, z_border_;
   std::vector<size_t> z_offset_;
   std::vector<char> merged_with_parent_;
   int failed_ = -1;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 
 #include "algebra/elimination_assembly.h"
 #include "algebra/interrupt.h"
@@ -114,6 +115,18 @@ void TreeElimination<S>::take_units(const S* solution) {
     }
 }
 
+template <class S>
+template <class F>
+void TreeElimination<S>::of_one_kind(int state, F&& visit) const {
+  const Space& space = r_->states[state];
+  for (size_t k = 0; k < state_at_[state].size(); ++k) {
+    const Place p = state_at_[state][k];
+    const size_t first = (p.front < 0 ? total_ : fronts_[p.front].vector) + p.position;
+    const int n = space.belongs_to_bodies() ? space.body_size(static_cast<int>(k)) : space.dimension();
+    for (int i = 0; i < n; ++i) visit(first + i);
+  }
+}
+
 // A solution of natural size in all states, for scattered signs on the right side; then the same once more from the product with it.
 template <class S>
 S TreeElimination<S>::lost() {
@@ -139,6 +152,43 @@ S TreeElimination<S>::lost() {
     if (!(e <= error)) error = e;
   }
   return error;
+}
+
+// What the probe above cannot see: noise that fills a whole state, which the product with it gives back as it is. Each equation's right side
+// is as large as its largest entry, and the residual of the solution, corrected once as every solve is, must be rounding of the row's terms.
+template <class S>
+bool TreeElimination<S>::natural_sides_are_solved(S tolerated) {
+  using std::abs;
+  const size_t size = total_ + border_;
+  const auto largest = [](S& target, const S& entry, const S& x) { target = std::max(target, S(abs(entry * x))); };
+  solution_.assign(size, S(1));
+  probe_.assign(size, S(0));
+  over_products(solution_.data(), probe_.data(), 1, largest);
+  for (size_t i = 0; i < size; ++i) {  // scattered, and no number divides another: of whole ones noise may vanish
+    const std::uint32_t scattered = static_cast<std::uint32_t>(i + 1) * 2654435761u;
+    probe_[i] *= (scattered >> 7 & 1 ? S(1) : S(-1)) / (S(1) + S(scattered) / S(4294967296.0));
+  }
+  solution_ = probe_;
+  solve_system(solution_.data(), 1);
+  residual_ = probe_;
+  subtract_product(solution_.data(), residual_.data(), 1);
+  solve_system(residual_.data(), 1);
+  for (size_t i = 0; i < size; ++i) solution_[i] += residual_[i];
+  residual_ = probe_;
+  subtract_product(solution_.data(), residual_.data(), 1);
+  for (S& b : probe_) b = abs(b);
+  over_products(solution_.data(), probe_.data(), 1, [](S& target, const S& entry, const S& x) { target += abs(entry * x); });
+  // Rows whose own terms are noise: beside the largest of their states at any body.
+  for (size_t j = 0; j < r_->states.size(); ++j) {
+    S most = S(0);
+    of_one_kind(static_cast<int>(j), [&](size_t i) { most = std::max(most, S(abs(solution_[i]))); });
+    of_one_kind(static_cast<int>(j), [&](size_t i) { solution_[i] = most; });
+  }
+  backward_.assign(size, S(0));
+  over_products(solution_.data(), backward_.data(), 1, largest);
+  for (size_t i = 0; i < size; ++i)
+    if (const S r = abs(residual_[i]); r > tolerated * probe_[i] && r > S(1000) * epsilon<S>() * backward_[i]) return false;
+  return true;
 }
 
 template <class S>
@@ -174,9 +224,10 @@ bool TreeElimination<S>::factor(Blocks&& blocks, Values&& values, S tolerated) {
     assemble(blocks, values);
     if (eliminate()) {
       growth_ = lost();
-      if (growth_ <= tolerated) return true;
-      where = "elimination body by body loses " + elimination::digits(growth_) + " digits";
-      if (growth_ <= half) {
+      const bool solved = natural_sides_are_solved(half);
+      if (growth_ <= tolerated && solved) return true;
+      where = "elimination body by body loses " + (growth_ <= tolerated ? "all" : elimination::digits(growth_)) + " digits";
+      if (growth_ <= half && solved) {
         note_ = "digits: " + where;
         return true;
       }
@@ -242,13 +293,14 @@ void TreeElimination<S>::solve_system(S* b, int m) {
 }
 
 template <class S>
-void TreeElimination<S>::subtract_product(const S* s, S* r, int m) const {
+template <class Term>
+void TreeElimination<S>::over_products(const S* s, S* r, int m, Term&& term) const {
   const S* border_s = s + total_ * m;
   S* border_r = r + total_ * m;
   const auto row_product = [&](const S* row, const S* v, int n, S* target) {
     for (int a = 0; a < n; ++a)
       if (!(row[a] == S(0)))
-        for (int c = 0; c < m; ++c) target[c] -= row[a] * v[a * m + c];
+        for (int c = 0; c < m; ++c) term(target[c], row[a], v[a * m + c]);
   };
   for (const Front& f : fronts_) {
     const S* own = s + f.vector * m;
@@ -260,7 +312,7 @@ void TreeElimination<S>::subtract_product(const S* s, S* r, int m) const {
       for (int j = 0; j < across; ++j) {
         if (line[j] == S(0)) continue;
         const S* v = j < f.width() ? s + (fronts_[f.parent].vector + f.columns[j]) * m : border_s + (j - f.width()) * m;
-        for (int c = 0; c < m; ++c) target[c] -= line[j] * v[c];
+        for (int c = 0; c < m; ++c) term(target[c], line[j], v[c]);
       }
     }
     for (int i = 0; i < f.height() + border_; ++i) {
