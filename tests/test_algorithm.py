@@ -455,7 +455,7 @@ def test_the_text_of_a_realization_shows_its_equations_and_their_elimination():
     o, c = letters_and_constants(False)
     text = (o.MM + 0.1 * o.I).inv().op.algorithm().text
     for line in (
-        "s₂(k) - E*(p,k) s₂(p) - H*(k) s(k) = b₂(k)",
+        "s(k) - E*(p,k) s(p) - H*(k) s₃(k) = b₁(k)",
         "A(k) = T(k,k) - Σ_c T(k,c) U(c)",
         "U(k) = A⁻¹(k) T(k,p)",
         "r(k) = b(k) - Σ_c T(k,c) A⁻¹(c) r(c)",
@@ -463,7 +463,7 @@ def test_the_text_of_a_realization_shows_its_equations_and_their_elimination():
     ):
         assert line in text
     bordered = (o.MM + o.J + c.border @ c.border.T + 0.1 * o.I).inv().op.algorithm().text
-    assert "S₂ = T₂(b,b) - Σ_k Y₂(k) X₂(k)" in bordered and "s₄ - Σ_k U*(·,k) s(k) = b₄" in bordered  # U is the user's
+    assert "S₂ = T₂(b,b) - Σ_k Y₂(k) X₂(k)" in bordered and "s₃ - Σ_k U*(·,k) s₅(k) = b₃" in bordered  # U is the user's
 
 
 def test_passes_that_go_one_way_are_one_pass():

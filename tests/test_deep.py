@@ -128,4 +128,4 @@ def test_sums_of_many_scalars(soa):
     s = soa.D.trace()
     total = nest(s, lambda t: t + s, 3000)
     assert np.isclose(float(total), 3001 * float(s), rtol=1e-12)
-    assert total.text().count("trace") == 3001
+    assert total.text().count("tr(D)") == 3001

@@ -15,7 +15,7 @@ def letters(request):
     """(letters of the pairs, letters of the robot): {name: (operator, dense)}."""
     model = pc.tree([-1, 0, 0, 1, 1], ["free", "pin", "ball", "universal", "slider"], seed=2, rotor_inertia=request.param)
     model.q = model.random_state(2).q
-    theorem = next(t for t in model.soa.theorems() if t.name.startswith("#64"))
+    theorem = next(t for t in model.soa.theorems() if t.name == "bodies grouped in pairs: the same mass matrix")
     grouped = theorem.lhs.sources[0]
     both = ({n: grouped.symbol(n) for n in NAMES}, dict(zip(NAMES, model.soa(" ".join(NAMES)), strict=True)))
     return [{name: (op, op.dense()) for name, op in own.items()} for own in both]

@@ -42,12 +42,12 @@ BOOST_AUTO_TEST_CASE(a_comparison_of_packs_holds_in_every_lane) {
 
 // (j + 1) Σ w(i)² x(i)² with w = (-D₁₁⁻¹ D₁ⱼ, 1), solved here by Cramer's rule.
 BOOST_AUTO_TEST_CASE(the_reach_of_a_pivot) {
-  const double L[] = {2, 0, 0, 0.5, 1, 0, -1.5, 0.25, 3};  // D = L L*
+  const double L[] = {1, 0, 0, 0.5, 1, 0, -1.5, 0.25, 1}, d[] = {4, 1, 9};  // D = L d L*
   const double squares[] = {3, 5, 7};
   double D[9] = {}, work[3];
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j)
-      for (int a = 0; a < 3; ++a) D[3 * i + j] += L[3 * i + a] * L[3 * j + a];
+      for (int a = 0; a < 3; ++a) D[3 * i + j] += L[3 * i + a] * d[a] * L[3 * j + a];
   BOOST_TEST(pivot_reach(L, 3, 0, squares, work) == 3.0);
   const double w = -D[1] / D[0];
   BOOST_TEST(std::abs(pivot_reach(L, 3, 1, squares, work) / (2 * (w * w * 3 + 5)) - 1) < 8 * eps);

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from fractions import Fraction
+from numbers import Real
 
 from .formulas import (
     Assembled,
@@ -36,6 +38,8 @@ from .formulas import (
     product,
 )
 
+_SHOWN = 1000
+"""Ratios over a larger number are shown as decimals."""
 _PLACES = {
     "k": {"k": "k", "p": "p", "c": "c"},
     "pk": {"k": "p,k", "c": "k,c"},
@@ -160,9 +164,9 @@ class Text:
         where = _PLACES[quantity.indices].get(at, "")
         return f"({where})" if where else ""
 
-    def number(self, x: float) -> str:
-        """A coefficient."""
-        return f"{x:.12g}"
+    def number(self, x: Real) -> str:
+        """A coefficient: a ratio of small numbers as such."""
+        return str(x) if isinstance(x, Fraction) and x.denominator <= _SHOWN else f"{float(x):.12g}"
 
     # ------------------------------------------------------------------ formulas
     def node(self, node: Node, marks: str = "") -> str:
@@ -362,8 +366,10 @@ class Latex(Text):
     def marked(self, inner: str, marks: str) -> str:
         return f"\\left({inner}\\right)^{{{marks}}}"
 
-    def number(self, x: float) -> str:
-        mantissa, _, exponent = f"{x:.12g}".partition("e")
+    def number(self, x: Real) -> str:
+        if isinstance(x, Fraction) and 1 < x.denominator <= _SHOWN:
+            return f"\\tfrac{{{x.numerator}}}{{{x.denominator}}}"
+        mantissa, _, exponent = f"{float(x):.12g}".partition("e")
         return f"{mantissa}\\cdot 10^{{{int(exponent)}}}" if exponent else mantissa
 
     def plain(self, node: Node) -> str:

@@ -151,7 +151,7 @@ class Source:
 
     def scaled(self, term: Term, first: bool) -> str:
         """A term with its sign and coefficient; `first` in a sum."""
-        size, sign = abs(term.coefficient), "-" if term.coefficient < 0 else ""
+        size, sign = float(abs(term.coefficient)), "-" if term.coefficient < 0 else ""
         if term.node == Product(()):
             body = repr(size)
         else:
