@@ -93,8 +93,15 @@ def test_numpy_on_either_side(letters):
     G = letters.G
     y = rng.uniform(-1, 1, len(G.value))
     G.assert_close(y @ G.op, y @ G.value, np.sqrt(len(y)))
-    for number in (np.float64(2), np.float32(2), np.int64(2), np.array(2.0), 2, True + True):
+    arrays = np.array(2), np.array(2.0), np.array(np.longdouble(2)), np.ma.array(2.0)
+    for number in (np.float64(2), np.float32(2), np.int64(2), *arrays, 2, True + True):
         assert number * MM.op == 2 * MM.op == MM.op * number
+        assert float(number * MM.op.trace()) == float(MM.op.trace() * number) == 2 * float(MM.op.trace())
+    arrays = np.array(1j), np.array([2.0]), np.array([]), np.array("2")
+    for none in (np.complex128(1j), np.complex64(2), np.ma.masked, *arrays, "2", np.datetime64(1, "s"), None):
+        for refused in (lambda x: MM.op.trace() * x, lambda x: x * MM.op.trace(), lambda x: MM.op * x):
+            with pytest.raises(TypeError):
+                refused(none)
     assert np.float64(0) + MM.op == MM.op
     MM.assert_close(MM.op @ list(x), MM.value @ x, np.sqrt(n))
     whole = np.arange(n)

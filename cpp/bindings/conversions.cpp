@@ -155,7 +155,7 @@ py::object whole_number(const std::string& digits) { return py::module_::import(
 
 Coefficient to_coefficient(const py::handle& value) {
   if (PyFloat_Check(value.ptr())) return PyFloat_AS_DOUBLE(value.ptr());
-  if (PyIndex_Check(value.ptr())) {
+  if (PyLong_Check(value.ptr()) || (PyIndex_Check(value.ptr()) && !py::isinstance<py::array>(value))) {
     const py::object whole = py::reinterpret_steal<py::object>(PyNumber_Index(value.ptr()));
     if (!whole) throw py::error_already_set();
     int overflow = 0;
@@ -172,7 +172,12 @@ Coefficient to_coefficient(const py::handle& value) {
     }
     return Coefficient::ratio(digits_of(ratio[0]), digits_of(ratio[1]));
   }
-  return py::float_(py::reinterpret_borrow<py::object>(value)).cast<double>();
+  const char* why;
+  const Array a = real_numbers(value, why);
+  if (!why && a.ndim() != 0) why = "is not one number";
+  if (why) throw py::type_error("a coefficient is one real number; this " + std::string(why) + ": " + std::string(py::repr(value)));
+  const py::object one = py::isinstance<py::array>(value) ? value.attr("item")() : py::none();  // a wider one with all its digits
+  return one.is_none() || py::isinstance<py::array>(one) ? Coefficient(*a.data()) : to_coefficient(one);
 }
 
 py::object to_number(const Coefficient& c) {

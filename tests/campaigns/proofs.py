@@ -27,6 +27,9 @@ from pycraft.symbolic.values import NoValue, transferred  # noqa: E402
 BOUND = 1e-7
 """What a proved statement may be off by, relative to its sides, on small models: their condition is below 1e6."""
 
+NUMBERS = {"tr(": np.trace, "ln det ": lambda X: np.linalg.slogdet(X)[1], "‖": np.linalg.norm}
+"""How the text of a scalar begins, and what it is by dense NumPy."""
+
 
 @dataclass
 class Tally:
@@ -93,8 +96,9 @@ def number_of(side, operators):
         return dense(transferred(side, operators), {})
     (operand,) = side.operands()
     X = dense(transferred(operand, operators), {})
-    kind = side.text().partition("(")[0]
-    return np.array([np.trace(X) if kind == "trace" else np.linalg.slogdet(X)[1] if kind == "ln det" else np.linalg.norm(X)])
+    text = side.text()
+    (evaluated,) = (by for sign, by in NUMBERS.items() if text.startswith(sign))
+    return np.array([evaluated(X)])
 
 
 def is_false(proof, lhs, rhs):
