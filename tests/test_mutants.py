@@ -10,6 +10,10 @@ from mutants import building, cpp_places, listed, python_places, switches
 ROOT = Path(__file__).parent.parent
 
 
+def test_every_change_listed_by_hand_is_of_a_text_that_is_there():
+    assert [listed.found(ROOT, changes)[1] for changes in (listed.CPP, listed.PYTHON)] == [[], []]
+
+
 def test_places_of_cpp():
     found = building.without_overlaps([*listed.found(ROOT, listed.CPP)[0], *cpp_places.everything(ROOT)])
     assert len(found) > 400 and len({m.key for m in found}) == len(found)

@@ -46,7 +46,7 @@ CHANGES = {
     "pycraft/identities/book.py": [
         ("a divisor as a factor", "value / divisor", "value * divisor"),
         ("a sign bound to the whole sum", "negative = False\n        return total", "pass\n        return total"),
-        ("a fraction read upside down", "float(parts[0]) / float(parts[1])", "float(parts[1]) / float(parts[0])"),
+        ("a fraction read upside down", "return decimal(parts[0]) / decimal(parts[1])", "return decimal(parts[1]) / decimal(parts[0])"),
         ("a star that does not transpose", "return lambda x: x.T", "return lambda x: x"),
     ],
     "pycraft/models/rotations.py": [
