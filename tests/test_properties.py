@@ -238,10 +238,11 @@ def test_text_reads_back_as_the_same_value(model, data):
 
 @runs(60)
 @given(SMALL, st.data())
-def test_text_reads_back_as_an_equal_expression(model, data):
-    op = formula_of(data, letters_of(model), 2).op
-    made = read_back(model, op.text())
-    assert made == op, f"{op.text()} reads as {made.text()}"
+def test_text_reads_back_as_what_has_the_same_text(model, data):
+    """Numbers in text are decimals, and 0.3 in Python is a double: what is read has the same text, not the same coefficients."""
+    text = formula_of(data, letters_of(model), 2).op.text()
+    made = read_back(model, text)
+    assert made.text() == text, f"{text} reads as {made.text()}"
 
 
 @runs(60)

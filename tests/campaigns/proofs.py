@@ -27,8 +27,8 @@ from pycraft.symbolic.values import NoValue, transferred  # noqa: E402
 BOUND = 1e-7
 """What a proved statement may be off by, relative to its sides, on small models: their condition is below 1e6."""
 
-NUMBERS = {"tr(": np.trace, "ln det ": lambda X: np.linalg.slogdet(X)[1], "‖": np.linalg.norm}
-"""How the text of a scalar begins, and what it is by dense NumPy."""
+REDUCED = {"trace": np.trace, "norm": np.linalg.norm, "logdet": lambda X: np.linalg.slogdet(X)[1]}
+"""What a statement may be about besides its operators, and what that is by dense NumPy."""
 
 
 @dataclass
@@ -56,15 +56,20 @@ def statement(seed):
     return lhs, rhs, kind, hypotheses
 
 
-def said(lhs, rhs, kind, soa):
-    """Both sides as what the statement is about; operators where the kind does not fit them."""
+def about(lhs, rhs, kind, soa):
+    """(lhs, rhs, reduction): of which operators the statement is, and which of `REDUCED`; None where the kind does not fit them."""
     if kind == "trace" and lhs.domain == lhs.codomain:
-        return lhs.trace(), rhs.trace()
+        return lhs, rhs, "trace"
     if kind == "norm":
-        return lhs.norm(), rhs.norm()
+        return lhs, rhs, "norm"
     if kind == "determinant" and lhs.domain == lhs.codomain == soa.Theta:
-        return (soa.D + lhs.T @ lhs).logdet(), (soa.D + rhs.T @ rhs).logdet()
-    return lhs, rhs
+        return soa.D + lhs.T @ lhs, soa.D + rhs.T @ rhs, "logdet"
+    return lhs, rhs, None
+
+
+def said(lhs, rhs, reduction):
+    """Both sides of the statement."""
+    return (getattr(lhs, reduction)(), getattr(rhs, reduction)()) if reduction else (lhs, rhs)
 
 
 def perturbed(rng, e):
@@ -90,24 +95,19 @@ def perturbed(rng, e):
         return None
 
 
-def number_of(side, operators):
+def number_of(operand, reduction, operators):
     """The value of a side on a model: an array, or a number, by dense NumPy."""
-    if isinstance(side, pc.Operator):
-        return dense(transferred(side, operators), {})
-    (operand,) = side.operands()
     X = dense(transferred(operand, operators), {})
-    text = side.text()
-    (evaluated,) = (by for sign, by in NUMBERS.items() if text.startswith(sign))
-    return np.array([evaluated(X)])
+    return np.array([REDUCED[reduction](X)]) if reduction else X
 
 
-def is_false(proof, lhs, rhs):
+def is_false(proof, lhs, rhs, reduction):
     """Whether a proved statement fails on a model that meets its hypotheses and on which every inverse in it exists."""
     for seed in (1, 2):
         model = meeting(proof.hypotheses, seed)
         model.q = model.random_state(seed).q
         try:
-            left, right = (number_of(side, model.soa) for side in (lhs, rhs))
+            left, right = (number_of(side, reduction, model.soa) for side in (lhs, rhs))
         except (np.linalg.LinAlgError, NoValue, pc.Error):
             continue
         size = max(np.abs(left).max(initial=0.0), np.abs(right).max(initial=0.0), 1.0)
@@ -123,8 +123,7 @@ def run(first, seeds, tally, seconds=float("inf")):
         if time.perf_counter() - begin > seconds:
             break
         lhs, rhs, kind, hypotheses = statement(seed)
-        true = said(lhs, rhs, kind, _own(lhs))
-        proof = prove(*true)
+        proof = prove(*said(*about(lhs, rhs, kind, _own(lhs))))
         tally.true += 1
         tally.proved += bool(proof)
         if not proof or not {*proof.hypotheses} <= {*hypotheses}:
@@ -134,11 +133,11 @@ def run(first, seeds, tally, seconds=float("inf")):
             other = perturbed(rng, rhs)
             if other is None or (other.domain, other.codomain) != (lhs.domain, lhs.codomain):
                 continue
-            false = said(lhs, other, kind, _own(lhs))
-            proof = prove(*false)
+            claim = about(lhs, other, kind, _own(lhs))
+            proof = prove(*said(*claim))
             tally.perturbed += 1
             tally.proved_perturbed += bool(proof)
-            if proof and is_false(proof, *false):
+            if proof and is_false(proof, *claim):
                 tally.false_proofs.append((seed, str(proof)))
     return tally
 
