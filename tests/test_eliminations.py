@@ -68,3 +68,14 @@ def test_every_state_of_a_batch_has_residuals_of_its_own():
         for q, row in zip(Q, together, strict=True):
             assert np.array_equal(op.at(q, precision="single", refine=2, residual="wider") @ X, row)
             assert relative(row, op.at(q, precision=50) @ X) <= 2.0**-22
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_signs_that_cancel_in_a_probe_are_no_loss(seed):
+    """Three free bodies: the states lie 18 apart, and right sides whose signs repeat with that distance left a state as zero."""
+    model = pc.tree([-1, 0, 0], ["free"] * 3, seed=seed, rotor_inertia=False)
+    model.q = model.random_state(seed).q
+    H, phi, M = model.soa("H phi M")
+    MM = H @ phi @ M @ phi.T @ H.T
+    exact = pc.blockdiag(MM.inv()).dense()
+    assert np.abs(pc.blockdiag(MM.inv()).dense(rules=False) - exact).max() <= 64 * np.finfo(float).eps * np.linalg.cond(MM.dense()) * np.abs(exact).max()

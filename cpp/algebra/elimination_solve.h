@@ -9,6 +9,18 @@
 
 namespace pycraft {
 
+namespace elimination {
+
+// Signs and sizes from 1/2 to 1, scattered: no two near each other have a sum that vanishes, and no number divides another. (Of whole ones
+// a state may come out as zero but for rounding, which is no unit for its errors.)
+template <class S>
+S scattered(size_t i) {
+  const std::uint32_t bits = static_cast<std::uint32_t>(i + 1) * 2654435761u;
+  return (bits >> 7 & 1 ? S(1) : S(-1)) / (S(1) + S(bits) / S(4294967296.0));
+}
+
+}  // namespace elimination
+
 template <class S>
 bool TreeElimination<S>::eliminate() {
   using std::abs;
@@ -127,7 +139,7 @@ void TreeElimination<S>::of_one_kind(int state, F&& visit) const {
   }
 }
 
-// A solution of natural size in all states, for scattered signs on the right side; then the same once more from the product with it.
+// A solution of natural size in all states, for scattered numbers on the right side; then the same once more from the product with it.
 template <class S>
 S TreeElimination<S>::lost() {
   using std::abs, std::ldexp;
@@ -139,7 +151,7 @@ S TreeElimination<S>::lost() {
   if (work_.size() < largest) work_.resize(largest);
   residual_.resize(size);
   for (size_t i = 0; i < size; ++i)
-    residual_[i] = ldexp((i * 2654435761u >> 7) & 1 ? S(1) : S(-1), std::clamp(-row_scale_[i], -furthest, furthest));
+    residual_[i] = ldexp(elimination::scattered<S>(i), std::clamp(-row_scale_[i], -furthest, furthest));
   solve_system(residual_.data(), 1);
   take_units(residual_.data());
   rhs_.assign(size, S(0));
@@ -154,39 +166,42 @@ S TreeElimination<S>::lost() {
   return error;
 }
 
-// What the probe above cannot see: noise that fills a whole state, which the product with it gives back as it is. Each equation's right side
-// is as large as its largest entry, and the residual of the solution, corrected once as every solve is, must be rounding of the row's terms.
+// What the probe above cannot see: noise that fills a whole state, which the product with it gives back as it is. Each equation's right sides
+// are as large as its largest entry, and the residuals of the solutions, corrected once as every solve is, must be rounding of the row's terms.
 template <class S>
 bool TreeElimination<S>::natural_sides_are_solved(S tolerated) {
   using std::abs;
+  constexpr int m = 6;  // of one right side alone, noise may vanish by luck
   const size_t size = total_ + border_;
+  size_t widest = border_;
+  for (const Front& f : fronts_) widest = std::max(widest, size_t(f.n));
+  if (work_.size() < widest * m) work_.resize(widest * m);
   const auto largest = [](S& target, const S& entry, const S& x) { target = std::max(target, S(abs(entry * x))); };
-  solution_.assign(size, S(1));
-  probe_.assign(size, S(0));
-  over_products(solution_.data(), probe_.data(), 1, largest);
-  for (size_t i = 0; i < size; ++i) {  // scattered, and no number divides another: of whole ones noise may vanish
-    const std::uint32_t scattered = static_cast<std::uint32_t>(i + 1) * 2654435761u;
-    probe_[i] *= (scattered >> 7 & 1 ? S(1) : S(-1)) / (S(1) + S(scattered) / S(4294967296.0));
-  }
+  solution_.assign(size * m, S(1));
+  probe_.assign(size * m, S(0));
+  over_products(solution_.data(), probe_.data(), m, largest);
+  for (size_t i = 0; i < size * m; ++i) probe_[i] *= elimination::scattered<S>(i);
   solution_ = probe_;
-  solve_system(solution_.data(), 1);
+  solve_system(solution_.data(), m);
   residual_ = probe_;
-  subtract_product(solution_.data(), residual_.data(), 1);
-  solve_system(residual_.data(), 1);
-  for (size_t i = 0; i < size; ++i) solution_[i] += residual_[i];
+  subtract_product(solution_.data(), residual_.data(), m);
+  solve_system(residual_.data(), m);
+  for (size_t i = 0; i < size * m; ++i) solution_[i] += residual_[i];
   residual_ = probe_;
-  subtract_product(solution_.data(), residual_.data(), 1);
+  subtract_product(solution_.data(), residual_.data(), m);
   for (S& b : probe_) b = abs(b);
-  over_products(solution_.data(), probe_.data(), 1, [](S& target, const S& entry, const S& x) { target += abs(entry * x); });
+  over_products(solution_.data(), probe_.data(), m, [](S& target, const S& entry, const S& x) { target += abs(entry * x); });
   // Rows whose own terms are noise: beside the largest of their states at any body.
   for (size_t j = 0; j < r_->states.size(); ++j) {
     S most = S(0);
-    of_one_kind(static_cast<int>(j), [&](size_t i) { most = std::max(most, S(abs(solution_[i]))); });
-    of_one_kind(static_cast<int>(j), [&](size_t i) { solution_[i] = most; });
+    of_one_kind(static_cast<int>(j), [&](size_t i) {
+      for (int c = 0; c < m; ++c) most = std::max(most, S(abs(solution_[i * m + c])));
+    });
+    of_one_kind(static_cast<int>(j), [&](size_t i) { std::fill_n(solution_.begin() + i * m, m, most); });
   }
-  backward_.assign(size, S(0));
-  over_products(solution_.data(), backward_.data(), 1, largest);
-  for (size_t i = 0; i < size; ++i)
+  backward_.assign(size * m, S(0));
+  over_products(solution_.data(), backward_.data(), m, largest);
+  for (size_t i = 0; i < size * m; ++i)
     if (const S r = abs(residual_[i]); r > tolerated * probe_[i] && r > S(1000) * epsilon<S>() * backward_[i]) return false;
   return true;
 }
