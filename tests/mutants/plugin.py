@@ -50,7 +50,7 @@ sys.path.insert(0, str(TREE))
 if os.environ.get("PYCRAFT_MUTANT_SOURCE"):
     sys.meta_path.insert(0, MutatedFinder(os.environ["PYCRAFT_MUTANT_SOURCE"]))
 
-import pycraft  # noqa: E402
+import pycraft  # noqa: E402 - after the finders
 
 assert pycraft.__file__.startswith(str(TREE)), pycraft.__file__
 
