@@ -27,7 +27,7 @@ def beside(work, edit, seconds=0.6):
                 work()
             except pc.StaleOperatorError:
                 pass
-            except Exception as error:  # noqa: BLE001
+            except Exception as error:
                 wrong.append(error)
 
     threads = [threading.Thread(target=run) for _ in range(3)]

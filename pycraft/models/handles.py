@@ -254,7 +254,7 @@ class Named(Mapping):
 
     def __contains__(self, name: object) -> bool:
         try:
-            self[name]  # type: ignore[index] - anything may be asked for
+            self[name]  # type: ignore[index]  # anything may be asked for
         except KeyError:
             return False
         return True

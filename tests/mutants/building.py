@@ -15,11 +15,15 @@ from . import switches
 
 
 def copy_of_tree(root, tree):
+    """What git lists, and no source or test that an earlier copy had and that is gone."""
     listed = ["git", "-C", str(root), "ls-files", "--cached", "--others", "--exclude-standard", "-z"]
-    for name in subprocess.run(listed, check=True, capture_output=True, text=True).stdout.split("\0"):
-        if name and (root / name).is_file():
-            (tree / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy2(root / name, tree / name)
+    names = {n for n in subprocess.run(listed, check=True, capture_output=True, text=True).stdout.split("\0") if (root / n).is_file()}
+    for name in names:
+        (tree / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(root / name, tree / name)
+    for path in [*tree.glob("tests/**/*.py"), *tree.glob("pycraft/**/*.py")]:
+        if str(path.relative_to(tree)) not in names:
+            path.unlink()
 
 
 def dependent_objects(root, files):
