@@ -70,7 +70,7 @@ class Equation:
         if not mark and not base:
             return self
         if (mark, base) not in self._copies:
-            carried = lambda p: {marked(word, mark, base): c for word, c in p.items()}  # noqa: E731
+            carried = lambda p: {marked(word, mark, base): c for word, c in p.items()}
             lhs, rhs = carried(self.lhs), carried(self.rhs)
             made = Equation("copy", self.text, lhs, rhs, hypothesis=self.hypothesis, source=self)
             made.check = lambda: lhs == carried(self.lhs) and rhs == carried(self.rhs)
