@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from pathlib import Path
-from typing import Annotated, Any, Optional
+from typing import Annotated, Any
 
 import typer
 from rich.markup import escape
@@ -23,7 +23,7 @@ app = typer.Typer(
 
 MIMIC = ("refuse", "lock", "free")
 Model = Annotated[str, typer.Argument(help="A URDF or MJCF file, or the name of a robot that comes with the package (see pycraft.robots).")]
-Root = Annotated[Optional[str], typer.Option(help="fixed | free: a free hinge first; fixed if left out, of a robot by name its own.")]
+Root = Annotated[str | None, typer.Option(help="fixed | free: a free hinge first; fixed if left out, of a robot by name its own.")]
 Mimic = Annotated[str, typer.Option(help="refuse | lock | free: what becomes of a file's mimic joints.")]
 
 
@@ -82,7 +82,7 @@ def check_seconds(**durations: float | None) -> None:
 
 @app.command()
 def tour(
-    model: Annotated[Optional[str], typer.Argument(help="A URDF or MJCF file, or a robot's name; the Panda by default.")] = None,
+    model: Annotated[str | None, typer.Argument(help="A URDF or MJCF file, or a robot's name; the Panda by default.")] = None,
     root: Root = None,
     mimic: Mimic = "refuse",
 ) -> None:
@@ -143,7 +143,7 @@ def bench(seconds: Annotated[float, typer.Option(help="Seconds per figure.")] = 
     for heading, figures in results.items():
         table = Table(title=heading, title_justify="left", box=None, header_style="bold")
         for column, justify in (("figure", "left"), ("measured", "right"), ("bound", "right"), ("", "left")):
-            table.add_column(column, justify=justify)  # type: ignore[arg-type]  # rich's literal
+            table.add_column(column, justify=justify)  # type: ignore[arg-type]
         for figure in figures:
             missed += not figure.passed
             style = "" if figure.passed else "bold red"
@@ -157,16 +157,16 @@ def bench(seconds: Annotated[float, typer.Option(help="Seconds per figure.")] = 
 def accuracy(
     model: Model,
     integration: Annotated[bool, typer.Option("--integration", help="Integrators and tolerances instead of forms and precisions.")] = False,
-    form: Annotated[Optional[list[str]], typer.Option(help="Only this form; may be repeated.")] = None,
-    precision: Annotated[Optional[list[str]], typer.Option(help="Only this precision; may be repeated.")] = None,
-    method: Annotated[Optional[list[str]], typer.Option(help="Only this method, or integrator; may be repeated.")] = None,
-    error: Annotated[Optional[float], typer.Option(help="Name the cheapest row whose error is at most this.")] = None,
+    form: Annotated[list[str] | None, typer.Option(help="Only this form; may be repeated.")] = None,
+    precision: Annotated[list[str] | None, typer.Option(help="Only this precision; may be repeated.")] = None,
+    method: Annotated[list[str] | None, typer.Option(help="Only this method, or integrator; may be repeated.")] = None,
+    error: Annotated[float | None, typer.Option(help="Name the cheapest row whose error is at most this.")] = None,
     seconds: Annotated[float, typer.Option(help="Seconds per figure.")] = 0.05,
-    duration: Annotated[Optional[float], typer.Option(help="Seconds of the motion that is integrated; 1 if left out.")] = None,
+    duration: Annotated[float | None, typer.Option(help="Seconds of the motion that is integrated; 1 if left out.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the states and forces.")] = 0,
-    csv: Annotated[Optional[Path], typer.Option(help="Write the rows as CSV.")] = None,
-    json: Annotated[Optional[Path], typer.Option(help="Write the rows as JSON.")] = None,
-    plot: Annotated[Optional[Path], typer.Option(help="Draw error against time (PNG, SVG or PDF).")] = None,
+    csv: Annotated[Path | None, typer.Option(help="Write the rows as CSV.")] = None,
+    json: Annotated[Path | None, typer.Option(help="Write the rows as JSON.")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Draw error against time (PNG, SVG or PDF).")] = None,
     root: Root = None,
     mimic: Mimic = "refuse",
 ) -> None:
@@ -257,9 +257,9 @@ def stability(
     steps: Annotated[int, typer.Option(help="Steps of each trajectory.")] = 1_000_000,
     case: Annotated[str, typer.Option(help="Only cases whose name or family has this text.")] = "",
     peers: Annotated[bool, typer.Option(help="Pinocchio, MuJoCo, Drake, as far as they are installed, side by side.")] = True,
-    output: Annotated[Optional[Path], typer.Option(help="Where to write the table (Markdown).")] = None,
-    csv: Annotated[Optional[Path], typer.Option(help="Write the rows as CSV.")] = None,
-    json: Annotated[Optional[Path], typer.Option(help="Write the rows as JSON.")] = None,
+    output: Annotated[Path | None, typer.Option(help="Where to write the table (Markdown).")] = None,
+    csv: Annotated[Path | None, typer.Option(help="Write the rows as CSV.")] = None,
+    json: Annotated[Path | None, typer.Option(help="Write the rows as JSON.")] = None,
 ) -> None:
     """Run the hard cases over forms, refinements and precisions; exit status 1 if a bound does not hold."""
     from .accuracy import stability as hard
@@ -296,7 +296,7 @@ def stability(
 
 @app.command()
 def peers(
-    output: Annotated[Optional[Path], typer.Option(help="Where to write the table (Markdown).")] = None,
+    output: Annotated[Path | None, typer.Option(help="Where to write the table (Markdown).")] = None,
     states: Annotated[int, typer.Option(help="Random states per robot.")] = 20,
     seed: Annotated[int, typer.Option(help="Seed of the states.")] = 0,
 ) -> None:

@@ -16,12 +16,12 @@ sweep is made. Residuals are judged relative to the larger side, numbers relativ
 from __future__ import annotations
 
 from collections.abc import Callable
-from numbers import Real
 from typing import Any
 
 import numpy as np
 
 from .. import _core
+from .vocabulary import is_number
 
 EPSILON = _core.epsilons()
 """Epsilon of each precision by name."""
@@ -38,7 +38,7 @@ _RICCATI = {"P", "P_plus", "D", "G", "K", "tau", "tau_bar", "E_psi", "psi", "psi
 class Sizes:
     """Norms of expressions at one state, remembered; and what rounding makes of them."""
 
-    def __init__(self, bind: Callable[[_core.Operator], _core.Operator]):
+    def __init__(self, bind: Callable[[Any], Any]):
         self._bind = bind
         self._norms: dict[Any, float] = {}
         self._amplification: dict[Any, float] = {}
@@ -71,7 +71,7 @@ class Sizes:
                 case "sum":
                     return sum(norms)
                 case "scaled":
-                    return abs(operator.coefficient) * norms[0]
+                    return abs(float(operator.coefficient)) * norms[0]
                 case "transpose":
                     return norms[0]
                 case "function":  # crm(x) and its like
@@ -81,8 +81,8 @@ class Sizes:
 
     def size(self, side: Any) -> float:
         """The error of a side per unit of c · eps."""
-        if isinstance(side, Real):
-            return float(abs(side))
+        if is_number(side):
+            return abs(float(side))
         if isinstance(side, _core.Scalar):
             return self._scalar(side)
         children = side.children

@@ -278,7 +278,7 @@ def to_pdf(notebook: str | Path) -> Path:
     reasons = []
     for exporter in (nbconvert.PDFExporter, nbconvert.WebPDFExporter):
         try:
-            body, _ = exporter().from_filename(str(path))
+            body: Any = exporter().from_filename(str(path))[0]
         except Exception as error:  # whatever LaTeX, pandoc or a browser says: it is the reason
             reasons.append(f"{exporter.__name__}: {str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__}")
             continue
