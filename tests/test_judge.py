@@ -104,7 +104,9 @@ def test_norms_follow_the_vectors():
     assert found == [5.0, 40.0]
 
 
-def test_theorems_are_judged_at_the_present_state_and_at_those_drawn():
+def test_theorems_are_judged_at_the_present_state_and_at_those_drawn(monkeypatch):
+    some = pc.OperatorSet.theorems
+    monkeypatch.setattr(pc.OperatorSet, "theorems", lambda self: some(self)[:12])
     model = pc.chain(2)
     judged = [f.states for f in model.soa.check(states=2).findings if f.states]
     assert judged and set(judged) == {3}

@@ -71,7 +71,7 @@ WHERE = [
 ]
 
 
-@pytest.mark.parametrize(("text", "where"), WHERE)
+@pytest.mark.parametrize(("text", "where"), [pytest.param(*case, marks=[pytest.mark.slow] * (i % 3 > 0)) for i, case in enumerate(WHERE)])
 def test_the_fewest_hypotheses(text, where):
     found = pc.truth(text, smallest_case=False)
     assert [set(chosen) for chosen in found.where] == where
@@ -104,7 +104,7 @@ BLAMED = [
 ]
 
 
-@pytest.mark.parametrize("text", BLAMED)
+@pytest.mark.parametrize("text", [BLAMED[0], *(pytest.param(text, marks=pytest.mark.slow) for text in BLAMED[1:])])
 def test_a_wrong_formula_is_refuted_where_the_true_one_holds(text):
     """Each fails with rotor inertia, as the true one does: that says nothing of its own error."""
     report = pc.check(text)
