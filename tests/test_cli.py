@@ -6,18 +6,26 @@ from importlib import import_module
 import pytest
 from typer.testing import CliRunner
 
+import pycraft as pc
 from pycraft.cli import app
 
 runner = CliRunner()
 
 
+@pytest.fixture
+def few_theorems(monkeypatch):
+    """Every fifth of them and what waits: what the command shows does not depend on how many there are."""
+    theorems = pc.OperatorSet.theorems
+    monkeypatch.setattr(pc.OperatorSet, "theorems", lambda self: [t for i, t in enumerate(theorems(self)) if i % 5 == 0 or t.waiting])
+
+
 def test_check_passes_on_a_robot():
-    result = runner.invoke(app, ["check", "ur5", "--states", "1"])
+    result = runner.invoke(app, ["check", "ur5", "--states", "0"])
     assert result.exit_code == 0, result.output
     assert "ur5" in result.output.lower() and "largest residual of what holds" in result.output
 
 
-def test_check_as_json():
+def test_check_as_json(few_theorems):
     result = runner.invoke(app, ["check", "panda", "--states", "1", "--json"])
     assert result.exit_code == 0, result.output
     report = json.loads(result.output)
@@ -41,7 +49,7 @@ def test_check_ends_with_one_where_a_theorem_fails(monkeypatch):
             assert result.exit_code == status and verdict in result.output + " holds", (verdict, options)
 
 
-def test_check_shows_the_exceptions_and_all_by_full():
+def test_check_shows_the_exceptions_and_all_by_full(few_theorems):
     short, full = (runner.invoke(app, ["check", "puma560", "--states", "0", *more]).output for more in ([], ["--full"]))
     assert "φ = I + E_φ φ" not in short and "φ = I + E_φ φ" in full and short.splitlines()[0] == full.splitlines()[0]
 

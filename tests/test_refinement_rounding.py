@@ -37,14 +37,14 @@ def run_campaign(seeds):
 
 
 def test_no_value_is_spoiled_and_no_error_understated():
-    """Twelve of each family; and refinement is of use, or leaving everything as it is would pass."""
-    assert run_campaign(range(12 * len(campaign.FAMILIES))) > 300
+    """Three of each family; and refinement is of use, or leaving everything as it is would pass."""
+    assert run_campaign(range(3 * len(campaign.FAMILIES))) > 50
 
 
 @pytest.mark.slow
 def test_no_value_is_spoiled_and_no_error_understated_in_three_hundred_cases():
     """A part of the five thousand of `make campaigns`."""
-    run_campaign(range(84, 384))
+    assert run_campaign(range(300)) > 1000
 
 
 @pytest.mark.parametrize("seed", [807, 1073, 1647, 1808])

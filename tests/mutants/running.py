@@ -95,8 +95,10 @@ class Run:
 def pytest_run(build, files, seconds, tests=None, first=False, **environment):
     """A run of all everyday tests of these files, or of those that are named, in their order; of the first that fails with `first`."""
     values = {k: v for k, v in os.environ.items() if not k.startswith("PYCRAFT_MUTANT")}
-    values |= {"PYCRAFT_MUTANT_TREE": str(build.tree), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", **environment}
-    options = ["-q", "-p", "no:cacheprovider", "--tb=no", "-rfE", "-m", "not slow and not peers", "--import-mode=prepend", *["-x"] * first]
+    values |= {"PYCRAFT_MUTANT_TREE": str(build.tree), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    values |= {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", **environment}  # hypothesis takes a second, where no test asks for it
+    options = ["-q", "-p", "no:cacheprovider", "--tb=no", "--assert=plain", "-rfE", "--import-mode=prepend", *["-x"] * first]
+    options += ["-m", "not slow and not peers"]
     with tempfile.TemporaryDirectory() as folder:
         red = pathlib.Path(folder, "red")
         red.touch()
