@@ -65,6 +65,8 @@ def test_tour(robot):
     parts = ["The operators, typed as on paper", "Factor and invert", "Beyond the theorems", "Every theorem"]
     for part in (*parts, "smallest counterexample", "What it costs"):
         assert part in result.output
+    typed = [line.rstrip() for line in result.output.splitlines() if ">>>" in line]
+    assert typed and max(map(len, typed)) <= 80  # what is to be typed goes on in no second line
 
 
 def test_bench_holds_its_bounds():

@@ -145,7 +145,9 @@ def test_bench_ends_with_one_where_a_bound_is_missed(monkeypatch):
 
     for value, status in ((0.5, 0), (1.0, 0), (1.5, 1), (float("nan"), 1)):
         monkeypatch.setattr("pycraft.bench.run", figures(value))
-        assert runner.invoke(app, ["bench"]).exit_code == status, value
+        result = runner.invoke(app, ["bench"])
+        assert result.exit_code == status, value
+        assert ("a figure: " in result.output and "is over its bound, 1 x" in result.output) == bool(status)
 
 
 def test_every_figure_of_what_accuracy_costs_has_its_bound(monkeypatch):
