@@ -92,6 +92,8 @@ def nothing_measured(monkeypatch):
     [
         ("accuracy panda --csv {tmp}/no/a.csv", "--csv {tmp}/no/a.csv: there is no folder"),
         ("accuracy panda --json {tmp}", "--json {tmp}: a folder"),
+        ("accuracy panda --csv {tmp}/a --json {tmp}/a", "--csv and --json name the same file"),
+        ("check none.tex --precision banana", "no precision is called 'banana'"),
         ("accuracy panda --plot {tmp}/a.foo", "there are"),
         ("accuracy panda --plot {tmp}/a", "a picture has the extension of its format"),
         ("accuracy panda --seed -1", "--seed -1: a whole number, 0 or more"),

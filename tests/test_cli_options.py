@@ -124,6 +124,19 @@ def test_an_option_reaches_what_is_measured(command, option, measured, tmp_path)
     assert len(set(outcomes)) == len(outcomes)
 
 
+def test_options_reach_the_check_of_a_paper(monkeypatch, tmp_path):
+    from pycraft.identities import paper
+
+    calls = []
+    monkeypatch.setattr(paper, "check_paper", lambda path, **options: calls.append(options) or paper.PaperReport(path, []))
+    for given in ([], ["--states", "1"], ["--seed", "2"], ["--precision", "quad"], ["--precision", "50"]):
+        assert runner.invoke(app, ["check", "p.tex", *given]).exit_code == 1
+    assert len({str({k: v for k, v in c.items() if k != "progress"}) for c in calls}) == 5
+    for given in (["--full"], ["--root", "free"], ["--mimic", "lock"]):
+        result = runner.invoke(app, ["check", "p.tex", *given])
+        assert result.exit_code == 2 and f"{given[0]} belongs to models" in result.output and len(calls) == 5
+
+
 def test_json_is_json_and_follows_its_seed(monkeypatch):
     """--json --seed: other states, other residuals."""
     from pycraft.operators import OperatorSet
