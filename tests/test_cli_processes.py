@@ -76,6 +76,10 @@ def test_an_ascii_terminal():
         ("check panda --precision ²", "precision"),
         ("check nowhere.urdf", "no file is called 'nowhere.urdf'"),
         ("stability --case nowhere", "no hard case has 'nowhere'"),
+        ("nonsense", "No such command 'nonsense'; "),
+        ("--nonsense", "No such option"),
+        ("check", "Missing argument"),
+        ("check panda --states many", "--help says what there is"),
     ],
 )
 def test_options(arguments, words):

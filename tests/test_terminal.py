@@ -44,6 +44,26 @@ def test_the_report_of_theorems_fits():
     assert "undefined: an inverse in them does not exist here" in repr(made)
 
 
+def test_a_theorem_that_goes_on_is_no_heading():
+    """The second line of a long one began where headings begin."""
+    headings = {f.group for f in report().findings} | {"theorem", "arm:", "largest"}
+    table = report().full().split("theorem", 1)[1].splitlines()[1:]
+    flush = [line for line in table if line[:1].strip()]
+    assert flush and all(any(line.startswith(h) for h in headings) for line in flush), flush
+
+
+def test_plans_fit():
+    """A row of the plan is a line, also where it is set in by three; texts of steps are whole."""
+    arm = pc.chain(3)
+    H, phi, M = arm.soa("H phi M")
+    MM = H @ phi @ M @ phi.T @ H.T
+    for op in (MM.inv(), (MM + 0.1 * arm.soa.I).inv(), MM.inv().diff(0)):
+        rows = str(op.explain()).split("  #  step", 1)[1]
+        fits(rows, 77)
+        assert len({line.index(" flop") for line in rows.splitlines() if " flop" in line}) <= 3  # of flop, kflop, Mflop
+        assert all(s["text"].replace(" ", "") in rows.replace(" ", "").replace("\n", "") or len(s["text"]) > 36 for s in op.plan().steps)
+
+
 def test_what_holds_shows_the_scalar_that_decided():
     """Both sides of ΥM = ΥM are rounding of zero in double on a slider without a mass: no residual of 1, no bound above 1e-6, is shown."""
     made = report()

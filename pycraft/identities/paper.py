@@ -110,6 +110,7 @@ def check_paper(
     states: int = 20,
     seed: int = 0,
     search: bool = True,
+    precision: str | int = "extended",
     progress: Callable[[str], None] | None = None,
 ) -> PaperReport:
     """Check every displayed equation of a LaTeX file numerically.
@@ -118,22 +119,28 @@ def check_paper(
     ----------
     path : a LaTeX file, UTF-8; files that it includes are not followed
     model : Multibody or OperatorSet; random trees of all hinge kinds where left out
-    states, seed, search : as `pycraft.check` has them
+    states, seed, search, precision : as `pycraft.check` has them
     progress : called with the line of each equation, if given
 
     Raises
     ------
     ModelError
         No file of that name, or it is not text in UTF-8.
+    EvaluationError
+        No such precision, or none that is wider than double.
     """
-    from .checker import check
+    from .checker import check, check_wider
 
+    def checked(text: str) -> Any:
+        return check(text, model, states=states, seed=seed, search=search, precision=precision)
+
+    check_wider(precision)
     source = _read(Path(path))
     found: list[Equation] = []
     for line, latex in equations(source):
         if progress is not None:
             progress(f"line {line}")
-        found += _judged(line, latex, lambda text: check(text, model, states=states, seed=seed, search=search), model is None)
+        found += _judged(line, latex, checked, model is None)
     return PaperReport(str(path), found)
 
 
