@@ -119,15 +119,16 @@ class Sizes:
                     made = made @ factor
                     size = np.linalg.norm(made)
             case "sum":
-                made = sum(matrix for matrix, _ in parts)
+                made = np.sum([matrix for matrix, _ in parts], axis=0)
                 off = sum(its + len(parts) * eps * np.linalg.norm(matrix) for matrix, its in parts)
             case "scaled":
-                made, off = operator.coefficient * parts[0][0], abs(operator.coefficient) * parts[0][1]
+                c = float(operator.coefficient)
+                made, off = c * parts[0][0], abs(c) * parts[0][1]
             case "transpose":
                 made, off = parts[0][0].T, parts[0][1]
             case _:
                 made = self._bind(operator).dense()
-                off = self._off(operator, np.linalg.norm(made), parts[0][1] if parts else 0.0)
+                off = self._off(operator, float(np.linalg.norm(made)), parts[0][1] if parts else 0.0)
         return made, float(off)
 
     def _off(self, operator: _core.Operator, norm: float, inner: float) -> float:
