@@ -88,10 +88,10 @@ def check_theorem(
     try:
         found = judge_states(lhs, rhs, states, vectors, **options)
     except _core.SingularHingeError as error:
-        finding.verdict, finding.note = "undefined", str(error)
+        finding.verdict, finding.note = UNDEFINED, str(error)
     except _core.SingularOperatorError as error:
         # Outside its hypotheses a theorem may ask for an inverse that is not there: one way to fail.
-        finding.verdict, finding.note = "expected to fail" if unmet else "undefined", str(error)
+        finding.verdict, finding.note = "expected to fail" if unmet else UNDEFINED, str(error)
     else:
         finding.judged(found)
         if unmet:
@@ -153,6 +153,8 @@ def check(
     from .search import named_vectors, statement_text
 
     _check_wider(precision)
+    if states < 1:
+        raise _core.EvaluationError(f"states is {states}: a statement is checked at one state at least")
     text = statement if isinstance(statement, str) else f"{statement[0].text()} == {statement[1].text()}"
     if model is None:
         if not isinstance(statement, str):
