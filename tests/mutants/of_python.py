@@ -116,8 +116,8 @@ CHANGES = {
         ("one small model is enough", "all(residual(new, other) < _CLOSE for other in models[1:])", "True"),
         ("hypotheses are not ranked", "r.cost + 0.5 * len(r.where[0])", "r.cost"),
         ("more repairs than asked for", "    del result.found[most:]\n", ""),
-        ("repairs in any order", "return sorted(near, key=lambda item: item[1].cost), tried", "return near, tried"),
-        ("what is true is repaired", "if own.where:", "if False:"),
+        ("repairs in any order", "return sorted(near, key=lambda item: item[1].cost), tried, whole", "return near, tried, whole"),
+        ("what is true is repaired", "if _is_close(formula, models) and (own", "if False and (own"),
     ],
     "pycraft/interop/compare.py": [
         ("gravity is not made the same", "        common.gravity = there\n", ""),
