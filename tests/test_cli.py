@@ -40,9 +40,9 @@ def test_check_ends_with_one_where_a_theorem_fails(monkeypatch):
     from pycraft.identities.report import Finding, Report
     from pycraft.operators import OperatorSet
 
-    made = Report("arm", {}, [Finding("a", "group", "a = b", "a = b", [], [], "holds")])
+    made = Report("arm", {}, [Finding(name, "group", "a = b", "a = b", [], [], "holds") for name in "ab"])
     monkeypatch.setattr(OperatorSet, "check", lambda self, **_: made)
-    for verdict, status in [("holds", 0), ("expected to fail", 0), ("fails", 1), ("undecided", 3)]:
+    for verdict, status in [("holds", 0), ("expected to fail", 0), ("fails", 1), ("undecided", 3), ("undefined", 3)]:
         made.findings[0].verdict = verdict
         for options in ([], ["--full"], ["--json"]):
             result = runner.invoke(app, ["check", "panda", *options])

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 import pycraft as pc
+from pycraft.accuracy.stability_table import Stability
 from pycraft.identities.bounds import Sizes
 from pycraft.identities.judge import FAILS, HOLDS, UNDECIDED, BoundState, Taken, Verdict, decided, judge, ladder
 from pycraft.identities.report import PASSED, CheckReport, Finding, Report
+from pycraft.interop.compare import ModelComparison, _relative
 
 EPSILON = pc._core.epsilons()
 
@@ -162,7 +164,7 @@ def test_a_verdict_that_is_not_there_raises():
 
 def test_reports_pass_nothing_that_fails_or_is_undecided():
     verdicts = ["holds", "fails", "undecided", "expected to fail", "holds anyway", "waiting", "undefined"]
-    assert set(PASSED) == set(verdicts) - {"fails", "undecided"}
+    assert set(PASSED) == set(verdicts) - {"fails", "undecided", "undefined"}
     for n in (1, 2):
         for chosen in itertools.product(verdicts, repeat=n):
             report = Report("arm", {}, [Finding(str(i), "g", "a = b", "a = b", [], [], v) for i, v in enumerate(chosen)])
@@ -172,9 +174,22 @@ def test_reports_pass_nothing_that_fails_or_is_undecided():
                 assert report.status == 3
                 with pytest.raises(pc.UndecidedError):
                     bool(report)
+            elif "undefined" in chosen or "holds" not in chosen:  # something was not shown, or nothing was
+                assert not report and report.status == 3 and len(report.undefined) == chosen.count("undefined")
             else:
                 assert report and report.status == 0
-            assert not any(report.findings[i].passed for i, v in enumerate(chosen) if v in ("fails", "undecided"))
+            assert not any(report.findings[i].passed for i, v in enumerate(chosen) if v in ("fails", "undecided", "undefined"))
+
+
+def test_nothing_shown_is_not_true():
+    assert not Report("arm", {}) and Report("arm", {}).status == 3
+    assert Verdict().verdict == UNDECIDED
+    with pytest.raises(pc.EvaluationError, match="at one state at least"):
+        pc.check("D = D", pc.chain(2), states=0)
+    assert not ModelComparison("a", "b", 0) and not Stability([], {})
+    arms = pc.chain(2), pc.chain(2)
+    assert pc.compare(*arms, states=1) and not pc.compare(*arms, states=0)
+    assert _relative(np.array([np.nan]), np.array([1.0])) == np.inf
 
 
 def test_a_false_statement_on_a_graded_chain_fails():
