@@ -37,11 +37,9 @@ class Commands(TyperGroup):
     """Commands whose failures are lines, not tracebacks. PYCRAFT_TRACEBACK=1 in the environment shows where an unexpected one arose."""
 
     def make_context(self, *arguments: Any, **options: Any) -> Any:
-        try:
-            return super().make_context(*arguments, **options)
-        except Exception as error:
-            _tell_usage(error)
-            raise
+        if sys.stdout is None:
+            fail("the output is closed")
+        return _guarded(lambda: super(Commands, self).make_context(*arguments, **options))
 
     def invoke(self, ctx: Any) -> Any:
         # Letters that a terminal cannot show are escaped, so that a result is never lost to them.

@@ -98,10 +98,18 @@ def test_a_full_disk():
         done = pycraft("check", "panda", "--states", "0", stdout=full)
     lines = done.stderr.splitlines()
     assert done.returncode == 2 and lines == ["error: the output: No space left on device"], done.stderr
+    with open("/dev/full", "w") as full:
+        refused(pycraft("--help", stdout=full), 2, "No space left on device")
     done = pycraft(
         "accuracy", "ur5", "--seconds", "0", "--method", "articulated", "--form", "fast", "--precision", "double", "--csv", "/dev/full"
     )
     assert done.returncode == 2 and done.stderr.splitlines()[-1].startswith("error: ") and "No space left" in done.stderr
+
+
+def test_an_output_that_is_closed():
+    command = f'"{sys.executable}" -m pycraft.cli check panda >&-'
+    done = subprocess.run(command, shell=True, stderr=subprocess.PIPE, text=True, timeout=300)
+    assert done.returncode == 2 and done.stderr.splitlines() == ["error: the output is closed"]
 
 
 def test_a_reader_that_has_seen_enough():

@@ -49,6 +49,42 @@ def test_the_pages_run(page, examples):
     assert result.failed == 0 and result.attempted > examples
 
 
+ROBOTS = ROOT / "pycraft" / "models" / "robots"
+
+
+def test_the_page_of_models_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("arm.urdf").write_text((ROBOTS / "panda.urdf").read_text())
+    with pytest.warns(pycraft.ModelWarning, match="left aside"):
+        result = doctest.testfile(str(ROOT / "docs" / "models.md"), module_relative=False, optionflags=doctest.ELLIPSIS)
+    assert result.failed == 0 and result.attempted > 15
+
+
+def test_what_the_page_of_algorithms_prints():
+    text = (ROOT / "docs" / "algorithm.md").read_text()
+    names = {}
+    for block in re.findall(r"```python\n(.*?)```", text, re.S):
+        exec(compile(block, "algorithm.md", "exec"), names)
+    assert abs(names["y"] - names["MM"].inv() @ names["x"]).max() < 1e-9
+    printed = re.findall(r"`print\((\w+)\.algorithm\(\)\)`[^\n]*:\n\n```\n(.*?)```", text, re.S)
+    assert [name for name, _ in printed] == ["MM", "inverse"]
+    for name, shown in printed:
+        assert str(names[name].algorithm()).strip() == shown.strip(), name
+
+
+@pytest.mark.peers
+def test_the_other_packages_of_the_page_of_comparisons(tmp_path, monkeypatch):
+    pytest.importorskip("pinocchio")
+    monkeypatch.chdir(tmp_path)
+    Path("panda.urdf").write_text((ROBOTS / "panda.urdf").read_text())
+    Path("panda.xml").write_text(pycraft.interop.export.to_mjcf(pycraft.robots.panda()))
+    block = re.search(r"```python\n(import mujoco.*?)```", (ROOT / "docs" / "comparing.md").read_text(), re.S).group(1)
+    names = {"pc": pycraft, "arm": pycraft.robots.panda()}
+    imports, *compared = block.splitlines()
+    exec(imports, names)
+    assert len(compared) == 3 and all(eval(line, names) for line in compared)
+
+
 @pytest.mark.parametrize("page", ["symbolic", "kalman", "accuracy", "evaluation", "statements", "teaching", "proofs"])
 def test_the_blocks_of_a_page_run(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

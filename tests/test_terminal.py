@@ -1,5 +1,6 @@
 """Tables in a terminal: 80 columns, nothing that matters cut, no accent that overprints, columns that align, exceptions first."""
 
+import re
 import unicodedata
 
 import pytest
@@ -75,6 +76,17 @@ def test_what_holds_shows_the_scalar_that_decided():
         found = repr(pc.check(text, pc.chain(2), states=1))
         assert shown in found and "worst" not in found, found
     assert "read as" not in repr(pc.check("D = HPH*", pc.chain(2), states=1))
+
+
+def test_text_in_formulas_is_text():
+    """MathJax shows an error for _ or ^ in \\text, and no letter of ours there."""
+    for t in pc.chain(1).soa.theorems():
+        for words in re.findall(r"\\text\{([^{}]*)\}", t.latex):
+            assert words.isascii() and not set(words) & set("_^&#%$*"), t.latex
+
+
+def test_the_summary_of_a_page_has_its_lines():
+    assert "3 holds" not in repr(report()) and "<br>largest residual" in report()._repr_html_()
 
 
 def test_the_summary_and_the_exceptions_come_first():

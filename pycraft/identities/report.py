@@ -179,8 +179,9 @@ class Report:
                 f"<td style='text-align:left'>{escape(', '.join(f.hypotheses))}</td>{numbers}"
                 f"<td style='text-align:left;color:{color[f.verdict]}'>{f.verdict}{note}</td></tr>"
             )
-        head = "<tr><th>theorem</th><th>hypotheses</th><th>double</th><th>decided</th><th>bound</th><th>verdict</th></tr>"
-        return f"<p><b>{escape(self.summary())}</b></p><table style='font-size:85%'>{head}{''.join(rows)}</table>"
+        left = "<th style='text-align:left'>"
+        head = f"<tr>{left}theorem</th>{left}hypotheses</th><th>double</th><th>decided</th><th>bound</th>{left}verdict</th></tr>"
+        return f"<p><b>{escape(self.summary()).replace(chr(10), '<br>')}</b></p><table style='font-size:85%'>{head}{''.join(rows)}</table>"
 
 
 @dataclass
