@@ -32,7 +32,7 @@ NESTS = {
     "block diagonals": lambda soa: nest(soa.phi, lambda e: pc.blockdiag(0.5 * e + soa.phi)),
     "flat sums": lambda soa: nest(soa.D, lambda e: e + soa.D, 3000),
     "flat products": lambda soa: nest(soa.tau, lambda e: e @ soa.tau, 3000),
-    "products with sums": lambda soa: nest(soa.tau, lambda e: (0.5 * e + soa.I) @ soa.tau),
+    "products with sums": lambda soa: nest(soa.tau, lambda e: (0.5 * e + soa.I) @ soa.tau, 3000),
     "I alone": lambda soa: nest(soa.I, lambda e: (0.9999 * e).T) @ pc.identity(soa.Theta),
 }
 
