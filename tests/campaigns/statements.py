@@ -23,7 +23,9 @@ from wrong_formulas import TRUE  # noqa: E402
 import pycraft as pc  # noqa: E402
 from campaigns.command_line import seeds, tallied  # noqa: E402
 from pycraft.identities.edits import changed  # noqa: E402
-from pycraft.identities.formula import Misfit, Value, evaluate, read_formula, written_statement  # noqa: E402
+from pycraft.identities.formula import written_statement  # noqa: E402
+from pycraft.identities.formula_reading import read_formula  # noqa: E402
+from pycraft.identities.formula_values import Misfit, Value, evaluate  # noqa: E402
 from pycraft.identities.judge import BoundState, judge_states  # noqa: E402
 from pycraft.identities.parse import Statements  # noqa: E402
 from pycraft.models.state import State  # noqa: E402
