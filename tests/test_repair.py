@@ -10,7 +10,9 @@ import pycraft as pc
 from pycraft.identities.budget import Budget
 from pycraft.identities.edits import changed
 from pycraft.identities.family import Spec
-from pycraft.identities.formula import DenseLetters, Misfit, evaluate, read_formula, residual, written_statement
+from pycraft.identities.formula import written_statement
+from pycraft.identities.formula_reading import read_formula
+from pycraft.identities.formula_values import DenseLetters, Misfit, evaluate, residual
 from pycraft.identities.parse import Statements
 from pycraft.symbolic import prove
 from pycraft.symbolic.repair import nearest, small_models

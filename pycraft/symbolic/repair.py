@@ -17,7 +17,9 @@ from .. import _core
 from ..identities.budget import Budget
 from ..identities.edits import Slip, changed
 from ..identities.family import HYPOTHESES, Spec
-from ..identities.formula import DenseLetters, Formula, Misfit, read_formula, residual, written_statement
+from ..identities.formula import Formula, written_statement
+from ..identities.formula_reading import read_formula
+from ..identities.formula_values import DenseLetters, Misfit, residual
 from ..identities.tables import monospace, wrapped
 from ..identities.truth import in_words, truth_within
 from .prove import prove
