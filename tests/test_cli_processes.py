@@ -124,9 +124,9 @@ def test_a_reader_that_has_seen_enough():
 @pytest.mark.parametrize(
     ("package", "arguments", "words"),
     [
-        ("pinocchio", ["peers"], "needs the package pinocchio, which is not installed: pip install pycraft-soa[peers]"),
-        ("jupyterlab", ["lab"], "the lab needs the package jupyterlab, which is not installed: pip install pycraft-soa[lab]"),
-        ("mujoco", ["check", "{odd}.xml"], "by the package mujoco, which is not installed: pip install pycraft-soa[mjcf]"),
+        ("pinocchio", ["peers"], "needs the package pinocchio, which is not installed: pip install 'pycraft-soa[peers]'"),
+        ("jupyterlab", ["lab"], "the lab needs the package jupyterlab, which is not installed: pip install 'pycraft-soa[lab]'"),
+        ("mujoco", ["check", "{odd}.xml"], "by the package mujoco, which is not installed: pip install 'pycraft-soa[mjcf]'"),
     ],
 )
 def test_packages_that_are_not_there(tmp_path, package, arguments, words):

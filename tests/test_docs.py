@@ -52,14 +52,6 @@ def test_the_pages_run(page, examples):
 ROBOTS = ROOT / "pycraft" / "models" / "robots"
 
 
-def test_the_page_of_models_runs(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    Path("arm.urdf").write_text((ROBOTS / "panda.urdf").read_text())
-    with pytest.warns(pycraft.ModelWarning, match="left aside"):
-        result = doctest.testfile(str(ROOT / "docs" / "models.md"), module_relative=False, optionflags=doctest.ELLIPSIS)
-    assert result.failed == 0 and result.attempted > 15
-
-
 def test_what_the_page_of_algorithms_prints():
     text = (ROOT / "docs" / "algorithm.md").read_text()
     names = {}

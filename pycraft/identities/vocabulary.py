@@ -107,7 +107,7 @@ class Vocabulary:
         if name == "det":
             return "a determinant is read by its logarithm: ln det A"
         if name.startswith("\\"):
-            return f"the command {name} is not known here"
+            return f"the command {name.partition('_')[0]} is not known here"
         near = get_close_matches(name, [*self.names, *WITH_ARGUMENTS, *FUNCTIONS], cutoff=0.7)
         return f"no operator is called {name!r}" + (f"; the nearest names are {', '.join(near)}" if near else "")
 

@@ -230,7 +230,7 @@ class Elements:
             raise self.file.error(ours, f"{label(element)}: <pycraft> has the attribute {unknown[0]!r}; there is rotor_inertia")
         values, count = self.file.numbers(ours, "rotor_inertia", None, element), _COORDINATES[hinge]
         if len(values) != count:
-            what = f"has {count} coordinates and {len(values)} rotor inertias; write one value per coordinate"
+            what = f"takes {count} rotor inerti{'a' if count == 1 else 'as'}, one for each coordinate, not {len(values)}"
             raise self.file.error(ours, f"{label(element)} {what}")
         return values
 

@@ -292,7 +292,7 @@ def to_pdf(notebook: str | Path) -> Path:
     try:
         import nbconvert
     except ImportError:
-        raise _core.ModelError("PDF is made by nbconvert, which is not installed: pip install pycraft-soa[lab]") from None
+        raise _core.ModelError("PDF is made by nbconvert, which is not installed: pip install 'pycraft-soa[lab]'") from None
     reasons = []
     for exporter in (nbconvert.PDFExporter, nbconvert.WebPDFExporter):
         try:
