@@ -114,6 +114,19 @@ def test_no_change_makes_both_sides_the_same():
         assert all(left != right for (left, right), _ in changed(read_formula(text)))
 
 
+def test_a_number_is_turned_upside_down_and_no_more():
+    turned = [new for new, slip in changed(read_formula("2 φ = ψ")) if "number 2 upside down" in slip.words]
+    assert turned == [read_formula("φ/2 = ψ")]
+
+
+def test_one_slip_at_all_places_is_less_likely_than_at_one():
+    found = {slip.words: slip.cost for _, slip in changed(read_formula("[I-HφK]* D⁻¹ [I-HφK] = ℳ⁻¹"))}
+    everywhere = {words: cost for words, cost in found.items() if ", at all 2 places" in words}
+    assert everywhere
+    for words, cost in everywhere.items():
+        assert cost > min((c for w, c in found.items() if w.startswith(words.removesuffix(", at all 2 places")) and w != words), default=0)
+
+
 def test_inverses_that_exist_by_rounding_alone_are_none():
     _, dense = letters()
     for text in ("(E + 1e-14 I)⁻¹ = φ", "(HMH* - HMH*)⁻¹ = D"):
