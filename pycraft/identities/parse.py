@@ -18,6 +18,7 @@ from numbers import Real
 from typing import Any
 
 from .. import _core
+from .block_reading import refuse_by_block
 from .book import read_book
 from .spelling import Spelled, spelled
 from .vocabulary import FUNCTIONS, WITH_ARGUMENTS, Misread, ParseError, Vocabulary, decimal, power
@@ -54,6 +55,7 @@ class Statements:
         ParseError
             Nothing fits (the reasons of both readings are shown), or both do.
         """
+        refuse_by_block(text, self._vocabulary.own)
         found: list[Statement] = []
         reasons: dict[str, str] = {}
         place = ""
