@@ -145,10 +145,10 @@ def value(node: Node, blocks: Blocks, bodies: dict[str, int]) -> Block:
                 array = array + v.array
             return Block(array, values[0].codomain, values[0].domain, error + eps * len(values) * _norm(array))
         case Product(factors=factors):
-            made = value(factors[0], blocks, bodies)
+            whole = value(factors[0], blocks, bodies)
             for factor, before in zip(factors[1:], factors, strict=False):
-                made = _times(made, value(factor, blocks, bodies), (before, factor), eps)
-            return made
+                whole = _times(whole, value(factor, blocks, bodies), (before, factor), eps)
+            return whole
         case Sum(terms=terms, signs=signs):
             return _sum([value(term, blocks, bodies) for term in terms], signs, node, eps)
         case Power(inner=inner, exponent=-1):
