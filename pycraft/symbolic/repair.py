@@ -14,6 +14,7 @@ from html import escape
 from typing import Any
 
 from .. import _core
+from ..identities.block_reading import refuse_by_block
 from ..identities.budget import Budget
 from ..identities.edits import Slip, changed
 from ..identities.family import HYPOTHESES, Spec
@@ -131,6 +132,7 @@ def repair(statement: str, *, most: int = 3, budget: float = 5.0) -> Repairs:
           true where J = 0; proved
     """
     begin, spending = time.perf_counter(), Budget(budget)
+    refuse_by_block(statement)
     formula = read_formula(statement)
     models = small_models()
     result = Repairs(statement)
