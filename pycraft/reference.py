@@ -39,7 +39,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from .reference_forms import FORMS, articulated_inertia  # noqa: F401
+from .reference_forms import FORMS, articulated_inertia  # noqa: F401 - names of this module, too
 from .reference_numbers import converted, epsilon, in_doubles, inv, mpmath_context, smallest_singular_value
 from .reference_spatial import (  # noqa: F401
     Q_SIZE,
