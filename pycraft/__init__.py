@@ -22,6 +22,7 @@ import pkgutil
 # In a source checkout the folder `pycraft` hides the installed package: its compiled core is found all the same.
 if importlib.util.find_spec("pycraft._core") is None:
     __path__ = pkgutil.extend_path(__path__, __name__)
+del importlib, pkgutil  # no names of the workbench
 
 from . import _core, interop, models, robots
 from ._core import (

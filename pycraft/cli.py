@@ -110,7 +110,7 @@ def check(
 ) -> None:
     """Check every theorem on a model, or the displayed equations of a LaTeX paper (a .tex file, on random trees).
 
-    Exit status 1 if something fails that should hold, 3 if something is undecided.
+    Exit status 1 if something fails that should hold, 3 if something is undecided, or undefined on the model.
     """
     check_least(0, states=states, seed=seed)
     wide = int(precision) if precision.isdecimal() else precision

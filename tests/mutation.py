@@ -80,7 +80,7 @@ def main():
         return 0
 
     build = running.kept_or_built(ROOT, options, [m for m in everything if not m.python], show)
-    left = {(m.file, m.begin, m.change): i for i, m in enumerate(build.mutants)}
+    left = {(m.file, m.begin, m.change): i for i, m in enumerate(build.mutants) if m not in build.dropped}
     numbers = {m.key: left[m.file, m.begin, m.change] for m in everything if not m.python and (m.file, m.begin, m.change) in left}
     mutants = chosen(options, [m for m in everything if m.python or m.key in numbers])
     notes = running.noted(build, options, show)

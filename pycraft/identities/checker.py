@@ -88,10 +88,10 @@ def check_theorem(
     try:
         found = judge_states(lhs, rhs, states, vectors, **options)
     except _core.SingularHingeError as error:
-        finding.verdict, finding.note = "undefined", str(error)
+        finding.verdict, finding.note = UNDEFINED, str(error)
     except _core.SingularOperatorError as error:
         # Outside its hypotheses a theorem may ask for an inverse that is not there: one way to fail.
-        finding.verdict, finding.note = "expected to fail" if unmet else "undefined", str(error)
+        finding.verdict, finding.note = "expected to fail" if unmet else UNDEFINED, str(error)
     else:
         finding.judged(found)
         if unmet:
@@ -136,7 +136,7 @@ def check(
         refute it; where no hypothesis saves it, for the smallest that meets all of them
     precision : the first scalar beside double in which residuals are taken, "extended", "quad", 50 or 100 digits. Where it does not decide,
         the wider ones are tried in turn: extended costs about twice a run in double, quad 20, 50 digits 60 and 100 digits 100 times.
-    budget : seconds for that search
+    budget : CPU seconds for each part of that search: where it is true, and the smallest refutation. The report says where it ended one.
 
     Returns
     -------
@@ -153,6 +153,8 @@ def check(
     from .search import named_vectors, statement_text
 
     check_wider(precision)
+    if states < 1:
+        raise _core.EvaluationError(f"states is {states}: a statement is checked at one state at least")
     text = statement if isinstance(statement, str) else f"{statement[0].text()} == {statement[1].text()}"
     if model is None:
         if not isinstance(statement, str):
@@ -232,7 +234,11 @@ def _explain(report: CheckReport, text: str, **options: Any) -> None:
     except (_core.EvaluationError, _core.SpaceError, _core.ModelError):
         report.notes.append("it cannot be read on random trees: no smaller counterexample was looked for")
     else:
-        report.true_where = saving(found, options.get("traits"))
+        if found is None:
+            spent = f"after {options['budget']:g} s of CPU time (budget={options['budget']:g})"
+            report.notes.append(f"the search for hypotheses under which it is true ended {spent}")
+        else:
+            report.true_where = saving(found, options.get("traits"))
 
 
 def run(read: Statement, operators: Any, states: int, seed: int, precision: str | int) -> Verdict:

@@ -75,7 +75,7 @@ def findings_table(findings: Sequence[Any]) -> Any:
     table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 1, 0, 0))
     table.add_column("theorem", overflow="fold", ratio=1)
     for header, justify in (("residual", "right"), ("bound", "right"), ("in", "left"), ("verdict", "left")):
-        table.add_column(header, justify=justify, no_wrap=True, overflow="ignore")  # type: ignore[arg-type]
+        table.add_column(header, justify=justify, no_wrap=True, overflow="ignore")  # type: ignore[arg-type]  # rich's literal
     group = None
     for f in findings:
         if f.group != group:
@@ -103,7 +103,7 @@ def text_of(renderable: Any, width: int = WIDTH) -> str:
 
     console = Console(file=StringIO(), width=width, color_system=None, force_jupyter=False)
     console.print(renderable)
-    return "\n".join(line.rstrip() for line in console.file.getvalue().splitlines()).strip("\n")  # type: ignore[attr-defined]
+    return "\n".join(line.rstrip() for line in console.file.getvalue().splitlines()).strip("\n")  # type: ignore[attr-defined]  # a StringIO
 
 
 _COLORS = {"true": "#2a7", "FALSE": "#c22", "undecided": "#c90", "not said": "#999"}

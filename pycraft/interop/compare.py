@@ -45,7 +45,7 @@ class ModelComparison:
     bounds: dict[str, float] = field(default_factory=dict)
 
     def __bool__(self) -> bool:
-        return all(self.in_common[name] <= self.bounds[name] for name in self.in_common)
+        return bool(self.in_common) and all(self.in_common[name] <= self.bounds[name] for name in self.in_common)
 
     @property
     def worst(self) -> float:
@@ -207,6 +207,8 @@ def _compare_at(result: ModelComparison, model: Any, common: Any, twin: Twin, st
 
 
 def _relative(a: np.ndarray, b: np.ndarray) -> float:
+    if not (np.isfinite(a).all() and np.isfinite(b).all()):
+        return float("inf")
     scale = max(np.abs(a).max(initial=0.0), np.abs(b).max(initial=0.0))
     return float(np.abs(a - b).max(initial=0.0) / scale) if scale > 0 else 0.0
 

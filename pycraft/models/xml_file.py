@@ -156,10 +156,10 @@ class XmlFile:
         if value is None and default is not None:
             return default
         try:  # most are one word, and a large file has millions
-            number = float(value)  # type: ignore[arg-type]
+            number = float(value)  # type: ignore[arg-type]  # None is caught
         except (TypeError, ValueError):
             number = math.nan
-        if math.isfinite(number) and value.isascii() and "_" not in value:  # type: ignore[union-attr]
+        if math.isfinite(number) and value.isascii() and "_" not in value:  # type: ignore[union-attr]  # finite, so no None
             return number
         return self._floats(element, attribute, value, 1, owner, infinite)[0]
 

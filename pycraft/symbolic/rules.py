@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
+from typing import Any
 
 from . import mechanics
 from .axioms import Theory, solved, theory
@@ -21,6 +22,10 @@ from .words import FIRST, ONE, Alphabet, Number, Polynomial, Word, add_to, deriv
 
 WORDS, REWRITES = 2000, 12000
 """Sizes at which a reduction gives up; `generous` allows for more."""
+REMEMBERED = 50000
+"""How many words it is known of where a rule fits."""
+_UNSEEN = 1 << 30
+"""No group's rank."""
 _allowed: ContextVar[int] = ContextVar("allowed", default=1)
 
 
@@ -144,24 +149,30 @@ class Budget:
     rewrites: int = field(default_factory=lambda: REWRITES * _allowed.get())
 
 
-@dataclass
 class Rules:
-    """Rules by the first letter of the word that they replace, in all and by group."""
+    """Rules by the first letter of the word that they replace, and by group: own ones, and those of `base`, which change no more."""
 
-    by_first: dict[str, list[Rule]] = field(default_factory=dict)
-    _groups: dict[int, dict[str, list[Rule]]] = field(default_factory=dict)
-    _best: dict[Word, int | None] = field(default_factory=dict)
+    def __init__(self, base: Rules | None = None):
+        self._base = base
+        self._by_first: dict[str, list[Rule]] = {}
+        self._groups: dict[int, dict[str, list[Rule]]] = {}
+        self._lengths: dict[str, set[int]] = {}
+        self._ranks: dict[Word, int] = {}
+        self._best: dict[Word, int | None] = {}
+        self._places: dict[int, dict[Word, tuple[int, Rule] | None]] = {}
 
     def copy(self) -> Rules:
-        copied = Rules()
-        for rule in self.all():
-            copied.add(rule)
-        return copied
+        """Rules that may be added to; these must not be, from here on."""
+        return Rules(self)
 
     def add(self, rule: Rule) -> None:
-        self.by_first.setdefault(rule.word[0], []).append(rule)
-        self._groups.setdefault(rule.group, {}).setdefault(rule.word[0], []).append(rule)
+        first = rule.word[0]
+        self._by_first.setdefault(first, []).append(rule)
+        self._groups.setdefault(rule.group, {}).setdefault(first, []).append(rule)
+        self._lengths.setdefault(first, set()).add(len(rule.word))
+        self._ranks[rule.word] = min(rule.group, self._ranks.get(rule.word, rule.group))
         self._best.clear()
+        self._places.pop(rule.group, None)
 
     def add_equation(self, equation: Equation, word: Word, alphabet: Alphabet, group: int) -> None:
         """Its rule, and its transpose's where the two do not lead in a circle."""
@@ -171,16 +182,43 @@ class Rules:
         if star != word and all(w != star for w, _ in rule.to):
             self.add(rule_from(equation.transposed(alphabet), star, group))
 
+    def beginning(self, letter: str) -> list[Rule]:
+        """The rules for words that begin with a letter."""
+        below = [] if self._base is None else self._base.beginning(letter)
+        return below + self._by_first[letter] if letter in self._by_first else below
+
     def all(self) -> list[Rule]:
-        return [rule for rules in self.by_first.values() for rule in rules]
+        """Every rule, by first letters."""
+        return [rule for letter in self._letters() for rule in self.beginning(letter)]
+
+    def _letters(self) -> dict[str, list[Rule]]:
+        return self._by_first if self._base is None else {**self._base._letters(), **self._by_first}
 
     def best(self, word: Word) -> int | None:
         """The first group in rank that fits anywhere."""
-        if word not in self._best:
-            if len(self._best) > 50000:
-                self._best.clear()
-            self._best[word] = min((rule.group for _, rule in _fitting(word, self.by_first)), default=None)
-        return self._best[word]
+        found: int | None = self._best.get(word, _UNSEEN)
+        if found == _UNSEEN:
+            found = None if self._base is None else self._base.best(word)
+            for place, letter in enumerate(word):
+                for length in self._lengths.get(letter, ()):
+                    rank = self._ranks.get(word[place : place + length])
+                    if rank is not None and (found is None or rank < found):
+                        found = rank
+            _remember(self._best, word, found)
+        return found
+
+    def of(self, rank: int) -> Rules:
+        """The rules among which those of a group are: groups of a statement's own are others than those of all."""
+        return self if self._base is None or rank in self._groups else self._base.of(rank)
+
+    def place(self, word: Word, rank: int) -> tuple[int, Rule] | None:
+        """(place, rule) of the group's rule that fits leftmost; of several there, the one that was added first."""
+        places = self._places.setdefault(rank, {})
+        if word in places:
+            return places[word]
+        rules = self._groups[rank]
+        fitting = ((at, rule) for at, x in enumerate(word) for rule in rules.get(x, ()) if word[at : at + len(rule.word)] == rule.word)
+        return _remember(places, word, next(fitting, None))
 
     def reduce(self, p: Polynomial, alphabet: Alphabet, budget: Budget | None = None) -> tuple[Polynomial, list[Step]]:
         """(the normal form, the steps that lead there).
@@ -219,14 +257,14 @@ class Rules:
         """One equation, at every place in these words."""
         done: Polynomial = {}
         uses: list[Use] = []
-        rules = self._groups[group]
+        rules = self.of(group)
         for start, x in p.items():
             todo = [(start, x)]
             if start not in where:
                 add_to(done, *todo.pop())
             while todo:
                 word, c = todo.pop()
-                found = next(_fitting(word, rules), None)
+                found = rules.place(word, group)
                 if found is None:
                     add_to(done, word, c)
                     continue
@@ -240,12 +278,11 @@ class Rules:
         return Step(p, done, uses, alphabet)
 
 
-def _fitting(word: Word, rules: dict[str, list[Rule]]) -> Iterator[tuple[int, Rule]]:
-    """(place, rule) of what fits, leftmost first."""
-    for place, letter in enumerate(word):
-        for rule in rules.get(letter, ()):
-            if word[place : place + len(rule.word)] == rule.word:
-                yield place, rule
+def _remember(where: dict[Word, Any], word: Word, found: Any) -> Any:
+    if len(where) > REMEMBERED:
+        where.clear()
+    where[word] = found
+    return found
 
 
 def normal_form(p: Polynomial, rules: Rules, alphabet: Alphabet) -> Polynomial:

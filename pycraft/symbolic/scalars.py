@@ -325,7 +325,7 @@ class ScalarRules:
         if word[1].startswith("I["):
             return
         for turned in self._rotations(word):
-            for rule in self.local.rules.by_first.get(turned[0], ()):
+            for rule in self.local.rules.beginning(turned[0]):
                 if rule.word[0] in self._symmetric and len(rule.word) == 1:
                     continue
                 if turned[: len(rule.word)] == rule.word and (rule.group < 0 or all(weight(w) < weight(rule.word) for w, _ in rule.to)):

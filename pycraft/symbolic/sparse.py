@@ -105,7 +105,7 @@ class Matrix:
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Matrix) and self.shape == other.shape and not any((self - other).rows)
 
-    __hash__ = None  # type: ignore[assignment]
+    __hash__ = None  # type: ignore[assignment]  # how Python spells unhashable
 
     def eliminated(self, right: Matrix) -> tuple[Matrix, Any]:
         """A⁻¹B and det A, by Gauss and Jordan on entries reduced at every step.

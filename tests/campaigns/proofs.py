@@ -1,14 +1,21 @@
-"""Proofs against a hostile stream of statements: `python tests/campaigns/proofs.py --seeds N [--first K]`.
+"""Proofs against a hostile stream of statements: `python tests/campaigns/proofs.py --seeds N [--first K] [--jobs J] [--to FILE]`.
 
 For every seed a random true identity outside the catalogue (`random_identities`: axioms and lemmas applied at random to random words), said
 of operators, of inverses, traces, norms or determinants, must be proved; and a statement one step from it (a letter exchanged, a sign
 turned, a star dropped, a number changed, an inverse set around a part) must not be proved, unless dense NumPy finds it true on models that
-meet the hypotheses of the proof. Prints what was not found, and what was proved and is false; exits with 1 where anything false was.
+meet the hypotheses of the proof. Says every minute how far it is, what was not found, and what was proved and is false; exits with 1
+where anything false was. With --to, what came of each seed is a line of that file, and seeds that are there already are not run again.
+
+A statement costs some 50 ms: 1000 seeds are about 3500 statements, three minutes of one core; 42000 are 10⁵ perturbed ones, two hours.
 """
 
 import argparse
+import contextlib
 import functools
+import json
+import multiprocessing
 import operator
+import os
 import sys
 import time
 from dataclasses import dataclass, field
@@ -17,12 +24,12 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
-from perturbations import dense, exchanges, nodes, replaced  # noqa: E402
-from random_identities import J0, identity_pair, meeting, tree  # noqa: E402
+from perturbations import dense, exchanges, nodes, replaced
+from random_identities import J0, identity_pair, meeting, tree
 
-import pycraft as pc  # noqa: E402
-from pycraft.symbolic import prove  # noqa: E402
-from pycraft.symbolic.values import NoValue, transferred  # noqa: E402
+import pycraft as pc
+from pycraft.symbolic import prove
+from pycraft.symbolic.values import NoValue, transferred
 
 BOUND = 1e-7
 """What a proved statement may be off by, relative to its sides, on small models: their condition is below 1e6."""
@@ -39,8 +46,23 @@ class Tally:
     proved: int = 0
     perturbed: int = 0
     proved_perturbed: int = 0
+    seconds: float = 0.0
     unproved: list = field(default_factory=list)
     false_proofs: list = field(default_factory=list)
+
+    def add(self, other):
+        """All of it, and of another one."""
+        for name, value in vars(other).items():
+            setattr(self, name, getattr(self, name) + value)
+        return self
+
+    def __str__(self):
+        rate = 1000 * self.seconds / max(self.true + self.perturbed, 1)
+        return (
+            f"{self.proved} of {self.true} true statements proved, not found, or under more hypotheses: {self.unproved}; "
+            f"{self.perturbed} perturbed, {self.proved_perturbed} of them proved, {len(self.false_proofs)} of these false; "
+            f"{rate:.0f} ms of a core each"
+        )
 
 
 def statement(seed):
@@ -116,30 +138,33 @@ def is_false(proof, lhs, rhs, reduction):
     return False
 
 
-def run(first, seeds, tally, seconds=float("inf")):
-    """Seeds first, first + 1, ..., until the time is over."""
-    begin = time.perf_counter()
-    for seed in range(first, first + seeds):
-        if time.perf_counter() - begin > seconds:
-            break
-        lhs, rhs, kind, hypotheses = statement(seed)
-        proof = prove(*said(*about(lhs, rhs, kind, _own(lhs))))
-        tally.true += 1
-        tally.proved += bool(proof)
-        if not proof or not {*proof.hypotheses} <= {*hypotheses}:
-            tally.unproved.append(seed)
-        rng = np.random.default_rng([seed, 1])
-        for _ in range(3):
-            other = perturbed(rng, rhs)
-            if other is None or (other.domain, other.codomain) != (lhs.domain, lhs.codomain):
-                continue
-            claim = about(lhs, other, kind, _own(lhs))
-            proof = prove(*said(*claim))
-            tally.perturbed += 1
-            tally.proved_perturbed += bool(proof)
-            if proof and is_false(proof, *claim):
-                tally.false_proofs.append((seed, str(proof)))
+def tried(seed):
+    """What came of one seed."""
+    tally, begin = Tally(), time.process_time()
+    lhs, rhs, kind, hypotheses = statement(seed)
+    proof = prove(*said(*about(lhs, rhs, kind, _own(lhs))))
+    tally.true += 1
+    tally.proved += bool(proof)
+    if not proof or not {*proof.hypotheses} <= {*hypotheses}:
+        tally.unproved.append(seed)
+    rng = np.random.default_rng([seed, 1])
+    for _ in range(3):
+        other = perturbed(rng, rhs)
+        if other is None or (other.domain, other.codomain) != (lhs.domain, lhs.codomain):
+            continue
+        claim = about(lhs, other, kind, _own(lhs))
+        proof = prove(*said(*claim))
+        tally.perturbed += 1
+        tally.proved_perturbed += bool(proof)
+        if proof and is_false(proof, *claim):
+            tally.false_proofs.append((seed, str(proof)))
+    tally.seconds = time.process_time() - begin
     return tally
+
+
+def run(seeds):
+    """What came of these seeds together."""
+    return functools.reduce(Tally.add, map(tried, seeds), Tally())
 
 
 def _own(e):
@@ -150,18 +175,60 @@ def _own(e):
     return OperatorSet(source, source.model)
 
 
-def main():
+def _numbered(seed):
+    return seed, tried(seed)
+
+
+def known(path):
+    """What a file says of seeds: a line each, the last of which may have been cut off."""
+    found = {}
+    for line in path.read_text().splitlines() if path is not None and path.exists() else ():
+        try:
+            seed, values = json.loads(line)
+        except json.JSONDecodeError:
+            continue
+        found[seed] = Tally(**values)
+    return found
+
+
+def results(seeds, jobs, path):
+    """The tally of each seed, as they come; those that the file has first."""
+    found = known(path)
+    yield from (tally for seed, tally in found.items() if seed in seeds)
+    left = [seed for seed in seeds if seed not in found]
+    with contextlib.ExitStack() as open_here:
+        lines = open_here.enter_context(open(path or os.devnull, "a"))
+        if jobs > 1:
+            pool = open_here.enter_context(multiprocessing.get_context("spawn").Pool(jobs))
+        for seed, tally in pool.imap_unordered(_numbered, left) if jobs > 1 else map(_numbered, left):
+            lines.write("\n" * (seed == left[0]) + json.dumps([seed, vars(tally)]) + "\n")
+            lines.flush()
+            yield tally
+
+
+def main(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=1000)
     parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--seconds", type=float, default=float("inf"))
-    arguments = parser.parse_args()
-    tally = run(arguments.first, arguments.seeds, Tally(), arguments.seconds)
-    print(f"proved {tally.proved} of {tally.true} true statements; not found, or under more hypotheses: {tally.unproved}")
-    print(f"{tally.perturbed} perturbed statements, {tally.proved_perturbed} of them proved, {len(tally.false_proofs)} of these false")
-    for seed, text in tally.false_proofs:
-        print(f"seed {seed}: {text}")
-    return 1 if tally.false_proofs else 0
+    parser.add_argument("--seconds", type=float, default=float("inf"), help="of wall time, after which no further seed is begun")
+    parser.add_argument("--jobs", type=int, default=1, help="processes")
+    parser.add_argument("--to", type=Path, help="a file of results: what it has is not run again")
+    parser.add_argument("--every", type=float, default=60.0, help="seconds between lines that say how far it is")
+    given = parser.parse_args(arguments)
+    total, begin = Tally(), time.perf_counter()
+    said_at = begin
+    for tally in results(range(given.first, given.first + given.seeds), given.jobs, given.to):
+        total.add(tally)
+        for seed, text in tally.false_proofs:
+            print(f"FALSE, seed {seed}: {text}", flush=True)
+        now = time.perf_counter()
+        if now - said_at > given.every:
+            said_at = now
+            print(f"{now - begin:.0f} s, {total.true} of {given.seeds} seeds: {total}", flush=True)
+        if now - begin > given.seconds:
+            break
+    print(total, flush=True)
+    return 1 if total.false_proofs else 0
 
 
 if __name__ == "__main__":

@@ -85,7 +85,6 @@ EQUIVALENT = {
         "a refinement of an elimination need only shrink",
         "",
     ): "corrections of rounding more, no digit else",
-    ("pycraft/identities/book.py", "a sign bound to the whole sum", ""): "every term but the first has its sign before it",
 }
 
 
