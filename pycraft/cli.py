@@ -151,7 +151,7 @@ def bench(seconds: Annotated[float, typer.Option(help="Seconds per figure.")] = 
     for heading, figures in results.items():
         table = Table(title=heading, title_justify="left", box=None, header_style="bold")
         for column, justify in (("figure", "left"), ("measured", "right"), ("bound", "right"), ("", "left")):
-            table.add_column(column, justify=justify)  # type: ignore[arg-type]
+            table.add_column(column, justify=justify)  # type: ignore[arg-type]  # rich's words
         for figure in figures:
             missed += [] if figure.passed else [figure]
             style = "" if figure.passed else "bold red"

@@ -4,6 +4,7 @@ import doctest
 import importlib
 import pkgutil
 import re
+import textwrap
 from pathlib import Path
 
 import pytest
@@ -47,6 +48,13 @@ def test_the_pages_run(page, examples):
     options = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
     result = doctest.testfile(str(ROOT / "docs" / f"{page}.md"), module_relative=False, optionflags=options)
     assert result.failed == 0 and result.attempted > examples
+
+
+def test_help_starts_with_what_to_type():
+    typed, rest = pycraft.__doc__.split("What to type::")[1].split("\n\n", 2)[1:]
+    names = {}
+    exec(textwrap.dedent(typed), names)
+    assert names["MM"].shape == (7, 7) and "pc.check(" in typed and "doctest" not in typed and "arm.soa?" in rest
 
 
 ROBOTS = ROOT / "pycraft" / "models" / "robots"
