@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import pycraft as pc
+from pycraft.identities.directions import coordinates_meant
 from pycraft.identities.parse import ParseError, Statements
 
 
@@ -228,3 +229,12 @@ def test_statements_on_random_trees():
 def test_without_a_search_there_is_no_counterexample(model):
     report = pc.check("φ == ψ", model, search=False)
     assert not report and report.counterexample is None and report.bound < 1e-9 < report.worst
+
+
+def test_the_coordinates_that_are_meant():
+    """i is the last of its hinge, so that those before it turn with it; j is outboard of it."""
+    assert coordinates_meant(pc.tree([-1, 0, 1], ["pin", "ball", "pin"]).soa) == (3, 4)
+    assert coordinates_meant(pc.tree([-1, 0, 1, 0], ["pin", "universal", "pin", "free"]).soa) == (2, 3)
+    assert coordinates_meant(pc.chain(1).soa) == (0, 0)
+    with pytest.raises(pc.ModelError, match="no coordinate"):
+        coordinates_meant(pc.tree([-1], "weld").soa)
