@@ -137,9 +137,9 @@ class _WithArguments:
         if directions is not None:
             if self._name != "Lambda":
                 raise _core.EvaluationError(f"{self._name} takes no directions; Lambda does")
-            return _directed_inertia(self._operators, _listed(argument), directions)  # type: ignore[arg-type]
+            return _directed_inertia(self._operators, _listed(argument), directions)  # type: ignore[arg-type]  # _listed checks
         if self._name != "Delta":
-            return source.symbol(self._name, nodes=_listed(argument))  # type: ignore[arg-type]
+            return source.symbol(self._name, nodes=_listed(argument))  # type: ignore[arg-type]  # _listed checks
         if isinstance(argument, str):
             names = source.coordinate_names
             if argument not in names:

@@ -39,9 +39,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from .reference_forms import FORMS, articulated_inertia  # noqa: F401
+from .reference_forms import FORMS, articulated_inertia  # noqa: F401 - part of this module's face
 from .reference_numbers import converted, epsilon, in_doubles, inv, mpmath_context, smallest_singular_value
-from .reference_spatial import (  # noqa: F401
+from .reference_spatial import (  # noqa: F401 - part of this module's face
     Q_SIZE,
     V_SIZE,
     crf,

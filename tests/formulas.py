@@ -200,7 +200,7 @@ class Letters:
         return tuple(getattr(self, name) for name in names.split())
 
     @property
-    def I(self):  # noqa: E743
+    def I(self):
         return Formula(self.soa.I, 1.0, 0.0)
 
     def constant(self, array, domain, codomain, name="C"):

@@ -22,7 +22,7 @@ def about(axis, angle):
 
 
 def numbers(array):
-    exact = lambda row: [mpf(float(x)) for x in row]  # noqa: E731
+    exact = lambda row: [mpf(float(x)) for x in row]
     return matrix([exact(row) for row in array] if hasattr(array[0], "__len__") else exact(array))
 
 

@@ -46,7 +46,7 @@ def draw(choose, letters, domain, codomain, depth) -> Formula:
     if depth <= 0:
         kinds = ["product"]
     kind = choose(kinds)
-    go = lambda a, b: draw(choose, letters, a, b, depth - 1)  # noqa: E731
+    go = lambda a, b: draw(choose, letters, a, b, depth - 1)
     if kind == "leaf":
         return choose(simple)()
     if kind == "product":

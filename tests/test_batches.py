@@ -65,7 +65,7 @@ def test_zeros_identities_and_constants_have_the_batch(batch):
 
 def test_the_innermost_binding_wins_over_what_hangs_on_no_state(batch):
     model, Q, V = batch
-    D, I = model.soa("D I")  # noqa: E741
+    D, I = model.soa("D I")
     inner = D.at(Q, V) + I
     assert np.array_equal(inner.at(Q[:2], V[:2]).dense(), inner.dense())
     with pytest.raises(pc.EvaluationError, match="batches of"):

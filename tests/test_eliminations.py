@@ -21,7 +21,7 @@ def chain():
 def test_corrections_go_on_while_they_shrink():
     """ℳ − λ I beside an eigenvalue, in single: an elimination with three digits."""
     arm = chain()
-    H, phi, M, I = arm.soa("H phi M I")  # noqa: E741
+    H, phi, M, I = arm.soa("H phi M I")
     MM = H @ phi @ M @ phi.T @ H.T
     op = (MM - float(np.linalg.eigvalsh(MM.dense())[0]) * (1 + 2e-4) * I).inv()
     exact = op.at(arm.q, precision=50) @ X
@@ -60,7 +60,7 @@ def test_states_that_are_lost_as_a_whole_are_found(ratio, seed):
 
 def test_every_state_of_a_batch_has_residuals_of_its_own():
     arm = chain()
-    H, phi, M, I = arm.soa("H phi M I")  # noqa: E741
+    H, phi, M, I = arm.soa("H phi M I")
     MM = H @ phi @ M @ phi.T @ H.T
     Q = np.random.default_rng(1).uniform(-1, 1, (3, 6))
     for op in ((MM + 0.1 * I).inv(), MM.inv()):

@@ -51,8 +51,8 @@ def epsilon(precision):
 def massless_inner_bodies():
     """A spherical shoulder of three pins on massless bodies, askew with offset points; a massless slider further out, and branches."""
     rng = np.random.default_rng(5)
-    solid = lambda m: dict(mass=m, com=0.2 * rng.normal(size=3), inertia=random_inertia(rng, m))  # noqa: E731
-    pin = lambda: [subhinge("pin", rng.normal(size=3), 0.3 * rng.normal(size=3))]  # noqa: E731
+    solid = lambda m: dict(mass=m, com=0.2 * rng.normal(size=3), inertia=random_inertia(rng, m))
+    pin = lambda: [subhinge("pin", rng.normal(size=3), 0.3 * rng.normal(size=3))]
     bodies = [
         body("yaw", -1, pin(), mass=0.0),
         body("pitch", 0, pin(), mass=0.0, position=[0.1, 0, 0.2]),
@@ -67,8 +67,8 @@ def massless_inner_bodies():
 def rotors_on_some():
     """J on all coordinates of a hinge, on one of two, on none; and a massless tip that only J makes regular."""
     rng = np.random.default_rng(6)
-    solid = lambda m: dict(mass=m, com=0.2 * rng.normal(size=3), inertia=random_inertia(rng, m))  # noqa: E731
-    pin = lambda: subhinge("pin", rng.normal(size=3), 0.3 * rng.normal(size=3))  # noqa: E731
+    solid = lambda m: dict(mass=m, com=0.2 * rng.normal(size=3), inertia=random_inertia(rng, m))
+    pin = lambda: subhinge("pin", rng.normal(size=3), 0.3 * rng.normal(size=3))
     bodies = [
         body("base", -1, [subhinge("free")], **solid(3.0)),
         body("upper", 0, [pin(), pin()], position=[0.2, 0, 0], rotor=[0.4, 0.0], **solid(1.0)),
@@ -221,7 +221,7 @@ def test_bare_trees_in_quad(shape, with_J):
 def test_semidefinite_blocks(form):
     """Inertias without full rank, zero among them, and J on some coordinates of a hinge, on bare blocks."""
     rng = np.random.default_rng(9)
-    thin = lambda s, r: (lambda X: X @ X.T)(np.round(rng.normal(size=(s, r)) * 16) / 16)  # noqa: E731  exact, so exactly semidefinite
+    thin = lambda s, r: (lambda X: X @ X.T)(np.round(rng.normal(size=(s, r)) * 16) / 16)
     parents, sizes, dof = [-1, 0, 1, 1, 0], [6, 4, 5, 3, 6], [2, 1, 2, 3, 1]
     E = [None, *[rng.normal(size=(sizes[p], s)) / np.sqrt(s) for p, s in zip(parents[1:], sizes[1:], strict=True)]]
     H = [rng.normal(size=(n, s)) for n, s in zip(dof, sizes, strict=True)]

@@ -144,7 +144,7 @@ def checking():
 
 
 def proving():
-    H, phi, psi, K, I, M, D = pc.chain(2, seed=1).soa("H phi psi K I M D")  # noqa: E741
+    H, phi, psi, K, I, M, D = pc.chain(2, seed=1).soa("H phi psi K I M D")
     left = H @ phi @ M @ psi.T @ H.T @ (I - H @ psi @ K).T
     return lambda: pc.prove(left @ left, D @ (I + H @ phi @ K) @ D)
 

@@ -106,7 +106,9 @@ def test_norms_follow_the_vectors():
     assert found == [5.0, 40.0]
 
 
-def test_theorems_are_judged_at_the_present_state_and_at_those_drawn():
+def test_theorems_are_judged_at_the_present_state_and_at_those_drawn(monkeypatch):
+    some = pc.OperatorSet.theorems
+    monkeypatch.setattr(pc.OperatorSet, "theorems", lambda self: some(self)[:12])
     model = pc.chain(2)
     judged = [f.states for f in model.soa.check(states=2).findings if f.states]
     assert judged and set(judged) == {3}
@@ -221,9 +223,12 @@ def far(distance):
     return arm
 
 
+@pytest.mark.parametrize("every", [3, pytest.param(1, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", ["far", "water", "heavy tip"])
-def test_derived_bounds_hold(name):
-    """In double and in the scalar that decided: a true theorem's residual is below the bound."""
+def test_derived_bounds_hold(name, every, monkeypatch):
+    """In double and in the scalar that decided: a true theorem's residual is below the bound. Every day every third of them."""
+    theorems = pc.OperatorSet.theorems
+    monkeypatch.setattr(pc.OperatorSet, "theorems", lambda self: theorems(self)[::every])
     model = {"far": lambda: far(1e4), "water": water, "heavy tip": lambda: heavy_tip(5, 1e6)}[name]()
     report = model.soa.check(states=1)
     assert report, report.failed

@@ -28,7 +28,7 @@ def transition(rng, n, radius):
 def system(seed, n=3, m=2, p=2, steps=12, radius=0.9, varying=False, rank=None):
     """Arguments of a random model."""
     rng = np.random.default_rng(seed)
-    many = lambda make, count: np.array([make() for _ in range(count)]) if varying else make()  # noqa: E731
+    many = lambda make, count: np.array([make() for _ in range(count)]) if varying else make()
     return dict(
         A=many(lambda: transition(rng, n, radius), steps - 1),
         B=many(lambda: rng.normal(size=(n, p)), steps - 1),
@@ -60,7 +60,7 @@ class Joint:
     """Mean and covariance of all states and measurements of a model, dense, forward in time."""
 
     def __init__(self, A, B, C, Q, R, x0, P0, steps):
-        at = lambda x, t: x if x.ndim == 2 else x[t]  # noqa: E731
+        at = lambda x, t: x if x.ndim == 2 else x[t]
         n, m = at(A, 0).shape[0] if A.size else len(x0), at(C, 0).shape[0]
         self.n, self.m, self.steps = n, m, steps
         Phi = np.eye(steps * n)  # x = Phi (noises; first state)
@@ -237,7 +237,7 @@ def statsmodels_results(arguments, y, smooth=True):
     n, m, p = A.shape[-1], C.shape[-2], Q.shape[-1]
     model = KalmanSmoother(k_endog=m, k_states=n, k_posdef=p)
     model.bind(np.asfortranarray(y.T))  # (k_endog, nobs)
-    over = lambda x: np.moveaxis(np.concatenate([x, x[-1:]]) if len(x) == len(y) - 1 else x, 0, -1) if x.ndim == 3 else x  # noqa: E731
+    over = lambda x: np.moveaxis(np.concatenate([x, x[-1:]]) if len(x) == len(y) - 1 else x, 0, -1) if x.ndim == 3 else x
     model["transition"], model["selection"], model["design"] = over(A), over(B), over(C)
     model["state_cov"], model["obs_cov"] = over(Q), over(R)
     model.tolerance = 0  # its shortcut to the steady state is off by more than rounding

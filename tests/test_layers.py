@@ -1,6 +1,7 @@
 """Dependencies point one way (architecture.md, Layout): a grep of the C++ includes, the Python imports and the build's flags."""
 
 import ast
+import functools
 import pathlib
 import re
 
@@ -25,6 +26,11 @@ CORE = ["spatial", "algebra", "model", "operators", "recursions", "dynamics"]
 PEERS = {"pinocchio", "mujoco", "example_robot_data"}
 
 
+@functools.cache
+def parsed(path):
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
 def sources(folder):
     return sorted(path for path in (CPP / folder).rglob("*") if path.suffix in (".h", ".cpp"))
 
@@ -42,7 +48,7 @@ def modules():
 def imports(path):
     """(absolute module of the import, the node) of every import of a module, also inside functions."""
     package = ["pycraft", *path.relative_to(PYTHON).parent.parts]
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(parsed(path)):
         if isinstance(node, ast.Import):
             for alias in node.names:
                 yield alias.name, node
@@ -137,7 +143,7 @@ def test_other_tools_are_imported_by_interop_alone():
 def test_peers_are_not_needed_to_import_the_package():
     """Other tools are optional: they are imported inside functions."""
     for path in modules():
-        tree = ast.parse(path.read_text(encoding="utf-8"))
+        tree = parsed(path)
         for node in tree.body:
             if isinstance(node, ast.Import | ast.ImportFrom):
                 names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else [node.module or ""]
@@ -150,7 +156,7 @@ def test_what_takes_long_to_import_is_imported_where_it_is_used():
     for path in modules():
         if path.name.startswith("reference") or path.relative_to(PYTHON).parts[0] == "symbolic":
             continue
-        tree = ast.parse(path.read_text(encoding="utf-8"))
+        tree = parsed(path)
         for node in tree.body:
             named = [a.name for a in node.names] if isinstance(node, ast.Import) else []
             named += [node.module or ""] if isinstance(node, ast.ImportFrom) and not node.level else []
@@ -166,7 +172,7 @@ def test_python_imports_point_one_way():
     }
     for path in modules():
         first = path.relative_to(PYTHON).parts[0]
-        tree = ast.parse(path.read_text(encoding="utf-8"))
+        tree = parsed(path)
         top = {id(node) for node in tree.body}
         for name, node in imports(path):
             target = name.split(".")[1] if name.startswith("pycraft.") else ""
@@ -179,6 +185,20 @@ def test_nothing_prints_but_the_command_line():
     for path in modules():
         if path.name in ("cli.py", "__main__.py") or path.relative_to(PYTHON).parts[0] == "cli":
             continue
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in ast.walk(parsed(path)):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
                 assert node.func.id != "print", f"{path.relative_to(ROOT)}:{node.lineno} prints"
+
+
+def test_every_exception_to_a_check_says_why():
+    """`noqa: code - why`, `type: ignore[code]  # why`; what is skipped is told by the call itself."""
+    exception = re.compile(r"# (noqa|type: ignore|pragma)\b(?P<rest>.*)")
+    reasoned = re.compile(r"(: [A-Z]+\d+(, [A-Z]+\d+)* - \w+|\[[\w-]+\]  # \w+)")
+    paths = [path for folder in ("pycraft", "tests", "cpp") for path in sorted((ROOT / folder).rglob("*.py"))]
+    without, made = [], 0
+    for path in paths:
+        for line in path.read_text(encoding="utf-8").splitlines() if path.name != "test_layers.py" else ():
+            for m in exception.finditer(line):
+                made += 1
+                without += [] if reasoned.match(m["rest"]) else [f"{path.relative_to(ROOT)}: {line.strip()}"]
+    assert made > 20 and without == []

@@ -3,9 +3,10 @@
 import ast
 import random
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
-from mutants import building, cpp_places, listed, python_places, switches
+from mutants import building, cpp_places, listed, python_places, running, switches
 
 ROOT = Path(__file__).parent.parent
 
@@ -48,3 +49,68 @@ def test_places_of_python():
 )
 def test_an_expression_becomes_a_switch(right, wrong, switched):
     assert listed.switched(right, wrong) == switched
+
+
+@pytest.fixture(scope="module")
+def small_build(tmp_path_factory):
+    """A tree with a package and tests of its own; the tool's plugin is that of here."""
+    tree = tmp_path_factory.mktemp("tree")
+    for name, text in {
+        "pyproject.toml": "[tool.pytest.ini_options]\nmarkers = ['slow', 'peers']",
+        "pycraft/__init__.py": "",
+        "tests/test_some.py": "def test_right(): pass\ndef test_wrong(): assert 0\ndef test_wrong_too(): assert 0\n",
+        "tests/test_end.py": "import os\ndef test_end(): os.abort()\n",
+    }.items():
+        (tree / name).parent.mkdir(exist_ok=True)
+        (tree / name).write_text(text, encoding="utf-8")
+    (tree / "tests/mutants").symlink_to(ROOT / "tests/mutants")
+    return SimpleNamespace(tree=tree)
+
+
+@pytest.mark.parametrize(
+    ("tests", "by"),
+    [
+        (["test_some.py::test_right", "test_some.py::test_gone", "test_gone.py::test_gone"], ""),
+        (["test_some.py::test_right", "test_some.py::test_wrong_too", "test_some.py::test_wrong"], "tests/test_some.py::test_wrong_too"),
+        (["test_some.py::test_right", "test_end.py::test_end"], "crash: tests/test_end.py::test_end"),
+    ],
+)
+def test_a_mutant_is_killed_by_a_test_that_fails_and_not_by_one_that_is_gone(small_build, tests, by):
+    tests = [f"tests/{name}" for name in tests]
+    files = [name for name in dict.fromkeys(t.split("::")[0] for t in tests) if (small_build.tree / name).exists()]
+    assert running.pytest_run(small_build, files, 60, tests, first=True).by() == by
+
+
+@pytest.mark.parametrize(
+    ("status", "lines", "by"),
+    [
+        (pytest.ExitCode.OK, ["began a", "began b"], ""),
+        (pytest.ExitCode.USAGE_ERROR, [], ""),  # a file that is gone
+        (pytest.ExitCode.NO_TESTS_COLLECTED, [], ""),
+        (pytest.ExitCode.TESTS_FAILED, ["began a", "began b", "red b"], "b"),
+        (pytest.ExitCode.USAGE_ERROR, ["red tests/test_a.py"], "tests/test_a.py"),  # it cannot be imported
+        (-11, ["began a", "began b"], "crash: b"),
+        (None, ["began a"], "no end: a"),
+        (3, ["began a"], "exit status 3: a"),
+        (running.NOT_IMPORTED, [], "import pycraft"),
+    ],
+)
+def test_what_turned_red(status, lines, by):
+    assert running.Run(status, "", lines).by() == by
+
+
+def test_a_copy_of_the_tree_keeps_no_test_that_is_gone(tmp_path):
+    gone = tmp_path / "tests/test_gone.py"
+    gone.parent.mkdir()
+    gone.touch()
+    building.copy_of_tree(ROOT, tmp_path)
+    assert not gone.exists() and (tmp_path / "tests/test_mutants.py").is_file()
+
+
+def test_the_table_names_tests_and_no_place_of_this_machine():
+    text = (ROOT / "tests/mutation.md").read_text(encoding="utf-8")
+    killers = [row.split(" | ")[1].removesuffix(" |") for row in text.split("## Listed by hand")[1].splitlines()[4:]]
+    assert killers and "/tree/" not in text
+    for by in killers:
+        file = by.split(": ")[-1].split("::")[0]
+        assert by in ("survived", "not executed", "import pycraft") or (ROOT / file).is_file(), by

@@ -81,8 +81,13 @@ def same_expression(model):
 INNER = [another_state, present_state_moved, another_model, dying_model, batch, same_expression]
 
 
-@pytest.mark.parametrize("inner", INNER)
-@pytest.mark.parametrize("bound", [False, True])
+EVERY_DAY = list(zip(INNER, [True, False] * 3, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("inner", "bound"),
+    [*EVERY_DAY, *(pytest.param(inner, not bound, marks=pytest.mark.slow) for inner, bound in EVERY_DAY)],
+)
 def test_a_run_within_an_operator_from_outside(inner, bound):
     """Σ of terms before and after the operator from outside, so that the run goes on with its values when it comes back."""
     model = every_kind()

@@ -141,7 +141,7 @@ def test_operators_outlive_the_name_of_their_model():
     soa = pc.chain(3).soa
     H = soa.H
     gc.collect()
-    assert H.dense().shape == (3, 18) and soa.check()
+    assert H.dense().shape == (3, 18) and pc.check("HψMψ*H* == D", soa)
     assert pickle.loads(pickle.dumps(H)).shape == (3, 18)
     assert pc.check("HψMψ*H* == D", pc.chain(2).soa)
 

@@ -150,7 +150,7 @@ def test_uniform_chain_in_closed_form():
     arm = pc.chain(n)
     H, phi, M = arm.soa("H phi M")
     # rod k covers [k, k+1]: ℳ_ij = Σ_{k >= max(i,j)} ∫_k^{k+1} (x - i)(x - j) dx
-    cubic = lambda x, i, j: x**3 / 3 - (i + j) * x**2 / 2 + i * j * x  # noqa: E731
+    cubic = lambda x, i, j: x**3 / 3 - (i + j) * x**2 / 2 + i * j * x
     expected = [[sum(cubic(k + 1, i, j) - cubic(k, i, j) for k in range(max(i, j), n)) for j in range(n)] for i in range(n)]
     dense = (H @ phi @ M @ phi.T @ H.T).dense()
     assert np.abs(dense - expected).max() <= 48 * n * EPS * norm(expected)

@@ -180,7 +180,7 @@ def test_unknown_names(model):
             make()
     assert soa.Delta("hinge3") == soa.Delta(model.coordinate_names.index("hinge3"))
     with pytest.raises(AttributeError, match="operator of mechanics"):
-        getattr(pc.sko_model([-1], [None], [np.eye(1)], [np.eye(1)]), "V_tilde")  # noqa: B009
+        getattr(pc.sko_model([-1], [None], [np.eye(1)], [np.eye(1)]), "V_tilde")  # noqa: B009 - the call is what is tested
 
 
 def test_states_of_the_wrong_size(model):

@@ -4,7 +4,7 @@ import pytest
 
 pytest.importorskip("pinocchio")
 
-from pycraft.interop import peers  # noqa: E402 - after the check that the extra is there
+from pycraft.interop import peers
 
 pytestmark = pytest.mark.peers
 

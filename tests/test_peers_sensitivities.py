@@ -19,8 +19,8 @@ import pytest
 pin = pytest.importorskip("pinocchio")
 
 import pycraft as pc  # noqa: E402 - after the check that the extra is there
-from pycraft.interop import peers  # noqa: E402
-from pycraft.interop import pinocchio as convention  # noqa: E402
+from pycraft.interop import peers  # noqa: E402 - as above
+from pycraft.interop import pinocchio as convention  # noqa: E402 - as above
 
 pytestmark = [pytest.mark.peers, pytest.mark.filterwarnings("ignore::pycraft.ModelWarning")]
 
@@ -225,7 +225,7 @@ def test_mass_matrix_by_parameters_of_bodies(pairs):
     mass_matrix, slope = H @ phi @ M @ phi.T @ H.T, p.mass_columns()
     for k, body in [*enumerate(p.model.bodies.values())][:: max(1, len(p.model.bodies) // 3)]:
         m, c = body.mass, body.com
-        moment = lambda A: A[np.triu_indices(3)]  # noqa: E731
+        moment = lambda A: A[np.triu_indices(3)]
         turn = np.zeros((3, 3))
         turn[0, 2] = turn[2, 0] = 1
         square = np.outer(np.eye(3)[1], c) + np.outer(c, np.eye(3)[1])

@@ -189,12 +189,12 @@ class Expression:
             return lambda: Expression(pc.blockdiag(self.op))
         return lambda: Expression(getattr(self.op, name)())
 
-    def _binary(name):  # noqa: N805
+    def _binary(name):
         return lambda self, other: Expression(getattr(self.op, name)(getattr(other, "op", other)))
 
     for verb in ("__matmul__", "__mul__", "__rmul__", "__add__", "__sub__", "__truediv__", "__pow__"):
         locals()[verb] = _binary(verb)
-    __neg__ = lambda self: Expression(-self.op)  # noqa: E731
+    __neg__ = lambda self: Expression(-self.op)
 
 
 def bare_constants(o, n):

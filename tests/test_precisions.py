@@ -186,9 +186,9 @@ def test_digits_that_there_are_not():
     x = np.ones(2)
     for wrong in (60, 200, 0, "60 digits", None):
         for call in (
-            lambda: multibody.forward_dynamics(x, x, x, precision=wrong),  # noqa: B023
-            lambda: multibody.soa.D.at(x, precision=wrong),  # noqa: B023
-            lambda: multibody.mass_matrix_inverse(x, precision=wrong),  # noqa: B023
+            lambda: multibody.forward_dynamics(x, x, x, precision=wrong),  # noqa: B023 - called before the next
+            lambda: multibody.soa.D.at(x, precision=wrong),  # noqa: B023 - called before the next
+            lambda: multibody.mass_matrix_inverse(x, precision=wrong),  # noqa: B023 - called before the next
         ):
             with pytest.raises((pc.Error, TypeError)) as error:
                 pytest.fail(str(call()))

@@ -39,6 +39,6 @@ def test_the_command_says_how_far_it_is_and_goes_on_where_it_stopped(tmp_path, c
 
 @pytest.mark.slow
 def test_many_true_statements_are_proved_and_nothing_false_is():
-    tally = proofs.run(range(10, 250))
+    tally = proofs.run(range(10, 110))
     assert not tally.false_proofs, tally.false_proofs
-    assert tally.proved >= 0.99 * tally.true and tally.perturbed > 400
+    assert tally.proved >= 0.99 * tally.true and tally.perturbed > 150

@@ -167,8 +167,8 @@ def test_heavy_tips_on_hinges_of_several_coordinates(kind):
             state = multibody.random_state(seed)
             tau = np.random.default_rng(seed).normal(size=multibody.nv)
             exact = multibody.forward_dynamics(state.q, state.v, tau, precision=50)
-            error = lambda **way: np.linalg.norm(  # noqa: E731
-                multibody.forward_dynamics(state.q, state.v, tau, **way) - exact) / np.linalg.norm(exact)  # noqa: B023  # fmt: skip
+            error = lambda **way: np.linalg.norm(
+                multibody.forward_dynamics(state.q, state.v, tau, **way) - exact) / np.linalg.norm(exact)  # noqa: B023 - called before the next  # fmt: skip
             assert error(form="ud") <= floor(multibody.nv)
             assert error(form="square-root") <= floor(multibody.nv) + EPS * np.sqrt(ratio)
             assert error(form="square-root", refine=1) <= floor(multibody.nv)
@@ -225,7 +225,7 @@ def test_a_hundred_links(folded):
     q, v, tau = drawn(multibody, 1)
     q, v = q * folded, v * folded  # straight, forces of 1e9 that cancel would be another case: the next one
     exact = multibody.forward_dynamics(q, v, tau, precision=50)
-    error = lambda **way: np.linalg.norm(multibody.forward_dynamics(q, v, tau, **way) - exact) / np.linalg.norm(exact)  # noqa: E731
+    error = lambda **way: np.linalg.norm(multibody.forward_dynamics(q, v, tau, **way) - exact) / np.linalg.norm(exact)
     assert 1e-12 < error() < 1e-5
     assert error(refine=1) <= floor(100) and error(form="ud") <= floor(100)
     assert error(form="square-root") <= 10 * floor(100) and error(form="square-root", refine=1) <= floor(100)
@@ -238,7 +238,7 @@ def test_a_stretched_chain_needs_a_wider_residual(n):
     q, zero, first = np.zeros(n), np.zeros(n), np.eye(n)[0]
     tau = multibody.inverse_dynamics(q, zero, first, precision="quad")
     exact = multibody.forward_dynamics(q, zero, tau, precision=50)
-    error = lambda **way: np.linalg.norm(multibody.forward_dynamics(q, zero, tau, **way) - exact)  # noqa: E731
+    error = lambda **way: np.linalg.norm(multibody.forward_dynamics(q, zero, tau, **way) - exact)
     for form in FORMS:
         unrefined, same, wider = error(form=form), error(form=form, refine=2), error(form=form, refine=2, residual="wider")
         assert 1e-12 < unrefined < 1e-7 and wider <= max(unrefined / 300, floor(n))
@@ -254,7 +254,7 @@ def test_quad_refined_once_has_the_digits_of_quad():
     inverse = (H @ phi @ M @ phi.T @ H.T).inv()
     with mpmath.workdps(DIGITS):
         for precision, eps in (("extended", 2.0**-63), ("quad", 2.0**-112)):
-            value = lambda **way: inverse.at(q, precision=precision, **way).dense(dtype=object) @ x  # noqa: B023, E731
+            value = lambda **way: inverse.at(q, precision=precision, **way).dense(dtype=object) @ x  # noqa: B023 - called before the next
             assert relative_error(value(refine=1), exact) <= floor(10, eps)
             assert relative_error(value(refine=1, residual="wider"), exact) <= floor(10, eps)
             assert relative_error(value(), exact) > 10 * floor(10, eps)
@@ -395,8 +395,8 @@ def test_single_precision_with_a_wider_residual():
             state = multibody.random_state(seed)
             draw = state.q, state.v, np.random.default_rng(seed).normal(size=multibody.nv)
             exact = multibody.forward_dynamics(*draw, precision="quad")
-            error = lambda **way: np.linalg.norm(  # noqa: E731
-                multibody.forward_dynamics(*draw, precision="single", **way) - exact) / np.linalg.norm(exact)  # noqa: B023  # fmt: skip
+            error = lambda **way: np.linalg.norm(
+                multibody.forward_dynamics(*draw, precision="single", **way) - exact) / np.linalg.norm(exact)  # noqa: B023 - called before the next  # fmt: skip
             assert error(refine="auto", residual="wider") <= single, (multibody.name, seed)
             assert error() <= 1e3 * single * amplification(letters_of(multibody, draw[0]).o)
 
@@ -408,7 +408,7 @@ def test_refinement_of_what_needs_none(name, form):
     answer."""
     if name == "massless inner bodies":
         rng = np.random.default_rng(8)
-        pin = lambda: [subhinge("pin", rng.normal(size=3), 0.3 * rng.normal(size=3))]  # noqa: E731
+        pin = lambda: [subhinge("pin", rng.normal(size=3), 0.3 * rng.normal(size=3))]
         solid = dict(mass=2.0, com=[0.1, 0.2, 0.3], inertia=random_inertia(rng, 2.0))
         multibody = pc.Multibody.from_description(
             model([body("a", -1, pin(), mass=0.0), body("b", 0, pin(), mass=0.0), body("c", 1, pin(), **solid)], (1, 2, 3))

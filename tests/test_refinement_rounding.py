@@ -17,7 +17,7 @@ import pycraft as pc
 
 sys.path.insert(0, str(Path(__file__).parent / "campaigns"))
 
-import refinement as campaign  # noqa: E402
+import refinement as campaign
 
 FORMS = campaign.FORMS
 each_form = pytest.mark.parametrize("form", FORMS)
@@ -37,14 +37,14 @@ def run_campaign(seeds):
 
 
 def test_no_value_is_spoiled_and_no_error_understated():
-    """Twelve of each family; and refinement is of use, or leaving everything as it is would pass."""
-    assert run_campaign(range(12 * len(campaign.FAMILIES))) > 300
+    """Three of each family; and refinement is of use, or leaving everything as it is would pass."""
+    assert run_campaign(range(3 * len(campaign.FAMILIES))) > 50
 
 
 @pytest.mark.slow
 def test_no_value_is_spoiled_and_no_error_understated_in_three_hundred_cases():
     """A part of the five thousand of `make campaigns`."""
-    run_campaign(range(84, 384))
+    assert run_campaign(range(300)) > 1000
 
 
 @pytest.mark.parametrize("seed", [807, 1073, 1647, 1808])
@@ -52,7 +52,7 @@ def test_eliminations_are_refined_to_rounding(seed):
     """(ℳ + D)⁻¹x of nearly stretched chains: corrections from a residual in double were rounding, 4 times the error of before them."""
     run_campaign([seed])
     _, multibody, q, _, tau = campaign.case(seed)
-    H, phi, M, I = multibody.soa("H phi M I")  # noqa: E741
+    H, phi, M, I = multibody.soa("H phi M I")
     shifted = (H @ phi @ M @ phi.T @ H.T + 0.1 * I).inv()
     exact = shifted.at(q, precision=50) @ tau
     for way in campaign.WAYS:
@@ -89,7 +89,7 @@ def test_a_satellite_keeps_its_digits(form):
     """Correct to 1e-15 or not, the value is as good refined as it was, and the report covers it."""
     multibody, q, v, tau = bus(7700.0)
     exact = multibody.forward_dynamics(q, v, tau, form="ud", precision=50)
-    off = lambda value: np.linalg.norm(value - exact) / np.linalg.norm(exact)  # noqa: E731
+    off = lambda value: np.linalg.norm(value - exact) / np.linalg.norm(exact)
     unrefined = off(multibody.forward_dynamics(q, v, tau, form=form))
     for way in campaign.WAYS:
         found = multibody.refinement(q, v, tau, form=form, **way)
@@ -137,7 +137,7 @@ def test_a_wide_gather_is_enough_for_a_stretched_chain(n, bound):
     rods, zero = pc.chain(n), np.zeros(n)
     tau = rods.inverse_dynamics(zero, zero, np.eye(n)[0], precision="quad")
     exact = rods.forward_dynamics(zero, zero, tau, form="ud", precision=50)
-    off = lambda value: np.linalg.norm(value - exact) / np.linalg.norm(exact)  # noqa: E731
+    off = lambda value: np.linalg.norm(value - exact) / np.linalg.norm(exact)
     H, phi, M, J = rods.soa("H phi M J")
     inverse = (H @ phi @ M @ phi.T @ H.T + J).inv()
     for form in FORMS:

@@ -302,9 +302,10 @@ def nearly_dependent(rng):
 
 
 @each_form
-def test_hinges_that_nearly_undo_each_other(form):
+@pytest.mark.parametrize("seeds", everyday(150, slow=[1500]))
+def test_hinges_that_nearly_undo_each_other(seeds, form):
     answers = 0
-    for seed in range(1500):
+    for seed in range(seeds):
         rng = np.random.default_rng(seed)
         try:
             arm = nearly_dependent(rng)
@@ -312,7 +313,7 @@ def test_hinges_that_nearly_undo_each_other(form):
             continue
         q = rng.normal(size=arm.nv) * np.where(rng.random(arm.nv) < 0.6, 10.0 ** rng.uniform(-10, 0), 1.0)
         answers += right_or_refused(arm, q, rng.normal(size=arm.nv), form)
-    assert answers > 750
+    assert answers > seeds / 2
 
 
 def test_what_leaves_the_range_of_its_numbers_is_no_result():

@@ -94,6 +94,7 @@ MISREAD = [
     ("inv phi", r"inv needs its operand in parentheses: inv\(A\)", 0),
     ("φ B", r"B needs its arguments, as in B\(body\)", 2),
     ("φ† M", "not understood at '†", 1),
+    (r"\int_0^1 D", r"the command \\int is not known", 0),
     ("M_1", "no operator is called 'M_1'", 0),
 ]
 

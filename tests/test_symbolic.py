@@ -319,7 +319,7 @@ def test_what_has_no_closed_form_is_said():
     with pytest.raises(TypeError, match="not of list"):
         forms.evaluate([1])
     with pytest.raises(AttributeError, match="no closed form is called 'Q'"):
-        forms.Q  # noqa: B018
+        forms.Q  # noqa: B018 - asking raises
     with pytest.raises(pc.ModelError, match="names= takes 2, not 1"):
         symbolic(model, "a")
     with pytest.raises(pc.ModelError, match="no parameter is called"):
@@ -337,7 +337,7 @@ def test_what_has_no_closed_form_is_said():
     with pytest.raises(pc.SingularHingeError, match="hinge 'a' of body 'a'"):
         massless = pc.Multibody("massless")
         massless.add_body("a", mass=1.0)
-        symbolic(massless).D  # noqa: B018
+        symbolic(massless).D  # noqa: B018 - asking raises
 
 
 def test_blocks_by_name_and_how_it_shows():

@@ -55,7 +55,7 @@ def test_statements_are_checked_in_any_units(unit):
             inertia=mass * length**2 * np.diag([0.1, 0.2, 0.25]),
         )
     pair.q = (0.3, 0.4)
-    H, phi, M, psi, K, D, I = pair.soa("H phi M psi K D I")  # noqa: E741
+    H, phi, M, psi, K, D, I = pair.soa("H phi M psi K D I")
     MM = H @ phi @ M @ phi.T @ H.T
     S = I - H @ psi @ K
     dense = np.asarray(MM.dense())

@@ -60,7 +60,7 @@ def tiers(op, request):
 
 
 def test_no_elimination_is_planned(tree):
-    H, phi, M, J, D, psi, K, Omega, I = letters(tree)  # noqa: E741
+    H, phi, M, J, D, psi, K, Omega, I = letters(tree)
     MM = H @ phi @ M @ phi.T @ H.T
     moved = MM + J
     S = I - H @ psi @ K

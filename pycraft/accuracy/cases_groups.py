@@ -78,7 +78,7 @@ def _case(name: str, hard: str, quantity: str, measure: Callable[[Iterable[int],
     """The length of a large rotation vector is rounded, too: hence θ in the bound."""
     bounds = tuple(
         Bound((_label(angle),), "worst", f"{factor:g} (1 + θ) eps" if angle >= 1 else f"{factor:g} eps", partial(_limit, factor, angle))
-        for angle in measure.args[0]  # type: ignore[attr-defined]
+        for angle in measure.args[0]  # type: ignore[attr-defined]  # a partial's
     )
     return MeasuredCase(name, FAMILY, hard, {}, measure, quantity, f"{DIGITS} digits, closed form", bounds, "exponential of SO(3), SE(3)")
 

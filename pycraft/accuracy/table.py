@@ -256,7 +256,8 @@ def _states(model: Any, q: Any, v: Any, tau: Any, seed: int) -> tuple[np.ndarray
     q, v, tau, batch = motion_state(model, q, v, tau[0] if np.ndim(tau) == 2 and len(tau) == 1 else tau)
     if batch == (0,):
         raise _core.ModelError(f"no state given: the arrays of {model.name!r} have no rows")
-    return tuple(np.ascontiguousarray(np.broadcast_to(a, (*(batch or (1,)), a.shape[-1]))) for a in (q, v, tau))  # type: ignore[return-value]
+    q, v, tau = (np.ascontiguousarray(np.broadcast_to(a, (*(batch or (1,)), a.shape[-1]))) for a in (q, v, tau))
+    return q, v, tau
 
 
 def ladder(table: AccuracyTable) -> list[dict[str, Any]]:

@@ -142,7 +142,7 @@ class TidyTable:
         width = terminal_width()
         console = Console(file=StringIO(), width=width, color_system=None, force_jupyter=False)
         console.print(self.table(width))
-        return "\n".join(line.rstrip() for line in console.file.getvalue().rstrip().split("\n"))  # type: ignore[attr-defined]
+        return "\n".join(line.rstrip() for line in console.file.getvalue().rstrip().split("\n"))  # type: ignore[attr-defined]  # a StringIO
 
     def _repr_html_(self) -> str:
         head = "".join(f"<th style='text-align:left'>{escape(heading)}</th>" for heading in self.shown.values())

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from . import step_blocks, step_realizations, step_vectors  # noqa: F401  (they register their writers)
+from . import step_blocks, step_realizations, step_vectors  # noqa: F401 - they register their writers
 from .cpp_source import CppSource
 from .formulas import At, Equation, Once, Operator, Product, Program, Quantity, Term, fused, pruned, reads
 from .letters import Workbook

@@ -364,7 +364,7 @@ class Program:
 
     inputs: list[Quantity] = field(default_factory=list)
     items: list[Item] = field(default_factory=list)
-    result: Quantity = None  # type: ignore[assignment]
+    result: Quantity = None  # type: ignore[assignment]  # set when it is written
     identity_columns: bool = False  # x is the identity
 
 

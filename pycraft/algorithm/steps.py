@@ -226,7 +226,8 @@ class Recursion:
         if step["symbol"]["name"] == "B":
             register = self.plan["registers"][step["out"]]
             columns = self.book.cut(register["columns"])
-        return self.models[step["context"]].letter(step["symbol"]["name"], tuple(step["symbol"]["arguments"]), columns)  # type: ignore[arg-type]
+        symbol = step["symbol"]
+        return self.models[step["context"]].letter(symbol["name"], tuple(symbol["arguments"]), columns)  # type: ignore[arg-type]  # JSON
 
     def operator(self, step: Step) -> Quantity:
         """The dense matrix of a step's operand."""

@@ -10,7 +10,7 @@ from fractions import Fraction
 from functools import lru_cache, reduce
 from typing import Any
 
-from lark import Lark, Token, Transformer, exceptions
+from lark import Lark, Token, Transformer, Tree, exceptions
 
 from .. import _core
 from .vocabulary import FUNCTIONS, SCALARS, WITH_ARGUMENTS, Misread, ParseError, Vocabulary, decimal, needs_arguments, power
@@ -67,7 +67,7 @@ def read_book(source: str, vocabulary: Vocabulary) -> list[Any]:
     if tower := re.search(r"(?<=\^)\d+\s*\^\s*-?\d", source):
         raise Misread("a power of a power needs parentheses", tower.start())
     try:
-        return _Evaluate(vocabulary).transform(_parser(tuple(sorted(vocabulary.names))).parse(source))
+        return _Evaluate(vocabulary).transform(_tree(source, tuple(sorted(vocabulary.names))))
     except exceptions.VisitError as error:
         if isinstance(error.orig_exc, (_core.Error, ParseError)):
             raise error.orig_exc from None
@@ -105,6 +105,12 @@ def _stumble(source: str, at: int, vocabulary: Vocabulary) -> Misread:
     if name and name not in vocabulary.names:
         return Misread(vocabulary.unknown(name), at)
     return Misread(f"not understood at {rest[:12]!r}", at)
+
+
+@lru_cache(maxsize=512)
+def _tree(source: str, names: tuple[str, ...]) -> Tree:
+    """The syntax tree of a text, found once: it is the same on every model, and a search reads a statement on dozens."""
+    return _parser(names).parse(source)
 
 
 @lru_cache(maxsize=4)

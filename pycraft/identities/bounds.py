@@ -16,12 +16,12 @@ sweep is made. Residuals are judged relative to the larger side, numbers relativ
 from __future__ import annotations
 
 from collections.abc import Callable
-from numbers import Real
 from typing import Any
 
 import numpy as np
 
 from .. import _core
+from .vocabulary import is_number
 
 EPSILON = _core.epsilons()
 """Epsilon of each precision by name."""
@@ -36,11 +36,19 @@ _RICCATI = {"P", "P_plus", "D", "G", "K", "tau", "tau_bar", "E_psi", "psi", "psi
 
 
 class Sizes:
-    """Norms of expressions at one state, remembered; and what rounding makes of them."""
+    """Norms of expressions at one state, remembered; and what rounding makes of them.
 
-    def __init__(self, bind: Callable[[_core.Operator], _core.Operator]):
-        self._bind = bind
-        self._norms: dict[Any, float] = {}
+    With `double` the norms of what is small are those of dense matrices of its parts: there are as many products as places in a
+    statement, and to plan each of them takes longer. What rounding can make of such a matrix is counted along with it, and is added to
+    its norm.
+    """
+
+    def __init__(self, bind: Callable[[Any], Any], double: bool = False):
+        self._bind, self._double = bind, double
+        self._norms: dict[Any, tuple[float, float | None]] = {}
+        self._least, self._uncounted, self._rough = False, False, False
+        self._norms_with_vectors: dict[Any, float] = {}
+        self._matrices: dict[Any, tuple[np.ndarray, float]] = {}
         self._amplification: dict[Any, float] = {}
         self._vectors: dict[str, Any] = {}
 
@@ -48,18 +56,94 @@ class Sizes:
         """The values of named vectors from here on."""
         if vectors != self._vectors:
             self._vectors = vectors
-            self._norms = {e: x for e, x in self._norms.items() if not _has_vectors(e)}
+            self._norms_with_vectors.clear()
 
     def norm(self, operator: _core.Operator) -> float:
         """Frobenius norm, estimated by a few random vectors where the operator is large."""
         if operator.kind == "identity":
             return float(np.sqrt(operator.shape[0]))
         if operator not in self._norms:
-            if _has_vectors(operator):
-                self._norms[operator] = self._norm_with_vectors(operator)
-            else:
-                self._norms[operator] = _norm(self._bind(operator))
-        return self._norms[operator]
+            if operator in self._norms_with_vectors or _has_vectors(operator):
+                if operator not in self._norms_with_vectors:
+                    self._norms_with_vectors[operator] = self._norm_with_vectors(operator)
+                self._uncounted = True
+                return self._norms_with_vectors[operator]
+            self._norms[operator] = self._norm(operator)
+        norm, off = self._norms[operator]
+        if off is None:
+            self._uncounted = True
+            return norm
+        self._rough |= off > 0.1 * norm
+        return max(0.0, norm - off) if self._least else norm + off
+
+    def of_sides(self, lhs: Any, rhs: Any) -> tuple[float, bool]:
+        """(the size of both sides, whether it is known to be that to a factor of two)."""
+        self._uncounted = self._rough = False
+        size = self.size(lhs) + self.size(rhs)
+        counted = not self._uncounted
+        if counted and self._rough:
+            self._least = True
+            counted = size <= 2 * (self.size(lhs) + self.size(rhs))
+            self._least = False
+        return size, counted
+
+    def _norm(self, operator: _core.Operator) -> tuple[float, float | None]:
+        """The norm of an expression, and what its rounding may be where that is counted."""
+        n = operator.shape[1]
+        if n > PROBE_ABOVE:
+            return float(np.linalg.norm(self._bind(operator) @ probes(n)) / np.sqrt(PROBES)), None
+        if self._double and max(operator.shape) <= DENSE_BELOW:
+            try:
+                matrix, off = self._matrix(operator)
+                return float(np.linalg.norm(matrix)), off
+            except (_core.SingularOperatorError, _core.SingularHingeError):
+                pass  # a part may have no value where the whole has one
+        return float(self._bind(operator).norm()), None
+
+    def _matrix(self, operator: _core.Operator) -> tuple[np.ndarray, float]:
+        """The matrix of an expression from those of what it is made of, and how far off it may be, as a norm."""
+        if operator not in self._matrices:
+            self._matrices[operator] = self._made(operator)
+        return self._matrices[operator]
+
+    def _made(self, operator: _core.Operator) -> tuple[np.ndarray, float]:
+        eps = EPSILON["double"]
+        parts = [self._matrix(child) for child in operator.children]
+        match operator.kind:
+            case "product":
+                made, off = parts[0]
+                size = np.linalg.norm(made)
+                for factor, its in parts[1:]:
+                    own = np.linalg.norm(factor)
+                    off = off * (own + its) + size * (its + len(factor) * eps * own)
+                    made = made @ factor
+                    size = np.linalg.norm(made)
+            case "sum":
+                made = np.sum([matrix for matrix, _ in parts], axis=0)
+                off = sum(its + len(parts) * eps * np.linalg.norm(matrix) for matrix, its in parts)
+            case "scaled":
+                c = float(operator.coefficient)
+                made, off = c * parts[0][0], abs(c) * parts[0][1]
+            case "transpose":
+                made, off = parts[0][0].T, parts[0][1]
+            case _:
+                made = self._bind(operator).dense()
+                off = self._off(operator, float(np.linalg.norm(made)), parts[0][1] if parts else 0.0)
+        return made, float(off)
+
+    def _off(self, operator: _core.Operator, norm: float, inner: float) -> float:
+        """How far off the value of an operator that is no product or sum may be: by its own sweep, and by `inner` of its operand."""
+        match operator.kind:
+            case "inverse":
+                return norm**2 * inner
+            case "sqrt":  # |√(x + e) - √x| is at most √e
+                return float(np.sqrt(inner))
+            case "function":  # linear in its operand: crm(x), lower½(X)
+                return 2 * inner
+            case "blockdiag":
+                return inner
+        growth = max([1.0, *(self.amplification(s) for s in sources(operator, True))])
+        return CONSTANT * max([6.0, *(sweep(s) for s in sources(operator))]) * EPSILON["double"] * growth * norm
 
     def _norm_with_vectors(self, operator: _core.Operator) -> float:
         # A column is told by its space: a row on a model of one degree of freedom has one column as well.
@@ -71,7 +155,7 @@ class Sizes:
                 case "sum":
                     return sum(norms)
                 case "scaled":
-                    return abs(operator.coefficient) * norms[0]
+                    return abs(float(operator.coefficient)) * norms[0]
                 case "transpose":
                     return norms[0]
                 case "function":  # crm(x) and its like
@@ -81,8 +165,8 @@ class Sizes:
 
     def size(self, side: Any) -> float:
         """The error of a side per unit of c · eps."""
-        if isinstance(side, Real):
-            return float(abs(side))
+        if is_number(side):
+            return abs(float(side))
         if isinstance(side, _core.Scalar):
             return self._scalar(side)
         children = side.children
@@ -195,18 +279,13 @@ def _has_vectors(operator: _core.Operator) -> bool:
 PROBE_ABOVE = 400
 """Columns up to which operators are compared entry by entry; larger ones are compared on random vectors."""
 PROBES = 8
+DENSE_BELOW = 120
+"""Rows and columns up to which the dense matrix of a product costs less than its plan."""
 
 
 def probes(dimension: int) -> np.ndarray:
     """Random vectors of signs (dimension, PROBES): the mean of |Ax|² over them is the squared Frobenius norm."""
     return np.random.default_rng(dimension).choice([-1.0, 1.0], (dimension, PROBES))
-
-
-def _norm(operator: _core.Operator) -> float:
-    n = operator.shape[1]
-    if n <= PROBE_ABOVE:
-        return float(operator.norm())
-    return float(np.linalg.norm(operator @ probes(n)) / np.sqrt(PROBES))
 
 
 def sources(side: Any, riccati: bool = False) -> list[Any]:
@@ -228,10 +307,11 @@ class Roundings:
     size : the errors of both sides per unit of c · eps, without what the Riccati sweep makes of them
     terms : of numbers, the size of what they are sums of; 0 of operators
     growth : what the Riccati sweep makes of its roundings, 1 where no side mentions a value of it
+    counted : whether the size is that, to a factor of two, for all that rounding can make of the norms
     """
 
     def __init__(self, lhs: Any, rhs: Any, sizes: Sizes):
-        self.size = sizes.size(lhs) + sizes.size(rhs)
+        self.size, self.counted = sizes.of_sides(lhs, rhs)
         self.terms = max(sizes.terms(lhs), sizes.terms(rhs)) if isinstance(lhs, _core.Scalar) else 0.0
         self.growth = max([1.0, *(sizes.amplification(s) for s in dict.fromkeys(sources(lhs, True) + sources(rhs, True)))])
         self._sweep = max([6.0, *(sweep(s) for s in dict.fromkeys(sources(lhs) + sources(rhs)))])

@@ -42,7 +42,7 @@ def check_model(operators: Any, *, states: int = 3, seed: int = 0, precision: st
     precision : the first scalar beside double, "extended", "quad", 50 or 100 digits
     progress : called with each theorem's name, if given
     """
-    _check_wider(precision)
+    check_wider(precision)
     source = operators._source
     model = operators._model
     report = Report(source.name, dict(source.traits))
@@ -60,7 +60,7 @@ def check_model(operators: Any, *, states: int = 3, seed: int = 0, precision: st
     return report
 
 
-def _check_wider(precision: str | int) -> None:
+def check_wider(precision: str | int) -> None:
     """A residual must be seen to fall: double beside double shows nothing."""
     names = list(_core.epsilons())
     _core.wider(precision)  # raises where there is no such precision
@@ -155,7 +155,7 @@ def check(
     """
     from .search import named_vectors, statement_text
 
-    _check_wider(precision)
+    check_wider(precision)
     if states < 1:
         raise _core.EvaluationError(f"states is {states}: a statement is checked at one state at least")
     text = statement if isinstance(statement, str) else f"{statement[0].text()} == {statement[1].text()}"

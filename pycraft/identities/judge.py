@@ -32,7 +32,7 @@ STAYS = 0.5
 RUNNING = 3
 """So many falls running are no chance: each is by the ratio of two epsilons, 2000 and more."""
 ROUNDING_NORMS = 1e-3
-"""A bound above this in double: the norms that it is made of are rounding themselves, and are taken again in quad."""
+"""A bound above this in double: norms that it is made of may be rounding themselves, and are taken again in quad."""
 HOLDS, FAILS, UNDECIDED = "holds", "fails", "undecided"
 
 
@@ -72,7 +72,7 @@ class BoundState:
     def sizes(self, precision: str | int, values: dict[str, list[float]]) -> Sizes:
         """Norms in one precision, shared by all statements at this state."""
         if precision not in self._sizes:
-            self._sizes[precision] = Sizes(lambda e: self.bind(e, precision))
+            self._sizes[precision] = Sizes(lambda e: self.bind(e, precision), precision == "double")
         self._sizes[precision].give(values)
         return self._sizes[precision]
 
@@ -176,12 +176,12 @@ class Scales:
         """
         made = self._roundings("double", precision in ("double", "extended"))
         sides = max(entries[1:])
-        trusted = made is not None and made.bound(made.size / max(sides, 1e-300), "double") <= ROUNDING_NORMS
-        if not trusted and precision not in ("double", "extended"):
+        self._entries.append((precision, entries[0], sides))
+        fall = self._sides_fall()
+        if precision not in ("double", "extended") and not (made is not None and self._trusted(made, sides, fall)):
             made = self._roundings(precision, True)
         assert made is not None
-        self._entries.append((precision, entries[0], sides))
-        vanishing = made.terms == 0 and self._sides_fall()
+        vanishing = made.terms == 0 and fall
         common = max(size / EPSILON[p] for p, _, size in self._entries) if vanishing else 0.0
         found = []
         for p, difference, size in self._entries:
@@ -189,6 +189,12 @@ class Scales:
             bound = made.bound(1.0 if common else made.size / max(scale, 1e-300), p) if scale > 0 else 0.0
             found.append(Taken(p, difference / scale if scale > 0 else difference, bound))
         return found, vanishing, made.growth
+
+    @staticmethod
+    def _trusted(made: Roundings, sides: float, fall: bool) -> bool:
+        """Whether norms of double can be judged by: they are no rounding. The size of sides that fall is not asked for."""
+        relative = 1.0 if made.counted or (fall and made.terms == 0) else made.size / max(sides, 1e-300)
+        return made.bound(relative, "double") <= ROUNDING_NORMS
 
     def _sides_fall(self) -> bool:
         """Whether both sides are zero, or were rounding in the last two precisions."""

@@ -179,8 +179,9 @@ class Report:
                 f"<td style='text-align:left'>{escape(', '.join(f.hypotheses))}</td>{numbers}"
                 f"<td style='text-align:left;color:{color[f.verdict]}'>{f.verdict}{note}</td></tr>"
             )
-        head = "<tr><th>theorem</th><th>hypotheses</th><th>double</th><th>decided</th><th>bound</th><th>verdict</th></tr>"
-        return f"<p><b>{escape(self.summary())}</b></p><table style='font-size:85%'>{head}{''.join(rows)}</table>"
+        left = "<th style='text-align:left'>"
+        head = f"<tr>{left}theorem</th>{left}hypotheses</th><th>double</th><th>decided</th><th>bound</th>{left}verdict</th></tr>"
+        return f"<p><b>{escape(self.summary()).replace(chr(10), '<br>')}</b></p><table style='font-size:85%'>{head}{''.join(rows)}</table>"
 
 
 @dataclass
@@ -250,8 +251,12 @@ class CheckReport:
         return f"FALSE, also where {in_words(met)}" if met else "FALSE"
 
     def __repr__(self) -> str:
+        return "\n".join([*map(wrapped, monospace(self.statement).split("\n")), *self.details()])
+
+    def details(self) -> list[str]:
+        """What the report says below the statement, line by line."""
         on = self.models[0] if len(self.models) == 1 else f"{len(self.models)} models"
-        lines = [monospace(self.statement), *read_as(self.statement, self.understood)]
+        lines = read_as(self.statement, self.understood)
         if self.verdict == FAILS:
             lines.append(f"  {self._headline()}")
             lines.append(f"  relative residual {self.worst:.1e} in double; in {self._decisive()}")
@@ -263,4 +268,4 @@ class CheckReport:
             narrow = f"; in double {self.worst:.1e}" if self.worst <= self.bound <= SHOWN else ""
             lines.append(f"  in {self._decisive()}{narrow}")
         lines += [f"  {note}" for note in self.notes]
-        return "\n".join(wrapped(line) if len(line) > WIDTH else line for part in lines for line in part.split("\n"))
+        return [wrapped(line) if len(line) > WIDTH else line for part in lines for line in part.split("\n")]

@@ -14,7 +14,6 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -26,6 +25,7 @@ from .family import DOF, HYPOTHESES, Spec, family, named_vectors, read_on
 from .judge import FAILS, BoundState, Verdict, judge, ladder
 from .parse import Statement
 from .tables import wrapped
+from .vocabulary import is_number
 
 __all__ = ["Counterexample", "named_vectors", "refutation", "smallest", "statement_text"]
 
@@ -97,7 +97,9 @@ class Counterexample:
         ]
         that = f" that meets {', '.join(h for h in HYPOTHESES if h in self.meets)}" if self.meets else ""
         counted = f"{self.tried} models, {self.states} states each"
-        if self.exhausted:
+        if self.exhausted and not self.tried:
+            lines.append(f"  no tree with a choice of hinge kinds{that} is smaller")
+        elif self.exhausted:
             lines += [f"  every smaller tree shape and choice of hinge kinds{that} was tried:", f"  {counted}"]
         else:
             lines.append("  no body of it can be left out and no hinge made simpler;")
@@ -114,7 +116,7 @@ def statement_text(read: Statement) -> str:
 
 def _side_text(side: Any) -> str:
     """A side as text; doubles that are not the decimals that they are written as by their ratios."""
-    if isinstance(side, Real):
+    if is_number(side):
         return str(Fraction(side))
     in_python = isinstance(side, _core.Operator)
 

@@ -88,9 +88,9 @@ class SensitivityCalls(DirectCalls):
             symbols = self.christoffel(q, precision=precision)
             return np.einsum("...ijk,...k->...ij", symbols, checked_forces(self, v, "v"))
         if form == "skew":
-            H, phi, M, turning, H_dot, cross = self.soa("H phi M Delta_theta_dot H_dot momentum_cross")  # type: ignore[attr-defined]
+            H, phi, M, turning, H_dot, cross = self.soa("H phi M Delta_theta_dot H_dot momentum_cross")  # type: ignore[attr-defined]  # the model's
             J = phi.T @ H.T
-            J_dot = phi.T @ (turning.T @ self.soa.phi_tilde.T @ H.T + H_dot.T)  # type: ignore[attr-defined]
+            J_dot = phi.T @ (turning.T @ self.soa.phi_tilde.T @ H.T + H_dot.T)  # type: ignore[attr-defined]  # the model's
             C = H @ phi @ (M @ J_dot + cross @ J)
             many = np.broadcast_shapes(np.shape(q)[:-1], np.shape(v)[:-1])  # one of them may be shared by the batch
             states = np.broadcast_to(q, (*many, np.shape(q)[-1])), np.broadcast_to(v, (*many, self.nv))
@@ -112,7 +112,7 @@ class SensitivityCalls(DirectCalls):
         """
         q, v = at_state(self, q)
         if p is None:
-            MM, J = self.soa("MM J")  # type: ignore[attr-defined]
+            MM, J = self.soa("MM J")  # type: ignore[attr-defined]  # the model's
             p = (MM + J).at(q, precision=precision) @ np.asarray(v, float)
         tau = np.zeros(self.nv) if tau is None else tau
         return self._sensitivities().hamiltonian(q, p, tau, precision)
@@ -124,7 +124,7 @@ class SensitivityCalls(DirectCalls):
         """
         q, v = at_state(self, q, v)
         tau = np.zeros(self.nv) if tau is None else tau
-        H, phi, K, psi, I = self.soa("H phi K psi I")  # type: ignore[attr-defined]
+        H, phi, K, psi, I = self.soa("H phi K psi I")  # type: ignore[attr-defined]  # the model's
         forces = checked_forces(self, tau) - self.bias_forces(q, v, precision=precision)
         whole, inverse = (I + H @ phi @ K).T, I - H @ psi @ K
         return whole.at(q, precision=precision) @ np.asarray(v, float), inverse.at(q, precision=precision) @ forces
@@ -136,8 +136,8 @@ class SensitivityCalls(DirectCalls):
         """
         q, v = at_state(self, q, v)
         tau = np.zeros(self.nv) if tau is None else tau
-        H, phi, K, psi, M, D, I = self.soa("H phi K psi M D I")  # type: ignore[attr-defined]
-        cross, V_bar, V_tilde = self.soa("momentum_cross V_bar V_tilde")  # type: ignore[attr-defined]
+        H, phi, K, psi, M, D, I = self.soa("H phi K psi M D I")  # type: ignore[attr-defined]  # the model's
+        cross, V_bar, V_tilde = self.soa("momentum_cross V_bar V_tilde")  # type: ignore[attr-defined]  # the model's
         root = D.sqrt()
         m, inverse = (I + H @ phi @ K) @ root, root.inv() @ (I - H @ psi @ K)
         J = phi.T @ H.T
@@ -177,7 +177,7 @@ class SensitivityCalls(DirectCalls):
     def inertial_parameters(self) -> np.ndarray:
         """π (10 n,) of the regressor, from the bodies' present mass properties."""
         rows = []
-        for body in self.bodies.values():  # type: ignore[attr-defined]
+        for body in self.bodies.values():  # type: ignore[attr-defined]  # the model's
             c, mass = body.com, body.mass
             about_origin = body.inertia + mass * (c @ c * np.eye(3) - np.outer(c, c))
             rows.append(np.r_[mass, mass * c, about_origin[np.triu_indices(3)]])

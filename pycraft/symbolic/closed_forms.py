@@ -219,7 +219,7 @@ class ClosedForms:
         if name == "reciprocal":
             return 1 / self._scalar(terms[0], given, simplify)
         matrix = self._matrix(operand, given)
-        show = lambda x: matrix.field.expression(x, simplify)  # noqa: E731
+        show = lambda x: matrix.field.expression(x, simplify)
         if name == "trace":
             return show(matrix.trace())
         if name == "logdet":
@@ -248,7 +248,7 @@ class ClosedForms:
         else:
             value = self._value(expression, given or {}, False)
         rates = self._letters.rates().sympy(False) * sympy.Matrix(direction)
-        turned = lambda e: self._again(sum((e.diff(x) * r for x, r in zip(self.q, rates, strict=True)), sympy.S.Zero))  # noqa: E731
+        turned = lambda e: self._again(sum((e.diff(x) * r for x, r in zip(self.q, rates, strict=True)), sympy.S.Zero))
         return value.applyfunc(turned) if isinstance(value, sympy.MatrixBase) else turned(value)
 
     def _again(self, e: Any) -> Any:

@@ -70,7 +70,7 @@ class Equation:
         if not mark and not base:
             return self
         if (mark, base) not in self._copies:
-            carried = lambda p: {marked(word, mark, base): c for word, c in p.items()}  # noqa: E731
+            carried = lambda p: {marked(word, mark, base): c for word, c in p.items()}
             lhs, rhs = carried(self.lhs), carried(self.rhs)
             made = Equation("copy", self.text, lhs, rhs, hypothesis=self.hypothesis, source=self)
             made.check = lambda: lhs == carried(self.lhs) and rhs == carried(self.rhs)
@@ -191,9 +191,13 @@ class Step:
         """The axioms or lemmas used, as text, and at how many places."""
         if self.title or not self.uses:
             return self.title or "collect terms"
-        transposed = all(use.equation.kind == "transpose" for use in self.uses)
-        places = f", at {len(self.uses)} places" if len(self.uses) > 1 else ""
-        return "; ".join(e.text for e in self.equations) + (" (transposed)" if transposed else "") + places
+        return "; ".join(e.text for e in self.equations) + self.manner
+
+    @property
+    def manner(self) -> str:
+        """How the equations are used: transposed, and at how many places."""
+        transposed = bool(self.uses) and all(use.equation.kind == "transpose" for use in self.uses)
+        return (" (transposed)" if transposed else "") + (f", at {len(self.uses)} places" if len(self.uses) > 1 else "")
 
     @property
     def positions(self) -> list[tuple[str, int, str]]:

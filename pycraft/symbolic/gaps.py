@@ -161,7 +161,7 @@ class WithGaps:
         rows = [f"& {self.steps[0].before_latex()}"]
         for i, step in enumerate(self.steps, 1):
             gap = i in self.blanks
-            rows.append(f"={{}}& {GAP if gap else step.after_latex()} && \\text{{({i})}}\\;{'' if gap else reason_latex(step)}")
+            rows.append(f"={{}}& {GAP if gap else step.after_latex()} && \\text{{{i}.}}\\;{'' if gap else reason_latex(step)}")
         return "\\begin{aligned}" + "\\\\\n".join(rows) + "\\end{aligned}"
 
     def _repr_latex_(self) -> str:

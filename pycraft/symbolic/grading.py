@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from numbers import Real
 from typing import Any
 
 from .. import _core
 from ..identities.checker import check
 from ..identities.parse import Statement
+from ..identities.vocabulary import is_number
 from .attempt import Attempt
 from .derivation import DerivativeProblem
 from .equations import Step
@@ -110,7 +110,7 @@ class Graded(WithGaps):
             if read.rhs is not None:
                 raise _core.EvaluationError(f"{text!r} is a statement: the line is one expression, equal to the line before")
             line = read.lhs
-        if isinstance(line, Real) and line == 0:
+        if is_number(line) and line == 0:
             return _core.zero(lhs.domain, lhs.codomain)
         if not isinstance(line, _core.Operator):
             raise _core.EvaluationError(f"a line is an operator, not {line!r}")

@@ -194,7 +194,7 @@ class Letters:
         if key not in self._made:
             if name not in LETTERS:
                 raise _core.EvaluationError(f"the letter {name!r} has no closed form here")
-            made = LETTERS[name](self) if argument is None else LETTERS[name](self, argument)  # type: ignore[call-arg]
+            made = LETTERS[name](self) if argument is None else LETTERS[name](self, argument)  # type: ignore[call-arg]  # as the letter takes
             self._made[key] = made
         return self._made[key]
 

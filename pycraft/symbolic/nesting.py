@@ -24,6 +24,6 @@ def within_reach(what: str) -> Callable[[_Call], _Call]:
                     f"{what}: the expression is nested too deeply (some hundred levels); take its parts one by one"
                 ) from None
 
-        return guarded  # type: ignore[return-value]
+        return guarded  # type: ignore[return-value]  # as the call that it wraps
 
     return decorated

@@ -53,7 +53,7 @@ def is_positive_definite(p: Polynomial, alphabet: Alphabet, hypotheses: Iterable
 
 def _sign(word: Word, alphabet: Alphabet, definite: frozenset[str]) -> str:
     """definite, semidefinite, or nothing. What is definite is symmetric."""
-    plainly = lambda w: tuple(x.replace("*", "¹" if inverted(x) else "") if split(x)[0] in definite else x for x in w)  # noqa: E731
+    plainly = lambda w: tuple(x.replace("*", "¹" if inverted(x) else "") if split(x)[0] in definite else x for x in w)
     if plainly(word) != plainly(alphabet.star_word(word)):
         return ""
     half = len(word) // 2

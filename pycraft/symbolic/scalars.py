@@ -151,7 +151,8 @@ class ScalarStep(Step):
 
 
 def _negative(use: Use) -> Use:
-    made, more = type(use), {}
+    made: Any = type(use)
+    more: dict[str, Any] = {}
     if isinstance(use, TraceUse):
         more = {"space": use.space}
     elif isinstance(use, ProductUse):
@@ -444,7 +445,7 @@ class ScalarRules:
             if not inner or any(len(w) < 2 or w[0] != H or w[-1] != H_star for w in inner):
                 continue
             rows = {mark: (of_model("H", mark), of_model("H*", mark)) for mark in (first, second)}
-            block = lambda i, j, r=rows: {(r[i][0], *w[1:-1], r[j][1]): c for w, c in inner.items()}  # noqa: E731
+            block = lambda i, j, r=rows: {(r[i][0], *w[1:-1], r[j][1]): c for w, c in inner.items()}
             form = self.local.reduce(block(first, first))[0]
             inverted_by = [o for o in self.problem.opaque if o.kind == "inverse" and self.local.reduce(o.inner)[0] == form]
             blocks = [o for o in self.problem.opaque if o.kind == "operand" and self.local.reduce(o.inner)[0] == form]
@@ -492,7 +493,7 @@ class ScalarRules:
                 continue
             for p in (its_form, a.star_of(its_form)):
                 if form and p and p.keys() == form.keys():
-                    check = lambda i=its_inner, f=its_form, s=its_steps: chain_holds(steps, inner, form) and chain_holds(s, i, f)  # noqa: E731
+                    check = lambda i=its_inner, f=its_form, s=its_steps: chain_holds(steps, inner, form) and chain_holds(s, i, f)
                     ratios: set[Number] = {ratio(c, p[w]) for w, c in form.items()}
                     size = max(c if c > 0 else -c for c in ratios)
                     if len(ratios) == 1 and (kind == "norm" or size == 1):

@@ -105,7 +105,7 @@ class Matrix:
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Matrix) and self.shape == other.shape and not any((self - other).rows)
 
-    __hash__ = None  # type: ignore[assignment]
+    __hash__ = None  # type: ignore[assignment]  # how Python spells unhashable
 
     def eliminated(self, right: Matrix) -> tuple[Matrix, Any]:
         """A⁻¹B and det A, by Gauss and Jordan on entries reduced at every step.
@@ -152,15 +152,15 @@ class Matrix:
 
     def _by_cofactors(self) -> Matrix:
         n, field = len(self.rows), self.field
-        at = lambda i, j: self.rows[i % n].get(j % n, field.zero)  # noqa: E731
+        at = lambda i, j: self.rows[i % n].get(j % n, field.zero)
         if n == 3:
-            minor = lambda i, j: field.inner(  # noqa: E731
+            minor = lambda i, j: field.inner(
                 [(at(i + 1, j + 1), at(i + 2, j + 2)), (-at(i + 1, j + 2), at(i + 2, j + 1))]
             )
         elif n == 2:
-            minor = lambda i, j: at(i + 1, j + 1) if i == j else -at(i + 1, j + 1)  # noqa: E731
+            minor = lambda i, j: at(i + 1, j + 1) if i == j else -at(i + 1, j + 1)
         else:
-            minor = lambda i, j: field.one  # noqa: E731
+            minor = lambda i, j: field.one
         cofactors = [[minor(i, j) for j in range(n)] for i in range(n)]
         determinant = field.inner([(at(0, j), cofactors[0][j]) for j in range(n)]) if n else field.one
         if not determinant:

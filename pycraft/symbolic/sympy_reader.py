@@ -117,7 +117,7 @@ class Reader:
         inside, name = self._nonzero(e.arg), e.args[0].name
         if name == "lower_half":
             return _core._make("function", [inside], 1.0)
-        return _core._function(self._operators._source, name, None, inside)  # type: ignore[arg-type]
+        return _core._function(self._operators._source, name, None, inside)  # type: ignore[arg-type]  # not "gravity"
 
     # ------------------------------------------------------------------ numbers and scalars
     def _number(self, x: Any) -> float | Fraction:

@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from mechanisms import random_tree  # noqa: E402
-from oracle import reference  # noqa: E402
+from mechanisms import random_tree
+from oracle import reference
 
-import pycraft as pc  # noqa: E402
-from campaigns.command_line import listed, seeds  # noqa: E402
+import pycraft as pc
+from campaigns.command_line import listed, seeds
 
 ANYTHING = [
     None, True, 0, 1, -1, 3.5, -0.0, 1e300, -1e300, 5e-324, np.nan, np.inf, -np.inf, 10**400, 2**40, -(2**70), 1j, np.complex64(1 +
@@ -53,8 +53,8 @@ def state_of(model):
 
 def entries(model, rng):
     """Name and function of one strange argument, or of several."""
-    any_body = lambda: model.bodies[rng.choice(list(model.bodies))]  # noqa: E731
-    any_hinge = lambda: model.hinges[rng.choice(list(model.hinges))]  # noqa: E731
+    any_body = lambda: model.bodies[rng.choice(list(model.bodies))]
+    any_hinge = lambda: model.hinges[rng.choice(list(model.hinges))]
     q, v = np.array(model.q), np.array(model.v)
 
     def strange():

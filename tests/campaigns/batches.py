@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from mechanisms import random_tree, uniform_batch  # noqa: E402
-from random_formulas import draw, seeded  # noqa: E402
+from mechanisms import random_tree, uniform_batch
+from random_formulas import draw, seeded
 
-import pycraft as pc  # noqa: E402
-from campaigns.command_line import seeds, tallied  # noqa: E402
+import pycraft as pc
+from campaigns.command_line import seeds, tallied
 
 STATES = 3
 
@@ -67,7 +67,7 @@ class TypedLetters:
 
 def vanishing(rng, soa, e):
     """An expression of e's spaces in which a state may have no part."""
-    phi, psi, E, E_psi, H, K, D, I = soa("phi psi E E_psi H K D I")  # noqa: E741
+    phi, psi, E, E_psi, H, K, D, I = soa("phi psi E E_psi H K D I")
     return [
         lambda: e,
         lambda: 0 * e,
@@ -141,8 +141,8 @@ def check(seed):
     Q, V = uniform_batch(model, STATES, seed)
     found, compared = [], 0
     for name, ask in requests(e, rng, model.nv).items():
-        together = outcome(lambda: ask(e.at(Q, V), None))  # noqa: B023
-        singly = [outcome(lambda s=s: ask(e.at(Q[s], V[s]), s)) for s in range(STATES)]  # noqa: B023
+        together = outcome(lambda: ask(e.at(Q, V), None))  # noqa: B023 - called before the next
+        singly = [outcome(lambda s=s: ask(e.at(Q[s], V[s]), s)) for s in range(STATES)]  # noqa: B023 - called before the next
         compared += 1
         refused = [s for s in singly if isinstance(s, type)]
         if refused or isinstance(together, type):

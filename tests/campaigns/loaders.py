@@ -14,8 +14,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-import pycraft as pc  # noqa: E402
-from campaigns.command_line import listed, seeds  # noqa: E402
+import pycraft as pc
+from campaigns.command_line import listed, seeds
 
 SECONDS = 5.0  # for files of a few hundred bytes
 NAMES = [
@@ -39,8 +39,8 @@ KINDS = ["revolute", "continuous", "prismatic", "fixed", "floating", "planar", "
 def urdf(rng):
     """A URDF file, mostly right."""
     n = int(rng.integers(1, 6))
-    odd = lambda usual, strange, p: str(rng.choice(strange)) if rng.random() < p else usual  # noqa: E731
-    number = lambda x: odd(str(x), NUMBERS, 0.02)  # noqa: E731
+    odd = lambda usual, strange, p: str(rng.choice(strange)) if rng.random() < p else usual
+    number = lambda x: odd(str(x), NUMBERS, 0.02)
     names = [odd(f"l{k}", NAMES, 0.15) for k in range(n)]
     quoted = [name.replace("<", "&lt;").replace('"', "&quot;") for name in names]
     lines = [f'<robot name="{odd("r", NAMES, 0.1)}">'.replace("<(", "(")]
@@ -62,7 +62,7 @@ def urdf(rng):
 
 def mjcf(rng):
     """An MJCF file, mostly right."""
-    name = lambda usual: str(rng.choice(NAMES)).replace("<", "&lt;").replace('"', "&quot;") if rng.random() < 0.2 else usual  # noqa: E731
+    name = lambda usual: str(rng.choice(NAMES)).replace("<", "&lt;").replace('"', "&quot;") if rng.random() < 0.2 else usual
     joints = "".join(
         f'<joint name="{name(f"j{i}")}" type="{rng.choice(["hinge", "slide", "ball", "free"])}"/>' for i in range(int(rng.integers(3)))
     )

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from mechanisms import random_tree  # noqa: E402
+from mechanisms import random_tree
 
-import pycraft as pc  # noqa: E402
-from campaigns.command_line import listed, seeds  # noqa: E402
+import pycraft as pc
+from campaigns.command_line import listed, seeds
 
 FORWARD = [
     {},

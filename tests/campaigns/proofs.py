@@ -24,12 +24,12 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
-from perturbations import dense, exchanges, nodes, replaced  # noqa: E402
-from random_identities import J0, identity_pair, meeting, tree  # noqa: E402
+from perturbations import dense, exchanges, nodes, replaced
+from random_identities import J0, identity_pair, meeting, tree
 
-import pycraft as pc  # noqa: E402
-from pycraft.symbolic import prove  # noqa: E402
-from pycraft.symbolic.values import NoValue, transferred  # noqa: E402
+import pycraft as pc
+from pycraft.symbolic import prove
+from pycraft.symbolic.values import NoValue, transferred
 
 BOUND = 1e-7
 """What a proved statement may be off by, relative to its sides, on small models: their condition is below 1e6."""

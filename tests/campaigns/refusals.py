@@ -17,7 +17,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-import pycraft as pc  # noqa: E402
+import pycraft as pc
 
 KINDS = ("pin", "slider", "universal", "ball", "cylindrical", "planar", "gimbal")
 FORMS = ("fast", "ud", "square-root")

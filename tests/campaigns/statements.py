@@ -15,20 +15,20 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from descriptions import random_description, random_state  # noqa: E402
-from mechanisms import build  # noqa: E402
-from oracle import reference  # noqa: E402
-from wrong_formulas import TRUE  # noqa: E402
+from descriptions import random_description, random_state
+from mechanisms import build
+from oracle import reference
+from wrong_formulas import TRUE
 
-import pycraft as pc  # noqa: E402
-from campaigns.command_line import seeds, tallied  # noqa: E402
-from pycraft.identities.edits import changed  # noqa: E402
-from pycraft.identities.formula import written_statement  # noqa: E402
-from pycraft.identities.formula_reading import read_formula  # noqa: E402
-from pycraft.identities.formula_values import Misfit, Value, evaluate  # noqa: E402
-from pycraft.identities.judge import BoundState, judge_states  # noqa: E402
-from pycraft.identities.parse import Statements  # noqa: E402
-from pycraft.models.state import State  # noqa: E402
+import pycraft as pc
+from campaigns.command_line import seeds, tallied
+from pycraft.identities.edits import changed
+from pycraft.identities.formula import written_statement
+from pycraft.identities.formula_reading import read_formula
+from pycraft.identities.formula_values import Misfit, Value, evaluate
+from pycraft.identities.judge import BoundState, judge_states
+from pycraft.identities.parse import Statements
+from pycraft.models.state import State
 
 APART, TOGETHER = 1e-6, 1e-10
 """Dense double on trees of up to six bodies is good to 1e-12 or so; a change makes 1e-3 and more."""

@@ -15,11 +15,15 @@ from . import switches
 
 
 def copy_of_tree(root, tree):
+    """What git lists, and no source or test that an earlier copy had and that is gone."""
     listed = ["git", "-C", str(root), "ls-files", "--cached", "--others", "--exclude-standard", "-z"]
-    for name in subprocess.run(listed, check=True, capture_output=True, text=True).stdout.split("\0"):
-        if name and (root / name).is_file():
-            (tree / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy2(root / name, tree / name)
+    names = {n for n in subprocess.run(listed, check=True, capture_output=True, text=True).stdout.split("\0") if (root / n).is_file()}
+    for name in names:
+        (tree / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(root / name, tree / name)
+    for path in [*tree.glob("tests/**/*.py"), *tree.glob("pycraft/**/*.py")]:
+        if str(path.relative_to(tree)) not in names:
+            path.unlink()
 
 
 def dependent_objects(root, files):
@@ -36,7 +40,7 @@ def dependent_objects(root, files):
 
 
 class TestBuild:
-    """mutants: those of C++; numbers are their places in `self.mutants` (what does not compile is dropped)."""
+    """mutants: those of C++; numbers are their places in `self.mutants`, also of those that are `dropped`, as they do not compile."""
 
     def __init__(self, root, folder, mutants, jobs, optimisation="1", show=print):
         self.root, self.folder, self.tree = root, pathlib.Path(folder), pathlib.Path(folder) / "tree"
@@ -57,37 +61,26 @@ class TestBuild:
         """The mutated files and the switches."""
         by_file = {}
         for number, m in enumerate(self.mutants):
-            by_file.setdefault(m.file, []).append((number, m))
+            if m not in self.dropped:
+                by_file.setdefault(m.file, []).append((number, m))
         for file, text in self.originals.items():
             (self.tree / file).write_text(switches.instrumented(text, by_file.get(file, [])), encoding="utf-8")
         (self.tree / "cpp/mutants.h").write_text(switches.header(len(self.mutants)), encoding="utf-8")
 
-    def compiled(self, obj, syntax_only=False):
+    def compiled(self, obj):
         """The compiler's complaint, or nothing."""
         made = self.folder / "objects" / obj
         made.parent.mkdir(parents=True, exist_ok=True)
         command = shlex.split(self.commands[obj]["command"].replace(str(self.root / "cpp"), str(self.tree / "cpp")))
         command[command.index("-o") + 1] = str(made)
-        command += [
-            f"-O{self.optimisation}",
-            "-w",
-            "-include",
-            str(self.tree / "cpp/mutants.h"),
-            *(["-fsyntax-only"] if syntax_only else []),
-        ]
-        run = subprocess.run(command, capture_output=True, text=True, cwd=self.root / "build")
+        command += [f"-O{self.optimisation}", "-w", "-include", str(self.tree / "cpp/mutants.h")]
+        launcher = shlex.split(os.environ.get("CMAKE_CXX_COMPILER_LAUNCHER", ""))
+        run = subprocess.run([*launcher, *command], capture_output=True, text=True, cwd=self.root / "build")
         self.objects[obj] = made
         return run.stderr if run.returncode else ""
 
     def compile(self, objects):
         self.show(f"{len(self.mutants)} mutants of C++; {len(objects)} of {len(self.objects)} objects to compile")
-        for obj in [
-            o
-            for o in objects
-            if re.search(r"rigid_dynamics|sensitivities\.cpp|engine\.cpp|trajectory|methods\.cpp", o) and "register" not in o
-        ]:
-            while complaint := self.compiled(obj, syntax_only=True):
-                self.drop(complaint)
         with concurrent.futures.ThreadPoolExecutor(self.jobs) as pool:
             while objects:
                 complaints = list(pool.map(self.compiled, objects))
@@ -98,7 +91,7 @@ class TestBuild:
     def drop(self, complaint):
         """Mutants on lines that the compiler names: what does not compile is no mutant."""
         named = set(re.findall(rf"{re.escape(str(self.tree))}/(cpp/[\w/.]+):(\d+)", complaint))
-        bad = [m for m in self.mutants if (m.file, str(m.line)) in named]
+        bad = [m for m in self.mutants if (m.file, str(m.line)) in named and m not in self.dropped]
         errors = re.findall(rf"{re.escape(str(self.tree))}/(cpp/[\w/.]+):(\d+):\d+: error", complaint)
         exact = [m for m in bad if (m.file, str(m.line)) in set(errors)]
         bad = exact or bad
@@ -107,7 +100,6 @@ class TestBuild:
         for m in bad:
             self.show(f"does not compile: {m.file}:{m.line} {m.change}")
         self.dropped += bad
-        self.mutants = [m for m in self.mutants if m not in bad]
         self.write()
 
     def link(self):

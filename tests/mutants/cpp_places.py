@@ -37,7 +37,7 @@ EXCHANGED = {**dict(PAIRS), **{b: a for a, b in PAIRS}}
 
 def blanked(text):
     """The text with comments, strings, subscripts and the heads of loops as blanks: what is left is arithmetic. Same length."""
-    hide = lambda m: re.sub(r"[^\n]", " ", m.group())  # noqa: E731
+    hide = lambda m: re.sub(r"[^\n]", " ", m.group())
     text = re.sub(r"//[^\n]*|/\*.*?\*/|\"(?:\\.|[^\"\\\n])*\"|^\s*#[^\n]*", hide, text, flags=re.S | re.M)
     chars = list(text)
     for opening, closing, starts in (

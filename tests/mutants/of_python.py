@@ -16,12 +16,8 @@ CHANGES = {
         ("the fall of what holds is not its bound", "found.verdict == HOLDS and found.decisive.bound > DECIDES", "False"),
         ("what stays need not stay", "STAYS = 0.5", "STAYS = 0.0"),
         ("two falls running decide", "RUNNING = 3", "RUNNING = 2"),
-        (
-            "norms of double are always trusted",
-            "trusted = made is not None and made.bound(",
-            "trusted = made is not None and 0 * made.bound(",
-        ),
-        ("what has terms vanishes", "vanishing = made.terms == 0 and self._sides_fall()", "vanishing = self._sides_fall()"),
+        ("norms of double are always trusted", 'return made.bound(relative, "double") <= ROUNDING_NORMS', "return True"),
+        ("what has terms vanishes", "vanishing = made.terms == 0 and fall", "vanishing = fall"),
         ("sides always fall", "return after <= SCATTER * EPSILON[wide] / EPSILON[narrow] * before", "return True"),
         (
             "undecided beside failing is undecided",

@@ -2,6 +2,8 @@
 
 PYCRAFT_MUTANT_SOURCE=file:begin:end:text   that span of a module of pycraft is read as the text (an import hook; nothing is written)
 PYCRAFT_MUTANT_NOTES=path                   tests, their outcomes and seconds, the switches and functions they touched, as JSON
+PYCRAFT_MUTANT_TESTS=path                   only the tests named there, line by line, in that order; others of their files are left out
+PYCRAFT_MUTANT_RED=path                     a line "began name" or "red name" for each test that begins or fails, as they do
 """
 
 import ctypes
@@ -10,6 +12,8 @@ import json
 import os
 import pathlib
 import sys
+
+import pytest
 
 TREE = pathlib.Path(os.environ["PYCRAFT_MUTANT_TREE"])
 
@@ -46,7 +50,7 @@ sys.path.insert(0, str(TREE))
 if os.environ.get("PYCRAFT_MUTANT_SOURCE"):
     sys.meta_path.insert(0, MutatedFinder(os.environ["PYCRAFT_MUTANT_SOURCE"]))
 
-import pycraft  # noqa: E402
+import pycraft  # noqa: E402 - after the finders
 
 assert pycraft.__file__.startswith(str(TREE)), pycraft.__file__
 
@@ -57,8 +61,10 @@ class Notes:
     def __init__(self, path):
         self.path, self.tests, self.setup = path, {}, {}
         library = ctypes.CDLL(pycraft._core.__file__)
-        library.pycraft_mutants_touched.restype = ctypes.POINTER(ctypes.c_ubyte)
-        self.count, self.flags = library.pycraft_mutants_count(), library.pycraft_mutants_touched()
+        self.count, self.flags = 0, (ctypes.c_ubyte * 1)()
+        if hasattr(library, "pycraft_mutants_count"):  # not where only Python is mutated
+            library.pycraft_mutants_touched.restype = ctypes.POINTER(ctypes.c_ubyte)
+            self.count, self.flags = library.pycraft_mutants_count(), library.pycraft_mutants_touched()
         self.functions = set()
         self.prefix = str(TREE / "pycraft")
 
@@ -98,6 +104,42 @@ class Notes:
         pathlib.Path(self.path).write_text(json.dumps(data), encoding="utf-8")
 
 
+class Named:
+    """Some tests of the files that are given. One that is no longer there is passed over: its absence says nothing of a mutant."""
+
+    def __init__(self, path):
+        self.places = {name: i for i, name in enumerate(pathlib.Path(path).read_text(encoding="utf-8").splitlines())}
+
+    @pytest.hookimpl(trylast=True)
+    def pytest_collection_modifyitems(self, config, items):
+        there = sorted((item for item in items if item.nodeid in self.places), key=lambda item: self.places[item.nodeid])
+        config.hook.pytest_deselected(items=[item for item in items if item.nodeid not in self.places])
+        items[:] = there
+
+
+class Red:
+    """What failed, written at once: a test that ends the process has begun and is the last to have done so."""
+
+    def __init__(self, path):
+        self.path = pathlib.Path(path)
+
+    def write(self, what, name):
+        with open(self.path, "a", encoding="utf-8") as file:
+            file.write(f"{what} {name}\n")
+
+    def pytest_runtest_logstart(self, nodeid):
+        self.write("began", nodeid)
+
+    def pytest_collectreport(self, report):
+        if report.failed:
+            self.write("red", report.nodeid)
+
+    def pytest_runtest_logreport(self, report):
+        if report.failed:
+            self.write("red", report.nodeid)
+
+
 def pytest_configure(config):
-    if os.environ.get("PYCRAFT_MUTANT_NOTES"):
-        config.pluginmanager.register(Notes(os.environ["PYCRAFT_MUTANT_NOTES"]))
+    for name, plugin in (("NOTES", Notes), ("TESTS", Named), ("RED", Red)):
+        if os.environ.get(f"PYCRAFT_MUTANT_{name}"):
+            config.pluginmanager.register(plugin(os.environ[f"PYCRAFT_MUTANT_{name}"]))

@@ -6,7 +6,7 @@ from .known import reason
 def table(mutants, results, seconds, options):
     """The page as text; how many survivors are not explained."""
     rows = [(m, results[m.key]) for m in mutants]
-    count = lambda verdict, part: sum(r["verdict"] == verdict for m, r in rows if part(m))  # noqa: E731
+    count = lambda verdict, part: sum(r["verdict"] == verdict for m, r in rows if part(m))
     parts = [
         ("listed by hand", lambda m: bool(m.name)),
         ("drawn, C++", lambda m: not m.name and not m.python),

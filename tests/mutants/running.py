@@ -9,17 +9,28 @@ import pathlib
 import pickle
 import subprocess
 import sys
+import tempfile
 import time
+from dataclasses import dataclass
+
+import pytest
 
 from . import building
 from .known import AREAS, DOZEN_TESTS
 
 SKIPPED_FILES = {"test_notebooks.py", "test_stubs.py", "test_cpp_users.py", "test_mutation.py", "test_layers.py"}
+NOT_IMPORTED = 77
 RUN = """
 import sys
-sys.path.insert(0, sys.argv[1] + "/tests")
-import mutants.plugin, pytest
-sys.exit(pytest.main(sys.argv[2:], [mutants.plugin]))
+tree, not_imported, *options = sys.argv[1:]
+sys.path.insert(0, tree + "/tests")
+import pytest
+try:
+    import mutants.plugin
+except Exception as error:
+    print(error)
+    sys.exit(int(not_imported))
+sys.exit(pytest.main(options, [mutants.plugin]))
 """
 
 
@@ -32,6 +43,12 @@ def digest(*parts):
 
 def contents(root, *patterns):
     return b"".join(path.read_bytes() for pattern in patterns for path in sorted(root.glob(pattern)))
+
+
+def everywhere(tree):
+    """What any test may depend on: the package, and what tests share."""
+    tests = [path for path in sorted(tree.glob("tests/*.py")) if not path.name.startswith("test_")]
+    return contents(tree, "pycraft/**/*.py") + b"".join(path.read_bytes() for path in tests)
 
 
 def kept_or_built(root, options, mutants, show):
@@ -57,19 +74,48 @@ def kept_or_built(root, options, mutants, show):
     return build
 
 
-def pytest_run(build, tests, seconds, **environment):
-    """(exit status, output); 124 where it did not end."""
+@dataclass
+class Run:
+    status: int | None  # none where it did not end
+    output: str
+    lines: list  # "began name", "red name"
+
+    def by(self):
+        """What turned red: a test, or how the run ended. Nothing where the tests passed, or where there were none of them."""
+        red = [line.removeprefix("red ") for line in self.lines if line.startswith("red ")]
+        begun = [line.removeprefix("began ") for line in self.lines if line.startswith("began ")]
+        if red or self.status in (0, pytest.ExitCode.USAGE_ERROR, pytest.ExitCode.NO_TESTS_COLLECTED):
+            return red[0] if red else ""
+        if self.status == NOT_IMPORTED:
+            return "import pycraft"
+        how = "no end" if self.status is None else "crash" if self.status < 0 else f"exit status {self.status}"
+        return f"{how}: {begun[-1]}" if begun else how
+
+
+def pytest_run(build, files, seconds, tests=None, first=False, **environment):
+    """A run of all everyday tests of these files, or of those that are named, in their order; of the first that fails with `first`."""
     values = {k: v for k, v in os.environ.items() if not k.startswith("PYCRAFT_MUTANT")}
-    values |= {"PYCRAFT_MUTANT_TREE": str(build.tree), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", **environment}
-    options = ["-q", "-p", "no:cacheprovider", "--tb=no", "-rfE", "-m", "not slow and not peers", "--import-mode=prepend"]
-    program = [sys.executable, "-c", RUN, str(build.tree), *options, *tests]
-    try:
-        run = subprocess.run(
-            program, cwd=build.tree, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=seconds, env=values
-        )
-    except subprocess.TimeoutExpired:
-        return 124, "no end"
-    return run.returncode, run.stdout
+    values |= {"PYCRAFT_MUTANT_TREE": str(build.tree), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    values |= {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", **environment}  # hypothesis takes a second, where no test asks for it
+    options = ["-q", "-p", "no:cacheprovider", "--tb=no", "--assert=plain", "-rfE", "--import-mode=prepend", *["-x"] * first]
+    options += ["-m", "not slow and not peers"]
+    with tempfile.TemporaryDirectory() as folder:
+        red = pathlib.Path(folder, "red")
+        red.touch()
+        values["PYCRAFT_MUTANT_RED"] = str(red)
+        if tests is not None:
+            named = pathlib.Path(folder, "tests")
+            named.write_text("\n".join(tests), encoding="utf-8")
+            values["PYCRAFT_MUTANT_TESTS"] = str(named)
+        program = [sys.executable, "-c", RUN, str(build.tree), str(NOT_IMPORTED), *options, *files]
+        try:
+            run = subprocess.run(
+                program, cwd=build.tree, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=seconds, env=values
+            )
+            status, output = run.returncode, run.stdout
+        except subprocess.TimeoutExpired:
+            status, output = None, "no end"
+        return Run(status, output, red.read_text(encoding="utf-8").splitlines())
 
 
 def noted(build, options, show):
@@ -77,15 +123,16 @@ def noted(build, options, show):
     begin, files = time.perf_counter(), sorted(p for p in (build.tree / "tests").glob("test_*.py") if p.name not in SKIPPED_FILES)
     if options.dozen:
         files = [p for p in files if p.name in DOZEN_TESTS]
-    python = contents(build.tree, "pycraft/**/*.py")
+    shared = everywhere(build.tree)
 
     def one(path):
-        note = build.folder / f"{path.stem}.{digest(python, path.read_bytes())}.json"
+        note = build.folder / f"{path.stem}.{digest(shared, path.read_bytes())}.json"
         if not note.exists():
-            status, output = pytest_run(build, [str(path.relative_to(build.tree))], 900, PYCRAFT_MUTANT_NOTES=str(note))
+            for gone in build.folder.glob(f"{path.stem}.*.json"):
+                gone.unlink()
+            run = pytest_run(build, [str(path.relative_to(build.tree))], 900, PYCRAFT_MUTANT_NOTES=str(note))
             if not note.exists():
-                if status not in (0, 5):
-                    show(f"{path.name} does not run in the copy: {output[-300:]}")
+                show(f"{path.name} does not run in the copy: {run.output[-300:]}")
                 return {}
         return json.loads(note.read_text(encoding="utf-8"))
 
@@ -119,11 +166,11 @@ def passes(program, **environment):
 
 def tried(build, mutants, numbers, notes, options, show):
     """Mutant's key -> verdict, the test that killed it, tests that ran, seconds. C++ meets the tests of its kernels first."""
-    kernels = building.kernels(build)
-    if not passes(kernels):
+    kernels = building.kernels(build) if build.mutants else None
+    if kernels and not passes(kernels):
         show(f"red without any mutant: {building.KERNELS}")
         kernels = None
-    python = contents(build.tree, "pycraft/**/*.py")
+    shared = everywhere(build.tree)
     touched = {"everything": list(notes)}
     for name, t in notes.items():
         for place in t["touched"]:
@@ -136,15 +183,15 @@ def tried(build, mutants, numbers, notes, options, show):
 
     def digest_of(by):
         """Of the source and of the file of the test that killed: while they stay a mutant is not tried again."""
-        test = build.tree / by.split("::")[0]
-        return digest(python, test.read_bytes() if test.is_file() else b"")
+        test = build.tree / by.split("::")[0].split(": ")[-1]
+        return digest(shared, test.read_bytes() if test.is_file() else b"")
 
     def one(mutant):
         before = killed.get(mutant.key)
         if before and before["digest"] == digest_of(before["by"]):
             return before
         found = attempt(mutant)
-        if found["verdict"] == "killed" and found["by"] != "no end":
+        if found["verdict"] == "killed" and not found["by"].startswith("no end"):  # the machine may have been busy
             killed[mutant.key] = found | {"digest": digest_of(found["by"])}
         return found
 
@@ -173,14 +220,8 @@ def tried(build, mutants, numbers, notes, options, show):
         for part in (own, others):
             if not part:
                 continue
-            arguments = pathlib.Path(build.folder / f"{mutant.key}.tests")
-            arguments.write_text("\n".join(part), encoding="utf-8")
-            status, output = pytest_run(build, ["-x", f"@{arguments}"], 6 * options.budget + 240, **environment)
-            if status:
-                red = next((line for line in output.splitlines() if line.startswith(("FAILED", "ERROR"))), "")
-                by = red.split(" - ")[0].removeprefix("FAILED ").removeprefix("ERROR ") or (
-                    "no end" if status == 124 else f"exit status {status}"
-                )
+            files = list(dict.fromkeys(name.split("::")[0] for name in part))
+            if by := pytest_run(build, files, 6 * options.budget + 240, part, first=True, **environment).by():
                 if by in notes:
                     kills[by] = kills.get(by, 0) + 1
                 return {"verdict": "killed", "by": by, "tests": len(within), "seconds": time.perf_counter() - begin}
