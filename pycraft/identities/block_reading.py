@@ -13,8 +13,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
+from ..formula_nodes import parts
 from .block_relations import Relation, relations
-from .formula import INDEXED, SYMBOLS, Formula, Letter, Node, Power, parts, rebuilt, starred, written
+from .formula import INDEXED, SYMBOLS, Formula, Letter, Node, Power, rebuilt, starred, written
 from .formula_reading import Book
 from .spelling import Spelled, spelled
 from .vocabulary import Misread, ParseError

@@ -6,24 +6,15 @@ arrangement of letters, which can be changed (`edits`). `formula_reading` makes 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 
 from .. import _core
+from ..formula_nodes import Node, Product, Suffixed, flat
 
 SYMBOLS = {name: shown for name, shown, *_ in _core.symbol_table()} | {"MM": "ℳ", "I": "I", "N": "N"}
 FUNCTIONS = ("inv", "blockdiag", "sqrt", "trace", "tr", "logdet", "norm")
 INDEXED = ("B", "Jacobian", "Lambda", "Delta")
-
-
-@dataclass(frozen=True)
-class Node:
-    """A part of a formula."""
-
-    @property
-    def children(self) -> tuple[Node, ...]:
-        return ()
 
 
 @dataclass(frozen=True)
@@ -35,17 +26,6 @@ class Letter(Node):
 @dataclass(frozen=True)
 class Number(Node):
     value: Fraction
-
-
-@dataclass(frozen=True)
-class Suffixed(Node):
-    """What a suffix makes of one formula."""
-
-    inner: Node
-
-    @property
-    def children(self) -> tuple[Node, ...]:
-        return (self.inner,)
 
 
 @dataclass(frozen=True)
@@ -69,15 +49,6 @@ class Call(Node):
 
 
 @dataclass(frozen=True)
-class Product(Node):
-    factors: tuple[Node, ...]
-
-    @property
-    def children(self) -> tuple[Node, ...]:
-        return self.factors
-
-
-@dataclass(frozen=True)
 class Sum(Node):
     """Terms with their signs, 1 and -1."""
 
@@ -96,9 +67,9 @@ Formula = tuple[Node, Node]
 # ---------------------------------------------------------------------- made simply
 def product(*factors: Node) -> Node:
     """A product, flat, without an I beside other factors."""
-    flat = [f for factor in factors for f in (factor.factors if isinstance(factor, Product) else (factor,))]
-    flat = [f for f in flat if f != Letter("I")] if any(not isinstance(f, Number) and f != Letter("I") for f in flat) else flat
-    return flat[0] if len(flat) == 1 else Product(tuple(flat))
+    made = flat(factors)
+    made = [f for f in made if f != Letter("I")] if any(not isinstance(f, Number) and f != Letter("I") for f in made) else made
+    return made[0] if len(made) == 1 else Product(tuple(made))
 
 
 def total(terms: list[tuple[int, Node]]) -> Node:
@@ -137,13 +108,6 @@ def rebuilt(node: Node, children: list[Node]) -> Node:
         case Sum(signs=signs):
             return total(list(zip(signs, children, strict=True)))
     return node
-
-
-def parts(node: Node) -> Iterator[Node]:
-    """The node and all under it."""
-    yield node
-    for child in node.children:
-        yield from parts(child)
 
 
 # ---------------------------------------------------------------------- formula to text
