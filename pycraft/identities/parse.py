@@ -62,7 +62,7 @@ class Statements:
                 found.append(self._read(source, text, reading))
             # The core's errors of names, spaces and models are TypeErrors and ValueErrors; what Python finds wrong reads no better.
             except (TypeError, ValueError, AttributeError, ArithmeticError, RecursionError) as error:
-                reasons[reading] = str(error)
+                reasons[reading] = "it divides by zero" if isinstance(error, ZeroDivisionError) else str(error)
                 misfits = misfits or isinstance(error, _core.SpaceError) and not isinstance(error, _NoSpaceError)
                 place = error.place(source) if isinstance(error, Misread) else ""
         if not found:

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import difflib
 import random
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
+from numbers import Integral
 from typing import Any
 
 from .. import _core
@@ -111,6 +112,9 @@ def exercise(theorem: Any, model: Any = None, blank: int | Sequence[int] | None 
     if isinstance(theorem, str):
         read, name = _read_theorem(theorem, model)
     else:
+        if not isinstance(theorem, Sequence) or len(theorem) != 2:
+            what = "a theorem's name, a statement as text or a pair (lhs, rhs)"
+            raise _core.EvaluationError(f"an exercise is made of {what}, not of {theorem!r}")
         lhs, rhs = theorem
         read, name = Statement(lhs, rhs, "", "expressions"), ""
     proof = prove(read.lhs, read.rhs, model)
@@ -162,7 +166,7 @@ class Exercise:
             gaps = self.gaps()
         if blank is None:
             blank = random.Random(seed).choice(gaps)
-        self._leave_out({blank} if isinstance(blank, int) else set(blank))
+        self._leave_out(_lines_of(blank))
         self._read_text = Statements(self._operators(), self._abbreviations())
 
     def _leave_out(self, blanks: set[int]) -> None:
@@ -291,6 +295,8 @@ class Exercise:
     # ------------------------------------------------------------------ help
     def hint(self, level: int = 1) -> str:
         """1: the equation that leads to the line; 2: where it is used; 3: the line's beginning; beyond that, the line."""
+        if not isinstance(level, int):
+            raise _core.EvaluationError(f"hints have the levels 1, 2, 3 and more, not {level!r}")
         step = self.steps[self.blank - 1]
         there = any(u.left + u.word + u.right in step.full()[0] for u in step.uses)
         if level <= 1:
@@ -562,6 +568,17 @@ def _replaced(p: Polynomial, equation: Equation, word: Word, star: Word, alphabe
         if p == before:
             break
     return p
+
+
+def _lines_of(blank: Any) -> set[int]:
+    """The lines to leave out, of one number or several."""
+    given = [blank] if isinstance(blank, Integral) else blank
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        raise _core.EvaluationError(f"blank={blank!r}: the number of a line, or several")
+    lines = list(given)
+    if any(isinstance(line, bool) or not isinstance(line, Integral) for line in lines):
+        raise _core.EvaluationError(f"blank={blank!r}: lines are told by their numbers, from 1")
+    return set(map(int, lines))
 
 
 def _used(proof: Proof, hypothesis: str) -> dict[str, str]:
