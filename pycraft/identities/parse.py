@@ -209,6 +209,13 @@ def _check_same_spaces(lhs: Any, rhs: Any) -> None:
         raise ParseError("a statement about numbers alone")
 
 
+def as_text(statement: Any) -> str:
+    """A statement that is given as text. EvaluationError where it is none."""
+    if not isinstance(statement, str):
+        raise _core.EvaluationError(f"a statement is text, such as 'ψ⁻¹ = φ⁻¹ + KH', not {statement!r:.80}")
+    return statement
+
+
 class _NoSpaceError(_core.SpaceError):
     """Neither side says on which space its I acts."""
 

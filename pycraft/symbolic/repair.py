@@ -20,6 +20,7 @@ from ..identities.family import HYPOTHESES, Spec
 from ..identities.formula import Formula, written_statement
 from ..identities.formula_reading import read_formula
 from ..identities.formula_values import DenseLetters, Misfit, residual
+from ..identities.parse import as_text
 from ..identities.tables import monospace, wrapped
 from ..identities.truth import in_words, truth_within
 from .prove import prove
@@ -131,7 +132,7 @@ def repair(statement: str, *, most: int = 3, budget: float = 5.0) -> Repairs:
           true where J = 0; proved
     """
     begin, spending = time.perf_counter(), Budget(budget)
-    formula = read_formula(statement)
+    formula = read_formula(as_text(statement))
     models = small_models()
     result = Repairs(statement)
     if _is_close(formula, models) and (own := _found(formula, None, spending)) is not None:
