@@ -4,6 +4,7 @@
     python tests/mutation.py --all                every mutant there is: hours
     python tests/mutation.py --dozen              the twelve that every `make test-peers` tries: minutes, most of them one build
     python tests/mutation.py --only sweeps        those whose file, rule or change has this in its name
+    python tests/mutation.py --python             those of Python alone, with the core as it is
     python tests/mutation.py --list               what there is
 
 All mutants of C++ are switches of one build in a copy of the tree, those of Python spans replaced as a module is read: the tree itself is
@@ -41,6 +42,8 @@ def chosen(options, drawn):
     draw = random.Random(options.seed)
     cpp, python = [m for m in others if not m.python], [m for m in others if m.python]
     half = options.sample // 2
+    if options.python:
+        half = 0
     return by_hand + draw.sample(cpp, min(half, len(cpp))) + draw.sample(python, min(options.sample - half, len(python)))
 
 
@@ -53,6 +56,7 @@ def main():
     parser.add_argument("--all", action="store_true")
     parser.add_argument("--dozen", action="store_true")
     parser.add_argument("--only", default="")
+    parser.add_argument("--python", action="store_true")
     parser.add_argument("--list", action="store_true")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--budget", type=float, default=60, help="seconds of tests for one mutant")
@@ -70,6 +74,8 @@ def main():
     for name in stale:
         show(f"its text is not there, or not there once (tests/mutants/listed.py): {name}")
     everything = [*by_hand, *cpp_places.everything(ROOT), *python_places.everything(ROOT)]
+    if options.python:
+        everything = [m for m in everything if m.python]
     if options.dozen:  # the rest of the build is taken as it is
         everything = [m for m in everything if m.name in DOZEN]
     if options.list:
@@ -79,10 +85,11 @@ def main():
         show(f"{len(everything) - python} of C++, {python} of Python, {len(by_hand)} of them listed by hand")
         return 0
 
-    build = running.kept_or_built(ROOT, options, [m for m in everything if not m.python], show)
+    wanted = chosen(options, everything)
+    build = running.kept_or_built(ROOT, options, [m for m in everything if not m.python] if any(not m.python for m in wanted) else [], show)
     left = {(m.file, m.begin, m.change): i for i, m in enumerate(build.mutants) if m not in build.dropped}
     numbers = {m.key: left[m.file, m.begin, m.change] for m in everything if not m.python and (m.file, m.begin, m.change) in left}
-    mutants = chosen(options, [m for m in everything if m.python or m.key in numbers])
+    mutants = [m for m in wanted if m.python or m.key in numbers]
     notes = running.noted(build, options, show)
     results = running.tried(build, mutants, numbers, notes, options, show)
     text, unexplained = report.table(mutants, results, time.perf_counter() - begin, options)

@@ -188,3 +188,17 @@ def test_nothing_prints_but_the_command_line():
         for node in ast.walk(parsed(path)):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
                 assert node.func.id != "print", f"{path.relative_to(ROOT)}:{node.lineno} prints"
+
+
+def test_every_exception_to_a_check_says_why():
+    """`noqa: code - why`, `type: ignore[code]  # why`; what is skipped is told by the call itself."""
+    exception = re.compile(r"# (noqa|type: ignore|pragma)\b(?P<rest>.*)")
+    reasoned = re.compile(r"(: [A-Z]+\d+(, [A-Z]+\d+)* - \w+|\[[\w-]+\]  # \w+)")
+    paths = [path for folder in ("pycraft", "tests", "cpp") for path in sorted((ROOT / folder).rglob("*.py"))]
+    without, made = [], 0
+    for path in paths:
+        for line in path.read_text(encoding="utf-8").splitlines() if path.name != "test_layers.py" else ():
+            for m in exception.finditer(line):
+                made += 1
+                without += [] if reasoned.match(m["rest"]) else [f"{path.relative_to(ROOT)}: {line.strip()}"]
+    assert made > 20 and without == []

@@ -19,7 +19,7 @@ from pycraft.symbolic.repair import nearest, small_models
 
 
 def letters(seed=5):
-    spec = Spec((-1, 0, 1), ("pin", "screw", "slider"), False, seed)
+    spec = Spec((-1, 0, 1), ("pin", "ball", "slider"), False, seed)
     model = spec.model()
     state = spec.states(model, 1)[0]
     model.q, model.v = state.q, state.v
@@ -114,6 +114,9 @@ TEXTS = [
     "sqrt(D) sqrt(D)* = D",
     "velocity = φ* H* theta_dot",
     "B(node1)* φ* H* = 𝒥(node1)",
+    "D/4 + 3D/4 = D",
+    "phi@M/5 + 4*phi@M/5 == phi@M",
+    "φ - (φ - (ψ - φ)) = ψ - φ",
 ]
 
 
@@ -131,6 +134,32 @@ def test_a_formula_is_what_the_statement_is(text):
         if value.domain != "any":
             np.testing.assert_allclose(value.array, values[0], rtol=1e-9, atol=1e-9)
     assert residual(formula, dense) < 1e-10
+
+
+def test_no_change_makes_both_sides_the_same():
+    """φ = ψ with a letter exchanged is φ = φ, which says nothing."""
+    for text in ("φ = ψ", "G* = H"):
+        assert all(left != right for (left, right), _ in changed(read_formula(text)))
+
+
+def test_a_number_is_turned_upside_down_and_no_more():
+    turned = [new for new, slip in changed(read_formula("2 φ = ψ")) if "number 2 upside down" in slip.words]
+    assert turned == [read_formula("φ/2 = ψ")]
+
+
+def test_one_slip_at_all_places_is_less_likely_than_at_one():
+    found = {slip.words: slip.cost for _, slip in changed(read_formula("[I-HφK]* D⁻¹ [I-HφK] = ℳ⁻¹"))}
+    everywhere = {words: cost for words, cost in found.items() if ", at all 2 places" in words}
+    assert everywhere
+    for words, cost in everywhere.items():
+        assert cost > min((c for w, c in found.items() if w.startswith(words.removesuffix(", at all 2 places")) and w != words), default=0)
+
+
+def test_inverses_that_exist_by_rounding_alone_are_none():
+    _, dense = letters()
+    for text in ("(E + 1e-14 I)⁻¹ = φ", "(HMH* - HMH*)⁻¹ = D"):
+        with pytest.raises(Misfit):
+            residual(read_formula(text), dense)
 
 
 def test_spaces_that_do_not_fit_are_seen():

@@ -316,6 +316,10 @@ class Roundings:
         self.growth = max([1.0, *(sizes.amplification(s) for s in dict.fromkeys(sources(lhs, True) + sources(rhs, True)))])
         self._sweep = max([6.0, *(sweep(s) for s in dict.fromkeys(sources(lhs) + sources(rhs)))])
 
+    def absolute(self, precision: str | int) -> float:
+        """The bound on |lhs - rhs| itself."""
+        return CONSTANT * self._sweep * EPSILON[precision] * self.size * self.growth
+
     def bound(self, relative_size: float, precision: str | int) -> float:
         """The bound on |lhs - rhs| over a scale, `relative_size` the size over that scale."""
         return CONSTANT * self._sweep * EPSILON[precision] * max(1.0, relative_size) * self.growth

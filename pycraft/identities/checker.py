@@ -10,6 +10,8 @@ import numpy as np
 
 from .. import _core
 from ..arguments import whole
+from .block_check import check_by_block
+from .block_reading import is_by_block
 from .judge import FAILS, BoundState, Verdict, judge_states, ladder
 from .parse import Statement, Statements, check_has_space
 from .report import UNDEFINED, CheckReport, Finding, Report
@@ -136,7 +138,8 @@ def check(
     ----------
     statement : str, or a pair (lhs, rhs) of expressions
         As text in Python's spelling, the book's (Unicode or ASCII) or LaTeX: ``"HψMψ*H* == D"``, ``"inv(psi) == inv(phi) + K*H"``. `MM`
-        is the mass matrix HφMφ*H*, `N` the number of coordinates.
+        is the mass matrix HφMφ*H*, `N` the number of coordinates. Operators with bodies behind them make a statement by block,
+        ``"Ω(i,j) = Υ(i)ψ(i,j), i above j"``: it is checked for every choice of bodies of which its relations hold.
     model : Multibody, OperatorSet or None
         None: random trees that between them meet and break every standard hypothesis, deep and wide ones among them, moving and in
         gravity (text only; see `pycraft.truth` for where it is true and where not).
@@ -171,13 +174,15 @@ def check(
         text = statement
     else:
         raise _core.EvaluationError(f"check takes a statement as text or a pair of expressions, not {statement!r:.80}")
+    operators: Any = None if model is None else getattr(model, "soa", model)
+    if model is not None and not hasattr(operators, "_source"):
+        raise _core.EvaluationError(f"a statement is checked on a model or its operators (model.soa), not on {model!r:.80}")
+    if isinstance(statement, str) and is_by_block(statement, [] if operators is None else [name for name, *_ in operators.V.blocks]):
+        return check_by_block(statement, operators, states=states, seed=seed, precision=precision)
     if model is None:
         if not isinstance(statement, str):
             raise _core.EvaluationError("expressions belong to one model: give text to check a statement on random trees")
         return _check_on_trees(text, states=states, seed=seed, search=search, precision=precision, budget=budget)
-    operators = model if not hasattr(model, "soa") else model.soa
-    if not hasattr(operators, "_source"):
-        raise _core.EvaluationError(f"a statement is checked on a model or its operators (model.soa), not on {model!r:.80}")
     if isinstance(statement, str):
         read = Statements(operators).read(statement)
         if read.rhs is None:

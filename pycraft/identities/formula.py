@@ -151,7 +151,7 @@ def written(node: Node, shown: bool = False) -> str:
     """As text that reads in one way only; `shown`: as the book prints it."""
     match node:
         case Letter(name=name, arguments=arguments):
-            return (SYMBOLS[name] if shown else name) + (f"({', '.join(arguments)})" if arguments else "")
+            return (SYMBOLS.get(name, name) if shown else name) + (f"({', '.join(arguments)})" if arguments else "")
         case Number(value=value):
             return _number(value)
         case Star(inner=inner):

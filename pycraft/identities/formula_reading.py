@@ -21,7 +21,7 @@ def read_formula(text: str) -> Formula:
     sides = re.split(r"==?", source)
     if len(sides) != 2:
         raise ParseError(f"{text!r} has {'one side' if len(sides) == 1 else 'more than two sides'}; a statement is lhs == rhs")
-    left, right = (_python(side) if is_python else _Book(side).whole() for side in sides)
+    left, right = (_python(side) if is_python else Book(side).whole() for side in sides)
     return left, right
 
 
@@ -76,24 +76,45 @@ def _tokens() -> re.Pattern[str]:
     )
 
 
-class _Book:
+class Book:
     """The book's reading: juxtaposition multiplies, a postfix star transposes."""
 
     def __init__(self, source: str):
         self._tokens: list[tuple[str, str]] = []
+        self._places: list[int] = []
+        self._end = len(source)
         at = 0
         while source[at:].strip():
-            found = _tokens().match(source, at)
+            found = self._token(source, at)
             if found is None:
-                raise ParseError(f"not understood at {source[at : at + 12].strip()!r}")
-            kind = str(found.lastgroup)
-            self._tokens.append((kind, found[kind]))
-            at = found.end()
+                raise self._stumbled(f"not understood at {source[at : at + 12].strip()!r}", at)
+            self._tokens.append(found[:2])
+            self._places.append(at)
+            at = found[2]
+
+    def _token(self, source: str, at: int) -> tuple[str, str, int] | None:
+        """(kind, text, where it ends) of what stands at a place."""
+        found = _tokens().match(source, at)
+        return None if found is None else (str(found.lastgroup), found[str(found.lastgroup)], found.end())
+
+    def _stumbled(self, message: str, at: int) -> ParseError:
+        """The error of what stands at a place."""
+        return ParseError(message)
+
+    def _take(self) -> tuple[str, str]:
+        if not self._tokens:
+            raise self._stumbled("not understood at its end", self._end)
+        self._places.pop(0)
+        return self._tokens.pop(0)
+
+    @property
+    def _at(self) -> int:
+        return self._places[0] if self._places else self._end
 
     def whole(self) -> Node:
         node = self._sum()
         if self._tokens:
-            raise ParseError(f"not understood at {self._tokens[0][1]!r}")
+            raise self._stumbled(f"not understood at {self._next()[1]!r}", self._at)
         return node
 
     def _next(self) -> tuple[str, str]:
@@ -104,7 +125,7 @@ class _Book:
         while True:
             sign = 1
             while self._next()[1] in ("+", "-"):
-                sign = -sign if self._tokens.pop(0)[1] == "-" else sign
+                sign = -sign if self._take()[1] == "-" else sign
             terms.append((sign, self._product()))
             if self._next()[1] not in ("+", "-"):
                 return total(terms)
@@ -114,22 +135,25 @@ class _Book:
         while True:
             kind, text = self._next()
             if text in ("@", "·"):
-                self._tokens.pop(0)
+                self._take()
             elif text == "/":
-                self._tokens.pop(0)
-                factors.insert(0, Number(1 / decimal(self._tokens.pop(0)[1])))
-            elif kind in ("number", "function", "indexed", "name") or text in ("(", "[", "{"):
+                self._take()
+                factors.insert(0, Number(1 / decimal(self._take()[1])))
+            elif self._starts_factor(kind, text):
                 factors.append(self._postfix())
             else:
                 break
         if not factors:
-            raise ParseError(f"not understood at {text!r}" if text else "not understood at its end")
+            raise self._stumbled(f"not understood at {text!r}" if text else "not understood at its end", self._at)
         return product(*factors)
+
+    def _starts_factor(self, kind: str, text: str) -> bool:
+        return kind in ("number", "function", "indexed", "name") or text in ("(", "[", "{")
 
     def _postfix(self) -> Node:
         node = self._atom()
         while self._next()[0] in ("star", "power", "inverse", "root"):
-            kind, text = self._tokens.pop(0)
+            kind, text = self._take()
             if kind == "star":
                 node = starred(node)
             elif kind == "power":
@@ -140,7 +164,7 @@ class _Book:
         return node
 
     def _atom(self) -> Node:
-        kind, text = self._tokens.pop(0)
+        kind, text = self._take()
         if kind == "number":
             return Number(decimal(text))
         if kind == "name":
@@ -151,7 +175,7 @@ class _Book:
         if kind == "function":
             if self._next()[1] not in ("(", "[", "{"):  # tr ΥM, ln det D: what follows; √D: the one factor
                 return _call("sqrt", self._postfix()) if text == "√" else _call(text, self._product())
-            self._tokens.pop(0)
+            self._take()
             node = self._sum()
             self._close()
             return _call({"√": "sqrt"}.get(text, text), node)
@@ -161,5 +185,5 @@ class _Book:
 
     def _close(self) -> None:
         if self._next()[1] not in (")", "]", "}"):
-            raise ParseError("a bracket is not closed")
-        self._tokens.pop(0)
+            raise self._stumbled("a bracket is not closed", self._at)
+        self._take()

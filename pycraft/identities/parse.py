@@ -17,6 +17,7 @@ from fractions import Fraction
 from typing import Any
 
 from .. import _core
+from .block_reading import refuse_by_block
 from .book import read_book
 from .spelling import Spelled, spelled
 from .vocabulary import FUNCTIONS, WITH_ARGUMENTS, Misread, ParseError, SpacesError, Vocabulary, decimal, is_number, power
@@ -53,6 +54,7 @@ class Statements:
         ParseError
             Nothing fits (the reasons of both readings are shown), or both do. SpacesError where only the spaces do not fit.
         """
+        refuse_by_block(text, self._vocabulary.own)
         found: list[Statement] = []
         reasons: dict[str, str] = {}
         place, misfits = "", False

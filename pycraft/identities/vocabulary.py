@@ -77,6 +77,11 @@ class Vocabulary:
         self._operators = operators
 
     @property
+    def own(self) -> set[str]:
+        """Names that are not the table's."""
+        return {*self._own}
+
+    @property
     def names(self) -> set[str]:
         """Names that stand alone, without arguments."""
         return {*(_NAMES - set(WITH_ARGUMENTS)), *_ALIASES, *self._own}

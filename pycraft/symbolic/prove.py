@@ -313,6 +313,7 @@ def _settings(problem: DerivativeProblem) -> Iterator[tuple[Setting, list[tuple[
         for chosen in itertools.combinations(possible, size):
             extra = list(rules) + constant * ("constant H" in chosen)
             extra += [_no_delta(problem, n) for n in deltas if "single-DOF hinges" in chosen]
+            extra += problem.single_axis_rules() if "single-DOF hinges" in chosen else []
             yield Setting(frozenset(chosen), composite, "serial chain" in chosen, velocities), extra
 
 

@@ -14,6 +14,7 @@ from html import escape
 from typing import Any
 
 from .. import _core
+from ..identities.block_reading import refuse_by_block
 from ..identities.budget import Budget
 from ..identities.edits import Slip, changed
 from ..identities.family import HYPOTHESES, Spec
@@ -132,7 +133,8 @@ def repair(statement: str, *, most: int = 3, budget: float = 5.0) -> Repairs:
           true where J = 0; proved
     """
     begin, spending = time.perf_counter(), Budget(budget)
-    formula = read_formula(as_text(statement))
+    refuse_by_block(as_text(statement))
+    formula = read_formula(statement)
     models = small_models()
     result = Repairs(statement)
     if _is_close(formula, models) and (own := _found(formula, None, spending)) is not None:

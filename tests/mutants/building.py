@@ -74,7 +74,8 @@ class TestBuild:
         command = shlex.split(self.commands[obj]["command"].replace(str(self.root / "cpp"), str(self.tree / "cpp")))
         command[command.index("-o") + 1] = str(made)
         command += [f"-O{self.optimisation}", "-w", "-include", str(self.tree / "cpp/mutants.h")]
-        run = subprocess.run(command, capture_output=True, text=True, cwd=self.root / "build")
+        launcher = shlex.split(os.environ.get("CMAKE_CXX_COMPILER_LAUNCHER", ""))
+        run = subprocess.run([*launcher, *command], capture_output=True, text=True, cwd=self.root / "build")
         self.objects[obj] = made
         return run.stderr if run.returncode else ""
 

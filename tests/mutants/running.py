@@ -166,8 +166,8 @@ def passes(program, **environment):
 
 def tried(build, mutants, numbers, notes, options, show):
     """Mutant's key -> verdict, the test that killed it, tests that ran, seconds. C++ meets the tests of its kernels first."""
-    kernels = building.kernels(build)
-    if not passes(kernels):
+    kernels = building.kernels(build) if build.mutants else None
+    if kernels and not passes(kernels):
         show(f"red without any mutant: {building.KERNELS}")
         kernels = None
     shared = everywhere(build.tree)
