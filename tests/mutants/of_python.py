@@ -150,10 +150,10 @@ CHANGES = {
         ("macros of macros are left", "range(1000)", "range(1)"),
         (
             "undecided beside failing",
-            '3 if "undecided" in self.counts and "fails" not in self.counts else 1',
-            '3 if "undecided" in self.counts else 1',
+            '3 if UNDECIDED in self.counts and FAILS not in self.counts else 1',
+            '3 if UNDECIDED in self.counts else 1',
         ),
-        ("a paper of nothing is true", 'any(e.verdict == "holds" for e in self.equations) and not', "not"),
+        ("a paper of nothing is true", 'bool({HOLDS, TRUE_WHERE} & {*self.counts}) and not', "not"),
         ("lines of the display", 'start = line + body.count("\\n", 0, at + begins)', "start = line"),
         ("rows that begin with a minus stand alone", "[-+=·@]|", "[+=·@]|"),
     ],
