@@ -4,7 +4,7 @@
     python tests/mutation.py --all                every mutant there is: hours
     python tests/mutation.py --dozen              the twelve that every `make test-peers` tries: minutes, most of them one build
     python tests/mutation.py --only sweeps        those whose file, rule or change has this in its name
-    python tests/mutation.py --python             those of Python alone, with the core as it is
+    python tests/mutation.py --python             those of Python alone, with the core as it is; --areas: and the tests of their own areas
     python tests/mutation.py --list               what there is
 
 All mutants of C++ are switches of one build in a copy of the tree, those of Python spans replaced as a module is read: the tree itself is
@@ -57,6 +57,7 @@ def main():
     parser.add_argument("--dozen", action="store_true")
     parser.add_argument("--only", default="")
     parser.add_argument("--python", action="store_true")
+    parser.add_argument("--areas", action="store_true", help="only the tests of the areas of what is tried: less is noted")
     parser.add_argument("--list", action="store_true")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--budget", type=float, default=60, help="seconds of tests for one mutant")
@@ -90,7 +91,7 @@ def main():
     left = {(m.file, m.begin, m.change): i for i, m in enumerate(build.mutants) if m not in build.dropped}
     numbers = {m.key: left[m.file, m.begin, m.change] for m in everything if not m.python and (m.file, m.begin, m.change) in left}
     mutants = [m for m in wanted if m.python or m.key in numbers]
-    notes = running.noted(build, options, show)
+    notes = running.noted(build, mutants, options, show)
     results = running.tried(build, mutants, numbers, notes, options, show)
     text, unexplained = report.table(mutants, results, time.perf_counter() - begin, options)
     output = options.output or (ROOT / "tests" / "mutation.md" if not (options.dozen or options.only or options.all) else None)

@@ -172,6 +172,7 @@ def test_cases_are_proved_one_by_one(text, assume):
     "text, assume, where",
     [
         ("HG = I", "J > 0 or J = 0", "J > 0"),  # true in the second case only
+        ("HG = I", "J = 0 or J > 0", "J > 0"),
         ("J inv(J) D = D", "J > 0 or J = 0", "J = 0"),  # in which J⁻¹ does not exist
         ("φ = ψ", "serial chain or J = 0", "serial chain"),
     ],

@@ -107,6 +107,12 @@ def test_what_is_not_read_shows_the_place(typed, said, column, read):
     assert lines[-2].strip() == typed.strip() and lines[-1].index("^") - 4 in (column, column - 1), str(caught.value)
 
 
+@pytest.mark.parametrize("text", ["1/0", "φ/0", "φ = 1/0 φ", r"\frac{1}{0} D = D"])
+def test_a_division_by_zero_is_called_so(text, read):
+    with pytest.raises(ParseError, match="divides by zero"):
+        read(text)
+
+
 def test_the_place_is_in_the_line_that_was_typed(read):
     with pytest.raises(ParseError) as caught:
         read("\\begin{equation}\n  \\mathcal{M} =\n  H \\phi Q \\phi^* H^*\n\\end{equation}")

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import pycraft as pc
+from pycraft.identities.directions import coordinates_meant
 from pycraft.identities.parse import ParseError, Statements
 
 
@@ -228,3 +229,34 @@ def test_statements_on_random_trees():
 def test_without_a_search_there_is_no_counterexample(model):
     report = pc.check("φ == ψ", model, search=False)
     assert not report and report.counterexample is None and report.bound < 1e-9 < report.worst
+
+
+def test_the_coordinates_that_are_meant():
+    """i is the last of its hinge, so that those before it turn with it; j is outboard of it."""
+    assert coordinates_meant(pc.tree([-1, 0, 1], ["pin", "ball", "pin"]).soa) == (3, 4)
+    assert coordinates_meant(pc.tree([-1, 0, 1, 0], ["pin", "universal", "pin", "free"]).soa) == (2, 3)
+    assert coordinates_meant(pc.chain(1).soa) == (0, 0)
+    with pytest.raises(pc.ModelError, match="no coordinate"):
+        coordinates_meant(pc.tree([-1], "weld").soa)
+
+
+@pytest.mark.parametrize("given", [3, None, b"phi", np.eye(3), ("φ", "ψ"), ["φ = φ", "φ = φ", "φ = φ"]], ids=repr)
+@pytest.mark.parametrize("ask", ["check", "truth", "repair", "parse"])
+def test_what_is_no_text_is_said(ask, given):
+    model = [pc.chain(1)] if ask == "parse" else []
+    with pytest.raises(pc.EvaluationError, match="statement (is|as) text"):
+        getattr(pc, ask)(given, *model)
+
+
+def test_options_of_a_check_are_checked():
+    arm = pc.chain(1)
+    for options in ({"states": "x"}, {"states": 2.5}, {"states": 0}, {"seed": "x"}, {"seed": -1}):
+        with pytest.raises(pc.Error, match=f"{next(iter(options))}.*(whole number|one state at least)"):
+            pc.check("φ = φ", arm, **options)
+        if options != {"states": 0}:
+            with pytest.raises(pc.Error, match=f"{next(iter(options))}.*whole number"):
+                arm.soa.check(**options)
+    with pytest.raises(pc.EvaluationError, match="0 or more"):
+        arm.soa.check(states=-2)
+    with pytest.raises(pc.EvaluationError, match="on a model or its operators"):
+        pc.check("φ = φ", 3)

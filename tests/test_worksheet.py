@@ -156,5 +156,12 @@ def test_exercises_with_several_gaps():
         task.gap(3)
     with pytest.raises(pc.EvaluationError, match="there is no line 9"):
         pc.exercise("HψMψ*H* == D", blank=[2, 9])
+    for blank in ("2", 2.5, True, [1.0], ["1"]):
+        with pytest.raises(pc.EvaluationError, match="blank=.*number"):
+            pc.exercise("HψMψ*H* == D", blank=blank)
+    with pytest.raises(pc.EvaluationError, match="hints have the levels 1, 2, 3"):
+        task.hint("much")
+    with pytest.raises(pc.EvaluationError, match=r"a theorem's name, a statement as text or a pair \(lhs, rhs\), not of 3"):
+        pc.exercise(3)
     with pytest.raises(pc.EvaluationError, match=r"blank=\[\] names none"):
         pc.exercise("HψMψ*H* == D", blank=[])

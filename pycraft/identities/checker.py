@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..arguments import whole
 from .block_check import check_by_block
 from .block_reading import is_by_block
 from .judge import FAILS, BoundState, Verdict, judge_states, ladder
@@ -43,6 +44,9 @@ def check_model(operators: Any, *, states: int = 3, seed: int = 0, precision: st
     progress : called with each theorem's name, if given
     """
     check_wider(precision)
+    _check_seed(seed)
+    if whole(states, "states") < 0:
+        raise _core.EvaluationError(f"states is {states}: random states beside the present one, 0 or more")
     source = operators._source
     model = operators._model
     report = Report(source.name, dict(source.traits))
@@ -58,6 +62,11 @@ def check_model(operators: Any, *, states: int = 3, seed: int = 0, precision: st
         report.findings.append(check_theorem(theorem, theorem.unmet(source), drawn, rng, precision))
     report.seconds = time.perf_counter() - begin
     return report
+
+
+def _check_seed(seed: Any) -> None:
+    if whole(seed, "seed") < 0:
+        raise _core.EvaluationError(f"seed is {seed}: a whole number, 0 or more")
 
 
 def check_wider(precision: str | int) -> None:
@@ -156,10 +165,18 @@ def check(
     from .search import named_vectors, statement_text
 
     check_wider(precision)
-    if states < 1:
+    if whole(states, "states") < 1:
         raise _core.EvaluationError(f"states is {states}: a statement is checked at one state at least")
-    text = statement if isinstance(statement, str) else f"{statement[0].text()} == {statement[1].text()}"
+    _check_seed(seed)
+    if isinstance(statement, (tuple, list)) and len(statement) == 2 and all(hasattr(side, "text") for side in statement):
+        text = f"{statement[0].text()} == {statement[1].text()}"
+    elif isinstance(statement, str):
+        text = statement
+    else:
+        raise _core.EvaluationError(f"check takes a statement as text or a pair of expressions, not {statement!r:.80}")
     operators: Any = None if model is None else getattr(model, "soa", model)
+    if model is not None and not hasattr(operators, "_source"):
+        raise _core.EvaluationError(f"a statement is checked on a model or its operators (model.soa), not on {model!r:.80}")
     if isinstance(statement, str) and is_by_block(statement, [] if operators is None else [name for name, *_ in operators.V.blocks]):
         return check_by_block(statement, operators, states=states, seed=seed, precision=precision)
     if model is None:

@@ -64,7 +64,7 @@ class Statements:
                 found.append(self._read(source, text, reading))
             # The core's errors of names, spaces and models are TypeErrors and ValueErrors; what Python finds wrong reads no better.
             except (TypeError, ValueError, AttributeError, ArithmeticError, RecursionError) as error:
-                reasons[reading] = str(error)
+                reasons[reading] = "it divides by zero" if isinstance(error, ZeroDivisionError) else str(error)
                 misfits = misfits or isinstance(error, _core.SpaceError) and not isinstance(error, _NoSpaceError)
                 place = error.place(source) if isinstance(error, Misread) else ""
         if not found:
@@ -209,6 +209,13 @@ def _check_same_spaces(lhs: Any, rhs: Any) -> None:
                 raise _core.SpaceError(f"{_text(lhs)} and {_text(rhs)} do not act between the same spaces")
     elif not isinstance(lhs, _core.Scalar) and not isinstance(rhs, _core.Scalar):
         raise ParseError("a statement about numbers alone")
+
+
+def as_text(statement: Any) -> str:
+    """A statement that is given as text. EvaluationError where it is none."""
+    if not isinstance(statement, str):
+        raise _core.EvaluationError(f"a statement is text, such as 'ψ⁻¹ = φ⁻¹ + KH', not {statement!r:.80}")
+    return statement
 
 
 class _NoSpaceError(_core.SpaceError):

@@ -14,7 +14,7 @@ from .. import _core
 from .budget import Budget
 from .family import CELLS, CONSTANT, EVERY, HYPOTHESES, ONE, WITH_J, Cell, family, nilpotency, read_on, specs
 from .judge import FAILS, HOLDS, UNDECIDED
-from .parse import Statements
+from .parse import Statements, as_text
 from .search import Counterexample, judged, smallest, understood
 from .tables import STYLES, monospace, read_as, text_of, wrapped
 
@@ -186,7 +186,7 @@ def truth(
     'TRUE where J = 0'
     """
     begin = time.perf_counter()
-    made = truth_within(statement, Budget(math.inf), precision, vectors)
+    made = truth_within(as_text(statement), Budget(math.inf), precision, vectors)
     assert made is not None
     false = [c for c in made.cells if c.example is not None]
     whole = Budget(budget)

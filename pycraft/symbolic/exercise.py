@@ -60,6 +60,9 @@ def exercise(theorem: Any, model: Any = None, blank: int | Sequence[int] | None 
     if isinstance(theorem, str):
         read, name = _read_theorem(theorem, model)
     else:
+        if not isinstance(theorem, Sequence) or len(theorem) != 2:
+            what = "a theorem's name, a statement as text or a pair (lhs, rhs)"
+            raise _core.EvaluationError(f"an exercise is made of {what}, not of {theorem!r}")
         lhs, rhs = theorem
         read, name = Statement(lhs, rhs, "", "expressions"), ""
     proof = prove(read.lhs, read.rhs, model)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from copy import copy
+from numbers import Integral
 from typing import Any, TypeVar
 
 from .. import _core
@@ -43,7 +44,7 @@ class WithGaps:
             gaps = self.gaps()
         if blank is None:
             blank = random.Random(seed).choice(gaps)
-        self._leave_out({blank} if isinstance(blank, int) else set(blank))
+        self._leave_out(_lines_of(blank))
         self._read_text = Statements(self._operators(), self._abbreviations())
 
     def _leave_out(self, blanks: set[int]) -> None:
@@ -172,6 +173,8 @@ class WithGaps:
     # ------------------------------------------------------------------ help
     def hint(self, level: int = 1) -> str:
         """1: the equation that leads to the line; 2: where it is used; 3: the line's beginning; beyond that, the line."""
+        if not isinstance(level, int):
+            raise _core.EvaluationError(f"hints have the levels 1, 2, 3 and more, not {level!r}")
         step = self.steps[self.blank - 1]
         there = any(u.left + u.word + u.right in step.full()[0] for u in step.uses)
         if level <= 1:
@@ -191,3 +194,14 @@ class WithGaps:
         """The line left out, and what leads to it."""
         step = self.steps[self.blank - 1]
         return f"{step.after_text()}   [{step.reason}]"
+
+
+def _lines_of(blank: Any) -> set[int]:
+    """The lines to leave out, of one number or several."""
+    given = [blank] if isinstance(blank, Integral) else blank
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        raise _core.EvaluationError(f"blank={blank!r}: the number of a line, or several")
+    lines = list(given)
+    if any(isinstance(line, bool) or not isinstance(line, Integral) for line in lines):
+        raise _core.EvaluationError(f"blank={blank!r}: lines are told by their numbers, from 1")
+    return set(map(int, lines))

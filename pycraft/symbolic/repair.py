@@ -21,6 +21,7 @@ from ..identities.family import HYPOTHESES, Spec
 from ..identities.formula import Formula, written_statement
 from ..identities.formula_reading import read_formula
 from ..identities.formula_values import DenseLetters, Misfit, residual
+from ..identities.parse import as_text
 from ..identities.tables import monospace, wrapped
 from ..identities.truth import in_words, truth_within
 from .prove import prove
@@ -132,7 +133,7 @@ def repair(statement: str, *, most: int = 3, budget: float = 5.0) -> Repairs:
           true where J = 0; proved
     """
     begin, spending = time.perf_counter(), Budget(budget)
-    refuse_by_block(statement)
+    refuse_by_block(as_text(statement))
     formula = read_formula(statement)
     models = small_models()
     result = Repairs(statement)

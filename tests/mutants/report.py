@@ -18,7 +18,9 @@ def table(mutants, results, seconds, options):
         "how it goes about it. Mutants *listed by hand* are what a saboteur tried (tests/mutants/listed.py); the others are drawn from",
         "a seed.",
         "",
-        f"Seed {options.seed}; {options.budget:.0f} s of tests for a mutant at most; {seconds / 60:.0f} min with {options.jobs} jobs.",
+        f"Seed {options.seed}; {options.budget:.0f} s of tests for a mutant at most; {seconds / 60:.0f} min with {options.jobs} jobs."
+        + " Changes of Python alone." * options.python
+        + " Of the tests those of the areas of what was tried." * options.areas,
         "",
         "| | killed | survived | of them explained | executed by no test |",
         "|---|---|---|---|---|",

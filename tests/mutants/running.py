@@ -118,11 +118,12 @@ def pytest_run(build, files, seconds, tests=None, first=False, **environment):
         return Run(status, output, red.read_text(encoding="utf-8").splitlines())
 
 
-def noted(build, options, show):
+def noted(build, mutants, options, show):
     """What every everyday test touches, with its seconds; those that are red already are left out."""
     begin, files = time.perf_counter(), sorted(p for p in (build.tree / "tests").glob("test_*.py") if p.name not in SKIPPED_FILES)
-    if options.dozen:
-        files = [p for p in files if p.name in DOZEN_TESTS]
+    if options.dozen or options.areas:
+        wanted = DOZEN_TESTS if options.dozen else {name for m in mutants for name in AREAS.get(m.file, ())}
+        files = [p for p in files if p.name in wanted]
     shared = everywhere(build.tree)
 
     def one(path):
