@@ -57,7 +57,7 @@ FALSE = [
 def test_true_ones(arm, text, count):
     report = pc.check(text, arm, states=1)
     assert report and f"for {count} choices of bodies" in repr(report), report
-    assert report.residual <= report.residual_bound <= 1e-12
+    assert report.residual <= report.residual_bound <= 1e-12 and report.precision == "extended"
 
 
 @pytest.mark.parametrize(("text", "where"), FALSE)

@@ -21,7 +21,7 @@ from .spelling import Spelled, spelled
 from .vocabulary import Misread, ParseError
 
 VARIABLE = r"[c-z]\d?"
-_PARENT = rf"(?:parent|℘|P)\s*\(\s*(?:{VARIABLE})\s*\)"
+_PARENT = rf"(?:parent|℘|P)\s*\(\s*(?P<of>{VARIABLE})\s*\)"
 _SUFFIX = r"(?:\^\*|\^-1|\^T|'|\*)?"
 
 
@@ -136,7 +136,8 @@ def _block(bodies: tuple[str, ...]) -> re.Pattern[str]:
     """A letter with bodies, an optional suffix between; functions and the letters that take other arguments are passed over."""
     from .vocabulary import FUNCTIONS
 
-    body = "|".join([_PARENT, rf"{VARIABLE}(?!\w)", *(rf"'?\"?{re.escape(b)}'?\"?(?!\w)" for b in sorted(bodies, key=len, reverse=True))])
+    own = (rf"'?\"?{re.escape(name)}'?\"?(?!\w)" for name in sorted(bodies, key=len, reverse=True))
+    body = "|".join([_PARENT.replace("?P<of>", "?:"), rf"{VARIABLE}(?!\w)", *own])
     names = "|".join(re.escape(n) for n in sorted({*SYMBOLS} - {*INDEXED, "I", "N"} | {"X", "V"}, key=lambda n: (-len(n), n)))
     passed = "|".join(re.escape(n) for n in (*FUNCTIONS, *INDEXED))
     return re.compile(
@@ -192,7 +193,7 @@ class _BlockBook(Book):
 def _bare(argument: str) -> str:
     argument = argument.strip().strip("'\"")
     found = re.fullmatch(_PARENT, argument)
-    return f"parent({next(re.finditer(VARIABLE, argument[argument.index('(') :]))[0]})" if found else argument
+    return f"parent({found['of']})" if found else argument
 
 
 def _free(sides: Iterable[Node], bodies: set[str]) -> tuple[str, ...]:

@@ -107,6 +107,23 @@ CHANGES = {
         ("numbers are not turned over", "product(Number(1 / factor.value), *rest)", "product(Number(factor.value), *rest)"),
         ("changes at several places come first", "cost=slip.cost + 0.25", "cost=slip.cost - 5"),
     ],
+    "pycraft/identities/block_relations.py": [
+        ("what is above includes itself", "return b[0] != b[1] and b[0] in", "return b[0] in"),
+        ("any common ancestor is the closest", "if a in of_j), None) == b[0]", "if a in of_j), None) in ancestors(parents, b[0])"),
+    ],
+    "pycraft/identities/block_values.py": [
+        ("a block's transpose is the block", "Block(x.array.T, _dual(x.domain)", "Block(x.array, _dual(x.domain)"),
+        ("children are all bodies", "if not of or p == bodies[of]]", "if True]"),
+        ("extended numbers are doubles", "high.astype(np.longdouble) + low.astype(np.longdouble)", "high.astype(np.longdouble)"),
+    ],
+    "pycraft/identities/block_check.py": [
+        (
+            "one choice of bodies is enough",
+            "    for state in states:\n        try:",
+            "    chosen = chosen[:1]\n    for state in states:\n        try:",
+        ),
+        ("any relation saves", "if any(relation.holds(parents, bodies) for parents, found in on for bodies in found.bad):", "if False:"),
+    ],
     "pycraft/symbolic/repair.py": [
         ("close is a tenth", "_CLOSE = 1e-9", "_CLOSE = 1e-1"),
         ("one small model is enough", "all(residual(new, other) < _CLOSE for other in models[1:])", "True"),
@@ -150,10 +167,10 @@ CHANGES = {
         ("macros of macros are left", "range(1000)", "range(1)"),
         (
             "undecided beside failing",
-            '3 if UNDECIDED in self.counts and FAILS not in self.counts else 1',
-            '3 if UNDECIDED in self.counts else 1',
+            "3 if UNDECIDED in self.counts and FAILS not in self.counts else 1",
+            "3 if UNDECIDED in self.counts else 1",
         ),
-        ("a paper of nothing is true", 'bool({HOLDS, TRUE_WHERE} & {*self.counts}) and not', "not"),
+        ("a paper of nothing is true", "bool({HOLDS, TRUE_WHERE} & {*self.counts}) and not", "not"),
         ("lines of the display", 'start = line + body.count("\\n", 0, at + begins)', "start = line"),
         ("rows that begin with a minus stand alone", "[-+=·@]|", "[+=·@]|"),
     ],
