@@ -169,7 +169,8 @@ def _explain(report: CheckReport, read: BlockStatement, said: dict[str, Any]) ->
     """The smallest model that refutes it, of those tried; hypotheses, and relations of the bodies, under which it was true on all."""
     refuted = [(entry[0], name, entry[1], entry[2]) for name, entry in said.items() if entry[2].refutation is not None]
     spec, name, operators, on = min(refuted, key=lambda r: r[0].size if r[0] is not None else (0, 0))
-    state, bodies, residual = on.refutation  # type: ignore[misc]
+    assert on.refutation is not None
+    state, bodies, residual = on.refutation
     names = _names(operators)
     chosen = {letter: names[bodies[letter]] for letter in read.indices}
     report.counterexample = BlockRefutation(name, state, chosen, residual, spec)

@@ -191,7 +191,7 @@ class _BlockBook(Book):
 def _bare(argument: str) -> str:
     argument = argument.strip().strip("'\"")
     found = re.fullmatch(_PARENT, argument)
-    return f"parent({re.search(VARIABLE, argument[argument.index('(') :])[0]})" if found else argument  # type: ignore[index]
+    return f"parent({re.search(VARIABLE, argument[argument.index('(') :])[0]})" if found else argument  # type: ignore[index]  # found
 
 
 def _free(sides: Iterable[Node], bodies: set[str]) -> tuple[str, ...]:

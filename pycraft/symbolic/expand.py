@@ -27,6 +27,7 @@ from .words import (
     Letter,
     Number,
     Polynomial,
+    Word,
     add_to,
     inverse_of,
     monomial,
@@ -122,6 +123,10 @@ class Problem:
     def marks(self) -> tuple[str, ...]:
         """The marks of the models whose letters occur; the first has none."""
         return tuple(["", *FURTHER][: max(1, len(self.contexts))])
+
+    def recursion_rules(self) -> list[tuple[Equation, Word]]:
+        """Of derivatives, where diagonal blocks are taken; here there are none."""
+        return []
 
     def polynomials(self) -> list[Polynomial]:
         """What the statement is made of: both sides, and the operands of the letters that it adds."""
