@@ -75,6 +75,7 @@ def test_the_books_formulas_are_true_under_their_hypotheses(judged):
         (r"\tau P = P \tau", "fails", "spaces do not fit"),  # it was "not read", and passed
         (r"M = H\phi M\phi^*H^*", "fails", "spaces do not fit"),
         (r"\mathcal D = \ln\det \mathcal M", "fails", "one is an operator, the other a number"),
+        ("G(k) = P(k) D(k)", "fails", "spaces do not fit"),
         ("I = I", "not read", "said of no space"),
         ("1 = 2", "not read", "numbers alone"),
     ],

@@ -167,6 +167,8 @@ def _judged(line: int, latex: str, check: Callable[[str], Any], on_trees: bool) 
             report = check(text)
         except SpacesError as error:
             yield Equation(line, text, FAILS, note="  spaces do not fit\n" + str(error).split("\n", 1)[-1])
+        except _core.SpaceError as error:  # of a statement by block
+            yield Equation(line, text, FAILS, note=f"  spaces do not fit\n  {error}")
         except ParseError as error:
             yield Equation(line, text, NOT_READ, note=str(error).split("\n", 1)[-1])
         except _core.Error as error:

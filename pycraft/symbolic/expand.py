@@ -27,6 +27,7 @@ from .words import (
     Letter,
     Number,
     Polynomial,
+    Word,
     add_to,
     inverse_of,
     monomial,
