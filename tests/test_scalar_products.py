@@ -95,7 +95,8 @@ def test_what_is_no_scalar(arm):
 
 def test_expressions_bound_alike_are_equal(arm):
     D, Q = arm.soa.D, np.stack([arm.random_state(k).q for k in range(2)])
-    assert D.at(arm.q) == D.at(np.array(arm.q)) and hash(D.at(arm.q)) == hash(D.at(list(arm.q)))
+    one, other = D.at(arm.q), D.at(list(arm.q))
+    assert one == D.at(np.array(arm.q)) and one == other and hash(one) == hash(other)
     assert D.at(Q) == D.at(Q.copy()) and D.at(arm.q, arm.v) == D.at(arm.random_state(1)) and D.trace().at(Q) == D.trace().at(Q)
     assert pickle.loads(pickle.dumps((D.at(Q), D.at(Q))))[0].children == []
     one, two = pickle.loads(pickle.dumps((D.at(Q), D.at(Q))))

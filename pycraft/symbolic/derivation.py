@@ -254,7 +254,7 @@ class DerivativeProblem(Problem):
 
     def _deltas_with_constant_axes(self, delta: str, outer: str) -> list[RuleOf]:
         """∂_tΔ_i = 0 and ∂_iΔ_θ̇ = 0 where the axes are constant in their bodies; ∂_iḢ = 0 follows from Ḣ = 0."""
-        found = []
+        found: list[RuleOf] = []
         for name in (f"{outer}{delta}", f"{outer}Ḣ"):
             known = self.alphabet.letters.get(name)
             if known is not None:
