@@ -1,6 +1,7 @@
 """The judge of statements: what is not decided is not true, what does not fall with epsilon is false, bounds hold, nothing is blind."""
 
 import itertools
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import pytest
 import pycraft as pc
 from pycraft.accuracy.stability_table import Stability
 from pycraft.identities.bounds import Sizes
-from pycraft.identities.judge import FAILS, HOLDS, UNDECIDED, BoundState, Taken, Verdict, decided, judge, ladder
+from pycraft.identities.judge import FAILS, HOLDS, UNDECIDED, BoundState, Judgement, Scales, Taken, Verdict, decided, judge, ladder
 from pycraft.identities.report import PASSED, CheckReport, Finding, Report
 from pycraft.interop.compare import ModelComparison, _relative
 
@@ -265,3 +266,54 @@ def test_both_sides_zero_is_said():
     assert not pc.check("H@tau_bar == 0", arm, states=2).notes  # that it is zero is what is said
     arm.gravity = (0, 0, -9.81)
     assert not pc.check("gravity_field == 7*gravity_field", arm, states=2, search=False)
+
+
+# ---------------------------------------------------------------------- norms
+
+
+def test_norms_that_are_rounding_are_not_relied_on():
+    """The rounding of a matrix is counted along: HψMψ*H* - D is zero, and its norm in double nothing but that."""
+    soa = pc.chain(4, seed=2).soa
+    H, psi, M, D, phi, E = soa("H psi M D phi E")
+    x = pc.vector("x", soa.Theta)
+    nothing = H @ psi @ M @ psi.T @ H.T - D
+    sizes = Sizes(lambda e: e, double=True)
+    sizes.give({"x": [1.0, 2.0, 3.0, 4.0]})
+    rounding = np.finfo(float).eps * np.linalg.norm(D.dense())
+    assert rounding <= sizes.norm(nothing) <= 1e6 * rounding
+    assert sizes.of_sides(phi, pc.identity(phi.domain) + phi @ E)[1]
+    for side in (nothing @ nothing, (nothing + 1e-16 * D).inv() @ D, D @ x):
+        assert not sizes.of_sides(side, 0.0)[1], side
+    assert not Sizes(lambda e: e).of_sides(phi, phi)[1]  # by plans in another precision: nothing is counted
+    before = sizes.norm(D @ x)
+    sizes.give({"x": [10.0, 20.0, 30.0, 40.0]})
+    assert sizes.norm(D @ x) == pytest.approx(10 * before)
+
+
+@pytest.mark.parametrize(
+    ("counted", "terms", "sides", "fall", "trusted"),
+    [
+        (True, 0.0, 1e-14, False, True),
+        (False, 0.0, 1.0, False, True),
+        (False, 0.0, 1e-14, False, False),
+        (False, 0.0, 1e-14, True, True),
+        (False, 1.0, 1e-14, True, False),
+    ],
+)
+def test_when_norms_of_double_are_trusted(counted, terms, sides, fall, trusted):
+    made = SimpleNamespace(counted=counted, terms=terms, size=1.0, bound=lambda relative, _: 1e-16 * max(1.0, relative))
+    assert Scales._trusted(made, sides, fall) == trusted
+    made.bound = lambda relative, _: 1e-2  # by what the sweep makes of its roundings
+    assert not Scales._trusted(made, sides, fall)
+
+
+def test_a_verdict_over_states_is_its_worst():
+    def at_a_state(verdict, precision="quad", residual=1e-30):
+        return Judgement([Taken(precision, residual, 1e-3)], verdict=verdict)
+
+    holds, fails, undecided = map(at_a_state, (HOLDS, FAILS, UNDECIDED))
+    for some, worst in (([holds, undecided, fails], FAILS), ([undecided, fails], FAILS), ([holds, undecided], UNDECIDED), ([holds, holds], HOLDS)):
+        assert {Verdict(list(order)).verdict for order in itertools.permutations(some)} == {worst}
+    wide, wider = at_a_state(HOLDS, residual=2e-30), at_a_state(HOLDS, "extended", 1e-5)
+    for order in itertools.permutations([holds, wide, wider]):
+        assert Verdict(list(order)).shown is wide

@@ -44,7 +44,7 @@ def test_no_value_is_spoiled_and_no_error_understated():
 @pytest.mark.slow
 def test_no_value_is_spoiled_and_no_error_understated_in_three_hundred_cases():
     """A part of the five thousand of `make campaigns`."""
-    assert run_campaign(range(300)) > 1000
+    assert run_campaign(range(300)) > 500
 
 
 @pytest.mark.parametrize("seed", [807, 1073, 1647, 1808])

@@ -51,7 +51,7 @@ AREAS = {
     "cpp/algebra/interrupt.cpp": ["test_interrupts.py"],
     "pycraft/identities/report.py": ["test_failing_reports.py", "test_judge.py", "test_terminal.py"],
     "pycraft/identities/judge.py": ["test_judge.py"],
-    "pycraft/identities/checker.py": ["test_judge.py", "test_failing_reports.py"],
+    "pycraft/identities/checker.py": ["test_judge.py", "test_failing_reports.py", "test_checker.py"],
     "pycraft/identities/bounds.py": ["test_judge.py"],
     "pycraft/identities/book.py": ["test_readings.py"],
     "pycraft/identities/parse.py": ["test_readings.py", "test_statements.py"],
