@@ -96,6 +96,38 @@ def test_what_a_sweep_amplifies_is_no_rise():
     assert decided(at(1e-16, 1e-13, bounds=[1e-9, 1e-12]), 1e6) == HOLDS
 
 
+class NormsOf:
+    """Roundings whose double has no digit: a bound of 1 there, of 1e3 epsilons in wider scalars."""
+
+    size, terms, growth = 1.0, 0.0, 1.0
+
+    def __init__(self, lhs, rhs, precision):
+        self.made_in = precision
+
+    def bound(self, relative_size, precision):
+        return 1.0 if self.made_in == "double" else 1e3 * EPSILON[precision]
+
+
+def test_norms_of_double_are_taken_where_rounding_leaves_them_digits(monkeypatch):
+    """Where it leaves none, the bound in quad is that of norms in quad, and 1e-9 is no rounding there."""
+
+    class At:
+        def sizes(self, precision, values):
+            return precision
+
+    monkeypatch.setattr("pycraft.identities.judge.Roundings", NormsOf)
+    scales = Scales(1.0, 1.0, At(), {})
+    for precision in ("double", "extended"):
+        (*_, taken), _, _ = scales.taken(precision, (1e-9, 1.0, 1.0))
+        assert taken.bound == 1.0
+    (*_, taken), _, _ = scales.taken("quad", (1e-9, 1.0, 1.0))
+    assert taken.bound == 1e3 * EPSILON["quad"] < taken.residual
+    good = {"double": 1e3 * EPSILON["quad"], "quad": 1.0}
+    monkeypatch.setattr(NormsOf, "bound", lambda self, relative_size, precision: good[self.made_in])
+    (*_, taken), _, _ = Scales(1.0, 1.0, At(), {}).taken("quad", (1e-9, 1.0, 1.0))
+    assert taken.bound == 1e3 * EPSILON["quad"]  # those of double, which cost least
+
+
 def test_norms_follow_the_vectors():
     model = pc.chain(2)
     x = pc.vector("x", model.soa.Theta)

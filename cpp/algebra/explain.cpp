@@ -85,6 +85,7 @@ const char* step_kind_name(StepKind kind) {
     case StepKind::selected_blocks: return "selected_blocks";
     case StepKind::mass_matrix: return "mass_matrix";
     case StepKind::mass_matrix_solve: return "mass_matrix_solve";
+    case StepKind::mass_matrix_solve_tangent: return "mass_matrix_solve_tangent";
     case StepKind::mass_matrix_dense: return "mass_matrix_dense";
     case StepKind::dense_factor: return "dense_factor";
     case StepKind::dense_solve: return "dense_solve";

@@ -169,7 +169,7 @@ Plan Planner::plan(const Expression& typed, Request request) {
   typed.check_current();
   more_digits_ = precision_of(typed) > Precision::double_;
   Expression e = lower(typed, false);
-  if (options_.rules) e = optimise(e, plan_.notes);
+  if (options_.rules) e = optimise(with_swept_tangents(e, request), plan_.notes);
   plan_.domain = e.domain();
   plan_.codomain = e.codomain();
   const bool bodies = cut_alike(e.domain(), e.codomain());

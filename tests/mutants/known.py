@@ -88,7 +88,7 @@ EQUIVALENT = {
         "cpp/algebra/elimination_solve.h",
         "a refinement of an elimination need only shrink",
         "",
-    ): "corrections of rounding more, no digit else",
+    ): "what loses more than a hundredth is refused, so corrections shrink a hundredfold or are rounding: one of these more, no digit else",
 }
 
 
