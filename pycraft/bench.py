@@ -163,7 +163,7 @@ def _beside_pinocchio(name: str, robot: Any, q: np.ndarray, v: np.ndarray, u: np
 # What a way to compute may cost over `fast` in double (quad: the compiler's own 128 bits, or the portable type).
 WAYS: dict[str, tuple[dict[str, Any], float]] = {
     "fast + 1 refinement": ({"refine": 1}, 2.2),
-    "fast + 1 refinement, wide gather": ({"refine": 1, "residual": "gather"}, 3.0),
+    "fast + 1 refinement, wide gather": ({"refine": 1, "residual": "gather"}, 2.6),
     "ud": ({"form": "ud"}, 3.5),
     "square-root": ({"form": "square-root"}, 6.0),
     "extended": ({"precision": "extended"}, 15.0 if _core.epsilons()["extended"] > 1e-25 else 80.0),
@@ -171,8 +171,8 @@ WAYS: dict[str, tuple[dict[str, Any], float]] = {
 }
 
 
-UD_AT_WORST = 4.5
-"""`ud` over `fast` where every joint has one coordinate and little else to do, or the columns leave the cache."""
+UD_AT_WORST = 3.5
+"""`ud` over `fast` where every joint has one coordinate and little else to do, or there are more bodies than a cache holds."""
 
 
 def ud_at_worst(seconds: float) -> list[Figure]:

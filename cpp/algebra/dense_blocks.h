@@ -340,6 +340,7 @@ class DenseBlocks {
     }
     add_factors("J", k, hinge_diagonal(k), n, [&](const S& w, auto u) { factors_->add_rotor(k, w, u); });
     none_.assign(s, 0);
+    factors_->fill_up(k);
     factors_->eliminate(k, form, none_.data(), false);
     for (int j = 0; j < n; ++j) {
       pivots[j] = factors_->weight(j) * factors_->lower(j, j) * factors_->lower(j, j);

@@ -5,7 +5,8 @@
 // It contracts by about the relative error of the first solution, down to the floor that the rounding of r leaves. So much of δ as that
 // rounding may have made is known, along δ itself (algebra/sweeps/residual_rounding.h), and decides:
 //
-//   - a δ that may be nothing but rounding is not applied, as x may be better than the residual can tell;
+//   - a δ that may be nothing but rounding is not applied, as x may be better than the residual can tell; one of four roundings of x or less is
+//     not even asked, unless motions and forces, all of the residual, are formed in a wider scalar;
 //   - a first δ above 0.3 of the solution is refused, for nothing is known then; unless it is small beside terms that cancelled in the
 //     solution, and rounding, or followed by a correction that is small;
 //   - corrections that do not halve end it, and are refused where they are above 0.3 of the solution.
@@ -46,7 +47,7 @@ void refine(S* x, int n, int m, const Refinement& how, Form form, const S& large
             Rounding&& rounding, RefinementWork<S>& work) {
   using std::abs, std::sqrt;
   const size_t size = size_t(n) * m;
-  const S limit = S(0.3), exact = how.residual != ResidualPrecision::same ? S(0) : S(S(4) * epsilon<S>());
+  const S limit = S(0.3), exact = how.wider() ? S(0) : S(S(4) * epsilon<S>());
   for (auto* v : {&work.r, &work.delta, &work.direction})
     if (v->size() < size) v->resize(size);
   work.length.resize(m), work.rounding.assign(m, S(0)), work.last.assign(m, S(0)), work.open.assign(m, 1), work.corrections.clear();

@@ -10,9 +10,11 @@ void SkoStructure::finish() {
   const int n = bodies();
   offset.assign(1, 0);
   dof_offset.assign(1, 0);
+  last_child.assign(n, -1);
   for (int k = 0; k < n; ++k) {
     if (parent[k] >= k || parent[k] < -1)
       throw ModelError("body " + std::to_string(k) + " has parent " + std::to_string(parent[k]) + "; parents come before their children");
+    if (parent[k] >= 0) last_child[parent[k]] = k;
     offset.push_back(offset.back() + size[k]);
     dof_offset.push_back(dof_offset.back() + dof[k]);
   }

@@ -12,6 +12,7 @@ struct SkoStructure {
   std::vector<int> size;                       // s_k: rows of body k in V and F (6 for a rigid body)
   std::vector<int> dof;                        // n_k: rows of H(k)
   std::vector<int> offset, dof_offset;         // prefix sums, one longer
+  std::vector<int> last_child;                 // the child that sweeps from the tips come from first, -1 at a tip
   std::vector<std::string> body_names, hinge_names, coordinate_names;
 
   int bodies() const { return static_cast<int>(parent.size()); }

@@ -79,7 +79,7 @@ class SkoValues {
   // The fused kernels: y = HφMφ*H* x + J x if asked; y = [I-HψK]* D⁻¹ [I-HψK] x; HφMφ*H* as a dense matrix.
   virtual void mass_matrix(bool with_hinge_diagonal, const S* x, S* y, int columns, S* scratch) const = 0;
   virtual void mass_matrix_inverse(const S* x, S* y, int columns, S* scratch) const = 0;
-  // r = b - (HφMφ*H* + J) x with forces gathered one scalar up, of those that know their inertias in it.
+  // r = b - (HφMφ*H* + J) x with forces gathered one scalar up, of those that know their masses to it.
   virtual bool gathers_wider() const { return false; }
   virtual void gathered_residual(const S*, const S*, S*, int, S*, std::vector<Wider<S>>&) const { throw EvaluationError("forces are not gathered in wider numbers here"); }
   // The most that rounding of a residual b - (HφMφ*H* + J) x, in these units, makes of a correction along w, column by column: sweeps/residual_rounding.h.

@@ -57,7 +57,7 @@ typename RigidDynamics<S>::AddedInertias RigidDynamics<S>::forward_dynamics_of_p
   };
   const auto residual_at = [&](const S* x, S* r) {
     if (how.refinement.gathers_wider()) {
-      newton_euler_residual_gathered(*model_, wide_model_->inertia, blocks_, points_, x, tau, r, alpha_, force_, wide_force_);
+      newton_euler_residual_gathered(*model_, blocks_, points_, x, tau, r, alpha_, force_, wide_force_);
     } else if (how.refinement.wider()) {
       convert(x, n, wide_x_), wide_r_.resize(n);
       wider_->residual(tau, wide_x_.data(), wide_r_.data());
@@ -71,7 +71,6 @@ typename RigidDynamics<S>::AddedInertias RigidDynamics<S>::forward_dynamics_of_p
   };
   refinement_.corrections.clear();
   if (how.refinement.steps != 0 && how.refinement.wider()) wider(q, v);
-  if (how.refinement.steps != 0 && how.refinement.gathers_wider()) gather_wider();
   if (!added.empty()) {
     articulated_inertia_tip_to_base(tree_, blocks_);
     std::fill_n(vdot, n, S(0));
@@ -153,11 +152,6 @@ template <class S>
 template <class T>
 void RigidDynamics<S>::size_residual(const RigidDynamics<T>& formed, const T* vdot, const Refinement& how) {
   newton_euler_sizes(tree_, *formed.model_, formed.blocks_, formed.points_, formed.v_.data(), vdot, tau_.data(), formed.alpha_, formed.force_, units_of<S>(how), sizes_);
-}
-
-template <class S>
-void RigidDynamics<S>::gather_wider() {
-  if (!wide_model_) wide_model_ = source_.compiled<Wider<S>>();
 }
 
 // From the direction given, or any other, the worst signs along it and what they make are found in turn: each is at least as long as
@@ -266,7 +260,6 @@ void RigidDynamics<S>::mass_matrix_solve(const double* q, const S* right, int m,
   project_off_null_space(added, out, m);
   refinement_.corrections.clear();
   if (how.refinement.steps != 0) {
-    if (how.refinement.gathers_wider()) gather_wider();
     if (how.refinement.wider()) {
       rest_.assign(N, 0.0);
       wider(q, rest_.data());
@@ -274,7 +267,7 @@ void RigidDynamics<S>::mass_matrix_solve(const double* q, const S* right, int m,
     refine(out, N, m, how.refinement, how.form, S(0), [&] { return "the mass matrix inverse of '" + source_.name() + "'"; },
            [&](const S* x, S* r) {
              if (how.refinement.gathers_wider()) {
-               mass_matrix_residual_gathered(tree_, blocks_, wide_model_->inertia, x, columns_.data(), r, m, scratch_.data(), wide_r_);
+               mass_matrix_residual_gathered(tree_, blocks_, model_->mass_properties, x, columns_.data(), r, m, scratch_.data(), wide_r_);
              } else if (how.refinement.wider()) {
                convert(x, size, wide_x_), convert(columns_.data(), size, wide_r_);
                wider_->subtract_product(wide_x_.data(), wide_r_.data(), m);

@@ -76,7 +76,6 @@ class RigidDynamics {
   template <class T>
   void size_residual(const RigidDynamics<T>& formed, const T* vdot, const Refinement& how);  // of the one that was formed last
   S length(const S* x) const;   // 2-norm of nv numbers
-  void gather_wider();  // from now on forces can be
   S floor(const S* direction);  // the most that rounding of that residual can make of a correction
   template <class F>
   AddedInertias with_every_hinge_regular(F f);
@@ -93,7 +92,6 @@ class RigidDynamics {
   std::vector<double> rest_;     // v = 0
   std::vector<S> q_, v_, tau_, columns_, scratch_, r_;
   std::unique_ptr<RigidDynamics<Wider<S>>> wider_;
-  std::shared_ptr<const CompiledModel<Wider<S>>> wide_model_;
   std::vector<Vector6<Wider<S>>> wide_force_;
   std::vector<Wider<S>> wide_x_, wide_r_;
   RefinementWork<S> refinement_;

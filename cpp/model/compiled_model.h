@@ -30,6 +30,7 @@ struct CompiledModel {
   std::vector<Pose<S>> placement;
   std::vector<RigidInertia<S>> inertia;
   std::vector<InertiaFactors<S>> inertia_factors;
+  std::vector<MassProperties> mass_properties;
   std::vector<S> rotor_inertia;               // per coordinate
   bool has_rotor_inertia = false;
   std::vector<std::array<int, 3>> translations;  // per body: coordinates that move it along any line, without rotor inertia; -1: none

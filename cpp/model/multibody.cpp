@@ -490,6 +490,7 @@ std::shared_ptr<const CompiledModel<S>> compile(const Multibody& model) {
     c->placement.push_back(renormalised<S>(b.hinge.placement));
     c->inertia.push_back(rigid_inertia(S(b.mass), cast<S>(b.com), cast<S>(b.inertia)));
     c->inertia_factors.push_back(inertia_factors<S>(b.mass, b.com, b.inertia));
+    c->mass_properties.push_back({b.mass, b.com, b.inertia});
     for (size_t i = 0; i < b.hinge.subhinges.size(); ++i) {
       const Subhinge& h = b.hinge.subhinges[i];
       const Vector3<S> axis = renormalised<S>(h.axis), point = cast<S>(h.point);

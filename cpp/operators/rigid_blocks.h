@@ -15,6 +15,7 @@
 #include "operators/rigid_factors.h"
 #include "spatial/articulated_inertia.h"
 #include "spatial/sizes.h"
+#include "spatial/wide_force.h"
 
 namespace pycraft {
 
@@ -207,15 +208,22 @@ class RigidBlocks {
       }
     }
   }
-  // ---------------------------------------------------------------- forces in a wider scalar T, of inertias given in it
+  // ---------------------------------------------------------------- forces in a wider scalar T
   template <class T>
-  void inertia_wide(int k, const std::vector<RigidInertia<T>>& inertias, const S* a, T* f, int m) const {
-    for (int c = 0; c < m; ++c) store(inertias[k] * cast<T>(load(a, m, c)), f, m, c);
+  void inertia_wide(int k, const std::vector<MassProperties>& masses, const S* a, T* f, int m) const {
+    for (int c = 0; c < m; ++c) {
+      Vector6<T> force;
+      wide_force<T, S>(masses[k], load(a, m, c), nullptr, force);
+      store(force, f, m, c);
+    }
   }
   template <class T>
   void shift_add_wide(int k, const T* x, T* y, int m) const {
-    const Pose<T> X = cast<T>(pose[k]);
-    for (int c = 0; c < m; ++c) add_to(force_to_parent(X, load(x, m, c)), y, m, c);
+    for (int c = 0; c < m; ++c) {
+      Vector6<T> sum = load(y, m, c);
+      add_wide_to_parent(pose[k], load(x, m, c), sum);
+      store(sum, y, m, c);
+    }
   }
   // r = b - H f - J x
   template <class T>
@@ -223,7 +231,7 @@ class RigidBlocks {
     for (int c = 0; c < m; ++c)
       for (int j = first(k); j < last(k); ++j) {
         const size_t at = size_t(j - first(k)) * m + c;
-        r[at] = static_cast<S>(T(b[at]) - dot(cast<T>(H[j]), load(f, m, c)) - T(J[j]) * T(x[at]));
+        r[at] = static_cast<S>(T(b[at]) - wide_dot(H[j], load(f, m, c)) - T(J[j]) * T(x[at]));
       }
   }
 

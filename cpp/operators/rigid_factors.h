@@ -14,21 +14,30 @@ namespace pycraft {
 template <class S>
 class RigidFactors {
  public:
-  explicit RigidFactors(const SkoStructure& tree) : tree_(tree), factors_(tree), bias_(tree.coordinates(), S(0)) {}
+  explicit RigidFactors(const SkoStructure& tree) : tree_(tree), factors_(tree), bias_(tree.coordinates(), S(0)), weighted_(factors_.widest()) {}
 
   void start(int k, const InertiaFactors<S>& own) {
     factors_.start(k);
-    for (int c = 0; c < 6; ++c) factors_.add(k, own.weight[c], S(0), [&](int i) { return own.column[c][i]; });
+    const int stride = factors_.stride(k);
+    S* row = factors_.more(k, 6);
+    for (int i = 0; i < 6; ++i, row += stride)
+      for (int c = 0; c < 6; ++c) row[c] = own.column[c][i];
+    std::fill_n(row, 6, S(0));
+    std::copy_n(own.weight, 6, row + stride);
   }
   // The gyroscopic force of body k as accelerations of its own columns, and what is left of it as a force.
   Vector6<S> start_bias(int k, const InertiaFactors<S>& own, const Vector3<S>& omega) { return gyroscopic_bias(own, omega, factors_.bias_row(k)); }
   // ρ <- ρ - C* a
   void add_acceleration(int k, const Vector6<S>& a) {
-    S* rho = factors_.bias_row(k);
-    for (int i = 0; i < 6; ++i) {
-      const S* row = factors_.body_row(k, i);
-      for (int c = 0; c < factors_.columns(k); ++c) rho[c] -= a[i] * row[c];
-    }
+    const int stride = factors_.stride(k);
+    const S* __restrict row = factors_.body_row(k, 0);
+    S* __restrict rho = factors_.bias_row(k);
+    factors_.fill_up(k);
+    for_columns<S>(factors_.columns(k), [&](int c) {
+      S sum = rho[c];
+      for (int i = 0; i < 6; ++i) sum -= a[i] * row[i * stride + c];
+      rho[c] = sum;
+    });
   }
   ArticulatedInertia<S> inertia(int k) const {
     return symmetric([&](int i, int j) { return factors_.inertia(k, i, j); });
@@ -38,24 +47,38 @@ class RigidFactors {
   // G, D, L and pivots d of its factors LdL*, and with bias the rates that C W ρ* gives the hinge; nv_of(k) of each. False, with L and pivots
   // alone, where a pivot is not positive.
   bool eliminate(int k, Form form, const Vector6<S>* H, const S* J, const int* aligned, bool with_bias, Vector6<S>* G, S* D, S* L, S* pivots) {
-    const int n = tree_.dof[k], m = factors_.columns(k);
-    if (std::any_of(aligned, aligned + n, [](int axis) { return axis < 0; }))
-      for (int i = 0; i < 6; ++i) diagonal_[i] = factors_.inertia(k, i, i);
+    const int n = tree_.dof[k], m = factors_.columns(k), stride = factors_.stride(k);
+    const S* __restrict body = factors_.body_row(k, 0);
+    if (!with_bias) factors_.fill_up(k);  // else accelerations were added
+    if (std::any_of(aligned, aligned + n, [](int axis) { return axis < 0; })) {
+      const S* __restrict weight = factors_.weights(k);
+      S* __restrict square = weighted_.data();
+      for (int i = 0; i < 6; ++i) {
+        for_columns<S>(m, [&](int c) { square[c] = weight[c] * body[i * stride + c]; });
+        diagonal_[i] = product_of_rows(square, body + i * stride, m);
+      }
+    }
     bool rotor = false;
     for (int j = 0; j < n; ++j) rotor |= !(J[j] == S(0));
     int is_hinge_row[6] = {0, 0, 0, 0, 0, 0};
     for (int j = 0; j < n; ++j) {
-      S* row = factors_.hinge_row(k, j);
-      std::fill_n(row, m, S(0));
-      for (int i = 0; i < 6; ++i) {
-        if (aligned[j] >= 0 && i != aligned[j]) continue;
-        const S h = H[j][i], *body = factors_.body_row(k, i);
-        for (int c = 0; c < m; ++c) row[c] += h * body[c];
+      S* __restrict row = factors_.hinge_row(k, j);
+      if (const int i = aligned[j]; i >= 0) {
+        const S h = H[j][i];
+        for_columns<S>(m, [&](int c) { row[c] = h * body[i * stride + c]; });
+      } else {
+        const Vector6<S> h = H[j];
+        for_columns<S>(m, [&](int c) {
+          S sum = h[0] * body[c];
+          for (int i = 1; i < 6; ++i) sum += h[i] * body[i * stride + c];
+          row[c] = sum;
+        });
       }
       if (aligned[j] >= 0 && !rotor) is_hinge_row[aligned[j]] = H[j][aligned[j]] > S(0) ? j + 1 : -(j + 1);
     }
     for (int j = 0; j < n && rotor; ++j)
       if (!(J[j] == S(0))) factors_.add_rotor(k, J[j], [j](int i) { return i == j ? S(1) : S(0); });
+    if (rotor) factors_.fill_up(k);
     factors_.eliminate(k, form, is_hinge_row, with_bias);
     hinge_rows_ = n;
 
@@ -106,11 +129,15 @@ class RigidFactors {
     return sum;
   }
   void to_parent(int k, const Pose<S>& X) {
-    for (int r = tree_.dof[k]; r < factors_.pivots(); ++r) {
-      Vector6<S> u;
-      for (int i = 0; i < 6; ++i) u[i] = factors_.U(i, r);
-      u = force_to_parent(X, u);
-      factors_.add(tree_.parent[k], factors_.weight(r), factors_.bias(r), [&](int i) { return u[i]; });
+    const int first = tree_.dof[k], columns = factors_.pivots() - first, p = tree_.parent[k], stride = factors_.stride(p);
+    const S *__restrict u[6], *__restrict bias = factors_.bias_row_left(first), *__restrict weight = factors_.weights_left(first);
+    for (int i = 0; i < 6; ++i) u[i] = factors_.U_row(i, first);
+    S* __restrict to = factors_.more(p, columns);
+    for (int c = 0; c < columns; ++c) {
+      const Vector6<S> carried = force_to_parent(X, Vector6<S>{{u[0][c], u[1][c], u[2][c]}, {u[3][c], u[4][c], u[5][c]}});
+      for (int i = 0; i < 6; ++i) to[i * stride + c] = carried[i];
+      to[6 * stride + c] = bias[c];
+      to[7 * stride + c] = weight[c];
     }
   }
 
@@ -128,7 +155,7 @@ class RigidFactors {
 
   const SkoStructure& tree_;
   FactoredInertia<S> factors_;
-  std::vector<S> bias_;
+  std::vector<S> bias_, weighted_;
   S diagonal_[6];
   int hinge_rows_ = 0;
 };

@@ -21,8 +21,7 @@ class RigidValues final : public TreeValues<RigidBlocks<S>> {
   void function_block(const Symbol& function, const S* x, S* out) const override;
   bool gathers_wider() const override { return true; }
   void gathered_residual(const S* x, const S* b, S* r, int m, S* scratch, std::vector<Wider<S>>& forces) const override {
-    const auto wide = model_.compiled<Wider<S>>();
-    mass_matrix_residual_gathered(this->tree_, this->blocks_, wide->inertia, x, b, r, m, scratch, forces);
+    mass_matrix_residual_gathered(this->tree_, this->blocks_, compiled_->mass_properties, x, b, r, m, scratch, forces);
   }
 
   std::unique_ptr<InverseTangent<S>> inverse_tangent() const override;

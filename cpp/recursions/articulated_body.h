@@ -43,13 +43,13 @@ S articulated_body(const SkoStructure& tree, const CompiledModel<S>& model, Rigi
   blocks.keep_inertias = false;
   blocks.with_bias = factored;
   bool doubtful = false;
-  for (int k = 0; k < model.bodies; ++k) {
-    check_interrupt_at(k);
+  const auto start = [&](int k) {
     blocks.start_articulated(k);
     z[k] = factored ? blocks.factors().start_bias(k, model.inertia_factors[k], points.angular_velocity[k]) : points.b[k];
-  }
+  };
   for (int k = model.bodies - 1; k >= 0; --k) {
     check_interrupt_at(k);
+    if (tree.last_child[k] < 0) start(k);
     const int p = model.parent[k], first = model.v_offset[k], n = model.nv_of[k];
     if (factored) blocks.factors().add_acceleration(k, points.a[k]);
     const Pivots found = blocks.eliminate_hinge(k);
@@ -66,6 +66,7 @@ S articulated_body(const SkoStructure& tree, const CompiledModel<S>& model, Rigi
     blocks.solve_D_in_place(k, vdot + first, 1);  // ν
     for (int j = 0; j < n && factored; ++j) vdot[first + j] += blocks.factors().bias(k)[j];
     if (p >= 0) {
+      if (tree.last_child[p] == k) start(p);
       blocks.articulated_to_parent(k);
       z[p] = z[p] + force_to_parent(blocks.pose[k], plus);
     }

@@ -13,6 +13,7 @@
 #include "algebra/interrupt.h"
 #include "operators/rigid_blocks.h"
 #include "recursions/point_accelerations.h"
+#include "spatial/wide_force.h"
 
 namespace pycraft {
 
@@ -38,10 +39,11 @@ void newton_euler(const CompiledModel<S>& model, const RigidBlocks<S>& blocks, c
   }
 }
 
-// r = τ - T of the same equations, motions in S and forces gathered in a wider T: M α + b of inertias given in T. f in S as above.
+// r = τ - T of the same equations, motions in S and forces gathered in a wider T: M α + b of masses that are no rounded inertias. f in S as
+// above.
 template <class S, class T, class U>
-void newton_euler_residual_gathered(const CompiledModel<S>& model, const std::vector<RigidInertia<T>>& inertias, const RigidBlocks<S>& blocks,
-                                    const PointAccelerations<S>& points, const S* vdot, const U* tau, S* r, std::vector<Vector6<S>>& alpha, std::vector<Vector6<S>>& f, std::vector<Vector6<T>>& wide) {
+void newton_euler_residual_gathered(const CompiledModel<S>& model, const RigidBlocks<S>& blocks, const PointAccelerations<S>& points, const S* vdot,
+                                    const U* tau, S* r, std::vector<Vector6<S>>& alpha, std::vector<Vector6<S>>& f, std::vector<Vector6<T>>& wide) {
   const Vector6<S> base{Vector3<S>::zero(), -model.gravity};
   wide.resize(model.bodies);
   for (int k = 0; k < model.bodies; ++k) {
@@ -50,15 +52,14 @@ void newton_euler_residual_gathered(const CompiledModel<S>& model, const std::ve
     Vector6<S> acceleration = motion_to_child(blocks.pose[k], p < 0 ? base : alpha[p]) + points.a[k];
     for (int j = first; j < first + n; ++j) acceleration = acceleration + vdot[j] * blocks.H[j];
     alpha[k] = acceleration;
-    const RigidInertia<T>& M = inertias[k];
-    wide[k] = M * cast<T>(acceleration) + gyroscopic_part(M, cast<T>(points.angular_velocity[k]));
+    wide_force(model.mass_properties[k], alpha[k], &points.angular_velocity[k], wide[k]);
   }
   for (int k = model.bodies - 1; k >= 0; --k) {
     check_interrupt_at(k);
     const int p = model.parent[k], first = model.v_offset[k], n = model.nv_of[k];
     f[k] = cast<S>(wide[k]);
-    for (int j = first; j < first + n; ++j) r[j] = static_cast<S>(T(tau[j]) - dot(cast<T>(blocks.H[j]), wide[k]) - T(blocks.J[j]) * T(vdot[j]));
-    if (p >= 0) wide[p] = wide[p] + force_to_parent(cast<T>(blocks.pose[k]), wide[k]);
+    for (int j = first; j < first + n; ++j) r[j] = static_cast<S>(T(tau[j]) - wide_dot(blocks.H[j], wide[k]) - T(blocks.J[j]) * T(vdot[j]));
+    if (p >= 0) add_wide_to_parent(blocks.pose[k], wide[k], wide[p]);
   }
 }
 

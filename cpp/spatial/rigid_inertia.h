@@ -16,6 +16,13 @@ struct RigidInertia {
   static RigidInertia zero() { return {S(0), Vector3<S>::zero(), Symmetric3<S>::zero()}; }
 };
 
+// A body's numbers as they are given, of which inertias in any scalar are made.
+struct MassProperties {
+  double mass;
+  Vector3<double> com;
+  Symmetric3<double> about_com;
+};
+
 // From mass, centre of mass and the inertia about the centre of mass.
 template <class S>
 inline RigidInertia<S> rigid_inertia(const S& mass, const Vector3<S>& com, const Symmetric3<S>& about_com) {

@@ -4,16 +4,20 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <numeric>
+#include <random>
 
 #include "algebra/equilibration.h"
 #include "algebra/gram_factors.h"
 #include "algebra/refinement.h"
 #include "algebra/small_lu.h"
+#include "algebra/sweeps/factored_inertia.h"
 #include "algebra/sweeps/residual_rounding.h"
 #include "algebra/sweeps/singular_pivot.h"
 #include "recursions/configuration_rate.h"
 #include "recursions/kinematics.h"
 #include "spatial/pack.h"
+#include "spatial/wide_force.h"
 #include "robot.h"
 
 using namespace pycraft;
@@ -275,5 +279,116 @@ BOOST_AUTO_TEST_CASE(moves_keep_the_length_of_quaternions) {
       for (int i = 0; i < 4; ++i) squares += (q[i] / length) * (q[i] / length);
       if (kind == SubhingeKind::ball || length < 1e100) BOOST_TEST(std::abs(std::sqrt(squares) - 1) < 50 * 4 * eps);
     }
+  }
+}
+
+namespace {
+
+SkoStructure tree_of_sixes(const std::vector<int>& parents) {
+  SkoStructure tree;
+  tree.parent = parents;
+  tree.size.assign(parents.size(), 6), tree.dof.assign(parents.size(), 1);
+  tree.finish();
+  return tree;
+}
+
+std::vector<int> chain_of(int n) {
+  std::vector<int> parents(n);
+  for (int k = 0; k < n; ++k) parents[k] = k - 1;
+  return parents;
+}
+
+}  // namespace
+
+// 1.6 MB of 2000 bodies, which no cache near the processor holds, before bodies gave their room back.
+BOOST_AUTO_TEST_CASE(columns_of_a_chain_take_the_room_of_two_bodies) {
+  const auto room = [](const std::vector<int>& parents) { return FactoredInertia<double>(tree_of_sixes(parents)).scalars(); };
+  BOOST_TEST(room(chain_of(2000)) == room(chain_of(3)));
+  BOOST_TEST(room(chain_of(3)) > room(chain_of(1)));
+  BOOST_TEST(room({-1, 0, 0, 0, 0}) > room({-1, 0, 0}));  // of a star all columns of the leaves meet
+}
+
+// A sweep as block policies make it, in bodies of six with one coordinate each: no body writes into the room of another that is open.
+BOOST_AUTO_TEST_CASE(open_bodies_share_no_room) {
+  std::mt19937 random(5);
+  for (int trial = 0; trial < 50; ++trial) {
+    std::vector<int> parents(1, -1);
+    while (parents.size() < 12) {  // depth first, as models are: a child of the last body or of one above it
+      int p = static_cast<int>(parents.size()) - 1;
+      for (int up = random() % 3; up > 0 && p >= 0; --up) p = parents[p];
+      parents.push_back(p);
+    }
+    const SkoStructure tree = tree_of_sixes(parents);
+    FactoredInertia<double> factors(tree);
+    const auto start = [&](int k) {
+      factors.start(k);
+      for (int c = 0; c < 6; ++c) factors.add(k, 1 + c, k, [&](int i) { return 100 * k + 10 * i + c; });
+    };
+    const auto unharmed = [&](int k) {
+      for (int i = 0; i < 6; ++i)
+        for (int c = 0; c < 6; ++c)
+          if (factors.body_row(k, i)[c] != 100 * k + 10 * i + c || factors.weights(k)[c] != 1 + c) return false;
+      return true;
+    };
+    for (int k = tree.bodies() - 1; k >= 0; --k) {
+      if (tree.last_child[k] < 0) start(k);
+      BOOST_TEST(unharmed(k));
+      factors.fill_up(k);
+      const int p = tree.parent[k];
+      if (p < 0) continue;
+      if (tree.last_child[p] == k) start(p);
+      BOOST_TEST(unharmed(k));
+      for (int c = 0; c < 6; ++c) factors.add(p, -1, -1, [](int) { return -1.0; });
+    }
+  }
+}
+
+// Rows that are filled up to whole fours, whichever way they are taken, against the same in packs, bit for bit.
+BOOST_AUTO_TEST_CASE(orthogonal_rows_are_the_same_however_many_are_taken_at_a_time) {
+  using Four = Pack<double, 4>;
+  const int stride = 24, count = 8, pivots = 7;
+  for (int m : {1, 5, 6, 11, 12, 13, 17, 22}) {
+    std::vector<double> A(count * stride, 0), w(stride, 0), weighted(stride), L(count * pivots), d(pivots);
+    std::vector<int> rows(count);
+    std::iota(rows.begin(), rows.end(), 0);
+    const std::vector<double> numbers = random_numbers(count * stride + m, m);
+    for (int r = 0; r < count; ++r)
+      for (int c = 0; c < m; ++c) A[r * stride + c] = numbers[r * stride + c];
+    for (int c = 0; c < m; ++c) w[c] = std::abs(numbers[count * stride + c]);
+    std::vector<Four> A4(A.begin(), A.end()), w4(w.begin(), w.end()), weighted4(stride), L4(L.size()), d4(pivots);
+    std::vector<double> A1 = A, L1(L.size()), d1(pivots);
+    weighted_gram_schmidt(A.data(), stride, rows.data(), count, pivots, m, w.data(), weighted.data(), L.data(), d.data());
+    orthogonalise(A1.data(), stride, rows.data(), count, pivots, m, w.data(), weighted.data(), L1.data(), d1.data());
+    weighted_gram_schmidt(A4.data(), stride, rows.data(), count, pivots, m, w4.data(), weighted4.data(), L4.data(), d4.data());
+    for (size_t i = 0; i < L.size(); ++i) BOOST_TEST((L[i] == L1[i] && L[i] == L4[i].v[3]));
+    for (int r = 0; r < pivots; ++r) BOOST_TEST((d[r] == d1[r] && d[r] == d4[r].v[0]));
+  }
+}
+
+// Of masses as they are given, against the inertia about the origin in quad; rounded in T once an operation, never in double.
+BOOST_AUTO_TEST_CASE(wide_forces_are_wide) {
+  const auto near = [](Extended x, Quad exact, Quad size) { return abs(Quad(x) - exact) <= Quad(64) * Quad(epsilon<Extended>()) * size; };
+  for (int seed = 0; seed < 20; ++seed) {
+    const std::vector<double> x = random_numbers(40, seed);
+    const MassProperties M{1 + x[0], {x[1], x[2], x[3]}, {2 + x[4], x[5], x[6], 2 + x[7], x[8], 2 + x[9]}};
+    const Vector6<double> a{{x[10], x[11], x[12]}, {x[13], x[14], x[15]}};
+    const Vector3<double> omega{x[16], x[17], x[18]};
+    const RigidInertia<Quad> exact = rigid_inertia(Quad(M.mass), cast<Quad>(M.com), cast<Quad>(M.about_com));
+    const Vector3<Quad> w = cast<Quad>(omega);
+    const Vector6<Quad> rest = exact * cast<Quad>(a), moving = rest + Vector6<Quad>{cross(w, exact.rotational * w), cross(w, cross(w, exact.moment))};
+    Vector6<Extended> f, g;
+    wide_force<Extended, double>(M, a, nullptr, f);
+    wide_force(M, a, &omega, g);
+    const Pose<double> X{exp_rotation(Vector3<double>{x[20], x[21], x[22]}), {x[23], x[24], x[25]}};
+    const Vector6<Quad> carried = force_to_parent(cast<Quad>(X), moving);
+    Vector6<Extended> parent = Vector6<Extended>::zero();
+    add_wide_to_parent(X, g, parent);
+    add_wide_to_parent(X, g, parent);
+    for (int i = 0; i < 6; ++i) {
+      BOOST_TEST(near(f[i], rest[i], Quad(30)));
+      BOOST_TEST(near(g[i], moving[i], Quad(60)));
+      BOOST_TEST(near(parent[i], Quad(2) * carried[i], Quad(400)));
+    }
+    BOOST_TEST(near(wide_dot(a, g), dot(cast<Quad>(a), moving), Quad(400)));
   }
 }

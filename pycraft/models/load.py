@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import numpy as np
 
@@ -103,7 +105,23 @@ def read(
     for option, value in (("root", root), ("mimic", mimic), ("welds", welds)):
         if value not in _OPTIONS[option]:
             raise _core.ModelError(f"{option}={value!r}: there are {', '.join(map(repr, _OPTIONS[option]))}")
-    file = XmlFile(path)
+    with _no_collection():
+        return _read(XmlFile(path), root, mimic, welds, strict)
+
+
+@contextmanager
+def _no_collection() -> Iterator[None]:
+    """No search for garbage meanwhile: a file of 10⁵ links makes objects by the million, all of which are in use."""
+    searched = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if searched:
+            gc.enable()
+
+
+def _read(file: XmlFile, root: str, mimic: str, welds: str, strict: bool) -> tuple[Multibody, list[str]]:
     if file.root_name == "robot":
         with np.errstate(over="ignore", invalid="ignore"):  # what is not finite then is refused, with its line
             return urdf.read(file, root=root, mimic=mimic, welds=welds, strict=strict)

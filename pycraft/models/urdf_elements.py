@@ -29,12 +29,10 @@ _IDENTITY, _ZERO, _X = np.eye(3), np.zeros(3), np.array([1.0, 0.0, 0.0])
 for _constant in (_IDENTITY, _ZERO, _X):
     _constant.setflags(write=False)
 # Of a joint: element, attribute, what it is called in Multibody.left_aside.
-_LEFT_ASIDE = (
-    ("dynamics", "damping", "damping"),
-    ("dynamics", "friction", "friction"),
-    ("limit", "effort", "effort limit"),
-    ("limit", "velocity", "velocity limit"),
-)
+_LEFT_ASIDE = {
+    "dynamics": (("damping", "damping"), ("friction", "friction")),
+    "limit": (("effort", "effort limit"), ("velocity", "velocity limit")),
+}
 _EXPAND = "expand the file first: xacro file.xacro > file.urdf"
 
 
@@ -152,7 +150,7 @@ class Elements:
         mass = self.file.required(inertial, "mass", element, 'write <mass value="..."/> in kg')
         inertia = self.file.required(inertial, "inertia", element, "write it with six moments, zeros for a point mass")
         rotation, com = self._origin(inertial, element)
-        xx, xy, xz, yy, yz, zz = (self.file.number(inertia, moment, element) for moment in _MOMENTS)
+        xx, xy, xz, yy, yz, zz = self.file.each_number(inertia, _MOMENTS, element)
         moments = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         if rotation is not _IDENTITY:
             moments = turned_inertia(rotation, moments)
@@ -183,12 +181,15 @@ class Elements:
 
     def _leave_aside(self, name: str, element: Element) -> None:
         """What the file says of a joint that a model does not have: numbers above zero of damping, friction and bounds."""
-        for tag, attribute, quantity in _LEFT_ASIDE:
+        for tag, quantities in _LEFT_ASIDE.items():
             inner = self.file.child(element, tag)
-            if inner is not None and inner.get(attribute) is not None:
-                number = self.file.number(inner, attribute, element, infinite=True)
-                if number > 0:
-                    self.left_aside.setdefault(quantity, {})[name] = number
+            if inner is None:
+                continue
+            for attribute, quantity in quantities:
+                if inner.get(attribute) is not None:
+                    number = self.file.number(inner, attribute, element, infinite=True)
+                    if number > 0:
+                        self.left_aside.setdefault(quantity, {})[name] = number
 
     def _end(self, end: str, element: Element) -> str:
         inner = self.file.required(element, end, element, f'write <{end} link="..."/>')

@@ -14,6 +14,7 @@ from lxml import etree
 from .. import _core
 
 Element: TypeAlias = "etree._Element"
+_NONE: list[Element] = []
 
 
 class XmlFile:
@@ -92,10 +93,14 @@ class XmlFile:
     def children(self, element: Element, name: str) -> list[Element]:
         """Children of that name, in the root's namespace (if it has one)."""
         if element is not self._looked_into:  # asked for one name after the other, of one element after the other
-            self._looked_into, self._found = element, {}
-            for child in element.iterchildren("*"):
-                self._found.setdefault(child.tag, []).append(child)
-        return self._found.get(f"{{{self._space}}}{name}" if self._space else name, [])
+            found: dict[str, list[Element]] = {}
+            for child in element:
+                if (tag := child.tag) in found:
+                    found[tag].append(child)
+                else:
+                    found[tag] = [child]
+            self._looked_into, self._found = element, found
+        return self._found.get(f"{{{self._space}}}{name}" if self._space else name, _NONE)
 
     def child(self, element: Element, name: str) -> Element | None:
         """The one child of that name, None if there is none; ModelError if there are several: which one counts is not clear."""
@@ -162,6 +167,17 @@ class XmlFile:
         if math.isfinite(number) and value.isascii() and "_" not in value:  # type: ignore[union-attr]  # finite, so no None
             return number
         return self._floats(element, attribute, value, 1, owner, infinite)[0]
+
+    def each_number(self, element: Element, attributes: tuple[str, ...], owner: Element) -> list[float]:
+        """One number of each of these attributes, all of which must be there."""
+        values = [element.get(attribute) for attribute in attributes]
+        try:  # all at once, where nothing is wrong
+            numbers, written = list(map(float, values)), "".join(values)  # type: ignore[arg-type]
+        except (TypeError, ValueError):
+            return [self.number(element, attribute, owner) for attribute in attributes]
+        if written.isascii() and "_" not in written and all(map(math.isfinite, numbers)):
+            return numbers
+        return [self.number(element, attribute, owner) for attribute in attributes]
 
     def _floats(
         self, element: Element, attribute: str, value: str | None, count: int | None, owner: Element, infinite: bool

@@ -23,7 +23,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <map>
+#include <type_traits>
 #include <vector>
 
 #include "algebra/arithmetic.h"
@@ -36,7 +37,7 @@ inline S ratio_or_zero(const S& x, const S& y) {
   return y == S(0) ? S(0) : S(x / y);
 }
 
-// Σ x y with four sums in flight.
+// Σ x y in four sums, of entries 0, 4, 8, ..., of 1, 5, 9, ..., and so on: in any scalar, however many are taken at a time.
 template <class S>
 inline S dot_product(const S* x, const S* y, int n) {
   S a = S(0), b = S(0), c = S(0), d = S(0);
@@ -47,27 +48,79 @@ inline S dot_product(const S* x, const S* y, int n) {
     c += x[i + 2] * y[i + 2];
     d += x[i + 3] * y[i + 3];
   }
-  for (; i < n; ++i) a += x[i] * y[i];
+  if (i < n) a += x[i] * y[i];
+  if (i + 1 < n) b += x[i + 1] * y[i + 1];
+  if (i + 2 < n) c += x[i + 2] * y[i + 2];
   return (a + b) + (c + d);
 }
 
-// Rows A (given by their numbers) of m columns: the first `pivots` are made orthogonal in the weights w, the others relieved of them.
-// L: rows x pivots, unit lower; d: their weighted squares. A row of weight zero takes nothing from the others.
+// How many columns are taken at a time: rows of machine numbers are filled up with zeros to whole fours.
 template <class S>
-inline void weighted_gram_schmidt(S* A, int stride, const int* rows, int count, int pivots, int m, const S* w, S* weighted, S* L, S* d) {
+inline constexpr int columns_at_once = std::is_same_v<S, double> || std::is_same_v<S, Single> ? 4 : 1;
+template <class S>
+inline constexpr int filled(int columns) {
+  return (columns + columns_at_once<S> - 1) / columns_at_once<S> * columns_at_once<S>;
+}
+// f(c) for columns 0, ..., m - 1, in whole fours.
+template <class S, class F>
+inline void for_columns(int m, F f) {
+  for (int c = 0; c < m; c += columns_at_once<S>)
+    for (int i = c; i < c + columns_at_once<S>; ++i) f(i);
+}
+// Σ x y over rows that are filled up.
+template <class S>
+inline S product_of_rows(const S* x, const S* y, int m) {
+  if constexpr (columns_at_once<S> == 1) return dot_product(x, y, m);
+  S a = S(0), b = S(0), c = S(0), d = S(0);
+  for (int i = 0; i < m; i += 4) {
+    a += x[i] * y[i];
+    b += x[i + 1] * y[i + 1];
+    c += x[i + 2] * y[i + 2];
+    d += x[i + 3] * y[i + 3];
+  }
+  return (a + b) + (c + d);
+}
+
+// Rows A (given by their numbers) of m columns, filled up: the first `pivots` are made orthogonal in the weights w, the others relieved of
+// them. L: rows x pivots, unit lower; d: their weighted squares. A row of weight zero takes nothing from the others.
+template <class S>
+[[gnu::always_inline]] inline void orthogonalise(S* __restrict A, int stride, const int* rows, int count, int pivots, int m, const S* __restrict w,
+                                                 S* __restrict weighted, S* __restrict L, S* __restrict d) {
   for (int r = 0; r < pivots; ++r) {
-    S* a = A + rows[r] * stride;
-    for (int c = 0; c < m; ++c) weighted[c] = w[c] * a[c];
-    d[r] = dot_product(weighted, a, m);
+    const S* __restrict a = A + rows[r] * stride;
+    for_columns<S>(m, [&](int c) { weighted[c] = w[c] * a[c]; });
+    const S square = product_of_rows(weighted, a, m);
+    d[r] = square;
     for (int s = 0; s < r; ++s) L[s * pivots + r] = S(0);
     L[r * pivots + r] = S(1);
     for (int s = r + 1; s < count; ++s) {
-      S* b = A + rows[s] * stride;
-      const S f = ratio_or_zero(dot_product(weighted, b, m), d[r]);
+      S* __restrict b = A + rows[s] * stride;
+      const S f = ratio_or_zero(product_of_rows(weighted, b, m), square);
       L[s * pivots + r] = f;
-      for (int c = 0; c < m; ++c) b[c] -= f * a[c];
+      for_columns<S>(m, [&](int c) { b[c] -= f * a[c]; });
     }
   }
+}
+
+// Four doubles at a time where the processor can; the same bits.
+#if defined(__x86_64__) && defined(__GNUC__)
+template <class S>
+[[gnu::target("avx2")]] void orthogonalise_by_fours(S* A, int stride, const int* rows, int count, int pivots, int m, const S* w, S* weighted, S* L, S* d) {
+  orthogonalise(A, stride, rows, count, pivots, m, w, weighted, L, d);
+}
+inline bool has_fours() {
+  static const bool has = __builtin_cpu_supports("avx2");
+  return has;
+}
+#endif
+
+template <class S>
+inline void weighted_gram_schmidt(S* A, int stride, const int* rows, int count, int pivots, int m, const S* w, S* weighted, S* L, S* d) {
+#if defined(__x86_64__) && defined(__GNUC__)
+  if constexpr (columns_at_once<S> > 1)
+    if (has_fours()) return orthogonalise_by_fours(A, stride, rows, count, pivots, m, w, weighted, L, d);
+#endif
+  orthogonalise(A, stride, rows, count, pivots, m, w, weighted, L, d);
 }
 
 // The same with weights that are in the columns already, by reflections: A = L Q, Q* Q = 1.
@@ -123,64 +176,95 @@ inline bool semidefinite_factors(const S* given, int n, const S& rounding, S* U,
 template <class S>
 class FactoredInertia {
  public:
-  explicit FactoredInertia(const SkoStructure& tree) : tree_(tree), at_(tree.bodies()), weight_at_(tree.bodies()), capacity_(tree.bodies()), count_(tree.bodies()) {
-    int rows = 0, widest = 0;
-    for (int k = 0; k < tree.bodies(); ++k) capacity_[k] = tree.size[k] + tree.dof[k];
+  // Sweeps go from the tips: a body takes room when its first child comes in, and gives it back once it has gone into its parent.
+  explicit FactoredInertia(const SkoStructure& tree) : tree_(tree), at_(tree.bodies()), stride_(tree.bodies()), count_(tree.bodies()) {
+    std::vector<int> capacity(tree.bodies());
+    for (int k = 0; k < tree.bodies(); ++k) capacity[k] = tree.size[k] + tree.dof[k];
     for (int k = 0; k < tree.bodies(); ++k)
-      if (tree.parent[k] >= 0) capacity_[tree.parent[k]] += tree.size[k];
-    size_t at = 0, weights = 0;
+      if (tree.parent[k] >= 0) capacity[tree.parent[k]] += tree.size[k];
+    int rows = 0, widest = 0;
     for (int k = 0; k < tree.bodies(); ++k) {
-      at_[k] = at;
-      weight_at_[k] = weights;
+      stride_[k] = filled<S>(capacity[k]);
       rows = std::max(rows, tree.dof[k] + tree.size[k] + 1);
-      widest = std::max(widest, capacity_[k]);
-      at += size_t(tree.dof[k] + tree.size[k] + 1) * capacity_[k];
-      weights += capacity_[k];
+      widest = std::max(widest, stride_[k]);
     }
-    A_.resize(at);
-    w_.resize(weights);
-    L_.resize(size_t(rows) * rows), d_.resize(rows), rows_.resize(rows), position_.resize(rows), source_.resize(rows);
+    size_t room = 0;
+    std::map<size_t, std::vector<size_t>> left;  // of bodies that are through, by size
+    const auto size = [&](int k) { return size_t(tree.dof[k] + tree.size[k] + 2) * stride_[k]; };
+    const auto take = [&](int k) {
+      std::vector<size_t>& same = left[size(k)];
+      at_[k] = same.empty() ? room : same.back();
+      if (same.empty())
+        room += size(k);
+      else
+        same.pop_back();
+    };
+    for (int k = tree.bodies() - 1; k >= 0; --k) {
+      const int p = tree.parent[k];
+      if (tree.last_child[k] < 0) take(k);
+      if (p >= 0 && tree.last_child[p] == k) take(p);
+      left[size(k)].push_back(at_[k]);
+    }
+    A_.resize(room);
+    L_.resize(size_t(rows) * rows), d_.resize(rows), zeros_.assign(rows, S(0)), rows_.resize(rows), position_.resize(rows), source_.resize(rows);
     weighted_.resize(widest), sorted_.resize(widest), order_.resize(widest);
   }
 
-  size_t scalars() const { return A_.size() + w_.size() + L_.size() + d_.size() + weighted_.size() + sorted_.size(); }
+  size_t scalars() const { return A_.size() + L_.size() + d_.size() + weighted_.size() + sorted_.size(); }
 
   // ---- columns of P(k)
   void start(int k) { count_[k] = 0; }
   // A column with its weight; element i of it is u(i).
   template <class Column>
   void add(int k, const S& weight, const S& rho, Column&& u) {
-    const int n = tree_.dof[k], s = tree_.size[k], c = count_[k]++, stride = capacity_[k];
-    S* A = A_.data() + at_[k] + c;
+    const int n = tree_.dof[k], s = tree_.size[k], stride = stride_[k];
+    S* A = A_.data() + at_[k] + count_[k]++;
     for (int i = 0; i < s; ++i) A[(n + i) * stride] = u(i);
     A[(n + s) * stride] = rho;
-    w_[weight_at_[k] + c] = weight;
+    A[(n + s + 1) * stride] = weight;
   }
   int columns(int k) const { return count_[k]; }
-  const S* body_row(int k, int i) const { return A_.data() + at_[k] + size_t(tree_.dof[k] + i) * capacity_[k]; }
-  S* bias_row(int k) { return A_.data() + at_[k] + size_t(tree_.dof[k] + tree_.size[k]) * capacity_[k]; }
-  S* hinge_row(int k, int j) { return A_.data() + at_[k] + size_t(j) * capacity_[k]; }
+  const S* body_row(int k, int i) const { return A_.data() + at_[k] + size_t(tree_.dof[k] + i) * stride_[k]; }
+  S* bias_row(int k) { return A_.data() + at_[k] + size_t(tree_.dof[k] + tree_.size[k]) * stride_[k]; }
+  S* hinge_row(int k, int j) { return A_.data() + at_[k] + size_t(j) * stride_[k]; }
+  const S* weights(int k) const { return A_.data() + at_[k] + size_t(tree_.dof[k] + tree_.size[k] + 1) * stride_[k]; }
   // Entry (i, j) of P(k), before the hinge is eliminated.
   S inertia(int k, int i, int j) const {
-    const S *a = body_row(k, i), *b = body_row(k, j), *w = w_.data() + weight_at_[k];
+    const S *a = body_row(k, i), *b = body_row(k, j), *w = weights(k);
     S sum = S(0);
     for (int c = 0; c < count_[k]; ++c) sum += w[c] * a[c] * b[c];
     return sum;
   }
+  // Columns from columns(k) to whole fours become zero in all rows: before rows are worked on, and again after more were added.
+  void fill_up(int k) {
+    S* A = A_.data() + at_[k];
+    const int rows = tree_.dof[k] + tree_.size[k] + 2, m = count_[k], end = filled<S>(m);
+    for (int row = 0; m < end && row < rows; ++row, A += stride_[k])
+      for (int c = end - columns_at_once<S>; c < end; ++c)
+        if (c >= m) A[c] = S(0);
+  }
+  // Room for more columns of body k: its first row from there on, the next ones stride(k) apart, ρ and the weights last.
+  S* more(int k, int columns) {
+    S* at = A_.data() + at_[k] + size_t(tree_.dof[k]) * stride_[k] + count_[k];
+    count_[k] += columns;
+    return at;
+  }
+  int stride(int k) const { return stride_[k]; }
+  size_t widest() const { return weighted_.size(); }
 
   // ---- the hinge: the caller fills hinge_row(k, j) with H C over columns(k), then adds the factors of J
   template <class Column>
   void add_rotor(int k, const S& weight, Column&& u) {
-    const int n = tree_.dof[k], s = tree_.size[k], c = count_[k]++, stride = capacity_[k];
-    S* A = A_.data() + at_[k] + c;
+    const int n = tree_.dof[k], s = tree_.size[k], stride = stride_[k];
+    S* A = A_.data() + at_[k] + count_[k]++;
     for (int j = 0; j < n; ++j) A[j * stride] = u(j);
     for (int i = 0; i <= s; ++i) A[(n + i) * stride] = S(0);
-    w_[weight_at_[k] + c] = weight;
+    A[(n + s + 1) * stride] = weight;
   }
-  // is_hinge_row[i]: ±(j + 1) where row i of the body is ± the hinge's row j and J = 0, else 0. bias: the row ρ is in use.
+  // Rows are filled up. is_hinge_row[i]: ±(j + 1) where row i of the body is ± the hinge's row j and J = 0, else 0. bias: the row ρ is in use.
   void eliminate(int k, Form form, const int* is_hinge_row, bool bias) {
-    const int n = tree_.dof[k], s = tree_.size[k], m = count_[k], stride = capacity_[k];
-    S *A = A_.data() + at_[k], *w = w_.data() + weight_at_[k];
+    const int n = tree_.dof[k], s = tree_.size[k], m = count_[k], stride = stride_[k];
+    S *A = A_.data() + at_[k], *w = A + (n + s + 1) * stride;
     int count = 0;
     for (int j = 0; j < n; ++j) rows_[count++] = j;
     for (int i = 0; i < s; ++i) {
@@ -214,6 +298,10 @@ class FactoredInertia {
   }
   // P⁺ = U d U*: column r = n, ..., pivots() - 1, of weight(r).
   S U(int i, int r) const { return position_[i] >= 0 ? lower(position_[i], r) : S(0); }
+  // Row i of U from column r on.
+  const S* U_row(int i, int r) const { return position_[i] >= 0 ? L_.data() + position_[i] * pivots_ + r : zeros_.data(); }
+  const S* bias_row_left(int r) const { return bias_at_ >= 0 ? L_.data() + bias_at_ * pivots_ + r : zeros_.data(); }
+  const S* weights_left(int r) const { return d_.data() + r; }
   // ρ against row r, of the hinge or of the body.
   S bias(int r) const { return bias_at_ >= 0 ? lower(bias_at_, r) : S(0); }
 
@@ -240,9 +328,9 @@ class FactoredInertia {
   }
 
   const SkoStructure& tree_;
-  std::vector<size_t> at_, weight_at_;
-  std::vector<int> capacity_, count_, order_, rows_, position_, source_;  // position: of a body row among the rows of L
-  std::vector<S> A_, w_, L_, d_, weighted_, sorted_;
+  std::vector<size_t> at_;                                              // of each body's rows: hinge, body, ρ, weights
+  std::vector<int> stride_, count_, order_, rows_, position_, source_;  // position: of a body row among the rows of L
+  std::vector<S> A_, L_, d_, zeros_, weighted_, sorted_;
   int pivots_ = 0, bias_at_ = -1;
 };
 

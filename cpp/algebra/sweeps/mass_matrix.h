@@ -39,9 +39,9 @@ void mass_matrix_apply(const SkoStructure& tree, const Blocks& blocks, bool with
   }
 }
 
-// r = b - (HφMφ*H* + J) x with motions in S and forces, of inertias in a wider T, gathered in T; scratch: dimension * m scalars.
-template <class Blocks, class Inertias, class S, class T>
-void mass_matrix_residual_gathered(const SkoStructure& tree, const Blocks& blocks, const Inertias& inertias, const S* x, const S* b, S* r, int m, S* scratch, std::vector<T>& forces) {
+// r = b - (HφMφ*H* + J) x with motions in S and forces, of masses that are no rounded inertias, gathered in a wider T; scratch: dimension * m scalars.
+template <class Blocks, class Masses, class S, class T>
+void mass_matrix_residual_gathered(const SkoStructure& tree, const Blocks& blocks, const Masses& masses, const S* x, const S* b, S* r, int m, S* scratch, std::vector<T>& forces) {
   S* alpha = scratch;
   forces.assign(std::max(forces.size(), static_cast<size_t>(tree.dimension()) * m), T(0));
   std::fill_n(alpha, static_cast<size_t>(tree.dimension()) * m, S(0));
@@ -49,7 +49,7 @@ void mass_matrix_residual_gathered(const SkoStructure& tree, const Blocks& block
     S* ak = alpha + tree.offset[k] * m;
     if (tree.parent[k] >= 0) blocks.shift_transposed_add(k, alpha + tree.offset[tree.parent[k]] * m, ak, m);
     blocks.hinge_transposed_add(k, x + tree.dof_offset[k] * m, ak, m);
-    blocks.inertia_wide(k, inertias, ak, forces.data() + tree.offset[k] * m, m);
+    blocks.inertia_wide(k, masses, ak, forces.data() + tree.offset[k] * m, m);
   }
   for (int k = tree.bodies() - 1; k >= 0; --k) {
     const T* fk = forces.data() + tree.offset[k] * m;

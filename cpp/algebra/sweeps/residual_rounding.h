@@ -94,7 +94,8 @@ void rounding_along(const SkoStructure& tree, const Blocks& blocks, const S* w, 
     if (tree.parent[k] >= 0) blocks.shift_add(k, e + size_t(tree.offset[k]) * m, e + size_t(tree.offset[tree.parent[k]]) * m, m);
   std::fill_n(out, m, S(0));
   const auto add = [&](const std::vector<S>& adjoint, const std::vector<S>& size, int rows) {
-    for (size_t i = 0; i < size_t(rows) * m; ++i) out[i % m] += abs(adjoint[i]) * size[i];
+    for (size_t i = 0, at = 0; i < size_t(rows); ++i)
+      for (int c = 0; c < m; ++c, ++at) out[c] += abs(adjoint[at]) * size[at];
   };
   add(sizes.f, sizes.motion, tree.dimension());
   add(sizes.g, sizes.force, tree.dimension());
