@@ -297,7 +297,8 @@ def test_a_verdict_over_states_is_its_worst():
         return Judgement([Taken(precision, residual, 1e-3)], verdict=verdict)
 
     holds, fails, undecided = map(at_a_state, (HOLDS, FAILS, UNDECIDED))
-    for some, worst in (([holds, undecided, fails], FAILS), ([undecided, fails], FAILS), ([holds, undecided], UNDECIDED), ([holds, holds], HOLDS)):
+    cases = [([holds, undecided, fails], FAILS), ([undecided, fails], FAILS), ([holds, undecided], UNDECIDED), ([holds, holds], HOLDS)]
+    for some, worst in cases:
         assert {Verdict(list(order)).verdict for order in itertools.permutations(some)} == {worst}
     wide, wider = at_a_state(HOLDS, residual=2e-30), at_a_state(HOLDS, "extended", 1e-5)
     for order in itertools.permutations([holds, wide, wider]):
