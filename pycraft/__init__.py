@@ -2,17 +2,16 @@
 
 What to type::
 
-    >>> import pycraft as pc
-    >>> arm = pc.robots.panda()                  # or pc.load("arm.urdf"), pc.chain(10), pc.Multibody("mine") built body by body
-    >>> arm.q = arm.random_state(seed=0).q
-    >>> H, phi, M, D, K, psi, I = arm.soa("H phi M D K psi I")
-    >>> MM = H @ phi @ M @ phi.T @ H.T           # typed as on paper; nothing is computed yet
-    >>> MM.inv() @ [1, 0, 0, 0, 0, 0, 0]         # O(N): the theorems find [I-HψK]* D⁻¹ [I-HψK]  # doctest: +SKIP
-    >>> MM.inv().explain()                       # how, and what it costs  # doctest: +SKIP
-    >>> pc.check("inv(psi) == inv(phi) + K*H", arm)        # is it true?  # doctest: +SKIP
-    >>> pc.prove("inv(MM) == (I - H*psi*K).T * inv(D) * (I - H*psi*K)", model=arm)   # and why?  # doctest: +SKIP
-    >>> arm.forward_dynamics().shape             # numbers and no algebra, at the present state
-    (7,)
+    import pycraft as pc
+    arm = pc.robots.panda()                  # or pc.load("arm.urdf"), pc.chain(10), pc.Multibody("mine") built body by body
+    arm.q = arm.random_state(seed=0).q
+    H, phi, M, D, K, psi, I = arm.soa("H phi M D K psi I")
+    MM = H @ phi @ M @ phi.T @ H.T           # typed as on paper; nothing is computed yet
+    MM.inv() @ [1, 0, 0, 0, 0, 0, 0]         # O(N): the theorems find [I-HψK]* D⁻¹ [I-HψK]
+    MM.inv().explain()                       # how, and what it costs
+    pc.check("inv(psi) == inv(phi) + K*H", arm)        # is it true?
+    pc.prove("inv(MM) == (I - H*psi*K).T * inv(D) * (I - H*psi*K)", model=arm)   # and why?
+    arm.forward_dynamics()                   # numbers and no algebra, at the present state
 
 `arm.soa?` lists the operators, docs/notation.md their letters; `pc.Multibody` has the direct calls; on the command line, `pycraft tour`.
 """

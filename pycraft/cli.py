@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from pathlib import Path
-from typing import Annotated, Any, Optional
+from typing import Annotated, Any
 
 import typer
 from rich.markup import escape
@@ -18,12 +18,13 @@ app = typer.Typer(
     add_completion=False,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
-    help="A workbench for the Spatial Operator Algebra over a multibody model.",
+    help="A workbench for the Spatial Operator Algebra over a multibody model. Tables fit the terminal, or the environment's COLUMNS; "
+    "files and pipes, which have no width of their own, get 140 columns.",
 )
 
 MIMIC = ("refuse", "lock", "free")
 Model = Annotated[str, typer.Argument(help="A URDF or MJCF file, or the name of a robot that comes with the package (see pycraft.robots).")]
-Root = Annotated[Optional[str], typer.Option(help="fixed | free: a free hinge first; fixed if left out, of a robot by name its own.")]
+Root = Annotated[str | None, typer.Option(help="fixed | free: a free hinge first; fixed if left out, of a robot by name its own.")]
 Mimic = Annotated[str, typer.Option(help="refuse | lock | free: what becomes of a file's mimic joints.")]
 
 
@@ -37,7 +38,7 @@ def load_model(name: str, root: str | None = None, mimic: str = "refuse") -> Any
         raise _core.ModelError(f"mimic={mimic!r}: there are {', '.join(map(repr, MIMIC))}")
     if name in robots.names() and not Path(name).is_file():  # none of them has a mimic joint
         return getattr(robots, name)(**({} if root is None else {"root": root}))
-    if not Path(name).exists():
+    if not name or not Path(name).exists():
         raise _core.ModelError(f"no file is called {name!r}, and no robot of the package; its robots are {', '.join(robots.names())}")
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", ModelWarning)
@@ -49,9 +50,13 @@ def load_model(name: str, root: str | None = None, mimic: str = "refuse") -> Any
 
 def check_outputs(**paths: Path | None) -> None:
     """Where files are to be written, before what goes into them is measured: the folder is there, a picture has a format."""
+    taken: dict[Path, str] = {}
     for option, path in paths.items():
         if path is None:
             continue
+        other = taken.setdefault(path.absolute(), option)
+        if other != option and path.absolute().parent != Path("/dev"):
+            fail(f"--{other} and --{option} name the same file, {path}")
         if path.is_dir():
             fail(f"--{option} {path}: a folder; give a file in it")
         if not path.absolute().parent.is_dir():
@@ -82,7 +87,7 @@ def check_seconds(**durations: float | None) -> None:
 
 @app.command()
 def tour(
-    model: Annotated[Optional[str], typer.Argument(help="A URDF or MJCF file, or a robot's name; the Panda by default.")] = None,
+    model: Annotated[str | None, typer.Argument(help="A URDF or MJCF file, or a robot's name; the Panda by default.")] = None,
     root: Root = None,
     mimic: Mimic = "refuse",
 ) -> None:
@@ -105,12 +110,15 @@ def check(
 ) -> None:
     """Check every theorem on a model, or the displayed equations of a LaTeX paper (a .tex file, on random trees).
 
-    Exit status 1 if something fails that should hold, 3 if something is undecided.
+    Exit status 1 if something fails that should hold, 3 if something is undecided, or undefined on the model.
     """
     check_least(0, states=states, seed=seed)
     wide = int(precision) if precision.isdecimal() else precision
     if model.endswith(".tex"):
-        _check_paper(model, states, seed, json)
+        for option, given in (("full", full), ("root", root is not None), ("mimic", mimic != "refuse")):
+            if given:
+                fail(f"--{option} belongs to models; a paper is checked on random trees, and shown in full")
+        _check_paper(model, states, seed, wide, json)
     robot = load_model(model, root, mimic)
     with diagnostics.status("checking") as status:
         report = robot.soa.check(states=states, seed=seed, precision=wide, progress=lambda name: status.update(escape(name)))
@@ -122,11 +130,11 @@ def check(
     raise typer.Exit(report.status)
 
 
-def _check_paper(path: str, states: int, seed: int, json: bool) -> None:
+def _check_paper(path: str, states: int, seed: int, precision: str | int, json: bool) -> None:
     from .identities.paper import check_paper
 
     with diagnostics.status("reading") as status:
-        report = check_paper(path, states=max(states, 1), seed=seed, progress=status.update)
+        report = check_paper(path, states=max(states, 1), seed=seed, precision=precision, progress=status.update)
     print(report.to_json() if json else report)
     raise typer.Exit(report.status)
 
@@ -139,17 +147,20 @@ def bench(seconds: Annotated[float, typer.Option(help="Seconds per figure.")] = 
     check_seconds(seconds=seconds)
     with diagnostics.status("measuring"):
         results = run(seconds)
-    missed = 0
+    missed = []
     for heading, figures in results.items():
         table = Table(title=heading, title_justify="left", box=None, header_style="bold")
         for column, justify in (("figure", "left"), ("measured", "right"), ("bound", "right"), ("", "left")):
-            table.add_column(column, justify=justify)  # type: ignore[arg-type]  # rich's literal
+            table.add_column(column, justify=justify)  # type: ignore[arg-type]  # rich's words
         for figure in figures:
-            missed += not figure.passed
+            missed += [] if figure.passed else [figure]
             style = "" if figure.passed else "bold red"
             bound = "" if figure.bound is None else f"{figure.bound:g} {figure.unit}"
             table.add_row(figure.name, f"{figure.value:.3g} {figure.unit}", bound, figure.note, style=style)
         console.print(table)
+    for figure in missed:  # in a file red is not seen
+        text = f"{figure.name}: {figure.value:.3g} {figure.unit} is over its bound, {figure.bound:g} {figure.unit}"
+        console.print(text, style="red", markup=False, highlight=False)
     raise typer.Exit(1 if missed else 0)
 
 
@@ -157,16 +168,16 @@ def bench(seconds: Annotated[float, typer.Option(help="Seconds per figure.")] = 
 def accuracy(
     model: Model,
     integration: Annotated[bool, typer.Option("--integration", help="Integrators and tolerances instead of forms and precisions.")] = False,
-    form: Annotated[Optional[list[str]], typer.Option(help="Only this form; may be repeated.")] = None,
-    precision: Annotated[Optional[list[str]], typer.Option(help="Only this precision; may be repeated.")] = None,
-    method: Annotated[Optional[list[str]], typer.Option(help="Only this method, or integrator; may be repeated.")] = None,
-    error: Annotated[Optional[float], typer.Option(help="Name the cheapest row whose error is at most this.")] = None,
+    form: Annotated[list[str] | None, typer.Option(help="Only this form; may be repeated.")] = None,
+    precision: Annotated[list[str] | None, typer.Option(help="Only this precision; may be repeated.")] = None,
+    method: Annotated[list[str] | None, typer.Option(help="Only this method, or integrator; may be repeated.")] = None,
+    error: Annotated[float | None, typer.Option(help="Name the cheapest row whose error is at most this.")] = None,
     seconds: Annotated[float, typer.Option(help="Seconds per figure.")] = 0.05,
-    duration: Annotated[Optional[float], typer.Option(help="Seconds of the motion that is integrated; 1 if left out.")] = None,
+    duration: Annotated[float | None, typer.Option(help="Seconds of the motion that is integrated; 1 if left out.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the states and forces.")] = 0,
-    csv: Annotated[Optional[Path], typer.Option(help="Write the rows as CSV.")] = None,
-    json: Annotated[Optional[Path], typer.Option(help="Write the rows as JSON.")] = None,
-    plot: Annotated[Optional[Path], typer.Option(help="Draw error against time (PNG, SVG or PDF).")] = None,
+    csv: Annotated[Path | None, typer.Option(help="Write the rows as CSV.")] = None,
+    json: Annotated[Path | None, typer.Option(help="Write the rows as JSON.")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Draw error against time (PNG, SVG or PDF).")] = None,
     root: Root = None,
     mimic: Mimic = "refuse",
 ) -> None:
@@ -257,9 +268,9 @@ def stability(
     steps: Annotated[int, typer.Option(help="Steps of each trajectory.")] = 1_000_000,
     case: Annotated[str, typer.Option(help="Only cases whose name or family has this text.")] = "",
     peers: Annotated[bool, typer.Option(help="Pinocchio, MuJoCo, Drake, as far as they are installed, side by side.")] = True,
-    output: Annotated[Optional[Path], typer.Option(help="Where to write the table (Markdown).")] = None,
-    csv: Annotated[Optional[Path], typer.Option(help="Write the rows as CSV.")] = None,
-    json: Annotated[Optional[Path], typer.Option(help="Write the rows as JSON.")] = None,
+    output: Annotated[Path | None, typer.Option(help="Where to write the table (Markdown).")] = None,
+    csv: Annotated[Path | None, typer.Option(help="Write the rows as CSV.")] = None,
+    json: Annotated[Path | None, typer.Option(help="Write the rows as JSON.")] = None,
 ) -> None:
     """Run the hard cases over forms, refinements and precisions; exit status 1 if a bound does not hold."""
     from .accuracy import stability as hard
@@ -296,7 +307,7 @@ def stability(
 
 @app.command()
 def peers(
-    output: Annotated[Optional[Path], typer.Option(help="Where to write the table (Markdown).")] = None,
+    output: Annotated[Path | None, typer.Option(help="Where to write the table (Markdown).")] = None,
     states: Annotated[int, typer.Option(help="Random states per robot.")] = 20,
     seed: Annotated[int, typer.Option(help="Seed of the states.")] = 0,
 ) -> None:

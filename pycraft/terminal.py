@@ -36,6 +36,11 @@ def fail(text: str, status: int = REFUSED) -> NoReturn:
 class Commands(TyperGroup):
     """Commands whose failures are lines, not tracebacks. PYCRAFT_TRACEBACK=1 in the environment shows where an unexpected one arose."""
 
+    def make_context(self, *arguments: Any, **options: Any) -> Any:
+        if sys.stdout is None:
+            fail("the output is closed")
+        return _guarded(lambda: super(Commands, self).make_context(*arguments, **options))
+
     def invoke(self, ctx: Any) -> Any:
         # Letters that a terminal cannot show are escaped, so that a result is never lost to them.
         for stream in (sys.stdout, sys.stderr):
@@ -60,10 +65,20 @@ def _guarded(run: Callable[[], Any]) -> Any:
     except KeyboardInterrupt:
         fail("interrupted", INTERRUPTED)
     except Exception as error:
+        _tell_usage(error)
         if os.environ.get("PYCRAFT_TRACEBACK") or type(error).__module__.startswith(("click", "typer")):
             raise
         fail(f"unexpected {type(error).__name__}: {error}; PYCRAFT_TRACEBACK=1 shows where", UNEXPECTED)
     return result
+
+
+def _tell_usage(error: Exception) -> None:
+    """End with what typer has to say of arguments that cannot be, in one line. Not where there were none: it then shows the help."""
+    message = getattr(error, "format_message", None)
+    if message is None or type(error).__name__ == "NoArgsIsHelpError":
+        return
+    command = getattr(getattr(error, "ctx", None), "command_path", "pycraft")
+    fail(f"{message().rstrip('.')}; {command} --help says what there is")
 
 
 def _flushed(run: Callable[[], Any]) -> Any:

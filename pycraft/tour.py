@@ -125,7 +125,8 @@ def _show_factorization(robot: Any, MM: _core.Operator, soa: Any, say: Say) -> N
     by_hand = S.T @ D.inv() @ S
     x = np.ones(robot.nv)
     solved = system.inv() @ x
-    say.code("S = I - H@psi@K; by_hand = (S.T @ D.inv() @ S).dense(rules=False)     # as typed, letter by letter")
+    say.code("S = I - H@psi@K")
+    say.code("by_hand = (S.T @ D.inv() @ S).dense(rules=False)    # letter by letter")
     typed = by_hand.dense(rules=False)
     say.code(f"{name}.inv() @ x - by_hand @ x", f"{_relative(solved, typed @ x):.0e} relative")
     exact = np.linalg.solve(system.dense(), x)
@@ -173,7 +174,7 @@ def _show_beyond(MM: _core.Operator, soa: Any, say: Say) -> None:
 def _show_tip(robot: Any, soa: Any, say: Say) -> None:
     tip = list(robot.bodies)[-1]
     say.heading(f"Operational space of '{tip}'")
-    say.code(f'soa.Lambda("{tip}")     # (B*ΩB)⁻¹, the inertia that a hand at the tip feels')
+    say.code(f'soa.Lambda("{tip}")', "(B*ΩB)⁻¹, the inertia that a hand at the tip feels")
     try:
         inertia = soa.Lambda(tip).dense()
         say.text(f"principal inertias {_numbers(np.sort(np.linalg.eigvalsh((inertia + inertia.T) / 2))[::-1], 6)}")

@@ -394,6 +394,8 @@ def test_every_kind_of_step_was_run():
     for name in ("∂D^½", "∂b", "V̄̇", "ḃ"):
         assert_is_the_operator(DERIVATIVES[name](o, 7))
     run(pc.blockdiag(o.E.op.T @ o.Upsilon.op @ o.E.op).algorithm(request="trace"))
+    model = every_kind(True)
+    assert_is_the_operator((o.soa.MM + o.soa.J).inv().diff(7).at(model.q, form="ud"))
     assert set(pc._core.step_kinds()) - _executed == set()
 
 

@@ -40,9 +40,9 @@ def test_check_ends_with_one_where_a_theorem_fails(monkeypatch):
     from pycraft.identities.report import Finding, Report
     from pycraft.operators import OperatorSet
 
-    made = Report("arm", {}, [Finding("a", "group", "a = b", "a = b", [], [], "holds")])
+    made = Report("arm", {}, [Finding(name, "group", "a = b", "a = b", [], [], "holds") for name in "ab"])
     monkeypatch.setattr(OperatorSet, "check", lambda self, **_: made)
-    for verdict, status in [("holds", 0), ("expected to fail", 0), ("fails", 1), ("undecided", 3)]:
+    for verdict, status in [("holds", 0), ("expected to fail", 0), ("fails", 1), ("undecided", 3), ("undefined", 3)]:
         made.findings[0].verdict = verdict
         for options in ([], ["--full"], ["--json"]):
             result = runner.invoke(app, ["check", "panda", *options])
@@ -72,6 +72,8 @@ def test_tour():
     parts = ["The operators, typed as on paper", "Factor and invert", "Beyond the theorems", "Every theorem"]
     for part in (*parts, "smallest counterexample", "What it costs"):
         assert part in result.output
+    typed = [line.rstrip() for line in result.output.splitlines() if ">>>" in line]
+    assert typed and max(map(len, typed)) <= 80  # what is to be typed goes on in no second line
 
 
 def test_bench_holds_its_bounds():
@@ -97,6 +99,8 @@ def nothing_measured(monkeypatch):
     [
         ("accuracy panda --csv {tmp}/no/a.csv", "--csv {tmp}/no/a.csv: there is no folder"),
         ("accuracy panda --json {tmp}", "--json {tmp}: a folder"),
+        ("accuracy panda --csv {tmp}/a --json {tmp}/a", "--csv and --json name the same file"),
+        ("check none.tex --precision banana", "no precision is called 'banana'"),
         ("accuracy panda --plot {tmp}/a.foo", "there are"),
         ("accuracy panda --plot {tmp}/a", "a picture has the extension of its format"),
         ("accuracy panda --seed -1", "--seed -1: a whole number, 0 or more"),

@@ -124,6 +124,19 @@ def test_an_option_reaches_what_is_measured(command, option, measured, tmp_path)
     assert len(set(outcomes)) == len(outcomes)
 
 
+def test_options_reach_the_check_of_a_paper(monkeypatch, tmp_path):
+    from pycraft.identities import paper
+
+    calls = []
+    monkeypatch.setattr(paper, "check_paper", lambda path, **options: calls.append(options) or paper.PaperReport(path, []))
+    for given in ([], ["--states", "1"], ["--seed", "2"], ["--precision", "quad"], ["--precision", "50"]):
+        assert runner.invoke(app, ["check", "p.tex", *given]).exit_code == 1
+    assert len({str({k: v for k, v in c.items() if k != "progress"}) for c in calls}) == 5
+    for given in (["--full"], ["--root", "free"], ["--mimic", "lock"]):
+        result = runner.invoke(app, ["check", "p.tex", *given])
+        assert result.exit_code == 2 and f"{given[0]} belongs to models" in result.output and len(calls) == 5
+
+
 def test_json_is_json_and_follows_its_seed(monkeypatch):
     """--json --seed: other states, other residuals."""
     from pycraft.operators import OperatorSet
@@ -145,7 +158,9 @@ def test_bench_ends_with_one_where_a_bound_is_missed(monkeypatch):
 
     for value, status in ((0.5, 0), (1.0, 0), (1.5, 1), (float("nan"), 1)):
         monkeypatch.setattr("pycraft.bench.run", figures(value))
-        assert runner.invoke(app, ["bench"]).exit_code == status, value
+        result = runner.invoke(app, ["bench"])
+        assert result.exit_code == status, value
+        assert ("a figure: " in result.output and "is over its bound, 1 x" in result.output) == bool(status)
 
 
 def test_every_figure_of_what_accuracy_costs_has_its_bound(monkeypatch):

@@ -76,6 +76,10 @@ def test_an_ascii_terminal():
         ("check panda --precision ²", "precision"),
         ("check nowhere.urdf", "no file is called 'nowhere.urdf'"),
         ("stability --case nowhere", "no hard case has 'nowhere'"),
+        ("nonsense", "No such command 'nonsense'; "),
+        ("--nonsense", "No such option"),
+        ("check", "Missing argument"),
+        ("check panda --states many", "--help says what there is"),
     ],
 )
 def test_options(arguments, words):
@@ -94,10 +98,18 @@ def test_a_full_disk():
         done = pycraft("check", "panda", "--states", "0", stdout=full)
     lines = done.stderr.splitlines()
     assert done.returncode == 2 and lines == ["error: the output: No space left on device"], done.stderr
+    with open("/dev/full", "w") as full:
+        refused(pycraft("--help", stdout=full), 2, "No space left on device")
     done = pycraft(
         "accuracy", "ur5", "--seconds", "0", "--method", "articulated", "--form", "fast", "--precision", "double", "--csv", "/dev/full"
     )
     assert done.returncode == 2 and done.stderr.splitlines()[-1].startswith("error: ") and "No space left" in done.stderr
+
+
+def test_an_output_that_is_closed():
+    command = f'"{sys.executable}" -m pycraft.cli check panda >&-'
+    done = subprocess.run(command, shell=True, stderr=subprocess.PIPE, text=True, timeout=300)
+    assert done.returncode == 2 and done.stderr.splitlines() == ["error: the output is closed"]
 
 
 def test_a_reader_that_has_seen_enough():
@@ -112,9 +124,9 @@ def test_a_reader_that_has_seen_enough():
 @pytest.mark.parametrize(
     ("package", "arguments", "words"),
     [
-        ("pinocchio", ["peers"], "needs the package pinocchio, which is not installed: pip install pycraft-soa[peers]"),
-        ("jupyterlab", ["lab"], "the lab needs the package jupyterlab, which is not installed: pip install pycraft-soa[lab]"),
-        ("mujoco", ["check", "{odd}.xml"], "by the package mujoco, which is not installed: pip install pycraft-soa[mjcf]"),
+        ("pinocchio", ["peers"], "needs the package pinocchio, which is not installed: pip install 'pycraft-soa[peers]'"),
+        ("jupyterlab", ["lab"], "the lab needs the package jupyterlab, which is not installed: pip install 'pycraft-soa[lab]'"),
+        ("mujoco", ["check", "{odd}.xml"], "by the package mujoco, which is not installed: pip install 'pycraft-soa[mjcf]'"),
     ],
 )
 def test_packages_that_are_not_there(tmp_path, package, arguments, words):

@@ -80,6 +80,8 @@ def test_what_cannot_be_compared():
         pc.compare(model, tree(["pin", "pin"]))
     with pytest.raises(pc.ModelError, match="compare takes a pinocchio.Model, a mujoco.MjModel, .* not ndarray"):
         pc.compare(model, np.eye(3))
+    with pytest.raises(pc.ModelError, match="compare's first model is a Multibody, not int"):
+        pc.compare(3, model)
 
 
 @pytest.mark.peers
@@ -88,7 +90,9 @@ def test_every_hinge_in_pinocchio(rotors):
     from pycraft.interop import export
 
     model = tree(EVERY_KIND, rotor_inertia=rotors)
-    report = pc.compare(model, export.to_pinocchio(model).model)
+    made = export.to_pinocchio(model)
+    report = pc.compare(model, made)
+    assert repr(report) == repr(pc.compare(model, made.model))
     assert report and {d.kind for d in report.differences} == {"quaternion", "free joints", "body frame"}
     assert report.in_common["mass matrix"] < 2e-14 and report.in_common["inverse dynamics"] < 2e-14 < report.as_they_are["mass matrix"]
 

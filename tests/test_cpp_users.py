@@ -47,7 +47,8 @@ def test_what_is_missing_is_named(tmp_path):
     run = configure(
         tmp_path, f"-Dpycraft_DIR={elsewhere}", "-DCMAKE_DISABLE_FIND_PACKAGE_Eigen3=ON", "-DCMAKE_DISABLE_FIND_PACKAGE_Boost=ON"
     )
-    assert run.returncode and "pycraft needs the headers of Eigen3 and Boost: pip install pycraft-soa[cpp]" in " ".join(run.stderr.split())
+    said = " ".join(run.stderr.split())
+    assert run.returncode and "pycraft needs the headers of Eigen3 and Boost: pip install 'pycraft-soa[cpp]'" in said
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ import doctest
 import importlib
 import pkgutil
 import re
+import textwrap
 from pathlib import Path
 
 import pytest
@@ -47,6 +48,41 @@ def test_the_pages_run(page, examples):
     options = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
     result = doctest.testfile(str(ROOT / "docs" / f"{page}.md"), module_relative=False, optionflags=options)
     assert result.failed == 0 and result.attempted > examples
+
+
+def test_help_starts_with_what_to_type():
+    typed, rest = pycraft.__doc__.split("What to type::")[1].split("\n\n", 2)[1:]
+    names = {}
+    exec(textwrap.dedent(typed), names)
+    assert names["MM"].shape == (7, 7) and "pc.check(" in typed and "doctest" not in typed and "arm.soa?" in rest
+
+
+ROBOTS = ROOT / "pycraft" / "models" / "robots"
+
+
+def test_what_the_page_of_algorithms_prints():
+    text = (ROOT / "docs" / "algorithm.md").read_text()
+    names = {}
+    for block in re.findall(r"```python\n(.*?)```", text, re.S):
+        exec(compile(block, "algorithm.md", "exec"), names)
+    assert abs(names["y"] - names["MM"].inv() @ names["x"]).max() < 1e-9
+    printed = re.findall(r"`print\((\w+)\.algorithm\(\)\)`[^\n]*:\n\n```\n(.*?)```", text, re.S)
+    assert [name for name, _ in printed] == ["MM", "inverse"]
+    for name, shown in printed:
+        assert str(names[name].algorithm()).strip() == shown.strip(), name
+
+
+@pytest.mark.peers
+def test_the_other_packages_of_the_page_of_comparisons(tmp_path, monkeypatch):
+    pytest.importorskip("pinocchio")
+    monkeypatch.chdir(tmp_path)
+    Path("panda.urdf").write_text((ROBOTS / "panda.urdf").read_text())
+    Path("panda.xml").write_text(pycraft.interop.export.to_mjcf(pycraft.robots.panda()))
+    block = re.search(r"```python\n(import mujoco.*?)```", (ROOT / "docs" / "comparing.md").read_text(), re.S).group(1)
+    names = {"pc": pycraft, "arm": pycraft.robots.panda()}
+    imports, *compared = block.splitlines()
+    exec(imports, names)
+    assert len(compared) == 3 and all(eval(line, names) for line in compared)
 
 
 @pytest.mark.parametrize("page", ["symbolic", "kalman", "accuracy", "evaluation", "statements", "teaching", "proofs"])

@@ -169,12 +169,12 @@ BAD = {
     "two rotor inertias": (
         [BASE, ARM, joint('<pycraft rotor_inertia="1 2"/>')],
         5,
-        "joint 'elbow' has 1 coordinates and 2 rotor inertias; write one value per coordinate",
+        "joint 'elbow' takes 1 rotor inertia, one for each coordinate, not 2",
     ),
     "rotor of a weld": (
         [BASE, ARM, joint('<pycraft rotor_inertia="1"/>', kind="fixed")],
         5,
-        "joint 'elbow' has 0 coordinates and 1 rotor inertias",
+        "joint 'elbow' takes 0 rotor inertias, one for each coordinate, not 1",
     ),
     "unknown attribute of ours": (
         [BASE, ARM, joint('<pycraft rotor="1"/>')],

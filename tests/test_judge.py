@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 import pycraft as pc
+from pycraft.accuracy.stability_table import Stability
 from pycraft.identities.bounds import Sizes
 from pycraft.identities.judge import FAILS, HOLDS, UNDECIDED, BoundState, Judgement, Scales, Taken, Verdict, decided, judge, ladder
 from pycraft.identities.report import PASSED, CheckReport, Finding, Report
+from pycraft.interop.compare import ModelComparison, _relative
 
 EPSILON = pc._core.epsilons()
 
@@ -94,6 +96,38 @@ def test_what_a_sweep_amplifies_is_no_rise():
     assert decided(at(1e-16, 1e-13, bounds=[1e-9, 1e-12]), 1e6) == HOLDS
 
 
+class NormsOf:
+    """Roundings whose double has no digit: a bound of 1 there, of 1e3 epsilons in wider scalars."""
+
+    size, terms, growth = 1.0, 0.0, 1.0
+
+    def __init__(self, lhs, rhs, precision):
+        self.made_in = precision
+
+    def bound(self, relative_size, precision):
+        return 1.0 if self.made_in == "double" else 1e3 * EPSILON[precision]
+
+
+def test_norms_of_double_are_taken_where_rounding_leaves_them_digits(monkeypatch):
+    """Where it leaves none, the bound in quad is that of norms in quad, and 1e-9 is no rounding there."""
+
+    class At:
+        def sizes(self, precision, values):
+            return precision
+
+    monkeypatch.setattr("pycraft.identities.judge.Roundings", NormsOf)
+    scales = Scales(1.0, 1.0, At(), {})
+    for precision in ("double", "extended"):
+        (*_, taken), _, _ = scales.taken(precision, (1e-9, 1.0, 1.0))
+        assert taken.bound == 1.0
+    (*_, taken), _, _ = scales.taken("quad", (1e-9, 1.0, 1.0))
+    assert taken.bound == 1e3 * EPSILON["quad"] < taken.residual
+    good = {"double": 1e3 * EPSILON["quad"], "quad": 1.0}
+    monkeypatch.setattr(NormsOf, "bound", lambda self, relative_size, precision: good[self.made_in])
+    (*_, taken), _, _ = Scales(1.0, 1.0, At(), {}).taken("quad", (1e-9, 1.0, 1.0))
+    assert taken.bound == 1e3 * EPSILON["quad"]  # those of double, which cost least
+
+
 def test_norms_follow_the_vectors():
     model = pc.chain(2)
     x = pc.vector("x", model.soa.Theta)
@@ -163,7 +197,7 @@ def test_a_verdict_that_is_not_there_raises():
 
 def test_reports_pass_nothing_that_fails_or_is_undecided():
     verdicts = ["holds", "fails", "undecided", "expected to fail", "holds anyway", "waiting", "undefined"]
-    assert set(PASSED) == set(verdicts) - {"fails", "undecided"}
+    assert set(PASSED) == set(verdicts) - {"fails", "undecided", "undefined"}
     for n in (1, 2):
         for chosen in itertools.product(verdicts, repeat=n):
             report = Report("arm", {}, [Finding(str(i), "g", "a = b", "a = b", [], [], v) for i, v in enumerate(chosen)])
@@ -173,9 +207,22 @@ def test_reports_pass_nothing_that_fails_or_is_undecided():
                 assert report.status == 3
                 with pytest.raises(pc.UndecidedError):
                     bool(report)
+            elif "undefined" in chosen or "holds" not in chosen:  # something was not shown, or nothing was
+                assert not report and report.status == 3 and len(report.undefined) == chosen.count("undefined")
             else:
                 assert report and report.status == 0
-            assert not any(report.findings[i].passed for i, v in enumerate(chosen) if v in ("fails", "undecided"))
+            assert not any(report.findings[i].passed for i, v in enumerate(chosen) if v in ("fails", "undecided", "undefined"))
+
+
+def test_nothing_shown_is_not_true():
+    assert not Report("arm", {}) and Report("arm", {}).status == 3
+    assert Verdict().verdict == UNDECIDED
+    with pytest.raises(pc.EvaluationError, match="at one state at least"):
+        pc.check("D = D", pc.chain(2), states=0)
+    assert not ModelComparison("a", "b", 0) and not Stability([], {})
+    arms = pc.chain(2), pc.chain(2)
+    assert pc.compare(*arms, states=1) and not pc.compare(*arms, states=0)
+    assert _relative(np.array([np.nan]), np.array([1.0])) == np.inf
 
 
 def test_a_false_statement_on_a_graded_chain_fails():

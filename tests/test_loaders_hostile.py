@@ -208,3 +208,17 @@ def test_packages_are_not_looked_for_at_the_root_of_the_file_system(tmp_path):
     assert resolve_package("package://robot/meshes/a.stl", tmp_path / "robot" / "urdf" / "r.urdf") == mesh
     with pytest.raises(pc.ModelError, match="is not found in"):
         resolve_package("package://robot/" + "x" * 5000, tmp_path / "robot" / "r.urdf")
+
+
+def test_what_is_no_path():
+    for given in (3, None, ["a.urdf"], 2.5):
+        with pytest.raises(pc.ModelError, match="a model is loaded from the path of a file, not from"):
+            pc.load(given)
+
+
+def test_bytes_in_another_encoding_name_the_remedy(tmp_path):
+    path = tmp_path / "latin.urdf"
+    path.write_bytes('<robot name="r"><link name="é"/></robot>'.encode("latin-1"))
+    with pytest.raises(pc.ModelError, match="not well-formed XML: .*, column .*; save the file in UTF-8, or declare") as caught:
+        pc.load(path)
+    assert str(caught.value).count("line") == 1  # of "first line": the place is file:line, once

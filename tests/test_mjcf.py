@@ -3,6 +3,7 @@
 Both sides compute sums of some tens of products; MuJoCo normalises its quaternions in between. `ROUNDING` (oracle.py) covers it.
 """
 
+import re
 from dataclasses import astuple
 
 import numpy as np
@@ -230,7 +231,9 @@ def test_armature_of_a_free_joint_is_told(mujoco, write):
 def test_refused(mujoco, write, world, says):
     with pytest.raises(pc.ModelError) as caught:
         pc.load(write(world))
-    assert f"scene.xml: {says}" in str(caught.value)
+    text = str(caught.value)
+    line = re.search(r", line (\d+)$", text)[1]
+    assert f"scene.xml:{line}: {says}" in text
 
 
 @pytest.mark.peers

@@ -44,6 +44,56 @@ def test_the_report_tells_all(report):
     assert [e["line"] for e in json.loads(report.to_json())["equations"]] == [e.line for e in report.equations]
 
 
+@pytest.fixture
+def judged(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def judge(*rows, **options):
+        Path("p.tex").write_text("\n".join(rows), encoding="utf-8")
+        return check_paper("p.tex", **options)
+
+    return judge
+
+
+def test_the_books_formulas_are_true_under_their_hypotheses(judged):
+    """In papers J = 0 stands in words, if at all: every second formula of the book was said to fail."""
+    report = judged(r"\[ H\mathcal{G} = I \]", r"\[ \mathcal{G} = PH^*\mathcal{D} \]", states=1)
+    assert [(e.verdict, e.where) for e in report.equations] == [("true where", "J = 0"), ("fails", "")]
+    assert report.status == 1 and report.summary().endswith("2 equations: 1 fails, 1 true where J = 0")
+    shown = repr(report).split("\n")
+    assert shown[0] == r"p.tex:1: true where J = 0: H\mathcal{G} = I" and shown[1] == "    read as H G = I"
+    assert all(len(line) <= 80 for line in shown[1:-1]) and "0 models" not in repr(report) and "is smaller" in repr(report)
+    report.equations.pop()
+    assert report and report.status == 0
+    arm = pc.tree([-1], ["pin"], seed=1, rotor_inertia=True)  # on a model of one's own it is true or not
+    assert [e.verdict for e in judged(r"\[ H\mathcal{G} = I \]", model=arm, states=1).equations] == ["fails"]
+
+
+@pytest.mark.parametrize(
+    ("text", "verdict", "words"),
+    [
+        (r"\tau P = P \tau", "fails", "spaces do not fit"),  # it was "not read", and passed
+        (r"M = H\phi M\phi^*H^*", "fails", "spaces do not fit"),
+        (r"\mathcal D = \ln\det \mathcal M", "fails", "one is an operator, the other a number"),
+        ("G(k) = P(k) D(k)", "fails", "spaces do not fit"),
+        ("I = I", "not read", "said of no space"),
+        ("1 = 2", "not read", "numbers alone"),
+    ],
+)
+def test_spaces_that_do_not_fit_fail(judged, text, verdict, words):
+    report = judged(rf"\[ {text} \]", model=pc.chain(2), states=1)
+    assert [e.verdict for e in report.equations] == [verdict] and words in report.equations[0].note
+
+
+def test_arguments_and_bare_macros_read(judged):
+    r"""\mathcal{M}(\theta) is \mathcal{M}; a macro may begin with the sign that raises it."""
+    rows = [r"\newcommand{\T}{^{*}}\newcommand{\M}{\mathcal{M}}\newcommand{\two}{2}", r"\[ \M(\theta) = H\phi M\phi\T H\T \]"]
+    rows += [r"\[ \M(q, \dot q)^\two = \M \left(\theta,\dot{\theta}\right) \M \]", r"\[ D(\theta) = (\theta) \]"]
+    report = judged(*rows, model=pc.chain(2), states=1)
+    assert [e.verdict for e in report.equations] == ["holds", "holds", "not read"], repr(report)
+    assert "{^{*}}" not in report.equations[0].latex and r"^{2}" in report.equations[1].latex
+
+
 def test_what_is_not_read_shows_the_place(report):
     note = next(e.note for e in report.equations if e.line == 31)
     assert "no operator is called" in note and "^" in note.split("\n")[-1]

@@ -407,3 +407,18 @@ def test_a_solve_that_is_refined_stays_a_solve():
     solve = "[I-HψK]* D⁻¹ [I-HψK]"
     q = arm.random_state(1).q
     assert solve in str(op.at(q, refine=1).explain()) and solve not in str(op.at(q).explain())
+
+
+def test_a_refined_product_without_a_solve_says_so():
+    arm = pc.chain(3)
+    arm.add_node("tip", list(arm.bodies)[-1], position=(1, 0, 0))
+    H, phi, M = arm.soa("H phi M")
+    MM = H @ phi @ M @ phi.T @ H.T
+    note = "refinement: there is no solve here, so nothing is corrected"
+    product = MM.inv() @ H @ phi @ arm.soa.B(["tip"])
+    assert note in product.at(arm.q, refine=1).plan().notes and note not in product.at(arm.q).plan().notes
+    assert f"by {note}" in str(product.at(arm.q, refine=1).plan())
+    np.testing.assert_array_equal(product.at(arm.q, refine=1).dense(), product.at(arm.q).dense())  # and nothing is
+    for solved in (MM.inv(), (MM + arm.soa.D).inv(), product.T, MM.inv() @ MM.inv()):
+        assert note not in solved.at(arm.q, refine=1).plan().notes, solved.text()
+    assert note in MM.at(arm.q, refine=1).plan().notes

@@ -227,6 +227,10 @@ def test_a_proof_unfolds_down_to_its_axioms():
     assert proof._repr_html_().count("<li>") == len(proof.steps)
     latex = full.latex()
     assert latex.count("\\begin{aligned}") == len(full.lemmas) + 1 and latex.count("{") == latex.count("}")
+    text = str(full)
+    for said in (", by (", "(transposed)", ", at 2 places"):  # LaTeX cited no lemma by its number
+        assert latex.count(said) == text.count(said) > 0, said
+    assert "$$" not in latex
     failed = prove("ψ = φ")
     assert "no proof found" in str(failed.full()) and "no proof found" in failed._repr_html_()
 

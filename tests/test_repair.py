@@ -1,14 +1,20 @@
 """`repair`: the nearest true formulas to a wrong one, in words; and the syntax tree that it changes."""
 
+import re
+
 import numpy as np
 import pytest
 from wrong_formulas import WRONG
 
 import pycraft as pc
+from pycraft.identities.budget import Budget
 from pycraft.identities.edits import changed
 from pycraft.identities.family import Spec
-from pycraft.identities.formula import DenseLetters, Misfit, evaluate, read_formula, residual, written_statement
+from pycraft.identities.formula import written_statement
+from pycraft.identities.formula_reading import read_formula
+from pycraft.identities.formula_values import DenseLetters, Misfit, evaluate, residual
 from pycraft.identities.parse import Statements
+from pycraft.symbolic import prove
 from pycraft.symbolic.repair import nearest, small_models
 
 
@@ -27,7 +33,8 @@ def models():
 
 def explained(text, words, models):
     """The slip is among the five likeliest that lead to a formula true on small chains."""
-    near, tried = nearest(read_formula(text), models)
+    near, tried, whole = nearest(read_formula(text), models)
+    assert whole
     assert any(words in slip.words for _, slip in near[:5]), (text, [slip.words for _, slip in near[:8]])
     assert tried >= 1 and all(residual(new, models[0]) < 1e-9 for new, _ in near)
 
@@ -58,13 +65,34 @@ def test_the_true_one_is_the_nearest_and_proved():
 def test_a_true_formula_needs_none():
     found = pc.repair("HψMψ*H* = D")
     assert not len(found) and "needs no repair: TRUE where J = 0" in repr(found)
+    assert "needs no repair: TRUE on every tree" in repr(pc.repair("ψ⁻¹ = φ⁻¹ + KH"))
+
+
+def test_the_budget_is_cpu_time_and_its_end_is_said(monkeypatch):
+    found = pc.repair("ψ⁻¹ = φ⁻¹ - KH", budget=0)
+    assert not len(found) and "not every change was tried" in found.ended and found.ended in found._repr_html_()
+    assert "after 0 s of CPU time (budget=0)" in " ".join(repr(found).split())
+    assert not pc.repair("D = HPH", most=1).ended
+    monkeypatch.setattr(Budget, "left", 1e9)
+    monkeypatch.setattr(Budget, "over", True)
+    assert re.search(r": [1-9]\d* formulas that hold on small chains were not looked at", pc.repair("D = HPH").ended)
+
+
+def test_a_false_statement_is_not_searched_in_silence():
+    arm = pc.chain(2)
+    x = pc.vector("x", arm.soa.F)
+    report = pc.check((arm.soa.phi @ x, arm.soa.psi @ x), arm, states=1, budget=0)
+    assert not report and "ended after 0 s of CPU time (budget=0)" in " ".join(repr(report).split())
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("pycraft.identities.search.refutation", lambda *_, **__: pytest.fail("searched without a budget"))
+        prove(arm.soa.phi @ x, arm.soa.psi @ x).search_counterexample(budget=0)
 
 
 def test_what_is_no_statement_is_said():
     for text in ("HψMψ*H*", "D = ", "D = H?H", "D = (HP"):
         with pytest.raises(pc.EvaluationError):
             pc.repair(text)
-    assert "no true formula one change away" in repr(pc.repair("φMψ = Ωφ", budget=5))
+    assert "no true formula one change away" in repr(pc.repair("φMψ = Ωφ"))
 
 
 # ---------------------------------------------------------------------- the syntax tree

@@ -94,6 +94,7 @@ MISREAD = [
     ("inv phi", r"inv needs its operand in parentheses: inv\(A\)", 0),
     ("φ B", r"B needs its arguments, as in B\(body\)", 2),
     ("φ† M", "not understood at '†", 1),
+    (r"\int_0^1 D", r"the command \\int is not known", 0),
     ("M_1", "no operator is called 'M_1'", 0),
 ]
 
@@ -104,6 +105,12 @@ def test_what_is_not_read_shows_the_place(typed, said, column, read):
         read(typed)
     lines = str(caught.value).split("\n")
     assert lines[-2].strip() == typed.strip() and lines[-1].index("^") - 4 in (column, column - 1), str(caught.value)
+
+
+@pytest.mark.parametrize("text", ["1/0", "φ/0", "φ = 1/0 φ", r"\frac{1}{0} D = D"])
+def test_a_division_by_zero_is_called_so(text, read):
+    with pytest.raises(ParseError, match="divides by zero"):
+        read(text)
 
 
 def test_the_place_is_in_the_line_that_was_typed(read):

@@ -204,8 +204,3 @@ def test_a_scalar_shows_its_value():
     stale = arm.soa.D.logdet()
     arm.add_body("more", "body1", mass=1.0)
     assert repr(stale) == "<scalar ln det D>"
-
-
-def test_help_starts_with_what_to_type():
-    lines = pc.__doc__.splitlines()
-    assert ">>> import pycraft as pc" in pc.__doc__ and any("pc.load" in line for line in lines[:25])

@@ -192,7 +192,7 @@ def test_the_smallest_counterexample(text, bodies, dof, rotor, saved):
     again = pc.check(text, example.model(), states=1, search=False)
     assert not again  # the counterexample refutes by itself
     shown = repr(report)
-    assert "FALSE" in shown and f"pc.tree({example.parents}" in shown and f"{example.states} states each" in shown
+    assert "FALSE" in shown and f"pc.tree({example.parents}" in shown and (f"{example.states} states each" in shown) == (example.tried > 0)
     if saved:
         assert f"TRUE where {saved}; FALSE elsewhere" in shown
     at_state = example.model()
@@ -238,3 +238,25 @@ def test_the_coordinates_that_are_meant():
     assert coordinates_meant(pc.chain(1).soa) == (0, 0)
     with pytest.raises(pc.ModelError, match="no coordinate"):
         coordinates_meant(pc.tree([-1], "weld").soa)
+
+
+@pytest.mark.parametrize("given", [3, None, b"phi", np.eye(3), ("φ", "ψ"), ["φ = φ", "φ = φ", "φ = φ"]], ids=repr)
+@pytest.mark.parametrize("ask", ["check", "truth", "repair", "parse"])
+def test_what_is_no_text_is_said(ask, given):
+    model = [pc.chain(1)] if ask == "parse" else []
+    with pytest.raises(pc.EvaluationError, match="statement (is|as) text"):
+        getattr(pc, ask)(given, *model)
+
+
+def test_options_of_a_check_are_checked():
+    arm = pc.chain(1)
+    for options in ({"states": "x"}, {"states": 2.5}, {"states": 0}, {"seed": "x"}, {"seed": -1}):
+        with pytest.raises(pc.Error, match=f"{next(iter(options))}.*(whole number|one state at least)"):
+            pc.check("φ = φ", arm, **options)
+        if options != {"states": 0}:
+            with pytest.raises(pc.Error, match=f"{next(iter(options))}.*whole number"):
+                arm.soa.check(**options)
+    with pytest.raises(pc.EvaluationError, match="0 or more"):
+        arm.soa.check(states=-2)
+    with pytest.raises(pc.EvaluationError, match="on a model or its operators"):
+        pc.check("φ = φ", 3)

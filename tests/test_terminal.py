@@ -1,5 +1,6 @@
 """Tables in a terminal: 80 columns, nothing that matters cut, no accent that overprints, columns that align, exceptions first."""
 
+import re
 import unicodedata
 
 import pytest
@@ -44,6 +45,26 @@ def test_the_report_of_theorems_fits():
     assert "undefined: an inverse in them does not exist here" in repr(made)
 
 
+def test_a_theorem_that_goes_on_is_no_heading():
+    """The second line of a long one began where headings begin."""
+    headings = {f.group for f in report().findings} | {"theorem", "arm:", "largest"}
+    table = report().full().split("theorem", 1)[1].splitlines()[1:]
+    flush = [line for line in table if line[:1].strip()]
+    assert flush and all(any(line.startswith(h) for h in headings) for line in flush), flush
+
+
+def test_plans_fit():
+    """A row of the plan is a line, also where it is set in by three; texts of steps are whole."""
+    arm = pc.chain(3)
+    H, phi, M = arm.soa("H phi M")
+    MM = H @ phi @ M @ phi.T @ H.T
+    for op in (MM.inv(), (MM + 0.1 * arm.soa.I).inv(), MM.inv().diff(0)):
+        rows = str(op.explain()).split("  #  step", 1)[1]
+        fits(rows, 77)
+        assert len({line.index(" flop") for line in rows.splitlines() if " flop" in line}) <= 3  # of flop, kflop, Mflop
+        assert all(s["text"].replace(" ", "") in rows.replace(" ", "").replace("\n", "") or len(s["text"]) > 36 for s in op.plan().steps)
+
+
 def test_what_holds_shows_the_scalar_that_decided():
     """Both sides of ΥM = ΥM are rounding of zero in double on a slider without a mass: no residual of 1, no bound above 1e-6, is shown."""
     made = report()
@@ -55,6 +76,17 @@ def test_what_holds_shows_the_scalar_that_decided():
         found = repr(pc.check(text, pc.chain(2), states=1))
         assert shown in found and "worst" not in found, found
     assert "read as" not in repr(pc.check("D = HPH*", pc.chain(2), states=1))
+
+
+def test_text_in_formulas_is_text():
+    """MathJax shows an error for _ or ^ in \\text, and no letter of ours there."""
+    for t in pc.chain(1).soa.theorems():
+        for words in re.findall(r"\\text\{([^{}]*)\}", t.latex):
+            assert words.isascii() and not set(words) & set("_^&#%$*"), t.latex
+
+
+def test_the_summary_of_a_page_has_its_lines():
+    assert "3 holds" not in repr(report()) and "<br>largest residual" in report()._repr_html_()
 
 
 def test_the_summary_and_the_exceptions_come_first():

@@ -103,11 +103,44 @@ def test_what_a_worksheet_cannot_be(tmp_path):
         worksheet("inverse", students=["a", "a"])
     with pytest.raises(pc.EvaluationError, match="one statement, student, question and blank or more"):
         worksheet("inverse", students=0)
+    for students in ("ada", 2.5, [1, 2], None, True):
+        with pytest.raises(pc.EvaluationError, match="students=.*: how many there are, or a list of their names"):
+            worksheet("inverse", students=students)
     (tmp_path / "x.ipynb").write_text("{}")
     with pytest.raises(pc.ModelError, match="no notebook of a worksheet"):
         grade(tmp_path / "x.ipynb")
     with pytest.raises(pc.ModelError, match="no notebook of a worksheet"):
         grade(tmp_path / "none.ipynb")
+
+
+def test_a_class_prints_as_a_list(sheets):
+    lines = repr(sheets).splitlines()
+    assert lines[0] == "12 worksheets: factorization" and all(len(line) <= 80 for line in lines)
+    assert all(any(line.startswith(f"  {sheet.student}: ") for line in lines) for sheet in sheets) and "Question(" not in repr(sheets)
+
+
+def test_pdfs(sheets, tmp_path, monkeypatch):
+    """Through LaTeX, else through a browser; where neither is there, one line says what to install, and the notebooks are written."""
+    nbconvert = pytest.importorskip("nbconvert")
+
+    class Missing:
+        def from_filename(self, path):
+            raise OSError("no such program\nand more of it")
+
+    class Browser:
+        def from_filename(self, path):
+            return b"%PDF of " + path.encode(), {}
+
+    monkeypatch.setattr(nbconvert, "PDFExporter", Missing)
+    monkeypatch.setattr(nbconvert, "WebPDFExporter", Missing)
+    one = type(sheets)("factorization", sheets.sheets[:1])
+    with pytest.raises(pc.ModelError, match="nbconvert.webpdf.*playwright install chromium.*no such program no such program") as refused:
+        one.save(tmp_path, pdf=True)
+    assert "\n" not in str(refused.value) and (tmp_path / "key" / "student01.ipynb").is_file()
+    monkeypatch.setattr(nbconvert, "WebPDFExporter", Browser)
+    written = one.save(tmp_path, pdf=True)
+    assert [p.name for p in written] == ["student01.ipynb", "student01.ipynb", "student01.pdf", "student01.pdf"]
+    assert written[2].read_bytes().startswith(b"%PDF of ")
 
 
 def test_exercises_with_several_gaps():
@@ -123,5 +156,12 @@ def test_exercises_with_several_gaps():
         task.gap(3)
     with pytest.raises(pc.EvaluationError, match="there is no line 9"):
         pc.exercise("HψMψ*H* == D", blank=[2, 9])
+    for blank in ("2", 2.5, True, [1.0], ["1"]):
+        with pytest.raises(pc.EvaluationError, match="blank=.*number"):
+            pc.exercise("HψMψ*H* == D", blank=blank)
+    with pytest.raises(pc.EvaluationError, match="hints have the levels 1, 2, 3"):
+        task.hint("much")
+    with pytest.raises(pc.EvaluationError, match=r"a theorem's name, a statement as text or a pair \(lhs, rhs\), not of 3"):
+        pc.exercise(3)
     with pytest.raises(pc.EvaluationError, match=r"blank=\[\] names none"):
         pc.exercise("HψMψ*H* == D", blank=[])

@@ -1,6 +1,8 @@
 """What people type: every spelling beside the package's own. Unicode, ASCII, LaTeX as written by hand and as printed by other tools."""
 
 SPELLINGS = {
+    "norm(Hψ)": ["‖Hψ‖", "‖H ψ‖", "||Hψ||", r"\|H\psi\|", r"\lVert H\psi\rVert", r"\left\|H\psi\right\|", r"\Vert H \psi \Vert"],
+    "D I": [r"D\mathbb{1}", r"D \mathbf{1}", r"\mathcal{D} \mathbb 1", r"D\mathbb{I}", "D𝟙"],
     "φ⁻*": [
         "φ⁻*",
         "φ^{-*}",

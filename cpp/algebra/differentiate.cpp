@@ -75,8 +75,8 @@ struct Differentiator::State {
       case NodeKind::square_root: {
         const Expression tangent = run(e.children()[0]);
         if (is_zero(tangent)) return zero(e.domain(), e.codomain());
-        const Expression inverse = e.inv();
-        return times({e, lower_half(times({inverse, tangent, star(inverse)})), identity(e.domain())});
+        const Expression inverse = e.inv(), own = is_block_diagonal(tangent) ? tangent : block_diagonal(tangent);
+        return times({e, lower_half(times({inverse, own, star(inverse)})), identity(e.domain())});
       }
       case NodeKind::block_function: {
         if (e.node().symbol.definition->id != SymbolId::lower_half_of) return direction.tangent(e, *owner);

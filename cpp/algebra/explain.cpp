@@ -1,6 +1,7 @@
 // The plan as a table: what runs, in which tier, what it costs.
 #include <cstdio>
 #include <sstream>
+#include <vector>
 
 #include "algebra/plan.h"
 
@@ -23,6 +24,22 @@ size_t display_width(const std::string& text) {
 std::string padded(const std::string& text, size_t width) {
   const size_t own = display_width(text);
   return own < width ? text + std::string(width - own, ' ') : text;
+}
+
+// Broken at spaces into lines of at most this width; a word that is longer has a line of its own.
+std::vector<std::string> lines_of(const std::string& text, size_t width) {
+  std::vector<std::string> lines(1);
+  std::istringstream words(text);
+  for (std::string word; words >> word;) {
+    std::string& line = lines.back();
+    if (line.empty())
+      line = word;
+    else if (display_width(line) + 1 + display_width(word) <= width)
+      line += " " + word;
+    else
+      lines.push_back(word);
+  }
+  return lines;
 }
 
 std::string quantity(double x, const char* unit) {
@@ -68,6 +85,7 @@ const char* step_kind_name(StepKind kind) {
     case StepKind::selected_blocks: return "selected_blocks";
     case StepKind::mass_matrix: return "mass_matrix";
     case StepKind::mass_matrix_solve: return "mass_matrix_solve";
+    case StepKind::mass_matrix_solve_tangent: return "mass_matrix_solve_tangent";
     case StepKind::mass_matrix_dense: return "mass_matrix_dense";
     case StepKind::dense_factor: return "dense_factor";
     case StepKind::dense_solve: return "dense_solve";
@@ -96,16 +114,19 @@ std::string explain(const Plan& plan) {
   if (plan.precision != Precision::double_) out << ", in " << precision_name(plan.precision) << (plan.precision < Precision::digits50 ? " precision" : " digits");
   out << "\n";
   for (const std::string& note : plan.notes) out << "  by " << note << "\n";
+  // The table fits a terminal of 80 columns, with three to spare for who sets it in.
   size_t widest = 20;
-  for (const Step& s : plan.steps) widest = std::max(widest, std::min<size_t>(display_width(s.text), 70));
-  out << "  #  " << padded("step", widest + 2) << padded("tier", 13) << padded("flops", 11) << "memory\n";
+  for (const Step& s : plan.steps) widest = std::max(widest, std::min<size_t>(display_width(s.text), 36));
+  out << "  #  " << padded("step", widest + 2) << padded("tier", 13) << padded("flops", 12) << "memory\n";
   int i = 0;
   for (const Step& s : plan.steps) {
     char number[16];
     std::snprintf(number, sizeof number, "%3d  ", ++i);
-    out << number << padded(s.text, widest + 2) << padded(tiers[s.tier], 13) << padded(quantity(s.flops, "flop"), 11) << quantity(s.bytes, "B") << "\n";
+    const std::vector<std::string> text = lines_of(s.text, widest);
+    out << number << padded(text[0], widest + 2) << padded(tiers[s.tier], 13) << padded(quantity(s.flops, "flop"), 12) << quantity(s.bytes, "B") << "\n";
+    for (size_t k = 1; k < text.size(); ++k) out << "       " << text[k] << "\n";
   }
-  out << "     " << padded("total" + std::string(plan.columns_of_identity ? " (per column)" : ""), widest + 15) << padded(quantity(plan.flops(), "flop"), 11)
+  out << "     " << padded("total" + std::string(plan.columns_of_identity ? " (per column)" : ""), widest + 15) << padded(quantity(plan.flops(), "flop"), 12)
       << quantity(plan.bytes(), "B") << "\n";
   return out.str();
 }

@@ -8,6 +8,7 @@
 
 #include "algebra/errors.h"
 #include "algebra/plan.h"
+#include "algebra/polynomial.h"
 #include "algebra/properties.h"
 #include "algebra/source.h"
 
@@ -369,7 +370,7 @@ Expression block_diagonal(const Expression& a) {
 Expression square_root(const Expression& a) {
   if (a.kind() == NodeKind::identity) return a;
   if (a.floating()) throw SpaceError("sqrt(" + label(a) + "): it has no space yet");
-  if (!is_block_diagonal(a) || !is_symmetric(a))
+  if (!(is_block_diagonal(a) && is_symmetric(a)) && !symmetric_block_diagonal_by_theorems(a))
     throw SpaceError("sqrt(" + label(a) + "): a square root is taken of a symmetric block-diagonal operator, body by body");
   const Space domain = a.domain().dual() == a.domain() ? a.domain() : Space(SpaceKind::Whitened, a.domain().layout_pointer());
   return make(Node{NodeKind::square_root, domain, a.codomain(), {a}});

@@ -42,6 +42,7 @@ enum class StepKind {
   selected_blocks,   // the diagonal blocks of a factored realization's operator
   mass_matrix,       // fused: y = (HφMφ*H* [+ J]) x
   mass_matrix_solve, // fused: y = [I-HψK]* D⁻¹ [I-HψK] x
+  mass_matrix_solve_tangent, // y = ∂(HφMφ*H* + J)⁻¹ x by the derivative of the Riccati sweep; where it has none, by the operand
   mass_matrix_dense, // composite-body assembly of HφMφ*H* [+ J]
   dense_factor,      // LU of an operator made dense, column by column
   dense_solve,
@@ -83,7 +84,7 @@ struct Step {
   std::shared_ptr<const ConstantData> constant;
   std::shared_ptr<const ExternalData> external;
   std::shared_ptr<const Realization> realization;
-  std::shared_ptr<const Plan> operand;      // dense_factor: the plan that applies the operator
+  std::shared_ptr<const Plan> operand;      // dense_factor, mass_matrix_solve_tangent: the plan that applies the operator
   double flops = 0;                         // for one column
   double bytes = 0;                         // of the register written
   int tier = 2;                             // 0 values, 1 recognised kernel, 2 sweep, 3 realization, 4 dense

@@ -124,8 +124,9 @@ int Planner::blocks(const Expression& e) {
       break;
     }
     case NodeKind::square_root: {
+      const Expression& inner = e.children()[0];  // block diagonal by structure, or by theorems
       Step s{StepKind::root_blocks};
-      s.in = {blocks(e.children()[0])};
+      s.in = {is_block_diagonal(inner) ? blocks(inner) : diagonal_blocks(inner)};
       s.flops = block_product_flops(e.codomain(), e.codomain(), e.domain()) / 6;
       s.bytes = 8 * entries;
       s.text = "blocks: " + show(e);

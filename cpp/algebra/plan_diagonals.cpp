@@ -26,6 +26,7 @@ std::optional<int> Planner::structural_diagonal(const Expression& e) {
       if (!symbol) return std::nullopt;
       if (symbol->definition->pattern == Pattern::resolvent) return identity_blocks(e.codomain(), e.domain());
       if (symbol->definition->pattern == Pattern::edges) return zero_blocks(e.codomain(), e.domain());
+      if (symbol->definition->tangent_of_inverse) return std::nullopt;
       if (symbol->definition->pattern == Pattern::compound) return diagonal_by_structure(lower(e, true));
       return std::nullopt;
     }
@@ -59,10 +60,7 @@ std::optional<int> Planner::structural_diagonal(const Expression& e) {
     }
     case NodeKind::product: {
       const auto& f = e.children();
-      if (is_upper_triangular(e) || is_lower_triangular(e)) {
-        bool each = true;  // a triangular product is the product of triangular factors unless E ... E* met inside
-        for (const Expression& x : f) each &= is_upper_triangular(e) ? is_upper_triangular(x) : is_lower_triangular(x);
-        if (!each) return std::nullopt;
+      if (is_upper_triangular(e) || is_lower_triangular(e)) {  // and not both, like E X E*: then so is each factor
         std::optional<int> r;
         for (const Expression& x : f) {
           const auto d = diagonal_by_structure(x);
@@ -143,6 +141,7 @@ int Planner::diagonal_blocks(const Expression& e) {
     s.text = "blocks: blockdiag(" + show(e) + ") column by column" + how;
     return emit(std::move(s), out);
   };
+  if (has_swept_tangent(e)) return from_columns(", by the derivative of the Riccati sweep", 1);
   const Expression spelled = lower(e, true);  // Λ and its like are as small as their nodes
   if (spelled.kind() == NodeKind::inverse && gram_root(spelled.children()[0])) return from_columns(", by its triangular factors", 1);
   std::string reason;

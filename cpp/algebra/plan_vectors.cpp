@@ -28,7 +28,7 @@ std::vector<Expression> gathered_by_psi(const std::vector<Expression>& factors) 
   for (const Expression& f : factors) {
     bool transposed = false;
     const Symbol* symbol = letter_of(f, transposed);
-    if (!symbol || symbol->definition->pattern != Pattern::compound) {
+    if (!symbol || symbol->definition->pattern != Pattern::compound || symbol->definition->tangent_of_inverse) {
       out.push_back(f);
       continue;
     }
@@ -267,7 +267,9 @@ int Planner::apply_symbol(const Symbol& symbol, bool transposed, bool inverted, 
   const bool wide = plan_.registers[x].wide;
   std::string text = show(e) + (transposed ? "*" : "") + (inverted ? "⁻¹" : "");
   switch (d.pattern) {
-    case Pattern::compound: return apply(lower(transposed ? d.expand(symbol).T() : d.expand(symbol), true), x);
+    case Pattern::compound:
+      if (d.tangent_of_inverse) return apply_inverse_tangent(symbol, x);
+      return apply(lower(transposed ? d.expand(symbol).T() : d.expand(symbol), true), x);
     case Pattern::vector: {
       Step s{StepKind::apply_column};
       s.in = {vector_value(e), x};
@@ -299,6 +301,20 @@ int Planner::apply_symbol(const Symbol& symbol, bool transposed, bool inverted, 
   s.bytes = vector_bytes(codomain);
   s.text = text;
   return emit(std::move(s), {RegisterKind::vector, codomain, {}, nullptr, wide});
+}
+
+int Planner::apply_inverse_tangent(const Symbol& symbol, int x) {
+  const Space space = symbol.source->theta();
+  Step s{StepKind::mass_matrix_solve_tangent};
+  s.in = {x};
+  s.symbol = symbol;
+  s.context = context_of(symbol, symbol.definition->groups);
+  s.operand = plan_operand(symbol.definition->expand(symbol));
+  s.flops = 3 * (group_flops(*symbol.source, Group::articulated) + mass_matrix_flops(*symbol.source, true));
+  s.bytes = vector_bytes(space) + vector_bytes(symbol.source->motions());
+  s.tier = 1;
+  s.text = "∂(HφMφ*H* + J)⁻¹ along " + symbol.argument_text + " (the derivative of the Riccati sweep)";
+  return emit(std::move(s), {RegisterKind::vector, space, {}, nullptr, plan_.registers[x].wide});
 }
 
 int Planner::vector_value(const Expression& e) {

@@ -131,8 +131,6 @@ namespace {
 // Determinants, traces, diagonals and triangular factors of what is solved have no residual that a solve would correct: refinement of
 // them is the next precision up. Of what is not solved there is none.
 bool refined_by_precision(const Plan& plan) {
-  const bool asked = std::any_of(plan.contexts.begin(), plan.contexts.end(), [](const Context& c) { return c.binding && c.binding->arithmetic.refinement.steps != 0; });
-  if (!asked) return false;
   const auto uses = [&](auto which) { return std::any_of(plan.steps.begin(), plan.steps.end(), which); };
   if (uses([](const Step& s) { return s.kind == StepKind::apply_external || (s.operand && std::any_of(s.operand->steps.begin(), s.operand->steps.end(), [](const Step& o) { return o.kind == StepKind::apply_external; })); }))
     return false;  // what comes from outside computes in double precision
@@ -145,6 +143,17 @@ bool refined_by_precision(const Plan& plan) {
     case Request::logdet: return true;
     default: return uses([](const Step& s) { return s.kind == StepKind::dense_factor && s.flag; });
   }
+}
+
+bool refinement_asked(const Plan& plan) {
+  return std::any_of(plan.contexts.begin(), plan.contexts.end(), [](const Context& c) { return c.binding && c.binding->arithmetic.refinement.steps != 0; });
+}
+
+// Whether a step of the plan, or of an operand's, is a solve that refinement corrects.
+bool solves(const Plan& plan) {
+  return std::any_of(plan.steps.begin(), plan.steps.end(), [](const Step& s) {
+    return s.kind == StepKind::solve || s.kind == StepKind::mass_matrix_solve || s.kind == StepKind::dense_solve || (s.operand && solves(*s.operand));
+  });
 }
 
 Precision wider(Precision precision) {
@@ -160,7 +169,7 @@ Plan Planner::plan(const Expression& typed, Request request) {
   typed.check_current();
   more_digits_ = precision_of(typed) > Precision::double_;
   Expression e = lower(typed, false);
-  if (options_.rules) e = optimise(e, plan_.notes);
+  if (options_.rules) e = optimise(with_swept_tangents(e, request), plan_.notes);
   plan_.domain = e.domain();
   plan_.codomain = e.codomain();
   const bool bodies = cut_alike(e.domain(), e.codomain());
@@ -268,9 +277,12 @@ Plan Planner::plan(const Expression& typed, Request request) {
   plan_.batch = batch_of(typed);
   plan_.batched = plan_.batch >= 0;
   plan_.precision = precision_of(typed);
+  if (!refinement_asked(plan_)) return std::move(plan_);
   if (refined_by_precision(plan_)) {
     plan_.precision = wider(plan_.precision);
     plan_.notes.push_back("refinement: there is no solve to correct here, so all of it is computed one precision up");
+  } else if (!solves(plan_)) {
+    plan_.notes.push_back("refinement: there is no solve here, so nothing is corrected");
   }
   return std::move(plan_);
 }

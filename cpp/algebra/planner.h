@@ -42,6 +42,7 @@ class Planner {
   int apply_sum(const Expression& e, int x);
   int apply_symbol(const Symbol& symbol, bool transposed, bool inverted, int x);
   int apply_inverse(const Expression& e, int x);
+  int apply_inverse_tangent(const Symbol& symbol, int x);
   int apply_blocks(int block, bool transposed, int x, const std::string& text);
   int vector_value(const Expression& e);
   int column(const Expression& e);   // a vector expression as one column, whatever the run's width
@@ -87,6 +88,11 @@ class Planner {
 constexpr size_t most_steps = 200000;
 
 // ---------------------------------------------------------------- optimisation by theorems (optimise.cpp)
+// The same with -X⁻¹ ∂X X⁻¹, X = HφMφ*H* (+ J), as a letter of its own, and for a trace tr(X⁻¹ ∂X) as tr(D⁻¹ ∂D), where the form carries
+// factors of P: differentiated forces lose what these keep (plan_tangents.cpp).
+Expression with_swept_tangents(const Expression& lowered, Request request);
+bool has_swept_tangent(const Expression& e);
+
 // The cheapest expression that the theorems give for e: recognised forms, cancelled inverses, normal form if it costs less.
 Expression optimise(const Expression& lowered, std::vector<std::string>& notes);
 

@@ -4,7 +4,9 @@
 #include <deque>
 
 #include "algebra/lower.h"
+#include "algebra/properties.h"
 #include "algebra/rules.h"
+#include "algebra/simplify.h"
 #include "algebra/source.h"
 
 namespace pycraft {
@@ -254,6 +256,22 @@ bool equal_by_theorems(const Expression& left, const Expression& right) {
     if (found == y->end() || found->second != c) return false;
   }
   return true;
+}
+
+bool symmetric_block_diagonal_by_theorems(const Expression& e) {
+  if (e.floating() || !(e.domain() == e.codomain().dual())) return false;
+  const Expression shortest = simplify(e);
+  if (is_block_diagonal(shortest) && is_symmetric(shortest)) return true;
+  for (const Expression& spelling : {e, shortest}) {
+    Alphabet alphabet;
+    const auto form = normal_form(spelling, alphabet);
+    if (!form) continue;
+    const Expression made = to_expression(*form, alphabet, e.domain(), e.codomain());
+    if (!is_block_diagonal(made)) continue;
+    const auto starred = normal_form(made.T(), alphabet);
+    if (starred && *starred == *form) return true;
+  }
+  return false;
 }
 
 }  // namespace pycraft

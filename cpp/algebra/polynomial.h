@@ -47,4 +47,7 @@ Expression to_expression(const Polynomial& p, const Alphabet& alphabet, const Sp
 // Whether both have the same normal form.
 bool equal_by_theorems(const Expression& a, const Expression& b);
 
+// Whether e is its own transpose, body by body, by what the theorems make of it: τ̄P, EP(I-φ⁻¹)*.
+bool symmetric_block_diagonal_by_theorems(const Expression& e);
+
 }  // namespace pycraft

@@ -72,6 +72,11 @@ class SkoSource : public std::enable_shared_from_this<SkoSource> {
   virtual void check_state(const double* q, size_t nq, const double* v, size_t nv) const = 0;
   virtual std::shared_ptr<const StateData> state() const = 0;
   virtual std::uint64_t parameters() const = 0;  // grows with every change of a mass, a placement, ...
+  // Where tangent = ∂X of a direction that moves this model's bodies, X = HφMφ*H* (+ J): a letter for ∂(X⁻¹), which values apply by the
+  // derivative of the Riccati sweep, and ∂D. Letters are bound as those of X are.
+  virtual bool tangent_of_inverse(const Expression& X, const Expression& tangent, Expression& letter, Expression& of_D) {
+    return static_cast<void>(X), static_cast<void>(tangent), static_cast<void>(letter), static_cast<void>(of_D), false;
+  }
 #define PYCRAFT_MAKE_VALUES(S) virtual std::unique_ptr<SkoValues<S>> make_values(S) const = 0;
   PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_MAKE_VALUES)
 #undef PYCRAFT_MAKE_VALUES

@@ -41,6 +41,7 @@ struct SymbolDefinition {
   bool symmetric = false;
   unsigned groups = Group::kinematics;
   Expression (*expand)(const Symbol&) = nullptr;  // compounds: the definition
+  bool tangent_of_inverse = false;                // ∂(ℳ + J)⁻¹: applied by the derivative of the Riccati sweep
 };
 
 struct Symbol {

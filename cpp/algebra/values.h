@@ -9,12 +9,25 @@
 #include <thread>
 #include <utility>
 
+#include "algebra/errors.h"
 #include "algebra/mutex.h"
 #include "algebra/source.h"
 #include "algebra/sweeps/residual_rounding.h"
 #include "algebra/symbol.h"
 
 namespace pycraft {
+
+template <class S>
+class SkoValues;
+
+// y = ∂(ℳ + J)⁻¹ x along the direction of a letter (SymbolDefinition::tangent_of_inverse), by the derivative of the Riccati sweep at these
+// values. False where the sweep has no derivative there. Its memory is kept from run to run.
+template <class S>
+class InverseTangent {
+ public:
+  virtual ~InverseTangent() = default;
+  virtual bool apply(const SkoValues<S>& values, const Symbol& direction, const S* x, S* y, int columns) = 0;
+};
 
 template <class S>
 class SkoValues {
@@ -74,6 +87,8 @@ class SkoValues {
   virtual void mass_matrix_dense(bool with_hinge_diagonal, S* out) const = 0;
   // ln det D(k) summed over the hinges.
   virtual S log_determinant_of_D() const = 0;
+  // Null where the sweep is not differentiated: in the widest scalars.
+  virtual std::unique_ptr<InverseTangent<S>> inverse_tangent() const { return nullptr; }
 
  protected:
   virtual void set_state(const double* q, const double* v) = 0;

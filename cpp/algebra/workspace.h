@@ -159,6 +159,10 @@ class Workspace {
           solve_mass_matrix(s, values, w);
         return;
       }
+      case StepKind::mass_matrix_solve_tangent:
+        ++counts.kernels;
+        solve_mass_matrix_tangent(s, values, width(s.in[0], m), counts);
+        return;
       case StepKind::mass_matrix_dense:
         ++counts.kernels;
         dense_[s.out].resize(size_t(rows(s.out)) * rows(s.out));
@@ -434,6 +438,29 @@ class Workspace {
            refinement_);
   }
 
+  void solve_mass_matrix_tangent(const Step& s, const std::vector<SkoValues<S>*>& values, int w, PassCounts& counts) {
+    auto [known, fresh] = tangents_.try_emplace(s.out);
+    if (fresh) known->second = values[s.context]->inverse_tangent();
+    if (known->second && known->second->apply(*values[s.context], s.symbol, vectors_[s.in[0]].data(), vectors_[s.out].data(), w)) return;
+    Workspace& typed = operand_workspace(s);
+    typed.vector(s.operand->input) = vectors_[s.in[0]];
+    typed.run(operand_values(s, values), w, true, counts);
+    vectors_[s.out] = typed.vector(s.operand->output);
+  }
+
+  Workspace& operand_workspace(const Step& s) {
+    Workspace* w = nullptr;
+    for (auto& [step, workspace] : operands_)
+      if (step == &s) w = workspace.get();
+    w->state = state;
+    return *w;
+  }
+  std::vector<SkoValues<S>*> operand_values(const Step& s, const std::vector<SkoValues<S>*>& values) const {
+    std::vector<SkoValues<S>*> own;
+    for (const Context& c : s.operand->contexts) own.push_back(values[std::find(plan_->contexts.begin(), plan_->contexts.end(), c) - plan_->contexts.begin()]);
+    return own;
+  }
+
   void apply_external_operator(const Step& s, int w) {
     if constexpr (std::is_same_v<S, double>) {
       const auto& f = s.transposed ? s.external->apply_transposed : s.external->apply;
@@ -445,13 +472,9 @@ class Workspace {
   }
 
   void operand_as_matrix(const Step& s, const std::vector<SkoValues<S>*>& values, std::vector<S>& A, PassCounts& counts) {
-    Workspace* w = nullptr;
-    for (auto& [step, workspace] : operands_)
-      if (step == &s) w = workspace.get();
-    std::vector<SkoValues<S>*> own;
-    for (const Context& c : s.operand->contexts) own.push_back(values[std::find(plan_->contexts.begin(), plan_->contexts.end(), c) - plan_->contexts.begin()]);
+    Workspace* w = &operand_workspace(s);
+    const std::vector<SkoValues<S>*> own = operand_values(s, values);
     const int rows = s.operand->codomain.dimension(), columns = s.operand->domain.dimension();
-    w->state = state;
     A.resize(size_t(rows) * columns);
     for (int start = 0; start < columns; start += columns_at_a_time) {
       const int m = std::min(columns_at_a_time, columns - start);
@@ -616,6 +639,7 @@ class Workspace {
   std::vector<SmallLU<S>> dense_lu_;
   std::vector<std::optional<GramFactors<S>>> gram_;
   std::vector<std::pair<const Step*, std::unique_ptr<Workspace>>> operands_;
+  std::map<int, std::unique_ptr<InverseTangent<S>>> tangents_;  // by the register that is written
   SmallLU<S> lu_;
   std::vector<S> gathered_, scratch_, block_, product_, magnitude_;
   RefinementWork<S> refinement_;

@@ -30,6 +30,7 @@ bool PackedDynamics<T>::forward_dynamics(const double* q, size_t q_stride, const
   } catch (const SingularHingeError&) {
     return false;
   }
+  if (blocks_.faint().body >= 0) return false;
   for (int b = 0; b < width; ++b)
     for (int i = 0; i < model_.nv; ++i) vdot[size_t(b) * model_.nv + i] = vdot_[i].v[b] - points_.absorbed[i].v[b];
   return true;

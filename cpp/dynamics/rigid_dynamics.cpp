@@ -82,7 +82,10 @@ typename RigidDynamics<S>::AddedInertias RigidDynamics<S>::forward_dynamics_of_p
     solve_regular(r_.data(), vdot);
   }
   left_ = S(0);
-  if (how.refinement.steps == 0) return added;
+  if (how.refinement.steps == 0) {
+    if (how.on_singular != OnSingular::minimum_norm && blocks_.faint().body >= 0) correct_faint(q, v, tau, vdot);
+    return added;
+  }
   const auto size_at = [&](const S* x) {
     if (how.refinement.wider())
       size_residual(*wider_, wide_x_.data(), how.refinement);
@@ -99,6 +102,43 @@ typename RigidDynamics<S>::AddedInertias RigidDynamics<S>::forward_dynamics_of_p
   size_at(vdot);
   left_ = maximum(maximum(length(refinement_.delta.data()), floor(refinement_.delta.data())), S(epsilon<S>() / S(2) * length(vdot)));
   return added;
+}
+
+// Where a coordinate feels hardly any inertia: accelerations are corrected by residuals two scalars up (one up inertias about a body's origin
+// round to more than the faintest inertia that a form can carry) as long as corrections shrink. Refused is what comes no closer than `faint_limit`
+// of the accelerations; and where the first correction matters at all, what the rounding of these residuals leaves, which corrections do
+// not show: it is the same in each.
+template <class S>
+template <class T>
+void RigidDynamics<S>::correct_faint(const T* q, const T* v, const T* tau, S* vdot) {
+  const int n = model_->nv;
+  using Exact = Wider<Wider<S>>;
+  RigidDynamics<Exact>& up = wider(q, v).wider(q, v);
+  std::vector<Exact> x, exact(n);
+  std::vector<S>& r = r_;
+  r.resize(n);
+  columns_.resize(std::max(columns_.size(), size_t(n)));
+  // What coasts has no acceleration to compare with: the motion's own, ω² and gravity over the length of the body.
+  const FaintPivot& faint = blocks_.faint();
+  const RigidInertia<S>& own = model_->inertia[faint.body];
+  S scale = length(vdot) + ratio_or_zero(own.mass * norm(model_->gravity), norm(own.moment));
+  for (const Vector3<S>& omega : points_.angular_velocity) scale = maximum(scale, dot(omega, omega));
+  S last = S(0.3) / S(0.9) * scale, first = S(0);
+  for (int step = 0; step < 5; ++step) {
+    convert(vdot, n, x);
+    up.residual(tau, x.data(), exact.data());
+    for (int i = 0; i < n; ++i) r[i] = static_cast<S>(exact[i]);
+    solve(r.data(), columns_.data(), 1);
+    const S size = length(columns_.data());
+    if (!(S(0.9) * last >= size)) break;  // not a number, too far, or no closer
+    for (int i = 0; i < n; ++i) vdot[i] += columns_[i];
+    last = size;
+    if (step == 0) first = size;
+    if (size <= S(4) * epsilon<S>() * length(vdot)) break;
+  }
+  const S left = S(faint.ratio) * static_cast<S>(epsilon<Exact>());
+  const bool close = faint_limit<S>() * length(vdot) >= last || S(4) * epsilon<S>() * scale >= last;
+  if (!close || (first > faint_error<S>() * scale && !(faint_limit<S>() > left))) throw_faint_hinge(tree_, faint);
 }
 
 template <class S>

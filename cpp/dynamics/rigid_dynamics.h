@@ -72,6 +72,8 @@ class RigidDynamics {
   template <class T>
   RigidDynamics<Wider<S>>& wider(const T* q, const T* v);
   template <class T>
+  void correct_faint(const T* q, const T* v, const T* tau, S* vdot);
+  template <class T>
   void size_residual(const RigidDynamics<T>& formed, const T* vdot, const Refinement& how);  // of the one that was formed last
   S length(const S* x) const;   // 2-norm of nv numbers
   void gather_wider();  // from now on forces can be

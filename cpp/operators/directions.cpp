@@ -190,7 +190,7 @@ class MechanicsDirection : public Direction {
 // Moves along fixed twists: a coordinate, or what a placement or an axis is perturbed by.
 class TwistDirection : public MechanicsDirection {
  public:
-  TwistDirection(std::shared_ptr<MultibodyOperators> source, std::vector<std::pair<double, std::vector<int>>> twists)
+  TwistDirection(std::shared_ptr<MultibodyOperators> source, Twists twists)
       : MechanicsDirection(std::move(source)), twists_(std::move(twists)) {}
 
   Expression frame_motion(const Symbol& like) const override {
@@ -234,7 +234,7 @@ class TwistDirection : public MechanicsDirection {
   }
 
  private:
-  std::vector<std::pair<double, std::vector<int>>> twists_;
+  Twists twists_;
 };
 
 class TimeDirection final : public MechanicsDirection {
@@ -312,10 +312,23 @@ class InertiaDirection final : public MechanicsDirection {
 
 }  // namespace
 
+std::unique_ptr<Direction> twist_direction(const std::shared_ptr<MultibodyOperators>& source, Twists twists) {
+  return std::make_unique<TwistDirection>(source, std::move(twists));
+}
+
+int coordinates_before(const MultibodyOperators& source, const std::vector<int>& twist) {
+  const Place at = place_of(source, twist);
+  int count = 0, subhinge = 0;
+  for (const Subhinge& h : source.model()->body(at.body).hinge.subhinges) {
+    if (subhinge++ < at.slot) count += h.nv();
+  }
+  return count;
+}
+
 std::unique_ptr<Direction> coordinate_direction(const std::shared_ptr<MultibodyOperators>& source, int coordinate) {
   if (coordinate < 0 || coordinate >= source->nv())
     throw ModelError("coordinate " + std::to_string(coordinate) + " of '" + source->name() + "', which has " + std::to_string(source->nv()));
-  return std::make_unique<TwistDirection>(source, std::vector<std::pair<double, std::vector<int>>>{{1.0, {coordinate}}});
+  return twist_direction(source, {{1.0, {coordinate}}});
 }
 
 std::unique_ptr<Direction> time_direction(const std::shared_ptr<MultibodyOperators>& source, const Expression& vdot) {
@@ -327,11 +340,11 @@ std::unique_ptr<Direction> time_direction(const std::shared_ptr<MultibodyOperato
 std::unique_ptr<Direction> parameter_direction(const Parameter& p) {
   p.source->check_current();
   if (p.twists.empty()) return std::make_unique<InertiaDirection>(p.source, p.inertia_body, p.inertia, p.rotor);
-  std::vector<std::pair<double, std::vector<int>>> twists;
+  Twists twists;
   for (const InsertedTwist& t : p.twists)
     for (int c = 0; c < 6; ++c)
       if (t.twist[c] != 0) twists.push_back({t.twist[c], {t.body, t.position, c}});
-  return std::make_unique<TwistDirection>(p.source, std::move(twists));
+  return twist_direction(p.source, std::move(twists));
 }
 
 }  // namespace pycraft

@@ -28,7 +28,8 @@ enum DerivativeSymbolId : int {
   direction_twist,                               // the twist of a direction in the axes of its body; arguments as Delta's
   motion_cross,                                  // functions of a vector: crm(x), crf(x), and -[[ñ, f̃], [f̃, 0]] of x = (n; f)
   force_cross,
-  momentum_cross_of
+  momentum_cross_of,
+  inverse_tangent                                // ∂(ℳ + J)⁻¹ in plans: operators/inverse_tangent.h
 };
 const std::vector<SymbolDefinition>& derivative_symbols();
 
@@ -50,10 +51,16 @@ struct Parameter {
   int rotor = -1;                      // coordinate
 };
 
+// Twists (Delta's arguments) and how much of each.
+using Twists = std::vector<std::pair<double, std::vector<int>>>;
+std::unique_ptr<Direction> twist_direction(const std::shared_ptr<MultibodyOperators>& source, Twists twists);
 std::unique_ptr<Direction> coordinate_direction(const std::shared_ptr<MultibodyOperators>& source, int coordinate);
 // vdot: a vector of Θ; empty: refused where it is needed.
 std::unique_ptr<Direction> time_direction(const std::shared_ptr<MultibodyOperators>& source, const Expression& vdot);
 std::unique_ptr<Direction> parameter_direction(const Parameter& parameter);
+
+// The coordinates of a hinge inboard of where a twist stands: these rows of H move with it.
+int coordinates_before(const MultibodyOperators& source, const std::vector<int>& twist);
 
 // Theorems of the calculus.
 std::vector<Theorem> calculus_theorems(const std::shared_ptr<MultibodyOperators>& source);

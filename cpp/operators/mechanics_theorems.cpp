@@ -132,7 +132,7 @@ std::vector<Theorem> mechanics_theorems(const std::shared_ptr<MultibodyOperators
 
   group = "Waiting";
   const std::string loops = "loops", flexible = "flexible bodies";
-  wait("compound bodies: ℳ_C = X*ℳX, their accelerations and calculus", loops, "soa.md #60");
+  wait("compound bodies: their mass matrix, accelerations and calculus", loops, "soa.md #60");
   wait("tree augmentation", loops, "soa.md #63");
   wait("modal blocks and their calculus", flexible, "soa.md, One algebra, three kinds of body");
   return list;

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "operators/directions.h"
+#include "operators/inverse_tangent.h"
 #include "operators/rigid_values.h"
 
 namespace pycraft {
@@ -32,9 +33,13 @@ Space MultibodyOperators::space(SpaceKind kind, const std::vector<int>& nodes) c
 }
 
 #define PYCRAFT_MAKE_VALUES(S) \
-  std::unique_ptr<SkoValues<S>> MultibodyOperators::make_values(S) const { return std::make_unique<RigidValues<S>>(structure(), *model_); }
+  std::unique_ptr<SkoValues<S>> MultibodyOperators::make_values(S) const { return std::make_unique<RigidValues<S>>(*this); }
 PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_MAKE_VALUES)
 #undef PYCRAFT_MAKE_VALUES
+
+bool MultibodyOperators::tangent_of_inverse(const Expression& X, const Expression& tangent, Expression& letter, Expression& of_D) {
+  return pycraft::tangent_of_inverse(std::static_pointer_cast<MultibodyOperators>(shared_from_this()), X, tangent, letter, of_D);
+}
 
 std::shared_ptr<MultibodyOperators> operators_of(const std::shared_ptr<Multibody>& model) {
   if (auto known = std::static_pointer_cast<MultibodyOperators>(model->operators())) return known;
@@ -250,6 +255,14 @@ void RigidValues<S>::vector(const Symbol& symbol, S* out) const {
       copy(field);
     }
   }
+}
+
+template <class S>
+std::unique_ptr<InverseTangent<S>> RigidValues<S>::inverse_tangent() const {
+  if constexpr (std::numeric_limits<S>::digits <= std::numeric_limits<Quad>::digits)
+    return std::make_unique<RigidInverseTangent<S>>(this->tree_);
+  else
+    return nullptr;
 }
 
 #define PYCRAFT_INSTANTIATE(S) template class RigidValues<S>;

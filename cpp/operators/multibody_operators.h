@@ -53,6 +53,7 @@ class MultibodyOperators final : public SkoSource {
   unsigned enter_use() const override { return model_->enter_use(); }
   void leave_use(unsigned entered) const noexcept override { model_->leave_use(entered); }
   Space space(SpaceKind kind, const std::vector<int>& arguments) const override;
+  bool tangent_of_inverse(const Expression& X, const Expression& tangent, Expression& letter, Expression& of_D) override;
   PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_OVERRIDE_MAKE_VALUES)
 
  private:

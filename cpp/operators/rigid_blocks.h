@@ -46,7 +46,7 @@ class RigidBlocks {
     J.resize(N);
     pivots_.resize(N);
     aligned.assign(N, -1);
-    mass_.resize(n), rotational_.resize(n), reach_.resize(n), error_.resize(n), growth_.resize(n);
+    mass_.resize(n), rotational_.resize(n), reach_.resize(n), lever_.resize(n), error_.resize(n), growth_.resize(n);
     for (int dof : tree.dof) pivot_work_.resize(std::max(pivot_work_.size(), 3 * size_t(dof)));
     size_t d = 0;
     for (size_t k = 0; k < n; ++k) {
@@ -285,7 +285,9 @@ class RigidBlocks {
     mass_[k] = inertia[k].mass;
     rotational_[k] = inertia[k].rotational.s[0] + inertia[k].rotational.s[3] + inertia[k].rotational.s[5] + uncertain(k);
     reach_[k] = S(0);
+    lever_[k] = ratio_or_zero(longest(inertia[k].moment), inertia[k].mass);
     error_[k] = S(0), growth_[k] = S(1);
+    if (k == 0) faint_ = {};
   }
   // D, G, P⁺ of body k; doubtful where a pivot is so small that only the error sweep can tell whether it is noise.
   Pivots eliminate_hinge(int k) {
@@ -309,12 +311,15 @@ class RigidBlocks {
       factors_->to_parent(k, pose[k]);
     using std::abs;
     const Vector3<S>& l = pose[k].p;
+    lever_[p] = maximum(lever_[p], maximum(lever_[k], longest(l)));
     mass_[p] += mass_[k];
     rotational_[p] += rotational_[k];
     reach_[p] = maximum(reach_[p], S(reach_[k] + abs(l[0]) + abs(l[1]) + abs(l[2])));
     error_[p] = maximum(error_[p], error_[k]), growth_[p] = maximum(growth_[p], growth_[k]);
   }
   RigidFactors<S>& factors() { return *factors_; }
+  // The faintest coordinate of the last sweep in a factored form (algebra/sweeps/singular_pivot.h); body -1: none.
+  const FaintPivot& faint() const { return faint_; }
   // ---------------------------------------------------------------- error bound
   void start_error(int k) {
     X_.resize(tree_.bodies());
@@ -426,10 +431,32 @@ class RigidBlocks {
       fresh = maximum(fresh, S(inverse * pivot_reach(L.data() + d_[k], n, j, carried, w)));
       grown = maximum(grown, S(inverse * pivot_reach(L.data() + d_[k], n, j, own, w)));
     }
+    if (form != Form::fast) note_faint(k, own, carried, w);
     error_[k] += rounding_bound<S>(form) * fresh;
     growth_[k] *= maximum(S(1), S(grown / S(16)));
     if (!(S(1) > gain_bound<S>(form) * grown)) return true;
     return !(largest_growth(form) > growth_[k] && S(1) > S(4) * error_[k] * growth_[k]);
+  }
+  // Lengths are right to eps of themselves, so that where a linear inertia p remains, rows of columns for turns are right to eps l √p. What a
+  // body carries has p at most its mass; only where that leaves a doubt it is taken from the factors.
+  void note_faint(int k, const S* own, S* squares, S* w) {
+    const int n = tree_.dof[k], f = first(k);
+    for (const bool exact : {false, true}) {
+      const S linear = lever_[k] * lever_[k] * (exact ? factors_->linear_trace() : S(S(3) * mass_[k]));
+      for (int i = 0; i < n; ++i) squares[i] = dot(H[f + i].angular, H[f + i].angular) * linear + (aligned[f + i] >= 0 ? S(0) : own[i]);
+      bool sound = true;
+      for (int j = 0; j < n; ++j) {
+        const S ratio = pivot_reach(L.data() + d_[k], n, j, squares, w) / pivots_[f + j];
+        if (S(1) > faint_ratio<S>() * ratio) continue;
+        sound = false;
+        if (exact && !(faint_.ratio > to_double(ratio))) faint_ = {k, j, to_double(pivots_[f + j]), to_double(ratio)};
+      }
+      if (sound) return;
+    }
+  }
+  static S longest(const Vector3<S>& l) {
+    using std::abs;
+    return maximum(S(abs(l[0])), maximum(S(abs(l[1])), S(abs(l[2]))));
   }
   // In units of the rounding bound: what factors of the body's inertia leave out. The plain form rounds at more than that.
   S uncertain(int k) const { return form == Form::fast ? S(0) : S((*inertia_factors)[k].uncertain / rounding_bound<S>(form)); }
@@ -463,7 +490,8 @@ class RigidBlocks {
 
   const SkoStructure& tree_;
   std::vector<size_t> d_;
-  std::vector<S> pivots_, pivot_work_, mass_, rotational_, reach_, error_, growth_;  // error, growth: of what a body carries
+  std::vector<S> pivots_, pivot_work_, mass_, rotational_, reach_, lever_, error_, growth_;  // of what a body carries; lever: its longest piece
+  FaintPivot faint_;
   std::vector<Vector6<S>> W;
   std::vector<ArticulatedInertia<S>> X_;
   std::unique_ptr<RigidFactors<S>> factors_;

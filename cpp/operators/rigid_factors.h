@@ -57,6 +57,7 @@ class RigidFactors {
     for (int j = 0; j < n && rotor; ++j)
       if (!(J[j] == S(0))) factors_.add_rotor(k, J[j], [j](int i) { return i == j ? S(1) : S(0); });
     factors_.eliminate(k, form, is_hinge_row, with_bias);
+    hinge_rows_ = n;
 
     bool positive = true;
     for (int j = 0; j < n; ++j) {
@@ -94,6 +95,16 @@ class RigidFactors {
       return sum;
     });
   }
+  // P(3,3) + P(4,4) + P(5,5), as it was before.
+  S linear_trace() const {
+    S sum = S(0);
+    for (int i = 3; i < 6; ++i)
+      for (int r = 0; r < factors_.pivots(); ++r) {
+        const S x = r < hinge_rows_ ? factors_.against(i, r) : factors_.U(i, r);
+        sum += x * factors_.weight(r) * x;
+      }
+    return sum;
+  }
   void to_parent(int k, const Pose<S>& X) {
     for (int r = tree_.dof[k]; r < factors_.pivots(); ++r) {
       Vector6<S> u;
@@ -119,6 +130,7 @@ class RigidFactors {
   FactoredInertia<S> factors_;
   std::vector<S> bias_;
   S diagonal_[6];
+  int hinge_rows_ = 0;
 };
 
 }  // namespace pycraft

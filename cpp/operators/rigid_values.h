@@ -13,8 +13,8 @@ namespace pycraft {
 template <class S>
 class RigidValues final : public TreeValues<RigidBlocks<S>> {
  public:
-  RigidValues(const SkoStructure& structure, const Multibody& model)
-      : TreeValues<RigidBlocks<S>>(structure), model_(model), q_(model.nq()), v_(model.nv()) {}
+  explicit RigidValues(const MultibodyOperators& source)
+      : TreeValues<RigidBlocks<S>>(source.structure()), source_(source), model_(*source.model()), q_(model_.nq()), v_(model_.nv()) {}
 
   void block(const Symbol& symbol, int k, S* out) const override;
   void vector(const Symbol& symbol, S* out) const override;
@@ -25,10 +25,16 @@ class RigidValues final : public TreeValues<RigidBlocks<S>> {
     mass_matrix_residual_gathered(this->tree_, this->blocks_, wide->inertia, x, b, r, m, scratch, forces);
   }
 
+  std::unique_ptr<InverseTangent<S>> inverse_tangent() const override;
+
+  const MultibodyOperators& source() const { return source_; }
+  const std::shared_ptr<const CompiledModel<S>>& compiled_model() const { return compiled_; }
   const CompiledModel<S>& compiled() const { return *compiled_; }
   const std::vector<S>& q() const { return q_; }
   const std::vector<S>& v() const { return v_; }
   const Velocities<S>& velocities() const { return velocities_; }
+  // The twist of a direction (Delta's arguments) in the axes of its body, and the body.
+  Vector6<S> twist(const std::vector<int>& direction, int& body) const;
 
  protected:
   void set_state(const double* q, const double* v) override {
@@ -47,10 +53,9 @@ class RigidValues final : public TreeValues<RigidBlocks<S>> {
   }
 
  private:
-  // The twist of a direction (Delta's arguments) in the axes of its body, and the body.
-  Vector6<S> twist(const std::vector<int>& direction, int& body) const;
   void inertia_derivative_block(const std::vector<int>& arguments, S* out) const;
 
+  const MultibodyOperators& source_;
   const Multibody& model_;
   std::shared_ptr<const CompiledModel<S>> compiled_;
   std::vector<S> q_, v_;

@@ -9,8 +9,10 @@
 #include "algebra/gram_factors.h"
 #include "algebra/refinement.h"
 #include "algebra/small_lu.h"
+#include "algebra/sweeps/residual_rounding.h"
 #include "algebra/sweeps/singular_pivot.h"
 #include "recursions/configuration_rate.h"
+#include "recursions/kinematics.h"
 #include "spatial/pack.h"
 #include "robot.h"
 
@@ -233,6 +235,26 @@ BOOST_AUTO_TEST_CASE(a_first_correction_above_three_tenths_is_refused) {
 BOOST_AUTO_TEST_CASE(what_may_be_rounding_is_not_applied) {
   BOOST_TEST(corrected(1, 1.1, 1, 0, 0.2).x == 1);
   BOOST_TEST(corrected(1, 1.1, 1, 0, 0.01).x == 1.1);
+}
+
+// Rotors are in the residual r = b - (HφMφ*H* + J) x and nowhere in the forces: what they add to its rounding is u J |x|, coordinate by coordinate.
+BOOST_AUTO_TEST_CASE(the_rounding_of_what_rotors_add) {
+  const auto model = pycraft::testing::robot();
+  const auto compiled = model->compiled<double>();
+  const SkoStructure tree = model->structure();
+  RigidBlocks<double> blocks(tree);
+  const std::vector<double> q = model->state()->q, x = random_numbers(model->nv(), 4), b = random_numbers(model->nv(), 5);
+  kinematics(*compiled, q.data(), blocks);
+  const RoundingUnits<double> units{eps / 2, eps / 8};
+  ResidualSizes<double> without, with;
+  residual_sizes(tree, blocks, x.data(), b.data(), 1, units, without);
+  for (int j = 0; j < model->nv(); ++j) blocks.J[j] = 1e3 + j;
+  residual_sizes(tree, blocks, x.data(), b.data(), 1, units, with);
+  for (int j = 0; j < model->nv(); ++j) {
+    const double added = units.force * (1e3 + j) * std::abs(x[j]);
+    BOOST_TEST(std::abs(with.coordinate[j] - without.coordinate[j] - added) <= 8 * eps * with.coordinate[j]);
+  }
+  BOOST_TEST((with.force == without.force && with.motion == without.motion));
 }
 
 // A move is a product of quaternions: |q| is kept, whatever it is.

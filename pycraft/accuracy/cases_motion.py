@@ -84,7 +84,7 @@ def bus(seed: int, heavy: float = 2000.0, light: float = 0.05) -> tuple[Multibod
     for k, kind in enumerate(("pin", "pin", "ball", "slider", "pin", "pin")):
         parent = "bus" if k % 3 == 0 else f"link{k - 1}"
         inertia = 0.05 * light * np.diag(rng.uniform(1, 2, 3))
-        axis = {} if kind == "ball" else {"axis": rng.normal(size=3)}
+        axis: dict[str, Any] = {} if kind == "ball" else {"axis": rng.normal(size=3)}
         model.add_body(
             f"link{k}", parent, kind, position=rng.normal(size=3), mass=light, com=0.2 * rng.normal(size=3), inertia=inertia, **axis
         )

@@ -48,7 +48,7 @@ def row(
 
 
 class Stability(TidyTable):
-    """Rows of a run, true where every bound holds. See `pycraft.accuracy.stability_markdown` for the table that is committed."""
+    """Rows of a run, true where every bound holds, and there is one. See `pycraft.accuracy.stability_markdown` for the committed table."""
 
     columns: ClassVar[tuple[str, ...]] = COLUMNS
     shown: ClassVar[dict[str, str]] = {
@@ -63,7 +63,7 @@ class Stability(TidyTable):
         super().__init__("Hard cases", rows, about)
 
     def __bool__(self) -> bool:
-        return all(row["passed"] for row in self.rows)
+        return bool(self.rows) and all(row["passed"] for row in self.rows)
 
     @property
     def failures(self) -> list[dict[str, Any]]:

@@ -32,7 +32,7 @@ from .formulas import (
 )
 from .letters import total
 from .recursion import pass_words
-from .source import WORDS, Source, at_child, documentation, helpers, parent_is_read, place_of, tree_of_terms
+from .source import Source, documentation, helpers, parent_is_read, tree_of_terms
 
 _RESULT_TYPES = {"vector": "Matrix", "matrix": "Matrix", "blocks": "Blocks", "scalar": "double"}
 
@@ -144,8 +144,7 @@ class CppSource(Source):
     def elimination(self, system: System) -> list[str]:
         name, suffix = system.quantity.name, self.suffix(system.tree)
         self.used.add("TreeSystem")
-        bodies = ", ".join(self.extent(c, "k") if isinstance(c, Cut) else "0" for c in system.cuts)
-        border = ", ".join("0" if isinstance(c, Cut) else str(c) for c in system.cuts)
+        bodies, border = self.extents(system)
         lines = [
             "",
             "// the equations of the realization, T s = b, body by body",
@@ -156,21 +155,15 @@ class CppSource(Source):
             f"  [[maybe_unused]] const int p = parent{suffix}[k];",
         ]
         corner: list[str] = []
-        for i, relation in enumerate(system.relations):
-            lines_of = lines if isinstance(system.cuts[i], Cut) else corner
-            indent = "  " if isinstance(system.cuts[i], Cut) else ""
-            lines_of.append(f"{indent}// {WORDS.relation(system, i)}")
-            for term, j in relation:
-                place, guarded = place_of(system, i, j, term)
-                node = at_child(term).node if term.over == "c" else term.node
-                value = self.scaled(Term(node, abs(term.coefficient)), True)
-                sign = "-=" if term.coefficient < 0 else "+="
+        for of_bodies, reading, entries in self.relations(system):
+            (lines if of_bodies else corner).append(f"{'  ' if of_bodies else ''}// {reading}")
+            for place, guarded, at, sign, value in entries:
                 if place == "corner":
-                    corner.append(f"{name}.corner({i}, {j}) {sign} {value};")
+                    corner.append(f"{name}.corner({at}) {sign} {value};")
                 elif place == "below":
-                    corner.append(f"for (int k = 0; k < n{suffix}; ++k) {name}.below(k, {i}, {j}) {sign} {value};")
+                    corner.append(f"for (int k = 0; k < n{suffix}; ++k) {name}.below(k, {at}) {sign} {value};")
                 else:
-                    lines.append(f"  {'if (p >= 0) ' if guarded else ''}{name}.{place}(k, {i}, {j}) {sign} {value};")
+                    lines.append(f"  {'if (p >= 0) ' if guarded else ''}{name}.{place}(k, {at}) {sign} {value};")
         return [*lines, "}", *corner]
 
     def solution(self, item: Solution) -> list[str]:
@@ -180,14 +173,11 @@ class CppSource(Source):
         body: list[str] = []
         once: list[str] = []
         lines = ["", f"Blocks {b} = {name}.vector({columns});"]
-        for i, terms in enumerate(item.inputs):
-            local = isinstance(item.system.cuts[i], Cut)
-            lines_of, indent = (body, "  ") if local else (once, "")
-            lines_of += [f"{indent}// {WORDS.input_equation(item, i)}"] if terms else []
-            for term in terms:
-                value = self.scaled(Term(term.node, abs(term.coefficient)), True)
-                sign = "-=" if term.coefficient < 0 else "+="
-                lines_of.append(f"{indent}{name}.part({b}, {'k' if local else -1}, {i}) {sign} {value};")
+        for i, (of_bodies, reading, terms) in enumerate(self.right_sides(item)):
+            lines_of, indent, k = (body, "  ", "k") if of_bodies else (once, "", "-1")
+            lines_of += [f"{indent}// {reading}"] if terms else []
+            for sign, value in terms:
+                lines_of.append(f"{indent}{name}.part({b}, {k}, {i}) {sign} {value};")
         if body:
             lines += [f"for (int k = 0; k < n{suffix}; ++k) {{", *body, "}"]
         lines += [*once, f"{b} = {name}.solve({b});"]

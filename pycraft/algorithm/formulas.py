@@ -12,6 +12,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
+from ..formula_nodes import Node, Product, Suffixed, flat
+
 
 # ---------------------------------------------------------------------- quantities
 @dataclass(frozen=True)
@@ -62,10 +64,6 @@ class Quantity:
 
 
 # ---------------------------------------------------------------------- formulas
-class Node:
-    """A formula: matrices of one body, its parent and its children."""
-
-
 @dataclass(frozen=True)
 class At(Node):
     """A quantity at body k, its parent p, its child c; "" for the whole of it."""
@@ -75,24 +73,13 @@ class At(Node):
 
 
 @dataclass(frozen=True)
-class Transposed(Node):
+class Transposed(Suffixed):
     """X*."""
 
-    inner: Node
-
 
 @dataclass(frozen=True)
-class Inverse(Node):
+class Inverse(Suffixed):
     """X⁻¹: a solve where something follows it."""
-
-    inner: Node
-
-
-@dataclass(frozen=True)
-class Product(Node):
-    """Factors from left to right."""
-
-    factors: tuple[Node, ...]
 
 
 @dataclass(frozen=True)
@@ -108,6 +95,10 @@ class Function(Node):
 
     name: str
     inner: Node
+
+    @property
+    def children(self) -> tuple[Node, ...]:
+        return (self.inner,)
 
 
 @dataclass(frozen=True)
@@ -177,18 +168,9 @@ def star(node: Node) -> Node:
 
 def product(*factors: Node) -> Node:
     """A product, flat, identities left out."""
-    flat: list[Node] = []
-    for factor in factors:
-        flat += factor.factors if isinstance(factor, Product) else [factor]
-    kept = [factor for factor in flat if not isinstance(factor, Identity)] or flat[:1]
+    whole = flat(factors)
+    kept = [factor for factor in whole if not isinstance(factor, Identity)] or whole[:1]
     return kept[0] if len(kept) == 1 else Product(tuple(kept))
-
-
-def children_of(node: Node) -> tuple[Node, ...]:
-    """The formulas that a formula is made of."""
-    if isinstance(node, (Transposed, Inverse, Function)):
-        return (node.inner,)
-    return node.factors if isinstance(node, Product) else ()
 
 
 def moved(node: Node, places: dict[str, str]) -> Node:
@@ -214,7 +196,7 @@ def quantities_in(node: Node) -> Iterator[Quantity]:
         yield node.system.quantity
     if isinstance(node, MadeDense):
         yield from reads(node.operator)
-    for inner in children_of(node):
+    for inner in node.children:
         yield from quantities_in(inner)
 
 
@@ -426,5 +408,5 @@ def tree_in(node: Node) -> int:
     if isinstance(node, Identity) and isinstance(node.cut, Cut):
         return node.cut.tree
     own = [q.tree for q in quantities_in(node) if q.tree >= 0]
-    inner = [tree_in(child) for child in children_of(node)]
+    inner = [tree_in(child) for child in node.children]
     return max([-1, *own, *inner])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from fractions import Fraction
-from numbers import Real
 
 from .formulas import (
     Assembled,
@@ -164,7 +163,7 @@ class Text:
         where = _PLACES[quantity.indices].get(at, "")
         return f"({where})" if where else ""
 
-    def number(self, x: Real) -> str:
+    def number(self, x: float | Fraction) -> str:
         """A coefficient: a ratio of small numbers as such."""
         return str(x) if isinstance(x, Fraction) and x.denominator <= _SHOWN else f"{float(x):.12g}"
 
@@ -366,7 +365,7 @@ class Latex(Text):
     def marked(self, inner: str, marks: str) -> str:
         return f"\\left({inner}\\right)^{{{marks}}}"
 
-    def number(self, x: Real) -> str:
+    def number(self, x: float | Fraction) -> str:
         if isinstance(x, Fraction) and 1 < x.denominator <= _SHOWN:
             return f"\\tfrac{{{x.numerator}}}{{{x.denominator}}}"
         mantissa, _, exponent = f"{float(x):.12g}".partition("e")

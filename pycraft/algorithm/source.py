@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
 
 from .formulas import (
     At,
@@ -177,9 +178,44 @@ class Source:
         """How many rows of a space belong to body k."""
         raise NotImplementedError
 
+    # ------------------------------------------------------------------ systems, entry by entry
+    def extents(self, system: System) -> tuple[str, str]:
+        """(the sizes of a body's states, those of the border's), zero for what lies in the other."""
+        bodies = ", ".join(self.extent(c, "k") if isinstance(c, Cut) else "0" for c in system.cuts)
+        return bodies, ", ".join("0" if isinstance(c, Cut) else str(c) for c in system.cuts)
+
+    def relations(self, system: System) -> Iterator[tuple[bool, str, list[Entry]]]:
+        """Of each equation of T: whether it is one of every body, how it reads, and its entries."""
+        for i, relation in enumerate(system.relations):
+            entries = []
+            for term, j in relation:
+                node = at_child(term).node if term.over == "c" else term.node
+                entries.append(Entry(*place_of(system, i, j, term), f"{i}, {j}", *self.signed(node, term.coefficient)))
+            yield isinstance(system.cuts[i], Cut), WORDS.relation(system, i), entries
+
+    def right_sides(self, item: Solution) -> Iterator[tuple[bool, str, list[tuple[str, str]]]]:
+        """Of each equation: whether it is one of every body, how its right side reads, and (sign, value) of what is added to it."""
+        for i, terms in enumerate(item.inputs):
+            added = [self.signed(term.node, term.coefficient) for term in terms]
+            yield isinstance(item.system.cuts[i], Cut), WORDS.input_equation(item, i) if terms else "", added
+
+    def signed(self, node: Node, coefficient: Any) -> tuple[str, str]:
+        """(the operator that adds, the value without its sign)."""
+        return "-=" if coefficient < 0 else "+=", self.scaled(Term(node, abs(coefficient)), True)
+
     def comment(self, equation: Equation, whole: bool = False) -> str:
         """The equation as the book writes it."""
         return WORDS.whole(equation) if whole else WORDS.equation(equation)
+
+
+class Entry(NamedTuple):
+    """A term added to one block of T: which block, whether it is there only where there is a parent, where, and what."""
+
+    place: str
+    guarded: bool
+    at: str
+    sign: str
+    value: str
 
 
 def is_vector(node: Node) -> bool:

@@ -220,6 +220,12 @@ def _mass_matrix_solve(r: Recursion, step: Step) -> None:
     )
 
 
+@writer("mass_matrix_solve_tangent")
+def _mass_matrix_solve_tangent(r: Recursion, step: Step) -> None:
+    """∂(ℳ + J)⁻¹ x as −(ℳ + J)⁻¹ (∂ℳ) (ℳ + J)⁻¹ x: the core differentiates the sweep itself, which keeps more digits."""
+    r.inlined(step)
+
+
 @writer("mass_matrix_dense")
 def _mass_matrix_dense(r: Recursion, step: Step) -> None:
     """ℳ (+ J) as a matrix, from the composite-body inertias."""

@@ -229,6 +229,17 @@ class Recursion:
         symbol = step["symbol"]
         return self.models[step["context"]].letter(symbol["name"], tuple(symbol["arguments"]), columns)  # type: ignore[arg-type]  # JSON
 
+    def inlined(self, step: Step) -> None:
+        """The equations of a step's operand in the place of the step."""
+        operand, out = step["operand"], step["out"]
+        letter = self.result_letter if out == self.plan["output"] and self.plan["request"] == "apply" else "w"
+        nested = Recursion(self.book, operand, letter, self.vectors, nested=True)
+        nested.program, nested.columns = self.program, self.columns_of(step["in"][0])
+        nested.values[operand["input"]] = self.values[step["in"][0]]
+        for inner in operand["steps"]:
+            WRITERS[inner["kind"]](nested, inner)
+        self.values[out] = nested.values[operand["output"]]
+
     def operator(self, step: Step) -> Quantity:
         """The dense matrix of a step's operand."""
         quantity = self.book.new("X", "function")

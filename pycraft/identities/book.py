@@ -167,7 +167,6 @@ class _Evaluate(Transformer):
             value = value if divisor is None else value / divisor
             value = -value if negative else value
             total = value if total is None else total + value
-            negative = False
         return total
 
     def term(self, parts):

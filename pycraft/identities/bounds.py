@@ -16,12 +16,12 @@ sweep is made. Residuals are judged relative to the larger side, numbers relativ
 from __future__ import annotations
 
 from collections.abc import Callable
-from numbers import Real
 from typing import Any
 
 import numpy as np
 
 from .. import _core
+from .vocabulary import is_number
 
 EPSILON = _core.epsilons()
 """Epsilon of each precision by name."""
@@ -43,7 +43,7 @@ class Sizes:
     its norm.
     """
 
-    def __init__(self, bind: Callable[[_core.Operator], _core.Operator], double: bool = False):
+    def __init__(self, bind: Callable[[Any], Any], double: bool = False):
         self._bind, self._double = bind, double
         self._norms: dict[Any, tuple[float, float | None]] = {}
         self._least, self._uncounted, self._rough = False, False, False
@@ -119,15 +119,16 @@ class Sizes:
                     made = made @ factor
                     size = np.linalg.norm(made)
             case "sum":
-                made = sum(matrix for matrix, _ in parts)
+                made = np.sum([matrix for matrix, _ in parts], axis=0)
                 off = sum(its + len(parts) * eps * np.linalg.norm(matrix) for matrix, its in parts)
             case "scaled":
-                made, off = operator.coefficient * parts[0][0], abs(operator.coefficient) * parts[0][1]
+                c = float(operator.coefficient)
+                made, off = c * parts[0][0], abs(c) * parts[0][1]
             case "transpose":
                 made, off = parts[0][0].T, parts[0][1]
             case _:
                 made = self._bind(operator).dense()
-                off = self._off(operator, np.linalg.norm(made), parts[0][1] if parts else 0.0)
+                off = self._off(operator, float(np.linalg.norm(made)), parts[0][1] if parts else 0.0)
         return made, float(off)
 
     def _off(self, operator: _core.Operator, norm: float, inner: float) -> float:
@@ -154,7 +155,7 @@ class Sizes:
                 case "sum":
                     return sum(norms)
                 case "scaled":
-                    return abs(operator.coefficient) * norms[0]
+                    return abs(float(operator.coefficient)) * norms[0]
                 case "transpose":
                     return norms[0]
                 case "function":  # crm(x) and its like
@@ -164,8 +165,8 @@ class Sizes:
 
     def size(self, side: Any) -> float:
         """The error of a side per unit of c · eps."""
-        if isinstance(side, Real):
-            return float(abs(side))
+        if is_number(side):
+            return abs(float(side))
         if isinstance(side, _core.Scalar):
             return self._scalar(side)
         children = side.children
@@ -314,6 +315,10 @@ class Roundings:
         self.terms = max(sizes.terms(lhs), sizes.terms(rhs)) if isinstance(lhs, _core.Scalar) else 0.0
         self.growth = max([1.0, *(sizes.amplification(s) for s in dict.fromkeys(sources(lhs, True) + sources(rhs, True)))])
         self._sweep = max([6.0, *(sweep(s) for s in dict.fromkeys(sources(lhs) + sources(rhs)))])
+
+    def absolute(self, precision: str | int) -> float:
+        """The bound on |lhs - rhs| itself."""
+        return CONSTANT * self._sweep * EPSILON[precision] * self.size * self.growth
 
     def bound(self, relative_size: float, precision: str | int) -> float:
         """The bound on |lhs - rhs| over a scale, `relative_size` the size over that scale."""

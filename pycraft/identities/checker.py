@@ -9,6 +9,9 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..arguments import whole
+from .block_check import check_by_block
+from .block_reading import is_by_block
 from .judge import FAILS, BoundState, Verdict, judge_states, ladder
 from .parse import Statement, Statements, check_has_space
 from .report import UNDEFINED, CheckReport, Finding, Report
@@ -40,7 +43,10 @@ def check_model(operators: Any, *, states: int = 3, seed: int = 0, precision: st
     precision : the first scalar beside double, "extended", "quad", 50 or 100 digits
     progress : called with each theorem's name, if given
     """
-    _check_wider(precision)
+    check_wider(precision)
+    _check_seed(seed)
+    if whole(states, "states") < 0:
+        raise _core.EvaluationError(f"states is {states}: random states beside the present one, 0 or more")
     source = operators._source
     model = operators._model
     report = Report(source.name, dict(source.traits))
@@ -58,7 +64,12 @@ def check_model(operators: Any, *, states: int = 3, seed: int = 0, precision: st
     return report
 
 
-def _check_wider(precision: str | int) -> None:
+def _check_seed(seed: Any) -> None:
+    if whole(seed, "seed") < 0:
+        raise _core.EvaluationError(f"seed is {seed}: a whole number, 0 or more")
+
+
+def check_wider(precision: str | int) -> None:
     """A residual must be seen to fall: double beside double shows nothing."""
     names = list(_core.epsilons())
     _core.wider(precision)  # raises where there is no such precision
@@ -88,10 +99,10 @@ def check_theorem(
     try:
         found = judge_states(lhs, rhs, states, vectors, **options)
     except _core.SingularHingeError as error:
-        finding.verdict, finding.note = "undefined", str(error)
+        finding.verdict, finding.note = UNDEFINED, str(error)
     except _core.SingularOperatorError as error:
         # Outside its hypotheses a theorem may ask for an inverse that is not there: one way to fail.
-        finding.verdict, finding.note = "expected to fail" if unmet else "undefined", str(error)
+        finding.verdict, finding.note = "expected to fail" if unmet else UNDEFINED, str(error)
     else:
         finding.judged(found)
         if unmet:
@@ -127,7 +138,8 @@ def check(
     ----------
     statement : str, or a pair (lhs, rhs) of expressions
         As text in Python's spelling, the book's (Unicode or ASCII) or LaTeX: ``"HψMψ*H* == D"``, ``"inv(psi) == inv(phi) + K*H"``. `MM`
-        is the mass matrix HφMφ*H*, `N` the number of coordinates.
+        is the mass matrix HφMφ*H*, `N` the number of coordinates. Operators with bodies behind them make a statement by block,
+        ``"Ω(i,j) = Υ(i)ψ(i,j), i above j"``: it is checked for every choice of bodies of which its relations hold.
     model : Multibody, OperatorSet or None
         None: random trees that between them meet and break every standard hypothesis, deep and wide ones among them, moving and in
         gravity (text only; see `pycraft.truth` for where it is true and where not).
@@ -136,7 +148,7 @@ def check(
         refute it; where no hypothesis saves it, for the smallest that meets all of them
     precision : the first scalar beside double in which residuals are taken, "extended", "quad", 50 or 100 digits. Where it does not decide,
         the wider ones are tried in turn: extended costs about twice a run in double, quad 20, 50 digits 60 and 100 digits 100 times.
-    budget : seconds for that search
+    budget : CPU seconds for each part of that search: where it is true, and the smallest refutation. The report says where it ended one.
 
     Returns
     -------
@@ -152,13 +164,25 @@ def check(
     """
     from .search import named_vectors, statement_text
 
-    _check_wider(precision)
-    text = statement if isinstance(statement, str) else f"{statement[0].text()} == {statement[1].text()}"
+    check_wider(precision)
+    if whole(states, "states") < 1:
+        raise _core.EvaluationError(f"states is {states}: a statement is checked at one state at least")
+    _check_seed(seed)
+    if isinstance(statement, (tuple, list)) and len(statement) == 2 and all(hasattr(side, "text") for side in statement):
+        text = f"{statement[0].text()} == {statement[1].text()}"
+    elif isinstance(statement, str):
+        text = statement
+    else:
+        raise _core.EvaluationError(f"check takes a statement as text or a pair of expressions, not {statement!r:.80}")
+    operators: Any = None if model is None else getattr(model, "soa", model)
+    if model is not None and not hasattr(operators, "_source"):
+        raise _core.EvaluationError(f"a statement is checked on a model or its operators (model.soa), not on {model!r:.80}")
+    if isinstance(statement, str) and is_by_block(statement, [] if operators is None else [name for name, *_ in operators.V.blocks]):
+        return check_by_block(statement, operators, states=states, seed=seed, precision=precision)
     if model is None:
         if not isinstance(statement, str):
             raise _core.EvaluationError("expressions belong to one model: give text to check a statement on random trees")
         return _check_on_trees(text, states=states, seed=seed, search=search, precision=precision, budget=budget)
-    operators = model if not hasattr(model, "soa") else model.soa
     if isinstance(statement, str):
         read = Statements(operators).read(statement)
         if read.rhs is None:
@@ -232,7 +256,11 @@ def _explain(report: CheckReport, text: str, **options: Any) -> None:
     except (_core.EvaluationError, _core.SpaceError, _core.ModelError):
         report.notes.append("it cannot be read on random trees: no smaller counterexample was looked for")
     else:
-        report.true_where = saving(found, options.get("traits"))
+        if found is None:
+            spent = f"after {options['budget']:g} s of CPU time (budget={options['budget']:g})"
+            report.notes.append(f"the search for hypotheses under which it is true ended {spent}")
+        else:
+            report.true_where = saving(found, options.get("traits"))
 
 
 def run(read: Statement, operators: Any, states: int, seed: int, precision: str | int) -> Verdict:

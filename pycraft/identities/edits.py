@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
+from ..formula_nodes import parts
 from .formula import (
     Call,
     Formula,
@@ -21,7 +22,6 @@ from .formula import (
     Star,
     Sum,
     inverted,
-    parts,
     product,
     rebuilt,
     starred,

@@ -252,9 +252,9 @@ class Verdict:
 
     @property
     def verdict(self) -> str:
-        """ "fails" where it fails at a state, "holds" where it holds at all of them."""
+        """ "fails" where it fails at a state, "holds" where it holds at all of them, and there is one."""
         found = {j.verdict for j in self.judgements}
-        return FAILS if FAILS in found else UNDECIDED if UNDECIDED in found else HOLDS
+        return FAILS if FAILS in found else HOLDS if found == {HOLDS} else UNDECIDED
 
     @property
     def states(self) -> int:

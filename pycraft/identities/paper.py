@@ -2,7 +2,9 @@ r"""The displayed equations of a LaTeX paper, each with its verdict: `pycraft ch
 
 Displays are ``\[ \]``, ``$$ $$`` and the environments of equation, align, gather, multline, eqnarray and their like. Rows are joined where
 one begins with a sign and chained where one begins with an equals sign: A = B = C is A = B and B = C. Macros that the paper defines are
-expanded. An equation that does not read as a statement of operators is listed with the reason, never left out.
+expanded, arguments such as ``(\theta, \dot\theta)`` behind an operator are left out. What is true under a standard hypothesis alone
+(J = 0, say) is told apart from what is false: papers say their hypotheses in words. An equation that does not read as a statement of
+operators is listed with the reason, never left out; one of operators whose spaces do not fit is false.
 """
 
 from __future__ import annotations
@@ -16,7 +18,8 @@ from typing import Any
 
 from .. import _core
 from .spelling import spelled
-from .vocabulary import ParseError
+from .tables import WIDTH, wrapped
+from .vocabulary import ParseError, SpacesError
 
 _ENVIRONMENTS = "equation|align|alignat|flalign|gather|multline|eqnarray|displaymath|math|dmath"
 _DISPLAY = re.compile(
@@ -29,31 +32,48 @@ _DEFINES = re.compile(
 )
 
 
+# What an operator depends on, behind its letter: (\theta), (\theta, \dot{\theta}), (q, \dot q).
+_ANGLE = r"(?:\\d?dot\s*(?:\{\s*(?:\\theta|q)\s*\}|\s(?:\\theta|q)|\\theta)|\\theta|q)"
+_ARGUMENTS = re.compile(rf"(?<=[A-Za-z}}\])])\s*(?:\\left)?\(\s*{_ANGLE}(?:\s*,\s*{_ANGLE})*\s*(?:\\right)?\)")
+
+HOLDS, TRUE_WHERE, FAILS, UNDECIDED, NOT_READ = "holds", "true where", "fails", "undecided", "not read"
+
+
 @dataclass
 class Equation:
-    """One statement of a paper: `verdict` is "holds", "fails" or "undecided", or "not read", with the reason in `note`."""
+    """One statement of a paper.
+
+    `verdict` is "holds", "fails", "undecided" or "not read", or "true where", with the hypotheses in `where`. `understood` is how it was
+    read, `note` what else is to be said: the smallest counterexample, the reason why it was not read.
+    """
 
     line: int
     latex: str
     verdict: str
     understood: str = ""
     note: str = ""
+    where: str = ""
+
+    @property
+    def headline(self) -> str:
+        """The verdict with its hypotheses."""
+        return f"{self.verdict} {self.where}" if self.where else self.verdict
 
 
 @dataclass
 class PaperReport:
-    """The equations of one file, in order. True if all that was read holds and something was read."""
+    """The equations of one file, in order. True if something was read, and all of that holds or is true under hypotheses that are told."""
 
     path: str
     equations: list[Equation]
 
     def __bool__(self) -> bool:
-        return any(e.verdict == "holds" for e in self.equations) and not any(e.verdict in ("fails", "undecided") for e in self.equations)
+        return bool({HOLDS, TRUE_WHERE} & {*self.counts}) and not {FAILS, UNDECIDED} & {*self.counts}
 
     @property
     def status(self) -> int:
-        """Exit status of a command: 0 if all that was read holds, 1 if something fails or nothing was read, 3 if something is undecided."""
-        return 0 if self else 3 if "undecided" in self.counts and "fails" not in self.counts else 1
+        """Exit status of a command: 0 if true as a condition, 1 if something fails or nothing was read, 3 if something is undecided."""
+        return 0 if self else 3 if UNDECIDED in self.counts and FAILS not in self.counts else 1
 
     @property
     def counts(self) -> dict[str, int]:
@@ -63,7 +83,12 @@ class PaperReport:
         return found
 
     def summary(self) -> str:
-        parts = [f"{self.counts[verdict]} {verdict}" for verdict in ("fails", "undecided", "holds", "not read") if verdict in self.counts]
+        told: dict[str, int] = {}
+        for verdict in (FAILS, UNDECIDED, TRUE_WHERE, HOLDS, NOT_READ):
+            for e in self.equations:
+                if e.verdict == verdict:
+                    told[e.headline] = told.get(e.headline, 0) + 1
+        parts = [f"{count} {headline}" for headline, count in told.items()]
         return f"{self.path}: {len(self.equations)} equations" + (": " + ", ".join(parts) if parts else "; none is displayed")
 
     def to_json(self) -> str:
@@ -72,10 +97,10 @@ class PaperReport:
     def __repr__(self) -> str:
         lines = []
         for e in self.equations:
-            shown = e.understood or " ".join(e.latex.split())
-            lines.append(f"{self.path}:{e.line}: {e.verdict}: {shown}")
-            lines += [f"    {line}" for line in e.note.split("\n") if line.strip()]
-        return "\n".join([*lines, self.summary()])
+            lines.append(wrapped(f"{self.path}:{e.line}: {e.headline}: {' '.join(e.latex.split())}"))
+            notes = [f"  {note}" for note in e.note.split("\n") if note.strip()]
+            lines += [note if len(note) <= WIDTH else wrapped(note) for note in notes]
+        return "\n".join([*lines, wrapped(self.summary())])
 
 
 def check_paper(
@@ -85,6 +110,7 @@ def check_paper(
     states: int = 20,
     seed: int = 0,
     search: bool = True,
+    precision: str | int = "extended",
     progress: Callable[[str], None] | None = None,
 ) -> PaperReport:
     """Check every displayed equation of a LaTeX file numerically.
@@ -93,22 +119,28 @@ def check_paper(
     ----------
     path : a LaTeX file, UTF-8; files that it includes are not followed
     model : Multibody or OperatorSet; random trees of all hinge kinds where left out
-    states, seed, search : as `pycraft.check` has them
+    states, seed, search, precision : as `pycraft.check` has them
     progress : called with the line of each equation, if given
 
     Raises
     ------
     ModelError
         No file of that name, or it is not text in UTF-8.
+    EvaluationError
+        No such precision, or none that is wider than double.
     """
-    from .checker import check
+    from .checker import check, check_wider
 
+    def checked(text: str) -> Any:
+        return check(text, model, states=states, seed=seed, search=search, precision=precision)
+
+    check_wider(precision)
     source = _read(Path(path))
     found: list[Equation] = []
     for line, latex in equations(source):
         if progress is not None:
             progress(f"line {line}")
-        found += _judged(line, latex, lambda text: check(text, model, states=states, seed=seed, search=search))
+        found += _judged(line, latex, checked, model is None)
     return PaperReport(str(path), found)
 
 
@@ -121,22 +153,32 @@ def _read(path: Path) -> str:
         raise _core.ModelError(f"{path}: {error.strerror or error}") from None
 
 
-def _judged(line: int, latex: str, check: Callable[[str], Any]) -> Iterator[Equation]:
-    """One equation for each equals sign of a row."""
+def _judged(line: int, latex: str, check: Callable[[str], Any], on_trees: bool) -> Iterator[Equation]:
+    """One equation for each equals sign of a row. A model of one's own meets its hypotheses or does not; random trees do both."""
+    from .truth import in_words
+
     sides = [side.strip() for side in _EQUALS.split(latex)]
     if len(sides) < 2:
-        yield Equation(line, latex, "not read", note="it has no equals sign")
+        yield Equation(line, latex, NOT_READ, note="  it has no equals sign")
         return
     for lhs, rhs in zip(sides, sides[1:], strict=False):
         text = f"{lhs} = {rhs}"
         try:
             report = check(text)
+        except SpacesError as error:
+            yield Equation(line, text, FAILS, note="  spaces do not fit\n" + str(error).split("\n", 1)[-1])
+        except _core.SpaceError as error:  # of a statement by block
+            yield Equation(line, text, FAILS, note=f"  spaces do not fit\n  {error}")
         except ParseError as error:
-            yield Equation(line, text, "not read", note=str(error).split("\n", 1)[-1])
+            yield Equation(line, text, NOT_READ, note=str(error).split("\n", 1)[-1])
         except _core.Error as error:
-            yield Equation(line, text, "not read", note=str(error))
+            yield Equation(line, text, NOT_READ, note=f"  {error}")
         else:
-            yield Equation(line, text, report.verdict, note="" if report.verdict == "holds" else repr(report).split("\n", 1)[-1])
+            where = ", or where ".join(map(in_words, report.true_where)) if report.verdict == FAILS and on_trees else ""
+            details = report.details()
+            if report.verdict == HOLDS or where:
+                details = [detail for detail in details if detail.startswith("  read as")]
+            yield Equation(line, text, TRUE_WHERE if where else report.verdict, report.understood, "\n".join(details), where)
 
 
 # ------------------------------------------------------------------ LaTeX
@@ -179,6 +221,7 @@ def _plain(row: str) -> str:
     """A row without what numbers, labels and sets it, and without the point that ends its sentence."""
     row = re.sub(r"\\(label|tag\*?|notag|nonumber|intertext|shortintertext)\s*(\{[^{}]*\})?", " ", row)
     row = re.sub(r"\\(begin|end)\{(split|aligned|gathered|subequations)\}(\[[^\]]*\])?", " ", row)
+    row = _ARGUMENTS.sub("", row)
     return row.replace("&", " ").strip()
 
 
@@ -228,5 +271,6 @@ def _expanded(row: str, macros: dict[str, tuple[int, str]]) -> str:
             argument = _braced(row, end) if row[end : end + 1] == "{" else row[end : end + 1]
             end += len(argument) + (2 if row[end : end + 1] == "{" else 0)
             body = body.replace(f"#{k + 1}", argument)
-        row = row[: match.start()] + (f"{{{body}}}" if count == 0 and not body.startswith("\\operatorname") else body) + row[end:]
+        raised = row[: match.start()].rstrip().endswith(("^", "_"))  # what is raised is one group
+        row = row[: match.start()] + (f"{{{body}}}" if raised else body) + row[end:]
     return row

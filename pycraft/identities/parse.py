@@ -14,13 +14,13 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from numbers import Real
 from typing import Any
 
 from .. import _core
+from .block_reading import refuse_by_block
 from .book import read_book
 from .spelling import Spelled, spelled
-from .vocabulary import FUNCTIONS, WITH_ARGUMENTS, Misread, ParseError, Vocabulary, decimal, power
+from .vocabulary import FUNCTIONS, WITH_ARGUMENTS, Misread, ParseError, SpacesError, Vocabulary, decimal, is_number, power
 
 __all__ = ["ParseError", "Statement", "Statements", "check_has_space"]
 
@@ -52,24 +52,27 @@ class Statements:
         Raises
         ------
         ParseError
-            Nothing fits (the reasons of both readings are shown), or both do.
+            Nothing fits (the reasons of both readings are shown), or both do. SpacesError where only the spaces do not fit.
         """
+        refuse_by_block(text, self._vocabulary.own)
         found: list[Statement] = []
         reasons: dict[str, str] = {}
-        place = ""
+        place, misfits = "", False
         source = spelled(text)
         for reading in ("Python", "the book"):
             try:
                 found.append(self._read(source, text, reading))
             # The core's errors of names, spaces and models are TypeErrors and ValueErrors; what Python finds wrong reads no better.
             except (TypeError, ValueError, AttributeError, ArithmeticError, RecursionError) as error:
-                reasons[reading] = str(error)
+                reasons[reading] = "it divides by zero" if isinstance(error, ZeroDivisionError) else str(error)
+                misfits = misfits or isinstance(error, _core.SpaceError) and not isinstance(error, _NoSpaceError)
                 place = error.place(source) if isinstance(error, Misread) else ""
         if not found:
             if not _looks_like_python(source.text) or reasons["Python"] == reasons["the book"]:
                 del reasons["Python"]
             why = "\n".join(f"  read as {reading}: {reason}" if len(reasons) == 2 else f"  {reason}" for reading, reason in reasons.items())
-            raise ParseError(f"{text!r} does not read as a statement of operators.\n{why}{place}")
+            kind = SpacesError if misfits else ParseError
+            raise kind(f"{text!r} does not read as a statement of operators.\n{why}{place}")
         first = found[0]
         if len(found) == 2 and not (_same(first.lhs, found[1].lhs) and _same(first.rhs, found[1].rhs)):
             shown = "\n".join(f"  {s.reading}: {_text(s.lhs)} = {_text(s.rhs)}" for s in found)
@@ -184,12 +187,12 @@ def _text(side: Any) -> str:
 def _balance(side: Any, other: Any) -> Any:
     """0 and I take the spaces of the other side; numbers beside a scalar become scalars."""
     if getattr(other, "domain", None) is not None:
-        if isinstance(side, Real) and side == 0:
+        if is_number(side) and side == 0:
             return _core.zero(other.domain, other.codomain)
         if isinstance(side, _core.Operator) and side.domain is None:
             own = _core.identity(other.domain)
             return own if side.kind == "identity" else side @ own
-    if isinstance(other, _core.Scalar) and isinstance(side, Real):
+    if isinstance(other, _core.Scalar) and is_number(side):
         return _core.scalar(side)
     return side
 
@@ -208,7 +211,18 @@ def _check_same_spaces(lhs: Any, rhs: Any) -> None:
         raise ParseError("a statement about numbers alone")
 
 
+def as_text(statement: Any) -> str:
+    """A statement that is given as text. EvaluationError where it is none."""
+    if not isinstance(statement, str):
+        raise _core.EvaluationError(f"a statement is text, such as 'ψ⁻¹ = φ⁻¹ + KH', not {statement!r:.80}")
+    return statement
+
+
+class _NoSpaceError(_core.SpaceError):
+    """Neither side says on which space its I acts."""
+
+
 def check_has_space(lhs: _core.Operator, rhs: _core.Operator) -> None:
     """Raises where neither side says on which space its I acts."""
     if lhs.domain is None and rhs.domain is None:
-        raise _core.SpaceError(f"{lhs.text()} = {rhs.text()} is said of no space: an I takes its space from an operator beside it")
+        raise _NoSpaceError(f"{lhs.text()} = {rhs.text()} is said of no space: an I takes its space from an operator beside it")

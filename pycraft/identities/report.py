@@ -14,7 +14,8 @@ OPEN = ("fails", "undecided", "undefined")
 """Verdicts that say that something is wrong, or not known."""
 SHOWN = 1e-6
 """Of what holds no residual is shown whose bound is larger."""
-PASSED = ("holds", "expected to fail", "holds anyway", "waiting", "undefined")
+PASSED = ("holds", "expected to fail", "holds anyway", "waiting")
+"""Verdicts that say that nothing is wrong; only the first says that something was shown."""
 
 
 @dataclass
@@ -68,9 +69,10 @@ class Finding:
 class Report:
     """The findings on one model.
 
-    As a condition: true if all that should hold does, false if something fails that should hold; UndecidedError where nothing fails and
-    something is undecided. `.status` says the same as an exit status, 0, 1 or 3. Printed, it is the summary and the exceptions;
-    `.full()` has every theorem.
+    As a condition: true if all that should hold does, false if something fails that should hold, or is undefined, or if nothing holds
+    at all: what was not shown is not true; UndecidedError where nothing fails and something is undecided. `.status` says the same as an
+    exit status, 0, 1 (something fails) or 3 (something was not shown). Printed, it is the summary and the exceptions; `.full()` has every
+    theorem.
     """
 
     model: str
@@ -81,12 +83,12 @@ class Report:
     def __bool__(self) -> bool:
         if self.undecided and not self.failed:
             raise UndecidedError(f"{self.model}: undecided in every precision tried: {', '.join(f.name for f in self.undecided)}")
-        return not self.failed
+        return self.status == 0
 
     @property
     def status(self) -> int:
-        """0 where all that should hold does, 1 where something fails, 3 where nothing fails and something is undecided."""
-        return 1 if self.failed else 3 if self.undecided else 0
+        """0 where all that should hold does, 1 where something fails, 3 where nothing fails and something was not shown, or nothing was."""
+        return 1 if self.failed else 3 if self.undecided or self.undefined or not self._held else 0
 
     @property
     def worst(self) -> float:
@@ -99,11 +101,16 @@ class Report:
 
     @property
     def failed(self) -> list[Finding]:
-        return [f for f in self.findings if not f.passed and f.verdict != UNDECIDED]
+        return [f for f in self.findings if f.verdict == FAILS]
 
     @property
     def undecided(self) -> list[Finding]:
         return [f for f in self.findings if f.verdict == UNDECIDED]
+
+    @property
+    def undefined(self) -> list[Finding]:
+        """What should hold, and asks for an inverse that does not exist on the model."""
+        return [f for f in self.findings if f.verdict == UNDEFINED]
 
     def counts(self) -> dict[str, int]:
         counts: dict[str, int] = {}
@@ -172,8 +179,9 @@ class Report:
                 f"<td style='text-align:left'>{escape(', '.join(f.hypotheses))}</td>{numbers}"
                 f"<td style='text-align:left;color:{color[f.verdict]}'>{f.verdict}{note}</td></tr>"
             )
-        head = "<tr><th>theorem</th><th>hypotheses</th><th>double</th><th>decided</th><th>bound</th><th>verdict</th></tr>"
-        return f"<p><b>{escape(self.summary())}</b></p><table style='font-size:85%'>{head}{''.join(rows)}</table>"
+        left = "<th style='text-align:left'>"
+        head = f"<tr>{left}theorem</th>{left}hypotheses</th><th>double</th><th>decided</th><th>bound</th>{left}verdict</th></tr>"
+        return f"<p><b>{escape(self.summary()).replace(chr(10), '<br>')}</b></p><table style='font-size:85%'>{head}{''.join(rows)}</table>"
 
 
 @dataclass
@@ -243,8 +251,12 @@ class CheckReport:
         return f"FALSE, also where {in_words(met)}" if met else "FALSE"
 
     def __repr__(self) -> str:
+        return "\n".join([*map(wrapped, monospace(self.statement).split("\n")), *self.details()])
+
+    def details(self) -> list[str]:
+        """What the report says below the statement, line by line."""
         on = self.models[0] if len(self.models) == 1 else f"{len(self.models)} models"
-        lines = [monospace(self.statement), *read_as(self.statement, self.understood)]
+        lines = read_as(self.statement, self.understood)
         if self.verdict == FAILS:
             lines.append(f"  {self._headline()}")
             lines.append(f"  relative residual {self.worst:.1e} in double; in {self._decisive()}")
@@ -256,4 +268,4 @@ class CheckReport:
             narrow = f"; in double {self.worst:.1e}" if self.worst <= self.bound <= SHOWN else ""
             lines.append(f"  in {self._decisive()}{narrow}")
         lines += [f"  {note}" for note in self.notes]
-        return "\n".join(wrapped(line) if len(line) > WIDTH else line for part in lines for line in part.split("\n"))
+        return [wrapped(line) if len(line) > WIDTH else line for part in lines for line in part.split("\n")]

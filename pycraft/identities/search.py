@@ -11,21 +11,21 @@ from __future__ import annotations
 
 import itertools
 import re
-import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from numbers import Real
 from typing import Any
 
 import numpy as np
 
 from .. import _core
 from ..models.state import State
+from .budget import Budget
 from .family import DOF, HYPOTHESES, Spec, family, named_vectors, read_on
 from .judge import FAILS, BoundState, Verdict, judge, ladder
 from .parse import Statement
 from .tables import wrapped
+from .vocabulary import is_number
 
 __all__ = ["Counterexample", "named_vectors", "refutation", "smallest", "statement_text"]
 
@@ -97,7 +97,9 @@ class Counterexample:
         ]
         that = f" that meets {', '.join(h for h in HYPOTHESES if h in self.meets)}" if self.meets else ""
         counted = f"{self.tried} models, {self.states} states each"
-        if self.exhausted:
+        if self.exhausted and not self.tried:
+            lines.append(f"  no tree with a choice of hinge kinds{that} is smaller")
+        elif self.exhausted:
             lines += [f"  every smaller tree shape and choice of hinge kinds{that} was tried:", f"  {counted}"]
         else:
             lines.append("  no body of it can be left out and no hinge made simpler;")
@@ -114,7 +116,7 @@ def statement_text(read: Statement) -> str:
 
 def _side_text(side: Any) -> str:
     """A side as text; doubles that are not the decimals that they are written as by their ratios."""
-    if isinstance(side, Real):
+    if is_number(side):
         return str(Fraction(side))
     in_python = isinstance(side, _core.Operator)
 
@@ -201,13 +203,13 @@ def shrunk(
     found: Counterexample,
     allowed: Callable[[Spec], bool],
     precision: str | int,
-    deadline: float,
+    budget: Budget,
     states: int = STATES,
     vectors: Mapping[str, str] | None = None,
 ) -> Counterexample:
     """A refutation of which nothing can be taken away, among the models that are allowed."""
     smaller = True
-    while smaller and time.perf_counter() < deadline:
+    while smaller and not budget.over:
         smaller = False
         for spec in _smaller(found.spec):
             if not any(map(DOF.get, spec.kinds)) or not allowed(spec):
@@ -216,7 +218,7 @@ def shrunk(
             if again is not None:
                 found, smaller = again, True
                 break
-            if time.perf_counter() > deadline:
+            if budget.over:
                 break
     return found
 
@@ -261,13 +263,13 @@ def smallest(
     *,
     seed: int = 0,
     precision: str | int = "extended",
-    budget: float = 20.0,
+    budget: float = 5.0,
     found: Counterexample | None = None,
     meets: frozenset[str] = frozenset(),
     allowed: Callable[[Spec], bool] | None = None,
     vectors: Mapping[str, str] | None = None,
 ) -> Counterexample | None:
-    """The smallest refutation by (bodies, degrees of freedom), or None if none was found within the budget (seconds).
+    """The smallest refutation by (bodies, degrees of freedom), or None if none was found within the budget (CPU seconds).
 
     Parameters
     ----------
@@ -279,23 +281,22 @@ def smallest(
     """
     if not {"Θ", "V", "F"}.issuperset((vectors or {}).values()):
         return None
-    deadline = time.perf_counter() + budget
+    whole = Budget(budget)
 
     def fits(spec: Spec) -> bool:
         return meets <= spec.met and (allowed is None or allowed(spec))
 
     if found is None:
-        found = next(
-            (r for spec in family(1) if fits(spec) and (r := refutation(text, spec, precision, vectors=vectors)) is not None), None
-        )
+        tries = (spec for spec in family(1) if not whole.over and fits(spec))
+        found = next((r for spec in tries if (r := refutation(text, spec, precision, vectors=vectors)) is not None), None)
     if found is not None:
-        found = shrunk(text, found, fits, precision, time.perf_counter() + budget / 2, vectors=vectors)
+        found = shrunk(text, found, fits, precision, Budget(budget / 2), vectors=vectors)
     limit = (4, 24) if found is None else found.spec.size
     tried, first, complete = 0, None, True
     for spec in candidates(limit[0]):
         if (*spec.size, spec.rotor_inertia) >= (*limit, found is not None and found.rotor_inertia):
             break
-        if time.perf_counter() > deadline:
+        if whole.over:
             complete = False
             break
         if not fits(spec):

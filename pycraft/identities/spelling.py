@@ -110,6 +110,7 @@ _LAYOUT = _rules(
         (r"\\(?:cdot|times|circ|ast(?=\s*[A-Za-z\\(\[]))(?![A-Za-z])", "·"),
         (r"\\(?:ast|star)(?![A-Za-z])", "*"),
         (r"\\(?:top|intercal|prime)(?![A-Za-z])", "ᵀ"),
+        (r"\\(?:\||[lr]?Vert(?![A-Za-z]))", "‖"),
         (r"\\sqrt\s*\{", "√{"),
         (r"\\sqrt(?![A-Za-z{])", "√"),
     ]
@@ -123,7 +124,7 @@ _GREEK = {
     "Lambda": "Λ", "Delta": "Δ", "varUpsilon": "Υ", "varOmega": "Ω", "varLambda": "Λ", "varDelta": "Δ",
 }  # fmt: skip
 # Letters that another font makes another operator. 𝒱 alone is the velocity V; 𝒱 under an accent Ṽ or V̄.
-_SCRIPT = {"mathcal M": "ℳ", "mathscr M": "ℳ", "mathscr B": "𝓑", "mathcal J": "𝒥", "mathscr J": "𝒥"}
+_SCRIPT = {"mathcal M": "ℳ", "mathscr M": "ℳ", "mathscr B": "𝓑", "mathcal J": "𝒥", "mathscr J": "𝒥", "mathbb 1": "I", "mathbf 1": "I"}
 _ACCENTS = {"tilde": "\u0303", "widetilde": "\u0303", "bar": "\u0304", "overline": "\u0304", "dot": "\u0307"}
 
 
@@ -236,6 +237,7 @@ _NAMES = _rules(
         ),
         ("|".join(map(re.escape, _SIGNS)), lambda m: _SIGNS[m[0]]),
         (r":=", "="),
+        (r"‖([^‖]*)‖|\|\|([^|]*)\|\|", lambda m: f" norm({m[1] or m[2]}) "),
         *((_no_combining(letter), name) for letter, name in _LETTERS),
         (r"(?<![A-Za-z_])(?:ln|log)\s*\|\s*det\s*(\([^|]*\)|\[[^|]*\]|[^|]*)\|", lambda m: f" logdet({m[1]}) "),
         (r"(?<![A-Za-z_])(?:ln|log)\s*(?:\(\s*det\s*\(([^()]*)\)\s*\))", r" logdet(\1) "),

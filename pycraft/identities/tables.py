@@ -68,6 +68,7 @@ def precision_text(precision: str | int) -> str:
 
 def findings_table(findings: Sequence[Any]) -> Any:
     """Theorems by group: statement, the residual and bound that decided and in which precision, the verdict."""
+    from rich.padding import Padding
     from rich.table import Table
     from rich.text import Text
 
@@ -80,19 +81,19 @@ def findings_table(findings: Sequence[Any]) -> Any:
         if f.group != group:
             group = f.group
             table.add_row(Text(monospace(group), style="bold underline"))
-        statement = Text("  " + monospace(f.statement).replace("\n", " "))
+        statement = Text(monospace(f.statement).replace("\n", " "))
         if f.unmet:
-            statement.append(f"\n  needs {', '.join(f.unmet)}", style="dim")
+            statement.append(f"\nneeds {', '.join(f.unmet)}", style="dim")
         elif f.verdict == "waiting":
-            statement.append(f"\n  waits for {f.note}", style="dim")
+            statement.append(f"\nwaits for {f.note}", style="dim")
         elif f.note and f.verdict != "holds":
-            statement.append(f"\n  {monospace(f.note)}", style="dim")
+            statement.append(f"\n{monospace(f.note)}", style="dim")
         verdict = Text(f.verdict, style=STYLES[f.verdict])
         if f.states:
             numbers = (f"{f.wide_residual:.1e}", f"{f.wide_bound:.0e}", precision_text(f.wide_precision))
         else:
             numbers = ("", "", "no inverse" if f.verdict in ("expected to fail", "undefined") else "")
-        table.add_row(statement, *numbers, verdict)
+        table.add_row(Padding(statement, (0, 0, 0, 2)), *numbers, verdict)  # set in where it goes on, too: a heading is not
     return table
 
 

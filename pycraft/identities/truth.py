@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -10,9 +11,10 @@ from html import escape
 from typing import Any
 
 from .. import _core
+from .budget import Budget
 from .family import CELLS, CONSTANT, EVERY, HYPOTHESES, ONE, WITH_J, Cell, family, nilpotency, read_on, specs
 from .judge import FAILS, HOLDS, UNDECIDED
-from .parse import Statements
+from .parse import Statements, as_text
 from .search import Counterexample, judged, smallest, understood
 from .tables import STYLES, monospace, read_as, text_of, wrapped
 
@@ -164,7 +166,7 @@ def truth(
     statement : as text, see `check`. Names are those of random trees: "body0", "hinge0", "node0", ...
     smallest_case : look for the smallest case in each false cell
     precision : the first scalar beside double
-    budget : seconds for the smallest cases, of all cells together
+    budget : CPU seconds for the smallest cases, of all cells together
     vectors : names of the vectors in the text, and of their spaces, "Θ", "V" or "F"
 
     Returns
@@ -184,15 +186,16 @@ def truth(
     'TRUE where J = 0'
     """
     begin = time.perf_counter()
-    depth = depth_for(statement, vectors)
-    cells = [_cell_truth(statement, cell, depth, precision, vectors) for cell in CELLS]
-    false = [c for c in cells if c.example is not None]
-    deadline = time.perf_counter() + budget
+    made = truth_within(as_text(statement), Budget(math.inf), precision, vectors)
+    assert made is not None
+    false = [c for c in made.cells if c.example is not None]
+    whole = Budget(budget)
     for i, found in enumerate(false if smallest_case else []):
-        left = max(0.0, deadline - time.perf_counter()) / (len(false) - i)
+        left = whole.left / (len(false) - i)
         only: dict[str, Any] = dict(meets=found.cell.least, allowed=found.cell.holds, vectors=vectors)
         found.example = smallest(statement, precision=precision, budget=left, found=found.example, **only)
-    return TruthMap(statement, cells, time.perf_counter() - begin, understood(statement))
+    made.seconds = time.perf_counter() - begin
+    return made
 
 
 def depth_for(statement: str, vectors: Mapping[str, str] | None = None) -> int:
@@ -222,10 +225,28 @@ def _refusal(statement: str, model: Any) -> Exception | None:
     return None
 
 
-def _cell_truth(statement: str, cell: Cell, depth: int, precision: str | int, vectors: Mapping[str, str] | None) -> CellTruth:
-    """The models of a cell up to the first that refutes."""
+def truth_within(
+    statement: str, budget: Budget, precision: str | int = "extended", vectors: Mapping[str, str] | None = None
+) -> TruthMap | None:
+    """The truth map without smallest cases; None where the budget ends first."""
+    begin = time.perf_counter()
+    depth, cells = depth_for(statement, vectors), []
+    for cell in CELLS:
+        found = _cell_truth(statement, cell, depth, precision, vectors, budget)
+        if found is None:
+            return None
+        cells.append(found)
+    return TruthMap(statement, cells, time.perf_counter() - begin, understood(statement))
+
+
+def _cell_truth(
+    statement: str, cell: Cell, depth: int, precision: str | int, vectors: Mapping[str, str] | None, budget: Budget
+) -> CellTruth | None:
+    """The models of a cell up to the first that refutes; None where the budget ends before."""
     found = []
     for spec in specs(cell, depth):
+        if budget.over:
+            return None
         verdict = judged(statement, spec, 1, precision, vectors)
         if verdict is None:
             continue
@@ -257,20 +278,20 @@ def explained(
     found: Counterexample | None = None,
     traits: Callable[[], dict[str, bool]] | None = None,
     vectors: Mapping[str, str] | None = None,
-) -> tuple[TruthMap, Counterexample | None]:
+) -> tuple[TruthMap | None, Counterexample | None]:
     """(the truth map of a false statement, the case that tells most): the smallest of all where a hypothesis saves it; else the
     smallest that meets all hypotheses under which it still fails, so that it is not blamed on what the true formula does not hold for
-    either."""
-    found_map = truth(statement, smallest_case=False, precision=precision, vectors=vectors)
-    saved = saving(found_map, traits)
+    either. No map where it takes more than the budget, CPU seconds for each of the two."""
+    found_map = truth_within(statement, Budget(budget), precision, vectors)
+    saved = saving(found_map, traits) if found_map is not None else []
     start: Counterexample | None = found
     meets: frozenset[str] = frozenset()
-    if not saved:
+    if found_map is not None and not saved:
         false = [c for c in found_map.cells if c.verdict == FALSE]
         strict = [c for c in false if STRICTEST <= c.cell.least] or sorted(false, key=lambda c: -len(c.cell.least))[:1]
         if strict:
             start, meets = strict[0].example, strict[0].cell.least
-    if start is None:
+    if start is None and found_map is not None:
         start = next((c.example for c in found_map.cells if c.example is not None), None)
     example = smallest(statement, seed=seed, precision=precision, budget=budget, found=start, meets=meets, vectors=vectors)
     if example is not None:

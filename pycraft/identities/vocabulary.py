@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from difflib import get_close_matches
 from fractions import Fraction
 from numbers import Real
-from typing import Any
+from typing import Any, TypeGuard
 
 from .. import _core
 from .directions import COORDINATES, along, coordinates_meant
@@ -46,6 +46,10 @@ class ParseError(_core.EvaluationError):
     """A statement that cannot be read, or that can be read in two ways."""
 
 
+class SpacesError(ParseError):
+    """A statement of operators whose spaces do not fit: it cannot be true, on any model."""
+
+
 class Misread(ParseError):
     """What one reading stumbles over, at character `at` of the spelled text."""
 
@@ -71,6 +75,11 @@ class Vocabulary:
         self._own = {"MM": H @ phi @ M @ phi.T @ H.T, "I": operators.I, "N": operators.Theta.dimension}
         self._own |= {"vdot": _core.vector("vdot", operators.Theta), **(extra or {})}
         self._operators = operators
+
+    @property
+    def own(self) -> set[str]:
+        """Names that are not the table's."""
+        return {*self._own}
 
     @property
     def names(self) -> set[str]:
@@ -103,7 +112,7 @@ class Vocabulary:
         if name == "det":
             return "a determinant is read by its logarithm: ln det A"
         if name.startswith("\\"):
-            return f"the command {name} is not known here"
+            return f"the command {name.partition('_')[0]} is not known here"
         near = get_close_matches(name, [*self.names, *WITH_ARGUMENTS, *FUNCTIONS], cutoff=0.7)
         return f"no operator is called {name!r}" + (f"; the nearest names are {', '.join(near)}" if near else "")
 
@@ -126,6 +135,11 @@ def decimal(text: str) -> Fraction:
     return Fraction(text)
 
 
+def is_number(x: object) -> TypeGuard[float | Fraction]:
+    """A real number and no scalar expression; NumPy's count."""
+    return isinstance(x, Real)
+
+
 def power(base: Any, exponent: Any) -> Any:
     """base to a whole power.
 
@@ -134,6 +148,6 @@ def power(base: Any, exponent: Any) -> Any:
     ParseError
         The exponent is no whole number, or beyond 1000.
     """
-    if not isinstance(exponent, Real) or not abs(exponent) <= LARGEST_POWER or exponent != int(exponent):
+    if not is_number(exponent) or not -LARGEST_POWER <= exponent <= LARGEST_POWER or exponent != int(exponent):
         raise ParseError(f"a power is a whole number up to {LARGEST_POWER}")
     return base ** int(exponent)

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import _core
+from .export import PinocchioModel
 from .twins import MuJoCoTwin, OwnTwin, PinocchioTwin, Twin
 
 QUANTITIES = ("mass matrix", "inverse dynamics", "forward dynamics")
@@ -44,7 +45,7 @@ class ModelComparison:
     bounds: dict[str, float] = field(default_factory=dict)
 
     def __bool__(self) -> bool:
-        return all(self.in_common[name] <= self.bounds[name] for name in self.in_common)
+        return bool(self.in_common) and all(self.in_common[name] <= self.bounds[name] for name in self.in_common)
 
     @property
     def worst(self) -> float:
@@ -76,7 +77,8 @@ def compare(model: Any, other: Any, *, states: int = 5, seed: int = 0, root: str
     Parameters
     ----------
     model : Multibody
-    other : a `pinocchio.Model`, a `mujoco.MjModel`, another Multibody, or the path of a URDF or MJCF file
+    other : a `pinocchio.Model` (also as `interop.export.to_pinocchio` gives it), a `mujoco.MjModel`, another Multibody, or the path of a
+        URDF or MJCF file
     states : random states, drawn from `seed`
     root : "fixed" or "free", of a file; as `model` has it where left out
 
@@ -99,6 +101,8 @@ def compare(model: Any, other: Any, *, states: int = 5, seed: int = 0, root: str
     >>> print(pc.compare(arm, other).differences[0].text)
     (0, 0, 0) here, (0, -9.81, 0) there
     """
+    if not hasattr(model, "forward_dynamics") or not hasattr(model, "hinges"):
+        raise _core.ModelError(f"compare's first model is a Multibody, not {type(model).__name__}")
     twin = _twin(model, other, root)
     rng = np.random.default_rng(seed)
     drawn = [model.random_state(rng) for _ in range(states)]
@@ -121,6 +125,8 @@ def _twin(model: Any, other: Any, root: str | None) -> Twin:
         return OwnTwin(model, load(other, root=root or ("free" if free else "fixed")))
     if hasattr(other, "forward_dynamics") and hasattr(other, "hinges"):
         return OwnTwin(model, other)
+    if isinstance(other, PinocchioModel):
+        other = other.model
     package = type(other).__module__.split(".")[0]
     if package == "pinocchio":
         return PinocchioTwin(model, other)
@@ -201,6 +207,8 @@ def _compare_at(result: ModelComparison, model: Any, common: Any, twin: Twin, st
 
 
 def _relative(a: np.ndarray, b: np.ndarray) -> float:
+    if not (np.isfinite(a).all() and np.isfinite(b).all()):
+        return float("inf")
     scale = max(np.abs(a).max(initial=0.0), np.abs(b).max(initial=0.0))
     return float(np.abs(a - b).max(initial=0.0) / scale) if scale > 0 else 0.0
 

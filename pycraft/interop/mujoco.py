@@ -12,7 +12,9 @@ base, as MuJoCo has them nowhere else.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -38,7 +40,10 @@ def compiled(path: str) -> Any:
     try:
         return mujoco.MjSpec.from_file(path).compile()
     except ValueError as error:
-        raise _core.ModelError(f"{path}: MuJoCo refuses the file: {' '.join(str(error).split())}") from None
+        said = " ".join(str(error).split())
+        found = re.search(r", line (\d+)$", said)
+        whole = found is not None and b"<include" not in Path(path).read_bytes()  # or the line may be another file's
+        raise _core.ModelError(f"{path}{f':{found[1]}' if found and whole else ''}: MuJoCo refuses the file: {said}") from None
 
 
 class _Free(NamedTuple):

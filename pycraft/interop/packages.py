@@ -17,5 +17,5 @@ def required(package: str, extra: str, what: str) -> Any:
     try:
         return import_module(package)
     except ImportError:
-        text = f"{what} the package {package}, which is not installed: pip install pycraft-soa[{extra}]"
+        text = f"{what} the package {package}, which is not installed: pip install 'pycraft-soa[{extra}]'"
         raise MissingPackageError(text) from None

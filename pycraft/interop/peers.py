@@ -51,7 +51,7 @@ def robot_files() -> list[Path]:
     for folder in [Path(p) for p in map(str, _prefixes(pinocchio))]:
         if (folder / "share" / "example-robot-data" / "robots").is_dir():
             return sorted((folder / "share" / "example-robot-data" / "robots").rglob("*.urdf"))
-    raise _core.ModelError("example-robot-data is not installed: pip install pycraft-soa[peers]")
+    raise _core.ModelError("example-robot-data is not installed: pip install 'pycraft-soa[peers]'")
 
 
 def _prefixes(module: Any) -> Iterator[Path]:

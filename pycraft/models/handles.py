@@ -243,7 +243,7 @@ class Named(Mapping):
     def __init__(self, names: Callable[[], Sequence[str]], make: Callable[[str], Any], find: Callable[[str], Any]):
         self._names, self._make, self._find = names, make, find
 
-    def __getitem__(self, name: str) -> Any:
+    def __getitem__(self, name: object) -> Any:
         if not isinstance(name, str):
             raise KeyError(f"by name, not by {name!r}")
         try:
@@ -254,7 +254,7 @@ class Named(Mapping):
 
     def __contains__(self, name: object) -> bool:
         try:
-            self[name]  # type: ignore[index]  # anything may be asked for
+            self.__getitem__(name)
         except KeyError:
             return False
         return True

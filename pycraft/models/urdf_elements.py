@@ -6,7 +6,7 @@ import difflib
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -110,11 +110,13 @@ class Elements:
         # In libxml2: to list the attributes of an element one by one takes time by the square of their number.
         macros = "//*[contains(name(), 'xacro') or contains(namespace-uri(), 'xacro')]"
         expressions = "//@*[contains(., '${') or contains(., '$(')]"
-        for found in self.file.root.xpath(f"({macros} | {expressions})[1]"):
-            if not isinstance(found, str):
-                raise self.file.error(found, f"<{local_name(found)}> is a xacro macro; {_EXPAND}")
-            element = found.getparent()
-            raise self.file.error(element, f'{label(element)}: {found.attrname}="{found}" is a xacro expression; {_EXPAND}')
+        found: list[Any] = self.file.root.xpath(f"({macros} | {expressions})[1]")
+        for macro in found:
+            if not isinstance(macro, str):
+                raise self.file.error(macro, f"<{local_name(macro)}> is a xacro macro; {_EXPAND}")
+            attribute: Any = macro  # a string that knows its element
+            element = attribute.getparent()
+            raise self.file.error(element, f'{label(element)}: {attribute.attrname}="{macro}" is a xacro expression; {_EXPAND}')
 
     def _named(self, kind: str, read: Callable[[str, Element], T]) -> Iterator[T]:
         """The root's elements of one kind, read one by one; ModelError where two have the same name."""
@@ -228,7 +230,7 @@ class Elements:
             raise self.file.error(ours, f"{label(element)}: <pycraft> has the attribute {unknown[0]!r}; there is rotor_inertia")
         values, count = self.file.numbers(ours, "rotor_inertia", None, element), _COORDINATES[hinge]
         if len(values) != count:
-            what = f"has {count} coordinates and {len(values)} rotor inertias; write one value per coordinate"
+            what = f"takes {count} rotor inerti{'a' if count == 1 else 'as'}, one for each coordinate, not {len(values)}"
             raise self.file.error(ours, f"{label(element)} {what}")
         return values
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Iterable
 from typing import TypeAlias
 
@@ -34,7 +35,10 @@ class XmlFile:
     """
 
     def __init__(self, path: str | os.PathLike[str]):
-        self.path = os.fsdecode(path)
+        try:
+            self.path = os.fsdecode(path)
+        except TypeError:
+            raise _core.ModelError(f"a model is loaded from the path of a file, not from {path!r:.80}") from None
         try:
             with open(self.path, "rb") as file:
                 data = file.read()
@@ -71,7 +75,9 @@ class XmlFile:
                 parser = etree.XMLParser(recover=True, **options)
                 return etree.fromstring(data, parser), parser
             line = f":{error.lineno}" if error.lineno else ""
-            raise _core.ModelError(f"{self.path}{line}: not well-formed XML: {error.msg}") from None
+            text = re.sub(r", line \d+, column (\d+)$", r", column \1", error.msg)
+            remedy = "; save the file in UTF-8, or declare its encoding in its first line" if "encoding" in text else ""
+            raise _core.ModelError(f"{self.path}{line}: not well-formed XML: {text}{remedy}") from None
 
     # ------------------------------------------------------------------ errors
     def at(self, element: Element) -> str:
@@ -182,7 +188,7 @@ class XmlFile:
         many = "numbers separated by blanks"
         wanted = "one number" if count == 1 else many if count is None else f"{count} {many}"
         if not words or count not in (None, len(words)):
-            return self.error(element, f'{where}="{value}" has {len(words)} values; write {wanted}')
+            return self.error(element, f'{where}="{value}" has {len(words)} value{"s" * (len(words) != 1)}; write {wanted}')
         word = next(word for word in words if math.isnan(_float(word)) or (math.isinf(_float(word)) and not infinite))
         if math.isinf(_float(word)) or word.strip("+-").lower() == "nan":
             return self.error(element, f'{where}="{value}": {word!r} is not a finite number; write {wanted}')

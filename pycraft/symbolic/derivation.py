@@ -15,6 +15,7 @@ from .axioms import replaced_everywhere, solved, theory
 from .derivative import TIME
 from .equations import Equation, Step, joined
 from .expand import Problem
+from .rules import COMPLIANCE
 from .walk import Walk
 from .words import (
     FIRST,
@@ -89,8 +90,8 @@ def derivative_of(equation: Equation, mark: str = FIRST) -> Equation:
 class Derivatives:
     """The lemmas on derivatives with one mark, by their text with ∂ for that mark, on the letters of one alphabet."""
 
-    def __init__(self, alphabet: Alphabet, mark: str = FIRST):
-        self.alphabet, self.mark = alphabet, mark
+    def __init__(self, alphabet: Alphabet, mark: str = FIRST, shown: str = ""):
+        self.alphabet, self.mark, self._shown = alphabet, mark, shown or mark
         for known in list(alphabet.letters.values()):
             self.add_letter(known)
         self._equations: dict[str, Equation] = {}
@@ -98,9 +99,10 @@ class Derivatives:
     def add_letter(self, known: Letter) -> None:
         """∂X of a letter X that is no second derivative."""
         if len(derivations(known.name)[0]) < 2:
-            name, partial = f"{self.mark}{known.name}", "\\partial_j" if self.mark == SECOND else "\\partial"
+            subscript = "" if self.mark == FIRST else "_j" if self._shown == SECOND else "_t"
+            name, partial = f"{self.mark}{known.name}", f"\\partial{subscript}"
             shape = "down" if known.shape == "unit" else known.shape
-            self.alphabet.add(Letter(name, f"{self.mark}{known.text}", f"{partial} {{{known.latex}}}", known.symmetric, shape))
+            self.alphabet.add(Letter(name, f"{self._shown}{known.text}", f"{partial} {{{known.latex}}}", known.symmetric, shape))
 
     def __call__(self, text: str) -> Equation:
         """The equation of this text: of derivatives, d(...), or of `axioms`."""
@@ -136,7 +138,7 @@ RuleOf = tuple[Equation, Word]
 
 
 class DerivativeProblem(Problem):
-    """A problem whose statement may hold derivatives along one or two coordinates, first and second ones, or along time."""
+    """A problem whose statement may hold derivatives along one or two coordinates, or along one and time, first and second ones."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -159,11 +161,11 @@ class DerivativeProblem(Problem):
         along = self.alphabet.along
         mark = next((m for m, known in along.items() if known == index), None)
         if mark is None:
-            if len(along) == 2 or along and TIME in (index, *along.values()):
-                raise _core.EvaluationError("a statement holds derivatives along two coordinates at most, or along time")
+            if len(along) == 2:
+                raise _core.EvaluationError("a statement holds derivatives along two coordinates at most, or along one and time")
             mark = SECOND if along else FIRST
             along[mark] = index
-            self._derivatives[mark] = Derivatives(self.alphabet, mark)
+            self._derivatives[mark] = Derivatives(self.alphabet, mark, "∂_t " if index == TIME and mark == SECOND else mark)
         return mark
 
     def derivative_rules(self) -> tuple[list[RuleOf], list[RuleOf]]:
@@ -181,8 +183,30 @@ class DerivativeProblem(Problem):
             first, under = self._first_rules(inner, deltas[inner])
             rules += [self._derived(rule, inner, outer) for rule in first]
             constant += [self._derived(rule, inner, outer) for rule in under]
-            rules += self._deltas_that_stay(deltas[inner], outer)
+            if TIME in self.alphabet.along.values():
+                constant += self._deltas_with_constant_axes(deltas[inner], outer)
+            else:
+                rules += self._deltas_that_stay(deltas[inner], outer)
         return rules[::-1], constant
+
+    def single_axis_rules(self) -> list[RuleOf]:
+        """Under "single-DOF hinges": Δ_θ̇Δ_i = Δ_iΔ_θ̇, at each body crosses of one axis; with stars as without."""
+        along = self.alphabet.along
+        if len(along) < 2 or TIME not in along.values():
+            return []
+        a, in_time = self.alphabet, next(m for m, index in along.items() if index == TIME)
+        T, D = self._delta(in_time), self._delta(next(m for m in along if m != in_time))
+        text = f"{a.word_text((T, D))} = {a.word_text((D, T))}"
+        return [(Equation("hypothesis", text, {(T, D): ONE}, {(D, T): ONE}, hypothesis="single-DOF hinges"), (T, D))]
+
+    def recursion_rules(self) -> list[RuleOf]:
+        """Of ∂Υ, where diagonal blocks are taken: E_φ*∂ΥE_φ by ∂Υ and ∂S, which has no blocks on the diagonal."""
+        text, word = next((text, word) for word, text in COMPLIANCE if word == "E_φ* Υ E_φ")
+        rules = []
+        for mark in self._derivatives:
+            at = tuple(f"{mark}{x}" if x == "Υ" else x for x in word.split())
+            rules.append((derivative_of(theory()(text), mark), at))
+        return rules
 
     def _first_rules(self, mark: str, delta: str) -> tuple[list[RuleOf], list[RuleOf]]:
         d, a = self._derivatives[mark], self.alphabet
@@ -228,9 +252,19 @@ class DerivativeProblem(Problem):
         text = f"{outer}{self.alphabet.letter_text(delta)} = 0, θ_i and θ_j one or of two hinges"
         return [(Equation("axiom", text, {(name,): ONE}, {}), (name,))]
 
+    def _deltas_with_constant_axes(self, delta: str, outer: str) -> list[RuleOf]:
+        """∂_tΔ_i = 0 and ∂_iΔ_θ̇ = 0 where the axes are constant in their bodies; ∂_iḢ = 0 follows from Ḣ = 0."""
+        found: list[RuleOf] = []
+        for name in (f"{outer}{delta}", f"{outer}Ḣ"):
+            known = self.alphabet.letters.get(name)
+            if known is not None:
+                found.append((Equation("hypothesis", f"{known.text} = 0", {(name,): ONE}, {}, hypothesis="constant H"), (name,)))
+        return found
+
     def _deltas_of_two_bodies(self, deltas: list[str]) -> list[RuleOf]:
         """Δ_iΔ_j = 0, each a block of one body, where these are two; with stars as without."""
-        if len(deltas) < 2 or len({self._body_of(index) for index in self.alphabet.along.values()}) < 2:
+        along = self.alphabet.along.values()
+        if len(deltas) < 2 or TIME in along or len({self._body_of(index) for index in along}) < 2:
             return []
         a, (x, y) = self.alphabet, deltas
         pairs = [(u, v) for u in (x, a.star(x)) for v in (y, a.star(y))] + [(a.star(y), x), (y, x)]

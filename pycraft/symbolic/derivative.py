@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from numbers import Real
 from typing import Any
 
 from .. import _core
+from ..identities.vocabulary import is_number
 
 TIME = "t"
 """The direction of a derivative along time, where coordinates are numbers."""
@@ -53,10 +53,10 @@ class Formula:
         return Formula("product", [other, self])
 
     def __mul__(self, other: Any) -> Formula:
-        return self._times(other) if isinstance(other, Real) else self @ other
+        return self._times(other) if is_number(other) else self @ other
 
     def __rmul__(self, other: Any) -> Formula:
-        return self._times(other) if isinstance(other, Real) else Formula("product", [other, self])
+        return self._times(other) if is_number(other) else Formula("product", [other, self])
 
     def __truediv__(self, number: Any) -> Formula:
         return self._times(Fraction(1) / Fraction(number))

@@ -191,9 +191,13 @@ class Step:
         """The axioms or lemmas used, as text, and at how many places."""
         if self.title or not self.uses:
             return self.title or "collect terms"
-        transposed = all(use.equation.kind == "transpose" for use in self.uses)
-        places = f", at {len(self.uses)} places" if len(self.uses) > 1 else ""
-        return "; ".join(e.text for e in self.equations) + (" (transposed)" if transposed else "") + places
+        return "; ".join(e.text for e in self.equations) + self.manner
+
+    @property
+    def manner(self) -> str:
+        """How the equations are used: transposed, and at how many places."""
+        transposed = bool(self.uses) and all(use.equation.kind == "transpose" for use in self.uses)
+        return (" (transposed)" if transposed else "") + (f", at {len(self.uses)} places" if len(self.uses) > 1 else "")
 
     @property
     def positions(self) -> list[tuple[str, int, str]]:

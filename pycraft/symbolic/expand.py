@@ -27,6 +27,7 @@ from .words import (
     Letter,
     Number,
     Polynomial,
+    Word,
     add_to,
     inverse_of,
     monomial,
@@ -127,6 +128,10 @@ class Problem:
         """What the statement is made of: both sides, and the operands of the letters that it adds."""
         assumed = [p for equation, _ in self.assumed for p in (equation.lhs, equation.rhs)]
         return [*self.sides, *(o.inner for o in self.opaque), *assumed]
+
+    def recursion_rules(self) -> list[tuple[Equation, Word]]:
+        """Equations between derivatives of one recursion, where diagonal blocks are taken: a statement without derivatives has none."""
+        return []
 
     def expand(self, expression: Any) -> Spelling:
         """The expression in words, as the step that says so.

@@ -44,6 +44,7 @@ from .words import (
     root_of,
     split,
     times,
+    underived,
 )
 
 KNOWN_INVERSES = [
@@ -94,6 +95,10 @@ class LocalRules:
         self._definite = {n for n, e in constants.items() if is_positive_constant(e)}
         for equation, word in extra:
             self.add(equation, word)
+        if self.block_rules is not None and "Υ" in {underived(plain(x)) for p in problem.polynomials() for w in p for x in w}:
+            for equation, word in problem.recursion_rules():
+                self._rank -= 1
+                self.block_rules.add_equation(equation, word, self.alphabet, self._rank)
         for equation, name in problem.assumed:
             self._assume(equation, name)
         self._world_axes()

@@ -167,13 +167,13 @@ class Proof:
         """What is left between the normal forms."""
         return self._alphabet.text(combine((1, self._forms[0]), (-1, self._forms[1])))
 
-    def search_counterexample(self, *, seed: int = 0, budget: float = 20.0) -> Any:
+    def search_counterexample(self, *, seed: int = 0, budget: float = 5.0) -> Any:
         """The smallest model and state at which the statement is false, or None if none was found.
 
         Parameters
         ----------
         seed : of the models and states
-        budget : seconds
+        budget : CPU seconds
 
         Returns
         -------

@@ -10,12 +10,12 @@ from __future__ import annotations
 import functools
 import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from numbers import Real
 from typing import Any
 
 from .. import _core
 from ..identities.checker import with_spaces
 from ..identities.parse import Statement
+from ..identities.vocabulary import is_number
 from . import mechanics, scalars
 from .attempt import Attempt, Outcome
 from .axioms import theory
@@ -136,7 +136,7 @@ def _sides(lhs: Any, rhs: Any) -> tuple[Any, Any]:
     sides = [lhs, rhs]
     for i, other in ((0, rhs), (1, lhs)):
         domain = getattr(other, "domain", None)
-        if domain is not None and isinstance(sides[i], Real) and sides[i] == 0:
+        if domain is not None and is_number(sides[i]) and sides[i] == 0:
             sides[i] = _core.zero(domain, other.codomain)
         elif domain is not None and isinstance(sides[i], _core.Operator) and sides[i].domain is None:
             sides[i] = sides[i] @ _core.identity(domain)
@@ -162,7 +162,7 @@ def _prove(read: Statement, model: Any, assumed: Sequence[Assumption] = (), unkn
     problem = DerivativeProblem()
     problem.unknown = {*unknown}
     read = Statement(_one_identity(read.lhs), _one_identity(read.rhs), read.text, read.reading)
-    sides = [_core.scalar(side) if isinstance(side, Real) else side for side in (read.lhs, read.rhs)]
+    sides = [_core.scalar(side) if is_number(side) else side for side in (read.lhs, read.rhs)]
     read = Statement(sides[0], sides[1], read.text, read.reading)
     problem.scalars = not any(hasattr(side, "kind") for side in sides)
     problem.of_one_model = read.reading == "expressions"
@@ -313,6 +313,7 @@ def _settings(problem: DerivativeProblem) -> Iterator[tuple[Setting, list[tuple[
         for chosen in itertools.combinations(possible, size):
             extra = list(rules) + constant * ("constant H" in chosen)
             extra += [_no_delta(problem, n) for n in deltas if "single-DOF hinges" in chosen]
+            extra += problem.single_axis_rules() if "single-DOF hinges" in chosen else []
             yield Setting(frozenset(chosen), composite, "serial chain" in chosen, velocities), extra
 
 

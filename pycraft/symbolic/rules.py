@@ -91,7 +91,7 @@ _REST = [
     ("E_φ P ψ*", "E_φ P ψ* = E_φ P + P ψ* − M ψ*"),
 ]
 _SIBLINGS = [("S", "Υ = E_ψ* Υ E_ψ − S + H* D⁻¹ H")]
-_COMPLIANCE = [
+COMPLIANCE = [
     ("ψ* H* D⁻¹ H ψ", "ψ* H* D⁻¹ H ψ = ψ* Υ + Υ ψ − Υ + ψ* S ψ"),
     ("E_φ* Υ E_φ", "E_φ* Υ E_φ = S + Υ − H* D⁻¹ H + E_φ* Υ K H + H* K* Υ E_φ − H* K* Υ K H"),
     ("E_φ* Υ ψ", "E_φ* Υ ψ = H* K* Υ ψ + E_φ* Υ − H* K* Υ + S ψ + Υ ψ − H* D⁻¹ H ψ"),
@@ -314,7 +314,7 @@ def chosen(setting: Setting) -> list[tuple[str, str]]:
     facts += _ARTICULATED
     facts += _WITH_R if setting.composite else _WITHOUT_R
     facts += _REST
-    facts += _COMPLIANCE if setting.compliance else _SIBLINGS
+    facts += COMPLIANCE if setting.compliance else _SIBLINGS
     return facts
 
 

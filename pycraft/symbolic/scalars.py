@@ -151,7 +151,8 @@ class ScalarStep(Step):
 
 
 def _negative(use: Use) -> Use:
-    made, more = type(use), {}
+    made: Any = type(use)
+    more: dict[str, Any] = {}
     if isinstance(use, TraceUse):
         more = {"space": use.space}
     elif isinstance(use, ProductUse):

@@ -45,19 +45,23 @@ def reason(step: Step, cited: dict[str, int] | None = None) -> str:
     return found
 
 
-def reason_latex(step: Step) -> str:
-    """The equations of a step as mathematics."""
+def reason_latex(step: Step, cited: dict[str, int] | None = None) -> str:
+    """The equations of a step as mathematics, with the numbers of the lemmas that are cited."""
     if step.title or not step.uses:
         return f"\\text{{{escaped(step.reason)}}}"
     latex = step.alphabet.latex
-    return ";\\;".join(f"{latex(e.lhs)} = {latex(e.rhs)}" for e in step.equations)
+    made = []
+    for e in step.equations:
+        number = (cited or {}).get(e.text) if e.kind in ("lemma", "structure") else None
+        made.append(f"{latex(e.lhs)} = {latex(e.rhs)}" + ("" if number is None else f"\\text{{, by ({number})}}"))
+    return ";\\;".join(made) + (f"\\text{{{step.manner}}}" if step.manner else "")
 
 
-def aligned(steps: Sequence[Step]) -> str:
+def aligned(steps: Sequence[Step], cited: dict[str, int] | None = None) -> str:
     """The chain as an aligned display, each step on a line and its reason below it on the right where the line is long."""
     rows = [f"& {steps[0].before_latex()}"] if steps else []
     for s in steps:
-        why = f"&& \\text{{({s.number})}}\\;{reason_latex(s)}"
+        why = f"&& \\text{{{s.number}.}}\\;{reason_latex(s, cited)}"
         split = len(s.after_text()) > WIDTH
         rows += [f"={{}}& {s.after_latex()}", f"& {why}"] if split else [f"={{}}& {s.after_latex()} {why}"]
     return "\\begin{aligned}" + "\\\\\n".join(rows) + "\\end{aligned}"
@@ -67,7 +71,7 @@ def escaped(text: str) -> str:
     """Plain text for LaTeX's \\text: letters of the algebra as mathematics."""
     for a, b in _MATHEMATICS:
         text = text.replace(a, b)
-    return text
+    return text.replace("$$", "")
 
 
 _MATHEMATICS = [
@@ -109,7 +113,7 @@ class FullProof:
         for p in (*self.lemmas, self.proof):
             number = self._numbers.get(p.statement)
             title = f"\\text{{({number})}}\\quad " if number is not None and p is not self.proof else ""
-            made.append(f"{title}{p._latex}{_where_latex(p)}\\\\\n{aligned(p.steps)}")
+            made.append(f"{title}{p._latex}{_where_latex(p)}\\\\\n{aligned(p.steps, self._numbers)}")
         return "\\begin{gathered}" + "\\\\[1ex]\n".join(made) + "\\end{gathered}"
 
 

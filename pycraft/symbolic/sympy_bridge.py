@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from .. import _core
-from ..identities.parse import ParseError, Statements
+from ..identities.parse import ParseError, Statements, as_text
 from ..operators import OperatorSet
 from .nesting import within_reach
 
@@ -41,7 +41,7 @@ def parse(text: str, model: Any, **names: _core.Operator) -> Any:
     >>> parse(r"[I - H\psi\mathcal{K}]^*\mathcal{D}^{-1}[I - H\psi\mathcal{K}]", pc.chain(3))
     <(I − H ψ K)* D⁻¹ (I − H ψ K) : Θ (3) → Θ (3)>
     """
-    statement = Statements(_operators(model), names).read(text)
+    statement = Statements(_operators(model), names).read(as_text(text))
     if statement.rhs is not None:
         raise ParseError(f"{text!r} is an equation; parse takes one expression, pycraft.check equations")
     return statement.lhs

@@ -10,12 +10,14 @@ from __future__ import annotations
 import ast
 import json
 import random
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from numbers import Integral
 from pathlib import Path
 from typing import Any
 
 from .. import _core
+from ..identities.tables import monospace, wrapped
 from .exercise import Exercise, Judgement, exercise
 
 TOPICS = {
@@ -108,9 +110,9 @@ class Worksheet:
         }
 
 
-@dataclass
+@dataclass(repr=False)
 class Worksheets:
-    """The worksheets of a class, see `worksheet`."""
+    """The worksheets of a class, see `worksheet`. It prints as who has which questions, and which lines are left out."""
 
     topic: str
     sheets: list[Worksheet]
@@ -124,13 +126,21 @@ class Worksheets:
     def __getitem__(self, k: int) -> Worksheet:
         return self.sheets[k]
 
+    def __repr__(self) -> str:
+        lines = [f"{len(self)} worksheets: {self.topic}"]
+        for sheet in self.sheets:
+            asked = "; ".join(f"{q.statement} (lines {', '.join(map(str, q.blanks))})" for q in sheet.questions)
+            lines.append(monospace(f"  {sheet.student}: {asked}"))
+        return "\n".join(map(wrapped, lines))
+
     def save(self, folder: str | Path, pdf: bool = False) -> list[Path]:
         """Write `<student>.ipynb` for every student and `key/<student>.ipynb` with the solutions; with `pdf`, each as PDF too.
 
         Raises
         ------
         ModelError
-            The folder cannot be written; for PDF, nbconvert (extra [lab]) or what it needs is missing: the text says what.
+            The folder cannot be written; for PDF, nbconvert (extra [lab]) or what it needs is missing: the text says what. The
+            notebooks are written all the same.
         """
         folder = Path(folder)
         written = []
@@ -187,7 +197,7 @@ def worksheet(
     if isinstance(topic, str) and topic not in TOPICS:
         raise _core.EvaluationError(f"no topic is called {topic!r}; there are {', '.join(TOPICS)}, or give a list of statements")
     statements = TOPICS[topic] if isinstance(topic, str) else list(topic)
-    names = [f"student{k:02d}" for k in range(1, students + 1)] if isinstance(students, int) else list(students)
+    names = _names(students)
     if not statements or not names or questions < 1 or blanks < 1:
         raise _core.EvaluationError("a worksheet takes one statement, student, question and blank or more")
     if len(set(names)) < len(names) or any(not n or Path(n).name != n for n in names):
@@ -201,6 +211,14 @@ def worksheet(
             Worksheet(topic if isinstance(topic, str) else "exercises", name, [_question(s, gaps[s], blanks, draw) for s in chosen])
         )
     return Worksheets(sheets[0].topic, sheets)
+
+
+def _names(students: int | Sequence[str]) -> list[str]:
+    if isinstance(students, Integral) and not isinstance(students, bool):
+        return [f"student{k:02d}" for k in range(1, int(students) + 1)]
+    if isinstance(students, str) or not isinstance(students, Iterable) or not all(isinstance(name, str) for name in students):
+        raise _core.EvaluationError(f"students={students!r}: how many there are, or a list of their names")
+    return list(students)
 
 
 def _gaps(task: Exercise) -> list[int]:
@@ -274,19 +292,19 @@ def to_pdf(notebook: str | Path) -> Path:
     try:
         import nbconvert
     except ImportError:
-        raise _core.ModelError("PDF is made by nbconvert, which is not installed: pip install pycraft-soa[lab]") from None
+        raise _core.ModelError("PDF is made by nbconvert, which is not installed: pip install 'pycraft-soa[lab]'") from None
     reasons = []
     for exporter in (nbconvert.PDFExporter, nbconvert.WebPDFExporter):
         try:
-            body, _ = exporter().from_filename(str(path))
+            body: Any = exporter().from_filename(str(path))[0]
         except Exception as error:  # whatever LaTeX, pandoc or a browser says: it is the reason
-            reasons.append(f"{exporter.__name__}: {str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__}")
+            reasons.append(str(error).strip().partition("\n")[0] or type(error).__name__)
             continue
         out = path.with_suffix(".pdf")
         out.write_bytes(body)
         return out
-    needs = "a PDF takes pandoc and XeLaTeX, or nbconvert[webpdf] with a Chromium"
-    raise _core.ModelError(f"{path.name}: {needs}\n  " + "\n  ".join(reasons))
+    needs = "a PDF takes pandoc and XeLaTeX, or a browser: pip install 'nbconvert[webpdf]', then playwright install chromium"
+    raise _core.ModelError(f"{path.name}: {needs} (tried both: {' '.join(reasons)})")
 
 
 def _cell(kind: str, source: str, tags: Sequence[str] = ()) -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """What the campaigns have in common as commands."""
 
 import argparse
+import time
 
 
 def seeds(document, count, first=True):
@@ -14,15 +15,22 @@ def seeds(document, count, first=True):
     return range(begin, begin + given.seeds)
 
 
-def tallied(seeds, each, words):
-    """Run `each(seed)`, (how many comparisons, what is wrong, line by line), show it, and sum up; the exit status."""
+def tallied(seeds, each, words, every=60.0):
+    """Run `each(seed)`, (how many comparisons, what is wrong, line by line), show it, and sum up; the exit status.
+
+    Says every so many seconds how far it is.
+    """
     compared, wrong = 0, []
-    for seed in seeds:
+    said_at = begin = time.perf_counter()
+    for done, seed in enumerate(seeds, 1):
         count, lines = each(seed)
         compared += count
         wrong += lines
         for line in lines:
             print(line, flush=True)
+        if time.perf_counter() - said_at > every:
+            said_at = time.perf_counter()
+            print(f"{said_at - begin:.0f} s, {done} of {len(seeds)} seeds: {compared} {words}, {len(wrong)} wrong", flush=True)
     print(f"{compared} {words}, {len(wrong)} wrong")
     return 1 if wrong else 0
 

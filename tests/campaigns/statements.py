@@ -23,7 +23,9 @@ from wrong_formulas import TRUE
 import pycraft as pc
 from campaigns.command_line import seeds, tallied
 from pycraft.identities.edits import changed
-from pycraft.identities.formula import Misfit, Value, evaluate, read_formula, written_statement
+from pycraft.identities.formula import written_statement
+from pycraft.identities.formula_reading import read_formula
+from pycraft.identities.formula_values import Misfit, Value, evaluate
 from pycraft.identities.judge import BoundState, judge_states
 from pycraft.identities.parse import Statements
 from pycraft.models.state import State

@@ -29,6 +29,20 @@ TIMES = (0, 1, -7)
 """Binary exponents of times, in turn."""
 
 
+def solid(rng):
+    """The inertia of eight points of mass 1/8 about their centre: of some solid, in units of mass and length."""
+    points = rng.normal(size=(8, 3)) * 0.3
+    spread = points - points.mean(axis=0)
+    return (np.sum(spread**2) * np.eye(3) - spread.T @ spread) / 8
+
+
+def add_drawn(model, rng, k, parent, kind, units, inertia, **options):
+    """Body k on body `parent` (the base where that is -1), placed at random and with random masses, in units of (mass, length)."""
+    mass, length = units
+    placed = {"position": length * rng.uniform(-1, 1, 3), "mass": mass * rng.uniform(0.1, 2), "com": length * rng.uniform(-0.3, 0.3, 3)}
+    model.add_body(f"body{k}", f"body{parent}" if parent >= 0 else None, kind, inertia=mass * length**2 * inertia, **placed, **options)
+
+
 class Moving:
     """A random tree of every kind of hinge in motion, in units of `mass`, `length` and `time`."""
 
@@ -52,24 +66,12 @@ class Moving:
         own_powers = {}
         for k in range(int(rng.integers(2, 8))):
             kind = str(rng.choice(list(self.KINDS)))
-            points = rng.normal(size=(8, 3)) * 0.3
-            spread = points - points.mean(axis=0)
-            inertia = (np.sum(spread**2) * np.eye(3) - spread.T @ spread) / 8
+            inertia = solid(rng)
             parent, own = int(rng.integers(0, k)) if k else -1, np.array(self.KINDS[kind])
             rotors = mass * length ** (2.0 - 2 * own) * rng.uniform(0, 0.2, len(own)) * (rng.random() < 0.3)
             options = {"axis": rng.normal(size=3)} if kind in ("pin", "slider", "screw", "cylindrical") else {}
-            self.model.add_body(
-                f"body{k}",
-                f"body{parent}" if parent >= 0 else None,
-                kind,
-                position=length * rng.uniform(-1, 1, 3),
-                mass=mass * rng.uniform(0.1, 2),
-                com=length * rng.uniform(-0.3, 0.3, 3),
-                inertia=mass * length**2 * inertia,
-                rotor_inertia=rotors,
-                **options,
-                **({"pitch": 0.25 * length} if kind == "screw" else {}),
-            )
+            options |= {"pitch": 0.25 * length} if kind == "screw" else {}
+            add_drawn(self.model, rng, k, parent, kind, (mass, length), inertia, rotor_inertia=rotors, **options)
             own_powers[f"body{k}"] = own, {"ball": np.zeros(4), "free": np.r_[np.zeros(4), np.ones(3)]}.get(kind, own)
         n = self.model.nv
         self.powers, positions = np.zeros(n), np.zeros(self.model.nq)
@@ -114,20 +116,10 @@ class Drawn:
         for k in range(int(rng.integers(2, 9))):
             kind = str(rng.choice(list(LENGTHS)))
             axis = rng.normal(size=3)
-            points = rng.normal(size=(8, 3)) * 0.3  # of a solid, so that its inertia is one
-            spread = points - points.mean(axis=0)
-            inertia = (np.sum(spread**2) * np.eye(3) - spread.T @ spread) / 8
+            inertia = solid(rng)
             parent = int(rng.integers(-1, k)) if k else -1
-            self.model.add_body(
-                f"body{k}",
-                f"body{parent}" if parent >= 0 else None,
-                kind,
-                position=length * rng.uniform(-1, 1, 3),
-                mass=mass * rng.uniform(0.1, 2),
-                com=length * rng.uniform(-0.3, 0.3, 3),
-                inertia=mass * length**2 * inertia,
-                **({"axis": axis} if kind in ("pin", "slider", "cylindrical") else {}),
-            )
+            options = {"axis": axis} if kind in ("pin", "slider", "cylindrical") else {}
+            add_drawn(self.model, rng, k, parent, kind, (mass, length), inertia, **options)
             kinds[f"body{k}"] = kind
         self.q = np.array(self.model.random_state(seed=1).q)
         self.lengths = np.zeros(self.model.nv)

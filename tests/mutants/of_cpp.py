@@ -130,7 +130,6 @@ CHANGES = {
             "e.domain().dimension() * Coefficient::log_of_size(e.node().coefficient)",
             "Coefficient::log_of_size(e.node().coefficient)",
         ),
-        ("the diagonal of any product is that of its factors", "if (!each) return std::nullopt;", ";", STATEMENT),
     ],
     "cpp/algebra/plan_vectors.cpp": [
         ("a multiple of J is J", "b.coefficient != a.coefficient", "false"),

@@ -14,9 +14,15 @@
 // lengths y and P(a,a)^½ of its rows, a product that should vanish leaves eps y P(a,a)^½, and so G and with it the innovations are off by
 // eps y²/D of what they could be at all. At one no digit of what a motion of the parent makes of θ̈ would be right, however good D is.
 //
+// Beside what a hinge moves along other directions, D may be so faint that the value keeps few digits and yet some: the errors of G, of forces
+// and of gyroscopic terms enter θ̈ by their ratio to D, and how much of θ̈ they are hangs on the forces. No bound of D alone can say: forward
+// dynamics in a factored form measures it, where `faint_ratio` leaves a doubt, by a residual in wider scalars, corrects θ̈ so, and refuses what
+// does not come to `faint_limit` so (dynamics/rigid_dynamics.cpp).
+//
 // The sweep costs as much again as P's own; block policies run it only where an estimate of X leaves a doubt.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -35,6 +41,27 @@ inline S rounding_bound(Form form) {
   return form == Form::fast ? S(8) * epsilon<S>() : S(column * column);
 }
 
+// What a hinge coordinate feels, D, and how much more its body feels along others: `ratio` times eps is what its θ̈ may be off by.
+struct FaintPivot {
+  int body = -1, coordinate = 0;
+  double pivot = 0, ratio = 0;
+};
+// Of θ̈ that may be off by more than 2⁻²⁶ (in single precision √eps) a residual is formed; more than 64 times that is refused.
+template <class S>
+inline S faint_error() {
+  using std::sqrt;
+  static const double root = std::sqrt(std::max(to_double(epsilon<S>()), 0x1p-52));
+  return S(root);
+}
+template <class S>
+inline S faint_ratio() {
+  return epsilon<S>() / faint_error<S>();
+}
+template <class S>
+inline S faint_limit() {
+  return S(64) * faint_error<S>();
+}
+
 // What the elimination of a hinge found in the pivots of D(k).
 enum class Pivots { sound, doubtful, not_positive };
 
@@ -50,6 +77,16 @@ enum class Pivots { sound, doubtful, not_positive };
                            "): give the bodies it moves a mass, or the hinge a rotor inertia, or weld it; where it carries light bodies under heavy ones, take " +
                            remedy,
                            tree.dof_offset[k] + coordinate);
+}
+
+[[noreturn]] inline void throw_faint_hinge(const SkoStructure& tree, const FaintPivot& faint) {
+  char numbers[96];
+  std::snprintf(numbers, sizeof numbers, "D = %.3g, and %.1g times as much along others", faint.pivot, faint.ratio);
+  throw SingularHingeError("hinge '" + tree.hinge_names[faint.body] + "' of body '" + tree.body_names[faint.body] + "' feels too little inertia along coordinate '" +
+                             tree.coordinate_names[tree.dof_offset[faint.body] + faint.coordinate] + "' (" + numbers +
+                             "): of the accelerations here fewer than six digits would be right; take a wider precision, or give the bodies it moves more "
+                             "inertia, or the hinge a rotor inertia",
+                           tree.dof_offset[faint.body] + faint.coordinate);
 }
 
 // (j + 1) Σ_i w(i)² squares(i), w = (-D₁₁⁻¹ D₁ⱼ, 1) for D = L d L*, L with a unit diagonal; w: n numbers of scratch.

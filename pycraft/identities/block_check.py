@@ -1,0 +1,197 @@
+"""`check` of a statement by block: for every choice of bodies that is meant, on a model or on random trees."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import mpmath
+import numpy as np
+
+from .. import _core
+from .block_reading import BlockStatement, read_by_block
+from .block_relations import Relation, choices, standard
+from .block_values import ANY, Blocks, place_text, value
+from .family import HYPOTHESES, Spec, family
+from .judge import FAILS, HOLDS, UNDECIDED, BoundState, Judgement, Taken, Verdict, decided, ladder
+from .report import CheckReport
+from .vocabulary import ParseError
+
+WORST = 8
+"""In wider scalars these choices of bodies are looked at first: if the statement fails for one of them, it fails."""
+_DIGITS = 120
+"""Of the operations on blocks of wide numbers: more than the numbers have."""
+
+
+@dataclass
+class BlockRefutation:
+    """A model, a state and bodies for which a statement by block is false."""
+
+    model: str
+    state: Any
+    bodies: dict[str, str]
+    residual: float
+    spec: Spec | None = None
+    meets: frozenset[str] = frozenset()
+
+    def __repr__(self) -> str:
+        chosen = ", ".join(f"{letter} = {name}" for letter, name in self.bodies.items())
+        return f"  false for {chosen or 'all bodies'}\n  on {self.model}, off by {self.residual:.1e} of the largest block"
+
+
+@dataclass
+class _OnModel:
+    """What was found on one model."""
+
+    verdict: Verdict = field(default_factory=Verdict)
+    counted: int = 0
+    bad: list[dict[str, int]] = field(default_factory=list)
+    good: list[dict[str, int]] = field(default_factory=list)
+    refutation: tuple[Any, dict[str, int], float] | None = None
+
+
+def check_by_block(text: str, model: Any, *, states: int, seed: int, precision: str | int) -> CheckReport:
+    """The report of a statement by block; see `pycraft.check`."""
+    found: dict[str, tuple[Spec | None, Any, _OnModel]] = {}
+    if model is not None:
+        operators = getattr(model, "soa", model)
+        own = operators._model
+        read = read_by_block(text, _names(operators))
+        rng = np.random.default_rng(seed)
+        drawn = [None] if own is None else [own.random_state(rng) for _ in range(states)]
+        found[operators._source.name] = None, operators, _on_model(read, operators, drawn, precision)
+    else:
+        read = read_by_block(text)
+        for spec in family(states):
+            spec = replace(spec, seed=spec.seed + seed)
+            operators = spec.model().soa
+            found[str(spec)] = (spec, operators, _on_model(read, operators, spec.states(operators._model, 1), precision))
+    said = {name: entry for name, entry in found.items() if entry[2].counted}
+    if not said:
+        raise _core.EvaluationError(f"{text!r}: no bodies are as it says on {'the random trees' if model is None else 'the model'}")
+    whole = Verdict([j for _, _, on in said.values() for j in on.verdict.judgements])
+    report = CheckReport.of(text, whole, [*said], read.understood)
+    count = sum(on.counted for _, _, on in said.values())
+    report.notes.append(f"checked by block, for {count} choices of bodies")
+    if whole.verdict == FAILS:
+        _explain(report, read, said)
+    return report
+
+
+def _names(operators: Any) -> list[str]:
+    return [name for name, *_ in operators.V.blocks]
+
+
+def _on_model(read: BlockStatement, operators: Any, states: list[Any], precision: str | int) -> _OnModel:
+    """The statement on one model, at these states."""
+    found = _OnModel()
+    parents, names = operators._source.parents, _names(operators)
+    fixed = {name: body for name, _, body in operators.V.blocks}
+    unknown = [x for x in read.indices if len(x) > 2]
+    if unknown:
+        raise ParseError(f"no body is called {unknown[0]!r}; there are {', '.join(names[:12])}")
+    chosen = [
+        bodies
+        for bodies in choices(read.indices, parents, read.relations, fixed)
+        if all(parents[bodies[x]] >= 0 for x in read.needs_parent if x in bodies)
+    ]
+    if not chosen:
+        return found
+    for state in states:
+        try:
+            judgement, apart = _judged(read, operators, BoundState(operators, state), chosen, precision)
+        except (_core.SingularOperatorError, _core.SingularHingeError):
+            continue
+        found.counted = len(chosen)
+        found.verdict.judgements.append(judgement)
+        wrong = [i for i, far in enumerate(apart) if far]
+        found.bad += [chosen[i] for i in wrong]
+        found.good += [bodies for i, bodies in enumerate(chosen) if not apart[i]]
+        if judgement.verdict == FAILS:
+            found.refutation = state, chosen[max(wrong, key=lambda i: apart[i])] if wrong else chosen[0], judgement.decisive.residual
+            break
+    return found
+
+
+def _judged(
+    read: BlockStatement, operators: Any, at: BoundState, chosen: list[dict[str, int]], precision: str | int
+) -> tuple[Judgement, list[float]]:
+    """(the verdict at a state, by how much each choice of bodies is off in the second scalar, 0 for what may be rounding)."""
+    found = Judgement(state=at.state)
+    apart: list[float] = []
+    among = list(range(len(chosen)))
+    for step, name in enumerate(ladder(precision)):
+        blocks = Blocks(at, operators, name)
+        with mpmath.workdps(_DIGITS):
+            if step == 2 and any(apart):  # where it is false, some bodies are enough
+                among = sorted(among, key=lambda i: -apart[i])[:WORST]
+            both = [_both(read, blocks, chosen[i]) for i in among]
+        scale = max((size for _, _, size in both), default=0.0)
+        found.zero = scale == 0
+        far = [difference / scale if scale else difference for difference, _, _ in both]
+        bounds = [error / scale if scale else 0.0 for _, error, _ in both]
+        found.taken.append(Taken(name, max(far), max(bounds)))
+        if step == 1:
+            narrow = found.taken[0]
+            falls = max(narrow.residual / narrow.epsilon, 1.0) * found.taken[1].epsilon
+            apart = [x if x > max(b, 64 * falls) or x > 1e-9 else 0.0 for x, b in zip(far, bounds, strict=True)]
+        found.verdict = decided(found.taken, blocks.growth)
+        if found.verdict != UNDECIDED and (found.verdict == FAILS or len(among) == len(chosen)):
+            break
+    if found.verdict == UNDECIDED:
+        found.verdict = decided(found.taken, blocks.growth, last=True)
+    return found, apart
+
+
+def _both(read: BlockStatement, blocks: Blocks, bodies: dict[str, int]) -> tuple[float, float, float]:
+    """(the largest entry of lhs - rhs, the bound on it, the largest entry of both)."""
+    left, right = (value(side, blocks, bodies) for side in read.formula)
+    places = [(x.codomain, x.domain) for x in (left, right)]
+    zero = [x.array.ndim == 0 and not x.array for x in (left, right)]
+    if ANY not in places[0] + places[1] and places[0] != places[1] and not any(zero):
+        led = [f"from {place_text(domain)} to {place_text(codomain)}" for codomain, domain in places]
+        raise _core.SpaceError(f"the left side leads {led[0]}, the right side {led[1]}")
+    arrays = [left.array, right.array]
+    for i, x in enumerate((left, right)):
+        if x.codomain == ANY and places[1 - i][0] != ANY:
+            arrays[i] = x.array[0, 0] * np.eye(*arrays[1 - i].shape)
+    difference = arrays[0] - arrays[1]
+    sizes = [_largest(a) for a in arrays]
+    return _largest(difference), left.error + right.error + blocks.epsilon * max(sizes), max(sizes)
+
+
+def _largest(array: Any) -> float:
+    return max((abs(float(x)) for x in np.ravel(array)), default=0.0)
+
+
+def _explain(report: CheckReport, read: BlockStatement, said: dict[str, Any]) -> None:
+    """The smallest model that refutes it, of those tried; hypotheses, and relations of the bodies, under which it was true on all."""
+    refuted = [(entry[0], name, entry[1], entry[2].refutation) for name, entry in said.items() if entry[2].refutation is not None]
+    spec, name, operators, (state, bodies, residual) = min(refuted, key=lambda r: r[0].size if r[0] is not None else (0, 0))
+    names = _names(operators)
+    chosen = {letter: names[bodies[letter]] for letter in read.indices}
+    report.counterexample = BlockRefutation(name, state, chosen, residual, spec)
+    if spec is not None:
+        report.true_where = _saving([(entry[0].met, entry[2].verdict.verdict == HOLDS) for entry in said.values()])
+    saved = [r for r in standard(read.indices) if r not in read.relations and _saves(r, said)]
+    if saved and not report.true_where:
+        report.notes.append(f"true on {'all models tried' if spec is not None else 'it'} where {saved[0]}")
+
+
+def _saving(found: list[tuple[frozenset[str], bool]]) -> list[frozenset[str]]:
+    """The fewest hypotheses with which it held on every model, of two at least."""
+    for size in range(1, len(HYPOTHESES)):
+        sets = [frozenset(h) for h in itertools.combinations(HYPOTHESES, size)]
+        held = [h for h in sets if len(m := [holds for met, holds in found if h <= met]) > 1 and all(m)]
+        if held:
+            return held
+    return []
+
+
+def _saves(relation: Relation, said: dict[str, Any]) -> bool:
+    """Whether no choice of bodies of which it holds was off, and some were right; it must leave some out."""
+    on = [(entry[1]._source.parents, entry[2]) for entry in said.values()]
+    if any(relation.holds(parents, bodies) for parents, found in on for bodies in found.bad):
+        return False
+    return any(relation.holds(parents, bodies) for parents, found in on for bodies in found.good)

@@ -1,0 +1,215 @@
+"""Statements by block: `Ω(i,j) = ψ*(c,i)Υ(c)ψ(c,j), c the closest common ancestor of i and j`, as text.
+
+An operator with bodies behind it is one of its blocks: X(i,j) leads from body j to body i, X(k) of a block-diagonal operator is X(k,k),
+x(k) of a vector its entries of body k. As in the book X*(i,j) is the transpose of X(i,j); D⁻¹(k) is D(k)⁻¹. Bodies are small letters from c
+to z, 𝒫(k) or parent(k), or a body's own name. Σ_{j∈C(k)} or Σ_{j∈children(k)} sums the product behind it over the children of k, Σ_j over
+all bodies. Behind a comma or "where" stands which bodies are meant, see `block_relations`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+
+from ..formula_nodes import parts
+from .block_relations import Relation, relations
+from .formula import INDEXED, SYMBOLS, Formula, Letter, Node, Power, rebuilt, starred, written
+from .formula_reading import Book
+from .spelling import Spelled, spelled
+from .vocabulary import Misread, ParseError
+
+VARIABLE = r"[c-z]\d?"
+_PARENT = rf"(?:parent|℘|P)\s*\(\s*(?P<of>{VARIABLE})\s*\)"
+_SUFFIX = r"(?:\^\*|\^-1|\^T|'|\*)?"
+
+
+@dataclass(frozen=True)
+class SumOver(Node):
+    """Σ inner over the children of a body, or over all bodies where `of` is empty."""
+
+    index: str
+    of: str
+    inner: Node
+
+    @property
+    def children(self) -> tuple[Node, ...]:
+        return (self.inner,)
+
+
+@dataclass(frozen=True)
+class BlockStatement:
+    """Two sides, the letters that run over bodies, and which of them are meant."""
+
+    text: str
+    formula: Formula
+    indices: tuple[str, ...]
+    relations: tuple[Relation, ...]
+
+    @property
+    def understood(self) -> str:
+        """How it was read."""
+        meant = ", ".join(map(str, self.relations))
+        return " = ".join(map(shown, self.formula)) + (f", {meant}" if meant else "")
+
+    @property
+    def needs_parent(self) -> set[str]:
+        """The letters of bodies that must hang on another."""
+        found = {a for side in self.formula for node in parts(side) if isinstance(node, Letter) for a in node.arguments}
+        return {a[len("parent(") : -1] for a in found if a.startswith("parent(")}
+
+
+def is_by_block(text: str, bodies: Iterable[str] = (), own: Iterable[str] = ()) -> bool:
+    """Whether blocks of bodies stand in a text; `own` are letters that stand for something else."""
+    found = _block(tuple(bodies)).finditer(spelled(_divided(text)[0]).text)
+    return any(m["name"] and not {a.strip() for a in m["arguments"].split(",")} & {*own} for m in found)
+
+
+def refuse_by_block(text: str, own: Iterable[str] = ()) -> None:
+    """Raises ParseError for a statement by block: what reads operators alone says so."""
+    if is_by_block(text, own=own):
+        raise ParseError(
+            f"{text!r} is a statement by block: pycraft.check evaluates it for every choice of bodies; statements by block are checked, "
+            "and not proved, mapped or repaired"
+        )
+
+
+def read_by_block(text: str, bodies: Iterable[str] = ()) -> BlockStatement:
+    """The statement.
+
+    Raises
+    ------
+    ParseError
+        It does not read as one; the place is shown.
+    """
+    said, meant = _divided(text)
+    source = spelled(said)
+    try:
+        if re.search(r"\.T|@", source.text) and re.search(r"\)\s*\*\s*\w", source.text):
+            raise Misread("with .T and @ a * says two things: write @ to multiply", source.text.index("*"))
+        sides = [(m.start(), m.end()) for m in re.finditer(r"==?", source.text)]
+        if len(sides) != 1:
+            raise ParseError(f"{'one side' if not sides else 'more than two sides'}; a statement is lhs = rhs")
+        (at, behind) = sides[0]
+        left = _BlockBook(source.text[:at], 0, tuple(bodies)).whole()
+        right = _BlockBook(source.text[behind:], behind, tuple(bodies)).whole()
+        free = _free((left, right), {*bodies})
+        return BlockStatement(text, (left, right), free, tuple(relations(meant, free, len(said))))
+    except Misread as error:
+        place = (
+            Spelled(text, text, list(range(len(text) + 1))).place(error.at) if error.at >= len(said) and meant else source.place(error.at)
+        )
+        lines = "".join(f"\n    {line}" for line in place.split("\n"))
+        raise ParseError(f"{text!r} does not read as a statement by block.\n  {error.message}{lines}") from None
+    except ParseError as error:
+        raise ParseError(f"{text!r} does not read as a statement by block.\n  {error}") from None
+
+
+def shown(node: Node) -> str:
+    """A side as the book prints it."""
+    if isinstance(node, SumOver):
+        return f"Σ_{{{node.index}{f' ∈ children({node.of})' if node.of else ''}}} {shown(node.inner)}"
+    stands = {
+        child: Letter(f"\0{i}") for i, child in enumerate(dict.fromkeys(node.children)) if any(isinstance(p, SumOver) for p in parts(child))
+    }
+    if not stands:
+        return written(node, shown=True)
+    text = written(rebuilt(node, [stands.get(c, c) for c in node.children]), shown=True)
+    for child, letter in stands.items():
+        text = text.replace(letter.name, shown(child))
+    return text
+
+
+def _divided(text: str) -> tuple[str, str]:
+    """The statement, and what is said behind its first comma outside of brackets, or behind "where"."""
+    depth = 0
+    for i, c in enumerate(text):
+        depth += (c in "([{") - (c in ")]}")
+        if depth == 0 and (c in ",;" or re.match(r"\b(where|for|if|with)\b", text[i:]) and (i == 0 or not text[i - 1].isalnum())):
+            return text[:i], text[i:]
+    return text, ""
+
+
+@lru_cache(maxsize=8)
+def _block(bodies: tuple[str, ...]) -> re.Pattern[str]:
+    """A letter with bodies, an optional suffix between; functions and the letters that take other arguments are passed over."""
+    from .vocabulary import FUNCTIONS
+
+    own = (rf"'?\"?{re.escape(name)}'?\"?(?!\w)" for name in sorted(bodies, key=len, reverse=True))
+    body = "|".join([_PARENT.replace("?P<of>", "?:"), rf"{VARIABLE}(?!\w)", *own])
+    names = "|".join(re.escape(n) for n in sorted({*SYMBOLS} - {*INDEXED, "I", "N"} | {"X", "V"}, key=lambda n: (-len(n), n)))
+    passed = "|".join(re.escape(n) for n in (*FUNCTIONS, *INDEXED))
+    return re.compile(
+        rf"(?:(?:{passed})\s*(?=\())|(?P<name>{names})\s*(?P<suffix>{_SUFFIX})\s*\(\s*(?P<arguments>(?:{body})(?:\s*,\s*(?:{body}))*)\s*\)"
+    )
+
+
+_SUM = re.compile(
+    rf"\s*(?:Σ|∑|\\sum|sum(?=_))\s*_?\s*(?P<open>[{{(])?\s*(?:\\?forall|∀)?\s*(?P<index>{VARIABLE})"
+    rf"(?:\s*(?:∈|\\in|\bin\b)\s*(?:C|children|child)\s*\(\s*(?P<of>{VARIABLE})\s*\))?\s*(?(open)[}})])"
+)
+
+
+class _BlockBook(Book):
+    """The book's reading, with blocks of bodies and sums over bodies among its factors."""
+
+    def __init__(self, source: str, begin: int, bodies: tuple[str, ...]):
+        self._bodies, self._begin = bodies, begin
+        super().__init__(source)
+
+    def _token(self, source: str, at: int) -> tuple[str, str, int] | None:
+        space = len(source[at:]) - len(source[at:].lstrip())
+        block = _block(self._bodies).match(source, at + space)
+        if block is not None and block["name"]:
+            return "block", f"{block['name']};{block['suffix']};{block['arguments']}", block.end()
+        summed = _SUM.match(source, at)
+        if summed is not None:
+            return "over", f"{summed['index']};{summed['of'] or ''}", summed.end()
+        return super()._token(source, at)
+
+    def _stumbled(self, message: str, at: int) -> ParseError:
+        return Misread(message, at + self._begin)
+
+    def _starts_factor(self, kind: str, text: str) -> bool:
+        return kind in ("block", "over") or super()._starts_factor(kind, text)
+
+    def _atom(self) -> Node:
+        kind, text = self._next()
+        if kind == "over":
+            self._take()
+            index, of = text.split(";")
+            return SumOver(index, of, self._product())
+        if kind == "block":
+            self._take()
+            name, suffix, arguments = text.split(";")
+            named = Letter({"X": "X_world", "V": "velocity"}.get(name, name), tuple(map(_bare, arguments.split(","))))
+            if suffix == "^-1" and len(named.arguments) > 1:
+                raise self._stumbled(f"of the inverse of a block or a block of the inverse? write inv({name}({arguments}))", self._at)
+            return starred(named) if suffix and suffix != "^-1" else Power(named, -1) if suffix else named
+        return super()._atom()
+
+
+def _bare(argument: str) -> str:
+    argument = argument.strip().strip("'\"")
+    found = re.fullmatch(_PARENT, argument)
+    return f"parent({found['of']})" if found else argument
+
+
+def _free(sides: Iterable[Node], bodies: set[str]) -> tuple[str, ...]:
+    """The letters of bodies that no sum runs over, in order."""
+
+    def walk(node: Node, bound: frozenset[str]) -> Iterator[str]:
+        if isinstance(node, SumOver):
+            if node.of and node.of not in bound:
+                yield node.of
+            bound = bound | {node.index}
+        if isinstance(node, Letter):
+            for a in node.arguments:
+                letter = a[len("parent(") : -1] if a.startswith("parent(") else a
+                if letter not in bound and letter not in bodies and node.name not in INDEXED:
+                    yield letter
+        for child in node.children:
+            yield from walk(child, bound)
+
+    return tuple(dict.fromkeys(letter for side in sides for letter in walk(side, frozenset())))

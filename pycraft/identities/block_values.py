@@ -1,0 +1,252 @@
+"""Values of statements by block: every letter's matrix once per precision, its blocks, and what rounding made of them.
+
+Each value carries a bound on its error: a letter's own as in `bounds`, of its whole matrix; of products, sums and inverses what those make
+of it, to first order, and the rounding of the few operations on blocks themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import mpmath
+import numpy as np
+
+from .. import _core
+from .block_reading import SumOver, shown
+from .bounds import EPSILON, Roundings
+from .formula import Call, Letter, Node, Number, Power, Product, Star, Sum
+from .judge import BoundState
+from .vocabulary import ParseError
+
+Place = tuple[str, str]
+"""A space, and the letter of the body whose part of it is meant."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """A block, where it leads to and from (None of a number; "any" of an I), and the bound on its error in the Frobenius norm."""
+
+    array: Any
+    codomain: Place | None
+    domain: Place | None
+    error: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "array", np.asarray(self.array))  # arithmetic makes scalars of numbers
+
+    @property
+    def norm(self) -> float:
+        return _norm(self.array)
+
+
+ANY: Place = ("any", "")
+
+
+class Blocks:
+    """The blocks of a model's letters at one state, in one precision."""
+
+    def __init__(self, at: BoundState, operators: Any, precision: str | int):
+        self._at, self._operators, self.precision = at, operators, precision
+        self._matrices: dict[str, tuple[Any, Any, float]] = {}
+        self.parents: Sequence[int] = operators._source.parents
+        self.epsilon = EPSILON[precision]
+        self.growth = 1.0
+
+    def _matrix(self, name: str) -> tuple[Any, Any, float]:
+        """(the operator, its matrix, the bound on its error)."""
+        if name not in self._matrices:
+            operator = self._operator(name)
+            bound = self._at.bind(operator, self.precision)
+            if self.precision == "double":
+                array = np.asarray(bound.dense(), float)
+            else:
+                array = np.asarray(bound.dense(dtype=object))
+                if self.precision == "extended":
+                    array = _as_extended(array)
+            zero = _core.zero(operator.domain, operator.codomain)
+            roundings = Roundings(operator, zero, self._at.sizes("double", {}))
+            self.growth = max(self.growth, roundings.growth)
+            self._matrices[name] = operator, array, roundings.absolute(self.precision)
+        return self._matrices[name]
+
+    def _operator(self, name: str) -> Any:
+        if name == "MM":
+            H, phi, M = self._operators("H phi M")
+            return H @ phi @ M @ phi.T @ H.T
+        return getattr(self._operators, name)
+
+    def of(self, letter: Letter, bodies: dict[str, int]) -> Block:
+        """The block of a letter; raises ParseError where it has none."""
+        if letter.name == "I":
+            return Block(np.ones((1, 1)), ANY, ANY)
+        if letter.name == "N":
+            return Block(np.asarray(float(self._operators.Theta.dimension)), None, None)
+        operator, array, error = self._matrix(letter.name)
+        arguments, vector = letter.arguments, operator.domain.name == "R^1"
+        if not arguments:
+            return Block(array, (operator.codomain.name, ""), None if vector else (operator.domain.name, ""), error)
+        if len(arguments) == 1 and not vector:
+            if not operator.is_block_diagonal:
+                raise ParseError(f"{shown(letter)}: {operator.text()} has blocks between two bodies, {operator.text()}(i,j)")
+            arguments = arguments * 2
+        if len(arguments) != (1 if vector else 2):
+            raise ParseError(f"{shown(letter)}: blocks have {'one body' if vector else 'one body or two'}")
+        rows = _part(operator.codomain, self._body(arguments[0], bodies), letter)
+        if vector:
+            return Block(array[rows], (operator.codomain.name, arguments[0]), ("R^1", ""), error)
+        columns = _part(operator.domain, self._body(arguments[1], bodies), letter)
+        return Block(array[rows, columns], (operator.codomain.name, arguments[0]), (operator.domain.name, arguments[1]), error)
+
+    def _body(self, argument: str, bodies: dict[str, int]) -> int:
+        if argument.startswith("parent("):
+            return self.parents[bodies[argument[len("parent(") : -1]]]
+        return bodies[argument]
+
+
+def _part(space: Any, body: int, letter: Letter) -> slice:
+    found = next((where for _, where, k in space.blocks if k == body), None)
+    if found is None:
+        raise ParseError(f"{shown(letter)}: {space.name} is not cut into bodies")
+    return found
+
+
+_DUAL = {"V": "F", "F": "V"}
+
+
+def value(node: Node, blocks: Blocks, bodies: dict[str, int]) -> Block:
+    """The value of a side for these bodies.
+
+    Raises
+    ------
+    SpaceError
+        Blocks that do not meet: the one ends at another body, or in another space, than the next begins.
+    SingularOperatorError
+        An inverse that does not exist.
+    """
+    eps = blocks.epsilon
+    match node:
+        case Letter():
+            return blocks.of(node, bodies)
+        case Number(value=number):
+            made = np.asarray(mpmath.mpf(number.numerator) / number.denominator if blocks.precision != "double" else float(number))
+            return Block(_as_extended(made) if blocks.precision == "extended" else made, None, None, eps * abs(float(number)))
+        case Star(inner=inner):
+            x = value(inner, blocks, bodies)
+            return x if x.domain is None else Block(x.array.T, _dual(x.domain), _dual(x.codomain), x.error)
+        case SumOver(index=index, of=of, inner=inner):
+            over = [k for k, p in enumerate(blocks.parents) if not of or p == bodies[of]]
+            values = [value(inner, blocks, {**bodies, index: k}) for k in over]
+            if not values:
+                return Block(np.zeros((1, 1)), ANY, ANY)
+            array, error = values[0].array, sum(v.error for v in values)
+            for v in values[1:]:
+                array = array + v.array
+            return Block(array, values[0].codomain, values[0].domain, error + eps * len(values) * _norm(array))
+        case Product(factors=factors):
+            whole = value(factors[0], blocks, bodies)
+            for factor, before in zip(factors[1:], factors, strict=False):
+                whole = _times(whole, value(factor, blocks, bodies), (before, factor), eps)
+            return whole
+        case Sum(terms=terms, signs=signs):
+            return _sum([value(term, blocks, bodies) for term in terms], signs, node, eps)
+        case Power(inner=inner, exponent=-1):
+            return _inverse(value(inner, blocks, bodies), inner, eps)
+        case Call(function=("trace" | "logdet") as function, inner=inner):
+            return _number(function, value(inner, blocks, bodies), inner, eps)
+    raise ParseError(f"{shown(node)}: of blocks there are products, sums, transposes, inverses, traces and ln det")
+
+
+def _dual(place: Place | None) -> Place | None:
+    return None if place is None else (_DUAL.get(place[0], place[0]), place[1])
+
+
+def place_text(place: Place | None) -> str:
+    if place is None:
+        return "a number"
+    return f"{place[0]} of body {place[1]}" if place[1] else f"{place[0]} of all bodies"
+
+
+def _times(a: Block, b: Block, texts: tuple[Node, Node], eps: float) -> Block:
+    if a.domain is None and a.codomain is None or b.domain is None and b.codomain is None:
+        made = a if b.codomain is None else b
+        error = a.error * b.norm + a.norm * b.error
+        return Block(a.array * b.array, made.codomain, made.domain, error + eps * a.norm * b.norm)
+    if ANY in (a.domain, b.codomain):
+        made, other = (a, b) if b.codomain == ANY else (b, a)
+        return Block(made.array * other.array[0, 0], made.codomain, made.domain, made.error)
+    if a.domain != b.codomain:
+        raise _core.SpaceError(
+            f"{shown(texts[0])} acts on {place_text(a.domain)}, and {shown(texts[1])}, applied before it, leads to {place_text(b.codomain)}"
+        )
+    error = a.error * b.norm + a.norm * b.error + eps * a.array.shape[-1] * a.norm * b.norm
+    return Block(a.array @ b.array, a.codomain, b.domain, error)
+
+
+def _sum(values: list[Block], signs: Sequence[int], node: Node, eps: float) -> Block:
+    known = [v for v in values if v.codomain != ANY]
+    first = known[0] if known else values[0]
+    for v, term in zip(values, node.children, strict=True):
+        if v.codomain != ANY and (v.codomain, v.domain) != (first.codomain, first.domain):
+            places = [f"from {place_text(x.domain)} to {place_text(x.codomain)}" for x in (first, v)]
+            raise _core.SpaceError(f"the terms of a sum lead between different places: {places[0]}; {shown(term)} {places[1]}")
+    arrays = [v.array if v.codomain != ANY or not known else v.array[0, 0] * np.eye(*first.array.shape) for v in values]
+    total = arrays[0] * signs[0]
+    for array, sign in zip(arrays[1:], signs[1:], strict=True):
+        total = total + sign * array
+    return Block(total, first.codomain, first.domain, sum(v.error for v in values) + eps * sum(map(_norm, arrays)))
+
+
+def _eliminated(a: Any) -> tuple[Any, Any]:
+    """(the inverse of a block, its pivots), by elimination with partial pivoting, in the block's own numbers."""
+    n = len(a)
+    work = np.concatenate([a, np.eye(n).astype(a.dtype) if a.dtype != object else np.eye(n).astype(int).astype(object)], axis=1)
+    pivots = []
+    for k in range(n):
+        row = k + int(np.argmax([abs(x) for x in work[k:, k]]))
+        if not work[row, k]:
+            raise _core.SingularOperatorError("a block without an inverse")
+        work[[k, row]] = work[[row, k]]
+        pivots.append(work[k, k])
+        work[k] = work[k] / work[k, k]
+        for i in range(n):
+            if i != k:
+                work[i] = work[i] - work[i, k] * work[k]
+    return work[:, n:], pivots
+
+
+def _inverse(x: Block, inner: Node, eps: float) -> Block:
+    if x.domain is None or x.array.shape[0] != x.array.shape[1]:
+        raise _core.SpaceError(f"{shown(inner)} has no inverse: it leads from {place_text(x.domain)} to {place_text(x.codomain)}")
+    if x.codomain == ANY:
+        return Block(1 / x.array, ANY, ANY)
+    made = _eliminated(x.array)[0]
+    size = _norm(made)
+    return Block(made, x.domain, x.codomain, size**2 * (x.error + eps * len(made) * x.norm))
+
+
+def _number(function: str, x: Block, inner: Node, eps: float) -> Block:
+    if x.domain is None or x.array.shape[0] != x.array.shape[1]:
+        raise _core.SpaceError(f"{function} of {shown(inner)}, which leads from {place_text(x.domain)} to {place_text(x.codomain)}")
+    n = len(x.array)
+    if function == "trace":
+        return Block(np.asarray(sum(x.array[k, k] for k in range(n))), None, None, float(np.sqrt(n)) * (x.error + eps * x.norm))
+    inverse, pivots = _eliminated(x.array)
+    log = mpmath.log if x.array.dtype == object else np.log
+    total = np.asarray(sum((log(abs(p)) for p in pivots), start=0 * x.array.flat[0] if n else 0.0))
+    return Block(total, None, None, _norm(inverse) * (x.error + eps * n * x.norm) + eps * abs(float(total)))
+
+
+def _norm(array: Any) -> float:
+    array = np.asarray(array)
+    if array.dtype == object:
+        array = array.astype(float)
+    return float(np.sqrt((array * array).sum()))
+
+
+def _as_extended(array: Any) -> Any:
+    """mpmath numbers as long doubles: each the sum of a double and the rest."""
+    high = np.asarray(array, float)
+    low = np.asarray(array - high, float)
+    return high.astype(np.longdouble) + low.astype(np.longdouble)
