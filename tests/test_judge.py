@@ -99,7 +99,7 @@ def test_what_a_sweep_amplifies_is_no_rise():
 class NormsOf:
     """Roundings whose double has no digit: a bound of 1 there, of 1e3 epsilons in wider scalars."""
 
-    size, terms, growth = 1.0, 0.0, 1.0
+    size, terms, growth, counted = 1.0, 0.0, 1.0, False
 
     def __init__(self, lhs, rhs, precision):
         self.made_in = precision
