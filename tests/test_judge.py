@@ -99,7 +99,7 @@ def test_what_a_sweep_amplifies_is_no_rise():
 class NormsOf:
     """Roundings whose double has no digit: a bound of 1 there, of 1e3 epsilons in wider scalars."""
 
-    size, terms, growth = 1.0, 0.0, 1.0
+    size, terms, growth, counted = 1.0, 0.0, 1.0, False
 
     def __init__(self, lhs, rhs, precision):
         self.made_in = precision
@@ -344,8 +344,8 @@ def test_a_verdict_over_states_is_its_worst():
         return Judgement([Taken(precision, residual, 1e-3)], verdict=verdict)
 
     holds, fails, undecided = map(at_a_state, (HOLDS, FAILS, UNDECIDED))
-    worst_of = (([holds, undecided, fails], FAILS), ([undecided, fails], FAILS), ([holds, undecided], UNDECIDED), ([holds, holds], HOLDS))
-    for some, worst in worst_of:
+    cases = [([holds, undecided, fails], FAILS), ([undecided, fails], FAILS), ([holds, undecided], UNDECIDED), ([holds, holds], HOLDS)]
+    for some, worst in cases:
         assert {Verdict(list(order)).verdict for order in itertools.permutations(some)} == {worst}
     wide, wider = at_a_state(HOLDS, residual=2e-30), at_a_state(HOLDS, "extended", 1e-5)
     for order in itertools.permutations([holds, wide, wider]):
