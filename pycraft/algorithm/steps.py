@@ -75,7 +75,7 @@ class Recursion:
             for realization in [step["realization"]] if step["realization"] else []:
                 self.uses.update(t["right"] for t in realization["outputs"])
         self.nested = nested
-        self.columns: str = COLUMNS
+        self.columns: int | str = COLUMNS
         # A vector expression: x is the number 1.
         readers = [step for step in plan["steps"] if plan["input"] in step["in"]]
         one = plan["request"] == "apply" and not nested and plan["input"] >= 0 and plan["domain"].name == "R^1"
@@ -94,7 +94,7 @@ class Recursion:
             self.values[register] = self.vectors[name]
         if plan["input"] >= 0 and not self.unit_input:
             x = self._shaped(self.book.new, "x", plan["domain"], COLUMNS)
-            self.columns += x.name.removeprefix("x")
+            self.columns = COLUMNS + x.name.removeprefix("x")
             x = replace(x, columns=self.columns)
             self.values[plan["input"]] = x
             program.inputs.append(x)
