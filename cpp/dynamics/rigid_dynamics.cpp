@@ -81,10 +81,8 @@ typename RigidDynamics<S>::AddedInertias RigidDynamics<S>::forward_dynamics_of_p
     solve_regular(r_.data(), vdot);
   }
   left_ = S(0);
-  if (how.refinement.steps == 0) {
-    if (how.on_singular != OnSingular::minimum_norm && blocks_.faint().body >= 0) correct_faint(q, v, tau, vdot);
-    return added;
-  }
+  if (how.on_singular != OnSingular::minimum_norm && blocks_.faint().body >= 0) correct_faint(q, v, tau, vdot);
+  if (how.refinement.steps == 0) return added;
   const auto size_at = [&](const S* x) {
     if (how.refinement.wider())
       size_residual(*wider_, wide_x_.data(), how.refinement);

@@ -154,7 +154,7 @@ void RigidInverseTangent<S>::move(const RigidValues<S>& values, const S& amount,
 }
 
 template <class S>
-void RigidInverseTangent<S>::seed(const RigidValues<S>& values, const DirectionOfTangent& direction) {
+void RigidInverseTangent<S>::seed(const RigidValues<S>& values) {
   if (compiled_ != values.compiled_model()) compiled_ = values.compiled_model(), model_ = broadcast<T>(*compiled_);
   const RigidBlocks<S>& at = values.blocks();
   for (int k = 0; k < tree_.bodies(); ++k) blocks_.pose[k] = cast<T>(at.pose[k]);
@@ -165,8 +165,11 @@ void RigidInverseTangent<S>::seed(const RigidValues<S>& values, const DirectionO
   factors_ = model_.inertia_factors;
   blocks_.inertia_factors = &factors_;
   blocks_.form = Form::ud;  // reflections would pass over a row that is zero here and not beside it
-  for (const auto& [amount, twist] : direction.twists) move(values, S(amount), twist);
-  for (int i = 0; direction.time && i < tree_.coordinates(); ++i) move(values, values.v()[i], {i});
+  for (const auto& [amount, twist] : direction_->twists) move(values, S(amount), twist);
+  for (int i = 0; direction_->time && i < tree_.coordinates(); ++i) {
+    coordinate_[0] = i;
+    move(values, values.v()[i], coordinate_);
+  }
 }
 
 template <class S>
@@ -174,7 +177,8 @@ bool RigidInverseTangent<S>::apply(const SkoValues<S>& values, const Symbol& let
   const size_t size = size_t(tree_.coordinates()) * columns;
   x_.assign(x, x + size);
   y_.resize(size), scratch_.resize(size_t(tree_.dimension()) * columns);
-  seed(static_cast<const RigidValues<S>&>(values), direction_of_tangent(letter));
+  if (!direction_) direction_ = direction_of_tangent(letter);
+  seed(static_cast<const RigidValues<S>&>(values));
   articulated_inertia_tip_to_base(tree_, blocks_);
   mass_matrix_inverse_apply(tree_, blocks_, x_.data(), y_.data(), columns, scratch_.data());
   for (size_t i = 0; i < size; ++i) {

@@ -45,7 +45,7 @@ class RigidInverseTangent final : public InverseTangent<S> {
 
  private:
   using T = Tangent<S, 1>;
-  void seed(const RigidValues<S>& values, const DirectionOfTangent& direction);
+  void seed(const RigidValues<S>& values);
   void move(const RigidValues<S>& values, const S& amount, const std::vector<int>& twist);
 
   const SkoStructure& tree_;
@@ -53,6 +53,8 @@ class RigidInverseTangent final : public InverseTangent<S> {
   std::shared_ptr<const CompiledModel<S>> compiled_;
   CompiledModel<T> model_;
   std::vector<InertiaFactors<T>> factors_;
+  std::optional<DirectionOfTangent> direction_;  // of the one letter that this serves
+  std::vector<int> coordinate_ = {0};
   std::vector<T> x_, y_, scratch_;
 };
 

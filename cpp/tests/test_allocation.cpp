@@ -77,12 +77,16 @@ BOOST_AUTO_TEST_CASE(runs_of_plans) {
   twice->apply = twice->apply_transposed = [n](const double* x, double* y, int columns) {
     for (int i = 0; i < n * columns; ++i) y[i] = 2 * x[i];
   };
+  const auto in_factors = std::make_shared<Binding>();
+  in_factors->nq = mb->nq(), in_factors->nv = mb->nv(), in_factors->q = mb->state()->q, in_factors->v = mb->state()->v;
+  in_factors->arithmetic.form = Form::ud;
   std::set<StepKind> seen;
   for (const Expression& e : {o.phi, o.psi.T(), o.K, o.Omega, o.D.inv(), o.tau_bar, MM, MM.inv(), (MM + 0.1 * o.I).inv(), block_diagonal(o.Omega), (MM.inv() + 0.01 * o.D).inv(),
                               MMm, MMm.inv(), m.psi, (MMm + 0.1 * m.I).inv(), square_root(o.D), lower_half(o.D), zero(MM.domain(), MM.codomain()), C * MM, (dense_constant(o.phi.domain(), o.phi.codomain()) + o.phi).inv(),
                               block_diagonal((C + MM).inv()), block_diagonal(o.phi * o.M * o.phi.T()), block_diagonal(o.psi.T() * o.Upsilon * o.psi), 2 * I - MM, (o.D + 0.1 * I).inv(),
                               MM.inv() + external(twice, MM.domain(), MM.codomain()), crf_V * o.phi, o.M * a + b, a * a.T(), block_diagonal(o.E * o.M * o.E.T()),
-                              block_diagonal((MM + 0.1 * o.I).inv()), o.phi * o.M, long_phi, differentiate(MM, *coordinate_direction(source, 2)), differentiate(MM.inv(), *coordinate_direction(source, 2))})
+                              block_diagonal((MM + 0.1 * o.I).inv()), o.phi * o.M, long_phi, differentiate(MM, *coordinate_direction(source, 2)), differentiate(MM.inv(), *coordinate_direction(source, 2)),
+                              differentiate(MM.inv(), *coordinate_direction(source, 7)).at(in_factors), differentiate(MM.inv(), *time_direction(source, {})).at(in_factors)})
     for (const bool rules : {true, false}) check_runs(e, seen, rules);
   for (int kind = 0; kind < step_kinds; ++kind)
     BOOST_TEST(seen.count(StepKind(kind)) == 1, "no run had a step " << step_kind_name(StepKind(kind)));
