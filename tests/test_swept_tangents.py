@@ -14,6 +14,11 @@ def inverse(model):
     return (model.soa.MM + model.soa.J).inv()
 
 
+def steps_of(expression):
+    """The plan as it is explained, whatever the width of its lines."""
+    return " ".join(str(expression.explain()).split())
+
+
 def relative(got, truth, scale=0.0):
     return np.abs(got - truth).max() / max(np.abs(truth).max(), scale)
 
@@ -126,14 +131,14 @@ def test_every_kind_of_hinge(form):
 def test_the_step_is_there_in_factored_forms_alone():
     model = every_kind()
     op = inverse(model).diff(9)
-    assert STEP in str(op.at(model.q, form="ud").explain()) and STEP in str(op.at(model.q, form="square-root").explain())
-    assert STEP not in str(op.at(model.q).explain()) and STEP not in str(op.explain())
-    assert STEP not in str(op.at(model.q, form="ud", precision=100).explain())
+    assert STEP in steps_of(op.at(model.q, form="ud")) and STEP in steps_of(op.at(model.q, form="square-root"))
+    assert STEP not in steps_of(op.at(model.q)) and STEP not in steps_of(op)
+    assert STEP not in steps_of(op.at(model.q, form="ud", precision=100))
     inner = next(h for h in model.hinges.values() if len(h.subhinges) > 2)
-    assert STEP in str(inverse(model).diff(inner.symbol("placement", "x")).at(model.q, form="ud").explain())
+    assert STEP in steps_of(inverse(model).diff(inner.symbol("placement", "x")).at(model.q, form="ud"))
     amid = inverse(model).diff(inner.symbol("point", "x", 1))  # computed as typed: right, to what `fast` has
-    assert STEP not in str(amid.at(model.q, form="ud").explain())
-    assert STEP not in str((model.soa.MM + 2 * model.soa.J).inv().diff(9).at(model.q, form="ud").explain())
+    assert STEP not in steps_of(amid.at(model.q, form="ud"))
+    assert STEP not in steps_of((model.soa.MM + 2 * model.soa.J).inv().diff(9).at(model.q, form="ud"))
     other = inverse(model) @ (2 * (model.soa.MM + model.soa.J).diff(9)) @ inverse(model)  # no ∂(ℳ + J)⁻¹, but twice that
     x = np.ones(model.nv)
     assert relative(other.at(model.q, form="ud") @ x, -2 * (op.at(model.q, form="ud") @ x)) < 1e-12

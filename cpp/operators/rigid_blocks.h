@@ -295,7 +295,7 @@ class RigidBlocks {
     reach_[k] = S(0);
     lever_[k] = ratio_or_zero(longest(inertia[k].moment), inertia[k].mass);
     error_[k] = S(0), growth_[k] = S(1);
-    if (k == 0) faint_ = {};
+    if (k == tree_.bodies() - 1) faint_ = {};  // the first that any sweep eliminates
   }
   // D, G, P⁺ of body k; doubtful where a pivot is so small that only the error sweep can tell whether it is noise.
   Pivots eliminate_hinge(int k) {

@@ -172,7 +172,7 @@ class XmlFile:
         """One number of each of these attributes, all of which must be there."""
         values = [element.get(attribute) for attribute in attributes]
         try:  # all at once, where nothing is wrong
-            numbers, written = list(map(float, values)), "".join(values)  # type: ignore[arg-type]
+            numbers, written = list(map(float, values)), "".join(values)  # type: ignore[arg-type]  # None is caught
         except (TypeError, ValueError):
             return [self.number(element, attribute, owner) for attribute in attributes]
         if written.isascii() and "_" not in written and all(map(math.isfinite, numbers)):

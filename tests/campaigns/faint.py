@@ -19,7 +19,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-import pycraft as pc  # noqa: E402
+import pycraft as pc
 
 FORMS = ("fast", "ud", "square-root")
 KINDS = ("ball", "gimbal", "universal", "free", "pins", "pin")
