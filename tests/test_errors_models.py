@@ -307,7 +307,7 @@ def test_mjcf_without_its_package(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     path = tmp_path / "arm.xml"
     path.write_text("<mujoco><worldbody/></mujoco>")
-    says = r"arm.xml: MJCF files are read by the package mujoco.*pip install \"pycraft-soa\[mjcf\]\""
+    says = r"arm.xml: MJCF files are read by the package mujoco.*pip install 'pycraft-soa\[mjcf\]'"
     with pytest.raises(pc.Error, match=says) as caught:
         pc.load(path)
     assert isinstance(caught.value, ImportError)
