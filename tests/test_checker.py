@@ -9,6 +9,7 @@ from mechanisms import every_kind
 from perturbations import difference, exchanges
 
 import pycraft as pc
+from pycraft.identities.checker import check_theorem
 
 NEED_J_ZERO = {
     "Riccati equation of P",
@@ -312,6 +313,18 @@ def test_what_falls_and_is_exact_passes():
     assert pc.check((phi, phi), model) and pc.check((H - H, pc.zero(model.soa.F, model.soa.Theta)), model)
     zero = pc.check("0*phi == 0", model)
     assert zero and not zero.undecided and zero.worst == 0.0
+
+
+def test_an_inverse_that_is_not_there_is_a_way_to_fail_outside_the_hypotheses_alone(monkeypatch):
+    """Where all hypotheses are met nothing was expected to fail: the theorem is undefined there."""
+
+    def singular(*_, **__):
+        raise pc.SingularOperatorError("no inverse")
+
+    monkeypatch.setattr("pycraft.identities.checker.judge_states", singular)
+    theorem = next(t for t in statements(pc.chain(2).soa.theorems()) if t.hypotheses)
+    found = {bool(unmet): check_theorem(theorem, unmet, [], np.random.default_rng(0)) for unmet in ([], theorem.hypotheses)}
+    assert (found[False].verdict, found[True].verdict) == ("undefined", "expected to fail") and found[False].note == "no inverse"
 
 
 def test_precisions_by_name(monkeypatch):

@@ -34,6 +34,8 @@ def test_other_orders_are_converted():
         model.add_body(name, mass=1.0 + (name == "a"), com=(0, 0.1, 0.2), inertia=np.eye(3), hinge_name=name)
     for name in "ba":
         other.add_body(name, mass=1.0 + (name == "a"), com=(0, 0.1, 0.2), inertia=np.eye(3), hinge_name=name)
+    for arm in (model, other):
+        arm.hinges["a"].rotor_inertia, arm.hinges["b"].rotor_inertia = 0.1, 0.7
     report = pc.compare(model, other)
     assert report and kinds_said(report) == ["order"] and "first comes a here, b there" in repr(report)
     assert report.as_they_are["mass matrix"] > 1e-3 > 1e-14 > report.worst
@@ -179,3 +181,12 @@ def test_what_they_are_is_shown_before_gravity_is_the_same():
     other.gravity = (0, 0, -9.81)
     report = pc.compare(two_links(), other)
     assert report and report.as_they_are["forward dynamics"] > 1e-3 > 1e-13 > report.in_common["forward dynamics"]
+
+
+def test_forward_dynamics_may_lose_what_the_mass_matrix_is_conditioned_by():
+    model = two_links(mass=2000.0)
+    report = pc.compare(model, copy.deepcopy(model), states=1)
+    condition = np.linalg.cond(model.mass_matrix(model.random_state(np.random.default_rng(0)).q))
+    rounding = 100 * model.nv * np.finfo(float).eps
+    assert condition > 2 and report.bounds["mass matrix"] == report.bounds["inverse dynamics"] == rounding
+    assert report.bounds["forward dynamics"] / rounding == pytest.approx(condition, rel=1e-9)

@@ -128,6 +128,21 @@ def test_norms_of_double_are_taken_where_rounding_leaves_them_digits(monkeypatch
     assert taken.bound == 1e3 * EPSILON["quad"]  # those of double, which cost least
 
 
+def test_a_product_rounds_at_every_factor():
+    """m times the worst of ‖F₁…Fᵢ₋₁‖ ‖Fᵢ‖ ‖Fᵢ₊₁…Fₘ‖: each of the m steps rounds."""
+    arm = pc.chain(4)
+    E, M = arm.soa("E M")
+    factors = [E, E, M, E.T]
+    values = [F.dense() for F in factors]
+    before, after = [np.eye(len(arm.soa.F))], [np.eye(len(arm.soa.F))]
+    for F, last in zip(values, reversed(values), strict=True):
+        before.append(before[-1] @ F)
+        after.append(last @ after[-1])
+    norm = np.linalg.norm
+    steps = [(norm(before[i]) if i else 1) * norm(F) * (norm(after[3 - i]) if i < 3 else 1) for i, F in enumerate(values)]
+    np.testing.assert_allclose(Sizes(lambda e: e).size(E @ E @ M @ E.T), 4 * max(steps), rtol=1e-12)
+
+
 def test_norms_follow_the_vectors():
     model = pc.chain(2)
     x = pc.vector("x", model.soa.Theta)

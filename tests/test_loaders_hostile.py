@@ -81,6 +81,13 @@ def test_entities_that_nothing_declares_are_refused(says, doctype):
     assert "<" not in says(doctype + robot(link("a"), "&nope;")).split(":", 2)[0]
 
 
+@pytest.mark.parametrize("declared", ["'10'", "SYSTEM 'missing.txt'", "SYSTEM 'robot.urdf'"])
+def test_entities_that_are_declared_are_named_and_nothing_of_them_is_read(says, declared):
+    """Expanded, the others would open a file: one that is not there, and this one again."""
+    text = says(f"<!DOCTYPE robot [<!ENTITY a {declared}>]>\n" + robot(link("a"), "&a;"))
+    assert text == ":2: the file declares entities (a), which are not expanded; write their text out"
+
+
 def test_entities_of_xml_itself_are_read(tmp_path):
     path = tmp_path / "r.urdf"
     path.write_text(robot(link("a &amp; b", INERTIAL.replace('value="1"', 'value="&#49;0"'))))

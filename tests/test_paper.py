@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import pycraft as pc
-from pycraft.identities.paper import check_paper, equations
+from pycraft.identities.paper import Equation, PaperReport, check_paper, equations
 
 PAPER = Path(__file__).parent / "data" / "paper.tex"
 
@@ -109,6 +109,27 @@ def test_macros_comments_and_conditions():
     )
     found = [(line, " ".join(text.split())) for line, text in equations(source)]
     assert found[:2] == [(3, r"\phi \psi^{*} = I"), (3, "D = D")] and len(found) == 3
+
+
+@pytest.mark.parametrize("sign", ["-", "+", "=", r"\cdot ", r"\times "])
+def test_a_row_that_begins_with_a_sign_goes_on(sign):
+    source = "\\begin{align}\nA &= B \\\\\n&" + sign + "C \\\\\nD &= E\n\\end{align}"
+    assert [(line, " ".join(text.split())) for line, text in equations(source)] == [(2, f"A = B {sign}C"), (4, "D = E")]
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "status"),
+    [
+        (["holds", "undecided"], 3),
+        (["undecided", "fails"], 1),
+        (["holds", "fails"], 1),
+        (["holds", "true where", "not read"], 0),
+        (["not read"], 1),
+    ],
+)
+def test_what_fails_is_told_before_what_is_undecided(verdicts, status):
+    report = PaperReport("p.tex", [Equation(k, "", verdict) for k, verdict in enumerate(verdicts)])
+    assert report.status == status and bool(report) == (status == 0)
 
 
 def test_files_that_cannot_be_read(tmp_path):

@@ -1,10 +1,12 @@
 """What may be assumed and defined in a proof, and statements of compliances, diagonal blocks, nodes and roots."""
 
+import numpy as np
 import pytest
 from random_identities import CHAIN, CONSTANT, J0, ROUNDING, SINGLE, meeting, tree
 
 import pycraft as pc
 from pycraft.symbolic import derivative, prove, prove_derivative
+from pycraft.symbolic.relations import at_the_roots
 
 # (text, what is assumed, the hypotheses of the proof, what it presupposes)
 ASSUMED = [
@@ -64,6 +66,16 @@ def test_letters_of_ones_own():
     assert prove("MM + J == A D A*", arm, define={"A": pc.identity(arm.soa.Theta) + H @ phi @ K})
     assert prove("MM + J == A D A*", define={"A": "I + HφK"})
     assert prove("T*MM*T == 0 + T*MM T", define={"T": "Θ"}) or prove("T*ℳT = T*ℳ*T", define={"T": "Θ"})
+
+
+def test_only_a_constant_of_bodies_on_the_base_does_not_see_the_tree():
+    arm = pc.chain(2).soa
+    for stands, steps in ((slice(0, 6), 6), (slice(None), 0)):
+        numbers = np.zeros((2, 12))
+        numbers[:, stands] = 1.0
+        C = pc.constant(numbers, arm.F, pc.euclidean(2), "C")
+        assert bool(prove(C @ arm.M @ arm.phi.T, C @ arm.M)) == bool(steps)
+        assert len([*at_the_roots("C", C, arm._source)]) == steps
 
 
 @pytest.mark.parametrize(

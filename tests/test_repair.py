@@ -1,6 +1,7 @@
 """`repair`: the nearest true formulas to a wrong one, in words; and the syntax tree that it changes."""
 
 import re
+import sys
 
 import numpy as np
 import pytest
@@ -15,7 +16,9 @@ from pycraft.identities.formula_reading import read_formula
 from pycraft.identities.formula_values import DenseLetters, Misfit, evaluate, residual
 from pycraft.identities.parse import Statements
 from pycraft.symbolic import prove
-from pycraft.symbolic.repair import nearest, small_models
+from pycraft.symbolic.repair import Repair, nearest, small_models
+
+module = sys.modules[Repair.__module__]  # by its name: the function is called as the module is
 
 
 def letters(seed=5):
@@ -60,6 +63,30 @@ def test_the_true_one_is_the_nearest_and_proved():
     assert "proved" in repr(found) and "<ol>" in found._repr_html_() and max(map(len, repr(found).splitlines())) <= 80
     book = pc.repair("D = HPH", most=1)
     assert book[0].where == [{"J = 0"}] and "true where J = 0; proved" in repr(book)
+
+
+def test_what_is_nearly_true_is_false(models):
+    """A thousandth is as far from true as a wrong letter."""
+    for text, close in (("ψ⁻¹ = φ⁻¹ + KH", True), ("ψ⁻¹ = φ⁻¹ + 1.001KH", False), ("φ = φ + 1e-6 ψ", False)):
+        assert module._is_close(read_formula(text), models) == close
+
+
+def test_what_holds_on_the_first_model_alone_is_left_out(models):
+    """The second has rotor inertia, where D is not HPH*."""
+    rotors = module._letters(Spec((-1, 0, 1), ("screw", "pin", "pin"), True, 6))
+    for others, found in (([models[1]], True), ([rotors], False)):
+        near, _, _ = nearest(read_formula("D = HPH"), [models[0], *others])
+        assert any("star missing on H" in slip.words for _, slip in near) == found
+
+
+def test_few_hypotheses_come_first_and_no_more_than_are_asked_for(monkeypatch):
+    """A slip that is a little likelier is no reason to suppose two hypotheses more."""
+    needs = {"one": (1.0, {"J = 0", "serial chain"}), "two": (1.2, set()), "three": (1.3, {"J = 0"})}
+    monkeypatch.setattr(module, "nearest", lambda *_: ([(name, None) for name in needs], 3, True))
+    monkeypatch.setattr(module, "_is_close", lambda *_: False)
+    monkeypatch.setattr(module, "_found", lambda name, *_: Repair(name, name, "", needs[name][0], [frozenset(needs[name][1])]))
+    assert [r.statement for r in pc.repair("φ = ψ")] == ["two", "three", "one"]
+    assert [r.statement for r in pc.repair("φ = ψ", most=1)] == ["two"]
 
 
 def test_a_true_formula_needs_none():

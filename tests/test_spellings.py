@@ -31,6 +31,12 @@ def test_every_spelling_reads_as_what_is_meant(meant, read):
             np.testing.assert_allclose(value(got), value(wanted), rtol=1e-12, atol=1e-12 * np.abs(value(wanted)).max(), err_msg=typed)
 
 
+@pytest.mark.parametrize("sign", [r"\cdot", r"\times"])
+def test_powers_of_ten(sign, read):
+    for power, number in (("^{2}", "300"), ("^2", "300"), ("^{-2}", "0.03"), (" ^ { +2 }", "300")):
+        assert read(rf"3 {sign} 10{power} \phi").lhs == read(f"{number} φ").lhs
+
+
 def test_every_letter_reads_by_its_name_its_sign_and_its_latex(read):
     with_arguments = {"B": "body1", "Jacobian": "body1", "Lambda": "body1", "Delta": "0"}
     for name, shown, latex, *_ in _core.symbol_table():

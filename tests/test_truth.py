@@ -1,11 +1,20 @@
 """Statements on random trees: where they are true, under which hypotheses, and the case that tells most."""
 
+import itertools
+import math
+import sys
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import pycraft as pc
-from pycraft.identities.family import CELLS, DEPTH, DOF, HYPOTHESES, Spec, family, respelled, specs
-from pycraft.identities.truth import FALSE, TRUE
+from pycraft.identities.budget import Budget
+from pycraft.identities.family import CELLS, CHAIN, DEPTH, DOF, HYPOTHESES, NO_J, WITH_J, Spec, family, respelled, specs
+from pycraft.identities.judge import HOLDS, UNDECIDED
+from pycraft.identities.truth import FALSE, TRUE, UNREAD, CellTruth, TruthMap, explained, saving, truth_within
+
+MODULE = sys.modules[TruthMap.__module__]  # by its name: the function is called as the module is
 
 NOT_CERTIFIED = [
     "φ = I + E + E² + EEE",
@@ -51,6 +60,8 @@ def test_the_family_has_every_kind_everywhere():
             traits = {name for name, is_met in model.soa._source.traits.items() if is_met}
             assert spec.met - {"free root"} <= traits and np.abs(np.asarray(model.gravity)).min() > 0.5
             assert spec.met & set(traits) == {h for h in HYPOTHESES if h in traits and h in spec.met}
+            for node in model.nodes.values():  # beside the body's own frame in place and direction
+                assert np.abs(node.pose[:3, 3]).max() > 1e-3 and np.abs(node.pose[:3, :3] - np.eye(3)).max() > 1e-3
 
 
 def test_one_coordinate_has_the_hinges_name():
@@ -126,3 +137,40 @@ def test_a_hypothesis_that_the_refuting_model_meets_saves_nothing():
     arm = pc.tree([-1, 0, 0], "pin", seed=3)
     assert not pc.check("ℳ = 2ℳ", arm, budget=0.5).true_where
     assert pc.check("Ω = Υ + ψ̃*Υ + Υψ̃", arm).true_where == [{"serial chain"}]
+
+
+def of_cells(verdict):
+    """A truth map by rule: what is found in each cell."""
+    return TruthMap("φ = ψ", [CellTruth(cell, verdict(cell), 4) for cell in CELLS])
+
+
+def test_what_the_refuting_model_meets_is_taken_out():
+    found = of_cells(lambda cell: TRUE if cell.J == NO_J or cell.shape == CHAIN else FALSE)
+    assert found.where == saving(found) == [{"J = 0"}, {"serial chain"}]
+    assert saving(found, lambda: {"J = 0": True, "serial chain": False}) == [{"serial chain"}]
+    assert saving(found, lambda: {"J = 0": True, "serial chain": True}) == []
+
+
+def test_a_map_that_says_nothing_is_not_true():
+    assert not of_cells(lambda cell: UNREAD) and of_cells(lambda cell: TRUE)
+    assert of_cells(lambda cell: TRUE if cell.J == WITH_J else UNREAD)
+    for verdict in (FALSE, UNDECIDED):
+        assert not of_cells(lambda cell, verdict=verdict: verdict if cell == CELLS[-1] else TRUE)
+
+
+def test_one_undecided_model_leaves_its_cell_undecided(monkeypatch):
+    verdicts = itertools.cycle([HOLDS, UNDECIDED, HOLDS, HOLDS, *[HOLDS] * 4])
+    monkeypatch.setattr(MODULE, "judged", lambda *_: SimpleNamespace(verdict=next(verdicts)))
+    found = truth_within("φ = ψ", Budget(math.inf))
+    assert [cell.verdict for cell in found] == [UNDECIDED, TRUE] * (len(CELLS) // 2) and not found
+
+
+def test_what_nothing_saves_is_refuted_where_most_hypotheses_are_met(monkeypatch):
+    """It is not blamed on what the true formula does not hold for either."""
+    asked = []
+    monkeypatch.setattr(MODULE, "smallest", lambda *_, **options: asked.append(options["meets"]))
+    for undecided, meets in (({}, CELLS[0]), ({CELLS[0]}, CELLS[1])):
+        found = of_cells(lambda cell, undecided=undecided: UNDECIDED if cell in undecided else FALSE)
+        monkeypatch.setattr(MODULE, "truth_within", lambda *_, found=found: found)
+        explained("φ = ψ")
+        assert asked.pop() == meets.least and len(meets.least) >= 3

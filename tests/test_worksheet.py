@@ -5,7 +5,7 @@ import json
 import pytest
 
 import pycraft as pc
-from pycraft.symbolic.worksheet import TOPICS, grade, worksheet
+from pycraft.symbolic.worksheet import TOPICS, _gaps, grade, worksheet
 
 
 def handed_in(path, answers):
@@ -61,6 +61,21 @@ def test_what_is_handed_in_is_graded_by_proof(sheets, tmp_path):
     assert grades[2].points == 0 and {j.verdict for j in grades[2].judgements.values()} == {"no answer"}
     handed_in(tmp_path / "student01.ipynb", right | {first: f"2*({right[first]})"})
     assert grade(tmp_path / "student01.ipynb").points == len(right) - 1
+
+
+def test_no_two_lines_in_a_row_are_left_out(sheets):
+    """Each answer is then judged between lines that are seen."""
+    pairs = [question.blanks for sheet in sheets for question in sheet.questions if len(question.blanks) == 2]
+    assert pairs and all(last - first > 1 for first, last in pairs)
+
+
+def test_a_line_that_only_names_what_is_there_is_not_asked_for(monkeypatch):
+    """Line 4 calls a part of line 5 by a name that no statement reads."""
+    task = pc.exercise("Ω decomposed with siblings")
+    monkeypatch.setattr(type(task), "gaps", lambda self: [1, 4])
+    assert _gaps(task) == [1] and not task.leaving_out(4).answer(task.steps[3].after_text())
+    monkeypatch.setattr(type(task), "gaps", lambda self: [4])
+    assert _gaps(task) == [4]  # where there is no other
 
 
 def test_another_question_in_the_file_is_not_graded(sheets, tmp_path):

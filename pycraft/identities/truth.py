@@ -265,10 +265,6 @@ def saving(found: TruthMap, traits: Callable[[], dict[str, bool]] | None = None)
     return [chosen for chosen in found.where if chosen and not chosen <= met]
 
 
-STRICTEST = frozenset({"J = 0", "serial chain", "constant H", "single-DOF hinges"})
-"""All standard hypotheses at once (but for a free root, which has six degrees of freedom)."""
-
-
 def explained(
     statement: str,
     *,
@@ -288,9 +284,9 @@ def explained(
     meets: frozenset[str] = frozenset()
     if found_map is not None and not saved:
         false = [c for c in found_map.cells if c.verdict == FALSE]
-        strict = [c for c in false if STRICTEST <= c.cell.least] or sorted(false, key=lambda c: -len(c.cell.least))[:1]
-        if strict:
-            start, meets = strict[0].example, strict[0].cell.least
+        if false:
+            strictest = max(false, key=lambda c: len(c.cell.least))
+            start, meets = strictest.example, strictest.cell.least
     if start is None and found_map is not None:
         start = next((c.example for c in found_map.cells if c.example is not None), None)
     example = smallest(statement, seed=seed, precision=precision, budget=budget, found=start, meets=meets, vectors=vectors)

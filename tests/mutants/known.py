@@ -89,6 +89,11 @@ EQUIVALENT = {
         "a refinement of an elimination need only shrink",
         "",
     ): "what loses more than a hundredth is refused, so corrections shrink a hundredfold or are rounding: one of these more, no digit else",
+    (
+        "pycraft/identities/search.py",
+        "children of a body left out",
+        "",
+    ): "children of the body left out stand at its parent by then: no parent is k, and what is above k is above 0",
 }
 
 
