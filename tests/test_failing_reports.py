@@ -20,6 +20,7 @@ def test_one_that_fails_is_enough(others):
         verdicts = [*others[:at], "fails", *others[at:]]
         report = Report("model", {}, [finding(v) for v in verdicts])
         assert not report and [f.verdict for f in report.failed] == ["fails"]
+        assert [f.passed for f in report.findings] == [v != "fails" for v in verdicts]
 
 
 def test_the_command_ends_with_one(monkeypatch):
