@@ -73,6 +73,11 @@ class TestBuild:
         made.parent.mkdir(parents=True, exist_ok=True)
         command = shlex.split(self.commands[obj]["command"].replace(str(self.root / "cpp"), str(self.tree / "cpp")))
         command[command.index("-o") + 1] = str(made)
+        together = self.root / "build" / command[command.index("-c") + 1]
+        if together.is_relative_to(self.root / "build"):  # sources that are compiled together: a file of CMake's that includes them
+            copy = made.with_suffix(".together.cxx")
+            copy.write_text(together.read_text(encoding="utf-8").replace(str(self.root / "cpp"), str(self.tree / "cpp")), encoding="utf-8")
+            command[command.index("-c") + 1] = str(copy)
         command += [f"-O{self.optimisation}", "-w", "-include", str(self.tree / "cpp/mutants.h")]
         launcher = shlex.split(os.environ.get("CMAKE_CXX_COMPILER_LAUNCHER", ""))
         run = subprocess.run([*launcher, *command], capture_output=True, text=True, cwd=self.root / "build")
