@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
@@ -36,7 +37,7 @@ from .recursion import Text
 WORDS = Text()
 
 
-class Source:
+class Source(ABC):
     """A writer of source; subclasses give the language's words."""
 
     transpose = "{}.T"
@@ -48,41 +49,41 @@ class Source:
         self.used: set[str] = set()
 
     # ------------------------------------------------------------------ words of a language, given by subclasses
+    @abstractmethod
     def at(self, node: At) -> str:
         """A quantity at a body, or the whole of it."""
-        raise NotImplementedError
 
+    @abstractmethod
     def other(self, node: Node) -> str:
         """A formula that is special to dense matrices and systems."""
-        raise NotImplementedError
 
+    @abstractmethod
     def sweep(self, item: Sweep) -> list[str]:
         """A loop over bodies."""
-        raise NotImplementedError
 
+    @abstractmethod
     def once(self, equation: Equation) -> list[str]:
         """An equation of the whole."""
-        raise NotImplementedError
 
+    @abstractmethod
     def elimination(self, system: System) -> list[str]:
         """The assembly of a system's blocks."""
-        raise NotImplementedError
 
+    @abstractmethod
     def solution(self, item: Solution) -> list[str]:
         """A right-hand side and its solve."""
-        raise NotImplementedError
 
+    @abstractmethod
     def selected(self, item: Selected) -> list[str]:
         """The diagonal blocks of a system's inverse."""
-        raise NotImplementedError
 
+    @abstractmethod
     def composite(self, item: CompositeAssembly) -> list[str]:
         """The composite-body assembly."""
-        raise NotImplementedError
 
+    @abstractmethod
     def operator(self, item: Operator) -> list[str]:
         """A function inside the function."""
-        raise NotImplementedError
 
     def item(self, item: Item) -> list[str]:
         """The lines of one pass."""
@@ -174,9 +175,9 @@ class Source:
             return self.length(cut, k)
         return cut if isinstance(cut, str) else str(cut)
 
+    @abstractmethod
     def length(self, cut: Cut, k: str) -> str:
         """How many rows of a space belong to body k."""
-        raise NotImplementedError
 
     # ------------------------------------------------------------------ systems, entry by entry
     def extents(self, system: System) -> tuple[str, str]:

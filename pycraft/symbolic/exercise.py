@@ -12,7 +12,7 @@ from typing import Any
 
 from .. import _core
 from ..identities.parse import Statement, Statements
-from .grading import Graded, Judgement
+from .grading import Exercise, Judgement
 from .proof import example
 from .prove import _operators, prove
 
@@ -90,15 +90,3 @@ def _read_theorem(text: str, model: Any) -> tuple[Any, str]:
         hint = f"; near it: {', '.join(map(repr, near))}" if near else "; soa.theorems() lists them"
         raise _core.EvaluationError(f"no theorem is called {text!r}, and it is no statement lhs == rhs{hint}")
     return Statements(operators).read(text), ""
-
-
-class Exercise(Graded):
-    """A derivation with a gap or several, see `exercise`.
-
-    Attributes
-    ----------
-    proof : the whole proof
-    steps : the derivation shown: the proof's, with lemmas opened where it has too few lines to leave one out
-    blanks : the numbers of the lines left out
-    blank : the one that `answer`, `hint` and `solution` are about: the first, see `gap`
-    """

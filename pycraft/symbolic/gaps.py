@@ -23,15 +23,7 @@ _Own = TypeVar("_Own", bound="WithGaps")
 
 
 class WithGaps:
-    """A derivation with a gap or several, see `exercise`.
-
-    Attributes
-    ----------
-    proof : the whole proof
-    steps : the derivation shown: the proof's, with lemmas opened where it has too few lines to leave one out
-    blanks : the numbers of the lines left out
-    blank : the one that `answer`, `hint` and `solution` are about: the first, see `gap`
-    """
+    """A derivation with lines left out: how it is shown, and hints; `Exercise` judges answers."""
 
     def __init__(self, proof: Proof, model: Any = None, blank: int | Sequence[int] | None = None, seed: int = 0):
         self.proof, self._model, self._read = proof, model, proof._read

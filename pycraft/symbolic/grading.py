@@ -62,8 +62,16 @@ class Judgement:
     __str__ = __repr__
 
 
-class Graded(WithGaps):
-    """A derivation with gaps whose answers are judged."""
+class Exercise(WithGaps):
+    """A derivation with a gap or several whose answers are judged, see `exercise`.
+
+    Attributes
+    ----------
+    proof : the whole proof
+    steps : the derivation shown: the proof's, with lemmas opened where it has too few lines to leave one out
+    blanks : the numbers of the lines left out
+    blank : the one that `answer`, `hint` and `solution` are about: the first, see `gap`
+    """
 
     def answer(self, line: Any) -> Any:
         """Judge a line: an expression, or text in Unicode, ASCII or LaTeX; of several gaps {number: line}, which gives {number: Judgement}.
