@@ -303,6 +303,14 @@ def test_xacro_file(tmp_path):
     assert pc.load(path).nv == 0
 
 
+@pytest.mark.parametrize("as_given", [str, str.encode])
+def test_the_text_of_a_model_is_no_path(as_given):
+    text = "\n<robot name='r'>" + "<link name='a'/>" * 10000 + "</robot>"
+    with pytest.raises(pc.ModelError, match="write \"<robot name='r'>.*to a file") as caught:
+        pc.load(as_given(text))
+    assert len(str(caught.value)) < 200
+
+
 def test_mjcf_without_its_package(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     path = tmp_path / "arm.xml"

@@ -40,6 +40,9 @@ class XmlFile:
             self.path = os.fsdecode(path)
         except TypeError:
             raise _core.ModelError(f"a model is loaded from the path of a file, not from {path!r:.80}") from None
+        if self.path.lstrip().startswith("<"):
+            begins = self.path.strip()[:40]
+            raise _core.ModelError(f"a model is loaded from the path of a file, not from its text: write {begins!r}... to a file")
         try:
             with open(self.path, "rb") as file:
                 data = file.read()
