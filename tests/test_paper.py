@@ -1,6 +1,7 @@
 """`pycraft check paper.tex`: every displayed equation is found, read, and given a verdict with its line."""
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -12,8 +13,9 @@ PAPER = Path(__file__).parent / "data" / "paper.tex"
 
 
 @pytest.fixture(scope="module")
-def report():
-    return check_paper(PAPER, pc.tree([-1, 0], ["pin", "slider"], seed=1), states=2, search=False)
+def report(tmp_path_factory):
+    deep = tmp_path_factory.mktemp("a_directory_whose_name_is_longer_than_a_line_of_a_terminal_of_eighty_columns")
+    return check_paper(shutil.copy(PAPER, deep), pc.tree([-1, 0], ["pin", "slider"], seed=1), states=2, search=False)
 
 
 def test_every_display_is_found_with_its_line(report):
@@ -40,7 +42,7 @@ def test_the_report_tells_all(report):
     assert not report and report.counts == {"holds": 8, "fails": 1, "not read": 2}
     shown = repr(report)
     assert "paper.tex:17: fails" in shown and "paper.tex:31: not read" in shown and "it has no equals sign" in shown
-    assert shown.endswith("11 equations: 1 fails, 8 holds, 2 not read")
+    assert shown.endswith("\npaper.tex: 11 equations: 1 fails, 8 holds, 2 not read")  # however long the path above it is
     assert [e["line"] for e in json.loads(report.to_json())["equations"]] == [e.line for e in report.equations]
 
 

@@ -89,7 +89,7 @@ class PaperReport:
                 if e.verdict == verdict:
                     told[e.headline] = told.get(e.headline, 0) + 1
         parts = [f"{count} {headline}" for headline, count in told.items()]
-        return f"{self.path}: {len(self.equations)} equations" + (": " + ", ".join(parts) if parts else "; none is displayed")
+        return f"{Path(self.path).name}: {len(self.equations)} equations" + (": " + ", ".join(parts) if parts else "; none is displayed")
 
     def to_json(self) -> str:
         return json.dumps({"path": self.path, "equations": [asdict(e) for e in self.equations]}, indent=1)
@@ -97,7 +97,9 @@ class PaperReport:
     def __repr__(self) -> str:
         lines = []
         for e in self.equations:
-            lines.append(wrapped(f"{self.path}:{e.line}: {e.headline}: {' '.join(e.latex.split())}"))
+            place, latex = f"{self.path}:{e.line}: {e.headline}:", " ".join(e.latex.split())
+            whole = f"{place} {latex}"
+            lines += [whole] if len(whole) <= WIDTH else [place, wrapped(f"    {latex}")]
             notes = [f"  {note}" for note in e.note.split("\n") if note.strip()]
             lines += [note if len(note) <= WIDTH else wrapped(note) for note in notes]
         return "\n".join([*lines, wrapped(self.summary())])
