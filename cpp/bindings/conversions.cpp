@@ -55,6 +55,13 @@ Array real_numbers(const py::handle& value, const char*& why) {
   return a;
 }
 
+// The items of a tuple or list of so many Python floats, which are numbers without a doubt and need no array on the way; else null.
+PyObject* const* plain_floats(const py::handle& value, Py_ssize_t count) {
+  if ((!PyTuple_CheckExact(value.ptr()) && !PyList_CheckExact(value.ptr())) || PySequence_Fast_GET_SIZE(value.ptr()) != count) return nullptr;
+  PyObject* const* const items = PySequence_Fast_ITEMS(value.ptr());
+  return std::all_of(items, items + count, [](PyObject* x) { return PyFloat_CheckExact(x); }) ? items : nullptr;
+}
+
 }  // namespace
 
 Array numbers(const py::handle& value, const char* what) {
@@ -65,6 +72,7 @@ Array numbers(const py::handle& value, const char* what) {
 }
 
 double one_number(const py::handle& value, const char* what) {
+  if (PyFloat_CheckExact(value.ptr())) return PyFloat_AS_DOUBLE(value.ptr());
   const Array a = numbers(value, what);
   if (a.ndim() != 0) throw ModelError(std::string(what) + " takes one number, not an array of " + std::to_string(a.size()));
   return *a.data();
@@ -78,6 +86,7 @@ int clipped(const py::handle& whole) {
 }
 
 std::vector<double> list_of_numbers(const py::handle& value, const char* what) {
+  if (PyFloat_CheckExact(value.ptr())) return {PyFloat_AS_DOUBLE(value.ptr())};
   const Array a = numbers(value, what);
   if (a.ndim() > 1) throw ModelError(std::string(what) + " takes a number or a list of numbers, not an array of " + std::to_string(a.ndim()) + " dimensions");
   return {a.data(), a.data() + a.size()};
@@ -103,6 +112,8 @@ std::string shape_text(const py::array& a) {
 }
 
 Vector3<double> to_vector3(const py::handle& value, const char* what) {
+  if (PyObject* const* const items = plain_floats(value, 3))
+    return {PyFloat_AS_DOUBLE(items[0]), PyFloat_AS_DOUBLE(items[1]), PyFloat_AS_DOUBLE(items[2])};
   const Array a = numbers(value, what);
   if (a.ndim() != 1 || a.size() != 3) throw ModelError(std::string(what) + " takes 3 numbers, not " + shape_text(a));
   return {a.data()[0], a.data()[1], a.data()[2]};

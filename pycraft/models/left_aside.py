@@ -18,7 +18,7 @@ def by_coordinate(model: Multibody, of_hinges: Mapping[str, Mapping[str, float]]
     """
     if not of_hinges:
         return {}
-    arrays, slices = {}, {name: hinge.v_slice for name, hinge in model.hinges.items()}
+    arrays, slices = {}, {name: model._slices(k)[1] for k, name in enumerate(model._names()[1])}
     for quantity, numbers in of_hinges.items():
         values = np.full(model.nv, np.nan)
         for hinge, number in numbers.items():

@@ -77,7 +77,7 @@ class Multibody(Closed, IntegrationCalls, _core.Multibody):
         com: Vector | None = None,
         inertia: np.ndarray | None = None,
         rotor_inertia: float | Vector | None = None,
-        limits: tuple[Vector, Vector] | None = None,
+        limits: tuple[float | Vector, float | Vector] | None = None,
         hinge_name: str | None = None,
     ) -> Body:
         """Add a body on a hinge.

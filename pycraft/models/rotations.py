@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 
 def rotation_from_rpy(rpy: Sequence[float] | np.ndarray) -> np.ndarray:
     """Rz(yaw) Ry(pitch) Rx(roll), (3, 3): turns about the fixed axes x, y, z in that order, angles in radians."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
+    (cr, cp, cy), (sr, sp, sy) = map(math.cos, rpy), map(math.sin, rpy)
     return np.array(
         [
             [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],

@@ -64,7 +64,7 @@ def _settle_mimics(file: XmlFile, joints: dict[str, Joint], mimic: str) -> None:
     for joint in followers:
         _lock(file, joints, joint, positions)
     for joint in followers:
-        axis = joint.axis / np.linalg.norm(joint.axis)
+        axis = np.asarray(joint.axis) / np.linalg.norm(joint.axis)
         if joint.kind == "pin":
             joint.rotation = joint.rotation @ rotation_about(axis, positions[joint.name])
         else:
@@ -158,9 +158,9 @@ class _Tree:
         named = min((k for k in words if words[k] in text), key=lambda k: text.find(words[k]), default="body")  # a name may hold the other
         if named == "hinge" and link in self.inboard:
             owner = self.inboard[link].element
-            at = self.file.child(owner, "pycraft") if "rotor" in text else None
-        elif (inertial := self.file.child(owner, "inertial")) is not None:
-            at = self.file.child(inertial, "mass" if "its mass" in text else "inertia")
+            at = next(iter(self.file.children(owner, "pycraft")), None) if "rotor" in text else None
+        elif inertial := self.file.children(owner, "inertial"):
+            at = self.file.children(inertial[0], "mass" if "its mass" in text else "inertia")[0]
         text = text.replace(words[named], label(owner), 1)  # the file's words for the core's
         return self.file.error(at if at is not None else owner, text)
 

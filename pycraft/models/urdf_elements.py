@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
@@ -25,9 +25,10 @@ HINGES = {
 }
 _COORDINATES = {"pin": 1, "slider": 1, "weld": 0, "free": 6, "planar": 3, "ball": 3}
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-_IDENTITY, _ZERO, _X = np.eye(3), np.zeros(3), np.array([1.0, 0.0, 0.0])
-for _constant in (_IDENTITY, _ZERO, _X):
-    _constant.setflags(write=False)
+_IDENTITY, _ZERO, _X = np.eye(3), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)
+_IDENTITY.setflags(write=False)
+_LINK_PARTS, _INERTIAL_PARTS = frozenset({"inertial"}), frozenset({"origin", "mass", "inertia"})
+_JOINT_PARTS = frozenset({"origin", "parent", "child", "axis", "limit", "dynamics", "mimic", "pycraft"})
 # Of a joint: element, attribute, what it is called in Multibody.left_aside.
 _LEFT_ASIDE = {
     "dynamics": (("damping", "damping"), ("friction", "friction")),
@@ -43,7 +44,7 @@ class Link:
     name: str
     element: Element
     mass: float = 0.0
-    com: np.ndarray = field(default_factory=lambda: _ZERO)
+    com: Sequence[float] = _ZERO
     inertia: np.ndarray = field(default_factory=lambda: np.zeros((3, 3)))
 
 
@@ -67,10 +68,10 @@ class Joint:
     parent: str
     child: str
     rotation: np.ndarray
-    position: np.ndarray
-    axis: np.ndarray
-    limits: tuple[np.ndarray, np.ndarray] | None
-    rotor_inertia: np.ndarray | None
+    position: Sequence[float] | np.ndarray
+    axis: Sequence[float]
+    limits: tuple[float, float] | None
+    rotor_inertia: Sequence[float] | None
     mimic: Mimic | None
 
 
@@ -97,10 +98,10 @@ class Elements:
         self.warnings: list[str] = []
         self.left_aside: dict[str, dict[str, float]] = {}  # numbers by quantity and joint
         self._refuse_xacro()
-        self.links = {link.name: link for link in self._named("link", self._link)}
+        self.links = self._named("link", self._link)
         if not self.links:
             raise file.error(file.root, f"{label(file.root)} has no links; a robot has one at least")
-        self.joints = {joint.name: joint for joint in self._named("joint", self._joint)}
+        self.joints = self._named("joint", self._joint)
 
     def _refuse_xacro(self) -> None:
         if not self.file.may_have_macros:
@@ -116,25 +117,25 @@ class Elements:
             element = attribute.getparent()
             raise self.file.error(element, f'{label(element)}: {attribute.attrname}="{macro}" is a xacro expression; {_EXPAND}')
 
-    def _named(self, kind: str, read: Callable[[str, Element], T]) -> Iterator[T]:
-        """The root's elements of one kind, read one by one; ModelError where two have the same name."""
-        lines: dict[str, int] = {}
+    def _named(self, kind: str, read: Callable[[str, Element], T]) -> dict[str, T]:
+        """The root's elements of one kind by name; ModelError where two have the same name."""
+        found: dict[str, T] = {}
         for element in self.file.children(self.file.root, kind):
             name = self.file.text(element, "name")
-            if name in lines:
-                raise self.file.error(element, f"{kind} {name!r} is defined twice, first in line {lines[name]}; rename one")
-            lines[name] = element.sourceline
-            yield read(name, element)
+            if name in found:
+                first = found[name].element.sourceline
+                raise self.file.error(element, f"{kind} {name!r} is defined twice, first in line {first}; rename one")
+            found[name] = read(name, element)
+        return found
 
-    def _origin(self, parent: Element, owner: Element) -> tuple[np.ndarray, np.ndarray]:
+    def _pose(self, origin: Element | None, owner: Element) -> tuple[np.ndarray, Sequence[float]]:
         """Rotation and position that an <origin> gives; the identity where there is none."""
-        origin = self.file.child(parent, "origin")
         if origin is None:
             return _IDENTITY, _ZERO
         position = self.file.numbers(origin, "xyz", 3, owner, _ZERO)
         if origin.get("quat_xyzw") is None:
             angles = self.file.numbers(origin, "rpy", 3, owner, _ZERO)
-            return rotation_from_rpy(angles) if angles.any() else _IDENTITY, position
+            return rotation_from_rpy(angles) if any(angles) else _IDENTITY, position
         if origin.get("rpy") is not None:
             raise self.file.error(origin, f"{label(owner)}: <origin> has rpy and quat_xyzw; give one of them")
         quaternion = self.file.numbers(origin, "quat_xyzw", 4, owner)
@@ -144,12 +145,13 @@ class Elements:
 
     # ------------------------------------------------------------------ links
     def _link(self, name: str, element: Element) -> Link:
-        inertial = self.file.child(element, "inertial")
+        inertial = self.file.parts(element, _LINK_PARTS).get("inertial")
         if inertial is None:
             return Link(name, element)
-        mass = self.file.required(inertial, "mass", element, 'write <mass value="..."/> in kg')
-        inertia = self.file.required(inertial, "inertia", element, "write it with six moments, zeros for a point mass")
-        rotation, com = self._origin(inertial, element)
+        parts = self.file.parts(inertial, _INERTIAL_PARTS)
+        mass = self.file.required(parts, "mass", inertial, element, 'write <mass value="..."/> in kg')
+        inertia = self.file.required(parts, "inertia", inertial, element, "write it with six moments, zeros for a point mass")
+        rotation, com = self._pose(parts.get("origin"), element)
         xx, xy, xz, yy, yz, zz = self.file.each_number(inertia, _MOMENTS, element)
         moments = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         if rotation is not _IDENTITY:
@@ -161,38 +163,36 @@ class Elements:
         kind = self.file.text(element, "type")
         if kind not in HINGES:
             raise self.file.error(element, f"joint {name!r} has the type {kind!r}; there are {', '.join(HINGES)}")
-        hinge = HINGES[kind]
+        hinge, parts = HINGES[kind], self.file.parts(element, _JOINT_PARTS)
         if hinge != "weld":
-            self._leave_aside(name, element)
-        rotation, position = self._origin(element, element)
+            self._leave_aside(name, element, parts)
+        rotation, position = self._pose(parts.get("origin"), element)
         return Joint(
             name,
             element,
             hinge,
-            self._end("parent", element),
-            self._end("child", element),
+            self._end("parent", element, parts),
+            self._end("child", element, parts),
             rotation,
             position,
-            self._axis(element, hinge),
-            self._limits(element, kind),
-            self._rotor_inertia(element, hinge),
-            self._mimic(element, hinge),
+            self._axis(element, parts.get("axis"), hinge),
+            self._limits(element, parts.get("limit"), kind),
+            self._rotor_inertia(element, parts.get("pycraft"), hinge),
+            self._mimic(element, parts.get("mimic"), hinge),
         )
 
-    def _leave_aside(self, name: str, element: Element) -> None:
+    def _leave_aside(self, name: str, element: Element, parts: dict[str, Element]) -> None:
         """What the file says of a joint that a model does not have: numbers above zero of damping, friction and bounds."""
         for tag, quantities in _LEFT_ASIDE.items():
-            inner = self.file.child(element, tag)
-            if inner is None:
+            if (inner := parts.get(tag)) is None:
                 continue
             for attribute, quantity in quantities:
-                if inner.get(attribute) is not None:
-                    number = self.file.number(inner, attribute, element, infinite=True)
-                    if number > 0:
-                        self.left_aside.setdefault(quantity, {})[name] = number
+                number = self.file.number(inner, attribute, element, 0.0, infinite=True)
+                if number > 0:
+                    self.left_aside.setdefault(quantity, {})[name] = number
 
-    def _end(self, end: str, element: Element) -> str:
-        inner = self.file.required(element, end, element, f'write <{end} link="..."/>')
+    def _end(self, end: str, element: Element, parts: dict[str, Element]) -> str:
+        inner = self.file.required(parts, end, element, element, f'write <{end} link="..."/>')
         link = self.file.text(inner, "link", element)
         if link not in self.links:
             near = (difflib.get_close_matches(link, self.links, 3) if len(link) < 200 else []) or list(self.links)[:6]
@@ -201,8 +201,7 @@ class Elements:
             raise self.file.error(inner, f"{label(element)} has the {end} {link!r}, and no link has this name; {remedy}")
         return link
 
-    def _axis(self, element: Element, hinge: str) -> np.ndarray:
-        axis = self.file.child(element, "axis")
+    def _axis(self, element: Element, axis: Element | None, hinge: str) -> Sequence[float]:
         if axis is None or hinge not in ("pin", "slider", "planar"):
             return _X  # a zero axis is common in joints that have none
         direction = self.file.numbers(axis, "xyz", 3, element, _X)
@@ -211,19 +210,18 @@ class Elements:
             raise self.file.error(axis, f"{label(element)}: its axis has length {length:g}; give a direction")
         return direction
 
-    def _limits(self, element: Element, kind: str) -> tuple[np.ndarray, np.ndarray] | None:
-        limit = self.file.child(element, "limit") if kind in ("revolute", "prismatic") else None
-        if limit is None or (limit.get("lower") is None and limit.get("upper") is None):
+    def _limits(self, element: Element, limit: Element | None, kind: str) -> tuple[float, float] | None:
+        if kind not in ("revolute", "prismatic") or limit is None or (limit.get("lower") is None and limit.get("upper") is None):
             return None
-        lower, upper = (self.file.number(limit, end, element, 0.0, infinite=True) for end in ("lower", "upper"))
+        lower = self.file.number(limit, "lower", element, 0.0, infinite=True)
+        upper = self.file.number(limit, "upper", element, 0.0, infinite=True)
         if lower > upper:
             text = f"its lower limit {lower:g} lies above the upper one {upper:g}; both are left out"
             self.warnings.append(f"{self.file.at(limit)}: {label(element)}: {text}")
             return None
-        return np.array([lower]), np.array([upper])
+        return lower, upper
 
-    def _rotor_inertia(self, element: Element, hinge: str) -> np.ndarray | None:
-        ours = self.file.child(element, "pycraft")
+    def _rotor_inertia(self, element: Element, ours: Element | None, hinge: str) -> Sequence[float] | None:
         if ours is None:
             return None
         unknown = [attribute for attribute in ours.attrib if attribute != "rotor_inertia"]
@@ -235,8 +233,7 @@ class Elements:
             raise self.file.error(ours, f"{label(element)} {what}")
         return values
 
-    def _mimic(self, element: Element, hinge: str) -> Mimic | None:
-        mimic = self.file.child(element, "mimic")
+    def _mimic(self, element: Element, mimic: Element | None, hinge: str) -> Mimic | None:
         if mimic is None or not self.follow or hinge == "weld":
             return None
         multiplier, offset = (

@@ -5,16 +5,14 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TypeAlias
 
-import numpy as np
 from lxml import etree
 
 from .. import _core
 
 Element: TypeAlias = "etree._Element"
-_NONE: list[Element] = []
 
 
 class XmlFile:
@@ -52,8 +50,6 @@ class XmlFile:
             raise _core.ModelError(f"{self.path!r}: cannot be read: {error}") from None
         self.root, parser = self._parse(data)
         self.root_name, self._space = local_name(self.root), _namespace(self.root)
-        self._looked_into: Element | None = None
-        self._found: dict[str, list[Element]] = {}
         # Expressions of macros may hide in any element and attribute; whether there can be any is seen from the bytes.
         self.may_have_macros = not data.isascii() or any(mark in data for mark in (b"xacro", b"${", b"$(", b"&#", b"\x00"))
         dtd = self.root.getroottree().docinfo.internalDTD
@@ -95,27 +91,25 @@ class XmlFile:
     # ------------------------------------------------------------------ elements
     def children(self, element: Element, name: str) -> list[Element]:
         """Children of that name, in the root's namespace (if it has one)."""
-        if element is not self._looked_into:  # asked for one name after the other, of one element after the other
-            found: dict[str, list[Element]] = {}
-            for child in element:
-                if (tag := child.tag) in found:
-                    found[tag].append(child)
-                else:
-                    found[tag] = [child]
-            self._looked_into, self._found = element, found
-        return self._found.get(f"{{{self._space}}}{name}" if self._space else name, _NONE)
+        return element.findall(f"{{{self._space}}}{name}" if self._space else name)
 
-    def child(self, element: Element, name: str) -> Element | None:
-        """The one child of that name, None if there is none; ModelError if there are several: which one counts is not clear."""
-        found = self.children(element, name)
-        if len(found) > 1:
-            first = f"the first in line {found[0].sourceline}"
-            raise self.error(found[1], f"{label(element)} has {len(found)} elements <{name}>, {first}; keep one")
-        return found[0] if found else None
+    def parts(self, element: Element, names: frozenset[str]) -> dict[str, Element]:
+        """The children of these names, by name; ModelError if there are several of one: which one counts is not clear."""
+        found: dict[str, Element] = {}
+        for child in element:
+            name = child.tag
+            if self._space:
+                space, _, name = name[1:].partition("}")
+                if space != self._space:
+                    continue
+            if name in names and found.setdefault(name, child) is not child:
+                count, first = len(self.children(element, name)), f"the first in line {found[name].sourceline}"
+                raise self.error(child, f"{label(element)} has {count} elements <{name}>, {first}; keep one")
+        return found
 
-    def required(self, element: Element, name: str, owner: Element, remedy: str) -> Element:
-        """The one child of that name; ModelError, naming the link or joint `owner`, if there is none."""
-        found = self.child(element, name)
+    def required(self, parts: dict[str, Element], name: str, element: Element, owner: Element, remedy: str) -> Element:
+        """That one of the parts of an element; ModelError, naming the link or joint `owner`, if there is none."""
+        found = parts.get(name)
         if found is None:
             raise self.error(element, f"{label(owner)} has no <{name}>; {remedy}")
         return found
@@ -136,9 +130,9 @@ class XmlFile:
         attribute: str,
         count: int | None,
         owner: Element,
-        default: np.ndarray | None = None,
+        default: Sequence[float] | None = None,
         infinite: bool = False,
-    ) -> np.ndarray:
+    ) -> Sequence[float]:
         """Numbers of an attribute, separated by blanks.
 
         Parameters
@@ -156,7 +150,7 @@ class XmlFile:
         value = element.get(attribute)
         if value is None and default is not None:
             return default
-        return np.array(self._floats(element, attribute, value, count, owner, infinite))
+        return self._floats(element, attribute, value, count, owner, infinite)
 
     def number(self, element: Element, attribute: str, owner: Element, default: float | None = None, infinite: bool = False) -> float:
         """One number of an attribute: see `numbers`."""
