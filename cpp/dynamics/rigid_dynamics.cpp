@@ -133,9 +133,10 @@ void RigidDynamics<S>::correct_faint(const T* q, const T* v, const T* tau, S* vd
     if (step == 0) first = size;
     if (size <= S(4) * epsilon<S>() * length(vdot)) break;
   }
-  const S left = S(faint.ratio) * static_cast<S>(epsilon<Exact>());
+  const S left = S(64 * faint.ratio) * static_cast<S>(epsilon<Exact>());  // so many roundings, as of columns
+  const S size = maximum(length(vdot), S(S(4) * epsilon<S>() * scale));
   const bool close = faint_limit<S>() * length(vdot) >= last || S(4) * epsilon<S>() * scale >= last;
-  if (!close || (first > faint_error<S>() * scale && !(faint_limit<S>() > left))) throw_faint_hinge(tree_, faint);
+  if (!close || (first > faint_error<S>() * size && !(faint_limit<S>() > left))) throw_faint_hinge(tree_, faint);
 }
 
 template <class S>

@@ -326,7 +326,7 @@ class RigidBlocks {
     error_[p] = maximum(error_[p], error_[k]), growth_[p] = maximum(growth_[p], growth_[k]);
   }
   RigidFactors<S>& factors() { return *factors_; }
-  // The faintest coordinate of the last sweep in a factored form (algebra/sweeps/singular_pivot.h); body -1: none.
+  // The faintest coordinate of the last sweep (algebra/sweeps/singular_pivot.h); body -1: none.
   const FaintPivot& faint() const { return faint_; }
   // ---------------------------------------------------------------- error bound
   void start_error(int k) {
@@ -427,7 +427,7 @@ class RigidBlocks {
     const int n = tree_.dof[k], f = first(k);
     if (n == 0) return false;
     S *own = pivot_work_.data(), *carried = own + n, *w = carried + n;
-    const S inertia_bound = S(4) * (rotational_[k] + mass_[k] * reach_[k] * reach_[k]);
+    const S furthest = maximum(reach_[k], lever_[k]), inertia_bound = S(4) * (rotational_[k] + mass_[k] * furthest * furthest);
     for (int i = 0; i < n; ++i) {
       const Vector6<S>& h = H[f + i];
       carried[i] = dot(h.angular, h.angular) * inertia_bound + S(2) * dot(h.linear, h.linear) * mass_[k] + J[f + i];
@@ -439,29 +439,31 @@ class RigidBlocks {
       fresh = maximum(fresh, S(inverse * pivot_reach(L.data() + d_[k], n, j, carried, w)));
       grown = maximum(grown, S(inverse * pivot_reach(L.data() + d_[k], n, j, own, w)));
     }
-    if (form != Form::fast) note_faint(k, own, carried, w);
+    if (!(S(1) > faint_ratio<S>(form) * fresh)) note_faint(k, own, carried, w);
     error_[k] += rounding_bound<S>(form) * fresh;
     growth_[k] *= maximum(S(1), S(grown / S(16)));
     if (!(S(1) > gain_bound<S>(form) * grown)) return true;
     return !(largest_growth(form) > growth_[k] && S(1) > S(4) * error_[k] * growth_[k]);
   }
   // Lengths are right to eps of themselves, so that where a linear inertia p remains, rows of columns for turns are right to eps l √p. What a
-  // body carries has p at most its mass; only where that leaves a doubt it is taken from the factors.
+  // body carries has p at most its mass; only where that leaves a doubt it is taken from P.
   void note_faint(int k, const S* own, S* squares, S* w) {
     const int n = tree_.dof[k], f = first(k);
     for (const bool exact : {false, true}) {
-      const S linear = lever_[k] * lever_[k] * (exact ? factors_->linear_trace() : S(S(3) * mass_[k]));
+      const S linear = lever_[k] * lever_[k] * (exact ? linear_trace(k) : S(S(3) * mass_[k]));
       for (int i = 0; i < n; ++i) squares[i] = dot(H[f + i].angular, H[f + i].angular) * linear + (aligned[f + i] >= 0 ? S(0) : own[i]);
       bool sound = true;
       for (int j = 0; j < n; ++j) {
         const S ratio = pivot_reach(L.data() + d_[k], n, j, squares, w) / pivots_[f + j];
-        if (S(1) > faint_ratio<S>() * ratio) continue;
+        if (S(1) > faint_ratio<S>(form) * ratio) continue;
         sound = false;
         if (exact && !(faint_.ratio > to_double(ratio))) faint_ = {k, j, to_double(pivots_[f + j]), to_double(ratio)};
       }
       if (sound) return;
     }
   }
+  // P(3,3) + P(4,4) + P(5,5)
+  S linear_trace(int k) const { return form == Form::fast ? S(P[k].C(0, 0) + P[k].C(1, 1) + P[k].C(2, 2)) : factors_->linear_trace(); }
   static S longest(const Vector3<S>& l) {
     using std::abs;
     return maximum(S(abs(l[0])), maximum(S(abs(l[1])), S(abs(l[2]))));

@@ -4,8 +4,8 @@ A body whose inertia about a line through its hinge is a share of what it has ac
 three pins in a row or a pin along that line; at the root or hung from a link, alone or with a body beyond; along an axis of
 coordinates or askew; thin all round its centre, or about its own line alone. Forward dynamics under random torques, torques of
 given accelerations, gravity alone, velocities alone, and all of these, against 100 digits. An answer is bad where it is off by more
-than 1e-6 and by more than ten times what half a unit in the last place of the state, the torques, the lengths and the inertias makes
-of the exact one.
+than 1e-6 (the plain form: 1e-2) and by more than ten times what half a unit in the last place of the state, the torques, the lengths
+and the inertias makes of the exact one.
 
     python tests/campaigns/faint.py --seeds 3
 """
@@ -25,7 +25,8 @@ FORMS = ("fast", "ud", "square-root")
 KINDS = ("ball", "gimbal", "universal", "free", "pins", "pin")
 PLACES = ("root", "hung", "root, beyond", "hung, beyond")
 SHARES = 10.0 ** -np.arange(8.0, 28.5)
-BAD, HALF = 1e-6, 2.0**-53
+BAD = {"fast": 1e-2, "ud": 1e-6, "square-root": 1e-6}
+HALF = 2.0**-53
 
 
 def thin(rng, share, kind, place, askew, all_round):
@@ -104,9 +105,9 @@ def of_data(arm, q, v, tau, truth, rng):
     return largest
 
 
-def bad(error, data):
+def bad(form, error, data):
     """Of what its own data do not tell to a digit (a shaft that coasts) nothing is bad."""
-    return error is not None and error > max(BAD, 10 * data) and data < 0.1
+    return error is not None and error > max(BAD[form], 10 * data) and data < 0.1
 
 
 def cases(seeds, kinds=KINDS, places=PLACES, shares=SHARES):
@@ -120,7 +121,7 @@ def cases(seeds, kinds=KINDS, places=PLACES, shares=SHARES):
 
 
 def judged(seed, kind, place, askew, all_round, share, forms=FORMS):
-    """Yields (form, load, error or None where refused, error of the data where the other is above 1e-6)."""
+    """Yields (form, load, error or None where refused, error of the data where the other is above its form's bound)."""
     rng = np.random.default_rng([seed, int(round(-10 * np.log10(share)))])
     arm = thin(rng, share, kind, place, askew, all_round)
     if arm is None:
@@ -141,7 +142,7 @@ def judged(seed, kind, place, askew, all_round, share, forms=FORMS):
             except pc.SingularHingeError:
                 yield form, load, None, 0.0
                 continue
-            if error > BAD and data is None:
+            if error > BAD[form] and data is None:
                 data = of_data(arm, state.q, v, tau, truth, rng)
             yield form, load, error, data or 0.0
 
@@ -155,7 +156,7 @@ def run(seeds, **which):
             row[error is None] += 1
             if error is not None and error > 10 * data and data < 0.1:
                 row[2] = max(row[2], error)
-                if bad(error, data):
+                if bad(form, error, data):
                     wrong.append(f"{form}, {load}: off by {error:.1e}, data {data:.1e}; {case}")
     return table, wrong
 
@@ -167,7 +168,5 @@ if __name__ == "__main__":
     print("form         I/mc²   answers  refusals  worst")
     for (form, share), (answers, refusals, worst) in sorted(found.items(), key=lambda row: (row[0][0], -row[0][1])):
         print(f"{form:12} {share:.0e} {answers:8d} {refusals:9d}  {worst:.1e}")
-    silent = [line for line in wrong if not line.startswith("fast")]
-    print(f"fast: {len(wrong) - len(silent)} bad answers")
-    print("\n".join(silent[:40]))
-    sys.exit(f"{len(silent)} bad answers of factored forms" if silent else 0)
+    print("\n".join(wrong[:40]))
+    sys.exit(f"{len(wrong)} bad answers" if wrong else 0)
