@@ -1,7 +1,9 @@
 #include "algebra/engine.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <cstdint>
 #include <mutex>
 
 #include "algebra/errors.h"
@@ -36,15 +38,23 @@ struct ExecutionPool::Impl {
   PerScalar<Free> free;
   PassCounts counts;
   std::vector<std::string> notes;
+  std::vector<std::atomic<std::uint64_t>> seen;  // per context: the parameters that the plan was last found to be made for
 };
 
-ExecutionPool::ExecutionPool(std::shared_ptr<const Plan> plan) : plan_(std::move(plan)), impl_(std::make_unique<Impl>()) {}
+ExecutionPool::ExecutionPool(std::shared_ptr<const Plan> plan) : plan_(std::move(plan)), impl_(std::make_unique<Impl>()) {
+  impl_->seen = std::vector<std::atomic<std::uint64_t>>(plan_->contexts.size());
+  for (auto& parameters : impl_->seen) parameters = ~std::uint64_t(0);  // none
+}
 ExecutionPool::~ExecutionPool() = default;
 
 bool ExecutionPool::current() const {
   for (size_t c = 0; c < plan_->contexts.size(); ++c) {
-    plan_->contexts[c].source->check_current();
-    if (plan_->contexts[c].source->traits().hinge_diagonal != plan_->hinge_diagonal[c]) return false;
+    const SkoSource& source = *plan_->contexts[c].source;
+    source.check_current();
+    const std::uint64_t parameters = source.parameters();
+    if (impl_->seen[c] == parameters) continue;
+    if (source.traits().hinge_diagonal != plan_->hinge_diagonal[c]) return false;
+    impl_->seen[c] = parameters;
   }
   return true;
 }

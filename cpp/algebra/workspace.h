@@ -47,7 +47,7 @@ class Workspace {
       if (reg.kind == RegisterKind::vector) vectors_[r].resize(size_t(reg.space.dimension()) * (reg.wide ? columns : 1));
     }
     for (const Step& s : plan_->steps) {
-      check_interrupt();
+      if (&s != plan_->steps.data()) check_interrupt();
       const bool per_column = s.out >= 0 && plan_->registers[s.out].kind == RegisterKind::vector;
       // a function of a vector, and what is made of it, may hang on a named vector
       if (!values_changed && !per_column && !functions_of_vectors_) continue;

@@ -103,8 +103,7 @@ typename RigidDynamics<S>::AddedInertias RigidDynamics<S>::forward_dynamics_of_p
 
 // Where a coordinate feels hardly any inertia: accelerations are corrected by residuals two scalars up (one up inertias about a body's origin
 // round to more than the faintest inertia that a form can carry) as long as corrections shrink. Refused is what comes no closer than `faint_limit`
-// of the accelerations; and where the first correction matters at all, what the rounding of these residuals leaves, which corrections do
-// not show: it is the same in each.
+// of the accelerations, and what is so faint that the rounding of these residuals, which corrections do not show, may be more.
 template <class S>
 template <class T>
 void RigidDynamics<S>::correct_faint(const T* q, const T* v, const T* tau, S* vdot) {
@@ -120,7 +119,7 @@ void RigidDynamics<S>::correct_faint(const T* q, const T* v, const T* tau, S* vd
   const RigidInertia<S>& own = model_->inertia[faint.body];
   S scale = length(vdot) + ratio_or_zero(own.mass * norm(model_->gravity), norm(own.moment));
   for (const Vector3<S>& omega : points_.angular_velocity) scale = maximum(scale, dot(omega, omega));
-  S last = S(0.3) / S(0.9) * scale, first = S(0);
+  S last = S(0.3) / S(0.9) * scale;
   for (int step = 0; step < 5; ++step) {
     convert(vdot, n, x);
     up.residual(tau, x.data(), exact.data());
@@ -130,13 +129,11 @@ void RigidDynamics<S>::correct_faint(const T* q, const T* v, const T* tau, S* vd
     if (!(S(0.9) * last >= size)) break;  // not a number, too far, or no closer
     for (int i = 0; i < n; ++i) vdot[i] += columns_[i];
     last = size;
-    if (step == 0) first = size;
     if (size <= S(4) * epsilon<S>() * length(vdot)) break;
   }
   const S left = S(64 * faint.ratio) * static_cast<S>(epsilon<Exact>());  // so many roundings, as of columns
-  const S size = maximum(length(vdot), S(S(4) * epsilon<S>() * scale));
   const bool close = faint_limit<S>() * length(vdot) >= last || S(4) * epsilon<S>() * scale >= last;
-  if (!close || (first > faint_error<S>() * size && !(faint_limit<S>() > left))) throw_faint_hinge(tree_, faint);
+  if (!close || !(faint_limit<S>() > left)) throw_faint_hinge(tree_, faint);
 }
 
 template <class S>

@@ -17,7 +17,7 @@
 // Beside what a hinge moves along other directions, D may be so faint that the value keeps few digits and yet some: the errors of G, of forces
 // and of gyroscopic terms enter θ̈ by their ratio to D, and how much of θ̈ they are hangs on the forces. No bound of D alone can say: forward
 // dynamics measures it, where `faint_ratio` leaves a doubt, by a residual in wider scalars, corrects θ̈ so, and refuses what does not come to
-// `faint_limit` so (dynamics/rigid_dynamics.cpp). The plain form owes fewer digits: it is in doubt where not two of them are sure.
+// `faint_limit` so (dynamics/rigid_dynamics.cpp). The plain form owes fewer: it is in doubt where not three digits are sure.
 //
 // The sweep costs as much again as P's own; block policies run it only where an estimate of X leaves a doubt.
 #pragma once
@@ -46,7 +46,7 @@ struct FaintPivot {
   int body = -1, coordinate = 0;
   double pivot = 0, ratio = 0;
 };
-// Of θ̈ that may be off by more than 2⁻²⁶ (in single precision √eps), in the plain form by more than 2⁻⁷, a residual is formed; what stays off by
+// Of θ̈ that may be off by more than 2⁻²⁶ (in single precision √eps), in the plain form by more than 2⁻¹⁰, a residual is formed; what stays off by
 // more than 64 times the first of these is refused.
 template <class S>
 inline S faint_error() {
@@ -56,7 +56,7 @@ inline S faint_error() {
 }
 template <class S>
 inline S faint_ratio(Form form) {
-  return epsilon<S>() / (form == Form::fast ? S(0x1p-7) : faint_error<S>());
+  return epsilon<S>() / (form == Form::fast ? S(0x1p-10) : faint_error<S>());
 }
 template <class S>
 inline S faint_limit() {
