@@ -20,10 +20,7 @@ SLOW = {
     ),
     "test_calculus": lambda item: (
         item.originalname in ("test_second_derivatives", "test_along_time", "test_along_parameters")
-        or (
-            item.originalname == "test_along_every_coordinate"
-            and item.callspec.params["name"] not in ("E", "D", "ℳ")
-        )
+        or (item.originalname == "test_along_every_coordinate" and item.callspec.params["name"] not in ("E", "D", "ℳ"))
     ),
     "test_cli": lambda item: item.originalname == "test_tour",
     "test_reference": lambda item: any(f"[{name}" in item.nodeid for name in ("every kind", "sequences, rotors")),

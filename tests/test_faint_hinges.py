@@ -1,4 +1,4 @@
-"""A coordinate that feels hardly any inertia beside others of its body: forms answer to six digits (the plain one to two), or refuse by name."""
+"""A coordinate that feels hardly any inertia beside others of its body: six digits (in the plain form two), or a refusal by name."""
 
 import numpy as np
 import pytest

@@ -5,6 +5,7 @@ import json
 import pytest
 
 import pycraft as pc
+from pycraft.symbolic.pdf import with_letters
 from pycraft.symbolic.worksheet import TOPICS, _gaps, grade, worksheet
 
 
@@ -156,6 +157,29 @@ def test_pdfs(sheets, tmp_path, monkeypatch):
     written = one.save(tmp_path, pdf=True)
     assert [p.name for p in written] == ["student01.ipynb", "student01.ipynb", "student01.pdf", "student01.pdf"]
     assert written[2].read_bytes().startswith(b"%PDF of ")
+
+
+def test_what_is_in_a_worksheet_has_its_letters_in_latex(tmp_path):
+    """Fonts of code have none of them: a PDF of the key read `[I + H K]`."""
+    shown = {
+        c
+        for topic in TOPICS
+        for solved in (False, True)
+        for c in json.dumps(worksheet(topic, 1)[0].notebook(solved)["cells"], ensure_ascii=False)
+    }
+    file = tmp_path / "sheet.tex"
+    file.write_text("\\documentclass{article}\n\\begin{document}\nφ\n\\end{document}\n", encoding="utf-8")
+    with_letters(file)
+    head, _, body = file.read_text(encoding="utf-8").partition("\\begin{document}")
+    assert head == "\\documentclass{article}\n" and body.endswith("\nφ\n\\end{document}\n")
+    assert {c for c in shown if not c.isascii()} <= set(body) and "\\def φ{\\ensuremath{\\phi}}" in body
+
+
+def test_derivations_keep_to_the_width_of_a_page():
+    """Reasons stand beside the lines, or below them all where a line and a reason are too long for one row; steps count from 1."""
+    short, long = pc.exercise("HψMψ*H* == D", blank=2), pc.exercise("[I+HφK]⁻¹ = I - HψK", blank=2).leaving_out(2)
+    assert "&& \\text{1.}" in short.latex() and "\\qquad" not in short.latex()
+    assert "&&" not in long.latex() and [rf"\qquad \text{{{i}.}}" in long.latex() for i in range(4)] == [False, True, True, True]
 
 
 def test_exercises_with_several_gaps():

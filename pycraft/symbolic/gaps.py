@@ -15,10 +15,9 @@ from .derivation import DerivativeProblem
 from .equations import Step, chain_holds, opened
 from .proof import Proof, example
 from .prove import _operators
-from .shown import escaped, reason_latex
+from .shown import GAP, aligned, escaped
 from .words import Polynomial
 
-GAP = "\\boxed{\\;?\\;}"
 _Own = TypeVar("_Own", bound="WithGaps")
 
 
@@ -151,11 +150,7 @@ class WithGaps:
 
     def latex(self) -> str:
         """The derivation as an aligned display, a box for the gap."""
-        rows = [f"& {self.steps[0].before_latex()}"]
-        for i, step in enumerate(self.steps, 1):
-            gap = i in self.blanks
-            rows.append(f"={{}}& {GAP if gap else step.after_latex()} && \\text{{{i}.}}\\;{'' if gap else reason_latex(step)}")
-        return "\\begin{aligned}" + "\\\\\n".join(rows) + "\\end{aligned}"
+        return aligned(self.steps, blanks=self.blanks)
 
     def _repr_latex_(self) -> str:
         where = f"\\quad\\text{{where {escaped(' and '.join(self.proof.hypotheses))}}}" if self.proof.hypotheses else ""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 from .equations import Step
@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from .proof import Proof
 
 WIDTH = 76
+GAP = "\\boxed{\\;?\\;}"
+"""What stands for a line left out."""
 _STYLE = (
     "<style>.pycraft-proof{font-family:serif;max-width:60em}.pycraft-proof ol{margin:.2em 0 .8em;padding-left:2.5em}"
     ".pycraft-proof li{display:list-item;overflow-wrap:anywhere}.pycraft-proof .reason{opacity:.7;margin-left:1.5em;font-size:.9em}</style>"
@@ -57,13 +59,16 @@ def reason_latex(step: Step, cited: dict[str, int] | None = None) -> str:
     return ";\\;".join(made) + (f"\\text{{{step.manner}}}" if step.manner else "")
 
 
-def aligned(steps: Sequence[Step], cited: dict[str, int] | None = None) -> str:
-    """The chain as an aligned display, each step on a line and its reason below it on the right where the line is long."""
-    rows = [f"& {steps[0].before_latex()}"] if steps else []
-    for s in steps:
-        why = f"&& \\text{{{s.number}.}}\\;{reason_latex(s, cited)}"
-        split = len(s.after_text()) > WIDTH
-        rows += [f"={{}}& {s.after_latex()}", f"& {why}"] if split else [f"={{}}& {s.after_latex()} {why}"]
+def aligned(steps: Sequence[Step], cited: dict[str, int] | None = None, blanks: Collection[int] = ()) -> str:
+    """The chain as an aligned display, a box for the lines left out; reasons beside the lines, or below them where a page is too narrow."""
+    if not steps:
+        return "\\begin{aligned}\\end{aligned}"
+    beside = max(len(s.after_text()) for s in steps) + max(len(s.reason) for s in steps) <= WIDTH
+    rows = [f"& {steps[0].before_latex()}"]
+    for i, s in enumerate(steps, 1):
+        line, number = GAP if i in blanks else s.after_latex(), f"\\text{{{i}.}}\\;"
+        why = number if i in blanks else number + reason_latex(s, cited)
+        rows += [f"={{}}& {line} && {why}"] if beside else [f"={{}}& {line}", f"& \\qquad {why}"]
     return "\\begin{aligned}" + "\\\\\n".join(rows) + "\\end{aligned}"
 
 

@@ -154,9 +154,7 @@ class Matrix:
         n, field = len(self.rows), self.field
         at = lambda i, j: self.rows[i % n].get(j % n, field.zero)
         if n == 3:
-            minor = lambda i, j: field.inner(
-                [(at(i + 1, j + 1), at(i + 2, j + 2)), (-at(i + 1, j + 2), at(i + 2, j + 1))]
-            )
+            minor = lambda i, j: field.inner([(at(i + 1, j + 1), at(i + 2, j + 2)), (-at(i + 1, j + 2), at(i + 2, j + 1))])
         elif n == 2:
             minor = lambda i, j: at(i + 1, j + 1) if i == j else -at(i + 1, j + 1)
         else:

@@ -19,6 +19,7 @@ from typing import Any
 from .. import _core
 from ..identities.tables import monospace, wrapped
 from .exercise import Exercise, Judgement, exercise
+from .pdf import to_pdf
 
 TOPICS = {
     "resolvents": ["ψ⁻¹φ = I + KHφ", "φψ⁻¹ = I + φKH", "[I-HψK]Hφ = Hψ", "φK[I-HψK] = ψK", "[I+HφK]⁻¹ = I - HψK"],
@@ -278,33 +279,6 @@ def _judged(sheet: Worksheet, answers: dict[str, dict[Any, Any]]) -> Grade:
             empty = not isinstance(text, str) or not text.strip()
             found.judgements[k, line] = Judgement("no answer", "") if empty else task.gap(line).answer(text)
     return found
-
-
-def to_pdf(notebook: str | Path) -> Path:
-    """A notebook as PDF beside it, by nbconvert: through LaTeX where XeLaTeX is installed, else through a browser.
-
-    Raises
-    ------
-    ModelError
-        nbconvert (extra [lab]), or both ways of making a PDF, are missing; the text says what to install.
-    """
-    path = Path(notebook)
-    try:
-        import nbconvert
-    except ImportError:
-        raise _core.ModelError("PDF is made by nbconvert, which is not installed: pip install 'pycraft-soa[lab]'") from None
-    reasons = []
-    for exporter in (nbconvert.PDFExporter, nbconvert.WebPDFExporter):
-        try:
-            body: Any = exporter().from_filename(str(path))[0]
-        except Exception as error:  # whatever LaTeX, pandoc or a browser says: it is the reason
-            reasons.append(str(error).strip().partition("\n")[0] or type(error).__name__)
-            continue
-        out = path.with_suffix(".pdf")
-        out.write_bytes(body)
-        return out
-    needs = "a PDF takes pandoc and XeLaTeX, or a browser: pip install 'nbconvert[webpdf]', then playwright install chromium"
-    raise _core.ModelError(f"{path.name}: {needs} (tried both: {' '.join(reasons)})")
 
 
 def _cell(kind: str, source: str, tags: Sequence[str] = ()) -> dict[str, Any]:
