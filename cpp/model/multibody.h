@@ -133,7 +133,7 @@ class Multibody : public std::enable_shared_from_this<Multibody> {
   std::shared_ptr<const StateData> state_;
   mutable Mutex mutex_;
   mutable UseCount use_;
-  std::uint64_t parameters_ = 1;
+  std::atomic<std::uint64_t> parameters_ = 1;  // read beside edits
   std::vector<std::pair<std::string, std::string>> warnings_;
   std::set<std::string> said_massless_;
   std::unordered_map<std::string, std::pair<std::vector<double>, std::vector<double>>> carried_;  // q, v by hinge, across an edit
