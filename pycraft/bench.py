@@ -1,10 +1,16 @@
-"""`pycraft bench`: the bounds on speed, measured; each result is checked in the same run that times it. Figures are ratios of one run."""
+"""`pycraft bench`: the bounds on speed, measured; each result is checked in the same run that times it. Figures are ratios of one run.
+
+What a ratio compares is timed in turn, several times, and the least of the medians counts: a machine's speed changes from one second to the
+next, and what else runs on it only adds.
+"""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -51,25 +57,34 @@ def _checked(name: str, operator: _core.Operator, x: np.ndarray) -> None:
         raise _core.EvaluationError(f"{name} is wrong in the run that times it: off by {error:.1e}")
 
 
+Timed: TypeAlias = Callable[[float], Mapping[str, float]]
+"""Times something for so many seconds."""
+
+
+def in_turn(seconds: float, *timed: Timed, rounds: int = 5) -> list[float]:
+    """The time of each, in seconds a call: one after the other for several rounds, the least median of each."""
+    medians = [[each(seconds / rounds)["median"] for each in timed] for _ in range(rounds)]
+    return [min(of_one) for of_one in zip(*medians, strict=True)]
+
+
 def per_link(seconds: float = 0.1) -> list[Figure]:
     """Time per link for chains of 1000 links over that for 100, of every operator and of ℳ⁻¹x: O(N) means about one."""
-    medians: dict[str, dict[int, float]] = {}
     rng = np.random.default_rng(0)
-    for n in (SHORT, LONG):
-        arm = chain(n, seed=1)
+    arms, timed = [chain(n, seed=1) for n in (SHORT, LONG)], dict[str, list[Timed]]()
+    for arm in arms:
         arm.q = arm.random_state(1).q
         for name, operator in operators_of(arm).items():
             x = rng.uniform(-1, 1, operator.shape[1])
-            if n == SHORT:
+            if arm is arms[0]:
                 _checked(name, operator, x)
-            medians.setdefault(name, {})[n] = _core.time_apply(operator, x, seconds)["median"] / n
-        q, v, u = _states(arm)
+            timed.setdefault(name, []).append(partial(_core.time_apply, operator, x))
         for call in ("forward_dynamics", "inverse_dynamics"):
-            medians.setdefault(call, {})[n] = _core.time_dynamics(arm, call, q, v, u, seconds)["median"] / n
-    return [
-        Figure(name, t[LONG] / t[SHORT], "x", 1.5, f"{1e9 * t[LONG]:.0f} ns a link at {LONG}, {1e9 * t[SHORT]:.0f} at {SHORT}")
-        for name, t in medians.items()
-    ]
+            timed.setdefault(call, []).append(partial(_core.time_dynamics, arm, call, *_states(arm)))
+    figures = []
+    for name, both in timed.items():
+        short, long = (t / n for t, n in zip(in_turn(seconds, *both), (SHORT, LONG), strict=True))
+        figures.append(Figure(name, long / short, "x", 1.5, f"{1e9 * long:.0f} ns a link at {LONG}, {1e9 * short:.0f} at {SHORT}"))
+    return figures
 
 
 def _states(arm: Any, count: int = 8) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -105,8 +120,8 @@ def direct_calls(seconds: float = 0.2) -> list[Figure]:
         if not error < 1e-6:
             raise _core.EvaluationError(f"forward dynamics of {name} is wrong in the run that times it: off by {error:.1e}")
         for call in ("forward_dynamics", "inverse_dynamics", "mass_matrix"):
-            timing = _core.time_dynamics(robot, call, q, v, u, seconds)
-            figures.append(Figure(f"{name} ({robot.nv} dof): {call}", 1e6 * timing["median"], "us"))
+            (own,) = in_turn(seconds, partial(_core.time_dynamics, robot, call, q, v, u))
+            figures.append(Figure(f"{name} ({robot.nv} dof): {call}", 1e6 * own, "us"))
     return figures
 
 
@@ -132,9 +147,8 @@ def sensitivities(seconds: float = 0.2) -> list[Figure]:
         slope = float((MM + robot.soa.J).logdet().diff(i).at(q[0]))
         if not abs(robot.log_determinant_gradient(q[0])[i] - slope) <= 1e-9 * (1 + abs(slope)):
             raise _core.EvaluationError(f"the gradient of ln det of {name} is wrong in the run that times it")
-        forward = _core.time_dynamics(robot, "forward_dynamics", q, v, u, seconds)["median"]
         for call in ("log_determinant_gradient", "inverse_dynamics_derivatives", "forward_dynamics_derivatives"):
-            own = _core.time_dynamics(robot, call, q, v, u, seconds)["median"]
+            forward, own = in_turn(seconds, *(partial(_core.time_dynamics, robot, c, q, v, u) for c in ("forward_dynamics", call)))
             bound, what = 4.0 if call == "log_determinant_gradient" else None, f"{name} ({robot.nv} dof): {call} over forward dynamics"
             figures.append(Figure(what, own / forward, "x", bound, f"{1e6 * own:.2f} us"))
         figures.extend(_beside_pinocchio(name, robot, q[0], v[0], u[0]))
@@ -186,8 +200,7 @@ def ud_at_worst(seconds: float) -> list[Figure]:
     }
     figures = []
     for name, model in models.items():
-        q, v, u = _states(model)
-        fast, own = (min(_core.time_forward(model, q, v, u, seconds, form=form)["minimum"] for _ in range(3)) for form in ("fast", "ud"))
+        fast, own = in_turn(seconds, *(partial(_core.time_forward, model, *_states(model), form=form) for form in ("fast", "ud")))
         figures.append(Figure(f"{name}: ud over fast", own / fast, "x", UD_AT_WORST, f"{1e6 * own:.1f} us"))
     return figures
 
@@ -200,23 +213,22 @@ def accuracy(seconds: float = 0.2) -> list[Figure]:
     for name, model in (("panda", robots.panda()), ("g1", robots.g1()), ("chain of 100", chain(100, seed=1))):
         q, v, u = _states(model)
         exact = model.forward_dynamics(q, v, u, precision="quad")
-        fast = _core.time_forward(model, q, v, u, seconds)["median"]
+        plain = partial(_core.time_forward, model, q, v, u)
         for way, (options, bound) in WAYS.items():
             error = np.abs(model.forward_dynamics(q, v, u, **options) - exact).max() / np.abs(exact).max()
             if not error < 1e-6:
                 raise _core.EvaluationError(f"{way} of {name} is wrong in the run that times it: off by {error:.1e}")
-            own = _core.time_forward(model, q, v, u, seconds, **options)["median"]
+            fast, own = in_turn(seconds, plain, partial(plain, **options))
             measured = f"{1e6 * own:.2f} us, error {error:.0e}"
             figures.append(Figure(f"{name} ({model.nv} dof): {way} over fast", own / fast, "x", bound, measured))
-        packs = {}
         for form in ("fast", "ud"):
-            for precision in ("double", "single"):
-                packed = _core.time_packs(model, q, v, u, seconds, form, precision)["median"]
-                packs[form, precision] = packed
-                note = f"{1e6 * packed:.2f} us a state"
-                figures.append(Figure(f"{name}: {form} in packs, {precision}, over one by one in double", packed / fast, "x", None, note))
-            ratio = packs[form, "single"] / packs[form, "double"]
-            figures.append(Figure(f"{name}: {form} in batches, single over double", ratio, "x", 1.0))
+            precisions = ("double", "single")
+            packs = [partial(_core.time_packs, model, q, v, u, form=form, precision=precision) for precision in precisions]
+            fast, *packed = in_turn(seconds, plain, *packs)
+            for precision, own in zip(precisions, packed, strict=True):
+                note = f"{1e6 * own:.2f} us a state"
+                figures.append(Figure(f"{name}: {form} in packs, {precision}, over one by one in double", own / fast, "x", None, note))
+            figures.append(Figure(f"{name}: {form} in batches, single over double", packed[1] / packed[0], "x", 1.0))
     return figures + ud_at_worst(seconds)
 
 
