@@ -172,7 +172,7 @@ def test_every_figure_of_what_accuracy_costs_has_its_bound(monkeypatch):
         return dict.fromkeys(("median", "minimum"), 1e-6 if options in ({}, {"form": "fast"}) else 1e-3)
 
     monkeypatch.setattr(_core, "time_forward", slow)
-    monkeypatch.setattr(_core, "time_packs", lambda *_: {"median": 1e-6})
+    monkeypatch.setattr(_core, "time_packs", lambda *_, **__: {"median": 1e-6})
     figures = {f.name: f for f in bench.accuracy(0)}
     ways = {name: f for name, f in figures.items() if " over fast" in name and "packs" not in name}
     assert len(ways) == 3 * len(bench.WAYS) + 4  # `ud` at its worst

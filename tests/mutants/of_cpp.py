@@ -35,10 +35,11 @@ CHANGES = {
         ("limits are not checked when set", "check_limits(body(k).hinge, lower, upper);", ";", STATEMENT),
     ],
     "cpp/algebra/engine.cpp": [
-        ("plans for J = 0 kept", "plan_->contexts[c].source->traits().hinge_diagonal != plan_->hinge_diagonal[c]", "false"),
+        ("plans for J = 0 kept", "source.traits().hinge_diagonal != plan_->hinge_diagonal[c]", "false"),
+        ("a plan is for J = 0 once and for all", "impl_->seen[c] == parameters", "impl_->seen[c] != ~std::uint64_t(0)"),
         (
             "only the first model of a plan is looked at",
-            "plan_->contexts[c].source->check_current();",
+            "source.check_current();",
             "if (c > 0) return true;",
             STATEMENT,
         ),
