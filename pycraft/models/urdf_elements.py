@@ -28,7 +28,8 @@ _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _IDENTITY, _ZERO, _X = np.eye(3), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)
 _IDENTITY.setflags(write=False)
 _LINK_PARTS, _INERTIAL_PARTS = frozenset({"inertial"}), frozenset({"origin", "mass", "inertia"})
-_JOINT_PARTS = frozenset({"origin", "parent", "child", "axis", "limit", "dynamics", "mimic", "pycraft"})
+_WELD_PARTS = frozenset({"origin", "parent", "child", "axis", "mimic", "pycraft"})
+_JOINT_PARTS = _WELD_PARTS | {"limit", "dynamics"}
 # Of a joint: element, attribute, what it is called in Multibody.left_aside.
 _LEFT_ASIDE = {
     "dynamics": (("damping", "damping"), ("friction", "friction")),
@@ -163,7 +164,8 @@ class Elements:
         kind = self.file.text(element, "type")
         if kind not in HINGES:
             raise self.file.error(element, f"joint {name!r} has the type {kind!r}; there are {', '.join(HINGES)}")
-        hinge, parts = HINGES[kind], self.file.parts(element, _JOINT_PARTS)
+        hinge = HINGES[kind]
+        parts = self.file.parts(element, _JOINT_PARTS if hinge != "weld" else _WELD_PARTS)
         if hinge != "weld":
             self._leave_aside(name, element, parts)
         rotation, position = self._pose(parts.get("origin"), element)

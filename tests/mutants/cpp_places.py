@@ -100,7 +100,8 @@ def places(root, file):
                 f"the other sign at `{m.group()}{code[m.end() : m.end() + 12].split(';')[0]}`",
             )
     for m in re.finditer(r"([+-])=(?!=)", code):
-        if not POINTERS.match(code, m.end()):
+        chosen = "?" in code[m.end() : code.index(";", m.end())]  # the sign would belong to the condition
+        if not chosen and not POINTERS.match(code, m.end()):
             add(m.start(), m.end(), f"{m.group()} PYCRAFT_SIGN({{i}}) *", f"the other sign at `{m.group()}`")
     for m in re.finditer(r"(?<=[({,=?:] )-(?=[\w(])|(?<=[({])-(?=[\w(])|(?<=return )-(?=[\w(])", code):  # a lone minus
         if not re.match(r"-\d", code[m.start() :]):
