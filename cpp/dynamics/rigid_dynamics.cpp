@@ -102,21 +102,29 @@ typename RigidDynamics<S>::AddedInertias RigidDynamics<S>::forward_dynamics_of_p
 }
 
 // Where a coordinate feels hardly any inertia: accelerations are corrected by residuals two scalars up (one up inertias about a body's origin
-// round to more than the faintest inertia that a form can carry) as long as corrections shrink. Refused is what comes no closer than `faint_limit`
-// of the accelerations, and what is so faint that the rounding of these residuals, which corrections do not show, may be more.
+// round to more than the faintest inertia that a form can carry), or three where the rounding of those, which corrections do not show, may be
+// too much, as long as corrections shrink. Refused is what comes no closer than `faint_limit` of the accelerations.
 template <class S>
 template <class T>
 void RigidDynamics<S>::correct_faint(const T* q, const T* v, const T* tau, S* vdot) {
+  auto& two_up = wider(q, v).wider(q, v);
+  const auto left = [&]<class E>(RigidDynamics<E>&) { return S(64 * blocks_.faint().ratio) * static_cast<S>(epsilon<E>()); };  // so many roundings, as of columns
+  if (faint_limit<S>() > left(two_up)) return correct_faint_by(two_up, tau, vdot);
+  auto& three_up = two_up.wider(q, v);
+  if (!(faint_limit<S>() > left(three_up))) throw_faint_hinge(tree_, blocks_.faint());
+  correct_faint_by(three_up, tau, vdot);
+}
+
+template <class S>
+template <class E, class T>
+void RigidDynamics<S>::correct_faint_by(RigidDynamics<E>& up, const T* tau, S* vdot) {
   const int n = model_->nv;
-  using Exact = Wider<Wider<S>>;
-  RigidDynamics<Exact>& up = wider(q, v).wider(q, v);
-  std::vector<Exact> x, exact(n);
+  std::vector<E> x, exact(n);
   std::vector<S>& r = r_;
   r.resize(n);
   columns_.resize(std::max(columns_.size(), size_t(n)));
   // What coasts has no acceleration to compare with: the motion's own, ω² and gravity over the length of the body.
-  const FaintPivot& faint = blocks_.faint();
-  const RigidInertia<S>& own = model_->inertia[faint.body];
+  const RigidInertia<S>& own = model_->inertia[blocks_.faint().body];
   S scale = length(vdot) + ratio_or_zero(own.mass * norm(model_->gravity), norm(own.moment));
   for (const Vector3<S>& omega : points_.angular_velocity) scale = maximum(scale, dot(omega, omega));
   S last = S(0.3) / S(0.9) * scale;
@@ -126,14 +134,13 @@ void RigidDynamics<S>::correct_faint(const T* q, const T* v, const T* tau, S* vd
     for (int i = 0; i < n; ++i) r[i] = static_cast<S>(exact[i]);
     solve(r.data(), columns_.data(), 1);
     const S size = length(columns_.data());
-    if (!(S(0.9) * last >= size)) break;  // not a number, too far, or no closer
-    for (int i = 0; i < n; ++i) vdot[i] += columns_[i];
+    const bool closer = S(0.9) * last >= size;  // else too far, not a number, or noise, which the one before met by luck
     last = size;
+    if (!closer) break;
+    for (int i = 0; i < n; ++i) vdot[i] += columns_[i];
     if (size <= S(4) * epsilon<S>() * length(vdot)) break;
   }
-  const S left = S(64 * faint.ratio) * static_cast<S>(epsilon<Exact>());  // so many roundings, as of columns
-  const bool close = faint_limit<S>() * length(vdot) >= last || S(4) * epsilon<S>() * scale >= last;
-  if (!close || !(faint_limit<S>() > left)) throw_faint_hinge(tree_, faint);
+  if (!(faint_limit<S>() * length(vdot) >= last || S(4) * epsilon<S>() * scale >= last)) throw_faint_hinge(tree_, blocks_.faint());
 }
 
 template <class S>

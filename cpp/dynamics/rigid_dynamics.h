@@ -73,6 +73,8 @@ class RigidDynamics {
   RigidDynamics<Wider<S>>& wider(const T* q, const T* v);
   template <class T>
   void correct_faint(const T* q, const T* v, const T* tau, S* vdot);
+  template <class E, class T>
+  void correct_faint_by(RigidDynamics<E>& up, const T* tau, S* vdot);
   template <class T>
   void size_residual(const RigidDynamics<T>& formed, const T* vdot, const Refinement& how);  // of the one that was formed last
   S length(const S* x) const;   // 2-norm of nv numbers
