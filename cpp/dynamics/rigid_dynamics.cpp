@@ -140,6 +140,10 @@ void RigidDynamics<S>::correct_faint_by(RigidDynamics<E>& up, const T* tau, S* v
     for (int i = 0; i < n; ++i) vdot[i] += columns_[i];
     if (size <= S(4) * epsilon<S>() * length(vdot)) break;
   }
+  // What the last residual lost as it was rounded tells what such rounding makes of θ̈.
+  for (int i = 0; i < n; ++i) r[i] = static_cast<S>(exact[i] - E(static_cast<S>(exact[i])));
+  solve(r.data(), columns_.data(), 1);
+  last = maximum(last, length(columns_.data()));
   if (!(faint_limit<S>() * length(vdot) >= last || S(4) * epsilon<S>() * scale >= last)) throw_faint_hinge(tree_, blocks_.faint());
 }
 
