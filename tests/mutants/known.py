@@ -94,6 +94,11 @@ EQUIVALENT = {
         "children of a body left out",
         "",
     ): "children of the body left out stand at its parent by then: no parent is k, and what is above k is above 0",
+    (
+        "pycraft/models/xml_file.py",
+        "entities are expanded",
+        "",
+    ): "a file that declares entities is refused after, one that does not has none to expand, and none is fetched",
 }
 
 
