@@ -268,6 +268,7 @@ def test_display(measured):
     assert html.count("<tr") == len(table) + 1 and table.table().row_count == len(table)
 
 
+@pytest.mark.slow
 def test_the_plot_names_its_front_and_labels_keep_clear(measured):
     import matplotlib.pyplot as plt
 

@@ -238,6 +238,7 @@ def test_what_is_zero_by_structure_is_the_zero_operator():
     assert MM.diff([1, "hinge2"]) == [MM.diff(1), MM.diff(2)] and MM.diff([]) == []
 
 
+@pytest.mark.slow
 def test_no_plan_of_a_derivative_is_dense(model):
     for name, op in expressions(model).items():
         if op.domain == pc.euclidean(1):

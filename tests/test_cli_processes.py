@@ -93,6 +93,7 @@ def test_errors_of_several_lines_are_one(tmp_path):
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
+@pytest.mark.slow
 def test_a_full_disk():
     with open("/dev/full", "w") as full:
         done = pycraft("check", "panda", "--states", "0", stdout=full)
@@ -112,6 +113,7 @@ def test_an_output_that_is_closed():
     assert done.returncode == 2 and done.stderr.splitlines() == ["error: the output is closed"]
 
 
+@pytest.mark.slow
 def test_a_reader_that_has_seen_enough():
     code = (
         "import subprocess, sys\np = subprocess.Popen([sys.executable, '-m', 'pycraft.cli', 'check', 'panda', '--states', '0'],"

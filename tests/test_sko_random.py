@@ -77,6 +77,7 @@ def test_every_theorem_on_one_body(with_J):
     assert report and {f.verdict for f in report.findings} <= {"holds", "expected to fail", "holds anyway"}, report.counts()
 
 
+@pytest.mark.slow
 def test_true_theorems_hold_where_a_hinge_is_nearly_free():
     """D is 5000 times smaller than with the next hinges locked. Residuals scatter by as much from one precision to the next: a
     lucky one in double is no measure for the wider one, and every theorem holds."""

@@ -132,6 +132,7 @@ def test_a_formula_of_the_book_is_true_where_the_book_says():
     assert report.counterexample.rotor_inertia and (report.counterexample.bodies, report.counterexample.model().nv) == (1, 1)
 
 
+@pytest.mark.slow
 def test_a_hypothesis_that_the_refuting_model_meets_saves_nothing():
     """The statement is false on a model without rotor inertia: that J = 0 were enough would contradict it."""
     arm = pc.tree([-1, 0, 0], "pin", seed=3)
