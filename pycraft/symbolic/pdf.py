@@ -6,14 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from .. import _core
+from .shown import MATHEMATICS
 
-_MATHEMATICS = {
-    **{"φ": r"\phi", "ψ": r"\psi", "τ": r"\tau", "θ": r"\theta", "γ": r"\gamma", "ν": r"\nu", "Υ": r"\Upsilon", "Ω": r"\Omega"},
-    **{"Λ": r"\Lambda", "Δ": r"\Delta", "ℳ": r"\mathcal M", "𝒥": r"\mathcal J", "𝓑": r"\mathcal B", "∂": r"\partial", "√": r"\surd"},
-    **{"−": "-", "·": r"\cdot", "×": r"\times", "‖": r"\Vert", "½": r"\frac12", "≥": r"\geq", "≤": r"\leq", "ℓ": r"\ell"},
-    **{"⁻": "{}^-", "⁺": "{}^+", "¹": "{}^1", "²": "{}^2", "³": "{}^3", "ᵀ": r"{}^\top"},
-    **{letter: f"{{}}_{digit}" for digit, letter in enumerate("₀₁₂₃₄₅₆₇₈₉")},
-}
 _ACCENTS = {"\u0303": r"\~{}", "\u0304": r"\={}", "\u0307": r"\.{}", "\u0308": r"\"{}"}
 """Set over the letter before them."""
 
@@ -53,7 +47,7 @@ def to_pdf(notebook: str | Path) -> Path:
 
 def with_letters(file: Path) -> None:
     """Let a LaTeX file show letters that its fonts may not have: each becomes a command where the document begins."""
-    made = {letter: rf"\ensuremath{{{latex}}}" for letter, latex in _MATHEMATICS.items()}
+    made = {letter: rf"\ensuremath{{{latex}}}" for letter, latex in MATHEMATICS.items()}
     made |= {accent: rf"\llap{{{command}}}" for accent, command in _ACCENTS.items()}
     commands = "".join(f'\\catcode"{ord(letter):X}=13\\protected\\def {letter}{{{command}}}%\n' for letter, command in made.items())
     text = file.read_text(encoding="utf-8")
