@@ -94,12 +94,12 @@ void check_limits(const Hinge& hinge, const std::vector<double>& lower, const st
     throw ModelError(name + " takes " + std::to_string(count) + " lower and " + std::to_string(count) + " upper limits, one a subhinge (" +
                      hinge_kind_name(hinge.kind) + "), not " + std::to_string(lower.size()) + " and " + std::to_string(upper.size()));
   for (size_t i = 0; i < count; ++i) {
-    const std::string pair = "(" + short_number(lower[i]) + ", " + short_number(upper[i]) + ")";
+    const auto pair = [&] { return "(" + short_number(lower[i]) + ", " + short_number(upper[i]) + ")"; };
     if (!(lower[i] < std::numeric_limits<double>::infinity()) || !(upper[i] > -std::numeric_limits<double>::infinity()))
-      throw ModelError(name + ": limits " + pair + " leave no position; a side without a limit is -inf below, inf above");
-    if (lower[i] > upper[i]) throw ModelError(name + ": limits " + pair + " are the wrong way round; give (lower, upper)");
+      throw ModelError(name + ": limits " + pair() + " leave no position; a side without a limit is -inf below, inf above");
+    if (lower[i] > upper[i]) throw ModelError(name + ": limits " + pair() + " are the wrong way round; give (lower, upper)");
     if (hinge.subhinges[i].nq() > 1 && (std::isfinite(lower[i]) || std::isfinite(upper[i])))
-      throw ModelError(name + ": limits " + pair + " of a " + subhinge_kind_name(hinge.subhinges[i].kind) +
+      throw ModelError(name + ": limits " + pair() + " of a " + subhinge_kind_name(hinge.subhinges[i].kind) +
                        " subhinge; only one coordinate has limits, give it (-inf, inf)");
   }
 }
