@@ -35,7 +35,7 @@ pytestmark = pytest.mark.skipif(CMAKE is None, reason="needs CMake")
 
 def test_the_package_names_its_headers():
     folder = Path(pc.cmake_dir())
-    assert (folder / "pycraftConfig.cmake").is_file() and (folder.parents[2] / "include/pycraft/algebra/expression.h").is_file()
+    assert (folder / "pycraftConfig.cmake").is_file() and (folder.parents[2] / "include/pycraft/algebra/language/expression.h").is_file()
     targets = (folder / "pycraftTargets.cmake").read_text()
     assert 'INTERFACE_COMPILE_FEATURES "cxx_std_20"' in targets
 

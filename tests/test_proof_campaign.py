@@ -29,12 +29,16 @@ def test_the_command_says_how_far_it_is_and_goes_on_where_it_stopped(tmp_path, c
     with open(results, "a") as lines:
         lines.write('[2, {"tr')  # cut off
     ran = []
-    monkeypatch.setattr(proofs, "tried", lambda seed, whole=proofs.tried: ran.append(seed) or whole(seed))
+    monkeypatch.setattr(proofs, "tried", lambda seed, each, whole=proofs.tried: ran.append(seed) or whole(seed, each))
     assert proofs.main(["--seeds", "3", "--to", str(results)]) == 0
     assert ran == [2] and capsys.readouterr().out.startswith("3 of 3")
     results.write_text('[0, {"true": 1, "false_proofs": [[0, "D = J"]]}]\n')
     assert proofs.main(["--seeds", "1", "--to", str(results)]) == 1
     assert "FALSE, seed 0: D = J" in capsys.readouterr().out
+
+
+def test_quick_statements_are_perturbed_as_often_as_asked_for():
+    assert proofs.tried(0, 12).perturbed > proofs.tried(0).perturbed > 0
 
 
 @pytest.mark.slow

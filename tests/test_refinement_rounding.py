@@ -1,6 +1,6 @@
 """Refinement spoils nothing and tells the truth: what may be rounding of the residual is no correction, and it counts in the error.
 
-The rounding of a residual, carried through ℳ⁻¹Hφ, is bounded along the correction itself: cpp/algebra/sweeps/residual_rounding.h.
+The rounding of a residual, carried through ℳ⁻¹Hφ, is bounded along the correction itself: cpp/algebra/trees/sweeps/residual_rounding.h.
 """
 
 import re

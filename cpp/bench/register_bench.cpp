@@ -1,13 +1,14 @@
 // What `pycraft bench` times in the core, without Python in the loop: an expression applied, a direct call over a set of states.
 #include <string>
 
-#include "algebra/errors.h"
+#include "algebra/engine/evaluate.h"
 #include "bench/timing.h"
 #include "bindings/bindings.h"
 #include "dynamics/methods.h"
 #include "dynamics/packed_dynamics.h"
 #include "dynamics/rigid_dynamics.h"
 #include "dynamics/sensitivities.h"
+#include "runtime/errors.h"
 
 namespace pycraft {
 

@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "algebra/coefficient.h"
-#include "algebra/engine.h"
-#include "algebra/expression.h"
-#include "algebra/source.h"
+#include "algebra/engine/engine.h"
+#include "algebra/language/expression.h"
+#include "algebra/language/source.h"
+#include "numerics/coefficient.h"
 #include "spatial/pose.h"
 #include "spatial/symmetric3.h"
 

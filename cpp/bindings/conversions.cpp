@@ -2,8 +2,8 @@
 #include <cstring>
 #include <limits>
 
-#include "algebra/errors.h"
 #include "bindings/bindings.h"
+#include "runtime/errors.h"
 
 namespace pycraft {
 

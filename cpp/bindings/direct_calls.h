@@ -7,9 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include "algebra/errors.h"
 #include "bindings/bindings.h"
 #include "dynamics/workspace_pool.h"
+#include "runtime/errors.h"
 
 namespace pycraft {
 

@@ -1,5 +1,6 @@
 // The Python module: a table of contents.
-#include "algebra/scalar_expression.h"
+#include "algebra/language/scalar_expression.h"
+#include "algebra/planning/explain.h"
 #include "bindings/bindings.h"
 #include "model/multibody.h"
 

@@ -1,11 +1,11 @@
 // Derivatives of operators and scalars: along coordinates, time and parameters.
 #include <cmath>
 
-#include "algebra/differentiate.h"
-#include "algebra/errors.h"
+#include "algebra/theorems/differentiate.h"
 #include "bindings/bindings.h"
 #include "operators/derived_operators.h"
 #include "operators/directions.h"
+#include "runtime/errors.h"
 
 namespace pycraft {
 

@@ -1,8 +1,8 @@
 // A user's own operators: arrays, and linear operators from outside.
 #include <cmath>
 
-#include "algebra/errors.h"
 #include "bindings/bindings.h"
+#include "runtime/errors.h"
 
 namespace pycraft {
 

@@ -1,5 +1,5 @@
 // Errors: one common base, pycraft.Error, and the fitting built-in beside it.
-#include "algebra/errors.h"
+#include "runtime/errors.h"
 
 #include "bindings/bindings.h"
 

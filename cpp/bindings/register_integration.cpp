@@ -3,8 +3,8 @@
 
 #include "bindings/direct_calls.h"
 #include "dynamics/rigid_dynamics.h"
-#include "dynamics/trajectory.h"
-#include "recursions/configuration_rate.h"
+#include "model/configuration_rate.h"
+#include "simulation/trajectory.h"
 
 namespace pycraft {
 

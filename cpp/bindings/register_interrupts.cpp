@@ -3,9 +3,9 @@
 #include <chrono>
 #include <thread>
 
-#include "algebra/errors.h"
-#include "algebra/interrupt.h"
 #include "bindings/bindings.h"
+#include "runtime/errors.h"
+#include "runtime/interrupt.h"
 
 namespace pycraft {
 

@@ -1,6 +1,6 @@
-#include "algebra/errors.h"
 #include "bindings/bindings.h"
 #include "model/multibody.h"
+#include "runtime/errors.h"
 
 namespace pycraft {
 

@@ -1,14 +1,17 @@
 // Operators: all arithmetic dispatch between operators, numbers and arrays lives here, and nowhere else.
 #include <cmath>
 
-#include "algebra/errors.h"
-#include "algebra/matrix_tree.h"
-#include "algebra/planner.h"
-#include "algebra/polynomial.h"
-#include "algebra/properties.h"
-#include "algebra/simplify.h"
+#include "algebra/engine/evaluate.h"
+#include "algebra/language/display.h"
+#include "algebra/planning/square_root.h"
+#include "algebra/language/properties.h"
+#include "algebra/planning/planner.h"
+#include "algebra/planning/simplify.h"
+#include "algebra/theorems/polynomial.h"
+#include "algebra/trees/matrix_tree.h"
 #include "bindings/bindings.h"
 #include "operators/multibody_operators.h"
+#include "runtime/errors.h"
 
 namespace pycraft {
 

@@ -1,9 +1,10 @@
 // Expressions as plain parts and back: pickling, copying.
 #include <unordered_map>
 
-#include "algebra/errors.h"
+#include "algebra/planning/square_root.h"
 #include "bindings/bindings.h"
 #include "operators/directions.h"
+#include "runtime/errors.h"
 
 namespace pycraft {
 

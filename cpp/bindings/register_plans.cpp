@@ -1,12 +1,13 @@
-#include "algebra/plan.h"
+#include "algebra/planning/plan.h"
 
 #include <cstdint>
 
-#include "algebra/errors.h"
-#include "algebra/realization.h"
-#include "algebra/values.h"
+#include "algebra/language/values.h"
+#include "algebra/planning/explain.h"
+#include "algebra/planning/realization.h"
 #include "bindings/bindings.h"
 #include "operators/directions.h"
+#include "runtime/errors.h"
 
 namespace pycraft {
 

@@ -1,8 +1,10 @@
 #include <cmath>
 
-#include "algebra/errors.h"
-#include "algebra/scalar_expression.h"
+#include "algebra/engine/evaluate.h"
+#include "algebra/language/display.h"
+#include "algebra/language/scalar_expression.h"
 #include "bindings/bindings.h"
+#include "runtime/errors.h"
 
 namespace pycraft {
 

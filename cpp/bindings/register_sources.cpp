@@ -1,12 +1,12 @@
 // Where operators come from: multibody models, trees of matrices, and the states that expressions are bound to.
 #include <algorithm>
 
-#include "algebra/aggregated_tree.h"
-#include "algebra/errors.h"
-#include "algebra/matrix_tree.h"
+#include "algebra/trees/aggregated_tree.h"
+#include "algebra/trees/matrix_tree.h"
 #include "bindings/bindings.h"
 #include "operators/derived_operators.h"
 #include "operators/directions.h"
+#include "runtime/errors.h"
 
 namespace pycraft {
 

@@ -1,10 +1,10 @@
-#include "algebra/space.h"
+#include "algebra/language/space.h"
 
 #include <cstdint>
 #include <limits>
 
-#include "algebra/errors.h"
 #include "bindings/bindings.h"
+#include "runtime/errors.h"
 
 namespace pycraft {
 

@@ -1,6 +1,8 @@
-#include "algebra/theorems.h"
+#include "algebra/theorems/theorems.h"
 
-#include "algebra/matrix_tree.h"
+#include "algebra/engine/evaluate.h"
+#include "algebra/language/display.h"
+#include "algebra/trees/matrix_tree.h"
 #include "bindings/bindings.h"
 #include "operators/multibody_operators.h"
 

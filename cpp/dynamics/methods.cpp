@@ -1,14 +1,15 @@
-#include "algebra/interrupt.h"
 #include "dynamics/methods.h"
+#include "runtime/interrupt.h"
 
 #include <cstdio>
 
-#include "algebra/errors.h"
-#include "algebra/sweeps/articulated_inertia.h"
-#include "algebra/sweeps/mass_matrix.h"
+#include "algebra/trees/sweeps/articulated_inertia.h"
+#include "algebra/trees/sweeps/mass_matrix.h"
+#include "dynamics/tree_factors.h"
 #include "recursions/composite_mass_matrix.h"
 #include "recursions/kinematics.h"
 #include "recursions/newton_euler.h"
+#include "runtime/errors.h"
 
 namespace pycraft {
 
@@ -124,7 +125,7 @@ size_t DynamicsMethods<S>::memory(Method method) const {
   size_t d = 0;  // D(k) and its factor
   for (int count : tree_.dof) d += 2 * size_t(count) * count;
   const size_t common = bodies * (sizeof(Pose<S>) + sizeof(RigidInertia<S>) + 6 * six) + n * (2 * six + 2 * sizeof(S));
-  const size_t composite = bodies * sizeof(ArticulatedInertia<S>), square = n * n * sizeof(S);
+  const size_t composite = bodies * sizeof(Symmetric6<S>), square = n * n * sizeof(S);
   switch (method) {
     case Method::cholesky: return common + composite + square + 2 * n * sizeof(S);
     case Method::ldl: return common + composite + square + 2 * n * (sizeof(S) + sizeof(int));

@@ -13,11 +13,12 @@
 #include <string>
 #include <vector>
 
-#include "dynamics/conjugate_gradients.h"
-#include "dynamics/dense_factors.h"
+#include "dynamics/tree_factors.h"
 #include "model/multibody.h"
-#include "operators/rigid_blocks.h"
+#include "numerics/conjugate_gradients.h"
+#include "numerics/dense_factors.h"
 #include "recursions/point_accelerations.h"
+#include "rigid/rigid_blocks.h"
 
 namespace pycraft {
 

@@ -3,11 +3,11 @@
 
 #include <vector>
 
-#include "algebra/arithmetic.h"
 #include "model/multibody.h"
-#include "operators/rigid_blocks.h"
+#include "numerics/arithmetic.h"
+#include "numerics/pack.h"
 #include "recursions/point_accelerations.h"
-#include "spatial/pack.h"
+#include "rigid/rigid_blocks.h"
 
 namespace pycraft {
 

@@ -7,13 +7,13 @@
 #include <utility>
 #include <vector>
 
-#include "algebra/refinement.h"
-#include "algebra/sweeps/residual_rounding.h"
+#include "algebra/trees/sweeps/residual_rounding.h"
 #include "dynamics/workspace_pool.h"
 #include "model/multibody.h"
-#include "operators/rigid_blocks.h"
+#include "numerics/refinement.h"
 #include "recursions/point_accelerations.h"
 #include "recursions/velocities.h"
+#include "rigid/rigid_blocks.h"
 
 namespace pycraft {
 

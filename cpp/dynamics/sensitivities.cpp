@@ -2,11 +2,11 @@
 
 #include <algorithm>
 
-#include "algebra/interrupt.h"
-#include "algebra/sweeps/articulated_inertia.h"
-#include "algebra/sweeps/upsilon.h"
+#include "algebra/trees/sweeps/articulated_inertia.h"
+#include "algebra/trees/sweeps/upsilon.h"
 #include "recursions/kinematics.h"
 #include "recursions/newton_euler.h"
+#include "runtime/interrupt.h"
 
 namespace pycraft {
 
@@ -373,7 +373,7 @@ void Sensitivities<S>::log_determinant(const S* q, S* coordinates, S* inertias, 
   for (int k = 0; k < m.bodies; ++k) {
     check_interrupt_at(k);
     const int p = m.parent[k], first = m.v_offset[k], last = first + m.nv_of[k];
-    const ArticulatedInertia<S>& Y = blocks_.Y[k];
+    const Symmetric6<S>& Y = blocks_.Y[k];
     if (inertias) {  // tr(Υ ∂M)
       S* g = inertias + 10 * k;
       g[0] = Y(3, 3) + Y(4, 4) + Y(5, 5);
@@ -386,8 +386,8 @@ void Sensitivities<S>::log_determinant(const S* q, S* coordinates, S* inertias, 
       for (int e = 0; e < 6; ++e) g[4 + e] = (row[e] == column[e] ? S(1) : S(2)) * Y(row[e], column[e]);
     }
     if (!coordinates && !geometry && !axes) continue;
-    const ArticulatedInertia<S> W = p < 0 ? ArticulatedInertia<S>::zero() : compliance_to_child(blocks_.pose[k], blocks_.Y[p]);  // E*ΥE
-    const ArticulatedInertia<S>& plus = blocks_.Pplus[k];
+    const Symmetric6<S> W = p < 0 ? Symmetric6<S>::zero() : compliance_to_child(blocks_.pose[k], blocks_.Y[p]);  // E*ΥE
+    const Symmetric6<S>& plus = blocks_.Pplus[k];
     // g: 2 tr(P⁺ W crf(x)) = g·x; with A = P⁺W: tr(A crf(x)) = Σ A(i,j) crf(x)(j,i)
     S A[6][6];
     for (int i = 0; i < 6; ++i)

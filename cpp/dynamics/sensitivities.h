@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "algebra/sweeps/mass_matrix.h"
+#include "algebra/trees/sweeps/mass_matrix.h"
 #include "dynamics/rigid_dynamics.h"
 #include "dynamics/tangent_dynamics.h"
 #include "model/multibody.h"

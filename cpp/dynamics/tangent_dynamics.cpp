@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "model/configuration_rate.h"
 #include "recursions/articulated_body.h"
-#include "recursions/configuration_rate.h"
 #include "recursions/kinematics.h"
 
 namespace pycraft {

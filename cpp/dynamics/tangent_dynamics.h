@@ -7,11 +7,11 @@
 
 #include <vector>
 
-#include "algebra/arithmetic.h"
 #include "model/multibody.h"
-#include "operators/rigid_blocks.h"
+#include "numerics/arithmetic.h"
+#include "numerics/tangent.h"
 #include "recursions/point_accelerations.h"
-#include "spatial/tangent.h"
+#include "rigid/rigid_blocks.h"
 
 namespace pycraft {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "algebra/errors.h"
+#include "runtime/errors.h"
 
 namespace pycraft {
 

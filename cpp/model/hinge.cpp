@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "algebra/errors.h"
+#include "runtime/errors.h"
 
 namespace pycraft {
 

@@ -8,7 +8,7 @@
 #include <limits>
 #include <type_traits>
 
-#include "algebra/sweeps/factored_inertia.h"
+#include "numerics/semidefinite_factors.h"
 #include "spatial/pose.h"
 #include "spatial/symmetric3.h"
 

@@ -5,10 +5,10 @@
 #include <functional>
 #include <mutex>
 
-#include "algebra/errors.h"
-#include "algebra/interrupt.h"
 #include "model/checks.h"
 #include "model/compiled_model.h"
+#include "runtime/errors.h"
+#include "runtime/interrupt.h"
 
 namespace pycraft {
 

@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "algebra/mutex.h"
-#include "algebra/source.h"
+#include "algebra/language/source.h"
 #include "model/hinge.h"
+#include "runtime/mutex.h"
 #include "spatial/rigid_inertia.h"
 
 namespace pycraft {

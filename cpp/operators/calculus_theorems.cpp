@@ -2,6 +2,7 @@
 // different form, so that equality says something of the rules.
 #include <algorithm>
 
+#include "algebra/planning/square_root.h"
 #include "operators/derived_operators.h"
 #include "operators/directions.h"
 

@@ -1,6 +1,6 @@
 #include "operators/derived_operators.h"
 
-#include "algebra/tree_values.h"
+#include "algebra/trees/tree_values.h"
 #include "recursions/kinematics.h"
 
 namespace pycraft {

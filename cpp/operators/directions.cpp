@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "algebra/errors.h"
-#include "algebra/lower.h"
-#include "algebra/theorems.h"
+#include "algebra/language/display.h"
+#include "algebra/language/lower.h"
+#include "algebra/theorems/theorems.h"
 #include "operators/derived_operators.h"
+#include "runtime/errors.h"
 
 namespace pycraft {
 

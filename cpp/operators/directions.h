@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include "algebra/differentiate.h"
+#include "algebra/theorems/differentiate.h"
 #include "operators/multibody_operators.h"
 
 namespace pycraft {

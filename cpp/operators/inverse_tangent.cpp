@@ -5,11 +5,12 @@
 #include <cmath>
 #include <cstdint>
 
-#include "algebra/lower.h"
-#include "algebra/planner.h"
-#include "algebra/sweeps/articulated_inertia.h"
-#include "algebra/sweeps/mass_matrix.h"
-#include "algebra/theorems.h"
+#include "algebra/language/lower.h"
+#include "algebra/planning/planner.h"
+#include "algebra/planning/recognise.h"
+#include "algebra/theorems/theorems.h"
+#include "algebra/trees/sweeps/articulated_inertia.h"
+#include "algebra/trees/sweeps/mass_matrix.h"
 #include "operators/rigid_values.h"
 
 namespace pycraft {

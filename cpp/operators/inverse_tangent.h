@@ -1,6 +1,6 @@
 // ∂(ℳ + J)⁻¹ x along coordinates, fixed twists and time, by the derivative of the Riccati sweep.
 //
-// The sweep runs on numbers with a derivative each (spatial/tangent.h), in the form `ud`, seeded by what the direction makes of the leaves:
+// The sweep runs on numbers with a derivative each (numerics/tangent.h), in the form `ud`, seeded by what the direction makes of the leaves:
 //
 //   ∂R(k) = R(k) ω~,  ∂l(k) = R(k) v     of the pose X_pk, h = (ω; v) the twist in the axes of body k: ∂E = E crf(h)
 //   ∂H(j) = H(j) crf(h)                  of the rows inboard of where the twist stands in its hinge
@@ -17,10 +17,10 @@
 #include <optional>
 #include <vector>
 
-#include "algebra/values.h"
+#include "algebra/language/values.h"
+#include "numerics/tangent.h"
 #include "operators/directions.h"
-#include "operators/rigid_blocks.h"
-#include "spatial/tangent.h"
+#include "rigid/rigid_blocks.h"
 
 namespace pycraft {
 

@@ -5,12 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "algebra/expression.h"
-#include "algebra/source.h"
-#include "algebra/theorems.h"
-#include "algebra/tree_values.h"
+#include "algebra/language/expression.h"
+#include "algebra/language/source.h"
+#include "algebra/theorems/theorems.h"
+#include "algebra/trees/tree_values.h"
 #include "model/multibody.h"
-#include "operators/rigid_blocks.h"
+#include "rigid/rigid_blocks.h"
 
 namespace pycraft {
 

@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "algebra/tree_values.h"
+#include "algebra/trees/tree_values.h"
 #include "operators/multibody_operators.h"
 #include "recursions/kinematics.h"
 #include "recursions/velocities.h"

@@ -1,6 +1,6 @@
 // Forward dynamics (articulated-body algorithm), with gravity as the acceleration -g of the base:
 //
-//   tip to base:  P, D, G, P⁺ of algebra/sweeps/articulated_inertia.h, and
+//   tip to base:  P, D, G, P⁺ of algebra/trees/sweeps/articulated_inertia.h, and
 //                 z(k) = P(k) a(k) + b(k) + Σ_{children c} E(k,c) z⁺(c)
 //                 ε(k) = T(k) - H(k) z(k),   ν(k) = D(k)⁻¹ ε(k),   z⁺(k) = z(k) + G(k) ε(k)
 //   base to tip:  α⁺(k) = E(p,k)* α(p),   θ̈(k) = ν(k) - G(k)* α⁺(k),   α(k) = α⁺(k) + H(k)* θ̈(k) + a(k),   α(base) = -g
@@ -18,10 +18,10 @@
 
 #include <vector>
 
-#include "algebra/interrupt.h"
-#include "algebra/sweeps/articulated_inertia.h"
-#include "operators/rigid_blocks.h"
+#include "algebra/trees/sweeps/articulated_inertia.h"
 #include "recursions/point_accelerations.h"
+#include "rigid/rigid_blocks.h"
+#include "runtime/interrupt.h"
 
 namespace pycraft {
 

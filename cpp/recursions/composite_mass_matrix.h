@@ -1,6 +1,6 @@
 // The mass matrix by composite-body inertias:
 //
-//   R(k) by algebra/sweeps/composite_inertia.h;   ℳ(k,k) = H(k) R(k) H(k)* + J(k);
+//   R(k) by algebra/trees/sweeps/composite_inertia.h;   ℳ(k,k) = H(k) R(k) H(k)* + J(k);
 //   f = R(k) h_j* carried to each ancestor a by f <- φ f:   ℳ(a,k) = H(a) f
 //
 // Cost O(N · depth). Writes the full symmetric matrix, row-major.
@@ -9,9 +9,9 @@
 
 #include <algorithm>
 
-#include "algebra/interrupt.h"
-#include "algebra/sweeps/composite_inertia.h"
-#include "operators/rigid_blocks.h"
+#include "algebra/trees/sweeps/composite_inertia.h"
+#include "rigid/rigid_blocks.h"
+#include "runtime/interrupt.h"
 
 namespace pycraft {
 

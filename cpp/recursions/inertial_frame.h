@@ -19,11 +19,11 @@
 
 #include <vector>
 
-#include "algebra/interrupt.h"
 #include "model/compiled_model.h"
 #include "model/hinge_kinematics.h"
-#include "operators/rigid_blocks.h"
 #include "recursions/point_accelerations.h"
+#include "rigid/rigid_blocks.h"
+#include "runtime/interrupt.h"
 
 namespace pycraft {
 

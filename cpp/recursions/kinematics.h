@@ -3,10 +3,10 @@
 
 #include <algorithm>
 
-#include "algebra/interrupt.h"
 #include "model/compiled_model.h"
 #include "model/hinge_kinematics.h"
-#include "operators/rigid_blocks.h"
+#include "rigid/rigid_blocks.h"
+#include "runtime/interrupt.h"
 
 namespace pycraft {
 

@@ -10,9 +10,9 @@
 
 #include <vector>
 
-#include "algebra/interrupt.h"
-#include "operators/rigid_blocks.h"
 #include "recursions/point_accelerations.h"
+#include "rigid/rigid_blocks.h"
+#include "runtime/interrupt.h"
 #include "spatial/wide_force.h"
 
 namespace pycraft {

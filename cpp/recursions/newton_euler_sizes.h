@@ -1,5 +1,5 @@
 // The sizes of what inverse dynamics adds up, body by body and entry by entry: what the rounding of a residual τ - (ℳθ̈ + 𝒞) is made of,
-// see algebra/sweeps/residual_rounding.h. Every product is that of newton_euler and point_accelerations with absolute values, |·|. With u a
+// see algebra/trees/sweeps/residual_rounding.h. Every product is that of newton_euler and point_accelerations with absolute values, |·|. With u a
 // unit of rounding, angular velocities are off by u dω in any direction, base to tip
 //
 //   dω(k) = dω(p) + ‖ω(k)‖ + ‖ω(p)‖ + Σ ‖h_ω‖|θ̇|
@@ -19,9 +19,9 @@
 #include <cmath>
 #include <vector>
 
-#include "algebra/sweeps/residual_rounding.h"
-#include "operators/rigid_blocks.h"
+#include "algebra/trees/sweeps/residual_rounding.h"
 #include "recursions/point_accelerations.h"
+#include "rigid/rigid_blocks.h"
 #include "spatial/sizes.h"
 
 namespace pycraft {

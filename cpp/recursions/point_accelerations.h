@@ -21,8 +21,8 @@
 
 #include <vector>
 
-#include "algebra/interrupt.h"
 #include "model/compiled_model.h"
+#include "runtime/interrupt.h"
 #include "spatial/pose.h"
 
 namespace pycraft {

@@ -13,9 +13,9 @@
 
 #include <vector>
 
-#include "algebra/interrupt.h"
 #include "model/compiled_model.h"
 #include "model/hinge_kinematics.h"
+#include "runtime/interrupt.h"
 
 namespace pycraft {
 

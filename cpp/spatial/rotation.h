@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "spatial/scalar.h"
+#include "numerics/scalar.h"
 #include "spatial/vector3.h"
 
 namespace pycraft {

@@ -4,9 +4,10 @@
 #include <Eigen/Dense>
 #include <random>
 
-#include "algebra/engine.h"
-#include "algebra/matrix_tree.h"
-#include "algebra/theorems.h"
+#include "algebra/engine/engine.h"
+#include "algebra/engine/evaluate.h"
+#include "algebra/theorems/theorems.h"
+#include "algebra/trees/matrix_tree.h"
 
 namespace pycraft::testing {
 

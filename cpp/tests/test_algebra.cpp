@@ -2,12 +2,14 @@
 #define BOOST_TEST_MODULE algebra
 #include <boost/test/included/unit_test.hpp>
 
-#include "algebra/errors.h"
-#include "algebra/lower.h"
-#include "algebra/polynomial.h"
-#include "algebra/properties.h"
-#include "algebra/simplify.h"
+#include "algebra/engine/evaluate.h"
+#include "algebra/language/display.h"
+#include "algebra/language/lower.h"
+#include "algebra/language/properties.h"
+#include "algebra/planning/simplify.h"
+#include "algebra/theorems/polynomial.h"
 #include "random_tree.h"
+#include "runtime/errors.h"
 
 using namespace pycraft;
 using namespace pycraft::testing;

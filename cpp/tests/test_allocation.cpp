@@ -4,12 +4,16 @@
 #include <cmath>
 #include <set>
 
+#include "algebra/engine/evaluate.h"
+#include "algebra/language/display.h"
+#include "algebra/planning/explain.h"
+#include "algebra/planning/square_root.h"
+#include "allocations.h"
 #include "dynamics/packed_dynamics.h"
 #include "dynamics/rigid_dynamics.h"
 #include "dynamics/sensitivities.h"
 #include "operators/directions.h"
 #include "operators/multibody_operators.h"
-#include "allocations.h"
 #include "random_tree.h"
 #include "robot.h"
 

@@ -2,9 +2,9 @@
 #define BOOST_TEST_MODULE arithmetic
 #include <boost/test/included/unit_test.hpp>
 
-#include "algebra/eigen.h"
-#include "algebra/errors.h"
+#include "algebra/engine/eigen.h"
 #include "random_tree.h"
+#include "runtime/errors.h"
 
 using namespace pycraft;
 

@@ -7,18 +7,18 @@
 #include <numeric>
 #include <random>
 
-#include "algebra/equilibration.h"
-#include "algebra/gram_factors.h"
-#include "algebra/refinement.h"
-#include "algebra/small_lu.h"
-#include "algebra/sweeps/factored_inertia.h"
-#include "algebra/sweeps/residual_rounding.h"
-#include "algebra/sweeps/singular_pivot.h"
-#include "recursions/configuration_rate.h"
+#include "algebra/trees/sweeps/factored_inertia.h"
+#include "algebra/trees/sweeps/residual_rounding.h"
+#include "algebra/trees/sweeps/singular_pivot.h"
+#include "model/configuration_rate.h"
+#include "numerics/equilibration.h"
+#include "numerics/gram_factors.h"
+#include "numerics/pack.h"
+#include "numerics/refinement.h"
+#include "numerics/small_lu.h"
 #include "recursions/kinematics.h"
-#include "spatial/pack.h"
-#include "spatial/wide_force.h"
 #include "robot.h"
+#include "spatial/wide_force.h"
 
 using namespace pycraft;
 using pycraft::testing::random_numbers;

@@ -2,12 +2,12 @@
 #define BOOST_TEST_MODULE methods
 #include <boost/test/included/unit_test.hpp>
 
+#include "allocations.h"
 #include "dynamics/methods.h"
 #include "dynamics/rigid_dynamics.h"
-#include "dynamics/trajectory.h"
-#include "recursions/configuration_rate.h"
-#include "allocations.h"
+#include "model/configuration_rate.h"
 #include "robot.h"
+#include "simulation/trajectory.h"
 
 using namespace pycraft;
 using namespace pycraft::testing;

@@ -2,10 +2,10 @@
 #define BOOST_TEST_MODULE multibody
 #include <boost/test/included/unit_test.hpp>
 
-#include "algebra/errors.h"
 #include "dynamics/rigid_dynamics.h"
 #include "operators/multibody_operators.h"
 #include "random_tree.h"
+#include "runtime/errors.h"
 
 using namespace pycraft;
 using namespace pycraft::testing;

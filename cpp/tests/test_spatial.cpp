@@ -3,8 +3,8 @@
 #include <boost/test/included/unit_test.hpp>
 #include <random>
 
-#include "spatial/articulated_inertia.h"
-#include "spatial/scalar.h"
+#include "numerics/scalar.h"
+#include "spatial/symmetric6.h"
 
 using namespace pycraft;
 using Scalars = std::tuple<Single, double, Extended, Quad, Digits50, Digits100>;
@@ -102,18 +102,18 @@ BOOST_AUTO_TEST_CASE_TEMPLATE(inertias_transform_as_operators, S, Scalars) {
     const Vector6<S> V = draw.six();
     const Vector6<S> through = force_to_parent(X, M * motion_to_child(X, V));  // φMφ* V
     BOOST_TEST(relative(to_parent(X, M) * V, through) < few);
-    const ArticulatedInertia<S> P = articulated_inertia(M);
+    const Symmetric6<S> P = symmetric6(M);
     BOOST_TEST(relative(P * V, M * V) < few);
     BOOST_TEST(relative(to_parent(X, P) * V, through) < few);
     // a general symmetric one: P - w w*
-    ArticulatedInertia<S> Q = P;
+    Symmetric6<S> Q = P;
     const Vector6<S> w = draw.six();
     downdate(Q, w, w);
     BOOST_TEST(relative(Q * V, P * V - dot(w, V) * w) < few);
     const Vector6<S> f = draw.six();
     BOOST_TEST(relative(to_parent(X, Q) * V, force_to_parent(X, Q * motion_to_child(X, V))) < few);
     BOOST_TEST(relative(compliance_to_child(X, Q) * f, motion_to_child(X, Q * force_to_parent(X, f))) < few);
-    ArticulatedInertia<S> U = ArticulatedInertia<S>::zero();
+    Symmetric6<S> U = Symmetric6<S>::zero();
     add_symmetric_product(U, w, f);
     BOOST_TEST(relative(U * V, dot(f, V) * w + dot(w, V) * f) < few);
     annihilate(Q, 1);

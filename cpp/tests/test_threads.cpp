@@ -4,10 +4,10 @@
 #include <boost/test/included/unit_test.hpp>
 #include <thread>
 
-#include "algebra/errors.h"
 #include "dynamics/rigid_dynamics.h"
 #include "operators/multibody_operators.h"
 #include "random_tree.h"
+#include "runtime/errors.h"
 
 using namespace pycraft;
 using namespace pycraft::testing;

@@ -10,18 +10,19 @@ import re
 from .mutant import Mutant, line_of, shown_line
 
 TARGETS = [
-    "cpp/operators/rigid_blocks.h",
-    "cpp/algebra/dense_blocks.h",
+    "cpp/rigid/rigid_blocks.h",
+    "cpp/algebra/trees/dense_blocks.h",
+    "cpp/numerics/tangent.h",
     "cpp/spatial/*.h",
     "cpp/recursions/*.h",
-    "cpp/algebra/sweeps/*.h",
+    "cpp/algebra/trees/sweeps/*.h",
     "cpp/model/hinge_kinematics.h",
-    "cpp/algebra/theorems.cpp",
+    "cpp/algebra/theorems/theorems.cpp",
     "cpp/dynamics/sensitivities.cpp",
     "cpp/operators/rigid_values.h",
-    "cpp/operators/rigid_factors.h",
+    "cpp/rigid/rigid_factors.h",
 ]
-LEFT_OUT = {"cpp/spatial/scalar.h", "cpp/spatial/pack.h"}  # conversions between scalars; lanes are in `listed.py`
+LEFT_OUT = {"cpp/numerics/scalar.h", "cpp/numerics/pack.h"}  # conversions between scalars; lanes are in `listed.py`
 BOOKKEEPING = {"DenseBlocks", "RigidBlocks", "resize", "throw_singular_hinge", "add", "operator+=", "operator-=", "operator-", "operator+"}
 POINTERS = re.compile(
     r"\s*(?:tree\w*\.|model\.\w+_offset|at_|d_\b|f\b|first\b|size_t|1\b|static_cast|int\(|offset|back\b|rows\b|[a-z]\s*[,)])"

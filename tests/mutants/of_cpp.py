@@ -3,7 +3,7 @@
 STATEMENT = "statement"
 
 CHANGES = {
-    "cpp/spatial/pack.h": [
+    "cpp/numerics/pack.h": [
         (
             "a comparison of packs holds where any lane holds",
             "all &= f(a.v[i], b.v[i]);",
@@ -11,7 +11,7 @@ CHANGES = {
             STATEMENT,
         ),
     ],
-    "cpp/algebra/source.cpp": [
+    "cpp/algebra/language/source.cpp": [
         ("stale numbers of the present state", "c.parameters != version", "false"),
         ("stale numbers of a bound state", "entry->parameters != source->parameters()", "false"),
     ],
@@ -34,7 +34,7 @@ CHANGES = {
         ("gravity is no new version", "gravity_ = g;\n  ++parameters_;", "gravity_ = g;", STATEMENT),
         ("limits are not checked when set", "check_limits(body(k).hinge, lower, upper);", ";", STATEMENT),
     ],
-    "cpp/algebra/engine.cpp": [
+    "cpp/algebra/engine/engine.cpp": [
         ("plans for J = 0 kept", "source.traits().hinge_diagonal != plan_->hinge_diagonal[c]", "false"),
         ("a plan is for J = 0 once and for all", "impl_->seen[c] == parameters", "impl_->seen[c] != ~std::uint64_t(0)"),
         (
@@ -52,11 +52,11 @@ CHANGES = {
         ("a workspace keeps the number of its first state", "w.state = b;", ";", STATEMENT),
         ("what is out of range is returned", "in_range &= std::isfinite(result.values[at]);", ";", STATEMENT),
     ],
-    "cpp/algebra/workspace.h": [
+    "cpp/algebra/engine/workspace.h": [
         ("wider values of the state before", "if (now == followed_) return;", "if (!followed_.empty()) return;", STATEMENT),
         ("indefinite blocks have a root", "pivot < -bound", "false"),
     ],
-    "cpp/algebra/differentiate.cpp": [
+    "cpp/algebra/theorems/differentiate.cpp": [
         ("∂P without G ∂J G*", "times({o.G, run(o.J), o.G.T()})", "zero(o.M.domain(), o.M.codomain())"),
         ("∂ blockdiag(AXA*) as if X were symmetric", "times({bar, e, star(F)})", "star(times({F, e, star(bar)}))"),
     ],
@@ -81,19 +81,19 @@ CHANGES = {
     "cpp/recursions/point_accelerations.h": [
         ("a hinge's own terms are never absorbed", "own == OwnTerms::absorbed && t[0] >= 0", "own != own && t[0] >= 0"),
     ],
-    "cpp/algebra/sweeps/singular_pivot.h": [("pivot bound without its (j + 1)", "return S(j + 1) * sum;", "return sum;", STATEMENT)],
-    "cpp/operators/rigid_blocks.h": [
+    "cpp/algebra/trees/sweeps/singular_pivot.h": [("pivot bound without its (j + 1)", "return S(j + 1) * sum;", "return sum;", STATEMENT)],
+    "cpp/rigid/rigid_blocks.h": [
         ("pivot bound without its J", "dot(H[j], X_[k] * H[j]) + J[j]", "dot(H[j], X_[k] * H[j])"),
         ("rounding of a rotor's forces not counted", "u.force * J[j] * S(abs(x[at]))", "S(0)"),
     ],
-    "cpp/algebra/refinement.h": [
+    "cpp/numerics/refinement.h": [
         ("refinement refuses at 0.9", "S(0.3)", "S(0.9)"),
         ("refinement goes on while corrections shrink", "length < work.last[c] / S(2)", "length < work.last[c]"),
         ("what cancelled is not counted", "S(S(1e3) * epsilon<S>() * largest)", "S(0)"),
         ("corrections of rounding are applied", "length > S(2) * work.rounding[c]", "true"),
         ("corrections of rounding are applied", "length > work.rounding[c]", "true"),
     ],
-    "cpp/algebra/elimination_solve.h": [
+    "cpp/algebra/engine/elimination/elimination_solve.h": [
         ("elimination with one refinement", "step < std::max(asked, 4)", "step < 1"),
         ("digits lost by the elimination ignored", "growth_ <= tolerated && solved", "true"),
         (
@@ -110,21 +110,21 @@ CHANGES = {
         ),
         ("a refinement of an elimination need only shrink", "correction < last / S(2)", "correction < last"),
     ],
-    "cpp/algebra/small_lu.h": [
+    "cpp/numerics/small_lu.h": [
         ("rows are not exchanged", "S(0.1) * largest", "S(0) * largest"),
         ("no pivot of an elimination is noise", "S(4 * n) * epsilon<S>() * column_[k]", "S(0)"),
         ("noise is judged by what is left", "sizes ? sizes[i] : S(0)", "S(0)"),
     ],
-    "cpp/algebra/equilibration.cpp": [
+    "cpp/numerics/equilibration.cpp": [
         ("rows have no scale of their own", "row_[k] = -by_column_[f].exponent - column_[j];", "row_[k] = 0;", STATEMENT),
         ("a longer path leaves the scales as they are", "v_[j] -= base - distance_[j];", ";", STATEMENT),
     ],
-    "cpp/algebra/gram_factors.h": [
+    "cpp/numerics/gram_factors.h": [
         ("rows heaviest last", "return largest[a] > largest[b];", "return largest[a] < largest[b];", STATEMENT),
         ("a dependent column is taken", "norm > S(16 * rows) * epsilon<S>() * S(sqrt(S(whole + below)))", "norm > S(0)"),
         ("the factors' diagonal keeps its sign", "head < S(0) ? norm : S(-norm)", "norm"),
     ],
-    "cpp/algebra/plan_diagonals.cpp": [
+    "cpp/algebra/planning/plan_diagonals.cpp": [
         ("ln det of HφMφ*H* is that of D whatever J", "!model.source->traits().hinge_diagonal", "true"),
         (
             "ln det of a multiple of n dimensions as of one",
@@ -132,7 +132,7 @@ CHANGES = {
             "Coefficient::log_of_size(e.node().coefficient)",
         ),
     ],
-    "cpp/algebra/plan_vectors.cpp": [
+    "cpp/algebra/planning/plan_vectors.cpp": [
         ("a multiple of J is J", "b.coefficient != a.coefficient", "false"),
         ("a solve that is refined is gathered by ψ", "h->binding && h->binding->arithmetic.refinement.steps != 0", "false"),
     ],
@@ -143,10 +143,10 @@ CHANGES = {
             "true",
         ),
     ],
-    "cpp/recursions/configuration_rate.h": [
+    "cpp/model/configuration_rate.h": [
         ("a move makes unit quaternions", "out[0] = to.w", "out[0] = to.w / sqrt(to.w * to.w + to.x * to.x + to.y * to.y + to.z * to.z)"),
     ],
-    "cpp/dynamics/trajectory.cpp": [
+    "cpp/simulation/trajectory.cpp": [
         ("the step after a cut step is the cut one", "cut && abs(tried) < abs(h) ? h : tried", "tried"),
         ("lengths of quaternions walk", "scale_quaternions<S>(equations_.model(), lengths_.data(), x_.data());", ";", STATEMENT),
     ],
@@ -167,5 +167,5 @@ CHANGES = {
     "cpp/bindings/direct_calls.h": [
         ("only what begins where the result begins is copied", "from >= to + out.size() || to >= from + a.array.size()", "from != to"),
     ],
-    "cpp/algebra/interrupt.cpp": [("signals are looked at once a minute", "now - last < pause", "now - last < 1000 * pause")],
+    "cpp/runtime/interrupt.cpp": [("signals are looked at once a minute", "now - last < pause", "now - last < 1000 * pause")],
 }

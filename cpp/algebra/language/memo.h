@@ -1,0 +1,34 @@
+// A place by a node of an expression where the layers above keep what they made of it: the expression itself knows nothing of them.
+#pragma once
+
+#include <memory>
+
+#include "runtime/mutex.h"
+
+namespace pycraft {
+
+class Memo {
+ public:
+  // What is kept here, made where there is none. Everybody who asks means the same Kept.
+  template <class Kept>
+  std::shared_ptr<Kept> get() {
+    std::lock_guard<Mutex> lock(mutex_);
+    if (mutex_.abandoned()) leave_behind(kept_, of_inverse_);
+    if (!kept_) kept_ = std::make_shared<Kept>();
+    return std::static_pointer_cast<Kept>(kept_);
+  }
+  // That of every inverse of the node: `MM.inv() @ x` in a loop is planned once.
+  std::shared_ptr<Memo> of_inverse() {
+    std::lock_guard<Mutex> lock(mutex_);
+    if (mutex_.abandoned()) leave_behind(kept_, of_inverse_);
+    if (!of_inverse_) of_inverse_ = std::make_shared<Memo>();
+    return of_inverse_;
+  }
+
+ private:
+  Mutex mutex_;
+  std::shared_ptr<void> kept_;
+  std::shared_ptr<Memo> of_inverse_;
+};
+
+}  // namespace pycraft

@@ -1,0 +1,90 @@
+// From an expression to a plan, in three tiers: a recognised kernel; sweeps of resolvents; realization and elimination. Only a full
+// dense constant, somebody else's operator under an inverse, or (found at run time) a singular pivot goes to a dense factorization.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "algebra/language/expression.h"
+#include "algebra/language/scalar_expression.h"
+#include "algebra/planning/plan.h"
+#include "algebra/planning/realization.h"
+
+namespace pycraft {
+
+class Planner {
+ public:
+  explicit Planner(const PlanOptions& options) : options_(options) {}
+
+  // The request as a plan. Recurses as deep as the expression is nested (with_stack_for).
+  Plan plan(const Expression& e, Request request);
+
+ private:
+  friend class RealizationBuilder;
+
+  // The operand of a dense factorization, lowered, for the plan of `whole`, which holds the factors of what is dense inside it.
+  Planner(const PlanOptions& options, Planner& whole) : options_(options), whole_(&whole) {}
+  Plan plan_lowered(const Expression& lowered);
+  void finish();
+
+  // ---- steps and registers
+  int new_register(RegisterKind kind, const Space& rows, const Space& columns, bool wide);
+  int emit(Step step, Register out);
+  int context_of(const Symbol& symbol, unsigned groups);
+  void emit_values();
+
+  // ---- vectors: registers of y = e x
+  int apply(const Expression& e, int x);
+  int apply_product(const std::vector<Expression>& factors, int x, const Expression& whole);
+  int apply_sum(const Expression& e, int x);
+  int apply_symbol(const Symbol& symbol, bool transposed, bool inverted, int x);
+  int apply_inverse(const Expression& e, int x);
+  int apply_inverse_tangent(const Symbol& symbol, int x);
+  int apply_blocks(int block, bool transposed, int x, const std::string& text);
+  int vector_value(const Expression& e);
+  int column(const Expression& e);   // a vector expression as one column, whatever the run's width
+  int solve_realization(const Expression& e, int x);
+  int dense_factor(const Expression& operand, const std::string& reason);   // a register of the whole plan
+  int solve_dense(const Expression& operand, int x, const std::string& reason);
+  std::optional<Expression> gram_root(const Expression& e) const;
+  int factor_gram(const Expression& e, const Expression& root);
+  std::shared_ptr<const Plan> plan_operand(const Expression& operand);
+
+  // ---- block registers of block-diagonal expressions
+  int blocks(const Expression& e);
+  int multiply_blocks(int a, int b);
+  int identity_blocks(const Space& rows, const Space& columns);
+  int zero_blocks(const Space& rows, const Space& columns);
+
+  // ---- structure
+  std::optional<int> diagonal_by_structure(const Expression& e);   // block register of blockdiag(e), no elimination
+  std::optional<int> structural_diagonal(const Expression& e);     // the same, not remembered
+  int diagonal_blocks(const Expression& e);
+  std::optional<int> diagonal_by_theorem(const std::vector<Expression>& factors);
+  int logdet(const Expression& e);
+  std::optional<std::vector<int>> logdet_of_factors(const std::vector<Expression>& factors);
+  std::optional<int> logdet_by_structure(const Expression& e);
+
+  int id_of(const Expression& e);
+  double vector_bytes(const Space& space) const { return 8.0 * space.dimension(); }
+
+  PlanOptions options_;
+  bool more_digits_ = false;         // bound to a precision above double
+  Plan plan_;
+  std::unordered_map<Expression, int, ExpressionHash> ids_;
+  std::map<std::pair<int, int>, int> vector_memo_;
+  std::map<int, int> block_memo_;
+  std::map<std::pair<int, int>, int> block_product_memo_;
+  std::map<int, std::optional<int>> diagonal_memo_;
+  Planner* whole_ = nullptr;                // null: this is the whole plan
+  std::map<int, int> dense_memo_;           // of the whole plan: factors by operand
+  std::map<int, int> imported_;             // of an operand's plan: its registers for those of the whole
+};
+
+// Steps of one plan; beyond it a shared part occurs too many times over.
+constexpr size_t most_steps = 200000;
+
+}  // namespace pycraft

@@ -1,0 +1,189 @@
+// What the theorems do for plans: recognise the forms that have kernels however they are spelled, invert by factors, let resolvents
+// meet their inverses. None of it changes a result; all of it changes the cost.
+#include <algorithm>
+#include <unordered_map>
+
+#include "algebra/language/display.h"
+#include "algebra/language/lower.h"
+#include "algebra/language/properties.h"
+#include "algebra/planning/planner.h"
+#include "algebra/planning/recognise.h"
+#include "algebra/theorems/polynomial.h"
+#include "algebra/theorems/rules.h"
+#include "algebra/theorems/theorems.h"
+#include "runtime/interrupt.h"
+
+namespace pycraft {
+
+Kernels kernels_of(const Symbol& like) {
+  const Letters o(like.source, like.binding);
+  const Expression S = o.I - o.H * o.psi * o.K;
+  Kernels k;
+  k.mass_matrix = lower(o.H * o.phi * o.M * o.phi.T() * o.H.T(), false).children();
+  k.mass_matrix_inverse = lower(S.T() * o.D.inv() * S, false).children();
+  return k;
+}
+
+namespace {
+
+double plan_flops(const Expression& e, bool rules) {
+  return Planner({rules}).plan(e, Request::apply).flops();
+}
+
+// What is longer has no normal form that would be found in time, and no kernel of its own.
+constexpr size_t most_letters = 1000;
+
+// Nodes of the expression written out as a tree, as far as most_letters.
+size_t written_length(const Expression& e) {
+  size_t length = 0;
+  std::vector<const Expression*> todo = {&e};
+  while (!todo.empty() && length <= most_letters) {
+    const Expression& x = *todo.back();
+    todo.pop_back();
+    ++length;
+    for (const Expression& c : x.children()) todo.push_back(&c);
+  }
+  return length;
+}
+
+class Optimiser {
+ public:
+  explicit Optimiser(std::vector<std::string>& notes) : notes_(notes) {}
+
+  Expression run(const Expression& e) {
+    const auto known = done_.find(e.get());
+    if (known != done_.end()) return known->second;
+    check_interrupt();
+    Expression better = compute(e);
+    done_.emplace(e.get(), better);
+    alive_.push_back(e);
+    return better;
+  }
+
+ private:
+  Expression compute(const Expression& e) {
+    switch (e.kind()) {
+      case NodeKind::inverse: {
+        const Expression& inner = e.children()[0];
+        if (inner.kind() == NodeKind::symbol || inner.kind() == NodeKind::transpose) return e;
+        if (!is_block_diagonal(inner) && written_length(inner) <= most_letters) {
+          if (const auto known = invert_by_theorem(inner)) {
+            note(known->theorem + ": (" + show(inner) + ")⁻¹ = " + show(known->inverse));
+            return run_parts(known->inverse);
+          }
+        }
+        const Expression better = run(inner);
+        return better.get() == inner.get() ? e : lowered_inverse(better);
+      }
+      case NodeKind::sum:
+      case NodeKind::product: return recognise(cancel(run_parts(e)));
+      default: return run_parts(e);
+    }
+  }
+
+  void note(const std::string& text) {
+    if (std::find(notes_.begin(), notes_.end(), text) == notes_.end()) notes_.push_back(text);
+  }
+
+  Expression run_parts(const Expression& e) {
+    if (e.kind() != NodeKind::sum && e.kind() != NodeKind::product && e.kind() != NodeKind::scaled && e.kind() != NodeKind::block_diagonal &&
+        e.kind() != NodeKind::square_root)
+      return e;
+    std::vector<Expression> parts;
+    bool changed = false;
+    for (const Expression& c : e.children()) {
+      parts.push_back(run(c));
+      changed |= parts.back().get() != c.get();
+    }
+    if (!changed) return e;
+    switch (e.kind()) {
+      case NodeKind::sum: return lowered_sum(parts, e.domain(), e.codomain());
+      case NodeKind::product: return lowered_product(parts, e.domain(), e.codomain());
+      case NodeKind::scaled: return lowered_product({e.node().coefficient * parts[0]}, e.domain(), e.codomain());
+      case NodeKind::block_diagonal: {
+        if (is_block_diagonal(parts[0])) return parts[0];
+        const Scaled s = split_scalar(parts[0]);
+        return s.coefficient == 1 ? block_diagonal(s.expression) : s.coefficient * block_diagonal(s.expression);
+      }
+      default: return square_root_of(parts[0]);
+    }
+  }
+
+  // ... X X⁻¹ ... loses both, X a run of factors.
+  Expression cancel(const Expression& e) {
+    if (e.kind() != NodeKind::product) return e;
+    std::vector<Expression> f = e.children();
+    bool again = true, changed = false;
+    while (again) {
+      again = false;
+      for (size_t i = 0; i < f.size() && !again; ++i) {
+        if (f[i].kind() != NodeKind::inverse) continue;
+        const Expression& inner = f[i].children()[0];
+        const std::vector<Expression> run = inner.kind() == NodeKind::product ? inner.children() : std::vector<Expression>{inner};
+        const auto matches = [&](size_t at) { return at + run.size() <= f.size() && std::equal(run.begin(), run.end(), f.begin() + at); };
+        if (i >= run.size() && matches(i - run.size())) {
+          f.erase(f.begin() + (i - run.size()), f.begin() + i + 1);
+          again = changed = true;
+        } else if (matches(i + 1)) {
+          f.erase(f.begin() + i, f.begin() + i + 1 + run.size());
+          again = changed = true;
+        }
+      }
+    }
+    return changed ? lowered_product(f, e.domain(), e.codomain()) : e;
+  }
+
+  // HφMφ*H* (+ J) in any spelling, and whatever the normal form makes cheaper.
+  Expression recognise(const Expression& e) {
+    if (written_length(e) > most_letters) return e;
+    const auto models = contexts(e);
+    if (models.size() != 1 || !e.domain().belongs_to_bodies()) return e;
+    bool resolvents = false;
+    visit(e, [&](const Expression& x) {
+      resolvents |= x.kind() == NodeKind::symbol && (x.node().symbol.definition->pattern == Pattern::resolvent || x.node().symbol.definition->pattern == Pattern::compound);
+    });
+    if (!resolvents) return e;
+    Alphabet alphabet;
+    const auto form = normal_form(e, alphabet);
+    if (!form) return e;
+    const Letters o(models[0].source, models[0].binding);
+    const Expression mass_matrix = lower(o.H * o.phi * o.M * o.phi.T() * o.H.T(), false);
+    if (e.domain() == models[0].source->theta() && e.codomain() == models[0].source->theta() && e != mass_matrix) {
+      const auto own = normal_form(mass_matrix, alphabet);
+      const Word j{alphabet.letter(o.J)};
+      Polynomial with_J = *own;
+      if (models[0].source->traits().hinge_diagonal) {
+        with_J[j] += 1;
+        if (with_J[j] == 0) with_J.erase(j);
+      }
+      const auto multiple = [&](const Polynomial& p) -> Coefficient {
+        if (p.size() != form->size() || p.empty()) return 0;
+        const Coefficient f = form->begin()->second / p.begin()->second;
+        for (auto a = form->begin(), b = p.begin(); a != form->end(); ++a, ++b)
+          if (a->first != b->first || a->second != f * b->second) return 0;
+        return f;
+      };
+      if (const Coefficient f = multiple(*own); f != 0) return found(e, f == 1 ? mass_matrix : f * mass_matrix);
+      if (const Coefficient f = multiple(with_J); f != 0) return found(e, lower(f * (mass_matrix + o.J), false));
+    }
+    const Expression normal = lower(to_expression(*form, alphabet, e.domain(), e.codomain()), false);
+    if (normal == e || plan_flops(normal, false) >= plan_flops(e, false)) return e;
+    return found(e, normal);
+  }
+
+  Expression found(const Expression& e, const Expression& better) {
+    if (better == e) return e;
+    note(show(e) + " = " + show(better));
+    return better;
+  }
+
+  std::vector<std::string>& notes_;
+  std::unordered_map<const Expression::Node*, Expression> done_;
+  std::vector<Expression> alive_;
+};
+
+}  // namespace
+
+Expression optimise(const Expression& lowered, std::vector<std::string>& notes) { return Optimiser(notes).run(lowered); }
+
+}  // namespace pycraft

@@ -1,0 +1,177 @@
+#include "algebra/theorems/rules.h"
+
+#include "algebra/language/lower.h"
+#include "algebra/language/values.h"
+#include "algebra/theorems/theorems.h"
+#include "runtime/errors.h"
+#include "runtime/without_interrupts.h"
+
+namespace pycraft {
+
+namespace {
+
+// Two bodies and nothing else: the theorems are stated on its letters once, to be compiled.
+class Prototype final : public SkoSource {
+ public:
+  Prototype() : SkoSource(skeleton(), "prototype") {}
+  Traits traits() const override { return {true, true, true, true, true, true}; }
+  int nq() const override { return 0; }
+  int nv() const override { return 0; }
+  void check_state(const double*, size_t, const double*, size_t) const override {}
+  std::shared_ptr<const StateData> state() const override { return std::make_shared<StateData>(); }
+  std::uint64_t parameters() const override { return 0; }
+#define PYCRAFT_NO_VALUES(S) std::unique_ptr<SkoValues<S>> make_values(S) const override { return nullptr; }
+  PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_NO_VALUES)
+#undef PYCRAFT_NO_VALUES
+
+ private:
+  static SkoStructure skeleton() {
+    SkoStructure s;
+    s.parent = {-1, 0};
+    s.size = {2, 2};
+    s.dof = {1, 1};
+    s.finish();
+    return s;
+  }
+};
+
+const std::shared_ptr<SkoSource>& prototype() {
+  static const std::shared_ptr<SkoSource> source = std::make_shared<Prototype>();
+  return source;
+}
+
+// A letter's code; only symbols and their transposes and inverses occur in rules.
+int code_of(const Expression& atom) {
+  bool transposed = false, inverted = false;
+  const Expression* e = &atom;
+  while (e->kind() != NodeKind::symbol) {
+    (e->kind() == NodeKind::transpose ? transposed : inverted) ^= true;
+    e = &e->children()[0];
+  }
+  return letter_code(e->node().symbol.definition->id, transposed, inverted);
+}
+
+std::vector<int> word_of(const Expression& e) {
+  if (e.kind() == NodeKind::identity) return {};
+  if (e.kind() == NodeKind::product) {
+    std::vector<int> codes;
+    for (const Expression& f : e.children()) codes.push_back(code_of(f));
+    return codes;
+  }
+  return {code_of(e)};
+}
+
+Rule compile(const Expression& lhs, const Expression& rhs, const std::string& name) {
+  Rule rule{word_of(lower(lhs, false)), {}, name};
+  const Expression right = lower(rhs, false);
+  const std::vector<Expression> terms = right.kind() == NodeKind::sum ? right.children() : std::vector<Expression>{right};
+  for (const Expression& t : terms) {
+    const Scaled s = split_scalar(t);
+    rule.to.emplace_back(s.coefficient, word_of(s.expression));
+  }
+  return rule;
+}
+
+// A normal form whose letters are all of one model, by codes; with_J false: as on a model without hinge-diagonal term.
+using Pattern_ = std::map<std::vector<int>, Coefficient>;
+std::optional<Pattern_> codes_of(const Polynomial& p, const Alphabet& alphabet) {
+  Pattern_ pattern;
+  for (const auto& [word, c] : p) {
+    std::vector<int> codes;
+    for (int l : word) {
+      if (alphabet.code(l) < 0) return std::nullopt;
+      codes.push_back(alphabet.code(l));
+    }
+    pattern[codes] += c;
+  }
+  return pattern;
+}
+
+// f with a = f b.
+std::optional<Coefficient> ratio(const Pattern_& a, const Pattern_& b) {
+  if (a.size() != b.size() || a.empty()) return std::nullopt;
+  const Coefficient f = a.begin()->second / b.begin()->second;
+  for (auto i = a.begin(), j = b.begin(); i != a.end(); ++i, ++j)
+    if (i->first != j->first || i->second != f * j->second) return std::nullopt;
+  return f;
+}
+
+struct InversePattern {
+  Pattern_ with_J, without_J;
+  int theorem;           // index in sko_theorems
+  bool invert_rhs;       // the pattern is the right side's, the inverse the left side
+  bool transposed;
+};
+
+const std::vector<InversePattern>& inverse_patterns() {
+  static const std::vector<InversePattern> patterns = [] {
+    const WithoutInterrupts meanwhile;
+    std::vector<InversePattern> list;
+    const std::vector<Theorem> theorems = sko_theorems(prototype());
+    const int j_code = letter_code(SymbolId::J, false, false);
+    for (size_t i = 0; i < theorems.size(); ++i) {
+      if (theorems[i].use != Use::inverse) continue;
+      for (const bool rhs : {false, true})
+        for (const bool t : {false, true}) {
+          const Expression side = rhs ? std::get<Expression>(theorems[i].rhs) : std::get<Expression>(theorems[i].lhs).children()[0];
+          Alphabet alphabet;
+          const auto form = normal_form(t ? side.T() : side, alphabet);
+          InversePattern p{*codes_of(*form, alphabet), {}, static_cast<int>(i), rhs, t};
+          for (const auto& [codes, c] : p.with_J)
+            if (std::find(codes.begin(), codes.end(), j_code) == codes.end()) p.without_J[codes] = c;
+          list.push_back(std::move(p));
+        }
+    }
+    return list;
+  }();
+  return patterns;
+}
+
+}  // namespace
+
+const std::vector<Rule>& rewrite_rules() {
+  static const std::vector<Rule> rules = [] {
+    const WithoutInterrupts meanwhile;
+    std::vector<Rule> list;
+    for (const Theorem& t : sko_theorems(prototype())) {
+      if (t.use != Use::rewrite) continue;
+      const Expression lhs = std::get<Expression>(t.lhs), rhs = std::get<Expression>(t.rhs);
+      const Rule rule = compile(lhs, rhs, t.name), transposed = compile(lhs.T(), rhs.T(), t.name);
+      list.push_back(rule);
+      // The rule φR -> φMφ* + R - Rφ* has a transpose that would undo it.
+      if (transposed.from == rule.from || t.name == "φR by φMφ*") continue;
+      list.push_back(transposed);
+    }
+    return list;
+  }();
+  return rules;
+}
+
+std::optional<Inverted> invert_by_theorem(const Expression& e) {
+  if (!e.domain().belongs_to_bodies()) return std::nullopt;
+  const auto models = contexts(e);
+  if (models.size() != 1) return std::nullopt;
+  Alphabet alphabet;
+  const auto form = normal_form(e, alphabet);
+  if (!form) return std::nullopt;
+  const auto pattern = codes_of(*form, alphabet);
+  if (!pattern) return std::nullopt;
+  const bool with_J = models[0].source->traits().hinge_diagonal;
+  for (const InversePattern& p : inverse_patterns()) {
+    const auto f = ratio(*pattern, with_J ? p.with_J : p.without_J);
+    if (!f) continue;
+    const Theorem theorem = sko_theorems(models[0].source)[p.theorem];
+    Expression inverse = p.invert_rhs ? std::get<Expression>(theorem.lhs).children()[0] : std::get<Expression>(theorem.rhs);
+    // Without rotor inertia the inverse of [I-HψK]*D⁻¹[I-HψK] is shown, and swept, as HφMφ*H*.
+    if (models[0].binding) inverse = inverse.at(models[0].binding);
+    if (p.transposed) inverse = inverse.T();
+    if (!(inverse.domain() == e.codomain()) || !(inverse.codomain() == e.domain())) continue;
+    inverse = lower(inverse, false);
+    if (!with_J && inverse.kind() == NodeKind::sum && inverse.children().size() == 2 && inverse.children()[1].is(SymbolId::J)) inverse = inverse.children()[0];
+    if (*f != 1) inverse = lower((1 / *f) * inverse, false);
+    return Inverted{inverse, theorem.name};
+  }
+  return std::nullopt;
+}
+
+}  // namespace pycraft

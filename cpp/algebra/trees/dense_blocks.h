@@ -1,0 +1,402 @@
+// Blocks of any size per body, as dense row-major matrices: the block policy of bare SKO trees, of compound and flexible bodies.
+// The sweeps see the same functions as of the rigid policy (rigid/rigid_blocks.h).
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "algebra/language/structure.h"
+#include "algebra/language/symbol.h"
+#include "algebra/trees/sweeps/factored_inertia.h"
+#include "algebra/trees/sweeps/singular_pivot.h"
+#include "numerics/small_ldl.h"
+#include "numerics/small_matrix.h"
+#include "runtime/errors.h"
+
+namespace pycraft {
+
+template <class S>
+class DenseBlocks {
+ public:
+  using Scalar = S;
+
+  explicit DenseBlocks(const SkoStructure& tree) : tree_(tree) {
+    size_t e = 0, h = 0, m = 0, d = 0;
+    int s_max = 0, n_max = 0;
+    for (int k = 0; k < tree.bodies(); ++k) {
+      const int s = tree.size[k], n = tree.dof[k], p = tree.parent[k];
+      at_.push_back({e, h, m, d});
+      e += p >= 0 ? static_cast<size_t>(tree.size[p]) * s : 0;
+      h += static_cast<size_t>(n) * s;
+      m += static_cast<size_t>(s) * s;
+      d += static_cast<size_t>(n) * n;
+      s_max = std::max(s_max, s);
+      n_max = std::max(n_max, n);
+    }
+    E.resize(e);
+    for (auto* x : {&H, &G}) x->resize(h);
+    for (auto* x : {&M, &P, &Pplus, &R, &Y, &X}) x->resize(m);
+    for (auto* x : {&J, &D, &L}) x->resize(d);
+    pivots_.resize(tree.coordinates());
+    work_.resize(std::max(4 * s_max * s_max + n_max * s_max, 2 * n_max));
+    error_work_.resize(3 * s_max * s_max);
+  }
+
+  Form form = Form::fast;
+  bool keep_inertias = true, with_bias = false;  // blocks of any size always keep P and P⁺, and know no bias
+
+  S* edge(int k) { return E.data() + at_[k].e; }
+  S* hinge_map(int k) { return H.data() + at_[k].h; }
+  S* mass(int k) { return M.data() + at_[k].m; }
+  S* hinge_diagonal(int k) { return J.data() + at_[k].d; }
+  const S* edge(int k) const { return E.data() + at_[k].e; }
+  const S* hinge_map(int k) const { return H.data() + at_[k].h; }
+
+  // ---------------------------------------------------------------- applied to vectors (m columns, row-major)
+  void shift_add(int k, const S* x, S* y, int m) const { multiply_add(edge(k), x, y, tree_.size[tree_.parent[k]], tree_.size[k], m); }
+  void shift_transposed_add(int k, const S* x, S* y, int m) const {
+    transposed_multiply_add(edge(k), x, y, tree_.size[k], tree_.size[tree_.parent[k]], m);
+  }
+  // y += E (x - G H x)
+  void articulated_shift_add(int k, const S* x, S* y, int m) const {
+    const int s = tree_.size[k], n = tree_.dof[k];
+    thread_local std::vector<S> w;
+    w.assign(x, x + s * m);
+    thread_local std::vector<S> hx;
+    hx.assign(n * m, S(0));
+    multiply_add(hinge_map(k), x, hx.data(), n, s, m);
+    transposed_multiply_add(gain(k), hx.data(), w.data(), s, n, m, S(-1));
+    shift_add(k, w.data(), y, m);
+  }
+  // y += (I - H*G*) E* x
+  void articulated_shift_transposed_add(int k, const S* x, S* y, int m) const {
+    const int s = tree_.size[k], n = tree_.dof[k];
+    thread_local std::vector<S> w, gw;
+    w.assign(s * m, S(0));
+    shift_transposed_add(k, x, w.data(), m);
+    gw.assign(n * m, S(0));
+    multiply_add(gain(k), w.data(), gw.data(), n, s, m);
+    transposed_multiply_add(hinge_map(k), gw.data(), w.data(), s, n, m, S(-1));
+    for (int i = 0; i < s * m; ++i) y[i] += w[i];
+  }
+  void hinge(int k, const S* x, S* y, int m) const {
+    std::fill_n(y, tree_.dof[k] * m, S(0));
+    multiply_add(hinge_map(k), x, y, tree_.dof[k], tree_.size[k], m);
+  }
+  void hinge_transposed_add(int k, const S* x, S* y, int m) const { transposed_multiply_add(hinge_map(k), x, y, tree_.size[k], tree_.dof[k], m); }
+  void hinge_diagonal_add(int k, const S* x, S* y, int m) const { multiply_add(J.data() + at_[k].d, x, y, tree_.dof[k], tree_.dof[k], m); }
+  void inertia_in_place(int k, S* x, int m) const {
+    thread_local std::vector<S> w;
+    w.assign(x, x + tree_.size[k] * m);
+    std::fill_n(x, tree_.size[k] * m, S(0));
+    multiply_add(M.data() + at_[k].m, w.data(), x, tree_.size[k], tree_.size[k], m);
+  }
+  // e = x - H z,  z += G e
+  void innovation(int k, const S* x, S* z, S* e, int m) const {
+    std::copy_n(x, tree_.dof[k] * m, e);
+    multiply_add(hinge_map(k), z, e, tree_.dof[k], tree_.size[k], m, S(-1));
+    transposed_multiply_add(gain(k), e, z, tree_.size[k], tree_.dof[k], m);
+  }
+  // y -= G* a
+  void gain_transposed_subtract(int k, const S* a, S* y, int m) const { multiply_add(gain(k), a, y, tree_.dof[k], tree_.size[k], m, S(-1)); }
+  void solve_D_in_place(int k, S* x, int m) const {
+    ldl_solve(L.data() + at_[k].d, pivots_.data() + tree_.dof_offset[k], tree_.dof[k], x, m);
+  }
+  // y = A(k) x or A(k)* x of a block-diagonal symbol
+  void apply(int id, bool transposed, int k, const S* x, S* y, int m) const {
+    const int s = tree_.size[k], n = tree_.dof[k];
+    switch (id) {
+      case SymbolId::H:
+        if (transposed) {
+          std::fill_n(y, s * m, S(0));
+          transposed_multiply_add(hinge_map(k), x, y, s, n, m);
+        } else {
+          hinge(k, x, y, m);
+        }
+        return;
+      case SymbolId::G:  // stored as G*, n rows
+        std::fill_n(y, (transposed ? n : s) * m, S(0));
+        if (transposed)
+          multiply_add(gain(k), x, y, n, s, m);
+        else
+          transposed_multiply_add(gain(k), x, y, s, n, m);
+        return;
+      case SymbolId::J:
+      case SymbolId::D:
+        std::fill_n(y, n * m, S(0));
+        multiply_add((id == SymbolId::J ? J : D).data() + at_[k].d, x, y, n, n, m);
+        return;
+      default:
+        std::fill_n(y, s * m, S(0));
+        multiply_add(square(id).data() + at_[k].m, x, y, s, s, m);
+    }
+  }
+  // Block (k,k), row-major; E: block (parent, k).
+  void block(int id, int k, S* out) const {
+    const int s = tree_.size[k], n = tree_.dof[k];
+    switch (id) {
+      case SymbolId::E: std::copy_n(edge(k), tree_.size[tree_.parent[k]] * s, out); return;
+      case SymbolId::H: std::copy_n(hinge_map(k), n * s, out); return;
+      case SymbolId::G:
+        for (int i = 0; i < s; ++i)
+          for (int j = 0; j < n; ++j) out[i * n + j] = gain(k)[j * s + i];
+        return;
+      case SymbolId::J: std::copy_n(J.data() + at_[k].d, n * n, out); return;
+      case SymbolId::D: std::copy_n(D.data() + at_[k].d, n * n, out); return;
+      default: std::copy_n(square(id).data() + at_[k].m, s * s, out);
+    }
+  }
+  // ---------------------------------------------------------------- sizes of what residuals add up (sweeps/residual_rounding.h)
+  void motion_sizes(int k, const S* parent, const S* x, const S* a, S* out, int m) const {
+    using std::abs;
+    for (int i = 0; i < tree_.size[k] * m; ++i) out[i] = abs(a[i]);
+    if (parent) add_sizes<true>(edge(k), S(1), parent, out, tree_.size[k], tree_.size[tree_.parent[k]], m);
+    add_sizes<true>(hinge_map(k), S(1), x, out, tree_.size[k], tree_.dof[k], m);
+  }
+  template <class Units>
+  void inertia_sizes(int k, const S* a, const Units& u, S* out, int m) const {
+    std::fill_n(out, tree_.size[k] * m, S(0));
+    add_sizes<false>(M.data() + at_[k].m, S(S(2) * u.force), a, out, tree_.size[k], tree_.size[k], m);
+  }
+  template <class Units>
+  void shifted_force_sizes(int k, const S* f, const Units& u, S* out, int m) const {
+    add_sizes<false>(edge(k), u.motion, f, out, tree_.size[tree_.parent[k]], tree_.size[k], m);
+  }
+  template <class Units>
+  void coordinate_sizes(int k, const S* f, const S* x, const Units& u, S* out, int m) const {
+    std::fill_n(out, tree_.dof[k] * m, S(0));
+    add_sizes<false>(hinge_map(k), u.motion, f, out, tree_.dof[k], tree_.size[k], m);
+    add_sizes<false>(J.data() + at_[k].d, u.force, x, out, tree_.dof[k], tree_.dof[k], m);
+  }
+  S log_determinant_of_D() const {
+    using std::log;
+    S sum = S(0);
+    for (const S& p : pivots_) sum += log(p);
+    return sum;
+  }
+
+  // ---------------------------------------------------------------- articulated inertia (sweeps/articulated_inertia.h)
+  void start_articulated(int k) {
+    if (form == Form::fast) {
+      std::copy_n(mass(k), tree_.size[k] * tree_.size[k], P.data() + at_[k].m);
+      return;
+    }
+    if (!factors_) factors_ = std::make_unique<FactoredInertia<S>>(tree_);
+    factors_->start(k);
+    uncertain_.resize(tree_.bodies());
+    uncertain_[k] = add_factors("M", k, mass(k), tree_.size[k], [&](const S& w, auto u) { factors_->add(k, w, S(0), u); });
+  }
+  // D, G, P⁺ of body k. Always in doubt: blocks of any size have no cheap bound on their rounding.
+  Pivots eliminate_hinge(int k) {
+    if (form != Form::fast) return eliminate_hinge_of_factors(k);
+    const int s = tree_.size[k], n = tree_.dof[k];
+    const S* h = hinge_map(k);
+    S *p = P.data() + at_[k].m, *plus = Pplus.data() + at_[k].m, *d = D.data() + at_[k].d, *l = L.data() + at_[k].d, *g = G.data() + at_[k].h;
+    std::copy_n(p, s * s, plus);
+    if (n == 0) return Pivots::sound;
+    std::fill_n(g, n * s, S(0));
+    multiply_add(h, p, g, n, s, s);  // HP, n x s
+    std::copy_n(hinge_diagonal(k), n * n, d);
+    multiply_transposed_add(g, h, d, n, s, n);
+    symmetrise(d, n);
+    std::copy_n(d, n * n, l);
+    S* pivots = pivots_.data() + tree_.dof_offset[k];
+    if (ldl_in_place(l, n, pivots) < n) return Pivots::not_positive;
+    forward_substitute(l, n, g, s);              // L⁻¹HP
+    add_squares(g, pivots, plus, n, s, S(-1));   // P - (L⁻¹HP)* d⁻¹ (L⁻¹HP)
+    divide_by_pivots(pivots, n, g, s);
+    back_substitute(l, n, g, s);                 // G* = D⁻¹HP
+    return Pivots::doubtful;
+  }
+  void articulated_to_parent(int k) {
+    const int p = tree_.parent[k], s = tree_.size[k];
+    if (form == Form::fast) return congruence_add(k, Pplus.data() + at_[k].m, P.data() + at_[p].m);
+    for (int r = tree_.dof[k]; r < factors_->pivots(); ++r)
+      factors_->add(p, factors_->weight(r), S(0), [&](int i) {
+        S sum = S(0);
+        for (int a = 0; a < s; ++a) sum += edge(k)[i * s + a] * factors_->U(a, r);
+        return sum;
+      });
+  }
+  // ---------------------------------------------------------------- error bound (sweeps/singular_pivot.h)
+  void start_error(int k) {
+    const int s = tree_.size[k];
+    S* x = X.data() + at_[k].m;
+    std::fill_n(x, s * s, S(0));
+    // What factors of M(k) took for rounding, in units of the bound.
+    const S left = form != Form::fast && uncertain_[k] ? S(S(8 * s) * epsilon<S>() / rounding_bound<S>(form)) : S(0);
+    for (int i = 0; i < s; ++i) x[i * s + i] = P[at_[k].m + i * s + i] + left * mass(k)[i * s + i];
+  }
+  void check_pivots(int k) {
+    const int s = tree_.size[k], n = tree_.dof[k];
+    S* x = work_.data();
+    for (int j = 0; j < n; ++j) {
+      x[j] = hinge_diagonal(k)[j * n + j];
+      for (int a = 0; a < s; ++a)
+        for (int b = 0; b < s; ++b) x[j] += hinge_map(k)[j * s + a] * X[at_[k].m + a * s + b] * hinge_map(k)[j * s + b];
+    }
+    require_pivots(tree_, k, L.data() + at_[k].d, pivots_.data() + tree_.dof_offset[k], x, form);
+    for (int j = 0; j < n; ++j) {
+      x[j] = hinge_diagonal(k)[j * n + j];
+      for (int a = 0; a < s; ++a) x[j] += hinge_map(k)[j * s + a] * hinge_map(k)[j * s + a] * P[at_[k].m + a * s + a];
+    }
+    require_gain(tree_, k, L.data() + at_[k].d, pivots_.data() + tree_.dof_offset[k], x, form);
+  }
+  void error_to_parent(int k) {
+    const int s = tree_.size[k];
+    S *bar = error_work_.data(), *t = bar + s * s, *plus = t + s * s;
+    std::fill_n(bar, 3 * s * s, S(0));
+    for (int i = 0; i < s; ++i) bar[i * s + i] = S(1), plus[i * s + i] = P[at_[k].m + i * s + i];
+    transposed_multiply_add(gain(k), hinge_map(k), bar, s, tree_.dof[k], s, S(-1));
+    multiply_add(bar, X.data() + at_[k].m, t, s, s, s);
+    multiply_transposed_add(t, bar, plus, s, s, s);
+    for (int j = 0; j < tree_.dof[k]; ++j) {
+      const S *h = hinge_map(k) + j * s, *g = gain(k) + j * s;
+      S square = hinge_diagonal(k)[j * tree_.dof[k] + j];
+      for (int a = 0; a < s; ++a) square += h[a] * h[a] * P[at_[k].m + a * s + a];
+      for (int a = 0; a < s; ++a)
+        for (int b = 0; b < s; ++b) plus[a * s + b] += square * g[a] * g[b];
+    }
+    congruence_add(k, plus, X.data() + at_[tree_.parent[k]].m);
+  }
+
+  // ---------------------------------------------------------------- composite inertia, compliance
+  void start_composite(int k) { std::copy_n(mass(k), tree_.size[k] * tree_.size[k], R.data() + at_[k].m); }
+  void composite_to_parent(int k) { congruence_add(k, R.data() + at_[k].m, R.data() + at_[tree_.parent[k]].m); }
+  void compliance_from_parent(int k, int p) {
+    const int s = tree_.size[k], n = tree_.dof[k];
+    S *y = Y.data() + at_[k].m, *t = work_.data();
+    std::fill_n(y, s * s, S(0));
+    if (p >= 0) {  // τ̄* E* Υ(p) E τ̄
+      const int sp = tree_.size[p];
+      S *e = t + s * s, *w = e + sp * s;
+      std::copy_n(edge(k), sp * s, e);                                         // E τ̄ = E - (EG)H
+      std::fill_n(w, sp * s, S(0));
+      for (int i = 0; i < sp; ++i)
+        for (int j = 0; j < n; ++j) {
+          S eg = S(0);
+          for (int a = 0; a < s; ++a) eg += edge(k)[i * s + a] * gain(k)[j * s + a];
+          for (int a = 0; a < s; ++a) e[i * s + a] -= eg * hinge_map(k)[j * s + a];
+        }
+      multiply_add(Y.data() + at_[p].m, e, w, sp, sp, s);
+      transposed_multiply_add(e, w, y, s, sp, s);
+    }
+    std::copy_n(hinge_map(k), n * s, t);
+    forward_substitute(L.data() + at_[k].d, n, t, s);
+    add_squares(t, pivots_.data() + tree_.dof_offset[k], y, n, s, S(1));       // + H*D⁻¹H
+  }
+
+ private:
+  struct Offsets {
+    size_t e, h, m, d;
+  };
+  const S* gain(int k) const { return G.data() + at_[k].h; }  // G*, n x s
+  // A (s x s) += f Σ a* a / d of the n rows a of t, symmetric.
+  static void add_squares(const S* t, const S* d, S* A, int n, int s, const S& f) {
+    for (int j = 0; j < n; ++j)
+      for (int a = 0; a < s; ++a) {
+        const S scaled = f * t[j * s + a] / d[j];
+        for (int b = 0; b <= a; ++b) A[a * s + b] += scaled * t[j * s + b];
+      }
+    symmetrise(A, s);
+  }
+  // out (r x m) += u |A| |x|, A (r x n); transposed: u |A*| |x|, A (n x r)
+  template <bool transposed>
+  static void add_sizes(const S* A, const S& u, const S* x, S* out, int r, int n, int m) {
+    using std::abs;
+    for (int i = 0; i < r; ++i)
+      for (int k = 0; k < n; ++k) {
+        const S a = u * S(abs(transposed ? A[k * r + i] : A[i * n + k]));
+        for (int c = 0; c < m; ++c) out[i * m + c] += a * S(abs(x[k * m + c]));
+      }
+  }
+  // add(w, u) for the factors of M(k) or J(k); whether they leave out what may be rounding.
+  template <class Add>
+  bool add_factors(const char* letter, int k, const S* A, int n, Add&& add) {
+    factor_work_.resize(std::max(factor_work_.size(), size_t(2 * n + 1) * n));
+    S *U = factor_work_.data(), *w = U + n * n;
+    if (!semidefinite_factors(A, n, S(S(8 * n) * epsilon<S>()), U, w, w + n))
+      throw EvaluationError(std::string(letter) + " of body '" + tree_.body_names[k] + "' is not positive semidefinite, so it has no factors: form=\"fast\" needs none");
+    for (int r = 0; r < n; ++r)
+      if (!(w[r] == S(0))) add(w[r], [u = U + r * n](int i) { return u[i]; });
+    return std::any_of(w + n, w + n + n * n, [](const S& x) { return !(x == S(0)); });
+  }
+  Pivots eliminate_hinge_of_factors(int k) {
+    const int s = tree_.size[k], n = tree_.dof[k], m = factors_->columns(k);
+    S *p = P.data() + at_[k].m, *plus = Pplus.data() + at_[k].m, *d = D.data() + at_[k].d, *l = L.data() + at_[k].d, *g = G.data() + at_[k].h;
+    S* pivots = pivots_.data() + tree_.dof_offset[k];
+    for (int i = 0; i < s; ++i)
+      for (int j = 0; j <= i; ++j) p[i * s + j] = p[j * s + i] = factors_->inertia(k, i, j);
+    for (int j = 0; j < n; ++j) {
+      S* row = factors_->hinge_row(k, j);
+      std::fill_n(row, m, S(0));
+      for (int i = 0; i < s; ++i) {
+        const S *body = factors_->body_row(k, i), h = hinge_map(k)[j * s + i];
+        if (!(h == S(0)))
+          for (int c = 0; c < m; ++c) row[c] += h * body[c];
+      }
+    }
+    add_factors("J", k, hinge_diagonal(k), n, [&](const S& w, auto u) { factors_->add_rotor(k, w, u); });
+    none_.assign(s, 0);
+    factors_->fill_up(k);
+    factors_->eliminate(k, form, none_.data(), false);
+    for (int j = 0; j < n; ++j) {
+      pivots[j] = factors_->weight(j) * factors_->lower(j, j) * factors_->lower(j, j);
+      for (int i = 0; i < n; ++i) l[i * n + j] = i < j ? S(0) : ratio_or_zero(factors_->lower(i, j), factors_->lower(j, j));
+    }
+    if (std::any_of(pivots, pivots + n, [](const S& pivot) { return !(pivot > S(0)); })) return Pivots::not_positive;
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j <= i; ++j) {
+        S sum = S(0);
+        for (int a = 0; a <= j; ++a) sum += l[i * n + a] * pivots[a] * l[j * n + a];
+        d[i * n + j] = d[j * n + i] = sum;
+      }
+    for (int j = n - 1; j >= 0; --j)  // G* = L₁⁻* L₂*
+      for (int i = 0; i < s; ++i) {
+        S sum = factors_->against(i, j);
+        for (int a = j + 1; a < n; ++a) sum -= factors_->lower(a, j) * g[a * s + i];
+        g[j * s + i] = sum / factors_->lower(j, j);
+      }
+    for (int i = 0; i < s; ++i)
+      for (int j = 0; j <= i; ++j) {
+        S sum = S(0);
+        for (int r = n; r < factors_->pivots(); ++r) sum += factors_->U(i, r) * factors_->weight(r) * factors_->U(j, r);
+        plus[i * s + j] = plus[j * s + i] = sum;
+      }
+    return n > 0 ? Pivots::doubtful : Pivots::sound;
+  }
+  const std::vector<S>& square(int id) const {
+    switch (id) {
+      case SymbolId::M: return M;
+      case SymbolId::P: return P;
+      case SymbolId::P_plus: return Pplus;
+      case SymbolId::R: return R;
+      default: return Y;
+    }
+  }
+  // A(parent) += E B E*, kept symmetric.
+  void congruence_add(int k, const S* B, S* A) {
+    const int s = tree_.size[k], sp = tree_.size[tree_.parent[k]];
+    S* t = work_.data();
+    std::fill_n(t, sp * s, S(0));
+    multiply_add(edge(k), B, t, sp, s, s);
+    for (int i = 0; i < sp; ++i)
+      for (int j = 0; j <= i; ++j) {
+        S sum = S(0);
+        for (int a = 0; a < s; ++a) sum += t[i * s + a] * edge(k)[j * s + a];
+        A[i * sp + j] += sum;
+        if (j < i) A[j * sp + i] = A[i * sp + j];
+      }
+  }
+
+  const SkoStructure& tree_;
+  std::vector<Offsets> at_;
+  std::vector<S> E, H, G, M, P, Pplus, R, Y, X, J, D, L, pivots_, work_, error_work_, factor_work_;
+  std::vector<int> none_;
+  std::unique_ptr<FactoredInertia<S>> factors_;
+  std::vector<char> uncertain_;
+};
+
+}  // namespace pycraft
