@@ -18,13 +18,15 @@ What to type::
 
 import importlib.util
 import pkgutil
+from importlib import import_module as _import_module
+from typing import TYPE_CHECKING as _TYPE_CHECKING
 
 # In a source checkout the folder `pycraft` hides the installed package: its compiled core is found all the same.
 if importlib.util.find_spec("pycraft._core") is None:
     __path__ = pkgutil.extend_path(__path__, __name__)
 del importlib, pkgutil  # no names of the workbench
 
-from . import _core, interop, models, robots
+from . import _core, face, interop, models
 from ._core import (
     Error,
     EvaluationError,
@@ -44,32 +46,57 @@ from ._core import (
     vector,
     zero,
 )
-from .accuracy.table import accuracy
-from .accuracy.work_precision import work_precision
-from .bare_trees import sko_model
-from .identities import UndecidedError, check, truth
-from .interop import compare
 from .kalman import kalman
+from .models.bare_trees import sko_model
 from .models.generators import chain, tree
-from .models.load import load
 from .models.multibody import Multibody
-from .models.state import State
 from .models.warning import ModelWarning
 from .operators import OperatorSet
-from .symbolic import (
-    Exercise,
-    Proof,
-    derivative,
-    exercise,
-    from_sympy,
-    parse,
-    prove,
-    prove_derivative,
-    repair,
-    symbolic,
-    to_sympy,
-    worksheet,
-)
+from .state import State
+
+face.attach()
+del face
+_import_module(f"{__name__}.accuracy")
+del globals()["accuracy"]  # the room, imported here so that no later import of it hides the function of its name
+
+if _TYPE_CHECKING:
+    from .accuracy.tables.table import accuracy
+    from .accuracy.tables.work_precision import work_precision
+    from .closed_forms import symbolic
+    from .identities import UndecidedError, check, truth
+    from .models import robots
+    from .models.loaders import load
+    from .peers import compare
+    from .proofs import Exercise, Proof, derivative, exercise, prove, prove_derivative, repair, worksheet
+    from .sympy_bridge import from_sympy, parse, to_sympy
+
+# What takes long to import is imported when it is first asked for: the same names, each with its room.
+_LATER = {
+    "accuracy.tables.table": ("accuracy",),
+    "accuracy.tables.work_precision": ("work_precision",),
+    "closed_forms": ("symbolic",),
+    "identities": ("UndecidedError", "check", "truth"),
+    "models.loaders": ("load",),
+    "models.robots": ("robots",),
+    "peers": ("compare",),
+    "proofs": ("Exercise", "Proof", "derivative", "exercise", "prove", "prove_derivative", "repair", "worksheet"),
+    "sympy_bridge": ("from_sympy", "parse", "to_sympy"),
+}
+
+
+if not _TYPE_CHECKING:  # types see the names above, and no others
+
+    def __getattr__(name):
+        for room, names in _LATER.items():
+            if name in names:
+                module = _import_module(f"{__name__}.{room}")
+                globals()[name] = found = getattr(module, name, module)  # the robots are a module themselves
+                return found
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+    def __dir__():
+        return sorted({*globals(), *__all__})
+
 
 __version__ = "0.1.0"
 

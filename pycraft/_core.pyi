@@ -285,7 +285,7 @@ class Operator:
     def algorithm(self, language: str = 'text', request: str = 'apply') -> typing.Any:
         """
         The plan written out as the textbook recursion: language "text", "latex", or "python" (NumPy alone) and "cpp" (Eigen alone),
-        source that runs by itself. See pycraft.algorithm.
+        source that runs by itself. See pycraft.recursions.
         """
     def at(self, q: typing.Any = None, v: typing.Any = None, *, form: str = 'fast', refine: typing.Any = 0, residual: str = 'same', precision: str | int = 'double') -> Operator:
         """
@@ -302,7 +302,7 @@ class Operator:
         certify(q=None, x=None, *, v=None, form="fast", refine=0, residual="same", precision="double", seed=0, seconds=0.02)
 
         The value at one state, the dense form or the product with x, with its measured error, what rounding of q, v and x does,
-        condition, where digits are lost and what the next rung costs: a pycraft.accuracy.certificate.Certificate. q: (nq,) or a State,
+        condition, where digits are lost and what the next rung costs: a pycraft.accuracy.certificates.certificate.Certificate. q: (nq,) or a State,
         the model's present state where left out; x: (n,) or (n, m); v: (nv,), zero where left out; form, refine, residual and precision
         as in at; seed: of the signs by which the data are moved; seconds: spent on each timing. Raises EvaluationError where the
         expression is bound already, ModelError for arrays of another shape and for a model without coordinates.
@@ -512,7 +512,7 @@ class Scalar:
         ...
     def algorithm(self, language: str = 'text') -> typing.Any:
         """
-        The recursion that computes it: "text", "latex", "python" or "cpp". See pycraft.algorithm.
+        The recursion that computes it: "text", "latex", "python" or "cpp". See pycraft.recursions.
         """
     def at(self, *args, **kwargs) -> typing.Any:
         ...
@@ -523,7 +523,7 @@ class Scalar:
         certify(q=None, *, v=None, form="fast", refine=0, residual="same", precision="double", seed=0, seconds=0.02)
 
         The number at one state with its measured error, what rounding of q and v does, where digits are lost and what the next rung
-        costs: a pycraft.accuracy.certificate.Certificate. q: (nq,) or a State, the model's present state where left out; v: (nv,), zero
+        costs: a pycraft.accuracy.certificates.certificate.Certificate. q: (nq,) or a State, the model's present state where left out; v: (nv,), zero
         where left out; form, refine, residual and precision as in at; seed: of the signs by which the data are moved; seconds: spent
         on each timing. Raises EvaluationError where it is bound already, ModelError for arrays of another shape and for a model
         without coordinates.
@@ -592,7 +592,7 @@ class Plan:
     @property
     def program(self) -> dict:
         """
-        The plan as plain data: contexts, registers and steps in dictionaries; pycraft.algorithm writes them out.
+        The plan as plain data: contexts, registers and steps in dictionaries; pycraft.recursions writes them out.
         """
     @property
     def run_notes(self) -> list[str]:
@@ -915,4 +915,5 @@ def zero(domain: Space, codomain: Space) -> Operator:
     """
     The zero operator.
     """
+_face: dict[str, typing.Any]
 float128: bool = True

@@ -20,8 +20,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 from . import _core
-from .bare_trees import sko_model
-from .operators import OperatorSet
+from .models.bare_trees import sko_model
+from .operators.operator_set import OperatorSet
 
 _Answer = TypeVar("_Answer")
 

@@ -17,7 +17,7 @@ import types
 import numpy as np
 
 FOLDER = pathlib.Path(__file__).parents[1] / "pycraft"
-SOURCES = sorted(FOLDER.glob("reference*.py"))
+SOURCES = sorted((FOLDER / "reference").glob("*.py"))
 alone = sys.modules["pycraft_alone"] = types.ModuleType("pycraft_alone")  # the folder as a package without its __init__
 alone.__path__ = [str(FOLDER)]
 reference = importlib.import_module("pycraft_alone.reference")

@@ -8,7 +8,7 @@ import numpy as np
 from formulas import blocks_only
 
 import pycraft as pc
-from pycraft.symbolic import values
+from pycraft.proofs import values
 
 EXCHANGED = {
     "E": "E_psi",

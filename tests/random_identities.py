@@ -7,8 +7,8 @@ import operator
 from fractions import Fraction
 
 import pycraft as pc
-from pycraft.symbolic.axioms import theory
-from pycraft.symbolic.words import add_to, split
+from pycraft.proofs.axioms import theory
+from pycraft.proofs.words import add_to, split
 
 J0, CHAIN, SINGLE, CONSTANT = "J = 0", "serial chain", "single-DOF hinges", "constant H"
 ROUNDING = 1e-11

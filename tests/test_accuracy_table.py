@@ -13,10 +13,10 @@ from matplotlib.text import Text
 from test_certify import hard
 
 import pycraft as pc
-from pycraft.accuracy.plotting import _between, place_labels
 from pycraft.accuracy.rungs import LADDER, OTHER_METHODS
-from pycraft.accuracy.table import AccuracyTable, accuracy, ladder, largest_component, mark_pareto
-from pycraft.accuracy.timing import time_forward_dynamics, workspace_bytes
+from pycraft.accuracy.tables.plotting import _between, place_labels
+from pycraft.accuracy.tables.table import AccuracyTable, accuracy, ladder, largest_component, mark_pareto
+from pycraft.accuracy.tables.timing import time_forward_dynamics, workspace_bytes
 
 matplotlib.use("Agg")
 

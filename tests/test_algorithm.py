@@ -21,8 +21,8 @@ from spellings import BLOCKS, EVERYTHING, Constants
 from test_sko_random import TREES, letters_on
 
 import pycraft as pc
-from pycraft.algorithm import LANGUAGES
-from pycraft.algorithm.steps import WRITERS
+from pycraft.recursions import LANGUAGES
+from pycraft.recursions.steps import WRITERS
 
 _made = {}
 _executed = set()  # kinds of steps whose emitted source ran in this run

@@ -11,7 +11,7 @@ from pycraft.identities import block_check
 from pycraft.identities.block_reading import is_by_block, read_by_block
 from pycraft.identities.block_relations import ancestors, choices, standard
 from pycraft.identities.family import Spec
-from pycraft.symbolic import prove
+from pycraft.proofs import prove
 
 CLOSEST = "c the closest common ancestor of i and j"
 

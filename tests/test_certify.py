@@ -8,15 +8,15 @@ import pytest
 from descriptions import body, model, subhinge
 
 import pycraft as pc
-from pycraft.accuracy import certify
-from pycraft.accuracy.catalogue import Sample
-from pycraft.accuracy.certificate import rounding_level
-from pycraft.accuracy.certify import certify_dynamics
-from pycraft.accuracy.chains import links
-from pycraft.accuracy.floor import floors, refinement_floor
-from pycraft.accuracy.locator import condition_estimate
+from pycraft.accuracy.certificates import certify
+from pycraft.accuracy.certificates.certificate import rounding_level
+from pycraft.accuracy.certificates.certify import certify_dynamics
+from pycraft.accuracy.certificates.floor import floors, refinement_floor
+from pycraft.accuracy.certificates.locator import condition_estimate
+from pycraft.accuracy.hard_cases.case import Sample
+from pycraft.accuracy.hard_cases.chains import links
+from pycraft.accuracy.hard_cases.stability import _reference
 from pycraft.accuracy.rungs import LADDER, WIDE_GATHER, WIDER_RESIDUAL, Rung, above
-from pycraft.accuracy.stability import _reference
 
 
 def hard(name, seed=0):

@@ -8,9 +8,9 @@ import pytest
 from test_certify import hard
 
 import pycraft as pc
-from pycraft.accuracy import certify
-from pycraft.accuracy.certify import certify_dynamics, certify_expression
-from pycraft.accuracy.locator import runs_articulated_sweep
+from pycraft.accuracy.certificates import certify
+from pycraft.accuracy.certificates.certify import certify_dynamics, certify_expression
+from pycraft.accuracy.certificates.locator import runs_articulated_sweep
 from pycraft.accuracy.rungs import Rung
 
 

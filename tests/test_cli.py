@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 import pycraft as pc
-from pycraft.cli import app
+from pycraft.cli.commands import app
 
 runner = CliRunner()
 
@@ -38,7 +38,7 @@ def test_check_as_json(few_theorems):
 
 def test_check_ends_with_one_where_a_theorem_fails(monkeypatch):
     from pycraft.identities.report import Finding, Report
-    from pycraft.operators import OperatorSet
+    from pycraft.operators.operator_set import OperatorSet
 
     made = Report("arm", {}, [Finding(name, "group", "a = b", "a = b", [], [], "holds") for name in "ab"])
     monkeypatch.setattr(OperatorSet, "check", lambda self, **_: made)
@@ -78,7 +78,7 @@ def test_tour():
 
 def test_bench_holds_its_bounds():
     """The figures are taken and checked; times are judged by `pycraft bench`, not here."""
-    from pycraft.bench import building, per_link
+    from pycraft.cli.bench import building, per_link
 
     figures = per_link(seconds=0.005)
     assert {f.name for f in figures} >= {"phi", "psi*", "Upsilon", "MM^-1", "forward_dynamics"}
@@ -90,7 +90,7 @@ def test_bench_holds_its_bounds():
 @pytest.fixture
 def nothing_measured(monkeypatch):
     """Measuring is a failure."""
-    for module, name in (("table", "accuracy"), ("work_precision", "work_precision"), ("stability", "run")):
+    for module, name in (("tables.table", "accuracy"), ("tables.work_precision", "work_precision"), ("hard_cases.stability", "run")):
         monkeypatch.setattr(import_module(f"pycraft.accuracy.{module}"), name, lambda *_, **__: pytest.fail("measured"))
 
 

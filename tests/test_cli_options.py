@@ -8,7 +8,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from pycraft.cli import app
+from pycraft.cli.commands import app
 
 runner = CliRunner()
 COMMANDS = typer.main.get_command(app).commands
@@ -91,9 +91,9 @@ def measured(monkeypatch):
         recorded(operators._model, **options)
 
     for module, name in (
-        ("pycraft.tour", "run"), ("pycraft.bench", "run"), ("pycraft.accuracy.table", "accuracy"),
-        ("pycraft.accuracy.work_precision", "work_precision"), ("pycraft.accuracy.stability", "run"),
-        ("pycraft.interop.peers", "compare_all"),
+        ("pycraft.cli.tour", "run"), ("pycraft.cli.bench", "run"), ("pycraft.accuracy.tables.table", "accuracy"),
+        ("pycraft.accuracy.tables.work_precision", "work_precision"), ("pycraft.accuracy.hard_cases.stability", "run"),
+        ("pycraft.peers.peers", "compare_all"),
     ):  # fmt: skip
         monkeypatch.setattr(import_module(module), name, recorded)
     monkeypatch.setattr("pycraft.operators.OperatorSet.check", checked)
@@ -139,7 +139,7 @@ def test_options_reach_the_check_of_a_paper(monkeypatch, tmp_path):
 
 def test_json_is_json_and_follows_its_seed(monkeypatch):
     """--json --seed: other states, other residuals."""
-    from pycraft.operators import OperatorSet
+    from pycraft.operators.operator_set import OperatorSet
 
     some = OperatorSet.theorems
     monkeypatch.setattr(OperatorSet, "theorems", lambda self: some(self)[:12])
@@ -151,13 +151,13 @@ def test_json_is_json_and_follows_its_seed(monkeypatch):
 
 
 def test_bench_ends_with_one_where_a_bound_is_missed(monkeypatch):
-    from pycraft.bench import Figure
+    from pycraft.cli.bench import Figure
 
     def figures(value):
         return lambda seconds: {"heading": [Figure("a figure", value, "x", 1.0), Figure("without a bound", 9.0, "x")]}
 
     for value, status in ((0.5, 0), (1.0, 0), (1.5, 1), (float("nan"), 1)):
-        monkeypatch.setattr("pycraft.bench.run", figures(value))
+        monkeypatch.setattr("pycraft.cli.bench.run", figures(value))
         result = runner.invoke(app, ["bench"])
         assert result.exit_code == status, value
         assert ("a figure: " in result.output and "is over its bound, 1 x" in result.output) == bool(status)
@@ -165,7 +165,7 @@ def test_bench_ends_with_one_where_a_bound_is_missed(monkeypatch):
 
 def test_every_figure_of_what_accuracy_costs_has_its_bound(monkeypatch):
     """With clocks that say ten times too much for every way but `fast`, no bound holds by being absent."""
-    import pycraft.bench as bench
+    import pycraft.cli.bench as bench
     from pycraft import _core
 
     def slow(*_, **options):
@@ -181,7 +181,7 @@ def test_every_figure_of_what_accuracy_costs_has_its_bound(monkeypatch):
 
 
 def test_tables_are_written_where_the_options_say(tmp_path, monkeypatch):
-    from pycraft.accuracy import stability
+    from pycraft.accuracy.hard_cases import stability
 
     chosen = [c for c in stability.catalogue() if "wrist" in c.name.lower()][:1]
     results = stability.run(1, 1, cases=chosen, peers=False)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import pycraft as pc
-from pycraft.accuracy.chains import links
+from pycraft.accuracy.hard_cases.chains import links
 
 FORMS = ("fast", "ud", "square-root")
 FACTORED = FORMS[1:]

@@ -24,7 +24,7 @@ def test_notation_lists_every_operator():
 
 
 def modules():
-    skipped = ("pycraft._core", "pycraft.interop.pinocchio", "pycraft.interop.peers")
+    skipped = ("pycraft._core", "pycraft.cli.__main__", "pycraft.interop.pinocchio", "pycraft.peers.peers")
     return sorted(m.name for m in pkgutil.walk_packages(pycraft.__path__, "pycraft.") if m.name not in skipped)
 
 
@@ -77,9 +77,9 @@ def test_the_other_packages_of_the_page_of_comparisons(tmp_path, monkeypatch):
     pytest.importorskip("pinocchio")
     monkeypatch.chdir(tmp_path)
     Path("panda.urdf").write_text((ROBOTS / "panda.urdf").read_text())
-    Path("panda.xml").write_text(pycraft.interop.export.to_mjcf(pycraft.robots.panda()))
+    Path("panda.xml").write_text(pycraft.interop.export.to_mjcf(pycraft.models.robots.panda()))
     block = re.search(r"```python\n(import mujoco.*?)```", (ROOT / "docs" / "comparing.md").read_text(), re.S).group(1)
-    names = {"pc": pycraft, "arm": pycraft.robots.panda()}
+    names = {"pc": pycraft, "arm": pycraft.models.robots.panda()}
     imports, *compared = block.splitlines()
     exec(imports, names)
     assert len(compared) == 3 and all(eval(line, names) for line in compared)

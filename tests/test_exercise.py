@@ -3,9 +3,9 @@
 import pytest
 
 import pycraft as pc
-from pycraft.symbolic import Exercise, exercise, grading, prove
-from pycraft.symbolic.equations import chain_holds
-from pycraft.symbolic.proof import example
+from pycraft.proofs import Exercise, exercise, grading, prove
+from pycraft.proofs.equations import chain_holds
+from pycraft.proofs.proof import example
 
 INNOVATIONS = "HψMψ*H* == D"
 WITH_J = "innovations covariance with J"

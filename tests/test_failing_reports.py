@@ -4,7 +4,7 @@ import pytest
 from typer.testing import CliRunner
 
 import pycraft as pc
-from pycraft.cli import app
+from pycraft.cli.commands import app
 from pycraft.identities.report import Finding, Report
 
 

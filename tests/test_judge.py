@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import pycraft as pc
-from pycraft.accuracy.stability_table import Stability
-from pycraft.identities.bounds import Sizes
+from pycraft.accuracy.hard_cases.stability_table import Stability
 from pycraft.identities.judge import FAILS, HOLDS, UNDECIDED, BoundState, Judgement, Scales, Taken, Verdict, decided, judge, ladder
 from pycraft.identities.report import PASSED, CheckReport, Finding, Report
-from pycraft.interop.compare import ModelComparison, _relative
+from pycraft.identities.residual_bounds import Sizes
+from pycraft.peers.compare import ModelComparison, _relative
 
 EPSILON = pc._core.epsilons()
 

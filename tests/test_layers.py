@@ -4,6 +4,8 @@ import ast
 import functools
 import pathlib
 import re
+import subprocess
+import sys
 
 import pytest
 
@@ -166,14 +168,14 @@ def test_no_flag_trades_accuracy():
 
 
 def test_the_oracle_imports_nothing_of_the_package():
-    sources = sorted(PYTHON.glob("reference*.py"))
-    found = {name for path in sources for name, _ in imports(path)} - {f"pycraft.{path.stem}" for path in sources}
+    sources = sorted((PYTHON / "reference").glob("*.py"))
+    found = {name for path in sources for name, _ in imports(path) if not name.startswith("pycraft.reference")}
     assert len(sources) > 1 and {name.split(".")[0] for name in found} <= {"__future__", "functools", "types", "typing", "numpy", "scipy"}
 
 
-def test_other_tools_are_imported_by_interop_alone():
+def test_other_tools_are_imported_by_interop_and_peers_alone():
     for path in modules():
-        if path.relative_to(PYTHON).parts[0] == "interop":
+        if python_room(path) in ("interop", "peers"):
             continue
         for name, node in imports(path):
             assert name.split(".")[0] not in PEERS, f"{path.relative_to(ROOT)}:{node.lineno} imports {name}"
@@ -193,7 +195,7 @@ def test_peers_are_not_needed_to_import_the_package():
 def test_what_takes_long_to_import_is_imported_where_it_is_used():
     """SciPy, SymPy and Matplotlib are as long in coming as all of the package; every command would wait for them."""
     for path in modules():
-        if path.name.startswith("reference") or path.relative_to(PYTHON).parts[0] == "symbolic":
+        if python_room(path) in ("reference", "proofs", "closed_forms", "sympy_bridge"):
             continue
         tree = parsed(path)
         for node in tree.body:
@@ -203,26 +205,123 @@ def test_what_takes_long_to_import_is_imported_where_it_is_used():
             assert not slow, f"{path.relative_to(ROOT)}:{node.lineno}"
 
 
-def test_python_imports_point_one_way():
-    """models, operators ← identities, and nobody needs the command line."""
-    above = {
-        "models": {"identities", "cli", "symbolic", "accuracy", "scenes", "view"},
-        "operators.py": {"identities", "cli", "models"},
-    }
-    for path in modules():
-        first = path.relative_to(PYTHON).parts[0]
-        tree = parsed(path)
-        top = {id(node) for node in tree.body}
-        for name, node in imports(path):
-            target = name.split(".")[1] if name.startswith("pycraft.") else ""
-            if id(node) in top and first in above:
-                assert target not in above[first], f"{path.relative_to(ROOT)}:{node.lineno} imports {name}"
-            assert first == "cli.py" or target != "cli" or first == "__main__.py", f"{path.relative_to(ROOT)} imports the command line"
+# The rooms of Python, each with what it may import besides itself, at the top of a file, inside a function or for types alone; what that
+# may import, it may, too. A module that stands beside the rooms is one of its own.
+RESTS_ON = {
+    "_core": [],
+    "closed": ["_core"],
+    "arguments": ["_core"],
+    "formula_nodes": [],
+    "tidy": ["_core"],
+    "state": ["arguments", "closed"],
+    "reference": [],
+    "operators": ["arguments", "closed"],
+    "dynamics": ["state"],
+    "interop": ["_core"],
+    "models": ["operators", "dynamics", "interop"],
+    "kalman": ["models"],
+    "recursions": ["models", "formula_nodes"],
+    "identities": ["models", "formula_nodes", "reference"],
+    "peers": ["models"],
+    "proofs": ["identities"],
+    "closed_forms": ["proofs"],
+    "sympy_bridge": ["proofs"],
+    "accuracy": ["identities", "peers", "tidy"],
+    "face": ["accuracy", "recursions", "identities"],
+    "": ["face", "kalman", "closed_forms", "sympy_bridge"],  # pycraft itself
+    "cli": [""],
+}
+
+
+@functools.cache
+def resting_on(room):
+    """All that a room may import."""
+    return {room}.union(*map(resting_on, RESTS_ON[room]))
+
+
+def targets(path):
+    """(room, node) of every import of the package's own modules in a module."""
+    for name, node in imports(path):
+        parts = name.split(".")
+        if parts[0] != "pycraft":
+            continue
+        if len(parts) > 1:
+            yield parts[1], node
+        elif isinstance(node, ast.ImportFrom):  # from pycraft import x: a room, or a name of the package's own
+            yield from ((alias.name if alias.name in RESTS_ON else "", node) for alias in node.names)
+        else:
+            yield "", node
+
+
+def python_room(path):
+    first = path.relative_to(PYTHON).parts[0].removesuffix(".py")
+    return "" if first == "__init__" else first
+
+
+def printed(code):
+    """What a process of its own prints."""
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip()
+
+
+def test_importing_the_package_imports_little_but_numpy():
+    slow = [
+        "scipy",
+        "sympy",
+        "matplotlib",
+        "lark",
+        "rich",
+        "typer",
+        "lxml",
+        "mpmath",
+        "pycraft.identities",
+        "pycraft.proofs",
+        "pycraft.cli",
+    ]
+    assert printed(f"import sys, pycraft; print([name for name in {slow} if name in sys.modules])") == "[]"
+
+
+def test_what_is_imported_later_is_what_types_see():
+    import pycraft
+
+    blocks = [node for node in parsed(PYTHON / "__init__.py").body if isinstance(node, ast.If) and isinstance(node.test, ast.Name)]
+    (block,) = blocks  # if _TYPE_CHECKING
+    seen = {alias.name: node.module for node in block.body for alias in node.names}
+    later = {name: room for room, names in pycraft._LATER.items() for name in names}
+    assert seen == {name: "models" if name == "robots" else room for name, room in later.items()}
+    assert set(later) <= set(pycraft.__all__)
+    for name in later:
+        assert getattr(pycraft, name).__name__.split(".")[-1] == name
+    # a room has the name of a function
+    assert printed("import pycraft as pc; pc.chain(2).certify(); print(callable(pc.accuracy), callable(pc.kalman))") == "True True"
+
+
+def test_every_module_is_in_a_room():
+    assert {python_room(path) for path in modules()} | {"_core"} == set(RESTS_ON)
+
+
+@pytest.mark.parametrize("room", [room for room in RESTS_ON if room != "_core"])
+def test_python_imports_point_one_way(room):
+    for path in (path for path in modules() if python_room(path) == room):
+        for target, node in targets(path):
+            assert target in resting_on(room), f"{path.relative_to(ROOT)}:{node.lineno} imports pycraft.{target}: {room} may not"
+
+
+def test_the_core_imports_none_of_the_package():
+    """What it calls back for is attached by pycraft/face.py; `pycraft._core` is the core itself."""
+    for path in sources("bindings") + sources("bench"):
+        for name in re.findall(r'(?:import_?|module_::import)\("(pycraft[^"]*)"\)', path.read_text(encoding="utf-8")):
+            assert name == "pycraft._core", f"{path.relative_to(ROOT)} imports {name}"
+
+
+def test_no_two_modules_share_a_name():
+    """A name finds one thing."""
+    names = [path.stem for path in modules() if path.stem not in ("__init__", path.parent.name)]
+    assert sorted(names) == sorted(set(names))
 
 
 def test_nothing_prints_but_the_command_line():
     for path in modules():
-        if path.name in ("cli.py", "__main__.py") or path.relative_to(PYTHON).parts[0] == "cli":
+        if python_room(path) == "cli":
             continue
         for node in ast.walk(parsed(path)):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):

@@ -7,7 +7,7 @@ import pytest
 from campaigns import loaders
 
 import pycraft as pc
-from pycraft.models.urdf import resolve_package
+from pycraft.models.loaders.urdf import resolve_package
 
 INERTIAL = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
 

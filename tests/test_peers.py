@@ -4,7 +4,7 @@ import pytest
 
 pytest.importorskip("pinocchio")
 
-from pycraft.interop import peers
+from pycraft.peers import peers
 
 pytestmark = pytest.mark.peers
 

@@ -19,8 +19,8 @@ import pytest
 pin = pytest.importorskip("pinocchio")
 
 import pycraft as pc  # noqa: E402 - after the check that the extra is there
-from pycraft.interop import peers  # noqa: E402 - as above
 from pycraft.interop import pinocchio as convention  # noqa: E402 - as above
+from pycraft.peers import peers  # noqa: E402 - as above
 
 pytestmark = [pytest.mark.peers, pytest.mark.filterwarnings("ignore::pycraft.ModelWarning")]
 

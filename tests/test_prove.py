@@ -13,12 +13,12 @@ from perturbations import dense, difference, exchanges, nodes, replaced
 from random_identities import CHAIN, CONSTANT, J0, ROUNDING, SINGLE, identity_pair, meeting, tree
 
 import pycraft as pc
-from pycraft.symbolic import Proof, derivative, prove, prove_derivative
-from pycraft.symbolic.axioms import AXIOMS, LEMMAS, SYMMETRIC, Theory, theory
-from pycraft.symbolic.equations import SYMMETRY, Equation, Step, Use, foundations
-from pycraft.symbolic.rules import Setting, normal_form, overlaps, rules_for, weight
-from pycraft.symbolic.values import Values, transferred
-from pycraft.symbolic.words import Alphabet, add_to, combine, parse, parse_equation
+from pycraft.proofs import Proof, derivative, prove, prove_derivative
+from pycraft.proofs.axioms import AXIOMS, LEMMAS, SYMMETRIC, Theory, theory
+from pycraft.proofs.equations import SYMMETRY, Equation, Step, Use, foundations
+from pycraft.proofs.normal_form import Setting, normal_form, overlaps, rules_for, weight
+from pycraft.proofs.values import Values, transferred
+from pycraft.proofs.words import Alphabet, add_to, combine, parse, parse_equation
 
 
 @pytest.fixture(scope="module")

@@ -5,8 +5,8 @@ import pytest
 from random_identities import CHAIN, CONSTANT, J0, ROUNDING, SINGLE, meeting, tree
 
 import pycraft as pc
-from pycraft.symbolic import derivative, prove, prove_derivative
-from pycraft.symbolic.relations import at_the_roots
+from pycraft.proofs import derivative, prove, prove_derivative
+from pycraft.proofs.relations import at_the_roots
 
 # (text, what is assumed, the hypotheses of the proof, what it presupposes)
 ASSUMED = [

@@ -7,13 +7,13 @@ import pytest
 from random_identities import J0, ROUNDING, meeting, tree
 
 import pycraft as pc
-from pycraft.symbolic import mechanics, prove
-from pycraft.symbolic.axioms import theory
-from pycraft.symbolic.equations import Equation, Step, Use
-from pycraft.symbolic.relations import _axioms_are_carried
-from pycraft.symbolic.scalars import ScalarStep, TraceUse, trace_word
-from pycraft.symbolic.values import Values
-from pycraft.symbolic.words import Alphabet, parse_equation
+from pycraft.proofs import mechanics, prove
+from pycraft.proofs.axioms import theory
+from pycraft.proofs.equations import Equation, Step, Use
+from pycraft.proofs.relations import _axioms_are_carried
+from pycraft.proofs.scalars import ScalarStep, TraceUse, trace_word
+from pycraft.proofs.values import Values
+from pycraft.proofs.words import Alphabet, parse_equation
 
 NOT_DERIVED = {
     "perturbed inertias, relative error in the ℳ norm",  # an inequality

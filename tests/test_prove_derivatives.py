@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import pycraft as pc
-from pycraft.symbolic import derivative, prove
+from pycraft.proofs import derivative, prove
 
 CONSTANT, SINGLE = "constant H", "single-DOF hinges"
 

@@ -5,10 +5,10 @@ import pytest
 from random_identities import J0, meeting, tree
 
 import pycraft as pc
-from pycraft.symbolic import exercise, prove
-from pycraft.symbolic.equations import Equation
-from pycraft.symbolic.presuppositions import is_positive_definite, is_triangular, presupposed
-from pycraft.symbolic.words import Alphabet, Letter, parse
+from pycraft.proofs import exercise, prove
+from pycraft.proofs.equations import Equation
+from pycraft.proofs.presuppositions import is_positive_definite, is_triangular, presupposed
+from pycraft.proofs.words import Alphabet, Letter, parse
 
 
 @pytest.fixture(scope="module")

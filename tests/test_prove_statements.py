@@ -9,11 +9,11 @@ from formulas import blocks_only
 from random_identities import CHAIN, CONSTANT, J0, ROUNDING, SINGLE, meeting, random_word, tree
 
 import pycraft as pc
-from pycraft.symbolic import Proof, derivative, prove, prove_derivative
-from pycraft.symbolic.blocks import diagonal_blocks
-from pycraft.symbolic.proof import example
-from pycraft.symbolic.values import NoValue, Values
-from pycraft.symbolic.words import Alphabet, parse
+from pycraft.proofs import Proof, derivative, prove, prove_derivative
+from pycraft.proofs.blocks import diagonal_blocks
+from pycraft.proofs.proof import example
+from pycraft.proofs.values import NoValue, Values
+from pycraft.proofs.words import Alphabet, parse
 
 
 @pytest.fixture(scope="module")

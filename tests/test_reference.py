@@ -1,4 +1,4 @@
-"""The oracle `pycraft/reference.py` against what is independent of it: differentiated poses, Newton and Euler, energy.
+"""The oracle `pycraft/reference/__init__.py` against what is independent of it: differentiated poses, Newton and Euler, energy.
 
 Closed forms are in test_reference_closed_forms.py, the algebra's identities and limits in test_reference_algebra.py.
 """

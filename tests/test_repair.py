@@ -15,8 +15,8 @@ from pycraft.identities.formula import written_statement
 from pycraft.identities.formula_reading import read_formula
 from pycraft.identities.formula_values import DenseLetters, Misfit, evaluate, residual
 from pycraft.identities.parse import Statements
-from pycraft.symbolic import prove
-from pycraft.symbolic.repair import Repair, nearest, small_models
+from pycraft.proofs import prove
+from pycraft.proofs.repair import Repair, nearest, small_models
 
 module = sys.modules[Repair.__module__]  # by its name: the function is called as the module is
 

@@ -9,7 +9,7 @@ import sympy
 from formulas import EPS, LETTERS, letters_of, norm
 
 import pycraft as pc
-from pycraft.symbolic.closed_forms import symbolic
+from pycraft.closed_forms.closed_forms import symbolic
 
 VECTORS = {"theta_dot": "v", "velocity": "V", "a": "a", "b": "b", "gravity_base": "a_gravity"}
 MOVING = "Delta_theta_dot V_tilde V_bar momentum_cross H_dot".split()

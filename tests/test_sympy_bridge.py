@@ -13,7 +13,7 @@ from random_formulas import draw, seeded
 import pycraft as pc
 from pycraft import _core
 from pycraft.identities.parse import ParseError
-from pycraft.symbolic.sympy_bridge import from_sympy, parse, to_sympy
+from pycraft.sympy_bridge.sympy_bridge import from_sympy, parse, to_sympy
 
 SEEDS = range(60)
 

@@ -7,10 +7,10 @@ import pytest
 from rich.cells import cell_len
 
 import pycraft as pc
-from pycraft.accuracy.table import AccuracyTable
+from pycraft.accuracy.tables.table import AccuracyTable
 from pycraft.identities.parse import Statements
 from pycraft.identities.report import Finding, Report
-from pycraft.identities.tables import monospace, precision_text, text_of, wrapped
+from pycraft.identities.terminal_report import monospace, precision_text, text_of, wrapped
 
 LONG = "ℳ_pp - ℳ_pf(ℳ_ff)⁻¹ℳ_fp = H_pY*MYH_p*,  Y = ψ_f* - Ω_fP_f and so on and on, in the blocks on one path to the base of φ̃"
 
@@ -154,8 +154,8 @@ def test_accuracy_tables_fit():
 
 
 def test_tables_of_integrators_and_of_hard_cases_fit():
-    from pycraft.accuracy.stability_table import COLUMNS, Stability
-    from pycraft.accuracy.work_precision import WorkPrecisionTable
+    from pycraft.accuracy.hard_cases.stability_table import COLUMNS, Stability
+    from pycraft.accuracy.tables.work_precision import WorkPrecisionTable
 
     run = dict.fromkeys(WorkPrecisionTable.columns) | {
         "integrator": "bulirsch-stoer", "tolerance": 1e-9, "error": 1e-13, "drift": 2e-13, "seconds": 1.234e-3,

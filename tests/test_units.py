@@ -6,7 +6,7 @@ from campaigns import units
 from campaigns.units import UNITS
 
 import pycraft as pc
-from pycraft.accuracy import cases_elimination
+from pycraft.accuracy.hard_cases import cases_elimination
 
 
 @pytest.mark.parametrize("first", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in range(100, 300, 50))])

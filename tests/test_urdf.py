@@ -11,7 +11,7 @@ from oracle import agree, reference
 from scipy.spatial.transform import Rotation
 
 import pycraft as pc
-from pycraft.models.urdf import resolve_package
+from pycraft.models.loaders.urdf import resolve_package
 
 INERTIAL = (
     '<inertial><origin xyz="0.1 -0.2 0.3" rpy="0.4 -0.5 0.6"/><mass value="2"/>'

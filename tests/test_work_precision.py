@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import pycraft as pc
-from pycraft.accuracy.trajectory import integrate_by_scipy
-from pycraft.accuracy.work_precision import TOLERANCES, WorkPrecisionTable, trajectory_error, work_precision
+from pycraft.accuracy.tables.work_precision import TOLERANCES, WorkPrecisionTable, trajectory_error, work_precision
+from pycraft.dynamics.trajectory import integrate_by_scipy
 
 matplotlib.use("Agg")
 PERIOD = 2.367841947576

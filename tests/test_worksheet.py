@@ -5,8 +5,8 @@ import json
 import pytest
 
 import pycraft as pc
-from pycraft.symbolic.pdf import with_letters
-from pycraft.symbolic.worksheet import TOPICS, _gaps, grade, worksheet
+from pycraft.proofs.pdf import with_letters
+from pycraft.proofs.worksheet import TOPICS, _gaps, grade, worksheet
 
 
 def handed_in(path, answers):

@@ -69,6 +69,9 @@ Class& unpicklable(Class& c) {
   return c;
 }
 
+// What the Python face does for the core: pycraft/face.py puts it into `_core._face` by name. The core imports nothing of the package.
+py::object of_face(const char* name);
+
 // ---- conversions
 Vector3<double> to_vector3(const py::handle& value, const char* what);
 Matrix3<double> to_matrix3(const py::handle& value, const char* what);

@@ -111,6 +111,12 @@ std::string shape_text(const py::array& a) {
   return text + ")";
 }
 
+py::object of_face(const char* name) {
+  const py::object face = py::module_::import("pycraft._core").attr("_face");
+  if (!face.contains(name)) throw std::logic_error(std::string("nothing is attached to the core as '") + name + "'; import pycraft");
+  return face[name];
+}
+
 Vector3<double> to_vector3(const py::handle& value, const char* what) {
   if (PyObject* const* const items = plain_floats(value, 3))
     return {PyFloat_AS_DOUBLE(items[0]), PyFloat_AS_DOUBLE(items[1]), PyFloat_AS_DOUBLE(items[2])};
@@ -209,7 +215,7 @@ py::object to_array(const Result& r, std::vector<py::ssize_t> shape) {
   }
   py::list parts;
   for (const auto& e : r.expansions) parts.append(py::cast(e));
-  return py::module_::import("pycraft.operators").attr("exact_numbers")(parts, py::cast(shape));
+  return of_face("exact_numbers")(parts, py::cast(shape));
 }
 
 Array real_array(const py::object& x) {

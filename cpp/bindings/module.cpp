@@ -27,6 +27,7 @@ void declare_types(py::module_& m) {
 
 PYBIND11_MODULE(_core, m) {
   m.doc() = "The compiled core of pycraft: operators, planner, engine and model. Use it through the package pycraft.";
+  m.attr("_face") = pybind11::dict();  // see of_face
   pycraft::register_interrupts(m);
   pycraft::register_errors(m);
   pycraft::declare_types(m);

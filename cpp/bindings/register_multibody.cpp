@@ -216,8 +216,7 @@ void register_multibody(py::module_& m) {
       .def("take_warnings", &Multibody::take_warnings)
       // A model whose Python face is gone (an operator held alone) is pickled as its face would be.
       .def("__reduce__", [](const py::object& self) -> py::tuple {
-        const py::module_ face = py::module_::import("pycraft.models.multibody");
-        return py::make_tuple(face.attr("Multibody").attr("from_description"), py::make_tuple(face.attr("describe")(self)));
+        return py::make_tuple(of_face("model_from_description"), py::make_tuple(of_face("describe")(self)));
       })
       .def_property_readonly("has_rotor_inertia", &Multibody::has_rotor_inertia);
 }

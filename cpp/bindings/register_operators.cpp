@@ -263,22 +263,22 @@ void register_operators(py::module_& m) {
       .def_property_readonly("is_block_diagonal", [](const Expression& e) { return is_block_diagonal(e); }, "Known by rule.")
       .def_property_readonly("is_upper_triangular", [](const Expression& e) { return is_upper_triangular(e); }, "By blocks, parents before children: φ and ψ are. Known by rule.")
       .def_property_readonly("is_lower_triangular", [](const Expression& e) { return is_lower_triangular(e); }, "By blocks: φ* and ψ* are. Known by rule.")
-      .def("explain", [](const Expression& e, const std::string& request) { return py::module_::import("pycraft.operators").attr("explain")(e, request); },
+      .def("explain", [](const Expression& e, const std::string& request) { return of_face("explain")(e, request); },
            py::arg("request") = "apply", "The plan as a table: steps, tiers, cost; shown when it is the last line of a cell.")
       .def("algorithm", [](const Expression& e, const std::string& language, const std::string& request) {
-        return py::module_::import("pycraft.operators").attr("algorithm")(e, language, request);
+        return of_face("algorithm")(e, language, request);
       }, py::arg("language") = "text", py::arg("request") = "apply",
            "The plan written out as the textbook recursion: language \"text\", \"latex\", or \"python\" (NumPy alone) and \"cpp\" (Eigen alone),\n"
-           "source that runs by itself. See pycraft.algorithm.")
+           "source that runs by itself. See pycraft.recursions.")
       .def("certify", [](const py::object& self, const py::args& args, const py::kwargs& kwargs) {
-        return py::module_::import("pycraft.accuracy.certify").attr("certify_expression")(self, *args, **kwargs);
+        return of_face("certify_expression")(self, *args, **kwargs);
       }, "certify(q=None, x=None, *, v=None, form=\"fast\", refine=0, residual=\"same\", precision=\"double\", seed=0, seconds=0.02)\n\n"
          "The value at one state, the dense form or the product with x, with its measured error, what rounding of q, v and x does,\n"
-         "condition, where digits are lost and what the next rung costs: a pycraft.accuracy.certificate.Certificate. q: (nq,) or a State,\n"
+         "condition, where digits are lost and what the next rung costs: a pycraft.accuracy.certificates.certificate.Certificate. q: (nq,) or a State,\n"
          "the model's present state where left out; x: (n,) or (n, m); v: (nv,), zero where left out; form, refine, residual and precision\n"
          "as in at; seed: of the signs by which the data are moved; seconds: spent on each timing. Raises EvaluationError where the\n"
          "expression is bound already, ModelError for arrays of another shape and for a model without coordinates.")
-      .def("blocks", [](const Expression& e, const std::string& order) { return py::module_::import("pycraft.block_view").attr("block_view")(e, order); },
+      .def("blocks", [](const Expression& e, const std::string& order) { return of_face("block_view")(e, order); },
            py::arg("order") = "base-to-tip", "A labelled block view of the dense form; order=\"tip-to-base\" shows the book's triangles.")
       .def("plan", [](const Expression& e, const std::string& request, bool rules) {
         static const std::pair<const char*, Request> names[] = {{"apply", Request::apply}, {"dense", Request::dense}, {"diagonal", Request::diagonal},
@@ -341,7 +341,7 @@ void register_operators(py::module_& m) {
       })
       .def("_parts", &parts)
       .def("__reduce__", [](const Expression& e) -> py::tuple {
-        return py::make_tuple(py::module_::import("pycraft.operators").attr("operator_from_nodes"), py::make_tuple(all_parts(e)));
+        return py::make_tuple(of_face("operator_from_nodes"), py::make_tuple(all_parts(e)));
       });
 
   m.def("identity", [](const py::object& space) { return space.is_none() ? identity() : identity(space.cast<Space>()); }, py::arg("space") = py::none(),

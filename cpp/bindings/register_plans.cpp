@@ -223,7 +223,7 @@ void register_plans(py::module_& m) {
       .def_property_readonly("passes", &ExecutionPool::last_counts, "Counters of the last run.")
       .def_property_readonly("run_notes", &ExecutionPool::run_notes)
       .def_property_readonly("program", [](const ExecutionPool& p) { return plan_as_data(p.plan()); },
-                             "The plan as plain data: contexts, registers and steps in dictionaries; pycraft.algorithm writes them out.")
+                             "The plan as plain data: contexts, registers and steps in dictionaries; pycraft.recursions writes them out.")
       .def("numbers", [](const ExecutionPool& p, size_t context, const std::string& name, const std::vector<int>& arguments, int state) {
         return numbers_of(p.plan(), context, name, arguments, state);
       }, py::arg("context"), py::arg("name"), py::arg("arguments") = std::vector<int>(), py::arg("state") = 0,

@@ -65,17 +65,17 @@ void register_scalars(py::module_& m) {
       }, py::arg("dtype") = py::none(), py::arg("copy") = py::none())
       .def("__format__", [](const Scalar& s, const std::string& spec) { return py::float_(single(s)).attr("__format__")(spec); })
       .def("at", [](const Scalar& s, const py::args& args, const py::kwargs& kwargs) {
-        return py::module_::import("pycraft.operators").attr("scalar_at")(s, *args, **kwargs);
+        return of_face("scalar_at")(s, *args, **kwargs);
       })
       .def("certify", [](const py::object& self, const py::args& args, const py::kwargs& kwargs) {
-        return py::module_::import("pycraft.accuracy.certify").attr("certify_expression")(self, *args, **kwargs);
+        return of_face("certify_expression")(self, *args, **kwargs);
       }, "certify(q=None, *, v=None, form=\"fast\", refine=0, residual=\"same\", precision=\"double\", seed=0, seconds=0.02)\n\n"
          "The number at one state with its measured error, what rounding of q and v does, where digits are lost and what the next rung\n"
-         "costs: a pycraft.accuracy.certificate.Certificate. q: (nq,) or a State, the model's present state where left out; v: (nv,), zero\n"
+         "costs: a pycraft.accuracy.certificates.certificate.Certificate. q: (nq,) or a State, the model's present state where left out; v: (nv,), zero\n"
          "where left out; form, refine, residual and precision as in at; seed: of the signs by which the data are moved; seconds: spent\n"
          "on each timing. Raises EvaluationError where it is bound already, ModelError for arrays of another shape and for a model\n"
          "without coordinates.")
-      .def("gradient", [](const Scalar& s, const std::string& over) { return py::module_::import("pycraft.operators").attr("scalar_gradient")(s, over); },
+      .def("gradient", [](const Scalar& s, const std::string& over) { return of_face("scalar_gradient")(s, over); },
            py::arg("over") = "coordinates",
            "All derivatives at once, as an array: over \"coordinates\" (nv,), or (B, nv) where a batch is bound. Of ln det(HφMφ*H* [+ J]) and\n"
            "ln det D in three sweeps, O(N), and then also over \"inertias\", \"geometry\", \"axes\" (see\n"
@@ -111,8 +111,8 @@ void register_scalars(py::module_& m) {
       .def("__eq__", [](const Scalar& a, const Scalar& b) { return a == b; })
       .def("__hash__", [](const Scalar& a) { return std::hash<std::string>()(show(a)); })
       .def("algorithm", [](const Scalar& a, const std::string& language) {
-        return py::module_::import("pycraft.operators").attr("algorithm")(a, language);
-      }, py::arg("language") = "text", "The recursion that computes it: \"text\", \"latex\", \"python\" or \"cpp\". See pycraft.algorithm.")
+        return of_face("algorithm")(a, language);
+      }, py::arg("language") = "text", "The recursion that computes it: \"text\", \"latex\", \"python\" or \"cpp\". See pycraft.recursions.")
       .def("text", [](const Scalar& a) { return show(a); })
       .def("latex", [](const Scalar& a) { return show(a, Style::latex); })
       .def("_repr_latex_", [](const Scalar& a) { return "$" + show(a, Style::latex) + shown_value(a, " = ") + "$"; })

@@ -21,8 +21,13 @@ class StaleOperatorError(Error, RuntimeError): ...
 def stubs() -> str:
     """The text of the stub file."""
     with tempfile.TemporaryDirectory() as folder:
-        subprocess.run([sys.executable, "-m", "pybind11_stubgen", "pycraft._core", "-o", folder, "--exit-code"], check=True, capture_output=True)
+        subprocess.run(
+            [sys.executable, "-m", "pybind11_stubgen", "pycraft._core", "-o", folder, "--exit-code"], check=True, capture_output=True
+        )
         text = (Path(folder) / "pycraft" / "_core.pyi").read_text()
+    # What the face attaches is found when it is called.
+    text = re.sub(r"^_face: dict = .*$", "_face: dict[str, typing.Any]", text, flags=re.MULTILINE)
+    text = re.sub(r"^import pycraft\..*\n", "", text, flags=re.MULTILINE)
     # The exceptions live in the core but call themselves pycraft's.
     text = re.sub(r"[ \t]+$", "", text, flags=re.MULTILINE)
     text = re.sub(r"from pycraft import \w+Error\n|from pycraft import Error\n", "", text)

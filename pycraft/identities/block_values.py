@@ -15,9 +15,9 @@ import numpy as np
 
 from .. import _core
 from .block_reading import SumOver, shown
-from .bounds import EPSILON, Roundings
 from .formula import Call, Letter, Node, Number, Power, Product, Star, Sum
 from .judge import BoundState
+from .residual_bounds import EPSILON, Roundings
 from .vocabulary import ParseError
 
 Place = tuple[str, str]

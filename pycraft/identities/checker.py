@@ -12,22 +12,10 @@ from .. import _core
 from ..arguments import whole
 from .block_check import check_by_block
 from .block_reading import is_by_block
+from .drawn_vectors import drawn_vectors
 from .judge import FAILS, BoundState, Verdict, judge_states, ladder
 from .parse import Statement, Statements, check_has_space
 from .report import UNDEFINED, CheckReport, Finding, Report
-
-
-def drawn_vectors(side: Any, rng: np.random.Generator, known: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Random values for the named vectors of an expression."""
-    if isinstance(side, _core.Scalar):
-        for operand in side.operands():
-            drawn_vectors(operand, rng, known)
-    elif isinstance(side, _core.Operator):
-        if side.kind == "vector" and side.name not in known:
-            known[side.name] = rng.uniform(-1, 1, side.codomain.dimension)
-        for child in side.children:
-            drawn_vectors(child, rng, known)
-    return known
 
 
 def check_model(operators: Any, *, states: int = 3, seed: int = 0, precision: str | int = "extended", progress: Any = None) -> Report:
@@ -79,7 +67,7 @@ def check_wider(precision: str | int) -> None:
 
 
 def _present(model: Any) -> Any:
-    from ..models.state import State
+    from ..state import State
 
     return State(np.array(model.q), np.array(model.v))
 

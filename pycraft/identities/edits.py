@@ -11,23 +11,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from ..formula_nodes import parts
-from .formula import (
-    Call,
-    Formula,
-    Letter,
-    Node,
-    Number,
-    Power,
-    Product,
-    Star,
-    Sum,
-    inverted,
-    product,
-    rebuilt,
-    starred,
-    total,
-    written,
-)
+from .formula import Call, Formula, Letter, Node, Number, Power, Product, Star, Sum, inverted, product, rebuilt, starred, total, written
 
 _CONFUSED = (
     {"phi", "psi"}, {"E", "E_psi"}, {"phi_tilde", "psi_tilde"},

@@ -18,7 +18,7 @@ import numpy as np
 
 from .. import _core
 from ..models.generators import tree
-from ..models.state import State
+from ..state import State
 from .parse import Statement, Statements
 
 DOF = {

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from .bounds import CONSTANT, EPSILON, Roundings, Sizes
+from .residual_bounds import CONSTANT, EPSILON, Roundings, Sizes
 
 DECIDES = 1e-12
 """A bound above this decides nothing: differences as small as the bound are not seen."""

@@ -18,7 +18,7 @@ from typing import Any
 
 from .. import _core
 from .spelling import spelled
-from .tables import WIDTH, wrapped
+from .terminal_report import WIDTH, wrapped
 from .vocabulary import ParseError, SpacesError
 
 _ENVIRONMENTS = "equation|align|alignat|flalign|gather|multline|eqnarray|displaymath|math|dmath"

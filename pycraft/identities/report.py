@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from .judge import FAILS, HOLDS, UNDECIDED, UndecidedError, Verdict
-from .tables import WIDTH, findings_table, monospace, precision_text, read_as, text_of, wrapped
+from .terminal_report import WIDTH, findings_table, monospace, precision_text, read_as, text_of, wrapped
 
 UNDEFINED = "undefined"
 OPEN = ("fails", "undecided", "undefined")

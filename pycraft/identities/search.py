@@ -19,12 +19,13 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..models.state import State
+from ..state import State
 from .budget import Budget
+from .drawn_vectors import drawn_vectors
 from .family import DOF, HYPOTHESES, Spec, family, named_vectors, read_on
 from .judge import FAILS, BoundState, Verdict, judge, ladder
 from .parse import Statement
-from .tables import wrapped
+from .terminal_report import wrapped
 from .vocabulary import is_number
 
 __all__ = ["Counterexample", "named_vectors", "refutation", "smallest", "statement_text"]
@@ -145,8 +146,6 @@ def judged(
     text: str, spec: Spec, states: int = 1, precision: str | int = "extended", vectors: Mapping[str, str] | None = None
 ) -> Verdict | None:
     """The verdict on a model: up to the first state that refutes. None where it has not what the statement names, or no inverse exists."""
-    from .checker import drawn_vectors
-
     model = spec.model()
     read = read_on(text, spec, model, vectors)
     if read is None or read.rhs is None:

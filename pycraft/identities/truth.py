@@ -16,7 +16,7 @@ from .family import CELLS, CONSTANT, EVERY, HYPOTHESES, ONE, WITH_J, Cell, famil
 from .judge import FAILS, HOLDS, UNDECIDED
 from .parse import Statements, as_text
 from .search import Counterexample, judged, smallest, understood
-from .tables import STYLES, monospace, read_as, text_of, wrapped
+from .terminal_report import STYLES, monospace, read_as, text_of, wrapped
 
 TRUE, FALSE, UNREAD = "true", "FALSE", "not said"
 _WORDS = {HOLDS: TRUE, FAILS: FALSE, UNDECIDED: UNDECIDED}
@@ -121,13 +121,13 @@ class TruthMap:
         return f"{head}\n\n{text_of(self.table())}"
 
     def _repr_html_(self) -> str:
-        from .tables import truth_html
+        from .terminal_report import truth_html
 
         return f"<p><b>{escape(self.statement)}</b><br>{escape(self.verdict)}</p>" + truth_html(self)
 
     def plot(self, ax: Any = None) -> Any:
         """The map as a picture: green where true, red where false with the smallest case; returns the axes."""
-        from .tables import truth_plot
+        from .terminal_report import truth_plot
 
         return truth_plot(self, ax)
 

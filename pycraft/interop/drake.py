@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from ..models.multibody import Multibody
-    from .export import Peer
+from .described import Described
+from .peer import Peer, PeerRefusal
 
 
-def drake_peer(model: Multibody) -> Peer:
+def drake_peer(model: Described) -> Peer:
     """Drake's forward dynamics (articulated bodies, a continuous plant) on the model.
 
     Raises PeerRefusal for hinges other than pin, slider and screw, and for what Drake refuses.
     """
     from pydrake.multibody.plant import MultibodyPlant
-
-    from .export import PeerRefusal
 
     plant = MultibodyPlant(0.0)
     try:
@@ -29,11 +26,9 @@ def drake_peer(model: Multibody) -> Peer:
     return _peer(plant, model)
 
 
-def _build(plant: Any, model: Multibody) -> None:
+def _build(plant: Any, model: Described) -> None:
     from pydrake.math import RigidTransform, RotationMatrix
     from pydrake.multibody import tree
-
-    from .export import PeerRefusal
 
     bodies: list[Any] = []
     for body in model.description()["bodies"]:
@@ -72,10 +67,8 @@ def _build(plant: Any, model: Multibody) -> None:
     plant.mutable_gravity_field().set_gravity_vector(np.array(model.gravity, float))
 
 
-def _peer(plant: Any, model: Multibody) -> Peer:
+def _peer(plant: Any, model: Described) -> Peer:
     from importlib.metadata import version
-
-    from .export import Peer
 
     context = plant.CreateDefaultContext()
     forces = plant.get_applied_generalized_force_input_port()

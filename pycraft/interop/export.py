@@ -11,40 +11,22 @@ order about the same points, so that coordinates mean the same numbers.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from .. import _core
 from . import mujoco as convention
+from .described import Described
+from .drake import drake_peer
+from .peer import Peer, PeerRefusal, Vector
 
-if TYPE_CHECKING:
-    from ..models.multibody import Multibody
-
-Vector = np.ndarray
 _PINOCCHIO_BYTES = 64
 """Pinocchio's work space a coordinate cubed, measured: it holds tensors for second derivatives."""
 _Q_SIZE, _V_SIZE = {"ball": 4, "free": 7}, {"ball": 3, "free": 6}
 
 
-class PeerRefusal(_core.ModelError):
-    """Another package does not take this model; the text says why, in the package's own words where it has some."""
-
-
-@dataclass(frozen=True)
-class Peer:
-    """Another package's forward dynamics of one model: `forward_dynamics(q, v, tau)` takes (nq,), (nv,), (nv,), ours, and gives (nv,).
-
-    `said` collects the warnings that it gives beside its values.
-    """
-
-    name: str
-    forward_dynamics: Callable[[Vector, Vector, Vector], Vector]
-    said: list[str] = field(default_factory=list)
-
-
-def _bodies(model: Multibody) -> list[dict[str, Any]]:
+def _bodies(model: Described) -> list[dict[str, Any]]:
     return model.description()["bodies"]
 
 
@@ -68,7 +50,7 @@ class PinocchioModel:
         return out
 
 
-def to_pinocchio(model: Multibody) -> PinocchioModel:
+def to_pinocchio(model: Described) -> PinocchioModel:
     """The model as a `pinocchio.Model` made joint by joint, with rotor inertias as armature and the same gravity.
 
     Raises PeerRefusal for what Pinocchio refuses. All hinge kinds go over.
@@ -144,7 +126,7 @@ def _pinocchio_joint(subhinge: dict[str, Any]) -> Any:
             return pin.JointModelFreeFlyer()
 
 
-def pinocchio_peer(model: Multibody) -> Peer:
+def pinocchio_peer(model: Described) -> Peer:
     """Pinocchio's articulated-body algorithm (`aba`) on the model. Raises PeerRefusal where its work space takes over 2 GB."""
     import pinocchio as pin
 
@@ -171,7 +153,7 @@ _COMPILER = dict(
 _JOINTS = {"pin": "hinge", "slider": "slide", "ball": "ball"}
 
 
-def to_mjcf(model: Multibody) -> str:
+def to_mjcf(model: Described) -> str:
     """The model as MJCF text: bodies, joints, inertias with 17 digits, no geometry, contacts and constraints off.
 
     Raises PeerRefusal for a screw, for a free hinge that is not alone on the base, and for rotor inertias that differ within a ball or
@@ -231,7 +213,7 @@ def _numbers(values: Any) -> str:
     return " ".join(repr(float(x)) for x in np.ravel(values))
 
 
-def mujoco_peer(model: Multibody) -> Peer:
+def mujoco_peer(model: Described) -> Peer:
     """MuJoCo's forward dynamics (`mj_forward`, constraints off) on the model. Raises PeerRefusal with the compiler's text."""
     import mujoco
 
@@ -260,11 +242,9 @@ def mujoco_peer(model: Multibody) -> Peer:
 # All of them ----------------------------------------------------------------------------------------------------------
 
 
-def installed() -> dict[str, Callable[[Multibody], Peer]]:
+def installed() -> dict[str, Callable[[Described], Peer]]:
     """What makes a peer of a model, by the name of each package that can be imported: Pinocchio, MuJoCo, Drake."""
     from importlib.util import find_spec
-
-    from .drake import drake_peer
 
     makers = {"pinocchio": ("Pinocchio", pinocchio_peer), "mujoco": ("MuJoCo", mujoco_peer), "pydrake": ("Drake", drake_peer)}
     return {name: make for module, (name, make) in makers.items() if find_spec(module) is not None}

@@ -15,15 +15,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from .. import _core
+from .described import Described
 from .packages import required
-
-if TYPE_CHECKING:
-    from ..models.multibody import Multibody
 
 
 def compiled(path: str) -> Any:
@@ -54,7 +52,7 @@ class _Free(NamedTuple):
     placement: np.ndarray
 
 
-def _free_hinges(model: Multibody) -> Iterator[_Free]:
+def _free_hinges(model: Described) -> Iterator[_Free]:
     for hinge in model.hinges.values():
         if all(subhinge["kind"] != "free" for subhinge in hinge.subhinges):
             continue
@@ -64,7 +62,7 @@ def _free_hinges(model: Multibody) -> Iterator[_Free]:
         yield _Free(hinge.q_slice.start, hinge.v_slice.start, hinge.placement)
 
 
-def permutation(model: Multibody) -> tuple[np.ndarray, np.ndarray]:
+def permutation(model: Described) -> tuple[np.ndarray, np.ndarray]:
     """The order of MuJoCo's numbers: `q[..., i]` is qpos and `v[..., j]` is in the order of qvel, i (nq,) and j (nv,).
 
     This is the whole conversion of positions where free hinges are placed at the world's origin; linear velocities of free
@@ -77,7 +75,7 @@ def permutation(model: Multibody) -> tuple[np.ndarray, np.ndarray]:
     return i, j
 
 
-def to_mujoco(model: Multibody, q, v) -> tuple[np.ndarray, np.ndarray]:
+def to_mujoco(model: Described, q, v) -> tuple[np.ndarray, np.ndarray]:
     """qpos (..., nq) and qvel (..., nv) of the state q (..., nq), v (..., nv).
 
     Raises ModelError for a free hinge that is not on the base.
@@ -103,7 +101,7 @@ def to_mujoco(model: Multibody, q, v) -> tuple[np.ndarray, np.ndarray]:
     return qpos, qvel
 
 
-def from_mujoco(model: Multibody, qpos, qvel) -> tuple[np.ndarray, np.ndarray]:
+def from_mujoco(model: Described, qpos, qvel) -> tuple[np.ndarray, np.ndarray]:
     """The state q (..., nq), v (..., nv) of MuJoCo's qpos (..., nq), qvel (..., nv): the inverse of `to_mujoco`."""
     qpos, qvel = _sized(model, qpos, model.nq, "qpos"), _sized(model, qvel, model.nv, "qvel")
     i, j = permutation(model)
@@ -120,7 +118,7 @@ def from_mujoco(model: Multibody, qpos, qvel) -> tuple[np.ndarray, np.ndarray]:
     return q, v
 
 
-def velocity_map(model: Multibody, q) -> np.ndarray:
+def velocity_map(model: Described, q) -> np.ndarray:
     """T (nv, nv), orthogonal, with qvel = T v at the state q (nq,).
 
     Forces follow by duality, qfrc = T tau, and MuJoCo's mass matrix is T (ℳ + J) T*.
@@ -129,7 +127,7 @@ def velocity_map(model: Multibody, q) -> np.ndarray:
     return to_mujoco(model, np.broadcast_to(q, (model.nv, model.nq)), np.eye(model.nv))[1].T
 
 
-def acceleration_to_mujoco(model: Multibody, q, v, vdot) -> np.ndarray:
+def acceleration_to_mujoco(model: Described, q, v, vdot) -> np.ndarray:
     """qacc (nv,) of the accelerations vdot (nv,) at the state q (nq,), v (nv,): T v̇ + Ṫ v.
 
     MuJoCo's linear acceleration is that of the body's origin in world axes, R(v̇ + ω × v).
@@ -151,7 +149,7 @@ def joint_names(hinge: Any) -> list[str]:
     return [hinge.name] if len(hinge.subhinges) == 1 else [f"{hinge.name}[{i}]" for i in range(len(hinge.subhinges))]
 
 
-def order(model: Multibody, compiled_model: Any) -> tuple[np.ndarray, np.ndarray, dict[str, int]]:
+def order(model: Described, compiled_model: Any) -> tuple[np.ndarray, np.ndarray, dict[str, int]]:
     """Where the numbers of `to_mujoco` stand in the MjModel's qpos (nq,) and qvel (nv,), and the first joint of every hinge by name.
 
     Hinges are matched by the name of their first joint, else by the name of the body. Raises ModelError for what only one of the two
@@ -192,7 +190,7 @@ def order(model: Multibody, compiled_model: Any) -> tuple[np.ndarray, np.ndarray
 # Quaternions (w, x, y, z) with leading axes ---------------------------------------------------------------------------
 
 
-def _sized(model: Multibody, x, size: int, name: str) -> np.ndarray:
+def _sized(model: Described, x, size: int, name: str) -> np.ndarray:
     x = np.asarray(x, float)
     if x.shape[-1:] != (size,):
         raise _core.ModelError(f"{name} of {model.name!r} takes {size} numbers, not an array {x.shape}")

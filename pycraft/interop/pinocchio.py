@@ -7,15 +7,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from importlib.resources import as_file, files
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from .. import _core
+from .described import Described
 from .packages import required
-
-if TYPE_CHECKING:
-    from ..models.multibody import Multibody
 
 _SWAP = np.array([3, 4, 5, 0, 1, 2])
 """From angular-first to linear-first order."""
@@ -39,7 +37,7 @@ class Coordinates:
     `q(q)` converts configurations, `velocities(q)` is the orthogonal matrix S with v_pinocchio = S v; so ℳ_pinocchio = S ℳ S*.
     """
 
-    model: Multibody
+    model: Described
     pin_model: Any
     joints: list[tuple[int, str, slice, slice]]
 
@@ -149,7 +147,7 @@ def _unit(quaternion: np.ndarray) -> np.ndarray:
     return quaternion / np.linalg.norm(quaternion)
 
 
-def coordinates(model: Multibody, pin_model: Any) -> Coordinates:
+def coordinates(model: Described, pin_model: Any) -> Coordinates:
     """Match hinges and joints by name. Raises ModelError for a joint that only one of the two has."""
     hinges = model.hinges
     joints = []

@@ -10,9 +10,9 @@ import numpy as np
 from .. import _core
 from ..arguments import limit_pair, listed, pose_parts, text
 from ..closed import Closed
+from ..dynamics.integration import IntegrationCalls
+from ..state import State, at_state, random_state
 from .handles import Body, Hinge, Named, Node, Vector
-from .integration import IntegrationCalls
-from .state import State, at_state, random_state
 
 _Z = (0.0, 0.0, 1.0)
 _DEFAULT_AXES: dict[str, tuple[tuple[float, float, float], ...]] = {
@@ -177,7 +177,7 @@ class Multibody(Closed, IntegrationCalls, _core.Multibody):
     @property
     def soa(self):
         """The spatial operators of this model: `soa.phi`, `soa.H`, ..., or several at once: `phi, H, M = soa("phi H M")`."""
-        from ..operators import OperatorSet
+        from ..operators.operator_set import OperatorSet
 
         if self._soa is None or not self._soa.is_current():
             self.warn()
@@ -186,7 +186,7 @@ class Multibody(Closed, IntegrationCalls, _core.Multibody):
 
     def certify(self, q=None, v=None, tau=None, **options: Any) -> Any:
         """Forward dynamics with its measured error, what rounding of q, v and tau does, condition, floor of refinement, where digits are
-        lost, and what the next rung costs: a `pycraft.accuracy.certificate.Certificate`.
+        lost, and what the next rung costs: a `pycraft.accuracy.certificates.certificate.Certificate`.
 
         Parameters
         ----------
@@ -200,9 +200,7 @@ class Multibody(Closed, IntegrationCalls, _core.Multibody):
         Raises what `forward_dynamics` raises, and ModelError for a model without coordinates. Cost: a dozen evaluations in quad
         precision, O(N); the floor, up to 400 coordinates, O(N²).
         """
-        from ..accuracy.certify import certify_dynamics
-
-        return certify_dynamics(self, *at_state(self, q, v), tau, **options)
+        return _core._face["certify_dynamics"](self, *at_state(self, q, v), tau, **options)
 
     def warn(self) -> None:
         """Say, once, what is legal but worth a word: violated triangle inequalities, massless bodies on hinges."""

@@ -18,6 +18,7 @@ from random_formulas import draw, seeded
 
 import pycraft as pc
 from campaigns.command_line import seeds, tallied
+from pycraft.operators.operator_set import operator_from_parts
 
 STATES = 3
 
@@ -111,7 +112,7 @@ def requests(e, rng, nv):
         "norm": lambda b, s: b.norm(),
         "simplified": lambda b, s: b.simplify().dense(),
         "transposed": lambda b, s: b.T @ np.ones(m),
-        "a copy": lambda b, s: pc.operators.operator_from_parts(*b._parts()).dense() if e.children == [] else b.dense(),
+        "a copy": lambda b, s: operator_from_parts(*b._parts()).dense() if e.children == [] else b.dense(),
     }
     if e.domain.name != "R^1":
         all_of["blockdiag"] = lambda b, s: pc.blockdiag(b).dense()

@@ -1,4 +1,4 @@
-"""Proofs against a hostile stream of statements: `python tests/campaigns/proofs.py --seeds N [--first K] [--each E] [--jobs J] [--to FILE]`.
+"""Proofs against a hostile stream of statements: `python tests/campaigns/proofs.py --seeds N [--each E] [--jobs J] [--to FILE]`.
 
 For every seed a random true identity outside the catalogue (`random_identities`: axioms and lemmas applied at random to random words), said
 of operators, of inverses, traces, norms or determinants, must be proved; and a statement one step from it (a letter exchanged, a sign
@@ -30,8 +30,8 @@ from perturbations import dense, exchanges, nodes, replaced
 from random_identities import J0, identity_pair, meeting, tree
 
 import pycraft as pc
-from pycraft.symbolic import prove
-from pycraft.symbolic.values import NoValue, transferred
+from pycraft.proofs import prove
+from pycraft.proofs.values import NoValue, transferred
 
 BOUND = 1e-7
 """What a proved statement may be off by, relative to its sides, on small models: their condition is below 1e6."""
@@ -68,7 +68,7 @@ class Tally:
 
 
 def statement(seed):
-    """(lhs, rhs, kind, hypotheses) of a true statement of expressions on a small tree; kind says of what."""
+    """(lhs, rhs, kind, hypotheses, soa) of a true statement on a small tree: kind says of what, soa are the operators of the tree."""
     rng = np.random.default_rng(seed)
     hypotheses = (J0,) if seed % 3 == 0 else ()
     soa = tree(seed % 7, rotor_inertia=not hypotheses).soa
@@ -77,7 +77,7 @@ def statement(seed):
         if isinstance(lhs, pc.Operator) and isinstance(rhs, pc.Operator) and np.abs(dense(lhs, {})).max(initial=0.0) > 1e-9:
             break
     kind = ["operators", "operators", "trace", "norm", "determinant"][int(rng.integers(5))]
-    return lhs, rhs, kind, hypotheses
+    return lhs, rhs, kind, hypotheses, soa
 
 
 def about(lhs, rhs, kind, soa):
@@ -141,15 +141,15 @@ def is_false(proof, lhs, rhs, reduction):
 
 
 AT_LEAST, QUICK = 3, 0.1
-"""How often a statement is perturbed however long its own proof takes, and up to how many seconds it may take to be perturbed more often."""
+"""How often a statement is perturbed however long its own proof takes; up to how many seconds it may take to be so more often."""
 
 
 def tried(seed, each=AT_LEAST):
     """What came of one seed."""
     tally, begin = Tally(), time.process_time()
-    lhs, rhs, kind, hypotheses = statement(seed)
+    lhs, rhs, kind, hypotheses, soa = statement(seed)
     proof_begin = time.process_time()
-    proof = prove(*said(*about(lhs, rhs, kind, _own(lhs))))
+    proof = prove(*said(*about(lhs, rhs, kind, soa)))
     times = each if time.process_time() - proof_begin < QUICK else AT_LEAST
     tally.true += 1
     tally.proved += bool(proof)
@@ -160,7 +160,7 @@ def tried(seed, each=AT_LEAST):
         other = perturbed(rng, rhs)
         if other is None or (other.domain, other.codomain) != (lhs.domain, lhs.codomain):
             continue
-        claim = about(lhs, other, kind, _own(lhs))
+        claim = about(lhs, other, kind, soa)
         proof = prove(*said(*claim))
         tally.perturbed += 1
         tally.proved_perturbed += bool(proof)
@@ -173,14 +173,6 @@ def tried(seed, each=AT_LEAST):
 def run(seeds):
     """What came of these seeds together."""
     return functools.reduce(Tally.add, map(tried, seeds), Tally())
-
-
-def _own(e):
-    """The letters of the model that an expression belongs to."""
-    from pycraft.operators import OperatorSet
-
-    source = e.sources[0]
-    return OperatorSet(source, source.model)
 
 
 def _numbered(seed, each):

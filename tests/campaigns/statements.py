@@ -28,7 +28,7 @@ from pycraft.identities.formula_reading import read_formula
 from pycraft.identities.formula_values import Misfit, Value, evaluate
 from pycraft.identities.judge import BoundState, judge_states
 from pycraft.identities.parse import Statements
-from pycraft.models.state import State
+from pycraft.state import State
 
 APART, TOGETHER = 1e-6, 1e-10
 """Dense double on trees of up to six bodies is good to 1e-12 or so; a change makes 1e-3 and more."""

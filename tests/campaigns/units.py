@@ -18,7 +18,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import pycraft as pc
-from pycraft.accuracy.cases_elimination import UNITS
+from pycraft.accuracy.hard_cases.cases_elimination import UNITS
 
 LENGTHS = {"pin": (0,), "slider": (1,), "cylindrical": (0, 1), "ball": (0, 0, 0), "universal": (0, 0)}
 """Of each coordinate: the power of a length in it."""

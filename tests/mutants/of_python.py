@@ -28,7 +28,7 @@ CHANGES = {
         ("amplification is not counted", "max(SCATTER * seen, CONSTANT * amplified)", "SCATTER * seen"),
         ("a fall may scatter by 64000", "SCATTER = 64.0", "SCATTER = 64000.0"),
     ],
-    "pycraft/cli.py": [
+    "pycraft/cli/commands.py": [
         ("check --json without its seed", "states=states, seed=seed, precision=wide, progress", "states=states, precision=wide, progress"),
         ("bench exits with 0", "raise typer.Exit(1 if missed else 0)", "raise typer.Exit(0)"),
         ("--mimic ignored", 'root=root or "fixed", mimic=mimic', 'root=root or "fixed", mimic="lock"'),
@@ -38,7 +38,7 @@ CHANGES = {
         ("peers --seed ignored", "compare_all(states, seed,", "compare_all(states, 0,"),
         ("accuracy --seed ignored", "                    seed=seed,\n", "                    seed=0,\n"),
     ],
-    "pycraft/bench.py": [
+    "pycraft/cli/bench.py": [
         ("bench loses its bounds", "self.bound is None or self.value <= self.bound", "True"),
     ],
     "pycraft/identities/book.py": [
@@ -46,7 +46,7 @@ CHANGES = {
         ("a fraction read upside down", "return decimal(parts[0]) / decimal(parts[1])", "return decimal(parts[1]) / decimal(parts[0])"),
         ("a star that does not transpose", "return lambda x: x.T", "return lambda x: x"),
     ],
-    "pycraft/models/rotations.py": [
+    "pycraft/models/loaders/rotations.py": [
         ("a quaternion's rotation with a sign wrong", "[1 - 2 * (y * y + z * z)", "[1 + 2 * (y * y + z * z)"),
         ("an inertia turned the other way", "rotation @ inertia @ rotation.T", "rotation.T @ inertia @ rotation"),
     ],
@@ -64,7 +64,7 @@ CHANGES = {
         ),
         ("the seed of random trees ignored", "seed=spec.seed + seed", "seed=spec.seed"),
     ],
-    "pycraft/identities/bounds.py": [
+    "pycraft/identities/residual_bounds.py": [
         (
             "factors of a product are not counted",
             "return len(children) * max(self._step(children, i) for i in range(len(children)))",
@@ -124,7 +124,7 @@ CHANGES = {
         ),
         ("any relation saves", "if any(relation.holds(parents, bodies) for parents, found in on for bodies in found.bad):", "if False:"),
     ],
-    "pycraft/symbolic/repair.py": [
+    "pycraft/proofs/repair.py": [
         ("close is a tenth", "_CLOSE = 1e-9", "_CLOSE = 1e-1"),
         ("one small model is enough", "all(residual(new, other) < _CLOSE for other in models[1:])", "True"),
         ("hypotheses are not ranked", "r.cost + 0.5 * len(r.where[0])", "r.cost"),
@@ -132,7 +132,7 @@ CHANGES = {
         ("repairs in any order", "return sorted(near, key=lambda item: item[1].cost), tried, whole", "return near, tried, whole"),
         ("what is true is repaired", "if _is_close(formula, models) and (own", "if False and (own"),
     ],
-    "pycraft/interop/compare.py": [
+    "pycraft/peers/compare.py": [
         ("gravity is not made the same", "        common.gravity = there\n", ""),
         ("rotor inertias are not made the same", "            common.hinges[name].rotor_inertia = theirs\n", ""),
         ("frames of bodies are physical", 'kind != "body frame"', "True"),
@@ -146,7 +146,7 @@ CHANGES = {
             "result.in_common[name] = _relative(ours(), theirs)",
         ),
     ],
-    "pycraft/interop/twins.py": [
+    "pycraft/peers/twins.py": [
         (
             "armature in the other order",
             "self.armature[model.hinges[name].v_slice] = hinge.rotor_inertia",
@@ -154,7 +154,7 @@ CHANGES = {
         ),
         ("inertia seen from the other side", "R @ self.com + p, R @ self.inertia @ R.T", "R @ self.com + p, R.T @ self.inertia @ R"),
     ],
-    "pycraft/symbolic/worksheet.py": [
+    "pycraft/proofs/worksheet.py": [
         ("worksheets ignore their seed", 'random.Random(f"{seed} {k}")', 'random.Random(f"{k}")'),
         ("lines in a row are left out", "abs(line - other) == 1", "False"),
         ("graded by the file's own questions", "        if sheet is None:\n", "        if True:\n"),
@@ -174,7 +174,7 @@ CHANGES = {
         ("lines of the display", 'start = line + body.count("\\n", 0, at + begins)', "start = line"),
         ("rows that begin with a minus stand alone", "[-+=·@]|", "[+=·@]|"),
     ],
-    "pycraft/symbolic/presuppositions.py": [
+    "pycraft/proofs/presuppositions.py": [
         ("semidefinite is definite", 'kind = "definite" if inverted(center[0]) else "semidefinite"', 'kind = "definite"'),
         ("a zero diagonal is regular", "return sum(c for word, c in p.items() if ways[word] <= {unit}) != 0", "return True"),
         ("inverses that exist nowhere", "if found and not any(found):", "if False:"),
@@ -184,7 +184,7 @@ CHANGES = {
             "if any(not signs[word] for word, c in p.items()):",
         ),
     ],
-    "pycraft/symbolic/relations.py": [
+    "pycraft/proofs/relations.py": [
         ("compliance along the hinge whatever J", 'for mark in marks if "J = 0" in hypotheses else ():', "for mark in marks:"),
         ("every constant stands at the base", "    if not _is_zero(X, inner):\n        return\n", ""),
         ("nodes on several bodies as on one", " or len(symbol_nodes(e)) != 1", ""),
@@ -197,7 +197,7 @@ CHANGES = {
             "parents=tuple(p - (p >= k and p > 0) for p in parents)",
         ),
     ],
-    "pycraft/models/xml_file.py": [
+    "pycraft/models/loaders/xml_file.py": [
         ("undeclared entities are dropped", 'if "UNDECLARED_ENTITY" in entry.type_name:', "if False:"),
         ("entities are expanded", "resolve_entities=False", "resolve_entities=True"),
     ],

@@ -12,14 +12,14 @@ TARGETS = [
     "pycraft/interop/*.py",
     "pycraft/symbolic/*.py",
     "pycraft/kalman.py",
-    "pycraft/operators.py",
-    "pycraft/accuracy/certify.py",
-    "pycraft/accuracy/table.py",
-    "pycraft/accuracy/bounds.py",
-    "pycraft/algorithm/steps.py",
-    "pycraft/robots.py",
+    "pycraft/operators/operator_set.py",
+    "pycraft/accuracy/certificates/certify.py",
+    "pycraft/accuracy/tables/table.py",
+    "pycraft/accuracy/hard_cases/shared_bounds.py",
+    "pycraft/recursions/steps.py",
+    "pycraft/models/robots/__init__.py",
 ]
-LEFT_OUT = {"pycraft/interop/peers.py", "pycraft/interop/pinocchio.py", "pycraft/interop/drake.py"}  # tested by `make test-peers`
+LEFT_OUT = {"pycraft/peers/peers.py", "pycraft/interop/pinocchio.py", "pycraft/interop/drake.py"}  # tested by `make test-peers`
 OTHER = {
     ast.Add: ("+", "-"),
     ast.Sub: ("-", "+"),

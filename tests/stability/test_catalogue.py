@@ -8,11 +8,12 @@ import pytest
 from multiprecision import forward_dynamics as exact_dynamics
 from multiprecision import relative_error
 
-from pycraft.accuracy import stability
-from pycraft.accuracy.bounds import UD_UNREFINED
-from pycraft.accuracy.catalogue import SIZES, DynamicsCase, MeasuredCase, Sample, catalogue, quantile
-from pycraft.accuracy.stability_markdown import markdown
-from pycraft.accuracy.stability_table import COLUMNS, Stability
+from pycraft.accuracy.hard_cases import stability
+from pycraft.accuracy.hard_cases.case import DynamicsCase, MeasuredCase, Sample, quantile
+from pycraft.accuracy.hard_cases.catalogue import SIZES, catalogue
+from pycraft.accuracy.hard_cases.shared_bounds import UD_UNREFINED
+from pycraft.accuracy.hard_cases.stability_markdown import markdown
+from pycraft.accuracy.hard_cases.stability_table import COLUMNS, Stability
 
 WORDS = (
     """

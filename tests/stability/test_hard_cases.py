@@ -5,8 +5,8 @@ The full run, 200 instances and a million steps with the installed packages side
 
 import pytest
 
-from pycraft.accuracy import stability
-from pycraft.accuracy.catalogue import catalogue
+from pycraft.accuracy.hard_cases import stability
+from pycraft.accuracy.hard_cases.catalogue import catalogue
 
 SEEDS, STEPS, SIZES = 12, 20_000, (2, 8, 16, 64)
 CASES = catalogue(SIZES)

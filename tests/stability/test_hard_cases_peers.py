@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from pycraft.accuracy import stability
-from pycraft.accuracy.bounds import WITHIN_PEERS
-from pycraft.accuracy.catalogue import DynamicsCase, catalogue
+from pycraft.accuracy.hard_cases import stability
+from pycraft.accuracy.hard_cases.case import DynamicsCase
+from pycraft.accuracy.hard_cases.catalogue import catalogue
+from pycraft.accuracy.hard_cases.shared_bounds import WITHIN_PEERS
 
 pytestmark = pytest.mark.peers
 

@@ -1,0 +1,42 @@
+"""The catalogue of hard cases: every file of cases there is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from .case import Case
+
+SIZES = (2, 4, 8, 16, 32, 64, 128, 256, 512, 1024)
+
+
+def catalogue(sizes: Iterable[int] = SIZES) -> list[Case]:
+    """Every case, the chains with these numbers of links; other cases larger than the largest are left out."""
+    from . import (
+        cases_chains,
+        cases_configurations,
+        cases_elimination,
+        cases_groups,
+        cases_massless,
+        cases_motion,
+        cases_ratios,
+        cases_refinement,
+        cases_trajectories,
+        cases_units,
+    )
+
+    sizes = sorted(sizes)
+    cases: list[Case] = cases_chains.cases(sizes)
+    modules = (
+        cases_ratios,
+        cases_refinement,
+        cases_massless,
+        cases_configurations,
+        cases_units,
+        cases_elimination,
+        cases_groups,
+        cases_motion,
+        cases_trajectories,
+    )
+    for module in modules:
+        cases += [case for case in module.cases() if case.parameters.get("N", 0) <= max(sizes[-1], 10)]
+    return cases

@@ -1,0 +1,264 @@
+"""Work and precision of integration: error of the trajectory and drift of the energy against time, over integrators and tolerances."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ... import _core
+from ...dynamics.by_realization import checked_forces
+from ...dynamics.trajectory import SCIPY, integrate_by_scipy, integrator_names
+from ...tidy import TidyTable, error_text, refusal_text, seconds_text
+from ..checked_options import checked_model, checked_names, checked_positive, checked_seconds
+
+INTEGRATORS = ("dopri5", "fehlberg78", "bulirsch-stoer", "rkmk4", "scipy:RK45", "scipy:DOP853", "scipy:LSODA")
+TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
+STEPS = tuple(0.05 / 2**k for k in range(0, 10, 2))
+"""Seconds: of integrators with steps of one size."""
+ONE_SIZE = ("rk4", "rkmk4")
+SAMPLES = 8
+"""Times, evenly spaced, at which trajectories are compared."""
+
+
+class WorkPrecisionTable(TidyTable):
+    """Rows of `work_precision`: one integrator at one tolerance each.
+
+    Each row is a dictionary: "integrator", "tolerance" (rtol and atol, None of steps of one size), "step" (s, None of controlled ones),
+    "error" (of the configuration, on the group: the root mean square over coordinates, rad and m, the largest over the sampled times),
+    "drift" (of the energy, the largest over the sampled times relative to the largest kinetic energy of the reference; None where energy
+    is not conserved or not given), "seconds" (of the whole run), "evaluations" (of the accelerations), "resolved" (whether the error
+    stands above the reference's own), "refused" (the reason, where there is one).
+
+    `reference` is what errors are measured against, in words; `reference_error` its own error, measured as theirs.
+    """
+
+    columns = ("integrator", "tolerance", "step", "error", "drift", "seconds", "evaluations", "resolved", "refused")
+    shown = {
+        "integrator": "integrator", "tolerance": "tolerance or step", "error": "error (rad, m)", "drift": "energy drift", "seconds": "time",
+        "evaluations": "evaluations", "refused": "",
+    }  # fmt: skip
+    short: ClassVar[dict[str, str]] = {"tolerance": "tol., step"}
+
+    @property
+    def reference(self) -> str:
+        return self.about["reference"]
+
+    @property
+    def reference_error(self) -> float:
+        return self.about["reference_error"]
+
+    def fastest(self, error: float) -> dict[str, Any]:
+        """The cheapest row whose error is at most `error`. Raises ValueError where none is."""
+        answers = [row for row in self.rows if not row["refused"] and row["error"] <= error]
+        if not answers:
+            best = min((row for row in self.rows if not row["refused"]), key=lambda row: row["error"], default=None)
+            found = "every one is refused" if best is None else f"the best is {self.label(best)}, {best['error']:.1e}"
+            raise ValueError(f"no row of {self.title!r} has an error of at most {error:g}: {found}")
+        return min(answers, key=lambda row: row["seconds"])
+
+    def plot(self, axes: Any = None) -> Any:
+        """Two panels, error and energy drift against the time of a run, logarithmic; returns the axes."""
+        from .plotting import work_precision_plot
+
+        return work_precision_plot(self, axes)
+
+    def cell(self, key: str, row: dict[str, Any]) -> str:
+        if key == "tolerance":
+            return f"{row['tolerance']:.0e}" if row["step"] is None else f"{row['step']:.2g} s"
+        if key in ("error", "drift"):
+            below = "< " if key == "error" and row["resolved"] is False else ""
+            value = max(row[key], self.reference_error) if below else row[key]
+            return below + error_text(value)
+        if key == "seconds":
+            return seconds_text(row["seconds"])
+        if key == "refused":
+            return refusal_text(row["refused"])
+        return super().cell(key, row)
+
+    def style(self, row: dict[str, Any]) -> str:
+        return "dim" if row["refused"] else ""
+
+    def label(self, row: dict[str, Any]) -> str:
+        return f"{row['integrator']} at {self.cell('tolerance', row)}"
+
+
+def work_precision(
+    model: Any,
+    q: Any,
+    v: Any = None,
+    tau: Any = None,
+    *,
+    duration: float = 1.0,
+    integrators: str | Sequence[str] = INTEGRATORS,
+    tolerances: float | Sequence[float] = TOLERANCES,
+    steps: float | Sequence[float] = STEPS,
+    right_hand_side: Callable[[float, np.ndarray, np.ndarray], np.ndarray] | None = None,
+    energy: Callable[[np.ndarray, np.ndarray], float] | None = None,
+    form: str = "fast",
+    refine: int | str = 0,
+    seconds: float = 0.05,
+    progress: Callable[[str], None] | None = None,
+) -> WorkPrecisionTable:
+    """Integrate one motion by several integrators at several tolerances, and measure what each costs and how far off it is.
+
+    Parameters
+    ----------
+    model : Multibody
+    q, v, tau : (nq,) or a State, (nv,), (nv,)
+        The initial state and constant generalized forces, zero where left out.
+    duration : s
+    integrators : names that `integrate_ode` takes
+        Boost.Odeint's run in C++; SciPy's ("scipy:...") call from Python, and their time is mostly that of Python.
+    tolerances : rtol and atol of integrators with controlled steps
+    steps : s, of those with steps of one size ("rk4", "rkmk4")
+    right_hand_side : callable (t, q, v) -> v̇ (nv,)
+        Any other motion of the same coordinates: with contact, control, damping. It takes the place of forward dynamics under `tau`, for
+        SciPy's integrators alone, and is tried once at the initial state before anything is measured. This is where a scene passes its own.
+    energy : callable (q, v) -> J
+        What the motion conserves; kinetic and potential energy of the model where neither tau nor right_hand_side is given. A row where it
+        is no finite number is refused.
+    form, refine : of forward dynamics, as it takes them
+    seconds : a run is repeated until this is spent, once at least; the least time counts
+    progress : called with "reference", then with each row's name before it is run
+
+    A name or number stands for a list of one. The reference comes first and is two runs: of long or fast motions it may take longer than
+    every row, and an interrupt ends it.
+
+    The reference is fehlberg78 in extended precision at a tolerance of 1e-16 (with a right-hand side: DOP853 at 1e-13 in double). Its own
+    error is its distance to a run at a hundred times that tolerance, which the motion's sensitivity is in; rows below it are not resolved.
+    Trajectories are compared at eight times; SciPy's integrators interpolate to them, Boost.Odeint's end a step there.
+
+    Raises
+    ------
+    TypeError
+        What is given is no model.
+    ModelError
+        A model without coordinates; states or forces of the wrong shape or not finite.
+    EvaluationError
+        An integrator, form or refinement that is not there; tolerances, steps or a duration that are not positive and finite; a
+        right_hand_side or energy whose result at the initial state is none; a reference that cannot be computed, with the time.
+
+    Examples
+    --------
+    >>> import pycraft as pc
+    >>> from pycraft.accuracy.tables.work_precision import work_precision
+    >>> arm = pc.chain(2)
+    >>> arm.gravity = (0, -9.81, 0)
+    >>> table = work_precision(arm, [0.0, 0.0], duration=0.5, integrators=["dopri5"], tolerances=[1e-4, 1e-8], seconds=0)
+    >>> [row["error"] < 1e-3 for row in table], table[1]["error"] < table[0]["error"]
+    ([True, True], True)
+    """
+    checked_model(model, "work_precision")
+    seconds, refine = checked_seconds(seconds), _core.checked_refinement(refine, "same", "double")
+    q, v, tau = _initial(model, q, v, tau)
+    if not isinstance(duration, (int, float, np.number)) or not 0 < duration < np.inf:
+        raise _core.EvaluationError(f"duration={duration!r}: a positive, finite number of seconds")
+    integrators = checked_names(integrators, "integrators", "integrator", integrator_names())
+    tolerances = checked_positive(tolerances, "tolerances", "a positive, finite tolerance")
+    steps = checked_positive(steps, "steps", "a positive, finite number of seconds")
+    checked_names([form], "form", "form", _core.forms())
+    _probe(model, q, v, right_hand_side, energy)
+    times = np.linspace(0.0, duration, SAMPLES + 1)
+    if energy is None and right_hand_side is None and (tau is None or not np.any(tau)):
+        energy = _mechanical_energy(model)
+
+    def integrate(integrator: str, precision: str = "double", **options: Any) -> tuple[np.ndarray, np.ndarray, int, float]:
+        if right_hand_side is None:
+            run = model.integrate_ode(q, v, times, tau=tau, integrator=integrator, precision=precision, form=form, refine=refine, **options)
+        elif (solver := integrator.removeprefix("scipy:")) == integrator:
+            known = ", ".join(f"'scipy:{name}'" for name in SCIPY)
+            raise _core.EvaluationError(f"integrator {integrator!r} takes no right-hand side of its own; there are {known}")
+        else:
+            run = integrate_by_scipy(right_hand_side, model.configuration_rate, q, v, times, solver, options["rtol"], options["atol"], None)
+        return run.q, run.v, run.evaluations, run.seconds
+
+    if progress is not None:
+        progress("reference")
+    name, wide, tolerance = ("fehlberg78", "extended", 1e-16) if right_hand_side is None else ("scipy:DOP853", "double", 1e-13)
+    truth = integrate(name, wide, rtol=tolerance, atol=tolerance)
+    looser = integrate(name, wide, rtol=100 * tolerance, atol=100 * tolerance)
+    own = trajectory_error(model, truth[0], looser[0])
+    scale = max((float(model.kinetic_energy(x, y)) for x, y in zip(truth[0], truth[1], strict=True)), default=0.0)
+
+    rows = []
+    for integrator in integrators:
+        fixed = integrator in ONE_SIZE
+        for amount in steps if fixed else tolerances:
+            if progress is not None:
+                progress(f"{integrator}, {amount:g}")
+            options = {"step": amount} if fixed else {"rtol": amount, "atol": amount}
+            rows.append(_row(model, integrator, options, integrate, truth[0], own, energy, scale, seconds))
+    gravity = "its own right-hand side" if right_hand_side is not None else f"gravity ({', '.join(f'{g:g}' for g in model.gravity)}) m/s²"
+    return WorkPrecisionTable(
+        f"Integration of {model.name}, {duration:g} s, {gravity}, from {'a moving state' if np.any(v) else 'rest'}",
+        rows,
+        {
+            "model": model.name, "nv": model.nv, "duration": duration, "reference": f"{name} in {wide} precision, tolerance {tolerance:g}",
+            "reference_error": own, "gravity": [float(g) for g in model.gravity], "q": q.tolist(), "v": v.tolist(),
+        },
+    )  # fmt: skip
+
+
+def _row(
+    model: Any, integrator: str, options: dict[str, float], integrate: Callable, truth: np.ndarray, own: float, energy: Any, scale: float,
+    budget: float,
+) -> dict[str, Any]:  # fmt: skip
+    row: dict[str, Any] = dict.fromkeys(WorkPrecisionTable.columns)
+    row |= {"integrator": integrator, "tolerance": options.get("rtol"), "step": options.get("step"), "refused": ""}
+    try:
+        q, v, evaluations, taken = integrate(integrator, **options)
+    except (ArithmeticError, _core.Error) as reason:
+        return row | {"refused": str(reason)}
+    if energy is not None and scale > 0:
+        values = np.array([energy(x, y) for x, y in zip(q, v, strict=True)], float)
+        if not np.isfinite(values).all():
+            return row | {"refused": f"energy(q, v) is {values[~np.isfinite(values)][0]} along the motion, no number of joules"}
+        row["drift"] = float(np.abs(values - values[0]).max() / scale)
+    error, spent = trajectory_error(model, truth, q), taken
+    while spent < budget:
+        again = integrate(integrator, **options)[3]
+        taken, spent = min(taken, again), spent + again
+    row |= {"error": error, "seconds": taken, "evaluations": int(evaluations), "resolved": error > own}
+    return row
+
+
+def trajectory_error(model: Any, truth: np.ndarray, q: np.ndarray) -> float:
+    """The largest distance of two trajectories (T, nq) over their times: the root mean square of `difference` over the coordinates."""
+    distances = [np.sqrt(np.mean(np.square(model.difference(a, b)))) for a, b in zip(truth, q, strict=True)]
+    return float(max(distances, default=0.0))
+
+
+def _initial(model: Any, q: Any, v: Any, tau: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+    """One initial state (nq,), (nv,) and forces (nv,) or None, checked."""
+    v = getattr(q, "v", None) if v is None else v
+    q, v = getattr(q, "q", q), np.zeros(model.nv) if v is None else getattr(v, "v", v)
+    model.configuration_rate(q, v)  # the core's own checks
+    q, v = np.array(q, float), np.array(v, float)
+    tau = None if tau is None else checked_forces(model, tau)
+    if max(np.ndim(x) for x in (q, v, tau)) > 1:
+        raise _core.ModelError(f"work_precision integrates from one state of {model.name!r}, not from a batch")
+    return q, v, tau
+
+
+def _probe(model: Any, q: np.ndarray, v: np.ndarray, right_hand_side: Any, energy: Any) -> None:
+    """Call what is given once, at the initial state: its errors come before minutes of measuring."""
+    for name, function in (("right_hand_side", right_hand_side), ("energy", energy)):
+        if function is not None and not callable(function):
+            raise _core.EvaluationError(f"{name}: a function is called, not {function!r}")
+    if right_hand_side is not None:
+        rate = np.asarray(right_hand_side(0.0, q.copy(), v.copy()), float)
+        if rate.shape != (model.nv,):
+            raise _core.EvaluationError(f"right_hand_side(0, q, v) has shape {rate.shape}; it gives the accelerations, ({model.nv},)")
+        if not np.isfinite(rate).all():
+            at = int(np.argmin(np.isfinite(rate)))
+            raise _core.EvaluationError(f"right_hand_side(0, q, v) is {rate[at]} at coordinate {model.coordinate_names[at]!r}")
+    if energy is not None:
+        value = np.asarray(energy(q.copy(), v.copy()), float)
+        if value.shape != () or not np.isfinite(value):
+            raise _core.EvaluationError(f"energy(q, v) is {value} at the initial state; it gives a finite number of joules")
+
+
+def _mechanical_energy(model: Any) -> Callable[[np.ndarray, np.ndarray], float]:
+    return lambda q, v: float(model.kinetic_energy(q, v) + model.potential_energy(q))

@@ -1,0 +1,100 @@
+"""How commands speak: results on stdout, everything else on stderr, every failure one line and an exit status."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable
+from typing import Any, NoReturn, TextIO
+
+import typer
+from rich.console import Console
+from typer.core import TyperGroup
+
+from .. import _core
+from ..tidy import terminal_width
+
+REFUSED, INTERRUPTED, UNEXPECTED = 2, 130, 70  # exit statuses beside 0, and 1 for a check that does not pass
+
+console = Console()
+if not console.is_terminal:
+    console = Console(width=terminal_width())  # a file or a pipe has no width of its own
+diagnostics = Console(stderr=True)
+
+
+def note(text: str) -> None:
+    """A line on stderr."""
+    diagnostics.print(text, markup=False, highlight=False, soft_wrap=True)
+
+
+def fail(text: str, status: int = REFUSED) -> NoReturn:
+    """End a command with an error's text in one line."""
+    note(f"error: {' '.join(text.split())}")
+    raise typer.Exit(status)
+
+
+class Commands(TyperGroup):
+    """Commands whose failures are lines, not tracebacks. PYCRAFT_TRACEBACK=1 in the environment shows where an unexpected one arose."""
+
+    def make_context(self, *arguments: Any, **options: Any) -> Any:
+        if sys.stdout is None:
+            fail("the output is closed")
+        return _guarded(lambda: super(Commands, self).make_context(*arguments, **options))
+
+    def invoke(self, ctx: Any) -> Any:
+        # Letters that a terminal cannot show are escaped, so that a result is never lost to them.
+        for stream in (sys.stdout, sys.stderr):
+            if hasattr(stream, "reconfigure"):
+                stream.reconfigure(errors="backslashreplace")
+        return _guarded(lambda: super(Commands, self).invoke(ctx))
+
+
+def _guarded(run: Callable[[], Any]) -> Any:
+    try:
+        result = _flushed(run)
+    except (typer.Exit, typer.Abort):
+        raise
+    except _core.Error as error:
+        fail(str(error))
+    except BrokenPipeError:  # the reader has seen enough
+        _let_go(sys.stdout)
+        raise typer.Exit(1) from None
+    except OSError as error:
+        _let_go(sys.stdout)
+        fail(f"{error.filename or 'the output'}: {error.strerror or error}")
+    except KeyboardInterrupt:
+        fail("interrupted", INTERRUPTED)
+    except Exception as error:
+        _tell_usage(error)
+        if os.environ.get("PYCRAFT_TRACEBACK") or type(error).__module__.startswith(("click", "typer")):
+            raise
+        fail(f"unexpected {type(error).__name__}: {error}; PYCRAFT_TRACEBACK=1 shows where", UNEXPECTED)
+    return result
+
+
+def _tell_usage(error: Exception) -> None:
+    """End with what typer has to say of arguments that cannot be, in one line. Not where there were none: it then shows the help."""
+    message = getattr(error, "format_message", None)
+    if message is None or type(error).__name__ == "NoArgsIsHelpError":
+        return
+    command = getattr(getattr(error, "ctx", None), "command_path", "pycraft")
+    fail(f"{message().rstrip('.')}; {command} --help says what there is")
+
+
+def _flushed(run: Callable[[], Any]) -> Any:
+    """A full disk is noticed when the result is written, at the latest here."""
+    try:
+        result = run()
+    except typer.Exit:
+        sys.stdout.flush()
+        raise
+    sys.stdout.flush()
+    return result
+
+
+def _let_go(stream: TextIO) -> None:
+    """What is left in a stream that cannot be written is dropped: the interpreter would try it again at its end."""
+    try:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+    except (OSError, ValueError):  # not a file: a test's, a notebook's
+        pass

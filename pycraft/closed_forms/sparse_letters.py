@@ -1,0 +1,464 @@
+"""Every letter of the algebra as a sparse matrix of closed forms: the formulas of `pycraft.reference`, entry by entry exact.
+
+Notation and conventions are those of `docs/notation.md`; `*` is the transpose. [Jain 2011]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import reduce
+from itertools import accumulate
+from typing import Any
+
+import sympy
+
+from .. import _core
+from ..proofs.rational import Rationals
+from .parameters import Parameters
+from .sparse import Matrix
+
+Q_SIZE = {"pin": 1, "slider": 1, "screw": 1, "ball": 4, "free": 7}
+V_SIZE = {"pin": 1, "slider": 1, "screw": 1, "ball": 3, "free": 6}
+ANGLES = ("pin", "screw")
+
+Pose = tuple[Matrix, Matrix]  # rotation (3, 3) and position (3, 1)
+
+
+class Letters:
+    """The letters of a tree of rigid bodies at symbols q and v. Each is computed when first asked for.
+
+    Parameters
+    ----------
+    parameters : of the model
+    q, v : symbols of the coordinates and velocities
+    unit : quaternions taken as of unit length; otherwise as q/|q|
+    """
+
+    def __init__(self, parameters: Parameters, q: Sequence[sympy.Symbol], v: Sequence[sympy.Symbol], unit: bool):
+        self.parameters, self.q, self.v, self.unit = parameters, list(q), list(v), unit
+        self.parents = [b["parent"] for b in parameters.bodies]
+        ends = list(accumulate(sum(V_SIZE[s["kind"]] for s in b["subhinges"]) for b in parameters.bodies))
+        self.coordinates = [slice(i, j) for i, j in zip([0, *ends], ends, strict=False)]
+        self.states = [slice(6 * k, 6 * k + 6) for k in range(len(self.parents))]
+        self.field = Rationals([*self._atoms(), *self.v, *parameters.expressions()], self._quaternions() if unit else ())
+        self._made: dict[Any, Matrix] = {}
+        self._hinges = self._kinematics()
+
+    # ------------------------------------------------------------------ coordinates
+    def _subhinges(self) -> list[tuple[dict[str, Any], list[sympy.Symbol]]]:
+        """Every subhinge with its coordinates."""
+        at, found = 0, []
+        for body in self.parameters.bodies:
+            for s in body["subhinges"]:
+                found.append((s, self.q[at : at + Q_SIZE[s["kind"]]]))
+                at += Q_SIZE[s["kind"]]
+        return found
+
+    def _quaternions(self) -> list[list[sympy.Symbol]]:
+        return [q[:4] for s, q in self._subhinges() if s["kind"] in ("ball", "free")]
+
+    def _atoms(self) -> list[sympy.Expr]:
+        """What entries are rational in: sines and cosines of angles, the other coordinates."""
+        atoms: list[sympy.Expr] = []
+        for s, q in self._subhinges():
+            if s["kind"] in ANGLES:
+                atoms += [sympy.sin(q[0]), sympy.cos(q[0])]
+            if s["kind"] != "pin":
+                atoms += q
+        return atoms
+
+    def rates(self) -> Matrix:
+        """Γ, (nq, nv): q̇ = Γ(q)θ̇. Ball: ½ q⊗(0, ω); free: that, and R(q) on the linear velocity."""
+        blocks = []
+        half = sympy.Rational(1, 2)
+        for s, q in self._subhinges():
+            if s["kind"] in ("ball", "free"):
+                w, x, y, z = (half * e for e in q[:4])
+                turn = self._matrix([[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]])
+                blocks.append(turn)
+                if s["kind"] == "free":
+                    blocks.append(self._rotation(q[:4]))
+            else:
+                blocks.append(self._matrix([[1]]))
+        return Matrix.diagonal(self.field, blocks)
+
+    # ------------------------------------------------------------------ spatial algebra
+    def _matrix(self, entries: Sequence[Sequence[Any]], columns: int | None = None) -> Matrix:
+        return Matrix.of(self.field, entries, columns)
+
+    def _skew(self, u: Matrix) -> Matrix:
+        x, y, z = (row.get(0, u.field.zero) for row in u.rows)
+        rows = [{1: -z, 2: y}, {0: z, 2: -x}, {0: -y, 1: x}]
+        return Matrix(u.field, [{j: e for j, e in row.items() if e} for row in rows], 3)
+
+    def _blocks(self, a: Matrix | None, b: Matrix | None, c: Matrix | None, d: Matrix | None) -> Matrix:
+        """[[a, b], [c, d]] of (3, 3) blocks, zero where None."""
+        made = Matrix.zeros(next(x.field for x in (a, b, c, d) if x is not None), 6, 6)
+        for i, j, block in ((0, 0, a), (0, 3, b), (3, 0, c), (3, 3, d)):
+            if block is not None:
+                made.place(slice(i, i + 3), slice(j, j + 3), block)
+        return made
+
+    def _parts(self, x: Matrix) -> tuple[Matrix, Matrix]:
+        column = slice(0, 1)
+        return self._skew(x.block(slice(0, 3), column)), self._skew(x.block(slice(3, 6), column))
+
+    def _crm(self, x: Matrix) -> Matrix:
+        """Ṽ: [[ω̃, 0], [ṽ, ω̃]]."""
+        w, v = self._parts(x)
+        return self._blocks(w, None, v, w)
+
+    def _crf(self, x: Matrix) -> Matrix:
+        """V̄: [[ω̃, ṽ], [0, ω̃]] = −Ṽ*."""
+        w, v = self._parts(x)
+        return self._blocks(w, v, None, w)
+
+    def _phi(self, pose: Pose) -> Matrix:
+        """φ(p,k): [[R, l̃R], [0, R]]."""
+        R, l = pose
+        return self._blocks(R, self._skew(l) @ R, None, R)
+
+    def _compose(self, a: Pose, b: Pose) -> Pose:
+        return a[0] @ b[0], a[1] + a[0] @ b[1]
+
+    def _still(self) -> Pose:
+        return Matrix.identity(self.field, 3), Matrix.zeros(self.field, 3, 1)
+
+    def _rotation(self, q: Sequence[sympy.Expr]) -> Matrix:
+        """R(q): (w² − u·u)I + 2uu* + 2wũ of the quaternion, over |q|² unless it is taken as 1."""
+        w, x, y, z = q
+        rows = [
+            [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z],
+        ]
+        length = 1 if self.unit else w * w + x * x + y * y + z * z
+        return self._matrix([[e / length for e in row] for row in rows])
+
+    # ------------------------------------------------------------------ hinges
+    def _axis_and_point(self, s: dict[str, Any]) -> tuple[Matrix, Matrix]:
+        return self._matrix([[x] for x in s["axis"]], 1), self._matrix([[x] for x in s["point"]], 1)
+
+    def _step(self, s: dict[str, Any], q: Sequence[sympy.Symbol]) -> Pose:
+        """Pose of the frame after a subhinge in the frame before it. A rotation about a: cos q I + sin q ã + (1 − cos q) aa*."""
+        kind, one = s["kind"], Matrix.identity(self.field, 3)
+        a, c = self._axis_and_point(s)
+        if kind == "slider":
+            return one, a.scaled(self.field.element(q[0]))
+        if kind == "free":
+            return self._rotation(q[:4]), self._matrix([[x] for x in q[4:]], 1)
+        if kind == "ball":
+            R = self._rotation(q)
+            return R, c - R @ c
+        sine, cosine = self.field.element(sympy.sin(q[0])), self.field.element(sympy.cos(q[0]))
+        R = one.scaled(cosine) + self._skew(a).scaled(sine) + (a @ a.T).scaled(self.field.one - cosine)
+        travel = self.field.element(s["pitch"] * q[0]) if kind == "screw" else self.field.zero
+        return R, c - R @ c + a.scaled(travel)
+
+    def _rows(self, s: dict[str, Any]) -> Matrix:
+        """Rows of H of one subhinge, in the frame after it: pin (a; c×a), slider (0; a), screw (a; c×a + pitch a), ball (e_i; c×e_i)."""
+        a, c = self._axis_and_point(s)
+        if s["kind"] == "free":
+            return Matrix.identity(self.field, 6)
+        axes = Matrix.identity(self.field, 3) if s["kind"] == "ball" else a
+        turning = Matrix.zeros(self.field, 3, axes.columns) if s["kind"] == "slider" else axes
+        moving = a if s["kind"] == "slider" else self._skew(c) @ axes
+        if s["kind"] == "screw":
+            moving = moving + a.scaled(self.field.element(s["pitch"]))
+        made = Matrix.zeros(self.field, 6, axes.columns)
+        made.place(slice(0, 3), slice(0, axes.columns), turning)
+        made.place(slice(3, 6), slice(0, axes.columns), moving)
+        return made.T
+
+    def _kinematics(self) -> list[tuple[Pose, list[Matrix]]]:
+        """Of each body: its pose in its parent, and the rows of H of each subhinge, carried to the body's frame."""
+        at, made = 0, []
+        self._steps: list[list[Pose]] = []
+        for body in self.parameters.bodies:
+            steps, rows = [], []
+            for s in body["subhinges"]:
+                steps.append(self._step(s, self.q[at : at + Q_SIZE[s["kind"]]]))
+                at += Q_SIZE[s["kind"]]
+            placement = self._matrix(body["rotation"]), self._matrix([[x] for x in body["position"]], 1)
+            for j, s in enumerate(body["subhinges"]):
+                later = reduce(self._compose, steps[j + 1 :], self._still())
+                rows.append(self._rows(s) @ self._phi(later))
+            made.append((reduce(self._compose, steps, placement), rows))
+            self._steps.append(steps)
+        return made
+
+    # ------------------------------------------------------------------ letters
+    def __call__(self, name: str, argument: Any = None) -> Matrix:
+        """A letter by its ASCII name; node names or a coordinate as argument."""
+        key = (name, tuple(argument) if isinstance(argument, list) else argument)
+        if key not in self._made:
+            if name not in LETTERS:
+                raise _core.EvaluationError(f"the letter {name!r} has no closed form here")
+            made = LETTERS[name](self) if argument is None else LETTERS[name](self, argument)  # type: ignore[call-arg]  # as the letter takes
+            self._made[key] = made
+        return self._made[key]
+
+    def _zeros(self, rows: str, columns: str) -> Matrix:
+        size = {"t": self.coordinates[-1].stop if self.coordinates else 0, "s": 6 * len(self.parents)}
+        return Matrix.zeros(self.field, size[rows], size[columns])
+
+    def _diagonal(self, blocks: Sequence[Matrix]) -> Matrix:
+        return Matrix.diagonal(self.field, list(blocks))
+
+    def _each(self, make: Callable[[Matrix], Matrix], x: Matrix) -> Matrix:
+        """Block diagonal of make(x(k))."""
+        return Matrix.diagonal(x.field, [make(x.block(s, slice(0, 1))) for s in self.states])
+
+    def _identity(self) -> Matrix:
+        return Matrix.identity(self.field, 6 * len(self.parents))
+
+    def _E(self) -> Matrix:
+        made = self._zeros("s", "s")
+        for k, p in enumerate(self.parents):
+            if p >= 0:
+                made.place(self.states[p], self.states[k], self._phi(self._hinges[k][0]))
+        return made
+
+    def _resolvent(self, name: str) -> Matrix:
+        """(I − E)⁻¹, block by block along the paths to the base: column k is e_k + E's column k in the parent's column."""
+        E, made = self(name), self._identity()
+        for k, p in enumerate(self.parents):
+            if p >= 0:
+                inboard = slice(0, self.states[p].stop)
+                made.place(inboard, self.states[k], made.block(inboard, self.states[p]) @ E.block(self.states[p], self.states[k]))
+        return made
+
+    def _stacked(self, k: int) -> Matrix:
+        """H(k)."""
+        rows = [row for part in self._hinges[k][1] for row in part.rows]
+        return Matrix(self.field, rows, 6)
+
+    def _inertia(self, k: int) -> Matrix:
+        """M(k): [[𝓘 − m c̃c̃, m c̃], [−m c̃, m I]]."""
+        body = self.parameters.bodies[k]
+        c, m = self._skew(self._matrix([[x] for x in body["com"]], 1)), self.field.element(body["mass"])
+        first = c.scaled(m)
+        return self._blocks(self._matrix(body["inertia"]) - first @ c, first, -first, Matrix.identity(self.field, 3).scaled(m))
+
+    def _J(self) -> Matrix:
+        rotors = [r for b in self.parameters.bodies for r in b["rotor_inertia"]]
+        return self._diagonal([self._matrix([[r]]) for r in rotors])
+
+    def _carried(self, E: Matrix, inertias: Matrix, k: int) -> Matrix:
+        """Σ over the children c of body k: E(k,c) X(c) E*(k,c)."""
+        total = Matrix.zeros(self.field, 6, 6)
+        for c, p in enumerate(self.parents):
+            if p == k:
+                block = E.block(self.states[k], self.states[c])
+                total = total + block @ inertias.block(self.states[c], self.states[c]) @ block.T
+        return total
+
+    def _R(self) -> Matrix:
+        """R(k) = M(k) + Σ E_φ(k,c)R(c)E_φ*(k,c), tip to base."""
+        M, E, made = self("M"), self("E"), self._zeros("s", "s")
+        for k in reversed(range(len(self.parents))):
+            s = self.states[k]
+            made.place(s, s, M.block(s, s) + self._carried(E, made, k))
+        return made
+
+    def _articulated(self, name: str) -> Matrix:
+        """P(k) = M(k) + Σ E_φP⁺E_φ*, D = HPH* + J, G = PH*D⁻¹, P⁺ = τ̄P, tip to base: all four at once."""
+        M, E, H, J = self("M"), self("E"), self("H"), self("J")
+        P, P_plus, D, G = (self._zeros(*sizes) for sizes in ("ss", "ss", "tt", "st"))
+        inverse = self._zeros("t", "t")
+        for k in reversed(range(len(self.parents))):
+            s, t = self.states[k], self.coordinates[k]
+            inertia = M.block(s, s) + self._carried(E, P_plus, k)
+            h = H.block(t, s)
+            force = inertia @ h.T
+            d = h @ force + J.block(t, t)
+            try:
+                inverted = d.inverse()
+            except _core.SingularOperatorError:
+                body = self.parameters.bodies[k]
+                raise _core.SingularHingeError(
+                    f"D is singular at hinge '{body['hinge']}' of body '{body['name']}': some motion of it meets no inertia, at any state"
+                ) from None
+            gain = force @ inverted
+            for made, row, column, block in (
+                (P, s, s, inertia), (D, t, t, d), (inverse, t, t, inverted), (G, s, t, gain), (P_plus, s, s, inertia - gain @ force.T),
+            ):  # fmt: skip
+                made.place(row, column, block)
+        self._made |= {(n, None): x for n, x in zip(("P", "P_plus", "D", "D_inverse", "G"), (P, P_plus, D, inverse, G), strict=True)}
+        return self._made[name, None]
+
+    def _Upsilon(self) -> Matrix:
+        """Υ(k) = H*(k)D⁻¹(k)H(k) + E_ψ*(p,k)Υ(p)E_ψ(p,k), base to tip."""
+        H, E, made = self("H"), self("E_psi"), self._zeros("s", "s")
+        own = H.T @ self("D_inverse") @ H
+        for k, p in enumerate(self.parents):
+            s = self.states[k]
+            block = own.block(s, s)
+            if p >= 0:
+                up = E.block(self.states[p], s)
+                block = block + up.T @ made.block(self.states[p], self.states[p]) @ up
+            made.place(s, s, block)
+        return made
+
+    # ------------------------------------------------------------------ nodes, coordinates, velocities
+    def _node(self, name: str) -> tuple[int, Pose]:
+        for k, body in enumerate(self.parameters.bodies):
+            if body["name"] == name:
+                return k, self._still()
+        for node in self.parameters.nodes:
+            if node["name"] == name:
+                return node["body"], (self._matrix(node["rotation"]), self._matrix([[x] for x in node["position"]], 1))
+        raise _core.ModelError(f"no node or body is called {name!r}")
+
+    def _B(self, names: Sequence[str]) -> Matrix:
+        made = Matrix.zeros(self.field, 6 * len(self.parents), 6 * len(names))
+        for j, name in enumerate(names):
+            k, pose = self._node(name)
+            if k >= 0:
+                made.place(self.states[k], slice(6 * j, 6 * j + 6), self._phi(pose))
+        return made
+
+    def _Lambda(self, names: Sequence[str]) -> Matrix:
+        B = self("B", names)
+        return (B.T @ self("Omega") @ B).inverse()
+
+    def _twist(self, direction: int | Sequence[int]) -> Matrix:
+        """h, stacked: the twist of a coordinate, or (k, p, c): component c in the axes before subhinge p of body k; in the body's axes."""
+        if isinstance(direction, int):
+            return self("H").T.block(slice(0, 6 * len(self.parents)), slice(direction, direction + 1))
+        k, position, component = direction
+        made = Matrix.zeros(self.field, 6 * len(self.parents), 1)
+        unit = Matrix.identity(self.field, 6).block(slice(0, 6), slice(component, component + 1))
+        made.place(self.states[k], slice(0, 1), self._phi(reduce(self._compose, self._steps[k][position:], self._still())).T @ unit)
+        return made
+
+    def _Delta(self, direction: int | Sequence[int]) -> Matrix:
+        return self._each(self._crf, self("h", direction))
+
+    def _Pi(self, which: int | Sequence[int]) -> Matrix:
+        """Π: ones at one coordinate, or at those of subhinges first to last of hinge k (-1: of all), (k, first, last)."""
+        chosen = [which]
+        if not isinstance(which, int):
+            body, first, last = which
+            chosen = []
+            for k, ((_, parts), t) in enumerate(zip(self._hinges, self.coordinates, strict=True)):
+                ends = list(accumulate((len(p.rows) for p in parts), initial=t.start))
+                if body in (-1, k):
+                    chosen += range(ends[min(first, len(parts))], ends[min(last, len(parts))])
+        rows = [{i: self.field.one} if i in chosen else {} for i in range(len(self.v))]
+        return Matrix(self.field, rows, len(self.v))
+
+    def _dM(self, arguments: Sequence[int]) -> Matrix:
+        """∂M by mass, centre of mass (3) and inertia (xx xy xz yy yz zz) of one body, one after the other: (k, parameter, ...)."""
+        k, *parameters = arguments
+        m, *c = sympy.symbols("m c:3", cls=sympy.Dummy)
+        inertia = sympy.symbols("i:6", cls=sympy.Dummy)
+        xx, xy, xz, yy, yz, zz = inertia
+        skew = sympy.Matrix([[0, -c[2], c[1]], [c[2], 0, -c[0]], [-c[1], c[0], 0]])
+        body = self.parameters.bodies[k]
+        block = sympy.Matrix([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) - m * skew * skew
+        full = sympy.Matrix(sympy.BlockMatrix([[block, m * skew], [-m * skew, m * sympy.eye(3)]]))
+        for p in parameters:
+            full = full.diff([m, *c, *inertia][p])
+        of = body["inertia"]
+        values = [body["mass"], *body["com"], of[0][0], of[0][1], of[0][2], of[1][1], of[1][2], of[2][2]]
+        full = full.subs(dict(zip([m, *c, *inertia], values, strict=True)))
+        made = self._zeros("s", "s")
+        made.place(self.states[k], self.states[k], self._matrix(full.tolist()))
+        return made
+
+    def function(self, name: str, x: Matrix) -> Matrix:
+        """crm, crf or mcross of every body's part of a stacked vector."""
+        makers = {"crm": self._crm, "crf": self._crf, "mcross": self._momentum}
+        if name not in makers:
+            raise _core.EvaluationError(f"the function {name!r} has no closed form here")
+        return self._each(makers[name], x)
+
+    def _theta_dot(self) -> Matrix:
+        return self._matrix([[x] for x in self.v], 1)
+
+    def _momentum(self, p: Matrix) -> Matrix:
+        n, f = self._parts(p)
+        return -self._blocks(n, f, f, None)
+
+    def _H_dot(self) -> Matrix:
+        """Row j of Ḣ(k) is row j of H(k) times crf of the velocity of the subhinges after j."""
+        blocks, speeds = [], self("theta_dot")
+        for (_, parts), t in zip(self._hinges, self.coordinates, strict=True):
+            rows: list[dict[int, Any]] = []
+            at = t.start
+            for part in parts:
+                at += len(part.rows)
+                later = slice(at, t.stop)
+                after = self._stacked_after(parts, part)
+                rows += (part @ self._crf(after.T @ speeds.block(later, slice(0, 1)))).rows
+            blocks.append(Matrix(self.field, rows, 6))
+        return self._diagonal(blocks)
+
+    def _stacked_after(self, parts: Sequence[Matrix], part: Matrix) -> Matrix:
+        index = next(i for i, p in enumerate(parts) if p is part)
+        return Matrix(self.field, [row for p in parts[index + 1 :] for row in p.rows], 6)
+
+    def _world(self, k: int) -> Pose:
+        own = self._hinges[k][0]
+        return own if self.parents[k] < 0 else self._compose(self._world(self.parents[k]), own)
+
+    def _field_of_gravity(self, roots_only: bool) -> Matrix:
+        """φ*(0,k)(0; g) at every body; at the roots alone and negative, the base's acceleration."""
+        g = self._matrix([[0], [0], [0], *[[x] for x in self.parameters.gravity]], 1)
+        rows: list[dict[int, Any]] = []
+        for k, p in enumerate(self.parents):
+            if roots_only:
+                rows += (-self._phi(self._world(k)).T @ g).rows if p < 0 else [{} for _ in range(6)]
+            else:
+                rows += (self._phi((self._world(k)[0], self._still()[1])).T @ g).rows
+        return Matrix(self.field, rows, 1)
+
+
+LETTERS: dict[str, Callable[..., Matrix]] = {
+    "E": Letters._E,
+    "phi": lambda o: o._resolvent("E"),
+    "phi_tilde": lambda o: o("phi") - o._identity(),
+    "H": lambda o: o._diagonal([o._stacked(k) for k in range(len(o.parents))]),
+    "M": lambda o: o._diagonal([o._inertia(k) for k in range(len(o.parents))]),
+    "J": Letters._J,
+    "R": Letters._R,
+    "P": lambda o: o._articulated("P"),
+    "P_plus": lambda o: o._articulated("P_plus"),
+    "D": lambda o: o._articulated("D"),
+    "D_inverse": lambda o: o._articulated("D_inverse"),
+    "G": lambda o: o._articulated("G"),
+    "K": lambda o: o("E") @ o("G"),
+    "tau": lambda o: o("G") @ o("H"),
+    "tau_bar": lambda o: o._identity() - o("tau"),
+    "E_psi": lambda o: o("E") @ o("tau_bar"),
+    "psi": lambda o: o._resolvent("E_psi"),
+    "psi_tilde": lambda o: o("psi") - o._identity(),
+    "Upsilon": Letters._Upsilon,
+    "Omega": lambda o: o("psi").T @ o("H").T @ o("D_inverse") @ o("H") @ o("psi"),
+    "B": Letters._B,
+    "Jacobian": lambda o, names: o("B", names).T @ o("phi").T @ o("H").T,
+    "Lambda": Letters._Lambda,
+    "Delta": Letters._Delta,
+    "h": Letters._twist,  # this and the next two come up in derivatives
+    "Pi": Letters._Pi,
+    "dM": Letters._dM,
+    "theta_dot": Letters._theta_dot,
+    "H_dot": Letters._H_dot,
+    "Delta_theta_dot": lambda o: o._each(o._crf, o("H").T @ o("theta_dot")),
+    "velocity": lambda o: o("phi").T @ o("H").T @ o("theta_dot"),
+    "V_tilde": lambda o: o._each(o._crm, o("velocity")),
+    "V_bar": lambda o: o._each(o._crf, o("velocity")),
+    "momentum_cross": lambda o: o._each(o._momentum, o("M") @ o("velocity")),
+    "a": lambda o: o("V_tilde") @ o("H").T @ o("theta_dot") + o("H_dot").T @ o("theta_dot"),
+    "b": lambda o: o("V_bar") @ o("M") @ o("velocity"),
+    "X_world": lambda o: o._diagonal([o._phi(o._world(k)) for k in range(len(o.parents))]),
+    "gravity_field": lambda o: o._field_of_gravity(False),
+    "gravity_base": lambda o: o._field_of_gravity(True),
+    # What is asked for so often that it has a name: ℳ as typed, the equations of motion's mass matrix, its inverse, bias forces.
+    "MM": lambda o: o("H") @ o("phi") @ o("M") @ o("phi").T @ o("H").T,
+    "mass_matrix": lambda o: o("MM") + o("J"),
+    "innovations": lambda o: Matrix.identity(o.field, len(o.v)) - o("H") @ o("psi") @ o("K"),
+    "mass_matrix_inverse": lambda o: o("innovations").T @ o("D_inverse") @ o("innovations"),
+    "bias_forces": lambda o: o("H") @ o("phi") @ (o("M") @ o("phi").T @ (o("a") + o("gravity_base")) + o("b")),
+}

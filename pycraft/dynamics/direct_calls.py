@@ -1,0 +1,285 @@
+"""The direct calls of a model, for those who want numbers and no algebra: arrays in, arrays out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from ..arguments import text
+from ..state import at_state
+from .by_realization import by_realization, output
+from .jacobians import resolved_jacobian
+
+
+def cached(model: Any, name: str, make: Callable[[Any], Any]) -> Any:
+    """What is made of a model at the first call and kept on it."""
+    if name not in model.__dict__:
+        setattr(model, name, make(model))
+    return getattr(model, name)
+
+
+def by_method(model: Any, method: str, q, v, tau, precision: str | int, out) -> np.ndarray:
+    """Forward dynamics by another method than the articulated-body recursion."""
+    if method == "realization":
+        return by_realization(model, q, v, tau, precision, out)
+    return cached(model, "_methods", _core.Methods).forward_dynamics(method, q, v, tau, precision, out)
+
+
+class DirectCalls:
+    """Forward and inverse dynamics, mass matrix, Jacobians, energies.
+
+    Each takes one state or a leading batch axis (B, ...), an argument of one state beside a batch standing for all. q may be a State,
+    which brings its v; without q it is the model's present state, `arm.q` and `arm.v`, as for expressions; beside an array q,
+    velocities, forces and accelerations that are left out are zero. SI units and radians. Generalized velocities of ball and free
+    hinges are in the axes of the body that the hinge moves, angular first. Results are float64, in `out` (writeable, C-ordered) where
+    one is given. Everywhere a ModelError names an argument of the wrong shape or with an entry that is not finite, and EvaluationError
+    an unknown option, and a result beyond the range of its numbers; errors at a state of a batch tell which.
+    """
+
+    nv: int
+
+    def _calls(self) -> _core.Dynamics:
+        return cached(self, "_direct", _core.Dynamics)
+
+    def forward_dynamics(
+        self,
+        q=None,
+        v=None,
+        tau=None,
+        *,
+        form: str = "fast",
+        refine: int | str = 0,
+        residual: str = "same",
+        precision: str | int = "double",
+        method: str = "articulated",
+        on_singular: str = "raise",
+        out=None,
+    ) -> np.ndarray:
+        """Accelerations v̇ under generalized forces, gravity included: articulated-body algorithm, O(N).
+
+        Parameters
+        ----------
+        q, v, tau : (nq,), (nv,), (nv,), each with an optional leading batch axis
+            Coordinates (rad, m), velocities (rad/s, m/s), generalized forces (N m, N). Batches of the forms "fast" and "ud" run in packs.
+        form : {"fast", "ud", "square-root"}
+            How the articulated inertia is carried: as P, as U diag(w) U*, as L L*. The factored forms keep the digits of light bodies
+            beside heavy ones; they cost about three and four times as much.
+        refine : int or "auto"
+            Corrections by the residual of inverse dynamics, with gravity and Coriolis terms inside the sweep; "auto" takes them as long
+            as they shrink. A correction that may be no more than the rounding of its residual is left out.
+        residual : {"same", "gather", "wider"}
+            The residual of a refinement at the precision itself; with the forces gathered in the next wider one, which is where stretched
+            chains lose their digits; or all of it in the next wider one. Without refinement nothing has a residual, and this changes
+            nothing.
+        precision : {"single", "double", "extended", "quad", 50, 100}
+            The scalar of the whole computation; results are rounded to double.
+        method : {"articulated", "cholesky", "ldl", "conjugate-gradients", "inverse", "realization"}
+            "articulated" is the O(N) recursion; the others solve the equations of motion by the mass matrix (see docs/accuracy.md)
+            and take no form and no refinement.
+        on_singular : {"raise", "minimum-norm"}
+            What becomes of a hinge that feels no inertia: an error that names it, or the accelerations of least norm among those that
+            fit the forces best.
+
+        Returns
+        -------
+        (nv,) or (B, nv), rad/s² and m/s²
+
+        Raises
+        ------
+        SingularHingeError
+            D(k) is singular at the rounding bound of the form in use.
+        SingularOperatorError
+            Of the other methods: the mass matrix is not positive definite to rounding.
+        RefinementError
+            The first correction is more than 0.3 of the solution, or the corrections do not shrink.
+
+        Source: articulated-body forward dynamics by the operator factorization of the mass matrix [Jain 2011].
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> arm = pc.chain(2)
+        >>> arm.forward_dynamics([0, 0], [0, 0], [1, 0]).round(3).tolist()
+        [1.714, -4.286]
+        """
+        q, v = at_state(self, q, v)
+        tau = np.zeros(self.nv) if tau is None else tau
+        if isinstance(method, str) and method == "articulated":
+            return self._calls().forward_dynamics(q, v, tau, form, refine, residual, precision, on_singular, out)
+        if not isinstance(method, str):
+            raise _core.EvaluationError(f"method={method!r}: a name, 'articulated', 'cholesky', ...")
+        if form != "fast" or refine != 0 or residual != "same" or on_singular != "raise":
+            raise _core.EvaluationError(
+                f"method {method!r} has no form, no refinement and no other answer to singular hinges; those are the articulated method's"
+            )
+        return by_method(self, method, q, v, tau, precision, out)
+
+    def refinement(
+        self,
+        q=None,
+        v=None,
+        tau=None,
+        *,
+        form: str = "fast",
+        refine: int | str = "auto",
+        residual: str = "same",
+        precision: str | int = "double",
+    ) -> dict[str, Any]:
+        """Forward dynamics of one state with its corrections; arguments and errors as `forward_dynamics` has them.
+
+        `value` (nv,), rad/s² and m/s²; `steps`, how many corrections were solved for; `corrections`, the largest entry of each over that
+        of the solution, or over its own where that is larger, so at most 1; `error`, None without a correction: the estimate of
+        ‖value - exact‖ / ‖value‖, 2-norms. That is the last correction, applied or left out, or the floor where it is larger: the most
+        that the rounding of velocities, poses, motions and forces in the residual can make of a correction. It may be far above the true
+        error, as where the value is better than any residual in this precision could tell; where accelerations cancel to nothing it is
+        above 1. O(N) a correction. ModelError for a batch, which has as many corrections as states.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> found = pc.chain(2).refinement([0, 0], [0, 0], [1, 0], refine=1)
+        >>> found["steps"], found["corrections"][0] < 1e-14
+        (1, True)
+        """
+        q, v = at_state(self, q, v)
+        tau = np.zeros(self.nv) if tau is None else tau
+        value, corrections, error = self._calls().refinement(q, v, tau, form, refine, residual, precision)
+        return {"value": value, "steps": len(corrections), "corrections": corrections, "error": error}
+
+    def inverse_dynamics(self, q=None, v=None, vdot=None, *, precision: str | int = "double", out=None) -> np.ndarray:
+        """Generalized forces (nv,) or (B, nv), N m and N, for the accelerations vdot, gravity and rotor inertia included.
+
+        Newton-Euler, O(N) [Jain 2011, inverse dynamics]. In precision "single" to "quad".
+        """
+        q, v = at_state(self, q, v)
+        return self._calls().inverse_dynamics(q, v, vdot, precision, out)
+
+    def bias_forces(self, q=None, v=None, *, precision: str | int = "double", out=None) -> np.ndarray:
+        """Coriolis, gyroscopic and gravity forces 𝒞 (nv,) or (B, nv), N m and N: inverse dynamics at zero acceleration. O(N).
+
+        The equations of motion are ℳ(q) v̇ + 𝒞(q, v) = τ [Jain 2011]. In precision "single" to "quad".
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> arm = pc.chain(2)
+        >>> arm.bias_forces([0, 0], [1, 1]).tolist()  # no gravity, stretched: nothing
+        [0.0, 0.0]
+        """
+        q, v = at_state(self, q, v)
+        return self._calls().inverse_dynamics(q, v, None, precision, out)
+
+    def mass_matrix(self, q=None, *, precision: str | int = "double", out=None) -> np.ndarray:
+        """The mass matrix ℳ + J = HφMφ*H* + J of the equations of motion, full symmetric (nv, nv) or (B, nv, nv).
+
+        Rotor inertia J included. kg m² between angles, kg m and kg where travels take part. Composite bodies, O(N²) [Jain 2011]. In
+        precision "single" to "quad".
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> pc.chain(2).mass_matrix([0, 0]).round(4).tolist()
+        [[2.6667, 0.8333], [0.8333, 0.3333]]
+        """
+        return self._calls().mass_matrix(at_state(self, q)[0], precision, out)
+
+    def mass_matrix_inverse(
+        self,
+        q=None,
+        *,
+        form: str = "fast",
+        refine: int | str = 0,
+        residual: str = "same",
+        precision: str | int = "double",
+        on_singular: str = "raise",
+        out=None,
+    ) -> np.ndarray:
+        """The inverse of `mass_matrix`, full symmetric (nv, nv) or (B, nv, nv), by the innovations factors: O(N) a column.
+
+        (ℳ + J)⁻¹ = [I - HψK]* D⁻¹ [I - HψK] [Jain 2011]. Options and errors as in forward_dynamics; on_singular="minimum-norm" gives the
+        pseudoinverse.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> pc.chain(2).mass_matrix_inverse([0, 0]).round(3).tolist()
+        [[1.714, -4.286], [-4.286, 13.714]]
+        """
+        return self._calls().mass_matrix_inverse(at_state(self, q)[0], form, refine, residual, precision, on_singular, out)
+
+    def jacobian(
+        self, frame: str, q=None, *, axes: str = "body", relative_to: str | None = None, precision: str | int = "double", out=None
+    ) -> np.ndarray:
+        """Jacobian (6, nv) or (B, 6, nv) of the spatial velocity of a body or node, by its name: O(N).
+
+        J v is the velocity (angular rad/s, then linear m/s) of the frame against `relative_to`, a body or node by its name, the world
+        where left out. Axes and the point whose linear velocity it is:
+
+        "body"     the frame's own axes, its origin
+        "aligned"  the axes of `relative_to`, the frame's origin
+        "world"    the axes of `relative_to`, the point of the frame that is at its origin
+
+        ModelError where no body or node has the name, EvaluationError for other axes. In precision "single" to "quad".
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> arm = pc.chain(2)
+        >>> arm.jacobian("body1", [0, 0])[[2, 4]].tolist()  # the second body: turning about z, moving along y
+        [[1.0, 1.0], [1.0, 0.0]]
+        >>> arm.jacobian("body1", [0, 0], relative_to="body0")[[2, 4]].tolist()  # against the first body: turning alone
+        [[0.0, 1.0], [0.0, 0.0]]
+        """
+        frame, q = text(frame, "a frame"), at_state(self, q)[0]
+        if relative_to is None and isinstance(axes, str) and axes == "body":
+            return self._calls().jacobian(frame, q, precision, out)
+        result = resolved_jacobian(self, frame, q, axes, relative_to, precision)
+        if out is None:
+            return result
+        out = output(out, result.shape)
+        out[...] = result
+        return out
+
+    def pose(self, frame: str, q=None) -> np.ndarray:
+        """Pose (4, 4) or (B, 4, 4) of a body or node, by its name, in the world: its axes as columns, its origin in metres. O(N).
+
+        ModelError where no body or node has the name.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> pc.chain(2).pose("body1", [0, 0])[:3, 3].tolist()
+        [1.0, 0.0, 0.0]
+        """
+        return self._calls().pose(text(frame, "a frame"), at_state(self, q)[0])
+
+    def kinetic_energy(self, q=None, v=None) -> np.ndarray:
+        """½ v·(ℳ + J)v, in joules, a number or (B,). O(N).
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> round(float(pc.chain(2).kinetic_energy([0, 0], [1, 0])), 4)
+        1.3333
+        """
+        return self._calls().energy(*at_state(self, q, v), (0.0, 0.0, 0.0))[..., 0]
+
+    def potential_energy(self, q=None, *, datum=(0.0, 0.0, 0.0)) -> np.ndarray:
+        """Energy -m g·(c - datum) in the uniform gravity field, c the centre of mass. Joules, a number or (B,).
+
+        A number or (B,). Summed outboard to inboard and rounded once, so its error is that of a double of its size. Far from the datum,
+        (3,) in the world's axes, m, differences of energies are smaller than that: take a datum near the system. O(N).
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> arm = pc.chain(1)
+        >>> arm.gravity = (-9.81, 0, 0)
+        >>> round(float(arm.potential_energy([0])), 4)  # 1 kg, 0.5 m up
+        4.905
+        """
+        q = _core.real_array(at_state(self, q)[0], "q")
+        return self._calls().energy(q, np.zeros((*q.shape[:-1], self.nv)), datum)[..., 1]

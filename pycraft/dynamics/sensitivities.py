@@ -1,0 +1,193 @@
+"""Derivatives of the direct calls: arrays in, arrays out. The same quantities as expressions are `Operator.diff`.
+
+Derivatives along q are along coordinates, and on ball and free hinges along quasi-velocities (in which v is given). Third-order arrays
+have the derivative last. Every call takes one state or a leading batch axis, and a precision.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .. import _core
+from ..arguments import text
+from ..state import at_state
+from .by_realization import checked_forces
+from .direct_calls import DirectCalls, cached
+
+
+class DynamicsDerivatives(NamedTuple):
+    """Derivatives of inverse dynamics (by q, v and v̇) or of forward dynamics (by q, v and τ), each (nv, nv) or (B, nv, nv)."""
+
+    q: np.ndarray
+    v: np.ndarray
+    input: np.ndarray
+
+
+class Momentum(NamedTuple):
+    """Momentum about the world's origin in world axes: h = matrix @ v, (6,); matrix (6, nv); dq = ∂h/∂q at v, (6, nv)."""
+
+    value: np.ndarray
+    matrix: np.ndarray
+    dq: np.ndarray
+
+
+class SensitivityCalls(DirectCalls):
+    """Derivatives of inverse and forward dynamics, of the mass matrix, of energy, momentum and Jacobians; the inertial regressor."""
+
+    def _sensitivities(self) -> _core.Sensitivities:
+        return cached(self, "_derivatives", _core.Sensitivities)
+
+    def inverse_dynamics_derivatives(self, q=None, v=None, vdot=None, *, precision: str = "double") -> DynamicsDerivatives:
+        """∂T/∂q, ∂T/∂v and ∂T/∂v̇ = ℳ + J of T = inverse_dynamics(q, v, v̇), gravity included. Cost O(N · depth)."""
+        q, v = at_state(self, q, v)
+        vdot = np.zeros(self.nv) if vdot is None else vdot
+        dq, dv = self._sensitivities().inverse_dynamics(q, v, vdot, precision)
+        mass = self.mass_matrix(q, precision=precision)
+        return DynamicsDerivatives(dq, dv, mass if mass.shape == dq.shape else np.broadcast_to(mass, dq.shape).copy())
+
+    def forward_dynamics_derivatives(
+        self, q=None, v=None, tau=None, *, form: str = "fast", refine: int | str = 0, residual: str = "same", precision: str = "double"
+    ) -> DynamicsDerivatives:
+        """∂v̇/∂q, ∂v̇/∂v and ∂v̇/∂τ = (ℳ + J)⁻¹ of v̇ = forward_dynamics(q, v, τ). Raises what it raises.
+
+        In the form "fast" -(ℳ + J)⁻¹ ∂T/∂q and -(ℳ + J)⁻¹ ∂T/∂v at v̇, accelerations and solutions refined as asked: O(N²). Forces of heavy
+        bodies hide a light one's there. The forms "ud" and "square-root" keep the digits that v̇ keeps: the sweep of "ud" is differentiated,
+        four directions at a time, in O(N²) as well, at about N times the cost of one; refinement acts on (ℳ + J)⁻¹ alone then. Where the
+        sweep has no derivative (P⁺ is singular at this very configuration, not beside it) the first way is taken with the form's inverse.
+
+        The free root's travel enters ∂v̇/∂v of its own linear accelerations and nothing else.
+        """
+        q, v = at_state(self, q, v)
+        tau = np.zeros(self.nv) if tau is None else tau
+        return DynamicsDerivatives(*self._sensitivities().forward_dynamics(q, v, tau, form, refine, residual, precision))
+
+    def mass_matrix_derivative(self, q=None, *, precision: str = "double", out=None) -> np.ndarray:
+        """∂ℳ/∂q, (nv, nv, nv) or (B, nv, nv, nv): entry (i, j, k) is ∂ℳ(i,j)/∂q_k. Cost O(N · depth²) beside the zeros."""
+        q, _ = at_state(self, q)
+        return self._sensitivities().third_order(False, q, precision, out)
+
+    def christoffel(self, q=None, *, precision: str = "double", out=None) -> np.ndarray:
+        """Christoffel symbols of the first kind Γ (nv, nv, nv): Σ_jk Γ(i,j,k) v_j v_k is the Coriolis force, and Σ_k Γ(i,j,k) v_k = C(i,j).
+
+        Γ(i,j,k) = ½(∂_kℳ(i,j) + ∂_jℳ(i,k) - ∂_iℳ(j,k)), and on ball and free hinges the brackets of the quasi-velocities besides (Koszul).
+        Γ(i,j,k) - Γ(i,k,j) is the bracket's: zero for coordinates. Rotor inertias are constant and add nothing.
+        """
+        q, _ = at_state(self, q)
+        return self._sensitivities().third_order(True, q, precision, out)
+
+    def coriolis_matrix(self, q=None, v=None, *, form: str = "christoffel", precision: str = "double") -> np.ndarray:
+        """C (nv, nv) with C v the Coriolis and gyroscopic forces (gravity apart) and ℳ̇ - 2C skew.
+
+        form="christoffel": C = Γ v, the one for which also ∂(Cv)/∂v = 2C on hinges of one coordinate each; "skew": the operators'
+        C = Hφ(M𝒥̇ + 𝓑𝒥), 𝒥 = φ*H*, which is skew-consistent too and not Christoffel's. Cost O(N · depth²), O(N²).
+        """
+        q, v = at_state(self, q, v)
+        if form == "christoffel":
+            symbols = self.christoffel(q, precision=precision)
+            return np.einsum("...ijk,...k->...ij", symbols, checked_forces(self, v, "v"))
+        if form == "skew":
+            H, phi, M, turning, H_dot, cross = self.soa("H phi M Delta_theta_dot H_dot momentum_cross")  # type: ignore[attr-defined]  # the model's
+            J = phi.T @ H.T
+            J_dot = phi.T @ (turning.T @ self.soa.phi_tilde.T @ H.T + H_dot.T)  # type: ignore[attr-defined]  # the model's
+            C = H @ phi @ (M @ J_dot + cross @ J)
+            many = np.broadcast_shapes(np.shape(q)[:-1], np.shape(v)[:-1])  # one of them may be shared by the batch
+            states = np.broadcast_to(q, (*many, np.shape(q)[-1])), np.broadcast_to(v, (*many, self.nv))
+            return C.at(*states, precision=precision).dense()
+        raise _core.EvaluationError(f"form {form!r} of the Coriolis matrix is not there; there are 'christoffel' and 'skew'")
+
+    def kinetic_energy_derivatives(self, q=None, v=None, *, precision: str = "double") -> tuple[np.ndarray, np.ndarray]:
+        """∂KE/∂q and ∂KE/∂v = (ℳ + J) v, each (nv,) or (B, nv). Cost O(N)."""
+        q, v = at_state(self, q, v)
+        return self._sensitivities().kinetic_energy(q, v, precision)
+
+    def hamiltonian_dynamics(self, q=None, p=None, tau=None, *, precision: str = "double") -> tuple[np.ndarray, np.ndarray]:
+        """The Hamiltonian form in O(N): v and ṗ of the generalized momenta p = (ℳ + J) v under the forces tau, gravity included.
+
+        Without p those of the state's v.
+
+        ṗ = T + Ḣp - HV̄p of the bodies' momenta p = φMV, so that no derivative of ℳ is formed. Each (nv,) or (B, nv). SingularHingeError
+        as in forward dynamics.
+        """
+        q, v = at_state(self, q)
+        if p is None:
+            MM, J = self.soa("MM J")  # type: ignore[attr-defined]  # the model's
+            p = (MM + J).at(q, precision=precision) @ np.asarray(v, float)
+        tau = np.zeros(self.nv) if tau is None else tau
+        return self._sensitivities().hamiltonian(q, p, tau, precision)
+
+    def innovations(self, q=None, v=None, tau=None, *, precision: str = "double") -> tuple[np.ndarray, np.ndarray]:
+        """Innovations velocity ξ = [I+HφK]*v and innovations ε = [I-HψK](τ - 𝒞), each (nv,) or (B, nv): decoupled coordinates.
+
+        2 KE = ξ*Dξ and 2 × the acceleration energy's like: (τ-𝒞)*(ℳ+J)⁻¹(τ-𝒞) = ε*D⁻¹ε, both sums over hinges. O(N).
+        """
+        q, v = at_state(self, q, v)
+        tau = np.zeros(self.nv) if tau is None else tau
+        H, phi, K, psi, I = self.soa("H phi K psi I")  # type: ignore[attr-defined]  # the model's
+        forces = checked_forces(self, tau) - self.bias_forces(q, v, precision=precision)
+        whole, inverse = (I + H @ phi @ K).T, I - H @ psi @ K
+        return whole.at(q, precision=precision) @ np.asarray(v, float), inverse.at(q, precision=precision) @ forces
+
+    def diagonalised_dynamics(self, q=None, v=None, tau=None, *, precision: str = "double") -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """η, S and m⁻¹τ' of η̇ + Sη = m⁻¹τ', m = [I+HφK]D^½, η = m*v, S skew, τ' = τ less gravity's forces: (nv,), (nv, nv), (nv,).
+
+        2 KE = η*η; S does no work. Cost O(N) for η and m⁻¹τ', O(N²) for S. One state.
+        """
+        q, v = at_state(self, q, v)
+        tau = np.zeros(self.nv) if tau is None else tau
+        H, phi, K, psi, M, D, I = self.soa("H phi K psi M D I")  # type: ignore[attr-defined]  # the model's
+        cross, V_bar, V_tilde = self.soa("momentum_cross V_bar V_tilde")  # type: ignore[attr-defined]  # the model's
+        root = D.sqrt()
+        m, inverse = (I + H @ phi @ K) @ root, root.inv() @ (I - H @ psi @ K)
+        J = phi.T @ H.T
+        C = H @ phi @ (M @ J.dot() + 0.5 * (cross + V_bar @ M + M @ V_tilde) @ J)
+        S = inverse @ C @ inverse.T - m.dot().T @ inverse.T
+        rest = np.zeros(self.nv)
+        forces = checked_forces(self, tau) - self.bias_forces(q, rest, precision=precision)
+        bound = {"precision": precision}
+        return m.T.at(q, v, **bound) @ np.asarray(v, float), S.at(q, v, **bound).dense(), inverse.at(q, v, **bound) @ forces
+
+    def momentum(self, q=None, v=None, *, precision: str = "double") -> Momentum:
+        """Momentum of all bodies about the world's origin, its matrix and its derivative. Cost O(N)."""
+        q, v = at_state(self, q, v)
+        matrix, dq = self._sensitivities().momentum(q, v, precision)
+        return Momentum(np.einsum("...ij,...j->...i", matrix, np.asarray(v, float)), matrix, dq)
+
+    def jacobian_dot(self, frame: str, q=None, v=None, *, precision: str = "double") -> np.ndarray:
+        """Time derivative (6, nv) or (B, 6, nv) of `jacobian(frame, q)` along v, in the same axes. Cost O(N)."""
+        q, v = at_state(self, q, v)
+        return self._sensitivities().jacobian_rate(text(frame, "a frame"), q, v, precision)
+
+    def jacobian_derivative(self, frame: str, q=None, *, precision: str = "double") -> np.ndarray:
+        """The kinematic Hessian ∂𝒥/∂q of `jacobian(frame, q)` in its own axes, (6, nv, nv) or (B, 6, nv, nv). Cost O(N + depth²)."""
+        q, _ = at_state(self, q)
+        return self._sensitivities().jacobian_derivative(text(frame, "a frame"), q, precision)
+
+    def inertial_regressor(self, q=None, v=None, vdot=None, *, precision: str = "double") -> np.ndarray:
+        """Y (nv, 10 n) or (B, nv, 10 n) with inverse_dynamics = Y π + J v̇, gravity included. Cost O(N · depth).
+
+        π holds ten numbers per body, in the bodies' order (`inertial_parameters`): mass, mass times centre of mass (3), rotational inertia
+        about the body's origin (xx, xy, xz, yy, yz, zz).
+        """
+        q, v = at_state(self, q, v)
+        vdot = np.zeros(self.nv) if vdot is None else vdot
+        return self._sensitivities().inertial_regressor(q, v, vdot, precision)
+
+    def inertial_parameters(self) -> np.ndarray:
+        """π (10 n,) of the regressor, from the bodies' present mass properties."""
+        rows = []
+        for body in self.bodies.values():  # type: ignore[attr-defined]  # the model's
+            c, mass = body.com, body.mass
+            about_origin = body.inertia + mass * (c @ c * np.eye(3) - np.outer(c, c))
+            rows.append(np.r_[mass, mass * c, about_origin[np.triu_indices(3)]])
+        return np.concatenate(rows) if rows else np.zeros(0)
+
+    def log_determinant_gradient(self, q=None, over: str = "coordinates", *, precision: str = "double") -> np.ndarray:
+        """Gradient of ln det(ℳ + J) in three sweeps, O(N), whatever it is taken over.
+
+        "coordinates" (nv,); "inertias" (n, 10), by the regressor's parameters: tr(Υ∂M); "geometry" (n, 6), by a twist at each hinge's
+        placement: 2 tr(P⁺WΔ), W = blockdiag(E*ΥE); "axes" (nv, 6), by the rows of H in the body's axes, poses held: 2(I - P⁺W)G.
+        """
+        q, _ = at_state(self, q)
+        return self._sensitivities().log_determinant(over, q, precision)

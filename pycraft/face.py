@@ -1,0 +1,59 @@
+"""What the core and the lower rooms call back for, attached here and nowhere else: none of them imports what stands above it.
+
+`_core._face` holds functions by name. What takes long to import is imported when it is called.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from . import _core
+from .models.multibody import Multibody, describe
+from .operators import operator_set
+from .operators.block_view import block_view
+
+
+def algorithm(expression: _core.Operator | _core.Scalar, language: str = "text", request: str = "apply") -> Any:
+    """`Operator.algorithm`, `Scalar.algorithm`, and the typed formulas of an operator set."""
+    from .recursions import algorithm as written
+
+    return written(expression, language, request)
+
+
+def certify_expression(*arguments: Any, **options: Any) -> Any:
+    """`Operator.certify` and `Scalar.certify`."""
+    from .accuracy.certificates.certify import certify_expression as certify
+
+    return certify(*arguments, **options)
+
+
+def certify_dynamics(*arguments: Any, **options: Any) -> Any:
+    """`Multibody.certify`."""
+    from .accuracy.certificates.certify import certify_dynamics as certify
+
+    return certify(*arguments, **options)
+
+
+def check_model(*arguments: Any, **options: Any) -> Any:
+    """`OperatorSet.check`."""
+    from .identities.checker import check_model as check
+
+    return check(*arguments, **options)
+
+
+def attach() -> None:
+    """Puts the functions where the core and the lower rooms find them."""
+    _core._face.update(
+        algorithm=algorithm,
+        block_view=block_view,
+        certify_dynamics=certify_dynamics,
+        certify_expression=certify_expression,
+        check_model=check_model,
+        describe=describe,
+        exact_numbers=operator_set.exact_numbers,
+        explain=operator_set.explain,
+        model_from_description=Multibody.from_description,
+        operator_from_nodes=operator_set.operator_from_nodes,
+        scalar_at=operator_set.scalar_at,
+        scalar_gradient=operator_set.scalar_gradient,
+    )

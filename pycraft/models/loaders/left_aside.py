@@ -1,0 +1,43 @@
+"""What a file says and a model does not have: gathered by coordinate, told once, kept as numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from ..multibody import Multibody
+
+
+def by_coordinate(model: Multibody, of_hinges: Mapping[str, Mapping[str, float]]) -> dict[str, np.ndarray]:
+    """Arrays (nv,) from numbers by quantity and hinge; NaN where the file has none of that quantity.
+
+    A hinge that the model does not have (it was welded) is passed over, and so is a quantity that is left on none.
+    """
+    if not of_hinges:
+        return {}
+    arrays, slices = {}, {name: model._slices(k)[1] for k, name in enumerate(model._names()[1])}
+    for quantity, numbers in of_hinges.items():
+        values = np.full(model.nv, np.nan)
+        for hinge, number in numbers.items():
+            if hinge in slices:
+                values[slices[hinge]] = number
+        if not np.isnan(values).all():
+            arrays[quantity] = values
+    return arrays
+
+
+def told(left: Mapping[str, np.ndarray], model: Multibody) -> str:
+    """One line about all of it, and how to get it; empty where nothing is left aside."""
+    if not left:
+        return ""
+    parts = []
+    for quantity, values in left.items():
+        if quantity == "gravity":
+            parts.append(f'gravity {tuple(values.tolist())}, which load(..., gravity="file") takes')
+            continue
+        count = int(np.count_nonzero(~np.isnan(values)))
+        parts.append(f"{quantity} of {count} coordinate{'s' if count > 1 else ''}")
+    return f"left aside: {'; '.join(parts)}; the numbers are in left_aside of the model"

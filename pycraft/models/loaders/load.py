@@ -1,0 +1,134 @@
+"""Models from files: `load` looks into the file and hands it to the reader of its format."""
+
+from __future__ import annotations
+
+import gc
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+import numpy as np
+
+from ... import _core
+from ..multibody import Multibody
+from ..warning import warn
+from . import urdf
+from .left_aside import told
+from .xml_file import XmlFile
+
+_OPTIONS = {"root": ("fixed", "free"), "mimic": ("refuse", "lock", "free"), "welds": ("lump", "keep")}
+
+
+def load(
+    path: str | os.PathLike[str],
+    root: str = "fixed",
+    mimic: str = "refuse",
+    welds: str = "lump",
+    package_dirs: Sequence[str | os.PathLike[str]] = (),
+    strict: bool = False,
+    *,
+    gravity: str | Sequence[float] | None = None,
+) -> Multibody:
+    """The model of a URDF or MJCF file (which of the two, its root element says).
+
+    Hinges carry the file's joint names, bodies its link names, the model the robot's name. Children come in the order of
+    their joint elements, depth first. Gravity is zero until it is set, also where the file gives it; damping, friction,
+    springs and bounds on efforts and velocities are effects: a warning tells which of them the file has, and
+    `Multibody.left_aside` has their numbers. Motors and contacts are not read.
+
+    Parameters
+    ----------
+    path : path of the file
+    root : {"fixed", "free"}
+        What carries the root link: the base, or a free hinge called "root" whose body has the root link's name. An MJCF
+        file says so itself; for it there is only "fixed".
+    mimic : {"refuse", "lock", "free"}
+        A joint that follows another: an error that names it; a weld where it stands when the other joint is at zero; a
+        joint that moves on its own.
+    welds : {"lump", "keep"}
+        A link on a fixed joint becomes part of the body that moves it and a node with its name (a fixed root link becomes
+        a node of the base), or stays a body with no coordinates. Both give the same mass matrix.
+    package_dirs : folders
+        Where packages of "package://" names lie. No mesh is opened to load a URDF file: see
+        `pycraft.models.loaders.urdf.resolve_package`.
+    strict : bool
+        An inertia that violates the triangle inequality is an error instead of a warning.
+    gravity : (3,) m/s², or "file"
+        The model's gravity; "file": what an MJCF file says. Zero where left out.
+
+    Warns
+    -----
+    ModelWarning
+        Once each, with file and line: inertias that violate the triangle inequality, massless bodies on hinges, limits
+        that are the wrong way round; constraints of an MJCF file that are left out. Once for a file: what is left aside.
+
+    Raises
+    ------
+    ModelError
+        Whatever the file gets wrong, with file, line, element and remedy; in an MJCF file what MuJoCo refuses.
+    MissingPackageError
+        An MJCF file without the package mujoco (extra `mjcf`).
+
+    Examples
+    --------
+    >>> import pycraft as pc
+    >>> arm = pc.load("arm.urdf")  # doctest: +SKIP
+    """
+    model, words = read(path, root=root, mimic=mimic, welds=welds, package_dirs=package_dirs, strict=strict)
+    if isinstance(gravity, str):
+        if gravity != "file":
+            raise _core.ModelError(f"gravity={gravity!r}: three numbers in m/s², or 'file'")
+        if "gravity" not in model.left_aside:
+            text = "gravity='file', and the file says none; a URDF file never does: give three numbers"
+            raise _core.ModelError(f"{os.fsdecode(path)}: {text}")
+        model.gravity = model._left_aside.pop("gravity")
+    elif gravity is not None:
+        model.gravity = gravity
+        model._left_aside.pop("gravity", None)
+    if text := told(model.left_aside, model):
+        words = [*words, f"{os.fsdecode(path)}: {text}"]
+    for text in words:
+        warn(text)
+    return model
+
+
+def read(
+    path: str | os.PathLike[str],
+    *,
+    root: str = "fixed",
+    mimic: str = "refuse",
+    welds: str = "lump",
+    package_dirs: Sequence[str | os.PathLike[str]] = (),
+    strict: bool = False,
+) -> tuple[Multibody, list[str]]:
+    """The model of a file and what `load` warns of, for callers that know the file and decide themselves what to say."""
+    for option, value in (("root", root), ("mimic", mimic), ("welds", welds)):
+        if value not in _OPTIONS[option]:
+            raise _core.ModelError(f"{option}={value!r}: there are {', '.join(map(repr, _OPTIONS[option]))}")
+    with _no_collection():
+        return _read(XmlFile(path), root, mimic, welds, strict)
+
+
+@contextmanager
+def _no_collection() -> Iterator[None]:
+    """No search for garbage meanwhile: a file of 10⁵ links makes objects by the million, all of which are in use."""
+    searched = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if searched:
+            gc.enable()
+
+
+def _read(file: XmlFile, root: str, mimic: str, welds: str, strict: bool) -> tuple[Multibody, list[str]]:
+    if file.root_name == "robot":
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite then is refused, with its line
+            return urdf.read(file, root=root, mimic=mimic, welds=welds, strict=strict)
+    if file.root_name == "mujoco":
+        from . import mjcf  # its package is an extra
+
+        with np.errstate(over="ignore", invalid="ignore"):
+            return mjcf.read(file, root=root, welds=welds, strict=strict)
+    text = f"<{file.root_name}> is the root element of no format that is read; there are <robot> (URDF) and <mujoco> (MJCF)"
+    raise file.error(file.root, text)

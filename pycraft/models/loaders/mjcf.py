@@ -1,0 +1,230 @@
+"""MJCF files read into a `Multibody` through the mujoco package (extra `mjcf`), whose compiler settles frames and inertias.
+
+joint type        hinge     coordinates
+hinge             pin       angle about the axis through the joint's pos
+slide             slider    travel along the axis
+ball              ball      quaternion (w, x, y, z)
+free              free      quaternion, position of the body in the world, which is MuJoCo's qpos in another order
+several           custom    those of its joints, in their order
+none              weld      none
+
+Names. Bodies have the file's names ("body3", by MuJoCo's number, without one). A hinge has its joint's name, or its body's
+name where the joint has none or there are several (the first joint's where some joint is called like the body). A site with
+a name is a node, with "_site" added where a body has its name already.
+
+Coordinates are MuJoCo's numbers: a joint's `ref` goes into the placement of its hinge, and the model's state is MuJoCo's qpos0.
+`pycraft.interop.mujoco` has the order and the velocities of free hinges. `armature` is the rotor inertia.
+
+Not in the model, as they are effects: gravity (zero until it is set), springs, damping and friction of joints, which
+are in `Multibody.left_aside`; actuators, contacts and fluid forces, which are not read. Equality constraints, tendons
+and flexes are left out with a warning that names them.
+"""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ... import _core
+from ...interop import mujoco as conventions
+from ..multibody import Multibody
+from .rotations import rotation_about, rotation_from_quaternion, turned_inertia
+from .xml_file import XmlFile
+
+log = logging.getLogger(__name__)
+
+_FREE, _BALL, _SLIDE, _HINGE = range(4)  # mjtJoint
+_KINDS = {_FREE: "free", _BALL: "ball", _SLIDE: "slider", _HINGE: "pin"}
+_V_SIZE = {_FREE: 6, _BALL: 3, _SLIDE: 1, _HINGE: 1}
+_EQUALITIES = ("connect", "weld", "joint", "tendon", "flex", "flexvert", "flexstrain", "distance")  # mjtEq
+
+
+def read(file: XmlFile, *, root: str, welds: str, strict: bool) -> tuple[Multibody, list[str]]:
+    """The model of an MJCF file, and what is worth a warning about it. Parameters are those of `pycraft.load`.
+
+    Raises
+    ------
+    MissingPackageError
+        The mujoco package is not installed: names the extra.
+    ModelError
+        What MuJoCo refuses, in its words; root="free", which an MJCF file says itself by a freejoint.
+    """
+    if root == "free":
+        raise file.error(file.root, 'root="free" is for URDF files; in an MJCF file give the body a <freejoint name="root"/>')
+    try:
+        return _Reader(conventions.compiled(file.path), file).model(welds, strict)
+    except UnicodeDecodeError as error:  # MuJoCo hands names on as bytes
+        text = f"a name is not in UTF-8 ({error.reason}), which is how MuJoCo reads files whatever they declare; convert the file"
+        raise file.error(file.root, text) from None
+
+
+class _Reader:
+    """One compiled model on its way to a `Multibody`."""
+
+    def __init__(self, compiled: Any, file: XmlFile):
+        self.m, self.path = compiled, file.path
+        self.name = file.root.get("model") or Path(file.path).stem
+        self.joint_names = {name for j in range(compiled.njnt) if (name := compiled.joint(j).name)}
+        self.bodies = self._body_names()
+        self.warnings: list[str] = []
+
+    def _body_names(self) -> list[str]:
+        named = {self.m.body(b).name for b in range(self.m.nbody)}
+        return [self.m.body(b).name or _unused(f"body{b}", named) for b in range(self.m.nbody)]
+
+    def model(self, welds: str, strict: bool) -> tuple[Multibody, list[str]]:
+        m, model = self.m, Multibody(self.name, welds=welds, strict=strict)
+        hinges = set(self.joint_names)
+        try:
+            for b in range(1, m.nbody):
+                options = self._hinge(b)
+                name = self._hinge_name(b, hinges)
+                hinges.add(name)
+                parent = int(m.body_parentid[b])
+                model.add_body(
+                    self.bodies[b],
+                    self.bodies[parent] if parent else None,
+                    hinge_name=name,
+                    mass=m.body_mass[b],
+                    com=m.body_ipos[b],
+                    inertia=turned_inertia(rotation_from_quaternion(m.body_iquat[b]), np.diag(m.body_inertia[b])),
+                    **options,
+                )
+            self._add_sites(model)
+        except _core.ModelError as error:
+            raise _core.ModelError(f"{self.path}: {error}") from None
+        model.q = conventions.from_mujoco(model, m.qpos0, np.zeros(m.nv))[0]
+        self._left_out()
+        model._left_aside = self._left_aside(model)
+        return model, self.warnings + [f"{self.path}: {text}" for _, text in model.take_warnings()]
+
+    def _add_sites(self, model: Multibody) -> None:
+        m, frames = self.m, set(self.bodies)
+        for s in range(m.nsite):
+            if not (name := m.site(s).name):
+                continue  # nothing could refer to it
+            name = _unused(name, frames, "_site")
+            frames.add(name)
+            on, rotation = int(m.site_bodyid[s]), rotation_from_quaternion(m.site_quat[s])
+            model.add_node(name, self.bodies[on] if on else None, position=m.site_pos[s], rotation=rotation)
+
+    # ------------------------------------------------------------------ hinges
+    def _joints(self, b: int) -> range:
+        first = int(self.m.body_jntadr[b])
+        return range(first, first + int(self.m.body_jntnum[b]))
+
+    def _hinge_name(self, b: int, taken: set[str]) -> str:
+        joints = self._joints(b)
+        if len(joints) == 1 and self.m.joint(joints[0]).name:
+            return self.m.joint(joints[0]).name
+        body, first = self.bodies[b], self.m.joint(joints[0]).name if joints else ""
+        return body if body not in taken else first or _unused(f"{body}_joint", taken)
+
+    def _hinge(self, b: int) -> dict[str, Any]:
+        """How the body moves, as `Multibody.add_body` takes it."""
+        m, joints = self.m, self._joints(b)
+        placement = np.eye(4)
+        placement[:3, :3], placement[:3, 3] = rotation_from_quaternion(m.body_quat[b]), m.body_pos[b]
+        if not joints:
+            return dict(hinge="weld", placement=placement)
+        kinds = [int(m.jnt_type[j]) for j in joints]
+        dofs = range(int(m.jnt_dofadr[joints[0]]), int(m.jnt_dofadr[joints[0]]) + sum(_V_SIZE[kind] for kind in kinds))
+        options: dict[str, Any] = dict(hinge=_KINDS[kinds[0]] if len(kinds) == 1 else "custom")
+        options["rotor_inertia"] = m.dof_armature[dofs]
+        if kinds == [_FREE]:  # its coordinates are the body's pose in the world: the body's pos and quat are in qpos0 only
+            if np.any(m.dof_armature[dofs]):
+                self.warnings.append(
+                    f"{self.path}: the free joint of body {self.bodies[b]!r} has armature; here it acts along the body's axes, "
+                    "in MuJoCo along the world's, so that bias forces differ by armature times ω × v"
+                )
+            return options
+        placement, subhinges = self._absorb_references(placement, joints)
+        options["placement"] = placement
+        if len(kinds) == 1:
+            options["point"] = subhinges[0]["point"]
+            if kinds[0] != _BALL:
+                options["axis"] = subhinges[0]["axis"]
+        else:
+            options["subhinges"] = subhinges
+        limited = [bool(m.jnt_limited[j]) and kind != _BALL for j, kind in zip(joints, kinds, strict=True)]
+        if any(limited):
+            pairs = [m.jnt_range[j] if has else (-np.inf, np.inf) for j, has in zip(joints, limited, strict=True)]
+            options["limits"] = tuple(np.array(pairs).T)
+        return options
+
+    def _absorb_references(self, placement: np.ndarray, joints: range) -> tuple[np.ndarray, list[dict[str, Any]]]:
+        """Subhinges that are at MuJoCo's joint angles, and the placement with what their `ref` leaves.
+
+        A joint's step is s(q − ref) = s(−ref) s(q). The constant steps are handed to the left, s(q) C = C (C⁻¹ s(q) C), into the
+        placement: a step that is passed gets its axis and point from C⁻¹. A ball joint keeps its quaternion: MuJoCo allows no
+        rotation after it, so that C is a translation there.
+        """
+        C = np.eye(4)
+        subhinges: list[dict[str, Any]] = []
+        for j in reversed(joints):
+            kind, axis, point = int(self.m.jnt_type[j]), np.array(self.m.jnt_axis[j]), np.array(self.m.jnt_pos[j])
+            moved = not np.array_equal(C, np.eye(4))
+            inverse = _pose(C[:3, :3].T, -C[:3, :3].T @ C[:3, 3])
+            passed = dict(axis=inverse[:3, :3] @ axis, point=inverse[:3, :3] @ point + inverse[:3, 3])
+            subhinges.insert(0, dict(kind=_KINDS[kind]) | (passed if moved else dict(axis=axis, point=point)))
+            reference = 0.0 if kind == _BALL else float(self.m.qpos0[self.m.jnt_qposadr[j]])
+            if reference and kind == _HINGE:
+                R = rotation_about(axis, -reference)
+                C = _pose(R, point - R @ point) @ C
+            elif reference:
+                C = _pose(np.eye(3), -reference * axis) @ C
+        return placement @ C if not np.array_equal(C, np.eye(4)) else placement, subhinges
+
+    # ------------------------------------------------------------------ what a model does not have
+    def _left_aside(self, model: Multibody) -> dict[str, np.ndarray]:
+        """Gravity, and per coordinate damping, friction and stiffness, where the file has any: see `Multibody.left_aside`."""
+        m, left = self.m, {}
+        if np.any(m.opt.gravity):
+            left["gravity"] = np.array(m.opt.gravity)
+        order = conventions.permutation(model)[1]
+        stiffness = m.jnt_stiffness[m.dof_jntid]
+        for quantity, numbers in (("damping", m.dof_damping), ("friction", m.dof_frictionloss), ("stiffness", stiffness)):
+            if np.any(numbers):
+                values = np.full(m.nv, np.nan)
+                values[order] = np.where(np.asarray(numbers) != 0, numbers, np.nan)
+                left[quantity] = values
+        return left
+
+    def _left_out(self) -> None:
+        m = self.m
+        constraints = [self._equality(e) for e in range(m.neq)]
+        constraints += [f"tendon {m.tendon(t).name or t!r}" for t in range(m.ntendon)]
+        constraints += [f"flex {f}" for f in range(m.nflex)]
+        if constraints:
+            self.warnings.append(f"{self.path}: left out, as a model is a tree of rigid bodies: {', '.join(constraints)}")
+        if m.npair or np.any((m.geom_contype != 0) | (m.geom_conaffinity != 0)):
+            log.info("%s: contacts between its %d geoms are not read; they are effects", self.path, m.ngeom)
+
+    def _equality(self, e: int) -> str:
+        m = self.m
+        kind = _EQUALITIES[int(m.eq_type[e])]
+        ids = [int(i) for i in (m.eq_obj1id[e], m.eq_obj2id[e]) if i >= 0]
+        if kind in ("joint", "tendon"):
+            objects = [(m.joint(i) if kind == "joint" else m.tendon(i)).name or str(i) for i in ids]
+        elif kind in ("connect", "weld"):
+            sites = int(m.eq_objtype[e]) == 6  # mjOBJ_SITE
+            objects = [(m.site(i).name or str(i)) if sites else self.bodies[i] for i in ids]
+        else:
+            objects = []
+        name = m.equality(e).name
+        return f"equality {kind}{f' {name!r}' if name else ''}{' of ' + ' and '.join(map(repr, objects)) if objects else ''}"
+
+
+def _pose(rotation: np.ndarray, position: np.ndarray) -> np.ndarray:
+    X = np.eye(4)
+    X[:3, :3], X[:3, 3] = rotation, position
+    return X
+
+
+def _unused(name: str, taken: set[str], suffix: str = "_") -> str:
+    while name in taken:
+        name += suffix
+    return name

@@ -1,0 +1,237 @@
+"""An XML file being read: its root element, numbers from attributes, and errors that say file, line and element."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from collections.abc import Iterable, Sequence
+from typing import TypeAlias
+
+from lxml import etree
+
+from ... import _core
+
+Element: TypeAlias = "etree._Element"
+
+
+class XmlFile:
+    """One XML file.
+
+    Parameters
+    ----------
+    path : path of the file; shown in errors as it was given
+
+    Attributes
+    ----------
+    path : str
+    root : the root element; its local name is `root_name`
+
+    Raises
+    ------
+    ModelError
+        A file that is not there or cannot be read; XML that is not well formed (with its line); entities of its own.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]):
+        try:
+            self.path = os.fsdecode(path)
+        except TypeError:
+            raise _core.ModelError(f"a model is loaded from the path of a file, not from {path!r:.80}") from None
+        if self.path.lstrip().startswith("<"):
+            begins = self.path.strip()[:40]
+            raise _core.ModelError(f"a model is loaded from the path of a file, not from its text: write {begins!r}... to a file")
+        try:
+            with open(self.path, "rb") as file:
+                data = file.read()
+        except OSError as error:
+            raise _core.ModelError(f"{self.path}: cannot be read: {error.strerror or error}") from None
+        except ValueError as error:  # a NUL in the path
+            raise _core.ModelError(f"{self.path!r}: cannot be read: {error}") from None
+        self.root, parser = self._parse(data)
+        self.root_name, self._space = local_name(self.root), _namespace(self.root)
+        # Expressions of macros may hide in any element and attribute; whether there can be any is seen from the bytes.
+        self.may_have_macros = not data.isascii() or any(mark in data for mark in (b"xacro", b"${", b"$(", b"&#", b"\x00"))
+        dtd = self.root.getroottree().docinfo.internalDTD
+        entities = [entity.name for entity in dtd.iterentities()] if dtd is not None else []
+        if entities:
+            text = f"the file declares entities ({', '.join(entities)}), which are not expanded; write their text out"
+            raise self.error(self.root, text)
+        for entry in parser.error_log:  # only a warning where a DOCTYPE speaks of declarations elsewhere; nothing is put in their place
+            if "UNDECLARED_ENTITY" in entry.type_name:
+                text = f"{entry.message}: entities are not expanded; write its text out"
+                raise _core.ModelError(f"{self.path}:{entry.line}: {text}")
+
+    def _parse(self, data: bytes) -> tuple[Element, etree.XMLParser]:
+        # Files come from anywhere: nothing is fetched, no entity is expanded, the parser's limits on depth and size stay.
+        options = dict(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
+        options |= dict(remove_comments=True, remove_pis=True)
+        parser = etree.XMLParser(**options)
+        try:
+            return etree.fromstring(data, parser), parser
+        except etree.XMLSyntaxError as error:
+            # Old files use prefixes such as <controller:gazebo_ros> without declaring them, in parts that are not read.
+            if len(parser.error_log) and all(entry.domain_name == "NAMESPACE" for entry in parser.error_log):
+                parser = etree.XMLParser(recover=True, **options)
+                return etree.fromstring(data, parser), parser
+            line = f":{error.lineno}" if error.lineno else ""
+            text = re.sub(r", line \d+, column (\d+)$", r", column \1", error.msg)
+            remedy = "; save the file in UTF-8, or declare its encoding in its first line" if "encoding" in text else ""
+            raise _core.ModelError(f"{self.path}{line}: not well-formed XML: {text}{remedy}") from None
+
+    # ------------------------------------------------------------------ errors
+    def at(self, element: Element) -> str:
+        """Where an element is: file:line."""
+        return f"{self.path}:{element.sourceline}"
+
+    def error(self, element: Element, text: str) -> Exception:
+        """A ModelError to raise: "file:line: text"."""
+        return _core.ModelError(f"{self.at(element)}: {text}")
+
+    # ------------------------------------------------------------------ elements
+    def children(self, element: Element, name: str) -> list[Element]:
+        """Children of that name, in the root's namespace (if it has one)."""
+        return element.findall(f"{{{self._space}}}{name}" if self._space else name)
+
+    def parts(self, element: Element, names: frozenset[str]) -> dict[str, Element]:
+        """The children of these names, by name; ModelError if there are several of one: which one counts is not clear."""
+        found: dict[str, Element] = {}
+        for child in element:
+            name = child.tag
+            if self._space:
+                space, _, name = name[1:].partition("}")
+                if space != self._space:
+                    continue
+            if name in names and found.setdefault(name, child) is not child:
+                count, first = len(self.children(element, name)), f"the first in line {found[name].sourceline}"
+                raise self.error(child, f"{label(element)} has {count} elements <{name}>, {first}; keep one")
+        return found
+
+    def required(self, parts: dict[str, Element], name: str, element: Element, owner: Element, remedy: str) -> Element:
+        """That one of the parts of an element; ModelError, naming the link or joint `owner`, if there is none."""
+        found = parts.get(name)
+        if found is None:
+            raise self.error(element, f"{label(owner)} has no <{name}>; {remedy}")
+        return found
+
+    # ------------------------------------------------------------------ attributes
+    def text(self, element: Element, attribute: str, owner: Element | None = None) -> str:
+        """An attribute that must be there and not empty."""
+        value = (element.get(attribute) or "").strip()
+        if not value:
+            of = f" of {label(owner)}" if owner is not None else ""
+            tag = local_name(element)
+            raise self.error(element, f'<{tag}>{of} has no {attribute}; give it one: {attribute}="..."')
+        return value
+
+    def numbers(
+        self,
+        element: Element,
+        attribute: str,
+        count: int | None,
+        owner: Element,
+        default: Sequence[float] | None = None,
+        infinite: bool = False,
+    ) -> Sequence[float]:
+        """Numbers of an attribute, separated by blanks.
+
+        Parameters
+        ----------
+        count : how many there must be; None: at least one
+        owner : the link or joint that the element belongs to, for the error
+        default : returned where the attribute is absent; with None it must be there
+        infinite : whether "inf" is a number; "nan" never is
+
+        Raises
+        ------
+        ModelError
+            A wrong count, or a word that is no finite number: says file, line, owner, element, attribute and the word.
+        """
+        value = element.get(attribute)
+        if value is None and default is not None:
+            return default
+        return self._floats(element, attribute, value, count, owner, infinite)
+
+    def number(self, element: Element, attribute: str, owner: Element, default: float | None = None, infinite: bool = False) -> float:
+        """One number of an attribute: see `numbers`."""
+        value = element.get(attribute)
+        if value is None and default is not None:
+            return default
+        try:  # most are one word, and a large file has millions
+            number = float(value)  # type: ignore[arg-type]  # None is caught
+        except (TypeError, ValueError):
+            number = math.nan
+        if math.isfinite(number) and value.isascii() and "_" not in value:  # type: ignore[union-attr]  # finite, so no None
+            return number
+        return self._floats(element, attribute, value, 1, owner, infinite)[0]
+
+    def each_number(self, element: Element, attributes: tuple[str, ...], owner: Element) -> list[float]:
+        """One number of each of these attributes, all of which must be there."""
+        values = [element.get(attribute) for attribute in attributes]
+        try:  # all at once, where nothing is wrong
+            numbers, written = list(map(float, values)), "".join(values)  # type: ignore[arg-type]  # None is caught
+        except (TypeError, ValueError):
+            return [self.number(element, attribute, owner) for attribute in attributes]
+        if written.isascii() and "_" not in written and all(map(math.isfinite, numbers)):
+            return numbers
+        return [self.number(element, attribute, owner) for attribute in attributes]
+
+    def _floats(
+        self, element: Element, attribute: str, value: str | None, count: int | None, owner: Element, infinite: bool
+    ) -> list[float]:
+        words = value.split() if value is not None else []
+        if words and count in (None, len(words)):
+            try:
+                numbers = list(map(float, words))
+            except ValueError:
+                numbers = [math.nan]
+            # Digits of other scripts and 1_000 are numbers to Python alone.
+            as_written = value is not None and value.isascii() and "_" not in value
+            if as_written and (all(map(math.isfinite, numbers)) or (infinite and not any(map(math.isnan, numbers)))):
+                return numbers
+        raise self._no_numbers(element, attribute, value, words, count, owner, infinite)
+
+    def _no_numbers(
+        self, element: Element, attribute: str, value: str | None, words: list[str], count: int | None, owner: Element, infinite: bool
+    ) -> Exception:
+        """What is wrong with an attribute that is not so many numbers."""
+        where = f"{label(owner)}: <{local_name(element)}> {attribute}"
+        if value is None:
+            return self.error(element, f"{where} is missing; write it")
+        many = "numbers separated by blanks"
+        wanted = "one number" if count == 1 else many if count is None else f"{count} {many}"
+        if not words or count not in (None, len(words)):
+            return self.error(element, f'{where}="{value}" has {len(words)} value{"s" * (len(words) != 1)}; write {wanted}')
+        word = next(word for word in words if math.isnan(_float(word)) or (math.isinf(_float(word)) and not infinite))
+        if math.isinf(_float(word)) or word.strip("+-").lower() == "nan":
+            return self.error(element, f'{where}="{value}": {word!r} is not a finite number; write {wanted}')
+        return self.error(element, f'{where}="{value}": {word!r} is not a number; write {wanted}, with a decimal point')
+
+
+def _float(word: str) -> float:
+    """The number that a word is; NaN for none."""
+    try:
+        return float(word) if word.isascii() and "_" not in word else math.nan
+    except ValueError:
+        return math.nan
+
+
+def local_name(element: Element) -> str:
+    """The tag without its namespace. (QName refuses what a prefix that was never declared leaves in a tag.)"""
+    return element.tag.rpartition("}")[2]
+
+
+def _namespace(element: Element) -> str:
+    return element.tag[1:].partition("}")[0] if element.tag.startswith("{") else ""
+
+
+def abbreviated(items: Iterable[str], between: str = ", ", most: int = 12) -> str:
+    """A list for an error: in full if it is short, else its beginning and how many there are."""
+    items = list(items)
+    return between.join(items if len(items) <= most else [*items[:most], f"... ({len(items)} in all)"])
+
+
+def label(element: Element) -> str:
+    """How errors call an element: link 'forearm', joint 'elbow', or <robot> where it has no name."""
+    name, kind = element.get("name"), local_name(element)
+    return f"{kind} {name!r}" if name else f"<{kind}>"

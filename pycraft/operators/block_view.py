@@ -1,0 +1,150 @@
+"""Operators as labelled blocks: rows and columns by body, hinge or node name, for indexing and for looking at."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from html import escape
+
+import numpy as np
+
+from .. import _core
+
+ENTRIES = 12
+"""Up to so many rows and columns every entry is shown; beyond, one number a block."""
+BLOCKS = 40
+"""Blocks a row or column of the HTML table; the text shows as many columns as fit."""
+WIDTH = 100
+LEGEND = "largest entry of each block, with its sign"
+
+
+class BlockView:
+    """A dense operator cut into labelled blocks: rows and columns by body, hinge or node name.
+
+    `view["link2", "link3"]` is the block in that row and column; `view.rows`, `view.columns` are the labels. With
+    `order="tip-to-base"` the last body comes first, so that φ is lower triangular as in the book. Up to 12 rows and columns every entry
+    is shown, lines part the blocks; beyond, each block shows its largest entry with its sign. In a notebook blue cells are positive, orange
+    ones negative, deeper where the logarithm of their size is larger.
+    """
+
+    def __init__(self, values: np.ndarray, rows: list[tuple[str, slice]], columns: list[tuple[str, slice]], title: str):
+        self.values, self.title = values, title
+        self._rows, self._columns = dict(rows), dict(columns)
+
+    @property
+    def rows(self) -> list[str]:
+        return list(self._rows)
+
+    @property
+    def columns(self) -> list[str]:
+        return list(self._columns)
+
+    def __getitem__(self, key: tuple[str, str]) -> np.ndarray:
+        row, column = key
+        for name, known in ((row, self._rows), (column, self._columns)):
+            if name not in known:
+                raise KeyError(f"no block row or column is called {name!r}; there are {', '.join(known)}")
+        return self.values[self._rows[row], self._columns[column]]
+
+    def __iter__(self) -> Iterator[tuple[str, str]]:
+        return ((r, c) for r in self._rows for c in self._columns)
+
+    def largest(self) -> np.ndarray:
+        """The entry of largest magnitude of each block, with its sign, (rows, columns); zero for blocks without entries."""
+        out = np.zeros((len(self._rows), len(self._columns)))
+        for i, r in enumerate(self._rows):
+            for j, c in enumerate(self._columns):
+                block = self[r, c].ravel()
+                out[i, j] = block[np.abs(block).argmax()] if block.size else 0.0
+        return out
+
+    def norms(self) -> np.ndarray:
+        """The magnitude of the largest entry of each block, (rows, columns)."""
+        return np.abs(self.largest())
+
+    # ------------------------------------------------------------------ what is shown
+
+    def _cells(self) -> tuple[np.ndarray, list[str], list[str], list[bool], list[bool]]:
+        """Numbers, labels of rows and columns, and where a block begins in each: entries of small operators, else one number a block."""
+        if max(self.values.shape, default=0) > ENTRIES:
+            return self.largest(), self.rows, self.columns, [False] * len(self.rows), [False] * len(self.columns)
+        (of_row, rows, top), (of_column, columns, left) = (_entries(blocks) for blocks in (self._rows, self._columns))
+        return self.values[np.ix_(of_row, of_column)], rows, columns, top, left
+
+    def __repr__(self) -> str:
+        numbers, rows, columns, *_ = self._cells()
+        texts = [["·" if x == 0 else f"{x:.3g}" for x in row] for row in numbers]
+        edge = max([len(r) for r in rows] + [0]) + 2
+        widths = [max(len(c), *(len(row[j]) for row in texts), 1) + 2 if texts else len(c) + 2 for j, c in enumerate(columns)]
+        shown = int(np.searchsorted(np.cumsum(widths), WIDTH - edge, side="right"))
+        lines = [self.title, " " * edge + "".join(f"{c:>{w}}" for c, w in zip(columns[:shown], widths, strict=False))]
+        lines += [
+            f"{r:<{edge}}" + "".join(f"{t:>{w}}" for t, w in zip(row[:shown], widths, strict=False))
+            for r, row in list(zip(rows, texts, strict=True))[:BLOCKS]
+        ]
+        counts = ((len(rows) - BLOCKS, "rows"), (len(columns) - shown, "columns"))
+        left_out = [f"{more} more {what}" for more, what in counts if more > 0]
+        if max(self.values.shape, default=0) > ENTRIES:
+            left_out.insert(0, f"{LEGEND}; · is an exact zero")
+        return "\n".join([*lines, "; ".join(left_out)] if left_out else lines)
+
+    def _repr_html_(self) -> str:
+        numbers, rows, columns, top, left = self._cells()
+        scale = np.abs(numbers).max(initial=0.0)
+        head = "".join(f"<th style='writing-mode:vertical-rl;text-align:left;padding:4px'>{escape(c)}</th>" for c in columns[:BLOCKS])
+        body = "".join(
+            f"<tr><th style='text-align:left;position:sticky;left:0;white-space:nowrap'>{escape(r)}</th>"
+            + "".join(_cell(x, scale, top[i], left[j]) for j, x in enumerate(numbers[i, :BLOCKS]))
+            + "</tr>"
+            for i, r in enumerate(rows[:BLOCKS])
+        )
+        notes = [f"{LEGEND}; blank is an exact zero"] if max(self.values.shape, default=0) > ENTRIES else []
+        if max(len(rows), len(columns)) > BLOCKS:
+            notes.append(f"the first {BLOCKS} of {len(rows)} × {len(columns)} blocks")
+        caption = f"<div style='font-size:80%'>{escape('; '.join(notes))}</div>" if notes else ""
+        table = f"<table style='border-collapse:collapse;font-size:80%;color:inherit'><tr><th></th>{head}</tr>{body}</table>"
+        return f"<p>{escape(self.title)}</p><div style='overflow-x:auto;max-width:100%'>{table}</div>{caption}"
+
+
+def _entries(blocks: dict[str, slice]) -> tuple[list[int], list[str], list[bool]]:
+    """The entries of labelled blocks in their order: number, label (with the number in its block), whether a block begins there."""
+    index: list[int] = []
+    labels: list[str] = []
+    begins: list[bool] = []
+    for name, where in blocks.items():
+        size = where.stop - where.start
+        index += range(where.start, where.stop)
+        labels += [name] if size == 1 else [f"{name}[{k}]" for k in range(size)]
+        begins += [k == 0 and bool(index[:-size]) for k in range(size)]
+    return index, labels, begins
+
+
+def _cell(x: float, scale: float, top: bool, left: bool) -> str:
+    """A cell: blue or orange over whatever lies behind, in the page's own ink, so that it reads on white and on black."""
+    lines = "".join(f"border-{side}:1px solid;" for side, there in (("top", top), ("left", left)) if there)
+    if x == 0:
+        return f"<td style='{lines}text-align:center;padding:2px 6px'></td>"
+    depth = 0.45 * min(1.0, max(0.15, 1 + np.log10(abs(x) / scale) / 8))
+    color = "60,130,220" if x > 0 else "230,120,30"
+    return f"<td style='{lines}background:rgba({color},{depth:.2f});text-align:right;padding:2px 6px;white-space:nowrap'>{x:.3g}</td>"
+
+
+def block_view(operator: _core.Operator, order: str = "base-to-tip") -> BlockView:
+    """The operator's dense form as labelled blocks.
+
+    Raises
+    ------
+    EvaluationError
+        An order that is neither "base-to-tip" nor "tip-to-base"; a batch of states is bound.
+    """
+    if order not in ("base-to-tip", "tip-to-base"):
+        raise _core.EvaluationError(f"order={order!r}: there are 'base-to-tip' and 'tip-to-base'")
+    values = operator.dense()
+    if values.ndim == 3:
+        raise _core.EvaluationError("blocks() shows one state; bind one with .at(q)")
+
+    def labels(space: _core.Space) -> list[tuple[str, slice]]:
+        blocks = [(label or str(i), where) for i, (label, where, _) in enumerate(space.blocks)]
+        return blocks if order == "base-to-tip" else blocks[::-1]
+
+    title = f"{operator.text()} : {operator.domain.name} → {operator.codomain.name}"
+    return BlockView(values, labels(operator.codomain), labels(operator.domain), title)

@@ -1,0 +1,301 @@
+"""The operator set of a model (`soa.phi`, `soa.H`, ...), and how expressions evaluate and display in Python."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from functools import reduce
+from operator import mul
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from ..arguments import clipped
+from ..closed import Closed
+
+_NAMES = {entry[0]: entry for entry in _core.symbol_table()}
+_NODE_OPERATORS = ("B", "Jacobian", "Lambda")
+_PLAIN = tuple(name for name in _NAMES if name not in (*_NODE_OPERATORS, "Delta"))
+_SPACES = ("Theta", "V", "F")
+_COMPOSED: dict[str, Callable[[Any], _core.Operator]] = {
+    "MM": lambda soa: soa.H @ soa.phi @ soa.M @ soa.phi.T @ soa.H.T,
+    "MM_inv": lambda soa: soa.MM.inv(),
+}
+
+
+class OperatorSet(Closed):
+    """The spatial operators of one model.
+
+    Attributes are the book's letters in ASCII: ``E phi phi_tilde H M J R P P_plus D G K tau tau_bar E_psi psi psi_tilde Upsilon Omega``,
+    ``I`` the identity, ``MM = H φ M φ* H*`` and its inverse ``MM_inv`` (where hinges have rotor inertias, the equations of motion have
+    ``MM + J``), the velocity-dependent ``Delta_theta_dot V_tilde V_bar momentum_cross H_dot``, the vectors ``theta_dot velocity a
+    b gravity_field gravity_base``, and ``X_world``. With arguments: ``B(names)``, ``Jacobian(names)``, ``Lambda(names)`` of nodes,
+    ``Delta(coordinate)``. Spaces: ``Theta``, ``V``, ``F``, ``NodesV(names)``, ``NodesF(names)``. Calling the set with a string of names
+    returns a tuple.
+
+    Examples
+    --------
+    >>> import pycraft as pc
+    >>> arm = pc.chain(3)
+    >>> H, phi, M = arm.soa("H phi M")
+    >>> H @ phi @ M @ phi.T @ H.T
+    <H φ M φ* H* : Θ (3) → Θ (3)>
+    """
+
+    def __init__(self, source: _core.SkoSource, model: Any = None):
+        self._source = source
+        self._model = model  # keeps the Python face alive: the core knows only its own half
+        self._made: dict[str, _core.Operator] = {}
+
+    def is_current(self) -> bool:
+        """Whether the model's structure is still the one these operators were made for."""
+        try:
+            self._source.check_current()
+        except _core.StaleOperatorError:
+            return False
+        return True
+
+    def __call__(self, names: str) -> Any:
+        operators = tuple(getattr(self, name) for name in names.split())
+        return operators[0] if len(operators) == 1 else operators
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        if name == "I":
+            return _core.identity()
+        if name in _COMPOSED:
+            if name not in self._made:
+                self._made[name] = _COMPOSED[name](self)
+            return self._made[name]
+        if name in _SPACES:
+            return getattr(self._source, name)
+        if name in _NODE_OPERATORS or name == "Delta":
+            return _WithArguments(self, name)
+        if name in _PLAIN:
+            if name not in self._made:
+                try:
+                    self._made[name] = self._source.symbol(name)
+                except _core.EvaluationError as error:
+                    raise AttributeError(str(error)) from None
+            return self._made[name]
+        raise AttributeError(
+            f"no operator is called {name!r}; there are {', '.join((*_NAMES, *_COMPOSED))}, I, and the spaces Theta, V, F, NodesV, NodesF"
+        )
+
+    def __dir__(self) -> Iterable[str]:
+        return [*super().__dir__(), *_NAMES, "I", *_COMPOSED, *_SPACES]
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return [*_NAMES, "I", *_COMPOSED]
+
+    def NodesV(self, names: str | Sequence[str]) -> _core.Space:
+        """Stacked motions of these nodes, six numbers each."""
+        return self._source.nodes_space(_listed(names), True)
+
+    def NodesF(self, names: str | Sequence[str]) -> _core.Space:
+        """Stacked forces on these nodes, six numbers each."""
+        return self._source.nodes_space(_listed(names), False)
+
+    def check(self, **options: Any):
+        """Check every theorem on this model, see `pycraft.identities.check_model`."""
+        return _core._face["check_model"](self, **options)
+
+    def theorems(self) -> list[_core.Theorem]:
+        """Every theorem as data: name, both sides as expressions, hypotheses, source."""
+        return _core.theorems(self._source)
+
+    def __repr__(self) -> str:
+        return f"<operators of {self._source.name!r}: {self._source.Theta.dimension} degrees of freedom>"
+
+    def __reduce__(self):
+        return _operators_again, (self._source, self._model)
+
+
+def _operators_again(source: _core.SkoSource, model: Any) -> OperatorSet:
+    return OperatorSet(source) if model is None else model.soa
+
+
+class _WithArguments:
+    """soa.B, soa.Jacobian, soa.Lambda, soa.Delta: operators that take node names or a coordinate."""
+
+    def __init__(self, operators: OperatorSet, name: str):
+        self._operators, self._name = operators, name
+        self.__doc__ = _NAMES[name][-1]
+
+    def __call__(self, argument: str | int | Sequence[str], directions: Any = None) -> _core.Operator:
+        """The operator of these nodes (or, of Delta, along this coordinate).
+
+        Lambda alone takes `directions`: the rows of C (k, 6 m), on the m nodes' motions stacked, angular first in each node's axes; for
+        one node also names among "rx", "ry", "rz", "x", "y", "z". Then it is (C B*ΩB C*)⁻¹: R^k → R^k, what resists motion along them
+        alone. It has a value where B*ΩB is singular, as for an arm of fewer than six hinges, if no motion along the directions is
+        impossible.
+        """
+        source = self._operators._source
+        if directions is not None:
+            if self._name != "Lambda":
+                raise _core.EvaluationError(f"{self._name} takes no directions; Lambda does")
+            return _directed_inertia(self._operators, _listed(argument), directions)  # type: ignore[arg-type]  # _listed checks
+        if self._name != "Delta":
+            return source.symbol(self._name, nodes=_listed(argument))  # type: ignore[arg-type]  # _listed checks
+        if isinstance(argument, str):
+            names = source.coordinate_names
+            if argument not in names:
+                raise _core.ModelError(f"no coordinate of {source.name!r} is called {argument!r}; there are {', '.join(names[:12])}")
+            argument = names.index(argument)
+        return source.symbol("Delta", coordinate=clipped(argument, f"a coordinate of {source.name!r}"))
+
+    def __repr__(self) -> str:
+        return f"<{self._name}: {_NAMES[self._name][-1]}>"
+
+
+_TWIST = ("rx", "ry", "rz", "x", "y", "z")
+
+
+def _directed_inertia(soa: OperatorSet, nodes: list[str], directions: Any) -> _core.Operator:
+    """(C B*ΩB C*)⁻¹ for the rows C of directions, or their names."""
+    named = [directions] if isinstance(directions, str) else directions
+    if all(isinstance(d, str) for d in named):
+        if len(nodes) != 1 or not set(named) <= set(_TWIST) or len(set(named)) < len(named):
+            text = f"of one node, different ones of {', '.join(_TWIST)}; of several, rows (k, 6 m)"
+            raise _core.EvaluationError(f"directions {named!r}: {text}")
+        rows = np.eye(6)[[_TWIST.index(d) for d in named]]
+    else:
+        rows = np.atleast_2d(_core.real_array(directions, "directions"))
+    if rows.ndim != 2 or rows.shape[1] != 6 * len(nodes) or not len(rows):
+        raise _core.EvaluationError(f"directions of {len(nodes)} nodes: rows (k, {6 * len(nodes)}), not {np.shape(directions)}")
+    if np.linalg.matrix_rank(rows) < len(rows):
+        raise _core.EvaluationError(f"directions: the {len(rows)} rows are linearly dependent; leave out what the others say")
+    B = soa.B(nodes)
+    C = _core.constant(rows, B.domain.dual, len(rows), "C")
+    return (C @ B.T @ soa.Omega @ B @ C.T).inv()
+
+
+def _listed(names: str | Sequence[str]) -> list[str]:
+    listed = [names] if isinstance(names, str) else list(names) if isinstance(names, Iterable) else [names]
+    for name in listed:
+        if not isinstance(name, str):
+            raise _core.ModelError(f"nodes are called by their names, not by {name!r}")
+    return listed
+
+
+# ---------------------------------------------------------------------- what the core asks for
+def exact_numbers(parts: list[list[float]], shape: Sequence[int]) -> np.ndarray:
+    """Exact sums of doubles as an object array of mpmath numbers."""
+    import mpmath
+
+    out = np.empty(len(parts), dtype=object)
+    with mpmath.workprec(512):  # eight doubles hold less
+        for i, terms in enumerate(parts):
+            out[i] = mpmath.fsum(terms)
+    return out.reshape(tuple(shape))
+
+
+def scalar_at(
+    scalar: _core.Scalar,
+    q=None,
+    v=None,
+    *,
+    form: str = "fast",
+    refine: int | str = 0,
+    residual: str = "same",
+    precision: str | int = "double",
+) -> _core.Scalar:
+    """The same scalar bound to a state, as Operator.at."""
+    return scalar.bound(_core._bind(scalar.operands(), q, v, form, refine, residual, precision))
+
+
+def operator_from_parts(
+    kind: int, payload: Any, children: list[_core.Operator], leaf_binding: _core.Binding | None = None
+) -> _core.Operator:
+    """An operator from what it was pickled as; `leaf_binding` of zeros, identities, constants and vectors."""
+    name = (
+        "symbol",
+        "vector",
+        "identity",
+        "zero",
+        "constant",
+        "external",
+        "sum",
+        "product",
+        "scaled",
+        "transpose",
+        "inverse",
+        "blockdiag",
+        "sqrt",
+        "function",
+    )[kind]
+    if name == "symbol":
+        source, symbol, numbers, nodes, text, binding = payload
+        made = source._symbol_again(symbol, numbers, nodes, text)
+        return made if binding is None else made._bound(binding)
+    if name == "function" and payload is not None:
+        source, function, binding = payload
+        return _core._function(source, function, binding, children[0])
+    if name in ("vector", "identity", "zero", "constant"):
+        leaf = _core._leaf_from_parts(name, payload)
+        return leaf if leaf_binding is None else leaf._bound(leaf_binding)
+    return _core._make(name, children, payload if name == "scaled" else 1.0)
+
+
+def operator_from_nodes(nodes: list[tuple[int, Any, list[int], _core.Binding | None]]) -> _core.Operator:
+    """An operator from all its nodes, parts before what they are parts of."""
+    made: list[_core.Operator] = []
+    for kind, payload, children, leaf_binding in nodes:
+        made.append(operator_from_parts(kind, payload, [made[i] for i in children], leaf_binding))
+    return made[-1]
+
+
+# ---------------------------------------------------------------------- gradients
+def scalar_gradient(scalar: _core.Scalar, over: str = "coordinates") -> np.ndarray:
+    """All derivatives of a scalar expression, see `Scalar.gradient`."""
+    kind, value, operand, terms = scalar._parts()
+    if terms:
+        parts = [scalar_gradient(t, over) for t in terms]
+        if kind in (_PRODUCT, _RECIPROCAL):
+            values = [np.asarray(t.value())[..., None] for t in terms]
+            if kind == _RECIPROCAL:
+                return np.asarray(-parts[0] / values[0] ** 2)
+            others = [reduce(mul, values[:i] + values[i + 1 :], 1.0) for i in range(len(terms))]
+            return np.asarray(sum(x * part for x, part in zip(others, parts, strict=True)))
+        return np.asarray((float(value) if kind == _SCALED else 1.0) * sum(parts))
+    if operand is None:  # a number in a sum
+        return np.zeros(())
+    models = {source.model for source in operand.sources if isinstance(source, _core.MultibodyOperators)}
+    if len(models) != 1:
+        what = "depends on two models: differentiate along one coordinate at a time" if models else "does not depend on a multibody model"
+        raise _core.EvaluationError(f"{scalar!r} has no gradient: it {what}")
+    model: Any = models.pop()
+    if kind == _LOGDET and _is_mass_matrix(operand):
+        q, _, precision = operand._state or (model.q, None, "double")
+        return _core.Sensitivities(model).log_determinant(over, q, precision)  # not the model's own: its Python face may be gone
+    if over != "coordinates":
+        raise _core.EvaluationError(f"gradient over {over!r} is there for ln det of the mass matrix and of D, not for {scalar!r}")
+    return np.stack([np.asarray(scalar.diff(i), float) for i in range(model.nv)], axis=-1) if model.nv else np.zeros(0)
+
+
+_LOGDET, _SCALED, _PRODUCT, _RECIPROCAL = 2, 5, 6, 7
+
+
+def _is_mass_matrix(operand: _core.Operator) -> bool:
+    """HφMφ*H*, with J where there is one, or D: what has the determinant of ℳ + J."""
+    source = next(s for s in operand.sources if isinstance(s, _core.MultibodyOperators))
+    letters = [source.symbol(name) for name in ("H", "phi", "M", "J", "D")]
+    if operand._state is not None:
+        binding = _core._binding(operand)
+        letters = [letter._bound(binding) for letter in letters]
+    H, phi, M, J, D = letters
+    whole = H @ phi @ M @ phi.T @ H.T + J
+    return len(operand.sources) == 1 and (operand == D or (operand.domain == H.codomain and _core.equal_by_theorems(operand, whole)))
+
+
+class Explanation(str):
+    """A plan as text: prints as a table, and shows as one at the end of a notebook cell."""
+
+    def __repr__(self) -> str:
+        return str(self)
+
+
+def explain(operator: _core.Operator, request: str = "apply") -> Explanation:
+    """The plan of an expression as a table of steps, tiers and costs; after a run, with what the run reported."""
+    return Explanation(str(operator.plan(request)))

@@ -1,0 +1,92 @@
+"""Exercises: a derivation with one line left out, and a judge of what is filled in, who accepts proofs and nothing else.
+
+An answer is accepted if it is proved equal to the line before, from the axioms and under no other hypotheses than the theorem's. Numbers
+only ever refute: they say by how much a false line is off, and that a hypothesis which would save it is not idle.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+from typing import Any
+
+from .. import _core
+from ..identities.parse import Statement, Statements
+from .grading import Exercise, Judgement
+from .proof import example
+from .prove import _operators, prove
+
+__all__ = ["Exercise", "Judgement", "exercise"]
+
+
+def exercise(theorem: Any, model: Any = None, blank: int | Sequence[int] | None = None, seed: int = 0) -> Exercise:
+    """A proof with one line left out, or several, to be filled in.
+
+    Parameters
+    ----------
+    theorem : a name of the catalogue (`soa.theorems()`), a statement as text, or a pair (lhs, rhs) of expressions
+    model : Multibody or OperatorSet on which text is read and numbers are taken; a small random tree if left out
+    blank : the number of the line to leave out, from 1, or several; without it, one is drawn
+    seed : of that draw
+
+    Returns
+    -------
+    Exercise
+        It prints the derivation with the gaps; `.answer(line)`, `.hint(level)`, `.solution()`; of several gaps `.answer({2: ..., 4: ...})`
+        judges each, and `.gap(4)` is the exercise at one of them.
+
+    Raises
+    ------
+    EvaluationError
+        There is no proof of it, no such theorem, no such line.
+    ParseError
+        Text that is no statement.
+
+    Examples
+    --------
+    >>> from pycraft.proofs import exercise
+    >>> task = exercise("HψMψ*H* == D", blank=2)
+    >>> print(task)
+    H ψ M ψ* H* = D, where J = 0
+          H ψ M ψ* H*
+       1. = H ψ P H* + H P ψ* H* − H P H*   [ψ M ψ* = ψ P + P ψ* − P]
+       2. = ?
+       3. = H ψ G D + D G* ψ* H* − D        [G D = P H*, at 2 places]
+       4. = H G D + D G* H* − D             [ψ G = G, at 2 places]
+       5. = D                               [H G = I, at 2 places]
+    >>> bool(task.answer("HψPH* + HPψ*H* - D"))
+    True
+    """
+    if isinstance(theorem, str):
+        read, name = _read_theorem(theorem, model)
+    else:
+        if not isinstance(theorem, Sequence) or len(theorem) != 2:
+            what = "a theorem's name, a statement as text or a pair (lhs, rhs)"
+            raise _core.EvaluationError(f"an exercise is made of {what}, not of {theorem!r}")
+        lhs, rhs = theorem
+        read, name = Statement(lhs, rhs, "", "expressions"), ""
+    proof = prove(read.lhs, read.rhs, model)
+    if not isinstance(read.lhs, _core.Operator):
+        raise _core.EvaluationError(f"there is no proof to leave a line out of: {name or proof.statement} is said of numbers")
+    if not proof:
+        said = f"{name}: {proof.statement}" if name else proof.statement
+        raise _core.EvaluationError(f"there is no proof to leave a line out of: {said}\n  {str(proof).partition(chr(10))[2].strip()}")
+    return Exercise(proof, model, blank, seed)
+
+
+def _read_theorem(text: str, model: Any) -> tuple[Any, str]:
+    """(the statement, its name in the catalogue)."""
+    operators = _operators(model if model is not None else example())
+    theorems = {t.name: t for t in operators.theorems()}
+    found = theorems.get(text) or next((t for t in theorems.values() if t.name.lower() == text.lower()), None)
+    if found is not None:
+        reason = "waits for what is not there yet" if found.waiting else "it is said of blocks on one path" if found.on_one_path else ""
+        reason = reason or ("it is a bound" if found.at_most else "")
+        if reason:
+            raise _core.EvaluationError(f"there is no proof of {found.name!r} to leave a line out of: {reason}")
+        return Statement(found.lhs, found.rhs, "", "expressions"), found.name
+    if "=" not in text:
+        near = difflib.get_close_matches(text, theorems, 3, 0.4)
+        hint = f"; near it: {', '.join(map(repr, near))}" if near else "; soa.theorems() lists them"
+        raise _core.EvaluationError(f"no theorem is called {text!r}, and it is no statement lhs == rhs{hint}")
+    return Statements(operators).read(text), ""

@@ -1,0 +1,317 @@
+"""Proofs as they are read: numbered steps from one side to the other, what they rest on, and numbers beside them."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from typing import Any
+
+from ..models.generators import tree
+from .derivative import Formula
+from .equations import Equation, Step, chain_holds, foundations, numbered
+from .expand import Opaque, Problem, Spelling
+from .presuppositions import nowhere
+from .shown import FullProof, aligned, escaped, lines, page
+from .values import LARGEST, NoValue, Values
+from .words import Alphabet, Polynomial, combine
+
+HYPOTHESES = ("J = 0", "serial chain", "single-DOF hinges", "constant H")
+"""Names of the hypotheses that a proof may have, as models' traits name them."""
+
+COUNTED = "the coordinates of this model"
+"""The note of an equation that says how many coordinates one model has."""
+
+
+class Proof:
+    """What `prove` found: true as a condition if there is a derivation, all of whose steps were multiplied out once more.
+
+    Attributes
+    ----------
+    statement : as text
+    steps : numbered, from the left side to the right: `.before_text()`, `.after_text()`, the same in LaTeX, `.before` and `.after` as
+        polynomials, `.reason` (the axiom or lemma), `.positions`, `.residual`
+    presupposes : inverses that the proof uses and that nothing here shows to exist; each exists on some model that meets the hypotheses
+    rests_on : every equation that it uses, with all that those use, premises first
+    unmet : hypotheses of the proof that the model at hand does not meet
+    note : why nothing was tried, if so
+
+    Examples
+    --------
+    >>> import pycraft as pc
+    >>> from pycraft.proofs import prove
+    >>> proof = prove("HψMψ*H* == D", pc.chain(3))
+    >>> bool(proof), proof.hypotheses
+    (True, ['J = 0'])
+    """
+
+    def __init__(
+        self,
+        statement: str,
+        latex: str,
+        alphabet: Alphabet,
+        steps: Sequence[Step] = (),
+        normal_forms: tuple[Polynomial, Polynomial] = ({}, {}),
+        *,
+        claim: Equation | None = None,
+        note: str = "",
+    ):
+        self.statement, self.note, self._latex = statement, note, latex
+        self.steps = numbered(list(steps))
+        self.presupposes: list[str] = []
+        self.unmet: list[str] = []
+        self._alphabet, self._forms, self._claim = alphabet, normal_forms, claim
+        self.rests_on = [e for e in foundations(p for s in self.steps for p in s.premises()) if e is not claim]
+        self._spellings: list[Spelling] = []
+        self._inverted: list[str] = []
+        self._determinants: list[str] = []
+        self._opaque: list[Opaque] = []
+        self._contexts: list[tuple[Any, Any]] = []
+        self._read: Any = None
+        self._model: Any = None
+        self._found = False
+
+    @classmethod
+    def of_statement(
+        cls, read: Any, problem: Problem, spellings: Sequence[Spelling], steps: Sequence[Step], forms: Any, note: str = ""
+    ) -> Proof:
+        """The proof of a statement that was read; none found if there are no steps."""
+        statement, latex = (f"{getattr(read.lhs, how)()} = {getattr(read.rhs, how)()}" for how in ("text", "latex"))
+        proof = cls(statement, latex, problem.alphabet, steps, forms, note=note)
+        proof._opaque, proof._determinants = list(problem.opaque), sorted(problem.determinants)
+        proof._spellings, proof._contexts, proof._read = list(spellings), list(problem.contexts), read
+        proof.rests_on = foundations([*proof.rests_on, *(e for s in spellings for e in s.premises())]) if steps else []
+        proof._found = proof.recheck()
+        return proof
+
+    @classmethod
+    def of_lemma(cls, lemma: Equation, alphabet: Alphabet) -> Proof:
+        """The proof of a lemma."""
+        steps = [copy.copy(step) for step in lemma.steps]
+        own = steps[0].alphabet if steps else alphabet
+        latex = f"{own.latex(lemma.lhs)} = {own.latex(lemma.rhs)}"
+        proof = cls(lemma.text, latex, own, steps, (lemma.lhs, lemma.rhs), claim=lemma, note=lemma.note)
+        proof.rests_on = foundations([lemma])[:-1]
+        proof._found = proof.recheck()
+        return proof
+
+    def __bool__(self) -> bool:
+        return self._found
+
+    def recheck(self) -> bool:
+        """Whether every step, and every step of every lemma, follows from the equations that it names: exact, and nothing is searched."""
+        if self._claim is not None:
+            return self._claim.holds() and all(e.holds() for e in self.rests_on)
+        if not self.steps:
+            return False
+        first, last = self.steps[0].full()[0], self.steps[-1].full()[1]
+        if self._spellings:
+            first, last = (s.before for s in self._spellings)
+        spelled = all(s.holds() for s in self._spellings)
+        return spelled and chain_holds(self.steps, first, last) and all(e.holds() for e in self.rests_on)
+
+    # ------------------------------------------------------------------ what it rests on
+    @property
+    def hypotheses(self) -> list[str]:
+        """Names of the hypotheses that steps or their lemmas use."""
+        used = dict.fromkeys(e.hypothesis for e in self.rests_on if e.kind == "hypothesis" and e.hypothesis)
+        return [*(name for name in HYPOTHESES if name in used), *(name for name in used if name not in HYPOTHESES)]
+
+    @property
+    def axioms(self) -> list[str]:
+        """Texts of the axioms that it rests on, those of its lemmas included."""
+        return list(dict.fromkeys(e.text for e in self.rests_on if e.kind == "axiom"))
+
+    @property
+    def lemmas(self) -> list[Proof]:
+        """The lemmas that the steps name, each with a proof of its own."""
+        named = dict.fromkeys(e.root for step in self.steps for e in step.premises())
+        return [Proof.of_lemma(e, self._alphabet) for e in named if e.kind in ("lemma", "structure")]
+
+    def all_lemmas(self) -> list[Proof]:
+        """Those lemmas and the lemmas of their proofs, each before what cites it."""
+        return [Proof.of_lemma(e, self._alphabet) for e in self.rests_on if e.kind in ("lemma", "structure")]
+
+    # ------------------------------------------------------------------ what it takes for granted
+    def takes_for_granted(self, letters: Sequence[str], assumed: Sequence[tuple[Equation, str]] = ()) -> None:
+        """The inverses of these letters are presuppositions; those that the user assumes to exist are hypotheses."""
+        self.presupposes = [self._inverse_text(name) for name in letters]
+        given = [(equation, name) for equation, name in assumed if name]
+        self._inverted = [*letters, *(name for _, name in given)]
+        if given and any(e.kind == "inverse" for e in self.rests_on):
+            self.rests_on += [equation for equation, _ in given if equation not in self.rests_on]
+
+    def _inverse_text(self, name: str) -> str:
+        """The inverse of a letter as it was typed."""
+        typed = next((o.expression.text() for o in self._opaque if o.name == name and o.kind == "inverse"), None)
+        return f"{self._alphabet.letter_text(name)}⁻¹" if typed is None else f"({typed})⁻¹"
+
+    def void_where(self, hypotheses: Sequence[str], operators: Any = None) -> str:
+        """Why the proof says nothing under these hypotheses: an inverse, a root or a ln|det| in it exists on no model tried. Else empty."""
+        roots = [o.name for o in self._opaque if o.kind == "sqrt"]
+        name = nowhere([*self._inverted, *self._determinants], roots, self._alphabet, hypotheses, self._contexts, operators)
+        if not name:
+            return ""
+        text = self._alphabet.letter_text(name)
+        shown = self._inverse_text(name) if name in self._inverted else f"ln|det {text}|" if name in self._determinants else text
+        where = f" where {' and '.join(hypotheses)}" if hypotheses else ""
+        return f"it takes {shown}, which exists on no model that was tried{where}"
+
+    # ------------------------------------------------------------------ where the two sides stand
+    @property
+    def normal_forms(self) -> tuple[str, str]:
+        """Both sides as far as they were brought."""
+        return self._alphabet.text(self._forms[0]), self._alphabet.text(self._forms[1])
+
+    @property
+    def difference(self) -> str:
+        """What is left between the normal forms."""
+        return self._alphabet.text(combine((1, self._forms[0]), (-1, self._forms[1])))
+
+    def search_counterexample(self, *, seed: int = 0, budget: float = 5.0) -> Any:
+        """The smallest model and state at which the statement is false, or None if none was found.
+
+        Parameters
+        ----------
+        seed : of the models and states
+        budget : CPU seconds
+
+        Returns
+        -------
+        pycraft.identities.search.Counterexample or None
+            None also for derivatives, and for constants, which belong to their own model.
+        """
+        from ..identities.search import named_vectors, smallest, statement_text
+
+        if self._read is None or any(isinstance(side, Formula) for side in (self._read.lhs, self._read.rhs)):
+            return None
+        return smallest(statement_text(self._read), seed=seed, budget=budget, vectors=named_vectors(self._read))
+
+    # ------------------------------------------------------------------ numbers
+    def verify(self, model: Any = None, seed: int = 0) -> float:
+        """Evaluate both sides of every step at a random state: a check of the proof, which decides nothing.
+
+        Parameters
+        ----------
+        model : Multibody or OperatorSet; None for the one of the statement, or a small random one that meets the hypotheses
+        seed : of the state, and of the vectors that the steps are applied to
+
+        Returns
+        -------
+        float
+            The worst residual, relative to the largest term of its step; every `step.residual` is set. Steps that use a hypothesis which
+            the model does not meet have large ones, and `unmet` names it.
+
+        Raises
+        ------
+        NoValue
+            A letter has no value on that model: a constant of another model, an inverse that does not exist.
+        """
+        operators = getattr(model if model is not None else self._model or example(self.hypotheses), "soa", None)
+        operators = operators if operators is not None else model if model is not None else self._model
+        own = bool(self._contexts) and self._contexts[0][0] is operators._source
+        state = None if operators._model is None else operators._model.random_state(seed)
+        values = Values(self._alphabet, operators, state, self._contexts if own else (), seed)
+        self.unmet = _unmet(self.hypotheses, operators)
+        residuals = [values.residual(step) for step in self.steps]
+        for step, residual in zip(self.steps, residuals, strict=True):
+            step.residual = residual
+        return max(residuals, default=0.0)
+
+    def verify_where_possible(self, operators: Any) -> None:
+        """Residuals at a random state of the model at hand; of an example where that is large, or fails a hypothesis."""
+        self._model = operators
+        unmet = [] if operators is None else _unmet(self.hypotheses, operators)
+        if unmet and any(e.note == COUNTED for e in self.rests_on):  # a number that belongs to the model at hand
+            self.unmet = unmet
+            return
+        if set(self.hypotheses) - {*HYPOTHESES}:  # no model is known that meets what was assumed
+            self.unmet = unmet
+            return
+        own = [] if operators is None or unmet or len(operators.F) > LARGEST else [operators]
+        for candidate in (*own, *examples(self.hypotheses)):
+            try:
+                self.verify(candidate)
+                break
+            except (ArithmeticError, ValueError, TypeError):
+                continue
+        self.unmet = unmet
+
+    @property
+    def worst(self) -> float | None:
+        """The worst residual of the steps that were evaluated; None if none was."""
+        return max((s.residual for s in self.steps if s.residual is not None), default=None)
+
+    # ------------------------------------------------------------------ how it is shown
+    def __str__(self) -> str:
+        if not self:
+            return f"{self.statement}\n  no proof found{self._reason()}"
+        title = f"{self.statement}\n  proved" + (f" where {' and '.join(self.hypotheses)}" if self.hypotheses else ", no hypothesis")
+        title += f"; presupposes {', '.join(self.presupposes)}" if self.presupposes else ""
+        title += f"; not met by the model at hand: {' and '.join(self.unmet)}" if self.unmet else ""
+        shown = [title, *lines(self.steps)]
+        shown += [f"  {self.note}"] if self.note else []
+        shown += [f"  rests on {'; '.join(self.axioms)}"] if self.axioms else []
+        shown += [f"  largest residual of a step at a random state: {self.worst:.1e}"] if self.worst is not None else []
+        return "\n".join(shown)
+
+    def _reason(self) -> str:
+        if self.note:
+            return f": {self.note}"
+        left, right = self.normal_forms
+        return f"\n  left side:  {left}\n  right side: {right}\n  difference: {self.difference}"
+
+    def __repr__(self) -> str:
+        return str(self)
+
+    def latex(self) -> str:
+        """The chain of steps as an aligned display, or both normal forms."""
+        if not self:
+            return " \\ne ".join(self._alphabet.latex(p) for p in self._forms) if not self.note else f"\\text{{{escaped(self.note)}}}"
+        return aligned(self.steps)
+
+    def full(self) -> FullProof:
+        """The proof with the derivations of all its lemmas, down to the axioms, numbered, each before what cites it.
+
+        It prints as text, as HTML in notebooks, and has `.latex()`.
+        """
+        return FullProof(self)
+
+    def _repr_html_(self) -> str:
+        return page(self)
+
+    def _repr_latex_(self) -> str:
+        where = f" where {' and '.join(self.hypotheses)}" if self.hypotheses else ""
+        verdict = f"proved{where}: " if self else "no proof found; normal forms of both sides: " if not self.note else "no proof found: "
+        return f"$$\\begin{{gathered}}{self._latex}\\\\ \\text{{{escaped(verdict)}}}\\\\ {self.latex()}\\end{{gathered}}$$"
+
+
+def _unmet(hypotheses: Sequence[str], operators: Any) -> list[str]:
+    return [h for h in hypotheses if not operators._source.traits.get(h, True)]
+
+
+def example(hypotheses: Sequence[str] = ()) -> Any:
+    """A small random model that meets these hypotheses, and fails the others."""
+    kinds = ["universal", "ball", "pin", "slider"]
+    if "constant H" in hypotheses:
+        kinds = ["free", "ball", "pin", "slider"]
+    if "single-DOF hinges" in hypotheses:
+        kinds = ["pin", "slider", "pin", "screw"]
+    return tree([-1, 0, 1, 2] if "serial chain" in hypotheses else [-1, 0, 0, 1], kinds, seed=3, rotor_inertia="J = 0" not in hypotheses)
+
+
+def examples(hypotheses: Sequence[str] = ()) -> list[Any]:
+    """Small random models that meet these hypotheses: `example`; a path of six bodies or more, on which powers of E_φ that vanish on
+    a short one are seen; one whose hinges are all free, where H, Υ and compliances of several nodes are regular."""
+    kinds = ["universal", "ball", "pin", "slider", "pin", "ball", "pin"]
+    if "constant H" in hypotheses:
+        kinds[0] = "free"
+    if "single-DOF hinges" in hypotheses:
+        kinds = ["pin", "slider", "pin", "screw", "pin", "slider", "pin"]
+    chain, rotors = "serial chain" in hypotheses, "J = 0" not in hypotheses
+    made = [example(hypotheses), tree([-1, 0, 1, 2, 3, 4, 5 if chain else 1], kinds, seed=5, rotor_inertia=rotors)]
+    if "single-DOF hinges" not in hypotheses:
+        made.append(tree([-1, 0, 1 if chain else 0, 2 if chain else 1], ["free"] * 4, seed=7, rotor_inertia=rotors))
+    return made
+
+
+__all__ = ["HYPOTHESES", "NoValue", "Proof", "example", "examples"]

@@ -1,0 +1,344 @@
+"""`prove`: one side of a statement derived from the other, from what the operators are defined to be.
+
+Both sides are brought to a normal form by rules that are axioms or proved from them (`axioms`), and one chain of steps leads from side to
+side: first without a hypothesis, then under those that may matter, fewest first. Every step is checked by multiplying it out
+(`equations`), whatever search found it. If the normal forms differ, no proof was found, and nothing is said about the statement.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+from .. import _core
+from ..identities.checker import with_spaces
+from ..identities.parse import Statement
+from ..identities.vocabulary import is_number
+from . import mechanics, scalars
+from .attempt import Attempt, Outcome
+from .axioms import theory
+from .cases import by_cases
+from .completion import complete
+from .derivation import DerivativeProblem
+from .derivative import TIME, derivative
+from .equations import Equation, Step, joined, numbered, opened
+from .nesting import within_reach
+from .normal_form import Setting, generous
+from .presuppositions import Void, inverses_used, presupposed
+from .proof import Proof, example, examples
+from .reading import Assumption, assumptions, reading
+from .values import Values
+from .walk import GaveUp
+from .words import ONE, Alphabet, Polynomial, Word, combine, inverted, plain, split, underived
+
+
+@within_reach("prove")
+def prove(lhs: Any, rhs: Any = None, model: Any = None, *, assume: Iterable[str] = (), define: Mapping[str, Any] | None = None) -> Proof:
+    """Derive one side of a statement from the other, from the definitions of the operators.
+
+    Parameters
+    ----------
+    lhs, rhs : expressions of one model; or a statement as text and, in the second place, its model
+    model : Multibody or OperatorSet: what text is read on, and where the steps are evaluated. Text without a model is read on a small tree.
+    assume : what is taken for granted, as text: equations of operators ("G X = 0", "C = C*"), "X > 0" (symmetric and positive definite,
+        hence with an inverse), or hypotheses by name ("J = 0", "serial chain", ...). Those that the proof uses are among its hypotheses.
+        "J > 0 or J = 0" is proved case by case.
+    define : letters of one's own for the text, by name: expressions, text that reads as one, "Θ", "V" or "F" for a vector there, "Θ → V"
+        for an operator of which nothing is known. In the text itself they stand before the statement:
+        `x ∈ Θ; C : Θ → Θ; A := I + HφK; statement`.
+
+    Returns
+    -------
+    Proof
+        True if a derivation was found: its steps, hypotheses, lemmas and residuals. Else false, with both normal forms: nothing is then
+        said about the statement; `pycraft.check` and `Proof.search_counterexample` look at it numerically.
+
+    Raises
+    ------
+    ParseError, SpaceError
+        The text does not read as a statement; the sides do not act between the same spaces.
+    EvaluationError
+        There is only one side.
+
+    Notes
+    -----
+    Cost: milliseconds to a few tenths of a second, whatever the size of the model; no number decides anything.
+
+    Examples
+    --------
+    >>> import pycraft as pc
+    >>> from pycraft.proofs import prove
+    >>> arm = pc.chain(3)
+    >>> H, phi, psi, K, M, D, I = arm.soa("H phi psi K M D I")
+    >>> MM, S = H @ phi @ M @ phi.T @ H.T, I - H @ psi @ K
+    >>> proof = prove(MM.inv(), S.T @ D.inv() @ S)
+    >>> bool(proof), proof.hypotheses
+    (True, ['J = 0'])
+    """
+    texts = isinstance(lhs, str)
+    if texts and isinstance(rhs, str):
+        lhs, rhs = f"{lhs} == {rhs}", None
+    if not texts and rhs is None:
+        raise _core.EvaluationError("a statement has two sides: prove(lhs, rhs), or prove(text, model)")
+    if texts and rhs is not None and model is None:
+        model = rhs
+    if texts:
+        read_on = reading(_operators(model if model is not None else example()), define)
+        read = read_on.statement(lhs)
+        if read.rhs is None:
+            raise _core.EvaluationError(f"{lhs!r} has one side; a statement is lhs == rhs")
+    else:
+        read = Statement(*_sides(lhs, rhs), "", "expressions")
+        read_on = reading(_operators(model) if model is not None else _letters_of(read), define)
+    return by_cases(assume, lambda case: _prove(read, model, assumptions(read_on, case), read_on.unknown))
+
+
+@within_reach("prove")
+def prove_derivative(expression: Any, rhs: Any, coordinate: int | str) -> Proof:
+    """Derive ∂(expression)/∂θ_i = rhs from the product rule and ∂E_φ = E_φΔ_i.
+
+    Parameters
+    ----------
+    expression : an operator expression
+    rhs : an expression; it may hold `derivative(X, i)` of any operator X
+    coordinate : the coordinate i, by number or name
+
+    Returns
+    -------
+    Proof
+        As from `prove`, with "constant H" and "single-DOF hinges" among its hypotheses where a step uses them.
+
+    Raises
+    ------
+    ModelError
+        There is no such coordinate.
+
+    Examples
+    --------
+    >>> import pycraft as pc
+    >>> from pycraft.proofs import prove_derivative
+    >>> soa = pc.chain(3).soa
+    >>> bool(prove_derivative(soa.phi, soa.phi_tilde @ soa.Delta(1) @ soa.phi, 1))
+    True
+    """
+    return prove(derivative(expression, coordinate), rhs)
+
+
+# ---------------------------------------------------------------------- reading
+def _operators(model: Any) -> Any:
+    return getattr(model, "soa", model)
+
+
+def _sides(lhs: Any, rhs: Any) -> tuple[Any, Any]:
+    """Both sides with the spaces of each other; a 0 takes them too. Raises SpaceError where they differ."""
+    sides = [lhs, rhs]
+    for i, other in ((0, rhs), (1, lhs)):
+        domain = getattr(other, "domain", None)
+        if domain is not None and is_number(sides[i]) and sides[i] == 0:
+            sides[i] = _core.zero(domain, other.codomain)
+        elif domain is not None and isinstance(sides[i], _core.Operator) and sides[i].domain is None:
+            sides[i] = sides[i] @ _core.identity(domain)
+    if all(isinstance(s, _core.Operator) for s in sides):
+        left, right = with_spaces(*sides)
+        left - right  # raises where the spaces differ
+        return sides[0], sides[1]
+    spaces = [(getattr(s, "domain", None), getattr(s, "codomain", None)) for s in sides]
+    if all(domain is not None for domain, _ in spaces) and spaces[0] != spaces[1]:
+        raise _core.SpaceError(f"{sides[0].text()} and {sides[1].text()} do not act between the same spaces")
+    return sides[0], sides[1]
+
+
+def _one_identity(side: Any) -> Any:
+    """I for the I I that an I becomes when it is given its space."""
+    if getattr(side, "kind", "") == "product" and all(f.kind == "identity" for f in side.children):
+        return _core.identity(side.domain)
+    return side
+
+
+# ---------------------------------------------------------------------- search
+def _prove(read: Statement, model: Any, assumed: Sequence[Assumption] = (), unknown: Iterable[str] = ()) -> Proof:
+    problem = DerivativeProblem()
+    problem.unknown = {*unknown}
+    read = Statement(_one_identity(read.lhs), _one_identity(read.rhs), read.text, read.reading)
+    sides = [_core.scalar(side) if is_number(side) else side for side in (read.lhs, read.rhs)]
+    read = Statement(sides[0], sides[1], read.text, read.reading)
+    problem.scalars = not any(hasattr(side, "kind") for side in sides)
+    problem.of_one_model = read.reading == "expressions"
+    expand = problem.expand if not problem.scalars else functools.partial(scalars.expand, problem)
+    try:
+        left, right = expand(read.lhs), expand(read.rhs)
+    except Void as zero:
+        return Proof.of_statement(read, problem, [], [], ({}, {}), str(zero))
+    except GaveUp:
+        return Proof.of_statement(read, problem, [], [], ({}, {}), "it is too large: too many words, inverses or nodes")
+    p, q = problem.sides = [left.before, right.before]
+    problem.numbers = not problem.scalars and all(
+        space is not None and space.name == "R^1" for space in (read.lhs.domain, read.lhs.codomain)
+    )
+    nearest: tuple[Polynomial, Polynomial] | None = None
+    own, void = _operators(model) if model is not None else _operators_of(problem), ""
+    problem.assumed = [_assumed(problem, a) for a in assumed if a.lhs is not None]
+    if impossible := _impossible(problem):
+        return Proof.of_statement(read, problem, [left, right], [], (p, q), impossible)
+    for attempt, outcome in _attempts(problem, p, q):
+        if attempt is None or isinstance(outcome, Void):
+            void = void or str(outcome)
+            continue
+        if not outcome.closed:
+            nearest = nearest or (outcome.lhs, outcome.rhs)
+            continue
+        steps = joined(outcome.left, outcome.right, p, q, problem.alphabet) or []
+        steps = _without_the_claim(steps, combine((1, p), (-1, q)), problem.alphabet)
+        typed = ([left] if left.says_something else []), ([right.reversed()] if right.says_something else [])
+        proof = Proof.of_statement(read, problem, [left, right], [*typed[0], *steps, *typed[1]], (outcome.lhs, outcome.rhs))
+        proof.takes_for_granted(_presupposed(attempt, proof), problem.assumed)
+        if impossible := proof.void_where(proof.hypotheses, own):
+            void = void or impossible
+            continue
+        proof.verify_where_possible(own)
+        return proof
+    return Proof.of_statement(read, problem, [left, right], [], nearest or (p, q), void)
+
+
+def _assumed(problem: DerivativeProblem, a: Assumption) -> tuple[Equation, str]:
+    """(the hypothesis, the letter that it says to be symmetric and regular, if it says that)."""
+    if not a.regular:
+        return Equation("hypothesis", a.text, problem.words(a.lhs), problem.words(a.rhs), hypothesis=a.text), ""
+    ((letter,),) = problem.words(a.lhs.inv())
+    name = split(letter)[0]
+    return Equation("hypothesis", a.text, {(problem.alphabet.star(name),): ONE}, {(name,): ONE}, hypothesis=a.text), name
+
+
+def _impossible(problem: DerivativeProblem) -> str:
+    """What is assumed of letters of the table alone, and holds on no model that was tried; empty if all may hold."""
+    table = theory().alphabet.letters
+    for equation, _ in problem.assumed:
+        words = [*equation.lhs, *equation.rhs]
+        if not all(split(x)[0] in table for word in words for x in word):
+            continue
+        step = Step(equation.lhs, equation.rhs, [], problem.alphabet)
+        models = [m for h in ([], ["J = 0"], ["serial chain", "J = 0"], ["single-DOF hinges", "constant H"]) for m in examples(h)]
+        if not any(_holds(step, problem, m) for m in models):
+            return f"{equation.text}, which is assumed, holds on no model that was tried"
+    return ""
+
+
+def _holds(step: Step, problem: DerivativeProblem, model: Any) -> bool:
+    try:
+        return Values(problem.alphabet, model.soa, model.random_state(1)).residual(step) < ASSUMED
+    except ArithmeticError:
+        return True
+
+
+ASSUMED = 1e-9
+"""How far an assumption may be off on a model, relative to its terms, and count as met there: rounding of small models."""
+
+
+def _without_the_claim(steps: list[Step], claim: Polynomial, alphabet: Alphabet) -> list[Step]:
+    """The chain with every lemma that is the claim itself opened: a proof argues for it, and does not cite it."""
+    said = [claim, alphabet.star_of(claim)]
+    said += [combine((-1, p)) for p in said]
+    made: list[Step] = []
+    for step in steps:
+        itself = next((e for e in step.equations if e.kind == "lemma" and e.difference in said), None)
+        made += [step] if itself is None else opened(step, itself)
+    return numbered(made)
+
+
+def _presupposed(attempt: Attempt, proof: Proof) -> list[str]:
+    """The letters whose inverses the statement or its proof takes for granted."""
+    stated = {split(x)[0] for p in attempt.problem.polynomials() for w in p for x in w if inverted(x)}
+    return presupposed(stated | inverses_used(proof.rests_on), attempt.regular, attempt.needs)
+
+
+GENEROUS, AGAIN = 6, 2
+"""How much larger a reduction may grow in the end, and under how many of the settings that had given up."""
+
+
+def _attempts(problem: DerivativeProblem, p: Polynomial, q: Polynomial) -> Iterator[tuple[Attempt | None, Outcome | Void]]:
+    """Attempts under more and more hypotheses; again, with completed rules; then with more room. The outcome of inverting zero is Void."""
+    made: list[Attempt] = []
+    given_up: list[tuple[Setting, list[tuple[Equation, Word]]]] = []
+    for setting, extra in _settings(problem):
+        try:
+            made.append(Attempt(problem, setting, extra))
+            outcome = made[-1].run(p, q)
+        except Void as void:
+            yield None, void
+            continue
+        except GaveUp:
+            given_up.append((setting, extra))
+            continue
+        if outcome.closed:  # fewer hypotheses may do, with more room
+            weaker = [tried for tried in given_up if tried[0].hypotheses < setting.hypotheses]
+            yield from _again(problem, weaker, p, q)
+            given_up = [tried for tried in given_up if tried not in weaker]
+        yield made[-1], outcome
+    for attempt in made:
+        try:
+            if attempt.local and complete(attempt):
+                yield attempt, attempt.run(p, q)
+        except GaveUp:
+            continue
+    yield from _again(problem, given_up, p, q)
+
+
+def _again(problem: DerivativeProblem, settings: list[Any], p: Polynomial, q: Polynomial) -> Iterator[tuple[Attempt, Outcome]]:
+    """Attempts with more room."""
+    for setting, extra in settings[:AGAIN]:
+        try:
+            with generous(GENEROUS):
+                larger = Attempt(problem, setting, extra)
+                found = larger.run(p, q)
+            yield larger, found
+        except GaveUp:
+            continue
+
+
+def _settings(problem: DerivativeProblem) -> Iterator[tuple[Setting, list[tuple[Equation, Word]]]]:
+    """Settings by the number of hypotheses, with the rules that they add."""
+    rules, constant = problem.derivative_rules()
+    letters = {x for p in problem.polynomials() for word in p for x in word}
+    names = {underived(plain(x)) for x in letters}
+    deltas = [n for n, known in problem.alphabet.letters.items() if getattr(known.expression, "name", "") in ("Delta", "Delta_theta_dot")]
+    regular = {name for _, name in problem.assumed if name}
+    possible = ["J = 0"] * ("J⁻¹" not in letters and "J" not in regular) + ["serial chain"] * ("Υ" in names)
+    if names & {"Ḣ", "a"} or TIME in problem.alphabet.along.values():
+        constant.append((Equation("hypothesis", "Ḣ = 0", {("Ḣ",): ONE}, {}, hypothesis="constant H"), ("Ḣ",)))
+    possible += ["single-DOF hinges"] * bool(deltas) + ["constant H"] * bool(constant)
+    composite, velocities = "R" in names or bool(problem.relations), bool(names & mechanics.NAMES)
+    for size in range(len(possible) + 1):
+        for chosen in itertools.combinations(possible, size):
+            extra = list(rules) + constant * ("constant H" in chosen)
+            extra += [_no_delta(problem, n) for n in deltas if "single-DOF hinges" in chosen]
+            extra += problem.single_axis_rules() if "single-DOF hinges" in chosen else []
+            yield Setting(frozenset(chosen), composite, "serial chain" in chosen, velocities), extra
+
+
+def _no_delta(problem: DerivativeProblem, name: str) -> tuple[Equation, Word]:
+    """HΔ = 0 where the axes at Δ's body are one: h*crf(h) = 0."""
+    word = ("H", name)
+    text = f"{problem.alphabet.word_text(word)} = 0"
+    return Equation("hypothesis", text, {word: ONE}, {}, hypothesis="single-DOF hinges"), word
+
+
+def _letters_of(read: Statement) -> Any:
+    """The operators of the model that expressions are of."""
+    from ..operators.operator_set import OperatorSet
+
+    for side in (read.lhs, read.rhs):
+        for source in getattr(side, "sources", ()):
+            return OperatorSet(source, getattr(source, "model", None))
+    return example().soa
+
+
+def _operators_of(problem: DerivativeProblem) -> Any:
+    """The operators of the model that the letters belong to; None where its states cannot be drawn."""
+    from ..operators.operator_set import OperatorSet
+
+    for source, _ in problem.contexts[:1]:
+        model = getattr(source, "model", None)
+        return OperatorSet(source, model if hasattr(model, "random_state") else None)
+    return None

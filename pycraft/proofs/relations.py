@@ -1,0 +1,172 @@
+"""Trees that were made of another: the same bodies with some hinges locked, and the same model in world axes.
+
+With hinges locked, E_φ and M are the model's own, and so is what is made of them alone. In world axes every letter is the model's between
+the frames' changes X = blockdiag φ(0,k): E_φ' = XE_φX⁻¹, H' = HX⁻¹, M' = XMX*, J' = J; and what the axioms determine from these follows
+them, since the axioms are the same equations again between X's.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable, Iterator, Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from .axioms import AXIOMS, theory
+from .blocks import diagonal_part
+from .equations import Equation
+from .normal_form import Setting, normal_form, rules_for
+from .values import LARGEST
+from .words import Polynomial, Word, add_to, monomial, of_model, parse, plain, split
+
+_GIVEN = ("E_φ", "H", "M", "J")
+"""Letters that a tree is made of; the axioms determine the others."""
+_FORCES = dict.fromkeys(["E_φ", "φ", "φ̃", "E_ψ", "ψ", "ψ̃", "τ", "τ̄"], (("X",), ("X⁻¹",)))
+_INERTIAS = dict.fromkeys(["M", "P", "P⁺", "R"], (("X",), ("X*",)))
+_COMPLIANCES = dict.fromkeys(["Υ", "Ω", "S"], (("X⁻*",), ("X⁻¹",)))
+_FRAMES: dict[str, tuple[Word, Word]] = {
+    **_FORCES, **_INERTIAS, **_COMPLIANCES,
+    **{"H": ((), ("X⁻¹",)), "G": (("X",), ()), "K": (("X",), ()), "D": ((), ()), "J": ((), ())},
+}  # fmt: skip
+
+
+def in_world(letter: str, mark: str, base: str) -> Equation | None:
+    """A letter of the tree in world axes by those of its model, P' = XPX*; None for one of another tree."""
+    name = plain(letter)
+    if name not in _FRAMES or split(letter)[0] != name + mark:
+        return None
+    own = name + split(letter)[1]
+    word = tuple(of_model(x, base) for x in _carried((own,)))
+    lhs, rhs = monomial(letter), monomial(*word)
+    if own in _GIVEN:
+        return Equation("definition", f"{letter} = {' '.join(word)}", lhs, rhs)
+    note = "the axioms of the letters in world axes are those of the model between X and X⁻¹, or X*"
+    return Equation("structure", f"{letter} = {' '.join(word)}", lhs, rhs, note=note, check=_axioms_are_carried)
+
+
+def _carried(word: Word) -> Word:
+    """A word in world axes by the model's letters."""
+    done: list[str] = []
+    for letter in word:
+        name, mark = split(letter)
+        left, right = _FRAMES[name]
+        if mark in ("⁻¹", "⁻*"):
+            left, right = (tuple(map(_inverse, reversed(x))) for x in (right, left))
+        if mark in ("*", "⁻*"):
+            left, right = (tuple(map(theory().alphabet.star, reversed(x))) for x in (right, left))
+        for x in (*left, letter, *right):
+            if done and done[-1] == _inverse(x):
+                done.pop()
+            else:
+                done.append(x)
+    return tuple(done)
+
+
+def _inverse(letter: str) -> str:
+    name, mark = split(letter)
+    return name + {"": "⁻¹", "⁻¹": "", "*": "⁻*", "⁻*": "*"}[mark] if name == "X" else ""
+
+
+@lru_cache(maxsize=1)
+def _axioms_are_carried() -> bool:
+    """Whether every axiom, carried to world axes, is that axiom between X's."""
+    alphabet = theory().alphabet
+    rules = rules_for(Setting(composite=True, compliance=True))
+    for text in AXIOMS:
+        bare: Polynomial = {}
+        ends = set()
+        for word, c in theory()(text).difference.items():
+            left, inner, right = _without_ends(_carried(word))
+            ends |= {(left, right)} if word else set()  # X I X⁻¹ is I
+            add_to(bare, inner, c)
+        if len(ends) > 1 or normal_form(bare, rules, alphabet):
+            return False
+    return True
+
+
+def _without_ends(word: Word) -> tuple[Word, Word, Word]:
+    left = word[:1] if word[:1] in (("X",), ("X⁻*",)) else ()
+    right = word[-1:] if word[-1:] in (("X⁻¹",), ("X*",)) else ()
+    return left, word[len(left) : len(word) - len(right)], right
+
+
+def at_the_roots(letter: str, e: Any, source: Any) -> Iterator[tuple[Equation, Word]]:
+    """What a constant whose numbers stand at bodies on the base alone does not see: (equation, word), c B φ* = c B for block diagonal B.
+
+    A root has no parent: φ* leads from it to itself alone.
+    """
+    space = e.domain
+    if source is None or space not in (source.F, source.V) or max(e.shape) > LARGEST:
+        return
+    inner = [s for (_, s, _), parent in zip(space.blocks, source.parents, strict=True) if parent >= 0]
+    X = np.asarray(e.dense())
+    if not _is_zero(X, inner):
+        return
+    for B in ((), ("M",), ("P",), ("R",)) if space == source.F else ((),):
+        for x in ("φ*", "ψ*") if bool(B) == (space == source.F) else ():
+            word, rest = (letter, *B, x), (letter, *B)
+            text = f"{e.text()} {' '.join((*B, x))} = {' '.join((e.text(), *B))}"
+            note = f"{e.text()} is zero but at bodies on the base"
+            empty = functools.partial(_is_zero, X, inner)
+            yield Equation("structure", text, monomial(*word), monomial(*rest), note=note, check=empty), word
+
+
+def _is_zero(X: np.ndarray, columns: Sequence[slice]) -> bool:
+    return not any(X[:, s].any() for s in columns)
+
+
+def compliance_facts(problem: Any, hypotheses: Iterable[str]) -> Iterator[tuple[Equation, Word]]:
+    """What the diagonal blocks of Ω give beside words: ΥG = H*D⁻¹ where J = 0, and B*ΩB = B*ΥB of nodes on one body."""
+    letters = {x for p in problem.polynomials() for word in p for x in word}
+    marks = [mark for mark in problem.marks if of_model("Υ", mark) in letters]
+    for mark in marks if "J = 0" in hypotheses else ():
+        lhs, rhs = (tuple(of_model(x, mark) for x in word) for word in (("Υ", "G"), ("H*", "D⁻¹")))
+        note = "Υ = blockdiag(E_ψ*ΥE_ψ) + H*D⁻¹H, and blockdiag(X) B = blockdiag(X B) for B = PH*, with E_ψPH* = KJ = 0"
+        uses = [theory()(text) for text in ("Υ = E_ψ* Υ E_ψ − S + H* D⁻¹ H", "E_ψ P H* = K J", "J = 0")]
+        text = f"{' '.join(lhs)} = {' '.join(rhs)}"
+        yield Equation("structure", text, monomial(*lhs), monomial(*rhs), uses=uses, note=note, check=_nothing_along_the_hinge), lhs
+    for name, known in problem.alphabet.letters.items():
+        e = known.expression
+        if getattr(e, "kind", "") != "symbol" or e.name != "B" or len(symbol_nodes(e)) != 1 or not marks:
+            continue
+        star, mark = problem.alphabet.star(name), marks[0]
+        whole = (star, *(of_model(x, mark) for x in ("ψ*", "H*", "D⁻¹", "H", "ψ")), name)
+        inner = (star, of_model("Υ", mark), name)
+        text = f"{known.text}* Ω {known.text} = {known.text}* Υ {known.text}"
+        lemma = theory()("ψ* H* D⁻¹ H ψ = ψ* Υ + Υ ψ − Υ + ψ* S ψ")
+        note = "of one body's node only that body's block of Ω counts, and Υ = blockdiag(Ω)"
+        yield Equation("structure", text, monomial(*whole), monomial(*inner), uses=[lemma], note=note, check=_blocks_of_compliance), whole
+
+
+def symbol_nodes(e: Any) -> Sequence[str]:
+    """The nodes that a symbol is of."""
+    return e._parts()[1][3]
+
+
+def _nothing_along_the_hinge() -> bool:
+    return not normal_form(parse("E_ψ P H*"), rules_for(Setting(frozenset({"J = 0"}))), theory().alphabet)
+
+
+def _blocks_of_compliance() -> bool:
+    return diagonal_part(parse("ψ* Υ + Υ ψ − Υ + ψ* S ψ"), theory().alphabet) == parse("Υ")
+
+
+def crosses_with_axes(problem: Any) -> Iterator[tuple[Equation, Word]]:
+    """h_i* crf(y) = −y* Δ_i, of a coordinate's axis h_i and a vector y: crossing changes sign with the order, and Δ_i = crf(h_i) there."""
+    letters = list(problem.alphabet.letters.items())
+    symbols = [(name, x.expression) for name, x in letters if getattr(x.expression, "kind", "") == "symbol"]
+    for name, known in letters:
+        e = known.expression
+        if getattr(e, "kind", "") != "function" or e.name != "crf":
+            continue
+        y = problem.words(e.children[0])
+        for axis, h in symbols:
+            for delta, d in symbols if h.name == "h" else ():
+                if d.name != "Delta" or d._parts()[1][2] != h._parts()[1][2]:
+                    continue
+                a = problem.alphabet
+                star, lhs = a.star_of(y), (a.star(axis), name)
+                text = f"{a.word_text(lhs)} = −({a.text(star)}) {a.letter_text(delta)}"
+                yield Equation("axiom", text, monomial(*lhs), {(*w, delta): -c for w, c in star.items()}), lhs

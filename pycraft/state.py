@@ -1,0 +1,69 @@
+"""States: q and v of one model, and how random ones are drawn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from . import _core
+from .arguments import seed_of
+from .closed import Closed
+
+
+@dataclass
+class State(Closed):
+    """Generalized coordinates `q` (nq,) and velocities `v` (nv,) of a model.
+
+    Anything that takes q takes a State, and then its v with it.
+    """
+
+    q: np.ndarray
+    v: np.ndarray
+
+
+def at_state(model: Any, q: Any = None, v: Any = None) -> tuple[Any, Any]:
+    """The q and v that a call means, by the one rule of direct calls and of `Operator.at`.
+
+    Without q the model's present state, v with it unless it is given; of a State its q, and its v unless one is given; beside an array q
+    zero velocities where v is left out.
+    """
+    if q is None:
+        return model.q, model.v if v is None else getattr(v, "v", v)
+    if not isinstance(q, np.ndarray) and hasattr(q, "q") and hasattr(q, "v"):
+        return q.q, q.v if v is None else getattr(v, "v", v)
+    return q, np.zeros(model.nv) if v is None else getattr(v, "v", v)
+
+
+def random_state(model: _core.Multibody, seed: int | np.random.Generator = 0) -> State:
+    """A random state of `model`, the same for the same seed.
+
+    One-coordinate subhinges: uniform within the limits, else ±π for angles and ±1 m for travels. Ball and free: rotations uniform on
+    the group (a normalised Gaussian quaternion), positions in ±1 m. Velocities uniform in ±1.
+    """
+    rng = seed_of(seed)
+    q, at = np.array(model.zero_q()), 0
+    for k in range(model._size):
+        hinge = model._body(k)["hinge"]
+        lower, upper = hinge["lower"], hinge["upper"]
+        for i, subhinge in enumerate(hinge["subhinges"]):
+            if subhinge["kind"] in ("ball", "free"):
+                quaternion = rng.normal(size=4)
+                q[at : at + 4] = quaternion / np.linalg.norm(quaternion)
+                if subhinge["kind"] == "free":
+                    q[at + 4 : at + 7] = rng.uniform(-1, 1, 3)
+                at += 4 if subhinge["kind"] == "ball" else 7
+            else:
+                span = np.pi if subhinge["kind"] in ("pin", "screw") else 1.0
+                q[at] = rng.uniform(*_interval(span, lower[i], upper[i]) if len(lower) else (-span, span))
+                at += 1
+    return State(q, rng.uniform(-1, 1, model.nv))
+
+
+def _interval(span: float, lower: float, upper: float) -> tuple[float, float]:
+    """What of ±span lies within the limits; where nothing does, the part of them nearest to zero, as wide as they and ±span allow."""
+    low, high = max(-span, lower), min(span, upper)
+    if low <= high:
+        return low, high
+    return (lower, min(upper, lower + 2 * span)) if lower > 0 else (max(lower, upper - 2 * span), upper)
