@@ -223,7 +223,7 @@ void register_sources(py::module_& m) {
     py::list table;
     for (const auto* symbols : {&sko_symbols(), &mechanics_symbols()})
       for (const SymbolDefinition& d : *symbols) {
-        static const char* kinds[] = {"Θ", "V", "F", "W", "NodesV", "NodesF", "Loops", "R^1"};
+        static const char* kinds[] = {"Θ", "V", "F", "W", "NodesV", "NodesF", "R^1"};
         table.append(py::make_tuple(d.ascii, d.unicode, d.latex, kinds[static_cast<int>(d.domain)], kinds[static_cast<int>(d.codomain)], d.meaning));
       }
     return table;

@@ -149,7 +149,7 @@ class Workbook:
 
     def cut(self, space: Any) -> Cut | int:
         """The cut of a space; the dimension of R^n."""
-        if space.name.startswith("R^") or space.name == "Loops":
+        if space.name.startswith("R^"):
             return space.dimension
         tree = self.tree_of(space)
         rows: list[list[int]] = [[] for _ in range(space.bodies)]

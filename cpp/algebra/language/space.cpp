@@ -64,7 +64,6 @@ std::string Space::name() const {
     case SpaceKind::V: return "V";
     case SpaceKind::F: return "F";
     case SpaceKind::Whitened: return "W";
-    case SpaceKind::Loops: return "Loops";
     case SpaceKind::Euclidean: return "R^" + std::to_string(dimension());
     default: break;
   }

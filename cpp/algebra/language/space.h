@@ -10,9 +10,9 @@
 namespace pycraft {
 
 // Θ generalized coordinates' velocities and forces; V, F stacked body motions and forces; NodesV, NodesF stacked node motions and
-// forces; Whitened: where square roots of V -> F operators start (M = M^½ M^½*); Loops constraint multipliers; Euclidean: R^n, a user's
+// forces; Whitened: where square roots of V -> F operators start (M = M^½ M^½*); Euclidean: R^n, a user's
 // own. V and F are dual, NodesV and NodesF too; the others are their own dual.
-enum class SpaceKind { Theta, V, F, Whitened, NodesV, NodesF, Loops, Euclidean };
+enum class SpaceKind { Theta, V, F, Whitened, NodesV, NodesF, Euclidean };
 
 // How a space is cut into blocks. Block j belongs to a body (-1: to none) and covers [offset, offset + size) of a vector.
 struct SpaceLayout {
@@ -42,7 +42,7 @@ class Space {
   Space dual() const;
   // Rows of body k: the number of entries a vector has there.
   int body_size(int body) const;
-  bool belongs_to_bodies() const { return kind_ != SpaceKind::Euclidean && kind_ != SpaceKind::Loops; }
+  bool belongs_to_bodies() const { return kind_ != SpaceKind::Euclidean; }
 
   std::string name() const;         // Θ, V, F, NodesV(tool), R^3
   std::string description() const;  // Θ (7)

@@ -14,7 +14,6 @@ std::vector<std::string> hypothesis_names(unsigned h) {
   if (h & no_hinge_diagonal) names.push_back("J = 0");
   if (h & single_dof) names.push_back("single-DOF hinges");
   if (h & constant_hinges) names.push_back("constant H");
-  if (h & no_loop) names.push_back("no loop");
   if (h & free_root) names.push_back("free root");
   if (h & equal_blocks) names.push_back("blocks of one size");
   return names;

@@ -13,7 +13,7 @@
 namespace pycraft {
 
 // What a theorem asks for beyond a tree with D invertible.
-enum Hypothesis : unsigned { no_hypothesis = 0, chain = 1, no_hinge_diagonal = 2, single_dof = 4, constant_hinges = 8, no_loop = 16, free_root = 32, equal_blocks = 64 };
+enum Hypothesis : unsigned { no_hypothesis = 0, chain = 1, no_hinge_diagonal = 2, single_dof = 4, constant_hinges = 8, free_root = 16, equal_blocks = 32 };
 std::vector<std::string> hypothesis_names(unsigned hypotheses);
 // Those that the model does not meet.
 unsigned unmet(unsigned hypotheses, const Traits& traits);
