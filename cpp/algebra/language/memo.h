@@ -1,6 +1,7 @@
 // A place by a node of an expression where the layers above keep what they made of it: the expression itself knows nothing of them.
 #pragma once
 
+#include <atomic>
 #include <memory>
 
 #include "runtime/mutex.h"
@@ -9,13 +10,15 @@ namespace pycraft {
 
 class Memo {
  public:
-  // What is kept here, made where there is none. Everybody who asks means the same Kept.
+  // What is kept here, made where there is none; it lasts as long as the memo. Everybody who asks means the same Kept.
   template <class Kept>
-  std::shared_ptr<Kept> get() {
+  Kept& get() {
+    if (void* made = made_.load(std::memory_order_acquire)) return *static_cast<Kept*>(made);
     std::lock_guard<Mutex> lock(mutex_);
     if (mutex_.abandoned()) leave_behind(kept_, of_inverse_);
     if (!kept_) kept_ = std::make_shared<Kept>();
-    return std::static_pointer_cast<Kept>(kept_);
+    made_.store(kept_.get(), std::memory_order_release);
+    return *static_cast<Kept*>(kept_.get());
   }
   // That of every inverse of the node: `MM.inv() @ x` in a loop is planned once.
   std::shared_ptr<Memo> of_inverse() {
@@ -27,6 +30,7 @@ class Memo {
 
  private:
   Mutex mutex_;
+  std::atomic<void*> made_{nullptr};  // once there is one, without the lock
   std::shared_ptr<void> kept_;
   std::shared_ptr<Memo> of_inverse_;
 };
