@@ -38,7 +38,7 @@ _LEFT_ASIDE = {
 _EXPAND = "expand the file first: xacro file.xacro > file.urdf"
 
 
-@dataclass
+@dataclass(slots=True)
 class Link:
     """A link: its element, mass (kg), centre of mass (m) in the link's frame, inertia about it (kg m²) in the link's axes."""
 
@@ -49,7 +49,7 @@ class Link:
     inertia: np.ndarray = field(default_factory=lambda: np.zeros((3, 3)))
 
 
-@dataclass
+@dataclass(slots=True)
 class Mimic:
     """position = multiplier · (position of the joint it follows) + offset."""
 
@@ -59,7 +59,7 @@ class Mimic:
     offset: float
 
 
-@dataclass(eq=False)  # hashed by identity
+@dataclass(eq=False, slots=True)  # hashed by identity
 class Joint:
     """A joint: its element, kind of hinge, the pose of the child link in the parent link at zero, and how it moves."""
 

@@ -94,8 +94,11 @@ class XmlFile:
         return element.findall(f"{{{self._space}}}{name}" if self._space else name)
 
     def parts(self, element: Element, names: frozenset[str]) -> dict[str, Element]:
-        """The children of these names, by name; ModelError if there are several of one: which one counts is not clear."""
-        found: dict[str, Element] = {}
+        """The children by name, those of these names among them; ModelError if there are several of one: which one counts is not clear."""
+        found: dict[str, Element] = {child.tag: child for child in element}
+        if not self._space and len(found) == len(element):  # most have one of each, and a large file has them by the million
+            return found
+        found.clear()
         for child in element:
             name = child.tag
             if self._space:
@@ -150,6 +153,12 @@ class XmlFile:
         value = element.get(attribute)
         if value is None and default is not None:
             return default
+        try:  # most are as they should be
+            numbers = [*map(float, value.split())]  # type: ignore[union-attr]  # None is caught
+        except (AttributeError, ValueError):
+            numbers = []
+        if len(numbers) == count and all(map(math.isfinite, numbers)) and value.isascii() and "_" not in value:  # type: ignore[union-attr]  # numbers, so no None
+            return numbers
         return self._floats(element, attribute, value, count, owner, infinite)
 
     def number(self, element: Element, attribute: str, owner: Element, default: float | None = None, infinite: bool = False) -> float:
