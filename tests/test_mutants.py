@@ -16,6 +16,16 @@ def test_every_change_listed_by_hand_is_of_a_text_that_is_there():
     assert [listed.found(ROOT, changes)[1] for changes in (listed.CPP, listed.PYTHON)] == [[], []]
 
 
+@pytest.mark.parametrize("places", [cpp_places, python_places])
+def test_every_pattern_of_places_finds_files(places):
+    assert [pattern for pattern in places.TARGETS if not any(ROOT.glob(pattern))] == []
+
+
+def test_what_is_left_out_would_be_in():
+    files = {path.relative_to(ROOT).as_posix() for pattern in python_places.TARGETS for path in ROOT.glob(pattern)}
+    assert python_places.LEFT_OUT <= files
+
+
 def test_places_of_cpp():
     found = building.without_overlaps([*listed.found(ROOT, listed.CPP)[0], *cpp_places.everything(ROOT)])
     assert len(found) > 400 and len({m.key for m in found}) == len(found)

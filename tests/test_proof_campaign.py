@@ -37,8 +37,12 @@ def test_the_command_says_how_far_it_is_and_goes_on_where_it_stopped(tmp_path, c
     assert "FALSE, seed 0: D = J" in capsys.readouterr().out
 
 
-def test_quick_statements_are_perturbed_as_often_as_asked_for():
-    assert proofs.tried(0, 12).perturbed > proofs.tried(0).perturbed > 0
+def test_quick_statements_are_perturbed_as_often_as_asked_for(monkeypatch):
+    monkeypatch.setattr(proofs, "QUICK", float("inf"))
+    often, seldom = proofs.tried(0, 12).perturbed, proofs.tried(0).perturbed
+    assert often > seldom > 0
+    monkeypatch.setattr(proofs, "QUICK", 0.0)
+    assert proofs.tried(0, 12).perturbed == seldom
 
 
 @pytest.mark.slow

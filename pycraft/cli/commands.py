@@ -23,9 +23,7 @@ app = typer.Typer(
 )
 
 MIMIC = ("refuse", "lock", "free")
-Model = Annotated[
-    str, typer.Argument(help="A URDF or MJCF file, or the name of a robot that comes with the package (see pycraft.models.robots).")
-]
+Model = Annotated[str, typer.Argument(help="A URDF or MJCF file, or the name of a robot that comes with the package (see pycraft.robots).")]
 Root = Annotated[str | None, typer.Option(help="fixed | free: a free hinge first; fixed if left out, of a robot by name its own.")]
 Mimic = Annotated[str, typer.Option(help="refuse | lock | free: what becomes of a file's mimic joints.")]
 

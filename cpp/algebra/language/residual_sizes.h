@@ -20,7 +20,7 @@ inline RoundingUnits<S> units_of(const Refinement& how) {
   return {how.wider() ? up : own, how.residual == ResidualPrecision::same ? own : up};
 }
 
-// The sizes u A, u F and u T, of m columns each, and room for the functions below.
+// The sizes u A, u F and u T, of m columns each, and room for the functions of residual_rounding.h.
 template <class S>
 struct ResidualSizes {
   std::vector<S> motion, force, coordinate, y, g, f;

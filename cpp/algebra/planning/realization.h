@@ -47,6 +47,7 @@ struct Realization {
 };
 
 class Planner;
+
 // The realization of y = e x; emits the block registers it needs through the planner. On failure `reason` says why.
 std::shared_ptr<const Realization> build_realization(Planner& planner, const Expression& e, bool local_ends, std::string& reason);
 

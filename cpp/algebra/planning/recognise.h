@@ -1,4 +1,4 @@
-// What the theorems do for plans.
+// What the theorems do for plans: the forms that have kernels, however they are spelled.
 #pragma once
 
 #include <string>
