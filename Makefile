@@ -3,13 +3,14 @@
 #   make test                   set up, then all tests, C++ and Python, that need no peer packages
 #   make test-peers             the same robots against Pinocchio and MuJoCo (extra [peers]), and a dozen mutants
 #   make check                  the everyday subset, under three minutes
+#   make lint                   what ruff and mypy have to say of Python; fails on the first
 #   make lab | bench            JupyterLab in notebooks; the bounds measured
 #   make test-address | test-undefined | test-thread   the C++ tests under a sanitizer (GCC's or Clang's)
 #   make test-clang             the C++ tests built by Clang (needs clang++: apt install clang, or CLANG=/path/to/clang++)
 #   make wheel                  dist/*.whl for other machines: libquadmath inside, the glibc it needs in its name (Linux)
 #   make mutants                small wrong changes, which the tests must notice; writes tests/mutation.md (under an hour)
 #   make campaigns              refinement against 5000 models made to break it (ten minutes of one core)
-#   make stability              the catalogue of hard cases in full, beside the peers; writes tests/stability/table.md
+#   make stability              the catalogue of hard cases in full, beside the peers; writes tests/accuracy/stability.md
 PYTHON ?= python3
 MODEL ?=
 BIN := .venv/bin
@@ -20,7 +21,7 @@ SOURCES := $(shell find cpp pycraft -name '*.h' -o -name '*.cpp' -o -name '*.py'
 # What is compiled: a change in any of these rebuilds. Python sources are used where they lie.
 COMPILED := $(shell find cpp -name '*.h' -o -name '*.cpp' -o -name '*.in' -o -name '*.py') CMakeLists.txt pyproject.toml
 
-.PHONY: tour test test-cpp test-python test-peers check lab bench stability campaigns lint clean wheel mutants \
+.PHONY: FORCE tour test test-cpp test-python test-peers check lab bench stability campaigns lint clean wheel mutants \
         test-address test-undefined test-thread test-clang
 
 tour: .venv/installed
@@ -36,7 +37,7 @@ test-python: .venv/tested
 	$(BIN)/python -m pytest $(PARALLEL) -m "not peers"
 
 check: .venv/tested
-	$(BIN)/ruff check pycraft tests
+	$(BIN)/ruff check pycraft tests cpp
 	$(BIN)/cmake --build build --target test_allocation test_kernels -j $(JOBS)
 	build/test_allocation
 	build/test_kernels
@@ -84,14 +85,14 @@ mutants: .venv/tested
 	$(BIN)/python tests/mutation.py --jobs $(JOBS)
 
 stability: .venv/peers
-	$(BIN)/pycraft stability --output tests/stability/table.md
+	$(BIN)/pycraft stability --output tests/accuracy/stability.md
 
 campaigns: .venv/tested
 	$(BIN)/python tests/campaigns/refinement.py --seeds 5000 --jobs $(JOBS) --verbose
 
 lint: .venv/tested
-	$(BIN)/ruff check pycraft tests
-	$(BIN)/ruff format --check pycraft tests || true
+	$(BIN)/ruff check pycraft tests cpp
+	$(BIN)/ruff format --check pycraft tests cpp
 	$(BIN)/mypy
 
 # ---- environments. The build requirements are installed into the environment once, so that rebuilding is incremental.
@@ -101,7 +102,12 @@ lint: .venv/tested
 	$(BIN)/python cpp/build_requirements.py | $(BIN)/python -m pip install --quiet -r /dev/stdin
 	touch $@
 
-.venv/installed: .venv/requirements $(COMPILED)
+# An editable install knows each module by its place: it is made anew where one came, went or moved.
+.venv/modules: .venv/requirements FORCE
+	find pycraft -name "*.py" | LC_ALL=C sort | cmp -s - $@ || find pycraft -name "*.py" | LC_ALL=C sort > $@
+FORCE:
+
+.venv/installed: .venv/requirements .venv/modules $(COMPILED)
 	$(BIN)/python -m pip install --quiet --no-build-isolation --editable . -C build-dir=build
 	touch $@
 

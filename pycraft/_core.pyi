@@ -7,7 +7,7 @@ import fractions
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Binding', 'Dynamics', 'Error', 'EvaluationError', 'Integration', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'Scalar', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'Theorem', 'blockdiag', 'checked_refinement', 'constant', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'identity', 'integrators', 'methods', 'operators_of', 'precisions', 'real_array', 'residual', 'scalar', 'step_kinds', 'symbol_table', 'theorems', 'time_apply', 'time_dynamics', 'time_forward', 'time_method', 'time_packs', 'vector', 'wider', 'zero']
+__all__: list[str] = ['Binding', 'Dynamics', 'Error', 'EvaluationError', 'GroupedOperators', 'Integration', 'Letter', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'Scalar', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'Theorem', 'blockdiag', 'checked_refinement', 'constant', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'identity', 'integrators', 'methods', 'operators_of', 'precisions', 'real_array', 'residual', 'scalar', 'step_kinds', 'symbol_table', 'theorems', 'time_apply', 'time_dynamics', 'time_forward', 'time_method', 'time_packs', 'vector', 'wider', 'zero']
 
 class Error(Exception): ...
 class SpaceError(Error, TypeError): ...
@@ -75,6 +75,8 @@ class Multibody:
     def _body_index(self, arg0: str) -> int:
         ...
     def _hinge_index(self, arg0: str) -> int:
+        ...
+    def _hinge_sizes(self) -> tuple[list[str], list[int]]:
         ...
     def _names(self) -> tuple[list[str], list[str]]:
         ...
@@ -200,11 +202,16 @@ class SkoSource:
     @property
     def derived_from(self) -> typing.Any:
         """
-        How this tree was made of a model's, "hinge subset" or "world frame", and that model's source; None for a model's own.
+        How this tree was made of a model's, "hinge subset", "world frame" or "groups of bodies", and that model's source; None for a model's own.
         """
     @property
     def dof(self) -> list[int]:
         ...
+    @property
+    def groups(self) -> typing.Any:
+        """
+        Of grouped bodies: the numbers of the model's bodies in each group; None for other trees.
+        """
     @property
     def hinge_names(self) -> list[str]:
         ...
@@ -431,9 +438,14 @@ class Operator:
     def kind(self) -> str:
         ...
     @property
+    def letter(self) -> typing.Any:
+        """
+        What stands behind a symbol, or a function of a model: a Letter. None for anything else.
+        """
+    @property
     def name(self) -> typing.Any:
         """
-        A symbol's or a function's ASCII name; None for anything else composed.
+        A symbol's or a function's ASCII name, a vector's or a constant's own; None for what is composed.
         """
     @property
     def shape(self) -> tuple[int, int]:
@@ -552,6 +564,26 @@ class Scalar:
         """
         The number; with a batch bound, an array (batch,).
         """
+    @property
+    def kind(self) -> str:
+        """
+        "number", "trace", "logdet", "norm", "sum", "scaled", "product" or "reciprocal".
+        """
+    @property
+    def number(self) -> typing.Any:
+        """
+        The number, or that in front of what is scaled: a float where it is one exactly, else a Fraction. None for other kinds.
+        """
+    @property
+    def operand(self) -> typing.Any:
+        """
+        The operator that a trace, ln|det| or norm is of; None for other kinds.
+        """
+    @property
+    def terms(self) -> list[Scalar]:
+        """
+        What a sum, product, multiple or reciprocal is made of, as scalars.
+        """
 class Plan:
     """
     A plan: what an expression becomes before any number is touched. `str(plan)` is the table that explain() shows.
@@ -611,6 +643,13 @@ class MultibodyOperators(SkoSource):
     @property
     def model(self) -> Multibody:
         ...
+class GroupedOperators(SkoSource):
+    """
+    The source of a multibody model's operators with its bodies in groups.
+    """
+    @property
+    def model(self) -> Multibody:
+        ...
 class MatrixTree(SkoSource):
     """
     A tree whose blocks E, H, M, J are given as matrices of any size.
@@ -619,6 +658,35 @@ class MatrixTree(SkoSource):
         ...
     def __reduce__(self) -> tuple:
         ...
+class Letter:
+    """
+    What stands behind a symbol of an expression: which letter, whose, of which nodes or coordinate, and at which state.
+    """
+    @property
+    def arguments(self) -> list:
+        """
+        The names of its nodes, or its coordinate's number; empty for most letters.
+        """
+    @property
+    def binding(self) -> typing.Any:
+        """
+        The state that it is bound to; None where it is not.
+        """
+    @property
+    def name(self) -> str:
+        """
+        Its ASCII name.
+        """
+    @property
+    def source(self) -> SkoSource:
+        """
+        The operators that it is one of.
+        """
+    @property
+    def text(self) -> str:
+        """
+        Its arguments as they are shown.
+        """
 class Parameter:
     """
     What diff() takes beside a coordinate: a mass property, a rotor inertia, a placement, a hinge axis.
@@ -795,6 +863,8 @@ def _binding_from_parts(arg0: typing.SupportsInt | typing.SupportsIndex, arg1: t
 def _derived_operators(arg0: SkoSource, arg1: typing.Any) -> SkoSource:
     ...
 def _function(arg0: SkoSource, arg1: str, arg2: Binding, arg3: Operator) -> Operator:
+    ...
+def _grouped(base: MultibodyOperators, groups: collections.abc.Sequence[collections.abc.Sequence[str]]) -> GroupedOperators:
     ...
 def _inertia_parameter(arg0: MultibodyOperators, arg1: typing.SupportsInt | typing.SupportsIndex, arg2: typing.SupportsInt | typing.SupportsIndex, arg3: str) -> Parameter:
     ...

@@ -72,6 +72,13 @@ Class& unpicklable(Class& c) {
 // What the Python face does for the core: pycraft/face.py puts it into `_core._face` by name. The core imports nothing of the package.
 py::object of_face(const char* name);
 
+// What stands behind a symbol of an expression, as Python reads it.
+struct Letter {
+  Symbol symbol;
+  bool of_nodes() const;
+  std::vector<std::string> nodes() const;  // by name: their numbers may differ in another model
+};
+
 // ---- conversions
 Vector3<double> to_vector3(const py::handle& value, const char* what);
 Matrix3<double> to_matrix3(const py::handle& value, const char* what);
@@ -99,6 +106,8 @@ py::object part_of_state(const py::handle& given, const char* what);  // of a St
 std::vector<double> one_state(const py::handle& given, const char* what);  // q or v of one state
 std::string shape_text(const py::array& a);                     // how errors call what was given: "4", "an array (1, 3)"
 
+// A letter's record by its ASCII name. EvaluationError where there is none.
+const SymbolDefinition& definition_named(const std::string& name);
 // The symbol of this name of a source; node operators take node names, Delta a coordinate.
 Expression source_symbol(const std::shared_ptr<SkoSource>& source, const std::string& name, const std::vector<std::string>& nodes, int coordinate);
 // A state, or a batch, for all models that occur unbound in the operands; q None takes the model's present state.

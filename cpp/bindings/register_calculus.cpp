@@ -11,12 +11,6 @@ namespace pycraft {
 
 namespace {
 
-std::shared_ptr<MultibodyOperators> mechanics_of(const std::shared_ptr<SkoSource>& source) {
-  if (auto own = std::dynamic_pointer_cast<MultibodyOperators>(source)) return own;
-  if (auto derived = std::dynamic_pointer_cast<DerivedOperators>(source)) return derived->base();
-  return nullptr;
-}
-
 // The one model of an expression, else of the spaces of its constants; null where it has none that moves.
 std::shared_ptr<MultibodyOperators> model_of(const std::vector<Expression>& operands) {
   std::shared_ptr<MultibodyOperators> found;

@@ -156,6 +156,12 @@ void register_multibody(py::module_& m) {
         }
         return py::make_tuple(bodies, hinges);
       })
+      .def("_hinge_sizes", [](const Multibody& mb) {
+        std::vector<std::string> hinges;
+        std::vector<int> counts;
+        for (int k = 0; k < mb.bodies(); ++k) hinges.push_back(mb.body(k).hinge.name), counts.push_back(mb.body(k).hinge.nv());
+        return py::make_tuple(hinges, counts);
+      })
       .def_property_readonly("coordinate_names", [](const Multibody& mb) { return mb.structure().coordinate_names; },
                              "One per generalized velocity: the hinge's name, or \"hinge[j]\" where it has several.")
       .def("_set_mass_properties", [](Multibody& mb, int k, const py::object& mass, const py::object& com, const py::object& inertia) {

@@ -301,8 +301,13 @@ void register_operators(py::module_& m) {
       .def_property_readonly("name", [](const Expression& e) -> py::object {
         if (e.kind() == NodeKind::symbol || e.kind() == NodeKind::block_function) return py::cast(e.node().symbol.definition->ascii);
         if (e.kind() == NodeKind::vector) return py::cast(e.node().name);
+        if (e.kind() == NodeKind::constant) return py::cast(e.node().constant->name);
         return py::none();
-      }, "A symbol's or a function's ASCII name; None for anything else composed.")
+      }, "A symbol's or a function's ASCII name, a vector's or a constant's own; None for what is composed.")
+      .def_property_readonly("letter", [](const Expression& e) -> py::object {
+        const bool has = e.kind() == NodeKind::symbol || (e.kind() == NodeKind::block_function && e.node().symbol.source);
+        return has ? py::cast(Letter{e.node().symbol}) : py::none();
+      }, "What stands behind a symbol, or a function of a model: a Letter. None for anything else.")
       .def_property_readonly("batch", [](const Expression& e) -> py::object { return batch_of(e) < 0 ? py::object(py::none()) : py::cast(batch_of(e)); })
       .def_property_readonly("_state", [](const Expression& e) -> py::object {
         const auto all = contexts(e);

@@ -4,6 +4,7 @@
 #include "algebra/planning/square_root.h"
 #include "bindings/bindings.h"
 #include "operators/directions.h"
+#include "operators/grouped_operators.h"
 #include "runtime/errors.h"
 
 namespace pycraft {
@@ -17,10 +18,28 @@ py::object binding_of(const Symbol& s) { return s.binding ? py::cast(std::const_
 
 }  // namespace
 
+bool Letter::of_nodes() const {
+  const int id = symbol.definition->id;
+  return id == MechanicsSymbolId::B || id == MechanicsSymbolId::Jacobian || id == MechanicsSymbolId::Lambda;
+}
+
+std::vector<std::string> Letter::nodes() const {
+  std::vector<std::string> names;
+  if (!of_nodes()) return names;
+  const auto model = std::dynamic_pointer_cast<MultibodyOperators>(symbol.source)->model();
+  for (int a : symbol.arguments) names.push_back(a >= 0 ? model->node(a).name : model->body(-1 - a).name);
+  return names;
+}
+
 // A space as its model and kind, so that it can be pickled and found again.
 py::tuple space_parts(const Space& s) {
   if (s.kind() == SpaceKind::Euclidean) return py::make_tuple(py::none(), static_cast<int>(s.kind()), s.dimension(), py::list());
-  const auto source = source_owning(s);
+  auto source = source_owning(s);
+  if (s.layout().bodies != s.layout().owner) {  // coordinates and nodes of grouped bodies are the robot's, cut into groups
+    auto cut = std::make_shared<SpaceLayout>(s.layout());
+    cut->owner = s.layout().bodies;
+    if (const auto grouped = std::dynamic_pointer_cast<GroupedOperators>(source_owning(Space(s.kind(), cut)))) source = grouped;
+  }
   if (!source) throw StaleOperatorError("the model of " + s.description() + " is gone; a space is pickled and copied with its model");
   py::list names;
   for (const auto& b : s.layout().blocks)
@@ -47,15 +66,9 @@ static py::tuple parts_of_node(const Expression& e) {
   py::object payload = py::none();
   switch (n.kind) {
     case NodeKind::symbol: {
-      // Nodes by name: their numbers may differ in the model that is there then.
-      std::vector<std::string> nodes;
-      std::vector<int> numbers = n.symbol.arguments;
-      const int id = n.symbol.definition->id;
-      if (id == MechanicsSymbolId::B || id == MechanicsSymbolId::Jacobian || id == MechanicsSymbolId::Lambda) {
-        const auto mechanics = std::dynamic_pointer_cast<MultibodyOperators>(n.symbol.source);
-        for (int a : numbers) nodes.push_back(a >= 0 ? mechanics->model()->node(a).name : mechanics->model()->body(-1 - a).name);
-        numbers.clear();
-      }
+      const Letter letter{n.symbol};
+      const std::vector<std::string> nodes = letter.nodes();
+      const std::vector<int> numbers = letter.of_nodes() ? std::vector<int>() : n.symbol.arguments;
       payload = py::make_tuple(source_of(n.symbol), n.symbol.definition->ascii, numbers, nodes, n.symbol.argument_text, binding_of(n.symbol));
       break;
     }
@@ -94,6 +107,18 @@ py::list all_parts(const Expression& e) {
 }
 
 void register_pickling(py::module_& m) {
+  py::class_<Letter>(m, "Letter", "What stands behind a symbol of an expression: which letter, whose, of which nodes or coordinate, and at which state.")
+      .def_property_readonly("name", [](const Letter& l) { return l.symbol.definition->ascii; }, "Its ASCII name.")
+      .def_property_readonly("source", [](const Letter& l) { return l.symbol.source; }, "The operators that it is one of.")
+      .def_property_readonly("arguments", [](const Letter& l) {
+        py::list all;
+        for (const std::string& node : l.nodes()) all.append(node);
+        if (!l.of_nodes())
+          for (int a : l.symbol.arguments) all.append(a);
+        return all;
+      }, "The names of its nodes, or its coordinate's number; empty for most letters.")
+      .def_property_readonly("text", [](const Letter& l) { return l.symbol.argument_text; }, "Its arguments as they are shown.")
+      .def_property_readonly("binding", [](const Letter& l) { return binding_of(l.symbol); }, "The state that it is bound to; None where it is not.");
   m.def("_make", [](const std::string& kind, const std::vector<Expression>& children, const Coefficient& coefficient) {
     if (kind == "sum") return sum_of(children);
     if (kind == "product") return product_of(children);

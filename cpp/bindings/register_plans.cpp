@@ -6,7 +6,6 @@
 #include "algebra/planning/explain.h"
 #include "algebra/planning/realization.h"
 #include "bindings/bindings.h"
-#include "operators/directions.h"
 #include "runtime/errors.h"
 
 namespace pycraft {
@@ -143,33 +142,29 @@ ValuesInUse<double> values_at(const Context& c, unsigned groups, int state) {
 py::object numbers_of(const Plan& p, size_t context, const std::string& name, const std::vector<int>& arguments, int state) {
   const Context& c = p.contexts.at(context);
   c.source->check_current();
-  for (const auto* symbols : {&sko_symbols(), &mechanics_symbols(), &derivative_symbols()})
-    for (const SymbolDefinition& d : *symbols) {
-      if (d.ascii != name) continue;
-      const Symbol symbol{&d, nullptr, nullptr, arguments, ""};
-      const auto values = values_at(c, d.groups, state);
-      const Space rows = c.source->space(d.codomain, arguments);
-      if (d.pattern == Pattern::vector) {
-        std::vector<double> v(rows.dimension());
-        values->vector(symbol, v.data());
-        return to_numpy(v);
-      }
-      if (d.pattern != Pattern::block_diagonal && d.pattern != Pattern::edges) throw EvaluationError(name + " has no blocks");
-      const Space columns = c.source->space(d.domain, arguments);
-      py::list blocks;
-      for (int k = 0; k < c.source->structure().bodies(); ++k) {
-        const int p = d.pattern == Pattern::edges ? c.source->structure().parent[k] : k;
-        if (p < 0) {
-          blocks.append(py::none());
-          continue;
-        }
-        py::array_t<double> b({rows.body_size(p), columns.body_size(k)});
-        if (b.size()) values->block(symbol, k, b.mutable_data());
-        blocks.append(b);
-      }
-      return blocks;
+  const SymbolDefinition& d = definition_named(name);
+  const Symbol symbol{&d, nullptr, nullptr, arguments, ""};
+  const auto values = values_at(c, d.groups, state);
+  const Space rows = c.source->space(d.codomain, arguments);
+  if (d.pattern == Pattern::vector) {
+    std::vector<double> v(rows.dimension());
+    values->vector(symbol, v.data());
+    return to_numpy(v);
+  }
+  if (d.pattern != Pattern::block_diagonal && d.pattern != Pattern::edges) throw EvaluationError(name + " has no blocks");
+  const Space columns = c.source->space(d.domain, arguments);
+  py::list blocks;
+  for (int k = 0; k < c.source->structure().bodies(); ++k) {
+    const int p = d.pattern == Pattern::edges ? c.source->structure().parent[k] : k;
+    if (p < 0) {
+      blocks.append(py::none());
+      continue;
     }
-  throw EvaluationError("no operator is called '" + name + "'");
+    py::array_t<double> b({rows.body_size(p), columns.body_size(k)});
+    if (b.size()) values->block(symbol, k, b.mutable_data());
+    blocks.append(b);
+  }
+  return blocks;
 }
 
 }  // namespace

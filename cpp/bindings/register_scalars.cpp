@@ -117,6 +117,16 @@ void register_scalars(py::module_& m) {
       .def("latex", [](const Scalar& a) { return show(a, Style::latex); })
       .def("_repr_latex_", [](const Scalar& a) { return "$" + show(a, Style::latex) + shown_value(a, " = ") + "$"; })
       .def("__repr__", [](const Scalar& a) { return "<scalar " + show(a) + shown_value(a, " = ") + ">"; })
+      // ---- the tree, to be read
+      .def_property_readonly("kind", [](const Scalar& a) { return scalar_kind_name(a.node().kind); },
+                             "\"number\", \"trace\", \"logdet\", \"norm\", \"sum\", \"scaled\", \"product\" or \"reciprocal\".")
+      .def_property_readonly("number", [](const Scalar& a) -> py::object {
+        const bool has = a.node().kind == ScalarKind::number || a.node().kind == ScalarKind::scaled;
+        return has ? to_number(a.node().value) : py::object(py::none());
+      }, "The number, or that in front of what is scaled: a float where it is one exactly, else a Fraction. None for other kinds.")
+      .def_property_readonly("operand", [](const Scalar& a) -> py::object { return a.node().operand ? py::cast(a.node().operand) : py::none(); },
+                             "The operator that a trace, ln|det| or norm is of; None for other kinds.")
+      .def_property_readonly("terms", [](const Scalar& a) { return a.node().terms; }, "What a sum, product, multiple or reciprocal is made of, as scalars.")
       .def("_parts", [](const Scalar& a) {
         const auto& n = a.node();
         return py::make_tuple(static_cast<int>(n.kind), to_number(n.value), n.operand ? py::cast(n.operand) : py::none(), py::cast(n.terms));

@@ -6,11 +6,10 @@
 #include "bindings/bindings.h"
 #include "operators/derived_operators.h"
 #include "operators/directions.h"
+#include "operators/grouped_operators.h"
 #include "runtime/errors.h"
 
 namespace pycraft {
-
-namespace {
 
 const SymbolDefinition& definition_named(const std::string& name) {
   for (const SymbolDefinition& d : sko_symbols())
@@ -19,8 +18,12 @@ const SymbolDefinition& definition_named(const std::string& name) {
     if (d.ascii == name) return d;
   for (const SymbolDefinition& d : derivative_symbols())
     if (d.ascii == name) return d;
+  for (const SymbolDefinition& d : grouped_symbols())
+    if (d.ascii == name) return d;
   throw EvaluationError("no operator is called '" + name + "'");
 }
+
+namespace {
 
 // Whose state an `at` binds: of the symbols that are not bound yet; where there are none, of the spaces of zeros, identities and
 // constants. `anything`: whether there is something to bind.
@@ -55,14 +58,18 @@ Expression source_symbol(const std::shared_ptr<SkoSource>& source, const std::st
   const SymbolDefinition& d = definition_named(name);
   source->check_current();
   if (d.id < first_extra) return make_symbol(d, source);
-  const auto mechanics = std::dynamic_pointer_cast<MultibodyOperators>(source);
-  if (!mechanics) throw EvaluationError("'" + name + "' is an operator of mechanics; '" + source->name() + "' is a bare tree of matrices");
+  if (d.id >= first_grouped_symbol) {
+    if (!std::dynamic_pointer_cast<GroupedOperators>(source)) throw EvaluationError("'" + name + "' is a letter of grouped bodies; '" + source->name() + "' has none");
+    return make_symbol(d, source);
+  }
+  if (!std::dynamic_pointer_cast<MultibodyOperators>(source) && !std::dynamic_pointer_cast<GroupedOperators>(source))
+    throw EvaluationError("'" + name + "' is an operator of mechanics; '" + source->name() + (mechanics_of(source) ? "' has none" : "' is a bare tree of matrices"));
   switch (d.id) {
     case MechanicsSymbolId::B:
     case MechanicsSymbolId::Jacobian:
-    case MechanicsSymbolId::Lambda: return node_operator(static_cast<MechanicsSymbolId>(d.id), mechanics, nodes);
-    case MechanicsSymbolId::Delta: return delta_operator(mechanics, coordinate);
-    default: return mechanics_operator(static_cast<MechanicsSymbolId>(d.id), mechanics);
+    case MechanicsSymbolId::Lambda: return node_operator(static_cast<MechanicsSymbolId>(d.id), source, nodes);
+    case MechanicsSymbolId::Delta: return delta_operator(source, coordinate);
+    default: return mechanics_operator(static_cast<MechanicsSymbolId>(d.id), source);
   }
 }
 
@@ -152,6 +159,10 @@ void register_sources(py::module_& m) {
           grouped->base().check_current();
           return py::make_tuple(made, py::make_tuple(std::const_pointer_cast<SkoSource>(grouped->base().shared_from_this()), "bodies in pairs"));
         }
+        if (const auto* grouped = dynamic_cast<const GroupedOperators*>(&s)) {
+          grouped->base()->check_current();
+          return py::make_tuple(made, py::make_tuple(grouped->base(), py::make_tuple("groups", grouped->groups())));
+        }
         const auto* derived = dynamic_cast<const DerivedOperators*>(&s);
         if (!derived) throw py::type_error("operators of '" + s.name() + "' cannot be pickled or copied; make them anew where they are wanted");
         derived->base()->check_current();
@@ -167,12 +178,20 @@ void register_sources(py::module_& m) {
       .def_property_readonly("dof", [](const SkoSource& s) { return s.structure().dof; })
       .def_property_readonly("body_names", [](const SkoSource& s) { return s.structure().body_names; })
       .def_property_readonly("hinge_names", [](const SkoSource& s) { return s.structure().hinge_names; })
-      .def_property_readonly("coordinate_names", [](const SkoSource& s) { return s.structure().coordinate_names; })
+      .def_property_readonly("coordinate_names", [](const SkoSource& s) {  // in the order of a vector's entries
+        const auto* grouped = dynamic_cast<const GroupedOperators*>(&s);
+        return grouped ? grouped->base()->structure().coordinate_names : s.structure().coordinate_names;
+      })
       .def_property_readonly("derived_from", [](const SkoSource& s) -> py::object {
         const auto* derived = dynamic_cast<const DerivedOperators*>(&s);
         if (derived == nullptr) return py::none();
-        return py::make_tuple(dynamic_cast<const WorldFrame*>(&s) != nullptr ? "world frame" : "hinge subset", derived->base());
-      }, "How this tree was made of a model's, \"hinge subset\" or \"world frame\", and that model's source; None for a model's own.")
+        const char* how = dynamic_cast<const WorldFrame*>(&s) ? "world frame" : dynamic_cast<const GroupedOperators*>(&s) ? "groups of bodies" : "hinge subset";
+        return py::make_tuple(how, derived->base());
+      }, "How this tree was made of a model's, \"hinge subset\", \"world frame\" or \"groups of bodies\", and that model's source; None for a model's own.")
+      .def_property_readonly("groups", [](const SkoSource& s) -> py::object {
+        const auto* grouped = dynamic_cast<const GroupedOperators*>(&s);
+        return grouped ? py::cast(grouped->groups()) : py::object(py::none());
+      }, "Of grouped bodies: the numbers of the model's bodies in each group; None for other trees.")
       .def_property_readonly("traits", [](const SkoSource& s) {
         const Traits t = s.traits();
         py::dict d;
@@ -192,14 +211,19 @@ void register_sources(py::module_& m) {
         s.check_current();  // else its copy would be of the model as it is now
         return py::make_tuple(py::module_::import("pycraft._core").attr("operators_of"), py::make_tuple(py::cast(s.model())));
       });
+  py::class_<GroupedOperators, SkoSource, std::shared_ptr<GroupedOperators>>(m, "GroupedOperators", "The source of a multibody model's operators with its bodies in groups.")
+      .def_property_readonly("model", [](const GroupedOperators& s) { return s.base()->model(); });
   m.def("operators_of", &operators_of, py::arg("model"));
-  // how: "bodies in pairs", "world frame", or which hinges move
+  m.def("_grouped", &grouped_operators, py::arg("base"), py::arg("groups"));
+  // how: "bodies in pairs", "world frame", ("groups", the bodies of each), or which hinges move
   m.def("_derived_operators", [](const std::shared_ptr<SkoSource>& base, const py::object& how) -> std::shared_ptr<SkoSource> {
     const std::string kind = py::isinstance<py::str>(how) ? how.cast<std::string>() : "hinges";
     if (kind == "bodies in pairs") return std::make_shared<AggregatedTree>(base);
     const auto model = std::dynamic_pointer_cast<MultibodyOperators>(base);
     if (!model) throw EvaluationError("'" + base->name() + "' is no multibody model");
     if (kind == "world frame") return std::make_shared<WorldFrame>(model);
+    if (py::isinstance<py::tuple>(how))
+      return std::make_shared<GroupedOperators>(model, Grouping(model->structure(), model->name(), how.cast<py::tuple>()[1].cast<std::vector<std::vector<int>>>()));
     return std::make_shared<HingeSubset>(model, how.cast<std::vector<char>>());
   });
   py::class_<MatrixTree, SkoSource, std::shared_ptr<MatrixTree>>(m, "MatrixTree", "A tree whose blocks E, H, M, J are given as matrices of any size.")

@@ -23,7 +23,7 @@ void register_spaces(py::module_& m) {
           "List of (label, slice, body number) in the order of a vector's entries; body -1 for none.")
       .def_property_readonly("bodies", [](const Space& s) { return s.belongs_to_bodies() ? s.layout().of_body.size() : 0; },
                              "Number of bodies that it is cut into; 0 for R^n.")
-      .def_property_readonly("_owner", [](const Space& s) { return reinterpret_cast<std::uintptr_t>(s.layout().owner); })
+      .def_property_readonly("_owner", [](const Space& s) { return reinterpret_cast<std::uintptr_t>(s.layout().bodies); })
       .def("__len__", &Space::dimension)
       .def("__eq__", [](const Space& a, const Space& b) { return a == b; })
       .def("__eq__", [](const Space&, const py::object&) { return py::reinterpret_borrow<py::object>(Py_NotImplemented); })

@@ -97,9 +97,7 @@ class WorldValues final : public DerivedValues<S> {
 }  // namespace
 
 DerivedOperators::DerivedOperators(SkoStructure structure, const std::string& name, std::shared_ptr<MultibodyOperators> base)
-    : SkoSource(std::move(structure), name), base_(std::move(base)) {
-  share_bodies_with(*base_);
-}
+    : SkoSource(std::move(structure), name), base_(std::move(base)) {}
 
 Traits DerivedOperators::traits() const {
   Traits t = base_->traits();
@@ -109,14 +107,23 @@ Traits DerivedOperators::traits() const {
   return t;
 }
 
+std::shared_ptr<MultibodyOperators> mechanics_of(const std::shared_ptr<SkoSource>& source) {
+  if (auto own = std::dynamic_pointer_cast<MultibodyOperators>(source)) return own;
+  if (auto derived = std::dynamic_pointer_cast<DerivedOperators>(source)) return derived->base();
+  return nullptr;
+}
+
 HingeSubset::HingeSubset(std::shared_ptr<MultibodyOperators> base, std::vector<char> kept)
-    : DerivedOperators(kept_structure(base->structure(), kept), base->name() + ", some hinges", base), kept_(std::move(kept)) {}
+    : DerivedOperators(kept_structure(base->structure(), kept), base->name() + ", some hinges", base), kept_(std::move(kept)) {
+  share_bodies_with(*base_);
+}
 #define PYCRAFT_MAKE_VALUES(S) \
   std::unique_ptr<SkoValues<S>> HingeSubset::make_values(S) const { return std::make_unique<SubsetValues<S>>(*this, base_->structure()); }
 PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_MAKE_VALUES)
 #undef PYCRAFT_MAKE_VALUES
 
 WorldFrame::WorldFrame(std::shared_ptr<MultibodyOperators> base) : DerivedOperators(base->structure(), base->name() + ", world frame", base) {
+  share_bodies_with(*base_);
   share_coordinates_with(*base_);
 }
 #define PYCRAFT_MAKE_VALUES(S) \

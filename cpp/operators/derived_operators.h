@@ -14,11 +14,12 @@ namespace pycraft {
 class DerivedOperators : public SkoSource {
  public:
   Traits traits() const override;
-  bool rigid() const override { return true; }
+  BlockCosts costs(int k) const override { return rigid_costs(structure(), k); }
   int nq() const override { return base_->nq(); }
   int nv() const override { return base_->nv(); }
   void check_state(const double* q, size_t nq, const double* v, size_t nv) const override { base_->check_state(q, nq, v, nv); }
   std::shared_ptr<const StateData> state() const override { return base_->state(); }
+  void check_current() const override { base_->check_current(); }
   std::uint64_t parameters() const override { return base_->parameters(); }
   unsigned enter_use() const override { return base_->enter_use(); }
   void leave_use(unsigned entered) const noexcept override { base_->leave_use(entered); }
@@ -29,6 +30,9 @@ class DerivedOperators : public SkoSource {
   DerivedOperators(SkoStructure structure, const std::string& name, std::shared_ptr<MultibodyOperators> base);
   std::shared_ptr<MultibodyOperators> base_;
 };
+
+// The operators of the robot that these are derived from, or those themselves; null for a bare tree.
+std::shared_ptr<MultibodyOperators> mechanics_of(const std::shared_ptr<SkoSource>& source);
 
 // The hinges marked in `kept` move; the others are locked.
 class HingeSubset final : public DerivedOperators {

@@ -6,7 +6,7 @@
 #include "algebra/language/display.h"
 #include "algebra/language/lower.h"
 #include "algebra/theorems/theorems.h"
-#include "operators/derived_operators.h"
+#include "operators/grouped_operators.h"
 #include "runtime/errors.h"
 
 namespace pycraft {
@@ -34,12 +34,20 @@ bool is_zero(const Expression& e) { return e.kind() == NodeKind::zero; }
 Expression times(const std::vector<Expression>& f) { return lowered_product(f, f.back().domain(), f.front().codomain()); }
 Expression plus(const std::vector<Expression>& t) { return lowered_sum(t, t[0].domain(), t[0].codomain()); }
 
-// The letters of a model at one binding.
+// The letters of a model at one binding: a robot's own, or those of its bodies in groups.
 struct MechanicsLetters {
-  std::shared_ptr<MultibodyOperators> source;
+  std::shared_ptr<SkoSource> source;
+  std::shared_ptr<MultibodyOperators> robot;
   std::shared_ptr<const Binding> binding;
+  bool grouped;
   Letters o;
-  MechanicsLetters(std::shared_ptr<MultibodyOperators> s, const std::shared_ptr<const Binding>& b) : source(s), binding(b), o(s, b) {}
+  MechanicsLetters(std::shared_ptr<SkoSource> s, std::shared_ptr<MultibodyOperators> r, const std::shared_ptr<const Binding>& b)
+      : source(s), robot(std::move(r)), binding(b), grouped(source != robot), o(s, b) {}
+
+  // Of the robot's bodies, one by one: H, φ; and φ_S, which they are carried by within a group.
+  Expression own_H() const { return grouped ? bound(make_symbol(grouped_symbols()[1], source)) : o.H; }
+  Expression own_phi() const { return grouped ? times({inner(), o.phi}) : o.phi; }
+  Expression inner() const { return grouped ? bound(make_symbol(grouped_symbols()[0], source)) : identity(o.M.codomain()); }
 
   Expression bound(const Expression& e) const { return binding ? e.at(binding) : e; }
   Expression letter(MechanicsSymbolId id) const { return bound(make_symbol(definition(id), source)); }
@@ -54,14 +62,14 @@ struct MechanicsLetters {
   }
 
   std::string text(const std::vector<int>& direction) const {
-    if (direction.size() == 1) return source->structure().coordinate_names[direction[0]];
+    if (direction.size() == 1) return robot->structure().coordinate_names[direction[0]];
     static const char* components[] = {"rx", "ry", "rz", "x", "y", "z"};
-    return source->structure().hinge_names[direction[0]] + "@" + std::to_string(direction[1]) + "." + components[direction[2]];
+    return robot->structure().hinge_names[direction[0]] + "@" + std::to_string(direction[1]) + "." + components[direction[2]];
   }
   std::string selection_text(const std::vector<int>& which) const {
-    if (which.size() == 1) return source->structure().coordinate_names[which[0]];
+    if (which.size() == 1) return robot->structure().coordinate_names[which[0]];
     const std::string range = std::to_string(which[1]) + ":" + (which[2] > 5 ? std::string() : std::to_string(which[2]));
-    return which[0] < 0 ? range : source->structure().hinge_names[which[0]] + "[" + range + "]";
+    return which[0] < 0 ? range : robot->structure().hinge_names[which[0]] + "[" + range + "]";
   }
 };
 
@@ -96,6 +104,14 @@ Place place_of(const MultibodyOperators& source, const std::vector<int>& directi
   return {k, static_cast<double>(subhinge_of_coordinate(source, k, direction[0]))};
 }
 
+// Ḣ of the robot's bodies, one by one.
+Expression own_H_dot(const MechanicsLetters& l) {
+  std::vector<Expression> terms = {zero(l.o.H.domain(), l.o.H.codomain())};
+  for (int p = 1; p < most_subhinges(*l.robot); ++p)
+    terms.push_back(times({l.selection({-1, 0, p}), l.own_H(), l.crf(times({l.own_H().T(), l.selection({-1, p, p + 1}), l.letter(theta_dot)}))}));
+  return plus(terms);
+}
+
 // What is common: symbols that are functions of others.
 class MechanicsDirection : public Direction {
  public:
@@ -104,13 +120,18 @@ class MechanicsDirection : public Direction {
   Expression edge_factor(const Symbol& s) const override {
     const MechanicsLetters l = letters(s);
     if (is_world(s)) return zero(s.source->forces(), s.source->forces());  // parent matrix ⊗ 1
-    return body_edge_factor(l);
+    return l.grouped ? times({body_edge_factor(l), l.inner()}) : body_edge_factor(l);
   }
 
   Expression block_tangent(const Symbol& s) const override {
     const MechanicsLetters l = letters(s);
     const SymbolId id = static_cast<SymbolId>(s.definition->id);
     if (s.source == source_) return tangent_of_block(l, id);
+    if (l.grouped) {  // H = H_S φ_S, ∂φ_S = (φ_S - I) Δ φ_S
+      if (id != SymbolId::H) return tangent_of_block(l, id);
+      const Expression turned = times({body_edge_factor(l), l.inner()});
+      return plus({times({tangent_of_block(l, id), l.inner()}), times({l.o.H, turned}), times({-1.0 * l.own_H(), turned})});
+    }
     const Letters own(s.source, s.binding);
     if (is_world(s)) {  // H' = HX⁻¹, M' = XMX*, X moves by X W
       const Expression X = l.letter(X_world), W = times({X, frame_motion(s), X.inv()});
@@ -130,7 +151,7 @@ class MechanicsDirection : public Direction {
     if (e.kind() == NodeKind::block_function)
       return l.function(static_cast<DerivativeSymbolId>(e.node().symbol.definition->id), rules(e.children()[0]));
     const Symbol& s = e.node().symbol;
-    const Expression theta = l.letter(theta_dot), relative = times({l.o.H.T(), theta}), V = times({l.o.phi.T(), l.o.H.T(), theta});
+    const Expression theta = l.letter(theta_dot), relative = times({l.own_H().T(), theta}), V = times({l.o.phi.T(), l.o.H.T(), theta});
     switch (s.definition->id) {
       case Delta: return moved(l, l.delta(s.arguments), s.arguments);
       case direction_twist: return moved_twist(l, l.twist(s.arguments), s.arguments);
@@ -140,17 +161,28 @@ class MechanicsDirection : public Direction {
       case momentum_cross: return l.function(momentum_cross_of, rules(times({l.o.M, V})));
       case MechanicsSymbolId::X_world: return times({l.letter(X_world), frame_motion(s)});
       case H_dot: {
-        std::vector<Expression> terms = {zero(l.o.H.domain(), l.o.H.codomain())};
-        for (int p = 1; p < most_subhinges(*l.source); ++p)
-          terms.push_back(times({l.selection({-1, 0, p}), l.o.H, l.crf(times({l.o.H.T(), l.selection({-1, p, p + 1}), theta}))}));
-        return rules(plus(terms));
+        if (!l.grouped) return rules(own_H_dot(l));
+        const Expression turned = times({l.letter(Delta_theta_dot), l.inner()});
+        return rules(plus({times({own_H_dot(l), l.inner()}), times({l.o.H, turned}), times({-1.0 * l.own_H(), turned})}));
       }
+      case inner_phi: {
+        const Expression turned = times({body_edge_factor(l), l.inner()});
+        return plus({times({l.inner(), turned}), times({-1.0 * identity(turned.codomain()), turned})});
+      }
+      case inner_H: return tangent_of_block(l, SymbolId::H);
       case theta_dot: return velocity_tangent(l, e);
       case velocity: return rules(V);
-      case coriolis_acceleration: return rules(plus({times({l.letter(V_tilde), relative}), times({l.letter(H_dot).T(), theta})}));
+      case coriolis_acceleration: {
+        const Expression own = plus({times({l.letter(V_tilde), relative}), times({l.grouped ? own_H_dot(l).T() : l.letter(H_dot).T(), theta})});
+        return rules(l.grouped ? times({l.inner().T(), own}) : own);
+      }
       case gyroscopic_force: return rules(times({l.letter(V_bar), l.o.M, V}));
       case gravity_field: return times({frame_motion(s).T(), e});
-      case gravity_base: return times({root_motion(l).T(), e});
+      case gravity_base: {
+        if (!l.grouped) return times({root_motion(l).T(), e});
+        const Expression of_roots = times({l.inner().inv().T(), e});  // a₀ = φ_S* of it
+        return plus({times({rules(l.inner()).T(), of_roots}), times({l.inner().T(), root_motion(l).T(), of_roots})});
+      }
       case inertia_derivative: return inertia_tangent(l, s);
       default: return zero(e.domain(), e.codomain());  // B, Π
     }
@@ -168,8 +200,7 @@ class MechanicsDirection : public Direction {
   virtual Expression root_motion(const MechanicsLetters& l) const = 0;
 
   MechanicsLetters letters(const Symbol& s) const {
-    if (s.source == source_) return {source_, s.binding};
-    if (const auto derived = std::dynamic_pointer_cast<DerivedOperators>(s.source); derived && derived->base() == source_) return {source_, s.binding};
+    if (mechanics_of(s.source) == source_) return {std::dynamic_pointer_cast<GroupedOperators>(s.source) ? s.source : source_, source_, s.binding};
     throw EvaluationError("'" + s.source->name() + "' is not the model that this derivative is taken of" +
                           (s.source->name() == source_->name() ? ": another of that name is" : ", '" + source_->name() + "'"));
   }
@@ -197,7 +228,7 @@ class TwistDirection : public MechanicsDirection {
   Expression frame_motion(const Symbol& like) const override {
     const MechanicsLetters l = letters(like);
     std::vector<Expression> terms = {zero(Space::euclidean(1), l.o.M.domain())};
-    for (const auto& [c, direction] : twists_) terms.push_back(times({c * l.o.phi.T(), l.twist(direction)}));
+    for (const auto& [c, direction] : twists_) terms.push_back(times({c * l.own_phi().T(), l.twist(direction)}));
     return l.crf(plus(terms));
   }
 
@@ -220,7 +251,7 @@ class TwistDirection : public MechanicsDirection {
     for (const auto& [c, direction] : twists_) {
       const Place at = place_of(*source_, direction);
       const int before = static_cast<int>(std::ceil(at.slot));  // subhinges inboard of it
-      if (before > 0) terms.push_back(times({c * l.selection({at.body, 0, before}), l.o.H, l.delta(direction)}));
+      if (before > 0) terms.push_back(times({c * l.selection({at.body, 0, before}), l.own_H(), l.delta(direction)}));
     }
     return plus(terms);
   }
@@ -251,14 +282,14 @@ class TimeDirection final : public MechanicsDirection {
   }
   Expression root_motion(const MechanicsLetters& l) const override { return l.letter(Delta_theta_dot); }
   Expression tangent_of_block(const MechanicsLetters& l, SymbolId id) const override {
-    if (id == SymbolId::H) return most_subhinges(*source_) > 1 ? l.letter(H_dot) : zero(l.o.H.domain(), l.o.H.codomain());
+    if (id == SymbolId::H) return most_subhinges(*source_) > 1 ? (l.grouped ? own_H_dot(l) : l.letter(H_dot)) : zero(l.o.H.domain(), l.o.H.codomain());
     return id == SymbolId::M ? zero(l.o.M.domain(), l.o.M.codomain()) : zero(l.o.J.domain(), l.o.J.codomain());
   }
   Expression outboard_motion(const MechanicsLetters& l, const std::vector<int>& direction) const override {
     const Place own = place_of(*source_, direction);
     const int from = static_cast<int>(std::floor(own.slot)) + 1, count = static_cast<int>(source_->model()->body(own.body).hinge.subhinges.size());
     if (from >= count) return zero(l.o.M.codomain(), l.o.M.codomain());
-    return l.crf(times({l.o.H.T(), l.selection({own.body, from, count}), l.letter(theta_dot)}));
+    return l.crf(times({l.own_H().T(), l.selection({own.body, from, count}), l.letter(theta_dot)}));
   }
   Expression velocity_tangent(const MechanicsLetters&, const Expression&) const override {
     if (!vdot_) throw EvaluationError("the time derivative of what depends on v needs the accelerations: .dot(vdot=...)");

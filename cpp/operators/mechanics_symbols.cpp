@@ -1,4 +1,5 @@
 // The symbols that mechanics adds, their spaces and what the compound ones abbreviate.
+#include "operators/derived_operators.h"
 #include "operators/multibody_operators.h"
 
 namespace pycraft {
@@ -53,30 +54,31 @@ const std::vector<SymbolDefinition>& mechanics_symbols() {
   return table;
 }
 
-Expression mechanics_operator(MechanicsSymbolId id, const std::shared_ptr<MultibodyOperators>& source) {
+Expression mechanics_operator(MechanicsSymbolId id, const std::shared_ptr<SkoSource>& source) {
   return make_symbol(definition(id), source);
 }
 
-Expression node_operator(MechanicsSymbolId id, const std::shared_ptr<MultibodyOperators>& source, const std::vector<std::string>& names) {
+Expression node_operator(MechanicsSymbolId id, const std::shared_ptr<SkoSource>& source, const std::vector<std::string>& names) {
   if (names.empty()) throw ModelError(definition(id).ascii + " takes at least one node");
+  const Multibody& model = *mechanics_of(source)->model();
   std::vector<int> numbers;
   std::string text;
   for (const std::string& name : names) {
-    const int index = source->model()->node_index(name);
-    if (source->model()->node(index).body < 0)
+    const int index = model.node_index(name);
+    if (model.node(index).body < 0)
       throw ModelError("node '" + name + "' lies on the base of '" + source->name() + "': it does not move and feels no body's force");
     // Nodes are added without renumbering bodies; a body's own frame is told from them by its sign.
-    const int nodes = static_cast<int>(source->model()->nodes().size());
+    const int nodes = static_cast<int>(model.nodes().size());
     numbers.push_back(index < nodes ? index : -1 - (index - nodes));
     text += (text.empty() ? "" : ", ") + name;
   }
   return make_symbol(definition(id), source, numbers, text);
 }
 
-Expression delta_operator(const std::shared_ptr<MultibodyOperators>& source, int i) {
+Expression delta_operator(const std::shared_ptr<SkoSource>& source, int i) {
   if (i < 0 || i >= source->nv())
     throw ModelError("coordinate " + std::to_string(i) + " of '" + source->name() + "', which has " + std::to_string(source->nv()));
-  return make_symbol(definition(Delta), source, {i}, source->structure().coordinate_names[i]);
+  return make_symbol(definition(Delta), source, {i}, mechanics_of(source)->structure().coordinate_names[i]);
 }
 
 }  // namespace pycraft

@@ -19,7 +19,7 @@ Traits MultibodyOperators::traits() const {
 Space MultibodyOperators::space(SpaceKind kind, const std::vector<int>& nodes) const {
   if (kind != SpaceKind::NodesV && kind != SpaceKind::NodesF) return SkoSource::space(kind, nodes);
   auto layout = std::make_shared<SpaceLayout>();
-  layout->owner = this;
+  layout->owner = layout->bodies = this;
   layout->owner_name = name();
   layout->nodes = nodes;
   layout->of_body.resize(structure().bodies());
@@ -213,7 +213,7 @@ void RigidValues<S>::inertia_derivative_block(const std::vector<int>& arguments,
 }
 
 template <class S>
-void RigidValues<S>::function_block(const Symbol& function, const S* x, S* out) const {
+void RigidValues<S>::function_block(const Symbol& function, int, const S* x, S* out) const {
   const Vector6<S> v{{x[0], x[1], x[2]}, {x[3], x[4], x[5]}};
   switch (function.definition->id) {
     case motion_cross: cross_motion_block(v, out); return;

@@ -41,7 +41,7 @@ class MultibodyOperators final : public SkoSource {
 
   const std::shared_ptr<Multibody>& model() const { return model_; }
   Traits traits() const override;
-  bool rigid() const override { return true; }
+  BlockCosts costs(int k) const override { return rigid_costs(structure(), k); }
   int nq() const override { return model_->nq(); }
   int nv() const override { return model_->nv(); }
   void check_state(const double* q, size_t nq, const double* v, size_t nv) const override {
@@ -63,10 +63,10 @@ class MultibodyOperators final : public SkoSource {
 // The model's operators, made at the first call and again after its structure changed.
 std::shared_ptr<MultibodyOperators> operators_of(const std::shared_ptr<Multibody>& model);
 
-// Node operators by name (ModelError for an unknown one).
-Expression node_operator(MechanicsSymbolId id, const std::shared_ptr<MultibodyOperators>& source, const std::vector<std::string>& names);
-Expression mechanics_operator(MechanicsSymbolId id, const std::shared_ptr<MultibodyOperators>& source);
-Expression delta_operator(const std::shared_ptr<MultibodyOperators>& source, int coordinate);
+// Letters of a robot, or of its bodies in groups. Node operators by name (ModelError for an unknown one).
+Expression node_operator(MechanicsSymbolId id, const std::shared_ptr<SkoSource>& source, const std::vector<std::string>& names);
+Expression mechanics_operator(MechanicsSymbolId id, const std::shared_ptr<SkoSource>& source);
+Expression delta_operator(const std::shared_ptr<SkoSource>& source, int coordinate);
 
 // Theorems that need mechanics: velocities, dynamics, Coriolis matrices, gravity, other frames, hybrid dynamics.
 std::vector<Theorem> mechanics_theorems(const std::shared_ptr<MultibodyOperators>& source);

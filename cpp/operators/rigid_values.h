@@ -18,7 +18,7 @@ class RigidValues final : public TreeValues<RigidBlocks<S>> {
 
   void block(const Symbol& symbol, int k, S* out) const override;
   void vector(const Symbol& symbol, S* out) const override;
-  void function_block(const Symbol& function, const S* x, S* out) const override;
+  void function_block(const Symbol& function, int k, const S* x, S* out) const override;
   bool gathers_wider() const override { return true; }
   void gathered_residual(const S* x, const S* b, S* r, int m, S* scratch, std::vector<Wider<S>>& forces) const override {
     mass_matrix_residual_gathered(this->tree_, this->blocks_, compiled_->mass_properties, x, b, r, m, scratch, forces);

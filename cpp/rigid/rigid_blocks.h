@@ -7,8 +7,10 @@
 #include <memory>
 #include <vector>
 
+#include "algebra/language/source.h"
 #include "algebra/language/structure.h"
 #include "algebra/language/symbol.h"
+#include "algebra/trees/block_policy.h"
 #include "algebra/trees/sweeps/singular_pivot.h"
 #include "model/compiled_model.h"
 #include "numerics/small_ldl.h"
@@ -31,6 +33,12 @@ inline void store(const Vector6<S>& v, S* y, int m, int c) {
 template <class S>
 inline void add_to(const Vector6<S>& v, S* y, int m, int c) {
   for (int i = 0; i < 6; ++i) y[i * m + c] += v[i];
+}
+
+// A rotation of a vector 15, φ 45, a rigid inertia 45, φ A φ* of a symmetric A 250.
+inline BlockCosts rigid_costs(const SkoStructure& tree, int k) {
+  const bool carried = tree.parent[k] >= 0;
+  return {carried ? 45.0 : 0.0, 45, carried ? 250.0 : 0.0, 60, 22, 30, 21};
 }
 
 template <class S>
@@ -275,12 +283,8 @@ class RigidBlocks {
     }
   }
 
-  S log_determinant_of_D() const {
-    using std::log;
-    S sum = S(0);
-    for (const S& p : pivots_) sum += log(p);
-    return sum;
-  }
+  // Pivots d of D(k) = L d L*.
+  const S* pivots(int k) const { return pivots_.data() + first(k); }
 
   // ---------------------------------------------------------------- articulated inertia
   void start_articulated(int k) {
@@ -342,13 +346,7 @@ class RigidBlocks {
       pivot_work_[j - first(k)] = aligned[j] >= 0 ? D[d_[k] + (j - first(k)) * (tree_.dof[k] + 1)] : S(dot(H[j], own * H[j]) + J[j]);
     require_gain(tree_, k, L.data() + d_[k], pivots_.data() + first(k), pivot_work_.data(), form);
   }
-  void error_to_parent(int k) {
-    Symmetric6<S> plus = projected(X_[k], H, G, k);  // τ̄Xτ̄*
-    const Symmetric6<S> own = diagonal_part(P[k]);
-    for (int j = first(k); j < last(k); ++j) add_symmetric_product(plus, (S(0.5) * (dot(H[j], own * H[j]) + J[j])) * G[j], G[j]);
-    pycraft::add(plus, own);
-    pycraft::add(X_[tree_.parent[k]], to_parent(pose[k], plus));
-  }
+  void error_to_parent(int k) { pycraft::add(X_[tree_.parent[k]], to_parent(pose[k], error_left(k))); }
 
   // ---------------------------------------------------------------- composite inertia, compliance
   void start_composite(int k) { R[k] = symmetric6(inertia[k]); }
@@ -356,6 +354,48 @@ class RigidBlocks {
   void compliance_from_parent(int k, int p) {
     // τ̄* (E*Υ(p)E) τ̄ + H*D⁻¹H
     Y[k] = p < 0 ? Symmetric6<S>::zero() : projected(compliance_to_child(pose[k], Y[p]), G, H, k);
+    add_hinge_compliance(k);
+  }
+
+  // ---------------------------------------------------------------- for neighbours of another kind (algebra/trees/mixed_blocks.h)
+  void carried(Carried what, int k, S* out) const {
+    const Symmetric6<S> A = what == Carried::articulated ? Pplus[k] : what == Carried::composite ? R[k] : error_left(k);
+    for (int i = 0; i < 6; ++i)
+      for (int j = 0; j < 6; ++j) out[i * 6 + j] = A(i, j);
+  }
+  void take(Carried what, int p, const S* A) {
+    pycraft::add(what == Carried::articulated ? P[p] : what == Carried::composite ? R[p] : X_[p],
+                 symmetric6_of<S>([&](int i, int j) { return A[i * 6 + j]; }));
+  }
+  template <class F>
+  void carried_columns(int k, F&& f) {
+    factors_->carried_columns(k, f);
+  }
+  template <class Column>
+  void take_column(int p, const S& weight, Column&& u) {
+    factors_->take_column(p, weight, u);
+  }
+  void compliance_from(int k, const S* seen) {
+    Y[k] = projected(symmetric6_of<S>([&](int i, int j) { return seen[i * 6 + j]; }), G, H, k);
+    add_hinge_compliance(k);
+  }
+
+  std::vector<Symmetric6<S>> P, Pplus, R, Y;
+  std::vector<Vector6<S>> G;   // columns of G, one per coordinate
+  std::vector<S> D, L;         // n_k x n_k per body: D(k) and L of its factors LdL*, d the pivots
+  size_t d_offset(int k) const { return d_[k]; }
+
+ private:
+  // X⁺(k)
+  Symmetric6<S> error_left(int k) const {
+    Symmetric6<S> plus = projected(X_[k], H, G, k);  // τ̄Xτ̄*
+    const Symmetric6<S> own = diagonal_part(P[k]);
+    for (int j = first(k); j < last(k); ++j) add_symmetric_product(plus, (S(0.5) * (dot(H[j], own * H[j]) + J[j])) * G[j], G[j]);
+    pycraft::add(plus, own);
+    return plus;
+  }
+  // Υ(k) += H*D⁻¹H
+  void add_hinge_compliance(int k) {
     const int n = tree_.dof[k], f = first(k);
     if (n == 1) {
       Vector6<S> h = (S(1) / D[d_[k]]) * H[f];
@@ -370,12 +410,6 @@ class RigidBlocks {
     }
   }
 
-  std::vector<Symmetric6<S>> P, Pplus, R, Y;
-  std::vector<Vector6<S>> G;   // columns of G, one per coordinate
-  std::vector<S> D, L;         // n_k x n_k per body: D(k) and L of its factors LdL*, d the pivots
-  size_t d_offset(int k) const { return d_[k]; }
-
- private:
   int first(int k) const { return tree_.dof_offset[k]; }
   int last(int k) const { return tree_.dof_offset[k + 1]; }
   const Symmetric6<S>& six(int id, int k) const {

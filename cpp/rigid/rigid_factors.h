@@ -40,7 +40,7 @@ class RigidFactors {
     });
   }
   Symmetric6<S> inertia(int k) const {
-    return symmetric([&](int i, int j) { return factors_.inertia(k, i, j); });
+    return symmetric6_of<S>([&](int i, int j) { return factors_.inertia(k, i, j); });
   }
   // Entry (i, i) of P(k), of the body whose hinge was eliminated last and has a row that is no coordinate axis.
   const S& diagonal(int i) const { return diagonal_[i]; }
@@ -112,7 +112,7 @@ class RigidFactors {
   const S* bias(int k) const { return bias_.data() + tree_.dof_offset[k]; }
   // ---- of the body whose hinge was eliminated last
   Symmetric6<S> plus(int k) const {
-    return symmetric([&](int i, int j) {
+    return symmetric6_of<S>([&](int i, int j) {
       S sum = S(0);
       for (int r = tree_.dof[k]; r < factors_.pivots(); ++r) sum += factors_.U(i, r) * factors_.weight(r) * factors_.U(j, r);
       return sum;
@@ -141,18 +141,17 @@ class RigidFactors {
     }
   }
 
- private:
-  template <class Entry>
-  static Symmetric6<S> symmetric(Entry&& entry) {
-    Symmetric6<S> P;
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) {
-        if (j >= i) P.A(i, j) = entry(i, j), P.C(i, j) = entry(i + 3, j + 3);
-        P.B(i, j) = entry(i, j + 3);
-      }
-    return P;
+  // ---- for neighbours of another kind (algebra/trees/mixed_blocks.h): f(weight, u) of every column of P⁺, and one that comes in
+  template <class F>
+  void carried_columns(int k, F&& f) const {
+    for (int r = tree_.dof[k]; r < factors_.pivots(); ++r) f(factors_.weight(r), [&](int i) { return factors_.U(i, r); });
+  }
+  template <class Column>
+  void take_column(int p, const S& weight, Column&& u) {
+    factors_.add(p, weight, S(0), u);
   }
 
+ private:
   const SkoStructure& tree_;
   FactoredInertia<S> factors_;
   std::vector<S> bias_, weighted_;

@@ -25,6 +25,17 @@ template <class S>
 inline Symmetric6<S> symmetric6(const RigidInertia<S>& M) {
   return {M.rotational, skew(M.moment), Symmetric3<S>::diagonal(M.mass)};
 }
+// Of its entries (i, j), those with i <= j and of the upper right block.
+template <class S, class Entry>
+inline Symmetric6<S> symmetric6_of(Entry&& entry) {
+  Symmetric6<S> P;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      if (j >= i) P.A(i, j) = entry(i, j), P.C(i, j) = entry(i + 3, j + 3);
+      P.B(i, j) = entry(i, j + 3);
+    }
+  return P;
+}
 template <class S>
 inline Vector6<S> operator*(const Symmetric6<S>& P, const Vector6<S>& V) {
   return {P.A * V.angular + P.B * V.linear, transpose_times(P.B, V.angular) + P.C * V.linear};

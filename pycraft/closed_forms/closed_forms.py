@@ -196,18 +196,25 @@ class ClosedForms:
             raise _core.EvaluationError(f"{expression.text()} is not made of the letters of {self.model.name!r}")
         from .evaluation import Evaluation
 
-        made = Evaluation(self, given).of(expression)
+        walk = Evaluation(self._letters, self._field, given, self._sample)
+        made = walk.of(expression)
+        self._field = walk.field
         if expression.domain is None:
             raise _core.EvaluationError(f"{expression.text()} is said of no space: an I takes its space from an operator beside it")
         return made
+
+    def _sample(self) -> dict[Any, float]:
+        """A state and parameters at which signs are looked at: the model's numbers, and a random state."""
+        state = self.model.random_state(1)
+        known = dict(zip([*self.q, *self.v], [*state.q, *state.v], strict=True))
+        return {x: float(value) for x, value in (known | self.parameters).items()}
 
     def _scalar(self, scalar: Any, given: Mapping[str, Any], simplify: bool) -> Any:
         import sympy
 
         from ..proofs.rational import exact
 
-        kind, value, operand, terms = scalar._parts()
-        name = ("number", "trace", "logdet", "norm", "sum", "scaled", "product", "reciprocal")[kind]
+        name, value, operand, terms = scalar.kind, scalar.number, scalar.operand, scalar.terms
         if name == "number":
             return exact(value)
         if name == "sum":
@@ -247,7 +254,7 @@ class ClosedForms:
             value = sympy.expand_trig(expression)
         else:
             value = self._value(expression, given or {}, False)
-        rates = self._letters.rates().sympy(False) * sympy.Matrix(direction)
+        rates = self._letters.hinges.rates().sympy(False) * sympy.Matrix(direction)
         turned = lambda e: self._again(sum((e.diff(x) * r for x, r in zip(self.q, rates, strict=True)), sympy.S.Zero))
         return value.applyfunc(turned) if isinstance(value, sympy.MatrixBase) else turned(value)
 

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import sympy
 
 from .. import _core
-from ..proofs.rational import exact
+from ..proofs.rational import Rationals, exact
 from .sparse import Matrix
-
-if TYPE_CHECKING:
-    from .closed_forms import ClosedForms
+from .sparse_letters import Letters
 
 
 def _require_unbound(e: Any, binding: Any) -> None:
@@ -22,10 +20,19 @@ def _require_unbound(e: Any, binding: Any) -> None:
 
 
 class Evaluation:
-    """One walk over an expression. An I without a space is a number until it meets a matrix."""
+    """One walk over an expression. An I without a space is a number until it meets a matrix.
 
-    def __init__(self, forms: ClosedForms, given: Mapping[str, Any]):
-        self._forms, self._given = forms, given
+    Parameters
+    ----------
+    letters : of the mechanism
+    field : that the entries are taken from; `.field` is what it grew to, by the symbols and roots that were met
+    given : entries of vectors and constants by name
+    sample : numbers for all symbols, at which the sign of a root is looked at
+    """
+
+    def __init__(self, letters: Letters, field: Rationals, given: Mapping[str, Any], sample: Callable[[], dict[Any, float]]):
+        self.field = field
+        self._letters, self._given, self._sample = letters, given, sample
         self._known: dict[Any, Any] = {}
 
     def of(self, e: Any) -> Any:
@@ -40,35 +47,36 @@ class Evaluation:
     def _children(self, e: Any) -> list[Any]:
         """The children's matrices over one field."""
         made = [self.of(c) for c in e.children]
-        field = self._forms._field
+        field = self.field
         return [x if c.domain is None else x.lifted(field) for x, c in zip(made, e.children, strict=True)]
 
     # ------------------------------------------------------------------ leaves
     def _symbol(self, e: Any) -> Matrix:
-        _, name, numbers, nodes, _, binding = e._parts()[1]
-        _require_unbound(e, binding)
-        arguments = list(nodes) or list(numbers)
-        if len(arguments) == 1 and not nodes:
-            return self._forms._letters(name, arguments[0])
-        return self._forms._letters(name, arguments) if arguments else self._forms._letters(name)
+        _require_unbound(e, e.letter.binding)
+        match e.letter.arguments:
+            case []:
+                return self._letters(e.name)
+            case [int(coordinate)]:
+                return self._letters(e.name, coordinate)
+            case several:
+                return self._letters(e.name, several)
 
     def _function(self, e: Any) -> Matrix:
         """Block functions, which derivatives bring up: crm, crf, mcross of a vector, the lower triangle with half its diagonal."""
         (x,) = self._children(e)
-        payload = e._parts()[1]
-        if payload is None:
+        if e.letter is None:
             made = self._blockwise(e.children[0], x, lambda block: block.lower_half())
             if made is None:
                 raise _core.EvaluationError(f"{e.text()}: a lower half is taken body by body, of a block-diagonal operator")
             return made
-        _require_unbound(e, payload[-1])
-        return self._forms._letters.function(payload[1], x)
+        _require_unbound(e, e.letter.binding)
+        return self._letters.function(e.name, x)
 
     def _identity(self, e: Any) -> Any:
-        return 1 if e.domain is None else Matrix.identity(self._forms._field, e.domain.dimension)
+        return 1 if e.domain is None else Matrix.identity(self.field, e.domain.dimension)
 
     def _zero(self, e: Any) -> Matrix:
-        return Matrix.zeros(self._forms._field, e.codomain.dimension, e.domain.dimension)
+        return Matrix.zeros(self.field, e.codomain.dimension, e.domain.dimension)
 
     def _vector(self, e: Any) -> Matrix:
         if e.name in self._given:
@@ -76,9 +84,8 @@ class Evaluation:
         return self._entries([sympy.Symbol(f"{e.name}{i + 1}", real=True) for i in range(e.codomain.dimension)], e)
 
     def _constant(self, e: Any) -> Matrix:
-        name = e._parts()[1][-1]
-        if name in self._given:
-            return self._entries(self._given[name], e)
+        if e.name in self._given:
+            return self._entries(self._given[e.name], e)
         return self._entries([[exact(x) for x in row] for row in e.dense()], e)
 
     def _entries(self, entries: Any, e: Any) -> Matrix:
@@ -88,8 +95,8 @@ class Evaluation:
         flat = [sympy.sympify(x) for row in listed for x in (row if isinstance(row, list | tuple) else [row])]
         if len(flat) != rows * columns:
             raise _core.EvaluationError(f"{e.text()} is given {len(flat)} entries; it is an array ({rows}, {columns})")
-        self._forms._field = self._forms._field.extended(flat)
-        return Matrix.of(self._forms._field, [flat[i * columns : (i + 1) * columns] for i in range(rows)], columns)
+        self.field = self.field.extended(flat)
+        return Matrix.of(self.field, [flat[i * columns : (i + 1) * columns] for i in range(rows)], columns)
 
     def _external(self, e: Any) -> Matrix:
         raise _core.EvaluationError(f"{e.text()} is a Python function of numbers: it has no closed form")
@@ -97,14 +104,14 @@ class Evaluation:
     # ------------------------------------------------------------------ composed
     def _number(self, x: Any, dimension: int) -> Matrix:
         """A factor of I as a matrix."""
-        field = self._forms._field
+        field = self.field
         return Matrix.identity(field, dimension).scaled(field.element(x))
 
     def _sum(self, e: Any) -> Any:
         if e.domain is None:
             return sum(self.of(c) for c in e.children)
         parts = [self._number(x, e.domain.dimension) if c.domain is None else x for x, c in zip(self._children(e), e.children, strict=True)]
-        field = self._forms._field
+        field = self.field
         total = parts[0].lifted(field)
         for part in parts[1:]:
             total = total + part.lifted(field)
@@ -123,7 +130,7 @@ class Evaluation:
         (x,), number = self._children(e), exact(e.coefficient)
         if e.domain is None:
             return number * x
-        field = self._forms._field = self._forms._field.extended([number])
+        field = self.field = self.field.extended([number])
         return x.lifted(field).scaled(field.element(number))
 
     def _transpose(self, e: Any) -> Any:
@@ -135,7 +142,7 @@ class Evaluation:
         if e.domain is None:
             return 1 / x
         if e.children[0].kind == "symbol" and e.children[0].name == "D":
-            return self._forms._letters("D_inverse")
+            return self._letters("D_inverse")
         made = self._blockwise(e.children[0], x, lambda block: block.inverse())
         return x.inverse() if made is None else made
 
@@ -156,7 +163,7 @@ class Evaluation:
         if not e.is_block_diagonal or [r[1] for r in rows] != [c[1] for c in columns]:
             return None
         made = [make(x.block(where, where)) for _, where, _ in rows]
-        field = self._forms._field
+        field = self.field
         return Matrix.diagonal(field, [block.lifted(field) for block in made])
 
     def _sqrt(self, e: Any) -> Matrix:
@@ -177,17 +184,11 @@ class Evaluation:
                     raise _core.EvaluationError("a root of an operator that is not positive semidefinite")
                 columns.append(column)
                 continue
-            self._forms._field, root = self._forms._field.root(self._forms._field.lift(pivot), sample)
-            field = self._forms._field
+            self.field, root = self.field.root(self.field.lift(pivot), sample)
+            field = self.field
             column = column.lifted(field)
             columns.append(column.scaled(field.one / root))
             a = a.lifted(field) - (column @ column.T).scaled(field.one / field.lift(pivot))
-        field = self._forms._field
+        field = self.field
         rows = [{j: x for j, c in enumerate(columns) if (x := c.lifted(field).rows[i].get(0))} for i in range(n)]
         return Matrix(field, rows, n)
-
-    def _sample(self) -> dict[Any, float]:
-        """A state and parameters at which signs are looked at: the model's numbers, and a random state."""
-        state = self._forms.model.random_state(1)
-        known = dict(zip([*self._forms.q, *self._forms.v], [*state.q, *state.v], strict=True))
-        return {x: float(value) for x, value in (known | self._forms.parameters).items()}

@@ -13,15 +13,10 @@ from typing import Any
 import sympy
 
 from .. import _core
-from ..proofs.rational import Rationals
 from .parameters import Parameters
 from .sparse import Matrix
-
-Q_SIZE = {"pin": 1, "slider": 1, "screw": 1, "ball": 4, "free": 7}
-V_SIZE = {"pin": 1, "slider": 1, "screw": 1, "ball": 3, "free": 6}
-ANGLES = ("pin", "screw")
-
-Pose = tuple[Matrix, Matrix]  # rotation (3, 3) and position (3, 1)
+from .sparse_hinges import V_SIZE, Hinges
+from .sparse_spatial import Pose, composed, crf, crm, force_transform, in_blocks, momentum_cross, skew, still
 
 
 class Letters:
@@ -35,157 +30,17 @@ class Letters:
     """
 
     def __init__(self, parameters: Parameters, q: Sequence[sympy.Symbol], v: Sequence[sympy.Symbol], unit: bool):
-        self.parameters, self.q, self.v, self.unit = parameters, list(q), list(v), unit
+        self.parameters, self.v = parameters, list(v)
+        self.hinges = Hinges(parameters, q, v, unit)
+        self.field = self.hinges.field
         self.parents = [b["parent"] for b in parameters.bodies]
         ends = list(accumulate(sum(V_SIZE[s["kind"]] for s in b["subhinges"]) for b in parameters.bodies))
         self.coordinates = [slice(i, j) for i, j in zip([0, *ends], ends, strict=False)]
         self.states = [slice(6 * k, 6 * k + 6) for k in range(len(self.parents))]
-        self.field = Rationals([*self._atoms(), *self.v, *parameters.expressions()], self._quaternions() if unit else ())
         self._made: dict[Any, Matrix] = {}
-        self._hinges = self._kinematics()
 
-    # ------------------------------------------------------------------ coordinates
-    def _subhinges(self) -> list[tuple[dict[str, Any], list[sympy.Symbol]]]:
-        """Every subhinge with its coordinates."""
-        at, found = 0, []
-        for body in self.parameters.bodies:
-            for s in body["subhinges"]:
-                found.append((s, self.q[at : at + Q_SIZE[s["kind"]]]))
-                at += Q_SIZE[s["kind"]]
-        return found
-
-    def _quaternions(self) -> list[list[sympy.Symbol]]:
-        return [q[:4] for s, q in self._subhinges() if s["kind"] in ("ball", "free")]
-
-    def _atoms(self) -> list[sympy.Expr]:
-        """What entries are rational in: sines and cosines of angles, the other coordinates."""
-        atoms: list[sympy.Expr] = []
-        for s, q in self._subhinges():
-            if s["kind"] in ANGLES:
-                atoms += [sympy.sin(q[0]), sympy.cos(q[0])]
-            if s["kind"] != "pin":
-                atoms += q
-        return atoms
-
-    def rates(self) -> Matrix:
-        """Γ, (nq, nv): q̇ = Γ(q)θ̇. Ball: ½ q⊗(0, ω); free: that, and R(q) on the linear velocity."""
-        blocks = []
-        half = sympy.Rational(1, 2)
-        for s, q in self._subhinges():
-            if s["kind"] in ("ball", "free"):
-                w, x, y, z = (half * e for e in q[:4])
-                turn = self._matrix([[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]])
-                blocks.append(turn)
-                if s["kind"] == "free":
-                    blocks.append(self._rotation(q[:4]))
-            else:
-                blocks.append(self._matrix([[1]]))
-        return Matrix.diagonal(self.field, blocks)
-
-    # ------------------------------------------------------------------ spatial algebra
     def _matrix(self, entries: Sequence[Sequence[Any]], columns: int | None = None) -> Matrix:
         return Matrix.of(self.field, entries, columns)
-
-    def _skew(self, u: Matrix) -> Matrix:
-        x, y, z = (row.get(0, u.field.zero) for row in u.rows)
-        rows = [{1: -z, 2: y}, {0: z, 2: -x}, {0: -y, 1: x}]
-        return Matrix(u.field, [{j: e for j, e in row.items() if e} for row in rows], 3)
-
-    def _blocks(self, a: Matrix | None, b: Matrix | None, c: Matrix | None, d: Matrix | None) -> Matrix:
-        """[[a, b], [c, d]] of (3, 3) blocks, zero where None."""
-        made = Matrix.zeros(next(x.field for x in (a, b, c, d) if x is not None), 6, 6)
-        for i, j, block in ((0, 0, a), (0, 3, b), (3, 0, c), (3, 3, d)):
-            if block is not None:
-                made.place(slice(i, i + 3), slice(j, j + 3), block)
-        return made
-
-    def _parts(self, x: Matrix) -> tuple[Matrix, Matrix]:
-        column = slice(0, 1)
-        return self._skew(x.block(slice(0, 3), column)), self._skew(x.block(slice(3, 6), column))
-
-    def _crm(self, x: Matrix) -> Matrix:
-        """Ṽ: [[ω̃, 0], [ṽ, ω̃]]."""
-        w, v = self._parts(x)
-        return self._blocks(w, None, v, w)
-
-    def _crf(self, x: Matrix) -> Matrix:
-        """V̄: [[ω̃, ṽ], [0, ω̃]] = −Ṽ*."""
-        w, v = self._parts(x)
-        return self._blocks(w, v, None, w)
-
-    def _phi(self, pose: Pose) -> Matrix:
-        """φ(p,k): [[R, l̃R], [0, R]]."""
-        R, l = pose
-        return self._blocks(R, self._skew(l) @ R, None, R)
-
-    def _compose(self, a: Pose, b: Pose) -> Pose:
-        return a[0] @ b[0], a[1] + a[0] @ b[1]
-
-    def _still(self) -> Pose:
-        return Matrix.identity(self.field, 3), Matrix.zeros(self.field, 3, 1)
-
-    def _rotation(self, q: Sequence[sympy.Expr]) -> Matrix:
-        """R(q): (w² − u·u)I + 2uu* + 2wũ of the quaternion, over |q|² unless it is taken as 1."""
-        w, x, y, z = q
-        rows = [
-            [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z],
-        ]
-        length = 1 if self.unit else w * w + x * x + y * y + z * z
-        return self._matrix([[e / length for e in row] for row in rows])
-
-    # ------------------------------------------------------------------ hinges
-    def _axis_and_point(self, s: dict[str, Any]) -> tuple[Matrix, Matrix]:
-        return self._matrix([[x] for x in s["axis"]], 1), self._matrix([[x] for x in s["point"]], 1)
-
-    def _step(self, s: dict[str, Any], q: Sequence[sympy.Symbol]) -> Pose:
-        """Pose of the frame after a subhinge in the frame before it. A rotation about a: cos q I + sin q ã + (1 − cos q) aa*."""
-        kind, one = s["kind"], Matrix.identity(self.field, 3)
-        a, c = self._axis_and_point(s)
-        if kind == "slider":
-            return one, a.scaled(self.field.element(q[0]))
-        if kind == "free":
-            return self._rotation(q[:4]), self._matrix([[x] for x in q[4:]], 1)
-        if kind == "ball":
-            R = self._rotation(q)
-            return R, c - R @ c
-        sine, cosine = self.field.element(sympy.sin(q[0])), self.field.element(sympy.cos(q[0]))
-        R = one.scaled(cosine) + self._skew(a).scaled(sine) + (a @ a.T).scaled(self.field.one - cosine)
-        travel = self.field.element(s["pitch"] * q[0]) if kind == "screw" else self.field.zero
-        return R, c - R @ c + a.scaled(travel)
-
-    def _rows(self, s: dict[str, Any]) -> Matrix:
-        """Rows of H of one subhinge, in the frame after it: pin (a; c×a), slider (0; a), screw (a; c×a + pitch a), ball (e_i; c×e_i)."""
-        a, c = self._axis_and_point(s)
-        if s["kind"] == "free":
-            return Matrix.identity(self.field, 6)
-        axes = Matrix.identity(self.field, 3) if s["kind"] == "ball" else a
-        turning = Matrix.zeros(self.field, 3, axes.columns) if s["kind"] == "slider" else axes
-        moving = a if s["kind"] == "slider" else self._skew(c) @ axes
-        if s["kind"] == "screw":
-            moving = moving + a.scaled(self.field.element(s["pitch"]))
-        made = Matrix.zeros(self.field, 6, axes.columns)
-        made.place(slice(0, 3), slice(0, axes.columns), turning)
-        made.place(slice(3, 6), slice(0, axes.columns), moving)
-        return made.T
-
-    def _kinematics(self) -> list[tuple[Pose, list[Matrix]]]:
-        """Of each body: its pose in its parent, and the rows of H of each subhinge, carried to the body's frame."""
-        at, made = 0, []
-        self._steps: list[list[Pose]] = []
-        for body in self.parameters.bodies:
-            steps, rows = [], []
-            for s in body["subhinges"]:
-                steps.append(self._step(s, self.q[at : at + Q_SIZE[s["kind"]]]))
-                at += Q_SIZE[s["kind"]]
-            placement = self._matrix(body["rotation"]), self._matrix([[x] for x in body["position"]], 1)
-            for j, s in enumerate(body["subhinges"]):
-                later = reduce(self._compose, steps[j + 1 :], self._still())
-                rows.append(self._rows(s) @ self._phi(later))
-            made.append((reduce(self._compose, steps, placement), rows))
-            self._steps.append(steps)
-        return made
 
     # ------------------------------------------------------------------ letters
     def __call__(self, name: str, argument: Any = None) -> Matrix:
@@ -216,7 +71,7 @@ class Letters:
         made = self._zeros("s", "s")
         for k, p in enumerate(self.parents):
             if p >= 0:
-                made.place(self.states[p], self.states[k], self._phi(self._hinges[k][0]))
+                made.place(self.states[p], self.states[k], force_transform(self.hinges.poses[k]))
         return made
 
     def _resolvent(self, name: str) -> Matrix:
@@ -230,15 +85,15 @@ class Letters:
 
     def _stacked(self, k: int) -> Matrix:
         """H(k)."""
-        rows = [row for part in self._hinges[k][1] for row in part.rows]
+        rows = [row for part in self.hinges.rows[k] for row in part.rows]
         return Matrix(self.field, rows, 6)
 
     def _inertia(self, k: int) -> Matrix:
         """M(k): [[𝓘 − m c̃c̃, m c̃], [−m c̃, m I]]."""
         body = self.parameters.bodies[k]
-        c, m = self._skew(self._matrix([[x] for x in body["com"]], 1)), self.field.element(body["mass"])
+        c, m = skew(self._matrix([[x] for x in body["com"]], 1)), self.field.element(body["mass"])
         first = c.scaled(m)
-        return self._blocks(self._matrix(body["inertia"]) - first @ c, first, -first, Matrix.identity(self.field, 3).scaled(m))
+        return in_blocks(self._matrix(body["inertia"]) - first @ c, first, -first, Matrix.identity(self.field, 3).scaled(m))
 
     def _J(self) -> Matrix:
         rotors = [r for b in self.parameters.bodies for r in b["rotor_inertia"]]
@@ -304,7 +159,7 @@ class Letters:
     def _node(self, name: str) -> tuple[int, Pose]:
         for k, body in enumerate(self.parameters.bodies):
             if body["name"] == name:
-                return k, self._still()
+                return k, still(self.field)
         for node in self.parameters.nodes:
             if node["name"] == name:
                 return node["body"], (self._matrix(node["rotation"]), self._matrix([[x] for x in node["position"]], 1))
@@ -315,7 +170,7 @@ class Letters:
         for j, name in enumerate(names):
             k, pose = self._node(name)
             if k >= 0:
-                made.place(self.states[k], slice(6 * j, 6 * j + 6), self._phi(pose))
+                made.place(self.states[k], slice(6 * j, 6 * j + 6), force_transform(pose))
         return made
 
     def _Lambda(self, names: Sequence[str]) -> Matrix:
@@ -329,11 +184,13 @@ class Letters:
         k, position, component = direction
         made = Matrix.zeros(self.field, 6 * len(self.parents), 1)
         unit = Matrix.identity(self.field, 6).block(slice(0, 6), slice(component, component + 1))
-        made.place(self.states[k], slice(0, 1), self._phi(reduce(self._compose, self._steps[k][position:], self._still())).T @ unit)
+        made.place(
+            self.states[k], slice(0, 1), force_transform(reduce(composed, self.hinges.steps[k][position:], still(self.field))).T @ unit
+        )
         return made
 
     def _Delta(self, direction: int | Sequence[int]) -> Matrix:
-        return self._each(self._crf, self("h", direction))
+        return self._each(crf, self("h", direction))
 
     def _Pi(self, which: int | Sequence[int]) -> Matrix:
         """Π: ones at one coordinate, or at those of subhinges first to last of hinge k (-1: of all), (k, first, last)."""
@@ -341,7 +198,7 @@ class Letters:
         if not isinstance(which, int):
             body, first, last = which
             chosen = []
-            for k, ((_, parts), t) in enumerate(zip(self._hinges, self.coordinates, strict=True)):
+            for k, (parts, t) in enumerate(zip(self.hinges.rows, self.coordinates, strict=True)):
                 ends = list(accumulate((len(p.rows) for p in parts), initial=t.start))
                 if body in (-1, k):
                     chosen += range(ends[min(first, len(parts))], ends[min(last, len(parts))])
@@ -369,7 +226,7 @@ class Letters:
 
     def function(self, name: str, x: Matrix) -> Matrix:
         """crm, crf or mcross of every body's part of a stacked vector."""
-        makers = {"crm": self._crm, "crf": self._crf, "mcross": self._momentum}
+        makers = {"crm": crm, "crf": crf, "mcross": momentum_cross}
         if name not in makers:
             raise _core.EvaluationError(f"the function {name!r} has no closed form here")
         return self._each(makers[name], x)
@@ -377,21 +234,17 @@ class Letters:
     def _theta_dot(self) -> Matrix:
         return self._matrix([[x] for x in self.v], 1)
 
-    def _momentum(self, p: Matrix) -> Matrix:
-        n, f = self._parts(p)
-        return -self._blocks(n, f, f, None)
-
     def _H_dot(self) -> Matrix:
         """Row j of Ḣ(k) is row j of H(k) times crf of the velocity of the subhinges after j."""
         blocks, speeds = [], self("theta_dot")
-        for (_, parts), t in zip(self._hinges, self.coordinates, strict=True):
+        for parts, t in zip(self.hinges.rows, self.coordinates, strict=True):
             rows: list[dict[int, Any]] = []
             at = t.start
             for part in parts:
                 at += len(part.rows)
                 later = slice(at, t.stop)
                 after = self._stacked_after(parts, part)
-                rows += (part @ self._crf(after.T @ speeds.block(later, slice(0, 1)))).rows
+                rows += (part @ crf(after.T @ speeds.block(later, slice(0, 1)))).rows
             blocks.append(Matrix(self.field, rows, 6))
         return self._diagonal(blocks)
 
@@ -400,8 +253,8 @@ class Letters:
         return Matrix(self.field, [row for p in parts[index + 1 :] for row in p.rows], 6)
 
     def _world(self, k: int) -> Pose:
-        own = self._hinges[k][0]
-        return own if self.parents[k] < 0 else self._compose(self._world(self.parents[k]), own)
+        own = self.hinges.poses[k]
+        return own if self.parents[k] < 0 else composed(self._world(self.parents[k]), own)
 
     def _field_of_gravity(self, roots_only: bool) -> Matrix:
         """φ*(0,k)(0; g) at every body; at the roots alone and negative, the base's acceleration."""
@@ -409,9 +262,9 @@ class Letters:
         rows: list[dict[int, Any]] = []
         for k, p in enumerate(self.parents):
             if roots_only:
-                rows += (-self._phi(self._world(k)).T @ g).rows if p < 0 else [{} for _ in range(6)]
+                rows += (-force_transform(self._world(k)).T @ g).rows if p < 0 else [{} for _ in range(6)]
             else:
-                rows += (self._phi((self._world(k)[0], self._still()[1])).T @ g).rows
+                rows += (force_transform((self._world(k)[0], still(self.field)[1])).T @ g).rows
         return Matrix(self.field, rows, 1)
 
 
@@ -445,14 +298,14 @@ LETTERS: dict[str, Callable[..., Matrix]] = {
     "dM": Letters._dM,
     "theta_dot": Letters._theta_dot,
     "H_dot": Letters._H_dot,
-    "Delta_theta_dot": lambda o: o._each(o._crf, o("H").T @ o("theta_dot")),
+    "Delta_theta_dot": lambda o: o._each(crf, o("H").T @ o("theta_dot")),
     "velocity": lambda o: o("phi").T @ o("H").T @ o("theta_dot"),
-    "V_tilde": lambda o: o._each(o._crm, o("velocity")),
-    "V_bar": lambda o: o._each(o._crf, o("velocity")),
-    "momentum_cross": lambda o: o._each(o._momentum, o("M") @ o("velocity")),
+    "V_tilde": lambda o: o._each(crm, o("velocity")),
+    "V_bar": lambda o: o._each(crf, o("velocity")),
+    "momentum_cross": lambda o: o._each(momentum_cross, o("M") @ o("velocity")),
     "a": lambda o: o("V_tilde") @ o("H").T @ o("theta_dot") + o("H_dot").T @ o("theta_dot"),
     "b": lambda o: o("V_bar") @ o("M") @ o("velocity"),
-    "X_world": lambda o: o._diagonal([o._phi(o._world(k)) for k in range(len(o.parents))]),
+    "X_world": lambda o: o._diagonal([force_transform(o._world(k)) for k in range(len(o.parents))]),
     "gravity_field": lambda o: o._field_of_gravity(False),
     "gravity_base": lambda o: o._field_of_gravity(True),
     # What is asked for so often that it has a name: ℳ as typed, the equations of motion's mass matrix, its inverse, bias forces.

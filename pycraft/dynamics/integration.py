@@ -96,12 +96,7 @@ class IntegrationCalls(SensitivityCalls):
         if normalise not in ("never", "each step"):
             raise _core.EvaluationError(f"normalise={normalise!r}: there are 'never' and 'each step'")
         q, v = at_state(self, q, v)
-        times = np.atleast_1d(np.array(_core.real_array(times, "times")))
-        if times.ndim != 1 or not times.size:
-            raise _core.EvaluationError(f"times: a list of times in seconds, not an array of shape {times.shape}")
-        if not np.isfinite(times).all():
-            at = int(np.argmin(np.isfinite(times)))
-            raise _core.EvaluationError(f"times: entry {at} is {times[at]:g}; times are finite numbers of seconds")
+        times = _checked_times(times)
         if step is not None and not step > 0:
             raise _core.EvaluationError(f"step={step}: a step is a positive number of seconds")
         if not integrator.startswith("scipy:"):
@@ -131,3 +126,14 @@ class IntegrationCalls(SensitivityCalls):
             return self.forward_dynamics(q, v, forces - friction * v, form=form, refine=refine, precision=precision)
 
         return integrate_by_scipy(accelerations, self.configuration_rate, q, v, times, integrator.removeprefix("scipy:"), rtol, atol, step)
+
+
+def _checked_times(times: Any) -> np.ndarray:
+    """Times as an array of their own (T,). EvaluationError where there is none, or one is not finite."""
+    made = np.atleast_1d(np.array(_core.real_array(times, "times")))
+    if made.ndim != 1 or not made.size:
+        raise _core.EvaluationError(f"times: a list of times in seconds, not an array of shape {made.shape}")
+    if not np.isfinite(made).all():
+        at = int(np.argmin(np.isfinite(made)))
+        raise _core.EvaluationError(f"times: entry {at} is {made[at]:g}; times are finite numbers of seconds")
+    return made

@@ -10,6 +10,7 @@ import mpmath
 import numpy as np
 
 from .. import _core
+from ..operators.operator_set import OperatorSet
 from .block_reading import BlockStatement, read_by_block
 from .block_relations import Relation, choices, standard
 from .block_values import ANY, Blocks, place_text, value
@@ -51,16 +52,15 @@ class _OnModel:
     refutation: tuple[Any, dict[str, int], float] | None = None
 
 
-def check_by_block(text: str, model: Any, *, states: int, seed: int, precision: str | int) -> CheckReport:
-    """The report of a statement by block; see `pycraft.check`."""
+def check_by_block(text: str, given: OperatorSet | None, *, states: int, seed: int, precision: str | int) -> CheckReport:
+    """The report of a statement by block on these operators, or on random trees; see `pycraft.check`."""
     found: dict[str, tuple[Spec | None, Any, _OnModel]] = {}
-    if model is not None:
-        operators = getattr(model, "soa", model)
-        own = operators._model
-        read = read_by_block(text, _names(operators))
+    if given is not None:
+        own = given._model
+        read = read_by_block(text, _names(given))
         rng = np.random.default_rng(seed)
         drawn = [None] if own is None else [own.random_state(rng) for _ in range(states)]
-        found[operators._source.name] = None, operators, _on_model(read, operators, drawn, precision)
+        found[given._source.name] = None, given, _on_model(read, given, drawn, precision)
     else:
         read = read_by_block(text)
         for spec in family(states):
@@ -69,7 +69,7 @@ def check_by_block(text: str, model: Any, *, states: int, seed: int, precision: 
             found[str(spec)] = (spec, operators, _on_model(read, operators, spec.states(operators._model, 1), precision))
     said = {name: entry for name, entry in found.items() if entry[2].counted}
     if not said:
-        raise _core.EvaluationError(f"{text!r}: no bodies are as it says on {'the random trees' if model is None else 'the model'}")
+        raise _core.EvaluationError(f"{text!r}: no bodies are as it says on {'the random trees' if given is None else 'the model'}")
     whole = Verdict([j for _, _, on in said.values() for j in on.verdict.judgements])
     report = CheckReport.of(text, whole, [*said], read.understood)
     count = sum(on.counted for _, _, on in said.values())

@@ -13,7 +13,7 @@ from typing import Any
 from lark import Lark, Token, Transformer, Tree, exceptions
 
 from .. import _core
-from .vocabulary import FUNCTIONS, SCALARS, WITH_ARGUMENTS, Misread, ParseError, Vocabulary, decimal, needs_arguments, power
+from .vocabulary import FUNCTIONS, SCALARS, WITH_ARGUMENTS, Misread, ParseError, Vocabulary, decimal, is_operator, needs_arguments, power
 
 _BOOK = r"""
 start: side (("==" | "=") side)?
@@ -127,12 +127,7 @@ def _parser(names: tuple[str, ...]) -> Lark:
 
 def _product(factors: list[Any]) -> Any:
     """Operators by @, scalars by *."""
-    return reduce(lambda a, b: a @ b if _is_operator(a) and _is_operator(b) else a * b, factors)
-
-
-def _is_operator(x: Any) -> bool:
-    """Operators, and formulas with derivatives of them; no numbers."""
-    return hasattr(x, "codomain")
+    return reduce(lambda a, b: a @ b if is_operator(a) and is_operator(b) else a * b, factors)
 
 
 class _Evaluate(Transformer):
@@ -177,8 +172,8 @@ class _Evaluate(Transformer):
         elif len(parts) > 1 and not isinstance(parts[-1], list) and (isinstance(parts[-2], list) or not isinstance(parts[-1], Fraction)):
             divisor = parts.pop()
         factors = parts.pop() if isinstance(parts[-1], list) else []
-        operators = [f for f in factors if _is_operator(f)]
-        return [*parts, *(f for f in factors if not _is_operator(f))], operators, divisor
+        operators = [f for f in factors if is_operator(f)]
+        return [*parts, *(f for f in factors if not is_operator(f))], operators, divisor
 
     def number(self, parts):
         if len(parts) == 2 and not decimal(parts[1]):

@@ -10,12 +10,14 @@ import numpy as np
 
 from .. import _core
 from ..arguments import whole
+from ..operators.operator_set import OperatorSet
 from .block_check import check_by_block
 from .block_reading import is_by_block
 from .drawn_vectors import drawn_vectors
 from .judge import FAILS, BoundState, Verdict, judge_states, ladder
 from .parse import Statement, Statements, check_has_space
 from .report import UNDEFINED, CheckReport, Finding, Report
+from .vocabulary import is_operator
 
 
 def check_model(operators: Any, *, states: int = 3, seed: int = 0, precision: str | int = "extended", progress: Any = None) -> Report:
@@ -110,6 +112,10 @@ def with_spaces(lhs: Any, rhs: Any) -> tuple[Any, Any]:
     return lhs, rhs
 
 
+def _is_expression(side: Any) -> bool:
+    return is_operator(side) or isinstance(side, _core.Scalar)
+
+
 def check(
     statement: Any,
     model: Any = None,
@@ -156,14 +162,14 @@ def check(
     if whole(states, "states") < 1:
         raise _core.EvaluationError(f"states is {states}: a statement is checked at one state at least")
     _check_seed(seed)
-    if isinstance(statement, (tuple, list)) and len(statement) == 2 and all(hasattr(side, "text") for side in statement):
+    if isinstance(statement, (tuple, list)) and len(statement) == 2 and all(map(_is_expression, statement)):
         text = f"{statement[0].text()} == {statement[1].text()}"
     elif isinstance(statement, str):
         text = statement
     else:
         raise _core.EvaluationError(f"check takes a statement as text or a pair of expressions, not {statement!r:.80}")
     operators: Any = None if model is None else getattr(model, "soa", model)
-    if model is not None and not hasattr(operators, "_source"):
+    if model is not None and not isinstance(operators, OperatorSet):
         raise _core.EvaluationError(f"a statement is checked on a model or its operators (model.soa), not on {model!r:.80}")
     if isinstance(statement, str) and is_by_block(statement, [] if operators is None else [name for name, *_ in operators.V.blocks]):
         return check_by_block(statement, operators, states=states, seed=seed, precision=precision)

@@ -50,7 +50,7 @@ def along(x: Any, direction: str, operators: Any) -> Any:
     EvaluationError
         What is to be differentiated is no expression.
     """
-    if not hasattr(x, "diff"):
+    if not isinstance(x, (_core.Operator, _core.Scalar)):
         raise _core.EvaluationError(f"{x} is a number: nothing to differentiate")
     if direction == "t":
         return x.dot(vdot=_core.vector("vdot", operators.Theta))

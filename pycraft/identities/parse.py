@@ -20,7 +20,7 @@ from .. import _core
 from .block_reading import refuse_by_block
 from .book import read_book
 from .spelling import Spelled, spelled
-from .vocabulary import FUNCTIONS, WITH_ARGUMENTS, Misread, ParseError, SpacesError, Vocabulary, decimal, is_number, power
+from .vocabulary import FUNCTIONS, WITH_ARGUMENTS, Misread, ParseError, SpacesError, Vocabulary, decimal, is_number, is_operator, power
 
 __all__ = ["ParseError", "Statement", "Statements", "check_has_space"]
 
@@ -181,12 +181,12 @@ def _unscaled(side: _core.Operator) -> Any:
 
 
 def _text(side: Any) -> str:
-    return "" if side is None else side.text() if hasattr(side, "text") else str(side)
+    return "" if side is None else str(side) if is_number(side) else side.text()
 
 
 def _balance(side: Any, other: Any) -> Any:
     """0 and I take the spaces of the other side; numbers beside a scalar become scalars."""
-    if getattr(other, "domain", None) is not None:
+    if is_operator(other) and other.domain is not None:
         if is_number(side) and side == 0:
             return _core.zero(other.domain, other.codomain)
         if isinstance(side, _core.Operator) and side.domain is None:
@@ -198,12 +198,12 @@ def _balance(side: Any, other: Any) -> Any:
 
 
 def _check_same_spaces(lhs: Any, rhs: Any) -> None:
-    if hasattr(lhs, "codomain") != hasattr(rhs, "codomain"):
+    if is_operator(lhs) != is_operator(rhs):
         raise _core.SpaceError(f"{_text(lhs)} and {_text(rhs)}: one is an operator, the other a number")
     if isinstance(lhs, _core.Operator) and isinstance(rhs, _core.Operator):
         check_has_space(lhs, rhs)
         lhs - rhs  # raises where the spaces differ
-    elif hasattr(lhs, "codomain"):  # a formula with derivatives
+    elif is_operator(lhs):  # a formula with derivatives
         for a, b in ((lhs.domain, rhs.domain), (lhs.codomain, rhs.codomain)):
             if a is not None and b is not None and a != b:
                 raise _core.SpaceError(f"{_text(lhs)} and {_text(rhs)} do not act between the same spaces")

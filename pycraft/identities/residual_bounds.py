@@ -30,8 +30,6 @@ CONSTANT = 4.0
 
 _NUMBERS = _core.euclidean(1)
 """The domain of a vector."""
-_TRACE, _LOGDET, _SCALED, _PRODUCT, _RECIPROCAL = 1, 2, 5, 6, 7
-"""Kinds of scalar expressions, as the core numbers them."""
 _RICCATI = {"P", "P_plus", "D", "G", "K", "tau", "tau_bar", "E_psi", "psi", "psi_tilde", "Upsilon", "Omega", "Lambda"}
 
 
@@ -210,35 +208,35 @@ class Sizes:
         return self.norm(factors[0] if len(factors) == 1 else _core._make("product", factors, 1.0))
 
     def _scalar(self, side: _core.Scalar) -> float:
-        kind, value, operand, terms = side._parts()
+        kind, value, operand, terms = side.kind, side.number, side.operand, side.terms
         if operand is None:
             if not terms:
                 return float(abs(value))
             own = [self._scalar(t) for t in terms]
-            if kind == _PRODUCT:
+            if kind == "product":
                 sizes = [self.terms(t) for t in terms]
                 return float(sum(x * np.prod(sizes[:i] + sizes[i + 1 :]) for i, x in enumerate(own)))
-            if kind == _RECIPROCAL:
+            if kind == "reciprocal":
                 return own[0] * self.terms(side) ** 2
-            return float(abs(value) if kind == _SCALED else 1.0) * sum(own)
-        if kind == _LOGDET:  # ln|det X| moves by tr(X⁻¹ δX)
+            return float(abs(value) if kind == "scaled" else 1.0) * sum(own)
+        if kind == "logdet":  # ln|det X| moves by tr(X⁻¹ δX)
             return max(1.0, self.size(operand) * self.norm(operand.inv()))
         return self.size(operand)
 
     def terms(self, side: _core.Scalar) -> float:
         """The size of what a number is a sum of: the diagonal of a trace, one for a logarithm, by which a relative error moves it."""
-        kind, value, operand, terms = side._parts()
+        kind, value, operand, terms = side.kind, side.number, side.operand, side.terms
         if operand is None:
             if not terms:
                 return float(abs(value))
-            if kind == _PRODUCT:
+            if kind == "product":
                 return float(np.prod([self.terms(t) for t in terms]))
-            if kind == _RECIPROCAL:
+            if kind == "reciprocal":
                 return 1 / max(abs(float(self._bind(terms[0]))), 1e-300)
-            return float(abs(value) if kind == _SCALED else 1.0) * sum(self.terms(t) for t in terms)
-        if kind == _TRACE:
+            return float(abs(value) if kind == "scaled" else 1.0) * sum(self.terms(t) for t in terms)
+        if kind == "trace":
             return float(self._diagonal(operand).sum())
-        if kind == _LOGDET:
+        if kind == "logdet":
             return max(1.0, abs(float(self._bind(operand).logdet())))
         return self.norm(operand)
 

@@ -13,6 +13,18 @@ from .. import _core
 from .directions import COORDINATES, along, coordinates_meant
 from .spelling import Spelled
 
+
+class Written:
+    """An operator that is written and not worked out, such as a derivative that is to be proved equal to something.
+
+    It has a domain, a codomain and a text as operators have.
+    """
+
+    def blockdiag(self) -> Written:
+        """Its diagonal blocks."""
+        raise NotImplementedError
+
+
 SCALARS = {
     "trace": lambda x: x.trace(),
     "tr": lambda x: x.trace(),
@@ -23,7 +35,7 @@ SCALARS = {
 FUNCTIONS = {
     **SCALARS,
     "inv": lambda x: x.inv(),
-    **dict.fromkeys(("blockdiag", "blkdiag", "bdiag"), lambda x: x.blockdiag() if hasattr(x, "blockdiag") else _core.blockdiag(x)),
+    **dict.fromkeys(("blockdiag", "blkdiag", "bdiag"), lambda x: x.blockdiag() if isinstance(x, Written) else _core.blockdiag(x)),
     "sqrt": lambda x: x.sqrt(),
     "transpose": lambda x: x.T,
 }
@@ -138,6 +150,11 @@ def decimal(text: str) -> Fraction:
 def is_number(x: object) -> TypeGuard[float | Fraction]:
     """A real number and no scalar expression; NumPy's count."""
     return isinstance(x, Real)
+
+
+def is_operator(x: object) -> bool:
+    """An operator, worked out or not; no number and no scalar expression."""
+    return isinstance(x, (_core.Operator, Written))
 
 
 def power(base: Any, exponent: Any) -> Any:

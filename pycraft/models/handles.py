@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from .. import _core
 from ..arguments import limit_pair, pose_parts, text, whole
 from ..closed import Closed
-
-if TYPE_CHECKING:
-    from .multibody import Multibody
+from .with_operators import WithOperators
 
 Vector = Sequence[float] | np.ndarray
 
@@ -28,13 +26,20 @@ def _component(i: int | str, names: Sequence[str] = ("x", "y", "z")) -> int:
     raise _core.ModelError(f"no component is called {i!r}; there are {', '.join(names)}, or 0 to {len(names) - 1}")
 
 
+def _source(model: WithOperators) -> _core.MultibodyOperators:
+    """Whose parameters they are: the model's operators as the core has them."""
+    source = model.soa._source
+    assert isinstance(source, _core.MultibodyOperators)
+    return source
+
+
 class Body(Closed):
     """A body of a model: `.mass` (kg), `.com` (3,) in the body frame (m), `.inertia` (3, 3) about the centre of mass (kg m²).
 
     The values can be set; each is checked (see `Multibody.add_body`). `.hinge` is the hinge that carries the body.
     """
 
-    def __init__(self, model: Multibody, name: str):
+    def __init__(self, model: WithOperators, name: str):
         self._model, self._name = model, name
 
     @property
@@ -92,7 +97,7 @@ class Body(Closed):
             which, label = 4 + row * (5 - row) // 2 + column, f"inertia.{'xyz'[row]}{'xyz'[column]}"
         else:
             raise _core.ModelError(f"body {self.name!r} has no parameter {name!r}; there are mass, com, inertia, and those of its hinge")
-        return _core._inertia_parameter(self._model.soa._source, body, which, f"{self.name}.{label}")
+        return _core._inertia_parameter(_source(self._model), body, which, f"{self.name}.{label}")
 
     @property
     def parent(self) -> Body | None:
@@ -111,7 +116,7 @@ class Hinge(Closed):
     `.placement` is the pose of the hinge's inboard frame in the parent body's frame; `.limits` are (lower, upper) per coordinate, or None.
     """
 
-    def __init__(self, model: Multibody, name: str):
+    def __init__(self, model: WithOperators, name: str):
         self._model, self._name = model, name
 
     @property
@@ -161,7 +166,7 @@ class Hinge(Closed):
         to 5), radians or metres; "axis": a subhinge's axis turned about component x, y or z of the axes before it, its point held;
         "point": that axis shifted along x, y or z; "rotor_inertia": of coordinate number `component` of the hinge.
         """
-        k, source, name = self._index(), self._model.soa._source, text(name, "a parameter")
+        k, source, name = self._index(), _source(self._model), text(name, "a parameter")
         if name == "rotor_inertia":
             own = range(self._model.nv)[self.v_slice]
             c = _component(component, [str(j) for j in range(len(own))])
@@ -211,7 +216,7 @@ class Hinge(Closed):
 class Node(Closed):
     """A frame on a body, or on the base: `.body` (None for the base), `.pose` (4, 4) in the body's frame."""
 
-    def __init__(self, model: Multibody, name: str):
+    def __init__(self, model: WithOperators, name: str):
         self._model, self._name = model, name
 
     @property

@@ -13,6 +13,7 @@ from ..closed import Closed
 from ..dynamics.integration import IntegrationCalls
 from ..state import State, at_state, random_state
 from .handles import Body, Hinge, Named, Node, Vector
+from .with_operators import WithOperators
 
 _Z = (0.0, 0.0, 1.0)
 _DEFAULT_AXES: dict[str, tuple[tuple[float, float, float], ...]] = {
@@ -26,7 +27,7 @@ _DEFAULT_AXES: dict[str, tuple[tuple[float, float, float], ...]] = {
 }
 
 
-class Multibody(Closed, IntegrationCalls, _core.Multibody):
+class Multibody(Closed, IntegrationCalls, WithOperators):
     """A tree of bodies on hinges, with nodes, a state (`q`, `v`) and gravity (zero until it is set).
 
     Build one body by body, or load it (`pycraft.load`). Bodies are kept depth first, children in the order they were added, and
@@ -55,7 +56,6 @@ class Multibody(Closed, IntegrationCalls, _core.Multibody):
         if not isinstance(welds, str) or welds not in ("lump", "keep"):
             raise _core.ModelError(f"welds={welds!r}: there are 'lump' and 'keep'")
         super().__init__(text(name, "a model"), welds == "keep", strict)
-        self._soa = None
         self._left_aside: dict[str, np.ndarray] = {}
 
     # ------------------------------------------------------------------ structure
@@ -173,17 +173,7 @@ class Multibody(Closed, IntegrationCalls, _core.Multibody):
         """A random state: angles within ±π and travels within ±1 m (or the limits where there are), uniform rotations, v in ±1."""
         return random_state(self, seed)
 
-    # ------------------------------------------------------------------ operators
-    @property
-    def soa(self):
-        """The spatial operators of this model: `soa.phi`, `soa.H`, ..., or several at once: `phi, H, M = soa("phi H M")`."""
-        from ..operators.operator_set import OperatorSet
-
-        if self._soa is None or not self._soa.is_current():
-            self.warn()
-            self._soa = OperatorSet(_core.operators_of(self), self)
-        return self._soa
-
+    # ------------------------------------------------------------------ numbers with their errors
     def certify(self, q=None, v=None, tau=None, **options: Any) -> Any:
         """Forward dynamics with its measured error, what rounding of q, v and tau does, condition, floor of refinement, where digits are
         lost, and what the next rung costs: a `pycraft.accuracy.certificates.certificate.Certificate`.
@@ -201,13 +191,6 @@ class Multibody(Closed, IntegrationCalls, _core.Multibody):
         precision, O(N); the floor, up to 400 coordinates, O(N²).
         """
         return _core._face["certify_dynamics"](self, *at_state(self, q, v), tau, **options)
-
-    def warn(self) -> None:
-        """Say, once, what is legal but worth a word: violated triangle inequalities, massless bodies on hinges."""
-        from .warning import warn
-
-        for _, words in self.take_warnings():
-            warn(words)
 
     # ------------------------------------------------------------------ copies
     def description(self) -> dict[str, Any]:

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from .diagonal_parts import DiagonalParts
 from .equations import NO_FRAME, Equation, Frame, Step, Use
 from .expand import Problem
-from .inverses import LocalRules
+from .inverses import Inverses
+from .local_rules import LocalRules
 from .normal_form import Setting
-from .scalars import ScalarRules
+from .roots import Roots
+from .scalar_rules import ScalarRules
 from .words import ONE, Polynomial, Word, add_to, combine, inverse_of, inverted, plain, split
 
 ROUNDS = 4
@@ -32,15 +35,26 @@ class Outcome:
 
 
 class Attempt(LocalRules):
-    """The rules of one setting and statement, and what they make of it."""
+    """The rules of one setting and statement, and what they make of it.
+
+    Attributes
+    ----------
+    inverses : what is known of the inverses in the statement
+    """
 
     def __init__(self, problem: Problem, setting: Setting, extra: Iterable[tuple[Equation, Word]] = ()):
         super().__init__(problem, setting, list(extra))
+        self.inverses = Inverses(self)
+        diagonal_parts, roots = DiagonalParts(self), Roots(self)
+        added_by = {"inverse": self.inverses.add, "blockdiag": diagonal_parts.add, "half": diagonal_parts.add_half, "sqrt": roots.add}
+        for opaque in problem.opaque:
+            if opaque.kind != "operand":
+                added_by[opaque.kind](opaque)
 
     def run(self, lhs: Polynomial, rhs: Polynomial) -> Outcome:
         """Normal forms of both sides, cleared of inverses where that closes the gap. Raises GaveUp."""
         if self.problem.scalars:
-            scalars = ScalarRules(self)
+            scalars = ScalarRules(self, self.inverses)
             (p, left), (q, right) = (scalars.reduce(side) for side in (lhs, rhs))
             return Outcome(left, right, p, q)
         turned = self._turned(rhs, lhs) if self.problem.numbers else []

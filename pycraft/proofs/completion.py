@@ -1,7 +1,7 @@
 """Completion: where two rules overlap on a word, it can be rewritten in two ways; if these differ, their equality is a new rule.
 
-Only overlaps with what a statement adds are looked at: the rules of `rules.py` have none left that say anything new. Bounded, in rules and
-rewrites; each new rule is a lemma with its own proof.
+Only overlaps with what a statement adds are looked at: the rules of `normal_form` have none left that say anything new. Bounded, in
+rules and rewrites; each new rule is a lemma with its own proof.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def complete(attempt: Attempt) -> int:
 
     None if they say something of the letters of the table alone: the axioms do not, so what the statement presupposes cannot be.
     """
-    own = {id(e) for e in attempt.local} | {id(e.transposed(attempt.alphabet)) for e in attempt.local}
+    own = {id(e) for e in attempt.equations} | {id(e.transposed(attempt.alphabet)) for e in attempt.equations}
     queue = [rule for rule in attempt.rules.all() if id(rule.equation) in own]
     budget, added = Budget(REWRITES), 0
     while queue:

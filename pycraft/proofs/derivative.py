@@ -6,13 +6,13 @@ from fractions import Fraction
 from typing import Any
 
 from .. import _core
-from ..identities.vocabulary import is_number
+from ..identities.vocabulary import Written, is_number
 
 TIME = "t"
 """The direction of a derivative along time, where coordinates are numbers."""
 
 
-class Formula:
+class Formula(Written):
     """A derivative, or what is made of derivatives and operators: goes wherever `prove` takes an expression.
 
     Sums, differences, products (`@`), multiples by numbers and `.T`, with operators on either side. It has no value of its own: `X.diff(i)`

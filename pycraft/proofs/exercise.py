@@ -13,8 +13,8 @@ from typing import Any
 from .. import _core
 from ..identities.parse import Statement, Statements
 from .grading import Exercise, Judgement
-from .proof import example
-from .prove import _operators, prove
+from .models_tried import example, operators_of
+from .prove import prove
 
 __all__ = ["Exercise", "Judgement", "exercise"]
 
@@ -76,7 +76,7 @@ def exercise(theorem: Any, model: Any = None, blank: int | Sequence[int] | None 
 
 def _read_theorem(text: str, model: Any) -> tuple[Any, str]:
     """(the statement, its name in the catalogue)."""
-    operators = _operators(model if model is not None else example())
+    operators = operators_of(model if model is not None else example())
     theorems = {t.name: t for t in operators.theorems()}
     found = theorems.get(text) or next((t for t in theorems.values() if t.name.lower() == text.lower()), None)
     if found is not None:

@@ -16,6 +16,7 @@ from typing import Any
 from .. import _core
 from . import factors
 from .axioms import INVERTIBLE
+from .derivative import Formula
 from .equations import Equation, Step, symmetries
 from .normal_form import WORDS
 from .walk import GaveUp, Walk, carried_out
@@ -139,7 +140,7 @@ class Problem:
         Raises
         ------
         GaveUp
-            More than `rules.WORDS` words.
+            More than `normal_form.WORDS` words.
         """
         self._used = []
         p = self.words(expression)
@@ -156,7 +157,7 @@ class Problem:
         Raises
         ------
         GaveUp
-            Beyond `walk.NODES` nodes, `OPERANDS` inverses, `rules.WORDS` words, or words of `LENGTH` letters.
+            Beyond `walk.NODES` nodes, `OPERANDS` inverses, `normal_form.WORDS` words, or words of `LENGTH` letters.
         """
         return carried_out(self._words(e, transposed))
 
@@ -304,7 +305,7 @@ class Problem:
             text, latex = self._shown(inner, e) if kind in ("inverse", "operand") else (e.text(), f"{{{e.latex()}}}")
             symmetric = kind == "blockdiag" and bool(e.is_symmetric)
             shape = "diagonal" if kind in ("blockdiag", "sqrt", "half") else "full"
-            known = e.written_out() if hasattr(e, "written_out") else e  # of a formula with derivatives, what it is
+            known = e.written_out() if isinstance(e, Formula) else e  # of a formula with derivatives, what it is
             self.alphabet.add(Letter(name, text, latex, symmetric, shape, None, known))
             definition = Equation("definition", f"{text} = {self.alphabet.text(inner)}", monomial(name), inner)
             self.opaque.append(Opaque(name, kind, e, inner, definition))
@@ -336,8 +337,8 @@ class Problem:
 
 def symbol_parts(e: Any) -> tuple[Any, str, list[Any], Any]:
     """(source, ASCII name, arguments: node names or a coordinate, binding) of a symbol."""
-    source, name, numbers, nodes, _, binding = e._parts()[1]
-    return source, name, [*numbers, *nodes], binding
+    letter = e.letter
+    return letter.source, letter.name, letter.arguments, letter.binding
 
 
 def _same_state(a: Any, b: Any) -> bool:

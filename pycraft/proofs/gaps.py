@@ -13,8 +13,8 @@ from ..identities.parse import Statements
 from .axioms import replaced_everywhere, solved
 from .derivation import DerivativeProblem
 from .equations import Step, chain_holds, opened
-from .proof import Proof, example
-from .prove import _operators
+from .models_tried import example, operators_of, operators_of_sources
+from .proof import Proof
 from .shown import GAP, aligned, escaped
 from .words import Polynomial
 
@@ -108,18 +108,17 @@ class WithGaps:
     def _operators(self) -> Any:
         """Those that answers are read on."""
         if self._model is not None:
-            return _operators(self._model)
-        from ..operators.operator_set import OperatorSet
-
-        for source, _ in self.proof._contexts[:1]:
-            model = getattr(source, "model", None)
-            return OperatorSet(source, model if hasattr(model, "random_state") else None)
-        return example().soa
+            return operators_of(self._model)
+        return operators_of_sources(source for source, _ in self.proof._contexts) or example().soa
 
     def _abbreviations(self) -> dict[str, Any]:
         """Vectors and constants by their names, and X₁, ... as the derivation shows them."""
         problem, letters = self._problem(), self.proof._alphabet.letters.values()
-        named = {x.text: x.expression for x in letters if getattr(x.expression, "kind", "") in ("vector", "constant")}
+        named = {
+            x.text: x.expression
+            for x in letters
+            if isinstance(x.expression, _core.Operator) and x.expression.kind in ("vector", "constant")
+        }
         found: dict[str, Any] = {text: e for text, e in named.items() if text.isidentifier()}
         for o in problem.opaque:
             text = self.proof._alphabet.letters[o.name].text

@@ -15,7 +15,8 @@ from .derivation import DerivativeProblem
 from .equations import Step
 from .exercise_steps import candidates, single_equation, used
 from .gaps import WithGaps
-from .proof import Proof, examples
+from .models_tried import examples
+from .proof import Proof
 from .prove import _settings, prove
 from .values import LARGEST, NoValue, transferred
 from .walk import GaveUp

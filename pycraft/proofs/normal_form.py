@@ -123,6 +123,12 @@ def weight(word: Word) -> tuple[int, int, Word]:
     return sum(map(letter_weight, word)), len(word), word
 
 
+def scaled(p: Polynomial) -> tuple[tuple, Number]:
+    """(a key for the polynomial up to a factor, that factor)."""
+    lead = p[max(p, key=weight)]
+    return tuple(sorted((w, ratio(c, lead)) for w, c in p.items())), lead
+
+
 # ---------------------------------------------------------------------- rules
 @dataclass(frozen=True)
 class Rule:

@@ -14,8 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from .. import _core
 from .blocks import moves
 from .equations import Equation, foundations
+from .models_tried import examples
 from .values import LARGEST, SINGULAR, NoValue, Values, is_singular
 from .walk import GaveUp
 from .words import Alphabet, Polynomial, Word, inverted, parse, plain, split
@@ -83,7 +85,7 @@ def is_positive_constant(e: Any) -> bool:
 
 
 def _numbers(e: Any) -> bool:
-    return getattr(e, "kind", "") == "constant" and max(e.shape) <= LARGEST
+    return isinstance(e, _core.Operator) and e.kind == "constant" and max(e.shape) <= LARGEST
 
 
 # ---------------------------------------------------------------------- of a proof
@@ -118,8 +120,6 @@ def nowhere(inverses: Sequence[str], roots: Sequence[str], alphabet: Alphabet, h
 
 def _family(alphabet: Alphabet, hypotheses: Sequence[str], contexts: Any, own: Any) -> Iterator[Values]:
     """Letters at states of the model at hand, where it meets the hypotheses, and of trees that do."""
-    from .proof import examples
-
     if own is not None and len(own.F) <= LARGEST and all(own._source.traits.get(h, True) for h in hypotheses):
         mine = contexts and contexts[0][0] is own._source
         yield Values(alphabet, own, None if own._model is None else own._model.random_state(1), contexts if mine else ())

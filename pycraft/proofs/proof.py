@@ -6,13 +6,13 @@ import copy
 from collections.abc import Sequence
 from typing import Any
 
-from ..models.generators import tree
 from .derivative import Formula
 from .equations import Equation, Step, chain_holds, foundations, numbered
 from .expand import Opaque, Problem, Spelling
+from .models_tried import example, examples, operators_of
 from .presuppositions import nowhere
 from .shown import FullProof, aligned, escaped, lines, page
-from .values import LARGEST, NoValue, Values
+from .values import LARGEST, Values
 from .words import Alphabet, Polynomial, combine
 
 HYPOTHESES = ("J = 0", "serial chain", "single-DOF hinges", "constant H")
@@ -206,8 +206,7 @@ class Proof:
         NoValue
             A letter has no value on that model: a constant of another model, an inverse that does not exist.
         """
-        operators = getattr(model if model is not None else self._model or example(self.hypotheses), "soa", None)
-        operators = operators if operators is not None else model if model is not None else self._model
+        operators = operators_of(model if model is not None else self._model or example(self.hypotheses))
         own = bool(self._contexts) and self._contexts[0][0] is operators._source
         state = None if operators._model is None else operators._model.random_state(seed)
         values = Values(self._alphabet, operators, state, self._contexts if own else (), seed)
@@ -287,31 +286,3 @@ class Proof:
 
 def _unmet(hypotheses: Sequence[str], operators: Any) -> list[str]:
     return [h for h in hypotheses if not operators._source.traits.get(h, True)]
-
-
-def example(hypotheses: Sequence[str] = ()) -> Any:
-    """A small random model that meets these hypotheses, and fails the others."""
-    kinds = ["universal", "ball", "pin", "slider"]
-    if "constant H" in hypotheses:
-        kinds = ["free", "ball", "pin", "slider"]
-    if "single-DOF hinges" in hypotheses:
-        kinds = ["pin", "slider", "pin", "screw"]
-    return tree([-1, 0, 1, 2] if "serial chain" in hypotheses else [-1, 0, 0, 1], kinds, seed=3, rotor_inertia="J = 0" not in hypotheses)
-
-
-def examples(hypotheses: Sequence[str] = ()) -> list[Any]:
-    """Small random models that meet these hypotheses: `example`; a path of six bodies or more, on which powers of E_φ that vanish on
-    a short one are seen; one whose hinges are all free, where H, Υ and compliances of several nodes are regular."""
-    kinds = ["universal", "ball", "pin", "slider", "pin", "ball", "pin"]
-    if "constant H" in hypotheses:
-        kinds[0] = "free"
-    if "single-DOF hinges" in hypotheses:
-        kinds = ["pin", "slider", "pin", "screw", "pin", "slider", "pin"]
-    chain, rotors = "serial chain" in hypotheses, "J = 0" not in hypotheses
-    made = [example(hypotheses), tree([-1, 0, 1, 2, 3, 4, 5 if chain else 1], kinds, seed=5, rotor_inertia=rotors)]
-    if "single-DOF hinges" not in hypotheses:
-        made.append(tree([-1, 0, 1 if chain else 0, 2 if chain else 1], ["free"] * 4, seed=7, rotor_inertia=rotors))
-    return made
-
-
-__all__ = ["HYPOTHESES", "NoValue", "Proof", "example", "examples"]

@@ -15,8 +15,8 @@ from typing import Any
 from .. import _core
 from ..identities.checker import with_spaces
 from ..identities.parse import Statement
-from ..identities.vocabulary import is_number
-from . import mechanics, scalars
+from ..identities.vocabulary import is_number, is_operator
+from . import mechanics, scalar_spelling
 from .attempt import Attempt, Outcome
 from .axioms import theory
 from .cases import by_cases
@@ -24,10 +24,11 @@ from .completion import complete
 from .derivation import DerivativeProblem
 from .derivative import TIME, derivative
 from .equations import Equation, Step, joined, numbered, opened
+from .models_tried import example, examples, operators_of, operators_of_sources
 from .nesting import within_reach
 from .normal_form import Setting, generous
 from .presuppositions import Void, inverses_used, presupposed
-from .proof import Proof, example, examples
+from .proof import Proof
 from .reading import Assumption, assumptions, reading
 from .values import Values
 from .walk import GaveUp
@@ -85,13 +86,13 @@ def prove(lhs: Any, rhs: Any = None, model: Any = None, *, assume: Iterable[str]
     if texts and rhs is not None and model is None:
         model = rhs
     if texts:
-        read_on = reading(_operators(model if model is not None else example()), define)
+        read_on = reading(operators_of(model if model is not None else example()), define)
         read = read_on.statement(lhs)
         if read.rhs is None:
             raise _core.EvaluationError(f"{lhs!r} has one side; a statement is lhs == rhs")
     else:
         read = Statement(*_sides(lhs, rhs), "", "expressions")
-        read_on = reading(_operators(model) if model is not None else _letters_of(read), define)
+        read_on = reading(operators_of(model) if model is not None else _letters_of(read), define)
     return by_cases(assume, lambda case: _prove(read, model, assumptions(read_on, case), read_on.unknown))
 
 
@@ -127,15 +128,11 @@ def prove_derivative(expression: Any, rhs: Any, coordinate: int | str) -> Proof:
 
 
 # ---------------------------------------------------------------------- reading
-def _operators(model: Any) -> Any:
-    return getattr(model, "soa", model)
-
-
 def _sides(lhs: Any, rhs: Any) -> tuple[Any, Any]:
     """Both sides with the spaces of each other; a 0 takes them too. Raises SpaceError where they differ."""
     sides = [lhs, rhs]
     for i, other in ((0, rhs), (1, lhs)):
-        domain = getattr(other, "domain", None)
+        domain = other.domain if is_operator(other) else None
         if domain is not None and is_number(sides[i]) and sides[i] == 0:
             sides[i] = _core.zero(domain, other.codomain)
         elif domain is not None and isinstance(sides[i], _core.Operator) and sides[i].domain is None:
@@ -144,15 +141,15 @@ def _sides(lhs: Any, rhs: Any) -> tuple[Any, Any]:
         left, right = with_spaces(*sides)
         left - right  # raises where the spaces differ
         return sides[0], sides[1]
-    spaces = [(getattr(s, "domain", None), getattr(s, "codomain", None)) for s in sides]
-    if all(domain is not None for domain, _ in spaces) and spaces[0] != spaces[1]:
+    spaces = [(s.domain, s.codomain) for s in sides if is_operator(s) and s.domain is not None]
+    if len(spaces) == 2 and spaces[0] != spaces[1]:
         raise _core.SpaceError(f"{sides[0].text()} and {sides[1].text()} do not act between the same spaces")
     return sides[0], sides[1]
 
 
 def _one_identity(side: Any) -> Any:
     """I for the I I that an I becomes when it is given its space."""
-    if getattr(side, "kind", "") == "product" and all(f.kind == "identity" for f in side.children):
+    if isinstance(side, _core.Operator) and side.kind == "product" and all(f.kind == "identity" for f in side.children):
         return _core.identity(side.domain)
     return side
 
@@ -164,9 +161,9 @@ def _prove(read: Statement, model: Any, assumed: Sequence[Assumption] = (), unkn
     read = Statement(_one_identity(read.lhs), _one_identity(read.rhs), read.text, read.reading)
     sides = [_core.scalar(side) if is_number(side) else side for side in (read.lhs, read.rhs)]
     read = Statement(sides[0], sides[1], read.text, read.reading)
-    problem.scalars = not any(hasattr(side, "kind") for side in sides)
+    problem.scalars = all(isinstance(side, _core.Scalar) for side in sides)
     problem.of_one_model = read.reading == "expressions"
-    expand = problem.expand if not problem.scalars else functools.partial(scalars.expand, problem)
+    expand = problem.expand if not problem.scalars else functools.partial(scalar_spelling.expand, problem)
     try:
         left, right = expand(read.lhs), expand(read.rhs)
     except Void as zero:
@@ -178,7 +175,8 @@ def _prove(read: Statement, model: Any, assumed: Sequence[Assumption] = (), unkn
         space is not None and space.name == "R^1" for space in (read.lhs.domain, read.lhs.codomain)
     )
     nearest: tuple[Polynomial, Polynomial] | None = None
-    own, void = _operators(model) if model is not None else _operators_of(problem), ""
+    own = operators_of(model) if model is not None else operators_of_sources(source for source, _ in problem.contexts)
+    void = ""
     problem.assumed = [_assumed(problem, a) for a in assumed if a.lhs is not None]
     if impossible := _impossible(problem):
         return Proof.of_statement(read, problem, [left, right], [], (p, q), impossible)
@@ -278,7 +276,7 @@ def _attempts(problem: DerivativeProblem, p: Polynomial, q: Polynomial) -> Itera
         yield made[-1], outcome
     for attempt in made:
         try:
-            if attempt.local and complete(attempt):
+            if attempt.equations and complete(attempt):
                 yield attempt, attempt.run(p, q)
         except GaveUp:
             continue
@@ -302,7 +300,8 @@ def _settings(problem: DerivativeProblem) -> Iterator[tuple[Setting, list[tuple[
     rules, constant = problem.derivative_rules()
     letters = {x for p in problem.polynomials() for word in p for x in word}
     names = {underived(plain(x)) for x in letters}
-    deltas = [n for n, known in problem.alphabet.letters.items() if getattr(known.expression, "name", "") in ("Delta", "Delta_theta_dot")]
+    expressions = {n: known.expression for n, known in problem.alphabet.letters.items()}
+    deltas = [n for n, e in expressions.items() if isinstance(e, _core.Operator) and e.name in ("Delta", "Delta_theta_dot")]
     regular = {name for _, name in problem.assumed if name}
     possible = ["J = 0"] * ("J⁻¹" not in letters and "J" not in regular) + ["serial chain"] * ("Υ" in names)
     if names & {"Ḣ", "a"} or TIME in problem.alphabet.along.values():
@@ -326,19 +325,5 @@ def _no_delta(problem: DerivativeProblem, name: str) -> tuple[Equation, Word]:
 
 def _letters_of(read: Statement) -> Any:
     """The operators of the model that expressions are of."""
-    from ..operators.operator_set import OperatorSet
-
-    for side in (read.lhs, read.rhs):
-        for source in getattr(side, "sources", ()):
-            return OperatorSet(source, getattr(source, "model", None))
-    return example().soa
-
-
-def _operators_of(problem: DerivativeProblem) -> Any:
-    """The operators of the model that the letters belong to; None where its states cannot be drawn."""
-    from ..operators.operator_set import OperatorSet
-
-    for source, _ in problem.contexts[:1]:
-        model = getattr(source, "model", None)
-        return OperatorSet(source, model if hasattr(model, "random_state") else None)
-    return None
+    sides = [side for side in (read.lhs, read.rhs) if is_operator(side)]
+    return operators_of_sources(source for side in sides for source in side.sources) or example().soa

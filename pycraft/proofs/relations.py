@@ -10,10 +10,11 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
+from .. import _core
 from .axioms import AXIOMS, theory
 from .blocks import diagonal_part
 from .equations import Equation
@@ -129,7 +130,7 @@ def compliance_facts(problem: Any, hypotheses: Iterable[str]) -> Iterator[tuple[
         yield Equation("structure", text, monomial(*lhs), monomial(*rhs), uses=uses, note=note, check=_nothing_along_the_hinge), lhs
     for name, known in problem.alphabet.letters.items():
         e = known.expression
-        if getattr(e, "kind", "") != "symbol" or e.name != "B" or len(symbol_nodes(e)) != 1 or not marks:
+        if not _is_of_kind("symbol", e) or e.name != "B" or len(e.letter.arguments) != 1 or not marks:
             continue
         star, mark = problem.alphabet.star(name), marks[0]
         whole = (star, *(of_model(x, mark) for x in ("ψ*", "H*", "D⁻¹", "H", "ψ")), name)
@@ -140,9 +141,8 @@ def compliance_facts(problem: Any, hypotheses: Iterable[str]) -> Iterator[tuple[
         yield Equation("structure", text, monomial(*whole), monomial(*inner), uses=[lemma], note=note, check=_blocks_of_compliance), whole
 
 
-def symbol_nodes(e: Any) -> Sequence[str]:
-    """The nodes that a symbol is of."""
-    return e._parts()[1][3]
+def _is_of_kind(kind: str, e: Any) -> TypeGuard[_core.Operator]:
+    return isinstance(e, _core.Operator) and e.kind == kind
 
 
 def _nothing_along_the_hinge() -> bool:
@@ -156,15 +156,15 @@ def _blocks_of_compliance() -> bool:
 def crosses_with_axes(problem: Any) -> Iterator[tuple[Equation, Word]]:
     """h_i* crf(y) = −y* Δ_i, of a coordinate's axis h_i and a vector y: crossing changes sign with the order, and Δ_i = crf(h_i) there."""
     letters = list(problem.alphabet.letters.items())
-    symbols = [(name, x.expression) for name, x in letters if getattr(x.expression, "kind", "") == "symbol"]
+    symbols = [(name, x.expression) for name, x in letters if _is_of_kind("symbol", x.expression)]
     for name, known in letters:
         e = known.expression
-        if getattr(e, "kind", "") != "function" or e.name != "crf":
+        if not _is_of_kind("function", e) or e.name != "crf":
             continue
         y = problem.words(e.children[0])
         for axis, h in symbols:
             for delta, d in symbols if h.name == "h" else ():
-                if d.name != "Delta" or d._parts()[1][2] != h._parts()[1][2]:
+                if d.name != "Delta" or d.letter.arguments != h.letter.arguments:
                     continue
                 a = problem.alphabet
                 star, lhs = a.star_of(y), (a.star(axis), name)

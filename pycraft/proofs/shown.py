@@ -4,12 +4,27 @@ from __future__ import annotations
 
 import html
 from collections.abc import Collection, Sequence
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from .equations import Step
 
-if TYPE_CHECKING:
-    from .proof import Proof
+
+class Shown(Protocol):
+    """What is shown of a proof; it is true as a condition where there is one."""
+
+    statement: str
+    steps: list[Step]
+    presupposes: list[str]
+    note: str
+    _latex: str
+
+    @property
+    def hypotheses(self) -> list[str]: ...
+
+    def all_lemmas(self) -> Sequence[Shown]: ...
+
+    def __bool__(self) -> bool: ...
+
 
 WIDTH = 76
 GAP = "\\boxed{\\;?\\;}"
@@ -93,7 +108,7 @@ MATHEMATICS = {
 class FullProof:
     """A proof with the derivations of its lemmas, each numbered and before what cites it, down to the axioms. See `Proof.full`."""
 
-    def __init__(self, proof: Proof):
+    def __init__(self, proof: Shown):
         self.proof = proof
         self.lemmas = proof.all_lemmas() if proof else []
         self._numbers = {lemma.statement: i for i, lemma in enumerate(self.lemmas, 1)}
@@ -127,21 +142,21 @@ class FullProof:
         return "\\begin{gathered}" + "\\\\[1ex]\n".join(made) + "\\end{gathered}"
 
 
-def where(proof: Proof) -> str:
+def where(proof: Shown) -> str:
     """The hypotheses, as the end of a sentence."""
     return f", where {' and '.join(proof.hypotheses)}" if proof.hypotheses else ""
 
 
-def _where_latex(proof: Proof) -> str:
+def _where_latex(proof: Shown) -> str:
     return f"\\quad\\text{{where {escaped(' and '.join(proof.hypotheses))}}}" if proof.hypotheses else ""
 
 
-def page(proof: Proof) -> str:
+def page(proof: Shown) -> str:
     """A proof alone, as HTML; its steps wrap."""
     return f'{_STYLE}<div class="pycraft-proof">{_section(proof, None, {})}</div>'
 
 
-def _section(proof: Proof, number: int | None, cited: dict[str, int]) -> str:
+def _section(proof: Shown, number: int | None, cited: dict[str, int]) -> str:
     """One proof: its statement, and its steps as a list."""
     label = f"({number}) " if number is not None else ""
     head = f"<b>{html.escape(label + proof.statement + where(proof))}</b>"

@@ -3,7 +3,8 @@ needs Eigen alone.
 
 A plan names sweeps and kernels; here they are unfolded into the equations of body k, its parent p and its children c. `steps` holds one
 writer per kind of step, and all four languages are written from its equations. Source runs by itself: it takes the tree, the given blocks
-(E, H, M, J, and what else the expression reads) and x, and computes P, D, G, ψ, R, Υ, ... on its way.
+(E, H, M, J, and what else the expression reads) and x, and computes P, D, G, ψ, R, Υ, ... on its way; the functions of `runtime/` that it
+calls are copied in front of it.
 """
 
 from __future__ import annotations
@@ -36,7 +37,6 @@ _TITLES = {
     "logdet": "y = ln|det({})|",
     "norm": "y = ‖{}‖",
 }
-_SCALAR_REQUESTS = {1: "trace", 2: "logdet", 3: "norm"}
 
 
 class Algorithm:
@@ -257,23 +257,18 @@ def _parts_of(expression: Any, request: str) -> list[tuple[Any, str, float]]:
     """(operator, request, coefficient) of an operator, or of every operator in a scalar."""
     if not isinstance(expression, _core.Scalar):
         return [(expression, request, 1.0)]
-    kind, value, operand, terms = expression._parts()
-    if kind in _SCALAR_REQUESTS:
-        return [(operand, _SCALAR_REQUESTS[kind], 1.0)]
-    factor = value if terms and kind == _SCALED else 1.0
-    return [(o, r, factor * c) for term in terms for o, r, c in _parts_of(term, request)]
-
-
-_SCALED = 5
+    if expression.operand is not None:
+        return [(expression.operand, expression.kind, 1.0)]
+    factor = expression.number if expression.kind == "scaled" else 1.0
+    return [(o, r, factor * c) for term in expression.terms for o, r, c in _parts_of(term, request)]
 
 
 def _constant_of(scalar: Any) -> float:
     """The number in a scalar."""
-    kind, value, _, terms = scalar._parts()
-    if kind == 0:
-        return float(value)
-    inner = sum(_constant_of(term) for term in terms)
-    return float(value * inner) if kind == _SCALED else float(inner)
+    if scalar.kind == "number":
+        return float(scalar.number)
+    inner = sum(_constant_of(term) for term in scalar.terms)
+    return float(scalar.number * inner) if scalar.kind == "scaled" else float(inner)
 
 
 def _listed(value: Any) -> Any:

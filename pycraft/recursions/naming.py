@@ -221,8 +221,13 @@ def total(cut: Cut | int) -> int:
     return cut if isinstance(cut, int) else cut.total
 
 
-_SQUARE = ("M", "P", "P_plus", "R", "Upsilon", "V_tilde", "V_bar", "Delta_theta_dot", "momentum_cross", "X_world", "Delta", "tau_bar", "dM")
-_GIVEN = ("E", "H", "M", "J", "H_dot", "B", "theta_dot", "gravity_base", "dM", "Pi")
+_SQUARE = (
+    *("M", "P", "P_plus", "R", "Upsilon", "V_tilde", "V_bar", "Delta_theta_dot", "momentum_cross", "X_world", "Delta", "tau_bar", "dM"),
+    "phi_S",
+)
+_GIVEN = ("E", "H", "M", "J", "H_dot", "B", "theta_dot", "gravity_base", "dM", "Pi", "phi_S", "H_S")
+_GIVEN_OF_GROUPS = ("V_tilde", "V_bar", "Delta_theta_dot", "momentum_cross", "X_world", "Delta", "h", "a", "b", "gravity_field")
+"""Of groups of bodies: what is made body by body within them."""
 
 
 class Model:
@@ -249,6 +254,7 @@ class Model:
             "E": square | {"indices": "pk"},
             "H": {"rows": self.theta, "columns": self.bodies},
             "H_dot": {"rows": self.theta, "columns": self.bodies},
+            "H_S": {"rows": self.theta, "columns": self.bodies},
             "G": {"rows": self.bodies, "columns": self.theta},
             "D": {"rows": self.theta, "columns": self.theta},
             "J": {"rows": self.theta, "columns": self.theta},
@@ -274,7 +280,7 @@ class Model:
         if (name, arguments) in self._made:
             return self._made[name, arguments]
         inserted = name == "h" and len(arguments) > 1  # a twist within a hinge: given
-        if name in _GIVEN or inserted:
+        if name in _GIVEN or inserted or (self.source.groups is not None and name in _GIVEN_OF_GROUPS):
             shape: dict[str, Any] = {"rows": self.bodies, "columns": columns} if name == "B" else {}
             made = self._new(name, arguments, **shape)
             self.book.leaves.append(Leaf(made, "symbol", self.index, name, arguments))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from .. import _core
 from .formulas import At, Equation, Function, Identity, Inverse, Product, Term, moved, product, star
 from .steps import Formula, Recursion, Step, writer
 
@@ -69,6 +70,11 @@ def _function_blocks(r: Recursion, step: Step) -> None:
     name = step["symbol"]["name"]
     inner = r.stored(step["in"][0])
     names = {"crm": "crm", "crf": "crf", "mcross": "cross_of_momentum"}
+    if name in names and r.models[step["context"]].source.groups is not None:
+        raise _core.EvaluationError(
+            f"{name} of a vector goes body by body within a group of bodies, which no recursion over groups says; "
+            "write out the operators of the model itself"
+        )
     r.define(r.target(step["out"]), Term(Function(names.get(name, "lower_half"), At(inner))))
 
 

@@ -69,10 +69,10 @@ class OperatorSymbol(MatrixSymbol):
 
 def symbol_of(e: _core.Operator, name: str, rows: Any, columns: Any) -> OperatorSymbol:
     """The symbol of a leaf: a letter that can be found again by name, or an operator that is kept."""
-    payload: Any = e._parts()[1] if e.kind == "symbol" else None
-    if payload is not None and payload[-1] is None:  # a letter, not bound to a state
-        _, letter, numbers, nodes, text, _ = payload
-        token = json.dumps({"name": letter, "numbers": list(numbers), "nodes": list(nodes), "text": text})
+    letter = e.letter if e.kind == "symbol" else None
+    if letter is not None and letter.binding is None:
+        numbers, nodes = ([a for a in letter.arguments if isinstance(a, str) == named] for named in (False, True))
+        token = json.dumps({"name": letter.name, "numbers": numbers, "nodes": nodes, "text": letter.text})
     else:
         token = keep(e)
     return OperatorSymbol(name, rows, columns, token, e.latex(), e.text())

@@ -25,7 +25,6 @@ from .sympy_operators import (
     symbol_of,
 )
 
-_SCALARS = ("number", "trace", "logdet", "norm", "sum", "scaled", "product", "reciprocal")
 # A space and its dual have one dimension: names by the space.
 _DIMENSIONS = {"Θ": "N", "V": "n", "F": "n", "W": "n"}
 
@@ -79,10 +78,8 @@ def _of(e: _core.Operator, fits: sympy.Expr) -> Any:
     if kind == "scaled":
         return OperatorProduct(number(e.coefficient), _of(children[0], fits))
     if kind == "function":
-        payload = e._parts()[1]
-        name = "lower_half" if payload is None else payload[1]
-        token = keep(e) if payload is not None and payload[-1] is not None else ""
-        return BlockFunction(name, _of(children[0], dimension(children[0].domain)), dimension(e.domain), token)
+        token = keep(e) if e.letter is not None and e.letter.binding is not None else ""
+        return BlockFunction(e.name, _of(children[0], dimension(children[0].domain)), dimension(e.domain), token)
     rules = {"transpose": Star, "inverse": Inverse, "blockdiag": BlockDiagonal, "sqrt": Root}
     if kind not in rules:
         raise _core.EvaluationError(f"{e.text()}: an expression of kind {kind!r} has no SymPy form")
@@ -91,14 +88,12 @@ def _of(e: _core.Operator, fits: sympy.Expr) -> Any:
 
 def _ascii(e: _core.Operator) -> str:
     """A letter's name with its arguments: B(tool)."""
-    _, name, numbers, nodes, text, _ = e._parts()[1]
-    return f"{name}({text})" if numbers or nodes else name
+    return f"{e.name}({e.letter.text})" if e.letter.arguments else e.name
 
 
 def scalar(s: _core.Scalar) -> Any:
     """The SymPy expression of a scalar expression, sums and multiples unevaluated."""
-    kind, value, operand, terms = s._parts()
-    name = _SCALARS[kind]
+    name, value, operand, terms = s.kind, s.number, s.operand, s.terms
     if name == "number":
         return number(value)
     if name == "sum":

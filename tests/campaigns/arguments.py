@@ -12,11 +12,10 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from mechanisms import random_tree
-from oracle import reference
-
 import pycraft as pc
 from campaigns.command_line import listed, seeds
+from support.mechanisms import random_tree
+from support.oracle import reference
 
 ANYTHING = [
     None, True, 0, 1, -1, 3.5, -0.0, 1e300, -1e300, 5e-324, np.nan, np.inf, -np.inf, 10**400, 2**40, -(2**70), 1j, np.complex64(1 +

@@ -13,12 +13,11 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from mechanisms import random_tree, uniform_batch
-from random_formulas import draw, seeded
-
 import pycraft as pc
 from campaigns.command_line import seeds, tallied
 from pycraft.operators.operator_set import operator_from_parts
+from support.mechanisms import random_tree, uniform_batch
+from support.random_formulas import draw, seeded
 
 STATES = 3
 

@@ -11,10 +11,9 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from mechanisms import random_tree
-
 import pycraft as pc
 from campaigns.command_line import listed, seeds
+from support.mechanisms import random_tree
 
 FORWARD = [
     {},

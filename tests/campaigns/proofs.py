@@ -26,13 +26,12 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parent.parent))
-from perturbations import dense, exchanges, nodes, replaced
-from random_identities import J0, identity_pair, meeting, tree
-
+sys.path.insert(0, str(Path(__file__).parents[1]))
 import pycraft as pc
 from pycraft.proofs import prove
 from pycraft.proofs.values import NoValue, transferred
+from support.perturbations import dense, exchanges, nodes, replaced
+from support.random_identities import J0, identity_pair, meeting, tree
 
 BOUND = 1e-7
 """What a proved statement may be off by, relative to its sides, on small models: their condition is below 1e6."""

@@ -19,9 +19,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from descriptions import KINDS, body, model, random_description, random_unit, sizes, subhinge
-
 import pycraft as pc
+from support.descriptions import KINDS, body, model, random_description, random_unit, sizes, subhinge
 
 FORMS = ("fast", "ud", "square-root")
 WAYS = tuple(dict(refine=refine, residual=residual) for residual in ("same", "gather", "wider") for refine in (1, "auto"))

@@ -15,11 +15,6 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from descriptions import random_description, random_state
-from mechanisms import build
-from oracle import reference
-from wrong_formulas import TRUE
-
 import pycraft as pc
 from campaigns.command_line import seeds, tallied
 from pycraft.identities.edits import changed
@@ -29,6 +24,10 @@ from pycraft.identities.formula_values import Misfit, Value, evaluate
 from pycraft.identities.judge import BoundState, judge_states
 from pycraft.identities.parse import Statements
 from pycraft.state import State
+from support.descriptions import random_description, random_state
+from support.mechanisms import build
+from support.oracle import reference
+from support.wrong_formulas import TRUE
 
 APART, TOGETHER = 1e-6, 1e-10
 """Dense double on trees of up to six bodies is good to 1e-12 or so; a change makes 1e-3 and more."""

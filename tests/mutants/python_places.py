@@ -16,12 +16,14 @@ TARGETS = [
     "pycraft/closed_forms/*.py",
     "pycraft/sympy_bridge/*.py",
     "pycraft/state.py",
-    "pycraft/kalman.py",
+    "pycraft/kalman/*.py",
     "pycraft/operators/operator_set.py",
     "pycraft/accuracy/certificates/certify.py",
     "pycraft/accuracy/tables/table.py",
     "pycraft/accuracy/hard_cases/shared_bounds.py",
     "pycraft/recursions/steps.py",
+    "pycraft/recursions/copied_parts.py",
+    "pycraft/recursions/runtime/*.py",
 ]
 LEFT_OUT = {"pycraft/peers/peers.py", "pycraft/interop/pinocchio.py", "pycraft/interop/drake.py"}  # tested by `make test-peers`
 OTHER = {

@@ -47,8 +47,7 @@ def contents(root, *patterns):
 
 def everywhere(tree):
     """What any test may depend on: the package, and what tests share."""
-    tests = [path for path in sorted(tree.glob("tests/*.py")) if not path.name.startswith("test_")]
-    return contents(tree, "pycraft/**/*.py") + b"".join(path.read_bytes() for path in tests)
+    return contents(tree, "pycraft/**/*.py", "tests/conftest.py", "tests/support/*.py", "tests/campaigns/*.py")
 
 
 def kept_or_built(root, options, mutants, show):
@@ -120,10 +119,10 @@ def pytest_run(build, files, seconds, tests=None, first=False, **environment):
 
 def noted(build, mutants, options, show):
     """What every everyday test touches, with its seconds; those that are red already are left out."""
-    begin, files = time.perf_counter(), sorted(p for p in (build.tree / "tests").glob("test_*.py") if p.name not in SKIPPED_FILES)
+    begin, files = time.perf_counter(), sorted(p for p in (build.tree / "tests").rglob("test_*.py") if p.name not in SKIPPED_FILES)
     if options.dozen or options.areas:
         wanted = DOZEN_TESTS if options.dozen else {name for m in mutants for name in AREAS.get(m.file, ())}
-        files = [p for p in files if p.name in wanted]
+        files = [p for p in files if p.relative_to(build.tree / "tests").as_posix() in wanted]
     shared = everywhere(build.tree)
 
     def one(path):

@@ -131,7 +131,7 @@ double largest_entry(const Expression& e, const std::map<std::string, std::vecto
   const SkoStructure* tree = nullptr;
   if (on_one_path) {
     for (const Context& c : contexts(e))
-      if (cut_into_bodies_of(c.source->structure(), e.codomain()) && cut_into_bodies_of(c.source->structure(), e.domain())) tree = &c.source->structure();
+      if (cut_alike(c.source->motions(), e.codomain()) && cut_alike(c.source->motions(), e.domain())) tree = &c.source->structure();
     if (!tree) throw SpaceError("blocks on one path of " + show(e) + ": " + e.domain().description() + " and " + e.codomain().description() + " are not cut into the bodies of one model");
     row_body.resize(r.rows), column_body.resize(r.columns);
     for (const auto& block : e.codomain().layout().blocks) std::fill_n(row_body.begin() + block.offset, block.size, block.body);

@@ -540,7 +540,7 @@ class Workspace {
             const Space& space = plan_->registers[s.in[0]].space;
             gathered_.clear();
             elimination::for_rows(space, k, [&](int, int row) { gathered_.push_back(vectors_[s.in[0]][row]); });
-            values[s.context]->function_block(s.symbol, gathered_.data(), out.at(k));
+            values[s.context]->function_block(s.symbol, k, gathered_.data(), out.at(k));
           } else {
             const int n = out.rows[k];
             for (int i = 0; i < n; ++i)

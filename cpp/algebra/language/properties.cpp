@@ -1,5 +1,7 @@
 #include "algebra/language/properties.h"
 
+#include <unordered_map>
+
 #include "algebra/language/lower.h"
 #include "algebra/language/source.h"
 
@@ -20,15 +22,20 @@ const Symbol* edge_symbol(const Expression& e, bool& transposed) {
 
 unsigned triangles(const Expression& e);
 
+// Blocks over one model's bodies and over another's, of the same coordinates, add up to none over either.
+bool cut_alike(const Expression& sum, const Expression& term) {
+  return sum.floating() || term.floating() || (cut_alike(sum.domain(), term.domain()) && cut_alike(sum.codomain(), term.codomain()));
+}
+bool meet_cut_alike(const Expression& left, const Expression& right) {
+  return left.floating() || right.floating() || cut_alike(left.domain(), right.codomain());
+}
+
 // From those of its parts.
 unsigned triangles_of_node(const Expression& e) {
   switch (e.kind()) {
     case NodeKind::symbol: {
       const Symbol& symbol = e.node().symbol;
       const SymbolDefinition& d = *symbol.definition;
-      // Blocks over other bodies than those of its spaces: of no known structure there.
-      if (d.pattern != Pattern::vector && !(cut_into_bodies_of(symbol.source->structure(), e.domain()) && cut_into_bodies_of(symbol.source->structure(), e.codomain())))
-        return 0;
       switch (d.pattern) {
         case Pattern::block_diagonal:
         case Pattern::function: return both;
@@ -52,7 +59,7 @@ unsigned triangles_of_node(const Expression& e) {
     case NodeKind::inverse: return triangles(e.children()[0]);  // the inverse of a block-triangular operator is so too
     case NodeKind::sum: {
       unsigned t = both;
-      for (const Expression& c : e.children()) t &= triangles(c);
+      for (const Expression& c : e.children()) t &= cut_alike(e, c) ? triangles(c) : 0u;
       return t;
     }
     case NodeKind::product: {
@@ -67,7 +74,7 @@ unsigned triangles_of_node(const Expression& e) {
         if (inner) return both;
       }
       unsigned t = both;
-      for (const Expression& c : f) t &= triangles(c);
+      for (size_t i = 0; i < f.size(); ++i) t &= i && !meet_cut_alike(f[i - 1], f[i]) ? 0u : triangles(f[i]);
       return t;
     }
   }
@@ -98,6 +105,17 @@ unsigned triangles(const Expression& e) {
 bool is_block_diagonal(const Expression& e) { return triangles(e) == both; }
 bool is_upper_triangular(const Expression& e) { return triangles(e) & upper; }
 bool is_lower_triangular(const Expression& e) { return triangles(e) & lower_; }
+
+bool cut_in_one_way(const Expression& e) {
+  std::unordered_map<const void*, const void*> bodies;  // by whose coordinates they are
+  bool one = true;
+  visit(e, [&](const Expression& x) {
+    if (!one || x.floating()) return;
+    for (const Space& space : {x.domain(), x.codomain()})
+      if (space.kind() == SpaceKind::Theta) one &= bodies.emplace(space.layout().owner, space.layout().bodies).first->second == space.layout().bodies;
+  });
+  return one;
+}
 
 bool is_symmetric(const Expression& e) {
   if (e.floating()) return true;

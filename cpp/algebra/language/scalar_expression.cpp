@@ -8,6 +8,11 @@
 
 namespace pycraft {
 
+const char* scalar_kind_name(ScalarKind kind) {
+  static const char* const names[] = {"number", "trace", "logdet", "norm", "sum", "scaled", "product", "reciprocal"};
+  return names[static_cast<int>(kind)];
+}
+
 namespace {
 
 constexpr size_t most_factors = 1000;

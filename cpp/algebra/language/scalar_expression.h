@@ -11,6 +11,7 @@
 namespace pycraft {
 
 enum class ScalarKind { number, trace, logdet, norm, sum, scaled, product, reciprocal };
+const char* scalar_kind_name(ScalarKind kind);
 
 class Scalar {
  public:

@@ -34,6 +34,15 @@ SkoSource::SkoSource(SkoStructure structure, std::string name) : structure_(std:
   body_layout_ = body_layout(structure_, this, name_);
 }
 
+void SkoSource::share_bodies_with(const SkoSource& other) {
+  body_layout_ = other.body_layout_;
+  theta_layout_ = cut_into_bodies_of(*theta_layout_, body_layout_->bodies);
+}
+
+void SkoSource::share_coordinates_in_groups(const SkoSource& other, const std::vector<std::vector<int>>& groups) {
+  theta_layout_ = cut_into_groups(*other.theta_layout_, groups, this);
+}
+
 Space SkoSource::space(SpaceKind kind, const std::vector<int>&) const {
   switch (kind) {
     case SpaceKind::Theta: return theta();

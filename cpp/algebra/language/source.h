@@ -44,6 +44,16 @@ struct Traits {
   bool equal_blocks;    // every body has as many rows as its parent: E square
 };
 
+// What the block policy of a body makes of its work: operations and numbers.
+struct BlockCosts {
+  double shift;                          // E(p,k) x, of a body with a parent
+  double inertia;                        // M(k) x
+  double congruence;                     // E A E* to the parent
+  double kinematics, kinematic_numbers;  // E, M at a state, without the rows of H
+  double kinematics_of_coordinate;       // a row of H
+  double square_numbers;                 // a symmetric block of the body
+};
+
 // The source a space belongs to, while it lives; null for R^n.
 std::shared_ptr<SkoSource> source_owning(const Space& space);
 
@@ -62,10 +72,10 @@ class SkoSource : public std::enable_shared_from_this<SkoSource> {
 
   // An edit of the model's structure makes everything built on this source stale.
   void invalidate(const std::string& reason);
-  void check_current() const;
+  virtual void check_current() const;
 
   virtual Traits traits() const = 0;
-  virtual bool rigid() const { return false; }  // blocks of 3x3 structure: cheaper steps
+  virtual BlockCosts costs(int body) const = 0;
   virtual int nq() const = 0;
   virtual int nv() const = 0;
   // Throws ModelError that names what is wrong with a state.
@@ -91,8 +101,10 @@ class SkoSource : public std::enable_shared_from_this<SkoSource> {
 
  protected:
   // Derived models whose bodies, or coordinates, are those of another: their operators combine with its.
-  void share_bodies_with(const SkoSource& other) { body_layout_ = other.body_layout_; }
+  void share_bodies_with(const SkoSource& other);
   void share_coordinates_with(const SkoSource& other) { theta_layout_ = other.theta_layout_; }
+  // The coordinates of another whose bodies, in groups, are this one's.
+  void share_coordinates_in_groups(const SkoSource& other, const std::vector<std::vector<int>>& groups);
 
  private:
   SkoStructure structure_;

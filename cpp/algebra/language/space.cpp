@@ -7,7 +7,7 @@ namespace {
 std::shared_ptr<const SpaceLayout> tree_layout(const std::vector<int>& sizes, const std::vector<int>& offsets,
                                                const std::vector<std::string>& labels, const void* owner, const std::string& owner_name) {
   auto layout = std::make_shared<SpaceLayout>();
-  layout->owner = owner;
+  layout->owner = layout->bodies = owner;
   layout->owner_name = owner_name;
   for (int k = 0; k < static_cast<int>(sizes.size()); ++k) {
     layout->blocks.push_back({k, offsets[k], sizes[k], labels[k]});
@@ -27,13 +27,26 @@ std::shared_ptr<const SpaceLayout> coordinate_layout(const SkoStructure& s, cons
   return tree_layout(s.dof, s.dof_offset, s.hinge_names, owner, owner_name);
 }
 
-bool cut_alike(const Space& a, const Space& b) {
-  return a.belongs_to_bodies() && b.belongs_to_bodies() && a.layout().of_body.size() == b.layout().of_body.size();
+std::shared_ptr<const SpaceLayout> cut_into_groups(const SpaceLayout& layout, const std::vector<std::vector<int>>& groups, const void* bodies) {
+  auto cut = std::make_shared<SpaceLayout>(layout);
+  cut->bodies = bodies;
+  cut->of_body.assign(groups.size(), {});
+  for (size_t g = 0; g < groups.size(); ++g)
+    for (int k : groups[g])
+      for (int block : layout.of_body[k]) {
+        cut->blocks[block].body = static_cast<int>(g);
+        cut->of_body[g].push_back(block);
+      }
+  return cut;
 }
 
-bool cut_into_bodies_of(const SkoStructure& s, const Space& space) {
-  return space.belongs_to_bodies() && space.layout().of_body.size() == static_cast<size_t>(s.bodies());
+std::shared_ptr<const SpaceLayout> cut_into_bodies_of(const SpaceLayout& layout, const void* bodies) {
+  auto cut = std::make_shared<SpaceLayout>(layout);
+  cut->bodies = bodies;
+  return cut;
 }
+
+bool cut_alike(const Space& a, const Space& b) { return a.belongs_to_bodies() && b.belongs_to_bodies() && a.layout().bodies == b.layout().bodies; }
 
 Space Space::euclidean(int dimension) {
   auto layout = std::make_shared<SpaceLayout>();
@@ -84,6 +97,7 @@ bool operator==(const Space& a, const Space& b) {
   if (a.layout_ == b.layout_) return a.kind_ == b.kind_;
   if (!a.layout_ || !b.layout_ || a.kind_ != b.kind_) return false;
   if (a.kind_ == SpaceKind::Euclidean) return a.dimension() == b.dimension();
+  if (a.kind_ == SpaceKind::Theta) return a.layout_->owner == b.layout_->owner;
   const bool nodes = a.kind_ == SpaceKind::NodesV || a.kind_ == SpaceKind::NodesF;
   return nodes && a.layout_->owner == b.layout_->owner && a.layout_->nodes == b.layout_->nodes;
 }

@@ -20,7 +20,8 @@ struct SpaceLayout {
     int body, offset, size;
     std::string label;
   };
-  const void* owner = nullptr;  // identity of the structure that made it; null for Euclidean
+  const void* owner = nullptr;  // whose numbers these are: identity of a source; null for Euclidean
+  const void* bodies = nullptr; // whose bodies it is cut into
   std::string owner_name;
   std::vector<Block> blocks;
   std::vector<std::vector<int>> of_body;  // block indices per body
@@ -54,14 +55,16 @@ class Space {
   std::shared_ptr<const SpaceLayout> layout_;
 };
 
-// Whether both are cut into blocks of as many bodies. Bodies grouped in pairs share the coordinates of the ungrouped model, and with them
-// the space Θ, which is cut as the ungrouped model is.
+// Whether both are cut into blocks of the same bodies. Grouped bodies have the coordinates of the model they are made of, so that both spaces Θ are
+// one: vectors and operators go from either to the other. But each is cut into its own bodies, and what has letters of both into none.
 bool cut_alike(const Space& a, const Space& b);
-// Whether a space is cut into the bodies of this structure.
-bool cut_into_bodies_of(const SkoStructure& structure, const Space& space);
 
 // The layouts of a structure's own spaces.
 std::shared_ptr<const SpaceLayout> body_layout(const SkoStructure& structure, const void* owner, const std::string& owner_name);
 std::shared_ptr<const SpaceLayout> coordinate_layout(const SkoStructure& structure, const void* owner, const std::string& owner_name);
+// The coordinates of a layout, cut into groups of its bodies: groups[g] lists them in the order in which group g takes their coordinates.
+std::shared_ptr<const SpaceLayout> cut_into_groups(const SpaceLayout& layout, const std::vector<std::vector<int>>& groups, const void* bodies);
+// The same blocks, as bodies of another.
+std::shared_ptr<const SpaceLayout> cut_into_bodies_of(const SpaceLayout& layout, const void* bodies);
 
 }  // namespace pycraft

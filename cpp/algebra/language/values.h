@@ -72,8 +72,8 @@ class SkoValues {
   virtual void sweep(SymbolId resolvent, bool transposed, const S* x, S* y, int columns) const = 0;
   // Block (k, k) of a block-diagonal symbol, row-major; for an edge symbol the block (parent of k, k).
   virtual void block(const Symbol& symbol, int k, S* out) const = 0;
-  // A block function of a vector's part at one body.
-  virtual void function_block(const Symbol& function, const S* x, S* out) const = 0;
+  // A block function of a vector's part at body k.
+  virtual void function_block(const Symbol& function, int k, const S* x, S* out) const = 0;
   // A vector symbol.
   virtual void vector(const Symbol& symbol, S* out) const = 0;
   // The fused kernels: y = HφMφ*H* x + J x if asked; y = [I-HψK]* D⁻¹ [I-HψK] x; HφMφ*H* as a dense matrix.

@@ -23,6 +23,7 @@ std::optional<int> Planner::diagonal_by_structure(const Expression& e) {
 
 std::optional<int> Planner::structural_diagonal(const Expression& e) {
   if (is_block_diagonal(e)) return blocks(e);
+  if (!one_cut_) return std::nullopt;
   switch (e.kind()) {
     case NodeKind::symbol:
     case NodeKind::transpose: {
@@ -198,19 +199,12 @@ std::optional<int> Planner::logdet_by_structure(const Expression& e) {
 
 // ln|det| of the factors of a product, HφMφ*H* (whose determinant is D's where J = 0) taken together; none where another one is not square.
 std::optional<std::vector<int>> Planner::logdet_of_factors(const std::vector<Expression>& factors) {
-  const size_t kernel = 5;
-  const auto is_mass_matrix = [&](size_t at) {
-    if (!options_.rules || at + kernel > factors.size() || !is_symbol(factors[at], SymbolId::H)) return false;
-    const Symbol& model = factors[at].node().symbol;
-    const std::vector<Expression> run(factors.begin() + at, factors.begin() + at + kernel);
-    return !model.source->traits().hinge_diagonal && run == kernels_of(model).mass_matrix;
-  };
   std::vector<Expression> parts;
   for (size_t i = 0; i < factors.size();) {
-    if (is_mass_matrix(i)) {
-      const Symbol& model = factors[i].node().symbol;
-      parts.push_back(Letters(model.source, model.binding).D);
-      i += kernel;
+    const Symbol* model = options_.rules ? mass_matrix_model(factors, i) : nullptr;
+    if (model && !model->source->traits().hinge_diagonal) {
+      parts.push_back(Letters(model->source, model->binding).D);
+      i += kernels_of(*model).mass_matrix.size();
     } else {
       if (factors[i].domain().dimension() != factors[i].codomain().dimension()) return std::nullopt;
       parts.push_back(factors[i++]);
@@ -247,12 +241,8 @@ int Planner::logdet(const Expression& e) {
     }
     case NodeKind::sum: {  // ln det (ℳ + J) = ln det D
       if (!options_.rules || e.children().size() != 2) break;
-      for (int i : {0, 1}) {
-        const Expression &product = e.children()[i], &rotors = e.children()[1 - i];
-        if (product.kind() != NodeKind::product || !is_symbol(rotors, SymbolId::J)) continue;
-        const Symbol& model = rotors.node().symbol;
-        if (product.children() == kernels_of(model).mass_matrix) return logdet(Letters(model.source, model.binding).D);
-      }
+      const auto whole = mass_matrices_with_rotors(e);
+      if (whole.size() == 1 && whole[0].coefficient == 1) return logdet(Letters(whole[0].model.source, whole[0].model.binding).D);
       break;
     }
     default: break;

@@ -225,26 +225,18 @@ int Planner::apply_sum(const Expression& e, int x) {
   std::vector<char> used(e.children().size(), 0);
   std::vector<std::pair<Coefficient, int>> parts;
   if (options_.rules)
-    for (size_t i = 0; i < e.children().size(); ++i) {
-      const Scaled a = split_scalar(e.children()[i]);
-      if (a.expression.kind() != NodeKind::product || !is_symbol(a.expression.children()[0], SymbolId::H)) continue;
-      const Symbol& h = a.expression.children()[0].node().symbol;
-      if (a.expression.children() != kernels_of(h).mass_matrix) continue;
-      for (size_t j = 0; j < e.children().size(); ++j) {
-        const Scaled b = split_scalar(e.children()[j]);
-        if (used[j] || !is_symbol(b.expression, SymbolId::J) || !same_model(b.expression.node().symbol, h) || b.coefficient != a.coefficient) continue;
-        Step s{StepKind::mass_matrix};
-        s.in = {x};
-        s.flag = true;
-        s.context = context_of(h, Group::kinematics);
-        s.flops = mass_matrix_flops(*h.source, false);
-        s.bytes = vector_bytes(h.source->theta()) + vector_bytes(h.source->motions());
-        s.tier = 1;
-        s.text = "HφMφ*H* + J (Newton-Euler at rest: base to tip, tip to base)";
-        parts.emplace_back(a.coefficient, emit(std::move(s), {RegisterKind::vector, e.codomain(), {}, nullptr, plan_.registers[x].wide}));
-        used[i] = used[j] = 1;
-        break;
-      }
+    for (const MassMatrixWithRotors& whole : mass_matrices_with_rotors(e)) {
+      const Symbol& h = whole.model;
+      Step s{StepKind::mass_matrix};
+      s.in = {x};
+      s.flag = true;
+      s.context = context_of(h, Group::kinematics);
+      s.flops = mass_matrix_flops(*h.source, false);
+      s.bytes = vector_bytes(h.source->theta()) + vector_bytes(h.source->motions());
+      s.tier = 1;
+      s.text = "HφMφ*H* + J (Newton-Euler at rest: base to tip, tip to base)";
+      parts.emplace_back(whole.coefficient, emit(std::move(s), {RegisterKind::vector, e.codomain(), {}, nullptr, plan_.registers[x].wide}));
+      used[whole.product] = used[whole.rotors] = 1;
     }
   for (size_t i = 0; i < e.children().size(); ++i) {
     if (used[i]) continue;

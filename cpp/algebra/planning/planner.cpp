@@ -175,6 +175,7 @@ Plan Planner::plan(const Expression& typed, Request request) {
   more_digits_ = precision_of(typed) > Precision::double_;
   Expression e = lower(typed, false);
   if (options_.rules) e = optimise(with_swept_tangents(e, request), plan_.notes);
+  one_cut_ = cut_in_one_way(e);
   plan_.domain = e.domain();
   plan_.codomain = e.codomain();
   const bool bodies = cut_alike(e.domain(), e.codomain());
@@ -194,22 +195,11 @@ Plan Planner::plan(const Expression& typed, Request request) {
         plan_.output = emit(std::move(s), {RegisterKind::dense, e.codomain(), e.domain(), nullptr, false});
         break;
       }
-      const Expression* h = nullptr;
-      bool with_J = false;
-      const auto is_mass_matrix = [](const Expression& x) {
-        return x.kind() == NodeKind::product && is_symbol(x.children()[0], SymbolId::H) &&
-               x.children() == kernels_of(x.children()[0].node().symbol).mass_matrix;
-      };
-      if (options_.rules && is_mass_matrix(e)) h = &e.children()[0];
-      if (options_.rules && e.kind() == NodeKind::sum && e.children().size() == 2)
-        for (int i : {0, 1})
-          if (is_mass_matrix(e.children()[i]) && is_symbol(e.children()[1 - i], SymbolId::J) &&
-              same_model(e.children()[i].children()[0].node().symbol, e.children()[1 - i].node().symbol)) {
-            h = &e.children()[i].children()[0];
-            with_J = true;
-          }
-      if (h) {
-        const Symbol& symbol = h->node().symbol;
+      const auto with_rotors = mass_matrices_with_rotors(e);
+      const bool with_J = e.kind() == NodeKind::sum && e.children().size() == 2 && with_rotors.size() == 1 && with_rotors[0].coefficient == 1;
+      const Symbol* model = with_J ? &with_rotors[0].model : mass_matrix_model(e);
+      if (options_.rules && model) {
+        const Symbol& symbol = *model;
         Step s{StepKind::mass_matrix_dense};
         s.flag = with_J;
         s.context = context_of(symbol, Group::kinematics | Group::composite);

@@ -72,6 +72,7 @@ class Planner {
   double vector_bytes(const Space& space) const { return 8.0 * space.dimension(); }
 
   PlanOptions options_;
+  bool one_cut_ = true;              // no coordinates are cut into bodies in two ways
   bool more_digits_ = false;         // bound to a precision above double
   Plan plan_;
   std::unordered_map<Expression, int, ExpressionHash> ids_;

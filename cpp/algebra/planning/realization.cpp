@@ -103,6 +103,7 @@ class RealizationBuilder {
     r_->codomain = e.codomain();
     const auto models = contexts(e);
     if (models.empty()) return fail("no tree in it");
+    if (!planner_.one_cut_) return fail("its coordinates are cut into bodies in two ways");
     r_->tree = models[0].source;
     const SkoStructure& tree = r_->tree->structure();
     for (const Context& c : models)

@@ -5,6 +5,7 @@
 
 #include "algebra/language/display.h"
 #include "algebra/language/lower.h"
+#include "algebra/language/patterns.h"
 #include "algebra/language/properties.h"
 #include "algebra/planning/planner.h"
 #include "algebra/planning/recognise.h"
@@ -22,6 +23,38 @@ Kernels kernels_of(const Symbol& like) {
   k.mass_matrix = lower(o.H * o.phi * o.M * o.phi.T() * o.H.T(), false).children();
   k.mass_matrix_inverse = lower(S.T() * o.D.inv() * S, false).children();
   return k;
+}
+
+const Symbol* mass_matrix_model(const std::vector<Expression>& factors, size_t at) {
+  if (at >= factors.size() || !is_symbol(factors[at], SymbolId::H)) return nullptr;
+  const Symbol& model = factors[at].node().symbol;
+  const std::vector<Expression> known = kernels_of(model).mass_matrix;
+  return at + known.size() <= factors.size() && std::equal(known.begin(), known.end(), factors.begin() + at) ? &model : nullptr;
+}
+
+const Symbol* mass_matrix_model(const Expression& e) {
+  const size_t factors = 5;
+  return e.kind() == NodeKind::product && e.children().size() == factors ? mass_matrix_model(e.children(), 0) : nullptr;
+}
+
+std::vector<MassMatrixWithRotors> mass_matrices_with_rotors(const Expression& e) {
+  std::vector<MassMatrixWithRotors> found;
+  if (e.kind() != NodeKind::sum) return found;
+  std::vector<char> taken(e.children().size(), 0);
+  for (size_t i = 0; i < e.children().size(); ++i) {
+    const Scaled product = split_scalar(e.children()[i]);
+    const Symbol* model = mass_matrix_model(product.expression);
+    if (!model) continue;
+    for (size_t j = 0; j < e.children().size(); ++j) {
+      const Scaled rotors = split_scalar(e.children()[j]);
+      if (taken[j] || !is_symbol(rotors.expression, SymbolId::J) || !same_model(rotors.expression.node().symbol, *model) || rotors.coefficient != product.coefficient)
+        continue;
+      found.push_back({*model, product.coefficient, i, j});
+      taken[j] = 1;
+      break;
+    }
+  }
+  return found;
 }
 
 namespace {

@@ -18,4 +18,16 @@ struct Kernels {
 };
 Kernels kernels_of(const Symbol& like);
 
+// Whose mass matrix HφMφ*H* e is, and whose a product has in its factors from `at` on; null where it is none.
+const Symbol* mass_matrix_model(const Expression& e);
+const Symbol* mass_matrix_model(const std::vector<Expression>& factors, size_t at);
+
+// f (HφMφ*H* + J) among the terms of a sum: both of one model, both with one coefficient. Every term is in one of them at most.
+struct MassMatrixWithRotors {
+  Symbol model;
+  Coefficient coefficient;
+  size_t product, rotors;  // terms
+};
+std::vector<MassMatrixWithRotors> mass_matrices_with_rotors(const Expression& sum);
+
 }  // namespace pycraft

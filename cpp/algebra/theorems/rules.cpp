@@ -15,6 +15,7 @@ class Prototype final : public SkoSource {
  public:
   Prototype() : SkoSource(skeleton(), "prototype") {}
   Traits traits() const override { return {true, true, true, true, true, true}; }
+  BlockCosts costs(int) const override { return {}; }
   int nq() const override { return 0; }
   int nv() const override { return 0; }
   void check_state(const double*, size_t, const double*, size_t) const override {}
@@ -98,10 +99,30 @@ std::optional<Coefficient> ratio(const Pattern_& a, const Pattern_& b) {
 
 struct InversePattern {
   Pattern_ with_J, without_J;
-  int theorem;           // index in sko_theorems
-  bool invert_rhs;       // the pattern is the right side's, the inverse the left side
-  bool transposed;
+  Expression inverse;    // in the letters of the prototype
+  std::string theorem;
 };
+
+// An expression of the prototype's letters, in those of a model.
+Expression in_letters_of(const Expression& e, const Context& model) {
+  const auto& parts = e.children();
+  switch (e.kind()) {
+    case NodeKind::symbol: {
+      const Expression letter = make_symbol(*e.node().symbol.definition, model.source);
+      return model.binding ? letter.at(model.binding) : letter;
+    }
+    case NodeKind::identity: return identity();
+    case NodeKind::transpose: return in_letters_of(parts[0], model).T();
+    case NodeKind::inverse: return in_letters_of(parts[0], model).inv();
+    case NodeKind::scaled: return e.node().coefficient * in_letters_of(parts[0], model);
+    default: {
+      Expression whole = in_letters_of(parts[0], model);
+      for (size_t i = 1; i < parts.size(); ++i)
+        whole = e.kind() == NodeKind::sum ? whole + in_letters_of(parts[i], model) : whole * in_letters_of(parts[i], model);
+      return whole;
+    }
+  }
+}
 
 const std::vector<InversePattern>& inverse_patterns() {
   static const std::vector<InversePattern> patterns = [] {
@@ -116,7 +137,8 @@ const std::vector<InversePattern>& inverse_patterns() {
           const Expression side = rhs ? std::get<Expression>(theorems[i].rhs) : std::get<Expression>(theorems[i].lhs).children()[0];
           Alphabet alphabet;
           const auto form = normal_form(t ? side.T() : side, alphabet);
-          InversePattern p{*codes_of(*form, alphabet), {}, static_cast<int>(i), rhs, t};
+          const Expression other = rhs ? std::get<Expression>(theorems[i].lhs).children()[0] : std::get<Expression>(theorems[i].rhs);
+          InversePattern p{*codes_of(*form, alphabet), {}, t ? other.T() : other, theorems[i].name};
           for (const auto& [codes, c] : p.with_J)
             if (std::find(codes.begin(), codes.end(), j_code) == codes.end()) p.without_J[codes] = c;
           list.push_back(std::move(p));
@@ -138,8 +160,7 @@ const std::vector<Rule>& rewrite_rules() {
       const Expression lhs = std::get<Expression>(t.lhs), rhs = std::get<Expression>(t.rhs);
       const Rule rule = compile(lhs, rhs, t.name), transposed = compile(lhs.T(), rhs.T(), t.name);
       list.push_back(rule);
-      // The rule φR -> φMφ* + R - Rφ* has a transpose that would undo it.
-      if (transposed.from == rule.from || t.name == "φR by φMφ*") continue;
+      if (transposed.from == rule.from || t.one_way) continue;
       list.push_back(transposed);
     }
     return list;
@@ -160,16 +181,13 @@ std::optional<Inverted> invert_by_theorem(const Expression& e) {
   for (const InversePattern& p : inverse_patterns()) {
     const auto f = ratio(*pattern, with_J ? p.with_J : p.without_J);
     if (!f) continue;
-    const Theorem theorem = sko_theorems(models[0].source)[p.theorem];
-    Expression inverse = p.invert_rhs ? std::get<Expression>(theorem.lhs).children()[0] : std::get<Expression>(theorem.rhs);
+    Expression inverse = in_letters_of(p.inverse, models[0]);
     // Without rotor inertia the inverse of [I-HψK]*D⁻¹[I-HψK] is shown, and swept, as HφMφ*H*.
-    if (models[0].binding) inverse = inverse.at(models[0].binding);
-    if (p.transposed) inverse = inverse.T();
     if (!(inverse.domain() == e.codomain()) || !(inverse.codomain() == e.domain())) continue;
     inverse = lower(inverse, false);
     if (!with_J && inverse.kind() == NodeKind::sum && inverse.children().size() == 2 && inverse.children()[1].is(SymbolId::J)) inverse = inverse.children()[0];
     if (*f != 1) inverse = lower((1 / *f) * inverse, false);
-    return Inverted{inverse, theorem.name};
+    return Inverted{inverse, p.theorem};
   }
   return std::nullopt;
 }

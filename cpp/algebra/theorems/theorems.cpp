@@ -70,6 +70,7 @@ std::vector<Theorem> sko_theorems(const std::shared_ptr<SkoSource>& source) {
   state("ERE* = R-M", E * R * E.T(), R - M, no_hypothesis, rewrite);
   state("ERφ* by R", E * R * phi.T(), E * R + R * phi.T() - M * phi.T(), no_hypothesis, rewrite);
   state("φR by φMφ*", phi * R, phi * M * phi.T() + R - R * phi.T(), no_hypothesis, rewrite);
+  list.back().one_way = true;
   state("φMφ* decomposed by R", phi * M * phi.T(), R + phi_tilde * R + R * phi_tilde.T());
   state("mass matrix by composite bodies", MM, H * (R + phi_tilde * R + R * phi_tilde.T()) * H.T());
   state("diagonal blocks of φMφ*", block_diagonal(phi * M * phi.T()), R);

@@ -38,6 +38,7 @@ struct Theorem {
   bool at_most = false;      // lhs <= rhs instead of lhs = rhs
   std::string waiting;       // not evaluated yet, and for what it waits
   std::string text, latex;   // how it is shown, where the sides spelled out would hide it
+  bool one_way = false;      // of a rewriting: its transpose would undo it, and is none
 };
 
 // What an expression is made of: the letters of one model.

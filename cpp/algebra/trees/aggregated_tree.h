@@ -1,17 +1,11 @@
-// The same system with bodies grouped in pairs (a body and the child that follows it in the order), each pair one SKO node:
-//
-//   φ_S = (I - E_S)⁻¹,  H_C = H_S φ_S,  M_C = M_S,  E(p,C) = A φ_S with A the row of E to the pair's first body,
-//   E(C,child) = the child's E in the rows of its own parent.
-//
-// Compound bodies of any kind (loops, coalesced bodies) are built this way; here nothing is constrained, so nothing outside changes.
+// The same system with bodies grouped in pairs (a body and the child that follows it in the order), each pair one SKO node of dense blocks: a tree of
+// any kind in blocks of other sizes, on which theorems are tried (grouping.h). Robots' bodies are grouped by operators/grouped_operators.h.
 #pragma once
 
 #include <memory>
-#include <vector>
 
 #include "algebra/language/source.h"
-#include "algebra/trees/dense_blocks.h"
-#include "algebra/trees/tree_values.h"
+#include "algebra/trees/grouping.h"
 
 namespace pycraft {
 
@@ -20,21 +14,24 @@ class AggregatedTree final : public SkoSource {
   explicit AggregatedTree(std::shared_ptr<SkoSource> base);
 
   const SkoSource& base() const { return *base_; }
-  const std::vector<std::vector<int>>& groups() const { return groups_; }
-  int group_of(int body) const { return group_of_[body]; }
+  const Grouping& grouping() const { return grouping_; }
 
-  Traits traits() const override { return base_->traits(); }
+  Traits traits() const override;
+  BlockCosts costs(int k) const override { return dense_costs(structure(), k); }
   int nq() const override { return base_->nq(); }
   int nv() const override { return base_->nv(); }
   void check_state(const double* q, size_t nq, const double* v, size_t nv) const override { base_->check_state(q, nq, v, nv); }
   std::shared_ptr<const StateData> state() const override { return base_->state(); }
+  void check_current() const override { base_->check_current(); }
   std::uint64_t parameters() const override { return base_->parameters(); }
+  unsigned enter_use() const override { return base_->enter_use(); }
+  void leave_use(unsigned entered) const noexcept override { base_->leave_use(entered); }
   PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_OVERRIDE_MAKE_VALUES)
 
  private:
+  AggregatedTree(std::shared_ptr<SkoSource> base, Grouping grouping);
   std::shared_ptr<SkoSource> base_;
-  std::vector<std::vector<int>> groups_;
-  std::vector<int> group_of_;
+  Grouping grouping_;
 };
 
 }  // namespace pycraft

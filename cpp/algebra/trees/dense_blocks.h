@@ -7,8 +7,10 @@
 #include <memory>
 #include <vector>
 
+#include "algebra/language/source.h"
 #include "algebra/language/structure.h"
 #include "algebra/language/symbol.h"
+#include "algebra/trees/block_policy.h"
 #include "algebra/trees/sweeps/factored_inertia.h"
 #include "algebra/trees/sweeps/singular_pivot.h"
 #include "numerics/small_ldl.h"
@@ -16,6 +18,11 @@
 #include "runtime/errors.h"
 
 namespace pycraft {
+
+inline BlockCosts dense_costs(const SkoStructure& tree, int k) {
+  const double s = tree.size[k], parent = tree.parent[k] < 0 ? 0 : tree.size[tree.parent[k]];
+  return {2 * s * parent, 2 * s * s, 2 * parent * s * s + parent * parent * s, 0, s * s + s * parent, 0, s * s};
+}
 
 template <class S>
 class DenseBlocks {
@@ -42,6 +49,7 @@ class DenseBlocks {
     pivots_.resize(tree.coordinates());
     work_.resize(std::max(4 * s_max * s_max + n_max * s_max, 2 * n_max));
     error_work_.resize(3 * s_max * s_max);
+    uncertain_.resize(tree.bodies());  // of bodies that no sweep has come to, too: the search for a singular pivot asks all
   }
 
   Form form = Form::fast;
@@ -152,8 +160,11 @@ class DenseBlocks {
   void motion_sizes(int k, const S* parent, const S* x, const S* a, S* out, int m) const {
     using std::abs;
     for (int i = 0; i < tree_.size[k] * m; ++i) out[i] = abs(a[i]);
-    if (parent) add_sizes<true>(edge(k), S(1), parent, out, tree_.size[k], tree_.size[tree_.parent[k]], m);
+    if (parent) carried_motion_sizes(k, parent, out, m);
     add_sizes<true>(hinge_map(k), S(1), x, out, tree_.size[k], tree_.dof[k], m);
+  }
+  void carried_motion_sizes(int k, const S* parent, S* out, int m) const {
+    add_sizes<true>(edge(k), S(1), parent, out, tree_.size[k], tree_.size[tree_.parent[k]], m);
   }
   template <class Units>
   void inertia_sizes(int k, const S* a, const Units& u, S* out, int m) const {
@@ -170,12 +181,8 @@ class DenseBlocks {
     add_sizes<false>(hinge_map(k), u.motion, f, out, tree_.dof[k], tree_.size[k], m);
     add_sizes<false>(J.data() + at_[k].d, u.force, x, out, tree_.dof[k], tree_.dof[k], m);
   }
-  S log_determinant_of_D() const {
-    using std::log;
-    S sum = S(0);
-    for (const S& p : pivots_) sum += log(p);
-    return sum;
-  }
+  // Pivots d of D(k) = L d L*.
+  const S* pivots(int k) const { return pivots_.data() + tree_.dof_offset[k]; }
 
   // ---------------------------------------------------------------- articulated inertia (sweeps/articulated_inertia.h)
   void start_articulated(int k) {
@@ -185,7 +192,6 @@ class DenseBlocks {
     }
     if (!factors_) factors_ = std::make_unique<FactoredInertia<S>>(tree_);
     factors_->start(k);
-    uncertain_.resize(tree_.bodies());
     uncertain_[k] = add_factors("M", k, mass(k), tree_.size[k], [&](const S& w, auto u) { factors_->add(k, w, S(0), u); });
   }
   // D, G, P⁺ of body k. Always in doubt: blocks of any size have no cheap bound on their rounding.
@@ -244,22 +250,34 @@ class DenseBlocks {
     }
     require_gain(tree_, k, L.data() + at_[k].d, pivots_.data() + tree_.dof_offset[k], x, form);
   }
-  void error_to_parent(int k) {
+  void error_to_parent(int k) { congruence_add(k, error_left(k), X.data() + at_[tree_.parent[k]].m); }
+
+  // ---------------------------------------------------------------- for neighbours of another kind (trees/mixed_blocks.h)
+  void carried(Carried what, int k, S* out) {
+    const S* A = what == Carried::articulated ? Pplus.data() + at_[k].m : what == Carried::composite ? R.data() + at_[k].m : error_left(k);
+    std::copy_n(A, tree_.size[k] * tree_.size[k], out);
+  }
+  void take(Carried what, int p, const S* A) {
+    S* to = (what == Carried::articulated ? P : what == Carried::composite ? R : X).data() + at_[p].m;
+    for (int i = 0; i < tree_.size[p] * tree_.size[p]; ++i) to[i] += A[i];
+  }
+  template <class F>
+  void carried_columns(int k, F&& f) {
+    for (int r = tree_.dof[k]; r < factors_->pivots(); ++r) f(factors_->weight(r), [&](int i) { return factors_->U(i, r); });
+  }
+  template <class Column>
+  void take_column(int p, const S& weight, Column&& u) {
+    factors_->add(p, weight, S(0), u);
+  }
+  void compliance_from(int k, const S* seen) {
     const int s = tree_.size[k];
-    S *bar = error_work_.data(), *t = bar + s * s, *plus = t + s * s;
-    std::fill_n(bar, 3 * s * s, S(0));
-    for (int i = 0; i < s; ++i) bar[i * s + i] = S(1), plus[i * s + i] = P[at_[k].m + i * s + i];
+    S *y = Y.data() + at_[k].m, *bar = error_work_.data(), *t = bar + s * s;
+    std::fill_n(bar, 2 * s * s, S(0)), std::fill_n(y, s * s, S(0));
+    for (int i = 0; i < s; ++i) bar[i * s + i] = S(1);
     transposed_multiply_add(gain(k), hinge_map(k), bar, s, tree_.dof[k], s, S(-1));
-    multiply_add(bar, X.data() + at_[k].m, t, s, s, s);
-    multiply_transposed_add(t, bar, plus, s, s, s);
-    for (int j = 0; j < tree_.dof[k]; ++j) {
-      const S *h = hinge_map(k) + j * s, *g = gain(k) + j * s;
-      S square = hinge_diagonal(k)[j * tree_.dof[k] + j];
-      for (int a = 0; a < s; ++a) square += h[a] * h[a] * P[at_[k].m + a * s + a];
-      for (int a = 0; a < s; ++a)
-        for (int b = 0; b < s; ++b) plus[a * s + b] += square * g[a] * g[b];
-    }
-    congruence_add(k, plus, X.data() + at_[tree_.parent[k]].m);
+    multiply_add(seen, bar, t, s, s, s);
+    transposed_multiply_add(bar, t, y, s, s, s);
+    add_hinge_compliance(k, y);
   }
 
   // ---------------------------------------------------------------- composite inertia, compliance
@@ -283,9 +301,7 @@ class DenseBlocks {
       multiply_add(Y.data() + at_[p].m, e, w, sp, sp, s);
       transposed_multiply_add(e, w, y, s, sp, s);
     }
-    std::copy_n(hinge_map(k), n * s, t);
-    forward_substitute(L.data() + at_[k].d, n, t, s);
-    add_squares(t, pivots_.data() + tree_.dof_offset[k], y, n, s, S(1));       // + H*D⁻¹H
+    add_hinge_compliance(k, y);
   }
 
  private:
@@ -293,6 +309,32 @@ class DenseBlocks {
     size_t e, h, m, d;
   };
   const S* gain(int k) const { return G.data() + at_[k].h; }  // G*, n x s
+  // X⁺(k)
+  const S* error_left(int k) {
+    const int s = tree_.size[k];
+    S *bar = error_work_.data(), *t = bar + s * s, *plus = t + s * s;
+    std::fill_n(bar, 3 * s * s, S(0));
+    for (int i = 0; i < s; ++i) bar[i * s + i] = S(1), plus[i * s + i] = P[at_[k].m + i * s + i];
+    transposed_multiply_add(gain(k), hinge_map(k), bar, s, tree_.dof[k], s, S(-1));
+    multiply_add(bar, X.data() + at_[k].m, t, s, s, s);
+    multiply_transposed_add(t, bar, plus, s, s, s);
+    for (int j = 0; j < tree_.dof[k]; ++j) {
+      const S *h = hinge_map(k) + j * s, *g = gain(k) + j * s;
+      S square = hinge_diagonal(k)[j * tree_.dof[k] + j];
+      for (int a = 0; a < s; ++a) square += h[a] * h[a] * P[at_[k].m + a * s + a];
+      for (int a = 0; a < s; ++a)
+        for (int b = 0; b < s; ++b) plus[a * s + b] += square * g[a] * g[b];
+    }
+    return plus;
+  }
+  // y += H*D⁻¹H
+  void add_hinge_compliance(int k, S* y) {
+    const int s = tree_.size[k], n = tree_.dof[k];
+    S* t = work_.data();
+    std::copy_n(hinge_map(k), n * s, t);
+    forward_substitute(L.data() + at_[k].d, n, t, s);
+    add_squares(t, pivots_.data() + tree_.dof_offset[k], y, n, s, S(1));
+  }
   // A (s x s) += f Σ a* a / d of the n rows a of t, symmetric.
   static void add_squares(const S* t, const S* d, S* A, int n, int s, const S& f) {
     for (int j = 0; j < n; ++j)

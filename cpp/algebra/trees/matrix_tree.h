@@ -17,6 +17,7 @@ class MatrixTree final : public SkoSource {
              std::vector<std::vector<double>> M, std::vector<std::vector<double>> J);
 
   Traits traits() const override;
+  BlockCosts costs(int k) const override { return dense_costs(structure(), k); }
   int nq() const override { return 0; }
   int nv() const override { return 0; }
   void check_state(const double* q, size_t nq, const double* v, size_t nv) const override;

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "algebra/language/values.h"
+#include "algebra/trees/block_policy.h"
 #include "algebra/trees/sweeps/articulated_inertia.h"
 #include "algebra/trees/sweeps/composite_inertia.h"
 #include "algebra/trees/sweeps/mass_matrix.h"
@@ -14,7 +15,7 @@
 
 namespace pycraft {
 
-template <class Blocks>
+template <BlockPolicy Blocks>
 class TreeValues : public SkoValues<typename Blocks::Scalar> {
  public:
   using S = typename Blocks::Scalar;
@@ -58,7 +59,7 @@ class TreeValues : public SkoValues<typename Blocks::Scalar> {
     }
   }
   void block(const Symbol& symbol, int k, S* out) const override { blocks_.block(symbol.definition->id, k, out); }
-  void function_block(const Symbol& function, const S*, S*) const override { throw EvaluationError("no function '" + function.definition->ascii + "' here"); }
+  void function_block(const Symbol& function, int, const S*, S*) const override { throw EvaluationError("no function '" + function.definition->ascii + "' here"); }
   void vector(const Symbol& symbol, S*) const override { throw EvaluationError("no vector '" + symbol.definition->ascii + "' here"); }
   void mass_matrix(bool with_hinge_diagonal, const S* x, S* y, int m, S* scratch) const override {
     mass_matrix_apply(tree_, blocks_, with_hinge_diagonal, x, y, m, scratch);
@@ -68,7 +69,13 @@ class TreeValues : public SkoValues<typename Blocks::Scalar> {
     residual_sizes(tree_, blocks_, x, b, m, units, sizes);
     rounding_along(tree_, blocks_, w, m, sizes, out);
   }
-  S log_determinant_of_D() const override { return blocks_.log_determinant_of_D(); }
+  S log_determinant_of_D() const override {
+    using std::log;
+    S sum = S(0);
+    for (int k = 0; k < tree_.bodies(); ++k)
+      for (int j = 0; j < tree_.dof[k]; ++j) sum += log(blocks_.pivots(k)[j]);
+    return sum;
+  }
 
   // ℳ(k,j) = H(k) R(k) φ*(k,j)...: column j of body k is carried from k to its ancestors only.
   void mass_matrix_dense(bool with_hinge_diagonal, S* out) const override {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
@@ -167,26 +167,13 @@ def certify_expression(
     check(seed, method=method, on_singular=on_singular)
     scalar = isinstance(expr, _core.Scalar)
     operands = expr.operands() if scalar else [expr]
-    if any(_bound(operand) for operand in operands):
-        raise _core.EvaluationError(f"{expr.text()} is bound to a state already; certify the expression itself: expr.certify(q)")
-    if x is not None and scalar:
-        raise _core.EvaluationError(f"{expr.text()} is a number: there is nothing to apply to x")
     sources = list({id(s): s for operand in operands for s in operand.sources}.values())
     models = [s.model for s in sources if isinstance(s, _core.MultibodyOperators)]
-    for model in models:
-        check_coordinates(model)
-    if any(0 in operand.shape for operand in operands):
-        raise _core.EvaluationError(f"{expr.text()} has no entries: nothing to certify")
+    _check_certifiable(expr, operands, models, x)
+    q, v = _expression_state(models, q, v)
     data: Data = {}
-    if v is None and hasattr(q, "v"):
-        v = q.v
-    if models:
-        if q is None:
-            q, v = np.array(models[0].q), np.array(models[0].v) if v is None else v
-        q = vector(models[0], "q", getattr(q, "q", q), models[0].nq)
-        v = None if v is None else vector(models[0], "v", v, models[0].nv)
-        if len(models) == 1:
-            data = {"q": q} if v is None else {"q": q, "v": v}
+    if len(models) == 1:
+        data = {"q": q} if v is None else {"q": q, "v": v}
     if x is not None:
         data["x"] = applied_to(expr, x)
     rung = Rung(form, refine, residual, precision)
@@ -208,12 +195,6 @@ def certify_expression(
             return float(bound)
         return bound.dense() if x is None else bound @ data["x"]
 
-    notes = {"floor": "is there for forward dynamics"}
-    notes |= {name: f"{name} is zero, and exact" for name in ("v", "x") if name in data and not data[name].any()}
-    if "q" not in data:
-        notes["input_error"] = "q is moved where it has the coordinates of one model"
-    if not articulated:
-        notes["locator"] = "the plan has no articulated sweep: no D(k) is used, and no form matters"
     square = operands[0] if len(operands) == 1 and operands[0].domain == operands[0].codomain else None
     return _certificate(_Measured(
         what=expr.text(),
@@ -229,8 +210,43 @@ def certify_expression(
         square=None if square is None else (square, square.text()),
         sources=sources if articulated else [],
         floor=None,
-        notes=notes,
+        notes=_expression_notes(data, articulated),
     ))  # fmt: skip
+
+
+def _check_certifiable(expr: Any, operands: Sequence[Any], models: Sequence[Any], x: Any) -> None:
+    """Raise EvaluationError for an expression that is bound, a number beside x, or without entries; ModelError without coordinates."""
+    if any(_bound(operand) for operand in operands):
+        raise _core.EvaluationError(f"{expr.text()} is bound to a state already; certify the expression itself: expr.certify(q)")
+    if x is not None and isinstance(expr, _core.Scalar):
+        raise _core.EvaluationError(f"{expr.text()} is a number: there is nothing to apply to x")
+    for model in models:
+        check_coordinates(model)
+    if any(0 in operand.shape for operand in operands):
+        raise _core.EvaluationError(f"{expr.text()} has no entries: nothing to certify")
+
+
+def _expression_state(models: Sequence[Any], q: Any, v: Any) -> tuple[Any, Any]:
+    """(q, v) of the first model, checked: of a State, or the model's present ones where left out; as given without a model."""
+    if v is None and hasattr(q, "v"):
+        v = q.v
+    if not models:
+        return q, v
+    if q is None:
+        q, v = np.array(models[0].q), np.array(models[0].v) if v is None else v
+    q = vector(models[0], "q", getattr(q, "q", q), models[0].nq)
+    return q, None if v is None else vector(models[0], "v", v, models[0].nv)
+
+
+def _expression_notes(data: Data, articulated: bool) -> dict[str, str]:
+    """Why a part of the certificate is not there."""
+    notes = {"floor": "is there for forward dynamics"}
+    notes |= {name: f"{name} is zero, and exact" for name in ("v", "x") if name in data and not data[name].any()}
+    if "q" not in data:
+        notes["input_error"] = "q is moved where it has the coordinates of one model"
+    if not articulated:
+        notes["locator"] = "the plan has no articulated sweep: no D(k) is used, and no form matters"
+    return notes
 
 
 # ---------------------------------------------------------------------- the parts of a certificate

@@ -13,9 +13,6 @@ from ..exact import BITS, EXACT, relative_error
 from ..rungs import Rung, epsilon
 from .certificate import HingeLoss
 
-_REQUESTS = {1: "trace", 2: "logdet", 3: "norm"}
-"""What a scalar asks of its operand, by the kind of the scalar."""
-
 
 def runs_articulated_sweep(expr: Any, request: str) -> bool:
     """Whether the plan of what is evaluated has the sweep that makes P(k), D(k) and G(k).
@@ -26,10 +23,9 @@ def runs_articulated_sweep(expr: Any, request: str) -> bool:
     request : of an operator, as in `plan`: "apply", "dense"; a scalar has its own
     """
     if isinstance(expr, _core.Scalar):
-        kind, _, operand, terms = expr._parts()
-        if kind in _REQUESTS:
-            return runs_articulated_sweep(operand, _REQUESTS[kind])
-        return any(runs_articulated_sweep(term, request) for term in terms)
+        if expr.operand is not None:
+            return runs_articulated_sweep(expr.operand, expr.kind)
+        return any(runs_articulated_sweep(term, request) for term in expr.terms)
     return any("Riccati sweep" in step["text"] for step in expr.plan(request).steps)
 
 

@@ -18,6 +18,10 @@ TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 STEPS = tuple(0.05 / 2**k for k in range(0, 10, 2))
 """Seconds: of integrators with steps of one size."""
 ONE_SIZE = ("rk4", "rkmk4")
+Run = tuple[np.ndarray, np.ndarray, int, float]
+"""q and v at the sampled times, evaluations, seconds."""
+Integrate = Callable[..., Run]
+"""A run by the name of an integrator, with its options."""
 SAMPLES = 8
 """Times, evenly spaced, at which trajectories are compared."""
 
@@ -164,16 +168,10 @@ def work_precision(
     if energy is None and right_hand_side is None and (tau is None or not np.any(tau)):
         energy = _mechanical_energy(model)
 
-    def integrate(integrator: str, precision: str = "double", **options: Any) -> tuple[np.ndarray, np.ndarray, int, float]:
-        if right_hand_side is None:
-            run = model.integrate_ode(q, v, times, tau=tau, integrator=integrator, precision=precision, form=form, refine=refine, **options)
-        elif (solver := integrator.removeprefix("scipy:")) == integrator:
-            known = ", ".join(f"'scipy:{name}'" for name in SCIPY)
-            raise _core.EvaluationError(f"integrator {integrator!r} takes no right-hand side of its own; there are {known}")
-        else:
-            run = integrate_by_scipy(right_hand_side, model.configuration_rate, q, v, times, solver, options["rtol"], options["atol"], None)
-        return run.q, run.v, run.evaluations, run.seconds
-
+    if right_hand_side is None:
+        integrate = _by_forward_dynamics(model, q, v, times, tau=tau, form=form, refine=refine)
+    else:
+        integrate = _by_right_hand_side(model, q, v, times, right_hand_side)
     if progress is not None:
         progress("reference")
     name, wide, tolerance = ("fehlberg78", "extended", 1e-16) if right_hand_side is None else ("scipy:DOP853", "double", 1e-13)
@@ -199,6 +197,29 @@ def work_precision(
             "reference_error": own, "gravity": [float(g) for g in model.gravity], "q": q.tolist(), "v": v.tolist(),
         },
     )  # fmt: skip
+
+
+def _by_forward_dynamics(model: Any, q: np.ndarray, v: np.ndarray, times: np.ndarray, **own: Any) -> Integrate:
+    """Runs of `integrate_ode`."""
+
+    def integrate(integrator: str, precision: str = "double", **options: Any) -> Run:
+        run = model.integrate_ode(q, v, times, integrator=integrator, precision=precision, **own, **options)
+        return run.q, run.v, run.evaluations, run.seconds
+
+    return integrate
+
+
+def _by_right_hand_side(model: Any, q: np.ndarray, v: np.ndarray, times: np.ndarray, right_hand_side: Callable[..., Any]) -> Integrate:
+    """Runs of SciPy's integrators with a right-hand side of one's own. They raise EvaluationError for any other integrator."""
+
+    def integrate(integrator: str, precision: str = "double", **options: Any) -> Run:
+        if (solver := integrator.removeprefix("scipy:")) == integrator:
+            known = ", ".join(f"'scipy:{name}'" for name in SCIPY)
+            raise _core.EvaluationError(f"integrator {integrator!r} takes no right-hand side of its own; there are {known}")
+        run = integrate_by_scipy(right_hand_side, model.configuration_rate, q, v, times, solver, options["rtol"], options["atol"], None)
+        return run.q, run.v, run.evaluations, run.seconds
+
+    return integrate
 
 
 def _row(

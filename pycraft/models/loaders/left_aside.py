@@ -18,12 +18,10 @@ def by_coordinate(model: Multibody, of_hinges: Mapping[str, Mapping[str, float]]
     """
     if not of_hinges:
         return {}
-    arrays, slices = {}, {name: model._slices(k)[1] for k, name in enumerate(model._names()[1])}
+    hinges, counts = model._hinge_sizes()
+    arrays = {}
     for quantity, numbers in of_hinges.items():
-        values = np.full(model.nv, np.nan)
-        for hinge, number in numbers.items():
-            if hinge in slices:
-                values[slices[hinge]] = number
+        values = np.repeat([numbers.get(hinge, np.nan) for hinge in hinges], counts)
         if not np.isnan(values).all():
             arrays[quantity] = values
     return arrays

@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
 
-def rotation_from_rpy(rpy: Sequence[float] | np.ndarray) -> np.ndarray:
-    """Rz(yaw) Ry(pitch) Rx(roll), (3, 3): turns about the fixed axes x, y, z in that order, angles in radians."""
-    (cr, cp, cy), (sr, sp, sy) = map(math.cos, rpy), map(math.sin, rpy)
-    return np.array(
+@lru_cache(maxsize=1 << 12)  # most of a large file's are few different ones
+def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> np.ndarray:
+    """Rz(yaw) Ry(pitch) Rx(roll), (3, 3), read-only: turns about the fixed axes x, y, z in that order, angles in radians."""
+    (cr, cp, cy), (sr, sp, sy) = map(math.cos, (roll, pitch, yaw)), map(math.sin, (roll, pitch, yaw))
+    rotation = np.array(
         [
             [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
             [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
             [-sp, cp * sr, cp * cr],
         ]
     )
+    rotation.setflags(write=False)
+    return rotation
 
 
 def rotation_from_quaternion(quaternion: Sequence[float] | np.ndarray) -> np.ndarray:

@@ -19,7 +19,6 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path, PurePosixPath
-from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
@@ -174,22 +173,17 @@ def _build(tree: _Tree, root: str, welds: str, strict: bool) -> Multibody:
     for name in tree.depth_first(tree.root):
         link, joint = tree.links[name], tree.inboard.get(name)
         hinge = joint.name if joint else "root" if "root" not in joints else f"root of {name}"
-        body: dict[str, Any] = dict(mass=link.mass, com=link.com, inertia=link.inertia)
-        try:
-            if joint is None:
-                model.add_body(name, None, "free" if root == "free" else "weld", hinge_name=hinge, **body)
-                continue
-            model.add_body(
-                name,
-                joint.parent,
-                joint.kind,
-                axis=joint.axis if joint.kind in ("pin", "slider", "planar") else None,
-                hinge_name=hinge,
-                rotation=joint.rotation,
-                position=joint.position,
-                limits=joint.limits,
-                rotor_inertia=joint.rotor_inertia,
-                **body,
+        if joint is None:
+            kind, parent, axes, rotation, position, limits, rotor = "free" if root == "free" else "weld", "", [], None, None, None, None
+        else:
+            kind, parent, rotation, position, limits, rotor = (
+                joint.kind, joint.parent, joint.rotation, joint.position, joint.limits, joint.rotor_inertia,
+            )  # fmt: skip
+            axes = [joint.axis] if kind in ("pin", "slider", "planar") else []
+        lower, upper = limits or (None, None)
+        try:  # what add_body checks of a user's arguments, the reader of the elements has
+            model._add_body(
+                name, parent, kind, hinge, axes, None, 0.0, None, rotation, position, link.mass, link.com, link.inertia, rotor, lower, upper
             )
         except _core.ModelError as error:
             raise tree.located(str(error), name, hinge) from None

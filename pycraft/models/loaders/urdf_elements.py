@@ -136,7 +136,7 @@ class Elements:
         position = self.file.numbers(origin, "xyz", 3, owner, _ZERO)
         if origin.get("quat_xyzw") is None:
             angles = self.file.numbers(origin, "rpy", 3, owner, _ZERO)
-            return rotation_from_rpy(angles) if any(angles) else _IDENTITY, position
+            return rotation_from_rpy(*angles) if any(angles) else _IDENTITY, position
         if origin.get("rpy") is not None:
             raise self.file.error(origin, f"{label(owner)}: <origin> has rpy and quat_xyzw; give one of them")
         quaternion = self.file.numbers(origin, "quat_xyzw", 4, owner)
@@ -153,7 +153,7 @@ class Elements:
         mass = self.file.required(parts, "mass", inertial, element, 'write <mass value="..."/> in kg')
         inertia = self.file.required(parts, "inertia", inertial, element, "write it with six moments, zeros for a point mass")
         rotation, com = self._pose(parts.get("origin"), element)
-        xx, xy, xz, yy, yz, zz = self.file.each_number(inertia, _MOMENTS, element)
+        xx, xy, xz, yy, yz, zz = [self.file.number(inertia, moment, element) for moment in _MOMENTS]
         moments = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         if rotation is not _IDENTITY:
             moments = turned_inertia(rotation, moments)

@@ -6,6 +6,7 @@ import math
 import os
 import re
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from typing import TypeAlias
 
 from lxml import etree
@@ -153,11 +154,8 @@ class XmlFile:
         value = element.get(attribute)
         if value is None and default is not None:
             return default
-        try:  # most are as they should be
-            numbers = [*map(float, value.split())]  # type: ignore[union-attr]  # None is caught
-        except (AttributeError, ValueError):
-            numbers = []
-        if len(numbers) == count and all(map(math.isfinite, numbers)) and value.isascii() and "_" not in value:  # type: ignore[union-attr]  # numbers, so no None
+        numbers = _plain_numbers(value)  # most are as they should be
+        if len(numbers) == count:
             return numbers
         return self._floats(element, attribute, value, count, owner, infinite)
 
@@ -166,24 +164,10 @@ class XmlFile:
         value = element.get(attribute)
         if value is None and default is not None:
             return default
-        try:  # most are one word, and a large file has millions
-            number = float(value)  # type: ignore[arg-type]  # None is caught
-        except (TypeError, ValueError):
-            number = math.nan
-        if math.isfinite(number) and value.isascii() and "_" not in value:  # type: ignore[union-attr]  # finite, so no None
-            return number
+        numbers = _plain_numbers(value)
+        if len(numbers) == 1:
+            return numbers[0]
         return self._floats(element, attribute, value, 1, owner, infinite)[0]
-
-    def each_number(self, element: Element, attributes: tuple[str, ...], owner: Element) -> list[float]:
-        """One number of each of these attributes, all of which must be there."""
-        values = [element.get(attribute) for attribute in attributes]
-        try:  # all at once, where nothing is wrong
-            numbers, written = list(map(float, values)), "".join(values)  # type: ignore[arg-type]  # None is caught
-        except (TypeError, ValueError):
-            return [self.number(element, attribute, owner) for attribute in attributes]
-        if written.isascii() and "_" not in written and all(map(math.isfinite, numbers)):
-            return numbers
-        return [self.number(element, attribute, owner) for attribute in attributes]
 
     def _floats(
         self, element: Element, attribute: str, value: str | None, count: int | None, owner: Element, infinite: bool
@@ -215,6 +199,19 @@ class XmlFile:
         if math.isinf(_float(word)) or word.strip("+-").lower() == "nan":
             return self.error(element, f'{where}="{value}": {word!r} is not a finite number; write {wanted}')
         return self.error(element, f'{where}="{value}": {word!r} is not a number; write {wanted}, with a decimal point')
+
+
+@lru_cache(maxsize=1 << 12)  # a large file has numbers by the million, and most of them many times
+def _plain_numbers(value: str | None) -> tuple[float, ...]:
+    """The finite numbers of an attribute; none of them where it is absent or any of it is something else."""
+    if value is None:
+        return ()
+    try:
+        numbers = tuple(map(float, value.split()))
+    except ValueError:
+        return ()
+    # Digits of other scripts and 1_000 are numbers to Python alone.
+    return numbers if all(map(math.isfinite, numbers)) and value.isascii() and "_" not in value else ()
 
 
 def _float(word: str) -> float:

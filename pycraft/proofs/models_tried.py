@@ -1,0 +1,49 @@
+"""The models that statements are read on and proofs are tried on: the one at hand, or small random ones that meet the hypotheses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from .. import _core
+from ..models.generators import tree
+from ..models.multibody import Multibody
+from ..operators.operator_set import OperatorSet
+
+
+def operators_of(model: Any) -> OperatorSet:
+    """The operators of a model, or these themselves."""
+    return model if isinstance(model, OperatorSet) else model.soa
+
+
+def operators_of_sources(sources: Iterable[_core.SkoSource]) -> OperatorSet | None:
+    """The operators of the model that the first of these is of; None without any. It has states where it is a Multibody."""
+    for source in sources:
+        model = source.model if isinstance(source, _core.MultibodyOperators) else None
+        return OperatorSet(source, model if isinstance(model, Multibody) else None)
+    return None
+
+
+def example(hypotheses: Sequence[str] = ()) -> Any:
+    """A small random model that meets these hypotheses, and fails the others."""
+    kinds = ["universal", "ball", "pin", "slider"]
+    if "constant H" in hypotheses:
+        kinds = ["free", "ball", "pin", "slider"]
+    if "single-DOF hinges" in hypotheses:
+        kinds = ["pin", "slider", "pin", "screw"]
+    return tree([-1, 0, 1, 2] if "serial chain" in hypotheses else [-1, 0, 0, 1], kinds, seed=3, rotor_inertia="J = 0" not in hypotheses)
+
+
+def examples(hypotheses: Sequence[str] = ()) -> list[Any]:
+    """Small random models that meet these hypotheses: `example`; a path of six bodies or more, on which powers of E_φ that vanish on
+    a short one are seen; one whose hinges are all free, where H, Υ and compliances of several nodes are regular."""
+    kinds = ["universal", "ball", "pin", "slider", "pin", "ball", "pin"]
+    if "constant H" in hypotheses:
+        kinds[0] = "free"
+    if "single-DOF hinges" in hypotheses:
+        kinds = ["pin", "slider", "pin", "screw", "pin", "slider", "pin"]
+    chain, rotors = "serial chain" in hypotheses, "J = 0" not in hypotheses
+    made = [example(hypotheses), tree([-1, 0, 1, 2, 3, 4, 5 if chain else 1], kinds, seed=5, rotor_inertia=rotors)]
+    if "single-DOF hinges" not in hypotheses:
+        made.append(tree([-1, 0, 1 if chain else 0, 2 if chain else 1], ["free"] * 4, seed=7, rotor_inertia=rotors))
+    return made

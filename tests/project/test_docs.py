@@ -1,0 +1,106 @@
+"""What the documents say is so: the operator table is complete, examples in docstrings and in the README run."""
+
+import doctest
+import importlib
+import pkgutil
+import re
+import textwrap
+from pathlib import Path
+
+import pytest
+
+import pycraft
+from pycraft import _core
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_notation_lists_every_operator():
+    text = (ROOT / "docs" / "notation.md").read_text()
+    for ascii_name, unicode_name, latex, *_ in _core.symbol_table():
+        row = next((line for line in text.splitlines() if re.match(rf"\| `{re.escape(ascii_name)}[`(]", line)), None)
+        assert row is not None, ascii_name
+        assert f"| {unicode_name} |" in row and f"`{latex}`" in row, row
+
+
+def modules():
+    skipped = ("pycraft._core", "pycraft.cli.__main__", "pycraft.interop.pinocchio", "pycraft.peers.peers")
+    return sorted(m.name for m in pkgutil.walk_packages(pycraft.__path__, "pycraft.") if m.name not in skipped)
+
+
+@pytest.mark.parametrize("name", modules())
+def test_docstring_examples(name):
+    module = importlib.import_module(name)
+    result = doctest.testmod(module, optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
+    assert result.failed == 0
+
+
+def test_the_readme_example_runs():
+    text = (ROOT / "README.md").read_text()
+    block = re.search(r"```python\n(.*?)```", text, re.S).group(1)
+    names = {}
+    exec(compile(block, "README.md", "exec"), names)
+    assert names["MM"].shape == (7, 7)
+
+
+@pytest.mark.parametrize(("page", "examples"), [("sensitivities", 20), ("comparing", 5), ("mixed_trees", 8)])
+def test_the_pages_run(page, examples):
+    options = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
+    result = doctest.testfile(str(ROOT / "docs" / f"{page}.md"), module_relative=False, optionflags=options)
+    assert result.failed == 0 and result.attempted > examples
+
+
+def test_help_starts_with_what_to_type():
+    typed, rest = pycraft.__doc__.split("What to type::")[1].split("\n\n", 2)[1:]
+    names = {}
+    exec(textwrap.dedent(typed), names)
+    assert names["MM"].shape == (7, 7) and "pc.check(" in typed and "doctest" not in typed and "arm.soa?" in rest
+
+
+ROBOTS = ROOT / "pycraft" / "models" / "robots"
+
+
+def test_what_the_page_of_algorithms_prints():
+    text = (ROOT / "docs" / "algorithm.md").read_text()
+    names = {}
+    for block in re.findall(r"```python\n(.*?)```", text, re.S):
+        exec(compile(block, "algorithm.md", "exec"), names)
+    assert abs(names["y"] - names["MM"].inv() @ names["x"]).max() < 1e-9
+    printed = re.findall(r"`print\((\w+)\.algorithm\(\)\)`[^\n]*:\n\n```\n(.*?)```", text, re.S)
+    assert [name for name, _ in printed] == ["MM", "inverse"]
+    for name, shown in printed:
+        assert str(names[name].algorithm()).strip() == shown.strip(), name
+
+
+@pytest.mark.peers
+def test_the_other_packages_of_the_page_of_comparisons(tmp_path, monkeypatch):
+    pytest.importorskip("pinocchio")
+    monkeypatch.chdir(tmp_path)
+    Path("panda.urdf").write_text((ROBOTS / "panda.urdf").read_text())
+    Path("panda.xml").write_text(pycraft.interop.export.to_mjcf(pycraft.models.robots.panda()))
+    block = re.search(r"```python\n(import mujoco.*?)```", (ROOT / "docs" / "comparing.md").read_text(), re.S).group(1)
+    names = {"pc": pycraft, "arm": pycraft.models.robots.panda()}
+    imports, *compared = block.splitlines()
+    exec(imports, names)
+    assert len(compared) == 3 and all(eval(line, names) for line in compared)
+
+
+@pytest.mark.parametrize("page", ["symbolic", "kalman", "accuracy", "evaluation", "statements", "teaching", "proofs"])
+def test_the_blocks_of_a_page_run(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / f"{page}.md").read_text(), re.S)
+    for block in blocks:
+        exec(compile(block, f"{page}.md", "exec"), names)
+    assert blocks and len(names) > 3
+
+
+def test_public_names_have_docstrings():
+    for name in pycraft.__all__:
+        assert getattr(pycraft, name).__doc__, name
+
+
+def test_no_machine_or_package_host_in_tracked_text():
+    for path in [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / "pycraft").rglob("*.py")]:
+        text = path.read_text()
+        assert not re.search(r"/(home|tmp)/", text), path

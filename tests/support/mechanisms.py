@@ -1,0 +1,57 @@
+"""Mechanisms for tests: descriptions of every hinge kind and tree shape, built as models and put at a random state."""
+
+import numpy as np
+
+import pycraft as pc
+from support.descriptions import KINDS, random_description
+
+SHAPES = {"chain": [-1, 0, 1, 2], "tree": [-1, 0, 0, 1, 1], "forest": [-1, 0, -1, 2, 2]}
+SEQUENCES = {
+    "ball-slider": ("ball", "slider"),
+    "slider-ball": ("slider", "ball"),
+    "screw-ball-pin": ("screw", "ball", "pin"),
+    "pin-pin-slider-screw": ("pin", "pin", "slider", "screw"),
+}
+LARGE_TREE = [-1, 0, 0, 1, 1, 2, 4, 4, 3, 7, 5]
+
+
+def build(description, seed=0):
+    """The model of a description, at a random state."""
+    model = pc.Multibody.from_description(description)
+    state = model.random_state(seed)
+    model.q, model.v = state.q, state.v
+    return model
+
+
+def with_hinges(kind, shape, rotor_inertia=False, seed=0):
+    """A mechanism of one hinge kind or sequence on every second body, pins between them."""
+    parents = SHAPES[shape]
+    sequence = SEQUENCES.get(kind, kind)
+    kinds = [sequence if k % 2 == 0 else "pin" for k in range(len(parents))]
+    number = [*KINDS, *SEQUENCES].index(kind) * 10 + list(SHAPES).index(shape)
+    return build(random_description(parents, kinds, 1000 + number + seed, rotor_inertia), seed)
+
+
+def every_kind(rotor_inertia=False, seed=0):
+    """A branched tree with one hinge of every kind, a kept weld among them."""
+    return build(random_description(LARGE_TREE, KINDS, 40 + seed, rotor_inertia), seed)
+
+
+def random_tree(rng, bodies, rotor_inertia=None, kinds=None):
+    """A random forest of random kinds (welds kept), with or without rotor inertia by a toss where that is None."""
+    parents = [int(rng.integers(-1, k)) if k else -1 for k in range(bodies)]
+    kinds = [str(x) for x in rng.choice([k for k in (kinds or KINDS)], bodies)]
+    if rotor_inertia is None:
+        rotor_inertia = bool(rng.integers(2))
+    return build(random_description(parents, kinds, int(rng.integers(2**31)), rotor_inertia), int(rng.integers(2**31)))
+
+
+def nodes_of(model):
+    """Names of the nodes that move."""
+    return [name for name, node in model.nodes.items() if node.body is not None]
+
+
+def uniform_batch(model, size, seed=0):
+    """q (size, nq) and v (size, nv) of random states."""
+    states = [model.random_state(seed + i) for i in range(size)]
+    return np.array([s.q for s in states]).reshape(size, model.nq), np.array([s.v for s in states]).reshape(size, model.nv)
