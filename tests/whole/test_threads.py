@@ -92,7 +92,7 @@ def structure():
 
     def edit():
         """One edit a call: what follows a refused one finds the model as it was."""
-        new = [b.name for b in model.bodies if b.name.startswith("new")]
+        new = [name for name in model.bodies if name.startswith("new")]
         if len(new) > 4:
             model.remove_body(new[0])
         else:
