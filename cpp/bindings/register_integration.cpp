@@ -3,7 +3,7 @@
 
 #include "bindings/direct_calls.h"
 #include "dynamics/rigid_dynamics.h"
-#include "model/configuration_rate.h"
+#include "model/configuration.h"
 #include "simulation/trajectory.h"
 
 namespace pycraft {

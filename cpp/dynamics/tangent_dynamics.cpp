@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "model/configuration_rate.h"
+#include "model/configuration.h"
 #include "recursions/articulated_body.h"
 #include "recursions/kinematics.h"
 

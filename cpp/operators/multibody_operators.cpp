@@ -170,7 +170,7 @@ Vector6<S> RigidValues<S>::twist(const std::vector<int>& direction, int& body) c
   const S* q = q_.data() + model.q_offset[body];
   for (int i = model.first_subhinge[body]; i < model.first_subhinge[body + 1]; ++i) {
     if (i - model.first_subhinge[body] >= direction[1]) h = motion_to_child(subhinge_step(model.subhinges[i], q), h);
-    q += model.subhinges[i].kind == SubhingeKind::ball ? 4 : model.subhinges[i].kind == SubhingeKind::free ? 7 : 1;
+    q += record_of(model.subhinges[i].kind).nq;
   }
   return h;
 }

@@ -101,7 +101,7 @@ struct InertialFrame {
     for (int k = 0; k < model.bodies; ++k) {
       int j = model.v_offset[k];
       for (int i = model.first_subhinge[k]; i < model.first_subhinge[k + 1]; ++i)
-        for (int c = 0; c < coordinates(model.subhinges[i].kind); ++c, ++j) body_of[j] = k, subhinge_of[j] = i;
+        for (int c = 0; c < record_of(model.subhinges[i].kind).nv; ++c, ++j) body_of[j] = k, subhinge_of[j] = i;
     }
   }
 
@@ -157,7 +157,7 @@ struct InertialFrame {
       for (int c = first; c < last; ++c) travel[k] = travel[k] + rate(c) * twist[c].linear;
     const auto seen = [&](const Vector6<S>& x) { return p < 0 ? Vector6<S>{x.angular, x.linear - travel[k]} : x; };
     for (int i = model.first_subhinge[k], j = first; i < model.first_subhinge[k + 1]; ++i) {
-      const int end = j + coordinates(model.subhinges[i].kind);
+      const int end = j + record_of(model.subhinges[i].kind).nv;
       const Vector6<S> before = seen(velocity), acceleration_before = acceleration;
       for (int c = j; c < end; ++c) {
         psi_dot[c] = cross_motion(before, twist[c]);

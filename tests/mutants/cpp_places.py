@@ -16,7 +16,7 @@ TARGETS = [
     "cpp/numerics/orthogonalisation.h",
     "cpp/numerics/semidefinite_factors.h",
     "cpp/algebra/language/residual_sizes.h",
-    "cpp/model/configuration_rate.h",
+    "cpp/model/configuration.h",
     "cpp/spatial/*.h",
     "cpp/recursions/*.h",
     "cpp/algebra/trees/sweeps/*.h",

@@ -194,7 +194,7 @@ CHANGES = {
             "true",
         ),
     ],
-    "cpp/model/configuration_rate.h": [
+    "cpp/model/configuration.h": [
         ("a move makes unit quaternions", "out[0] = to.w", "out[0] = to.w / sqrt(to.w * to.w + to.x * to.x + to.y * to.y + to.z * to.z)"),
     ],
     "cpp/simulation/trajectory.cpp": [
