@@ -73,13 +73,19 @@ void register_multibody(py::module_& m) {
       .def_readonly("point", &SubhingeRecord::point, "Whether it has a point.")
       .def_readonly("pitch", &SubhingeRecord::pitch, "Whether it has a pitch, in metres per radian.")
       .def("__repr__", [](const SubhingeRecord& r) { return "<subhinge kind '" + std::string(r.name) + "': nq " + std::to_string(r.nq) + ", nv " + std::to_string(r.nv) + ">"; });
+  py::class_<HingeRecord>(m, "HingeKind", "A kind of hinge: its subhinges, one after the other; a custom one has any.")
+      .def_property_readonly("name", [](const HingeRecord& r) { return r.name; })
+      .def_readonly("axes", &HingeRecord::axes, "How many axes it is given.")
+      .def_property_readonly("subhinges", [](const HingeRecord& r) {
+        py::list names;
+        for (const auto& [kind, axis] : r.subhinges) names.append(record_of(kind).name);
+        return py::tuple(names);
+      }, "Names of their kinds.")
+      .def_property_readonly("nv", &HingeRecord::nv, "Degrees of freedom.")
+      .def("__repr__", [](const HingeRecord& r) { return "<hinge kind '" + std::string(r.name) + "': " + std::to_string(r.subhinges.size()) + " subhinges>"; });
   py::dict subhinges, hinges;
   for (const SubhingeRecord& row : subhinge_records) subhinges[row.name] = py::cast(&row, py::return_value_policy::reference);
-  for (const HingeRecord& row : hinge_records()) {
-    py::list names;
-    for (const auto& [kind, axis] : row.subhinges) names.append(record_of(kind).name);
-    hinges[row.name] = py::tuple(names);
-  }
+  for (const HingeRecord& row : hinge_records()) hinges[row.name] = py::cast(&row, py::return_value_policy::reference);
   m.attr("subhinge_kinds") = subhinges;
   m.attr("hinge_kinds") = hinges;
   declared<py::class_<Multibody, std::shared_ptr<Multibody>>>(m, "Multibody")

@@ -37,7 +37,7 @@ void with_remedy(const Expression& e, F f) {
     f();
   } catch (const SingularOperatorError& error) {
     bool of_nodes = false;
-    visit(e, [&](const Expression& x) { of_nodes |= x.kind() == NodeKind::symbol && x.node().symbol.definition->id == MechanicsSymbolId::Lambda; });
+    visit(e, [&](const Expression& x) { of_nodes |= x.kind() == NodeKind::symbol && x.node().symbol.definition->id == SymbolId::Lambda; });
     if (!of_nodes) throw;
     throw SingularOperatorError(std::string(error.what()) + "; Λ is the inverse of B*ΩB, which has none where the nodes cannot move in every direction: take those " +
                                 "in which they can, Lambda(nodes, directions=[\"x\", ...])");
@@ -319,6 +319,10 @@ void register_operators(py::module_& m) {
         };
         return py::make_tuple(shaped(b.q, b.nq), shaped(b.v, b.nv), b.arithmetic.precision);
       }, "(q, v, precision) that it is bound to, None where it is not.")
+      .def_property_readonly("definition", [](const Expression& e) {
+        const bool compound = e.kind() == NodeKind::symbol && e.node().symbol.definition->expand;
+        return compound ? py::cast(e.node().symbol.definition->expand(e.node().symbol)) : py::object(py::none());
+      }, "What a letter abbreviates: EφG of K, B*φ*H* of 𝒥; None for what is no such letter.")
       .def("_with_operand", [](const Expression& e, const Expression& operand) {
         if (e.kind() != NodeKind::block_function) throw EvaluationError(show(e) + " is no function of an operand");
         const Symbol& s = e.node().symbol;

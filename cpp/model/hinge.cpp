@@ -88,6 +88,11 @@ const HingeRecord& record_of(HingeKind kind) { return hinge_records()[static_cas
 HingeKind hinge_kind_from_name(const std::string& name) { return static_cast<HingeKind>(row_called(name, "hinge", hinge_records())); }
 SubhingeKind subhinge_kind_from_name(const std::string& name) { return static_cast<SubhingeKind>(row_called(name, "subhinge", subhinge_records)); }
 
+int HingeRecord::nv() const {
+  int n = 0;
+  for (const auto& [kind, axis] : subhinges) n += record_of(kind).nv;
+  return n;
+}
 int Hinge::nq() const {
   int n = 0;
   for (const Subhinge& s : subhinges) n += s.nq();

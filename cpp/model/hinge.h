@@ -30,6 +30,7 @@ struct HingeRecord {
   const char* name;
   int axes;  // that a user gives
   std::vector<std::pair<SubhingeKind, int>> subhinges;
+  int nv() const;
 };
 const std::vector<HingeRecord>& hinge_records();  // in the order of the enumeration
 const HingeRecord& record_of(HingeKind kind);

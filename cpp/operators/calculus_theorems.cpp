@@ -4,11 +4,14 @@
 
 #include "algebra/planning/square_root.h"
 #include "operators/derived_operators.h"
+#include "operators/alphabet.h"
 #include "operators/directions.h"
 
 namespace pycraft {
 
 namespace {
+
+using enum SymbolId;
 
 // A coordinate along which much changes: of a hinge with few of them that carries many bodies, and whose parent is no root: where the
 // root is free, P⁺ and G of the root are 0 and I at every state.
@@ -44,9 +47,9 @@ std::vector<Theorem> calculus_theorems(const std::shared_ptr<MultibodyOperators>
   if (N == 0) return list;
   const Letters letters(source);
   const auto& [_, E, phi, phi_tilde, H, M, J, P, P_plus, D, G, K, tau, tau_bar, E_psi, psi, psi_tilde, R, Upsilon, Omega, I] = letters;
-  const auto mechanics = [&](MechanicsSymbolId id) { return mechanics_operator(id, source); };
-  const auto function = [&](DerivativeSymbolId id, const Expression& x) {
-    return block_function(derivative_symbols()[id - first_derivative_symbol], source, nullptr, x);
+  const auto mechanics = [&](SymbolId id) { return mechanics_operator(id, source); };
+  const auto function = [&](SymbolId id, const Expression& x) {
+    return block_function(definition_of(id), source, nullptr, x);
   };
   const auto unit = [&](int i) {
     std::vector<double> e(N, 0.0);
@@ -95,13 +98,13 @@ std::vector<Theorem> calculus_theorems(const std::shared_ptr<MultibodyOperators>
   if (dH.kind() != NodeKind::zero) gradient = gradient + 2.0 * trace(dH * (I - P_plus * W) * G);
   state("gradient of ln det ℳ", differentiate(logdet(MM + J), *along_i), gradient, "∂ ln det(ℳ+J) = 2 tr(P⁺WΔ) + 2 tr(∂H(I-P⁺W)G),  W = blockdiag(E*ΥE)",
         "\\partial\\ln\\det(\\mathcal{M}+J) = 2\\operatorname{tr}(P^+W\\Delta) + 2\\operatorname{tr}(\\partial H(I-P^+W)\\mathcal{G})", no_hypothesis, "soa.md #35");
-  const Parameter mass{source, "mass", {}, source->structure().bodies() - 1, mass_of_body, -1};
+  const Parameter mass{source, "mass", {}, source->structure().bodies() - 1, InertiaParameter::mass, -1};
   const auto by_mass = parameter_direction(mass);
   state("gradient of ln det ℳ by a mass", differentiate(logdet(MM + J), *by_mass), trace(Upsilon * differentiate(M, *by_mass)), "∂ ln det(ℳ+J) = tr(Υ∂M)",
         "\\partial\\ln\\det(\\mathcal{M}+J) = \\operatorname{tr}(\\Upsilon\\,\\partial M)", no_hypothesis, "soa.md #32");
   const Expression p = phi * M * V, e = unit(several);
   const Expression outboard = function(force_cross, E.T() * V);
-  const Expression h = make_symbol(derivative_symbols()[direction_twist - first_derivative_symbol], source, {several}, source->structure().coordinate_names[several]);
+  const Expression h = make_symbol(definition_of(direction_twist), source, OfCoordinate{several}, source->structure().coordinate_names[several]);
   state("slope of the kinetic energy", 0.5 * differentiate(V.T() * M * V, *along_several), -(h.T() * outboard * p),
         "∂KE = -h*crf(E*V)p,  p = φMV", "\\partial KE = -h^*\\operatorname{crf}(\\mathcal{E}^*\\mathcal{V})p", constant_hinges, "soa.md #18");
   const Expression alpha = phi.T() * (H.T() * qdd + a), f = phi * (M * alpha + b);

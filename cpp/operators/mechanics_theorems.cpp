@@ -5,10 +5,12 @@
 
 namespace pycraft {
 
+using enum SymbolId;
+
 std::vector<Theorem> mechanics_theorems(const std::shared_ptr<MultibodyOperators>& source) {
   const Letters letters(source);
   const auto& [_, E, phi, phi_tilde, H, M, J, P, P_plus, D, G, K, tau, tau_bar, E_psi, psi, psi_tilde, R, Upsilon, Omega, I] = letters;
-  const auto mechanics = [&](MechanicsSymbolId id) { return mechanics_operator(id, source); };
+  const auto mechanics = [&](SymbolId id) { return mechanics_operator(id, source); };
   const Expression S = I - H * psi * K, A = I + H * phi * K, MM = H * phi * M * phi.T() * H.T();
   const Expression qd = mechanics(theta_dot), V = mechanics(velocity), a = mechanics(coriolis_acceleration), b = mechanics(gyroscopic_force);
   const Expression qdd = make_vector("vdot", source->theta()), T = make_vector("T", source->theta());

@@ -143,7 +143,7 @@ class RigidBlocks {
     }
     ldl_solve(L.data() + d_[k], pivots_.data() + first(k), n, x, m);
   }
-  void apply(int id, bool transposed, int k, const S* x, S* y, int m) const {
+  void apply(SymbolId id, bool transposed, int k, const S* x, S* y, int m) const {
     const int n = tree_.dof[k];
     switch (id) {
       case SymbolId::H:
@@ -183,7 +183,7 @@ class RigidBlocks {
       }
     }
   }
-  void block(int id, int k, S* out) const {
+  void block(SymbolId id, int k, S* out) const {
     const int n = tree_.dof[k];
     switch (id) {
       case SymbolId::E: {
@@ -412,7 +412,7 @@ class RigidBlocks {
 
   int first(int k) const { return tree_.dof_offset[k]; }
   int last(int k) const { return tree_.dof_offset[k + 1]; }
-  const Symmetric6<S>& six(int id, int k) const {
+  const Symmetric6<S>& six(SymbolId id, int k) const {
     switch (id) {
       case SymbolId::P: return P[k];
       case SymbolId::P_plus: return Pplus[k];

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import _core
 from . import mujoco as convention
 from .described import Described
 from .drake import drake_peer
@@ -182,7 +183,7 @@ def to_mjcf(model: Described) -> str:
             inertial.set("diaginertia", _numbers(np.diag(inertia)))
         at = 0
         for i, subhinge in enumerate(hinge["subhinges"]):
-            size = _V_SIZE.get(subhinge["kind"], 1)
+            size = _core.subhinge_kinds[subhinge["kind"]].nv
             _mujoco_joint(element, hinge, i, subhinge, np.asarray(hinge["rotor_inertia"], float)[at : at + size], parent)
             at += size
         elements.append(element)

@@ -224,7 +224,7 @@ class Algorithm:
                 continue
             model = self._book.models[leaf.context]
             part, context = self._place_of(model)
-            numbers = plans[part].numbers(context, leaf.symbol, list(leaf.arguments), state)
+            numbers = plans[part].numbers(context, leaf.symbol, leaf.arguments, state)
             if leaf.source == "root frame":
                 numbers = [b if p < 0 else np.zeros_like(b) for b, p in zip(numbers, model.source.parents, strict=True)]
             data[leaf.quantity.name] = numbers

@@ -354,7 +354,7 @@ class Leaf:
     source: str  # "symbol", "root frame", "constant", "external"
     context: int = -1
     symbol: str = ""
-    arguments: tuple[int, ...] = ()
+    arguments: tuple[Any, ...] = ()
     numbers: Any = None
 
 

@@ -573,8 +573,8 @@ class Workspace {
 
   // Y += X B X* (up: Y the parent's block) or X* B X (down: Y the child's), X = E(p,k) or E_ψ(p,k).
   void add_congruence(const Step& s, const std::vector<SkoValues<S>*>& values, int k, const S* B, S* Y, bool down) {
-    static const Symbol edge{&sko_symbols()[SymbolId::E], nullptr, nullptr, {}, {}}, gain{&sko_symbols()[SymbolId::G], nullptr, nullptr, {}, {}},
-        hinge{&sko_symbols()[SymbolId::H], nullptr, nullptr, {}, {}};
+    static const Symbol edge{&sko_symbol(SymbolId::E), nullptr, nullptr, {}, {}}, gain{&sko_symbol(SymbolId::G), nullptr, nullptr, {}, {}},
+        hinge{&sko_symbol(SymbolId::H), nullptr, nullptr, {}, {}};
     const SkoStructure& t = structure(s);
     const int sk = t.size[k], sp = t.size[t.parent[k]], n = t.dof[k];
     block_.resize(size_t(sp) * sk);

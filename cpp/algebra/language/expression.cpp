@@ -40,11 +40,10 @@ size_t hash_of(const Node& n) {
   size_t h = mix(17, static_cast<size_t>(n.kind));
   switch (n.kind) {
     case NodeKind::symbol:
-      h = mix(mix(mix(h, n.symbol.definition->id), reinterpret_cast<size_t>(n.symbol.source.get())), reinterpret_cast<size_t>(n.symbol.binding.get()));
-      for (int a : n.symbol.arguments) h = mix(h, a);
-      return h;
+      h = mix(mix(mix(h, static_cast<size_t>(n.symbol.definition->id)), reinterpret_cast<size_t>(n.symbol.source.get())), reinterpret_cast<size_t>(n.symbol.binding.get()));
+      return mix(h, hash_of(n.symbol.arguments));
     case NodeKind::block_function:
-      return mix(mix(mix(h, n.symbol.definition->id), reinterpret_cast<size_t>(n.symbol.source.get())), n.children[0].node().hash);
+      return mix(mix(mix(h, static_cast<size_t>(n.symbol.definition->id)), reinterpret_cast<size_t>(n.symbol.source.get())), n.children[0].node().hash);
     case NodeKind::vector: return mix(mix(h, std::hash<std::string>()(n.name)), hash_of(n.codomain));
     case NodeKind::identity:
     case NodeKind::zero: return mix(mix(h, hash_of(n.domain)), hash_of(n.codomain));
@@ -152,13 +151,14 @@ bool operator==(const Expression& a, const Expression& b) {
 
 // ------------------------------------------------------------------ leaves
 
-Expression make_symbol(const SymbolDefinition& definition, std::shared_ptr<SkoSource> source, std::vector<int> arguments, std::string argument_text) {
+Expression make_symbol(const SymbolDefinition& definition, std::shared_ptr<SkoSource> source, SymbolArguments arguments, std::string argument_text) {
+  if (!fits(definition.takes, arguments)) throw EvaluationError("'" + definition.ascii + "' is not of what it was given");
   Node n{NodeKind::symbol, source->space(definition.domain, arguments), source->space(definition.codomain, arguments), {}};
   n.symbol = Symbol{&definition, std::move(source), nullptr, std::move(arguments), std::move(argument_text)};
   return make(std::move(n));
 }
 
-Expression make_symbol(SymbolId id, std::shared_ptr<SkoSource> source) { return make_symbol(sko_symbols()[id], std::move(source)); }
+Expression make_symbol(SymbolId id, std::shared_ptr<SkoSource> source) { return make_symbol(sko_symbol(id), std::move(source)); }
 
 Expression make_vector(const std::string& name, const Space& space) {
   Node n{NodeKind::vector, Space::euclidean(1), space, {}};

@@ -287,7 +287,7 @@ int Planner::apply_symbol(const Symbol& symbol, bool transposed, bool inverted, 
     }
     default: break;
   }
-  if (d.id >= first_extra) return apply_blocks(blocks(transposed ? e.T() : e), false, x, text);
+  if (d.kind() != LetterKind::sko) return apply_blocks(blocks(transposed ? e.T() : e), false, x, text);
   Step s{StepKind::apply_symbol};
   s.in = {x};
   s.symbol = symbol;

@@ -12,6 +12,8 @@ namespace pycraft {
 
 namespace {
 
+using enum SymbolId;
+
 constexpr size_t word_limit = 400, step_limit = 20000, visit_limit = 100000;
 
 struct Unfolded {
@@ -51,7 +53,7 @@ int Alphabet::letter(const Expression& atom) {
   if (found != numbers_.end()) return found->second;
   const int number = static_cast<int>(atoms_.size());
   atoms_.push_back(canonical);
-  const bool known = u.symbol && u.symbol->definition->id < first_extra;
+  const bool known = u.symbol && u.symbol->definition->kind() == LetterKind::sko;
   codes_.push_back(known ? letter_code(u.symbol->definition->id, u.transposed, u.inverted) : -1);
   zero_.push_back(known && u.symbol->definition->id == J && !u.symbol->source->traits().hinge_diagonal);
   numbers_.emplace(canonical, number);

@@ -113,7 +113,7 @@ class DenseBlocks {
     ldl_solve(L.data() + at_[k].d, pivots_.data() + tree_.dof_offset[k], tree_.dof[k], x, m);
   }
   // y = A(k) x or A(k)* x of a block-diagonal symbol
-  void apply(int id, bool transposed, int k, const S* x, S* y, int m) const {
+  void apply(SymbolId id, bool transposed, int k, const S* x, S* y, int m) const {
     const int s = tree_.size[k], n = tree_.dof[k];
     switch (id) {
       case SymbolId::H:
@@ -142,7 +142,7 @@ class DenseBlocks {
     }
   }
   // Block (k,k), row-major; E: block (parent, k).
-  void block(int id, int k, S* out) const {
+  void block(SymbolId id, int k, S* out) const {
     const int s = tree_.size[k], n = tree_.dof[k];
     switch (id) {
       case SymbolId::E: std::copy_n(edge(k), tree_.size[tree_.parent[k]] * s, out); return;
@@ -409,7 +409,7 @@ class DenseBlocks {
       }
     return n > 0 ? Pivots::doubtful : Pivots::sound;
   }
-  const std::vector<S>& square(int id) const {
+  const std::vector<S>& square(SymbolId id) const {
     switch (id) {
       case SymbolId::M: return M;
       case SymbolId::P: return P;

@@ -165,7 +165,7 @@ template <class Blocks, class Values>
 void TreeElimination<S>::assemble(Blocks&& blocks, Values&& values) {
   std::fill(A_.begin(), A_.end(), S(0));
   std::fill(border_matrix_.begin(), border_matrix_.end(), S(0));
-  static const Symbol edge_symbol{&sko_symbols()[SymbolId::E], nullptr, nullptr, {}, {}};
+  static const Symbol edge_symbol{&sko_symbol(SymbolId::E), nullptr, nullptr, {}, {}};
   for (const Realization::Term& t : r_->terms) {
     const Space &row_space = r_->equations[t.row], &column_space = r_->states[t.column];
     if (!row_space.belongs_to_bodies()) {  // the identity of a border state
