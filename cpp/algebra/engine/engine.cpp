@@ -6,7 +6,11 @@
 #include <cstdint>
 #include <mutex>
 
-#include "algebra/engine/workspace.h"
+#include "algebra/engine/block_steps.h"
+#include "algebra/engine/dense_steps.h"
+#include "algebra/engine/refined_solves.h"
+#include "algebra/engine/scalar_steps.h"
+#include "algebra/engine/vector_steps.h"
 #include "runtime/errors.h"
 
 namespace pycraft {
