@@ -37,6 +37,7 @@ CORE = [room for room in STANDS_ON if room not in ("bindings", "bench", "tests")
 PARTS = {
     "algebra/planning/plan_blocks",  # class Planner, by what is planned
     "algebra/planning/plan_diagonals",
+    "algebra/planning/plan_solves",
     "algebra/planning/plan_vectors",
     "operators/calculus_theorems",  # rows of the catalogue
     "operators/mechanics_theorems",
