@@ -19,17 +19,18 @@ RigidDynamics<S>::RigidDynamics(const Multibody& model)
 
 template <class S>
 template <class T>
-void RigidDynamics<S>::set_state(const T* q, const T* v) {
+void RigidDynamics<S>::set_state(const T* q, const T* v, const Applied<T>* applied) {
   convert(q, model_->nq, q_);
   convert(v, model_->nv, v_);
   kinematics(*model_, q_.data(), blocks_);
   point_accelerations_base_to_tip(*model_, blocks_.pose.data(), blocks_.H.data(), v_.data(), OwnTerms::absorbed, points_);
+  applied_ = applied ? converted(*applied, model_->bodies, wrenches_) : own_gravity(*model_);
 }
 
 template <class S>
 template <class T>
-void RigidDynamics<S>::forward_dynamics(const T* q, const T* v, const T* tau, S* vdot, const Solving& how) {
-  const auto added = forward_dynamics_of_points(q, v, tau, vdot, how);
+void RigidDynamics<S>::forward_dynamics(const T* q, const T* v, const T* tau, S* vdot, const Solving& how, const Applied<T>* applied) {
+  const auto added = forward_dynamics_of_points(q, v, tau, vdot, how, applied);
   for (int i = 0; i < model_->nv; ++i) vdot[i] -= points_.absorbed[i];
   project_off_null_space(added, vdot, 1);
   if (!how.estimate || how.refinement.steps == 0) return;
@@ -39,14 +40,15 @@ void RigidDynamics<S>::forward_dynamics(const T* q, const T* v, const T* tau, S*
 
 template <class S>
 template <class T>
-typename RigidDynamics<S>::AddedInertias RigidDynamics<S>::forward_dynamics_of_points(const T* q, const T* v, const T* tau, S* vdot, const Solving& how) {
+typename RigidDynamics<S>::AddedInertias RigidDynamics<S>::forward_dynamics_of_points(const T* q, const T* v, const T* tau, S* vdot, const Solving& how,
+                                                                                     const Applied<T>* applied) {
   const int n = model_->nv;
-  set_state(q, v);
+  set_state(q, v, applied);
   convert(tau, n, tau_);
   blocks_.form = how.form;
   S largest = S(0);
   AddedInertias added;
-  const auto sweep = [&] { largest = articulated_body(tree_, *model_, blocks_, points_, tau_.data(), vdot, force_, alpha_); };
+  const auto sweep = [&] { largest = articulated_body(tree_, *model_, blocks_, points_, applied_, tau_.data(), vdot, force_, alpha_); };
   if (how.on_singular == OnSingular::minimum_norm)
     added = with_every_hinge_regular(sweep);
   else
@@ -57,7 +59,7 @@ typename RigidDynamics<S>::AddedInertias RigidDynamics<S>::forward_dynamics_of_p
   };
   const auto residual_at = [&](const S* x, S* r) {
     if (how.refinement.gathers_wider()) {
-      newton_euler_residual_gathered(*model_, blocks_, points_, x, tau, r, alpha_, force_, wide_force_);
+      newton_euler_residual_gathered(*model_, blocks_, points_, applied_, x, tau, r, alpha_, force_, wide_force_);
     } else if (how.refinement.wider()) {
       convert(x, n, wide_x_), wide_r_.resize(n);
       wider_->residual(tau, wide_x_.data(), wide_r_.data());
@@ -70,18 +72,18 @@ typename RigidDynamics<S>::AddedInertias RigidDynamics<S>::forward_dynamics_of_p
     project_off_null_space(added, r, 1);
   };
   refinement_.corrections.clear();
-  if (how.refinement.steps != 0 && how.refinement.wider()) wider(q, v);
+  if (how.refinement.steps != 0 && how.refinement.wider()) wider(q, v, applied);
   if (!added.empty()) {
     articulated_inertia_tip_to_base(tree_, blocks_);
     std::fill_n(vdot, n, S(0));
     r_.resize(n);
-    newton_euler(*model_, blocks_, points_, vdot, r_.data(), alpha_, force_);
+    newton_euler(*model_, blocks_, points_, applied_, vdot, r_.data(), alpha_, force_);
     for (int i = 0; i < n; ++i) r_[i] = tau_[i] - r_[i];
     project_off_null_space(added, r_.data(), 1);
     solve_regular(r_.data(), vdot);
   }
   left_ = S(0);
-  if (how.on_singular != OnSingular::minimum_norm && blocks_.faint().body >= 0) correct_faint(q, v, tau, vdot);
+  if (how.on_singular != OnSingular::minimum_norm && blocks_.faint().body >= 0) correct_faint(q, v, tau, vdot, applied);
   if (how.refinement.steps == 0) return added;
   const auto size_at = [&](const S* x) {
     if (how.refinement.wider())
@@ -106,11 +108,11 @@ typename RigidDynamics<S>::AddedInertias RigidDynamics<S>::forward_dynamics_of_p
 // too much, as long as corrections shrink. Refused is what comes no closer than `faint_limit` of the accelerations.
 template <class S>
 template <class T>
-void RigidDynamics<S>::correct_faint(const T* q, const T* v, const T* tau, S* vdot) {
-  auto& two_up = wider(q, v).wider(q, v);
+void RigidDynamics<S>::correct_faint(const T* q, const T* v, const T* tau, S* vdot, const Applied<T>* applied) {
+  auto& two_up = wider(q, v, applied).wider(q, v, applied);
   const auto left = [&]<class E>(RigidDynamics<E>&) { return S(64 * blocks_.faint().ratio) * static_cast<S>(epsilon<E>()); };  // so many roundings, as of columns
   if (faint_limit<S>() > left(two_up)) return correct_faint_by(two_up, tau, vdot);
-  auto& three_up = two_up.wider(q, v);
+  auto& three_up = two_up.wider(q, v, applied);
   if (!(faint_limit<S>() > left(three_up))) throw_faint_hinge(tree_, blocks_.faint());
   correct_faint_by(three_up, tau, vdot);
 }
@@ -125,7 +127,7 @@ void RigidDynamics<S>::correct_faint_by(RigidDynamics<E>& up, const T* tau, S* v
   columns_.resize(std::max(columns_.size(), size_t(n)));
   // What coasts has no acceleration to compare with: the motion's own, ω² and gravity over the length of the body.
   const RigidInertia<S>& own = model_->inertia[blocks_.faint().body];
-  S scale = length(vdot) + ratio_or_zero(own.mass * norm(model_->gravity), norm(own.moment));
+  S scale = length(vdot) + ratio_or_zero(own.mass * norm(applied_.gravity), norm(own.moment));
   for (const Vector3<S>& omega : points_.angular_velocity) scale = maximum(scale, dot(omega, omega));
   S last = S(0.3) / S(0.9) * scale;
   for (int step = 0; step < 5; ++step) {
@@ -158,7 +160,7 @@ S RigidDynamics<S>::length(const S* x) const {
 template <class S>
 template <class T>
 void RigidDynamics<S>::size_residual(const RigidDynamics<T>& formed, const T* vdot, const Refinement& how) {
-  newton_euler_sizes(tree_, *formed.model_, formed.blocks_, formed.points_, formed.v_.data(), vdot, tau_.data(), formed.alpha_, formed.force_, units_of<S>(how), sizes_);
+  newton_euler_sizes(tree_, *formed.model_, formed.blocks_, formed.points_, formed.applied_, formed.v_.data(), vdot, tau_.data(), formed.alpha_, formed.force_, units_of<S>(how), sizes_);
 }
 
 // From the direction given, or any other, the worst signs along it and what they make are found in turn: each is at least as long as
@@ -197,7 +199,7 @@ size_t RigidDynamics<S>::bytes(Form form) const {
 template <class S>
 template <class T>
 void RigidDynamics<S>::residual(const T* tau, const S* vdot, S* r) {
-  newton_euler(*model_, blocks_, points_, vdot, r, alpha_, force_);
+  newton_euler(*model_, blocks_, points_, applied_, vdot, r, alpha_, force_);
   for (int i = 0; i < model_->nv; ++i) r[i] = S(tau[i]) - r[i];
 }
 
@@ -218,17 +220,17 @@ void RigidDynamics<S>::solve(const S* r, S* x, int m) {
 
 template <class S>
 template <class T>
-RigidDynamics<Wider<S>>& RigidDynamics<S>::wider(const T* q, const T* v) {
+RigidDynamics<Wider<S>>& RigidDynamics<S>::wider(const T* q, const T* v, const Applied<T>* applied) {
   if (!wider_) wider_ = std::make_unique<RigidDynamics<Wider<S>>>(source_);
-  wider_->set_state(q, v);
+  wider_->set_state(q, v, applied);
   return *wider_;
 }
 
 template <class S>
-void RigidDynamics<S>::inverse_dynamics(const S* q, const S* v, const S* vdot, S* tau) {
+void RigidDynamics<S>::inverse_dynamics(const S* q, const S* v, const S* vdot, S* tau, const Applied<S>* applied) {
   kinematics(*model_, q, blocks_);
   point_accelerations_base_to_tip(*model_, blocks_.pose.data(), blocks_.H.data(), v, OwnTerms::kept, points_);
-  newton_euler(*model_, blocks_, points_, vdot, tau, alpha_, force_);
+  newton_euler(*model_, blocks_, points_, applied ? *applied : own_gravity(*model_), vdot, tau, alpha_, force_);
 }
 
 template <class S>
@@ -269,7 +271,7 @@ void RigidDynamics<S>::mass_matrix_solve(const double* q, const S* right, int m,
   if (how.refinement.steps != 0) {
     if (how.refinement.wider()) {
       rest_.assign(N, 0.0);
-      wider(q, rest_.data());
+      wider<double>(q, rest_.data(), nullptr);
     }
     refine(out, N, m, how.refinement, how.form, S(0), [&] { return "the mass matrix inverse of '" + source_.name() + "'"; },
            [&](const S* x, S* r) {
@@ -378,7 +380,8 @@ S RigidDynamics<S>::kinetic_energy(const S* q, const S* v) {
 }
 
 template <class S>
-S RigidDynamics<S>::potential_energy(const S* q, const Vector3<S>& datum) {
+S RigidDynamics<S>::potential_energy(const S* q, const Vector3<S>& datum, const Vector3<S>* gravity) {
+  const Vector3<S>& g = gravity ? *gravity : model_->gravity;
   kinematics(*model_, q, blocks_);
   // Masses and their first moments about the origins of the bodies that carry them; only a root's own height is large far from the datum, and
   // it is added last, in wider numbers, so that the sum is rounded once.
@@ -393,18 +396,18 @@ S RigidDynamics<S>::potential_energy(const S* q, const Vector3<S>& datum) {
       carried[p].moment = carried[p].moment + moment + carried[k].mass * X.p;
       continue;
     }
-    for (int i = 0; i < 3; ++i) energy -= W(model_->gravity[i]) * (W(moment[i]) + W(carried[k].mass) * (W(X.p[i]) - W(datum[i])));
+    for (int i = 0; i < 3; ++i) energy -= W(g[i]) * (W(moment[i]) + W(carried[k].mass) * (W(X.p[i]) - W(datum[i])));
   }
   return static_cast<S>(energy);
 }
 
 #define PYCRAFT_INSTANTIATE(S)     \
   template class RigidDynamics<S>; \
-  template void RigidDynamics<S>::forward_dynamics(const double*, const double*, const double*, S*, const Solving&); \
-  template std::vector<std::pair<int, S>> RigidDynamics<S>::forward_dynamics_of_points(const double*, const double*, const double*, S*, const Solving&);
+  template void RigidDynamics<S>::forward_dynamics(const double*, const double*, const double*, S*, const Solving&, const Applied<double>*); \
+  template std::vector<std::pair<int, S>> RigidDynamics<S>::forward_dynamics_of_points(const double*, const double*, const double*, S*, const Solving&, const Applied<double>*);
 PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_INSTANTIATE)
 #undef PYCRAFT_INSTANTIATE
-template void RigidDynamics<Extended>::forward_dynamics(const Extended*, const Extended*, const Extended*, Extended*, const Solving&);
-template void RigidDynamics<Quad>::forward_dynamics(const Quad*, const Quad*, const Quad*, Quad*, const Solving&);
+template void RigidDynamics<Extended>::forward_dynamics(const Extended*, const Extended*, const Extended*, Extended*, const Solving&, const Applied<Extended>*);
+template void RigidDynamics<Quad>::forward_dynamics(const Quad*, const Quad*, const Quad*, Quad*, const Solving&, const Applied<Quad>*);
 
 }  // namespace pycraft

@@ -25,9 +25,9 @@ Sensitivities<S>::Sensitivities(const Multibody& model)
       force_(model_->bodies) {}
 
 template <class S>
-void Sensitivities<S>::frame_at(const S* q, const S* v, const S* vdot, OwnTerms own) {
+void Sensitivities<S>::frame_at(const S* q, const S* v, const S* vdot, const Vector3<S>* gravity) {
   kinematics(*model_, q, blocks_);
-  frame_.fill(*model_, blocks_, v, vdot, own);
+  frame_.fill(*model_, blocks_, gravity ? *gravity : model_->gravity, v, vdot);
 }
 
 template <class S>
@@ -40,8 +40,8 @@ void Sensitivities<S>::twists_about(int body) {
 }
 
 template <class S>
-void Sensitivities<S>::inverse_dynamics(const S* q, const S* v, const S* vdot, S* dq, S* dv) {
-  frame_at(q, v, vdot, OwnTerms::kept);
+void Sensitivities<S>::inverse_dynamics(const S* q, const S* v, const S* vdot, S* dq, S* dv, const Vector3<S>* gravity) {
+  frame_at(q, v, vdot, gravity);
   differentiate_forces(dq, dv, model_->nv);
 }
 
@@ -78,19 +78,21 @@ void Sensitivities<S>::differentiate_forces(S* dq, S* dv, int stride) {
 }
 
 template <class S>
-void Sensitivities<S>::forward_dynamics(const double* q, const double* v, const double* tau, const Solving& how, S* dq, S* dv, S* dtau) {
+void Sensitivities<S>::forward_dynamics(const double* q, const double* v, const double* tau, const Solving& how, S* dq, S* dv, S* dtau,
+                                         const Vector3<double>* gravity) {
   const int N = model_->nv;
   const size_t square = size_t(N) * N;
-  if (how.form != Form::fast && differentiate_sweep(q, v, tau, how, dq, dv, dtau)) return;
+  const Applied<double> weight{gravity ? *gravity : source_.gravity()};
+  if (how.form != Form::fast && differentiate_sweep(q, v, tau, how, dq, dv, dtau, &weight)) return;
   if (!dynamics_) dynamics_ = std::make_unique<RigidDynamics<S>>(source_);
   convert(q, model_->nq, q_), convert(v, N, v_);
   rates_.resize(N), work_.resize(3 * square), solution_.resize(3 * square);
-  dynamics_->forward_dynamics_of_points(q, v, tau, rates_.data(), how);
+  dynamics_->forward_dynamics_of_points(q, v, tau, rates_.data(), how, &weight);
   kinematics(*model_, q_.data(), blocks_);
   point_accelerations_base_to_tip(*model_, blocks_.pose.data(), blocks_.H.data(), v_.data(), OwnTerms::absorbed, points_);
   for (int k = 0; k < model_->bodies; ++k)  // of what hinges absorb, the frame knows that of free roots
     for (int j = model_->v_offset[k]; j < model_->v_offset[k] + model_->nv_of[k] && !frame_.floats(*model_, k); ++j) rates_[j] -= points_.absorbed[j];
-  frame_.fill(*model_, blocks_, v_.data(), rates_.data(), OwnTerms::absorbed);
+  frame_.fill(*model_, blocks_, cast<S>(weight.gravity), v_.data(), rates_.data(), OwnTerms::absorbed);
   // Columns: ∂T/∂q, ∂T/∂v, 1.
   differentiate_forces(work_.data(), work_.data() + N, 3 * N);
   for (int i = 0; i < N; ++i)
@@ -127,9 +129,10 @@ void Sensitivities<S>::differentiate_absorbed(S* dv) {
 // body would hide a light one's. It is the sweep of `ud` for both: reflections would pass over a row that is zero here and not beside it.
 // Its own result is not refined; (ℳ + J)⁻¹ is, as asked.
 template <class S>
-bool Sensitivities<S>::differentiate_sweep(const double* q, const double* v, const double* tau, const Solving& how, S* dq, S* dv, S* dtau) {
+bool Sensitivities<S>::differentiate_sweep(const double* q, const double* v, const double* tau, const Solving& how, S* dq, S* dv, S* dtau,
+                                           const Applied<double>* applied) {
   if (!tangents_) tangents_ = std::make_unique<TangentDynamics<S>>(source_);
-  if (!tangents_->forward_dynamics(q, v, tau, Form::ud, dq, dv)) return false;
+  if (!tangents_->forward_dynamics(q, v, tau, Form::ud, dq, dv, applied)) return false;
   if (!dynamics_) dynamics_ = std::make_unique<RigidDynamics<S>>(source_);
   dynamics_->mass_matrix_inverse(q, dtau, how);
   return true;
@@ -248,28 +251,25 @@ void Sensitivities<S>::kinetic_energy(const S* q, const S* v, S* dq, S* dv) {
 }
 
 template <class S>
-void Sensitivities<S>::hamiltonian(const S* q, const S* p, const S* tau, S* v, S* p_rate) {
+void Sensitivities<S>::hamiltonian(const S* q, const S* p, const S* tau, S* v, S* p_rate, const Vector3<S>* gravity) {
+  const Vector3<S>& g = gravity ? *gravity : model_->gravity;
   kinematics(*model_, q, blocks_);
   articulated_inertia_tip_to_base(tree_, blocks_);
   scratch_.resize(std::max(scratch_.size(), size_t(6) * model_->bodies));
   mass_matrix_inverse_apply(tree_, blocks_, p, v, 1, scratch_.data());
-  frame_.fill(*model_, blocks_, v, nullptr);
+  frame_.fill(*model_, blocks_, g, v, nullptr);
   // d(S_j·p)/dt = Ṡ_j·p + S_j·ṗ, and S_j·ṗ is what the hinge's force and gravity do: tau_j + S_j·(weight outboard). Of Ṡ_j·p, with u in
   // both, what multiplies u twice is (u × s)·mu = 0.
   for (int k = 0; k < model_->bodies; ++k) {
     check_interrupt_at(k);
-    const Vector6<S> travel = uniform(frame_.travel[k]), field = uniform(gravity_at(k));
+    int root = k;
+    while (model_->parent[root] >= 0) root = model_->parent[root];
+    const Vector6<S> travel = uniform(frame_.travel[k]), field = uniform(transpose_times(blocks_.pose[root].R, g));  // in the frame's axes
     const Vector6<S>& momentum = frame_.B[k].momentum;
     for (int j = model_->v_offset[k]; j < model_->v_offset[k] + model_->nv_of[k]; ++j)
       p_rate[j] = tau[j] + dot(frame_.twist_rate[j], momentum) + dot(frame_.twist_rate[j], frame_.R[k] * travel) +
                   dot(cross_motion(travel, frame_.twist[j]), momentum) + dot(frame_.twist[j], frame_.R[k] * field);
   }
-}
-
-template <class S>
-Vector3<S> Sensitivities<S>::gravity_at(int k) const {
-  while (model_->parent[k] >= 0) k = model_->parent[k];
-  return transpose_times(blocks_.pose[k].R, model_->gravity);
 }
 
 // The change of what the frame sees, and of (h × u; m u): ∂h × u.
@@ -336,13 +336,13 @@ Pose<S> Sensitivities<S>::node_in_axes(const Node& node) const {
 }
 
 template <class S>
-void Sensitivities<S>::inertial_regressor(const S* q, const S* v, const S* vdot, S* out) {
+void Sensitivities<S>::inertial_regressor(const S* q, const S* v, const S* vdot, S* out, const Vector3<S>* gravity) {
   const CompiledModel<S>& m = *model_;
   const int columns = 10 * m.bodies;
   kinematics(m, q, blocks_);
   point_accelerations_base_to_tip(m, blocks_.pose.data(), blocks_.H.data(), v, OwnTerms::kept, points_);
   rates_.resize(m.nv);
-  newton_euler(m, blocks_, points_, vdot, rates_.data(), alpha_, force_);
+  newton_euler(m, blocks_, points_, gravity ? Applied<S>{*gravity} : own_gravity(m), vdot, rates_.data(), alpha_, force_);
   std::fill_n(out, size_t(m.nv) * columns, S(0));
   for (int k = 0; k < m.bodies; ++k) {
     check_interrupt_at(k, k);
