@@ -19,6 +19,7 @@
 namespace pycraft {
 
 enum class OnSingular { raise, minimum_norm };
+OnSingular on_singular_from_name(const std::string& name);  // EvaluationError that lists the names
 
 // How accelerations are solved for.
 struct Solving {
