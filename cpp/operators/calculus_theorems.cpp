@@ -42,6 +42,7 @@ int failing_coordinate(const MultibodyOperators& source, bool subhinges, int oth
 }  // namespace
 
 std::vector<Theorem> calculus_theorems(const std::shared_ptr<MultibodyOperators>& source) {
+  using enum Hypothesis;
   std::vector<Theorem> list;
   const int N = source->nv();
   if (N == 0) return list;
@@ -57,7 +58,7 @@ std::vector<Theorem> calculus_theorems(const std::shared_ptr<MultibodyOperators>
     return constant(std::move(e), Space::euclidean(1), source->theta(), "e" + std::to_string(i));
   };
   std::string group;
-  const auto state = [&](const std::string& name, Side lhs, Side rhs, const std::string& text, const std::string& latex, unsigned hypotheses = no_hypothesis,
+  const auto state = [&](const std::string& name, Side lhs, Side rhs, const std::string& text, const std::string& latex, Hypothesis hypotheses = no_hypothesis,
                          const std::string& from = "soa.md, Calculus") {
     list.push_back({name, group, std::move(lhs), std::move(rhs), hypotheses, from, Use::check});
     list.back().text = text;

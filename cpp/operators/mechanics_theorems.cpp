@@ -8,6 +8,7 @@ namespace pycraft {
 using enum SymbolId;
 
 std::vector<Theorem> mechanics_theorems(const std::shared_ptr<MultibodyOperators>& source) {
+  using enum Hypothesis;
   const Letters letters(source);
   const auto& [_, E, phi, phi_tilde, H, M, J, P, P_plus, D, G, K, tau, tau_bar, E_psi, psi, psi_tilde, R, Upsilon, Omega, I] = letters;
   const auto mechanics = [&](SymbolId id) { return mechanics_operator(id, source); };
@@ -16,7 +17,7 @@ std::vector<Theorem> mechanics_theorems(const std::shared_ptr<MultibodyOperators
   const Expression qdd = make_vector("vdot", source->theta()), T = make_vector("T", source->theta());
   std::vector<Theorem> list;
   std::string group;
-  const auto state = [&](const std::string& name, Side lhs, Side rhs, unsigned hypotheses = no_hypothesis, const std::string& from = "Jain 2011") {
+  const auto state = [&](const std::string& name, Side lhs, Side rhs, Hypothesis hypotheses = no_hypothesis, const std::string& from = "Jain 2011") {
     list.push_back({name, group, std::move(lhs), std::move(rhs), hypotheses, from, Use::check});
   };
   const auto shown = [&](const std::string& text, const std::string& latex) {

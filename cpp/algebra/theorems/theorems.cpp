@@ -8,25 +8,33 @@
 
 namespace pycraft {
 
-std::vector<std::string> hypothesis_names(unsigned h) {
+std::vector<std::string> hypothesis_names(Hypothesis hypotheses) {
+  using enum Hypothesis;
   std::vector<std::string> names;
-  if (h & chain) names.push_back("serial chain");
-  if (h & no_hinge_diagonal) names.push_back("J = 0");
-  if (h & single_dof) names.push_back("single-DOF hinges");
-  if (h & constant_hinges) names.push_back("constant H");
-  if (h & free_root) names.push_back("free root");
-  if (h & equal_blocks) names.push_back("blocks of one size");
+  const auto name = [&](Hypothesis one, const char* words) {
+    if (contains(hypotheses, one)) names.push_back(words);
+  };
+  name(chain, "serial chain");
+  name(no_hinge_diagonal, "J = 0");
+  name(single_dof, "single-DOF hinges");
+  name(constant_hinges, "constant H");
+  name(free_root, "free root");
+  name(equal_blocks, "blocks of one size");
   return names;
 }
 
-unsigned unmet(unsigned h, const Traits& t) {
-  unsigned missing = 0;
-  if ((h & chain) && !t.chain) missing |= chain;
-  if ((h & no_hinge_diagonal) && t.hinge_diagonal) missing |= no_hinge_diagonal;
-  if ((h & single_dof) && !t.single_dof) missing |= single_dof;
-  if ((h & constant_hinges) && !t.constant_hinges) missing |= constant_hinges;
-  if ((h & free_root) && !t.free_root) missing |= free_root;
-  if ((h & equal_blocks) && !t.equal_blocks) missing |= equal_blocks;
+Hypothesis unmet(Hypothesis hypotheses, const Traits& t) {
+  using enum Hypothesis;
+  Hypothesis missing = no_hypothesis;
+  const auto ask = [&](Hypothesis one, bool met) {
+    if (contains(hypotheses, one) && !met) missing = missing | one;
+  };
+  ask(chain, t.chain);
+  ask(no_hinge_diagonal, !t.hinge_diagonal);
+  ask(single_dof, t.single_dof);
+  ask(constant_hinges, t.constant_hinges);
+  ask(free_root, t.free_root);
+  ask(equal_blocks, t.equal_blocks);
   return missing;
 }
 
@@ -49,10 +57,11 @@ std::vector<Theorem> sko_theorems(const std::shared_ptr<SkoSource>& source) {
   const Expression S = I - H * psi * K;   // its inverse
   const Expression MM = H * phi * M * phi.T() * H.T();
   const std::string book = "Jain 2011", extended = "general J";
+  using enum Hypothesis;
   using enum Use;
   std::vector<Theorem> list;
   std::string group;
-  const auto state = [&](const char* name, Side lhs, Side rhs, unsigned hypotheses = no_hypothesis, Use use = check, std::string from = "") {
+  const auto state = [&](const char* name, Side lhs, Side rhs, Hypothesis hypotheses = no_hypothesis, Use use = check, std::string from = "") {
     if (use == inverse) lhs = std::get<Expression>(lhs).inv();
     list.push_back({name, group, std::move(lhs), std::move(rhs), hypotheses, from.empty() ? book : std::move(from), use});
   };
