@@ -50,6 +50,18 @@ struct Letters {
   Expression E, phi, phi_tilde, H, M, J, P, P_plus, D, G, K, tau, tau_bar, E_psi, psi, psi_tilde, R, Upsilon, Omega, I;
 };
 
+// The letters of a model and the theorems stated with them, each under the heading of its group.
+struct Statements : Letters {
+  using Letters::Letters;
+  // How the last one is shown, where the sides spelled out would hide it.
+  void shown(const std::string& text, const std::string& latex) {
+    list.back().text = text;
+    list.back().latex = latex;
+  }
+  std::vector<Theorem> list;
+  std::string group;
+};
+
 // The theorems that hold on every SKO tree, stated for this model.
 std::vector<Theorem> sko_theorems(const std::shared_ptr<SkoSource>& source);
 
