@@ -47,8 +47,8 @@ BOOST_AUTO_TEST_CASE(theorems_hold_or_fail_as_stated) {
       const auto tree = random_tree(3, parents, with_J);
       for (const Theorem& t : sko_theorems(tree)) {
         if (!std::holds_alternative<Expression>(t.lhs) || t.at_most) continue;
-        const bool applies = unmet(t.hypotheses, tree->traits()) == 0;
-        if (t.hypotheses & free_root) continue;  // Υ has no inverse without one
+        const bool applies = unmet(t.hypotheses, tree->traits()) == Hypothesis::no_hypothesis;
+        if (contains(t.hypotheses, Hypothesis::free_root)) continue;  // Υ has no inverse without one
         std::map<std::string, std::vector<double>> vectors;
         const Residual r = residual(std::get<Expression>(t.lhs), std::get<Expression>(t.rhs), vectors, t.on_one_path);
         const double relative = r.difference / std::max({r.left, r.right, 1.0});

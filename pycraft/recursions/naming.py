@@ -9,24 +9,8 @@ import re
 from typing import Any
 
 from .. import _core
-from .formulas import (
-    At,
-    Cut,
-    Equation,
-    Function,
-    HingeRow,
-    Identity,
-    Inverse,
-    Item,
-    Leaf,
-    Letter,
-    Node,
-    Quantity,
-    Sweep,
-    Term,
-    product,
-    star,
-)
+from .formulas import At, Cut, Function, HingeRow, Identity, Inverse, Letter, Node, Quantity, product, star
+from .passes import Equation, Item, Leaf, Sweep, Term
 
 _SYMBOLS = {s.name: (s.text, s.latex) for s in _core.symbols}
 _SYMBOLS["E"] = ("E", "E")

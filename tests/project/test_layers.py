@@ -326,6 +326,13 @@ def test_tests_have_the_folders_of_the_package():
     assert all((ROOT / "tests" / folder / "__init__.py").is_file() for folder in folders)
 
 
+def test_what_tests_share_is_in_support():
+    """No test imports another: what both need is in tests/support."""
+    for path in sorted((ROOT / "tests").rglob("*.py")):
+        named = re.findall(r"^\s*(?:from|import) +([\w.]+)", path.read_text(encoding="utf-8"), re.M)
+        assert not [name for name in named if re.search(r"(^|\.)test_", name)], path.relative_to(ROOT)
+
+
 def test_no_two_test_files_share_a_name():
     """What the everyday subset leaves out is told by the name of the file."""
     names = [path.stem for path in (ROOT / "tests").rglob("test_*.py")]
