@@ -11,18 +11,23 @@ from .mutant import Mutant, line_of, shown_line
 
 TARGETS = [
     "cpp/rigid/rigid_blocks.h",
+    "cpp/rigid/rigid_elimination.h",
+    "cpp/rigid/rigid_residuals.h",
     "cpp/algebra/trees/dense_blocks.h",
+    "cpp/algebra/trees/dense_elimination.h",
     "cpp/numerics/tangent.h",
     "cpp/numerics/orthogonalisation.h",
     "cpp/numerics/semidefinite_factors.h",
     "cpp/algebra/language/residual_sizes.h",
     "cpp/model/configuration.h",
+    "cpp/model/subhinge_kinds.h",
     "cpp/spatial/*.h",
     "cpp/recursions/*.h",
     "cpp/algebra/trees/sweeps/*.h",
     "cpp/model/hinge_kinematics.h",
     "cpp/algebra/theorems/theorems.cpp",
     "cpp/dynamics/sensitivities.cpp",
+    "cpp/dynamics/parameter_sensitivities.h",
     "cpp/operators/rigid_values.h",
     "cpp/rigid/rigid_factors.h",
 ]
