@@ -48,8 +48,10 @@ void register_dynamics(py::module_& m) {
         const bool moving = !vdot.is_none();
         if (moving) all.emplace_back("vdot", vdot);
         Arguments given(d.model(), all);
-        const Given accelerations = moving ? given[2] : Given{};
-        return written(d.model(), given, out, {d.model().nv()}, [&](double* target) { d.inverse_dynamics(given[0], given[1], moving ? &accelerations : nullptr, precision, target); });
+        return written(d.model(), given, out, {d.model().nv()}, [&](double* target) {
+          const Given accelerations = moving ? given[2] : Given{};
+          d.inverse_dynamics(given[0], given[1], moving ? &accelerations : nullptr, precision, target);
+        });
       }, py::arg("q"), py::arg("v"), py::arg("vdot"), py::arg("precision"), py::arg("out"))
       .def("mass_matrix", [](BatchDynamics& d, const py::object& q, Precision precision, const py::object& out) {
         Arguments given(d.model(), {{"q", q}});
