@@ -7,7 +7,7 @@ import fractions
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Binding', 'Dynamics', 'Error', 'EvaluationError', 'GroupedOperators', 'Integration', 'Letter', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'Scalar', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'Theorem', 'blockdiag', 'checked_refinement', 'constant', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'identity', 'integrators', 'methods', 'operators_of', 'precisions', 'real_array', 'residual', 'scalar', 'step_kinds', 'symbol_table', 'theorems', 'time_apply', 'time_dynamics', 'time_forward', 'time_method', 'time_packs', 'vector', 'wider', 'zero']
+__all__: list[str] = ['Binding', 'Dynamics', 'Error', 'EvaluationError', 'GroupedOperators', 'HingeKind', 'Integration', 'Letter', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'Scalar', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'blockdiag', 'checked_refinement', 'constant', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'hinge_kinds', 'identity', 'integrators', 'methods', 'operators_of', 'precisions', 'real_array', 'residual', 'scalar', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_dynamics', 'time_forward', 'time_method', 'time_packs', 'vector', 'wider', 'zero']
 
 class Error(Exception): ...
 class SpaceError(Error, TypeError): ...
@@ -176,7 +176,7 @@ class SkoSource:
     """
     def __reduce__(self) -> tuple:
         ...
-    def _symbol_again(self, arg0: str, arg1: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], arg2: collections.abc.Sequence[str], arg3: str) -> Operator:
+    def _symbol_again(self, arg0: str, arg1: tuple, arg2: str) -> Operator:
         ...
     def check_current(self) -> None:
         ...
@@ -410,6 +410,11 @@ class Operator:
         The number in front: a float where it is one exactly, else a Fraction.
         """
     @property
+    def definition(self) -> typing.Any:
+        """
+        What a letter abbreviates: EφG of K, B*φ*H* of 𝒥; None for what is no such letter.
+        """
+    @property
     def domain(self) -> typing.Any:
         """
         The space it acts on; None for an I that has none yet.
@@ -594,7 +599,7 @@ class Plan:
         ...
     def __str__(self) -> str:
         ...
-    def numbers(self, context: typing.SupportsInt | typing.SupportsIndex, name: str, arguments: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] = [], state: typing.SupportsInt | typing.SupportsIndex = 0) -> typing.Any:
+    def numbers(self, context: typing.SupportsInt | typing.SupportsIndex, name: str, arguments: tuple = (), state: typing.SupportsInt | typing.SupportsIndex = 0) -> typing.Any:
         """
         A symbol's numbers at a context's state: a vector, or one block per body; `state` picks one of a batch.
         """
@@ -634,6 +639,74 @@ class Plan:
         """
         The steps as dictionaries: text, tier, flops, memory.
         """
+class SubhingeKind:
+    """
+    A kind of subhinge: sizes, and what its coordinates are.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def angle(self) -> bool:
+        """
+        Whether its one coordinate is an angle, in radians.
+        """
+    @property
+    def axis(self) -> bool:
+        """
+        Whether it has an axis.
+        """
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def nq(self) -> int:
+        """
+        Numbers in q.
+        """
+    @property
+    def nv(self) -> int:
+        """
+        Velocities.
+        """
+    @property
+    def pitch(self) -> bool:
+        """
+        Whether it has a pitch, in metres per radian.
+        """
+    @property
+    def point(self) -> bool:
+        """
+        Whether it has a point.
+        """
+    @property
+    def quaternion(self) -> typing.Any:
+        """
+        Where its unit quaternion (w, x, y, z) begins in its q; None where it has none.
+        """
+class HingeKind:
+    """
+    A kind of hinge: its subhinges, one after the other; a custom one has any.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def axes(self) -> int:
+        """
+        How many axes it is given.
+        """
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def nv(self) -> int:
+        """
+        Degrees of freedom.
+        """
+    @property
+    def subhinges(self) -> tuple:
+        """
+        Names of their kinds.
+        """
 class MultibodyOperators(SkoSource):
     """
     The operators' source of a multibody model.
@@ -658,14 +731,55 @@ class MatrixTree(SkoSource):
         ...
     def __reduce__(self) -> tuple:
         ...
+class SymbolDefinition:
+    """
+    What is said of a letter without numbers: names, spaces, what it is of.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def codomain(self) -> str:
+        ...
+    @property
+    def domain(self) -> str:
+        ...
+    @property
+    def is_symmetric(self) -> bool:
+        ...
+    @property
+    def is_vector(self) -> bool:
+        """
+        Whether it is a vector that the model provides.
+        """
+    @property
+    def latex(self) -> str:
+        ...
+    @property
+    def meaning(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        """
+        In ASCII: the attribute of an operator set.
+        """
+    @property
+    def takes(self) -> str:
+        """
+        What it is called with: "nothing", "nodes", "coordinate"; what derivatives bring up: "selection", "inertia", "direction".
+        """
+    @property
+    def text(self) -> str:
+        """
+        As it is shown.
+        """
 class Letter:
     """
     What stands behind a symbol of an expression: which letter, whose, of which nodes or coordinate, and at which state.
     """
     @property
-    def arguments(self) -> list:
+    def arguments(self) -> tuple:
         """
-        The names of its nodes, or its coordinate's number; empty for most letters.
+        What it is of: () for most letters, ("nodes", names...), ("coordinate", number); of what derivatives bring up ("twist", body, subhinge, component), ("subhinges", body, from, to), ("inertia", body, parameters...).
         """
     @property
     def binding(self) -> typing.Any:
@@ -945,10 +1059,6 @@ def step_kinds() -> list[str]:
     """
     The kinds of steps that plans are made of.
     """
-def symbol_table() -> list:
-    """
-    Every operator: (ASCII, Unicode, LaTeX, domain, codomain, meaning).
-    """
 def theorems(source: SkoSource) -> list[Theorem]:
     """
     Every theorem, stated on the letters of one model.
@@ -987,3 +1097,6 @@ def zero(domain: Space, codomain: Space) -> Operator:
     """
 _face: dict[str, typing.Any]
 float128: bool = True
+hinge_kinds: dict
+subhinge_kinds: dict
+symbols: tuple

@@ -48,16 +48,19 @@ def random_state(model: _core.Multibody, seed: int | np.random.Generator = 0) ->
         hinge = model._body(k)["hinge"]
         lower, upper = hinge["lower"], hinge["upper"]
         for i, subhinge in enumerate(hinge["subhinges"]):
-            if subhinge["kind"] in ("ball", "free"):
-                quaternion = rng.normal(size=4)
-                q[at : at + 4] = quaternion / np.linalg.norm(quaternion)
-                if subhinge["kind"] == "free":
-                    q[at + 4 : at + 7] = rng.uniform(-1, 1, 3)
-                at += 4 if subhinge["kind"] == "ball" else 7
-            else:
-                span = np.pi if subhinge["kind"] in ("pin", "screw") else 1.0
+            kind = _core.subhinge_kinds[subhinge["kind"]]
+            if kind.nq == 1:
+                span = np.pi if kind.angle else 1.0
                 q[at] = rng.uniform(*_interval(span, lower[i], upper[i]) if len(lower) else (-span, span))
-                at += 1
+            else:
+                free = np.arange(at, at + kind.nq)
+                if kind.quaternion is not None:
+                    turned = at + kind.quaternion
+                    quaternion = rng.normal(size=4)
+                    q[turned : turned + 4] = quaternion / np.linalg.norm(quaternion)
+                    free = free[(free < turned) | (free >= turned + 4)]
+                q[free] = rng.uniform(-1, 1, len(free))
+            at += kind.nq
     return State(q, rng.uniform(-1, 1, model.nv))
 
 

@@ -75,7 +75,6 @@ py::object of_face(const char* name);
 // What stands behind a symbol of an expression, as Python reads it.
 struct Letter {
   Symbol symbol;
-  bool of_nodes() const;
   std::vector<std::string> nodes() const;  // by name: their numbers may differ in another model
 };
 
@@ -106,8 +105,11 @@ py::object part_of_state(const py::handle& given, const char* what);  // of a St
 std::vector<double> one_state(const py::handle& given, const char* what);  // q or v of one state
 std::string shape_text(const py::array& a);                     // how errors call what was given: "4", "an array (1, 3)"
 
-// A letter's record by its ASCII name. EvaluationError where there is none.
-const SymbolDefinition& definition_named(const std::string& name);
+// What a letter is of, as Python has it, and back but for nodes.
+py::tuple arguments_as_data(const Symbol& symbol);
+SymbolArguments arguments_from_data(const py::tuple& data);
+// A letter by its ASCII name and the data of its arguments.
+Expression symbol_again(const std::shared_ptr<SkoSource>& source, const std::string& name, const py::tuple& arguments, const std::string& text);
 // The symbol of this name of a source; node operators take node names, Delta a coordinate.
 Expression source_symbol(const std::shared_ptr<SkoSource>& source, const std::string& name, const std::vector<std::string>& nodes, int coordinate);
 // A state, or a batch, for all models that occur unbound in the operands; q None takes the model's present state.

@@ -146,10 +146,10 @@ void register_calculus(py::module_& m) {
     return p;
   });
   m.def("_rotor_parameter", [](const std::shared_ptr<MultibodyOperators>& source, int coordinate, const std::string& name) {
-    return Parameter{source, name, {}, -1, mass_of_body, coordinate};
+    return Parameter{source, name, {}, -1, InertiaParameter::mass, coordinate};
   });
   m.def("_twist_parameter", [](const std::shared_ptr<MultibodyOperators>& source, const std::vector<std::tuple<int, int, std::vector<double>>>& twists, const std::string& name) {
-    Parameter p{source, name, {}, -1, mass_of_body, -1};
+    Parameter p{source, name, {}, -1, InertiaParameter::mass, -1};
     for (const auto& [body, position, twist] : twists) {
       InsertedTwist t{body, position, {}};
       std::copy_n(twist.begin(), 6, t.twist);

@@ -3,7 +3,7 @@
 
 #include "bindings/direct_calls.h"
 #include "dynamics/rigid_dynamics.h"
-#include "model/configuration_rate.h"
+#include "model/configuration.h"
 #include "simulation/trajectory.h"
 
 namespace pycraft {
@@ -20,7 +20,7 @@ class Kinematics {
   std::shared_ptr<const CompiledModel<S>> model_;
 };
 
-using Integration = DirectCalls<Kinematics>;
+using Integration = Batches<Kinematics>;
 
 // Forward dynamics as the trajectory asks for it.
 template <class S>
@@ -74,14 +74,8 @@ void register_integration(py::module_& m) {
   unpicklable(integration)
       .def(py::init<std::shared_ptr<Multibody>>())
       .def("configuration_rate", [](Integration& d, const py::object& q, const py::object& v, Precision precision, const py::object& out) {
-        const Multibody& mb = d.model();
-        const int nq = mb.nq(), nv = mb.nv();
-        const Argument a = argument(q, nq, "q", mb), b = argument(v, nv, "v", mb);
-        const int batch = common_batch({&a, &b});
-        check_states(mb, a, batch);
-        check_velocities(mb, b, batch, "v");
-        return run(d, precision, {{&a, nq}, {&b, nv}}, output(out, batch, {nq}), nq, batch,
-                   [](auto& w, auto in, auto* y) { w.rate(in[0], in[1], y); });
+        Arguments given(d.model(), {{"q", q}, {"v", v}});
+        return run(d, precision, given, out, {d.model().nq()}, [](auto& w, auto in, auto* y) { w.rate(in[0], in[1], y); });
       }, py::arg("q"), py::arg("v"), py::arg("precision"), py::arg("out"))
       .def("trajectory", [](Integration& d, const py::object& q, const py::object& v, const std::vector<double>& times, const py::object& tau,
                             const py::object& damping, const std::string& integrator, double rtol, double atol, double step, bool normalise,

@@ -6,20 +6,7 @@ namespace pycraft {
 
 namespace {
 
-using Methods = DirectCalls<DynamicsMethods>;
-
-struct MotionState {
-  Argument q, v, tau;
-  int batch;
-  MotionState(const Multibody& mb, const py::object& given_q, const py::object& given_v, const py::object& given_tau)
-      : q(argument(given_q, mb.nq(), "q", mb)), v(argument(given_v, mb.nv(), "v", mb)), tau(argument(given_tau, mb.nv(), "tau", mb)),
-        batch(common_batch({&q, &v, &tau})) {
-    check_states(mb, q, batch);
-    check_velocities(mb, v, batch, "v");
-    check_velocities(mb, tau, batch, "tau");
-  }
-  std::vector<std::pair<const Argument*, int>> arguments(const Multibody& mb) const { return {{&q, mb.nq()}, {&v, mb.nv()}, {&tau, mb.nv()}}; }
-};
+using Methods = Batches<DynamicsMethods>;
 
 }  // namespace
 
@@ -31,17 +18,13 @@ void register_methods(py::module_& m) {
       .def("forward_dynamics", [](Methods& d, const std::string& method, const py::object& q, const py::object& v, const py::object& tau,
                                   Precision precision, const py::object& out) {
         const Method by = method_from_name(method);
-        const Multibody& mb = d.model();
-        const MotionState s(mb, q, v, tau);
-        return run(d, precision, s.arguments(mb), output(out, s.batch, {mb.nv()}), mb.nv(), s.batch,
-                   [by](auto& w, auto in, auto* y) { w.forward_dynamics(by, in[0], in[1], in[2], y); });
+        Arguments given(d.model(), {{"q", q}, {"v", v}, {"tau", tau}});
+        return run(d, precision, given, out, {d.model().nv()}, [by](auto& w, auto in, auto* y) { w.forward_dynamics(by, in[0], in[1], in[2], y); });
       }, py::arg("method"), q, v, tau, precision, py::arg("out"), "Accelerations (nv,) or (B, nv).")
       .def("conjugate_gradients", [](Methods& d, const py::object& q, const py::object& v, const py::object& tau, Precision precision) {
-        const Multibody& mb = d.model();
-        const int nv = mb.nv();
-        const MotionState s(mb, q, v, tau);
-        const py::array_t<double> target = output(py::none(), s.batch, {nv + 2});
-        py::array_t<double> all = run(d, precision, s.arguments(mb), target, nv + 2, s.batch, [nv](auto& w, auto in, auto* y) {
+        const int nv = d.model().nv();
+        Arguments given(d.model(), {{"q", q}, {"v", v}, {"tau", tau}});
+        py::array_t<double> all = run(d, precision, given, py::none(), {nv + 2}, [nv](auto& w, auto in, auto* y) {
           w.forward_dynamics(Method::conjugate_gradients, in[0], in[1], in[2], y);
           y[nv] = w.iterations();
           y[nv + 1] = w.residual();

@@ -8,7 +8,7 @@ namespace {
 
 py::dict subhinge_dict(const Subhinge& s) {
   py::dict d;
-  d["kind"] = subhinge_kind_name(s.kind);
+  d["kind"] = s.record().name;
   d["axis"] = to_numpy(s.axis);
   d["point"] = to_numpy(s.point);
   d["pitch"] = s.pitch;
@@ -24,6 +24,12 @@ py::dict node_dict(const Node& n) {
   return d;
 }
 
+std::string subhinge_kinds() {
+  std::string all;
+  for (const SubhingeRecord& row : subhinge_records) all += (all.empty() ? "" : ", ") + std::string(row.name);
+  return all;
+}
+
 // A subhinge from a mapping with "kind", and "axis", "point", "pitch" as far as the kind has them.
 Subhinge subhinge_from(const py::handle& item, const std::string& hinge) {
   const std::string name = "hinge '" + hinge + "'";
@@ -36,21 +42,14 @@ Subhinge subhinge_from(const py::handle& item, const std::string& hinge) {
       throw ModelError(name + ": a subhinge has no '" + text + "'; there are kind, axis, point, pitch");
   }
   if (!d.contains("kind") || !py::isinstance<py::str>(d["kind"]))
-    throw ModelError(name + ": a subhinge says its kind, one of pin, slider, screw, ball, free: {\"kind\": \"pin\"}");
+    throw ModelError(name + ": a subhinge says its kind, one of " + subhinge_kinds() + ": {\"kind\": \"pin\"}");
   const SubhingeKind kind = subhinge_kind_from_name(py::cast<std::string>(d["kind"]));
   Vector3<double> axis{0, 0, 1}, point{0, 0, 0};
   double pitch = 0;
   if (d.contains("axis")) axis = to_vector3(d["axis"], ("axis of " + name).c_str());
   if (d.contains("point")) point = to_vector3(d["point"], ("point of " + name).c_str());
   if (d.contains("pitch")) pitch = one_number(d["pitch"], ("pitch of " + name).c_str());
-  switch (kind) {  // the checks of the one-subhinge kinds serve here too
-    case SubhingeKind::pin: return subhinges_of(HingeKind::pin, {axis}, point, pitch, hinge)[0];
-    case SubhingeKind::slider: return subhinges_of(HingeKind::slider, {axis}, point, pitch, hinge)[0];
-    case SubhingeKind::screw: return subhinges_of(HingeKind::screw, {axis}, point, pitch, hinge)[0];
-    case SubhingeKind::ball: return subhinges_of(HingeKind::ball, {}, point, pitch, hinge)[0];
-    case SubhingeKind::free: return subhinges_of(HingeKind::free, {}, point, pitch, hinge)[0];
-  }
-  throw ModelError(name + " has a subhinge of no kind");
+  return subhinge_of(kind, axis, point, pitch, hinge);
 }
 
 Pose<double> pose_from(const py::object& rotation, const py::object& position, const std::string& what) {
@@ -63,6 +62,32 @@ Pose<double> pose_from(const py::object& rotation, const py::object& position, c
 }  // namespace
 
 void register_multibody(py::module_& m) {
+  py::class_<SubhingeRecord>(m, "SubhingeKind", "A kind of subhinge: sizes, and what its coordinates are.")
+      .def_property_readonly("name", [](const SubhingeRecord& r) { return r.name; })
+      .def_readonly("nq", &SubhingeRecord::nq, "Numbers in q.")
+      .def_readonly("nv", &SubhingeRecord::nv, "Velocities.")
+      .def_property_readonly("quaternion", [](const SubhingeRecord& r) { return r.quaternion < 0 ? py::object(py::none()) : py::object(py::int_(r.quaternion)); },
+                             "Where its unit quaternion (w, x, y, z) begins in its q; None where it has none.")
+      .def_readonly("angle", &SubhingeRecord::angle, "Whether its one coordinate is an angle, in radians.")
+      .def_readonly("axis", &SubhingeRecord::axis, "Whether it has an axis.")
+      .def_readonly("point", &SubhingeRecord::point, "Whether it has a point.")
+      .def_readonly("pitch", &SubhingeRecord::pitch, "Whether it has a pitch, in metres per radian.")
+      .def("__repr__", [](const SubhingeRecord& r) { return "<subhinge kind '" + std::string(r.name) + "': nq " + std::to_string(r.nq) + ", nv " + std::to_string(r.nv) + ">"; });
+  py::class_<HingeRecord>(m, "HingeKind", "A kind of hinge: its subhinges, one after the other; a custom one has any.")
+      .def_property_readonly("name", [](const HingeRecord& r) { return r.name; })
+      .def_readonly("axes", &HingeRecord::axes, "How many axes it is given.")
+      .def_property_readonly("subhinges", [](const HingeRecord& r) {
+        py::list names;
+        for (const auto& [kind, axis] : r.subhinges) names.append(record_of(kind).name);
+        return py::tuple(names);
+      }, "Names of their kinds.")
+      .def_property_readonly("nv", &HingeRecord::nv, "Degrees of freedom.")
+      .def("__repr__", [](const HingeRecord& r) { return "<hinge kind '" + std::string(r.name) + "': " + std::to_string(r.subhinges.size()) + " subhinges>"; });
+  py::dict subhinges, hinges;
+  for (const SubhingeRecord& row : subhinge_records) subhinges[row.name] = py::cast(&row, py::return_value_policy::reference);
+  for (const HingeRecord& row : hinge_records()) hinges[row.name] = py::cast(&row, py::return_value_policy::reference);
+  m.attr("subhinge_kinds") = subhinges;
+  m.attr("hinge_kinds") = hinges;
   declared<py::class_<Multibody, std::shared_ptr<Multibody>>>(m, "Multibody")
       .def(py::init<std::string, bool, bool>(), py::arg("name") = "multibody", py::arg("keep_welds") = false, py::arg("strict") = false)
       .def_property_readonly("name", &Multibody::name)
@@ -120,7 +145,7 @@ void register_multibody(py::module_& m) {
         d["inertia"] = to_numpy(I);
         py::dict h;
         h["name"] = b.hinge.name;
-        h["kind"] = hinge_kind_name(b.hinge.kind);
+        h["kind"] = record_of(b.hinge.kind).name;
         py::dict placement;
         placement["rotation"] = to_numpy(b.hinge.placement.R);
         placement["position"] = to_numpy(b.hinge.placement.p);

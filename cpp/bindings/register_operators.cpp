@@ -37,7 +37,7 @@ void with_remedy(const Expression& e, F f) {
     f();
   } catch (const SingularOperatorError& error) {
     bool of_nodes = false;
-    visit(e, [&](const Expression& x) { of_nodes |= x.kind() == NodeKind::symbol && x.node().symbol.definition->id == MechanicsSymbolId::Lambda; });
+    visit(e, [&](const Expression& x) { of_nodes |= x.kind() == NodeKind::symbol && x.node().symbol.definition->id == SymbolId::Lambda; });
     if (!of_nodes) throw;
     throw SingularOperatorError(std::string(error.what()) + "; Λ is the inverse of B*ΩB, which has none where the nodes cannot move in every direction: take those " +
                                 "in which they can, Lambda(nodes, directions=[\"x\", ...])");
@@ -184,12 +184,7 @@ py::object value(const Expression& e, const py::kwargs& vectors) {
   return to_array(r, shape);
 }
 
-}  // namespace
-
-void register_operators(py::module_& m) {
-  auto op = declared<py::class_<Expression>>(m, "Operator");
-  op.attr("__array_ufunc__") = py::none();
-  op.attr("__array_priority__") = py::float_(1000.0);
+void define_spaces_and_states(py::class_<Expression>& op) {
   op.def_property_readonly("domain", [](const Expression& e) { return e.floating() ? py::object(py::none()) : py::cast(e.domain()); }, "The space it acts on; None for an I that has none yet.")
       .def_property_readonly("codomain", [](const Expression& e) { return e.floating() ? py::object(py::none()) : py::cast(e.codomain()); })
       .def_property_readonly("shape", [](const Expression& e) {
@@ -205,13 +200,15 @@ void register_operators(py::module_& m) {
          "The same expression bound to a state: q (nq,) or a batch (B, nq), v likewise (zero if left out); q=None takes the model's present\n"
          "state. The innermost binding wins. form: \"fast\", \"ud\" or \"square-root\", of the articulated-inertia sweep; refine: corrections of\n"
          "what is solved, a number or \"auto\", with residual=\"same\", \"gather\" or \"wider\"; precision: \"single\", \"double\", \"extended\", \"quad\", 50, 100.")
-      .def("_bound", [](const Expression& e, const std::shared_ptr<const Binding>& b) { return e.at(b); })
-      // ---- arithmetic
-      .def("__matmul__", [](const Expression& a, const py::object& b) -> py::object {
-        if (is_operator(b)) return py::cast(a * b.cast<Expression>());
-        if (is_array(b)) return apply_to_array(a, b);
-        return not_implemented();
-      })
+      .def("_bound", [](const Expression& e, const std::shared_ptr<const Binding>& b) { return e.at(b); });
+}
+
+void define_arithmetic(py::class_<Expression>& op) {
+  op.def("__matmul__", [](const Expression& a, const py::object& b) -> py::object {
+    if (is_operator(b)) return py::cast(a * b.cast<Expression>());
+    if (is_array(b)) return apply_to_array(a, b);
+    return not_implemented();
+  })
       .def("__rmatmul__", [](const Expression& a, const py::object& b) -> py::object { return is_array(b) ? apply_from_left(b, a) : not_implemented(); })
       .def("__mul__", &multiply)
       .def("__rmul__", [](const Expression& a, const py::object& b) -> py::object {
@@ -240,11 +237,13 @@ void register_operators(py::module_& m) {
       })
       .def("__eq__", [](const Expression& a, const py::object& b) -> py::object { return is_operator(b) ? py::cast(a == b.cast<Expression>()) : not_implemented(); },
            "Structural equality after flattening sums and products: a bool, no numbers. Equality by value is pycraft.check.")
-      .def("__hash__", [](const Expression& e) { return static_cast<py::ssize_t>(e.node().hash >> 1); })
-      // ---- numbers
-      .def("dense", &dense, py::arg("dtype") = py::none(), py::arg("rules") = true,
-           "The operator as an array (codomain, domain), with a leading batch axis if one is bound. dtype=object keeps a wider precision as\n"
-           "mpmath numbers; rules=False evaluates what was typed, no theorem used.")
+      .def("__hash__", [](const Expression& e) { return static_cast<py::ssize_t>(e.node().hash >> 1); });
+}
+
+void define_numbers(py::class_<Expression>& op) {
+  op.def("dense", &dense, py::arg("dtype") = py::none(), py::arg("rules") = true,
+         "The operator as an array (codomain, domain), with a leading batch axis if one is bound. dtype=object keeps a wider precision as\n"
+         "mpmath numbers; rules=False evaluates what was typed, no theorem used.")
       .def("__array__", [](const Expression& e, const py::object& dtype, const py::object&) {
         py::object a = dense(e, py::none(), true);
         return dtype.is_none() ? a : a.attr("astype")(dtype);
@@ -253,12 +252,15 @@ void register_operators(py::module_& m) {
       .def("value", &value, "The value of a vector expression; named vectors (pycraft.vector) are given by name. rules=False evaluates what was typed.")
       .def("trace", [](const Expression& e) { return trace(e); }, "The trace, as a scalar expression. Cost O(N).")
       .def("logdet", [](const Expression& e) { return logdet(e); }, "ln|det|, as a scalar expression. Cost O(N); exact by structure where a theorem gives it.")
-      .def("norm", [](const Expression& e) { return norm(e); }, "The Frobenius norm, as a scalar expression.")
-      // ---- algebra
-      .def("simplify", [](const Expression& e) {
-        ReleasedGil release;
-        return simplify(e);
-      }, "The shortest expression that the rewriting theorems find equal to this one.")
+      .def("norm", [](const Expression& e) { return norm(e); }, "The Frobenius norm, as a scalar expression.");
+}
+
+// What the planner and the faces make of it.
+void define_planning(py::class_<Expression>& op) {
+  op.def("simplify", [](const Expression& e) {
+    ReleasedGil release;
+    return simplify(e);
+  }, "The shortest expression that the rewriting theorems find equal to this one.")
       .def_property_readonly("is_symmetric", &is_symmetric, "Known by rule, no number looked at.")
       .def_property_readonly("is_block_diagonal", [](const Expression& e) { return is_block_diagonal(e); }, "Known by rule.")
       .def_property_readonly("is_upper_triangular", [](const Expression& e) { return is_upper_triangular(e); }, "By blocks, parents before children: φ and ψ are. Known by rule.")
@@ -290,8 +292,12 @@ void register_operators(py::module_& m) {
             return prepare(e, r, rules);
           }
         throw EvaluationError("no plan is made for '" + request + "'; there are apply, dense, diagonal, blockdiag, trace, logdet, norm");
-      }, py::arg("request") = "apply", py::arg("rules") = true, "The plan: what is run, step by step, with its cost.")
-      .def_property_readonly("children", [](const Expression& e) { return e.children(); })
+      }, py::arg("request") = "apply", py::arg("rules") = true, "The plan: what is run, step by step, with its cost.");
+}
+
+// What it is made of.
+void define_structure(py::class_<Expression>& op) {
+  op.def_property_readonly("children", [](const Expression& e) { return e.children(); })
       .def_property_readonly("kind", [](const Expression& e) {
         static const char* names[] = {"symbol", "vector", "identity", "zero", "constant", "external", "sum", "product", "scaled", "transpose", "inverse", "blockdiag", "sqrt", "function"};
         return names[static_cast<int>(e.kind())];
@@ -319,6 +325,10 @@ void register_operators(py::module_& m) {
         };
         return py::make_tuple(shaped(b.q, b.nq), shaped(b.v, b.nv), b.arithmetic.precision);
       }, "(q, v, precision) that it is bound to, None where it is not.")
+      .def_property_readonly("definition", [](const Expression& e) {
+        const bool compound = e.kind() == NodeKind::symbol && e.node().symbol.definition->expand;
+        return compound ? py::cast(e.node().symbol.definition->expand(e.node().symbol)) : py::object(py::none());
+      }, "What a letter abbreviates: EφG of K, B*φ*H* of 𝒥; None for what is no such letter.")
       .def("_with_operand", [](const Expression& e, const Expression& operand) {
         if (e.kind() != NodeKind::block_function) throw EvaluationError(show(e) + " is no function of an operand");
         const Symbol& s = e.node().symbol;
@@ -329,9 +339,11 @@ void register_operators(py::module_& m) {
         py::list all;
         for (const Context& c : contexts(e)) all.append(py::cast(c.source));
         return all;
-      })
-      // ---- text
-      .def("text", [](const Expression& e) { return show_in_full(e); }, "As the book prints it, in Unicode; EvaluationError beyond ten million characters.")
+      });
+}
+
+void define_text(py::class_<Expression>& op) {
+  op.def("text", [](const Expression& e) { return show_in_full(e); }, "As the book prints it, in Unicode; EvaluationError beyond ten million characters.")
       .def("latex", [](const Expression& e) { return show_in_full(e, Style::latex); })
       .def("python", [](const Expression& e) { return show_in_full(e, Style::python); }, "As Python reads it.")
       .def("__str__", [](const Expression& e) { return show(e, Style::unicode, 100000); })
@@ -348,7 +360,20 @@ void register_operators(py::module_& m) {
       .def("__reduce__", [](const Expression& e) -> py::tuple {
         return py::make_tuple(of_face("operator_from_nodes"), py::make_tuple(all_parts(e)));
       });
+}
 
+}  // namespace
+
+void register_operators(py::module_& m) {
+  auto op = declared<py::class_<Expression>>(m, "Operator");
+  op.attr("__array_ufunc__") = py::none();
+  op.attr("__array_priority__") = py::float_(1000.0);
+  define_spaces_and_states(op);
+  define_arithmetic(op);
+  define_numbers(op);
+  define_planning(op);
+  define_structure(op);
+  define_text(op);
   m.def("identity", [](const py::object& space) { return space.is_none() ? identity() : identity(space.cast<Space>()); }, py::arg("space") = py::none(),
         "I; without a space it takes that of the operator it is combined with.");
   m.def("zero", &zero, py::arg("domain"), py::arg("codomain"), "The zero operator.");

@@ -3,6 +3,7 @@
 
 #include "algebra/planning/square_root.h"
 #include "bindings/bindings.h"
+#include "operators/alphabet.h"
 #include "operators/directions.h"
 #include "operators/grouped_operators.h"
 #include "runtime/errors.h"
@@ -18,17 +19,69 @@ py::object binding_of(const Symbol& s) { return s.binding ? py::cast(std::const_
 
 }  // namespace
 
-bool Letter::of_nodes() const {
-  const int id = symbol.definition->id;
-  return id == MechanicsSymbolId::B || id == MechanicsSymbolId::Jacobian || id == MechanicsSymbolId::Lambda;
-}
-
 std::vector<std::string> Letter::nodes() const {
   std::vector<std::string> names;
-  if (!of_nodes()) return names;
-  const auto model = std::dynamic_pointer_cast<MultibodyOperators>(symbol.source)->model();
-  for (int a : symbol.arguments) names.push_back(a >= 0 ? model->node(a).name : model->body(-1 - a).name);
+  const auto* of = std::get_if<OfNodes>(&symbol.arguments);
+  if (!of) return names;
+  const auto model = mechanics_of(symbol.source)->model();
+  for (int a : of->nodes) names.push_back(a >= 0 ? model->node(a).name : model->body(-1 - a).name);
   return names;
+}
+
+namespace {
+
+py::tuple place_as_data(const TwistPlace& place) {
+  if (const auto* of = std::get_if<OfCoordinate>(&place)) return py::make_tuple("coordinate", of->coordinate);
+  const OfTwist& of = std::get<OfTwist>(place);
+  return py::make_tuple("twist", of.body, of.position, of.component);
+}
+TwistPlace place_from_data(const py::tuple& data) {
+  if (data[0].cast<std::string>() == "coordinate") return OfCoordinate{data[1].cast<int>()};
+  return OfTwist{data[1].cast<int>(), data[2].cast<int>(), data[3].cast<int>()};
+}
+
+}  // namespace
+
+// What a letter is of: the word for it, then its numbers or the names of nodes; () where it is of nothing.
+py::tuple arguments_as_data(const Symbol& symbol) {
+  const SymbolArguments& given = symbol.arguments;
+  py::list data;
+  if (std::holds_alternative<OfNodes>(given)) {
+    data.append("nodes");
+    for (const std::string& name : Letter{symbol}.nodes()) data.append(name);
+  } else if (std::holds_alternative<OfCoordinate>(given) || std::holds_alternative<OfTwist>(given)) {
+    return place_as_data(place_in(given));
+  } else if (const auto* of = std::get_if<OfSubhinges>(&given)) {
+    return py::make_tuple("subhinges", of->body, of->from, of->to);
+  } else if (const auto* of = std::get_if<OfInertia>(&given)) {
+    data.append("inertia"), data.append(of->body);
+    for (const InertiaParameter p : of->parameters) data.append(static_cast<int>(p));
+  } else if (const auto* of = std::get_if<OfDirection>(&given)) {
+    data.append("direction"), data.append(of->time);
+    for (const auto& [amount, place] : of->twists) data.append(py::make_tuple(amount, place_as_data(place)));
+  }
+  return py::tuple(data);
+}
+
+// The same again; nodes are found by name (node_operator).
+SymbolArguments arguments_from_data(const py::tuple& data) {
+  if (py::len(data) == 0) return {};
+  const auto word = data[0].cast<std::string>();
+  const auto number = [&](size_t i) { return data[i].cast<int>(); };
+  if (word == "coordinate" || word == "twist") return as_arguments(place_from_data(data));
+  if (word == "subhinges") return OfSubhinges{number(1), number(2), number(3)};
+  if (word == "inertia") {
+    OfInertia of{number(1), {}};
+    for (size_t i = 2; i < py::len(data); ++i) of.parameters.push_back(static_cast<InertiaParameter>(number(i)));
+    return of;
+  }
+  if (word != "direction") throw EvaluationError("a letter is of nodes, a coordinate, a twist, subhinges, inertia or a direction, not of '" + word + "'");
+  OfDirection of{data[1].cast<bool>(), {}};
+  for (size_t i = 2; i < py::len(data); ++i) {
+    const auto twist = data[i].cast<py::tuple>();
+    of.twists.emplace_back(twist[0].cast<double>(), place_from_data(twist[1].cast<py::tuple>()));
+  }
+  return of;
 }
 
 // A space as its model and kind, so that it can be pickled and found again.
@@ -66,10 +119,7 @@ static py::tuple parts_of_node(const Expression& e) {
   py::object payload = py::none();
   switch (n.kind) {
     case NodeKind::symbol: {
-      const Letter letter{n.symbol};
-      const std::vector<std::string> nodes = letter.nodes();
-      const std::vector<int> numbers = letter.of_nodes() ? std::vector<int>() : n.symbol.arguments;
-      payload = py::make_tuple(source_of(n.symbol), n.symbol.definition->ascii, numbers, nodes, n.symbol.argument_text, binding_of(n.symbol));
+      payload = py::make_tuple(source_of(n.symbol), n.symbol.definition->ascii, arguments_as_data(n.symbol), n.symbol.argument_text, binding_of(n.symbol));
       break;
     }
     case NodeKind::block_function:
@@ -111,12 +161,9 @@ void register_pickling(py::module_& m) {
       .def_property_readonly("name", [](const Letter& l) { return l.symbol.definition->ascii; }, "Its ASCII name.")
       .def_property_readonly("source", [](const Letter& l) { return l.symbol.source; }, "The operators that it is one of.")
       .def_property_readonly("arguments", [](const Letter& l) {
-        py::list all;
-        for (const std::string& node : l.nodes()) all.append(node);
-        if (!l.of_nodes())
-          for (int a : l.symbol.arguments) all.append(a);
-        return all;
-      }, "The names of its nodes, or its coordinate's number; empty for most letters.")
+        return arguments_as_data(l.symbol);
+      }, "What it is of: () for most letters, (\"nodes\", names...), (\"coordinate\", number); of what derivatives bring up (\"twist\", body, subhinge, component), "
+         "(\"subhinges\", body, from, to), (\"inertia\", body, parameters...).")
       .def_property_readonly("text", [](const Letter& l) { return l.symbol.argument_text; }, "Its arguments as they are shown.")
       .def_property_readonly("binding", [](const Letter& l) { return binding_of(l.symbol); }, "The state that it is bound to; None where it is not.");
   m.def("_make", [](const std::string& kind, const std::vector<Expression>& children, const Coefficient& coefficient) {
@@ -130,9 +177,9 @@ void register_pickling(py::module_& m) {
     return square_root(children[0]);
   });
   m.def("_function", [](const std::shared_ptr<SkoSource>& source, const std::string& name, const std::shared_ptr<Binding>& binding, const Expression& operand) {
-    for (const SymbolDefinition& d : derivative_symbols())
-      if (d.ascii == name) return block_function(d, source, binding, operand);
-    throw EvaluationError("no function is called '" + name + "'");
+    const SymbolDefinition& d = definition_named(name);
+    if (d.pattern != Pattern::function) throw EvaluationError("'" + name + "' is no function");
+    return block_function(d, source, binding, operand);
   });
   m.def("_leaf_from_parts", [](const std::string& kind, const py::object& payload) {
     if (kind == "identity") return payload.is_none() ? identity() : identity(space_from_parts(payload.cast<py::tuple>()));

@@ -35,7 +35,7 @@ py::object symbol_as_data(const Symbol& s) {
   if (!s.definition) return py::none();
   py::dict d;
   d["name"] = s.definition->ascii;
-  d["arguments"] = s.arguments;
+  d["arguments"] = arguments_as_data(s);
   d["argument_text"] = s.argument_text;
   return d;
 }
@@ -139,20 +139,21 @@ ValuesInUse<double> values_at(const Context& c, unsigned groups, int state) {
 }
 
 // The numbers of a symbol at a context's state: a vector, or one block per body (None where an edge symbol has none).
-py::object numbers_of(const Plan& p, size_t context, const std::string& name, const std::vector<int>& arguments, int state) {
+py::object numbers_of(const Plan& p, size_t context, const std::string& name, const py::tuple& data, int state) {
   const Context& c = p.contexts.at(context);
   c.source->check_current();
-  const SymbolDefinition& d = definition_named(name);
-  const Symbol symbol{&d, nullptr, nullptr, arguments, ""};
+  const Expression letter = symbol_again(c.source, name, data, "");
+  const Symbol& symbol = letter.node().symbol;
+  const SymbolDefinition& d = *symbol.definition;
   const auto values = values_at(c, d.groups, state);
-  const Space rows = c.source->space(d.codomain, arguments);
+  const Space& rows = letter.codomain();
   if (d.pattern == Pattern::vector) {
     std::vector<double> v(rows.dimension());
     values->vector(symbol, v.data());
     return to_numpy(v);
   }
   if (d.pattern != Pattern::block_diagonal && d.pattern != Pattern::edges) throw EvaluationError(name + " has no blocks");
-  const Space columns = c.source->space(d.domain, arguments);
+  const Space& columns = letter.domain();
   py::list blocks;
   for (int k = 0; k < c.source->structure().bodies(); ++k) {
     const int p = d.pattern == Pattern::edges ? c.source->structure().parent[k] : k;
@@ -219,9 +220,9 @@ void register_plans(py::module_& m) {
       .def_property_readonly("run_notes", &ExecutionPool::run_notes)
       .def_property_readonly("program", [](const ExecutionPool& p) { return plan_as_data(p.plan()); },
                              "The plan as plain data: contexts, registers and steps in dictionaries; pycraft.recursions writes them out.")
-      .def("numbers", [](const ExecutionPool& p, size_t context, const std::string& name, const std::vector<int>& arguments, int state) {
+      .def("numbers", [](const ExecutionPool& p, size_t context, const std::string& name, const py::tuple& arguments, int state) {
         return numbers_of(p.plan(), context, name, arguments, state);
-      }, py::arg("context"), py::arg("name"), py::arg("arguments") = std::vector<int>(), py::arg("state") = 0,
+      }, py::arg("context"), py::arg("name"), py::arg("arguments") = py::tuple(), py::arg("state") = 0,
            "A symbol's numbers at a context's state: a vector, or one block per body; `state` picks one of a batch.")
       .def_property_readonly(
           "steps",

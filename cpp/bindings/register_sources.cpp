@@ -4,24 +4,13 @@
 #include "algebra/trees/aggregated_tree.h"
 #include "algebra/trees/matrix_tree.h"
 #include "bindings/bindings.h"
+#include "operators/alphabet.h"
 #include "operators/derived_operators.h"
 #include "operators/directions.h"
 #include "operators/grouped_operators.h"
 #include "runtime/errors.h"
 
 namespace pycraft {
-
-const SymbolDefinition& definition_named(const std::string& name) {
-  for (const SymbolDefinition& d : sko_symbols())
-    if (d.ascii == name) return d;
-  for (const SymbolDefinition& d : mechanics_symbols())
-    if (d.ascii == name) return d;
-  for (const SymbolDefinition& d : derivative_symbols())
-    if (d.ascii == name) return d;
-  for (const SymbolDefinition& d : grouped_symbols())
-    if (d.ascii == name) return d;
-  throw EvaluationError("no operator is called '" + name + "'");
-}
 
 namespace {
 
@@ -46,30 +35,31 @@ std::vector<std::shared_ptr<SkoSource>> unbound_sources(const std::vector<Expres
 
 }  // namespace
 
-// A symbol as it was pickled: arguments are numbers, or the names of nodes.
-Expression symbol_again(const std::shared_ptr<SkoSource>& source, const std::string& name, const std::vector<int>& numbers, const std::vector<std::string>& nodes,
-                        const std::string& text) {
-  if (!nodes.empty()) return source_symbol(source, name, nodes, -1);
+// A symbol as it was pickled, its arguments as `arguments_as_data` has them.
+Expression symbol_again(const std::shared_ptr<SkoSource>& source, const std::string& name, const py::tuple& arguments, const std::string& text) {
+  if (py::len(arguments) > 0 && arguments[0].cast<std::string>() == "nodes") {
+    std::vector<std::string> nodes;
+    for (size_t i = 1; i < py::len(arguments); ++i) nodes.push_back(arguments[i].cast<std::string>());
+    return source_symbol(source, name, nodes, -1);
+  }
   source->check_current();
-  return make_symbol(definition_named(name), source, numbers, text);
+  return make_symbol(definition_named(name), source, arguments_from_data(arguments), text);
 }
 
 Expression source_symbol(const std::shared_ptr<SkoSource>& source, const std::string& name, const std::vector<std::string>& nodes, int coordinate) {
   const SymbolDefinition& d = definition_named(name);
   source->check_current();
-  if (d.id < first_extra) return make_symbol(d, source);
-  if (d.id >= first_grouped_symbol) {
+  if (d.kind() == LetterKind::sko) return make_symbol(d, source);
+  if (d.kind() == LetterKind::groups) {
     if (!std::dynamic_pointer_cast<GroupedOperators>(source)) throw EvaluationError("'" + name + "' is a letter of grouped bodies; '" + source->name() + "' has none");
     return make_symbol(d, source);
   }
   if (!std::dynamic_pointer_cast<MultibodyOperators>(source) && !std::dynamic_pointer_cast<GroupedOperators>(source))
     throw EvaluationError("'" + name + "' is an operator of mechanics; '" + source->name() + (mechanics_of(source) ? "' has none" : "' is a bare tree of matrices"));
-  switch (d.id) {
-    case MechanicsSymbolId::B:
-    case MechanicsSymbolId::Jacobian:
-    case MechanicsSymbolId::Lambda: return node_operator(static_cast<MechanicsSymbolId>(d.id), source, nodes);
-    case MechanicsSymbolId::Delta: return delta_operator(source, coordinate);
-    default: return mechanics_operator(static_cast<MechanicsSymbolId>(d.id), source);
+  switch (d.takes) {
+    case Takes::nodes: return node_operator(d.id, source, nodes);
+    case Takes::place: return delta_operator(source, coordinate);
+    default: return mechanics_operator(d.id, source);
   }
 }
 
@@ -243,15 +233,24 @@ void register_sources(py::module_& m) {
                               py::make_tuple(s.parent, s.size, s.dof, t.E, t.H, t.M, t.J, s.body_names, t.name()));
       });
 
-  m.def("symbol_table", [] {
-    py::list table;
-    for (const auto* symbols : {&sko_symbols(), &mechanics_symbols()})
-      for (const SymbolDefinition& d : *symbols) {
-        static const char* kinds[] = {"Θ", "V", "F", "W", "NodesV", "NodesF", "R^1"};
-        table.append(py::make_tuple(d.ascii, d.unicode, d.latex, kinds[static_cast<int>(d.domain)], kinds[static_cast<int>(d.codomain)], d.meaning));
-      }
-    return table;
-  }, "Every operator: (ASCII, Unicode, LaTeX, domain, codomain, meaning).");
+  static const char* const spaces[] = {"Θ", "V", "F", "W", "NodesV", "NodesF", "R^1"};
+  static const char* const takes[] = {"nothing", "nodes", "coordinate", "selection", "inertia", "direction"};
+  py::class_<SymbolDefinition>(m, "SymbolDefinition", "What is said of a letter without numbers: names, spaces, what it is of.")
+      .def_readonly("name", &SymbolDefinition::ascii, "In ASCII: the attribute of an operator set.")
+      .def_readonly("text", &SymbolDefinition::unicode, "As it is shown.")
+      .def_readonly("latex", &SymbolDefinition::latex)
+      .def_property_readonly("domain", [](const SymbolDefinition& d) { return spaces[static_cast<int>(d.domain)]; })
+      .def_property_readonly("codomain", [](const SymbolDefinition& d) { return spaces[static_cast<int>(d.codomain)]; })
+      .def_readonly("meaning", &SymbolDefinition::meaning)
+      .def_property_readonly("takes", [](const SymbolDefinition& d) { return takes[static_cast<int>(d.takes)]; },
+                             "What it is called with: \"nothing\", \"nodes\", \"coordinate\"; what derivatives bring up: \"selection\", \"inertia\", \"direction\".")
+      .def_property_readonly("is_vector", [](const SymbolDefinition& d) { return d.pattern == Pattern::vector; }, "Whether it is a vector that the model provides.")
+      .def_readonly("is_symmetric", &SymbolDefinition::symmetric)
+      .def("__repr__", [](const SymbolDefinition& d) { return "<letter " + d.unicode + ": " + d.meaning + ">"; });
+  py::list symbols;
+  for (const SymbolDefinition* d : alphabet())
+    if (d->kind() == LetterKind::sko || d->kind() == LetterKind::mechanics) symbols.append(py::cast(d, py::return_value_policy::reference));
+  m.attr("symbols") = py::tuple(symbols);
 }
 
 }  // namespace pycraft

@@ -42,8 +42,8 @@ void register_theorems(py::module_& m) {
       .def("__reduce__", [side](const Theorem& t) -> py::tuple {
         const bool waits = !t.waiting.empty();
         return py::make_tuple(py::module_::import("pycraft._core").attr("_theorem_from_parts"),
-                              py::make_tuple(t.name, t.group, waits ? py::none() : side(t.lhs), waits ? py::none() : side(t.rhs), t.hypotheses, t.source,
-                                             static_cast<int>(t.use), t.on_one_path, t.at_most, t.waiting, t.text, t.latex));
+                              py::make_tuple(t.name, t.group, waits ? py::none() : side(t.lhs), waits ? py::none() : side(t.rhs),
+                                             static_cast<unsigned>(t.hypotheses), t.source, static_cast<int>(t.use), t.on_one_path, t.at_most, t.waiting, t.text, t.latex));
       })
       .def("__repr__", [](const Theorem& t) { return "<theorem " + t.name + ">"; });
   m.def("_theorem_from_parts", [](std::string name, std::string group, const py::object& lhs, const py::object& rhs, unsigned hypotheses, std::string source,
@@ -52,8 +52,8 @@ void register_theorems(py::module_& m) {
       if (s.is_none()) return Expression();
       return py::isinstance<Scalar>(s) ? Side(s.cast<Scalar>()) : Side(s.cast<Expression>());
     };
-    return Theorem{std::move(name), std::move(group), given(lhs), given(rhs), hypotheses, std::move(source), static_cast<Use>(use), on_one_path, at_most,
-                   std::move(waiting), std::move(text), std::move(latex)};
+    return Theorem{std::move(name), std::move(group), given(lhs), given(rhs), static_cast<Hypothesis>(hypotheses), std::move(source),
+                   static_cast<Use>(use), on_one_path, at_most, std::move(waiting), std::move(text), std::move(latex)};
   });
   m.def("theorems", [](const std::shared_ptr<SkoSource>& source) {
     std::vector<Theorem> all = sko_theorems(source);

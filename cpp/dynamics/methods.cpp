@@ -35,10 +35,10 @@ DynamicsMethods<S>::DynamicsMethods(const Multibody& model)
       right_side_(tree_.coordinates()), work_(2 * size_t(tree_.coordinates())) {}
 
 template <class S>
-void DynamicsMethods<S>::forward_dynamics(Method method, const S* q, const S* v, const S* tau, S* vdot) {
+void DynamicsMethods<S>::forward_dynamics(Method method, const S* q, const S* v, const S* tau, S* vdot, const Applied<S>* applied) {
   kinematics(*model_, q, blocks_);
   point_accelerations_base_to_tip(*model_, blocks_.pose.data(), blocks_.H.data(), v, OwnTerms::absorbed, points_);
-  newton_euler(*model_, blocks_, points_, static_cast<const S*>(nullptr), right_side_.data(), alpha_, force_);  // 𝒞
+  newton_euler(*model_, blocks_, points_, applied ? *applied : own_gravity(*model_), static_cast<const S*>(nullptr), right_side_.data(), alpha_, force_);  // 𝒞
   for (int i = 0; i < model_->nv; ++i) right_side_[i] = tau[i] - right_side_[i];
   switch (method) {
     case Method::cholesky:

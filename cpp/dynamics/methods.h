@@ -17,6 +17,7 @@
 #include "model/multibody.h"
 #include "numerics/conjugate_gradients.h"
 #include "numerics/dense_factors.h"
+#include "recursions/applied.h"
 #include "recursions/point_accelerations.h"
 #include "rigid/rigid_blocks.h"
 
@@ -35,7 +36,7 @@ class DynamicsMethods {
 
   // Throws SingularOperatorError that names the coordinate where a pivot of a factor is noise, or where conjugate gradients do not get the
   // residual below sqrt(eps); SingularHingeError for `inverse`.
-  void forward_dynamics(Method method, const S* q, const S* v, const S* tau, S* vdot);
+  void forward_dynamics(Method method, const S* q, const S* v, const S* tau, S* vdot, const Applied<S>* applied = nullptr);
 
   // Of the last call with conjugate gradients: iterations, and ‖T - 𝒞 - ℳθ̈‖/‖T - 𝒞‖ in the norm of the preconditioner.
   int iterations() const { return gradients_.iterations; }

@@ -18,7 +18,7 @@ void PackedDynamics<T>::load(const double* from, size_t stride, int n, std::vect
 
 template <class T>
 bool PackedDynamics<T>::forward_dynamics(const double* q, size_t q_stride, const double* v, size_t v_stride, const double* tau, size_t tau_stride, double* vdot,
-                                         Form form) {
+                                         Form form, const Applied<double>* applied) {
   load(q, q_stride, model_.nq, q_);
   load(v, v_stride, model_.nv, v_);
   load(tau, tau_stride, model_.nv, tau_);
@@ -26,7 +26,7 @@ bool PackedDynamics<T>::forward_dynamics(const double* q, size_t q_stride, const
   point_accelerations_base_to_tip(model_, blocks_.pose.data(), blocks_.H.data(), v_.data(), OwnTerms::absorbed, points_);
   blocks_.form = form;
   try {
-    articulated_body(tree_, model_, blocks_, points_, tau_.data(), vdot_.data(), force_, alpha_);
+    articulated_body(tree_, model_, blocks_, points_, applied ? converted(*applied, model_.bodies, wrenches_) : own_gravity(model_), tau_.data(), vdot_.data(), force_, alpha_);
   } catch (const SingularHingeError&) {
     return false;
   }

@@ -6,6 +6,7 @@
 #include "model/multibody.h"
 #include "numerics/arithmetic.h"
 #include "numerics/pack.h"
+#include "recursions/applied.h"
 #include "recursions/point_accelerations.h"
 #include "rigid/rigid_blocks.h"
 
@@ -20,8 +21,9 @@ class PackedDynamics {
   explicit PackedDynamics(const Multibody& model);
 
   // States b = 0, ..., width - 1 at q + b*q_stride, ...; accelerations to vdot + b*nv. False where a hinge of one of them is in doubt:
-  // nothing is decided then, and the states are to be taken one by one.
-  bool forward_dynamics(const double* q, size_t q_stride, const double* v, size_t v_stride, const double* tau, size_t tau_stride, double* vdot, Form form);
+  // nothing is decided then, and the states are to be taken one by one. `applied` acts on all of them; null: the model's gravity alone.
+  bool forward_dynamics(const double* q, size_t q_stride, const double* v, size_t v_stride, const double* tau, size_t tau_stride, double* vdot, Form form,
+                        const Applied<double>* applied = nullptr);
 
  private:
   static void load(const double* from, size_t stride, int n, std::vector<S>& to);
@@ -31,6 +33,7 @@ class PackedDynamics {
   RigidBlocks<S> blocks_;
   PointAccelerations<S> points_;
   std::vector<Vector6<S>> alpha_, force_;
+  std::vector<Vector6<S>> wrenches_;
   std::vector<S> q_, v_, tau_, vdot_;
 };
 

@@ -1,9 +1,8 @@
 #include "dynamics/rigid_dynamics.h"
 
 #include "algebra/trees/sweeps/articulated_inertia.h"
-#include "algebra/trees/sweeps/composite_inertia.h"
 #include "algebra/trees/sweeps/mass_matrix.h"
-#include "numerics/small_ldl.h"
+#include "dynamics/singular_hinges.h"
 #include "numerics/small_matrix.h"
 #include "recursions/articulated_body.h"
 #include "recursions/composite_mass_matrix.h"
@@ -13,23 +12,30 @@
 
 namespace pycraft {
 
+OnSingular on_singular_from_name(const std::string& name) {
+  if (name == "raise") return OnSingular::raise;
+  if (name == "minimum-norm") return OnSingular::minimum_norm;
+  throw EvaluationError("on_singular '" + name + "' is not there; there are 'raise' and 'minimum-norm'");
+}
+
 template <class S>
 RigidDynamics<S>::RigidDynamics(const Multibody& model)
     : source_(model), tree_(model.structure()), model_(model.compiled<S>()), blocks_(tree_), alpha_(tree_.bodies()), force_(tree_.bodies()) {}
 
 template <class S>
 template <class T>
-void RigidDynamics<S>::set_state(const T* q, const T* v) {
+void RigidDynamics<S>::set_state(const T* q, const T* v, const Applied<T>* applied) {
   convert(q, model_->nq, q_);
   convert(v, model_->nv, v_);
   kinematics(*model_, q_.data(), blocks_);
   point_accelerations_base_to_tip(*model_, blocks_.pose.data(), blocks_.H.data(), v_.data(), OwnTerms::absorbed, points_);
+  applied_ = applied ? converted(*applied, model_->bodies, wrenches_) : own_gravity(*model_);
 }
 
 template <class S>
 template <class T>
-void RigidDynamics<S>::forward_dynamics(const T* q, const T* v, const T* tau, S* vdot, const Solving& how) {
-  const auto added = forward_dynamics_of_points(q, v, tau, vdot, how);
+void RigidDynamics<S>::forward_dynamics(const T* q, const T* v, const T* tau, S* vdot, const Solving& how, const Applied<T>* applied) {
+  const auto added = forward_dynamics_of_points(q, v, tau, vdot, how, applied);
   for (int i = 0; i < model_->nv; ++i) vdot[i] -= points_.absorbed[i];
   project_off_null_space(added, vdot, 1);
   if (!how.estimate || how.refinement.steps == 0) return;
@@ -39,14 +45,15 @@ void RigidDynamics<S>::forward_dynamics(const T* q, const T* v, const T* tau, S*
 
 template <class S>
 template <class T>
-typename RigidDynamics<S>::AddedInertias RigidDynamics<S>::forward_dynamics_of_points(const T* q, const T* v, const T* tau, S* vdot, const Solving& how) {
+typename RigidDynamics<S>::AddedInertias RigidDynamics<S>::forward_dynamics_of_points(const T* q, const T* v, const T* tau, S* vdot, const Solving& how,
+                                                                                     const Applied<T>* applied) {
   const int n = model_->nv;
-  set_state(q, v);
+  set_state(q, v, applied);
   convert(tau, n, tau_);
   blocks_.form = how.form;
   S largest = S(0);
   AddedInertias added;
-  const auto sweep = [&] { largest = articulated_body(tree_, *model_, blocks_, points_, tau_.data(), vdot, force_, alpha_); };
+  const auto sweep = [&] { largest = articulated_body(tree_, *model_, blocks_, points_, applied_, tau_.data(), vdot, force_, alpha_); };
   if (how.on_singular == OnSingular::minimum_norm)
     added = with_every_hinge_regular(sweep);
   else
@@ -57,7 +64,7 @@ typename RigidDynamics<S>::AddedInertias RigidDynamics<S>::forward_dynamics_of_p
   };
   const auto residual_at = [&](const S* x, S* r) {
     if (how.refinement.gathers_wider()) {
-      newton_euler_residual_gathered(*model_, blocks_, points_, x, tau, r, alpha_, force_, wide_force_);
+      newton_euler_residual_gathered(*model_, blocks_, points_, applied_, x, tau, r, alpha_, force_, wide_force_);
     } else if (how.refinement.wider()) {
       convert(x, n, wide_x_), wide_r_.resize(n);
       wider_->residual(tau, wide_x_.data(), wide_r_.data());
@@ -70,18 +77,18 @@ typename RigidDynamics<S>::AddedInertias RigidDynamics<S>::forward_dynamics_of_p
     project_off_null_space(added, r, 1);
   };
   refinement_.corrections.clear();
-  if (how.refinement.steps != 0 && how.refinement.wider()) wider(q, v);
+  if (how.refinement.steps != 0 && how.refinement.wider()) wider(q, v, applied);
   if (!added.empty()) {
     articulated_inertia_tip_to_base(tree_, blocks_);
     std::fill_n(vdot, n, S(0));
     r_.resize(n);
-    newton_euler(*model_, blocks_, points_, vdot, r_.data(), alpha_, force_);
+    newton_euler(*model_, blocks_, points_, applied_, vdot, r_.data(), alpha_, force_);
     for (int i = 0; i < n; ++i) r_[i] = tau_[i] - r_[i];
     project_off_null_space(added, r_.data(), 1);
     solve_regular(r_.data(), vdot);
   }
   left_ = S(0);
-  if (how.on_singular != OnSingular::minimum_norm && blocks_.faint().body >= 0) correct_faint(q, v, tau, vdot);
+  if (how.on_singular != OnSingular::minimum_norm && blocks_.faint().body >= 0) correct_faint(q, v, tau, vdot, applied);
   if (how.refinement.steps == 0) return added;
   const auto size_at = [&](const S* x) {
     if (how.refinement.wider())
@@ -106,11 +113,11 @@ typename RigidDynamics<S>::AddedInertias RigidDynamics<S>::forward_dynamics_of_p
 // too much, as long as corrections shrink. Refused is what comes no closer than `faint_limit` of the accelerations.
 template <class S>
 template <class T>
-void RigidDynamics<S>::correct_faint(const T* q, const T* v, const T* tau, S* vdot) {
-  auto& two_up = wider(q, v).wider(q, v);
+void RigidDynamics<S>::correct_faint(const T* q, const T* v, const T* tau, S* vdot, const Applied<T>* applied) {
+  auto& two_up = wider(q, v, applied).wider(q, v, applied);
   const auto left = [&]<class E>(RigidDynamics<E>&) { return S(64 * blocks_.faint().ratio) * static_cast<S>(epsilon<E>()); };  // so many roundings, as of columns
   if (faint_limit<S>() > left(two_up)) return correct_faint_by(two_up, tau, vdot);
-  auto& three_up = two_up.wider(q, v);
+  auto& three_up = two_up.wider(q, v, applied);
   if (!(faint_limit<S>() > left(three_up))) throw_faint_hinge(tree_, blocks_.faint());
   correct_faint_by(three_up, tau, vdot);
 }
@@ -125,7 +132,7 @@ void RigidDynamics<S>::correct_faint_by(RigidDynamics<E>& up, const T* tau, S* v
   columns_.resize(std::max(columns_.size(), size_t(n)));
   // What coasts has no acceleration to compare with: the motion's own, ω² and gravity over the length of the body.
   const RigidInertia<S>& own = model_->inertia[blocks_.faint().body];
-  S scale = length(vdot) + ratio_or_zero(own.mass * norm(model_->gravity), norm(own.moment));
+  S scale = length(vdot) + ratio_or_zero(own.mass * norm(applied_.gravity), norm(own.moment));
   for (const Vector3<S>& omega : points_.angular_velocity) scale = maximum(scale, dot(omega, omega));
   S last = S(0.3) / S(0.9) * scale;
   for (int step = 0; step < 5; ++step) {
@@ -158,7 +165,7 @@ S RigidDynamics<S>::length(const S* x) const {
 template <class S>
 template <class T>
 void RigidDynamics<S>::size_residual(const RigidDynamics<T>& formed, const T* vdot, const Refinement& how) {
-  newton_euler_sizes(tree_, *formed.model_, formed.blocks_, formed.points_, formed.v_.data(), vdot, tau_.data(), formed.alpha_, formed.force_, units_of<S>(how), sizes_);
+  newton_euler_sizes(tree_, *formed.model_, formed.blocks_, formed.points_, formed.applied_, formed.v_.data(), vdot, tau_.data(), formed.alpha_, formed.force_, units_of<S>(how), sizes_);
 }
 
 // From the direction given, or any other, the worst signs along it and what they make are found in turn: each is at least as long as
@@ -197,7 +204,7 @@ size_t RigidDynamics<S>::bytes(Form form) const {
 template <class S>
 template <class T>
 void RigidDynamics<S>::residual(const T* tau, const S* vdot, S* r) {
-  newton_euler(*model_, blocks_, points_, vdot, r, alpha_, force_);
+  newton_euler(*model_, blocks_, points_, applied_, vdot, r, alpha_, force_);
   for (int i = 0; i < model_->nv; ++i) r[i] = S(tau[i]) - r[i];
 }
 
@@ -218,17 +225,17 @@ void RigidDynamics<S>::solve(const S* r, S* x, int m) {
 
 template <class S>
 template <class T>
-RigidDynamics<Wider<S>>& RigidDynamics<S>::wider(const T* q, const T* v) {
+RigidDynamics<Wider<S>>& RigidDynamics<S>::wider(const T* q, const T* v, const Applied<T>* applied) {
   if (!wider_) wider_ = std::make_unique<RigidDynamics<Wider<S>>>(source_);
-  wider_->set_state(q, v);
+  wider_->set_state(q, v, applied);
   return *wider_;
 }
 
 template <class S>
-void RigidDynamics<S>::inverse_dynamics(const S* q, const S* v, const S* vdot, S* tau) {
+void RigidDynamics<S>::inverse_dynamics(const S* q, const S* v, const S* vdot, S* tau, const Applied<S>* applied) {
   kinematics(*model_, q, blocks_);
   point_accelerations_base_to_tip(*model_, blocks_.pose.data(), blocks_.H.data(), v, OwnTerms::kept, points_);
-  newton_euler(*model_, blocks_, points_, vdot, tau, alpha_, force_);
+  newton_euler(*model_, blocks_, points_, applied ? *applied : own_gravity(*model_), vdot, tau, alpha_, force_);
 }
 
 template <class S>
@@ -269,7 +276,7 @@ void RigidDynamics<S>::mass_matrix_solve(const double* q, const S* right, int m,
   if (how.refinement.steps != 0) {
     if (how.refinement.wider()) {
       rest_.assign(N, 0.0);
-      wider(q, rest_.data());
+      wider<double>(q, rest_.data(), nullptr);
     }
     refine(out, N, m, how.refinement, how.form, S(0), [&] { return "the mass matrix inverse of '" + source_.name() + "'"; },
            [&](const S* x, S* r) {
@@ -296,51 +303,6 @@ void RigidDynamics<S>::mass_matrix_solve(const double* q, const S* right, int m,
              rounding_along(tree_, blocks_, direction, m, sizes_, rounding);
            },
            refinement_);
-  }
-}
-
-// ---- singular hinges: ℳ + J n = 0 for some n with n_j ≠ 0, j the coordinate at fault. With an inertia s added to J(j) the matrix is
-// regular, and its solution x of forces b ⊥ n is one of the singular system: n*(ℳ + s e e*) x = s n_j x_j = n* b = 0.
-
-template <class S>
-template <class F>
-typename RigidDynamics<S>::AddedInertias RigidDynamics<S>::with_every_hinge_regular(F f) {
-  AddedInertias added;
-  for (;;) {
-    try {
-      f();
-      return added;
-    } catch (const SingularHingeError& e) {
-      for (const auto& [j, _] : added)
-        if (j == e.coordinate) throw;
-      S inertia = S(1);  // any number will do: of the size of the mass that the hinge would move if all others were locked
-      composite_inertia_tip_to_base(tree_, blocks_);
-      for (int k = 0; k < model_->bodies; ++k)
-        if (e.coordinate >= tree_.dof_offset[k] && e.coordinate < tree_.dof_offset[k + 1]) {
-          const S locked = dot(blocks_.H[e.coordinate], blocks_.R[k] * blocks_.H[e.coordinate]);
-          if (locked > S(0)) inertia = locked;
-        }
-      added.emplace_back(e.coordinate, inertia);
-      blocks_.J[e.coordinate] += inertia;
-    }
-  }
-}
-
-// x <- x - N (N*N)⁻¹ N* x, N = (ℳ + J)⁻¹ e_j of the regularised matrix for every coordinate at fault.
-template <class S>
-void RigidDynamics<S>::project_off_null_space(const AddedInertias& added, S* x, int m) {
-  const int n = model_->nv, z = static_cast<int>(added.size());
-  if (z == 0) return;
-  std::vector<S> unit(size_t(n) * z, S(0)), N(size_t(n) * z), gram(size_t(z) * z, S(0)), pivots(z), weights(size_t(z) * m);
-  for (int c = 0; c < z; ++c) unit[size_t(added[c].first) * z + c] = added[c].second;
-  solve(unit.data(), N.data(), z);
-  transposed_multiply_add(N.data(), N.data(), gram.data(), z, n, z);
-  if (ldl_in_place(gram.data(), z, pivots.data()) < z) throw SingularOperatorError("the null space of '" + source_.name() + "' at its singular hinges is not resolved");
-  for (int pass = 0; pass < 2; ++pass) {  // twice is enough
-    std::fill(weights.begin(), weights.end(), S(0));
-    transposed_multiply_add(N.data(), x, weights.data(), z, n, m);
-    ldl_solve(gram.data(), pivots.data(), z, weights.data(), m);
-    multiply_add(N.data(), weights.data(), x, n, z, m, S(-1));
   }
 }
 
@@ -378,7 +340,8 @@ S RigidDynamics<S>::kinetic_energy(const S* q, const S* v) {
 }
 
 template <class S>
-S RigidDynamics<S>::potential_energy(const S* q, const Vector3<S>& datum) {
+S RigidDynamics<S>::potential_energy(const S* q, const Vector3<S>& datum, const Vector3<S>* gravity) {
+  const Vector3<S>& g = gravity ? *gravity : model_->gravity;
   kinematics(*model_, q, blocks_);
   // Masses and their first moments about the origins of the bodies that carry them; only a root's own height is large far from the datum, and
   // it is added last, in wider numbers, so that the sum is rounded once.
@@ -393,18 +356,18 @@ S RigidDynamics<S>::potential_energy(const S* q, const Vector3<S>& datum) {
       carried[p].moment = carried[p].moment + moment + carried[k].mass * X.p;
       continue;
     }
-    for (int i = 0; i < 3; ++i) energy -= W(model_->gravity[i]) * (W(moment[i]) + W(carried[k].mass) * (W(X.p[i]) - W(datum[i])));
+    for (int i = 0; i < 3; ++i) energy -= W(g[i]) * (W(moment[i]) + W(carried[k].mass) * (W(X.p[i]) - W(datum[i])));
   }
   return static_cast<S>(energy);
 }
 
 #define PYCRAFT_INSTANTIATE(S)     \
   template class RigidDynamics<S>; \
-  template void RigidDynamics<S>::forward_dynamics(const double*, const double*, const double*, S*, const Solving&); \
-  template std::vector<std::pair<int, S>> RigidDynamics<S>::forward_dynamics_of_points(const double*, const double*, const double*, S*, const Solving&);
+  template void RigidDynamics<S>::forward_dynamics(const double*, const double*, const double*, S*, const Solving&, const Applied<double>*); \
+  template std::vector<std::pair<int, S>> RigidDynamics<S>::forward_dynamics_of_points(const double*, const double*, const double*, S*, const Solving&, const Applied<double>*);
 PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_INSTANTIATE)
 #undef PYCRAFT_INSTANTIATE
-template void RigidDynamics<Extended>::forward_dynamics(const Extended*, const Extended*, const Extended*, Extended*, const Solving&);
-template void RigidDynamics<Quad>::forward_dynamics(const Quad*, const Quad*, const Quad*, Quad*, const Solving&);
+template void RigidDynamics<Extended>::forward_dynamics(const Extended*, const Extended*, const Extended*, Extended*, const Solving&, const Applied<Extended>*);
+template void RigidDynamics<Quad>::forward_dynamics(const Quad*, const Quad*, const Quad*, Quad*, const Solving&, const Applied<Quad>*);
 
 }  // namespace pycraft

@@ -11,6 +11,7 @@
 #include "dynamics/workspace_pool.h"
 #include "model/multibody.h"
 #include "numerics/refinement.h"
+#include "recursions/applied.h"
 #include "recursions/point_accelerations.h"
 #include "recursions/velocities.h"
 #include "rigid/rigid_blocks.h"
@@ -18,6 +19,7 @@
 namespace pycraft {
 
 enum class OnSingular { raise, minimum_norm };
+OnSingular on_singular_from_name(const std::string& name);  // EvaluationError that lists the names
 
 // How accelerations are solved for.
 struct Solving {
@@ -35,21 +37,23 @@ class RigidDynamics {
 
   // Each takes one state; sizes are the caller's business (Multibody::check_q, check_v). States of forward dynamics are doubles, or S:
   // what a narrower scalar rounds away, a wider residual sees.
+  // `applied` is gravity and what else acts from outside; null: the model's gravity alone.
   template <class T>
-  void forward_dynamics(const T* q, const T* v, const T* tau, S* vdot, const Solving& how = {});
+  void forward_dynamics(const T* q, const T* v, const T* tau, S* vdot, const Solving& how = {}, const Applied<T>* applied = nullptr);
   // The same but θ̈ + x, before x is taken off that hinges absorb (recursions/point_accelerations.h): of the size of accelerations, however
   // fast the whole travels. Returns the inertias that were added to singular hinges.
   using AddedInertias = std::vector<std::pair<int, S>>;
   template <class T>
-  AddedInertias forward_dynamics_of_points(const T* q, const T* v, const T* tau, S* vdot, const Solving& how = {});
-  void inverse_dynamics(const S* q, const S* v, const S* vdot, S* tau);   // vdot null: bias forces
+  AddedInertias forward_dynamics_of_points(const T* q, const T* v, const T* tau, S* vdot, const Solving& how = {}, const Applied<T>* applied = nullptr);
+  void inverse_dynamics(const S* q, const S* v, const S* vdot, S* tau, const Applied<S>* applied = nullptr);  // vdot null: bias forces
   void mass_matrix(const S* q, S* out);                                   // ℳ + J, full
   void mass_matrix_inverse(const double* q, S* out, const Solving& how = {});  // (ℳ + J)⁻¹, full; O(N) a column
   void mass_matrix_solve(const double* q, const S* right, int m, S* out, const Solving& how = {});  // (ℳ + J)⁻¹ of m columns
   void jacobian(const Node& node, const S* q, S* out);  // 6 x nv, node axes
   Pose<S> pose(const Node& node, const S* q);     // X_WN
   S kinetic_energy(const S* q, const S* v);       // with rotor inertia
-  S potential_energy(const S* q, const Vector3<S>& datum = Vector3<S>::zero());  // -Σ m g·(c - datum), datum a point in the world
+  // -Σ m g·(c - datum), datum a point in the world; gravity null: the model's.
+  S potential_energy(const S* q, const Vector3<S>& datum = Vector3<S>::zero(), const Vector3<S>* gravity = nullptr);
 
   // What forward dynamics in this form works in.
   size_t bytes(Form form) const;
@@ -64,15 +68,15 @@ class RigidDynamics {
   friend class RigidDynamics;
 
   template <class T>
-  void set_state(const T* q, const T* v);                 // kinematics and what depends on velocities, for equations to be solved
+  void set_state(const T* q, const T* v, const Applied<T>* applied);  // kinematics and what depends on velocities, for equations to be solved
   template <class T>
   void residual(const T* tau, const S* vdot, S* r);       // tau - inverse dynamics, at the state that was set; vdot with what hinges absorb
   void subtract_product(const S* x, S* r, int m);         // r -= (ℳ + J) x
   void solve(const S* r, S* x, int m);                    // with the kept factors
   template <class T>
-  RigidDynamics<Wider<S>>& wider(const T* q, const T* v);
+  RigidDynamics<Wider<S>>& wider(const T* q, const T* v, const Applied<T>* applied);
   template <class T>
-  void correct_faint(const T* q, const T* v, const T* tau, S* vdot);
+  void correct_faint(const T* q, const T* v, const T* tau, S* vdot, const Applied<T>* applied);
   template <class E, class T>
   void correct_faint_by(RigidDynamics<E>& up, const T* tau, S* vdot);
   template <class T>
@@ -89,6 +93,8 @@ class RigidDynamics {
   RigidBlocks<S> blocks_;
   Velocities<S> velocities_;      // of energies
   PointAccelerations<S> points_;  // of equations of motion
+  Applied<S> applied_;            // to them
+  std::vector<Vector6<S>> wrenches_;
   std::vector<Vector6<S>> alpha_, force_;
   std::vector<Pose<S>> world_;   // X_WB of every body
   std::vector<double> rest_;     // v = 0

@@ -3,9 +3,8 @@
 #include <algorithm>
 
 #include "algebra/trees/sweeps/articulated_inertia.h"
-#include "algebra/trees/sweeps/upsilon.h"
+#include "dynamics/parameter_sensitivities.h"
 #include "recursions/kinematics.h"
-#include "recursions/newton_euler.h"
 #include "runtime/interrupt.h"
 
 namespace pycraft {
@@ -25,9 +24,9 @@ Sensitivities<S>::Sensitivities(const Multibody& model)
       force_(model_->bodies) {}
 
 template <class S>
-void Sensitivities<S>::frame_at(const S* q, const S* v, const S* vdot, OwnTerms own) {
+void Sensitivities<S>::frame_at(const S* q, const S* v, const S* vdot, const Vector3<S>* gravity) {
   kinematics(*model_, q, blocks_);
-  frame_.fill(*model_, blocks_, v, vdot, own);
+  frame_.fill(*model_, blocks_, gravity ? *gravity : model_->gravity, v, vdot);
 }
 
 template <class S>
@@ -40,8 +39,8 @@ void Sensitivities<S>::twists_about(int body) {
 }
 
 template <class S>
-void Sensitivities<S>::inverse_dynamics(const S* q, const S* v, const S* vdot, S* dq, S* dv) {
-  frame_at(q, v, vdot, OwnTerms::kept);
+void Sensitivities<S>::inverse_dynamics(const S* q, const S* v, const S* vdot, S* dq, S* dv, const Vector3<S>* gravity) {
+  frame_at(q, v, vdot, gravity);
   differentiate_forces(dq, dv, model_->nv);
 }
 
@@ -78,19 +77,21 @@ void Sensitivities<S>::differentiate_forces(S* dq, S* dv, int stride) {
 }
 
 template <class S>
-void Sensitivities<S>::forward_dynamics(const double* q, const double* v, const double* tau, const Solving& how, S* dq, S* dv, S* dtau) {
+void Sensitivities<S>::forward_dynamics(const double* q, const double* v, const double* tau, const Solving& how, S* dq, S* dv, S* dtau,
+                                         const Vector3<double>* gravity) {
   const int N = model_->nv;
   const size_t square = size_t(N) * N;
-  if (how.form != Form::fast && differentiate_sweep(q, v, tau, how, dq, dv, dtau)) return;
+  const Applied<double> weight{gravity ? *gravity : source_.gravity()};
+  if (how.form != Form::fast && differentiate_sweep(q, v, tau, how, dq, dv, dtau, &weight)) return;
   if (!dynamics_) dynamics_ = std::make_unique<RigidDynamics<S>>(source_);
   convert(q, model_->nq, q_), convert(v, N, v_);
   rates_.resize(N), work_.resize(3 * square), solution_.resize(3 * square);
-  dynamics_->forward_dynamics_of_points(q, v, tau, rates_.data(), how);
+  dynamics_->forward_dynamics_of_points(q, v, tau, rates_.data(), how, &weight);
   kinematics(*model_, q_.data(), blocks_);
   point_accelerations_base_to_tip(*model_, blocks_.pose.data(), blocks_.H.data(), v_.data(), OwnTerms::absorbed, points_);
   for (int k = 0; k < model_->bodies; ++k)  // of what hinges absorb, the frame knows that of free roots
     for (int j = model_->v_offset[k]; j < model_->v_offset[k] + model_->nv_of[k] && !frame_.floats(*model_, k); ++j) rates_[j] -= points_.absorbed[j];
-  frame_.fill(*model_, blocks_, v_.data(), rates_.data(), OwnTerms::absorbed);
+  frame_.fill(*model_, blocks_, cast<S>(weight.gravity), v_.data(), rates_.data(), OwnTerms::absorbed);
   // Columns: ∂T/∂q, ∂T/∂v, 1.
   differentiate_forces(work_.data(), work_.data() + N, 3 * N);
   for (int i = 0; i < N; ++i)
@@ -127,9 +128,10 @@ void Sensitivities<S>::differentiate_absorbed(S* dv) {
 // body would hide a light one's. It is the sweep of `ud` for both: reflections would pass over a row that is zero here and not beside it.
 // Its own result is not refined; (ℳ + J)⁻¹ is, as asked.
 template <class S>
-bool Sensitivities<S>::differentiate_sweep(const double* q, const double* v, const double* tau, const Solving& how, S* dq, S* dv, S* dtau) {
+bool Sensitivities<S>::differentiate_sweep(const double* q, const double* v, const double* tau, const Solving& how, S* dq, S* dv, S* dtau,
+                                           const Applied<double>* applied) {
   if (!tangents_) tangents_ = std::make_unique<TangentDynamics<S>>(source_);
-  if (!tangents_->forward_dynamics(q, v, tau, Form::ud, dq, dv)) return false;
+  if (!tangents_->forward_dynamics(q, v, tau, Form::ud, dq, dv, applied)) return false;
   if (!dynamics_) dynamics_ = std::make_unique<RigidDynamics<S>>(source_);
   dynamics_->mass_matrix_inverse(q, dtau, how);
   return true;
@@ -248,28 +250,25 @@ void Sensitivities<S>::kinetic_energy(const S* q, const S* v, S* dq, S* dv) {
 }
 
 template <class S>
-void Sensitivities<S>::hamiltonian(const S* q, const S* p, const S* tau, S* v, S* p_rate) {
+void Sensitivities<S>::hamiltonian(const S* q, const S* p, const S* tau, S* v, S* p_rate, const Vector3<S>* gravity) {
+  const Vector3<S>& g = gravity ? *gravity : model_->gravity;
   kinematics(*model_, q, blocks_);
   articulated_inertia_tip_to_base(tree_, blocks_);
   scratch_.resize(std::max(scratch_.size(), size_t(6) * model_->bodies));
   mass_matrix_inverse_apply(tree_, blocks_, p, v, 1, scratch_.data());
-  frame_.fill(*model_, blocks_, v, nullptr);
+  frame_.fill(*model_, blocks_, g, v, nullptr);
   // d(S_j·p)/dt = Ṡ_j·p + S_j·ṗ, and S_j·ṗ is what the hinge's force and gravity do: tau_j + S_j·(weight outboard). Of Ṡ_j·p, with u in
   // both, what multiplies u twice is (u × s)·mu = 0.
   for (int k = 0; k < model_->bodies; ++k) {
     check_interrupt_at(k);
-    const Vector6<S> travel = uniform(frame_.travel[k]), field = uniform(gravity_at(k));
+    int root = k;
+    while (model_->parent[root] >= 0) root = model_->parent[root];
+    const Vector6<S> travel = uniform(frame_.travel[k]), field = uniform(transpose_times(blocks_.pose[root].R, g));  // in the frame's axes
     const Vector6<S>& momentum = frame_.B[k].momentum;
     for (int j = model_->v_offset[k]; j < model_->v_offset[k] + model_->nv_of[k]; ++j)
       p_rate[j] = tau[j] + dot(frame_.twist_rate[j], momentum) + dot(frame_.twist_rate[j], frame_.R[k] * travel) +
                   dot(cross_motion(travel, frame_.twist[j]), momentum) + dot(frame_.twist[j], frame_.R[k] * field);
   }
-}
-
-template <class S>
-Vector3<S> Sensitivities<S>::gravity_at(int k) const {
-  while (model_->parent[k] >= 0) k = model_->parent[k];
-  return transpose_times(blocks_.pose[k].R, model_->gravity);
 }
 
 // The change of what the frame sees, and of (h × u; m u): ∂h × u.
@@ -333,99 +332,6 @@ void Sensitivities<S>::jacobian_derivative(const Node& node, const S* q, S* out)
 template <class S>
 Pose<S> Sensitivities<S>::node_in_axes(const Node& node) const {
   return Pose<S>{frame_.axes[node.body], Vector3<S>::zero()} * cast<S>(node.pose);
-}
-
-template <class S>
-void Sensitivities<S>::inertial_regressor(const S* q, const S* v, const S* vdot, S* out) {
-  const CompiledModel<S>& m = *model_;
-  const int columns = 10 * m.bodies;
-  kinematics(m, q, blocks_);
-  point_accelerations_base_to_tip(m, blocks_.pose.data(), blocks_.H.data(), v, OwnTerms::kept, points_);
-  rates_.resize(m.nv);
-  newton_euler(m, blocks_, points_, vdot, rates_.data(), alpha_, force_);
-  std::fill_n(out, size_t(m.nv) * columns, S(0));
-  for (int k = 0; k < m.bodies; ++k) {
-    check_interrupt_at(k, k);
-    const Vector3<S>& omega = points_.angular_velocity[k];
-    for (int p = 0; p < 10; ++p) {
-      RigidInertia<S> unit = RigidInertia<S>::zero();
-      if (p == 0)
-        unit.mass = S(1);
-      else if (p < 4)
-        unit.moment[p - 1] = S(1);
-      else
-        unit.rotational.s[p - 4] = S(1);
-      Vector6<S> f = unit * alpha_[k] + gyroscopic_part(unit, omega);
-      for (int a = k; a >= 0; a = m.parent[a]) {
-        for (int i = m.v_offset[a]; i < m.v_offset[a] + m.nv_of[a]; ++i) out[size_t(i) * columns + 10 * k + p] = dot(blocks_.H[i], f);
-        f = force_to_parent(blocks_.pose[a], f);
-      }
-    }
-  }
-}
-
-template <class S>
-void Sensitivities<S>::log_determinant(const S* q, S* coordinates, S* inertias, S* geometry, S* axes) {
-  const CompiledModel<S>& m = *model_;
-  kinematics(m, q, blocks_);
-  articulated_inertia_tip_to_base(tree_, blocks_);
-  upsilon_base_to_tip(tree_, blocks_);
-  for (int k = 0; k < m.bodies; ++k) {
-    check_interrupt_at(k);
-    const int p = m.parent[k], first = m.v_offset[k], last = first + m.nv_of[k];
-    const Symmetric6<S>& Y = blocks_.Y[k];
-    if (inertias) {  // tr(Υ ∂M)
-      S* g = inertias + 10 * k;
-      g[0] = Y(3, 3) + Y(4, 4) + Y(5, 5);
-      // ∂M = [[0, ẽ], [-ẽ, 0]], ẽ(b, a) = 1 = -ẽ(a, b)
-      for (int c = 0; c < 3; ++c) {
-        const int a = (c + 1) % 3, b = (c + 2) % 3;
-        g[1 + c] = S(2) * (Y(b, 3 + a) - Y(a, 3 + b));
-      }
-      static const int row[] = {0, 0, 0, 1, 1, 2}, column[] = {0, 1, 2, 1, 2, 2};
-      for (int e = 0; e < 6; ++e) g[4 + e] = (row[e] == column[e] ? S(1) : S(2)) * Y(row[e], column[e]);
-    }
-    if (!coordinates && !geometry && !axes) continue;
-    const Symmetric6<S> W = p < 0 ? Symmetric6<S>::zero() : compliance_to_child(blocks_.pose[k], blocks_.Y[p]);  // E*ΥE
-    const Symmetric6<S>& plus = blocks_.Pplus[k];
-    // g: 2 tr(P⁺ W crf(x)) = g·x; with A = P⁺W: tr(A crf(x)) = Σ A(i,j) crf(x)(j,i)
-    S A[6][6];
-    for (int i = 0; i < 6; ++i)
-      for (int j = 0; j < 6; ++j) {
-        A[i][j] = S(0);
-        for (int a = 0; a < 6; ++a) A[i][j] += plus(i, a) * W(a, j);
-      }
-    Vector6<S> g = Vector6<S>::zero();
-    for (int c = 0; c < 3; ++c) {
-      const int a = (c + 1) % 3, b = (c + 2) % 3;  // (x̃)(b, a) = x_c, (x̃)(a, b) = -x_c
-      g.angular[c] = S(2) * (A[a][b] - A[b][a] + A[3 + a][3 + b] - A[3 + b][3 + a]);
-      g.linear[c] = S(2) * (A[3 + a][b] - A[3 + b][a]);
-    }
-    // 2 (I - P⁺W) G, column j: what a change of row j of H is worth
-    const auto by_row = [&](int j) {
-      Vector6<S> r = blocks_.G[j];
-      const Vector6<S> gain = blocks_.G[j];
-      for (int i = 0; i < 6; ++i)
-        for (int a = 0; a < 6; ++a) r[i] -= A[i][a] * gain[a];
-      return S(2) * r;
-    };
-    if (coordinates)
-      for (int i = first; i < last; ++i) {
-        S sum = dot(g, blocks_.H[i]);
-        for (int j = first; j < last; ++j)  // ∂H: rows of subhinges inboard of i's turn with it
-          if (frame_.inboard(j, i)) sum += dot(by_row(j), S(-1) * cross_motion(blocks_.H[i], blocks_.H[j]));
-        coordinates[i] = sum;
-      }
-    if (axes)
-      for (int j = first; j < last; ++j) {
-        const Vector6<S> r = by_row(j);
-        for (int i = 0; i < 6; ++i) axes[6 * j + i] = r[i];
-      }
-    if (geometry) {  // a twist at the placement, seen in the body's axes: the hinge's own motion carries it
-      const Vector6<S> placed = force_to_parent(inverse(m.placement[k]) * blocks_.pose[k], g);
-      for (int i = 0; i < 6; ++i) geometry[6 * k + i] = placed[i];
-    }
-  }
 }
 
 #define PYCRAFT_INSTANTIATE(S) template class Sensitivities<S>;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "model/configuration_rate.h"
+#include "model/configuration.h"
 #include "recursions/articulated_body.h"
 #include "recursions/kinematics.h"
 
@@ -34,7 +34,7 @@ void TangentDynamics<T>::seed(const T* q, const T* v, int first, int count) {
 }
 
 template <class T>
-bool TangentDynamics<T>::forward_dynamics(const double* q, const double* v, const double* tau, Form form, T* dq, T* dv) {
+bool TangentDynamics<T>::forward_dynamics(const double* q, const double* v, const double* tau, Form form, T* dq, T* dv, const Applied<double>* applied) {
   const int N = model_.nv;
   convert(q, model_.nq, at_), convert(v, N, velocity_);
   tau_.assign(tau, tau + N);
@@ -44,7 +44,7 @@ bool TangentDynamics<T>::forward_dynamics(const double* q, const double* v, cons
     seed(at_.data(), velocity_.data(), first, count);
     kinematics(model_, q_.data(), blocks_);
     point_accelerations_base_to_tip(model_, blocks_.pose.data(), blocks_.H.data(), v_.data(), OwnTerms::absorbed, points_);
-    articulated_body(tree_, model_, blocks_, points_, tau_.data(), vdot_.data(), force_, alpha_);
+    articulated_body(tree_, model_, blocks_, points_, applied ? converted(*applied, model_.bodies, wrenches_) : own_gravity(model_), tau_.data(), vdot_.data(), force_, alpha_);
     for (int w = 0; w < count; ++w) {
       T* column = first + w < N ? dq + first + w : dv + (first + w - N);
       for (int j = 0; j < N; ++j) {

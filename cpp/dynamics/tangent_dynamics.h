@@ -10,6 +10,7 @@
 #include "model/multibody.h"
 #include "numerics/arithmetic.h"
 #include "numerics/tangent.h"
+#include "recursions/applied.h"
 #include "recursions/point_accelerations.h"
 #include "rigid/rigid_blocks.h"
 
@@ -25,7 +26,7 @@ class TangentDynamics {
 
   // ∂v̇/∂q, ∂v̇/∂v (nv x nv) along quasi-velocities and velocities. False where the sweep has no derivative: P⁺ lost a direction here
   // that it has beside. SingularHingeError as forward dynamics.
-  bool forward_dynamics(const double* q, const double* v, const double* tau, Form form, T* dq, T* dv);
+  bool forward_dynamics(const double* q, const double* v, const double* tau, Form form, T* dq, T* dv, const Applied<double>* applied = nullptr);
 
  private:
   void seed(const T* q, const T* v, int first, int count);
@@ -36,6 +37,7 @@ class TangentDynamics {
   RigidBlocks<S> blocks_;
   PointAccelerations<S> points_;
   std::vector<Vector6<S>> alpha_, force_;
+  std::vector<Vector6<S>> wrenches_;
   std::vector<S> q_, v_, tau_, vdot_;
   std::vector<T> at_, velocity_, direction_, rate_;
 };

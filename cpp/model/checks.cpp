@@ -32,28 +32,9 @@ Matrix3<double> nearest_rotation(Matrix3<double> R) {
   return R;
 }
 
-// The subhinges that a kind has; a custom hinge has any.
-std::vector<SubhingeKind> sequence(HingeKind kind) {
-  using enum SubhingeKind;
-  switch (kind) {
-    case HingeKind::pin: return {pin};
-    case HingeKind::slider: return {slider};
-    case HingeKind::screw: return {screw};
-    case HingeKind::universal: return {pin, pin};
-    case HingeKind::gimbal: return {pin, pin, pin};
-    case HingeKind::cylindrical: return {pin, slider};
-    case HingeKind::planar: return {slider, slider, pin};
-    case HingeKind::ball: return {ball};
-    case HingeKind::free: return {free};
-    case HingeKind::weld:
-    case HingeKind::custom: return {};
-  }
-  return {};
-}
-
 std::string listed(const std::vector<SubhingeKind>& kinds) {
   std::string text;
-  for (SubhingeKind kind : kinds) text += (text.empty() ? "" : ", ") + std::string(subhinge_kind_name(kind));
+  for (SubhingeKind kind : kinds) text += (text.empty() ? "" : ", ") + std::string(record_of(kind).name);
   return text.empty() ? "none" : text;
 }
 
@@ -63,6 +44,17 @@ std::string short_number(double x) {
   char buffer[32];
   std::snprintf(buffer, sizeof buffer, "%.6g", x);
   return buffer;
+}
+
+void throw_unknown(const char* what, const std::string& name, const std::string& model, const std::unordered_map<std::string, int>& known) {
+  std::string text = std::string("no ") + what + " of '" + model + "' is called '" + name + "'; there are ";
+  std::vector<std::string> names;
+  for (const auto& [known_name, _] : known) names.push_back(known_name);
+  std::sort(names.begin(), names.end());
+  if (names.empty()) text += "none";
+  for (size_t i = 0; i < names.size() && i < 12; ++i) text += (i ? ", " : "") + names[i];
+  if (names.size() > 12) text += ", ... (" + std::to_string(names.size()) + " in all)";
+  throw ModelError(text);
 }
 
 Pose<double> checked_pose(const Pose<double>& pose, const std::string& what) {
@@ -92,29 +84,42 @@ void check_limits(const Hinge& hinge, const std::vector<double>& lower, const st
   const size_t count = hinge.subhinges.size();
   if (lower.size() != count || upper.size() != count)
     throw ModelError(name + " takes " + std::to_string(count) + " lower and " + std::to_string(count) + " upper limits, one a subhinge (" +
-                     hinge_kind_name(hinge.kind) + "), not " + std::to_string(lower.size()) + " and " + std::to_string(upper.size()));
+                     record_of(hinge.kind).name + "), not " + std::to_string(lower.size()) + " and " + std::to_string(upper.size()));
   for (size_t i = 0; i < count; ++i) {
     const auto pair = [&] { return "(" + short_number(lower[i]) + ", " + short_number(upper[i]) + ")"; };
     if (!(lower[i] < std::numeric_limits<double>::infinity()) || !(upper[i] > -std::numeric_limits<double>::infinity()))
       throw ModelError(name + ": limits " + pair() + " leave no position; a side without a limit is -inf below, inf above");
     if (lower[i] > upper[i]) throw ModelError(name + ": limits " + pair() + " are the wrong way round; give (lower, upper)");
-    if (hinge.subhinges[i].nq() > 1 && (std::isfinite(lower[i]) || std::isfinite(upper[i])))
-      throw ModelError(name + ": limits " + pair() + " of a " + subhinge_kind_name(hinge.subhinges[i].kind) +
+    if (!hinge.subhinges[i].record().limits() && (std::isfinite(lower[i]) || std::isfinite(upper[i])))
+      throw ModelError(name + ": limits " + pair() + " of a " + hinge.subhinges[i].record().name +
                        " subhinge; only one coordinate has limits, give it (-inf, inf)");
   }
 }
 
 Hinge checked_hinge(Hinge hinge) {
-  const std::vector<SubhingeKind> wanted = sequence(hinge.kind);
-  std::vector<SubhingeKind> given;
+  std::vector<SubhingeKind> wanted, given;
+  for (const auto& [kind, axis] : record_of(hinge.kind).subhinges) wanted.push_back(kind);
   for (const Subhinge& s : hinge.subhinges) given.push_back(s.kind);
   if (hinge.kind != HingeKind::custom && given != wanted)
-    throw ModelError("hinge '" + hinge.name + "' of kind '" + hinge_kind_name(hinge.kind) + "' has the subhinges " + listed(wanted) + ", not " + listed(given) +
+    throw ModelError("hinge '" + hinge.name + "' of kind '" + record_of(hinge.kind).name + "' has the subhinges " + listed(wanted) + ", not " + listed(given) +
                      "; a hinge of your own is of kind 'custom'");
   hinge.placement = checked_pose(hinge.placement, "the placement of hinge '" + hinge.name + "'");
   hinge.rotor_inertia = checked_rotor_inertia(hinge, std::move(hinge.rotor_inertia));
   check_limits(hinge, hinge.lower, hinge.upper);
   return hinge;
+}
+
+void check_configuration(const Hinge& hinge, const double* q) {
+  for (int i = 0; i < hinge.nq(); ++i)
+    if (!std::isfinite(q[i])) throw ModelError("q of hinge '" + hinge.name + "': entry " + std::to_string(i) + " is " + short_number(q[i]));
+  for (const Subhinge& s : hinge.subhinges) {
+    if (const int at = s.record().quaternion; at >= 0) {
+      const double size = length(Quaternion<double>{q[at], q[at + 1], q[at + 2], q[at + 3]});
+      if (size < 1e-8)
+        throw ModelError("q of hinge '" + hinge.name + "': its quaternion has length " + short_number(size) + " and no direction; (1, 0, 0, 0) is no rotation");
+    }
+    q += s.nq();
+  }
 }
 
 std::string check_mass_properties(const std::string& body, double mass, const Vector3<double>& com, const Symmetric3<double>& inertia) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <unordered_map>
 
 #include "model/multibody.h"
 
@@ -10,6 +11,9 @@ namespace pycraft {
 
 // Up to six digits, for errors.
 std::string short_number(double x);
+
+// ModelError for a name that `known` has not: what there is, up to a dozen.
+[[noreturn]] void throw_unknown(const char* what, const std::string& name, const std::string& model, const std::unordered_map<std::string, int>& known);
 
 // The pose, its rotation brought to the nearest orthogonal matrix where it is one to six digits only. `what` names it: "node 'tip'". Throws
 // for entries that are not finite, scalings, shears and reflections.
@@ -21,6 +25,9 @@ Hinge checked_hinge(Hinge hinge);
 std::vector<double> checked_rotor_inertia(const Hinge& hinge, std::vector<double> values);
 // One pair a subhinge, lower ≤ upper; -inf and inf are no limit.
 void check_limits(const Hinge& hinge, const std::vector<double>& lower, const std::vector<double>& upper);
+
+// The hinge's coordinates: finite, quaternions with a direction.
+void check_configuration(const Hinge& hinge, const double* q);
 
 // Finite, a mass that is not negative, an inertia that is positive semidefinite. Returns what is wrong with the triangle inequality, or "".
 std::string check_mass_properties(const std::string& body, double mass, const Vector3<double>& com, const Symmetric3<double>& inertia);

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "model/hinge.h"
@@ -10,15 +11,6 @@
 #include "spatial/rigid_inertia.h"
 
 namespace pycraft {
-
-// A subhinge as a kernel wants it.
-template <class S>
-struct CompiledSubhinge {
-  SubhingeKind kind;
-  Vector6<S> twist;   // pin, slider, screw
-  Vector3<S> axis, point;
-  S pitch;
-};
 
 template <class S>
 struct CompiledModel {
@@ -37,6 +29,12 @@ struct CompiledModel {
   std::vector<int> aligned;                   // per coordinate: i where its row of H is exactly e_i at every q, else -1
   Vector3<S> gravity;
 };
+
+class Multibody;
+
+// Unit axes and orthogonal rotations are so to the rounding of S, not of the doubles they were given in.
+template <class S>
+std::shared_ptr<const CompiledModel<S>> compile_model(const Multibody& model);
 
 template <class S, class T>
 inline InertiaFactors<S> cast(const InertiaFactors<T>& f) {

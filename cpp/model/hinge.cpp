@@ -1,5 +1,6 @@
 #include "model/hinge.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "runtime/errors.h"
@@ -7,9 +8,6 @@
 namespace pycraft {
 
 namespace {
-
-constexpr const char* kinds[] = {"weld", "pin", "slider", "screw", "universal", "gimbal", "cylindrical", "planar", "ball", "free", "custom"};
-constexpr const char* subhinge_kinds[] = {"pin", "slider", "screw", "ball", "free"};
 
 Vector3<double> unit(const Vector3<double>& axis, const std::string& hinge) {
   const double length = norm(axis);
@@ -20,26 +18,81 @@ Vector3<double> unit(const Vector3<double>& axis, const std::string& hinge) {
   return {axis[0] / length, axis[1] / length, axis[2] / length};
 }
 
+constexpr int none = -1;  // no axis
+
+template <class Records>
+size_t row_called(const std::string& name, const char* what, const Records& records) {
+  std::string all;
+  size_t i = 0;
+  for (const auto& row : records) {
+    if (name == row.name) return i;
+    all += (i++ ? ", " : "") + std::string(row.name);
+  }
+  throw ModelError(std::string("no ") + what + " kind is called '" + name + "'; there are " + all);
+}
+
+// A point and a pitch are numbers, and given to hinges that have them.
+void check_numbers(const std::string& kind, const std::vector<std::pair<SubhingeKind, int>>& subhinges, const Vector3<double>& point, double pitch,
+                   const std::string& hinge) {
+  for (int i = 0; i < 3; ++i)
+    if (!std::isfinite(point[i])) throw ModelError("hinge '" + hinge + "': its point has an entry that is not a number");
+  if (!std::isfinite(pitch)) throw ModelError("hinge '" + hinge + "': its pitch is not a number");
+  const auto any = [&](bool SubhingeRecord::* has) {
+    return std::any_of(subhinges.begin(), subhinges.end(), [&](const auto& s) { return record_of(s.first).*has; });
+  };
+  const auto has_no = [&](const char* what) { throw ModelError("hinge '" + hinge + "' of kind '" + kind + "' has no " + what + "; leave it out"); };
+  if (pitch != 0 && !any(&SubhingeRecord::pitch)) has_no("pitch");
+  if (norm(point) != 0 && !any(&SubhingeRecord::point)) has_no("point");
+}
+
+Subhinge subhinge_along(SubhingeKind kind, const Vector3<double>& axis, const Vector3<double>& point, double pitch) {
+  return {kind, axis, point, record_of(kind).pitch ? pitch : 0};
+}
+
+// A plane's x and y after its normal: x is the coordinate axis least aligned with the normal, made orthogonal to it; y completes the
+// right-handed frame.
+void add_axes_across(std::vector<Vector3<double>>& axes, const std::string& hinge) {
+  const Vector3<double> n = axes[0];
+  Vector3<double> x{1, 0, 0}, y{0, 1, 0};
+  if (n[2] != 1) {
+    const int least = std::abs(n[0]) <= std::abs(n[1]) && std::abs(n[0]) <= std::abs(n[2]) ? 0 : std::abs(n[1]) <= std::abs(n[2]) ? 1 : 2;
+    Vector3<double> e{0, 0, 0};
+    e[least] = 1;
+    x = unit(e - dot(e, n) * n, hinge);
+    y = cross(n, x);
+  }
+  axes.push_back(x), axes.push_back(y);
+}
+
 }  // namespace
 
-const char* hinge_kind_name(HingeKind kind) { return kinds[static_cast<int>(kind)]; }
-const char* subhinge_kind_name(SubhingeKind kind) { return subhinge_kinds[static_cast<int>(kind)]; }
-
-HingeKind hinge_kind_from_name(const std::string& name) {
-  std::string all;
-  for (int i = 0; i < 11; ++i) {
-    if (name == kinds[i]) return static_cast<HingeKind>(i);
-    all += (i ? ", " : "") + std::string(kinds[i]);
-  }
-  throw ModelError("no hinge kind is called '" + name + "'; there are " + all);
+const std::vector<HingeRecord>& hinge_records() {
+  using enum SubhingeKind;
+  static const std::vector<HingeRecord> records = {
+      {"weld", 0, {}},
+      {"pin", 1, {{pin, 0}}},
+      {"slider", 1, {{slider, 0}}},
+      {"screw", 1, {{screw, 0}}},
+      {"universal", 2, {{pin, 0}, {pin, 1}}},
+      {"gimbal", 3, {{pin, 0}, {pin, 1}, {pin, 2}}},
+      {"cylindrical", 1, {{pin, 0}, {slider, 0}}},
+      {"planar", 1, {{slider, 1}, {slider, 2}, {pin, 0}}},  // the normal is given, two axes across it are found
+      {"ball", 0, {{ball, none}}},
+      {"free", 0, {{free, none}}},
+      {"custom", 0, {}},
+  };
+  return records;
 }
+const HingeRecord& record_of(HingeKind kind) { return hinge_records()[static_cast<size_t>(kind)]; }
 
-SubhingeKind subhinge_kind_from_name(const std::string& name) {
-  for (int i = 0; i < 5; ++i)
-    if (name == subhinge_kinds[i]) return static_cast<SubhingeKind>(i);
-  throw ModelError("no subhinge kind is called '" + name + "'; there are pin, slider, screw, ball, free");
+HingeKind hinge_kind_from_name(const std::string& name) { return static_cast<HingeKind>(row_called(name, "hinge", hinge_records())); }
+SubhingeKind subhinge_kind_from_name(const std::string& name) { return static_cast<SubhingeKind>(row_called(name, "subhinge", subhinge_records)); }
+
+int HingeRecord::nv() const {
+  int n = 0;
+  for (const auto& [kind, axis] : subhinges) n += record_of(kind).nv;
+  return n;
 }
-
 int Hinge::nq() const {
   int n = 0;
   for (const Subhinge& s : subhinges) n += s.nq();
@@ -53,53 +106,22 @@ int Hinge::nv() const {
 
 std::vector<Subhinge> subhinges_of(HingeKind kind, const std::vector<Vector3<double>>& given, const Vector3<double>& point, double pitch,
                                    const std::string& hinge) {
-  const auto need = [&](size_t count) {
-    if (given.size() != count)
-      throw ModelError("hinge '" + hinge + "' of kind '" + hinge_kind_name(kind) + "' takes " + std::to_string(count) + " axes, not " +
-                       std::to_string(given.size()));
-  };
-  for (int i = 0; i < 3; ++i)
-    if (!std::isfinite(point[i])) throw ModelError("hinge '" + hinge + "': its point has an entry that is not a number");
-  if (!std::isfinite(pitch)) throw ModelError("hinge '" + hinge + "': its pitch is not a number");
-  const auto has_no = [&](const char* what, bool given_all_the_same) {
-    if (given_all_the_same) throw ModelError("hinge '" + hinge + "' of kind '" + hinge_kind_name(kind) + "' has no " + what + "; leave it out");
-  };
-  has_no("pitch", pitch != 0 && kind != HingeKind::screw);
-  has_no("point", (kind == HingeKind::weld || kind == HingeKind::free) && norm(point) != 0);
+  if (kind == HingeKind::custom) throw ModelError("hinge '" + hinge + "' of kind 'custom' takes its subhinges one by one");
+  const HingeRecord& row = record_of(kind);
+  check_numbers(row.name, row.subhinges, point, pitch, hinge);
   std::vector<Vector3<double>> axes;
   for (const Vector3<double>& a : given) axes.push_back(unit(a, hinge));
-  switch (kind) {
-    case HingeKind::weld: need(0); return {};
-    case HingeKind::pin: need(1); return {{SubhingeKind::pin, axes[0], point}};
-    case HingeKind::slider: need(1); return {{SubhingeKind::slider, axes[0], point}};
-    case HingeKind::screw: need(1); return {{SubhingeKind::screw, axes[0], point, pitch}};
-    case HingeKind::universal: need(2); return {{SubhingeKind::pin, axes[0], point}, {SubhingeKind::pin, axes[1], point}};
-    case HingeKind::gimbal:
-      need(3);
-      return {{SubhingeKind::pin, axes[0], point}, {SubhingeKind::pin, axes[1], point}, {SubhingeKind::pin, axes[2], point}};
-    case HingeKind::cylindrical: need(1); return {{SubhingeKind::pin, axes[0], point}, {SubhingeKind::slider, axes[0], point}};
-    case HingeKind::planar: {
-      // x is the coordinate axis least aligned with the normal, made orthogonal to it; y completes the right-handed frame.
-      need(1);
-      const Vector3<double> n = axes[0];
-      Vector3<double> x, y;
-      if (n[2] == 1) {
-        x = {1, 0, 0}, y = {0, 1, 0};
-      } else {
-        const int least = std::abs(n[0]) <= std::abs(n[1]) && std::abs(n[0]) <= std::abs(n[2]) ? 0 : std::abs(n[1]) <= std::abs(n[2]) ? 1 : 2;
-        Vector3<double> e{0, 0, 0};
-        e[least] = 1;
-        const Vector3<double> projected = e - dot(e, n) * n;
-        x = unit(projected, hinge);
-        y = cross(n, x);
-      }
-      return {{SubhingeKind::slider, x, point}, {SubhingeKind::slider, y, point}, {SubhingeKind::pin, n, point}};
-    }
-    case HingeKind::ball: need(0); return {{SubhingeKind::ball, {0, 0, 1}, point}};
-    case HingeKind::free: need(0); return {{SubhingeKind::free, {0, 0, 1}, {0, 0, 0}}};
-    case HingeKind::custom: throw ModelError("hinge '" + hinge + "' of kind 'custom' takes its subhinges one by one");
-  }
-  return {};
+  if (static_cast<int>(axes.size()) != row.axes)
+    throw ModelError("hinge '" + hinge + "' of kind '" + row.name + "' takes " + std::to_string(row.axes) + " axes, not " + std::to_string(axes.size()));
+  if (kind == HingeKind::planar) add_axes_across(axes, hinge);
+  std::vector<Subhinge> made;
+  for (const auto& [subhinge, axis] : row.subhinges) made.push_back(subhinge_along(subhinge, axis == none ? Vector3<double>{0, 0, 1} : axes[axis], point, pitch));
+  return made;
+}
+
+Subhinge subhinge_of(SubhingeKind kind, const Vector3<double>& axis, const Vector3<double>& point, double pitch, const std::string& hinge) {
+  check_numbers(record_of(kind).name, {{kind, 0}}, point, pitch, hinge);
+  return subhinge_along(kind, record_of(kind).axis ? unit(axis, hinge) : Vector3<double>{0, 0, 1}, point, pitch);
 }
 
 }  // namespace pycraft

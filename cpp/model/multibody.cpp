@@ -7,6 +7,8 @@
 
 #include "model/checks.h"
 #include "model/compiled_model.h"
+#include "model/configuration.h"
+#include "model/lumping.h"
 #include "runtime/errors.h"
 #include "runtime/interrupt.h"
 
@@ -14,19 +16,14 @@ namespace pycraft {
 
 namespace {
 
-template <class Names>
-[[noreturn]] void throw_unknown(const char* what, const std::string& name, const std::string& model, const Names& known) {
-  std::string text = std::string("no ") + what + " of '" + model + "' is called '" + name + "'; there are ";
-  std::vector<std::string> names;
-  for (const auto& [known_name, _] : known) names.push_back(known_name);
-  std::sort(names.begin(), names.end());
-  if (names.empty()) text += "none";
-  for (size_t i = 0; i < names.size() && i < 12; ++i) text += (i ? ", " : "") + names[i];
-  if (names.size() > 12) text += ", ... (" + std::to_string(names.size()) + " in all)";
-  throw ModelError(text);
+// The hinge's coordinates at zero: a quaternion is that of no rotation.
+void append_zero(const Hinge& hinge, std::vector<double>& q) {
+  for (const Subhinge& s : hinge.subhinges) {
+    const size_t at = q.size();
+    q.resize(at + s.nq(), 0.0);
+    if (s.record().quaternion >= 0) q[at + s.record().quaternion] = 1;
+  }
 }
-
-RigidInertia<long double> wide_inertia(const Body& b) { return rigid_inertia(static_cast<long double>(b.mass), cast<long double>(b.com), cast<long double>(b.inertia)); }
 
 }  // namespace
 
@@ -110,19 +107,7 @@ void Multibody::note(const std::string& body, const std::string& text) {
 void Multibody::lump(const Body& body, const Node& onto) {
   const Pose<double> X = body.hinge.placement;  // in the body that moves it
   if (onto.body >= 0 && (body.mass != 0 || std::any_of(body.inertia.s, body.inertia.s + 6, [](double x) { return x != 0; }))) {
-    Body& b = bodies_[onto.body];
-    const RigidInertia<long double> sum = wide_inertia(b) + to_parent(cast<long double>(X), wide_inertia(body));
-    Vector3<long double> com{0, 0, 0};
-    if (sum.mass > 0) com = (1 / sum.mass) * sum.moment;
-    Symmetric3<long double> about = sum.rotational;
-    const Symmetric3<long double> point = point_inertia(com);
-    for (int i = 0; i < 6; ++i) about.s[i] -= sum.mass * point.s[i];
-    const Vector3<double> new_com = cast<double>(com);
-    const Symmetric3<double> new_inertia = cast<double>(about);
-    check_mass_properties(b.name + "' with '" + body.name, static_cast<double>(sum.mass), new_com, new_inertia);
-    b.mass = static_cast<double>(sum.mass);
-    b.com = new_com;
-    b.inertia = new_inertia;
+    bodies_[onto.body] = lumped(bodies_[onto.body], X, body);
     ++parameters_;
   }
   node_numbers_[body.name] = static_cast<int>(nodes_.size());
@@ -211,12 +196,8 @@ void Multibody::settle() {
       state->q.insert(state->q.end(), old->second.first.begin(), old->second.first.end());
       state->v.insert(state->v.end(), old->second.second.begin(), old->second.second.end());
     } else {
-      for (const Subhinge& s : h.subhinges) {
-        const size_t at = state->q.size();
-        state->q.resize(at + s.nq(), 0.0);
-        if (s.nq() > 1) state->q[at] = 1;
-        state->v.resize(state->v.size() + s.nv(), 0.0);
-      }
+      append_zero(h, state->q);
+      state->v.resize(state->v.size() + h.nv(), 0.0);
     }
   }
   for (size_t i = 0; i < nodes_.size(); ++i) node_numbers_[nodes_[i].name] = static_cast<int>(i);
@@ -333,20 +314,8 @@ std::shared_ptr<const StateData> Multibody::state() const {
 void Multibody::check_q(const double* q, size_t size) const {
   if (static_cast<int>(size) != nq())
     throw ModelError("q of '" + name_ + "' takes " + std::to_string(nq()) + " numbers (" + std::to_string(bodies()) + " hinges), not " + std::to_string(size));
-  for (int k = 0; k < bodies(); ++k) {
-    const Hinge& h = bodies_[k].hinge;
-    const double* at = q + q_offset_[k];
-    for (int i = 0; i < h.nq(); ++i)
-      if (!std::isfinite(at[i])) throw ModelError("q of hinge '" + h.name + "': entry " + std::to_string(i) + " is " + short_number(at[i]));
-    for (const Subhinge& s : h.subhinges) {
-      if (s.nq() >= 4) {
-        const double length = std::hypot(std::hypot(at[0], at[1]), std::hypot(at[2], at[3]));
-        if (length < 1e-8)
-          throw ModelError("q of hinge '" + h.name + "': its quaternion has length " + short_number(length) + " and no direction; (1, 0, 0, 0) is no rotation");
-      }
-      at += s.nq();
-    }
-  }
+  for (int k = 0; k < bodies(); ++k)
+    check_configuration(bodies_[k].hinge, q + q_offset_[k]);
 }
 
 void Multibody::check_v(const double* v, size_t size, const char* what) const {
@@ -378,154 +347,22 @@ void Multibody::set_v(const std::vector<double>& v) {
 std::vector<double> Multibody::zero_q() const {
   settled();
   std::vector<double> q;
-  for (int k = 0; k < bodies(); ++k)
-    for (const Subhinge& s : body(k).hinge.subhinges) {
-      const size_t at = q.size();
-      q.resize(at + s.nq(), 0.0);
-      if (s.nq() > 1) q[at] = 1;
-    }
+  for (const Body& b : bodies_) append_zero(b.hinge, q);
   return q;
 }
 
 void Multibody::integrate(const double* q, const double* dv, double* out) const {
-  settled();
-  for (int k = 0; k < bodies(); ++k) {
-    const double *x = q + q_offset_[k], *d = dv + v_offset_[k];
-    double* y = out + q_offset_[k];
-    for (const Subhinge& s : body(k).hinge.subhinges) {
-      if (s.nq() == 1) {
-        y[0] = x[0] + d[0];
-      } else {
-        const Quaternion<double> q0{x[0], x[1], x[2], x[3]};
-        const Vector3<double> w{d[0], d[1], d[2]};
-        Quaternion<double> q1 = q0 * exp_quaternion(w);
-        // The product keeps |q0| up to rounding; over many steps rounding would walk, so the length is set to what it was.
-        const double want = std::hypot(std::hypot(q0.w, q0.x), std::hypot(q0.y, q0.z));
-        const double have = std::hypot(std::hypot(q1.w, q1.x), std::hypot(q1.y, q1.z));
-        const double scale = want / have;
-        if (s.nq() == 7) {
-          const Vector3<double> moved = quaternion_rotation(q0) * screw_translation(w, {d[3], d[4], d[5]});
-          for (int i = 0; i < 3; ++i) y[4 + i] = x[4 + i] + moved[i];
-        }
-        y[0] = scale * q1.w, y[1] = scale * q1.x, y[2] = scale * q1.y, y[3] = scale * q1.z;
-      }
-      x += s.nq(), y += s.nq(), d += s.nv();
-    }
-  }
+  const auto model = compiled<double>();
+  // A product of quaternions keeps the length up to rounding; over many steps that would walk, so it is set to what it was.
+  std::vector<double> lengths(model->subhinges.size());
+  quaternion_lengths(*model, q, lengths.data());
+  move_configuration(*model, q, dv, out);
+  scale_quaternions<double>(*model, lengths.data(), out);
 }
 
-void Multibody::difference(const double* q0, const double* q1, double* out) const {
-  settled();
-  for (int k = 0; k < bodies(); ++k) {
-    const double *a = q0 + q_offset_[k], *b = q1 + q_offset_[k];
-    double* d = out + v_offset_[k];
-    for (const Subhinge& s : body(k).hinge.subhinges) {
-      if (s.nq() == 1) {
-        d[0] = b[0] - a[0];
-      } else {
-        const Quaternion<double> from = with_squares<double>({a[0], -a[1], -a[2], -a[3]}), to = with_squares<double>({b[0], b[1], b[2], b[3]});
-        const Vector3<double> w = log_quaternion(from * to);
-        Vector6<double> twist{w, {0, 0, 0}};
-        if (s.nq() == 7) {
-          const Matrix3<double> R = quaternion_rotation(Quaternion<double>{a[0], a[1], a[2], a[3]});
-          twist = log_pose(w, transpose_times(R, Vector3<double>{b[4] - a[4], b[5] - a[5], b[6] - a[6]}));
-        }
-        for (int i = 0; i < s.nv(); ++i) d[i] = twist[i];
-      }
-      a += s.nq(), b += s.nq(), d += s.nv();
-    }
-  }
-}
+void Multibody::difference(const double* q0, const double* q1, double* out) const { configuration_difference(*compiled<double>(), q0, q1, out); }
 
 // ------------------------------------------------------------------ flat arrays
-
-namespace {
-
-// Unit axes and orthogonal rotations are so to the rounding of S, not of the doubles they were given in.
-template <class S>
-Vector3<S> renormalised(const Vector3<double>& a) {
-  const Vector3<S> x = cast<S>(a);
-  if constexpr (std::is_same_v<S, double>) return x;
-  return (S(1) / norm(x)) * x;
-}
-template <class S>
-Pose<S> renormalised(const Pose<double>& X) {
-  if constexpr (std::is_same_v<S, double>) return X;
-  const Pose<S> wide = cast<S>(X);
-  const Quaternion<S> q = rotation_quaternion(wide.R);
-  return {quaternion_rotation(q), wide.p};
-}
-
-// Coordinates of a hinge that move its body along any line whatever the others are, numbered from `first`: a free subhinge's, or three
-// sliders'. None where one of them has a rotor, whose inertia a change of the body's velocity does not share.
-std::array<int, 3> translations(const Hinge& hinge, int first) {
-  std::vector<int> found;
-  int j = 0;
-  for (const Subhinge& h : hinge.subhinges) {
-    if (h.kind == SubhingeKind::slider) found.push_back(j);
-    if (h.kind == SubhingeKind::free) found.insert(found.end(), {j + 3, j + 4, j + 5});
-    j += h.nv();
-  }
-  const bool driven = std::any_of(found.begin(), found.end(), [&](int i) { return hinge.rotor_inertia[i] != 0; });
-  if (found.size() != 3 || driven) return {-1, -1, -1};
-  return {first + found[0], first + found[1], first + found[2]};
-}
-
-template <class S>
-std::shared_ptr<const CompiledModel<S>> compile(const Multibody& model) {
-  auto c = std::make_shared<CompiledModel<S>>();
-  c->parameters = model.parameters();
-  c->bodies = model.bodies();
-  c->nq = model.nq();
-  c->nv = model.nv();
-  c->gravity = cast<S>(model.gravity());
-  c->first_subhinge.push_back(0);
-  for (int k = 0; k < model.bodies(); ++k) {
-    check_interrupt_at(k);
-    const Body& b = model.body(k);
-    c->parent.push_back(b.parent);
-    c->q_offset.push_back(model.q_offset(k));
-    c->v_offset.push_back(model.v_offset(k));
-    c->nv_of.push_back(b.hinge.nv());
-    c->placement.push_back(renormalised<S>(b.hinge.placement));
-    c->inertia.push_back(rigid_inertia(S(b.mass), cast<S>(b.com), cast<S>(b.inertia)));
-    c->inertia_factors.push_back(inertia_factors<S>(b.mass, b.com, b.inertia));
-    c->mass_properties.push_back({b.mass, b.com, b.inertia});
-    for (size_t i = 0; i < b.hinge.subhinges.size(); ++i) {
-      const Subhinge& h = b.hinge.subhinges[i];
-      const Vector3<S> axis = renormalised<S>(h.axis), point = cast<S>(h.point);
-      const S pitch = S(h.pitch);
-      Vector6<S> twist = Vector6<S>::zero();
-      if (h.kind == SubhingeKind::pin || h.kind == SubhingeKind::screw) twist = {axis, cross(point, axis) + pitch * axis};
-      if (h.kind == SubhingeKind::slider) twist = {Vector3<S>::zero(), axis};
-      c->subhinges.push_back({h.kind, twist, axis, point, pitch});
-      // Which coordinate axis the rows are, exactly and at every q: only in the last subhinge.
-      const bool last = i + 1 == b.hinge.subhinges.size();
-      for (int j = 0; j < h.nv(); ++j) {
-        int index = -1;
-        const bool at_origin = point[0] == S(0) && point[1] == S(0) && point[2] == S(0);
-        if (last && h.kind == SubhingeKind::free) index = j;
-        if (last && h.kind == SubhingeKind::ball && at_origin) index = j;
-        if (last && h.nv() == 1)
-          for (int a = 0; a < 6; ++a) {
-            bool is = twist[a] == S(1) || twist[a] == S(-1);
-            for (int o = 0; o < 6 && is; ++o) is = o == a || twist[o] == S(0);
-            if (is) index = a;
-          }
-        c->aligned.push_back(index);
-      }
-    }
-    c->first_subhinge.push_back(static_cast<int>(c->subhinges.size()));
-    c->translations.push_back(translations(b.hinge, c->v_offset.back()));
-    for (double j : b.hinge.rotor_inertia) {
-      c->rotor_inertia.push_back(S(j));
-      c->has_rotor_inertia |= j != 0;
-    }
-  }
-  return c;
-}
-
-}  // namespace
 
 template <class S>
 std::shared_ptr<const CompiledModel<S>> Multibody::compiled() const {
@@ -538,7 +375,7 @@ std::shared_ptr<const CompiledModel<S>> Multibody::compiled() const {
     if (kept && kept->parameters == parameters_) return kept;
   }
   // Outside the lock: a signal's handler, called in between, may ask for the same. Nobody edits the model meanwhile.
-  const std::shared_ptr<const CompiledModel<S>> made = compile<S>(*this);
+  const std::shared_ptr<const CompiledModel<S>> made = compile_model<S>(*this);
   std::lock_guard<Mutex> lock(mutex_);
   if (!kept || kept->parameters != made->parameters) kept = made;
   return kept;

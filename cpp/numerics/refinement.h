@@ -40,32 +40,50 @@ struct RefinementWork {
   std::vector<double> corrections;  // |δ|/max(|x|, |δ|) of every step, the largest over the columns
 };
 
+// The largest of column c of m; what is no number where one is none.
+template <class S>
+S largest_in_column(const S* v, size_t size, int m, int c) {
+  using std::abs;
+  S most = S(0);
+  for (size_t i = c; i < size; i += m)
+    if (const S y = abs(v[i]); !(y <= most)) {
+      most = y;
+      if (!(y == y)) break;
+    }
+  return most;
+}
+
+// The unit direction of a correction of column c into work.direction, and its length; zeros where the column is not open.
+template <class S>
+void take_direction(RefinementWork<S>& work, size_t size, int m, int c, const S& correction) {
+  using std::sqrt;
+  S square = S(0);
+  for (size_t i = c; i < size; i += m) {
+    work.direction[i] = work.open[c] ? S(work.delta[i] / correction) : S(0);
+    square += work.direction[i] * work.direction[i];
+  }
+  const S length = sqrt(square);
+  for (size_t i = c; i < size && work.open[c]; i += m) work.direction[i] /= length;
+  work.length[c] = correction * length;
+}
+
 // x: n rows of m columns, with terms as large as `largest` that cancelled in it. residual(x, r) and solve(r, δ); what() names the system;
 // rounding(w, out): of every column, the most that the rounding of the last residual can make of δ along w, |w| = 1.
 template <class S, class What, class Residual, class Solve, class Rounding>
 void refine(S* x, int n, int m, const Refinement& how, Form form, const S& largest, What&& what, Residual&& residual, Solve&& solve,
             Rounding&& rounding, RefinementWork<S>& work) {
-  using std::abs, std::sqrt;
   const size_t size = size_t(n) * m;
   const S limit = S(0.3), exact = how.wider() ? S(0) : S(S(4) * epsilon<S>());
   for (auto* v : {&work.r, &work.delta, &work.direction})
     if (v->size() < size) v->resize(size);
   work.length.resize(m), work.rounding.assign(m, S(0)), work.last.assign(m, S(0)), work.open.assign(m, 1), work.corrections.clear();
-  S *delta = work.delta.data(), *direction = work.direction.data();
+  const S* delta = work.delta.data();
+  const auto largest_of = [&](const S* v, int c) { return largest_in_column(v, size, m, c); };
   const int asked = how.steps == Refinement::automatic ? most_corrections : how.steps;
   bool unsure = false;
   for (int step = 0; step < asked || (unsure && step == asked); ++step) {
     residual(x, work.r.data());
-    solve(work.r.data(), delta);
-    const auto largest_of = [&](const S* v, int c) {
-      S most = S(0);
-      for (size_t i = c; i < size; i += m)
-        if (const S y = abs(v[i]); !(y <= most)) {
-          most = y;
-          if (!(y == y)) break;
-        }
-      return most;
-    };
+    solve(work.r.data(), work.delta.data());
     // directions of the corrections that are more than a few roundings of the solution
     S worst = S(0);
     bool doubt = false;
@@ -76,18 +94,11 @@ void refine(S* x, int n, int m, const Refinement& how, Form form, const S& large
       if (work.open[c] && correction > S(0)) worst = maximum(worst, S(correction / maximum(solution, correction)));
       if (!(correction > exact * solution)) work.open[c] = 0;
       doubt |= bool(work.open[c]);
-      S square = S(0);
-      for (size_t i = c; i < size; i += m) {
-        direction[i] = work.open[c] ? S(delta[i] / correction) : S(0);
-        square += direction[i] * direction[i];
-      }
-      const S length = sqrt(square);
-      for (size_t i = c; i < size && work.open[c]; i += m) direction[i] /= length;
-      work.length[c] = correction * length;
+      take_direction(work, size, m, c, correction);
     }
     work.corrections.push_back(to_double(worst));
     if (!doubt) return;
-    rounding(direction, work.rounding.data());
+    rounding(work.direction.data(), work.rounding.data());
     bool applied = false;
     unsure = false;
     for (int c = 0; c < m; ++c) {

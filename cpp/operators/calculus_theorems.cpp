@@ -4,11 +4,14 @@
 
 #include "algebra/planning/square_root.h"
 #include "operators/derived_operators.h"
+#include "operators/alphabet.h"
 #include "operators/directions.h"
 
 namespace pycraft {
 
 namespace {
+
+using enum SymbolId;
 
 // A coordinate along which much changes: of a hinge with few of them that carries many bodies, and whose parent is no root: where the
 // root is free, P⁺ and G of the root are 0 and I at every state.
@@ -36,126 +39,159 @@ int failing_coordinate(const MultibodyOperators& source, bool subhinges, int oth
   return otherwise;
 }
 
+struct CalculusTheorems : Statements {
+  using enum Hypothesis;
+  explicit CalculusTheorems(const std::shared_ptr<MultibodyOperators>& of) : Statements(of), robot(of) {}
+
+  Expression mechanics(SymbolId id) const { return mechanics_operator(id, robot); }
+  Expression function(SymbolId id, const Expression& x) const { return block_function(definition_of(id), robot, nullptr, x); }
+  Expression unit(int coordinate) const {
+    std::vector<double> e(robot->nv(), 0.0);
+    e[coordinate] = 1;
+    return constant(std::move(e), Space::euclidean(1), robot->theta(), "e" + std::to_string(coordinate));
+  }
+  Expression d(const Expression& e) const { return differentiate(e, *along_i); }
+  Expression dot(const Expression& e) const { return differentiate(e, *along_time); }
+  void state(const std::string& name, Side lhs, Side rhs, const std::string& text, const std::string& latex, Hypothesis hypotheses = no_hypothesis,
+             const std::string& from = "soa.md, Calculus") {
+    list.push_back({name, group, std::move(lhs), std::move(rhs), hypotheses, from, Use::check});
+    shown(text, latex);
+  }
+
+  void mass_matrix_along_a_coordinate() {
+    group = "Calculus along a coordinate";
+    const Expression Delta_several = delta_operator(robot, several), Delta_many = delta_operator(robot, many);
+    const Expression half = H * phi_tilde * Delta_several * phi * M * phi.T() * H.T();
+    state("∂ℳ", differentiate(MM, *along_several), half + half.T(), "∂ℳ = Hφ̃Δφ Mφ*H* + (…)*", "\\partial\\mathcal{M} = H\\tilde\\phi\\Delta\\phi M\\phi^*H^* + (\\cdots)^*", constant_hinges);
+    const Expression book = H * phi * (Delta_many * phi * M + M * phi.T() * Delta_many.T()) * phi.T() * H.T();
+    state("∂ℳ, single-DOF form", differentiate(MM, *along_many), book, "∂ℳ = Hφ[ΔφM + Mφ*Δ*]φ*H*", "\\partial\\mathcal{M} = H\\phi[\\Delta\\phi M + M\\phi^*\\Delta^*]\\phi^*H^*", single_dof,
+          "Jain 2011");
+  }
+
+  void operators_along_a_coordinate() {
+    const Expression inverse = (MM + J).inv();
+    state("∂ℳ by the innovations factors", d(MM + J), d(A * D * A.T()), "∂ℳ = ∂([I+HφK]D[I+HφK]*)",
+          "\\partial\\mathcal{M} = \\partial([I+H\\phi\\mathcal{K}]\\mathcal{D}[I+H\\phi\\mathcal{K}]^*)");
+    state("∂(ℳ⁻¹)", d(S.T() * D.inv() * S), -(inverse * d(MM) * inverse), "∂([I-HψK]*D⁻¹[I-HψK]) = -(ℳ+J)⁻¹∂ℳ(ℳ+J)⁻¹",
+          "\\partial([I-H\\psi\\mathcal{K}]^*\\mathcal{D}^{-1}[I-H\\psi\\mathcal{K}]) = -(\\mathcal{M}+J)^{-1}\\partial\\mathcal{M}(\\mathcal{M}+J)^{-1}");
+    state("∂P by the Riccati equation", d(P), d(M + E_psi * P * E.T()), "∂P = ∂(M + E_ψPE_φ*)", "\\partial P = \\partial(M + \\mathcal{E}_\\psi P\\mathcal{E}_\\phi^*)");
+    state("∂P⁺", d(P_plus), d(tau_bar * P), "∂P⁺ = ∂(τ̄P)", "\\partial P^+ = \\partial(\\bar\\tau P)");
+    state("∂G", d(G), d(P * H.T() * D.inv()), "∂G = ∂(PH*D⁻¹)", "\\partial\\mathcal{G} = \\partial(PH^*\\mathcal{D}^{-1})");
+    state("∂ψ", d(psi), -(psi * d(phi.inv() + K * H) * psi), "∂ψ = -ψ ∂(φ⁻¹ + KH) ψ", "\\partial\\psi = -\\psi\\,\\partial(\\phi^{-1}+\\mathcal{K}H)\\,\\psi");
+    state("∂(I-HψK)", d(S), -(S * d(A) * S), "∂[I-HψK] = -[I-HψK] ∂[I+HφK] [I-HψK]", "\\partial[I-H\\psi\\mathcal{K}] = -[I-H\\psi\\mathcal{K}]\\,\\partial[I+H\\phi\\mathcal{K}]\\,[I-H\\psi\\mathcal{K}]");
+    state("∂R", d(R), d(M + E * R * E.T()), "∂R = ∂(M + E_φRE_φ*)", "\\partial\\mathcal{R} = \\partial(M+\\mathcal{E}_\\phi\\mathcal{R}\\mathcal{E}_\\phi^*)");
+    state("∂Υ", d(Upsilon), block_diagonal(d(Omega)), "∂Υ = blockdiag(∂Ω)", "\\partial\\Upsilon = \\operatorname{blockdiag}(\\partial\\Omega)");
+  }
+
+  void log_determinant() {
+    const Expression dH = d(H), Delta_i = delta_operator(robot, i);
+    const Expression W = block_diagonal(E.T() * Upsilon * E);
+    Scalar gradient = 2.0 * trace(P_plus * W * Delta_i);
+    if (dH.kind() != NodeKind::zero) gradient = gradient + 2.0 * trace(dH * (I - P_plus * W) * G);
+    state("gradient of ln det ℳ", differentiate(logdet(MM + J), *along_i), gradient, "∂ ln det(ℳ+J) = 2 tr(P⁺WΔ) + 2 tr(∂H(I-P⁺W)G),  W = blockdiag(E*ΥE)",
+          "\\partial\\ln\\det(\\mathcal{M}+J) = 2\\operatorname{tr}(P^+W\\Delta) + 2\\operatorname{tr}(\\partial H(I-P^+W)\\mathcal{G})", no_hypothesis, "soa.md #35");
+    const Parameter mass{robot, "mass", {}, robot->structure().bodies() - 1, InertiaParameter::mass, -1};
+    const auto by_mass = parameter_direction(mass);
+    state("gradient of ln det ℳ by a mass", differentiate(logdet(MM + J), *by_mass), trace(Upsilon * differentiate(M, *by_mass)), "∂ ln det(ℳ+J) = tr(Υ∂M)",
+          "\\partial\\ln\\det(\\mathcal{M}+J) = \\operatorname{tr}(\\Upsilon\\,\\partial M)", no_hypothesis, "soa.md #32");
+  }
+
+  void motion_along_a_coordinate() {
+    const Expression e = unit(several);
+    const Expression outboard = function(force_cross, E.T() * V);
+    const Expression h = make_symbol(definition_of(direction_twist), source, OfCoordinate{several}, robot->structure().coordinate_names[several]);
+    state("slope of the kinetic energy", 0.5 * differentiate(V.T() * M * V, *along_several), -(h.T() * outboard * p),
+          "∂KE = -h*crf(E*V)p,  p = φMV", "\\partial KE = -h^*\\operatorname{crf}(\\mathcal{E}^*\\mathcal{V})p", constant_hinges, "soa.md #18");
+    const Expression dV = phi.T() * function(motion_cross, E.T() * V) * H.T() * e;
+    const Expression dalpha = phi.T() * (function(motion_cross, E.T() * alpha) * H.T() * e - function(motion_cross, H.T() * qd) * dV);
+    state("derivative of inverse dynamics", differentiate(H * f, *along_several),
+          H * phi_tilde * function(momentum_cross_of, f) * H.T() * e +
+              H * phi * (M * dalpha + (mechanics(momentum_cross) + mechanics(V_bar) * M) * dV),
+          "∂T = Hφ̃𝓕H*e + Hφ(M∂α + (𝓑+V̄M)∂V)", "\\partial T = H\\tilde\\phi\\mathscr{F}H^*e + H\\phi(M\\partial\\alpha+(\\mathscr{B}+\\bar{\\mathcal{V}}M)\\partial\\mathcal{V})",
+          constant_hinges, "soa.md #25");
+  }
+
+  void quasi_derivatives() {
+    for (int k = 0; k < robot->model()->bodies(); ++k) {
+      const auto& subhinges = robot->model()->body(k).hinge.subhinges;
+      if (robot->structure().parent[k] < 0 || subhinges.size() != 1 || subhinges[0].nv() < 3) continue;  // a root's turn changes no ℳ
+      const int first = robot->structure().dof_offset[k];
+      const auto x = coordinate_direction(robot, first), y = coordinate_direction(robot, first + 1), z = coordinate_direction(robot, first + 2);
+      state("quasi-derivatives do not commute", differentiate(differentiate(MM, *y), *x) - differentiate(differentiate(MM, *x), *y), differentiate(MM, *z),
+            "[∂_x, ∂_y]ℳ = ∂_zℳ about the axes of a ball or free hinge", "[\\partial_x,\\partial_y]\\mathcal{M} = \\partial_z\\mathcal{M}", no_hypothesis, "soa.md #37");
+      break;
+    }
+  }
+
+  void rates() {
+    group = "Calculus along time";
+    state("accelerations", dot(V), alpha, "dV/dt = φ*(H*θ̈ + a)", "\\dot{\\mathcal{V}} = \\phi^*(H^*\\ddot\\theta+\\mathfrak{a})", no_hypothesis, "soa.md #11");
+    state("forces as rates of momentum", dot(p) + mechanics(V_bar) * p, f, "ṗ + V̄p = f,  p = φMV", "\\dot p + \\bar{\\mathcal{V}}p = f", no_hypothesis, "soa.md #16");
+    state("Hamiltonian form", dot(MM * qd), H * f + mechanics(H_dot) * p - H * mechanics(V_bar) * p, "d(ℳθ̇)/dt = T + Ḣp - HV̄p",
+          "\\tfrac{d}{dt}(\\mathcal{M}\\dot\\theta) = T + \\dot Hp - H\\bar{\\mathcal{V}}p", no_hypothesis, "soa.md #17");
+  }
+
+  void coriolis_matrix() {
+    state("rate of the body Jacobian", J_dot, phi.T() * (mechanics(Delta_theta_dot).T() * phi_tilde.T() * H.T() + mechanics(H_dot).T()),
+          "d(φ*H*)/dt = φ*(Δ_θ̇*φ̃*H* + Ḣ*)", "\\tfrac{d}{dt}(\\phi^*H^*) = \\phi^*(\\Delta_{\\dot\\theta}^*\\tilde\\phi^*H^*+\\dot H^*)");
+    state("ℳ̇ - 2C is skew, ℳ̇ by rule", dot(MM) - 2.0 * C, -(dot(MM) - 2.0 * C).T(), "ℳ̇ - 2C = -(ℳ̇ - 2C)*,  ℳ̇ = d(HφMφ*H*)/dt",
+          "\\dot{\\mathcal{M}} - 2C = -(\\dot{\\mathcal{M}} - 2C)^*", no_hypothesis, "soa.md #21");
+    // a coordinate outboard of `many` where there is one
+    int k = many, body = 0;
+    while (robot->structure().dof_offset[body + 1] <= many) ++body;
+    for (int c = 0; c < robot->structure().bodies(); ++c)
+      if (robot->structure().parent[c] == body && robot->structure().dof[c] > 0) k = robot->structure().dof_offset[c];
+    const auto along_k = coordinate_direction(robot, k);
+    state("C is the Christoffel matrix", unit(k).T() * C * unit(many),
+          0.5 * (unit(k).T() * dot(MM) * unit(many) + unit(k).T() * differentiate(MM, *along_many) * qd - unit(many).T() * differentiate(MM, *along_k) * qd), "C(k,i) = ½ Σ_j (∂_jℳ(k,i) + ∂_iℳ(k,j) - ∂_kℳ(i,j)) θ̇_j",
+          "C_{ki} = \\tfrac12\\sum_j(\\partial_j\\mathcal{M}_{ki}+\\partial_i\\mathcal{M}_{kj}-\\partial_k\\mathcal{M}_{ij})\\dot\\theta_j", single_dof, "soa.md #22");
+  }
+
+  void diagonalised_dynamics() {
+    const Expression m = A * square_root(D), inverse_m = square_root(D).inv() * S, skew = inverse_m * C * inverse_m.T() - dot(m).T() * inverse_m.T();
+    state("diagonalised dynamics: S is skew", skew, -skew.T(), "S = m⁻¹Cm⁻* - ṁ*m⁻* = -S*,  m = [I+HφK]D^½",
+          "S = m^{-1}Cm^{-*}-\\dot m^*m^{-*} = -S^*,\\quad m = [I+H\\phi\\mathcal{K}]\\mathcal{D}^{1/2}", no_hypothesis, "soa.md #23");
+    state("diagonalised dynamics", dot(m.T() * qd) + skew * m.T() * qd, inverse_m * (H * f + J * qdd), "η̇ + Sη = m⁻¹T,  η = m*θ̇", "\\dot\\eta + S\\eta = m^{-1}T,\\quad \\eta = m^*\\dot\\theta",
+          no_hypothesis, "soa.md #24");
+  }
+
+  void world_frame() {
+    group = "World frame, calculus";
+    const Letters w(std::make_shared<WorldFrame>(robot));
+    const Expression X = mechanics(X_world);
+    state("∂M'", d(w.M), d(X * M * X.T()), "∂M' = Δ'M' + M'Δ'*  of  M' = XMX*", "\\partial M' = \\Delta'M'+M'\\Delta'^*", no_hypothesis, "soa.md #53");
+    state("∂H'", d(w.H), d(H * X.inv()), "∂H' = ∂(HX⁻¹)", "\\partial H' = \\partial(HX^{-1})", no_hypothesis, "soa.md #53");
+    state("∂P' and ∂P", d(w.P), X * differentiate_in_world(P, *along_i) * X.T(), "∂P' = X(∂P + ΔP + PΔ*)X*", "\\partial P' = X(\\partial P+\\hat\\Delta P+P\\hat\\Delta^*)X^*",
+          no_hypothesis, "soa.md #54");
+  }
+
+  const std::shared_ptr<MultibodyOperators> robot;
+  const int i = telling_coordinate(*robot), several = failing_coordinate(*robot, true, i), many = failing_coordinate(*robot, false, i);
+  const Expression qdd = make_vector("vdot", robot->theta());
+  const std::unique_ptr<Direction> along_i = coordinate_direction(robot, i), along_several = coordinate_direction(robot, several);
+  const std::unique_ptr<Direction> along_many = coordinate_direction(robot, many), along_time = time_direction(robot, qdd);
+  const Expression MM = H * phi * M * phi.T() * H.T(), A = I + H * phi * K, S = I - H * psi * K;
+  const Expression qd = mechanics(theta_dot), V = mechanics(velocity), a = mechanics(coriolis_acceleration), b = mechanics(gyroscopic_force);
+  const Expression alpha = phi.T() * (H.T() * qdd + a), f = phi * (M * alpha + b), p = phi * M * V;
+  const Expression jacobian = phi.T() * H.T(), J_dot = dot(jacobian);
+  const Expression C = H * phi * (M * J_dot + 0.5 * (mechanics(momentum_cross) + mechanics(V_bar) * M + M * mechanics(V_tilde)) * jacobian);
+};
+
 }  // namespace
 
 std::vector<Theorem> calculus_theorems(const std::shared_ptr<MultibodyOperators>& source) {
-  std::vector<Theorem> list;
-  const int N = source->nv();
-  if (N == 0) return list;
-  const Letters letters(source);
-  const auto& [_, E, phi, phi_tilde, H, M, J, P, P_plus, D, G, K, tau, tau_bar, E_psi, psi, psi_tilde, R, Upsilon, Omega, I] = letters;
-  const auto mechanics = [&](MechanicsSymbolId id) { return mechanics_operator(id, source); };
-  const auto function = [&](DerivativeSymbolId id, const Expression& x) {
-    return block_function(derivative_symbols()[id - first_derivative_symbol], source, nullptr, x);
-  };
-  const auto unit = [&](int i) {
-    std::vector<double> e(N, 0.0);
-    e[i] = 1;
-    return constant(std::move(e), Space::euclidean(1), source->theta(), "e" + std::to_string(i));
-  };
-  std::string group;
-  const auto state = [&](const std::string& name, Side lhs, Side rhs, const std::string& text, const std::string& latex, unsigned hypotheses = no_hypothesis,
-                         const std::string& from = "soa.md, Calculus") {
-    list.push_back({name, group, std::move(lhs), std::move(rhs), hypotheses, from, Use::check});
-    list.back().text = text;
-    list.back().latex = latex;
-  };
-  const int i = telling_coordinate(*source);
-  const auto along_i = coordinate_direction(source, i);
-  const Expression qdd = make_vector("vdot", source->theta());
-  const auto along_time = time_direction(source, qdd);
-  const auto d = [&](const Expression& e) { return differentiate(e, *along_i); };
-  const auto dot = [&](const Expression& e) { return differentiate(e, *along_time); };
-  const Expression Delta_i = delta_operator(source, i), MM = H * phi * M * phi.T() * H.T(), A = I + H * phi * K, S = I - H * psi * K;
-  const Expression qd = mechanics(theta_dot), V = mechanics(velocity), a = mechanics(coriolis_acceleration), b = mechanics(gyroscopic_force);
-  const Expression dH = d(H), inverse = (MM + J).inv();
-
-  group = "Calculus along a coordinate";
-  const int several = failing_coordinate(*source, true, i), many = failing_coordinate(*source, false, i);
-  const Expression Delta_several = delta_operator(source, several), Delta_many = delta_operator(source, many);
-  const auto along_several = coordinate_direction(source, several), along_many = coordinate_direction(source, many);
-  const Expression half = H * phi_tilde * Delta_several * phi * M * phi.T() * H.T();
-  state("∂ℳ", differentiate(MM, *along_several), half + half.T(), "∂ℳ = Hφ̃Δφ Mφ*H* + (…)*", "\\partial\\mathcal{M} = H\\tilde\\phi\\Delta\\phi M\\phi^*H^* + (\\cdots)^*", constant_hinges);
-  const Expression book = H * phi * (Delta_many * phi * M + M * phi.T() * Delta_many.T()) * phi.T() * H.T();
-  state("∂ℳ, single-DOF form", differentiate(MM, *along_many), book, "∂ℳ = Hφ[ΔφM + Mφ*Δ*]φ*H*", "\\partial\\mathcal{M} = H\\phi[\\Delta\\phi M + M\\phi^*\\Delta^*]\\phi^*H^*", single_dof,
-        "Jain 2011");
-  state("∂ℳ by the innovations factors", d(MM + J), d(A * D * A.T()), "∂ℳ = ∂([I+HφK]D[I+HφK]*)",
-        "\\partial\\mathcal{M} = \\partial([I+H\\phi\\mathcal{K}]\\mathcal{D}[I+H\\phi\\mathcal{K}]^*)");
-  state("∂(ℳ⁻¹)", d(S.T() * D.inv() * S), -(inverse * d(MM) * inverse), "∂([I-HψK]*D⁻¹[I-HψK]) = -(ℳ+J)⁻¹∂ℳ(ℳ+J)⁻¹",
-        "\\partial([I-H\\psi\\mathcal{K}]^*\\mathcal{D}^{-1}[I-H\\psi\\mathcal{K}]) = -(\\mathcal{M}+J)^{-1}\\partial\\mathcal{M}(\\mathcal{M}+J)^{-1}");
-  state("∂P by the Riccati equation", d(P), d(M + E_psi * P * E.T()), "∂P = ∂(M + E_ψPE_φ*)", "\\partial P = \\partial(M + \\mathcal{E}_\\psi P\\mathcal{E}_\\phi^*)");
-  state("∂P⁺", d(P_plus), d(tau_bar * P), "∂P⁺ = ∂(τ̄P)", "\\partial P^+ = \\partial(\\bar\\tau P)");
-  state("∂G", d(G), d(P * H.T() * D.inv()), "∂G = ∂(PH*D⁻¹)", "\\partial\\mathcal{G} = \\partial(PH^*\\mathcal{D}^{-1})");
-  state("∂ψ", d(psi), -(psi * d(phi.inv() + K * H) * psi), "∂ψ = -ψ ∂(φ⁻¹ + KH) ψ", "\\partial\\psi = -\\psi\\,\\partial(\\phi^{-1}+\\mathcal{K}H)\\,\\psi");
-  state("∂(I-HψK)", d(S), -(S * d(A) * S), "∂[I-HψK] = -[I-HψK] ∂[I+HφK] [I-HψK]", "\\partial[I-H\\psi\\mathcal{K}] = -[I-H\\psi\\mathcal{K}]\\,\\partial[I+H\\phi\\mathcal{K}]\\,[I-H\\psi\\mathcal{K}]");
-  state("∂R", d(R), d(M + E * R * E.T()), "∂R = ∂(M + E_φRE_φ*)", "\\partial\\mathcal{R} = \\partial(M+\\mathcal{E}_\\phi\\mathcal{R}\\mathcal{E}_\\phi^*)");
-  state("∂Υ", d(Upsilon), block_diagonal(d(Omega)), "∂Υ = blockdiag(∂Ω)", "\\partial\\Upsilon = \\operatorname{blockdiag}(\\partial\\Omega)");
-  const Expression W = block_diagonal(E.T() * Upsilon * E);
-  Scalar gradient = 2.0 * trace(P_plus * W * Delta_i);
-  if (dH.kind() != NodeKind::zero) gradient = gradient + 2.0 * trace(dH * (I - P_plus * W) * G);
-  state("gradient of ln det ℳ", differentiate(logdet(MM + J), *along_i), gradient, "∂ ln det(ℳ+J) = 2 tr(P⁺WΔ) + 2 tr(∂H(I-P⁺W)G),  W = blockdiag(E*ΥE)",
-        "\\partial\\ln\\det(\\mathcal{M}+J) = 2\\operatorname{tr}(P^+W\\Delta) + 2\\operatorname{tr}(\\partial H(I-P^+W)\\mathcal{G})", no_hypothesis, "soa.md #35");
-  const Parameter mass{source, "mass", {}, source->structure().bodies() - 1, mass_of_body, -1};
-  const auto by_mass = parameter_direction(mass);
-  state("gradient of ln det ℳ by a mass", differentiate(logdet(MM + J), *by_mass), trace(Upsilon * differentiate(M, *by_mass)), "∂ ln det(ℳ+J) = tr(Υ∂M)",
-        "\\partial\\ln\\det(\\mathcal{M}+J) = \\operatorname{tr}(\\Upsilon\\,\\partial M)", no_hypothesis, "soa.md #32");
-  const Expression p = phi * M * V, e = unit(several);
-  const Expression outboard = function(force_cross, E.T() * V);
-  const Expression h = make_symbol(derivative_symbols()[direction_twist - first_derivative_symbol], source, {several}, source->structure().coordinate_names[several]);
-  state("slope of the kinetic energy", 0.5 * differentiate(V.T() * M * V, *along_several), -(h.T() * outboard * p),
-        "∂KE = -h*crf(E*V)p,  p = φMV", "\\partial KE = -h^*\\operatorname{crf}(\\mathcal{E}^*\\mathcal{V})p", constant_hinges, "soa.md #18");
-  const Expression alpha = phi.T() * (H.T() * qdd + a), f = phi * (M * alpha + b);
-  const Expression dV = phi.T() * function(motion_cross, E.T() * V) * H.T() * e;
-  const Expression dalpha = phi.T() * (function(motion_cross, E.T() * alpha) * H.T() * e - function(motion_cross, H.T() * qd) * dV);
-  state("derivative of inverse dynamics", differentiate(H * f, *along_several),
-        H * phi_tilde * function(momentum_cross_of, f) * H.T() * e +
-            H * phi * (M * dalpha + (mechanics(momentum_cross) + mechanics(V_bar) * M) * dV),
-        "∂T = Hφ̃𝓕H*e + Hφ(M∂α + (𝓑+V̄M)∂V)", "\\partial T = H\\tilde\\phi\\mathscr{F}H^*e + H\\phi(M\\partial\\alpha+(\\mathscr{B}+\\bar{\\mathcal{V}}M)\\partial\\mathcal{V})",
-        constant_hinges, "soa.md #25");
-  for (int k = 0; k < source->model()->bodies(); ++k) {
-    const auto& subhinges = source->model()->body(k).hinge.subhinges;
-    if (source->structure().parent[k] < 0 || subhinges.size() != 1 || subhinges[0].nv() < 3) continue;  // a root's turn changes no ℳ
-    const int first = source->structure().dof_offset[k];
-    const auto x = coordinate_direction(source, first), y = coordinate_direction(source, first + 1), z = coordinate_direction(source, first + 2);
-    state("quasi-derivatives do not commute", differentiate(differentiate(MM, *y), *x) - differentiate(differentiate(MM, *x), *y), differentiate(MM, *z),
-          "[∂_x, ∂_y]ℳ = ∂_zℳ about the axes of a ball or free hinge", "[\\partial_x,\\partial_y]\\mathcal{M} = \\partial_z\\mathcal{M}", no_hypothesis, "soa.md #37");
-    break;
-  }
-
-  group = "Calculus along time";
-  state("accelerations", dot(V), alpha, "dV/dt = φ*(H*θ̈ + a)", "\\dot{\\mathcal{V}} = \\phi^*(H^*\\ddot\\theta+\\mathfrak{a})", no_hypothesis, "soa.md #11");
-  state("forces as rates of momentum", dot(p) + mechanics(V_bar) * p, f, "ṗ + V̄p = f,  p = φMV", "\\dot p + \\bar{\\mathcal{V}}p = f", no_hypothesis, "soa.md #16");
-  state("Hamiltonian form", dot(MM * qd), H * f + mechanics(H_dot) * p - H * mechanics(V_bar) * p, "d(ℳθ̇)/dt = T + Ḣp - HV̄p",
-        "\\tfrac{d}{dt}(\\mathcal{M}\\dot\\theta) = T + \\dot Hp - H\\bar{\\mathcal{V}}p", no_hypothesis, "soa.md #17");
-  const Expression jacobian = phi.T() * H.T(), J_dot = dot(jacobian);
-  state("rate of the body Jacobian", J_dot, phi.T() * (mechanics(Delta_theta_dot).T() * phi_tilde.T() * H.T() + mechanics(H_dot).T()),
-        "d(φ*H*)/dt = φ*(Δ_θ̇*φ̃*H* + Ḣ*)", "\\tfrac{d}{dt}(\\phi^*H^*) = \\phi^*(\\Delta_{\\dot\\theta}^*\\tilde\\phi^*H^*+\\dot H^*)");
-  const Expression C = H * phi * (M * J_dot + 0.5 * (mechanics(momentum_cross) + mechanics(V_bar) * M + M * mechanics(V_tilde)) * jacobian);
-  state("ℳ̇ - 2C is skew, ℳ̇ by rule", dot(MM) - 2.0 * C, -(dot(MM) - 2.0 * C).T(), "ℳ̇ - 2C = -(ℳ̇ - 2C)*,  ℳ̇ = d(HφMφ*H*)/dt",
-        "\\dot{\\mathcal{M}} - 2C = -(\\dot{\\mathcal{M}} - 2C)^*", no_hypothesis, "soa.md #21");
-  // a coordinate outboard of `many` where there is one
-  int k = many, body = 0;
-  while (source->structure().dof_offset[body + 1] <= many) ++body;
-  for (int c = 0; c < source->structure().bodies(); ++c)
-    if (source->structure().parent[c] == body && source->structure().dof[c] > 0) k = source->structure().dof_offset[c];
-  const auto along_k = coordinate_direction(source, k);
-  state("C is the Christoffel matrix", unit(k).T() * C * unit(many),
-        0.5 * (unit(k).T() * dot(MM) * unit(many) + unit(k).T() * differentiate(MM, *along_many) * qd - unit(many).T() * differentiate(MM, *along_k) * qd), "C(k,i) = ½ Σ_j (∂_jℳ(k,i) + ∂_iℳ(k,j) - ∂_kℳ(i,j)) θ̇_j",
-        "C_{ki} = \\tfrac12\\sum_j(\\partial_j\\mathcal{M}_{ki}+\\partial_i\\mathcal{M}_{kj}-\\partial_k\\mathcal{M}_{ij})\\dot\\theta_j", single_dof, "soa.md #22");
-  const Expression m = A * square_root(D), inverse_m = square_root(D).inv() * S, skew = inverse_m * C * inverse_m.T() - dot(m).T() * inverse_m.T();
-  state("diagonalised dynamics: S is skew", skew, -skew.T(), "S = m⁻¹Cm⁻* - ṁ*m⁻* = -S*,  m = [I+HφK]D^½",
-        "S = m^{-1}Cm^{-*}-\\dot m^*m^{-*} = -S^*,\\quad m = [I+H\\phi\\mathcal{K}]\\mathcal{D}^{1/2}", no_hypothesis, "soa.md #23");
-  state("diagonalised dynamics", dot(m.T() * qd) + skew * m.T() * qd, inverse_m * (H * f + J * qdd), "η̇ + Sη = m⁻¹T,  η = m*θ̇", "\\dot\\eta + S\\eta = m^{-1}T,\\quad \\eta = m^*\\dot\\theta",
-        no_hypothesis, "soa.md #24");
-
-  group = "World frame, calculus";
-  const Letters w(std::make_shared<WorldFrame>(source));
-  const Expression X = mechanics(X_world);
-  state("∂M'", d(w.M), d(X * M * X.T()), "∂M' = Δ'M' + M'Δ'*  of  M' = XMX*", "\\partial M' = \\Delta'M'+M'\\Delta'^*", no_hypothesis, "soa.md #53");
-  state("∂H'", d(w.H), d(H * X.inv()), "∂H' = ∂(HX⁻¹)", "\\partial H' = \\partial(HX^{-1})", no_hypothesis, "soa.md #53");
-  state("∂P' and ∂P", d(w.P), X * differentiate_in_world(P, *along_i) * X.T(), "∂P' = X(∂P + ΔP + PΔ*)X*", "\\partial P' = X(\\partial P+\\hat\\Delta P+P\\hat\\Delta^*)X^*",
-        no_hypothesis, "soa.md #54");
-  return list;
+  if (source->nv() == 0) return {};
+  CalculusTheorems all(source);
+  all.mass_matrix_along_a_coordinate();
+  all.operators_along_a_coordinate();
+  all.log_determinant();
+  all.motion_along_a_coordinate();
+  all.quasi_derivatives();
+  all.rates();
+  all.coriolis_matrix();
+  all.diagonalised_dynamics();
+  all.world_frame();
+  return std::move(all.list);
 }
 
 }  // namespace pycraft

@@ -6,7 +6,9 @@
 #include "algebra/language/display.h"
 #include "algebra/language/lower.h"
 #include "algebra/theorems/theorems.h"
+#include "operators/alphabet.h"
 #include "operators/grouped_operators.h"
+#include "operators/inverse_tangent.h"
 #include "runtime/errors.h"
 
 namespace pycraft {
@@ -14,21 +16,23 @@ namespace pycraft {
 const std::vector<SymbolDefinition>& derivative_symbols() {
   using S = SpaceKind;
   using enum Pattern;
+  using enum SymbolId;
   static const std::vector<SymbolDefinition> table = {
-      {inertia_derivative, "dM", "∂M", "\\partial M", "derivative of M by mass properties of one body", S::V, S::F, block_diagonal, true},
-      {coordinate_selection, "Pi", "Π", "\\Pi", "some coordinates: ones on the diagonal", S::Theta, S::Theta, block_diagonal, true},
-      {direction_twist, "h", "h", "h", "the twist of a direction, in the axes of its body", S::Euclidean, S::V, vector},
+      {inertia_derivative, "dM", "∂M", "\\partial M", "derivative of M by mass properties of one body", S::V, S::F, block_diagonal, {.symmetric = true, .takes = Takes::inertia}},
+      {coordinate_selection, "Pi", "Π", "\\Pi", "some coordinates: ones on the diagonal", S::Theta, S::Theta, block_diagonal, {.symmetric = true, .takes = Takes::selection}},
+      {direction_twist, "h", "h", "h", "the twist of a direction, in the axes of its body", S::Euclidean, S::V, vector, {.takes = Takes::place}},
       {motion_cross, "crm", "crm", "\\operatorname{crm}", "motion cross product with a vector", S::V, S::V, function},
       {force_cross, "crf", "crf", "\\operatorname{crf}", "force cross product with a vector", S::F, S::F, function},
       {momentum_cross_of, "mcross", "mcross", "\\operatorname{mcross}", "-[[ñ, f̃], [f̃, 0]] of a vector (n; f)", S::V, S::F, function},
+      {inverse_tangent, "dMM_inv", "∂(ℳ+J)⁻¹", "\\partial(\\mathcal{M}+J)^{-1}", "derivative of the inverse mass matrix", S::Theta, S::Theta, compound,
+       {.symmetric = true, .groups = Group::kinematics | Group::articulated, .takes = Takes::direction, .expand = expand_inverse_tangent, .tangent_of_inverse = true}},
   };
   return table;
 }
 
 namespace {
 
-const SymbolDefinition& definition(DerivativeSymbolId id) { return derivative_symbols()[id - first_derivative_symbol]; }
-const SymbolDefinition& definition(MechanicsSymbolId id) { return mechanics_symbols()[static_cast<int>(id) - static_cast<int>(first_extra)]; }
+using enum SymbolId;
 
 bool is_zero(const Expression& e) { return e.kind() == NodeKind::zero; }
 Expression times(const std::vector<Expression>& f) { return lowered_product(f, f.back().domain(), f.front().codomain()); }
@@ -45,31 +49,34 @@ struct MechanicsLetters {
       : source(s), robot(std::move(r)), binding(b), grouped(source != robot), o(s, b) {}
 
   // Of the robot's bodies, one by one: H, φ; and φ_S, which they are carried by within a group.
-  Expression own_H() const { return grouped ? bound(make_symbol(grouped_symbols()[1], source)) : o.H; }
+  Expression own_H() const { return grouped ? bound(make_symbol(definition_of(SymbolId::inner_H), source)) : o.H; }
   Expression own_phi() const { return grouped ? times({inner(), o.phi}) : o.phi; }
-  Expression inner() const { return grouped ? bound(make_symbol(grouped_symbols()[0], source)) : identity(o.M.codomain()); }
+  Expression inner() const { return grouped ? bound(make_symbol(definition_of(SymbolId::inner_phi), source)) : identity(o.M.codomain()); }
 
   Expression bound(const Expression& e) const { return binding ? e.at(binding) : e; }
-  Expression letter(MechanicsSymbolId id) const { return bound(make_symbol(definition(id), source)); }
-  Expression delta(const std::vector<int>& direction) const { return bound(make_symbol(definition(Delta), source, direction, text(direction))); }
-  Expression twist(const std::vector<int>& direction) const { return bound(make_symbol(definition(direction_twist), source, direction, text(direction))); }
-  Expression selection(const std::vector<int>& which) const { return bound(make_symbol(definition(coordinate_selection), source, which, selection_text(which))); }
-  Expression crm(const Expression& x) const { return function(motion_cross, x); }
-  Expression crf(const Expression& x) const { return function(force_cross, x); }
-  Expression function(DerivativeSymbolId id, const Expression& x) const {
-    const SymbolDefinition& d = definition(id);
+  Expression letter(SymbolId id) const { return bound(make_symbol(definition_of(id), source)); }
+  Expression delta(const TwistPlace& at) const { return bound(make_symbol(definition_of(SymbolId::Delta), source, as_arguments(at), text(at))); }
+  Expression twist(const TwistPlace& at) const { return bound(make_symbol(definition_of(SymbolId::direction_twist), source, as_arguments(at), text(at))); }
+  Expression selection(const OfSubhinges& of) const {
+    const std::string range = std::to_string(of.from) + ":" + (of.to > 5 ? std::string() : std::to_string(of.to));
+    return selected(of, of.body < 0 ? range : robot->structure().hinge_names[of.body] + "[" + range + "]");
+  }
+  Expression selection(const OfCoordinate& of) const { return selected(of, robot->structure().coordinate_names[of.coordinate]); }
+  Expression selected(SymbolArguments which, std::string shown) const {
+    return bound(make_symbol(definition_of(SymbolId::coordinate_selection), source, std::move(which), std::move(shown)));
+  }
+  Expression crm(const Expression& x) const { return function(SymbolId::motion_cross, x); }
+  Expression crf(const Expression& x) const { return function(SymbolId::force_cross, x); }
+  Expression function(SymbolId id, const Expression& x) const {
+    const SymbolDefinition& d = definition_of(id);
     return is_zero(x) ? zero(source->space(d.domain, {}), source->space(d.codomain, {})) : block_function(d, source, binding, x);
   }
 
-  std::string text(const std::vector<int>& direction) const {
-    if (direction.size() == 1) return robot->structure().coordinate_names[direction[0]];
+  std::string text(const TwistPlace& at) const {
+    if (const auto* of = std::get_if<OfCoordinate>(&at)) return robot->structure().coordinate_names[of->coordinate];
     static const char* components[] = {"rx", "ry", "rz", "x", "y", "z"};
-    return robot->structure().hinge_names[direction[0]] + "@" + std::to_string(direction[1]) + "." + components[direction[2]];
-  }
-  std::string selection_text(const std::vector<int>& which) const {
-    if (which.size() == 1) return robot->structure().coordinate_names[which[0]];
-    const std::string range = std::to_string(which[1]) + ":" + (which[2] > 5 ? std::string() : std::to_string(which[2]));
-    return which[0] < 0 ? range : robot->structure().hinge_names[which[0]] + "[" + range + "]";
+    const OfTwist& of = std::get<OfTwist>(at);
+    return robot->structure().hinge_names[of.body] + "@" + std::to_string(of.position) + "." + components[of.component];
   }
 };
 
@@ -98,17 +105,17 @@ struct Place {
   int body;
   double slot;  // coordinates of subhinge s: s; a twist before subhinge p: p - 1/2
 };
-Place place_of(const MultibodyOperators& source, const std::vector<int>& direction) {
-  if (direction.size() == 3) return {direction[0], direction[1] - 0.5};
-  const int k = body_of_coordinate(source.structure(), direction[0]);
-  return {k, static_cast<double>(subhinge_of_coordinate(source, k, direction[0]))};
+Place place_of(const MultibodyOperators& source, const TwistPlace& at) {
+  if (const auto* of = std::get_if<OfTwist>(&at)) return {of->body, of->position - 0.5};
+  const int coordinate = std::get<OfCoordinate>(at).coordinate, k = body_of_coordinate(source.structure(), coordinate);
+  return {k, static_cast<double>(subhinge_of_coordinate(source, k, coordinate))};
 }
 
 // Ḣ of the robot's bodies, one by one.
 Expression own_H_dot(const MechanicsLetters& l) {
   std::vector<Expression> terms = {zero(l.o.H.domain(), l.o.H.codomain())};
   for (int p = 1; p < most_subhinges(*l.robot); ++p)
-    terms.push_back(times({l.selection({-1, 0, p}), l.own_H(), l.crf(times({l.own_H().T(), l.selection({-1, p, p + 1}), l.letter(theta_dot)}))}));
+    terms.push_back(times({l.selection(OfSubhinges{-1, 0, p}), l.own_H(), l.crf(times({l.own_H().T(), l.selection(OfSubhinges{-1, p, p + 1}), l.letter(theta_dot)}))}));
   return plus(terms);
 }
 
@@ -125,7 +132,7 @@ class MechanicsDirection : public Direction {
 
   Expression block_tangent(const Symbol& s) const override {
     const MechanicsLetters l = letters(s);
-    const SymbolId id = static_cast<SymbolId>(s.definition->id);
+    const SymbolId id = s.definition->id;
     if (s.source == source_) return tangent_of_block(l, id);
     if (l.grouped) {  // H = H_S φ_S, ∂φ_S = (φ_S - I) Δ φ_S
       if (id != SymbolId::H) return tangent_of_block(l, id);
@@ -149,17 +156,17 @@ class MechanicsDirection : public Direction {
   Expression tangent(const Expression& e, Differentiator& rules) const override {
     const MechanicsLetters l = letters(e.node().symbol);
     if (e.kind() == NodeKind::block_function)
-      return l.function(static_cast<DerivativeSymbolId>(e.node().symbol.definition->id), rules(e.children()[0]));
+      return l.function(e.node().symbol.definition->id, rules(e.children()[0]));
     const Symbol& s = e.node().symbol;
     const Expression theta = l.letter(theta_dot), relative = times({l.own_H().T(), theta}), V = times({l.o.phi.T(), l.o.H.T(), theta});
     switch (s.definition->id) {
-      case Delta: return moved(l, l.delta(s.arguments), s.arguments);
-      case direction_twist: return moved_twist(l, l.twist(s.arguments), s.arguments);
+      case Delta: return moved(l, l.delta(place_in(s.arguments)), place_in(s.arguments));
+      case direction_twist: return moved_twist(l, l.twist(place_in(s.arguments)), place_in(s.arguments));
       case Delta_theta_dot: return l.crf(rules(relative));
       case V_tilde: return l.crm(rules(V));
       case V_bar: return l.crf(rules(V));
       case momentum_cross: return l.function(momentum_cross_of, rules(times({l.o.M, V})));
-      case MechanicsSymbolId::X_world: return times({l.letter(X_world), frame_motion(s)});
+      case SymbolId::X_world: return times({l.letter(X_world), frame_motion(s)});
       case H_dot: {
         if (!l.grouped) return rules(own_H_dot(l));
         const Expression turned = times({l.letter(Delta_theta_dot), l.inner()});
@@ -193,7 +200,7 @@ class MechanicsDirection : public Direction {
   virtual Expression body_edge_factor(const MechanicsLetters& l) const = 0;
   virtual Expression tangent_of_block(const MechanicsLetters& l, SymbolId id) const = 0;
   // ∂Δ_a = Δ_a W - W Δ_a and ∂h_a = W* h_a, W what moves outboard of a in its hinge.
-  virtual Expression outboard_motion(const MechanicsLetters& l, const std::vector<int>& direction) const = 0;
+  virtual Expression outboard_motion(const MechanicsLetters& l, const TwistPlace& direction) const = 0;
   virtual Expression velocity_tangent(const MechanicsLetters&, const Expression& e) const { return zero(e.domain(), e.codomain()); }
   virtual Expression inertia_tangent(const MechanicsLetters&, const Symbol& s) const { return zero(s.source->motions(), s.source->forces()); }
   // crf of what moves a body relative to its parent, roots included.
@@ -209,11 +216,11 @@ class MechanicsDirection : public Direction {
   std::shared_ptr<MultibodyOperators> source_;
 
  private:
-  Expression moved(const MechanicsLetters& l, const Expression& delta, const std::vector<int>& direction) const {
+  Expression moved(const MechanicsLetters& l, const Expression& delta, const TwistPlace& direction) const {
     const Expression W = outboard_motion(l, direction);
     return plus({times({delta, W}), times({-1.0 * identity(W.codomain()), W, delta})});
   }
-  Expression moved_twist(const MechanicsLetters& l, const Expression& twist, const std::vector<int>& direction) const {
+  Expression moved_twist(const MechanicsLetters& l, const Expression& twist, const TwistPlace& direction) const {
     const Expression W = outboard_motion(l, direction);
     return is_zero(W) ? zero(twist.domain(), twist.codomain()) : times({W.T(), twist});
   }
@@ -251,11 +258,11 @@ class TwistDirection : public MechanicsDirection {
     for (const auto& [c, direction] : twists_) {
       const Place at = place_of(*source_, direction);
       const int before = static_cast<int>(std::ceil(at.slot));  // subhinges inboard of it
-      if (before > 0) terms.push_back(times({c * l.selection({at.body, 0, before}), l.own_H(), l.delta(direction)}));
+      if (before > 0) terms.push_back(times({c * l.selection(OfSubhinges{at.body, 0, before}), l.own_H(), l.delta(direction)}));
     }
     return plus(terms);
   }
-  Expression outboard_motion(const MechanicsLetters& l, const std::vector<int>& direction) const override {
+  Expression outboard_motion(const MechanicsLetters& l, const TwistPlace& direction) const override {
     const Place own = place_of(*source_, direction);
     std::vector<Expression> terms = {zero(l.o.M.codomain(), l.o.M.codomain())};
     for (const auto& [c, other] : twists_) {
@@ -285,11 +292,11 @@ class TimeDirection final : public MechanicsDirection {
     if (id == SymbolId::H) return most_subhinges(*source_) > 1 ? (l.grouped ? own_H_dot(l) : l.letter(H_dot)) : zero(l.o.H.domain(), l.o.H.codomain());
     return id == SymbolId::M ? zero(l.o.M.domain(), l.o.M.codomain()) : zero(l.o.J.domain(), l.o.J.codomain());
   }
-  Expression outboard_motion(const MechanicsLetters& l, const std::vector<int>& direction) const override {
+  Expression outboard_motion(const MechanicsLetters& l, const TwistPlace& direction) const override {
     const Place own = place_of(*source_, direction);
     const int from = static_cast<int>(std::floor(own.slot)) + 1, count = static_cast<int>(source_->model()->body(own.body).hinge.subhinges.size());
     if (from >= count) return zero(l.o.M.codomain(), l.o.M.codomain());
-    return l.crf(times({l.own_H().T(), l.selection({own.body, from, count}), l.letter(theta_dot)}));
+    return l.crf(times({l.own_H().T(), l.selection(OfSubhinges{own.body, from, count}), l.letter(theta_dot)}));
   }
   Expression velocity_tangent(const MechanicsLetters&, const Expression&) const override {
     if (!vdot_) throw EvaluationError("the time derivative of what depends on v needs the accelerations: .dot(vdot=...)");
@@ -303,43 +310,45 @@ class TimeDirection final : public MechanicsDirection {
 // Mass properties and rotor inertias: nothing moves but M or J.
 class InertiaDirection final : public MechanicsDirection {
  public:
-  InertiaDirection(std::shared_ptr<MultibodyOperators> source, int body, int parameter, int rotor)
+  InertiaDirection(std::shared_ptr<MultibodyOperators> source, int body, InertiaParameter parameter, int rotor)
       : MechanicsDirection(std::move(source)), body_(body), parameter_(parameter), rotor_(rotor) {}
   Expression frame_motion(const Symbol& like) const override { return nothing(letters(like)); }
 
  protected:
   Expression body_edge_factor(const MechanicsLetters& l) const override { return nothing(l); }
   Expression root_motion(const MechanicsLetters& l) const override { return nothing(l); }
-  Expression outboard_motion(const MechanicsLetters& l, const std::vector<int>&) const override { return nothing(l); }
+  Expression outboard_motion(const MechanicsLetters& l, const TwistPlace&) const override { return nothing(l); }
   Expression tangent_of_block(const MechanicsLetters& l, SymbolId id) const override {
-    if (id == SymbolId::M && rotor_ < 0) return derivative(l, {body_, parameter_});
-    if (id == SymbolId::J && rotor_ >= 0) return l.selection({rotor_});
+    if (id == SymbolId::M && rotor_ < 0) return derivative(l, OfInertia{body_, {parameter_}});
+    if (id == SymbolId::J && rotor_ >= 0) return l.selection(OfCoordinate{rotor_});
     const Expression letter = id == SymbolId::H ? l.o.H : id == SymbolId::M ? l.o.M : l.o.J;
     return zero(letter.domain(), letter.codomain());
   }
   Expression inertia_tangent(const MechanicsLetters& l, const Symbol& s) const override {
-    if (rotor_ >= 0 || s.arguments[0] != body_) return zero(l.o.M.domain(), l.o.M.codomain());
-    std::vector<int> arguments = s.arguments;
-    arguments.push_back(parameter_);
-    std::sort(arguments.begin() + 1, arguments.end());
-    return derivative(l, arguments);
+    OfInertia of = std::get<OfInertia>(s.arguments);
+    if (rotor_ >= 0 || of.body != body_) return zero(l.o.M.domain(), l.o.M.codomain());
+    of.parameters.push_back(parameter_);
+    std::sort(of.parameters.begin(), of.parameters.end());
+    return derivative(l, of);
   }
 
  private:
   static Expression nothing(const MechanicsLetters& l) { return zero(l.o.M.codomain(), l.o.M.codomain()); }
-  Expression derivative(const MechanicsLetters& l, const std::vector<int>& arguments) const {
+  Expression derivative(const MechanicsLetters& l, const OfInertia& of) const {
     static const char* names[] = {"mass", "com_x", "com_y", "com_z", "I_xx", "I_xy", "I_xz", "I_yy", "I_yz", "I_zz"};
     int masses = 0, coms = 0, entries = 0;
-    std::string text = source_->structure().body_names[arguments[0]];
-    for (size_t i = 1; i < arguments.size(); ++i) {
-      (arguments[i] == mass_of_body ? masses : arguments[i] <= com_z ? coms : entries) += 1;
-      text += std::string(i == 1 ? "." : ",") + names[arguments[i]];
+    std::string text = source_->structure().body_names[of.body];
+    for (const InertiaParameter& p : of.parameters) {
+      (p == InertiaParameter::mass ? masses : p <= InertiaParameter::com_z ? coms : entries) += 1;
+      text += std::string(&p == &of.parameters[0] ? "." : ",") + names[static_cast<int>(p)];
     }
     // M is linear in the mass and the inertia about the centre of mass, and quadratic in the centre of mass.
     if (masses > 1 || coms > 2 || entries > 1 || (entries && masses + coms)) return zero(l.o.M.domain(), l.o.M.codomain());
-    return l.bound(make_symbol(definition(inertia_derivative), l.source, arguments, text));
+    return l.bound(make_symbol(definition_of(SymbolId::inertia_derivative), l.source, of, text));
   }
-  int body_, parameter_, rotor_;
+  int body_;
+  InertiaParameter parameter_;
+  int rotor_;
 };
 
 }  // namespace
@@ -348,7 +357,7 @@ std::unique_ptr<Direction> twist_direction(const std::shared_ptr<MultibodyOperat
   return std::make_unique<TwistDirection>(source, std::move(twists));
 }
 
-int coordinates_before(const MultibodyOperators& source, const std::vector<int>& twist) {
+int coordinates_before(const MultibodyOperators& source, const TwistPlace& twist) {
   const Place at = place_of(source, twist);
   int count = 0, subhinge = 0;
   for (const Subhinge& h : source.model()->body(at.body).hinge.subhinges) {
@@ -360,7 +369,7 @@ int coordinates_before(const MultibodyOperators& source, const std::vector<int>&
 std::unique_ptr<Direction> coordinate_direction(const std::shared_ptr<MultibodyOperators>& source, int coordinate) {
   if (coordinate < 0 || coordinate >= source->nv())
     throw ModelError("coordinate " + std::to_string(coordinate) + " of '" + source->name() + "', which has " + std::to_string(source->nv()));
-  return twist_direction(source, {{1.0, {coordinate}}});
+  return twist_direction(source, {{1.0, OfCoordinate{coordinate}}});
 }
 
 std::unique_ptr<Direction> time_direction(const std::shared_ptr<MultibodyOperators>& source, const Expression& vdot) {
@@ -375,7 +384,7 @@ std::unique_ptr<Direction> parameter_direction(const Parameter& p) {
   Twists twists;
   for (const InsertedTwist& t : p.twists)
     for (int c = 0; c < 6; ++c)
-      if (t.twist[c] != 0) twists.push_back({t.twist[c], {t.body, t.position, c}});
+      if (t.twist[c] != 0) twists.emplace_back(t.twist[c], OfTwist{t.body, t.position, c});
   return twist_direction(p.source, std::move(twists));
 }
 

@@ -20,20 +20,8 @@
 
 namespace pycraft {
 
-// Symbols that only derivatives bring up.
-enum DerivativeSymbolId : int {
-  first_derivative_symbol = first_extra + 100,
-  inertia_derivative = first_derivative_symbol,  // arguments: body, parameters (see InertiaParameter)
-  coordinate_selection,                          // Π, diagonal of ones; arguments: body (-1: all), subhinges from, to; or one coordinate
-  direction_twist,                               // the twist of a direction in the axes of its body; arguments as Delta's
-  motion_cross,                                  // functions of a vector: crm(x), crf(x), and -[[ñ, f̃], [f̃, 0]] of x = (n; f)
-  force_cross,
-  momentum_cross_of,
-  inverse_tangent                                // ∂(ℳ + J)⁻¹ in plans: operators/inverse_tangent.h
-};
+// Records of the letters that only derivatives bring up.
 const std::vector<SymbolDefinition>& derivative_symbols();
-
-enum InertiaParameter : int { mass_of_body, com_x, com_y, com_z, inertia_xx, inertia_xy, inertia_xz, inertia_yy, inertia_yz, inertia_zz };
 
 // A twist fixed in hinge `body` before its subhinge `position`, six numbers, angular first.
 struct InsertedTwist {
@@ -47,12 +35,10 @@ struct Parameter {
   std::string name;
   std::vector<InsertedTwist> twists;   // placement, axis, point
   int inertia_body = -1;               // mass properties
-  InertiaParameter inertia = mass_of_body;
+  InertiaParameter inertia = InertiaParameter::mass;
   int rotor = -1;                      // coordinate
 };
 
-// Twists (Delta's arguments) and how much of each.
-using Twists = std::vector<std::pair<double, std::vector<int>>>;
 std::unique_ptr<Direction> twist_direction(const std::shared_ptr<MultibodyOperators>& source, Twists twists);
 std::unique_ptr<Direction> coordinate_direction(const std::shared_ptr<MultibodyOperators>& source, int coordinate);
 // vdot: a vector of Θ; empty: refused where it is needed.
@@ -60,7 +46,7 @@ std::unique_ptr<Direction> time_direction(const std::shared_ptr<MultibodyOperato
 std::unique_ptr<Direction> parameter_direction(const Parameter& parameter);
 
 // The coordinates of a hinge inboard of where a twist stands: these rows of H move with it.
-int coordinates_before(const MultibodyOperators& source, const std::vector<int>& twist);
+int coordinates_before(const MultibodyOperators& source, const TwistPlace& twist);
 
 // Theorems of the calculus.
 std::vector<Theorem> calculus_theorems(const std::shared_ptr<MultibodyOperators>& source);

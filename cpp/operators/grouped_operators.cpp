@@ -4,6 +4,7 @@
 
 #include "algebra/trees/mixed_blocks.h"
 #include "algebra/trees/reordered_values.h"
+#include "operators/alphabet.h"
 #include "operators/directions.h"
 #include "operators/rigid_values.h"
 #include "runtime/errors.h"
@@ -12,13 +13,15 @@ namespace pycraft {
 
 const std::vector<SymbolDefinition>& grouped_symbols() {
   static const std::vector<SymbolDefinition> table = {
-      {inner_phi, "phi_S", "φ_S", "\\phi_S", "φ within each group of bodies, (I-E_S)⁻¹", SpaceKind::F, SpaceKind::F, Pattern::block_diagonal},
-      {inner_H, "H_S", "H_S", "H_S", "hinge maps of the bodies of each group: H = H_S φ_S", SpaceKind::F, SpaceKind::Theta, Pattern::block_diagonal},
+      {SymbolId::inner_phi, "phi_S", "φ_S", "\\phi_S", "φ within each group of bodies, (I-E_S)⁻¹", SpaceKind::F, SpaceKind::F, Pattern::block_diagonal},
+      {SymbolId::inner_H, "H_S", "H_S", "H_S", "hinge maps of the bodies of each group: H = H_S φ_S", SpaceKind::F, SpaceKind::Theta, Pattern::block_diagonal},
   };
   return table;
 }
 
 namespace {
+
+using enum SymbolId;
 
 std::vector<char> single_groups(const Grouping& grouping) {
   std::vector<char> single;
@@ -45,7 +48,7 @@ class GroupedValues final : public ReorderedValues<MixedBlocks<RigidBlocks<S>>> 
       case H_dot: return block_of_H_dot(symbol, g, out);
       default: break;
     }
-    if (d.id < first_extra) return Base::block(symbol, g, out);
+    if (d.kind() == LetterKind::sko) return Base::block(symbol, g, out);
     along_diagonal(g, d.domain, d.codomain, [&](int k, S* own) { base_.block(symbol, k, own); }, out, &symbol);
   }
   void function_block(const Symbol& function, int g, const S* x, S* out) const override {
@@ -125,7 +128,8 @@ class GroupedValues final : public ReorderedValues<MixedBlocks<RigidBlocks<S>>> 
   int rows_of(SpaceKind kind, int k, const Symbol* symbol = nullptr) const {
     if (kind != SpaceKind::NodesF) return kind == SpaceKind::Theta ? robot_.dof[k] : robot_.size[k];
     const Multibody& model = source_.model();
-    return 6 * static_cast<int>(std::count_if(symbol->arguments.begin(), symbol->arguments.end(),
+    const std::vector<int>& of = std::get<OfNodes>(symbol->arguments).nodes;
+    return 6 * static_cast<int>(std::count_if(of.begin(), of.end(),
                                               [&](int node) { return (node >= 0 ? model.node(node).body : -1 - node) == k; }));
   }
   // Ḣ_S φ_S + (H_C - H_S) Δ_θ̇ φ_S
@@ -133,7 +137,7 @@ class GroupedValues final : public ReorderedValues<MixedBlocks<RigidBlocks<S>>> 
     const int s = this->tree_.size[g], n = this->tree_.dof[g];
     std::vector<S> rate(size_t(n) * s), delta(size_t(s) * s), whole(size_t(n) * s);
     along_diagonal(g, SpaceKind::F, SpaceKind::Theta, [&](int k, S* own) { base_.block(symbol, k, own); }, rate.data());
-    const Symbol turning{&mechanics_symbols()[static_cast<int>(Delta_theta_dot) - static_cast<int>(first_extra)], nullptr, nullptr, {}, {}};
+    const Symbol turning{&definition_of(Delta_theta_dot), nullptr, nullptr, {}, {}};
     along_diagonal(g, SpaceKind::F, SpaceKind::F, [&](int k, S* own) { base_.block(turning, k, own); }, delta.data());
     this->blocks_.block(SymbolId::H, g, whole.data());
     for (size_t i = 0; i < whole.size(); ++i) whole[i] -= H_[g][i];
@@ -173,9 +177,9 @@ BlockCosts GroupedOperators::costs(int g) const {
   return own;
 }
 
-Space GroupedOperators::space(SpaceKind kind, const std::vector<int>& nodes) const {
-  if (kind != SpaceKind::NodesV && kind != SpaceKind::NodesF) return SkoSource::space(kind, nodes);
-  return Space(kind, cut_into_groups(base_->space(kind, nodes).layout(), grouping_.groups, this));
+Space GroupedOperators::space(SpaceKind kind, const SymbolArguments& arguments) const {
+  if (kind != SpaceKind::NodesV && kind != SpaceKind::NodesF) return SkoSource::space(kind, arguments);
+  return Space(kind, cut_into_groups(base_->space(kind, arguments).layout(), grouping_.groups, this));
 }
 
 std::shared_ptr<GroupedOperators> grouped_operators(const std::shared_ptr<MultibodyOperators>& base, const std::vector<std::vector<std::string>>& groups) {

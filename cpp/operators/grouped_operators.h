@@ -16,12 +16,7 @@
 
 namespace pycraft {
 
-// What grouped bodies alone have.
-enum GroupedSymbolId : int {
-  first_grouped_symbol = first_extra + 200,
-  inner_phi = first_grouped_symbol,  // φ_S
-  inner_H                            // H_S
-};
+// Records of the letters that grouped bodies alone have.
 const std::vector<SymbolDefinition>& grouped_symbols();
 
 class GroupedOperators final : public DerivedOperators {
@@ -34,7 +29,7 @@ class GroupedOperators final : public DerivedOperators {
 
   Traits traits() const override;
   BlockCosts costs(int g) const override;
-  Space space(SpaceKind kind, const std::vector<int>& nodes) const override;
+  Space space(SpaceKind kind, const SymbolArguments& arguments) const override;
   PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_OVERRIDE_MAKE_VALUES)
 
  private:

@@ -1,9 +1,7 @@
 #include "operators/inverse_tangent.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <cstdint>
 
 #include "algebra/language/lower.h"
 #include "algebra/planning/planner.h"
@@ -11,46 +9,19 @@
 #include "algebra/theorems/theorems.h"
 #include "algebra/trees/sweeps/articulated_inertia.h"
 #include "algebra/trees/sweeps/mass_matrix.h"
+#include "operators/alphabet.h"
 #include "operators/rigid_values.h"
 
 namespace pycraft {
 
 namespace {
 
-// Arguments of the letter: 1 for time; else 0, and for each twist the two halves of its amount's bits, the length of its arguments, these.
-std::vector<int> arguments_of(const DirectionOfTangent& direction) {
-  std::vector<int> all = {direction.time ? 1 : 0};
-  for (const auto& [amount, twist] : direction.twists) {
-    const std::uint64_t bits = std::bit_cast<std::uint64_t>(amount);
-    all.push_back(static_cast<int>(static_cast<std::uint32_t>(bits >> 32)));
-    all.push_back(static_cast<int>(static_cast<std::uint32_t>(bits)));
-    all.push_back(static_cast<int>(twist.size()));
-    all.insert(all.end(), twist.begin(), twist.end());
-  }
-  return all;
-}
-
-std::unique_ptr<Direction> as_direction(const std::shared_ptr<MultibodyOperators>& source, const DirectionOfTangent& direction) {
+std::unique_ptr<Direction> as_direction(const std::shared_ptr<MultibodyOperators>& source, const OfDirection& direction) {
   return direction.time ? time_direction(source, {}) : twist_direction(source, direction.twists);
 }
 
-// What was typed: -(ℳ + J)⁻¹ ∂ℳ (ℳ + J)⁻¹, by the factors of the inverse.
-Expression expand_inverse_tangent(const Symbol& s) {
-  const Letters o(s.source, s.binding);
-  const Expression inverse = product_of(kernels_of(s).mass_matrix_inverse);
-  const auto direction = as_direction(std::dynamic_pointer_cast<MultibodyOperators>(s.source), direction_of_tangent(s));
-  return lower(-1.0 * (inverse * differentiate(o.H * o.phi * o.M * o.phi.T() * o.H.T(), *direction) * inverse), false);
-}
-
-const SymbolDefinition& inverse_tangent_symbol() {
-  static const SymbolDefinition definition = {inverse_tangent, "dMM_inv", "∂(ℳ+J)⁻¹", "\\partial(\\mathcal{M}+J)^{-1}", "derivative of the inverse mass matrix",
-                                              SpaceKind::Theta, SpaceKind::Theta, Pattern::compound, true, Group::kinematics | Group::articulated,
-                                              expand_inverse_tangent, true};
-  return definition;
-}
-
 const Symbol* delta_of(const Expression& e) {
-  return e.kind() == NodeKind::symbol && e.node().symbol.definition->id == MechanicsSymbolId::Delta ? &e.node().symbol : nullptr;
+  return e.kind() == NodeKind::symbol && e.node().symbol.definition->id == SymbolId::Delta ? &e.node().symbol : nullptr;
 }
 
 // Σ c Δ(twist), if e is such a sum.
@@ -60,7 +31,7 @@ std::optional<Twists> twists_of(const Expression& e) {
     const Scaled part = split_scalar(t);
     const Symbol* delta = delta_of(part.expression);
     if (!delta || !part.coefficient.is_double()) return std::nullopt;
-    twists.emplace_back(part.coefficient.nearest(), delta->arguments);
+    twists.emplace_back(part.coefficient.nearest(), place_in(delta->arguments));
   }
   return twists;
 }
@@ -73,50 +44,49 @@ Vector6<S> value(const Vector6<Tangent<S, 1>>& u) {
 }
 
 // Directions that the letters of a derivative speak of: time; what follows an E, which ∂E = E Σ c Δ says in full; single twists.
-std::vector<DirectionOfTangent> directions_in(const Expression& tangent) {
-  std::vector<DirectionOfTangent> found;
-  std::vector<std::vector<int>> single;
+std::vector<OfDirection> directions_in(const Expression& tangent) {
+  std::vector<OfDirection> found;
+  std::vector<TwistPlace> single;
   bool time = false;
   visit(tangent, [&](const Expression& e) {
     if (e.kind() == NodeKind::symbol) {
-      const int id = e.node().symbol.definition->id;
-      time |= id == MechanicsSymbolId::Delta_theta_dot || id == MechanicsSymbolId::H_dot;
-      if (const Symbol* delta = delta_of(e); delta && std::find(single.begin(), single.end(), delta->arguments) == single.end()) single.push_back(delta->arguments);
+      const SymbolId id = e.node().symbol.definition->id;
+      time |= id == SymbolId::Delta_theta_dot || id == SymbolId::H_dot;
+      if (const Symbol* delta = delta_of(e); delta && std::find(single.begin(), single.end(), place_in(delta->arguments)) == single.end())
+        single.push_back(place_in(delta->arguments));
     }
     if (e.kind() != NodeKind::product) return;
     for (size_t i = 0; i + 1 < e.children().size(); ++i)
       if (e.children()[i].is(SymbolId::E) && e.children()[i + 1].kind() == NodeKind::sum)
         if (auto twists = twists_of(e.children()[i + 1])) found.push_back({false, std::move(*twists)});
   });
-  for (std::vector<int>& twist : single) found.push_back({false, {{1.0, std::move(twist)}}});
-  if (time) found.insert(found.begin(), DirectionOfTangent{true, {}});
+  for (const TwistPlace& place : single) found.push_back({false, {{1.0, place}}});
+  if (time) found.insert(found.begin(), OfDirection{true, {}});
   return found;
 }
 
 }  // namespace
 
-DirectionOfTangent direction_of_tangent(const Symbol& letter) {
-  const std::vector<int>& all = letter.arguments;
-  DirectionOfTangent direction{all[0] == 1, {}};
-  for (size_t i = 1; i < all.size(); i += 3 + size_t(all[i + 2])) {
-    const std::uint64_t bits = std::uint64_t(static_cast<std::uint32_t>(all[i])) << 32 | static_cast<std::uint32_t>(all[i + 1]);
-    direction.twists.emplace_back(std::bit_cast<double>(bits), std::vector<int>(all.begin() + i + 3, all.begin() + i + 3 + all[i + 2]));
-  }
-  return direction;
+Expression expand_inverse_tangent(const Symbol& s) {
+  const Letters o(s.source, s.binding);
+  const Expression inverse = product_of(kernels_of(s).mass_matrix_inverse);
+  const auto direction = as_direction(std::dynamic_pointer_cast<MultibodyOperators>(s.source), std::get<OfDirection>(s.arguments));
+  return lower(-1.0 * (inverse * differentiate(o.H * o.phi * o.M * o.phi.T() * o.H.T(), *direction) * inverse), false);
 }
 
 bool tangent_of_inverse(const std::shared_ptr<MultibodyOperators>& source, const Expression& X, const Expression& tangent, Expression& letter, Expression& of_D) {
   // A fixed twist in the midst of a hinge may move its rows out of what they span here and nowhere beside it: there the sweep has no derivative.
-  const auto amid = [&](const std::pair<double, std::vector<int>>& twist) {
-    const int k = twist.second[0], before = twist.second.size() == 3 ? coordinates_before(*source, twist.second) : 0;
-    return before > 0 && before < source->structure().dof[k];
+  const auto amid = [&](const Twists::value_type& twist) {
+    const auto* of = std::get_if<OfTwist>(&twist.second);
+    const int before = of ? coordinates_before(*source, *of) : 0;
+    return before > 0 && before < source->structure().dof[of->body];
   };
-  for (const DirectionOfTangent& direction : directions_in(tangent)) {
+  for (const OfDirection& direction : directions_in(tangent)) {
     if (std::any_of(direction.twists.begin(), direction.twists.end(), amid)) continue;
     const auto along = as_direction(source, direction);
     if (lower(differentiate(X, *along), false) != tangent) continue;
     const Letters o(source, contexts(X)[0].binding);
-    letter = make_symbol(inverse_tangent_symbol(), source, arguments_of(direction), direction.time ? "time" : "a coordinate");
+    letter = make_symbol(definition_of(SymbolId::inverse_tangent), source, direction, direction.time ? "time" : "a coordinate");
     if (contexts(X)[0].binding) letter = letter.at(contexts(X)[0].binding);
     of_D = lower(differentiate(o.D, *along), false);
     return true;
@@ -125,14 +95,14 @@ bool tangent_of_inverse(const std::shared_ptr<MultibodyOperators>& source, const
 }
 
 template <class S>
-void RigidInverseTangent<S>::move(const RigidValues<S>& values, const S& amount, const std::vector<int>& twist) {
+void RigidInverseTangent<S>::move(const RigidValues<S>& values, const S& amount, const TwistPlace& place) {
   int k;
-  const Vector6<S> h = amount * values.twist(twist, k);
+  const Vector6<S> h = amount * values.twist(place, k);
   const auto add = [&](int body, const Matrix3<S>& turned, const Vector3<S>& shifted) {
     for (int i = 0; i < 9; ++i) blocks_.pose[body].R.m[i].d[0] += turned.m[i];
     for (int i = 0; i < 3; ++i) blocks_.pose[body].p[i].d[0] += shifted[i];
   };
-  const int first = tree_.dof_offset[k], last = first + coordinates_before(values.source(), twist);
+  const int first = tree_.dof_offset[k], last = first + coordinates_before(values.source(), place);
   if (first < last && last == tree_.dof_offset[k + 1]) {
     for (Vector6<T>& u : factors_[k].column) {
       const Vector6<S> moved = cross_force(h, value(u));
@@ -166,11 +136,8 @@ void RigidInverseTangent<S>::seed(const RigidValues<S>& values) {
   factors_ = model_.inertia_factors;
   blocks_.inertia_factors = &factors_;
   blocks_.form = Form::ud;  // reflections would pass over a row that is zero here and not beside it
-  for (const auto& [amount, twist] : direction_->twists) move(values, S(amount), twist);
-  for (int i = 0; direction_->time && i < tree_.coordinates(); ++i) {
-    coordinate_[0] = i;
-    move(values, values.v()[i], coordinate_);
-  }
+  for (const auto& [amount, place] : direction_->twists) move(values, S(amount), place);
+  for (int i = 0; direction_->time && i < tree_.coordinates(); ++i) move(values, values.v()[i], OfCoordinate{i});
 }
 
 template <class S>
@@ -178,7 +145,7 @@ bool RigidInverseTangent<S>::apply(const SkoValues<S>& values, const Symbol& let
   const size_t size = size_t(tree_.coordinates()) * columns;
   x_.assign(x, x + size);
   y_.resize(size), scratch_.resize(size_t(tree_.dimension()) * columns);
-  if (!direction_) direction_ = direction_of_tangent(letter);
+  if (!direction_) direction_ = std::get<OfDirection>(letter.arguments);
   seed(static_cast<const RigidValues<S>&>(values));
   articulated_inertia_tip_to_base(tree_, blocks_);
   mass_matrix_inverse_apply(tree_, blocks_, x_.data(), y_.data(), columns, scratch_.data());

@@ -24,12 +24,8 @@
 
 namespace pycraft {
 
-// The direction of a letter ∂(ℳ + J)⁻¹; no twists: time, along the velocities.
-struct DirectionOfTangent {
-  bool time = false;
-  Twists twists;
-};
-DirectionOfTangent direction_of_tangent(const Symbol& letter);
+// What the letter stands for: -(ℳ + J)⁻¹ ∂ℳ (ℳ + J)⁻¹, by the factors of the inverse.
+Expression expand_inverse_tangent(const Symbol& letter);
 
 // The letter for ∂(X⁻¹), X = HφMφ*H* (+ J), if `tangent` is ∂X along a direction found in its letters; and ∂D.
 bool tangent_of_inverse(const std::shared_ptr<MultibodyOperators>& source, const Expression& X, const Expression& tangent, Expression& letter, Expression& of_D);
@@ -46,15 +42,14 @@ class RigidInverseTangent final : public InverseTangent<S> {
  private:
   using T = Tangent<S, 1>;
   void seed(const RigidValues<S>& values);
-  void move(const RigidValues<S>& values, const S& amount, const std::vector<int>& twist);
+  void move(const RigidValues<S>& values, const S& amount, const TwistPlace& place);
 
   const SkoStructure& tree_;
   RigidBlocks<T> blocks_;
   std::shared_ptr<const CompiledModel<S>> compiled_;
   CompiledModel<T> model_;
   std::vector<InertiaFactors<T>> factors_;
-  std::optional<DirectionOfTangent> direction_;  // of the one letter that this serves
-  std::vector<int> coordinate_ = {0};
+  std::optional<OfDirection> direction_;  // of the one letter that this serves
   std::vector<T> x_, y_, scratch_;
 };
 

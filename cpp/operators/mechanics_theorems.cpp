@@ -5,137 +5,164 @@
 
 namespace pycraft {
 
-std::vector<Theorem> mechanics_theorems(const std::shared_ptr<MultibodyOperators>& source) {
-  const Letters letters(source);
-  const auto& [_, E, phi, phi_tilde, H, M, J, P, P_plus, D, G, K, tau, tau_bar, E_psi, psi, psi_tilde, R, Upsilon, Omega, I] = letters;
-  const auto mechanics = [&](MechanicsSymbolId id) { return mechanics_operator(id, source); };
-  const Expression S = I - H * psi * K, A = I + H * phi * K, MM = H * phi * M * phi.T() * H.T();
-  const Expression qd = mechanics(theta_dot), V = mechanics(velocity), a = mechanics(coriolis_acceleration), b = mechanics(gyroscopic_force);
-  const Expression qdd = make_vector("vdot", source->theta()), T = make_vector("T", source->theta());
-  std::vector<Theorem> list;
-  std::string group;
-  const auto state = [&](const std::string& name, Side lhs, Side rhs, unsigned hypotheses = no_hypothesis, const std::string& from = "Jain 2011") {
+using enum SymbolId;
+
+namespace {
+
+struct MechanicsTheorems : Statements {
+  using enum Hypothesis;
+  explicit MechanicsTheorems(const std::shared_ptr<MultibodyOperators>& of) : Statements(of), robot(of) {}
+
+  Expression mechanics(SymbolId id) const { return mechanics_operator(id, robot); }
+  void state(const std::string& name, Side lhs, Side rhs, Hypothesis hypotheses = no_hypothesis, const std::string& from = "Jain 2011") {
     list.push_back({name, group, std::move(lhs), std::move(rhs), hypotheses, from, Use::check});
-  };
-  const auto shown = [&](const std::string& text, const std::string& latex) {
-    list.back().text = text;
-    list.back().latex = latex;
-  };
-  const auto wait = [&](const std::string& name, const std::string& what, const std::string& from) {
+  }
+  void wait(const std::string& name, const std::string& what, const std::string& from) {
     list.push_back({name, group, number(0), number(0), no_hypothesis, from, Use::check});
     list.back().waiting = what;
-  };
+  }
 
-  group = "Equations of motion";
+  void equations_of_motion() {
+    group = "Equations of motion";
+    state("velocities", V, phi.T() * H.T() * qd);
+    state("Coriolis acceleration", a, mechanics(V_tilde) * H.T() * qd + mechanics(H_dot).T() * qd);
+    state("gyroscopic force", b, mechanics(V_bar) * M * V);
+    state("momentum_cross acts as V̄M", mechanics(momentum_cross) * V, mechanics(V_bar) * M * V);
+    state("equations of motion", torque, (MM + J) * qdd + bias);
+    shown("T = (ℳ+J) θ̈ + 𝒞", "T = (\\mathcal{M}+J)\\ddot\\theta + \\mathcal{C}");
+    const Expression z = psi * (K * torque + P * a + b), epsilon = torque - H * z, nu = D.inv() * epsilon;
+    state("forward dynamics", S.T() * nu - K.T() * psi.T() * a, qdd);
+    shown("[I-HψK]* ν - K*ψ* a = θ̈,  ν = D⁻¹(T - Hz),  z = ψ(KT + Pa + b)", "[I-H\\psi\\mathcal{K}]^*\\nu - \\mathcal{K}^*\\psi^*\\mathfrak{a} = \\ddot\\theta,\\quad \\nu = \\mathcal{D}^{-1}(T-Hz)");
+    state("accelerations by innovations", psi.T() * (H.T() * nu + a), alpha);
+    shown("ψ*(H*ν + a) = φ*(H*θ̈ + a)", "\\psi^*(H^*\\nu+\\mathfrak{a}) = \\phi^*(H^*\\ddot\\theta+\\mathfrak{a})");
+    state("interbody forces by innovations", P * (alpha - a) + z, f);
+    shown("P(α - a) + z = φ(Mα + b)", "P(\\alpha-\\mathfrak{a})+z = \\phi(M\\alpha+\\mathfrak{b})");
+    state("forces without hinge quantities", P_plus * E.T() * alpha + z + G * epsilon, f, no_hypothesis, "soa.md #13");
+    shown("P⁺E*α + z + Gε = f", "P^{+}\\mathcal{E}^*\\alpha + z + \\mathcal{G}\\epsilon = f");
+    state("accelerations by Ω", phi.T() * H.T() * (MM + J).inv() * torque + (I - Omega * M) * phi.T() * a - Omega * b, alpha, no_hypothesis, "soa.md #14");
+    shown("φ*H*(ℳ+J)⁻¹T + (I-ΩM)φ*a - Ωb = α", "\\phi^*H^*(\\mathcal{M}+J)^{-1}T + (I-\\Omega M)\\phi^*\\mathfrak{a} - \\Omega\\mathfrak{b} = \\alpha");
+  }
+
+  void innovations() {
+    group = "Innovations";
+    const Expression xi = A.T() * qd;
+    state("innovations velocity", xi, G.T() * V, no_hinge_diagonal, "soa.md #8");
+    state("kinetic energy", V.T() * M * V + qd.T() * J * qd, xi.T() * D * xi, no_hypothesis, "soa.md #9");
+    shown("V*MV + θ̇*Jθ̇ = ξ*Dξ", "\\mathcal{V}^*M\\mathcal{V} + \\dot\\theta^*J\\dot\\theta = \\xi^*\\mathcal{D}\\xi");
+    state("innovations form", T.T() * (MM + J).inv() * T, (S * T).T() * D.inv() * S * T, no_hypothesis, "soa.md #10");
+    shown("T*(ℳ+J)⁻¹T = ε*D⁻¹ε,  ε = [I-HψK]T", "T^*(\\mathcal{M}+J)^{-1}T = \\epsilon^*\\mathcal{D}^{-1}\\epsilon,\\quad \\epsilon=[I-H\\psi\\mathcal{K}]T");
+    state("composite momentum", H * phi * M * V, MM * qd, no_hypothesis, "soa.md #15");
+    if (robot->traits().free_root || std::count(robot->structure().parent.begin(), robot->structure().parent.end(), -1) == 1) {
+      std::vector<double> pick(size_t(6) * robot->structure().dimension(), 0.0);
+      for (int i = 0; i < 6; ++i) pick[size_t(i) * robot->structure().dimension() + i] = 1;
+      const Expression root = constant(std::move(pick), robot->forces(), Space::euclidean(6), "root");
+      state("momentum matrix about the root", root * phi * R * H.T(), root * phi * M * phi.T() * H.T(), no_hypothesis, "soa.md #19");
+      shown("[φRH*] = [φMφ*H*] in the root's rows", "[\\phi\\mathcal{R}H^*]_{\\text{root}} = [\\phi M\\phi^*H^*]_{\\text{root}}");
+    }
+  }
+
+  void coriolis_matrices() {
+    group = "Coriolis matrices";
+    const Expression J_dot = phi.T() * (mechanics(Delta_theta_dot).T() * phi_tilde.T() * H.T() + mechanics(H_dot).T());
+    const Expression jacobian = phi.T() * H.T();
+    const Expression C_skew = H * phi * (M * J_dot + mechanics(momentum_cross) * jacobian);
+    const Expression C_christoffel = H * phi * (M * J_dot + 0.5 * (mechanics(momentum_cross) + mechanics(V_bar) * M + M * mechanics(V_tilde)) * jacobian);
+    const Expression half = (mechanics(H_dot) * phi + H * phi_tilde * mechanics(Delta_theta_dot) * phi) * M * phi.T() * H.T();
+    const Expression rate = half + half.T();  // ℳ̇
+    state("C θ̇ is the Coriolis force", C_skew * qd, bias);
+    shown("C θ̇ = 𝒞,  C = Hφ(MJ̇ + 𝓑J)", "C\\dot\\theta = \\mathcal{C},\\quad C = H\\phi(M\\dot{J}+\\mathscr{B}J)");
+    state("ℳ̇ - 2C is skew", rate - 2 * C_skew, -(rate - 2 * C_skew).T());
+    shown("ℳ̇ - 2C = -(ℳ̇ - 2C)*", "\\dot{\\mathcal{M}} - 2C = -(\\dot{\\mathcal{M}} - 2C)^*");
+    state("the Christoffel-consistent C gives the same force", C_christoffel * qd, bias, no_hypothesis, "soa.md #20");
+    shown("C θ̇ = 𝒞,  C = Hφ(MJ̇ + ½(𝓑 + V̄M + MṼ)J)", "C\\dot\\theta = \\mathcal{C},\\quad C = H\\phi(M\\dot{J}+\\tfrac12(\\mathscr{B}+\\bar{\\mathcal{V}}M+M\\tilde{\\mathcal{V}})J)");
+    state("ℳ̇ - 2C is skew for the Christoffel-consistent C", rate - 2 * C_christoffel, -(rate - 2 * C_christoffel).T(), no_hypothesis, "soa.md #21");
+    shown("ℳ̇ - 2C = -(ℳ̇ - 2C)* for that C", "\\dot{\\mathcal{M}} - 2C = -(\\dot{\\mathcal{M}} - 2C)^*\\text{ for that }C");
+  }
+
+  void gravity() {
+    group = "Gravity";
+    state("gravity as the base's acceleration", phi.T() * mechanics(gravity_base), -mechanics(gravity_field), no_hypothesis, "soa.md #55");
+  }
+
+  void world_frame() {
+    group = "World frame";
+    const auto world = std::make_shared<WorldFrame>(robot);
+    const Letters w(world);
+    const Expression X = mechanics(X_world);
+    state("X E X⁻¹ is constant", X * E * X.inv(), w.E, no_hypothesis, "soa.md #51");
+    shown("X E X⁻¹ = E' (parent matrix ⊗ 1)", "X\\mathcal{E}_\\phi X^{-1} = \\mathcal{E}_\\phi'");
+    state("P' = XPX*", w.P, X * P * X.T(), no_hypothesis, "soa.md #52");
+    shown("P' = X P X*", "P' = XPX^*");
+    state("D' = D", w.D, D, no_hypothesis, "soa.md #52");
+    shown("D' = D", "\\mathcal{D}' = \\mathcal{D}");
+    state("G' = XG", w.G, X * G, no_hypothesis, "soa.md #52");
+    shown("G' = X G", "\\mathcal{G}' = X\\mathcal{G}");
+    state("ψ' = XψX⁻¹", w.psi, X * psi * X.inv(), no_hypothesis, "soa.md #52");
+    shown("ψ' = X ψ X⁻¹", "\\psi' = X\\psi X^{-1}");
+  }
+
+  void hybrid_dynamics() {
+    group = "Hybrid dynamics (every third hinge prescribed)";
+    const int n = robot->structure().bodies();
+    std::vector<char> free(n), prescribed(n);
+    for (int k = 0; k < n; ++k) {
+      prescribed[k] = k % 3 == 1;
+      free[k] = !prescribed[k];
+    }
+    const auto free_hinges = std::make_shared<HingeSubset>(robot, free), prescribed_hinges = std::make_shared<HingeSubset>(robot, prescribed);
+    const Letters F(free_hinges), Q(prescribed_hinges);
+    const Expression qdd_f = make_vector("vdot_f", free_hinges->theta()), qdd_p = make_vector("vdot_p", prescribed_hinges->theta());
+    const Expression a_p = a + Q.H.T() * qdd_p, alpha_h = phi.T() * (F.H.T() * qdd_f + a_p), f_h = phi * (M * alpha_h + b);
+    const Expression T_f = F.H * f_h + F.J * qdd_f, T_p = Q.H * f_h;
+    const Expression S_f = I - F.H * F.psi * F.K;
+    const Expression z_f = F.psi * (F.K * T_f + F.P * a_p + b), nu_f = F.D.inv() * (T_f - F.H * z_f);
+    state("hybrid forward dynamics", S_f.T() * nu_f - F.K.T() * F.psi.T() * a_p, qdd_f, no_hypothesis, "soa.md #38");
+    shown("[I-H_fψ_fK_f]*ν_f - K_f*ψ_f*a' = θ̈_f,  a' = a + H_p*θ̈_p", "[I-H_f\\psi_f\\mathcal{K}_f]^*\\nu_f - \\mathcal{K}_f^*\\psi_f^*\\mathfrak{a}' = \\ddot\\theta_f,\\quad \\mathfrak{a}'=\\mathfrak{a}+H_p^*\\ddot\\theta_p");
+    state("prescribed hinges' forces", Q.H * (F.P * (F.psi.T() * (F.H.T() * nu_f + a_p) - a_p) + z_f), T_p, no_hypothesis, "soa.md #39");
+    shown("T_p = H_p(P_f(α - a') + z_f)", "T_p = H_p(P_f(\\alpha-\\mathfrak{a}')+z_f)");
+    const Expression MM_ff = F.H * phi * M * phi.T() * F.H.T(), MM_fp = F.H * phi * M * phi.T() * Q.H.T(), MM_pp = Q.H * phi * M * phi.T() * Q.H.T();
+    const Expression Y = F.psi.T() - F.Omega * F.P;
+    const Expression schur = MM_pp - MM_fp.T() * (MM_ff + F.J).inv() * MM_fp;
+    state("Schur complement", schur, Q.H * Y.T() * M * Y * Q.H.T(), no_hinge_diagonal, "soa.md #40");
+    shown("ℳ_pp - ℳ_pf(ℳ_ff)⁻¹ℳ_fp = H_pY*MYH_p*,  Y = ψ_f* - Ω_fP_f", "\\mathcal{M}_{pp}-\\mathcal{M}_{pf}\\mathcal{M}_{ff}^{-1}\\mathcal{M}_{fp} = H_pY^*MYH_p^*,\\quad Y=\\psi_f^*-\\Omega_fP_f");
+    state("generalized Jacobian", phi.T() * Q.H.T() - phi.T() * F.H.T() * (MM_ff + F.J).inv() * MM_fp, Y * Q.H.T(), no_hypothesis, "soa.md #41");
+    shown("𝒥_p - 𝒥_f(ℳ_ff+J_f)⁻¹ℳ_fp = (ψ_f* - Ω_fP_f)H_p*", "\\mathcal{J}_p-\\mathcal{J}_f(\\mathcal{M}_{ff}+J_f)^{-1}\\mathcal{M}_{fp} = (\\psi_f^*-\\Omega_fP_f)H_p^*");
+    state("ℳ_ff⁻¹ℳ_fp by the factors", (MM_ff + F.J).inv() * MM_fp, (F.K.T() * F.psi.T() + S_f.T() * F.D.inv() * F.H * F.psi * F.P) * Q.H.T(), no_hypothesis,
+          "soa.md #42");
+    shown("(ℳ_ff+J_f)⁻¹ℳ_fp = (K_f*ψ_f* + [I-H_fψ_fK_f]*D_f⁻¹H_fψ_fP_f)H_p*", "(\\mathcal{M}_{ff}+J_f)^{-1}\\mathcal{M}_{fp} = (\\mathcal{K}_f^*\\psi_f^* + [I-H_f\\psi_f\\mathcal{K}_f]^*\\mathcal{D}_f^{-1}H_f\\psi_fP_f)H_p^*");
+    state("determinants of the partition", logdet(MM), logdet(MM_ff) + logdet(schur), no_hinge_diagonal, "soa.md #43");
+    shown("ln det ℳ = ln det ℳ_ff + ln det(ℳ_pp - ℳ_pf(ℳ_ff)⁻¹ℳ_fp)", "\\ln\\det\\mathcal{M} = \\ln\\det\\mathcal{M}_{ff}+\\ln\\det(\\mathcal{M}_{pp}-\\mathcal{M}_{pf}\\mathcal{M}_{ff}^{-1}\\mathcal{M}_{fp})");
+  }
+
+  void waiting() {
+    group = "Waiting";
+    const std::string loops = "loops", flexible = "flexible bodies";
+    wait("compound bodies: their mass matrix, accelerations and calculus", loops, "soa.md #60");
+    wait("tree augmentation", loops, "soa.md #63");
+    wait("modal blocks and their calculus", flexible, "soa.md, One algebra, three kinds of body");
+  }
+
+  const std::shared_ptr<MultibodyOperators> robot;
+  const Expression S = I - H * psi * K, A = I + H * phi * K, MM = H * phi * M * phi.T() * H.T();
+  const Expression qd = mechanics(theta_dot), V = mechanics(velocity), a = mechanics(coriolis_acceleration), b = mechanics(gyroscopic_force);
+  const Expression qdd = make_vector("vdot", robot->theta()), T = make_vector("T", robot->theta());
   const Expression alpha = phi.T() * (H.T() * qdd + a), f = phi * (M * alpha + b), torque = H * f + J * qdd;
   const Expression bias = H * phi * (M * phi.T() * a + b);
-  state("velocities", V, phi.T() * H.T() * qd);
-  state("Coriolis acceleration", a, mechanics(V_tilde) * H.T() * qd + mechanics(H_dot).T() * qd);
-  state("gyroscopic force", b, mechanics(V_bar) * M * V);
-  state("momentum_cross acts as V̄M", mechanics(momentum_cross) * V, mechanics(V_bar) * M * V);
-  state("equations of motion", torque, (MM + J) * qdd + bias);
-  shown("T = (ℳ+J) θ̈ + 𝒞", "T = (\\mathcal{M}+J)\\ddot\\theta + \\mathcal{C}");
-  const Expression z = psi * (K * torque + P * a + b), epsilon = torque - H * z, nu = D.inv() * epsilon;
-  state("forward dynamics", S.T() * nu - K.T() * psi.T() * a, qdd);
-  shown("[I-HψK]* ν - K*ψ* a = θ̈,  ν = D⁻¹(T - Hz),  z = ψ(KT + Pa + b)", "[I-H\\psi\\mathcal{K}]^*\\nu - \\mathcal{K}^*\\psi^*\\mathfrak{a} = \\ddot\\theta,\\quad \\nu = \\mathcal{D}^{-1}(T-Hz)");
-  state("accelerations by innovations", psi.T() * (H.T() * nu + a), alpha);
-  shown("ψ*(H*ν + a) = φ*(H*θ̈ + a)", "\\psi^*(H^*\\nu+\\mathfrak{a}) = \\phi^*(H^*\\ddot\\theta+\\mathfrak{a})");
-  state("interbody forces by innovations", P * (alpha - a) + z, f);
-  shown("P(α - a) + z = φ(Mα + b)", "P(\\alpha-\\mathfrak{a})+z = \\phi(M\\alpha+\\mathfrak{b})");
-  state("forces without hinge quantities", P_plus * E.T() * alpha + z + G * epsilon, f, no_hypothesis, "soa.md #13");
-  shown("P⁺E*α + z + Gε = f", "P^{+}\\mathcal{E}^*\\alpha + z + \\mathcal{G}\\epsilon = f");
-  state("accelerations by Ω", phi.T() * H.T() * (MM + J).inv() * torque + (I - Omega * M) * phi.T() * a - Omega * b, alpha, no_hypothesis, "soa.md #14");
-  shown("φ*H*(ℳ+J)⁻¹T + (I-ΩM)φ*a - Ωb = α", "\\phi^*H^*(\\mathcal{M}+J)^{-1}T + (I-\\Omega M)\\phi^*\\mathfrak{a} - \\Omega\\mathfrak{b} = \\alpha");
+};
 
-  group = "Innovations";
-  const Expression xi = A.T() * qd;
-  state("innovations velocity", xi, G.T() * V, no_hinge_diagonal, "soa.md #8");
-  state("kinetic energy", V.T() * M * V + qd.T() * J * qd, xi.T() * D * xi, no_hypothesis, "soa.md #9");
-  shown("V*MV + θ̇*Jθ̇ = ξ*Dξ", "\\mathcal{V}^*M\\mathcal{V} + \\dot\\theta^*J\\dot\\theta = \\xi^*\\mathcal{D}\\xi");
-  state("innovations form", T.T() * (MM + J).inv() * T, (S * T).T() * D.inv() * S * T, no_hypothesis, "soa.md #10");
-  shown("T*(ℳ+J)⁻¹T = ε*D⁻¹ε,  ε = [I-HψK]T", "T^*(\\mathcal{M}+J)^{-1}T = \\epsilon^*\\mathcal{D}^{-1}\\epsilon,\\quad \\epsilon=[I-H\\psi\\mathcal{K}]T");
-  state("composite momentum", H * phi * M * V, MM * qd, no_hypothesis, "soa.md #15");
-  if (source->traits().free_root || std::count(source->structure().parent.begin(), source->structure().parent.end(), -1) == 1) {
-    std::vector<double> pick(size_t(6) * source->structure().dimension(), 0.0);
-    for (int i = 0; i < 6; ++i) pick[size_t(i) * source->structure().dimension() + i] = 1;
-    const Expression root = constant(std::move(pick), source->forces(), Space::euclidean(6), "root");
-    state("momentum matrix about the root", root * phi * R * H.T(), root * phi * M * phi.T() * H.T(), no_hypothesis, "soa.md #19");
-    shown("[φRH*] = [φMφ*H*] in the root's rows", "[\\phi\\mathcal{R}H^*]_{\\text{root}} = [\\phi M\\phi^*H^*]_{\\text{root}}");
-  }
+}  // namespace
 
-  group = "Coriolis matrices";
-  const Expression J_dot = phi.T() * (mechanics(Delta_theta_dot).T() * phi_tilde.T() * H.T() + mechanics(H_dot).T());
-  const Expression jacobian = phi.T() * H.T();
-  const Expression C_skew = H * phi * (M * J_dot + mechanics(momentum_cross) * jacobian);
-  const Expression C_christoffel = H * phi * (M * J_dot + 0.5 * (mechanics(momentum_cross) + mechanics(V_bar) * M + M * mechanics(V_tilde)) * jacobian);
-  const Expression half = (mechanics(H_dot) * phi + H * phi_tilde * mechanics(Delta_theta_dot) * phi) * M * phi.T() * H.T();
-  const Expression rate = half + half.T();  // ℳ̇
-  state("C θ̇ is the Coriolis force", C_skew * qd, bias);
-  shown("C θ̇ = 𝒞,  C = Hφ(MJ̇ + 𝓑J)", "C\\dot\\theta = \\mathcal{C},\\quad C = H\\phi(M\\dot{J}+\\mathscr{B}J)");
-  state("ℳ̇ - 2C is skew", rate - 2 * C_skew, -(rate - 2 * C_skew).T());
-  shown("ℳ̇ - 2C = -(ℳ̇ - 2C)*", "\\dot{\\mathcal{M}} - 2C = -(\\dot{\\mathcal{M}} - 2C)^*");
-  state("the Christoffel-consistent C gives the same force", C_christoffel * qd, bias, no_hypothesis, "soa.md #20");
-  shown("C θ̇ = 𝒞,  C = Hφ(MJ̇ + ½(𝓑 + V̄M + MṼ)J)", "C\\dot\\theta = \\mathcal{C},\\quad C = H\\phi(M\\dot{J}+\\tfrac12(\\mathscr{B}+\\bar{\\mathcal{V}}M+M\\tilde{\\mathcal{V}})J)");
-  state("ℳ̇ - 2C is skew for the Christoffel-consistent C", rate - 2 * C_christoffel, -(rate - 2 * C_christoffel).T(), no_hypothesis, "soa.md #21");
-  shown("ℳ̇ - 2C = -(ℳ̇ - 2C)* for that C", "\\dot{\\mathcal{M}} - 2C = -(\\dot{\\mathcal{M}} - 2C)^*\\text{ for that }C");
-
-  group = "Gravity";
-  state("gravity as the base's acceleration", phi.T() * mechanics(gravity_base), -mechanics(gravity_field), no_hypothesis, "soa.md #55");
-
-  group = "World frame";
-  const auto world = std::make_shared<WorldFrame>(source);
-  const Letters w(world);
-  const Expression X = mechanics(X_world);
-  state("X E X⁻¹ is constant", X * E * X.inv(), w.E, no_hypothesis, "soa.md #51");
-  shown("X E X⁻¹ = E' (parent matrix ⊗ 1)", "X\\mathcal{E}_\\phi X^{-1} = \\mathcal{E}_\\phi'");
-  state("P' = XPX*", w.P, X * P * X.T(), no_hypothesis, "soa.md #52");
-  shown("P' = X P X*", "P' = XPX^*");
-  state("D' = D", w.D, D, no_hypothesis, "soa.md #52");
-  shown("D' = D", "\\mathcal{D}' = \\mathcal{D}");
-  state("G' = XG", w.G, X * G, no_hypothesis, "soa.md #52");
-  shown("G' = X G", "\\mathcal{G}' = X\\mathcal{G}");
-  state("ψ' = XψX⁻¹", w.psi, X * psi * X.inv(), no_hypothesis, "soa.md #52");
-  shown("ψ' = X ψ X⁻¹", "\\psi' = X\\psi X^{-1}");
-
-  group = "Hybrid dynamics (every third hinge prescribed)";
-  const int n = source->structure().bodies();
-  std::vector<char> free(n), prescribed(n);
-  for (int k = 0; k < n; ++k) {
-    prescribed[k] = k % 3 == 1;
-    free[k] = !prescribed[k];
-  }
-  const auto free_hinges = std::make_shared<HingeSubset>(source, free), prescribed_hinges = std::make_shared<HingeSubset>(source, prescribed);
-  const Letters F(free_hinges), Q(prescribed_hinges);
-  const Expression qdd_f = make_vector("vdot_f", free_hinges->theta()), qdd_p = make_vector("vdot_p", prescribed_hinges->theta());
-  const Expression a_p = a + Q.H.T() * qdd_p, alpha_h = phi.T() * (F.H.T() * qdd_f + a_p), f_h = phi * (M * alpha_h + b);
-  const Expression T_f = F.H * f_h + F.J * qdd_f, T_p = Q.H * f_h;
-  const Expression S_f = I - F.H * F.psi * F.K;
-  const Expression z_f = F.psi * (F.K * T_f + F.P * a_p + b), nu_f = F.D.inv() * (T_f - F.H * z_f);
-  state("hybrid forward dynamics", S_f.T() * nu_f - F.K.T() * F.psi.T() * a_p, qdd_f, no_hypothesis, "soa.md #38");
-  shown("[I-H_fψ_fK_f]*ν_f - K_f*ψ_f*a' = θ̈_f,  a' = a + H_p*θ̈_p", "[I-H_f\\psi_f\\mathcal{K}_f]^*\\nu_f - \\mathcal{K}_f^*\\psi_f^*\\mathfrak{a}' = \\ddot\\theta_f,\\quad \\mathfrak{a}'=\\mathfrak{a}+H_p^*\\ddot\\theta_p");
-  state("prescribed hinges' forces", Q.H * (F.P * (F.psi.T() * (F.H.T() * nu_f + a_p) - a_p) + z_f), T_p, no_hypothesis, "soa.md #39");
-  shown("T_p = H_p(P_f(α - a') + z_f)", "T_p = H_p(P_f(\\alpha-\\mathfrak{a}')+z_f)");
-  const Expression MM_ff = F.H * phi * M * phi.T() * F.H.T(), MM_fp = F.H * phi * M * phi.T() * Q.H.T(), MM_pp = Q.H * phi * M * phi.T() * Q.H.T();
-  const Expression Y = F.psi.T() - F.Omega * F.P;
-  const Expression schur = MM_pp - MM_fp.T() * (MM_ff + F.J).inv() * MM_fp;
-  state("Schur complement", schur, Q.H * Y.T() * M * Y * Q.H.T(), no_hinge_diagonal, "soa.md #40");
-  shown("ℳ_pp - ℳ_pf(ℳ_ff)⁻¹ℳ_fp = H_pY*MYH_p*,  Y = ψ_f* - Ω_fP_f", "\\mathcal{M}_{pp}-\\mathcal{M}_{pf}\\mathcal{M}_{ff}^{-1}\\mathcal{M}_{fp} = H_pY^*MYH_p^*,\\quad Y=\\psi_f^*-\\Omega_fP_f");
-  state("generalized Jacobian", phi.T() * Q.H.T() - phi.T() * F.H.T() * (MM_ff + F.J).inv() * MM_fp, Y * Q.H.T(), no_hypothesis, "soa.md #41");
-  shown("𝒥_p - 𝒥_f(ℳ_ff+J_f)⁻¹ℳ_fp = (ψ_f* - Ω_fP_f)H_p*", "\\mathcal{J}_p-\\mathcal{J}_f(\\mathcal{M}_{ff}+J_f)^{-1}\\mathcal{M}_{fp} = (\\psi_f^*-\\Omega_fP_f)H_p^*");
-  state("ℳ_ff⁻¹ℳ_fp by the factors", (MM_ff + F.J).inv() * MM_fp, (F.K.T() * F.psi.T() + S_f.T() * F.D.inv() * F.H * F.psi * F.P) * Q.H.T(), no_hypothesis,
-        "soa.md #42");
-  shown("(ℳ_ff+J_f)⁻¹ℳ_fp = (K_f*ψ_f* + [I-H_fψ_fK_f]*D_f⁻¹H_fψ_fP_f)H_p*", "(\\mathcal{M}_{ff}+J_f)^{-1}\\mathcal{M}_{fp} = (\\mathcal{K}_f^*\\psi_f^* + [I-H_f\\psi_f\\mathcal{K}_f]^*\\mathcal{D}_f^{-1}H_f\\psi_fP_f)H_p^*");
-  state("determinants of the partition", logdet(MM), logdet(MM_ff) + logdet(schur), no_hinge_diagonal, "soa.md #43");
-  shown("ln det ℳ = ln det ℳ_ff + ln det(ℳ_pp - ℳ_pf(ℳ_ff)⁻¹ℳ_fp)", "\\ln\\det\\mathcal{M} = \\ln\\det\\mathcal{M}_{ff}+\\ln\\det(\\mathcal{M}_{pp}-\\mathcal{M}_{pf}\\mathcal{M}_{ff}^{-1}\\mathcal{M}_{fp})");
-
-  for (Theorem& t : calculus_theorems(source)) list.push_back(std::move(t));
-
-  group = "Waiting";
-  const std::string loops = "loops", flexible = "flexible bodies";
-  wait("compound bodies: their mass matrix, accelerations and calculus", loops, "soa.md #60");
-  wait("tree augmentation", loops, "soa.md #63");
-  wait("modal blocks and their calculus", flexible, "soa.md, One algebra, three kinds of body");
-  return list;
+std::vector<Theorem> mechanics_theorems(const std::shared_ptr<MultibodyOperators>& source) {
+  MechanicsTheorems all(source);
+  all.equations_of_motion();
+  all.innovations();
+  all.coriolis_matrices();
+  all.gravity();
+  all.world_frame();
+  all.hybrid_dynamics();
+  for (Theorem& t : calculus_theorems(source)) all.list.push_back(std::move(t));
+  all.waiting();
+  return std::move(all.list);
 }
 
 }  // namespace pycraft

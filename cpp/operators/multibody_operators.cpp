@@ -16,8 +16,9 @@ Traits MultibodyOperators::traits() const {
   return {structure().is_chain(), structure().single_dof(), constant, model_->has_rotor_inertia(), structure().free_root(), structure().equal_blocks()};
 }
 
-Space MultibodyOperators::space(SpaceKind kind, const std::vector<int>& nodes) const {
-  if (kind != SpaceKind::NodesV && kind != SpaceKind::NodesF) return SkoSource::space(kind, nodes);
+Space MultibodyOperators::space(SpaceKind kind, const SymbolArguments& arguments) const {
+  if (kind != SpaceKind::NodesV && kind != SpaceKind::NodesF) return SkoSource::space(kind, arguments);
+  const std::vector<int>& nodes = std::get<OfNodes>(arguments).nodes;
   auto layout = std::make_shared<SpaceLayout>();
   layout->owner = layout->bodies = this;
   layout->owner_name = name();
@@ -51,6 +52,8 @@ std::shared_ptr<MultibodyOperators> operators_of(const std::shared_ptr<Multibody
 // ------------------------------------------------------------------ blocks of the symbols of mechanics
 
 namespace {
+
+using enum SymbolId;
 
 template <class S>
 void put(const Matrix3<S>& A, S* out, int columns, int row, int column) {
@@ -98,10 +101,10 @@ void RigidValues<S>::block(const Symbol& symbol, int k, S* out) const {
   const RigidBlocks<S>& b = this->blocks_;
   const SkoStructure& tree = this->tree_;
   switch (symbol.definition->id) {
-    case MechanicsSymbolId::B: {
+    case SymbolId::B: {
       // Columns: the forces of the nodes on body k, in the order they were named.
       std::vector<int> here;
-      for (int node : symbol.arguments)
+      for (int node : std::get<OfNodes>(symbol.arguments).nodes)
         if ((node >= 0 ? model_.node(node).body : -1 - node) == k) here.push_back(node);
       const int columns = 6 * static_cast<int>(here.size());
       for (size_t j = 0; j < here.size(); ++j)
@@ -110,34 +113,20 @@ void RigidValues<S>::block(const Symbol& symbol, int k, S* out) const {
     }
     case Delta: {
       int body;
-      const Vector6<S> h = twist(symbol.arguments, body);
+      const Vector6<S> h = twist(place_in(symbol.arguments), body);
       if (body == k)
         cross_force_block(h, out);
       else
         std::fill_n(out, 36, S(0));
       return;
     }
-    case inertia_derivative:
+    case inertia_derivative: {
+      const OfInertia& of = std::get<OfInertia>(symbol.arguments);
       std::fill_n(out, 36, S(0));
-      if (symbol.arguments[0] == k) inertia_derivative_block(symbol.arguments, out);
-      return;
-    case coordinate_selection: {
-      const int n = tree.dof[k];
-      std::fill_n(out, n * n, S(0));
-      if (symbol.arguments.size() == 1) {
-        const int i = symbol.arguments[0] - tree.dof_offset[k];
-        if (i >= 0 && i < n) out[i * n + i] = S(1);
-        return;
-      }
-      if (symbol.arguments[0] >= 0 && symbol.arguments[0] != k) return;
-      int j = 0, s = 0;
-      for (const Subhinge& h : model_.body(k).hinge.subhinges) {
-        for (int c = 0; c < h.nv(); ++c, ++j)
-          if (s >= symbol.arguments[1] && s < symbol.arguments[2]) out[j * n + j] = S(1);
-        ++s;
-      }
+      if (of.body == k) inertia_derivative_block(of, out);
       return;
     }
+    case coordinate_selection: selection_block(symbol.arguments, k, out); return;
     case Delta_theta_dot: cross_force_block(velocities_.relative[k], out); return;
     case V_tilde: cross_motion_block(velocities_.V[k], out); return;
     case V_bar: cross_force_block(velocities_.V[k], out); return;
@@ -154,23 +143,45 @@ void RigidValues<S>::block(const Symbol& symbol, int k, S* out) const {
   }
 }
 
+// Ones on the diagonal at the coordinates that are selected.
 template <class S>
-Vector6<S> RigidValues<S>::twist(const std::vector<int>& direction, int& body) const {
+void RigidValues<S>::selection_block(const SymbolArguments& which, int k, S* out) const {
   const SkoStructure& tree = this->tree_;
-  if (direction.size() == 1) {
+  const int n = tree.dof[k];
+  std::fill_n(out, n * n, S(0));
+  if (const auto* one = std::get_if<OfCoordinate>(&which)) {
+    const int i = one->coordinate - tree.dof_offset[k];
+    if (i >= 0 && i < n) out[i * n + i] = S(1);
+    return;
+  }
+  const OfSubhinges& of = std::get<OfSubhinges>(which);
+  if (of.body >= 0 && of.body != k) return;
+  int j = 0, s = 0;
+  for (const Subhinge& h : model_.body(k).hinge.subhinges) {
+    for (int c = 0; c < h.nv(); ++c, ++j)
+      if (s >= of.from && s < of.to) out[j * n + j] = S(1);
+    ++s;
+  }
+}
+
+template <class S>
+Vector6<S> RigidValues<S>::twist(const TwistPlace& place, int& body) const {
+  const SkoStructure& tree = this->tree_;
+  if (const auto* of = std::get_if<OfCoordinate>(&place)) {
     body = 0;
-    while (tree.dof_offset[body + 1] <= direction[0]) ++body;
-    return this->blocks_.H[direction[0]];
+    while (tree.dof_offset[body + 1] <= of->coordinate) ++body;
+    return this->blocks_.H[of->coordinate];
   }
   // a twist fixed before a subhinge, carried past the steps that follow
-  body = direction[0];
+  const OfTwist& of = std::get<OfTwist>(place);
+  body = of.body;
   Vector6<S> h = Vector6<S>::zero();
-  h[direction[2]] = S(1);
+  h[of.component] = S(1);
   const CompiledModel<S>& model = *compiled_;
   const S* q = q_.data() + model.q_offset[body];
   for (int i = model.first_subhinge[body]; i < model.first_subhinge[body + 1]; ++i) {
-    if (i - model.first_subhinge[body] >= direction[1]) h = motion_to_child(subhinge_step(model.subhinges[i], q), h);
-    q += model.subhinges[i].kind == SubhingeKind::ball ? 4 : model.subhinges[i].kind == SubhingeKind::free ? 7 : 1;
+    if (i - model.first_subhinge[body] >= of.position) h = motion_to_child(subhinge_step(model.subhinges[i], q), h);
+    q += record_of(model.subhinges[i].kind).nq;
   }
   return h;
 }
@@ -178,19 +189,19 @@ Vector6<S> RigidValues<S>::twist(const std::vector<int>& direction, int& body) c
 // M is linear in the mass and in the inertia about the centre of mass, quadratic in the centre of mass c:
 // M = [[I + m(c·c 1 - cc*), m c~], [-m c~, m 1]]
 template <class S>
-void RigidValues<S>::inertia_derivative_block(const std::vector<int>& arguments, S* out) const {
-  const Body& body = model_.body(arguments[0]);
+void RigidValues<S>::inertia_derivative_block(const OfInertia& of, S* out) const {
+  const Body& body = model_.body(of.body);
   const Vector3<S> c = cast<S>(body.com);
   S mass = S(body.mass), linear = S(0);
   std::vector<int> along;
-  for (size_t i = 1; i < arguments.size(); ++i) {
-    if (arguments[i] == mass_of_body) {
+  for (const InertiaParameter p : of.parameters) {
+    if (p == InertiaParameter::mass) {
       mass = linear = S(1);
-    } else if (arguments[i] <= com_z) {
-      along.push_back(arguments[i] - com_x);
+    } else if (p <= InertiaParameter::com_z) {
+      along.push_back(static_cast<int>(p) - static_cast<int>(InertiaParameter::com_x));
     } else {
       static const int row[] = {0, 0, 0, 1, 1, 2}, column[] = {0, 1, 2, 1, 2, 2};
-      const int a = row[arguments[i] - inertia_xx], b = column[arguments[i] - inertia_xx];
+      const int entry = static_cast<int>(p) - static_cast<int>(InertiaParameter::inertia_xx), a = row[entry], b = column[entry];
       out[a * 6 + b] = out[b * 6 + a] = S(1);
       return;
     }
@@ -237,7 +248,7 @@ void RigidValues<S>::vector(const Symbol& symbol, S* out) const {
     case direction_twist: {
       std::fill_n(out, 6 * tree.bodies(), S(0));
       int body;
-      const Vector6<S> h = twist(symbol.arguments, body);
+      const Vector6<S> h = twist(place_in(symbol.arguments), body);
       for (int i = 0; i < 6; ++i) out[6 * body + i] = h[i];
       return;
     }

@@ -14,25 +14,7 @@
 
 namespace pycraft {
 
-// Symbols of mechanics. Arguments: B, Jacobian, Lambda take node numbers, Delta a coordinate.
-enum MechanicsSymbolId : int {
-  B = first_extra,
-  Jacobian,
-  Lambda,
-  Delta,             // crf(h_i) at the body of coordinate i
-  Delta_theta_dot,   // crf(H*θ̇)
-  V_tilde,           // crm(V)
-  V_bar,             // crf(V)
-  momentum_cross,    // -[[ñ, f̃], [f̃, 0]] of (n; f) = M V
-  X_world,           // φ(0,k): forces in body k's frame to the world's
-  H_dot,             // Ḣ along θ̇
-  theta_dot,         // the model's v
-  velocity,          // V = φ*H*θ̇
-  coriolis_acceleration,  // a = ṼH*θ̇ + Ḣ*θ̇
-  gyroscopic_force,  // b = V̄MV
-  gravity_field,     // the gravity acceleration (0; g) seen in every body
-  gravity_base       // -φ*(0,r)(0; g) at the roots: the base acceleration that stands for gravity
-};
+// Records of the letters of mechanics.
 const std::vector<SymbolDefinition>& mechanics_symbols();
 
 class MultibodyOperators final : public SkoSource {
@@ -52,7 +34,7 @@ class MultibodyOperators final : public SkoSource {
   std::uint64_t parameters() const override { return model_->parameters(); }
   unsigned enter_use() const override { return model_->enter_use(); }
   void leave_use(unsigned entered) const noexcept override { model_->leave_use(entered); }
-  Space space(SpaceKind kind, const std::vector<int>& arguments) const override;
+  Space space(SpaceKind kind, const SymbolArguments& arguments) const override;
   bool tangent_of_inverse(const Expression& X, const Expression& tangent, Expression& letter, Expression& of_D) override;
   PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_OVERRIDE_MAKE_VALUES)
 
@@ -64,8 +46,8 @@ class MultibodyOperators final : public SkoSource {
 std::shared_ptr<MultibodyOperators> operators_of(const std::shared_ptr<Multibody>& model);
 
 // Letters of a robot, or of its bodies in groups. Node operators by name (ModelError for an unknown one).
-Expression node_operator(MechanicsSymbolId id, const std::shared_ptr<SkoSource>& source, const std::vector<std::string>& names);
-Expression mechanics_operator(MechanicsSymbolId id, const std::shared_ptr<SkoSource>& source);
+Expression node_operator(SymbolId id, const std::shared_ptr<SkoSource>& source, const std::vector<std::string>& names);
+Expression mechanics_operator(SymbolId id, const std::shared_ptr<SkoSource>& source);
 Expression delta_operator(const std::shared_ptr<SkoSource>& source, int coordinate);
 
 // Theorems that need mechanics: velocities, dynamics, Coriolis matrices, gravity, other frames, hybrid dynamics.

@@ -32,8 +32,8 @@ class RigidValues final : public TreeValues<RigidBlocks<S>> {
   const std::vector<S>& q() const { return q_; }
   const std::vector<S>& v() const { return v_; }
   const Velocities<S>& velocities() const { return velocities_; }
-  // The twist of a direction (Delta's arguments) in the axes of its body, and the body.
-  Vector6<S> twist(const std::vector<int>& direction, int& body) const;
+  // The twist of a place in the axes of its body, and the body.
+  Vector6<S> twist(const TwistPlace& place, int& body) const;
 
  protected:
   void set_state(const double* q, const double* v) override {
@@ -52,7 +52,8 @@ class RigidValues final : public TreeValues<RigidBlocks<S>> {
   }
 
  private:
-  void inertia_derivative_block(const std::vector<int>& arguments, S* out) const;
+  void inertia_derivative_block(const OfInertia& of, S* out) const;
+  void selection_block(const SymbolArguments& which, int k, S* out) const;
 
   const MultibodyOperators& source_;
   const Multibody& model_;

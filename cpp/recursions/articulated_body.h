@@ -1,11 +1,11 @@
 // Forward dynamics (articulated-body algorithm), with gravity as the acceleration -g of the base:
 //
 //   tip to base:  P, D, G, P⁺ of algebra/trees/sweeps/articulated_inertia.h, and
-//                 z(k) = P(k) a(k) + b(k) + Σ_{children c} E(k,c) z⁺(c)
+//                 z(k) = P(k) a(k) + b(k) - w(k) + Σ_{children c} E(k,c) z⁺(c)
 //                 ε(k) = T(k) - H(k) z(k),   ν(k) = D(k)⁻¹ ε(k),   z⁺(k) = z(k) + G(k) ε(k)
 //   base to tip:  α⁺(k) = E(p,k)* α(p),   θ̈(k) = ν(k) - G(k)* α⁺(k),   α(k) = α⁺(k) + H(k)* θ̈(k) + a(k),   α(base) = -g
 //
-// with α, a and b those of points (recursions/point_accelerations.h): the equations are the same for these and for the book's.
+// with w the wrench applied to the body (recursions/applied.h), and α, a and b those of points (recursions/point_accelerations.h): the equations are the same for these and for the book's.
 //
 // In the factored forms P = C W C* and z = y - C W ρ*: of the forces that go with an inertia only accelerations ρ of its columns are kept,
 // so that a heavy body's do not drown a light one's. Per body ρ(k) = -b(k) in its own columns, ρ⁺ what is left of ρ - a*C beside the
@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "algebra/trees/sweeps/articulated_inertia.h"
+#include "recursions/applied.h"
 #include "recursions/point_accelerations.h"
 #include "rigid/rigid_blocks.h"
 #include "runtime/interrupt.h"
@@ -37,7 +38,7 @@ void refuse_pivots(const SkoStructure& tree, RigidBlocks<S>& blocks, int last) {
 // z, alpha: scratch, one Vector6 per body. vdot is θ̈ + x where hinges absorb their own terms x. Returns the largest of the terms that made up
 // vdot. Throws SingularHingeError.
 template <class S>
-S articulated_body(const SkoStructure& tree, const CompiledModel<S>& model, RigidBlocks<S>& blocks, const PointAccelerations<S>& points, const S* T, S* vdot,
+S articulated_body(const SkoStructure& tree, const CompiledModel<S>& model, RigidBlocks<S>& blocks, const PointAccelerations<S>& points, const Applied<S>& applied, const S* T, S* vdot,
                    std::vector<Vector6<S>>& z, std::vector<Vector6<S>>& alpha) {
   const bool factored = blocks.form != Form::fast;
   blocks.keep_inertias = false;
@@ -45,7 +46,7 @@ S articulated_body(const SkoStructure& tree, const CompiledModel<S>& model, Rigi
   bool doubtful = false;
   const auto start = [&](int k) {
     blocks.start_articulated(k);
-    z[k] = factored ? blocks.factors().start_bias(k, model.inertia_factors[k], points.angular_velocity[k]) : points.b[k];
+    z[k] = applied.taken_from(factored ? blocks.factors().start_bias(k, model.inertia_factors[k], points.angular_velocity[k]) : points.b[k], k);
   };
   for (int k = model.bodies - 1; k >= 0; --k) {
     check_interrupt_at(k);
@@ -73,7 +74,7 @@ S articulated_body(const SkoStructure& tree, const CompiledModel<S>& model, Rigi
   }
   if (doubtful) refuse_pivots(tree, blocks, 0);
   S largest = S(0);
-  const Vector6<S> base{Vector3<S>::zero(), -model.gravity};
+  const Vector6<S> base = applied.base();
   for (int k = 0; k < model.bodies; ++k) {
     check_interrupt_at(k);
     const int p = model.parent[k], first = model.v_offset[k], n = model.nv_of[k];

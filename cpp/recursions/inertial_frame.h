@@ -101,7 +101,7 @@ struct InertialFrame {
     for (int k = 0; k < model.bodies; ++k) {
       int j = model.v_offset[k];
       for (int i = model.first_subhinge[k]; i < model.first_subhinge[k + 1]; ++i)
-        for (int c = 0; c < coordinates(model.subhinges[i].kind); ++c, ++j) body_of[j] = k, subhinge_of[j] = i;
+        for (int c = 0; c < record_of(model.subhinges[i].kind).nv; ++c, ++j) body_of[j] = k, subhinge_of[j] = i;
     }
   }
 
@@ -110,10 +110,10 @@ struct InertialFrame {
 
   // From hinge kinematics at a configuration; v, vdot may be null (rest). With own terms absorbed, vdot and what it is differentiated for
   // are the accelerations θ̈ + x of free roots (recursions/point_accelerations.h), and rates do not depend on their travel at all.
-  void fill(const CompiledModel<S>& model, const RigidBlocks<S>& blocks, const S* v, const S* vdot, OwnTerms own = OwnTerms::kept) {
+  void fill(const CompiledModel<S>& model, const RigidBlocks<S>& blocks, const Vector3<S>& gravity, const S* v, const S* vdot, OwnTerms own = OwnTerms::kept) {
     for (int k = 0; k < model.bodies; ++k) {
       check_interrupt_at(k);
-      place(model, blocks, k);
+      place(model, blocks, gravity, k);
       move(model, k, v, vdot, own);
       const RigidInertia<S>& I = model.inertia[k];
       R[k] = {I.mass, axes[k] * I.moment, rotate(axes[k], I.rotational)};
@@ -136,13 +136,13 @@ struct InertialFrame {
   }
 
  private:
-  void place(const CompiledModel<S>& model, const RigidBlocks<S>& blocks, int k) {
+  void place(const CompiledModel<S>& model, const RigidBlocks<S>& blocks, const Vector3<S>& gravity, int k) {
     const int p = model.parent[k];
     const Pose<S>& X = blocks.pose[k];
     axes[k] = p < 0 ? Matrix3<S>::identity() : axes[p] * X.R;
     arm[k] = p < 0 ? Vector3<S>::zero() : axes[p] * X.p;
     origin[k] = p < 0 ? Vector3<S>::zero() : origin[p] + arm[k];
-    alpha[k] = p < 0 ? Vector6<S>{Vector3<S>::zero(), transpose_times(X.R, -model.gravity)} : motion_outboard(arm[k], alpha[p]);
+    alpha[k] = p < 0 ? Vector6<S>{Vector3<S>::zero(), transpose_times(X.R, -gravity)} : motion_outboard(arm[k], alpha[p]);
     for (int c = model.v_offset[k]; c < model.v_offset[k] + model.nv_of[k]; ++c) twist[c] = {axes[k] * blocks.H[c].angular, axes[k] * blocks.H[c].linear};
   }
 
@@ -157,7 +157,7 @@ struct InertialFrame {
       for (int c = first; c < last; ++c) travel[k] = travel[k] + rate(c) * twist[c].linear;
     const auto seen = [&](const Vector6<S>& x) { return p < 0 ? Vector6<S>{x.angular, x.linear - travel[k]} : x; };
     for (int i = model.first_subhinge[k], j = first; i < model.first_subhinge[k + 1]; ++i) {
-      const int end = j + coordinates(model.subhinges[i].kind);
+      const int end = j + record_of(model.subhinges[i].kind).nv;
       const Vector6<S> before = seen(velocity), acceleration_before = acceleration;
       for (int c = j; c < end; ++c) {
         psi_dot[c] = cross_motion(before, twist[c]);

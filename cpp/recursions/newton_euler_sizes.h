@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "algebra/trees/sweeps/residual_rounding.h"
+#include "recursions/applied.h"
 #include "recursions/point_accelerations.h"
 #include "rigid/rigid_blocks.h"
 #include "spatial/sizes.h"
@@ -28,13 +29,13 @@ namespace pycraft {
 
 // alpha, f: of newton_euler at vdot. Numbers of a wider scalar T may be sized in a narrower S.
 template <class S, class T>
-void newton_euler_sizes(const SkoStructure& tree, const CompiledModel<T>& model, const RigidBlocks<T>& blocks, const PointAccelerations<T>& points, const T* v, const T* vdot,
+void newton_euler_sizes(const SkoStructure& tree, const CompiledModel<T>& model, const RigidBlocks<T>& blocks, const PointAccelerations<T>& points, const Applied<T>& applied, const T* v, const T* vdot,
                         const S* tau, const std::vector<Vector6<T>>& alpha, const std::vector<Vector6<T>>& f, const RoundingUnits<S>& units,
                         ResidualSizes<S>& out) {
   using std::abs;
   out.resize(tree, 1);
   const auto size = [](const auto& x) { return sizes::of<S>(x); };
-  const Vector6<S> base{Vector3<S>::zero(), size(model.gravity)};
+  const Vector6<S> base{Vector3<S>::zero(), size(applied.gravity)};
   S* off = out.g.data();  // dω
   for (int k = 0; k < model.bodies; ++k) {
     const int p = model.parent[k], first = model.v_offset[k];
@@ -57,7 +58,8 @@ void newton_euler_sizes(const SkoStructure& tree, const CompiledModel<T>& model,
     motion.angular = motion.angular + sizes::crossed(spin, relative.angular);
     motion.linear = motion.linear + S(2) * sizes::crossed(spin, relative.linear);
     store(units.motion * motion, out.motion.data() + tree.offset[k], 1, 0);
-    const Vector6<S> force = S(2) * sizes::pushed(M, size(alpha[k])) + size(points.b[k]) + size(f[k]);
+    Vector6<S> force = S(2) * sizes::pushed(M, size(alpha[k])) + size(points.b[k]) + size(f[k]);
+    if (applied.wrenches) force = force + size(applied.wrenches[k]);
     const Vector6<S> gyroscopic{sizes::crossed(spin, M.rotational * spin), sizes::crossed(spin, sizes::crossed(spin, M.moment))};
     store(units.force * force + units.motion * gyroscopic, out.force.data() + tree.offset[k], 1, 0);
   }

@@ -70,7 +70,7 @@ void point_accelerations_base_to_tip(const CompiledModel<S>& model, const Pose<S
     int j = model.v_offset[k];
     for (int i = model.first_subhinge[k]; i < model.first_subhinge[k + 1]; ++i) {
       Vector6<S> relative = v[j] * H[j];
-      for (const int end = j++ + coordinates(model.subhinges[i].kind); j < end; ++j) relative = relative + v[j] * H[j];
+      for (const int end = j++ + record_of(model.subhinges[i].kind).nv; j < end; ++j) relative = relative + v[j] * H[j];
       a.angular = a.angular + cross(omega, relative.angular);
       a.linear = a.linear + cross(S(2) * omega + relative.angular, relative.linear);
       omega = omega + relative.angular;

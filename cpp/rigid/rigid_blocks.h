@@ -143,7 +143,7 @@ class RigidBlocks {
     }
     ldl_solve(L.data() + d_[k], pivots_.data() + first(k), n, x, m);
   }
-  void apply(int id, bool transposed, int k, const S* x, S* y, int m) const {
+  void apply(SymbolId id, bool transposed, int k, const S* x, S* y, int m) const {
     const int n = tree_.dof[k];
     switch (id) {
       case SymbolId::H:
@@ -183,7 +183,7 @@ class RigidBlocks {
       }
     }
   }
-  void block(int id, int k, S* out) const {
+  void block(SymbolId id, int k, S* out) const {
     const int n = tree_.dof[k];
     switch (id) {
       case SymbolId::E: {
@@ -218,70 +218,21 @@ class RigidBlocks {
   }
   // ---------------------------------------------------------------- forces in a wider scalar T
   template <class T>
-  void inertia_wide(int k, const std::vector<MassProperties>& masses, const S* a, T* f, int m) const {
-    for (int c = 0; c < m; ++c) {
-      Vector6<T> force;
-      wide_force<T, S>(masses[k], load(a, m, c), nullptr, force);
-      store(force, f, m, c);
-    }
-  }
+  void inertia_wide(int k, const std::vector<MassProperties>& masses, const S* a, T* f, int m) const;
   template <class T>
-  void shift_add_wide(int k, const T* x, T* y, int m) const {
-    for (int c = 0; c < m; ++c) {
-      Vector6<T> sum = load(y, m, c);
-      add_wide_to_parent(pose[k], load(x, m, c), sum);
-      store(sum, y, m, c);
-    }
-  }
-  // r = b - H f - J x
+  void shift_add_wide(int k, const T* x, T* y, int m) const;
   template <class T>
-  void residual_wide(int k, const T* f, const S* x, const S* b, S* r, int m) const {
-    for (int c = 0; c < m; ++c)
-      for (int j = first(k); j < last(k); ++j) {
-        const size_t at = size_t(j - first(k)) * m + c;
-        r[at] = static_cast<S>(T(b[at]) - wide_dot(H[j], load(f, m, c)) - T(J[j]) * T(x[at]));
-      }
-  }
+  void residual_wide(int k, const T* f, const S* x, const S* b, S* r, int m) const;
 
   // ---------------------------------------------------------------- sizes of what residuals add up (algebra/trees/sweeps/residual_rounding.h)
-  // Poses and hinge maps are rounded as motions are, but for turns by right angles without travel, and axes of coordinates.
-  bool exact_pose(int k) const {
-    for (int j = first(k); j < last(k); ++j)
-      if (aligned[j] < 0 || aligned[j] > 2) return false;
-    return std::all_of(pose[k].R.m, pose[k].R.m + 9, [](const S& x) { return x == S(0) || x == S(1) || x == S(-1); });
-  }
-  void motion_sizes(int k, const S* parent, const S* x, const S* a, S* out, int m) const {
-    using std::abs;
-    const Pose<S> X = sizes::of<S>(pose[k]);
-    for (int c = 0; c < m; ++c) {
-      Vector6<S> sum = sizes::of<S>(load(a, m, c));
-      if (parent) sum = sum + sizes::motion_carried(X, sizes::of<S>(load(parent, m, c)));
-      for (int j = first(k); j < last(k); ++j) sum = sum + S(abs(x[(j - first(k)) * m + c])) * sizes::of<S>(H[j]);
-      store(sum, out, m, c);
-    }
-  }
+  bool exact_pose(int k) const;
+  void motion_sizes(int k, const S* parent, const S* x, const S* a, S* out, int m) const;
   template <class Units>
-  void inertia_sizes(int k, const S* a, const Units& u, S* out, int m) const {  // of M a, twice: of its terms and of what they add up to
-    const RigidInertia<S> M = sizes::of<S>(inertia[k]);
-    for (int c = 0; c < m; ++c) store(S(S(2) * u.force) * sizes::pushed(M, sizes::of<S>(load(a, m, c))), out, m, c);
-  }
+  void inertia_sizes(int k, const S* a, const Units& u, S* out, int m) const;
   template <class Units>
-  void shifted_force_sizes(int k, const S* f, const Units& u, S* out, int m) const {
-    const Pose<S> X = sizes::of<S>(pose[k]);
-    const S& unit = exact_pose(k) ? u.force : u.motion;
-    for (int c = 0; c < m; ++c) add_to(unit * sizes::force_carried(X, sizes::of<S>(load(f, m, c))), out, m, c);
-  }
+  void shifted_force_sizes(int k, const S* f, const Units& u, S* out, int m) const;
   template <class Units>
-  void coordinate_sizes(int k, const S* f, const S* x, const Units& u, S* out, int m) const {
-    using std::abs;
-    for (int c = 0; c < m; ++c) {
-      const Vector6<S> size = sizes::of<S>(load(f, m, c));
-      for (int j = first(k); j < last(k); ++j) {
-        const size_t at = size_t(j - first(k)) * m + c;
-        out[at] = (aligned[j] >= 0 ? u.force : u.motion) * dot(sizes::of<S>(H[j]), size) + u.force * J[j] * S(abs(x[at]));
-      }
-    }
-  }
+  void coordinate_sizes(int k, const S* f, const S* x, const Units& u, S* out, int m) const;
 
   // Pivots d of D(k) = L d L*.
   const S* pivots(int k) const { return pivots_.data() + first(k); }
@@ -333,19 +284,8 @@ class RigidBlocks {
   // The faintest coordinate of the last sweep (algebra/trees/sweeps/singular_pivot.h); body -1: none.
   const FaintPivot& faint() const { return faint_; }
   // ---------------------------------------------------------------- error bound
-  void start_error(int k) {
-    X_.resize(tree_.bodies());
-    X_[k] = diagonal_part(P[k]);
-    for (int i = 0; i < 3; ++i) X_[k].A(i, i) += uncertain(k);
-  }
-  void check_pivots(int k) {
-    for (int j = first(k); j < last(k); ++j) pivot_work_[j - first(k)] = dot(H[j], X_[k] * H[j]) + J[j];
-    require_pivots(tree_, k, L.data() + d_[k], pivots_.data() + first(k), pivot_work_.data(), form);
-    const Symmetric6<S> own = diagonal_part(P[k]);
-    for (int j = first(k); j < last(k); ++j)
-      pivot_work_[j - first(k)] = aligned[j] >= 0 ? D[d_[k] + (j - first(k)) * (tree_.dof[k] + 1)] : S(dot(H[j], own * H[j]) + J[j]);
-    require_gain(tree_, k, L.data() + d_[k], pivots_.data() + first(k), pivot_work_.data(), form);
-  }
+  void start_error(int k);
+  void check_pivots(int k);
   void error_to_parent(int k) { pycraft::add(X_[tree_.parent[k]], to_parent(pose[k], error_left(k))); }
 
   // ---------------------------------------------------------------- composite inertia, compliance
@@ -386,14 +326,7 @@ class RigidBlocks {
   size_t d_offset(int k) const { return d_[k]; }
 
  private:
-  // X⁺(k)
-  Symmetric6<S> error_left(int k) const {
-    Symmetric6<S> plus = projected(X_[k], H, G, k);  // τ̄Xτ̄*
-    const Symmetric6<S> own = diagonal_part(P[k]);
-    for (int j = first(k); j < last(k); ++j) add_symmetric_product(plus, (S(0.5) * (dot(H[j], own * H[j]) + J[j])) * G[j], G[j]);
-    pycraft::add(plus, own);
-    return plus;
-  }
+  Symmetric6<S> error_left(int k) const;
   // Υ(k) += H*D⁻¹H
   void add_hinge_compliance(int k) {
     const int n = tree_.dof[k], f = first(k);
@@ -412,7 +345,7 @@ class RigidBlocks {
 
   int first(int k) const { return tree_.dof_offset[k]; }
   int last(int k) const { return tree_.dof_offset[k + 1]; }
-  const Symmetric6<S>& six(int id, int k) const {
+  const Symmetric6<S>& six(SymbolId id, int k) const {
     switch (id) {
       case SymbolId::P: return P[k];
       case SymbolId::P_plus: return Pplus[k];
@@ -420,82 +353,9 @@ class RigidBlocks {
       default: return Y[k];
     }
   }
-  // D, G, P⁺ from P; false where a pivot is not positive.
-  bool eliminate_hinge_of_inertia(int k) {
-    const int n = tree_.dof[k], f = first(k);
-    Pplus[k] = P[k];
-    if (n == 0) return true;
-    S *d = D.data() + d_[k], *l = L.data() + d_[k], *pivots = pivots_.data() + f;
-    for (int j = 0; j < n; ++j) G[f + j] = P[k] * H[f + j];  // PH*
-    for (int i = 0; i < n; ++i)
-      for (int j = 0; j <= i; ++j) d[i * n + j] = d[j * n + i] = dot(H[f + i], G[f + j]) + (i == j ? J[f + i] : S(0));
-    if (n == 1) {
-      pivots[0] = d[0];
-      if (!(d[0] > S(0))) return false;
-      W[f] = (S(1) / d[0]) * G[f];
-      // P - (PH*)(PH*)*/D, symmetric by construction
-      downdate(Pplus[k], G[f], W[f]);
-      G[f] = W[f];
-    } else {
-      std::copy_n(d, n * n, l);
-      if (ldl_in_place(l, n, pivots) < n) return false;
-      for (int i = 0; i < n; ++i) {  // W = PH*L⁻*d⁻¹
-        for (int a = 0; a < i; ++a) G[f + i] = G[f + i] - l[i * n + a] * G[f + a];
-        W[f + i] = (S(1) / pivots[i]) * G[f + i];
-        downdate(Pplus[k], G[f + i], W[f + i]);
-      }
-      for (int i = n - 1; i >= 0; --i) {  // G = W L⁻¹
-        for (int a = i + 1; a < n; ++a) W[f + i] = W[f + i] - l[a * n + i] * W[f + a];
-        G[f + i] = W[f + i];
-      }
-    }
-    for (int j = f; j < f + n; ++j)
-      if (aligned[j] >= 0 && no_hinge_diagonal(k)) annihilate(Pplus[k], aligned[j]);
-    return true;
-  }
-  // Whether a pivot may be noise, so that the error sweep must tell. Two things make noise: what a hinge carries rounds at its composite
-  // inertia, not at the pivot, and light pivots y² » D enlarge what was there. The first is added up, the second multiplied, from the
-  // tips; of ratios y²/D only what exceeds 16 counts, or long chains of oblique axes would all be in doubt, and only products above the
-  // fifth root of the rounding bound's inverse are. A machine of coordinate axes has y² = D.
-  bool doubtful(int k) {
-    const int n = tree_.dof[k], f = first(k);
-    if (n == 0) return false;
-    S *own = pivot_work_.data(), *carried = own + n, *w = carried + n;
-    const S furthest = maximum(reach_[k], lever_[k]), inertia_bound = S(4) * (rotational_[k] + mass_[k] * furthest * furthest);
-    for (int i = 0; i < n; ++i) {
-      const Vector6<S>& h = H[f + i];
-      carried[i] = dot(h.angular, h.angular) * inertia_bound + S(2) * dot(h.linear, h.linear) * mass_[k] + J[f + i];
-      own[i] = aligned[f + i] >= 0 ? D[d_[k] + i * n + i] : S(own_rounding(k, h) + J[f + i]);
-    }
-    S fresh = S(0), grown = S(1);
-    for (int j = 0; j < n; ++j) {
-      const S inverse = S(1) / pivots_[f + j];
-      fresh = maximum(fresh, S(inverse * pivot_reach(L.data() + d_[k], n, j, carried, w)));
-      grown = maximum(grown, S(inverse * pivot_reach(L.data() + d_[k], n, j, own, w)));
-    }
-    if (!(S(1) > faint_ratio<S>(form) * fresh)) note_faint(k, own, carried, w);
-    error_[k] += rounding_bound<S>(form) * fresh;
-    growth_[k] *= maximum(S(1), S(grown / S(16)));
-    if (!(S(1) > gain_bound<S>(form) * grown)) return true;
-    return !(largest_growth(form) > growth_[k] && S(1) > S(4) * error_[k] * growth_[k]);
-  }
-  // Lengths are right to eps of themselves, so that where a linear inertia p remains, rows of columns for turns are right to eps l √p. What a
-  // body carries has p at most its mass; only where that leaves a doubt it is taken from P.
-  void note_faint(int k, const S* own, S* squares, S* w) {
-    const int n = tree_.dof[k], f = first(k);
-    for (const bool exact : {false, true}) {
-      const S linear = lever_[k] * lever_[k] * (exact ? linear_trace(k) : S(S(3) * mass_[k]));
-      for (int i = 0; i < n; ++i) squares[i] = dot(H[f + i].angular, H[f + i].angular) * linear + (aligned[f + i] >= 0 ? S(0) : own[i]);
-      bool sound = true;
-      for (int j = 0; j < n; ++j) {
-        const S ratio = pivot_reach(L.data() + d_[k], n, j, squares, w) / pivots_[f + j];
-        if (S(1) > faint_ratio<S>(form) * ratio) continue;
-        sound = false;
-        if (exact && !(faint_.ratio > to_double(ratio))) faint_ = {k, j, to_double(pivots_[f + j]), to_double(ratio)};
-      }
-      if (sound) return;
-    }
-  }
+  bool eliminate_hinge_of_inertia(int k);
+  bool doubtful(int k);
+  void note_faint(int k, const S* own, S* squares, S* w);
   // P(3,3) + P(4,4) + P(5,5)
   S linear_trace(int k) const { return form == Form::fast ? S(P[k].C(0, 0) + P[k].C(1, 1) + P[k].C(2, 2)) : factors_->linear_trace(); }
   static S longest(const Vector3<S>& l) {
@@ -509,28 +369,13 @@ class RigidBlocks {
     return growth[static_cast<int>(form)];
   }
   static S of_fifth_root(Form form) { return S(std::pow(double(to_double(rounding_bound<S>(form))), -0.2)); }
-  // Σ h(i)² P(i,i)
-  S own_rounding(int k, const Vector6<S>& h) const {
-    S sum = S(0);
-    for (int i = 0; i < 6; ++i) sum += h[i] * h[i] * (form == Form::fast ? P[k](i, i) : factors_->diagonal(i));
-    return sum;
-  }
+  S own_rounding(int k, const Vector6<S>& h) const;
   bool no_hinge_diagonal(int k) const {
     for (int j = first(k); j < last(k); ++j)
       if (!(J[j] == S(0))) return false;
     return true;
   }
-  // (I - Σ b a*) A (I - Σ a b*) for the rows a, b of hinge k.
-  Symmetric6<S> projected(const Symmetric6<S>& A, const std::vector<Vector6<S>>& a, const std::vector<Vector6<S>>& b, int k) const {
-    Symmetric6<S> Q = A;
-    // A - Σ_j (b_j (A a_j)* + (A a_j) b_j*) + Σ_ij b_i (a_i* A a_j) b_j*
-    for (int j = first(k); j < last(k); ++j) {
-      Vector6<S> u = S(-1) * (A * a[j]);
-      for (int i = first(k); i < last(k); ++i) u = u + (S(0.5) * dot(a[i], A * a[j])) * b[i];
-      add_symmetric_product(Q, u, b[j]);
-    }
-    return Q;
-  }
+  Symmetric6<S> projected(const Symmetric6<S>& A, const std::vector<Vector6<S>>& a, const std::vector<Vector6<S>>& b, int k) const;
 
   const SkoStructure& tree_;
   std::vector<size_t> d_;
@@ -542,3 +387,6 @@ class RigidBlocks {
 };
 
 }  // namespace pycraft
+
+#include "rigid/rigid_elimination.h"
+#include "rigid/rigid_residuals.h"

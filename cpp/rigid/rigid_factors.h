@@ -88,26 +88,8 @@ class RigidFactors {
       positive &= pivots[j] > S(0);
       for (int i = 0; i < n; ++i) L[i * n + j] = i < j ? S(0) : ratio_or_zero(factors_.lower(i, j), factors_.lower(j, j));
     }
-    if (!positive) return false;
-    for (int i = 0; i < n; ++i)
-      for (int j = 0; j <= i; ++j) {
-        S sum = S(0);
-        for (int a = 0; a <= j; ++a) sum += factors_.lower(i, a) * factors_.weight(a) * factors_.lower(j, a);
-        D[i * n + j] = D[j * n + i] = sum;
-      }
-    for (int j = n - 1; j >= 0; --j) {
-      Vector6<S> g;
-      for (int i = 0; i < 6; ++i) g[i] = factors_.against(i, j);
-      S bias = factors_.bias(j);
-      for (int a = j + 1; a < n; ++a) {
-        g = g - factors_.lower(a, j) * G[a];
-        bias -= factors_.lower(a, j) * bias_[tree_.dof_offset[k] + a];
-      }
-      const S scale = S(1) / factors_.lower(j, j);
-      G[j] = scale * g;
-      bias_[tree_.dof_offset[k] + j] = scale * bias;
-    }
-    return true;
+    if (positive) read_gains(k, G, D);
+    return positive;
   }
   const S* bias(int k) const { return bias_.data() + tree_.dof_offset[k]; }
   // ---- of the body whose hinge was eliminated last
@@ -152,6 +134,29 @@ class RigidFactors {
   }
 
  private:
+  // D = L_D d L_D*, G and the bias' rates by the triangle on top of the factors.
+  void read_gains(int k, Vector6<S>* G, S* D) {
+    const int n = tree_.dof[k];
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j <= i; ++j) {
+        S sum = S(0);
+        for (int a = 0; a <= j; ++a) sum += factors_.lower(i, a) * factors_.weight(a) * factors_.lower(j, a);
+        D[i * n + j] = D[j * n + i] = sum;
+      }
+    for (int j = n - 1; j >= 0; --j) {
+      Vector6<S> g;
+      for (int i = 0; i < 6; ++i) g[i] = factors_.against(i, j);
+      S bias = factors_.bias(j);
+      for (int a = j + 1; a < n; ++a) {
+        g = g - factors_.lower(a, j) * G[a];
+        bias -= factors_.lower(a, j) * bias_[tree_.dof_offset[k] + a];
+      }
+      const S scale = S(1) / factors_.lower(j, j);
+      G[j] = scale * g;
+      bias_[tree_.dof_offset[k] + j] = scale * bias;
+    }
+  }
+
   const SkoStructure& tree_;
   FactoredInertia<S> factors_;
   std::vector<S> bias_, weighted_;

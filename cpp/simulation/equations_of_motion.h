@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "model/configuration_rate.h"
+#include "model/configuration.h"
 #include "runtime/interrupt.h"
 #include "simulation/trajectory.h"
 
@@ -41,26 +41,16 @@ class EquationsOfMotion {
 
 // The inverse of the exponential's differential on the group, to the order that a method of order 4 needs: along u, a body velocity v is
 //   u̇ = v + ½ [u, v] + 1/12 [u, [u, v]],
-// [,] zero for pins, sliders and screws, ω×ω for ball hinges and the cross product of twists for free ones.
+// [,] the bracket of each subhinge's group.
 template <class S>
 void exponential_coordinates_rate(const CompiledModel<S>& model, const S* u, const S* v, S* rate) {
   const S half = S(1) / S(2), twelfth = S(1) / S(12);
-  for (const CompiledSubhinge<S>& h : model.subhinges) {
-    if (h.kind == SubhingeKind::ball) {
-      const Vector3<S> along{u[0], u[1], u[2]}, w{v[0], v[1], v[2]};
-      const Vector3<S> once = cross(along, w), twice = cross(along, once);
-      for (int i = 0; i < 3; ++i) rate[i] = w[i] + half * once[i] + twelfth * twice[i];
-      u += 3, v += 3, rate += 3;
-    } else if (h.kind == SubhingeKind::free) {
-      const Vector6<S> along{{u[0], u[1], u[2]}, {u[3], u[4], u[5]}}, w{{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
-      const Vector6<S> once = cross_motion(along, w), twice = cross_motion(along, once);
-      for (int i = 0; i < 6; ++i) rate[i] = w[i] + half * once[i] + twelfth * twice[i];
-      u += 6, v += 6, rate += 6;
-    } else {
-      *rate++ = *v++;
-      ++u;
-    }
-  }
+  each_subhinge(model, [&](auto row, int, int at) {
+    S once[row.nv], twice[row.nv];
+    row.bracket(u + at, v + at, once);
+    row.bracket(u + at, static_cast<const S*>(once), twice);
+    for (int i = 0; i < row.nv; ++i) rate[at + i] = v[at + i] + half * once[i] + twelfth * twice[i];
+  });
 }
 
 // Runge-Kutta-Munthe-Kaas: the classical method of order 4 in exponential coordinates u about the step's first configuration, q = q₀ exp(u).

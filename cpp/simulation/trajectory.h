@@ -1,4 +1,4 @@
-// Trajectories of a model: q̇ = N(q) v (model/configuration_rate.h), v̇ from a callable, under constant generalized forces and viscous
+// Trajectories of a model: q̇ = N(q) v (model/configuration.h), v̇ from a callable, under constant generalized forces and viscous
 // damping, T = tau - d ∘ v. Steppers of Boost.Odeint on (q, v) as numbers, and one on the model's group:
 //
 // dopri5          Runge-Kutta 5(4) of Dormand and Prince    steps controlled by rtol and atol

@@ -80,6 +80,19 @@ inline Quaternion<S> with_squares(const Quaternion<S>& q) {
   return {scale * q.w, scale * q.x, scale * q.y, scale * q.z};
 }
 
+// |q|, also where squares overflow or vanish.
+template <class S>
+inline S length(const Quaternion<S>& q) {
+  using std::abs;
+  using std::sqrt;
+  const S square = q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z;
+  if (square > S(1e-20) && S(1e20) > square) return sqrt(square);
+  const S largest = maximum(maximum(S(abs(q.w)), S(abs(q.x))), maximum(S(abs(q.y)), S(abs(q.z))));
+  if (!(largest > S(0))) return S(0);
+  const S w = q.w / largest, x = q.x / largest, y = q.y / largest, z = q.z / largest;
+  return largest * sqrt(S(w * w + x * x + y * y + z * z));
+}
+
 // R(q/|q|): the quaternion is used normalised and never rewritten.
 template <class S>
 inline Matrix3<S> quaternion_rotation(const Quaternion<S>& given) {

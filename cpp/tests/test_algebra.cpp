@@ -20,6 +20,55 @@ const std::vector<int> branched{-1, 0, 1, 1, 0, 4, -1}, serial{-1, 0, 1, 2, 3};
 // Products of a dozen blocks of a well-conditioned tree round to about a thousand epsilon.
 constexpr double rounding = 1e-12;
 
+// A letter of one's own: a record, and a source whose values know its blocks, twice M(k).
+const SymbolDefinition& doubled() {
+  static const SymbolDefinition record = {static_cast<SymbolId>(1000), "doubled", "M₂", "M_2", "twice the inertias", SpaceKind::V, SpaceKind::F, Pattern::block_diagonal,
+                                          {.symmetric = true}};
+  return record;
+}
+
+template <class S>
+class DoubledValues final : public TreeValues<DenseBlocks<S>> {
+ public:
+  DoubledValues(const SkoStructure& tree, const MatrixTree& numbers) : TreeValues<DenseBlocks<S>>(tree), numbers_(numbers) {}
+  void block(const Symbol& symbol, int k, S* out) const override {
+    if (symbol.definition != &doubled()) return TreeValues<DenseBlocks<S>>::block(symbol, k, out);
+    std::transform(numbers_.M[k].begin(), numbers_.M[k].end(), out, [](double x) { return S(2 * x); });
+  }
+
+ protected:
+  void set_state(const double*, const double*) override {}
+  void fill() override {
+    const auto copy = [](const std::vector<double>& from, S* to) { std::transform(from.begin(), from.end(), to, [](double x) { return S(x); }); };
+    for (int k = 0; k < this->tree_.bodies(); ++k) {
+      if (this->tree_.parent[k] >= 0) copy(numbers_.E[k], this->blocks_.edge(k));
+      copy(numbers_.H[k], this->blocks_.hinge_map(k)), copy(numbers_.M[k], this->blocks_.mass(k)), copy(numbers_.J[k], this->blocks_.hinge_diagonal(k));
+    }
+  }
+
+ private:
+  const MatrixTree& numbers_;
+};
+
+class DoubledTree final : public SkoSource {
+ public:
+  explicit DoubledTree(std::shared_ptr<MatrixTree> numbers) : SkoSource(numbers->structure(), "doubled"), numbers_(std::move(numbers)) {}
+  Traits traits() const override { return numbers_->traits(); }
+  BlockCosts costs(int k) const override { return numbers_->costs(k); }
+  int nq() const override { return 0; }
+  int nv() const override { return 0; }
+  void check_state(const double*, size_t, const double*, size_t) const override {}
+  std::shared_ptr<const StateData> state() const override { return numbers_->state(); }
+  std::uint64_t parameters() const override { return 0; }
+#define PYCRAFT_MAKE_VALUES(S) \
+  std::unique_ptr<SkoValues<S>> make_values(S) const override { return std::make_unique<DoubledValues<S>>(structure(), *numbers_); }
+  PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_MAKE_VALUES)
+#undef PYCRAFT_MAKE_VALUES
+
+ private:
+  std::shared_ptr<MatrixTree> numbers_;
+};
+
 }  // namespace
 
 BOOST_AUTO_TEST_CASE(dense_forms_follow_their_definitions) {
@@ -47,8 +96,8 @@ BOOST_AUTO_TEST_CASE(theorems_hold_or_fail_as_stated) {
       const auto tree = random_tree(3, parents, with_J);
       for (const Theorem& t : sko_theorems(tree)) {
         if (!std::holds_alternative<Expression>(t.lhs) || t.at_most) continue;
-        const bool applies = unmet(t.hypotheses, tree->traits()) == 0;
-        if (t.hypotheses & free_root) continue;  // Υ has no inverse without one
+        const bool applies = unmet(t.hypotheses, tree->traits()) == Hypothesis::no_hypothesis;
+        if (contains(t.hypotheses, Hypothesis::free_root)) continue;  // Υ has no inverse without one
         std::map<std::string, std::vector<double>> vectors;
         const Residual r = residual(std::get<Expression>(t.lhs), std::get<Expression>(t.rhs), vectors, t.on_one_path);
         const double relative = r.difference / std::max({r.left, r.right, 1.0});
@@ -170,4 +219,22 @@ BOOST_AUTO_TEST_CASE(degenerate_trees) {
   BOOST_TEST(r.values[0] == 0.0);
   const Letters one(random_tree(9, {-1}));
   BOOST_TEST(difference(dense((one.H * one.phi * one.M * one.phi.T() * one.H.T()).inv()), dense(one.D.inv())) < rounding);
+}
+
+BOOST_AUTO_TEST_CASE(a_letter_of_ones_own_is_a_record_and_blocks) {
+  const auto tree = std::make_shared<DoubledTree>(random_tree(4, branched, true));
+  const Letters o(tree);
+  const Expression M2 = make_symbol(doubled(), tree);
+  BOOST_TEST(show(o.H * o.phi * M2) == "H φ M₂");
+  BOOST_TEST(show(M2, Style::latex) == "M_2");
+  BOOST_TEST(is_block_diagonal(M2));
+  BOOST_TEST(is_symmetric(o.phi * M2 * o.phi.T()));
+  const Expression X = o.H * o.phi * M2 * o.phi.T() * o.H.T() + o.J;
+  const Dense H = dense(o.H), phi = dense(o.phi), M = dense(o.M), J = dense(o.J);
+  const Dense value = 2 * H * phi * M * phi.transpose() * H.transpose() + J;
+  BOOST_TEST(difference(dense(X), value) < rounding);
+  BOOST_TEST(difference(dense(X.inv()), value.inverse()) < rounding * value.norm() * value.inverse().norm());  // over the tree, as any sum is
+  BOOST_TEST(difference(dense(block_diagonal(o.phi * M2 * o.phi.T())), 2 * dense(o.R)) < rounding);
+  BOOST_TEST((M2 == make_symbol(doubled(), tree)));
+  BOOST_CHECK_THROW(make_symbol(doubled(), tree, OfCoordinate{0}), EvaluationError);
 }

@@ -74,8 +74,8 @@ BOOST_AUTO_TEST_CASE(runs_of_plans) {
   for (int k = 0; k < 150; ++k) chain[k] = k - 1;
   const Expression long_phi = Letters(random_tree(2, chain)).phi;
   const Expression C = dense_constant(MM.domain(), MM.codomain()), I = identity(MM.domain());
-  const auto mechanics = [&](MechanicsSymbolId id) { return mechanics_operator(id, source); };
-  const Expression crf_V = mechanics(pycraft::V_bar), a = mechanics(coriolis_acceleration), b = mechanics(gyroscopic_force);
+  const auto mechanics = [&](SymbolId id) { return mechanics_operator(id, source); };
+  const Expression crf_V = mechanics(SymbolId::V_bar), a = mechanics(SymbolId::coriolis_acceleration), b = mechanics(SymbolId::gyroscopic_force);
   auto twice = std::make_shared<ExternalData>();
   const int n = MM.domain().dimension();
   twice->apply = twice->apply_transposed = [n](const double* x, double* y, int columns) {

@@ -10,7 +10,7 @@
 #include "algebra/trees/sweeps/factored_inertia.h"
 #include "algebra/trees/sweeps/residual_rounding.h"
 #include "algebra/trees/sweeps/singular_pivot.h"
-#include "model/configuration_rate.h"
+#include "model/configuration.h"
 #include "numerics/equilibration.h"
 #include "numerics/gram_factors.h"
 #include "numerics/pack.h"

@@ -5,7 +5,7 @@
 #include "allocations.h"
 #include "dynamics/methods.h"
 #include "dynamics/rigid_dynamics.h"
-#include "model/configuration_rate.h"
+#include "model/configuration.h"
 #include "robot.h"
 #include "simulation/trajectory.h"
 

@@ -165,6 +165,21 @@ def bench(seconds: Annotated[float, typer.Option(help="Seconds per figure.")] = 
     raise typer.Exit(1 if missed else 0)
 
 
+def _write(table: Any, csv: Path | None, json: Path | None, plot: Path | None) -> None:
+    """The table as files, those that were asked for."""
+    if csv:
+        table.to_csv(csv)
+    if json:
+        table.to_json(json)
+    if plot:
+        import matplotlib
+
+        matplotlib.use("Agg")
+        axes = table.plot()
+        figure = axes.figure if hasattr(axes, "figure") else axes[0].figure
+        figure.savefig(plot, dpi=150, bbox_inches="tight")
+
+
 @app.command()
 def accuracy(
     model: Model,
@@ -236,17 +251,7 @@ def accuracy(
         console.print(escape(text), highlight=False)
     for reason, labels in table.refusals.items():
         console.print(f"[bold]refused:[/] {escape('; '.join(labels))}: {escape(reason)}", highlight=False)
-    if csv:
-        table.to_csv(csv)
-    if json:
-        table.to_json(json)
-    if plot:
-        import matplotlib
-
-        matplotlib.use("Agg")
-        axes = table.plot()
-        figure = axes[0].figure if integration else axes.figure
-        figure.savefig(plot, dpi=150, bbox_inches="tight")
+    _write(table, csv, json, plot)
     for path in (csv, json, plot):
         if path:
             note(f"wrote {path}")

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
 LARGEST = 4
 
+_TAKES = {s.name: s.takes for s in _core.symbols}
+"""What letters are called with."""
+
 
 def symbolic(
     model: Multibody,
@@ -124,10 +127,11 @@ class ClosedForms:
             raise AttributeError(name)
         from .sparse_letters import LETTERS
 
-        if name in ("B", "Jacobian", "Lambda"):
-            return lambda nodes: self._letter(name, [nodes] if isinstance(nodes, str) else list(nodes))
-        if name == "Delta":
-            return lambda coordinate: self._letter(name, self._coordinate(coordinate))
+        match _TAKES.get(name):
+            case "nodes":
+                return lambda nodes: self._letter(name, ("nodes", nodes) if isinstance(nodes, str) else ("nodes", *nodes))
+            case "coordinate":
+                return lambda coordinate: self._letter(name, ("coordinate", self._coordinate(coordinate)))
         if name not in LETTERS:
             raise AttributeError(f"no closed form is called {name!r}; there are {', '.join(LETTERS)}, and evaluate(expression)")
         return self._letter(name)
@@ -142,11 +146,10 @@ class ClosedForms:
         made = tuple(getattr(self, name) for name in names.split())
         return made[0] if len(made) == 1 else made
 
-    def _letter(self, name: str, argument: Any = None) -> sympy.ImmutableDenseMatrix:
-        key = (name, tuple(argument) if isinstance(argument, list) else argument)
-        if key not in self._shown:
-            self._shown[key] = self._letters(name, argument).sympy(self._simplify)
-        return self._shown[key]
+    def _letter(self, name: str, of: tuple[Any, ...] = ()) -> sympy.ImmutableDenseMatrix:
+        if (name, of) not in self._shown:
+            self._shown[name, of] = self._letters(name, of).sympy(self._simplify)
+        return self._shown[name, of]
 
     def _coordinate(self, coordinate: int | str) -> int:
         names = self.model.coordinate_names

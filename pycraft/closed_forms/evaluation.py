@@ -53,13 +53,7 @@ class Evaluation:
     # ------------------------------------------------------------------ leaves
     def _symbol(self, e: Any) -> Matrix:
         _require_unbound(e, e.letter.binding)
-        match e.letter.arguments:
-            case []:
-                return self._letters(e.name)
-            case [int(coordinate)]:
-                return self._letters(e.name, coordinate)
-            case several:
-                return self._letters(e.name, several)
+        return self._letters(e.name, e.letter.arguments)
 
     def _function(self, e: Any) -> Matrix:
         """Block functions, which derivatives bring up: crm, crf, mcross of a vector, the lower triangle with half its diagonal."""

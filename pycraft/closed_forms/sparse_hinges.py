@@ -9,14 +9,14 @@ from typing import Any
 
 import sympy
 
+from .. import _core
 from ..proofs.rational import Rationals
 from .parameters import Parameters
 from .sparse import Matrix
 from .sparse_spatial import Pose, composed, force_transform, rotation_of, skew, still
 
-Q_SIZE = {"pin": 1, "slider": 1, "screw": 1, "ball": 4, "free": 7}
-V_SIZE = {"pin": 1, "slider": 1, "screw": 1, "ball": 3, "free": 6}
-ANGLES = ("pin", "screw")
+KINDS = _core.subhinge_kinds
+"""Sizes of the kinds of subhinges by name."""
 
 
 class Hinges:
@@ -46,18 +46,19 @@ class Hinges:
         at, found = 0, []
         for body in self._parameters.bodies:
             for s in body["subhinges"]:
-                found.append((s, self._q[at : at + Q_SIZE[s["kind"]]]))
-                at += Q_SIZE[s["kind"]]
+                found.append((s, self._q[at : at + KINDS[s["kind"]].nq]))
+                at += KINDS[s["kind"]].nq
         return found
 
     def _quaternions(self) -> list[list[sympy.Symbol]]:
-        return [q[:4] for s, q in self._subhinges() if s["kind"] in ("ball", "free")]
+        starts = ((KINDS[s["kind"]].quaternion, q) for s, q in self._subhinges())
+        return [q[at : at + 4] for at, q in starts if at is not None]
 
     def _atoms(self) -> list[sympy.Expr]:
         """What entries are rational in: sines and cosines of angles, the other coordinates."""
         atoms: list[sympy.Expr] = []
         for s, q in self._subhinges():
-            if s["kind"] in ANGLES:
+            if KINDS[s["kind"]].angle:
                 atoms += [sympy.sin(q[0]), sympy.cos(q[0])]
             if s["kind"] != "pin":
                 atoms += q

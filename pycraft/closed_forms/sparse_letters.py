@@ -15,7 +15,7 @@ import sympy
 from .. import _core
 from .parameters import Parameters
 from .sparse import Matrix
-from .sparse_hinges import V_SIZE, Hinges
+from .sparse_hinges import KINDS, Hinges
 from .sparse_spatial import Pose, composed, crf, crm, force_transform, in_blocks, momentum_cross, skew, still
 
 
@@ -34,7 +34,7 @@ class Letters:
         self.hinges = Hinges(parameters, q, v, unit)
         self.field = self.hinges.field
         self.parents = [b["parent"] for b in parameters.bodies]
-        ends = list(accumulate(sum(V_SIZE[s["kind"]] for s in b["subhinges"]) for b in parameters.bodies))
+        ends = list(accumulate(sum(KINDS[s["kind"]].nv for s in b["subhinges"]) for b in parameters.bodies))
         self.coordinates = [slice(i, j) for i, j in zip([0, *ends], ends, strict=False)]
         self.states = [slice(6 * k, 6 * k + 6) for k in range(len(self.parents))]
         self._made: dict[Any, Matrix] = {}
@@ -43,15 +43,13 @@ class Letters:
         return Matrix.of(self.field, entries, columns)
 
     # ------------------------------------------------------------------ letters
-    def __call__(self, name: str, argument: Any = None) -> Matrix:
-        """A letter by its ASCII name; node names or a coordinate as argument."""
-        key = (name, tuple(argument) if isinstance(argument, list) else argument)
-        if key not in self._made:
+    def __call__(self, name: str, of: tuple[Any, ...] = ()) -> Matrix:
+        """A letter by its ASCII name, and what it is of as `Letter.arguments` has it."""
+        if (name, of) not in self._made:
             if name not in LETTERS:
                 raise _core.EvaluationError(f"the letter {name!r} has no closed form here")
-            made = LETTERS[name](self) if argument is None else LETTERS[name](self, argument)  # type: ignore[call-arg]  # as the letter takes
-            self._made[key] = made
-        return self._made[key]
+            self._made[name, of] = LETTERS[name](self, of) if of else LETTERS[name](self)  # type: ignore[call-arg]  # as the letter takes
+        return self._made[name, of]
 
     def _zeros(self, rows: str, columns: str) -> Matrix:
         size = {"t": self.coordinates[-1].stop if self.coordinates else 0, "s": 6 * len(self.parents)}
@@ -139,8 +137,8 @@ class Letters:
                 (P, s, s, inertia), (D, t, t, d), (inverse, t, t, inverted), (G, s, t, gain), (P_plus, s, s, inertia - gain @ force.T),
             ):  # fmt: skip
                 made.place(row, column, block)
-        self._made |= {(n, None): x for n, x in zip(("P", "P_plus", "D", "D_inverse", "G"), (P, P_plus, D, inverse, G), strict=True)}
-        return self._made[name, None]
+        self._made |= {(n, ()): x for n, x in zip(("P", "P_plus", "D", "D_inverse", "G"), (P, P_plus, D, inverse, G), strict=True)}
+        return self._made[name, ()]
 
     def _Upsilon(self) -> Matrix:
         """Υ(k) = H*(k)D⁻¹(k)H(k) + E_ψ*(p,k)Υ(p)E_ψ(p,k), base to tip."""
@@ -165,7 +163,8 @@ class Letters:
                 return node["body"], (self._matrix(node["rotation"]), self._matrix([[x] for x in node["position"]], 1))
         raise _core.ModelError(f"no node or body is called {name!r}")
 
-    def _B(self, names: Sequence[str]) -> Matrix:
+    def _B(self, of: tuple[Any, ...]) -> Matrix:
+        _, *names = of
         made = Matrix.zeros(self.field, 6 * len(self.parents), 6 * len(names))
         for j, name in enumerate(names):
             k, pose = self._node(name)
@@ -173,15 +172,15 @@ class Letters:
                 made.place(self.states[k], slice(6 * j, 6 * j + 6), force_transform(pose))
         return made
 
-    def _Lambda(self, names: Sequence[str]) -> Matrix:
-        B = self("B", names)
+    def _Lambda(self, of: tuple[Any, ...]) -> Matrix:
+        B = self("B", of)
         return (B.T @ self("Omega") @ B).inverse()
 
-    def _twist(self, direction: int | Sequence[int]) -> Matrix:
-        """h, stacked: the twist of a coordinate, or (k, p, c): component c in the axes before subhinge p of body k; in the body's axes."""
-        if isinstance(direction, int):
-            return self("H").T.block(slice(0, 6 * len(self.parents)), slice(direction, direction + 1))
-        k, position, component = direction
+    def _twist(self, of: tuple[Any, ...]) -> Matrix:
+        """h, stacked: the twist of a coordinate, or component c in the axes before subhinge p of body k; in the body's axes."""
+        if of[0] == "coordinate":
+            return self("H").T.block(slice(0, 6 * len(self.parents)), slice(of[1], of[1] + 1))
+        _, k, position, component = of
         made = Matrix.zeros(self.field, 6 * len(self.parents), 1)
         unit = Matrix.identity(self.field, 6).block(slice(0, 6), slice(component, component + 1))
         made.place(
@@ -189,14 +188,14 @@ class Letters:
         )
         return made
 
-    def _Delta(self, direction: int | Sequence[int]) -> Matrix:
-        return self._each(crf, self("h", direction))
+    def _Delta(self, of: tuple[Any, ...]) -> Matrix:
+        return self._each(crf, self("h", of))
 
-    def _Pi(self, which: int | Sequence[int]) -> Matrix:
-        """Π: ones at one coordinate, or at those of subhinges first to last of hinge k (-1: of all), (k, first, last)."""
-        chosen = [which]
-        if not isinstance(which, int):
-            body, first, last = which
+    def _Pi(self, of: tuple[Any, ...]) -> Matrix:
+        """Π: ones at one coordinate, or at those of subhinges first to last of hinge k (-1: of all)."""
+        chosen = [of[1]]
+        if of[0] == "subhinges":
+            _, body, first, last = of
             chosen = []
             for k, (parts, t) in enumerate(zip(self.hinges.rows, self.coordinates, strict=True)):
                 ends = list(accumulate((len(p.rows) for p in parts), initial=t.start))
@@ -205,9 +204,9 @@ class Letters:
         rows = [{i: self.field.one} if i in chosen else {} for i in range(len(self.v))]
         return Matrix(self.field, rows, len(self.v))
 
-    def _dM(self, arguments: Sequence[int]) -> Matrix:
-        """∂M by mass, centre of mass (3) and inertia (xx xy xz yy yz zz) of one body, one after the other: (k, parameter, ...)."""
-        k, *parameters = arguments
+    def _dM(self, of: tuple[Any, ...]) -> Matrix:
+        """∂M by mass, centre of mass (3) and inertia (xx xy xz yy yz zz) of one body, one after the other."""
+        _, k, *parameters = of
         m, *c = sympy.symbols("m c:3", cls=sympy.Dummy)
         inertia = sympy.symbols("i:6", cls=sympy.Dummy)
         xx, xy, xz, yy, yz, zz = inertia
@@ -290,7 +289,7 @@ LETTERS: dict[str, Callable[..., Matrix]] = {
     "Upsilon": Letters._Upsilon,
     "Omega": lambda o: o("psi").T @ o("H").T @ o("D_inverse") @ o("H") @ o("psi"),
     "B": Letters._B,
-    "Jacobian": lambda o, names: o("B", names).T @ o("phi").T @ o("H").T,
+    "Jacobian": lambda o, of: o("B", of).T @ o("phi").T @ o("H").T,
     "Lambda": Letters._Lambda,
     "Delta": Letters._Delta,
     "h": Letters._twist,  # this and the next two come up in derivatives

@@ -131,12 +131,12 @@ def _scales(node: Node) -> tuple[tuple[Fraction, str], ...]:
 
 
 def _of_letter(letter: Letter) -> Iterator[tuple[Node, Slip]]:
-    from .formula import SYMBOLS
+    from .formula import INDEXED, SYMBOLS
 
     if letter.arguments:
         return
     for name in SYMBOLS:
-        if name in (letter.name, "N", "I", "B", "Jacobian", "Lambda", "Delta"):
+        if name in (letter.name, "N", "I", *INDEXED):
             continue
         new = Letter(name)
         pair = {name, letter.name}

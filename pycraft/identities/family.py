@@ -21,21 +21,10 @@ from ..models.generators import tree
 from ..state import State
 from .parse import Statement, Statements
 
-DOF = {
-    "weld": 0,
-    "pin": 1,
-    "slider": 1,
-    "screw": 1,
-    "universal": 2,
-    "cylindrical": 2,
-    "gimbal": 3,
-    "planar": 3,
-    "ball": 3,
-    "custom": 3,
-    "free": 6,
-}
-"""Degrees of freedom of the hinge kinds, fewest first."""
-ONE_SUBHINGE = ("weld", "pin", "slider", "screw", "ball", "free")
+_SIZES = {kind: row.nv for kind, row in _core.hinge_kinds.items()} | {"custom": 3}
+DOF = dict(sorted(_SIZES.items(), key=lambda item: item[1]))
+"""Degrees of freedom of the hinge kinds, fewest first; of the custom hinges of `pycraft.tree`."""
+ONE_SUBHINGE = tuple(kind for kind, row in _core.hinge_kinds.items() if len(row.subhinges) < 2 and kind != "custom")
 """Kinds whose H is constant."""
 HYPOTHESES = ("J = 0", "serial chain", "constant H", "single-DOF hinges", "free root")
 """The standard hypotheses, as the theorems name them."""

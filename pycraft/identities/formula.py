@@ -12,9 +12,9 @@ from fractions import Fraction
 from .. import _core
 from ..formula_nodes import Node, Product, Suffixed, flat
 
-SYMBOLS = {name: shown for name, shown, *_ in _core.symbol_table()} | {"MM": "ℳ", "I": "I", "N": "N"}
+SYMBOLS = {s.name: s.text for s in _core.symbols} | {"MM": "ℳ", "I": "I", "N": "N"}
 FUNCTIONS = ("inv", "blockdiag", "sqrt", "trace", "tr", "logdet", "norm")
-INDEXED = ("B", "Jacobian", "Lambda", "Delta")
+INDEXED = tuple(s.name for s in _core.symbols if s.takes != "nothing")
 
 
 @dataclass(frozen=True)

@@ -203,10 +203,9 @@ def _plain_letter(found: re.Match[str]) -> str:
     return _VARIANTS.get(plain, plain)
 
 
-_TABLE = _core.symbol_table()
-_OWN_LETTERS = {"ℳ"} | {shown for _, shown, *_ in _TABLE if len(shown) == 1 and not shown.isascii()}
+_OWN_LETTERS = {"ℳ"} | {s.text for s in _core.symbols if len(s.text) == 1 and not s.text.isascii()}
 _LETTERS = [
-    *sorted(((shown, f" {name} ") for name, shown, *_ in _TABLE if not shown.isascii()), key=lambda entry: -len(entry[0])),
+    *sorted(((s.text, f" {s.name} ") for s in _core.symbols if not s.text.isascii()), key=lambda entry: -len(entry[0])),
     ("ℳ", " MM "),
 ]
 

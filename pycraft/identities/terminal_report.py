@@ -29,7 +29,7 @@ _ACCENTED = re.compile(f"(\\w)([{''.join(_ACCENTS)}])")
 @lru_cache(maxsize=1)
 def _letters() -> list[tuple[str, str]]:
     """Letters that only a combining accent can write, and their ASCII names: the longest first."""
-    known = [(unicodedata.normalize("NFC", shown), name) for name, shown, *_ in _core.symbol_table()]
+    known = [(unicodedata.normalize("NFC", s.text), s.name) for s in _core.symbols]
     return sorted(((s, n) for s, n in known if any(unicodedata.combining(c) for c in s)), key=lambda e: -len(e[0]))
 
 

@@ -39,15 +39,13 @@ FUNCTIONS = {
     "sqrt": lambda x: x.sqrt(),
     "transpose": lambda x: x.T,
 }
-WITH_ARGUMENTS = ("B", "Jacobian", "Lambda", "Delta")
+WITH_ARGUMENTS = tuple(s.name for s in _core.symbols if s.takes != "nothing")
 LARGEST_POWER = 1000
 
-# Symbols in the order of the core's table: (ascii, unicode, latex, domain, codomain, meaning).
-_TABLE = _core.symbol_table()
-_NAMES = {entry[0] for entry in _TABLE}
+_NAMES = {s.name for s in _core.symbols}
 # What stands for a letter in ASCII where its own name is another: X, V; E_phi; and names typed without their underscores: taubar, Epsi.
 _ALIASES = {
-    **{shown: name for name, shown, *_ in _TABLE if shown != name and shown.isascii()},
+    **{s.text: s.name for s in _core.symbols if s.text != s.name and s.text.isascii()},
     **{name.replace("_", ""): name for name in _NAMES if "_" in name},
     "E_phi": "E",
     "Ephi": "E",

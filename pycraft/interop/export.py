@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import _core
 from . import mujoco as convention
 from .described import Described
 from .drake import drake_peer
@@ -23,7 +24,6 @@ from .peer import Peer, PeerRefusal, Vector
 
 _PINOCCHIO_BYTES = 64
 """Pinocchio's work space a coordinate cubed, measured: it holds tensors for second derivatives."""
-_Q_SIZE, _V_SIZE = {"ball": 4, "free": 7}, {"ball": 3, "free": 6}
 
 
 def _bodies(model: Described) -> list[dict[str, Any]]:
@@ -78,8 +78,8 @@ def to_pinocchio(model: Described) -> PinocchioModel:
                 moved = np.asarray(subhinge["point"], float) - point
                 point = point + moved
             parts.append((_pinocchio_joint(subhinge), pin.SE3(np.eye(3), moved)))
-            size_q, size_v = _Q_SIZE.get(subhinge["kind"], 1), _V_SIZE.get(subhinge["kind"], 1)
-            own_q, own_v = np.arange(at_q, at_q + size_q), np.arange(at_v, at_v + size_v)
+            kind = _core.subhinge_kinds[subhinge["kind"]]
+            own_q, own_v = np.arange(at_q, at_q + kind.nq), np.arange(at_v, at_v + kind.nv)
             if subhinge["kind"] == "ball":
                 quaternions.append(at_q)
                 own_q = own_q[[1, 2, 3, 0]]
@@ -88,7 +88,7 @@ def to_pinocchio(model: Described) -> PinocchioModel:
                 own_q, own_v = own_q[[4, 5, 6, 1, 2, 3, 0]], own_v[[3, 4, 5, 0, 1, 2]]
             of_q.extend(own_q)
             of_v.extend(own_v)
-            at_q, at_v = at_q + size_q, at_v + size_v
+            at_q, at_v = at_q + kind.nq, at_v + kind.nv
         outboard = pin.SE3(np.eye(3), -point)
         if not parts:
             outboard = inboard
@@ -183,7 +183,7 @@ def to_mjcf(model: Described) -> str:
             inertial.set("diaginertia", _numbers(np.diag(inertia)))
         at = 0
         for i, subhinge in enumerate(hinge["subhinges"]):
-            size = _V_SIZE.get(subhinge["kind"], 1)
+            size = _core.subhinge_kinds[subhinge["kind"]].nv
             _mujoco_joint(element, hinge, i, subhinge, np.asarray(hinge["rotor_inertia"], float)[at : at + size], parent)
             at += size
         elements.append(element)

@@ -11,8 +11,8 @@ from .. import _core
 from ..arguments import LARGEST, listed, name_of, one_number, parents_of, seed_of, text, whole
 from .multibody import Multibody
 
-_COORDINATES = {"universal": 2, "cylindrical": 2, "gimbal": 3, "planar": 3, "ball": 3, "custom": 3, "free": 6}  # of those with several
-KINDS = ("weld", "pin", "slider", "screw", "universal", "gimbal", "cylindrical", "planar", "ball", "free", "custom")
+_CUSTOM = ("pin", "slider", "pin")
+"""Subhinges of the custom hinges that are made here."""
 
 
 def chain(
@@ -49,9 +49,9 @@ def chain(
     for k in range(n):
         options: dict[str, Any] = {}
         if kind == "custom":
-            options["subhinges"] = [{"kind": s, "axis": (0, 0, 1)} for s in ("pin", "slider", "pin")]
-        elif kind in ("universal", "gimbal"):
-            options["axes"] = [(0, 0, 1), (0, 1, 0), (1, 0, 0)][: 2 if kind == "universal" else 3]
+            options["subhinges"] = [{"kind": s, "axis": (0, 0, 1)} for s in _CUSTOM]
+        elif kind in _core.hinge_kinds and _core.hinge_kinds[kind].axes > 1:
+            options["axes"] = [(0, 0, 1), (0, 1, 0), (1, 0, 0)][: _core.hinge_kinds[kind].axes]
         model.add_body(
             f"body{k}",
             f"body{k - 1}" if k else None,
@@ -88,19 +88,7 @@ def tree(
     rng = seed_of(seed)
     model = Multibody(name_of(name, "a model", f"tree of {len(parents)}"), welds=welds)
     for k, (parent, kind) in enumerate(zip(parents, kinds, strict=True)):
-        options: dict[str, Any] = {}
-        if kind == "custom":
-            options["subhinges"] = [{"kind": s, "axis": _axis(rng), "point": rng.uniform(-0.2, 0.2, 3)} for s in ("pin", "slider", "pin")]
-        elif kind in ("universal", "gimbal"):
-            options["axes"] = list(_orthogonal(rng)[: 2 if kind == "universal" else 3])
-            options["point"] = rng.uniform(-0.2, 0.2, 3)
-        elif kind in ("pin", "slider", "screw", "cylindrical", "planar"):
-            options["axis"] = _axis(rng)
-            options["point"] = rng.uniform(-0.2, 0.2, 3)
-            if kind == "screw":
-                options["pitch"] = rng.uniform(0.05, 0.3)
-        elif kind == "ball":
-            options["point"] = rng.uniform(-0.2, 0.2, 3)
+        options = _random_options(kind, rng)
         spread = rng.normal(size=(3, 3))
         inertia = 0.1 * spread @ spread.T + 0.05 * np.eye(3)
         # Second moments of a body are a positive definite matrix S; tr(S) 1 - S obeys the triangle inequality.
@@ -109,7 +97,7 @@ def tree(
             rotation=_orthogonal(rng), position=rng.uniform(-1, 1, 3), mass=rng.uniform(0.5, 3.0), com=rng.uniform(-0.2, 0.2, 3)
         )
         if rotor_inertia and kind != "weld":
-            options["rotor_inertia"] = rng.uniform(0.05, 0.5, _COORDINATES.get(kind, 1))
+            options["rotor_inertia"] = rng.uniform(0.05, 0.5, sum(_core.subhinge_kinds[s].nv for s in _subhinges(kind)))
         model.add_body(
             f"body{k}",
             f"body{parent}" if parent >= 0 else None,
@@ -119,6 +107,29 @@ def tree(
             **options,
         )
     return model
+
+
+def _subhinges(kind: str) -> tuple[str, ...]:
+    """The kinds of a hinge's subhinges; none for a name that is no kind."""
+    return _CUSTOM if kind == "custom" else _core.hinge_kinds[kind].subhinges if kind in _core.hinge_kinds else ()
+
+
+def _random_options(kind: str, rng: np.random.Generator) -> dict[str, Any]:
+    """Axes, point and pitch, as far as the kind has them."""
+    if kind == "custom":
+        return {"subhinges": [{"kind": s, "axis": _axis(rng), "point": rng.uniform(-0.2, 0.2, 3)} for s in _CUSTOM]}
+    subhinges = [_core.subhinge_kinds[s] for s in _subhinges(kind)]
+    options: dict[str, Any] = {}
+    axes = _core.hinge_kinds[kind].axes if subhinges else 0
+    if axes > 1:
+        options["axes"] = list(_orthogonal(rng)[:axes])
+    elif axes:
+        options["axis"] = _axis(rng)
+    if any(s.point for s in subhinges):
+        options["point"] = rng.uniform(-0.2, 0.2, 3)
+    if any(s.pitch for s in subhinges):
+        options["pitch"] = rng.uniform(0.05, 0.3)
+    return options
 
 
 def _axis(rng: np.random.Generator) -> np.ndarray:

@@ -13,9 +13,8 @@ from .. import _core
 from ..arguments import clipped
 from ..closed import Closed
 
-_NAMES = {entry[0]: entry for entry in _core.symbol_table()}
-_NODE_OPERATORS = ("B", "Jacobian", "Lambda")
-_PLAIN = tuple(name for name in _NAMES if name not in (*_NODE_OPERATORS, "Delta"))
+_NAMES = {s.name: s for s in _core.symbols}
+_PLAIN = tuple(s.name for s in _core.symbols if s.takes == "nothing")
 _OF_GROUPS = ("phi_S", "H_S")
 _SPACES = ("Theta", "V", "F")
 _COMPOSED: dict[str, Callable[[Any], _core.Operator]] = {
@@ -71,7 +70,7 @@ class OperatorSet(Closed):
             return self._made[name]
         if name in _SPACES:
             return getattr(self._source, name)
-        if name in _NODE_OPERATORS or name == "Delta":
+        if name in _NAMES and name not in _PLAIN:
             return _WithArguments(self, name)
         if name in _PLAIN or (name in _OF_GROUPS and self._source.groups is not None):
             if name not in self._made:
@@ -170,7 +169,7 @@ class _WithArguments:
 
     def __init__(self, operators: OperatorSet, name: str):
         self._operators, self._name = operators, name
-        self.__doc__ = _NAMES[name][-1]
+        self.__doc__ = _NAMES[name].meaning
 
     def __call__(self, argument: str | int | Sequence[str], directions: Any = None) -> _core.Operator:
         """The operator of these nodes (or, of Delta, along this coordinate).
@@ -185,17 +184,17 @@ class _WithArguments:
             if self._name != "Lambda":
                 raise _core.EvaluationError(f"{self._name} takes no directions; Lambda does")
             return _directed_inertia(self._operators, _listed(argument), directions)  # type: ignore[arg-type]  # _listed checks
-        if self._name != "Delta":
+        if _NAMES[self._name].takes == "nodes":
             return source.symbol(self._name, nodes=_listed(argument))  # type: ignore[arg-type]  # _listed checks
         if isinstance(argument, str):
             names = source.coordinate_names
             if argument not in names:
                 raise _core.ModelError(f"no coordinate of {source.name!r} is called {argument!r}; there are {', '.join(names[:12])}")
             argument = names.index(argument)
-        return source.symbol("Delta", coordinate=clipped(argument, f"a coordinate of {source.name!r}"))
+        return source.symbol(self._name, coordinate=clipped(argument, f"a coordinate of {source.name!r}"))
 
     def __repr__(self) -> str:
-        return f"<{self._name}: {_NAMES[self._name][-1]}>"
+        return f"<{self._name}: {_NAMES[self._name].meaning}>"
 
 
 _TWIST = ("rx", "ry", "rz", "x", "y", "z")
@@ -275,8 +274,8 @@ def operator_from_parts(
         "function",
     )[kind]
     if name == "symbol":
-        source, symbol, numbers, nodes, text, binding = payload
-        made = source._symbol_again(symbol, numbers, nodes, text)
+        source, symbol, arguments, text, binding = payload
+        made = source._symbol_again(symbol, arguments, text)
         return made if binding is None else made._bound(binding)
     if name == "function" and payload is not None:
         source, function, binding = payload

@@ -47,7 +47,7 @@ LENGTH = 200
 OPERANDS = 40
 """Inverses of sums, diagonal parts and roots in a statement at which writing it out gives up."""
 MASS_MATRIX = parse("H φ M φ* H*")
-_TABLE = {ascii: (text, latex) for ascii, text, latex, *_ in _core.symbol_table()}
+_TABLE = {s.name: (s.text, s.latex) for s in _core.symbols}
 
 
 @dataclass(eq=False)
@@ -223,13 +223,10 @@ class Problem:
 
     def _unfolded(self, e: Any) -> Any:
         """𝒥 and Λ by their definitions."""
-        source, name, nodes, binding = symbol_parts(e)
-        if name not in self._definitions:
-            self._definitions[name] = Equation("definition", UNFOLDED[name], {}, {})
-        self._used.append(self._definitions[name])
-        phi, H, Omega = (_bound(source.symbol(n), binding) for n in ("phi", "H", "Omega"))
-        B = _bound(source.symbol("B", nodes=nodes), binding)
-        return B.T @ phi.T @ H.T if name == "Jacobian" else (B.T @ Omega @ B).inv()
+        if e.name not in self._definitions:
+            self._definitions[e.name] = Equation("definition", UNFOLDED[e.name], {}, {})
+        self._used.append(self._definitions[e.name])
+        return e.definition
 
     # ------------------------------------------------------------------ letters
     def letter(self, e: Any) -> str:
@@ -335,8 +332,8 @@ class Problem:
         return "X" + number.translate(str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")), f"X_{{{number}}}"
 
 
-def symbol_parts(e: Any) -> tuple[Any, str, list[Any], Any]:
-    """(source, ASCII name, arguments: node names or a coordinate, binding) of a symbol."""
+def symbol_parts(e: Any) -> tuple[Any, str, tuple[Any, ...], Any]:
+    """(source, ASCII name, arguments: what it is of, binding) of a symbol."""
     letter = e.letter
     return letter.source, letter.name, letter.arguments, letter.binding
 
@@ -350,10 +347,6 @@ def exact(coefficient: float | Fraction) -> Number:
     if isinstance(coefficient, float) and not math.isfinite(coefficient):
         raise _core.EvaluationError(f"a coefficient {coefficient} is no number to reckon with")
     return ratio(Fraction(coefficient), 1)
-
-
-def _bound(symbol: Any, binding: Any) -> Any:
-    return symbol if binding is None else symbol._bound(binding)
 
 
 def square(factor: Any) -> bool:

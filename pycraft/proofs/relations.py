@@ -130,7 +130,7 @@ def compliance_facts(problem: Any, hypotheses: Iterable[str]) -> Iterator[tuple[
         yield Equation("structure", text, monomial(*lhs), monomial(*rhs), uses=uses, note=note, check=_nothing_along_the_hinge), lhs
     for name, known in problem.alphabet.letters.items():
         e = known.expression
-        if not _is_of_kind("symbol", e) or e.name != "B" or len(e.letter.arguments) != 1 or not marks:
+        if not _is_of_kind("symbol", e) or e.name != "B" or len(e.letter.arguments) != 2 or not marks:
             continue
         star, mark = problem.alphabet.star(name), marks[0]
         whole = (star, *(of_model(x, mark) for x in ("ψ*", "H*", "D⁻¹", "H", "ψ")), name)

@@ -14,7 +14,7 @@ from .walk import GaveUp
 from .words import NUMBER, Alphabet, Polynomial, Word, add_to, factors_of, ratio, split, underived
 
 _DUALS = {"F": "V", "V": "F", "NodesF": "NodesV", "NodesV": "NodesF"}
-_SPACES_OF = {ascii: (domain, codomain) for ascii, _, _, domain, codomain, *_ in _core.symbol_table()} | {"S": ("F", "V")}
+_SPACES_OF = {s.name: (s.domain, s.codomain) for s in _core.symbols} | {"S": ("F", "V")}
 
 
 def trace_word(word: Word, alphabet: Alphabet, space: str) -> Word:

@@ -231,8 +231,8 @@ def _transferred(e: Any, operators: Any) -> Walk:
             _, name, arguments, _ = symbol_parts(e)
             source = operators._source
             if name == "Delta":  # any coordinate will do
-                return source.symbol(name, coordinate=min(arguments[0], operators.Theta.dimension - 1))
-            return source.symbol(name, nodes=arguments)
+                return source.symbol(name, coordinate=min(arguments[1], operators.Theta.dimension - 1))
+            return source.symbol(name, nodes=list(arguments[1:]))
         case "vector":
             return _core.vector(e.name, _space(e.codomain, operators))
         case "identity":

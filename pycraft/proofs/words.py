@@ -162,9 +162,9 @@ def shape_of(name: str) -> str:
 def sko_letters() -> dict[str, Letter]:
     """The letters of the core's table that take no argument, and S, the siblings' part of E_ψ*ΥE_ψ."""
     letters = {
-        text: Letter(text, text, latex, text in SYMMETRIC, shape_of(text), ascii)
-        for ascii, text, latex, *_ in _core.symbol_table()
-        if ascii not in ("B", "Jacobian", "Lambda", "Delta")
+        s.text: Letter(s.text, s.text, s.latex, s.text in SYMMETRIC, shape_of(s.text), s.name)
+        for s in _core.symbols
+        if s.takes == "nothing"
     }
     letters["S"] = Letter("S", "S", "S", True, "siblings")
     return letters

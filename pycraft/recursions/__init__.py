@@ -18,8 +18,9 @@ import numpy as np
 from .. import _core
 from . import step_blocks, step_realizations, step_vectors  # noqa: F401 - they register their writers
 from .cpp_source import CppSource
-from .formulas import At, Equation, Once, Operator, Product, Program, Quantity, Term, fused, pruned, reads
+from .formulas import At, Product, Quantity
 from .naming import Workbook
+from .passes import Equation, Once, Operator, Program, Term, fused, pruned, reads
 from .python_source import PythonSource
 from .recursion import Latex, Line, Text
 from .steps import Recursion
@@ -224,7 +225,7 @@ class Algorithm:
                 continue
             model = self._book.models[leaf.context]
             part, context = self._place_of(model)
-            numbers = plans[part].numbers(context, leaf.symbol, list(leaf.arguments), state)
+            numbers = plans[part].numbers(context, leaf.symbol, leaf.arguments, state)
             if leaf.source == "root frame":
                 numbers = [b if p < 0 else np.zeros_like(b) for b, p in zip(numbers, model.source.parents, strict=True)]
             data[leaf.quantity.name] = numbers

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from .copied_parts import copied, cpp_includes, cpp_letters, cpp_parts
-from .formulas import Cut, DiagonalPart, Equation, HingeRow, Identity, Node, Operator, Program, Quantity, System, Term
+from .formulas import Cut, DiagonalPart, HingeRow, Identity, Node, Quantity
 from .naming import total
+from .passes import Equation, Operator, Program, System, Term
 from .shared_passes import Passes
 from .shared_source import tree_of_terms
 

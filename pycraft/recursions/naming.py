@@ -9,26 +9,10 @@ import re
 from typing import Any
 
 from .. import _core
-from .formulas import (
-    At,
-    Cut,
-    Equation,
-    Function,
-    HingeRow,
-    Identity,
-    Inverse,
-    Item,
-    Leaf,
-    Letter,
-    Node,
-    Quantity,
-    Sweep,
-    Term,
-    product,
-    star,
-)
+from .formulas import At, Cut, Function, HingeRow, Identity, Inverse, Letter, Node, Quantity, product, star
+from .passes import Equation, Item, Leaf, Sweep, Term
 
-_SYMBOLS = {ascii_name: (text, latex) for ascii_name, text, latex, *_ in _core.symbol_table()}
+_SYMBOLS = {s.name: (s.text, s.latex) for s in _core.symbols}
 _SYMBOLS["E"] = ("E", "E")
 _LETTERS = {
     "alpha": ("α", "\\alpha"),
@@ -248,7 +232,7 @@ class Model:
         return f"of '{self.source.name}'" + (" at a bound state" if self.binding else "")
 
     # ------------------------------------------------------------------ shapes and places
-    def _new(self, name: str, arguments: tuple[int, ...] = (), **shape: Any) -> Quantity:
+    def _new(self, name: str, arguments: tuple[Any, ...] = (), **shape: Any) -> Quantity:
         square = {"rows": self.bodies, "columns": self.bodies}
         shapes: dict[str, dict[str, Any]] = {
             "E": square | {"indices": "pk"},
@@ -275,11 +259,11 @@ class Model:
         """Equations of this model's bodies, among the passes that define letters."""
         self.book.items.append(Sweep(self.tree, direction, list(equations)))
 
-    def letter(self, name: str, arguments: tuple[int, ...] = (), columns: Cut | None = None) -> Quantity:
+    def letter(self, name: str, arguments: tuple[Any, ...] = (), columns: Cut | None = None) -> Quantity:
         """The quantity of a letter, its recursion written where this is the first use of it."""
         if (name, arguments) in self._made:
             return self._made[name, arguments]
-        inserted = name == "h" and len(arguments) > 1  # a twist within a hinge: given
+        inserted = name == "h" and arguments[0] == "twist"  # within a hinge: given
         if name in _GIVEN or inserted or (self.source.groups is not None and name in _GIVEN_OF_GROUPS):
             shape: dict[str, Any] = {"rows": self.bodies, "columns": columns} if name == "B" else {}
             made = self._new(name, arguments, **shape)
@@ -361,17 +345,17 @@ class Model:
         M, V = self.at("M"), self.at("velocity")
         self.sweep(0, Equation(self._new("momentum_cross"), (Term(Function("cross_of_momentum", product(M, V))),)))
 
-    def _direction(self, name: str, arguments: tuple[int, ...]) -> None:
+    def _direction(self, name: str, arguments: tuple[Any, ...]) -> None:
         """Δ = crf(h) at the body of a direction: a coordinate, whose twist h is a row of H, or a twist given within a hinge."""
         twist: Node
-        if len(arguments) == 1:
-            body, first = 0, 0
-            while arguments[0] >= first + len(self.theta.rows[body]):
-                first += len(self.theta.rows[body])
+        if arguments[0] == "coordinate":
+            body, row = 0, arguments[1]
+            while row >= len(self.theta.rows[body]):
+                row -= len(self.theta.rows[body])
                 body += 1
-            twist = HingeRow(self.letter("H"), arguments[0] - first)
+            twist = HingeRow(self.letter("H"), row)
         else:
-            body, twist = arguments[0], At(self.letter("h", arguments))
+            body, twist = arguments[1], At(self.letter("h", arguments))
         node = twist if name == "h" else Function("crf", twist)
         self.sweep(0, Equation(self._new(name, arguments), (Term(node, body=body),)))
 

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from .copied_parts import copied, python_parts
-from .formulas import Cut, DiagonalPart, Equation, HingeRow, Operator, Program, Quantity, System, Term
+from .formulas import Cut, DiagonalPart, HingeRow, Quantity
 from .naming import total
+from .passes import Equation, Operator, Program, System, Term
 from .shared_passes import Passes
 from .shared_source import tree_of_terms
 

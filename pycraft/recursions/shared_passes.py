@@ -6,25 +6,8 @@ from abc import abstractmethod
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
-from .formulas import (
-    At,
-    CompositeAssembly,
-    Cut,
-    Elimination,
-    Equation,
-    Item,
-    Node,
-    Once,
-    Operator,
-    Program,
-    Quantity,
-    Selected,
-    Solution,
-    Sweep,
-    System,
-    Term,
-    moved,
-)
+from .formulas import At, Cut, Node, Quantity, moved
+from .passes import CompositeAssembly, Elimination, Equation, Item, Once, Operator, Program, Selected, Solution, Sweep, System, Term
 from .recursion import Text, pass_words
 from .shared_source import Source
 

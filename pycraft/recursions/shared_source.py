@@ -10,24 +10,19 @@ from .formulas import (
     At,
     Cut,
     DiagonalPart,
-    Equation,
     Function,
     HingeRow,
     Identity,
     Inverse,
-    InverseBlock,
-    MadeDense,
     Node,
     Part,
     Product,
     Quantity,
-    SystemLogdet,
-    Term,
     Transposed,
     star,
-    tree_in,
 )
 from .naming import Workbook, total
+from .passes import Equation, InverseBlock, MadeDense, SystemLogdet, Term, tree_in
 
 
 class Source(ABC):

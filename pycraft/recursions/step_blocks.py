@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from .. import _core
-from .formulas import At, Equation, Function, Identity, Inverse, Product, Term, moved, product, star
+from .formulas import At, Function, Identity, Inverse, Product, moved, product, star
+from .passes import Equation, Term
 from .steps import Formula, Recursion, Step, writer
 
 

@@ -5,24 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from .formulas import (
-    At,
-    Cut,
-    Elimination,
-    Identity,
-    InverseBlock,
-    Node,
-    Part,
-    Quantity,
-    Selected,
-    Solution,
-    System,
-    SystemLogdet,
-    Term,
-    moved,
-    product,
-    star,
-)
+from .formulas import At, Cut, Identity, Node, Part, Quantity, moved, product, star
+from .passes import Elimination, InverseBlock, Selected, Solution, System, SystemLogdet, Term
 from .steps import Recursion, Step, writer
 
 

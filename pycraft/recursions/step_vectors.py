@@ -4,23 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from .formulas import (
-    Assembled,
-    At,
-    CompositeAssembly,
-    Cut,
-    DiagonalPart,
-    Equation,
-    Function,
-    Inverse,
-    Node,
-    Product,
-    Quantity,
-    Term,
-    Transposed,
-    product,
-    star,
-)
+from .formulas import Assembled, At, Cut, DiagonalPart, Function, Inverse, Node, Product, Quantity, Transposed, product, star
+from .passes import CompositeAssembly, Equation, Term
 from .steps import Recursion, Step, writer
 
 _GROUPS = {"kinematics": 1, "articulated": 2, "composite": 4, "compliance": 8, "velocities": 16}

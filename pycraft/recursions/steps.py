@@ -11,29 +11,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from .formulas import (
-    COLUMNS,
-    At,
-    Cut,
-    Equation,
-    Function,
-    MadeDense,
-    Node,
-    Once,
-    Operator,
-    Product,
-    Program,
-    Quantity,
-    Sweep,
-    System,
-    Term,
-    fused,
-    moved,
-    product,
-    pruned,
-    quantities_in,
-)
+from .formulas import COLUMNS, At, Cut, Function, Node, Product, Quantity, moved, product
 from .naming import Model, Workbook, total
+from .passes import Equation, MadeDense, Once, Operator, Program, Sweep, System, Term, fused, pruned, quantities_in
 
 Step = dict[str, Any]
 WRITERS: dict[str, Callable[[Recursion, Step], None]] = {}

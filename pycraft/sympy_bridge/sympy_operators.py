@@ -48,9 +48,7 @@ class OperatorSymbol(MatrixSymbol):
                     f"{self.name} was made in another process: a constant or vector is known only where it was made"
                 )
             return _KEPT[self.token]
-        if said.get("numbers") or said.get("nodes"):
-            return operators._source._symbol_again(said["name"], said["numbers"], said["nodes"], said["text"])
-        return operators._source._symbol_again(said["name"], [], [], "")
+        return operators._source._symbol_again(said["name"], _tuples(said.get("arguments", ())), said.get("text", ""))
 
     def _eval_transpose(self) -> Star:
         return Star(self)
@@ -67,12 +65,16 @@ class OperatorSymbol(MatrixSymbol):
     _sympyrepr = _sympystr
 
 
+def _tuples(data: Any) -> Any:
+    """JSON's lists as the tuples that they were."""
+    return tuple(map(_tuples, data)) if isinstance(data, list | tuple) else data
+
+
 def symbol_of(e: _core.Operator, name: str, rows: Any, columns: Any) -> OperatorSymbol:
     """The symbol of a leaf: a letter that can be found again by name, or an operator that is kept."""
     letter = e.letter if e.kind == "symbol" else None
     if letter is not None and letter.binding is None:
-        numbers, nodes = ([a for a in letter.arguments if isinstance(a, str) == named] for named in (False, True))
-        token = json.dumps({"name": letter.name, "numbers": numbers, "nodes": nodes, "text": letter.text})
+        token = json.dumps({"name": letter.name, "arguments": letter.arguments, "text": letter.text})
     else:
         token = keep(e)
     return OperatorSymbol(name, rows, columns, token, e.latex(), e.text())

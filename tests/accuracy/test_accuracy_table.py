@@ -11,12 +11,12 @@ import pytest
 from matplotlib.text import Text
 
 import pycraft as pc
-from accuracy.test_certify import hard
 from pycraft.accuracy.rungs import LADDER, OTHER_METHODS
 from pycraft.accuracy.tables.plotting import _between, place_labels
 from pycraft.accuracy.tables.table import AccuracyTable, accuracy, ladder, largest_component, mark_pareto
 from pycraft.accuracy.tables.timing import time_forward_dynamics, workspace_bytes
 from support import multiprecision
+from support.hard_chains import hard
 
 matplotlib.use("Agg")
 

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import pycraft as pc
-from accuracy.test_certify import hard
 from pycraft.accuracy.certificates import certify
 from pycraft.accuracy.certificates.certify import certify_dynamics, certify_expression
 from pycraft.accuracy.certificates.locator import runs_articulated_sweep
 from pycraft.accuracy.rungs import Rung
+from support.hard_chains import hard
 
 
 @pytest.fixture(scope="module")

@@ -1,9 +1,4 @@
-"""Derivatives of every operator by rule, against fourth-order differences of the same expression in extended precision.
-
-A fourth-order difference of step h has a truncation error of h⁴ f⁽⁵⁾/30 and a rounding error of about 2 eps |f| / h in the state (q is a
-double, moved by h on the group). With h = 2⁻¹⁰ both are near 1e-12 of the operators' own size; operators that invert D are amplified by
-its condition, and TOLERANCE leaves a factor of 100.
-"""
+"""Derivatives of every operator by rule, against fourth-order differences of the same expression in extended precision."""
 
 import pickle
 
@@ -12,9 +7,9 @@ import pytest
 from scipy.linalg import expm
 
 import pycraft as pc
+from support.differences import TOLERANCE, along, assert_close, difference, numbers, value
 from support.formulas import EPS, norm
 
-TOLERANCE, STEP = 1e-9, 2.0**-10
 KINDS = ["pin", "universal", "ball", "slider", "gimbal", "custom", "screw", "free", "planar", "cylindrical"]
 LETTERS = (
     "E phi phi_tilde H M J R P P_plus D G K tau tau_bar E_psi psi psi_tilde Upsilon Omega "
@@ -63,32 +58,6 @@ NAMES = LETTERS + [
     "𝒥", "Λ", "Δ", "ℳ", "ℳ⁻¹", "(ℳ+J)⁻¹", "a realization", "a nested realization", "√D", "m", "[I-HψK]*D⁻¹[I-HψK]", "blockdiag(φPφ*)",
     "blockdiag(ψ*MψM)", "3 ℳ - D",
 ]  # fmt: skip
-
-
-def difference(f, h=STEP):
-    """Fourth order, of a function of a step along the direction."""
-    return np.array((8 * (f(h) - f(-h)) - (f(2 * h) - f(-2 * h))) / (12 * h), float)
-
-
-def value(op, *state):
-    bound = op.at(*state, precision="extended")
-    return bound.value(dtype=object) if op.shape[1] == 1 and op.domain == pc.euclidean(1) else bound.dense(dtype=object)
-
-
-def along(model, op, i, q, v):
-    e = np.eye(model.nv)[i]
-    return difference(lambda t: value(op, model.integrate(q, t * e), v))
-
-
-def numbers(op, q, v):
-    bound = op.at(q, v)
-    return bound.value() if op.domain == pc.euclidean(1) else bound.dense()
-
-
-def assert_close(got, expected, label):
-    assert got.shape == expected.shape
-    error = np.abs(got - expected).max(initial=0) / (1 + np.abs(expected).max(initial=0))
-    assert error <= TOLERANCE, f"{label}: off by {error:.1e}"
 
 
 @pytest.mark.parametrize("name", NAMES)

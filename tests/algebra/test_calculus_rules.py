@@ -1,14 +1,14 @@
 """Each rule of differentiation where no term of it vanishes: J ≠ 0, hinges of several coordinates, blocks that are not symmetric.
 
 Small and quick beside test_calculus, of which the everyday subset has the first derivatives of a few letters only. Differences and
-tolerance are those of that file.
+tolerance are those of `differences`, as there.
 """
 
 import numpy as np
 import pytest
 
 import pycraft as pc
-from algebra.test_calculus import along, assert_close, difference, numbers, value
+from support.differences import along, assert_close, difference, numbers, value
 
 
 @pytest.fixture(scope="module")

@@ -39,7 +39,7 @@ class Oracle:
     """The letters of a description at a state, from the dense reference."""
 
     dual = {"V": "F", "F": "V", "Θ": "Θ", "R^1": "R^1", None: None, "any": "any"}
-    spaces = {name: (codomain, domain) for name, _, _, domain, codomain, *_ in pc._core.symbol_table()} | {"MM": ("Θ", "Θ")}
+    spaces = {s.name: (s.codomain, s.domain) for s in pc._core.symbols} | {"MM": ("Θ", "Θ")}
 
     def __init__(self, description, state):
         self._operators = reference.operators(description, *state)

@@ -11,24 +11,13 @@ import pytest
 
 import pycraft as pc
 from support.descriptions import KINDS
-from support.formulas import EPS, amplification, depth, norm
+from support.formulas import EPS, amplification, norm
 from support.mechanisms import SEQUENCES, every_kind, nodes_of, uniform_batch, with_hinges
 from support.oracle import reference
+from support.sizes_of_calls import force_size, roundings
 
 rotors = pytest.mark.parametrize("rotor_inertia", [False, True], ids=["no rotors", "rotors"])
 each_hinge = pytest.mark.parametrize("kind", [*KINDS, *SEQUENCES])
-
-
-def roundings(o):
-    """Roundings of one sweep, both evaluations counted, grown by ‖φ‖ per body."""
-    return 200 * depth(o.parents) * EPS * max(1.0, norm(o.phi) / np.sqrt(max(1, len(o.phi))))
-
-
-def force_size(o, description, vdot):
-    """What the generalized forces are sums of: ‖Hφ‖ (‖M‖ (‖φ*H*θ̈‖ + ‖φ*a‖) + ‖b‖) + ‖Jθ̈‖, without the cancellation in a and b."""
-    V = norm(o.V)
-    a = V * (norm(o.H.T @ o.v) + norm(o.v)) + norm(o.a_gravity) + norm(o.H_dot.T @ o.v)
-    return norm(o.H @ o.phi) * (norm(o.M) * norm(o.phi) * (norm(o.H.T @ vdot) + a) + norm(o.M) * V**2) + norm(o.J @ vdot)
 
 
 def close(actual, expected, bound):

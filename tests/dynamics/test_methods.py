@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 import pycraft as pc
-from dynamics.test_direct_calls import force_size, roundings
 from pycraft import _core
 from support.descriptions import KINDS
 from support.formulas import EPS, amplification, norm
 from support.mechanisms import SEQUENCES, every_kind, random_tree, uniform_batch, with_hinges
 from support.oracle import reference
-from sweeps.test_singular_hinges import REGULAR, SINGULAR, at_random_state
+from support.singular_hinges import REGULAR, SINGULAR, at_random_state
+from support.sizes_of_calls import force_size, roundings
 
 METHODS = _core.methods()
 each_method = pytest.mark.parametrize("method", METHODS)

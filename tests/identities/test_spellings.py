@@ -39,7 +39,7 @@ def test_powers_of_ten(sign, read):
 
 def test_every_letter_reads_by_its_name_its_sign_and_its_latex(read):
     with_arguments = {"B": "body1", "Jacobian": "body1", "Lambda": "body1", "Delta": "0"}
-    for name, shown, latex, *_ in _core.symbol_table():
+    for name, shown, latex in ((s.name, s.text, s.latex) for s in _core.symbols):
         if name in with_arguments:
             argument = with_arguments[name]
             assert read(f"{name}({argument})").lhs == read(f"{shown}({argument})").lhs == read(f"{latex}_{{\\mathrm{{{argument}}}}}").lhs

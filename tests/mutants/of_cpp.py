@@ -15,7 +15,9 @@ CHANGES = {
         ("stale numbers of the present state", "c.parameters != version", "false"),
         ("stale numbers of a bound state", "entry->parameters != source->parameters()", "false"),
     ],
-    "cpp/dynamics/workspace_pool.h": [("stale workspaces of direct calls", "version_ != model.parameters()", "version_ == 0")],
+    "cpp/dynamics/workspace_pool.h": [
+        ("stale workspaces of direct calls", "version_ != model.parameters()", "version_ == 0"),
+    ],
     "cpp/model/multibody.cpp": [
         ("compiled models outlive a parameter", "kept->parameters == parameters_", "true"),
         ("a mass is no new version", "bodies_[k].inertia = inertia;\n  ++parameters_;", "bodies_[k].inertia = inertia;", STATEMENT),
@@ -33,48 +35,27 @@ CHANGES = {
         ),
         ("gravity is no new version", "gravity_ = g;\n  ++parameters_;", "gravity_ = g;", STATEMENT),
         ("limits are not checked when set", "check_limits(body(k).hinge, lower, upper);", ";", STATEMENT),
+        ("lengths of quaternions walk as a state is moved", "scale_quaternions<double>(*model, lengths.data(), out);", ";", STATEMENT),
     ],
     "cpp/algebra/engine/engine.cpp": [
         ("plans for J = 0 kept", "source.traits().hinge_diagonal != plan_->hinge_diagonal[c]", "false"),
         ("a plan is for J = 0 once and for all", "impl_->seen[c] == parameters", "impl_->seen[c] != ~std::uint64_t(0)"),
-        (
-            "only the first model of a plan is looked at",
-            "source.check_current();",
-            "if (c > 0) return true;",
-            STATEMENT,
-        ),
+        ("only the first model of a plan is looked at", "source.check_current();", "if (c > 0) return true;", STATEMENT),
         (
             "blocks of a batch are those of its first state",
-            "fresh |= w.generations[c] != values[c]->generation();",
+            "fresh |= w_.generations[c] != w_.values[c]->generation();",
             "fresh |= b == 0;",
             STATEMENT,
         ),
-        ("a workspace keeps the number of its first state", "w.state = b;", ";", STATEMENT),
-        ("what is out of range is returned", "in_range &= std::isfinite(result.values[at]);", ";", STATEMENT),
-    ],
-    "cpp/algebra/engine/workspace.h": [
-        ("wider values of the state before", "if (now == followed_) return;", "if (!followed_.empty()) return;", STATEMENT),
-        ("indefinite blocks have a root", "pivot < -bound", "false"),
+        ("a workspace keeps the number of its first state", "w_.state = b;", ";", STATEMENT),
+        ("what is out of range is returned", "in_range_ &= std::isfinite(result_.values[at]);", ";", STATEMENT),
     ],
     "cpp/algebra/trees/mixed_blocks.h": [
-        (
-            "an edge from a rigid body to a group is rigid",
-            "is_structured_[k] && is_structured_[tree_.parent[k]]",
-            "is_structured_[k]",
-        ),
+        ("an edge from a rigid body to a group is rigid", "is_structured_[k] && is_structured_[tree_.parent[k]]", "is_structured_[k]"),
         ("across kinds ψ is φ", "for (int i = 0; i < s * m; ++i) left[i] -= gained[i];", ";", STATEMENT),
         ("across kinds ψ* is φ*", "structured.hinge_transposed_add(k, along.data(), seen.data(), m);", ";", STATEMENT),
-        (
-            "mixed trees trust what rigid ones do",
-            "found == Pivots::sound && tree_.dof[k] > 0 ? Pivots::doubtful : found",
-            "found",
-        ),
-        (
-            "columns across kinds are not carried",
-            "sum += dense.edge(k)[i * s + a] * u(a);",
-            "sum += a == i ? u(a) : S(0);",
-            STATEMENT,
-        ),
+        ("mixed trees trust what rigid ones do", "found == Pivots::sound && tree_.dof[k] > 0 ? Pivots::doubtful : found", "found"),
+        ("columns across kinds are not carried", "sum += dense.edge(k)[i * s + a] * u(a);", "sum += a == i ? u(a) : S(0);", STATEMENT),
         ("P⁺ across kinds is R", "carry(Carried::articulated, k)", "carry(Carried::composite, k)"),
     ],
     "cpp/algebra/trees/reordered_values.h": [
@@ -109,10 +90,11 @@ CHANGES = {
         ("∂P without G ∂J G*", "times({o.G, run(o.J), o.G.T()})", "zero(o.M.domain(), o.M.codomain())"),
         ("∂ blockdiag(AXA*) as if X were symmetric", "times({bar, e, star(F)})", "star(times({F, e, star(bar)}))"),
     ],
-    "cpp/operators/directions.cpp": [("a coordinate moves its own twist", "own.slot < at.slot) terms", "own.slot <= at.slot) terms")],
+    "cpp/operators/directions.cpp": [
+        ("a coordinate moves its own twist", "own.slot < at.slot) terms", "own.slot <= at.slot) terms"),
+    ],
     "cpp/dynamics/rigid_dynamics.cpp": [
         ("minimum norm refined without the added inertia", "r[j] += inertia * x[j];", "(void)inertia;", STATEMENT),
-        ("projected once", "pass < 2", "pass < 1"),
         (
             "the wider residual rounded first",
             "wider_->residual(tau, wide_x_.data(), wide_r_.data());",
@@ -130,10 +112,8 @@ CHANGES = {
     "cpp/recursions/point_accelerations.h": [
         ("a hinge's own terms are never absorbed", "own == OwnTerms::absorbed && t[0] >= 0", "own != own && t[0] >= 0"),
     ],
-    "cpp/algebra/trees/sweeps/singular_pivot.h": [("pivot bound without its (j + 1)", "return S(j + 1) * sum;", "return sum;", STATEMENT)],
-    "cpp/rigid/rigid_blocks.h": [
-        ("pivot bound without its J", "dot(H[j], X_[k] * H[j]) + J[j]", "dot(H[j], X_[k] * H[j])"),
-        ("rounding of a rotor's forces not counted", "u.force * J[j] * S(abs(x[at]))", "S(0)"),
+    "cpp/algebra/trees/sweeps/singular_pivot.h": [
+        ("pivot bound without its (j + 1)", "return S(j + 1) * sum;", "return sum;", STATEMENT),
     ],
     "cpp/numerics/refinement.h": [
         ("refinement refuses at 0.9", "S(0.3)", "S(0.9)"),
@@ -144,19 +124,6 @@ CHANGES = {
     ],
     "cpp/algebra/engine/elimination/elimination_solve.h": [
         ("elimination with one refinement", "step < std::max(asked, 4)", "step < 1"),
-        ("digits lost by the elimination ignored", "growth_ <= tolerated && solved", "true"),
-        (
-            "fronts are not brought to one scale",
-            "shift_[part] = a != none && o != none ? (o - a) >> 1 : o != none ? o : a != none ? -a : 0;",
-            "shift_[part] = 0;",
-        ),
-        ("units are not those of the solution", "unit_[i] += size;", ";", STATEMENT),
-        (
-            "what the last state merged stays merged",
-            "std::fill(merged_with_parent_.begin(), merged_with_parent_.end(), 0);",
-            ";",
-            STATEMENT,
-        ),
         ("a refinement of an elimination need only shrink", "correction < last / S(2)", "correction < last"),
     ],
     "cpp/numerics/small_lu.h": [
@@ -188,20 +155,15 @@ CHANGES = {
         ("a solve that is refined is gathered by ψ", "h->binding && h->binding->arithmetic.refinement.steps != 0", "false"),
     ],
     "cpp/dynamics/methods.cpp": [
-        (
-            "conjugate gradients never refuse",
-            "gradients_.residual < sqrt(epsilon<S>()) && gradients_.condition < widest",
-            "true",
-        ),
-    ],
-    "cpp/model/configuration_rate.h": [
-        ("a move makes unit quaternions", "out[0] = to.w", "out[0] = to.w / sqrt(to.w * to.w + to.x * to.x + to.y * to.y + to.z * to.z)"),
+        ("conjugate gradients never refuse", "gradients_.residual < sqrt(epsilon<S>()) && gradients_.condition < widest", "true"),
     ],
     "cpp/simulation/trajectory.cpp": [
         ("the step after a cut step is the cut one", "cut && abs(tried) < abs(h) ? h : tried", "tried"),
         ("lengths of quaternions walk", "scale_quaternions<S>(equations_.model(), lengths_.data(), x_.data());", ";", STATEMENT),
     ],
-    "cpp/dynamics/packed_dynamics.cpp": [("a batch returns its first state's rows", "from[b * stride + i]", "from[i]")],
+    "cpp/dynamics/packed_dynamics.cpp": [
+        ("a batch returns its first state's rows", "from[b * stride + i]", "from[i]"),
+    ],
     "cpp/model/checks.cpp": [
         ("a rotation of two digits is taken", "off <= given_digits", "off <= 1e-2"),
         ("a reflection is a rotation", "determinant(pose.R) < 0", "false"),
@@ -218,5 +180,81 @@ CHANGES = {
     "cpp/bindings/direct_calls.h": [
         ("only what begins where the result begins is copied", "from >= to + out.size() || to >= from + a.array.size()", "from != to"),
     ],
-    "cpp/runtime/interrupt.cpp": [("signals are looked at once a minute", "now - last < pause", "now - last < 1000 * pause")],
+    "cpp/runtime/interrupt.cpp": [
+        ("signals are looked at once a minute", "now - last < pause", "now - last < 1000 * pause"),
+    ],
+    "cpp/algebra/engine/refined_solves.h": [
+        ("wider values of the state before", "if (now == followed_) return;", "if (!followed_.empty()) return;", STATEMENT),
+    ],
+    "cpp/algebra/engine/block_steps.h": [
+        ("indefinite blocks have a root", "pivot < -bound", "false"),
+    ],
+    "cpp/dynamics/singular_hinges.h": [
+        ("projected once", "pass < 2", "pass < 1"),
+    ],
+    "cpp/rigid/rigid_elimination.h": [
+        ("pivot bound without its J", "dot(H[j], X_[k] * H[j]) + J[j]", "dot(H[j], X_[k] * H[j])"),
+    ],
+    "cpp/rigid/rigid_residuals.h": [
+        ("rounding of a rotor's forces not counted", "u.force * J[j] * S(abs(x[at]))", "S(0)"),
+    ],
+    "cpp/algebra/engine/elimination/elimination_factor.h": [
+        ("digits lost by the elimination ignored", "growth_ <= tolerated && solved", "true"),
+        (
+            "what the last state merged stays merged",
+            "std::fill(merged_with_parent_.begin(), merged_with_parent_.end(), 0);",
+            ";",
+            STATEMENT,
+        ),
+    ],
+    "cpp/algebra/engine/elimination/elimination_accuracy.h": [
+        (
+            "fronts are not brought to one scale",
+            "shift_[part] = a != none && o != none ? (o - a) >> 1 : o != none ? o : a != none ? -a : 0;",
+            "shift_[part] = 0;",
+        ),
+        ("units are not those of the solution", "unit_[i] += size;", ";", STATEMENT),
+    ],
+    "cpp/model/subhinge_kinds.h": [
+        ("a move makes unit quaternions", "out[0] = to.w", "out[0] = to.w / sqrt(to.w * to.w + to.x * to.x + to.y * to.y + to.z * to.z)"),
+        (
+            "rows of a ball turn about its frame's origin",
+            "out[j] = {e, cross(h.point, e)};",
+            "out[j] = {e, Vector3<S>::zero()};",
+            STATEMENT,
+        ),
+        (
+            "the bracket of twists has no linear part",
+            "for (int i = 0; i < 6; ++i) out[i] = w[i];",
+            "for (int i = 0; i < 6; ++i) out[i] = i < 3 ? w[i] : S(0);",
+            STATEMENT,
+        ),
+        (
+            "what lies between two poses is seen from the base",
+            "transpose_times(R, Vector3<S>{q[4] - p[4], q[5] - p[5], q[6] - p[6]})",
+            "Vector3<S>{q[4] - p[4], q[5] - p[5], q[6] - p[6]}",
+        ),
+        ("a screw does not travel", "turned.p + (h.pitch * q[0]) * h.axis", "turned.p"),
+    ],
+    "cpp/model/hinge.cpp": [
+        ("a pin keeps a pitch", "record_of(kind).pitch ? pitch : 0", "pitch"),
+        (
+            "a gimbal's axes are all its first",
+            '{"gimbal", 3, {{pin, 0}, {pin, 1}, {pin, 2}}}',
+            '{"gimbal", 3, {{pin, 0}, {pin, 0}, {pin, 0}}}',
+        ),
+    ],
+    "cpp/model/compiled_model.cpp": [
+        ("rows of inboard subhinges stay along axes", "last ? axis_along(r) : -1", "axis_along(r)"),
+        ("two sliders move a body along any line", "found.size() != 3 || driven", "found.empty() || driven"),
+    ],
+    "cpp/dynamics/batches.h": [
+        ("a batch has its first state's numbers", "batch < 0 ? 0 : size_t(b) * width", "0"),
+    ],
+    "cpp/dynamics/batches.cpp": [
+        ("only the first state of a batch is checked", "g.batch < 0 ? 1 : g.batch", "1"),
+    ],
+    "cpp/operators/multibody_operators.cpp": [
+        ("a selection is of the whole hinge", "s >= of.from && s < of.to", "s >= of.from"),
+    ],
 }

@@ -187,7 +187,7 @@ CHANGES = {
     "pycraft/proofs/relations.py": [
         ("compliance along the hinge whatever J", 'for mark in marks if "J = 0" in hypotheses else ():', "for mark in marks:"),
         ("every constant stands at the base", "    if not _is_zero(X, inner):\n        return\n", ""),
-        ("nodes on several bodies as on one", " or len(e.letter.arguments) != 1", ""),
+        ("nodes on several bodies as on one", " or len(e.letter.arguments) != 2", ""),
     ],
     "pycraft/identities/search.py": [
         ("one state a model", "STATES = 3", "STATES = 1"),

@@ -64,5 +64,8 @@ def test_the_example_of_the_page_runs(tmp_path):
     inverse = (H @ phi @ M @ phi.T @ H.T).inv()
     q, forces = [0.4, 1.1], np.array([1.0, 0.5])
     assert shown == inverse.text()
-    for line, expected in zip(numbers, (inverse.at(q) @ forces, pendulum.forward_dynamics(q, [0, 0], forces)), strict=True):
-        assert np.allclose([float(x) for x in line.split()[2:]], expected, rtol=1e-12, atol=0)
+    expected = [inverse.at(q) @ forces, pendulum.forward_dynamics(q, [0, 0], forces)]
+    pendulum.gravity = (0, -1.62, 0)
+    expected.append(pendulum.forward_dynamics([0, 0], [0, 0], forces + [2, 0]))  # 2 N across the lower rod's hinge, 1 m from the upper's
+    for line, value in zip(numbers, expected, strict=True):
+        assert np.allclose([float(x) for x in line.split()[-2:]], value, rtol=1e-12, atol=0)

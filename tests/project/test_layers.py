@@ -37,6 +37,7 @@ CORE = [room for room in STANDS_ON if room not in ("bindings", "bench", "tests")
 PARTS = {
     "algebra/planning/plan_blocks",  # class Planner, by what is planned
     "algebra/planning/plan_diagonals",
+    "algebra/planning/plan_solves",
     "algebra/planning/plan_vectors",
     "operators/calculus_theorems",  # rows of the catalogue
     "operators/mechanics_theorems",
@@ -323,6 +324,13 @@ def test_tests_have_the_folders_of_the_package():
     folders = {path.parent.relative_to(ROOT / "tests").as_posix() for path in (ROOT / "tests").rglob("test_*.py")}
     assert folders <= set(RESTS_ON) | {"algebra", "sweeps", "whole", "project"}
     assert all((ROOT / "tests" / folder / "__init__.py").is_file() for folder in folders)
+
+
+def test_what_tests_share_is_in_support():
+    """No test imports another: what both need is in tests/support."""
+    for path in sorted((ROOT / "tests").rglob("*.py")):
+        named = re.findall(r"^\s*(?:from|import) +([\w.]+)", path.read_text(encoding="utf-8"), re.M)
+        assert not [name for name in named if re.search(r"(^|\.)test_", name)], path.relative_to(ROOT)
 
 
 def test_no_two_test_files_share_a_name():

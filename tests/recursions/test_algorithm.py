@@ -9,16 +9,16 @@ import json
 import re
 import subprocess
 import sys
-import sysconfig
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import pycraft as pc
-from algebra.test_sko_random import TREES, letters_on
 from pycraft.recursions import LANGUAGES
 from pycraft.recursions.steps import WRITERS
+from support.block_trees import TREES, letters_on
+from support.eigen import eigen_headers
 from support.formulas import EPS, SLACK, letters_of, norm
 from support.mechanisms import every_kind, random_tree, uniform_batch
 from support.random_formulas import draw, seeded
@@ -500,15 +500,6 @@ def test_what_is_refused():
 
 
 # ---------------------------------------------------------------------- C++
-
-
-def eigen_headers():
-    """The folder of Eigen's headers, from the build requirement."""
-    for root in {sysconfig.get_paths()["purelib"], *sys.path}:
-        for folder in ("cmeel.prefix/include/eigen3", "include/eigen3"):
-            if (Path(root) / folder / "Eigen" / "Dense").exists():
-                return Path(root) / folder
-    return next((p for p in (Path("/usr/include/eigen3"), Path("/usr/local/include/eigen3")) if p.exists()), None)
 
 
 PRINT = """

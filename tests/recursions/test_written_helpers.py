@@ -15,7 +15,7 @@ from scipy.linalg import block_diag
 from pycraft.recursions import copied_parts
 from pycraft.recursions.runtime import cross_products, matrices, stacking, tree_system
 from pycraft.recursions.runtime.tree_system import TreeSystem
-from recursions.test_algorithm import eigen_headers
+from support.eigen import eigen_headers
 
 MODULES = {module.__name__.rpartition(".")[2]: module for module in (matrices, stacking, cross_products, tree_system)}
 RUNTIME = Path(matrices.__file__).parent

@@ -3,7 +3,7 @@
 import numpy as np
 
 import pycraft as pc
-from support.descriptions import KINDS, random_description
+from support.descriptions import KINDS, body, model, random_description, random_inertia, subhinge
 
 SHAPES = {"chain": [-1, 0, 1, 2], "tree": [-1, 0, 0, 1, 1], "forest": [-1, 0, -1, 2, 2]}
 SEQUENCES = {
@@ -55,3 +55,34 @@ def uniform_batch(model, size, seed=0):
     """q (size, nq) and v (size, nv) of random states."""
     states = [model.random_state(seed + i) for i in range(size)]
     return np.array([s.q for s in states]).reshape(size, model.nq), np.array([s.v for s in states]).reshape(size, model.nv)
+
+
+def massless_inner_bodies():
+    """A spherical shoulder of three pins on massless bodies, askew with offset points; a massless slider further out, and branches."""
+    rng = np.random.default_rng(5)
+    solid = lambda m: dict(mass=m, com=0.2 * rng.normal(size=3), inertia=random_inertia(rng, m))
+    pin = lambda: [subhinge("pin", rng.normal(size=3), 0.3 * rng.normal(size=3))]
+    bodies = [
+        body("yaw", -1, pin(), mass=0.0),
+        body("pitch", 0, pin(), mass=0.0, position=[0.1, 0, 0.2]),
+        body("roll", 1, pin(), position=[0, 0.3, 0], **solid(2.0)),
+        body("carriage", 2, [subhinge("slider", rng.normal(size=3))], mass=0.0, position=[0.4, 0, 0]),
+        body("tool", 3, [subhinge("ball", point=[0.1, 0.2, 0])], **solid(0.7)),
+        body("hand", 2, pin(), position=[0, 0, 0.5], **solid(1.3)),
+    ]
+    return model(bodies, (0.3, -1.0, -9.8))
+
+
+def rotors_on_some():
+    """J on all coordinates of a hinge, on one of two, on none; and a massless tip that only J makes regular."""
+    rng = np.random.default_rng(6)
+    solid = lambda m: dict(mass=m, com=0.2 * rng.normal(size=3), inertia=random_inertia(rng, m))
+    pin = lambda: subhinge("pin", rng.normal(size=3), 0.3 * rng.normal(size=3))
+    bodies = [
+        body("base", -1, [subhinge("free")], **solid(3.0)),
+        body("upper", 0, [pin(), pin()], position=[0.2, 0, 0], rotor=[0.4, 0.0], **solid(1.0)),
+        body("lower", 1, [subhinge("slider", rng.normal(size=3)), pin()], rotor=[0.2, 0.3], **solid(1.0)),
+        body("wheel", 2, [pin()], mass=0.0, rotor=[0.1]),
+        body("tail", 0, [pin()], position=[-0.3, 0, 0], **solid(0.5)),
+    ]
+    return model(bodies, (0, 0, -9.8))

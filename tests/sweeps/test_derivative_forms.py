@@ -4,18 +4,7 @@ import numpy as np
 import pytest
 
 import pycraft as pc
-from pycraft.accuracy.hard_cases.chains import links
-
-FORMS = ("fast", "ud", "square-root")
-FACTORED = FORMS[1:]
-PARENTS = [-1, 0, 1, 1, 3, 0, 5, 6, 2, 8]
-KINDS = ["free", "pin", "ball", "slider", "universal", "screw", "custom", "planar", "free", "gimbal"]
-
-
-def heavy_tip(seed, ratio=1e9, n=10):
-    rng = np.random.default_rng([13, seed])
-    model = links([1.0] * (n - 1) + [ratio], [0.1] * n, rng, "random")
-    return model, rng.uniform(-3, 3, n), rng.normal(size=n), rng.normal(size=n)
+from support.forms import FACTORED, FORMS, KINDS, PARENTS, heavy_tip
 
 
 def relative(got, truth):

@@ -7,76 +7,27 @@ forms that carry factors cancel less; they are held to the same bound here, and 
 """
 
 import pickle
-from functools import cache
 
 import mpmath
 import numpy as np
 import pytest
 
 import pycraft as pc
-from algebra.test_sko_random import TREES, letters_on, random_blocks
 from pycraft import _core
+from support.block_trees import TREES, letters_on, random_blocks
 from support.descriptions import KINDS, body, model, random_description, random_inertia, subhinge
+from support.forms import FORMS, RICCATI, epsilon, largest
 from support.formulas import EPS, SLACK, Letters, amplification, letters_of, norm
-from support.mechanisms import SEQUENCES, SHAPES, build, every_kind, uniform_batch, with_hinges
+from support.mechanisms import SEQUENCES, SHAPES, build, every_kind, massless_inner_bodies, rotors_on_some, uniform_batch, with_hinges
 from support.oracle import reference
 
-FORMS = ("fast", "ud", "square-root")
-RICCATI = "P P_plus D G K tau tau_bar E_psi psi psi_tilde Upsilon Omega".split()
 DIGITS = 60
 each_form = pytest.mark.parametrize("form", FORMS)
 each_hinge = pytest.mark.parametrize("kind", [*KINDS, *SEQUENCES])
 rotors = pytest.mark.parametrize("rotor_inertia", [False, True], ids=["no rotors", "rotors"])
 
 
-def doubles(x):
-    """An array of mpmath numbers rounded to doubles."""
-    return np.asarray(x, float)
-
-
-def largest(x):
-    """The largest entry of an array of mpmath numbers, as a double."""
-    return float(max((abs(e) for e in np.asarray(x).flat), default=0.0))
-
-
-@cache
-def epsilon(precision):
-    """Epsilon of a precision by its name or number of digits."""
-    return float({str(name): value for name, value in _core.epsilons().items()}[str(precision)])
-
-
 # ---------------------------------------------------------------------- mechanisms
-
-
-def massless_inner_bodies():
-    """A spherical shoulder of three pins on massless bodies, askew with offset points; a massless slider further out, and branches."""
-    rng = np.random.default_rng(5)
-    solid = lambda m: dict(mass=m, com=0.2 * rng.normal(size=3), inertia=random_inertia(rng, m))
-    pin = lambda: [subhinge("pin", rng.normal(size=3), 0.3 * rng.normal(size=3))]
-    bodies = [
-        body("yaw", -1, pin(), mass=0.0),
-        body("pitch", 0, pin(), mass=0.0, position=[0.1, 0, 0.2]),
-        body("roll", 1, pin(), position=[0, 0.3, 0], **solid(2.0)),
-        body("carriage", 2, [subhinge("slider", rng.normal(size=3))], mass=0.0, position=[0.4, 0, 0]),
-        body("tool", 3, [subhinge("ball", point=[0.1, 0.2, 0])], **solid(0.7)),
-        body("hand", 2, pin(), position=[0, 0, 0.5], **solid(1.3)),
-    ]
-    return model(bodies, (0.3, -1.0, -9.8))
-
-
-def rotors_on_some():
-    """J on all coordinates of a hinge, on one of two, on none; and a massless tip that only J makes regular."""
-    rng = np.random.default_rng(6)
-    solid = lambda m: dict(mass=m, com=0.2 * rng.normal(size=3), inertia=random_inertia(rng, m))
-    pin = lambda: subhinge("pin", rng.normal(size=3), 0.3 * rng.normal(size=3))
-    bodies = [
-        body("base", -1, [subhinge("free")], **solid(3.0)),
-        body("upper", 0, [pin(), pin()], position=[0.2, 0, 0], rotor=[0.4, 0.0], **solid(1.0)),
-        body("lower", 1, [subhinge("slider", rng.normal(size=3)), pin()], rotor=[0.2, 0.3], **solid(1.0)),
-        body("wheel", 2, [pin()], mass=0.0, rotor=[0.1]),
-        body("tail", 0, [pin()], position=[-0.3, 0, 0], **solid(0.5)),
-    ]
-    return model(bodies, (0, 0, -9.8))
 
 
 SPECIAL = {

@@ -12,10 +12,10 @@ import pytest
 import pycraft as pc
 from pycraft import _core
 from support.descriptions import random_description
+from support.forms import RICCATI, epsilon, largest
 from support.formulas import EPS, letters_of, norm
-from support.mechanisms import build, uniform_batch
+from support.mechanisms import build, rotors_on_some, uniform_batch
 from support.oracle import reference
-from sweeps.test_forms import RICCATI, epsilon, largest, rotors_on_some
 
 DIGITS = 120
 PRECISIONS = ("single", "double", "extended", "quad", 50, 100)

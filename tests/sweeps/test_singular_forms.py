@@ -11,13 +11,12 @@ import pytest
 
 import pycraft as pc
 from support.descriptions import body, model, random_inertia, subhinge
+from support.exact_accelerations import drawn, exact_accelerations, floor, heavy_tip, relative_error
+from support.forms import FORMS, epsilon
 from support.formulas import EPS
 from support.oracle import reference
-from sweeps.test_forms import epsilon
-from sweeps.test_refinement import drawn, exact_accelerations, floor, heavy_tip, relative_error
-from sweeps.test_singular_hinges import REGULAR, SINGULAR, SKEW, at_random_state, links, what_needs_D
+from support.singular_hinges import REGULAR, SINGULAR, SKEW, at_random_state, links, what_needs_D
 
-FORMS = ("fast", "ud", "square-root")
 FACTORED = ("ud", "square-root")
 # Coaxial in doubles only: 0.3 - 1 is rounded, and a wider precision sees the lever arm of 1e-17 that is left.
 ROUNDED = ("light coaxial link in a long arm",)

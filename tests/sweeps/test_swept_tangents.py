@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import pycraft as pc
-from sweeps.test_derivative_forms import FACTORED, FORMS, KINDS, PARENTS, heavy_tip
+from support.forms import FACTORED, FORMS, KINDS, PARENTS, heavy_tip
 
 STEP = "the derivative of the Riccati sweep"
 

@@ -164,7 +164,7 @@ def test_spaces_are_checked_on_the_way_back(arm):
 
 
 def test_latex_of_every_letter_is_that_of_the_notation(arm):
-    for name, shown, latex, *_ in _core.symbol_table():
+    for name, shown, latex in ((s.name, s.text, s.latex) for s in _core.symbols):
         letter = getattr(arm.soa, name)
         if name in ("B", "Jacobian", "Lambda"):
             letter, tail = letter("node9"), r"_{\mathrm{node9}}"

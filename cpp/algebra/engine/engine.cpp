@@ -6,7 +6,11 @@
 #include <cstdint>
 #include <mutex>
 
-#include "algebra/engine/workspace.h"
+#include "algebra/engine/block_steps.h"
+#include "algebra/engine/dense_steps.h"
+#include "algebra/engine/refined_solves.h"
+#include "algebra/engine/scalar_steps.h"
+#include "algebra/engine/vector_steps.h"
 #include "runtime/errors.h"
 
 namespace pycraft {
@@ -76,9 +80,183 @@ std::vector<std::string> ExecutionPool::run_notes() const {
   throw EvaluationError("the value of '" + plan.text + "' is beyond the range of its numbers: take other units, or a wider precision (.at(precision=\"extended\"))");
 }
 
+namespace {
+
+// One run of a plan in a workspace, state after state.
+template <class S>
+class Run {
+ public:
+  Run(const Plan& plan, Workspace<S>& workspace, const Inputs& inputs, bool expansions, Result& result)
+      : plan_(plan), w_(workspace), inputs_(inputs), expansions_(expansions), result_(result), states_(plan.batched ? plan.batch : 1) {
+    take_values();
+    check_vectors();
+    result_.batch = plan.batched ? states_ : (inputs.batched ? -2 : -1);
+  }
+  // What was held of the models goes with the run: an operator from outside, or a signal's handler, may run another one on this thread
+  // before this one is over.
+  ~Run() { w_.held.clear(); }
+  Run(const Run&) = delete;
+
+  PassCounts run() {
+    for (int b = 0; b < states_; ++b)
+      naming_state(b, states_, [&] {
+        run_state(b);
+        if (!in_range_) throw_beyond_range(plan_, inputs_);
+      });
+    const bool number = plan_.request == Request::trace || plan_.request == Request::logdet || plan_.request == Request::norm;
+    if (states_ == 0) shape(number ? 1 : plan_.codomain.dimension(), plan_.request == Request::dense ? plan_.domain.dimension() : inputs_.columns);
+    return counts_;
+  }
+
+ private:
+  // The values of every context: those that are kept for the model's state or a binding's, or the workspace's own for a batch.
+  void take_values() {
+    w_.held.clear();
+    w_.held.resize(plan_.contexts.size());
+    w_.values.assign(plan_.contexts.size(), nullptr);
+    if (w_.own_values.size() != plan_.contexts.size()) w_.own_values.resize(plan_.contexts.size());
+    for (size_t c = 0; c < plan_.contexts.size(); ++c) {
+      const Context& context = plan_.contexts[c];
+      if (!context.binding) {
+        w_.held[c] = context.source->template current_values<S>(plan_.groups[c]);
+      } else if (context.binding->batch < 0) {
+        w_.held[c] = context.binding->template values<S>(context.source, plan_.groups[c]);
+      } else {
+        context.source->check_current();
+        if (!w_.own_values[c]) {
+          w_.own_values[c] = context.source->make_values(S());
+          w_.own_values[c]->use(context.binding->arithmetic.form);
+        }
+        w_.values[c] = w_.own_values[c].get();
+        continue;
+      }
+      w_.values[c] = w_.held[c].get();
+    }
+  }
+
+  void check_vectors() const {
+    for (const auto& [name, r] : plan_.vectors) {
+      const auto given = inputs_.vectors.find(name);
+      if (given == inputs_.vectors.end()) throw EvaluationError("the vector '" + name + "' has no value: give it by name");
+      if (static_cast<int>(given->second.size()) != plan_.registers[r].space.dimension())
+        throw EvaluationError("the vector '" + name + "' has " + std::to_string(given->second.size()) + " entries; it lies in " +
+                              plan_.registers[r].space.description());
+    }
+  }
+
+  // Moves the values of batches to state b. Whether anything changed since the last run: else blocks and factors serve again.
+  bool move_to(int b) {
+    for (size_t c = 0; c < plan_.contexts.size(); ++c) {
+      const Binding* binding = plan_.contexts[c].binding.get();
+      if (!binding || binding->batch < 0) continue;
+      w_.values[c]->move_to(binding->q.data() + size_t(b) * binding->nq, binding->v.data() + size_t(b) * binding->nv);
+      w_.values[c]->require(plan_.groups[c]);
+    }
+    bool fresh = w_.generations.size() != w_.values.size();
+    w_.generations.resize(w_.values.size());
+    for (size_t c = 0; c < w_.values.size(); ++c) {
+      fresh |= w_.generations[c] != w_.values[c]->generation();
+      w_.generations[c] = w_.values[c]->generation();
+    }
+    if (w_.values.empty()) fresh = !w_.ran;
+    w_.state = b;
+    w_.ran = true;
+    return fresh;
+  }
+
+  void run_state(int b) {
+    const bool fresh = move_to(b);
+    for (const auto& [name, r] : plan_.vectors) {
+      const std::vector<double>& given = inputs_.vectors.at(name);
+      w_.vector(r).assign(given.begin(), given.end());
+    }
+    if (plan_.columns_of_identity) return run_columns(b, fresh);
+    const int n_in = plan_.domain.dimension(), m = inputs_.columns;
+    if (plan_.input >= 0) {
+      std::vector<S>& x = w_.vector(plan_.input);
+      x.resize(size_t(n_in) * m);
+      const double* given = inputs_.x ? inputs_.x + (inputs_.batched ? size_t(b) * n_in * m : 0) : nullptr;
+      for (size_t i = 0; i < x.size(); ++i) x[i] = given ? S(given[i]) : S(1);
+    }
+    w_.run(w_.values, m, fresh, counts_);
+    if (states_ > 1) check_interrupt();
+    const Register& out = plan_.registers[plan_.output];
+    switch (out.kind) {
+      case RegisterKind::vector: return store_all(b, w_.vector(plan_.output), plan_.codomain.dimension(), out.wide ? m : 1);
+      case RegisterKind::dense: return store_all(b, w_.dense(plan_.output), plan_.codomain.dimension(), n_in);
+      case RegisterKind::blocks: {
+        const std::vector<S>& y = w_.blocks(plan_.output).data;
+        return store_all(b, y, static_cast<int>(y.size()), 1);
+      }
+      default:
+        if (b == 0) shape(1, 1);
+        store(b, w_.scalar(plan_.output));
+    }
+  }
+
+  // The operator itself, its diagonal, trace or norm, from columns of the identity, some at a time.
+  void run_columns(int b, bool fresh) {
+    const int n_in = plan_.domain.dimension(), n_out = plan_.codomain.dimension();
+    const bool is_norm = plan_.request == Request::norm, is_trace = plan_.request == Request::trace, is_diagonal = plan_.request == Request::diagonal;
+    if (b == 0) shape(is_norm || is_trace ? 1 : n_out, is_norm || is_trace || is_diagonal ? 1 : n_in);
+    const int output = is_norm ? plan_.steps.back().in[0] : plan_.output;
+    S squares = S(0), sum = S(0);
+    for (int start = 0; start < n_in; start += columns_at_a_time) {
+      const int m = std::min(columns_at_a_time, n_in - start);
+      std::vector<S>& x = w_.vector(plan_.input);
+      x.assign(size_t(n_in) * m, S(0));
+      for (int j = 0; j < m; ++j) x[size_t(start + j) * m + j] = S(1);
+      w_.run(w_.values, m, start == 0 && fresh, counts_);
+      const std::vector<S>& y = w_.vector(output);
+      for (int i = 0; i < n_out; ++i)
+        for (int j = 0; j < m; ++j) {
+          const S value = y[size_t(i) * m + j];
+          if (is_norm) {
+            squares += value * value;
+          } else if (is_trace) {
+            sum += i == start + j ? value : S(0);
+          } else if (is_diagonal) {
+            if (i == start + j) store(size_t(b) * n_out + i, value);
+          } else {
+            store(size_t(b) * n_out * n_in + size_t(i) * n_in + start + j, value);
+          }
+        }
+      check_interrupt();
+    }
+    using std::sqrt;
+    if (is_norm) store(b, sqrt(squares));
+    if (is_trace) store(b, sum);
+  }
+
+  void shape(int rows, int columns) {
+    result_.rows = rows;
+    result_.columns = columns;
+    result_.values.resize(size_t(states_) * rows * columns);
+    if (expansions_) result_.expansions.resize(result_.values.size());
+  }
+  void store(size_t at, const S& value) {
+    result_.values[at] = to_double(value);
+    in_range_ &= std::isfinite(result_.values[at]);
+    if (expansions_) result_.expansions[at] = expansion(value);
+  }
+  void store_all(int b, const std::vector<S>& y, int rows, int columns) {
+    if (b == 0) shape(rows, columns);
+    for (size_t i = 0; i < y.size(); ++i) store(size_t(b) * y.size() + i, y[i]);
+  }
+
+  const Plan& plan_;
+  Workspace<S>& w_;
+  const Inputs& inputs_;
+  bool expansions_, in_range_ = true;
+  Result& result_;
+  int states_;
+  PassCounts counts_;
+};
+
+}  // namespace
+
 template <class S>
 void ExecutionPool::run_at(const Inputs& inputs, bool expansions, Result& result) {
-  const Plan& plan = *plan_;
   std::unique_ptr<Workspace<S>> workspace;
   {
     std::lock_guard<Mutex> lock(impl_->mutex);
@@ -90,156 +268,10 @@ void ExecutionPool::run_at(const Inputs& inputs, bool expansions, Result& result
     }
   }
   if (!workspace) workspace = std::make_unique<Workspace<S>>(plan_);
-  Workspace<S>& w = *workspace;
-  const int states = plan.batched ? plan.batch : 1;
-  PassCounts counts;
-
-  // Of this run alone: an operator from outside, or a signal's handler, may run another one on this thread before this one is over.
-  std::vector<ValuesInUse<S>>& held = w.held;
-  std::vector<SkoValues<S>*>& values = w.values;
-  held.clear();
-  held.resize(plan.contexts.size());
-  values.assign(plan.contexts.size(), nullptr);
-  if (w.own_values.size() != plan.contexts.size()) w.own_values.resize(plan.contexts.size());
-  for (size_t c = 0; c < plan.contexts.size(); ++c) {
-    const Context& context = plan.contexts[c];
-    if (!context.binding) {
-      held[c] = context.source->template current_values<S>(plan.groups[c]);
-    } else if (context.binding->batch < 0) {
-      held[c] = context.binding->template values<S>(context.source, plan.groups[c]);
-    } else {
-      context.source->check_current();
-      if (!w.own_values[c]) {
-        w.own_values[c] = context.source->make_values(S());
-        w.own_values[c]->use(context.binding->arithmetic.form);
-      }
-      values[c] = w.own_values[c].get();
-      continue;
-    }
-    values[c] = held[c].get();
-  }
-
-  const Register* out = plan.output >= 0 ? &plan.registers[plan.output] : nullptr;
-  const bool identity_columns = plan.columns_of_identity;
-  result.batch = plan.batched ? states : (inputs.batched ? -2 : -1);
-  bool in_range = true;
-  const auto store = [&](size_t at, const S& value) {
-    result.values[at] = to_double(value);
-    in_range &= std::isfinite(result.values[at]);
-    if (expansions) result.expansions[at] = expansion(value);
-  };
-  const auto shape = [&](int rows, int columns) {
-    result.rows = rows;
-    result.columns = columns;
-    result.values.resize(size_t(states) * rows * columns);
-    if (expansions) result.expansions.resize(result.values.size());
-  };
-  const int n_in = plan.domain.dimension(), n_out = plan.codomain.dimension();
-  for (const auto& [name, r] : plan.vectors) {
-    const auto given = inputs.vectors.find(name);
-    if (given == inputs.vectors.end()) throw EvaluationError("the vector '" + name + "' has no value: give it by name");
-    if (static_cast<int>(given->second.size()) != plan.registers[r].space.dimension())
-      throw EvaluationError("the vector '" + name + "' has " + std::to_string(given->second.size()) + " entries; it lies in " +
-                            plan.registers[r].space.description());
-  }
-  const auto run_state = [&](int b) {
-    for (size_t c = 0; c < plan.contexts.size(); ++c) {
-      const Context& context = plan.contexts[c];
-      if (!context.binding || context.binding->batch < 0) continue;
-      values[c]->move_to(context.binding->q.data() + size_t(b) * context.binding->nq, context.binding->v.data() + size_t(b) * context.binding->nv);
-      values[c]->require(plan.groups[c]);
-    }
-    // Blocks and factors of the last run serve again where the values are the same.
-    bool fresh = w.generations.size() != values.size();
-    w.generations.resize(values.size());
-    for (size_t c = 0; c < values.size(); ++c) {
-      fresh |= w.generations[c] != values[c]->generation();
-      w.generations[c] = values[c]->generation();
-    }
-    if (values.empty()) fresh = !w.ran;
-    w.state = b;
-    w.ran = true;
-    for (const auto& [name, r] : plan.vectors) {
-      const std::vector<double>& given = inputs.vectors.at(name);
-      w.vector(r).assign(given.begin(), given.end());
-    }
-    if (identity_columns) {
-      const bool is_norm = plan.request == Request::norm, is_trace = plan.request == Request::trace, is_diagonal = plan.request == Request::diagonal;
-      if (b == 0) shape(is_norm || is_trace ? 1 : n_out, is_norm || is_trace || is_diagonal ? 1 : n_in);
-      const int output = is_norm ? plan.steps.back().in[0] : plan.output;
-      S squares = S(0), sum = S(0);
-      for (int start = 0; start < n_in || start == 0; start += columns_at_a_time) {
-        const int m = std::min(columns_at_a_time, n_in - start);
-        if (m <= 0) break;
-        std::vector<S>& x = w.vector(plan.input);
-        x.assign(size_t(n_in) * m, S(0));
-        for (int j = 0; j < m; ++j) x[size_t(start + j) * m + j] = S(1);
-        w.run(values, m, start == 0 && fresh, counts);
-        const std::vector<S>& y = w.vector(output);
-        for (int i = 0; i < n_out; ++i)
-          for (int j = 0; j < m; ++j) {
-            const S value = y[size_t(i) * m + j];
-            if (is_norm)
-              squares += value * value;
-            else if (is_trace)
-              sum += i == start + j ? value : S(0);
-            else if (is_diagonal) {
-              if (i == start + j) store(size_t(b) * n_out + i, value);
-            } else
-              store(size_t(b) * n_out * n_in + size_t(i) * n_in + start + j, value);
-          }
-        check_interrupt();
-      }
-      using std::sqrt;
-      if (is_norm) store(b, sqrt(squares));
-      if (is_trace) store(b, sum);
-      return;
-    }
-    const int m = inputs.columns;
-    if (plan.input >= 0) {
-      std::vector<S>& x = w.vector(plan.input);
-      x.resize(size_t(n_in) * m);
-      const double* given = inputs.x ? inputs.x + (inputs.batched ? size_t(b) * n_in * m : 0) : nullptr;
-      for (size_t i = 0; i < x.size(); ++i) x[i] = given ? S(given[i]) : S(1);
-    }
-    w.run(values, m, fresh, counts);
-    if (states > 1) check_interrupt();
-    switch (out->kind) {
-      case RegisterKind::vector: {
-        const int columns = out->wide ? m : 1;
-        if (b == 0) shape(n_out, columns);
-        const std::vector<S>& y = w.vector(plan.output);
-        for (size_t i = 0; i < y.size(); ++i) store(size_t(b) * y.size() + i, y[i]);
-        break;
-      }
-      case RegisterKind::dense: {
-        if (b == 0) shape(n_out, n_in);
-        const std::vector<S>& y = w.dense(plan.output);
-        for (size_t i = 0; i < y.size(); ++i) store(size_t(b) * y.size() + i, y[i]);
-        break;
-      }
-      case RegisterKind::blocks: {
-        const std::vector<S>& y = w.blocks(plan.output).data;
-        if (b == 0) shape(static_cast<int>(y.size()), 1);
-        for (size_t i = 0; i < y.size(); ++i) store(size_t(b) * y.size() + i, y[i]);
-        break;
-      }
-      default:
-        if (b == 0) shape(1, 1);
-        store(b, w.scalar(plan.output));
-    }
-  };
-  for (int b = 0; b < states; ++b)
-    naming_state(b, plan.batched ? states : 1, [&] {
-      run_state(b);
-      if (!in_range) throw_beyond_range(plan, inputs);
-    });
-  if (states == 0) shape(plan.request == Request::trace || plan.request == Request::logdet || plan.request == Request::norm ? 1 : n_out,
-                         plan.request == Request::dense ? n_in : inputs.columns);
-  held.clear();
+  const PassCounts counts = Run<S>(*plan_, *workspace, inputs, expansions, result).run();
   std::lock_guard<Mutex> lock(impl_->mutex);
   impl_->counts = counts;
-  if (!w.notes().empty()) impl_->notes = w.notes();
+  if (!workspace->notes().empty()) impl_->notes = workspace->notes();
   std::get<Impl::Free<S>>(impl_->free).push_back(std::move(workspace));
 }
 

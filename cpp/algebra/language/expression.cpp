@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <unordered_map>
 #include <unordered_set>
 
 #include "algebra/language/display.h"
 #include "algebra/language/memo.h"
+#include "algebra/language/nodes.h"
 #include "algebra/language/properties.h"
 #include "algebra/language/source.h"
 #include "runtime/errors.h"
@@ -18,61 +18,6 @@ namespace {
 
 using Node = Expression::Node;
 
-size_t mix(size_t seed, size_t value) { return seed ^ (value * 0x9e3779b97f4a7c15ULL + 0x7f4a7c15ULL + (seed << 6) + (seed >> 2)); }
-
-// The number in front and what it scales. Signs move freely, -(2X) is (-2)X, as they round nothing.
-std::pair<Coefficient, const Expression*> scaling(const Node& n) {
-  Coefficient c = n.coefficient;
-  const Expression* x = &n.children[0];
-  while (x->kind() == NodeKind::scaled && (abs(c) == 1 || abs(x->node().coefficient) == 1)) {
-    c *= x->node().coefficient;
-    x = &x->children()[0];
-  }
-  return {c, x};
-}
-
-// Spaces that are equal have the same.
-size_t hash_of(const Space& s) {
-  return s ? mix(mix(static_cast<size_t>(s.kind()), reinterpret_cast<size_t>(s.layout().owner)), s.dimension()) : 0;
-}
-
-size_t hash_of(const Node& n) {
-  size_t h = mix(17, static_cast<size_t>(n.kind));
-  switch (n.kind) {
-    case NodeKind::symbol:
-      h = mix(mix(mix(h, n.symbol.definition->id), reinterpret_cast<size_t>(n.symbol.source.get())), reinterpret_cast<size_t>(n.symbol.binding.get()));
-      for (int a : n.symbol.arguments) h = mix(h, a);
-      return h;
-    case NodeKind::block_function:
-      return mix(mix(mix(h, n.symbol.definition->id), reinterpret_cast<size_t>(n.symbol.source.get())), n.children[0].node().hash);
-    case NodeKind::vector: return mix(mix(h, std::hash<std::string>()(n.name)), hash_of(n.codomain));
-    case NodeKind::identity:
-    case NodeKind::zero: return mix(mix(h, hash_of(n.domain)), hash_of(n.codomain));
-    case NodeKind::constant: return mix(h, reinterpret_cast<size_t>(n.constant.get()));
-    case NodeKind::external: return mix(h, reinterpret_cast<size_t>(n.external.get()));
-    case NodeKind::scaled: {
-      const auto [c, x] = scaling(n);
-      return mix(mix(h, CoefficientHash()(c)), x->node().hash);
-    }
-    case NodeKind::sum: {
-      size_t total = 0;  // whatever the order
-      for (const Expression& c : n.children) total += mix(31, c.node().hash);
-      return mix(h, total);
-    }
-    default:
-      for (const Expression& c : n.children) h = mix(h, c.node().hash);
-      return h;
-  }
-}
-
-Expression make(Node node, std::shared_ptr<Memo> memo = nullptr) {
-  node.hash = hash_of(node);
-  node.depth = 1;
-  for (const Expression& c : node.children) node.depth = std::max(node.depth, 1 + c.node().depth);
-  node.memo = memo ? std::move(memo) : std::make_shared<Memo>();
-  return Expression(std::make_shared<const Node>(std::move(node)));
-}
-
 std::string owner_note(const Space& a, const Space& b) {
   const std::string x = a.layout().owner_name, y = b.layout().owner_name;
   if (a.layout().owner == b.layout().owner || x.empty() || y.empty()) return "";
@@ -80,102 +25,35 @@ std::string owner_note(const Space& a, const Space& b) {
                 : " They belong to two different models, '" + x + "' and '" + y + "'.";
 }
 
-// What two nodes are beside their parts; `pairs` gets the parts that must be equal.
-bool equal_but_for_parts(const Node& x, const Node& y, std::vector<std::pair<const Expression*, const Expression*>>& pairs) {
-  if (x.hash != y.hash || x.kind != y.kind || x.children.size() != y.children.size()) return false;
-  switch (x.kind) {
-    case NodeKind::symbol: return x.symbol == y.symbol;
-    case NodeKind::vector: return x.name == y.name && x.codomain == y.codomain;
-    case NodeKind::identity: return x.domain == y.domain;
-    case NodeKind::zero: return x.domain == y.domain && x.codomain == y.codomain;
-    case NodeKind::constant: return x.constant == y.constant;
-    case NodeKind::external: return x.external == y.external;
-    case NodeKind::scaled: {
-      const auto [c, s] = scaling(x);
-      const auto [d, t] = scaling(y);
-      pairs.emplace_back(s, t);
-      return c == d;
-    }
-    case NodeKind::sum: {  // whatever the order: equal terms have equal hashes
-      const auto by_hash = [](const Node& n) {
-        std::vector<const Expression*> terms;
-        for (const Expression& c : n.children) terms.push_back(&c);
-        std::stable_sort(terms.begin(), terms.end(), [](auto* a, auto* b) { return a->node().hash < b->node().hash; });
-        return terms;
-      };
-      const auto a = by_hash(x), b = by_hash(y);
-      for (size_t i = 0; i < a.size(); ++i) pairs.emplace_back(a[i], b[i]);
-      return true;
-    }
-    case NodeKind::block_function:
-      if (x.symbol.definition != y.symbol.definition || x.symbol.source != y.symbol.source) return false;
-      break;
-    default: break;
-  }
-  for (size_t i = 0; i < x.children.size(); ++i) pairs.emplace_back(&x.children[i], &y.children[i]);
-  return true;
-}
-
 }  // namespace
-
-Parts::~Parts() {
-  thread_local std::vector<Expression>* leaving = nullptr;
-  if (empty()) return;
-  if (leaving) {
-    leaving->insert(leaving->end(), std::make_move_iterator(begin()), std::make_move_iterator(end()));
-    return;
-  }
-  std::vector<Expression> todo;
-  leaving = &todo;
-  todo.swap(*this);
-  while (!todo.empty()) {
-    const Expression last = std::move(todo.back());
-    todo.pop_back();
-  }
-  leaving = nullptr;
-}
-
-bool operator==(const Expression& a, const Expression& b) {
-  if (a.get() == b.get()) return true;
-  if (!a || !b || a.node().hash != b.node().hash) return false;
-  std::vector<std::pair<const Expression*, const Expression*>> todo = {{&a, &b}};
-  std::map<std::pair<const Node*, const Node*>, char> seen;
-  while (!todo.empty()) {
-    const auto [x, y] = todo.back();
-    todo.pop_back();
-    if (x->get() == y->get()) continue;
-    if (!x->children().empty() && !seen.try_emplace({x->get(), y->get()}).second) continue;  // compared, or about to be
-    if (!equal_but_for_parts(x->node(), y->node(), todo)) return false;
-  }
-  return true;
-}
 
 // ------------------------------------------------------------------ leaves
 
-Expression make_symbol(const SymbolDefinition& definition, std::shared_ptr<SkoSource> source, std::vector<int> arguments, std::string argument_text) {
+Expression make_symbol(const SymbolDefinition& definition, std::shared_ptr<SkoSource> source, SymbolArguments arguments, std::string argument_text) {
+  if (!fits(definition.takes, arguments)) throw EvaluationError("'" + definition.ascii + "' is not of what it was given");
   Node n{NodeKind::symbol, source->space(definition.domain, arguments), source->space(definition.codomain, arguments), {}};
   n.symbol = Symbol{&definition, std::move(source), nullptr, std::move(arguments), std::move(argument_text)};
-  return make(std::move(n));
+  return make_node(std::move(n));
 }
 
-Expression make_symbol(SymbolId id, std::shared_ptr<SkoSource> source) { return make_symbol(sko_symbols()[id], std::move(source)); }
+Expression make_symbol(SymbolId id, std::shared_ptr<SkoSource> source) { return make_symbol(sko_symbol(id), std::move(source)); }
 
 Expression make_vector(const std::string& name, const Space& space) {
   Node n{NodeKind::vector, Space::euclidean(1), space, {}};
   n.name = name;
-  return make(std::move(n));
+  return make_node(std::move(n));
 }
 
 Expression identity() {
-  return make(Node{NodeKind::identity, Space(), Space(), {}});
+  return make_node(Node{NodeKind::identity, Space(), Space(), {}});
 }
 
 Expression identity(const Space& space) {
-  return make(Node{NodeKind::identity, space, space, {}});
+  return make_node(Node{NodeKind::identity, space, space, {}});
 }
 
 Expression zero(const Space& domain, const Space& codomain) {
-  return make(Node{NodeKind::zero, domain, codomain, {}});
+  return make_node(Node{NodeKind::zero, domain, codomain, {}});
 }
 
 Expression constant(std::vector<double> dense, const Space& domain, const Space& codomain, const std::string& name) {
@@ -212,7 +90,7 @@ Expression constant(std::vector<double> dense, const Space& domain, const Space&
   data->dense = std::move(dense);
   Node n{NodeKind::constant, domain, codomain, {}};
   n.constant = std::move(data);
-  return make(std::move(n));
+  return make_node(std::move(n));
 }
 
 Expression constant_blocks(std::vector<std::vector<double>> blocks, const Space& domain, const Space& codomain, const std::string& name) {
@@ -234,13 +112,13 @@ Expression constant_blocks(std::vector<std::vector<double>> blocks, const Space&
   data->blocks = std::move(blocks);
   Node n{NodeKind::constant, domain, codomain, {}};
   n.constant = std::move(data);
-  return make(std::move(n));
+  return make_node(std::move(n));
 }
 
 Expression external(std::shared_ptr<const ExternalData> data, const Space& domain, const Space& codomain) {
   Node n{NodeKind::external, domain, codomain, {}};
   n.external = std::move(data);
-  return make(std::move(n));
+  return make_node(std::move(n));
 }
 
 // ------------------------------------------------------------------ arithmetic
@@ -256,7 +134,7 @@ Expression with_space(const Expression& e, const Space& space) {
       Node n = x.node();
       n.domain = n.codomain = dual_space ? dual : space;
       for (Expression& c : n.children) c = (dual_space != (n.kind == NodeKind::transpose)) ? made.at(c.get()).second : made.at(c.get()).first;
-      return make(std::move(n));
+      return make_node(std::move(n));
     };
     made.emplace(x.get(), std::make_pair(in(false), in(true)));
   });
@@ -302,7 +180,7 @@ Expression sum_of(std::vector<Expression> terms) {
   }
   if (flat.size() == 1) return flat[0];
   if (flat.size() > most_parts) throw_too_many_parts("a sum", double(flat.size()));
-  return make(Node{NodeKind::sum, flat[0].domain(), flat[0].codomain(), std::move(flat)});
+  return make_node(Node{NodeKind::sum, flat[0].domain(), flat[0].codomain(), std::move(flat)});
 }
 
 Expression product_of(std::vector<Expression> factors) {
@@ -329,7 +207,7 @@ Expression product_of(std::vector<Expression> factors) {
   if (flat.size() == 1) return flat[0];
   if (flat.size() > most_parts) throw_too_many_parts("a product", double(flat.size()));
   const Space domain = flat.back().domain(), codomain = flat.front().codomain();
-  return make(Node{NodeKind::product, domain, codomain, std::move(flat)});
+  return make_node(Node{NodeKind::product, domain, codomain, std::move(flat)});
 }
 
 Expression operator+(const Expression& a, const Expression& b) { return sum_of({a, b}); }
@@ -340,37 +218,37 @@ Expression operator*(const Expression& a, const Expression& b) { return product_
 Expression operator*(const Coefficient& c, const Expression& a) {
   Node n{NodeKind::scaled, a.domain(), a.codomain(), {a}};
   n.coefficient = c;
-  return make(std::move(n));
+  return make_node(std::move(n));
 }
 
 Expression Expression::T() const {
-  if (floating()) return make(Node{NodeKind::transpose, Space(), Space(), {*this}});
-  return make(Node{NodeKind::transpose, codomain().dual(), domain().dual(), {*this}});
+  if (floating()) return make_node(Node{NodeKind::transpose, Space(), Space(), {*this}});
+  return make_node(Node{NodeKind::transpose, codomain().dual(), domain().dual(), {*this}});
 }
 
 Expression Expression::inv() const {
   if (!floating() && domain().dimension() != codomain().dimension())
     throw SpaceError(label(*this) + " maps " + domain().description() + " to " + codomain().description() + ": it is not square and has no inverse");
-  return make(Node{NodeKind::inverse, codomain(), domain(), {*this}}, node().memo->of_inverse());
+  return make_node(Node{NodeKind::inverse, codomain(), domain(), {*this}}, node().memo->of_inverse());
 }
 
 Expression block_diagonal(const Expression& a) {
   if (a.floating()) return a;
   if (!cut_alike(a.domain(), a.codomain()))
     throw SpaceError("blockdiag(" + label(a) + "): " + a.domain().description() + " and " + a.codomain().description() + " are not cut into the same bodies");
-  return make(Node{NodeKind::block_diagonal, a.domain(), a.codomain(), {a}});
+  return make_node(Node{NodeKind::block_diagonal, a.domain(), a.codomain(), {a}});
 }
 
 Expression square_root_of(const Expression& a) {
   if (a.kind() == NodeKind::identity) return a;
   const Space domain = a.domain().dual() == a.domain() ? a.domain() : Space(SpaceKind::Whitened, a.domain().layout_pointer());
-  return make(Node{NodeKind::square_root, domain, a.codomain(), {a}});
+  return make_node(Node{NodeKind::square_root, domain, a.codomain(), {a}});
 }
 
 Expression block_function(const SymbolDefinition& function, std::shared_ptr<SkoSource> source, std::shared_ptr<const Binding> binding, const Expression& operand) {
   Node n{NodeKind::block_function, source->space(function.domain, {}), source->space(function.codomain, {}), {operand}};
   n.symbol = Symbol{&function, std::move(source), std::move(binding), {}, {}};
-  return make(std::move(n));
+  return make_node(std::move(n));
 }
 
 Expression lower_half(const Expression& a) {
@@ -378,7 +256,7 @@ Expression lower_half(const Expression& a) {
                                            SpaceKind::Theta, SpaceKind::Theta, Pattern::function};
   Node n{NodeKind::block_function, a.domain(), a.codomain(), {a}};
   n.symbol.definition = &definition;
-  return make(std::move(n));
+  return make_node(std::move(n));
 }
 
 Expression power(const Expression& a, int exponent) {
@@ -422,7 +300,7 @@ Expression Expression::at(std::shared_ptr<const Binding> binding) const {
     Node n = e.node();
     if (binds && !n.symbol.binding) n.symbol.binding = binding;
     for (Expression& c : n.children) c = moved.at(c.get());
-    moved.emplace(e.get(), make(std::move(n)));
+    moved.emplace(e.get(), make_node(std::move(n)));
   });
   return moved.at(get());
 }

@@ -114,7 +114,7 @@ struct ExpressionHash {
   size_t operator()(const Expression& e) const { return e.node().hash; }
 };
 
-Expression make_symbol(const SymbolDefinition& definition, std::shared_ptr<SkoSource> source, std::vector<int> arguments = {},
+Expression make_symbol(const SymbolDefinition& definition, std::shared_ptr<SkoSource> source, SymbolArguments arguments = {},
                        std::string argument_text = "");
 Expression make_symbol(SymbolId id, std::shared_ptr<SkoSource> source);
 Expression make_vector(const std::string& name, const Space& space);

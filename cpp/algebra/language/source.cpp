@@ -43,7 +43,7 @@ void SkoSource::share_coordinates_in_groups(const SkoSource& other, const std::v
   theta_layout_ = cut_into_groups(*other.theta_layout_, groups, this);
 }
 
-Space SkoSource::space(SpaceKind kind, const std::vector<int>&) const {
+Space SkoSource::space(SpaceKind kind, const SymbolArguments&) const {
   switch (kind) {
     case SpaceKind::Theta: return theta();
     case SpaceKind::V: return motions();

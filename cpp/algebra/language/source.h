@@ -67,8 +67,8 @@ class SkoSource : public std::enable_shared_from_this<SkoSource> {
   Space theta() const { return Space(SpaceKind::Theta, theta_layout_); }
   Space motions() const { return Space(SpaceKind::V, body_layout_); }
   Space forces() const { return Space(SpaceKind::F, body_layout_); }
-  // The space of this kind; arguments are node numbers for NodesV and NodesF.
-  virtual Space space(SpaceKind kind, const std::vector<int>& arguments) const;
+  // The space of this kind; NodesV and NodesF are those of the nodes that a letter is of.
+  virtual Space space(SpaceKind kind, const SymbolArguments& arguments) const;
 
   // An edit of the model's structure makes everything built on this source stale.
   void invalidate(const std::string& reason);

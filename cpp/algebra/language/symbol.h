@@ -3,9 +3,11 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "algebra/language/space.h"
+#include "algebra/language/symbol_arguments.h"
 
 namespace pycraft {
 
@@ -28,27 +30,76 @@ struct Group {
   enum : unsigned { kinematics = 1, articulated = 2, composite = 4, compliance = 8, velocities = 16 };
 };
 
-// The SKO symbols, which any tree of blocks has. Mechanics adds its own, from first_extra on.
-enum SymbolId : int { E, phi, phi_tilde, H, M, J, P, P_plus, D, G, K, tau, tau_bar, E_psi, psi, psi_tilde, R, Upsilon, Omega, lower_half_of, first_extra };
+// Every letter there is. A letter's record stands in the room that knows what it is: `sko_symbols` here, the others in operators/.
+enum class SymbolId {
+  // of any tree of blocks
+  E, phi, phi_tilde, H, M, J, P, P_plus, D, G, K, tau, tau_bar, E_psi, psi, psi_tilde, R, Upsilon, Omega,
+  lower_half_of,          // a function: lower½(X)
+  // of mechanics
+  B,
+  Jacobian,
+  Lambda,
+  Delta,                  // crf(h_i) at the body of coordinate i
+  Delta_theta_dot,        // crf(H*θ̇)
+  V_tilde,                // crm(V)
+  V_bar,                  // crf(V)
+  momentum_cross,         // -[[ñ, f̃], [f̃, 0]] of (n; f) = M V
+  X_world,                // φ(0,k): forces in body k's frame to the world's
+  H_dot,                  // Ḣ along θ̇
+  theta_dot,              // the model's v
+  velocity,               // V = φ*H*θ̇
+  coriolis_acceleration,  // a = ṼH*θ̇ + Ḣ*θ̇
+  gyroscopic_force,       // b = V̄MV
+  gravity_field,          // the gravity acceleration (0; g) seen in every body
+  gravity_base,           // -φ*(0,r)(0; g) at the roots: the base acceleration that stands for gravity
+  // that only derivatives bring up
+  inertia_derivative,
+  coordinate_selection,   // Π, diagonal of ones
+  direction_twist,        // the twist of a direction in the axes of its body
+  motion_cross,           // functions of a vector: crm(x), crf(x), and -[[ñ, f̃], [f̃, 0]] of x = (n; f)
+  force_cross,
+  momentum_cross_of,
+  inverse_tangent,        // ∂(ℳ + J)⁻¹ in plans: operators/inverse_tangent.h
+  // of grouped bodies
+  inner_phi,              // φ_S
+  inner_H                 // H_S
+};
+
+// Who has a letter: any tree, a multibody model, expressions that were differentiated, grouped bodies.
+enum class LetterKind { sko, mechanics, derivatives, groups };
+constexpr LetterKind kind_of(SymbolId id) {
+  return id < SymbolId::B ? LetterKind::sko : id < SymbolId::inertia_derivative ? LetterKind::mechanics : id < SymbolId::inner_phi ? LetterKind::derivatives : LetterKind::groups;
+}
 
 struct Symbol;
 
-struct SymbolDefinition {
-  int id;
+// What most letters are not, and what some are.
+struct SymbolTraits {
+  bool symmetric = false;
+  unsigned groups = Group::kinematics;            // what of its values is computed first
+  Takes takes = Takes::nothing;
+  Expression (*expand)(const Symbol&) = nullptr;  // compounds: the definition
+  bool tangent_of_inverse = false;                // ∂(ℳ + J)⁻¹: applied by the derivative of the Riccati sweep
+};
+
+// The record of a letter: all that is said of it without numbers.
+struct SymbolDefinition : SymbolTraits {
+  SymbolDefinition(SymbolId its_id, std::string its_ascii, std::string its_unicode, std::string its_latex, std::string its_meaning, SpaceKind from, SpaceKind to,
+                   Pattern its_pattern, SymbolTraits more = {})
+      : SymbolTraits(more), id(its_id), ascii(std::move(its_ascii)), unicode(std::move(its_unicode)), latex(std::move(its_latex)),
+        meaning(std::move(its_meaning)), domain(from), codomain(to), pattern(its_pattern) {}
+  SymbolId id;
   std::string ascii, unicode, latex, meaning;
   SpaceKind domain, codomain;
   Pattern pattern;
-  bool symmetric = false;
-  unsigned groups = Group::kinematics;
-  Expression (*expand)(const Symbol&) = nullptr;  // compounds: the definition
-  bool tangent_of_inverse = false;                // ∂(ℳ + J)⁻¹: applied by the derivative of the Riccati sweep
+  LetterKind kind() const { return kind_of(id); }
 };
 
 struct Symbol {
   const SymbolDefinition* definition;
   std::shared_ptr<SkoSource> source;
   std::shared_ptr<const Binding> binding;  // null: the model's state at the time of evaluation
-  std::vector<int> arguments;              // a coordinate, or node numbers
+  SymbolArguments arguments;
   std::string argument_text;               // how the arguments are shown
 };
 
@@ -59,5 +110,6 @@ inline bool operator==(const Symbol& a, const Symbol& b) { return same_letter(a,
 
 // The table of the SKO symbols, in the order of SymbolId.
 const std::vector<SymbolDefinition>& sko_symbols();
+inline const SymbolDefinition& sko_symbol(SymbolId id) { return sko_symbols()[static_cast<size_t>(id)]; }
 
 }  // namespace pycraft

@@ -32,6 +32,7 @@ class InverseTangent {
 template <class S>
 class SkoValues {
  public:
+  using Scalar = S;
   virtual ~SkoValues() = default;
 
   // The form of the articulated-inertia sweep; set before the first state.

@@ -1,6 +1,10 @@
 // What steps cost, in floating-point operations per column: what the block policy of each body says, and two operations an entry of H, G, D, P, R, Υ.
 #include "algebra/planning/costs.h"
+
+#include <algorithm>
+
 #include "algebra/planning/planner.h"
+#include "algebra/planning/realization.h"
 
 namespace pycraft {
 
@@ -83,6 +87,50 @@ double mass_matrix_dense_flops(const SkoSource& s) {
     depth[k] = t.parent[k] < 0 ? 1 : depth[t.parent[k]] + 1;
     sum += depth[k] * t.dof[k] * (s.costs(k).shift + 2.0 * t.size[k] * t.dof[k]);
   }
+  return sum;
+}
+
+// ------------------------------------------------------------------ realizations
+
+std::vector<int> Realization::body_states() const {
+  std::vector<int> sizes(tree->structure().bodies(), 0);
+  for (const Space& s : states)
+    if (s.belongs_to_bodies())
+      for (size_t k = 0; k < sizes.size(); ++k) sizes[k] += s.body_size(static_cast<int>(k));
+  return sizes;
+}
+
+namespace {
+
+// Columns that a body shares with its parent: the states that travel along the edges.
+double interface_size(const Realization& r) {
+  std::vector<char> up(r.equations.size(), 0), down(r.states.size(), 0);
+  for (const auto& t : r.terms) {
+    if (t.shift == Shift::up) up[t.row] = 1;
+    if (t.shift == Shift::down) down[t.column] = 1;
+  }
+  const double six = 6;
+  return six * (std::count(up.begin(), up.end(), 1) + std::count(down.begin(), down.end(), 1)) / 2.0;
+}
+
+}  // namespace
+
+double Realization::factor_flops() const {
+  double sum = 0;
+  const double c = interface_size(*this);
+  for (int n : body_states()) sum += 2.0 * n * n * n / 3 + 2.0 * n * n * c + 2.0 * c * c * n;
+  return sum;
+}
+double Realization::solve_flops() const {
+  double sum = 0;
+  const double c = interface_size(*this);
+  for (int n : body_states()) sum += 2 * (2.0 * n * n + 4.0 * n * c);  // twice: one refinement
+  return sum;
+}
+double Realization::entries() const {
+  double sum = 0;
+  const double c = interface_size(*this);
+  for (int n : body_states()) sum += 2 * (double(n) * n + 2 * n * c);
   return sum;
 }
 

@@ -48,9 +48,7 @@ std::optional<int> Planner::structural_diagonal(const Expression& e) {
         s.coefficients.push_back(part.coefficient);
       }
       s.flops = 2 * block_entries(e.codomain(), e.domain()) * terms.size();
-      s.bytes = 8 * block_entries(e.codomain(), e.domain());
-      s.text = "blocks: blockdiag(" + show(e) + ")";
-      return emit(std::move(s), {RegisterKind::blocks, e.codomain(), e.domain(), nullptr, false});
+      return emit_blocks(std::move(s), e, "blockdiag(" + show(e) + ")");
     }
     case NodeKind::inverse: {
       const Expression& inner = e.children()[0];
@@ -60,58 +58,57 @@ std::optional<int> Planner::structural_diagonal(const Expression& e) {
       Step s{StepKind::invert_blocks};
       s.in = {*r};
       s.flops = block_product_flops(e.codomain(), e.codomain(), e.domain());
-      s.bytes = 8 * block_entries(e.codomain(), e.domain());
-      s.text = "blocks: blockdiag(" + show(e) + ")";
-      return emit(std::move(s), {RegisterKind::blocks, e.codomain(), e.domain(), nullptr, false});
+      return emit_blocks(std::move(s), e, "blockdiag(" + show(e) + ")");
     }
-    case NodeKind::product: {
-      const auto& f = e.children();
-      if (is_upper_triangular(e) || is_lower_triangular(e)) {  // and not both, like E X E*: then so is each factor
-        std::optional<int> r;
-        for (const Expression& x : f) {
-          const auto d = diagonal_by_structure(x);
-          if (!d) return std::nullopt;
-          r = r ? multiply_blocks(*r, *d) : *d;
-        }
-        return r;
-      }
-      // blockdiag(A X B) = A blockdiag(X) B with A, B block diagonal.
-      size_t i = 0;
-      while (i < f.size() && is_block_diagonal(f[i])) ++i;
-      size_t j = f.size();
-      while (j > i && is_block_diagonal(f[j - 1])) --j;
-      const auto part = [&](size_t from, size_t to) { return product_of(std::vector<Expression>(f.begin() + from, f.begin() + to)); };
-      if (i > 0 || j < f.size()) {
-        const auto inner = i < j ? diagonal_by_structure(part(i, j)) : std::nullopt;
-        if (!inner) return std::nullopt;
-        int r = *inner;
-        if (i > 0) r = multiply_blocks(blocks(part(0, i)), r);
-        if (j < f.size()) r = multiply_blocks(r, blocks(part(j, f.size())));
-        return r;
-      }
-      // φ X φ* with X block diagonal: a Lyapunov sweep. E* X E: a step base to tip.
-      if (const auto known = diagonal_by_theorem(f)) return known;
-      bool left_t = false, right_t = false;
-      const Symbol *left = letter_of(f.front(), left_t), *right = letter_of(f.back(), right_t);
-      if (!left || !right || left->definition != right->definition || !same_model(*left, *right) || left_t == right_t) return std::nullopt;
-      const bool edges = left->definition->pattern == Pattern::edges && left_t;
-      if (left->definition->pattern != Pattern::resolvent && !edges) return std::nullopt;
-      for (size_t k = 1; k + 1 < f.size(); ++k)
-        if (!is_block_diagonal(f[k])) return std::nullopt;
-      const int middle = f.size() == 2 ? identity_blocks(f[0].domain(), f[1].codomain()) : blocks(part(1, f.size() - 1));
-      Step s{edges ? StepKind::congruence_blocks : StepKind::lyapunov_blocks};
-      s.in = {middle};
-      s.symbol = *left;
-      s.transposed = left_t;
-      s.context = context_of(*left, left->definition->groups);
-      s.flops = group_flops(*left->source, Group::composite) * (left->definition->id == SymbolId::psi ? 2 : 1);
-      s.bytes = 8 * block_entries(e.codomain(), e.domain());
-      s.text = "blocks: blockdiag(" + show(e) + ")" +
-               (left_t ? " (base to tip)" : " (tip to base)");
-      return emit(std::move(s), {RegisterKind::blocks, e.codomain(), e.domain(), nullptr, false});
-    }
+    case NodeKind::product: return diagonal_of_product(e);
     default: return std::nullopt;
   }
+}
+
+std::optional<int> Planner::diagonal_of_product(const Expression& e) {
+  const auto& f = e.children();
+  if (is_upper_triangular(e) || is_lower_triangular(e)) {  // and not both, like E X E*: then so is each factor
+    std::optional<int> r;
+    for (const Expression& x : f) {
+      const auto d = diagonal_by_structure(x);
+      if (!d) return std::nullopt;
+      r = r ? multiply_blocks(*r, *d) : *d;
+    }
+    return r;
+  }
+  // blockdiag(A X B) = A blockdiag(X) B with A, B block diagonal.
+  size_t i = 0, j = f.size();
+  while (i < f.size() && is_block_diagonal(f[i])) ++i;
+  while (j > i && is_block_diagonal(f[j - 1])) --j;
+  if (i == 0 && j == f.size()) return diagonal_of_congruence(e);
+  const auto part = [&](size_t from, size_t to) { return product_of(std::vector<Expression>(f.begin() + from, f.begin() + to)); };
+  const auto inner = i < j ? diagonal_by_structure(part(i, j)) : std::nullopt;
+  if (!inner) return std::nullopt;
+  int r = *inner;
+  if (i > 0) r = multiply_blocks(blocks(part(0, i)), r);
+  if (j < f.size()) r = multiply_blocks(r, blocks(part(j, f.size())));
+  return r;
+}
+
+// φ X φ* with X block diagonal: a Lyapunov sweep. E* X E: a step base to tip.
+std::optional<int> Planner::diagonal_of_congruence(const Expression& e) {
+  const auto& f = e.children();
+  if (const auto known = diagonal_by_theorem(f)) return known;
+  bool left_t = false, right_t = false;
+  const Symbol *left = letter_of(f.front(), left_t), *right = letter_of(f.back(), right_t);
+  if (!left || !right || left->definition != right->definition || !same_model(*left, *right) || left_t == right_t) return std::nullopt;
+  const bool edges = left->definition->pattern == Pattern::edges && left_t;
+  if (left->definition->pattern != Pattern::resolvent && !edges) return std::nullopt;
+  for (size_t k = 1; k + 1 < f.size(); ++k)
+    if (!is_block_diagonal(f[k])) return std::nullopt;
+  const std::vector<Expression> inside(f.begin() + 1, f.end() - 1);
+  Step s{edges ? StepKind::congruence_blocks : StepKind::lyapunov_blocks};
+  s.in = {f.size() == 2 ? identity_blocks(f[0].domain(), f[1].codomain()) : blocks(product_of(inside))};
+  s.symbol = *left;
+  s.transposed = left_t;
+  s.context = context_of(*left, left->definition->groups);
+  s.flops = group_flops(*left->source, Group::composite) * (left->definition->id == SymbolId::psi ? 2 : 1);
+  return emit_blocks(std::move(s), e, "blockdiag(" + show(e) + ")" + (left_t ? " (base to tip)" : " (tip to base)"));
 }
 
 // What the sweeps P, D, G (tip to base) and Υ (base to tip) say of the diagonal blocks of a product, O(N):
@@ -215,29 +212,29 @@ std::optional<std::vector<int>> Planner::logdet_of_factors(const std::vector<Exp
   return registers;
 }
 
+int Planner::combine_scalars(std::vector<int> in, std::vector<Coefficient> coefficients, const std::string& text, const Coefficient& constant) {
+  Step s{StepKind::combine_scalars};
+  s.in = std::move(in);
+  s.coefficients = std::move(coefficients);
+  s.coefficients.push_back(constant);
+  s.text = text;
+  return emit(std::move(s), {RegisterKind::scalar, {}, {}, nullptr, false});
+}
+
 int Planner::logdet(const Expression& e) {
-  const Register scalar{RegisterKind::scalar, {}, {}, nullptr, false};
-  const auto combine = [&](std::vector<int> in, std::vector<Coefficient> c, const std::string& text, const Coefficient& constant) {
-    Step s{StepKind::combine_scalars};
-    s.in = std::move(in);
-    s.coefficients = std::move(c);
-    s.coefficients.push_back(constant);
-    s.text = text;
-    return emit(std::move(s), scalar);
-  };
   switch (e.kind()) {
     case NodeKind::symbol:
       if (e.node().symbol.definition->pattern == Pattern::compound) return logdet(lower(e, true));  // Λ
       break;
-    case NodeKind::identity: return combine({}, {}, "ln det I = 0", 0);
+    case NodeKind::identity: return combine_scalars({}, {}, "ln det I = 0", 0);
     case NodeKind::scaled:
-      return combine({logdet(e.children()[0])}, {1}, "ln det of a multiple", e.domain().dimension() * Coefficient::log_of_size(e.node().coefficient));
-    case NodeKind::inverse: return combine({logdet(e.children()[0])}, {-1}, "ln det of an inverse", 0);
+      return combine_scalars({logdet(e.children()[0])}, {1}, "ln det of a multiple", e.domain().dimension() * Coefficient::log_of_size(e.node().coefficient));
+    case NodeKind::inverse: return combine_scalars({logdet(e.children()[0])}, {-1}, "ln det of an inverse", 0);
     case NodeKind::product: {
       const auto parts = logdet_of_factors(e.children());
       if (!parts) break;
       if (parts->size() == 1) return parts->front();
-      return combine(*parts, std::vector<Coefficient>(parts->size(), 1), "ln det of a product", 0);
+      return combine_scalars(*parts, std::vector<Coefficient>(parts->size(), 1), "ln det of a product", 0);
     }
     case NodeKind::sum: {  // ln det (ℳ + J) = ln det D
       if (!options_.rules || e.children().size() != 2) break;
@@ -253,9 +250,14 @@ int Planner::logdet(const Expression& e) {
     s.in = {factor_gram(e, *root)};
     s.tier = 1;
     s.text = "ln|det| from the factors of " + show(e);
-    return emit(std::move(s), scalar);
+    return emit(std::move(s), {RegisterKind::scalar, {}, {}, nullptr, false});
   }
-  // A sum, or a product of factors that are not square: the closed realization has its determinant over that of its own states.
+  return logdet_by_elimination(e);
+}
+
+// A sum, or a product of factors that are not square: the closed realization has its determinant over that of its own states.
+int Planner::logdet_by_elimination(const Expression& e) {
+  const Register scalar{RegisterKind::scalar, {}, {}, nullptr, false};
   std::string reason;
   const auto system = build_realization(*this, e.inv(), false, reason);
   const auto own = system ? build_realization(*this, e, false, reason) : nullptr;
@@ -283,7 +285,7 @@ int Planner::logdet(const Expression& e) {
     s.text = "ln|det| from the pivots";
     parts.push_back(emit(std::move(s), scalar));
   }
-  return combine(parts, {1, -1}, "ln|det| of " + show(e), 0);
+  return combine_scalars(parts, {1, -1}, "ln|det| of " + show(e), 0);
 }
 
 }  // namespace pycraft

@@ -74,148 +74,119 @@ int Planner::apply(const Expression& e, int x) {
   const std::pair<int, int> key{id_of(e), x};
   const auto known = vector_memo_.find(key);
   if (known != vector_memo_.end()) return known->second;
-  const bool wide = plan_.registers[x].wide;
-  int y = -1;
+  return vector_memo_[key] = apply_anew(e, x);
+}
+
+int Planner::apply_anew(const Expression& e, int x) {
   switch (e.kind()) {
-    case NodeKind::identity: y = x; break;
+    case NodeKind::identity: return x;
     case NodeKind::zero: {
       Step s{StepKind::zero};
       s.text = "0";
-      s.bytes = vector_bytes(e.codomain());
-      y = emit(std::move(s), {RegisterKind::vector, e.codomain(), {}, nullptr, wide});
-      break;
+      return emit_vector(std::move(s), e.codomain(), x);
     }
-    case NodeKind::symbol: y = apply_symbol(e.node().symbol, false, false, x); break;
+    case NodeKind::symbol: return apply_symbol(e.node().symbol, false, false, x);
     case NodeKind::transpose: {
       const Expression& inner = e.children()[0];
-      if (inner.kind() == NodeKind::symbol) {
-        y = apply_symbol(inner.node().symbol, true, false, x);
-      } else if (inner.kind() == NodeKind::vector) {
-        Step s{StepKind::apply_column};
-        s.in = {vector_value(inner), x};
-        s.transposed = true;
-        s.flops = 2.0 * inner.codomain().dimension();
-        s.text = show(e);
-        y = emit(std::move(s), {RegisterKind::vector, e.codomain(), {}, nullptr, wide});
-      } else if (inner.kind() == NodeKind::constant && inner.node().constant->blocks.empty()) {
-        Step s{StepKind::apply_constant};
-        s.in = {x};
-        s.constant = inner.node().constant;
-        s.transposed = true;
-        s.flops = 2.0 * e.domain().dimension() * e.codomain().dimension();
-        s.text = show(e);
-        y = emit(std::move(s), {RegisterKind::vector, e.codomain(), {}, nullptr, wide});
-      } else if (inner.kind() == NodeKind::external) {
-        Step s{StepKind::apply_external};
-        s.in = {x};
-        s.external = inner.node().external;
-        s.transposed = true;
-        s.text = show(e);
-        y = emit(std::move(s), {RegisterKind::vector, e.codomain(), {}, nullptr, wide});
-      } else {
-        y = apply_blocks(blocks(e), false, x, show(e));
-      }
-      break;
+      return inner.kind() == NodeKind::symbol ? apply_symbol(inner.node().symbol, true, false, x) : apply_given(e, inner, true, x);
     }
-    case NodeKind::vector: {
-      Step s{StepKind::apply_column};
-      s.in = {vector_value(e), x};
-      s.flops = 2.0 * e.codomain().dimension();
-      s.bytes = vector_bytes(e.codomain());
-      s.text = show(e);
-      y = emit(std::move(s), {RegisterKind::vector, e.codomain(), {}, nullptr, wide});
-      break;
-    }
-    case NodeKind::constant: {
-      if (!e.node().constant->blocks.empty()) {
-        y = apply_blocks(blocks(e), false, x, show(e));
-        break;
-      }
-      Step s{StepKind::apply_constant};
-      s.in = {x};
-      s.constant = e.node().constant;
-      s.flops = 2.0 * e.domain().dimension() * e.codomain().dimension();
-      s.bytes = vector_bytes(e.codomain());
-      s.text = show(e);
-      y = emit(std::move(s), {RegisterKind::vector, e.codomain(), {}, nullptr, wide});
-      break;
-    }
-    case NodeKind::external: {
-      Step s{StepKind::apply_external};
-      s.in = {x};
-      s.external = e.node().external;
-      s.bytes = vector_bytes(e.codomain());
-      s.text = show(e);
-      y = emit(std::move(s), {RegisterKind::vector, e.codomain(), {}, nullptr, wide});
-      break;
-    }
+    case NodeKind::vector:
+    case NodeKind::constant:
+    case NodeKind::external: return apply_given(e, e, false, x);
     case NodeKind::scaled: {
       Step s{StepKind::combine};
       s.in = {apply(e.children()[0], x)};
       s.coefficients = {e.node().coefficient};
       s.flops = e.codomain().dimension();
-      s.bytes = vector_bytes(e.codomain());
       s.text = show(e.node().coefficient * identity());
-      y = emit(std::move(s), {RegisterKind::vector, e.codomain(), {}, nullptr, wide});
-      break;
+      return emit_vector(std::move(s), e.codomain(), x);
     }
-    case NodeKind::sum: y = apply_sum(e, x); break;
-    case NodeKind::product: y = apply_product(e.children(), x, e); break;
-    case NodeKind::inverse: y = apply_inverse(e, x); break;
+    case NodeKind::sum: return apply_sum(e, x);
+    case NodeKind::product: return apply_product(e.children(), x);
+    case NodeKind::inverse: return apply_inverse(e, x);
     case NodeKind::block_diagonal:
     case NodeKind::block_function:
-    case NodeKind::square_root: y = apply_blocks(blocks(e), false, x, show(e)); break;
+    case NodeKind::square_root: break;
   }
-  vector_memo_[key] = y;
-  return y;
+  return apply_blocks(blocks(e), false, x, show(e));
 }
 
-int Planner::apply_product(const std::vector<Expression>& typed, int x, const Expression&) {
+// A user's vector, constant or operator, or the transpose e of it.
+int Planner::apply_given(const Expression& e, const Expression& given, bool transposed, int x) {
+  Step s{StepKind::apply_external};
+  s.transposed = transposed;
+  s.text = show(e);
+  if (given.kind() == NodeKind::vector) {
+    s.kind = StepKind::apply_column;
+    s.in = {vector_value(given), x};
+    s.flops = 2.0 * given.codomain().dimension();
+  } else if (given.kind() == NodeKind::constant && given.node().constant->blocks.empty()) {
+    s.kind = StepKind::apply_constant;
+    s.in = {x};
+    s.constant = given.node().constant;
+    s.flops = 2.0 * e.domain().dimension() * e.codomain().dimension();
+  } else if (given.kind() == NodeKind::external) {
+    s.in = {x};
+    s.external = given.node().external;
+  } else {
+    return apply_blocks(blocks(e), false, x, s.text);
+  }
+  return emit_vector(std::move(s), e.codomain(), x);
+}
+
+// The register of a vector in `space`, as wide as register x.
+int Planner::emit_vector(Step s, const Space& space, int x) {
+  if (s.bytes == 0) s.bytes = vector_bytes(space);
+  return emit(std::move(s), {RegisterKind::vector, space, {}, nullptr, plan_.registers[x].wide});
+}
+
+// A kernel of a whole model's ℳ or ℳ⁻¹ on a vector: HφMφ*H*, with J where it is asked for, or its inverse.
+int Planner::emit_kernel(StepKind kind, const Symbol& model, bool with_J, int x, const char* text) {
+  const bool solves = kind == StepKind::mass_matrix_solve;
+  Step s{kind};
+  s.in = {x};
+  s.flag = with_J;
+  s.context = context_of(model, solves ? Group::kinematics | Group::articulated : Group::kinematics);
+  s.flops = mass_matrix_flops(*model.source, solves);
+  s.bytes = vector_bytes(model.source->theta()) + vector_bytes(model.source->motions());
+  s.tier = 1;
+  s.text = text;
+  return emit_vector(std::move(s), model.source->theta(), x);
+}
+
+// How many of the factors that end at `end` are a kernel's; x becomes the register of what it makes.
+size_t Planner::apply_kernel(const std::vector<Expression>& factors, size_t end, int& x) {
+  bool transposed = false;
+  const Symbol* last = letter_of(factors[end - 1], transposed);
+  if (last && transposed && is_symbol(factors[end - 1].children()[0], SymbolId::H)) {
+    const Kernels kernels = kernels_of(*last);
+    if (ends_with(factors, end, kernels.mass_matrix)) {
+      x = emit_kernel(StepKind::mass_matrix, *last, false, x, "HφMφ*H* (Newton-Euler at rest: base to tip, tip to base)");
+      return kernels.mass_matrix.size();
+    }
+  }
+  if (factors[end - 1].kind() != NodeKind::sum) return 0;
+  for (const Expression& t : factors[end - 1].children()) {
+    const Scaled part = split_scalar(t);
+    if (part.expression.kind() != NodeKind::product || !is_symbol(part.expression.children()[0], SymbolId::H)) continue;
+    const Symbol& h = part.expression.children()[0].node().symbol;
+    const Kernels kernels = kernels_of(h);
+    if (!ends_with(factors, end, kernels.mass_matrix_inverse)) continue;
+    x = emit_kernel(StepKind::mass_matrix_solve, h, false, x, "[I-HψK]* D⁻¹ [I-HψK] (tip to base, base to tip)");
+    return kernels.mass_matrix_inverse.size();
+  }
+  return 0;
+}
+
+int Planner::apply_product(const std::vector<Expression>& typed, int x) {
   const std::vector<Expression> factors = options_.rules ? gathered_by_psi(typed) : typed;
   size_t end = factors.size();
   while (end > 0) {
-    // A run of factors with a kernel of its own?
-    bool transposed = false;
-    const Symbol* last = letter_of(factors[end - 1], transposed);
-    size_t taken = 0;
-    if (options_.rules && last && is_symbol(transposed ? factors[end - 1].children()[0] : factors[end - 1], SymbolId::H) && transposed) {
-      const Kernels kernels = kernels_of(*last);
-      if (ends_with(factors, end, kernels.mass_matrix)) {
-        Step s{StepKind::mass_matrix};
-        s.in = {x};
-        s.context = context_of(*last, Group::kinematics);
-        s.flops = mass_matrix_flops(*last->source, false);
-        s.bytes = vector_bytes(last->source->theta()) + vector_bytes(last->source->motions());
-        s.tier = 1;
-        s.text = "HφMφ*H* (Newton-Euler at rest: base to tip, tip to base)";
-        x = emit(std::move(s), {RegisterKind::vector, last->source->theta(), {}, nullptr, plan_.registers[x].wide});
-        taken = kernels.mass_matrix.size();
-      }
-    }
-    if (!taken && options_.rules && factors[end - 1].kind() == NodeKind::sum) {
-      for (const Expression& t : factors[end - 1].children()) {
-        const Scaled part = split_scalar(t);
-        if (part.expression.kind() != NodeKind::product || !is_symbol(part.expression.children()[0], SymbolId::H)) continue;
-        const Symbol& h = part.expression.children()[0].node().symbol;
-        const Kernels kernels = kernels_of(h);
-        if (!ends_with(factors, end, kernels.mass_matrix_inverse)) continue;
-        Step s{StepKind::mass_matrix_solve};
-        s.in = {x};
-        s.context = context_of(h, Group::kinematics | Group::articulated);
-        s.flops = mass_matrix_flops(*h.source, true);
-        s.bytes = vector_bytes(h.source->theta()) + vector_bytes(h.source->motions());
-        s.tier = 1;
-        s.text = "[I-HψK]* D⁻¹ [I-HψK] (tip to base, base to tip)";
-        x = emit(std::move(s), {RegisterKind::vector, h.source->theta(), {}, nullptr, plan_.registers[x].wide});
-        taken = kernels.mass_matrix_inverse.size();
-        break;
-      }
-    }
-    if (taken) {
+    const size_t taken = options_.rules ? apply_kernel(factors, end, x) : 0;
+    if (taken)
       end -= taken;
-      continue;
-    }
-    x = apply(factors[--end], x);
+    else
+      x = apply(factors[--end], x);
   }
   return x;
 }
@@ -226,16 +197,8 @@ int Planner::apply_sum(const Expression& e, int x) {
   std::vector<std::pair<Coefficient, int>> parts;
   if (options_.rules)
     for (const MassMatrixWithRotors& whole : mass_matrices_with_rotors(e)) {
-      const Symbol& h = whole.model;
-      Step s{StepKind::mass_matrix};
-      s.in = {x};
-      s.flag = true;
-      s.context = context_of(h, Group::kinematics);
-      s.flops = mass_matrix_flops(*h.source, false);
-      s.bytes = vector_bytes(h.source->theta()) + vector_bytes(h.source->motions());
-      s.tier = 1;
-      s.text = "HφMφ*H* + J (Newton-Euler at rest: base to tip, tip to base)";
-      parts.emplace_back(whole.coefficient, emit(std::move(s), {RegisterKind::vector, e.codomain(), {}, nullptr, plan_.registers[x].wide}));
+      const int y = emit_kernel(StepKind::mass_matrix, whole.model, true, x, "HφMφ*H* + J (Newton-Euler at rest: base to tip, tip to base)");
+      parts.emplace_back(whole.coefficient, y);
       used[whole.product] = used[whole.rotors] = 1;
     }
   for (size_t i = 0; i < e.children().size(); ++i) {
@@ -250,9 +213,8 @@ int Planner::apply_sum(const Expression& e, int x) {
     s.in.push_back(r);
   }
   s.flops = 2.0 * e.codomain().dimension() * parts.size();
-  s.bytes = vector_bytes(e.codomain());
   s.text = parts.size() == 1 ? "scale" : "sum of " + std::to_string(parts.size()) + " terms";
-  return emit(std::move(s), {RegisterKind::vector, e.codomain(), {}, nullptr, plan_.registers[x].wide});
+  return emit_vector(std::move(s), e.codomain(), x);
 }
 
 int Planner::apply_symbol(const Symbol& symbol, bool transposed, bool inverted, int x) {
@@ -261,7 +223,6 @@ int Planner::apply_symbol(const Symbol& symbol, bool transposed, bool inverted, 
   if (symbol.binding) e = e.at(symbol.binding);
   const Space domain = inverted ? (transposed ? e.domain().dual() : e.codomain()) : (transposed ? e.codomain().dual() : e.domain());
   const Space codomain = inverted ? (transposed ? e.codomain().dual() : e.domain()) : (transposed ? e.domain().dual() : e.codomain());
-  const bool wide = plan_.registers[x].wide;
   std::string text = show(e) + (transposed ? "*" : "") + (inverted ? "⁻¹" : "");
   switch (d.pattern) {
     case Pattern::compound:
@@ -273,7 +234,7 @@ int Planner::apply_symbol(const Symbol& symbol, bool transposed, bool inverted, 
       s.transposed = transposed;
       s.flops = 2.0 * e.codomain().dimension();
       s.text = text;
-      return emit(std::move(s), {RegisterKind::vector, codomain, {}, nullptr, wide});
+      return emit_vector(std::move(s), codomain, x);
     }
     case Pattern::resolvent: {
       Step s{transposed ? StepKind::scatter : StepKind::gather};
@@ -283,11 +244,11 @@ int Planner::apply_symbol(const Symbol& symbol, bool transposed, bool inverted, 
       s.flops = resolvent_flops(symbol);
       s.bytes = vector_bytes(codomain);
       s.text = text + (transposed ? " (base to tip)" : " (tip to base)");
-      return emit(std::move(s), {RegisterKind::vector, codomain, {}, nullptr, wide});
+      return emit_vector(std::move(s), codomain, x);
     }
     default: break;
   }
-  if (d.id >= first_extra) return apply_blocks(blocks(transposed ? e.T() : e), false, x, text);
+  if (d.kind() != LetterKind::sko) return apply_blocks(blocks(transposed ? e.T() : e), false, x, text);
   Step s{StepKind::apply_symbol};
   s.in = {x};
   s.symbol = symbol;
@@ -297,7 +258,7 @@ int Planner::apply_symbol(const Symbol& symbol, bool transposed, bool inverted, 
   s.flops = symbol_flops(symbol);
   s.bytes = vector_bytes(codomain);
   s.text = text;
-  return emit(std::move(s), {RegisterKind::vector, codomain, {}, nullptr, wide});
+  return emit_vector(std::move(s), codomain, x);
 }
 
 int Planner::apply_inverse_tangent(const Symbol& symbol, int x) {
@@ -311,7 +272,7 @@ int Planner::apply_inverse_tangent(const Symbol& symbol, int x) {
   s.bytes = vector_bytes(space) + vector_bytes(symbol.source->motions());
   s.tier = 1;
   s.text = "∂(HφMφ*H* + J)⁻¹ along " + symbol.argument_text + " (the derivative of the Riccati sweep)";
-  return emit(std::move(s), {RegisterKind::vector, space, {}, nullptr, plan_.registers[x].wide});
+  return emit_vector(std::move(s), space, x);
 }
 
 int Planner::vector_value(const Expression& e) {
@@ -361,7 +322,7 @@ int Planner::column(const Expression& e) {
     }
     case NodeKind::product: {
       const auto& f = e.children();
-      r = apply_product(std::vector<Expression>(f.begin(), f.end() - 1), column(f.back()), e);
+      r = apply_product(std::vector<Expression>(f.begin(), f.end() - 1), column(f.back()));
       break;
     }
     case NodeKind::scaled:
@@ -394,145 +355,7 @@ int Planner::apply_blocks(int block, bool transposed, int x, const std::string& 
   const Space out = transposed ? b.columns.dual() : b.space;
   s.bytes = vector_bytes(out);
   s.text = text;
-  return emit(std::move(s), {RegisterKind::vector, out, {}, nullptr, plan_.registers[x].wide});
-}
-
-int Planner::apply_inverse(const Expression& e, int x) {
-  const Expression& inner = e.children()[0];
-  bool transposed = false;
-  if (const Symbol* symbol = letter_of(inner, transposed)) {
-    if (symbol->definition->id == SymbolId::D) return apply_symbol(*symbol, false, true, x);
-    if (symbol->definition->pattern == Pattern::resolvent && options_.rules) {  // φ⁻¹ = I - E, ψ⁻¹ = I - E_ψ
-      const SymbolId edge = symbol->definition->id == SymbolId::phi ? SymbolId::E : SymbolId::E_psi;
-      Expression edges = make_symbol(edge, symbol->source);
-      if (symbol->binding) edges = edges.at(symbol->binding);
-      if (transposed) edges = edges.T();
-      return apply(lower(identity() - edges, true), x);
-    }
-  }
-  if (is_block_diagonal(inner)) return apply_blocks(blocks(e), false, x, show(e));
-  if (const auto root = gram_root(inner)) {
-    Step s{StepKind::dense_solve};
-    s.in = {factor_gram(inner, *root), x};
-    s.flops = 2.0 * inner.domain().dimension() * inner.domain().dimension();
-    s.bytes = vector_bytes(e.codomain());
-    s.tier = 1;
-    s.text = show(e) + " by its triangular factors";
-    return emit(std::move(s), {RegisterKind::vector, e.codomain(), {}, nullptr, plan_.registers[x].wide});
-  }
-  return solve_realization(e, x);
-}
-
-int Planner::solve_realization(const Expression& e, int x) {
-  std::string reason;
-  const auto realization = build_realization(*this, e, false, reason);
-  if (!realization) return solve_dense(e.children()[0], x, reason);
-  Step f{StepKind::factor};
-  f.realization = realization;
-  f.flops = realization->factor_flops();
-  f.bytes = 8 * realization->entries();
-  f.tier = 3;
-  f.text = "eliminate " + show(e) + " over the tree, leaves to root";
-  const auto key = id_of(e);
-  int factor;
-  if (const auto known = block_memo_.find(key); known != block_memo_.end()) {
-    factor = known->second;
-  } else {
-    factor = emit(std::move(f), {RegisterKind::factor, {}, {}, realization, false});
-    block_memo_[key] = factor;
-  }
-  Step s{StepKind::solve};
-  s.in = {factor, x};
-  s.realization = realization;
-  s.flops = realization->solve_flops();
-  s.bytes = vector_bytes(e.codomain());
-  s.tier = 3;
-  s.text = show(e) + " (leaves to root, root to leaves)";
-  return emit(std::move(s), {RegisterKind::vector, e.codomain(), {}, nullptr, plan_.registers[x].wide});
-}
-
-// A plan of its own, whose values are computed with this one's.
-std::shared_ptr<const Plan> Planner::plan_operand(const Expression& operand) {
-  auto made = std::make_shared<const Plan>(Planner(options_).plan(operand, Request::apply));
-  for (size_t c = 0; c < made->contexts.size(); ++c)
-    context_of(Symbol{nullptr, made->contexts[c].source, made->contexts[c].binding, {}, {}}, made->groups[c]);
-  return made;
-}
-
-// L⁻¹HψB of B*ψ*H*D⁻¹HψB, D = LL*, in whatever spelling reads the same from D⁻¹ to both sides: of the operators of nodes and of R^n, whose
-// inverse is Λ and its like.
-std::optional<Expression> Planner::gram_root(const Expression& e) const {
-  const SpaceKind kind = e.domain().kind();
-  if (kind == SpaceKind::Theta || kind == SpaceKind::V || kind == SpaceKind::F) return std::nullopt;
-  if (!options_.rules || e.kind() != NodeKind::product) return std::nullopt;
-  const std::vector<Expression>& f = e.children();
-  const size_t middle = f.size() / 2;
-  if (f.size() % 2 == 0 || f[middle].kind() != NodeKind::inverse || !is_symbol(f[middle].children()[0], SymbolId::D)) return std::nullopt;
-  for (size_t i = 0; i < middle; ++i)
-    if (f[i] != lower(f[f.size() - 1 - i].T(), false)) return std::nullopt;
-  const Expression D = f[middle].children()[0];
-  const Letters o(D.node().symbol.source, D.node().symbol.binding);
-  std::vector<Expression> right{square_root(D).inv()};
-  size_t i = middle + 1;
-  if (i + 2 < f.size() && f[i] == kernels_of(D.node().symbol).mass_matrix_inverse.back() && f[i + 1] == o.H && f[i + 2] == o.phi) {
-    right.insert(right.end(), {o.H, o.psi});  // [I-HψK]Hφ = Hψ
-    i += 3;
-  }
-  right.insert(right.end(), f.begin() + i, f.end());
-  return product_of(right);
-}
-
-int Planner::factor_gram(const Expression& e, const Expression& root) {
-  const int key = id_of(e);
-  if (const auto known = block_memo_.find(key); known != block_memo_.end()) return known->second;
-  const double n = root.codomain().dimension(), r = root.domain().dimension();
-  Step f{StepKind::dense_factor};
-  f.flag = true;
-  f.operand = plan_operand(root);
-  f.flops = 2 * n * r * r + r * f.operand->flops();
-  f.bytes = 8 * (n * r + r * r);
-  f.tier = 1;
-  f.text = "X*X = " + show(e) + ": triangular factors of X = " + show(root);
-  return block_memo_[key] = emit(std::move(f), {RegisterKind::dense, e.codomain(), e.domain(), nullptr, false});
-}
-
-// Of one operand the whole plan has the factors once, wherever they are needed.
-int Planner::dense_factor(const Expression& operand, const std::string& reason) {
-  if (whole_) return whole_->dense_factor(operand, reason);
-  const int key = id_of(operand);
-  if (const auto known = dense_memo_.find(key); known != dense_memo_.end()) return known->second;
-  if (std::find(plan_.notes.begin(), plan_.notes.end(), "dense: " + reason) == plan_.notes.end()) plan_.notes.push_back("dense: " + reason);
-  const double n = operand.domain().dimension();
-  Step f{StepKind::dense_factor};
-  f.operand = std::make_shared<const Plan>(Planner(options_, *this).plan_lowered(operand));
-  for (size_t c = 0; c < f.operand->contexts.size(); ++c)
-    context_of(Symbol{nullptr, f.operand->contexts[c].source, f.operand->contexts[c].binding, {}, {}}, f.operand->groups[c]);
-  f.flops = 2 * n * n * n / 3 + n * f.operand->flops();
-  f.bytes = 8 * n * n;
-  f.tier = 4;
-  f.text = show(operand) + " made dense and factored: " + reason;
-  return dense_memo_[key] = emit(std::move(f), {RegisterKind::dense, operand.codomain(), operand.domain(), nullptr, false});
-}
-
-int Planner::solve_dense(const Expression& operand, int x, const std::string& reason) {
-  const double n = operand.domain().dimension();
-  int factor = dense_factor(operand, reason);
-  if (whole_) {
-    const auto [known, fresh] = imported_.try_emplace(factor, -1);
-    if (fresh) {
-      known->second = new_register(RegisterKind::dense, operand.codomain(), operand.domain(), false);
-      plan_.registers[known->second].shared = factor;
-    }
-    factor = known->second;
-  }
-  if (x < 0) return factor;
-  Step s{StepKind::dense_solve};
-  s.in = {factor, x};
-  s.flops = 2 * n * n;
-  s.bytes = 8 * n;
-  s.tier = 4;
-  s.text = "(" + show(operand) + ")⁻¹ by the dense factors";
-  return emit(std::move(s), {RegisterKind::vector, operand.domain(), {}, nullptr, plan_.registers[x].wide});
+  return emit_vector(std::move(s), out, x);
 }
 
 }  // namespace pycraft

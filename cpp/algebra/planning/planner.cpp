@@ -129,10 +129,6 @@ Precision precision_of(const Expression& e) {
   return symbols ? *symbols : leaves.value_or(Precision::double_);
 }
 
-}  // namespace
-
-namespace {
-
 // Determinants, traces, diagonals and triangular factors of what is solved have no residual that a solve would correct: refinement of
 // them is the next precision up. Of what is not solved there is none.
 bool refined_by_precision(const Plan& plan) {
@@ -178,89 +174,97 @@ Plan Planner::plan(const Expression& typed, Request request) {
   one_cut_ = cut_in_one_way(e);
   plan_.domain = e.domain();
   plan_.codomain = e.codomain();
-  const bool bodies = cut_alike(e.domain(), e.codomain());
-  const auto apply_to_input = [&] {
-    plan_.input = new_register(RegisterKind::vector, e.domain(), {}, true);
-    plan_.output = apply(e, plan_.input);
-  };
   switch (request) {
-    case Request::apply: apply_to_input(); break;
-    case Request::dense: {
-      const Scaled whole = split_scalar(e);
-      if (bodies && is_block_diagonal(e)) {
-        Step s{StepKind::gather_blocks};
-        s.in = {blocks(e)};
-        s.bytes = 8.0 * e.domain().dimension() * e.codomain().dimension();
-        s.text = "blocks as a matrix";
-        plan_.output = emit(std::move(s), {RegisterKind::dense, e.codomain(), e.domain(), nullptr, false});
-        break;
-      }
-      const auto with_rotors = mass_matrices_with_rotors(e);
-      const bool with_J = e.kind() == NodeKind::sum && e.children().size() == 2 && with_rotors.size() == 1 && with_rotors[0].coefficient == 1;
-      const Symbol* model = with_J ? &with_rotors[0].model : mass_matrix_model(e);
-      if (options_.rules && model) {
-        const Symbol& symbol = *model;
-        Step s{StepKind::mass_matrix_dense};
-        s.flag = with_J;
-        s.context = context_of(symbol, Group::kinematics | Group::composite);
-        s.flops = mass_matrix_dense_flops(*symbol.source);
-        s.bytes = 8.0 * e.domain().dimension() * e.codomain().dimension();
-        s.tier = 1;
-        s.text = "composite-body assembly of HφMφ*H*";
-        plan_.output = emit(std::move(s), {RegisterKind::dense, e.codomain(), e.domain(), nullptr, false});
-        break;
-      }
-      plan_.columns_of_identity = true;
-      apply_to_input();
-      break;
-    }
+    case Request::apply: apply_to_input(e); break;
+    case Request::dense: plan_dense(e); break;
     case Request::block_diagonal:
     case Request::diagonal:
-    case Request::trace: {
-      const char* what = request == Request::trace ? "trace" : "diagonal";
-      if (!bodies) {
-        plan_.columns_of_identity = true;
-        apply_to_input();
-        break;
-      }
-      const int b = diagonal_blocks(e);
-      if (request == Request::block_diagonal) {
-        plan_.output = b;
-        break;
-      }
-      if (e.domain().dimension() != e.codomain().dimension())
-        throw SpaceError(std::string(what) + " of " + show(typed) + ": it maps " + e.domain().description() + " to " + e.codomain().description());
-      Step s{request == Request::trace ? StepKind::trace_of_blocks : StepKind::diagonal_of_blocks};
-      s.in = {b};
-      s.text = what;
-      plan_.output = emit(std::move(s), {request == Request::trace ? RegisterKind::scalar : RegisterKind::vector, e.codomain(), {}, nullptr, false});
-      break;
-    }
+    case Request::trace: plan_diagonal(e, typed); break;
     case Request::logdet: plan_.output = logdet(e); break;
-    case Request::norm: {
-      // Small or tall operators column by column; long ones as tr(X*X) over the tree.
-      const std::optional<Expression> weight = e.domain().dimension() > 600 && bodies ? euclidean_weight(e.codomain()) : std::nullopt;
-      if (weight) {
-        const Expression square = lower(e.T() * *weight * e, false);
-        std::string reason;
-        if (is_block_diagonal(e) || build_realization(*this, square, true, reason)) {
-          Step s{StepKind::root_of_trace};
-          s.in = {diagonal_blocks(square)};
-          s.text = "norm from tr(X*X)";
-          plan_.output = emit(std::move(s), {RegisterKind::scalar, {}, {}, nullptr, false});
-          break;
-        }
-      }
-      plan_.columns_of_identity = true;
-      apply_to_input();
-      Step s{StepKind::norm_of_vector};
-      s.in = {plan_.output};
-      s.text = "norm, columns of the identity some at a time";
-      plan_.output = emit(std::move(s), {RegisterKind::scalar, {}, {}, nullptr, false});
-      break;
-    }
+    case Request::norm: plan_norm(e); break;
   }
   finish();
+  plan_arithmetic(typed);
+  return std::move(plan_);
+}
+
+void Planner::apply_to_input(const Expression& e) {
+  plan_.input = new_register(RegisterKind::vector, e.domain(), {}, true);
+  plan_.output = apply(e, plan_.input);
+}
+
+void Planner::apply_to_identity(const Expression& e) {
+  plan_.columns_of_identity = true;
+  apply_to_input(e);
+}
+
+void Planner::plan_dense(const Expression& e) {
+  const Register out{RegisterKind::dense, e.codomain(), e.domain(), nullptr, false};
+  const double bytes = 8.0 * e.domain().dimension() * e.codomain().dimension();
+  if (cut_alike(e.domain(), e.codomain()) && is_block_diagonal(e)) {
+    Step s{StepKind::gather_blocks};
+    s.in = {blocks(e)};
+    s.bytes = bytes;
+    s.text = "blocks as a matrix";
+    plan_.output = emit(std::move(s), out);
+    return;
+  }
+  const auto with_rotors = mass_matrices_with_rotors(e);
+  const bool with_J = e.kind() == NodeKind::sum && e.children().size() == 2 && with_rotors.size() == 1 && with_rotors[0].coefficient == 1;
+  const Symbol* model = with_J ? &with_rotors[0].model : mass_matrix_model(e);
+  if (!options_.rules || !model) return apply_to_identity(e);
+  Step s{StepKind::mass_matrix_dense};
+  s.flag = with_J;
+  s.context = context_of(*model, Group::kinematics | Group::composite);
+  s.flops = mass_matrix_dense_flops(*model->source);
+  s.bytes = bytes;
+  s.tier = 1;
+  s.text = "composite-body assembly of HφMφ*H*";
+  plan_.output = emit(std::move(s), out);
+}
+
+void Planner::plan_diagonal(const Expression& e, const Expression& typed) {
+  if (!cut_alike(e.domain(), e.codomain())) return apply_to_identity(e);
+  const int b = diagonal_blocks(e);
+  if (plan_.request == Request::block_diagonal) {
+    plan_.output = b;
+    return;
+  }
+  const bool trace = plan_.request == Request::trace;
+  const char* what = trace ? "trace" : "diagonal";
+  if (e.domain().dimension() != e.codomain().dimension())
+    throw SpaceError(std::string(what) + " of " + show(typed) + ": it maps " + e.domain().description() + " to " + e.codomain().description());
+  Step s{trace ? StepKind::trace_of_blocks : StepKind::diagonal_of_blocks};
+  s.in = {b};
+  s.text = what;
+  plan_.output = emit(std::move(s), {trace ? RegisterKind::scalar : RegisterKind::vector, e.codomain(), {}, nullptr, false});
+}
+
+// Small or tall operators column by column; long ones as tr(X*X) over the tree.
+void Planner::plan_norm(const Expression& e) {
+  const Register scalar{RegisterKind::scalar, {}, {}, nullptr, false};
+  const bool bodies = cut_alike(e.domain(), e.codomain());
+  const std::optional<Expression> weight = e.domain().dimension() > 600 && bodies ? euclidean_weight(e.codomain()) : std::nullopt;
+  if (weight) {
+    const Expression square = lower(e.T() * *weight * e, false);
+    std::string reason;
+    if (is_block_diagonal(e) || build_realization(*this, square, true, reason)) {
+      Step s{StepKind::root_of_trace};
+      s.in = {diagonal_blocks(square)};
+      s.text = "norm from tr(X*X)";
+      plan_.output = emit(std::move(s), scalar);
+      return;
+    }
+  }
+  apply_to_identity(e);
+  Step s{StepKind::norm_of_vector};
+  s.in = {plan_.output};
+  s.text = "norm, columns of the identity some at a time";
+  plan_.output = emit(std::move(s), scalar);
+}
+
+// Batch, precision and refinement of what was typed: theorems may leave nothing in the plan that hangs on a state.
+void Planner::plan_arithmetic(const Expression& typed) {
   // A theorem may have used J = 0 and left nothing of a model: the plan hangs on it all the same.
   for (const Context& c : contexts(typed))
     if (std::none_of(plan_.contexts.begin(), plan_.contexts.end(), [&](const Context& known) { return known.source == c.source; })) {
@@ -268,18 +272,16 @@ Plan Planner::plan(const Expression& typed, Request request) {
       plan_.groups.push_back(0);
       plan_.hinge_diagonal.push_back(c.source->traits().hinge_diagonal);
     }
-  // Of what was typed: theorems may leave nothing in the plan that hangs on a state.
   plan_.batch = batch_of(typed);
   plan_.batched = plan_.batch >= 0;
   plan_.precision = precision_of(typed);
-  if (!refinement_asked(plan_)) return std::move(plan_);
+  if (!refinement_asked(plan_)) return;
   if (refined_by_precision(plan_)) {
     plan_.precision = wider(plan_.precision);
     plan_.notes.push_back("refinement: there is no solve to correct here, so all of it is computed one precision up");
   } else if (!solves(plan_)) {
     plan_.notes.push_back("refinement: there is no solve here, so nothing is corrected");
   }
-  return std::move(plan_);
 }
 
 void Planner::finish() {
@@ -293,8 +295,7 @@ Plan Planner::plan_lowered(const Expression& e) {
   plan_.text = show(e);
   plan_.domain = e.domain();
   plan_.codomain = e.codomain();
-  plan_.input = new_register(RegisterKind::vector, e.domain(), {}, true);
-  plan_.output = apply(e, plan_.input);
+  apply_to_input(e);
   finish();
   return std::move(plan_);
 }

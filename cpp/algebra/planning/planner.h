@@ -30,6 +30,14 @@ class Planner {
   Plan plan_lowered(const Expression& lowered);
   void finish();
 
+  // ---- what is asked for
+  void apply_to_input(const Expression& e);
+  void apply_to_identity(const Expression& e);  // its columns some at a time
+  void plan_dense(const Expression& e);
+  void plan_diagonal(const Expression& e, const Expression& typed);
+  void plan_norm(const Expression& e);
+  void plan_arithmetic(const Expression& typed);
+
   // ---- steps and registers
   int new_register(RegisterKind kind, const Space& rows, const Space& columns, bool wide);
   int emit(Step step, Register out);
@@ -38,7 +46,12 @@ class Planner {
 
   // ---- vectors: registers of y = e x
   int apply(const Expression& e, int x);
-  int apply_product(const std::vector<Expression>& factors, int x, const Expression& whole);
+  int apply_anew(const Expression& e, int x);
+  int apply_given(const Expression& e, const Expression& given, bool transposed, int x);
+  int apply_product(const std::vector<Expression>& factors, int x);
+  size_t apply_kernel(const std::vector<Expression>& factors, size_t end, int& x);
+  int emit_vector(Step s, const Space& space, int x);
+  int emit_kernel(StepKind kind, const Symbol& model, bool with_J, int x, const char* text);
   int apply_sum(const Expression& e, int x);
   int apply_symbol(const Symbol& symbol, bool transposed, bool inverted, int x);
   int apply_inverse(const Expression& e, int x);
@@ -55,6 +68,11 @@ class Planner {
 
   // ---- block registers of block-diagonal expressions
   int blocks(const Expression& e);
+  int blocks_anew(const Expression& e);
+  int blocks_of_sum(const Expression& e);
+  int blocks_of_product(const Expression& e);
+  int blocks_of_function(const Expression& e);
+  int emit_blocks(Step s, const Expression& e, const std::string& text);
   int multiply_blocks(int a, int b);
   int identity_blocks(const Space& rows, const Space& columns);
   int zero_blocks(const Space& rows, const Space& columns);
@@ -64,7 +82,11 @@ class Planner {
   std::optional<int> structural_diagonal(const Expression& e);     // the same, not remembered
   int diagonal_blocks(const Expression& e);
   std::optional<int> diagonal_by_theorem(const std::vector<Expression>& factors);
+  std::optional<int> diagonal_of_product(const Expression& e);
+  std::optional<int> diagonal_of_congruence(const Expression& e);
   int logdet(const Expression& e);
+  int logdet_by_elimination(const Expression& e);
+  int combine_scalars(std::vector<int> in, std::vector<Coefficient> coefficients, const std::string& text, const Coefficient& constant);
   std::optional<std::vector<int>> logdet_of_factors(const std::vector<Expression>& factors);
   std::optional<int> logdet_by_structure(const Expression& e);
 

@@ -1,16 +1,14 @@
 #include "algebra/planning/realization.h"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
-#include <optional>
 
 #include "algebra/language/display.h"
 #include "algebra/language/lower.h"
 #include "algebra/language/properties.h"
 #include "algebra/language/source.h"
+#include "algebra/planning/low_rank.h"
 #include "algebra/planning/planner.h"
-#include "numerics/small_lu.h"
 #include "runtime/interrupt.h"
 
 namespace pycraft {
@@ -34,63 +32,6 @@ struct Signal {
   Space space;
   std::vector<SignalTerm> terms;
 };
-
-// C = C(:,J) C(I,J)⁻¹ C(I,:) with r rows I and columns J, up to 16: entries of C alone, so that no digit is lost before the run. The rows and
-// columns are found by elimination with complete pivoting in double precision.
-struct LowRank {
-  int rank;
-  std::shared_ptr<const ConstantData> columns, core, rows;
-};
-
-// Whether that holds in the widest digits, and not to the rounding of a double only.
-bool exactly(const LowRank& factors, const std::vector<double>& C, int rows, int columns) {
-  using Widest = Digits100;
-  const int r = factors.rank;
-  std::vector<Widest> core(factors.core->dense.begin(), factors.core->dense.end()), X(factors.rows->dense.begin(), factors.rows->dense.end()), work(size_t(r) * columns);
-  SmallLU<Widest> lu;
-  if (r > 0 && !lu.factor(core.data(), r, nullptr)) return false;
-  if (r > 0) lu.solve(X.data(), columns, work.data());
-  const Widest tolerance = Widest(1e-80) * Widest(std::abs(*std::max_element(C.begin(), C.end(), [](double a, double b) { return std::abs(a) < std::abs(b); })));
-  for (int i = 0; i < rows; ++i)
-    for (int j = 0; j < columns; ++j) {
-      Widest rest = C[size_t(i) * columns + j];
-      for (int a = 0; a < r; ++a) rest -= Widest(factors.columns->dense[size_t(i) * r + a]) * X[size_t(a) * columns + j];
-      if (abs(rest) > tolerance) return false;
-    }
-  return true;
-}
-
-std::optional<LowRank> low_rank_factors(const ConstantData& c, int rows, int columns, bool more_digits) {
-  constexpr int limit = 16;
-  std::vector<double> rest = c.dense;
-  const auto largest = [&] {
-    return static_cast<size_t>(std::max_element(rest.begin(), rest.end(), [](double a, double b) { return std::abs(a) < std::abs(b); }) - rest.begin());
-  };
-  if (rest.empty()) return std::nullopt;
-  const double tolerance = std::max(rows, columns) * epsilon<double>() * std::abs(rest[largest()]);
-  std::vector<int> I, J;
-  for (size_t at = largest(); std::abs(rest[at]) > tolerance; at = largest()) {
-    if (static_cast<int>(I.size()) == std::min(limit, std::min(rows, columns) - 1)) return std::nullopt;
-    const int i = static_cast<int>(at / columns), j = static_cast<int>(at % columns);
-    I.push_back(i), J.push_back(j);
-    const std::vector<double> row(rest.begin() + size_t(i) * columns, rest.begin() + size_t(i + 1) * columns);
-    for (int a = 0; a < rows; ++a) {
-      const double f = rest[size_t(a) * columns + j] / row[j];
-      for (int b = 0; b < columns; ++b) rest[size_t(a) * columns + b] -= f * row[b];
-    }
-  }
-  const auto part = [&](const std::vector<int>* of_rows, const std::vector<int>* of_columns) {
-    auto made = std::make_shared<ConstantData>();
-    made->name = c.name;
-    for (int a = 0; a < (of_rows ? static_cast<int>(of_rows->size()) : rows); ++a)
-      for (int b = 0; b < (of_columns ? static_cast<int>(of_columns->size()) : columns); ++b)
-        made->dense.push_back(c.dense[size_t(of_rows ? (*of_rows)[a] : a) * columns + (of_columns ? (*of_columns)[b] : b)]);
-    return made;
-  };
-  const LowRank factors{static_cast<int>(I.size()), part(nullptr, &J), part(&I, &J), part(&I, nullptr)};
-  if (more_digits && !exactly(factors, c.dense, rows, columns)) return std::nullopt;
-  return factors;
-}
 
 }  // namespace
 
@@ -211,29 +152,7 @@ class RealizationBuilder {
         collect(y);
         return true;
       }
-      case NodeKind::product: {
-        Signal s = x;
-        const auto& f = e.children();
-        size_t end = f.size();
-        while (end > 0) {
-          // A run of block-diagonal factors is one block register.
-          size_t begin = end;
-          while (begin > 0 && tree_space(f[begin - 1]) && is_block_diagonal(f[begin - 1])) --begin;
-          Signal next;
-          if (begin < end) {
-            const Expression run = product_of(std::vector<Expression>(f.begin() + begin, f.begin() + end));
-            next.space = run.codomain();
-            multiply(planner_.blocks(run), s, next);
-            end = begin;
-          } else if (!apply(f[--end], s, next)) {
-            return false;
-          }
-          s = next;
-        }
-        y = s;
-        y.space = e.codomain();
-        return true;
-      }
+      case NodeKind::product: return product(e, x, y);
       default: break;
     }
     if (tree_space(e) && is_block_diagonal(e)) {
@@ -242,37 +161,64 @@ class RealizationBuilder {
     }
     bool transposed = e.kind() == NodeKind::transpose;
     const Expression& inner = transposed ? e.children()[0] : e;
-    if (inner.kind() == NodeKind::symbol) {
-      const Symbol& symbol = inner.node().symbol;
-      switch (symbol.definition->pattern) {
-        case Pattern::compound: return apply(lower(e, true), x, y);
-        case Pattern::edges: return shift(symbol, transposed, x, y);
-        case Pattern::resolvent: return resolvent(symbol, transposed, x, y);
-        case Pattern::vector: return refuse("the vector " + show(inner) + " in it is no tree operator");
-        default: return refuse(show(inner) + " has blocks over other bodies than those of its spaces");
-      }
-    }
+    if (inner.kind() == NodeKind::symbol) return letter(e, inner.node().symbol, transposed, x, y);
     if (inner.kind() == NodeKind::constant) return border(inner.node().constant, transposed, e, x, y);
-    if (e.kind() == NodeKind::inverse) {
-      // States w with X w = x.
-      const Expression& X = e.children()[0];
-      if (!same_cut(X.domain(), X.codomain())) return refuse(show(X) + " has no square blocks");
-      Signal w{X.domain(), {}};
-      const int s = static_cast<int>(r_->states.size());
-      implicit_.push_back(s);
-      r_->states.push_back(X.domain());
-      r_->equations.push_back(X.codomain());
-      count_rows(X.domain());
-      w.terms = {{s}};
-      Signal image;
-      if (!apply(X, w, image)) return false;
-      add_to_equation(s, image, 1.0);
-      add_to_equation(s, x, -1.0);
-      y.terms = w.terms;
-      return true;
-    }
+    if (e.kind() == NodeKind::inverse) return inverse(e.children()[0], x, y);
     if (inner.kind() == NodeKind::external) return refuse(show(inner) + " is an operator of unknown structure");
     return refuse(show(e) + " is no tree operator");
+  }
+
+  bool product(const Expression& e, const Signal& x, Signal& y) {
+    Signal s = x;
+    const auto& f = e.children();
+    size_t end = f.size();
+    while (end > 0) {
+      // A run of block-diagonal factors is one block register.
+      size_t begin = end;
+      while (begin > 0 && tree_space(f[begin - 1]) && is_block_diagonal(f[begin - 1])) --begin;
+      Signal next;
+      if (begin < end) {
+        const Expression run = product_of(std::vector<Expression>(f.begin() + begin, f.begin() + end));
+        next.space = run.codomain();
+        multiply(planner_.blocks(run), s, next);
+        end = begin;
+      } else if (!apply(f[--end], s, next)) {
+        return false;
+      }
+      s = next;
+    }
+    y = s;
+    y.space = e.codomain();
+    return true;
+  }
+
+  // e: the letter, or its transpose.
+  bool letter(const Expression& e, const Symbol& symbol, bool transposed, const Signal& x, Signal& y) {
+    switch (symbol.definition->pattern) {
+      case Pattern::compound: return apply(lower(e, true), x, y);
+      case Pattern::edges: return shift(symbol, transposed, x, y);
+      case Pattern::resolvent: return resolvent(symbol, transposed, x, y);
+      case Pattern::vector: return refuse("the vector " + show(transposed ? e.children()[0] : e) + " in it is no tree operator");
+      default: return refuse(show(transposed ? e.children()[0] : e) + " has blocks over other bodies than those of its spaces");
+    }
+  }
+
+  // y = X⁻¹ x: states w with X w = x.
+  bool inverse(const Expression& X, const Signal& x, Signal& y) {
+    if (!same_cut(X.domain(), X.codomain())) return refuse(show(X) + " has no square blocks");
+    Signal w{X.domain(), {}};
+    const int s = static_cast<int>(r_->states.size());
+    implicit_.push_back(s);
+    r_->states.push_back(X.domain());
+    r_->equations.push_back(X.codomain());
+    count_rows(X.domain());
+    w.terms = {{s}};
+    Signal image;
+    if (!apply(X, w, image)) return false;
+    add_to_equation(s, image, 1.0);
+    add_to_equation(s, x, -1.0);
+    y.terms = w.terms;
+    return true;
   }
 
   // Terms on the same state through the same factors are one.
@@ -418,48 +364,6 @@ class RealizationBuilder {
 
 std::shared_ptr<const Realization> build_realization(Planner& planner, const Expression& e, bool local_ends, std::string& reason) {
   return RealizationBuilder(planner, reason).build(e, local_ends);
-}
-
-std::vector<int> Realization::body_states() const {
-  std::vector<int> sizes(tree->structure().bodies(), 0);
-  for (const Space& s : states)
-    if (s.belongs_to_bodies())
-      for (size_t k = 0; k < sizes.size(); ++k) sizes[k] += s.body_size(static_cast<int>(k));
-  return sizes;
-}
-
-namespace {
-
-// Columns that a body shares with its parent: the states that travel along the edges.
-double interface_size(const Realization& r) {
-  std::vector<char> up(r.equations.size(), 0), down(r.states.size(), 0);
-  for (const auto& t : r.terms) {
-    if (t.shift == Shift::up) up[t.row] = 1;
-    if (t.shift == Shift::down) down[t.column] = 1;
-  }
-  const double six = 6;
-  return six * (std::count(up.begin(), up.end(), 1) + std::count(down.begin(), down.end(), 1)) / 2.0;
-}
-
-}  // namespace
-
-double Realization::factor_flops() const {
-  double sum = 0;
-  const double c = interface_size(*this);
-  for (int n : body_states()) sum += 2.0 * n * n * n / 3 + 2.0 * n * n * c + 2.0 * c * c * n;
-  return sum;
-}
-double Realization::solve_flops() const {
-  double sum = 0;
-  const double c = interface_size(*this);
-  for (int n : body_states()) sum += 2 * (2.0 * n * n + 4.0 * n * c);  // twice: one refinement
-  return sum;
-}
-double Realization::entries() const {
-  double sum = 0;
-  const double c = interface_size(*this);
-  for (int n : body_states()) sum += 2 * (double(n) * n + 2 * n * c);
-  return sum;
 }
 
 }  // namespace pycraft

@@ -96,7 +96,7 @@ struct Differentiator::State {
   // ∂ of one letter, by the table at the head of differentiate.h.
   Expression letter(const Expression& e) {
     const Symbol& s = e.node().symbol;
-    if (s.definition->id >= first_extra) {
+    if (s.definition->kind() != LetterKind::sko) {
       if (s.definition->pattern == Pattern::compound) return run(lower(s.definition->expand(s), false));
       return direction.tangent(e, *owner);
     }
@@ -231,7 +231,7 @@ Expression differentiate_in_world(const Expression& e, const Direction& directio
   const auto models = contexts(e);
   const Context model = models.empty() ? model_of_spaces(e) : models[0];
   if (!model.source) return result;
-  const Symbol like{&sko_symbols()[SymbolId::E], model.source, model.binding, {}, {}};
+  const Symbol like{&sko_symbol(SymbolId::E), model.source, model.binding, {}, {}};
   const Expression W = direction.frame_motion(like);
   const auto motion = [&](const Space& s) -> Expression {
     if (s == W.domain()) return W;

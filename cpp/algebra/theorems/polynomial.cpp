@@ -12,6 +12,8 @@ namespace pycraft {
 
 namespace {
 
+using enum SymbolId;
+
 constexpr size_t word_limit = 400, step_limit = 20000, visit_limit = 100000;
 
 struct Unfolded {
@@ -51,7 +53,7 @@ int Alphabet::letter(const Expression& atom) {
   if (found != numbers_.end()) return found->second;
   const int number = static_cast<int>(atoms_.size());
   atoms_.push_back(canonical);
-  const bool known = u.symbol && u.symbol->definition->id < first_extra;
+  const bool known = u.symbol && u.symbol->definition->kind() == LetterKind::sko;
   codes_.push_back(known ? letter_code(u.symbol->definition->id, u.transposed, u.inverted) : -1);
   zero_.push_back(known && u.symbol->definition->id == J && !u.symbol->source->traits().hinge_diagonal);
   numbers_.emplace(canonical, number);
@@ -105,46 +107,46 @@ class Normaliser {
           for (const auto& [w, x] : expand(c)) add(p, w, x);
         return p;
       }
-      case NodeKind::product: {
-        Polynomial p = {{Word{}, 1}};
-        for (const Expression& f : e.children()) {
-          const Polynomial q = expand(f);
-          Polynomial r;
-          for (const auto& [w, x] : p)
-            for (const auto& [u, y] : q) {
-              Word joined = w;
-              joined.insert(joined.end(), u.begin(), u.end());
-              add(r, joined, x * y);
-            }
-          // Letters meet their inverses before rules open them up: reduce early only to stop growth.
-          p = r.size() > 40 ? reduce(r) : r;
-          if (overflow_ || p.size() > word_limit) {
-            overflow_ = true;
-            return {};
-          }
-        }
-        return p;
-      }
-      case NodeKind::inverse: {
-        // The inverse of a resolvent is a polynomial; of anything else a letter.
-        const Expression& inner = e.children()[0];
-        const Unfolded u = unfold(e);
-        if (u.symbol && u.inverted && u.symbol->definition->pattern == Pattern::resolvent) {
-          const int l = alphabet_.letter(inner);
-          const bool articulated_resolvent = u.symbol->definition->id == psi;
-          Polynomial p = {{Word{}, 1}};
-          const int edge = alphabet_.sibling(l, letter_code(E, u.transposed, false));
-          add(p, {edge}, -1.0);
-          if (articulated_resolvent) {  // ψ⁻¹ = I - E + KH
-            const int gain = alphabet_.sibling(l, letter_code(K, u.transposed, false)), hinge = alphabet_.sibling(l, letter_code(H, u.transposed, false));
-            add(p, u.transposed ? Word{hinge, gain} : Word{gain, hinge}, 1.0);
-          }
-          return p;
-        }
-        return {{Word{alphabet_.letter(e)}, 1}};
-      }
+      case NodeKind::product: return expand_product(e);
+      case NodeKind::inverse: return expand_inverse(e);
       default: return {{Word{alphabet_.letter(e)}, 1}};
     }
+  }
+
+  Polynomial expand_product(const Expression& e) {
+    Polynomial p = {{Word{}, 1}};
+    for (const Expression& f : e.children()) {
+      const Polynomial q = expand(f);
+      Polynomial r;
+      for (const auto& [w, x] : p)
+        for (const auto& [u, y] : q) {
+          Word joined = w;
+          joined.insert(joined.end(), u.begin(), u.end());
+          add(r, joined, x * y);
+        }
+      // Letters meet their inverses before rules open them up: reduce early only to stop growth.
+      p = r.size() > 40 ? reduce(r) : r;
+      if (overflow_ || p.size() > word_limit) {
+        overflow_ = true;
+        return {};
+      }
+    }
+    return p;
+  }
+
+  // The inverse of a resolvent is a polynomial; of anything else a letter.
+  Polynomial expand_inverse(const Expression& e) {
+    const Unfolded u = unfold(e);
+    if (!(u.symbol && u.inverted && u.symbol->definition->pattern == Pattern::resolvent)) return {{Word{alphabet_.letter(e)}, 1}};
+    const int l = alphabet_.letter(e.children()[0]);
+    Polynomial p = {{Word{}, 1}};
+    const int edge = alphabet_.sibling(l, letter_code(E, u.transposed, false));
+    add(p, {edge}, -1.0);
+    if (u.symbol->definition->id == psi) {  // ψ⁻¹ = I - E + KH
+      const int gain = alphabet_.sibling(l, letter_code(K, u.transposed, false)), hinge = alphabet_.sibling(l, letter_code(H, u.transposed, false));
+      add(p, u.transposed ? Word{hinge, gain} : Word{gain, hinge}, 1.0);
+    }
+    return p;
   }
 
   static void add(Polynomial& p, const Word& w, const Coefficient& c) {

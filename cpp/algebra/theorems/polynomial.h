@@ -36,7 +36,7 @@ class Alphabet {
   std::unordered_map<Expression, int, ExpressionHash> numbers_;
 };
 
-inline int letter_code(int symbol_id, bool transposed, bool inverted) { return 4 * symbol_id + 2 * transposed + inverted; }
+inline int letter_code(SymbolId id, bool transposed, bool inverted) { return 4 * static_cast<int>(id) + 2 * transposed + inverted; }
 
 // Nothing where the expansion would grow beyond a few hundred words: the planner then keeps what was typed.
 std::optional<Polynomial> normal_form(const Expression& e, Alphabet& alphabet);

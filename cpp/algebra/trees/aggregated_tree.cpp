@@ -20,7 +20,7 @@ class AggregatedValues final : public ReorderedValues<DenseBlocks<S>> {
       const int columns = id == SymbolId::J ? t.dof[k] : t.size[k];
       const int rows = id == SymbolId::H || id == SymbolId::J ? t.dof[k] : id == SymbolId::E ? t.size[t.parent[k]] : t.size[k];
       std::vector<S> out(size_t(rows) * columns);
-      if (!out.empty()) base_->block(Symbol{&sko_symbols()[id], nullptr, nullptr, {}, {}}, k, out.data());
+      if (!out.empty()) base_->block(Symbol{&sko_symbol(id), nullptr, nullptr, {}, {}}, k, out.data());
       return out;
     };
     std::vector<S> phi, H;

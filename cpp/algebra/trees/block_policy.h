@@ -20,7 +20,7 @@ namespace pycraft {
 enum class Carried { articulated, error, composite };
 
 template <class B>
-concept BlockPolicy = requires(B blocks, const B& known, int id, int k, const typename B::Scalar* x, typename B::Scalar* y, typename B::Scalar* z, int m,
+concept BlockPolicy = requires(B blocks, const B& known, SymbolId id, int k, const typename B::Scalar* x, typename B::Scalar* y, typename B::Scalar* z, int m,
                                bool transposed, const RoundingUnits<typename B::Scalar>& units, Form form) {
   // ---- applied to vectors
   known.shift_add(k, x, y, m);                        // y(p) += E x(k)

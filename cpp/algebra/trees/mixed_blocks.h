@@ -88,10 +88,10 @@ class MixedBlocks {
   void solve_D_in_place(int k, S* x, int m) const {
     of_body(k, [&](const auto& b) { b.solve_D_in_place(k, x, m); });
   }
-  void apply(int id, bool transposed, int k, const S* x, S* y, int m) const {
+  void apply(SymbolId id, bool transposed, int k, const S* x, S* y, int m) const {
     of_body(k, [&](const auto& b) { b.apply(id, transposed, k, x, y, m); });
   }
-  void block(int id, int k, S* out) const {
+  void block(SymbolId id, int k, S* out) const {
     if (id == SymbolId::E)
       of_edge(k, [&](const auto& b) { b.block(id, k, out); });
     else

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from ... import _core
 from .rotations import rotation_from_quaternion, rotation_from_rpy, turned_inertia
 from .xml_file import Element, XmlFile, label, local_name
 
@@ -23,7 +24,6 @@ HINGES = {
     "ball": "ball",
     "spherical": "ball",
 }
-_COORDINATES = {"pin": 1, "slider": 1, "weld": 0, "free": 6, "planar": 3, "ball": 3}
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _IDENTITY, _ZERO, _X = np.eye(3), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)
 _IDENTITY.setflags(write=False)
@@ -229,7 +229,7 @@ class Elements:
         unknown = [attribute for attribute in ours.attrib if attribute != "rotor_inertia"]
         if unknown:
             raise self.file.error(ours, f"{label(element)}: <pycraft> has the attribute {unknown[0]!r}; there is rotor_inertia")
-        values, count = self.file.numbers(ours, "rotor_inertia", None, element), _COORDINATES[hinge]
+        values, count = self.file.numbers(ours, "rotor_inertia", None, element), _core.hinge_kinds[hinge].nv
         if len(values) != count:
             what = f"takes {count} rotor inerti{'a' if count == 1 else 'as'}, one for each coordinate, not {len(values)}"
             raise self.file.error(ours, f"{label(element)} {what}")

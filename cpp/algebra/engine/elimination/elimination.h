@@ -107,6 +107,9 @@ class TreeElimination {
   };
 
   void lay_out(bool one_front);
+  void make_fronts(bool one_front);
+  int place(const std::vector<Space>& spaces, bool one_front, std::vector<std::vector<Place>>& at, std::vector<int>& used) const;
+  void join_fronts();                                      // which of a parent's states and equations edges touch
   bool eliminate();
   void join_scales();
   void take_units(const S* solution);
@@ -119,8 +122,17 @@ class TreeElimination {
   void add_block(Place row, Place column, const S* block, int r, int c, S factor);
   template <class Blocks, class Values>
   void assemble(Blocks&& blocks, Values&& values);
+  template <class Blocks>
+  void add_term(const Realization::Term& t, Blocks&& blocks);
+  template <class Blocks, class Values>
+  void add_edge_term(const Realization::Term& t, Blocks&& blocks, Values&& values);
+  template <class Values>
+  void load_edge(const Realization::Term& t, int k, Values&& values);
+  void add_border(const Realization::Border& t);
   template <class T, class Blocks>
   void right_hand_side(const T* x, int m, Blocks&& blocks);
+  template <class T, class Blocks>
+  void gather_output(const T* x, int m, Blocks&& blocks);
   template <class Term>
   void over_products(const S* s, S* r, int m, Term&& term) const;  // term(r(i), T(i,j), s(j)) for every entry of T
   void subtract_product(const S* s, S* r, int m) const {           // r -= T s
@@ -153,6 +165,9 @@ class TreeElimination {
 
 }  // namespace pycraft
 
+#include "algebra/engine/elimination/elimination_accuracy.h"
 #include "algebra/engine/elimination/elimination_assembly.h"
+#include "algebra/engine/elimination/elimination_factor.h"
+#include "algebra/engine/elimination/elimination_layout.h"
 #include "algebra/engine/elimination/elimination_selected.h"
 #include "algebra/engine/elimination/elimination_solve.h"
