@@ -8,19 +8,20 @@
 
 namespace pycraft {
 
-namespace {
-
+// q̇ = N(q) v.
 template <class S>
-class Kinematics {
+class ConfigurationRates {
  public:
-  explicit Kinematics(const Multibody& model) : model_(model.compiled<S>()) {}
+  explicit ConfigurationRates(const Multibody& model) : model_(model.compiled<S>()) {}
   void rate(const S* q, const S* v, S* out) const { configuration_rate(*model_, q, v, out); }
 
  private:
   std::shared_ptr<const CompiledModel<S>> model_;
 };
 
-using Integration = Batches<Kinematics>;
+namespace {
+
+using Integration = Batches<ConfigurationRates>;
 
 // Forward dynamics as the trajectory asks for it.
 template <class S>

@@ -7,14 +7,13 @@
 #include <vector>
 
 #include "algebra/language/memo.h"
+#include "algebra/language/mixed_hash.h"
 
 namespace pycraft {
 
 namespace {
 
 using Node = Expression::Node;
-
-size_t mix(size_t seed, size_t value) { return seed ^ (value * 0x9e3779b97f4a7c15ULL + 0x7f4a7c15ULL + (seed << 6) + (seed >> 2)); }
 
 // The number in front and what it scales. Signs move freely, -(2X) is (-2)X, as they round nothing.
 std::pair<Coefficient, const Expression*> scaling(const Node& n) {

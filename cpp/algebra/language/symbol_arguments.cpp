@@ -2,6 +2,8 @@
 
 #include <functional>
 
+#include "algebra/language/mixed_hash.h"
+
 namespace pycraft {
 
 namespace {
@@ -10,8 +12,6 @@ template <class... F>
 struct Each : F... {
   using F::operator()...;
 };
-
-size_t mix(size_t h, size_t x) { return h ^ (x + 0x9e3779b97f4a7c15u + (h << 6) + (h >> 2)); }
 
 size_t mix_all(size_t h, std::initializer_list<int> numbers) {
   for (int n : numbers) h = mix(h, static_cast<size_t>(n));
