@@ -110,15 +110,18 @@ Hinge checked_hinge(Hinge hinge) {
 }
 
 void check_configuration(const Hinge& hinge, const double* q) {
-  for (int i = 0; i < hinge.nq(); ++i)
-    if (!std::isfinite(q[i])) throw ModelError("q of hinge '" + hinge.name + "': entry " + std::to_string(i) + " is " + short_number(q[i]));
+  int first = 0;
   for (const Subhinge& s : hinge.subhinges) {
-    if (const int at = s.record().quaternion; at >= 0) {
-      const double size = length(Quaternion<double>{q[at], q[at + 1], q[at + 2], q[at + 3]});
+    const SubhingeRecord& r = s.record();
+    for (int i = first; i < first + r.nq; ++i)
+      if (!std::isfinite(q[i])) throw ModelError("q of hinge '" + hinge.name + "': entry " + std::to_string(i) + " is " + short_number(q[i]));
+    if (r.quaternion >= 0) {
+      const double* at = q + first + r.quaternion;
+      const double size = length(Quaternion<double>{at[0], at[1], at[2], at[3]});
       if (size < 1e-8)
         throw ModelError("q of hinge '" + hinge.name + "': its quaternion has length " + short_number(size) + " and no direction; (1, 0, 0, 0) is no rotation");
     }
-    q += s.nq();
+    first += r.nq;
   }
 }
 

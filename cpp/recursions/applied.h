@@ -14,8 +14,10 @@ struct Applied {
 
   // Gravity is the acceleration -g of the base.
   Vector6<S> base() const { return {Vector3<S>::zero(), -gravity}; }
-  // f less what is applied to body k.
-  Vector6<S> taken_from(const Vector6<S>& f, int k) const { return wrenches ? f - wrenches[k] : f; }
+  // f -= what is applied to body k.
+  void subtract_from(Vector6<S>& f, int k) const {
+    if (wrenches) f = f - wrenches[k];
+  }
 };
 
 // The model's gravity and nothing else.

@@ -46,7 +46,8 @@ S articulated_body(const SkoStructure& tree, const CompiledModel<S>& model, Rigi
   bool doubtful = false;
   const auto start = [&](int k) {
     blocks.start_articulated(k);
-    z[k] = applied.taken_from(factored ? blocks.factors().start_bias(k, model.inertia_factors[k], points.angular_velocity[k]) : points.b[k], k);
+    z[k] = factored ? blocks.factors().start_bias(k, model.inertia_factors[k], points.angular_velocity[k]) : points.b[k];
+    applied.subtract_from(z[k], k);
   };
   for (int k = model.bodies - 1; k >= 0; --k) {
     check_interrupt_at(k);

@@ -30,7 +30,8 @@ void newton_euler(const CompiledModel<S>& model, const RigidBlocks<S>& blocks, c
     if (vdot)
       for (int j = first; j < first + n; ++j) acceleration = acceleration + vdot[j] * blocks.H[j];
     alpha[k] = acceleration;
-    f[k] = applied.taken_from(blocks.inertia[k] * acceleration + points.b[k], k);
+    f[k] = blocks.inertia[k] * acceleration + points.b[k];
+    applied.subtract_from(f[k], k);
   }
   for (int k = model.bodies - 1; k >= 0; --k) {
     check_interrupt_at(k);

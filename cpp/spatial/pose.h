@@ -19,29 +19,29 @@ struct Vector6 {
 };
 
 template <class S>
-inline Vector6<S> operator+(const Vector6<S>& a, const Vector6<S>& b) {
+[[gnu::always_inline]] inline Vector6<S> operator+(const Vector6<S>& a, const Vector6<S>& b) {
   return {a.angular + b.angular, a.linear + b.linear};
 }
 template <class S>
-inline Vector6<S> operator-(const Vector6<S>& a, const Vector6<S>& b) {
+[[gnu::always_inline]] inline Vector6<S> operator-(const Vector6<S>& a, const Vector6<S>& b) {
   return {a.angular - b.angular, a.linear - b.linear};
 }
 template <class S>
-inline Vector6<S> operator*(const S& c, const Vector6<S>& a) {
+[[gnu::always_inline]] inline Vector6<S> operator*(const S& c, const Vector6<S>& a) {
   return {c * a.angular, c * a.linear};
 }
 template <class S>
-inline S dot(const Vector6<S>& a, const Vector6<S>& b) {
+[[gnu::always_inline]] inline S dot(const Vector6<S>& a, const Vector6<S>& b) {
   return dot(a.angular, b.angular) + dot(a.linear, b.linear);
 }
 // V~ W = crm(V) W, the cross product of motions.
 template <class S>
-inline Vector6<S> cross_motion(const Vector6<S>& V, const Vector6<S>& W) {
+[[gnu::always_inline]] inline Vector6<S> cross_motion(const Vector6<S>& V, const Vector6<S>& W) {
   return {cross(V.angular, W.angular), cross(V.linear, W.angular) + cross(V.angular, W.linear)};
 }
 // V¯ f = crf(V) f = -(V~)* f, a motion's cross product with a force.
 template <class S>
-inline Vector6<S> cross_force(const Vector6<S>& V, const Vector6<S>& f) {
+[[gnu::always_inline]] inline Vector6<S> cross_force(const Vector6<S>& V, const Vector6<S>& f) {
   return {cross(V.angular, f.angular) + cross(V.linear, f.linear), cross(V.angular, f.linear)};
 }
 template <class T, class S>
@@ -66,12 +66,12 @@ inline Pose<S> inverse(const Pose<S>& X) {
   return {transpose(X.R), -transpose_times(X.R, X.p)};
 }
 template <class S>
-inline Vector6<S> force_to_parent(const Pose<S>& X, const Vector6<S>& f) {
+[[gnu::always_inline]] inline Vector6<S> force_to_parent(const Pose<S>& X, const Vector6<S>& f) {
   const Vector3<S> linear = X.R * f.linear;
   return {X.R * f.angular + cross(X.p, linear), linear};
 }
 template <class S>
-inline Vector6<S> motion_to_child(const Pose<S>& X, const Vector6<S>& V) {
+[[gnu::always_inline]] inline Vector6<S> motion_to_child(const Pose<S>& X, const Vector6<S>& V) {
   return {transpose_times(X.R, V.angular), transpose_times(X.R, V.linear - cross(X.p, V.angular))};
 }
 template <class T, class S>

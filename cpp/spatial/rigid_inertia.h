@@ -33,7 +33,7 @@ inline RigidInertia<S> rigid_inertia(const S& mass, const Vector3<S>& com, const
   return {mass, h, I};
 }
 template <class S>
-inline Vector6<S> operator*(const RigidInertia<S>& M, const Vector6<S>& V) {
+[[gnu::always_inline]] inline Vector6<S> operator*(const RigidInertia<S>& M, const Vector6<S>& V) {
   return {M.rotational * V.angular + cross(M.moment, V.linear), M.mass * V.linear - cross(M.moment, V.angular)};
 }
 template <class S>

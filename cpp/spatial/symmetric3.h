@@ -26,7 +26,7 @@ inline Symmetric3<S> operator+(const Symmetric3<S>& A, const Symmetric3<S>& B) {
   return C;
 }
 template <class S>
-inline Vector3<S> operator*(const Symmetric3<S>& A, const Vector3<S>& x) {
+[[gnu::always_inline]] inline Vector3<S> operator*(const Symmetric3<S>& A, const Vector3<S>& x) {
   return {A.s[0] * x[0] + A.s[1] * x[1] + A.s[2] * x[2], A.s[1] * x[0] + A.s[3] * x[1] + A.s[4] * x[2],
           A.s[2] * x[0] + A.s[4] * x[1] + A.s[5] * x[2]};
 }

@@ -1,4 +1,5 @@
 // Three-vectors and 3x3 matrices as plain arrays of scalars: no alignment demands, any scalar (a SIMD pack of states too).
+// What every sweep does at every body is inlined always: what else a source compiles does not then decide how fast its sweeps are.
 #pragma once
 
 #include <cmath>
@@ -24,11 +25,11 @@ struct Matrix3 {
 };
 
 template <class S>
-inline Vector3<S> operator+(const Vector3<S>& a, const Vector3<S>& b) {
+[[gnu::always_inline]] inline Vector3<S> operator+(const Vector3<S>& a, const Vector3<S>& b) {
   return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
 }
 template <class S>
-inline Vector3<S> operator-(const Vector3<S>& a, const Vector3<S>& b) {
+[[gnu::always_inline]] inline Vector3<S> operator-(const Vector3<S>& a, const Vector3<S>& b) {
   return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
 }
 template <class S>
@@ -36,15 +37,15 @@ inline Vector3<S> operator-(const Vector3<S>& a) {
   return {-a[0], -a[1], -a[2]};
 }
 template <class S>
-inline Vector3<S> operator*(const S& c, const Vector3<S>& a) {
+[[gnu::always_inline]] inline Vector3<S> operator*(const S& c, const Vector3<S>& a) {
   return {c * a[0], c * a[1], c * a[2]};
 }
 template <class S>
-inline S dot(const Vector3<S>& a, const Vector3<S>& b) {
+[[gnu::always_inline]] inline S dot(const Vector3<S>& a, const Vector3<S>& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 template <class S>
-inline Vector3<S> cross(const Vector3<S>& a, const Vector3<S>& b) {
+[[gnu::always_inline]] inline Vector3<S> cross(const Vector3<S>& a, const Vector3<S>& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 template <class S>
@@ -54,13 +55,13 @@ inline S norm(const Vector3<S>& a) {
 }
 
 template <class S>
-inline Vector3<S> operator*(const Matrix3<S>& A, const Vector3<S>& x) {
+[[gnu::always_inline]] inline Vector3<S> operator*(const Matrix3<S>& A, const Vector3<S>& x) {
   return {A(0, 0) * x[0] + A(0, 1) * x[1] + A(0, 2) * x[2], A(1, 0) * x[0] + A(1, 1) * x[1] + A(1, 2) * x[2],
           A(2, 0) * x[0] + A(2, 1) * x[1] + A(2, 2) * x[2]};
 }
 // A* x without forming A*.
 template <class S>
-inline Vector3<S> transpose_times(const Matrix3<S>& A, const Vector3<S>& x) {
+[[gnu::always_inline]] inline Vector3<S> transpose_times(const Matrix3<S>& A, const Vector3<S>& x) {
   return {A(0, 0) * x[0] + A(1, 0) * x[1] + A(2, 0) * x[2], A(0, 1) * x[0] + A(1, 1) * x[1] + A(2, 1) * x[2],
           A(0, 2) * x[0] + A(1, 2) * x[1] + A(2, 2) * x[2]};
 }

@@ -30,13 +30,16 @@ def dependent_objects(root, files):
     """Objects of the ordinary build that were made from one of these files."""
     ninja = shutil.which("ninja", path=str(pathlib.Path(sys.executable).parent)) or "ninja"
     text = subprocess.run([ninja, "-C", str(root / "build"), "-t", "deps"], check=True, capture_output=True, text=True).stdout
-    found, build = set(), root / "build"
+    objects, found, build = set(), set(), root / "build"
     wanted = {str((root / f).resolve()) for f in files}
     for block in text.split("\n\n"):
         head, *rest = block.strip().splitlines() or [""]
+        made = head.split(":")[0]
+        objects.add(made)
         if any(os.path.normpath(build / line.strip()) in wanted for line in rest):
-            found.add(head.split(":")[0])
-    return found
+            found.add(made)
+    headers = tuple(made.partition("cmake_pch")[0] for made in found if made.endswith(".gch"))  # precompiled: their objects do not list them
+    return found | {o for o in objects if headers and o.startswith(headers)}
 
 
 class TestBuild:
@@ -52,7 +55,7 @@ class TestBuild:
         self.commands = {
             c["output"].removeprefix(str(root / "build") + "/"): c for c in json.loads((root / "build/compile_commands.json").read_text())
         }
-        self.objects = {o: root / "build" / o for o in self.commands if "pycraft_core.dir" in o or "_core.dir" in o}
+        self.objects = {o: root / "build" / o for o in self.commands if "_core.dir" in o and o.endswith(".o")}  # no precompiled header
         self.write()
         self.compile(sorted(dependent_objects(root, {m.file for m in self.mutants}) & self.objects.keys()))
         self.link()
@@ -73,6 +76,8 @@ class TestBuild:
         made.parent.mkdir(parents=True, exist_ok=True)
         command = shlex.split(self.commands[obj]["command"].replace(str(self.root / "cpp"), str(self.tree / "cpp")))
         command[command.index("-o") + 1] = str(made)
+        if "-include" in command:  # the precompiled header: made of the files as they are, without switches
+            del command[command.index("-include") : command.index("-include") + 2]
         together = self.root / "build" / command[command.index("-c") + 1]
         if together.is_relative_to(self.root / "build"):  # sources that are compiled together: a file of CMake's that includes them
             copy = made.with_suffix(".together.cxx")
