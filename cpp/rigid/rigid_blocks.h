@@ -386,6 +386,10 @@ class RigidBlocks {
   std::unique_ptr<RigidFactors<S>> factors_;
 };
 
+#define PYCRAFT_EXTERN(S) extern template class RigidBlocks<S>;
+PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_EXTERN)
+#undef PYCRAFT_EXTERN
+
 }  // namespace pycraft
 
 #include "rigid/rigid_elimination.h"

@@ -166,4 +166,8 @@ class RigidFactors {
   int hinge_rows_ = 0;
 };
 
+#define PYCRAFT_EXTERN(S) extern template class RigidFactors<S>;
+PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_EXTERN)
+#undef PYCRAFT_EXTERN
+
 }  // namespace pycraft

@@ -195,4 +195,8 @@ class FactoredInertia {
   int pivots_ = 0, bias_at_ = -1;
 };
 
+#define PYCRAFT_EXTERN(S) extern template class FactoredInertia<S>;
+PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_EXTERN)
+#undef PYCRAFT_EXTERN
+
 }  // namespace pycraft

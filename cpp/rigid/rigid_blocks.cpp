@@ -1,0 +1,10 @@
+// The blocks of rigid bodies, compiled once for every scalar.
+#include "rigid/rigid_blocks.h"
+
+namespace pycraft {
+
+#define PYCRAFT_INSTANTIATE(S) template class RigidBlocks<S>;
+PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_INSTANTIATE)
+#undef PYCRAFT_INSTANTIATE
+
+}  // namespace pycraft
