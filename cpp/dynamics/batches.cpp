@@ -5,7 +5,7 @@
 
 namespace pycraft {
 
-int common_batch(const std::vector<Given>& given) {
+int common_batch(Givens given) {
   int batch = -1;
   for (const Given& g : given) {
     if (g.batch < 0) continue;
@@ -20,14 +20,14 @@ void throw_width(const Multibody& model, const std::string& name, int width) {
   throw ModelError(name + " of '" + model.name() + "' takes " + std::to_string(width) + " numbers, or (B, " + std::to_string(width) + ") for a batch");
 }
 
-void check_widths(const Multibody& model, const std::vector<Given>& given) {
+void check_widths(const Multibody& model, Givens given) {
   for (const Given& g : given) {
     const int width = g.is_configuration() ? model.nq() : model.nv();
     if (g.width != width) throw_width(model, g.name, width);
   }
 }
 
-void check_given(const Multibody& model, const std::vector<Given>& given) {
+void check_given(const Multibody& model, Givens given) {
   check_widths(model, given);
   for (const Given& g : given)
     for (int b = 0; b < (g.batch < 0 ? 1 : g.batch); ++b) {

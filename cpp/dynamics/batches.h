@@ -2,7 +2,9 @@
 // checked here, once, for C++ and Python alike; workspaces are kept, one per thread, so that nothing is allocated per state.
 #pragma once
 
+#include <array>
 #include <memory>
+#include <span>
 #include <string>
 #include <tuple>
 #include <type_traits>
@@ -26,11 +28,13 @@ struct Given {
   bool is_configuration() const { return name[0] == 'q' && name[1] == 0; }
 };
 
+using Givens = std::span<const Given>;
+
 // The states that these are of, -1: one state. ModelError for two batches.
-int common_batch(const std::vector<Given>& given);
+int common_batch(Givens given);
 // ModelError that names what is wrong: another width than the model's, entries that are not finite, a quaternion without direction.
-void check_given(const Multibody& model, const std::vector<Given>& given);
-void check_widths(const Multibody& model, const std::vector<Given>& given);
+void check_given(const Multibody& model, Givens given);
+void check_widths(const Multibody& model, Givens given);
 [[noreturn]] void throw_width(const Multibody& model, const std::string& name, int width);
 // EvaluationError where a result left the range of its numbers.
 void require_finite(const double* x, size_t n, const Multibody& model);
@@ -62,7 +66,7 @@ class Batches {
   // f(workspace, numbers, y) state after state: numbers[i] of given[i] in the scalar S of the precision, y the size numbers of the result,
   // which come to out + b size as doubles.
   template <class F>
-  void run(Precision precision, const std::vector<Given>& given, int size, double* out, F f) {
+  void run(Precision precision, Givens given, int size, double* out, F f) {
     const ModelInUse use(*model_);
     check_given(*model_, given);
     const int batch = common_batch(given), states = batch < 0 ? 1 : batch;
@@ -76,10 +80,10 @@ class Batches {
 
  private:
   template <class S, class F>
-  void run_at(const std::vector<Given>& given, int states, int size, double* out, F& f) {
+  void run_at(Givens given, int states, int size, double* out, F& f) {
     constexpr bool as_given = std::is_same_v<S, double>;
     std::vector<std::vector<S>> own(as_given ? 0 : given.size());
-    std::vector<const S*> numbers(given.size());
+    std::array<const S*, 4> numbers{};  // no call is given more
     std::vector<S> result(as_given ? 0 : size);
     each<S>(0, states, states, [&](Workspace<S>& w, int b) {
       double* to = out + size_t(b) * size;

@@ -12,6 +12,7 @@ from ..arguments import text
 from ..state import at_state
 from .by_realization import by_realization, output
 from .jacobians import resolved_jacobian
+from .prepared import direct, prepared
 
 
 def cached(model: Any, name: str, make: Callable[[Any], Any]) -> Any:
@@ -44,6 +45,7 @@ class DirectCalls:
     def _calls(self) -> _core.Dynamics:
         return cached(self, "_direct", _core.Dynamics)
 
+    @direct
     def forward_dynamics(
         self,
         q=None,
@@ -117,6 +119,34 @@ class DirectCalls:
             )
         return by_method(self, method, q, v, tau, precision, out)
 
+    def prepare(self, call: str, *, batch: int | None = None, **options: Any) -> Callable[..., np.ndarray]:
+        """A direct call for loops, with its options read once: it takes arrays at their places, and `out=`.
+
+        Parameters
+        ----------
+        call : {"forward_dynamics", "inverse_dynamics", "bias_forces", "mass_matrix", "mass_matrix_inverse", "jacobian", "pose"}
+        batch : int, optional
+            Every call takes so many states, and each argument a leading axis of that length or stands for all; else one state a call.
+        options
+            As the call itself has them: form, refine, residual, precision, on_singular; frame=, a name, of Jacobians and poses.
+
+        Returns
+        -------
+        callable
+            Of q, v, tau for forward dynamics; of q, v, vdot for inverse dynamics; of q, v for bias forces; of q for the others; each with
+            out=. Arrays that are contiguous float64 cost least. It follows later edits of the model. ModelError for another number of
+            states, and what the call itself raises.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> arm = pc.chain(2)
+        >>> accelerations = arm.prepare("forward_dynamics", form="ud")
+        >>> accelerations(np.zeros(2), np.zeros(2), np.array([1.0, 0.0])).round(3).tolist()
+        [1.714, -4.286]
+        """
+        return prepared(self, call, batch, options)
+
     def refinement(
         self,
         q=None,
@@ -149,6 +179,7 @@ class DirectCalls:
         value, corrections, error = self._calls().refinement(q, v, tau, form, refine, residual, precision)
         return {"value": value, "steps": len(corrections), "corrections": corrections, "error": error}
 
+    @direct
     def inverse_dynamics(self, q=None, v=None, vdot=None, *, precision: str | int = "double", out=None) -> np.ndarray:
         """Generalized forces (nv,) or (B, nv), N m and N, for the accelerations vdot, gravity and rotor inertia included.
 
@@ -157,6 +188,7 @@ class DirectCalls:
         q, v = at_state(self, q, v)
         return self._calls().inverse_dynamics(q, v, vdot, precision, out)
 
+    @direct
     def bias_forces(self, q=None, v=None, *, precision: str | int = "double", out=None) -> np.ndarray:
         """Coriolis, gyroscopic and gravity forces 𝒞 (nv,) or (B, nv), N m and N: inverse dynamics at zero acceleration. O(N).
 
@@ -172,6 +204,7 @@ class DirectCalls:
         q, v = at_state(self, q, v)
         return self._calls().inverse_dynamics(q, v, None, precision, out)
 
+    @direct
     def mass_matrix(self, q=None, *, precision: str | int = "double", out=None) -> np.ndarray:
         """The mass matrix ℳ + J = HφMφ*H* + J of the equations of motion, full symmetric (nv, nv) or (B, nv, nv).
 
@@ -186,6 +219,7 @@ class DirectCalls:
         """
         return self._calls().mass_matrix(at_state(self, q)[0], precision, out)
 
+    @direct
     def mass_matrix_inverse(
         self,
         q=None,
@@ -210,6 +244,7 @@ class DirectCalls:
         """
         return self._calls().mass_matrix_inverse(at_state(self, q)[0], form, refine, residual, precision, on_singular, out)
 
+    @direct
     def jacobian(
         self, frame: str, q=None, *, axes: str = "body", relative_to: str | None = None, precision: str | int = "double", out=None
     ) -> np.ndarray:
@@ -243,6 +278,7 @@ class DirectCalls:
         out[...] = result
         return out
 
+    @direct
     def pose(self, frame: str, q=None) -> np.ndarray:
         """Pose (4, 4) or (B, 4, 4) of a body or node, by its name, in the world: its axes as columns, its origin in metres. O(N).
 

@@ -15,7 +15,7 @@ NOT_OF_A_STATE = {"inertial_parameters", "prepare"}
 def calls(model):
     """Every direct call that takes q, by name, with the names of its other arguments up to the options."""
     found = {}
-    for name, function in inspect.getmembers(type(model), inspect.isfunction):
+    for name, function in inspect.getmembers(type(model), lambda member: inspect.isfunction(inspect.unwrap(member))):
         parameters = inspect.signature(function).parameters
         if name.startswith("_") or "q" not in parameters or name in ("integrate_ode", "certify"):
             continue

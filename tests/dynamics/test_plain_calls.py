@@ -1,0 +1,330 @@
+"""Contiguous float64 arrays go to the core past the Python method; they get what the method gives, to the last bit, and its errors."""
+
+import copy
+import gc
+import inspect
+import pickle
+import sys
+import threading
+
+import numpy as np
+import pytest
+
+import pycraft as pc
+
+CALLS = {
+    "forward_dynamics": ("q", "v", "tau"),
+    "inverse_dynamics": ("q", "v", "vdot"),
+    "bias_forces": ("q", "v"),
+    "mass_matrix": ("q",),
+    "mass_matrix_inverse": ("q",),
+    "jacobian": ("q",),
+    "pose": ("q",),
+}
+SOLVING = ("forward_dynamics", "mass_matrix_inverse")
+MODELS = {
+    "panda": pc.robots.panda,
+    "branched, with a free base": pc.robots.g1,
+    "more bodies than keep the GIL": lambda: pc.chain(80, seed=2),
+    "one body": lambda: pc.chain(1),
+}
+
+
+def welds_only():
+    model = pc.Multibody("welds", welds="keep")
+    model.add_body("a", hinge="weld", mass=1.0)
+    return model
+
+
+def by_the_method(model, call, *arrays, **options):
+    return getattr(type(model), call).__wrapped__(model, *arrays, **options)
+
+
+def frame_first(model, call):
+    return (list(model.bodies)[-1],) if call in ("jacobian", "pose") else ()
+
+
+def given(model, call, states, seed=0):
+    rng = np.random.default_rng(seed)
+    q = np.array([model.random_state(int(rng.integers(1 << 30))).q for _ in range(max(states, 1))])
+    if states == 0:
+        q = q[:0]
+    others = [rng.normal(size=(len(q), model.nv)) for _ in CALLS[call][1:]]
+    arrays = [np.ascontiguousarray(q), *others]
+    return [a[0].copy() for a in arrays] if states < 0 else arrays
+
+
+def same(a, b):
+    assert a.shape == b.shape and a.dtype == b.dtype == np.float64
+    np.testing.assert_array_equal(a, b)
+
+
+def taken_by_the_core(monkeypatch, model):
+    """Fails where a call comes by the method."""
+    monkeypatch.setattr(type(model), "_calls", lambda self: pytest.fail("by the method"))
+
+
+@pytest.mark.parametrize("states", [-1, 0, 1, 5, 19])
+@pytest.mark.parametrize("call", CALLS)
+@pytest.mark.parametrize("kind", MODELS)
+def test_as_the_method_has_it(kind, call, states, monkeypatch):
+    model = MODELS[kind]()
+    arrays, frame = given(model, call, states), frame_first(model, call)
+    wanted = by_the_method(model, call, *frame, *arrays)
+    taken_by_the_core(monkeypatch, model)
+    same(getattr(model, call)(*frame, *arrays), wanted)
+    if call != "pose":
+        out = np.empty_like(wanted)
+        assert getattr(model, call)(*frame, *arrays, out=out) is out
+        same(out, wanted)
+
+
+@pytest.mark.parametrize("form", ["fast", "ud", "square-root"])
+@pytest.mark.parametrize("call", SOLVING)
+def test_a_form_by_its_name(call, form, monkeypatch):
+    model = pc.robots.panda()
+    arrays = given(model, call, 6)
+    options = {"form": form, "refine": 0, "residual": "same", "precision": "double", "on_singular": "raise"}
+    wanted = by_the_method(model, call, *arrays, **options)
+    taken_by_the_core(monkeypatch, model)
+    same(getattr(model, call)(*arrays, **options), wanted)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"form": "ud", "refine": 2}, {"refine": "auto"}, {"precision": "quad"}, {"precision": 50}, {"residual": "gather", "refine": 1}, {"on_singular": "minimum-norm"}],
+    ids=str,
+)
+@pytest.mark.parametrize("call", SOLVING)
+def test_other_options_are_heard(call, options):
+    model = pc.chain(6, seed=3)
+    arrays = given(model, call, 3)
+    same(getattr(model, call)(*arrays, **options), by_the_method(model, call, *arrays, **options))
+    same(model.prepare(call, batch=3, **options)(*arrays), by_the_method(model, call, *arrays, **options))
+
+
+def test_one_state_stands_for_all():
+    model = pc.robots.panda()
+    q, v, tau = given(model, "forward_dynamics", 5)
+    same(model.forward_dynamics(q, v[0].copy(), tau), by_the_method(model, "forward_dynamics", q, np.tile(v[0], (5, 1)), tau))
+    same(model.forward_dynamics(q[0].copy(), v[0].copy(), tau), by_the_method(model, "forward_dynamics", np.tile(q[0], (5, 1)), np.tile(v[0], (5, 1)), tau))
+
+
+def strided(a):
+    wide = np.zeros((*a.shape[:-1], 2 * a.shape[-1]))
+    wide[..., ::2] = a
+    return wide[..., ::2]
+
+
+class Own(np.ndarray):
+    pass
+
+
+@pytest.mark.parametrize(
+    "other",
+    [list, tuple, strided, np.asfortranarray, lambda a: a.astype(">f8"), lambda a: a.astype(np.longdouble), lambda a: a.view(Own), lambda a: a[None][0]],
+    ids=["list", "tuple", "strided", "column by column", "other byte order", "long double", "a subclass", "a view"],
+)
+@pytest.mark.parametrize("states", [-1, 4])
+def test_whatever_holds_the_numbers(other, states):
+    model = pc.robots.panda()
+    arrays = given(model, "forward_dynamics", states)
+    same(model.forward_dynamics(*map(other, arrays)), by_the_method(model, "forward_dynamics", *arrays))
+
+
+def test_of_a_state_and_of_the_present_state():
+    model = pc.robots.panda()
+    state, tau = model.random_state(3), np.ones(model.nv)
+    wanted = by_the_method(model, "forward_dynamics", state.q, state.v, tau)
+    same(model.forward_dynamics(state, None, tau), wanted)
+    same(model.forward_dynamics(tau=tau, v=state.v, q=state.q), wanted)
+    model.q, model.v = state.q, state.v
+    same(model.forward_dynamics(None, None, tau), wanted)
+    same(model.forward_dynamics(tau=tau), wanted)
+
+
+def wrong(model):
+    q, v, tau = given(model, "forward_dynamics", -1)
+    bad = v.copy()
+    bad[1] = np.nan
+    out = np.empty(model.nv)
+    out.flags.writeable = False
+    return {
+        "too long": ((np.zeros(8), v, tau), {}),
+        "not finite": ((q, bad, tau), {}),
+        "three axes": ((q[None, None], v, tau), {}),
+        "no axis": ((np.array(1.0), v, tau), {}),
+        "two batches": ((np.tile(q, (2, 1)), np.tile(v, (3, 1)), tau), {}),
+        "not writeable": ((q, v, tau), {"out": out}),
+        "another shape": ((q, v, tau), {"out": np.empty(3)}),
+        "another type": ((q, v, tau), {"out": np.empty(model.nv, np.float32)}),
+        "whole numbers": ((q, v, tau), {"out": np.empty(model.nv, int)}),
+        "no form": ((q, v, tau), {"form": "udu"}),
+        "form 3": ((q, v, tau), {"form": 3}),
+        "no option": ((q, v, tau), {"fom": "ud"}),
+        "no method": ((q, v, tau), {"method": "magic"}),
+        "too many": ((q, v, tau, tau), {}),
+        "refine -1": ((q, v, tau), {"refine": -1}),
+        "complex": ((q + 0j, v, tau), {}),
+    }
+
+
+@pytest.mark.parametrize("case", wrong(pc.robots.panda()))
+def test_errors_are_the_methods(case):
+    model = pc.robots.panda()
+    arrays, options = wrong(model)[case]
+    with pytest.raises(Exception) as said:
+        model.forward_dynamics(*arrays, **options)
+    with pytest.raises(type(said.value)) as wanted:
+        by_the_method(model, "forward_dynamics", *arrays, **options)
+    assert str(said.value) == str(wanted.value)
+
+
+def test_a_result_in_the_memory_of_an_argument():
+    model = pc.robots.panda()
+    for i in range(3):
+        arrays = given(model, "forward_dynamics", 20)
+        wanted = by_the_method(model, "forward_dynamics", *arrays)
+        memory = np.zeros((21, model.nv))
+        memory[1:] = arrays[i]
+        arrays[i] = memory[1:]
+        same(model.forward_dynamics(*arrays, out=memory[:20]), wanted)
+
+
+def test_singular_hinges_are_named():
+    model = pc.Multibody("light")
+    model.add_body("feather")
+    with pytest.raises(pc.SingularHingeError, match="feather"):
+        model.forward_dynamics(np.zeros(1), np.zeros(1), np.ones(1))
+
+
+def test_welds_only():
+    model = welds_only()
+    none = np.zeros(0)
+    assert model.forward_dynamics(none, none, none).shape == (0,)
+    assert model.mass_matrix(none).shape == (0, 0)
+    assert model.mass_matrix(np.zeros((3, 0))).shape == (3, 0, 0)
+    assert model.jacobian("a", none).shape == (6, 0)
+
+
+def test_edits_are_followed():
+    model = pc.chain(2)
+    call, state = model.prepare("forward_dynamics"), (np.zeros(2), np.zeros(2), np.ones(2))
+    before = call(*state)
+    model.gravity = (0, -9.81, 0)
+    same(call(*state), by_the_method(model, "forward_dynamics", *state))
+    assert not np.array_equal(call(*state), before)
+    tip, place = model.prepare("jacobian", frame="body1"), np.zeros(3)
+    model.add_body("more", parent="body1", mass=1.0, com=(0.5, 0, 0))
+    three = np.zeros(3), np.zeros(3), np.ones(3)
+    same(call(*three), by_the_method(model, "forward_dynamics", *three))
+    same(tip(place), by_the_method(model, "jacobian", "body1", place))
+    with pytest.raises(pc.ModelError, match="takes 3 numbers"):
+        call(*state)
+
+
+@pytest.mark.parametrize("call", CALLS)
+@pytest.mark.parametrize("states", [None, 0, 4])
+def test_prepared(call, states, monkeypatch):
+    model = pc.robots.panda()
+    arrays, frame = given(model, call, -1 if states is None else states), frame_first(model, call)
+    wanted = by_the_method(model, call, *frame, *arrays)
+    ready = model.prepare(call, batch=states, **({"frame": frame[0]} if frame else {}))
+    out = np.empty_like(wanted)
+    same(ready(*[a.tolist() if states != 0 else a for a in arrays]), wanted)
+    same(ready(*map(strided, arrays), out=out), wanted)
+    taken_by_the_core(monkeypatch, model)
+    same(ready(*arrays), wanted)
+    assert ready(*arrays, out=out) is out
+    same(out, wanted)
+    assert call in ready.__doc__
+
+
+@pytest.mark.parametrize(
+    "ask, error, words",
+    [
+        (lambda m: m.prepare("dynamics"), pc.EvaluationError, "'forward_dynamics'"),
+        (lambda m: m.prepare("mass_matrix", form="ud"), pc.EvaluationError, "no option 'form'"),
+        (lambda m: m.prepare("forward_dynamics", form="udu"), pc.EvaluationError, "udu"),
+        (lambda m: m.prepare("forward_dynamics", batch=-1), pc.EvaluationError, "batch=-1"),
+        (lambda m: m.prepare("forward_dynamics", batch=2.0), pc.EvaluationError, "batch=2.0"),
+        (lambda m: m.prepare("jacobian"), pc.EvaluationError, "frame="),
+        (lambda m: m.prepare("pose", frame="nose"), pc.ModelError, "nose"),
+        (lambda m: m.prepare("bias_forces")(m.q), TypeError, "q, v"),
+        (lambda m: m.prepare("mass_matrix", batch=3)(m.q), pc.ModelError, "3 states and is given one state"),
+        (lambda m: m.prepare("mass_matrix")(np.tile(m.q, (2, 1))), pc.ModelError, "one state and is given 2 states"),
+        (lambda m: m.prepare("mass_matrix", batch=3)(np.tile(m.q, (2, 1))), pc.ModelError, "3 states and is given 2 states"),
+        (lambda m: m.prepare("forward_dynamics")(m.q, m.v, m.v, form="ud"), TypeError, "form"),
+    ],
+)
+def test_prepared_says_what_is_wrong(ask, error, words):
+    with pytest.raises(error, match=words):
+        ask(pc.robots.panda())
+
+
+def test_looks_like_a_method():
+    call = pc.Multibody.forward_dynamics
+    assert list(inspect.signature(call).parameters)[:4] == ["self", "q", "v", "tau"]
+    assert list(inspect.signature(pc.chain(1).forward_dynamics).parameters)[:3] == ["q", "v", "tau"]
+    assert inspect.getdoc(call).startswith("Accelerations v̇") and inspect.isroutine(call)
+    assert call.__name__ == "forward_dynamics" and "forward_dynamics" in repr(pc.chain(1).forward_dynamics)
+    with pytest.raises(TypeError):
+        type(call)()
+
+    class Louder(pc.Multibody):
+        def forward_dynamics(self, *arrays, **options):
+            return 2 * super().forward_dynamics(*arrays, **options)
+
+    louder = Louder("louder")
+    louder.add_body("a", mass=1.0, com=(1, 0, 0))
+    assert louder.forward_dynamics(np.zeros(1), np.zeros(1), np.ones(1)) == 2.0
+
+
+def test_models_are_still_copied():
+    model = pc.chain(3)
+    state = np.zeros(3), np.zeros(3), np.ones(3)
+    wanted = model.forward_dynamics(*state)
+    for again in (copy.deepcopy(model), pickle.loads(pickle.dumps(model))):
+        again.gravity = (0, -9.81, 0)
+        assert not np.array_equal(again.forward_dynamics(*state), wanted)
+    same(model.forward_dynamics(*state), wanted)
+
+
+def test_nothing_is_left_over():
+    model = pc.robots.panda()
+    arrays, out = given(model, "forward_dynamics", -1), np.empty(model.nv)
+    call = model.prepare("forward_dynamics")
+
+    def use():
+        for _ in range(200):
+            call(*arrays)
+            call(*arrays, out=out)
+            model.forward_dynamics(*arrays, form="ud")
+            with pytest.raises(pc.ModelError):
+                call(*arrays[:2], np.full(model.nv, np.nan))
+
+    use()
+    gc.collect()
+    before = [sys.getrefcount(x) for x in (*arrays, out, np.dtype(np.float64), model)]
+    use()
+    gc.collect()
+    assert [sys.getrefcount(x) for x in (*arrays, out, np.dtype(np.float64), model)] == before
+
+
+def test_threads_do_not_share():
+    model = pc.chain(70, seed=1)  # large enough for the GIL to be let go
+    states = [given(model, "forward_dynamics", -1, seed) for seed in range(4)]
+    wanted = [by_the_method(model, "forward_dynamics", *s) for s in states]
+    call, wrong_ones = model.prepare("forward_dynamics"), []
+
+    def work(i):
+        for _ in range(200):
+            if not np.array_equal(call(*states[i]), wanted[i]):
+                wrong_ones.append(i)
+
+    threads = [threading.Thread(target=work, args=(i,)) for i in range(4)]
+    for t in threads:
+        t.start()
+    for t in threads:
+        t.join()
+    assert not wrong_ones
