@@ -245,8 +245,21 @@ void RigidDynamics<S>::mass_matrix(const S* q, S* out) {
 }
 
 template <class S>
+void RigidDynamics<S>::place(const double* q, Form form) {
+  convert(q, model_->nq, q_);
+  kinematics(*model_, q_.data(), blocks_);
+  blocks_.form = form;
+}
+
+template <class S>
 void RigidDynamics<S>::mass_matrix_inverse(const double* q, S* out, const Solving& how) {
   const int N = model_->nv;
+  if (how.refinement.steps == 0 && how.on_singular == OnSingular::raise) {
+    place(q, how.form);
+    articulated_inertia_tip_to_base(tree_, blocks_);
+    inverse_mass_matrix(tree_, *model_, blocks_, inverse_, out);
+    return;
+  }
   std::vector<S>& identity = r_;
   identity.assign(size_t(N) * N, S(0));
   for (int i = 0; i < N; ++i) identity[size_t(i) * N + i] = S(1);
@@ -260,9 +273,7 @@ template <class S>
 void RigidDynamics<S>::mass_matrix_solve(const double* q, const S* right, int m, S* out, const Solving& how) {
   const int N = model_->nv;
   const size_t size = size_t(N) * m;
-  convert(q, model_->nq, q_);
-  kinematics(*model_, q_.data(), blocks_);
-  blocks_.form = how.form;
+  place(q, how.form);
   columns_.assign(right, right + size);
   AddedInertias added;
   if (how.on_singular == OnSingular::minimum_norm)

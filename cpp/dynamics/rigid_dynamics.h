@@ -12,6 +12,7 @@
 #include "model/multibody.h"
 #include "numerics/refinement.h"
 #include "recursions/applied.h"
+#include "recursions/inverse_mass_matrix.h"
 #include "recursions/point_accelerations.h"
 #include "recursions/velocities.h"
 #include "rigid/rigid_blocks.h"
@@ -73,6 +74,7 @@ class RigidDynamics {
   void residual(const T* tau, const S* vdot, S* r);       // tau - inverse dynamics, at the state that was set; vdot with what hinges absorb
   void subtract_product(const S* x, S* r, int m);         // r -= (ℳ + J) x
   void solve(const S* r, S* x, int m);                    // with the kept factors
+  void place(const double* q, Form form);                 // the configuration, and how its articulated inertias will be found
   template <class T>
   RigidDynamics<Wider<S>>& wider(const T* q, const T* v, const Applied<T>* applied);
   template <class T>
@@ -99,6 +101,7 @@ class RigidDynamics {
   std::vector<Pose<S>> world_;   // X_WB of every body
   std::vector<double> rest_;     // v = 0
   std::vector<S> q_, v_, tau_, columns_, scratch_, r_;
+  InverseColumns<S> inverse_;
   std::unique_ptr<RigidDynamics<Wider<S>>> wider_;
   std::vector<Vector6<Wider<S>>> wide_force_;
   std::vector<Wider<S>> wide_x_, wide_r_;

@@ -12,7 +12,7 @@ import pytest
 import pycraft as pc
 from support.descriptions import KINDS
 from support.formulas import EPS, amplification, norm
-from support.mechanisms import SEQUENCES, every_kind, nodes_of, uniform_batch, with_hinges
+from support.mechanisms import SEQUENCES, every_kind, nodes_of, random_tree, uniform_batch, with_hinges
 from support.oracle import reference
 from support.sizes_of_calls import force_size, roundings
 
@@ -53,6 +53,26 @@ def check_all(model, q, v, vdot, calls):
     for name in [*nodes_of(model), "body0"]:
         close(calls["jacobian", name], reference.node_jacobian(description, name, q), eps * (1 + norm(o.Jacobian([name]))))
         close(calls["pose", name], reference.node_pose(description, name, q), eps * (1 + reach))
+
+
+@pytest.mark.parametrize("form", ["fast", "ud", "square-root"])
+@pytest.mark.parametrize("seed", range(12))
+def test_the_inverse_on_forests(seed, form):
+    """Bodies that wait for their siblings keep their accelerations; a workspace serves one size after another."""
+    rng = np.random.default_rng(seed)
+    model = random_tree(rng, int(rng.integers(1, 25)))
+    description = model.description()
+    for edit in range(2):
+        state = model.random_state(rng)
+        MM = reference.mass_matrix(description, state.q)
+        inverse = np.linalg.inv(MM)
+        found = model.mass_matrix_inverse(state.q, form=form)
+        o = reference.operators(description, state.q, state.v)
+        close(found, inverse, norm(inverse) ** 2 * norm(MM) * amplification(o) * roundings(o))
+        assert np.array_equal(found, found.T)
+        model.add_body(f"more {edit}", parent=list(model.bodies)[-1], mass=1.0, com=(0.3, 0, 0), rotor_inertia=0.1)
+        description = model.description()
+
 
 
 def all_calls(model, q, v, vdot):
