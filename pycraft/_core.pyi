@@ -7,7 +7,7 @@ import fractions
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Binding', 'Dynamics', 'Error', 'EvaluationError', 'GroupedOperators', 'HingeKind', 'Integration', 'Letter', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'Scalar', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'blockdiag', 'checked_refinement', 'constant', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'hinge_kinds', 'identity', 'integrators', 'methods', 'operators_of', 'precisions', 'real_array', 'residual', 'scalar', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_dynamics', 'time_forward', 'time_method', 'time_packs', 'vector', 'wider', 'zero']
+__all__: list[str] = ['Binding', 'Dynamics', 'Error', 'EvaluationError', 'GroupedOperators', 'HingeKind', 'Integration', 'Letter', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'Scalar', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'blockdiag', 'checked_refinement', 'constant', 'direct_call', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'hinge_kinds', 'identity', 'integrators', 'methods', 'operators_of', 'precisions', 'prepared_call', 'real_array', 'residual', 'scalar', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_dynamics', 'time_forward', 'time_method', 'time_packs', 'vector', 'wider', 'zero']
 
 class Error(Exception): ...
 class SpaceError(Error, TypeError): ...
@@ -1009,6 +1009,10 @@ def constant(array: typing.Any, domain: typing.Any, codomain: typing.Any, name: 
     An array as an operator from `domain` to `codomain` (spaces, or a size n for R^n): a matrix, one diagonal, or a list of one block per
     body. What is block diagonal over the bodies is kept so; what has low rank is found when a plan needs it.
     """
+def direct_call(function: collections.abc.Callable) -> typing.Any:
+    """
+    The direct call of this name: its plain case in the core, everything else by the function.
+    """
 def epsilons() -> dict:
     """
     Epsilon of each precision by name.
@@ -1044,6 +1048,10 @@ def operators_of(model: Multibody) -> MultibodyOperators:
 def precisions() -> list[str | int]:
     """
     The precisions, from narrow to wide.
+    """
+def prepared_call(function: typing.Any, name: str, dynamics: typing.Any, batch: typing.Any, frame: str, form: str, refine: typing.Any, residual: str, precision: str | int, on_singular: str) -> typing.Any:
+    """
+    A direct call of one model with its options, as `prepare` gives it.
     """
 def real_array(value: typing.Any, what: str) -> numpy.typing.NDArray[numpy.float64]:
     """

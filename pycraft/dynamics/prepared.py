@@ -64,5 +64,7 @@ def prepared(model: Any, call: str, batch: int | None, options: dict[str, Any]) 
         return result
 
     call_with_other_arguments.__name__ = call_with_other_arguments.__qualname__ = f"prepared_{call}"
-    call_with_other_arguments.__doc__ = f"{call}({', '.join(arrays)}, *, out=None) of '{model.name}', {'one state' if batch is None else f'{batch} states'} a call."
+    call_with_other_arguments.__doc__ = (
+        f"{call}({', '.join(arrays)}, *, out=None) of '{model.name}', {'one state' if batch is None else f'{batch} states'} a call."
+    )
     return _core.prepared_call(call_with_other_arguments, call, model._calls(), batch, frame, **{**_DEFAULTS, **how})

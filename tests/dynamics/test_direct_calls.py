@@ -74,7 +74,6 @@ def test_the_inverse_on_forests(seed, form):
         description = model.description()
 
 
-
 def all_calls(model, q, v, vdot):
     """Every direct call by name, at a state or a batch."""
     calls = {

@@ -92,7 +92,14 @@ def test_a_form_by_its_name(call, form, monkeypatch):
 
 @pytest.mark.parametrize(
     "options",
-    [{"form": "ud", "refine": 2}, {"refine": "auto"}, {"precision": "quad"}, {"precision": 50}, {"residual": "gather", "refine": 1}, {"on_singular": "minimum-norm"}],
+    [
+        {"form": "ud", "refine": 2},
+        {"refine": "auto"},
+        {"precision": "quad"},
+        {"precision": 50},
+        {"residual": "gather", "refine": 1},
+        {"on_singular": "minimum-norm"},
+    ],
     ids=str,
 )
 @pytest.mark.parametrize("call", SOLVING)
@@ -107,7 +114,10 @@ def test_one_state_stands_for_all():
     model = pc.robots.panda()
     q, v, tau = given(model, "forward_dynamics", 5)
     same(model.forward_dynamics(q, v[0].copy(), tau), by_the_method(model, "forward_dynamics", q, np.tile(v[0], (5, 1)), tau))
-    same(model.forward_dynamics(q[0].copy(), v[0].copy(), tau), by_the_method(model, "forward_dynamics", np.tile(q[0], (5, 1)), np.tile(v[0], (5, 1)), tau))
+    same(
+        model.forward_dynamics(q[0].copy(), v[0].copy(), tau),
+        by_the_method(model, "forward_dynamics", np.tile(q[0], (5, 1)), np.tile(v[0], (5, 1)), tau),
+    )
 
 
 def strided(a):
@@ -122,7 +132,16 @@ class Own(np.ndarray):
 
 @pytest.mark.parametrize(
     "other",
-    [list, tuple, strided, np.asfortranarray, lambda a: a.astype(">f8"), lambda a: a.astype(np.longdouble), lambda a: a.view(Own), lambda a: a[None][0]],
+    [
+        list,
+        tuple,
+        strided,
+        np.asfortranarray,
+        lambda a: a.astype(">f8"),
+        lambda a: a.astype(np.longdouble),
+        lambda a: a.view(Own),
+        lambda a: a[None][0],
+    ],
     ids=["list", "tuple", "strided", "column by column", "other byte order", "long double", "a subclass", "a view"],
 )
 @pytest.mark.parametrize("states", [-1, 4])

@@ -38,7 +38,9 @@ def dependent_objects(root, files):
         objects.add(made)
         if any(os.path.normpath(build / line.strip()) in wanted for line in rest):
             found.add(made)
-    headers = tuple(made.partition("cmake_pch")[0] for made in found if made.endswith(".gch"))  # precompiled: their objects do not list them
+    headers = tuple(
+        made.partition("cmake_pch")[0] for made in found if made.endswith(".gch")
+    )  # precompiled: their objects do not list them
     return found | {o for o in objects if headers and o.startswith(headers)}
 
 
