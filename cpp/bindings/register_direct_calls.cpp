@@ -105,12 +105,14 @@ struct Callable {
 // Bodies times states below which the GIL is kept: letting it go and taking it again would cost more than it gives to others.
 constexpr py::ssize_t kept = 64;
 
-// The core's object behind the Python model's `_direct`, which its first call makes.
+// The core's object behind the Python model: its `_direct`, which the first call by the method makes. The model keeps it.
 BatchDynamics* dynamics_of(PyObject* model) {
   static PyObject* const name = PyUnicode_InternFromString("_direct");
-  PyObject** const attributes = _PyObject_GetDictPtr(model);
-  PyObject* const held = attributes && *attributes ? PyDict_GetItemWithError(*attributes, name) : nullptr;
-  return held ? py::cast<BatchDynamics*>(py::handle(held)) : nullptr;
+  const py::object held = py::reinterpret_steal<py::object>(PyObject_GetAttr(model, name));
+  if (held) return py::cast<BatchDynamics*>(held);
+  if (!PyErr_ExceptionMatches(PyExc_AttributeError)) throw py::error_already_set();
+  PyErr_Clear();
+  return nullptr;
 }
 
 bool named(PyObject* text, const char* ascii) { return PyUnicode_CompareWithASCIIString(text, ascii) == 0; }
@@ -128,7 +130,10 @@ bool takes(const DirectCall& call, Options& options, PyObject* name, PyObject* v
       }
     return false;
   }
-  if (named(name, "refine")) return PyLong_CheckExact(value) && PyLong_AsLong(value) == 0 && !PyErr_Occurred();
+  if (named(name, "refine")) {
+    int beyond;
+    return PyLong_CheckExact(value) && PyLong_AsLongAndOverflow(value, &beyond) == 0 && !beyond;
+  }
   return PyUnicode_Check(value) && ((named(name, "residual") && named(value, "same")) || (named(name, "on_singular") && named(value, "raise")) ||
                                     (named(name, "method") && named(value, "articulated") && call.given == 3));
 }

@@ -46,17 +46,15 @@ void BatchDynamics::forward_dynamics_at(const Given& q, const Given& v, const Gi
 void BatchDynamics::forward_dynamics(const Given& q, const Given& v, const Given& tau, const Solving& how, Precision precision, double* vdot,
                                      const Applied<double>* applied) {
   const ModelInUse use(model());
-  const Given given[] = {q, v, tau};
-  check_given(model(), given);
-  const int batch = common_batch(given);
+  check_given(model(), {q, v, tau});
+  const int batch = common_batch({q, v, tau});
   at_precision(precision, [&]<class S>(S) { forward_dynamics_at<S>(q, v, tau, batch < 0 ? 1 : batch, how, vdot, applied); });
 }
 
 RefinementReport BatchDynamics::refinement(const Given& q, const Given& v, const Given& tau, const Solving& how, Precision precision, double* vdot) {
-  const Given given[] = {q, v, tau};
-  if (common_batch(given) >= 0) throw ModelError("the corrections of a refinement are those of one state; a batch has as many as states");
+  if (common_batch({q, v, tau}) >= 0) throw ModelError("the corrections of a refinement are those of one state; a batch has as many as states");
   const ModelInUse use(model());
-  check_given(model(), given);
+  check_given(model(), {q, v, tau});
   Solving estimated = how;
   estimated.estimate = true;
   RefinementReport report;
@@ -86,12 +84,12 @@ void BatchDynamics::inverse_dynamics(const Given& q, const Given& v, const Given
 }
 
 void BatchDynamics::mass_matrix(const Given& q, Precision precision, double* out) {
-  run(precision, Givens(&q, 1), model().nv() * model().nv(), out, [](auto& w, auto in, auto* y) { w.mass_matrix(in[0], y); });
+  run(precision, {q}, model().nv() * model().nv(), out, [](auto& w, auto in, auto* y) { w.mass_matrix(in[0], y); });
 }
 
 void BatchDynamics::mass_matrix_inverse(const Given& q, const Solving& how, Precision precision, double* out) {
   const ModelInUse use(model());
-  check_given(model(), Givens(&q, 1));
+  check_given(model(), {q});
   const size_t size = size_t(model().nv()) * model().nv();
   const int states = q.batch < 0 ? 1 : q.batch;
   at_precision(precision, [&]<class S>(S) {
@@ -105,11 +103,11 @@ void BatchDynamics::mass_matrix_inverse(const Given& q, const Solving& how, Prec
 }
 
 void BatchDynamics::jacobian(const Node& node, const Given& q, Precision precision, double* out) {
-  run(precision, Givens(&q, 1), 6 * model().nv(), out, [&](auto& w, auto in, auto* y) { w.jacobian(node, in[0], y); });
+  run(precision, {q}, 6 * model().nv(), out, [&](auto& w, auto in, auto* y) { w.jacobian(node, in[0], y); });
 }
 
 void BatchDynamics::pose(const Node& node, const Given& q, double* out) {
-  run(Precision::double_, Givens(&q, 1), 16, out, [&](auto& w, auto in, auto* y) {
+  run(Precision::double_, {q}, 16, out, [&](auto& w, auto in, auto* y) {
     const auto X = w.pose(node, in[0]);
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < 3; ++j) y[4 * i + j] = X.R(i, j);
@@ -121,8 +119,7 @@ void BatchDynamics::pose(const Node& node, const Given& q, double* out) {
 }
 
 void BatchDynamics::energy(const Given& q, const Given& v, const Vector3<double>& datum, double* out) {
-  const Given given[] = {q, v};
-  run(Precision::double_, given, 2, out, [&](auto& w, auto in, auto* y) {
+  run(Precision::double_, {q, v}, 2, out, [&](auto& w, auto in, auto* y) {
     using S = std::remove_pointer_t<decltype(y)>;
     y[0] = w.kinetic_energy(in[0], in[1]);
     y[1] = w.potential_energy(in[0], cast<S>(datum));

@@ -22,9 +22,8 @@ class BatchSensitivities : public Batches<Sensitivities> {
   // ∂v̇/∂q, ∂v̇/∂v, ∂v̇/∂τ one after the other, 3 (nv, nv) a state.
   void forward_dynamics(const Given& q, const Given& v, const Given& tau, const Solving& how, Precision precision, double* out) {
     const ModelInUse use(model());
-    const Given given[] = {q, v, tau};
-    check_given(model(), given);
-    const int batch = common_batch(given), states = batch < 0 ? 1 : batch;
+    check_given(model(), {q, v, tau});
+    const int batch = common_batch({q, v, tau}), states = batch < 0 ? 1 : batch;
     const size_t square = size_t(model().nv()) * model().nv();
     at_precision(precision, [&]<class S>(S) {
       if constexpr (!available_at<Sensitivities, S>) {

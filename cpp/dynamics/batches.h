@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <initializer_list>
 #include <memory>
 #include <span>
 #include <string>
@@ -28,7 +29,11 @@ struct Given {
   bool is_configuration() const { return name[0] == 'q' && name[1] == 0; }
 };
 
-using Givens = std::span<const Given>;
+// Several of them, for the time of a call.
+struct Givens : std::span<const Given> {
+  using std::span<const Given>::span;
+  Givens(std::initializer_list<Given> list) : std::span<const Given>(list.begin(), list.size()) {}
+};
 
 // The states that these are of, -1: one state. ModelError for two batches.
 int common_batch(Givens given);

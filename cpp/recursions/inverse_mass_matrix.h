@@ -21,7 +21,7 @@ namespace pycraft {
 // What it works in, kept from call to call.
 template <class S>
 struct InverseColumns {
-  std::vector<S> z, innovations, alpha;  // (6, nv), (6, nv), and (6, nv) a slot
+  std::vector<S> z, innovations, alpha;  // (6, nv); (coordinates of one hinge, nv); (6, nv) a slot
   std::vector<int> end, slot, free;      // the first column past those outboard; where a body's α is
 };
 
@@ -58,7 +58,9 @@ inline void move_columns(S* y, int stride, int columns, F f) {
 template <class S>
 void innovations_tip_to_base(const CompiledModel<S>& model, const RigidBlocks<S>& blocks, InverseColumns<S>& w, S* out) {
   const int N = model.nv;
-  w.z.resize(size_t(6) * N), w.innovations.resize(size_t(6) * N), w.end.resize(model.bodies);
+  int widest = 0;  // hinges of one's own may have more coordinates than six
+  for (const int n : model.nv_of) widest = std::max(widest, n);
+  w.z.resize(size_t(6) * N), w.innovations.resize(size_t(widest) * N), w.end.resize(model.bodies);
   for (int k = 0; k < model.bodies; ++k) w.end[k] = model.v_offset[k] + model.nv_of[k];
   for (int k = model.bodies - 1; k >= 0; --k) {
     check_interrupt_at(k, N);

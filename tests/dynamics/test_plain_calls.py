@@ -184,6 +184,7 @@ def wrong(model):
         "no method": ((q, v, tau), {"method": "magic"}),
         "too many": ((q, v, tau, tau), {}),
         "refine -1": ((q, v, tau), {"refine": -1}),
+        "refine 10^30": ((q, v, tau), {"refine": 10**30}),
         "complex": ((q + 0j, v, tau), {}),
     }
 
