@@ -58,7 +58,7 @@ def check_all(model, q, v, vdot, calls):
 @pytest.mark.parametrize("form", ["fast", "ud", "square-root"])
 @pytest.mark.parametrize("seed", range(-2, 12))
 def test_the_inverse_on_forests(seed, form):
-    """Bodies that wait for their siblings keep their accelerations; a workspace serves one size after another; hinges of eight coordinates."""
+    """Bodies that wait for their siblings keep their accelerations; one size after another; hinges of eight coordinates."""
     rng = np.random.default_rng(abs(seed))
     eight = random_description([-1, 0, 0], [("slider", "free", "pin"), "pin", ("free", "slider", "pin")], 7, rotor_inertia=True)
     model = build(eight) if seed < 0 else random_tree(rng, int(rng.integers(1, 25)))
