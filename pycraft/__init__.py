@@ -43,6 +43,7 @@ from ._core import (
     constant,
     euclidean,
     identity,
+    instruction_set,
     vector,
     zero,
 )
@@ -139,6 +140,7 @@ __all__ = [
     "exercise",
     "from_sympy",
     "identity",
+    "instruction_set",
     "interop",
     "kalman",
     "load",

@@ -4,9 +4,8 @@
 #include "algebra/engine/evaluate.h"
 #include "bench/timing.h"
 #include "bindings/bindings.h"
+#include "dynamics/batch_dynamics.h"
 #include "dynamics/methods.h"
-#include "dynamics/packed_dynamics.h"
-#include "dynamics/rigid_dynamics.h"
 #include "dynamics/sensitivities.h"
 #include "runtime/errors.h"
 
@@ -48,18 +47,16 @@ py::dict time_forward(const std::shared_ptr<Multibody>& model, const Array& q, c
   const Solving how{form, refinement(refine, residual, precision), OnSingular::raise};
   const int K = states_of(q), nq = model->nq(), nv = model->nv();
   const double *Q = q.data(), *V = v.data(), *U = u.data();
+  std::vector<double> out(nv);
+  BatchDynamics w(model);
+  int k = 0;
   Timing t;
   {
     ReleasedGil release;
-    at_precision(precision, [&]<class S>(S) {
-      RigidDynamics<S> w(*model);
-      std::vector<S> out(nv);
-      int k = 0;
-      t = time_calls([&] {
-        w.forward_dynamics(Q + size_t(k) * nq, V + size_t(k) * nv, U + size_t(k) * nv, out.data(), how);
-        k = (k + 1) % K;
-      }, seconds);
-    });
+    t = time_calls([&] {
+      w.forward_dynamics({"q", Q + size_t(k) * nq, nq}, {"v", V + size_t(k) * nv, nv}, {"tau", U + size_t(k) * nv, nv}, how, precision, out.data());
+      k = (k + 1) % K;
+    }, seconds);
   }
   return result(t);
 }
@@ -86,28 +83,19 @@ py::dict time_method(const std::shared_ptr<Multibody>& model, const std::string&
   return result(t);
 }
 
-// Forward dynamics of a batch in packs, seconds per state; the number of states is a multiple of a pack's width.
+// Forward dynamics of a batch, seconds per state.
 py::dict time_packs(const std::shared_ptr<Multibody>& model, const Array& q, const Array& v, const Array& u, double seconds, Form form, Precision precision) {
   const int K = states_of(q), nq = model->nq(), nv = model->nv();
   const double *Q = q.data(), *V = v.data(), *U = u.data();
   std::vector<double> out(size_t(K) * nv);
+  BatchDynamics w(model);
+  const Given states[] = {{"q", Q, nq, K}, {"v", V, nv, K}, {"tau", U, nv, K}};
+  Solving how;
+  how.form = form;
   Timing t;
-  const auto run = [&]<class T>(T) {
-    constexpr int width = PackedDynamics<T>::width;
-    if (K % width) throw EvaluationError("packs take a multiple of " + std::to_string(width) + " states");
-    PackedDynamics<T> w(*model);
-    t = time_calls([&] {
-      for (int b = 0; b < K; b += width)
-        if (!w.forward_dynamics(Q + size_t(b) * nq, nq, V + size_t(b) * nv, nv, U + size_t(b) * nv, nv, out.data() + size_t(b) * nv, form))
-          throw EvaluationError("a hinge of '" + model->name() + "' is in doubt: not a case for packs");
-    }, seconds);
-  };
   {
     ReleasedGil release;
-    if (precision == Precision::single)
-      run(Single());
-    else
-      run(double());
+    t = time_calls([&] { w.forward_dynamics(states[0], states[1], states[2], how, precision, out.data()); }, seconds);
   }
   t.minimum /= K, t.median /= K;
   return result(t);
@@ -115,7 +103,7 @@ py::dict time_packs(const std::shared_ptr<Multibody>& model, const Array& q, con
 
 // One call per state in rotation; q (K, nq), v, u (K, nv).
 py::dict time_dynamics(const std::shared_ptr<Multibody>& model, const std::string& call, const Array& q, const Array& v, const Array& u, double seconds) {
-  RigidDynamics<double> w(*model);
+  BatchDynamics w(model);
   Sensitivities<double> s(*model);
   const int K = states_of(q), nq = model->nq(), nv = model->nv();
   const size_t square = size_t(nv) * nv;
@@ -123,19 +111,24 @@ py::dict time_dynamics(const std::shared_ptr<Multibody>& model, const std::strin
   int k = 0;
   const auto next = [&] { k = (k + 1) % K; };
   const double *Q = q.data(), *V = v.data(), *U = u.data();
+  const auto at_q = [&](const double* x) { return Given{"q", x, nq}; };
+  const auto at_v = [&](const double* x) { return Given{"v", x, nv}; };
   ReleasedGil release;
   Timing t;
   const auto run = [&](auto f) {
     t = time_calls([&] { f(Q + size_t(k) * nq, V + size_t(k) * nv, U + size_t(k) * nv), next(); }, seconds);
   };
   if (call == "forward_dynamics") {
-    run([&](auto a, auto b, auto c) { w.forward_dynamics(a, b, c, out.data()); });
+    run([&](auto a, auto b, auto c) { w.forward_dynamics(at_q(a), at_v(b), at_v(c), {}, Precision::double_, out.data()); });
   } else if (call == "inverse_dynamics") {
-    run([&](auto a, auto b, auto c) { w.inverse_dynamics(a, b, c, out.data()); });
+    run([&](auto a, auto b, auto c) {
+      const Given given = at_v(c);
+      w.inverse_dynamics(at_q(a), at_v(b), &given, Precision::double_, out.data());
+    });
   } else if (call == "mass_matrix") {
-    run([&](auto a, auto, auto) { w.mass_matrix(a, out.data()); });
+    run([&](auto a, auto, auto) { w.mass_matrix(at_q(a), Precision::double_, out.data()); });
   } else if (call == "mass_matrix_inverse") {
-    run([&](auto a, auto, auto) { w.mass_matrix_inverse(a, out.data()); });
+    run([&](auto a, auto, auto) { w.mass_matrix_inverse(at_q(a), {}, Precision::double_, out.data()); });
   } else if (call == "inverse_dynamics_derivatives") {
     run([&](auto a, auto b, auto c) { s.inverse_dynamics(a, b, c, out.data(), out.data() + square); });
   } else if (call == "forward_dynamics_derivatives") {  // the accelerations and their derivatives

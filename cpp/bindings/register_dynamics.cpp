@@ -5,6 +5,13 @@
 namespace pycraft {
 
 void register_dynamics(py::module_& m) {
+  m.def("instruction_set", [] { return kernels::instruction_set().name; },
+        "The instruction set whose kernels direct calls run: the widest that this machine has, or the one that the environment variable PYCRAFT_ISA names.");
+  m.def("instruction_sets", [] {
+    std::vector<std::string> names;
+    for (const auto& set : kernels::instruction_sets()) names.push_back(set.name);
+    return names;
+  }, "Those that were built and that this machine has, from narrow to wide.");
   m.def("checked_refinement", [](const py::object& refine, const std::string& residual, Precision precision) {
     const int steps = refinement(refine, residual, precision).steps;
     return steps == Refinement::automatic ? py::object(py::str("auto")) : py::object(py::int_(steps));

@@ -7,57 +7,109 @@ namespace {
 template <class S>
 using Wrenches = std::vector<Vector6<S>>;
 
+// What kernels do: at regular states what becomes of singular ones does not matter.
+bool plain(const Solving& how) { return how.form == Form::fast && how.refinement.steps == 0; }
+
 }  // namespace
 
+template <class Again>
+bool BatchDynamics::by_links(Precision precision, kernels::Call call, const Given& q, const Given* v, const Given* u, int states, int size, double* out,
+                             const Applied<double>* applied, Again again) {
+  bool done = false;
+  const auto run = [&]<class S>(S) {
+    std::get<WorkspacePool<LinkDynamics<S>>>(links_).with(model(), [&](LinkDynamics<S>& w) {
+      done = w.there();
+      if (done) w.run(call, q, v, u, states, size, out, applied, again);
+    });
+  };
+  if (precision == Precision::double_) run(double());
+  if (precision == Precision::single) run(Single());
+  return done;
+}
+
+BatchDynamics::Starts BatchDynamics::refined_from(Precision precision, kernels::Call call, const Given& q, const Given* v, const Given* u, int states, int size,
+                                                  const Solving& how, const Applied<double>* applied) {
+  Starts starts;
+  if (how.form != Form::fast || how.refinement.steps == 0 || how.on_singular != OnSingular::raise) return starts;
+  starts.size = size;
+  starts.values.resize(size_t(states) * size), starts.there.assign(states, 1);
+  const bool done = by_links(precision, call, q, v, u, states, size, starts.values.data(), applied,
+                             [&](int from, int to) { std::fill(starts.there.begin() + from, starts.there.begin() + to, 0); });
+  if (!done) starts.there.clear();
+  return starts;
+}
+
+template <class General>
+void BatchDynamics::plainly(Precision precision, kernels::Call call, Givens given, int size, double* out, const Applied<double>* applied, General general) {
+  const ModelInUse use(model());
+  check_given(model(), given);
+  const int batch = common_batch(given);
+  bool doubt = false;
+  const bool done = by_links(precision, call, given[0], given.size() > 1 ? &given[1] : nullptr, given.size() > 2 ? &given[2] : nullptr, batch < 0 ? 1 : batch, size, out, applied,
+                             [&](int, int) { doubt = true; });
+  if (!done || doubt) general();
+}
+
+// In other forms, refined, at wider precisions, or where kernels were in doubt.
 template <class S>
-void BatchDynamics::forward_dynamics_at(const Given& q, const Given& v, const Given& tau, int states, const Solving& how, double* vdot,
-                                        const Applied<double>* applied) {
+void BatchDynamics::forward_dynamics_at(const Given& q, const Given& v, const Given& tau, int from, int to, int states, const Solving& how,
+                                        const Starts& starts, double* vdot, const Applied<double>* applied) {
   const int nv = model().nv();
   std::vector<S> own(std::is_same_v<S, double> ? 0 : nv);
   const auto one_by_one = [&](int from, int to) {
     each<S>(from, to, states, [&](RigidDynamics<S>& w, int b) {
       double* out = vdot + size_t(b) * nv;
+      const Solving of_state = starts.of(b, how);
       if constexpr (std::is_same_v<S, double>) {
-        w.forward_dynamics(q.at(b), v.at(b), tau.at(b), out, how, applied);
+        w.forward_dynamics(q.at(b), v.at(b), tau.at(b), out, of_state, applied);
       } else {
-        w.forward_dynamics(q.at(b), v.at(b), tau.at(b), own.data(), how, applied);
+        w.forward_dynamics(q.at(b), v.at(b), tau.at(b), own.data(), of_state, applied);
         for (int j = 0; j < nv; ++j) out[j] = to_double(own[j]);
       }
       require_finite(out, nv, model());
     });
   };
-  int b = 0;
+  int b = from;
   if constexpr (std::is_same_v<S, double> || std::is_same_v<S, Single>) {
     constexpr int width = PackedDynamics<S>::width;
-    if (states >= width && how.form != Form::square_root && how.refinement.steps == 0 && how.on_singular == OnSingular::raise)
+    if (to - from >= width && how.form != Form::square_root && how.refinement.steps == 0 && how.on_singular == OnSingular::raise)
       std::get<WorkspacePool<PackedDynamics<S>>>(packs_).with(model(), [&](PackedDynamics<S>& w) {
         const auto stride = [](const Given& g) { return g.batch < 0 ? size_t(0) : size_t(g.width); };
-        for (; b + width <= states; b += width) {
-          double* to = vdot + size_t(b) * nv;
-          if (!w.forward_dynamics(q.at(b), stride(q), v.at(b), stride(v), tau.at(b), stride(tau), to, how.form, applied) || !all_finite(to, size_t(width) * nv))
+        for (; b + width <= to; b += width) {
+          double* to_b = vdot + size_t(b) * nv;
+          if (!w.forward_dynamics(q.at(b), stride(q), v.at(b), stride(v), tau.at(b), stride(tau), to_b, how.form, applied) || !all_finite(to_b, size_t(width) * nv))
             one_by_one(b, b + width);
           if (b % 1024 == 0) check_interrupt();
         }
       });
   }
-  one_by_one(b, states);
+  one_by_one(b, to);
 }
 
 void BatchDynamics::forward_dynamics(const Given& q, const Given& v, const Given& tau, const Solving& how, Precision precision, double* vdot,
                                      const Applied<double>* applied) {
   const ModelInUse use(model());
   check_given(model(), {q, v, tau});
-  const int batch = common_batch({q, v, tau});
-  at_precision(precision, [&]<class S>(S) { forward_dynamics_at<S>(q, v, tau, batch < 0 ? 1 : batch, how, vdot, applied); });
+  const int batch = common_batch({q, v, tau}), states = batch < 0 ? 1 : batch;
+  const Starts starts = refined_from(precision, kernels::Call::forward_dynamics, q, &v, &tau, states, model().nv(), how, applied);
+  const auto general = [&](int from, int to) {
+    at_precision(precision, [&]<class S>(S) { forward_dynamics_at<S>(q, v, tau, from, to, states, how, starts, vdot, applied); });
+  };
+  if (!plain(how) || !by_links(precision, kernels::Call::forward_dynamics, q, &v, &tau, states, model().nv(), vdot, applied, general)) general(0, states);
 }
 
 RefinementReport BatchDynamics::refinement(const Given& q, const Given& v, const Given& tau, const Solving& how, Precision precision, double* vdot) {
   if (common_batch({q, v, tau}) >= 0) throw ModelError("the corrections of a refinement are those of one state; a batch has as many as states");
   const ModelInUse use(model());
   check_given(model(), {q, v, tau});
-  Solving estimated = how;
-  estimated.estimate = true;
   RefinementReport report;
+  if (how.refinement.steps == 0) {
+    forward_dynamics(q, v, tau, how, precision, vdot);
+    return report;
+  }
+  const Starts starts = refined_from(precision, kernels::Call::forward_dynamics, q, &v, &tau, 1, model().nv(), how, nullptr);
+  Solving estimated = starts.of(0, how);
+  estimated.estimate = true;
   at_precision(precision, [&]<class S>(S) {
     std::vector<S> own(model().nv());
     each<S>(0, 1, 1, [&](RigidDynamics<S>& w, int) {
@@ -73,18 +125,23 @@ RefinementReport BatchDynamics::refinement(const Given& q, const Given& v, const
 void BatchDynamics::inverse_dynamics(const Given& q, const Given& v, const Given* vdot, Precision precision, double* tau, const Applied<double>* applied) {
   const bool moving = vdot;
   const Given given[] = {q, v, moving ? *vdot : Given{}};
-  PerScalar<Wrenches> wrenches;
-  run(precision, Givens(given, moving ? 3 : 2), model().nv(), tau, [&](auto& w, auto in, auto* y) {
-    using S = std::remove_pointer_t<decltype(y)>;
-    const S* accelerations = moving ? in[2] : nullptr;
-    if (!applied) return w.inverse_dynamics(in[0], in[1], accelerations, y);
-    const Applied<S> own = converted(*applied, model().bodies(), std::get<Wrenches<S>>(wrenches));
-    w.inverse_dynamics(in[0], in[1], accelerations, y, &own);
+  const Givens all(given, moving ? 3 : 2);
+  plainly(precision, kernels::Call::inverse_dynamics, all, model().nv(), tau, applied, [&] {
+    PerScalar<Wrenches> wrenches;
+    run(precision, all, model().nv(), tau, [&](auto& w, auto in, auto* y) {
+      using S = std::remove_pointer_t<decltype(y)>;
+      const S* accelerations = moving ? in[2] : nullptr;
+      if (!applied) return w.inverse_dynamics(in[0], in[1], accelerations, y);
+      const Applied<S> own = converted(*applied, model().bodies(), std::get<Wrenches<S>>(wrenches));
+      w.inverse_dynamics(in[0], in[1], accelerations, y, &own);
+    });
   });
 }
 
 void BatchDynamics::mass_matrix(const Given& q, Precision precision, double* out) {
-  run(precision, {q}, model().nv() * model().nv(), out, [](auto& w, auto in, auto* y) { w.mass_matrix(in[0], y); });
+  const int size = model().nv() * model().nv();
+  plainly(precision, kernels::Call::mass_matrix, {q}, size, out, nullptr,
+          [&] { run(precision, {q}, size, out, [](auto& w, auto in, auto* y) { w.mass_matrix(in[0], y); }); });
 }
 
 void BatchDynamics::mass_matrix_inverse(const Given& q, const Solving& how, Precision precision, double* out) {
@@ -92,14 +149,18 @@ void BatchDynamics::mass_matrix_inverse(const Given& q, const Solving& how, Prec
   check_given(model(), {q});
   const size_t size = size_t(model().nv()) * model().nv();
   const int states = q.batch < 0 ? 1 : q.batch;
-  at_precision(precision, [&]<class S>(S) {
-    std::vector<S> inverse(size);
-    each<S>(0, states, states, [&](RigidDynamics<S>& w, int b) {
-      w.mass_matrix_inverse(q.at(b), inverse.data(), how);
-      for (size_t i = 0; i < size; ++i) out[b * size + i] = to_double(inverse[i]);
-      require_finite(out + b * size, size, model());
+  const Starts starts = refined_from(precision, kernels::Call::mass_matrix_inverse, q, nullptr, nullptr, states, static_cast<int>(size), how, nullptr);
+  const auto general = [&](int from, int to) {
+    at_precision(precision, [&]<class S>(S) {
+      std::vector<S> inverse(size);
+      each<S>(from, to, states, [&](RigidDynamics<S>& w, int b) {
+        w.mass_matrix_inverse(q.at(b), inverse.data(), starts.of(b, how));
+        for (size_t i = 0; i < size; ++i) out[b * size + i] = to_double(inverse[i]);
+        require_finite(out + b * size, size, model());
+      });
     });
-  });
+  };
+  if (!plain(how) || !by_links(precision, kernels::Call::mass_matrix_inverse, q, nullptr, nullptr, states, static_cast<int>(size), out, nullptr, general)) general(0, states);
 }
 
 void BatchDynamics::jacobian(const Node& node, const Given& q, Precision precision, double* out) {

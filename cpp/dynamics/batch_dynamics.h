@@ -1,5 +1,5 @@
-// The direct calls of rigid dynamics on one state or a batch: forward dynamics in packs where that is the same, inverse dynamics, mass
-// matrices, Jacobians, poses, energies. Arrays are row-major, state after state; SI units, spatial quantities angular first.
+// The direct calls of rigid dynamics on one state or a batch: forward and inverse dynamics, mass matrices and their inverses by the kernels of
+// the machine's instruction set where that is the plain case, by the general recursions else; Jacobians, poses, energies. Arrays are row-major, state after state; SI units, spatial quantities angular first.
 #pragma once
 
 #include <memory>
@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dynamics/batches.h"
+#include "dynamics/link_dynamics.h"
 #include "dynamics/packed_dynamics.h"
 #include "dynamics/rigid_dynamics.h"
 
@@ -36,10 +37,33 @@ class BatchDynamics : public Batches<RigidDynamics> {
   void energy(const Given& q, const Given& v, const Vector3<double>& datum, double* out);                 // kinetic, potential
 
  private:
+
+  // The values of unrefined calls, which refinement starts from, so that its corrections are their errors.
+  struct Starts {
+    std::vector<double> values;
+    std::vector<char> there;
+    int size = 0;
+    Solving of(int b, Solving how) const {
+      if (!there.empty() && there[b]) how.start = values.data() + size_t(b) * size;
+      return how;
+    }
+  };
+  Starts refined_from(Precision precision, kernels::Call call, const Given& q, const Given* v, const Given* u, int states, int size, const Solving& how,
+                      const Applied<double>* applied);
   template <class S>
-  void forward_dynamics_at(const Given& q, const Given& v, const Given& tau, int states, const Solving& how, double* vdot, const Applied<double>* applied);
+  void forward_dynamics_at(const Given& q, const Given& v, const Given& tau, int from, int to, int states, const Solving& how, const Starts& starts, double* vdot,
+                           const Applied<double>* applied);
+
+  // The plain case by kernels; false where it is not there for this model or precision. again(from, to): states in doubt.
+  template <class Again>
+  bool by_links(Precision precision, kernels::Call call, const Given& q, const Given* v, const Given* u, int states, int size, double* out, const Applied<double>* applied, Again again);
+
+  // The same of calls that never leave a state in doubt: general(out) where kernels are not there, or where a number left its range.
+  template <class General>
+  void plainly(Precision precision, kernels::Call call, Givens given, int size, double* out, const Applied<double>* applied, General general);
 
   std::tuple<WorkspacePool<PackedDynamics<Single>>, WorkspacePool<PackedDynamics<double>>> packs_;
+  std::tuple<WorkspacePool<LinkDynamics<Single>>, WorkspacePool<LinkDynamics<double>>> links_;
 };
 
 }  // namespace pycraft

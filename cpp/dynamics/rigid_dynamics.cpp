@@ -90,6 +90,7 @@ typename RigidDynamics<S>::AddedInertias RigidDynamics<S>::forward_dynamics_of_p
   left_ = S(0);
   if (how.on_singular != OnSingular::minimum_norm && blocks_.faint().body >= 0) correct_faint(q, v, tau, vdot, applied);
   if (how.refinement.steps == 0) return added;
+  for (int i = 0; i < n && how.start; ++i) vdot[i] = S(how.start[i]) + points_.absorbed[i];
   const auto size_at = [&](const S* x) {
     if (how.refinement.wider())
       size_residual(*wider_, wide_x_.data(), how.refinement);
@@ -283,6 +284,7 @@ void RigidDynamics<S>::mass_matrix_solve(const double* q, const S* right, int m,
   project_off_null_space(added, columns_.data(), m);
   solve(columns_.data(), out, m);
   project_off_null_space(added, out, m);
+  for (size_t i = 0; i < size && how.start; ++i) out[i] = S(how.start[i]);
   refinement_.corrections.clear();
   if (how.refinement.steps != 0) {
     if (how.refinement.wider()) {

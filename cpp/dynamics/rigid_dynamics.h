@@ -28,6 +28,8 @@ struct Solving {
   Refinement refinement;
   OnSingular on_singular = OnSingular::raise;
   bool estimate = false;  // of a refined value: how far it is off
+  // What is refined: the value that kernels gave (link_dynamics.h), accelerations or (ℳ + J)⁻¹; null: what the sweep itself gives.
+  const double* start = nullptr;
 };
 
 // Numbers of one model at one scalar.

@@ -115,7 +115,7 @@ BOOST_AUTO_TEST_CASE(a_batch_is_its_states_one_by_one) {
   std::vector<double> M(nv * nv), direct(nv * nv);
   calls.mass_matrix(of("q", s.q, nq, -1), Precision::double_, M.data());
   one.mass_matrix(s.q.data(), direct.data());
-  BOOST_TEST(M == direct);
+  BOOST_TEST(furthest(M, direct) <= 40 * nv * epsilon<double>() * largest(direct));  // by kernels, and by the general recursion
 }
 
 BOOST_AUTO_TEST_CASE(what_is_given_is_checked) {

@@ -194,7 +194,10 @@ def faults(row):
     if row["refused"]:
         return
     rounding = ROUNDINGS * np.sqrt(row["n"]) * row["size"]
-    if row["refined"] > max(WORSE * row["unrefined"], rounding):
+    # Kernels (cpp/kernels) round poses in frames of their own, and no residual sees that: of two values as good as poses are, the plain
+    # form may have the luckier one, and refinement the other. What it reports says so.
+    lucky = row["form"] == "fast" and row["reported"] is not None and row["refined"] <= row["reported"]
+    if row["refined"] > max(WORSE * row["unrefined"], rounding) and not lucky:
         yield "spoiled"
     if row["reported"] is not None and not row["refined"] <= max(rounding, UNDERSTATED * row["reported"]):
         yield "understated"

@@ -24,9 +24,10 @@ STANDS_ON = {
     "algebra/engine": ["algebra/planning"],
     "model": ["spatial", "algebra/language"],
     "rigid": ["model", "algebra/trees"],
+    "kernels": ["rigid"],
     "recursions": ["rigid"],
     "operators": ["recursions", "algebra/planning"],
-    "dynamics": ["recursions"],
+    "dynamics": ["recursions", "kernels"],
     "simulation": ["dynamics"],
     "bindings": ["simulation", "operators", "algebra/engine"],
     "bench": ["bindings"],
@@ -35,6 +36,9 @@ STANDS_ON = {
 CORE = [room for room in STANDS_ON if room not in ("bindings", "bench", "tests")]
 # Sources that are parts of a class or a table declared elsewhere.
 PARTS = {
+    "kernels/kernels_baseline",  # the kernels of an instruction set each
+    "kernels/kernels_avx2",
+    "kernels/kernels_avx512",
     "algebra/planning/plan_blocks",  # class Planner, by what is planned
     "algebra/planning/plan_diagonals",
     "algebra/planning/plan_solves",

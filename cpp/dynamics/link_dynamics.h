@@ -1,0 +1,93 @@
+// Direct calls by the kernels of this machine's instruction set (cpp/kernels): the plain case of forward dynamics, inverse dynamics, the mass
+// matrix and its inverse, one state or packs of states. What kernels leave in doubt is the general recursions' to decide (rigid_dynamics.h).
+#pragma once
+
+#include <algorithm>
+#include <memory>
+#include <new>
+#include <vector>
+
+#include "dynamics/batches.h"
+#include "kernels/instruction_set.h"
+#include "kernels/link_model.h"
+#include "recursions/applied.h"
+#include "runtime/interrupt.h"
+
+namespace pycraft {
+
+// Of one model, for T = float or double. Memory is kept from call to call.
+template <class T>
+class LinkDynamics {
+ public:
+  explicit LinkDynamics(const Multibody& model) : set_(kernels::instruction_set()), model_(kernels::LinkModel<T>::of(model)), nv_(model.nv()) {
+    for (int i = 0; i < 3; ++i) gravity_[i] = static_cast<T>(model.gravity()[i]);
+  }
+
+  // Whether the model is one that kernels know.
+  bool there() const { return model_ != nullptr; }
+
+  // The call at `count` states, `size` numbers a state to out + b size; again(from, to) is called for runs of states in doubt. v and u may be null.
+  template <class Again>
+  void run(kernels::Call call, const Given& q, const Given* v, const Given* u, int count, int size, double* out, const Applied<double>* applied, Again again) {
+    T gravity[3];
+    const T* wrenches = nullptr;
+    std::copy_n(gravity_, 3, gravity);
+    if (applied) {
+      for (int i = 0; i < 3; ++i) gravity[i] = static_cast<T>(applied->gravity[i]);
+      if (applied->wrenches) wrenches = carried(*applied);
+    }
+    const bool matrix = call == kernels::Call::mass_matrix || call == kernels::Call::mass_matrix_inverse;  // kernels look through those themselves
+    const auto stride = [](const Given& g) { return g.batch < 0 ? size_t(0) : size_t(g.width); };
+    int doubted = 0;  // how many states before b are in doubt
+    for (int b = 0; b < count;) {
+      const kernels::Kernels<T>& kernel = chosen(count - b, matrix);
+      const kernels::Kernel<T>& how = kernel[call];
+      const int lanes = std::min(kernel.lanes, count - b);
+      const kernels::States<T> states{q.at(b), v ? v->at(b) : nullptr, u ? u->at(b) : nullptr, stride(q), v ? stride(*v) : 0, u ? stride(*u) : 0, lanes, gravity, wrenches};
+      const unsigned sound = how.run(model_->links(), states, out + size_t(b) * size, size, work(how.work(model_->links())));
+      for (const int end = b + lanes, first = b; b < end; ++b) {
+        const bool sure = (sound >> (b - first) & 1) && (matrix || all_finite(out + size_t(b) * size, size));
+        if (sure && doubted > 0) again(b - doubted, b);
+        doubted = sure ? 0 : doubted + 1;
+      }
+      if (b % 1024 < lanes) check_interrupt();
+    }
+    if (doubted > 0) again(count - doubted, count);
+  }
+
+ private:
+  // Matrices of many coordinates have rows enough to fill registers with, and packs of them would not fit near memory.
+  const kernels::Kernels<T>& chosen(int states, bool matrix) const {
+    if constexpr (std::is_same_v<T, double>)
+      return states == 1 || (matrix && nv_ > 48) ? set_.one : set_.pack;
+    else
+      return set_.singles;
+  }
+  T* work(size_t numbers) {
+    if (numbers > size_) {
+      work_.reset(static_cast<T*>(::operator new(numbers * sizeof(T), std::align_val_t(64))));
+      size_ = numbers;
+    }
+    return work_.get();
+  }
+  const T* carried(const Applied<double>& applied) {
+    on_bodies_.resize(model_->bodies());
+    for (size_t k = 0; k < on_bodies_.size(); ++k) on_bodies_[k] = cast<T>(applied.wrenches[k]);
+    model_->wrenches_on_links(on_bodies_.data(), on_links_);
+    return on_links_.data();
+  }
+
+  struct Free {
+    void operator()(T* x) const { ::operator delete(x, std::align_val_t(64)); }
+  };
+  const kernels::InstructionSet& set_;
+  std::unique_ptr<kernels::LinkModel<T>> model_;
+  int nv_;
+  T gravity_[3];
+  std::unique_ptr<T, Free> work_;
+  size_t size_ = 0;
+  std::vector<Vector6<T>> on_bodies_;
+  std::vector<T> on_links_;
+};
+
+}  // namespace pycraft

@@ -1,0 +1,96 @@
+// Six rows of columns, (n; f) or (α; a) a column, in the base's axes about the origin of one link after another. From link to link columns are
+// moved, not turned: forces gain l × f in their angular part, motions lose l × α in their linear one. Neighbouring columns are neighbours in
+// every row, so that one instruction takes several of them.
+#pragma once
+
+#include "kernels/steps.h"
+
+namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET {
+
+// How a link lies at a configuration, in the base's axes.
+template <class S>
+struct Lying {
+  Matrix3<S> axes;
+  Vector3<S> arm;  // its origin from the parent's
+};
+
+template <class Kind, class S, class T>
+[[gnu::always_inline]] inline void lie_in(const Link<T>& link, const Lying<S>* above, const Place<S>& place, Lying<S>& out) {
+  const auto rotation = Kind::rotation(place);
+  const Vector3<S> arm = Kind::arm(link, place);
+  out.arm = above ? above->axes * arm : arm;
+  for (int r = 0; r < 3; ++r) {  // rows of axes: what takes the link's coordinates to one of the base's
+    Vector3<S> row = Vector3<S>::zero();
+    if (above)
+      row = {above->axes(r, 0), above->axes(r, 1), above->axes(r, 2)};
+    else
+      row[r] = S(1);
+    row = rotation.to_child(row);
+    out.axes(r, 0) = row[0], out.axes(r, 1) = row[1], out.axes(r, 2) = row[2];
+  }
+}
+
+template <class S, class T>
+inline void lie(const Links<T>& links, const States<T>& at, Lying<S>* out) {
+  for (int k = 0; k < links.count; ++k) {
+    const Link<T>& link = links.link[k];
+    const Lying<S>* const above = link.parent < 0 ? nullptr : out + link.parent;
+    with_step(link.step, [&](auto kind) {
+      using Kind = decltype(kind);
+      Place<S> place;
+      place_link<Kind>(link, at, place);
+      lie_in<Kind>(link, above, place, out[k]);
+    });
+  }
+}
+template <class S>
+struct Columns {
+  S *n[3], *f[3];
+  Columns(S* base, size_t stride, int first) {
+    for (int r = 0; r < 3; ++r) n[r] = base + r * stride + first, f[r] = base + (3 + r) * stride + first;
+  }
+};
+
+// move(c, n, f) of every column from the first on; what it makes of f is kept only where `forces` says so.
+template <bool forces, class S, class Move>
+[[gnu::always_inline]] inline void each_column(const Columns<S>& y, int first, int last, Move move) {
+  S *__restrict n0 = y.n[0], *__restrict n1 = y.n[1], *__restrict n2 = y.n[2], *__restrict f0 = y.f[0], *__restrict f1 = y.f[1], *__restrict f2 = y.f[2];
+#pragma GCC ivdep
+  for (int c = first; c < last; ++c) {
+    Vector3<S> n{n0[c], n1[c], n2[c]}, f{f0[c], f1[c], f2[c]};
+    move(c, n, f);
+    n0[c] = n[0], n1[c] = n[1], n2[c] = n[2];
+    if constexpr (forces) f0[c] = f[0], f1[c] = f[1], f2[c] = f[2];
+  }
+}
+
+// The upper triangle of n numbers a side mirrored. False where one of them is no number or not finite.
+inline bool mirror(double* out, int n) {
+  constexpr int tile = 8;
+  double odd[tile] = {};
+  for (int top = 0; top < n; top += tile)
+    for (int left = 0; left <= top; left += tile) {
+      if (left == top || top + tile > n) {
+        for (int i = top; i < n && i < top + tile; ++i)
+          for (int j = left; j <= i && j < left + tile; ++j) {
+            const double x = out[size_t(j) * n + i];
+            odd[0] += x - x;
+            out[size_t(i) * n + j] = x;
+          }
+        continue;
+      }
+      double block[tile][tile];
+      for (int j = 0; j < tile; ++j)
+        for (int i = 0; i < tile; ++i) {
+          const double x = out[size_t(left + j) * n + top + i];
+          odd[i] += x - x;
+          block[i][j] = x;
+        }
+      for (int i = 0; i < tile; ++i)
+        for (int j = 0; j < tile; ++j) out[size_t(top + i) * n + left + j] = block[i][j];
+    }
+  for (int i = 1; i < tile; ++i) odd[0] += odd[i];
+  return odd[0] == 0;
+}
+
+}  // namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET

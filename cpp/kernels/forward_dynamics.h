@@ -1,0 +1,269 @@
+// Forward dynamics on links: the articulated-body algorithm of recursions/articulated_body.h, the equations written out for each kind of step.
+//
+//   tip to base:  D = P_hh + J,  ε = T - z_h,  G = P_h/D,  P⁺ = P - G P_h*,  z⁺ = z + G ε + P⁺ a'
+//   base to tip:  α⁺ = E* α(p) + a',   θ̈ = D⁻¹(ε - P_h* α⁺)
+//
+// with P_h the column of the hinge's axis. What projecting out a hinge without J makes zero is neither stored nor computed: a pin's row of A
+// and B. The inertia of a chain stays at hand from link to link; only branches are laid aside, at their parent.
+//
+// A pivot that is small beside what it might be is not judged here (pivots.h): its state comes back in doubt.
+#pragma once
+
+#include "kernels/motions.h"
+#include "kernels/pivots.h"
+
+namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET {
+
+template <class S>
+struct ForwardLink {
+  Motion<S> motion;
+  S inverse, innovation;      // D⁻¹, ε
+  Vector3<S> angular, linear;  // P_h
+  Vector3<S> alpha, acceleration;  // of the link
+};
+template <class S>
+struct ForwardMultiple {  // hinges of several coordinates
+  S rate[6];              // D⁻¹ε
+  Matrix3<S> gain;        // ball: D⁻¹B
+  Factors<3, S> ball;     // of D
+  Factors<6, S> free;
+};
+
+template <class S>
+struct ForwardWork {
+  ForwardLink<S>* link;
+  Inertia<S>* branch;
+  ForwardMultiple<S>* multiple;
+  template <class T>
+  static size_t size(const Links<T>& links) {
+    return links.count * (sizeof(ForwardLink<S>) + sizeof(Inertia<S>)) + links.multiple * sizeof(ForwardMultiple<S>);
+  }
+  template <class T>
+  ForwardWork(const Links<T>& links, T* work) {
+    link = reinterpret_cast<ForwardLink<S>*>(work);
+    branch = reinterpret_cast<Inertia<S>*>(link + links.count);
+    multiple = reinterpret_cast<ForwardMultiple<S>*>(branch + links.count);
+  }
+  template <class T>
+  ForwardMultiple<S>* of(const Link<T>& link) const { return multiple + (link.multi < 0 ? 0 : link.multi); }
+};
+
+// P += M, z += b' - what is applied
+template <class S, class T>
+[[gnu::always_inline]] inline void add_own(const Link<T>& link, const Vector3<S>& omega, const T* wrench, Inertia<S>& P) {
+  const Symmetric3<S> I = rotational_of<S>(link);
+  const Vector3<S> h = spread<S>(link.moment);
+  const S m(link.mass);
+  for (int i = 0; i < 6; ++i) P.A.s[i] += I.s[i];
+  P.B(0, 1) -= h[2], P.B(0, 2) += h[1], P.B(1, 0) += h[2], P.B(1, 2) -= h[0], P.B(2, 0) -= h[1], P.B(2, 1) += h[0];
+  P.C(0, 0) += m, P.C(1, 1) += m, P.C(2, 2) += m;
+  P.n = P.n + gyroscopic(omega, I);
+  P.f = P.f + twice_crossed(omega, h);
+  if (wrench) P.n = P.n - spread<S>(wrench), P.f = P.f - spread<S>(wrench + 3);
+}
+
+// P⁺ and z⁺ of a pin, P in its axes and of it.
+template <int K, bool rotor, class S>
+[[gnu::always_inline]] inline void project_pin(const S& ratio, const Vector3<S>& turning, const S& force, const ForwardLink<S>& w, Inertia<S>& P) {
+  constexpr int i = (K + 1) % 3, j = (K + 2) % 3;
+  const S gi = w.angular[i] * w.inverse, gj = w.angular[j] * w.inverse;
+  const Vector3<S> gf = w.inverse * w.linear;
+  P.A(i, i) -= gi * w.angular[i], P.A(i, j) -= gi * w.angular[j], P.A(j, j) -= gj * w.angular[j];
+  for (int r = 0; r < 3; ++r) {
+    P.B(i, r) -= gi * w.linear[r], P.B(j, r) -= gj * w.linear[r];
+    for (int k = r; k < 3; ++k) P.C(r, k) -= gf[r] * w.linear[k];
+  }
+  P.n[i] += gi * w.innovation + P.A(i, i) * turning[i] + P.A(i, j) * turning[j];
+  P.n[j] += gj * w.innovation + P.A(i, j) * turning[i] + P.A(j, j) * turning[j];
+  P.f = P.f + w.innovation * gf;
+  for (int r = 0; r < 3; ++r) P.f[r] += P.B(i, r) * turning[i] + P.B(j, r) * turning[j];
+  P.n[K] = force;
+  if constexpr (rotor) {  // what the rotor keeps of the row: J/D of it
+    P.A(K, K) *= ratio, P.A(i, K) *= ratio, P.A(j, K) *= ratio;
+    for (int r = 0; r < 3; ++r) P.B(K, r) *= ratio;
+    P.n[K] = force - ratio * w.innovation + P.A(i, K) * turning[i] + P.A(j, K) * turning[j];
+  }
+}
+
+// P⁺ and ε's part of z⁺ of a slider or a screw.
+template <class S>
+[[gnu::always_inline]] inline void project_out(const LinkOf<S>& link, const ForwardLink<S>& w, Inertia<S>& P) {
+  const Vector3<S> turned = w.inverse * w.angular, moved = w.inverse * w.linear;
+  for (int r = 0; r < 3; ++r)
+    for (int k = 0; k < 3; ++k) {
+      if (k >= r) P.A(r, k) -= turned[r] * w.angular[k], P.C(r, k) -= moved[r] * w.linear[k];
+      P.B(r, k) -= turned[r] * w.linear[k];
+    }
+  P.n = P.n + w.innovation * turned, P.f = P.f + w.innovation * moved;
+  if (link.turn == 0 && !link.rotor)
+    for (int r = 0; r < 3; ++r) P.C(r, 2) = P.B(r, 2) = S(0);
+}
+
+// The hinge of link k eliminated: D⁻¹, ε, P_h, and unless it is a root P⁺ and z⁺ about the parent's origin, in its axes.
+template <class Kind, bool rotor, class S, class T>
+void eliminate(const Link<T>& link, const Links<T>& links, const States<T>& at, const S& gone, ForwardLink<S>& w, ForwardMultiple<S>* multiple, Inertia<S>& P,
+                                             typename S::Bits& sound) {
+  const Motion<S>& m = w.motion;
+  const auto force = [&](int i) { return at.u ? gathered<S>(at.u + link.v + i, at.u_stride, at.states) : S(0); };
+  const bool root = link.parent < 0;
+  const auto rotation = Kind::rotation(m.place);
+  constexpr int K = Kind::row;
+  if constexpr (Kind::nv == 1) {
+    const S J(link.J), tau = S(link.sign) * force(0);
+    S D(J), along, own;
+    if constexpr (Kind::pin) {
+      w.angular = {P.A(0, K), P.A(1, K), P.A(2, K)}, w.linear = {P.B(K, 0), P.B(K, 1), P.B(K, 2)};
+      D += w.angular[K], along = P.n[K];
+    } else {
+      const S turn(link.turn), travel(link.travel);
+      for (int r = 0; r < 3; ++r) w.angular[r] = turn * P.A(r, K) + travel * P.B(r, K), w.linear[r] = turn * P.B(K, r) + travel * P.C(r, K);
+      D += turn * w.angular[K] + travel * w.linear[K], along = turn * P.n[K] + travel * P.f[K];
+      // Beside a coordinate axis a row rounds at its own length.
+      own = turn * turn * P.A(K, K) + travel * travel * P.C(K, K) + J;
+    }
+    const S most = carried_inertia<Kind>(link, gone);
+    sound = sound & greater(D, S(links.faint) * most);
+    w.inverse = S(1) / D;
+    P.error += S(links.rounding) * most * w.inverse;
+    if constexpr (!Kind::pin) P.growth *= larger(S(1), S(S(T(0.0625)) * own * w.inverse));
+    w.innovation = tau - along;
+    if (root) return;
+    constexpr int zero = Kind::pin && !rotor ? K : -1;
+    if constexpr (Kind::pin) {
+      project_pin<K, rotor>(S(J * w.inverse), m.turning, tau, w, P);
+    } else {
+      project_out(link, w, P);
+      P.n = P.n + P.A * m.turning, P.f = P.f + transpose_times(P.B, m.turning);
+    }
+    rotation.template turn<zero>(P);
+    constexpr int left = decltype(rotation)::template turned_zero<zero>;
+    P.n = rotation.to_parent(P.n), P.f = rotation.to_parent(P.f) + P.C * m.sliding;
+    for (int r = 0; r < 3; ++r)
+      if (r != left) P.n[r] += P.B(r, 0) * m.sliding[0] + P.B(r, 1) * m.sliding[1] + P.B(r, 2) * m.sliding[2];
+    shift<left>(Kind::arm(link, m.place), P);
+  } else if constexpr (Kind::nv == 3) {
+    sound = sound & factor_ball(P, link, gone, links, multiple->ball);
+    for (int r = 0; r < 3; ++r) {
+      S column[3] = {P.B(0, r), P.B(1, r), P.B(2, r)};
+      multiple->ball.solve(column);
+      for (int i = 0; i < 3; ++i) multiple->gain(i, r) = column[i];
+    }
+    for (int i = 0; i < 3; ++i) multiple->rate[i] = force(i) - P.n[i];
+    multiple->ball.solve(multiple->rate);
+    if (root) return;
+    P.f = P.f + transpose_times(P.B, Vector3<S>{multiple->rate[0], multiple->rate[1], multiple->rate[2]});
+    P.n = {force(0), force(1), force(2)};
+    for (int r = 0; r < 3; ++r)
+      for (int k = r; k < 3; ++k)
+        P.C(r, k) -= P.B(0, r) * multiple->gain(0, k) + P.B(1, r) * multiple->gain(1, k) + P.B(2, r) * multiple->gain(2, k);
+    P.A = Symmetric3<S>::zero(), P.B = Matrix3<S>::zero();
+    rotation.turn_symmetric(P.C);
+    P.n = rotation.to_parent(P.n), P.f = rotation.to_parent(P.f) + P.C * m.sliding;
+    shift<-1>(Kind::arm(link, m.place), P);
+  } else {
+    sound = sound & factor_free(P, link, gone, links, multiple->free);
+    for (int i = 0; i < 3; ++i) multiple->rate[i] = force(i) - P.n[i], multiple->rate[3 + i] = force(3 + i) - P.f[i];
+    multiple->free.solve(multiple->rate);
+    if (root) return;
+    P.f = rotation.to_parent(Vector3<S>{force(3), force(4), force(5)});
+    P.n = rotation.to_parent(Vector3<S>{force(0), force(1), force(2)}) + cross(Kind::arm(link, m.place), P.f);
+    P.A = P.C = Symmetric3<S>::zero(), P.B = Matrix3<S>::zero();
+  }
+}
+
+// Of link k from its parent's acceleration (alpha; acceleration), which becomes its own.
+template <class Kind, class S, class T>
+[[gnu::always_inline]] inline void accelerate(const Link<T>& link, const States<T>& at, const ForwardLink<S>& w, const ForwardMultiple<S>* multiple, Vector3<S>& alpha, Vector3<S>& acceleration,
+                                              double* out, size_t stride) {
+  const Motion<S>& m = w.motion;
+  const auto rotation = Kind::rotation(m.place);
+  Vector3<S> linear = acceleration + cross(alpha, Kind::arm(link, m.place));
+  if constexpr (Kind::nv < 6) linear = linear + m.sliding;
+  acceleration = rotation.to_child(linear);
+  alpha = rotation.to_child(alpha);
+  const auto give = [&](int i, const S& x) { scattered(x, out + link.v + i, stride, at.states); };
+  if constexpr (Kind::nv == 1) {
+    constexpr int K = Kind::row, i = (K + 1) % 3, j = (K + 2) % 3;
+    if constexpr (Kind::pin) {
+      alpha[i] += m.turning[i], alpha[j] += m.turning[j];
+      const S left = w.innovation - w.angular[i] * alpha[i] - w.angular[j] * alpha[j] - dot(w.linear, acceleration);
+      // D θ̈ = left - (D - J) α_K
+      const S whole = (left + S(link.J) * alpha[K]) * w.inverse;
+      give(0, S(link.sign) * (whole - alpha[K]));
+      alpha[K] = whole;
+    } else {
+      alpha = alpha + m.turning;
+      const S rate = (w.innovation - dot(w.angular, alpha) - dot(w.linear, acceleration)) * w.inverse;
+      alpha[K] += S(link.turn) * rate, acceleration[K] += S(link.travel) * rate;
+      give(0, S(link.sign) * rate);
+    }
+  } else if constexpr (Kind::nv == 3) {
+    alpha = alpha + m.turning;
+    const Vector3<S> whole = Vector3<S>{multiple->rate[0], multiple->rate[1], multiple->rate[2]} - multiple->gain * acceleration;
+    for (int i = 0; i < 3; ++i) give(i, whole[i] - alpha[i]);
+    alpha = whole;
+  } else {
+    alpha = alpha + m.turning;
+    const S* rate = multiple->rate;
+    for (int i = 0; i < 3; ++i) give(i, rate[i] - alpha[i]), give(3 + i, rate[3 + i] - acceleration[i] - m.sliding[i]);
+    alpha = {rate[0], rate[1], rate[2]}, acceleration = {rate[3], rate[4], rate[5]};
+  }
+}
+
+// Articulated inertias and the forces that go with them, tip to base, of links that are placed. Which lanes are sound.
+template <class S, class T>
+inline typename S::Bits articulated_tip_to_base(const Links<T>& links, const States<T>& at, const ForwardWork<S>& w) {
+  const S gone = travel<S>(links, at);
+  typename S::Bits sound = S::all();
+  for (int k = 0; k < links.count; ++k)
+    if (links.link[k].branches) w.branch[k] = no_inertia<S>();
+  Inertia<S> P;
+  for (int k = links.count - 1; k >= 0; --k) {
+    const Link<T>& link = links.link[k];
+    ForwardLink<S>& own = w.link[k];
+    const bool leaf = k + 1 == links.count || links.link[k + 1].parent != k;
+    if (leaf) P = no_inertia<S>();
+    if (link.branches) add(P, w.branch[k]);
+    add_own(link, own.motion.omega, at.wrenches ? at.wrenches + 6 * k : nullptr, P);
+    if (link.rotor)
+      with_step(link.step, [&](auto kind) { eliminate<decltype(kind), decltype(kind)::pin>(link, links, at, gone, own, w.of(link), P, sound); });
+    else
+      with_step(link.step, [&](auto kind) { eliminate<decltype(kind), false>(link, links, at, gone, own, w.of(link), P, sound); });
+    if (link.parent < 0)
+      sound = sound & greater(S(links.growth), P.growth) & greater(S(1), S(T(4)) * P.error * P.growth);
+    else if (link.parent != k - 1)
+      add(w.branch[link.parent], P);
+  }
+  return sound;
+}
+
+template <class S>
+unsigned forward_dynamics(const Links<typename S::Scalar>& links, const States<typename S::Scalar>& at, double* out, size_t stride, typename S::Scalar* work) {
+  using T = typename S::Scalar;
+  const ForwardWork<S> w(links, work);
+  for (int k = 0; k < links.count; ++k) {
+    const Link<T>& link = links.link[k];
+    with_step(link.step, [&](auto kind) {
+      using Kind = decltype(kind);
+      Motion<S>& m = w.link[k].motion;
+      place_link<Kind>(link, at, m.place);
+      move_link<Kind>(link, at, link.parent < 0 ? nullptr : &w.link[link.parent].motion.omega, m);
+    });
+  }
+  const typename S::Bits sound = articulated_tip_to_base(links, at, w);
+  const Vector3<S> base = -spread<S>(at.gravity);
+  Vector3<S> alpha, acceleration;
+  for (int k = 0; k < links.count; ++k) {
+    const Link<T>& link = links.link[k];
+    ForwardLink<S>& own = w.link[k];
+    if (link.parent < 0)
+      alpha = Vector3<S>::zero(), acceleration = base;
+    else if (link.parent != k - 1)
+      alpha = w.link[link.parent].alpha, acceleration = w.link[link.parent].acceleration;
+    with_step(link.step, [&](auto kind) { accelerate<decltype(kind)>(link, at, own, w.of(link), alpha, acceleration, out, stride); });
+    if (link.branches) own.alpha = alpha, own.acceleration = acceleration;
+  }
+  return S::mask(sound);
+}
+
+}  // namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET

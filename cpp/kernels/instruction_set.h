@@ -1,0 +1,23 @@
+// The kernels that this machine runs: of the widest instruction set that it has and that was built, or of the one that the environment
+// variable PYCRAFT_ISA names ("baseline", "avx2", "avx512").
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "kernels/links.h"
+
+namespace pycraft::kernels {
+
+struct InstructionSet {
+  std::string name;
+  Kernels<double> one, pack;  // one state; as many as there are lanes
+  Kernels<float> singles;
+};
+
+// EvaluationError where PYCRAFT_ISA names a set that is not there or that this machine has not.
+const InstructionSet& instruction_set();
+// Those that were built and that this machine has, from narrow to wide.
+const std::vector<InstructionSet>& instruction_sets();
+
+}  // namespace pycraft::kernels

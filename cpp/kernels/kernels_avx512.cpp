@@ -1,0 +1,12 @@
+// Kernels for AVX-512: eight doubles or sixteen floats at once. One state is left to AVX2.
+#define PYCRAFT_INSTRUCTION_SET avx512
+#include "kernels/kernels.h"
+
+namespace pycraft::kernels {
+
+extern const Kernels<double> avx512_pack;
+extern const Kernels<float> avx512_singles;
+const Kernels<double> avx512_pack = avx512::kernels_of<double, 8>;
+const Kernels<float> avx512_singles = avx512::kernels_of<float, 16>;
+
+}  // namespace pycraft::kernels

@@ -1,0 +1,141 @@
+// Numbers of several states side by side, one instruction for all. A comparison gives a truth per lane.
+//
+// Everything of the kernels lives in a namespace named for the instruction set that a source is built for: functions of one set never take
+// the place of another's when objects are linked, as all of their arguments have types of that namespace.
+#pragma once
+
+#ifndef PYCRAFT_INSTRUCTION_SET
+#error "kernels are built by cpp/kernels/kernels_*.cpp alone"
+#endif
+
+#include <cmath>
+#include <cstdint>
+
+#include "spatial/symmetric3.h"
+#include "spatial/vector3.h"
+
+namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET {
+
+template <class T>
+struct BitsOf;
+template <>
+struct BitsOf<double> {
+  using type = std::int64_t;
+};
+template <>
+struct BitsOf<float> {
+  using type = std::int32_t;
+};
+
+template <class T, int W>
+struct Lanes {
+  using Scalar = T;
+  using Bit = typename BitsOf<T>::type;
+  typedef T Vector __attribute__((vector_size(W * sizeof(T))));
+  typedef Bit Bits __attribute__((vector_size(W * sizeof(T))));
+  static constexpr int width = W;
+  Vector v;
+
+  Lanes() = default;
+  [[gnu::always_inline]] Lanes(T x) : v(x - Vector{}) {}
+  [[gnu::always_inline]] static Lanes of(Vector x) {
+    Lanes a;
+    a.v = x;
+    return a;
+  }
+  T lane(int b) const { return v[b]; }
+  void set(int b, T x) { v[b] = x; }
+
+  [[gnu::always_inline]] Lanes& operator+=(const Lanes& b) { v += b.v; return *this; }
+  [[gnu::always_inline]] Lanes& operator-=(const Lanes& b) { v -= b.v; return *this; }
+  [[gnu::always_inline]] Lanes& operator*=(const Lanes& b) { v *= b.v; return *this; }
+  [[gnu::always_inline]] friend Lanes operator+(const Lanes& a, const Lanes& b) { return of(a.v + b.v); }
+  [[gnu::always_inline]] friend Lanes operator-(const Lanes& a, const Lanes& b) { return of(a.v - b.v); }
+  [[gnu::always_inline]] friend Lanes operator*(const Lanes& a, const Lanes& b) { return of(a.v * b.v); }
+  [[gnu::always_inline]] friend Lanes operator/(const Lanes& a, const Lanes& b) { return of(a.v / b.v); }
+  [[gnu::always_inline]] friend Lanes operator-(const Lanes& a) { return of(-a.v); }
+
+  // ---- truths: all bits of a lane, or none
+  [[gnu::always_inline]] static Bits all() { return ~Bits{}; }
+  [[gnu::always_inline]] friend Bits greater(const Lanes& a, const Lanes& b) { return a.v > b.v; }
+  [[gnu::always_inline]] static Lanes choose(Bits truth, const Lanes& a, const Lanes& b) { return of((Vector)((truth & (Bits)a.v) | (~truth & (Bits)b.v))); }
+  static unsigned mask(Bits truth) {
+    unsigned m = 0;
+    for (int b = 0; b < W; ++b) m |= unsigned(truth[b] & 1) << b;
+    return m;
+  }
+  [[gnu::always_inline]] Bits bits() const { return (Bits)v; }
+  [[gnu::always_inline]] static Lanes from_bits(Bits x) { return of((Vector)x); }
+};
+
+// One state.
+template <class T>
+struct Lanes<T, 1> {
+  using Scalar = T;
+  using Bit = typename BitsOf<T>::type;
+  using Bits = Bit;
+  static constexpr int width = 1;
+  T v;
+
+  Lanes() = default;
+  [[gnu::always_inline]] Lanes(T x) : v(x) {}
+  T lane(int) const { return v; }
+  void set(int, T x) { v = x; }
+
+  [[gnu::always_inline]] Lanes& operator+=(const Lanes& b) { v += b.v; return *this; }
+  [[gnu::always_inline]] Lanes& operator-=(const Lanes& b) { v -= b.v; return *this; }
+  [[gnu::always_inline]] Lanes& operator*=(const Lanes& b) { v *= b.v; return *this; }
+  [[gnu::always_inline]] friend Lanes operator+(const Lanes& a, const Lanes& b) { return Lanes(a.v + b.v); }
+  [[gnu::always_inline]] friend Lanes operator-(const Lanes& a, const Lanes& b) { return Lanes(a.v - b.v); }
+  [[gnu::always_inline]] friend Lanes operator*(const Lanes& a, const Lanes& b) { return Lanes(a.v * b.v); }
+  [[gnu::always_inline]] friend Lanes operator/(const Lanes& a, const Lanes& b) { return Lanes(a.v / b.v); }
+  [[gnu::always_inline]] friend Lanes operator-(const Lanes& a) { return Lanes(-a.v); }
+
+  [[gnu::always_inline]] static Bits all() { return ~Bits{}; }
+  [[gnu::always_inline]] friend Bits greater(const Lanes& a, const Lanes& b) { return -Bits(a.v > b.v); }
+  [[gnu::always_inline]] static Lanes choose(Bits truth, const Lanes& a, const Lanes& b) { return from_bits((truth & a.bits()) | (~truth & b.bits())); }
+  static unsigned mask(Bits truth) { return unsigned(truth & 1); }
+  [[gnu::always_inline]] Bits bits() const {
+    Bits x;
+    __builtin_memcpy(&x, &v, sizeof x);
+    return x;
+  }
+  [[gnu::always_inline]] static Lanes from_bits(Bits x) {
+    Lanes a;
+    __builtin_memcpy(&a.v, &x, sizeof x);
+    return a;
+  }
+};
+
+template <class T, int W>
+[[gnu::always_inline]] inline Lanes<T, W> magnitude(const Lanes<T, W>& a) {
+  constexpr auto sign = typename BitsOf<T>::type(1) << (8 * sizeof(T) - 1);
+  return Lanes<T, W>::from_bits(a.bits() & ~sign);
+}
+template <class T, int W>
+[[gnu::always_inline]] inline Lanes<T, W> larger(const Lanes<T, W>& a, const Lanes<T, W>& b) {
+  return Lanes<T, W>::choose(greater(b, a), b, a);
+}
+template <class S, class T>
+[[gnu::always_inline]] inline Vector3<S> spread(const T* x) {
+  return {S(x[0]), S(x[1]), S(x[2])};
+}
+// One number of every state.
+template <class S>
+[[gnu::always_inline]] inline S gathered(const double* x, size_t stride, int states) {
+  using T = typename S::Scalar;
+  if constexpr (S::width == 1) return S(T(*x));
+  S a;
+  if (states == S::width) {
+    for (int b = 0; b < S::width; ++b) a.set(b, T(x[b * stride]));
+  } else {
+    for (int b = 0; b < S::width; ++b) a.set(b, T(x[(b < states ? b : states - 1) * stride]));
+  }
+  return a;
+}
+template <class S>
+[[gnu::always_inline]] inline void scattered(const S& a, double* x, size_t stride, int states) {
+  for (int b = 0; b < S::width && b < states; ++b) x[b * stride] = double(a.lane(b));
+}
+
+}  // namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET

@@ -1,0 +1,42 @@
+// The links of a model: hinges taken apart into subhinges, welded bodies joined to what carries them, frames laid so that the axis of a pin,
+// slider or screw is a coordinate axis through the link's origin.
+//
+// Where a hinge's axis is a coordinate axis of its parent link to 8 eps (what the rotations of poses are rounded by), it is taken for it, and
+// the link's axes are the parent's at rest; else the link is turned so that the axis becomes z. Poses and inertias are carried to the new
+// frames in extended precision and rounded once.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "kernels/links.h"
+#include "model/multibody.h"
+
+namespace pycraft::kernels {
+
+template <class T>
+class LinkModel {
+ public:
+  // Nothing where a hinge is not one of those that kernels know: a rotor on a ball or a free hinge, or three sliders that carry a body along
+  // and stand behind another subhinge, whose own terms only the general recursions keep from masses.
+  static std::unique_ptr<LinkModel> of(const Multibody& model);
+
+  const Links<T>& links() const { return links_; }
+  size_t bodies() const { return bodies_.size(); }
+  // (n; f) on every body, in its frame, as those on links.
+  void wrenches_on_links(const Vector6<T>* on_bodies, std::vector<T>& out) const;
+
+ private:
+  struct Carried {  // where a body is part of a link
+    int link;       // -1: of the base
+    Pose<T> pose;
+  };
+  Links<T> links_{};
+  std::vector<Link<T>> all_;
+  std::vector<Carried> bodies_;
+};
+
+extern template class LinkModel<float>;
+extern template class LinkModel<double>;
+
+}  // namespace pycraft::kernels

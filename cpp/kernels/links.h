@@ -1,0 +1,70 @@
+// A model as the kernels of direct calls read it: links in a flat array, a step kind each, frames laid so that hinge axes are coordinate axes.
+//
+// A link is a body, or a massless piece between two subhinges of one hinge. Its frame is the kernels' own: rest_model.h says how it lies in
+// the body's. Generalized coordinates are the model's, so that velocities, accelerations, forces, ℳ and ℳ⁻¹ are those of the model itself.
+// Plain data: sources built for other instruction sets include this file, and hardly any of it is code.
+#pragma once
+
+#include <cstddef>
+
+namespace pycraft::kernels {
+
+// How a link moves against its parent. pin_x, pin_y, pin_z: its axes are the parent's at rest, turned about one of them; turned_pin: about z,
+// after a fixed rotation; helix: a slider or a screw along z. A ball's centre and a free link's frame are the link's origin.
+enum class Step : int { pin_x, pin_y, pin_z, turned_pin, helix, ball, free };
+
+template <class T>
+struct Link {
+  Step step;
+  int parent;                // -1: the base
+  int q, v;                  // where its coordinates begin
+  int end;                   // one past the last coordinate of the links outboard of it and its own
+  bool branches;             // has children besides the one that follows it
+  bool rotor;                // J is not zero
+  int multi;                 // of links with several coordinates: which of them, else -1
+  int slot;                  // where sweeps outward that keep columns have this link's: its parent's, where it is the last child
+  T sign;                    // -1: the hinge turns or slides against the coordinate axis
+  T R[9], p[3];              // of the frame before the step in the parent's
+  T mass, moment[3], rotational[6];
+  T J;
+  T turn, travel;            // of a helix, for a unit of its coordinate
+  // Of what it carries, for the bound below which a pivot is in doubt: the sum of traces, the mass, the length of the longest way outward.
+  T carried_rotational, carried_mass, furthest;
+};
+
+template <class T>
+struct Links {
+  int count, nq, nv;
+  int multiple, slots;          // links with several coordinates; links whose columns are kept at once
+  const Link<T>* link;
+  T rounding, faint, growth;    // bounds of doubt, see pivots.h
+};
+
+// States to compute at: state b at q + b q_stride, and so on; lanes beyond `states` repeat the last one.
+template <class T>
+struct States {
+  const double *q, *v, *u;
+  size_t q_stride, v_stride, u_stride;
+  int states;
+  const T* gravity;   // three numbers
+  const T* wrenches;  // (n; f) on every link in its frame about its origin, at all states; null: none
+};
+
+// What a call is: `run` writes the results to out + b out_stride, in `work`, aligned to 64 bytes and of as many numbers as the other function
+// says. Bit b of what comes back says that state b is sound: of others the results mean nothing, and the general recursions decide.
+template <class T>
+struct Kernel {
+  unsigned (*run)(const Links<T>& links, const States<T>& states, double* out, size_t out_stride, T* work);
+  size_t (*work)(const Links<T>& links);
+};
+
+enum class Call { forward_dynamics, inverse_dynamics, mass_matrix, mass_matrix_inverse };
+
+template <class T>
+struct Kernels {
+  int lanes;           // states at once
+  Kernel<T> calls[4];
+  const Kernel<T>& operator[](Call call) const { return calls[static_cast<int>(call)]; }
+};
+
+}  // namespace pycraft::kernels

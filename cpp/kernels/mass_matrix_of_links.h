@@ -1,0 +1,136 @@
+// The mass matrix on links: composite inertias R, tip to base, and with them the columns R h* of every coordinate outboard of a link. A link's
+// row of ℳ is its hinge's row times those columns:
+//
+//   (n; f)(k) = R(k) h(k)*,   ℳ(a, k) = h(a) (n; f)(k) for a from k to the base,   n <- n + l(a) × f
+//
+// in the base's axes, about the origin of a. Cost O(N · depth), nine products an entry.
+#pragma once
+
+#include "kernels/columns.h"
+#include "kernels/motions.h"
+
+namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET {
+
+template <class S>
+struct CompositeInertia {
+  S mass;
+  Vector3<S> moment;
+  Symmetric3<S> rotational;
+};
+template <class S>
+[[gnu::always_inline]] inline void add(CompositeInertia<S>& R, const CompositeInertia<S>& other) {
+  R.mass += other.mass, R.moment = R.moment + other.moment, R.rotational = R.rotational + other.rotational;
+}
+// About a point at -l.
+template <class S>
+[[gnu::always_inline]] inline void shift(const Vector3<S>& l, CompositeInertia<S>& R) {
+  const Vector3<S> g = R.moment + (S(0.5) * R.mass) * l;
+  const S d = S(2) * dot(l, g);
+  for (int i = 0; i < 3; ++i)
+    for (int j = i; j < 3; ++j) {
+      const S change = l[i] * g[j] + g[i] * l[j];
+      R.rotational(i, j) += i == j ? d - change : -change;
+    }
+  R.moment = R.moment + R.mass * l;
+}
+// A link's own, in the base's axes.
+template <class S>
+[[gnu::always_inline]] inline CompositeInertia<S> own_inertia(const LinkOf<S>& link, const Matrix3<S>& axes) {
+  CompositeInertia<S> R{S(link.mass), axes * spread<S>(link.moment), rotational_of<S>(link)};
+  Full<S>{axes}.turn_symmetric(R.rotational);
+  return R;
+}
+
+// A row of H in the base's axes.
+template <class S>
+struct HingeRow {
+  Vector3<S> angular, linear;
+};
+// Row i of a link's hinge.
+template <class Kind, class S>
+[[gnu::always_inline]] inline HingeRow<S> hinge_row(const LinkOf<S>& link, const Matrix3<S>& axes, int i) {
+  const Vector3<S> none = Vector3<S>::zero();
+  const int r = Kind::nv == 1 ? Kind::row : i % 3;
+  const Vector3<S> axis{axes(0, r), axes(1, r), axes(2, r)};
+  if constexpr (Kind::nv > 1) return i < 3 ? HingeRow<S>{axis, none} : HingeRow<S>{none, axis};
+  if constexpr (Kind::pin) return {S(link.sign) * axis, none};
+  return {S(link.sign) * S(link.turn) * axis, S(link.sign) * S(link.travel) * axis};
+}
+
+template <class S>
+struct MatrixWork {
+  Lying<S>* lying;
+  CompositeInertia<S>* branch;
+  S* columns;  // (6, nv)
+  template <class T>
+  static size_t size(const Links<T>& links) {
+    return links.count * (sizeof(Lying<S>) + sizeof(CompositeInertia<S>)) + size_t(6) * links.nv * sizeof(S);
+  }
+  template <class T>
+  MatrixWork(const Links<T>& links, T* work) {
+    lying = reinterpret_cast<Lying<S>*>(work);
+    branch = reinterpret_cast<CompositeInertia<S>*>(lying + links.count);
+    columns = reinterpret_cast<S*>(branch + links.count);
+  }
+};
+
+// Columns of a link's own coordinates, its rows of ℳ, and the columns moved to the parent's origin.
+template <class Kind, class S, class T>
+[[gnu::always_inline]] inline void give_rows(const Link<T>& link, const Lying<S>& lying, const CompositeInertia<S>& R, const Columns<S>& y, const States<T>& at, int N, double* out, size_t out_stride) {
+  const int count = link.end - link.v;
+  const bool pin = Kind::pin;
+  for (int i = 0; i < Kind::nv; ++i) {
+    const HingeRow<S> h = hinge_row<Kind>(link, lying.axes, i);
+    const Vector3<S> n = R.rotational * h.angular + cross(R.moment, h.linear), f = R.mass * h.linear - cross(R.moment, h.angular);
+    for (int r = 0; r < 3; ++r) y.n[r][i] = n[r], y.f[r][i] = f[r];
+  }
+  double* const rows = out + size_t(link.v) * N + link.v;
+  for (int i = 0; i < Kind::nv; ++i) {
+    const HingeRow<S> h = hinge_row<Kind>(link, lying.axes, i);
+    double* __restrict const row = rows + size_t(i) * N;
+    const bool last = i + 1 == Kind::nv;
+    const Vector3<S> l = last && link.parent >= 0 ? lying.arm : Vector3<S>::zero();
+    each_column<false>(y, 0, count, [&](int c, Vector3<S>& n, Vector3<S>& f) {
+      S x = dot(h.angular, n);
+      if (!pin) x += dot(h.linear, f);
+      n = n + cross(l, f);
+      if constexpr (S::width == 1)
+        row[c] = double(x.v);
+      else
+        scattered(x, row + c, out_stride, at.states);
+    });
+    for (int b = 0; b < S::width && b < at.states; ++b) {
+      double* const of_state = row + b * out_stride;
+      of_state[i] += double(link.J);
+      for (int c = count; c < N - link.v; ++c) of_state[c] = 0;
+    }
+  }
+}
+
+template <class S>
+unsigned mass_matrix(const Links<typename S::Scalar>& links, const States<typename S::Scalar>& at, double* out, size_t out_stride, typename S::Scalar* work) {
+  using T = typename S::Scalar;
+  const int N = links.nv;
+  const MatrixWork<S> w(links, work);
+  const CompositeInertia<S> nothing{S(0), Vector3<S>::zero(), Symmetric3<S>::zero()};
+  lie(links, at, w.lying);
+  for (int k = 0; k < links.count; ++k)
+    if (links.link[k].branches) w.branch[k] = nothing;
+  CompositeInertia<S> R = nothing;
+  for (int k = links.count - 1; k >= 0; --k) {
+    const Link<T>& link = links.link[k];
+    if (k + 1 == links.count || links.link[k + 1].parent != k) R = nothing;
+    if (link.branches) add(R, w.branch[k]);
+    add(R, own_inertia(link, w.lying[k].axes));
+    const Columns<S> y(w.columns, N, link.v);
+    with_step(link.step, [&](auto kind) { give_rows<decltype(kind)>(link, w.lying[k], R, y, at, N, out, out_stride); });
+    if (link.parent < 0) continue;
+    shift(w.lying[k].arm, R);
+    if (link.parent != k - 1) add(w.branch[link.parent], R);
+  }
+  unsigned sound = 0;
+  for (int b = 0; b < S::width && b < at.states; ++b) sound |= unsigned(mirror(out + b * out_stride, N)) << b;
+  return sound;
+}
+
+}  // namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET

@@ -1,0 +1,95 @@
+// Pivots of a hinge's inertia D = L d L*, and whether they stand out of what rounding may make of them: the estimate of
+// rigid/rigid_elimination.h, with bounds of what a hinge carries that hold at every configuration. With `most` the inertia that a coordinate
+// might feel if all masses outboard of it lay as far away as they can reach, and `own` what its row of P rounds at, from the tips inward
+//
+//   error(k)  = max over children + rounding · most/d,   growth(k) = max over children · max(1, own/d / 16)
+//
+// A state is sound where every d > faint · most, and at the roots 4 error growth < 1 and growth is below its bound. Else it is left in doubt:
+// the general recursion has an error sweep to decide it by.
+#pragma once
+
+#include "kernels/motions.h"
+
+namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET {
+
+// The most that a turn of the link about its origin can feel; `gone`: what sliders add to lengths.
+template <class S>
+[[gnu::always_inline]] inline S turned_inertia(const LinkOf<S>& link, const S& gone) {
+  const S furthest = S(link.furthest) + gone;
+  return S(4) * (S(link.carried_rotational) + S(link.carried_mass) * furthest * furthest);
+}
+// Of a hinge's one coordinate.
+template <class Kind, class S>
+[[gnu::always_inline]] inline S carried_inertia(const LinkOf<S>& link, const S& gone) {
+  const S turned = turned_inertia(link, gone), turn(link.turn), travel(link.travel);
+  if constexpr (Kind::pin)
+    return S(link.J) + turned;
+  else
+    return S(link.J) + turn * turn * turned + S(2) * travel * travel * S(link.carried_mass);
+}
+
+template <int n, class S>
+struct Factors {
+  S lower[n][n], inverse[n];  // L below its unit diagonal; 1/d
+
+  // Of a symmetric matrix, its lower triangle, of which coordinate i can feel carried[i] at most; which lanes are sound. P: of the link.
+  template <class T>
+  typename S::Bits factor(const S (&D)[n][n], const S (&carried)[n], const Links<T>& links, Inertia<S>& P) {
+    typename S::Bits sound = S::all();
+    S w[n][n];  // L⁻¹
+    S fresh(0), grown(1);
+    for (int j = 0; j < n; ++j) {
+      S scaled[n];  // row j of L times d
+      S pivot = D[j][j];
+      for (int i = 0; i < j; ++i) {
+        scaled[i] = D[j][i];
+        for (int a = 0; a < i; ++a) scaled[i] -= lower[i][a] * scaled[a];
+        lower[j][i] = scaled[i] * inverse[i];
+        pivot -= lower[j][i] * scaled[i];
+      }
+      S most = carried[j], own = D[j][j];
+      for (int i = 0; i < j; ++i) {
+        w[j][i] = -lower[j][i];
+        for (int a = i + 1; a < j; ++a) w[j][i] -= lower[j][a] * w[a][i];
+        most += w[j][i] * w[j][i] * carried[i], own += w[j][i] * w[j][i] * D[i][i];
+      }
+      const S terms{T(j + 1)};
+      sound = sound & greater(pivot, S(links.faint) * terms * most);
+      inverse[j] = S(1) / pivot;
+      fresh = larger(fresh, S(terms * most * inverse[j])), grown = larger(grown, S(terms * own * inverse[j]));
+    }
+    P.error += S(links.rounding) * fresh;
+    P.growth *= larger(S(1), S(S(T(0.0625)) * grown));
+    return sound;
+  }
+  void solve(S* x) const {
+    for (int i = 0; i < n; ++i)
+      for (int a = 0; a < i; ++a) x[i] -= lower[i][a] * x[a];
+    for (int i = 0; i < n; ++i) x[i] *= inverse[i];
+    for (int i = n - 1; i >= 0; --i)
+      for (int a = i + 1; a < n; ++a) x[i] -= lower[a][i] * x[a];
+  }
+};
+
+// Of a ball, whose D is A; of a free link, whose D is all of P.
+template <class S, class T>
+inline typename S::Bits factor_ball(Inertia<S>& P, const Link<T>& link, const S& gone, const Links<T>& links, Factors<3, S>& factors) {
+  const S turned = turned_inertia(link, gone), carried[3] = {turned, turned, turned};
+  S D[3][3];
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j <= i; ++j) D[i][j] = P.A(i, j);
+  return factors.factor(D, carried, links, P);
+}
+template <class S, class T>
+inline typename S::Bits factor_free(Inertia<S>& P, const Link<T>& link, const S& gone, const Links<T>& links, Factors<6, S>& factors) {
+  const S turned = turned_inertia(link, gone), moved = S(2) * S(link.carried_mass), carried[6] = {turned, turned, turned, moved, moved, moved};
+  S D[6][6];
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      if (j <= i) D[i][j] = P.A(i, j), D[3 + i][3 + j] = P.C(i, j);
+      D[3 + i][j] = P.B(j, i);
+    }
+  return factors.factor(D, carried, links, P);
+}
+
+}  // namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET

@@ -1,0 +1,44 @@
+"""Models with every kind of hinge where kernels of direct calls may meet it, states of them, and the calls."""
+
+import numpy as np
+
+import pycraft as pc
+
+KINDS = ["pin", "slider", "screw", "universal", "gimbal", "cylindrical", "planar", "ball", "free", "weld"]
+STATES = 7  # two packs of four and a remainder, or four of two, or one of eight
+
+
+def trees():
+    """Every kind of hinge at the base, in the middle of a branched tree and at a tip; a model without coordinates; welds kept."""
+    for kind in KINDS:
+        yield pc.tree([-1, 0, 1, 1, 0, 4], [kind, "pin", kind, "screw", "ball", kind], seed=3, name=f"tree of {kind}")
+    yield pc.tree([-1, 0, 1, 2], ["pin", "weld", "weld", "slider"], seed=4, welds="keep", name="welds kept")
+    yield pc.tree([-1, 0], ["weld", "weld"], seed=5, name="welds only")
+    rotors = pc.tree([-1, 0, 1, 0], ["pin", "slider", "pin", "screw"], seed=6, name="rotors")
+    for name in rotors.hinges:
+        rotors.hinges[name].rotor_inertia = 0.7
+    yield rotors
+    yield pc.chain(30, seed=1)
+    yield pc.robots.panda()
+    yield pc.robots.g1()
+
+
+MODELS = {model.name: model for model in trees()}
+
+
+def states(model, count=STATES):
+    drawn = [model.random_state(seed) for seed in range(count)]
+    rng = np.random.default_rng(7)
+    Q, V = (np.array([getattr(s, name) for s in drawn]) for name in "qv")
+    return Q, V, rng.uniform(-1, 1, (count, model.nv))
+
+
+def calls(model, Q, V, U, **how):
+    """Every call that kernels have."""
+    return {
+        "forward_dynamics": model.forward_dynamics(Q, V, U, **how),
+        "inverse_dynamics": model.inverse_dynamics(Q, V, U, **how),
+        "bias_forces": model.bias_forces(Q, V, **how),
+        "mass_matrix": model.mass_matrix(Q, **how),
+        "mass_matrix_inverse": model.mass_matrix_inverse(Q, **how),
+    }
