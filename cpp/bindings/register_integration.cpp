@@ -2,8 +2,8 @@
 #include <chrono>
 
 #include "bindings/direct_calls.h"
-#include "dynamics/rigid_dynamics.h"
 #include "model/configuration.h"
+#include "simulation/accelerations.h"
 #include "simulation/trajectory.h"
 
 namespace pycraft {
@@ -23,13 +23,6 @@ namespace {
 
 using Integration = Batches<ConfigurationRates>;
 
-// Forward dynamics as the trajectory asks for it.
-template <class S>
-Accelerations<S> accelerations(const Multibody& model, const Solving& how) {
-  auto workspace = std::make_shared<RigidDynamics<S>>(model);
-  return [workspace, how](const S* q, const S* v, const S* tau, S* vdot) { workspace->forward_dynamics(q, v, tau, vdot, how); };
-}
-
 // One state's numbers, or zeros for None.
 std::vector<double> vector_of(const Multibody& mb, const py::object& given, const char* what) {
   if (given.is_none()) return std::vector<double>(mb.nv(), 0.0);
@@ -43,7 +36,7 @@ py::dict trajectory(const Multibody& mb, const std::vector<double>& q, const std
                     const std::vector<double>& tau, const std::vector<double>& damping, const TrajectoryOptions& options, const Solving& how) {
   const int nq = mb.nq(), nv = mb.nv();
   const auto model = mb.compiled<S>();
-  const Accelerations<S> function = accelerations<S>(mb, how);
+  const Accelerations<S> function = accelerations_of<S>(mb, how);
   const auto wide = [](const std::vector<double>& x) { return std::vector<S>(x.begin(), x.end()); };
   const std::vector<S> q0 = wide(q), v0 = wide(v), force = wide(tau), friction = wide(damping);
   const auto count = static_cast<py::ssize_t>(times.size());

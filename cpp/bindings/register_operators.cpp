@@ -12,6 +12,7 @@
 #include "bindings/bindings.h"
 #include "operators/multibody_operators.h"
 #include "runtime/errors.h"
+#include "runtime/interrupt.h"
 
 namespace pycraft {
 
@@ -47,11 +48,13 @@ void with_remedy(const Expression& e, F f) {
 // y = e x
 py::object apply_to_array(Expression e, const py::object& given) {
   const Array x = real_array(given);
-  const int batch = e.floating() ? -1 : batch_of(e);
-  if (e.floating()) {
+  const bool floating = e.floating();
+  if (floating) {
     if (x.ndim() < 1 || x.ndim() > 2) throw EvaluationError("I is applied to an array (n,) or (n, m)");
     e = with_space(e, Space::euclidean(static_cast<int>(x.shape(0))));
   }
+  auto plan = prepare(e, Request::apply);
+  const int batch = floating ? -1 : plan->plan().batch;
   const py::ssize_t n = e.domain().dimension();
   const auto refuse = [&]() {
     std::string shape = "(";
@@ -78,7 +81,12 @@ py::object apply_to_array(Expression e, const py::object& given) {
   Result r;
   {
     ReleasedGil release;
-    with_remedy(e, [&] { apply(e, inputs, r); });
+    with_remedy(e, [&] {
+      while (!plan->run(inputs, false, r)) {  // the model changed since the plan was made
+        check_interrupt();
+        plan = prepare(e, Request::apply);
+      }
+    });
   }
   std::vector<py::ssize_t> shape;
   if (batch >= 0) shape.push_back(batch);

@@ -30,19 +30,6 @@ template <class Kind, class S, class T>
   }
 }
 
-template <class S, class T>
-inline void lie(const Links<T>& links, const States<T>& at, Lying<S>* out) {
-  for (int k = 0; k < links.count; ++k) {
-    const Link<T>& link = links.link[k];
-    const Lying<S>* const above = link.parent < 0 ? nullptr : out + link.parent;
-    with_step(link.step, [&](auto kind) {
-      using Kind = decltype(kind);
-      Place<S> place;
-      place_link<Kind>(link, at, place);
-      lie_in<Kind>(link, above, place, out[k]);
-    });
-  }
-}
 template <class S>
 struct Columns {
   S *n[3], *f[3];

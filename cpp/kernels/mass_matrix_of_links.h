@@ -3,7 +3,7 @@
 //
 //   (n; f)(k) = R(k) h(k)*,   ℳ(a, k) = h(a) (n; f)(k) for a from k to the base,   n <- n + l(a) × f
 //
-// in the base's axes, about the origin of a. Cost O(N · depth), nine products an entry.
+// columns in the base's axes about the origin of a, inertias in the links' own. Cost O(N · depth), nine products an entry.
 #pragma once
 
 #include "kernels/columns.h"
@@ -21,24 +21,18 @@ template <class S>
 [[gnu::always_inline]] inline void add(CompositeInertia<S>& R, const CompositeInertia<S>& other) {
   R.mass += other.mass, R.moment = R.moment + other.moment, R.rotational = R.rotational + other.rotational;
 }
-// About a point at -l.
-template <class S>
-[[gnu::always_inline]] inline void shift(const Vector3<S>& l, CompositeInertia<S>& R) {
-  const Vector3<S> g = R.moment + (S(0.5) * R.mass) * l;
+// About the parent's origin, which lies at -l, in its axes.
+template <class Rotation, class S>
+[[gnu::always_inline]] inline void to_parent(const Rotation& rotation, const Vector3<S>& l, CompositeInertia<S>& R) {
+  rotation.turn_symmetric(R.rotational);
+  const Vector3<S> h = rotation.to_parent(R.moment), g = h + (S(0.5) * R.mass) * l;
   const S d = S(2) * dot(l, g);
   for (int i = 0; i < 3; ++i)
     for (int j = i; j < 3; ++j) {
       const S change = l[i] * g[j] + g[i] * l[j];
       R.rotational(i, j) += i == j ? d - change : -change;
     }
-  R.moment = R.moment + R.mass * l;
-}
-// A link's own, in the base's axes.
-template <class S>
-[[gnu::always_inline]] inline CompositeInertia<S> own_inertia(const LinkOf<S>& link, const Matrix3<S>& axes) {
-  CompositeInertia<S> R{S(link.mass), axes * spread<S>(link.moment), rotational_of<S>(link)};
-  Full<S>{axes}.turn_symmetric(R.rotational);
-  return R;
+  R.moment = h + R.mass * l;
 }
 
 // A row of H in the base's axes.
@@ -46,7 +40,18 @@ template <class S>
 struct HingeRow {
   Vector3<S> angular, linear;
 };
-// Row i of a link's hinge.
+// Row i of a link's hinge in the link's axes, and in the base's.
+template <class Kind, class S>
+[[gnu::always_inline]] inline HingeRow<S> own_row(const LinkOf<S>& link, int i) {
+  HingeRow<S> h{Vector3<S>::zero(), Vector3<S>::zero()};
+  if constexpr (Kind::nv > 1) {
+    (i < 3 ? h.angular : h.linear)[i % 3] = S(1);
+  } else {
+    h.angular[Kind::row] = S(link.sign) * S(link.turn);
+    if constexpr (!Kind::pin) h.linear[Kind::row] = S(link.sign) * S(link.travel);
+  }
+  return h;
+}
 template <class Kind, class S>
 [[gnu::always_inline]] inline HingeRow<S> hinge_row(const LinkOf<S>& link, const Matrix3<S>& axes, int i) {
   const Vector3<S> none = Vector3<S>::zero();
@@ -60,28 +65,30 @@ template <class Kind, class S>
 template <class S>
 struct MatrixWork {
   Lying<S>* lying;
+  Place<S>* place;
   CompositeInertia<S>* branch;
   S* columns;  // (6, nv)
   template <class T>
   static size_t size(const Links<T>& links) {
-    return links.count * (sizeof(Lying<S>) + sizeof(CompositeInertia<S>)) + size_t(6) * links.nv * sizeof(S);
+    return links.count * (sizeof(Lying<S>) + sizeof(Place<S>) + sizeof(CompositeInertia<S>)) + size_t(6) * links.nv * sizeof(S);
   }
   template <class T>
   MatrixWork(const Links<T>& links, T* work) {
     lying = reinterpret_cast<Lying<S>*>(work);
-    branch = reinterpret_cast<CompositeInertia<S>*>(lying + links.count);
+    place = reinterpret_cast<Place<S>*>(lying + links.count);
+    branch = reinterpret_cast<CompositeInertia<S>*>(place + links.count);
     columns = reinterpret_cast<S*>(branch + links.count);
   }
 };
 
-// Columns of a link's own coordinates, its rows of ℳ, and the columns moved to the parent's origin.
+// Columns of a link's own coordinates, its rows of ℳ, and the columns moved to the parent's origin. R in the link's axes.
 template <class Kind, class S, class T>
 [[gnu::always_inline]] inline void give_rows(const Link<T>& link, const Lying<S>& lying, const CompositeInertia<S>& R, const Columns<S>& y, const States<T>& at, int N, double* out, size_t out_stride) {
   const int count = link.end - link.v;
   const bool pin = Kind::pin;
   for (int i = 0; i < Kind::nv; ++i) {
-    const HingeRow<S> h = hinge_row<Kind>(link, lying.axes, i);
-    const Vector3<S> n = R.rotational * h.angular + cross(R.moment, h.linear), f = R.mass * h.linear - cross(R.moment, h.angular);
+    const HingeRow<S> h = own_row<Kind, S>(link, i);
+    const Vector3<S> n = lying.axes * (R.rotational * h.angular + cross(R.moment, h.linear)), f = lying.axes * (R.mass * h.linear - cross(R.moment, h.angular));
     for (int r = 0; r < 3; ++r) y.n[r][i] = n[r], y.f[r][i] = f[r];
   }
   double* const rows = out + size_t(link.v) * N + link.v;
@@ -113,20 +120,27 @@ unsigned mass_matrix(const Links<typename S::Scalar>& links, const States<typena
   const int N = links.nv;
   const MatrixWork<S> w(links, work);
   const CompositeInertia<S> nothing{S(0), Vector3<S>::zero(), Symmetric3<S>::zero()};
-  lie(links, at, w.lying);
-  for (int k = 0; k < links.count; ++k)
-    if (links.link[k].branches) w.branch[k] = nothing;
+  for (int k = 0; k < links.count; ++k) {
+    const Link<T>& link = links.link[k];
+    with_step(link.step, [&](auto kind) {
+      place_link<decltype(kind)>(link, at, w.place[k]);
+      lie_in<decltype(kind)>(link, link.parent < 0 ? nullptr : w.lying + link.parent, w.place[k], w.lying[k]);
+    });
+    if (link.branches) w.branch[k] = nothing;
+  }
   CompositeInertia<S> R = nothing;
   for (int k = links.count - 1; k >= 0; --k) {
     const Link<T>& link = links.link[k];
     if (k + 1 == links.count || links.link[k + 1].parent != k) R = nothing;
     if (link.branches) add(R, w.branch[k]);
-    add(R, own_inertia(link, w.lying[k].axes));
+    add(R, CompositeInertia<S>{S(link.mass), spread<S>(link.moment), rotational_of<S>(link)});
     const Columns<S> y(w.columns, N, link.v);
-    with_step(link.step, [&](auto kind) { give_rows<decltype(kind)>(link, w.lying[k], R, y, at, N, out, out_stride); });
-    if (link.parent < 0) continue;
-    shift(w.lying[k].arm, R);
-    if (link.parent != k - 1) add(w.branch[link.parent], R);
+    with_step(link.step, [&](auto kind) {
+      using Kind = decltype(kind);
+      give_rows<Kind>(link, w.lying[k], R, y, at, N, out, out_stride);
+      if (link.parent >= 0) to_parent(Kind::rotation(w.place[k]), Kind::arm(link, w.place[k]), R);
+    });
+    if (link.parent >= 0 && link.parent != k - 1) add(w.branch[link.parent], R);
   }
   unsigned sound = 0;
   for (int b = 0; b < S::width && b < at.states; ++b) sound |= unsigned(mirror(out + b * out_stride, N)) << b;

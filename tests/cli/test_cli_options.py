@@ -58,6 +58,7 @@ AFTER = {
     "check": {"json", "full"},
     "accuracy": {"error", "csv", "json", "plot"},  # also test_cli.py
     "stability": {"output", "csv", "json"},
+    "bench": {"peers", "quick", "json", "plot", "page"},  # test_speed.py
     "peers": {"output"},  # test_peers.py: `make test-peers`
 }
 
