@@ -7,7 +7,7 @@ import fractions
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Binding', 'Dynamics', 'Error', 'EvaluationError', 'GroupedOperators', 'HingeKind', 'Integration', 'Letter', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'Scalar', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'blockdiag', 'checked_refinement', 'constant', 'direct_call', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'hinge_kinds', 'identity', 'instruction_set', 'instruction_sets', 'integrators', 'methods', 'operators_of', 'precisions', 'prepared_call', 'real_array', 'residual', 'scalar', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_dynamics', 'time_forward', 'time_method', 'time_packs', 'vector', 'wider', 'zero']
+__all__: list[str] = ['Binding', 'Dynamics', 'Error', 'EvaluationError', 'GroupedOperators', 'HingeKind', 'Integration', 'Letter', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'Scalar', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'blockdiag', 'checked_refinement', 'constant', 'direct_call', 'direct_calls', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'hinge_kinds', 'identity', 'instruction_set', 'instruction_sets', 'integrators', 'methods', 'operators_of', 'precisions', 'prepared_call', 'real_array', 'residual', 'scalar', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_dynamics', 'time_forward', 'time_method', 'time_packs', 'vector', 'wider', 'zero']
 
 class Error(Exception): ...
 class SpaceError(Error, TypeError): ...
@@ -1013,6 +1013,10 @@ def direct_call(function: collections.abc.Callable) -> typing.Any:
     """
     The direct call of this name: its plain case in the core, everything else by the function.
     """
+def direct_calls() -> dict[str, tuple[tuple[str, ...], tuple[str, ...]]]:
+    """
+    By name: the arrays of each direct call, and the options that it is prepared with.
+    """
 def epsilons() -> dict:
     """
     Epsilon of each precision by name.
@@ -1057,7 +1061,7 @@ def precisions() -> list[str | int]:
     """
     The precisions, from narrow to wide.
     """
-def prepared_call(function: typing.Any, name: str, dynamics: typing.Any, batch: typing.Any, frame: str, form: str, refine: typing.Any, residual: str, precision: str | int, on_singular: str) -> typing.Any:
+def prepared_call(function: typing.Any, name: str, dynamics: typing.Any, batch: typing.SupportsInt | typing.SupportsIndex | None, *, frame: str = '', form: str = 'fast', refine: typing.Any = 0, residual: str = 'same', precision: str | int = 'double', on_singular: str = 'raise') -> typing.Any:
     """
     A direct call of one model with its options, as `prepare` gives it.
     """

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,7 +23,13 @@ struct Argument {
 inline Argument argument(const py::object& given, const char* name, const Multibody& model) {
   const bool of_q = name == std::string("q"), of_state = of_q || name == std::string("v");
   Argument a{name, numbers(of_state ? part_of_state(given, name) : given, name)};
-  if (a.array.ndim() < 1 || a.array.ndim() > 2) throw_width(model, name, of_q ? model.nq() : model.nv());
+  const int width = of_q ? model.nq() : model.nv();
+  const py::ssize_t axes = a.array.ndim();
+  if (axes < 1 || axes > 2 || a.array.shape(axes - 1) != width) throw_width(model, name, width);
+  constexpr int most = std::numeric_limits<int>::max();  // the core counts states by int
+  if (axes == 2 && a.array.shape(0) > most)
+    throw ModelError(std::string(name) + " of '" + model.name() + "' has " + std::to_string(a.array.shape(0)) + " states; one call takes at most " +
+                     std::to_string(most) + ": give them in parts");
   return a;
 }
 
@@ -31,7 +38,6 @@ struct Arguments {
   std::vector<Argument> held;
   Arguments(const Multibody& model, const std::vector<std::pair<const char*, py::object>>& all) {
     for (const auto& [name, object] : all) held.push_back(argument(object, name, model));
-    check_widths(model, given());
     batch = common_batch(given());
   }
   std::vector<Given> given() const {

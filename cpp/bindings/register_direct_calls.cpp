@@ -1,9 +1,13 @@
 // The plain case of a direct call: contiguous float64 arrays at their places, options by name. It takes CPython's own way of calling
 // (PEP 590) to the core, without pybind11's dispatcher and without a Python function between. Whatever else is given (lists, a State,
 // nothing for the present state, another method) goes to the Python function of that name, which knows it all and says what is wrong.
+#include <array>
 #include <cstddef>
+#include <limits>
 #include <memory>
 #include <optional>
+
+#include <pybind11/typing.h>
 
 #include "bindings/direct_calls.h"
 #include "dynamics/batch_dynamics.h"
@@ -16,34 +20,66 @@ namespace {
 struct Options {
   Solving how;
   Precision precision = Precision::double_;
-  const Node* node = nullptr;  // of what is asked of a frame
 };
 
-// A direct call: the arrays that it is given, the result of one state, and the core's function.
+// A call as it came, as far as it is plain.
+struct Asked {
+  BatchDynamics* dynamics = nullptr;
+  Options options;
+  Node node;                   // of what is asked of a frame
+  std::array<Given, 3> given;
+  int states = -1;             // one
+  PyObject* out = nullptr;     // a new array
+};
+
+// What a call takes besides arrays.
+enum Takes : unsigned { takes_frame = 1, takes_solving = 2, takes_precision = 4, takes_method = 8 };
+
+// The axes of the result of one state: how many, and how long.
+struct Axes {
+  int count;
+  std::array<int, 2> lengths;
+};
+constexpr int coordinates = -1;  // the length nv of the model
+
 struct DirectCall {
   const char* name;
-  std::array<const char*, 3> arrays;
-  int given;
-  bool of_frame, solves;  // the frame comes first; takes a form and a refinement
-  std::array<int, 2> (*shape)(int nv);  // a vector: {0, n}
-  void (*compute)(BatchDynamics& d, const Given* in, const Options& options, double* out);
+  std::array<const char*, 3> arrays;  // null after the last
+  unsigned takes;
+  Axes result;
+  void (*compute)(const Asked& a, double* out);
+
+  int given() const { return static_cast<int>(std::find(arrays.begin(), arrays.end(), nullptr) - arrays.begin()); }
+  // Those of a prepared call. The method is none of them: what stands here is the articulated one.
+  std::vector<const char*> options() const {
+    std::vector<const char*> names;
+    if (takes & takes_frame) names = {"frame"};
+    if (takes & takes_solving) names.insert(names.end(), {"form", "refine", "residual", "on_singular"});
+    if (takes & takes_precision) names.push_back("precision");
+    return names;
+  }
 };
 
 constexpr DirectCall direct_calls[] = {
-    {"forward_dynamics", {"q", "v", "tau"}, 3, false, true, [](int nv) { return std::array{0, nv}; },
-     [](BatchDynamics& d, const Given* in, const Options& o, double* out) { d.forward_dynamics(in[0], in[1], in[2], o.how, o.precision, out); }},
-    {"inverse_dynamics", {"q", "v", "vdot"}, 3, false, false, [](int nv) { return std::array{0, nv}; },
-     [](BatchDynamics& d, const Given* in, const Options& o, double* out) { d.inverse_dynamics(in[0], in[1], &in[2], o.precision, out); }},
-    {"bias_forces", {"q", "v"}, 2, false, false, [](int nv) { return std::array{0, nv}; },
-     [](BatchDynamics& d, const Given* in, const Options& o, double* out) { d.inverse_dynamics(in[0], in[1], nullptr, o.precision, out); }},
-    {"mass_matrix", {"q"}, 1, false, false, [](int nv) { return std::array{nv, nv}; },
-     [](BatchDynamics& d, const Given* in, const Options& o, double* out) { d.mass_matrix(in[0], o.precision, out); }},
-    {"mass_matrix_inverse", {"q"}, 1, false, true, [](int nv) { return std::array{nv, nv}; },
-     [](BatchDynamics& d, const Given* in, const Options& o, double* out) { d.mass_matrix_inverse(in[0], o.how, o.precision, out); }},
-    {"jacobian", {"q"}, 1, true, false, [](int nv) { return std::array{6, nv}; },
-     [](BatchDynamics& d, const Given* in, const Options& o, double* out) { d.jacobian(*o.node, in[0], o.precision, out); }},
-    {"pose", {"q"}, 1, true, false, [](int) { return std::array{4, 4}; },
-     [](BatchDynamics& d, const Given* in, const Options& o, double* out) { d.pose(*o.node, in[0], out); }},
+    {"forward_dynamics", {"q", "v", "tau"}, takes_solving | takes_precision | takes_method, {1, {coordinates}}, [](const Asked& a, double* out) {
+       a.dynamics->forward_dynamics(a.given[0], a.given[1], a.given[2], a.options.how, a.options.precision, out);
+     }},
+    {"inverse_dynamics", {"q", "v", "vdot"}, takes_precision, {1, {coordinates}}, [](const Asked& a, double* out) {
+       a.dynamics->inverse_dynamics(a.given[0], a.given[1], &a.given[2], a.options.precision, out);
+     }},
+    {"bias_forces", {"q", "v"}, takes_precision, {1, {coordinates}}, [](const Asked& a, double* out) {
+       a.dynamics->inverse_dynamics(a.given[0], a.given[1], nullptr, a.options.precision, out);
+     }},
+    {"mass_matrix", {"q"}, takes_precision, {2, {coordinates, coordinates}}, [](const Asked& a, double* out) {
+       a.dynamics->mass_matrix(a.given[0], a.options.precision, out);
+     }},
+    {"mass_matrix_inverse", {"q"}, takes_solving | takes_precision, {2, {coordinates, coordinates}}, [](const Asked& a, double* out) {
+       a.dynamics->mass_matrix_inverse(a.given[0], a.options.how, a.options.precision, out);
+     }},
+    {"jacobian", {"q"}, takes_frame | takes_precision, {2, {6, coordinates}}, [](const Asked& a, double* out) {
+       a.dynamics->jacobian(a.node, a.given[0], a.options.precision, out);
+     }},
+    {"pose", {"q"}, takes_frame, {2, {4, 4}}, [](const Asked& a, double* out) { a.dynamics->pose(a.node, a.given[0], out); }},
 };
 
 const DirectCall& direct_call(const std::string& name) {
@@ -66,19 +102,28 @@ PyObject* float64() {
 
 struct Plain {
   double* data;
-  int ndim, width;
-  py::ssize_t states;  // -1: one
-  const py::ssize_t* shape;
+  int axes;  // one at least
+  const py::ssize_t* lengths;
+  bool writeable;
 };
 
 // An ndarray itself, aligned, C-ordered, float64 in the machine's byte order; else nothing.
 std::optional<Plain> plain(PyObject* given) {
-  auto& numpy = py::detail::npy_api::get();
-  if (Py_TYPE(given) != numpy.PyArray_Type_) return std::nullopt;
+  using Api = py::detail::npy_api;
+  if (Py_TYPE(given) != Api::get().PyArray_Type_) return std::nullopt;
   const Proxy* a = py::detail::array_proxy(given);
-  constexpr int wanted = py::detail::npy_api::NPY_ARRAY_ALIGNED_ | py::detail::npy_api::NPY_ARRAY_C_CONTIGUOUS_;
+  constexpr int wanted = Api::NPY_ARRAY_ALIGNED_ | Api::NPY_ARRAY_C_CONTIGUOUS_;
   if (a->descr != float64() || (a->flags & wanted) != wanted || a->nd < 1) return std::nullopt;
-  return Plain{reinterpret_cast<double*>(a->data), a->nd, static_cast<int>(a->dimensions[a->nd - 1]), a->nd == 2 ? a->dimensions[0] : -1, a->dimensions};
+  return Plain{reinterpret_cast<double*>(a->data), a->nd, a->dimensions, (a->flags & Api::NPY_ARRAY_WRITEABLE_) != 0};
+}
+
+// An argument of `width` numbers a state. Nothing also where an int, as the core counts by, does not hold the states.
+std::optional<Given> plain_argument(PyObject* object, const char* name, int width) {
+  const auto a = plain(object);
+  if (!a || a->axes > 2 || a->lengths[a->axes - 1] != width) return std::nullopt;
+  const py::ssize_t states = a->axes == 2 ? a->lengths[0] : -1;
+  if (states > std::numeric_limits<int>::max()) return std::nullopt;
+  return Given{name, a->data, width, static_cast<int>(states)};
 }
 
 PyObject* new_array(int ndim, py::ssize_t* shape) {
@@ -98,9 +143,10 @@ struct Callable {
   PyObject* dynamics;      // prepared: of one model; else that of the model that comes first
   const DirectCall* call;
   Options options;         // of calls that are not prepared: the defaults
-  std::string frame;       // prepared: whose Jacobian or pose
-  py::ssize_t states;      // prepared: a batch of so many, -1: one state; else -2: any
+  PyObject* frame;         // prepared: whose Jacobian or pose; else null
+  int states;              // prepared: a batch of so many, -1: one state; else -2: any
 };
+static_assert(std::is_trivially_copyable_v<Options>);  // Python makes it and lets it go, without constructor and destructor
 
 // Bodies times states below which the GIL is kept: letting it go and taking it again would cost more than it gives to others.
 constexpr py::ssize_t kept = 64;
@@ -117,14 +163,15 @@ BatchDynamics* dynamics_of(PyObject* model) {
 
 bool named(PyObject* text, const char* ascii) { return PyUnicode_CompareWithASCIIString(text, ascii) == 0; }
 
-// An option of a call that was not prepared, by its commonest values; false: by others.
+// An option of a call that was not prepared, by its commonest values; false: another option, or by others.
 bool takes(const DirectCall& call, Options& options, PyObject* name, PyObject* value) {
-  if (named(name, "precision")) return PyUnicode_Check(value) && named(value, "double");
-  if (!call.solves) return false;
+  const auto is = [&](const char* text) { return PyUnicode_Check(value) && named(value, text); };
+  if (named(name, "precision")) return call.takes & takes_precision && is("double");
+  if (named(name, "method")) return call.takes & takes_method && is("articulated");
+  if (!(call.takes & takes_solving)) return false;
   if (named(name, "form")) {
-    if (!PyUnicode_Check(value)) return false;
     for (const auto& [form, text] : {std::pair{Form::fast, "fast"}, std::pair{Form::ud, "ud"}, std::pair{Form::square_root, "square-root"}})
-      if (named(value, text)) {
+      if (is(text)) {
         options.how.form = form;
         return true;
       }
@@ -134,98 +181,105 @@ bool takes(const DirectCall& call, Options& options, PyObject* name, PyObject* v
     int beyond;
     return PyLong_CheckExact(value) && PyLong_AsLongAndOverflow(value, &beyond) == 0 && !beyond;
   }
-  return PyUnicode_Check(value) && ((named(name, "residual") && named(value, "same")) || (named(name, "on_singular") && named(value, "raise")) ||
-                                    (named(name, "method") && named(value, "articulated") && call.given == 3));
+  return (named(name, "residual") && is("same")) || (named(name, "on_singular") && is("raise"));
+}
+
+// What follows the arrays.
+bool take_options(const Callable& c, Asked& asked, PyObject* const* values, PyObject* names) {
+  const py::ssize_t count = names ? PyTuple_GET_SIZE(names) : 0;
+  for (py::ssize_t i = 0; i < count; ++i) {
+    PyObject* const name = PyTuple_GET_ITEM(names, i);
+    if (named(name, "out"))
+      asked.out = values[i] == Py_None ? nullptr : values[i];
+    else if (c.dynamics || !takes(*c.call, asked.options, name, values[i]))
+      return false;
+  }
+  return true;
+}
+
+bool take_frame(Asked& asked, PyObject* name) {
+  if (!PyUnicode_Check(name)) return false;
+  py::ssize_t length;
+  const char* const text = PyUnicode_AsUTF8AndSize(name, &length);
+  if (!text) throw py::error_already_set();
+  const Multibody& model = asked.dynamics->model();
+  asked.node = model.node(model.node_index(std::string(text, length)));
+  return true;
+}
+
+// One state stands for all of a batch.
+bool take_arrays(const DirectCall& call, Asked& asked, PyObject* const* arrays) {
+  const Multibody& model = asked.dynamics->model();
+  const int nq = model.nq(), nv = model.nv(), count = call.given();
+  for (int i = 0; i < count; ++i) {
+    const auto given = plain_argument(arrays[i], call.arrays[i], i == 0 ? nq : nv);
+    if (!given) return false;
+    if (given->batch >= 0) {
+      if (asked.states >= 0 && asked.states != given->batch) return false;
+      asked.states = given->batch;
+    }
+    asked.given[i] = *given;
+  }
+  return true;
+}
+
+// The array that is written to: a new one, or out=. Nothing where out= does not fit or lies in the memory of an argument.
+py::object result_of(const DirectCall& call, const Asked& asked) {
+  py::ssize_t lengths[3], size = 1;
+  int axes = 0;
+  if (asked.states >= 0) lengths[axes++] = asked.states;
+  for (int i = 0; i < call.result.count; ++i) {
+    const int length = call.result.lengths[i];
+    lengths[axes++] = length == coordinates ? asked.dynamics->model().nv() : length;
+  }
+  if (!asked.out) {
+    PyObject* const made = new_array(axes, lengths);
+    if (!made) throw py::error_already_set();
+    return py::reinterpret_steal<py::object>(made);
+  }
+  const auto out = plain(asked.out);
+  if (!out || !out->writeable || out->axes != axes || !std::equal(lengths, lengths + axes, out->lengths)) return py::object();
+  for (int i = 0; i < axes; ++i) size *= lengths[i];
+  for (int i = 0; i < call.given(); ++i) {
+    const Given& given = asked.given[i];
+    if (overlap(out->data, size, given.data, size_t(given.width) * std::max(given.batch, 1))) return py::object();
+  }
+  return py::reinterpret_borrow<py::object>(asked.out);
 }
 
 // The result; nothing where something is not plain.
-PyObject* computed(const Callable& c, PyObject* const* args, py::ssize_t count, PyObject* names) {
-  BatchDynamics* d;
+py::object computed(const Callable& c, PyObject* const* args, py::ssize_t count, PyObject* names) {
+  const DirectCall& call = *c.call;
+  Asked asked;
+  asked.options = c.options;
   if (c.dynamics) {
-    d = py::cast<BatchDynamics*>(py::handle(c.dynamics));
+    asked.dynamics = py::cast<BatchDynamics*>(py::handle(c.dynamics));
   } else {
-    if (count == 0 || !(d = dynamics_of(args[0]))) return nullptr;
+    if (count == 0 || !(asked.dynamics = dynamics_of(args[0]))) return py::object();
     ++args, --count;
   }
-  const DirectCall& call = *c.call;
-  Options options = c.options;
-  PyObject* out = nullptr;
-  const py::ssize_t keywords = names ? PyTuple_GET_SIZE(names) : 0;
-  if (count != call.given + (call.of_frame && !c.dynamics)) return nullptr;
-  for (py::ssize_t i = 0; i < keywords; ++i) {
-    PyObject *const name = PyTuple_GET_ITEM(names, i), *const value = args[count + i];
-    if (named(name, "out")) {
-      out = value == Py_None ? nullptr : value;
-    } else if (c.dynamics || !takes(call, options, name, value)) {
-      return nullptr;
-    }
-  }
-  const Multibody& model = d->model();
-  Node node;
-  if (call.of_frame) {
-    std::string frame = c.frame;
-    if (!c.dynamics) {
-      if (!PyUnicode_CheckExact(args[0])) return nullptr;
-      py::ssize_t length;
-      const char* const text = PyUnicode_AsUTF8AndSize(args[0], &length);
-      if (!text) return nullptr;
-      frame.assign(text, length);
-      ++args;
-    }
-    node = model.node(model.node_index(frame));
-    options.node = &node;
-  }
-  Given given[3];
-  py::ssize_t states = -1;
-  for (int i = 0; i < call.given; ++i) {
-    const auto a = plain(args[i]);
-    if (!a || a->ndim > 2 || a->width != (i == 0 ? model.nq() : model.nv())) return nullptr;
-    if (a->states >= 0) {
-      if (states >= 0 && states != a->states) return nullptr;
-      states = a->states;
-    }
-    given[i] = {call.arrays[i], a->data, a->width, static_cast<int>(a->states)};
-  }
-  if (c.states != -2 && c.states != states) return nullptr;
-  py::ssize_t shape[3];
-  int ndim = 0;
-  if (states >= 0) shape[ndim++] = states;
-  const auto [rows, columns] = call.shape(model.nv());
-  if (rows > 0) shape[ndim++] = rows;
-  if (call.shape(1)[0] > 0 && rows == 0) return nullptr;  // a matrix of no rows
-  shape[ndim++] = columns;
-  PyObject* result;
-  double* target;
-  if (out) {
-    const auto a = plain(out);
-    if (!a || a->ndim != ndim || !std::equal(shape, shape + ndim, a->shape) || !(py::detail::array_proxy(out)->flags & py::detail::npy_api::NPY_ARRAY_WRITEABLE_)) return nullptr;
-    target = a->data;
-    size_t size = 1;
-    for (int i = 0; i < ndim; ++i) size *= shape[i];
-    for (int i = 0; i < call.given; ++i)
-      if (overlap(target, size, given[i].data, size_t(given[i].width) * std::max(given[i].batch, 1))) return nullptr;
-    Py_INCREF(out);
-    result = out;
-  } else {
-    result = new_array(ndim, shape);
-    if (!result) throw py::error_already_set();
-    target = reinterpret_cast<double*>(py::detail::array_proxy(result)->data);
-  }
-  const py::object owned = py::reinterpret_steal<py::object>(result);
-  if (model.bodies() * std::max<py::ssize_t>(states, 1) <= kept) {
-    call.compute(*d, given, options, target);
+  const bool of_frame = call.takes & takes_frame, frame_first = of_frame && !c.dynamics;
+  if (count != call.given() + frame_first || !take_options(c, asked, args + count, names)) return py::object();
+  if (of_frame && !take_frame(asked, frame_first ? args[0] : c.frame)) return py::object();
+  if (!take_arrays(call, asked, args + frame_first)) return py::object();
+  if (c.states != -2 && c.states != asked.states) return py::object();
+  py::object result = result_of(call, asked);
+  if (!result) return result;
+  auto* const target = reinterpret_cast<double*>(py::detail::array_proxy(result.ptr())->data);
+  const Multibody& model = asked.dynamics->model();
+  if (py::ssize_t(model.bodies()) * std::max(asked.states, 1) <= kept) {
+    call.compute(asked, target);
   } else {
     const Undisturbed undisturbed(model);
-    call.compute(*d, given, options, target);
+    call.compute(asked, target);
   }
-  return py::object(owned).release().ptr();
+  return result;
 }
 
 PyObject* called(PyObject* self, PyObject* const* args, size_t flags, PyObject* names) {
   const auto& c = *reinterpret_cast<Callable*>(self);
   try {
-    if (PyObject* result = computed(c, args, PyVectorcall_NARGS(flags), names)) return result;
-    if (PyErr_Occurred()) return nullptr;
+    if (py::object result = computed(c, args, PyVectorcall_NARGS(flags), names)) return result.release().ptr();
     return PyObject_Vectorcall(c.function, args, flags & ~PY_VECTORCALL_ARGUMENTS_OFFSET, names);
   } catch (py::error_already_set& e) {
     e.restore();
@@ -241,15 +295,16 @@ PyObject* bound(PyObject* self, PyObject* object, PyObject*) {
   return self;
 }
 
-// Name, docstring, signature, ...: the Python function's.
+// What tells a reader of it (help(), inspect.signature, functools.wraps) is the Python function's; the rest is an object's own.
+PyObject* told(PyObject* self, void* name) {
+  return PyObject_GetAttrString(reinterpret_cast<Callable*>(self)->function, static_cast<const char*>(name));
+}
+constexpr PyGetSetDef told_as(const char* name) { return {name, told, nullptr, nullptr, const_cast<char*>(name)}; }
+
+// The module too, which the type has a name of in the way.
 PyObject* attribute(PyObject* self, PyObject* name) {
-  const auto& c = *reinterpret_cast<Callable*>(self);
-  if (named(name, "__wrapped__")) {
-    Py_INCREF(c.function);
-    return c.function;
-  }
-  if (named(name, "__class__") || named(name, "__reduce__") || named(name, "__reduce_ex__")) return PyObject_GenericGetAttr(self, name);
-  return PyObject_GetAttr(c.function, name);
+  static char module[] = "__module__";
+  return named(name, module) ? told(self, module) : PyObject_GenericGetAttr(self, name);
 }
 
 int visit(PyObject* self, visitproc visit, void* arg) {
@@ -257,24 +312,29 @@ int visit(PyObject* self, visitproc visit, void* arg) {
   Py_VISIT(Py_TYPE(self));
   Py_VISIT(c.function);
   Py_VISIT(c.dynamics);
+  Py_VISIT(c.frame);
   return 0;
 }
 int clear(PyObject* self) {
   auto& c = *reinterpret_cast<Callable*>(self);
   Py_CLEAR(c.function);
   Py_CLEAR(c.dynamics);
+  Py_CLEAR(c.frame);
   return 0;
 }
 void destroy(PyObject* self) {
   PyObject_GC_UnTrack(self);
   clear(self);
   PyTypeObject* const type = Py_TYPE(self);
-  std::destroy_at(&reinterpret_cast<Callable*>(self)->frame);
   type->tp_free(self);
   Py_DECREF(type);
 }
 
-PyMemberDef members[] = {{"__vectorcalloffset__", T_PYSSIZET, offsetof(Callable, vectorcall), READONLY, nullptr}, {nullptr, 0, 0, 0, nullptr}};
+PyMemberDef members[] = {{"__vectorcalloffset__", T_PYSSIZET, offsetof(Callable, vectorcall), READONLY, nullptr},
+                         {"__wrapped__", T_OBJECT_EX, offsetof(Callable, function), READONLY, nullptr},
+                         {nullptr, 0, 0, 0, nullptr}};
+PyGetSetDef told_of_function[] = {told_as("__name__"),     told_as("__qualname__"),   told_as("__doc__"), told_as("__annotations__"),
+                                  told_as("__defaults__"), told_as("__kwdefaults__"), {nullptr, nullptr, nullptr, nullptr, nullptr}};
 PyType_Slot slots[] = {{Py_tp_call, reinterpret_cast<void*>(PyVectorcall_Call)},
                        {Py_tp_descr_get, reinterpret_cast<void*>(bound)},
                        {Py_tp_getattro, reinterpret_cast<void*>(attribute)},
@@ -282,11 +342,12 @@ PyType_Slot slots[] = {{Py_tp_call, reinterpret_cast<void*>(PyVectorcall_Call)},
                        {Py_tp_clear, reinterpret_cast<void*>(clear)},
                        {Py_tp_dealloc, reinterpret_cast<void*>(destroy)},
                        {Py_tp_members, members},
+                       {Py_tp_getset, told_of_function},
                        {0, nullptr}};
 PyType_Spec spec = {"pycraft._core.DirectCall", sizeof(Callable), 0,
                     Py_TPFLAGS_DEFAULT | Py_TPFLAGS_HAVE_GC | Py_TPFLAGS_HAVE_VECTORCALL | Py_TPFLAGS_METHOD_DESCRIPTOR | Py_TPFLAGS_DISALLOW_INSTANTIATION, slots};
 
-py::object callable(const py::object& function, const DirectCall& call, py::object dynamics, const Options& options, const std::string& frame, py::ssize_t states) {
+py::object callable(const py::object& function, const DirectCall& call, py::object dynamics, const Options& options, py::object frame, int states) {
   static PyObject* const type = PyType_FromSpec(&spec);
   auto* const c = type ? PyObject_GC_New(Callable, reinterpret_cast<PyTypeObject*>(type)) : nullptr;
   if (!c) throw py::error_already_set();
@@ -295,24 +356,40 @@ py::object callable(const py::object& function, const DirectCall& call, py::obje
   c->dynamics = dynamics.release().ptr();
   c->call = &call;
   c->options = options;
-  std::construct_at(&c->frame, frame);
+  c->frame = frame.release().ptr();
   c->states = states;
   PyObject_GC_Track(c);
   return py::reinterpret_steal<py::object>(reinterpret_cast<PyObject*>(c));
 }
 
+using Names = py::typing::Tuple<py::str, py::ellipsis>;
+
+template <class Texts>
+Names names_of(const Texts& texts) {
+  py::list names;
+  for (const char* const text : texts)
+    if (text) names.append(text);
+  return py::tuple(names);
+}
+
 }  // namespace
 
 void register_direct_calls(py::module_& m) {
+  m.def("direct_calls", [] {
+    py::typing::Dict<py::str, py::typing::Tuple<Names, Names>> all;
+    for (const DirectCall& call : direct_calls) all[call.name] = py::make_tuple(names_of(call.arrays), names_of(call.options()));
+    return all;
+  }, "By name: the arrays of each direct call, and the options that it is prepared with.");
   m.def("direct_call", [](const py::function& function) {
-    return callable(function, direct_call(py::cast<std::string>(function.attr("__name__"))), py::object(), Options{}, "", -2);
+    return callable(function, direct_call(py::cast<std::string>(function.attr("__name__"))), py::object(), Options{}, py::object(), -2);
   }, py::arg("function"), "The direct call of this name: its plain case in the core, everything else by the function.");
-  m.def("prepared_call", [](const py::object& function, const std::string& name, const py::object& dynamics, const py::object& batch, const std::string& frame, Form form,
+  m.def("prepared_call", [](const py::object& function, const std::string& name, const py::object& dynamics, std::optional<int> batch, const py::str& frame, Form form,
                             const py::object& refine, const std::string& residual, Precision precision, const std::string& on_singular) {
     const Options options{{form, refinement(refine, residual, precision), on_singular_from_name(on_singular)}, precision};
-    return callable(function, direct_call(name), dynamics, options, frame, batch.is_none() ? -1 : py::cast<py::ssize_t>(batch));
-  }, py::arg("function"), py::arg("name"), py::arg("dynamics"), py::arg("batch"), py::arg("frame"), py::arg("form"), py::arg("refine"), py::arg("residual"),
-     py::arg("precision"), py::arg("on_singular"), "A direct call of one model with its options, as `prepare` gives it.");
+    return callable(function, direct_call(name), dynamics, options, frame, batch.value_or(-1));
+  }, py::arg("function"), py::arg("name"), py::arg("dynamics"), py::arg("batch"), py::kw_only(), py::arg("frame") = "", py::arg("form") = Form::fast,
+     py::arg("refine") = 0, py::arg("residual") = "same", py::arg("precision") = Precision::double_, py::arg("on_singular") = "raise",
+     "A direct call of one model with its options, as `prepare` gives it.");
 }
 
 }  // namespace pycraft

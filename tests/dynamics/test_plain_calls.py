@@ -1,9 +1,11 @@
 """Contiguous float64 arrays go to the core past the Python method; they get what the method gives, to the last bit, and its errors."""
 
 import copy
+import functools
 import gc
 import inspect
 import pickle
+import pydoc
 import sys
 import threading
 
@@ -11,16 +13,9 @@ import numpy as np
 import pytest
 
 import pycraft as pc
+from pycraft import _core
 
-CALLS = {
-    "forward_dynamics": ("q", "v", "tau"),
-    "inverse_dynamics": ("q", "v", "vdot"),
-    "bias_forces": ("q", "v"),
-    "mass_matrix": ("q",),
-    "mass_matrix_inverse": ("q",),
-    "jacobian": ("q",),
-    "pose": ("q",),
-}
+CALLS = {name: arrays for name, (arrays, _) in _core.direct_calls().items()}
 SOLVING = ("forward_dynamics", "mass_matrix_inverse")
 MODELS = {
     "panda": pc.robots.panda,
@@ -230,13 +225,26 @@ def test_singular_hinges_are_named():
         model.forward_dynamics(np.zeros(1), np.zeros(1), np.ones(1))
 
 
-def test_welds_only():
+@pytest.mark.parametrize("states", [-1, 0, 3])
+@pytest.mark.parametrize("call", CALLS)
+def test_no_coordinates(call, states, monkeypatch):
+    model, batch = welds_only(), () if states < 0 else (states,)
+    arrays, frame = given(model, call, states), frame_first(model, call)
+    wanted = by_the_method(model, call, *frame, *arrays)
+    taken_by_the_core(monkeypatch, model)
+    found = getattr(model, call)(*frame, *arrays)
+    same(found, wanted)
+    assert found.shape == (*batch, *{"mass_matrix": (0, 0), "mass_matrix_inverse": (0, 0), "jacobian": (6, 0), "pose": (4, 4)}.get(call, (0,)))
+
+
+def test_lengths_that_no_int_holds():
     model = welds_only()
-    none = np.zeros(0)
-    assert model.forward_dynamics(none, none, none).shape == (0,)
-    assert model.mass_matrix(none).shape == (0, 0)
-    assert model.mass_matrix(np.zeros((3, 0))).shape == (3, 0, 0)
-    assert model.jacobian("a", none).shape == (6, 0)
+    with pytest.raises(pc.ModelError, match=f"q of 'welds' has {2**31} states; one call takes at most {2**31 - 1}"):
+        model.mass_matrix(np.zeros((2**31, 0)))
+    with pytest.raises(pc.ModelError, match=f"vdot of 'welds' has {2**32} states"):
+        model.inverse_dynamics(np.zeros(0), np.zeros(0), np.zeros((2**32, 0)))
+    with pytest.raises(pc.ModelError, match="q of 'panda' takes 7 numbers"):
+        panda().mass_matrix(np.zeros((0, 2**32 + 7)))
 
 
 def test_edits_are_followed():
@@ -275,13 +283,25 @@ def test_prepared(call, states, monkeypatch):
 @pytest.mark.parametrize(
     "ask, error, words",
     [
-        (lambda m: m.prepare("dynamics"), pc.EvaluationError, "'forward_dynamics'"),
+        (lambda m: m.prepare("dynamics"), pc.EvaluationError, "'forward_dynamics'.*'pose', not 'dynamics'"),
+        (lambda m: m.prepare(["pose"]), pc.EvaluationError, r"'forward_dynamics'.*'pose', not \['pose'\]"),
+        (lambda m: m.prepare(None), pc.EvaluationError, "'forward_dynamics'.*'pose', not None"),
+        (lambda m: m.prepare(3), pc.EvaluationError, "'forward_dynamics'.*'pose', not 3"),
         (lambda m: m.prepare("mass_matrix", form="ud"), pc.EvaluationError, "no option 'form'"),
         (lambda m: m.prepare("forward_dynamics", form="udu"), pc.EvaluationError, "udu"),
         (lambda m: m.prepare("forward_dynamics", batch=-1), pc.EvaluationError, "batch=-1"),
         (lambda m: m.prepare("forward_dynamics", batch=2.0), pc.EvaluationError, "batch=2.0"),
+        (lambda m: m.prepare("forward_dynamics", batch=True), pc.EvaluationError, "batch=True"),
+        (lambda m: m.prepare("forward_dynamics", batch=np.True_), pc.EvaluationError, "batch="),
+        (lambda m: m.prepare("forward_dynamics", batch=[2]), pc.EvaluationError, "batch=.2."),
+        (lambda m: m.prepare("forward_dynamics", batch=2**31), pc.EvaluationError, f"up to {2**31 - 1}"),
         (lambda m: m.prepare("jacobian"), pc.EvaluationError, "frame="),
         (lambda m: m.prepare("pose", frame="nose"), pc.ModelError, "nose"),
+        (lambda m: m.prepare("pose", frame=3), pc.ModelError, "text, not by 3"),
+        (lambda m: m.prepare("pose", frame="panda_link7")(m.q, out=np.empty((2, 4, 4))), pc.ModelError, r"shape \(4, 4\)"),
+        (lambda m: m.pose("panda_link7", m.q, precision="double"), TypeError, "precision"),
+        (lambda m: m.mass_matrix(m.q, form="ud"), TypeError, "form"),
+        (lambda m: m.mass_matrix_inverse(m.q, method="articulated"), TypeError, "method"),
         (lambda m: m.prepare("bias_forces")(m.q), TypeError, "q, v"),
         (lambda m: m.prepare("mass_matrix", batch=3)(m.q), pc.ModelError, "3 states and is given one state"),
         (lambda m: m.prepare("mass_matrix")(np.tile(m.q, (2, 1))), pc.ModelError, "one state and is given 2 states"),
@@ -294,15 +314,65 @@ def test_prepared_says_what_is_wrong(ask, error, words):
         ask(panda())
 
 
+def test_batches_are_counted_by_any_whole_number():
+    model = panda()
+    (q,) = given(model, "mass_matrix", 3)
+    for batch in (3, np.int64(3), np.uint8(3)):
+        same(model.prepare("mass_matrix", batch=batch)(q), by_the_method(model, "mass_matrix", q))
+
+
+@pytest.mark.parametrize("call", CALLS)
+def test_the_core_takes_what_the_method_takes(call):
+    """But for out=, and for what leads to other computations."""
+    arrays, options = _core.direct_calls()[call]
+    method = inspect.signature(getattr(pc.Multibody, call)).parameters
+    assert [name for name in method if name in arrays] == list(arrays)
+    assert set(method) - {"self", "out", "method", "axes", "relative_to"} == {*arrays, *options}
+    defaults = {name: method[name].default for name in options if name != "frame"}
+    model = panda()
+    frame = {"frame": "panda_link7"} if "frame" in options else {}
+    states = given(model, call, 2)
+    same(model.prepare(call, batch=2, **frame)(*states), model.prepare(call, batch=2, **frame, **defaults)(*states))
+
+
 def test_looks_like_a_method():
     call = pc.Multibody.forward_dynamics
     assert list(inspect.signature(call).parameters)[:4] == ["self", "q", "v", "tau"]
     assert list(inspect.signature(pc.chain(1).forward_dynamics).parameters)[:3] == ["q", "v", "tau"]
     assert inspect.getdoc(call).startswith("Accelerations v̇") and inspect.isroutine(call)
     assert call.__name__ == "forward_dynamics" and "forward_dynamics" in repr(pc.chain(1).forward_dynamics)
+    assert call.__module__ == "pycraft.dynamics.direct_calls" and call.__qualname__ == "DirectCalls.forward_dynamics"
+    assert call.__kwdefaults__["form"] == "fast" and call.__defaults__ == (None, None, None)
+    for text in (pydoc.render_doc(call), pydoc.render_doc(pc.Multibody)):
+        assert "on_singular: 'str' = 'raise'" in text and "Accelerations v̇ under generalized forces" in text
     with pytest.raises(TypeError):
         type(call)()
 
+
+def test_is_no_function():
+    call = pc.Multibody.forward_dynamics
+    for name in ("__code__", "__globals__", "__closure__", "__dict__", "nothing"):
+        with pytest.raises(AttributeError, match=f"DirectCall' object has no attribute '{name}'"):
+            getattr(call, name)
+    with pytest.raises(AttributeError):
+        call.__name__ = "other"
+
+
+def test_can_be_wrapped_and_pickled():
+    model = warm(pc.chain(2))
+    state = np.zeros(2), np.zeros(2), np.ones(2)
+
+    @functools.wraps(pc.Multibody.forward_dynamics)
+    def louder(*given):
+        return 2 * model.forward_dynamics(*given)
+
+    assert louder.__name__ == "forward_dynamics" and louder.__doc__ == pc.Multibody.forward_dynamics.__doc__
+    assert list(inspect.signature(louder).parameters)[:4] == ["self", "q", "v", "tau"]
+    again = pickle.loads(pickle.dumps(model.forward_dynamics))
+    same(2 * again(*state), louder(*state))
+
+
+def test_is_overridden_and_called_by_super():
     class Louder(pc.Multibody):
         def forward_dynamics(self, *arrays, **options):
             return 2 * super().forward_dynamics(*arrays, **options)
