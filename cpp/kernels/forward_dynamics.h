@@ -99,6 +99,25 @@ template <class S>
     for (int r = 0; r < 3; ++r) P.C(r, 2) = P.B(r, 2) = S(0);
 }
 
+// D⁻¹B of a ball, from the factors of D.
+template <class S>
+[[gnu::always_inline]] inline void find_gain(const Inertia<S>& P, ForwardMultiple<S>& w) {
+  for (int r = 0; r < 3; ++r) {
+    S column[3] = {P.B(0, r), P.B(1, r), P.B(2, r)};
+    w.ball.solve(column);
+    for (int i = 0; i < 3; ++i) w.gain(i, r) = column[i];
+  }
+}
+
+// P⁺ of a ball and what its rate adds to the force of z⁺.
+template <class S>
+[[gnu::always_inline]] inline void project_ball(const ForwardMultiple<S>& w, Inertia<S>& P) {
+  P.f = P.f + transpose_times(P.B, Vector3<S>{w.rate[0], w.rate[1], w.rate[2]});
+  for (int r = 0; r < 3; ++r)
+    for (int k = r; k < 3; ++k) P.C(r, k) -= P.B(0, r) * w.gain(0, k) + P.B(1, r) * w.gain(1, k) + P.B(2, r) * w.gain(2, k);
+  P.A = Symmetric3<S>::zero(), P.B = Matrix3<S>::zero();
+}
+
 // The hinge of link k eliminated: D⁻¹, ε, P_h, and unless it is a root P⁺ and z⁺ about the parent's origin, in its axes.
 template <class Kind, bool rotor, class S, class T>
 void eliminate(const Link<T>& link, const Links<T>& links, const States<T>& at, const S& gone, ForwardLink<S>& w, ForwardMultiple<S>* multiple, Inertia<S>& P,
@@ -143,20 +162,12 @@ void eliminate(const Link<T>& link, const Links<T>& links, const States<T>& at, 
     shift<left>(Kind::arm(link, m.place), P);
   } else if constexpr (Kind::nv == 3) {
     sound = sound & factor_ball(P, link, gone, links, multiple->ball);
-    for (int r = 0; r < 3; ++r) {
-      S column[3] = {P.B(0, r), P.B(1, r), P.B(2, r)};
-      multiple->ball.solve(column);
-      for (int i = 0; i < 3; ++i) multiple->gain(i, r) = column[i];
-    }
+    find_gain(P, *multiple);
     for (int i = 0; i < 3; ++i) multiple->rate[i] = force(i) - P.n[i];
     multiple->ball.solve(multiple->rate);
     if (root) return;
-    P.f = P.f + transpose_times(P.B, Vector3<S>{multiple->rate[0], multiple->rate[1], multiple->rate[2]});
+    project_ball(*multiple, P);
     P.n = {force(0), force(1), force(2)};
-    for (int r = 0; r < 3; ++r)
-      for (int k = r; k < 3; ++k)
-        P.C(r, k) -= P.B(0, r) * multiple->gain(0, k) + P.B(1, r) * multiple->gain(1, k) + P.B(2, r) * multiple->gain(2, k);
-    P.A = Symmetric3<S>::zero(), P.B = Matrix3<S>::zero();
     rotation.turn_symmetric(P.C);
     P.n = rotation.to_parent(P.n), P.f = rotation.to_parent(P.f) + P.C * m.sliding;
     shift<-1>(Kind::arm(link, m.place), P);

@@ -4,9 +4,9 @@ Every lemma stands with what its own proof uses: pairs (word, equation), each of
 by what the equation says it is. When all have had their turn, in this order, the two sides are the same: that is the proof, carried out
 when the lemma is first used. An equation may be read in either direction; "(...)*" is its transpose. What a lemma cites stands above it.
 
-With their transposes, the equations that `normal_form` reads as rules bring words to a normal form that does not depend on where one begins
-(`tests/proofs/test_prove.py` resolves all their overlaps): two polynomials of these letters, Υ aside on chains, are equal by the axioms
-exactly if their normal forms are.
+With their transposes, the equations that `normal_form` reads as rules bring words to a normal form that does not depend on where one
+begins (`tests/proofs/test_prove_axioms.py` resolves all their overlaps): two polynomials of these letters, Υ aside on chains, are equal by
+the axioms exactly if their normal forms are.
 """
 
 from __future__ import annotations

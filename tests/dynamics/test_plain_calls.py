@@ -13,9 +13,8 @@ import numpy as np
 import pytest
 
 import pycraft as pc
-from pycraft import _core
+from support.plain_calls import CALLS, by_the_method, frame_first, given, panda, same, strided, taken_by_the_core, warm
 
-CALLS = {name: arrays for name, (arrays, _) in _core.direct_calls().items()}
 SOLVING = ("forward_dynamics", "mass_matrix_inverse")
 MODELS = {
     "panda": pc.robots.panda,
@@ -25,48 +24,10 @@ MODELS = {
 }
 
 
-def warm(model):
-    """The first call goes by the method; what it makes is kept on the model."""
-    model.mass_matrix()
-    return model
-
-
-def panda():
-    return warm(pc.robots.panda())
-
-
 def welds_only():
     model = pc.Multibody("welds", welds="keep")
     model.add_body("a", hinge="weld", mass=1.0)
     return warm(model)
-
-
-def by_the_method(model, call, *arrays, **options):
-    return getattr(type(model), call).__wrapped__(model, *arrays, **options)
-
-
-def frame_first(model, call):
-    return (list(model.bodies)[-1],) if call in ("jacobian", "pose") else ()
-
-
-def given(model, call, states, seed=0):
-    rng = np.random.default_rng(seed)
-    q = np.array([model.random_state(int(rng.integers(1 << 30))).q for _ in range(max(states, 1))])
-    if states == 0:
-        q = q[:0]
-    others = [rng.normal(size=(len(q), model.nv)) for _ in CALLS[call][1:]]
-    arrays = [np.ascontiguousarray(q), *others]
-    return [a[0].copy() for a in arrays] if states < 0 else arrays
-
-
-def same(a, b):
-    assert a.shape == b.shape and a.dtype == b.dtype == np.float64
-    np.testing.assert_array_equal(a, b)
-
-
-def taken_by_the_core(monkeypatch, model):
-    """Fails where a call comes by the method."""
-    monkeypatch.setattr(type(model), "_calls", lambda self: pytest.fail("by the method"))
 
 
 @pytest.mark.parametrize("states", [-1, 0, 1, 5, 19])
@@ -123,12 +84,6 @@ def test_one_state_stands_for_all():
         model.forward_dynamics(q[0].copy(), v[0].copy(), tau),
         by_the_method(model, "forward_dynamics", np.tile(q[0], (5, 1)), np.tile(v[0], (5, 1)), tau),
     )
-
-
-def strided(a):
-    wide = np.zeros((*a.shape[:-1], 2 * a.shape[-1]))
-    wide[..., ::2] = a
-    return wide[..., ::2]
 
 
 class Own(np.ndarray):
@@ -234,7 +189,8 @@ def test_no_coordinates(call, states, monkeypatch):
     taken_by_the_core(monkeypatch, model)
     found = getattr(model, call)(*frame, *arrays)
     same(found, wanted)
-    assert found.shape == (*batch, *{"mass_matrix": (0, 0), "mass_matrix_inverse": (0, 0), "jacobian": (6, 0), "pose": (4, 4)}.get(call, (0,)))
+    matrices = {"mass_matrix": (0, 0), "mass_matrix_inverse": (0, 0), "jacobian": (6, 0), "pose": (4, 4)}
+    assert found.shape == batch + matrices.get(call, (0,))
 
 
 def test_lengths_that_no_int_holds():
@@ -261,78 +217,6 @@ def test_edits_are_followed():
     same(tip(place), by_the_method(model, "jacobian", "body1", place))
     with pytest.raises(pc.ModelError, match="takes 3 numbers"):
         call(*state)
-
-
-@pytest.mark.parametrize("call", CALLS)
-@pytest.mark.parametrize("states", [None, 0, 4])
-def test_prepared(call, states, monkeypatch):
-    model = panda()
-    arrays, frame = given(model, call, -1 if states is None else states), frame_first(model, call)
-    wanted = by_the_method(model, call, *frame, *arrays)
-    ready = model.prepare(call, batch=states, **({"frame": frame[0]} if frame else {}))
-    out = np.empty_like(wanted)
-    same(ready(*[a.tolist() if states != 0 else a for a in arrays]), wanted)
-    same(ready(*map(strided, arrays), out=out), wanted)
-    taken_by_the_core(monkeypatch, model)
-    same(ready(*arrays), wanted)
-    assert ready(*arrays, out=out) is out
-    same(out, wanted)
-    assert call in ready.__doc__
-
-
-@pytest.mark.parametrize(
-    "ask, error, words",
-    [
-        (lambda m: m.prepare("dynamics"), pc.EvaluationError, "'forward_dynamics'.*'pose', not 'dynamics'"),
-        (lambda m: m.prepare(["pose"]), pc.EvaluationError, r"'forward_dynamics'.*'pose', not \['pose'\]"),
-        (lambda m: m.prepare(None), pc.EvaluationError, "'forward_dynamics'.*'pose', not None"),
-        (lambda m: m.prepare(3), pc.EvaluationError, "'forward_dynamics'.*'pose', not 3"),
-        (lambda m: m.prepare("mass_matrix", form="ud"), pc.EvaluationError, "no option 'form'"),
-        (lambda m: m.prepare("forward_dynamics", form="udu"), pc.EvaluationError, "udu"),
-        (lambda m: m.prepare("forward_dynamics", batch=-1), pc.EvaluationError, "batch=-1"),
-        (lambda m: m.prepare("forward_dynamics", batch=2.0), pc.EvaluationError, "batch=2.0"),
-        (lambda m: m.prepare("forward_dynamics", batch=True), pc.EvaluationError, "batch=True"),
-        (lambda m: m.prepare("forward_dynamics", batch=np.True_), pc.EvaluationError, "batch="),
-        (lambda m: m.prepare("forward_dynamics", batch=[2]), pc.EvaluationError, "batch=.2."),
-        (lambda m: m.prepare("forward_dynamics", batch=2**31), pc.EvaluationError, f"up to {2**31 - 1}"),
-        (lambda m: m.prepare("jacobian"), pc.EvaluationError, "frame="),
-        (lambda m: m.prepare("pose", frame="nose"), pc.ModelError, "nose"),
-        (lambda m: m.prepare("pose", frame=3), pc.ModelError, "text, not by 3"),
-        (lambda m: m.prepare("pose", frame="panda_link7")(m.q, out=np.empty((2, 4, 4))), pc.ModelError, r"shape \(4, 4\)"),
-        (lambda m: m.pose("panda_link7", m.q, precision="double"), TypeError, "precision"),
-        (lambda m: m.mass_matrix(m.q, form="ud"), TypeError, "form"),
-        (lambda m: m.mass_matrix_inverse(m.q, method="articulated"), TypeError, "method"),
-        (lambda m: m.prepare("bias_forces")(m.q), TypeError, "q, v"),
-        (lambda m: m.prepare("mass_matrix", batch=3)(m.q), pc.ModelError, "3 states and is given one state"),
-        (lambda m: m.prepare("mass_matrix")(np.tile(m.q, (2, 1))), pc.ModelError, "one state and is given 2 states"),
-        (lambda m: m.prepare("mass_matrix", batch=3)(np.tile(m.q, (2, 1))), pc.ModelError, "3 states and is given 2 states"),
-        (lambda m: m.prepare("forward_dynamics")(m.q, m.v, m.v, form="ud"), TypeError, "form"),
-    ],
-)
-def test_prepared_says_what_is_wrong(ask, error, words):
-    with pytest.raises(error, match=words):
-        ask(panda())
-
-
-def test_batches_are_counted_by_any_whole_number():
-    model = panda()
-    (q,) = given(model, "mass_matrix", 3)
-    for batch in (3, np.int64(3), np.uint8(3)):
-        same(model.prepare("mass_matrix", batch=batch)(q), by_the_method(model, "mass_matrix", q))
-
-
-@pytest.mark.parametrize("call", CALLS)
-def test_the_core_takes_what_the_method_takes(call):
-    """But for out=, and for what leads to other computations."""
-    arrays, options = _core.direct_calls()[call]
-    method = inspect.signature(getattr(pc.Multibody, call)).parameters
-    assert [name for name in method if name in arrays] == list(arrays)
-    assert set(method) - {"self", "out", "method", "axes", "relative_to"} == {*arrays, *options}
-    defaults = {name: method[name].default for name in options if name != "frame"}
-    model = panda()
-    frame = {"frame": "panda_link7"} if "frame" in options else {}
-    states = given(model, call, 2)
-    same(model.prepare(call, batch=2, **frame)(*states), model.prepare(call, batch=2, **frame, **defaults)(*states))
 
 
 def test_looks_like_a_method():

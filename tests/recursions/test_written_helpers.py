@@ -1,10 +1,9 @@
-"""What written programs bring along (pycraft/recursions/runtime): each function against NumPy, what is copied, and C++ against Python."""
+"""What written programs bring along (pycraft/recursions/runtime): each function against NumPy, and what is copied."""
 
 import ast
 import builtins
 import inspect
 import re
-import subprocess
 import symtable
 from pathlib import Path
 
@@ -14,21 +13,10 @@ from scipy.linalg import block_diag
 
 from pycraft.recursions import copied_parts
 from pycraft.recursions.runtime import cross_products, matrices, stacking, tree_system
-from pycraft.recursions.runtime.tree_system import TreeSystem
-from support.eigen import eigen_headers
+from support.tree_systems import ROWS, SIZES, TREES, built, entries_of, random, well_posed
 
 MODULES = {module.__name__.rpartition(".")[2]: module for module in (matrices, stacking, cross_products, tree_system)}
 RUNTIME = Path(matrices.__file__).parent
-SIZES = [0, 1, 4]
-
-
-def random(*shape):
-    """The same numbers for the same shape."""
-    return np.random.default_rng([7, *shape]).uniform(-1, 1, shape)
-
-
-def well_posed(n):
-    return random(n, n) + 3 * np.eye(n)
 
 
 # ---------------------------------------------------------------------- dense matrices
@@ -87,13 +75,6 @@ def test_a_pivot_is_zero_within_the_rounding_of_the_largest_entry():
 
 # ---------------------------------------------------------------------- body by body
 
-ROWS = {
-    "no body": [],
-    "one body": [[0, 1]],
-    "a body without coordinates": [[0], [], [1, 2]],
-    "rows in disorder": [[3, 0], [1], [4, 2]],
-}
-
 
 @pytest.mark.parametrize("sizes", [[], [3], [2, 0, 3], [0, 0]])
 def test_ranges_follow_each_other(sizes):
@@ -147,53 +128,6 @@ def test_cross_products_are_numpys():
 
 
 # ---------------------------------------------------------------------- systems over a tree
-
-TREES = {
-    "no body": ([], [], [2, 0]),
-    "one body": ([-1], [[2, 1]], [0, 0]),
-    "one body and a border": ([-1], [[2, 0]], [0, 1]),
-    "a chain": ([-1, 0, 1], [[1, 2], [2, 0], [0, 3]], [0, 0]),
-    "a branched tree and a border": ([-1, 0, 0, 1, 1, 2], [[2, 1], [1, 1], [0, 2], [3, 0], [0, 0], [1, 1]], [2, 1]),
-    "two roots": ([-1, -1, 1], [[1, 1]] * 3, [0, 2]),
-}
-
-
-def entries_of(parent, sizes, border, own=3.0):
-    """(place, arguments, block) of every block that a system on the tree has; `own` is on the diagonal."""
-    rng = np.random.default_rng(len(parent))
-    entries = []
-    for i in range(len(border)):
-        for j in range(len(border)):
-            diagonal = own if i == j else 0
-            for k, p in enumerate(parent):
-                entries.append(
-                    ("own", (k, i, j), rng.uniform(-1, 1, (sizes[k][i], sizes[k][j])) + diagonal * np.eye(sizes[k][i], sizes[k][j]))
-                )
-                entries.append(("right", (k, i, j), rng.uniform(-1, 1, (sizes[k][i], border[j]))))
-                entries.append(("below", (k, i, j), rng.uniform(-1, 1, (border[i], sizes[k][j]))))
-                if p >= 0:
-                    entries.append(("up", (k, i, j), rng.uniform(-1, 1, (sizes[p][i], sizes[k][j]))))
-                    entries.append(("down", (k, i, j), rng.uniform(-1, 1, (sizes[k][i], sizes[p][j]))))
-            entries.append(("corner", (i, j), rng.uniform(-1, 1, (border[i], border[j])) + 9 * diagonal * np.eye(border[i], border[j])))
-    return entries
-
-
-def built(parent, sizes, border, entries):
-    """The system, and the same as a dense matrix put together here."""
-    system = TreeSystem(parent, sizes, border)
-    rows, end = {}, 0
-    for k, of_body in enumerate([*sizes, border]):
-        for i, size in enumerate(of_body):
-            rows[k, i] = slice(end, end + size)
-            end += size
-    n, T = len(parent), np.zeros((end, end))
-    for place, (*body, i, j), value in entries:
-        getattr(system, place)(*body, i, j)[...] += value
-        k = body[0] if body else n
-        row = {"up": parent[k] if body else n, "below": n}.get(place, k)
-        column = {"down": parent[k] if body else n, "right": n}.get(place, k)
-        T[rows[row, i], rows[column, j]] += value
-    return system, T, rows
 
 
 def assert_is(system, T, rows, parent, tolerance=1e-12):
@@ -316,116 +250,3 @@ def test_parts_of_a_header_end_at_blank_lines_outside_braces():
     assert "namespace" not in "".join(part.text for part in parts) and copied_parts.cpp_letters().count("using") == 3
     heads = [part.names[0] for part in parts if part.text in copied_parts.copied(parts, ["assembled"])]
     assert heads == ["size", "put", "assembled"]
-
-
-# ---------------------------------------------------------------------- C++
-
-
-def compiled(text, folder, standard="c++17", program=None):
-    """Compiled without a warning, as a program or for its syntax alone."""
-    headers = eigen_headers()
-    if headers is None:
-        pytest.skip("Eigen's headers are not here")
-    (folder / "written.cpp").write_text(text, encoding="utf-8")
-    made = ["-O0", "-o", str(program)] if program else ["-fsyntax-only"]
-    command = ["g++", f"-std={standard}", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-isystem", str(headers), "-I", str(RUNTIME), *made]
-    run = subprocess.run([*command, str(folder / "written.cpp")], capture_output=True, text=True)
-    assert run.returncode == 0 and not run.stderr, run.stderr[:4000]
-
-
-@pytest.mark.parametrize("header", ["letters", *copied_parts.TOPICS])
-def test_a_header_compiles_by_itself_without_a_warning(header, tmp_path):
-    compiled(f'#include "{header}.h"\n', tmp_path)
-
-
-@pytest.mark.slow
-def test_the_headers_compile_as_the_language_of_the_core(tmp_path):
-    compiled("".join(f'#include "{topic}.h"\n' for topic in copied_parts.TOPICS), tmp_path, "c++20")
-
-
-@pytest.mark.slow
-def test_a_part_in_cpp_comes_with_all_that_it_uses(tmp_path):
-    text = "".join(f"#include <{header}>\n" for header in sorted(copied_parts.cpp_includes()))
-    for part in copied_parts.cpp_parts():
-        inside = copied_parts.cpp_letters() + "".join(copied_parts.copied(copied_parts.cpp_parts(), part.names[:1]))
-        text += f"namespace only_{part.names[0]} {{\n{inside}}}\n"
-    compiled(text, tmp_path)
-
-
-def literal(value):
-    """An argument in C++."""
-    if isinstance(value, float):
-        return repr(value)
-    if isinstance(value, int):
-        return str(value)
-    if isinstance(value, np.ndarray) and value.dtype == float:
-        return f"matrix({value.shape[0]}, {value.shape[1]}, {{{', '.join(repr(float(x)) for x in value.ravel())}}})"
-    if len(value) and isinstance(value[0], int | np.integer):
-        return f"std::vector<int>{{{', '.join(map(str, value))}}}"
-    kind = "Blocks" if len(value) and getattr(value[0], "dtype", "int") == "float64" else "Rows"
-    inner = (literal(x) if len(x) or kind == "Blocks" else "std::vector<int>{}" for x in value)
-    return f"{kind}{{{', '.join(inner)}}}"
-
-
-def numbers(value):
-    """A result as a flat list."""
-    if isinstance(value, list):
-        return [x for block in value for x in numbers(block)]
-    return np.ravel(value).tolist()
-
-
-SHOWN = """
-#include <iostream>
-using namespace pycraft::written;
-void show(double x) { std::cout << x << ' '; }
-void show(const Matrix& A) { for (int i = 0; i < A.rows(); ++i) for (int j = 0; j < A.cols(); ++j) show(A(i, j)); }
-void show(const Blocks& blocks) { for (const auto& B : blocks) show(B); }
-void show(const Rows& rows) { for (const auto& r : rows) for (int i : r) show(double(i)); }
-int main() {
-  std::cout.precision(17);
-"""
-
-
-def calls():
-    """(function, arguments) of every function that both languages have, degenerate sizes included."""
-    for n in SIZES:
-        A = well_posed(n)
-        yield from ((matrices.solve, [A, random(n, m)]) for m in (0, 2))
-        yield from ((f, [A]) for f in (matrices.inverse, matrices.symmetric, matrices.lower_half, matrices.diagonal, matrices.trace))
-        yield from ((f, [A]) for f in (matrices.norm, matrices.logdet))
-        yield from ((matrices.root, [B]) for B in (A @ A.T, np.ones((n, n))))
-    yield from ((matrices.square_root, [x]) for x in (2.0, -1e-30))
-    yield stacking.ranges, [[2, 0, 3]]
-    for rows in ([np.array(r, int) for r in of_bodies] for of_bodies in ROWS.values() if of_bodies):
-        x = random(sum(map(len, rows)), 2)
-        yield stacking.cut, [x, rows]
-        yield stacking.stack, [stacking.cut(x, rows), rows, 2]
-        yield stacking.assembled, [[random(len(r), len(r)) for r in rows], rows, rows]
-    yield cross_products.skew, [random(3, 1)]
-    yield from ((f, [random(6, 1)]) for f in (cross_products.crm, cross_products.crf, cross_products.cross_of_momentum))
-
-
-@pytest.mark.slow
-def test_cpp_computes_what_python_computes(tmp_path):
-    lines, expected = [], []
-    for function, arguments in calls():
-        lines.append(f"show({function.__name__}({', '.join(map(literal, arguments))}));")
-        flat = [arguments[0][:, 0]] if function is cross_products.skew else arguments
-        expected.append(numbers(function(*flat)))
-    singular = [("own", (0, 0, 0), np.eye(1)), ("up", (1, 0, 0), np.eye(1)), ("down", (1, 0, 0), np.eye(1))]
-    cases = [(*tree, entries_of(*tree, 6.0)) for tree in TREES.values()] + [([-1, 0], [[1], [1]], [0], singular)]
-    for at, (parent, sizes, border, entries) in enumerate(cases):
-        system = built(parent, sizes, border, entries)[0]
-        b = [x + 1 for x in system.vector(2)]
-        lists = literal(parent) if parent else "{}", literal(sizes) if sizes else "{}", literal(border)
-        lines.append(f"TreeSystem T{at}({', '.join(lists)});")
-        lines += [f"T{at}.{place}({', '.join(map(str, i))}) += {literal(value)};" for place, i, value in entries if value.size]
-        lines += [f"Blocks b{at} = T{at}.vector(2);", f"for (auto& x : b{at}) x.array() += 1;"]
-        lines.append(f"show(T{at}.solve(b{at})); show(T{at}.logdet()); show(T{at}.inverse());")
-        expected.append([*numbers(system.solve(b)), system.logdet(), *numbers(system.inverse())])
-    text = "".join(f'#include "{topic}.h"\n' for topic in copied_parts.TOPICS) + SHOWN
-    text += "\n".join(f"  {line}{' std::cout << std::endl;' if 'show' in line else ''}" for line in lines) + "\n}\n"
-    compiled(text, tmp_path, program=tmp_path / "written")
-    shown = subprocess.run([str(tmp_path / "written")], capture_output=True, text=True, check=True).stdout.split("\n")[:-1]
-    for line, values in zip(shown, expected, strict=True):
-        assert np.allclose(np.array(line.split(), float), values, rtol=1e-12, atol=1e-13)

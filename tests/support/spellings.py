@@ -5,6 +5,9 @@ the constants `c` of a model, so that the same formula is evaluated by the packa
 
 import numpy as np
 
+from support.formulas import letters_of
+from support.mechanisms import every_kind
+
 
 class Constants:
     """Seeded constants on the spaces of one operator set: positive blocks, thin borders, a full matrix."""
@@ -18,6 +21,17 @@ class Constants:
         self.loads = o.constant([spd(rng, s.stop - s.start) for _, s, _ in soa.F.blocks], soa.V, soa.F, "W")
         full = rng.normal(size=(n, n))
         self.full = lambda: o.constant(full @ full.T / n, soa.Theta, soa.Theta, "full")
+
+
+_made = {}
+
+
+def letters_and_constants(rotor_inertia):
+    """One branched tree of every hinge kind, welds kept, with or without rotors."""
+    if rotor_inertia not in _made:
+        o = letters_of(every_kind(rotor_inertia))
+        _made[rotor_inertia] = o, Constants(o)
+    return _made[rotor_inertia]
 
 
 def spd(rng, n):

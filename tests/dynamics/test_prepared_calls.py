@@ -1,0 +1,82 @@
+"""Calls whose options were read once: what the method gives, to the last bit, and errors that say what is wrong."""
+
+import inspect
+
+import numpy as np
+import pytest
+
+import pycraft as pc
+from pycraft import _core
+from support.plain_calls import CALLS, by_the_method, frame_first, given, panda, same, strided, taken_by_the_core
+
+
+@pytest.mark.parametrize("call", CALLS)
+@pytest.mark.parametrize("states", [None, 0, 4])
+def test_prepared(call, states, monkeypatch):
+    model = panda()
+    arrays, frame = given(model, call, -1 if states is None else states), frame_first(model, call)
+    wanted = by_the_method(model, call, *frame, *arrays)
+    ready = model.prepare(call, batch=states, **({"frame": frame[0]} if frame else {}))
+    out = np.empty_like(wanted)
+    same(ready(*[a.tolist() if states != 0 else a for a in arrays]), wanted)
+    same(ready(*map(strided, arrays), out=out), wanted)
+    taken_by_the_core(monkeypatch, model)
+    same(ready(*arrays), wanted)
+    assert ready(*arrays, out=out) is out
+    same(out, wanted)
+    assert call in ready.__doc__
+
+
+@pytest.mark.parametrize(
+    "ask, error, words",
+    [
+        (lambda m: m.prepare("dynamics"), pc.EvaluationError, "'forward_dynamics'.*'pose', not 'dynamics'"),
+        (lambda m: m.prepare(["pose"]), pc.EvaluationError, r"'forward_dynamics'.*'pose', not \['pose'\]"),
+        (lambda m: m.prepare(None), pc.EvaluationError, "'forward_dynamics'.*'pose', not None"),
+        (lambda m: m.prepare(3), pc.EvaluationError, "'forward_dynamics'.*'pose', not 3"),
+        (lambda m: m.prepare("mass_matrix", form="ud"), pc.EvaluationError, "no option 'form'"),
+        (lambda m: m.prepare("forward_dynamics", form="udu"), pc.EvaluationError, "udu"),
+        (lambda m: m.prepare("forward_dynamics", batch=-1), pc.EvaluationError, "batch=-1"),
+        (lambda m: m.prepare("forward_dynamics", batch=2.0), pc.EvaluationError, "batch=2.0"),
+        (lambda m: m.prepare("forward_dynamics", batch=True), pc.EvaluationError, "batch=True"),
+        (lambda m: m.prepare("forward_dynamics", batch=np.True_), pc.EvaluationError, "batch="),
+        (lambda m: m.prepare("forward_dynamics", batch=[2]), pc.EvaluationError, "batch=.2."),
+        (lambda m: m.prepare("forward_dynamics", batch=2**31), pc.EvaluationError, f"up to {2**31 - 1}"),
+        (lambda m: m.prepare("jacobian"), pc.EvaluationError, "frame="),
+        (lambda m: m.prepare("pose", frame="nose"), pc.ModelError, "nose"),
+        (lambda m: m.prepare("pose", frame=3), pc.ModelError, "text, not by 3"),
+        (lambda m: m.prepare("pose", frame="panda_link7")(m.q, out=np.empty((2, 4, 4))), pc.ModelError, r"shape \(4, 4\)"),
+        (lambda m: m.pose("panda_link7", m.q, precision="double"), TypeError, "precision"),
+        (lambda m: m.mass_matrix(m.q, form="ud"), TypeError, "form"),
+        (lambda m: m.mass_matrix_inverse(m.q, method="articulated"), TypeError, "method"),
+        (lambda m: m.prepare("bias_forces")(m.q), TypeError, "q, v"),
+        (lambda m: m.prepare("mass_matrix", batch=3)(m.q), pc.ModelError, "3 states and is given one state"),
+        (lambda m: m.prepare("mass_matrix")(np.tile(m.q, (2, 1))), pc.ModelError, "one state and is given 2 states"),
+        (lambda m: m.prepare("mass_matrix", batch=3)(np.tile(m.q, (2, 1))), pc.ModelError, "3 states and is given 2 states"),
+        (lambda m: m.prepare("forward_dynamics")(m.q, m.v, m.v, form="ud"), TypeError, "form"),
+    ],
+)
+def test_prepared_says_what_is_wrong(ask, error, words):
+    with pytest.raises(error, match=words):
+        ask(panda())
+
+
+def test_batches_are_counted_by_any_whole_number():
+    model = panda()
+    (q,) = given(model, "mass_matrix", 3)
+    for batch in (3, np.int64(3), np.uint8(3)):
+        same(model.prepare("mass_matrix", batch=batch)(q), by_the_method(model, "mass_matrix", q))
+
+
+@pytest.mark.parametrize("call", CALLS)
+def test_the_core_takes_what_the_method_takes(call):
+    """But for out=, and for what leads to other computations."""
+    arrays, options = _core.direct_calls()[call]
+    method = inspect.signature(getattr(pc.Multibody, call)).parameters
+    assert [name for name in method if name in arrays] == list(arrays)
+    assert set(method) - {"self", "out", "method", "axes", "relative_to"} == {*arrays, *options}
+    defaults = {name: method[name].default for name in options if name != "frame"}
+    model = panda()
+    frame = {"frame": "panda_link7"} if "frame" in options else {}
+    states = given(model, call, 2)
+    same(model.prepare(call, batch=2, **frame)(*states), model.prepare(call, batch=2, **frame, **defaults)(*states))
