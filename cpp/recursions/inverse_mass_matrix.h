@@ -1,6 +1,6 @@
 // The inverse of the mass matrix, entry by entry, by the innovations factors (ℳ + J)⁻¹ = [I - HψK]* D⁻¹ [I - HψK]:
 //
-//   tip to base, for the coordinates i of body k and the columns c of them and of all outboard; δ(i,c) is Kronecker's, z(c) = 0 at c:
+//   tip to base, for the coordinates i of body k and the columns c of them and of all outboard; δ Kronecker's, z(c) = 0 at first:
 //     ε(i,c) = δ(i,c) - H(i) z(c),   ν(k,c) = D(k)⁻¹ ε(k,c),   z(c) <- φ(p,k) (z(c) + G(k) ε(k,c))
 //   base to tip, for the columns c from those of k on:
 //     α(c) <- φ*(p,k) α(c),   (ℳ + J)⁻¹(k,c) = ν(k,c) - G(k)* α(c),   α(c) <- α(c) + H(k)* (ℳ + J)⁻¹(k,c)
