@@ -317,8 +317,8 @@ def test_arguments_that_make_no_sense(options, text):
 
 @pytest.mark.parametrize("integrator", [*CONTROLLED, *FIXED])
 def test_motion_that_leaves_all_bounds(integrator):
-    """Negative damping: the velocity grows tenfold every 2.3 ms. Its square is no number after 0.355 s, itself after 0.71 s; one pin needs no
-    square."""
+    """Negative damping: the velocity grows tenfold every 2.3 ms. Its square is no number after 0.355 s, itself after 0.71 s; of one pin
+    no square is needed."""
     model = pendulum()
     with pytest.raises(pc.EvaluationError, match=rf"integrator '{integrator}': .* t = 0\.(35|70)\d* s"):
         model.integrate_ode([0], [1], [0, 2], damping=[-1000], integrator=integrator, step=1e-4, rtol=1e-6)

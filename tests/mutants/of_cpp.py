@@ -161,6 +161,27 @@ CHANGES = {
         ("the step after a cut step is the cut one", "cut && abs(tried) < abs(h) ? h : tried", "tried"),
         ("lengths of quaternions walk", "scale_quaternions<S>(equations_.model(), lengths_.data(), x_.data());", ";", STATEMENT),
     ],
+    "cpp/kernels/forward_dynamics.h": [
+        ("a rotor keeps all of its row", "S(J * w.inverse)", "S(1)"),
+        ("a faint pivot of one coordinate is sound", "greater(D, S(links.faint) * most)", "S::all()"),
+        ("branches are lost", "add(w.branch[link.parent], P);", ";", STATEMENT),
+    ],
+    "cpp/kernels/steps.h": [
+        ("hinges against an axis turn with it", "S(link.sign) * of.sine", "of.sine"),
+    ],
+    "cpp/kernels/motions.h": [
+        ("sliders feel no Coriolis acceleration", "S(2) * S(link.travel) * turn", "S(0)"),
+    ],
+    "cpp/kernels/sine_cosine.h": [
+        ("angles beyond the reduction are reduced", "greater(magnitude(x), S(R::limit))", "greater(S(0), S(1))"),
+    ],
+    "cpp/kernels/link_model.cpp": [
+        ("an axis a millionth off a coordinate axis is that", "E(8) * E(epsilon<double>())", "E(1e-6)"),
+        ("no state of a tree is too faint", "own.carried_mass = static_cast<double>(M.mass);", "own.carried_mass = 0;", STATEMENT),
+    ],
+    "cpp/dynamics/link_dynamics.h": [
+        ("a last state in doubt is given", "if (doubted > 0) again(count - doubted, count);", ";", STATEMENT),
+    ],
     "cpp/dynamics/packed_dynamics.cpp": [
         ("a batch returns its first state's rows", "from[b * stride + i]", "from[i]"),
     ],
