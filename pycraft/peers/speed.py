@@ -30,6 +30,8 @@ CHAINS = (10, 30, 100, 300, 1000)
 LONGEST = (10_000, 100_000)
 """Chains that only calls of cost O(N) are timed on."""
 LINEAR = ("forward_dynamics", "inverse_dynamics")
+WITH_PINOCCHIO = 400
+"""Links of the longest chain with Pinocchio beside: its work space grows as nv³, 32 GB at 1000."""
 STATES = 8
 BATCH = 1024
 
@@ -275,7 +277,9 @@ def measure(seconds: float = 0.1, quick: bool = False, progress: Callable[[str],
         progress(model.name)
         model.gravity = (0, 0, -9.81)
         beyond = model.nv > max(CHAINS)
-        peer = None if beyond else Pinocchio(model, path)
+        peer = None if model.nv > WITH_PINOCCHIO else Pinocchio(model, path)
+        if not beyond and peer is None:
+            found.left_out.append(f"Pinocchio on {model.name}: its work space grows as nv³")
         overhead = overhead or (peer.bindings(seconds) if peer else {})
         calls = LINEAR if beyond else tuple(GOALS) if model.nv < max(CHAINS) else tuple(GOALS)[:-1]
         for call in calls:
