@@ -107,7 +107,8 @@ py::dict time_dynamics(const std::shared_ptr<Multibody>& model, const std::strin
   Sensitivities<double> s(*model);
   const int K = states_of(q), nq = model->nq(), nv = model->nv();
   const size_t square = size_t(nv) * nv;
-  std::vector<double> out(std::max(3 * square, size_t(6) * nv));
+  const bool vector = call == "forward_dynamics" || call == "inverse_dynamics";  // of chains whose matrices fit nowhere
+  std::vector<double> out(vector ? size_t(nv) : std::max(3 * square, size_t(6) * nv));
   int k = 0;
   const auto next = [&] { k = (k + 1) % K; };
   const double *Q = q.data(), *V = v.data(), *U = u.data();
