@@ -5,6 +5,7 @@
 #   make check                  the everyday subset, under three minutes
 #   make lint                   what ruff and mypy have to say of Python; fails on the first
 #   make lab | bench            JupyterLab in notebooks; the bounds measured
+#   make performance            speed beside Pinocchio and MuJoCo (extra [peers]); writes docs/performance.md
 #   make test-address | test-undefined | test-thread   the C++ tests under a sanitizer (GCC's or Clang's)
 #   make test-clang             the C++ tests built by Clang (needs clang++: apt install clang, or CLANG=/path/to/clang++)
 #   make wheel                  dist/*.whl for other machines: libquadmath inside, the glibc it needs in its name (Linux)
@@ -21,7 +22,7 @@ SOURCES := $(shell find cpp pycraft -name '*.h' -o -name '*.cpp' -o -name '*.py'
 # What is compiled: a change in any of these rebuilds. Python sources are used where they lie.
 COMPILED := $(shell find cpp -name '*.h' -o -name '*.cpp' -o -name '*.in' -o -name '*.py') CMakeLists.txt pyproject.toml
 
-.PHONY: FORCE tour test test-cpp test-python test-peers check lab bench stability campaigns lint clean wheel mutants \
+.PHONY: FORCE tour test test-cpp test-python test-peers check lab bench performance stability campaigns lint clean wheel mutants \
         test-address test-undefined test-thread test-clang
 
 tour: .venv/installed
@@ -80,6 +81,9 @@ lab: .venv/lab
 
 bench: .venv/installed
 	$(BIN)/pycraft bench
+
+performance: .venv/peers
+	$(BIN)/pycraft bench --peers --page docs/performance.md
 
 mutants: .venv/tested
 	$(BIN)/python tests/mutation.py --jobs $(JOBS)

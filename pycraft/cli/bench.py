@@ -221,6 +221,10 @@ def accuracy(seconds: float = 0.2) -> list[Figure]:
             fast, own = in_turn(seconds, plain, partial(plain, **options))
             measured = f"{1e6 * own:.2f} us, error {error:.0e}"
             figures.append(Figure(f"{name} ({model.nv} dof): {way} over fast", own / fast, "x", bound, measured))
+        fast, own = in_turn(seconds, plain, partial(plain, precision="single"))
+        error = np.abs(model.forward_dynamics(q, v, u, precision="single") - exact).max() / np.abs(exact).max()
+        note = f"{1e6 * own:.2f} us, error {error:.0e}"
+        figures.append(Figure(f"{name} ({model.nv} dof): single, one by one, over double", own / fast, "x", None, note))
         for form in ("fast", "ud"):
             precisions = ("double", "single")
             packs = [partial(_core.time_packs, model, q, v, u, form=form, precision=precision) for precision in precisions]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import warnings
-from json import dumps
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -150,12 +149,15 @@ def bench(
     plot: Annotated[Path | None, typer.Option(help="With --peers: draw cost against links (PNG, SVG or PDF).")] = None,
     page: Annotated[Path | None, typer.Option(help="With --peers: write the page docs/performance.md.")] = None,
 ) -> None:
-    """Measure the bounds on speed; exit status 1 if one is missed. With --peers, speed beside other packages."""
+    """Measure the bounds on speed; exit status 1 if one is missed. With --peers, speed beside other packages, met goals and missed ones."""
     from .bench import run
 
     check_seconds(seconds=seconds)
+    check_outputs(json=json, plot=plot, page=page)
     if peers:
-        return _bench_peers(seconds, quick, json, plot, page)
+        from .bench_peers import bench_peers
+
+        return bench_peers(seconds, quick, json, plot, page)
     if quick or json or plot or page:
         fail("--quick, --json, --plot and --page belong to bench --peers")
     with diagnostics.status("measuring"):
@@ -175,38 +177,6 @@ def bench(
         text = f"{figure.name}: {figure.value:.3g} {figure.unit} is over its bound, {figure.bound:g} {figure.unit}"
         console.print(text, style="red", markup=False, highlight=False)
     raise typer.Exit(1 if missed else 0)
-
-
-def _bench_peers(seconds: float, quick: bool, json: Path | None, plot: Path | None, page: Path | None) -> None:
-    from ..peers import speed
-    from . import speed_page
-    from .bench import accuracy as costs
-
-    with diagnostics.status("measuring") as status:
-        found = speed.measure(seconds, quick, lambda model: status.update(f"measuring {model}"))
-    for title, headings, lines in (
-        (
-            "Calls, microseconds; ratios over ours, ✗ where a goal is missed",
-            speed_page.HEADINGS,
-            [speed_page.cells(row) for row in found.rows],
-        ),
-        (f"Batches of {speed.BATCH}, over one call of Pinocchio", speed_page.BATCH_HEADINGS, speed_page.batch_cells(found)),
-    ):
-        table = Table(title=title, title_justify="left", box=None, header_style="bold")
-        for column, heading in enumerate(headings):
-            table.add_column(heading, justify="left" if column in (0, 2) and headings is speed_page.HEADINGS else "right")
-        for line in lines:
-            table.add_row(*line)
-        console.print(table)
-    for text in found.left_out:
-        note(f"left out: {text}")
-    if json:
-        json.write_text(dumps(found.as_json(), indent=1) + "\n", encoding="utf-8")
-    if plot:
-        speed_page.plot(found, plot)
-    if page:
-        with diagnostics.status("measuring what accuracy costs"):
-            page.write_text(speed_page.page(found, costs(seconds)), encoding="utf-8")
 
 
 def _write(table: Any, csv: Path | None, json: Path | None, plot: Path | None) -> None:

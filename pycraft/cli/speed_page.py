@@ -1,123 +1,204 @@
-"""What `pycraft bench --peers` shows of a run: tables for the terminal, docs/performance.md, plots."""
+"""What `pycraft bench --peers` shows of a run: the table for the terminal, docs/performance.md."""
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any
+from collections.abc import Iterable
 
-from ..peers.speed import BATCH, BATCH_GOALS, GOALS, Measured, Row, exponents
+from ..peers.clock import Time
+from ..peers.speed import BATCH, BATCH_GOALS, COLUMNS, FITTED_FROM, GOALS, STATES, WRONG, Measured, Row, exponents
 from .bench import Figure
 
 CALLS = {
     "forward_dynamics": "forward dynamics",
     "inverse_dynamics": "inverse dynamics",
-    "mass_matrix": "ℳ, full",
-    "mass_matrix_inverse": "ℳ⁻¹, full",
+    "mass_matrix": "mass matrix ℳ",
+    "mass_matrix_inverse": "inverse ℳ⁻¹",
     "inverse_dynamics_derivatives": "derivatives of inverse dynamics",
     "forward_dynamics_derivatives": "derivatives of forward dynamics",
+    "mass_matrix_inverse_product": f"ℳ⁻¹X, {COLUMNS} columns",
 }
+COMPARED: dict[str, dict[str, str]] = {
+    "forward_dynamics": {"Pinocchio": "`aba`", "MuJoCo": "`mj_forward`", "Drake": "`EvalTimeDerivatives`"},
+    "inverse_dynamics": {
+        "Pinocchio": "`rnea`",
+        "MuJoCo": "`mj_inverse`",
+        "Drake": "`CalcForceElementsContribution`, `CalcInverseDynamics`",
+    },
+    "mass_matrix": {"Pinocchio": "`crba`", "MuJoCo": "`mj_kinematics`, `mj_comPos`, `mj_crb`, `mj_fullM`", "Drake": "`CalcMassMatrix`"},
+    "mass_matrix_inverse": {"Pinocchio": "`computeMinverse`"},
+    "inverse_dynamics_derivatives": {"Pinocchio": "`computeRNEADerivatives`"},
+    "forward_dynamics_derivatives": {"Pinocchio": "`computeABADerivatives`"},
+    "mass_matrix_inverse_product": {
+        "Pinocchio": "`computeMinverse`, its product with X by NumPy",
+        "MuJoCo": "`mj_kinematics`, `mj_comPos`, `mj_crb`, `mj_factorM`, `mj_solveM`",
+    },
+}
+"""The calls of other packages that are timed, by call and package."""
 
 
-def _time(microseconds: float | None) -> str:
-    return "" if microseconds is None else f"{microseconds:.3g}"
-
-
-def _ratio(ratio: float | None, goal: float | None) -> str:
-    """A ratio to two digits, marked where it is below its goal."""
-    if ratio is None:
+def number(value: float | None) -> str:
+    """Three digits, without an exponent up to a million."""
+    if value is None:
         return ""
-    return f"{ratio:.2g}" + (" ✗" if goal is not None and ratio < goal else "")
+    return f"{value:,.0f}" if 1000 <= value < 1e6 else f"{value:.3g}"
 
 
-def cells(row: Row) -> list[str]:
-    """One line of the table: model, call, times in µs, ratios."""
-    kernel, python = GOALS[row.call]
-    others = [_time(row.peers.get(name)) for name in ("Pinocchio", "MuJoCo")]
-    return [
-        row.model, str(row.nv), CALLS[row.call], _time(row.kernel), _time(row.peer_kernel), _ratio(row.ratio, kernel),
-        _time(row.python), *others, _ratio(row.python_ratio, python),
-    ]  # fmt: skip
+def _time(time: Time | None) -> str:
+    return number(time and time.median)
 
 
-HEADINGS = ["model", "nv", "call", "C++ µs", "Pinocchio", "ratio", "Python µs", "Pinocchio", "MuJoCo", "ratio"]
+def _ratio(ratio: float | None, met: bool | None) -> str:
+    """A ratio to three digits, with a mark where there is a goal."""
+    return "" if ratio is None else f"{ratio:.3g}" + {None: "", True: " ✓", False: " ✗"}[met]
+
+
+def packages(found: Measured) -> list[str]:
+    """The other packages that were timed, Pinocchio first."""
+    return list(dict.fromkeys(name for row in found.rows for name in row.peers))
+
+
+def headings(found: Measured) -> list[str]:
+    """Of the table: in C++ ours, Pinocchio's and their ratio; from Python ours, all packages' and the ratio of the fastest."""
+    return ["model", "nv", "C++", "Pinocchio", "ratio", "Python", *packages(found), "ratio"]
+
+
+def cells(row: Row, others: Iterable[str]) -> list[str]:
+    """One line of the table: times in microseconds, ratios over ours."""
+    cpp, python = row.met
+    theirs = [_time(row.peers.get(name)) for name in others]
+    own = [row.model, str(row.nv), _time(row.kernel), _time(row.peer_kernel), _ratio(row.ratio, cpp)]
+    return [*own, _time(row.python), *theirs, _ratio(row.python_ratio, python)]
+
+
+def of_call(found: Measured, call: str) -> list[Row]:
+    """The rows of one call."""
+    return [row for row in found.rows if row.call == call]
+
+
+def goals(found: Measured) -> list[list[str]]:
+    """By call: the goal in C++, how many models meet it, the range of ratios; the same from Python."""
+    lines = []
+    for call, both in GOALS.items():
+        line = [CALLS[call]]
+        for which, goal in enumerate(both):
+            rows = of_call(found, call)
+            ratios = [r for r in ((row.ratio, row.python_ratio)[which] for row in rows) if r is not None]
+            met = [m for m in (row.met[which] for row in rows) if m is not None]
+            line += [number(goal), f"{sum(met)} of {len(met)}" if met else "", f"{min(ratios):.3g} to {max(ratios):.3g}" if ratios else ""]
+        lines.append(line)
+    return lines
+
+
+GOAL_HEADINGS = ["call", "goal in C++", "met", "ratios", "goal from Python", "met", "ratios"]
+BATCH_HEADINGS = ["model", "nv", "double, a state", "ratio", "single, a state", "ratio"]
 
 
 def batch_cells(found: Measured) -> list[list[str]]:
     """Lines of the table of batches."""
-    goals = BATCH_GOALS[found.machine["instruction set"]]
     lines = []
     for row in found.batches:
-        ratios = row.ratios or (None, None)
-        lines.append([row.model, _time(row.double), _ratio(ratios[0], goals[0]), _time(row.single), _ratio(ratios[1], goals[1])])
+        line = [row.model, str(row.nv)]
+        for time, ratio, goal in zip(
+            (row.double, row.single), row.ratios or (None, None), BATCH_GOALS[found.machine["instruction set"]], strict=True
+        ):
+            line += [_time(time), _ratio(ratio, None if goal is None or ratio is None else ratio >= goal)]
+        lines.append(line)
     return lines
 
 
-BATCH_HEADINGS = ["model", "double µs a state", "ratio", "single µs a state", "ratio"]
+def cost_cells(figures: list[Figure]) -> list[list[str]]:
+    """Lines of the table of what accuracy costs."""
+    return [[f.name, f"{f.value:.3g}", "" if f.bound is None else f"{f.bound:g}" + (" ✓" if f.passed else " ✗"), f.note] for f in figures]
 
 
-def _markdown(headings: list[str], lines: list[list[str]]) -> str:
-    rule = ["---" if i == 0 else "---:" for i in range(len(headings))]
-    return "\n".join("| " + " | ".join(line) + " |" for line in (headings, rule, *lines)) + "\n"
+COST_HEADINGS = ["way", "ratio", "bound", "time and error"]
 
 
-def page(found: Measured, accuracy: list[Figure]) -> str:
+def fitted(found: Measured) -> list[list[str]]:
+    """Lines of the table of exponents, ours and Pinocchio's."""
+    own, theirs = exponents(found.rows), exponents(found.rows, peer=True)
+    return [[CALLS[call], f"{p:.2f}", f"{theirs[call]:.2f}" if call in theirs else ""] for call, p in own.items()]
+
+
+def _markdown(head: list[str], lines: list[list[str]], words: int = 1) -> str:
+    """A table whose first columns, so many, are words."""
+    rule = ["---" if i < words else "---:" for i in range(len(head))]
+    return "\n".join("| " + " | ".join(line) + " |" for line in (head, rule, *lines)) + "\n"
+
+
+def _compared(found: Measured) -> str:
+    others = packages(found)
+    own = {call: f"`{call}`" for call in CALLS} | {"mass_matrix_inverse_product": "`(H φ M φ* H* + J)⁻¹ @ X`"}
+    lines = [[title, own[call], *(COMPARED[call].get(name, "") for name in others)] for call, title in CALLS.items()]
+    return _markdown(["call", "here", *others], lines, words=2 + len(others))
+
+
+def _calls(found: Measured) -> str:
+    others = packages(found)
+    parts = []
+    for call, title in CALLS.items():
+        cpp, python = GOALS[call]
+        said = f"Goals: {cpp:g} in C++, {python:g} from Python." if cpp and python else "No goal."
+        parts.append(f"### {title[0].upper()}{title[1:]}\n\n{said}\n")
+        parts.append(_markdown(headings(found), [cells(row, others) for row in of_call(found, call)]))
+    return "\n".join(parts)
+
+
+def page(found: Measured, costs: list[Figure]) -> str:
     """docs/performance.md: everything on it is measured in the run that writes it."""
-    machine = "; ".join(f"{name} {value}" for name, value in found.machine.items())
-    fitted = [[CALLS[call], f"{p:.2f}"] for call, p in exponents(found.rows).items()]
-    costs = [[f.name, f"{f.value:.3g}", "" if f.bound is None else f"{f.bound:g}" + ("" if f.passed else " ✗"), f.note] for f in accuracy]
+    machine = "\n".join(f"- {name}: {value}" for name, value in found.machine.items())
+    batch_goals = BATCH_GOALS[found.machine["instruction set"]]
+    asked = " and ".join(f"{goal:g} in {p}" for goal, p in zip(batch_goals, ("double", "single"), strict=True) if goal) or "none here"
+    left_out = "".join(f"- {text}\n" for text in found.left_out) or "- nothing\n"
     return f"""# Speed
 
-Written by `pycraft bench --peers --page docs/performance.md`; no figure here is typed by hand. Measured on:
-{machine}.
+Written by `pycraft bench --peers --page docs/performance.md`: no figure on this page is typed by hand. `--plot` draws cost against length,
+`--json` keeps all times, minimum and median. Measured on
 
-Times are microseconds, the least of several medians, of one pinned core; what a ratio compares is timed in turn. *C++* is the call in
-the core, its checks included; Pinocchio's is its call from Python less the same call on a model without joints. Ratios are the other
-package's time over ours: above one, ours is faster; ✗ marks a goal that is missed. Every result agrees with Pinocchio's to 1e-6 in the
-run that times both. ℳ is full and symmetric here, the upper triangle there. MuJoCo's forward dynamics is `mj_forward` with its constraints.
+{machine}
 
-{_markdown(HEADINGS, [cells(row) for row in found.rows])}
+Compare figures of one run alone: another machine has others.
+
+Times are microseconds. Each is the least median of several rounds on one core, after a warm-up; what a ratio compares is timed in turn. A
+ratio is the other package's time over ours: above one ours is faster; ✓ meets its goal, ✗ misses it. All results agree in the run that
+times them, to {WRONG:g} of the largest entry: with every package's, and where none goes, with our own in extended precision.
+
+*C++* is our call in the core, its checks included, over {STATES} states in rotation. Pinocchio's time in C++ is, of forward and inverse
+dynamics of up to 100 coordinates, that of its own loops in C++ over states (`abaInParallel`, `rneaInParallel`, one thread); of all else its
+call from Python less the same call on a model without joints and less the copies of matrices that its bindings make. *Python* is a call
+from Python on arrays that are ready; the ratio is over the fastest package.
+
+{_compared(found)}
+ℳ and ℳ⁻¹ are full and symmetric here; Pinocchio's `crba` from Python fills both triangles, too, and that is counted. MuJoCo's calls leave
+contacts and constraints off; its `mj_forward` computes positions, inertias, their factors and accelerations, and no state is set while the
+clock runs. Pins of the chains turn about y, x and z in turn, the axes for which other packages have their fastest joints; robots are as
+their files have them, legged ones on a free base.
+
+## Goals
+
+{_markdown(GOAL_HEADINGS, goals(found))}
+## Calls
+
+{_calls(found)}
 ## Batches
 
-A state of a batch of {BATCH}, forward dynamics from Python on one core, and Pinocchio's one call in C++ over it: no peer gains from a
-batch.
+Forward dynamics of {BATCH} states at once from Python, a state's share, and one call of Pinocchio's in C++ over it. Goals on this
+instruction set: {asked}.
 
 {_markdown(BATCH_HEADINGS, batch_cells(found))}
 ## How cost grows
 
-Fitted p of time ~ Nᵖ on chains of 100 links and more. ℳ and ℳ⁻¹ have N² entries, derivatives 2N² and 3N².
+The fitted p of time ~ Nᵖ in C++, on chains of {FITTED_FROM} links and more, up to the longest that was timed. ℳ and ℳ⁻¹ have N² entries,
+derivatives twice and three times as many.
 
-{_markdown(["call", "p"], fitted)}
+{_markdown(["call", "p, ours", "p, Pinocchio"], fitted(found))}
 ## What accuracy costs
 
-Forward dynamics in every form and precision, as a ratio to the plain one in double; ✗ marks a bound that is missed. The plain form runs
-kernels of its own; the others the recursions that the operators share.
+Forward dynamics in other forms and precisions, as a ratio to form `fast` in double, timed in turn; errors against quad precision; ✓ is
+within its bound, ✗ over it. `fast` runs kernels of its own, all other ways the recursions that the operators share. What each way is for:
+[accuracy.md](accuracy.md).
 
-{_markdown(["way", "ratio", "bound", "time and error"], costs)}
-Left out: {"; ".join(found.left_out) or "nothing"}.
-"""
+{_markdown(COST_HEADINGS, cost_cells(costs))}
+## Left out
 
-
-def plot(found: Measured, path: Path) -> None:
-    """Cost against the number of links, log-log, ours and Pinocchio's, with the fitted exponents of ours."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    fitted = exponents(found.rows)
-    figure, axes = plt.subplots(1, 2, figsize=(11, 4.6), layout="constrained")
-    groups: tuple[tuple[str, ...], ...] = (tuple(CALLS)[:2], tuple(CALLS)[2:])
-    for ax, calls in zip(axes, groups, strict=True):
-        for colour, call in enumerate(calls):
-            rows = [row for row in found.rows if row.call == call and row.model.startswith("chain")]
-            sizes: list[Any] = [row.nv for row in rows]
-            label = CALLS[call] + (f", p = {fitted[call]:.2f}" if call in fitted else "")
-            ax.loglog(sizes, [row.kernel for row in rows], "o-", color=f"C{colour}", label=label)
-            theirs = [(row.nv, row.peer_kernel) for row in rows if row.peer_kernel is not None]
-            ax.loglog(*zip(*theirs, strict=True), "x:", color=f"C{colour}", label=f"{CALLS[call]}, Pinocchio")
-        ax.set_xlabel("links of the chain")
-        ax.set_ylabel("time (µs)")
-        ax.grid(True, which="major", alpha=0.3)
-        ax.legend(fontsize=8)
-    figure.savefig(path, dpi=130)
-    plt.close(figure)
+{left_out}"""

@@ -10,8 +10,8 @@ from .described import Described
 from .peer import Peer, PeerRefusal
 
 
-def drake_peer(model: Described) -> Peer:
-    """Drake's forward dynamics (articulated bodies, a continuous plant) on the model.
+def drake_plant(model: Described) -> tuple[Any, np.ndarray, np.ndarray]:
+    """The model as a continuous plant of Drake, and where our q (nq,) and v (nv,) stand in its positions and velocities.
 
     Raises PeerRefusal for hinges other than pin, slider and screw, and for what Drake refuses.
     """
@@ -23,7 +23,10 @@ def drake_peer(model: Described) -> Peer:
         plant.Finalize()
     except RuntimeError as error:
         raise PeerRefusal(" ".join(str(error).split())) from None
-    return _peer(plant, model)
+    joints = [plant.GetJointByName(name) for name, hinge in model.hinges.items() if hinge.v_slice.stop > hinge.v_slice.start]
+    of_q = np.array([joint.position_start() for joint in joints])
+    of_v = np.array([joint.velocity_start() for joint in joints])
+    return plant, of_q, of_v
 
 
 def _build(plant: Any, model: Described) -> None:
@@ -67,14 +70,13 @@ def _build(plant: Any, model: Described) -> None:
     plant.mutable_gravity_field().set_gravity_vector(np.array(model.gravity, float))
 
 
-def _peer(plant: Any, model: Described) -> Peer:
+def drake_peer(model: Described) -> Peer:
+    """Drake's forward dynamics (articulated bodies) on the model. Raises PeerRefusal as `drake_plant` does."""
     from importlib.metadata import version
 
+    plant, of_q, of_v = drake_plant(model)
     context = plant.CreateDefaultContext()
     forces = plant.get_applied_generalized_force_input_port()
-    joints = [plant.GetJointByName(name) for name, hinge in model.hinges.items() if hinge.v_slice.stop > hinge.v_slice.start]
-    of_q = np.array([joint.position_start() for joint in joints])
-    of_v = np.array([joint.velocity_start() for joint in joints])
 
     def forward_dynamics(q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
         positions, velocities, applied = np.empty(model.nv), np.empty(model.nv), np.empty(model.nv)

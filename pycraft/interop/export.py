@@ -113,11 +113,14 @@ def _pinocchio_joint(subhinge: dict[str, Any]) -> Any:
     import pinocchio as pin
 
     axis = np.asarray(subhinge["axis"], float)
+    along = next((i for i in range(3) if np.array_equal(axis, np.eye(3)[i])), None)  # joints about coordinate axes are its fastest
     match subhinge["kind"]:
         case "pin":
-            return pin.JointModelRevoluteUnaligned(axis)
+            aligned = (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ)
+            return pin.JointModelRevoluteUnaligned(axis) if along is None else aligned[along]()
         case "slider":
-            return pin.JointModelPrismaticUnaligned(axis)
+            aligned = (pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ)
+            return pin.JointModelPrismaticUnaligned(axis) if along is None else aligned[along]()
         case "screw":
             return pin.JointModelHelicalUnaligned(axis, float(subhinge["pitch"]))
         case "ball":
@@ -126,13 +129,18 @@ def _pinocchio_joint(subhinge: dict[str, Any]) -> Any:
             return pin.JointModelFreeFlyer()
 
 
+def refuse_large(nv: int) -> None:
+    """Raises PeerRefusal where Pinocchio's work space of so many coordinates takes over 2 GB."""
+    if _PINOCCHIO_BYTES * nv**3 > 2**31:
+        size = _PINOCCHIO_BYTES * nv**3 / 2**30
+        raise PeerRefusal(f"its work space of {nv} coordinates takes {size:.0f} GB (third-order tensors for derivatives)")
+
+
 def pinocchio_peer(model: Described) -> Peer:
     """Pinocchio's articulated-body algorithm (`aba`) on the model. Raises PeerRefusal where its work space takes over 2 GB."""
     import pinocchio as pin
 
-    if _PINOCCHIO_BYTES * model.nv**3 > 2**31:
-        size = _PINOCCHIO_BYTES * model.nv**3 / 2**30
-        raise PeerRefusal(f"its work space of {model.nv} coordinates takes {size:.0f} GB (third-order tensors for derivatives)")
+    refuse_large(model.nv)
     twin = to_pinocchio(model)
     data = twin.model.createData()
 

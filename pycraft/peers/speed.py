@@ -1,83 +1,85 @@
-"""Direct calls beside other packages' on the same models, in one run: `pycraft bench --peers`.
+"""Direct calls beside other packages' on the same models, in one run: what `pycraft bench --peers` measures.
 
-Every figure is the least of several medians, and what a ratio compares is timed in turn. Kernels are timed inside C++, checks included, one
-state after another of a set; a peer has only its call from Python, so what its bindings take is measured on a model without joints and
-taken off. Each result is checked against the peer's before it is timed.
+Every figure is the least of several medians, and what a ratio compares is timed in turn. Ours are timed inside C++, checks included, one
+state after another of a set, and from Python. A peer is what is installed: calls from Python. For forward and inverse dynamics Pinocchio
+has loops in C++ over states, which give its time in C++; of its other calls that time is the one from Python less what the bindings take on
+a model without joints, and less the copies of matrices that they make. Each result is checked against the peer's before it is timed.
 """
 
 from __future__ import annotations
 
-import os
-import platform
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from functools import partial
-from importlib.resources import as_file, files
 from typing import Any
 
 import numpy as np
 
 from .. import _core
-from ..interop import pinocchio as convention
-from ..interop.export import PeerRefusal, to_mjcf, to_pinocchio
-from ..interop.mujoco import to_mujoco
-from ..interop.packages import required
-from ..models import robots
-from ..models.generators import chain
+from ..interop.peer import PeerRefusal
+from .clock import Clock, Time, elapsed, in_turn, machine, pin_to_one_core
+from .peer_calls import Call, other_packages
+from .timed_models import CHAINS, timed_models
 
-CHAINS = (10, 30, 100, 300, 1000)
-LONGEST = (10_000, 100_000)
-"""Chains that only calls of cost O(N) are timed on."""
 LINEAR = ("forward_dynamics", "inverse_dynamics")
-WITH_PINOCCHIO = 400
-"""Links of the longest chain with Pinocchio beside: its work space grows as nv³, 32 GB at 1000."""
 STATES = 8
 BATCH = 1024
+COLUMNS = 64
+WRONG = 1e-6
+"""Two packages' results differ by less, relative to the largest entry, or nothing is timed."""
 
-GOALS = {  # of the kernels in C++; from Python
+GOALS: dict[str, tuple[float | None, float | None]] = {  # times faster than the fastest peer: in C++; from Python
     "forward_dynamics": (3.0, 2.0),
     "inverse_dynamics": (2.0, 2.0),
-    "mass_matrix": (1.3, None),
-    "mass_matrix_inverse": (1.5, None),
-    "inverse_dynamics_derivatives": (1.5, None),
-    "forward_dynamics_derivatives": (2.0, None),
+    "mass_matrix": (1.3, 1.3),
+    "mass_matrix_inverse": (1.5, 1.5),
+    "inverse_dynamics_derivatives": (1.5, 1.5),
+    "forward_dynamics_derivatives": (2.0, 2.0),
+    "mass_matrix_inverse_product": (None, None),
 }
 BATCH_GOALS = {"baseline": (None, None), "avx2": (6.0, 10.0), "avx512": (12.0, 20.0)}
-"""Of a state of a batch over one call of the peer, in double and in single precision."""
+"""Of a state of a batch over one call of the peer in C++, in double and in single precision, by instruction set."""
 
 
 @dataclass
 class Row:
-    """One call on one model, microseconds; a peer's time in C++ is that from Python less what its bindings take."""
+    """One call on one model: our times in C++ and from Python, the peers' from Python by name, Pinocchio's in C++; ours against each."""
 
     model: str
     nv: int
     call: str
-    kernel: float
-    python: float
-    peers: dict[str, float] = field(default_factory=dict)
-    peer_kernel: float | None = None
-    error: float | None = None
+    kernel: Time
+    python: Time
+    peers: dict[str, Time] = field(default_factory=dict)
+    peer_kernel: Time | None = None
+    errors: dict[str, float] = field(default_factory=dict)
 
     @property
     def ratio(self) -> float | None:
-        """Pinocchio's kernel over ours."""
-        return None if self.peer_kernel is None else self.peer_kernel / self.kernel
+        """Pinocchio's time in C++ over ours."""
+        return None if self.peer_kernel is None else self.peer_kernel.median / self.kernel.median
 
     @property
     def python_ratio(self) -> float | None:
-        """The fastest peer over ours, both called from Python."""
-        return min(self.peers.values()) / self.python if self.peers else None
+        """The fastest peer's time over ours, both called from Python."""
+        return min(t.median for t in self.peers.values()) / self.python.median if self.peers else None
+
+    @property
+    def met(self) -> tuple[bool | None, bool | None]:
+        """Whether the goals are met, in C++ and from Python; None where there is no goal or no peer."""
+        goals, ratios = GOALS[self.call], (self.ratio, self.python_ratio)
+        cpp, python = (None if goal is None or ratio is None else ratio >= goal for goal, ratio in zip(goals, ratios, strict=True))
+        return cpp, python
 
 
 @dataclass
 class BatchRow:
-    """A state of a batch of `BATCH`, microseconds, and one call of the peer's kernel over it."""
+    """Forward dynamics of one state of a batch of `BATCH`, and one call of Pinocchio's in C++ over it (double, single)."""
 
     model: str
-    double: float
-    single: float
+    nv: int
+    double: Time
+    single: Time
     ratios: tuple[float, float] | None = None
 
 
@@ -91,213 +93,195 @@ class Measured:
     left_out: list[str] = field(default_factory=list)
 
     def as_json(self) -> dict[str, Any]:
-        """Plain data, ratios and fitted exponents included."""
-        rows = [{**asdict(row), "ratio": row.ratio, "python_ratio": row.python_ratio} for row in self.rows]
-        return {**asdict(self), "rows": rows, "exponents": exponents(self.rows)}
+        """Plain data: times in microseconds, with ratios, goals met and fitted exponents."""
+        rows = []
+        for row in self.rows:
+            times: dict[str, Any] = {"kernel": row.kernel._asdict(), "python": row.python._asdict()}
+            times["peer_kernel"] = row.peer_kernel and row.peer_kernel._asdict()
+            peers = {name: t._asdict() for name, t in row.peers.items()}
+            judged = {"ratio": row.ratio, "python_ratio": row.python_ratio, "goals": GOALS[row.call], "met": row.met}
+            rows.append({**asdict(row), **times, "peers": peers, **judged})
+        batches = [{**asdict(row), "double": row.double._asdict(), "single": row.single._asdict()} for row in self.batches]
+        fitted = {"ours": exponents(self.rows), "Pinocchio": exponents(self.rows, peer=True)}
+        return {**asdict(self), "unit": "microseconds", "rows": rows, "batches": batches, "exponents": fitted}
+
+    def leave_out(self, text: str) -> None:
+        """Say once what is not compared, and why."""
+        if text not in self.left_out:
+            self.left_out.append(text)
 
 
-def machine() -> dict[str, str]:
-    """What was measured on."""
-    model = platform.processor() or platform.machine()
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8") as info:
-            model = next((line.split(":", 1)[1].strip() for line in info if line.startswith("model name")), model)
-    except OSError:
-        pass
-    return {"processor": model, "instruction set": _core.instruction_set(), "python": platform.python_version(), "numpy": np.__version__}
-
-
-def pinned() -> None:
-    """This process on one core, where the system lets it."""
-    if hasattr(os, "sched_setaffinity"):
-        os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
-
-
-def elapsed(f: Callable[[], Any], seconds: float) -> float:
-    """Seconds a call: the median of batches long enough for the clock, after a first call to warm up."""
-    f()
-    begin = time.perf_counter()
-    f()
-    count = max(1, int(2e-4 / max(time.perf_counter() - begin, 1e-8)))
-    batches: list[float] = []
-    end = time.perf_counter() + seconds
-    while time.perf_counter() < end or len(batches) < 5:
-        begin = time.perf_counter()
-        for _ in range(count):
-            f()
-        batches.append((time.perf_counter() - begin) / count)
-    return float(np.median(batches))
-
-
-def least(seconds: float, *timed: Callable[[float], float], rounds: int = 3) -> list[float]:
-    """Of each the least of several measurements, one after the other, in microseconds."""
-    found = [[each(seconds / rounds) for each in timed] for _ in range(rounds)]
-    return [1e6 * min(of_one) for of_one in zip(*found, strict=True)]
-
-
-class Pinocchio:
-    """Pinocchio's calls on a model of ours, in our order where they are checked."""
-
-    def __init__(self, model: Any, path: str | None):
-        self.pin = required("pinocchio", "peers", "comparison with Pinocchio needs")
-        floating = model.nq != model.nv
-        if path is None:
-            twin = to_pinocchio(model)
-            self.model, self.q, self.S = twin.model, twin.q, np.eye(model.nv)[twin.of_v]
-        else:  # joints about coordinate axes are then of Pinocchio's faster kinds
-            self.model = convention.build(path, "free" if floating else "fixed")
-            order = convention.coordinates(model, self.model)
-            self.q, self.S = order.q, order.velocities(model.random_state(0).q)
-        self.model.gravity.linear = np.array(model.gravity, float)
-        self.data = self.model.createData()
-
-    def calls(self, q: np.ndarray, v: np.ndarray, u: np.ndarray) -> dict[str, tuple[Callable[[], Any], Callable[[], np.ndarray]]]:
-        """By our names: the call, and its value as we write it."""
-        pin, model, data, S = self.pin, self.model, self.data, self.S
-        q, v, u = self.q(q), S @ v, S @ u
-
-        def full(upper: np.ndarray) -> np.ndarray:
-            return S.T @ (np.triu(upper) + np.triu(upper, 1).T) @ S
-
-        return {
-            "forward_dynamics": (lambda: pin.aba(model, data, q, v, u), lambda: S.T @ pin.aba(model, data, q, v, u)),
-            "inverse_dynamics": (lambda: pin.rnea(model, data, q, v, u), lambda: S.T @ pin.rnea(model, data, q, v, u)),
-            "mass_matrix": (lambda: pin.crba(model, data, q), lambda: full(pin.crba(model, data, q))),
-            "mass_matrix_inverse": (lambda: pin.computeMinverse(model, data, q), lambda: full(pin.computeMinverse(model, data, q))),
-            "inverse_dynamics_derivatives": (
-                lambda: pin.computeRNEADerivatives(model, data, q, v, u),
-                lambda: S.T @ pin.computeRNEADerivatives(model, data, q, v, u)[1] @ S,
-            ),
-            "forward_dynamics_derivatives": (
-                lambda: pin.computeABADerivatives(model, data, q, v, u),
-                lambda: S.T @ pin.computeABADerivatives(model, data, q, v, u)[1] @ S,
-            ),
-        }
-
-    def bindings(self, seconds: float) -> dict[str, float]:
-        """What each call takes on a model without joints, seconds."""
-        empty = Pinocchio.__new__(Pinocchio)
-        empty.pin, empty.model, empty.q, empty.S = self.pin, self.pin.Model(), lambda q: q, np.eye(0)
-        empty.data = empty.model.createData()
-        return {name: elapsed(call, seconds) for name, (call, _) in empty.calls(np.zeros(0), np.zeros(0), np.zeros(0)).items()}
-
-
-def models(quick: bool = False) -> Iterator[tuple[Any, str | None]]:
-    """What is timed: robots with their files, then chains."""
-    for name in ("ur5", "panda") if quick else ("ur5", "panda", "a1", "g1"):
-        with as_file(files("pycraft.models") / "robots" / f"{name}.urdf") as path:
-            yield getattr(robots, name)(), str(path)
-    for n in CHAINS[:2] if quick else (*CHAINS, *LONGEST):
-        yield chain(n, seed=1), None
-
-
-def _states(model: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def states_of(model: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """q (8, nq), v and u (8, nv): the states that are timed."""
     states = [model.random_state(seed) for seed in range(STATES)]
     return np.array([s.q for s in states]), np.array([s.v for s in states]), np.array([s.v for s in states[::-1]])
 
 
-def _ours(model: Any, call: str, q: np.ndarray, v: np.ndarray, u: np.ndarray) -> Callable[[], Any]:
-    """The call from Python, as it is fastest."""
-    n = model.nv
-    vector, matrix = np.empty(n), np.empty((n, n) if n <= max(CHAINS) else (0, 0))
-    return {
-        "forward_dynamics": lambda: model.forward_dynamics(q, v, u, out=vector),
-        "inverse_dynamics": lambda: model.inverse_dynamics(q, v, u, out=vector),
-        "mass_matrix": lambda: model.mass_matrix(q, out=matrix),
-        "mass_matrix_inverse": lambda: model.mass_matrix_inverse(q, out=matrix),
-        "inverse_dynamics_derivatives": lambda: model.inverse_dynamics_derivatives(q, v, u),
-        "forward_dynamics_derivatives": lambda: model.forward_dynamics_derivatives(q, v, u),
-    }[call]
+class OwnCalls:
+    """Our calls on a model at the first of its states, as they are fastest from Python, and their clocks in C++."""
+
+    def __init__(self, model: Any, states: tuple[np.ndarray, np.ndarray, np.ndarray]):
+        self.model, self.states = model, states
+        Q, V, U = states
+        self.q, self.v, self.u = Q[0], V[0], U[0]
+        n = model.nv
+        self.X = np.random.default_rng(0).uniform(-1, 1, (n, COLUMNS)) if n <= max(CHAINS) else np.empty((n, 0))
+        self.vector, self.matrix = np.empty(n), np.empty((n, n) if n <= max(CHAINS) else (0, 0))
+        H, phi, M, J = model.soa("H phi M J")
+        self.inverse = (H @ phi @ M @ phi.T @ H.T + J).inv()
+
+    def run(self, call: str) -> Any:
+        """The call itself."""
+        model, q, v, u = self.model, self.q, self.v, self.u
+        match call:
+            case "forward_dynamics" | "inverse_dynamics":
+                return getattr(model, call)(q, v, u, out=self.vector)
+            case "mass_matrix" | "mass_matrix_inverse":
+                return getattr(model, call)(q, out=self.matrix)
+            case "mass_matrix_inverse_product":
+                model.q = q
+                return self.inverse @ self.X
+        return getattr(model, call)(q, v, u)
+
+    def from_python(self, call: str) -> Callable[[], Any]:
+        """What is timed: nothing is looked up while the clock runs."""
+        model, q, v, u, vector, matrix = self.model, self.q, self.v, self.u, self.vector, self.matrix
+        own = getattr(model, call, None)
+        match call:
+            case "forward_dynamics" | "inverse_dynamics":
+                return lambda: own(q, v, u, out=vector)  # type: ignore[misc]  # a call of the model
+            case "mass_matrix" | "mass_matrix_inverse":
+                return lambda: own(q, out=matrix)  # type: ignore[misc]  # a call of the model
+            case "mass_matrix_inverse_product":
+                return lambda: self.run(call)
+        return lambda: own(q, v, u)  # type: ignore[misc]  # a call of the model
+
+    def in_cpp(self, call: str) -> Clock:
+        """A clock without Python in the loop."""
+        if call == "mass_matrix_inverse_product":
+            self.model.q = self.q
+            return partial(_core.time_apply, self.inverse, self.X)
+        return partial(_core.time_dynamics, self.model, call, *self.states)
 
 
-def _value(call: str, given: Any) -> np.ndarray:
-    """What is compared: of derivatives those along velocities."""
-    return given[1] if isinstance(given, tuple) else np.asarray(given)
+def _checked(name: str, call: str, given: Any, expected: tuple[np.ndarray, ...], whose: str) -> float:
+    """The largest relative difference of a call's arrays. Raises EvaluationError where they are not the same."""
+    ours = given if isinstance(given, tuple) else (given,)
+    worst = 0.0
+    for mine, other in zip(ours, expected, strict=True):
+        size = max(float(np.abs(mine).max(initial=0.0)), float(np.abs(other).max(initial=0.0)), 1e-300)
+        error = float(np.abs(mine - other).max(initial=0.0)) / size
+        if not error < WRONG:
+            raise _core.EvaluationError(f"{call} of {name} is not {whose} in the run that times it: off by {error:.1e}")
+        worst = max(worst, error)
+    return worst
 
 
-def _row(model: Any, call: str, peer: Pinocchio | None, overhead: dict[str, float], seconds: float) -> Row:
-    Q, V, U = _states(model)
-    ours = _ours(model, call, Q[0], V[0], U[0])
-    timed: list[Callable[[float], float]] = [lambda s: _core.time_dynamics(model, call, Q, V, U, s)["median"], partial(elapsed, ours)]
-    row = Row(model.name, model.nv, call, 0.0, 0.0)
-    if peer is not None:
-        theirs, value = peer.calls(Q[0], V[0], U[0])[call]
-        found, other = _value(call, ours()), value()
-        row.error = float(np.abs(found - other).max() / np.abs(found).max())
-        if not row.error < 1e-6:
-            raise _core.EvaluationError(f"{call} of {model.name} is not Pinocchio's in the run that times both: off by {row.error:.1e}")
-        timed.append(partial(elapsed, theirs))
-    row.kernel, row.python, *of_peer = least(seconds, *timed)
-    if of_peer:
-        row.peers["Pinocchio"] = of_peer[0]
-        row.peer_kernel = max(of_peer[0] - 1e6 * overhead[call], 1e-3)
+def _checked_alone(name: str, call: str, own: OwnCalls) -> float:
+    """Where no peer goes: against extended precision; derivatives against each other, ℳ ∂v̇ = -∂τ at the accelerations of τ."""
+    model, q, v, u = own.model, own.q, own.v, own.u
+    exact = partial(getattr(model, call, model.mass_matrix_inverse), precision="extended")
+    match call:
+        case "forward_dynamics" | "inverse_dynamics":
+            return _checked(name, call, own.run(call), (exact(q, v, u),), "that of extended precision")
+        case "mass_matrix" | "mass_matrix_inverse":
+            return _checked(name, call, own.run(call), (exact(q),), "that of extended precision")
+        case "mass_matrix_inverse_product":
+            return _checked(name, call, own.run(call), (exact(q) @ own.X,), "that of extended precision")
+    slopes = model.forward_dynamics_derivatives(q, v, u)
+    forces = model.inverse_dynamics_derivatives(q, v, model.forward_dynamics(q, v, u))
+    M = model.mass_matrix(q)
+    worst = 0.0
+    for slope, force in zip(slopes[:2], forces[:2], strict=True):
+        error = float(np.abs(M @ slope + force).max() / (np.abs(M) @ np.abs(slope)).max())
+        if not error < WRONG:
+            raise _core.EvaluationError(f"derivatives of {name} do not belong together in the run that times them: off by {error:.1e}")
+        worst = max(worst, error)
+    return worst
+
+
+def measured_row(name: str, own: OwnCalls, call: str, peers: dict[str, Call], seconds: float, pinocchio: Any = None) -> Row:
+    """One call on one model, checked, then timed in turn with the peers'. `pinocchio`: its calls, for its time in C++."""
+    row = Row(name, own.model.nv, call, Time(0.0, 0.0), Time(0.0, 0.0))
+    for peer, other in peers.items():
+        row.errors[peer] = _checked(name, call, own.run(call), other.value(), f"{peer}'s")
+    if not peers:
+        row.errors["alone"] = _checked_alone(name, call, own)
+    clocks: list[Clock] = [own.in_cpp(call), partial(elapsed, own.from_python(call))]
+    clocks += [partial(elapsed, other.run) for other in peers.values()]
+    loop = None if pinocchio is None else pinocchio.in_cpp(call, *own.states)
+    row.kernel, row.python, *others = in_turn(seconds, *clocks, *([loop[0]] if loop else []))
+    row.peers = dict(zip(peers, others, strict=False))
+    if loop:
+        row.peer_kernel = others[-1].shared(loop[1])
+    elif pinocchio is not None:
+        row.peer_kernel = row.peers["Pinocchio"].less(_not_its_own(pinocchio, call, peers["Pinocchio"].copies, own.model.nv, seconds))
     return row
 
 
-def _with_mujoco(model: Any, row: Row, seconds: float, left_out: list[str]) -> None:
-    """MuJoCo's `mj_forward` beside forward dynamics: kinematics, inertia and its factors, as that call has them."""
-    try:
-        import mujoco
-    except ImportError:
-        left_out.append("MuJoCo: not installed")
-        return
-    try:
-        twin = mujoco.MjModel.from_xml_string(to_mjcf(model))
-    except (ValueError, PeerRefusal) as refusal:
-        left_out.append(f"MuJoCo on {model.name}: {refusal}")
-        return
-    data = mujoco.MjData(twin)
-    q, v, u = (x[0] for x in _states(model))
-    data.qpos, data.qvel = to_mujoco(model, q, v)
-    data.qfrc_applied = u
-    row.peers["MuJoCo"] = least(seconds, partial(elapsed, lambda: mujoco.mj_forward(twin, data)))[0]
+def _not_its_own(pinocchio: Any, call: str, copies: int, n: int, seconds: float) -> float:
+    """What Pinocchio's bindings take of a call, microseconds: of the call without joints, and of copies of a matrix n by n."""
+    bare, empty, matrix = pinocchio.bindings(call), np.empty((0, 0)), np.empty((n, n))
+    if not copies:
+        return in_turn(seconds / 4, partial(elapsed, bare))[0].median
+    clocks = (partial(elapsed, f) for f in (bare, empty.copy, matrix.copy))
+    overhead, nothing, copy = in_turn(seconds / 4, *clocks)
+    return overhead.median + copies * max(copy.median - nothing.median, 0.0)
 
 
-def _batch(model: Any, peer_kernel: float | None, seconds: float) -> BatchRow:
-    Q, V, U = (np.tile(x, (BATCH // STATES, 1)) for x in _states(model))
-    out = np.empty_like(V)
-    double, single = least(
-        seconds,
-        partial(elapsed, lambda: model.forward_dynamics(Q, V, U, out=out)),
-        partial(elapsed, lambda: model.forward_dynamics(Q, V, U, precision="single", out=out)),
+def _batch(name: str, own: OwnCalls, peer_kernel: Time | None, seconds: float) -> BatchRow:
+    Q, V, U = (np.tile(x, (BATCH // STATES, 1)) for x in own.states)
+    out, model = np.empty_like(V), own.model
+    double, single = (
+        time.shared(BATCH)
+        for time in in_turn(
+            seconds,
+            partial(elapsed, lambda: model.forward_dynamics(Q, V, U, out=out)),
+            partial(elapsed, lambda: model.forward_dynamics(Q, V, U, precision="single", out=out)),
+        )
     )
-    double, single = double / BATCH, single / BATCH
-    return BatchRow(model.name, double, single, None if peer_kernel is None else (peer_kernel / double, peer_kernel / single))
+    ratios = None if peer_kernel is None else (peer_kernel.median / double.median, peer_kernel.median / single.median)
+    return BatchRow(name, model.nv, double, single, ratios)
 
 
 def measure(seconds: float = 0.1, quick: bool = False, progress: Callable[[str], None] = lambda text: None) -> Measured:
-    """All figures. `quick`: two robots and two short chains. MissingPackageError where Pinocchio is not installed."""
-    required("pinocchio", "peers", "comparison with Pinocchio needs")
-    pinned()
-    found = Measured(machine())
-    if not quick:
-        found.left_out += ["ANYmal, Talos: their files come with no package that is needed here", "Drake, CasADi: not compared"]
-    overhead: dict[str, float] = {}
-    for model, path in models(quick):
-        progress(model.name)
-        model.gravity = (0, 0, -9.81)
-        beyond = model.nv > max(CHAINS)
-        peer = None if model.nv > WITH_PINOCCHIO else Pinocchio(model, path)
-        if not beyond and peer is None:
-            found.left_out.append(f"Pinocchio on {model.name}: its work space grows as nv³")
-        overhead = overhead or (peer.bindings(seconds) if peer else {})
-        calls = LINEAR if beyond else tuple(GOALS) if model.nv < max(CHAINS) else tuple(GOALS)[:-1]
-        for call in calls:
-            found.rows.append(_row(model, call, peer, overhead, seconds))
-            if call == "forward_dynamics" and peer:
-                _with_mujoco(model, found.rows[-1], seconds, found.left_out)
-        if not beyond and model.nv <= 100:
-            kernel = next(row.peer_kernel for row in found.rows if row.model == model.name and row.call == "forward_dynamics")
-            found.batches.append(_batch(model, kernel, seconds))
+    """All figures, `seconds` for each; `quick`: two robots and two short chains. MissingPackageError where Pinocchio is not installed."""
+    found = Measured(machine() | {"cores": pin_to_one_core()})
+    makers = other_packages(found.leave_out)
+    for name, model in timed_models(quick, found.leave_out):
+        progress(name)
+        own = OwnCalls(model, states_of(model))
+        if model.nv > max(CHAINS):
+            found.rows += [measured_row(name, own, call, {}, seconds) for call in LINEAR]
+            continue
+        packages = {}
+        for make in makers:
+            try:
+                packages[make.name] = make(model)
+            except PeerRefusal as refusal:
+                found.leave_out(f"{make.name} on {name}: {refusal}")
+        theirs = {peer: package.calls(own.q, own.v, own.u, own.X) for peer, package in packages.items()}
+        for call in GOALS:
+            progress(f"{name}: {call.replace('_', ' ')}")
+            peers = {peer: calls[call] for peer, calls in theirs.items() if call in calls}
+            found.rows.append(measured_row(name, own, call, peers, seconds, packages.get("Pinocchio")))
+        forward = next(row for row in found.rows if (row.model, row.call) == (name, "forward_dynamics"))
+        found.batches.append(_batch(name, own, forward.peer_kernel, seconds))
     return found
 
 
-def exponents(rows: list[Row]) -> dict[str, float]:
-    """By call the fitted p of time ~ N^p on chains of 100 links and more."""
+FITTED_FROM = 30
+"""Links of the shortest chain that an exponent is fitted to."""
+
+
+def exponents(rows: list[Row], peer: bool = False) -> dict[str, float]:
+    """By call the fitted p of time ~ N^p in C++, ours or Pinocchio's, on chains of 30 links and more."""
     fitted = {}
     for call in dict.fromkeys(row.call for row in rows):
-        points = [(row.nv, row.kernel) for row in rows if row.call == call and row.model.startswith("chain") and row.nv >= 100]
+        chains = [row for row in rows if row.call == call and row.model.startswith("chain") and row.nv >= FITTED_FROM]
+        times = [(row.nv, row.peer_kernel if peer else row.kernel) for row in chains]
+        points = np.array([(n, time.median) for n, time in times if time is not None])
         if len(points) >= 2:
-            sizes, times = np.log(np.array(points)).T
-            fitted[call] = float(np.polyfit(sizes, times, 1)[0])
+            sizes, costs = np.log(points).T
+            fitted[call] = float(np.polyfit(sizes, costs, 1)[0])
     return fitted
