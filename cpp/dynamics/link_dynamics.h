@@ -43,7 +43,7 @@ class LinkDynamics {
       const kernels::Kernels<T>& kernel = chosen(count - b, matrix);
       const kernels::Kernel<T>& how = kernel[call];
       const int lanes = std::min(kernel.lanes, count - b);
-      const kernels::States<T> states{q.at(b), v ? v->at(b) : nullptr, u ? u->at(b) : nullptr, stride(q), v ? stride(*v) : 0, u ? stride(*u) : 0, lanes, gravity, wrenches};
+      const kernels::States<T> states{q.at(b), v ? v->at(b) : nullptr, u ? u->at(b) : nullptr, stride(q), v ? stride(*v) : 0, u ? stride(*u) : 0, lanes, gravity, wrenches, check_interrupt};
       const unsigned sound = how.run(model_->links(), states, out + size_t(b) * size, size, work(how.work(model_->links())));
       for (const int end = b + lanes, first = b; b < end; ++b) {
         const bool sure = (sound >> (b - first) & 1) && (matrix || all_finite(out + size_t(b) * size, size));

@@ -52,10 +52,11 @@ template <bool forces, class S, class Move>
 }
 
 // The upper triangle of n numbers a side mirrored. False where one of them is no number or not finite.
-inline bool mirror(double* out, int n) {
+inline bool mirror(double* out, int n, void (*interrupt)()) {
   constexpr int tile = 8;
   double odd[tile] = {};
-  for (int top = 0; top < n; top += tile)
+  for (int top = 0; top < n; top += tile) {
+    if (n > 1024) interrupt();
     for (int left = 0; left <= top; left += tile) {
       if (left == top || top + tile > n) {
         for (int i = top; i < n && i < top + tile; ++i)
@@ -76,6 +77,7 @@ inline bool mirror(double* out, int n) {
       for (int i = 0; i < tile; ++i)
         for (int j = 0; j < tile; ++j) out[size_t(top + i) * n + left + j] = block[i][j];
     }
+  }
   for (int i = 1; i < tile; ++i) odd[0] += odd[i];
   return odd[0] == 0;
 }

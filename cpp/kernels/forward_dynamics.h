@@ -230,6 +230,7 @@ inline typename S::Bits articulated_tip_to_base(const Links<T>& links, const Sta
     if (links.link[k].branches) w.branch[k] = no_inertia<S>();
   Inertia<S> P;
   for (int k = links.count - 1; k >= 0; --k) {
+    stay_open(at, k);
     const Link<T>& link = links.link[k];
     ForwardLink<S>& own = w.link[k];
     const bool leaf = k + 1 == links.count || links.link[k + 1].parent != k;

@@ -82,6 +82,7 @@ unsigned inverse_dynamics(const Links<typename S::Scalar>& links, const States<t
     });
   }
   for (int k = links.count - 1; k >= 0; --k) {
+    stay_open(at, k);
     const Link<T>& link = links.link[k];
     with_step(link.step, [&](auto kind) { give_forces<decltype(kind)>(link, at, w[k], out, stride); });
     if (link.parent >= 0) w[link.parent].n = w[link.parent].n + w[k].n, w[link.parent].f = w[link.parent].f + w[k].f;

@@ -19,7 +19,4 @@ struct KernelsOf {
   static constexpr Kernels<T> all{W, {{forward_dynamics<S>, forward}, {inverse_dynamics<S>, inverse}, {mass_matrix<S>, matrix}, {mass_matrix_inverse<S>, matrix_inverse}}};
 };
 
-template <class T, int W>
-inline constexpr Kernels<T> kernels_of = KernelsOf<T, W>::all;
-
 }  // namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET

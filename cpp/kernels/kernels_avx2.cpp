@@ -6,7 +6,7 @@ namespace pycraft::kernels {
 
 extern const Kernels<double> avx2_one, avx2_pack;
 extern const Kernels<float> avx2_singles;
-const Kernels<double> avx2_one = avx2::kernels_of<double, 1>, avx2_pack = avx2::kernels_of<double, 4>;
-const Kernels<float> avx2_singles = avx2::kernels_of<float, 8>;
+const Kernels<double> avx2_one = avx2::KernelsOf<double, 1>::all, avx2_pack = avx2::KernelsOf<double, 4>::all;
+const Kernels<float> avx2_singles = avx2::KernelsOf<float, 8>::all;
 
 }  // namespace pycraft::kernels

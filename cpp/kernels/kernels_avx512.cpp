@@ -6,7 +6,7 @@ namespace pycraft::kernels {
 
 extern const Kernels<double> avx512_pack;
 extern const Kernels<float> avx512_singles;
-const Kernels<double> avx512_pack = avx512::kernels_of<double, 8>;
-const Kernels<float> avx512_singles = avx512::kernels_of<float, 16>;
+const Kernels<double> avx512_pack = avx512::KernelsOf<double, 8>::all;
+const Kernels<float> avx512_singles = avx512::KernelsOf<float, 16>::all;
 
 }  // namespace pycraft::kernels

@@ -48,6 +48,7 @@ struct States {
   int states;
   const T* gravity;   // three numbers
   const T* wrenches;  // (n; f) on every link in its frame about its origin, at all states; null: none
+  void (*interrupt)();  // asked in long loops; it throws to stop them
 };
 
 // What a call is: `run` writes the results to out + b out_stride, in `work`, aligned to 64 bytes and of as many numbers as the other function

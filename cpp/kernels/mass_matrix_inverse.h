@@ -140,11 +140,13 @@ unsigned mass_matrix_inverse(const Links<typename S::Scalar>& links, const State
   }
   unsigned sound = S::mask(articulated_tip_to_base(links, at, w));
   for (int k = links.count - 1; k >= 0; --k) {
+    stay_open(at, k, N);
     const Link<T>& link = links.link[k];
     S* const row = rows + size_t(link.v) * N + link.v;
     with_step(link.step, [&](auto kind) { innovations<decltype(kind)>(link, w.link[k], *w.of(link), own.lying[k], Columns<S>(own.z, N, link.v), row, N); });
   }
   for (int k = 0; k < links.count; ++k) {
+    stay_open(at, k, N);
     const Link<T>& link = links.link[k];
     const Columns<S> alpha(own.alpha + size_t(6) * N * link.slot, N, link.v);
     const int count = N - link.v, above = link.parent < 0 ? -1 : links.link[link.parent].slot;
@@ -161,7 +163,7 @@ unsigned mass_matrix_inverse(const Links<typename S::Scalar>& links, const State
     if (rows == own.rows)
       for (int i = 0; i < N; ++i)
         for (int j = i; j < N; ++j) to[size_t(i) * N + j] = double(rows[size_t(i) * N + j].lane(b));
-    if (!mirror(to, N)) sound &= ~(1u << b);
+    if (!mirror(to, N, at.interrupt)) sound &= ~(1u << b);
   }
   return sound;
 }

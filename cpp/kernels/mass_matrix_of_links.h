@@ -130,6 +130,7 @@ unsigned mass_matrix(const Links<typename S::Scalar>& links, const States<typena
   }
   CompositeInertia<S> R = nothing;
   for (int k = links.count - 1; k >= 0; --k) {
+    stay_open(at, k, N);
     const Link<T>& link = links.link[k];
     if (k + 1 == links.count || links.link[k + 1].parent != k) R = nothing;
     if (link.branches) add(R, w.branch[k]);
@@ -143,7 +144,7 @@ unsigned mass_matrix(const Links<typename S::Scalar>& links, const States<typena
     if (link.parent >= 0 && link.parent != k - 1) add(w.branch[link.parent], R);
   }
   unsigned sound = 0;
-  for (int b = 0; b < S::width && b < at.states; ++b) sound |= unsigned(mirror(out + b * out_stride, N)) << b;
+  for (int b = 0; b < S::width && b < at.states; ++b) sound |= unsigned(mirror(out + b * out_stride, N, at.interrupt)) << b;
   return sound;
 }
 

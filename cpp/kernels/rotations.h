@@ -1,4 +1,4 @@
-// How a link is turned against its parent: about a coordinate axis (Planar), by any rotation (Full), or not at all (Same). Each turns vectors
+// How a link is turned against its parent: about a coordinate axis (Planar) or by any rotation (Full). Each turns vectors
 // to and from the parent's axes and blocks R A R* of inertias, by no more than its structure asks: a planar one mixes two of three rows.
 //
 // turn<zero>(P) turns the three blocks of an inertia [[A, B], [B*, C]] of which row and column `zero` of A and row `zero` of B are exactly zero
@@ -29,17 +29,6 @@ template <class S>
 [[gnu::always_inline]] inline Inertia<S> no_inertia() {
   return {Symmetric3<S>::zero(), Matrix3<S>::zero(), Symmetric3<S>::zero(), Vector3<S>::zero(), Vector3<S>::zero(), S(0), S(1)};
 }
-
-template <class S>
-struct Same {
-  template <int zero>
-  static constexpr int turned_zero = zero;
-  [[gnu::always_inline]] Vector3<S> to_child(const Vector3<S>& x) const { return x; }
-  [[gnu::always_inline]] Vector3<S> to_parent(const Vector3<S>& x) const { return x; }
-  [[gnu::always_inline]] void turn_symmetric(Symmetric3<S>&) const {}
-  template <int>
-  [[gnu::always_inline]] void turn(Inertia<S>&) const {}
-};
 
 // About axis K by the angle whose cosine and sine are c and s.
 template <int K, class S>

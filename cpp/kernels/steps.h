@@ -12,6 +12,12 @@ namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET {
 template <class S>
 using LinkOf = Link<typename S::Scalar>;
 
+// In loops over links k, each of some 100 operations on so many columns, as runtime/interrupt.h has it.
+template <class T>
+[[gnu::always_inline]] inline void stay_open(const States<T>& at, int k, int columns = 1) {
+  if ((k & 255) == 255 || columns > 64) at.interrupt();
+}
+
 // What a configuration makes of a link.
 template <class S>
 struct Place {

@@ -50,7 +50,7 @@ def _measure_and_send(sender: Any, seconds: float, quick: bool) -> None:
         found = measure(seconds, quick, lambda text: sender.send(("progress", text)))
         sender.send(("progress", "what accuracy costs"))
         sender.send(("measured", (found, costs_of_accuracy(seconds))))
-    except Exception as error:
+    except Exception as error:  # whatever it is: raised again in the process that asked
         sender.send(("failed", error))
     finally:
         sender.close()
