@@ -11,6 +11,7 @@
 #include <type_traits>
 
 #include "numerics/scalar.h"
+#include "numerics/turns.h"
 
 namespace pycraft {
 
@@ -61,6 +62,9 @@ struct Tangent {
   friend bool operator==(const Tangent& a, const Tangent& b) { return a.x == b.x; }
 
   friend Tangent abs(const Tangent& a) { return a.x < T(0) ? -a : a; }
+  friend Tangent within_turns(const Tangent& a) {
+    return along(a, within_turns(a.x), T(1));
+  }
   friend Tangent sin(const Tangent& a) {
     using std::cos, std::sin;
     return along(a, sin(a.x), cos(a.x));

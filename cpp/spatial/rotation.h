@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "numerics/scalar.h"
+#include "numerics/turns.h"
 #include "spatial/vector3.h"
 
 namespace pycraft {
@@ -58,7 +59,7 @@ template <class S>
 inline Matrix3<S> axis_rotation(const Vector3<S>& axis, const S& angle) {
   using std::cos;
   using std::sin;
-  const S c = cos(angle), s = sin(angle), half = sin(angle / S(2)), v = S(2) * half * half;
+  const S within = within_turns(angle), c = cos(within), s = sin(within), half = sin(within / S(2)), v = S(2) * half * half;
   const S xy = v * axis[0] * axis[1], xz = v * axis[0] * axis[2], yz = v * axis[1] * axis[2];
   return {c + v * axis[0] * axis[0], xy - s * axis[2],          xz + s * axis[1],
           xy + s * axis[2],          c + v * axis[1] * axis[1], yz - s * axis[0],

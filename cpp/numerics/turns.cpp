@@ -1,0 +1,24 @@
+#include "numerics/turns.h"
+
+#include <boost/math/constants/constants.hpp>
+
+namespace pycraft {
+
+namespace {
+
+// 308 digits before the point, a hundred behind it, and some for the quotient's rounding.
+using Long = boost::multiprecision::number<boost::multiprecision::cpp_bin_float<430>, boost::multiprecision::et_off>;
+
+template <class S>
+S without_turns(const S& angle) {
+  if (!(abs(angle) > S(4))) return angle;
+  const Long x(angle), turn = boost::math::constants::two_pi<Long>();
+  return static_cast<S>(Long(x - turn * round(Long(x / turn))));
+}
+
+}  // namespace
+
+Digits50 within_turns(const Digits50& angle) { return without_turns(angle); }
+Digits100 within_turns(const Digits100& angle) { return without_turns(angle); }
+
+}  // namespace pycraft
