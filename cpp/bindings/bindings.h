@@ -32,6 +32,7 @@ void register_plans(py::module_& m);
 void register_multibody(py::module_& m);
 void register_dynamics(py::module_& m);
 void register_direct_calls(py::module_& m);
+void register_compiled(py::module_& m);
 void register_calculus(py::module_& m);
 void register_sensitivities(py::module_& m);
 void register_methods(py::module_& m);

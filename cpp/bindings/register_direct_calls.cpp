@@ -3,13 +3,13 @@
 // nothing for the present state, another method) goes to the Python function of that name, which knows it all and says what is wrong.
 #include <array>
 #include <cstddef>
-#include <limits>
 #include <memory>
 #include <optional>
 
 #include <pybind11/typing.h>
 
 #include "bindings/direct_calls.h"
+#include "bindings/plain_arrays.h"
 #include "dynamics/batch_dynamics.h"
 #include <structmember.h>  // after Python.h
 
@@ -90,49 +90,6 @@ const DirectCall& direct_call(const std::string& name) {
   }
   throw EvaluationError("'" + name + "' is no direct call; there are " + known);
 }
-
-// ---- arrays, past the wrappers
-
-using Proxy = py::detail::PyArray_Proxy;
-
-PyObject* float64() {
-  static PyObject* const descr = py::dtype::of<double>().release().ptr();  // NumPy's own; one for all arrays of native doubles
-  return descr;
-}
-
-struct Plain {
-  double* data;
-  int axes;  // one at least
-  const py::ssize_t* lengths;
-  bool writeable;
-};
-
-// An ndarray itself, aligned, C-ordered, float64 in the machine's byte order; else nothing.
-std::optional<Plain> plain(PyObject* given) {
-  using Api = py::detail::npy_api;
-  if (Py_TYPE(given) != Api::get().PyArray_Type_) return std::nullopt;
-  const Proxy* a = py::detail::array_proxy(given);
-  constexpr int wanted = Api::NPY_ARRAY_ALIGNED_ | Api::NPY_ARRAY_C_CONTIGUOUS_;
-  if (a->descr != float64() || (a->flags & wanted) != wanted || a->nd < 1) return std::nullopt;
-  return Plain{reinterpret_cast<double*>(a->data), a->nd, a->dimensions, (a->flags & Api::NPY_ARRAY_WRITEABLE_) != 0};
-}
-
-// An argument of `width` numbers a state. Nothing also where an int, as the core counts by, does not hold the states.
-std::optional<Given> plain_argument(PyObject* object, const char* name, int width) {
-  const auto a = plain(object);
-  if (!a || a->axes > 2 || a->lengths[a->axes - 1] != width) return std::nullopt;
-  const py::ssize_t states = a->axes == 2 ? a->lengths[0] : -1;
-  if (states > std::numeric_limits<int>::max()) return std::nullopt;
-  return Given{name, a->data, width, static_cast<int>(states)};
-}
-
-PyObject* new_array(int ndim, py::ssize_t* shape) {
-  auto& numpy = py::detail::npy_api::get();
-  Py_INCREF(float64());
-  return numpy.PyArray_NewFromDescr_(numpy.PyArray_Type_, float64(), ndim, shape, nullptr, nullptr, 0, nullptr);
-}
-
-bool overlap(const double* a, size_t n, const double* b, size_t m) { return a < b + m && b < a + n; }
 
 // ---- the callable
 
@@ -242,7 +199,7 @@ py::object result_of(const DirectCall& call, const Asked& asked) {
   for (int i = 0; i < axes; ++i) size *= lengths[i];
   for (int i = 0; i < call.given(); ++i) {
     const Given& given = asked.given[i];
-    if (overlap(out->data, size, given.data, size_t(given.width) * std::max(given.batch, 1))) return py::object();
+    if (overlap(out->data, size, given.data, size_t(given.width) * (given.batch < 0 ? 1 : given.batch))) return py::object();
   }
   return py::reinterpret_borrow<py::object>(asked.out);
 }

@@ -133,18 +133,20 @@ void eliminate(const Link<T>& link, const Links<T>& links, const States<T>& at, 
     if constexpr (Kind::pin) {
       w.angular = {P.A(0, K), P.A(1, K), P.A(2, K)}, w.linear = {P.B(K, 0), P.B(K, 1), P.B(K, 2)};
       D += w.angular[K], along = P.n[K];
+      own = mean_of_diagonal(P.A) + J;
     } else {
       const S turn(link.turn), travel(link.travel);
       for (int r = 0; r < 3; ++r) w.angular[r] = turn * P.A(r, K) + travel * P.B(r, K), w.linear[r] = turn * P.B(K, r) + travel * P.C(r, K);
       D += turn * w.angular[K] + travel * w.linear[K], along = turn * P.n[K] + travel * P.f[K];
-      // Beside a coordinate axis a row rounds at its own length.
-      own = turn * turn * P.A(K, K) + travel * travel * P.C(K, K) + J;
+      own = turn * turn * mean_of_diagonal(P.A) + travel * travel * mean_of_diagonal(P.C) + J;
     }
     const S most = carried_inertia<Kind>(link, gone);
     sound = sound & greater(D, S(links.faint) * most);
+    // What a slider moves may all have been taken up outboard: then what those pivots are unsure of is left.
+    if constexpr (!Kind::pin) sound = sound & greater(D, S(4) * most * P.error);
     w.inverse = S(1) / D;
     P.error += S(links.rounding) * most * w.inverse;
-    if constexpr (!Kind::pin) P.growth *= larger(S(1), S(S(T(0.0625)) * own * w.inverse));
+    if (link.oblique) P.growth *= larger(S(1), S(S(T(0.0625)) * own * w.inverse));
     w.innovation = tau - along;
     if (root) return;
     constexpr int zero = Kind::pin && !rotor ? K : -1;
@@ -198,10 +200,16 @@ template <class Kind, class S, class T>
     if constexpr (Kind::pin) {
       alpha[i] += m.turning[i], alpha[j] += m.turning[j];
       const S left = w.innovation - w.angular[i] * alpha[i] - w.angular[j] * alpha[j] - dot(w.linear, acceleration);
-      // D θ̈ = left - (D - J) α_K
-      const S whole = (left + S(link.J) * alpha[K]) * w.inverse;
-      give(0, S(link.sign) * (whole - alpha[K]));
-      alpha[K] = whole;
+      // D θ̈ = left - P_KK α_K. Without a rotor D is P_KK, and the link turns as if nothing turned its parent.
+      if (link.rotor) {
+        const S rate = (left - w.angular[K] * alpha[K]) * w.inverse;
+        give(0, S(link.sign) * rate);
+        alpha[K] += rate;
+      } else {
+        const S whole = left * w.inverse;
+        give(0, S(link.sign) * (whole - alpha[K]));
+        alpha[K] = whole;
+      }
     } else {
       alpha = alpha + m.turning;
       const S rate = (w.innovation - dot(w.angular, alpha) - dot(w.linear, acceleration)) * w.inverse;

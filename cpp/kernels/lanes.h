@@ -9,10 +9,8 @@
 #endif
 
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
-
-#include "spatial/symmetric3.h"
-#include "spatial/vector3.h"
 
 namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET {
 
@@ -116,13 +114,9 @@ template <class T, int W>
 [[gnu::always_inline]] inline Lanes<T, W> larger(const Lanes<T, W>& a, const Lanes<T, W>& b) {
   return Lanes<T, W>::choose(greater(b, a), b, a);
 }
-template <class S, class T>
-[[gnu::always_inline]] inline Vector3<S> spread(const T* x) {
-  return {S(x[0]), S(x[1]), S(x[2])};
-}
 // One number of every state.
 template <class S>
-[[gnu::always_inline]] inline S gathered(const double* x, size_t stride, int states) {
+[[gnu::always_inline]] inline S gathered(const double* x, std::size_t stride, int states) {
   using T = typename S::Scalar;
   if constexpr (S::width == 1) return S(T(*x));
   S a;
@@ -134,8 +128,14 @@ template <class S>
   return a;
 }
 template <class S>
-[[gnu::always_inline]] inline void scattered(const S& a, double* x, size_t stride, int states) {
+[[gnu::always_inline]] inline void scattered(const S& a, double* x, std::size_t stride, int states) {
   for (int b = 0; b < S::width && b < states; ++b) x[b * stride] = double(a.lane(b));
+}
+
+// A result that has left already.
+template <class S>
+[[gnu::always_inline]] inline void raise(double& x, typename S::Scalar by) {
+  x += double(by);
 }
 
 }  // namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET

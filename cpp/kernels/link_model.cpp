@@ -47,7 +47,8 @@ std::optional<RestLink> link_of(const CompiledSubhinge<E>& h, Pose<E>& before) {
   const auto along_axis = [&](bool level) {  // the origin on the axis, as near to the frame's as it can be
     Vector3<E> axis = before.R * h.axis;
     axis = (E(1) / norm(axis)) * axis;
-    const int found = level ? coordinate_axis(axis) : -1;
+    const int coordinate = coordinate_axis(axis), found = level ? coordinate : -1;
+    link.shape.oblique = coordinate < 0;
     if (found >= 0)
       link.shape.step = static_cast<Step>(found), link.shape.sign = axis[found] < E(0) ? -1 : 1;
     else
@@ -172,7 +173,7 @@ std::unique_ptr<LinkModel<T>> LinkModel<T>::of(const Multibody& model) {
   auto made = std::make_unique<LinkModel>();
   for (const RestLink& link : rest) {
     const Link<double>& d = link.shape;
-    Link<T> own{d.step, d.parent, d.q, d.v, d.end, d.branches, d.rotor, d.multi, d.slot, T(d.sign)};
+    Link<T> own{d.step, d.parent, d.q, d.v, d.end, d.branches, d.rotor, d.oblique, d.multi, d.slot, T(d.sign)};
     put(link.pose.R.m, own.R), put(link.pose.p.v, own.p);
     own.mass = static_cast<T>(link.inertia.mass);
     put(link.inertia.moment.v, own.moment), put(link.inertia.rotational.s, own.rotational);

@@ -21,6 +21,7 @@ struct Link {
   int end;                   // one past the last coordinate of the links outboard of it and its own
   bool branches;             // has children besides the one that follows it
   bool rotor;                // J is not zero
+  bool oblique;              // its axis is no coordinate axis of the parent at rest
   int multi;                 // of links with several coordinates: which of them, else -1
   int slot;                  // where sweeps outward that keep columns have this link's: its parent's, where it is the last child
   T sign;                    // -1: the hinge turns or slides against the coordinate axis

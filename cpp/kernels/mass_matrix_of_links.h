@@ -26,12 +26,11 @@ template <class Rotation, class S>
 [[gnu::always_inline]] inline void to_parent(const Rotation& rotation, const Vector3<S>& l, CompositeInertia<S>& R) {
   rotation.turn_symmetric(R.rotational);
   const Vector3<S> h = rotation.to_parent(R.moment), g = h + (S(0.5) * R.mass) * l;
-  const S d = S(2) * dot(l, g);
-  for (int i = 0; i < 3; ++i)
-    for (int j = i; j < 3; ++j) {
-      const S change = l[i] * g[j] + g[i] * l[j];
-      R.rotational(i, j) += i == j ? d - change : -change;
-    }
+  for (int i = 0; i < 3; ++i) {
+    const int j = (i + 1) % 3, k = (i + 2) % 3;
+    R.rotational(i, i) += S(2) * (l[j] * g[j] + l[k] * g[k]);  // what lies along an axis is not felt about it
+    R.rotational(i, j) -= l[i] * g[j] + g[i] * l[j];
+  }
   R.moment = h + R.mass * l;
 }
 
@@ -108,7 +107,7 @@ template <class Kind, class S, class T>
     });
     for (int b = 0; b < S::width && b < at.states; ++b) {
       double* const of_state = row + b * out_stride;
-      of_state[i] += double(link.J);
+      raise<S>(of_state[i], link.J);
       for (int c = count; c < N - link.v; ++c) of_state[c] = 0;
     }
   }

@@ -18,11 +18,10 @@ struct Motion {
   Vector3<S> sliding;   // the linear part of a', in the parent's axes; of a free link x, in its own
 };
 
-// u × (u × l)
+// u × (u × l): nothing where l lies along u, which u(u·l) - l(u·u) would leave to rounding.
 template <class S>
 [[gnu::always_inline]] inline Vector3<S> twice_crossed(const Vector3<S>& u, const Vector3<S>& l) {
-  const S along = dot(u, l), square = dot(u, u);
-  return {u[0] * along - l[0] * square, u[1] * along - l[1] * square, u[2] * along - l[2] * square};
+  return cross(u, cross(u, l));
 }
 // ω × Aω
 template <class S>

@@ -4,7 +4,9 @@
 //
 //   error(k)  = max over children + rounding · most/d,   growth(k) = max over children · max(1, own/d / 16)
 //
-// A state is sound where every d > faint · most, and at the roots 4 error growth < 1 and growth is below its bound. Else it is left in doubt:
+// A row of a coordinate axis rounds at its own pivot; of an oblique axis at what lies along all three.
+//
+// A state is sound where every d > faint · most, a slider's also d > 4 error · most of those outboard, and at the roots 4 error growth < 1 and growth is below its bound. Else it is left in doubt:
 // the general recursion has an error sweep to decide it by.
 #pragma once
 
@@ -26,6 +28,11 @@ template <class Kind, class S>
     return S(link.J) + turned;
   else
     return S(link.J) + turn * turn * turned + S(2) * travel * travel * S(link.carried_mass);
+}
+
+template <class S>
+[[gnu::always_inline]] inline S mean_of_diagonal(const Symmetric3<S>& A) {
+  return S(typename S::Scalar(1) / 3) * (A(0, 0) + A(1, 1) + A(2, 2));
 }
 
 template <int n, class S>

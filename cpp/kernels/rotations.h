@@ -6,8 +6,15 @@
 #pragma once
 
 #include "kernels/lanes.h"
+#include "spatial/symmetric3.h"
+#include "spatial/vector3.h"
 
 namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET {
+
+template <class S, class T>
+[[gnu::always_inline]] inline Vector3<S> spread(const T* x) {
+  return {S(x[0]), S(x[1]), S(x[2])};
+}
 
 template <class S>
 struct Inertia {  // [[A, B], [B*, C]], the force (n; f) that goes with it, and how sure they are
@@ -47,11 +54,10 @@ struct Planar {
     y[i] = c * x[i] - s * x[j], y[j] = c * x[j] + s * x[i], y[K] = x[K];
     return y;
   }
-  // By e = s²(A_ii - A_jj) + 2 s c A_ij, which what is turned gives from one diagonal entry to the other.
+  // Entry by entry, so that a small one turned into a large one's place and back keeps its digits.
   [[gnu::always_inline]] void turn_block(Symmetric3<S>& A) const {
-    const S cs = c * s, ss = s * s, d = A(i, i) - A(j, j), t = cs * A(i, j), e = ss * d + (t + t);
-    A(i, j) = cs * d + (A(i, j) - (ss + ss) * A(i, j));
-    A(i, i) -= e, A(j, j) += e;
+    const S ci = c * A(i, i) - s * A(i, j), cj = c * A(i, j) - s * A(j, j), si = s * A(i, i) + c * A(i, j), sj = s * A(i, j) + c * A(j, j);
+    A(i, i) = c * ci - s * cj, A(i, j) = c * si - s * sj, A(j, j) = s * si + c * sj;
   }
   [[gnu::always_inline]] void turn_symmetric(Symmetric3<S>& A) const {
     turn_block(A);
