@@ -7,7 +7,7 @@ import fractions
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Binding', 'Dynamics', 'Error', 'EvaluationError', 'GroupedOperators', 'HingeKind', 'Integration', 'Letter', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'Scalar', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'blockdiag', 'checked_refinement', 'constant', 'direct_call', 'direct_calls', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'hinge_kinds', 'identity', 'instruction_set', 'instruction_sets', 'integrators', 'methods', 'operators_of', 'precisions', 'prepared_call', 'real_array', 'residual', 'scalar', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_dynamics', 'time_forward', 'time_method', 'time_packs', 'vector', 'wider', 'zero']
+__all__: list[str] = ['Binding', 'Dynamics', 'Error', 'EvaluationError', 'GroupedOperators', 'HingeKind', 'Integration', 'Letter', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'Scalar', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'blockdiag', 'checked_refinement', 'compiled_call', 'constant', 'direct_call', 'direct_calls', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'hinge_kinds', 'identity', 'instruction_set', 'instruction_sets', 'integrators', 'kernel_headers', 'kernel_tape', 'methods', 'operators_of', 'precisions', 'prepared_call', 'real_array', 'residual', 'scalar', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_dynamics', 'time_forward', 'time_method', 'time_packs', 'vector', 'wider', 'zero']
 
 class Error(Exception): ...
 class SpaceError(Error, TypeError): ...
@@ -318,6 +318,13 @@ class Operator:
         """
         Raises StaleOperatorError if a model's structure changed since this was made.
         """
+    def compile(self, request: str = 'apply') -> typing.Any:
+        """
+        The plan written out for this model as straight-line C++, built and loaded: a callable of q, of v where velocities matter, of x for
+        "apply" and not for "dense", "diagonal", "trace", "logdet" and "norm"; each of one state or with a leading batch axis, with out=.
+        What is bound by at() is folded in. See Multibody.compile; EvaluationError for expressions of several models or with operators from
+        outside.
+        """
     def dense(self, dtype: typing.Any = None, rules: bool = True) -> typing.Any:
         """
         The operator as an array (codomain, domain), with a leading batch axis if one is bound. dtype=object keeps a wider precision as
@@ -544,6 +551,11 @@ class Scalar:
         where left out; form, refine, residual and precision as in at; seed: of the signs by which the data are moved; seconds: spent
         on each timing. Raises EvaluationError where it is bound already, ModelError for arrays of another shape and for a model
         without coordinates.
+        """
+    def compile(self) -> typing.Any:
+        """
+        Written out for this model as straight-line C++, built and loaded: a callable of q, and of v where velocities matter. See
+        Multibody.compile.
         """
     def diff(self, *args, frame: str = 'body') -> typing.Any:
         """
@@ -1004,6 +1016,10 @@ def checked_refinement(refine: typing.Any, residual: str, precision: str | int) 
     """
     The number of corrections, or 'auto'; EvaluationError for anything else.
     """
+def compiled_call(behind: typing.Any, library: str, function: str, widths: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], lengths: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], work: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
+    """
+    The callable of a built library; `behind` is called where arguments are not contiguous float64 arrays, or results in doubt.
+    """
 def constant(array: typing.Any, domain: typing.Any, codomain: typing.Any, name: str = 'C') -> Operator:
     """
     An array as an operator from `domain` to `codomain` (spaces, or a size n for R^n): a matrix, one diagonal, or a list of one block per
@@ -1050,6 +1066,14 @@ def instruction_sets() -> list[str]:
 def integrators() -> list[str]:
     """
     The integrators that Integration has.
+    """
+def kernel_headers() -> dict:
+    """
+    The text of the headers that compiled source begins with.
+    """
+def kernel_tape(model: Multibody, call: str) -> typing.Any:
+    """
+    What the kernel of a direct call does for this model, operation by operation; None where no kernel knows the model's hinges.
     """
 def methods() -> list[str]:
     """

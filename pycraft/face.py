@@ -34,6 +34,20 @@ def certify_dynamics(*arguments: Any, **options: Any) -> Any:
     return certify(*arguments, **options)
 
 
+def compile_call(*arguments: Any, **options: Any) -> Any:
+    """`Multibody.compile`."""
+    from .compiled import compile_call as compiled
+
+    return compiled(*arguments, **options)
+
+
+def compile_expression(*arguments: Any, **options: Any) -> Any:
+    """`Operator.compile` and `Scalar.compile`."""
+    from .compiled import compile_expression as compiled
+
+    return compiled(*arguments, **options)
+
+
 def check_model(*arguments: Any, **options: Any) -> Any:
     """`OperatorSet.check`."""
     from .identities.checker import check_model as check
@@ -49,6 +63,8 @@ def attach() -> None:
         certify_dynamics=certify_dynamics,
         certify_expression=certify_expression,
         check_model=check_model,
+        compile_call=compile_call,
+        compile_expression=compile_expression,
         describe=describe,
         exact_numbers=operator_set.exact_numbers,
         explain=operator_set.explain,

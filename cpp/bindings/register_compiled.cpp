@@ -157,11 +157,14 @@ py::object tape(const Multibody& model, const std::string& call) {
   for (int i = 0; i < 3; ++i) gravity[i] = model.gravity()[i];
   const kernels::Tape made = tape_of(links->links(), which, gravity, !bias, matrix ? model.nv() * model.nv() : model.nv());
   const auto n = static_cast<py::ssize_t>(made.operations.size());
-  py::array_t<int> what(n), first(n), second(n);
+  py::array_t<int> first(n), second(n);
+  py::list what;
+  std::vector<py::str> names(std::begin(kernels::names_of_operations), std::end(kernels::names_of_operations));
   py::array_t<double> number(n);
   for (py::ssize_t i = 0; i < n; ++i) {
     const kernels::Operation& o = made.operations[i];
-    what.mutable_at(i) = static_cast<int>(o.does), first.mutable_at(i) = o.first, second.mutable_at(i) = o.second, number.mutable_at(i) = o.number;
+    what.append(names[static_cast<size_t>(o.does)]);
+    first.mutable_at(i) = o.first, second.mutable_at(i) = o.second, number.mutable_at(i) = o.number;
   }
   return py::make_tuple(what, first, second, number, made.results, made.sound);
 }

@@ -280,6 +280,12 @@ void define_planning(py::class_<Expression>& op) {
       }, py::arg("language") = "text", py::arg("request") = "apply",
            "The plan written out as the textbook recursion: language \"text\", \"latex\", or \"python\" (NumPy alone) and \"cpp\" (Eigen alone),\n"
            "source that runs by itself. See pycraft.recursions.")
+      .def("compile", [](const Expression& e, const std::string& request) { return of_face("compile_expression")(e, request); },
+           py::arg("request") = "apply",
+           "The plan written out for this model as straight-line C++, built and loaded: a callable of q, of v where velocities matter, of x for\n"
+           "\"apply\" and not for \"dense\", \"diagonal\", \"trace\", \"logdet\" and \"norm\"; each of one state or with a leading batch axis, with out=.\n"
+           "What is bound by at() is folded in. See Multibody.compile; EvaluationError for expressions of several models or with operators from\n"
+           "outside.")
       .def("certify", [](const py::object& self, const py::args& args, const py::kwargs& kwargs) {
         return of_face("certify_expression")(self, *args, **kwargs);
       }, "certify(q=None, x=None, *, v=None, form=\"fast\", refine=0, residual=\"same\", precision=\"double\", seed=0, seconds=0.02)\n\n"

@@ -113,6 +113,9 @@ void register_scalars(py::module_& m) {
       .def("algorithm", [](const Scalar& a, const std::string& language) {
         return of_face("algorithm")(a, language);
       }, py::arg("language") = "text", "The recursion that computes it: \"text\", \"latex\", \"python\" or \"cpp\". See pycraft.recursions.")
+      .def("compile", [](const Scalar& a) { return of_face("compile_expression")(a, "apply"); },
+           "Written out for this model as straight-line C++, built and loaded: a callable of q, and of v where velocities matter. See\n"
+           "Multibody.compile.")
       .def("text", [](const Scalar& a) { return show(a); })
       .def("latex", [](const Scalar& a) { return show(a, Style::latex); })
       .def("_repr_latex_", [](const Scalar& a) { return "$" + show(a, Style::latex) + shown_value(a, " = ") + "$"; })

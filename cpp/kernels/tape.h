@@ -12,6 +12,7 @@ namespace pycraft::kernels {
 
 // number: the constant; q, v, u: entry `first` of that input; else of the results of operations `first` and `second`. greater and both: truths.
 enum class Does : unsigned char { number, q, v, u, add, subtract, multiply, divide, negate, sine, cosine, magnitude, larger, greater, both };
+inline constexpr const char* names_of_operations[] = {"number", "q", "v", "u", "add", "subtract", "multiply", "divide", "negate", "sine", "cosine", "magnitude", "larger", "greater", "both"};
 
 struct Operation {
   Does does;

@@ -1,6 +1,7 @@
 #include "numerics/coefficient.h"
 
 #include <array>
+#include <boost/multiprecision/cpp_bin_float.hpp>
 #include <boost/multiprecision/cpp_int.hpp>
 #include <charconv>
 #include <limits>

@@ -2,42 +2,16 @@
 #pragma once
 
 #include <algorithm>
-#include <cfloat>
 #include <cmath>
 #include <limits>
 #include <tuple>
 #include <type_traits>
 #include <vector>
 
-#if LDBL_MANT_DIG <= 53
-#include <boost/multiprecision/cpp_double_fp.hpp>
-#endif
-#if defined(PYCRAFT_FLOAT128)
-#include <boost/multiprecision/float128.hpp>
-#endif
-#include <boost/multiprecision/cpp_bin_float.hpp>
+#include "numerics/builtin_scalars.h"
+#include "numerics/digits.h"
 
 namespace pycraft {
-
-using Single = float;
-
-// "extended": long double where it is wider than double (x86: 64 bits, eps 1e-19; Linux on arm64: 113 bits), else double-double.
-#if LDBL_MANT_DIG > 53
-using Extended = long double;
-#else
-using Extended = boost::multiprecision::cpp_double_double;
-#endif
-
-// "quad": 113 bits, eps 2e-34; the compiler's own type where there is one.
-#if defined(PYCRAFT_FLOAT128)
-using Quad = boost::multiprecision::number<boost::multiprecision::float128_backend, boost::multiprecision::et_off>;
-#else
-using Quad = boost::multiprecision::number<boost::multiprecision::cpp_bin_float_quad::backend_type, boost::multiprecision::et_off>;
-#endif
-
-// For references: 50 and 100 decimal digits.
-using Digits50 = boost::multiprecision::number<boost::multiprecision::cpp_bin_float<50>, boost::multiprecision::et_off>;
-using Digits100 = boost::multiprecision::number<boost::multiprecision::cpp_bin_float<100>, boost::multiprecision::et_off>;
 
 // X(S) for the scalars up to quad, and for every scalar, from narrow to wide.
 #define PYCRAFT_FOR_EACH_SCALAR_TO_QUAD(X) X(Single) X(double) X(Extended) X(Quad)

@@ -2,6 +2,8 @@
 
 #include <boost/math/constants/constants.hpp>
 
+#include "numerics/digits_value.h"
+
 namespace pycraft {
 
 namespace {
@@ -9,11 +11,11 @@ namespace {
 // 308 digits before the point, a hundred behind it, and some for the quotient's rounding.
 using Long = boost::multiprecision::number<boost::multiprecision::cpp_bin_float<430>, boost::multiprecision::et_off>;
 
-template <class S>
-S without_turns(const S& angle) {
-  if (!(abs(angle) > S(4))) return angle;
-  const Long x(angle), turn = boost::math::constants::two_pi<Long>();
-  return static_cast<S>(Long(x - turn * round(Long(x / turn))));
+template <unsigned decimals>
+Digits<decimals> without_turns(const Digits<decimals>& angle) {
+  if (!(abs(angle) > Digits<decimals>(4))) return angle;
+  const Long x(value_of(angle)), turn = boost::math::constants::two_pi<Long>();
+  return digits_of<decimals>(static_cast<DigitsValue<decimals>>(Long(x - turn * round(Long(x / turn)))));
 }
 
 }  // namespace

@@ -68,5 +68,7 @@ def built(source: str) -> Path:
                 raise _core.EvaluationError(f"{shlex.join(command)} does not build the source:\n{done.stderr[:2000]}")
             os.replace(made, library)  # at once, so that no one loads half of it
     except OSError as error:
-        raise _core.EvaluationError(f"libraries cannot be kept in {place}: {error}; set PYCRAFT_CACHE to a folder that can be written") from error
+        raise _core.EvaluationError(
+            f"libraries cannot be kept in {place}: {error}; set PYCRAFT_CACHE to a folder that can be written"
+        ) from error
     return library

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from .. import _core
+from ..arguments import text
 from .build import built
+from .frames import frame_graph
+from .kernels import INPUTS, kernel_graph
 from .source import FUNCTION, written
 from .trace import Graph
 
-LARGEST = 200_000
-"""Operations beyond which a compiler takes minutes over a function of straight lines."""
+MOST_OPERATIONS, MOST_RESULTS = 100_000, 20_000
+"""Beyond which a compiler takes minutes over straight lines, and a state's results more than a stack may hold."""
+
+_OF_FRAMES = ("jacobian", "pose")
 
 
 class Compiled:
@@ -23,33 +31,121 @@ class Compiled:
     Attributes
     ----------
     name : what it computes
-    arguments : the names of its arrays
+    arguments : the names of its arrays, each of one state or with a leading batch axis
+    shape : of the result of one state
     source : the C++ that was compiled; it stands by itself
     library : path of the library that was built of it
     operations : how many a state takes: sums, products, quotients, a sine as one
     """
 
-    def __init__(self, name: str, arguments: Sequence[tuple[str, int]], shape: tuple[int, ...], ordinary: Callable[..., Any]):
-        self.name, self.arguments, self.shape = name, tuple(a for a, _ in arguments), shape
-        self.source, self.library, self.operations = "", Path(), 0
-        self._widths, self._ordinary = [n for _, n in arguments], ordinary
+    def __init__(self, name: str, graph: Graph, results: np.ndarray, arguments: Sequence[tuple[str, int]], ordinary: Callable[..., Any]):
+        size = len(graph.needed(results.ravel().tolist()))
+        if size > MOST_OPERATIONS or results.size > MOST_RESULTS:
+            raise _core.EvaluationError(
+                f"{name} comes to {size} operations and {results.size} results in straight lines; compile() writes up to {MOST_OPERATIONS} "
+                f"and {MOST_RESULTS}. prepare() and at(q) take models of any size"
+            )
+        self.name, self.arguments, self.shape = name, tuple(a for a, _ in arguments), results.shape
+        title = f"{name}: {', '.join(f'{a} ({n})' for a, n in arguments) or 'no input'} -> {results.shape}"
+        self.source, self.operations = written(graph, results, arguments, title)
+        self.library: Path = built(self.source)
+        self._ordinary = ordinary
         self.__doc__ = f"{name}({', '.join(self.arguments)}, *, out=None), compiled; one state, or a leading batch axis."
 
     def __call__(self, *given: Any, out: Any = None) -> Any:
         """By the ordinary way, whose errors name what is wrong."""
         if len(given) != len(self.arguments):
-            raise TypeError(f"compiled {self.name} takes {', '.join(self.arguments) or 'no arrays'}, and out=; it was given {len(given)} arguments")
+            raise TypeError(
+                f"compiled {self.name} takes {', '.join(self.arguments) or 'no arrays'}, and out=; it was given {len(given)} arguments"
+            )
         return self._ordinary(*given, out=out)
 
     def __repr__(self) -> str:
         return f"<compiled {self.name}({', '.join(self.arguments)}), {self.operations} operations>"
 
 
-def compiled(behind: Compiled, graph: Graph, results: np.ndarray, title: str, widths: Sequence[tuple[str, int]]) -> Any:
-    """The callable of a graph's results."""
-    needed = len(graph.needed(results.ravel().tolist()))
-    if needed > LARGEST:
-        raise _core.EvaluationError(f"{behind.name} comes to {needed} operations in straight lines; beyond {LARGEST} a compiler takes minutes over them")
-    behind.source, behind.operations = written(graph, results, widths, title)
-    behind.library = built(behind.source)
-    return _core.compiled_call(behind, str(behind.library), FUNCTION, behind._widths, list(behind.shape), behind.operations)
+def _callable(behind: Compiled, arguments: Sequence[tuple[str, int]]) -> Any:
+    if 0 in behind.shape:
+        return behind  # nothing to compute
+    return _core.compiled_call(behind, str(behind.library), FUNCTION, [n for _, n in arguments], list(behind.shape), behind.operations)
+
+
+def compile_call(model: Any, call: str, frame: str | None = None) -> Any:
+    """What `Multibody.compile` gives."""
+    if not isinstance(call, str) or call not in (*INPUTS, *_OF_FRAMES):
+        raise _core.EvaluationError(f"compile takes {', '.join(map(repr, (*INPUTS, *_OF_FRAMES)))}, not {call!r}")
+    if (frame is not None) != (call in _OF_FRAMES):
+        raise _core.EvaluationError(
+            f"a compiled {call} is that of a frame: compile({call!r}, frame=...)" if frame is None else f"a compiled {call} has no frame"
+        )
+    held = copy.deepcopy(model)  # later edits change neither what is compiled nor what answers in its place
+    if frame is None:
+        graph, results = kernel_graph(held, call)
+        ordinary, name = getattr(held, call), call
+    else:
+        frame = text(frame, "a frame")
+        held.pose(frame)  # ModelError where no body or node has the name
+        graph, results = frame_graph(held, call, frame)
+        ordinary, name = partial(_of_frame, held, call, frame), f"{call} of {frame}"
+    arguments = [(a, held.nq if a == "q" else held.nv) for a in INPUTS.get(call, ("q",))]
+    return _callable(Compiled(f"{held.name}: {name}", graph, results, arguments, ordinary), arguments)
+
+
+def _of_frame(model: Any, call: str, frame: str, q: Any, out: Any = None) -> Any:
+    if call == "jacobian" or out is None:
+        return getattr(model, call)(frame, q, **({} if out is None else {"out": out}))
+    return model.prepare(call, frame=frame, batch=len(q) if np.ndim(q) == 2 else None)(q, out=out)
+
+
+def compile_expression(expression: Any, request: str = "apply") -> Any:
+    """What `Operator.compile` and `Scalar.compile` give."""
+    from .expressions import ExpressionGraph
+
+    made = ExpressionGraph(expression, request)
+    ordinary = partial(
+        _evaluated, expression, request, made.model, _numbers_of(made.model), [a for a, _ in made.arguments], made.results.shape
+    )
+    name = expression.text() if request == "apply" else f"{request} of {expression.text()}"
+    return _callable(Compiled(name, made.graph, made.results, made.arguments, ordinary), made.arguments)
+
+
+def _numbers_of(model: Any) -> bytes:
+    """What an edit changes."""
+    return b"" if model is None else pickle.dumps({k: v for k, v in model.description().items() if k not in ("q", "v")})
+
+
+def _evaluated(
+    expression: Any, request: str, model: Any, numbers: bytes, names: Sequence[str], shape: tuple[int, ...], *given: Any, out: Any = None
+) -> Any:
+    """The expression at states, one after another, by its plan."""
+    if _numbers_of(model) != numbers:
+        raise _core.EvaluationError(f"{model.name!r} was edited after {expression.text()} was compiled: compile it again")
+    arrays = dict(zip(names, (np.asarray(a, float) for a in given), strict=True))
+    batches = {len(a) for a in arrays.values() if a.ndim == 2}
+    if len(batches) > 1 or any(a.ndim not in (1, 2) for a in arrays.values()):
+        shapes = ", ".join(f"{name} {a.shape}" for name, a in arrays.items())
+        raise _core.ModelError(f"each argument is of one state or of as many as the others: {shapes}")
+    count = batches.pop() if batches else None
+    result = np.empty(shape if count is None else (count, *shape))
+    for b in range(1 if count is None else count):
+        state = {name: a[b] if a.ndim == 2 else a for name, a in arrays.items()}
+        q, v = state.pop("q", None), state.pop("v", None)
+        bound = expression if q is None else expression.at(q, v) if v is not None else expression.at(q)
+        x = next(iter(state.values()), None)
+        value = _requested(bound, request, x)
+        result[... if count is None else b] = value
+    if out is None:
+        return result
+    if not isinstance(out, np.ndarray) or out.shape != result.shape or out.dtype != float or not out.flags.writeable:
+        raise _core.ModelError(f"out= takes a writeable float64 array of shape {result.shape}")
+    out[...] = result
+    return out
+
+
+def _requested(bound: Any, request: str, x: np.ndarray | None) -> Any:
+    if isinstance(bound, _core.Scalar):
+        return float(bound)
+    if request == "apply":
+        return bound @ x if x is not None else bound.dense().ravel()
+    value = getattr(bound, request)()
+    return float(value) if request in ("trace", "logdet", "norm") else value

@@ -1,11 +1,10 @@
-"""Expressions as straight-line code: the recursion that `algorithm("python")` writes, run once on numbers that remember what they are made of.
+"""Expressions as straight-line code: the recursion that `algorithm("python")` writes, run once on numbers that remember their making.
 
 What its functions decide by numbers (pivots, residuals) becomes a guard: where it does not hold, the expression is evaluated as usual.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -14,7 +13,7 @@ import numpy as np
 from .. import _core
 from ..recursions import Algorithm
 from .kinematics import Kinematics, force_transform
-from .trace import Graph, Traced
+from .trace import Graph
 
 REQUESTS = ("apply", "dense", "diagonal", "trace", "logdet", "norm")
 _FAINT = 1e-11  # of a pivot beside what it might be: far above what rounding leaves of a zero, far below what robots have
@@ -141,6 +140,8 @@ def _traced_system(TreeSystem: type, graph: Graph, functions: _Functions) -> typ
     """The elimination along a tree, its check by a known solution as guards."""
 
     class TracedTreeSystem(TreeSystem):  # type: ignore[misc]
+        factored: bool
+
         def factor(self) -> None:
             if self.factored:
                 return
@@ -188,7 +189,9 @@ class ExpressionGraph:
         self.graph = Graph()
         free = [m for m in algorithm._book.models if not m.binding and isinstance(m.source, _core.MultibodyOperators)]
         if len(free) > 1:
-            raise _core.EvaluationError("compile() takes expressions of one model, in one way of taking its bodies; bind the others by at(q)")
+            raise _core.EvaluationError(
+                "compile() takes expressions of one model, in one way of taking its bodies; bind the others by at(q)"
+            )
         self.model = free[0].source.model if free else None
         data = algorithm.data()
         reads_v = False
@@ -248,7 +251,9 @@ class ExpressionGraph:
                     parts = [force_transform(x).T @ field if root else 0.0 * field for x, root in zip(at.poses, roots, strict=True)]
                     made[name] = np.concatenate(parts).reshape(-1, 1)
                 case _:
-                    raise _core.EvaluationError(f"compile() knows no formula of {leaf.symbol} in the coordinates; bind it to a state by at(q)")
+                    raise _core.EvaluationError(
+                        f"compile() knows no formula of {leaf.symbol} in the coordinates; bind it to a state by at(q)"
+                    )
         return made
 
 
@@ -257,8 +262,3 @@ def _equal(a: Any, b: Any) -> bool:
     if isinstance(a, (list, tuple)):
         return len(a) == len(b) and all(_equal(x, y) for x, y in zip(a, b, strict=True))
     return a is b if a is None or b is None else bool(np.array_equal(a, b))
-
-
-def constant(x: Traced) -> float:
-    """The number of what depends on nothing."""
-    return math.nan if x.value is None else x.value

@@ -16,7 +16,6 @@ INPUTS = {
     "mass_matrix": ("q",),
     "mass_matrix_inverse": ("q",),
 }
-_PLAIN = {4: "add", 5: "subtract", 6: "multiply", 7: "divide", 8: "negate", 9: "sine", 10: "cosine", 11: "magnitude", 12: "larger"}
 
 
 def kernel_graph(model: Any, call: str) -> tuple[Graph, np.ndarray]:
@@ -24,27 +23,28 @@ def kernel_graph(model: Any, call: str) -> tuple[Graph, np.ndarray]:
     tape = _core.kernel_tape(model, call)
     if tape is None:
         raise _core.ModelError(
-            f"{call} of {model.name!r} cannot be compiled: no kernel knows a rotor on a ball or free hinge, nor sliders behind other subhinges"
+            f"{call} of {model.name!r} cannot be compiled: no kernel knows a rotor on a ball or free hinge, nor some sliders behind "
+            "other subhinges; its expressions can be"
         )
     graph, third = Graph(), INPUTS[call][-1]
     does, first, second, number, results, sound = tape
     made: list[int] = []
     truths: dict[int, list[int]] = {}
-    for at, (what, a, b, x) in enumerate(zip(does.tolist(), first.tolist(), second.tolist(), number.tolist(), strict=True)):
+    for at, (what, a, b, x) in enumerate(zip(does, first.tolist(), second.tolist(), number.tolist(), strict=True)):
         node = -1
         match what:
-            case 0:
+            case "number":
                 node = graph.number(x).index
-            case 1 | 2 | 3:
-                node = graph.input(("q", "v", third)[what - 1], a).index
-            case 8 | 9 | 10 | 11:
-                node = graph.put(_PLAIN[what], made[a])
-            case 13:
+            case "q" | "v" | "u":
+                node = graph.input(third if what == "u" else what, a).index
+            case "greater":
                 truths[at] = [graph.put("greater", made[a], made[b])]
-            case 14:
+            case "both":
                 truths[at] = truths[a] + truths[b]
+            case "negate" | "sine" | "cosine" | "magnitude":
+                node = graph.put(what, made[a])
             case _:
-                node = graph.put(_PLAIN[what], made[a], made[b])
+                node = graph.put(what, made[a], made[b])
         made.append(node)
     if sound >= 0:
         graph.guards = list(dict.fromkeys(truths[sound]))

@@ -11,13 +11,13 @@ from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 __all__ = ["Graph", "Traced"]
 
 CONSTANT, INPUT = "constant", "input"
-_FUNCTIONS = {
+_FUNCTIONS: dict[str, Callable[[float], float]] = {
     "sine": math.sin,
     "cosine": math.cos,
     "sqrt": lambda x: math.sqrt(x) if x >= 0 else math.nan,

@@ -232,7 +232,8 @@ RESTS_ON = {
     "closed_forms": ["proofs"],
     "sympy_bridge": ["proofs"],
     "accuracy": ["identities", "peers", "tidy"],
-    "face": ["accuracy", "recursions", "identities"],
+    "compiled": ["recursions"],
+    "face": ["accuracy", "compiled", "identities"],
     "": ["face", "kalman", "closed_forms", "sympy_bridge"],  # pycraft itself
     "cli": [""],
 }

@@ -1,0 +1,60 @@
+namespace {
+
+using pycraft::kernels::compiled::Lanes;
+
+#if defined(__AVX512F__)
+constexpr int width = 8;
+#elif defined(__AVX__)
+constexpr int width = 4;
+#else
+constexpr int width = 2;
+#endif
+typedef double Pack __attribute__((vector_size(width * sizeof(double))));  // as many states side by side
+
+template <class S>
+constexpr int lanes = sizeof(S) / sizeof(double);
+template <class S>
+using LanesOf = Lanes<double, lanes<S>>;
+template <class S>
+inline LanesOf<S> wide(const S& x) {
+  LanesOf<S> made;
+  made.v = x;
+  return made;
+}
+template <class S>
+inline S magnitude_of(const S& x) { return magnitude(wide(x)).v; }
+template <class S>
+inline S larger_of(const S& x, const S& y) { return larger(wide(x), wide(y)).v; }
+template <class S, class F>
+inline S each(S x, F f) {
+  if constexpr (lanes<S> == 1) return f(x);
+  else {
+    for (int b = 0; b < lanes<S>; ++b) x[b] = f(x[b]);
+    return x;
+  }
+}
+template <class S>
+inline S root_of(const S& x) { return each(x, [](double y) { return std::sqrt(y); }); }
+template <class S>
+inline S log_of(const S& x) { return each(x, [](double y) { return std::log(y); }); }
+template <class S>
+inline S sine_of(const S& x) { return sine_cosine(wide(x)).sine.v; }
+template <class S>
+inline S cosine_of(const S& x) { return sine_cosine(wide(x)).cosine.v; }
+// Of n angles: packs of states angle by angle; of one state, several angles at once.
+template <int n, class S>
+inline void sines_and_cosines(const S (&angle)[n], S (&s)[n], S (&c)[n]) {
+  if constexpr (lanes<S> > 1) {
+    for (int i = 0; i < n; ++i) {
+      const auto of = sine_cosine(wide(angle[i]));
+      s[i] = of.sine.v, c[i] = of.cosine.v;
+    }
+  } else {
+    for (int i = 0; i < n; i += width) {
+      LanesOf<Pack> x(0.0);
+      for (int b = 0; b < width && i + b < n; ++b) x.set(b, angle[i + b]);
+      const auto of = sine_cosine(x);
+      for (int b = 0; b < width && i + b < n; ++b) s[i + b] = of.sine.lane(b), c[i + b] = of.cosine.lane(b);
+    }
+  }
+}

@@ -1,0 +1,98 @@
+"""Numbers that remember how they came about: what is folded changes no value, and what is left out is not there."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pycraft.compiled.trace import Graph
+from support.graphs import evaluated
+
+ANGLES = [0.3, -1.7, 2.5]
+CONSTANTS = [0.0, 1.0, -1.0, 2.0, 0.5, -4.0, 0.1, -3.7]
+
+
+def recipes():
+    """Expressions as nested tuples of inputs, constants and operations."""
+    leaves = st.one_of(st.integers(0, 2).map(lambda i: ("x", i)), st.sampled_from(CONSTANTS).map(lambda c: ("c", c)))
+    return st.recursive(
+        leaves,
+        lambda inner: st.one_of(
+            st.tuples(st.sampled_from(["add", "subtract", "multiply"]), inner, inner),
+            st.tuples(st.sampled_from(["negate", "magnitude"]), inner),
+        ),
+        max_leaves=25,
+    )
+
+
+def cooked(recipe, x, of_function):
+    match recipe:
+        case ("x", i):
+            return x[i]
+        case ("c", c):
+            return c
+        case ("negate", a):
+            return -cooked(a, x, of_function)
+        case ("magnitude", a):
+            return abs(cooked(a, x, of_function))
+        case (name, a, b):
+            first, second = cooked(a, x, of_function), cooked(b, x, of_function)
+            return {"add": lambda: first + second, "subtract": lambda: first - second, "multiply": lambda: first * second}[name]()
+
+
+@given(recipes())
+def test_folding_changes_no_bit(recipe):
+    """Order of two terms, signs moved outward and powers of two are exact; 0 x is 0 and x - x is 0 for finite x."""
+    graph = Graph()
+    node = graph.number(cooked(recipe, graph.inputs("x", 3), None))
+    (found,), _ = evaluated(graph, np.array(node.index), {"x": np.array([ANGLES])})
+    assert found == cooked(recipe, ANGLES, None)
+
+
+def test_what_is_zero_or_one_is_left_out():
+    graph = Graph()
+    x, y = graph.inputs("x", 2)
+    before = len(graph.operations)
+    assert {made.index for made in (x + 0, 0 + x, x - 0, x * 1, 1 * x, x / 1, x + (y - y))} == {x.index}
+    assert (x * 0).value == 0 and (0 / x).value == 0 and (x - x).value == 0
+    assert len(graph.operations) == before + 1  # the constant one
+    assert (-(0 - x)).index == x.index
+
+
+def test_equal_operations_are_one():
+    graph = Graph()
+    x, y = graph.inputs("x", 2)
+    assert (x * y).index == (y * x).index and (x + y).index == (y + x).index
+    assert ((-x) * (-y)).index == (x * y).index and (x - (-y)).index == (x + y).index
+    assert (2.0 * (0.1 * x)).index == (0.2 * x).index
+    assert (3.0 * (0.1 * x)).index != (0.3 * x).index  # rounded twice
+
+
+def test_decisions_are_not_taken():
+    graph = Graph()
+    x = graph.input("x", 0)
+    with pytest.raises(TypeError, match="not known before"):
+        bool(x)
+    with pytest.raises(TypeError):
+        x < 1  # noqa: B015
+    graph.guard(x, 1.0)
+    assert [evaluated(graph, np.array(x.index), {"x": np.array([[v]])})[1][0] for v in (0.5, 2.0)] == [False, True]
+
+
+def test_arrays_take_it_entry_by_entry():
+    graph = Graph()
+    x = graph.inputs("x", 4)
+    A = np.array(x, object).reshape(2, 2)
+    for made in (A @ A, A * x[0], x[0] * A, A - 1.0, 1.0 - A, A / x[3]):
+        assert made.shape == (2, 2)
+    nodes = np.array([[e.index for e in row] for row in A @ A])
+    (found,), _ = evaluated(graph, nodes, {"x": np.array([[1.0, 2.0, 3.0, 4.0]])})
+    np.testing.assert_array_equal(found, np.array([[1.0, 2], [3, 4]]) @ np.array([[1.0, 2], [3, 4]]))
+
+
+def test_only_what_is_needed_is_written():
+    graph = Graph()
+    x, y = graph.inputs("x", 2)
+    wanted, _ = x * y, x + y
+    graph.guard(y, 0.25)
+    assert len(graph.needed([wanted.index])) == 5  # x, y, x y, 0.25, y > 0.25
