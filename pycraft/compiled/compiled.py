@@ -13,6 +13,7 @@ import numpy as np
 
 from .. import _core
 from ..arguments import text
+from ..models.multibody import describe
 from .build import built
 from .frames import frame_graph
 from .kernels import INPUTS, kernel_graph
@@ -111,7 +112,7 @@ def compile_expression(expression: Any, request: str = "apply") -> Any:
 
 def _numbers_of(model: Any) -> bytes:
     """What an edit changes."""
-    return b"" if model is None else pickle.dumps({k: v for k, v in model.description().items() if k not in ("q", "v")})
+    return b"" if model is None else pickle.dumps({k: v for k, v in describe(model).items() if k not in ("q", "v")})
 
 
 def _evaluated(

@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..models.multibody import describe
 from ..recursions import Algorithm
+from ..state import random_state
 from .kinematics import Kinematics, force_transform
 from .trace import Graph
 
@@ -166,7 +168,7 @@ def _traced_system(TreeSystem: type, graph: Graph, functions: _Functions) -> typ
 
 def _scale(model: Any) -> float:
     """What a hinge can feel at most: all masses at the length of all of the way, and their own inertias."""
-    bodies = model.description()["bodies"]
+    bodies = describe(model)["bodies"]
     mass = sum(b["mass"] for b in bodies)
     way = sum(np.abs(b["hinge"]["placement"]["position"]).sum() + np.abs(b["com"]).sum() for b in bodies)
     return float(max(mass, 4 * (mass * way * way + sum(np.trace(b["inertia"]) for b in bodies))))
@@ -224,7 +226,7 @@ class ExpressionGraph:
         """The given letters that depend on the state, as functions of it."""
         source = self.model
         assert source is not None
-        samples = [algorithm.data(s.q, s.v) for s in (source.random_state(seed=k) for k in (1, 2))]
+        samples = [algorithm.data(s.q, s.v) for s in (random_state(source, k) for k in (1, 2))]
         at = Kinematics(source, self.graph)
         roots = [p < 0 for p in model.source.parents]
         made: dict[str, Any] = {}
@@ -247,7 +249,7 @@ class ExpressionGraph:
                     none = np.full((6, 6), 0.0, object)
                     made[name] = [force_transform(x) if root else none for x, root in zip(at.poses, roots, strict=True)]
                 case "gravity_base":
-                    field = np.array([0.0, 0.0, 0.0, *source.gravity.tolist()], object)
+                    field = np.array([0.0, 0.0, 0.0, *(-describe(source)["gravity"]).tolist()], object)
                     parts = [force_transform(x).T @ field if root else 0.0 * field for x, root in zip(at.poses, roots, strict=True)]
                     made[name] = np.concatenate(parts).reshape(-1, 1)
                 case _:

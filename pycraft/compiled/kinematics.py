@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..models.multibody import describe
 from .trace import Graph, Traced
 
 _KINDS = _core.subhinge_kinds
@@ -117,7 +118,7 @@ class Kinematics:
     """
 
     def __init__(self, model: Any, graph: Graph):
-        description = model.description()
+        description = describe(model)
         q, v = iter(graph.inputs("q", model.nq)), iter(graph.inputs("v", model.nv))
         self.poses: list[Pose] = []
         self.H: list[np.ndarray] = []

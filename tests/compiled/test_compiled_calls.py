@@ -1,5 +1,6 @@
 """Direct calls compiled for one model: what they do for every kind of hinge, and how the callable behaves."""
 
+import re
 import subprocess
 import sys
 
@@ -58,7 +59,7 @@ def test_graphs_are_the_calls(name):
 def test_graphs_of_frames_are_the_calls(name):
     model = MODELS[name]
     Q, _, _ = kernel_cases.states(model)
-    for frame in (list(model.bodies)[-1], *list(model.nodes)[:1]):
+    for frame in (*list(model.bodies)[-1:], *list(model.nodes)[:1]):
         for call in ("jacobian", "pose"):
             graph, results = frame_graph(model, call, frame)
             found, _ = evaluated(graph, results, {"q": Q})
@@ -117,9 +118,11 @@ def test_errors_are_the_ordinary_ones(accelerations):
         for i in range(3):
             arrays = [q.copy(), v.copy(), tau.copy()]
             arrays[i][3, 1] = bad
-            with pytest.raises(pc.ModelError, match="state 3"):
+            with pytest.raises(pc.ModelError) as ordinary:
+                model.forward_dynamics(*arrays)
+            with pytest.raises(pc.ModelError, match=re.escape(str(ordinary.value))):
                 accelerations(*arrays)
-    with pytest.raises(pc.ModelError, match="of length"):
+    with pytest.raises(pc.ModelError):
         accelerations(q[:, :-1].copy(), v, tau)
     with pytest.raises(pc.ModelError):
         accelerations(q, v[:2].copy(), tau)
@@ -133,13 +136,13 @@ def test_errors_are_the_ordinary_ones(accelerations):
 
 
 def test_a_singular_state_is_refused_as_usual():
-    """Two sliders along one line when the pin between them is straight: compiled, the pivot is left in doubt."""
+    """Two sliders along one line where the pin between them is straight: the pivot is left in doubt."""
     model = pc.Multibody("in line")
     model.add_body("a", hinge="slider", axis=(1, 0, 0))
-    model.add_body("b", "a", axis=(0, 0, 1))
+    model.add_body("b", "a", axis=(0, 0, 1), rotor_inertia=1.0)
     model.add_body("c", "b", hinge="slider", axis=(1, 0, 0), mass=1.0)
     compiled, none = model.compile("forward_dynamics"), np.zeros(3)
-    bent = np.array([0.0, 1.0, 1.0])
+    bent = np.array([0.0, 1.0, 0.0])
     np.testing.assert_allclose(compiled(bent, none, none + 1), model.forward_dynamics(bent, none, none + 1), rtol=1e-13)
     for q in (none + 0.0, np.array([bent, none])):
         with pytest.raises(pc.SingularHingeError):

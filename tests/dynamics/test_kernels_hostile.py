@@ -1,13 +1,8 @@
 """Direct calls where numbers, models and callers are unkind: units and angles of any size, far points, what is not finite, singular states
 amid a batch, shared memory, edits, threads, wide and deep trees. The oracle is a wider precision, or bits that must not change.
 
-What fails at present, and is left out here:
-- mass_matrix: the inertia about an axis of a body a length l further along it loses eps (l/r)² of itself, r its distance from the axis.
-- a pin turned by π/2 exchanges a rod's two moments of inertia, and the small one is lost to rounding of the large one.
-- the centripetal acceleration of a point on the axis of a spin ω is eps ω² l, not zero.
-- the acceleration of a coordinate whose rotor J is much more than what it carries, P, loses eps J/P of itself.
-- four coordinates that carry one point mass (a slider, three pins, massless links) are not always refused, by general recursions neither.
-- precision=50 takes the cosine of more than 10^50 for one, precision=100 that of more than 10^100.
+Left out: four coordinates that carry one point mass (a slider, three pins, massless links) are not always refused, by general recursions
+neither.
 """
 
 import copy

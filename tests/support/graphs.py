@@ -21,7 +21,7 @@ FUNCTIONS = {
 
 
 def values(graph, inputs):
-    """Of every node, at inputs {name: (B, n)}; constants are numbers."""
+    """Of every node, at inputs {name: (B, n)}; constants are numbers. What no result reads need not be given."""
     found = []
     with np.errstate(all="ignore"):
         for name, *taken in graph.operations:
@@ -29,7 +29,7 @@ def values(graph, inputs):
                 case "constant":
                     found.append(np.float64(taken[0]))
                 case "input":
-                    found.append(inputs[taken[0]][..., taken[1]])
+                    found.append(inputs[taken[0]][..., taken[1]] if taken[0] in inputs else np.nan)
                 case _:
                     found.append(FUNCTIONS[name](*(found[x] for x in taken)))
     return found
