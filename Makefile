@@ -112,19 +112,19 @@ lint: .venv/tested
 FORCE:
 
 .venv/installed: .venv/requirements .venv/modules $(COMPILED)
-	$(BIN)/python -m pip install --quiet --no-build-isolation --editable . -C build-dir=build
+	CMAKE_BUILD_PARALLEL_LEVEL=$(JOBS) $(BIN)/python -m pip install --quiet --no-build-isolation --editable . -C build-dir=build
 	touch $@
 
 .venv/tested: .venv/installed
-	$(BIN)/python -m pip install --quiet --no-build-isolation --editable ".[test]" -C build-dir=build
+	CMAKE_BUILD_PARALLEL_LEVEL=$(JOBS) $(BIN)/python -m pip install --quiet --no-build-isolation --editable ".[test]" -C build-dir=build
 	touch $@
 
 .venv/peers: .venv/tested
-	$(BIN)/python -m pip install --quiet --no-build-isolation --editable ".[test,peers]" -C build-dir=build
+	CMAKE_BUILD_PARALLEL_LEVEL=$(JOBS) $(BIN)/python -m pip install --quiet --no-build-isolation --editable ".[test,peers]" -C build-dir=build
 	touch $@
 
 .venv/lab: .venv/installed
-	$(BIN)/python -m pip install --quiet --no-build-isolation --editable ".[lab]" -C build-dir=build
+	CMAKE_BUILD_PARALLEL_LEVEL=$(JOBS) $(BIN)/python -m pip install --quiet --no-build-isolation --editable ".[lab]" -C build-dir=build
 	touch $@
 
 clean:

@@ -320,10 +320,8 @@ class Operator:
         """
     def compile(self, request: str = 'apply') -> typing.Any:
         """
-        The plan written out for this model as straight-line C++, built and loaded: a callable of q, of v where velocities matter, of x for
-        "apply" and not for "dense", "diagonal", "trace", "logdet" and "norm"; each of one state or with a leading batch axis, with out=.
-        What is bound by at() is folded in. See Multibody.compile; EvaluationError for expressions of several models or with operators from
-        outside.
+        The plan written out as straight-line C++, built and loaded: a callable of q, of v where velocities matter, of x for "apply" and not
+        for "dense", "diagonal", "trace", "logdet" and "norm"; one state or a batch, out=. See Multibody.compile, docs/compiled.md.
         """
     def dense(self, dtype: typing.Any = None, rules: bool = True) -> typing.Any:
         """

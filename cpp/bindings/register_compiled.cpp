@@ -2,8 +2,8 @@
 #include <memory>
 
 #include <dlfcn.h>
+#include <generated/kernel_headers.h>
 
-#include "bindings/kernel_headers.h"
 #include "bindings/plain_arrays.h"
 #include "kernels/link_model.h"
 #include "kernels/tape.h"

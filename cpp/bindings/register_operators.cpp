@@ -282,10 +282,8 @@ void define_planning(py::class_<Expression>& op) {
            "source that runs by itself. See pycraft.recursions.")
       .def("compile", [](const Expression& e, const std::string& request) { return of_face("compile_expression")(e, request); },
            py::arg("request") = "apply",
-           "The plan written out for this model as straight-line C++, built and loaded: a callable of q, of v where velocities matter, of x for\n"
-           "\"apply\" and not for \"dense\", \"diagonal\", \"trace\", \"logdet\" and \"norm\"; each of one state or with a leading batch axis, with out=.\n"
-           "What is bound by at() is folded in. See Multibody.compile; EvaluationError for expressions of several models or with operators from\n"
-           "outside.")
+           "The plan written out as straight-line C++, built and loaded: a callable of q, of v where velocities matter, of x for \"apply\" and not\n"
+           "for \"dense\", \"diagonal\", \"trace\", \"logdet\" and \"norm\"; one state or a batch, out=. See Multibody.compile, docs/compiled.md.")
       .def("certify", [](const py::object& self, const py::args& args, const py::kwargs& kwargs) {
         return of_face("certify_expression")(self, *args, **kwargs);
       }, "certify(q=None, x=None, *, v=None, form=\"fast\", refine=0, residual=\"same\", precision=\"double\", seed=0, seconds=0.02)\n\n"

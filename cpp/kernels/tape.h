@@ -1,5 +1,5 @@
 // What a kernel computes for one model, operation by operation: its loops run once, on numbers that write down what becomes of them
-// (kernels_traced.cpp). Source is written from that, for this model alone (pycraft/compiled).
+// (tape.cpp). Source is written from that, for this model alone (pycraft/compiled).
 //
 // Plain data; nothing is folded here: constants are operations too, zeros and ones among them.
 #pragma once

@@ -141,7 +141,7 @@ class _Functions:
 def _traced_system(TreeSystem: type, graph: Graph, functions: _Functions) -> type:
     """The elimination along a tree, its check by a known solution as guards."""
 
-    class TracedTreeSystem(TreeSystem):  # type: ignore[misc]
+    class TracedTreeSystem(TreeSystem):  # type: ignore[misc]  # known when the source has run
         factored: bool
 
         def factor(self) -> None:

@@ -80,8 +80,8 @@ class Traced:
     def __bool__(self) -> bool:
         raise TypeError("whether a traced number is zero is not known before it has a value")
 
-    __eq__ = __ne__ = __lt__ = __le__ = __gt__ = __ge__ = None  # type: ignore[assignment]
-    __hash__ = None  # type: ignore[assignment]
+    __eq__ = __ne__ = __lt__ = __le__ = __gt__ = __ge__ = None  # type: ignore[assignment]  # undecided
+    __hash__ = None  # type: ignore[assignment]  # as nothing is equal
 
     def function(self, name: str) -> Traced:
         """negate, sine, cosine, sqrt, log or magnitude of it."""

@@ -13,6 +13,7 @@ from ..state import at_state
 from .by_realization import by_realization, output
 from .jacobians import resolved_jacobian
 from .prepared import direct, prepared
+from .threads import over_threads
 
 
 def cached(model: Any, name: str, make: Callable[[Any], Any]) -> Any:
@@ -36,8 +37,9 @@ class DirectCalls:
     which brings its v; without q it is the model's present state, `arm.q` and `arm.v`, as for expressions; beside an array q,
     velocities, forces and accelerations that are left out are zero. SI units and radians. Generalized velocities of ball and free
     hinges are in the axes of the body that the hinge moves, angular first. Results are float64, in `out` (writeable, C-ordered) where
-    one is given. Everywhere a ModelError names an argument of the wrong shape or with an entry that is not finite, and EvaluationError
-    an unknown option, and a result beyond the range of its numbers; errors at a state of a batch tell which.
+    one is given. `threads` shares the states of a batch out over so many threads; every state has the bits that it has with one.
+    Everywhere a ModelError names an argument of the wrong shape or with an entry that is not finite, and EvaluationError an unknown
+    option, and a result beyond the range of its numbers; errors at a state of a batch tell which.
     """
 
     nv: int
@@ -46,6 +48,7 @@ class DirectCalls:
         return cached(self, "_direct", _core.Dynamics)
 
     @direct
+    @over_threads
     def forward_dynamics(
         self,
         q=None,
@@ -58,6 +61,7 @@ class DirectCalls:
         precision: str | int = "double",
         method: str = "articulated",
         on_singular: str = "raise",
+        threads: int = 1,
         out=None,
     ) -> np.ndarray:
         """Accelerations v̇ under generalized forces, gravity included: articulated-body algorithm, O(N).
@@ -180,7 +184,8 @@ class DirectCalls:
         return {"value": value, "steps": len(corrections), "corrections": corrections, "error": error}
 
     @direct
-    def inverse_dynamics(self, q=None, v=None, vdot=None, *, precision: str | int = "double", out=None) -> np.ndarray:
+    @over_threads
+    def inverse_dynamics(self, q=None, v=None, vdot=None, *, precision: str | int = "double", threads: int = 1, out=None) -> np.ndarray:
         """Generalized forces (nv,) or (B, nv), N m and N, for the accelerations vdot, gravity and rotor inertia included.
 
         Newton-Euler, O(N) [Jain 2011, inverse dynamics]. In precision "single" to "quad".
@@ -189,7 +194,8 @@ class DirectCalls:
         return self._calls().inverse_dynamics(q, v, vdot, precision, out)
 
     @direct
-    def bias_forces(self, q=None, v=None, *, precision: str | int = "double", out=None) -> np.ndarray:
+    @over_threads
+    def bias_forces(self, q=None, v=None, *, precision: str | int = "double", threads: int = 1, out=None) -> np.ndarray:
         """Coriolis, gyroscopic and gravity forces 𝒞 (nv,) or (B, nv), N m and N: inverse dynamics at zero acceleration. O(N).
 
         The equations of motion are ℳ(q) v̇ + 𝒞(q, v) = τ [Jain 2011]. In precision "single" to "quad".
@@ -205,7 +211,8 @@ class DirectCalls:
         return self._calls().inverse_dynamics(q, v, None, precision, out)
 
     @direct
-    def mass_matrix(self, q=None, *, precision: str | int = "double", out=None) -> np.ndarray:
+    @over_threads
+    def mass_matrix(self, q=None, *, precision: str | int = "double", threads: int = 1, out=None) -> np.ndarray:
         """The mass matrix ℳ + J = HφMφ*H* + J of the equations of motion, full symmetric (nv, nv) or (B, nv, nv).
 
         Rotor inertia J included. kg m² between angles, kg m and kg where travels take part. Composite bodies, O(N²) [Jain 2011]. In
@@ -220,6 +227,7 @@ class DirectCalls:
         return self._calls().mass_matrix(at_state(self, q)[0], precision, out)
 
     @direct
+    @over_threads
     def mass_matrix_inverse(
         self,
         q=None,
@@ -229,6 +237,7 @@ class DirectCalls:
         residual: str = "same",
         precision: str | int = "double",
         on_singular: str = "raise",
+        threads: int = 1,
         out=None,
     ) -> np.ndarray:
         """The inverse of `mass_matrix`, full symmetric (nv, nv) or (B, nv, nv), by the innovations factors: O(N) a column.
@@ -245,8 +254,17 @@ class DirectCalls:
         return self._calls().mass_matrix_inverse(at_state(self, q)[0], form, refine, residual, precision, on_singular, out)
 
     @direct
+    @over_threads
     def jacobian(
-        self, frame: str, q=None, *, axes: str = "body", relative_to: str | None = None, precision: str | int = "double", out=None
+        self,
+        frame: str,
+        q=None,
+        *,
+        axes: str = "body",
+        relative_to: str | None = None,
+        precision: str | int = "double",
+        threads: int = 1,
+        out=None,
     ) -> np.ndarray:
         """Jacobian (6, nv) or (B, 6, nv) of the spatial velocity of a body or node, by its name: O(N).
 
@@ -279,7 +297,8 @@ class DirectCalls:
         return out
 
     @direct
-    def pose(self, frame: str, q=None) -> np.ndarray:
+    @over_threads
+    def pose(self, frame: str, q=None, *, threads: int = 1) -> np.ndarray:
         """Pose (4, 4) or (B, 4, 4) of a body or node, by its name, in the world: its axes as columns, its origin in metres. O(N).
 
         ModelError where no body or node has the name.
@@ -292,7 +311,8 @@ class DirectCalls:
         """
         return self._calls().pose(text(frame, "a frame"), at_state(self, q)[0])
 
-    def kinetic_energy(self, q=None, v=None) -> np.ndarray:
+    @over_threads
+    def kinetic_energy(self, q=None, v=None, *, threads: int = 1) -> np.ndarray:
         """½ v·(ℳ + J)v, in joules, a number or (B,). O(N).
 
         Examples
@@ -303,7 +323,8 @@ class DirectCalls:
         """
         return self._calls().energy(*at_state(self, q, v), (0.0, 0.0, 0.0))[..., 0]
 
-    def potential_energy(self, q=None, *, datum=(0.0, 0.0, 0.0)) -> np.ndarray:
+    @over_threads
+    def potential_energy(self, q=None, *, datum=(0.0, 0.0, 0.0), threads: int = 1) -> np.ndarray:
         """Energy -m g·(c - datum) in the uniform gravity field, c the centre of mass. Joules, a number or (B,).
 
         A number or (B,). Summed outboard to inboard and rounded once, so its error is that of a double of its size. Far from the datum,

@@ -15,6 +15,7 @@ from ..arguments import text
 from ..state import at_state
 from .by_realization import checked_forces
 from .direct_calls import DirectCalls, cached
+from .threads import over_threads
 
 
 class DynamicsDerivatives(NamedTuple):
@@ -39,7 +40,10 @@ class SensitivityCalls(DirectCalls):
     def _sensitivities(self) -> _core.Sensitivities:
         return cached(self, "_derivatives", _core.Sensitivities)
 
-    def inverse_dynamics_derivatives(self, q=None, v=None, vdot=None, *, precision: str = "double") -> DynamicsDerivatives:
+    @over_threads
+    def inverse_dynamics_derivatives(
+        self, q=None, v=None, vdot=None, *, precision: str = "double", threads: int = 1
+    ) -> DynamicsDerivatives:
         """∂T/∂q, ∂T/∂v and ∂T/∂v̇ = ℳ + J of T = inverse_dynamics(q, v, v̇), gravity included. Cost O(N · depth)."""
         q, v = at_state(self, q, v)
         vdot = np.zeros(self.nv) if vdot is None else vdot
@@ -47,8 +51,18 @@ class SensitivityCalls(DirectCalls):
         mass = self.mass_matrix(q, precision=precision)
         return DynamicsDerivatives(dq, dv, mass if mass.shape == dq.shape else np.broadcast_to(mass, dq.shape).copy())
 
+    @over_threads
     def forward_dynamics_derivatives(
-        self, q=None, v=None, tau=None, *, form: str = "fast", refine: int | str = 0, residual: str = "same", precision: str = "double"
+        self,
+        q=None,
+        v=None,
+        tau=None,
+        *,
+        form: str = "fast",
+        refine: int | str = 0,
+        residual: str = "same",
+        precision: str = "double",
+        threads: int = 1,
     ) -> DynamicsDerivatives:
         """∂v̇/∂q, ∂v̇/∂v and ∂v̇/∂τ = (ℳ + J)⁻¹ of v̇ = forward_dynamics(q, v, τ). Raises what it raises.
 
@@ -63,12 +77,14 @@ class SensitivityCalls(DirectCalls):
         tau = np.zeros(self.nv) if tau is None else tau
         return DynamicsDerivatives(*self._sensitivities().forward_dynamics(q, v, tau, form, refine, residual, precision))
 
-    def mass_matrix_derivative(self, q=None, *, precision: str = "double", out=None) -> np.ndarray:
+    @over_threads
+    def mass_matrix_derivative(self, q=None, *, precision: str = "double", threads: int = 1, out=None) -> np.ndarray:
         """∂ℳ/∂q, (nv, nv, nv) or (B, nv, nv, nv): entry (i, j, k) is ∂ℳ(i,j)/∂q_k. Cost O(N · depth²) beside the zeros."""
         q, _ = at_state(self, q)
         return self._sensitivities().third_order(False, q, precision, out)
 
-    def christoffel(self, q=None, *, precision: str = "double", out=None) -> np.ndarray:
+    @over_threads
+    def christoffel(self, q=None, *, precision: str = "double", threads: int = 1, out=None) -> np.ndarray:
         """Christoffel symbols of the first kind Γ (nv, nv, nv): Σ_jk Γ(i,j,k) v_j v_k is the Coriolis force, and Σ_k Γ(i,j,k) v_k = C(i,j).
 
         Γ(i,j,k) = ½(∂_kℳ(i,j) + ∂_jℳ(i,k) - ∂_iℳ(j,k)), and on ball and free hinges the brackets of the quasi-velocities besides (Koszul).
@@ -77,7 +93,8 @@ class SensitivityCalls(DirectCalls):
         q, _ = at_state(self, q)
         return self._sensitivities().third_order(True, q, precision, out)
 
-    def coriolis_matrix(self, q=None, v=None, *, form: str = "christoffel", precision: str = "double") -> np.ndarray:
+    @over_threads
+    def coriolis_matrix(self, q=None, v=None, *, form: str = "christoffel", precision: str = "double", threads: int = 1) -> np.ndarray:
         """C (nv, nv) with C v the Coriolis and gyroscopic forces (gravity apart) and ℳ̇ - 2C skew.
 
         form="christoffel": C = Γ v, the one for which also ∂(Cv)/∂v = 2C on hinges of one coordinate each; "skew": the operators'
@@ -97,12 +114,16 @@ class SensitivityCalls(DirectCalls):
             return C.at(*states, precision=precision).dense()
         raise _core.EvaluationError(f"form {form!r} of the Coriolis matrix is not there; there are 'christoffel' and 'skew'")
 
-    def kinetic_energy_derivatives(self, q=None, v=None, *, precision: str = "double") -> tuple[np.ndarray, np.ndarray]:
+    @over_threads
+    def kinetic_energy_derivatives(self, q=None, v=None, *, precision: str = "double", threads: int = 1) -> tuple[np.ndarray, np.ndarray]:
         """∂KE/∂q and ∂KE/∂v = (ℳ + J) v, each (nv,) or (B, nv). Cost O(N)."""
         q, v = at_state(self, q, v)
         return self._sensitivities().kinetic_energy(q, v, precision)
 
-    def hamiltonian_dynamics(self, q=None, p=None, tau=None, *, precision: str = "double") -> tuple[np.ndarray, np.ndarray]:
+    @over_threads
+    def hamiltonian_dynamics(
+        self, q=None, p=None, tau=None, *, precision: str = "double", threads: int = 1
+    ) -> tuple[np.ndarray, np.ndarray]:
         """The Hamiltonian form in O(N): v and ṗ of the generalized momenta p = (ℳ + J) v under the forces tau, gravity included.
 
         Without p those of the state's v.
@@ -117,7 +138,8 @@ class SensitivityCalls(DirectCalls):
         tau = np.zeros(self.nv) if tau is None else tau
         return self._sensitivities().hamiltonian(q, p, tau, precision)
 
-    def innovations(self, q=None, v=None, tau=None, *, precision: str = "double") -> tuple[np.ndarray, np.ndarray]:
+    @over_threads
+    def innovations(self, q=None, v=None, tau=None, *, precision: str = "double", threads: int = 1) -> tuple[np.ndarray, np.ndarray]:
         """Innovations velocity ξ = [I+HφK]*v and innovations ε = [I-HψK](τ - 𝒞), each (nv,) or (B, nv): decoupled coordinates.
 
         2 KE = ξ*Dξ and 2 × the acceleration energy's like: (τ-𝒞)*(ℳ+J)⁻¹(τ-𝒞) = ε*D⁻¹ε, both sums over hinges. O(N).
@@ -148,23 +170,27 @@ class SensitivityCalls(DirectCalls):
         bound = {"precision": precision}
         return m.T.at(q, v, **bound) @ np.asarray(v, float), S.at(q, v, **bound).dense(), inverse.at(q, v, **bound) @ forces
 
-    def momentum(self, q=None, v=None, *, precision: str = "double") -> Momentum:
+    @over_threads
+    def momentum(self, q=None, v=None, *, precision: str = "double", threads: int = 1) -> Momentum:
         """Momentum of all bodies about the world's origin, its matrix and its derivative. Cost O(N)."""
         q, v = at_state(self, q, v)
         matrix, dq = self._sensitivities().momentum(q, v, precision)
         return Momentum(np.einsum("...ij,...j->...i", matrix, np.asarray(v, float)), matrix, dq)
 
-    def jacobian_dot(self, frame: str, q=None, v=None, *, precision: str = "double") -> np.ndarray:
+    @over_threads
+    def jacobian_dot(self, frame: str, q=None, v=None, *, precision: str = "double", threads: int = 1) -> np.ndarray:
         """Time derivative (6, nv) or (B, 6, nv) of `jacobian(frame, q)` along v, in the same axes. Cost O(N)."""
         q, v = at_state(self, q, v)
         return self._sensitivities().jacobian_rate(text(frame, "a frame"), q, v, precision)
 
-    def jacobian_derivative(self, frame: str, q=None, *, precision: str = "double") -> np.ndarray:
+    @over_threads
+    def jacobian_derivative(self, frame: str, q=None, *, precision: str = "double", threads: int = 1) -> np.ndarray:
         """The kinematic Hessian ∂𝒥/∂q of `jacobian(frame, q)` in its own axes, (6, nv, nv) or (B, 6, nv, nv). Cost O(N + depth²)."""
         q, _ = at_state(self, q)
         return self._sensitivities().jacobian_derivative(text(frame, "a frame"), q, precision)
 
-    def inertial_regressor(self, q=None, v=None, vdot=None, *, precision: str = "double") -> np.ndarray:
+    @over_threads
+    def inertial_regressor(self, q=None, v=None, vdot=None, *, precision: str = "double", threads: int = 1) -> np.ndarray:
         """Y (nv, 10 n) or (B, nv, 10 n) with inverse_dynamics = Y π + J v̇, gravity included. Cost O(N · depth).
 
         π holds ten numbers per body, in the bodies' order (`inertial_parameters`): mass, mass times centre of mass (3), rotational inertia

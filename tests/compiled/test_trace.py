@@ -74,7 +74,7 @@ def test_decisions_are_not_taken():
     with pytest.raises(TypeError, match="not known before"):
         bool(x)
     with pytest.raises(TypeError):
-        x < 1  # noqa: B015
+        _ = x < 1
     graph.guard(x, 1.0)
     assert [evaluated(graph, np.array(x.index), {"x": np.array([[v]])})[1][0] for v in (0.5, 2.0)] == [False, True]
 

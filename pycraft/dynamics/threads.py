@@ -1,0 +1,86 @@
+"""Batches shared out over threads: the core computes outside the GIL, each part in a workspace of its own."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import operator
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, TypeVar
+
+import numpy as np
+
+from .. import _core
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+_PACK = 16  # states: as many as any kernel takes at once, so that every state has the bits that it has with one thread
+_PARTS = 4  # for each thread, so that a slow one holds up no more than a part
+
+
+def over_threads(method: F) -> F:
+    """Gives a call its `threads=`: with more than one, the states of a batch are shared out."""
+    names = [n for n, p in inspect.signature(method).parameters.items() if p.kind is p.POSITIONAL_OR_KEYWORD and n != "self"]
+
+    @functools.wraps(method)
+    def call(self: Any, *given: Any, threads: int = 1, **options: Any) -> Any:
+        count = _count(threads)
+        if count == 1:
+            return method(self, *given, **options)
+        return _shared(functools.partial(method, self), names, given, options, count)
+
+    return call  # type: ignore[return-value]  # of the same signature
+
+
+def _count(threads: Any) -> int:
+    count = 0
+    if not isinstance(threads, (bool, np.bool_)):
+        try:
+            count = operator.index(threads)
+        except TypeError:
+            count = 0
+    if not 1 <= count <= 1024:
+        raise _core.EvaluationError(f"threads={threads!r}: how many threads share the states of a batch, from 1 to 1024")
+    return count
+
+
+def _shared(call: Callable[..., Any], names: list[str], given: tuple[Any, ...], options: dict[str, Any], threads: int) -> Any:
+    """The call on parts of the batch; whatever is no batch, and every error, by the call as a whole."""
+    whole = functools.partial(call, *given, **options)
+    bound = {**dict(zip(names, given, strict=False)), **{n: x for n, x in options.items() if n in names}}
+    rest = {n: x for n, x in options.items() if n not in names and n != "out"}
+    arrays = {n: np.asarray(x) for n, x in bound.items() if isinstance(x, (np.ndarray, list, tuple)) and np.ndim(x) == 2}
+    sizes = {len(a) for a in arrays.values()}
+    out = options.get("out")
+    if "q" not in arrays or len(sizes) != 1 or len(given) > len(names):
+        return whole()
+    if not (out is None or (isinstance(out, np.ndarray) and out.ndim and len(out) in sizes)):
+        return whole()
+    (states,) = sizes
+    length = max(_PACK, -(-states // (threads * _PARTS * _PACK)) * _PACK)
+    if states <= length:
+        return whole()
+    if out is not None and any(np.shares_memory(out, a) for a in arrays.values()):
+        return whole()  # parts would read what others have written
+
+    def part(start: int) -> Any:
+        rows = slice(start, start + length)
+        own = {n: arrays[n][rows] if n in arrays else x for n, x in bound.items()}
+        return call(**own, **rest, **({} if out is None else {"out": out[rows]}))
+
+    pool = ThreadPoolExecutor(threads)
+    parts: list[Any] = []
+    try:
+        parts += pool.map(part, range(0, states, length))
+    except Exception:  # of a part, which knows its states by other numbers: the call as a whole says what is wrong
+        pool.shutdown(cancel_futures=True)
+        return whole()
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)  # an interrupt waits for no more than the parts in work
+    if out is not None:
+        return out
+    if isinstance(parts[0], tuple):
+        joined = [np.concatenate(column) for column in zip(*parts, strict=True)]
+        return type(parts[0])(*joined) if hasattr(parts[0], "_fields") else tuple(joined)
+    return np.concatenate(parts)
