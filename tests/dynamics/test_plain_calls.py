@@ -226,7 +226,8 @@ def test_looks_like_a_method():
     assert inspect.getdoc(call).startswith("Accelerations v̇") and inspect.isroutine(call)
     assert call.__name__ == "forward_dynamics" and "forward_dynamics" in repr(pc.chain(1).forward_dynamics)
     assert call.__module__ == "pycraft.dynamics.direct_calls" and call.__qualname__ == "DirectCalls.forward_dynamics"
-    assert call.__kwdefaults__["form"] == "fast" and call.__defaults__ == (None, None, None)
+    parameters = inspect.signature(call).parameters
+    assert parameters["form"].default == "fast" and parameters["q"].default is None and call.__kwdefaults__ == {"threads": 1}
     for text in (pydoc.render_doc(call), pydoc.render_doc(pc.Multibody)):
         assert "on_singular: 'str' = 'raise'" in text and "Accelerations v̇ under generalized forces" in text
     with pytest.raises(TypeError):
