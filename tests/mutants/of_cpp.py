@@ -163,8 +163,17 @@ CHANGES = {
     ],
     "cpp/kernels/forward_dynamics.h": [
         ("a rotor keeps all of its row", "S(J * w.inverse)", "S(1)"),
+        ("what pivots outboard are unsure of is forgotten", "greater(D, S(4) * most * P.error)", "S::all()"),
+        (
+            "a heavy rotor's rate is a difference",
+            "(left - w.angular[K] * alpha[K]) * w.inverse",
+            "(left + S(link.J) * alpha[K]) * w.inverse - alpha[K]",
+        ),
         ("a faint pivot of one coordinate is sound", "greater(D, S(links.faint) * most)", "S::all()"),
         ("branches are lost", "add(w.branch[link.parent], P);", ";", STATEMENT),
+    ],
+    "cpp/kernels/mass_matrix_of_links.h": [
+        ("lengths along an axis are felt", "S(2) * (l[j] * g[j] + l[k] * g[k])", "S(2) * (dot(l, g) - l[i] * g[i])"),
     ],
     "cpp/kernels/steps.h": [
         ("hinges against an axis turn with it", "S(link.sign) * of.sine", "of.sine"),

@@ -197,6 +197,48 @@ CHANGES = {
             "parents=tuple(p - (p >= k and p > 0) for p in parents)",
         ),
     ],
+    "pycraft/compiled/trace.py": [
+        (
+            "a negated difference is itself",
+            'return self._node("subtract", operation[2], operation[1])',
+            'return self._node("subtract", *operation[1:])',
+        ),
+        ("products lose a sign", "return product if None not in negatives else self._negate(product)", "return product"),
+        ("any factor is a power of two", " and math.log2(factor) == int(math.log2(factor)):", ":"),
+        ("guards are not kept", "            self.guards.append(node)\n", "            pass\n"),
+    ],
+    "pycraft/compiled/source.py": [
+        ("one angle for all", "self.early.index(taken[0])", "0"),
+        ("guards are not written", "return {' & '.join(guards) or 'S{} == S{}'};", "return S{{}} == S{{}};"),
+        (
+            "a difference without brackets",
+            'self._bracketed(second, strength - (name in ("add", "multiply")))',
+            "self._bracketed(second, strength - 1)",
+        ),
+    ],
+    "pycraft/compiled/expressions.py": [
+        ("gravity turned round", '*(-describe(source)["gravity"])', '*(describe(source)["gravity"])'),
+        ("pivots are not guarded", "graph.guard(pivot if mirrored else abs(pivot), _FAINT * self.scale)", "pass"),
+    ],
+    "pycraft/compiled/kinematics.py": [
+        ("rows of H change the wrong way", "[crm(h) @ moving for h in own]", "[-(crm(h) @ moving) for h in own]"),
+        ("a screw without its pitch", 'cross(c, a) + a * subhinge["pitch"] if kind', "cross(c, a) if kind"),
+    ],
+    "pycraft/compiled/frames.py": [
+        ("a node's own frame left out", "[*path, own], _STILL", "path, _STILL"),
+    ],
+    "pycraft/compiled/compiled.py": [
+        ("edits go unnoticed", "if _numbers_of(model) != numbers:", "if False:"),
+        ("later edits show", "held = copy.deepcopy(model)", "held = model"),
+    ],
+    "pycraft/compiled/build.py": [
+        ("one library for all sources", "source.encode(), shlex", 'b"", shlex'),
+    ],
+    "pycraft/dynamics/threads.py": [
+        ("parts of no whole packs", "_PACK = 16", "_PACK = 1"),
+        ("parts read what others wrote", "if out is not None and any(np.shares_memory(out, a) for a in arrays.values()):", "if False:"),
+        ("errors count states by parts", "        pool.shutdown(cancel_futures=True)\n        return whole()\n", "        raise\n"),
+    ],
     "pycraft/models/loaders/xml_file.py": [
         ("undeclared entities are dropped", 'if "UNDECLARED_ENTITY" in entry.type_name:', "if False:"),
         ("entities are expanded", "resolve_entities=False", "resolve_entities=True"),
