@@ -1,7 +1,10 @@
 """What the everyday subset leaves out besides the tests that mark themselves: what takes seconds and stands close to a quick test."""
 
 import os
+import tempfile
 
+# What examples compile is no business of the user's own folder.
+os.environ.setdefault("PYCRAFT_CACHE", os.path.join(tempfile.gettempdir(), f"pycraft-tests-{os.getuid()}"))
 # Before NumPy is imported: the tests run side by side, and threads of small products wait for each other.
 for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
@@ -44,7 +47,9 @@ SLOW = {
         or (item.originalname == "test_packages_that_are_not_there" and item.callspec.params["package"] == "jupyterlab")
         or item.originalname == "test_an_ascii_terminal"
     ),
-    "test_docs": lambda item: item.originalname == "test_the_readme_example_runs" or item.name.endswith("_page_run[statements]"),
+    "test_docs": lambda item: (
+        item.originalname == "test_the_readme_example_runs" or item.name.endswith(("_page_run[statements]", "_page_run[compiled]"))
+    ),
     "test_proof_campaign": lambda item: item.originalname.startswith("test_traces_with") and item.callspec.params["seed"] != 173,
     "test_forms": lambda item: (
         (item.originalname == "test_forms_agree_in_quad" and not item.callspec.params["rotor_inertia"])

@@ -4,6 +4,7 @@
 #include "algebra/engine/evaluate.h"
 #include "bench/timing.h"
 #include "bindings/bindings.h"
+#include "bindings/compiled_library.h"
 #include "dynamics/batch_dynamics.h"
 #include "dynamics/methods.h"
 #include "dynamics/sensitivities.h"
@@ -145,7 +146,27 @@ py::dict time_dynamics(const std::shared_ptr<Multibody>& model, const std::strin
 
 }  // namespace
 
+// A compiled function, one state after another; given: an array (K, n) for each input.
+py::dict time_compiled(const std::string& library, const std::string& function, const std::vector<Array>& given, int results, double seconds) {
+  const CompiledRun run = load_compiled(library, function);
+  std::vector<const double*> places(given.size());
+  const std::vector<std::int64_t> strides(given.size());
+  std::vector<double> out(results);
+  const int K = states_of(given.at(0));
+  int k = 0;
+  ReleasedGil release;
+  const Timing t = time_calls([&] {
+    for (size_t i = 0; i < given.size(); ++i) places[i] = given[i].data() + k * given[i].shape(1);
+    run(places.data(), strides.data(), out.data(), 1);
+    k = (k + 1) % K;
+  }, seconds);
+  py::gil_scoped_acquire acquire;
+  return result(t);
+}
+
 void register_bench(py::module_& m) {
+  m.def("time_compiled", &time_compiled, py::arg("library"), py::arg("function"), py::arg("given"), py::arg("results"), py::arg("seconds") = 0.2,
+        "Seconds per call of a compiled function over a set of states in rotation: minimum, median, calls.");
   m.def("time_apply", &time_apply, py::arg("operator"), py::arg("x"), py::arg("seconds") = 0.2, py::arg("rules") = true, "Seconds per application: minimum, median, calls.");
   m.def("time_dynamics", &time_dynamics, py::arg("model"), py::arg("call"), py::arg("q"), py::arg("v"), py::arg("u"), py::arg("seconds") = 0.2,
         "Seconds per direct call over a set of states in rotation: minimum, median, calls.");

@@ -1,9 +1,9 @@
 // Compiled functions (pycraft/compiled): what a kernel does for one model, to write source from, and the callable around what was built of it.
 #include <memory>
 
-#include <dlfcn.h>
 #include <generated/kernel_headers.h>
 
+#include "bindings/compiled_library.h"
 #include "bindings/plain_arrays.h"
 #include "kernels/link_model.h"
 #include "kernels/tape.h"
@@ -14,10 +14,6 @@ namespace pycraft {
 
 namespace {
 
-// What a library built from source offers (pycraft/compiled/source.py): the results at `states` states, given[i] + b strides[i] the input i of
-// state b; how many of them are in doubt.
-using Run = std::int64_t (*)(const double* const* given, const std::int64_t* strides, double* out, std::int64_t states);
-
 constexpr int most_inputs = 4;
 
 // Takes contiguous arrays to the library; whatever else comes, and what is left in doubt, is for the Python object behind it.
@@ -25,7 +21,7 @@ struct CompiledCall {
   PyObject_HEAD
   vectorcallfunc vectorcall;
   PyObject* behind;
-  Run run;
+  CompiledRun run;
   int inputs, widths[most_inputs];
   int axes;
   py::ssize_t lengths[2], size;  // of one result
@@ -130,14 +126,12 @@ py::object compiled_call(const py::object& behind, const std::string& library, c
                          py::ssize_t work) {
   static PyObject* const type = PyType_FromSpec(&spec);
   if (widths.size() > most_inputs || lengths.size() > 2) throw EvaluationError("a compiled function takes at most four arrays and gives at most a matrix");
-  void* const loaded = dlopen(library.c_str(), RTLD_NOW | RTLD_LOCAL);  // never unloaded: functions may run for as long as Python does
-  void* const run = loaded ? dlsym(loaded, function.c_str()) : nullptr;
-  if (!run) throw EvaluationError("'" + library + "' cannot be loaded: " + dlerror());
+  const CompiledRun run = load_compiled(library, function);
   auto* const c = type ? PyObject_GC_New(CompiledCall, reinterpret_cast<PyTypeObject*>(type)) : nullptr;
   if (!c) throw py::error_already_set();
   c->vectorcall = called;
   c->behind = behind.inc_ref().ptr();
-  c->run = reinterpret_cast<Run>(run);
+  c->run = run;
   c->inputs = static_cast<int>(widths.size()), std::copy(widths.begin(), widths.end(), c->widths);
   c->axes = static_cast<int>(lengths.size()), std::copy(lengths.begin(), lengths.end(), c->lengths);
   c->size = 1, c->work = work;

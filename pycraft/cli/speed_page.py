@@ -106,6 +106,18 @@ def batch_cells(found: Measured) -> list[list[str]]:
     return lines
 
 
+COMPILED_HEADINGS = ["model", "nv", "call", "operations", "build, s", "C++", "the call itself", "its ratio", "Pinocchio", "ratio", "Python"]
+
+
+def compiled_cells(found: Measured) -> list[list[str]]:
+    """Lines of the table of code compiled for one model."""
+    lines = []
+    for row in found.compiled:
+        line = [row.model, str(row.nv), CALLS[row.call], f"{row.operations:,}", f"{row.built:.1f}", _time(row.kernel), _time(row.ordinary)]
+        lines.append([*line, number(row.ordinary.median / row.kernel.median), _time(row.peer_kernel), number(row.ratio), _time(row.python)])
+    return lines
+
+
 def cost_cells(figures: list[Figure]) -> list[list[str]]:
     """Lines of the table of what accuracy costs."""
     return [[f.name, f"{f.value:.3g}", "" if f.bound is None else f"{f.bound:g}" + (" ✓" if f.passed else " ✗"), f.note] for f in figures]
@@ -186,6 +198,12 @@ Forward dynamics of {BATCH} states at once from Python, a state's share, and one
 instruction set: {asked}.
 
 {_markdown(BATCH_HEADINGS, batch_cells(found))}
+## Code for one model
+
+Calls compiled for their model ([compiled.md](compiled.md)), one state after another in C++, beside the call itself and Pinocchio's in
+C++; ratios over the compiled call. Code that is built on the machine that runs it uses all of its instructions, fused ones among them.
+
+{_markdown(COMPILED_HEADINGS, compiled_cells(found), words=3)}
 ## How cost grows
 
 The fitted p of time ~ Nᵖ in C++, on chains of {FITTED_FROM} links and more, up to the longest that was timed. ℳ and ℳ⁻¹ have N² entries,

@@ -17,7 +17,9 @@ import numpy as np
 
 from .. import _core
 from ..interop.peer import PeerRefusal
+from . import compiled_speed
 from .clock import Clock, Time, elapsed, in_turn, machine, pin_to_one_core
+from .compiled_speed import CompiledRow, compiled_row
 from .peer_calls import Call, other_packages
 from .timed_models import CHAINS, timed_models
 
@@ -91,6 +93,7 @@ class Measured:
     rows: list[Row] = field(default_factory=list)
     batches: list[BatchRow] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
+    compiled: list[CompiledRow] = field(default_factory=list)
 
     def as_json(self) -> dict[str, Any]:
         """Plain data: times in microseconds, with ratios, goals met and fitted exponents."""
@@ -102,8 +105,9 @@ class Measured:
             judged = {"ratio": row.ratio, "python_ratio": row.python_ratio, "goals": GOALS[row.call], "met": row.met}
             rows.append({**asdict(row), **times, "peers": peers, **judged})
         batches = [{**asdict(row), "double": row.double._asdict(), "single": row.single._asdict()} for row in self.batches]
+        compiled = [row.as_json() for row in self.compiled]
         fitted = {"ours": exponents(self.rows), "Pinocchio": exponents(self.rows, peer=True)}
-        return {**asdict(self), "unit": "microseconds", "rows": rows, "batches": batches, "exponents": fitted}
+        return {**asdict(self), "unit": "microseconds", "rows": rows, "batches": batches, "compiled": compiled, "exponents": fitted}
 
     def leave_out(self, text: str) -> None:
         """Say once what is not compared, and why."""
@@ -244,6 +248,16 @@ def _batch(name: str, own: OwnCalls, peer_kernel: Time | None, seconds: float) -
     return BatchRow(name, model.nv, double, single, ratios)
 
 
+def _compiled(found: Measured, name: str, own: OwnCalls, seconds: float) -> None:
+    peers = {row.call: row.peer_kernel for row in found.rows if row.model == name}
+    try:
+        found.compiled += [compiled_row(name, own.model, call, own.states, peers.get(call), seconds) for call in compiled_speed.CALLS]
+    except _core.EvaluationError as error:
+        if "compiler" not in str(error):
+            raise
+        found.leave_out(f"code compiled for a model: {error}")
+
+
 def measure(seconds: float = 0.1, quick: bool = False, progress: Callable[[str], None] = lambda text: None) -> Measured:
     """All figures, `seconds` for each; `quick`: two robots and two short chains. MissingPackageError where Pinocchio is not installed."""
     found = Measured(machine() | {"cores": pin_to_one_core()})
@@ -267,6 +281,9 @@ def measure(seconds: float = 0.1, quick: bool = False, progress: Callable[[str],
             found.rows.append(measured_row(name, own, call, peers, seconds, packages.get("Pinocchio")))
         forward = next(row for row in found.rows if (row.model, row.call) == (name, "forward_dynamics"))
         found.batches.append(_batch(name, own, forward.peer_kernel, seconds))
+        if model.nv <= compiled_speed.LARGEST:
+            progress(f"{name}: compiled")
+            _compiled(found, name, own, seconds)
     return found
 
 

@@ -14,6 +14,7 @@ from pycraft.cli.bench import Figure
 from pycraft.cli.commands import app
 from pycraft.peers import speed
 from pycraft.peers.clock import Time
+from pycraft.peers.compiled_speed import CompiledRow
 
 runner = CliRunner()
 
@@ -29,7 +30,9 @@ def measured():
     rows += [row(call, "UR5", 6, 1.0, 2.6, MuJoCo=2.0) for call in speed.GOALS]
     rows.append(speed.Row("chain of 1000", 1000, "forward_dynamics", Time(9.0, 10.0), Time(10.0, 11.0)))
     batches = [speed.BatchRow("UR5", 6, Time(0.4, 0.5), Time(0.3, 0.4), (5.0, 12.0)), speed.BatchRow("A", 9, Time(1, 1), Time(1, 1))]
-    return speed.Measured({"processor": "P", "instruction set": "avx2", "cores": "one"}, rows, batches, ["Talos: no file"])
+    compiled = [CompiledRow("UR5", 6, "forward_dynamics", 1984, 1.26, Time(0.3, 0.32), Time(0.5, 0.6), Time(0.7, 0.8), Time(1.5, 1.6))]
+    compiled.append(CompiledRow("A", 9, "mass_matrix", 10, 0.5, Time(1, 1), Time(1, 1), Time(1, 1), None))
+    return speed.Measured({"processor": "P", "instruction set": "avx2", "cores": "one"}, rows, batches, ["Talos: no file"], compiled)
 
 
 COSTS = [Figure("ud over fast", 5.0, "x", 3.5, "note"), Figure("quad over fast", 90.0, "x", 160.0), Figure("single", 0.5, "x")]
@@ -46,6 +49,8 @@ def test_the_page_says_what_was_measured():
         "| ud over fast | 5 | 3.5 ✗ | note |" in text and "| quad over fast | 90 | 160 ✓ |  |" in text and "| single | 0.5 |  |  |" in text
     )
     assert "| forward dynamics | 1.00 |" in text and "`mj_inverse`" in text and "Drake" not in text
+    assert "| UR5 | 6 | forward dynamics | 1,984 | 1.3 | 0.32 | 0.8 | 2.5 | 1.6 | 5 | 0.6 |" in text
+    assert "| A | 9 | mass matrix ℳ | 10 | 0.5 | 1 | 1 | 1 |  |  | 1 |" in text
     assert "- processor: P\n- instruction set: avx2\n" in text and "- Talos: no file" in text
 
 
@@ -80,6 +85,8 @@ def test_the_data_are_json():
     assert first["kernel"] == {"minimum": 0.05, "median": 0.1} and first["peers"]["Pinocchio"]["median"] == 2.0
     assert first["ratio"] == 10.0 and first["goals"] == [3.0, 2.0] and first["met"] == [True, False]
     assert data["rows"][-1]["peer_kernel"] is None and data["unit"] == "microseconds"
+    assert data["compiled"][0]["ratio"] == 5.0 and data["compiled"][0]["kernel"] == {"minimum": 0.3, "median": 0.32}
+    assert data["compiled"][1]["peer_kernel"] is None
     assert data["exponents"]["ours"]["mass_matrix"] == pytest.approx(1.0) and data["batches"][0]["ratios"] == [5.0, 12.0]
 
 

@@ -132,5 +132,7 @@ def test_a_quick_run(monkeypatch):
         assert r.kernel.median > 0 and r.python.median > 0 and r.peers["Pinocchio"].median > 0 and r.peer_kernel.median > 0
         assert set(r.errors) == set(r.peers) and max(r.errors.values()) < 1e-9
     assert all(r.double.median > 0 and r.single.median > 0 and min(r.ratios) > 0 for r in found.batches)
+    assert {r.model for r in found.compiled} == {"UR5", "Panda", "chain of 10"}
+    assert all(r.kernel.median > 0 and r.python.median > 0 and r.ratio > 0 for r in found.compiled)
     assert json.loads(json.dumps(found.as_json()))["rows"][0]["ratio"] > 0
     assert "UR5: forward dynamics" in said and any(text.startswith("CasADi") for text in found.left_out)

@@ -85,7 +85,7 @@ def test_the_other_packages_of_the_page_of_comparisons(tmp_path, monkeypatch):
     assert len(compared) == 3 and all(eval(line, names) for line in compared)
 
 
-@pytest.mark.parametrize("page", ["symbolic", "kalman", "accuracy", "evaluation", "statements", "teaching", "proofs"])
+@pytest.mark.parametrize("page", ["symbolic", "kalman", "accuracy", "evaluation", "statements", "teaching", "proofs", "compiled"])
 def test_the_blocks_of_a_page_run(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names = {}
