@@ -15,6 +15,7 @@ from .. import _core
 from ..arguments import text
 from ..models.multibody import describe
 from .build import built
+from .expressions import ExpressionGraph
 from .frames import frame_graph
 from .kernels import INPUTS, kernel_graph
 from .source import FUNCTION, written
@@ -100,12 +101,8 @@ def _of_frame(model: Any, call: str, frame: str, q: Any, out: Any = None) -> Any
 
 def compile_expression(expression: Any, request: str = "apply") -> Any:
     """What `Operator.compile` and `Scalar.compile` give."""
-    from .expressions import ExpressionGraph
-
     made = ExpressionGraph(expression, request)
-    ordinary = partial(
-        _evaluated, expression, request, made.model, _numbers_of(made.model), [a for a, _ in made.arguments], made.results.shape
-    )
+    ordinary = partial(_evaluated, expression, request, made, _numbers_of(made.model))
     name = expression.text() if request == "apply" else f"{request} of {expression.text()}"
     return _callable(Compiled(name, made.graph, made.results, made.arguments, ordinary), made.arguments)
 
@@ -115,12 +112,11 @@ def _numbers_of(model: Any) -> bytes:
     return b"" if model is None else pickle.dumps({k: v for k, v in describe(model).items() if k not in ("q", "v")})
 
 
-def _evaluated(
-    expression: Any, request: str, model: Any, numbers: bytes, names: Sequence[str], shape: tuple[int, ...], *given: Any, out: Any = None
-) -> Any:
+def _evaluated(expression: Any, request: str, made: ExpressionGraph, numbers: bytes, *given: Any, out: Any = None) -> Any:
     """The expression at states, one after another, by its plan."""
-    if _numbers_of(model) != numbers:
-        raise _core.EvaluationError(f"{model.name!r} was edited after {expression.text()} was compiled: compile it again")
+    if made.model is not None and _numbers_of(made.model) != numbers:
+        raise _core.EvaluationError(f"{made.model.name!r} was edited after {expression.text()} was compiled: compile it again")
+    names, shape = [name for name, _ in made.arguments], made.results.shape
     arrays = dict(zip(names, (np.asarray(a, float) for a in given), strict=True))
     batches = {len(a) for a in arrays.values() if a.ndim == 2}
     if len(batches) > 1 or any(a.ndim not in (1, 2) for a in arrays.values()):
@@ -130,11 +126,11 @@ def _evaluated(
     result = np.empty(shape if count is None else (count, *shape))
     for b in range(1 if count is None else count):
         state = {name: a[b] if a.ndim == 2 else a for name, a in arrays.items()}
-        q, v = state.pop("q", None), state.pop("v", None)
+        q, v = (state.pop(name, None) if made.model is not None else None for name in "qv")
+        vectors = {made.vectors[name]: state.pop(name) for name in list(state) if name in made.vectors}
         bound = expression if q is None else expression.at(q, v) if v is not None else expression.at(q)
         x = next(iter(state.values()), None)
-        value = _requested(bound, request, x)
-        result[... if count is None else b] = value
+        result[... if count is None else b] = bound.value(**vectors) if vectors else _requested(bound, request, x)
     if out is None:
         return result
     if not isinstance(out, np.ndarray) or out.shape != result.shape or out.dtype != float or not out.flags.writeable:

@@ -182,6 +182,7 @@ class ExpressionGraph:
     graph, results : the nodes of the result, in its shape
     arguments : names and widths of what it is a function of: q and v of a model at whose state letters are free, x
     model : that model; None where everything is bound
+    vectors : the names of named vectors by those of their arguments
     """
 
     def __init__(self, expression: Any, request: str):
@@ -206,8 +207,13 @@ class ExpressionGraph:
         self.arguments: list[tuple[str, int]] = []
         if self.model is not None:
             self.arguments = [("q", self.model.nq), *([("v", self.model.nv)] if reads_v else [])]
+        self.vectors = {q.name: name for name, q in algorithm._recursions[0].vectors.items()}
         given = [np.array(self.graph.inputs(q.name, n), object) for q, n in zip(takes, widths, strict=True)]
         self.arguments += [(q.name, n) for q, n in zip(takes, widths, strict=True)]
+        names = [name for name, _ in self.arguments]
+        for name in names:
+            if names.count(name) > 1:
+                raise _core.EvaluationError(f"a vector called {name!r} has the name of another argument of what compile() makes; rename it")
         results = self._run(str(algorithm), data, given)
         found = np.array(results, object)
         nodes = [self.graph.number(x).index for x in found.ravel()]

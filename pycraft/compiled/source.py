@@ -16,6 +16,7 @@ from .. import _core
 from .trace import CONSTANT, INPUT, Graph, operands
 
 FUNCTION = "pycraft_run"
+_KNOWN = ("q", "v", "x", "tau", "vdot")
 _LONGEST = 75
 _PIECE = 1000
 _SIGNS = {"add": " + ", "subtract": " - ", "multiply": " * ", "divide": " / "}
@@ -58,12 +59,17 @@ def written(graph: Graph, results: np.ndarray, arguments: Sequence[tuple[str, in
         "",
         f"constexpr int widths[] = {{{', '.join(str(n) for _, n in arguments) or '0'}}};",
         "",
-        *_functions(lines, [name for name, _ in arguments]),
+        *_functions(lines, [_array(name) for name, _ in arguments]),
         "",
         loop,
         "",
     ]
     return "\n".join(parts), lines.count
+
+
+def _array(name: str) -> str:
+    """What an input is called: a user's vector may have the name of what is written besides."""
+    return name if name in _KNOWN else f"in_{name}"
 
 
 def _function(head: str, inside: Iterable[str]) -> list[str]:
@@ -158,7 +164,7 @@ class _Lines:
                 self.text[node] = (_number(taken[0]), 4 if taken[0] >= 0 else 2)
                 return
             case "input":
-                self.text[node] = (f"{taken[0]}[{taken[1]}]", 4)
+                self.text[node] = (f"{_array(taken[0])}[{taken[1]}]", 4)
                 return
         self.count += 1
         if name in ("sine", "cosine") and taken[0] in self.early:

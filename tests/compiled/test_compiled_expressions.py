@@ -116,6 +116,26 @@ def test_compiled_expressions_run():
     np.testing.assert_allclose(out, compiled(Q, x), atol=10 * size)
 
 
+def test_named_vectors_are_arguments():
+    """By names that mean something else in what is written, too."""
+    model = TREES["screws, balls, sliders"]()
+    q = model.random_state(4).q
+    s, y = (pc.vector(name, model.soa.Theta) for name in ("s", "y"))
+    expression = model.soa.MM @ s - 2 * y
+    compiled = expression.compile()
+    assert compiled.arguments == ("q", "s", "y")
+    a, b = np.linspace(-1, 1, model.nv), np.ones(model.nv)
+    wanted = expression.at(q).value(s=a, y=b)
+    np.testing.assert_allclose(compiled(q, a, b), wanted, atol=1e-12 * np.abs(wanted).max())
+    np.testing.assert_array_equal(compiled(q.tolist(), a.tolist(), b.tolist()), wanted)
+
+
+def test_a_vector_named_as_a_state():
+    model = TREES["one body"]()
+    with pytest.raises(pc.EvaluationError, match="rename"):
+        (model.soa.MM @ pc.vector("q", model.soa.Theta)).compile()
+
+
 def test_compiled_scalars_run():
     model = TREES["one body"]()
     scalar = model.soa.MM.logdet() + 2.0
