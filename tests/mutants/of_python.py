@@ -228,7 +228,7 @@ CHANGES = {
         ("a node's own frame left out", "[*path, own], _STILL", "path, _STILL"),
     ],
     "pycraft/compiled/compiled.py": [
-        ("edits go unnoticed", "if _numbers_of(model) != numbers:", "if False:"),
+        ("edits go unnoticed", "made.model is not None and _numbers_of(made.model) != numbers", "False"),
         ("later edits show", "held = copy.deepcopy(model)", "held = model"),
     ],
     "pycraft/compiled/build.py": [
