@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import platform
 import shlex
 import shutil
 import subprocess
@@ -16,7 +17,8 @@ from pathlib import Path
 
 from .. import _core
 
-FLAGS = ("-std=c++20", "-O2", "-march=native", "-ffp-contract=fast", "-fno-math-errno", "-fPIC", "-shared")
+_NATIVE = "-mcpu=native" if platform.machine() in ("arm64", "aarch64") else "-march=native"
+FLAGS = ("-std=c++20", "-O2", _NATIVE, "-ffp-contract=fast", "-fno-math-errno", "-fPIC", "-shared")
 """Products are contracted with sums where the machine has such an instruction; nothing else of IEEE 754 is given up."""
 
 
