@@ -70,11 +70,11 @@ def test_batches_are_counted_by_any_whole_number():
 
 @pytest.mark.parametrize("call", CALLS)
 def test_the_core_takes_what_the_method_takes(call):
-    """But for out=, and for what leads to other computations."""
+    """But for out= and threads=, and for what leads to other computations."""
     arrays, options = _core.direct_calls()[call]
     method = inspect.signature(getattr(pc.Multibody, call)).parameters
     assert [name for name in method if name in arrays] == list(arrays)
-    assert set(method) - {"self", "out", "method", "axes", "relative_to"} == {*arrays, *options}
+    assert set(method) - {"self", "out", "threads", "method", "axes", "relative_to"} == {*arrays, *options}
     defaults = {name: method[name].default for name in options if name != "frame"}
     model = panda()
     frame = {"frame": "panda_link7"} if "frame" in options else {}
