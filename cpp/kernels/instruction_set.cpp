@@ -18,7 +18,7 @@ const std::vector<InstructionSet>& instruction_sets() {
     std::vector<InstructionSet> there{{"baseline", baseline_one, baseline_pack, baseline_singles}};
 #if defined(PYCRAFT_X86_64)
     __builtin_cpu_init();
-    if (__builtin_cpu_supports("avx2")) {
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
       there.push_back({"avx2", avx2_one, avx2_pack, avx2_singles});
       if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bw"))
         there.push_back({"avx512", avx2_one, avx512_pack, avx512_singles});  // one state has nothing to fill wider registers with

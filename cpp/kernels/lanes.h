@@ -2,6 +2,10 @@
 //
 // Everything of the kernels lives in a namespace named for the instruction set that a source is built for: functions of one set never take
 // the place of another's when objects are linked, as all of their arguments have types of that namespace.
+//
+// A product that is added to or taken from another number is fused with that where the instruction set can: it is not rounded by itself.
+// Which ones are is said by how a formula is written, left to right, and not left to the compiler: one state has the digits that it has in a
+// pack. In a b ± c d the second product is rounded.
 #pragma once
 
 #ifndef PYCRAFT_INSTRUCTION_SET
@@ -11,6 +15,9 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#ifdef __FMA__
+#include <immintrin.h>
+#endif
 
 namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET {
 
@@ -23,6 +30,35 @@ struct BitsOf<double> {
 template <>
 struct BitsOf<float> {
   using type = std::int32_t;
+};
+
+// a b + c, of numbers or of vectors of them.
+#ifdef __FMA__
+[[gnu::always_inline]] inline double fused(double a, double b, double c) { return __builtin_fma(a, b, c); }
+[[gnu::always_inline]] inline float fused(float a, float b, float c) { return __builtin_fmaf(a, b, c); }
+[[gnu::always_inline]] inline __m256d fused(__m256d a, __m256d b, __m256d c) { return _mm256_fmadd_pd(a, b, c); }
+[[gnu::always_inline]] inline __m256 fused(__m256 a, __m256 b, __m256 c) { return _mm256_fmadd_ps(a, b, c); }
+#ifdef __AVX512F__
+[[gnu::always_inline]] inline __m512d fused(__m512d a, __m512d b, __m512d c) { return _mm512_fmadd_pd(a, b, c); }
+[[gnu::always_inline]] inline __m512 fused(__m512 a, __m512 b, __m512 c) { return _mm512_fmadd_ps(a, b, c); }
+#endif
+#else
+template <class V>
+[[gnu::always_inline]] inline V fused(const V& a, const V& b, const V& c) { return a * b + c; }
+#endif
+
+// A product on its way.
+template <class S>
+struct Product {
+  S a, b;
+  [[gnu::always_inline]] operator S() const { return S::of(a.v * b.v); }
+  [[gnu::always_inline]] friend S operator+(const Product& x, const S& c) { return S::of(fused(x.a.v, x.b.v, c.v)); }
+  [[gnu::always_inline]] friend S operator+(const S& c, const Product& x) { return S::of(fused(x.a.v, x.b.v, c.v)); }
+  [[gnu::always_inline]] friend S operator+(const Product& x, const Product& y) { return x + S(y); }
+  [[gnu::always_inline]] friend S operator-(const Product& x, const S& c) { return S::of(fused(x.a.v, x.b.v, -c.v)); }
+  [[gnu::always_inline]] friend S operator-(const S& c, const Product& x) { return S::of(fused(-x.a.v, x.b.v, c.v)); }
+  [[gnu::always_inline]] friend S operator-(const Product& x, const Product& y) { return x - S(y); }
+  [[gnu::always_inline]] friend Product operator-(const Product& x) { return {-x.a, x.b}; }
 };
 
 template <class T, int W>
@@ -46,10 +82,12 @@ struct Lanes {
 
   [[gnu::always_inline]] Lanes& operator+=(const Lanes& b) { v += b.v; return *this; }
   [[gnu::always_inline]] Lanes& operator-=(const Lanes& b) { v -= b.v; return *this; }
+  [[gnu::always_inline]] Lanes& operator+=(const Product<Lanes>& b) { return *this = *this + b; }
+  [[gnu::always_inline]] Lanes& operator-=(const Product<Lanes>& b) { return *this = *this - b; }
   [[gnu::always_inline]] Lanes& operator*=(const Lanes& b) { v *= b.v; return *this; }
   [[gnu::always_inline]] friend Lanes operator+(const Lanes& a, const Lanes& b) { return of(a.v + b.v); }
   [[gnu::always_inline]] friend Lanes operator-(const Lanes& a, const Lanes& b) { return of(a.v - b.v); }
-  [[gnu::always_inline]] friend Lanes operator*(const Lanes& a, const Lanes& b) { return of(a.v * b.v); }
+  [[gnu::always_inline]] friend Product<Lanes> operator*(const Lanes& a, const Lanes& b) { return {a, b}; }
   [[gnu::always_inline]] friend Lanes operator/(const Lanes& a, const Lanes& b) { return of(a.v / b.v); }
   [[gnu::always_inline]] friend Lanes operator-(const Lanes& a) { return of(-a.v); }
 
@@ -77,15 +115,18 @@ struct Lanes<T, 1> {
 
   Lanes() = default;
   [[gnu::always_inline]] Lanes(T x) : v(x) {}
+  [[gnu::always_inline]] static Lanes of(T x) { return x; }
   T lane(int) const { return v; }
   void set(int, T x) { v = x; }
 
   [[gnu::always_inline]] Lanes& operator+=(const Lanes& b) { v += b.v; return *this; }
   [[gnu::always_inline]] Lanes& operator-=(const Lanes& b) { v -= b.v; return *this; }
+  [[gnu::always_inline]] Lanes& operator+=(const Product<Lanes>& b) { return *this = *this + b; }
+  [[gnu::always_inline]] Lanes& operator-=(const Product<Lanes>& b) { return *this = *this - b; }
   [[gnu::always_inline]] Lanes& operator*=(const Lanes& b) { v *= b.v; return *this; }
   [[gnu::always_inline]] friend Lanes operator+(const Lanes& a, const Lanes& b) { return Lanes(a.v + b.v); }
   [[gnu::always_inline]] friend Lanes operator-(const Lanes& a, const Lanes& b) { return Lanes(a.v - b.v); }
-  [[gnu::always_inline]] friend Lanes operator*(const Lanes& a, const Lanes& b) { return Lanes(a.v * b.v); }
+  [[gnu::always_inline]] friend Product<Lanes> operator*(const Lanes& a, const Lanes& b) { return {a, b}; }
   [[gnu::always_inline]] friend Lanes operator/(const Lanes& a, const Lanes& b) { return Lanes(a.v / b.v); }
   [[gnu::always_inline]] friend Lanes operator-(const Lanes& a) { return Lanes(-a.v); }
 

@@ -15,6 +15,10 @@ template <class S, class T>
 [[gnu::always_inline]] inline Vector3<S> spread(const T* x) {
   return {S(x[0]), S(x[1]), S(x[2])};
 }
+template <class S>
+[[gnu::always_inline]] inline Vector3<S> operator*(const Product<S>& s, const Vector3<S>& x) {
+  return S(s) * x;
+}
 
 template <class S>
 struct Inertia {  // [[A, B], [B*, C]], the force (n; f) that goes with it, and how sure they are
