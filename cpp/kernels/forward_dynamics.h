@@ -64,7 +64,7 @@ template <class S, class T>
 
 // P⁺ and z⁺ of a pin, P in its axes and of it.
 template <int K, bool rotor, class S>
-[[gnu::always_inline]] inline void project_pin(const S& ratio, const Vector3<S>& turning, const S& force, const ForwardLink<S>& w, Inertia<S>& P) {
+[[gnu::always_inline]] inline void project_pin(const S& ratio, const Vector3<S>& turning, const S& force, const ForwardLink<S>& __restrict w, Inertia<S>& __restrict P) {
   constexpr int i = (K + 1) % 3, j = (K + 2) % 3;
   const S gi = w.angular[i] * w.inverse, gj = w.angular[j] * w.inverse;
   const Vector3<S> gf = w.inverse * w.linear;
@@ -76,7 +76,7 @@ template <int K, bool rotor, class S>
   P.n[i] += gi * w.innovation + P.A(i, i) * turning[i] + P.A(i, j) * turning[j];
   P.n[j] += gj * w.innovation + P.A(i, j) * turning[i] + P.A(j, j) * turning[j];
   P.f = P.f + w.innovation * gf;
-  for (int r = 0; r < 3; ++r) P.f[r] += P.B(i, r) * turning[i] + P.B(j, r) * turning[j];
+  each_of<3>([&](int r) { P.f[r] += P.B(i, r) * turning[i] + P.B(j, r) * turning[j]; });
   P.n[K] = force;
   if constexpr (rotor) {  // what the rotor keeps of the row: J/D of it
     P.A(K, K) *= ratio, P.A(i, K) *= ratio, P.A(j, K) *= ratio;
@@ -87,7 +87,7 @@ template <int K, bool rotor, class S>
 
 // P⁺ and ε's part of z⁺ of a slider or a screw.
 template <class S>
-[[gnu::always_inline]] inline void project_out(const LinkOf<S>& link, const ForwardLink<S>& w, Inertia<S>& P) {
+[[gnu::always_inline]] inline void project_out(const LinkOf<S>& link, const ForwardLink<S>& __restrict w, Inertia<S>& __restrict P) {
   const Vector3<S> turned = w.inverse * w.angular, moved = w.inverse * w.linear;
   for (int r = 0; r < 3; ++r)
     for (int k = 0; k < 3; ++k) {
@@ -120,7 +120,7 @@ template <class S>
 
 // The hinge of link k eliminated: D⁻¹, ε, P_h, and unless it is a root P⁺ and z⁺ about the parent's origin, in its axes.
 template <class Kind, bool rotor, class S, class T>
-void eliminate(const Link<T>& link, const Links<T>& links, const States<T>& at, const S& gone, ForwardLink<S>& w, ForwardMultiple<S>* multiple, Inertia<S>& P,
+void eliminate(const Link<T>& link, const Links<T>& links, const States<T>& at, const S& gone, ForwardLink<S>& __restrict w, ForwardMultiple<S>* __restrict multiple, Inertia<S>& __restrict P,
                                              typename S::Bits& sound) {
   const Motion<S>& m = w.motion;
   const auto force = [&](int i) { return at.u ? gathered<S>(at.u + link.v + i, at.u_stride, at.states) : S(0); };
@@ -159,8 +159,9 @@ void eliminate(const Link<T>& link, const Links<T>& links, const States<T>& at, 
     rotation.template turn<zero>(P);
     constexpr int left = decltype(rotation)::template turned_zero<zero>;
     P.n = rotation.to_parent(P.n), P.f = rotation.to_parent(P.f) + P.C * m.sliding;
-    for (int r = 0; r < 3; ++r)
+    each_of<3>([&](int r) {
       if (r != left) P.n[r] += P.B(r, 0) * m.sliding[0] + P.B(r, 1) * m.sliding[1] + P.B(r, 2) * m.sliding[2];
+    });
     shift<left>(Kind::arm(link, m.place), P);
   } else if constexpr (Kind::nv == 3) {
     sound = sound & factor_ball(P, link, gone, links, multiple->ball);
@@ -219,7 +220,7 @@ template <class Kind, class S, class T>
   } else if constexpr (Kind::nv == 3) {
     alpha = alpha + m.turning;
     const Vector3<S> whole = Vector3<S>{multiple->rate[0], multiple->rate[1], multiple->rate[2]} - multiple->gain * acceleration;
-    for (int i = 0; i < 3; ++i) give(i, whole[i] - alpha[i]);
+    each_of<3>([&](int i) { give(i, whole[i] - alpha[i]); });
     alpha = whole;
   } else {
     alpha = alpha + m.turning;

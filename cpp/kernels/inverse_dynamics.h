@@ -31,9 +31,8 @@ template <class Kind, class S, class T>
       if constexpr (!Kind::pin) w.acceleration[Kind::row] += S(link.travel) * x;
       w.rotor = S(link.J) * x;
     } else {
-      for (int i = 0; i < 3; ++i) w.alpha[i] += rate(i);
-      if constexpr (Kind::nv == 6)
-        for (int i = 0; i < 3; ++i) w.acceleration[i] += rate(3 + i);
+      each_of<3>([&](int i) { w.alpha[i] += rate(i); });
+      if constexpr (Kind::nv == 6) each_of<3>([&](int i) { w.acceleration[i] += rate(3 + i); });
     }
   } else {
     w.rotor = S(0);

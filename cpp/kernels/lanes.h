@@ -155,6 +155,11 @@ template <class T, int W>
 [[gnu::always_inline]] inline Lanes<T, W> larger(const Lanes<T, W>& a, const Lanes<T, W>& b) {
   return Lanes<T, W>::choose(greater(b, a), b, a);
 }
+// f(0), ..., f(n - 1), written out: a compiler makes vectors of a loop's neighbours, which costs more than it brings for three.
+template <int n, class F>
+[[gnu::always_inline]] inline void each_of(F f) {
+  if constexpr (n > 0) each_of<n - 1>(f), f(n - 1);
+}
 // One number of every state.
 template <class S>
 [[gnu::always_inline]] inline S gathered(const double* x, std::size_t stride, int states) {

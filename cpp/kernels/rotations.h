@@ -99,10 +99,12 @@ struct Full {
   [[gnu::always_inline]] Vector3<S> to_parent(const Vector3<S>& x) const { return R * x; }
   [[gnu::always_inline]] void turn_symmetric(Symmetric3<S>& A) const {
     Matrix3<S> T;  // R A
-    for (int r = 0; r < 3; ++r)
-      for (int k = 0; k < 3; ++k) T(r, k) = R(r, 0) * A(0, k) + R(r, 1) * A(1, k) + R(r, 2) * A(2, k);
-    for (int r = 0; r < 3; ++r)
-      for (int k = r; k < 3; ++k) A(r, k) = T(r, 0) * R(k, 0) + T(r, 1) * R(k, 1) + T(r, 2) * R(k, 2);
+    each_of<3>([&](int r) { each_of<3>([&](int k) { T(r, k) = R(r, 0) * A(0, k) + R(r, 1) * A(1, k) + R(r, 2) * A(2, k); }); });
+    each_of<3>([&](int r) {
+      each_of<3>([&](int k) {
+        if (k >= r) A(r, k) = T(r, 0) * R(k, 0) + T(r, 1) * R(k, 1) + T(r, 2) * R(k, 2);
+      });
+    });
   }
   // With zero = 2, A has two columns and B two rows.
   template <int zero>
@@ -111,23 +113,24 @@ struct Full {
     constexpr int n = zero == 2 ? 2 : 3;
     turn_symmetric(P.C);
     Matrix3<S> T;  // its first n rows: of A R*, then of B R*
-    for (int r = 0; r < n; ++r)
-      for (int k = 0; k < 3; ++k) {
+    const auto turned = [&](int r, int k) {  // R T
+      S x = R(r, 0) * T(0, k) + R(r, 1) * T(1, k);
+      if constexpr (n == 3) x += R(r, 2) * T(2, k);
+      return x;
+    };
+    each_of<n>([&](int r) {
+      each_of<3>([&](int k) {
         T(r, k) = P.A(r, 0) * R(k, 0) + P.A(r, 1) * R(k, 1);
         if constexpr (n == 3) T(r, k) += P.A(r, 2) * R(k, 2);
-      }
-    for (int r = 0; r < 3; ++r)
-      for (int k = r; k < 3; ++k) {
-        P.A(r, k) = R(r, 0) * T(0, k) + R(r, 1) * T(1, k);
-        if constexpr (n == 3) P.A(r, k) += R(r, 2) * T(2, k);
-      }
-    for (int r = 0; r < n; ++r)
-      for (int k = 0; k < 3; ++k) T(r, k) = P.B(r, 0) * R(k, 0) + P.B(r, 1) * R(k, 1) + P.B(r, 2) * R(k, 2);
-    for (int r = 0; r < 3; ++r)
-      for (int k = 0; k < 3; ++k) {
-        P.B(r, k) = R(r, 0) * T(0, k) + R(r, 1) * T(1, k);
-        if constexpr (n == 3) P.B(r, k) += R(r, 2) * T(2, k);
-      }
+      });
+    });
+    each_of<3>([&](int r) {
+      each_of<3>([&](int k) {
+        if (k >= r) P.A(r, k) = turned(r, k);
+      });
+    });
+    each_of<n>([&](int r) { each_of<3>([&](int k) { T(r, k) = P.B(r, 0) * R(k, 0) + P.B(r, 1) * R(k, 1) + P.B(r, 2) * R(k, 2); }); });
+    each_of<3>([&](int r) { each_of<3>([&](int k) { P.B(r, k) = turned(r, k); }); });
   }
 };
 

@@ -35,10 +35,10 @@ template <class S>
 // R turned about its third axis by the angle of c and s.
 template <class S>
 [[gnu::always_inline]] inline void turned_about_z(const LinkOf<S>& link, Place<S>& place) {
-  for (int r = 0; r < 3; ++r) {
+  each_of<3>([&](int r) {
     const S x(link.R[3 * r]), y(link.R[3 * r + 1]);
     place.R(r, 0) = x * place.c + y * place.s, place.R(r, 1) = y * place.c - x * place.s, place.R(r, 2) = S(link.R[3 * r + 2]);
-  }
+  });
 }
 template <class S>
 [[gnu::always_inline]] inline void turn_by_angle(const LinkOf<S>& link, const S& q, Place<S>& place) {
@@ -57,8 +57,7 @@ template <class S>
 template <class S>
 [[gnu::always_inline]] inline Matrix3<S> product(const Matrix3<S>& A, const Matrix3<S>& B) {
   Matrix3<S> C;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) C(i, j) = A(i, 0) * B(0, j) + A(i, 1) * B(1, j) + A(i, 2) * B(2, j);
+  each_of<3>([&](int i) { each_of<3>([&](int j) { C(i, j) = A(i, 0) * B(0, j) + A(i, 1) * B(1, j) + A(i, 2) * B(2, j); }); });
   return C;
 }
 
@@ -94,7 +93,7 @@ struct Helix {
   [[gnu::always_inline]] static void place(const LinkOf<S>& link, const S* q, Place<S>& at) {
     turn_by_angle(link, S(S(link.turn) * q[0]), at), turned_about_z(link, at);
     const S travel = S(link.sign) * S(link.travel) * q[0];
-    for (int r = 0; r < 3; ++r) at.p[r] = S(link.p[r]) + travel * at.R(r, 2);
+    each_of<3>([&](int r) { at.p[r] = S(link.p[r]) + travel * at.R(r, 2); });
   }
   template <class S>
   [[gnu::always_inline]] static Vector3<S> arm(const LinkOf<S>&, const Place<S>& at) { return at.p; }
