@@ -1,8 +1,5 @@
 #include "dynamics/batches.h"
 
-#include <algorithm>
-#include <cmath>
-
 namespace pycraft {
 
 int common_batch(Givens given) {
@@ -36,10 +33,6 @@ void check_given(const Multibody& model, Givens given) {
       else
         model.check_v(g.at(b), g.width, g.name);
     }
-}
-
-bool all_finite(const double* x, size_t n) {
-  return std::all_of(x, x + n, [](double y) { return std::isfinite(y); });
 }
 
 void require_finite(const double* x, size_t n, const Multibody& model) {

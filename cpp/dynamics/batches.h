@@ -13,6 +13,7 @@
 
 #include "dynamics/workspace_pool.h"
 #include "numerics/arithmetic.h"
+#include "numerics/finite.h"
 #include "runtime/errors.h"
 #include "runtime/interrupt.h"
 
@@ -43,7 +44,6 @@ void check_widths(const Multibody& model, Givens given);
 [[noreturn]] void throw_width(const Multibody& model, const std::string& name, int width);
 // EvaluationError where a result left the range of its numbers.
 void require_finite(const double* x, size_t n, const Multibody& model);
-bool all_finite(const double* x, size_t n);
 
 // Whether Workspace<S> is there; else a call at that precision says where it stops.
 template <template <class> class Workspace, class S>

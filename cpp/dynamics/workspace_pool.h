@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -9,37 +10,46 @@
 
 namespace pycraft {
 
-// Workspaces of one model, taken and given back: threads do not share them.
+// Workspaces of one model, taken and given back: threads do not share them. The one given back last is at hand without a lock.
 template <class Workspace>
 class WorkspacePool {
  public:
+  ~WorkspacePool() { delete last_.load(); }
+
+  // While the caller holds a ModelInUse.
   template <class F>
   void with(const Multibody& model, F f) {
-    const ModelInUse use(model);
-    std::unique_ptr<Workspace> workspace;
-    {
-      std::lock_guard<Mutex> lock(mutex_);
-      if (mutex_.abandoned()) leave_behind(free_);
-      if (version_ != model.parameters()) {
-        free_.clear();
-        version_ = model.parameters();
-      }
-      if (!free_.empty()) {
-        workspace = std::move(free_.back());
-        free_.pop_back();
-      }
-    }
-    if (!workspace) workspace = std::make_unique<Workspace>(model);
-    const auto version = model.parameters();
-    f(*workspace);
-    std::lock_guard<Mutex> lock(mutex_);
-    if (version == version_) free_.push_back(std::move(workspace));
+    std::unique_ptr<Kept> own(last_.exchange(nullptr, std::memory_order_acquire));
+    if (!own) own = taken();
+    if (!own || own->version != model.parameters()) own = std::make_unique<Kept>(model);
+    f(own->workspace);
+    keep(std::unique_ptr<Kept>(last_.exchange(own.release(), std::memory_order_acq_rel)));
   }
 
  private:
+  struct Kept {
+    std::uint64_t version;
+    Workspace workspace;
+    explicit Kept(const Multibody& model) : version(model.parameters()), workspace(model) {}
+  };
+  std::unique_ptr<Kept> taken() {
+    std::lock_guard<Mutex> lock(mutex_);
+    if (mutex_.abandoned()) leave_behind(others_);
+    if (others_.empty()) return nullptr;
+    std::unique_ptr<Kept> own = std::move(others_.back());
+    others_.pop_back();
+    return own;
+  }
+  void keep(std::unique_ptr<Kept> other) {
+    if (!other) return;
+    std::lock_guard<Mutex> lock(mutex_);
+    if (mutex_.abandoned()) leave_behind(others_);
+    others_.push_back(std::move(other));
+  }
+
+  std::atomic<Kept*> last_{nullptr};
   Mutex mutex_;
-  std::uint64_t version_ = 0;
-  std::vector<std::unique_ptr<Workspace>> free_;
+  std::vector<std::unique_ptr<Kept>> others_;
 };
 
 }  // namespace pycraft

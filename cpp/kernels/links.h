@@ -50,6 +50,7 @@ struct States {
   const T* gravity;   // three numbers
   const T* wrenches;  // (n; f) on every link in its frame about its origin, at all states; null: none
   void (*interrupt)();  // asked in long loops; it throws to stop them
+  const T *cosines = nullptr, *sines = nullptr;  // of one state: of every coordinate
 };
 
 // What a call is: `run` writes the results to out + b out_stride, in `work`, aligned to 64 bytes and of as many numbers as the other function

@@ -40,9 +40,9 @@ template <class S>
     place.R(r, 0) = x * place.c + y * place.s, place.R(r, 1) = y * place.c - x * place.s, place.R(r, 2) = S(link.R[3 * r + 2]);
   });
 }
+// By the angle whose sine and cosine these are.
 template <class S>
-[[gnu::always_inline]] inline void turn_by_angle(const LinkOf<S>& link, const S& q, Place<S>& place) {
-  const SineCosine<S> of = sine_cosine(q);
+[[gnu::always_inline]] inline void turn_by(const LinkOf<S>& link, const SineCosine<S>& of, Place<S>& place) {
   place.c = of.cosine, place.s = S(link.sign) * of.sine;
 }
 // Of a quaternion w, x, y, z of any length but zero: first of the size of one, so that no square leaves its range.
@@ -69,7 +69,7 @@ struct LevelPin {
   template <class S>
   static auto rotation(const Place<S>& place) { return Planar<K, S>{place.c, place.s}; }
   template <class S>
-  [[gnu::always_inline]] static void place(const LinkOf<S>& link, const S* q, Place<S>& at) { turn_by_angle(link, q[0], at); }
+  [[gnu::always_inline]] static void place(const LinkOf<S>& link, const SineCosine<S>& q, Place<S>& at) { turn_by(link, q, at); }
   template <class S>
   [[gnu::always_inline]] static Vector3<S> arm(const LinkOf<S>& link, const Place<S>&) { return spread<S>(link.p); }
 };
@@ -79,7 +79,7 @@ struct TurnedPin {
   template <class S>
   static auto rotation(const Place<S>& place) { return Full<S>{place.R}; }
   template <class S>
-  [[gnu::always_inline]] static void place(const LinkOf<S>& link, const S* q, Place<S>& at) { turn_by_angle(link, q[0], at), turned_about_z(link, at); }
+  [[gnu::always_inline]] static void place(const LinkOf<S>& link, const SineCosine<S>& q, Place<S>& at) { turn_by(link, q, at), turned_about_z(link, at); }
   template <class S>
   [[gnu::always_inline]] static Vector3<S> arm(const LinkOf<S>& link, const Place<S>&) { return spread<S>(link.p); }
 };
@@ -91,7 +91,7 @@ struct Helix {
   static auto rotation(const Place<S>& place) { return Full<S>{place.R}; }
   template <class S>
   [[gnu::always_inline]] static void place(const LinkOf<S>& link, const S* q, Place<S>& at) {
-    turn_by_angle(link, S(S(link.turn) * q[0]), at), turned_about_z(link, at);
+    turn_by(link, sine_cosine(S(S(link.turn) * q[0])), at), turned_about_z(link, at);
     const S travel = S(link.sign) * S(link.travel) * q[0];
     each_of<3>([&](int r) { at.p[r] = S(link.p[r]) + travel * at.R(r, 2); });
   }
@@ -139,9 +139,35 @@ template <class F>
 // The coordinates of a link of every state, then its place.
 template <class Kind, class S, class T>
 [[gnu::always_inline]] inline void place_link(const Link<T>& link, const States<T>& at, Place<S>& place) {
-  S q[Kind::nq];
-  for (int i = 0; i < Kind::nq; ++i) q[i] = gathered<S>(at.q + link.q + i, at.q_stride, at.states);
-  Kind::place(link, q, place);
+  if constexpr (Kind::pin && S::width == 1) {
+    Kind::place(link, SineCosine<S>{S(at.sines[link.q]), S(at.cosines[link.q])}, place);
+  } else {
+    S q[Kind::nq];
+    for (int i = 0; i < Kind::nq; ++i) q[i] = gathered<S>(at.q + link.q + i, at.q_stride, at.states);
+    if constexpr (Kind::pin)
+      Kind::place(link, sine_cosine(q[0]), place);
+    else
+      Kind::place(link, q, place);
+  }
+}
+
+// Of one state: the sines and cosines of all its coordinates, W at once; what is no angle costs little. work: turns_size() numbers.
+template <int W, class T>
+inline size_t padded(const Links<T>& links) { return size_t(links.nq + W - 1) / W * W; }
+template <int W, class T>
+inline size_t turns_size(const Links<T>& links) { return (2 * padded<W>(links) + 7) / 8 * 8; }  // what follows stays aligned
+template <int W, class T>
+inline States<T> with_turns(const Links<T>& links, const States<T>& at, T* work) {
+  T* const cosines = work + padded<W>(links);
+  for (int i = 0; i < links.nq; i += W) {
+    Lanes<T, W> q(T(0));
+    for (int b = 0; b < W && i + b < links.nq; ++b) q.set(b, T(at.q[i + b]));
+    const SineCosine<Lanes<T, W>> of = sine_cosine(q);
+    for (int b = 0; b < W; ++b) work[i + b] = of.sine.lane(b), cosines[i + b] = of.cosine.lane(b);
+  }
+  States<T> turned = at;
+  turned.sines = work, turned.cosines = cosines;
+  return turned;
 }
 
 }  // namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET

@@ -125,6 +125,11 @@ void check_configuration(const Hinge& hinge, const double* q) {
   }
 }
 
+void check_rates(const Hinge& hinge, const double* v, const char* what) {
+  for (int i = 0; i < hinge.nv(); ++i)
+    if (!std::isfinite(v[i])) throw ModelError(std::string(what) + " of hinge '" + hinge.name + "': entry " + std::to_string(i) + " is " + short_number(v[i]));
+}
+
 std::string check_mass_properties(const std::string& body, double mass, const Vector3<double>& com, const Symmetric3<double>& inertia) {
   if (!std::isfinite(mass)) throw ModelError("body '" + body + "': its mass is " + short_number(mass));
   if (mass < 0) throw ModelError("body '" + body + "': its mass is " + short_number(mass) + " kg; a mass is not negative");

@@ -28,6 +28,8 @@ void check_limits(const Hinge& hinge, const std::vector<double>& lower, const st
 
 // The hinge's coordinates: finite, quaternions with a direction.
 void check_configuration(const Hinge& hinge, const double* q);
+// Velocities, accelerations or forces of the hinge, by the name of `what`: finite.
+void check_rates(const Hinge& hinge, const double* v, const char* what);
 
 // Finite, a mass that is not negative, an inertia that is positive semidefinite. Returns what is wrong with the triangle inequality, or "".
 std::string check_mass_properties(const std::string& body, double mass, const Vector3<double>& com, const Symmetric3<double>& inertia);

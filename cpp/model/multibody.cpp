@@ -9,6 +9,7 @@
 #include "model/compiled_model.h"
 #include "model/configuration.h"
 #include "model/lumping.h"
+#include "numerics/finite.h"
 #include "runtime/errors.h"
 #include "runtime/interrupt.h"
 
@@ -151,12 +152,9 @@ void Multibody::structure_changed(const std::string& reason) {
   settled_.store(false);
 }
 
-const Multibody& Multibody::settled() const {
-  if (!settled_.load(std::memory_order_acquire)) {
-    std::lock_guard<Mutex> lock(mutex_);
-    if (!settled_.load()) const_cast<Multibody*>(this)->settle();
-  }
-  return *this;
+void Multibody::settle_once() const {
+  std::lock_guard<Mutex> lock(mutex_);
+  if (!settled_.load()) const_cast<Multibody*>(this)->settle();
 }
 
 void Multibody::settle() {
@@ -184,11 +182,16 @@ void Multibody::settle() {
     if (node.body >= 0) node.body = place[node.body];
   body_numbers_.clear(), hinge_numbers_.clear(), node_numbers_.clear();
   q_offset_ = v_offset_ = {0};
+  quaternions_.clear();
   auto state = std::make_shared<StateData>();
   for (int k = 0; k < n; ++k) {
     const Hinge& h = bodies_[k].hinge;
     body_numbers_[bodies_[k].name] = k;
     hinge_numbers_[h.name] = k;
+    for (int at = q_offset_.back(); const Subhinge& s : h.subhinges) {
+      if (s.record().quaternion >= 0) quaternions_.push_back(at + s.record().quaternion);
+      at += s.nq();
+    }
     q_offset_.push_back(q_offset_.back() + h.nq());
     v_offset_.push_back(v_offset_.back() + h.nv());
     const auto old = carried_.find(h.name);
@@ -314,6 +317,8 @@ std::shared_ptr<const StateData> Multibody::state() const {
 void Multibody::check_q(const double* q, size_t size) const {
   if (static_cast<int>(size) != nq())
     throw ModelError("q of '" + name_ + "' takes " + std::to_string(nq()) + " numbers (" + std::to_string(bodies()) + " hinges), not " + std::to_string(size));
+  const auto directed = [q](int at) { return q[at] * q[at] + q[at + 1] * q[at + 1] + q[at + 2] * q[at + 2] + q[at + 3] * q[at + 3] > 1e-12; };
+  if (all_finite(q, size) && std::all_of(quaternions_.begin(), quaternions_.end(), directed)) return;  // the rule; else hinge by hinge
   for (int k = 0; k < bodies(); ++k)
     check_configuration(bodies_[k].hinge, q + q_offset_[k]);
 }
@@ -321,10 +326,9 @@ void Multibody::check_q(const double* q, size_t size) const {
 void Multibody::check_v(const double* v, size_t size, const char* what) const {
   if (static_cast<int>(size) != nv())
     throw ModelError(std::string(what) + " of '" + name_ + "' takes " + std::to_string(nv()) + " numbers, not " + std::to_string(size));
+  if (all_finite(v, size)) return;
   for (int k = 0; k < bodies(); ++k)
-    for (int i = v_offset_[k]; i < v_offset_[k + 1]; ++i)
-      if (!std::isfinite(v[i]))
-        throw ModelError(std::string(what) + " of hinge '" + bodies_[k].hinge.name + "': entry " + std::to_string(i - v_offset_[k]) + " is " + short_number(v[i]));
+    check_rates(bodies_[k].hinge, v + v_offset_[k], what);
 }
 
 void Multibody::set_q(const std::vector<double>& q) {

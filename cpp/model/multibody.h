@@ -120,7 +120,11 @@ class Multibody : public std::enable_shared_from_this<Multibody> {
   void lump(const Body& body, const Node& onto);
   void structure_changed(const std::string& reason);
   // Bodies are put in depth-first order, coordinates numbered and q, v carried over by hinge name: at the first look after an edit.
-  const Multibody& settled() const;
+  const Multibody& settled() const {
+    if (!settled_.load(std::memory_order_acquire)) settle_once();
+    return *this;
+  }
+  void settle_once() const;
   void settle();
 
   std::string name_;
@@ -129,6 +133,7 @@ class Multibody : public std::enable_shared_from_this<Multibody> {
   std::vector<Node> nodes_;
   std::unordered_map<std::string, int> body_numbers_, hinge_numbers_, node_numbers_;
   std::vector<int> q_offset_, v_offset_;    // one longer than bodies
+  std::vector<int> quaternions_;            // where in q they begin
   Vector3<double> gravity_{0, 0, 0};
   std::shared_ptr<const StateData> state_;
   mutable Mutex mutex_;

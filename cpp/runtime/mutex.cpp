@@ -11,20 +11,17 @@ namespace pycraft {
 
 namespace {
 
-std::atomic<unsigned> count{0};
 std::atomic_flag adopting = ATOMIC_FLAG_INIT;
 
 #if defined(PYCRAFT_FORKS)
 void in_the_child() {
-  ++count;
+  ++fork_count;
   adopting.clear();
 }
 const int registered = pthread_atfork(nullptr, nullptr, &in_the_child);
 #endif
 
 }  // namespace
-
-unsigned forks() { return count.load(std::memory_order_relaxed); }
 
 void Mutex::adopt() {
   while (adopting.test_and_set(std::memory_order_acquire)) std::this_thread::yield();
@@ -42,17 +39,12 @@ void UseCount::after_fork() noexcept {
   if (before != forks() && generation_.compare_exchange_strong(before, forks())) users_ = 0;
 }
 
-unsigned UseCount::enter() {
-  after_fork();
-  while (users_.fetch_add(1, std::memory_order_acquire) < 0) {
+// Counted already, beside an editor.
+void UseCount::wait() {
+  do {
     users_.fetch_sub(1, std::memory_order_relaxed);
     std::this_thread::yield();
-  }
-  return forks();
-}
-
-void UseCount::leave(unsigned entered) noexcept {
-  if (entered == forks()) users_.fetch_sub(1, std::memory_order_release);
+  } while (users_.fetch_add(1, std::memory_order_acquire) < 0);
 }
 
 bool UseCount::try_edit() noexcept {

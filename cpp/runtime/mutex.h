@@ -9,7 +9,8 @@
 namespace pycraft {
 
 // How many forks lie between the first process and this one.
-unsigned forks();
+inline std::atomic<unsigned> fork_count{0};
+inline unsigned forks() { return fork_count.load(std::memory_order_relaxed); }
 
 // A mutex that a forked child finds unlocked.
 class Mutex {
@@ -54,9 +55,20 @@ class UseCount {
 
  private:
   void after_fork() noexcept;
+  void wait();
   static constexpr int editing = -(1 << 30);
   std::atomic<int> users_{0};
   std::atomic<unsigned> generation_{forks()};
 };
+
+inline unsigned UseCount::enter() {
+  if (generation_.load() != forks()) after_fork();
+  if (users_.fetch_add(1, std::memory_order_acquire) < 0) wait();
+  return forks();
+}
+
+inline void UseCount::leave(unsigned entered) noexcept {
+  if (entered == forks()) users_.fetch_sub(1, std::memory_order_release);
+}
 
 }  // namespace pycraft

@@ -100,6 +100,7 @@ BOOST_AUTO_TEST_CASE(edits_beside_evaluations) {
   const std::vector<double> zero(4, 0.0), one(4, 1.0);
   const auto accelerations = [&] {
     std::vector<double> vdot(4);
+    const ModelInUse use(*mb);
     pool.with(*mb, [&](RigidDynamics<double>& w) { w.forward_dynamics(zero.data(), zero.data(), one.data(), vdot.data()); });
     return vdot;
   };
