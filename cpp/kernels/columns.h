@@ -51,6 +51,19 @@ template <bool forces, class S, class Move>
   }
 }
 
+// move(c, n, f) as above, of all columns before the last, several at once where that goes.
+template <class S, class Move>
+[[gnu::always_inline]] inline void each_few_columns(const Columns<S>& y, int last, Move move) {
+  const auto take = [&]<class V>(V, int c) {
+    Vector3<V> n{loaded<V>(y.n[0] + c), loaded<V>(y.n[1] + c), loaded<V>(y.n[2] + c)}, f{loaded<V>(y.f[0] + c), loaded<V>(y.f[1] + c), loaded<V>(y.f[2] + c)};
+    move(c, n, f);
+    each_of<3>([&](int r) { stored(n[r], y.n[r] + c), stored(f[r], y.f[r] + c); });
+  };
+  int c = 0;
+  for (; c + Several<S>::count <= last; c += Several<S>::count) take(typename Several<S>::type(), c);
+  for (; c < last; ++c) take(S(), c);
+}
+
 // The upper triangle of n numbers a side mirrored. False where one of them is no number or not finite.
 inline bool mirror(double* out, int n, void (*interrupt)()) {
   constexpr int tile = 8;

@@ -48,8 +48,8 @@ struct ForwardWork {
   ForwardMultiple<S>* of(const Link<T>& link) const { return multiple + (link.multi < 0 ? 0 : link.multi); }
 };
 
-// P += M, z += b' - what is applied
-template <class S, class T>
+// P += M, z += b' - what is applied. forces: whether z is wanted at all, here and below.
+template <bool forces, class S, class T>
 [[gnu::always_inline]] inline void add_own(const Link<T>& link, const Vector3<S>& omega, const T* wrench, Inertia<S>& P) {
   const Symmetric3<S> I = rotational_of<S>(link);
   const Vector3<S> h = spread<S>(link.moment);
@@ -57,13 +57,14 @@ template <class S, class T>
   for (int i = 0; i < 6; ++i) P.A.s[i] += I.s[i];
   P.B(0, 1) -= h[2], P.B(0, 2) += h[1], P.B(1, 0) += h[2], P.B(1, 2) -= h[0], P.B(2, 0) -= h[1], P.B(2, 1) += h[0];
   P.C(0, 0) += m, P.C(1, 1) += m, P.C(2, 2) += m;
+  if constexpr (!forces) return;
   P.n = P.n + gyroscopic(omega, I);
   P.f = P.f + twice_crossed(omega, h);
   if (wrench) P.n = P.n - spread<S>(wrench), P.f = P.f - spread<S>(wrench + 3);
 }
 
 // P⁺ and z⁺ of a pin, P in its axes and of it.
-template <int K, bool rotor, class S>
+template <int K, bool rotor, bool forces, class S>
 [[gnu::always_inline]] inline void project_pin(const S& ratio, const Vector3<S>& turning, const S& force, const ForwardLink<S>& __restrict w, Inertia<S>& __restrict P) {
   constexpr int i = (K + 1) % 3, j = (K + 2) % 3;
   const S gi = w.angular[i] * w.inverse, gj = w.angular[j] * w.inverse;
@@ -73,15 +74,17 @@ template <int K, bool rotor, class S>
     P.B(i, r) -= gi * w.linear[r], P.B(j, r) -= gj * w.linear[r];
     for (int k = r; k < 3; ++k) P.C(r, k) -= gf[r] * w.linear[k];
   }
-  P.n[i] += gi * w.innovation + P.A(i, i) * turning[i] + P.A(i, j) * turning[j];
-  P.n[j] += gj * w.innovation + P.A(i, j) * turning[i] + P.A(j, j) * turning[j];
-  P.f = P.f + w.innovation * gf;
-  each_of<3>([&](int r) { P.f[r] += P.B(i, r) * turning[i] + P.B(j, r) * turning[j]; });
-  P.n[K] = force;
+  if constexpr (forces) {
+    P.n[i] += gi * w.innovation + P.A(i, i) * turning[i] + P.A(i, j) * turning[j];
+    P.n[j] += gj * w.innovation + P.A(i, j) * turning[i] + P.A(j, j) * turning[j];
+    P.f = P.f + w.innovation * gf;
+    each_of<3>([&](int r) { P.f[r] += P.B(i, r) * turning[i] + P.B(j, r) * turning[j]; });
+    P.n[K] = force;
+  }
   if constexpr (rotor) {  // what the rotor keeps of the row: J/D of it
     P.A(K, K) *= ratio, P.A(i, K) *= ratio, P.A(j, K) *= ratio;
     for (int r = 0; r < 3; ++r) P.B(K, r) *= ratio;
-    P.n[K] = force - ratio * w.innovation + P.A(i, K) * turning[i] + P.A(j, K) * turning[j];
+    if constexpr (forces) P.n[K] = force - ratio * w.innovation + P.A(i, K) * turning[i] + P.A(j, K) * turning[j];
   }
 }
 
@@ -109,21 +112,55 @@ template <class S>
   }
 }
 
-// P⁺ of a ball and what its rate adds to the force of z⁺.
+// P⁺ of a ball.
 template <class S>
 [[gnu::always_inline]] inline void project_ball(const ForwardMultiple<S>& w, Inertia<S>& P) {
-  P.f = P.f + transpose_times(P.B, Vector3<S>{w.rate[0], w.rate[1], w.rate[2]});
   for (int r = 0; r < 3; ++r)
     for (int k = r; k < 3; ++k) P.C(r, k) -= P.B(0, r) * w.gain(0, k) + P.B(1, r) * w.gain(1, k) + P.B(2, r) * w.gain(2, k);
   P.A = Symmetric3<S>::zero(), P.B = Matrix3<S>::zero();
 }
 
+// A ball eliminated. `force` and `rotation` as below.
+template <bool forces, class S, class T, class Force, class Rotation>
+[[gnu::always_inline]] inline void eliminate_ball(const Link<T>& link, const Links<T>& links, const S& gone, const Motion<S>& m, const Rotation& rotation, const Vector3<S>& arm, Force force,
+                                                  ForwardMultiple<S>& multiple, Inertia<S>& P, typename S::Bits& sound) {
+  sound = sound & factor_ball(P, link, gone, links, multiple.ball);
+  find_gain(P, multiple);
+  if constexpr (forces) {
+    for (int i = 0; i < 3; ++i) multiple.rate[i] = force(i) - P.n[i];
+    multiple.ball.solve(multiple.rate);
+    P.f = P.f + transpose_times(P.B, Vector3<S>{multiple.rate[0], multiple.rate[1], multiple.rate[2]});
+  }
+  if (link.parent < 0) return;
+  project_ball(multiple, P);
+  rotation.turn_symmetric(P.C);
+  if constexpr (forces) {
+    P.f = rotation.to_parent(P.f) + P.C * m.sliding;
+    P.n = rotation.to_parent(Vector3<S>{force(0), force(1), force(2)}) + cross(arm, P.f);
+  }
+  shift<-1>(arm, P);
+}
+// A free link eliminated: nothing but the force that is put on it is left.
+template <bool forces, class S, class T, class Force, class Rotation>
+[[gnu::always_inline]] inline void eliminate_free(const Link<T>& link, const Links<T>& links, const S& gone, const Rotation& rotation, const Vector3<S>& arm, Force force, ForwardMultiple<S>& multiple,
+                                                  Inertia<S>& P, typename S::Bits& sound) {
+  sound = sound & factor_free(P, link, gone, links, multiple.free);
+  if constexpr (forces) {
+    for (int i = 0; i < 3; ++i) multiple.rate[i] = force(i) - P.n[i], multiple.rate[3 + i] = force(3 + i) - P.f[i];
+    multiple.free.solve(multiple.rate);
+    P.f = rotation.to_parent(Vector3<S>{force(3), force(4), force(5)});
+    P.n = rotation.to_parent(Vector3<S>{force(0), force(1), force(2)}) + cross(arm, P.f);
+  }
+  if (link.parent < 0) return;
+  P.A = P.C = Symmetric3<S>::zero(), P.B = Matrix3<S>::zero();
+}
+
 // The hinge of link k eliminated: D⁻¹, ε, P_h, and unless it is a root P⁺ and z⁺ about the parent's origin, in its axes.
-template <class Kind, bool rotor, class S, class T>
-void eliminate(const Link<T>& link, const Links<T>& links, const States<T>& at, const S& gone, ForwardLink<S>& __restrict w, ForwardMultiple<S>* __restrict multiple, Inertia<S>& __restrict P,
+template <class Kind, bool rotor, bool forces, class S, class T>
+[[gnu::flatten]] void eliminate(const Link<T>& link, const Links<T>& links, const States<T>& at, const S& gone, ForwardLink<S>& __restrict w, ForwardMultiple<S>* __restrict multiple, Inertia<S>& __restrict P,
                                              typename S::Bits& sound) {
   const Motion<S>& m = w.motion;
-  const auto force = [&](int i) { return at.u ? gathered<S>(at.u + link.v + i, at.u_stride, at.states) : S(0); };
+  const auto force = [&](int i) { return forces && at.u ? gathered<S>(at.u + link.v + i, at.u_stride, at.states) : S(0); };
   const bool root = link.parent < 0;
   const auto rotation = Kind::rotation(m.place);
   constexpr int K = Kind::row;
@@ -147,41 +184,29 @@ void eliminate(const Link<T>& link, const Links<T>& links, const States<T>& at, 
     w.inverse = S(1) / D;
     P.error += S(links.rounding) * most * w.inverse;
     if (link.oblique) P.growth *= larger(S(1), S(S(T(0.0625)) * own * w.inverse));
-    w.innovation = tau - along;
+    if constexpr (forces) w.innovation = tau - along;
     if (root) return;
     constexpr int zero = Kind::pin && !rotor ? K : -1;
     if constexpr (Kind::pin) {
-      project_pin<K, rotor>(S(J * w.inverse), m.turning, tau, w, P);
+      project_pin<K, rotor, forces>(S(J * w.inverse), m.turning, tau, w, P);
     } else {
       project_out(link, w, P);
-      P.n = P.n + P.A * m.turning, P.f = P.f + transpose_times(P.B, m.turning);
+      if constexpr (forces) P.n = P.n + P.A * m.turning, P.f = P.f + transpose_times(P.B, m.turning);
     }
     rotation.template turn<zero>(P);
     constexpr int left = decltype(rotation)::template turned_zero<zero>;
-    P.n = rotation.to_parent(P.n), P.f = rotation.to_parent(P.f) + P.C * m.sliding;
-    each_of<3>([&](int r) {
-      if (r != left) P.n[r] += P.B(r, 0) * m.sliding[0] + P.B(r, 1) * m.sliding[1] + P.B(r, 2) * m.sliding[2];
-    });
+    if constexpr (forces) {
+      P.n = rotation.to_parent(P.n), P.f = rotation.to_parent(P.f) + P.C * m.sliding;
+      each_of<3>([&](int r) {
+        if (r != left) P.n[r] += P.B(r, 0) * m.sliding[0] + P.B(r, 1) * m.sliding[1] + P.B(r, 2) * m.sliding[2];
+      });
+      P.n = P.n + cross(Kind::arm(link, m.place), P.f);
+    }
     shift<left>(Kind::arm(link, m.place), P);
   } else if constexpr (Kind::nv == 3) {
-    sound = sound & factor_ball(P, link, gone, links, multiple->ball);
-    find_gain(P, *multiple);
-    for (int i = 0; i < 3; ++i) multiple->rate[i] = force(i) - P.n[i];
-    multiple->ball.solve(multiple->rate);
-    if (root) return;
-    project_ball(*multiple, P);
-    P.n = {force(0), force(1), force(2)};
-    rotation.turn_symmetric(P.C);
-    P.n = rotation.to_parent(P.n), P.f = rotation.to_parent(P.f) + P.C * m.sliding;
-    shift<-1>(Kind::arm(link, m.place), P);
+    eliminate_ball<forces>(link, links, gone, m, rotation, Kind::arm(link, m.place), force, *multiple, P, sound);
   } else {
-    sound = sound & factor_free(P, link, gone, links, multiple->free);
-    for (int i = 0; i < 3; ++i) multiple->rate[i] = force(i) - P.n[i], multiple->rate[3 + i] = force(3 + i) - P.f[i];
-    multiple->free.solve(multiple->rate);
-    if (root) return;
-    P.f = rotation.to_parent(Vector3<S>{force(3), force(4), force(5)});
-    P.n = rotation.to_parent(Vector3<S>{force(0), force(1), force(2)}) + cross(Kind::arm(link, m.place), P.f);
-    P.A = P.C = Symmetric3<S>::zero(), P.B = Matrix3<S>::zero();
+    eliminate_free<forces>(link, links, gone, rotation, Kind::arm(link, m.place), force, *multiple, P, sound);
   }
 }
 
@@ -230,9 +255,9 @@ template <class Kind, class S, class T>
   }
 }
 
-// Articulated inertias and the forces that go with them, tip to base, of links that are placed. Which lanes are sound.
-template <class S, class T>
-inline typename S::Bits articulated_tip_to_base(const Links<T>& links, const States<T>& at, const ForwardWork<S>& w) {
+// Articulated inertias, and the forces that go with them, tip to base, of links that are placed. Which lanes are sound.
+template <bool forces, class S, class T>
+[[gnu::noinline]] typename S::Bits articulated_tip_to_base(const Links<T>& links, const States<T>& at, const ForwardWork<S>& w) {
   const S gone = travel<S>(links, at);
   typename S::Bits sound = S::all();
   for (int k = 0; k < links.count; ++k)
@@ -245,11 +270,11 @@ inline typename S::Bits articulated_tip_to_base(const Links<T>& links, const Sta
     const bool leaf = k + 1 == links.count || links.link[k + 1].parent != k;
     if (leaf) P = no_inertia<S>();
     if (link.branches) add(P, w.branch[k]);
-    add_own(link, own.motion.omega, at.wrenches ? at.wrenches + 6 * k : nullptr, P);
+    add_own<forces>(link, own.motion.omega, at.wrenches ? at.wrenches + 6 * k : nullptr, P);
     if (link.rotor)
-      with_step(link.step, [&](auto kind) { eliminate<decltype(kind), decltype(kind)::pin>(link, links, at, gone, own, w.of(link), P, sound); });
+      with_step(link.step, [&](auto kind) { eliminate<decltype(kind), decltype(kind)::pin, forces>(link, links, at, gone, own, w.of(link), P, sound); });
     else
-      with_step(link.step, [&](auto kind) { eliminate<decltype(kind), false>(link, links, at, gone, own, w.of(link), P, sound); });
+      with_step(link.step, [&](auto kind) { eliminate<decltype(kind), false, forces>(link, links, at, gone, own, w.of(link), P, sound); });
     if (link.parent < 0)
       sound = sound & greater(S(links.growth), P.growth) & greater(S(1), S(T(4)) * P.error * P.growth);
     else if (link.parent != k - 1)
@@ -271,7 +296,7 @@ unsigned forward_dynamics(const Links<typename S::Scalar>& links, const States<t
       move_link<Kind>(link, at, link.parent < 0 ? nullptr : &w.link[link.parent].motion.omega, m);
     });
   }
-  const typename S::Bits sound = articulated_tip_to_base(links, at, w);
+  const typename S::Bits sound = articulated_tip_to_base<true>(links, at, w);
   const Vector3<S> base = -spread<S>(at.gravity);
   Vector3<S> alpha, acceleration;
   for (int k = 0; k < links.count; ++k) {

@@ -8,11 +8,10 @@
 
 namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET {
 
-// On W states at once; of one state `neighbours` numbers go side by side where that is the same for all.
-template <class T, int W, int neighbours = W>
+template <class T, int W>
 struct KernelsOf {
   using S = Lanes<T, W>;
-  static size_t numbers(const Links<T>& links, size_t bytes) { return (W == 1 ? turns_size<neighbours>(links) : 0) + (bytes + sizeof(T) - 1) / sizeof(T); }
+  static size_t numbers(const Links<T>& links, size_t bytes) { return (W == 1 ? turns_size(links) : 0) + (bytes + sizeof(T) - 1) / sizeof(T); }
   static size_t forward(const Links<T>& links) { return numbers(links, ForwardWork<S>::size(links)); }
   static size_t inverse(const Links<T>& links) { return numbers(links, links.count * sizeof(InverseLink<S>)); }
   static size_t matrix(const Links<T>& links) { return numbers(links, MatrixWork<S>::size(links)); }
@@ -20,16 +19,20 @@ struct KernelsOf {
 
   template <auto kernel>
   static unsigned run(const Links<T>& links, const States<T>& at, double* out, size_t stride, T* work) {
-    if constexpr (W > 1)
-      return kernel(links, at, out, stride, work);
-    else
-      return kernel(links, with_turns<neighbours>(links, at, work), out, stride, work + turns_size<neighbours>(links));
+    if constexpr (W > 1) return kernel(links, at, out, stride, work);
+    const States<T> turned = with_turns(links, at, work);
+    return kernel(links, turned, out, stride, work + turns_size(links));
+  }
+  // Of one state, with all in it that is not apart by itself: a compiler would leave pieces of it to be called.
+  template <auto kernel>
+  [[gnu::flatten]] static unsigned run_whole(const Links<T>& links, const States<T>& at, double* out, size_t stride, T* work) {
+    return run<kernel>(links, at, out, stride, work);
   }
   static constexpr Kernels<T> all{W,
-                                  {{run<forward_dynamics<S>>, forward},
+                                  {{W == 1 ? run_whole<forward_dynamics<S>> : run<forward_dynamics<S>>, forward},
                                    {run<inverse_dynamics<S>>, inverse},
-                                   {run<mass_matrix<S>>, matrix},
-                                   {run<mass_matrix_inverse<S>>, matrix_inverse}}};
+                                   {W == 1 ? run_whole<mass_matrix<S>> : run<mass_matrix<S>>, matrix},
+                                   {W == 1 ? run_whole<mass_matrix_inverse<S>> : run<mass_matrix_inverse<S>>, matrix_inverse}}};
 };
 
 }  // namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET

@@ -6,7 +6,7 @@ namespace pycraft::kernels {
 
 extern const Kernels<double> avx2_one, avx2_pack;
 extern const Kernels<float> avx2_singles;
-const Kernels<double> avx2_one = avx2::KernelsOf<double, 1, 4>::all, avx2_pack = avx2::KernelsOf<double, 4>::all;
+const Kernels<double> avx2_one = avx2::KernelsOf<double, 1>::all, avx2_pack = avx2::KernelsOf<double, 4>::all;
 const Kernels<float> avx2_singles = avx2::KernelsOf<float, 8>::all;
 
 }  // namespace pycraft::kernels

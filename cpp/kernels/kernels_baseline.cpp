@@ -6,7 +6,7 @@ namespace pycraft::kernels {
 
 extern const Kernels<double> baseline_one, baseline_pack;
 extern const Kernels<float> baseline_singles;
-const Kernels<double> baseline_one = baseline::KernelsOf<double, 1, 2>::all, baseline_pack = baseline::KernelsOf<double, 2>::all;
+const Kernels<double> baseline_one = baseline::KernelsOf<double, 1>::all, baseline_pack = baseline::KernelsOf<double, 2>::all;
 const Kernels<float> baseline_singles = baseline::KernelsOf<float, 4>::all;
 
 }  // namespace pycraft::kernels

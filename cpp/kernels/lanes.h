@@ -15,6 +15,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 #ifdef __FMA__
 #include <immintrin.h>
 #endif
@@ -45,6 +46,15 @@ struct BitsOf<float> {
 #else
 template <class V>
 [[gnu::always_inline]] inline V fused(const V& a, const V& b, const V& c) { return a * b + c; }
+#endif
+
+// Numbers of one state that one instruction takes.
+template <class T>
+inline constexpr int neighbours =
+#ifdef __AVX__
+    32 / sizeof(T);
+#else
+    16 / sizeof(T);
 #endif
 
 // A product on its way.
@@ -176,6 +186,46 @@ template <class S>
 template <class S>
 [[gnu::always_inline]] inline void scattered(const S& a, double* x, std::size_t stride, int states) {
   for (int b = 0; b < S::width && b < states; ++b) x[b * stride] = double(a.lane(b));
+}
+
+// Numbers of one state that stand side by side are taken several at a time, as V; packs of states, and numbers that are written down, one by one.
+template <class S>
+struct Several {
+  using type = S;
+  static constexpr int count = 1;
+};
+template <class T>
+struct Several<Lanes<T, 1>> {
+  using type = Lanes<T, neighbours<T>>;
+  static constexpr int count = neighbours<T>;
+};
+template <class V, class S>
+[[gnu::always_inline]] inline V loaded(const S* x) {
+  V value;
+  __builtin_memcpy(&value, x, sizeof value);
+  return value;
+}
+template <class V, class S>
+[[gnu::always_inline]] inline void stored(const V& value, S* x) {
+  __builtin_memcpy(x, &value, sizeof value);
+}
+template <class V, class S>
+[[gnu::always_inline]] inline V wide(const S& x) {
+  if constexpr (std::is_same_v<V, S>)
+    return x;
+  else
+    return V(x.lane(0));
+}
+// Of columns c, c + 1, ...: 1 at column i and 0 beside it.
+template <class V, class S>
+[[gnu::always_inline]] inline V unit(int c, int i) {
+  V value(typename V::Scalar(0));
+  if constexpr (std::is_same_v<V, S>) {
+    if (c == i) value = V(typename V::Scalar(1));
+  } else if (c <= i && i < c + V::width) {
+    value.set(i - c, 1);
+  }
+  return value;
 }
 
 // A result that has left already.

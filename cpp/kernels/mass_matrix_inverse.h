@@ -46,14 +46,13 @@ template <class Kind, class S>
   const Vector3<S> l = link.parent < 0 ? Vector3<S>::zero() : lying.arm;
   if constexpr (Kind::nv == 1) {
     const auto own = OneCoordinate<S>::template of<Kind>(link, w, lying.axes);
-    const bool pin = Kind::pin;
     S* __restrict nu = rows;
     nu[0] = own.sign * own.inverse;
     const Vector3<S> f = own.sign * own.gain.linear, n = own.sign * own.gain.angular + cross(l, f);
     for (int r = 0; r < 3; ++r) z.n[r][0] = n[r], z.f[r][0] = f[r];
     each_column<true>(z, 1, count, [&](int c, Vector3<S>& n, Vector3<S>& f) {
       S e = -dot(own.h.angular, n);
-      if (!pin) e -= dot(own.h.linear, f);
+      if constexpr (!Kind::pin) e -= dot(own.h.linear, f);
       nu[c] = e * own.inverse;
       f = f + e * own.gain.linear;
       n = n + e * own.gain.angular + cross(l, f);
@@ -61,25 +60,26 @@ template <class Kind, class S>
   } else {
     for (int c = 0; c < Kind::nv; ++c)
       for (int r = 0; r < 3; ++r) z.n[r][c] = z.f[r][c] = S(0);
-    each_column<true>(z, 0, count, [&](int c, Vector3<S>& n, Vector3<S>& f) {
-      n = transpose_times(lying.axes, n), f = transpose_times(lying.axes, f);  // in the link's own axes
-      S e[Kind::nv];
-      for (int i = 0; i < 3; ++i) {
-        const S own(i == c ? 1 : 0);
+    each_few_columns(z, count, [&]<class V>(int c, Vector3<V>& n, Vector3<V>& f) {
+      const Matrix3<V> axes = wide<V>(lying.axes);
+      n = transpose_times(axes, n), f = transpose_times(axes, f);  // in the link's own axes
+      V e[Kind::nv];
+      each_of<3>([&](int i) {
+        const V own = unit<V, S>(c, i);
         e[i] = own - n[i], n[i] = own;
         if constexpr (Kind::nv == 6) {
-          const S along(3 + i == c ? 1 : 0);
+          const V along = unit<V, S>(c, 3 + i);
           e[3 + i] = along - f[i], f[i] = along;
         }
-      }
-      if constexpr (Kind::nv == 3) f = f + transpose_times(multiple.gain, Vector3<S>{e[0], e[1], e[2]});
+      });
+      if constexpr (Kind::nv == 3) f = f + transpose_times(wide<V>(multiple.gain), Vector3<V>{e[0], e[1], e[2]});
       if constexpr (Kind::nv == 3)
         multiple.ball.solve(e);
       else
         multiple.free.solve(e);
-      for (int i = 0; i < Kind::nv; ++i) rows[size_t(i) * N + c] = e[i];
-      f = lying.axes * f;
-      n = lying.axes * n + cross(l, f);
+      each_of<Kind::nv>([&](int i) { stored(e[i], rows + size_t(i) * N + c); });
+      f = axes * f;
+      n = axes * n + cross(wide<V>(l), f);
     });
   }
   for (int i = 0; i < Kind::nv; ++i)
@@ -93,30 +93,29 @@ template <class Kind, class S>
   const Vector3<S> l = link.parent < 0 ? Vector3<S>::zero() : lying.arm;
   if constexpr (Kind::nv == 1) {
     const auto own = OneCoordinate<S>::template of<Kind>(link, w, lying.axes);
-    const bool pin = Kind::pin;
     S* __restrict row = rows;
     each_column<true>(alpha, 0, count, [&](int c, Vector3<S>& angular, Vector3<S>& linear) {
       linear = linear + cross(angular, l);
       const S x = row[c] - dot(own.gain.angular, angular) - dot(own.gain.linear, linear);
       angular = angular + x * own.h.angular;
-      if (!pin) linear = linear + x * own.h.linear;
+      if constexpr (!Kind::pin) linear = linear + x * own.h.linear;
       row[c] = own.sign * x;
     });
   } else {
-    each_column<true>(alpha, 0, count, [&](int c, Vector3<S>& angular, Vector3<S>& linear) {
-      linear = transpose_times(lying.axes, linear + cross(angular, l)), angular = transpose_times(lying.axes, angular);
-      S* const own = rows + c;
-      Vector3<S> whole{own[0], own[N], own[2 * size_t(N)]};
-      if constexpr (Kind::nv == 3) whole = whole - multiple.gain * linear;
-      for (int i = 0; i < 3; ++i) own[i * size_t(N)] = whole[i] - angular[i];
-      angular = lying.axes * whole;
+    each_few_columns(alpha, count, [&]<class V>(int c, Vector3<V>& angular, Vector3<V>& linear) {
+      const Matrix3<V> axes = wide<V>(lying.axes);
+      linear = transpose_times(axes, linear + cross(angular, wide<V>(l))), angular = transpose_times(axes, angular);
+      const auto row = [&](int i) { return rows + size_t(i) * N + c; };
+      Vector3<V> whole{loaded<V>(row(0)), loaded<V>(row(1)), loaded<V>(row(2))};
+      if constexpr (Kind::nv == 3) whole = whole - wide<V>(multiple.gain) * linear;
+      each_of<3>([&](int i) { stored(V(whole[i] - angular[i]), row(i)); });
+      angular = axes * whole;
       if constexpr (Kind::nv == 6)
-        for (int i = 0; i < 3; ++i) {
-          S& x = own[(3 + i) * size_t(N)];
-          const S moved = x;
-          x = moved - linear[i], linear[i] = moved;
-        }
-      linear = lying.axes * linear;
+        each_of<3>([&](int i) {
+          const V moved = loaded<V>(row(3 + i));
+          stored(V(moved - linear[i]), row(3 + i)), linear[i] = moved;
+        });
+      linear = axes * linear;
     });
   }
 }
@@ -131,14 +130,13 @@ unsigned mass_matrix_inverse(const Links<typename S::Scalar>& links, const State
   if constexpr (S::width == 1 && sizeof(T) == sizeof(double)) rows = reinterpret_cast<S*>(out);
   for (int k = 0; k < links.count; ++k) {
     const Link<T>& link = links.link[k];
-    Motion<S>& m = w.link[k].motion;
-    m.omega = m.turning = m.sliding = Vector3<S>::zero();
+    Place<S>& place = w.link[k].motion.place;
     with_step(link.step, [&](auto kind) {
-      place_link<decltype(kind)>(link, at, m.place);
-      lie_in<decltype(kind)>(link, link.parent < 0 ? nullptr : own.lying + link.parent, m.place, own.lying[k]);
+      place_link<decltype(kind)>(link, at, place);
+      lie_in<decltype(kind)>(link, link.parent < 0 ? nullptr : own.lying + link.parent, place, own.lying[k]);
     });
   }
-  unsigned sound = S::mask(articulated_tip_to_base(links, at, w));
+  unsigned sound = S::mask(articulated_tip_to_base<false>(links, at, w));
   for (int k = links.count - 1; k >= 0; --k) {
     stay_open(at, k, N);
     const Link<T>& link = links.link[k];

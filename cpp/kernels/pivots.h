@@ -69,12 +69,17 @@ struct Factors {
     P.growth *= larger(S(1), S(S(T(0.0625)) * grown));
     return sound;
   }
-  void solve(S* x) const {
-    for (int i = 0; i < n; ++i)
-      for (int a = 0; a < i; ++a) x[i] -= lower[i][a] * x[a];
-    for (int i = 0; i < n; ++i) x[i] *= inverse[i];
-    for (int i = n - 1; i >= 0; --i)
-      for (int a = i + 1; a < n; ++a) x[i] -= lower[a][i] * x[a];
+  // V: S, or several of its numbers.
+  template <class V>
+  void solve(V* x) const {
+    each_of<n>([&](int i) {
+      for (int a = 0; a < i; ++a) x[i] -= wide<V>(lower[i][a]) * x[a];
+    });
+    each_of<n>([&](int i) { x[i] *= wide<V>(inverse[i]); });
+    each_of<n>([&](int b) {
+      const int i = n - 1 - b;
+      for (int a = i + 1; a < n; ++a) x[i] -= wide<V>(lower[a][i]) * x[a];
+    });
   }
 };
 

@@ -15,6 +15,16 @@ template <class S, class T>
 [[gnu::always_inline]] inline Vector3<S> spread(const T* x) {
   return {S(x[0]), S(x[1]), S(x[2])};
 }
+template <class V, class S>
+[[gnu::always_inline]] inline Vector3<V> wide(const Vector3<S>& x) {
+  return {wide<V>(x[0]), wide<V>(x[1]), wide<V>(x[2])};
+}
+template <class V, class S>
+[[gnu::always_inline]] inline Matrix3<V> wide(const Matrix3<S>& A) {
+  Matrix3<V> B;
+  each_of<9>([&](int i) { B.m[i] = wide<V>(A.m[i]); });
+  return B;
+}
 template <class S>
 [[gnu::always_inline]] inline Vector3<S> operator*(const Product<S>& s, const Vector3<S>& x) {
   return S(s) * x;
@@ -134,8 +144,8 @@ struct Full {
   }
 };
 
-// The same inertia and force about a point at -l, where row `zero` of A and B is zero (what is stored there does not count):
-//   B' = B + l~ C,   A' = A - B l~ + l~ B'*,   n' = n + l × f
+// The same inertia about a point at -l, where row `zero` of A and B is zero (what is stored there does not count):
+//   B' = B + l~ C,   A' = A - B l~ + l~ B'*
 template <int zero, class S>
 [[gnu::always_inline]] inline void shift(const Vector3<S>& l, Inertia<S>& P) {
   const Matrix3<S> old = P.B;
@@ -159,7 +169,6 @@ template <int zero, class S>
         P.A(r, k) += change;
     }
   }
-  P.n = P.n + cross(l, P.f);
 }
 
 }  // namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET

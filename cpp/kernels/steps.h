@@ -151,14 +151,15 @@ template <class Kind, class S, class T>
   }
 }
 
-// Of one state: the sines and cosines of all its coordinates, W at once; what is no angle costs little. work: turns_size() numbers.
-template <int W, class T>
-inline size_t padded(const Links<T>& links) { return size_t(links.nq + W - 1) / W * W; }
-template <int W, class T>
-inline size_t turns_size(const Links<T>& links) { return (2 * padded<W>(links) + 7) / 8 * 8; }  // what follows stays aligned
-template <int W, class T>
+// Of one state: the sines and cosines of all its coordinates, neighbours at once; what is no angle costs little. work: turns_size() numbers.
+template <class T>
+inline size_t padded(const Links<T>& links) { return size_t(links.nq + neighbours<T> - 1) / neighbours<T> * neighbours<T>; }
+template <class T>
+inline size_t turns_size(const Links<T>& links) { return (2 * padded(links) + 7) / 8 * 8; }  // what follows stays aligned
+template <class T>
 inline States<T> with_turns(const Links<T>& links, const States<T>& at, T* work) {
-  T* const cosines = work + padded<W>(links);
+  constexpr int W = neighbours<T>;
+  T* const cosines = work + padded(links);
   for (int i = 0; i < links.nq; i += W) {
     Lanes<T, W> q(T(0));
     for (int b = 0; b < W && i + b < links.nq; ++b) q.set(b, T(at.q[i + b]));

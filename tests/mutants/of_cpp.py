@@ -16,7 +16,7 @@ CHANGES = {
         ("stale numbers of a bound state", "entry->parameters != source->parameters()", "false"),
     ],
     "cpp/dynamics/workspace_pool.h": [
-        ("stale workspaces of direct calls", "version_ != model.parameters()", "version_ == 0"),
+        ("stale workspaces of direct calls", "own->version != model.parameters()", "own->version == 0"),
     ],
     "cpp/model/multibody.cpp": [
         ("compiled models outlive a parameter", "kept->parameters == parameters_", "true"),
