@@ -13,13 +13,12 @@ bool plain(const Solving& how) { return how.form == Form::fast && how.refinement
 }  // namespace
 
 template <class Again>
-bool BatchDynamics::by_links(Precision precision, kernels::Call call, const Given& q, const Given* v, const Given* u, int states, int size, double* out,
-                             const Applied<double>* applied, Again again) {
+bool BatchDynamics::by_links(Precision precision, const LinkCall& asked, int states, int size, double* out, Again again) {
   bool done = false;
   const auto run = [&]<class S>(S) {
     std::get<WorkspacePool<LinkDynamics<S>>>(links_).with(model(), [&](LinkDynamics<S>& w) {
       done = w.there();
-      if (done) w.run(call, q, v, u, states, size, out, applied, again);
+      if (done) w.run(asked, states, size, out, again);
     });
   };
   if (precision == Precision::double_) run(double());
@@ -27,26 +26,24 @@ bool BatchDynamics::by_links(Precision precision, kernels::Call call, const Give
   return done;
 }
 
-BatchDynamics::Starts BatchDynamics::refined_from(Precision precision, kernels::Call call, const Given& q, const Given* v, const Given* u, int states, int size,
-                                                  const Solving& how, const Applied<double>* applied) {
+BatchDynamics::Starts BatchDynamics::refined_from(Precision precision, const LinkCall& asked, int states, int size, const Solving& how) {
   Starts starts;
   if (how.form != Form::fast || how.refinement.steps == 0 || how.on_singular != OnSingular::raise) return starts;
   starts.size = size;
   starts.values.resize(size_t(states) * size), starts.there.assign(states, 1);
-  const bool done = by_links(precision, call, q, v, u, states, size, starts.values.data(), applied,
+  const bool done = by_links(precision, asked, states, size, starts.values.data(),
                              [&](int from, int to) { std::fill(starts.there.begin() + from, starts.there.begin() + to, 0); });
   if (!done) starts.there.clear();
   return starts;
 }
 
 template <class General>
-void BatchDynamics::plainly(Precision precision, kernels::Call call, Givens given, int size, double* out, const Applied<double>* applied, General general) {
+void BatchDynamics::plainly(Precision precision, const LinkCall& asked, Givens given, int size, double* out, General general) {
   const ModelInUse use(model());
   check_given(model(), given);
   const int batch = common_batch(given);
   bool doubt = false;
-  const bool done = by_links(precision, call, given[0], given.size() > 1 ? &given[1] : nullptr, given.size() > 2 ? &given[2] : nullptr, batch < 0 ? 1 : batch, size, out, applied,
-                             [&](int, int) { doubt = true; });
+  const bool done = by_links(precision, asked, batch < 0 ? 1 : batch, size, out, [&](int, int) { doubt = true; });
   if (!done || doubt) general();
 }
 
@@ -91,11 +88,12 @@ void BatchDynamics::forward_dynamics(const Given& q, const Given& v, const Given
   const ModelInUse use(model());
   check_given(model(), {q, v, tau});
   const int batch = common_batch({q, v, tau}), states = batch < 0 ? 1 : batch;
-  const Starts starts = refined_from(precision, kernels::Call::forward_dynamics, q, &v, &tau, states, model().nv(), how, applied);
+  const LinkCall asked{kernels::Call::forward_dynamics, q, &v, &tau, applied};
+  const Starts starts = refined_from(precision, asked, states, model().nv(), how);
   const auto general = [&](int from, int to) {
     at_precision(precision, [&]<class S>(S) { forward_dynamics_at<S>(q, v, tau, from, to, states, how, starts, vdot, applied); });
   };
-  if (!plain(how) || !by_links(precision, kernels::Call::forward_dynamics, q, &v, &tau, states, model().nv(), vdot, applied, general)) general(0, states);
+  if (!plain(how) || !by_links(precision, asked, states, model().nv(), vdot, general)) general(0, states);
 }
 
 RefinementReport BatchDynamics::refinement(const Given& q, const Given& v, const Given& tau, const Solving& how, Precision precision, double* vdot) {
@@ -107,7 +105,7 @@ RefinementReport BatchDynamics::refinement(const Given& q, const Given& v, const
     forward_dynamics(q, v, tau, how, precision, vdot);
     return report;
   }
-  const Starts starts = refined_from(precision, kernels::Call::forward_dynamics, q, &v, &tau, 1, model().nv(), how, nullptr);
+  const Starts starts = refined_from(precision, {kernels::Call::forward_dynamics, q, &v, &tau}, 1, model().nv(), how);
   Solving estimated = starts.of(0, how);
   estimated.estimate = true;
   at_precision(precision, [&]<class S>(S) {
@@ -126,7 +124,7 @@ void BatchDynamics::inverse_dynamics(const Given& q, const Given& v, const Given
   const bool moving = vdot;
   const Given given[] = {q, v, moving ? *vdot : Given{}};
   const Givens all(given, moving ? 3 : 2);
-  plainly(precision, kernels::Call::inverse_dynamics, all, model().nv(), tau, applied, [&] {
+  plainly(precision, {kernels::Call::inverse_dynamics, q, &v, vdot, applied}, all, model().nv(), tau, [&] {
     PerScalar<Wrenches> wrenches;
     run(precision, all, model().nv(), tau, [&](auto& w, auto in, auto* y) {
       using S = std::remove_pointer_t<decltype(y)>;
@@ -140,7 +138,7 @@ void BatchDynamics::inverse_dynamics(const Given& q, const Given& v, const Given
 
 void BatchDynamics::mass_matrix(const Given& q, Precision precision, double* out) {
   const int size = model().nv() * model().nv();
-  plainly(precision, kernels::Call::mass_matrix, {q}, size, out, nullptr,
+  plainly(precision, {kernels::Call::mass_matrix, q}, {q}, size, out,
           [&] { run(precision, {q}, size, out, [](auto& w, auto in, auto* y) { w.mass_matrix(in[0], y); }); });
 }
 
@@ -149,7 +147,8 @@ void BatchDynamics::mass_matrix_inverse(const Given& q, const Solving& how, Prec
   check_given(model(), {q});
   const size_t size = size_t(model().nv()) * model().nv();
   const int states = q.batch < 0 ? 1 : q.batch;
-  const Starts starts = refined_from(precision, kernels::Call::mass_matrix_inverse, q, nullptr, nullptr, states, static_cast<int>(size), how, nullptr);
+  const LinkCall asked{kernels::Call::mass_matrix_inverse, q};
+  const Starts starts = refined_from(precision, asked, states, static_cast<int>(size), how);
   const auto general = [&](int from, int to) {
     at_precision(precision, [&]<class S>(S) {
       std::vector<S> inverse(size);
@@ -160,22 +159,26 @@ void BatchDynamics::mass_matrix_inverse(const Given& q, const Solving& how, Prec
       });
     });
   };
-  if (!plain(how) || !by_links(precision, kernels::Call::mass_matrix_inverse, q, nullptr, nullptr, states, static_cast<int>(size), out, nullptr, general)) general(0, states);
+  if (!plain(how) || !by_links(precision, asked, states, static_cast<int>(size), out, general)) general(0, states);
 }
 
 void BatchDynamics::jacobian(const Node& node, const Given& q, Precision precision, double* out) {
-  run(precision, {q}, 6 * model().nv(), out, [&](auto& w, auto in, auto* y) { w.jacobian(node, in[0], y); });
+  const int size = 6 * model().nv();
+  plainly(precision, {.call = kernels::Call::jacobian, .q = q, .node = &node}, {q}, size, out,
+          [&] { run(precision, {q}, size, out, [&](auto& w, auto in, auto* y) { w.jacobian(node, in[0], y); }); });
 }
 
 void BatchDynamics::pose(const Node& node, const Given& q, double* out) {
-  run(Precision::double_, {q}, 16, out, [&](auto& w, auto in, auto* y) {
-    const auto X = w.pose(node, in[0]);
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) y[4 * i + j] = X.R(i, j);
-      y[4 * i + 3] = X.p[i];
-      y[12 + i] = 0;
-    }
-    y[15] = 1;
+  plainly(Precision::double_, {.call = kernels::Call::pose, .q = q, .node = &node}, {q}, 16, out, [&] {
+    run(Precision::double_, {q}, 16, out, [&](auto& w, auto in, auto* y) {
+      const auto X = w.pose(node, in[0]);
+      for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 3; ++j) y[4 * i + j] = X.R(i, j);
+        y[4 * i + 3] = X.p[i];
+        y[12 + i] = 0;
+      }
+      y[15] = 1;
+    });
   });
 }
 

@@ -48,19 +48,18 @@ class BatchDynamics : public Batches<RigidDynamics> {
       return how;
     }
   };
-  Starts refined_from(Precision precision, kernels::Call call, const Given& q, const Given* v, const Given* u, int states, int size, const Solving& how,
-                      const Applied<double>* applied);
+  Starts refined_from(Precision precision, const LinkCall& asked, int states, int size, const Solving& how);
   template <class S>
   void forward_dynamics_at(const Given& q, const Given& v, const Given& tau, int from, int to, int states, const Solving& how, const Starts& starts, double* vdot,
                            const Applied<double>* applied);
 
   // The plain case by kernels; false where it is not there for this model or precision. again(from, to): states in doubt.
   template <class Again>
-  bool by_links(Precision precision, kernels::Call call, const Given& q, const Given* v, const Given* u, int states, int size, double* out, const Applied<double>* applied, Again again);
+  bool by_links(Precision precision, const LinkCall& asked, int states, int size, double* out, Again again);
 
   // The same of calls that never leave a state in doubt: general(out) where kernels are not there, or where a number left its range.
   template <class General>
-  void plainly(Precision precision, kernels::Call call, Givens given, int size, double* out, const Applied<double>* applied, General general);
+  void plainly(Precision precision, const LinkCall& asked, Givens given, int size, double* out, General general);
 
   std::tuple<WorkspacePool<PackedDynamics<Single>>, WorkspacePool<PackedDynamics<double>>> packs_;
   std::tuple<WorkspacePool<LinkDynamics<Single>>, WorkspacePool<LinkDynamics<double>>> links_;

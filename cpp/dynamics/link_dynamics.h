@@ -15,6 +15,15 @@
 
 namespace pycraft {
 
+// A call of kernels: at what, under what, of what.
+struct LinkCall {
+  kernels::Call call;
+  const Given& q;
+  const Given *v = nullptr, *u = nullptr;
+  const Applied<double>* applied = nullptr;  // null: the model's gravity alone
+  const Node* node = nullptr;
+};
+
 // Of one model, for T = float or double. Memory is kept from call to call.
 template <class T>
 class LinkDynamics {
@@ -26,9 +35,10 @@ class LinkDynamics {
   // Whether the model is one that kernels know.
   bool there() const { return model_ != nullptr; }
 
-  // The call at `count` states, `size` numbers a state to out + b size; again(from, to) is called for runs of states in doubt. v and u may be null.
+  // At `count` states, `size` numbers a state to out + b size; again(from, to) is called for runs of states in doubt.
   template <class Again>
-  void run(kernels::Call call, const Given& q, const Given* v, const Given* u, int count, int size, double* out, const Applied<double>* applied, Again again) {
+  void run(const LinkCall& asked, int count, int size, double* out, Again again) {
+    const auto& [call, q, v, u, applied, node] = asked;
     T gravity[3];
     const T* wrenches = nullptr;
     std::copy_n(gravity_, 3, gravity);
@@ -38,12 +48,13 @@ class LinkDynamics {
     }
     const bool matrix = call == kernels::Call::mass_matrix || call == kernels::Call::mass_matrix_inverse;  // kernels look through those themselves
     const auto stride = [](const Given& g) { return g.batch < 0 ? size_t(0) : size_t(g.width); };
+    const kernels::OnLink<T> on_link = node ? model_->on_link(*node) : kernels::OnLink<T>{};
     int doubted = 0;  // how many states before b are in doubt
     for (int b = 0; b < count;) {
       const kernels::Kernels<T>& kernel = chosen(count - b, matrix);
       const kernels::Kernel<T>& how = kernel[call];
       const int lanes = std::min(kernel.lanes, count - b);
-      const kernels::States<T> states{q.at(b), v ? v->at(b) : nullptr, u ? u->at(b) : nullptr, stride(q), v ? stride(*v) : 0, u ? stride(*u) : 0, lanes, gravity, wrenches, check_interrupt};
+      const kernels::States<T> states{q.at(b), v ? v->at(b) : nullptr, u ? u->at(b) : nullptr, stride(q), v ? stride(*v) : 0, u ? stride(*u) : 0, lanes, gravity, wrenches, check_interrupt, node ? &on_link : nullptr};
       const unsigned sound = how.run(model_->links(), states, out + size_t(b) * size, size, work(how.work(model_->links())));
       for (const int end = b + lanes, first = b; b < end; ++b) {
         const bool sure = (sound >> (b - first) & 1) && (matrix || all_finite(out + size_t(b) * size, size));

@@ -5,6 +5,7 @@
 #include "kernels/inverse_dynamics.h"
 #include "kernels/mass_matrix_of_links.h"
 #include "kernels/mass_matrix_inverse.h"
+#include "kernels/node_kinematics.h"
 
 namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET {
 
@@ -16,6 +17,8 @@ struct KernelsOf {
   static size_t inverse(const Links<T>& links) { return numbers(links, links.count * sizeof(InverseLink<S>)); }
   static size_t matrix(const Links<T>& links) { return numbers(links, MatrixWork<S>::size(links)); }
   static size_t matrix_inverse(const Links<T>& links) { return numbers(links, ForwardWork<S>::size(links) + InverseWork<S>::size(links)); }
+
+  static size_t nothing(const Links<T>& links) { return numbers(links, 0); }
 
   template <auto kernel>
   static unsigned run(const Links<T>& links, const States<T>& at, double* out, size_t stride, T* work) {
@@ -32,7 +35,9 @@ struct KernelsOf {
                                   {{W == 1 ? run_whole<forward_dynamics<S>> : run<forward_dynamics<S>>, forward},
                                    {run<inverse_dynamics<S>>, inverse},
                                    {W == 1 ? run_whole<mass_matrix<S>> : run<mass_matrix<S>>, matrix},
-                                   {W == 1 ? run_whole<mass_matrix_inverse<S>> : run<mass_matrix_inverse<S>>, matrix_inverse}}};
+                                   {W == 1 ? run_whole<mass_matrix_inverse<S>> : run<mass_matrix_inverse<S>>, matrix_inverse},
+                                   {run<node_jacobian<S>>, nothing},
+                                   {run<node_pose<S>>, nothing}}};
 };
 
 }  // namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET

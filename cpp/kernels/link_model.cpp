@@ -198,6 +198,20 @@ void LinkModel<T>::wrenches_on_links(const Vector6<T>* on_bodies, std::vector<T>
   }
 }
 
+template <class T>
+OnLink<T> LinkModel<T>::on_link(const Node& node) const {
+  if (node.body < 0) {
+    OnLink<T> fixed{-1};
+    put(node.pose.R.m, fixed.R), put(node.pose.p.v, fixed.p);
+    return fixed;
+  }
+  const Carried& body = bodies_[node.body];
+  const Pose<T> pose = body.pose * cast<T>(node.pose);
+  OnLink<T> carried{body.link};
+  put(pose.R.m, carried.R), put(pose.p.v, carried.p);
+  return carried;
+}
+
 template class LinkModel<float>;
 template class LinkModel<double>;
 

@@ -23,6 +23,7 @@ class LinkModel {
 
   const Links<T>& links() const { return links_; }
   size_t bodies() const { return bodies_.size(); }
+  OnLink<T> on_link(const Node& node) const;
   // (n; f) on every body, in its frame, as those on links.
   void wrenches_on_links(const Vector6<T>* on_bodies, std::vector<T>& out) const;
 

@@ -41,6 +41,13 @@ struct Links {
   T rounding, faint, growth;    // bounds of doubt, see pivots.h
 };
 
+// A node as part of a link, -1: of the base.
+template <class T>
+struct OnLink {
+  int link;
+  T R[9], p[3];
+};
+
 // States to compute at: state b at q + b q_stride, and so on; lanes beyond `states` repeat the last one.
 template <class T>
 struct States {
@@ -50,6 +57,7 @@ struct States {
   const T* gravity;   // three numbers
   const T* wrenches;  // (n; f) on every link in its frame about its origin, at all states; null: none
   void (*interrupt)();  // asked in long loops; it throws to stop them
+  const OnLink<T>* node = nullptr;  // of calls that are asked of one
   const T *cosines = nullptr, *sines = nullptr;  // of one state: of every coordinate
 };
 
@@ -61,12 +69,12 @@ struct Kernel {
   size_t (*work)(const Links<T>& links);
 };
 
-enum class Call { forward_dynamics, inverse_dynamics, mass_matrix, mass_matrix_inverse };
+enum class Call { forward_dynamics, inverse_dynamics, mass_matrix, mass_matrix_inverse, jacobian, pose };
 
 template <class T>
 struct Kernels {
   int lanes;           // states at once
-  Kernel<T> calls[4];
+  Kernel<T> calls[6];
   const Kernel<T>& operator[](Call call) const { return calls[static_cast<int>(call)]; }
 };
 

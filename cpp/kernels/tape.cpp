@@ -27,6 +27,8 @@ Tape tape_of(const Links<double>& links, Call call, const double* gravity, bool 
     case Call::forward_dynamics: bytes = traced::ForwardWork<Number>::size(links); break;
     case Call::inverse_dynamics: bytes = links.count * sizeof(traced::InverseLink<Number>); break;
     case Call::mass_matrix: bytes = traced::MatrixWork<Number>::size(links); break;
+    case Call::jacobian:
+    case Call::pose: break;  // not recorded
     case Call::mass_matrix_inverse: bytes = traced::ForwardWork<Number>::size(links) + traced::InverseWork<Number>::size(links); break;
   }
   std::vector<double> work(bytes / sizeof(double) + 2);
@@ -38,6 +40,8 @@ Tape tape_of(const Links<double>& links, Call call, const double* gravity, bool 
     case Call::forward_dynamics: traced::forward_dynamics<Number>(links, at, out.data(), size, work.data()); break;
     case Call::inverse_dynamics: traced::inverse_dynamics<Number>(links, at, out.data(), size, work.data()); break;
     case Call::mass_matrix: traced::mass_matrix<Number>(links, at, out.data(), size, work.data()); break;
+    case Call::jacobian:
+    case Call::pose: break;
     case Call::mass_matrix_inverse: traced::mass_matrix_inverse<Number>(links, at, out.data(), size, work.data()); break;
   }
   tape.results.assign(out.begin(), out.end());

@@ -17,8 +17,8 @@ Accelerations<S> accelerations_of(const Multibody& model, const Solving& how) {
     const auto links = std::make_shared<LinkDynamics<double>>(model);
     if (links->there() && how.form == Form::fast && how.refinement.steps == 0)
       return [general, links, how, nq = model.nq(), nv = model.nv()](const double* q, const double* v, const double* tau, double* vdot) {
-        const Given velocity{"v", v, nv}, force{"tau", tau, nv};
-        links->run(kernels::Call::forward_dynamics, {"q", q, nq}, &velocity, &force, 1, nv, vdot, nullptr, [&](int, int) { general->forward_dynamics(q, v, tau, vdot, how); });
+        const Given configuration{"q", q, nq}, velocity{"v", v, nv}, force{"tau", tau, nv};
+        links->run({kernels::Call::forward_dynamics, configuration, &velocity, &force}, 1, nv, vdot, [&](int, int) { general->forward_dynamics(q, v, tau, vdot, how); });
       };
   }
   return [general, how](const S* q, const S* v, const S* tau, S* vdot) { general->forward_dynamics(q, v, tau, vdot, how); };

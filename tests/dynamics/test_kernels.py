@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import pycraft as pc
+from pycraft import reference
 from support import kernel_cases
 from support.kernel_cases import MODELS, STATES, calls, states
 
@@ -46,6 +47,29 @@ def test_wider_precisions_agree(model):
         assert np.abs(value - exact[name]).max() <= bound * np.abs(exact[name]).max(), name
 
 
+def test_jacobians_and_poses(model):
+    """Of every body, and of nodes off a body and off the base: a batch is its states, and as exact as sums of 6 products on the way are."""
+    turned = np.array([[0, -1, 0], [0.6, 0, -0.8], [0.8, 0, 0.6]])
+    nodes = {"off a body": [None, *model.bodies][-1], "off the base": None}
+    for name, body in nodes.items():
+        if name not in model.nodes:
+            model.add_node(name, body, position=(0.3, -0.2, 0.5), rotation=turned)
+    Q = states(model)[0]
+    size = 40 * max(model.nv, 1) * EPS
+    for frame in (*model.bodies, *nodes):
+        J, X = model.jacobian(frame, Q), model.pose(frame, Q)
+        assert (J.shape, X.shape) == ((STATES, 6, model.nv), (STATES, 4, 4))
+        exact = model.jacobian(frame, Q, precision="quad")
+        assert np.abs(J - exact).max(initial=0) <= size * np.abs(exact).max(initial=0)
+        for b in range(STATES):
+            np.testing.assert_array_equal(model.jacobian(frame, Q[b]), J[b])
+            np.testing.assert_array_equal(model.pose(frame, Q[b]), X[b])
+    description = model.description()
+    for frame in nodes:
+        placed = reference.node_pose(description, frame, Q[0])
+        assert np.abs(model.pose(frame, Q[0]) - placed).max() <= size * np.abs(placed).max()
+
+
 def test_general_recursions_agree(model):
     """`on_singular="minimum-norm"` is not a plain case, and at regular states it changes nothing."""
     if not model.nv:
@@ -68,6 +92,7 @@ import sys
 sys.path.insert(0, {folder!r})
 import numpy as np
 import pycraft as pc
+from pycraft import reference
 from support.kernel_cases import MODELS, STATES, calls, states
 kept = {{}}
 for model in MODELS.values():
