@@ -38,9 +38,19 @@ template <class S>
 [[gnu::always_inline]] inline Six<S> operator+(const Six<S>& a, const Six<S>& b) {
   return {a.angular + b.angular, a.linear + b.linear};
 }
+// a + c b, products fused.
 template <class S>
-[[gnu::always_inline]] inline Six<S> operator*(const S& c, const Six<S>& a) {
-  return {c * a.angular, c * a.linear};
+[[gnu::always_inline]] inline Vector3<S> plus(const Vector3<S>& a, const S& c, const Vector3<S>& b) {
+  return {a[0] + c * b[0], a[1] + c * b[1], a[2] + c * b[2]};
+}
+template <class S>
+[[gnu::always_inline]] inline Six<S> plus(const Six<S>& a, const S& c, const Six<S>& b) {
+  return {plus(a.angular, c, b.angular), plus(a.linear, c, b.linear)};
+}
+// a + l × f
+template <class S>
+[[gnu::always_inline]] inline Vector3<S> plus_cross(const Vector3<S>& a, const Vector3<S>& l, const Vector3<S>& f) {
+  return {a[0] + l[1] * f[2] - l[2] * f[1], a[1] + l[2] * f[0] - l[0] * f[2], a[2] + l[0] * f[1] - l[1] * f[0]};
 }
 template <class S>
 [[gnu::always_inline]] inline S dot(const Six<S>& a, const Six<S>& b) {
@@ -85,9 +95,9 @@ struct Edge {
   [[gnu::always_inline]] explicit Edge(const T* pose) : turn(pose), arm(spread<S>(pose + 9)) {}
   [[gnu::always_inline]] Six<S> to_parent(const Six<S>& z) const {
     const Vector3<S> f = turn.to_parent(z.linear);
-    return {turn.to_parent(z.angular) + cross(arm, f), f};
+    return {plus_cross(turn.to_parent(z.angular), arm, f), f};
   }
-  [[gnu::always_inline]] Six<S> to_child(const Six<S>& a) const { return {turn.to_child(a.angular), turn.to_child(a.linear - cross(arm, a.angular))}; }
+  [[gnu::always_inline]] Six<S> to_child(const Six<S>& a) const { return {turn.to_child(a.angular), turn.to_child(plus_cross(a.linear, a.angular, arm))}; }
 };
 
 // f<pin, level>: the coordinate axis of the pin and that of the turn, -1 where there is none.
@@ -148,7 +158,7 @@ template <int pin, int level, class S, class T>
       Six<S> zc = z[c];
       const S e = loaded<S>(x + c) - h * zc.angular[pin];
       stored(e / D, nu + c);
-      if (!root) z.set(c, edge.to_parent(zc + e * G));
+      if (!root) z.set(c, edge.to_parent(plus(zc, e, G)));
     });
   } else {
     z.each([&](int c) {
@@ -157,7 +167,7 @@ template <int pin, int level, class S, class T>
       for (int i = 0; i < n; ++i) {
         const S e = loaded<S>(x + i * m + c) - dot(Six<S>::spread(b.H + size_t(6) * (f + i)), zc);
         stored(e, nu + i * m + c);
-        moved = moved + e * Six<S>::spread(b.G + size_t(6) * (f + i));
+        moved = plus(moved, e, Six<S>::spread(b.G + size_t(6) * (f + i)));
       }
       if (!root) z.set(c, edge.to_parent(moved));
       if (n == 1)
@@ -192,7 +202,7 @@ template <int pin, int level, class S, class T>
       for (int i = 0; i < n; ++i) {
         S yc = loaded<S>(y + i * m + c);
         if (!root) yc -= dot(Six<S>::spread(b.G + size_t(6) * (f + i)), carried), stored(yc, y + i * m + c);
-        a = a + yc * Six<S>::spread(b.H + size_t(6) * (f + i));
+        a = plus(a, yc, Six<S>::spread(b.H + size_t(6) * (f + i)));
       }
       alpha.set(c, a);
     });
