@@ -154,14 +154,15 @@ template <int pin, int level, class S, class T>
   if constexpr (pin >= 0) {
     const S h(b.H[6 * f + pin]), D(b.D[b.at[k]]);
     const Six<S> G = Six<S>::spread(b.G + size_t(6) * f);
-    z.each([&](int c) {
-      Six<S> zc = z[c];
+    if (root) return z.each([&](int c) __attribute__((always_inline)) { stored((loaded<S>(x + c) - h * z[c].angular[pin]) / D, nu + c); });
+    z.each([&](int c) __attribute__((always_inline)) {
+      const Six<S> zc = z[c];
       const S e = loaded<S>(x + c) - h * zc.angular[pin];
       stored(e / D, nu + c);
-      if (!root) z.set(c, edge.to_parent(plus(zc, e, G)));
+      z.set(c, edge.to_parent(plus(zc, e, G)));
     });
   } else {
-    z.each([&](int c) {
+    z.each([&](int c) __attribute__((always_inline)) {
       const Six<S> zc = z[c];
       Six<S> moved = zc;
       for (int i = 0; i < n; ++i) {
@@ -188,15 +189,23 @@ template <int pin, int level, class S, class T>
   if constexpr (pin >= 0) {
     const S h(b.H[6 * f + pin]);
     const Six<S> G = Six<S>::spread(b.G + size_t(6) * f);
-    alpha.each([&](int c) {
-      Six<S> a = root ? Six<S>::zero() : edge.to_child(alpha[c]);
-      S yc = loaded<S>(y + c);
-      if (!root) yc -= dot(G, a), stored(yc, y + c);
+    if (root) {
+      alpha.each([&](int c) __attribute__((always_inline)) {
+        Six<S> a = Six<S>::zero();
+        a.angular[pin] = loaded<S>(y + c) * h;
+        alpha.set(c, a);
+      });
+      return;
+    }
+    alpha.each([&](int c) __attribute__((always_inline)) {
+      Six<S> a = edge.to_child(alpha[c]);
+      const S yc = loaded<S>(y + c) - dot(G, a);
+      stored(yc, y + c);
       a.angular[pin] += yc * h;
       alpha.set(c, a);
     });
   } else {
-    alpha.each([&](int c) {
+    alpha.each([&](int c) __attribute__((always_inline)) {
       const Six<S> carried = root ? Six<S>::zero() : edge.to_child(alpha[c]);
       Six<S> a = carried;
       for (int i = 0; i < n; ++i) {
@@ -212,15 +221,15 @@ template <int pin, int level, class S, class T>
 // to <- to + from, or from, or zero: six rows.
 template <class S>
 [[gnu::always_inline]] inline void add(const Rows<S>& to, const Rows<S>& from) {
-  to.each([&](int c) { to.set(c, to[c] + from[c]); });
+  to.each([&](int c) __attribute__((always_inline)) { to.set(c, to[c] + from[c]); });
 }
 template <class S>
 [[gnu::always_inline]] inline void copy(const Rows<S>& to, const Rows<S>& from) {
-  to.each([&](int c) { to.set(c, from[c]); });
+  to.each([&](int c) __attribute__((always_inline)) { to.set(c, from[c]); });
 }
 template <class S>
 [[gnu::always_inline]] inline void clear(const Rows<S>& to) {
-  to.each([&](int c) { to.set(c, Six<S>::zero()); });
+  to.each([&](int c) __attribute__((always_inline)) { to.set(c, Six<S>::zero()); });
 }
 
 // Sweeps over the bodies, six rows at hand from body to body: those of one that branches are kept.
