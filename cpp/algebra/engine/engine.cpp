@@ -235,19 +235,21 @@ class Run {
   void shape(int rows, int columns) {
     result_.rows = rows;
     result_.columns = columns;
-    result_.values.resize(size_t(states_) * rows * columns);
-    if (expansions_) result_.expansions.resize(result_.values.size());
+    const size_t all = size_t(states_) * rows * columns;
+    if (!result_.into) result_.values.resize(all);
+    out_ = result_.into ? result_.into : result_.values.data();
+    if (expansions_) result_.expansions.resize(all);
   }
   void store(size_t at, const S& value) {
-    result_.values[at] = to_double(value);
-    in_range_ &= std::isfinite(result_.values[at]);
+    out_[at] = to_double(value);
+    in_range_ &= std::isfinite(out_[at]);
     if (expansions_) result_.expansions[at] = expansion(value);
   }
   void store_all(int b, const std::vector<S>& y, int rows, int columns) {
     if (b == 0) shape(rows, columns);
     if constexpr (std::is_same_v<S, double>) {
       if (!expansions_) {
-        std::copy(y.begin(), y.end(), result_.values.begin() + size_t(b) * y.size());
+        std::copy(y.begin(), y.end(), out_ + size_t(b) * y.size());
         in_range_ &= all_finite(y.data(), y.size());
         return;
       }
@@ -260,6 +262,7 @@ class Run {
   const Inputs& inputs_;
   bool expansions_, in_range_ = true;
   Result& result_;
+  double* out_ = nullptr;
   int states_;
   PassCounts counts_;
 };
