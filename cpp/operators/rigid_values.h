@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "algebra/trees/tree_values.h"
-#include "operators/body_columns.h"
+#include "operators/many_columns.h"
 #include "operators/multibody_operators.h"
 #include "recursions/kinematics.h"
 #include "recursions/velocities.h"
@@ -72,7 +72,7 @@ class RigidValues final : public TreeValues<RigidBlocks<S>> {
   std::vector<S> q_, v_;
   Velocities<S> velocities_;
   std::vector<Pose<S>> world_;  // X_0k
-  BodyColumns columns_;
+  ManyColumns columns_;
 };
 
 }  // namespace pycraft

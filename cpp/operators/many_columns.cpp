@@ -1,4 +1,4 @@
-#include "operators/body_columns.h"
+#include "operators/many_columns.h"
 
 #include <cmath>
 
@@ -8,7 +8,7 @@ namespace pycraft {
 
 using kernels::Way;
 
-BodyColumns::BodyColumns(const SkoStructure& tree)
+ManyColumns::ManyColumns(const SkoStructure& tree)
     : tree_(tree), kernels_(kernels::instruction_set().columns), branches_(tree.bodies()), way_(tree.bodies(), Way::any) {
   for (int k = 0; k < tree.bodies(); ++k)
     if (const int p = tree.parent[k]; p >= 0 && p != k - 1) branches_[p] = true;
@@ -20,7 +20,7 @@ static bool about(int K, const Matrix3<double>& R) {
   return R(i, K) == 0 && R(j, K) == 0 && R(K, i) == 0 && R(K, j) == 0;
 }
 
-void BodyColumns::see(const RigidBlocks<double>& blocks) {
+void ManyColumns::see(const RigidBlocks<double>& blocks) {
   for (int k = 0; k < tree_.bodies(); ++k) {
     const int axis = tree_.dof[k] == 1 ? blocks.aligned[tree_.dof_offset[k]] : -1;
     const bool pin = axis >= 0 && axis < 3;
@@ -28,7 +28,7 @@ void BodyColumns::see(const RigidBlocks<double>& blocks) {
   }
 }
 
-kernels::Bodies<double> BodyColumns::bodies(const RigidBlocks<double>& blocks) const {
+kernels::Bodies<double> ManyColumns::bodies(const RigidBlocks<double>& blocks) const {
   static_assert(sizeof(Pose<double>) == 12 * sizeof(double) && sizeof(Vector6<double>) == 6 * sizeof(double));
   return {tree_.bodies(),
           tree_.parent.data(),
@@ -45,7 +45,7 @@ kernels::Bodies<double> BodyColumns::bodies(const RigidBlocks<double>& blocks) c
           check_interrupt};
 }
 
-void BodyColumns::mass_matrix_inverse(const RigidBlocks<double>& blocks, const double* x, double* y, int m, double* scratch) const {
+void ManyColumns::mass_matrix_inverse(const RigidBlocks<double>& blocks, const double* x, double* y, int m, double* scratch) const {
   kernels_.mass_matrix_inverse(bodies(blocks), x, y, m, scratch);
 }
 

@@ -9,9 +9,9 @@
 
 namespace pycraft {
 
-class BodyColumns {
+class ManyColumns {
  public:
-  explicit BodyColumns(const SkoStructure& tree);
+  explicit ManyColumns(const SkoStructure& tree);
   // After kinematics.
   void see(const RigidBlocks<double>& blocks);
   void mass_matrix_inverse(const RigidBlocks<double>& blocks, const double* x, double* y, int m, double* scratch) const;
