@@ -17,13 +17,13 @@ struct Loose<Lanes<T, 1>> {
   using type = T;
 };
 template <class S>
-[[gnu::always_inline]] inline S loaded(const typename S::Scalar* x) {
+[[gnu::always_inline]] inline S from_memory(const typename S::Scalar* x) {
   S a;
   a.v = *reinterpret_cast<const typename Loose<S>::type*>(x);
   return a;
 }
 template <class S>
-[[gnu::always_inline]] inline void stored(const S& a, typename S::Scalar* x) {
+[[gnu::always_inline]] inline void to_memory(const S& a, typename S::Scalar* x) {
   *reinterpret_cast<typename Loose<S>::type*>(x) = a.v;
 }
 
@@ -117,12 +117,12 @@ template <class F>
 // x <- D(k)⁻¹ x of n rows m apart, as small_ldl.h.
 template <class S, class T>
 inline void solve_D(const T* L, const T* pivots, int n, T* x, size_t m) {
-  const auto row = [&](int i) { return loaded<S>(x + i * m); };
+  const auto row = [&](int i) { return from_memory<S>(x + i * m); };
   for (int i = 1; i < n; ++i)
-    for (int j = 0; j < i; ++j) stored(row(i) - S(L[i * n + j]) * row(j), x + i * m);
-  for (int i = 0; i < n; ++i) stored(row(i) / S(pivots[i]), x + i * m);
+    for (int j = 0; j < i; ++j) to_memory(row(i) - S(L[i * n + j]) * row(j), x + i * m);
+  for (int i = 0; i < n; ++i) to_memory(row(i) / S(pivots[i]), x + i * m);
   for (int i = n - 2; i >= 0; --i)
-    for (int j = i + 1; j < n; ++j) stored(row(i) - S(L[j * n + i]) * row(j), x + i * m);
+    for (int j = i + 1; j < n; ++j) to_memory(row(i) - S(L[j * n + i]) * row(j), x + i * m);
 }
 
 // Six rows of columns in a row of memory.
@@ -132,11 +132,11 @@ struct Rows {
   int columns;
   [[gnu::always_inline]] Six<S> operator[](int c) const {
     Six<S> a;
-    for (int r = 0; r < 3; ++r) a.angular[r] = loaded<S>(base + r * columns + c), a.linear[r] = loaded<S>(base + (3 + r) * columns + c);
+    for (int r = 0; r < 3; ++r) a.angular[r] = from_memory<S>(base + r * columns + c), a.linear[r] = from_memory<S>(base + (3 + r) * columns + c);
     return a;
   }
   [[gnu::always_inline]] void set(int c, const Six<S>& a) const {
-    for (int r = 0; r < 3; ++r) stored(a.angular[r], base + r * columns + c), stored(a.linear[r], base + (3 + r) * columns + c);
+    for (int r = 0; r < 3; ++r) to_memory(a.angular[r], base + r * columns + c), to_memory(a.linear[r], base + (3 + r) * columns + c);
   }
   template <class F>
   [[gnu::always_inline]] void each(F&& f) const {
@@ -154,11 +154,11 @@ template <int pin, int level, class S, class T>
   if constexpr (pin >= 0) {
     const S h(b.H[6 * f + pin]), D(b.D[b.at[k]]);
     const Six<S> G = Six<S>::spread(b.G + size_t(6) * f);
-    if (root) return z.each([&](int c) __attribute__((always_inline)) { stored((loaded<S>(x + c) - h * z[c].angular[pin]) / D, nu + c); });
+    if (root) return z.each([&](int c) __attribute__((always_inline)) { to_memory((from_memory<S>(x + c) - h * z[c].angular[pin]) / D, nu + c); });
     z.each([&](int c) __attribute__((always_inline)) {
       const Six<S> zc = z[c];
-      const S e = loaded<S>(x + c) - h * zc.angular[pin];
-      stored(e / D, nu + c);
+      const S e = from_memory<S>(x + c) - h * zc.angular[pin];
+      to_memory(e / D, nu + c);
       z.set(c, edge.to_parent(plus(zc, e, G)));
     });
   } else {
@@ -166,13 +166,13 @@ template <int pin, int level, class S, class T>
       const Six<S> zc = z[c];
       Six<S> moved = zc;
       for (int i = 0; i < n; ++i) {
-        const S e = loaded<S>(x + i * m + c) - dot(Six<S>::spread(b.H + size_t(6) * (f + i)), zc);
-        stored(e, nu + i * m + c);
+        const S e = from_memory<S>(x + i * m + c) - dot(Six<S>::spread(b.H + size_t(6) * (f + i)), zc);
+        to_memory(e, nu + i * m + c);
         moved = plus(moved, e, Six<S>::spread(b.G + size_t(6) * (f + i)));
       }
       if (!root) z.set(c, edge.to_parent(moved));
       if (n == 1)
-        stored(loaded<S>(nu + c) / S(b.D[b.at[k]]), nu + c);
+        to_memory(from_memory<S>(nu + c) / S(b.D[b.at[k]]), nu + c);
       else
         solve_D<S>(b.L + b.at[k], b.pivots + f, n, nu + c, m);
     });
@@ -192,15 +192,15 @@ template <int pin, int level, class S, class T>
     if (root) {
       alpha.each([&](int c) __attribute__((always_inline)) {
         Six<S> a = Six<S>::zero();
-        a.angular[pin] = loaded<S>(y + c) * h;
+        a.angular[pin] = from_memory<S>(y + c) * h;
         alpha.set(c, a);
       });
       return;
     }
     alpha.each([&](int c) __attribute__((always_inline)) {
       Six<S> a = edge.to_child(alpha[c]);
-      const S yc = loaded<S>(y + c) - dot(G, a);
-      stored(yc, y + c);
+      const S yc = from_memory<S>(y + c) - dot(G, a);
+      to_memory(yc, y + c);
       a.angular[pin] += yc * h;
       alpha.set(c, a);
     });
@@ -209,8 +209,8 @@ template <int pin, int level, class S, class T>
       const Six<S> carried = root ? Six<S>::zero() : edge.to_child(alpha[c]);
       Six<S> a = carried;
       for (int i = 0; i < n; ++i) {
-        S yc = loaded<S>(y + i * m + c);
-        if (!root) yc -= dot(Six<S>::spread(b.G + size_t(6) * (f + i)), carried), stored(yc, y + i * m + c);
+        S yc = from_memory<S>(y + i * m + c);
+        if (!root) yc -= dot(Six<S>::spread(b.G + size_t(6) * (f + i)), carried), to_memory(yc, y + i * m + c);
         a = plus(a, yc, Six<S>::spread(b.H + size_t(6) * (f + i)));
       }
       alpha.set(c, a);
