@@ -2,6 +2,7 @@
 #include "algebra/language/scalar_expression.h"
 #include "algebra/planning/explain.h"
 #include "bindings/bindings.h"
+#include "bindings/plain_products.h"
 #include "model/multibody.h"
 
 namespace pycraft {
@@ -48,4 +49,5 @@ PYBIND11_MODULE(_core, m) {
   pycraft::register_integration(m);
   pycraft::register_theorems(m);
   pycraft::register_bench(m);
+  pycraft::take_plain_products(m.attr("Operator"));  // last: what is defined on a type sets its slots anew
 }

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "kernels/bodies.h"
 #include "kernels/links.h"
 
 namespace pycraft::kernels {
@@ -13,6 +14,7 @@ struct InstructionSet {
   std::string name;
   Kernels<double> one, pack;  // one state; as many as there are lanes
   Kernels<float> singles;
+  ColumnKernels<double> columns;
 };
 
 // EvaluationError where PYCRAFT_ISA names a set that is not there or that this machine has not.

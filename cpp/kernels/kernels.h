@@ -1,6 +1,7 @@
 // The kernels of one instruction set: what kernels_*.cpp give their names to.
 #pragma once
 
+#include "kernels/body_columns.h"
 #include "kernels/forward_dynamics.h"
 #include "kernels/inverse_dynamics.h"
 #include "kernels/mass_matrix_of_links.h"

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "algebra/trees/tree_values.h"
+#include "operators/many_columns.h"
 #include "operators/multibody_operators.h"
 #include "recursions/kinematics.h"
 #include "recursions/velocities.h"
@@ -14,7 +15,7 @@ template <class S>
 class RigidValues final : public TreeValues<RigidBlocks<S>> {
  public:
   explicit RigidValues(const MultibodyOperators& source)
-      : TreeValues<RigidBlocks<S>>(source.structure()), source_(source), model_(*source.model()), q_(model_.nq()), v_(model_.nv()) {}
+      : TreeValues<RigidBlocks<S>>(source.structure()), source_(source), model_(*source.model()), q_(model_.nq()), v_(model_.nv()), columns_(source.structure()) {}
 
   void block(const Symbol& symbol, int k, S* out) const override;
   void vector(const Symbol& symbol, S* out) const override;
@@ -22,6 +23,13 @@ class RigidValues final : public TreeValues<RigidBlocks<S>> {
   bool gathers_wider() const override { return true; }
   void gathered_residual(const S* x, const S* b, S* r, int m, S* scratch, std::vector<Wider<S>>& forces) const override {
     mass_matrix_residual_gathered(this->tree_, this->blocks_, compiled_->mass_properties, x, b, r, m, scratch, forces);
+  }
+
+  void mass_matrix_inverse(const S* x, S* y, int m, S* scratch) const override {
+    if constexpr (std::is_same_v<S, double>)
+      columns_.mass_matrix_inverse(this->blocks_, x, y, m, scratch);
+    else
+      mass_matrix_inverse_apply(this->tree_, this->blocks_, x, y, m, scratch);
   }
 
   std::unique_ptr<InverseTangent<S>> inverse_tangent() const override;
@@ -41,7 +49,10 @@ class RigidValues final : public TreeValues<RigidBlocks<S>> {
     for (size_t i = 0; i < q_.size(); ++i) q_[i] = S(q[i]);
     for (size_t i = 0; i < v_.size(); ++i) v_[i] = S(v[i]);
   }
-  void fill() override { kinematics(*compiled_, q_.data(), this->blocks_); }
+  void fill() override {
+    kinematics(*compiled_, q_.data(), this->blocks_);
+    if constexpr (std::is_same_v<S, double>) columns_.see(this->blocks_);
+  }
   void compute_velocities() override {
     velocities_base_to_tip(*compiled_, this->blocks_.pose.data(), this->blocks_.H.data(), v_.data(), velocities_);
     world_.resize(this->tree_.bodies());
@@ -61,6 +72,7 @@ class RigidValues final : public TreeValues<RigidBlocks<S>> {
   std::vector<S> q_, v_;
   Velocities<S> velocities_;
   std::vector<Pose<S>> world_;  // X_0k
+  ManyColumns columns_;
 };
 
 }  // namespace pycraft

@@ -323,7 +323,7 @@ class RigidBlocks {
   std::vector<Symmetric6<S>> P, Pplus, R, Y;
   std::vector<Vector6<S>> G;   // columns of G, one per coordinate
   std::vector<S> D, L;         // n_k x n_k per body: D(k) and L of its factors LdL*, d the pivots
-  size_t d_offset(int k) const { return d_[k]; }
+  const std::vector<size_t>& d_offsets() const { return d_; }  // where D(k) and L begin
 
  private:
   Symmetric6<S> error_left(int k) const;

@@ -48,7 +48,8 @@ CHANGES = {
             STATEMENT,
         ),
         ("a workspace keeps the number of its first state", "w_.state = b;", ";", STATEMENT),
-        ("what is out of range is returned", "in_range_ &= std::isfinite(result_.values[at]);", ";", STATEMENT),
+        ("what is out of range is returned in double", "in_range_ &= all_finite(y.data(), y.size());", ";", STATEMENT),
+        ("what is out of range is returned", "in_range_ &= std::isfinite(out_[at]);", ";", STATEMENT),
     ],
     "cpp/algebra/trees/mixed_blocks.h": [
         ("an edge from a rigid body to a group is rigid", "is_structured_[k] && is_structured_[tree_.parent[k]]", "is_structured_[k]"),

@@ -26,7 +26,7 @@ STANDS_ON = {
     "rigid": ["model", "algebra/trees"],
     "kernels": ["rigid"],
     "recursions": ["rigid"],
-    "operators": ["recursions", "algebra/planning"],
+    "operators": ["recursions", "kernels", "algebra/planning"],
     "dynamics": ["recursions", "kernels"],
     "simulation": ["dynamics"],
     "bindings": ["simulation", "operators", "algebra/engine"],

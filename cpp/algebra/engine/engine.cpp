@@ -11,6 +11,7 @@
 #include "algebra/engine/refined_solves.h"
 #include "algebra/engine/scalar_steps.h"
 #include "algebra/engine/vector_steps.h"
+#include "numerics/finite.h"
 #include "runtime/errors.h"
 
 namespace pycraft {
@@ -176,7 +177,10 @@ class Run {
       std::vector<S>& x = w_.vector(plan_.input);
       x.resize(size_t(n_in) * m);
       const double* given = inputs_.x ? inputs_.x + (inputs_.batched ? size_t(b) * n_in * m : 0) : nullptr;
-      for (size_t i = 0; i < x.size(); ++i) x[i] = given ? S(given[i]) : S(1);
+      if (given)
+        std::copy_n(given, x.size(), x.begin());
+      else
+        std::fill(x.begin(), x.end(), S(1));
     }
     w_.run(w_.values, m, fresh, counts_);
     if (states_ > 1) check_interrupt();
@@ -231,16 +235,25 @@ class Run {
   void shape(int rows, int columns) {
     result_.rows = rows;
     result_.columns = columns;
-    result_.values.resize(size_t(states_) * rows * columns);
-    if (expansions_) result_.expansions.resize(result_.values.size());
+    const size_t all = size_t(states_) * rows * columns;
+    if (!result_.into) result_.values.resize(all);
+    out_ = result_.into ? result_.into : result_.values.data();
+    if (expansions_) result_.expansions.resize(all);
   }
   void store(size_t at, const S& value) {
-    result_.values[at] = to_double(value);
-    in_range_ &= std::isfinite(result_.values[at]);
+    out_[at] = to_double(value);
+    in_range_ &= std::isfinite(out_[at]);
     if (expansions_) result_.expansions[at] = expansion(value);
   }
   void store_all(int b, const std::vector<S>& y, int rows, int columns) {
     if (b == 0) shape(rows, columns);
+    if constexpr (std::is_same_v<S, double>) {
+      if (!expansions_) {
+        std::copy(y.begin(), y.end(), out_ + size_t(b) * y.size());
+        in_range_ &= all_finite(y.data(), y.size());
+        return;
+      }
+    }
     for (size_t i = 0; i < y.size(); ++i) store(size_t(b) * y.size() + i, y[i]);
   }
 
@@ -249,6 +262,7 @@ class Run {
   const Inputs& inputs_;
   bool expansions_, in_range_ = true;
   Result& result_;
+  double* out_ = nullptr;
   int states_;
   PassCounts counts_;
 };

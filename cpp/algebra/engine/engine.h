@@ -19,6 +19,7 @@ struct Result {
   std::vector<double> values;                   // (batch,) rows, columns, row-major
   std::vector<std::vector<double>> expansions;  // per value, only if asked for
   int batch = -1, rows = 0, columns = 1;
+  double* into = nullptr;                       // where the values go instead, of a caller that knows how many there are
 };
 
 // Passes of the last run, by kind of step: what was executed, not what was planned.

@@ -46,12 +46,14 @@ class Workspace {
       const Register& reg = plan_->registers[r];
       if (reg.kind == RegisterKind::vector) vectors_[r].resize(size_t(reg.space.dimension()) * (reg.wide ? columns : 1));
     }
+    bool worked = false;
     for (const Step& s : plan_->steps) {
-      if (&s != plan_->steps.data()) check_interrupt();
       const bool per_column = s.out >= 0 && plan_->registers[s.out].kind == RegisterKind::vector;
       // a function of a vector, and what is made of it, may hang on a named vector
       if (!values_changed && !per_column && !functions_of_vectors_) continue;
+      if (worked) check_interrupt();
       step(s, values, columns, counts);
+      worked |= s.kind != StepKind::values;  // those are there before a run
     }
   }
 

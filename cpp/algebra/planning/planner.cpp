@@ -300,6 +300,18 @@ Plan Planner::plan_lowered(const Expression& e) {
   return std::move(plan_);
 }
 
+double Planner::lowered_flops(const Expression& e) {
+  plan_ = Plan{};
+  plan_.request = Request::apply;
+  more_digits_ = precision_of(e) > Precision::double_;
+  one_cut_ = cut_in_one_way(e);
+  plan_.domain = e.domain();
+  plan_.codomain = e.codomain();
+  apply_to_input(e);
+  finish();
+  return plan_.flops();
+}
+
 std::shared_ptr<const Plan> make_plan(const Expression& e, Request request, const PlanOptions& options) {
   std::shared_ptr<const Plan> made;
   with_stack_for(e.node().depth, [&] { made = std::make_shared<const Plan>(Planner(options).plan(e, request)); });

@@ -21,6 +21,8 @@ class Planner {
 
   // The request as a plan. Recurses as deep as the expression is nested (with_stack_for).
   Plan plan(const Expression& e, Request request);
+  // Of a lowered expression, applied as it stands.
+  double lowered_flops(const Expression& e);
 
  private:
   friend class RealizationBuilder;

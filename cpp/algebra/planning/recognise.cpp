@@ -59,9 +59,12 @@ std::vector<MassMatrixWithRotors> mass_matrices_with_rotors(const Expression& e)
 
 namespace {
 
-double plan_flops(const Expression& e, bool rules) {
-  return Planner({rules}).plan(e, Request::apply).flops();
-}
+// Of what is lowered, as it stands.
+double plan_flops(const Expression& e) { return Planner({false}).lowered_flops(e); }
+
+struct HashOfExpression {
+  size_t operator()(const Expression& e) const { return e.node().hash; }
+};
 
 // What is longer has no normal form that would be found in time, and no kernel of its own.
 constexpr size_t most_letters = 1000;
@@ -84,12 +87,11 @@ class Optimiser {
   explicit Optimiser(std::vector<std::string>& notes) : notes_(notes) {}
 
   Expression run(const Expression& e) {
-    const auto known = done_.find(e.get());
+    const auto known = done_.find(e);
     if (known != done_.end()) return known->second;
     check_interrupt();
     Expression better = compute(e);
-    done_.emplace(e.get(), better);
-    alive_.push_back(e);
+    done_.emplace(e, better);
     return better;
   }
 
@@ -200,7 +202,7 @@ class Optimiser {
       if (const Coefficient f = multiple(with_J); f != 0) return found(e, lower(f * (mass_matrix + o.J), false));
     }
     const Expression normal = lower(to_expression(*form, alphabet, e.domain(), e.codomain()), false);
-    if (normal == e || plan_flops(normal, false) >= plan_flops(e, false)) return e;
+    if (normal == e || plan_flops(normal) >= plan_flops(e)) return e;
     return found(e, normal);
   }
 
@@ -211,8 +213,7 @@ class Optimiser {
   }
 
   std::vector<std::string>& notes_;
-  std::unordered_map<const Expression::Node*, Expression> done_;
-  std::vector<Expression> alive_;
+  std::unordered_map<Expression, Expression, HashOfExpression> done_;  // a part that occurs again is another node as often as not
 };
 
 }  // namespace
