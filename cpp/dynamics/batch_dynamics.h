@@ -36,8 +36,23 @@ class BatchDynamics : public Batches<RigidDynamics> {
   void pose(const Node& node, const Given& q, double* out);                                               // X_WN, (4, 4) a state
   void energy(const Given& q, const Given& v, const Vector3<double>& datum, double* out);                 // kinetic, potential
 
- private:
+  // Three results by kernels, `size` numbers a state each; false where kernels are not there for this model or precision, again(from, to) for
+  // states in doubt. What is given was checked, and the model is in use.
+  template <class Again>
+  bool by_links(Precision precision, kernels::Call call, const Given& q, const Given& v, const Given& u, int states, size_t size, const std::array<double*, 3>& out, Again again) {
+    bool done = false;
+    const auto run = [&]<class S>(S) {
+      std::get<WorkspacePool<LinkDynamics<S>>>(links_).with(model(), [&](LinkDynamics<S>& w) {
+        done = w.there();
+        if (done) w.run(call, q, &v, &u, states, static_cast<int>(size), out[0], nullptr, again, &out[1]);
+      });
+    };
+    if (precision == Precision::double_) run(double());
+    if (precision == Precision::single) run(Single());
+    return done;
+  }
 
+ private:
   // The values of unrefined calls, which refinement starts from, so that its corrections are their errors.
   struct Starts {
     std::vector<double> values;

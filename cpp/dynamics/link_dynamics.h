@@ -26,9 +26,10 @@ class LinkDynamics {
   // Whether the model is one that kernels know.
   bool there() const { return model_ != nullptr; }
 
-  // The call at `count` states, `size` numbers a state to out + b size; again(from, to) is called for runs of states in doubt. v and u may be null.
+  // The call at `count` states, `size` numbers a state to out + b size, and to the two others of a call that has
+  // three results; again(from, to) is called for runs of states in doubt. v and u may be null.
   template <class Again>
-  void run(kernels::Call call, const Given& q, const Given* v, const Given* u, int count, int size, double* out, const Applied<double>* applied, Again again) {
+  void run(kernels::Call call, const Given& q, const Given* v, const Given* u, int count, int size, double* out, const Applied<double>* applied, Again again, double* const* others = nullptr) {
     T gravity[3];
     const T* wrenches = nullptr;
     std::copy_n(gravity_, 3, gravity);
@@ -36,14 +37,16 @@ class LinkDynamics {
       for (int i = 0; i < 3; ++i) gravity[i] = static_cast<T>(applied->gravity[i]);
       if (applied->wrenches) wrenches = carried(*applied);
     }
-    const bool matrix = call == kernels::Call::mass_matrix || call == kernels::Call::mass_matrix_inverse;  // kernels look through those themselves
+    const bool matrix = call != kernels::Call::forward_dynamics && call != kernels::Call::inverse_dynamics;  // kernels look through those themselves
     const auto stride = [](const Given& g) { return g.batch < 0 ? size_t(0) : size_t(g.width); };
     int doubted = 0;  // how many states before b are in doubt
     for (int b = 0; b < count;) {
       const kernels::Kernels<T>& kernel = chosen(count - b, matrix);
       const kernels::Kernel<T>& how = kernel[call];
       const int lanes = std::min(kernel.lanes, count - b);
-      const kernels::States<T> states{q.at(b), v ? v->at(b) : nullptr, u ? u->at(b) : nullptr, stride(q), v ? stride(*v) : 0, u ? stride(*u) : 0, lanes, gravity, wrenches, check_interrupt};
+      double* of_these[2] = {};
+      for (int i = 0; others && i < 2; ++i) of_these[i] = others[i] + size_t(b) * size;
+      const kernels::States<T> states{q.at(b), v ? v->at(b) : nullptr, u ? u->at(b) : nullptr, stride(q), v ? stride(*v) : 0, u ? stride(*u) : 0, lanes, gravity, wrenches, check_interrupt, of_these};
       const unsigned sound = how.run(model_->links(), states, out + size_t(b) * size, size, work(how.work(model_->links())));
       for (const int end = b + lanes, first = b; b < end; ++b) {
         const bool sure = (sound >> (b - first) & 1) && (matrix || all_finite(out + size_t(b) * size, size));

@@ -50,6 +50,7 @@ struct States {
   const T* gravity;   // three numbers
   const T* wrenches;  // (n; f) on every link in its frame about its origin, at all states; null: none
   void (*interrupt)();  // asked in long loops; it throws to stop them
+  double* const* others = nullptr;  // where further results of a call go, as the first
 };
 
 // What a call is: `run` writes the results to out + b out_stride, in `work`, aligned to 64 bytes and of as many numbers as the other function
@@ -60,12 +61,12 @@ struct Kernel {
   size_t (*work)(const Links<T>& links);
 };
 
-enum class Call { forward_dynamics, inverse_dynamics, mass_matrix, mass_matrix_inverse };
+enum class Call { forward_dynamics, inverse_dynamics, mass_matrix, mass_matrix_inverse, inverse_dynamics_derivatives, forward_dynamics_derivatives };
 
 template <class T>
 struct Kernels {
   int lanes;           // states at once
-  Kernel<T> calls[4];
+  Kernel<T> calls[6];
   const Kernel<T>& operator[](Call call) const { return calls[static_cast<int>(call)]; }
 };
 

@@ -47,9 +47,7 @@ class SensitivityCalls(DirectCalls):
         """∂T/∂q, ∂T/∂v and ∂T/∂v̇ = ℳ + J of T = inverse_dynamics(q, v, v̇), gravity included. Cost O(N · depth)."""
         q, v = at_state(self, q, v)
         vdot = np.zeros(self.nv) if vdot is None else vdot
-        dq, dv = self._sensitivities().inverse_dynamics(q, v, vdot, precision)
-        mass = self.mass_matrix(q, precision=precision)
-        return DynamicsDerivatives(dq, dv, mass if mass.shape == dq.shape else np.broadcast_to(mass, dq.shape).copy())
+        return DynamicsDerivatives(*self._sensitivities().inverse_dynamics(q, v, vdot, precision))
 
     @over_threads
     def forward_dynamics_derivatives(
