@@ -21,13 +21,22 @@ template <class S>
 struct ResponseColumns {
   static constexpr int rows = 18;
   Rows3<S> qn, qf, vn, vf, mn, mf;
-  ResponseColumns(S* base, size_t stride, int first)
-      : qn(base, stride, first), qf(base + 3 * stride, stride, first), vn(base + 6 * stride, stride, first), vf(base + 9 * stride, stride, first),
-        mn(base + 12 * stride, stride, first), mf(base + 15 * stride, stride, first) {}
+  ResponseColumns(S* base, size_t stride)
+      : qn(base, stride), qf(base + 3 * stride, stride), vn(base + 6 * stride, stride), vf(base + 9 * stride, stride), mn(base + 12 * stride, stride), mf(base + 15 * stride, stride) {}
+};
+// What coordinates add at their own links: b and y of ∂q and of ∂v.
+template <class S>
+struct OwnColumns {
+  static constexpr int rows = 18;
+  Rows3<S> qb, vb, qa, ql, va, vl;
+  OwnColumns(S* base, size_t stride)
+      : qb(base, stride), vb(base + 3 * stride, stride), qa(base + 6 * stride, stride), ql(base + 9 * stride, stride), va(base + 12 * stride, stride), vl(base + 15 * stride, stride) {}
 };
 template <class S>
 struct ResponseRows {
   S *q, *v, *m;
+  int stride, room;  // room: how far a row may be written to
+  ResponseRows of(int i) const { return {q + size_t(i) * stride, v + size_t(i) * stride, m + size_t(i) * stride, stride, room}; }
 };
 
 // A link as columns pass it: its coordinates, and what of K and P passes inward.
@@ -39,33 +48,35 @@ struct ArticulatedRate {
 
 template <class S>
 struct ForwardDerivativeWork {
+  S *z, *own, *alpha, *rows, *nu;  // nu: ν of coordinates at their own links, six of each kind a coordinate
   ForwardWork<S> forward;
   Inertia<S>* outboard;  // P⁺
   Instant<S>* instant;
   Carrying<S>* carried;
   ArticulatedRate<S>* rate;
-  S *z, *b, *alpha, *rows;
+  Direction<S>* direction;
   double* accelerations;
-  static constexpr bool in_place = S::width == 1 && sizeof(typename S::Scalar) == sizeof(double);
   template <class T>
-  static size_t size(const Links<T>& links) {
-    const size_t row = row_of<S>(links.nv), own = ForwardWork<S>::size(links) + 63 & ~size_t(63);
-    return own + links.count * (sizeof(Inertia<S>) + sizeof(Instant<S>) + sizeof(Carrying<S>) + sizeof(ArticulatedRate<S>)) +
-           (row * (ResponseColumns<S>::rows * (1 + links.slots) + 6) + (in_place ? 0 : size_t(3) * links.nv * links.nv)) * sizeof(S) +
-           size_t(links.nv) * S::width * sizeof(double);
+  static size_t columns(const Links<T>& links) {
+    const size_t row = row_of(links.nv);
+    return row * (ResponseColumns<S>::rows * (1 + links.slots) + OwnColumns<S>::rows + (in_place<S>(links.nv) ? 0 : size_t(3) * links.nv)) + size_t(18) * links.nv;
   }
   template <class T>
-  ForwardDerivativeWork(const Links<T>& links, T* work) : forward(links, work) {
-    const size_t row = row_of<S>(links.nv), own = ForwardWork<S>::size(links) + 63 & ~size_t(63);
-    outboard = reinterpret_cast<Inertia<S>*>(reinterpret_cast<char*>(work) + own);
+  static size_t size(const Links<T>& links) {
+    return columns(links) * sizeof(S) + ForwardWork<S>::size(links) + links.nv * (sizeof(Direction<S>) + S::width * sizeof(double)) +
+           links.count * (sizeof(Inertia<S>) + sizeof(Instant<S>) + sizeof(Carrying<S>) + sizeof(ArticulatedRate<S>));
+  }
+  template <class T>
+  ForwardDerivativeWork(const Links<T>& links, T* work) : z(reinterpret_cast<S*>(work)), forward(links, reinterpret_cast<T*>(z + columns(links))) {
+    const size_t row = row_of(links.nv);
+    own = z + row * ResponseColumns<S>::rows, alpha = own + row * OwnColumns<S>::rows, nu = alpha + row * ResponseColumns<S>::rows * links.slots;
+    rows = nu + size_t(18) * links.nv;
+    outboard = reinterpret_cast<Inertia<S>*>(reinterpret_cast<char*>(z + columns(links)) + ForwardWork<S>::size(links));
     instant = reinterpret_cast<Instant<S>*>(outboard + links.count);
     carried = reinterpret_cast<Carrying<S>*>(instant + links.count);
     rate = reinterpret_cast<ArticulatedRate<S>*>(carried + links.count);
-    z = reinterpret_cast<S*>(rate + links.count);
-    b = z + row * ResponseColumns<S>::rows;
-    alpha = b + row * 6;
-    rows = alpha + row * ResponseColumns<S>::rows * links.slots;
-    accelerations = reinterpret_cast<double*>(rows + (in_place ? 0 : size_t(3) * links.nv * links.nv));
+    direction = reinterpret_cast<Direction<S>*>(rate + links.count);
+    accelerations = reinterpret_cast<double*>(direction + links.nv);
   }
 };
 
@@ -130,81 +141,33 @@ template <class Kind, class S>
   }
 }
 
-// The columns of coordinates outboard of a link: ν, and z about the parent's origin.
-template <class Kind, class S>
-[[gnu::always_inline]] inline void respond(const LinkOf<S>& link, const ForwardLink<S>& w, const ForwardMultiple<S>& multiple, const Matrix3<S>& frame, const Vector3<S>& arm, const Direction<S>& own,
-                                           const ResponseColumns<S>& z, const ResponseRows<S>& to, int N) {
-  using V = Vector3<Block<S>>;
-  const int count = link.end - link.v;
-  const V l = in_all(arm);
-  if constexpr (Kind::nv == 1) {
-    const OneGain<S> hinge(link, w, frame);
-    const V s = in_all(own.s), slide = in_all(own.x), turn = in_all(hinge.gain.angular), pull = in_all(hinge.gain.linear);
-    const Block<S> inverse = in_all(hinge.inverse);
-    each_block<S>(1, count, [&](int c, int there, const Block<S>& its) {
-      const V by = its * l;
-      const auto pass = [&](const Rows3<S>& ns, const Rows3<S>& fs, S* row) {
-        V n = ns.at(c), f = fs.at(c);
-        Block<S> e = -dot(s, n);
-        if constexpr (!Kind::pin) e -= dot(slide, f);
-        put_first(e * inverse, row + c, there);
-        e *= its;
-        f = f + e * pull;
-        n = n + e * turn + cross(by, f);
-        ns.put(c, n), fs.put(c, f);
-      };
-      pass(z.qn, z.qf, to.q), pass(z.vn, z.vf, to.v), pass(z.mn, z.mf, to.m);
-    });
-  } else {
-    const Matrix3<Block<S>> axes = in_all(frame), gain = in_all(multiple.gain);
-    each_block<S>(Kind::nv, count, [&](int c, int there, const Block<S>& its) {
-      const auto pass = [&](const Rows3<S>& ns, const Rows3<S>& fs, S* row) {
-        const V n = ns.at(c), f = fs.at(c), turn = transpose_times(axes, n), along = transpose_times(axes, f);
-        Block<S> e[6] = {-turn[0], -turn[1], -turn[2], -along[0], -along[1], -along[2]};
-        const V left = Kind::nv == 3 ? axes * (along - transpose_times(gain, turn)) : V::zero(), moved = cross(l, left);
-        if constexpr (Kind::nv == 3)
-          solve_columns(multiple.ball, e);
-        else
-          solve_columns(multiple.free, e);
-        for (int i = 0; i < Kind::nv; ++i) put_first(e[i], row + size_t(i) * N + c, there);
-        if (there == BlockOf<S>::columns) {
-          ns.put(c, moved), fs.put(c, left);
-        } else {
-          for (int r = 0; r < 3; ++r) put_first(moved[r], ns.row[r] + c, there), put_first(left[r], fs.row[r] + c, there);
-        }
-      };
-      pass(z.qn, z.qf, to.q), pass(z.vn, z.vf, to.v), pass(z.mn, z.mf, to.m);
-    });
-  }
-}
-
 // The columns of a link's own coordinates: ν, and their z about the parent's origin. K: K⁺ about that point; P: P⁺, null at a root.
 template <class Kind, class S>
 [[gnu::always_inline]] inline void start(const LinkOf<S>& link, const ForwardLink<S>& w, const ForwardMultiple<S>& multiple, const Instant<S>& instant, const Carrying<S>& carried,
-                                         const Direction<S> (&own)[Kind::nv], const ArticulatedRate<S>& K, const Inertia<S>* P, const ResponseColumns<S>& z, const ResponseRows<S>& to, int N) {
+                                         const Direction<S>* own, const ArticulatedRate<S>& K, const Inertia<S>* P, const ResponseColumns<S>& z, S* nu) {
   const Vector3<S>& l = instant.lying.arm;
   const Matrix3<S>& axes = instant.lying.axes;
-  for (int c = 0; c < Kind::nv; ++c) {
-    const Direction<S>& k = own[c];
+  for (int i = 0; i < Kind::nv; ++i, nu += 18) {
+    const Direction<S>& k = own[i];
+    const int c = link.v + i;
     S e[6] = {S(0), S(0), S(0), S(0), S(0), S(0)};
-    e[c] = S(1);
+    e[i] = S(1);
     Spatial<S> m;  // of a unit force along the coordinate
     if constexpr (Kind::nv == 1) {
       const OneGain<S> hinge(link, w, axes);
       m = hinge.gain, e[0] = hinge.inverse;
     } else {
       m = {axes * Vector3<S>{e[0], e[1], e[2]}, axes * Vector3<S>{e[3], e[4], e[5]}};
-      if constexpr (Kind::nv == 3) m.linear = axes * Vector3<S>{multiple.gain(c, 0), multiple.gain(c, 1), multiple.gain(c, 2)};
+      if constexpr (Kind::nv == 3) m.linear = axes * Vector3<S>{multiple.gain(i, 0), multiple.gain(i, 1), multiple.gain(i, 2)};
       if constexpr (Kind::nv == 3)
         multiple.ball.solve(e);
       else
         multiple.free.solve(e);
     }
-    for (int i = 0; i < Kind::nv; ++i) {
-      const Matrix3<S>& kappa = K.kappa[i / 3];
-      const Vector3<S> row{kappa(i % 3, 0), kappa(i % 3, 1), kappa(i % 3, 2)};
-      const size_t at = size_t(i) * N + c;
-      to.q[at] = -dot(row, k.psi), to.v[at] = -dot(row, k.s), to.m[at] = e[i];
+    for (int j = 0; j < Kind::nv; ++j) {
+      const Matrix3<S>& kappa = K.kappa[j / 3];
+      const Vector3<S> row{kappa(j % 3, 0), kappa(j % 3, 1), kappa(j % 3, 2)};
+      nu[j] = -dot(row, k.psi), nu[6 + j] = -dot(row, k.s), nu[12 + j] = e[j];
     }
     if (!P) continue;
     const auto pushed = [&](const Vector3<S>& b, const Spatial<S>& y) {
@@ -216,127 +179,183 @@ template <class Kind, class S>
   }
 }
 
-// Tip to base at a link.
-template <class Kind, class S, class T>
-[[gnu::always_inline]] inline void respond_at(const Links<T>& links, int at_link, const States<T>& at, const ForwardDerivativeWork<S>& w, const ResponseRows<S>& rows) {
-  const Link<T>& link = links.link[at_link];
-  const int N = links.nv;
-  const Instant<S>& instant = w.instant[at_link];
-  const Instant<S>* const above = link.parent < 0 ? nullptr : &w.instant[link.parent];
-  const ForwardLink<S>& own = w.forward.link[at_link];
-  const ForwardMultiple<S>& multiple = *w.forward.of(link);
-  const ResponseColumns<S> z(w.z, row_of<S>(N), link.v);
-  const size_t first = size_t(link.v) * N + link.v;
-  const ResponseRows<S> to{rows.q + first, rows.v + first, rows.m + first};
-  const Vector3<S> l = above ? instant.lying.arm : Vector3<S>::zero();
-  Direction<S> directions[Kind::nv];
-  for (int i = 0; i < Kind::nv; ++i) directions[i] = direction<Kind>(link, at, above, instant, i);
-  ArticulatedRate<S>& K = w.rate[at_link];
-  project_rate<Kind>(link, own, multiple, instant.lying.axes, directions[0], K);
-  respond<Kind>(link, own, multiple, instant.lying.axes, l, directions[0], z, to, N);
-  for (int i = 0; i < Kind::nv; ++i)
-    for (int c = link.end - link.v; c < N - link.v; ++c) to.q[size_t(i) * N + c] = to.v[size_t(i) * N + c] = to.m[size_t(i) * N + c] = S(0);
-  Inertia<S>* const P = above ? &w.outboard[at_link] : nullptr;
-  if (above) {
-    Full<S>{above->lying.axes}.template turn<-1>(*P);
-    for (int j = 0; j < 3; ++j) add_column(K.n, j, cross(l, column(K.f, j)));
-  }
-  start<Kind>(link, own, multiple, instant, w.carried[at_link], directions, K, P, z, to, N);
-  if (!above) return;
-  ArticulatedRate<S>& parent = w.rate[link.parent];
-  const Vector3<S> d = S(-2) * instant.drift;
-  for (int j = 0; j < 3; ++j) {
-    Vector3<S> unit = Vector3<S>::zero();
-    unit[j] = S(1);
-    const Vector3<S> left = cross(d, unit);
-    add_column(parent.n, j, column(K.n, j) + P->B * left), add_column(parent.f, j, column(K.f, j) + P->C * left);
-  }
-  Carrying<S>& carries = w.carried[link.parent];
-  carries.torque = carries.torque + w.carried[at_link].torque + cross(l, w.carried[at_link].force), carries.force = carries.force + w.carried[at_link].force;
-}
-
-template <class S>
-[[gnu::always_inline]] inline Block<S> first_of(const S* x, int count) {
-  if (count == BlockOf<S>::columns) return block_at(x);
-  Block<S> y(typename S::Scalar(0));
-  if constexpr (BlockOf<S>::columns > 1)
-    for (int b = 0; b < count; ++b) y.set(b, x[b].v);
-  return y;
-}
-
-// Base to tip at a link, columns from `first` to `last`; inboard: those of coordinates inboard of the link, whose ν is made here.
-template <class Kind, bool inboard, class S>
-[[gnu::always_inline]] inline void finish_columns(const LinkOf<S>& link, const ForwardLink<S>& w, const ForwardMultiple<S>& multiple, const Instant<S>& instant, const Direction<S>& own,
-                                                  const ArticulatedRate<S>& K, S* b, size_t stride, const ResponseColumns<S>& alpha, const ResponseRows<S>& rows, int first, int last, int N) {
-  using V = Vector3<Block<S>>;
-  const V l = in_all(link.parent < 0 ? Vector3<S>::zero() : instant.lying.arm), d = in_all(S(2) * instant.drift);
-  const Rows3<S> bq(b, stride, 0), bv(b + 3 * stride, stride, 0);
-  const Matrix3<Block<S>> axes = in_all(instant.lying.axes), gains = in_all(multiple.gain), above = in_all(K.kappa[0]), below = in_all(K.kappa[1]);
-  const OneGain<S> hinge(link, w, instant.lying.axes);
-  const V s = in_all(own.s), slide = in_all(own.x), turn = in_all(hinge.gain.angular), pull = in_all(hinge.gain.linear);
-  each_block<S>(first, last, [&](int c, int there, const Block<S>&) {
-    const auto pass = [&](const Rows3<S>& angulars, const Rows3<S>& linears, const Rows3<S>& bs, S* row) {
-      V angular = angulars.at(c), linear = linears.at(c), of = V::zero();
-      linear = linear + cross(angular, l);
-      if constexpr (inboard) of = bs.at(c), linear = linear + cross(of, d);
-      if constexpr (Kind::nv == 1) {
-        Block<S> x = inboard ? -dot(V{above(0, 0), above(0, 1), above(0, 2)}, of) : first_of(row + c, there);
-        x = x - dot(turn, angular) - dot(pull, linear);
-        put_first(x, row + c, there);
-        angular = angular + x * s;
-        if constexpr (!Kind::pin) linear = linear + x * slide;
-      } else {
-        linear = transpose_times(axes, linear), angular = transpose_times(axes, angular);
-        V whole, moved;
-        if constexpr (inboard)
-          whole = V::zero() - above * of;
-        else
-          for (int i = 0; i < 3; ++i) whole[i] = first_of(row + size_t(i) * N + c, there);
-        if constexpr (Kind::nv == 3) whole = whole - gains * linear;
-        for (int i = 0; i < 3; ++i) put_first(whole[i] - angular[i], row + size_t(i) * N + c, there);
-        if constexpr (Kind::nv == 6) {
-          if constexpr (inboard)
-            moved = V::zero() - below * of;
-          else
-            for (int i = 0; i < 3; ++i) moved[i] = first_of(row + size_t(3 + i) * N + c, there);
-          for (int i = 0; i < 3; ++i) put_first(moved[i] - linear[i], row + size_t(3 + i) * N + c, there);
-          linear = moved;
-        }
-        angular = axes * whole, linear = axes * linear;
+// Tip to base: K, and what columns start from.
+template <class S, class T>
+inline void start_all(const Links<T>& links, const States<T>& at, const ForwardDerivativeWork<S>& w) {
+  const size_t stride = row_of(links.nv);
+  const ResponseColumns<S> z(w.z, stride);
+  const OwnColumns<S> adds(w.own, stride);
+  for (int k = links.count - 1; k >= 0; --k) {
+    stay_open(at, k);
+    const Link<T>& link = links.link[k];
+    const Instant<S>& instant = w.instant[k];
+    const Instant<S>* const above = link.parent < 0 ? nullptr : &w.instant[link.parent];
+    const Vector3<S> l = instant.lying.arm, d = S(-2) * instant.drift;
+    ArticulatedRate<S>& K = w.rate[k];
+    Inertia<S>* const P = above ? &w.outboard[k] : nullptr;
+    if (above) Full<S>{above->lying.axes}.template turn<-1>(*P);
+    with_step(link.step, [&](auto kind) {
+      using Kind = decltype(kind);
+      Direction<S>* const own = w.direction + link.v;
+      for (int i = 0; i < Kind::nv; ++i) {
+        const Direction<S> along = own[i] = direction<Kind>(link, at, above, instant, i);
+        const int c = link.v + i;
+        adds.qb.set(c, along.psi), adds.vb.set(c, along.s), adds.qa.set(c, along.psi_rate.angular), adds.ql.set(c, along.psi_rate.linear);
+        adds.va.set(c, along.chi.angular), adds.vl.set(c, along.chi.linear);
       }
-      for (int r = 0; r < 3; ++r) put_first(angular[r], angulars.row[r] + c, there), put_first(linear[r], linears.row[r] + c, there);
+      project_rate<Kind>(link, w.forward.link[k], *w.forward.of(link), instant.lying.axes, own[0], K);
+      for (int j = 0; above && j < 3; ++j) add_column(K.n, j, cross(l, column(K.f, j)));
+      start<Kind>(link, w.forward.link[k], *w.forward.of(link), instant, w.carried[k], own, K, P, z, w.nu + size_t(18) * link.v);
+    });
+    if (!above) continue;
+    ArticulatedRate<S>& parent = w.rate[link.parent];
+    for (int j = 0; j < 3; ++j) {
+      Vector3<S> unit = Vector3<S>::zero();
+      unit[j] = S(1);
+      const Vector3<S> left = cross(d, unit);
+      add_column(parent.n, j, column(K.n, j) + P->B * left), add_column(parent.f, j, column(K.f, j) + P->C * left);
+    }
+    Carrying<S>&carries = w.carried[link.parent], &own = w.carried[k];
+    carries.torque = carries.torque + own.torque + cross(l, own.force), carries.force = carries.force + own.force;
+  }
+}
+
+// The columns of coordinates outboard of a link: ν, and z about the parent's origin.
+template <class Kind, class S>
+[[gnu::always_inline]] inline void respond(const LinkOf<S>& link, const ForwardLink<S>& w, const ForwardMultiple<S>& multiple, const Lying<S>& lying, const Direction<S>& own,
+                                           const ResponseColumns<S>& z, const ResponseRows<S>& rows) {
+  using V = Vector3<Block<S>>;
+  const V l = in_all(link.parent < 0 ? Vector3<S>::zero() : lying.arm), s = in_all(own.s), slide = in_all(own.x);
+  const OneGain<S> hinge(link, w, lying.axes);
+  const V turn = in_all(hinge.gain.angular), pull = in_all(hinge.gain.linear);
+  const Block<S> inverse = in_all(hinge.inverse);
+  const Matrix3<Block<S>> axes = in_all(lying.axes), gain = in_all(multiple.gain);
+  const ResponseRows<S> to = rows.of(link.v);
+  each_block<S>(link.v + Kind::nv, link.end, [&](int c, const Block<S>& its) __attribute__((always_inline)) {
+    const auto pass = [&](const Rows3<S>& ns, const Rows3<S>& fs, S* row) __attribute__((always_inline)) {
+      V n = ns.at(c), f = fs.at(c);
+      if constexpr (Kind::nv == 1) {
+        Block<S> e = -dot(s, n);
+        if constexpr (!Kind::pin) e -= dot(slide, f);
+        put_first(e * inverse, row + c, to.room - c);
+        e = e * its;
+        f = f + e * pull;
+        n = n + e * turn + cross(its * l, f);
+      } else {
+        const V about = transpose_times(axes, n), along = transpose_times(axes, f);
+        Block<S> e[6] = {-about[0], -about[1], -about[2], -along[0], -along[1], -along[2]};
+        const V left = Kind::nv == 3 ? axes * (along - transpose_times(gain, about)) : V::zero(), moved = cross(l, left);
+        if constexpr (Kind::nv == 3)
+          solve_columns(multiple.ball, e);
+        else
+          solve_columns(multiple.free, e);
+        for (int i = 0; i < Kind::nv; ++i) put_first(e[i], row + size_t(i) * to.stride + c, to.room - c);
+        const auto asked = greater(its, Block<S>(typename S::Scalar(0)));
+        for (int r = 0; r < 3; ++r) n[r] = Block<S>::choose(asked, moved[r], n[r]), f[r] = Block<S>::choose(asked, left[r], f[r]);
+      }
+      ns.put(c, n), fs.put(c, f);
     };
-    pass(alpha.qn, alpha.qf, bq, rows.q), pass(alpha.vn, alpha.vf, bv, rows.v);
-    if constexpr (!inboard) pass(alpha.mn, alpha.mf, bq, rows.m);
+    pass(z.qn, z.qf, to.q), pass(z.vn, z.vf, to.v), pass(z.mn, z.mf, to.m);
   });
 }
+// What else is in those rows: ν of the link's own coordinates, and nothing elsewhere.
+template <class S>
+inline void respond_else(const LinkOf<S>& link, int nv, const S* nu, const ResponseRows<S>& rows, int N) {
+  for (int i = 0; i < nv; ++i) {
+    const ResponseRows<S> to = rows.of(link.v + i);
+    for (int c = link.v - link.v % BlockOf<S>::columns; c < link.v; ++c) to.q[c] = to.v[c] = to.m[c] = S(0);
+    for (int c = 0; c < nv; ++c) to.q[link.v + c] = nu[18 * c + i], to.v[link.v + c] = nu[18 * c + 6 + i], to.m[link.v + c] = nu[18 * c + 12 + i];
+    for (int c = link.end; c < N; ++c) to.q[c] = to.v[c] = to.m[c] = S(0);
+  }
+}
+
+// Where columns stand to a link: of coordinates inboard of it, in a block with its own, or none of either.
+enum class Standing { inboard, own, else_where };
+
+// Base to tip at a link, of one block: rows of results, and α of the link from its parent's.
+template <class Kind, class S>
+struct Finisher {
+  using B = Block<S>;
+  using V = Vector3<B>;
+  V l, d, s, slide, turn, pull;
+  Matrix3<B> axes, gain, above, below;
+  int stride, room;
+
+  Finisher(const LinkOf<S>& link, const ForwardLink<S>& w, const ForwardMultiple<S>& multiple, const Instant<S>& instant, const Direction<S>& own, const ArticulatedRate<S>& K, const ResponseRows<S>& rows)
+      : l(in_all(link.parent < 0 ? Vector3<S>::zero() : instant.lying.arm)), d(in_all(S(2) * instant.drift)), s(in_all(own.s)), slide(in_all(own.x)), axes(in_all(instant.lying.axes)),
+        gain(in_all(multiple.gain)), above(in_all(K.kappa[0])), below(in_all(K.kappa[1])), stride(rows.stride), room(rows.room) {
+    const OneGain<S> hinge(link, w, instant.lying.axes);
+    turn = in_all(hinge.gain.angular), pull = in_all(hinge.gain.linear);
+  }
+
+  // b: of inboard coordinates, else zero; y: of its own.
+  template <Standing where>
+  [[gnu::always_inline]] void pass(int c, const Rows3<S>& angulars, const Rows3<S>& linears, const V& b, const V& y_angular, const V& y_linear, S* row, B& odd) const {
+    V angular = angulars.at(c), linear = linears.at(c);
+    linear = linear + cross(angular, l);
+    if constexpr (where != Standing::else_where) linear = linear + cross(b, d);
+    if constexpr (where == Standing::own) linear = linear + y_linear, angular = angular + y_angular;
+    if constexpr (Kind::nv == 1) {
+      B x = where == Standing::inboard ? B(typename S::Scalar(0)) : first_of(row + c, room - c);
+      if constexpr (where != Standing::else_where) x -= dot(V{above(0, 0), above(0, 1), above(0, 2)}, b);
+      x = x - dot(turn, angular) - dot(pull, linear);
+      odd += x - x;
+      put_first(x, row + c, room - c);
+      angular = angular + x * s;
+      if constexpr (!Kind::pin) linear = linear + x * slide;
+    } else {
+      linear = transpose_times(axes, linear), angular = transpose_times(axes, angular);
+      V whole = V::zero(), moved = V::zero();
+      for (int i = 0; where != Standing::inboard && i < 3; ++i) {
+        whole[i] = first_of(row + size_t(i) * stride + c, room - c);
+        if constexpr (Kind::nv == 6) moved[i] = first_of(row + size_t(3 + i) * stride + c, room - c);
+      }
+      if constexpr (where != Standing::else_where) whole = whole - above * b, moved = moved - below * b;
+      if constexpr (Kind::nv == 3) whole = whole - gain * linear;
+      for (int i = 0; i < 3; ++i) {
+        const B x = whole[i] - angular[i];
+        odd += x - x;
+        put_first(x, row + size_t(i) * stride + c, room - c);
+        if constexpr (Kind::nv == 6) {
+          const B along = moved[i] - linear[i];
+          odd += along - along;
+          put_first(along, row + size_t(3 + i) * stride + c, room - c);
+          linear[i] = moved[i];
+        }
+      }
+      angular = axes * whole, linear = axes * linear;
+    }
+    angulars.put(c, angular), linears.put(c, linear);
+  }
+};
 
 template <class Kind, class S, class T>
-[[gnu::always_inline]] inline void finish_at(const Links<T>& links, int at_link, const States<T>& at, const ForwardDerivativeWork<S>& w, const ResponseRows<S>& rows) {
+[[gnu::always_inline]] inline void finish_at(const Links<T>& links, int at_link, const ForwardDerivativeWork<S>& w, const ResponseRows<S>& rows, Block<S>& odd) {
+  using V = Vector3<Block<S>>;
+  constexpr int n = BlockOf<S>::columns;
   const Link<T>& link = links.link[at_link];
-  const int N = links.nv;
-  const size_t stride = row_of<S>(N);
-  const Instant<S>& instant = w.instant[at_link];
-  const Instant<S>* const above = link.parent < 0 ? nullptr : &w.instant[link.parent];
-  const ResponseColumns<S> alpha(w.alpha + stride * ResponseColumns<S>::rows * link.slot, stride, 0);
-  const Rows3<S> bq(w.b, stride, 0), bv(w.b + 3 * stride, stride, 0);
-  const size_t first = size_t(link.v) * N;
-  const ResponseRows<S> to{rows.q + first, rows.v + first, rows.m + first};
-  Direction<S> own[Kind::nv];
-  for (int i = 0; i < Kind::nv; ++i) {
-    own[i] = direction<Kind>(link, at, above, instant, i);
-    const int c = link.v + i;
-    const auto raise = [&](const Rows3<S>& angular, const Rows3<S>& linear, const Spatial<S>& y) {
-      angular.set(c, angular.get(c) + y.angular);
-      linear.set(c, linear.get(c) + y.linear + (above ? cross(instant.lying.arm, y.angular) : Vector3<S>::zero()));
-    };
-    raise(alpha.qn, alpha.qf, own[i].psi_rate), raise(alpha.vn, alpha.vf, own[i].chi);
-    bq.set(c, own[i].psi), bv.set(c, own[i].s);
+  const int N = links.nv, own_end = link.v + Kind::nv, before = link.v - link.v % n, after = (own_end + n - 1) / n * n;
+  const size_t stride = row_of(N);
+  const ResponseColumns<S> alpha(w.alpha + stride * ResponseColumns<S>::rows * link.slot, stride);
+  const OwnColumns<S> adds(w.own, stride);
+  const ResponseRows<S> to = rows.of(link.v);
+  const Finisher<Kind, S> at(link, w.forward.link[at_link], *w.forward.of(link), w.instant[at_link], w.direction[link.v], w.rate[at_link], to);
+  const V none = V::zero();
+  for (int c = 0; c < before; c += n) {
+    at.template pass<Standing::inboard>(c, alpha.qn, alpha.qf, adds.qb.at(c), none, none, to.q, odd);
+    at.template pass<Standing::inboard>(c, alpha.vn, alpha.vf, adds.vb.at(c), none, none, to.v, odd);
   }
-  const ForwardLink<S>& hinge = w.forward.link[at_link];
-  const ForwardMultiple<S>& multiple = *w.forward.of(link);
-  finish_columns<Kind, true>(link, hinge, multiple, instant, own[0], w.rate[at_link], w.b, stride, alpha, to, 0, link.v, N);
-  finish_columns<Kind, false>(link, hinge, multiple, instant, own[0], w.rate[at_link], w.b, stride, alpha, to, link.v, N, N);
+  for (int c = before; c < after && c < N; c += n) {
+    const Block<S> inboard = ones_between<S>(c, 0, link.v), own = ones_between<S>(c, link.v, own_end);
+    at.template pass<Standing::own>(c, alpha.qn, alpha.qf, inboard * adds.qb.at(c), own * adds.qa.at(c), own * adds.ql.at(c), to.q, odd);
+    at.template pass<Standing::own>(c, alpha.vn, alpha.vf, inboard * adds.vb.at(c), own * adds.va.at(c), own * adds.vl.at(c), to.v, odd);
+    at.template pass<Standing::else_where>(c, alpha.mn, alpha.mf, none, none, none, to.m, odd);
+  }
+  for (int c = after; c < N; c += n) {
+    at.template pass<Standing::else_where>(c, alpha.qn, alpha.qf, none, none, none, to.q, odd);
+    at.template pass<Standing::else_where>(c, alpha.vn, alpha.vf, none, none, none, to.v, odd);
+    at.template pass<Standing::else_where>(c, alpha.mn, alpha.mf, none, none, none, to.m, odd);
+  }
 }
 
 // Forward dynamics, and how links stand and move at it.
@@ -380,44 +399,56 @@ inline typename S::Bits accelerate_all(const Links<T>& links, const States<T>& a
 template <class S, class T>
 inline void begin_columns(const Links<T>& links, int k, const ForwardDerivativeWork<S>& w) {
   const Link<T>& link = links.link[k];
-  const size_t stride = row_of<S>(links.nv), size = stride * ResponseColumns<S>::rows;
+  const size_t stride = row_of(links.nv), size = stride * ResponseColumns<S>::rows;
   const int above = link.parent < 0 ? -1 : links.link[link.parent].slot;
   if (above != link.slot)
     for (size_t i = 0; i < size; ++i) w.alpha[size * link.slot + i] = above < 0 ? S(0) : w.alpha[size * above + i];
   if (link.parent == k - 1) return;
   for (int r = 0; r < 6; ++r)
-    for (int c = link.parent < 0 ? 0 : links.link[link.parent + 1].v; c < link.v; ++c) w.b[r * stride + c] = S(0);
+    for (int c = link.parent < 0 ? 0 : links.link[link.parent + 1].v; c < link.v; ++c) w.own[r * stride + c] = S(0);
 }
 
 // ∂v̇/∂q to `out`, ∂v̇/∂v and (ℳ + J)⁻¹ to the others.
 template <class S>
 unsigned forward_dynamics_derivatives(const Links<typename S::Scalar>& links, const States<typename S::Scalar>& at, double* out, size_t out_stride, typename S::Scalar* work) {
-  using Work = ForwardDerivativeWork<S>;
-  const Work w(links, work);
-  const int N = links.nv;
-  const size_t square = size_t(N) * N, stride = row_of<S>(N);
-  ResponseRows<S> rows{w.rows, w.rows + square, w.rows + 2 * square};
-  if constexpr (Work::in_place) rows = {reinterpret_cast<S*>(out), reinterpret_cast<S*>(at.others[0]), reinterpret_cast<S*>(at.others[1])};
-  for (int r = 0; r < ResponseColumns<S>::rows + 6; ++r)
-    for (size_t c = N; c < stride; ++c) w.z[r * stride + c] = S(0);
+  using T = typename S::Scalar;
+  const ForwardDerivativeWork<S> w(links, work);
+  const int N = links.nv, stride = static_cast<int>(row_of(N));
+  const bool direct = in_place<S>(N);
+  const size_t size = size_t(stride) * N;
+  ResponseRows<S> rows{w.rows, w.rows + size, w.rows + 2 * size, stride, stride};
+  if constexpr (S::width == 1 && sizeof(T) == sizeof(double))
+    if (direct) rows = {reinterpret_cast<S*>(out), reinterpret_cast<S*>(at.others[0]), reinterpret_cast<S*>(at.others[1]), N, N};
+  for (int r = 0; r < ResponseColumns<S>::rows + OwnColumns<S>::rows; ++r)
+    for (int c = N; c < stride; ++c) w.z[size_t(r) * stride + c] = S(0);
+  for (size_t i = 0; !direct && i < 3 * size; i += stride)
+    for (int c = N; c < stride; ++c) w.rows[i + c] = S(0);
   unsigned sound = S::mask(accelerate_all(links, at, w));
+  start_all(links, at, w);
   for (int k = links.count - 1; k >= 0; --k) {
     stay_open(at, k, N);
-    with_step(links.link[k].step, [&](auto kind) { respond_at<decltype(kind)>(links, k, at, w, rows); });
+    const Link<T>& link = links.link[k];
+    with_step(link.step, [&](auto kind) {
+      using Kind = decltype(kind);
+      respond<Kind>(link, w.forward.link[k], *w.forward.of(link), w.instant[k].lying, w.direction[link.v], ResponseColumns<S>(w.z, stride), rows);
+      respond_else(link, Kind::nv, w.nu + size_t(18) * link.v, rows, N);
+    });
   }
+  Block<S> odd(T(0));
   for (int k = 0; k < links.count; ++k) {
     stay_open(at, k, N);
     begin_columns(links, k, w);
-    with_step(links.link[k].step, [&](auto kind) { finish_at<decltype(kind)>(links, k, at, w, rows); });
+    with_step(links.link[k].step, [&](auto kind) { finish_at<decltype(kind)>(links, k, w, rows, odd); });
   }
+  sound &= finite_states<S>(odd);
   for (int b = 0; b < S::width && b < at.states; ++b) {
     double* const to[] = {out + b * out_stride, at.others[0] + b * out_stride, at.others[1] + b * out_stride};
-    double odd = 0;
-    for (size_t i = 0; i < square; ++i) {
-      if constexpr (!Work::in_place) to[0][i] = double(rows.q[i].lane(b)), to[1][i] = double(rows.v[i].lane(b)), to[2][i] = double(rows.m[i].lane(b));
-      odd += (to[0][i] - to[0][i]) + (to[1][i] - to[1][i]);
+    for (int i = 0; !direct && i < N; ++i) {
+      const ResponseRows<S> from = rows.of(i);
+      for (int j = 0; j < N; ++j) to[0][size_t(i) * N + j] = double(from.q[j].lane(b)), to[1][size_t(i) * N + j] = double(from.v[j].lane(b));
+      for (int j = i; j < N; ++j) to[2][size_t(i) * N + j] = double(from.m[j].lane(b));
     }
-    if (!mirror(to[2], N, at.interrupt) || odd != 0) sound &= ~(1u << b);
+    mirror(to[2], N, at.interrupt);
   }
   return sound;
 }
