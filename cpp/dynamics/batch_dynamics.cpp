@@ -163,6 +163,14 @@ void BatchDynamics::mass_matrix_inverse(const Given& q, const Solving& how, Prec
   if (!plain(how) || !by_links(precision, kernels::Call::mass_matrix_inverse, q, nullptr, nullptr, states, static_cast<int>(size), out, nullptr, general)) general(0, states);
 }
 
+bool BatchDynamics::derivatives(kernels::Call call, const Given& q, const Given& v, const Given& u, const std::array<double*, 3>& out) {
+  const ModelInUse use(model());
+  check_given(model(), {q, v, u});
+  const int batch = common_batch({q, v, u});
+  bool doubt = false;
+  return by_links(Precision::double_, call, q, v, u, batch < 0 ? 1 : batch, size_t(model().nv()) * model().nv(), out, [&](int, int) { doubt = true; }) && !doubt;
+}
+
 void BatchDynamics::jacobian(const Node& node, const Given& q, Precision precision, double* out) {
   run(precision, {q}, 6 * model().nv(), out, [&](auto& w, auto in, auto* y) { w.jacobian(node, in[0], y); });
 }

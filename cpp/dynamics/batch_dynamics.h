@@ -36,6 +36,9 @@ class BatchDynamics : public Batches<RigidDynamics> {
   void pose(const Node& node, const Given& q, double* out);                                               // X_WN, (4, 4) a state
   void energy(const Given& q, const Given& v, const Vector3<double>& datum, double* out);                 // kinetic, potential
 
+  // The derivatives of inverse or forward dynamics by kernels, double precision; false where that is not the plain case, or a state in doubt:
+  // BatchSensitivities decides then.
+  bool derivatives(kernels::Call call, const Given& q, const Given& v, const Given& u, const std::array<double*, 3>& out);
   // Three results by kernels, `size` numbers a state each; false where kernels are not there for this model or precision, again(from, to) for
   // states in doubt. What is given was checked, and the model is in use.
   template <class Again>

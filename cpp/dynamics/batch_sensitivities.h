@@ -1,5 +1,6 @@
-// The derivatives of the direct calls on one state or a batch: `run` for what takes a state in the scalar of the precision, forward dynamics
-// from the doubles of the states, as there: what a narrower scalar rounds away, a wider residual sees.
+// The derivatives of the direct calls on one state or a batch: those of inverse and forward dynamics by kernels where that is the plain case,
+// `run` for what takes a state in the scalar of the precision. Forward dynamics is given the doubles of the states, as there: what a narrower
+// scalar rounds away, a wider residual sees.
 #pragma once
 
 #include <algorithm>
@@ -53,20 +54,20 @@ class BatchSensitivities : public Batches<Sensitivities> {
     const int batch = common_batch({q, v, tau}), states = batch < 0 ? 1 : batch;
     const size_t square = size_t(model().nv()) * model().nv();
     const auto general = [&](int from, int to) {
-    at_precision(precision, [&]<class S>(S) {
-      if constexpr (!available_at<Sensitivities, S>) {
-        throw EvaluationError(to_quad);
-      } else {
-        std::vector<S> y(3 * square);
-        each<S>(from, to, states, [&](Sensitivities<S>& w, int b) {
-          w.forward_dynamics(q.at(b), v.at(b), tau.at(b), how, y.data(), y.data() + square, y.data() + 2 * square);
-          for (int i = 0; i < 3; ++i) {
-            std::transform(y.begin() + i * square, y.begin() + (i + 1) * square, out[i] + b * square, [](const S& x) { return to_double(x); });
-            require_finite(out[i] + b * square, square, model());
-          }
-        });
-      }
-    });
+      at_precision(precision, [&]<class S>(S) {
+        if constexpr (!available_at<Sensitivities, S>) {
+          throw EvaluationError(to_quad);
+        } else {
+          std::vector<S> y(3 * square);
+          each<S>(from, to, states, [&](Sensitivities<S>& w, int b) {
+            w.forward_dynamics(q.at(b), v.at(b), tau.at(b), how, y.data(), y.data() + square, y.data() + 2 * square);
+            for (int i = 0; i < 3; ++i) {
+              std::transform(y.begin() + i * square, y.begin() + (i + 1) * square, out[i] + b * square, [](const S& x) { return to_double(x); });
+              require_finite(out[i] + b * square, square, model());
+            }
+          });
+        }
+      });
     };
     const bool plain = how.form == Form::fast && how.refinement.steps == 0;
     if (!plain || !dynamics_.by_links(precision, kernels::Call::forward_dynamics_derivatives, q, v, tau, states, square, out, general)) general(0, states);

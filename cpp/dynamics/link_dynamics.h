@@ -1,5 +1,5 @@
 // Direct calls by the kernels of this machine's instruction set (cpp/kernels): the plain case of forward dynamics, inverse dynamics, the mass
-// matrix and its inverse, one state or packs of states. What kernels leave in doubt is the general recursions' to decide (rigid_dynamics.h).
+// matrix, its inverse and the derivatives of both dynamics, one state or packs of states. What kernels leave in doubt is the general recursions' to decide (rigid_dynamics.h).
 #pragma once
 
 #include <algorithm>
