@@ -69,9 +69,10 @@ class SensitivityCalls(DirectCalls):
         """∂v̇/∂q, ∂v̇/∂v and ∂v̇/∂τ = (ℳ + J)⁻¹ of v̇ = forward_dynamics(q, v, τ). Raises what it raises.
 
         In the form "fast" by the sweeps of forward dynamics on a column for each coordinate, O(N²); where that is in doubt, at other
-        precisions and refined as asked, -(ℳ + J)⁻¹ ∂T/∂q and -(ℳ + J)⁻¹ ∂T/∂v at v̇. Forces of heavy bodies hide a light one's there. The forms "ud" and "square-root" keep the digits that v̇ keeps: the sweep of "ud" is differentiated,
-        four directions at a time, in O(N²) as well, at about N times the cost of one; refinement acts on (ℳ + J)⁻¹ alone then. Where the
-        sweep has no derivative (P⁺ is singular at this very configuration, not beside it) the first way is taken with the form's inverse.
+        precisions and refined as asked, -(ℳ + J)⁻¹ ∂T/∂q and -(ℳ + J)⁻¹ ∂T/∂v at v̇. Forces of heavy bodies hide a light one's there.
+        The forms "ud" and "square-root" keep the digits that v̇ keeps: the sweep of "ud" is differentiated, four directions at a time,
+        in O(N²) as well, at about N times the cost of one; refinement acts on (ℳ + J)⁻¹ alone then. Where the sweep has no derivative
+        (P⁺ is singular at this very configuration, not beside it) the first way is taken with the form's inverse.
 
         The free root's travel enters ∂v̇/∂v of its own linear accelerations and nothing else.
         """
