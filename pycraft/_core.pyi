@@ -1023,9 +1023,9 @@ def constant(array: typing.Any, domain: typing.Any, codomain: typing.Any, name: 
     An array as an operator from `domain` to `codomain` (spaces, or a size n for R^n): a matrix, one diagonal, or a list of one block per
     body. What is block diagonal over the bodies is kept so; what has low rank is found when a plan needs it.
     """
-def direct_call(function: collections.abc.Callable) -> typing.Any:
+def direct_call(function: collections.abc.Callable, made: type | None = None) -> typing.Any:
     """
-    The direct call of this name: its plain case in the core, everything else by the function.
+    The direct call of this name: its plain case in the core, everything else by the function. made: the tuple of its three results.
     """
 def direct_calls() -> dict[str, tuple[tuple[str, ...], tuple[str, ...]]]:
     """

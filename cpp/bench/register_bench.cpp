@@ -6,6 +6,7 @@
 #include "bindings/bindings.h"
 #include "bindings/compiled_library.h"
 #include "dynamics/batch_dynamics.h"
+#include "dynamics/batch_sensitivities.h"
 #include "dynamics/methods.h"
 #include "dynamics/sensitivities.h"
 #include "runtime/errors.h"
@@ -105,6 +106,7 @@ py::dict time_packs(const std::shared_ptr<Multibody>& model, const Array& q, con
 // One call per state in rotation; q (K, nq), v, u (K, nv).
 py::dict time_dynamics(const std::shared_ptr<Multibody>& model, const std::string& call, const Array& q, const Array& v, const Array& u, double seconds) {
   BatchDynamics w(model);
+  BatchSensitivities d(model);
   Sensitivities<double> s(*model);
   const int K = states_of(q), nq = model->nq(), nv = model->nv();
   const size_t square = size_t(nv) * nv;
@@ -132,9 +134,11 @@ py::dict time_dynamics(const std::shared_ptr<Multibody>& model, const std::strin
   } else if (call == "mass_matrix_inverse") {
     run([&](auto a, auto, auto) { w.mass_matrix_inverse(at_q(a), {}, Precision::double_, out.data()); });
   } else if (call == "inverse_dynamics_derivatives") {
-    run([&](auto a, auto b, auto c) { s.inverse_dynamics(a, b, c, out.data(), out.data() + square); });
+    run([&](auto a, auto b, auto c) { d.inverse_dynamics(at_q(a), at_v(b), at_v(c), Precision::double_, {out.data(), out.data() + square, out.data() + 2 * square}); });
   } else if (call == "forward_dynamics_derivatives") {  // the accelerations and their derivatives
-    run([&](auto a, auto b, auto c) { s.forward_dynamics(a, b, c, Solving(), out.data(), out.data() + square, out.data() + 2 * square); });
+    run([&](auto a, auto b, auto c) {
+      d.forward_dynamics(at_q(a), at_v(b), at_v(c), {}, Precision::double_, {out.data(), out.data() + square, out.data() + 2 * square});
+    });
   } else if (call == "log_determinant_gradient") {
     run([&](auto a, auto, auto) { s.log_determinant(a, out.data(), nullptr, nullptr, nullptr); });
   } else {

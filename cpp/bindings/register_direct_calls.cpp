@@ -48,6 +48,7 @@ struct DirectCall {
   unsigned takes;
   Axes result;
   void (*compute)(const Asked& a, double* out);
+  std::optional<kernels::Call> derivatives;  // of calls with three results, where kernels are sure of all states
 
   int given() const { return static_cast<int>(std::find(arrays.begin(), arrays.end(), nullptr) - arrays.begin()); }
   // Those of a prepared call. The method is none of them: what stands here is the articulated one.
@@ -80,6 +81,8 @@ constexpr DirectCall direct_calls[] = {
        a.dynamics->jacobian(a.node, a.given[0], a.options.precision, out);
      }},
     {"pose", {"q"}, takes_frame, {2, {4, 4}}, [](const Asked& a, double* out) { a.dynamics->pose(a.node, a.given[0], out); }},
+    {"inverse_dynamics_derivatives", {"q", "v", "vdot"}, takes_precision, {2, {coordinates, coordinates}}, nullptr, kernels::Call::inverse_dynamics_derivatives},
+    {"forward_dynamics_derivatives", {"q", "v", "tau"}, takes_precision, {2, {coordinates, coordinates}}, nullptr, kernels::Call::forward_dynamics_derivatives},
 };
 
 const DirectCall& direct_call(const std::string& name) {
@@ -101,6 +104,7 @@ struct Callable {
   const DirectCall* call;
   Options options;         // of calls that are not prepared: the defaults
   PyObject* frame;         // prepared: whose Jacobian or pose; else null
+  PyObject* made;          // of calls with three results: the kind of tuple that holds them; else null
   int states;              // prepared: a batch of so many, -1: one state; else -2: any
 };
 static_assert(std::is_trivially_copyable_v<Options>);  // Python makes it and lets it go, without constructor and destructor
@@ -146,7 +150,7 @@ bool take_options(const Callable& c, Asked& asked, PyObject* const* values, PyOb
   const py::ssize_t count = names ? PyTuple_GET_SIZE(names) : 0;
   for (py::ssize_t i = 0; i < count; ++i) {
     PyObject* const name = PyTuple_GET_ITEM(names, i);
-    if (named(name, "out"))
+    if (named(name, "out") && !c.made)
       asked.out = values[i] == Py_None ? nullptr : values[i];
     else if (c.dynamics || !takes(*c.call, asked.options, name, values[i]))
       return false;
@@ -204,6 +208,31 @@ py::object result_of(const DirectCall& call, const Asked& asked) {
   return py::reinterpret_borrow<py::object>(asked.out);
 }
 
+// Three results in a tuple of the kind that the call has; nothing where kernels are not sure.
+py::object derivatives(const Callable& c, const Asked& asked) {
+  std::array<double*, 3> target;
+  py::tuple all(3);
+  for (int i = 0; i < 3; ++i) {
+    py::object one = result_of(*c.call, asked);
+    target[i] = reinterpret_cast<double*>(py::detail::array_proxy(one.ptr())->data);
+    PyTuple_SET_ITEM(all.ptr(), i, one.release().ptr());
+  }
+  const auto sure = [&] { return asked.dynamics->derivatives(*c.call->derivatives, asked.given[0], asked.given[1], asked.given[2], target); };
+  const Multibody& model = asked.dynamics->model();
+  bool done;
+  if (py::ssize_t(model.bodies()) * std::max(asked.states, 1) <= kept) {
+    done = sure();
+  } else {
+    const Undisturbed undisturbed(model);
+    done = sure();
+  }
+  if (!done) return py::object();
+  const auto given = py::reinterpret_steal<py::object>(PyTuple_Pack(1, all.ptr()));
+  PyObject* const made = given ? PyTuple_Type.tp_new(reinterpret_cast<PyTypeObject*>(c.made), given.ptr(), nullptr) : nullptr;
+  if (!made) throw py::error_already_set();
+  return py::reinterpret_steal<py::object>(made);
+}
+
 // The result; nothing where something is not plain.
 py::object computed(const Callable& c, PyObject* const* args, py::ssize_t count, PyObject* names) {
   const DirectCall& call = *c.call;
@@ -220,6 +249,7 @@ py::object computed(const Callable& c, PyObject* const* args, py::ssize_t count,
   if (of_frame && !take_frame(asked, frame_first ? args[0] : c.frame)) return py::object();
   if (!take_arrays(call, asked, args + frame_first)) return py::object();
   if (c.states != -2 && c.states != asked.states) return py::object();
+  if (c.made) return derivatives(c, asked);
   py::object result = result_of(call, asked);
   if (!result) return result;
   auto* const target = reinterpret_cast<double*>(py::detail::array_proxy(result.ptr())->data);
@@ -270,6 +300,7 @@ int visit(PyObject* self, visitproc visit, void* arg) {
   Py_VISIT(c.function);
   Py_VISIT(c.dynamics);
   Py_VISIT(c.frame);
+  Py_VISIT(c.made);
   return 0;
 }
 int clear(PyObject* self) {
@@ -277,6 +308,7 @@ int clear(PyObject* self) {
   Py_CLEAR(c.function);
   Py_CLEAR(c.dynamics);
   Py_CLEAR(c.frame);
+  Py_CLEAR(c.made);
   return 0;
 }
 void destroy(PyObject* self) {
@@ -304,7 +336,7 @@ PyType_Slot slots[] = {{Py_tp_call, reinterpret_cast<void*>(PyVectorcall_Call)},
 PyType_Spec spec = {"pycraft._core.DirectCall", sizeof(Callable), 0,
                     Py_TPFLAGS_DEFAULT | Py_TPFLAGS_HAVE_GC | Py_TPFLAGS_HAVE_VECTORCALL | Py_TPFLAGS_METHOD_DESCRIPTOR | Py_TPFLAGS_DISALLOW_INSTANTIATION, slots};
 
-py::object callable(const py::object& function, const DirectCall& call, py::object dynamics, const Options& options, py::object frame, int states) {
+py::object callable(const py::object& function, const DirectCall& call, py::object dynamics, const Options& options, py::object frame, int states, py::object made = py::object()) {
   static PyObject* const type = PyType_FromSpec(&spec);
   auto* const c = type ? PyObject_GC_New(Callable, reinterpret_cast<PyTypeObject*>(type)) : nullptr;
   if (!c) throw py::error_already_set();
@@ -314,6 +346,7 @@ py::object callable(const py::object& function, const DirectCall& call, py::obje
   c->call = &call;
   c->options = options;
   c->frame = frame.release().ptr();
+  c->made = made.release().ptr();
   c->states = states;
   PyObject_GC_Track(c);
   return py::reinterpret_steal<py::object>(reinterpret_cast<PyObject*>(c));
@@ -334,12 +367,16 @@ Names names_of(const Texts& texts) {
 void register_direct_calls(py::module_& m) {
   m.def("direct_calls", [] {
     py::typing::Dict<py::str, py::typing::Tuple<Names, Names>> all;
-    for (const DirectCall& call : direct_calls) all[call.name] = py::make_tuple(names_of(call.arrays), names_of(call.options()));
+    for (const DirectCall& call : direct_calls)
+      if (!call.derivatives) all[call.name] = py::make_tuple(names_of(call.arrays), names_of(call.options()));
     return all;
   }, "By name: the arrays of each direct call, and the options that it is prepared with.");
-  m.def("direct_call", [](const py::function& function) {
-    return callable(function, direct_call(py::cast<std::string>(function.attr("__name__"))), py::object(), Options{}, py::object(), -2);
-  }, py::arg("function"), "The direct call of this name: its plain case in the core, everything else by the function.");
+  m.def("direct_call", [](const py::function& function, const std::optional<py::type>& made) {
+    const DirectCall& call = direct_call(py::cast<std::string>(function.attr("__name__")));
+    if (made.has_value() != call.derivatives.has_value() || (made && !PyType_IsSubtype(reinterpret_cast<PyTypeObject*>(made->ptr()), &PyTuple_Type)))
+      throw EvaluationError("calls with three results, and they alone, say in which kind of tuple they are");
+    return callable(function, call, py::object(), Options{}, py::object(), -2, made ? py::object(*made) : py::object());
+  }, py::arg("function"), py::arg("made") = py::none(), "The direct call of this name: its plain case in the core, everything else by the function. made: the tuple of its three results.");
   m.def("prepared_call", [](const py::object& function, const std::string& name, const py::object& dynamics, std::optional<int> batch, const py::str& frame, Form form,
                             const py::object& refine, const std::string& residual, Precision precision, const std::string& on_singular) {
     const Options options{{form, refinement(refine, residual, precision), on_singular_from_name(on_singular)}, precision};

@@ -24,6 +24,21 @@ py::tuple cut(const py::array_t<double>& all, int batch, const std::vector<std::
   return parts;
 }
 
+// Three matrices of nv numbers a side, which f writes.
+template <class F>
+py::tuple three(const Multibody& model, const Arguments& given, F f) {
+  py::tuple all(3);
+  std::array<double*, 3> to;
+  for (int i = 0; i < 3; ++i) {
+    py::array_t<double> one = output(py::none(), given.batch, {model.nv(), model.nv()});
+    to[i] = one.mutable_data();
+    all[i] = one;
+  }
+  const Undisturbed undisturbed(model);
+  f(to);
+  return all;
+}
+
 }  // namespace
 
 void register_sensitivities(py::module_& m) {
@@ -33,24 +48,15 @@ void register_sensitivities(py::module_& m) {
       .def(py::init<std::shared_ptr<Multibody>>())
       .def("inverse_dynamics", [](BatchSensitivities& d, const py::object& q, const py::object& v, const py::object& vdot, Precision precision) {
         const Multibody& mb = d.model();
-        const int n = mb.nv(), size = 2 * n * n;
         Arguments given(mb, {{"q", q}, {"v", v}, {"vdot", vdot}});
-        const auto all = run(d, precision, given, py::none(), {size}, [n](auto& w, auto in, auto* y) { w.inverse_dynamics(in[0], in[1], in[2], y, y + n * n); });
-        return cut(all, given.batch, {{n, n}, {n, n}});
+        return three(mb, given, [&](const std::array<double*, 3>& to) { d.inverse_dynamics(given[0], given[1], given[2], precision, to); });
       }, q, v, py::arg("vdot"), precision)
       .def("forward_dynamics", [](BatchSensitivities& d, const py::object& q, const py::object& v, const py::object& tau, Form form, const py::object& refine,
                                   const std::string& residual, Precision precision) {
         const Multibody& mb = d.model();
-        const int n = mb.nv(), size = 3 * n * n;
         Arguments given(mb, {{"q", q}, {"v", v}, {"tau", tau}});
         const Solving how{form, refinement(refine, residual, precision), OnSingular::raise};
-        py::array_t<double> all = output(py::none(), given.batch, {size});
-        double* target = all.mutable_data();
-        {
-          const Undisturbed undisturbed(mb);
-          d.forward_dynamics(given[0], given[1], given[2], how, precision, target);
-        }
-        return cut(all, given.batch, {{n, n}, {n, n}, {n, n}});
+        return three(mb, given, [&](const std::array<double*, 3>& to) { d.forward_dynamics(given[0], given[1], given[2], how, precision, to); });
       }, q, v, py::arg("tau"), py::arg("form"), py::arg("refine"), py::arg("residual"), precision)
       .def("third_order", [](BatchSensitivities& d, bool christoffel, const py::object& q, Precision precision, const py::object& out) {
         const Multibody& mb = d.model();

@@ -12,20 +12,6 @@ bool plain(const Solving& how) { return how.form == Form::fast && how.refinement
 
 }  // namespace
 
-template <class Again>
-bool BatchDynamics::by_links(Precision precision, const LinkCall& asked, int states, int size, double* out, Again again) {
-  bool done = false;
-  const auto run = [&]<class S>(S) {
-    std::get<WorkspacePool<LinkDynamics<S>>>(links_).with(model(), [&](LinkDynamics<S>& w) {
-      done = w.there();
-      if (done) w.run(asked, states, size, out, again);
-    });
-  };
-  if (precision == Precision::double_) run(double());
-  if (precision == Precision::single) run(Single());
-  return done;
-}
-
 BatchDynamics::Starts BatchDynamics::refined_from(Precision precision, const LinkCall& asked, int states, int size, const Solving& how) {
   Starts starts;
   if (how.form != Form::fast || how.refinement.steps == 0 || how.on_singular != OnSingular::raise) return starts;
@@ -160,6 +146,15 @@ void BatchDynamics::mass_matrix_inverse(const Given& q, const Solving& how, Prec
     });
   };
   if (!plain(how) || !by_links(precision, asked, states, static_cast<int>(size), out, general)) general(0, states);
+}
+
+bool BatchDynamics::derivatives(kernels::Call call, const Given& q, const Given& v, const Given& u, const std::array<double*, 3>& out) {
+  const ModelInUse use(model());
+  check_given(model(), {q, v, u});
+  const int batch = common_batch({q, v, u});
+  bool doubt = false;
+  const LinkCall asked{.call = call, .q = q, .v = &v, .u = &u, .others = &out[1]};
+  return by_links(Precision::double_, asked, batch < 0 ? 1 : batch, model().nv() * model().nv(), out[0], [&](int, int) { doubt = true; }) && !doubt;
 }
 
 void BatchDynamics::jacobian(const Node& node, const Given& q, Precision precision, double* out) {

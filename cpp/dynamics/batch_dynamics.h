@@ -36,8 +36,26 @@ class BatchDynamics : public Batches<RigidDynamics> {
   void pose(const Node& node, const Given& q, double* out);                                               // X_WN, (4, 4) a state
   void energy(const Given& q, const Given& v, const Vector3<double>& datum, double* out);                 // kinetic, potential
 
- private:
+  // The derivatives of inverse or forward dynamics by kernels, double precision; false where that is not the plain case, or a state in doubt:
+  // BatchSensitivities decides then.
+  bool derivatives(kernels::Call call, const Given& q, const Given& v, const Given& u, const std::array<double*, 3>& out);
+  // By kernels, where the plain case is there for this model and precision; else false. again(from, to): states in doubt. What is given was
+  // checked, and the model is in use.
+  template <class Again>
+  bool by_links(Precision precision, const LinkCall& asked, int states, int size, double* out, Again again) {
+    bool done = false;
+    const auto run = [&]<class S>(S) {
+      std::get<WorkspacePool<LinkDynamics<S>>>(links_).with(model(), [&](LinkDynamics<S>& w) {
+        done = w.there();
+        if (done) w.run(asked, states, size, out, again);
+      });
+    };
+    if (precision == Precision::double_) run(double());
+    if (precision == Precision::single) run(Single());
+    return done;
+  }
 
+ private:
   // The values of unrefined calls, which refinement starts from, so that its corrections are their errors.
   struct Starts {
     std::vector<double> values;
@@ -52,10 +70,6 @@ class BatchDynamics : public Batches<RigidDynamics> {
   template <class S>
   void forward_dynamics_at(const Given& q, const Given& v, const Given& tau, int from, int to, int states, const Solving& how, const Starts& starts, double* vdot,
                            const Applied<double>* applied);
-
-  // The plain case by kernels; false where it is not there for this model or precision. again(from, to): states in doubt.
-  template <class Again>
-  bool by_links(Precision precision, const LinkCall& asked, int states, int size, double* out, Again again);
 
   // The same of calls that never leave a state in doubt: general(out) where kernels are not there, or where a number left its range.
   template <class General>

@@ -1,5 +1,5 @@
 // Direct calls by the kernels of this machine's instruction set (cpp/kernels): the plain case of forward dynamics, inverse dynamics, the mass
-// matrix and its inverse, one state or packs of states. What kernels leave in doubt is the general recursions' to decide (rigid_dynamics.h).
+// matrix, its inverse and the derivatives of both dynamics, one state or packs of states. What kernels leave in doubt is the general recursions' to decide (rigid_dynamics.h).
 #pragma once
 
 #include <algorithm>
@@ -22,6 +22,7 @@ struct LinkCall {
   const Given *v = nullptr, *u = nullptr;
   const Applied<double>* applied = nullptr;  // null: the model's gravity alone
   const Node* node = nullptr;
+  double* const* others = nullptr;           // where the second and third result go
 };
 
 // Of one model, for T = float or double. Memory is kept from call to call.
@@ -35,10 +36,12 @@ class LinkDynamics {
   // Whether the model is one that kernels know.
   bool there() const { return model_ != nullptr; }
 
-  // At `count` states, `size` numbers a state to out + b size; again(from, to) is called for runs of states in doubt.
+  // At `count` states, `size` numbers a state to out + b size, and as many to each of the two others of a call that has three results;
+  // again(from, to) is called for runs of states in doubt.
   template <class Again>
   void run(const LinkCall& asked, int count, int size, double* out, Again again) {
-    const auto& [call, q, v, u, applied, node] = asked;
+    using kernels::Call;
+    const auto& [call, q, v, u, applied, node, others] = asked;
     T gravity[3];
     const T* wrenches = nullptr;
     std::copy_n(gravity_, 3, gravity);
@@ -46,7 +49,7 @@ class LinkDynamics {
       for (int i = 0; i < 3; ++i) gravity[i] = static_cast<T>(applied->gravity[i]);
       if (applied->wrenches) wrenches = carried(*applied);
     }
-    const bool matrix = call == kernels::Call::mass_matrix || call == kernels::Call::mass_matrix_inverse;  // kernels look through those themselves
+    const bool matrix = !(call == Call::forward_dynamics || call == Call::inverse_dynamics || call == Call::jacobian || call == Call::pose);  // kernels look through those themselves
     const auto stride = [](const Given& g) { return g.batch < 0 ? size_t(0) : size_t(g.width); };
     const kernels::OnLink<T> on_link = node ? model_->on_link(*node) : kernels::OnLink<T>{};
     int doubted = 0;  // how many states before b are in doubt
@@ -54,7 +57,9 @@ class LinkDynamics {
       const kernels::Kernels<T>& kernel = chosen(count - b, matrix);
       const kernels::Kernel<T>& how = kernel[call];
       const int lanes = std::min(kernel.lanes, count - b);
-      const kernels::States<T> states{q.at(b), v ? v->at(b) : nullptr, u ? u->at(b) : nullptr, stride(q), v ? stride(*v) : 0, u ? stride(*u) : 0, lanes, gravity, wrenches, check_interrupt, node ? &on_link : nullptr};
+      double* of_these[2] = {};
+      for (int i = 0; others && i < 2; ++i) of_these[i] = others[i] + size_t(b) * size;
+      const kernels::States<T> states{q.at(b), v ? v->at(b) : nullptr, u ? u->at(b) : nullptr, stride(q), v ? stride(*v) : 0, u ? stride(*u) : 0, lanes, gravity, wrenches, check_interrupt, node ? &on_link : nullptr, of_these};
       const unsigned sound = how.run(model_->links(), states, out + size_t(b) * size, size, work(how.work(model_->links())));
       for (const int end = b + lanes, first = b; b < end; ++b) {
         const bool sure = (sound >> (b - first) & 1) && (matrix || all_finite(out + size_t(b) * size, size));

@@ -255,9 +255,14 @@ template <class Kind, class S, class T>
   }
 }
 
-// Articulated inertias, and the forces that go with them, tip to base, of links that are placed. Which lanes are sound.
-template <bool forces, class S, class T>
-[[gnu::noinline]] typename S::Bits articulated_tip_to_base(const Links<T>& links, const States<T>& at, const ForwardWork<S>& w) {
+struct KeepsNothing {
+  template <class P>
+  void operator()(int, const P&) const {}
+};
+// Articulated inertias, and the forces that go with them, tip to base, of links that are placed. Which lanes are sound. keep(k, P): P⁺ of link
+// k about its parent's origin, in the parent's axes.
+template <bool forces, class S, class T, class Keep = KeepsNothing>
+[[gnu::noinline]] typename S::Bits articulated_tip_to_base(const Links<T>& links, const States<T>& at, const ForwardWork<S>& w, Keep keep = {}) {
   const S gone = travel<S>(links, at);
   typename S::Bits sound = S::all();
   for (int k = 0; k < links.count; ++k)
@@ -275,6 +280,7 @@ template <bool forces, class S, class T>
       with_step(link.step, [&](auto kind) { eliminate<decltype(kind), decltype(kind)::pin, forces>(link, links, at, gone, own, w.of(link), P, sound); });
     else
       with_step(link.step, [&](auto kind) { eliminate<decltype(kind), false, forces>(link, links, at, gone, own, w.of(link), P, sound); });
+    keep(k, P);
     if (link.parent < 0)
       sound = sound & greater(S(links.growth), P.growth) & greater(S(1), S(T(4)) * P.error * P.growth);
     else if (link.parent != k - 1)

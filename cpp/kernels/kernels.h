@@ -3,7 +3,9 @@
 
 #include "kernels/body_columns.h"
 #include "kernels/forward_dynamics.h"
+#include "kernels/forward_dynamics_derivatives.h"
 #include "kernels/inverse_dynamics.h"
+#include "kernels/inverse_dynamics_derivatives.h"
 #include "kernels/mass_matrix_of_links.h"
 #include "kernels/mass_matrix_inverse.h"
 #include "kernels/node_kinematics.h"
@@ -19,6 +21,8 @@ struct KernelsOf {
   static size_t matrix(const Links<T>& links) { return numbers(links, MatrixWork<S>::size(links)); }
   static size_t matrix_inverse(const Links<T>& links) { return numbers(links, ForwardWork<S>::size(links) + InverseWork<S>::size(links)); }
 
+  static size_t inverse_derivatives(const Links<T>& links) { return numbers(links, InverseDerivativeWork<S>::size(links)); }
+  static size_t forward_derivatives(const Links<T>& links) { return numbers(links, ForwardDerivativeWork<S>::size(links)); }
   static size_t nothing(const Links<T>& links) { return numbers(links, 0); }
 
   template <auto kernel>
@@ -37,6 +41,8 @@ struct KernelsOf {
                                    {run<inverse_dynamics<S>>, inverse},
                                    {W == 1 ? run_whole<mass_matrix<S>> : run<mass_matrix<S>>, matrix},
                                    {W == 1 ? run_whole<mass_matrix_inverse<S>> : run<mass_matrix_inverse<S>>, matrix_inverse},
+                                   {run<inverse_dynamics_derivatives<S>>, inverse_derivatives},
+                                   {run<forward_dynamics_derivatives<S>>, forward_derivatives},
                                    {run<node_jacobian<S>>, nothing},
                                    {run<node_pose<S>>, nothing}}};
 };

@@ -58,6 +58,7 @@ struct States {
   const T* wrenches;  // (n; f) on every link in its frame about its origin, at all states; null: none
   void (*interrupt)();  // asked in long loops; it throws to stop them
   const OnLink<T>* node = nullptr;  // of calls that are asked of one
+  double* const* others = nullptr;  // where further results of a call go, as the first
   const T *cosines = nullptr, *sines = nullptr;  // of one state: of every coordinate
 };
 
@@ -69,12 +70,12 @@ struct Kernel {
   size_t (*work)(const Links<T>& links);
 };
 
-enum class Call { forward_dynamics, inverse_dynamics, mass_matrix, mass_matrix_inverse, jacobian, pose };
+enum class Call { forward_dynamics, inverse_dynamics, mass_matrix, mass_matrix_inverse, inverse_dynamics_derivatives, forward_dynamics_derivatives, jacobian, pose };
 
 template <class T>
 struct Kernels {
   int lanes;           // states at once
-  Kernel<T> calls[6];
+  Kernel<T> calls[8];
   const Kernel<T>& operator[](Call call) const { return calls[static_cast<int>(call)]; }
 };
 

@@ -2,6 +2,7 @@
 
 #include <numeric>
 
+#include "runtime/errors.h"
 #include "runtime/interrupt.h"
 
 #define PYCRAFT_INSTRUCTION_SET traced
@@ -27,9 +28,8 @@ Tape tape_of(const Links<double>& links, Call call, const double* gravity, bool 
     case Call::forward_dynamics: bytes = traced::ForwardWork<Number>::size(links); break;
     case Call::inverse_dynamics: bytes = links.count * sizeof(traced::InverseLink<Number>); break;
     case Call::mass_matrix: bytes = traced::MatrixWork<Number>::size(links); break;
-    case Call::jacobian:
-    case Call::pose: break;  // not recorded
     case Call::mass_matrix_inverse: bytes = traced::ForwardWork<Number>::size(links) + traced::InverseWork<Number>::size(links); break;
+    default: throw EvaluationError("this call is not compiled");
   }
   std::vector<double> work(bytes / sizeof(double) + 2);
   struct Recorded {
@@ -40,9 +40,8 @@ Tape tape_of(const Links<double>& links, Call call, const double* gravity, bool 
     case Call::forward_dynamics: traced::forward_dynamics<Number>(links, at, out.data(), size, work.data()); break;
     case Call::inverse_dynamics: traced::inverse_dynamics<Number>(links, at, out.data(), size, work.data()); break;
     case Call::mass_matrix: traced::mass_matrix<Number>(links, at, out.data(), size, work.data()); break;
-    case Call::jacobian:
-    case Call::pose: break;
     case Call::mass_matrix_inverse: traced::mass_matrix_inverse<Number>(links, at, out.data(), size, work.data()); break;
+    default: break;
   }
   tape.results.assign(out.begin(), out.end());
   return tape;

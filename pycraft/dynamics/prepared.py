@@ -24,6 +24,11 @@ def direct(function: F) -> F:
     return _core.direct_call(function)
 
 
+def direct_of(made: type) -> Callable[[F], F]:
+    """The same of a call with three results, which this kind of tuple holds."""
+    return lambda function: _core.direct_call(function, made)
+
+
 def _states_of(batch: Any) -> int | None:
     """How many states each call takes, None for one. EvaluationError where that is no number of states."""
     if batch is None:

@@ -15,6 +15,7 @@ from ..arguments import text
 from ..state import at_state
 from .by_realization import checked_forces
 from .direct_calls import DirectCalls, cached
+from .prepared import direct_of
 from .threads import over_threads
 
 
@@ -38,8 +39,10 @@ class SensitivityCalls(DirectCalls):
     """Derivatives of inverse and forward dynamics, of the mass matrix, of energy, momentum and Jacobians; the inertial regressor."""
 
     def _sensitivities(self) -> _core.Sensitivities:
+        self._calls()  # which contiguous arrays go by, from the second call on
         return cached(self, "_derivatives", _core.Sensitivities)
 
+    @direct_of(DynamicsDerivatives)
     @over_threads
     def inverse_dynamics_derivatives(
         self, q=None, v=None, vdot=None, *, precision: str = "double", threads: int = 1
@@ -47,10 +50,9 @@ class SensitivityCalls(DirectCalls):
         """∂T/∂q, ∂T/∂v and ∂T/∂v̇ = ℳ + J of T = inverse_dynamics(q, v, v̇), gravity included. Cost O(N · depth)."""
         q, v = at_state(self, q, v)
         vdot = np.zeros(self.nv) if vdot is None else vdot
-        dq, dv = self._sensitivities().inverse_dynamics(q, v, vdot, precision)
-        mass = self.mass_matrix(q, precision=precision)
-        return DynamicsDerivatives(dq, dv, mass if mass.shape == dq.shape else np.broadcast_to(mass, dq.shape).copy())
+        return DynamicsDerivatives(*self._sensitivities().inverse_dynamics(q, v, vdot, precision))
 
+    @direct_of(DynamicsDerivatives)
     @over_threads
     def forward_dynamics_derivatives(
         self,
@@ -66,10 +68,11 @@ class SensitivityCalls(DirectCalls):
     ) -> DynamicsDerivatives:
         """∂v̇/∂q, ∂v̇/∂v and ∂v̇/∂τ = (ℳ + J)⁻¹ of v̇ = forward_dynamics(q, v, τ). Raises what it raises.
 
-        In the form "fast" -(ℳ + J)⁻¹ ∂T/∂q and -(ℳ + J)⁻¹ ∂T/∂v at v̇, accelerations and solutions refined as asked: O(N²). Forces of heavy
-        bodies hide a light one's there. The forms "ud" and "square-root" keep the digits that v̇ keeps: the sweep of "ud" is differentiated,
-        four directions at a time, in O(N²) as well, at about N times the cost of one; refinement acts on (ℳ + J)⁻¹ alone then. Where the
-        sweep has no derivative (P⁺ is singular at this very configuration, not beside it) the first way is taken with the form's inverse.
+        In the form "fast" by the sweeps of forward dynamics on a column for each coordinate, O(N²); where that is in doubt, at other
+        precisions and refined as asked, -(ℳ + J)⁻¹ ∂T/∂q and -(ℳ + J)⁻¹ ∂T/∂v at v̇. Forces of heavy bodies hide a light one's there.
+        The forms "ud" and "square-root" keep the digits that v̇ keeps: the sweep of "ud" is differentiated, four directions at a time,
+        in O(N²) as well, at about N times the cost of one; refinement acts on (ℳ + J)⁻¹ alone then. Where the sweep has no derivative
+        (P⁺ is singular at this very configuration, not beside it) the first way is taken with the form's inverse.
 
         The free root's travel enters ∂v̇/∂v of its own linear accelerations and nothing else.
         """

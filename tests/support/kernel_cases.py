@@ -35,7 +35,12 @@ def states(model, count=STATES):
 
 def calls(model, Q, V, U, **how):
     """Every call that kernels have."""
-    return {
+    derivatives = {
+        f"{call}, {along}": matrix
+        for call in ("inverse_dynamics_derivatives", "forward_dynamics_derivatives")
+        for along, matrix in zip(("q", "v", "input"), getattr(model, call)(Q, V, U, **how), strict=True)
+    }
+    return derivatives | {
         "forward_dynamics": model.forward_dynamics(Q, V, U, **how),
         "inverse_dynamics": model.inverse_dynamics(Q, V, U, **how),
         "bias_forces": model.bias_forces(Q, V, **how),

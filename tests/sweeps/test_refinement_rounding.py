@@ -146,7 +146,7 @@ def test_a_wide_gather_is_enough_for_a_stretched_chain(n, bound):
     # Columns of ℳ⁻¹ are right to rounding; their product with τ rounds again, at |ℳ⁻¹||τ|, and is no better than the unrefined answer.
     columns = inverse.at(zero, form="ud", precision="quad").dense()
     found = rods.mass_matrix_inverse(zero, refine=1, residual="gather")
-    assert np.linalg.norm(found - columns) <= EPS * np.linalg.norm(columns)
+    assert np.linalg.norm(found - columns) <= 4 * EPS * np.linalg.norm(columns)  # an error that small is not corrected
 
 
 def test_a_wide_gather_knows_every_term():
