@@ -7,26 +7,6 @@
 
 namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET {
 
-// Neighbours in memory, wherever that begins.
-template <class S>
-struct Loose {
-  typedef typename S::Scalar type __attribute__((vector_size(sizeof(S)), aligned(sizeof(typename S::Scalar)), may_alias));
-};
-template <class T>
-struct Loose<Lanes<T, 1>> {
-  using type = T;
-};
-template <class S>
-[[gnu::always_inline]] inline S from_memory(const typename S::Scalar* x) {
-  S a;
-  a.v = *reinterpret_cast<const typename Loose<S>::type*>(x);
-  return a;
-}
-template <class S>
-[[gnu::always_inline]] inline void to_memory(const S& a, typename S::Scalar* x) {
-  *reinterpret_cast<typename Loose<S>::type*>(x) = a.v;
-}
-
 template <class S>
 struct Six {  // (n; f) or (α; a)
   Vector3<S> angular, linear;

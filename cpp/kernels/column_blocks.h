@@ -9,42 +9,16 @@
 
 namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET {
 
-#ifdef __AVX2__
-inline constexpr int columns_at_once = 4;
-#else
-inline constexpr int columns_at_once = 2;
-#endif
-
-template <class S>
-struct BlockOf {
-  using type = S;
-  static constexpr int columns = 1;
-};
-template <class T>
-struct BlockOf<Lanes<T, 1>> {
-  using type = Lanes<T, columns_at_once>;
-  static constexpr int columns = columns_at_once;
-  typedef T Anywhere __attribute__((vector_size(columns_at_once * sizeof(T)), aligned(alignof(T)), may_alias));
-};
-template <class S>
-using Block = typename BlockOf<S>::type;
-
 // How long a row is that holds n columns and the last block of them.
 constexpr size_t row_of(int n) { return (size_t(n) + 7) & ~size_t(7); }
 
 template <class S>
 [[gnu::always_inline]] inline Block<S> block_at(const S* x) {
-  if constexpr (BlockOf<S>::columns == 1)
-    return *x;
-  else
-    return Block<S>::of(*reinterpret_cast<const typename BlockOf<S>::Anywhere*>(x));
+  return loaded<Block<S>>(x);
 }
 template <class S>
 [[gnu::always_inline]] inline void put_block(const Block<S>& y, S* x) {
-  if constexpr (BlockOf<S>::columns == 1)
-    *x = y;
-  else
-    *reinterpret_cast<typename BlockOf<S>::Anywhere*>(x) = y.v;
+  stored(y, x);
 }
 // Of a block, what lies before the end of its row.
 template <class S>
@@ -63,10 +37,7 @@ template <class S>
 }
 template <class S>
 [[gnu::always_inline]] inline Block<S> in_all(const S& x) {
-  if constexpr (BlockOf<S>::columns == 1)
-    return x;
-  else
-    return Block<S>(x.v);
+  return wide<Block<S>>(x);
 }
 template <class S>
 [[gnu::always_inline]] inline Vector3<Block<S>> in_all(const Vector3<S>& x) {

@@ -60,7 +60,7 @@ template <class S, class Move>
     each_of<3>([&](int r) { stored(n[r], y.n[r] + c), stored(f[r], y.f[r] + c); });
   };
   int c = 0;
-  for (; c + Several<S>::count <= last; c += Several<S>::count) take(typename Several<S>::type(), c);
+  for (; c + BlockOf<S>::columns <= last; c += BlockOf<S>::columns) take(Block<S>(), c);
   for (; c < last; ++c) take(S(), c);
 }
 

@@ -188,26 +188,54 @@ template <class S>
   for (int b = 0; b < S::width && b < states; ++b) x[b * stride] = double(a.lane(b));
 }
 
-// Numbers of one state that stand side by side are taken several at a time, as V; packs of states, and numbers that are written down, one by one.
+// Neighbours in memory, wherever that begins.
 template <class S>
-struct Several {
-  using type = S;
-  static constexpr int count = 1;
+struct Loose {
+  typedef typename S::Scalar type __attribute__((vector_size(sizeof(S)), aligned(sizeof(typename S::Scalar)), may_alias));
 };
 template <class T>
-struct Several<Lanes<T, 1>> {
-  using type = Lanes<T, neighbours<T>>;
-  static constexpr int count = neighbours<T>;
+struct Loose<Lanes<T, 1>> {
+  using type = T;
 };
+template <class S>
+[[gnu::always_inline]] inline S from_memory(const typename S::Scalar* x) {
+  S a;
+  a.v = *reinterpret_cast<const typename Loose<S>::type*>(x);
+  return a;
+}
+template <class S>
+[[gnu::always_inline]] inline void to_memory(const S& a, typename S::Scalar* x) {
+  *reinterpret_cast<typename Loose<S>::type*>(x) = a.v;
+}
+
+// Numbers of one state that stand side by side are taken several at a time; packs of states, and numbers that are written down, one by one.
+template <class S>
+struct BlockOf {
+  using type = S;
+  static constexpr int columns = 1;
+};
+template <class T>
+struct BlockOf<Lanes<T, 1>> {
+  using type = Lanes<T, neighbours<T>>;
+  static constexpr int columns = neighbours<T>;
+};
+template <class S>
+using Block = typename BlockOf<S>::type;
+
+// As V, one or a block.
 template <class V, class S>
 [[gnu::always_inline]] inline V loaded(const S* x) {
-  V value;
-  __builtin_memcpy(&value, x, sizeof value);
-  return value;
+  if constexpr (std::is_same_v<V, S>)
+    return *x;
+  else
+    return from_memory<V>(reinterpret_cast<const typename V::Scalar*>(x));
 }
 template <class V, class S>
 [[gnu::always_inline]] inline void stored(const V& value, S* x) {
-  __builtin_memcpy(x, &value, sizeof value);
+  if constexpr (std::is_same_v<V, S>)
+    *x = value;
+  else
+    to_memory(value, reinterpret_cast<typename V::Scalar*>(x));
 }
 template <class V, class S>
 [[gnu::always_inline]] inline V wide(const S& x) {
