@@ -46,7 +46,7 @@ class BatchDynamics : public Batches<RigidDynamics> {
     bool done = false;
     const auto run = [&]<class S>(S) {
       std::get<WorkspacePool<LinkDynamics<S>>>(links_).with(model(), [&](LinkDynamics<S>& w) {
-        done = w.there();
+        done = w.there(asked.call);
         if (done) w.run(asked, states, size, out, again);
       });
     };

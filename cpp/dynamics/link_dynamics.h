@@ -33,8 +33,13 @@ class LinkDynamics {
     for (int i = 0; i < 3; ++i) gravity_[i] = static_cast<T>(model.gravity()[i]);
   }
 
-  // Whether the model is one that kernels know.
-  bool there() const { return model_ != nullptr; }
+  // Whether kernels know the model and the call.
+  bool there(kernels::Call call) const {
+    if constexpr (std::is_same_v<T, double>)
+      return model_ && set_.one[call].run;
+    else
+      return model_ && set_.singles[call].run;
+  }
 
   // At `count` states, `size` numbers a state to out + b size, and as many to each of the two others of a call that has three results;
   // again(from, to) is called for runs of states in doubt.
@@ -54,7 +59,7 @@ class LinkDynamics {
     const kernels::OnLink<T> on_link = node ? model_->on_link(*node) : kernels::OnLink<T>{};
     int doubted = 0;  // how many states before b are in doubt
     for (int b = 0; b < count;) {
-      const kernels::Kernels<T>& kernel = chosen(count - b, matrix);
+      const kernels::Kernels<T>& kernel = chosen(call, count - b, matrix);
       const kernels::Kernel<T>& how = kernel[call];
       const int lanes = std::min(kernel.lanes, count - b);
       double* of_these[2] = {};
@@ -73,9 +78,9 @@ class LinkDynamics {
 
  private:
   // Matrices of many coordinates have rows enough to fill registers with, and packs of them would not fit near memory.
-  const kernels::Kernels<T>& chosen(int states, bool matrix) const {
+  const kernels::Kernels<T>& chosen(kernels::Call call, int states, bool matrix) const {
     if constexpr (std::is_same_v<T, double>)
-      return states == 1 || (matrix && nv_ > 48) ? set_.one : set_.pack;
+      return states == 1 || (matrix && nv_ > 48) || !set_.pack[call].run ? set_.one : set_.pack;
     else
       return set_.singles;
   }

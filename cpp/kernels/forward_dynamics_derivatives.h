@@ -201,7 +201,7 @@ unsigned forward_dynamics_derivatives(const Links<typename S::Scalar>& links, co
   for (int k = links.count - 1; k >= 0; --k) {
     stay_open(at, k, N);
     const Link<T>& link = links.link[k];
-    with_step(link.step, [&](auto kind) {
+    with_shape(link.step, [&](auto kind) {
       using Kind = decltype(kind);
       respond<Kind>(link, w.forward.link[k], *w.forward.of(link), w.instant[k].lying, w.direction[link.v], ResponseColumns<S>(w.z, stride), rows);
       respond_else(link, Kind::nv, w.nu + size_t(18) * link.v, rows, N);
@@ -211,7 +211,7 @@ unsigned forward_dynamics_derivatives(const Links<typename S::Scalar>& links, co
   for (int k = 0; k < links.count; ++k) {
     stay_open(at, k, N);
     begin_columns(links, k, w);
-    with_step(links.link[k].step, [&](auto kind) { finish_at<decltype(kind)>(links, k, w, rows, odd); });
+    with_shape(links.link[k].step, [&](auto kind) { finish_at<decltype(kind)>(links, k, w, rows, odd); });
   }
   sound &= finite_states<S>(odd);
   for (int b = 0; b < S::width && b < at.states; ++b) {

@@ -192,7 +192,7 @@ unsigned inverse_dynamics_derivatives(const Links<typename S::Scalar>& links, co
   for (int k = links.count - 1, turned_from = row; k >= 0; --k) {
     stay_open(at, k, N);
     const Link<T>& link = links.link[k];
-    with_step(link.step, [&](auto kind) { derivative_rows<decltype(kind)>(link, w.instant[k], w, rows, N, odd); });
+    with_shape(link.step, [&](auto kind) { derivative_rows<decltype(kind)>(link, w.instant[k], w, rows, N, odd); });
     for (; direct && turned_from > link.v; turned_from -= 8) {  // rows turned_from - 8 and on are there
       const int left = turned_from - 8;
       if (left < link.v) break;

@@ -36,13 +36,23 @@ struct KernelsOf {
   [[gnu::flatten]] static unsigned run_whole(const Links<T>& links, const States<T>& at, double* out, size_t stride, T* work) {
     return run<kernel>(links, at, out, stride, work);
   }
+  // Derivatives in double alone, in packs where registers hold four: they are most of what there is to compile.
+  static constexpr bool differentiates = sizeof(T) == sizeof(double) && (W == 1 || neighbours<T> >= 4);
+  static constexpr Kernel<T> derivatives_of_forces() {
+    if constexpr (differentiates) return {W == 1 ? run_whole<inverse_dynamics_derivatives<S>> : run<inverse_dynamics_derivatives<S>>, inverse_derivatives};
+    return {};
+  }
+  static constexpr Kernel<T> derivatives_of_accelerations() {
+    if constexpr (differentiates) return {W == 1 ? run_whole<forward_dynamics_derivatives<S>> : run<forward_dynamics_derivatives<S>>, forward_derivatives};
+    return {};
+  }
   static constexpr Kernels<T> all{W,
                                   {{W == 1 ? run_whole<forward_dynamics<S>> : run<forward_dynamics<S>>, forward},
                                    {run<inverse_dynamics<S>>, inverse},
                                    {W == 1 ? run_whole<mass_matrix<S>> : run<mass_matrix<S>>, matrix},
                                    {W == 1 ? run_whole<mass_matrix_inverse<S>> : run<mass_matrix_inverse<S>>, matrix_inverse},
-                                   {run<inverse_dynamics_derivatives<S>>, inverse_derivatives},
-                                   {run<forward_dynamics_derivatives<S>>, forward_derivatives},
+                                   derivatives_of_forces(),
+                                   derivatives_of_accelerations(),
                                    {run<node_jacobian<S>>, nothing},
                                    {run<node_pose<S>>, nothing}}};
 };

@@ -65,7 +65,7 @@ struct States {
 // What a call is: `run` writes the results to out + b out_stride, in `work`, aligned to 64 bytes and of as many numbers as the other function
 // says. Bit b of what comes back says that state b is sound: of others the results mean nothing, and the general recursions decide.
 template <class T>
-struct Kernel {
+struct Kernel {  // null: not there
   unsigned (*run)(const Links<T>& links, const States<T>& states, double* out, size_t out_stride, T* work);
   size_t (*work)(const Links<T>& links);
 };

@@ -136,6 +136,17 @@ template <class F>
   }
 }
 
+// By what a step is in the base's axes, where all pins are one.
+template <class F>
+[[gnu::always_inline]] inline void with_shape(Step step, F&& f) {
+  switch (step) {
+    case Step::helix: return f(Helix{});
+    case Step::ball: return f(Ball{});
+    case Step::free: return f(Free{});
+    default: return f(TurnedPin{});
+  }
+}
+
 // The coordinates of a link of every state, then its place.
 template <class Kind, class S, class T>
 [[gnu::always_inline]] inline void place_link(const Link<T>& link, const States<T>& at, Place<S>& place) {

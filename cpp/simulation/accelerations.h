@@ -15,7 +15,7 @@ Accelerations<S> accelerations_of(const Multibody& model, const Solving& how) {
   const auto general = std::make_shared<RigidDynamics<S>>(model);
   if constexpr (std::is_same_v<S, double>) {
     const auto links = std::make_shared<LinkDynamics<double>>(model);
-    if (links->there() && how.form == Form::fast && how.refinement.steps == 0)
+    if (links->there(kernels::Call::forward_dynamics) && how.form == Form::fast && how.refinement.steps == 0)
       return [general, links, how, nq = model.nq(), nv = model.nv()](const double* q, const double* v, const double* tau, double* vdot) {
         const Given configuration{"q", q, nq}, velocity{"v", v, nv}, force{"tau", tau, nv};
         links->run({kernels::Call::forward_dynamics, configuration, &velocity, &force}, 1, nv, vdot, [&](int, int) { general->forward_dynamics(q, v, tau, vdot, how); });
