@@ -90,7 +90,9 @@ def test_the_error_near_balance(panda, precision):
         assert certificate.error < 1e-16
     else:
         assert off > 1e-5 and certificate.error == pytest.approx(off, rel=1e-6)
-    assert certificate.input_error > 0.01 and "as good as its data" in repr(certificate)
+    # Rounding of the data and of the computation are alike here: which is the larger is chance.
+    assert certificate.input_error > 0.01 and certificate.error < 10 * certificate.input_error
+    assert ("is as good as its data" in repr(certificate)) == (certificate.error <= certificate.input_error)
 
 
 @pytest.mark.parametrize("form", ["fast", "ud", "square-root"])
