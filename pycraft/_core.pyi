@@ -233,6 +233,11 @@ class Binding:
     """
     def __reduce__(self) -> tuple:
         ...
+    @property
+    def threads(self) -> int:
+        """
+        How many share the states of a batch.
+        """
 class Operator:
     """
     An operator expression: what was typed, as data. It holds no numbers and computes nothing until it is applied to an array
@@ -294,11 +299,11 @@ class Operator:
         The plan written out as the textbook recursion: language "text", "latex", or "python" (NumPy alone) and "cpp" (Eigen alone),
         source that runs by itself. See pycraft.recursions.
         """
-    def at(self, q: typing.Any = None, v: typing.Any = None, *, form: str = 'fast', refine: typing.Any = 0, residual: str = 'same', precision: str | int = 'double') -> Operator:
+    def at(self, q: typing.Any = None, v: typing.Any = None, *, form: str = 'fast', refine: typing.Any = 0, residual: str = 'same', precision: str | int = 'double', threads: typing.Any = 1) -> Operator:
         """
-        The same expression bound to a state: q (nq,) or a batch (B, nq), v likewise (zero if left out); q=None takes the model's present
-        state. The innermost binding wins. form: "fast", "ud" or "square-root", of the articulated-inertia sweep; refine: corrections of
-        what is solved, a number or "auto", with residual="same", "gather" or "wider"; precision: "single", "double", "extended", "quad", 50, 100.
+        The same expression bound to a state: q (nq,) or a batch (B, nq), v likewise (zero if left out); q=None takes the model's present state.
+        The innermost binding wins. form: "fast", "ud" or "square-root", of the articulated-inertia sweep; refine: corrections of what is solved, a
+        number or "auto", with residual="same", "gather" or "wider"; precision: "single", "double", "extended", "quad", 50, 100; threads: share a batch.
         """
     def blocks(self, order: str = 'base-to-tip') -> typing.Any:
         """
@@ -855,9 +860,9 @@ class Dynamics:
         ...
     def energy(self, q: typing.Any, v: typing.Any, datum: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
         ...
-    def forward_dynamics(self, q: typing.Any, v: typing.Any, tau: typing.Any, form: str, refine: typing.Any, residual: str, precision: str | int, on_singular: str, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+    def forward_dynamics(self, q: typing.Any, v: typing.Any, tau: typing.Any, form: str, refine: typing.Any, residual: str, precision: str | int, on_singular: str, out: typing.Any, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> numpy.typing.NDArray[numpy.float64]:
         ...
-    def inverse_dynamics(self, q: typing.Any, v: typing.Any, vdot: typing.Any, precision: str | int, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+    def inverse_dynamics(self, q: typing.Any, v: typing.Any, vdot: typing.Any, precision: str | int, out: typing.Any, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> numpy.typing.NDArray[numpy.float64]:
         ...
     def jacobian(self, frame: str, q: typing.Any, precision: str | int, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
         ...
@@ -869,6 +874,10 @@ class Dynamics:
         """
         Bytes that one forward dynamics works in.
         """
+    def operational_space(self, inverse: bool, frames: collections.abc.Sequence[str], q: typing.Any) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        B*ΩB of these nodes or its inverse; None where kernels are not sure.
+        """
     def pose(self, frame: str, q: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
         ...
     def refinement(self, q: typing.Any, v: typing.Any, tau: typing.Any, form: str, refine: typing.Any, residual: str, precision: str | int) -> tuple[numpy.typing.NDArray[numpy.float64], list[float], typing.Any]:
@@ -877,6 +886,8 @@ class Sensitivities:
     def __init__(self, arg0: Multibody) -> None:
         ...
     def __reduce__(self) -> tuple:
+        ...
+    def coriolis_matrix(self, q: typing.Any, v: typing.Any, form: str, precision: str | int, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
         ...
     def forward_dynamics(self, q: typing.Any, v: typing.Any, tau: typing.Any, form: str, refine: typing.Any, residual: str, precision: str | int) -> tuple:
         ...
@@ -978,11 +989,11 @@ class Theorem:
     @property
     def waiting(self) -> str:
         ...
-def _bind(operands: collections.abc.Sequence[Operator], q: typing.Any, v: typing.Any, form: str = 'fast', refine: typing.Any = 0, residual: str = 'same', precision: str | int = 'double') -> Binding:
+def _bind(operands: collections.abc.Sequence[Operator], q: typing.Any, v: typing.Any, form: str = 'fast', refine: typing.Any = 0, residual: str = 'same', precision: str | int = 'double', threads: typing.Any = 1) -> Binding:
     ...
 def _binding(arg0: Operator) -> Binding:
     ...
-def _binding_from_parts(arg0: typing.SupportsInt | typing.SupportsIndex, arg1: typing.SupportsInt | typing.SupportsIndex, arg2: typing.SupportsInt | typing.SupportsIndex, arg3: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], arg4: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], arg5: str | int, arg6: str, arg7: typing.SupportsInt | typing.SupportsIndex, arg8: typing.SupportsInt | typing.SupportsIndex) -> Binding:
+def _binding_from_parts(arg0: typing.SupportsInt | typing.SupportsIndex, arg1: typing.SupportsInt | typing.SupportsIndex, arg2: typing.SupportsInt | typing.SupportsIndex, arg3: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], arg4: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], arg5: str | int, arg6: str, arg7: typing.SupportsInt | typing.SupportsIndex, arg8: typing.SupportsInt | typing.SupportsIndex, arg9: typing.SupportsInt | typing.SupportsIndex) -> Binding:
     ...
 def _derived_operators(arg0: SkoSource, arg1: typing.Any) -> SkoSource:
     ...
@@ -1083,9 +1094,9 @@ def precisions() -> list[str | int]:
     """
     The precisions, from narrow to wide.
     """
-def prepared_call(function: typing.Any, name: str, dynamics: typing.Any, batch: typing.SupportsInt | typing.SupportsIndex | None, *, frame: str = '', form: str = 'fast', refine: typing.Any = 0, residual: str = 'same', precision: str | int = 'double', on_singular: str = 'raise') -> typing.Any:
+def prepared_call(function: typing.Any, name: str, dynamics: typing.Any, batch: typing.SupportsInt | typing.SupportsIndex | None, made: type | None, *, frame: str = '', form: typing.Any = None, refine: typing.Any = 0, residual: str = 'same', precision: str | int = 'double', on_singular: str = 'raise') -> typing.Any:
     """
-    A direct call of one model with its options, as `prepare` gives it.
+    A direct call of one model with its options, as `prepare` gives it. made: the tuple of three results.
     """
 def real_array(value: typing.Any, what: str) -> numpy.typing.NDArray[numpy.float64]:
     """

@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from . import _core
+from .dynamics.threads import shared_out, thread_count
 from .models.multibody import Multibody, describe
 from .operators import operator_set
 from .operators.block_view import block_view
@@ -72,4 +73,6 @@ def attach() -> None:
         operator_from_nodes=operator_set.operator_from_nodes,
         scalar_at=operator_set.scalar_at,
         scalar_gradient=operator_set.scalar_gradient,
+        shared_out=shared_out,
+        thread_count=thread_count,
     )

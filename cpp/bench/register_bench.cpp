@@ -110,8 +110,8 @@ py::dict time_dynamics(const std::shared_ptr<Multibody>& model, const std::strin
   Sensitivities<double> s(*model);
   const int K = states_of(q), nq = model->nq(), nv = model->nv();
   const size_t square = size_t(nv) * nv;
-  const bool vector = call == "forward_dynamics" || call == "inverse_dynamics";  // of chains whose matrices fit nowhere
-  std::vector<double> out(vector ? size_t(nv) : std::max(3 * square, size_t(6) * nv));
+  const bool vector = call == "forward_dynamics" || call == "inverse_dynamics" || call == "operational_space_inertia";  // of chains whose matrices fit nowhere
+  std::vector<double> out(vector ? std::max(size_t(nv), size_t(36)) : std::max(3 * square, size_t(6) * nv));
   int k = 0;
   const auto next = [&] { k = (k + 1) % K; };
   const double *Q = q.data(), *V = v.data(), *U = u.data();
@@ -139,6 +139,13 @@ py::dict time_dynamics(const std::shared_ptr<Multibody>& model, const std::strin
     run([&](auto a, auto b, auto c) {
       d.forward_dynamics(at_q(a), at_v(b), at_v(c), {}, Precision::double_, {out.data(), out.data() + square, out.data() + 2 * square});
     });
+  } else if (call == "coriolis_matrix") {
+    run([&](auto a, auto b, auto) { d.coriolis_matrix(false, at_q(a), at_v(b), Precision::double_, out.data()); });
+  } else if (call == "operational_space_inertia") {  // of the last body
+    const Node tip = model->node(model->node_index(model->body(model->bodies() - 1).name));
+    bool sure = true;
+    run([&](auto a, auto, auto) { sure &= w.operational_space(true, {&tip, 1}, at_q(a), out.data()); });
+    if (!sure) throw EvaluationError("the operational-space inertia of a state that is timed is left to the operators");
   } else if (call == "log_determinant_gradient") {
     run([&](auto a, auto, auto) { s.log_determinant(a, out.data(), nullptr, nullptr, nullptr); });
   } else {

@@ -96,6 +96,7 @@ py::object to_number(const Coefficient& c);
 // A run's numbers as an array of this shape; with expansions, an object array of mpmath numbers that lose nothing.
 py::object to_array(const Result& result, std::vector<py::ssize_t> shape);
 bool wants_objects(const py::object& dtype);
+int thread_count(const py::object& threads);                    // threads=: from 1 to 1024, else EvaluationError
 
 // An array of real numbers. Complex numbers, text, dates and masked entries are refused: NumPy would cast them in silence.
 Array real_array(const py::object& x);                           // TypeError unless real numbers
@@ -116,7 +117,7 @@ Expression symbol_again(const std::shared_ptr<SkoSource>& source, const std::str
 Expression source_symbol(const std::shared_ptr<SkoSource>& source, const std::string& name, const std::vector<std::string>& nodes, int coordinate);
 // A state, or a batch, for all models that occur unbound in the operands; q None takes the model's present state.
 std::shared_ptr<const Binding> make_binding(const std::vector<Expression>& operands, const py::object& q, const py::object& v,
-                                            const Arithmetic& arithmetic);
+                                            const Arithmetic& arithmetic, const py::object& threads);
 // refine: a number of corrections or "auto"; residual: "same" | "gather" | "wider".
 Refinement refinement(const py::object& refine, const std::string& residual, Precision precision);
 // What a space and an expression are pickled as.

@@ -244,6 +244,12 @@ Refinement refinement(const py::object& refine, const std::string& residual, Pre
   return r;
 }
 
+int thread_count(const py::object& threads) {
+  if (PyLong_CheckExact(threads.ptr()) && PyLong_AsLong(threads.ptr()) == 1) return 1;
+  PyErr_Clear();  // a number beyond what a long holds
+  return of_face("thread_count")(threads).cast<int>();
+}
+
 bool wants_objects(const py::object& dtype) {
   if (dtype.is_none()) return false;
   if (dtype.is(py::handle(reinterpret_cast<PyObject*>(&PyBaseObject_Type)))) return true;

@@ -91,6 +91,12 @@ py::array_t<double> written(const Multibody& model, Arguments& arguments, const 
   return result;
 }
 
+// Which Coriolis matrix a form is: Hφ(MJ̇ + 𝓑J), or Christoffel's.
+inline bool is_skew(const std::string& form) {
+  if (form == "christoffel" || form == "skew") return form == "skew";
+  throw EvaluationError("form '" + form + "' of the Coriolis matrix is not there; there are 'christoffel' and 'skew'");
+}
+
 // f(workspace, numbers, y) state after state, see Batches::run.
 template <template <class> class Workspace, class F>
 py::array_t<double> run(Batches<Workspace>& d, Precision precision, Arguments& arguments, const py::object& out, const std::vector<py::ssize_t>& shape, F f) {

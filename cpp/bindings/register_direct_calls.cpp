@@ -8,6 +8,7 @@
 
 #include <pybind11/typing.h>
 
+#include "bindings/direct_call_table.h"
 #include "bindings/direct_calls.h"
 #include "bindings/plain_arrays.h"
 #include "dynamics/batch_dynamics.h"
@@ -15,84 +16,9 @@
 
 namespace pycraft {
 
+using namespace direct;
+
 namespace {
-
-struct Options {
-  Solving how;
-  Precision precision = Precision::double_;
-};
-
-// A call as it came, as far as it is plain.
-struct Asked {
-  BatchDynamics* dynamics = nullptr;
-  Options options;
-  Node node;                   // of what is asked of a frame
-  std::array<Given, 3> given;
-  int states = -1;             // one
-  PyObject* out = nullptr;     // a new array
-};
-
-// What a call takes besides arrays.
-enum Takes : unsigned { takes_frame = 1, takes_solving = 2, takes_precision = 4, takes_method = 8 };
-
-// The axes of the result of one state: how many, and how long.
-struct Axes {
-  int count;
-  std::array<int, 2> lengths;
-};
-constexpr int coordinates = -1;  // the length nv of the model
-
-struct DirectCall {
-  const char* name;
-  std::array<const char*, 3> arrays;  // null after the last
-  unsigned takes;
-  Axes result;
-  void (*compute)(const Asked& a, double* out);
-  std::optional<kernels::Call> derivatives;  // of calls with three results, where kernels are sure of all states
-
-  int given() const { return static_cast<int>(std::find(arrays.begin(), arrays.end(), nullptr) - arrays.begin()); }
-  // Those of a prepared call. The method is none of them: what stands here is the articulated one.
-  std::vector<const char*> options() const {
-    std::vector<const char*> names;
-    if (takes & takes_frame) names = {"frame"};
-    if (takes & takes_solving) names.insert(names.end(), {"form", "refine", "residual", "on_singular"});
-    if (takes & takes_precision) names.push_back("precision");
-    return names;
-  }
-};
-
-constexpr DirectCall direct_calls[] = {
-    {"forward_dynamics", {"q", "v", "tau"}, takes_solving | takes_precision | takes_method, {1, {coordinates}}, [](const Asked& a, double* out) {
-       a.dynamics->forward_dynamics(a.given[0], a.given[1], a.given[2], a.options.how, a.options.precision, out);
-     }},
-    {"inverse_dynamics", {"q", "v", "vdot"}, takes_precision, {1, {coordinates}}, [](const Asked& a, double* out) {
-       a.dynamics->inverse_dynamics(a.given[0], a.given[1], &a.given[2], a.options.precision, out);
-     }},
-    {"bias_forces", {"q", "v"}, takes_precision, {1, {coordinates}}, [](const Asked& a, double* out) {
-       a.dynamics->inverse_dynamics(a.given[0], a.given[1], nullptr, a.options.precision, out);
-     }},
-    {"mass_matrix", {"q"}, takes_precision, {2, {coordinates, coordinates}}, [](const Asked& a, double* out) {
-       a.dynamics->mass_matrix(a.given[0], a.options.precision, out);
-     }},
-    {"mass_matrix_inverse", {"q"}, takes_solving | takes_precision, {2, {coordinates, coordinates}}, [](const Asked& a, double* out) {
-       a.dynamics->mass_matrix_inverse(a.given[0], a.options.how, a.options.precision, out);
-     }},
-    {"jacobian", {"q"}, takes_frame | takes_precision, {2, {6, coordinates}}, [](const Asked& a, double* out) {
-       a.dynamics->jacobian(a.node, a.given[0], a.options.precision, out);
-     }},
-    {"pose", {"q"}, takes_frame, {2, {4, 4}}, [](const Asked& a, double* out) { a.dynamics->pose(a.node, a.given[0], out); }},
-    {"inverse_dynamics_derivatives", {"q", "v", "vdot"}, takes_precision, {2, {coordinates, coordinates}}, nullptr, kernels::Call::inverse_dynamics_derivatives},
-    {"forward_dynamics_derivatives", {"q", "v", "tau"}, takes_precision, {2, {coordinates, coordinates}}, nullptr, kernels::Call::forward_dynamics_derivatives},
-};
-
-const DirectCall& direct_call(const std::string& name) {
-  std::string known;
-  for (const DirectCall& call : direct_calls) {
-    if (name == call.name) return call;
-    known += (known.empty() ? "'" : ", '") + std::string(call.name) + "'";
-  }
-  throw EvaluationError("'" + name + "' is no direct call; there are " + known);
-}
 
 // ---- the callable
 
@@ -129,6 +55,10 @@ bool takes(const DirectCall& call, Options& options, PyObject* name, PyObject* v
   const auto is = [&](const char* text) { return PyUnicode_Check(value) && named(value, text); };
   if (named(name, "precision")) return call.takes & takes_precision && is("double");
   if (named(name, "method")) return call.takes & takes_method && is("articulated");
+  if (named(name, "form") && call.takes & takes_coriolis) {
+    options.skew = is("skew");
+    return options.skew || is("christoffel");
+  }
   if (!(call.takes & takes_solving)) return false;
   if (named(name, "form")) {
     for (const auto& [form, text] : {std::pair{Form::fast, "fast"}, std::pair{Form::ud, "ud"}, std::pair{Form::square_root, "square-root"}})
@@ -208,8 +138,10 @@ py::object result_of(const DirectCall& call, const Asked& asked) {
   return py::reinterpret_borrow<py::object>(asked.out);
 }
 
-// Three results in a tuple of the kind that the call has; nothing where kernels are not sure.
+// Three results in a tuple of the kind that the call has; nothing where it is not the plain case, or kernels are not sure.
 py::object derivatives(const Callable& c, const Asked& asked) {
+  const Options& options = asked.options;
+  if (options.precision != Precision::double_ || options.how.form != Form::fast || options.how.refinement.steps != 0) return py::object();
   std::array<double*, 3> target;
   py::tuple all(3);
   for (int i = 0; i < 3; ++i) {
@@ -254,13 +186,14 @@ py::object computed(const Callable& c, PyObject* const* args, py::ssize_t count,
   if (!result) return result;
   auto* const target = reinterpret_cast<double*>(py::detail::array_proxy(result.ptr())->data);
   const Multibody& model = asked.dynamics->model();
+  bool done;
   if (py::ssize_t(model.bodies()) * std::max(asked.states, 1) <= kept) {
-    call.compute(asked, target);
+    done = call.compute(asked, target);
   } else {
     const Undisturbed undisturbed(model);
-    call.compute(asked, target);
+    done = call.compute(asked, target);
   }
-  return result;
+  return done ? result : py::object();
 }
 
 PyObject* called(PyObject* self, PyObject* const* args, size_t flags, PyObject* names) {
@@ -367,8 +300,7 @@ Names names_of(const Texts& texts) {
 void register_direct_calls(py::module_& m) {
   m.def("direct_calls", [] {
     py::typing::Dict<py::str, py::typing::Tuple<Names, Names>> all;
-    for (const DirectCall& call : direct_calls)
-      if (!call.derivatives) all[call.name] = py::make_tuple(names_of(call.arrays), names_of(call.options()));
+    for (const DirectCall& call : direct_calls) all[call.name] = py::make_tuple(names_of(call.arrays), names_of(call.options()));
     return all;
   }, "By name: the arrays of each direct call, and the options that it is prepared with.");
   m.def("direct_call", [](const py::function& function, const std::optional<py::type>& made) {
@@ -377,13 +309,19 @@ void register_direct_calls(py::module_& m) {
       throw EvaluationError("calls with three results, and they alone, say in which kind of tuple they are");
     return callable(function, call, py::object(), Options{}, py::object(), -2, made ? py::object(*made) : py::object());
   }, py::arg("function"), py::arg("made") = py::none(), "The direct call of this name: its plain case in the core, everything else by the function. made: the tuple of its three results.");
-  m.def("prepared_call", [](const py::object& function, const std::string& name, const py::object& dynamics, std::optional<int> batch, const py::str& frame, Form form,
-                            const py::object& refine, const std::string& residual, Precision precision, const std::string& on_singular) {
-    const Options options{{form, refinement(refine, residual, precision), on_singular_from_name(on_singular)}, precision};
-    return callable(function, direct_call(name), dynamics, options, frame, batch.value_or(-1));
-  }, py::arg("function"), py::arg("name"), py::arg("dynamics"), py::arg("batch"), py::kw_only(), py::arg("frame") = "", py::arg("form") = Form::fast,
+  m.def("prepared_call", [](const py::object& function, const std::string& name, const py::object& dynamics, std::optional<int> batch, const std::optional<py::type>& made,
+                            const py::str& frame, const py::object& form, const py::object& refine, const std::string& residual, Precision precision,
+                            const std::string& on_singular) {
+    const DirectCall& call = direct_call(name);
+    Options options{{Form::fast, refinement(refine, residual, precision), on_singular_from_name(on_singular)}, precision};
+    if (!form.is_none() && call.takes & takes_coriolis)
+      options.skew = is_skew(py::cast<std::string>(form));
+    else if (!form.is_none())
+      options.how.form = py::cast<Form>(form);
+    return callable(function, call, dynamics, options, frame, batch.value_or(-1), made ? py::object(*made) : py::object());
+  }, py::arg("function"), py::arg("name"), py::arg("dynamics"), py::arg("batch"), py::arg("made"), py::kw_only(), py::arg("frame") = "", py::arg("form") = py::none(),
      py::arg("refine") = 0, py::arg("residual") = "same", py::arg("precision") = Precision::double_, py::arg("on_singular") = "raise",
-     "A direct call of one model with its options, as `prepare` gives it.");
+     "A direct call of one model with its options, as `prepare` gives it. made: the tuple of three results.");
 }
 
 }  // namespace pycraft

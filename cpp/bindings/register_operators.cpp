@@ -202,12 +202,12 @@ void define_spaces_and_states(py::class_<Expression>& op) {
       .def_property_readonly("T", &Expression::T, "The transpose, the book's star: A: X→Y gives A.T: Y'→X'. Cost: none.")
       .def("inv", &Expression::inv, "The inverse, as an expression; how it is evaluated is the planner's business (see explain).")
       .def("sqrt", &square_root, "L with A = L L.T, body by body; for symmetric block-diagonal operators.")
-      .def("at", [](const Expression& e, const py::object& q, const py::object& v, Form form, const py::object& refine, const std::string& residual, Precision precision) {
-        return e.at(make_binding({e}, q, v, {form, refinement(refine, residual, precision), precision}));
-      }, py::arg("q") = py::none(), py::arg("v") = py::none(), py::kw_only(), py::arg("form") = Form::fast, py::arg("refine") = 0, py::arg("residual") = "same", py::arg("precision") = Precision::double_,
-         "The same expression bound to a state: q (nq,) or a batch (B, nq), v likewise (zero if left out); q=None takes the model's present\n"
-         "state. The innermost binding wins. form: \"fast\", \"ud\" or \"square-root\", of the articulated-inertia sweep; refine: corrections of\n"
-         "what is solved, a number or \"auto\", with residual=\"same\", \"gather\" or \"wider\"; precision: \"single\", \"double\", \"extended\", \"quad\", 50, 100.")
+      .def("at", [](const Expression& e, const py::object& q, const py::object& v, Form form, const py::object& refine, const std::string& residual, Precision precision, const py::object& threads) {
+        return e.at(make_binding({e}, q, v, {form, refinement(refine, residual, precision), precision}, threads));
+      }, py::arg("q") = py::none(), py::arg("v") = py::none(), py::kw_only(), py::arg("form") = Form::fast, py::arg("refine") = 0, py::arg("residual") = "same", py::arg("precision") = Precision::double_, py::arg("threads") = 1,
+         "The same expression bound to a state: q (nq,) or a batch (B, nq), v likewise (zero if left out); q=None takes the model's present state.\n"
+         "The innermost binding wins. form: \"fast\", \"ud\" or \"square-root\", of the articulated-inertia sweep; refine: corrections of what is solved, a\n"
+         "number or \"auto\", with residual=\"same\", \"gather\" or \"wider\"; precision: \"single\", \"double\", \"extended\", \"quad\", 50, 100; threads: share a batch.")
       .def("_bound", [](const Expression& e, const std::shared_ptr<const Binding>& b) { return e.at(b); });
 }
 

@@ -69,6 +69,12 @@ void register_sensitivities(py::module_& m) {
             w.mass_matrix(in[0], y);
         });
       }, py::arg("christoffel"), q, precision, py::arg("out"))
+      .def("coriolis_matrix", [](BatchSensitivities& d, const py::object& q, const py::object& v, const std::string& form, Precision precision, const py::object& out) {
+        const Multibody& mb = d.model();
+        Arguments given(mb, {{"q", q}, {"v", v}});
+        const bool skew = is_skew(form);
+        return written(mb, given, out, {mb.nv(), mb.nv()}, [&](double* target) { d.coriolis_matrix(skew, given[0], given[1], precision, target); });
+      }, q, v, py::arg("form"), precision, py::arg("out"))
       .def("kinetic_energy", [](BatchSensitivities& d, const py::object& q, const py::object& v, Precision precision) {
         const Multibody& mb = d.model();
         const int n = mb.nv();

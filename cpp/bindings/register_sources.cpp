@@ -64,9 +64,10 @@ Expression source_symbol(const std::shared_ptr<SkoSource>& source, const std::st
 }
 
 std::shared_ptr<const Binding> make_binding(const std::vector<Expression>& operands, const py::object& q_given, const py::object& v_given,
-                                            const Arithmetic& arithmetic) {
+                                            const Arithmetic& arithmetic, const py::object& threads) {
   auto binding = std::make_shared<Binding>();
   binding->arithmetic = arithmetic;
+  const int count = thread_count(threads);
   bool anything = false;
   const auto sources = unbound_sources(operands, anything);
   if (!anything) return the_one_like(binding);
@@ -117,19 +118,21 @@ std::shared_ptr<const Binding> make_binding(const std::vector<Expression>& opera
   }
   binding->nq = nq;
   binding->nv = nv;
+  if (binding->batch >= 0) binding->threads = count;  // one state has nothing to share
   return the_one_like(binding);
 }
 
 void register_sources(py::module_& m) {
   declared<py::class_<Binding, std::shared_ptr<Binding>>>(m, "Binding")
+      .def_readonly("threads", &Binding::threads, "How many share the states of a batch.")
       .def("__reduce__", [](const Binding& b) -> py::tuple {
         return py::make_tuple(py::module_::import("pycraft._core").attr("_binding_from_parts"),
                               py::make_tuple(b.batch, b.nq, b.nv, b.q, b.v, b.arithmetic.precision, b.arithmetic.form, b.arithmetic.refinement.steps,
-                                             static_cast<int>(b.arithmetic.refinement.residual)));
+                                             static_cast<int>(b.arithmetic.refinement.residual), b.threads));
       });
-  m.def("_binding_from_parts", [](int batch, int nq, int nv, std::vector<double> q, std::vector<double> v, Precision precision, Form form, int steps, int residual) {
+  m.def("_binding_from_parts", [](int batch, int nq, int nv, std::vector<double> q, std::vector<double> v, Precision precision, Form form, int steps, int residual, int threads) {
     auto b = std::make_shared<Binding>();
-    b->batch = batch, b->nq = nq, b->nv = nv, b->q = std::move(q), b->v = std::move(v), b->arithmetic = {form, {steps, residual_precisions[residual]}, precision};
+    b->batch = batch, b->nq = nq, b->nv = nv, b->q = std::move(q), b->v = std::move(v), b->arithmetic = {form, {steps, residual_precisions[residual]}, precision}, b->threads = threads;
     return std::const_pointer_cast<Binding>(the_one_like(b));
   });
   m.def("_binding", [](const Expression& e) {
@@ -137,9 +140,10 @@ void register_sources(py::module_& m) {
     return all.empty() ? std::shared_ptr<Binding>() : std::const_pointer_cast<Binding>(all[0].binding);
   });
   m.def("_bind", [](const std::vector<Expression>& operands, const py::object& q, const py::object& v, Form form, const py::object& refine,
-                    const std::string& residual, Precision precision) { return make_binding(operands, q, v, {form, refinement(refine, residual, precision), precision}); },
+                    const std::string& residual, Precision precision,
+                    const py::object& threads) { return make_binding(operands, q, v, {form, refinement(refine, residual, precision), precision}, threads); },
         py::arg("operands"), py::arg("q"), py::arg("v"), py::arg("form") = Form::fast, py::arg("refine") = 0, py::arg("residual") = "same",
-        py::arg("precision") = Precision::double_);
+        py::arg("precision") = Precision::double_, py::arg("threads") = 1);
 
   auto any_source = declared<py::class_<SkoSource, std::shared_ptr<SkoSource>>>(m, "SkoSource");
   any_source

@@ -1,5 +1,8 @@
 #include "dynamics/batch_dynamics.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace pycraft {
 
 namespace {
@@ -9,15 +12,28 @@ using Wrenches = std::vector<Vector6<S>>;
 
 // What kernels do: at regular states what becomes of singular ones does not matter.
 bool plain(const Solving& how) { return how.form == Form::fast && how.refinement.steps == 0; }
+// Whether what is refined is what kernels give.
+bool refines_regular(const Solving& how) { return how.form == Form::fast && how.refinement.steps != 0 && how.on_singular == OnSingular::raise; }
+// Whether they refine it themselves.
+bool refined_by_links(const Solving& how) { return refines_regular(how) && !how.refinement.wider(); }
+LinkCall refined(LinkCall asked, const Refinement& how) {
+  asked.call = how.gathers_wider() ? kernels::Call::gathered_dynamics : kernels::Call::refined_dynamics;
+  asked.steps = how.steps == Refinement::automatic ? most_corrections : how.steps;
+  return asked;
+}
 
 }  // namespace
 
-BatchDynamics::Starts BatchDynamics::refined_from(Precision precision, const LinkCall& asked, int states, int size, const Solving& how) {
+BatchDynamics::Starts BatchDynamics::refined_from(Precision precision, const LinkCall& asked, int from, int to, int size, const Solving& how) {
   Starts starts;
-  if (how.form != Form::fast || how.refinement.steps == 0 || how.on_singular != OnSingular::raise) return starts;
-  starts.size = size;
+  if (!refines_regular(how)) return starts;
+  const int states = to - from;
+  starts.first = from, starts.size = size;
   starts.values.resize(size_t(states) * size), starts.there.assign(states, 1);
-  const bool done = by_links(precision, asked, states, size, starts.values.data(),
+  const auto rest = [from](const Given& all) { return Given{all.name, all.at(from), all.width, all.batch}; };
+  const Given q = rest(asked.q), v = asked.v ? rest(*asked.v) : Given{}, u = asked.u ? rest(*asked.u) : Given{};
+  const LinkCall plain{asked.call, q, asked.v ? &v : nullptr, asked.u ? &u : nullptr, asked.applied};
+  const bool done = by_links(precision, plain, states, size, starts.values.data(),
                              [&](int from, int to) { std::fill(starts.there.begin() + from, starts.there.begin() + to, 0); });
   if (!done) starts.there.clear();
   return starts;
@@ -70,16 +86,17 @@ void BatchDynamics::forward_dynamics_at(const Given& q, const Given& v, const Gi
 }
 
 void BatchDynamics::forward_dynamics(const Given& q, const Given& v, const Given& tau, const Solving& how, Precision precision, double* vdot,
-                                     const Applied<double>* applied) {
+                                     const Applied<double>* applied, int threads) {
   const ModelInUse use(model());
   check_given(model(), {q, v, tau});
   const int batch = common_batch({q, v, tau}), states = batch < 0 ? 1 : batch;
-  const LinkCall asked{kernels::Call::forward_dynamics, q, &v, &tau, applied};
-  const Starts starts = refined_from(precision, asked, states, model().nv(), how);
+  const LinkCall asked{.call = kernels::Call::forward_dynamics, .q = q, .v = &v, .u = &tau, .applied = applied, .threads = threads};
   const auto general = [&](int from, int to) {
+    const Starts starts = refined_from(precision, asked, from, to, model().nv(), how);
     at_precision(precision, [&]<class S>(S) { forward_dynamics_at<S>(q, v, tau, from, to, states, how, starts, vdot, applied); });
   };
-  if (!plain(how) || !by_links(precision, asked, states, model().nv(), vdot, general)) general(0, states);
+  const LinkCall whole = refined_by_links(how) ? refined(asked, how.refinement) : asked;
+  if (!(plain(how) || refined_by_links(how)) || !by_links(precision, whole, states, model().nv(), vdot, general)) general(0, states);
 }
 
 RefinementReport BatchDynamics::refinement(const Given& q, const Given& v, const Given& tau, const Solving& how, Precision precision, double* vdot) {
@@ -91,7 +108,8 @@ RefinementReport BatchDynamics::refinement(const Given& q, const Given& v, const
     forward_dynamics(q, v, tau, how, precision, vdot);
     return report;
   }
-  const Starts starts = refined_from(precision, {kernels::Call::forward_dynamics, q, &v, &tau}, 1, model().nv(), how);
+  const LinkCall asked{kernels::Call::forward_dynamics, q, &v, &tau};
+  const Starts starts = refined_from(precision, asked, 0, 1, model().nv(), how);
   Solving estimated = starts.of(0, how);
   estimated.estimate = true;
   at_precision(precision, [&]<class S>(S) {
@@ -103,14 +121,23 @@ RefinementReport BatchDynamics::refinement(const Given& q, const Given& v, const
     for (size_t j = 0; j < own.size(); ++j) vdot[j] = to_double(own[j]);
     require_finite(vdot, own.size(), model());
   });
+  if (!refined_by_links(how)) return report;
+  // What a call gives: as far off as this at most, and by how much they differ.
+  std::vector<double> called(model().nv());
+  bool sure = true;
+  if (!by_links(precision, refined(asked, how.refinement), 1, model().nv(), called.data(), [&](int, int) { sure = false; }) || !sure) return report;
+  double apart = 0, length = 0;
+  for (size_t j = 0; j < called.size(); ++j) apart = std::hypot(apart, called[j] - vdot[j]), length = std::hypot(length, vdot[j]);
+  if (apart > 0) report.estimated_error += apart / length;
+  std::copy(called.begin(), called.end(), vdot);
   return report;
 }
 
-void BatchDynamics::inverse_dynamics(const Given& q, const Given& v, const Given* vdot, Precision precision, double* tau, const Applied<double>* applied) {
+void BatchDynamics::inverse_dynamics(const Given& q, const Given& v, const Given* vdot, Precision precision, double* tau, const Applied<double>* applied, int threads) {
   const bool moving = vdot;
   const Given given[] = {q, v, moving ? *vdot : Given{}};
   const Givens all(given, moving ? 3 : 2);
-  plainly(precision, {kernels::Call::inverse_dynamics, q, &v, vdot, applied}, all, model().nv(), tau, [&] {
+  plainly(precision, {.call = kernels::Call::inverse_dynamics, .q = q, .v = &v, .u = vdot, .applied = applied, .threads = threads}, all, model().nv(), tau, [&] {
     PerScalar<Wrenches> wrenches;
     run(precision, all, model().nv(), tau, [&](auto& w, auto in, auto* y) {
       using S = std::remove_pointer_t<decltype(y)>;
@@ -134,8 +161,8 @@ void BatchDynamics::mass_matrix_inverse(const Given& q, const Solving& how, Prec
   const size_t size = size_t(model().nv()) * model().nv();
   const int states = q.batch < 0 ? 1 : q.batch;
   const LinkCall asked{kernels::Call::mass_matrix_inverse, q};
-  const Starts starts = refined_from(precision, asked, states, static_cast<int>(size), how);
   const auto general = [&](int from, int to) {
+    const Starts starts = refined_from(precision, asked, from, to, static_cast<int>(size), how);
     at_precision(precision, [&]<class S>(S) {
       std::vector<S> inverse(size);
       each<S>(from, to, states, [&](RigidDynamics<S>& w, int b) {
@@ -148,13 +175,27 @@ void BatchDynamics::mass_matrix_inverse(const Given& q, const Solving& how, Prec
   if (!plain(how) || !by_links(precision, asked, states, static_cast<int>(size), out, general)) general(0, states);
 }
 
+bool BatchDynamics::surely(const LinkCall& asked, Givens given, int size, double* out) {
+  bool done = true;
+  const auto general = [&] { done = false; };
+  plainly(Precision::double_, asked, given, size, out, general);
+  return done;
+}
+
 bool BatchDynamics::derivatives(kernels::Call call, const Given& q, const Given& v, const Given& u, const std::array<double*, 3>& out) {
-  const ModelInUse use(model());
-  check_given(model(), {q, v, u});
-  const int batch = common_batch({q, v, u});
-  bool doubt = false;
-  const LinkCall asked{.call = call, .q = q, .v = &v, .u = &u, .others = &out[1]};
-  return by_links(Precision::double_, asked, batch < 0 ? 1 : batch, model().nv() * model().nv(), out[0], [&](int, int) { doubt = true; }) && !doubt;
+  return surely({.call = call, .q = q, .v = &v, .u = &u, .others = &out[1]}, {q, v, u}, model().nv() * model().nv(), out[0]);
+}
+
+bool BatchDynamics::coriolis_matrix(bool skew, const Given& q, const Given& v, double* out) {
+  const kernels::Call call = skew ? kernels::Call::skew_coriolis_matrix : kernels::Call::coriolis_matrix;
+  return surely({.call = call, .q = q, .v = &v}, {q, v}, model().nv() * model().nv(), out);
+}
+
+bool BatchDynamics::operational_space(bool inverse, std::span<const Node> nodes, const Given& q, double* out) {
+  if (nodes.empty() || std::any_of(nodes.begin(), nodes.end(), [](const Node& node) { return node.body < 0; })) return false;
+  const kernels::Call call = inverse ? kernels::Call::operational_space_inertia : kernels::Call::operational_space_compliance;
+  const int rows = 6 * static_cast<int>(nodes.size());
+  return surely({.call = call, .q = q, .node = nodes.data(), .nodes = static_cast<int>(nodes.size())}, {q}, rows * rows, out);
 }
 
 void BatchDynamics::jacobian(const Node& node, const Given& q, Precision precision, double* out) {

@@ -47,6 +47,12 @@ class BatchSensitivities : public Batches<Sensitivities> {
     if (!dynamics_.by_links(precision, {.call = kernels::Call::inverse_dynamics_derivatives, .q = q, .v = &v, .u = &vdot, .others = &out[1]}, states, static_cast<int>(square), out[0], general)) general(0, states);
   }
 
+  // C, (nv, nv) a state: Hφ(MJ̇ + 𝓑J) or Christoffel's.
+  void coriolis_matrix(bool skew, const Given& q, const Given& v, Precision precision, double* out) {
+    if (precision == Precision::double_ && dynamics_.coriolis_matrix(skew, q, v, out)) return;
+    run(precision, {q, v}, model().nv() * model().nv(), out, [&](auto& w, auto in, auto* y) { w.coriolis_matrix(in[0], in[1], skew, y); });
+  }
+
   // ∂v̇/∂q, ∂v̇/∂v, ∂v̇/∂τ, (nv, nv) a state each.
   void forward_dynamics(const Given& q, const Given& v, const Given& tau, const Solving& how, Precision precision, const std::array<double*, 3>& out) {
     const ModelInUse use(model());

@@ -1,5 +1,5 @@
 // Direct calls by the kernels of this machine's instruction set (cpp/kernels): the plain case of forward dynamics, inverse dynamics, the mass
-// matrix, its inverse and the derivatives of both dynamics, one state or packs of states. What kernels leave in doubt is the general recursions' to decide (rigid_dynamics.h).
+// matrix, its inverse, the derivatives of both dynamics, Coriolis matrices and operational-space inertias, one state or packs of states. What kernels leave in doubt is the general recursions' to decide (rigid_dynamics.h).
 #pragma once
 
 #include <algorithm>
@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "dynamics/batches.h"
+#include "dynamics/subtrees.h"
 #include "kernels/instruction_set.h"
 #include "kernels/link_model.h"
 #include "recursions/applied.h"
@@ -21,8 +22,11 @@ struct LinkCall {
   const Given& q;
   const Given *v = nullptr, *u = nullptr;
   const Applied<double>* applied = nullptr;  // null: the model's gravity alone
-  const Node* node = nullptr;
+  const Node* node = nullptr;                // of what is asked of nodes: so many of them
+  int nodes = 1;
   double* const* others = nullptr;           // where the second and third result go
+  int threads = 1;                           // that share the subtrees of one state
+  int steps = 0;                             // of refined calls: corrections at most
 };
 
 // Of one model, for T = float or double. Memory is kept from call to call.
@@ -46,7 +50,7 @@ class LinkDynamics {
   template <class Again>
   void run(const LinkCall& asked, int count, int size, double* out, Again again) {
     using kernels::Call;
-    const auto& [call, q, v, u, applied, node, others] = asked;
+    const auto& [call, q, v, u, applied, node, nodes, others, threads, steps] = asked;
     T gravity[3];
     const T* wrenches = nullptr;
     std::copy_n(gravity_, 3, gravity);
@@ -54,9 +58,9 @@ class LinkDynamics {
       for (int i = 0; i < 3; ++i) gravity[i] = static_cast<T>(applied->gravity[i]);
       if (applied->wrenches) wrenches = carried(*applied);
     }
-    const bool matrix = !(call == Call::forward_dynamics || call == Call::inverse_dynamics || call == Call::jacobian || call == Call::pose);  // kernels look through those themselves
+    const bool matrix = is_matrix(call);
     const auto stride = [](const Given& g) { return g.batch < 0 ? size_t(0) : size_t(g.width); };
-    const kernels::OnLink<T> on_link = node ? model_->on_link(*node) : kernels::OnLink<T>{};
+    place(node, node ? nodes : 0);
     int doubted = 0;  // how many states before b are in doubt
     for (int b = 0; b < count;) {
       const kernels::Kernels<T>& kernel = chosen(call, count - b, matrix);
@@ -64,8 +68,12 @@ class LinkDynamics {
       const int lanes = std::min(kernel.lanes, count - b);
       double* of_these[2] = {};
       for (int i = 0; others && i < 2; ++i) of_these[i] = others[i] + size_t(b) * size;
-      const kernels::States<T> states{q.at(b), v ? v->at(b) : nullptr, u ? u->at(b) : nullptr, stride(q), v ? stride(*v) : 0, u ? stride(*u) : 0, lanes, gravity, wrenches, check_interrupt, node ? &on_link : nullptr, of_these};
-      const unsigned sound = how.run(model_->links(), states, out + size_t(b) * size, size, work(how.work(model_->links())));
+      const kernels::States<T> states{q.at(b), v ? v->at(b) : nullptr, u ? u->at(b) : nullptr, stride(q), v ? stride(*v) : 0, u ? stride(*u) : 0, lanes, gravity, wrenches, check_interrupt, on_nodes_.data(), static_cast<int>(on_nodes_.size()), of_these, nullptr, nullptr, T(0), steps};
+      T* const memory = work(how.work(model_->links(), states.nodes));
+      double* const to = out + size_t(b) * size;
+      const bool pieces = count == 1 && threads > 1 && in_parts(call, kernel);
+      const unsigned sound = pieces ? InParts<T>(kernel.in_parts[static_cast<int>(call)], model_->links(), model_->parts(), threads, to, memory).run(states)
+                                    : how.run(model_->links(), states, to, size, memory);
       for (const int end = b + lanes, first = b; b < end; ++b) {
         const bool sure = (sound >> (b - first) & 1) && (matrix || all_finite(out + size_t(b) * size, size));
         if (sure && doubted > 0) again(b - doubted, b);
@@ -77,12 +85,35 @@ class LinkDynamics {
   }
 
  private:
+  // Of all coordinates: kernels look through those for what is not finite themselves.
+  static bool is_matrix(kernels::Call call) {
+    switch (call) {
+      case kernels::Call::forward_dynamics:
+      case kernels::Call::inverse_dynamics:
+      case kernels::Call::jacobian:
+      case kernels::Call::pose:
+      case kernels::Call::refined_dynamics:
+      case kernels::Call::gathered_dynamics:
+      case kernels::Call::operational_space_compliance:
+      case kernels::Call::operational_space_inertia: return false;
+      default: return true;
+    }
+  }
+  // Nodes where links carry them, in the links' order.
+  void place(const Node* node, int nodes) {
+    on_nodes_.resize(nodes);
+    for (int i = 0; i < nodes; ++i) on_nodes_[i] = model_->on_link(node[i]), on_nodes_[i].place = i;
+    std::sort(on_nodes_.begin(), on_nodes_.end(), [](const auto& a, const auto& b) { return a.link != b.link ? a.link < b.link : a.place < b.place; });
+  }
   // Matrices of many coordinates have rows enough to fill registers with, and packs of them would not fit near memory.
   const kernels::Kernels<T>& chosen(kernels::Call call, int states, bool matrix) const {
     if constexpr (std::is_same_v<T, double>)
       return states == 1 || (matrix && nv_ > 48) || !set_.pack[call].run ? set_.one : set_.pack;
     else
       return set_.singles;
+  }
+  bool in_parts(kernels::Call call, const kernels::Kernels<T>& kernel) const {
+    return call <= kernels::Call::inverse_dynamics && kernel.in_parts[0].begin && !model_->parts().empty();
   }
   T* work(size_t numbers) {
     if (numbers > size_) {
@@ -109,6 +140,7 @@ class LinkDynamics {
   size_t size_ = 0;
   std::vector<Vector6<T>> on_bodies_;
   std::vector<T> on_links_;
+  std::vector<kernels::OnLink<T>> on_nodes_;
 };
 
 }  // namespace pycraft

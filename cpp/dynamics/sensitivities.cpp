@@ -234,6 +234,14 @@ void Sensitivities<S>::christoffel(const S* q, S* out) {
   }
 }
 
+template <class S>
+void Sensitivities<S>::coriolis_matrix(const S* q, const S* v, bool skew, S* out) {
+  kinematics(*model_, q, blocks_);
+  if (!coriolis_) coriolis_ = std::make_unique<CoriolisBodies<S>>(*model_);
+  coriolis_->fill(*model_, blocks_, v);
+  pycraft::coriolis_matrix(*model_, *coriolis_, skew, out);
+}
+
 // With the momentum of the bodies as it is seen from the frame, (n; f), and R(0; u) = (h × u; m u) of what it does not see:
 // KE = KE' + u·f + m|u|²/2.
 template <class S>

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "algebra/trees/sweeps/mass_matrix.h"
+#include "dynamics/coriolis_bodies.h"
 #include "dynamics/rigid_dynamics.h"
 #include "dynamics/tangent_dynamics.h"
 #include "model/multibody.h"
@@ -30,6 +31,8 @@ class Sensitivities {
   void mass_matrix(const S* q, S* out);
   // Γ(i, j, k) of Koszul's formula, with the brackets of quasi-velocities: Σ Γ(i,j,k) v_j v_k = C v without gravity. (nv, nv, nv).
   void christoffel(const S* q, S* out);
+  // C (nv, nv): Christoffel's Γ v, or Hφ(MJ̇ + 𝓑J).
+  void coriolis_matrix(const S* q, const S* v, bool skew, S* out);
   // ∂KE/∂q and ∂KE/∂v = (ℳ + J) v, each (nv). Rotors do not depend on q.
   void kinetic_energy(const S* q, const S* v, S* dq, S* dv);
   // Hamilton's equations: v = (ℳ + J)⁻¹p and ṗ = T + Ḣp - HV̄p of the bodies' momenta φMV, gravity included, each (nv).
@@ -65,6 +68,7 @@ class Sensitivities {
   std::vector<S> q_, v_, rates_, work_, solution_, scratch_;
   std::unique_ptr<RigidDynamics<S>> dynamics_;
   std::unique_ptr<TangentDynamics<S>> tangents_;
+  std::unique_ptr<CoriolisBodies<S>> coriolis_;
 };
 
 #define PYCRAFT_INSTANTIATE(S) extern template class Sensitivities<S>;

@@ -17,7 +17,9 @@ struct Bodies {
   const Way* way;
   const unsigned char* branches;  // has a child besides the body that follows it
   const T* pose;          // R by rows, then p
+  const T* inertia;       // ten numbers: mass, first moment, rotational inertia xx, xy, xz, yy, yz, zz
   const T *H, *G;         // six numbers a coordinate
+  const T* J;             // rotor inertia, a number a coordinate
   const T *D, *L;         // of each body from at[k] on: D(k), and L of D = L d L*
   const size_t* at;
   const T* pivots;        // d
@@ -26,8 +28,11 @@ struct Bodies {
 
 // On m columns, row-major, of one type: y = f(x), x and y apart from each other, in `scratch` of six numbers a body and column.
 template <class T>
+using ColumnKernel = void (*)(const Bodies<T>& bodies, const T* x, T* y, int m, T* scratch);
+template <class T>
 struct ColumnKernels {
-  void (*mass_matrix_inverse)(const Bodies<T>& bodies, const T* x, T* y, int m, T* scratch);
+  ColumnKernel<T> mass_matrix_inverse;
+  ColumnKernel<T> mass_matrix[2];   // without J, with it
 };
 
 }  // namespace pycraft::kernels

@@ -1,5 +1,6 @@
-// Sweeps over the bodies of a tree with several columns side by side, an instruction for all: algebra/trees/sweeps/mass_matrix.h, with
-// products fused as lanes.h says. A column has the same bits among any number of others. What a body's numbers make exactly zero is left out.
+// What sweeps over the bodies of a tree with several columns side by side, an instruction for all, are made of, and ℳ⁻¹X by them:
+// algebra/trees/sweeps/mass_matrix.h, with products fused as lanes.h says. A column has the same bits among any number of others. What a body's
+// numbers make exactly zero is left out.
 #pragma once
 
 #include "kernels/bodies.h"
@@ -105,18 +106,19 @@ inline void solve_D(const T* L, const T* pivots, int n, T* x, size_t m) {
     for (int j = i + 1; j < n; ++j) to_memory(row(i) - S(L[j * n + i]) * row(j), x + i * m);
 }
 
-// Six rows of columns in a row of memory.
-template <class S>
+// Six rows of columns, `stride` apart in memory.
+template <class S, class Number = typename S::Scalar>
 struct Rows {
-  typename S::Scalar* base;
+  Number* base;
   int columns;
+  size_t stride;
   [[gnu::always_inline]] Six<S> operator[](int c) const {
     Six<S> a;
-    for (int r = 0; r < 3; ++r) a.angular[r] = from_memory<S>(base + r * columns + c), a.linear[r] = from_memory<S>(base + (3 + r) * columns + c);
+    for (int r = 0; r < 3; ++r) a.angular[r] = from_memory<S>(base + r * stride + c), a.linear[r] = from_memory<S>(base + (3 + r) * stride + c);
     return a;
   }
   [[gnu::always_inline]] void set(int c, const Six<S>& a) const {
-    for (int r = 0; r < 3; ++r) to_memory(a.angular[r], base + r * columns + c), to_memory(a.linear[r], base + (3 + r) * columns + c);
+    for (int r = 0; r < 3; ++r) to_memory(a.angular[r], base + r * stride + c), to_memory(a.linear[r], base + (3 + r) * stride + c);
   }
   template <class F>
   [[gnu::always_inline]] void each(F&& f) const {
@@ -212,10 +214,16 @@ template <class S>
   to.each([&](int c) __attribute__((always_inline)) { to.set(c, Six<S>::zero()); });
 }
 
+// Six rows a body, as many columns as are at hand and `stride` apart.
+template <class S, class T>
+[[gnu::always_inline]] inline Rows<S, T> rows_of(int k, T* all, int columns, size_t stride) {
+  return {all + size_t(6) * k * stride, columns, stride};
+}
+
 // Sweeps over the bodies, six rows at hand from body to body: those of one that branches are kept.
 template <class S, class T, class F>
 [[gnu::always_inline]] inline void tip_to_base(const Bodies<T>& b, const Rows<S>& at_hand, T* kept, F&& f) {
-  const auto of = [&](int k) { return Rows<S>{kept + size_t(6) * k * at_hand.columns, at_hand.columns}; };
+  const auto of = [&](int k) { return rows_of<S>(k, kept, at_hand.columns, at_hand.stride); };
   for (int k = 0; k < b.count; ++k)
     if (b.branches[k]) clear(of(k));
   for (int k = b.count - 1; k >= 0; --k) {
@@ -229,7 +237,7 @@ template <class S, class T, class F>
 }
 template <class S, class T, class F>
 [[gnu::always_inline]] inline void base_to_tip(const Bodies<T>& b, const Rows<S>& at_hand, T* kept, F&& f) {
-  const auto of = [&](int k) { return Rows<S>{kept + size_t(6) * k * at_hand.columns, at_hand.columns}; };
+  const auto of = [&](int k) { return rows_of<S>(k, kept, at_hand.columns, at_hand.stride); };
   for (int k = 0; k < b.count; ++k) {
     if ((k & 255) == 255) b.interrupt();
     const int p = b.parent[k];
@@ -239,33 +247,35 @@ template <class S, class T, class F>
   }
 }
 
-template <class S, int columns, class T>
-void mass_matrix_inverse_of_columns(const Bodies<T>& b, const T* x, T* y, int count, size_t m, T* kept) {
-  alignas(64) T own[6 * columns];
-  const Rows<S> at_hand{own, columns == 1 ? 1 : count};
-  tip_to_base(b, at_hand, kept, [&](int k) __attribute__((always_inline)) {
-    with_way(b.way[k], [&]<int pin, int level>() __attribute__((always_inline)) { innovations<pin, level>(b, k, at_hand, x, y, m); });
-  });
-  base_to_tip(b, at_hand, kept, [&](int k) __attribute__((always_inline)) {
-    with_way(b.way[k], [&]<int pin, int level>() __attribute__((always_inline)) { accelerations<pin, level>(b, k, at_hand, y, m); });
-  });
-}
+// y = [I-HψK]* D⁻¹ [I-HψK] x
+struct MassMatrixInverse {
+  template <class S, int most, class T>
+  static void run(const Bodies<T>& b, const T* x, T* y, int count, size_t m, T* kept) {
+    alignas(64) T own[6 * most];
+    const int columns = most == 1 ? 1 : count;
+    const Rows<S> at_hand{own, columns, size_t(columns)};
+    tip_to_base(b, at_hand, kept, [&](int k) __attribute__((always_inline)) {
+      with_way(b.way[k], [&]<int pin, int level>() __attribute__((always_inline)) { innovations<pin, level>(b, k, at_hand, x, y, m); });
+    });
+    base_to_tip(b, at_hand, kept, [&](int k) __attribute__((always_inline)) {
+      with_way(b.way[k], [&]<int pin, int level>() __attribute__((always_inline)) { accelerations<pin, level>(b, k, at_hand, y, m); });
+    });
+  }
+};
 
 // W columns in an instruction, a block of them at once. What is left over overlaps those before it, or goes by fewer.
-template <class T, int W>
-void mass_matrix_inverse_columns(const Bodies<T>& b, const T* x, T* y, int m, T* scratch) {
+template <class Sweep, class T, int W>
+void of_columns(const Bodies<T>& b, const T* x, T* y, int m, T* scratch) {
   constexpr int block = W == 1 ? 1 : 64;
   if constexpr (W > 1) {
-    if (m < W) return mass_matrix_inverse_columns<T, W == 8 ? 4 : 1>(b, x, y, m, scratch);
+    if (m < W) return of_columns<Sweep, T, W == 8 ? 4 : 1>(b, x, y, m, scratch);
   }
   for (int c = 0; c < m;) {
+    if (c > 0) b.interrupt();
     const int count = m - c < W ? W : m - c < block ? (m - c) / W * W : block, at = c + count <= m ? c : m - count;
-    mass_matrix_inverse_of_columns<Lanes<T, W>, block>(b, x + at, y + at, count, m, scratch);
+    Sweep::template run<Lanes<T, W>, block>(b, x + at, y + at, count, size_t(m), scratch);
     c = at + count;
   }
 }
-
-template <class T, int W>
-constexpr ColumnKernels<T> column_kernels{mass_matrix_inverse_columns<T, W>};
 
 }  // namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET

@@ -81,23 +81,25 @@ struct Rows3 {
   }
 };
 
-// Columns `left` to left + 8 of a result below its diagonal, from as many rows above it: row j at above + (j & mask) stride.
-inline void put_below(const double* above, size_t stride, int mask, double* out, int left, int n) {
+// Columns `left` to left + 8 of a result below its diagonal, of rows from `from` to `to`, from as many rows above it: row j at above + (j & mask) stride.
+// from: left, or eight's multiple beyond it.
+inline void put_below(const double* above, size_t stride, int mask, double* out, int left, int from, int to, int n) {
   constexpr int tile = 8;
   const int right = left + tile < n ? left + tile : n;
-  for (int top = left; top < n; top += tile) {
-    if (top > left && top + tile <= n) {
+  for (int top = from; top < to; top += tile) {
+    if (top > left && top + tile <= to) {
       double block[tile][tile];
       for (int j = 0; j < tile; ++j)
         for (int i = 0; i < tile; ++i) block[i][j] = above[size_t((left + j) & mask) * stride + top + i];
       for (int i = 0; i < tile; ++i)
         for (int j = 0; j < tile; ++j) out[size_t(top + i) * n + left + j] = block[i][j];
     } else {
-      for (int i = top; i < n && i < top + tile; ++i)
+      for (int i = top; i < to && i < top + tile; ++i)
         for (int j = left; j < i && j < right; ++j) out[size_t(i) * n + j] = above[size_t(j & mask) * stride + i];
     }
   }
 }
+inline void put_below(const double* above, size_t stride, int mask, double* out, int left, int n) { put_below(above, stride, mask, out, left, left, n, n); }
 
 // Results of one state in place: rows of many columns, whose last block ends with the row.
 template <class S>

@@ -3,6 +3,7 @@
 // every row, so that one instruction takes several of them.
 #pragma once
 
+#include "kernels/mirror.h"
 #include "kernels/steps.h"
 
 namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET {
@@ -62,37 +63,6 @@ template <class S, class Move>
   int c = 0;
   for (; c + BlockOf<S>::columns <= last; c += BlockOf<S>::columns) take(Block<S>(), c);
   for (; c < last; ++c) take(S(), c);
-}
-
-// The upper triangle of n numbers a side mirrored. False where one of them is no number or not finite.
-inline bool mirror(double* out, int n, void (*interrupt)()) {
-  constexpr int tile = 8;
-  double odd[tile] = {};
-  for (int top = 0; top < n; top += tile) {
-    if (n > 1024) interrupt();
-    for (int left = 0; left <= top; left += tile) {
-      if (left == top || top + tile > n) {
-        for (int i = top; i < n && i < top + tile; ++i)
-          for (int j = left; j <= i && j < left + tile; ++j) {
-            const double x = out[size_t(j) * n + i];
-            odd[0] += x - x;
-            out[size_t(i) * n + j] = x;
-          }
-        continue;
-      }
-      double block[tile][tile];
-      for (int j = 0; j < tile; ++j)
-        for (int i = 0; i < tile; ++i) {
-          const double x = out[size_t(left + j) * n + top + i];
-          odd[i] += x - x;
-          block[i][j] = x;
-        }
-      for (int i = 0; i < tile; ++i)
-        for (int j = 0; j < tile; ++j) out[size_t(top + i) * n + left + j] = block[i][j];
-    }
-  }
-  for (int i = 1; i < tile; ++i) odd[0] += odd[i];
-  return odd[0] == 0;
 }
 
 }  // namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET

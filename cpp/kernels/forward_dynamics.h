@@ -6,47 +6,12 @@
 // with P_h the column of the hinge's axis. What projecting out a hinge without J makes zero is neither stored nor computed: a pin's row of A
 // and B. The inertia of a chain stays at hand from link to link; only branches are laid aside, at their parent.
 //
-// A pivot that is small beside what it might be is not judged here (pivots.h): its state comes back in doubt.
+// Where the estimate of pivots.h leaves a doubt of a pivot, the errors of pivot_errors.h decide.
 #pragma once
 
-#include "kernels/motions.h"
-#include "kernels/pivots.h"
+#include "kernels/pivot_errors.h"
 
 namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET {
-
-template <class S>
-struct ForwardLink {
-  Motion<S> motion;
-  S inverse, innovation;      // D⁻¹, ε
-  Vector3<S> angular, linear;  // P_h
-  Vector3<S> alpha, acceleration;  // of the link
-};
-template <class S>
-struct ForwardMultiple {  // hinges of several coordinates
-  S rate[6];              // D⁻¹ε
-  Matrix3<S> gain;        // ball: D⁻¹B
-  Factors<3, S> ball;     // of D
-  Factors<6, S> free;
-};
-
-template <class S>
-struct ForwardWork {
-  ForwardLink<S>* link;
-  Inertia<S>* branch;
-  ForwardMultiple<S>* multiple;
-  template <class T>
-  static size_t size(const Links<T>& links) {
-    return links.count * (sizeof(ForwardLink<S>) + sizeof(Inertia<S>)) + links.multiple * sizeof(ForwardMultiple<S>);
-  }
-  template <class T>
-  ForwardWork(const Links<T>& links, T* work) {
-    link = reinterpret_cast<ForwardLink<S>*>(work);
-    branch = reinterpret_cast<Inertia<S>*>(link + links.count);
-    multiple = reinterpret_cast<ForwardMultiple<S>*>(branch + links.count);
-  }
-  template <class T>
-  ForwardMultiple<S>* of(const Link<T>& link) const { return multiple + (link.multi < 0 ? 0 : link.multi); }
-};
 
 // P += M, z += b' - what is applied. forces: whether z is wanted at all, here and below.
 template <bool forces, class S, class T>
@@ -164,6 +129,7 @@ template <class Kind, bool rotor, bool forces, class S, class T>
   const bool root = link.parent < 0;
   const auto rotation = Kind::rotation(m.place);
   constexpr int K = Kind::row;
+  w.keep_diagonals(P);
   if constexpr (Kind::nv == 1) {
     const S J(link.J), tau = S(link.sign) * force(0);
     S D(J), along, own;
@@ -210,71 +176,81 @@ template <class Kind, bool rotor, bool forces, class S, class T>
   }
 }
 
-// Of link k from its parent's acceleration (alpha; acceleration), which becomes its own.
-template <class Kind, class S, class T>
-[[gnu::always_inline]] inline void accelerate(const Link<T>& link, const States<T>& at, const ForwardLink<S>& w, const ForwardMultiple<S>* multiple, Vector3<S>& alpha, Vector3<S>& acceleration,
-                                              double* out, size_t stride) {
+// A link's acceleration (alpha; acceleration) from its parent's, with the terms a' of motion or, as of a correction, without. innovation: ε; rate:
+// D⁻¹ε of several coordinates. give(i, x, absorbed): θ̈ + x of coordinate i, and where its hinge absorbs its own terms (motions.h) those.
+template <class Kind, bool moving, class S, class T, class Give>
+[[gnu::always_inline]] inline void accelerate_link(const Link<T>& link, const ForwardLink<S>& w, const S& innovation, const S* rate, const ForwardMultiple<S>* multiple, Vector3<S>& alpha,
+                                                   Vector3<S>& acceleration, Give give) {
   const Motion<S>& m = w.motion;
   const auto rotation = Kind::rotation(m.place);
   Vector3<S> linear = acceleration + cross(alpha, Kind::arm(link, m.place));
-  if constexpr (Kind::nv < 6) linear = linear + m.sliding;
+  if constexpr (moving && Kind::nv < 6) linear = linear + m.sliding;
   acceleration = rotation.to_child(linear);
   alpha = rotation.to_child(alpha);
-  const auto give = [&](int i, const S& x) { scattered(x, out + link.v + i, stride, at.states); };
+  const S* const nothing = nullptr;
   if constexpr (Kind::nv == 1) {
     constexpr int K = Kind::row, i = (K + 1) % 3, j = (K + 2) % 3;
     if constexpr (Kind::pin) {
-      alpha[i] += m.turning[i], alpha[j] += m.turning[j];
-      const S left = w.innovation - w.angular[i] * alpha[i] - w.angular[j] * alpha[j] - dot(w.linear, acceleration);
+      if constexpr (moving) alpha[i] += m.turning[i], alpha[j] += m.turning[j];
+      const S left = innovation - w.angular[i] * alpha[i] - w.angular[j] * alpha[j] - dot(w.linear, acceleration);
       // D θ̈ = left - P_KK α_K. Without a rotor D is P_KK, and the link turns as if nothing turned its parent.
       if (link.rotor) {
         const S rate = (left - w.angular[K] * alpha[K]) * w.inverse;
-        give(0, S(link.sign) * rate);
+        give(0, S(S(link.sign) * rate), nothing);
         alpha[K] += rate;
       } else {
         const S whole = left * w.inverse;
-        give(0, S(link.sign) * (whole - alpha[K]));
+        give(0, S(S(link.sign) * (whole - alpha[K])), nothing);
         alpha[K] = whole;
       }
     } else {
-      alpha = alpha + m.turning;
-      const S rate = (w.innovation - dot(w.angular, alpha) - dot(w.linear, acceleration)) * w.inverse;
+      if constexpr (moving) alpha = alpha + m.turning;
+      const S rate = (innovation - dot(w.angular, alpha) - dot(w.linear, acceleration)) * w.inverse;
       alpha[K] += S(link.turn) * rate, acceleration[K] += S(link.travel) * rate;
-      give(0, S(link.sign) * rate);
+      give(0, S(S(link.sign) * rate), nothing);
     }
   } else if constexpr (Kind::nv == 3) {
-    alpha = alpha + m.turning;
-    const Vector3<S> whole = Vector3<S>{multiple->rate[0], multiple->rate[1], multiple->rate[2]} - multiple->gain * acceleration;
-    each_of<3>([&](int i) { give(i, whole[i] - alpha[i]); });
+    if constexpr (moving) alpha = alpha + m.turning;
+    const Vector3<S> whole = Vector3<S>{rate[0], rate[1], rate[2]} - multiple->gain * acceleration;
+    each_of<3>([&](int i) { give(i, S(whole[i] - alpha[i]), nothing); });
     alpha = whole;
   } else {
-    alpha = alpha + m.turning;
-    const S* rate = multiple->rate;
-    for (int i = 0; i < 3; ++i) give(i, rate[i] - alpha[i]), give(3 + i, rate[3 + i] - acceleration[i] - m.sliding[i]);
+    if constexpr (moving) alpha = alpha + m.turning;
+    for (int i = 0; i < 3; ++i) give(i, S(rate[i] - alpha[i]), nothing), give(3 + i, S(rate[3 + i] - acceleration[i]), &m.sliding[i]);
     alpha = {rate[0], rate[1], rate[2]}, acceleration = {rate[3], rate[4], rate[5]};
   }
+}
+
+// θ̈ of a link to out.
+template <class Kind, class S, class T>
+[[gnu::always_inline]] inline void accelerate(const Link<T>& link, const States<T>& at, const ForwardLink<S>& w, const ForwardMultiple<S>* multiple, Vector3<S>& alpha, Vector3<S>& acceleration,
+                                              double* out, size_t stride) {
+  accelerate_link<Kind, true>(link, w, w.innovation, multiple->rate, multiple, alpha, acceleration, [&](int i, const S& x, const S* absorbed) {
+    scattered(absorbed ? S(x - *absorbed) : x, out + link.v + i, stride, at.states);
+  });
 }
 
 struct KeepsNothing {
   template <class P>
   void operator()(int, const P&) const {}
 };
-// Articulated inertias, and the forces that go with them, tip to base, of links that are placed. Which lanes are sound. keep(k, P): P⁺ of link
-// k about its parent's origin, in the parent's axes.
-template <bool forces, class S, class T, class Keep = KeepsNothing>
-[[gnu::noinline]] typename S::Bits articulated_tip_to_base(const Links<T>& links, const States<T>& at, const ForwardWork<S>& w, Keep keep = {}) {
-  const S gone = travel<S>(links, at);
-  typename S::Bits sound = S::all();
-  for (int k = 0; k < links.count; ++k)
+template <class S, class T>
+inline void clear_branches(const Links<T>& links, const ForwardWork<S>& w, int first, int last) {
+  for (int k = first; k < last; ++k)
     if (links.link[k].branches) w.branch[k] = no_inertia<S>();
+}
+// Articulated inertias, and the forces that go with them, tip to base, of links first..last, which are placed; branches are cleared. Which lanes
+// are sound. apart: a subtree whose P⁺ is left in its root's branch (join_parent). keep(k, P): P⁺ of link k about its parent's origin, in the
+// parent's axes.
+template <bool forces, class S, class T, class Keep = KeepsNothing>
+[[gnu::always_inline]] inline typename S::Bits eliminate_links(const Links<T>& links, const States<T>& at, const ForwardWork<S>& w, const S& gone, int first, int last, bool apart, Keep keep = {}) {
+  typename S::Bits sound = S::all();
   Inertia<S> P;
-  for (int k = links.count - 1; k >= 0; --k) {
+  for (int k = last - 1; k >= first; --k) {
     stay_open(at, k);
     const Link<T>& link = links.link[k];
     ForwardLink<S>& own = w.link[k];
-    const bool leaf = k + 1 == links.count || links.link[k + 1].parent != k;
-    if (leaf) P = no_inertia<S>();
-    if (link.branches) add(P, w.branch[k]);
+    start_inward(links, w, k, last, P);
     add_own<forces>(link, own.motion.omega, at.wrenches ? at.wrenches + 6 * k : nullptr, P);
     if (link.rotor)
       with_step(link.step, [&](auto kind) { eliminate<decltype(kind), decltype(kind)::pin, forces>(link, links, at, gone, own, w.of(link), P, sound); });
@@ -283,17 +259,30 @@ template <bool forces, class S, class T, class Keep = KeepsNothing>
     keep(k, P);
     if (link.parent < 0)
       sound = sound & greater(S(links.growth), P.growth) & greater(S(1), S(T(4)) * P.error * P.growth);
+    else if (apart && k == first)
+      w.branch[k] = P;
     else if (link.parent != k - 1)
       add(w.branch[link.parent], P);
   }
   return sound;
 }
+// The same of all links, where the estimate leaves a doubt by their errors.
+template <bool forces, class S, class T, class Keep = KeepsNothing>
+[[gnu::noinline]] typename S::Bits articulated_tip_to_base(const Links<T>& links, const States<T>& at, const ForwardWork<S>& w, Keep keep = {}) {
+  const S gone = travel<S>(links, at);
+  clear_branches(links, w, 0, links.count);
+  const typename S::Bits sound = eliminate_links<forces>(links, at, w, gone, 0, links.count, false, keep);
+  if constexpr (!S::recorded)
+    if (!links.several && S::mask(sound) != S::mask(S::all())) {
+      clear_branches(links, w, 0, links.count);
+      return sound | pivots_stand_out(links, at, w, gone, 0, links.count, false);
+    }
+  return sound;
+}
 
-template <class S>
-unsigned forward_dynamics(const Links<typename S::Scalar>& links, const States<typename S::Scalar>& at, double* out, size_t stride, typename S::Scalar* work) {
-  using T = typename S::Scalar;
-  const ForwardWork<S> w(links, work);
-  for (int k = 0; k < links.count; ++k) {
+template <class S, class T>
+[[gnu::always_inline]] inline void move_links(const Links<T>& links, const States<T>& at, const ForwardWork<S>& w, int first, int last) {
+  for (int k = first; k < last; ++k) {
     const Link<T>& link = links.link[k];
     with_step(link.step, [&](auto kind) {
       using Kind = decltype(kind);
@@ -302,19 +291,43 @@ unsigned forward_dynamics(const Links<typename S::Scalar>& links, const States<t
       move_link<Kind>(link, at, link.parent < 0 ? nullptr : &w.link[link.parent].motion.omega, m);
     });
   }
-  const typename S::Bits sound = articulated_tip_to_base<true>(links, at, w);
-  const Vector3<S> base = -spread<S>(at.gravity);
+}
+// Where links are and how they move, and what is eliminated. Which lanes are sound.
+template <class S, class T>
+[[gnu::always_inline]] inline typename S::Bits move_and_eliminate(const Links<T>& links, const States<T>& at, const ForwardWork<S>& w) {
+  move_links(links, at, w, 0, links.count);
+  return articulated_tip_to_base<true>(links, at, w);
+}
+
+// Accelerations, base to tip, of links first..last, those of a chain at hand: visit(k, alpha, acceleration) makes a parent's the link's. kept: those
+// of links that branch or end the piece, with alpha and acceleration; base: of what carries the roots.
+template <class S, class T, class Kept, class Visit>
+[[gnu::always_inline]] inline void outward(const Links<T>& links, int first, int last, const Vector3<S>& base, Kept* kept, Visit visit) {
   Vector3<S> alpha, acceleration;
-  for (int k = 0; k < links.count; ++k) {
+  for (int k = first; k < last; ++k) {
     const Link<T>& link = links.link[k];
-    ForwardLink<S>& own = w.link[k];
     if (link.parent < 0)
       alpha = Vector3<S>::zero(), acceleration = base;
-    else if (link.parent != k - 1)
-      alpha = w.link[link.parent].alpha, acceleration = w.link[link.parent].acceleration;
-    with_step(link.step, [&](auto kind) { accelerate<decltype(kind)>(link, at, own, w.of(link), alpha, acceleration, out, stride); });
-    if (link.branches) own.alpha = alpha, own.acceleration = acceleration;
+    else if (link.parent != k - 1 || k == first)
+      alpha = kept[link.parent].alpha, acceleration = kept[link.parent].acceleration;
+    visit(k, alpha, acceleration);
+    if (link.branches || k + 1 == last) kept[k].alpha = alpha, kept[k].acceleration = acceleration;
   }
+}
+
+template <class S, class T>
+[[gnu::always_inline]] inline void accelerate_links(const Links<T>& links, const States<T>& at, const ForwardWork<S>& w, int first, int last, double* out, size_t stride) {
+  outward(links, first, last, Vector3<S>(-spread<S>(at.gravity)), w.link, [&](int k, Vector3<S>& alpha, Vector3<S>& acceleration) {
+    const Link<T>& link = links.link[k];
+    with_step(link.step, [&](auto kind) { accelerate<decltype(kind)>(link, at, w.link[k], w.of(link), alpha, acceleration, out, stride); });
+  });
+}
+
+template <class S>
+unsigned forward_dynamics(const Links<typename S::Scalar>& links, const States<typename S::Scalar>& at, double* out, size_t stride, typename S::Scalar* work) {
+  const ForwardWork<S> w(links, work);
+  const typename S::Bits sound = move_and_eliminate(links, at, w);
+  accelerate_links(links, at, w, 0, links.count, out, stride);
   return S::mask(sound);
 }
 

@@ -20,19 +20,28 @@ namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET {
 
 // How a link moves.
 template <class S>
-struct Instant {
+struct Moving {
   Lying<S> lying;
-  Vector3<S> omega, spin, acceleration;  // ω, its rate, a
-  Vector3<S> drift;                      // d
+  Vector3<S> omega, drift;         // ω, d
+};
+// And what moves it.
+template <class S>
+struct Instant : Moving<S> {
+  Vector3<S> spin, acceleration;   // the rate of ω, a
 };
 
-// I, B = [[N, 0], [-2f~, 0]] by N = İ - n~ and the momentum (n; f), and the force F of a link or of all that it carries.
+// I, and B = [[N, 0], [-2f~, 0]] by N = İ - n~ and the momentum (n; f), of a link or of all that it carries.
 template <class S>
-struct Carrying {
+struct Momenta {
   S mass;
   Vector3<S> moment;
-  Symmetric3<S> rotational, rate;      // A; İ
-  Vector3<S> n, f, torque, force;
+  Symmetric3<S> rotational, rate;  // A; İ
+  Vector3<S> n, f;
+};
+// And the force F.
+template <class S>
+struct Carrying : Momenta<S> {
+  Vector3<S> torque, force;
 };
 
 template <class S>
@@ -79,12 +88,10 @@ template <class S, class T>
   return axes * Vector3<S>{velocity(3), velocity(4), velocity(5)};
 }
 
-// From the link's own axes: ω, its rate and a as the sweeps of dynamics have them.
+// d of a link that lies where it lies.
 template <class Kind, class S, class T>
-[[gnu::always_inline]] inline void stand(const Link<T>& link, const States<T>& at, const Instant<S>* above, const Vector3<S>& omega, const Vector3<S>& spin,
-                                         const Vector3<S>& acceleration, Instant<S>& out) {
+[[gnu::always_inline]] inline void drift_from(const Link<T>& link, const States<T>& at, const Moving<S>* above, Moving<S>& out) {
   const Matrix3<S>& axes = out.lying.axes;
-  out.omega = axes * omega, out.spin = axes * spin, out.acceleration = axes * acceleration;
   out.drift = above ? cross(above->omega, out.lying.arm) : Vector3<S>::zero();
   if constexpr (Kind::nv == 6) {
     out.drift = out.drift + hinge_travel(link, at, axes);
@@ -93,17 +100,22 @@ template <class Kind, class S, class T>
     out.drift = out.drift + rate * Vector3<S>{axes(0, 2), axes(1, 2), axes(2, 2)};
   }
 }
+// From the link's own axes: ω, its rate and a as the sweeps of dynamics have them.
+template <class Kind, class S, class T>
+[[gnu::always_inline]] inline void stand(const Link<T>& link, const States<T>& at, const Instant<S>* above, const Vector3<S>& omega, const Vector3<S>& spin,
+                                         const Vector3<S>& acceleration, Instant<S>& out) {
+  const Matrix3<S>& axes = out.lying.axes;
+  out.omega = axes * omega, out.spin = axes * spin, out.acceleration = axes * acceleration;
+  drift_from<Kind>(link, at, above, out);
+}
 
 // Of the link alone.
 template <class S>
-[[gnu::always_inline]] inline Carrying<S> carrying(const LinkOf<S>& link, const Instant<S>& of) {
+[[gnu::always_inline]] inline Momenta<S> momenta(const LinkOf<S>& link, const Moving<S>& of) {
   const Matrix3<S>& axes = of.lying.axes;
   const Symmetric3<S> A = turned(axes, rotational_of<S>(link));
   const Vector3<S> h = axes * spread<S>(link.moment), w = of.omega;
-  const S mass(link.mass);
-  Carrying<S> c{mass, h, A, Symmetric3<S>::zero(), A * w, cross(w, h), Vector3<S>::zero(), Vector3<S>::zero()};
-  c.force = mass * of.acceleration + cross(of.spin, h) + cross(w, c.f);
-  c.torque = A * of.spin + cross(h, of.acceleration) + cross(w, c.n);
+  Momenta<S> c{S(link.mass), h, A, Symmetric3<S>::zero(), A * w, cross(w, h)};
   Vector3<S> moved[3];  // columns of w~A
   for (int k = 0; k < 3; ++k) moved[k] = cross(w, Vector3<S>{A(0, k), A(1, k), A(2, k)});
   for (int i = 0; i < 3; ++i)
@@ -111,28 +123,44 @@ template <class S>
   return c;
 }
 template <class S>
-[[gnu::always_inline]] inline void add(Carrying<S>& c, const Carrying<S>& other) {
+[[gnu::always_inline]] inline Carrying<S> carrying(const LinkOf<S>& link, const Instant<S>& of) {
+  Carrying<S> c{momenta(link, of), Vector3<S>::zero(), Vector3<S>::zero()};
+  c.force = c.mass * of.acceleration + cross(of.spin, c.moment) + cross(of.omega, c.f);
+  c.torque = c.rotational * of.spin + cross(c.moment, of.acceleration) + cross(of.omega, c.n);
+  return c;
+}
+template <class S>
+[[gnu::always_inline]] inline void add(Momenta<S>& c, const Momenta<S>& other) {
   c.mass += other.mass, c.moment = c.moment + other.moment, c.rotational = c.rotational + other.rotational, c.rate = c.rate + other.rate;
-  c.n = c.n + other.n, c.f = c.f + other.f, c.torque = c.torque + other.torque, c.force = c.force + other.force;
+  c.n = c.n + other.n, c.f = c.f + other.f;
+}
+template <class S>
+[[gnu::always_inline]] inline void add(Carrying<S>& c, const Carrying<S>& other) {
+  add<S>(static_cast<Momenta<S>&>(c), static_cast<const Momenta<S>&>(other));
+  c.torque = c.torque + other.torque, c.force = c.force + other.force;
 }
 // About the parent's origin, in its frame.
 template <class S>
-[[gnu::always_inline]] inline void to_parent(const Vector3<S>& l, const Vector3<S>& d, Carrying<S>& c) {
+[[gnu::always_inline]] inline void to_parent(const Vector3<S>& l, const Vector3<S>& d, Momenta<S>& c) {
   add_moment_square(d, c.moment, c.rate);
   c.n = c.n + cross(c.moment, d), c.f = c.f + c.mass * d;
   add_moment_square(l, c.f, c.rate);
   c.n = c.n + cross(l, c.f);
   add_moment_square(l, c.moment + (S(0.5) * c.mass) * l, c.rotational);
   c.moment = c.moment + c.mass * l;
+}
+template <class S>
+[[gnu::always_inline]] inline void to_parent(const Vector3<S>& l, const Vector3<S>& d, Carrying<S>& c) {
+  to_parent(l, d, static_cast<Momenta<S>&>(c));
   c.torque = c.torque + cross(l, c.force);
 }
 // I y, and B b of the angular part b.
 template <class S>
-[[gnu::always_inline]] inline Spatial<S> inertia_times(const Carrying<S>& c, const Spatial<S>& y) {
+[[gnu::always_inline]] inline Spatial<S> inertia_times(const Momenta<S>& c, const Spatial<S>& y) {
   return {c.rotational * y.angular + cross(c.moment, y.linear), c.mass * y.linear + cross(y.angular, c.moment)};
 }
 template <class S>
-[[gnu::always_inline]] inline Spatial<S> rate_times(const Carrying<S>& c, const Vector3<S>& b) {
+[[gnu::always_inline]] inline Spatial<S> rate_times(const Momenta<S>& c, const Vector3<S>& b) {
   return {c.rate * b - cross(c.n, b), S(2) * cross(b, c.f)};
 }
 // crf(S) F

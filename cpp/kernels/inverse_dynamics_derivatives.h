@@ -184,8 +184,7 @@ unsigned inverse_dynamics_derivatives(const Links<typename S::Scalar>& links, co
   DerivativeRows<S> rows{w.rows, w.rows + size, w.rows + 2 * size, w.rows + 3 * size, w.rows + 4 * size, row, row, -1};
   if constexpr (S::width == 1 && sizeof(T) == sizeof(double))
     if (direct) rows = {reinterpret_cast<S*>(out), reinterpret_cast<S*>(at.others[0]), reinterpret_cast<S*>(at.others[1]), w.rows, w.rows + waiting, N, row, Work::ring - 1};
-  for (int r = 0; r < DerivativeColumns<S>::rows; ++r)
-    for (int c = N; c < row; ++c) w.columns[size_t(r) * row + c] = S(0);
+  for (size_t i = 0; i < size_t(DerivativeColumns<S>::rows) * row; ++i) w.columns[i] = S(0);  // what blocks hold besides a link's columns is finite
   stand_all(links, at, w);
   own_columns(links, at, w);
   Block<S> odd(T(0));

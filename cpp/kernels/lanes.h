@@ -78,6 +78,7 @@ struct Lanes {
   typedef T Vector __attribute__((vector_size(W * sizeof(T))));
   typedef Bit Bits __attribute__((vector_size(W * sizeof(T))));
   static constexpr int width = W;
+  static constexpr bool recorded = false;  // its truths are known where they are made
   Vector v;
 
   Lanes() = default;
@@ -121,6 +122,7 @@ struct Lanes<T, 1> {
   using Bit = typename BitsOf<T>::type;
   using Bits = Bit;
   static constexpr int width = 1;
+  static constexpr bool recorded = false;
   T v;
 
   Lanes() = default;

@@ -104,6 +104,7 @@ int finish(std::vector<RestLink>& rest) {
     own.carried_rotational = static_cast<double>(M.rotational.s[0] + M.rotational.s[3] + M.rotational.s[5]);
     own.furthest = 0;
     for (int i = 0; i < 3; ++i) own.furthest = std::max(own.furthest, std::abs(static_cast<double>(ratio_or_zero(M.moment[i], M.mass))));
+    own.longest = own.furthest;
     own.end = own.v + record_of(own.step == Step::free ? SubhingeKind::free : own.step == Step::ball ? SubhingeKind::ball : SubhingeKind::pin).nv;
   }
   for (int k = static_cast<int>(rest.size()) - 1; k >= 0; --k) {
@@ -114,6 +115,7 @@ int finish(std::vector<RestLink>& rest) {
     for (int i = 0; i < 3; ++i) length += std::abs(static_cast<double>(rest[k].pose.p[i]));
     above.carried_mass += own.carried_mass, above.carried_rotational += own.carried_rotational;
     above.furthest = std::max(above.furthest, own.furthest + length);
+    above.longest = std::max({above.longest, own.longest, length});
     above.end = std::max(above.end, own.end);
     above.branches |= own.parent != k - 1;
     rest[own.parent].last_child = std::max(rest[own.parent].last_child, k);
@@ -178,13 +180,22 @@ std::unique_ptr<LinkModel<T>> LinkModel<T>::of(const Multibody& model) {
     own.mass = static_cast<T>(link.inertia.mass);
     put(link.inertia.moment.v, own.moment), put(link.inertia.rotational.s, own.rotational);
     own.J = T(d.J), own.turn = T(d.turn), own.travel = T(d.travel);
-    own.carried_rotational = T(d.carried_rotational), own.carried_mass = T(d.carried_mass), own.furthest = T(d.furthest);
+    own.carried_rotational = T(d.carried_rotational), own.carried_mass = T(d.carried_mass), own.furthest = T(d.furthest), own.longest = T(d.longest);
     made->all_.push_back(own);
+    const auto& [m, h, I] = link.inertia;
+    const E numbers[] = {m, h[0], h[1], h[2], I.s[0], I.s[1], I.s[2], I.s[3], I.s[4], I.s[5]};
+    for (const E& x : numbers) made->wide_masses_.push_back(static_cast<double>(x));
+    for (const E& x : numbers) made->wide_masses_.push_back(static_cast<double>(E(x - E(static_cast<double>(x)))));
   }
   for (const auto& [at, pose] : bodies) made->bodies_.push_back({at, cast<T>(pose)});
+  std::vector<int> parents;
+  for (const auto& link : made->all_) parents.push_back(link.parent);
+  constexpr int least = 512;  // links: some hundred thousand operations, many times what a thread costs
+  made->parts_ = tree_parts(parents, std::max(least, static_cast<int>(parents.size()) / 64));
   const T rounding = rounding_bound<T>(Form::fast);
   const double growth = std::pow(to_double(rounding), -0.2);  // as rigid_elimination.h has it
-  made->links_ = {static_cast<int>(made->all_.size()), source->nq, source->nv, multiple, slots, made->all_.data(), rounding, faint_ratio<T>(Form::fast), static_cast<T>(growth)};
+  made->links_ = {static_cast<int>(made->all_.size()), source->nq, source->nv, multiple, slots, made->all_.data(), rounding, faint_ratio<T>(Form::fast), static_cast<T>(growth), made->wide_masses_.data()};
+  for (int k = 0; k < source->bodies; ++k) made->links_.several |= source->first_subhinge[k + 1] - source->first_subhinge[k] > 1;
   return made;
 }
 

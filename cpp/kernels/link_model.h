@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "kernels/links.h"
+#include "kernels/tree_parts.h"
 #include "model/multibody.h"
 
 namespace pycraft::kernels {
@@ -22,6 +23,8 @@ class LinkModel {
   static std::unique_ptr<LinkModel> of(const Multibody& model);
 
   const Links<T>& links() const { return links_; }
+  // For threads; none where the tree is small or does not branch into large ones.
+  const std::vector<TreePart>& parts() const { return parts_; }
   size_t bodies() const { return bodies_.size(); }
   OnLink<T> on_link(const Node& node) const;
   // (n; f) on every body, in its frame, as those on links.
@@ -34,6 +37,8 @@ class LinkModel {
   };
   Links<T> links_{};
   std::vector<Link<T>> all_;
+  std::vector<TreePart> parts_;
+  std::vector<double> wide_masses_;
   std::vector<Carried> bodies_;
 };
 

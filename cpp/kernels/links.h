@@ -29,8 +29,9 @@ struct Link {
   T mass, moment[3], rotational[6];
   T J;
   T turn, travel;            // of a helix, for a unit of its coordinate
-  // Of what it carries, for the bound below which a pivot is in doubt: the sum of traces, the mass, the length of the longest way outward.
-  T carried_rotational, carried_mass, furthest;
+  // Of what it carries, for the bound below which a pivot is in doubt: the sum of traces, the mass, the length of the longest way outward and of
+  // its longest piece.
+  T carried_rotational, carried_mass, furthest, longest;
 };
 
 template <class T>
@@ -39,6 +40,8 @@ struct Links {
   int multiple, slots;          // links with several coordinates; links whose columns are kept at once
   const Link<T>* link;
   T rounding, faint, growth;    // bounds of doubt, see pivots.h
+  const double* wide_masses;    // twenty a link: mass, moment, rotational, then what rounding took from these
+  bool several = false;         // whether a hinge is several links: of its pivots the general recursions decide
 };
 
 // A node as part of a link, -1: of the base.
@@ -46,6 +49,7 @@ template <class T>
 struct OnLink {
   int link;
   T R[9], p[3];
+  int place = 0;  // among the nodes of a call
 };
 
 // States to compute at: state b at q + b q_stride, and so on; lanes beyond `states` repeat the last one.
@@ -57,9 +61,12 @@ struct States {
   const T* gravity;   // three numbers
   const T* wrenches;  // (n; f) on every link in its frame about its origin, at all states; null: none
   void (*interrupt)();  // asked in long loops; it throws to stop them
-  const OnLink<T>* node = nullptr;  // of calls that are asked of one
+  const OnLink<T>* node = nullptr;  // of calls that are asked of one, or of several, in the order of their links
+  int nodes = 0;
   double* const* others = nullptr;  // where further results of a call go, as the first
   const T *cosines = nullptr, *sines = nullptr;  // of one state: of every coordinate
+  T gone = 0;                                    // of one state in parts: what sliders add to lengths
+  int steps = 0;             // of a refined call: corrections at most
 };
 
 // What a call is: `run` writes the results to out + b out_stride, in `work`, aligned to 64 bytes and of as many numbers as the other function
@@ -67,15 +74,33 @@ struct States {
 template <class T>
 struct Kernel {  // null: not there
   unsigned (*run)(const Links<T>& links, const States<T>& states, double* out, size_t out_stride, T* work);
-  size_t (*work)(const Links<T>& links);
+  size_t (*work)(const Links<T>& links, int nodes);
 };
 
-enum class Call { forward_dynamics, inverse_dynamics, mass_matrix, mass_matrix_inverse, inverse_dynamics_derivatives, forward_dynamics_derivatives, jacobian, pose };
+// Calls of one state piece by piece (tree_parts.h), each of links first..last: a piece of the trunk, or `apart` a subtree. What is null the
+// call does without.
+template <class T>
+struct PartKernel {
+  States<T> (*begin)(const Links<T>& links, const States<T>& states, T* work);  // how the others are to be given the state
+  void (*outward)(const Links<T>& links, const States<T>& at, int first, int last, T* work);
+  void (*clear)(const Links<T>& links, int first, int last, T* work);  // before inward and errors
+  unsigned (*inward)(const Links<T>& links, const States<T>& at, int first, int last, bool apart, double* out, T* work);  // whether it is sound
+  unsigned (*errors)(const Links<T>& links, const States<T>& at, int first, int last, bool apart, double* out, T* work);  // the same, where it is not
+  void (*join)(const Links<T>& links, int root, T* work);  // a subtree to the trunk, in the order that inward has
+  void (*finish)(const Links<T>& links, const States<T>& at, int first, int last, double* out, T* work);
+};
+
+enum class Call {
+  forward_dynamics, inverse_dynamics, mass_matrix, mass_matrix_inverse, inverse_dynamics_derivatives, forward_dynamics_derivatives, jacobian, pose,
+  coriolis_matrix, skew_coriolis_matrix, operational_space_compliance, operational_space_inertia,
+  refined_dynamics, gathered_dynamics
+};
 
 template <class T>
 struct Kernels {
   int lanes;           // states at once
-  Kernel<T> calls[8];
+  Kernel<T> calls[14];
+  PartKernel<T> in_parts[2];  // of forward and inverse dynamics; of one state alone
   const Kernel<T>& operator[](Call call) const { return calls[static_cast<int>(call)]; }
 };
 

@@ -80,22 +80,31 @@ struct MatrixWork {
   }
 };
 
-// Columns of a link's own coordinates, its rows of ℳ, and the columns moved to the parent's origin. R in the link's axes.
-template <class Kind, class S, class T>
-[[gnu::always_inline]] inline void give_rows(const Link<T>& link, const Lying<S>& lying, const CompositeInertia<S>& R, const Columns<S>& y, const States<T>& at, int N, double* out, size_t out_stride) {
-  const int count = link.end - link.v;
-  const bool pin = Kind::pin;
+// Columns of a link's own coordinates. R in the link's axes.
+template <class Kind, class S>
+[[gnu::always_inline]] inline void start_columns(const LinkOf<S>& link, const Lying<S>& lying, const CompositeInertia<S>& R, const Columns<S>& y) {
   for (int i = 0; i < Kind::nv; ++i) {
     const HingeRow<S> h = own_row<Kind, S>(link, i);
     const Vector3<S> n = lying.axes * (R.rotational * h.angular + cross(R.moment, h.linear)), f = lying.axes * (R.mass * h.linear - cross(R.moment, h.angular));
     for (int r = 0; r < 3; ++r) y.n[r][i] = n[r], y.f[r][i] = f[r];
   }
+}
+template <class S, class T>
+[[gnu::always_inline]] inline Vector3<S> arm_of(const Link<T>& link, const Lying<S>& lying) {
+  return link.parent < 0 ? Vector3<S>::zero() : lying.arm;
+}
+
+// A link's rows of ℳ, and the columns moved to the parent's origin.
+template <class Kind, class S, class T>
+[[gnu::always_inline]] inline void give_rows(const Link<T>& link, const Lying<S>& lying, const Columns<S>& y, const States<T>& at, int N, double* out, size_t out_stride) {
+  const int count = link.end - link.v;
+  const bool pin = Kind::pin;
   double* const rows = out + size_t(link.v) * N + link.v;
   for (int i = 0; i < Kind::nv; ++i) {
     const HingeRow<S> h = hinge_row<Kind>(link, lying.axes, i);
     double* __restrict const row = rows + size_t(i) * N;
     const bool last = i + 1 == Kind::nv;
-    const Vector3<S> l = last && link.parent >= 0 ? lying.arm : Vector3<S>::zero();
+    const Vector3<S> l = last ? arm_of(link, lying) : Vector3<S>::zero();
     each_column<false>(y, 0, count, [&](int c, Vector3<S>& n, Vector3<S>& f) {
       S x = dot(h.angular, n);
       if (!pin) x += dot(h.linear, f);
@@ -113,6 +122,38 @@ template <class Kind, class S, class T>
   }
 }
 
+// Of one state, where a pin follows a pin and nothing branches between: columns are read and written once for both.
+template <class T>
+[[gnu::always_inline]] inline bool pins_in_line(const Links<T>& links, int k) {
+  const auto pin = [](const Link<T>& link) { return link.step <= Step::turned_pin; };
+  const Link<T>&link = links.link[k], &parent = links.link[k > 0 ? k - 1 : 0];
+  return k > 0 && link.parent == k - 1 && !parent.branches && pin(link) && pin(parent) && link.end - link.v > 8;
+}
+template <class S, class T>
+[[gnu::always_inline]] inline Vector3<S> pin_axis(const Link<T>& link, const Lying<S>& lying) {
+  const int i = link.step == Step::turned_pin ? TurnedPin::row : static_cast<int>(link.step);
+  return S(link.sign) * Vector3<S>{lying.axes(0, i), lying.axes(1, i), lying.axes(2, i)};
+}
+// Rows of ℳ of a link and its parent, and the columns, from the parent's own on, moved to the grandparent's origin.
+template <class S, class T>
+inline void give_rows_of_two(const Link<T>* parent, const Lying<S>* lying, const Columns<S>& y, int N, double* out) {
+  const Link<T>& link = parent[1];
+  const int count = link.end - link.v;
+  const Vector3<S> h = pin_axis(link, lying[1]), g = pin_axis(*parent, lying[0]);
+  const Vector3<S> l = lying[1].arm, m = arm_of(*parent, lying[0]);
+  double* __restrict const row = out + size_t(link.v) * N + link.v;
+  double* __restrict const above = out + size_t(parent->v) * N + link.v;
+  each_column<false>(y, 0, 1, [&](int, Vector3<S>& n, Vector3<S>& f) { above[-1] = double(dot(g, n).v) + parent->J, n = n + cross(m, f); });
+  each_column<false>(y, 1, 1 + count, [&](int c, Vector3<S>& n, Vector3<S>& f) {
+    row[c - 1] = double(S(dot(h, n)).v);
+    n = n + cross(l, f);
+    above[c - 1] = double(S(dot(g, n)).v);
+    n = n + cross(m, f);
+  });
+  row[0] += link.J;
+  for (int c = count; c < N - link.v; ++c) row[c] = above[c] = 0;
+}
+
 template <class S>
 unsigned mass_matrix(const Links<typename S::Scalar>& links, const States<typename S::Scalar>& at, double* out, size_t out_stride, typename S::Scalar* work) {
   using T = typename S::Scalar;
@@ -128,18 +169,24 @@ unsigned mass_matrix(const Links<typename S::Scalar>& links, const States<typena
     if (link.branches) w.branch[k] = nothing;
   }
   CompositeInertia<S> R = nothing;
+  bool outer = false;  // whether the rows of the link before wait for this one's
   for (int k = links.count - 1; k >= 0; --k) {
     stay_open(at, k, N);
     const Link<T>& link = links.link[k];
     if (k + 1 == links.count || links.link[k + 1].parent != k) R = nothing;
     if (link.branches) add(R, w.branch[k]);
     add(R, CompositeInertia<S>{S(link.mass), spread<S>(link.moment), rotational_of<S>(link)});
+    const bool inner = outer;
+    outer = S::width == 1 && !inner && pins_in_line(links, k);
     const Columns<S> y(w.columns, N, link.v);
     with_step(link.step, [&](auto kind) {
       using Kind = decltype(kind);
-      give_rows<Kind>(link, w.lying[k], R, y, at, N, out, out_stride);
+      start_columns<Kind>(link, w.lying[k], R, y);
+      if (!inner && !outer) give_rows<Kind>(link, w.lying[k], y, at, N, out, out_stride);
       if (link.parent >= 0) to_parent(Kind::rotation(w.place[k]), Kind::arm(link, w.place[k]), R);
     });
+    if constexpr (S::width == 1)
+      if (inner) give_rows_of_two(&link, w.lying + k, y, N, out);
     if (link.parent >= 0 && link.parent != k - 1) add(w.branch[link.parent], R);
   }
   unsigned sound = 0;

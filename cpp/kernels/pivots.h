@@ -6,8 +6,8 @@
 //
 // A row of a coordinate axis rounds at its own pivot; of an oblique axis at what lies along all three.
 //
-// A state is sound where every d > faint · most, a slider's also d > 4 error · most of those outboard, and at the roots 4 error growth < 1 and growth is below its bound. Else it is left in doubt:
-// the general recursion has an error sweep to decide it by.
+// A state is sound where every d > faint · most, a slider's also d > 4 error · most of those outboard, and at the roots 4 error growth < 1 and
+// growth is below its bound. Else the errors of pivot_errors.h decide; what does not stand out by those is left to the general recursion.
 #pragma once
 
 #include "kernels/motions.h"

@@ -63,8 +63,9 @@ struct Planar {
     y[i] = c * x[i] + s * x[j], y[j] = c * x[j] - s * x[i], y[K] = x[K];
     return y;
   }
-  [[gnu::always_inline]] Vector3<S> to_parent(const Vector3<S>& x) const {
-    Vector3<S> y;
+  template <class V>  // S, or wider numbers
+  [[gnu::always_inline]] Vector3<V> to_parent(const Vector3<V>& x) const {
+    Vector3<V> y;
     y[i] = c * x[i] - s * x[j], y[j] = c * x[j] + s * x[i], y[K] = x[K];
     return y;
   }
@@ -106,7 +107,12 @@ struct Full {
   static constexpr int turned_zero = -1;
   const Matrix3<S>& R;
   [[gnu::always_inline]] Vector3<S> to_child(const Vector3<S>& x) const { return transpose_times(R, x); }
-  [[gnu::always_inline]] Vector3<S> to_parent(const Vector3<S>& x) const { return R * x; }
+  template <class V>
+  [[gnu::always_inline]] Vector3<V> to_parent(const Vector3<V>& x) const {
+    Vector3<V> y;
+    each_of<3>([&](int r) { y[r] = R(r, 0) * x[0] + R(r, 1) * x[1] + R(r, 2) * x[2]; });
+    return y;
+  }
   [[gnu::always_inline]] void turn_symmetric(Symmetric3<S>& A) const {
     Matrix3<S> T;  // R A
     each_of<3>([&](int r) { each_of<3>([&](int k) { T(r, k) = R(r, 0) * A(0, k) + R(r, 1) * A(1, k) + R(r, 2) * A(2, k); }); });

@@ -26,6 +26,7 @@ inline thread_local Recording* recording = nullptr;
 struct Number {
   using Scalar = double;
   using Bits = Truth;
+  static constexpr bool recorded = true;  // its truths are not known yet
   static constexpr int width = 2;  // results leave by scattered() alone, though there is one state
   alignas(double) int id;  // room for arrays of it is counted in doubles
 

@@ -69,7 +69,7 @@ std::vector<OfDirection> directions_in(const Expression& tangent) {
 
 Expression expand_inverse_tangent(const Symbol& s) {
   const Letters o(s.source, s.binding);
-  const Expression inverse = product_of(kernels_of(s).mass_matrix_inverse);
+  const Expression inverse = product_of(mass_matrix_inverse_of(s));
   const auto direction = as_direction(std::dynamic_pointer_cast<MultibodyOperators>(s.source), std::get<OfDirection>(s.arguments));
   return lower(-1.0 * (inverse * differentiate(o.H * o.phi * o.M * o.phi.T() * o.H.T(), *direction) * inverse), false);
 }

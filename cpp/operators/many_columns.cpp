@@ -29,20 +29,26 @@ void ManyColumns::see(const RigidBlocks<double>& blocks) {
 }
 
 kernels::Bodies<double> ManyColumns::bodies(const RigidBlocks<double>& blocks) const {
-  static_assert(sizeof(Pose<double>) == 12 * sizeof(double) && sizeof(Vector6<double>) == 6 * sizeof(double));
+  static_assert(sizeof(Pose<double>) == 12 * sizeof(double) && sizeof(Vector6<double>) == 6 * sizeof(double) && sizeof(RigidInertia<double>) == 10 * sizeof(double));
   return {tree_.bodies(),
           tree_.parent.data(),
           tree_.dof_offset.data(),
           way_.data(),
           branches_.data(),
           reinterpret_cast<const double*>(blocks.pose.data()),
+          reinterpret_cast<const double*>(blocks.inertia.data()),
           reinterpret_cast<const double*>(blocks.H.data()),
           reinterpret_cast<const double*>(blocks.G.data()),
+          blocks.J.data(),
           blocks.D.data(),
           blocks.L.data(),
           blocks.d_offsets().data(),
           blocks.pivots(0),
           check_interrupt};
+}
+
+void ManyColumns::mass_matrix(const RigidBlocks<double>& blocks, bool with_hinge_diagonal, const double* x, double* y, int m, double* scratch) const {
+  kernels_.mass_matrix[with_hinge_diagonal](bodies(blocks), x, y, m, scratch);
 }
 
 void ManyColumns::mass_matrix_inverse(const RigidBlocks<double>& blocks, const double* x, double* y, int m, double* scratch) const {

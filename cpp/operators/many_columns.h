@@ -15,6 +15,7 @@ class ManyColumns {
   // After kinematics.
   void see(const RigidBlocks<double>& blocks);
   void mass_matrix_inverse(const RigidBlocks<double>& blocks, const double* x, double* y, int m, double* scratch) const;
+  void mass_matrix(const RigidBlocks<double>& blocks, bool with_hinge_diagonal, const double* x, double* y, int m, double* scratch) const;
 
  private:
   kernels::Bodies<double> bodies(const RigidBlocks<double>& blocks) const;

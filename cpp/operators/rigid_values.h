@@ -25,6 +25,12 @@ class RigidValues final : public TreeValues<RigidBlocks<S>> {
     mass_matrix_residual_gathered(this->tree_, this->blocks_, compiled_->mass_properties, x, b, r, m, scratch, forces);
   }
 
+  void mass_matrix(bool with_hinge_diagonal, const S* x, S* y, int m, S* scratch) const override {
+    if constexpr (std::is_same_v<S, double>)
+      columns_.mass_matrix(this->blocks_, with_hinge_diagonal, x, y, m, scratch);
+    else
+      mass_matrix_apply(this->tree_, this->blocks_, with_hinge_diagonal, x, y, m, scratch);
+  }
   void mass_matrix_inverse(const S* x, S* y, int m, S* scratch) const override {
     if constexpr (std::is_same_v<S, double>)
       columns_.mass_matrix_inverse(this->blocks_, x, y, m, scratch);

@@ -20,4 +20,8 @@ constexpr int deepest = 200000;
 // caller waits and stays open to interrupts.
 void with_stack_for(int depth, const std::function<void()>& f);
 
+// Calls f(thread, i) for i = from, ..., to - 1 in so many threads, numbers 0, 1, ..., each of which takes the next few. Of several errors
+// that of the least i is thrown, as by one thread that takes one after the other. The caller waits and stays open to interrupts.
+void share_out(int from, int to, int threads, const std::function<void(int thread, int i)>& f);
+
 }  // namespace pycraft

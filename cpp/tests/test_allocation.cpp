@@ -9,6 +9,7 @@
 #include "algebra/planning/explain.h"
 #include "algebra/planning/square_root.h"
 #include "allocations.h"
+#include "dynamics/batch_dynamics.h"
 #include "dynamics/packed_dynamics.h"
 #include "dynamics/rigid_dynamics.h"
 #include "dynamics/sensitivities.h"
@@ -165,6 +166,7 @@ BOOST_AUTO_TEST_CASE(direct_calls) {
           "derivatives of forward dynamics");
   quiet([&] { s.mass_matrix(q.data(), out.data()); }, "derivative of the mass matrix");
   quiet([&] { s.christoffel(q.data(), out.data()); }, "Christoffel symbols");
+  for (const bool skew : {false, true}) quiet([&] { s.coriolis_matrix(q.data(), v.data(), skew, out.data()); }, "Coriolis matrix");
   quiet([&] { s.kinetic_energy(q.data(), v.data(), dq.data(), dv.data()); }, "derivatives of the kinetic energy");
   quiet([&] { s.hamiltonian(q.data(), v.data(), tau.data(), dq.data(), dv.data()); }, "Hamilton's equations");
   quiet([&] { s.momentum(q.data(), v.data(), out.data(), dq.data()); }, "momentum");
@@ -172,6 +174,13 @@ BOOST_AUTO_TEST_CASE(direct_calls) {
   std::vector<double> wide(6 * n * n + 10 * n * size_t(mb->bodies()));
   quiet([&] { s.jacobian_derivative(tool, q.data(), wide.data()); }, "derivative of the Jacobian");
   quiet([&] { s.inertial_regressor(q.data(), v.data(), tau.data(), wide.data()); }, "regressor");
+  BatchDynamics kernels(mb);
+  const Node both[] = {tool, mb->node(mb->node_index("body2"))};
+  const Given at{"q", q.data(), mb->nq()}, moving{"v", v.data(), mb->nv()};
+  for (const bool flag : {false, true}) {
+    quiet([&] { kernels.coriolis_matrix(flag, at, moving, out.data()); }, "Coriolis matrix by kernels");
+    quiet([&] { kernels.operational_space(flag, both, at, wide.data()); }, "operational space");
+  }
   std::vector<double> inertias(10 * size_t(mb->bodies())), geometry(6 * size_t(mb->bodies())), axes(6 * n);
   quiet([&] { s.log_determinant(q.data(), dq.data(), inertias.data(), geometry.data(), axes.data()); }, "gradient of the log determinant");
 }

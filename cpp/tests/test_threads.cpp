@@ -8,6 +8,7 @@
 #include "operators/multibody_operators.h"
 #include "random_tree.h"
 #include "runtime/errors.h"
+#include "runtime/interrupt.h"
 
 using namespace pycraft;
 using namespace pycraft::testing;
@@ -15,6 +16,7 @@ using namespace pycraft::testing;
 namespace {
 
 constexpr int threads = 4, rounds = 60;
+const std::thread::id main_thread = std::this_thread::get_id();
 
 template <class F>
 void in_parallel(F f) {
@@ -166,4 +168,53 @@ BOOST_AUTO_TEST_CASE(the_first_look_after_an_edit_in_every_thread) {
     });
     BOOST_TEST(wrong == 0);
   }
+}
+
+BOOST_AUTO_TEST_CASE(work_shared_out) {
+  for (int from : {0, 1})
+    for (int count : {0, 1, 3, 50, 1000})
+      for (int crew : {1, 2, 7}) {
+        std::vector<std::atomic<int>> done(count);
+        std::vector<std::atomic<std::thread::id>> by(crew);
+        std::atomic<int> wrong{0};
+        share_out(from, from + count, crew, [&](int thread, int i) {
+          ++done[i - from];
+          const std::thread::id before = by[thread].exchange(std::this_thread::get_id());  // a number is one thread's
+          wrong += before != std::thread::id() && before != std::this_thread::get_id();
+          wrong += std::this_thread::get_id() == main_thread;
+        });
+        for (const auto& times : done) wrong += times != 1;
+        BOOST_TEST(wrong == 0);
+      }
+}
+
+BOOST_AUTO_TEST_CASE(the_first_error_of_work_shared_out) {
+  for (int round = 0; round < rounds; ++round) {
+    const int first = 7 * round % 200;
+    std::vector<std::atomic<bool>> done(200);
+    const auto fails = [&](int i) { return i == first || (i > first && i % 3 == 0); };
+    try {
+      share_out(0, 200, threads, [&](int, int i) {
+        if (i == first) std::this_thread::yield();
+        if (fails(i)) throw ModelError("item " + std::to_string(i));
+        done[i] = true;
+      });
+      BOOST_ERROR("no error came through");
+    } catch (const ModelError& error) {
+      BOOST_TEST(std::string(error.what()) == "item " + std::to_string(first));
+    }
+    for (int i = 0; i < first; ++i) BOOST_TEST_REQUIRE(done[i].load());
+  }
+}
+
+BOOST_AUTO_TEST_CASE(an_interrupt_of_work_shared_out) {
+  struct Interrupt {};
+  set_interrupt_check([] {
+    if (std::this_thread::get_id() == main_thread) throw Interrupt{};  // asked of the caller alone
+  });
+  std::atomic<bool> ever{true};
+  BOOST_CHECK_THROW(share_out(0, 1000000, threads, [&](int, int) {
+    while (ever) check_interrupt();
+  }), Interrupt);
+  set_interrupt_check(nullptr);
 }

@@ -20,7 +20,7 @@ def plot(found: Measured, path: Path) -> None:
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(2, 4, figsize=(15, 7.2), layout="constrained")
+    figure, axes = plt.subplots(2, -(-(len(GOALS) + 1) // 2), figsize=(18, 7.2), layout="constrained")
     own, theirs = exponents(found.rows), exponents(found.rows, peer=True)
     for ax, call in zip(axes.flat, GOALS, strict=False):
         rows = [row for row in of_call(found, call) if row.model.startswith("chain")]

@@ -37,7 +37,8 @@ class DirectCalls:
     which brings its v; without q it is the model's present state, `arm.q` and `arm.v`, as for expressions; beside an array q,
     velocities, forces and accelerations that are left out are zero. SI units and radians. Generalized velocities of ball and free
     hinges are in the axes of the body that the hinge moves, angular first. Results are float64, in `out` (writeable, C-ordered) where
-    one is given. `threads` shares the states of a batch out over so many threads; every state has the bits that it has with one.
+    one is given. `threads` shares the states of a batch out over so many threads, of a single state of a large tree its subtrees (forward
+    and inverse dynamics, bias forces, double precision); every state has the bits that it has with one.
     Everywhere a ModelError names an argument of the wrong shape or with an entry that is not finite, and EvaluationError an unknown
     option, and a result beyond the range of its numbers; errors at a state of a batch tell which.
     """
@@ -114,7 +115,7 @@ class DirectCalls:
         q, v = at_state(self, q, v)
         tau = np.zeros(self.nv) if tau is None else tau
         if isinstance(method, str) and method == "articulated":
-            return self._calls().forward_dynamics(q, v, tau, form, refine, residual, precision, on_singular, out)
+            return self._calls().forward_dynamics(q, v, tau, form, refine, residual, precision, on_singular, out, threads)
         if not isinstance(method, str):
             raise _core.EvaluationError(f"method={method!r}: a name, 'articulated', 'cholesky', ...")
         if form != "fast" or refine != 0 or residual != "same" or on_singular != "raise":
@@ -123,23 +124,25 @@ class DirectCalls:
             )
         return by_method(self, method, q, v, tau, precision, out)
 
-    def prepare(self, call: str, *, batch: int | None = None, **options: Any) -> Callable[..., np.ndarray]:
+    def prepare(self, call: str, *, batch: int | None = None, **options: Any) -> Callable[..., Any]:
         """A direct call for loops, with its options read once: it takes arrays at their places, and `out=`.
 
         Parameters
         ----------
-        call : {"forward_dynamics", "inverse_dynamics", "bias_forces", "mass_matrix", "mass_matrix_inverse", "jacobian", "pose"}
+        call : {"forward_dynamics", "inverse_dynamics", "bias_forces", "mass_matrix", "mass_matrix_inverse", "jacobian", "pose", \
+"coriolis_matrix", "operational_space_inertia", "operational_space_compliance", "inverse_dynamics_derivatives", \
+"forward_dynamics_derivatives"}
         batch : int, optional
             Every call takes so many states, and each argument a leading axis of that length or stands for all; else one state a call.
         options
-            As the call itself has them: form, refine, residual, precision, on_singular; frame=, a name, of Jacobians and poses.
+            As the call itself has them: form, refine, residual, precision, on_singular; frame=, a name, of what is a frame's.
 
         Returns
         -------
         callable
-            Of q, v, tau for forward dynamics; of q, v, vdot for inverse dynamics; of q, v for bias forces; of q for the others; each with
-            out=. Arrays that are contiguous float64 cost least. It follows later edits of the model. ModelError for another number of
-            states, and what the call itself raises.
+            Of q, v, tau for forward dynamics and its derivatives; of q, v, vdot for inverse dynamics and its; of q, v for bias forces
+            and Coriolis matrices; of q for the others; each but derivatives with out=. Arrays that are contiguous float64 cost least. It
+            follows later edits of the model. ModelError for another number of states, and what the call itself raises.
 
         Examples
         --------
@@ -191,7 +194,7 @@ class DirectCalls:
         Newton-Euler, O(N) [Jain 2011, inverse dynamics]. In precision "single" to "quad".
         """
         q, v = at_state(self, q, v)
-        return self._calls().inverse_dynamics(q, v, vdot, precision, out)
+        return self._calls().inverse_dynamics(q, v, vdot, precision, out, threads)
 
     @direct
     @over_threads
@@ -208,7 +211,7 @@ class DirectCalls:
         [0.0, 0.0]
         """
         q, v = at_state(self, q, v)
-        return self._calls().inverse_dynamics(q, v, None, precision, out)
+        return self._calls().inverse_dynamics(q, v, None, precision, out, threads)
 
     @direct
     @over_threads

@@ -17,6 +17,8 @@ from .by_realization import output
 F = TypeVar("F", bound=Callable[..., Any])
 
 _CALLS = _core.direct_calls()
+_MADE: dict[str, type] = {}
+"""By name of a call with three results, the kind of tuple that holds them."""
 
 
 def direct(function: F) -> F:
@@ -26,7 +28,12 @@ def direct(function: F) -> F:
 
 def direct_of(made: type) -> Callable[[F], F]:
     """The same of a call with three results, which this kind of tuple holds."""
-    return lambda function: _core.direct_call(function, made)
+
+    def mark(function: F) -> F:
+        _MADE[function.__name__] = made
+        return _core.direct_call(function, made)
+
+    return mark
 
 
 def _states_of(batch: Any) -> int | None:
@@ -42,7 +49,7 @@ def _states_of(batch: Any) -> int | None:
     return states
 
 
-def prepared(model: Any, call: str, batch: int | None, options: dict[str, Any]) -> Callable[..., np.ndarray]:
+def prepared(model: Any, call: str, batch: int | None, options: dict[str, Any]) -> Callable[..., Any]:
     """What `Multibody.prepare` gives."""
     if not isinstance(call, str) or call not in _CALLS:
         raise _core.EvaluationError(f"prepare takes {', '.join(map(repr, _CALLS))}, not {call!r}")
@@ -59,24 +66,28 @@ def prepared(model: Any, call: str, batch: int | None, options: dict[str, Any]) 
         model.pose(*frame)  # ModelError where no body or node has the name
     ordinary = partial(getattr(model, call), *frame, **{name: value for name, value in options.items() if name != "frame"})
 
-    def call_with_other_arguments(*given: Any, out: Any = None) -> np.ndarray:
+    def call_with_other_arguments(*given: Any, out: Any = None) -> Any:
         if len(given) != len(arrays):
-            raise TypeError(f"a prepared {call} takes {', '.join(arrays)}, and out=; it was given {len(given)} arguments")
+            raise TypeError(
+                f"a prepared {call} takes {', '.join(arrays)}{'' if call in _MADE else ', and out='}; it was given {len(given)} arguments"
+            )
         states = {np.shape(x)[0] for x in given if np.ndim(x) == 2}
         if states != (set() if batch is None else {batch}):
             asked, found = ("one state" if n is None else f"{n} states" for n in (batch, min(states, default=None)))
             raise _core.ModelError(f"{call} was prepared for {asked} and is given {found}")
+        if out is None:
+            return ordinary(*given)
+        if call in _MADE:
+            raise TypeError(f"{call} has three results and takes no out=")
         if call != "pose":
             return ordinary(*given, out=out)
         result = ordinary(*given)
-        if out is None:
-            return result
         out = output(out, result.shape)
         out[...] = result
         return out
 
     call_with_other_arguments.__name__ = call_with_other_arguments.__qualname__ = f"prepared_{call}"
-    call_with_other_arguments.__doc__ = (
-        f"{call}({', '.join(arrays)}, *, out=None) of '{model.name}', {'one state' if batch is None else f'{batch} states'} a call."
-    )
-    return _core.prepared_call(call_with_other_arguments, call, model._calls(), batch, **options)
+    takes = ", ".join(arrays) + ("" if call in _MADE else ", *, out=None")
+    each = "one state" if batch is None else f"{batch} states"
+    call_with_other_arguments.__doc__ = f"{call}({takes}) of '{model.name}', {each} a call."
+    return _core.prepared_call(call_with_other_arguments, call, model._calls(), batch, _MADE.get(call), **options)

@@ -6,16 +6,17 @@ have the derivative last. Every call takes one state or a leading batch axis, an
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from .. import _core
 from ..arguments import text
 from ..state import at_state
-from .by_realization import checked_forces
-from .direct_calls import DirectCalls, cached
-from .prepared import direct_of
+from .by_realization import checked_forces, output
+from .direct_calls import cached
+from .operational_space import OperationalSpaceCalls
+from .prepared import direct, direct_of
 from .threads import over_threads
 
 
@@ -35,7 +36,7 @@ class Momentum(NamedTuple):
     dq: np.ndarray
 
 
-class SensitivityCalls(DirectCalls):
+class SensitivityCalls(OperationalSpaceCalls):
     """Derivatives of inverse and forward dynamics, of the mass matrix, of energy, momentum and Jacobians; the inertial regressor."""
 
     def _sensitivities(self) -> _core.Sensitivities:
@@ -96,26 +97,32 @@ class SensitivityCalls(DirectCalls):
         q, _ = at_state(self, q)
         return self._sensitivities().third_order(True, q, precision, out)
 
+    @direct
     @over_threads
-    def coriolis_matrix(self, q=None, v=None, *, form: str = "christoffel", precision: str = "double", threads: int = 1) -> np.ndarray:
-        """C (nv, nv) with C v the Coriolis and gyroscopic forces (gravity apart) and ℳ̇ - 2C skew.
+    def coriolis_matrix(
+        self, q=None, v=None, *, form: str = "christoffel", precision: str | int = "double", threads: int = 1, out=None
+    ) -> np.ndarray:
+        """C (nv, nv) with C v the Coriolis and gyroscopic forces (gravity apart) and ℳ̇ - 2C skew. Cost O(N · depth).
 
-        form="christoffel": C = Γ v, the one for which also ∂(Cv)/∂v = 2C on hinges of one coordinate each; "skew": the operators'
-        C = Hφ(M𝒥̇ + 𝓑𝒥), 𝒥 = φ*H*, which is skew-consistent too and not Christoffel's. Cost O(N · depth²), O(N²).
+        form="christoffel": C = Hφ(M𝒥̇ + ½(𝓑 + V̄M + MṼ)𝒥) = Γ v, the one for which also ∂(Cv)/∂v = 2C on hinges of one coordinate each;
+        "skew": C = Hφ(M𝒥̇ + 𝓑𝒥), 𝒥 = φ*H*, which is skew-consistent too and not Christoffel's.
         """
         q, v = at_state(self, q, v)
-        if form == "christoffel":
-            symbols = self.christoffel(q, precision=precision)
-            return np.einsum("...ijk,...k->...ij", symbols, checked_forces(self, v, "v"))
-        if form == "skew":
-            H, phi, M, turning, H_dot, cross = self.soa("H phi M Delta_theta_dot H_dot momentum_cross")  # type: ignore[attr-defined]  # the model's
-            J = phi.T @ H.T
-            J_dot = phi.T @ (turning.T @ self.soa.phi_tilde.T @ H.T + H_dot.T)  # type: ignore[attr-defined]  # the model's
-            C = H @ phi @ (M @ J_dot + cross @ J)
-            many = np.broadcast_shapes(np.shape(q)[:-1], np.shape(v)[:-1])  # one of them may be shared by the batch
-            states = np.broadcast_to(q, (*many, np.shape(q)[-1])), np.broadcast_to(v, (*many, self.nv))
-            return C.at(*states, precision=precision).dense()
-        raise _core.EvaluationError(f"form {form!r} of the Coriolis matrix is not there; there are 'christoffel' and 'skew'")
+        if form == "skew" and str(precision).isdigit():  # of so many digits, as operators are
+            return self._coriolis_operator(q, v, precision, out)
+        return self._sensitivities().coriolis_matrix(q, v, form, precision, out)
+
+    def _coriolis_operator(self, q: Any, v: Any, precision: str | int, out: Any) -> np.ndarray:
+        H, phi, M, turning, H_dot, cross = self.soa("H phi M Delta_theta_dot H_dot momentum_cross")  # type: ignore[attr-defined]  # the model's
+        J = phi.T @ H.T
+        J_dot = phi.T @ (turning.T @ self.soa.phi_tilde.T @ H.T + H_dot.T)  # type: ignore[attr-defined]  # the model's
+        C = H @ phi @ (M @ J_dot + cross @ J)
+        many = np.broadcast_shapes(np.shape(q)[:-1], np.shape(v)[:-1])  # one of them may be shared by the batch
+        states = np.broadcast_to(q, (*many, np.shape(q)[-1])), np.broadcast_to(v, (*many, self.nv))
+        found = C.at(*states, precision=precision).dense()
+        result = output(out, found.shape)
+        result[...] = found
+        return result
 
     @over_threads
     def kinetic_energy_derivatives(self, q=None, v=None, *, precision: str = "double", threads: int = 1) -> tuple[np.ndarray, np.ndarray]:

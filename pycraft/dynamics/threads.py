@@ -1,4 +1,7 @@
-"""Batches shared out over threads: the core computes outside the GIL, each part in a workspace of its own."""
+"""Batches shared out over threads: the core computes outside the GIL, each part in a workspace of its own.
+
+Of one state, calls that cost O(N) share out the subtrees of a large tree; the core does that.
+"""
 
 from __future__ import annotations
 
@@ -20,20 +23,22 @@ _PARTS = 4  # for each thread, so that a slow one holds up no more than a part
 
 
 def over_threads(method: F) -> F:
-    """Gives a call its `threads=`: with more than one, the states of a batch are shared out."""
+    """Gives a call its `threads=`: with more than one, the states of a batch are shared out. The call itself is told of a single state."""
     names = [n for n, p in inspect.signature(method).parameters.items() if p.kind is p.POSITIONAL_OR_KEYWORD and n != "self"]
 
     @functools.wraps(method)
     def call(self: Any, *given: Any, threads: int = 1, **options: Any) -> Any:
-        count = _count(threads)
-        if count == 1:
+        count = thread_count(threads)
+        if count == 1:  # nothing to look at
             return method(self, *given, **options)
-        return _shared(functools.partial(method, self), names, given, options, count)
+        bound = functools.partial(method, self)
+        return shared_out(bound, names, given, options, count, functools.partial(bound, *given, **options, threads=count))
 
     return call  # type: ignore[return-value]  # of the same signature
 
 
-def _count(threads: Any) -> int:
+def thread_count(threads: Any) -> int:
+    """The number of threads asked for, checked; also that of `Operator.at`."""
     count = 0
     if not isinstance(threads, (bool, np.bool_)):
         try:
@@ -45,15 +50,22 @@ def _count(threads: Any) -> int:
     return count
 
 
-def _shared(call: Callable[..., Any], names: list[str], given: tuple[Any, ...], options: dict[str, Any], threads: int) -> Any:
+def shared_out(
+    call: Callable[..., Any],
+    names: list[str],
+    given: tuple[Any, ...],
+    options: dict[str, Any],
+    threads: int,
+    whole: Callable[[], Any] | None = None,
+) -> Any:
     """The call on parts of the batch; whatever is no batch, and every error, by the call as a whole."""
-    whole = functools.partial(call, *given, **options)
+    whole = whole or functools.partial(call, *given, **options)
     bound = {**dict(zip(names, given, strict=False)), **{n: x for n, x in options.items() if n in names}}
     rest = {n: x for n, x in options.items() if n not in names and n != "out"}
     arrays = {n: np.asarray(x) for n, x in bound.items() if isinstance(x, (np.ndarray, list, tuple)) and np.ndim(x) == 2}
     sizes = {len(a) for a in arrays.values()}
     out = options.get("out")
-    if "q" not in arrays or len(sizes) != 1 or len(given) > len(names):
+    if threads == 1 or "q" not in arrays or len(sizes) != 1 or len(given) > len(names):
         return whole()
     if not (out is None or (isinstance(out, np.ndarray) and out.ndim and len(out) in sizes)):
         return whole()

@@ -35,12 +35,16 @@ def _bodies(model: Described) -> list[dict[str, Any]]:
 
 @dataclass(frozen=True)
 class PinocchioModel:
-    """Pinocchio's model with the order of its numbers: `q[..., of_q]` and `v[..., of_v]` are Pinocchio's, quaternions made unit."""
+    """Pinocchio's model with the order of its numbers: `q[..., of_q]` and `v[..., of_v]` are Pinocchio's, quaternions made unit.
+
+    `tip`: the joint that carries the last body, and where the body's frame is in the joint's.
+    """
 
     model: Any
     of_q: np.ndarray
     of_v: np.ndarray
     quaternions: tuple[int, ...]
+    tip: tuple[int, Any]
 
     def q(self, q: Vector) -> Vector:
         """Pinocchio's configuration (nq,) of ours."""
@@ -106,7 +110,8 @@ def to_pinocchio(model: Described) -> PinocchioModel:
         armature.extend(hinge["rotor_inertia"])
     out.armature = np.array(armature, float)[of_v]
     out.gravity.linear = np.array(model.gravity, float)
-    return PinocchioModel(out, np.array(of_q, int), np.array(of_v, int), tuple(quaternions))
+    tip = (joints[-1], placements[-1]) if joints else (0, pin.SE3.Identity())
+    return PinocchioModel(out, np.array(of_q, int), np.array(of_v, int), tuple(quaternions), tip)
 
 
 def _pinocchio_joint(subhinge: dict[str, Any]) -> Any:

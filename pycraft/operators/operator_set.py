@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from functools import reduce
+from functools import partial, reduce
 from operator import mul
 from typing import Any
 
@@ -248,9 +248,10 @@ def scalar_at(
     refine: int | str = 0,
     residual: str = "same",
     precision: str | int = "double",
+    threads: int = 1,
 ) -> _core.Scalar:
     """The same scalar bound to a state, as Operator.at."""
-    return scalar.bound(_core._bind(scalar.operands(), q, v, form, refine, residual, precision))
+    return scalar.bound(_core._bind(scalar.operands(), q, v, form, refine, residual, precision, threads))
 
 
 def operator_from_parts(
@@ -316,7 +317,9 @@ def scalar_gradient(scalar: _core.Scalar, over: str = "coordinates") -> np.ndarr
     model: Any = models.pop()
     if kind == "logdet" and _is_mass_matrix(operand):
         q, _, precision = operand._state or (model.q, None, "double")
-        return _core.Sensitivities(model).log_determinant(over, q, precision)  # not the model's own: its Python face may be gone
+        binding = _core._binding(operand)
+        call = partial(_core.Sensitivities(model).log_determinant, over)  # not the model's own: its Python face may be gone
+        return _core._face["shared_out"](call, ["q"], (q,), {"precision": precision}, binding.threads if binding else 1)
     if over != "coordinates":
         raise _core.EvaluationError(f"gradient over {over!r} is there for ln det of the mass matrix and of D, not for {scalar!r}")
     return np.stack([np.asarray(scalar.diff(i), float) for i in range(model.nv)], axis=-1) if model.nv else np.zeros(0)

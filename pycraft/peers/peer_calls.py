@@ -23,6 +23,9 @@ ONE_THREAD = 64
 """States of a batch that Pinocchio computes on one thread, for the time that a call takes in C++."""
 
 
+_ANGULAR = [3, 4, 5, 0, 1, 2]  # first
+
+
 class Call(NamedTuple):
     """A package's call: what is timed, its value as we write it, and how many arrays of the size of ℳ its bindings copy."""
 
@@ -49,10 +52,13 @@ class PinocchioCalls:
 
     def calls(self, q: np.ndarray, v: np.ndarray, u: np.ndarray, X: np.ndarray) -> dict[str, Call]:
         of_v = self.twin.of_v
-        return self._calls(self.twin.q(q), v[of_v], u[of_v], X[of_v], np.argsort(of_v))
+        return self._calls(self.twin.q(q), v[of_v], u[of_v], X[of_v], np.argsort(of_v), self.twin.tip)
 
-    def _calls(self, q: np.ndarray, v: np.ndarray, u: np.ndarray, X: np.ndarray, back: np.ndarray) -> dict[str, Call]:
+    def _calls(self, q: np.ndarray, v: np.ndarray, u: np.ndarray, X: np.ndarray, back: np.ndarray, tip: tuple[int, Any]) -> dict[str, Call]:
         pin, model, data = self.pin, self.model, self.data
+        held, held_data = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
+        held.append(pin.RigidConstraintModel(pin.ContactType.CONTACT_6D, model, *tip, pin.LOCAL))
+        held_data.append(held[0].createData())
 
         def square(matrix: np.ndarray) -> np.ndarray:
             return np.asarray(matrix)[np.ix_(back, back)]
@@ -88,6 +94,15 @@ class PinocchioCalls:
                 lambda: pin.computeABADerivatives(model, data, q, v, u),
                 lambda: derivatives(pin.computeABADerivatives(model, data, q, v, u)),
             ),
+            "coriolis_matrix": Call(
+                lambda: pin.computeCoriolisMatrix(model, data, q, v),
+                lambda: (square(pin.computeCoriolisMatrix(model, data, q, v)),),
+                copies=1,
+            ),
+            "operational_space_inertia": Call(  # without the inverse, which is NumPy's from Python and takes longer there
+                lambda: pin.computeDelassusMatrix(model, data, q, held, held_data),
+                lambda: (np.linalg.inv(pin.computeDelassusMatrix(model, data, q, held, held_data))[np.ix_(_ANGULAR, _ANGULAR)],),
+            ),
             "mass_matrix_inverse_product": Call(
                 lambda: pin.computeMinverse(model, data, q) @ X,
                 lambda: ((_full(pin.computeMinverse(model, data, q)) @ X)[back],),
@@ -95,12 +110,15 @@ class PinocchioCalls:
         }
 
     def bindings(self, call: str) -> Callable[[], Any]:
-        """The call on a model without joints: it does nothing, so what it takes is not the call's own work."""
-        empty = object.__new__(PinocchioCalls)
-        empty.pin, empty.model = self.pin, self.pin.Model()
+        """The call on a model without joints: what that takes is not the call's own work. One joint where it needs one."""
+        pin, empty = self.pin, object.__new__(PinocchioCalls)
+        empty.pin, empty.model = pin, pin.Model()
+        if call == "operational_space_inertia":
+            empty.model.addJoint(0, pin.JointModelRX(), pin.SE3.Identity(), "one")
+            empty.model.appendBodyToJoint(1, pin.Inertia.Identity(), pin.SE3.Identity())
         empty.data = empty.model.createData()
-        none = np.zeros(0)
-        return empty._calls(none, none, none, np.zeros((0, 1)), np.zeros(0, int))[call].run
+        none = np.zeros(empty.model.nv)
+        return empty._calls(none, none, none, np.zeros((len(none), 1)), np.arange(len(none)), (len(none), pin.SE3.Identity()))[call].run
 
     def in_cpp(self, call: str, q: np.ndarray, v: np.ndarray, u: np.ndarray) -> tuple[Clock, int] | None:
         """A clock of so many states (q, v, u) in a loop in C++ on one thread; None where the package has no such loop."""

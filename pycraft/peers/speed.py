@@ -23,7 +23,7 @@ from .compiled_speed import CompiledRow, compiled_row
 from .peer_calls import Call, other_packages
 from .timed_models import CHAINS, timed_models
 
-LINEAR = ("forward_dynamics", "inverse_dynamics")
+LINEAR = ("forward_dynamics", "inverse_dynamics", "operational_space_inertia")
 STATES = 8
 BATCH = 1024
 COLUMNS = 64
@@ -37,6 +37,8 @@ GOALS: dict[str, tuple[float | None, float | None]] = {  # times faster than the
     "mass_matrix_inverse": (1.5, 1.5),
     "inverse_dynamics_derivatives": (1.5, 1.5),
     "forward_dynamics_derivatives": (2.0, 2.0),
+    "coriolis_matrix": (1.3, 1.3),
+    "operational_space_inertia": (1.5, 1.5),
     "mass_matrix_inverse_product": (None, None),
 }
 BATCH_GOALS = {"baseline": (None, None), "avx2": (6.0, 10.0), "avx512": (12.0, 20.0)}
@@ -130,7 +132,8 @@ class OwnCalls:
         self.q, self.v, self.u = Q[0], V[0], U[0]
         n = model.nv
         self.X = np.random.default_rng(0).uniform(-1, 1, (n, COLUMNS)) if n <= max(CHAINS) else np.empty((n, 0))
-        self.vector, self.matrix = np.empty(n), np.empty((n, n) if n <= max(CHAINS) else (0, 0))
+        self.vector, self.matrix, self.square = np.empty(n), np.empty((n, n) if n <= max(CHAINS) else (0, 0)), np.empty((6, 6))
+        self.tip = list(model.bodies)[-1]
         H, phi, M, J = model.soa("H phi M J")
         self.inverse = (H @ phi @ M @ phi.T @ H.T + J).inv()
 
@@ -142,6 +145,10 @@ class OwnCalls:
                 return getattr(model, call)(q, v, u, out=self.vector)
             case "mass_matrix" | "mass_matrix_inverse":
                 return getattr(model, call)(q, out=self.matrix)
+            case "coriolis_matrix":
+                return model.coriolis_matrix(q, v, out=self.matrix)
+            case "operational_space_inertia":
+                return model.operational_space_inertia(self.tip, q, out=self.square)
             case "mass_matrix_inverse_product":
                 model.q = q
                 return self.inverse @ self.X
@@ -150,12 +157,17 @@ class OwnCalls:
     def from_python(self, call: str) -> Callable[[], Any]:
         """What is timed: nothing is looked up while the clock runs."""
         model, q, v, u, vector, matrix = self.model, self.q, self.v, self.u, self.vector, self.matrix
+        tip, square = self.tip, self.square
         own = getattr(model, call, None)
         match call:
             case "forward_dynamics" | "inverse_dynamics":
                 return lambda: own(q, v, u, out=vector)  # type: ignore[misc]  # a call of the model
             case "mass_matrix" | "mass_matrix_inverse":
                 return lambda: own(q, out=matrix)  # type: ignore[misc]  # a call of the model
+            case "coriolis_matrix":
+                return lambda: own(q, v, out=matrix)  # type: ignore[misc]  # a call of the model
+            case "operational_space_inertia":
+                return lambda: own(tip, q, out=square)  # type: ignore[misc]  # a call of the model
             case "mass_matrix_inverse_product":
                 return lambda: self.run(call)
         return lambda: own(q, v, u)  # type: ignore[misc]  # a call of the model
@@ -190,6 +202,10 @@ def _checked_alone(name: str, call: str, own: OwnCalls) -> float:
             return _checked(name, call, own.run(call), (exact(q, v, u),), "that of extended precision")
         case "mass_matrix" | "mass_matrix_inverse":
             return _checked(name, call, own.run(call), (exact(q),), "that of extended precision")
+        case "coriolis_matrix":
+            return _checked(name, call, own.run(call), (exact(q, v),), "that of extended precision")
+        case "operational_space_inertia":
+            return _checked(name, call, own.run(call), (exact(own.tip, q),), "that of extended precision")
         case "mass_matrix_inverse_product":
             return _checked(name, call, own.run(call), (exact(q) @ own.X,), "that of extended precision")
     slopes = model.forward_dynamics_derivatives(q, v, u)

@@ -132,6 +132,7 @@ def entries(model, rng):
         "diagonalised_dynamics": lambda: model.diagonalised_dynamics(*_one_of(rng, [q, v, v], strange)),
         "momentum": lambda: model.momentum(*_one_of(rng, [q, v], strange)),
         "coriolis_matrix": lambda: model.coriolis_matrix(*_one_of(rng, [q, v], strange)),
+        "operational space": lambda: model.operational_space_compliance(*_one_of(rng, ["body0", q], strange)),
         "jacobian_dot": lambda: model.jacobian_dot(*_one_of(rng, ["body0", q, v], strange)),
         "axes": lambda: model.jacobian("body0", q, axes=strange()),
         "relative_to": lambda: model.jacobian("body0", q, relative_to=strange()),

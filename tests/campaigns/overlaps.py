@@ -46,6 +46,8 @@ CALLS = {
     "mass_matrix_inverse": ((Q,), lambda nq, nv: (nv, nv), SOLVED),
     "mass_matrix_derivative": ((Q,), lambda nq, nv: (nv, nv, nv), PRECISIONS),
     "christoffel": ((Q,), lambda nq, nv: (nv, nv, nv), PRECISIONS),
+    "coriolis_matrix": ((Q, V), lambda nq, nv: (nv, nv), [*PRECISIONS, {"form": "skew"}]),
+    "operational_space_compliance": ((Q,), lambda nq, nv: (6, 6), PRECISIONS),
     "jacobian": ((Q,), lambda nq, nv: (6, nv), PRECISIONS),
     "configuration_rate": ((Q, V), lambda nq, nv: (nq,), PRECISIONS),
 }
@@ -84,7 +86,7 @@ def one_round(rng, model, name):
         placed.append(view)
     if batch and all(x.ndim == 1 for x in given):
         return None  # no batch after all
-    frame = ("body0",) if name == "jacobian" else ()
+    frame = ("body0",) if name in ("jacobian", "operational_space_compliance") else ()
 
     def call(arrays, out):
         return getattr(model, name)(*frame, *arrays, **option, out=out)

@@ -49,7 +49,7 @@ def test_graphs_are_the_calls(name):
     model.gravity = (0.4, -1.0, -9.0)
     Q, V, U = kernel_cases.states(model)
     for call, wanted in calls(model, Q, V, U).items():
-        if "derivatives" in call:
+        if call not in INPUTS:
             continue  # not compiled
         graph, results = kernel_graph(model, call)
         found, sound = evaluated(graph, results, {"q": Q, "v": V, "tau": U, "vdot": U})

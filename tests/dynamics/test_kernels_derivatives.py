@@ -6,26 +6,10 @@ import pytest
 
 import pycraft as pc
 from pycraft.dynamics.sensitivities import DynamicsDerivatives
-from support.kernel_cases import MODELS, states
+from support.kernel_cases import LONG, MODELS, states
 
 EPS = np.finfo(float).eps
 CALLS = ["inverse_dynamics_derivatives", "forward_dynamics_derivatives"]
-
-
-def long_models():
-    """Of 49 to 90 coordinates: a chain, branches of one coordinate, and branches of every kind of hinge; rotors on what can have them."""
-    rng = np.random.default_rng(3)
-    yield pc.chain(50, seed=2)
-    yield pc.tree([-1, *(int(rng.integers(max(0, k - 5), k)) for k in range(1, 57))], ["pin"] * 57, seed=5, name="branches")
-    kinds = ["free", "pin", "ball", "slider", "gimbal", "screw", "ball", "weld", "universal", "free", "pin", "planar"] * 3
-    mixed = pc.tree([-1, *(int(rng.integers(max(-1, k - 4), k)) for k in range(1, 36))], kinds, seed=6, name="every kind")
-    for name, hinge in mixed.hinges.items():
-        if hinge.kind == "pin":
-            mixed.hinges[name].rotor_inertia = 0.3
-    yield mixed
-
-
-LONG = {model.name: model for model in long_models()}
 
 
 @pytest.mark.parametrize("name", list(LONG))

@@ -75,7 +75,15 @@ def test_units_change_no_bit(precision, most, signs):
         there |= {
             name: x for name, x in calls(other, q, v, u * inertia, precision=precision).items() if name.startswith("forward_dynamics")
         }
-        factors = {"forward_dynamics": 1, "mass_matrix_inverse": 1 / inertia, "forward_dynamics_derivatives, input": 1 / inertia}
+        lengths = np.repeat([1, length], 3)  # angular, linear
+        felt = inertia / np.multiply.outer(lengths, lengths)
+        factors = {
+            "forward_dynamics": 1,
+            "mass_matrix_inverse": 1 / inertia,
+            "forward_dynamics_derivatives, input": 1 / inertia,
+            "operational_space_compliance": 1 / felt,
+            "operational_space_inertia": felt,
+        }
         for name, value in plain.items():
             factor = factors.get(name, 1 if name.startswith("forward_dynamics") else inertia)
             np.testing.assert_array_equal(there[name], value * factor, err_msg=name)

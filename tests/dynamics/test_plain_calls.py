@@ -35,6 +35,8 @@ def welds_only():
 @pytest.mark.parametrize("kind", MODELS)
 def test_as_the_method_has_it(kind, call, states, monkeypatch):
     model = warm(MODELS[kind]())
+    if model.nv < 6 and call == "operational_space_inertia":
+        return  # singular
     arrays, frame = given(model, call, states), frame_first(model, call)
     wanted = by_the_method(model, call, *frame, *arrays)
     taken_by_the_core(monkeypatch, model)
@@ -181,7 +183,7 @@ def test_singular_hinges_are_named():
 
 
 @pytest.mark.parametrize("states", [-1, 0, 3])
-@pytest.mark.parametrize("call", CALLS)
+@pytest.mark.parametrize("call", [call for call in CALLS if not call.startswith("operational_space")])
 def test_no_coordinates(call, states, monkeypatch):
     model, batch = welds_only(), () if states < 0 else (states,)
     arrays, frame = given(model, call, states), frame_first(model, call)
@@ -189,7 +191,7 @@ def test_no_coordinates(call, states, monkeypatch):
     taken_by_the_core(monkeypatch, model)
     found = getattr(model, call)(*frame, *arrays)
     same(found, wanted)
-    matrices = {"mass_matrix": (0, 0), "mass_matrix_inverse": (0, 0), "jacobian": (6, 0), "pose": (4, 4)}
+    matrices = {"mass_matrix": (0, 0), "mass_matrix_inverse": (0, 0), "coriolis_matrix": (0, 0), "jacobian": (6, 0), "pose": (4, 4)}
     assert found.shape == batch + matrices.get(call, (0,))
 
 

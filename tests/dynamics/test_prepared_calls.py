@@ -27,13 +27,59 @@ def test_prepared(call, states, monkeypatch):
     assert call in ready.__doc__
 
 
+@pytest.mark.parametrize("call", ["inverse_dynamics_derivatives", "forward_dynamics_derivatives"])
+def test_prepared_calls_of_three_results(call, monkeypatch):
+    model = panda()
+    rng = np.random.default_rng(1)
+    Q, V, U = np.array([model.random_state(s).q for s in range(4)]), *rng.normal(size=(2, 4, 7))
+    for arrays, batch in (((Q, V, U), 4), ((Q[0], V[0], U[0]), None), ((Q, V[0], U), 4), ((Q[:0], V[:0], U[:0]), 0)):
+        wanted = by_the_method(model, call, *arrays)
+        ready = model.prepare(call, batch=batch)
+        lists = [a.tolist() if batch != 0 else a for a in arrays]
+        with monkeypatch.context() as m:
+            m.setattr(type(model), "_sensitivities", lambda self: pytest.fail("by the method"))
+            found = ready(*arrays)
+        for other in (found, ready(*lists)):
+            assert type(other) is type(wanted)
+            for a, b in zip(other, wanted, strict=True):
+                same(a, b)
+    wider = model.prepare(call, precision="quad")(Q[0], V[0], U[0])
+    for a, b in zip(wider, by_the_method(model, call, Q[0], V[0], U[0], precision="quad"), strict=True):
+        same(a, b)
+    assert call in ready.__doc__ and "out" not in ready.__doc__
+
+
+def test_prepared_derivatives_in_another_form(monkeypatch):
+    model, rng = panda(), np.random.default_rng(2)
+    q, v, u = model.random_state(1).q, *rng.normal(size=(2, 7))
+    for options in ({"form": "ud"}, {"refine": 1}, {"refine": 1, "residual": "wider"}):
+        for a, b in zip(
+            model.prepare("forward_dynamics_derivatives", **options)(q, v, u),
+            by_the_method(model, "forward_dynamics_derivatives", q, v, u, **options),
+            strict=True,
+        ):
+            same(a, b)
+
+
+@pytest.mark.parametrize("form", ["christoffel", "skew"])
+def test_prepared_coriolis_matrices(form, monkeypatch):
+    model, rng = panda(), np.random.default_rng(2)
+    q, v = model.random_state(1).q, rng.normal(size=7)
+    wanted = {p: by_the_method(model, "coriolis_matrix", q, v, form=form, precision=p) for p in ("double", "quad")}
+    for precision, value in wanted.items():
+        same(model.prepare("coriolis_matrix", form=form, precision=precision)(q, v), value)
+    taken_by_the_core(monkeypatch, model)
+    same(model.coriolis_matrix(q, v, form=form), wanted["double"])
+    same(model.coriolis_matrix(q, v, form=form, precision="double"), wanted["double"])
+
+
 @pytest.mark.parametrize(
     "ask, error, words",
     [
-        (lambda m: m.prepare("dynamics"), pc.EvaluationError, "'forward_dynamics'.*'pose', not 'dynamics'"),
-        (lambda m: m.prepare(["pose"]), pc.EvaluationError, r"'forward_dynamics'.*'pose', not \['pose'\]"),
-        (lambda m: m.prepare(None), pc.EvaluationError, "'forward_dynamics'.*'pose', not None"),
-        (lambda m: m.prepare(3), pc.EvaluationError, "'forward_dynamics'.*'pose', not 3"),
+        (lambda m: m.prepare("dynamics"), pc.EvaluationError, "'forward_dynamics'.*'pose'.*, not 'dynamics'"),
+        (lambda m: m.prepare(["pose"]), pc.EvaluationError, r"'forward_dynamics'.*'pose'.*, not \['pose'\]"),
+        (lambda m: m.prepare(None), pc.EvaluationError, "'forward_dynamics'.*'pose'.*, not None"),
+        (lambda m: m.prepare(3), pc.EvaluationError, "'forward_dynamics'.*'pose'.*, not 3"),
         (lambda m: m.prepare("mass_matrix", form="ud"), pc.EvaluationError, "no option 'form'"),
         (lambda m: m.prepare("forward_dynamics", form="udu"), pc.EvaluationError, "udu"),
         (lambda m: m.prepare("forward_dynamics", batch=-1), pc.EvaluationError, "batch=-1"),
@@ -43,6 +89,12 @@ def test_prepared(call, states, monkeypatch):
         (lambda m: m.prepare("forward_dynamics", batch=[2]), pc.EvaluationError, "batch=.2."),
         (lambda m: m.prepare("forward_dynamics", batch=2**31), pc.EvaluationError, f"up to {2**31 - 1}"),
         (lambda m: m.prepare("jacobian"), pc.EvaluationError, "frame="),
+        (lambda m: m.prepare("operational_space_inertia"), pc.EvaluationError, "frame="),
+        (lambda m: m.prepare("coriolis_matrix", form="ud"), pc.EvaluationError, "'ud' of the Coriolis matrix.*'christoffel' and 'skew'"),
+        (lambda m: m.prepare("inverse_dynamics_derivatives", form="ud"), pc.EvaluationError, "no option 'form'"),
+        (lambda m: m.prepare("forward_dynamics_derivatives", on_singular="raise"), pc.EvaluationError, "no option 'on_singular'"),
+        (lambda m: m.prepare("inverse_dynamics_derivatives")(m.q, m.v), TypeError, "takes q, v, vdot; it was given 2"),
+        (lambda m: m.prepare("inverse_dynamics_derivatives")(m.q, m.v, m.v, out=m.v), TypeError, "no out="),
         (lambda m: m.prepare("pose", frame="nose"), pc.ModelError, "nose"),
         (lambda m: m.prepare("pose", frame=3), pc.ModelError, "text, not by 3"),
         (lambda m: m.prepare("pose", frame="panda_link7")(m.q, out=np.empty((2, 4, 4))), pc.ModelError, r"shape \(4, 4\)"),

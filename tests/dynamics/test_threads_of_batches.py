@@ -22,6 +22,7 @@ CALLS = {
     "mass_matrix_derivative": ("q",),
     "christoffel": ("q",),
     "coriolis_matrix": ("q", "v"),
+    "operational_space_compliance": ("frame", "q"),
     "kinetic_energy_derivatives": ("q", "v"),
     "hamiltonian_dynamics": ("q", "v", "u"),
     "innovations": ("q", "v", "u"),
@@ -38,6 +39,8 @@ WITH_OUT = [
     "mass_matrix_inverse",
     "jacobian",
     "mass_matrix_derivative",
+    "coriolis_matrix",
+    "operational_space_compliance",
 ]
 
 

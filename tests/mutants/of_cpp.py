@@ -48,8 +48,25 @@ CHANGES = {
             STATEMENT,
         ),
         ("a workspace keeps the number of its first state", "w_.state = b;", ";", STATEMENT),
-        ("what is out of range is returned in double", "in_range_ &= all_finite(y.data(), y.size());", ";", STATEMENT),
+        ("what is out of range is returned in double", "in_range_ &= all_finite(y, size);", ";", STATEMENT),
+        ("what is out of range is returned in its place", "in_range_ &= all_finite(out_ + size_t(b) * size, size);", ";", STATEMENT),
         ("what is out of range is returned", "in_range_ &= std::isfinite(out_[at]);", ";", STATEMENT),
+    ],
+    "cpp/algebra/engine/plan_cache.cpp": [
+        ("a plan in double serves in quad", "how.precision, binding.batch >= 0", "Precision::double_, binding.batch >= 0"),
+        ("a plan for one state serves for a batch", "how.precision, binding.batch >= 0", "how.precision, true"),
+        (
+            "plans at states for J = 0 once and for all",
+            "plan.contexts[c].source->traits().hinge_diagonal != plan.hinge_diagonal[c]",
+            "false",
+        ),
+    ],
+    "cpp/algebra/engine/in_place.h": [
+        ("what an operator from outside writes to is read", "plan.input >= 0 && !plan.calls_outside()", "plan.input >= 0"),
+    ],
+    "cpp/kernels/mass_matrix_of_columns.h": [
+        ("a body that branches counts twice", "if (!added) at = at + M * alpha[c];", "at = at + M * alpha[c];", STATEMENT),
+        ("no rotors", "if (with_J) yc +=", "if (with_J && false) yc +=", STATEMENT),
     ],
     "cpp/algebra/trees/mixed_blocks.h": [
         ("an edge from a rigid body to a group is rigid", "is_structured_[k] && is_structured_[tree_.parent[k]]", "is_structured_[k]"),
@@ -175,6 +192,18 @@ CHANGES = {
     ],
     "cpp/kernels/mass_matrix_of_links.h": [
         ("lengths along an axis are felt", "S(2) * (l[j] * g[j] + l[k] * g[k])", "S(2) * (dot(l, g) - l[i] * g[i])"),
+        ("two pins branch between", "!parent.branches && pin(link)", "pin(link)"),
+        ("of two pins the inner one has no rotor", "double(dot(g, n).v) + parent->J", "double(dot(g, n).v)"),
+    ],
+    "cpp/kernels/mirror.h": [
+        ("what is no number is mirrored", "odd += a - a, odd += b - b, odd += c - c, odd += d - d;", ";", STATEMENT),
+    ],
+    "cpp/kernels/articulated_links.h": [
+        ("what a subtree in another thread carries is lost", "P = w.branch[last];", "P = no_inertia<S>();", STATEMENT),
+    ],
+    "cpp/dynamics/subtrees.h": [
+        ("subtrees in threads are sound", "all &= one != 0;", ";", STATEMENT),
+        ("subtrees do not begin with zero branches", "before(apart_[i]), clear(apart_[i])", "before(apart_[i])"),
     ],
     "cpp/kernels/steps.h": [
         ("hinges against an axis turn with it", "S(link.sign) * of.sine", "of.sine"),
@@ -213,6 +242,7 @@ CHANGES = {
     ],
     "cpp/runtime/interrupt.cpp": [
         ("signals are looked at once a minute", "now - last < pause", "now - last < 1000 * pause"),
+        ("of several errors the last one", "if (i < end) end = i, error", "end = std::min(end.load(), i), error"),
     ],
     "cpp/algebra/engine/refined_solves.h": [
         ("wider values of the state before", "if (now == followed_) return;", "if (!followed_.empty()) return;", STATEMENT),

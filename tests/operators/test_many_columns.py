@@ -1,5 +1,5 @@
 """ℳ⁻¹X by kernels over many columns (cpp/kernels/body_columns.h), against quad precision for every kind of hinge; `operator @ array` by the
-type's own slot against the way that takes anything."""
+type's own slot against the way that takes anything. The other sweeps over many columns: test_sweeps_of_columns.py."""
 
 import os
 import subprocess

@@ -77,14 +77,14 @@ def test_a_robot_that_is_not_there_is_said(monkeypatch):
 
 @pytest.fixture
 def own():
-    model = timed_models.chain_of_machines(5)
+    model = timed_models.chain_of_machines(7)
     model.gravity = (0, 0, -9.81)
     return speed.OwnCalls(model, speed.states_of(model))
 
 
 @pytest.mark.parametrize("call", speed.GOALS)
 def test_every_call_is_checked_and_timed(own, call):
-    found = speed.measured_row("five", own, call, {}, 0.001)
+    found = speed.measured_row("seven", own, call, {}, 0.001)
     assert 0 < found.kernel.minimum <= found.kernel.median and 0 < found.python.minimum <= found.python.median
     assert found.errors["alone"] < 1e-12 and found.peer_kernel is None and not found.peers
 
@@ -93,12 +93,12 @@ def test_every_call_is_checked_and_timed(own, call):
 def test_a_wrong_result_is_not_timed(own, call):
     true = own.run(call)
     arrays = tuple(np.array(a) for a in (true if isinstance(true, tuple) else (true,)))
-    found = speed.measured_row("five", own, call, {"Other": Call(lambda: None, lambda: arrays)}, 0.001)
+    found = speed.measured_row("seven", own, call, {"Other": Call(lambda: None, lambda: arrays)}, 0.001)
     assert found.errors == {"Other": 0.0} and found.peers["Other"].median > 0
     for wrong in (1 + 1e-5, float("nan")):
         off = (*arrays[:-1], arrays[-1] * wrong)
-        with pytest.raises(pc.EvaluationError, match=f"{call} of five is not Other's in the run that times it"):
-            speed.measured_row("five", own, call, {"Other": Call(lambda: None, lambda off=off: off)}, 0.001)
+        with pytest.raises(pc.EvaluationError, match=f"{call} of seven is not Other's in the run that times it"):
+            speed.measured_row("seven", own, call, {"Other": Call(lambda: None, lambda off=off: off)}, 0.001)
 
 
 @pytest.mark.parametrize("call", speed.GOALS)
@@ -109,8 +109,8 @@ def test_a_wrong_result_is_not_timed_where_no_peer_goes(own, call, monkeypatch):
     else:
         value = np.array(own.run(call))
         monkeypatch.setattr(own, "run", lambda _: 1.001 * value)
-    with pytest.raises(pc.EvaluationError, match="of five"):
-        speed.measured_row("five", own, call, {}, 0.001)
+    with pytest.raises(pc.EvaluationError, match="of seven"):
+        speed.measured_row("seven", own, call, {}, 0.001)
 
 
 def test_a_chain_beyond_a_dense_matrix():

@@ -26,6 +26,22 @@ def trees():
 MODELS = {model.name: model for model in trees()}
 
 
+def long_models():
+    """Of 49 to 90 coordinates: a chain, branches of one coordinate, and branches of every kind of hinge; rotors on what can have them."""
+    rng = np.random.default_rng(3)
+    yield pc.chain(50, seed=2)
+    yield pc.tree([-1, *(int(rng.integers(max(0, k - 5), k)) for k in range(1, 57))], ["pin"] * 57, seed=5, name="branches")
+    kinds = ["free", "pin", "ball", "slider", "gimbal", "screw", "ball", "weld", "universal", "free", "pin", "planar"] * 3
+    mixed = pc.tree([-1, *(int(rng.integers(max(-1, k - 4), k)) for k in range(1, 36))], kinds, seed=6, name="every kind")
+    for name, hinge in mixed.hinges.items():
+        if hinge.kind == "pin":
+            mixed.hinges[name].rotor_inertia = 0.3
+    yield mixed
+
+
+LONG = {model.name: model for model in long_models()}
+
+
 def states(model, count=STATES):
     drawn = [model.random_state(seed) for seed in range(count)]
     rng = np.random.default_rng(7)
@@ -40,7 +56,12 @@ def calls(model, Q, V, U, **how):
         for call in ("inverse_dynamics_derivatives", "forward_dynamics_derivatives")
         for along, matrix in zip(("q", "v", "input"), getattr(model, call)(Q, V, U, **how), strict=True)
     }
+    if model.nv and how.get("precision") != "single":
+        tip = list(model.bodies)[-1]
+        derivatives["operational_space_compliance"] = model.operational_space_compliance(tip, Q, **how)
     return derivatives | {
+        "coriolis_matrix": model.coriolis_matrix(Q, V, **how),
+        "coriolis_matrix, skew": model.coriolis_matrix(Q, V, form="skew", **how),
         "forward_dynamics": model.forward_dynamics(Q, V, U, **how),
         "inverse_dynamics": model.inverse_dynamics(Q, V, U, **how),
         "bias_forces": model.bias_forces(Q, V, **how),

@@ -1,4 +1,4 @@
-"""Models whose ℳ⁻¹ is applied to many columns at once: those of the kernels of direct calls, and pins along coordinate axes."""
+"""Models whose operators are applied to many columns at once: those of the kernels of direct calls, and pins along coordinate axes."""
 
 import numpy as np
 
@@ -29,10 +29,28 @@ def along_axes():
 TREES = {**MODELS, "along axes": along_axes(), "chain of machines": chain_of_machines(12), "nothing": pc.Multibody("nothing")}
 
 
+def with_rotors():
+    """A tree of three branches at one body and a hinge of three coordinates, rotors on some."""
+    model = pc.tree([-1, 0, 0, 0, 2, 2], ["pin", "ball", "pin", "screw", "pin", "slider"], seed=8, name="with rotors")
+    for name, inertia in zip(list(model.hinges)[::2], (0.3, 1.1, 0.2), strict=False):
+        model.hinges[name].rotor_inertia = inertia
+    return model
+
+
+TREES["with rotors"] = with_rotors()
+
+
 def inverse_of(model):
     H, phi, M, J = model.soa("H phi M J")
     return (H @ phi @ M @ phi.T @ H.T + J).inv()
 
 
-def columns_of(model):
-    return np.random.default_rng(11).uniform(-1, 1, (model.nv, COLUMNS))
+def sweeps_of(model):
+    """What else is applied to many columns."""
+    H, phi, psi, M, J = model.soa("H phi psi M J")
+    MM = H @ phi @ M @ phi.T @ H.T
+    return {"ℳ": MM, "ℳ + J": MM + J, "φ": phi, "φ*": phi.T, "ψ": psi, "ψ*": psi.T}
+
+
+def columns_of(model, rows=None):
+    return np.random.default_rng(11).uniform(-1, 1, (model.nv if rows is None else rows, COLUMNS))

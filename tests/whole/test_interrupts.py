@@ -111,6 +111,12 @@ def a_batch():
     return lambda: model.forward_dynamics(q, zero, zero, precision=100)
 
 
+def a_batch_in_threads():
+    model = pc.robots.panda()
+    e = mass_matrix(model).inv().at(np.tile(model.q, (3000, 1)), precision=100, threads=2)
+    return lambda: e @ np.ones(model.nv)
+
+
 def one_large_state():
     model = pc.chain(20_000)
     zero = np.zeros(model.nv)
@@ -161,6 +167,7 @@ CALLS = {
     "a Riccati sweep in 100 digits": riccati_sweep,
     "a dense form": dense_form,
     "a batch in 100 digits": a_batch,
+    "a batch in threads": a_batch_in_threads,
     "one large state in 100 digits": one_large_state,
     "sensitivities": sensitivities,
     "a trajectory": a_trajectory,

@@ -85,6 +85,8 @@ DIRECT = {
     "christoffel": lambda m: m.christoffel(q),
     "coriolis_matrix": lambda m: m.coriolis_matrix(q, v),
     "coriolis_matrix, skew": lambda m: m.coriolis_matrix(q, v, form="skew"),
+    "operational_space_inertia": lambda m: m.operational_space_inertia("tool", q),
+    "operational_space_compliance": lambda m: m.operational_space_compliance(["tool"], q),
     "kinetic_energy_derivatives": lambda m: m.kinetic_energy_derivatives(q, v)[0],
     "hamiltonian_dynamics": lambda m: np.concatenate(m.hamiltonian_dynamics(q, v, tau)),
     "innovations": lambda m: np.concatenate(m.innovations(q, v, tau)),

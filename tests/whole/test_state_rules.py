@@ -8,7 +8,7 @@ import pytest
 import pycraft as pc
 from support.mechanisms import every_kind, uniform_batch
 
-FRAMES = {"jacobian", "pose", "jacobian_dot", "jacobian_derivative"}
+FRAMES = {"jacobian", "pose", "jacobian_dot", "jacobian_derivative", "operational_space_inertia", "operational_space_compliance"}
 NOT_OF_A_STATE = {"inertial_parameters", "prepare"}
 
 
@@ -40,7 +40,7 @@ def test_every_direct_call_takes_a_state_or_the_models_own(name):
         model = pc.chain(3, seed=1)
         state, now = model.random_state(5), model.random_state(6)
         model.q, model.v = now.q, now.v
-    frame = ("body1",) if name in FRAMES else ()
+    frame = ("body7",) if name.startswith("operational") else ("body1",) if name in FRAMES else ()  # body7 moves in every direction
     options = {"tau": np.arange(model.nv) / 10, "vdot": np.arange(model.nv) / 5, "p": np.ones(model.nv)}
     inputs = {key: options[key] for key in others if key != "v"}
     call = getattr(model, name)

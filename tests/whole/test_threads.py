@@ -196,6 +196,7 @@ def work():
     while True:
         try:
             e.at(Q) @ x
+            e.at(Q, threads=2) @ x
             (2 * e) @ x
             model.q = model.q + 1e-9
             model.forward_dynamics(Q, Q, Q)
@@ -217,6 +218,7 @@ for i in range({forks}):
     if child == 0:
         for _ in range(3):
             e @ x
+            e.at(Q, threads=2) @ x
             (3 * MM).inv() @ x
             model.q = model.q + 1e-6
             model.forward_dynamics(Q, Q, Q)

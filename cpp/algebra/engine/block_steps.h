@@ -91,7 +91,7 @@ void Workspace<S>::function_block(const Step& s, const std::vector<SkoValues<S>*
   BlockStorage<S>& out = blocks_[s.out];
   if (s.context >= 0) {
     gathered_.clear();
-    elimination::for_rows(plan_->registers[s.in[0]].space, k, [&](int, int row) { gathered_.push_back(vectors_[s.in[0]][row]); });
+    elimination::for_rows(plan_->registers[s.in[0]].space, k, [&](int, int row) { gathered_.push_back(numbers(s.in[0])[row]); });
     values[s.context]->function_block(s.symbol, k, gathered_.data(), out.at(k));
     return;
   }

@@ -8,6 +8,8 @@
 
 #include "algebra/engine/block_steps.h"
 #include "algebra/engine/dense_steps.h"
+#include "algebra/engine/in_place.h"
+#include "algebra/engine/in_use.h"
 #include "algebra/engine/refined_solves.h"
 #include "algebra/engine/scalar_steps.h"
 #include "algebra/engine/vector_steps.h"
@@ -16,26 +18,6 @@
 
 namespace pycraft {
 
-namespace {
-
-// No model of these contexts is edited while it lives.
-class InUse {
- public:
-  explicit InUse(const std::vector<Context>& contexts) : contexts_(contexts) {
-    for (const Context& c : contexts_) entered_ = c.source->enter_use();
-  }
-  ~InUse() {
-    for (const Context& c : contexts_) c.source->leave_use(entered_);
-  }
-  InUse(const InUse&) = delete;
-
- private:
-  const std::vector<Context>& contexts_;
-  unsigned entered_ = 0;
-};
-
-}  // namespace
-
 struct ExecutionPool::Impl {
   Mutex mutex;
   template <class S>
@@ -43,12 +25,44 @@ struct ExecutionPool::Impl {
   PerScalar<Free> free;
   PassCounts counts;
   std::vector<std::string> notes;
+  int threads = 1;                               // that share the states of a batch
+  InPlace in_place;
   std::vector<std::atomic<std::uint64_t>> seen;  // per context: the parameters that the plan was last found to be made for
+
+  template <class S>
+  std::unique_ptr<Workspace<S>> taken(const std::shared_ptr<const Plan>& plan) {
+    {
+      std::lock_guard<Mutex> lock(mutex);
+      if (mutex.abandoned()) leave_behind(free, notes);
+      auto& kept = std::get<Free<S>>(free);
+      if (!kept.empty()) {
+        std::unique_ptr<Workspace<S>> workspace = std::move(kept.back());
+        kept.pop_back();
+        return workspace;
+      }
+    }
+    return std::make_unique<Workspace<S>>(plan);
+  }
+  // Under the lock.
+  template <class S>
+  void keep(std::unique_ptr<Workspace<S>> workspace) {
+    std::get<Free<S>>(free).push_back(std::move(workspace));
+  }
 };
+
+// As many threads as a batch was bound with. An operator from outside is called by the caller's own alone.
+static int threads_of(const Plan& plan) {
+  int threads = 1;
+  for (const Context& c : plan.contexts)
+    if (c.binding && c.binding->batch >= 0) threads = std::max(threads, c.binding->threads);
+  return plan.calls_outside() ? 1 : threads;
+}
 
 ExecutionPool::ExecutionPool(std::shared_ptr<const Plan> plan) : plan_(std::move(plan)), impl_(std::make_unique<Impl>()) {
   impl_->seen = std::vector<std::atomic<std::uint64_t>>(plan_->contexts.size());
   for (auto& parameters : impl_->seen) parameters = ~std::uint64_t(0);  // none
+  impl_->threads = threads_of(*plan_);
+  impl_->in_place = InPlace(*plan_);
 }
 ExecutionPool::~ExecutionPool() = default;
 
@@ -62,6 +76,12 @@ bool ExecutionPool::current() const {
     impl_->seen[c] = parameters;
   }
   return true;
+}
+
+PassCounts& PassCounts::operator+=(const PassCounts& other) {
+  values += other.values, gathers += other.gathers, scatters += other.scatters;
+  kernels += other.kernels, eliminations += other.eliminations, dense += other.dense;
+  return *this;
 }
 
 PassCounts ExecutionPool::last_counts() const {
@@ -83,30 +103,41 @@ std::vector<std::string> ExecutionPool::run_notes() const {
 
 namespace {
 
-// One run of a plan in a workspace, state after state.
+// One run of a plan in a workspace, state after state, or some of the states of a run that began with the first.
 template <class S>
 class Run {
  public:
-  Run(const Plan& plan, Workspace<S>& workspace, const Inputs& inputs, bool expansions, Result& result)
+  Run(const Plan& plan, Workspace<S>& workspace, const Inputs& inputs, bool expansions, Result& result, const InPlace& in_place)
       : plan_(plan), w_(workspace), inputs_(inputs), expansions_(expansions), result_(result), states_(plan.batched ? plan.batch : 1) {
+    if constexpr (of_doubles) in_place_ = in_place, in_place_.output &= !expansions;
+
     take_values();
     check_vectors();
     result_.batch = plan.batched ? states_ : (inputs.batched ? -2 : -1);
+  }
+  // Beside another one that holds the values of what is no batch and has shaped the result.
+  Run(const Run& first, Workspace<S>& workspace)
+      : plan_(first.plan_), w_(workspace), inputs_(first.inputs_), expansions_(first.expansions_), result_(first.result_), out_(first.out_), in_place_(first.in_place_), states_(first.states_) {
+    w_.values = first.w_.values;
+    make_own_values();
   }
   // What was held of the models goes with the run: an operator from outside, or a signal's handler, may run another one on this thread
   // before this one is over.
   ~Run() { w_.held.clear(); }
   Run(const Run&) = delete;
 
-  PassCounts run() {
-    for (int b = 0; b < states_; ++b)
-      naming_state(b, states_, [&] {
-        run_state(b);
-        if (!in_range_) throw_beyond_range(plan_, inputs_);
-      });
+  int states() const { return states_; }
+  const PassCounts& counts() const { return counts_; }
+  void run(int b) {
+    naming_state(b, states_, [&] {
+      run_state(b);
+      if (!in_range_) throw_beyond_range(plan_, inputs_);
+    });
+  }
+  // The result of no states.
+  void run_none() {
     const bool number = plan_.request == Request::trace || plan_.request == Request::logdet || plan_.request == Request::norm;
-    if (states_ == 0) shape(number ? 1 : plan_.codomain.dimension(), plan_.request == Request::dense ? plan_.domain.dimension() : inputs_.columns);
-    return counts_;
+    shape(number ? 1 : plan_.codomain.dimension(), plan_.request == Request::dense ? plan_.domain.dimension() : inputs_.columns);
   }
 
  private:
@@ -115,7 +146,7 @@ class Run {
     w_.held.clear();
     w_.held.resize(plan_.contexts.size());
     w_.values.assign(plan_.contexts.size(), nullptr);
-    if (w_.own_values.size() != plan_.contexts.size()) w_.own_values.resize(plan_.contexts.size());
+    make_own_values();
     for (size_t c = 0; c < plan_.contexts.size(); ++c) {
       const Context& context = plan_.contexts[c];
       if (!context.binding) {
@@ -123,15 +154,23 @@ class Run {
       } else if (context.binding->batch < 0) {
         w_.held[c] = context.binding->template values<S>(context.source, plan_.groups[c]);
       } else {
-        context.source->check_current();
-        if (!w_.own_values[c]) {
-          w_.own_values[c] = context.source->make_values(S());
-          w_.own_values[c]->use(context.binding->arithmetic.form);
-        }
-        w_.values[c] = w_.own_values[c].get();
         continue;
       }
       w_.values[c] = w_.held[c].get();
+    }
+  }
+
+  void make_own_values() {
+    w_.own_values.resize(plan_.contexts.size());
+    for (size_t c = 0; c < plan_.contexts.size(); ++c) {
+      const Context& context = plan_.contexts[c];
+      if (!context.binding || context.binding->batch < 0) continue;
+      context.source->check_current();
+      if (!w_.own_values[c]) {
+        w_.own_values[c] = context.source->make_values(S());
+        w_.own_values[c]->use(context.binding->arithmetic.form);
+      }
+      w_.values[c] = w_.own_values[c].get();
     }
   }
 
@@ -172,31 +211,56 @@ class Run {
       w_.vector(r).assign(given.begin(), given.end());
     }
     if (plan_.columns_of_identity) return run_columns(b, fresh);
-    const int n_in = plan_.domain.dimension(), m = inputs_.columns;
-    if (plan_.input >= 0) {
-      std::vector<S>& x = w_.vector(plan_.input);
-      x.resize(size_t(n_in) * m);
-      const double* given = inputs_.x ? inputs_.x + (inputs_.batched ? size_t(b) * n_in * m : 0) : nullptr;
-      if (given)
-        std::copy_n(given, x.size(), x.begin());
-      else
-        std::fill(x.begin(), x.end(), S(1));
-    }
+    const int n_in = plan_.domain.dimension(), n_out = plan_.codomain.dimension(), m = inputs_.columns;
+    const Register& out = plan_.registers[plan_.output];
+    const size_t size = size_t(n_out) * (out.wide ? m : 1);
+    const Lent lent(*this);
+    if (plan_.input >= 0) take_input(b, size_t(n_in) * m);
+    if (b == 0 && out.kind == RegisterKind::vector) shape(n_out, out.wide ? m : 1);
+    if (in_place_.output) w_.lend(plan_.output, reinterpret_cast<S*>(out_ + size_t(b) * size));
     w_.run(w_.values, m, fresh, counts_);
     if (states_ > 1) check_interrupt();
-    const Register& out = plan_.registers[plan_.output];
     switch (out.kind) {
-      case RegisterKind::vector: return store_all(b, w_.vector(plan_.output), plan_.codomain.dimension(), out.wide ? m : 1);
-      case RegisterKind::dense: return store_all(b, w_.dense(plan_.output), plan_.codomain.dimension(), n_in);
+      case RegisterKind::vector:
+        if (in_place_.output)
+          in_range_ &= all_finite(out_ + size_t(b) * size, size);
+        else
+          store_all(b, w_.numbers(plan_.output), size);
+        return;
+      case RegisterKind::dense:
+        if (b == 0) shape(n_out, n_in);
+        return store_all(b, w_.dense(plan_.output).data(), size_t(n_out) * n_in);
       case RegisterKind::blocks: {
         const std::vector<S>& y = w_.blocks(plan_.output).data;
-        return store_all(b, y, static_cast<int>(y.size()), 1);
+        if (b == 0) shape(static_cast<int>(y.size()), 1);
+        return store_all(b, y.data(), y.size());
       }
       default:
         if (b == 0) shape(1, 1);
         store(b, w_.scalar(plan_.output));
     }
   }
+
+  void take_input(int b, size_t size) {
+    const double* given = inputs_.x ? inputs_.x + (inputs_.batched ? size_t(b) * size : 0) : nullptr;
+    if constexpr (of_doubles) {
+      if (given && in_place_.input) return w_.lend(plan_.input, const_cast<double*>(given));  // no step writes to it
+    }
+    std::vector<S>& x = w_.vector(plan_.input);
+    x.resize(size);
+    if (given)
+      std::copy_n(given, size, x.begin());
+    else
+      std::fill(x.begin(), x.end(), S(1));
+  }
+  struct Lent {  // until the state is done, be it by an error
+    Run& run;
+    explicit Lent(Run& r) : run(r) {}
+    ~Lent() {
+      if (run.plan_.input >= 0) run.w_.lend(run.plan_.input, nullptr);
+      if (run.plan_.output >= 0) run.w_.lend(run.plan_.output, nullptr);
+    }
+  };
 
   // The operator itself, its diagonal, trace or norm, from columns of the identity, some at a time.
   void run_columns(int b, bool fresh) {
@@ -245,16 +309,15 @@ class Run {
     in_range_ &= std::isfinite(out_[at]);
     if (expansions_) result_.expansions[at] = expansion(value);
   }
-  void store_all(int b, const std::vector<S>& y, int rows, int columns) {
-    if (b == 0) shape(rows, columns);
-    if constexpr (std::is_same_v<S, double>) {
+  void store_all(int b, const S* y, size_t size) {
+    if constexpr (of_doubles) {
       if (!expansions_) {
-        std::copy(y.begin(), y.end(), out_ + size_t(b) * y.size());
-        in_range_ &= all_finite(y.data(), y.size());
+        std::copy_n(y, size, out_ + size_t(b) * size);
+        in_range_ &= all_finite(y, size);
         return;
       }
     }
-    for (size_t i = 0; i < y.size(); ++i) store(size_t(b) * y.size() + i, y[i]);
+    for (size_t i = 0; i < size; ++i) store(size_t(b) * size + i, y[i]);
   }
 
   const Plan& plan_;
@@ -263,30 +326,56 @@ class Run {
   bool expansions_, in_range_ = true;
   Result& result_;
   double* out_ = nullptr;
+  static constexpr bool of_doubles = std::is_same_v<S, double>;
+  InPlace in_place_;
   int states_;
   PassCounts counts_;
 };
 
 }  // namespace
 
+// The states after the first in threads, each in a workspace of its own, which go to `used`.
+template <class S, class Taken>
+static PassCounts run_others(const Run<S>& first, int threads, std::vector<std::unique_ptr<Workspace<S>>>& used, Taken taken) {
+  used.resize(threads);
+  std::vector<std::unique_ptr<Run<S>>> runs(threads);
+  share_out(1, first.states(), threads, [&](int thread, int b) {
+    std::unique_ptr<Run<S>>& own = runs[thread];
+    if (!own) {
+      used[thread] = taken();
+      own = std::make_unique<Run<S>>(first, *used[thread]);
+    }
+    own->run(b);
+  });
+  std::erase(used, nullptr);
+  PassCounts counts;
+  for (const auto& run : runs)
+    if (run) counts += run->counts();
+  return counts;
+}
+
 template <class S>
 void ExecutionPool::run_at(const Inputs& inputs, bool expansions, Result& result) {
-  std::unique_ptr<Workspace<S>> workspace;
+  std::unique_ptr<Workspace<S>> workspace = impl_->taken<S>(plan_);
+  std::vector<std::unique_ptr<Workspace<S>>> others;
+  PassCounts counts;
   {
-    std::lock_guard<Mutex> lock(impl_->mutex);
-    if (impl_->mutex.abandoned()) leave_behind(impl_->free, impl_->notes);
-    auto& free = std::get<Impl::Free<S>>(impl_->free);
-    if (!free.empty()) {
-      workspace = std::move(free.back());
-      free.pop_back();
-    }
+    Run<S> run(*plan_, *workspace, inputs, expansions, result, impl_->in_place);
+    const int states = run.states(), threads = std::min(impl_->threads, states - 1);
+    if (states == 0) run.run_none();
+    for (int b = 0; b < (threads > 1 ? 1 : states); ++b) run.run(b);  // the first one finds the shape of the result
+    counts = run.counts();
+    if (threads > 1) counts += run_others(run, threads, others, [&] { return impl_->taken<S>(plan_); });
   }
-  if (!workspace) workspace = std::make_unique<Workspace<S>>(plan_);
-  const PassCounts counts = Run<S>(*plan_, *workspace, inputs, expansions, result).run();
   std::lock_guard<Mutex> lock(impl_->mutex);
   impl_->counts = counts;
   if (!workspace->notes().empty()) impl_->notes = workspace->notes();
-  std::get<Impl::Free<S>>(impl_->free).push_back(std::move(workspace));
+  impl_->keep(std::move(workspace));
+  for (auto& other : others) {
+    for (const std::string& note : other->notes())
+      if (std::find(impl_->notes.begin(), impl_->notes.end(), note) == impl_->notes.end()) impl_->notes.push_back(note);
+    impl_->keep(std::move(other));
+  }
 }
 
 bool ExecutionPool::run(const Inputs& inputs, bool expansions, Result& result) {
@@ -294,24 +383,6 @@ bool ExecutionPool::run(const Inputs& inputs, bool expansions, Result& result) {
   if (!current()) return false;
   at_precision(plan_->precision, [&]<class S>(S) { run_at<S>(inputs, expansions, result); });
   return true;
-}
-
-// The plan is made outside the lock: a signal's handler, called in between, may ask for the same one.
-std::shared_ptr<ExecutionPool> PlanCache::find_or_make(const Expression& e, Request request, const PlanOptions& options) {
-  const std::pair<Request, bool> key{request, options.rules};
-  {
-    std::lock_guard<Mutex> lock(mutex_);
-    if (mutex_.abandoned()) leave_behind(pools_);
-    const auto known = pools_.find(key);
-    if (known != pools_.end() && known->second->current()) return known->second;
-  }
-  const auto all = contexts(e);
-  const InUse use(all);
-  auto pool = std::make_shared<ExecutionPool>(make_plan(e, request, options));
-  std::lock_guard<Mutex> lock(mutex_);
-  std::shared_ptr<ExecutionPool>& kept = pools_[key];
-  if (!kept || !kept->current()) kept = pool;
-  return kept;
 }
 
 }  // namespace pycraft

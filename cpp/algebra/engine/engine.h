@@ -1,5 +1,5 @@
-// The engine: runs a plan's steps at one precision, for one state or state after state of a batch. All memory of a run is kept in a
-// workspace and reused, so that a second run of the same plan allocates nothing.
+// The engine: runs a plan's steps at one precision, for one state, or for the states of a batch, in one thread or several. All memory of
+// a run is kept in a workspace, one a thread, and reused, so that a second run of the same plan in one thread allocates nothing.
 #pragma once
 
 #include <functional>
@@ -25,6 +25,7 @@ struct Result {
 // Passes of the last run, by kind of step: what was executed, not what was planned.
 struct PassCounts {
   int values = 0, gathers = 0, scatters = 0, kernels = 0, eliminations = 0, dense = 0;
+  PassCounts& operator+=(const PassCounts& other);
 };
 
 struct Inputs {
@@ -52,16 +53,6 @@ class ExecutionPool {
   struct Impl;
   std::shared_ptr<const Plan> plan_;
   std::unique_ptr<Impl> impl_;
-};
-
-// Plans of one expression, one per request, with the workspaces of their runs: kept in its memo.
-class PlanCache {
- public:
-  std::shared_ptr<ExecutionPool> find_or_make(const Expression& e, Request request, const PlanOptions& options);
-
- private:
-  Mutex mutex_;
-  std::map<std::pair<Request, bool>, std::shared_ptr<ExecutionPool>> pools_;
 };
 
 }  // namespace pycraft

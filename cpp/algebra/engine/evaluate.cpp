@@ -4,6 +4,7 @@
 #include <cmath>
 #include <random>
 
+#include "algebra/engine/plan_cache.h"
 #include "algebra/language/display.h"
 #include "algebra/language/memo.h"
 #include "runtime/errors.h"

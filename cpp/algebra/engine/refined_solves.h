@@ -73,8 +73,8 @@ void Workspace<S>::run_as(const Workspace<T>& narrow, const std::vector<SkoValue
 template <class S>
 void Workspace<S>::solve_realization(const Step& s, const std::vector<SkoValues<S>*>& values, int w) {
   const Refinement how = refinement();
-  const S* x = vectors_[s.in[1]].data();
-  S* y = vectors_[s.out].data();
+  const S* x = numbers(s.in[1]);
+  S* y = numbers(s.out);
   const auto blocks = [&](int r) -> const BlockStorage<S>& { return blocks_[r]; };
   if (how.steps == 0 || std::is_same_v<S, Wider<S>> || eliminations_[s.in[0]].wide)
     return with_factors(s.in[0], [&](auto& factors) { factors.solve(x, y, w, blocks, how); });
@@ -88,8 +88,8 @@ void Workspace<S>::solve_realization(const Step& s, const std::vector<SkoValues<
 template <class S>
 void Workspace<S>::solve_mass_matrix(const Step& s, const std::vector<SkoValues<S>*>& values, int w) {
   const SkoValues<S>& own = *values[s.context];
-  const S* x = vectors_[s.in[0]].data();
-  S* y = vectors_[s.out].data();
+  const S* x = numbers(s.in[0]);
+  S* y = numbers(s.out);
   own.mass_matrix_inverse(x, y, w, scratch_.data());
   const Binding* binding = plan_->contexts[s.context].binding.get();
   if (!binding || binding->arithmetic.refinement.steps == 0) return;
@@ -120,11 +120,12 @@ template <class S>
 void Workspace<S>::solve_mass_matrix_tangent(const Step& s, const std::vector<SkoValues<S>*>& values, int w, PassCounts& counts) {
   auto [known, fresh] = tangents_.try_emplace(s.out);
   if (fresh) known->second = values[s.context]->inverse_tangent();
-  if (known->second && known->second->apply(*values[s.context], s.symbol, vectors_[s.in[0]].data(), vectors_[s.out].data(), w)) return;
+  if (known->second && known->second->apply(*values[s.context], s.symbol, numbers(s.in[0]), numbers(s.out), w)) return;
   Workspace& typed = operand_workspace(s);
-  typed.vector(s.operand->input) = vectors_[s.in[0]];
+  const size_t size = size_t(rows(s.out)) * w;
+  typed.vector(s.operand->input).assign(numbers(s.in[0]), numbers(s.in[0]) + size);
   typed.run(operand_values(s, values), w, true, counts);
-  vectors_[s.out] = typed.vector(s.operand->output);
+  std::copy_n(typed.numbers(s.operand->output), size, numbers(s.out));
 }
 
 }  // namespace pycraft

@@ -11,23 +11,23 @@ void Workspace<S>::vector_step(const Step& s, const std::vector<SkoValues<S>*>& 
     case StepKind::gather:
     case StepKind::scatter:
       ++(s.kind == StepKind::gather ? counts.gathers : counts.scatters);
-      values[s.context]->sweep(s.symbol.definition->id, s.kind == StepKind::scatter, vectors_[s.in[0]].data(), vectors_[s.out].data(), width(s.in[0], m));
+      values[s.context]->sweep(s.symbol.definition->id, s.kind == StepKind::scatter, numbers(s.in[0]), numbers(s.out), width(s.in[0], m));
       return;
     case StepKind::apply_symbol:
-      values[s.context]->apply(s.symbol, s.transposed, s.inverted, vectors_[s.in[0]].data(), vectors_[s.out].data(), width(s.in[0], m));
+      values[s.context]->apply(s.symbol, s.transposed, s.inverted, numbers(s.in[0]), numbers(s.out), width(s.in[0], m));
       return;
     case StepKind::apply_blocks: return apply_block_register(s, width(s.in[1], m));
     case StepKind::apply_constant: return apply_constant(s, width(s.in[0], m));
     case StepKind::apply_column: return apply_column(s, width(s.in[1], m));
     case StepKind::apply_external: return apply_external_operator(s, width(s.in[0], m));
-    case StepKind::combine: return combine(s);
+    case StepKind::combine: return combine(s, size_t(rows(s.out)) * width(s.out, m));
     case StepKind::vector_symbol:
       if (s.constant)
-        std::transform(s.constant->dense.begin(), s.constant->dense.end(), vectors_[s.out].begin(), [](double v) { return S(v); });
+        std::transform(s.constant->dense.begin(), s.constant->dense.end(), numbers(s.out), [](double v) { return S(v); });
       else
-        values[s.context]->vector(s.symbol, vectors_[s.out].data());
+        values[s.context]->vector(s.symbol, numbers(s.out));
       return;
-    case StepKind::zero: std::fill(vectors_[s.out].begin(), vectors_[s.out].end(), S(0)); return;
+    case StepKind::zero: std::fill_n(numbers(s.out), size_t(rows(s.out)) * width(s.out, m), S(0)); return;
     case StepKind::solve: return solve_realization(s, values, width(s.in[1], m));
     case StepKind::mass_matrix:
     case StepKind::mass_matrix_solve: ++counts.kernels; return apply_mass_matrix(s, values, width(s.in[0], m));
@@ -41,8 +41,8 @@ void Workspace<S>::vector_step(const Step& s, const std::vector<SkoValues<S>*>& 
 template <class S>
 void Workspace<S>::apply_constant(const Step& s, int w) {
   const int r = rows(s.out), c = rows(s.in[0]);
-  const S* x = vectors_[s.in[0]].data();
-  S* y = vectors_[s.out].data();
+  const S* x = numbers(s.in[0]);
+  S* y = numbers(s.out);
   std::fill_n(y, size_t(r) * w, S(0));
   for (int i = 0; i < r; ++i)
     for (int j = 0; j < c; ++j) {
@@ -54,8 +54,8 @@ void Workspace<S>::apply_constant(const Step& s, int w) {
 
 template <class S>
 void Workspace<S>::apply_column(const Step& s, int w) {
-  const S *v = vectors_[s.in[0]].data(), *x = vectors_[s.in[1]].data();
-  S* y = vectors_[s.out].data();
+  const S *v = numbers(s.in[0]), *x = numbers(s.in[1]);
+  S* y = numbers(s.out);
   if (s.transposed) {
     std::fill_n(y, w, S(0));
     for (int i = 0; i < rows(s.in[0]); ++i)
@@ -67,11 +67,10 @@ void Workspace<S>::apply_column(const Step& s, int w) {
 }
 
 template <class S>
-void Workspace<S>::combine(const Step& s) {
-  const size_t n = vectors_[s.out].size();
-  S* y = vectors_[s.out].data();
+void Workspace<S>::combine(const Step& s, size_t n) {
+  S* y = numbers(s.out);
   for (size_t t = 0; t < s.in.size(); ++t) {
-    const S* x = vectors_[s.in[t]].data();
+    const S* x = numbers(s.in[t]);
     const S c = S(s.coefficients[t]);
     if (t == 0)
       for (size_t i = 0; i < n; ++i) y[i] = c * x[i];
@@ -84,8 +83,8 @@ template <class S>
 void Workspace<S>::apply_block_register(const Step& s, int w) {
   const BlockStorage<S>& b = blocks_[s.in[0]];
   const Register& reg = plan_->registers[s.in[0]];
-  const S* x = vectors_[s.in[1]].data();
-  S* y = vectors_[s.out].data();
+  const S* x = numbers(s.in[1]);
+  S* y = numbers(s.out);
   for (size_t kk = 0; kk < b.rows.size(); ++kk) {
     const int k = static_cast<int>(kk);
     elimination::for_rows(reg.space, k, [&](int i, int row) {
@@ -105,7 +104,7 @@ void Workspace<S>::apply_external_operator(const Step& s, int w) {
   if constexpr (std::is_same_v<S, double>) {
     const auto& f = s.transposed ? s.external->apply_transposed : s.external->apply;
     if (!f) throw EvaluationError("the operator '" + s.external->name + "' has no " + (s.transposed ? "transpose" : "product"));
-    f(vectors_[s.in[0]].data(), vectors_[s.out].data(), w);
+    f(numbers(s.in[0]), numbers(s.out), w);
   } else {
     throw EvaluationError("the operator '" + s.external->name + "' comes from outside and computes in double precision only");
   }
@@ -115,17 +114,19 @@ template <class S>
 void Workspace<S>::apply_mass_matrix(const Step& s, const std::vector<SkoValues<S>*>& values, int w) {
   scratch_.resize(std::max(scratch_.size(), size_t(plan_->contexts[s.context].source->structure().dimension()) * w));
   if (s.kind == StepKind::mass_matrix)
-    values[s.context]->mass_matrix(s.flag, vectors_[s.in[0]].data(), vectors_[s.out].data(), w, scratch_.data());
+    values[s.context]->mass_matrix(s.flag, numbers(s.in[0]), numbers(s.out), w, scratch_.data());
   else
     solve_mass_matrix(s, values, w);
 }
 
 template <class S>
 void Workspace<S>::solve_dense(const Step& s, int w) {
-  vectors_[s.out] = vectors_[s.in[1]];
-  if (gram_[s.in[0]]) return gram_[s.in[0]]->solve(vectors_[s.out].data(), w);
-  scratch_.resize(std::max(scratch_.size(), vectors_[s.out].size()));
-  dense_factors(s.in[0]).solve(vectors_[s.out].data(), w, scratch_.data());
+  const size_t size = size_t(rows(s.out)) * w;
+  S* y = numbers(s.out);
+  std::copy_n(numbers(s.in[1]), size, y);
+  if (gram_[s.in[0]]) return gram_[s.in[0]]->solve(y, w);
+  scratch_.resize(std::max(scratch_.size(), size));
+  dense_factors(s.in[0]).solve(y, w, scratch_.data());
 }
 
 template <class S>
@@ -133,7 +134,7 @@ void Workspace<S>::read_diagonal(const Step& s) {
   const BlockStorage<S>& b = blocks_[s.in[0]];
   for (size_t k = 0; k < b.rows.size(); ++k)
     elimination::for_rows(plan_->registers[s.in[0]].space, static_cast<int>(k),
-                          [&](int i, int row) { vectors_[s.out][row] = b.at(static_cast<int>(k))[i * b.columns[k] + i]; });
+                          [&](int i, int row) { numbers(s.out)[row] = b.at(static_cast<int>(k))[i * b.columns[k] + i]; });
 }
 
 }  // namespace pycraft

@@ -25,7 +25,7 @@ template <class S>
 class Workspace {
  public:
   // of an operand's plan: `whole` holds the factors that it shares
-  explicit Workspace(std::shared_ptr<const Plan> plan, Workspace* whole = nullptr) : plan_(std::move(plan)), whole_(whole ? whole : this), vectors_(plan_->registers.size()), blocks_(plan_->registers.size()),
+  explicit Workspace(std::shared_ptr<const Plan> plan, Workspace* whole = nullptr) : plan_(std::move(plan)), whole_(whole ? whole : this), vectors_(plan_->registers.size()), lent_(plan_->registers.size()), blocks_(plan_->registers.size()),
                                                          scalars_(plan_->registers.size(), S(0)), dense_(plan_->registers.size()) {
     eliminations_.resize(plan_->registers.size());
     dense_lu_.resize(plan_->registers.size());
@@ -44,7 +44,7 @@ class Workspace {
   void run(const std::vector<SkoValues<S>*>& values, int columns, bool values_changed, PassCounts& counts) {
     for (size_t r = 0; r < plan_->registers.size(); ++r) {
       const Register& reg = plan_->registers[r];
-      if (reg.kind == RegisterKind::vector) vectors_[r].resize(size_t(reg.space.dimension()) * (reg.wide ? columns : 1));
+      if (reg.kind == RegisterKind::vector && !lent_[r]) vectors_[r].resize(size_t(reg.space.dimension()) * (reg.wide ? columns : 1));
     }
     bool worked = false;
     for (const Step& s : plan_->steps) {
@@ -58,6 +58,9 @@ class Workspace {
   }
 
   std::vector<S>& vector(int r) { return vectors_[r]; }
+  // Where the numbers of a vector register lie: in memory of its own, or in what it was lent for a run.
+  S* numbers(int r) { return lent_[r] ? lent_[r] : vectors_[r].data(); }
+  void lend(int r, S* memory) { lent_[r] = memory; }
   BlockStorage<S>& blocks(int r) { return blocks_[r]; }
   std::vector<S>& dense(int r) { return dense_[r]; }
   S& scalar(int r) { return scalars_[r]; }
@@ -82,7 +85,7 @@ class Workspace {
   void vector_step(const Step& s, const std::vector<SkoValues<S>*>& values, int m, PassCounts& counts);
   void apply_constant(const Step& s, int w);
   void apply_column(const Step& s, int w);
-  void combine(const Step& s);
+  void combine(const Step& s, size_t n);
   void apply_block_register(const Step& s, int w);
   void apply_external_operator(const Step& s, int w);
   void apply_mass_matrix(const Step& s, const std::vector<SkoValues<S>*>& values, int w);
@@ -149,6 +152,7 @@ class Workspace {
   std::shared_ptr<const Plan> plan_;
   Workspace* whole_;
   std::vector<std::vector<S>> vectors_;
+  std::vector<S*> lent_;                                  // null: none
   std::vector<BlockStorage<S>> blocks_;
   bool functions_of_vectors_ = false;
   std::vector<S> scalars_;

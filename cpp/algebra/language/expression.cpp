@@ -36,7 +36,12 @@ Expression make_symbol(const SymbolDefinition& definition, std::shared_ptr<SkoSo
   return make_node(std::move(n));
 }
 
-Expression make_symbol(SymbolId id, std::shared_ptr<SkoSource> source) { return make_symbol(sko_symbol(id), std::move(source)); }
+Expression make_symbol(SymbolId id, std::shared_ptr<SkoSource> source, std::shared_ptr<const Binding> binding) {
+  const SymbolDefinition& d = sko_symbol(id);
+  Node n{NodeKind::symbol, source->space(d.domain, {}), source->space(d.codomain, {}), {}};
+  n.symbol = Symbol{&d, std::move(source), std::move(binding), {}, {}};
+  return make_node(std::move(n));
+}
 
 Expression make_vector(const std::string& name, const Space& space) {
   Node n{NodeKind::vector, Space::euclidean(1), space, {}};
@@ -277,20 +282,22 @@ void visit(const Expression& e, const std::function<void(const Expression&)>& f)
   if (e.children().empty()) return f(e);
   // Derivatives share most of their parts: each is visited once.
   std::unordered_set<const Node*> seen;
-  std::vector<Expression> todo = {e};
+  std::vector<const Expression*> todo = {&e};
   while (!todo.empty()) {
-    const Expression x = todo.back();
+    const Expression& x = *todo.back();
     todo.pop_back();
     if (!x.children().empty() && !seen.insert(x.get()).second) continue;
     f(x);
-    todo.insert(todo.end(), x.children().rbegin(), x.children().rend());
+    for (auto c = x.children().rbegin(); c != x.children().rend(); ++c) todo.push_back(&*c);
   }
 }
 
 Expression Expression::at(std::shared_ptr<const Binding> binding) const {
   std::unordered_map<const Node*, Expression> moved;
+  bool bound_before = false;
   each_from_below(*this, [&](const Expression& e) {
     const bool binds = e.children().empty() || e.kind() == NodeKind::block_function;  // leaves without numbers, too: a batch is a batch
+    bound_before |= binds && e.node().symbol.binding;
     bool changed = binds && !e.node().symbol.binding;
     for (const Expression& c : e.children()) changed |= moved.at(c.get()).get() != c.get();
     if (!changed) {
@@ -300,7 +307,8 @@ Expression Expression::at(std::shared_ptr<const Binding> binding) const {
     Node n = e.node();
     if (binds && !n.symbol.binding) n.symbol.binding = binding;
     for (Expression& c : n.children) c = moved.at(c.get());
-    moved.emplace(e.get(), make_node(std::move(n)));
+    const bool whole = e.get() == get() && !bound_before;
+    moved.emplace(e.get(), make_node(std::move(n), whole ? std::make_shared<Memo>(node().memo) : nullptr));
   });
   return moved.at(get());
 }

@@ -116,7 +116,7 @@ struct ExpressionHash {
 
 Expression make_symbol(const SymbolDefinition& definition, std::shared_ptr<SkoSource> source, SymbolArguments arguments = {},
                        std::string argument_text = "");
-Expression make_symbol(SymbolId id, std::shared_ptr<SkoSource> source);
+Expression make_symbol(SymbolId id, std::shared_ptr<SkoSource> source, std::shared_ptr<const Binding> binding = nullptr);
 Expression make_vector(const std::string& name, const Space& space);
 Expression identity();
 Expression identity(const Space& space);

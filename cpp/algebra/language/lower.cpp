@@ -75,6 +75,8 @@ class Lowering {
 
   // What is below comes first, so that nothing recurses; each node once as it is and once transposed.
   Expression run(const Expression& root, bool transposed) {
+    const auto& known = transposed ? transposed_ : plain_;
+    if (const auto found = known.find(root.get()); found != known.end()) return found->second;
     std::vector<std::pair<Expression, bool>> todo = {{root, transposed}};
     while (!todo.empty()) {
       const auto [e, t] = todo.back();
@@ -111,7 +113,37 @@ class Lowering {
     }
   }
 
+  // Whether e, whose parts are as they were, is what lowering makes of it.
+  static bool is_lowered(const Expression& e) {
+    const auto& parts = e.children();
+    const auto none = [&](std::initializer_list<NodeKind> kinds) {
+      return std::none_of(parts.begin(), parts.end(), [&](const Expression& x) { return std::find(kinds.begin(), kinds.end(), x.kind()) != kinds.end(); });
+    };
+    switch (e.kind()) {
+      case NodeKind::product: return none({NodeKind::scaled, NodeKind::zero, NodeKind::identity, NodeKind::product});
+      case NodeKind::scaled: return none({NodeKind::scaled, NodeKind::zero, NodeKind::identity}) && !e.node().coefficient.is_zero() && e.node().coefficient != 1;
+      case NodeKind::inverse: return parts[0].kind() == NodeKind::symbol || parts[0].kind() == NodeKind::transpose || parts[0].kind() == NodeKind::sum;
+      case NodeKind::sum: {
+        constexpr size_t few = 16;
+        if (parts.size() > few || !none({NodeKind::zero, NodeKind::sum})) return false;
+        const auto term = [&](size_t i) -> const Expression& { return parts[i].kind() == NodeKind::scaled ? parts[i].children()[0] : parts[i]; };
+        for (size_t i = 0; i < parts.size(); ++i) {
+          const NodeKind kind = term(i).kind();
+          if (kind == NodeKind::zero || kind == NodeKind::sum || kind == NodeKind::scaled || (parts[i].kind() == NodeKind::scaled && !is_lowered(parts[i]))) return false;
+          for (size_t j = 0; j < i; ++j)
+            if (term(i).node().hash == term(j).node().hash) return false;  // to be collected
+        }
+        return true;
+      }
+      default: return false;
+    }
+  }
+  bool unchanged(const Expression& e) const {
+    return is_lowered(e) && std::all_of(e.children().begin(), e.children().end(), [&](const Expression& c) { return plain_.at(c.get()).get() == c.get(); });
+  }
+
   Expression compute(const Expression& e, bool t) {
+    if (!t && unchanged(e)) return e;
     const Space domain = t ? e.codomain().dual() : e.domain(), codomain = t ? e.domain().dual() : e.codomain();
     switch (e.kind()) {
       case NodeKind::symbol: {
@@ -136,7 +168,11 @@ class Lowering {
         return lowered_product(factors, domain, codomain);
       }
       case NodeKind::scaled: return lowered_product({e.node().coefficient * run(e.children()[0], t)}, domain, codomain);
-      case NodeKind::transpose: return run(e.children()[0], !t);
+      case NodeKind::transpose: {
+        const Expression inner = run(e.children()[0], !t);
+        const bool as_it_was = inner.kind() == NodeKind::transpose && inner.children()[0].get() == e.children()[0].get();
+        return !t && as_it_was ? e : inner;
+      }
       case NodeKind::inverse: return invert(run(e.children()[0], t));
       case NodeKind::square_root: {
         const Expression root = square_root_of(run(e.children()[0], false));

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <memory>
+#include <utility>
 
 #include "runtime/mutex.h"
 
@@ -10,6 +11,11 @@ namespace pycraft {
 
 class Memo {
  public:
+  Memo() = default;
+  // Of an expression that is another one bound to a state, whole: that of the other one.
+  explicit Memo(std::shared_ptr<Memo> origin) : origin_(std::move(origin)) {}
+  const std::shared_ptr<Memo>& origin() const { return origin_; }
+
   // What is kept here, made where there is none; it lasts as long as the memo. Everybody who asks means the same Kept.
   template <class Kept>
   Kept& get() {
@@ -24,7 +30,7 @@ class Memo {
   std::shared_ptr<Memo> of_inverse() {
     std::lock_guard<Mutex> lock(mutex_);
     if (mutex_.abandoned()) leave_behind(kept_, of_inverse_);
-    if (!of_inverse_) of_inverse_ = std::make_shared<Memo>();
+    if (!of_inverse_) of_inverse_ = std::make_shared<Memo>(origin_ ? origin_->of_inverse() : nullptr);
     return of_inverse_;
   }
 
@@ -33,6 +39,7 @@ class Memo {
   std::atomic<void*> made_{nullptr};  // once there is one, without the lock
   std::shared_ptr<void> kept_;
   std::shared_ptr<Memo> of_inverse_;
+  const std::shared_ptr<Memo> origin_;
 };
 
 }  // namespace pycraft

@@ -122,7 +122,7 @@ bool same_numbers(const std::vector<double>& a, const std::vector<double>& b) {
 }
 
 bool alike(const Binding& a, const Binding& b) {
-  return a.batch == b.batch && a.nq == b.nq && a.nv == b.nv && a.arithmetic == b.arithmetic && same_numbers(a.q, b.q) && same_numbers(a.v, b.v);
+  return a.batch == b.batch && a.nq == b.nq && a.nv == b.nv && a.arithmetic == b.arithmetic && a.threads == b.threads && same_numbers(a.q, b.q) && same_numbers(a.v, b.v);
 }
 
 size_t hash_of(const Binding& b) {

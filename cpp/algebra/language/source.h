@@ -124,6 +124,7 @@ struct Binding {
   int nq = 0, nv = 0;
   std::vector<double> q, v;  // (batch, nq) and (batch, nv), row after row
   Arithmetic arithmetic;
+  int threads = 1;           // that share the states of a batch
 
   // For one state: the cached values of this source.
   template <class S>

@@ -9,10 +9,7 @@ namespace {
 using enum SymbolId;
 
 // The symbol `id` of the same model at the same state.
-Expression letter(const Symbol& like, SymbolId id) {
-  Expression e = make_symbol(id, like.source);
-  return like.binding ? e.at(like.binding) : e;
-}
+Expression letter(const Symbol& like, SymbolId id) { return make_symbol(id, like.source, like.binding); }
 
 Expression expand_phi_tilde(const Symbol& s) { return letter(s, E) * letter(s, phi); }
 Expression expand_K(const Symbol& s) { return letter(s, E) * letter(s, G); }

@@ -113,6 +113,7 @@ struct Plan {
   double flops() const;
   double bytes() const;
   bool has_dense_step() const;
+  bool calls_outside() const;               // an operator that is somebody else's
 };
 
 struct PlanOptions {

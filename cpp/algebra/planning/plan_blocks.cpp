@@ -62,12 +62,12 @@ int Planner::blocks_anew(const Expression& e) {
       Step s{StepKind::load_blocks};
       s.symbol = symbol;
       s.context = context_of(symbol, symbol.definition->groups);
-      return emit_blocks(std::move(s), e, show(e));
+      return emit_blocks(std::move(s), e, shown(e));
     }
     case NodeKind::constant: {
       Step s{StepKind::load_blocks};
       s.constant = e.node().constant;
-      return emit_blocks(std::move(s), e, show(e));
+      return emit_blocks(std::move(s), e, shown(e));
     }
     case NodeKind::transpose: {
       const Expression& inner = e.children()[0];
@@ -83,14 +83,14 @@ int Planner::blocks_anew(const Expression& e) {
       Step s{StepKind::invert_blocks};
       s.in = {blocks(e.children()[0])};
       s.flops = block_product_flops(e.codomain(), e.codomain(), e.domain());
-      return emit_blocks(std::move(s), e, show(e));
+      return emit_blocks(std::move(s), e, shown(e));
     }
     case NodeKind::square_root: {
       const Expression& inner = e.children()[0];  // block diagonal by structure, or by theorems
       Step s{StepKind::root_blocks};
       s.in = {is_block_diagonal(inner) ? blocks(inner) : diagonal_blocks(inner)};
       s.flops = block_product_flops(e.codomain(), e.codomain(), e.domain()) / 6;
-      return emit_blocks(std::move(s), e, show(e));
+      return emit_blocks(std::move(s), e, shown(e));
     }
     case NodeKind::block_function: return blocks_of_function(e);
     case NodeKind::block_diagonal: return diagonal_blocks(e.children()[0]);
@@ -107,7 +107,7 @@ int Planner::blocks_of_sum(const Expression& e) {
     s.coefficients.push_back(part.coefficient);
   }
   s.flops = 2 * block_entries(e.codomain(), e.domain()) * terms.size();
-  return emit_blocks(std::move(s), e, show(e));
+  return emit_blocks(std::move(s), e, shown(e));
 }
 
 int Planner::blocks_of_product(const Expression& e) {
@@ -120,7 +120,7 @@ int Planner::blocks_of_product(const Expression& e) {
     s.context = context_of(*first, Group::kinematics);
     s.symbol = *first;
     s.flops = group_flops(*first->source, Group::composite);
-    return emit_blocks(std::move(s), e, show(e) + " (tip to base)");
+    return emit_blocks(std::move(s), e, shown(e) + " (tip to base)");
   }
   int r = blocks(e.children()[0]);
   for (size_t i = 1; i < e.children().size(); ++i) r = multiply_blocks(r, blocks(e.children()[i]));
@@ -134,7 +134,7 @@ int Planner::blocks_of_function(const Expression& e) {
   s.symbol = symbol;
   if (symbol.source) s.context = context_of(symbol, Group::kinematics);
   s.in = {symbol.source ? column(operand) : blocks(operand)};
-  return emit_blocks(std::move(s), e, show(e));
+  return emit_blocks(std::move(s), e, shown(e));
 }
 
 }  // namespace pycraft

@@ -48,7 +48,7 @@ std::optional<int> Planner::structural_diagonal(const Expression& e) {
         s.coefficients.push_back(part.coefficient);
       }
       s.flops = 2 * block_entries(e.codomain(), e.domain()) * terms.size();
-      return emit_blocks(std::move(s), e, "blockdiag(" + show(e) + ")");
+      return emit_blocks(std::move(s), e, "blockdiag(" + shown(e) + ")");
     }
     case NodeKind::inverse: {
       const Expression& inner = e.children()[0];
@@ -58,7 +58,7 @@ std::optional<int> Planner::structural_diagonal(const Expression& e) {
       Step s{StepKind::invert_blocks};
       s.in = {*r};
       s.flops = block_product_flops(e.codomain(), e.codomain(), e.domain());
-      return emit_blocks(std::move(s), e, "blockdiag(" + show(e) + ")");
+      return emit_blocks(std::move(s), e, "blockdiag(" + shown(e) + ")");
     }
     case NodeKind::product: return diagonal_of_product(e);
     default: return std::nullopt;
@@ -108,7 +108,7 @@ std::optional<int> Planner::diagonal_of_congruence(const Expression& e) {
   s.transposed = left_t;
   s.context = context_of(*left, left->definition->groups);
   s.flops = group_flops(*left->source, Group::composite) * (left->definition->id == SymbolId::psi ? 2 : 1);
-  return emit_blocks(std::move(s), e, "blockdiag(" + show(e) + ")" + (left_t ? " (base to tip)" : " (tip to base)"));
+  return emit_blocks(std::move(s), e, "blockdiag(" + shown(e) + ")" + (left_t ? " (base to tip)" : " (tip to base)"));
 }
 
 // What the sweeps P, D, G (tip to base) and Υ (base to tip) say of the diagonal blocks of a product, O(N):
@@ -123,7 +123,7 @@ std::optional<int> Planner::diagonal_by_theorem(const std::vector<Expression>& f
   const Symbol* model = factors.size() == 3 ? innovations_model(factors.back()) : letter_of(factors.back(), transposed);
   if (!model || transposed || !model->source) return std::nullopt;
   const Letters o(model->source, model->binding);
-  const std::vector<Expression> inverse = kernels_of(*model).mass_matrix_inverse;
+  const std::vector<Expression> inverse = mass_matrix_inverse_of(*model);
   if (factors == inverse) return diagonal_by_structure(lower(o.D.inv() + o.G.T() * o.E.T() * o.Upsilon * o.E * o.G, false));
   const Expression between = product_of(inverse);
   for (const Expression& omega : {o.psi.T() * o.H.T() * o.D.inv() * o.H * o.psi, o.phi.T() * o.H.T() * between * o.H * o.phi})
@@ -141,7 +141,7 @@ int Planner::diagonal_blocks(const Expression& e) {
     s.flops = e.domain().dimension() * s.operand->flops();
     s.bytes = 8.0 * e.domain().dimension() * e.codomain().dimension();
     s.tier = tier;
-    s.text = "blocks: blockdiag(" + show(e) + ") column by column" + how;
+    s.text = "blocks: blockdiag(" + shown(e) + ") column by column" + how;
     return emit(std::move(s), out);
   };
   if (has_swept_tangent(e)) return from_columns(", by the derivative of the Riccati sweep", 1);
@@ -155,7 +155,7 @@ int Planner::diagonal_blocks(const Expression& e) {
     f.flops = realization->factor_flops();
     f.bytes = 8 * realization->entries();
     f.tier = 3;
-    f.text = "eliminate " + show(e) + " over the tree, leaves to root";
+    f.text = "eliminate " + shown(e) + " over the tree, leaves to root";
     const int factor = emit(std::move(f), {RegisterKind::factor, {}, {}, realization, false});
     Step s{StepKind::selected_blocks};
     s.in = {factor};
@@ -163,7 +163,7 @@ int Planner::diagonal_blocks(const Expression& e) {
     s.flops = 2 * realization->factor_flops();
     s.bytes = 8 * realization->entries();
     s.tier = 3;
-    s.text = "blocks: blockdiag(" + show(e) + ") from the factors, root to leaves";
+    s.text = "blocks: blockdiag(" + shown(e) + ") from the factors, root to leaves";
     return emit(std::move(s), out);
   }
   plan_.notes.push_back("dense: " + reason);
@@ -200,8 +200,8 @@ std::optional<std::vector<int>> Planner::logdet_of_factors(const std::vector<Exp
   for (size_t i = 0; i < factors.size();) {
     const Symbol* model = options_.rules ? mass_matrix_model(factors, i) : nullptr;
     if (model && !model->source->traits().hinge_diagonal) {
-      parts.push_back(Letters(model->source, model->binding).D);
-      i += kernels_of(*model).mass_matrix.size();
+      parts.push_back(make_symbol(SymbolId::D, model->source, model->binding));
+      i += mass_matrix_factors;
     } else {
       if (factors[i].domain().dimension() != factors[i].codomain().dimension()) return std::nullopt;
       parts.push_back(factors[i++]);
@@ -239,7 +239,7 @@ int Planner::logdet(const Expression& e) {
     case NodeKind::sum: {  // ln det (ℳ + J) = ln det D
       if (!options_.rules || e.children().size() != 2) break;
       const auto whole = mass_matrices_with_rotors(e);
-      if (whole.size() == 1 && whole[0].coefficient == 1) return logdet(Letters(whole[0].model.source, whole[0].model.binding).D);
+      if (whole.size() == 1 && whole[0].coefficient == 1) return logdet(make_symbol(SymbolId::D, whole[0].model.source, whole[0].model.binding));
       break;
     }
     default: break;
@@ -249,7 +249,7 @@ int Planner::logdet(const Expression& e) {
     Step s{StepKind::logdet_of_dense};
     s.in = {factor_gram(e, *root)};
     s.tier = 1;
-    s.text = "ln|det| from the factors of " + show(e);
+    s.text = "ln|det| from the factors of " + shown(e);
     return emit(std::move(s), {RegisterKind::scalar, {}, {}, nullptr, false});
   }
   return logdet_by_elimination(e);
@@ -276,7 +276,7 @@ int Planner::logdet_by_elimination(const Expression& e) {
     f.flops = realization->factor_flops();
     f.bytes = 8 * realization->entries();
     f.tier = 3;
-    f.text = std::string("eliminate the realization of ") + show(e) + (realization == system ? " closed, leaves to root" : " itself");
+    f.text = std::string("eliminate the realization of ") + shown(e) + (realization == system ? " closed, leaves to root" : " itself");
     const int factor = emit(std::move(f), {RegisterKind::factor, {}, {}, realization, false});
     Step s{StepKind::logdet_of_factor};
     s.in = {factor};
@@ -285,7 +285,7 @@ int Planner::logdet_by_elimination(const Expression& e) {
     s.text = "ln|det| from the pivots";
     parts.push_back(emit(std::move(s), scalar));
   }
-  return combine_scalars(parts, {1, -1}, "ln|det| of " + show(e), 0);
+  return combine_scalars(parts, {1, -1}, "ln|det| of " + shown(e), 0);
 }
 
 }  // namespace pycraft

@@ -20,23 +20,22 @@ int Planner::apply_inverse(const Expression& e, int x) {
   const Expression& inner = e.children()[0];
   bool transposed = false;
   if (const Symbol* symbol = letter_of(inner, transposed)) {
-    if (symbol->definition->id == SymbolId::D) return apply_symbol(*symbol, false, true, x);
+    if (symbol->definition->id == SymbolId::D) return apply_symbol(transposed ? inner.children()[0] : inner, false, true, x);
     if (symbol->definition->pattern == Pattern::resolvent && options_.rules) {  // φ⁻¹ = I - E, ψ⁻¹ = I - E_ψ
       const SymbolId edge = symbol->definition->id == SymbolId::phi ? SymbolId::E : SymbolId::E_psi;
-      Expression edges = make_symbol(edge, symbol->source);
-      if (symbol->binding) edges = edges.at(symbol->binding);
+      Expression edges = make_symbol(edge, symbol->source, symbol->binding);
       if (transposed) edges = edges.T();
       return apply(lower(identity() - edges, true), x);
     }
   }
-  if (is_block_diagonal(inner)) return apply_blocks(blocks(e), false, x, show(e));
+  if (is_block_diagonal(inner)) return apply_blocks(blocks(e), false, x, shown(e));
   if (const auto root = gram_root(inner)) {
     Step s{StepKind::dense_solve};
     s.in = {factor_gram(inner, *root), x};
     s.flops = 2.0 * inner.domain().dimension() * inner.domain().dimension();
     s.bytes = vector_bytes(e.codomain());
     s.tier = 1;
-    s.text = show(e) + " by its triangular factors";
+    s.text = shown(e) + " by its triangular factors";
     return emit_vector(std::move(s), e.codomain(), x);
   }
   return solve_realization(e, x);
@@ -51,7 +50,7 @@ int Planner::solve_realization(const Expression& e, int x) {
   f.flops = realization->factor_flops();
   f.bytes = 8 * realization->entries();
   f.tier = 3;
-  f.text = "eliminate " + show(e) + " over the tree, leaves to root";
+  f.text = "eliminate " + shown(e) + " over the tree, leaves to root";
   const auto key = id_of(e);
   int factor;
   if (const auto known = block_memo_.find(key); known != block_memo_.end()) {
@@ -66,7 +65,7 @@ int Planner::solve_realization(const Expression& e, int x) {
   s.flops = realization->solve_flops();
   s.bytes = vector_bytes(e.codomain());
   s.tier = 3;
-  s.text = show(e) + " (leaves to root, root to leaves)";
+  s.text = shown(e) + " (leaves to root, root to leaves)";
   return emit_vector(std::move(s), e.codomain(), x);
 }
 
@@ -93,7 +92,7 @@ std::optional<Expression> Planner::gram_root(const Expression& e) const {
   const Letters o(D.node().symbol.source, D.node().symbol.binding);
   std::vector<Expression> right{square_root(D).inv()};
   size_t i = middle + 1;
-  if (i + 2 < f.size() && f[i] == kernels_of(D.node().symbol).mass_matrix_inverse.back() && f[i + 1] == o.H && f[i + 2] == o.phi) {
+  if (i + 2 < f.size() && f[i] == mass_matrix_inverse_of(D.node().symbol).back() && f[i + 1] == o.H && f[i + 2] == o.phi) {
     right.insert(right.end(), {o.H, o.psi});  // [I-HψK]Hφ = Hψ
     i += 3;
   }
@@ -111,7 +110,7 @@ int Planner::factor_gram(const Expression& e, const Expression& root) {
   f.flops = 2 * n * r * r + r * f.operand->flops();
   f.bytes = 8 * (n * r + r * r);
   f.tier = 1;
-  f.text = "X*X = " + show(e) + ": triangular factors of X = " + show(root);
+  f.text = "X*X = " + shown(e) + ": triangular factors of X = " + shown(root);
   return block_memo_[key] = emit(std::move(f), {RegisterKind::dense, e.codomain(), e.domain(), nullptr, false});
 }
 
@@ -129,7 +128,7 @@ int Planner::dense_factor(const Expression& operand, const std::string& reason) 
   f.flops = 2 * n * n * n / 3 + n * f.operand->flops();
   f.bytes = 8 * n * n;
   f.tier = 4;
-  f.text = show(operand) + " made dense and factored: " + reason;
+  f.text = shown(operand) + " made dense and factored: " + reason;
   return dense_memo_[key] = emit(std::move(f), {RegisterKind::dense, operand.codomain(), operand.domain(), nullptr, false});
 }
 
@@ -150,7 +149,7 @@ int Planner::solve_dense(const Expression& operand, int x, const std::string& re
   s.flops = 2 * n * n;
   s.bytes = 8 * n;
   s.tier = 4;
-  s.text = "(" + show(operand) + ")⁻¹ by the dense factors";
+  s.text = "(" + shown(operand) + ")⁻¹ by the dense factors";
   return emit_vector(std::move(s), operand.domain(), x);
 }
 

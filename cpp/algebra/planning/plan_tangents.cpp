@@ -34,7 +34,7 @@ bool tangents(const Expression& inverse, const Expression& tangent, Expression& 
   if (contexts(tangent).size() != 1) return false;
   const auto known = invert_by_theorem(X);
   const Symbol like{nullptr, models[0].source, models[0].binding, {}, {}};
-  if (!known || known->inverse.kind() != NodeKind::product || known->inverse.children() != kernels_of(like).mass_matrix_inverse) return false;
+  if (!known || known->inverse.kind() != NodeKind::product || known->inverse.children() != mass_matrix_inverse_of(like)) return false;
   return models[0].source->tangent_of_inverse(X, tangent, letter, of_D);
 }
 
@@ -76,7 +76,7 @@ Expression with_swept_tangents(const Expression& e, Request request) {
         for (const bool first : {true, false})
           if (tangents(first ? f.front() : f.back(), product_of({f.begin() + first, f.end() - !first}), letter, of_D)) {
             const Symbol& s = letter.node().symbol;
-            return lowered_product({lower(Letters(s.source, s.binding).D.inv(), false), of_D}, e.domain(), e.codomain());
+            return lowered_product({lower(make_symbol(SymbolId::D, s.source, s.binding).inv(), false), of_D}, e.domain(), e.codomain());
           }
       return in_product(e);
     }

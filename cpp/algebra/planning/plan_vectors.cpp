@@ -54,12 +54,11 @@ std::vector<Expression> gathered_by_psi(const std::vector<Expression>& factors) 
     const Symbol* h = letter(out[i + 1], SymbolId::H, starred);
     if (!h || !(starred || letter(out[i + 2], SymbolId::phi, false)) || out[starred ? i + 2 : i].kind() != NodeKind::sum) continue;
     if (h->binding && h->binding->arithmetic.refinement.steps != 0) continue;
-    const std::vector<Expression> inverse = kernels_of(*h).mass_matrix_inverse;
+    const std::vector<Expression> inverse = mass_matrix_inverse_of(*h);
     const Expression& resolvent = starred ? out[i].children()[0] : out[i + 2];
     if (!same_model(resolvent.node().symbol, *h) || inverse.size() != 3 || out[starred ? i + 2 : i] != inverse[starred ? 0 : 2]) continue;
     const Expression hinge = out[i + 1];
-    Expression psi = make_symbol(SymbolId::psi, h->source);
-    if (h->binding) psi = psi.at(h->binding);
+    const Expression psi = make_symbol(SymbolId::psi, h->source, h->binding);
     out.erase(out.begin() + i + 2);
     changed = true;
     out[i] = starred ? lower(psi.T(), false) : hinge;
@@ -85,10 +84,10 @@ int Planner::apply_anew(const Expression& e, int x) {
       s.text = "0";
       return emit_vector(std::move(s), e.codomain(), x);
     }
-    case NodeKind::symbol: return apply_symbol(e.node().symbol, false, false, x);
+    case NodeKind::symbol: return apply_symbol(e, false, false, x);
     case NodeKind::transpose: {
       const Expression& inner = e.children()[0];
-      return inner.kind() == NodeKind::symbol ? apply_symbol(inner.node().symbol, true, false, x) : apply_given(e, inner, true, x);
+      return inner.kind() == NodeKind::symbol ? apply_symbol(inner, true, false, x) : apply_given(e, inner, true, x);
     }
     case NodeKind::vector:
     case NodeKind::constant:
@@ -98,7 +97,7 @@ int Planner::apply_anew(const Expression& e, int x) {
       s.in = {apply(e.children()[0], x)};
       s.coefficients = {e.node().coefficient};
       s.flops = e.codomain().dimension();
-      s.text = show(e.node().coefficient * identity());
+      s.text = shown(e.node().coefficient * identity());
       return emit_vector(std::move(s), e.codomain(), x);
     }
     case NodeKind::sum: return apply_sum(e, x);
@@ -108,14 +107,14 @@ int Planner::apply_anew(const Expression& e, int x) {
     case NodeKind::block_function:
     case NodeKind::square_root: break;
   }
-  return apply_blocks(blocks(e), false, x, show(e));
+  return apply_blocks(blocks(e), false, x, shown(e));
 }
 
 // A user's vector, constant or operator, or the transpose e of it.
 int Planner::apply_given(const Expression& e, const Expression& given, bool transposed, int x) {
   Step s{StepKind::apply_external};
   s.transposed = transposed;
-  s.text = show(e);
+  s.text = shown(e);
   if (given.kind() == NodeKind::vector) {
     s.kind = StepKind::apply_column;
     s.in = {vector_value(given), x};
@@ -156,24 +155,19 @@ int Planner::emit_kernel(StepKind kind, const Symbol& model, bool with_J, int x,
 
 // How many of the factors that end at `end` are a kernel's; x becomes the register of what it makes.
 size_t Planner::apply_kernel(const std::vector<Expression>& factors, size_t end, int& x) {
-  bool transposed = false;
-  const Symbol* last = letter_of(factors[end - 1], transposed);
-  if (last && transposed && is_symbol(factors[end - 1].children()[0], SymbolId::H)) {
-    const Kernels kernels = kernels_of(*last);
-    if (ends_with(factors, end, kernels.mass_matrix)) {
-      x = emit_kernel(StepKind::mass_matrix, *last, false, x, "HφMφ*H* (Newton-Euler at rest: base to tip, tip to base)");
-      return kernels.mass_matrix.size();
-    }
+  if (const Symbol* model = end < mass_matrix_factors ? nullptr : mass_matrix_model(factors, end - mass_matrix_factors)) {
+    x = emit_kernel(StepKind::mass_matrix, *model, false, x, "HφMφ*H* (Newton-Euler at rest: base to tip, tip to base)");
+    return mass_matrix_factors;
   }
-  if (factors[end - 1].kind() != NodeKind::sum) return 0;
+  if (end < 3 || factors[end - 1].kind() != NodeKind::sum || factors[end - 2].kind() != NodeKind::inverse || factors[end - 3].kind() != NodeKind::sum) return 0;
   for (const Expression& t : factors[end - 1].children()) {
     const Scaled part = split_scalar(t);
     if (part.expression.kind() != NodeKind::product || !is_symbol(part.expression.children()[0], SymbolId::H)) continue;
     const Symbol& h = part.expression.children()[0].node().symbol;
-    const Kernels kernels = kernels_of(h);
-    if (!ends_with(factors, end, kernels.mass_matrix_inverse)) continue;
+    const std::vector<Expression> inverse = mass_matrix_inverse_of(h);
+    if (!ends_with(factors, end, inverse)) continue;
     x = emit_kernel(StepKind::mass_matrix_solve, h, false, x, "[I-HψK]* D⁻¹ [I-HψK] (tip to base, base to tip)");
-    return kernels.mass_matrix_inverse.size();
+    return inverse.size();
   }
   return 0;
 }
@@ -217,13 +211,12 @@ int Planner::apply_sum(const Expression& e, int x) {
   return emit_vector(std::move(s), e.codomain(), x);
 }
 
-int Planner::apply_symbol(const Symbol& symbol, bool transposed, bool inverted, int x) {
+int Planner::apply_symbol(const Expression& e, bool transposed, bool inverted, int x) {
+  const Symbol& symbol = e.node().symbol;
   const SymbolDefinition& d = *symbol.definition;
-  Expression e = make_symbol(d, symbol.source, symbol.arguments, symbol.argument_text);
-  if (symbol.binding) e = e.at(symbol.binding);
   const Space domain = inverted ? (transposed ? e.domain().dual() : e.codomain()) : (transposed ? e.codomain().dual() : e.domain());
   const Space codomain = inverted ? (transposed ? e.codomain().dual() : e.domain()) : (transposed ? e.domain().dual() : e.codomain());
-  std::string text = show(e) + (transposed ? "*" : "") + (inverted ? "⁻¹" : "");
+  const std::string text = shown(e) + (transposed ? "*" : "") + (inverted ? "⁻¹" : "");
   switch (d.pattern) {
     case Pattern::compound:
       if (d.tangent_of_inverse) return apply_inverse_tangent(symbol, x);
@@ -295,7 +288,7 @@ int Planner::vector_value(const Expression& e) {
     s.symbol = symbol;
     s.context = context_of(symbol, symbol.definition->groups);
     s.bytes = vector_bytes(e.codomain());
-    s.text = show(e);
+    s.text = shown(e);
     r = emit(std::move(s), {RegisterKind::vector, e.codomain(), {}, nullptr, false});
   }
   block_memo_[id_of(e)] = r;
@@ -316,7 +309,7 @@ int Planner::column(const Expression& e) {
       Step s{StepKind::vector_symbol};
       s.constant = e.node().constant;
       s.bytes = vector_bytes(e.codomain());
-      s.text = show(e);
+      s.text = shown(e);
       r = emit(std::move(s), {RegisterKind::vector, e.codomain(), {}, nullptr, false});
       break;
     }
@@ -335,7 +328,7 @@ int Planner::column(const Expression& e) {
       }
       s.flops = 2.0 * e.codomain().dimension() * s.in.size();
       s.bytes = vector_bytes(e.codomain());
-      s.text = show(e);
+      s.text = shown(e);
       r = emit(std::move(s), {RegisterKind::vector, e.codomain(), {}, nullptr, false});
       break;
     }

@@ -50,6 +50,8 @@ int Planner::context_of(const Symbol& symbol, unsigned groups) {
   return c;
 }
 
+std::string Planner::shown(const Expression& e) const { return for_costs_ ? std::string() : show(e); }
+
 int Planner::id_of(const Expression& e) { return ids_.try_emplace(e, static_cast<int>(ids_.size())).first->second; }
 
 // The sweeps that make the values go in front; a run skips those that are cached.
@@ -73,7 +75,7 @@ void Planner::emit_values() {
       front.push_back(s);
     }
   }
-  plan_.steps.insert(plan_.steps.begin(), front.begin(), front.end());
+  plan_.steps.insert(plan_.steps.begin(), std::make_move_iterator(front.begin()), std::make_move_iterator(front.end()));
 }
 
 // ------------------------------------------------------------------ requests
@@ -97,9 +99,10 @@ void drop_unused(Plan& plan) {
           for (int r : {t.left, t.right})
             if (r >= 0) needed[r] = 1;
     }
-    kept.push_back(*s);
+    kept.push_back(std::move(*s));
   }
-  plan.steps.assign(kept.rbegin(), kept.rend());
+  std::reverse(kept.begin(), kept.end());
+  plan.steps = std::move(kept);
 }
 
 // The identity of a space's numbers as a map to its dual, W of ‖X‖² = tr(X* W X); none for spaces of nodes.
@@ -292,7 +295,7 @@ void Planner::finish() {
 Plan Planner::plan_lowered(const Expression& e) {
   plan_ = Plan{};
   plan_.request = Request::apply;
-  plan_.text = show(e);
+  plan_.text = shown(e);
   plan_.domain = e.domain();
   plan_.codomain = e.codomain();
   apply_to_input(e);
@@ -301,6 +304,7 @@ Plan Planner::plan_lowered(const Expression& e) {
 }
 
 double Planner::lowered_flops(const Expression& e) {
+  for_costs_ = true;
   plan_ = Plan{};
   plan_.request = Request::apply;
   more_digits_ = precision_of(e) > Precision::double_;
@@ -330,6 +334,9 @@ double Plan::bytes() const {
   return sum;
 }
 
+bool Plan::calls_outside() const {
+  return std::any_of(steps.begin(), steps.end(), [](const Step& s) { return s.external || (s.operand && s.operand->calls_outside()); });
+}
 bool Plan::has_dense_step() const {
   return std::any_of(steps.begin(), steps.end(), [](const Step& s) { return s.tier == 4; });
 }

@@ -55,7 +55,7 @@ class Planner {
   int emit_vector(Step s, const Space& space, int x);
   int emit_kernel(StepKind kind, const Symbol& model, bool with_J, int x, const char* text);
   int apply_sum(const Expression& e, int x);
-  int apply_symbol(const Symbol& symbol, bool transposed, bool inverted, int x);
+  int apply_symbol(const Expression& letter, bool transposed, bool inverted, int x);
   int apply_inverse(const Expression& e, int x);
   int apply_inverse_tangent(const Symbol& symbol, int x);
   int apply_blocks(int block, bool transposed, int x, const std::string& text);
@@ -93,10 +93,12 @@ class Planner {
   std::optional<int> logdet_by_structure(const Expression& e);
 
   int id_of(const Expression& e);
+  std::string shown(const Expression& e) const;  // as steps have it
   double vector_bytes(const Space& space) const { return 8.0 * space.dimension(); }
 
   PlanOptions options_;
   bool one_cut_ = true;              // no coordinates are cut into bodies in two ways
+  bool for_costs_ = false;           // nobody reads the steps
   bool more_digits_ = false;         // bound to a precision above double
   Plan plan_;
   std::unordered_map<Expression, int, ExpressionHash> ids_;

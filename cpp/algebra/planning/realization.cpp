@@ -269,8 +269,7 @@ class RealizationBuilder {
     edge.shift = transposed ? Shift::down : Shift::up;
     edge.context = context;
     if (articulated_sweep) {
-      Expression bar = make_symbol(SymbolId::tau_bar, symbol.source);
-      if (symbol.binding) bar = bar.at(symbol.binding);
+      const Expression bar = make_symbol(SymbolId::tau_bar, symbol.source, symbol.binding);
       const int block = planner_.blocks(lower(transposed ? bar.T() : bar, true));
       (transposed ? edge.left : edge.right) = block;
     }

@@ -16,25 +16,28 @@
 
 namespace pycraft {
 
-Kernels kernels_of(const Symbol& like) {
-  const Letters o(like.source, like.binding);
-  const Expression S = o.I - o.H * o.psi * o.K;
-  Kernels k;
-  k.mass_matrix = lower(o.H * o.phi * o.M * o.phi.T() * o.H.T(), false).children();
-  k.mass_matrix_inverse = lower(S.T() * o.D.inv() * S, false).children();
-  return k;
+std::vector<Expression> mass_matrix_inverse_of(const Symbol& like) {
+  const auto letter = [&](SymbolId id) { return make_symbol(id, like.source, like.binding); };
+  const Expression S = identity() - letter(SymbolId::H) * letter(SymbolId::psi) * letter(SymbolId::K);
+  return lower(S.T() * letter(SymbolId::D).inv() * S, false).children();
 }
 
 const Symbol* mass_matrix_model(const std::vector<Expression>& factors, size_t at) {
-  if (at >= factors.size() || !is_symbol(factors[at], SymbolId::H)) return nullptr;
-  const Symbol& model = factors[at].node().symbol;
-  const std::vector<Expression> known = kernels_of(model).mass_matrix;
-  return at + known.size() <= factors.size() && std::equal(known.begin(), known.end(), factors.begin() + at) ? &model : nullptr;
+  static constexpr std::pair<SymbolId, bool> letters[mass_matrix_factors] = {
+      {SymbolId::H, false}, {SymbolId::phi, false}, {SymbolId::M, false}, {SymbolId::phi, true}, {SymbolId::H, true}};
+  if (at + mass_matrix_factors > factors.size()) return nullptr;
+  const Symbol* model = nullptr;
+  for (const auto& [id, starred] : letters) {
+    bool transposed = false;
+    const Symbol* symbol = letter_of(factors[at++], transposed);
+    if (!symbol || transposed != starred || symbol->definition->id != id || (model && !same_model(*symbol, *model))) return nullptr;
+    if (!model) model = symbol;
+  }
+  return model;
 }
 
 const Symbol* mass_matrix_model(const Expression& e) {
-  const size_t factors = 5;
-  return e.kind() == NodeKind::product && e.children().size() == factors ? mass_matrix_model(e.children(), 0) : nullptr;
+  return e.kind() == NodeKind::product && e.children().size() == mass_matrix_factors ? mass_matrix_model(e.children(), 0) : nullptr;
 }
 
 std::vector<MassMatrixWithRotors> mass_matrices_with_rotors(const Expression& e) {
@@ -58,6 +61,13 @@ std::vector<MassMatrixWithRotors> mass_matrices_with_rotors(const Expression& e)
 }
 
 namespace {
+
+// [I-HψK]* D⁻¹ [I-HψK]
+bool is_mass_matrix_inverse(const Expression& e) {
+  const auto& f = e.children();
+  if (e.kind() != NodeKind::product || f.size() != 3 || f[1].kind() != NodeKind::inverse || !is_symbol(f[1].children()[0], SymbolId::D)) return false;
+  return f == mass_matrix_inverse_of(f[1].children()[0].node().symbol);
+}
 
 // Of what is lowered, as it stands.
 double plan_flops(const Expression& e) { return Planner({false}).lowered_flops(e); }
@@ -104,14 +114,14 @@ class Optimiser {
         if (!is_block_diagonal(inner) && written_length(inner) <= most_letters) {
           if (const auto known = invert_by_theorem(inner)) {
             note(known->theorem + ": (" + show(inner) + ")⁻¹ = " + show(known->inverse));
-            return run_parts(known->inverse);
+            return is_mass_matrix_inverse(known->inverse) ? known->inverse : run_parts(known->inverse);
           }
         }
         const Expression better = run(inner);
         return better.get() == inner.get() ? e : lowered_inverse(better);
       }
-      case NodeKind::sum:
-      case NodeKind::product: return recognise(cancel(run_parts(e)));
+      case NodeKind::sum: return recognise(run_parts(e));
+      case NodeKind::product: return mass_matrix_model(e) || is_mass_matrix_inverse(e) ? e : recognise(cancel(run_parts(e)));
       default: return run_parts(e);
     }
   }
@@ -170,7 +180,7 @@ class Optimiser {
 
   // HφMφ*H* (+ J) in any spelling, and whatever the normal form makes cheaper.
   Expression recognise(const Expression& e) {
-    if (written_length(e) > most_letters) return e;
+    if (mass_matrix_model(e) || is_mass_matrix_inverse(e) || written_length(e) > most_letters) return e;
     const auto models = contexts(e);
     if (models.size() != 1 || !e.domain().belongs_to_bodies()) return e;
     bool resolvents = false;
@@ -181,11 +191,13 @@ class Optimiser {
     Alphabet alphabet;
     const auto form = normal_form(e, alphabet);
     if (!form) return e;
-    const Letters o(models[0].source, models[0].binding);
-    const Expression mass_matrix = lower(o.H * o.phi * o.M * o.phi.T() * o.H.T(), false);
-    if (e.domain() == models[0].source->theta() && e.codomain() == models[0].source->theta() && e != mass_matrix) {
+    const size_t most_words = 5;  // HφMφ*H* is HφKD + HφKDK*φ*H* + D + DK*φ*H* - J
+    if (form->size() <= most_words && e.domain() == models[0].source->theta() && e.codomain() == models[0].source->theta()) {
+      const auto letter = [&](SymbolId id) { return make_symbol(id, models[0].source, models[0].binding); };
+      const Expression H = letter(SymbolId::H), phi = letter(SymbolId::phi), J = letter(SymbolId::J);
+      const Expression mass_matrix = product_of({H, phi, letter(SymbolId::M), phi.T(), H.T()});
       const auto own = normal_form(mass_matrix, alphabet);
-      const Word j{alphabet.letter(o.J)};
+      const Word j{alphabet.letter(J)};
       Polynomial with_J = *own;
       if (models[0].source->traits().hinge_diagonal) {
         with_J[j] += 1;
@@ -199,7 +211,7 @@ class Optimiser {
         return f;
       };
       if (const Coefficient f = multiple(*own); f != 0) return found(e, f == 1 ? mass_matrix : f * mass_matrix);
-      if (const Coefficient f = multiple(with_J); f != 0) return found(e, lower(f * (mass_matrix + o.J), false));
+      if (const Coefficient f = multiple(with_J); f != 0) return found(e, lower(f * (mass_matrix + J), false));
     }
     const Expression normal = lower(to_expression(*form, alphabet, e.domain(), e.codomain()), false);
     if (normal == e || plan_flops(normal) >= plan_flops(e)) return e;

@@ -11,12 +11,9 @@ namespace pycraft {
 // The cheapest expression that the theorems give for e: recognised forms, cancelled inverses, normal form if it costs less.
 Expression optimise(const Expression& lowered, std::vector<std::string>& notes);
 
-// HφMφ*H* and [I-HψK]* D⁻¹ [I-HψK] of one model at one state, lowered: the forms that have kernels.
-struct Kernels {
-  std::vector<Expression> mass_matrix;          // factors
-  std::vector<Expression> mass_matrix_inverse;  // factors
-};
-Kernels kernels_of(const Symbol& like);
+// Of one model at one state, lowered, the forms that have kernels: HφMφ*H*, of five factors, and those of [I-HψK]* D⁻¹ [I-HψK].
+constexpr size_t mass_matrix_factors = 5;
+std::vector<Expression> mass_matrix_inverse_of(const Symbol& like);
 
 // Whose mass matrix HφMφ*H* e is, and whose a product has in its factors from `at` on; null where it is none.
 const Symbol* mass_matrix_model(const Expression& e);

@@ -1,12 +1,18 @@
 #include "algebra/theorems/polynomial.h"
-#include "runtime/interrupt.h"
 
+#include <algorithm>
+#include <bit>
+#include <cstdint>
 #include <deque>
+#include <mutex>
 
 #include "algebra/language/lower.h"
+#include "algebra/language/patterns.h"
 #include "algebra/language/properties.h"
 #include "algebra/language/source.h"
 #include "algebra/theorems/rules.h"
+#include "runtime/interrupt.h"
+#include "runtime/mutex.h"
 
 namespace pycraft {
 
@@ -61,10 +67,12 @@ int Alphabet::letter(const Expression& atom) {
 }
 
 int Alphabet::sibling(int like, int code) {
-  const Symbol& s = *unfold(atoms_[like]).symbol;
-  Expression e = make_symbol(static_cast<SymbolId>(code / 4), s.source);
-  if (s.binding) e = e.at(s.binding);
-  return letter(fold(e, code & 2, code & 1));
+  const auto [known, fresh] = siblings_.try_emplace({like, code}, -1);
+  if (fresh) {
+    const Symbol& s = *unfold(atoms_[like]).symbol;
+    known->second = letter(fold(make_symbol(static_cast<SymbolId>(code / 4), s.source, s.binding), code & 2, code & 1));
+  }
+  return known->second;
 }
 
 int Alphabet::inverse_of(int l) {
@@ -191,11 +199,12 @@ class Normaliser {
         }
       }
       if (alphabet_.code(word[at]) < 0) continue;
-      for (const Rule& rule : rewrite_rules()) {
+      for (const Rule* const begins : rewrite_rules_from(alphabet_.code(word[at]))) {
+        const Rule& rule = *begins;
         const size_t length = rule.from.size();
         if (at + length > word.size()) continue;
         bool fits = true;
-        for (size_t i = 0; i < length && fits; ++i) fits = alphabet_.code(word[at + i]) == rule.from[i];
+        for (size_t i = 1; i < length && fits; ++i) fits = alphabet_.code(word[at + i]) == rule.from[i];
         for (size_t i = 1; i < length && fits; ++i) fits = same_model(word[at], word[at + i]);
         if (!fits) continue;
         for (const auto& [x, codes] : rule.to) {
@@ -221,10 +230,106 @@ class Normaliser {
 
 }  // namespace
 
+namespace {
+
+// How an expression in SKO letters of one model is spelled: kinds, letters and coefficients, node by node. Its normal form hangs on nothing else,
+// but for whether J is zero.
+using Spelling = std::vector<std::int64_t>;
+constexpr size_t longest_spelling = 400;
+
+class Speller {
+ public:
+  // Nothing where there are other letters, or several models.
+  std::optional<Spelling> run(const Expression& e) {
+    if (!spell(e) || !model) return std::nullopt;
+    spelling_.push_back(model->source->traits().hinge_diagonal);
+    return std::move(spelling_);
+  }
+  const Symbol* model = nullptr;
+
+ private:
+  bool spell(const Expression& e) {
+    if (spelling_.size() > longest_spelling) return false;
+    spelling_.push_back(static_cast<std::int64_t>(e.kind()));
+    switch (e.kind()) {
+      case NodeKind::symbol: {
+        const Symbol& s = e.node().symbol;
+        if (!model) model = &s;
+        spelling_.push_back(static_cast<std::int64_t>(s.definition->id));
+        return s.definition->kind() == LetterKind::sko && same_model(s, *model);
+      }
+      case NodeKind::identity: return true;
+      case NodeKind::scaled:
+        if (!e.node().coefficient.is_double()) return false;
+        spelling_.push_back(std::bit_cast<std::int64_t>(e.node().coefficient.nearest()));
+        break;
+      case NodeKind::sum:
+      case NodeKind::product:
+      case NodeKind::transpose:
+      case NodeKind::inverse: break;
+      default: return false;
+    }
+    spelling_.push_back(static_cast<std::int64_t>(e.children().size()));
+    return std::all_of(e.children().begin(), e.children().end(), [&](const Expression& c) { return spell(c); });
+  }
+  Spelling spelling_;
+};
+
+// Normal forms by spelling: letters in the order in which they were met, by code, and words of them.
+struct Known {
+  std::vector<int> codes;
+  std::optional<Polynomial> form;
+};
+struct KnownForms {
+  Mutex mutex;
+  std::map<Spelling, Known> all;
+};
+constexpr size_t most_known = 2000;
+KnownForms& known_forms() {
+  static KnownForms* const instance = new KnownForms;  // never destroyed: threads may plan during the exit of the process
+  return *instance;
+}
+
+// As it was found before, in the letters of this model.
+std::optional<Known> recalled(const Spelling& spelling) {
+  KnownForms& known = known_forms();
+  const std::lock_guard<Mutex> lock(known.mutex);
+  if (known.mutex.abandoned()) leave_behind(known.all);
+  const auto found = known.all.find(spelling);
+  if (found == known.all.end()) return std::nullopt;
+  return found->second;
+}
+
+void remember(const Spelling& spelling, const Alphabet& alphabet, const std::optional<Polynomial>& form) {
+  Known made{alphabet.codes(), form};
+  if (std::find(made.codes.begin(), made.codes.end(), -1) != made.codes.end()) return;  // a letter that is an inverse
+  KnownForms& known = known_forms();
+  const std::lock_guard<Mutex> lock(known.mutex);
+  if (known.mutex.abandoned()) leave_behind(known.all);
+  if (known.all.size() >= most_known) known.all.clear();
+  known.all.emplace(spelling, std::move(made));
+}
+
+std::optional<Polynomial> form_of(const Expression& lowered, Alphabet& alphabet) {
+  Speller speller;
+  const auto spelling = alphabet.codes().empty() ? speller.run(lowered) : std::nullopt;
+  if (!spelling) return Normaliser(alphabet).run(lowered);
+  if (auto known = recalled(*spelling)) {
+    for (const int code : known->codes)
+      alphabet.letter(fold(make_symbol(static_cast<SymbolId>(code / 4), speller.model->source, speller.model->binding), code & 2, code & 1));
+    return std::move(known->form);
+  }
+  auto form = Normaliser(alphabet).run(lowered);
+  remember(*spelling, alphabet, form);
+  return form;
+}
+
+}  // namespace
+
 std::optional<Polynomial> normal_form(const Expression& e, Alphabet& alphabet) {
   // Compounds other than K are abbreviations; K is a letter of the normal form.
   std::optional<Polynomial> found;
-  with_stack_for(e.node().depth, [&] { found = Normaliser(alphabet).run(lower(e, false)); });
+  with_stack_for(e.node().depth, [&] { found = form_of(lower(e, false), alphabet); });
   return found;
 }
 

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "algebra/language/expression.h"
@@ -23,6 +24,7 @@ class Alphabet {
   const Expression& atom(int letter) const { return atoms_[letter]; }
   // (symbol id, transposed, inverted) of a symbol's letter as one number, for matching rules; -1 for anything else.
   int code(int letter) const { return codes_[letter]; }
+  const std::vector<int>& codes() const { return codes_; }  // of all letters
   // The letter with this code of the same model at the same state as another letter.
   int sibling(int letter, int code);
   // The letter's inverse (a letter again).
@@ -34,6 +36,7 @@ class Alphabet {
   std::vector<int> codes_;
   std::vector<char> zero_;
   std::unordered_map<Expression, int, ExpressionHash> numbers_;
+  std::map<std::pair<int, int>, int> siblings_;
 };
 
 inline int letter_code(SymbolId id, bool transposed, bool inverted) { return 4 * static_cast<int>(id) + 2 * transposed + inverted; }

@@ -1,5 +1,7 @@
 #include "algebra/theorems/rules.h"
 
+#include <unordered_map>
+
 #include "algebra/language/lower.h"
 #include "algebra/language/values.h"
 #include "algebra/theorems/theorems.h"
@@ -166,6 +168,17 @@ const std::vector<Rule>& rewrite_rules() {
     return list;
   }();
   return rules;
+}
+
+const std::vector<const Rule*>& rewrite_rules_from(int letter_code) {
+  static const std::unordered_map<int, std::vector<const Rule*>> by_first = [] {
+    std::unordered_map<int, std::vector<const Rule*>> rules;
+    for (const Rule& rule : rewrite_rules()) rules[rule.from.front()].push_back(&rule);
+    return rules;
+  }();
+  static const std::vector<const Rule*> none;
+  const auto found = by_first.find(letter_code);
+  return found == by_first.end() ? none : found->second;
 }
 
 std::optional<Inverted> invert_by_theorem(const Expression& e) {

@@ -15,8 +15,9 @@ struct Rule {
   std::string theorem;
 };
 
-// All rules, transposes included; compiled from sko_theorems once.
+// All rules, transposes included, and those of them that begin with a letter; compiled from sko_theorems once.
 const std::vector<Rule>& rewrite_rules();
+const std::vector<const Rule*>& rewrite_rules_from(int letter_code);
 
 // A theorem lhs⁻¹ = rhs read on one model's letters: if e is a multiple of some lhs, its inverse by the theorem; else nothing.
 struct Inverted {

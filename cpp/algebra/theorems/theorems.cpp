@@ -39,10 +39,7 @@ Hypothesis unmet(Hypothesis hypotheses, const Traits& t) {
 }
 
 Letters::Letters(std::shared_ptr<SkoSource> s, const std::shared_ptr<const Binding>& binding) : source(std::move(s)), I(identity()) {
-  const auto letter = [&](SymbolId id) {
-    const Expression e = make_symbol(id, source);
-    return binding ? e.at(binding) : e;
-  };
+  const auto letter = [&](SymbolId id) { return make_symbol(id, source, binding); };
   E = letter(SymbolId::E), phi = letter(SymbolId::phi), phi_tilde = letter(SymbolId::phi_tilde), H = letter(SymbolId::H), M = letter(SymbolId::M);
   J = letter(SymbolId::J), P = letter(SymbolId::P), P_plus = letter(SymbolId::P_plus), D = letter(SymbolId::D), G = letter(SymbolId::G);
   K = letter(SymbolId::K), tau = letter(SymbolId::tau), tau_bar = letter(SymbolId::tau_bar), E_psi = letter(SymbolId::E_psi);

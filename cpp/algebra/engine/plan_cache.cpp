@@ -1,0 +1,94 @@
+#include "algebra/engine/plan_cache.h"
+
+#include <algorithm>
+#include <mutex>
+
+#include "algebra/engine/in_use.h"
+#include "algebra/language/memo.h"
+
+namespace pycraft {
+
+namespace {
+
+bool bound_to(const Plan& plan, const std::shared_ptr<const Binding>& binding) {
+  return std::all_of(plan.contexts.begin(), plan.contexts.end(), [&](const Context& c) { return c.binding == binding; }) &&
+         std::all_of(plan.steps.begin(), plan.steps.end(), [&](const Step& s) { return !s.operand || bound_to(*s.operand, binding); });
+}
+
+// The same plan at another state, or at none.
+std::shared_ptr<const Plan> rebound(const Plan& plan, const std::shared_ptr<const Binding>& binding) {
+  auto made = std::make_shared<Plan>(plan);
+  for (Context& c : made->contexts) c.binding = binding;
+  for (Step& s : made->steps)
+    if (s.operand) s.operand = rebound(*s.operand, binding);
+  if (made->batched && binding) made->batch = binding->batch;
+  return made;
+}
+
+// Of models as they are now.
+bool current(const Plan& plan) {
+  for (size_t c = 0; c < plan.contexts.size(); ++c)
+    if (plan.contexts[c].source->traits().hinge_diagonal != plan.hinge_diagonal[c]) return false;
+  return true;
+}
+
+}  // namespace
+
+PlanCache::BoundKey PlanCache::key_of(Request request, bool rules, const Binding& binding) {
+  const Arithmetic& how = binding.arithmetic;
+  return {request, rules, how.form, how.refinement.steps, how.refinement.residual, how.precision, binding.batch >= 0};
+}
+
+std::shared_ptr<const Plan> PlanCache::find_bound(const BoundKey& key, const std::shared_ptr<const Binding>& binding) {
+  std::shared_ptr<const Plan> known;
+  {
+    std::lock_guard<Mutex> lock(mutex_);
+    if (mutex_.abandoned()) leave_behind(pools_, bound_);
+    const auto found = bound_.find(key);
+    if (found != bound_.end()) known = found->second;
+  }
+  return known && current(*known) ? rebound(*known, binding) : nullptr;
+}
+
+void PlanCache::keep_bound(const BoundKey& key, const std::shared_ptr<const Binding>& binding, const std::shared_ptr<const Plan>& plan) {
+  if (!bound_to(*plan, binding)) return;
+  const std::shared_ptr<const Plan> without = rebound(*plan, nullptr);
+  std::lock_guard<Mutex> lock(mutex_);
+  if (mutex_.abandoned()) leave_behind(pools_, bound_);
+  bound_[key] = without;
+}
+
+std::shared_ptr<const Plan> PlanCache::made(const Expression& e, Request request, const PlanOptions& options) {
+  const auto all = contexts(e);
+  const InUse use(all);
+  const std::shared_ptr<Memo>& origin = e.node().memo->origin();
+  const std::shared_ptr<const Binding> binding = all.empty() ? nullptr : all[0].binding;
+  if (!origin || !binding) return make_plan(e, request, options);
+  e.check_current();
+  PlanCache& of_origin = origin->get<PlanCache>();
+  const BoundKey key = key_of(request, options.rules, *binding);
+  std::shared_ptr<const Plan> plan = of_origin.find_bound(key, binding);
+  if (!plan) {
+    plan = make_plan(e, request, options);
+    of_origin.keep_bound(key, binding, plan);
+  }
+  return plan;
+}
+
+// The plan is made outside the lock: a signal's handler, called in between, may ask for the same one.
+std::shared_ptr<ExecutionPool> PlanCache::find_or_make(const Expression& e, Request request, const PlanOptions& options) {
+  const Key key{request, options.rules};
+  {
+    std::lock_guard<Mutex> lock(mutex_);
+    if (mutex_.abandoned()) leave_behind(pools_, bound_);
+    const auto known = pools_.find(key);
+    if (known != pools_.end() && known->second->current()) return known->second;
+  }
+  auto pool = std::make_shared<ExecutionPool>(made(e, request, options));
+  std::lock_guard<Mutex> lock(mutex_);
+  std::shared_ptr<ExecutionPool>& kept = pools_[key];
+  if (!kept || !kept->current()) kept = pool;
+  return kept;
+}
+
+}  // namespace pycraft

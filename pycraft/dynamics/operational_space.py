@@ -1,0 +1,81 @@
+"""Direct calls of what nodes feel: the operational-space inertia Λ and its inverse."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..arguments import text
+from ..state import at_state
+from .by_realization import output
+from .direct_calls import DirectCalls
+from .prepared import direct
+from .threads import over_threads
+
+
+class OperationalSpaceCalls(DirectCalls):
+    """Inertia and compliance of nodes, through the articulated bodies: no mass matrix is formed or inverted."""
+
+    @direct
+    @over_threads
+    def operational_space_inertia(
+        self, frame: str | Sequence[str], q=None, *, precision: str | int = "double", threads: int = 1, out=None
+    ) -> np.ndarray:
+        """Λ = (B*ΩB)⁻¹ = (𝒥(ℳ + J)⁻¹𝒥*)⁻¹ of bodies or nodes, by name: what resists accelerations there, (6, 6) or (B, 6, 6).
+
+        In each frame's own axes about its origin, angular first, as `jacobian` has it; of m names (6 m, 6 m), in their order. One sweep
+        over all bodies and one along the way from each frame to the base: O(N + m² depth). `soa.Lambda(frame)` is the same as an
+        operator, and with directions= that of fewer directions.
+
+        SingularOperatorError where the frames cannot move in every direction, as of an arm of fewer than six hinges;
+        SingularHingeError as in forward_dynamics; ModelError where no body or node has the name, or where it is fixed to the base.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> body = pc.Multibody("flying")
+        >>> _ = body.add_body("body", hinge="free", mass=2.0, inertia=np.diag([1.0, 2.0, 3.0]))
+        >>> body.operational_space_inertia("body").diagonal().tolist()  # nothing but its own
+        [1.0, 2.0, 3.0, 2.0, 2.0, 2.0]
+        """
+        return _of_frames(self, True, frame, at_state(self, q)[0], precision, out)
+
+    @direct
+    @over_threads
+    def operational_space_compliance(
+        self, frame: str | Sequence[str], q=None, *, precision: str | int = "double", threads: int = 1, out=None
+    ) -> np.ndarray:
+        """B*ΩB = 𝒥(ℳ + J)⁻¹𝒥* of bodies or nodes, by name: accelerations there by forces there, (6, 6) or (B, 6, 6).
+
+        As `operational_space_inertia`, whose inverse it is, and there also where that has none.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> pc.chain(2).operational_space_compliance("body1", [0, 0])[[2, 4]][:, [2, 4]].round(3).tolist()  # about z, along y
+        [[6.857, -2.571], [-2.571, 1.714]]
+        """
+        return _of_frames(self, False, frame, at_state(self, q)[0], precision, out)
+
+
+def _of_frames(model: Any, inverse: bool, frame: Any, q: Any, precision: str | int, out: Any) -> np.ndarray:
+    """By kernels, or where they are not sure or know no such precision, by the operators, which say what is singular."""
+    names = [frame] if isinstance(frame, str) or not isinstance(frame, Iterable) else list(frame)
+    names = [text(name, "a frame") for name in names]
+    result = model._calls().operational_space(inverse, names, q) if precision == "double" else None
+    if result is None:
+        result = _operator(model.soa, inverse, names).at(q, precision=precision).dense()
+    if out is None:
+        return result
+    out = output(out, result.shape)
+    out[...] = result
+    return out
+
+
+def _operator(soa: Any, inverse: bool, names: list[str]) -> Any:
+    if inverse:
+        return soa.Lambda(names)
+    B = soa.B(names)
+    return B.T @ soa.Omega @ B
