@@ -52,7 +52,7 @@ struct ForwardDerivativeWork {
   template <class T>
   static size_t columns(const Links<T>& links) {
     const size_t row = row_of(links.nv);
-    return row * (ResponseColumns<S>::rows * (1 + links.slots) + OwnColumns<S>::rows + (in_place<S>(links.nv) ? 0 : size_t(3) * links.nv)) + size_t(18) * links.nv;
+    return row * (ResponseColumns<S>::rows * (1 + links.slots) + OwnColumns<S>::rows + (in_place<S>(links.nv) ? 0 : size_t(3) * links.nv)) + row_of(18 * links.nv);
   }
   template <class T>
   static size_t size(const Links<T>& links) {
@@ -63,7 +63,7 @@ struct ForwardDerivativeWork {
   ForwardDerivativeWork(const Links<T>& links, T* work) : z(reinterpret_cast<S*>(work)), forward(links, reinterpret_cast<T*>(z + columns(links))) {
     const size_t row = row_of(links.nv);
     own = z + row * ResponseColumns<S>::rows, alpha = own + row * OwnColumns<S>::rows, nu = alpha + row * ResponseColumns<S>::rows * links.slots;
-    rows = nu + size_t(18) * links.nv;
+    rows = nu + row_of(18 * links.nv);
     outboard = reinterpret_cast<Inertia<S>*>(reinterpret_cast<char*>(z + columns(links)) + ForwardWork<S>::size(links));
     instant = reinterpret_cast<Instant<S>*>(outboard + links.count);
     carried = reinterpret_cast<Carrying<S>*>(instant + links.count);
