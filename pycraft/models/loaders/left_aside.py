@@ -10,6 +10,9 @@ import numpy as np
 if TYPE_CHECKING:
     from ..multibody import Multibody
 
+QUANTITIES = ("damping", "friction", "stiffness", "effort limit", "velocity limit")
+"""What of a coordinate there is to leave aside; beside them "gravity"."""
+
 
 def by_coordinate(model: Multibody, of_hinges: Mapping[str, Mapping[str, float]]) -> dict[str, np.ndarray]:
     """Arrays (nv,) from numbers by quantity and hinge; NaN where the file has none of that quantity.
