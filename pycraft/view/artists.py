@@ -12,6 +12,7 @@ class Canvas:
 
     def __init__(self, ax: Any, columns: tuple[int, int] | None):
         self.ax, self.columns = ax, columns
+        self._shared = bool(ax.has_data())  # with what was drawn before
 
     def _seen(self, places: np.ndarray) -> np.ndarray:
         return places if self.columns is None else places[..., self.columns]
@@ -29,10 +30,10 @@ class Canvas:
         return Labels(self, texts, **style)
 
     def frame(self, low: np.ndarray, high: np.ndarray) -> None:
-        """Shows the box from `low` to `high`, (3,) each, with equal scales; what the axes show already stays in view."""
+        """Shows the box from `low` to `high`, (3,) each, with equal scales; what the axes showed before stays in view."""
         names = "xyz" if self.columns is None else "xy"
         low, high = self._seen(low), self._seen(high)
-        if self.ax.has_data() and not self.ax.get_autoscale_on():
+        if self._shared:
             shown = np.array([getattr(self.ax, f"get_{name}lim")() for name in names])
             low, high = np.minimum(low, shown.min(axis=1)), np.maximum(high, shown.max(axis=1))
         for name, a, b in zip(names, low, high, strict=True):

@@ -3,7 +3,7 @@
 hinge points   where a hinge's axes meet the bodies: on the side of the parent, and on that of the body that it moves
 bones          from a body's hinge point to those of its children; of a body that carries none to its nodes, or to where its mass ends
 ties           from the hinge point of a body that carries others to its nodes
-slides         between the two points of a hinge that moves along its axes
+slides         between the two points of a hinge that moves along its axes, or whose axes do not meet
 axes           of a hinge's first and last subhinge that has one
 
 Where a body's mass ends: from its centre of mass c on along e, away from the hinge point, √(3 e·Se/m), half of the uniform rod that has
@@ -74,7 +74,7 @@ class Skeleton:
         inboard, outboard = (parent, p + R @ inner), (k, outer)
         self._points["joint"].append(outboard)
         loose = any(s["kind"] == "free" for s in subhinges)
-        if not loose and any(s["kind"] in ("slider", "screw") for s in subhinges):
+        if not loose and (any(s["kind"] in ("slider", "screw") for s in subhinges) or not np.array_equal(inner, outer)):
             self._lines["slide"].append((inboard, outboard))
         if not loose:
             self._lines["ground" if parent < 0 else "bone"].append(((BASE, np.zeros(3)) if parent < 0 else (parent, np.zeros(3)), inboard))
@@ -91,8 +91,8 @@ class Skeleton:
         """Bones begin at hinge points, whose bodies are known now; those of bodies that carry nothing end at nodes or with the mass."""
         self._lines["bone"] = [(hinge_points[end[0]], end) for _, end in self._lines["bone"]]
         extents = {k: _extent(body, hinge_points[k][1]) for k, body in enumerate(bodies)}
-        for body in bodies:
-            extents.pop(body["parent"], None)  # it carries this one
+        for (carrier, _), _ in self._lines["bone"]:  # on a free hinge nothing is carried
+            extents.pop(carrier, None)
         with_nodes = set()
         for node in nodes:
             k, at = node["body"], (node["body"], node["position"])

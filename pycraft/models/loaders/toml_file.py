@@ -54,6 +54,8 @@ class TomlFile:
             what, at_line, column = found.groups() if found else (str(error), None, None)
             at = f":{at_line or self.text.count(chr(10)) + 1}" if found else ""
             where = f" (column {column})" if column else " (at the end)" if found else ""
+            if not found and (long := re.search("[0-9_]{4300}", self.text)):
+                what, at = "a whole number of thousands of digits", f":{self.text.count(chr(10), 0, long.start()) + 1}"
             raise _core.ModelError(f"{self.path}{at}: not well-formed TOML: {what}{where}") from None
 
     def _refuse_long_keys(self) -> None:
@@ -115,7 +117,8 @@ class TomlTable:
         return self.file.error((*self.place, key) if key is not None else self.place, text)
 
     def _wrong(self, key: str, wanted: str) -> Exception:
-        return self.error(key, f"{self.label}: {key} = {_shown(self.data[key])}; write {wanted}")
+        value = self.data[key]
+        return self.error(key, f"{self.label}: {key} {'is' if isinstance(value, Mapping) else '='} {_shown(value)}; write {wanted}")
 
     # ------------------------------------------------------------------ values
     def text(self, key: str, default: str | None = None, empty: bool = False) -> str:

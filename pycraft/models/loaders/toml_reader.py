@@ -65,9 +65,8 @@ def read(file: TomlFile, *, root: str, welds: str | None, strict: bool) -> tuple
 
 def read_table(table: TomlTable, name: str, welds: str | None = None, strict: bool = False) -> tuple[Multibody, list[str]]:
     """The model that a table holds, `name` where it says none, and what is worth a warning about it."""
-    written = table.number("format", FORMAT, "the number that `save` wrote")
-    if written != FORMAT:
-        raise table.error("format", f"format = {written:g} is not read by this version of pycraft, which reads {FORMAT}")
+    if (written := table.data.get("format", FORMAT)) != FORMAT or isinstance(written, bool):
+        raise table.error("format", f"format = {written!r:.40} is not read by this version of pycraft, which reads {FORMAT}")
     kept = table.choice("welds", ("lump", "keep"), "lump")
     model = Multibody(table.text("name", name, empty=True), welds=welds or kept, strict=strict or table.flag("strict"))
     tables = (table.tables("bodies", BODY, "body", named=True) or []) + (table.tables("nodes", NODE, "node", named=True) or [])
@@ -274,9 +273,9 @@ def _set_state(model: Multibody, table: TomlTable) -> None:
             hinge = _hinge_called(model, name, given)
             part = hinge.q_slice if key == "q" else hinge.v_slice
             count = part.stop - part.start
-            wanted = f"{count} numbers, those of a {hinge.kind} hinge" if count != 1 else "one number"
             one = count == 1 and not isinstance(given.data[name], list)
-            values[part] = given.number(name, 0.0, wanted) if one else given.vector(name, count, wanted)
+            wanted = f"{count} finite numbers, those of a {hinge.kind} hinge" if count != 1 else "one finite number"
+            values[part] = given.number(name, 0.0, "that of the hinge's coordinate") if one else given.vector(name, count, wanted)
         try:
             setattr(model, key, values)
         except _core.ModelError as error:
@@ -304,5 +303,5 @@ def _left_aside(model: Multibody, table: TomlTable) -> dict[str, np.ndarray]:
         for name in given.data:
             if name not in numbers:
                 raise given.error(name, f"{given.label}: no coordinate is called {name!r}; {nearest(name, numbers)}")
-            made[key][numbers[name]] = given.number(name, 0.0, "of this coordinate", infinite=True)
+            made[key][numbers[name]] = given.number(name, 0.0, "that of this coordinate", infinite=True)
     return made

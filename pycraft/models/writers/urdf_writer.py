@@ -168,7 +168,7 @@ class _Links:
                 yield self._hinge(k, body)
             if self.moved[k].any():
                 yield _link(body["name"])
-                yield self._fixed(body["name"], self.carried[k], -self.moved[k])
+                yield self._fixed(body["name"], self.carried[k], _ZERO - self.moved[k])
         for node in self.described["nodes"]:
             if node["name"] != self.rooted:
                 on = node["body"]
