@@ -207,7 +207,20 @@ def test_the_lines_of_everything():
     }  # fmt: skip
 
 
-PIECES = ["a = 1", 'b = "#"', "c = [1,\n2]", "[d]", "[[e]]", "# c", "", 'f = """\n[g]\n"""', "h = {i = 1}", "j = '''\n\n'''", "k.l = 2"]
+PIECES = [
+    "a = 1",
+    'b = "#"',
+    "c = [1,\n2]",
+    "[d]",
+    "[[e]]",
+    "# c",
+    "",
+    'f = """\n[g]\n"""',
+    "h = {i = 1}",
+    "j = '''\n\n'''",
+    'm = ["""x"""", "b"]',
+    "k.l = 2",
+]
 
 
 @settings(deadline=None)

@@ -1,6 +1,8 @@
 """Models through TOML files: every number comes back to the last bit, and the text is one that a person reads and writes."""
 
+import re
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,7 +10,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import pycraft as pc
+from pycraft.models.loaders import rotations
 from pycraft.models.loaders.rotations import nearest_rpy, rotation_from_rpy, rpy_of_rotation
+from pycraft.models.loaders.toml_reader import BODY
 from pycraft.models.writers.toml_text import Inline, document
 from support.descriptions import KINDS
 from support.mechanisms import every_kind, with_hinges
@@ -35,7 +39,7 @@ def models(draw):
     described = plain.description()
     names = draw(st.lists(NAMES, min_size=2 * count + 2, max_size=2 * count + 2, unique=True))
     described["name"] = draw(st.one_of(st.just(""), NAMES))
-    described["gravity"] = draw(vectors())
+    described["gravity"], described["strict"] = draw(vectors()), draw(st.booleans())
     for k, body in enumerate(described["bodies"]):
         hinge = body["hinge"]
         body["name"] = names[k]
@@ -88,6 +92,7 @@ def test_every_kind_of_hinge(tmp_path, kind, welds, seed):
     assert differences(model.description(), again.description()) == []
     text = (tmp_path / "chain.toml").read_text()
     assert ("subhinges" in text) == (kind == "custom")  # axes, a point and a pitch are what is read of the others
+    assert max(map(len, text.split("\n"))) < 180
     assert not model.nv or np.array_equal(model.mass_matrix(), again.mass_matrix())
 
 
@@ -145,7 +150,7 @@ def test_what_a_file_looks_like(tmp_path):
     arm.gravity = (0, 0, -9.81)
     arm.q = [0.1, 0, 0.25]
     arm.save(tmp_path / "arm.toml")
-    assert (tmp_path / "arm.toml").read_text() == ARM
+    assert (tmp_path / "arm.toml").read_bytes().decode() == ARM
     assert differences(arm.description(), pc.load(tmp_path / "arm.toml").description()) == []
     arm.save(tmp_path / "arm.toml", state=False)
     assert "[state" not in (tmp_path / "arm.toml").read_text()
@@ -254,6 +259,13 @@ def test_other_ways_to_write_toml(load):
     assert model.bodies["a"].inertia.tolist() == np.eye(3).tolist()
 
 
+def test_a_state_of_some_hinges(load):
+    """The others are at zero: a quaternion is that of no rotation."""
+    text = '[[bodies]]\nname = "a"\nmass = 1\n[[bodies]]\nname = "b"\nparent = "a"\nhinge = "ball"\nmass = 1\n'
+    model = load(text + "[state]\nq.a = 0.5\nv.b = [1, 2, 3]")
+    assert model.q.tolist() == [0.5, 1, 0, 0, 0] and model.v.tolist() == [0, 1, 2, 3]
+
+
 def test_the_model_is_called_as_its_file(load):
     assert load("").name == "model" and load("").nv == 0 and load('name = ""').name == ""
 
@@ -317,8 +329,21 @@ def test_most_angles_of_few_digits_are_found(tmp_path):
     assert sum(rpy_of_rotation(rotation_from_rpy(*angles)) is not None for angles in drawn) > 190
 
 
+def test_three_angles_keep_their_digits_where_pitch_is_upright():
+    """Yaw is rounding alone there, and roll is what is left of it."""
+    rng, R = np.random.default_rng(0), rotation_from_rpy(0, np.pi / 2, 0)
+    for _ in range(200):
+        A, B = rotation_from_rpy(*rng.uniform(-3, 3, 3)), rotation_from_rpy(rng.uniform(-3, 3), 0, 0)
+        upright = A @ (A.T @ R @ B)  # to rounding
+        assert abs(rotation_from_rpy(*nearest_rpy(upright)) - upright).max() < 2e-15
+
+
 def test_zeros_with_a_sign_do_not_hang_on_what_was_read_before():
-    assert rotation_from_rpy(-0.0, -0.0, 1.0).tobytes() == rotation_from_rpy(0.0, 0.0, 1.0).tobytes()
+    turned = []
+    for zero in (0.0, -0.0):
+        rotations._rotation_from_rpy.cache_clear()
+        turned.append(rotation_from_rpy(zero, zero, 1.0).tobytes())
+    assert turned[0] == turned[1]
 
 
 @given(
@@ -360,3 +385,17 @@ def test_saving(tmp_path):
         warnings.simplefilter("error")
         assert pc.load(tmp_path / "ARM.TOML").nv == 2
     assert differences(arm.description(), saved_and_loaded(arm, tmp_path / "arm.toml").description()) == []
+
+
+def test_the_file_of_the_page(tmp_path):
+    """docs/models.md: what it shows is read, and says what it claims."""
+    page = (Path(__file__).parents[2] / "docs" / "models.md").read_text()
+    (text,) = re.findall(r"```toml\n(.*?)```", page, re.S)
+    (tmp_path / "arm.toml").write_text(text)
+    arm = loaded(tmp_path / "arm.toml")
+    assert set(re.findall(r"^(\w+)", re.sub(r"\[.*?\]", "", text), re.M)) >= {"limits", "rotor_inertia", "subhinges", "rpy", "com"}
+    assert (arm.nv, arm.coordinate_names) == (3, ["shoulder", "lower[0]", "lower[1]"])
+    assert arm.q.tolist() == [0.1, 0.2, 0.05] and arm.left_aside["damping"][0] == 0.5 and arm.nodes["tip"].body.name == "lower"
+    assert lost(arm, tmp_path / "again.toml") == []
+    for key in BODY:
+        assert re.search(rf"`?\b{key}\b", page), key

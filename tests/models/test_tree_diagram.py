@@ -33,6 +33,12 @@ base
                      └─ panda_link8  node"""
 
 
+def test_branches():
+    """Lines go down to the last of a body's children, beside those of its others."""
+    drawn = [re.split(r"  +(?=pin)", line)[0] for line in shown(pc.tree([-1, 0, 1, 1, 0, 4, -1], "pin"))]
+    assert drawn[2:] == ["├─ body0", "│  ├─ body1", "│  │  ├─ body2", "│  │  └─ body3", "│  └─ body4", "│     └─ body5", "└─ body6"]
+
+
 def test_every_kind_and_its_coordinates():
     model = every_kind()
     for line in shown(model)[2:]:

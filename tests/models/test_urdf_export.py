@@ -78,6 +78,8 @@ def test_robots_of_the_package(tmp_path, name, root, welds):
     check_the_same(robot, again)
     assert set(robot.bodies) <= set(again.bodies) <= {*robot.bodies, "world"}
     assert set(robot.nodes) <= set(again.nodes) <= {*robot.nodes, "world"}
+    third = saved_and_loaded(again, tmp_path / "again.urdf", welds=welds)
+    assert list(third.bodies) == list(again.bodies) and set(third.nodes) == set(again.nodes)
 
 
 def test_a_free_root_may_be_asked_for(tmp_path):
@@ -88,16 +90,20 @@ def test_a_free_root_may_be_asked_for(tmp_path):
         again = loaded(tmp_path / "a1.urdf", root=root)
         assert (again.nv, next(iter(again.hinges)), again.hinges["root"].kind) == (robot.nv, "root", "free")
     text = (tmp_path / "a1.urdf").read_text()
-    heavy = '<link name="world"><inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>'
-    (tmp_path / "a1.urdf").write_text(text.replace('<link name="world"/>', heavy))
-    with pytest.raises(pc.ModelError, match="has the name of the free hinge"):  # a body that flies, and one that flies off it
-        loaded(tmp_path / "a1.urdf", root="free")
+    for mass, moment in ((1, 1), (1, 0), (0, 1)):  # a body that flies, and one that flies off it
+        moments = f'ixx="{moment}" ixy="0" ixz="0" iyy="{moment}" iyz="0" izz="{moment}"'
+        heavy = f'<link name="world"><inertial><mass value="{mass}"/><inertia {moments}/></inertial></link>'
+        (tmp_path / "a1.urdf").write_text(text.replace('<link name="world"/>', heavy))
+        with pytest.raises(pc.ModelError, match="has the name of the free hinge"):
+            loaded(tmp_path / "a1.urdf", root="free")
 
 
 def test_what_a_file_looks_like(tmp_path):
     arm = pc.Multibody("arm")
     arm.add_body("post", hinge="pin", axis=(0, 0, 1), point=(0, 0, 5), mass=1, com=(0, 0, 0.5), inertia=np.diag([0.25, 0.25, 0]))
-    arm.add_body("lid", "post", hinge_name="crank", point=(0.5, 0, 0), position=(0, 0, 1), limits=(-1, np.inf), rotor_inertia=0.5, mass=2)
+    arm.add_body(
+        "lid", "post", hinge_name="crank", point=(0.5, 0, 0.25), position=(0, 0, 1), limits=(-1, np.inf), rotor_inertia=0.5, mass=2
+    )
     arm.add_node("knob", "lid", position=(1, 0, 0))
     arm.save(tmp_path / "arm.urdf")
     assert (tmp_path / "arm.urdf").read_text() == ARM
@@ -125,7 +131,7 @@ ARM = """\
   </joint>
   <link name="lid_at_hinge">
     <inertial>
-      <origin xyz="-0.5 0 0"/>
+      <origin xyz="-0.5 0 -0.25"/>
       <mass value="2"/>
       <inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/>
     </inertial>
@@ -133,7 +139,7 @@ ARM = """\
   <joint name="crank" type="revolute">
     <parent link="post"/>
     <child link="lid_at_hinge"/>
-    <origin xyz="0.5 0 1"/>
+    <origin xyz="0.5 0 1.25"/>
     <axis xyz="0 0 1"/>
     <limit lower="-1" upper="1.7976931348623157e+308" effort="0" velocity="0"/>
     <pycraft rotor_inertia="0.5"/>
@@ -142,13 +148,13 @@ ARM = """\
   <joint name="lid_fixed" type="fixed">
     <parent link="lid_at_hinge"/>
     <child link="lid"/>
-    <origin xyz="-0.5 0 0"/>
+    <origin xyz="-0.5 0 -0.25"/>
   </joint>
   <link name="knob"/>
   <joint name="knob_fixed" type="fixed">
     <parent link="lid_at_hinge"/>
     <child link="knob"/>
-    <origin xyz="0.5 0 0"/>
+    <origin xyz="0.5 0 -0.25"/>
   </joint>
 </robot>
 """
@@ -161,6 +167,34 @@ def test_names_that_are_taken(tmp_path):
     again = saved_and_loaded(model, tmp_path / "model.urdf")
     assert list(again.bodies) == ["world", "a_at_hinge_2", "a_at_hinge"] and "world_2" in again.nodes
     check_the_same(model, again)
+
+
+@pytest.mark.parametrize("position", [(0, 0, 0), (1, 0, 0)])
+def test_a_kept_root_is_the_root_link_where_it_is_at_the_origin(tmp_path, position):
+    model = pc.Multibody("m", welds="keep")
+    model.add_body("foot", hinge="weld", hinge_name="root", position=position, mass=1, inertia=np.eye(3))
+    model.add_body("leg", "foot", mass=1, inertia=np.eye(3))
+    model.add_node("mark", None, position=(0, 0, 1))
+    again = saved_and_loaded(model, tmp_path / "m.urdf", welds="keep")
+    assert set(again.bodies) == {"foot", "leg", "mark"} | ({"world"} if any(position) else set())
+    check_the_same(model, again)
+
+
+def test_what_a_file_gave_beside_the_model_is_given_again(tmp_path):
+    """Bounds of a joint without limits; what was left aside before an edit is not taken for other coordinates."""
+    text = '<limit effort="10" velocity="0"/><dynamics damping="2" friction="0"/>'
+    moments = '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>'
+    links = f'<link name="a"/><link name="b"><inertial><mass value="1"/>{moments}</inertial></link>'
+    joint = f'<joint name="j" type="continuous"><parent link="a"/><child link="b"/>{text}</joint>'
+    (tmp_path / "m.urdf").write_text(f'<robot name="m">{links}{joint}</robot>')
+    model = loaded(tmp_path / "m.urdf")
+    assert {name: values.tolist() for name, values in model.left_aside.items()} == {"effort limit": [10], "damping": [2]}
+    again = saved_and_loaded(model, tmp_path / "again.urdf")
+    assert differences(model.left_aside, again.left_aside) == []
+    model.add_body("tool", "b", mass=1, inertia=np.eye(3))
+    with pytest.warns(pc.ModelWarning, match="not saved is what was left aside"):
+        model.save(tmp_path / "again.urdf")
+    assert loaded(tmp_path / "again.urdf").left_aside == {}
 
 
 def test_a_custom_hinge_of_one_part_is_that_part(tmp_path):

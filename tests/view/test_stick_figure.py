@@ -111,6 +111,17 @@ def test_every_line_ends_on_what_it_joins():
     assert starts.max() < 1e-12  # every body has a bone, one that carries a body on a free hinge alone, too
 
 
+def test_markers_are_at_the_hinges_of_their_kind():
+    model = every_kind()
+    q = model.random_state(2).q
+    figure = StickFigure(model, q)
+    for body in model.bodies.values():
+        turning = [s["point"] for s in body.hinge.subhinges if s["kind"] not in ("slider", "free")]
+        place = (model.pose(body.name, q) @ [*(turning[-1] if turning else np.zeros(3)), 1])[:3]
+        np.testing.assert_allclose(shown_points(figure._joints[body.hinge.kind][0]), [place], atol=1e-12)
+    assert not len(shown_points(StickFigure(pc.robots.a1())._base))  # all that there is flies
+
+
 def test_what_slides_is_dashed_from_where_it_was():
     cart = pc.Multibody("cart")
     cart.add_body("cart", hinge="slider", axis=(1, 0, 0), position=(0, 0, 0.5), mass=1.0)
@@ -228,8 +239,11 @@ def test_planes_that_models_never_leave():
     assert Skeleton(model).normals() == (1, 2) and StickFigure(model)._canvas.columns == VIEWS["xz"]
     model.add_body("pole", "cart", axis=(0, 1, 0), **ROD)
     assert Skeleton(model).normals() == (1,)
+    beside = pc.Multibody.from_description(model.description())
     model.add_body("lift", "pole", hinge="slider", axis=(0, 1e-3, 1), **ROD)
     assert Skeleton(model).normals() == () and StickFigure(model).ax.name == "3d"
+    beside.add_body("wheel", "pole", axis=(0, 1, 0), position=(0, 0.1, 0), **ROD)  # moves along the plane, and is not in it
+    assert Skeleton(beside).normals() == ()
 
 
 def test_a_base_that_is_far_off():

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ... import _core
+from ..loaders.left_aside import current
 from ..loaders.rotations import rpy_of_rotation
 from ..loaders.toml_reader import FORMAT, MOMENTS
-from ..warning import warn
 from .toml_text import Inline, document
 
 if TYPE_CHECKING:
@@ -157,17 +157,9 @@ def _state(model: Multibody) -> dict[str, Any]:
 
 
 def _left_aside(model: Multibody) -> dict[str, Any]:
-    """By quantity and coordinate, NaN left out. What belongs to coordinates that a model had before it was edited is not written."""
+    """By quantity and coordinate, NaN left out."""
     data: dict[str, Any] = {}
-    stale = []
-    for quantity, values in model.left_aside.items():
-        if quantity == "gravity":
-            data[quantity] = values
-        elif len(values) == model.nv:
-            data[quantity] = {name: value for name, value in zip(model.coordinate_names, values, strict=True) if not np.isnan(value)}
-        else:
-            stale.append(f"{quantity} of {len(values)} coordinates")
-    if stale:
-        numbers = ", ".join(stale)
-        warn(f"{model.name!r} was edited since it was loaded and has {model.nv} coordinates: not saved is what was left aside, {numbers}")
+    for quantity, values in current(model).items():
+        named = zip(model.coordinate_names, values, strict=True) if quantity != "gravity" else ()
+        data[quantity] = values if quantity == "gravity" else {name: value for name, value in named if not np.isnan(value)}
     return data

@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ... import _core
+from ..loaders.left_aside import current
 from ..loaders.rotations import nearest_rpy
 from ..loaders.xml_file import abbreviated
 from ..warning import warn
@@ -116,8 +117,8 @@ def _unsaid(model: Multibody) -> list[str]:
 def _joint_extras(model: Multibody) -> dict[str, dict[str, float]]:
     """Damping, friction and bounds that were left aside, by hinge of one coordinate."""
     extras: dict[str, dict[str, float]] = {}
-    for quantity, values in model.left_aside.items():
-        if quantity not in ("damping", "friction", "effort limit", "velocity limit") or len(values) != model.nv:
+    for quantity, values in current(model).items():
+        if quantity not in ("damping", "friction", "effort limit", "velocity limit"):
             continue
         for name, hinge in model.hinges.items():
             value = values[hinge.v_slice]
@@ -151,7 +152,7 @@ class _Links:
         fixed = [node["name"] for node in nodes if node["body"] < 0 and _is_origin(node)]
         if fixed:
             return fixed[0], fixed[0]
-        if len(on_base) == 1 and all(node["body"] >= 0 for node in nodes):
+        if len(on_base) == 1:
             name, hinge = on_base[0]["name"], on_base[0]["hinge"]
             called_so = hinge["name"] in ("root", f"root of {name}")  # as `load` calls what it welds a kept root link by
             if called_so and not hinge["subhinges"] and _is_origin(hinge["placement"]):
