@@ -104,8 +104,9 @@ class StickFigure:
         self.update(q)
         if names:
             self._spread_names()
+        self._label(view)
         if ax is None:
-            self._label(view)
+            self.ax.set_title(model.name, fontsize="medium")
         if legend:
             self._legend(ax is None)
 
@@ -228,8 +229,8 @@ class StickFigure:
 
     def _label(self, view: str) -> None:
         for name, shown in zip("xyz", "xyz" if view == "3d" else view, strict=False):
-            getattr(self.ax, f"set_{name}label")(f"{shown} (m)", labelpad=9 if view == "3d" else None)
-        self.ax.set_title(self.model.name, fontsize="medium")
+            if not getattr(self.ax, f"get_{name}label")():
+                getattr(self.ax, f"set_{name}label")(f"{shown} (m)", labelpad=9 if view == "3d" else None)
 
     def _spread_names(self) -> None:
         """Names of hinges that are at one place go below each other."""

@@ -308,7 +308,10 @@ def test_several_states_in_one_picture():
     own = plt.subplots()[1]
     own.plot([0, 50], [0, 1])
     model.plot([0, 0], ax=own)
-    assert own.get_xlim()[1] >= 50 and own.get_xlabel() == ""
+    assert own.get_xlim()[1] >= 50 and (own.get_xlabel(), own.get_title()) == ("x (m)", "")
+    own.set_xlabel("mine")
+    model.plot([0, 0], ax=own)
+    assert own.get_xlabel() == "mine"
     space = plt.figure().add_subplot(projection="3d")
     assert model.plot(ax=space) is space
     assert pc.robots.panda().plot(ax=plt.subplots()[1], view="yz").name == "rectilinear"
