@@ -7,7 +7,7 @@ import fractions
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Binding', 'Dynamics', 'Error', 'EvaluationError', 'GroupedOperators', 'HingeKind', 'Integration', 'Letter', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'Scalar', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'blockdiag', 'checked_refinement', 'compiled_call', 'constant', 'direct_call', 'direct_calls', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'hinge_kinds', 'identity', 'instruction_set', 'instruction_sets', 'integrators', 'kernel_headers', 'kernel_tape', 'methods', 'operators_of', 'precisions', 'prepared_call', 'real_array', 'residual', 'scalar', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_compiled', 'time_dynamics', 'time_forward', 'time_method', 'time_packs', 'vector', 'wider', 'zero']
+__all__: list[str] = ['Binding', 'Dynamics', 'Effect', 'Error', 'EvaluationError', 'FunctionOfTime', 'GroupedOperators', 'HingeKind', 'Integration', 'Letter', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'Scalar', 'SceneCalls', 'SceneEffects', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'blockdiag', 'checked_refinement', 'compiled_call', 'constant', 'constant_in_time', 'coordinates_named', 'damping_effect', 'direct_call', 'direct_calls', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'gravity_effect', 'harmonic', 'hinge_kinds', 'identity', 'instruction_set', 'instruction_sets', 'integrators', 'kernel_headers', 'kernel_tape', 'methods', 'numbers_in_q', 'operators_of', 'piecewise_polynomial', 'precisions', 'prepared_call', 'prescribed_effect', 'python_effect', 'python_function_of_time', 'real_array', 'residual', 'scalar', 'spring_effect', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_compiled', 'time_dynamics', 'time_forward', 'time_method', 'time_packs', 'torque_source_effect', 'vector', 'wider', 'wrench_effect', 'zero']
 
 class Error(Exception): ...
 class SpaceError(Error, TypeError): ...
@@ -116,6 +116,9 @@ class Multibody:
         """
         All coordinates zero, quaternions (1, 0, 0, 0).
         """
+    @property
+    def _parameters(self) -> int:
+        ...
     @property
     def _size(self) -> int:
         ...
@@ -941,6 +944,72 @@ class Integration:
         ...
     def trajectory(self, q: typing.Any, v: typing.Any, times: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], tau: typing.Any, damping: typing.Any, integrator: str, rtol: typing.SupportsFloat | typing.SupportsIndex, atol: typing.SupportsFloat | typing.SupportsIndex, step: typing.SupportsFloat | typing.SupportsIndex, normalise: bool, precision: str | int, form: str, refine: typing.Any) -> dict:
         ...
+class FunctionOfTime:
+    """
+    Numbers as a function of time, with two derivatives.
+    """
+    def __call__(self, t: typing.SupportsFloat | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3, size): values, rates and second derivatives.
+        """
+    @property
+    def size(self) -> int:
+        ...
+class Effect:
+    """
+    An effect as the core has it; pycraft.effects makes them.
+    """
+    @property
+    def coordinates(self) -> list[int]:
+        ...
+    @property
+    def kind(self) -> str:
+        ...
+    @property
+    def potential(self) -> bool:
+        """
+        Whether it has a potential energy.
+        """
+    @property
+    def work(self) -> bool:
+        """
+        Whether some of its forces have none.
+        """
+class SceneEffects:
+    """
+    A model and the effects that act on it, by name, on or off; pycraft.Scene is its face.
+    """
+    def __init__(self, model: Multibody) -> None:
+        ...
+    def add(self, name: str, effect: Effect, on: bool) -> str:
+        ...
+    def remove(self, name: str) -> None:
+        ...
+    def set_on(self, name: str, on: bool) -> None:
+        ...
+class SceneCalls:
+    """
+    What is computed of a scene as it was when this was made.
+    """
+    def __init__(self, scene: SceneEffects, form: str, refine: typing.Any, residual: str, precision: str | int) -> None:
+        ...
+    def __reduce__(self) -> tuple:
+        ...
+    def along(self, t: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], own: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> dict:
+        ...
+    def evaluate(self, q: typing.Any, v: typing.Any, t: typing.SupportsFloat | typing.SupportsIndex, own: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], step: typing.SupportsFloat | typing.SupportsIndex) -> dict:
+        ...
+    def plan(self, list: str) -> list:
+        """
+        (name, what, because) of the passes of a 'motion', at 'rest', or with 'works'.
+        """
+    def simulate(self, q: typing.Any, v: typing.Any, times: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], own: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], energy: bool, integrator: str, rtol: typing.SupportsFloat | typing.SupportsIndex, atol: typing.SupportsFloat | typing.SupportsIndex, step: typing.SupportsFloat | typing.SupportsIndex, every_step: bool, normalise: bool) -> dict:
+        ...
+    @property
+    def workers(self) -> list[int]:
+        """
+        Numbers of the effects whose works are counted, among those that are on.
+        """
 class Theorem:
     """
     A theorem as data: both sides as expressions, its hypotheses, its source.
@@ -1034,6 +1103,14 @@ def constant(array: typing.Any, domain: typing.Any, codomain: typing.Any, name: 
     An array as an operator from `domain` to `codomain` (spaces, or a size n for R^n): a matrix, one diagonal, or a list of one block per
     body. What is block diagonal over the bodies is kept so; what has low rank is found when a plan needs it.
     """
+def constant_in_time(values: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> FunctionOfTime:
+    ...
+def coordinates_named(model: Multibody, names: collections.abc.Sequence[str] | None, effect: str) -> list[int]:
+    """
+    Numbers of the coordinates that names of hinges, coordinates or patterns mean; None: all.
+    """
+def damping_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, coefficient: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> Effect:
+    ...
 def direct_call(function: collections.abc.Callable, made: type | None = None) -> typing.Any:
     """
     The direct call of this name: its plain case in the core, everything else by the function. made: the tuple of its three results.
@@ -1060,6 +1137,10 @@ def forms() -> list[str]:
     """
     The forms of the articulated-inertia sweep.
     """
+def gravity_effect(g: typing.Any) -> Effect:
+    ...
+def harmonic(amplitude: typing.SupportsFloat | typing.SupportsIndex, frequency: typing.SupportsFloat | typing.SupportsIndex, phase: typing.SupportsFloat | typing.SupportsIndex, offset: typing.SupportsFloat | typing.SupportsIndex) -> FunctionOfTime:
+    ...
 def identity(space: typing.Any = None) -> Operator:
     """
     I; without a space it takes that of the operator it is combined with.
@@ -1072,9 +1153,9 @@ def instruction_sets() -> list[str]:
     """
     Those that were built and that this machine has, from narrow to wide.
     """
-def integrators() -> list[str]:
+def integrators(scenes: bool = False) -> list[str]:
     """
-    The integrators that Integration has.
+    The integrators of trajectories, or of scenes: those and what takes steps by effects that act implicitly.
     """
 def kernel_headers() -> dict:
     """
@@ -1088,7 +1169,13 @@ def methods() -> list[str]:
     """
     The methods of forward dynamics that Methods has.
     """
+def numbers_in_q(model: Multibody, coordinates: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> int:
+    """
+    How many numbers these coordinates' subhinges have in q.
+    """
 def operators_of(model: Multibody) -> MultibodyOperators:
+    ...
+def piecewise_polynomial(breaks: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], coefficients: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], size: typing.SupportsInt | typing.SupportsIndex) -> FunctionOfTime:
     ...
 def precisions() -> list[str | int]:
     """
@@ -1098,6 +1185,12 @@ def prepared_call(function: typing.Any, name: str, dynamics: typing.Any, batch: 
     """
     A direct call of one model with its options, as `prepare` gives it. made: the tuple of three results.
     """
+def prescribed_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, motion: FunctionOfTime) -> Effect:
+    ...
+def python_effect(model: Multibody, kind: str, coordinates: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], forces: typing.Any, rates: typing.Any, states: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], sample: typing.Any, period: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
+    ...
+def python_function_of_time(call: typing.Any, size: typing.SupportsInt | typing.SupportsIndex) -> FunctionOfTime:
+    ...
 def real_array(value: typing.Any, what: str) -> numpy.typing.NDArray[numpy.float64]:
     """
     An array of doubles, or a ModelError that names `what`: complex numbers, text, dates, None and masked entries are none.
@@ -1107,6 +1200,8 @@ def residual(a: typing.Any, b: typing.Any, vectors: collections.abc.Mapping[str,
     Largest entries of a - b, a and b: both evaluated as typed, no theorem used, the difference taken at the bound precision.
     """
 def scalar(value: float | fractions.Fraction) -> Scalar:
+    ...
+def spring_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, stiffness: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], rest: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> Effect:
     ...
 def step_kinds() -> list[str]:
     """
@@ -1140,6 +1235,8 @@ def time_packs(model: Multibody, q: typing.Annotated[numpy.typing.ArrayLike, num
     """
     Seconds per state of a batch in packs: minimum, median, calls.
     """
+def torque_source_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, torque: FunctionOfTime, effort_limit: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], speed_limit: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], speed_band: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
+    ...
 def vector(name: str, space: Space) -> Operator:
     """
     A named vector of a space: stands for an array that is given at the evaluation.
@@ -1148,6 +1245,8 @@ def wider(precision: str | int) -> typing.Any:
     """
     The next wider precision, None for the widest.
     """
+def wrench_effect(model: Multibody, node: str, wrench: FunctionOfTime, axes: str) -> Effect:
+    ...
 def zero(domain: Space, codomain: Space) -> Operator:
     """
     The zero operator.

@@ -232,9 +232,10 @@ RESTS_ON = {
     "closed_forms": ["proofs"],
     "sympy_bridge": ["proofs"],
     "accuracy": ["identities", "peers", "tidy"],
+    "scenes": ["models"],
     "compiled": ["recursions"],
     "face": ["accuracy", "compiled", "identities"],
-    "": ["face", "kalman", "closed_forms", "sympy_bridge"],  # pycraft itself
+    "": ["face", "kalman", "closed_forms", "scenes", "sympy_bridge"],  # pycraft itself
     "cli": [""],
 }
 
