@@ -7,7 +7,7 @@ import fractions
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Binding', 'Dynamics', 'Effect', 'Error', 'EvaluationError', 'FunctionOfTime', 'GroupedOperators', 'HingeKind', 'Integration', 'Letter', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'Scalar', 'SceneCalls', 'SceneEffects', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'blockdiag', 'checked_refinement', 'compiled_call', 'constant', 'constant_in_time', 'coordinates_named', 'damping_effect', 'direct_call', 'direct_calls', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'gravity_effect', 'harmonic', 'hinge_kinds', 'identity', 'instruction_set', 'instruction_sets', 'integrators', 'kernel_headers', 'kernel_tape', 'methods', 'numbers_in_q', 'operators_of', 'piecewise_polynomial', 'precisions', 'prepared_call', 'prescribed_effect', 'python_effect', 'python_function_of_time', 'real_array', 'residual', 'scalar', 'spring_effect', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_compiled', 'time_dynamics', 'time_forward', 'time_method', 'time_packs', 'torque_source_effect', 'vector', 'wider', 'wrench_effect', 'zero']
+__all__: list[str] = ['Binding', 'Dynamics', 'Effect', 'Error', 'EvaluationError', 'FunctionOfTime', 'GroupedOperators', 'HingeKind', 'Integration', 'Letter', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'Scalar', 'SceneCalls', 'SceneEffects', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'blockdiag', 'bushing_effect', 'checked_refinement', 'compiled_call', 'constant', 'constant_in_time', 'coordinates_named', 'coulomb_friction_effect', 'damping_effect', 'direct_call', 'direct_calls', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'gravity_effect', 'gravity_gradient_effect', 'harmonic', 'hinge_kinds', 'identity', 'implicit_damping_effect', 'implicit_spring_effect', 'instruction_set', 'instruction_sets', 'integrators', 'kernel_headers', 'kernel_tape', 'limits_effect', 'methods', 'motor_effect', 'node_damper_effect', 'node_spring_effect', 'numbers_in_q', 'operators_of', 'piecewise_polynomial', 'point_mass_gravity_effect', 'precisions', 'prepared_call', 'prescribed_effect', 'python_effect', 'python_function_of_time', 'quadratic_damping_effect', 'real_array', 'residual', 'rotor_inertia_effect', 'scalar', 'servo_effect', 'spring_effect', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_compiled', 'time_dynamics', 'time_forward', 'time_method', 'time_packs', 'torque_source_effect', 'vector', 'wider', 'wrench_effect', 'zero']
 
 class Error(Exception): ...
 class SpaceError(Error, TypeError): ...
@@ -1090,6 +1090,8 @@ def blockdiag(operator: Operator) -> Operator:
     """
     The operator's diagonal blocks, body by body, zero elsewhere.
     """
+def bushing_effect(model: Multibody, node_a: str, node_b: str, stiffness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], damping: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rotation: typing.Any, position: typing.Any) -> Effect:
+    ...
 def checked_refinement(refine: typing.Any, residual: str, precision: str | int) -> typing.Any:
     """
     The number of corrections, or 'auto'; EvaluationError for anything else.
@@ -1109,6 +1111,8 @@ def coordinates_named(model: Multibody, names: collections.abc.Sequence[str] | N
     """
     Numbers of the coordinates that names of hinges, coordinates or patterns mean; None: all.
     """
+def coulomb_friction_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, level: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], smoothing: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
+    ...
 def damping_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, coefficient: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> Effect:
     ...
 def direct_call(function: collections.abc.Callable, made: type | None = None) -> typing.Any:
@@ -1139,12 +1143,18 @@ def forms() -> list[str]:
     """
 def gravity_effect(g: typing.Any) -> Effect:
     ...
+def gravity_gradient_effect(model: Multibody, mu: typing.SupportsFloat | typing.SupportsIndex, position: typing.Any, bodies: collections.abc.Sequence[str] | None) -> Effect:
+    ...
 def harmonic(amplitude: typing.SupportsFloat | typing.SupportsIndex, frequency: typing.SupportsFloat | typing.SupportsIndex, phase: typing.SupportsFloat | typing.SupportsIndex, offset: typing.SupportsFloat | typing.SupportsIndex) -> FunctionOfTime:
     ...
 def identity(space: typing.Any = None) -> Operator:
     """
     I; without a space it takes that of the operator it is combined with.
     """
+def implicit_damping_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, coefficient: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> Effect:
+    ...
+def implicit_spring_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, stiffness: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], rest: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> Effect:
+    ...
 def instruction_set() -> str:
     """
     The instruction set whose kernels direct calls run: the widest that this machine has, or the one that the environment variable PYCRAFT_ISA names.
@@ -1165,10 +1175,18 @@ def kernel_tape(model: Multibody, call: str) -> typing.Any:
     """
     What the kernel of a direct call does for this model, operation by operation; None where no kernel knows the model's hinges.
     """
+def limits_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, stiffness: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], dissipation: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], lower: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], upper: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> Effect:
+    ...
 def methods() -> list[str]:
     """
     The methods of forward dynamics that Methods has.
     """
+def motor_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, command: FunctionOfTime, stall_torque: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], no_load_speed: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], gear_ratio: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], rotor_inertia: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], effort_limit: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], speed_limit: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], speed_band: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
+    ...
+def node_damper_effect(model: Multibody, node_a: str, node_b: str, coefficient: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
+    ...
+def node_spring_effect(model: Multibody, node_a: str, node_b: str, stiffness: typing.SupportsFloat | typing.SupportsIndex, length: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
+    ...
 def numbers_in_q(model: Multibody, coordinates: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> int:
     """
     How many numbers these coordinates' subhinges have in q.
@@ -1176,6 +1194,8 @@ def numbers_in_q(model: Multibody, coordinates: collections.abc.Sequence[typing.
 def operators_of(model: Multibody) -> MultibodyOperators:
     ...
 def piecewise_polynomial(breaks: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], coefficients: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], size: typing.SupportsInt | typing.SupportsIndex) -> FunctionOfTime:
+    ...
+def point_mass_gravity_effect(model: Multibody, mu: typing.SupportsFloat | typing.SupportsIndex, position: typing.Any, bodies: collections.abc.Sequence[str] | None) -> Effect:
     ...
 def precisions() -> list[str | int]:
     """
@@ -1191,6 +1211,8 @@ def python_effect(model: Multibody, kind: str, coordinates: collections.abc.Sequ
     ...
 def python_function_of_time(call: typing.Any, size: typing.SupportsInt | typing.SupportsIndex) -> FunctionOfTime:
     ...
+def quadratic_damping_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, coefficient: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> Effect:
+    ...
 def real_array(value: typing.Any, what: str) -> numpy.typing.NDArray[numpy.float64]:
     """
     An array of doubles, or a ModelError that names `what`: complex numbers, text, dates, None and masked entries are none.
@@ -1199,7 +1221,11 @@ def residual(a: typing.Any, b: typing.Any, vectors: collections.abc.Mapping[str,
     """
     Largest entries of a - b, a and b: both evaluated as typed, no theorem used, the difference taken at the bound precision.
     """
+def rotor_inertia_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, inertia: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], gear_ratio: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> Effect:
+    ...
 def scalar(value: float | fractions.Fraction) -> Scalar:
+    ...
+def servo_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, stiffness: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], damping: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], target: FunctionOfTime, effort_limit: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], speed_limit: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], speed_band: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
     ...
 def spring_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, stiffness: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], rest: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> Effect:
     ...

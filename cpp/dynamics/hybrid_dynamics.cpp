@@ -23,9 +23,10 @@ HingeTerms without_prescribed(HingeTerms terms) {
 PreparedLinks::PreparedLinks(const Multibody& model, const HingeTerms& terms, const Solving& how, const Vector3<double>& gravity, const std::vector<int>& wrenched)
     : model_(kernels::LinkModel<double>::of(model, terms)), nv_(model.nv()), wrenched_(wrenched) {
   using kernels::Call;
-  const bool refined = how.refinement.steps != 0;
-  if (!model_ || how.form != Form::fast || how.on_singular != OnSingular::raise || how.refinement.wider() || (refined && terms.prescribes())) return;
-  const Call call = all_prescribed(model, terms) ? Call::inverse_dynamics : !refined ? Call::forward_dynamics : how.refinement.gathers_wider() ? Call::gathered_dynamics : Call::refined_dynamics;
+  const bool refined = how.refinement.steps != 0, inverse = all_prescribed(model, terms);  // nothing is solved for: in any form
+  const bool plain = how.form == Form::fast && how.on_singular == OnSingular::raise && !how.refinement.wider();
+  if (!model_ || !(inverse || (plain && !(refined && terms.prescribes())))) return;
+  const Call call = inverse ? Call::inverse_dynamics : !refined ? Call::forward_dynamics : how.refinement.gathers_wider() ? Call::gathered_dynamics : Call::refined_dynamics;
   kernel_ = kernels::instruction_set().one[call];
   if (!kernel_.run) return;
   std::copy_n(gravity.v, 3, gravity_);

@@ -36,7 +36,7 @@ template <class S>
 // above: the parent's angular velocity; null at the base. States without v are at rest.
 template <class Kind, class S, class T>
 [[gnu::always_inline]] inline void move_link(const Link<T>& link, const States<T>& at, const Vector3<S>* above, Motion<S>& m) {
-  if (!at.v) return void(m.omega = m.turning = m.sliding = Vector3<S>::zero());
+  if (!at.v) [[unlikely]] return void(m.omega = m.turning = m.sliding = Vector3<S>::zero());
   const auto velocity = [&](int i) { return gathered<S>(at.v + link.v + i, at.v_stride, at.states); };
   const auto rotation = Kind::rotation(m.place);
   const Vector3<S> none = Vector3<S>::zero();

@@ -140,6 +140,29 @@ std::vector<int> hinges_named(const Multibody& model, const Names& names, const 
   return found;
 }
 
+std::vector<int> bodies_named(const Multibody& model, const Names& names, const std::string& effect) {
+  std::vector<int> found;
+  std::vector<char> there(model.bodies(), !names);
+  std::unordered_map<std::string, int> numbers;
+  for (int k = 0; k < model.bodies(); ++k) numbers[model.body(k).name] = k;
+  for (const std::string& name : names.value_or(std::vector<std::string>())) {
+    bool fits = false;
+    if (const auto exact = numbers.find(name); exact != numbers.end())
+      there[exact->second] = 1, fits = true;
+    else if (is_pattern(name))
+      for (const auto& [known, k] : numbers)
+        if (fits_pattern(known, name)) there[k] = 1, fits = true;
+    if (fits) continue;
+    std::vector<std::string> known;
+    for (const auto& [other, _] : numbers) known.push_back(other);
+    std::sort(known.begin(), known.end());
+    throw_not_there(effect, "body", name, model, known);
+  }
+  for (int k = 0; k < model.bodies(); ++k)
+    if (there[k]) found.push_back(k);
+  return found;
+}
+
 Node node_named(const Multibody& model, const std::string& name, const std::string& effect) {
   if (name.empty()) return {"", -1, Pose<double>::identity()};
   for (const Node& n : model.nodes())
@@ -180,6 +203,20 @@ SubhingePlace subhinge_of_coordinate(const Multibody& model, int coordinate) {
     q += s.nq(), v += s.nv(), ++i;
   }
   throw ModelError("coordinate " + std::to_string(coordinate) + " of '" + model.name() + "' is not there");
+}
+
+std::vector<SingleCoordinate> single_coordinates(const Multibody& model, const Names& hinges, const std::string& effect) {
+  const std::vector<std::string> names = model.structure().coordinate_names;
+  std::vector<SingleCoordinate> found;
+  for (const int j : coordinates_named(model, hinges, effect)) {
+    const SubhingePlace at = subhinge_of_coordinate(model, j);
+    const SubhingeRecord& record = record_of(at.kind);
+    if (record.nq == 1)
+      found.push_back({at.q, at.v});
+    else if (hinges)
+      throw ModelError(effect + ": coordinate '" + names[j] + "' is one of a " + record.name + " subhinge; it acts on pins, sliders and screws");
+  }
+  return found;
 }
 
 }  // namespace pycraft

@@ -21,6 +21,8 @@ using Names = std::optional<std::vector<std::string>>;  // none: all
 std::vector<int> coordinates_named(const Multibody& model, const Names& names, const std::string& effect);
 // The bodies that hinges of these names move.
 std::vector<int> hinges_named(const Multibody& model, const Names& names, const std::string& effect);
+// The bodies of these names.
+std::vector<int> bodies_named(const Multibody& model, const Names& names, const std::string& effect);
 // A node, or a body as a node; "" is the base.
 Node node_named(const Multibody& model, const std::string& name, const std::string& effect);
 
@@ -36,5 +38,12 @@ struct SubhingePlace {
   int q, v;
 };
 SubhingePlace subhinge_of_coordinate(const Multibody& model, int coordinate);
+
+// Where in q and v a coordinate of a pin, slider or screw is.
+struct SingleCoordinate {
+  int q, v;
+};
+// Coordinates that effects on single ones act on; where none are named those of balls and free subhinges are passed over, else they are refused.
+std::vector<SingleCoordinate> single_coordinates(const Multibody& model, const Names& hinges, const std::string& effect);
 
 }  // namespace pycraft

@@ -1,5 +1,6 @@
 #include "simulation/effects/drive_limits.h"
 
+#include <algorithm>
 #include <limits>
 
 #include "model/checks.h"
@@ -17,11 +18,14 @@ void check_bounds(std::vector<double>& bounds, size_t count, const std::string& 
     if (!(x > 0)) throw ModelError(what + " is " + short_number(x) + "; a limit is positive, inf for none");
 }
 
+bool finite(double x) { return std::isfinite(x); }
+
 }  // namespace
 
 void DriveLimits::check(size_t count, const std::string& effect) {
   check_bounds(effort, count, effect + ": effort_limit");
   check_bounds(speed, count, effect + ": speed_limit");
+  any = std::any_of(effort.begin(), effort.end(), finite) || std::any_of(speed.begin(), speed.end(), finite);
   if (!(band > 0 && band <= 1)) throw ModelError(effect + ": speed_band is " + short_number(band) + "; it is a share of the speed limit, above 0 and at most 1");
 }
 

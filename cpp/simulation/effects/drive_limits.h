@@ -13,11 +13,13 @@ namespace pycraft {
 struct DriveLimits {
   std::vector<double> effort, speed;  // one for each coordinate, infinite: none
   double band = 0.05;
+  bool any = true;                    // whether any of them is finite
   // ModelError that names the effect where one is not positive, or their number does not fit.
   void check(size_t count, const std::string& effect);
 
   template <class S>
   S bounded(size_t i, S force, const S& v) const {
+    if (!any) return force;
     const S most(effort[i]), fastest(speed[i]);
     if (force > most) force = most;
     if (-most > force) force = -most;

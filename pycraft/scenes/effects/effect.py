@@ -90,13 +90,13 @@ def plain(value: Any) -> Any:
     raise _core.ModelError(f"{value!r:.80} is no plain data: a function is Python's, and no file holds it")
 
 
-def names_of(hinges: Any, effect: str) -> list[str] | None:
+def names_of(given: Any, effect: str, what: str = "hinges") -> list[str] | None:
     """What an effect acts on, as a list of names: of a name, a handle, or a list of either; None is all."""
-    if hinges is None:
+    if given is None:
         return None
-    if isinstance(hinges, str) or hasattr(hinges, "name"):
-        hinges = [hinges]
-    return [text(getattr(hinge, "name", hinge), f"{effect}: a hinge") for hinge in listed(hinges, f"{effect}: hinges")]
+    if isinstance(given, str) or hasattr(given, "name"):
+        given = [given]
+    return [text(getattr(one, "name", one), f"{effect}: one of its {what}") for one in listed(given, f"{effect}: {what}")]
 
 
 def node_name(node: Any, effect: str) -> str:
