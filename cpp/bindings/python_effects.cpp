@@ -17,7 +17,7 @@ py::array_t<double> copied(const double* x, int n) {
 // What came back, as so many numbers; `what` for errors.
 void take(const py::object& given, int n, double* out, const std::string& what) {
   const Array a = numbers(given, what.c_str());
-  if (a.size() != n || a.ndim() > 1) throw ModelError(what + " gives " + shape_text(a) + (a.ndim() == 1 ? " numbers" : "") + " where " + std::to_string(n) + " are expected");
+  if (a.size() != n || a.ndim() > 1) throw ModelError(what + " gives " + shape_text(a) + (a.ndim() != 1 ? "" : a.size() == 1 ? " number" : " numbers") + " where " + std::to_string(n) + (n == 1 ? " is" : " are") + " expected");
   std::copy_n(a.data(), n, out);
 }
 
@@ -77,12 +77,11 @@ void PythonFunctionOfTime::at(double t, double* value, double* rate, double* sec
   const py::gil_scoped_acquire gil;
   const bool derivatives = rate || second;
   const py::object result = (*call_)(t, derivatives);
-  const std::string what = "a function of time";
-  if (!derivatives) return take(result, size_, value, what);
+  if (!derivatives) return take(result, size_, value, what_);
   const py::tuple all(result);
   double* const to[] = {value, rate, second};
   for (size_t i = 0; i < 3; ++i)
-    if (to[i]) take(all[i], size_, to[i], what);
+    if (to[i]) take(all[i], size_, to[i], what_);
 }
 
 PythonEffect::PythonEffect(std::string kind, int nq, int nv, std::vector<int> coordinates, const py::object& forces, const py::object& rates, std::vector<double> states, const py::object& sample,

@@ -14,10 +14,10 @@ namespace pycraft {
 // An object of Python's that any thread may let go of.
 std::shared_ptr<py::object> held_object(const py::object& object);
 
-// call(t, derivatives): values, or a tuple of values, rates and second derivatives, so many numbers each.
+// `what` it is, call(t, derivatives): values, or a tuple of values, rates and second derivatives, so many numbers each.
 class PythonFunctionOfTime : public InDoubles {
  public:
-  PythonFunctionOfTime(const py::object& call, int size) : call_(held_object(call)), size_(size) {}
+  PythonFunctionOfTime(const py::object& call, int size, std::string what) : call_(held_object(call)), size_(size), what_(std::move(what)) {}
   using InDoubles::at;
   int size() const override { return size_; }
   bool foreign() const override { return true; }
@@ -26,6 +26,7 @@ class PythonFunctionOfTime : public InDoubles {
  private:
   std::shared_ptr<py::object> call_;
   int size_;
+  std::string what_;  // for errors
 };
 
 // forces(t, q, v, own): nv numbers; rates(t, q, v, own): as many as it has states; sample(t, q, v): as many as it holds, which are its forces on

@@ -47,8 +47,9 @@ void register_effects(py::module_& m) {
   }, py::arg("breaks"), py::arg("coefficients"), py::arg("size"));
   m.def("harmonic", [shared](double amplitude, double frequency, double phase, double offset) { return shared(harmonic(amplitude, frequency, phase, offset)); }, py::arg("amplitude"),
         py::arg("frequency"), py::arg("phase"), py::arg("offset"));
-  m.def("python_function_of_time", [](const py::object& call, int size) { return std::shared_ptr<FunctionOfTime>(std::make_shared<PythonFunctionOfTime>(call, size)); }, py::arg("call"),
-        py::arg("size"));
+  m.def("python_function_of_time", [](const py::object& call, int size, const std::string& what) {
+    return std::shared_ptr<FunctionOfTime>(std::make_shared<PythonFunctionOfTime>(call, size, what));
+  }, py::arg("call"), py::arg("size"), py::arg("what"));
   m.def("coordinates_named", [](const Multibody& model, const Names& names, const std::string& effect) { return coordinates_named(model, names, effect); }, py::arg("model"), py::arg("names"),
         py::arg("effect"), "Numbers of the coordinates that names of hinges, coordinates or patterns mean; None: all.");
   m.def("numbers_in_q", [](const Multibody& model, const std::vector<int>& coordinates) {

@@ -150,10 +150,11 @@ class Scene(Closed):
         return self._entries[self._name(name)][1]
 
     def _turn(self, names: tuple[Any, ...], on: bool) -> Scene:
-        core = self._fresh_core()
         called = [self._name(name) for name in names]
-        for name in called:
-            core.set_on(name, on)
+        if on:
+            core = self._fresh_core()
+            for name in called:
+                core.set_on(name, True)
         for name in called:
             self._entries[name] = (self._entries[name][0], on)
         self._built = None

@@ -43,7 +43,7 @@ class Table(InTime):
 
     def in_core(self) -> _core.FunctionOfTime:
         t, y = _points(self.times, self.values, "a table")
-        slopes = np.diff(y, axis=0) / np.diff(t)[:, None] if len(t) > 1 else y[:0]
+        slopes = np.diff(y, axis=0) / np.diff(t)[:, None]
         return _core.piecewise_polynomial(t.tolist(), np.stack([slopes, y[:-1]]), y.shape[1])
 
 
@@ -69,8 +69,6 @@ class Spline(InTime):
         if self.ends not in ("clamped", "natural", "not-a-knot"):
             raise _core.ModelError(f"a spline's ends are 'clamped', 'natural' or 'not-a-knot', not {self.ends!r}")
         t, y = _points(self.times, self.values, "a spline")
-        if len(t) < 2 or not (np.diff(t) > 0).all():
-            raise _core.ModelError("a spline takes two times at least, and they rise")
         return _core.piecewise_polynomial(t.tolist(), CubicSpline(t, y, bc_type=self.ends).c, y.shape[1])
 
 
@@ -98,6 +96,8 @@ def _points(times: Any, values: Any, what: str) -> tuple[np.ndarray, np.ndarray]
     t, y = _core.real_array(times, f"times of {what}"), _core.real_array(values, f"values of {what}")
     if t.ndim != 1 or y.ndim not in (1, 2) or len(y) != len(t):
         raise _core.ModelError(f"{what} takes times (K,) and values (K,) or (K, n), not {t.shape} and {y.shape}")
+    if len(t) < 2 or not (np.diff(t) > 0).all():
+        raise _core.ModelError(f"{what} takes two times at least, and they rise")
     return t, y.reshape(len(t), -1)
 
 
@@ -121,7 +121,7 @@ def function_of_time(given: Any, what: str, size: int | None = None, derivatives
     if callable(given):
         if size is None:
             size = int(np.size(_values(given(0.0), what)))
-        return _core.python_function_of_time(_Differentiated(given, size, what, step) if derivatives else _Valued(given, what), size)
+        return _core.python_function_of_time(_Differentiated(given, size, what, step) if derivatives else _Valued(given, what), size, what)
     numbers = _core.real_array(given, what)
     if numbers.ndim > 1:
         raise _core.ModelError(f"{what} takes numbers, a table, a spline or a function of time, not an array {numbers.shape}")

@@ -18,7 +18,7 @@ class Limits(Effect):
     Parameters
     ----------
     stiffness : N m/rad or N/m, k; one number or one for each coordinate
-    dissipation : s/rad or s/m, a; about (1 - e)/v for a coefficient of restitution e at the speed v
+    dissipation : s/rad or s/m, a; about 3/2 (1 - e)/v for a coefficient of restitution e at the speed v
     lower, upper : rad or m, one number or one for each coordinate; None: those of the model's hinges (`hinge.limits`)
     hinges : names of hinges, coordinates, patterns, or a list of them; None: all that have a limit
     """
