@@ -74,7 +74,7 @@ class Scene(Closed):
     >>> arm = pc.chain(2)
     >>> scene = pc.Scene(arm).add(pc.effects.Gravity(g=(0, -9.81, 0)), pc.effects.Damping(0.1))
     >>> scene
-    <scene of 'chain of 2': gravity, damping>
+    <scene of 'chain of 2 rods': gravity, damping>
     >>> run = scene.simulate(1.0)
     >>> energy = run.energy["kinetic"] + run.energy["potential"] - run.energy["work"].sum(axis=1)
     >>> bool(np.ptp(energy) < 1e-7)

@@ -60,7 +60,7 @@ def from_model(model: Any) -> Offered:
     >>> import pycraft as pc
     >>> arm = pc.robots.panda()
     >>> [effect.kind() for effect in pc.effects.from_model(arm)]
-    []
+    ['damping', 'torque_source']
     """
     if not isinstance(model, _core.Multibody):
         raise _core.ModelError(f"effects are offered by a model, not by {model!r:.80}")
