@@ -175,10 +175,6 @@ CHANGES = {
     "cpp/dynamics/methods.cpp": [
         ("conjugate gradients never refuse", "gradients_.residual < sqrt(epsilon<S>()) && gradients_.condition < widest", "true"),
     ],
-    "cpp/simulation/trajectory.cpp": [
-        ("the step after a cut step is the cut one", "cut && abs(tried) < abs(h) ? h : tried", "tried"),
-        ("lengths of quaternions walk", "scale_quaternions<S>(equations_.model(), lengths_.data(), x_.data());", ";", STATEMENT),
-    ],
     "cpp/kernels/forward_dynamics.h": [
         ("a rotor keeps all of its row", "S(J * w.inverse)", "S(1)"),
         ("what pivots outboard are unsure of is forgotten", "greater(D, S(4) * most * P.error)", "S::all()"),
