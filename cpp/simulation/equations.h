@@ -40,6 +40,9 @@ class Equations {
   virtual bool stops() const { return false; }
   virtual double next_stop(double) const { return std::numeric_limits<double>::infinity(); }
   virtual void stop(const S&, State&) {}
+  // Functions of t and x at whose zeros the equations are others.
+  virtual int count_events() const { return 0; }
+  virtual void events(const S&, const State&, S*) {}
 
   long evaluations = 0;
 

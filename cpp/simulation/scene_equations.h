@@ -68,6 +68,12 @@ class SceneEquations : public Equations<S> {
   bool stops() const override { return std::isfinite(next_stop(0)); }
   double next_stop(double t) const override { return scene_.effects().next_sample(t); }
   void stop(const S& t, State& x) override { scene_.effects().sample(t, false, x.data(), x.data() + nq(), x.data() + nq() + nv()); }
+  int count_events() const override { return scene_.effects().count_events(); }
+  void events(const S& t, const State& x, S* out) override {
+    std::copy_n(x.data(), nq(), q_.data()), std::copy_n(x.data() + nq(), nv(), v_.data());
+    scene_.effects().prescribe(t, q_.data(), v_.data(), nullptr);
+    scene_.effects().events(t, q_.data(), v_.data(), x.data() + nq() + nv(), out);
+  }
 
  private:
   CompiledScene<S>& scene_;
