@@ -8,24 +8,30 @@ CHANGES = {
         ("lengths of quaternions walk", "scale_quaternions<S>(equations_.model(), lengths_.data(), x_.data());", ";", STATEMENT),
         ("a sample is taken a piece too late", "std::min(stop, times_[i])", "times_[i]"),
         ("a stepper keeps its slope over a sample", "begun && equations_.stops()", "false"),
-        ("implicit terms outlive their run", "~PlainSteps() { equations.set_step(S(0)); }", "~PlainSteps() {}"),
+        ("implicit terms outlive their run", "equations.set_step(S(0));", ";", STATEMENT),
     ],
     "cpp/simulation/integrators/steps_on_the_group.h": [
         ("implicit steps are explicit", "equations.set_step(h);", ";", STATEMENT),
-        ("stages are all at the step's beginning", "equations.evaluate(t + part[stage],", "equations.evaluate(t,"),
+        ("stages are all at the step's beginning", "t + part[stage]", "t"),
     ],
     "cpp/simulation/scene_equations.h": [
         ("works are seen by tolerances", "std::ldexp(1.0, 100)", "1.0"),
         ("prescribed coordinates drift", "scene_.effects().prescribe(t, x.data(), x.data() + nq(), nullptr);", ";", STATEMENT),
-        ("a controller is not asked at the start", "scene_.effects().sample(t, own == nullptr,", "scene_.effects().sample(t, false,"),
+        (
+            "a controller is not asked at the start",
+            "if (stops()) scene_.effects().sample(t, own == nullptr, x.data(), x.data() + nq(), x.data() + nq() + nv());",
+            ";",
+            STATEMENT,
+        ),
     ],
     "cpp/simulation/scene_forces.cpp": [
         (
             "what comes from outside is not looked at",
-            "refuse_unless_finite(effect);\n  for (int j : effect.declared.coordinates) tau_[j]",
-            "for (int j : effect.declared.coordinates) tau_[j]",
+            "refuse_unless_finite(effect);\n  for (int j : effect.declared.coordinates) tau_[j] += alone_tau_[j];",
+            "for (int j : effect.declared.coordinates) tau_[j] += alone_tau_[j];",
+            STATEMENT,
         ),
-        ("wrenches do no work", "power += dot(alone_wrench_[k], at_.twist[k]), ", ""),
+        ("wrenches do no work", "power += dot(alone_wrench_[k], at_.twist[k])", "power"),
         ("samples fall a hair late", "k * T - t < 1e-9 * T", "false"),
         ("wrenches pile up", "for (int k : wrenched_) wrench_[k] = Vector6<S>::zero();", ";", STATEMENT),
     ],
@@ -68,7 +74,7 @@ CHANGES = {
     ],
     "cpp/simulation/effects/prescribed_motion.cpp": [
         ("the length of a quaternion counts", "k * vector_part(x, z) - (k * along) * omega", "k * vector_part(x, z)"),
-        ("a position is in the body's axes", "- cross(omega, u)", ""),
+        ("a position is in the body's axes", "cross(omega, u)", "S(0) * u"),
     ],
     "cpp/simulation/effects/gravity_gradient.cpp": [
         ("a gradient is a couple alone", "(S(1.5) * mu_ / (cube * length))", "S(0)"),
@@ -79,7 +85,7 @@ CHANGES = {
     ],
     "cpp/recursions/prescribed_hinges.h": [
         ("prescribed accelerations do not reach other bodies", "points.a[k] = points.a[k] + rates_[j] * rows_[j];", ";", STATEMENT),
-        ("a rotor that is driven needs nothing", "+ whole_->rotor_inertia[j] * rates_[j]", ""),
+        ("a rotor that is driven needs nothing", "whole_->rotor_inertia[j] * rates_[j]", "S(0)"),
     ],
     "cpp/dynamics/hybrid_dynamics.cpp": [
         ("what is all prescribed is solved for", ": all_prescribed(model, terms) ? Given::accelerations", ""),
