@@ -88,7 +88,7 @@ CHANGES = {
         ("a rotor that is driven needs nothing", "whole_->rotor_inertia[j] * rates_[j]", "S(0)"),
     ],
     "cpp/dynamics/hybrid_dynamics.cpp": [
-        ("what is all prescribed is solved for", ": all_prescribed(model, terms) ? Given::accelerations", ""),
+        ("what is all prescribed is solved for", "all_prescribed(model, terms) ? Given::accelerations : Given::both", "Given::both"),
     ],
     "cpp/kernels/prescribed_links.h": [
         ("a screw that is driven does not travel", "slide[Kind::row] = S(link.travel) * x;", ";", STATEMENT),
