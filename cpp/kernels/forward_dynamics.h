@@ -10,6 +10,7 @@
 #pragma once
 
 #include "kernels/pivot_errors.h"
+#include "kernels/prescribed_links.h"
 
 namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET {
 
@@ -252,7 +253,9 @@ template <bool forces, class S, class T, class Keep = KeepsNothing>
     ForwardLink<S>& own = w.link[k];
     start_inward(links, w, k, last, P);
     add_own<forces>(link, own.motion.omega, at.wrenches ? at.wrenches + 6 * k : nullptr, P);
-    if (link.rotor)
+    if (forces && link.prescribed) [[unlikely]]
+      pass_inward(link, own, w.of(link), P);
+    else if (link.rotor)
       with_step(link.step, [&](auto kind) { eliminate<decltype(kind), decltype(kind)::pin, forces>(link, links, at, gone, own, w.of(link), P, sound); });
     else
       with_step(link.step, [&](auto kind) { eliminate<decltype(kind), false, forces>(link, links, at, gone, own, w.of(link), P, sound); });
@@ -290,6 +293,7 @@ template <class S, class T>
       place_link<Kind>(link, at, m.place);
       move_link<Kind>(link, at, link.parent < 0 ? nullptr : &w.link[link.parent].motion.omega, m);
     });
+    if (link.prescribed) [[unlikely]] prescribe(link, at, w.link[k]);
   }
 }
 // Where links are and how they move, and what is eliminated. Which lanes are sound.
@@ -319,6 +323,7 @@ template <class S, class T>
 [[gnu::always_inline]] inline void accelerate_links(const Links<T>& links, const States<T>& at, const ForwardWork<S>& w, int first, int last, double* out, size_t stride) {
   outward(links, first, last, Vector3<S>(-spread<S>(at.gravity)), w.link, [&](int k, Vector3<S>& alpha, Vector3<S>& acceleration) {
     const Link<T>& link = links.link[k];
+    if (link.prescribed) [[unlikely]] return pass_outward(link, at, w.link[k], w.of(link), alpha, acceleration, out, stride);
     with_step(link.step, [&](auto kind) { accelerate<decltype(kind)>(link, at, w.link[k], w.of(link), alpha, acceleration, out, stride); });
   });
 }

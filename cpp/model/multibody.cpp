@@ -278,8 +278,8 @@ void Multibody::set_rotor_inertia(int k, const std::vector<double>& values) {
 void Multibody::set_limits(int k, const std::vector<double>& lower, const std::vector<double>& upper) {
   const Edit edit(*this);
   check_limits(body(k).hinge, lower, upper);
-  bodies_[k].hinge.lower = lower;
-  bodies_[k].hinge.upper = upper;
+  bodies_[k].hinge.lower = lower, bodies_[k].hinge.upper = upper;
+  ++parameters_;
 }
 void Multibody::set_gravity(const Vector3<double>& g) {
   const Edit edit(*this);

@@ -59,6 +59,7 @@ class Multibody(Closed, IntegrationCalls, Pictures, WithOperators):
             raise _core.ModelError(f"welds={welds!r}: there are 'lump' and 'keep'")
         super().__init__(text(name, "a model"), welds == "keep", strict)
         self._left_aside: dict[str, np.ndarray] = {}
+        self._actuators: list[dict[str, Any]] = []
 
     # ------------------------------------------------------------------ structure
     def add_body(
@@ -310,28 +311,38 @@ class Multibody(Closed, IntegrationCalls, Pictures, WithOperators):
         """What the model's file says beside the model, by name; empty for a model that was not loaded.
 
         "gravity" (3,), m/s²; per coordinate (nv,), NaN where the file has none: "damping", "friction", "stiffness", and "effort limit",
-        "velocity limit". `integrate_ode(..., damping=np.nan_to_num(arm.left_aside["damping"]))` takes the first of these.
+        "velocity limit"; "spring rest" (nq,), where springs are slack, if that is not zero. `pycraft.effects.from_model` makes effects of
+        them; `integrate_ode(..., damping=np.nan_to_num(arm.left_aside["damping"]))` takes the first of these.
         """
         return dict(self._left_aside)
 
+    @property
+    def actuators(self) -> list[dict[str, Any]]:
+        """The actuators of the model's file, none for a model that was not loaded: `pycraft.effects.from_model` makes effects of them.
+
+        Each a dictionary: "name", "coordinate", "gear", "gain", "bias" (3,), "force range" (2,), and "why not" of one that no effect is,
+        else None. With a control u the force at the coordinate is gear · clip(gain u + bias · (1, gear q, gear v), force range).
+        """
+        return [dict(actuator) for actuator in self._actuators]
+
     def __reduce__(self):
-        return _again, (self.description(), self._left_aside)
+        return _again, (self.description(), self._left_aside, self._actuators)
 
     def __copy__(self) -> Multibody:
-        return _again(self.description(), self._left_aside)
+        return _again(self.description(), self._left_aside, self._actuators)
 
     def __deepcopy__(self, memo) -> Multibody:
-        memo[id(self)] = copy = _again(self.description(), self._left_aside)
+        memo[id(self)] = copy = _again(self.description(), self._left_aside, self._actuators)
         return copy
 
     def __repr__(self) -> str:
         return f"<multibody {self.name!r}: {self._size} bodies, {self.nv} degrees of freedom>"
 
 
-def _again(description: Mapping[str, Any], left_aside: Mapping[str, np.ndarray]) -> Multibody:
+def _again(description: Mapping[str, Any], left_aside: Mapping[str, np.ndarray], actuators: Sequence[dict[str, Any]] = ()) -> Multibody:
     """A copy of a model from its description and what its file said beside it."""
     model = Multibody.from_description(description)
-    model._left_aside = dict(left_aside)
+    model._left_aside, model._actuators = dict(left_aside), [dict(actuator) for actuator in actuators]
     return model
 
 

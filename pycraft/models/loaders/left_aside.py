@@ -44,13 +44,17 @@ def current(model: Multibody) -> dict[str, np.ndarray]:
 
 def told(left: Mapping[str, np.ndarray], model: Multibody) -> str:
     """One line about all of it, and how to get it; empty where nothing is left aside."""
-    if not left:
-        return ""
-    parts = []
+    parts, drives = [], len(model.actuators)
     for quantity, values in left.items():
+        if quantity == "spring rest":
+            continue  # goes with the stiffness
         if quantity == "gravity":
             parts.append(f'gravity {tuple(values.tolist())}, which load(..., gravity="file") takes')
             continue
         count = int(np.count_nonzero(~np.isnan(values)))
         parts.append(f"{quantity} of {count} coordinate{'s' if count > 1 else ''}")
+    if drives:
+        parts.append(f"{drives} actuator{'s' if drives > 1 else ''}")
+    if not parts:
+        return ""
     return f"left aside: {'; '.join(parts)}; the numbers are in left_aside of the model"

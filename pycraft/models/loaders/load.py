@@ -35,8 +35,8 @@ def load(
     A TOML file holds a model as it was saved, gravity and state with it. From the others hinges carry the file's joint names,
     bodies its link names, the model the robot's name. Children come in the order of their joint elements, depth first.
     Gravity is zero until it is set, also where the file gives it; damping, friction, springs and bounds on efforts and
-    velocities are effects: a warning tells which of them the file has, and `Multibody.left_aside` has their numbers. Motors
-    and contacts are not read.
+    velocities are effects: a warning tells which of them the file has, and `Multibody.left_aside` has their numbers,
+    `Multibody.actuators` those of actuators, and `pycraft.effects.from_model` makes effects of them. Contacts are not read.
 
     Parameters
     ----------
