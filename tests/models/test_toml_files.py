@@ -124,6 +124,24 @@ def test_a_model_of_a_mujoco_file(tmp_path):
     assert loaded(tmp_path / "m.toml", gravity="file").gravity.tolist() == [0, 0, -9.81]
 
 
+def test_springs_and_actuators_of_a_mujoco_file(tmp_path):
+    """Where springs are slack goes by the coordinates q, which a ball has more of; actuators that are no effects keep their reason."""
+    pytest.importorskip("mujoco")
+    text = (
+        '<mujoco model="m"><compiler angle="radian"/><worldbody><body name="a"><joint name="ball" type="ball" stiffness="2"/>'
+        '<geom size=".1"/><site name="tip"/><body name="b" pos="1 0 0"><joint name="j" stiffness="3" springref="0.4"/><geom size=".1"/>'
+        '</body></body></worldbody><actuator><motor name="push" joint="j" gear="50" forcerange="-3 4"/>'
+        '<position name="hold" joint="j" kp="7" kv="2"/>'
+        '<motor name="thrust" site="tip"/></actuator></mujoco>'
+    )
+    (tmp_path / "m.xml").write_text(text)
+    model = loaded(tmp_path / "m.xml")
+    assert model.left_aside["spring rest"].tolist() == [1, 0, 0, 0, 0.4] and len(model.actuators) == 3
+    assert lost(model, tmp_path / "m.toml") == []
+    again = loaded(tmp_path / "m.toml")
+    assert repr(pc.effects.from_model(again)) == repr(pc.effects.from_model(model))
+
+
 def test_edits_after_loading_and_long_ways_of_nodes(tmp_path):
     """Rotations that were multiplied many times and zeros with a sign come back as they are."""
     rng, model = np.random.default_rng(0), pc.Multibody("way")
@@ -301,6 +319,15 @@ def test_what_was_left_aside_before_an_edit_is_not_saved(tmp_path):
     with pytest.warns(pc.ModelWarning, match="not saved is what was left aside, damping of 7 coordinates"):
         arm.save(tmp_path / "arm.toml")
     assert loaded(tmp_path / "arm.toml").left_aside == {}
+
+
+def test_actuators_of_coordinates_that_are_gone_are_not_saved(tmp_path):
+    arm = pc.chain(2)
+    lost = {"name": "push", "coordinate": "elbow", "gear": 1.0, "gain": 1.0, "bias": [0.0] * 3, "force range": [-1.0, 1.0], "why not": None}
+    arm._actuators = [lost, lost | {"name": "pull", "coordinate": arm.coordinate_names[0]}]
+    with pytest.warns(pc.ModelWarning, match="not saved are actuators whose coordinates it no longer has, push"):
+        arm.save(tmp_path / "arm.toml")
+    assert loaded(tmp_path / "arm.toml").actuators == arm.actuators[1:]
 
 
 def test_saving(tmp_path):

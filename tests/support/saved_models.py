@@ -41,4 +41,5 @@ def saved_and_loaded(model, path, **options):
 def lost(model, path):
     """What a model loses on its way through a TOML file: nothing, in a list."""
     again = saved_and_loaded(model, path)
-    return differences(model.description(), again.description()) + differences(model.left_aside, again.left_aside, "left aside")
+    beside = differences(model.left_aside, again.left_aside, "left aside") + differences(model.actuators, again.actuators, "actuators")
+    return differences(model.description(), again.description()) + beside

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from ..multibody import Multibody
 
 QUANTITIES = ("damping", "friction", "stiffness", "effort limit", "velocity limit")
-"""What of a coordinate there is to leave aside; beside them "gravity"."""
+"""What of a coordinate there is to leave aside; beside them "gravity", and "spring rest" by the coordinates q."""
 
 
 def by_coordinate(model: Multibody, of_hinges: Mapping[str, Mapping[str, float]]) -> dict[str, np.ndarray]:
@@ -35,11 +35,22 @@ def by_coordinate(model: Multibody, of_hinges: Mapping[str, Mapping[str, float]]
 def current(model: Multibody) -> dict[str, np.ndarray]:
     """What of `left_aside` belongs to the coordinates that the model has now. Warns of the rest: the model was edited since."""
     left = model.left_aside
-    stale = [quantity for quantity, values in left.items() if quantity != "gravity" and len(values) != model.nv]
+    sizes = {"gravity": 3, "spring rest": model.nq}
+    stale = [quantity for quantity, values in left.items() if len(values) != sizes.get(quantity, model.nv)]
     if stale:
         numbers = ", ".join(f"{quantity} of {len(left[quantity])} coordinates" for quantity in stale)
         warn(f"{model.name!r} was edited since it was loaded and has {model.nv} coordinates: not saved is what was left aside, {numbers}")
     return {quantity: values for quantity, values in left.items() if quantity not in stale}
+
+
+def current_actuators(model: Multibody) -> list[dict[str, Any]]:
+    """The actuators whose coordinates the model still has. Warns of the others, as `current` does."""
+    names = {None, *model.coordinate_names}
+    gone = [actuator["name"] for actuator in model.actuators if actuator["coordinate"] not in names]
+    if gone:
+        lost = ", ".join(gone)
+        warn(f"{model.name!r} was edited since it was loaded: not saved are actuators whose coordinates it no longer has, {lost}")
+    return [actuator for actuator in model.actuators if actuator["coordinate"] in names]
 
 
 def told(left: Mapping[str, np.ndarray], model: Multibody) -> str:

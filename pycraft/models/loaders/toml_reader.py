@@ -20,13 +20,14 @@ from .xml_file import abbreviated
 
 FORMAT = 1
 """Raised when a file means something else than it did."""
-MODEL = ("format", "name", "gravity", "welds", "strict", "bodies", "nodes", "state", "left_aside")
+MODEL = ("format", "name", "gravity", "welds", "strict", "bodies", "nodes", "state", "left_aside", "actuators")
 POSE = ("position", "rotation", "rpy", "quaternion")
 BODY = (
     "name", "parent", "hinge", "hinge_name", "axis", "axes", "point", "pitch", "subhinges", *POSE, "limits", "rotor_inertia", "mass", "com",
     "inertia",
 )  # fmt: skip
 NODE = ("name", "body", *POSE)
+ACTUATOR = ("name", "coordinate", "gear", "gain", "bias", "force_range", "why_not")
 SUBHINGE = ("kind", "axis", "point", "pitch")
 MOMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 _VECTOR = "three finite numbers: [x, y, z]"
@@ -76,8 +77,9 @@ def read_table(table: TomlTable, name: str, welds: str | None = None, strict: bo
         model.gravity = gravity
     if (state := table.table("state", ("q", "v"), "the state")) is not None:
         _set_state(model, state)
-    if (left := table.table("left_aside", ("gravity", *QUANTITIES), "left_aside")) is not None:
+    if (left := table.table("left_aside", ("gravity", "spring_rest", *QUANTITIES), "left_aside")) is not None:
         model._left_aside = _left_aside(model, left)
+    model._actuators = [_actuator(model, actuator) for actuator in table.tables("actuators", ACTUATOR, "actuator", named=True) or []]
     lines = {body.data["name"]: body for body in tables}
     return model, [f"{lines[body].at() if body in lines else table.at()}: {text}" for body, text in model.take_warnings()]
 
@@ -266,21 +268,26 @@ def _limits(table: TomlTable) -> tuple[list[float], list[float]] | None:
 def _set_state(model: Multibody, table: TomlTable) -> None:
     """q and v by the names of hinges; what is not named stays at zero."""
     for key in ("q", "v"):
-        values = model.zero_q() if key == "q" else np.zeros(model.nv)
         if (given := table.table(key, None, f"{key} of the state")) is None:
             continue
-        for name in given.data:
-            hinge = _hinge_called(model, name, given)
-            part = hinge.q_slice if key == "q" else hinge.v_slice
-            count = part.stop - part.start
-            one = count == 1 and not isinstance(given.data[name], list)
-            wanted = f"{count} finite numbers, those of a {hinge.kind} hinge" if count != 1 else "one finite number"
-            values[part] = given.number(name, 0.0, "that of the hinge's coordinate") if one else given.vector(name, count, wanted)
+        values = _by_hinge(model, given, f"{key}_slice", model.zero_q() if key == "q" else np.zeros(model.nv))
         try:
             setattr(model, key, values)
         except _core.ModelError as error:
             spoken_of = [name for name in given.data if f"'{name}'" in str(error)]
             raise given.error(spoken_of[0] if spoken_of else None, str(error)) from None
+
+
+def _by_hinge(model: Multibody, table: TomlTable, part_of: str, values: np.ndarray) -> np.ndarray:
+    """`values` with those of the hinges that the table names."""
+    for name in table.data:
+        hinge = _hinge_called(model, name, table)
+        part: slice = getattr(hinge, part_of)
+        count = part.stop - part.start
+        one = count == 1 and not isinstance(table.data[name], list)
+        wanted = f"{count} finite numbers, those of a {hinge.kind} hinge" if count != 1 else "one finite number"
+        values[part] = table.number(name, 0.0, "that of the hinge's coordinate") if one else table.vector(name, count, wanted)
+    return values
 
 
 def _hinge_called(model: Multibody, name: str, table: TomlTable) -> Any:
@@ -299,9 +306,33 @@ def _left_aside(model: Multibody, table: TomlTable) -> dict[str, np.ndarray]:
             continue
         given = table.table(key, None, f"{key} in left_aside")
         assert given is not None
+        if key == "spring_rest":
+            made["spring rest"] = _by_hinge(model, given, "q_slice", model.zero_q())
+            continue
         made[key] = np.full(model.nv, np.nan)
         for name in given.data:
             if name not in numbers:
                 raise given.error(name, f"{given.label}: no coordinate is called {name!r}; {nearest(name, numbers)}")
             made[key][numbers[name]] = given.number(name, 0.0, "that of this coordinate", infinite=True)
     return made
+
+
+def _actuator(model: Multibody, table: TomlTable) -> dict[str, Any]:
+    """An actuator with the keys of `Multibody.actuators`; on no coordinate and with a reason why it is no effect, or on one."""
+    coordinate = table.text("coordinate", "") or None
+    if coordinate is not None and coordinate not in model.coordinate_names:
+        near = nearest(coordinate, model.coordinate_names)
+        raise table.error("coordinate", f"{table.label}: no coordinate is called {coordinate!r}; {near}")
+    why_not = table.text("why_not", "") or None
+    if coordinate is None and why_not is None:
+        raise table.error(None, f'{table.label} acts on no coordinate; name one: coordinate = "...", or say in why_not why there is none')
+    lower, upper = table.vector("force_range", 2, "two forces in N m or N: [lower, upper]", infinite=True) or (-np.inf, np.inf)
+    return {
+        "name": table.text("name"),
+        "coordinate": coordinate,
+        "gear": table.number("gear", 1.0, "the ratio of its gear"),
+        "gain": table.number("gain", 1.0, "in N m or N for each unit of control"),
+        "bias": table.vector("bias", 3, "three finite numbers: [force, force by position, force by velocity]") or [0.0, 0.0, 0.0],
+        "force range": [lower, upper],
+        "why not": why_not,
+    }

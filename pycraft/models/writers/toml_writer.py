@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ... import _core
-from ..loaders.left_aside import current
+from ..loaders.left_aside import current, current_actuators
 from ..loaders.rotations import rpy_of_rotation
 from ..loaders.toml_reader import FORMAT, MOMENTS
 from .toml_text import Inline, document
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ..multibody import Multibody
 
 _HEAD = "# A model of PyCraft: SI units and radians. docs/models.md, Files, says what the keys mean.\n\n"
+_SILENT = {"bias": [0.0, 0.0, 0.0], "force range": [-np.inf, np.inf]}
 _ZERO = np.zeros(3)
 # Of each kind that is given axes: which of its subhinges have them, in order. (Of a plane the normal is given, the axis of the last.)
 _GIVEN_AXES = {
@@ -57,6 +58,8 @@ def model_data(model: Multibody, state: bool = True) -> dict[str, Any]:
         data["state"] = moved
     if left := _left_aside(model):
         data["left_aside"] = left
+    if actuators := current_actuators(model):
+        data["actuators"] = [_actuator(actuator) for actuator in actuators]
     return data
 
 
@@ -146,20 +149,38 @@ def _subhinge(subhinge: dict[str, Any]) -> Inline:
 
 def _state(model: Multibody) -> dict[str, Any]:
     """q and v by the names of hinges, without those that are at zero."""
-    parts: dict[str, Any] = {}
-    hinges = [(name, hinge.q_slice, hinge.v_slice) for name, hinge in model.hinges.items()]
-    for key, numbers, zero in (("q", model.q, model.zero_q()), ("v", model.v, np.zeros(model.nv))):
-        slices = {name: q if key == "q" else v for name, q, v in hinges}
-        part = {name: numbers[at] for name, at in slices.items() if not same(numbers[at], zero[at])}
-        if part:
-            parts[key] = {name: values[0] if len(values) == 1 else values for name, values in part.items()}
-    return parts
+    parts = {"q": _positions(model, model.q)}
+    parts["v"] = _by_hinge({name: hinge.v_slice for name, hinge in model.hinges.items()}, model.v, np.zeros(model.nv))
+    return {key: part for key, part in parts.items() if part}
+
+
+def _positions(model: Multibody, q: np.ndarray) -> dict[str, Any]:
+    return _by_hinge({name: hinge.q_slice for name, hinge in model.hinges.items()}, q, model.zero_q())
+
+
+def _by_hinge(slices: dict[str, slice], numbers: np.ndarray, zero: np.ndarray) -> dict[str, Any]:
+    part = {name: numbers[at] for name, at in slices.items() if not same(numbers[at], zero[at])}
+    return {name: values[0] if len(values) == 1 else values for name, values in part.items()}
 
 
 def _left_aside(model: Multibody) -> dict[str, Any]:
-    """By quantity and coordinate, NaN left out."""
+    """By quantity and coordinate, NaN left out; where springs are slack by hinge, as positions are."""
     data: dict[str, Any] = {}
     for quantity, values in current(model).items():
-        named = zip(model.coordinate_names, values, strict=True) if quantity != "gravity" else ()
-        data[quantity] = values if quantity == "gravity" else {name: value for name, value in named if not np.isnan(value)}
+        if quantity == "gravity":
+            data[quantity] = values
+        elif quantity == "spring rest":
+            data["spring_rest"] = _positions(model, values)
+        else:
+            data[quantity] = {name: value for name, value in zip(model.coordinate_names, values, strict=True) if not np.isnan(value)}
+    return data
+
+
+def _actuator(actuator: dict[str, Any]) -> dict[str, Any]:
+    """The keys of `Multibody.actuators` as TOML's, without those that say nothing."""
+    data: dict[str, Any] = {"name": actuator["name"]}
+    for key in ("coordinate", "gear", "gain", "bias", "force range", "why not"):
+        value = actuator[key]
+        if value is not None and not (key in _SILENT and same(value, _SILENT[key])):
+            data[key.replace(" ", "_")] = value
     return data

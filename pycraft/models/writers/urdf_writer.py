@@ -108,6 +108,7 @@ def _unsaid(model: Multibody) -> list[str]:
     said = [f"gravity {tuple(model.gravity.tolist())}"] if model.gravity.any() else []
     if not (same(model.q, model.zero_q()) and same(model.v, np.zeros(model.nv))):
         said.append("the state q, v")
+    said += ["its actuators"] if model.actuators else []
     return said + [f"the {name} left aside" for name in ("gravity", "stiffness") if name in model.left_aside]
 
 
