@@ -105,7 +105,7 @@ AREAS = {
     "cpp/kernels/mass_matrix_of_columns.h": ["operators/test_sweeps_of_columns.py"],
     "cpp/operators/many_columns.cpp": ["operators/test_many_columns.py"],
     "cpp/bindings/plain_products.cpp": ["operators/test_many_columns.py", "operators/test_batches.py"],
-    "cpp/kernels/sine_cosine.h": ["dynamics/test_kernels.py"],
+    "cpp/lanes/sine_cosine.h": ["dynamics/test_kernels.py"],
     "cpp/kernels/link_model.cpp": ["dynamics/test_kernels.py", "sweeps/test_singular_hinges.py"],
     "cpp/dynamics/link_dynamics.h": ["dynamics/test_packs.py"],
     "cpp/dynamics/packed_dynamics.cpp": ["dynamics/test_packs.py"],

@@ -211,7 +211,7 @@ CHANGES = {
     "cpp/kernels/motions.h": [
         ("sliders feel no Coriolis acceleration", "S(2) * S(link.travel) * turn", "S(0)"),
     ],
-    "cpp/kernels/sine_cosine.h": [
+    "cpp/lanes/sine_cosine.h": [
         ("angles beyond the reduction are reduced", "greater(magnitude(x), S(R::limit))", "greater(S(0), S(1))"),
     ],
     "cpp/kernels/link_model.cpp": [
