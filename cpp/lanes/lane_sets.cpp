@@ -13,7 +13,7 @@ extern const LaneFunctions avx2_lanes, avx512_lanes;
 
 const std::vector<LaneSet>& lane_sets() {
   static const std::vector<LaneSet> sets = [] {
-    std::vector<LaneSet> there{{"baseline", baseline_lanes}};
+    std::vector<LaneSet> there{{everywhere, baseline_lanes}};
 #if defined(PYCRAFT_X86_64)
     __builtin_cpu_init();
     if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {

@@ -1,5 +1,5 @@
 // What numbers of several states do on this machine: by the widest instruction set that it has and that was built, or by the one that the
-// environment variable PYCRAFT_ISA names ("baseline", "avx2", "avx512").
+// environment variable PYCRAFT_ISA names ("baseline", "avx2", "avx512"; on arm64 "neon").
 #pragma once
 
 #include <string>
@@ -21,6 +21,13 @@ struct LaneSet {
   std::string name;
   LaneFunctions functions;
 };
+
+// What every machine of this kind has.
+#if defined(__aarch64__)
+inline constexpr const char* everywhere = "neon";  // part of every such processor
+#else
+inline constexpr const char* everywhere = "baseline";
+#endif
 
 // EvaluationError where PYCRAFT_ISA names a set that is not there or that this machine has not.
 const LaneSet& lane_set();

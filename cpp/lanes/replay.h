@@ -246,7 +246,7 @@ void turn_sines(double angle, double* out) {
 }
 
 constexpr bool fuses_products =
-#ifdef __FMA__
+#if defined(__FMA__) || defined(__aarch64__)
     true;
 #else
     false;

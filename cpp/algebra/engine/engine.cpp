@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <mutex>
@@ -112,13 +111,12 @@ template <class S>
 ExecutionPool::Packed ExecutionPool::run_packs(Run<S>& run, const Inputs& inputs, Result* expanded) {
   Packed done;
   if (!impl_->packs || run.states() < 2) return done;
-  using Clock = std::chrono::steady_clock;
   Packs::Way way = impl_->packs->way(plan_, inputs, run.states());
   if (way.tried > 0) {
-    const auto begin = Clock::now();
+    const double begin = Packs::seconds_of_thread();
     for (; done.from < way.tried; ++done.from) run.run(done.from);
     done.shaped = true;
-    way = impl_->packs->way_after(plan_, inputs, run.states(), done.from, std::chrono::duration<double>(Clock::now() - begin).count());
+    way = impl_->packs->way_after(plan_, inputs, run.states(), done.from, Packs::seconds_of_thread() - begin);
   }
   if (!way.taped) return done;
   const TapedPlan& taped = *way.taped;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <ctime>
 #include <mutex>
 
 #include "algebra/engine/run.h"
@@ -24,6 +25,14 @@ constexpr size_t most_operations = 2'000'000;
 constexpr int most_slower = 3;
 
 }  // namespace
+
+double Packs::seconds_of_thread() {
+#if defined(CLOCK_THREAD_CPUTIME_ID)
+  timespec t;
+  if (clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t) == 0) return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+#endif
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 int Packs::record_from(int states) { return forced.exchange(states); }
 
@@ -94,10 +103,9 @@ std::vector<int> Packs::run(const TapedPlan& taped, const Plan& plan, const Inpu
   }
   arrays.push_back({inputs.x, inputs.batched ? size_t(plan.domain.dimension()) * inputs.columns : 0});
   for (const auto& [name, r] : plan.vectors) arrays.push_back({inputs.vectors.at(name).data(), 0});
-  using Clock = std::chrono::steady_clock;
-  const auto begin = Clock::now();
+  const double begin = seconds_of_thread();
   std::vector<int> left = kernels::replayed(taped.program, arrays, {from, states, threads, out, size_t(taped.rows) * taped.columns}, rooms_);
-  if (threads == 1 && from < states) compare(taped, plan, inputs, std::chrono::duration<double>(Clock::now() - begin).count() / (states - from));
+  if (threads == 1 && from < states) compare(taped, plan, inputs, (seconds_of_thread() - begin) / (states - from));
   return left;
 }
 

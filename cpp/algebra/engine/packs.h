@@ -29,6 +29,9 @@ class Packs {
   // States from, ..., states - 1 of a batch, in so many threads, to `out`. Those whose results mean nothing are to be run by themselves.
   std::vector<int> run(const TapedPlan& taped, const Plan& plan, const Inputs& inputs, int from, int states, int threads, double* out);
 
+  // That this thread has computed: what else runs on the machine decides nothing.
+  static double seconds_of_thread();
+
   // From how many states on a batch is recorded, whatever it would take, and how it was before; 0: as is best.
   static int record_from(int states);
 
