@@ -69,6 +69,7 @@ if _TYPE_CHECKING:
     from .models.loaders import load
     from .peers import compare
     from .proofs import Exercise, Proof, derivative, exercise, prove, prove_derivative, repair, worksheet
+    from .scenes import Scene, effects
     from .sympy_bridge import from_sympy, parse, to_sympy
 
 # What takes long to import is imported when it is first asked for: the same names, each with its room.
@@ -81,6 +82,7 @@ _LATER = {
     "models.robots": ("robots",),
     "peers": ("compare",),
     "proofs": ("Exercise", "Proof", "derivative", "exercise", "prove", "prove_derivative", "repair", "worksheet"),
+    "scenes": ("Scene", "effects"),
     "sympy_bridge": ("from_sympy", "parse", "to_sympy"),
 }
 
@@ -121,6 +123,7 @@ __all__ = [
     "Proof",
     "RefinementError",
     "Scalar",
+    "Scene",
     "SingularHingeError",
     "SingularOperatorError",
     "Space",
@@ -136,6 +139,7 @@ __all__ = [
     "compare",
     "constant",
     "derivative",
+    "effects",
     "euclidean",
     "exercise",
     "from_sympy",

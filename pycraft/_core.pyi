@@ -7,7 +7,7 @@ import fractions
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Binding', 'Dynamics', 'Error', 'EvaluationError', 'GroupedOperators', 'HingeKind', 'Integration', 'Letter', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'Scalar', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'blockdiag', 'checked_refinement', 'compiled_call', 'constant', 'direct_call', 'direct_calls', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'hinge_kinds', 'identity', 'instruction_set', 'instruction_sets', 'integrators', 'kernel_headers', 'kernel_tape', 'methods', 'operators_of', 'precisions', 'prepared_call', 'real_array', 'residual', 'scalar', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_compiled', 'time_dynamics', 'time_forward', 'time_method', 'time_packs', 'vector', 'wider', 'zero']
+__all__: list[str] = ['Binding', 'Dynamics', 'Effect', 'Error', 'EvaluationError', 'FunctionOfTime', 'GroupedOperators', 'HingeKind', 'Integration', 'Letter', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'Scalar', 'SceneCalls', 'SceneEffects', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'blockdiag', 'bushing_effect', 'checked_refinement', 'compiled_call', 'constant', 'constant_in_time', 'coordinates_named', 'coulomb_friction_effect', 'damping_effect', 'direct_call', 'direct_calls', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'gravity_effect', 'gravity_gradient_effect', 'harmonic', 'hinge_kinds', 'identity', 'implicit_damping_effect', 'implicit_spring_effect', 'instruction_set', 'instruction_sets', 'integrators', 'kernel_headers', 'kernel_tape', 'limits_effect', 'methods', 'motor_effect', 'node_damper_effect', 'node_spring_effect', 'numbers_in_q', 'operators_of', 'piecewise_polynomial', 'point_mass_gravity_effect', 'precisions', 'prepared_call', 'prescribed_effect', 'python_effect', 'python_function_of_time', 'quadratic_damping_effect', 'real_array', 'residual', 'rotor_inertia_effect', 'scalar', 'servo_effect', 'spring_effect', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_by_hand', 'time_compiled', 'time_dynamics', 'time_forward', 'time_method', 'time_packs', 'time_scene', 'torque_source_effect', 'vector', 'wider', 'wrench_effect', 'zero']
 
 class Error(Exception): ...
 class SpaceError(Error, TypeError): ...
@@ -116,6 +116,9 @@ class Multibody:
         """
         All coordinates zero, quaternions (1, 0, 0, 0).
         """
+    @property
+    def _parameters(self) -> int:
+        ...
     @property
     def _size(self) -> int:
         ...
@@ -941,6 +944,72 @@ class Integration:
         ...
     def trajectory(self, q: typing.Any, v: typing.Any, times: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], tau: typing.Any, damping: typing.Any, integrator: str, rtol: typing.SupportsFloat | typing.SupportsIndex, atol: typing.SupportsFloat | typing.SupportsIndex, step: typing.SupportsFloat | typing.SupportsIndex, normalise: bool, precision: str | int, form: str, refine: typing.Any) -> dict:
         ...
+class FunctionOfTime:
+    """
+    Numbers as a function of time, with two derivatives.
+    """
+    def __call__(self, t: typing.SupportsFloat | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3, size): values, rates and second derivatives.
+        """
+    @property
+    def size(self) -> int:
+        ...
+class Effect:
+    """
+    An effect as the core has it; pycraft.effects makes them.
+    """
+    @property
+    def coordinates(self) -> list[int]:
+        ...
+    @property
+    def kind(self) -> str:
+        ...
+    @property
+    def potential(self) -> bool:
+        """
+        Whether it has a potential energy.
+        """
+    @property
+    def work(self) -> bool:
+        """
+        Whether some of its forces have none.
+        """
+class SceneEffects:
+    """
+    A model and the effects that act on it, by name, on or off; pycraft.Scene is its face.
+    """
+    def __init__(self, model: Multibody) -> None:
+        ...
+    def add(self, name: str, effect: Effect, on: bool) -> str:
+        ...
+    def remove(self, name: str) -> None:
+        ...
+    def set_on(self, name: str, on: bool) -> None:
+        ...
+class SceneCalls:
+    """
+    What is computed of a scene as it was when this was made.
+    """
+    def __init__(self, scene: SceneEffects, form: str, refine: typing.Any, residual: str, precision: str | int) -> None:
+        ...
+    def __reduce__(self) -> tuple:
+        ...
+    def along(self, t: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], own: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> dict:
+        ...
+    def evaluate(self, q: typing.Any, v: typing.Any, t: typing.SupportsFloat | typing.SupportsIndex, own: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], step: typing.SupportsFloat | typing.SupportsIndex) -> dict:
+        ...
+    def plan(self, list: str) -> list:
+        """
+        (name, what, because) of the passes of a 'motion', at 'rest', or with 'works'.
+        """
+    def simulate(self, q: typing.Any, v: typing.Any, times: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], own: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], energy: bool, integrator: str, rtol: typing.SupportsFloat | typing.SupportsIndex, atol: typing.SupportsFloat | typing.SupportsIndex, step: typing.SupportsFloat | typing.SupportsIndex, every_step: bool, normalise: bool) -> dict:
+        ...
+    @property
+    def workers(self) -> list[int]:
+        """
+        Numbers of the effects whose works are counted, among those that are on.
+        """
 class Theorem:
     """
     A theorem as data: both sides as expressions, its hypotheses, its source.
@@ -1021,6 +1090,8 @@ def blockdiag(operator: Operator) -> Operator:
     """
     The operator's diagonal blocks, body by body, zero elsewhere.
     """
+def bushing_effect(model: Multibody, node_a: str, node_b: str, stiffness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], damping: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rotation: typing.Any, position: typing.Any) -> Effect:
+    ...
 def checked_refinement(refine: typing.Any, residual: str, precision: str | int) -> typing.Any:
     """
     The number of corrections, or 'auto'; EvaluationError for anything else.
@@ -1034,6 +1105,16 @@ def constant(array: typing.Any, domain: typing.Any, codomain: typing.Any, name: 
     An array as an operator from `domain` to `codomain` (spaces, or a size n for R^n): a matrix, one diagonal, or a list of one block per
     body. What is block diagonal over the bodies is kept so; what has low rank is found when a plan needs it.
     """
+def constant_in_time(values: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> FunctionOfTime:
+    ...
+def coordinates_named(model: Multibody, names: collections.abc.Sequence[str] | None, effect: str) -> list[int]:
+    """
+    Numbers of the coordinates that names of hinges, coordinates or patterns mean; None: all.
+    """
+def coulomb_friction_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, level: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], smoothing: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
+    ...
+def damping_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, coefficient: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> Effect:
+    ...
 def direct_call(function: collections.abc.Callable, made: type | None = None) -> typing.Any:
     """
     The direct call of this name: its plain case in the core, everything else by the function. made: the tuple of its three results.
@@ -1060,10 +1141,20 @@ def forms() -> list[str]:
     """
     The forms of the articulated-inertia sweep.
     """
+def gravity_effect(g: typing.Any) -> Effect:
+    ...
+def gravity_gradient_effect(model: Multibody, mu: typing.SupportsFloat | typing.SupportsIndex, position: typing.Any, bodies: collections.abc.Sequence[str] | None) -> Effect:
+    ...
+def harmonic(amplitude: typing.SupportsFloat | typing.SupportsIndex, frequency: typing.SupportsFloat | typing.SupportsIndex, phase: typing.SupportsFloat | typing.SupportsIndex, offset: typing.SupportsFloat | typing.SupportsIndex) -> FunctionOfTime:
+    ...
 def identity(space: typing.Any = None) -> Operator:
     """
     I; without a space it takes that of the operator it is combined with.
     """
+def implicit_damping_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, coefficient: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> Effect:
+    ...
+def implicit_spring_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, stiffness: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], rest: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> Effect:
+    ...
 def instruction_set() -> str:
     """
     The instruction set whose kernels direct calls run: the widest that this machine has, or the one that the environment variable PYCRAFT_ISA names.
@@ -1072,9 +1163,9 @@ def instruction_sets() -> list[str]:
     """
     Those that were built and that this machine has, from narrow to wide.
     """
-def integrators() -> list[str]:
+def integrators(scenes: bool = False) -> list[str]:
     """
-    The integrators that Integration has.
+    The integrators of trajectories, or of scenes: those and what takes steps by effects that act implicitly.
     """
 def kernel_headers() -> dict:
     """
@@ -1084,11 +1175,27 @@ def kernel_tape(model: Multibody, call: str) -> typing.Any:
     """
     What the kernel of a direct call does for this model, operation by operation; None where no kernel knows the model's hinges.
     """
+def limits_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, stiffness: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], dissipation: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], lower: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], upper: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> Effect:
+    ...
 def methods() -> list[str]:
     """
     The methods of forward dynamics that Methods has.
     """
+def motor_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, command: FunctionOfTime, stall_torque: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], no_load_speed: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], gear_ratio: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], rotor_inertia: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], effort_limit: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], speed_limit: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], speed_band: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
+    ...
+def node_damper_effect(model: Multibody, node_a: str, node_b: str, coefficient: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
+    ...
+def node_spring_effect(model: Multibody, node_a: str, node_b: str, stiffness: typing.SupportsFloat | typing.SupportsIndex, length: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
+    ...
+def numbers_in_q(model: Multibody, coordinates: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> int:
+    """
+    How many numbers these coordinates' subhinges have in q.
+    """
 def operators_of(model: Multibody) -> MultibodyOperators:
+    ...
+def piecewise_polynomial(breaks: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], coefficients: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], size: typing.SupportsInt | typing.SupportsIndex) -> FunctionOfTime:
+    ...
+def point_mass_gravity_effect(model: Multibody, mu: typing.SupportsFloat | typing.SupportsIndex, position: typing.Any, bodies: collections.abc.Sequence[str] | None) -> Effect:
     ...
 def precisions() -> list[str | int]:
     """
@@ -1098,6 +1205,14 @@ def prepared_call(function: typing.Any, name: str, dynamics: typing.Any, batch: 
     """
     A direct call of one model with its options, as `prepare` gives it. made: the tuple of three results.
     """
+def prescribed_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, motion: FunctionOfTime) -> Effect:
+    ...
+def python_effect(model: Multibody, kind: str, coordinates: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], forces: typing.Any, rates: typing.Any, states: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], sample: typing.Any, period: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
+    ...
+def python_function_of_time(call: typing.Any, size: typing.SupportsInt | typing.SupportsIndex, what: str) -> FunctionOfTime:
+    ...
+def quadratic_damping_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, coefficient: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> Effect:
+    ...
 def real_array(value: typing.Any, what: str) -> numpy.typing.NDArray[numpy.float64]:
     """
     An array of doubles, or a ModelError that names `what`: complex numbers, text, dates, None and masked entries are none.
@@ -1106,7 +1221,13 @@ def residual(a: typing.Any, b: typing.Any, vectors: collections.abc.Mapping[str,
     """
     Largest entries of a - b, a and b: both evaluated as typed, no theorem used, the difference taken at the bound precision.
     """
+def rotor_inertia_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, inertia: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], gear_ratio: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> Effect:
+    ...
 def scalar(value: float | fractions.Fraction) -> Scalar:
+    ...
+def servo_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, stiffness: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], damping: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], target: FunctionOfTime, effort_limit: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], speed_limit: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], speed_band: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
+    ...
+def spring_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, stiffness: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], rest: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> Effect:
     ...
 def step_kinds() -> list[str]:
     """
@@ -1119,6 +1240,10 @@ def theorems(source: SkoSource) -> list[Theorem]:
 def time_apply(operator: Operator, x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2, rules: bool = True) -> dict:
     """
     Seconds per application: minimum, median, calls.
+    """
+def time_by_hand(model: Multibody, what: str, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2) -> tuple[dict, numpy.typing.NDArray[numpy.float64]]:
+    """
+    Seconds per forward dynamics by the bare kernel with one effect written out by hand: minimum, median, calls; and v̇ at the first state.
     """
 def time_compiled(library: str, function: str, given: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], results: typing.SupportsInt | typing.SupportsIndex, seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2) -> dict:
     """
@@ -1140,6 +1265,12 @@ def time_packs(model: Multibody, q: typing.Annotated[numpy.typing.ArrayLike, num
     """
     Seconds per state of a batch in packs: minimum, median, calls.
     """
+def time_scene(scene: SceneCalls, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2) -> dict:
+    """
+    Seconds per evaluation of a scene's accelerations: minimum, median, calls.
+    """
+def torque_source_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, torque: FunctionOfTime, effort_limit: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], speed_limit: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], speed_band: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
+    ...
 def vector(name: str, space: Space) -> Operator:
     """
     A named vector of a space: stands for an array that is given at the evaluation.
@@ -1148,6 +1279,8 @@ def wider(precision: str | int) -> typing.Any:
     """
     The next wider precision, None for the widest.
     """
+def wrench_effect(model: Multibody, node: str, wrench: FunctionOfTime, axes: str) -> Effect:
+    ...
 def zero(domain: Space, codomain: Space) -> Operator:
     """
     The zero operator.

@@ -2,6 +2,7 @@
 #include <string>
 
 #include "algebra/engine/evaluate.h"
+#include "bench/scenes_by_hand.h"
 #include "bench/timing.h"
 #include "bindings/bindings.h"
 #include "bindings/compiled_library.h"
@@ -10,6 +11,7 @@
 #include "dynamics/methods.h"
 #include "dynamics/sensitivities.h"
 #include "runtime/errors.h"
+#include "simulation/scene_calls.h"
 
 namespace pycraft {
 
@@ -155,6 +157,47 @@ py::dict time_dynamics(const std::shared_ptr<Multibody>& model, const std::strin
   return result(t);
 }
 
+// Accelerations of a scene, one state after another.
+py::dict time_scene(SceneCalls& calls, const Array& q, const Array& v, double seconds) {
+  if (calls.precision() != Precision::double_) throw EvaluationError("scenes are timed in double precision");
+  const Multibody& mb = calls.scene().model();
+  const int K = states_of(q), nq = mb.nq(), nv = mb.nv();
+  std::vector<double> out(nv);
+  int k = 0;
+  Timing t;
+  {
+    const ModelInUse use(mb);
+    ReleasedGil release;
+    calls.with([&]<class S>(CompiledScene<S>& scene) {
+      if constexpr (std::is_same_v<S, double>) {
+        const std::vector<double> own = scene.effects().own_states();
+        t = time_calls([&] {
+          scene.accelerations(0.0, q.data() + size_t(k) * nq, v.data() + size_t(k) * nv, own.data(), out.data());
+          k = (k + 1) % K;
+        }, seconds);
+      }
+    });
+  }
+  return result(t);
+}
+// The same by hand, and its last result.
+std::pair<py::dict, py::array_t<double>> time_by_hand(const std::shared_ptr<Multibody>& model, const std::string& what, const Array& q, const Array& v, double seconds) {
+  const int K = states_of(q), nq = model->nq(), nv = model->nv();
+  ByHand by_hand(*model, what);
+  std::vector<double> out(nv);
+  int k = 0;
+  Timing t;
+  {
+    ReleasedGil release;
+    t = time_calls([&] {
+      by_hand.run(q.data() + size_t(k) * nq, v.data() + size_t(k) * nv, out.data());
+      k = (k + 1) % K;
+    }, seconds);
+    by_hand.run(q.data(), v.data(), out.data());
+  }
+  return {result(t), to_numpy(out)};
+}
+
 }  // namespace
 
 // A compiled function, one state after another; given: an array (K, n) for each input.
@@ -186,6 +229,9 @@ void register_bench(py::module_& m) {
         "Seconds per forward dynamics over a set of states in rotation: minimum, median, calls.");
   m.def("time_method", &time_method, py::arg("model"), py::arg("method"), py::arg("q"), py::arg("v"), py::arg("u"), py::arg("seconds") = 0.2,
         py::arg("precision") = Precision::double_, "Seconds per forward dynamics by a method of the mass matrix: minimum, median, calls.");
+  m.def("time_scene", &time_scene, py::arg("scene"), py::arg("q"), py::arg("v"), py::arg("seconds") = 0.2, "Seconds per evaluation of a scene's accelerations: minimum, median, calls.");
+  m.def("time_by_hand", &time_by_hand, py::arg("model"), py::arg("what"), py::arg("q"), py::arg("v"), py::arg("seconds") = 0.2,
+        "Seconds per forward dynamics by the bare kernel with one effect written out by hand: minimum, median, calls; and v̇ at the first state.");
   m.def("time_packs", &time_packs, py::arg("model"), py::arg("q"), py::arg("v"), py::arg("u"), py::arg("seconds") = 0.2, py::arg("form") = Form::fast,
         py::arg("precision") = Precision::double_, "Seconds per state of a batch in packs: minimum, median, calls.");
 }

@@ -37,6 +37,8 @@ void register_calculus(py::module_& m);
 void register_sensitivities(py::module_& m);
 void register_methods(py::module_& m);
 void register_integration(py::module_& m);
+void register_effects(py::module_& m);
+void register_scenes(py::module_& m);
 void register_theorems(py::module_& m);
 void register_bench(py::module_& m);
 

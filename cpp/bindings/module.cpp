@@ -47,6 +47,8 @@ PYBIND11_MODULE(_core, m) {
   pycraft::register_sensitivities(m);
   pycraft::register_methods(m);
   pycraft::register_integration(m);
+  pycraft::register_effects(m);
+  pycraft::register_scenes(m);
   pycraft::register_theorems(m);
   pycraft::register_bench(m);
   pycraft::take_plain_products(m.attr("Operator"));  // last: what is defined on a type sets its slots anew

@@ -96,6 +96,7 @@ void register_multibody(py::module_& m) {
       .def_property_readonly("nq", &Multibody::nq, "Numbers in q: 4 for a ball, 7 for a free hinge, else one a coordinate.")
       .def_property_readonly("nv", &Multibody::nv, "Generalized velocities: the degrees of freedom.")
       .def_property_readonly("_size", &Multibody::bodies)
+      .def_property_readonly("_parameters", &Multibody::parameters)
       .def("_add_body",
            [](Multibody& mb, const std::string& name, const std::string& parent, const std::string& hinge, const std::string& hinge_name,
               const std::vector<py::object>& axes, const py::object& point, const py::object& pitch, const py::object& subhinges, const py::object& rotation,

@@ -56,6 +56,7 @@ class Batches {
  public:
   explicit Batches(std::shared_ptr<Multibody> model) : model_(std::move(model)) {}
   const Multibody& model() const { return *model_; }
+  const std::shared_ptr<Multibody>& shared_model() const { return model_; }
 
   // f(workspace, b) for the states from, ..., to - 1 of `states`.
   template <class S, class F>

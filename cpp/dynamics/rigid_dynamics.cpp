@@ -19,16 +19,25 @@ OnSingular on_singular_from_name(const std::string& name) {
 }
 
 template <class S>
-RigidDynamics<S>::RigidDynamics(const Multibody& model)
-    : source_(model), tree_(model.structure()), model_(model.compiled<S>()), blocks_(tree_), alpha_(tree_.bodies()), force_(tree_.bodies()) {}
+RigidDynamics<S>::RigidDynamics(const Multibody& model, const HingeTerms& terms)
+    : source_(model), terms_(terms), tree_(free_tree(model.structure(), terms)),
+      prescribed_(terms.prescribes() ? std::make_unique<PrescribedHinges<S>>(compile_model<S>(model, terms), terms) : nullptr),
+      model_(prescribed_ ? prescribed_->left() : terms.empty() ? model.compiled<S>() : compile_model<S>(model, terms)), blocks_(tree_), alpha_(tree_.bodies()),
+      force_(tree_.bodies()) {}
 
 template <class S>
 template <class T>
 void RigidDynamics<S>::set_state(const T* q, const T* v, const Applied<T>* applied) {
   convert(q, model_->nq, q_);
-  convert(v, model_->nv, v_);
-  kinematics(*model_, q_.data(), blocks_);
-  point_accelerations_base_to_tip(*model_, blocks_.pose.data(), blocks_.H.data(), v_.data(), OwnTerms::absorbed, points_);
+  convert(v, prescribed_ ? prescribed_->coordinates() : model_->nv, v_);
+  if (prescribed_) {
+    prescribed_->set_state(q_.data(), v_.data(), OwnTerms::absorbed, blocks_, points_);
+    prescribed_->keep_free(v_);
+  } else {
+    kinematics(*model_, q_.data(), blocks_);
+    point_accelerations_base_to_tip(*model_, blocks_.pose.data(), blocks_.H.data(), v_.data(), OwnTerms::absorbed, points_);
+  }
+  for (size_t j = 0; j < added_.size(); ++j) blocks_.J[j] += added_[j];
   applied_ = applied ? converted(*applied, model_->bodies, wrenches_) : own_gravity(*model_);
 }
 
@@ -227,7 +236,8 @@ void RigidDynamics<S>::solve(const S* r, S* x, int m) {
 template <class S>
 template <class T>
 RigidDynamics<Wider<S>>& RigidDynamics<S>::wider(const T* q, const T* v, const Applied<T>* applied) {
-  if (!wider_) wider_ = std::make_unique<RigidDynamics<Wider<S>>>(source_);
+  if (!wider_) wider_ = std::make_unique<RigidDynamics<Wider<S>>>(source_, terms_);
+  wider_->follow(*this);
   wider_->set_state(q, v, applied);
   return *wider_;
 }

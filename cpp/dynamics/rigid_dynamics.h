@@ -13,7 +13,9 @@
 #include "numerics/refinement.h"
 #include "recursions/applied.h"
 #include "recursions/inverse_mass_matrix.h"
+#include "recursions/newton_euler.h"
 #include "recursions/point_accelerations.h"
+#include "recursions/prescribed_hinges.h"
 #include "recursions/velocities.h"
 #include "rigid/rigid_blocks.h"
 
@@ -36,7 +38,21 @@ struct Solving {
 template <class S>
 class RigidDynamics {
  public:
-  explicit RigidDynamics(const Multibody& model);
+  // With terms, `forward_dynamics` is of the coordinates that are not prescribed, in their order, but for v, which is of all; it alone is meant.
+  explicit RigidDynamics(const Multibody& model, const HingeTerms& terms = {});
+
+  // Of the calls that follow, from numbers of all coordinates: accelerations of those that are prescribed, and what J has in addition.
+  template <class T>
+  void prescribe(const T* accelerations) {
+    if (prescribed_) prescribed_->prescribe(accelerations);
+  }
+  template <class T>
+  void add_to_hinges(const T* inertia) {
+    if (prescribed_) return prescribed_->take_free(inertia, added_);
+    added_.assign(inertia, inertia + model_->nv);
+  }
+  // After forward dynamics with these results: accelerations of the free coordinates and forces of the others, by coordinate of all.
+  void give_all(const S* vdot, S* out);
 
   // Each takes one state; sizes are the caller's business (Multibody::check_q, check_v). States of forward dynamics are doubles, or S:
   // what a narrower scalar rounds away, a wider residual sees.
@@ -76,6 +92,11 @@ class RigidDynamics {
   void residual(const T* tau, const S* vdot, S* r);       // tau - inverse dynamics, at the state that was set; vdot with what hinges absorb
   void subtract_product(const S* x, S* r, int m);         // r -= (ℳ + J) x
   void solve(const S* r, S* x, int m);                    // with the kept factors
+  template <class T>
+  void follow(const RigidDynamics<T>& narrower) {         // in what is prescribed and added
+    if (prescribed_) prescribed_->prescribe_as(*narrower.prescribed_);
+    added_.assign(narrower.added_.begin(), narrower.added_.end());
+  }
   void place(const double* q, Form form);                 // the configuration, and how its articulated inertias will be found
   template <class T>
   RigidDynamics<Wider<S>>& wider(const T* q, const T* v, const Applied<T>* applied);
@@ -92,8 +113,11 @@ class RigidDynamics {
   void project_off_null_space(const AddedInertias& added, S* x, int m);
 
   const Multibody& source_;
+  const HingeTerms terms_;
   const SkoStructure tree_;
-  std::shared_ptr<const CompiledModel<S>> model_;
+  std::unique_ptr<PrescribedHinges<S>> prescribed_;  // null: none
+  std::shared_ptr<const CompiledModel<S>> model_;    // without what is prescribed
+  std::vector<S> added_;                             // to J
   RigidBlocks<S> blocks_;
   Velocities<S> velocities_;      // of energies
   PointAccelerations<S> points_;  // of equations of motion
@@ -112,6 +136,14 @@ class RigidDynamics {
   S left_ = S(0);
   double estimated_error_ = 0;
 };
+
+template <class S>
+void RigidDynamics<S>::give_all(const S* vdot, S* out) {
+  r_.resize(model_->nv), columns_.resize(std::max(columns_.size(), size_t(model_->nv)));
+  for (int i = 0; i < model_->nv; ++i) r_[i] = vdot[i] + points_.absorbed[i];
+  newton_euler(*model_, blocks_, points_, applied_, r_.data(), columns_.data(), alpha_, force_);
+  prescribed_->give(vdot, force_, out);
+}
 
 #define PYCRAFT_INSTANTIATE(S) extern template class RigidDynamics<S>;
 PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_INSTANTIATE)

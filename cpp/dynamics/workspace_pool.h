@@ -16,21 +16,26 @@ class WorkspacePool {
  public:
   ~WorkspacePool() { delete last_.load(); }
 
-  // While the caller holds a ModelInUse.
-  template <class F>
-  void with(const Multibody& model, F f) {
+  // While the caller holds a ModelInUse. make(): a new one.
+  template <class F, class Make>
+  void with(const Multibody& model, F f, Make make) {
     std::unique_ptr<Kept> own(last_.exchange(nullptr, std::memory_order_acquire));
     if (!own) own = taken();
-    if (!own || own->version != model.parameters()) own = std::make_unique<Kept>(model);
+    if (!own || own->version != model.parameters()) own = std::make_unique<Kept>(model.parameters(), make);
     f(own->workspace);
     keep(std::unique_ptr<Kept>(last_.exchange(own.release(), std::memory_order_acq_rel)));
+  }
+  template <class F>
+  void with(const Multibody& model, F f) {
+    with(model, f, [&model] { return Workspace(model); });
   }
 
  private:
   struct Kept {
     std::uint64_t version;
     Workspace workspace;
-    explicit Kept(const Multibody& model) : version(model.parameters()), workspace(model) {}
+    template <class Make>
+    Kept(std::uint64_t of, Make& make) : version(of), workspace(make()) {}
   };
   std::unique_ptr<Kept> taken() {
     std::lock_guard<Mutex> lock(mutex_);

@@ -10,6 +10,7 @@
 #pragma once
 
 #include "kernels/pivot_errors.h"
+#include "kernels/prescribed_links.h"
 
 namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET {
 
@@ -54,7 +55,7 @@ template <int K, bool rotor, bool forces, class S>
 }
 
 // P⁺ and ε's part of z⁺ of a slider or a screw.
-template <class S>
+template <bool forces, class S>
 [[gnu::always_inline]] inline void project_out(const LinkOf<S>& link, const ForwardLink<S>& __restrict w, Inertia<S>& __restrict P) {
   const Vector3<S> turned = w.inverse * w.angular, moved = w.inverse * w.linear;
   for (int r = 0; r < 3; ++r)
@@ -62,7 +63,7 @@ template <class S>
       if (k >= r) P.A(r, k) -= turned[r] * w.angular[k], P.C(r, k) -= moved[r] * w.linear[k];
       P.B(r, k) -= turned[r] * w.linear[k];
     }
-  P.n = P.n + w.innovation * turned, P.f = P.f + w.innovation * moved;
+  if constexpr (forces) P.n = P.n + w.innovation * turned, P.f = P.f + w.innovation * moved;
   if (link.turn == 0 && !link.rotor)
     for (int r = 0; r < 3; ++r) P.C(r, 2) = P.B(r, 2) = S(0);
 }
@@ -156,7 +157,7 @@ template <class Kind, bool rotor, bool forces, class S, class T>
     if constexpr (Kind::pin) {
       project_pin<K, rotor, forces>(S(J * w.inverse), m.turning, tau, w, P);
     } else {
-      project_out(link, w, P);
+      project_out<forces>(link, w, P);
       if constexpr (forces) P.n = P.n + P.A * m.turning, P.f = P.f + transpose_times(P.B, m.turning);
     }
     rotation.template turn<zero>(P);
@@ -252,7 +253,9 @@ template <bool forces, class S, class T, class Keep = KeepsNothing>
     ForwardLink<S>& own = w.link[k];
     start_inward(links, w, k, last, P);
     add_own<forces>(link, own.motion.omega, at.wrenches ? at.wrenches + 6 * k : nullptr, P);
-    if (link.rotor)
+    if (forces && link.prescribed) [[unlikely]]
+      pass_inward(link, own, w.of(link), P);
+    else if (link.rotor)
       with_step(link.step, [&](auto kind) { eliminate<decltype(kind), decltype(kind)::pin, forces>(link, links, at, gone, own, w.of(link), P, sound); });
     else
       with_step(link.step, [&](auto kind) { eliminate<decltype(kind), false, forces>(link, links, at, gone, own, w.of(link), P, sound); });
@@ -290,6 +293,7 @@ template <class S, class T>
       place_link<Kind>(link, at, m.place);
       move_link<Kind>(link, at, link.parent < 0 ? nullptr : &w.link[link.parent].motion.omega, m);
     });
+    if (link.prescribed) [[unlikely]] prescribe(link, at, w.link[k]);
   }
 }
 // Where links are and how they move, and what is eliminated. Which lanes are sound.
@@ -319,6 +323,7 @@ template <class S, class T>
 [[gnu::always_inline]] inline void accelerate_links(const Links<T>& links, const States<T>& at, const ForwardWork<S>& w, int first, int last, double* out, size_t stride) {
   outward(links, first, last, Vector3<S>(-spread<S>(at.gravity)), w.link, [&](int k, Vector3<S>& alpha, Vector3<S>& acceleration) {
     const Link<T>& link = links.link[k];
+    if (link.prescribed) [[unlikely]] return pass_outward(link, at, w.link[k], w.of(link), alpha, acceleration, out, stride);
     with_step(link.step, [&](auto kind) { accelerate<decltype(kind)>(link, at, w.link[k], w.of(link), alpha, acceleration, out, stride); });
   });
 }

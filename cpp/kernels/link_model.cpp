@@ -139,8 +139,8 @@ int finish(std::vector<RestLink>& rest) {
 }  // namespace
 
 template <class T>
-std::unique_ptr<LinkModel<T>> LinkModel<T>::of(const Multibody& model) {
-  const auto source = model.compiled<E>();
+std::unique_ptr<LinkModel<T>> LinkModel<T>::of(const Multibody& model, const HingeTerms& terms) {
+  const auto source = terms.empty() ? model.compiled<E>() : compile_model<E>(model, terms);
   std::vector<RestLink> rest;
   std::vector<std::pair<int, Pose<E>>> bodies;
   int multiple = 0;
@@ -157,7 +157,8 @@ std::unique_ptr<LinkModel<T>> LinkModel<T>::of(const Multibody& model) {
       if (!link) return nullptr;
       const bool several = record.nv > 1;
       for (int j = v; j < v + record.nv; ++j) {
-        if (source->rotor_inertia[j] == E(0)) continue;
+        link->shape.prescribed |= terms.is_prescribed(j);
+        if (source->rotor_inertia[j] == E(0) && !terms.is_driven(j)) continue;
         if (several) return nullptr;
         link->shape.rotor = true, link->shape.J = static_cast<double>(source->rotor_inertia[j]);
       }
@@ -175,13 +176,14 @@ std::unique_ptr<LinkModel<T>> LinkModel<T>::of(const Multibody& model) {
   auto made = std::make_unique<LinkModel>();
   for (const RestLink& link : rest) {
     const Link<double>& d = link.shape;
-    Link<T> own{d.step, d.parent, d.q, d.v, d.end, d.branches, d.rotor, d.oblique, d.multi, d.slot, T(d.sign)};
+    Link<T> own{d.step, d.parent, d.q, d.v, d.end, d.branches, d.rotor, d.oblique, d.prescribed, d.multi, d.slot, T(d.sign)};
     put(link.pose.R.m, own.R), put(link.pose.p.v, own.p);
     own.mass = static_cast<T>(link.inertia.mass);
     put(link.inertia.moment.v, own.moment), put(link.inertia.rotational.s, own.rotational);
     own.J = T(d.J), own.turn = T(d.turn), own.travel = T(d.travel);
     own.carried_rotational = T(d.carried_rotational), own.carried_mass = T(d.carried_mass), own.furthest = T(d.furthest), own.longest = T(d.longest);
     made->all_.push_back(own);
+    made->inertia_.push_back(own.J);
     const auto& [m, h, I] = link.inertia;
     const E numbers[] = {m, h[0], h[1], h[2], I.s[0], I.s[1], I.s[2], I.s[3], I.s[4], I.s[5]};
     for (const E& x : numbers) made->wide_masses_.push_back(static_cast<double>(x));
@@ -195,6 +197,7 @@ std::unique_ptr<LinkModel<T>> LinkModel<T>::of(const Multibody& model) {
   const T rounding = rounding_bound<T>(Form::fast);
   const double growth = std::pow(to_double(rounding), -0.2);  // as rigid_elimination.h has it
   made->links_ = {static_cast<int>(made->all_.size()), source->nq, source->nv, multiple, slots, made->all_.data(), rounding, faint_ratio<T>(Form::fast), static_cast<T>(growth), made->wide_masses_.data()};
+  made->links_.prescribed = terms.prescribes();
   for (int k = 0; k < source->bodies; ++k) made->links_.several |= source->first_subhinge[k + 1] - source->first_subhinge[k] > 1;
   return made;
 }
@@ -207,6 +210,12 @@ void LinkModel<T>::wrenches_on_links(const Vector6<T>* on_bodies, std::vector<T>
     const Vector6<T> moved = force_to_parent(bodies_[k].pose, on_bodies[k]);
     for (int i = 0; i < 6; ++i) out[size_t(6) * bodies_[k].link + i] += moved[i];
   }
+}
+
+template <class T>
+void LinkModel<T>::add_to_hinges(const double* inertia) {
+  for (size_t k = 0; k < all_.size(); ++k)
+    if (all_[k].rotor && !all_[k].prescribed) all_[k].J = inertia_[k] + static_cast<T>(inertia[all_[k].v]);
 }
 
 template <class T>

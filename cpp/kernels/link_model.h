@@ -11,6 +11,7 @@
 
 #include "kernels/links.h"
 #include "kernels/tree_parts.h"
+#include "model/hinge_terms.h"
 #include "model/multibody.h"
 
 namespace pycraft::kernels {
@@ -20,7 +21,7 @@ class LinkModel {
  public:
   // Nothing where a hinge is not one of those that kernels know: a rotor on a ball or a free hinge, or three sliders that carry a body along
   // and stand behind another subhinge, whose own terms only the general recursions keep from masses.
-  static std::unique_ptr<LinkModel> of(const Multibody& model);
+  static std::unique_ptr<LinkModel> of(const Multibody& model, const HingeTerms& terms = {});
 
   const Links<T>& links() const { return links_; }
   // For threads; none where the tree is small or does not branch into large ones.
@@ -29,6 +30,11 @@ class LinkModel {
   OnLink<T> on_link(const Node& node) const;
   // (n; f) on every body, in its frame, as those on links.
   void wrenches_on_links(const Vector6<T>* on_bodies, std::vector<T>& out) const;
+  // The same of one body: its link, -1: of the base, and what is added there to (n; f).
+  int link_carrying(int body) const { return bodies_[body].link; }
+  Vector6<T> on_its_link(int body, const Vector6<T>& wrench) const { return force_to_parent(bodies_[body].pose, wrench); }
+  // J where links were made for it (HingeTerms::driven), added to what it was, from numbers of all coordinates.
+  void add_to_hinges(const double* inertia);
 
  private:
   struct Carried {  // where a body is part of a link
@@ -40,6 +46,7 @@ class LinkModel {
   std::vector<TreePart> parts_;
   std::vector<double> wide_masses_;
   std::vector<Carried> bodies_;
+  std::vector<T> inertia_;  // J of links as they were made
 };
 
 extern template class LinkModel<float>;

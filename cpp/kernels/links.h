@@ -22,6 +22,7 @@ struct Link {
   bool branches;             // has children besides the one that follows it
   bool rotor;                // J is not zero
   bool oblique;              // its axis is no coordinate axis of the parent at rest
+  bool prescribed;           // its acceleration is given and its force is found (prescribed_links.h)
   int multi;                 // of links with several coordinates: which of them, else -1
   int slot;                  // where sweeps outward that keep columns have this link's: its parent's, where it is the last child
   T sign;                    // -1: the hinge turns or slides against the coordinate axis
@@ -42,6 +43,7 @@ struct Links {
   T rounding, faint, growth;    // bounds of doubt, see pivots.h
   const double* wide_masses;    // twenty a link: mass, moment, rotational, then what rounding took from these
   bool several = false;         // whether a hinge is several links: of its pivots the general recursions decide
+  bool prescribed = false;      // whether any link is: for forward dynamics alone
 };
 
 // A node as part of a link, -1: of the base.

@@ -33,9 +33,10 @@ template <class S>
   return {S(link.rotational[0]), S(link.rotational[1]), S(link.rotational[2]), S(link.rotational[3]), S(link.rotational[4]), S(link.rotational[5])};
 }
 
-// above: the parent's angular velocity; null at the base.
+// above: the parent's angular velocity; null at the base. States without v are at rest.
 template <class Kind, class S, class T>
 [[gnu::always_inline]] inline void move_link(const Link<T>& link, const States<T>& at, const Vector3<S>* above, Motion<S>& m) {
+  if (!at.v) [[unlikely]] return void(m.omega = m.turning = m.sliding = Vector3<S>::zero());
   const auto velocity = [&](int i) { return gathered<S>(at.v + link.v + i, at.v_stride, at.states); };
   const auto rotation = Kind::rotation(m.place);
   const Vector3<S> none = Vector3<S>::zero();

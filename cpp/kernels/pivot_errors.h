@@ -128,14 +128,16 @@ template <class S, class T, class Tell = TellsNothing>
     const S lever = S(link.longest) + gone, linear = lever * lever * sum_of(own.acceleration);
     with_step(link.step, [&](auto kind) {
       using Kind = decltype(kind);
-      if constexpr (Kind::nv == 1)
-        sound = sound & pass_one<Kind>(link, links, own, linear, X);
-      else if constexpr (Kind::nv == 3)
-        sound = sound & pass_ball(links, own, *w.of(link), linear, X);
-      else
-        sound = sound & pass_free(links, own, *w.of(link), linear, X);
+      if (!link.prescribed) {  // else nothing is eliminated
+        if constexpr (Kind::nv == 1)
+          sound = sound & pass_one<Kind>(link, links, own, linear, X);
+        else if constexpr (Kind::nv == 3)
+          sound = sound & pass_ball(links, own, *w.of(link), linear, X);
+        else
+          sound = sound & pass_free(links, own, *w.of(link), linear, X);
+      }
       if (link.parent < 0) return;
-      add_diagonals();
+      if (!link.prescribed) add_diagonals();
       const auto rotation = Kind::rotation(own.motion.place);
       rotation.template turn<-1>(X);
       shift<-1>(Kind::arm(link, own.motion.place), X);

@@ -25,15 +25,16 @@ Pose<S> renormalised(const Pose<double>& X) {
 }
 
 // Coordinates of a hinge that move its body along any line whatever the others are, numbered from `first`: a free subhinge's, or three
-// sliders'. None where one of them has a rotor, whose inertia a change of the body's velocity does not share.
-std::array<int, 3> translations(const Hinge& hinge, int first) {
+// sliders'. None where one of them is prescribed, or has a rotor, whose inertia a change of the body's velocity does not share.
+std::array<int, 3> translations(const Hinge& hinge, int first, const HingeTerms& terms) {
   std::vector<int> found;
   int j = 0;
   for (const Subhinge& h : hinge.subhinges) {
     for (int i = 0; i < h.record().translations; ++i) found.push_back(j + h.record().translation + i);
     j += h.nv();
   }
-  const bool driven = std::any_of(found.begin(), found.end(), [&](int i) { return hinge.rotor_inertia[i] != 0; });
+  const auto taken = [&](int i) { return hinge.rotor_inertia[i] != 0 || terms.is_driven(first + i) || terms.is_prescribed(first + i); };
+  const bool driven = std::any_of(found.begin(), found.end(), taken);
   if (found.size() != 3 || driven) return {-1, -1, -1};
   return {first + found[0], first + found[1], first + found[2]};
 }
@@ -67,7 +68,7 @@ void add_subhinge(CompiledModel<S>& model, const Subhinge& given, bool last) {
 }  // namespace
 
 template <class S>
-std::shared_ptr<const CompiledModel<S>> compile_model(const Multibody& model) {
+std::shared_ptr<const CompiledModel<S>> compile_model(const Multibody& model, const HingeTerms& terms) {
   auto c = std::make_shared<CompiledModel<S>>();
   c->parameters = model.parameters();
   c->bodies = model.bodies();
@@ -88,15 +89,16 @@ std::shared_ptr<const CompiledModel<S>> compile_model(const Multibody& model) {
     c->mass_properties.push_back({b.mass, b.com, b.inertia});
     for (const Subhinge& h : b.hinge.subhinges) add_subhinge(*c, h, &h == &b.hinge.subhinges.back());
     c->first_subhinge.push_back(static_cast<int>(c->subhinges.size()));
-    c->translations.push_back(translations(b.hinge, c->v_offset.back()));
+    c->translations.push_back(translations(b.hinge, c->v_offset.back(), terms));
     for (double j : b.hinge.rotor_inertia) {
-      c->rotor_inertia.push_back(S(j));
-      c->has_rotor_inertia |= j != 0;
+      const S whole = S(j) + S(terms.inertia_of(static_cast<int>(c->rotor_inertia.size())));
+      c->rotor_inertia.push_back(whole);
+      c->has_rotor_inertia |= !(whole == S(0));
     }
   }
   return c;
 }
-#define PYCRAFT_INSTANTIATE(S) template std::shared_ptr<const CompiledModel<S>> compile_model<S>(const Multibody&);
+#define PYCRAFT_INSTANTIATE(S) template std::shared_ptr<const CompiledModel<S>> compile_model<S>(const Multibody&, const HingeTerms&);
 PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_INSTANTIATE)
 #undef PYCRAFT_INSTANTIATE
 

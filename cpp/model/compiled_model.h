@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "model/hinge.h"
+#include "model/hinge_terms.h"
 #include "model/inertia_factors.h"
 #include "spatial/rigid_inertia.h"
 
@@ -25,16 +26,16 @@ struct CompiledModel {
   std::vector<MassProperties> mass_properties;
   std::vector<S> rotor_inertia;               // per coordinate
   bool has_rotor_inertia = false;
-  std::vector<std::array<int, 3>> translations;  // per body: coordinates that move it along any line, without rotor inertia; -1: none
+  std::vector<std::array<int, 3>> translations;  // per body: coordinates that move it along any line, free and without rotor inertia; -1: none
   std::vector<int> aligned;                   // per coordinate: i where its row of H is exactly e_i at every q, else -1
   Vector3<S> gravity;
 };
 
 class Multibody;
 
-// Unit axes and orthogonal rotations are so to the rounding of S, not of the doubles they were given in.
+// Unit axes and orthogonal rotations are so to the rounding of S, not of the doubles they were given in. rotor_inertia has the terms' own.
 template <class S>
-std::shared_ptr<const CompiledModel<S>> compile_model(const Multibody& model);
+std::shared_ptr<const CompiledModel<S>> compile_model(const Multibody& model, const HingeTerms& terms = {});
 
 template <class S, class T>
 inline InertiaFactors<S> cast(const InertiaFactors<T>& f) {

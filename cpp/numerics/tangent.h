@@ -91,6 +91,18 @@ struct Tangent {
     if (root == T(0)) return undefined_unless_constant(a);
     return along(a, root, T(0.5) / root);
   }
+  friend Tangent atan2(const Tangent& y, const Tangent& x) {
+    using std::atan2;
+    const T square = x.x * x.x + y.x * y.x;
+    Tangent b = along(y, atan2(y.x, x.x), x.x / square);
+    for (int i = 0; i < W; ++i) b.d[i] -= y.x / square * x.d[i];
+    return b;
+  }
+  friend Tangent tanh(const Tangent& a) {
+    using std::tanh;
+    const T value = tanh(a.x);
+    return along(a, value, T(1) - value * value);
+  }
   friend Tangent ratio_or_zero(const Tangent& a, const Tangent& b) {
     if (!(b.x == T(0))) return a / b;
     return undefined_unless_constant(a + b);

@@ -10,6 +10,15 @@
 
 namespace pycraft {
 
+// M, J and what else of a rigid block policy is the same at every configuration.
+template <class S>
+void set_constants(const CompiledModel<S>& model, RigidBlocks<S>& blocks) {
+  std::copy(model.inertia.begin(), model.inertia.end(), blocks.inertia.begin());
+  std::copy(model.rotor_inertia.begin(), model.rotor_inertia.end(), blocks.J.begin());
+  std::copy(model.aligned.begin(), model.aligned.end(), blocks.aligned.begin());
+  blocks.inertia_factors = &model.inertia_factors;
+}
+
 // Fills E (as poses), H, M, J of a rigid block policy. Cost O(N).
 template <class S>
 void kinematics(const CompiledModel<S>& model, const S* q, RigidBlocks<S>& blocks) {
@@ -17,10 +26,7 @@ void kinematics(const CompiledModel<S>& model, const S* q, RigidBlocks<S>& block
     check_interrupt_at(k);
     blocks.pose[k] = hinge_kinematics(model, k, q, blocks.H.data() + model.v_offset[k]);
   }
-  std::copy(model.inertia.begin(), model.inertia.end(), blocks.inertia.begin());
-  std::copy(model.rotor_inertia.begin(), model.rotor_inertia.end(), blocks.J.begin());
-  std::copy(model.aligned.begin(), model.aligned.end(), blocks.aligned.begin());
-  blocks.inertia_factors = &model.inertia_factors;
+  set_constants(model, blocks);
 }
 
 }  // namespace pycraft

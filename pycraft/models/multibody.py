@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -13,6 +14,7 @@ from ..closed import Closed
 from ..dynamics.integration import IntegrationCalls
 from ..state import State, at_state, random_state
 from .handles import Body, Hinge, Named, Node, Vector
+from .pictures import Pictures
 from .with_operators import WithOperators
 
 _Z = (0.0, 0.0, 1.0)
@@ -27,7 +29,7 @@ _DEFAULT_AXES: dict[str, tuple[tuple[float, float, float], ...]] = {
 }
 
 
-class Multibody(Closed, IntegrationCalls, WithOperators):
+class Multibody(Closed, IntegrationCalls, Pictures, WithOperators):
     """A tree of bodies on hinges, with nodes, a state (`q`, `v`) and gravity (zero until it is set).
 
     Build one body by body, or load it (`pycraft.load`). Bodies are kept depth first, children in the order they were added, and
@@ -57,6 +59,7 @@ class Multibody(Closed, IntegrationCalls, WithOperators):
             raise _core.ModelError(f"welds={welds!r}: there are 'lump' and 'keep'")
         super().__init__(text(name, "a model"), welds == "keep", strict)
         self._left_aside: dict[str, np.ndarray] = {}
+        self._actuators: list[dict[str, Any]] = []
 
     # ------------------------------------------------------------------ structure
     def add_body(
@@ -232,6 +235,36 @@ class Multibody(Closed, IntegrationCalls, WithOperators):
         """
         return _core._face["compile_call"](self, call, frame)
 
+    # ------------------------------------------------------------------ files
+    def save(self, path: str | os.PathLike[str], *, state: bool = True) -> None:
+        """Write the model to a file: TOML that a person reads and writes, which `pycraft.load` reads back bit for bit, or URDF.
+
+        Parameters
+        ----------
+        path : path of the file, ending in ".toml" or ".urdf"
+            A file that is there is replaced.
+        state : bool
+            Whether q and v are written to a TOML file, as far as they are not zero.
+
+        Raises
+        ------
+        ModelError
+            An ending that is neither, a file that cannot be written; of URDF, what it does not have: hinges by name, and the remedy.
+
+        Warns
+        -----
+        ModelWarning
+            What the model has beside bodies and hinges and URDF does not hold (gravity, a state).
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> pc.robots.panda().save("panda.toml")  # doctest: +SKIP
+        """
+        from .writers import save
+
+        save(self, path, state)
+
     # ------------------------------------------------------------------ copies
     def description(self) -> dict[str, Any]:
         """The whole model as plain data: bodies with hinges, nodes, gravity, state (see `pycraft.reference` for the schema)."""
@@ -278,28 +311,38 @@ class Multibody(Closed, IntegrationCalls, WithOperators):
         """What the model's file says beside the model, by name; empty for a model that was not loaded.
 
         "gravity" (3,), m/s²; per coordinate (nv,), NaN where the file has none: "damping", "friction", "stiffness", and "effort limit",
-        "velocity limit". `integrate_ode(..., damping=np.nan_to_num(arm.left_aside["damping"]))` takes the first of these.
+        "velocity limit"; "spring rest" (nq,), where springs are slack, if that is not zero. `pycraft.effects.from_model` makes effects of
+        them; `integrate_ode(..., damping=np.nan_to_num(arm.left_aside["damping"]))` takes the first of these.
         """
         return dict(self._left_aside)
 
+    @property
+    def actuators(self) -> list[dict[str, Any]]:
+        """The actuators of the model's file, none for a model that was not loaded: `pycraft.effects.from_model` makes effects of them.
+
+        Each a dictionary: "name", "coordinate", "gear", "gain", "bias" (3,), "force range" (2,), and "why not" of one that no effect is,
+        else None. With a control u the force at the coordinate is gear · clip(gain u + bias · (1, gear q, gear v), force range).
+        """
+        return [dict(actuator) for actuator in self._actuators]
+
     def __reduce__(self):
-        return _again, (self.description(), self._left_aside)
+        return _again, (self.description(), self._left_aside, self._actuators)
 
     def __copy__(self) -> Multibody:
-        return _again(self.description(), self._left_aside)
+        return _again(self.description(), self._left_aside, self._actuators)
 
     def __deepcopy__(self, memo) -> Multibody:
-        memo[id(self)] = copy = _again(self.description(), self._left_aside)
+        memo[id(self)] = copy = _again(self.description(), self._left_aside, self._actuators)
         return copy
 
     def __repr__(self) -> str:
         return f"<multibody {self.name!r}: {self._size} bodies, {self.nv} degrees of freedom>"
 
 
-def _again(description: Mapping[str, Any], left_aside: Mapping[str, np.ndarray]) -> Multibody:
+def _again(description: Mapping[str, Any], left_aside: Mapping[str, np.ndarray], actuators: Sequence[dict[str, Any]] = ()) -> Multibody:
     """A copy of a model from its description and what its file said beside it."""
     model = Multibody.from_description(description)
-    model._left_aside = dict(left_aside)
+    model._left_aside, model._actuators = dict(left_aside), [dict(actuator) for actuator in actuators]
     return model
 
 

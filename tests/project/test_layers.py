@@ -236,9 +236,11 @@ RESTS_ON = {
     "closed_forms": ["proofs"],
     "sympy_bridge": ["proofs"],
     "accuracy": ["identities", "peers", "tidy"],
+    "scenes": ["models"],
     "compiled": ["recursions"],
-    "face": ["accuracy", "compiled", "identities"],
-    "": ["face", "kalman", "closed_forms", "sympy_bridge"],  # pycraft itself
+    "view": ["accuracy"],
+    "face": ["accuracy", "compiled", "identities", "view"],
+    "": ["face", "kalman", "closed_forms", "scenes", "sympy_bridge"],  # pycraft itself
     "cli": [""],
 }
 

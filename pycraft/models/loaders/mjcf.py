@@ -16,8 +16,8 @@ Coordinates are MuJoCo's numbers: a joint's `ref` goes into the placement of its
 `pycraft.interop.mujoco` has the order and the velocities of free hinges. `armature` is the rotor inertia.
 
 Not in the model, as they are effects: gravity (zero until it is set), springs, damping and friction of joints, which
-are in `Multibody.left_aside`; actuators, contacts and fluid forces, which are not read. Equality constraints, tendons
-and flexes are left out with a warning that names them.
+are in `Multibody.left_aside`, and actuators, in `Multibody.actuators`; contacts and fluid forces, which are not read.
+Equality constraints, tendons and flexes are left out with a warning that names them.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ import numpy as np
 from ... import _core
 from ...interop import mujoco as conventions
 from ..multibody import Multibody
+from .mjcf_actuators import read_actuators
 from .rotations import rotation_about, rotation_from_quaternion, turned_inertia
 from .xml_file import XmlFile
 
@@ -99,6 +100,7 @@ class _Reader:
         model.q = conventions.from_mujoco(model, m.qpos0, np.zeros(m.nv))[0]
         self._left_out()
         model._left_aside = self._left_aside(model)
+        model._actuators = read_actuators(self.m, model)
         return model, self.warnings + [f"{self.path}: {text}" for _, text in model.take_warnings()]
 
     def _add_sites(self, model: Multibody) -> None:
@@ -191,6 +193,9 @@ class _Reader:
                 values = np.full(m.nv, np.nan)
                 values[order] = np.where(np.asarray(numbers) != 0, numbers, np.nan)
                 left[quantity] = values
+        rest = conventions.from_mujoco(model, m.qpos_spring, np.zeros(m.nv))[0]
+        if "stiffness" in left and not np.array_equal(rest, model.zero_q()):
+            left["spring rest"] = rest
         return left
 
     def _left_out(self) -> None:

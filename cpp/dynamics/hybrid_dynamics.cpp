@@ -1,0 +1,116 @@
+#include "dynamics/hybrid_dynamics.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "numerics/finite.h"
+#include "runtime/interrupt.h"
+
+namespace pycraft {
+
+namespace {
+
+int prescribed_in(const HingeTerms& terms) { return static_cast<int>(std::count_if(terms.prescribed.begin(), terms.prescribed.end(), [](char p) { return p != 0; })); }
+bool all_prescribed(const Multibody& model, const HingeTerms& terms) { return model.nv() > 0 && prescribed_in(terms) == model.nv(); }
+
+HingeTerms without_prescribed(HingeTerms terms) {
+  terms.prescribed.clear();
+  return terms;
+}
+
+}  // namespace
+
+PreparedLinks::PreparedLinks(const Multibody& model, const HingeTerms& terms, const Solving& how, const Vector3<double>& gravity, const std::vector<int>& wrenched)
+    : model_(kernels::LinkModel<double>::of(model, terms)), nv_(model.nv()), wrenched_(wrenched) {
+  using kernels::Call;
+  const bool refined = how.refinement.steps != 0, inverse = all_prescribed(model, terms);  // nothing is solved for: in any form
+  const bool plain = how.form == Form::fast && how.on_singular == OnSingular::raise && !how.refinement.wider();
+  if (!model_ || !(inverse || (plain && !(refined && terms.prescribes())))) return;
+  const Call call = inverse ? Call::inverse_dynamics : !refined ? Call::forward_dynamics : how.refinement.gathers_wider() ? Call::gathered_dynamics : Call::refined_dynamics;
+  kernel_ = kernels::instruction_set().one[call];
+  if (!kernel_.run) return;
+  std::copy_n(gravity.v, 3, gravity_);
+  work_.reset(static_cast<double*>(::operator new((kernel_.work(model_->links(), 0) + 8) * sizeof(double), std::align_val_t(64))));
+  if (call != Call::forward_dynamics) no_forces_.assign(nv_, 0.0);  // they do not ask whether there are any
+  if (!wrenched_.empty()) on_links_.assign(size_t(6) * model_->links().count, 0.0);
+  states_.states = 1;
+  states_.gravity = gravity_;
+  states_.wrenches = wrenched_.empty() ? nullptr : on_links_.data();
+  states_.interrupt = check_interrupt;
+  states_.steps = how.refinement.steps == Refinement::automatic ? most_corrections : how.refinement.steps;
+}
+
+void PreparedLinks::carry(const Vector6<double>* wrenches) {
+  for (int k : wrenched_)
+    if (const int link = model_->link_carrying(k); link >= 0) std::fill_n(on_links_.data() + size_t(6) * link, 6, 0.0);
+  for (int k : wrenched_) {
+    const int link = model_->link_carrying(k);
+    if (link < 0) continue;
+    const Vector6<double> moved = model_->on_its_link(k, wrenches[k]);
+    for (int i = 0; i < 6; ++i) on_links_[size_t(6) * link + i] += moved[i];
+  }
+}
+
+bool PreparedLinks::run(const double* q, const double* v, const double* u, const Vector6<double>* wrenches, double* out) {
+  states_.q = q, states_.v = v;
+  states_.u = u || no_forces_.empty() ? u : no_forces_.data();
+  if (!wrenched_.empty()) carry(wrenches);
+  return (kernel_.run(model_->links(), states_, out, nv_, work_.get()) & 1) && all_finite(out, nv_);
+}
+
+template <class S>
+HybridDynamics<S>::HybridDynamics(const Multibody& model, const HingeTerms& terms, const Solving& how, const Vector3<double>& gravity, const std::vector<int>& wrenched)
+    : model_(model), terms_(terms), how_(how), applied_{cast<S>(gravity)}, wrenched_(wrenched) {
+  given_ = !terms.prescribes() ? Given::forces : all_prescribed(model, terms) ? Given::accelerations : Given::both;
+  if constexpr (std::is_same_v<S, double>) {
+    links_ = std::make_unique<PreparedLinks>(model, terms, how, gravity, wrenched);
+    if (!links_->there()) links_.reset();
+  }
+  for (int j = 0; j < model.nv(); ++j)
+    if (!terms.is_prescribed(j)) free_.push_back(j);
+  none_.assign(model.nv(), S(0)), forces_.resize(free_.size()), results_.resize(free_.size());
+  if (!wrenched_.empty()) all_wrenches_.assign(model.bodies(), Vector6<S>::zero());
+}
+
+template <class S>
+bool HybridDynamics<S>::run(const S* q, const S* v, const S* u, const Vector6<S>* wrenches, S* out) {
+  if constexpr (std::is_same_v<S, double>)
+    if (links_ && links_->run(q, v, u, wrenches, out)) return true;
+  return generally(q, v, u, wrenches, out);
+}
+
+template <class S>
+void HybridDynamics<S>::add_to_hinges(const S* inertia) {
+  added_.assign(inertia, inertia + model_.nv());
+  if constexpr (std::is_same_v<S, double>)
+    if (links_) links_->add_to_hinges(inertia);
+  if (general_) general_->add_to_hinges(inertia);
+}
+
+template <class S>
+bool HybridDynamics<S>::generally(const S* q, const S* v, const S* u, const Vector6<S>* wrenches, S* out) {
+  if (!general_) {
+    general_ = std::make_unique<RigidDynamics<S>>(model_, given_ == Given::accelerations ? without_prescribed(terms_) : terms_);
+    if (!added_.empty()) general_->add_to_hinges(added_.data());
+  }
+  if (!v) v = none_.data();
+  if (!u) u = none_.data();
+  for (int k : wrenched_) all_wrenches_[k] = wrenches[k];
+  applied_.wrenches = wrenched_.empty() ? nullptr : all_wrenches_.data();
+  switch (given_) {
+    case Given::forces: general_->forward_dynamics(q, v, u, out, how_, &applied_); break;
+    case Given::accelerations: general_->inverse_dynamics(q, v, u, out, &applied_); break;
+    case Given::both:
+      for (size_t i = 0; i < free_.size(); ++i) forces_[i] = u[free_[i]];
+      general_->prescribe(u);
+      general_->forward_dynamics(q, v, forces_.data(), results_.data(), how_, &applied_);
+      general_->give_all(results_.data(), out);
+  }
+  return std::all_of(out, out + model_.nv(), [](const S& x) { return std::isfinite(to_double(x)); });
+}
+
+template class HybridDynamics<double>;
+template class HybridDynamics<Extended>;
+template class HybridDynamics<Quad>;
+
+}  // namespace pycraft

@@ -1,0 +1,81 @@
+// Dynamics of one state after another with terms at the hinges (model/hinge_terms.h): accelerations where forces are given, forces where
+// accelerations are (hybrid dynamics), J with what is added to it. Nothing prescribed is forward dynamics and all is inverse dynamics, bit for bit.
+//
+// Everything but the numbers of a state is decided when it is made. In double precision and the plain form, refined or not, by kernels of this
+// machine's instruction set where they are sure (kernels/, prescribed_links.h; what is both refined and prescribed is not for them); else by the
+// general recursions (recursions/prescribed_hinges.h). No allocation after the first call of each.
+#pragma once
+
+#include <memory>
+#include <new>
+#include <vector>
+
+#include "dynamics/rigid_dynamics.h"
+#include "kernels/instruction_set.h"
+#include "kernels/link_model.h"
+
+namespace pycraft {
+
+// Where kernels are asked for one state: their memory, and all that is the same for every state.
+class PreparedLinks {
+ public:
+  // wrenched: the bodies that may carry wrenches.
+  PreparedLinks(const Multibody& model, const HingeTerms& terms, const Solving& how, const Vector3<double>& gravity, const std::vector<int>& wrenched);
+
+  // Whether there is a kernel for it.
+  bool there() const { return kernel_.run; }
+  // False where the state is in doubt, or a number left its range.
+  bool run(const double* q, const double* v, const double* u, const Vector6<double>* wrenches, double* out);
+  void add_to_hinges(const double* inertia) { model_->add_to_hinges(inertia); }
+
+ private:
+  void carry(const Vector6<double>* wrenches);
+  struct Free {
+    void operator()(double* x) const { ::operator delete(x, std::align_val_t(64)); }
+  };
+  std::unique_ptr<kernels::LinkModel<double>> model_;
+  kernels::Kernel<double> kernel_{};
+  kernels::States<double> states_{};
+  double gravity_[3];
+  int nv_;
+  std::vector<int> wrenched_;
+  std::vector<double> on_links_, no_forces_;
+  std::unique_ptr<double, Free> work_;
+};
+
+template <class S>
+class HybridDynamics {
+ public:
+  HybridDynamics(const Multibody& model, const HingeTerms& terms, const Solving& how, const Vector3<double>& gravity, const std::vector<int>& wrenched = {});
+
+  // v null: at rest. u: generalized forces, at prescribed coordinates accelerations; null: no forces. wrenches: (n; f) on every body in its
+  // axes about its origin, read at the bodies that were named; null: none. out: accelerations, at prescribed coordinates forces.
+  // Returns whether all of them are finite. SingularHingeError names the coordinate.
+  bool run(const S* q, const S* v, const S* u, const Vector6<S>* wrenches, S* out);
+  // What J has in addition at coordinates that are driven, until it is set again; of all coordinates.
+  void add_to_hinges(const S* inertia);
+  // Whether kernels are asked first.
+  bool by_kernels() const { return links_ != nullptr; }
+
+ private:
+  enum class Given { forces, accelerations, both };
+  bool generally(const S* q, const S* v, const S* u, const Vector6<S>* wrenches, S* out);
+
+  const Multibody& model_;
+  HingeTerms terms_;
+  Solving how_;
+  Given given_;
+  Applied<S> applied_;
+  std::vector<int> wrenched_;
+  std::unique_ptr<PreparedLinks> links_;
+  std::unique_ptr<RigidDynamics<S>> general_;  // made where it is first needed
+  std::vector<int> free_;
+  std::vector<S> none_, forces_, results_, added_;
+  std::vector<Vector6<S>> all_wrenches_;
+};
+
+extern template class HybridDynamics<double>;
+extern template class HybridDynamics<Extended>;
+extern template class HybridDynamics<Quad>;
+
+}  // namespace pycraft

@@ -1,0 +1,220 @@
+#include "simulation/compiled_scene.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "numerics/finite.h"
+#include "runtime/errors.h"
+
+namespace pycraft {
+
+namespace {
+
+HingeTerms terms_of(const Scene& scene) {
+  HingeTerms terms;
+  const auto nv = static_cast<unsigned>(scene.model().nv());
+  for (const SceneEntry& entry : scene.entries()) {
+    if (!entry.on) continue;
+    const Declaration d = entry.effect->declaration();
+    for (const HingeTerm& h : d.hinges) {
+      if (terms.inertia.empty()) terms.inertia.assign(nv, 0.0), terms.driven.assign(nv, 0);
+      terms.inertia[h.coordinate] += h.inertia;
+      if (h.damping != 0 || h.stiffness != 0) terms.driven[h.coordinate] = 1;
+    }
+    for (int j : d.prescribed) {
+      if (terms.prescribed.empty()) terms.prescribed.assign(nv, 0);
+      terms.prescribed[j] = 1;
+    }
+  }
+  return terms;
+}
+
+std::string plural(size_t n, const char* one, const char* several) { return std::to_string(n) + " " + (n == 1 ? one : several); }
+
+template <class S>
+bool all_are_finite(const S* x, int n) {
+  return std::all_of(x, x + n, [](const S& y) { return std::isfinite(to_double(y)); });
+}
+
+}  // namespace
+
+template <class S>
+CompiledScene<S>::CompiledScene(const Scene& scene, const Solving& how)
+    : scene_(scene), nv_(scene.model().nv()), forces_(scene_, scene.model().compiled<S>()), lists_(5), motion_(nv_), needed_(nv_), inertia_(nv_, S(0)), zeros_(nv_, S(0)), work_(nv_) {
+  for (const auto& e : forces_.effects()) {
+    if (e->declared.uniform_gravity) gravity_ = gravity_ + e->declared.gravity;
+    prescribed_.insert(prescribed_.end(), e->declared.prescribed.begin(), e->declared.prescribed.end());
+  }
+  if (forces_.forced() || !prescribed_.empty()) u_ = forces_.tau();
+  if (!forces_.wrenched().empty()) wrenches_ = forces_.wrenches();
+  solver_ = std::make_unique<HybridDynamics<S>>(scene.model(), terms_of(scene), how, gravity_, forces_.wrenched());
+  for (int list = 0; list < static_cast<int>(lists_.size()); ++list) plan(static_cast<SceneList>(list));
+}
+
+// ------------------------------------------------------------------ the lists
+
+template <class S>
+std::string CompiledScene<S>::described(const Active<S>& effect) const {
+  const Declaration& d = effect.declared;
+  std::string text;
+  if (!d.coordinates.empty()) text = "forces on " + plural(d.coordinates.size(), "coordinate", "coordinates");
+  if (!d.wrenches.empty()) text += (text.empty() ? "wrenches on " : ", wrenches on ") + plural(d.wrenches.size(), "body", "bodies");
+  if (!d.prescribed.empty()) text += (text.empty() ? "accelerations of " : ", accelerations of ") + plural(d.prescribed.size(), "coordinate", "coordinates");
+  return text;
+}
+
+template <class S>
+void CompiledScene<S>::add_reach(std::vector<Pass>& passes, const Reach& reach, bool moving, bool works) {
+  std::vector<std::string> readers, movers;
+  for (const auto& e : forces_.effects()) {
+    const bool of_work = works && e->declared.work && !e->declared.wrenches.empty();
+    if (!e->declared.poses.empty() || !e->declared.twists.empty() || of_work) readers.push_back(e->name);
+    if (!e->declared.twists.empty() || of_work) movers.push_back(e->name);
+  }
+  if (!reach.placed.empty()) passes.push_back({works ? place<true> : place<false>, nullptr, {"poses", plural(reach.placed.size(), "body", "bodies"), readers}});
+  if (moving && !reach.moved.empty()) passes.push_back({works ? move<true> : move<false>, nullptr, {"twists", plural(reach.moved.size(), "body", "bodies"), movers}});
+}
+
+template <class S>
+void CompiledScene<S>::add_accelerations(std::vector<Pass>& passes, bool works) {
+  std::vector<std::string> because;
+  for (const auto& e : forces_.effects())
+    if (e->declared.uniform_gravity || !e->declared.hinges.empty() || !e->declared.prescribed.empty()) because.push_back(e->name);
+  const bool hybrid = !prescribed_.empty(), all = hybrid && static_cast<int>(prescribed_.size()) == nv_;
+  const std::string what = std::string(all ? "inverse" : hybrid ? "hybrid" : "forward") + " dynamics, " + (by_kernels() ? "by kernels" : "by recursions");
+  passes.push_back({hybrid ? accelerate_and_prescribe : accelerate, nullptr, {"accelerations", what, because}});
+  for (const auto& e : forces_.effects())
+    if (works && e->worker >= 0 && !e->declared.prescribed.empty()) passes.push_back({count_prescribed, e.get(), {e->name + " work", "its power", {e->name}}});
+}
+
+template <class S>
+void CompiledScene<S>::plan(SceneList list) {
+  std::vector<Pass>& passes = lists_[static_cast<int>(list)];
+  const bool works = list == SceneList::works, moving = list != SceneList::rest && list != SceneList::apart_at_rest;
+  const bool apart = list == SceneList::apart || list == SceneList::apart_at_rest;
+  add_reach(passes, works ? forces_.works() : forces_.read(), moving, works);
+  for (const auto& e : forces_.effects()) {
+    if (!e->acts() || (!moving && e->declared.only_in_motion)) continue;
+    passes.push_back({apart ? act_and_keep : works && e->worker >= 0 ? act_and_count : e->declared.foreign ? act_and_look : act, e.get(), {e->name, described(*e), {e->name}}});
+  }
+  for (const auto& e : forces_.effects())
+    if (!e->declared.prescribed.empty()) passes.push_back({prescribe, e.get(), {e->name, described(*e), {e->name}}});
+  add_accelerations(passes, works);
+}
+
+template <class S>
+std::vector<PassRecord> CompiledScene<S>::passes(SceneList list) const {
+  std::vector<PassRecord> records;
+  for (const Pass& pass : lists_[static_cast<int>(list)]) records.push_back(pass.record);
+  return records;
+}
+
+// ------------------------------------------------------------------ at a state
+
+template <class S>
+bool CompiledScene<S>::run(SceneList list, const S& t, const S* q, const S* v, const S* own, S* vdot) {
+  forces_.start(t, q, v, own);
+  v_ = v, vdot_ = vdot;
+  for (Pass& pass : lists_[static_cast<int>(list)]) {
+    pass.run(*this, pass.of);
+    ++pass.record.times;
+  }
+  if (!finite_ && all_are_finite(q, numbers().nq) && (!v || all_are_finite(v, nv_))) forces_.look_for_culprits();
+  return finite_;
+}
+
+template <class S>
+bool CompiledScene<S>::accelerations_and_powers(const S& t, const S* q, const S* v, const S* own, S* vdot, S* powers) {
+  powers_ = powers;
+  return run(SceneList::works, t, q, v, own, vdot);
+}
+
+template <class S>
+bool CompiledScene<S>::accelerations_and_forces(const S& t, const S* q, const S* v, const S* own, S* vdot, S* rows) {
+  std::fill_n(rows, forces_.effects().size() * nv_, S(0));
+  rows_ = rows;
+  const bool finite = run(v ? SceneList::apart : SceneList::apart_at_rest, t, q, v, own, vdot);
+  forces_.place(forces_.whole());
+  for (const auto& e : forces_.effects())
+    if (!e->declared.wrenches.empty() && (v || !e->declared.only_in_motion)) forces_.gather_kept(*e, rows + size_t(e->number) * nv_);
+  add_structural_forces(q, vdot, rows);
+  return finite;
+}
+
+// Of what is no force that was added: gravity, what hinge terms take, what prescribed motion needs.
+template <class S>
+void CompiledScene<S>::add_structural_forces(const S* q, const S* vdot, S* rows) {
+  for (const auto& e : forces_.effects()) {
+    const Declaration& d = e->declared;
+    S* const row = rows + size_t(e->number) * nv_;
+    if (d.uniform_gravity) {
+      const Applied<S> field{cast<S>(d.gravity)};
+      whole_model().inverse_dynamics(q, zeros_.data(), nullptr, work_.data(), &field);
+      for (int j = 0; j < nv_; ++j) row[j] -= work_[j];
+    }
+    for (const HingeTerm& h : d.hinges) row[h.coordinate] -= (S(h.inertia) + step_ * (S(h.damping) + step_ * S(h.stiffness))) * vdot[h.coordinate];
+    for (int j : d.prescribed) row[j] += needed_[j];
+  }
+}
+
+template <class S>
+void CompiledScene<S>::accelerate_and_prescribe(CompiledScene& s, Active<S>*) {
+  S* const u = s.forces_.tau();
+  for (int j : s.prescribed_) s.needed_[j] = s.forces_.forced() ? u[j] : S(0), u[j] = s.motion_[j];
+  s.finite_ = s.solver_->run(s.forces_.at().q, s.v_, u, s.wrenches_, s.vdot_);
+  for (int j : s.prescribed_) s.needed_[j] = s.vdot_[j] - s.needed_[j], s.vdot_[j] = s.motion_[j];
+}
+
+template <class S>
+void CompiledScene<S>::count_prescribed(CompiledScene& s, Active<S>* e) {
+  S power = e->acts() ? s.powers_[e->worker] : S(0);
+  for (int j : e->declared.prescribed) power += s.needed_[j] * s.v_[j];
+  s.powers_[e->worker] = power;
+}
+
+template <class S>
+RigidDynamics<S>& CompiledScene<S>::whole_model() {
+  if (!whole_model_) whole_model_ = std::make_unique<RigidDynamics<S>>(scene_.model());
+  return *whole_model_;
+}
+
+template <class S>
+void CompiledScene<S>::energies(const S& t, const S* q, const S* v, const S* own, S* kinetic, S* potential) {
+  const S* const moving = v ? v : zeros_.data();
+  forces_.start(t, q, v, own);
+  forces_.place(forces_.read());
+  if (v) forces_.move(forces_.read());
+  *kinetic = whole_model().kinetic_energy(q, moving);
+  for (const auto& e : forces_.effects()) {
+    const Declaration& d = e->declared;
+    for (const HingeTerm& h : d.hinges) *kinetic += S(h.inertia) * moving[h.coordinate] * moving[h.coordinate] / S(2);
+    const Vector3<S> field = cast<S>(d.gravity);
+    potential[e->number] = d.potential ? forces_.potential(*e) : S(0);
+    if (d.uniform_gravity) potential[e->number] += whole_model().potential_energy(q, Vector3<S>::zero(), &field);
+  }
+}
+
+template <class S>
+bool CompiledScene<S>::steps_implicitly() const {
+  return std::any_of(forces_.effects().begin(), forces_.effects().end(), [](const auto& e) {
+    return std::any_of(e->declared.hinges.begin(), e->declared.hinges.end(), [](const HingeTerm& h) { return h.damping != 0 || h.stiffness != 0; });
+  });
+}
+
+template <class S>
+void CompiledScene<S>::set_step(const S& h) {
+  if (h == step_) return;
+  step_ = h;
+  forces_.set_step(h);
+  if (!steps_implicitly()) return;
+  std::fill(inertia_.begin(), inertia_.end(), S(0));
+  for (const auto& e : forces_.effects())
+    for (const HingeTerm& term : e->declared.hinges) inertia_[term.coordinate] += h * (S(term.damping) + h * S(term.stiffness));
+  solver_->add_to_hinges(inertia_.data());
+}
+
+#define PYCRAFT_INSTANTIATE(S) template class CompiledScene<S>;
+PYCRAFT_FOR_EACH_SCENE_SCALAR(PYCRAFT_INSTANTIATE)
+#undef PYCRAFT_INSTANTIATE
+
+}  // namespace pycraft

@@ -1,0 +1,108 @@
+// A scene compiled: an ordered list of passes, decided by structure alone.
+//
+//   poses          X_WB of the bodies that somebody reads, along their ways to the base and no others, with the rows of H there
+//   twists         V of the bodies whose velocities somebody reads, likewise
+//   <effect>       forces, wrenches or prescribed accelerations of one effect
+//   accelerations  forward dynamics, or hybrid where coordinates are prescribed; a uniform gravity is a number in it, and rotors are in its D
+//
+// A pass is there because of an effect that is on; what is off or absent leaves no pass, no branch and no memory. A state at rest has a list of
+// its own, without what needs velocities, and so has a run that keeps account of the work of each effect. Every pass counts how often it ran.
+//
+// One thread works with one compiled scene: it holds the numbers of the state that it was asked for last. No allocation after the first state.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "dynamics/hybrid_dynamics.h"
+#include "simulation/scene_forces.h"
+
+namespace pycraft {
+
+struct PassRecord {
+  std::string name, what;             // what it does, in words
+  std::vector<std::string> because;   // the effects that it is there for
+  long times = 0;
+};
+
+// Which list of passes: of a motion; of a state at rest; of a motion whose works are counted; of either with the forces of each effect kept apart.
+enum class SceneList { motion, rest, works, apart, apart_at_rest };
+
+template <class S>
+class CompiledScene {
+ public:
+  CompiledScene(const Scene& scene, const Solving& how);
+  CompiledScene(const CompiledScene&) = delete;
+
+  // v̇ (nv) at a state, v null where it is at rest; own: the effects' states (SceneForces::own_states). EvaluationError names the effect and the
+  // time where one gives what is not finite; SingularHingeError as forward dynamics. False where v̇ is not finite though the forces are.
+  bool accelerations(const S& t, const S* q, const S* v, const S* own, S* vdot) { return run(v ? SceneList::motion : SceneList::rest, t, q, v, own, vdot); }
+  // The same with the power of each effect that does work, in their order (SceneForces::workers).
+  bool accelerations_and_powers(const S& t, const S* q, const S* v, const S* own, S* vdot, S* powers);
+  // The same with generalized forces (nv) of every effect that is on, row by row: their sum is ℳ v̇ + 𝒞 of the model without gravity.
+  bool accelerations_and_forces(const S& t, const S* q, const S* v, const S* own, S* vdot, S* rows);
+  // Kinetic energy, rotors included; then the potential energy of every effect that is on, zero where it has none.
+  void energies(const S& t, const S* q, const S* v, const S* own, S* kinetic, S* potential);
+
+  // Accelerations of implicit steps of size h from now on (0: plain ones): D has h C + h² K in addition.
+  void set_step(const S& h);
+  bool steps_implicitly() const;
+
+  SceneForces<S>& effects() { return forces_; }
+  const SceneForces<S>& effects() const { return forces_; }
+  const CompiledModel<S>& numbers() const { return forces_.numbers(); }
+  const std::vector<int>& prescribed() const { return prescribed_; }
+  bool by_kernels() const { return solver_->by_kernels(); }
+  std::vector<PassRecord> passes(SceneList list) const;  // with how often they ran
+
+ private:
+  struct Pass {
+    void (*run)(CompiledScene&, Active<S>*);
+    Active<S>* of;
+    PassRecord record;
+  };
+  void plan(SceneList list);
+  void add_reach(std::vector<Pass>& passes, const Reach& reach, bool moving, bool works);
+  void add_accelerations(std::vector<Pass>& passes, bool works);
+  std::string described(const Active<S>& effect) const;
+  bool run(SceneList list, const S& t, const S* q, const S* v, const S* own, S* vdot);
+  void add_structural_forces(const S* q, const S* vdot, S* rows);
+  RigidDynamics<S>& whole_model();
+
+  // ---- passes
+  template <bool works>
+  static void place(CompiledScene& s, Active<S>*) { s.forces_.place(works ? s.forces_.works() : s.forces_.read()); }
+  template <bool works>
+  static void move(CompiledScene& s, Active<S>*) { s.forces_.move(works ? s.forces_.works() : s.forces_.read()); }
+  static void act(CompiledScene& s, Active<S>* e) { s.forces_.act(*e); }
+  static void act_and_look(CompiledScene& s, Active<S>* e) { s.forces_.act_and_look(*e); }
+  static void act_and_count(CompiledScene& s, Active<S>* e) { s.powers_[e->worker] = s.forces_.act_and_count(*e); }
+  static void act_and_keep(CompiledScene& s, Active<S>* e) { s.forces_.act_and_keep(*e, s.rows_ + size_t(e->number) * s.nv_); }
+  static void prescribe(CompiledScene& s, Active<S>* e) { s.forces_.prescribe(*e, s.forces_.at().t, nullptr, nullptr, s.motion_.data()); }
+  static void accelerate(CompiledScene& s, Active<S>*) { s.finite_ = s.solver_->run(s.forces_.at().q, s.v_, s.u_, s.wrenches_, s.vdot_); }
+  static void accelerate_and_prescribe(CompiledScene& s, Active<S>*);
+  static void count_prescribed(CompiledScene& s, Active<S>* e);
+
+  Scene scene_;  // as it was
+  int nv_;
+  SceneForces<S> forces_;
+  std::vector<int> prescribed_;
+  Vector3<double> gravity_{0, 0, 0};
+  std::vector<std::vector<Pass>> lists_;
+  std::unique_ptr<HybridDynamics<S>> solver_;
+  std::unique_ptr<RigidDynamics<S>> whole_model_;  // made where it is first needed
+  // ---- of the state that is being worked at
+  const S *v_ = nullptr, *u_ = nullptr;  // u: what the solver is given; null, as wrenches, where no effect gives any
+  const Vector6<S>* wrenches_ = nullptr;
+  S *vdot_ = nullptr, *powers_ = nullptr, *rows_ = nullptr;
+  bool finite_ = true;
+  S step_ = S(0);
+  std::vector<S> motion_, needed_, inertia_, zeros_, work_;  // of prescribed coordinates: θ̈, and the forces that they need; J; a model's forces
+};
+
+#define PYCRAFT_EXTERN(S) extern template class CompiledScene<S>;
+PYCRAFT_FOR_EACH_SCENE_SCALAR(PYCRAFT_EXTERN)
+#undef PYCRAFT_EXTERN
+
+}  // namespace pycraft

@@ -1,0 +1,52 @@
+#include "simulation/scene.h"
+
+#include <algorithm>
+
+#include "runtime/errors.h"
+#include "simulation/selection.h"
+
+namespace pycraft {
+
+size_t Scene::find(const std::string& name) const {
+  std::vector<std::string> known;
+  for (size_t i = 0; i < entries_.size(); ++i) {
+    if (entries_[i].name == name) return i;
+    known.push_back(entries_[i].name);
+  }
+  std::string text = "the scene of '" + model_->name() + "' has no effect '" + name + "'";
+  const auto near = nearest_names(name, known, 1);
+  throw ModelError(text + (near.empty() ? "; it is empty" : "; did you mean '" + near[0] + "'?"));
+}
+
+std::string Scene::add(const std::string& name, std::shared_ptr<const Effect> effect, bool on) {
+  const auto taken = [&](const std::string& n) { return std::any_of(entries_.begin(), entries_.end(), [&](const SceneEntry& e) { return e.name == n; }); };
+  std::string called = name.empty() ? effect->kind() : name;
+  if (taken(called) && !name.empty())
+    throw ModelError("the scene of '" + model_->name() + "' has an effect '" + name + "' already; give another name, or remove that one first");
+  for (int i = 2; taken(called); ++i) called = effect->kind() + "_" + std::to_string(i);
+  if (on) refuse_conflicts(called, *effect);
+  entries_.push_back({called, std::move(effect), on});
+  return called;
+}
+
+void Scene::remove(const std::string& name) { entries_.erase(entries_.begin() + static_cast<std::ptrdiff_t>(find(name))); }
+
+void Scene::set_on(const std::string& name, bool on) {
+  SceneEntry& entry = entries_[find(name)];
+  if (on && !entry.on) refuse_conflicts(name, *entry.effect);
+  entry.on = on;
+}
+
+void Scene::refuse_conflicts(const std::string& name, const Effect& effect) const {
+  const std::vector<int> prescribed = effect.declaration().prescribed;
+  for (const SceneEntry& other : entries_) {
+    if (!other.on || other.name == name) continue;
+    const std::vector<int> claimed = other.effect->declaration().prescribed;
+    for (int j : prescribed)
+      if (std::find(claimed.begin(), claimed.end(), j) != claimed.end())
+        throw ModelError("effects '" + other.name + "' and '" + name + "' both prescribe coordinate '" + model_->structure().coordinate_names[j] + "' of '" + model_->name() +
+                         "'; disable or remove one of them");
+  }
+}
+
+}  // namespace pycraft

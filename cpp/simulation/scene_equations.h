@@ -1,0 +1,84 @@
+// The right-hand side of a scene for integrators:
+//
+//   x = (q, v, y, w),   q̇ = N(q) v,   v̇ the scene's accelerations,   ẏ the rates of the effects' own states,   ẇ the power of each that does work
+//
+// What controllers hold from one sample to the next is part of y and has no rate. Works are integrals beside the motion: they are kept in units of
+// 2¹⁰⁰ J, which no tolerance sees and which costs no bit, so that no step is chosen for their sake. Prescribed coordinates are where their motion
+// says at every evaluation, whatever x says; in x they are set to it after each step.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "runtime/interrupt.h"
+#include "simulation/compiled_scene.h"
+#include "simulation/equations.h"
+
+namespace pycraft {
+
+template <class S>
+class SceneEquations : public Equations<S> {
+ public:
+  using typename Equations<S>::State;
+  using Equations<S>::nq;
+  using Equations<S>::nv;
+  using Equations<S>::evaluations;
+  // works: whether the works of effects are part of x.
+  SceneEquations(CompiledScene<S>& scene, bool works)
+      : Equations<S>(scene.numbers(), scene.effects().own() + (works ? static_cast<int>(scene.effects().workers().size()) : 0)), scene_(scene), own_(scene.effects().own()),
+        works_(this->rest() - own_), q_(nq()), v_(nv()) {}
+
+  CompiledScene<S>& scene() { return scene_; }
+  int works() const { return works_; }
+  static S unit_of_work() { return S(std::ldexp(1.0, 100)); }
+
+  // x of a state at t: own states as they are at first where own is null; samples are taken, prescribed coordinates set, works zero.
+  State initial(const S& t, const S* q, const S* v, const S* own) {
+    State x(q, q + nq());
+    x.insert(x.end(), v, v + nv());
+    for (double y : scene_.effects().own_states()) x.push_back(S(y));
+    if (own) std::copy_n(own, own_, x.data() + nq() + nv());
+    x.insert(x.end(), works_, S(0));
+    settle(t, x);
+    if (stops()) scene_.effects().sample(t, own == nullptr, x.data(), x.data() + nq(), x.data() + nq() + nv());
+    return x;
+  }
+
+  void evaluate(const S& t, const S* q, const S* v, const S* rest, S* vdot, S* rest_rate) override {
+    if ((++evaluations & 63) == 0) check_interrupt();
+    this->at_q_ = q, this->at_v_ = v;
+    if (!scene_.prescribed().empty()) {
+      std::copy_n(q, nq(), q_.data()), std::copy_n(v, nv(), v_.data());
+      scene_.effects().prescribe(t, q_.data(), v_.data(), nullptr);
+      this->at_q_ = q_.data(), this->at_v_ = v_.data();
+    }
+    if (works_ > 0)
+      scene_.accelerations_and_powers(t, this->at_q_, this->at_v_, rest, vdot, rest_rate + own_);
+    else
+      scene_.accelerations(t, this->at_q_, this->at_v_, rest, vdot);
+    for (int i = 0; i < works_; ++i) rest_rate[own_ + i] /= unit_of_work();
+    if (own_ > 0) scene_.effects().rates(rest_rate);
+  }
+
+  void settle(const S& t, State& x) override {
+    if (!scene_.prescribed().empty()) scene_.effects().prescribe(t, x.data(), x.data() + nq(), nullptr);
+  }
+  void set_step(const S& h) override { scene_.set_step(h); }
+  bool stops() const override { return std::isfinite(next_stop(0)); }
+  double next_stop(double t) const override { return scene_.effects().next_sample(t); }
+  void stop(const S& t, State& x) override { scene_.effects().sample(t, false, x.data(), x.data() + nq(), x.data() + nq() + nv()); }
+  int count_events() const override { return scene_.effects().count_events(); }
+  void events(const S& t, const State& x, S* out) override {
+    std::copy_n(x.data(), nq(), q_.data()), std::copy_n(x.data() + nq(), nv(), v_.data());
+    scene_.effects().prescribe(t, q_.data(), v_.data(), nullptr);
+    scene_.effects().events(t, q_.data(), v_.data(), x.data() + nq() + nv(), out);
+  }
+
+ private:
+  CompiledScene<S>& scene_;
+  int own_, works_;
+  State q_, v_;
+};
+
+}  // namespace pycraft

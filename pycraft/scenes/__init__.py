@@ -1,0 +1,6 @@
+"""Scenes: a model and the effects that act on it, each added by name; what is not named costs nothing."""
+
+from . import effects
+from .scene import Scene
+
+__all__ = ["Scene", "effects"]

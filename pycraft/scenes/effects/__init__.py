@@ -1,0 +1,44 @@
+"""Effects, each a class: what acts on a model where a scene has it. docs/scenes.md has them all in one table."""
+
+from .actuators import Motor, RotorInertia, Servo, TorqueSource
+from .effect import Effect
+from .frictions import CoulombFriction, Damping, ImplicitDamping, QuadraticDamping
+from .from_model import Offered, from_model
+from .functions_of_time import Harmonic, Spline, Table
+from .gravities import Gravity, GravityGradient, PointMassGravity
+from .motions import Prescribed
+from .springs import Bushing, ImplicitSpring, NodeDamper, NodeSpring, Spring
+from .stops import Limits
+from .user_effects import EffectState, Sampled, UserEffect
+from .wrenches import Wrench
+
+__all__ = [
+    "Bushing",
+    "CoulombFriction",
+    "Damping",
+    "Effect",
+    "EffectState",
+    "Gravity",
+    "GravityGradient",
+    "Harmonic",
+    "ImplicitDamping",
+    "ImplicitSpring",
+    "Limits",
+    "Motor",
+    "NodeDamper",
+    "NodeSpring",
+    "Offered",
+    "PointMassGravity",
+    "Prescribed",
+    "QuadraticDamping",
+    "RotorInertia",
+    "Sampled",
+    "Servo",
+    "Spline",
+    "Spring",
+    "Table",
+    "TorqueSource",
+    "UserEffect",
+    "Wrench",
+    "from_model",
+]

@@ -1,0 +1,93 @@
+"""What brakes the motion of hinges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from ... import _core
+from ...arguments import one_number
+from .effect import Effect, by_hinge, warn_of_negative
+
+
+@dataclass(repr=False, eq=False)
+class Damping(Effect):
+    """Viscous damping, T = -c v at every coordinate.
+
+    Parameters
+    ----------
+    coefficient : N m s/rad or N s/m
+        One number, one for each coordinate, or a dictionary by hinge. A negative one is warned of: it drives.
+    hinges : names of hinges, coordinates, patterns, or a list of them; None: all
+    """
+
+    coefficient: Any
+    hinges: Any = None
+
+    def made_for(self, model: _core.Multibody) -> _core.Effect:
+        names, values = by_hinge(self.coefficient, self.hinges, model, "damping", "coefficient")
+        warn_of_negative(values, "damping", "coefficient", "it drives the motion instead of braking it")
+        return _core.damping_effect(model, names, values)
+
+
+@dataclass(repr=False, eq=False)
+class QuadraticDamping(Effect):
+    """Damping as of a body in air, T = -c |v| v at every coordinate.
+
+    Parameters
+    ----------
+    coefficient : N m s²/rad² or N s²/m²
+        One number, one for each coordinate, or a dictionary by hinge. A negative one is warned of.
+    hinges : names of hinges, coordinates, patterns, or a list of them; None: all
+    """
+
+    coefficient: Any
+    hinges: Any = None
+
+    def made_for(self, model: _core.Multibody) -> _core.Effect:
+        names, values = by_hinge(self.coefficient, self.hinges, model, "quadratic_damping", "coefficient")
+        warn_of_negative(values, "quadratic_damping", "coefficient", "it drives the motion instead of braking it")
+        return _core.quadratic_damping_effect(model, names, values)
+
+
+@dataclass(repr=False, eq=False)
+class CoulombFriction(Effect):
+    """Dry friction, smoothed: T = -F tanh(v/s) at every coordinate. What should stick creeps, by s T/F.
+
+    Parameters
+    ----------
+    level : N m or N
+        F: one number, one for each coordinate, or a dictionary by hinge; not negative.
+    smoothing : rad/s or m/s
+        s, the speed at which three quarters of F are reached. Small ones make the equations stiff.
+    hinges : names of hinges, coordinates, patterns, or a list of them; None: all
+    """
+
+    level: Any
+    smoothing: float = 0.01
+    hinges: Any = None
+
+    def made_for(self, model: _core.Multibody) -> _core.Effect:
+        names, values = by_hinge(self.level, self.hinges, model, "coulomb_friction", "level")
+        return _core.coulomb_friction_effect(model, names, values, one_number(self.smoothing, "coulomb_friction: smoothing"))
+
+
+@dataclass(repr=False, eq=False)
+class ImplicitDamping(Effect):
+    """Viscous damping that steps of one size take implicitly: D has h c in addition ("semi-implicit-euler"), stable for any step and any c.
+
+    Other integrators, and `Scene.evaluate` without a step, see plain damping, T = -c v.
+
+    Parameters
+    ----------
+    coefficient : N m s/rad or N s/m
+        One number, one for each coordinate, or a dictionary by hinge; not negative.
+    hinges : names of hinges, coordinates, patterns, or a list of them; None: all
+    """
+
+    coefficient: Any
+    hinges: Any = None
+
+    def made_for(self, model: _core.Multibody) -> _core.Effect:
+        names, values = by_hinge(self.coefficient, self.hinges, model, "implicit_damping", "coefficient")
+        return _core.implicit_damping_effect(model, names, values)

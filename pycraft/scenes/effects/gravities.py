@@ -1,0 +1,67 @@
+"""Fields of gravity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from ... import _core
+from ...arguments import one_number
+from .effect import Effect, names_of
+
+
+@dataclass(repr=False, eq=False)
+class Gravity(Effect):
+    """Uniform gravity: the force m g at every body's centre of mass. Potential -Σ m g·c.
+
+    It costs nothing: accelerations are found with the base accelerated by -g.
+
+    Parameters
+    ----------
+    g : (3,) m/s², in the world's axes
+    """
+
+    g: Any = (0.0, 0.0, -9.81)
+
+    def made_for(self, model: _core.Multibody) -> _core.Effect:
+        return _core.gravity_effect(self.g)
+
+
+@dataclass(repr=False, eq=False)
+class PointMassGravity(Effect):
+    """The gravity of a point mass, F = -μ m r/|r|³ at every body's centre of mass, r from the point. Potential -Σ μ m/|r|.
+
+    Parameters
+    ----------
+    mu : m³/s², the gravitational parameter
+    position : (3,) m, the point, in the world's axes
+    bodies : names of bodies, patterns, or a list of them; None: all
+    """
+
+    mu: float
+    position: Any = (0.0, 0.0, 0.0)
+    bodies: Any = None
+
+    def made_for(self, model: _core.Multibody) -> _core.Effect:
+        mu = one_number(self.mu, "point_mass_gravity: mu")
+        return _core.point_mass_gravity_effect(model, mu, self.position, names_of(self.bodies, "point_mass_gravity", "bodies"))
+
+
+@dataclass(repr=False, eq=False)
+class GravityGradient(Effect):
+    """What a body's extent adds to the gravity of a point mass, in the order of its inertia (MacCullagh): N = 3μ/|r|³ r̂ × I r̂ and a force.
+
+    Parameters
+    ----------
+    mu : m³/s²
+    position : (3,) m, the point that attracts, in the world's axes
+    bodies : names of bodies, patterns, or a list of them; None: all
+    """
+
+    mu: float
+    position: Any = (0.0, 0.0, 0.0)
+    bodies: Any = None
+
+    def made_for(self, model: _core.Multibody) -> _core.Effect:
+        mu = one_number(self.mu, "gravity_gradient: mu")
+        return _core.gravity_gradient_effect(model, mu, self.position, names_of(self.bodies, "gravity_gradient", "bodies"))

@@ -1,0 +1,308 @@
+"""A scene: a model and the effects that act on it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from ..arguments import one_number, text
+from ..closed import Closed
+from ..state import at_state
+from .effects import Effect, UserEffect
+from .explain import plan_text
+from .run import Run, run_times
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """What a scene says of one state.
+
+    Attributes
+    ----------
+    vdot : (nv,) rad/s² and m/s²
+    forces : by effect, (nv,) generalized forces: gravity's too, of prescribed motion what it needs, of rotors what they take. Their sum is
+        what inverse dynamics of the model without gravity gives at vdot.
+    passes : how often each pass of the plan ran
+    """
+
+    vdot: np.ndarray
+    forces: dict[str, np.ndarray]
+    passes: dict[str, int]
+
+
+class Effects(Mapping[str, Effect]):
+    """The effects of a scene by name, in the order they were added."""
+
+    def __init__(self, entries: dict[str, tuple[Effect, bool]], scene: Scene):
+        self._entries, self._scene = entries, scene
+
+    def __getitem__(self, name: str) -> Effect:
+        try:
+            return self._entries[name][0]
+        except KeyError:
+            raise KeyError(self._scene._unknown(name)) from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._entries)
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return list(self._entries)
+
+    def __repr__(self) -> str:
+        return "{" + ", ".join(self._entries) + "}"
+
+
+class Scene(Closed):
+    """A model and the effects that act on it. It starts empty: nothing acts that was not added, the model's own gravity neither.
+
+    Parameters
+    ----------
+    model : Multibody
+    form, refine, residual, precision : how accelerations are solved for, as in `Multibody.forward_dynamics`; precision "double",
+        "extended" or "quad", of everything in a scene
+
+    Examples
+    --------
+    >>> import pycraft as pc
+    >>> arm = pc.chain(2)
+    >>> scene = pc.Scene(arm).add(pc.effects.Gravity(g=(0, -9.81, 0)), pc.effects.Damping(0.1))
+    >>> scene
+    <scene of 'chain of 2 rods': gravity, damping>
+    >>> run = scene.simulate(1.0)
+    >>> energy = run.energy["kinetic"] + run.energy["potential"] - run.energy["work"].sum(axis=1)
+    >>> bool(np.ptp(energy) < 1e-7)
+    True
+    """
+
+    def __init__(self, model: Any, *, form: str = "fast", refine: Any = 0, residual: str = "same", precision: Any = "double"):
+        if not isinstance(model, _core.Multibody):
+            raise _core.ModelError(f"a scene is of a model, not of {model!r:.80}")
+        self._model = model
+        self._entries: dict[str, tuple[Effect, bool]] = {}
+        self._how = (form, _core.checked_refinement(refine, residual, precision), residual, precision)
+        self._built: tuple[Any, Any] | None = None
+        self._calls()
+
+    # ------------------------------------------------------------------ effects
+    @property
+    def model(self) -> Any:
+        """The model."""
+        return self._model
+
+    @property
+    def effects(self) -> Effects:
+        """The effects by name."""
+        return Effects(self._entries, self)
+
+    def add(self, *effects: Any, name: str | None = None) -> Scene:
+        """Add effects, in their order; returns the scene.
+
+        Parameters
+        ----------
+        effects : effects of `pycraft.effects`, or callables (t, state) -> forces (`UserEffect`)
+        name : of a single one; its kind's by default ("damping"), with a number where that is taken ("damping_2")
+
+        Raises
+        ------
+        ModelError
+            Names of the model that are not there, with the nearest; numbers that make no sense; a name that is taken; two effects that
+            claim the same coordinate. The scene is then as it was.
+        """
+        if name is not None and len(effects) != 1:
+            raise _core.ModelError(f"name={name!r} is of one effect, not of {len(effects)}")
+        before, core = dict(self._entries), self._fresh_core()
+        try:
+            for given in effects:
+                effect = given if isinstance(given, Effect) else UserEffect(given)
+                called = core.add("" if name is None else text(name, "an effect"), effect.made_for(self._model), True)
+                self._entries[called] = (effect, True)
+        except BaseException:
+            self._entries.clear()
+            self._entries.update(before)
+            raise
+        self._built = None
+        return self
+
+    def remove(self, *names: Any) -> Scene:
+        """Take effects out, by name or themselves; returns the scene."""
+        for name in [self._name(name) for name in names]:
+            del self._entries[name]
+        self._built = None
+        return self
+
+    def enable(self, *names: Any) -> Scene:
+        """Turn effects on, by name or themselves. ModelError where another that is on claims the same coordinate."""
+        return self._turn(names, True)
+
+    def disable(self, *names: Any) -> Scene:
+        """Turn effects off, by name or themselves: they stay in the scene and cost nothing."""
+        return self._turn(names, False)
+
+    def is_on(self, name: Any) -> bool:
+        """Whether an effect is on."""
+        return self._entries[self._name(name)][1]
+
+    def _turn(self, names: tuple[Any, ...], on: bool) -> Scene:
+        called = [self._name(name) for name in names]
+        if on:
+            core = self._fresh_core()
+            for name in called:
+                core.set_on(name, True)
+        for name in called:
+            self._entries[name] = (self._entries[name][0], on)
+        self._built = None
+        return self
+
+    def _name(self, of: Any) -> str:
+        for name, (effect, _) in self._entries.items():
+            if of is effect or (isinstance(effect, UserEffect) and of is effect.function) or (isinstance(of, str) and of == name):
+                return name
+        raise _core.ModelError(self._unknown(of))
+
+    def _unknown(self, name: Any) -> str:
+        from difflib import get_close_matches
+
+        near = get_close_matches(name, list(self._entries), 1, 0.0) if isinstance(name, str) else []
+        return f"the scene of {self._model.name!r} has no effect {name!r}" + (f"; did you mean {near[0]!r}?" if near else "")
+
+    # ------------------------------------------------------------------ the core's own
+    def _fresh_core(self) -> _core.SceneEffects:
+        core = _core.SceneEffects(self._model)
+        for name, (effect, on) in self._entries.items():
+            core.add(name, effect.made_for(self._model), on)
+        return core
+
+    def _calls(self) -> _core.SceneCalls:
+        """What computes, made anew where effects or the model have changed."""
+        now = (
+            self._model._parameters,
+            self._how,
+            tuple((name, id(effect), effect._changes, on) for name, (effect, on) in self._entries.items()),
+        )
+        if self._built is None or self._built[0] != now:
+            form, refine, residual, precision = self._how
+            self._built = (now, _core.SceneCalls(self._fresh_core(), form, refine, residual, precision))
+        return self._built[1]
+
+    # ------------------------------------------------------------------ states and runs
+    def evaluate(self, q=None, v=None, t: float = 0.0, *, states=None, step: float = 0.0) -> Evaluation:
+        """Accelerations and forces at a state.
+
+        Parameters
+        ----------
+        q, v : (nq,), (nv,), by the rule of direct calls; beside an array q without v the model is at rest, and no pass that needs
+            velocities runs
+        t : s
+        states : of the effects' own; as they are at first where left out
+        step : s
+            Accelerations of an implicit step of this size: D has h C + h² K of implicit damping and stiffness in addition.
+
+        Raises
+        ------
+        ModelError
+            q or v of another size, not finite.
+        EvaluationError
+            An effect whose forces are not finite, by name, with the time.
+        SingularHingeError
+            As forward dynamics.
+        """
+        resting = v is None and q is not None and not hasattr(q, "v")
+        q, v = at_state(self._model, q, v)
+        own = [] if states is None else np.asarray(_core.real_array(states, "states")).tolist()
+        found = self._calls().evaluate(q, None if resting else v, one_number(t, "t"), own, one_number(step, "step"))
+        return Evaluation(found["vdot"], found["forces"], found["passes"])
+
+    def simulate(
+        self,
+        T: float,
+        q=None,
+        v=None,
+        *,
+        integrator: str = "dopri5",
+        rtol: float = 1e-9,
+        atol: float = 1e-12,
+        step: float | None = None,
+        t_eval=None,
+        energy: bool = True,
+        normalise: str = "never",
+    ) -> Run:
+        """The motion from a state at t = 0 to T.
+
+        Parameters
+        ----------
+        T : s
+        q, v : (nq,), (nv,) at t = 0, by the rule of direct calls; prescribed coordinates are their motion's
+        integrator : {"dopri5", "cash-karp54", "fehlberg78", "bulirsch-stoer", "rk4", "rkmk4", "semi-implicit-euler"}
+            As in `Multibody.integrate_ode`. "semi-implicit-euler" (order 1, steps of one size) takes implicit damping and stiffness into D:
+            stable for any.
+        rtol, atol : tolerances on the error of one step, per component of q, v and the effects' own states
+        step : s
+            Of one-size steps; the first step of the others, chosen if left out.
+        t_eval : (K,) s, rising, from 0 to T at most; the end of every step where left out
+        energy : bool
+            Whether the work of each effect is kept account of, for `Run.energy`.
+        normalise : {"never", "each step"}
+            Whether quaternions are set to unit length after each step.
+
+        Raises
+        ------
+        EvaluationError
+            Unknown names, times out of order, tolerances below the precision; the time where the step size falls to rounding or the
+            state is no longer finite; an effect whose forces are not finite, by name, with the time.
+        SingularHingeError
+            Of forward dynamics, with the time.
+        """
+        if integrator not in _core.integrators(scenes=True):
+            raise _core.EvaluationError(
+                f"no integrator is called {integrator!r}; there are {', '.join(map(repr, _core.integrators(scenes=True)))}"
+            )
+        if normalise not in ("never", "each step"):
+            raise _core.EvaluationError(f"normalise={normalise!r}: there are 'never' and 'each step'")
+        if step is not None and not step > 0:
+            raise _core.EvaluationError(f"step={step}: a step is a positive number of seconds")
+        times, every_step, keep = run_times(one_number(T, "T"), t_eval)
+        q, v = at_state(self._model, q, v)
+        calls = self._calls()
+        found = calls.simulate(
+            q, v, times, [], energy, integrator, float(rtol), float(atol), float(step or 0), every_step, normalise != "never"
+        )  # fmt: skip
+        names = [name for name, (_, on) in self._entries.items() if on]
+        return Run(self._model, calls, names, found, keep, energy)
+
+    # ------------------------------------------------------------------ what it is
+    def explain(self, at: str = "motion") -> str:
+        """The plan as a table: the passes of an evaluation, what each does, and the effects that it is there for.
+
+        at : {"motion", "rest", "works"}: of a motion, of a state at rest, of a run that keeps account of works
+        """
+        if at not in ("motion", "rest", "works"):
+            raise _core.EvaluationError(f"at={at!r}: there are 'motion', 'rest' and 'works'")
+        off = [name for name, (_, on) in self._entries.items() if not on]
+        return plan_text(self._model.name, self._calls().plan(at), off, self._how)
+
+    def __repr__(self) -> str:
+        shown = [name if on else f"({name} off)" for name, (_, on) in self._entries.items()]
+        return f"<scene of {self._model.name!r}: {', '.join(shown) or 'empty'}>"
+
+    def __str__(self) -> str:
+        lines = [f"scene of {self._model.name!r}"]
+        lines += [f"  {'on ' if on else 'off'} {name}: {effect!r}" for name, (effect, on) in self._entries.items()]
+        return "\n".join(lines if self._entries else [*lines, "  empty"])
+
+    # ------------------------------------------------------------------ copies
+    def __reduce__(self):
+        return _again, (type(self), self._model, list((name, effect, on) for name, (effect, on) in self._entries.items()), self._how)
+
+
+def _again(kind: type[Scene], model: Any, entries: list[tuple[str, Effect, bool]], how: tuple[Any, ...]) -> Scene:
+    form, refine, residual, precision = how
+    scene = kind(model, form=form, refine=refine, residual=residual, precision=precision)
+    scene._entries.update({name: (effect, on) for name, effect, on in entries})
+    return scene
