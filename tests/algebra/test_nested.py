@@ -114,6 +114,7 @@ def test_a_run_within_a_signals_handler(inner, states):
     Q, V = uniform_batch(model, states)
     MM = mass_matrix(model.soa)
     e, run, calls = (MM + model.soa.D).inv().at(Q, V), inner(model), []
+
     def handler(*_):
         calls.append(None)
         run()

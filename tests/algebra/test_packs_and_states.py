@@ -1,4 +1,4 @@
-"""What packs leave to their states: states without a value, pivots that others would choose, models that changed, threads; and what programs hold."""
+"""What packs leave to their states: those without a value, pivots that others would choose; models that changed, memory, threads."""
 
 import threading
 
@@ -7,7 +7,7 @@ import pytest
 
 import pycraft as pc
 from support.mechanisms import build, massless_inner_bodies, uniform_batch
-from support.packs import in_packs, one_by_one, packed
+from support.packs import NEVER, in_packs, one_by_one, packed, packs_from
 
 STATES = 60
 
@@ -215,3 +215,48 @@ def test_threads_of_the_caller():
     for thread in threads:
         thread.join()
     assert not wrong
+
+
+# ---------------------------------------------------------------------- what a run says
+def test_passes_are_counted():
+    """A pack executes for every state what its recording did."""
+    model = pc.robots.panda()
+    Q, V = uniform_batch(model, 24)
+    for e in (model.soa.MM.inv(), (model.soa.MM + 0.1 * model.soa.I).inv(), model.soa.psi.T @ model.soa.phi.T):
+        counts = []
+        for states in (1, NEVER):
+            with packs_from(states):
+                bound = e.at(Q, V)
+                bound @ np.ones(e.shape[1])
+                passes = bound.plan().passes
+                counts.append([getattr(passes, name) for name in ("values", "gathers", "scatters", "kernels", "eliminations", "dense")])
+        assert counts[0] == counts[1]
+
+
+def test_it_is_said():
+    model = pc.robots.panda()
+    Q, V = uniform_batch(model, 24)
+    bound = model.soa.MM.inv().at(Q, V)
+    in_packs(lambda: bound @ np.ones(7))
+    assert "in the last run: packs: 24 states, " in str(bound.explain())
+    one_by_one(lambda: bound @ np.ones(7))
+    assert "packs" not in str(bound.explain())
+
+
+def test_it_pays():
+    """Long batches are recorded without being told to, short ones are not."""
+    model = pc.robots.panda()
+    (Q, V), e = uniform_batch(model, 4000), model.soa.MM.inv()
+    e.at(Q[:3], V[:3]) @ np.ones(7)
+    assert not packed(e.at(Q[:3], V[:3]))
+    bound = e.at(Q, V)
+    bound @ np.ones(7)
+    assert packed(bound)
+    short = e.at(Q[:8], V[:8])
+    short @ np.ones(7)
+    assert packed(short).startswith("packs: 8 states")
+    eliminated = (model.soa.MM + 0.1 * model.soa.I).inv()
+    for count, expected in ((63, False), (64, True), (63, False)):
+        bound = eliminated.at(Q[:count], V[:count])
+        bound @ np.ones(7)
+        assert bool(packed(bound)) == expected

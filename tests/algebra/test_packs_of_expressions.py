@@ -1,4 +1,4 @@
-"""Batches of expressions in packs: the bits of the states one by one, whatever is asked, of whichever model; where pivots are chosen once, their rounding."""
+"""Batches of expressions in packs: the bits of the states one by one, whatever is asked; where pivots are chosen once, their rounding."""
 
 import copy
 import pickle
@@ -9,7 +9,7 @@ import pytest
 import pycraft as pc
 from pycraft import _core
 from support.mechanisms import build, every_kind, massless_inner_bodies, random_tree, rotors_on_some, uniform_batch, with_hinges
-from support.packs import in_packs, one_by_one, packed, packs_from
+from support.packs import in_packs, one_by_one, packed
 
 STATES = 11
 
@@ -61,7 +61,13 @@ def expressions(model):
     }
     if model.nv:
         i = model.nv // 2
-        found |= {"inverse": (MM + soa.J).inv(), "derivative": MM.diff(i), "of the inverse": (MM + soa.J).inv().diff(i), "rate": MM.dot(), "sweep's": P.diff(i)}
+        found |= {
+            "inverse": (MM + soa.J).inv(),
+            "derivative": MM.diff(i),
+            "of the inverse": (MM + soa.J).inv().diff(i),
+            "rate": MM.dot(),
+            "sweep's": P.diff(i),
+        }
     return found
 
 
@@ -172,10 +178,10 @@ def test_what_is_decided_once_hangs_on_no_history():
         model = pins_askew()
         e = (model.soa.MM + 0.3 * model.soa.I).inv()
         for i in order:
-            y = e.at(*states[i]) @ (np.ones(5) * 10.0 ** len(order))
-        found.append(y / 10.0 ** len(order))
-        assert packed(e.at(*states[0])) or True
-    assert np.abs(found[0] - found[1]).max() <= 1e-14 * np.abs(found[0]).max()
+            y = e.at(*states[i]) @ (np.ones(5) * 2.0 ** len(order))
+        found.append(y / 2.0 ** len(order))
+    np.testing.assert_array_equal(found[1], found[0])
+    np.testing.assert_array_equal(found[2], found[0])
     model = pins_askew()
     e = (model.soa.MM + 0.3 * model.soa.I).inv()
     first = e.at(*states[0]) @ np.ones(5)
@@ -254,7 +260,11 @@ def test_beside_other_states_and_models():
     a.q = a.random_state(99).q
     across = pc.constant(np.eye(3), a.soa.Theta, b.soa.Theta)
     here = a.soa.MM.at(a.random_state(5).q)
-    for e in (here.inv() @ a.soa.MM.at(Qa, Va), a.soa.MM @ a.soa.MM.at(Qa, Va).inv(), b.soa.MM.at(Qb, Vb) @ across @ a.soa.MM.inv().at(Qa, Va)):
+    for e in (
+        here.inv() @ a.soa.MM.at(Qa, Va),
+        a.soa.MM @ a.soa.MM.at(Qa, Va).inv(),
+        b.soa.MM.at(Qb, Vb) @ across @ a.soa.MM.inv().at(Qa, Va),
+    ):
         for _ in range(2):
             together = in_packs(lambda: e @ np.ones(3))  # noqa: B023 - called at once
             assert packed(e)
@@ -285,7 +295,12 @@ def test_bare_trees_and_groups():
     for e in (groups.psi, groups.P, groups.D):
         np.testing.assert_array_equal(in_packs(lambda: e.at(Q, V).dense()), one_by_one(lambda: e.at(Q, V).dense()))  # noqa: B023 - called at once
     rng = np.random.default_rng(0)
-    bare = pc.sko_model([-1, 0, 0], [None, rng.normal(size=(3, 2)), rng.normal(size=(3, 4))], [rng.normal(size=(1, n)) for n in (3, 2, 4)], [np.eye(n) for n in (3, 2, 4)])
+    bare = pc.sko_model(
+        [-1, 0, 0],
+        [None, rng.normal(size=(3, 2)), rng.normal(size=(3, 4))],
+        [rng.normal(size=(1, n)) for n in (3, 2, 4)],
+        [np.eye(n) for n in (3, 2, 4)],
+    )
     at = bare.MM.inv().at(np.zeros((9, 0)))
     X = rng.normal(size=(9, 3))
     np.testing.assert_array_equal(in_packs(lambda: at @ X), one_by_one(lambda: at @ X))
@@ -321,7 +336,10 @@ def test_both_sides_of_every_theorem():
             bound = side.at(Q, V)
             try:
                 singly = one_by_one(bound.dense)
-            except pc.EvaluationError:  # vectors that are to be given, inverses that are not there
+            except pc.Error as refused:  # vectors that are to be given, inverses that are not there
+                with pytest.raises(type(refused)) as error:
+                    in_packs(bound.dense)
+                assert str(error.value) == str(refused)
                 continue
             together = in_packs(bound.dense)
             done += bool(packed(bound, "dense"))
@@ -342,48 +360,3 @@ def test_random_trees():
             for form in ("fast", "ud", "square-root"):
                 bound = e.at(Q, V, form=form)
                 np.testing.assert_array_equal(in_packs(bound.dense), one_by_one(bound.dense), f"seed {seed}, {name}, {form}")
-
-
-# ---------------------------------------------------------------------- what a run says
-def test_passes_are_counted():
-    """A pack executes for every state what its recording did."""
-    model = pc.robots.panda()
-    Q, V = uniform_batch(model, 24)
-    for e in (model.soa.MM.inv(), (model.soa.MM + 0.1 * model.soa.I).inv(), model.soa.psi.T @ model.soa.phi.T):
-        counts = []
-        for states in (1, 2**31 - 1):
-            with packs_from(states):
-                bound = e.at(Q, V)
-                bound @ np.ones(e.shape[1])
-                passes = bound.plan().passes
-                counts.append([getattr(passes, name) for name in ("values", "gathers", "scatters", "kernels", "eliminations", "dense")])
-        assert counts[0] == counts[1]
-
-
-def test_it_is_said():
-    model = pc.robots.panda()
-    Q, V = uniform_batch(model, 24)
-    bound = model.soa.MM.inv().at(Q, V)
-    in_packs(lambda: bound @ np.ones(7))
-    assert "in the last run: packs: 24 states, " in str(bound.explain())
-    one_by_one(lambda: bound @ np.ones(7))
-    assert "packs" not in str(bound.explain())
-
-
-def test_it_pays():
-    """Long batches are recorded without being told to, short ones are not."""
-    model = pc.robots.panda()
-    (Q, V), e = uniform_batch(model, 4000), model.soa.MM.inv()
-    e.at(Q[:3], V[:3]) @ np.ones(7)
-    assert not packed(e.at(Q[:3], V[:3]))
-    bound = e.at(Q, V)
-    bound @ np.ones(7)
-    assert packed(bound)
-    short = e.at(Q[:8], V[:8])
-    short @ np.ones(7)
-    assert packed(short).startswith("packs: 8 states")
-    eliminated = (model.soa.MM + 0.1 * model.soa.I).inv()
-    for count, expected in ((63, False), (64, True), (63, False)):
-        bound = eliminated.at(Q[:count], V[:count])
-        bound @ np.ones(7)
-        assert bool(packed(bound)) == expected
