@@ -95,8 +95,17 @@ py::array_t<double> to_numpy(const std::vector<double>& v);
 Coefficient to_coefficient(const py::handle& value);
 py::object to_number(const Coefficient& c);
 
-// A run's numbers as an array of this shape; with expansions, an object array of mpmath numbers that lose nothing.
-py::object to_array(const Result& result, std::vector<py::ssize_t> shape);
+// A run's numbers as an array of this shape, into which the run writes; of objects, mpmath numbers that lose nothing.
+class ArrayOfRun {
+ public:
+  explicit ArrayOfRun(std::vector<py::ssize_t> shape, bool of_objects = false);
+  Result result;
+  py::object array() const;  // after the run
+
+ private:
+  std::vector<py::ssize_t> shape_;
+  py::object array_;
+};
 bool wants_objects(const py::object& dtype);
 int thread_count(const py::object& threads);                    // threads=: from 1 to 1024, else EvaluationError
 

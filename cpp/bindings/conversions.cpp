@@ -203,19 +203,23 @@ py::object to_number(const Coefficient& c) {
   return py::module_::import("fractions").attr("Fraction")(whole_number(above), whole_number(below));
 }
 
-py::object to_array(const Result& r, std::vector<py::ssize_t> shape) {
+ArrayOfRun::ArrayOfRun(std::vector<py::ssize_t> shape, bool of_objects) : shape_(std::move(shape)) {
+  if (of_objects) return;
+  py::array_t<double> a(shape_);
+  result.into = a.mutable_data();
+  array_ = std::move(a);
+}
+
+py::object ArrayOfRun::array() const {
   py::ssize_t entries = 1;
-  for (py::ssize_t n : shape) entries *= n;
-  if (entries != static_cast<py::ssize_t>(r.values.size()))  // never memory that nothing was written to
-    throw std::logic_error("a run gave " + std::to_string(r.values.size()) + " numbers where " + std::to_string(entries) + " were asked for");
-  if (r.expansions.empty() || r.expansions.size() != r.values.size()) {
-    py::array_t<double> a(shape);
-    if (entries) std::memcpy(a.mutable_data(), r.values.data(), r.values.size() * sizeof(double));
-    return a;
-  }
+  for (py::ssize_t n : shape_) entries *= n;
+  const py::ssize_t given = py::ssize_t(result.rows) * result.columns * (result.batch >= 0 ? result.batch : 1);
+  if (entries != given)  // never memory that nothing was written to
+    throw std::logic_error("a run gave " + std::to_string(given) + " numbers where " + std::to_string(entries) + " were asked for");
+  if (array_) return array_;
   py::list parts;
-  for (const auto& e : r.expansions) parts.append(py::cast(e));
-  return of_face("exact_numbers")(parts, py::cast(shape));
+  for (const auto& e : result.expansions) parts.append(py::cast(e));
+  return of_face("exact_numbers")(parts, py::cast(shape_));
 }
 
 Array real_array(const py::object& x) {

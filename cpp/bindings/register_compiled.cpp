@@ -6,7 +6,7 @@
 #include "bindings/compiled_library.h"
 #include "bindings/plain_arrays.h"
 #include "kernels/link_model.h"
-#include "kernels/tape.h"
+#include "kernels/taped_calls.h"
 #include "model/multibody.h"
 #include <structmember.h>  // after Python.h
 
@@ -153,14 +153,17 @@ py::object tape(const Multibody& model, const std::string& call) {
   const auto n = static_cast<py::ssize_t>(made.operations.size());
   py::array_t<int> first(n), second(n);
   py::list what;
+  const py::str arrays[] = {"q", "v", "u"};
   std::vector<py::str> names(std::begin(kernels::names_of_operations), std::end(kernels::names_of_operations));
   py::array_t<double> number(n);
   for (py::ssize_t i = 0; i < n; ++i) {
     const kernels::Operation& o = made.operations[i];
-    what.append(names[static_cast<size_t>(o.does)]);
+    what.append(o.does == kernels::Does::input ? arrays[o.second] : names[static_cast<size_t>(o.does)]);
     first.mutable_at(i) = o.first, second.mutable_at(i) = o.second, number.mutable_at(i) = o.number;
   }
-  return py::make_tuple(what, first, second, number, made.results, made.sound);
+  std::vector<int> results;
+  for (const kernels::TapedResult& r : made.results) results.push_back(r.from);
+  return py::make_tuple(what, first, second, number, results, made.guards.empty() ? -1 : made.guards[0].truth);
 }
 
 }  // namespace

@@ -45,6 +45,14 @@ void with_remedy(const Expression& e, F f) {
   }
 }
 
+// The axes of a result: states, if there are several, and rows.
+std::vector<py::ssize_t> rows_of(const Expression& e, int batch) {
+  std::vector<py::ssize_t> shape;
+  if (batch >= 0) shape.push_back(batch);
+  shape.push_back(e.codomain().dimension());
+  return shape;
+}
+
 // y = e x
 py::object apply_to_array(Expression e, const py::object& given) {
   const Array x = real_array(given);
@@ -78,21 +86,19 @@ py::object apply_to_array(Expression e, const py::object& given) {
     inputs.columns = columns ? static_cast<int>(x.shape(2)) : 1;
     inputs.batched = true;
   }
-  Result r;
+  std::vector<py::ssize_t> shape = rows_of(e, batch);
+  if (columns) shape.push_back(inputs.columns);
+  ArrayOfRun y(shape);
   {
     ReleasedGil release;
     with_remedy(e, [&] {
-      while (!plan->run(inputs, false, r)) {  // the model changed since the plan was made
+      while (!plan->run(inputs, false, y.result)) {  // the model changed since the plan was made
         check_interrupt();
         plan = prepare(e, Request::apply);
       }
     });
   }
-  std::vector<py::ssize_t> shape;
-  if (batch >= 0) shape.push_back(batch);
-  shape.push_back(e.codomain().dimension());
-  if (columns) shape.push_back(inputs.columns);
-  return to_array(r, shape);
+  return y.array();
 }
 
 // x e = (e* x*)*
@@ -133,30 +139,24 @@ py::object dense(const Expression& e, const py::object& dtype, bool rules) {
   const int batch = batch_of(e);
   check_dense_size(e, batch);
   const bool objects = wants_objects(dtype);
-  Result r;
+  std::vector<py::ssize_t> shape = rows_of(e, batch);
+  shape.push_back(e.domain().dimension());
+  ArrayOfRun y(shape, objects);
   {
     ReleasedGil release;
-    with_remedy(e, [&] { evaluate(e, Request::dense, r, rules, objects); });
+    with_remedy(e, [&] { evaluate(e, Request::dense, y.result, rules, objects); });
   }
-  std::vector<py::ssize_t> shape;
-  if (batch >= 0) shape.push_back(batch);
-  shape.push_back(e.codomain().dimension());
-  shape.push_back(e.domain().dimension());
-  return to_array(r, shape);
+  return y.array();
 }
 
 py::object diagonal(const Expression& e) {
   if (e.floating()) throw SpaceError("I has no space yet: combine it with an operator before asking for its entries");
-  const int batch = batch_of(e);
-  Result r;
+  ArrayOfRun y(rows_of(e, batch_of(e)));
   {
     ReleasedGil release;
-    with_remedy(e, [&] { evaluate(e, Request::diagonal, r); });
+    with_remedy(e, [&] { evaluate(e, Request::diagonal, y.result); });
   }
-  std::vector<py::ssize_t> shape;
-  if (batch >= 0) shape.push_back(batch);
-  shape.push_back(e.codomain().dimension());
-  return to_array(r, shape);
+  return y.array();
 }
 
 // The value of a vector expression, named vectors given by name.
@@ -179,17 +179,13 @@ py::object value(const Expression& e, const py::kwargs& vectors) {
     const Array a = real_array(py::reinterpret_borrow<py::object>(array));
     inputs.vectors[key].assign(a.data(), a.data() + a.size());
   }
-  const int batch = batch_of(e);
-  Result r;
   const bool objects = wants_objects(dtype);
+  ArrayOfRun y(rows_of(e, batch_of(e)), objects);
   {
     ReleasedGil release;
-    with_remedy(e, [&] { apply(e, inputs, r, rules, objects); });
+    with_remedy(e, [&] { apply(e, inputs, y.result, rules, objects); });
   }
-  std::vector<py::ssize_t> shape;
-  if (batch >= 0) shape.push_back(batch);
-  shape.push_back(e.codomain().dimension());
-  return to_array(r, shape);
+  return y.array();
 }
 
 void define_spaces_and_states(py::class_<Expression>& op) {

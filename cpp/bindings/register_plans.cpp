@@ -2,6 +2,7 @@
 
 #include <cstdint>
 
+#include "algebra/engine/packs.h"
 #include "algebra/language/values.h"
 #include "algebra/planning/explain.h"
 #include "algebra/planning/realization.h"
@@ -186,6 +187,8 @@ void register_plans(py::module_& m) {
   m.def("forms", [] { return std::vector<Form>(std::begin(forms), std::end(forms)); }, "The forms of the articulated-inertia sweep.");
   m.def("wider", [](Precision precision) { return precision == Precision::digits100 ? py::object(py::none()) : py::cast(precisions[static_cast<int>(precision) + 1]); },
         py::arg("precision"), "The next wider precision, None for the widest.");
+  m.def("record_from", &Packs::record_from, py::arg("states"),
+        "From how many states on a batch is recorded, whatever that takes; 0: as is best. Returns how it was before.");
   m.def("step_kinds", [] {
     std::vector<std::string> names;
     for (int i = 0; i < step_kinds; ++i) names.push_back(step_kind_name(static_cast<StepKind>(i)));

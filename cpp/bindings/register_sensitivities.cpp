@@ -120,23 +120,13 @@ void register_sensitivities(py::module_& m) {
         const Multibody& mb = d.model();
         const int n = mb.nv(), bodies = mb.bodies();
         Arguments given(mb, {{"q", q}});
-        std::vector<py::ssize_t> shape;
-        if (over == "coordinates")
-          shape = {n};
-        else if (over == "inertias")
-          shape = {bodies, 10};
-        else if (over == "geometry")
-          shape = {bodies, 6};
-        else if (over == "axes")
-          shape = {n, 6};
-        else
-          throw EvaluationError("gradient over '" + over + "': there are coordinates, inertias, geometry, axes");
-        const char which = over[0];
-        return run(d, precision, given, py::none(), shape, [which](auto& w, auto in, auto* y) {
-          using P = decltype(y);
-          P none = nullptr;
-          w.log_determinant(in[0], which == 'c' ? y : none, which == 'i' ? y : none, which == 'g' ? y : none, which == 'a' ? y : none);
-        });
+        const std::pair<GradientOver, std::vector<py::ssize_t>> all[] = {
+            {GradientOver::coordinates, {n}}, {GradientOver::inertias, {bodies, 10}}, {GradientOver::geometry, {bodies, 6}}, {GradientOver::axes, {n, 6}}};
+        static constexpr const char* names[] = {"coordinates", "inertias", "geometry", "axes"};
+        const auto named = std::find(std::begin(names), std::end(names), over);
+        if (named == std::end(names)) throw EvaluationError("gradient over '" + over + "': there are coordinates, inertias, geometry, axes");
+        const auto& [which, shape] = all[named - names];
+        return written(mb, given, py::none(), shape, [&](double* target) { d.log_determinant(which, given[0], precision, target); });
       }, py::arg("over"), q, precision);
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dynamics/batch_dynamics.h"
+#include "dynamics/packed_gradients.h"
 #include "dynamics/sensitivities.h"
 
 namespace pycraft {
@@ -47,6 +48,28 @@ class BatchSensitivities : public Batches<Sensitivities> {
     if (!dynamics_.by_links(precision, {.call = kernels::Call::inverse_dynamics_derivatives, .q = q, .v = &v, .u = &vdot, .others = &out[1]}, states, static_cast<int>(square), out[0], general)) general(0, states);
   }
 
+  // Gradients of ln det(ℳ + J), batches in packs.
+  void log_determinant(GradientOver over, const Given& q, Precision precision, double* out) {
+    const auto compute = [over](auto& w, auto in, auto* y) {
+      using P = decltype(y);
+      const auto wanted = [&](GradientOver one) { return one == over ? y : P(nullptr); };
+      w.log_determinant(in[0], wanted(GradientOver::coordinates), wanted(GradientOver::inertias), wanted(GradientOver::geometry), wanted(GradientOver::axes));
+    };
+    const int size = gradient_size(model(), over);
+    if (precision != Precision::double_ || q.batch < PackedGradients::least) return run(precision, {q}, size, out, compute);
+    const ModelInUse use(model());
+    check_given(model(), {q});
+    const std::vector<int> left = gradients_.run(model(), over, q.data, q.batch, out);
+    each<double>(0, static_cast<int>(left.size()), 1, [&](Sensitivities<double>& w, int i) {
+      naming_state(left[i], q.batch, [&] {
+        const double* const in[] = {q.at(left[i])};
+        double* const y = out + size_t(left[i]) * size;
+        compute(w, in, y);
+        require_finite(y, size, model());
+      });
+    });
+  }
+
   // C, (nv, nv) a state: Hφ(MJ̇ + 𝓑J) or Christoffel's.
   void coriolis_matrix(bool skew, const Given& q, const Given& v, Precision precision, double* out) {
     if (precision == Precision::double_ && dynamics_.coriolis_matrix(skew, q, v, out)) return;
@@ -81,6 +104,7 @@ class BatchSensitivities : public Batches<Sensitivities> {
 
  private:
   BatchDynamics dynamics_;
+  PackedGradients gradients_;
 };
 
 }  // namespace pycraft

@@ -4,7 +4,7 @@
 // At its ends a block sticks out: into columns of another branch, which wait at their place, or into room at a row's end. A mask keeps those still.
 #pragma once
 
-#include "kernels/lanes.h"
+#include "lanes/lanes.h"
 #include "spatial/vector3.h"
 
 namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET {

@@ -1,5 +1,4 @@
-// The kernels that this machine runs: of the widest instruction set that it has and that was built, or of the one that the environment
-// variable PYCRAFT_ISA names ("baseline", "avx2", "avx512"; on arm64 "neon").
+// The kernels of the instruction set that this machine runs (lanes/lane_sets.h).
 #pragma once
 
 #include <string>

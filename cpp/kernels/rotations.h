@@ -5,7 +5,7 @@
 // (-1: none): what is stored there does not count. turned_zero<zero> is what is zero afterwards.
 #pragma once
 
-#include "kernels/lanes.h"
+#include "lanes/lanes.h"
 #include "spatial/symmetric3.h"
 #include "spatial/vector3.h"
 

@@ -5,7 +5,7 @@
 
 #include "kernels/links.h"
 #include "kernels/rotations.h"
-#include "kernels/sine_cosine.h"
+#include "lanes/sine_cosine.h"
 
 namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET {
 

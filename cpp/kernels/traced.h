@@ -1,9 +1,10 @@
 // A number that writes down on a tape what is done to it, in the place of Lanes: kernels run on it as they are.
 #pragma once
 
-#include "kernels/lanes.h"
-#include "kernels/sine_cosine.h"
-#include "kernels/tape.h"
+#include "kernels/links.h"
+#include "lanes/lanes.h"
+#include "lanes/sine_cosine.h"
+#include "lanes/tape.h"
 
 namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET {
 
@@ -17,7 +18,7 @@ struct Recording {
   const States<double>& at;
   int nq, nv;
   int put(Does does, int first, int second = 0, double number = 0) {
-    tape.operations.push_back({does, first, second, number});
+    tape.operations.push_back({does, first, second, 0, number});
     return static_cast<int>(tape.operations.size()) - 1;
   }
 };
@@ -51,7 +52,8 @@ struct Number {
   static Truth all() { return {-1}; }
   friend Truth greater(Number a, Number b) { return {by(Does::greater, a, b).id}; }
   static unsigned mask(Truth truth) {
-    recording->tape.sound = truth.id;
+    recording->tape.guards.clear();
+    if (truth.id >= 0) recording->tape.guards.push_back({truth.id, true});
     return ~0u;
   }
 };
@@ -69,11 +71,11 @@ inline Number gathered<Number>(const double* x, size_t, int) {
   const States<double>& at = recording->at;
   Number a;
   if (x >= at.q && x < at.q + recording->nq)
-    a.id = recording->put(Does::q, static_cast<int>(x - at.q));
+    a.id = recording->put(Does::input, static_cast<int>(x - at.q), 0);
   else if (x >= at.v && x < at.v + recording->nv)
-    a.id = recording->put(Does::v, static_cast<int>(x - at.v));
+    a.id = recording->put(Does::input, static_cast<int>(x - at.v), 1);
   else
-    a.id = recording->put(Does::u, static_cast<int>(x - at.u));
+    a.id = recording->put(Does::input, static_cast<int>(x - at.u), 2);
   return a;
 }
 inline void scattered(const Number& a, double* x, size_t, int) { *x = a.id; }

@@ -149,6 +149,10 @@ class Multibody : public std::enable_shared_from_this<Multibody> {
   mutable PerScalar<CompiledPointer> compiled_;
 };
 
+// Recorded numbers of the model are constants: those of its doubles.
+template <>
+std::shared_ptr<const CompiledModel<Recorded>> Multibody::compiled<Recorded>() const;
+
 // An evaluation: as long as it lives the model is not edited.
 class ModelInUse {
  public:

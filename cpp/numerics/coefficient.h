@@ -37,9 +37,9 @@ class Coefficient {
   // In the precision of a run.
   template <class S>
     requires(std::same_as<S, Single> || std::same_as<S, double> || std::same_as<S, Extended> || std::same_as<S, Quad> || std::same_as<S, Digits50> ||
-             std::same_as<S, Digits100>)
+             std::same_as<S, Digits100> || is_recorded<S>)
   explicit operator S() const {
-    if constexpr (std::same_as<S, Single> || std::same_as<S, double>) {
+    if constexpr (std::same_as<S, Single> || std::same_as<S, double> || is_recorded<S>) {
       return static_cast<S>(value_);
     } else {
       if (!exact_) return S(value_);

@@ -12,7 +12,7 @@
 #include <cmath>
 #include <vector>
 
-#include "numerics/scalar.h"
+#include "numerics/decisions.h"
 #include "runtime/interrupt.h"
 
 namespace pycraft {
@@ -54,7 +54,7 @@ PivotFailure<S> cholesky_upper(S* A, int n, S* work) {
     for (int i = k + 1; i < n; ++i) {
       S* below = A + size_t(i) * n;
       const S factor = row[i];
-      if (factor == S(0)) continue;
+      if (vanishes(factor)) continue;
       for (int j = i; j < n; ++j) below[j] -= factor * row[j];
     }
   }

@@ -74,10 +74,10 @@ class GramFactors {
     std::iota(order_.begin(), order_.end(), 0);
     std::vector<S> largest(rows, S(0)), column(columns_, S(0));
     for (int i = 0; i < rows; ++i)
-      for (int j = 0; j < columns_; ++j) column[j] = std::max(column[j], S(abs(X[size_t(i) * columns_ + j])));
+      for (int j = 0; j < columns_; ++j) column[j] = maximum(column[j], S(abs(X[size_t(i) * columns_ + j])));
     for (int i = 0; i < rows; ++i)
       for (int j = 0; j < columns_; ++j)
-        if (column[j] > S(0)) largest[i] = std::max(largest[i], S(abs(X[size_t(i) * columns_ + j]) / column[j]));
+        if (column[j] > S(0)) largest[i] = maximum(largest[i], S(abs(X[size_t(i) * columns_ + j]) / column[j]));
     std::stable_sort(order_.begin(), order_.end(), [&](int a, int b) { return largest[a] > largest[b]; });
   }
 

@@ -11,7 +11,7 @@
 #include <cmath>
 #include <type_traits>
 
-#include "numerics/scalar.h"
+#include "numerics/decisions.h"
 
 namespace pycraft {
 
@@ -110,7 +110,7 @@ inline void householder_lower(S* A, int stride, const int* rows, int count, int 
     S* v = A + rows[r] * stride;
     const S square = dot_product(v + r, v + r, m - r), norm = sqrt(square), head = v[r];
     if (square > S(0)) {
-      v[r] = head < S(0) ? S(head - norm) : S(head + norm);
+      v[r] = where_less(head, S(0), S(head - norm), S(head + norm));
       const S beta = S(2) / dot_product(v + r, v + r, m - r);
       for (int s = r + 1; s < count; ++s) {
         S* b = A + rows[s] * stride;
@@ -118,7 +118,7 @@ inline void householder_lower(S* A, int stride, const int* rows, int count, int 
         for (int c = r; c < m; ++c) b[c] -= f * v[c];
       }
     }
-    L[r * pivots + r] = head < S(0) ? norm : S(-norm);
+    L[r * pivots + r] = where_less(head, S(0), norm, S(-norm));
     for (int s = r + 1; s < count; ++s) L[s * pivots + r] = A[rows[s] * stride + r];
   }
 }

@@ -17,6 +17,12 @@ namespace pycraft {
 #define PYCRAFT_FOR_EACH_SCALAR_TO_QUAD(X) X(Single) X(double) X(Extended) X(Quad)
 #define PYCRAFT_FOR_EACH_SCALAR(X) X(Single) X(double) X(Extended) X(Quad) X(Digits50) X(Digits100)
 
+// The double that writes down what is done to it (recorded.h): a scalar to values and workspaces, and to nothing that a user names.
+struct Recorded;
+template <class S>
+inline constexpr bool is_recorded = std::is_same_v<S, Recorded>;
+#define PYCRAFT_FOR_EACH_SCALAR_AND_RECORDED(X) PYCRAFT_FOR_EACH_SCALAR(X) X(Recorded)
+
 // One thing per scalar that the engine runs on: std::get<Thing<S>>(...).
 template <template <class> class Thing>
 using PerScalar = std::tuple<Thing<Single>, Thing<double>, Thing<Extended>, Thing<Quad>, Thing<Digits50>, Thing<Digits100>>;

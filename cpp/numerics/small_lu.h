@@ -8,8 +8,8 @@
 #include <cmath>
 #include <vector>
 
+#include "numerics/decisions.h"
 #include "numerics/equilibration.h"
-#include "numerics/scalar.h"
 #include "runtime/interrupt.h"
 
 namespace pycraft {
@@ -18,11 +18,10 @@ namespace pycraft {
 template <class S>
 struct Magnitude {
   S mantissa = S(1);
-  long exponent = 0;
+  std::conditional_t<is_recorded<S>, S, long> exponent{};
   void multiply(const S& factor) {
-    using std::frexp;
-    int shift = 0;
-    mantissa = frexp(S(mantissa * factor), &shift);
+    decltype(exponent) shift{};
+    mantissa = split(S(mantissa * factor), shift);
     exponent += shift;
   }
   void multiply(const Magnitude& other) {
@@ -40,46 +39,48 @@ class SmallLU {
  public:
   // Factors the n x n row-major matrix A in place; it must stay where it is. sizes: the largest number that went into each entry, so that a
   // pivot below 4 n eps of them is noise; null where nothing was added up in A. False if the matrix counts as singular.
-  bool factor(S* A, int n, const S* sizes) {
+  bool factor(S* A, int n, const Soft<S>* sizes) {
     using std::abs, std::ldexp;
     A_ = A;
     n_ = n;
     rows_.resize(n);
-    column_.assign(n, S(0));
+    column_.assign(n, Soft<S>(0));
     determinant_ = {};
     sizes_.resize(size_t(n) * n);
-    for (size_t i = 0; i < sizes_.size(); ++i) sizes_[i] = maximum(S(abs(A[i])), sizes ? sizes[i] : S(0));
+    for (size_t i = 0; i < sizes_.size(); ++i) sizes_[i] = maximum(Soft<S>(abs(soft(A[i]))), sizes ? sizes[i] : Soft<S>(0));
     if (!scales_.find(sizes_.data(), n)) return false;
     row_factor_.resize(n);
     for (int i = 0; i < n; ++i) {
       rows_[i] = i;
-      row_factor_[i] = ldexp(S(1), scales_.row(i));
+      row_factor_[i] = ldexp(Soft<S>(1), scales_.row(i));
     }
+    if (is_recorded<S> && !sizes) take_column_sizes();
     for (int i = 0; i < n; ++i)
-      for (int j = 0; j < n; ++j) column_[j] = maximum(column_[j], S(sizes_[size_t(i) * n + j] * row_factor_[i]));
+      for (int j = 0; j < n; ++j) column_[j] = maximum(column_[j], Soft<S>(sizes_[size_t(i) * n + j] * row_factor_[i]));
     for (int k = 0; k < n; ++k) {
       check_interrupt_at(k, n);
       // The state's own equation, unless another one is much larger: the recursions that the equations stand for are stable as they are.
       // Else the one that the equilibration matched it with. Where units are free an entry that is rounding (a block of R that cancels)
       // looks as large as any; what is matched takes part in the determinant, and such an entry does not.
       int best = k, own = -1, matched = -1;
-      S largest = S(-1);
+      Soft<S> largest = Soft<S>(-1);
       for (int i = k; i < n; ++i) {
-        const S candidate = abs(A[rows_[i] * n + k]) * row_factor_[rows_[i]];
+        const Soft<S> candidate = abs(soft(A[rows_[i] * n + k])) * row_factor_[rows_[i]];
         if (candidate > largest) largest = candidate, best = i;
         if (rows_[i] == k) own = i;
         if (rows_[i] == scales_.matched_row(k)) matched = i;
       }
       for (int i : {matched, own})
-        if (i >= 0 && abs(A[rows_[i] * n + k]) * row_factor_[rows_[i]] > S(0.1) * largest) best = i;
-      if (!(largest > S(4 * n) * epsilon<S>() * column_[k])) return false;
+        if (i >= 0 && abs(soft(A[rows_[i] * n + k])) * row_factor_[rows_[i]] > Soft<S>(0.1) * largest) best = i;
+      if (!(largest > Soft<S>(4 * n) * epsilon<Soft<S>>() * column_[k])) return false;
+      if (is_recorded<S> && !sizes && !still_chosen(k, best)) return false;
       std::swap(rows_[k], rows_[best]);
       const S* pivot_row = A + rows_[k] * n;
       determinant_.multiply(abs(pivot_row[k]));
       const S inverse = S(1) / pivot_row[k];
       for (int i = k + 1; i < n; ++i) {
         S* row = A + rows_[i] * n;
-        if (row[k] == S(0)) continue;
+        if (vanishes(row[k])) continue;
         const S l = row[k] *= inverse;
         for (int j = k + 1; j < n; ++j) row[j] -= l * pivot_row[j];
       }
@@ -95,7 +96,7 @@ class SmallLU {
       std::copy_n(x + rows_[i] * m, m, w);
       const S* row = A_ + rows_[i] * n_;
       for (int k = 0; k < i; ++k)
-        if (!(row[k] == S(0)))
+        if (!vanishes(row[k]))
           for (int c = 0; c < m; ++c) w[c] -= row[k] * work[k * m + c];
     }
     for (int i = n_ - 1; i >= 0; --i) {
@@ -104,7 +105,7 @@ class SmallLU {
       S* xi = x + i * m;
       std::copy_n(work + i * m, m, xi);
       for (int k = i + 1; k < n_; ++k)
-        if (!(row[k] == S(0)))
+        if (!vanishes(row[k]))
           for (int c = 0; c < m; ++c) xi[c] -= row[k] * x[k * m + c];
       for (int c = 0; c < m; ++c) xi[c] /= row[i];
     }
@@ -114,10 +115,29 @@ class SmallLU {
   const Equilibration& scales() const { return scales_; }
 
  private:
+  // What a recorded factorization needs of states beside its own: that what it chose in column k by the numbers of one is neither rounding nor
+  // far below the others. (An elimination over a tree measures instead what it lost, elimination_accuracy.h.)
+  void take_column_sizes() {
+    using std::abs;
+    column_sizes_.assign(n_, S(0));
+    for (int i = 0; i < n_; ++i)
+      for (int j = 0; j < n_; ++j) column_sizes_[j] = maximum(column_sizes_[j], S(S(row_factor_[i]) * abs(A_[i * n_ + j])));
+  }
+  bool still_chosen(int k, int best) const {
+    using std::abs;
+    const auto size = [&](int i) { return S(S(row_factor_[rows_[i]]) * abs(A_[rows_[i] * n_ + k])); };
+    const S chosen = size(best);
+    S largest = S(0);
+    for (int i = k; i < n_; ++i)
+      if (i != best) largest = maximum(largest, size(i));
+    return chosen > S(4 * n_) * epsilon<S>() * column_sizes_[k] && chosen > S(0.0625) * largest;
+  }
+
   S* A_ = nullptr;
   int n_ = 0;
   std::vector<int> rows_;
-  std::vector<S> column_, sizes_, row_factor_;
+  std::vector<Soft<S>> column_, sizes_, row_factor_;
+  std::vector<S> column_sizes_;
   Equilibration scales_;
   Magnitude<S> determinant_;
 };

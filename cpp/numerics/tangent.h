@@ -10,7 +10,7 @@
 #include <limits>
 #include <type_traits>
 
-#include "numerics/scalar.h"
+#include "numerics/decisions.h"
 #include "numerics/turns.h"
 
 namespace pycraft {
@@ -61,7 +61,19 @@ struct Tangent {
   friend bool operator>=(const Tangent& a, const Tangent& b) { return a.x >= b.x; }
   friend bool operator==(const Tangent& a, const Tangent& b) { return a.x == b.x; }
 
-  friend Tangent abs(const Tangent& a) { return a.x < T(0) ? -a : a; }
+  friend Tangent abs(const Tangent& a) {
+    if constexpr (is_recorded<T>)
+      return along(a, abs(a.x), where_less(a.x, T(0), T(-1), T(1)));
+    else
+      return a.x < T(0) ? -a : a;
+  }
+  friend Tangent maximum(const Tangent& a, const Tangent& b)
+    requires(is_recorded<T>)
+  {
+    Tangent c(maximum(a.x, b.x));
+    for (int i = 0; i < W; ++i) c.d[i] = where_less(a.x, b.x, b.d[i], a.d[i]);
+    return c;
+  }
   friend Tangent within_turns(const Tangent& a) {
     return along(a, within_turns(a.x), T(1));
   }

@@ -19,6 +19,7 @@ class DerivedOperators : public SkoSource {
   int nv() const override { return base_->nv(); }
   void check_state(const double* q, size_t nq, const double* v, size_t nv) const override { base_->check_state(q, nq, v, nv); }
   std::shared_ptr<const StateData> state() const override { return base_->state(); }
+  StateData generic_state() const override { return base_->generic_state(); }
   void check_current() const override { base_->check_current(); }
   std::uint64_t parameters() const override { return base_->parameters(); }
   unsigned enter_use() const override { return base_->enter_use(); }
@@ -39,7 +40,7 @@ class HingeSubset final : public DerivedOperators {
  public:
   HingeSubset(std::shared_ptr<MultibodyOperators> base, std::vector<char> kept);
   const std::vector<char>& kept() const { return kept_; }
-  PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_OVERRIDE_MAKE_VALUES)
+  PYCRAFT_FOR_EACH_SCALAR_AND_RECORDED(PYCRAFT_OVERRIDE_MAKE_VALUES)
 
  private:
   std::vector<char> kept_;
@@ -49,7 +50,7 @@ class HingeSubset final : public DerivedOperators {
 class WorldFrame final : public DerivedOperators {
  public:
   explicit WorldFrame(std::shared_ptr<MultibodyOperators> base);
-  PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_OVERRIDE_MAKE_VALUES)
+  PYCRAFT_FOR_EACH_SCALAR_AND_RECORDED(PYCRAFT_OVERRIDE_MAKE_VALUES)
 };
 
 }  // namespace pycraft

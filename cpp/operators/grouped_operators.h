@@ -30,7 +30,7 @@ class GroupedOperators final : public DerivedOperators {
   Traits traits() const override;
   BlockCosts costs(int g) const override;
   Space space(SpaceKind kind, const SymbolArguments& arguments) const override;
-  PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_OVERRIDE_MAKE_VALUES)
+  PYCRAFT_FOR_EACH_SCALAR_AND_RECORDED(PYCRAFT_OVERRIDE_MAKE_VALUES)
 
  private:
   Grouping grouping_;

@@ -31,12 +31,13 @@ class MultibodyOperators final : public SkoSource {
     model_->check_v(v, nv, "v");
   }
   std::shared_ptr<const StateData> state() const override { return model_->state(); }
+  StateData generic_state() const override;
   std::uint64_t parameters() const override { return model_->parameters(); }
   unsigned enter_use() const override { return model_->enter_use(); }
   void leave_use(unsigned entered) const noexcept override { model_->leave_use(entered); }
   Space space(SpaceKind kind, const SymbolArguments& arguments) const override;
   bool tangent_of_inverse(const Expression& X, const Expression& tangent, Expression& letter, Expression& of_D) override;
-  PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_OVERRIDE_MAKE_VALUES)
+  PYCRAFT_FOR_EACH_SCALAR_AND_RECORDED(PYCRAFT_OVERRIDE_MAKE_VALUES)
 
  private:
   std::shared_ptr<Multibody> model_;

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "algebra/trees/tree_values.h"
+#include "numerics/decisions.h"
 #include "operators/many_columns.h"
 #include "operators/multibody_operators.h"
 #include "recursions/kinematics.h"
@@ -26,13 +27,13 @@ class RigidValues final : public TreeValues<RigidBlocks<S>> {
   }
 
   void mass_matrix(bool with_hinge_diagonal, const S* x, S* y, int m, S* scratch) const override {
-    if constexpr (std::is_same_v<S, double>)
+    if constexpr (by_columns<S>)
       columns_.mass_matrix(this->blocks_, with_hinge_diagonal, x, y, m, scratch);
     else
       mass_matrix_apply(this->tree_, this->blocks_, with_hinge_diagonal, x, y, m, scratch);
   }
   void mass_matrix_inverse(const S* x, S* y, int m, S* scratch) const override {
-    if constexpr (std::is_same_v<S, double>)
+    if constexpr (by_columns<S>)
       columns_.mass_matrix_inverse(this->blocks_, x, y, m, scratch);
     else
       mass_matrix_inverse_apply(this->tree_, this->blocks_, x, y, m, scratch);
@@ -52,12 +53,12 @@ class RigidValues final : public TreeValues<RigidBlocks<S>> {
  protected:
   void set_state(const double* q, const double* v) override {
     compiled_ = model_.compiled<S>();
-    for (size_t i = 0; i < q_.size(); ++i) q_[i] = S(q[i]);
-    for (size_t i = 0; i < v_.size(); ++i) v_[i] = S(v[i]);
+    for (size_t i = 0; i < q_.size(); ++i) q_[i] = of_state<S>(q[i], 0, static_cast<int>(i));
+    for (size_t i = 0; i < v_.size(); ++i) v_[i] = of_state<S>(v[i], 1, static_cast<int>(i));
   }
   void fill() override {
     kinematics(*compiled_, q_.data(), this->blocks_);
-    if constexpr (std::is_same_v<S, double>) columns_.see(this->blocks_);
+    if constexpr (by_columns<S>) columns_.see(this->blocks_);
   }
   void compute_velocities() override {
     velocities_base_to_tip(*compiled_, this->blocks_.pose.data(), this->blocks_.H.data(), v_.data(), velocities_);
@@ -78,7 +79,7 @@ class RigidValues final : public TreeValues<RigidBlocks<S>> {
   std::vector<S> q_, v_;
   Velocities<S> velocities_;
   std::vector<Pose<S>> world_;  // X_0k
-  ManyColumns columns_;
+  ManyColumns<S> columns_;
 };
 
 }  // namespace pycraft

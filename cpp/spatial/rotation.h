@@ -57,9 +57,8 @@ inline Matrix3<S> exp_rotation(const Vector3<S>& w) {
 // The rotation about a unit axis: cos, sin of the angle taken once, at full accuracy for angles of any size.
 template <class S>
 inline Matrix3<S> axis_rotation(const Vector3<S>& axis, const S& angle) {
-  using std::cos;
-  using std::sin;
-  const S within = within_turns(angle), c = cos(within), s = sin(within), half = sin(within / S(2)), v = S(2) * half * half;
+  const TurnSines<S> of = turn_sines(angle);
+  const S &c = of.cosine, &s = of.sine, v = S(2) * of.sine_of_half * of.sine_of_half;
   const S xy = v * axis[0] * axis[1], xz = v * axis[0] * axis[2], yz = v * axis[1] * axis[2];
   return {c + v * axis[0] * axis[0], xy - s * axis[2],          xz + s * axis[1],
           xy + s * axis[2],          c + v * axis[1] * axis[1], yz - s * axis[0],

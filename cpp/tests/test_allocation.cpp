@@ -2,9 +2,11 @@
 #define BOOST_TEST_MODULE allocation
 #include <boost/test/included/unit_test.hpp>
 #include <cmath>
+#include <limits>
 #include <set>
 
 #include "algebra/engine/evaluate.h"
+#include "algebra/engine/packs.h"
 #include "algebra/language/display.h"
 #include "algebra/planning/explain.h"
 #include "algebra/planning/square_root.h"
@@ -95,6 +97,43 @@ BOOST_AUTO_TEST_CASE(runs_of_plans) {
     for (const bool rules : {true, false}) check_runs(e, seen, rules);
   for (int kind = 0; kind < step_kinds; ++kind)
     BOOST_TEST(seen.count(StepKind(kind)) == 1, "no run had a step " << step_kind_name(StepKind(kind)));
+}
+
+// Factors are made anew at every state, by elimination, too: what they stand in is kept. In packs it is the batch that takes some memory, whatever
+// its length.
+BOOST_AUTO_TEST_CASE(states_of_a_batch) {
+  const auto mb = robot();
+  const auto source = operators_of(mb);
+  const Letters o(source);
+  const Expression MM = o.H * o.phi * o.M * o.phi.T() * o.H.T();
+  const auto batch_of = [&](int states) {
+    const auto binding = std::make_shared<Binding>();
+    binding->batch = states, binding->nq = mb->nq(), binding->nv = mb->nv();
+    std::vector<double> along(mb->nv()), q(mb->nq());
+    for (int b = 0; b < states; ++b) {
+      for (int i = 0; i < mb->nv(); ++i) along[i] = std::sin(0.3 * b + i);
+      mb->integrate(mb->zero_q().data(), along.data(), q.data());
+      binding->q.insert(binding->q.end(), q.begin(), q.end()), binding->v.insert(binding->v.end(), along.begin(), along.end());
+    }
+    return binding;
+  };
+  const std::vector<double> x(MM.domain().dimension(), 0.5);
+  const auto counted = [&](const Expression& e, int states) {
+    const Expression bound = e.at(batch_of(states));
+    const auto pool = prepare(bound, Request::apply, true);
+    Inputs inputs;
+    inputs.x = x.data();
+    Result r;
+    return allocations_of([&] { pool->run(inputs, false, r); });
+  };
+  for (const Expression& e : {MM.inv(), (MM + 0.1 * o.I).inv(), (MM.inv() + 0.01 * o.D).inv(), block_diagonal((MM + 0.1 * o.I).inv()), (o.D + 0.1 * o.I).inv(),
+                              differentiate((MM + 0.1 * o.I).inv(), *coordinate_direction(source, 2))}) {
+    const int before = Packs::record_from(std::numeric_limits<int>::max());
+    BOOST_TEST(counted(e, 7) == 0, show(e));
+    Packs::record_from(1);
+    BOOST_TEST(counted(e, 64) == counted(e, 512), show(e));
+    Packs::record_from(before);
+  }
 }
 
 // A tip so light that only the error sweep can tell whether its pivots are noise.

@@ -7,7 +7,7 @@
 #include <random>
 
 #define PYCRAFT_INSTRUCTION_SET tested
-#include "kernels/sine_cosine.h"
+#include "lanes/sine_cosine.h"
 
 using namespace pycraft::kernels::tested;
 

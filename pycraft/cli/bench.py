@@ -92,14 +92,6 @@ def _states(arm: Any, count: int = 8) -> tuple[np.ndarray, np.ndarray, np.ndarra
     return np.array([s.q for s in states]), np.array([s.v for s in states]), np.array([s.v for s in states[::-1]])
 
 
-def building(repeats: int = 2000) -> Figure:
-    """Building an expression of ten operators in Python."""
-    soa = chain(7, seed=1).soa
-    H, psi, K, D, I = soa("H psi K D I")
-    best = min(_elapsed(lambda: (I - H @ psi @ K).T @ D.inv() @ (I - H @ psi @ K), repeats) for _ in range(5))
-    return Figure("building an expression of ten operators in Python", 1e6 * best, "us", 50.0)
-
-
 def _elapsed(f: Any, repeats: int) -> float:
     begin = time.perf_counter()
     for _ in range(repeats):
@@ -238,11 +230,12 @@ def accuracy(seconds: float = 0.2) -> list[Figure]:
 
 def run(seconds: float = 0.1) -> dict[str, list[Figure]]:
     """All figures, by heading."""
+    from .bench_expressions import expressions
     from .bench_scenes import scenes
 
     return {
         f"O(N): time per link at {LONG} links over {SHORT}": per_link(seconds),
-        "Expressions": [building()],
+        "Expressions": expressions(2 * seconds),
         "Direct calls": direct_calls(2 * seconds),
         "Sensitivities": sensitivities(2 * seconds),
         "What accuracy costs": accuracy(2 * seconds),

@@ -1,4 +1,4 @@
-"""Direct calls as straight-line code: what their kernels do for one model (cpp/kernels/tape.h), with its numbers folded in."""
+"""Direct calls as straight-line code: what their kernels do for one model (cpp/kernels/taped_calls.h), with its numbers folded in."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ def _headers() -> str:
     """The headers of lanes and of sine and cosine, as one text."""
     texts = _core.kernel_headers()
     inside = "\n".join(texts[name] for name in ("lanes.h", "sine_cosine.h"))
-    inside = re.sub(r'^#pragma once\n|^#include "kernels/.*\n', "", inside, flags=re.MULTILINE)
+    inside = re.sub(r'^#pragma once\n|^#include "lanes/.*\n', "", inside, flags=re.MULTILINE)
     return "#define PYCRAFT_INSTRUCTION_SET compiled\n" + inside
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import partial, reduce
 from operator import mul
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -296,6 +297,17 @@ def operator_from_nodes(nodes: list[tuple[int, Any, list[int], _core.Binding | N
 
 
 # ---------------------------------------------------------------------- gradients
+_SENSITIVITIES: WeakKeyDictionary[Any, _core.Sensitivities] = WeakKeyDictionary()
+
+
+def _sensitivities_of(model: Any) -> _core.Sensitivities:
+    """Of a model whose Python face may be gone: kept, as they keep what they recorded of batches."""
+    known = _SENSITIVITIES.get(model)
+    if known is None:
+        known = _SENSITIVITIES[model] = _core.Sensitivities(model)
+    return known
+
+
 def scalar_gradient(scalar: _core.Scalar, over: str = "coordinates") -> np.ndarray:
     """All derivatives of a scalar expression, see `Scalar.gradient`."""
     kind, value, operand, terms = scalar.kind, scalar.number, scalar.operand, scalar.terms
@@ -318,7 +330,7 @@ def scalar_gradient(scalar: _core.Scalar, over: str = "coordinates") -> np.ndarr
     if kind == "logdet" and _is_mass_matrix(operand):
         q, _, precision = operand._state or (model.q, None, "double")
         binding = _core._binding(operand)
-        call = partial(_core.Sensitivities(model).log_determinant, over)  # not the model's own: its Python face may be gone
+        call = partial(_sensitivities_of(model).log_determinant, over)
         return _core._face["shared_out"](call, ["q"], (q,), {"precision": precision}, binding.threads if binding else 1)
     if over != "coordinates":
         raise _core.EvaluationError(f"gradient over {over!r} is there for ln det of the mass matrix and of D, not for {scalar!r}")

@@ -9,6 +9,7 @@ import pytest
 
 import pycraft as pc
 from support.mechanisms import every_kind, uniform_batch
+from support.packs import NEVER, packs_from
 
 
 def mass_matrix(soa):
@@ -107,12 +108,12 @@ def test_a_run_within_an_operator_from_outside(inner, bound):
 
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no interval timers here")
 @pytest.mark.parametrize("inner", INNER[:-1])
-def test_a_run_within_a_signals_handler(inner):
+@pytest.mark.parametrize("states", [1000, 8000], ids=["one by one", "in packs"])
+def test_a_run_within_a_signals_handler(inner, states):
     model = every_kind()
-    Q, V = uniform_batch(model, 1000)
+    Q, V = uniform_batch(model, states)
     MM = mass_matrix(model.soa)
     e, run, calls = (MM + model.soa.D).inv().at(Q, V), inner(model), []
-    alone = e @ np.ones(model.nv)
 
     def handler(*_):
         calls.append(None)
@@ -120,11 +121,13 @@ def test_a_run_within_a_signals_handler(inner):
 
     before = signal.signal(signal.SIGALRM, handler)
     try:
-        for _ in range(20):
-            signal.setitimer(signal.ITIMER_REAL, 0.02)
-            assert np.array_equal(e @ np.ones(model.nv), alone)
-            if calls:
-                break
+        with packs_from(NEVER if states == 1000 else 1):
+            alone = e @ np.ones(model.nv)
+            for _ in range(20):
+                signal.setitimer(signal.ITIMER_REAL, 0.02)
+                assert np.array_equal(e @ np.ones(model.nv), alone)
+                if calls:
+                    break
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)

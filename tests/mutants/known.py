@@ -43,7 +43,12 @@ AREAS = {
     "cpp/algebra/language/source.cpp": ["whole/test_stale_numbers.py"],
     "cpp/dynamics/workspace_pool.h": ["whole/test_stale_numbers.py"],
     "cpp/model/multibody.cpp": ["whole/test_stale_numbers.py", "models/test_arguments.py"],
-    "cpp/algebra/engine/engine.cpp": ["whole/test_stale_numbers.py", "algebra/test_eliminations.py", "sweeps/test_singular_forms.py"],
+    "cpp/algebra/engine/engine.cpp": ["whole/test_stale_numbers.py", "algebra/test_packs_and_states.py"],
+    "cpp/algebra/engine/run.h": ["whole/test_stale_numbers.py", "algebra/test_eliminations.py", "sweeps/test_singular_forms.py"],
+    "cpp/algebra/engine/packs.cpp": ["algebra/test_packs_of_expressions.py", "algebra/test_packs_and_states.py"],
+    "cpp/lanes/replayed.cpp": ["algebra/test_packs_and_states.py"],
+    "cpp/lanes/program.cpp": ["algebra/test_packs_of_expressions.py"],
+    "cpp/numerics/recorded.cpp": ["algebra/test_packs_and_states.py", "algebra/test_packs_of_expressions.py"],
     "cpp/algebra/engine/refined_solves.h": ["algebra/test_eliminations.py", "sweeps/test_refined_calls.py", "sweeps/test_refinement.py"],
     "cpp/algebra/engine/block_steps.h": ["algebra/test_eliminations.py", "sweeps/test_refined_calls.py", "sweeps/test_refinement.py"],
     "cpp/algebra/engine/elimination/elimination_solve.h": [
@@ -79,7 +84,7 @@ AREAS = {
     "cpp/model/compiled_model.cpp": ["dynamics/test_direct_calls.py", "dynamics/test_galilean.py"],
     "cpp/dynamics/batches.h": ["dynamics/test_direct_calls.py"],
     "cpp/dynamics/batches.cpp": ["models/test_arguments.py"],
-    "cpp/operators/multibody_operators.cpp": ["algebra/test_calculus_rules.py"],
+    "cpp/operators/rigid_letters.h": ["algebra/test_calculus_rules.py"],
     "cpp/numerics/refinement.h": ["sweeps/test_refinement.py", "sweeps/test_refined_calls.py", "sweeps/test_refinement_rounding.py"],
     "cpp/algebra/planning/plan_diagonals.cpp": ["algebra/test_whole_inverse.py", "operators/test_operators_algebra.py"],
     "cpp/algebra/planning/recognise.cpp": [
@@ -138,7 +143,7 @@ AREAS = {
     "cpp/kernels/mass_matrix_of_columns.h": ["operators/test_sweeps_of_columns.py"],
     "cpp/operators/many_columns.cpp": ["operators/test_many_columns.py"],
     "cpp/bindings/plain_products.cpp": ["operators/test_many_columns.py", "operators/test_batches.py"],
-    "cpp/kernels/sine_cosine.h": ["dynamics/test_kernels.py"],
+    "cpp/lanes/sine_cosine.h": ["dynamics/test_kernels.py"],
     "cpp/kernels/link_model.cpp": ["dynamics/test_kernels.py", "sweeps/test_singular_hinges.py"],
     "cpp/dynamics/link_dynamics.h": ["dynamics/test_packs.py"],
     "cpp/dynamics/packed_dynamics.cpp": ["dynamics/test_packs.py"],
@@ -185,7 +190,7 @@ AREAS = {
     "cpp/algebra/trees/mixed_blocks.h": ["algebra/test_mixed_trees.py"],
     "cpp/algebra/trees/reordered_values.h": ["algebra/test_mixed_trees.py"],
     "cpp/algebra/trees/grouping.h": ["algebra/test_mixed_trees.py"],
-    "cpp/operators/grouped_operators.cpp": ["algebra/test_mixed_trees.py"],
+    "cpp/operators/grouped_values.h": ["algebra/test_mixed_trees.py"],
 }
 
 # (file, change, part of the line): why no test can tell.

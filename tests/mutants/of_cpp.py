@@ -41,6 +41,10 @@ CHANGES = {
         ("plans for J = 0 kept", "source.traits().hinge_diagonal != plan_->hinge_diagonal[c]", "false"),
         ("a plan is for J = 0 once and for all", "impl_->seen[c] == parameters", "impl_->seen[c] != ~std::uint64_t(0)"),
         ("only the first model of a plan is looked at", "source.check_current();", "if (c > 0) return true;", STATEMENT),
+        ("packs name no shape", "if (!done.shaped) run.shape(taped.rows, taped.columns);", ";", STATEMENT),
+        ("states that packs leave are left", "int state(int i) const { return i <", "int state(int i) const { return i + 1 <"),
+    ],
+    "cpp/algebra/engine/run.h": [
         (
             "blocks of a batch are those of its first state",
             "fresh |= w_.generations[c] != w_.values[c]->generation();",
@@ -51,6 +55,28 @@ CHANGES = {
         ("what is out of range is returned in double", "in_range_ &= all_finite(y, size);", ";", STATEMENT),
         ("what is out of range is returned in its place", "in_range_ &= all_finite(out_ + size_t(b) * size, size);", ";", STATEMENT),
         ("what is out of range is returned", "in_range_ &= std::isfinite(out_[at]);", ";", STATEMENT),
+    ],
+    "cpp/algebra/engine/packs.cpp": [
+        ("programs outlive a parameter", "{c.source->parameters(), c.binding ?", "{std::uint64_t(0), c.binding ?"),
+        ("programs outlive the model's state", "c.binding ? nullptr : c.source->state()", "nullptr"),
+        ("x of each state is that of the first", "inputs.batched ? size_t(plan.domain.dimension()) * inputs.columns : 0", "0"),
+        ("velocities are those of the first state", "batch ? size_t(c.binding->nv) : 0", "0"),
+        ("programs of all models are kept", "if (all_.size() == most_kept) all_.pop_back();", ";", STATEMENT),
+    ],
+    "cpp/lanes/replayed.cpp": [
+        ("no state is left to itself", "if (!sound[b]) left.push_back(states.from + b);", ";", STATEMENT),
+    ],
+    "cpp/lanes/program.cpp": [
+        ("places are given away before they are read", "last_[read] == k) release(read);", "last_[read] <= k + 1) release(read);"),
+    ],
+    "cpp/numerics/recorded.cpp": [
+        ("comparisons leave no guard", "now().require(by(what, value, a, b).id, value);", ";", STATEMENT),
+        (
+            "what zero multiplies need not be finite",
+            "if (!a.is_constant()) now().require_finite(a);\n  return std",
+            "return std",
+            STATEMENT,
+        ),
     ],
     "cpp/algebra/engine/plan_cache.cpp": [
         ("a plan in double serves in quad", "how.precision", "Precision::double_"),
@@ -87,7 +113,7 @@ CHANGES = {
             STATEMENT,
         ),
     ],
-    "cpp/operators/grouped_operators.cpp": [
+    "cpp/operators/grouped_values.h": [
         (
             "a of a group is that of its bodies",
             "std::fill_n(to, s, S(0));\n        transposed_multiply_add(phi_[g].data(), stacked.data(), to, s, s, 1);",
@@ -137,7 +163,7 @@ CHANGES = {
         ("refinement refuses at 0.9", "S(0.3)", "S(0.9)"),
         ("refinement goes on while corrections shrink", "length < work.last[c] / S(2)", "length < work.last[c]"),
         ("what cancelled is not counted", "S(S(1e3) * epsilon<S>() * largest)", "S(0)"),
-        ("corrections of rounding are applied", "length > S(2) * work.rounding[c]", "true"),
+        ("corrections of rounding are applied", "length > work.rounding[c]", "true"),
         ("corrections of rounding are applied", "length > work.rounding[c]", "true"),
     ],
     "cpp/algebra/engine/elimination/elimination_solve.h": [
@@ -145,9 +171,9 @@ CHANGES = {
         ("a refinement of an elimination need only shrink", "correction < last / S(2)", "correction < last"),
     ],
     "cpp/numerics/small_lu.h": [
-        ("rows are not exchanged", "S(0.1) * largest", "S(0) * largest"),
-        ("no pivot of an elimination is noise", "S(4 * n) * epsilon<S>() * column_[k]", "S(0)"),
-        ("noise is judged by what is left", "sizes ? sizes[i] : S(0)", "S(0)"),
+        ("rows are not exchanged", "Soft<S>(0.1) * largest", "Soft<S>(0) * largest"),
+        ("no pivot of an elimination is noise", "Soft<S>(4 * n) * epsilon<Soft<S>>() * column_[k]", "Soft<S>(0)"),
+        ("noise is judged by what is left", "sizes ? sizes[i] : Soft<S>(0)", "Soft<S>(0)"),
     ],
     "cpp/numerics/equilibration.cpp": [
         ("rows have no scale of their own", "row_[k] = -by_column_[f].exponent - column_[j];", "row_[k] = 0;", STATEMENT),
@@ -207,7 +233,7 @@ CHANGES = {
     "cpp/kernels/motions.h": [
         ("sliders feel no Coriolis acceleration", "S(2) * S(link.travel) * turn", "S(0)"),
     ],
-    "cpp/kernels/sine_cosine.h": [
+    "cpp/lanes/sine_cosine.h": [
         ("angles beyond the reduction are reduced", "greater(magnitude(x), S(R::limit))", "greater(S(0), S(1))"),
     ],
     "cpp/kernels/link_model.cpp": [
@@ -311,7 +337,7 @@ CHANGES = {
     "cpp/dynamics/batches.cpp": [
         ("only the first state of a batch is checked", "g.batch < 0 ? 1 : g.batch", "1"),
     ],
-    "cpp/operators/multibody_operators.cpp": [
+    "cpp/operators/rigid_letters.h": [
         ("a selection is of the whole hinge", "s >= of.from && s < of.to", "s >= of.from"),
     ],
 }

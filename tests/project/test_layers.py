@@ -15,7 +15,8 @@ CPP, PYTHON = ROOT / "cpp", ROOT / "pycraft"
 # The rooms of C++, each with what it may include besides itself; what that may include, it may, too.
 STANDS_ON = {
     "runtime": [],
-    "numerics": ["runtime"],
+    "lanes": ["runtime"],
+    "numerics": ["lanes"],
     "spatial": ["numerics"],
     "algebra/language": ["numerics"],
     "algebra/trees": ["algebra/language"],
@@ -36,6 +37,9 @@ STANDS_ON = {
 CORE = [room for room in STANDS_ON if room not in ("bindings", "bench", "tests")]
 # Sources that are parts of a class or a table declared elsewhere.
 PARTS = {
+    "lanes/lanes_baseline",  # what lanes do by an instruction set each
+    "lanes/lanes_avx2",
+    "lanes/lanes_avx512",
     "kernels/kernels_baseline",  # the kernels of an instruction set each
     "kernels/kernels_avx2",
     "kernels/kernels_avx512",

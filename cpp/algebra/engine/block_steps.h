@@ -160,7 +160,7 @@ void Workspace<S>::root_block(const BlockStorage<S>& in, BlockStorage<S>& out, i
   S* L = out.at(k);
   std::fill_n(L, size_t(n) * n, S(0));
   S largest = S(0);
-  for (int i = 0; i < n; ++i) largest = std::max(largest, A[i * n + i]);
+  for (int i = 0; i < n; ++i) largest = maximum(largest, A[i * n + i]);
   for (int j = 0; j < n; ++j) {
     S pivot = A[j * n + j];
     for (int a = 0; a < j; ++a) pivot -= L[j * n + a] * L[j * n + a];

@@ -87,7 +87,7 @@ void Workspace<S>::eliminate(const Step& s, const std::vector<SkoValues<S>*>& va
     return;
   }
   const std::string reason = own->note();
-  if constexpr (std::numeric_limits<S>::digits < std::numeric_limits<Quad>::digits) {
+  if constexpr (!is_recorded<S> && std::numeric_limits<S>::digits < std::numeric_limits<Quad>::digits) {
     wide = std::make_unique<TreeElimination<Quad>>(s.realization);
     if (wide->factor(blocks, numbers, Quad(1e7) * Quad(epsilon<S>()))) return note("quad: " + reason + "; eliminated in quad precision");
   }

@@ -6,15 +6,10 @@
 #include <cstdint>
 #include <mutex>
 
-#include "algebra/engine/block_steps.h"
-#include "algebra/engine/dense_steps.h"
-#include "algebra/engine/in_place.h"
 #include "algebra/engine/in_use.h"
-#include "algebra/engine/refined_solves.h"
-#include "algebra/engine/scalar_steps.h"
-#include "algebra/engine/vector_steps.h"
-#include "numerics/finite.h"
-#include "runtime/errors.h"
+#include "algebra/engine/packs.h"
+#include "algebra/engine/run.h"
+#include "lanes/lane_sets.h"
 
 namespace pycraft {
 
@@ -25,15 +20,17 @@ struct ExecutionPool::Impl {
   PerScalar<Free> free;
   PassCounts counts;
   std::vector<std::string> notes;
+  std::string packed;                            // what of the last run was done in packs
   int threads = 1;                               // that share the states of a batch
   InPlace in_place;
+  std::shared_ptr<Packs> packs;                  // null: no batch of it is recorded
   std::vector<std::atomic<std::uint64_t>> seen;  // per context: the parameters that the plan was last found to be made for
 
   template <class S>
   std::unique_ptr<Workspace<S>> taken(const std::shared_ptr<const Plan>& plan) {
     {
       std::lock_guard<Mutex> lock(mutex);
-      if (mutex.abandoned()) leave_behind(free, notes);
+      if (mutex.abandoned()) leave_behind(free, notes, packed);
       auto& kept = std::get<Free<S>>(free);
       if (!kept.empty()) {
         std::unique_ptr<Workspace<S>> workspace = std::move(kept.back());
@@ -58,11 +55,12 @@ static int threads_of(const Plan& plan) {
   return plan.calls_outside() ? 1 : threads;
 }
 
-ExecutionPool::ExecutionPool(std::shared_ptr<const Plan> plan) : plan_(std::move(plan)), impl_(std::make_unique<Impl>()) {
+ExecutionPool::ExecutionPool(std::shared_ptr<const Plan> plan, std::shared_ptr<Packs> packs) : plan_(std::move(plan)), impl_(std::make_unique<Impl>()) {
   impl_->seen = std::vector<std::atomic<std::uint64_t>>(plan_->contexts.size());
   for (auto& parameters : impl_->seen) parameters = ~std::uint64_t(0);  // none
   impl_->threads = threads_of(*plan_);
   impl_->in_place = InPlace(*plan_);
+  if (recordable(*plan_)) impl_->packs = packs ? std::move(packs) : std::make_shared<Packs>();
 }
 ExecutionPool::~ExecutionPool() = default;
 
@@ -84,268 +82,68 @@ PassCounts& PassCounts::operator+=(const PassCounts& other) {
   return *this;
 }
 
+PassCounts PassCounts::times(int states) const {
+  return {states * values, states * gathers, states * scatters, states * kernels, states * eliminations, states * dense};
+}
+
 PassCounts ExecutionPool::last_counts() const {
   std::lock_guard<Mutex> lock(impl_->mutex);
   return impl_->counts;
 }
 std::vector<std::string> ExecutionPool::run_notes() const {
   std::lock_guard<Mutex> lock(impl_->mutex);
-  return impl_->notes;
+  std::vector<std::string> notes = impl_->notes;
+  if (!impl_->packed.empty()) notes.push_back(impl_->packed);
+  return notes;
 }
 
-[[noreturn]] static void throw_beyond_range(const Plan& plan, const Inputs& inputs) {
-  const size_t given = inputs.x ? size_t(plan.domain.dimension()) * inputs.columns * (inputs.batched ? plan.batch : 1) : 0;
-  bool finite = std::all_of(inputs.x, inputs.x + given, [](double x) { return std::isfinite(x); });
-  for (const auto& [_, x] : inputs.vectors) finite &= std::all_of(x.begin(), x.end(), [](double y) { return std::isfinite(y); });
-  if (!finite) throw EvaluationError("the vector that '" + plan.text + "' is applied to has an entry that is no finite number");
-  throw EvaluationError("the value of '" + plan.text + "' is beyond the range of its numbers: take other units, or a wider precision (.at(precision=\"extended\"))");
-}
-
-namespace {
-
-// One run of a plan in a workspace, state after state, or some of the states of a run that began with the first.
-template <class S>
-class Run {
- public:
-  Run(const Plan& plan, Workspace<S>& workspace, const Inputs& inputs, bool expansions, Result& result, const InPlace& in_place)
-      : plan_(plan), w_(workspace), inputs_(inputs), expansions_(expansions), result_(result), states_(plan.batched ? plan.batch : 1) {
-    if constexpr (of_doubles) in_place_ = in_place, in_place_.output &= !expansions;
-
-    take_values();
-    check_vectors();
-    result_.batch = plan.batched ? states_ : (inputs.batched ? -2 : -1);
-  }
-  // Beside another one that holds the values of what is no batch and has shaped the result.
-  Run(const Run& first, Workspace<S>& workspace)
-      : plan_(first.plan_), w_(workspace), inputs_(first.inputs_), expansions_(first.expansions_), result_(first.result_), out_(first.out_), in_place_(first.in_place_), states_(first.states_) {
-    w_.values = first.w_.values;
-    make_own_values();
-  }
-  // What was held of the models goes with the run: an operator from outside, or a signal's handler, may run another one on this thread
-  // before this one is over.
-  ~Run() { w_.held.clear(); }
-  Run(const Run&) = delete;
-
-  int states() const { return states_; }
-  const PassCounts& counts() const { return counts_; }
-  void run(int b) {
-    naming_state(b, states_, [&] {
-      run_state(b);
-      if (!in_range_) throw_beyond_range(plan_, inputs_);
-    });
-  }
-  // The result of no states.
-  void run_none() {
-    const bool number = plan_.request == Request::trace || plan_.request == Request::logdet || plan_.request == Request::norm;
-    shape(number ? 1 : plan_.codomain.dimension(), plan_.request == Request::dense ? plan_.domain.dimension() : inputs_.columns);
-  }
-
- private:
-  // The values of every context: those that are kept for the model's state or a binding's, or the workspace's own for a batch.
-  void take_values() {
-    w_.held.clear();
-    w_.held.resize(plan_.contexts.size());
-    w_.values.assign(plan_.contexts.size(), nullptr);
-    make_own_values();
-    for (size_t c = 0; c < plan_.contexts.size(); ++c) {
-      const Context& context = plan_.contexts[c];
-      if (!context.binding) {
-        w_.held[c] = context.source->template current_values<S>(plan_.groups[c]);
-      } else if (context.binding->batch < 0) {
-        w_.held[c] = context.binding->template values<S>(context.source, plan_.groups[c]);
-      } else {
-        continue;
-      }
-      w_.values[c] = w_.held[c].get();
-    }
-  }
-
-  void make_own_values() {
-    w_.own_values.resize(plan_.contexts.size());
-    for (size_t c = 0; c < plan_.contexts.size(); ++c) {
-      const Context& context = plan_.contexts[c];
-      if (!context.binding || context.binding->batch < 0) continue;
-      context.source->check_current();
-      if (!w_.own_values[c]) {
-        w_.own_values[c] = context.source->make_values(S());
-        w_.own_values[c]->use(context.binding->arithmetic.form);
-      }
-      w_.values[c] = w_.own_values[c].get();
-    }
-  }
-
-  void check_vectors() const {
-    for (const auto& [name, r] : plan_.vectors) {
-      const auto given = inputs_.vectors.find(name);
-      if (given == inputs_.vectors.end()) throw EvaluationError("the vector '" + name + "' has no value: give it by name");
-      if (static_cast<int>(given->second.size()) != plan_.registers[r].space.dimension())
-        throw EvaluationError("the vector '" + name + "' has " + std::to_string(given->second.size()) + " entries; it lies in " +
-                              plan_.registers[r].space.description());
-    }
-  }
-
-  // Moves the values of batches to state b. Whether anything changed since the last run: else blocks and factors serve again.
-  bool move_to(int b) {
-    for (size_t c = 0; c < plan_.contexts.size(); ++c) {
-      const Binding* binding = plan_.contexts[c].binding.get();
-      if (!binding || binding->batch < 0) continue;
-      w_.values[c]->move_to(binding->q.data() + size_t(b) * binding->nq, binding->v.data() + size_t(b) * binding->nv);
-      w_.values[c]->require(plan_.groups[c]);
-    }
-    bool fresh = w_.generations.size() != w_.values.size();
-    w_.generations.resize(w_.values.size());
-    for (size_t c = 0; c < w_.values.size(); ++c) {
-      fresh |= w_.generations[c] != w_.values[c]->generation();
-      w_.generations[c] = w_.values[c]->generation();
-    }
-    if (w_.values.empty()) fresh = !w_.ran;
-    w_.state = b;
-    w_.ran = true;
-    return fresh;
-  }
-
-  void run_state(int b) {
-    const bool fresh = move_to(b);
-    for (const auto& [name, r] : plan_.vectors) {
-      const std::vector<double>& given = inputs_.vectors.at(name);
-      w_.vector(r).assign(given.begin(), given.end());
-    }
-    if (plan_.columns_of_identity) return run_columns(b, fresh);
-    const int n_in = plan_.domain.dimension(), n_out = plan_.codomain.dimension(), m = inputs_.columns;
-    const Register& out = plan_.registers[plan_.output];
-    const size_t size = size_t(n_out) * (out.wide ? m : 1);
-    const Lent lent(*this);
-    if (plan_.input >= 0) take_input(b, size_t(n_in) * m);
-    if (b == 0 && out.kind == RegisterKind::vector) shape(n_out, out.wide ? m : 1);
-    if (in_place_.output) w_.lend(plan_.output, reinterpret_cast<S*>(out_ + size_t(b) * size));
-    w_.run(w_.values, m, fresh, counts_);
-    if (states_ > 1) check_interrupt();
-    switch (out.kind) {
-      case RegisterKind::vector:
-        if (in_place_.output)
-          in_range_ &= all_finite(out_ + size_t(b) * size, size);
-        else
-          store_all(b, w_.numbers(plan_.output), size);
-        return;
-      case RegisterKind::dense:
-        if (b == 0) shape(n_out, n_in);
-        return store_all(b, w_.dense(plan_.output).data(), size_t(n_out) * n_in);
-      case RegisterKind::blocks: {
-        const std::vector<S>& y = w_.blocks(plan_.output).data;
-        if (b == 0) shape(static_cast<int>(y.size()), 1);
-        return store_all(b, y.data(), y.size());
-      }
-      default:
-        if (b == 0) shape(1, 1);
-        store(b, w_.scalar(plan_.output));
-    }
-  }
-
-  void take_input(int b, size_t size) {
-    const double* given = inputs_.x ? inputs_.x + (inputs_.batched ? size_t(b) * size : 0) : nullptr;
-    if constexpr (of_doubles) {
-      if (given && in_place_.input) return w_.lend(plan_.input, const_cast<double*>(given));  // no step writes to it
-    }
-    std::vector<S>& x = w_.vector(plan_.input);
-    x.resize(size);
-    if (given)
-      std::copy_n(given, size, x.begin());
-    else
-      std::fill(x.begin(), x.end(), S(1));
-  }
-  struct Lent {  // until the state is done, be it by an error
-    Run& run;
-    explicit Lent(Run& r) : run(r) {}
-    ~Lent() {
-      if (run.plan_.input >= 0) run.w_.lend(run.plan_.input, nullptr);
-      if (run.plan_.output >= 0) run.w_.lend(run.plan_.output, nullptr);
-    }
-  };
-
-  // The operator itself, its diagonal, trace or norm, from columns of the identity, some at a time.
-  void run_columns(int b, bool fresh) {
-    const int n_in = plan_.domain.dimension(), n_out = plan_.codomain.dimension();
-    const bool is_norm = plan_.request == Request::norm, is_trace = plan_.request == Request::trace, is_diagonal = plan_.request == Request::diagonal;
-    if (b == 0) shape(is_norm || is_trace ? 1 : n_out, is_norm || is_trace || is_diagonal ? 1 : n_in);
-    const int output = is_norm ? plan_.steps.back().in[0] : plan_.output;
-    S squares = S(0), sum = S(0);
-    for (int start = 0; start < n_in; start += columns_at_a_time) {
-      const int m = std::min(columns_at_a_time, n_in - start);
-      std::vector<S>& x = w_.vector(plan_.input);
-      x.assign(size_t(n_in) * m, S(0));
-      for (int j = 0; j < m; ++j) x[size_t(start + j) * m + j] = S(1);
-      w_.run(w_.values, m, start == 0 && fresh, counts_);
-      const std::vector<S>& y = w_.vector(output);
-      for (int i = 0; i < n_out; ++i)
-        for (int j = 0; j < m; ++j) {
-          const S value = y[size_t(i) * m + j];
-          if (is_norm) {
-            squares += value * value;
-          } else if (is_trace) {
-            sum += i == start + j ? value : S(0);
-          } else if (is_diagonal) {
-            if (i == start + j) store(size_t(b) * n_out + i, value);
-          } else {
-            store(size_t(b) * n_out * n_in + size_t(i) * n_in + start + j, value);
-          }
-        }
-      check_interrupt();
-    }
-    using std::sqrt;
-    if (is_norm) store(b, sqrt(squares));
-    if (is_trace) store(b, sum);
-  }
-
-  void shape(int rows, int columns) {
-    result_.rows = rows;
-    result_.columns = columns;
-    const size_t all = size_t(states_) * rows * columns;
-    if (!result_.into) result_.values.resize(all);
-    out_ = result_.into ? result_.into : result_.values.data();
-    if (expansions_) result_.expansions.resize(all);
-  }
-  void store(size_t at, const S& value) {
-    out_[at] = to_double(value);
-    in_range_ &= std::isfinite(out_[at]);
-    if (expansions_) result_.expansions[at] = expansion(value);
-  }
-  void store_all(int b, const S* y, size_t size) {
-    if constexpr (of_doubles) {
-      if (!expansions_) {
-        std::copy_n(y, size, out_ + size_t(b) * size);
-        in_range_ &= all_finite(y, size);
-        return;
-      }
-    }
-    for (size_t i = 0; i < size; ++i) store(size_t(b) * size + i, y[i]);
-  }
-
-  const Plan& plan_;
-  Workspace<S>& w_;
-  const Inputs& inputs_;
-  bool expansions_, in_range_ = true;
-  Result& result_;
-  double* out_ = nullptr;
-  static constexpr bool of_doubles = std::is_same_v<S, double>;
-  InPlace in_place_;
-  int states_;
-  PassCounts counts_;
+// What of a batch was done in packs: of the states before `from` all but some.
+struct ExecutionPool::Packed {
+  std::vector<int> left;
+  int from = 0;
+  bool shaped = false;  // the result
+  PassCounts counts;
+  std::string note;
+  int state(int i) const { return i < static_cast<int>(left.size()) ? left[i] : from + i - static_cast<int>(left.size()); }
 };
 
-}  // namespace
+template <class S>
+ExecutionPool::Packed ExecutionPool::run_packs(Run<S>& run, const Inputs& inputs, Result* expanded) {
+  Packed done;
+  if (!impl_->packs || run.states() < 2) return done;
+  Packs::Way way = impl_->packs->way(plan_, inputs, run.states());
+  if (way.tried > 0) {
+    const double begin = Packs::seconds_of_thread();
+    for (; done.from < way.tried; ++done.from) run.run(done.from);
+    done.shaped = true;
+    way = impl_->packs->way_after(plan_, inputs, run.states(), done.from, Packs::seconds_of_thread() - begin);
+  }
+  if (!way.taped) return done;
+  const TapedPlan& taped = *way.taped;
+  if (!done.shaped) run.shape(taped.rows, taped.columns);
+  done.left = impl_->packs->run(taped, *plan_, inputs, done.from, run.states(), impl_->threads, run.out());
+  const size_t size = size_t(taped.rows) * taped.columns;
+  for (size_t i = done.from * size; expanded && i < run.states() * size; ++i) expanded->expansions[i] = {run.out()[i]};
+  done.counts = taped.counts.times(run.states() - done.from - static_cast<int>(done.left.size()));
+  done.note = "packs: " + std::to_string(run.states() - done.from) + " states, " + std::to_string(taped.instructions) + " instructions for " +
+              std::to_string(kernels::lane_set().functions.width) + " at a time";
+  if (!done.left.empty()) done.note += "; " + std::to_string(done.left.size()) + " of them by themselves";
+  done.from = run.states(), done.shaped = true;
+  return done;
+}
 
-// The states after the first in threads, each in a workspace of its own, which go to `used`.
-template <class S, class Taken>
-static PassCounts run_others(const Run<S>& first, int threads, std::vector<std::unique_ptr<Workspace<S>>>& used, Taken taken) {
+// The others of so many states in threads, each in a workspace of its own, which go to `used`.
+template <class S, class State, class Taken>
+static PassCounts run_others(const Run<S>& first, int states, State state, int threads, std::vector<std::unique_ptr<Workspace<S>>>& used, Taken taken) {
   used.resize(threads);
   std::vector<std::unique_ptr<Run<S>>> runs(threads);
-  share_out(1, first.states(), threads, [&](int thread, int b) {
+  share_out(1, states, threads, [&](int thread, int i) {
     std::unique_ptr<Run<S>>& own = runs[thread];
     if (!own) {
       used[thread] = taken();
       own = std::make_unique<Run<S>>(first, *used[thread]);
     }
-    own->run(b);
+    own->run(state(i));
   });
   std::erase(used, nullptr);
   PassCounts counts;
@@ -359,16 +157,22 @@ void ExecutionPool::run_at(const Inputs& inputs, bool expansions, Result& result
   std::unique_ptr<Workspace<S>> workspace = impl_->taken<S>(plan_);
   std::vector<std::unique_ptr<Workspace<S>>> others;
   PassCounts counts;
+  std::string note;
   {
     Run<S> run(*plan_, *workspace, inputs, expansions, result, impl_->in_place);
-    const int states = run.states(), threads = std::min(impl_->threads, states - 1);
-    if (states == 0) run.run_none();
-    for (int b = 0; b < (threads > 1 ? 1 : states); ++b) run.run(b);  // the first one finds the shape of the result
+    if (run.states() == 0) run.run_none();
+    Packed packed;
+    if constexpr (std::is_same_v<S, double>) packed = run_packs(run, inputs, expansions ? &result : nullptr);
+    const int states = static_cast<int>(packed.left.size()) + run.states() - packed.from, threads = std::min(impl_->threads, states - 1);
+    for (int i = 0; i < (threads > 1 ? 1 : states); ++i) run.run(packed.state(i));  // the first one finds the shape of the result
     counts = run.counts();
-    if (threads > 1) counts += run_others(run, threads, others, [&] { return impl_->taken<S>(plan_); });
+    counts += packed.counts;
+    note = std::move(packed.note);
+    if (threads > 1) counts += run_others(run, states, [&](int i) { return packed.state(i); }, threads, others, [&] { return impl_->taken<S>(plan_); });
   }
   std::lock_guard<Mutex> lock(impl_->mutex);
   impl_->counts = counts;
+  impl_->packed = std::move(note);
   if (!workspace->notes().empty()) impl_->notes = workspace->notes();
   impl_->keep(std::move(workspace));
   for (auto& other : others) {

@@ -14,6 +14,10 @@
 
 namespace pycraft {
 
+class Packs;
+template <class S>
+class Run;
+
 // Numbers that leave the engine: doubles, or exact expansions of wider scalars.
 struct Result {
   std::vector<double> values;                   // (batch,) rows, columns, row-major
@@ -26,6 +30,7 @@ struct Result {
 struct PassCounts {
   int values = 0, gathers = 0, scatters = 0, kernels = 0, eliminations = 0, dense = 0;
   PassCounts& operator+=(const PassCounts& other);
+  PassCounts times(int states) const;
 };
 
 struct Inputs {
@@ -38,7 +43,8 @@ struct Inputs {
 // A plan with the workspaces of its runs. Runs in several threads each take their own.
 class ExecutionPool {
  public:
-  explicit ExecutionPool(std::shared_ptr<const Plan> plan);
+  // packs: of plans that differ by their states alone; of its own where there is none.
+  explicit ExecutionPool(std::shared_ptr<const Plan> plan, std::shared_ptr<Packs> packs = nullptr);
   ~ExecutionPool();
   const Plan& plan() const { return *plan_; }
   bool current() const;  // made for the models as they are now
@@ -50,6 +56,9 @@ class ExecutionPool {
  private:
   template <class S>
   void run_at(const Inputs& inputs, bool expansions, Result& result);
+  struct Packed;
+  template <class S>
+  Packed run_packs(Run<S>& run, const Inputs& inputs, Result* expanded);
   struct Impl;
   std::shared_ptr<const Plan> plan_;
   std::unique_ptr<Impl> impl_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <random>
 
 #include "algebra/engine/plan_cache.h"
@@ -54,6 +55,16 @@ Values together(const Values& a, const Values& b, F f) {
   return all;
 }
 
+// Of what is no sum, product, ... of others.
+std::optional<Request> request_of(const Scalar& s) {
+  switch (s.node().kind) {
+    case ScalarKind::trace: return Request::trace;
+    case ScalarKind::logdet: return Request::logdet;
+    case ScalarKind::norm: return Request::norm;
+    default: return std::nullopt;
+  }
+}
+
 Values values_of(const Scalar& s, bool rules) {
   const auto& n = s.node();
   switch (n.kind) {
@@ -82,9 +93,8 @@ Values values_of(const Scalar& s, bool rules) {
     }
     default: break;
   }
-  const Request request = n.kind == ScalarKind::trace ? Request::trace : n.kind == ScalarKind::logdet ? Request::logdet : Request::norm;
   Result r;
-  evaluate(n.operand, request, r, rules, true);
+  evaluate(n.operand, *request_of(s), r, rules, true);
   Values all{{}, r.batch};
   for (size_t i = 0; i < (r.batch >= 0 ? size_t(r.batch) : 1); ++i) all.of.push_back(widened(r.expansions[i]));
   return all;
@@ -93,6 +103,12 @@ Values values_of(const Scalar& s, bool rules) {
 }  // namespace
 
 std::vector<double> evaluate(const Scalar& s, int* batch, bool rules) {
+  if (const auto request = request_of(s)) {  // a number of one run, rounded as it leaves it
+    Result r;
+    evaluate(s.node().operand, *request, r, rules);
+    if (batch) *batch = r.batch;
+    return std::move(r.values);
+  }
   const Values all = values_of(s, rules);
   if (batch) *batch = all.batch;
   std::vector<double> rounded;

@@ -4,6 +4,7 @@
 #include <mutex>
 
 #include "algebra/engine/in_use.h"
+#include "algebra/engine/packs.h"
 #include "algebra/language/memo.h"
 
 namespace pycraft {
@@ -39,40 +40,38 @@ PlanCache::BoundKey PlanCache::key_of(Request request, bool rules, const Binding
   return {request, rules, how.form, how.refinement.steps, how.refinement.residual, how.precision, binding.batch >= 0};
 }
 
-std::shared_ptr<const Plan> PlanCache::find_bound(const BoundKey& key, const std::shared_ptr<const Binding>& binding) {
-  std::shared_ptr<const Plan> known;
+PlanCache::Made PlanCache::find_bound(const BoundKey& key, const std::shared_ptr<const Binding>& binding) {
+  Made known;
   {
     std::lock_guard<Mutex> lock(mutex_);
     if (mutex_.abandoned()) leave_behind(pools_, bound_);
     const auto found = bound_.find(key);
     if (found != bound_.end()) known = found->second;
   }
-  return known && current(*known) ? rebound(*known, binding) : nullptr;
+  if (!known.plan || !current(*known.plan)) return {};
+  return {rebound(*known.plan, binding), known.packs};
 }
 
-void PlanCache::keep_bound(const BoundKey& key, const std::shared_ptr<const Binding>& binding, const std::shared_ptr<const Plan>& plan) {
-  if (!bound_to(*plan, binding)) return;
-  const std::shared_ptr<const Plan> without = rebound(*plan, nullptr);
+PlanCache::Made PlanCache::keep_bound(const BoundKey& key, const std::shared_ptr<const Binding>& binding, const std::shared_ptr<const Plan>& plan) {
+  if (!bound_to(*plan, binding)) return {plan, nullptr};
+  const Made without{rebound(*plan, nullptr), std::make_shared<Packs>()};
   std::lock_guard<Mutex> lock(mutex_);
   if (mutex_.abandoned()) leave_behind(pools_, bound_);
   bound_[key] = without;
+  return {plan, without.packs};
 }
 
-std::shared_ptr<const Plan> PlanCache::made(const Expression& e, Request request, const PlanOptions& options) {
+PlanCache::Made PlanCache::made(const Expression& e, Request request, const PlanOptions& options) {
   const auto all = contexts(e);
   const InUse use(all);
   const std::shared_ptr<Memo>& origin = e.node().memo->origin();
   const std::shared_ptr<const Binding> binding = all.empty() ? nullptr : all[0].binding;
-  if (!origin || !binding) return make_plan(e, request, options);
+  if (!origin || !binding) return {make_plan(e, request, options), nullptr};
   e.check_current();
   PlanCache& of_origin = origin->get<PlanCache>();
   const BoundKey key = key_of(request, options.rules, *binding);
-  std::shared_ptr<const Plan> plan = of_origin.find_bound(key, binding);
-  if (!plan) {
-    plan = make_plan(e, request, options);
-    of_origin.keep_bound(key, binding, plan);
-  }
-  return plan;
+  if (Made known = of_origin.find_bound(key, binding); known.plan) return known;
+  return of_origin.keep_bound(key, binding, make_plan(e, request, options));
 }
 
 // The plan is made outside the lock: a signal's handler, called in between, may ask for the same one.
@@ -81,10 +80,11 @@ std::shared_ptr<ExecutionPool> PlanCache::find_or_make(const Expression& e, Requ
   {
     std::lock_guard<Mutex> lock(mutex_);
     if (mutex_.abandoned()) leave_behind(pools_, bound_);
-    const auto known = pools_.find(key);
-    if (known != pools_.end() && known->second->current()) return known->second;
+    const auto kept = pools_.find(key);
+    if (kept != pools_.end() && kept->second->current()) return kept->second;
   }
-  auto pool = std::make_shared<ExecutionPool>(made(e, request, options));
+  const Made known = made(e, request, options);
+  auto pool = std::make_shared<ExecutionPool>(known.plan, known.packs);
   std::lock_guard<Mutex> lock(mutex_);
   std::shared_ptr<ExecutionPool>& kept = pools_[key];
   if (!kept || !kept->current()) kept = pool;

@@ -15,7 +15,7 @@ void Workspace<S>::scalar_step(const Step& s, const std::vector<SkoValues<S>*>& 
       for (size_t k = 0; k < b.rows.size(); ++k)
         for (int i = 0; i < b.rows[k]; ++i) sum += b.at(static_cast<int>(k))[i * b.columns[k] + i];
       using std::sqrt;
-      scalars_[s.out] = s.kind == StepKind::trace_of_blocks ? sum : sqrt(std::max(sum, S(0)));
+      scalars_[s.out] = s.kind == StepKind::trace_of_blocks ? sum : sqrt(maximum(sum, S(0)));
       return;
     }
     case StepKind::logdet_of_blocks: {

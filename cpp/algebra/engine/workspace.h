@@ -131,10 +131,9 @@ class Workspace {
   template <class F>
   void with_factors(int r, F f) {
     auto& [own, wide] = eliminations_[r];
-    if (wide)
-      f(*wide);
-    else
-      f(*own);
+    if constexpr (!is_recorded<S>)
+      if (wide) return f(*wide);
+    f(*own);
   }
   Workspace& operand_workspace(const Step& s) {
     Workspace* w = nullptr;

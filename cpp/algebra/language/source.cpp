@@ -7,6 +7,7 @@
 #include <unordered_set>
 
 #include "algebra/language/values.h"
+#include "numerics/recorded.h"
 #include "runtime/errors.h"
 
 namespace pycraft {
@@ -63,6 +64,8 @@ std::shared_ptr<SkoSource> source_owning(const Space& space) {
   if (!space || !alive().sources.count(space.layout().owner)) return nullptr;
   return const_cast<SkoSource*>(static_cast<const SkoSource*>(space.layout().owner))->weak_from_this().lock();
 }
+
+std::unique_ptr<SkoValues<Recorded>> SkoSource::make_values(Recorded) const { return nullptr; }
 
 void SkoSource::invalidate(const std::string& reason) {
   stale_reason_ = reason;

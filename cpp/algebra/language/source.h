@@ -90,6 +90,10 @@ class SkoSource : public std::enable_shared_from_this<SkoSource> {
 #define PYCRAFT_MAKE_VALUES(S) virtual std::unique_ptr<SkoValues<S>> make_values(S) const = 0;
   PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_MAKE_VALUES)
 #undef PYCRAFT_MAKE_VALUES
+  // Null where batches of states are not recorded: then they run state after state.
+  virtual std::unique_ptr<SkoValues<Recorded>> make_values(Recorded) const;
+  // A state like any other, at which batches are recorded: no coordinate of it is special.
+  virtual StateData generic_state() const { return {}; }
 
   // The values at the model's present state with these groups computed.
   template <class S>

@@ -22,11 +22,12 @@ class AggregatedTree final : public SkoSource {
   int nv() const override { return base_->nv(); }
   void check_state(const double* q, size_t nq, const double* v, size_t nv) const override { base_->check_state(q, nq, v, nv); }
   std::shared_ptr<const StateData> state() const override { return base_->state(); }
+  StateData generic_state() const override { return base_->generic_state(); }
   void check_current() const override { base_->check_current(); }
   std::uint64_t parameters() const override { return base_->parameters(); }
   unsigned enter_use() const override { return base_->enter_use(); }
   void leave_use(unsigned entered) const noexcept override { base_->leave_use(entered); }
-  PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_OVERRIDE_MAKE_VALUES)
+  PYCRAFT_FOR_EACH_SCALAR_AND_RECORDED(PYCRAFT_OVERRIDE_MAKE_VALUES)
 
  private:
   AggregatedTree(std::shared_ptr<SkoSource> base, Grouping grouping);

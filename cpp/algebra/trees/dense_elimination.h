@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "numerics/decisions.h"
+
 namespace pycraft {
 
 // D, G, P⁺ of body k. Always in doubt: blocks of any size have no cheap bound on their rounding.
@@ -41,7 +43,7 @@ inline Pivots DenseBlocks<S>::eliminate_hinge_of_factors(int k) {
     std::fill_n(row, m, S(0));
     for (int i = 0; i < s; ++i) {
       const S *body = factors_->body_row(k, i), h = hinge_map(k)[j * s + i];
-      if (!(h == S(0)))
+      if (!vanishes(h))
         for (int c = 0; c < m; ++c) row[c] += h * body[c];
     }
   }

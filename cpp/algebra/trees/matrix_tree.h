@@ -23,7 +23,7 @@ class MatrixTree final : public SkoSource {
   void check_state(const double* q, size_t nq, const double* v, size_t nv) const override;
   std::shared_ptr<const StateData> state() const override { return state_; }
   std::uint64_t parameters() const override { return 0; }
-  PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_OVERRIDE_MAKE_VALUES)
+  PYCRAFT_FOR_EACH_SCALAR_AND_RECORDED(PYCRAFT_OVERRIDE_MAKE_VALUES)
 
   std::vector<std::vector<double>> E, H, M, J;
 

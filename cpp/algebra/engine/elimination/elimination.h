@@ -60,7 +60,9 @@ class TreeElimination {
   // False where a solution loses more than `tolerated` and the operator is too large for one front: note() says where, and a wider
   // scalar may decide.
   template <class Blocks, class Values>
-  bool factor(Blocks&& blocks, Values&& values, S tolerated = std::min(S(S(1e7) * epsilon<S>()), S(1e-2)));
+  bool factor(Blocks&& blocks, Values&& values, S tolerated = most_lost());
+  // A recorded one cannot be done in another way: states where it loses more, or nearly as much, run by themselves.
+  static S most_lost() { return is_recorded<S> ? S(S(1e6) * epsilon<S>()) : std::min(S(S(1e7) * epsilon<S>()), S(1e-2)); }
 
   // y = operator x, m columns, with one step of refinement or more. residual(x, s, r): r = b(x) - A s in a wider scalar.
   template <class T, class Blocks>
@@ -113,6 +115,7 @@ class TreeElimination {
   bool eliminate();
   void join_scales();
   void take_units(const S* solution);
+  S in_units(const S& x, size_t i) const;
   S lost();                                                // relative error of a solve whose solution is known
   bool natural_sides_are_solved(S tolerated);              // to a backward error, row by row
   void coarsen();                                          // every other front merged into its parent
@@ -150,8 +153,10 @@ class TreeElimination {
   std::vector<std::vector<Place>> state_at_, equation_at_;   // of state j at body k; Euclidean: one entry
   int border_ = 0;
   size_t total_ = 0;
-  std::vector<S> A_, original_, sizes_;                      // all matrices, factored and as assembled; the largest that went into each entry of A(k,k)
-  std::vector<S> border_matrix_, border_original_, border_sizes_;
+  std::vector<S> A_, original_;                      // all matrices, factored and as assembled; the largest that went into each entry of A(k,k)
+  std::vector<S> border_matrix_, border_original_;
+  std::vector<Soft<S>> sizes_, border_sizes_;
+  std::vector<S> natural_;                                   // of a recorded one: what gives each state in its unit
   std::vector<int> unit_, row_scale_, shift_, over_size_;    // binary exponents of each state's unit and each equation's scale; work
   std::vector<SmallLU<S>> lu_;
   SmallLU<S> border_lu_;

@@ -49,13 +49,13 @@ void TreeElimination<S>::join_scales() {
     };
     for (int i = 0; i < f.n; ++i)
       for (int j = 0; j < across; ++j)
-        if (const S a = abs(original_[f.across + size_t(i) * across + j]); a > S(0)) {
+        if (const Soft<S> a = abs(soft(original_[f.across + size_t(i) * across + j])); a > Soft<S>(0)) {
           int& size = shift_[scales.part_of_row(i)];
           size = std::max(size, static_cast<int>(ilogb(a)) + scales.row(i) + unit_[outside(j, f.columns)]);
         }
     for (int i = 0; i < f.height() + border_; ++i)
       for (int j = 0; j < f.n; ++j)
-        if (const S a = abs(original_[f.over + size_t(i) * f.n + j]); a > S(0)) {
+        if (const Soft<S> a = abs(soft(original_[f.over + size_t(i) * f.n + j])); a > Soft<S>(0)) {
           int& size = over_size_[scales.part_of_column(j)];
           size = std::max(size, static_cast<int>(ilogb(a)) + row_scale_[outside(i, f.rows)] + scales.column(j));
         }
@@ -67,19 +67,38 @@ void TreeElimination<S>::join_scales() {
   }
 }
 
+// x in the unit of state i. Recorded units are what they are at each state, no powers of two.
+template <class S>
+S TreeElimination<S>::in_units(const S& x, size_t i) const {
+  using std::ldexp;
+  if constexpr (is_recorded<S>)
+    return x * natural_[i];
+  else
+    return ldexp(x, -unit_[i]);
+}
+
 // The unit of a state at a body becomes the size that it takes in a solution.
 template <class S>
 void TreeElimination<S>::take_units(const S* solution) {
   using std::abs, std::ilogb, std::ldexp;
+  if constexpr (is_recorded<S>) {
+    natural_.clear();
+    for (int unit : unit_) natural_.push_back(ldexp(S(1), -unit));
+  }
   for (size_t j = 0; j < r_->states.size(); ++j)
     for (size_t k = 0; k < state_at_[j].size(); ++k) {
       const Place p = state_at_[j][k];
       const size_t first = (p.front < 0 ? total_ : fronts_[p.front].vector) + p.position;
       const size_t end = first + (r_->states[j].belongs_to_bodies() ? r_->states[j].body_size(static_cast<int>(k)) : r_->states[j].dimension());
       S largest = S(0);
-      for (size_t i = first; i < end; ++i) largest = std::max(largest, S(ldexp(S(abs(solution[i])), -unit_[i])));
-      if (!(largest > S(0))) continue;
-      const int size = static_cast<int>(ilogb(largest));
+      for (size_t i = first; i < end; ++i) largest = maximum(largest, in_units(S(abs(solution[i])), i));
+      if (!(soft(largest) > Soft<S>(0))) continue;
+      if constexpr (is_recorded<S>) {
+        const S inverse = S(1) / largest;
+        for (size_t i = first; i < end; ++i) natural_[i] *= inverse;
+        continue;
+      }
+      const int size = static_cast<int>(ilogb(soft(largest)));
       for (size_t i = first; i < end; ++i) unit_[i] += size;
     }
 }
@@ -117,8 +136,8 @@ S TreeElimination<S>::lost() {
   solve_system(rhs_.data(), 1);
   S error = S(0);
   for (size_t i = 0; i < size; ++i) {
-    const S e = ldexp(S(abs(S(rhs_[i] - residual_[i]))), -unit_[i]);
-    if (!(e <= error)) error = e;
+    const S e = in_units(S(abs(S(rhs_[i] - residual_[i]))), i);
+    error = larger_or_odd(error, e);
   }
   return error;
 }
@@ -133,7 +152,7 @@ bool TreeElimination<S>::natural_sides_are_solved(S tolerated) {
   size_t widest = border_;
   for (const Front& f : fronts_) widest = std::max(widest, size_t(f.n));
   if (work_.size() < widest * m) work_.resize(widest * m);
-  const auto largest = [](S& target, const S& entry, const S& x) { target = std::max(target, S(abs(entry * x))); };
+  const auto largest = [](S& target, const S& entry, const S& x) { target = maximum(target, S(abs(entry * x))); };
   solution_.assign(size * m, S(1));
   probe_.assign(size * m, S(0));
   over_products(solution_.data(), probe_.data(), m, largest);
@@ -152,7 +171,7 @@ bool TreeElimination<S>::natural_sides_are_solved(S tolerated) {
   for (size_t j = 0; j < r_->states.size(); ++j) {
     S most = S(0);
     of_one_kind(static_cast<int>(j), [&](size_t i) {
-      for (int c = 0; c < m; ++c) most = std::max(most, S(abs(solution_[i * m + c])));
+      for (int c = 0; c < m; ++c) most = maximum(most, S(abs(solution_[i * m + c])));
     });
     of_one_kind(static_cast<int>(j), [&](size_t i) { std::fill_n(solution_.begin() + i * m, m, most); });
   }

@@ -80,9 +80,9 @@ void TreeElimination<S>::assemble(Blocks&& blocks, Values&& values) {
   for (const Realization::Border& t : r_->border_terms) add_border(t);
   using std::abs;
   for (const Front& f : fronts_)
-    for (size_t i = 0; i < size_t(f.n) * f.n; ++i) sizes_[f.sizes + i] = abs(A_[f.matrix + i]);
+    for (size_t i = 0; i < size_t(f.n) * f.n; ++i) sizes_[f.sizes + i] = abs(soft(A_[f.matrix + i]));
   border_sizes_.resize(border_matrix_.size());
-  for (size_t i = 0; i < border_matrix_.size(); ++i) border_sizes_[i] = abs(border_matrix_[i]);
+  for (size_t i = 0; i < border_matrix_.size(); ++i) border_sizes_[i] = abs(soft(border_matrix_[i]));
   original_ = A_;
   border_original_ = border_matrix_;
 }

@@ -29,12 +29,12 @@ bool TreeElimination<S>::eliminate() {
       for (int j = 0; j < across; ++j) {
         S update = S(0);
         for (int a = 0; a < f.n; ++a) update += over[size_t(i) * f.n + a] * U[size_t(a) * across + j];
-        if (update == S(0)) continue;
+        if (vanishes(update)) continue;
         const bool parent_column = j < f.width();
         if (parent_row && parent_column) {
           A_[p->matrix + size_t(f.rows[i]) * p->n + f.columns[j]] -= update;
-          S& size = sizes_[p->sizes + size_t(f.rows[i]) * p->n + f.columns[j]];
-          size = std::max(size, S(abs(update)));
+          Soft<S>& size = sizes_[p->sizes + size_t(f.rows[i]) * p->n + f.columns[j]];
+          size = maximum(size, Soft<S>(abs(soft(update))));
         } else if (parent_row) {
           A_[p->across + size_t(f.rows[i]) * (p->width() + border_) + p->width() + (j - f.width())] -= update;
         } else if (parent_column) {
@@ -42,7 +42,7 @@ bool TreeElimination<S>::eliminate() {
         } else {
           const size_t at = size_t(i - f.height()) * border_ + (j - f.width());
           border_matrix_[at] -= update;
-          border_sizes_[at] = std::max(border_sizes_[at], S(abs(update)));
+          border_sizes_[at] = maximum(border_sizes_[at], Soft<S>(abs(soft(update))));
         }
       }
     }
@@ -86,6 +86,7 @@ bool TreeElimination<S>::factor(Blocks&& blocks, Values&& values, S tolerated) {
       growth_ = lost();
       const bool solved = natural_sides_are_solved(half);
       if (growth_ <= tolerated && solved) return true;
+      off_tape(growth_);
       where = "elimination body by body loses " + (growth_ <= tolerated ? "all" : elimination::digits(growth_)) + " digits";
       if (growth_ <= half && solved) {
         note_ = "digits: " + where;
@@ -96,6 +97,7 @@ bool TreeElimination<S>::factor(Blocks&& blocks, Values&& values, S tolerated) {
       coarsen();
       continue;
     }
+    off_tape(growth_);
     if (failed_ < 0) break;  // the border's own block
     const Front& f = fronts_[failed_];
     where = "the pivot block of body '" + tree_.body_names[f.bodies[0]] + "' is singular";

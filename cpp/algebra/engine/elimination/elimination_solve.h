@@ -19,7 +19,7 @@ void TreeElimination<S>::solve_system(S* b, int m) {
       S* target = i < f.height() ? b + (fronts_[f.parent].vector + f.rows[i]) * m : border + (i - f.height()) * m;
       const S* row = A_.data() + f.over + size_t(i) * f.n;
       for (int a = 0; a < f.n; ++a)
-        if (!(row[a] == S(0)))
+        if (!vanishes(row[a]))
           for (int c = 0; c < m; ++c) target[c] -= row[a] * y[a * m + c];
     }
   }
@@ -34,7 +34,7 @@ void TreeElimination<S>::solve_system(S* b, int m) {
       const S* s = j < f.width() ? b + (fronts_[f.parent].vector + f.columns[j]) * m : border + (j - f.width()) * m;
       for (int i = 0; i < f.n; ++i) {
         const S u = U[size_t(i) * across + j];
-        if (u == S(0)) continue;
+        if (vanishes(u)) continue;
         for (int c = 0; c < m; ++c) y[i * m + c] -= u * s[c];
       }
     }
@@ -48,7 +48,7 @@ void TreeElimination<S>::over_products(const S* s, S* r, int m, Term&& term) con
   S* border_r = r + total_ * m;
   const auto row_product = [&](const S* row, const S* v, int n, S* target) {
     for (int a = 0; a < n; ++a)
-      if (!(row[a] == S(0)))
+      if (!vanishes(row[a]))
         for (int c = 0; c < m; ++c) term(target[c], row[a], v[a * m + c]);
   };
   for (const Front& f : fronts_) {
@@ -59,7 +59,7 @@ void TreeElimination<S>::over_products(const S* s, S* r, int m, Term&& term) con
       row_product(original_.data() + f.matrix + size_t(i) * f.n, own, f.n, target);
       const S* line = original_.data() + f.across + size_t(i) * across;
       for (int j = 0; j < across; ++j) {
-        if (line[j] == S(0)) continue;
+        if (vanishes(line[j])) continue;
         const S* v = j < f.width() ? s + (fronts_[f.parent].vector + f.columns[j]) * m : border_s + (j - f.width()) * m;
         for (int c = 0; c < m; ++c) term(target[c], line[j], v[c]);
       }
@@ -163,7 +163,7 @@ void TreeElimination<S>::solve(const T* x, T* y, int m, Blocks&& blocks, const R
   residual_ = rhs_;
   solve_system(rhs_.data(), m);
   // One step of refinement on the system itself; further ones where they are asked for, or while the correction is large and shrinks.
-  using std::abs, std::ldexp;
+  using std::abs;
   const int asked = how.steps == Refinement::automatic ? most_corrections : how.steps;
   const S enough = how.steps ? epsilon<S>() : std::min(S(S(1e6) * epsilon<S>()), S(1e-3));
   S last = S(-1);
@@ -174,8 +174,8 @@ void TreeElimination<S>::solve(const T* x, T* y, int m, Blocks&& blocks, const R
     S correction = S(0), solution = S(0);
     for (size_t i = 0; i < total_ + border_; ++i)
       for (int c = 0; c < m; ++c) {
-        correction = std::max(correction, S(ldexp(S(abs(product_[i * m + c])), -unit_[i])));
-        solution = std::max(solution, S(ldexp(S(abs(rhs_[i * m + c])), -unit_[i])));
+        correction = maximum(correction, in_units(S(abs(product_[i * m + c])), i));
+        solution = maximum(solution, in_units(S(abs(rhs_[i * m + c])), i));
       }
     if (step && !(correction < last / S(2))) break;
     for (size_t i = 0; i < size; ++i) rhs_[i] += product_[i];

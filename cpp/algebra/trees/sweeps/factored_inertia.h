@@ -176,16 +176,31 @@ class FactoredInertia {
       for (int i = 0; i < rows; ++i) {
         S& a = A[i * stride + c];
         a *= root;
-        if (i + 1 < rows) size = std::max(size, S(abs(a)));
+        if (i + 1 < rows) size = maximum(size, S(abs(a)));
       }
       weighted_[c] = size;
       order_[c] = c;
     }
+    if constexpr (is_recorded<S>) return sort_columns(A, stride, rows, m);
     std::sort(order_.begin(), order_.begin() + m, [&](int a, int b) { return weighted_[a] > weighted_[b] || (weighted_[a] == weighted_[b] && a < b); });
     for (int i = 0; i < rows; ++i) {
       for (int c = 0; c < m; ++c) sorted_[c] = A[i * stride + order_[c]];
       std::copy_n(sorted_.data(), m, A + i * stride);
     }
+  }
+
+  // Whichever order it comes to: neighbours trade places where the second is the larger.
+  void sort_columns(S* A, int stride, int rows, int m) {
+    for (int last = m - 1; last > 0; --last)
+      for (int c = 0; c < last; ++c) {
+        const S size = weighted_[c], next = weighted_[c + 1];
+        const auto trade = [&](S& a, S& b) {
+          const S first = where_less(size, next, b, a);
+          b = where_less(size, next, a, b), a = first;
+        };
+        trade(weighted_[c], weighted_[c + 1]);
+        for (int i = 0; i < rows; ++i) trade(A[i * stride + c], A[i * stride + c + 1]);
+      }
   }
 
   const SkoStructure& tree_;

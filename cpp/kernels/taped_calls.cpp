@@ -1,4 +1,4 @@
-#include "kernels/tape.h"
+#include "kernels/taped_calls.h"
 
 #include <numeric>
 
@@ -18,7 +18,7 @@ namespace pycraft::kernels {
 using traced::Number;
 
 Tape tape_of(const Links<double>& links, Call call, const double* gravity, bool with_u, int size) {
-  Tape tape{{{Does::number, 0, 0, 0}}, {}, -1};
+  Tape tape;
   const std::vector<double> q(links.nq + 1), v(links.nv + 1), u(links.nv + 1);  // never read: places alone
   const States<double> at{q.data(), v.data(), with_u ? u.data() : nullptr, 0, 0, 0, 1, gravity, nullptr, check_interrupt};
   traced::Recording recording{tape, at, links.nq, links.nv};
@@ -43,7 +43,7 @@ Tape tape_of(const Links<double>& links, Call call, const double* gravity, bool 
     case Call::mass_matrix_inverse: traced::mass_matrix_inverse<Number>(links, at, out.data(), size, work.data()); break;
     default: break;
   }
-  tape.results.assign(out.begin(), out.end());
+  for (int i = 0; i < size; ++i) tape.results.push_back({i, static_cast<int>(out[i])});
   return tape;
 }
 

@@ -8,7 +8,7 @@
 // e_rem_pio2.c); in single: S. Moshier, Cephes mathematical library (sinf.c).
 #pragma once
 
-#include "kernels/lanes.h"
+#include "lanes/lanes.h"
 
 namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET {
 

@@ -1,0 +1,38 @@
+// Gradients of ln det(ℳ + J) of batches in packs: the recursion runs once on numbers that write down what is done to them
+// (numerics/recorded.h), and that is done again at the states, with the bits that it has by itself.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "lanes/replayed.h"
+#include "model/multibody.h"
+
+namespace pycraft {
+
+enum class GradientOver { coordinates, inertias, geometry, axes };
+int gradient_size(const Multibody& model, GradientOver over);
+
+// The recursion on q of this model; null where it cannot be recorded.
+std::shared_ptr<const kernels::Program> recorded_gradient(const Multibody& model, GradientOver over);
+
+class PackedGradients {
+ public:
+  // From so many states on.
+  static constexpr int least = 64;
+  // Which states are left; all of them where nothing could be recorded.
+  std::vector<int> run(const Multibody& model, GradientOver over, const double* q, int states, double* out);
+
+ private:
+  struct Kept {
+    std::uint64_t parameters = 0;
+    std::shared_ptr<const kernels::Program> program;
+  };
+  Mutex mutex_;
+  std::map<GradientOver, Kept> kept_;
+  kernels::Rooms rooms_;
+};
+
+}  // namespace pycraft

@@ -1,0 +1,25 @@
+#include "model/recorded_model.h"
+
+#include <cmath>
+
+#include "model/compiled_model.h"
+#include "numerics/recorded.h"
+
+namespace pycraft {
+
+template <>
+std::shared_ptr<const CompiledModel<Recorded>> Multibody::compiled<Recorded>() const {
+  return std::make_shared<CompiledModel<Recorded>>(broadcast<Recorded>(*compiled<double>()));
+}
+
+StateData generic_state(const Multibody& model) {
+  constexpr double golden = 0.6180339887498949;
+  const auto number = [](int i) { return (i % 3 == 1 ? -1 : 1) * (0.4 + 0.6 * std::fmod(golden * (i + 1), 1.0)); };
+  StateData at{model.zero_q(), {}};
+  std::vector<double> along;
+  for (int i = 0; i < model.nv(); ++i) along.push_back(number(i)), at.v.push_back(number(i + model.nv()));
+  model.integrate(model.zero_q().data(), along.data(), at.q.data());
+  return at;
+}
+
+}  // namespace pycraft

@@ -1,0 +1,15 @@
+// Robots at the recorded scalar: by themselves, as no time is spent in them (CMakeLists.txt).
+#include "numerics/recorded.h"
+#include "operators/derived_values.h"
+#include "operators/grouped_values.h"
+#include "operators/inverse_tangent_sweep.h"
+#include "operators/rigid_letters.h"
+
+namespace pycraft {
+
+std::unique_ptr<SkoValues<Recorded>> MultibodyOperators::make_values(Recorded) const { return std::make_unique<RigidValues<Recorded>>(*this); }
+std::unique_ptr<SkoValues<Recorded>> HingeSubset::make_values(Recorded) const { return std::make_unique<SubsetValues<Recorded>>(*this, base_->structure()); }
+std::unique_ptr<SkoValues<Recorded>> WorldFrame::make_values(Recorded) const { return std::make_unique<WorldValues<Recorded>>(*this); }
+std::unique_ptr<SkoValues<Recorded>> GroupedOperators::make_values(Recorded) const { return std::make_unique<GroupedValues<Recorded>>(*this); }
+
+}  // namespace pycraft

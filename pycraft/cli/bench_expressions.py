@@ -1,0 +1,151 @@
+"""What expressions cost (`pycraft bench`): built, planned, applied beside the kernels; batches in packs beside their states one by one.
+
+Each result is checked in the run that times it. Figures in microseconds are the least of several rounds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from ..models.generators import chain
+from .bench import Figure, _elapsed, _states, in_turn
+
+PLANNED, THIRD, OVER_KERNEL, OF_KERNEL = 100.0, 50e3, 0.6, 1.15
+"""Bounds: the first evaluation of ten operators, that of a third derivative, `e @ x` beyond its kernel (in µs); ℳ⁻¹x over its kernel."""
+NEVER = 2**31 - 1
+BATCH = 1024
+
+
+def _ten_operators(soa: Any) -> _core.Operator:
+    H, psi, K, D, I = soa("H psi K D I")
+    return (I - H @ psi @ K).T @ D.inv() @ (I - H @ psi @ K)
+
+
+def building(repeats: int = 2000) -> list[Figure]:
+    """An expression of ten operators in Python: typed, and evaluated for the first time; a third derivative, too."""
+    soa = chain(7, seed=1).soa
+    typed = min(_elapsed(lambda: _ten_operators(soa), repeats) for _ in range(5))
+    x = np.ones(7)
+    again = _ten_operators(soa) @ x
+    first = []
+    for _ in range(repeats // 10):
+        e = _ten_operators(soa)
+        first.append(_elapsed(lambda: e @ x, 1))  # noqa: B023 - called at once
+        if not np.array_equal(e @ x, again):
+            raise _core.EvaluationError("an expression that is typed anew has another value")
+    third = min(_elapsed(lambda: _third_derivative(soa), 1) for _ in range(5))
+    return [
+        Figure("building an expression of ten operators in Python", 1e6 * typed, "us", 50.0),
+        Figure("its first evaluation", 1e6 * min(first), "us", PLANNED),
+        Figure("a third derivative of Υ, built and evaluated for the first time", 1e6 * third, "us", THIRD),
+    ]
+
+
+def _third_derivative(soa: Any) -> np.ndarray:
+    return soa.Upsilon.diff(1).diff(2).diff(4) @ np.ones(42)
+
+
+def _beside_kernels(name: str, model: Any, seconds: float) -> list[Figure]:
+    """ℳ⁻¹x at states in rotation over forward dynamics at rest, which is ℳ⁻¹τ; what `e @ x` takes in Python beyond the core's run."""
+    q, v, u = _states(model)
+    inverse, x = model.soa.MM.inv(), u[0]
+    bound = inverse.at(q, v)
+    model_at_rest = model.forward_dynamics(q, 0 * v, x) - model.forward_dynamics(q, 0 * v)
+    before = _core.record_from(NEVER)
+    try:
+        if not np.allclose(bound @ x, model_at_rest, rtol=1e-6, atol=1e-6 * np.abs(model_at_rest).max()):
+            raise _core.EvaluationError(f"ℳ⁻¹x of {name} is wrong in the run that times it")
+        direct, own = in_turn(
+            seconds, partial(_core.time_dynamics, model, "forward_dynamics", q, 0 * v, u), partial(_core.time_apply, bound, x)
+        )
+    finally:
+        _core.record_from(before)
+    own /= len(q)
+    one = inverse.at(q[0])
+    (kernel,) = in_turn(seconds, partial(_core.time_apply, one, x))
+    python = min(_elapsed(lambda: one @ x, 2000) for _ in range(5))
+    return [
+        Figure(
+            f"{name}: MM^-1 @ x at new states over forward dynamics",
+            own / direct,
+            "x",
+            OF_KERNEL,
+            f"{1e6 * own:.2f} us and {1e6 * direct:.2f} us",
+        ),
+        Figure(
+            f"{name}: MM^-1 @ x from Python beyond the core's run",
+            1e6 * (python - kernel),
+            "us",
+            OVER_KERNEL,
+            f"{1e6 * kernel:.2f} us there",
+        ),
+    ]
+
+
+def _requests(model: Any) -> dict[str, Callable[[Any, Any], np.ndarray]]:
+    """What is asked of batches: sweeps, kernels, realizations, derivatives, eliminations."""
+    soa, x, i = model.soa, np.ones(model.nv), model.nv - 1
+    MM, shifted = soa.MM + soa.J, soa.MM + 0.1 * soa.I
+    requests: dict[str, Callable[[Any, Any], np.ndarray]] = {
+        "MM @ x": lambda Q, V: MM.at(Q, V) @ x,
+        "MM^-1 @ x": lambda Q, V: MM.inv().at(Q, V) @ x,
+        "H psi M psi* H* @ x": lambda Q, V: (soa.H @ soa.psi @ soa.M @ soa.psi.T @ soa.H.T).at(Q, V) @ x,
+        "MM as a matrix": lambda Q, V: MM.at(Q, V).dense(),
+        "(MM + 0.1 I)^-1 @ x": lambda Q, V: shifted.inv().at(Q, V) @ x,
+        "MM.diff(i) @ x": lambda Q, V: MM.diff(i).at(Q, V) @ x,
+        "MM^-1.diff(i) @ x": lambda Q, V: MM.inv().diff(i).at(Q, V) @ x,
+    }
+    if model.nv < 50:
+        requests |= {
+            "MM^-1 as a matrix": lambda Q, V: MM.inv().at(Q, V).dense(),
+            "MM.diff(i) as a matrix": lambda Q, V: MM.diff(i).at(Q, V).dense(),
+        }
+    return requests
+
+
+def _seconds(ask: Callable[[Any, Any], np.ndarray], q: np.ndarray, v: np.ndarray, record_from: int) -> float:
+    """A state of a batch, in packs or one by one; the least of some calls."""
+    before = _core.record_from(record_from)
+    try:
+        ask(q, v)
+        return min(_elapsed(lambda: ask(q, v), 1) for _ in range(5)) / len(q)
+    finally:
+        _core.record_from(before)
+
+
+def _in_packs(name: str, model: Any) -> list[Figure]:
+    """A batch in packs over its states one by one, and over calls for one state each."""
+    q, v, _ = _states(model, BATCH)
+    few = slice(0, 64)
+    figures = []
+    for what, ask in _requests(model).items():
+        before = _core.record_from(1)
+        together = ask(q[few], v[few])
+        _core.record_from(NEVER)
+        singly = ask(q[few], v[few])
+        _core.record_from(before)
+        if not np.allclose(together, singly, rtol=1e-8, atol=1e-8 * np.abs(singly).max()):
+            raise _core.EvaluationError(f"{what} of {name} in packs is wrong in the run that times it")
+        packed, one = _seconds(ask, q, v, 1), _seconds(ask, q[few], v[few], NEVER)
+        call = min(_elapsed(partial(ask, q[0], v[0]), 20) for _ in range(5))
+        note = f"{1e6 * packed:.2f} us a state; {1e6 * one:.2f} one by one, {1e6 * call:.1f} a call"
+        figures.append(Figure(f"{name}: {what} in packs over one by one", packed / one, "x", None, note))
+    return figures
+
+
+def expressions(seconds: float = 0.2) -> list[Figure]:
+    """All of the above, on two robots and a chain."""
+    from ..models import robots
+
+    figures = building()
+    models = {"panda": robots.panda(), "g1": robots.g1(), "chain of 100": chain(100, seed=1)}
+    for name, model in models.items():
+        figures += _beside_kernels(name, model, seconds)
+    for name, model in models.items():
+        figures += _in_packs(name, model)
+    return figures
