@@ -17,13 +17,13 @@ extern const ColumnKernels<double> avx2_columns, avx512_columns;
 
 const std::vector<InstructionSet>& instruction_sets() {
   static const std::vector<InstructionSet> sets = [] {
-    std::vector<InstructionSet> there{{"baseline", baseline_one, baseline_pack, baseline_singles, baseline_columns}};
+    std::vector<InstructionSet> there{{"baseline", baseline_one, baseline_pack, baseline_singles, baseline_singles, baseline_columns}};
 #if defined(PYCRAFT_X86_64)
     __builtin_cpu_init();
     if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
-      there.push_back({"avx2", avx2_one, avx2_pack, avx2_singles, avx2_columns});
+      there.push_back({"avx2", avx2_one, avx2_pack, avx2_singles, avx2_singles, avx2_columns});
       if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bw"))
-        there.push_back({"avx512", avx2_one, avx512_pack, avx512_singles, avx512_columns});  // one state has nothing to fill wider registers with
+        there.push_back({"avx512", avx2_one, avx512_pack, avx512_singles, avx2_singles, avx512_columns});  // one state has nothing to fill wider registers with
     }
 #endif
     return there;

@@ -1,4 +1,4 @@
-// Forward dynamics as trajectories ask for it, one state after another: by kernels in double precision and the plain form, where they are sure;
+// Forward dynamics as trajectories ask for it, one state after another: by kernels in double precision, where they are sure;
 // else by the general recursions.
 #pragma once
 
@@ -15,10 +15,11 @@ Accelerations<S> accelerations_of(const Multibody& model, const Solving& how) {
   const auto general = std::make_shared<RigidDynamics<S>>(model);
   if constexpr (std::is_same_v<S, double>) {
     const auto links = std::make_shared<LinkDynamics<double>>(model);
-    if (links->there(kernels::Call::forward_dynamics) && how.form == Form::fast && how.refinement.steps == 0)
-      return [general, links, how, nq = model.nq(), nv = model.nv()](const double* q, const double* v, const double* tau, double* vdot) {
+    const kernels::Call call = forward_dynamics_call(how.form);
+    if (links->there(call) && how.refinement.steps == 0)
+      return [general, links, how, call, nq = model.nq(), nv = model.nv()](const double* q, const double* v, const double* tau, double* vdot) {
         const Given configuration{"q", q, nq}, velocity{"v", v, nv}, force{"tau", tau, nv};
-        links->run({kernels::Call::forward_dynamics, configuration, &velocity, &force}, 1, nv, vdot, [&](int, int) { general->forward_dynamics(q, v, tau, vdot, how); });
+        links->run({call, configuration, &velocity, &force}, 1, nv, vdot, [&](int, int) { general->forward_dynamics(q, v, tau, vdot, how); });
       };
   }
   return [general, how](const S* q, const S* v, const S* tau, S* vdot) { general->forward_dynamics(q, v, tau, vdot, how); };
