@@ -15,9 +15,15 @@ extern const Kernels<float> avx2_singles, avx512_singles;
 extern const ColumnKernels<double> avx2_columns, avx512_columns;
 #endif
 
+#if defined(__aarch64__)
+constexpr const char* everywhere = "neon";  // part of every such processor
+#else
+constexpr const char* everywhere = "baseline";
+#endif
+
 const std::vector<InstructionSet>& instruction_sets() {
   static const std::vector<InstructionSet> sets = [] {
-    std::vector<InstructionSet> there{{"baseline", baseline_one, baseline_pack, baseline_singles, baseline_singles, baseline_columns}};
+    std::vector<InstructionSet> there{{everywhere, baseline_one, baseline_pack, baseline_singles, baseline_singles, baseline_columns}};
 #if defined(PYCRAFT_X86_64)
     __builtin_cpu_init();
     if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {

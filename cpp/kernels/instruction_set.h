@@ -1,5 +1,5 @@
 // The kernels that this machine runs: of the widest instruction set that it has and that was built, or of the one that the environment
-// variable PYCRAFT_ISA names ("baseline", "avx2", "avx512").
+// variable PYCRAFT_ISA names ("baseline", "avx2", "avx512"; on arm64 "neon").
 #pragma once
 
 #include <string>

@@ -16,8 +16,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <type_traits>
-#ifdef __FMA__
+#if defined(__FMA__)
 #include <immintrin.h>
+#elif defined(__aarch64__)
+#include <arm_neon.h>
 #endif
 
 namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET {
@@ -33,9 +35,15 @@ struct BitsOf<float> {
 };
 
 // a b + c, of numbers or of vectors of them.
-#ifdef __FMA__
+#if defined(__FMA__) || defined(__aarch64__)
 [[gnu::always_inline]] inline double fused(double a, double b, double c) { return __builtin_fma(a, b, c); }
 [[gnu::always_inline]] inline float fused(float a, float b, float c) { return __builtin_fmaf(a, b, c); }
+// Of numbers wider than words nothing fuses them.
+template <class T>
+  requires(std::is_class_v<T> || std::is_same_v<T, long double>)
+[[gnu::always_inline]] inline T fused(const T& a, const T& b, const T& c) { return a * b + c; }
+#endif
+#if defined(__FMA__)
 [[gnu::always_inline]] inline __m128d fused(__m128d a, __m128d b, __m128d c) { return _mm_fmadd_pd(a, b, c); }
 [[gnu::always_inline]] inline __m256d fused(__m256d a, __m256d b, __m256d c) { return _mm256_fmadd_pd(a, b, c); }
 [[gnu::always_inline]] inline __m256 fused(__m256 a, __m256 b, __m256 c) { return _mm256_fmadd_ps(a, b, c); }
@@ -43,6 +51,16 @@ struct BitsOf<float> {
 [[gnu::always_inline]] inline __m512d fused(__m512d a, __m512d b, __m512d c) { return _mm512_fmadd_pd(a, b, c); }
 [[gnu::always_inline]] inline __m512 fused(__m512 a, __m512 b, __m512 c) { return _mm512_fmadd_ps(a, b, c); }
 #endif
+#elif defined(__aarch64__)
+[[gnu::always_inline]] inline float64x2_t fused(float64x2_t a, float64x2_t b, float64x2_t c) { return vfmaq_f64(c, a, b); }
+[[gnu::always_inline]] inline float32x4_t fused(float32x4_t a, float32x4_t b, float32x4_t c) { return vfmaq_f32(c, a, b); }
+template <class V>
+  requires(!std::is_class_v<V> && sizeof(V) > 16)  // than a register
+[[gnu::always_inline]] inline V fused(const V& a, const V& b, const V& c) {
+  V x;
+  for (std::size_t i = 0; i < sizeof(V) / sizeof(x[0]); ++i) x[i] = fused(a[i], b[i], c[i]);
+  return x;
+}
 #else
 template <class V>
 [[gnu::always_inline]] inline V fused(const V& a, const V& b, const V& c) { return a * b + c; }

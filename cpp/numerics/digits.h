@@ -117,3 +117,9 @@ struct std::numeric_limits<pycraft::Digits<decimals>> {
   static Number infinity() { return Number(std::numeric_limits<double>::infinity()); }
   static Number quiet_NaN() { return Number(std::numeric_limits<double>::quiet_NaN()); }
 };
+
+#if !defined(PYCRAFT_FLOAT128)
+// To Boost's own quad they are no numbers whose parts it could take: they convert by themselves.
+template <unsigned decimals>
+struct boost::multiprecision::number_category<pycraft::Digits<decimals>> : std::integral_constant<int, boost::multiprecision::number_kind_unknown> {};
+#endif

@@ -233,7 +233,8 @@ RESTS_ON = {
     "sympy_bridge": ["proofs"],
     "accuracy": ["identities", "peers", "tidy"],
     "compiled": ["recursions"],
-    "face": ["accuracy", "compiled", "identities"],
+    "view": ["accuracy"],
+    "face": ["accuracy", "compiled", "identities", "view"],
     "": ["face", "kalman", "closed_forms", "sympy_bridge"],  # pycraft itself
     "cli": [""],
 }
