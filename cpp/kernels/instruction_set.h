@@ -18,7 +18,7 @@ struct InstructionSet {
   ColumnKernels<double> columns;
 };
 
-// Of one state in wide numbers, the same on every machine.
+// Of one state in wide numbers, the same on every machine; in quad precision where the compiler has that.
 extern const Kernels<Extended> extended_one;
 extern const Kernels<Quad> quad_one;
 

@@ -37,6 +37,10 @@ struct WideKernels {
 extern const Kernels<Extended> extended_one;
 extern const Kernels<Quad> quad_one;
 const Kernels<Extended> extended_one = wide::WideKernels<Extended>::all;
+#if defined(PYCRAFT_FLOAT128)
 const Kernels<Quad> quad_one = wide::WideKernels<Quad>::all;
+#else
+const Kernels<Quad> quad_one{1, {}, {}};  // Boost's own, whose arithmetic would be written out at every sign of a sweep: the recursions do it
+#endif
 
 }  // namespace pycraft::kernels

@@ -239,4 +239,6 @@ void check_wide(const kernels::Kernels<T>& set, double ratio, double at_most) {
   BOOST_TEST(own > 4 * eps);
 }
 BOOST_AUTO_TEST_CASE(extended_precision_is_that) { check_wide(kernels::extended_one, 1e7, epsilon<double>() * 1e7 / 100); }
-BOOST_AUTO_TEST_CASE(quad_precision_is_that) { check_wide(kernels::quad_one, 1e22, 1e-33 * 1e23); }
+BOOST_AUTO_TEST_CASE(quad_precision_is_that) {
+  if (kernels::quad_one[Call::forward_dynamics].run) check_wide(kernels::quad_one, 1e22, 1e-33 * 1e23);
+}
