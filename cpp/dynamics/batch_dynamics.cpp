@@ -26,7 +26,7 @@ LinkCall refined(LinkCall asked, const Solving& how) {
 
 BatchDynamics::Starts BatchDynamics::refined_from(Precision precision, const LinkCall& asked, int from, int to, int size, const Solving& how) {
   Starts starts;
-  if (!refines_regular(how)) return starts;
+  if (!refines_regular(how) || (precision != Precision::single && precision != Precision::double_)) return starts;  // doubles would cut wider values short
   const int states = to - from;
   starts.first = from, starts.size = size;
   starts.values.resize(size_t(states) * size), starts.there.assign(states, 1);

@@ -27,7 +27,7 @@ void each_set(F f) {
 }
 
 // A tree of these hinges in turn, two links wide where it branches: what hangs on a link comes as the one that follows it and as others.
-std::shared_ptr<Multibody> branched(const std::vector<HingeKind>& kinds, int seed, bool level = false, double massless = 0) {
+std::shared_ptr<Multibody> branched(const std::vector<HingeKind>& kinds, int seed, bool level = false, double massless = -1) {
   auto model = std::make_shared<Multibody>("branched");
   const int parents[] = {-1, 0, 1, 2, 1, 4, 0, 6, 7, 7, 7, 6, -1, 12, 13};
   const std::vector<double> x = random_numbers(400, seed);
@@ -88,8 +88,9 @@ BOOST_AUTO_TEST_CASE(every_hinge_rotor_and_branch) {
       }
 }
 
-// In single precision by 64 of its eps.
+// In single precision by 64 of its eps; its rounding leaves some in doubt where hinges have several coordinates or move along screws.
 BOOST_AUTO_TEST_CASE(in_single_precision) {
+  int sure = 0, all = 0;
   for (const auto& kinds : mixtures) {
     const Case of(branched(kinds, 8), 2);
     const std::vector<double> exact = exact_accelerations(of);
@@ -99,13 +100,17 @@ BOOST_AUTO_TEST_CASE(in_single_precision) {
           unsigned sound = 0;
           const std::vector<double> found = by_kernel((*singles)[call], of, sound);
           if (sound & 1) BOOST_TEST(off(found, exact) <= 64 * epsilon<Single>());
-          BOOST_TEST(((sound & 1) || kinds.size() > 4));
+          sure += sound & 1, ++all;
+          BOOST_TEST(((sound & 1) || kinds != std::vector{K::pin}));
         }
   }
+  BOOST_TEST_MESSAGE(sure << " sure of " << all);
+  BOOST_TEST(2 * sure > all);
 }
 
-// Massless bodies between others, point masses and rods: weights that are zero, couples that no column takes up.
+// Massless bodies between others, point masses and rods: weights that are zero, couples that no column takes up. What is singular is in doubt.
 BOOST_AUTO_TEST_CASE(bodies_without_mass_or_moments) {
+  int refused = 0;
   for (int seed = 0; seed < 12; ++seed) {
     const auto model = branched(seed % 2 ? std::vector{K::pin} : std::vector{K::pin, K::screw, K::ball}, seed, seed % 3 == 0, -0.4);
     for (int k = seed % 3; k < model->bodies(); k += 3) {
@@ -114,17 +119,24 @@ BOOST_AUTO_TEST_CASE(bodies_without_mass_or_moments) {
       model->set_mass_properties(k, m, b.com, k % 2 ? Symmetric3<double>{0, 0, 0, 0.2 * m, 0, 0.2 * m} : Symmetric3<double>::zero());
     }
     const Case of(model, seed + 20);
-    const std::vector<double> exact = exact_accelerations(of);
+    std::vector<double> exact;
+    try {
+      exact = exact_accelerations(of);
+    } catch (const SingularHingeError&) {
+      ++refused;
+    }
     for (const auto& [form, call] : factored) {
-      const double bound = 8 * off(by_recursion<double>(of, form), exact) + 256 * eps;
+      const double bound = exact.empty() ? 0 : 8 * off(by_recursion<double>(of, form), exact) + 256 * eps;
       each_set([&, call = call](const kernels::Kernels<double>& set) {
         unsigned sound = 0;
         const std::vector<double> found = by_kernel(set[call], of, sound);
-        if (sound & 1) BOOST_TEST(off(found, exact) <= bound, seed);
-        BOOST_TEST(((sound & 1) || seed % 2 == 0));
+        BOOST_TEST((sound & 1) == !exact.empty(), seed);
+        if (!exact.empty()) BOOST_TEST(off(found, exact) <= bound, seed);
       });
     }
   }
+  BOOST_TEST(refused > 0);
+  BOOST_TEST(refused <= 6);
 }
 
 // What the plain form loses is the ratio of masses; these lose none of it: their errors are as the general recursions' at every ratio, in the
@@ -187,10 +199,10 @@ void check_what_is_sound(double right, int least) {
       }
   }
   BOOST_TEST_MESSAGE(sure << " sure, " << refused << " refused");
-  BOOST_TEST(sure > least);
+  BOOST_TEST(sure > least * int(kernels::instruction_sets().size()));
 }
-BOOST_AUTO_TEST_CASE(what_is_sound_is_right) { check_what_is_sound<double>(1e-6, 300); }
-BOOST_AUTO_TEST_CASE(what_is_sound_is_right_in_single) { check_what_is_sound<float>(0.02, 100); }
+BOOST_AUTO_TEST_CASE(what_is_sound_is_right) { check_what_is_sound<double>(1e-6, 150); }
+BOOST_AUTO_TEST_CASE(what_is_sound_is_right_in_single) { check_what_is_sound<float>(0.02, 25); }
 
 // What the general recursions refuse as singular, kernels leave to them: a massless tip, a lock of a gimbal, two pins on one axis.
 BOOST_AUTO_TEST_CASE(singular_hinges_are_in_doubt) {
@@ -216,6 +228,45 @@ BOOST_AUTO_TEST_CASE(singular_hinges_are_in_doubt) {
         BOOST_TEST((sound & 1) == 0, kind);
       });
   }
+}
+
+// A bob whose own inertia is a vanishing share of that of its arm, alone and with another hung on it: six digits, or doubt.
+BOOST_AUTO_TEST_CASE(faint_coordinates_have_six_digits_or_are_in_doubt) {
+  int sure = 0, doubts = 0;
+  for (const K kind : {K::ball, K::pin, K::universal, K::gimbal, K::free})
+    for (int power = 4; power <= 30; ++power)
+      for (int seed = 0; seed < 6; ++seed) {
+        auto model = std::make_shared<Multibody>("bob");
+        const std::vector<double> x = random_numbers(12, seed);
+        const Vector3<double> com{0.3 + 0.1 * x[0], -0.4 + 0.1 * x[1], 0.5 + 0.1 * x[2]};
+        const double share = std::pow(10.0, -power);
+        for (int k = 0; k < 1 + seed % 2; ++k) {
+          Body b;
+          b.name = "body" + std::to_string(k), b.hinge.name = "hinge" + std::to_string(k);
+          b.mass = 1, b.com = com, b.inertia = {share, 0, 0, share, 0, share};
+          b.hinge.kind = k == 0 ? kind : K::pin;
+          if (k == 1) b.hinge.placement.p = com, b.inertia = {0.4, 0, 0, 0.5, 0, 0.3};
+          std::vector<Vector3<double>> axes;
+          if (b.hinge.kind == K::pin) axes = {k == 0 ? (1 / norm(com)) * com : Vector3<double>{0.6, 0, 0.8}};
+          if (kind == K::universal && k == 0) axes = {{0.6, 0.8, 0}, (1 / norm(com)) * com};
+          if (kind == K::gimbal && k == 0) axes = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+          b.hinge.subhinges = subhinges_of(b.hinge.kind, axes, {0, 0, 0}, 0, b.hinge.name);
+          model->add_body(b, k == 0 ? "" : "body0");
+        }
+        const Case of(model, seed + 50);
+        const std::vector<double> exact = by_recursion<Digits100>(of);
+        for (const auto& [form, call] : factored)
+          each_set([&, call = call, form = form](const kernels::Kernels<double>& set) {
+            unsigned sound = 0;
+            const std::vector<double> found = by_kernel(set[call], of, sound);
+            sound &= std::all_of(found.begin(), found.end(), [](double y) { return std::isfinite(y); });
+            ++(sound & 1 ? sure : doubts);
+            if (sound & 1) BOOST_TEST(off(found, exact) <= 1e-6, static_cast<int>(kind) << " " << power << " " << seed << " " << form_name(form));
+          });
+      }
+  BOOST_TEST_MESSAGE(sure << " sure, " << doubts << " in doubt");
+  BOOST_TEST(sure > 0.3 * (sure + doubts));
+  BOOST_TEST(doubts > 0.3 * (sure + doubts));
 }
 
 // Extended and quad precision: what heavy tips lose shows how many digits a value was computed with. The general recursions lose as much.

@@ -1,7 +1,8 @@
-"""Forward dynamics by kernels in the forms that carry factors (cpp/kernels/factored_dynamics.h) and in precisions wider than double: a batch is its
-states, digits and refusals are those of the general recursions.
+"""Forward dynamics by kernels in the forms that carry factors (cpp/kernels/factored_dynamics.h) and in precisions wider than double: a
+batch is its states, digits and refusals are those of the general recursions.
 
-Errors are relative 2-norms of a state's accelerations. What is left of them where nothing cancels is some roundings of the sweeps: eps √n and a few.
+Errors are relative 2-norms of a state's accelerations. What is left of them where nothing cancels is some roundings of the sweeps: eps √n
+and a few.
 """
 
 import numpy as np
@@ -12,8 +13,8 @@ from support.forms import FACTORED, heavy_tip
 from support.kernel_cases import MODELS, STATES, by_recursions, errors, heavy, states
 
 EPS = np.finfo(float).eps
-WAYS = {f"{form}{name}": {"form": form, **how} for form in FACTORED
-        for name, how in {"": {}, ", one": {"refine": 1}, ", auto": {"refine": "auto"}, ", gather": {"refine": 1, "residual": "gather"}}.items()}  # fmt: skip
+STEPS = {"": {}, ", one": {"refine": 1}, ", auto": {"refine": "auto"}, ", gather": {"refine": 1, "residual": "gather"}}
+WAYS = {f"{form}{name}": {"form": form, **how} for form in FACTORED for name, how in STEPS.items()}
 WIDE = {precision: {"precision": precision} for precision in ("extended", "quad")}
 REFERENCE = {"extended": "quad", "quad": "50"}
 each_form = pytest.mark.parametrize("form", FACTORED)
@@ -75,7 +76,8 @@ def test_heavy_tips_cost_no_digits(form):
 
 
 def test_kernels_are_what_runs():
-    """What they are compared with rounds apart: no bits of the general recursions. Wider numbers show that where a heavy tip has cost digits."""
+    """What they are compared with rounds apart: no bits of the general recursions. Wider numbers show that where a heavy tip has cost
+    digits."""
     ways = [*WAYS.values(), *({**how, "precision": "single"} for how in WAYS.values() if "refine" not in how), *WIDE.values()]
     for how in ways:
         model = heavy(MODELS["chain of 30"], {"extended": 1e8, "quad": 1e22}.get(how.get("precision"), 1.0))
@@ -152,3 +154,12 @@ def test_doubted_states_in_a_batch(way):
     Q[7, 2] = 0
     with pytest.raises(pc.SingularHingeError, match=r"'b(_hinge)?' of body 'b'(.|\n)*state 7 of"):
         arm.forward_dynamics(Q[: 7 + 5], V[: 7 + 5], U[: 7 + 5], **how)
+
+
+@pytest.mark.parametrize(("precision", "most"), [("extended", 1e-17), ("quad", 1e-30)])
+def test_reports_of_wide_numbers_start_from_all_their_digits(precision, most):
+    """What kernels return is rounded to a double: a refinement of more digits does not begin there."""
+    model = MODELS["chain of 30"]
+    q, v, u = (x[0] for x in states(model))
+    report = model.refinement(q, v, u, refine=1, residual="wider", precision=precision)
+    assert report["error"] <= most and max(report["corrections"], default=0) <= most

@@ -192,6 +192,27 @@ CHANGES = {
     "cpp/kernels/pivots.h": [
         ("what pivots outboard are unsure of is forgotten", "greater(D, S(4) * most * P.error)", "S::all()"),
     ],
+    "cpp/kernels/factored_dynamics.h": [
+        ("a rotor's link takes the whole force along", "S(tau - S(link.J) * rate)", "tau"),
+        ("what columns accelerate by themselves counts twice", "innovation + L.products[n]", "innovation"),
+        ("a factored root is sure of everything", "sure(P.error, P.growth, links.factored.growth)", "S::all()"),
+    ],
+    "cpp/kernels/factored_columns.h": [
+        ("columns of turns forget what the hinge turns by", "L.lower[r][n] - m.turning[of.turn[p]]", "L.lower[r][n]"),
+    ],
+    "cpp/kernels/reflected_rows.h": [
+        (
+            "a column that is through stays",
+            "V::choose(gone, V(typename V::Scalar(0)), V(loaded<V>(x + row) - wide_f[s] * a))",
+            "V(loaded<V>(x + row) - wide_f[s] * a)",
+        ),
+    ],
+    "cpp/kernels/link_factors.cpp": [
+        ("a rotor takes the place of a column", "full ? 12 : 5", "5"),
+    ],
+    "cpp/dynamics/batch_dynamics.cpp": [
+        ("refinement of wide numbers starts from a double", "precision != Precision::single && precision != Precision::double_", "false"),
+    ],
     "cpp/kernels/mass_matrix_of_links.h": [
         ("lengths along an axis are felt", "S(2) * (l[j] * g[j] + l[k] * g[k])", "S(2) * (dot(l, g) - l[i] * g[i])"),
         ("two pins branch between", "!parent.branches && pin(link)", "pin(link)"),

@@ -62,8 +62,8 @@ def heavy(model, ratio, gravity=(0.4, -1.0, -9.0)):
 
 
 def by_recursions(model, Q, V, U, **how):
-    """Forward dynamics by the general recursions: of the model beside a body at rest by itself, on a ball hinge with rotors, which kernels do not
-    know."""
+    """Forward dynamics by the general recursions: of the model beside a body at rest by itself, on a ball hinge with rotors, which kernels
+    do not know."""
     beside = pc.Multibody.from_description(model.description())
     beside.gravity = model.gravity
     beside.add_body("apart", None, hinge="ball", mass=1.0, inertia=np.eye(3), rotor_inertia=(0.1, 0.1, 0.1))
