@@ -13,12 +13,12 @@ using Wrenches = std::vector<Vector6<S>>;
 // What kernels do: at regular states what becomes of singular ones does not matter.
 bool plain(const Solving& how) { return how.form == Form::fast && how.refinement.steps == 0; }
 // Whether what is refined is what kernels give.
-bool refines_regular(const Solving& how) { return how.form == Form::fast && how.refinement.steps != 0 && how.on_singular == OnSingular::raise; }
+bool refines_regular(const Solving& how) { return how.refinement.steps != 0 && how.on_singular == OnSingular::raise; }
 // Whether they refine it themselves.
 bool refined_by_links(const Solving& how) { return refines_regular(how) && !how.refinement.wider(); }
-LinkCall refined(LinkCall asked, const Refinement& how) {
-  asked.call = how.gathers_wider() ? kernels::Call::gathered_dynamics : kernels::Call::refined_dynamics;
-  asked.steps = how.steps == Refinement::automatic ? most_corrections : how.steps;
+LinkCall refined(LinkCall asked, const Solving& how) {
+  asked.call = forward_dynamics_call(how.form, how.refinement);
+  asked.steps = how.refinement.steps == Refinement::automatic ? most_corrections : how.refinement.steps;
   return asked;
 }
 
@@ -26,7 +26,7 @@ LinkCall refined(LinkCall asked, const Refinement& how) {
 
 BatchDynamics::Starts BatchDynamics::refined_from(Precision precision, const LinkCall& asked, int from, int to, int size, const Solving& how) {
   Starts starts;
-  if (!refines_regular(how)) return starts;
+  if (!refines_regular(how) || (precision != Precision::single && precision != Precision::double_)) return starts;  // doubles would cut wider values short
   const int states = to - from;
   starts.first = from, starts.size = size;
   starts.values.resize(size_t(states) * size), starts.there.assign(states, 1);
@@ -49,7 +49,7 @@ void BatchDynamics::plainly(Precision precision, const LinkCall& asked, Givens g
   if (!done || doubt) general();
 }
 
-// In other forms, refined, at wider precisions, or where kernels were in doubt.
+// At wider precisions, refined by wider residuals, or where kernels were in doubt.
 template <class S>
 void BatchDynamics::forward_dynamics_at(const Given& q, const Given& v, const Given& tau, int from, int to, int states, const Solving& how,
                                         const Starts& starts, double* vdot, const Applied<double>* applied) {
@@ -90,13 +90,13 @@ void BatchDynamics::forward_dynamics(const Given& q, const Given& v, const Given
   const ModelInUse use(model());
   check_given(model(), {q, v, tau});
   const int batch = common_batch({q, v, tau}), states = batch < 0 ? 1 : batch;
-  const LinkCall asked{.call = kernels::Call::forward_dynamics, .q = q, .v = &v, .u = &tau, .applied = applied, .threads = threads};
+  const LinkCall asked{.call = forward_dynamics_call(how.form), .q = q, .v = &v, .u = &tau, .applied = applied, .threads = threads};
   const auto general = [&](int from, int to) {
     const Starts starts = refined_from(precision, asked, from, to, model().nv(), how);
     at_precision(precision, [&]<class S>(S) { forward_dynamics_at<S>(q, v, tau, from, to, states, how, starts, vdot, applied); });
   };
-  const LinkCall whole = refined_by_links(how) ? refined(asked, how.refinement) : asked;
-  if (!(plain(how) || refined_by_links(how)) || !by_links(precision, whole, states, model().nv(), vdot, general)) general(0, states);
+  const LinkCall whole = refined_by_links(how) ? refined(asked, how) : asked;
+  if (!(how.refinement.steps == 0 || refined_by_links(how)) || !by_links(precision, whole, states, model().nv(), vdot, general)) general(0, states);
 }
 
 RefinementReport BatchDynamics::refinement(const Given& q, const Given& v, const Given& tau, const Solving& how, Precision precision, double* vdot) {
@@ -108,7 +108,7 @@ RefinementReport BatchDynamics::refinement(const Given& q, const Given& v, const
     forward_dynamics(q, v, tau, how, precision, vdot);
     return report;
   }
-  const LinkCall asked{kernels::Call::forward_dynamics, q, &v, &tau};
+  const LinkCall asked{forward_dynamics_call(how.form), q, &v, &tau};
   const Starts starts = refined_from(precision, asked, 0, 1, model().nv(), how);
   Solving estimated = starts.of(0, how);
   estimated.estimate = true;
@@ -125,7 +125,7 @@ RefinementReport BatchDynamics::refinement(const Given& q, const Given& v, const
   // What a call gives: as far off as this at most, and by how much they differ.
   std::vector<double> called(model().nv());
   bool sure = true;
-  if (!by_links(precision, refined(asked, how.refinement), 1, model().nv(), called.data(), [&](int, int) { sure = false; }) || !sure) return report;
+  if (!by_links(precision, refined(asked, how), 1, model().nv(), called.data(), [&](int, int) { sure = false; }) || !sure) return report;
   double apart = 0, length = 0;
   for (size_t j = 0; j < called.size(); ++j) apart = std::hypot(apart, called[j] - vdot[j]), length = std::hypot(length, vdot[j]);
   if (apart > 0) report.estimated_error += apart / length;
@@ -162,7 +162,7 @@ void BatchDynamics::mass_matrix_inverse(const Given& q, const Solving& how, Prec
   const int states = q.batch < 0 ? 1 : q.batch;
   const LinkCall asked{kernels::Call::mass_matrix_inverse, q};
   const auto general = [&](int from, int to) {
-    const Starts starts = refined_from(precision, asked, from, to, static_cast<int>(size), how);
+    const Starts starts = how.form == Form::fast ? refined_from(precision, asked, from, to, static_cast<int>(size), how) : Starts{};
     at_precision(precision, [&]<class S>(S) {
       std::vector<S> inverse(size);
       each<S>(from, to, states, [&](RigidDynamics<S>& w, int b) {

@@ -57,6 +57,9 @@ class BatchDynamics : public Batches<RigidDynamics> {
     };
     if (precision == Precision::double_) run(double());
     if (precision == Precision::single) run(Single());
+    if (asked.call != kernels::Call::forward_dynamics) return done;  // what there is for wide numbers
+    if (precision == Precision::extended) run(Extended());
+    if (precision == Precision::quad) run(Quad());
     return done;
   }
 
@@ -83,7 +86,7 @@ class BatchDynamics : public Batches<RigidDynamics> {
   void plainly(Precision precision, const LinkCall& asked, Givens given, int size, double* out, General general);
 
   std::tuple<WorkspacePool<PackedDynamics<Single>>, WorkspacePool<PackedDynamics<double>>> packs_;
-  std::tuple<WorkspacePool<LinkDynamics<Single>>, WorkspacePool<LinkDynamics<double>>> links_;
+  std::tuple<WorkspacePool<LinkDynamics<Single>>, WorkspacePool<LinkDynamics<double>>, WorkspacePool<LinkDynamics<Extended>>, WorkspacePool<LinkDynamics<Quad>>> links_;
 };
 
 }  // namespace pycraft

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics/link_dynamics.h"
 #include "numerics/finite.h"
 #include "runtime/interrupt.h"
 
@@ -23,12 +24,14 @@ HingeTerms without_prescribed(HingeTerms terms) {
 PreparedLinks::PreparedLinks(const Multibody& model, const HingeTerms& terms, const Solving& how, const Vector3<double>& gravity, const std::vector<int>& wrenched)
     : model_(kernels::LinkModel<double>::of(model, terms)), nv_(model.nv()), wrenched_(wrenched) {
   using kernels::Call;
-  const bool refined = how.refinement.steps != 0, inverse = all_prescribed(model, terms);  // nothing is solved for: in any form
-  const bool plain = how.form == Form::fast && how.on_singular == OnSingular::raise && !how.refinement.wider();
-  if (!model_ || !(inverse || (plain && !(refined && terms.prescribes())))) return;
-  const Call call = inverse ? Call::inverse_dynamics : !refined ? Call::forward_dynamics : how.refinement.gathers_wider() ? Call::gathered_dynamics : Call::refined_dynamics;
+  const bool inverse = all_prescribed(model, terms);  // nothing is solved for: in any form
+  const bool regular = how.on_singular == OnSingular::raise && !how.refinement.wider();
+  const Call solving = forward_dynamics_call(how.form, how.refinement);
+  if (!model_ || !(inverse || (regular && (solving == Call::forward_dynamics || !terms.prescribes())))) return;
+  const Call call = inverse ? Call::inverse_dynamics : solving;
   kernel_ = kernels::instruction_set().one[call];
   if (!kernel_.run) return;
+  if (call >= Call::forward_dynamics_ud) model_->find_factors();
   std::copy_n(gravity.v, 3, gravity_);
   work_.reset(static_cast<double*>(::operator new((kernel_.work(model_->links(), 0) + 8) * sizeof(double), std::align_val_t(64))));
   if (call != Call::forward_dynamics) no_forces_.assign(nv_, 0.0);  // they do not ask whether there are any

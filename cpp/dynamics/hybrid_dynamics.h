@@ -1,9 +1,9 @@
 // Dynamics of one state after another with terms at the hinges (model/hinge_terms.h): accelerations where forces are given, forces where
 // accelerations are (hybrid dynamics), J with what is added to it. Nothing prescribed is forward dynamics and all is inverse dynamics, bit for bit.
 //
-// Everything but the numbers of a state is decided when it is made. In double precision and the plain form, refined or not, by kernels of this
-// machine's instruction set where they are sure (kernels/, prescribed_links.h; what is both refined and prescribed is not for them); else by the
-// general recursions (recursions/prescribed_hinges.h). No allocation after the first call of each.
+// Everything but the numbers of a state is decided when it is made. In double precision by kernels of this machine's instruction set where they
+// are sure (kernels/, prescribed_links.h; what is prescribed in a factored form, or refined, is not for them); else by the general recursions
+// (recursions/prescribed_hinges.h). No allocation after the first call of each.
 #pragma once
 
 #include <memory>

@@ -11,10 +11,20 @@
 #include "dynamics/subtrees.h"
 #include "kernels/instruction_set.h"
 #include "kernels/link_model.h"
+#include "numerics/arithmetic.h"
 #include "recursions/applied.h"
 #include "runtime/interrupt.h"
 
 namespace pycraft {
+
+// Forward dynamics in a form, as it comes from the sweep or refined.
+inline kernels::Call forward_dynamics_call(Form form, const Refinement& how = {}) {
+  using kernels::Call;
+  constexpr Call calls[3][3] = {{Call::forward_dynamics, Call::refined_dynamics, Call::gathered_dynamics},
+                                {Call::forward_dynamics_ud, Call::refined_dynamics_ud, Call::gathered_dynamics_ud},
+                                {Call::forward_dynamics_square_root, Call::refined_dynamics_square_root, Call::gathered_dynamics_square_root}};
+  return calls[static_cast<int>(form)][how.steps == 0 ? 0 : how.gathers_wider() ? 2 : 1];
+}
 
 // A call of kernels: at what, under what, of what.
 struct LinkCall {
@@ -29,7 +39,7 @@ struct LinkCall {
   int steps = 0;                             // of refined calls: corrections at most
 };
 
-// Of one model, for T = float or double. Memory is kept from call to call.
+// Of one model, for T from single to quad. Memory is kept from call to call.
 template <class T>
 class LinkDynamics {
  public:
@@ -39,10 +49,7 @@ class LinkDynamics {
 
   // Whether kernels know the model and the call.
   bool there(kernels::Call call) const {
-    if constexpr (std::is_same_v<T, double>)
-      return model_ && set_.one[call].run;
-    else
-      return model_ && set_.singles[call].run;
+    return model_ && chosen(call, 1, false)[call].run;
   }
 
   // At `count` states, `size` numbers a state to out + b size, and as many to each of the two others of a call that has three results;
@@ -58,6 +65,7 @@ class LinkDynamics {
       for (int i = 0; i < 3; ++i) gravity[i] = static_cast<T>(applied->gravity[i]);
       if (applied->wrenches) wrenches = carried(*applied);
     }
+    if (call >= Call::forward_dynamics_ud) model_->find_factors();
     const bool matrix = is_matrix(call);
     const auto stride = [](const Given& g) { return g.batch < 0 ? size_t(0) : size_t(g.width); };
     place(node, node ? nodes : 0);
@@ -87,17 +95,8 @@ class LinkDynamics {
  private:
   // Of all coordinates: kernels look through those for what is not finite themselves.
   static bool is_matrix(kernels::Call call) {
-    switch (call) {
-      case kernels::Call::forward_dynamics:
-      case kernels::Call::inverse_dynamics:
-      case kernels::Call::jacobian:
-      case kernels::Call::pose:
-      case kernels::Call::refined_dynamics:
-      case kernels::Call::gathered_dynamics:
-      case kernels::Call::operational_space_compliance:
-      case kernels::Call::operational_space_inertia: return false;
-      default: return true;
-    }
+    using kernels::Call;
+    return (call >= Call::mass_matrix && call <= Call::forward_dynamics_derivatives) || call == Call::coriolis_matrix || call == Call::skew_coriolis_matrix;
   }
   // Nodes where links carry them, in the links' order.
   void place(const Node* node, int nodes) {
@@ -109,8 +108,12 @@ class LinkDynamics {
   const kernels::Kernels<T>& chosen(kernels::Call call, int states, bool matrix) const {
     if constexpr (std::is_same_v<T, double>)
       return states == 1 || (matrix && nv_ > 48) || !set_.pack[call].run ? set_.one : set_.pack;
+    else if constexpr (std::is_same_v<T, Single>)
+      return states <= set_.few_singles.lanes ? set_.few_singles : set_.singles;
+    else if constexpr (std::is_same_v<T, Extended>)
+      return kernels::extended_one;
     else
-      return set_.singles;
+      return kernels::quad_one;
   }
   bool in_parts(kernels::Call call, const kernels::Kernels<T>& kernel) const {
     return call <= kernels::Call::inverse_dynamics && kernel.in_parts[0].begin && !model_->parts().empty();

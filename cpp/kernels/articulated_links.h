@@ -52,6 +52,16 @@ template <class S, class T>
     P = w.branch[last];
   if (links.link[k].branches) add(P, w.branch[k]);
 }
+// Where nothing but the force that goes with an inertia is carried, and how sure it is.
+template <class S>
+[[gnu::always_inline]] inline void carry_nothing(Inertia<S>& P) {
+  P.n = P.f = Vector3<S>::zero(), P.error = S(0), P.growth = S(1);
+}
+template <class S>
+[[gnu::always_inline]] inline void add_carried(Inertia<S>& P, const Inertia<S>& Q) {
+  P.n = P.n + Q.n, P.f = P.f + Q.f;
+  P.error = larger(P.error, Q.error), P.growth = larger(P.growth, Q.growth);
+}
 // What a subtree apart has left goes to its parent, whose own branches are cleared; a link that follows its parent is met by that itself.
 template <class S, class T>
 inline void join_parent(const Links<T>& links, const ForwardWork<S>& w, int root) {

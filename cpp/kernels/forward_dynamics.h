@@ -6,9 +6,10 @@
 // with P_h the column of the hinge's axis. What projecting out a hinge without J makes zero is neither stored nor computed: a pin's row of A
 // and B. The inertia of a chain stays at hand from link to link; only branches are laid aside, at their parent.
 //
-// Where the estimate of pivots.h leaves a doubt of a pivot, the errors of pivot_errors.h decide.
+// Where the estimate of pivots.h leaves a doubt of a pivot, that of carried_inertias.h may not, and else the errors of pivot_errors.h decide.
 #pragma once
 
+#include "kernels/carried_inertias.h"
 #include "kernels/pivot_errors.h"
 #include "kernels/prescribed_links.h"
 
@@ -133,24 +134,22 @@ template <class Kind, bool rotor, bool forces, class S, class T>
   w.keep_diagonals(P);
   if constexpr (Kind::nv == 1) {
     const S J(link.J), tau = S(link.sign) * force(0);
-    S D(J), along, own;
+    S D(J), along;
     if constexpr (Kind::pin) {
       w.angular = {P.A(0, K), P.A(1, K), P.A(2, K)}, w.linear = {P.B(K, 0), P.B(K, 1), P.B(K, 2)};
       D += w.angular[K], along = P.n[K];
-      own = mean_of_diagonal(P.A) + J;
     } else {
       const S turn(link.turn), travel(link.travel);
       for (int r = 0; r < 3; ++r) w.angular[r] = turn * P.A(r, K) + travel * P.B(r, K), w.linear[r] = turn * P.B(K, r) + travel * P.C(r, K);
       D += turn * w.angular[K] + travel * w.linear[K], along = turn * P.n[K] + travel * P.f[K];
-      own = turn * turn * mean_of_diagonal(P.A) + travel * travel * mean_of_diagonal(P.C) + J;
     }
+    const auto own = [&]() -> S {
+      const S turn(link.turn), travel(link.travel);
+      return Kind::pin ? S(mean_of_diagonal(P.A) + J) : S(turn * turn * mean_of_diagonal(P.A) + travel * travel * mean_of_diagonal(P.C) + J);
+    };
     const S most = carried_inertia<Kind>(link, gone);
-    sound = sound & greater(D, S(links.faint) * most);
-    // What a slider moves may all have been taken up outboard: then what those pivots are unsure of is left.
-    if constexpr (!Kind::pin) sound = sound & greater(D, S(4) * most * P.error);
     w.inverse = S(1) / D;
-    P.error += S(links.rounding) * most * w.inverse;
-    if (link.oblique) P.growth *= larger(S(1), S(S(T(0.0625)) * own * w.inverse));
+    sound = sound & greater(D, S(links.plain.faint) * most) & estimate_one<Kind>(link, links, D, w.inverse, most, own, P);
     if constexpr (forces) w.innovation = tau - along;
     if (root) return;
     constexpr int zero = Kind::pin && !rotor ? K : -1;
@@ -261,7 +260,7 @@ template <bool forces, class S, class T, class Keep = KeepsNothing>
       with_step(link.step, [&](auto kind) { eliminate<decltype(kind), false, forces>(link, links, at, gone, own, w.of(link), P, sound); });
     keep(k, P);
     if (link.parent < 0)
-      sound = sound & greater(S(links.growth), P.growth) & greater(S(1), S(T(4)) * P.error * P.growth);
+      sound = sound & sure(P.error, P.growth, links.plain.growth);
     else if (apart && k == first)
       w.branch[k] = P;
     else if (link.parent != k - 1)
@@ -269,17 +268,23 @@ template <bool forces, class S, class T, class Keep = KeepsNothing>
   }
   return sound;
 }
-// The same of all links, where the estimate leaves a doubt by their errors.
+// Which lanes a closer look at links that are eliminated calls sound.
+template <class S, class T>
+[[gnu::noinline]] typename S::Bits closer_look(const Links<T>& links, const States<T>& at, const ForwardWork<S>& w, const S& gone) {
+  clear_branches(links, w, 0, links.count);
+  const typename S::Bits sound = carried_inertias_leave_no_doubt(links, at, w, gone);
+  if (S::everywhere(sound)) return sound;
+  clear_branches(links, w, 0, links.count);
+  return sound | pivots_stand_out(links, at, w, gone, 0, links.count, false);
+}
+// The same of all links, with a closer look where that is needed.
 template <bool forces, class S, class T, class Keep = KeepsNothing>
 [[gnu::noinline]] typename S::Bits articulated_tip_to_base(const Links<T>& links, const States<T>& at, const ForwardWork<S>& w, Keep keep = {}) {
   const S gone = travel<S>(links, at);
   clear_branches(links, w, 0, links.count);
   const typename S::Bits sound = eliminate_links<forces>(links, at, w, gone, 0, links.count, false, keep);
   if constexpr (!S::recorded)
-    if (!links.several && S::mask(sound) != S::mask(S::all())) {
-      clear_branches(links, w, 0, links.count);
-      return sound | pivots_stand_out(links, at, w, gone, 0, links.count, false);
-    }
+    if (!links.several && S::mask(sound) != S::mask(S::all())) return sound | closer_look(links, at, w, gone);
   return sound;
 }
 

@@ -17,10 +17,10 @@ extern const ColumnKernels<double> avx2_columns, avx512_columns;
 
 const std::vector<InstructionSet>& instruction_sets() {
   static const std::vector<InstructionSet> sets = [] {
-    std::vector<InstructionSet> there{{everywhere, baseline_one, baseline_pack, baseline_singles, baseline_columns}};
+    std::vector<InstructionSet> there{{everywhere, baseline_one, baseline_pack, baseline_singles, baseline_singles, baseline_columns}};
 #if defined(PYCRAFT_X86_64)
-    there.push_back({"avx2", avx2_one, avx2_pack, avx2_singles, avx2_columns});
-    there.push_back({"avx512", avx2_one, avx512_pack, avx512_singles, avx512_columns});  // one state has nothing to fill wider registers with
+    there.push_back({"avx2", avx2_one, avx2_pack, avx2_singles, avx2_singles, avx2_columns});
+    there.push_back({"avx512", avx2_one, avx512_pack, avx512_singles, avx2_singles, avx512_columns});  // one state has nothing to fill wider registers with
 #endif
     std::erase_if(there, [](const InstructionSet& built) {
       return std::none_of(lane_sets().begin(), lane_sets().end(), [&](const LaneSet& set) { return set.name == built.name; });

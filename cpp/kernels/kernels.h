@@ -5,6 +5,7 @@
 
 #include "kernels/body_columns.h"
 #include "kernels/coriolis_matrix.h"
+#include "kernels/factored_dynamics.h"
 #include "kernels/forward_dynamics.h"
 #include "kernels/forward_dynamics_derivatives.h"
 #include "kernels/in_parts.h"
@@ -36,8 +37,11 @@ struct KernelsOf {
   static size_t forward_derivatives(const Links<T>& links, int) { return numbers(links, ForwardDerivativeWork<S>::size(links)); }
   static size_t coriolis(const Links<T>& links, int) { return numbers(links, CoriolisWork<S>::size(links)); }
   static size_t operational(const Links<T>& links, int nodes) { return numbers(links, ForwardWork<S>::size(links) + NodeWork<S>::size(links, nodes)); }
+  static size_t factored(const Links<T>& links, int) { return numbers(links, FactoredWork<S>::size(links)); }
   template <class V>
   static size_t refined(const Links<T>& links, int) { return numbers(links, RefinedWork<S, V>::size(links)); }
+  template <class V>
+  static size_t refined_factors(const Links<T>& links, int) { return numbers(links, RefinedWork<S, V>::size(links) + FactoredWork<S>::own_size(links)); }
   static size_t nothing(const Links<T>& links, int) { return numbers(links, 0); }
 
   template <auto kernel>
@@ -81,6 +85,11 @@ struct KernelsOf {
     if constexpr (differentiates) return {W == 1 ? run_whole<refined_dynamics<S, V>> : run<refined_dynamics<S, V>>, refined<V>};
     return {};
   }
+  template <class V, bool roots>
+  static constexpr Kernel<T> refinement_of_factors() {
+    if constexpr (differentiates) return {run<refined_dynamics_by_factors<S, V, roots>>, refined_factors<V>};
+    return {};
+  }
   static constexpr Kernels<T> all{W,
                                   {{W == 1 ? run_whole<forward_dynamics<S>> : run<forward_dynamics<S>>, forward},
                                    {run<inverse_dynamics<S>>, inverse},
@@ -95,7 +104,13 @@ struct KernelsOf {
                                    of_operational_space<false>(),
                                    of_operational_space<true>(),
                                    refinement<S>(),
-                                   refinement<Wide<S>>()},
+                                   refinement<Wide<S>>(),
+                                   {run<forward_dynamics_by_factors<S, false>>, factored},
+                                   refinement_of_factors<S, false>(),
+                                   refinement_of_factors<Wide<S>, false>(),
+                                   {run<forward_dynamics_by_factors<S, true>>, factored},
+                                   refinement_of_factors<S, true>(),
+                                   refinement_of_factors<Wide<S>, true>()},
                                   {pieces().first, pieces().second}};
 };
 

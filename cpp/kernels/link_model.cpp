@@ -12,8 +12,11 @@ namespace pycraft::kernels {
 
 namespace {
 
-using E = Extended;
+// What poses and inertias are carried to links in.
+template <class T>
+using Carrying = std::conditional_t<std::is_same_v<T, float> || std::is_same_v<T, double>, Extended, Quad>;
 
+template <class E>
 struct RestLink {
   Link<double> shape{};
   Pose<E> pose;                 // at rest, in the parent link
@@ -21,9 +24,10 @@ struct RestLink {
   int children = 0, last_child = -1;
 };
 
-// The coordinate axis that a is, 0, 1 or 2, or -1.
-int coordinate_axis(const Vector3<E>& a) {
-  const E small = E(8) * E(epsilon<double>());
+// The coordinate axis that a is to 8 `rounding`, 0, 1 or 2, or -1.
+template <class E>
+int coordinate_axis(const Vector3<E>& a, const E& rounding) {
+  const E small = E(8) * rounding;
   for (int i = 0; i < 3; ++i) {
     using std::abs;
     if (small >= abs(a[(i + 1) % 3]) && small >= abs(a[(i + 2) % 3])) return i;
@@ -31,6 +35,7 @@ int coordinate_axis(const Vector3<E>& a) {
   return -1;
 }
 // The least rotation that takes z to a, or to -a where that is less.
+template <class E>
 Matrix3<E> rotation_to(const Vector3<E>& a, double& sign) {
   sign = a[2] < E(0) ? -1 : 1;
   const Vector3<E> z = E(sign) * a;
@@ -40,14 +45,15 @@ Matrix3<E> rotation_to(const Vector3<E>& a, double& sign) {
 
 // A subhinge's link: its step and how it lies, `before` the frame of the subhinge in the parent link. What is left of `before` is the frame after
 // the subhinge in the new link.
-std::optional<RestLink> link_of(const CompiledSubhinge<E>& h, Pose<E>& before) {
-  RestLink link;
+template <class E>
+std::optional<RestLink<E>> link_of(const CompiledSubhinge<E>& h, Pose<E>& before, const E& rounding) {
+  RestLink<E> link;
   link.shape.sign = 1, link.shape.turn = 1, link.shape.travel = 0;
   link.pose = Pose<E>::identity();
   const auto along_axis = [&](bool level) {  // the origin on the axis, as near to the frame's as it can be
     Vector3<E> axis = before.R * h.axis;
     axis = (E(1) / norm(axis)) * axis;
-    const int coordinate = coordinate_axis(axis), found = level ? coordinate : -1;
+    const int coordinate = coordinate_axis(axis, rounding), found = level ? coordinate : -1;
     link.shape.oblique = coordinate < 0;
     if (found >= 0)
       link.shape.step = static_cast<Step>(found), link.shape.sign = axis[found] < E(0) ? -1 : 1;
@@ -83,6 +89,7 @@ std::optional<RestLink> link_of(const CompiledSubhinge<E>& h, Pose<E>& before) {
   return link;
 }
 
+template <class E>
 bool absorbs_elsewhere(const CompiledModel<E>& model, int k) {
   const int first = model.first_subhinge[k], count = model.first_subhinge[k + 1] - first;
   if (model.translations[k][0] < 0 || (count == 1 && model.subhinges[first].kind == SubhingeKind::free)) return false;
@@ -96,8 +103,9 @@ void put(const From& from, T (&to)[n]) {
 }
 
 // Sums over subtrees, the ways outward, and which columns are kept at once.
-int finish(std::vector<RestLink>& rest) {
-  for (RestLink& link : rest) {
+template <class E>
+int finish(std::vector<RestLink<E>>& rest) {
+  for (RestLink<E>& link : rest) {
     Link<double>& own = link.shape;
     const RigidInertia<E>& M = link.inertia;
     own.carried_mass = static_cast<double>(M.mass);
@@ -140,9 +148,12 @@ int finish(std::vector<RestLink>& rest) {
 
 template <class T>
 std::unique_ptr<LinkModel<T>> LinkModel<T>::of(const Multibody& model, const HingeTerms& terms) {
+  using E = Carrying<T>;
   const auto source = terms.empty() ? model.compiled<E>() : compile_model<E>(model, terms);
-  std::vector<RestLink> rest;
+  const E of_poses(std::min(to_double(epsilon<T>()), epsilon<double>()));
+  std::vector<RestLink<E>> rest;
   std::vector<std::pair<int, Pose<E>>> bodies;
+  auto made = std::make_unique<LinkModel>();
   int multiple = 0;
   for (int k = 0; k < source->bodies; ++k) {
     check_interrupt_at(k);
@@ -153,7 +164,7 @@ std::unique_ptr<LinkModel<T>> LinkModel<T>::of(const Multibody& model, const Hin
     int q = source->q_offset[k], v = source->v_offset[k];
     for (int i = source->first_subhinge[k]; i < source->first_subhinge[k + 1]; ++i) {
       const SubhingeRecord& record = record_of(source->subhinges[i].kind);
-      auto link = link_of(source->subhinges[i], before);
+      auto link = link_of(source->subhinges[i], before, of_poses);
       if (!link) return nullptr;
       const bool several = record.nv > 1;
       for (int j = v; j < v + record.nv; ++j) {
@@ -168,13 +179,27 @@ std::unique_ptr<LinkModel<T>> LinkModel<T>::of(const Multibody& model, const Hin
       q += record.nq, v += record.nv;
     }
     bodies.emplace_back(at, before);
+    made->bodies_.push_back({at, cast<T>(before)});
+    made->links_.several |= source->first_subhinge[k + 1] - source->first_subhinge[k] > 1;
     if (at < 0) continue;
     const MassProperties& mass = source->mass_properties[k];
+    if constexpr (has_factors) made->masses_.push_back({at, before, mass});
     rest[at].inertia = rest[at].inertia + to_parent(before, rigid_inertia(E(mass.mass), cast<E>(mass.com), cast<E>(mass.about_com)));
   }
-  const int slots = finish(rest);
-  auto made = std::make_unique<LinkModel>();
-  for (const RestLink& link : rest) {
+  Links<T>& links = made->links_;
+  links.nq = source->nq, links.nv = source->nv, links.multiple = multiple, links.slots = finish(rest);
+  links.prescribed = terms.prescribes();
+  made->take(rest);
+  return made;
+}
+
+// Every number rounded once.
+template <class T>
+template <class Rest>
+void LinkModel<T>::take(const std::vector<Rest>& rest) {
+  using E = Carrying<T>;
+  std::vector<int> parents;
+  for (const Rest& link : rest) {
     const Link<double>& d = link.shape;
     Link<T> own{d.step, d.parent, d.q, d.v, d.end, d.branches, d.rotor, d.oblique, d.prescribed, d.multi, d.slot, T(d.sign)};
     put(link.pose.R.m, own.R), put(link.pose.p.v, own.p);
@@ -182,24 +207,32 @@ std::unique_ptr<LinkModel<T>> LinkModel<T>::of(const Multibody& model, const Hin
     put(link.inertia.moment.v, own.moment), put(link.inertia.rotational.s, own.rotational);
     own.J = T(d.J), own.turn = T(d.turn), own.travel = T(d.travel);
     own.carried_rotational = T(d.carried_rotational), own.carried_mass = T(d.carried_mass), own.furthest = T(d.furthest), own.longest = T(d.longest);
-    made->all_.push_back(own);
-    made->inertia_.push_back(own.J);
+    all_.push_back(own);
+    inertia_.push_back(own.J);
+    parents.push_back(own.parent);
     const auto& [m, h, I] = link.inertia;
     const E numbers[] = {m, h[0], h[1], h[2], I.s[0], I.s[1], I.s[2], I.s[3], I.s[4], I.s[5]};
-    for (const E& x : numbers) made->wide_masses_.push_back(static_cast<double>(x));
-    for (const E& x : numbers) made->wide_masses_.push_back(static_cast<double>(E(x - E(static_cast<double>(x)))));
+    for (const E& x : numbers) wide_masses_.push_back(static_cast<double>(x));
+    for (const E& x : numbers) wide_masses_.push_back(static_cast<double>(E(x - E(static_cast<double>(x)))));
   }
-  for (const auto& [at, pose] : bodies) made->bodies_.push_back({at, cast<T>(pose)});
-  std::vector<int> parents;
-  for (const auto& link : made->all_) parents.push_back(link.parent);
   constexpr int least = 512;  // links: some hundred thousand operations, many times what a thread costs
-  made->parts_ = tree_parts(parents, std::max(least, static_cast<int>(parents.size()) / 64));
-  const T rounding = rounding_bound<T>(Form::fast);
-  const double growth = std::pow(to_double(rounding), -0.2);  // as rigid_elimination.h has it
-  made->links_ = {static_cast<int>(made->all_.size()), source->nq, source->nv, multiple, slots, made->all_.data(), rounding, faint_ratio<T>(Form::fast), static_cast<T>(growth), made->wide_masses_.data()};
-  made->links_.prescribed = terms.prescribes();
-  for (int k = 0; k < source->bodies; ++k) made->links_.several |= source->first_subhinge[k + 1] - source->first_subhinge[k] > 1;
-  return made;
+  parts_ = tree_parts(parents, std::max(least, static_cast<int>(parents.size()) / 64));
+  links_.count = static_cast<int>(all_.size()), links_.link = all_.data(), links_.wide_masses = wide_masses_.data();
+  const auto bounds = [](Form form) {
+    const T rounding = rounding_bound<T>(form);
+    return Bounds<T>{rounding, faint_ratio<T>(form), static_cast<T>(std::pow(to_double(rounding), -0.2)), gain_bound<T>(form)};  // as rigid_elimination.h has it
+  };
+  links_.plain = bounds(Form::fast), links_.factored = bounds(Form::ud);
+}
+
+template <class T>
+void LinkModel<T>::find_factors() {
+  if constexpr (has_factors) {
+    if (links_.factors[0]) return;
+    factored_ = factored_links(all_, masses_);
+    for (int form = 0; form < 2; ++form) links_.factors[form] = factored_.forms[form].data();
+    links_.fours = factored_.fours;
+  }
 }
 
 template <class T>
@@ -234,5 +267,7 @@ OnLink<T> LinkModel<T>::on_link(const Node& node) const {
 
 template class LinkModel<float>;
 template class LinkModel<double>;
+template class LinkModel<Extended>;
+template class LinkModel<Quad>;
 
 }  // namespace pycraft::kernels

@@ -1,14 +1,15 @@
 // The links of a model: hinges taken apart into subhinges, welded bodies joined to what carries them, frames laid so that the axis of a pin,
 // slider or screw is a coordinate axis through the link's origin.
 //
-// Where a hinge's axis is a coordinate axis of its parent link to 8 eps (what the rotations of poses are rounded by), it is taken for it, and
-// the link's axes are the parent's at rest; else the link is turned so that the axis becomes z. Poses and inertias are carried to the new
-// frames in extended precision and rounded once.
+// Where a hinge's axis is a coordinate axis of its parent link to 8 eps (what the rotations of poses are rounded by, in doubles or in wider
+// numbers), it is taken for it, and the link's axes are the parent's at rest; else the link is turned so that the axis becomes z. Poses and
+// inertias are carried to the new frames in extended precision, of wide numbers in quad, and rounded once.
 #pragma once
 
 #include <memory>
 #include <vector>
 
+#include "kernels/link_factors.h"
 #include "kernels/links.h"
 #include "kernels/tree_parts.h"
 #include "model/hinge_terms.h"
@@ -24,6 +25,8 @@ class LinkModel {
   static std::unique_ptr<LinkModel> of(const Multibody& model, const HingeTerms& terms = {});
 
   const Links<T>& links() const { return links_; }
+  // The links' inertias in factors, which only calls in factored forms ask for, in single and double precision.
+  void find_factors();
   // For threads; none where the tree is small or does not branch into large ones.
   const std::vector<TreePart>& parts() const { return parts_; }
   size_t bodies() const { return bodies_.size(); }
@@ -41,8 +44,14 @@ class LinkModel {
     int link;       // -1: of the base
     Pose<T> pose;
   };
+  static constexpr bool has_factors = std::is_same_v<T, float> || std::is_same_v<T, double>;
+  template <class Rest>
+  void take(const std::vector<Rest>& rest);
+
   Links<T> links_{};
   std::vector<Link<T>> all_;
+  std::vector<MassOnLink> masses_;
+  FactoredLinks<T> factored_;
   std::vector<TreePart> parts_;
   std::vector<double> wide_masses_;
   std::vector<Carried> bodies_;
@@ -51,5 +60,7 @@ class LinkModel {
 
 extern template class LinkModel<float>;
 extern template class LinkModel<double>;
+extern template class LinkModel<Extended>;
+extern template class LinkModel<Quad>;
 
 }  // namespace pycraft::kernels

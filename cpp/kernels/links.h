@@ -35,15 +35,40 @@ struct Link {
   T carried_rotational, carried_mass, furthest, longest;
 };
 
+// A link's own inertia as a sum of weighted squares (model/inertia_factors.h), for the forms that carry factors (factored_columns.h).
+template <class T>
+struct LinkFactors {
+  bool kept;          // the hinge's row is one more than the body's, and none of these becomes zero: a rotor, or a screw
+  bool empty, whole;  // has no mass; has inertia along every axis
+  int row[6];         // where each row of the body is: first those that the hinge makes zero, then angular ones, then linear ones
+  int fours;          // of columns
+  int rotor;          // the column of its rotor, -1: none
+  int room, to;       // of a link that branches, where its columns are, in fours; of one that does not follow its parent, where they go
+  T own[72];          // six columns in their places among eight (factored_columns.h)
+  T com[3], about[6]; // centre of mass, inertia about it
+  T mass_root;        // scale of the three columns of the mass
+  T acceleration[9];  // of the other three, of a couple about the centre: what of it they take up
+  T left[9];          // and what of the couple they do not
+  T uncertain;        // of what it carries: inertia that was taken for rounding
+};
+
+// Bounds of doubt, see pivots.h and factored_pivots.h.
+template <class T>
+struct Bounds {
+  T rounding, faint, growth, gain;
+};
+
 template <class T>
 struct Links {
   int count, nq, nv;
   int multiple, slots;          // links with several coordinates; links whose columns are kept at once
   const Link<T>* link;
-  T rounding, faint, growth;    // bounds of doubt, see pivots.h
   const double* wide_masses;    // twenty a link: mass, moment, rotational, then what rounding took from these
   bool several = false;         // whether a hinge is several links: of its pivots the general recursions decide
-  bool prescribed = false;      // whether any link is: for forward dynamics alone
+  bool prescribed = false;      // whether any link is: for forward dynamics alone, in the form fast
+  const LinkFactors<T>* factors[2] = {};  // in the form ud, and scaled by the roots of the weights
+  int fours = 0;                // of columns, of links that branch
+  Bounds<T> plain, factored;    // of the form fast, and of the others
 };
 
 // A node as part of a link, -1: of the base.
@@ -92,16 +117,19 @@ struct PartKernel {
   void (*finish)(const Links<T>& links, const States<T>& at, int first, int last, double* out, T* work);
 };
 
+// Those in factored forms last.
 enum class Call {
   forward_dynamics, inverse_dynamics, mass_matrix, mass_matrix_inverse, inverse_dynamics_derivatives, forward_dynamics_derivatives, jacobian, pose,
   coriolis_matrix, skew_coriolis_matrix, operational_space_compliance, operational_space_inertia,
-  refined_dynamics, gathered_dynamics
+  refined_dynamics, gathered_dynamics,
+  forward_dynamics_ud, refined_dynamics_ud, gathered_dynamics_ud,
+  forward_dynamics_square_root, refined_dynamics_square_root, gathered_dynamics_square_root
 };
 
 template <class T>
 struct Kernels {
   int lanes;           // states at once
-  Kernel<T> calls[14];
+  Kernel<T> calls[20];
   PartKernel<T> in_parts[2];  // of forward and inverse dynamics; of one state alone
   const Kernel<T>& operator[](Call call) const { return calls[static_cast<int>(call)]; }
 };

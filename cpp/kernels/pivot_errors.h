@@ -28,24 +28,14 @@ template <class S>
 // D > 2 rounding · (x² + J) and D > faint · felt, of a pivot by its inverse.
 template <class S, class T>
 [[gnu::always_inline]] inline typename S::Bits stands_out(const Links<T>& links, const S& inverse, const S& error, const S& felt) {
-  return greater(inverse, S(0)) & greater(S(1), S(S(T(2) * links.rounding) * error * inverse)) & greater(S(1), S(S(links.faint) * felt * inverse));
+  return greater(inverse, S(0)) & greater(S(1), S(S(T(2) * links.plain.rounding) * error * inverse)) & greater(S(1), S(S(links.plain.faint) * felt * inverse));
 }
 
 // Of n pivots by their factors.
 template <int n, class S, class T>
 inline typename S::Bits stand_out(const Links<T>& links, const Factors<n, S>& factors, const S (&errors)[n], const S (&felt)[n]) {
   typename S::Bits sound = S::all();
-  S w[n];  // (-D₁₁⁻¹ D₁ⱼ, 1)
-  for (int j = 0; j < n; ++j) {
-    S error = errors[j], feels = felt[j];
-    for (int back = 1; back <= j; ++back) {
-      const int i = j - back;
-      w[i] = -factors.lower[j][i];
-      for (int a = i + 1; a < j; ++a) w[i] -= factors.lower[a][i] * w[a];
-      error += w[i] * w[i] * errors[i], feels += w[i] * w[i] * felt[i];
-    }
-    sound = sound & stands_out(links, factors.inverse[j], S(S(T(j + 1)) * error), S(S(T(j + 1)) * feels));
-  }
+  for (int j = 0; j < n; ++j) sound = sound & stands_out(links, factors.inverse[j], factors.reach(j, errors), factors.reach(j, felt));
   return sound;
 }
 

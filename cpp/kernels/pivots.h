@@ -35,16 +35,28 @@ template <class S>
   return S(typename S::Scalar(1) / 3) * (A(0, 0) + A(1, 1) + A(2, 2));
 }
 
+// What the pivot of one coordinate adds to the estimate. most: what the coordinate can feel; own(): what its row of P rounds at; which lanes are sound.
+template <class Kind, class S, class T, class Own>
+[[gnu::always_inline]] inline typename S::Bits estimate_one(const Link<T>& link, const Links<T>& links, const S& D, const S& inverse, const S& most, Own own, Inertia<S>& P) {
+  typename S::Bits sound = S::all();
+  // What a slider moves may all have been taken up outboard: then what those pivots are unsure of is left.
+  if constexpr (!Kind::pin) sound = sound & greater(D, S(4) * most * P.error);
+  P.error += S(links.plain.rounding) * most * inverse;
+  if (link.oblique) P.growth *= larger(S(1), S(S(T(0.0625)) * own() * inverse));
+  return sound;
+}
+// Whether what was estimated of all links of a root leaves no doubt.
+template <class S, class T>
+[[gnu::always_inline]] inline typename S::Bits sure(const S& error, const S& growth, const T& largest_growth) {
+  return greater(S(largest_growth), growth) & greater(S(1), S(T(4)) * error * growth);
+}
+
 template <int n, class S>
 struct Factors {
   S lower[n][n], inverse[n];  // L below its unit diagonal; 1/d
 
-  // Of a symmetric matrix, its lower triangle, of which coordinate i can feel carried[i] at most; which lanes are sound. P: of the link.
-  template <class T>
-  typename S::Bits factor(const S (&D)[n][n], const S (&carried)[n], const Links<T>& links, Inertia<S>& P) {
-    typename S::Bits sound = S::all();
-    S w[n][n];  // L⁻¹
-    S fresh(0), grown(1);
+  // Of a symmetric matrix, its lower triangle.
+  void factor(const S (&D)[n][n]) {
     for (int j = 0; j < n; ++j) {
       S scaled[n];  // row j of L times d
       S pivot = D[j][j];
@@ -54,18 +66,32 @@ struct Factors {
         lower[j][i] = scaled[i] * inverse[i];
         pivot -= lower[j][i] * scaled[i];
       }
-      S most = carried[j], own = D[j][j];
-      for (int i = 0; i < j; ++i) {
-        w[j][i] = -lower[j][i];
-        for (int a = i + 1; a < j; ++a) w[j][i] -= lower[j][a] * w[a][i];
-        most += w[j][i] * w[j][i] * carried[i], own += w[j][i] * w[j][i] * D[i][i];
-      }
-      const S terms{T(j + 1)};
-      sound = sound & greater(pivot, S(links.faint) * terms * most);
       inverse[j] = S(1) / pivot;
-      fresh = larger(fresh, S(terms * most * inverse[j])), grown = larger(grown, S(terms * own * inverse[j]));
     }
-    P.error += S(links.rounding) * fresh;
+  }
+  // (j + 1) Σ_{i<=j} w(i)² squares(i), w = (-D₁₁⁻¹ D₁ⱼ, 1).
+  S reach(int j, const S (&squares)[n]) const {
+    S w[n], sum = squares[j];
+    for (int back = 1; back <= j; ++back) {
+      const int i = j - back;
+      w[i] = -lower[j][i];
+      for (int a = i + 1; a < j; ++a) w[i] -= lower[a][i] * w[a];
+      sum += w[i] * w[i] * squares[i];
+    }
+    return S(typename S::Scalar(j + 1)) * sum;
+  }
+  // What its pivots add to the estimate, of which coordinate i can feel carried[i] at most and its row rounds at own[i]; which lanes are sound: where
+  // more than a faint part of that is left.
+  template <class T>
+  typename S::Bits estimate(const S (&carried)[n], const S (&own)[n], const T& faint, const T& rounding, Inertia<S>& P) const {
+    typename S::Bits sound = S::all();
+    S fresh(0), grown(1);
+    for (int j = 0; j < n; ++j) {
+      const S most = reach(j, carried) * inverse[j];
+      sound = sound & greater(inverse[j], S(0)) & greater(S(1), S(faint) * most);
+      fresh = larger(fresh, most), grown = larger(grown, S(reach(j, own) * inverse[j]));
+    }
+    P.error += S(rounding) * fresh;
     P.growth *= larger(S(1), S(S(T(0.0625)) * grown));
     return sound;
   }
@@ -86,22 +112,25 @@ struct Factors {
 // Of a ball, whose D is A; of a free link, whose D is all of P.
 template <class S, class T>
 inline typename S::Bits factor_ball(Inertia<S>& P, const Link<T>& link, const S& gone, const Links<T>& links, Factors<3, S>& factors) {
-  const S turned = turned_inertia(link, gone), carried[3] = {turned, turned, turned};
+  const S turned = turned_inertia(link, gone), carried[3] = {turned, turned, turned}, own[3] = {P.A(0, 0), P.A(1, 1), P.A(2, 2)};
   S D[3][3];
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j <= i; ++j) D[i][j] = P.A(i, j);
-  return factors.factor(D, carried, links, P);
+  factors.factor(D);
+  return factors.estimate(carried, own, links.plain.faint, links.plain.rounding, P);
 }
 template <class S, class T>
 inline typename S::Bits factor_free(Inertia<S>& P, const Link<T>& link, const S& gone, const Links<T>& links, Factors<6, S>& factors) {
   const S turned = turned_inertia(link, gone), moved = S(2) * S(link.carried_mass), carried[6] = {turned, turned, turned, moved, moved, moved};
+  const S own[6] = {P.A(0, 0), P.A(1, 1), P.A(2, 2), P.C(0, 0), P.C(1, 1), P.C(2, 2)};
   S D[6][6];
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) {
       if (j <= i) D[i][j] = P.A(i, j), D[3 + i][3 + j] = P.C(i, j);
       D[3 + i][j] = P.B(j, i);
     }
-  return factors.factor(D, carried, links, P);
+  factors.factor(D);
+  return factors.estimate(carried, own, links.plain.faint, links.plain.rounding, P);
 }
 
 }  // namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET

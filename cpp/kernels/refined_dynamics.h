@@ -4,6 +4,7 @@
 
 #include <cfloat>
 
+#include "kernels/factored_dynamics.h"
 #include "kernels/residual_rounding_of_links.h"
 
 namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET {
@@ -12,13 +13,12 @@ namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET {
 template <class S, class V>
 inline constexpr double force_unit = std::is_same_v<S, V> ? DBL_EPSILON / 2 : DBL_EPSILON / 4096;
 
-// at.steps corrections at most, forces gathered in V. Solutions and corrections are compared by their largest entries, and with what rounding
-// may have made of a correction by its length: with d = δ/|δ|_max, along d/|d|.
-template <class S, class V>
-unsigned refined_dynamics(const Links<typename S::Scalar>& links, const States<typename S::Scalar>& at, double* out, size_t stride, typename S::Scalar* work) {
+// at.steps corrections at most of what is eliminated, forces gathered in V. Solutions and corrections are compared by their largest entries, and
+// with what rounding may have made of a correction by its length: with d = δ/|δ|_max, along d/|d|.
+template <class S, class V, class T>
+[[gnu::noinline, gnu::flatten]] unsigned refine_eliminated(const Links<T>& links, const States<T>& at, const RefinedWork<S, V>& w, typename S::Bits sound, double* out, size_t stride) {
   using Bits = typename S::Bits;
-  const RefinedWork<S, V> w(links, work);
-  Bits sound = move_and_eliminate(links, at, w.forward), open = S::all();
+  Bits open = S::all();
   outward(links, 0, links.count, Vector3<S>(-spread<S>(at.gravity)), w.response, [&](int k, Vector3<S>& alpha, Vector3<S>& acceleration) {
     const auto& link = links.link[k];
     ForwardMultiple<S>* const multiple = w.forward.of(link);
@@ -61,6 +61,20 @@ unsigned refined_dynamics(const Links<typename S::Scalar>& links, const States<t
   }
   for (int i = 0; i < links.nv; ++i) scattered(S(w.x[i] - w.absorbed[i]), out + i, stride, at.states);
   return S::mask(sound);
+}
+
+// In the form fast.
+template <class S, class V>
+unsigned refined_dynamics(const Links<typename S::Scalar>& links, const States<typename S::Scalar>& at, double* out, size_t stride, typename S::Scalar* work) {
+  const RefinedWork<S, V> w(links, work);
+  return refine_eliminated(links, at, w, move_and_eliminate(links, at, w.forward), out, stride);
+}
+// In a factored form.
+template <class S, class V, bool roots>
+unsigned refined_dynamics_by_factors(const Links<typename S::Scalar>& links, const States<typename S::Scalar>& at, double* out, size_t stride, typename S::Scalar* work) {
+  const RefinedWork<S, V> w(links, work);
+  const FactoredWork<S> factored{w.forward, reinterpret_cast<S*>(work + RefinedWork<S, V>::size(links) / sizeof(typename S::Scalar))};
+  return refine_eliminated(links, at, w, move_and_eliminate<roots>(links, at, factored), out, stride);
 }
 
 }  // namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET

@@ -75,12 +75,38 @@ template <class V, class T, class Own, class Visit>
   }
 }
 
+// In the parent's axes. Wide numbers of one state are turned side by side, n with f.
+template <class V, class Rotation>
+[[gnu::always_inline]] inline void turn(const Rotation& rotation, Force<V>& y) {
+  y.n = rotation.to_parent(y.n), y.f = rotation.to_parent(y.f);
+}
+template <class V, int K, class S>
+[[gnu::always_inline]] inline Vector3<Wide<V>> turned(const Planar<K, S>& rotation, const Vector3<Wide<V>>& x) {
+  return Planar<K, V>{wide<V>(rotation.c), wide<V>(rotation.s)}.to_parent(x);
+}
+template <class V, class S>
+[[gnu::always_inline]] inline Vector3<Wide<V>> turned(const Full<S>& rotation, const Vector3<Wide<V>>& x) {
+  const Matrix3<V> R = wide<V>(rotation.R);
+  return Full<V>{R}.to_parent(x);
+}
+template <class Rotation>
+[[gnu::always_inline]] inline void turn(const Rotation& rotation, Force<Wide<Lanes<double, 1>>>& y) {
+  using Both = Lanes<double, 2>;
+  const auto both = [](const Lanes<double, 1>& n, const Lanes<double, 1>& f) {
+    Both x;
+    x.set(0, n.v), x.set(1, f.v);
+    return x;
+  };
+  Vector3<Wide<Both>> x;
+  each_of<3>([&](int i) { x[i] = {both(y.n[i].v, y.f[i].v), both(y.n[i].rest, y.f[i].rest)}; });
+  x = turned(rotation, x);
+  each_of<3>([&](int i) { y.n[i] = {x[i].v.lane(0), x[i].rest.lane(0)}, y.f[i] = {x[i].v.lane(1), x[i].rest.lane(1)}; });
+}
 // About the parent's origin, in its axes.
 template <class Kind, class V, class S, class T>
 [[gnu::always_inline]] inline void to_parent(const Link<T>& link, const Motion<S>& m, Force<V>& y) {
-  const auto rotation = Kind::rotation(m.place);
-  y.f = rotation.to_parent(y.f);
-  y.n = rotation.to_parent(y.n) + arm_times(Kind::arm(link, m.place), y.f);
+  turn(Kind::rotation(m.place), y);
+  y.n = y.n + arm_times(Kind::arm(link, m.place), y.f);
 }
 
 // ε, and y⁺ as the parent's. force(i): T - J x along the link's own axes.
@@ -141,8 +167,11 @@ template <class V, class S, class T>
     if constexpr (std::is_same_v<S, V>) {
       own_force(link, m.omega, wrench, alpha, acceleration, own.force.n, own.force.f);
     } else {
-      wide_force(links.wide_masses + 20 * k, m.omega, alpha, acceleration, own.force.n, own.force.f);
+      // b' of velocities that are no wider: what rounding makes of it is an acceleration of the link's masses, as of motions.
+      const Vector3<S> n = gyroscopic(m.omega, rotational_of<S>(link)), f = twice_crossed(m.omega, spread<S>(link.moment));
+      each_of<3>([&](int i) { own.force.n[i] = V(n[i]), own.force.f[i] = V(f[i]); });
       for (int i = 0; i < 3 && wrench; ++i) own.force.n[i] -= V(S(wrench[i])), own.force.f[i] -= V(S(wrench[3 + i]));
+      add_wide_force(links.wide_masses + 20 * k, alpha, acceleration, own.force.n, own.force.f);
     }
   });
 }

@@ -101,10 +101,11 @@ template <class V, class S, class T>
 [[gnu::always_inline]] inline void add_force_sizes(const Link<T>& link, const T* wrench, const Vector3<S>& omega, const RefinedLink<S, V>& own, const Vector3<S>& gn, const Vector3<S>& gf, Rounding<S>& sum) {
   const Symmetric3<S> I = rotational_of<S>(link), sizes = magnitudes(I);
   const Vector3<S> h = spread<S>(link.moment), moment = magnitudes(h), alpha = magnitudes(own.alpha), acceleration = magnitudes(own.acceleration);
-  Vector3<S> n = S(2) * (sizes * alpha + crossed(moment, acceleration)) + magnitudes(gyroscopic(omega, I)) + magnitudes(own.total.n);
-  Vector3<S> f = S(2) * (S(link.mass) * acceleration + crossed(moment, alpha)) + magnitudes(twice_crossed(omega, h)) + magnitudes(own.total.f);
+  Vector3<S> n = S(2) * (sizes * alpha + crossed(moment, acceleration)) + magnitudes(own.total.n);
+  Vector3<S> f = S(2) * (S(link.mass) * acceleration + crossed(moment, alpha)) + magnitudes(own.total.f);
   if (wrench) n = n + magnitudes(spread<S>(wrench)), f = f + magnitudes(spread<S>(wrench + 3));
   sum.forces += dot(gn, n) + dot(gf, f);
+  sum.motions += dot(gn, magnitudes(gyroscopic(omega, I))) + dot(gf, magnitudes(twice_crossed(omega, h)));
   const Vector3<S> size = magnitudes(omega), W{size[0] + own.off, size[1] + own.off, size[2] + own.off};
   sum.motions += dot(gn, crossed(W, sizes * W)) + dot(gf, crossed(W, crossed(W, moment)));
 }

@@ -69,6 +69,25 @@ struct Planar {
     y[i] = c * x[i] - s * x[j], y[j] = c * x[j] + s * x[i], y[K] = x[K];
     return y;
   }
+  // y += x times what axis m becomes.
+  [[gnu::always_inline]] void add_column(int m, const S& x, Vector3<S>& y) const {
+    if (m == i)
+      y[i] += x * c, y[j] += x * s;
+    else if (m == j)
+      y[i] -= x * s, y[j] += x * c;
+    else
+      y[K] += x;
+  }
+  [[gnu::always_inline]] Vector3<S> column(int m) const {
+    Vector3<S> y = Vector3<S>::zero();
+    if (m == i)
+      y[i] = c, y[j] = s;
+    else if (m == j)
+      y[i] = -s, y[j] = c;
+    else
+      y[K] = S(1);
+    return y;
+  }
   // Entry by entry, so that a small one turned into a large one's place and back keeps its digits.
   [[gnu::always_inline]] void turn_block(Symmetric3<S>& A) const {
     const S ci = c * A(i, i) - s * A(i, j), cj = c * A(i, j) - s * A(j, j), si = s * A(i, i) + c * A(i, j), sj = s * A(i, j) + c * A(j, j);
@@ -113,6 +132,10 @@ struct Full {
     each_of<3>([&](int r) { y[r] = R(r, 0) * x[0] + R(r, 1) * x[1] + R(r, 2) * x[2]; });
     return y;
   }
+  [[gnu::always_inline]] void add_column(int m, const S& x, Vector3<S>& y) const {
+    each_of<3>([&](int r) { y[r] += x * R(r, m); });
+  }
+  [[gnu::always_inline]] Vector3<S> column(int m) const { return {R(0, m), R(1, m), R(2, m)}; }
   [[gnu::always_inline]] void turn_symmetric(Symmetric3<S>& A) const {
     Matrix3<S> T;  // R A
     each_of<3>([&](int r) { each_of<3>([&](int k) { T(r, k) = R(r, 0) * A(0, k) + R(r, 1) * A(1, k) + R(r, 2) * A(2, k); }); });

@@ -162,7 +162,8 @@ template <class Kind, class S, class T>
   }
 }
 
-// Of one state: the sines and cosines of all its coordinates, neighbours at once; what is no angle costs little. work: turns_size() numbers.
+// Of one state: the sines and cosines of all its coordinates, neighbours at once; what is no angle costs little. Of wide numbers, of which it would
+// cost as much, of its pins. work: turns_size() numbers.
 template <class T>
 inline size_t padded(const Links<T>& links) { return size_t(links.nq + neighbours<T> - 1) / neighbours<T> * neighbours<T>; }
 template <class T>
@@ -171,12 +172,17 @@ template <class T>
 inline States<T> with_turns(const Links<T>& links, const States<T>& at, T* work) {
   constexpr int W = neighbours<T>;
   T* const cosines = work + padded(links);
-  for (int i = 0; i < links.nq; i += W) {
+  const auto turn = [&](int i, int count) {
     Lanes<T, W> q(T(0));
-    for (int b = 0; b < W && i + b < links.nq; ++b) q.set(b, T(at.q[i + b]));
+    for (int b = 0; b < W && b < count; ++b) q.set(b, T(at.q[i + b]));
     const SineCosine<Lanes<T, W>> of = sine_cosine(q);
     for (int b = 0; b < W; ++b) work[i + b] = of.sine.lane(b), cosines[i + b] = of.cosine.lane(b);
-  }
+  };
+  if constexpr (is_word<T>)
+    for (int i = 0; i < links.nq; i += W) turn(i, links.nq - i);
+  else
+    for (int k = 0; k < links.count; ++k)
+      if (links.link[k].step <= Step::turned_pin) turn(links.link[k].q, 1);
   States<T> turned = at;
   turned.sines = work, turned.cosines = cosines;
   return turned;

@@ -56,18 +56,18 @@ template <class V, class S>
   return {l[1] * f[2] - l[2] * f[1], l[2] * f[0] - l[0] * f[2], l[0] * f[1] - l[1] * f[0]};
 }
 
-// M α + b' of a link: mass, mass times centre and rotational inertia about the origin, and after them what rounding took from these.
+// f + M α of a link: mass, mass times centre and rotational inertia about the origin, and after them what rounding took from these.
 template <class S>
-[[gnu::always_inline]] inline void wide_force(const double* M, const Vector3<S>& omega, const Vector3<S>& alpha, const Vector3<S>& acceleration, Vector3<Wide<S>>& n, Vector3<Wide<S>>& f) {
+[[gnu::always_inline]] inline void add_wide_force(const double* M, const Vector3<S>& alpha, const Vector3<S>& acceleration, Vector3<Wide<S>>& n, Vector3<Wide<S>>& f) {
   using V = Wide<S>;
   const auto number = [&](int i) __attribute__((always_inline)) { return V(S(M[i]), S(M[10 + i])); };
-  const auto turned = [&](const Vector3<S>& w) __attribute__((always_inline)) {
-    return Vector3<V>{w[0] * number(4) + w[1] * number(5) + w[2] * number(6), w[0] * number(5) + w[1] * number(7) + w[2] * number(8), w[0] * number(6) + w[1] * number(8) + w[2] * number(9)};
-  };
   const Vector3<V> h{number(1), number(2), number(3)};
-  f = arm_times(alpha, h) + arm_times(omega, arm_times(omega, h));
+  f = f + arm_times(alpha, h);
   each_of<3>([&](int i) { f[i] += acceleration[i] * number(0); });
-  n = turned(alpha) + arm_times(omega, turned(omega)) - arm_times(acceleration, h);
+  n = n - arm_times(acceleration, h);
+  n[0] += alpha[0] * number(4) + alpha[1] * number(5) + alpha[2] * number(6);
+  n[1] += alpha[0] * number(5) + alpha[1] * number(7) + alpha[2] * number(8);
+  n[2] += alpha[0] * number(6) + alpha[1] * number(8) + alpha[2] * number(9);
 }
 
 }  // namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET

@@ -24,10 +24,9 @@
 
 namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET {
 
+// Truths of numbers that are no machine word have no bits in common with these.
 template <class T>
-struct BitsOf;
-template <>
-struct BitsOf<double> {
+struct BitsOf {
   using type = std::int64_t;
 };
 template <>
@@ -39,8 +38,13 @@ struct BitsOf<float> {
 #if defined(__FMA__) || defined(__aarch64__)
 [[gnu::always_inline]] inline double fused(double a, double b, double c) { return __builtin_fma(a, b, c); }
 [[gnu::always_inline]] inline float fused(float a, float b, float c) { return __builtin_fmaf(a, b, c); }
+// Of numbers wider than words nothing fuses them.
+template <class T>
+  requires(std::is_class_v<T> || std::is_same_v<T, long double>)
+[[gnu::always_inline]] inline T fused(const T& a, const T& b, const T& c) { return a * b + c; }
 #endif
 #if defined(__FMA__)
+[[gnu::always_inline]] inline __m128d fused(__m128d a, __m128d b, __m128d c) { return _mm_fmadd_pd(a, b, c); }
 [[gnu::always_inline]] inline __m256d fused(__m256d a, __m256d b, __m256d c) { return _mm256_fmadd_pd(a, b, c); }
 [[gnu::always_inline]] inline __m256 fused(__m256 a, __m256 b, __m256 c) { return _mm256_fmadd_ps(a, b, c); }
 #ifdef __AVX512F__
@@ -51,7 +55,7 @@ struct BitsOf<float> {
 [[gnu::always_inline]] inline float64x2_t fused(float64x2_t a, float64x2_t b, float64x2_t c) { return vfmaq_f64(c, a, b); }
 [[gnu::always_inline]] inline float32x4_t fused(float32x4_t a, float32x4_t b, float32x4_t c) { return vfmaq_f32(c, a, b); }
 template <class V>
-  requires(sizeof(V) > 16)  // than a register
+  requires(!std::is_class_v<V> && sizeof(V) > 16)  // than a register
 [[gnu::always_inline]] inline V fused(const V& a, const V& b, const V& c) {
   V x;
   for (std::size_t i = 0; i < sizeof(V) / sizeof(x[0]); ++i) x[i] = fused(a[i], b[i], c[i]);
@@ -62,9 +66,12 @@ template <class V>
 [[gnu::always_inline]] inline V fused(const V& a, const V& b, const V& c) { return a * b + c; }
 #endif
 
+// Whether instructions take several of them.
+template <class T>
+inline constexpr bool is_word = std::is_same_v<T, double> || std::is_same_v<T, float>;
 // Numbers of one state that one instruction takes.
 template <class T>
-inline constexpr int neighbours =
+inline constexpr int neighbours = !is_word<T> ? 1 :
 #ifdef __AVX__
     32 / sizeof(T);
 #else
@@ -119,11 +126,23 @@ struct Lanes {
   // ---- truths: all bits of a lane, or none
   [[gnu::always_inline]] static Bits all() { return ~Bits{}; }
   [[gnu::always_inline]] friend Bits greater(const Lanes& a, const Lanes& b) { return a.v > b.v; }
+  [[gnu::always_inline]] friend Bits same(const Lanes& a, const Lanes& b) { return a.v == b.v; }
   [[gnu::always_inline]] static Lanes choose(Bits truth, const Lanes& a, const Lanes& b) { return of((Vector)((truth & (Bits)a.v) | (~truth & (Bits)b.v))); }
   static unsigned mask(Bits truth) {
     unsigned m = 0;
     for (int b = 0; b < W; ++b) m |= unsigned(truth[b] & 1) << b;
     return m;
+  }
+  // Whether it holds in every lane.
+  [[gnu::always_inline]] static bool everywhere(Bits truth) {
+#if defined(__AVX512DQ__) && defined(__AVX512VL__)
+    if constexpr (sizeof truth == 64 && sizeof(T) == 8) return _mm512_movepi64_mask((__m512i)truth) == 0xff;
+    if constexpr (sizeof truth == 64 && sizeof(T) == 4) return _mm512_movepi32_mask((__m512i)truth) == 0xffff;
+#endif
+#ifdef __AVX__
+    if constexpr (sizeof truth == 32) return _mm256_movemask_epi8((__m256i)truth) == -1;
+#endif
+    return mask(truth) == mask(all());
   }
   [[gnu::always_inline]] Bits bits() const { return (Bits)v; }
   [[gnu::always_inline]] static Lanes from_bits(Bits x) { return of((Vector)x); }
@@ -158,8 +177,15 @@ struct Lanes<T, 1> {
 
   [[gnu::always_inline]] static Bits all() { return ~Bits{}; }
   [[gnu::always_inline]] friend Bits greater(const Lanes& a, const Lanes& b) { return -Bits(a.v > b.v); }
-  [[gnu::always_inline]] static Lanes choose(Bits truth, const Lanes& a, const Lanes& b) { return from_bits((truth & a.bits()) | (~truth & b.bits())); }
+  [[gnu::always_inline]] friend Bits same(const Lanes& a, const Lanes& b) { return -Bits(a.v == b.v); }
+  [[gnu::always_inline]] static Lanes choose(Bits truth, const Lanes& a, const Lanes& b) {
+    if constexpr (is_word<T>)
+      return from_bits((truth & a.bits()) | (~truth & b.bits()));
+    else
+      return truth ? a : b;
+  }
   static unsigned mask(Bits truth) { return unsigned(truth & 1); }
+  [[gnu::always_inline]] static bool everywhere(Bits truth) { return truth != 0; }
   [[gnu::always_inline]] Bits bits() const {
     Bits x;
     __builtin_memcpy(&x, &v, sizeof x);
@@ -174,34 +200,60 @@ struct Lanes<T, 1> {
 
 template <class T, int W>
 [[gnu::always_inline]] inline Lanes<T, W> magnitude(const Lanes<T, W>& a) {
-  constexpr auto sign = typename BitsOf<T>::type(1) << (8 * sizeof(T) - 1);
-  return Lanes<T, W>::from_bits(a.bits() & ~sign);
+  if constexpr (is_word<T>) {
+    constexpr auto sign = typename BitsOf<T>::type(1) << (8 * sizeof(T) - 1);
+    return Lanes<T, W>::from_bits(a.bits() & ~sign);
+  } else {
+    return a.v < T(0) ? -a : a;
+  }
 }
 template <class T, int W>
 [[gnu::always_inline]] inline Lanes<T, W> larger(const Lanes<T, W>& a, const Lanes<T, W>& b) {
-  return Lanes<T, W>::choose(greater(b, a), b, a);
+  if constexpr (W == 1)
+    return b.v > a.v ? b : a;
+  else
+    return Lanes<T, W>::choose(greater(b, a), b, a);
 }
 // f(0), ..., f(n - 1), written out: a compiler makes vectors of a loop's neighbours, which costs more than it brings for three.
 template <int n, class F>
 [[gnu::always_inline]] inline void each_of(F f) {
   if constexpr (n > 0) each_of<n - 1>(f), f(n - 1);
 }
-// One number of every state.
+// One number of every state, as the lanes are or rounded to them all at once.
 template <class S>
 [[gnu::always_inline]] inline S gathered(const double* x, std::size_t stride, int states) {
   using T = typename S::Scalar;
-  if constexpr (S::width == 1) return S(T(*x));
-  S a;
-  if (states == S::width) {
-    for (int b = 0; b < S::width; ++b) a.set(b, T(x[b * stride]));
+  if constexpr (S::width == 1) {
+    return S(T(*x));
   } else {
-    for (int b = 0; b < S::width; ++b) a.set(b, T(x[(b < states ? b : states - 1) * stride]));
+    if (states == 1) return S(T(*x));
+    Lanes<double, S::width> a;
+    if (states == S::width) {
+      for (int b = 0; b < S::width; ++b) a.set(b, x[b * stride]);
+    } else {
+      for (int b = 0; b < S::width; ++b) a.set(b, x[(b < states ? b : states - 1) * stride]);
+    }
+    if constexpr (std::is_same_v<T, double>)
+      return a;
+    else
+      return S::of(__builtin_convertvector(a.v, typename S::Vector));
   }
-  return a;
 }
 template <class S>
 [[gnu::always_inline]] inline void scattered(const S& a, double* x, std::size_t stride, int states) {
-  for (int b = 0; b < S::width && b < states; ++b) x[b * stride] = double(a.lane(b));
+  if constexpr (S::width == 1) {
+    *x = double(a.v);
+  } else {
+    Lanes<double, S::width> all;
+    if constexpr (std::is_same_v<typename S::Scalar, double>)
+      all = a;
+    else
+      all.v = __builtin_convertvector(a.v, typename Lanes<double, S::width>::Vector);
+    if (states == S::width)
+      for (int b = 0; b < S::width; ++b) x[b * stride] = all.lane(b);
+    else
+      for (int b = 0; b < states; ++b) x[b * stride] = all.lane(b);
+  }
 }
 
 // Neighbours in memory, wherever that begins.

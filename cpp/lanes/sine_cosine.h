@@ -63,10 +63,18 @@ template <class S>
   const Bits n = nearest.bits(), odd = -(n & 1);
   const S sine = S::choose(odd, of.cosine, of.sine), cosine = S::choose(odd, of.sine, of.cosine);
   SineCosine<S> out{S::from_bits(sine.bits() ^ ((n & 2) << (shift - 1))), S::from_bits(cosine.bits() ^ (((n + 1) & 2) << (shift - 1)))};
-  if (const unsigned large = S::mask(greater(magnitude(x), S(R::limit))); __builtin_expect(large != 0, 0))
+  if (const Bits large = greater(magnitude(x), S(R::limit)); __builtin_expect(!S::everywhere(~large), 0))
     for (int b = 0; b < S::width; ++b)
-      if (large >> b & 1) out.sine.set(b, std::sin(x.lane(b))), out.cosine.set(b, std::cos(x.lane(b)));
+      if (S::mask(large) >> b & 1) out.sine.set(b, std::sin(x.lane(b))), out.cosine.set(b, std::cos(x.lane(b)));
   return out;
+}
+
+// Of a wide number, by its own library.
+template <class T>
+  requires(!is_word<T>)
+inline SineCosine<Lanes<T, 1>> sine_cosine(const Lanes<T, 1>& x) {
+  using std::sin, std::cos;
+  return {Lanes<T, 1>(sin(x.v)), Lanes<T, 1>(cos(x.v))};
 }
 
 }  // namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET

@@ -23,23 +23,11 @@ struct InertiaFactors {
   S uncertain = S(0);  // moment about the centre that was taken for rounding
 };
 
-// The moments about the centre are factored in quad precision, or in S where that is wider: what is left of a small one is right to the
-// digits of S. One that may be no more than the rounding of the doubles given counts as zero, and as uncertain; so does a negative one
-// that the model let pass.
-template <class S>
-inline InertiaFactors<S> inertia_factors(double mass, const Vector3<double>& com, const Symmetric3<double>& about_com) {
-  using Exact = std::conditional_t<(std::numeric_limits<S>::digits < std::numeric_limits<Quad>::digits), Quad, S>;
-  InertiaFactors<S> f;
-  f.com = {S(com[0]), S(com[1]), S(com[2])};
-  for (int i = 0; i < 3; ++i) {
-    Vector3<S> e = Vector3<S>::zero();
-    e[i] = S(1);
-    f.column[i] = {cross(f.com, e), e};
-    f.weight[i] = S(mass);
-  }
-  Exact I[9], U[9], w[3], work[9];
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) I[3 * i + j] = Exact(about_com(i, j));
+// Moments about the centre, full and symmetric, as weighted squares: the last three columns. One that may be no more than the rounding of the
+// doubles given counts as zero, and as uncertain; so does a negative one that the model let pass.
+template <class S, class Exact>
+inline void factor_moments(const Exact* I, InertiaFactors<S>& f) {
+  Exact U[9], w[3], work[9];
   const Exact rounding = Exact(2) * Exact(std::min(to_double(epsilon<S>()), epsilon<double>()));
   semidefinite_factors(I, 3, rounding, U, w, work);
   Exact left = Exact(0);  // no entry of what is left exceeds its largest diagonal entry by much
@@ -50,6 +38,27 @@ inline InertiaFactors<S> inertia_factors(double mass, const Vector3<double>& com
     f.column[3 + r] = {{static_cast<S>(U[3 * r]), static_cast<S>(U[3 * r + 1]), static_cast<S>(U[3 * r + 2])}, Vector3<S>::zero()};
     f.pivot[r] = U[3 * r] == Exact(1) ? 0 : U[3 * r + 1] == Exact(1) ? 1 : 2;
   }
+}
+
+// The scalar that moments are factored in, so that what is left of a small one is right to the digits of S.
+template <class S>
+using MomentScalar = std::conditional_t<(std::numeric_limits<S>::digits < std::numeric_limits<Quad>::digits), Quad, S>;
+
+template <class S>
+inline InertiaFactors<S> inertia_factors(double mass, const Vector3<double>& com, const Symmetric3<double>& about_com) {
+  using Exact = MomentScalar<S>;
+  InertiaFactors<S> f;
+  f.com = {S(com[0]), S(com[1]), S(com[2])};
+  for (int i = 0; i < 3; ++i) {
+    Vector3<S> e = Vector3<S>::zero();
+    e[i] = S(1);
+    f.column[i] = {cross(f.com, e), e};
+    f.weight[i] = S(mass);
+  }
+  Exact I[9];
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) I[3 * i + j] = Exact(about_com(i, j));
+  factor_moments(I, f);
   return f;
 }
 

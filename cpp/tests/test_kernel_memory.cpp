@@ -42,12 +42,15 @@ struct Memory {
 
 constexpr Call calls[] = {Call::forward_dynamics, Call::inverse_dynamics, Call::mass_matrix, Call::mass_matrix_inverse, Call::inverse_dynamics_derivatives,
                           Call::forward_dynamics_derivatives, Call::jacobian, Call::pose, Call::coriolis_matrix, Call::skew_coriolis_matrix,
-                          Call::operational_space_compliance, Call::operational_space_inertia, Call::refined_dynamics, Call::gathered_dynamics};
+                          Call::operational_space_compliance, Call::operational_space_inertia, Call::refined_dynamics, Call::gathered_dynamics,
+                          Call::forward_dynamics_ud, Call::refined_dynamics_ud, Call::gathered_dynamics_ud,
+                          Call::forward_dynamics_square_root, Call::refined_dynamics_square_root, Call::gathered_dynamics_square_root};
 
 template <class T>
 void check(const Multibody& model, const kernels::Kernels<T>& kernel) {
   const auto made = kernels::LinkModel<T>::of(model);
   BOOST_REQUIRE(made);
+  made->find_factors();
   const kernels::Links<T>& links = made->links();
   const int nv = model.nv(), nq = model.nq(), lanes = kernel.lanes;
   const size_t most = std::max<size_t>(size_t(nv) * nv, 36);

@@ -13,10 +13,12 @@
 #include "kernels/instruction_set.h"
 #include "kernels/link_model.h"
 #include "robot.h"
+#include "uneven.h"
 #include "runtime/interrupt.h"
 
 using namespace pycraft;
 using pycraft::testing::random_numbers;
+using pycraft::testing::uneven;
 
 namespace {
 
@@ -117,37 +119,6 @@ std::shared_ptr<Multibody> chain(int n, HingeKind kind = HingeKind::pin) {
 States states_of(const Multibody& model, int count, int seed) {
   States s{random_numbers(count * model.nq(), seed), random_numbers(count * model.nv(), seed + 1), random_numbers(count * model.nv(), seed + 2)};
   return s;
-}
-
-// Bodies of masses and sizes over twenty orders, or by `much` as many, with hinges of every sort.
-std::shared_ptr<Multibody> uneven(int seed, double much = 1) {
-  auto mb = std::make_shared<Multibody>("uneven");
-  const HingeKind kinds[] = {HingeKind::pin, HingeKind::slider, HingeKind::ball, HingeKind::screw, HingeKind::free, HingeKind::universal};
-  const std::vector<double> x = random_numbers(1000, seed);
-  size_t at = 0;
-  for (int k = 0; k < 6; ++k) {
-    Body b;
-    b.name = "body" + std::to_string(k);
-    b.mass = std::pow(10, 5 * much * x[at++]);
-    const double size = std::pow(10, much * (2.5 * x[at++] - 2));
-    b.com = {x[at] * size, x[at + 1] * size, x[at + 2] * size}, at += 3;
-    const double about = b.mass * std::pow(10, much * (8 * x[at++] - 8));
-    b.inertia = {about, 0, 0, 1.2 * about, 0, 0.9 * about};
-    b.hinge.kind = kinds[static_cast<int>(3 + 3 * x[at++]) % 6];
-    b.hinge.name = "hinge" + std::to_string(k);
-    b.hinge.placement.p = {x[at], x[at + 1], x[at + 2]}, at += 3;
-    std::vector<Vector3<double>> axes;
-    const bool oblique = x[at++] > 0;
-    if (b.hinge.kind == HingeKind::universal)
-      axes = {{1, 0, 0}, {0, 1, 0}};
-    else if (b.hinge.kind != HingeKind::ball && b.hinge.kind != HingeKind::free)
-      axes = {oblique ? Vector3<double>{0.6, 0, 0.8} : Vector3<double>{0, 1, 0}};
-    b.hinge.subhinges = subhinges_of(b.hinge.kind, axes, {0, 0, 0}, b.hinge.kind == HingeKind::screw ? 0.3 : 0, b.hinge.name);
-    const int parent = k - 1 - (x[at++] > 0.5 && k > 1);
-    mb->add_body(b, k == 0 ? "" : "body" + std::to_string(parent));
-  }
-  mb->set_gravity({0, 0, -9.81});
-  return mb;
 }
 
 }  // namespace
@@ -256,7 +227,7 @@ BOOST_AUTO_TEST_CASE(errors_are_those_of_matrices) {
 BOOST_AUTO_TEST_CASE(where_a_pivot_stands_out) {
   namespace k = kernels::tested;
   kernels::Links<double> links{};
-  links.rounding = 0x1p-20, links.faint = 0x1p-10;
+  links.plain.rounding = 0x1p-20, links.plain.faint = 0x1p-10;
   const auto out = [&](double pivot, double error, double felt) { return One::mask(k::stands_out(links, One(1 / pivot), One(error), One(felt))); };
   BOOST_TEST(out(1, 0x1.fp18, 0));
   BOOST_TEST(!out(1, 0x1p19, 0));
@@ -271,11 +242,11 @@ BOOST_AUTO_TEST_CASE(where_a_pivot_stands_out) {
     for (int j = 0; j < i; ++j) factors.lower[i][j] = L[3 * i + j];
   for (int weak = 0; weak < 3; ++weak)
     for (const double by : {0.9, 1.1}) {
-      for (int j = 0; j < 3; ++j) factors.inverse[j] = 1e-3 / (2 * links.rounding * pivot_reach(L, 3, j, squares, work));
+      for (int j = 0; j < 3; ++j) factors.inverse[j] = 1e-3 / (2 * links.plain.rounding * pivot_reach(L, 3, j, squares, work));
       factors.inverse[weak] *= One(1e3 * by);
       const One errors[3] = {3, 5, 7}, none[3] = {0, 0, 0};
       BOOST_TEST(One::mask(k::stand_out(links, factors, errors, none)) == (by < 1));
-      const One scale(2 * links.rounding / links.faint), felt[3] = {scale * errors[0], scale * errors[1], scale * errors[2]};
+      const One scale(2 * links.plain.rounding / links.plain.faint), felt[3] = {scale * errors[0], scale * errors[1], scale * errors[2]};
       BOOST_TEST(One::mask(k::stand_out(links, factors, none, felt)) == (by < 1));
     }
 }

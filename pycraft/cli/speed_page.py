@@ -218,7 +218,8 @@ derivatives twice and three times as many.
 ## What accuracy costs
 
 Forward dynamics in other forms and precisions, as a ratio to form `fast` in double, timed in turn; errors against quad precision; ✓ is
-within its bound, ✗ over it. `fast` runs kernels of its own, all other ways the recursions that the operators share. What each way is for:
+within its bound, ✗ over it. Direct calls of forward dynamics run kernels in every way that stands here.
+What each way is for:
 [accuracy.md](accuracy.md).
 
 {_markdown(COST_HEADINGS, cost_cells(costs))}

@@ -139,7 +139,7 @@ def test_instruction_sets_agree(tmp_path):
                 continue
             of = MODELS[model]
             size = 80 * of.nv * np.finfo(precision).eps  # twice what each is off by, see test_wider_precisions_agree
-            if call in ("forward_dynamics", "mass_matrix_inverse"):
+            if call.startswith(("forward_dynamics", "mass_matrix_inverse")) and "derivatives" not in call:
                 size *= np.linalg.cond(of.mass_matrix(states(of, int(count))[0])).max()
             assert np.abs(value - baseline).max() <= size * np.abs(baseline).max(), f"{name}: {case}"
 

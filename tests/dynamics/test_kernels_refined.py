@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pycraft as pc
-from support.kernel_cases import MODELS, STATES, states
+from support.kernel_cases import MODELS, STATES, errors, heavy, states
 
 EPS = np.finfo(float).eps
 WAYS = {
@@ -25,24 +25,6 @@ def model(request):
     model = MODELS[request.param]
     model.gravity = GRAVITY
     return model
-
-
-def heavy(model, ratio):
-    """The model with bodies without children `ratio` times as heavy."""
-    description = model.description()
-    parents = {b["parent"] for b in description["bodies"]}
-    for k, b in enumerate(description["bodies"]):
-        if k not in parents and b["name"] not in parents:
-            b["mass"], b["inertia"] = ratio * b["mass"], ratio * np.asarray(b["inertia"])
-    made = pc.Multibody.from_description(description)
-    made.gravity = GRAVITY
-    return made
-
-
-def errors(model, given, **how):
-    """Of every state."""
-    exact = model.forward_dynamics(*given, precision="quad")
-    return np.linalg.norm(model.forward_dynamics(*given, **how) - exact, axis=1) / np.linalg.norm(exact, axis=1)
 
 
 @pytest.mark.parametrize("way", WAYS)

@@ -31,7 +31,7 @@ def states(seed=0):
     return Q, V, TAU
 
 
-@pytest.mark.parametrize("form", ["fast", "ud"])
+@pytest.mark.parametrize("form", ["fast", "ud", "square-root"])
 @pytest.mark.parametrize("precision", ["double", "single"])
 def test_a_singular_lane_is_found(gimbal, form, precision):
     for lane in range(BATCH):
@@ -58,7 +58,7 @@ def askew():
     return model
 
 
-@pytest.mark.parametrize("form", ["fast", "ud"])
+@pytest.mark.parametrize("form", ["fast", "ud", "square-root"])
 def test_a_lane_of_noise_is_found(askew, form):
     """A positive pivot that is rounding passes for an inertia where it is not compared in its own lane."""
     for lane in range(BATCH):
@@ -69,7 +69,7 @@ def test_a_lane_of_noise_is_found(askew, form):
                 askew.forward_dynamics(Q, V, TAU, form=form)
 
 
-@pytest.mark.parametrize("form", ["fast", "ud"])
+@pytest.mark.parametrize("form", ["fast", "ud", "square-root"])
 def test_other_lanes_are_as_if_alone(gimbal, form):
     """A singular lane, answered by least norm; the others bit for bit as one by one."""
     for lane in (0, 3, BATCH - 1):
@@ -84,7 +84,7 @@ def test_other_lanes_are_as_if_alone(gimbal, form):
     assert np.abs(together - alone).max() <= 1e-13 * np.abs(alone).max()
 
 
-@pytest.mark.parametrize("form", ["fast", "ud"])
+@pytest.mark.parametrize("form", ["fast", "ud", "square-root"])
 def test_every_lane_has_its_own_numbers(form):
     """Lanes of free and ball hinges with lengths of quaternions of their own."""
     model = pc.tree([-1, 0, 1], ["free", "ball", "pin"], seed=2)

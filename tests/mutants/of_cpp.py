@@ -203,14 +203,37 @@ CHANGES = {
     ],
     "cpp/kernels/forward_dynamics.h": [
         ("a rotor keeps all of its row", "S(J * w.inverse)", "S(1)"),
-        ("what pivots outboard are unsure of is forgotten", "greater(D, S(4) * most * P.error)", "S::all()"),
         (
             "a heavy rotor's rate is a difference",
             "(left - w.angular[K] * alpha[K]) * w.inverse",
             "(left + S(link.J) * alpha[K]) * w.inverse - alpha[K]",
         ),
-        ("a faint pivot of one coordinate is sound", "greater(D, S(links.faint) * most)", "S::all()"),
+        ("a faint pivot of one coordinate is sound", "greater(D, S(links.plain.faint) * most)", "S::all()"),
         ("branches are lost", "add(w.branch[link.parent], P);", ";", STATEMENT),
+    ],
+    "cpp/kernels/pivots.h": [
+        ("what pivots outboard are unsure of is forgotten", "greater(D, S(4) * most * P.error)", "S::all()"),
+    ],
+    "cpp/kernels/factored_dynamics.h": [
+        ("a rotor's link takes the whole force along", "S(tau - S(link.J) * rate)", "tau"),
+        ("what columns accelerate by themselves counts twice", "innovation + L.products[n]", "innovation"),
+        ("a factored root is sure of everything", "sure(P.error, P.growth, links.factored.growth)", "S::all()"),
+    ],
+    "cpp/kernels/factored_columns.h": [
+        ("columns of turns forget what the hinge turns by", "L.lower[r][n] - m.turning[of.turn[p]]", "L.lower[r][n]"),
+    ],
+    "cpp/kernels/reflected_rows.h": [
+        (
+            "a column that is through stays",
+            "V::choose(gone, V(typename V::Scalar(0)), V(loaded<V>(x + row) - wide_f[s] * a))",
+            "V(loaded<V>(x + row) - wide_f[s] * a)",
+        ),
+    ],
+    "cpp/kernels/link_factors.cpp": [
+        ("a rotor takes the place of a column", "full ? 12 : 5", "5"),
+    ],
+    "cpp/dynamics/batch_dynamics.cpp": [
+        ("refinement of wide numbers starts from a double", "precision != Precision::single && precision != Precision::double_", "false"),
     ],
     "cpp/kernels/mass_matrix_of_links.h": [
         ("lengths along an axis are felt", "S(2) * (l[j] * g[j] + l[k] * g[k])", "S(2) * (dot(l, g) - l[i] * g[i])"),
@@ -237,7 +260,7 @@ CHANGES = {
         ("angles beyond the reduction are reduced", "greater(magnitude(x), S(R::limit))", "greater(S(0), S(1))"),
     ],
     "cpp/kernels/link_model.cpp": [
-        ("an axis a millionth off a coordinate axis is that", "E(8) * E(epsilon<double>())", "E(1e-6)"),
+        ("an axis a millionth off a coordinate axis is that", "E(8) * rounding", "E(1e-6)"),
         ("no state of a tree is too faint", "own.carried_mass = static_cast<double>(M.mass);", "own.carried_mass = 0;", STATEMENT),
     ],
     "cpp/dynamics/link_dynamics.h": [

@@ -43,6 +43,7 @@ PARTS = {
     "kernels/kernels_baseline",  # the kernels of an instruction set each
     "kernels/kernels_avx2",
     "kernels/kernels_avx512",
+    "kernels/kernels_wide",
     "algebra/planning/plan_blocks",  # class Planner, by what is planned
     "algebra/planning/plan_diagonals",
     "algebra/planning/plan_solves",

@@ -49,8 +49,36 @@ def states(model, count=STATES):
     return Q, V, rng.uniform(-1, 1, (count, model.nv))
 
 
+def heavy(model, ratio, gravity=(0.4, -1.0, -9.0)):
+    """The model with bodies without children `ratio` times as heavy."""
+    description = model.description()
+    parents = {b["parent"] for b in description["bodies"]}
+    for k, b in enumerate(description["bodies"]):
+        if k not in parents and b["name"] not in parents:
+            b["mass"], b["inertia"] = ratio * b["mass"], ratio * np.asarray(b["inertia"])
+    made = pc.Multibody.from_description(description)
+    made.gravity = gravity
+    return made
+
+
+def by_recursions(model, Q, V, U, **how):
+    """Forward dynamics by the general recursions: of the model beside a body at rest by itself, on a ball hinge with rotors, which kernels
+    do not know."""
+    beside = pc.Multibody.from_description(model.description())
+    beside.gravity = model.gravity
+    beside.add_body("apart", None, hinge="ball", mass=1.0, inertia=np.eye(3), rotor_inertia=(0.1, 0.1, 0.1))
+    more = np.zeros((len(Q), 3))
+    return beside.forward_dynamics(np.hstack([Q, more + 1, more[:, :1]]), np.hstack([V, more]), np.hstack([U, more]), **how)[:, : model.nv]
+
+
+def errors(model, given, reference="quad", call=pc.Multibody.forward_dynamics, **how):
+    """Of forward dynamics at every state: relative 2-norms."""
+    exact = model.forward_dynamics(*given, precision=reference)
+    return np.linalg.norm(call(model, *given, **how) - exact, axis=1) / np.linalg.norm(exact, axis=1)
+
+
 def calls(model, Q, V, U, **how):
-    """Every call that kernels have."""
+    """Every call that kernels have, forward dynamics in every form."""
     derivatives = {
         f"{call}, {along}": matrix
         for call in ("inverse_dynamics_derivatives", "forward_dynamics_derivatives")
@@ -63,6 +91,8 @@ def calls(model, Q, V, U, **how):
         "coriolis_matrix": model.coriolis_matrix(Q, V, **how),
         "coriolis_matrix, skew": model.coriolis_matrix(Q, V, form="skew", **how),
         "forward_dynamics": model.forward_dynamics(Q, V, U, **how),
+        "forward_dynamics, ud": model.forward_dynamics(Q, V, U, form="ud", **how),
+        "forward_dynamics, square-root": model.forward_dynamics(Q, V, U, form="square-root", **how),
         "inverse_dynamics": model.inverse_dynamics(Q, V, U, **how),
         "bias_forces": model.bias_forces(Q, V, **how),
         "mass_matrix": model.mass_matrix(Q, **how),
