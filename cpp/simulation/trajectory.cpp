@@ -8,10 +8,10 @@ namespace pycraft {
 namespace {
 
 template <class S>
-class EquationsOfMotion : public Equations<S> {
+class EquationsOfMotion : public ExplicitEquations<S> {
  public:
   EquationsOfMotion(const CompiledModel<S>& model, const Accelerations<S>& accelerations, const S* tau, const S* damping)
-      : Equations<S>(model, 0), accelerations_(accelerations), tau_(tau), damping_(damping), force_(tau, tau + model.nv) {}
+      : ExplicitEquations<S>(model, 0), accelerations_(accelerations), tau_(tau), damping_(damping), force_(tau, tau + model.nv) {}
 
   void evaluate(const S&, const S* q, const S* v, const S*, S* vdot, S*) override {
     if ((++this->evaluations & 63) == 0) check_interrupt();

@@ -1,5 +1,5 @@
 // Trajectories of a model with anybody's accelerations: q̇ = N(q) v (model/configuration.h), v̇ from a callable, under constant generalized forces
-// and viscous damping, T = tau - d ∘ v. The integrators are those of scenes (simulation/integrators/integrate.h).
+// and viscous damping, T = tau - d ∘ v. The integrators are the explicit ones of scenes (simulation/integrators/integrate.h).
 #pragma once
 
 #include <functional>

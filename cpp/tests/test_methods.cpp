@@ -60,7 +60,7 @@ BOOST_AUTO_TEST_CASE(steps_do_not_allocate) {
   const Accelerations<double> fall = [&](const double* at, const double* moving, const double* forces, double* vdot) {
     w.forward_dynamics(at, moving, forces, vdot);
   };
-  for (const Integrator integrator : integrators) {
+  for (const Integrator integrator : integrators_by(Way::at_states)) {
     long counts[2], steps[2];
     for (const int twice : {0, 1}) {
       const std::vector<double> times{0, 0.02 * (1 + twice)};
@@ -88,7 +88,7 @@ BOOST_AUTO_TEST_CASE(accelerations_are_a_callable) {
   mb->add_body(b, "");
   const Accelerations<double> spring = [](const double* q, const double*, const double* tau, double* vdot) { vdot[0] = tau[0] - q[0]; };
   const double q = 1, v = 0, tau = 0;
-  for (const Integrator integrator : integrators) {
+  for (const Integrator integrator : integrators_by(Way::at_states)) {
     double end = 0;
     const TrajectoryOptions options{integrator, 1e-11, 1e-12, 1e-3, false};
     const TrajectoryCost cost = integrate_trajectory<double>(*mb->compiled<double>(), spring, &q, &v, {0, 1}, &tau, nullptr, options,
