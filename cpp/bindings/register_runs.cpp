@@ -76,7 +76,7 @@ void run_in(CompiledScene<S>& scene, const std::vector<double>& q, const std::ve
     pair = paired(scene, works, asked.options);
   }
   record.nq = scene.numbers().nq, record.nv = scene.numbers().nv, record.own = scene.effects().own(), record.works = pair.equations->integrals();
-  record.own_events = pair.equations->events();
+  record.own_events = pair.equations->event_names();
   const std::vector<double>& own = asked.own;
   if (!own.empty() && static_cast<int>(own.size()) != record.own)
     throw ModelError("the effects have " + std::to_string(record.own) + " states of their own, not " + std::to_string(own.size()));

@@ -51,7 +51,7 @@ struct Declaration {
   std::vector<double> states;        // what they are at first: rates() says how they change
   std::vector<double> held;          // after these, kept from one sample to the next
   double period = 0;                 // s between samples; 0: none
-  int events = 0;                    // functions whose zeros matter
+  int events = 0;                    // functions of the state at whose zeros it is another one
   bool foreign = false;              // calls from outside of the core: what it gives is looked at each time
   int own() const { return static_cast<int>(states.size() + held.size()); }
 };

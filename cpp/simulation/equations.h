@@ -51,9 +51,9 @@ class Equations {
   virtual bool stops() const { return false; }
   virtual double next_stop(double) const { return std::numeric_limits<double>::infinity(); }
   virtual void stop(const S&, State&) {}
-  // Functions of (t, x) in whose zeros the motion changes its law, so that a step ends there.
-  virtual std::vector<std::string> events() const { return {}; }
-  virtual void event_values(const S&, const State&, S*) {}
+  // Functions of t and x at whose zeros the equations are others, by whose they are: a step ends there.
+  virtual std::vector<std::string> event_names() const { return {}; }
+  virtual void events(const S&, const State&, S*) {}
   // What number i of x is, for errors.
   virtual std::string name_of(int i) const { return "number " + std::to_string(i) + " of the state"; }
 

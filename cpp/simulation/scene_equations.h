@@ -27,10 +27,7 @@ class SceneEquations : public Kind<S> {
   // works: whether the works of effects are part of x.
   SceneEquations(CompiledScene<S>& scene, bool works)
       : Kind<S>(scene.numbers(), scene.effects().own() + (works ? static_cast<int>(scene.effects().workers().size()) : 0)), scene_(scene), own_(scene.effects().own()),
-        works_(this->rest() - own_), q_(nq()), v_(nv()) {
-    for (const auto& e : scene.effects().effects())
-      if (e->declared.events > 0) eventful_.push_back(e.get()), events_ += e->declared.events;
-  }
+        works_(this->rest() - own_), q_(nq()), v_(nv()) {}
 
   CompiledScene<S>& scene() const { return scene_; }
   int works() const { return works_; }
@@ -71,24 +68,11 @@ class SceneEquations : public Kind<S> {
   bool stops() const override { return std::isfinite(next_stop(0)); }
   double next_stop(double t) const override { return scene_.effects().next_sample(t); }
   void stop(const S& t, State& x) override { scene_.effects().sample(t, false, x.data(), x.data() + nq(), x.data() + nq() + nv()); }
-
-  std::vector<std::string> events() const override {
-    std::vector<std::string> names;
-    for (const Active<S>* e : eventful_) names.insert(names.end(), e->declared.events, e->name);
-    return names;
-  }
-  void event_values(const S& t, const State& x, S* out) override {
-    if (events_ == 0) return;
-    const S* const own = x.data() + nq() + nv();
-    SceneForces<S>& forces = scene_.effects();
-    forces.start(t, x.data(), x.data() + nq(), own);
-    forces.place(forces.read()), forces.move(forces.read());
-    for (Active<S>* e : eventful_) {
-      At<S> at = forces.at();
-      at.own = own + e->first;
-      e->bound->events(at, out);
-      out += e->declared.events;
-    }
+  std::vector<std::string> event_names() const override { return scene_.effects().event_names(); }
+  void events(const S& t, const State& x, S* out) override {
+    std::copy_n(x.data(), nq(), q_.data()), std::copy_n(x.data() + nq(), nv(), v_.data());
+    scene_.effects().prescribe(t, q_.data(), v_.data(), nullptr);
+    scene_.effects().events(t, q_.data(), v_.data(), x.data() + nq() + nv(), out);
   }
   std::string name_of(int i) const override;
 
@@ -97,9 +81,8 @@ class SceneEquations : public Kind<S> {
 
  private:
   CompiledScene<S>& scene_;
-  int own_, works_, events_ = 0;
+  int own_, works_;
   State q_, v_;
-  std::vector<Active<S>*> eventful_;
 };
 
 template <class S, template <class> class Kind>

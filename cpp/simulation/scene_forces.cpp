@@ -167,6 +167,23 @@ double SceneForces<S>::next_sample(double t) const {
 }
 
 template <class S>
+std::vector<std::string> SceneForces<S>::event_names() const {
+  std::vector<std::string> names;
+  for (const auto& e : effects_) names.insert(names.end(), e->declared.events, e->name);
+  return names;
+}
+
+template <class S>
+void SceneForces<S>::events(const S& t, const S* q, const S* v, const S* own, S* out) {
+  start(t, q, v, own);
+  place(read_), move(read_);
+  for (auto& e : effects_) {
+    if (e->declared.events > 0) e->bound->events(at_of(*e), out);
+    out += e->declared.events;
+  }
+}
+
+template <class S>
 void SceneForces<S>::blame(const Active<S>& effect, const std::string& what, const S& t) const {
   throw EvaluationError("effect '" + effect.name + "': " + what + " at t = " + short_number(to_double(t)) + " s");
 }

@@ -87,6 +87,7 @@ class Jet : public Effect {
     Declaration d;
     d.coordinates = {coordinate};
     d.states = {2.0};
+    d.events = 1;
     d.work = true;
     return d;
   }
@@ -98,6 +99,7 @@ struct BoundJet : BoundEffect<S> {
   explicit BoundJet(const Jet& of) : j(of.coordinate) {}
   void forces(const At<S>& at, const Forces<S>& out) override { out.generalized[j] += S(3) * at.own[0]; }
   void rates(const At<S>& at, S* out) override { out[0] = -at.own[0]; }
+  void events(const At<S>& at, S* out) override { out[0] = at.own[0] - S(0.125); }  // as good as empty
   int j;
 };
 PYCRAFT_BIND_EFFECT(Jet, BoundJet)
@@ -246,4 +248,28 @@ BOOST_AUTO_TEST_CASE(passes_are_counted) {
       BOOST_TEST(pass.name != "damping");
     }
   }
+}
+
+BOOST_AUTO_TEST_CASE(events_of_effects) {
+  const auto mb = machine();
+  Scene scene(mb);
+  const double none = std::numeric_limits<double>::infinity();
+  scene.add("", std::make_shared<Limits>(*mb, pin, std::vector<double>{30}, std::vector<double>{0}, std::vector<double>{-0.25}, std::vector<double>{0.75}));
+  scene.add("", std::make_shared<Damping>(*mb, all, std::vector<double>{0.2}));
+  scene.add("", std::make_shared<Jet>(0));
+  scene.add("lower", std::make_shared<Limits>(*mb, pin, std::vector<double>{30}, std::vector<double>{0}, std::vector<double>{-0.5}, std::vector<double>{none}));
+  CompiledScene<double> compiled(scene, {});
+  SceneEquations<double> equations(compiled, true);
+  const std::vector<double> q = mb->zero_q(), v = random_numbers(mb->nv(), 2);
+  const int at = compiled.numbers().q_offset[mb->body_index("body1")];
+  std::vector<double> x = equations.initial(0.0, q.data(), v.data(), nullptr), out(4);
+  x[at] = 0.5;
+  BOOST_TEST(equations.event_names() == (std::vector<std::string>{"limits", "limits", "jet", "lower"}), boost::test_tools::per_element());
+  BOOST_TEST(allocations_of([&] { equations.events(0.0, x, out.data()); }) == 0);
+  BOOST_TEST(out == (std::vector<double>{0.75, 0.25, 2 - 0.125, 1.0}), boost::test_tools::per_element());
+  scene.add("", std::make_shared<PrescribedMotion>(*mb, pin, constant_in_time({0.25})));
+  CompiledScene<double> driven(scene, {});
+  SceneEquations<double> others(driven, false);
+  others.events(0.0, x, out.data());  // of where the motion is, not of x
+  BOOST_TEST(out == (std::vector<double>{0.5, 0.5, 2 - 0.125, 0.75}), boost::test_tools::per_element());
 }

@@ -238,10 +238,13 @@ def accuracy(seconds: float = 0.2) -> list[Figure]:
 
 def run(seconds: float = 0.1) -> dict[str, list[Figure]]:
     """All figures, by heading."""
+    from .bench_scenes import scenes
+
     return {
         f"O(N): time per link at {LONG} links over {SHORT}": per_link(seconds),
         "Expressions": [building()],
         "Direct calls": direct_calls(2 * seconds),
         "Sensitivities": sensitivities(2 * seconds),
         "What accuracy costs": accuracy(2 * seconds),
+        "Scenes": scenes(2 * seconds),
     }

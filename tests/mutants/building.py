@@ -81,7 +81,7 @@ class TestBuild:
         if "-include" in command:  # the precompiled header: made of the files as they are, without switches
             del command[command.index("-include") : command.index("-include") + 2]
         together = self.root / "build" / command[command.index("-c") + 1]
-        if together.is_relative_to(self.root / "build"):  # sources that are compiled together: a file of CMake's that includes them
+        if "Unity" in together.parts:  # sources that are compiled together: a file of CMake's that includes them
             copy = made.with_suffix(".together.cxx")
             copy.write_text(together.read_text(encoding="utf-8").replace(str(self.root / "cpp"), str(self.tree / "cpp")), encoding="utf-8")
             command[command.index("-c") + 1] = str(copy)

@@ -30,6 +30,9 @@ TARGETS = [
     "cpp/dynamics/parameter_sensitivities.h",
     "cpp/operators/rigid_values.h",
     "cpp/rigid/rigid_factors.h",
+    "cpp/simulation/effects/*.cpp",
+    "cpp/simulation/effects/*.h",
+    "cpp/simulation/scene_kinematics.h",
 ]
 BOOKKEEPING = {"DenseBlocks", "RigidBlocks", "resize", "throw_singular_hinge", "add", "operator+=", "operator-=", "operator-", "operator+"}
 POINTERS = re.compile(

@@ -53,8 +53,8 @@ CHANGES = {
         ("what is out of range is returned", "in_range_ &= std::isfinite(out_[at]);", ";", STATEMENT),
     ],
     "cpp/algebra/engine/plan_cache.cpp": [
-        ("a plan in double serves in quad", "how.precision, binding.batch >= 0", "Precision::double_, binding.batch >= 0"),
-        ("a plan for one state serves for a batch", "how.precision, binding.batch >= 0", "how.precision, true"),
+        ("a plan in double serves in quad", "how.precision", "Precision::double_"),
+        ("a plan for one state serves for a batch", "binding.batch >= 0", "true"),
         (
             "plans at states for J = 0 once and for all",
             "plan.contexts[c].source->traits().hinge_diagonal != plan.hinge_diagonal[c]",
@@ -174,10 +174,6 @@ CHANGES = {
     ],
     "cpp/dynamics/methods.cpp": [
         ("conjugate gradients never refuse", "gradients_.residual < sqrt(epsilon<S>()) && gradients_.condition < widest", "true"),
-    ],
-    "cpp/simulation/trajectory.cpp": [
-        ("the step after a cut step is the cut one", "cut && abs(tried) < abs(h) ? h : tried", "tried"),
-        ("lengths of quaternions walk", "scale_quaternions<S>(equations_.model(), lengths_.data(), x_.data());", ";", STATEMENT),
     ],
     "cpp/kernels/forward_dynamics.h": [
         ("a rotor keeps all of its row", "S(J * w.inverse)", "S(1)"),

@@ -50,6 +50,29 @@ def test_the_pages_run(page, examples):
     assert result.failed == 0 and result.attempted > examples
 
 
+EFFECTS = [made for made in vars(pycraft.effects).values() if isinstance(made, type) and hasattr(made, "made_for")]
+PAGES = sorted((ROOT / "docs" / "effects").glob("*.md"))
+
+
+@pytest.mark.parametrize("page", [ROOT / "docs" / "scenes.md", *PAGES], ids=lambda page: page.stem)
+def test_the_pages_of_scenes_run(page):
+    result = doctest.testfile(str(page), module_relative=False, optionflags=doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS)
+    assert result.failed == 0 and result.attempted > 3
+
+
+def test_every_effect_has_its_page_and_its_row():
+    """With all that it is given and its source in C++; and there is no page of anything else."""
+    effects = {made.kind(): made for made in EFFECTS if made is not pycraft.effects.Effect}
+    assert sorted(effects) == [page.stem for page in PAGES] and len(effects) > 20
+    table = (ROOT / "docs" / "scenes.md").read_text()
+    for kind, made in effects.items():
+        text = (ROOT / "docs" / "effects" / f"{kind}.md").read_text()
+        assert f"| [{made.__name__}](effects/{kind}.md) |" in table and f"`pc.effects.{made.__name__}(" in text
+        missing = [field for field in made.__dataclass_fields__ if f"`{field}`" not in text]
+        assert not missing, (kind, missing)
+        assert all((ROOT / "cpp" / header).is_file() for header in re.findall(r"`(simulation/[\w/]+\.h)`", text))
+
+
 def test_help_starts_with_what_to_type():
     typed, rest = pycraft.__doc__.split("What to type::")[1].split("\n\n", 2)[1:]
     names = {}

@@ -42,6 +42,10 @@ class BoundLimits : public BoundEffect<S> {
     }
     return sum;
   }
+  // How far it is to each of them.
+  void events(const At<S>& at, S* out) override {
+    for (const Stop& s : stops_) *out++ = -beyond(at, s);
+  }
 
  private:
   struct Stop {
@@ -99,6 +103,7 @@ Declaration Limits::declaration() const {
   Declaration d;
   d.potential = d.velocities = d.work = true;
   for (const auto& [q, v] : coordinates) d.coordinates.push_back(v);
+  for (size_t i = 0; i < coordinates.size(); ++i) d.events += std::isfinite(lower[i]) + std::isfinite(upper[i]);
   return d;
 }
 

@@ -46,13 +46,13 @@ class Run {
   const IntegratorRecord& record() const { return record_of(options_.integrator); }
   static EventFunctions<S> with_those_of(Equations<S>& equations, const EventFunctions<S>& given) {
     EventFunctions<S> all;
-    const std::vector<std::string> own = equations.events();
+    const std::vector<std::string> own = equations.event_names();
     for (const std::string& name : own) all.kinds.push_back({name, 0, false, true});
     all.kinds.insert(all.kinds.end(), given.kinds.begin(), given.kinds.end());
     const int n = static_cast<int>(own.size());
     all.value = [&equations, &given, n, values = State(own.size())](int i, const S& t, const State& x) mutable {
       if (i >= n) return given.value(i - n, t, x);
-      equations.event_values(t, x, values.data());
+      equations.events(t, x, values.data());
       return values[i];
     };
     return all;

@@ -1,0 +1,103 @@
+"""Changes of scenes, their effects and their integrators by hand: as of_cpp.py has them."""
+
+STATEMENT = "statement"
+
+CHANGES = {
+    "cpp/simulation/integrators/integrate.cpp": [
+        ("the step after a cut step is the cut one", "cut && abs(tried) < abs(h) ? h : tried", "tried"),
+        ("lengths of quaternions walk", "scale_quaternions<S>(equations_.model(), lengths_.data(), x_.data());", ";", STATEMENT),
+        ("a sample is taken a piece too late", "std::min(stop, times_[i])", "times_[i]"),
+        ("a stepper keeps its slope over a sample", "begun && equations_.stops()", "false"),
+        ("implicit terms outlive their run", "equations.set_step(S(0));", ";", STATEMENT),
+    ],
+    "cpp/simulation/integrators/steps_on_the_group.h": [
+        ("implicit steps are explicit", "equations.set_step(h);", ";", STATEMENT),
+        ("stages are all at the step's beginning", "t + part[stage]", "t"),
+    ],
+    "cpp/simulation/scene_equations.h": [
+        ("works are seen by tolerances", "std::ldexp(1.0, 100)", "1.0"),
+        ("prescribed coordinates drift", "scene_.effects().prescribe(t, x.data(), x.data() + nq(), nullptr);", ";", STATEMENT),
+        (
+            "a controller is not asked at the start",
+            "if (stops()) scene_.effects().sample(t, own == nullptr, x.data(), x.data() + nq(), x.data() + nq() + nv());",
+            ";",
+            STATEMENT,
+        ),
+    ],
+    "cpp/simulation/scene_forces.cpp": [
+        (
+            "what comes from outside is not looked at",
+            "refuse_unless_finite(effect);\n  for (int j : effect.declared.coordinates) tau_[j] += alone_tau_[j];",
+            "for (int j : effect.declared.coordinates) tau_[j] += alone_tau_[j];",
+            STATEMENT,
+        ),
+        ("wrenches do no work", "power += dot(alone_wrench_[k], at_.twist[k])", "power"),
+        ("samples fall a hair late", "k * T - t < 1e-9 * T", "false"),
+        ("wrenches pile up", "for (int k : wrenched_) wrench_[k] = Vector6<S>::zero();", ";", STATEMENT),
+    ],
+    "cpp/simulation/compiled_scene.cpp": [
+        ("what prescribed motion needs counts other forces twice", "s.needed_[j] = s.vdot_[j] - s.needed_[j]", "s.needed_[j] = s.vdot_[j]"),
+        ("rotors have no energy", "*kinetic += S(h.inertia) * moving[h.coordinate] * moving[h.coordinate] / S(2);", ";", STATEMENT),
+        ("at rest everything acts", "(!moving && e->declared.only_in_motion)", "false"),
+        ("h² K is h K", "h * (S(term.damping) + h * S(term.stiffness))", "h * (S(term.damping) + S(term.stiffness))"),
+        ("a second gravity is the first", "gravity_ = gravity_ + e->declared.gravity", "gravity_ = e->declared.gravity"),
+    ],
+    "cpp/simulation/scene.cpp": [
+        ("a coordinate is prescribed twice", "if (on) refuse_conflicts(called, *effect);", ";", STATEMENT),
+        ("what is off is in the way", "!other.on || other.name == name", "other.name == name"),
+    ],
+    "cpp/simulation/selection.cpp": [
+        ("a coordinate counts twice", "if (!there[j]) there[j] = 1, found.push_back(j);", "found.push_back(j);", STATEMENT),
+        ("a question mark is a letter", "if (pattern[at] == '?') return ++at, true;", ";", STATEMENT),
+    ],
+    "cpp/simulation/function_of_time.cpp": [
+        ("tables go on beyond their ends", "before || after ? S(0) : S(1)", "S(1)"),
+        ("curvatures are half", "moving * S(2) * half", "moving * half"),
+    ],
+    "cpp/simulation/effects/bushing.cpp": [
+        ("a is pushed where b is", "moment + cross(x.apart, force)", "moment"),
+        ("rotation vectors turn as angular velocities", "moment_along_rotation_vector(x.xi.angular, g.angular)", "g.angular"),
+    ],
+    "cpp/simulation/effects/drive_limits.h": [
+        ("a speed limit brakes", "!(force * v > S(0))", "false"),
+    ],
+    "cpp/simulation/effects/limits.cpp": [
+        ("stops pull", "factor > S(0) ? factor : S(0)", "factor"),
+        ("what a stop stores counts as work", "(pushed(at, s) - S(1))", "pushed(at, s)"),
+    ],
+    "cpp/simulation/effects/node_damper.cpp": [
+        (
+            "dampers work across, too",
+            "(c_ * dot(along, b_.velocity(at) - a_.velocity(at))) * along",
+            "c_ * (b_.velocity(at) - a_.velocity(at))",
+        ),
+    ],
+    "cpp/simulation/effects/prescribed_motion.cpp": [
+        ("the length of a quaternion counts", "k * vector_part(x, z) - (k * along) * omega", "k * vector_part(x, z)"),
+        ("a position is in the body's axes", "cross(omega, u)", "S(0) * u"),
+    ],
+    "cpp/simulation/effects/gravity_gradient.cpp": [
+        ("a gradient is a couple alone", "(S(1.5) * mu_ / (cube * length))", "S(0)"),
+    ],
+    "cpp/simulation/effects/motor.cpp": [
+        ("a gear does not divide the speed", "n / S(of.numbers.no_load_speed[i])", "S(1) / S(of.numbers.no_load_speed[i])"),
+        ("a rotor is felt without its gear", "n * n * numbers.rotor_inertia[i]", "numbers.rotor_inertia[i]"),
+    ],
+    "cpp/recursions/prescribed_hinges.h": [
+        ("prescribed accelerations do not reach other bodies", "points.a[k] = points.a[k] + rates_[j] * rows_[j];", ";", STATEMENT),
+        ("a rotor that is driven needs nothing", "whole_->rotor_inertia[j] * rates_[j]", "S(0)"),
+    ],
+    "cpp/dynamics/hybrid_dynamics.cpp": [
+        ("what is all prescribed is solved for", "all_prescribed(model, terms) ? Given::accelerations : Given::both", "Given::both"),
+    ],
+    "cpp/kernels/prescribed_links.h": [
+        ("a screw that is driven does not travel", "slide[Kind::row] = S(link.travel) * x;", ";", STATEMENT),
+        ("a rotor that is driven by kernels needs nothing", "w.inverse = S(link.J) * x;", "w.inverse = S(0);", STATEMENT),
+        (
+            "a free body that is driven is in its own axes",
+            "rotation.to_parent(m.sliding + Vector3<S>{given(3), given(4), given(5)})",
+            "m.sliding + Vector3<S>{given(3), given(4), given(5)}",
+        ),
+        ("z⁺ forgets P a'", "P.n = P.n + P.A * m.turning, P.f = P.f + transpose_times(P.B, m.turning);", ";", STATEMENT),
+    ],
+}
