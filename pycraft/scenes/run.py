@@ -180,6 +180,46 @@ class Run(Motion):
 
         return plot(self, what, coordinates)
 
+    def animate(self, output: Any = None, *, fps: float = 25.0, speed: float = 1.0, trace: str | None = None, **options: Any) -> Any:
+        """The run as a moving stick figure, by Matplotlib alone.
+
+        Parameters
+        ----------
+        output : path that ends in ".html", ".gif" or ".mp4" (with ffmpeg), where it is written
+        fps : frames a second
+        speed : seconds of the run in a second of the film
+        trace : a body or node whose origin leaves its way behind
+        options : as `Multibody.plot` takes them: view, com, names, legend, shadow, ax
+
+        Returns
+        -------
+        RunAnimation
+            A notebook shows it with buttons to play it; `save` writes it, too. A run that kept no steps (dense=False) shows the last
+            state that was asked for before each frame.
+
+        Raises
+        ------
+        EvaluationError
+            Too many frames, another ending, a view that does not fit.
+        ModelError
+            A trace of what is not there.
+        OSError
+            An output that cannot be written, before a frame is drawn.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> pc.mechanisms.double_pendulum().simulate(0.2).animate(trace="lower")
+        <animation of 'double pendulum': 6 frames, 0 to 0.2 s>
+        """
+        from .run_animation import RunAnimation, checked_film
+
+        target = None if output is None else checked_film(output)
+        film = RunAnimation(self, fps, speed, trace, options)
+        if target is not None:
+            film.save(target)
+        return film
+
     # ------------------------------------------------------------------ copies
     def __getstate__(self) -> dict[str, Any]:
         if self._calls is not None and self._steps is not None:

@@ -13,6 +13,7 @@ from .. import _core
 from ..models.multibody import Multibody
 from .coordinate_units import coordinate_units
 from .events import EventStates
+from .file_targets import writable_target
 from .run_tables import HOLDS, columns_of, variables_of
 
 FORMAT = "pycraft run 1"
@@ -22,23 +23,9 @@ ENDINGS = (".nc", ".parquet", ".csv")
 def checked_output(path: Any) -> Path:
     """A path that a run can be written to. EvaluationError for an ending that is none of `ENDINGS`, OSError where it cannot be written,
     ImportError where a package is missing: before the run, not after it."""
-    target = Path(path)
-    if target.suffix not in ENDINGS:
-        raise _core.EvaluationError(f"output {str(path)!r}: a run is written to a file that ends in {', '.join(ENDINGS)}")
-    if not target.parent.is_dir():
-        raise FileNotFoundError(f"output {str(path)!r}: there is no folder {str(target.parent)!r}")
-    if target.is_dir():
-        raise IsADirectoryError(f"output {str(path)!r} is a folder")
+    target = writable_target(path, ENDINGS, "a run")
     if target.suffix == ".parquet":
         _pyarrow()
-    there = target.exists()
-    try:
-        with target.open("ab"):
-            pass
-    except OSError as error:
-        raise type(error)(f"output {str(path)!r} cannot be written: {error.strerror}") from None
-    if not there:
-        target.unlink()
     return target
 
 
