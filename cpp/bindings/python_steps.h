@@ -25,11 +25,12 @@ struct PythonEvents {
   double value(int event, double t, const std::vector<double>& x) const;
   template <class S>
   EventFunctions<S> functions() const {
-    return {kinds, [this](int event, const S& t, const std::vector<S>& x) {
-              std::vector<double> numbers;
-              for (const S& y : x) numbers.push_back(to_double(y));
-              return S(value(event, to_double(t), numbers));
-            }};
+    const auto value_of = [this](int event, const S& t, const std::vector<S>& x) {
+      std::vector<double> numbers;
+      for (const S& y : x) numbers.push_back(to_double(y));
+      return S(value(event, to_double(t), numbers));
+    };
+    return {kinds, value_of, nullptr};
   }
   std::vector<EventKind> kinds;
   std::vector<std::shared_ptr<py::object>> calls;

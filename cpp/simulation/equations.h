@@ -7,7 +7,7 @@
 //   LinearizedEquations     v̇ and its derivatives
 //   VariationalEquations    momenta, and the forces that change them
 //
-// simulation/scene_equations.h has those of a scene, trajectory.h those of any accelerations.
+// simulation/scene_equations.h has those of a scene.
 #pragma once
 
 #include <Eigen/Core>

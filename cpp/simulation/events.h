@@ -27,6 +27,7 @@ template <class S>
 struct EventFunctions {
   std::vector<EventKind> kinds;
   std::function<S(int event, const S& t, const std::vector<S>& x)> value;
+  std::function<void(const S& t, const std::vector<S>& x, S* out)> all;  // values of all, where that is less than one by one
 };
 
 template <class S>
@@ -65,12 +66,13 @@ template <class S>
 class EventWatch {
  public:
   using State = std::vector<S>;
-  explicit EventWatch(const EventFunctions<S>& functions) : functions_(functions), signs_(functions.kinds.size(), 0) {}
+  explicit EventWatch(const EventFunctions<S>& functions) : functions_(functions), signs_(functions.kinds.size(), 0), values_(functions.kinds.size()) {}
 
   bool any() const { return !signs_.empty(); }
   // Signs that were kept, or those at the start.
   void begin(const S& t, const State& x, const std::vector<int>* kept) {
-    for (size_t i = 0; i < signs_.size(); ++i) signs_[i] = kept && i < kept->size() ? (*kept)[i] : sign(functions_.value(static_cast<int>(i), t, x));
+    if (any()) evaluate(t, x);
+    for (size_t i = 0; i < signs_.size(); ++i) signs_[i] = kept && i < kept->size() ? (*kept)[i] : sign(values_[i]);
   }
   const std::vector<int>& signs() const { return signs_; }
 
@@ -78,9 +80,10 @@ class EventWatch {
   template <class Within>
   std::vector<Crossing<S>> in_step(const S& t0, const State& x0, const S& t1, const State& x1, Within within) {
     std::vector<Crossing<S>> found;
+    evaluate(t1, x1);
     for (size_t i = 0; i < signs_.size(); ++i) {
       const int event = static_cast<int>(i), direction = functions_.kinds[i].direction;
-      const S g1 = functions_.value(event, t1, x1);
+      const S g1 = values_[i];
       if (signs_[i] == 0) signs_[i] = sign(g1);
       if (signs_[i] == 0 || sign(g1) == signs_[i]) continue;
       const bool counts = direction == 0 || direction == -signs_[i];
@@ -108,8 +111,13 @@ class EventWatch {
 
  private:
   static int sign(const S& g) { return g > S(0) ? 1 : g < S(0) ? -1 : 0; }
+  void evaluate(const S& t, const State& x) {
+    if (functions_.all) return functions_.all(t, x, values_.data());
+    for (size_t i = 0; i < values_.size(); ++i) values_[i] = functions_.value(static_cast<int>(i), t, x);
+  }
   const EventFunctions<S>& functions_;
   std::vector<int> signs_;
+  State values_;
 };
 
 }  // namespace pycraft

@@ -107,7 +107,9 @@ def checked_film(path: Any) -> Path:
         from matplotlib.animation import FFMpegWriter
 
         if not FFMpegWriter.isAvailable():
-            raise _core.EvaluationError(f"output {str(path)!r}: '.mp4' needs ffmpeg, which is not installed; '.html' and '.gif' need nothing")
+            raise _core.EvaluationError(
+                f"output {str(path)!r}: '.mp4' needs ffmpeg, which is not installed; '.html' and '.gif' need nothing"
+            )
     return target
 
 

@@ -136,3 +136,31 @@ def test_errors_in_an_event_come_through():
 
     with pytest.raises(RuntimeError, match="mine"):
         pc.mechanisms.pendulum().simulate(0.2, events=wrong)
+
+
+# Where effects change their law ---------------------------------------------------------------------------------------
+
+
+def stopped(stiffness=1e4, end=0.5):
+    """A block of 1 kg that flies at 1 m/s against a stop at `end`, and back after half a period of its spring."""
+    model = pc.Multibody("block")
+    model.add_body("block", hinge="slider", axis=(1, 0, 0), mass=1.0, limits=(-end, end))
+    return pc.Scene(model).add(E.Limits(stiffness)), end, end + np.pi / np.sqrt(stiffness)
+
+
+@pytest.mark.parametrize("integrator", [name for name in EVERY if FIXED.get(name, 4) == 4])
+def test_a_step_ends_where_a_stop_is_met_and_left(integrator):
+    scene, met, left = stopped()
+    run = scene.simulate(1.2, [0.0], [1.0], **options_of(integrator) | ({"step": 1e-3} if integrator in FIXED else {}))
+    assert run.events["limits"].t == pytest.approx([met, left], abs=1e-5) and run.ended_by is None
+    assert run.events["limits"].q == pytest.approx(np.array([[0.5], [0.5]]), abs=1e-12)
+    assert all(np.abs(run.t - t).min() == 0 for t in run.events["limits"].t)
+    assert run.q[-1, 0] == pytest.approx(0.5 - (1.2 - left), abs=1e-5) and np.ptp(run.balance) < 1e-5
+
+
+def test_a_users_event_beside_them_keeps_its_place():
+    """The stop ends the step; what a user looks for in the same step is found as well, in order."""
+    scene, *_ = stopped()
+    seen = scene.simulate(0.6, [0.03], [1.0], integrator="rk4", step=0.1, events={"before": lambda t, s: s.q[0] - 0.45})
+    assert seen.events["before"].t[0] == pytest.approx(0.42, abs=1e-12) and seen.events["limits"].t[0] == pytest.approx(0.47, abs=1e-12)
+    assert list(seen.events) == ["limits", "before"]

@@ -55,6 +55,10 @@ class Run {
       equations.events(t, x, values.data());
       return values[i];
     };
+    all.all = [&equations, &given, n](const S& t, const State& x, S* out) {
+      if (n > 0) equations.events(t, x, out);
+      for (size_t i = 0; i < given.kinds.size(); ++i) out[n + i] = given.value(static_cast<int>(i), t, x);
+    };
     return all;
   }
 
