@@ -64,6 +64,7 @@ if _TYPE_CHECKING:
     from .accuracy.tables.table import accuracy
     from .accuracy.tables.work_precision import work_precision
     from .closed_forms import symbolic
+    from .ensembles import load_sweep, samples, sweep
     from .identities import UndecidedError, check, truth
     from .models import robots
     from .models.loaders import load
@@ -77,6 +78,7 @@ _LATER = {
     "accuracy.tables.table": ("accuracy",),
     "accuracy.tables.work_precision": ("work_precision",),
     "closed_forms": ("symbolic",),
+    "ensembles": ("load_sweep", "samples", "sweep"),
     "identities": ("UndecidedError", "check", "truth"),
     "models.loaders": ("load",),
     "models.robots": ("robots",),
@@ -151,6 +153,7 @@ __all__ = [
     "kalman",
     "load",
     "load_run",
+    "load_sweep",
     "mechanisms",
     "models",
     "parse",
@@ -158,7 +161,9 @@ __all__ = [
     "prove_derivative",
     "repair",
     "robots",
+    "samples",
     "sko_model",
+    "sweep",
     "symbolic",
     "to_sympy",
     "tree",

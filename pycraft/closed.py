@@ -17,14 +17,15 @@ class Closed:
 
     def __setattr__(self, name: str, value: Any) -> None:
         kind = type(self)
-        if not name.startswith("_") and kind.__module__.startswith("pycraft.") and not _settable(kind, name):
+        if not name.startswith("_") and kind.__module__.startswith("pycraft.") and not settable(kind, name):
             names = {*dir(kind), *getattr(kind, "__dataclass_fields__", ())}
-            known = sorted(n for n in names if not n.startswith("_") and _settable(kind, n))
+            known = sorted(n for n in names if not n.startswith("_") and settable(kind, n))
             raise UnknownAttributeError(f"{_called(self)} takes no {name!r}{_remedy(kind, name, known)}")
         super().__setattr__(name, value)
 
 
-def _settable(kind: type, name: str) -> bool:
+def settable(kind: type, name: str) -> bool:
+    """Whether objects of a kind have a value of this name that can be set."""
     found = getattr(kind, name, None)
     return isinstance(found, property) and found.fset is not None or name in getattr(kind, "__dataclass_fields__", ())
 

@@ -34,12 +34,10 @@ class ProgressBar:
             self._bar.update(self._task, completed=t - self._start, rate=f"{rate:.3g} s/s", at=at)
 
     def _open(self) -> None:
-        from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-        console = Console(stderr=True)
-        self._wanted = console.is_terminal or console.is_jupyter
-        if not self._wanted:
+        if (console := visible_console()) is None:
+            self._wanted = False
             return
         columns = [TextColumn("{task.fields[at]}"), BarColumn(), TextColumn("{task.fields[rate]}"), TimeRemainingColumn()]
         self._bar = Progress(*columns, console=console, transient=True)
@@ -49,3 +47,11 @@ class ProgressBar:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None) -> None:
         if self._bar is not None:
             self._bar.stop()
+
+
+def visible_console() -> Any:
+    """Where a bar is seen: standard error, if it is a terminal or a notebook; else None."""
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    return console if console.is_terminal or console.is_jupyter else None

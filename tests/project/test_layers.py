@@ -238,10 +238,11 @@ RESTS_ON = {
     "sympy_bridge": ["proofs"],
     "accuracy": ["identities", "peers", "tidy"],
     "scenes": ["view"],
+    "ensembles": ["scenes"],
     "compiled": ["recursions"],
     "view": ["accuracy"],
     "face": ["accuracy", "compiled", "identities", "view"],
-    "": ["face", "kalman", "closed_forms", "scenes", "sympy_bridge"],  # pycraft itself
+    "": ["face", "kalman", "closed_forms", "ensembles", "sympy_bridge"],  # pycraft itself
     "cli": [""],
 }
 
