@@ -1,7 +1,7 @@
 // Forward dynamics of one state in numbers wider than doubles, whose arithmetic is a library's or the old coprocessor's.
 #define PYCRAFT_INSTRUCTION_SET wide
 #include "numerics/scalar.h"
-#include "kernels/sine_cosine.h"
+#include "lanes/sine_cosine.h"
 
 #if defined(PYCRAFT_FLOAT128)
 namespace pycraft::kernels::wide {

@@ -5,7 +5,7 @@
 // the weights. A sum over columns is one of four sums, of columns 0, 4, 8, ..., of 1, 5, 9, ..., and so on, whatever takes them.
 #pragma once
 
-#include "kernels/lanes.h"
+#include "lanes/lanes.h"
 
 namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET {
 
