@@ -203,6 +203,8 @@ void LinkModel<T>::take(const std::vector<Rest>& rest) {
     const Link<double>& d = link.shape;
     Link<T> own{d.step, d.parent, d.q, d.v, d.end, d.branches, d.rotor, d.oblique, d.prescribed, d.multi, d.slot, T(d.sign)};
     put(link.pose.R.m, own.R), put(link.pose.p.v, own.p);
+    if constexpr (std::is_same_v<T, float>)  // squares of what rounding left of zeros are denormal numbers, which cost a hundred times as much
+      for (T& x : own.R) x = std::abs(x) < T(1e-16) ? T(0) : x;
     own.mass = static_cast<T>(link.inertia.mass);
     put(link.inertia.moment.v, own.moment), put(link.inertia.rotational.s, own.rotational);
     own.J = T(d.J), own.turn = T(d.turn), own.travel = T(d.travel);
