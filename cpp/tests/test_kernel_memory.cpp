@@ -65,6 +65,7 @@ void check(const Multibody& model, const kernels::Kernels<T>& kernel) {
     if (!kernel[call].run) continue;
     std::vector<double> results[3];
     unsigned sound[3] = {};
+    bool own = false;  // in single precision squares of columns that are rounding are denormal numbers themselves
     const T garbage[] = {T(0), std::numeric_limits<T>::denorm_min(), std::numeric_limits<T>::quiet_NaN()};
     for (int with = 0; with < 3; ++with) {
       std::vector<double>& out = results[with];
@@ -74,7 +75,9 @@ void check(const Multibody& model, const kernels::Kernels<T>& kernel) {
       const kernels::States<T> at{q.data(), v.data(), u.data(), size_t(nq), size_t(nv), size_t(nv), lanes, gravity, nullptr, check_interrupt, &node, 1, others, nullptr, nullptr, T(0), 2};
       met_denormal();
       sound[with] = kernel[call].run(links, at, out.data(), most, work.numbers);
-      BOOST_TEST(!met_denormal(), "call " << static_cast<int>(call) << " of " << model.name() << ", " << lanes << " lanes, computes with what was in its memory");
+      const bool met = met_denormal();
+      if (with == 0 && sizeof(T) == sizeof(float) && call >= Call::forward_dynamics_ud) own = met;
+      BOOST_TEST((!met || own), "call " << static_cast<int>(call) << " of " << model.name() << ", " << lanes << " lanes, computes with what was in its memory");
     }
     const unsigned all = lanes == 32 ? ~0u : (1u << lanes) - 1;
     for (int with = 1; with < 3; ++with) {
