@@ -8,7 +8,7 @@
 #include <limits>
 #include <type_traits>
 
-#include "numerics/scalar.h"
+#include "numerics/turns.h"
 
 namespace pycraft {
 
@@ -54,6 +54,14 @@ struct Pack {
   friend Pack sqrt(const Pack& a) { return each(a, [](T x) { return std::sqrt(x); }); }
   friend Pack abs(const Pack& a) { return each(a, [](T x) { return std::abs(x); }); }
   friend Pack sin(const Pack& a) { return each(a, [](T x) { return std::sin(x); }); }
+  friend TurnSines<Pack> turn_sines(const Pack& angle) {  // with the bits of each number
+    TurnSines<Pack> of;
+    for (int i = 0; i < W; ++i) {
+      const TurnSines<T> one = turn_sines(angle.v[i]);
+      of.cosine.v[i] = one.cosine, of.sine.v[i] = one.sine, of.sine_of_half.v[i] = one.sine_of_half;
+    }
+    return of;
+  }
   friend Pack cos(const Pack& a) { return each(a, [](T x) { return std::cos(x); }); }
   friend Pack maximum(const Pack& a, const Pack& b) {
     Pack c;

@@ -48,7 +48,12 @@ def test_the_plan_and_the_bits_that_it_would_have_had(name):
             for found, wanted in zip(values(e.at(q, v, **how), x), values(fresh, x), strict=True):
                 np.testing.assert_array_equal(found, wanted)
             for request in ("apply", "dense", "trace"):
-                assert str(e.at(q, v, **how).plan(request)) == str(fresh.plan(request))
+                assert said(e.at(q, v, **how), request) == said(fresh, request)
+
+
+def said(bound, request):
+    """A plan as text, but for what its last run did in packs: a plan that served before has a program."""
+    return [line for line in str(bound.plan(request)).splitlines() if "in the last run: packs" not in line]
 
 
 def test_a_state_within_stays():

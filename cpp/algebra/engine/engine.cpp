@@ -125,7 +125,8 @@ ExecutionPool::Packed ExecutionPool::run_packs(Run<S>& run, const Inputs& inputs
   const size_t size = size_t(taped.rows) * taped.columns;
   for (size_t i = done.from * size; expanded && i < run.states() * size; ++i) expanded->expansions[i] = {run.out()[i]};
   done.counts = taped.counts.times(run.states() - done.from - static_cast<int>(done.left.size()));
-  done.note = "packs: " + std::to_string(run.states() - done.from) + " states, " + std::to_string(taped.instructions) + " instructions for " +
+  if (done.from < run.states())
+    done.note = "packs: " + std::to_string(run.states() - done.from) + " states, " + std::to_string(taped.instructions) + " instructions for " +
               std::to_string(kernels::lane_set().functions.width) + " at a time";
   if (!done.left.empty()) done.note += "; " + std::to_string(done.left.size()) + " of them by themselves";
   done.from = run.states(), done.shaped = true;
