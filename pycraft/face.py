@@ -49,6 +49,13 @@ def compile_expression(*arguments: Any, **options: Any) -> Any:
     return compiled(*arguments, **options)
 
 
+def plot_model(*arguments: Any, **options: Any) -> Any:
+    """`Multibody.plot`."""
+    from .view import plot_model as plot
+
+    return plot(*arguments, **options)
+
+
 def check_model(*arguments: Any, **options: Any) -> Any:
     """`OperatorSet.check`."""
     from .identities.checker import check_model as check
@@ -71,6 +78,7 @@ def attach() -> None:
         explain=operator_set.explain,
         model_from_description=Multibody.from_description,
         operator_from_nodes=operator_set.operator_from_nodes,
+        plot_model=plot_model,
         scalar_at=operator_set.scalar_at,
         scalar_gradient=operator_set.scalar_gradient,
         shared_out=shared_out,

@@ -36,6 +36,7 @@ template <class S>
 struct ArticulatedRate {
   Matrix3<S> n, f;      // K
   Matrix3<S> kappa[2];  // rows of κ, of up to six coordinates; of one, the first
+  Spatial<S> gain;      // G of one coordinate
 };
 
 template <class S>
@@ -51,7 +52,7 @@ struct ForwardDerivativeWork {
   template <class T>
   static size_t columns(const Links<T>& links) {
     const size_t row = row_of(links.nv);
-    return row * (ResponseColumns<S>::rows * (1 + links.slots) + OwnColumns<S>::rows + (in_place<S>(links.nv) ? 0 : size_t(3) * links.nv)) + size_t(18) * links.nv;
+    return row * (ResponseColumns<S>::rows * (1 + links.slots) + OwnColumns<S>::rows + (in_place<S>(links.nv) ? 0 : size_t(3) * links.nv)) + row_of(18 * links.nv);
   }
   template <class T>
   static size_t size(const Links<T>& links) {
@@ -62,7 +63,7 @@ struct ForwardDerivativeWork {
   ForwardDerivativeWork(const Links<T>& links, T* work) : z(reinterpret_cast<S*>(work)), forward(links, reinterpret_cast<T*>(z + columns(links))) {
     const size_t row = row_of(links.nv);
     own = z + row * ResponseColumns<S>::rows, alpha = own + row * OwnColumns<S>::rows, nu = alpha + row * ResponseColumns<S>::rows * links.slots;
-    rows = nu + size_t(18) * links.nv;
+    rows = nu + row_of(18 * links.nv);
     outboard = reinterpret_cast<Inertia<S>*>(reinterpret_cast<char*>(z + columns(links)) + ForwardWork<S>::size(links));
     instant = reinterpret_cast<Instant<S>*>(outboard + links.count);
     carried = reinterpret_cast<Carrying<S>*>(instant + links.count);
@@ -81,16 +82,22 @@ template <class S>
   for (int r = 0; r < 3; ++r) A(r, j) += x[r];
 }
 
-// A hinge of one coordinate in the base's axes, with its sign.
+// G of a hinge of one coordinate in the base's axes, with its sign.
 template <class S>
-struct OneGain {
-  Spatial<S> gain;
-  S inverse;
-  OneGain(const LinkOf<S>& link, const ForwardLink<S>& w, const Matrix3<S>& axes) : inverse(w.inverse) {
-    const S by = S(link.sign) * w.inverse;
-    gain = {axes * (by * w.angular), axes * (by * w.linear)};
+[[gnu::always_inline]] inline Spatial<S> one_gain(const LinkOf<S>& link, const ForwardLink<S>& w, const Matrix3<S>& axes) {
+  const S by = S(link.sign) * w.inverse;
+  return {axes * (by * w.angular), axes * (by * w.linear)};
+}
+
+// The columns of B.
+template <class S>
+[[gnu::always_inline]] inline void start_rate(const Momenta<S>& c, ArticulatedRate<S>& K) {
+  for (int i = 0; i < 3; ++i) {
+    const int j = (i + 1) % 3, k = (i + 2) % 3;
+    K.n(i, i) = c.rate(i, i), K.n(i, j) = c.rate(i, j) + c.n[k], K.n(j, i) = c.rate(i, j) - c.n[k];
+    K.f(i, i) = S(0), K.f(i, j) = S(2) * c.f[k], K.f(j, i) = S(-2) * c.f[k];
   }
-};
+}
 
 // Forward dynamics, and how links stand and move at it.
 template <class S, class T>
@@ -119,12 +126,7 @@ inline typename S::Bits accelerate_all(const Links<T>& links, const States<T>& a
     });
     const Carrying<S> c = carrying<S>(link, w.instant[k]);
     w.carried[k] = c;
-    for (int j = 0; j < 3; ++j) {
-      Vector3<S> unit = Vector3<S>::zero();
-      unit[j] = S(1);
-      const Spatial<S> of = rate_times(c, unit);
-      for (int r = 0; r < 3; ++r) w.rate[k].n(r, j) = of.angular[r], w.rate[k].f(r, j) = of.linear[r];
-    }
+    start_rate(c, w.rate[k]);
   }
   return sound;
 }
@@ -132,14 +134,15 @@ inline typename S::Bits accelerate_all(const Links<T>& links, const States<T>& a
 // κ, and K⁺ in the place of K, about the link's origin.
 template <class Kind, class S>
 [[gnu::always_inline]] inline void project_rate(const LinkOf<S>& link, const ForwardLink<S>& w, const ForwardMultiple<S>& multiple, const Matrix3<S>& axes, const Direction<S>& own, ArticulatedRate<S>& K) {
+  Spatial<S> gain;
+  if constexpr (Kind::nv == 1) K.gain = gain = one_gain(link, w, axes);
   for (int j = 0; j < 3; ++j) {
     const Vector3<S> n = column(K.n, j), f = column(K.f, j);
     if constexpr (Kind::nv == 1) {
-      const OneGain<S> hinge(link, w, axes);
       S e = dot(own.s, n);
       if constexpr (!Kind::pin) e += dot(own.x, f);
-      K.kappa[0](0, j) = e * hinge.inverse;
-      add_column(K.n, j, S(-e) * hinge.gain.angular), add_column(K.f, j, S(-e) * hinge.gain.linear);
+      K.kappa[0](0, j) = e * w.inverse;
+      add_column(K.n, j, S(-e) * gain.angular), add_column(K.f, j, S(-e) * gain.linear);
     } else {
       const Vector3<S> turn = transpose_times(axes, n), along = transpose_times(axes, f);
       S e[6] = {turn[0], turn[1], turn[2], along[0], along[1], along[2]};
@@ -167,8 +170,7 @@ template <class Kind, class S>
     e[i] = S(1);
     Spatial<S> m;  // of a unit force along the coordinate
     if constexpr (Kind::nv == 1) {
-      const OneGain<S> hinge(link, w, axes);
-      m = hinge.gain, e[0] = hinge.inverse;
+      m = K.gain, e[0] = w.inverse;
     } else {
       m = {axes * Vector3<S>{e[0], e[1], e[2]}, axes * Vector3<S>{e[3], e[4], e[5]}};
       if constexpr (Kind::nv == 3) m.linear = axes * Vector3<S>{multiple.gain(i, 0), multiple.gain(i, 1), multiple.gain(i, 2)};
@@ -187,7 +189,7 @@ template <class Kind, class S>
       const Vector3<S> a = y.linear + cross(l, y.angular);
       return Spatial<S>{K.n * b + P->A * y.angular + P->B * a, K.f * b + transpose_times(P->B, y.angular) + P->C * a};
     };
-    const Spatial<S> q = pushed(k.psi, k.psi_rate) + inboard(l, turned_force(k, carried)), v = pushed(k.s, k.chi), unit = inboard(l, m);
+    const Spatial<S> q = pushed(k.psi, k.psi_rate) + inboard(l, turned_force<Kind>(k, carried)), v = pushed(k.s, k.chi), unit = inboard(l, m);
     z.qn.set(c, q.angular), z.qf.set(c, q.linear), z.vn.set(c, v.angular), z.vf.set(c, v.linear), z.mn.set(c, unit.angular), z.mf.set(c, unit.linear);
   }
 }
@@ -222,12 +224,8 @@ inline void start_all(const Links<T>& links, const States<T>& at, const ForwardD
     });
     if (!above) continue;
     ArticulatedRate<S>& parent = w.rate[link.parent];
-    for (int j = 0; j < 3; ++j) {
-      Vector3<S> unit = Vector3<S>::zero();
-      unit[j] = S(1);
-      const Vector3<S> left = cross(d, unit);
-      add_column(parent.n, j, column(K.n, j) + P->B * left), add_column(parent.f, j, column(K.f, j) + P->C * left);
-    }
+    for (int i = 0; i < 9; ++i) parent.n.m[i] += K.n.m[i], parent.f.m[i] += K.f.m[i];
+    add_times_skew(P->B, d, parent.n), add_times_skew(P->C, d, parent.f);
     Carrying<S>&carries = w.carried[link.parent], &own = w.carried[k];
     carries.torque = carries.torque + own.torque + cross(l, own.force), carries.force = carries.force + own.force;
   }

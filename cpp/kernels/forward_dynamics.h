@@ -55,7 +55,7 @@ template <int K, bool rotor, bool forces, class S>
 }
 
 // P⁺ and ε's part of z⁺ of a slider or a screw.
-template <class S>
+template <bool forces, class S>
 [[gnu::always_inline]] inline void project_out(const LinkOf<S>& link, const ForwardLink<S>& __restrict w, Inertia<S>& __restrict P) {
   const Vector3<S> turned = w.inverse * w.angular, moved = w.inverse * w.linear;
   for (int r = 0; r < 3; ++r)
@@ -63,7 +63,7 @@ template <class S>
       if (k >= r) P.A(r, k) -= turned[r] * w.angular[k], P.C(r, k) -= moved[r] * w.linear[k];
       P.B(r, k) -= turned[r] * w.linear[k];
     }
-  P.n = P.n + w.innovation * turned, P.f = P.f + w.innovation * moved;
+  if constexpr (forces) P.n = P.n + w.innovation * turned, P.f = P.f + w.innovation * moved;
   if (link.turn == 0 && !link.rotor)
     for (int r = 0; r < 3; ++r) P.C(r, 2) = P.B(r, 2) = S(0);
 }
@@ -157,7 +157,7 @@ template <class Kind, bool rotor, bool forces, class S, class T>
     if constexpr (Kind::pin) {
       project_pin<K, rotor, forces>(S(J * w.inverse), m.turning, tau, w, P);
     } else {
-      project_out(link, w, P);
+      project_out<forces>(link, w, P);
       if constexpr (forces) P.n = P.n + P.A * m.turning, P.f = P.f + transpose_times(P.B, m.turning);
     }
     rotation.template turn<zero>(P);

@@ -33,12 +33,11 @@ template <class S>
 // The columns of coordinates outboard of a link: ν, and z about the parent's origin.
 template <class Kind, class S>
 [[gnu::always_inline]] inline void respond(const LinkOf<S>& link, const ForwardLink<S>& w, const ForwardMultiple<S>& multiple, const Lying<S>& lying, const Direction<S>& own,
-                                           const ResponseColumns<S>& z, const ResponseRows<S>& rows) {
+                                           const Spatial<S>& hinge, const ResponseColumns<S>& z, const ResponseRows<S>& rows) {
   using V = Vector3<Block<S>>;
   const V l = in_all(link.parent < 0 ? Vector3<S>::zero() : lying.arm), s = in_all(own.s), slide = in_all(own.x);
-  const OneGain<S> hinge(link, w, lying.axes);
-  const V turn = in_all(hinge.gain.angular), pull = in_all(hinge.gain.linear);
-  const Block<S> inverse = in_all(hinge.inverse);
+  const V turn = in_all(hinge.angular), pull = in_all(hinge.linear);
+  const Block<S> inverse = in_all(w.inverse);
   const Matrix3<Block<S>> axes = in_all(lying.axes), gain = in_all(multiple.gain);
   const ResponseRows<S> to = rows.of(link.v);
   each_block<S>(link.v + Kind::nv, link.end, [&](int c, const Block<S>& its) __attribute__((always_inline)) {
@@ -91,11 +90,9 @@ struct Finisher {
   Matrix3<B> axes, gain, above, below;
   int stride, room;
 
-  Finisher(const LinkOf<S>& link, const ForwardLink<S>& w, const ForwardMultiple<S>& multiple, const Instant<S>& instant, const Direction<S>& own, const ArticulatedRate<S>& K, const ResponseRows<S>& rows)
-      : l(in_all(link.parent < 0 ? Vector3<S>::zero() : instant.lying.arm)), d(in_all(S(2) * instant.drift)), s(in_all(own.s)), slide(in_all(own.x)), axes(in_all(instant.lying.axes)),
+  Finisher(const LinkOf<S>& link, const ForwardMultiple<S>& multiple, const Instant<S>& instant, const Direction<S>& own, const ArticulatedRate<S>& K, const ResponseRows<S>& rows)
+      : l(in_all(link.parent < 0 ? Vector3<S>::zero() : instant.lying.arm)), d(in_all(S(2) * instant.drift)), s(in_all(own.s)), slide(in_all(own.x)), turn(in_all(K.gain.angular)), pull(in_all(K.gain.linear)), axes(in_all(instant.lying.axes)),
         gain(in_all(multiple.gain)), above(in_all(K.kappa[0])), below(in_all(K.kappa[1])), stride(rows.stride), room(rows.room) {
-    const OneGain<S> hinge(link, w, instant.lying.axes);
-    turn = in_all(hinge.gain.angular), pull = in_all(hinge.gain.linear);
   }
 
   // b: of inboard coordinates, else zero; y: of its own.
@@ -149,7 +146,7 @@ template <class Kind, class S, class T>
   const ResponseColumns<S> alpha(w.alpha + stride * ResponseColumns<S>::rows * link.slot, stride);
   const OwnColumns<S> adds(w.own, stride);
   const ResponseRows<S> to = rows.of(link.v);
-  const Finisher<Kind, S> at(link, w.forward.link[at_link], *w.forward.of(link), w.instant[at_link], w.direction[link.v], w.rate[at_link], to);
+  const Finisher<Kind, S> at(link, *w.forward.of(link), w.instant[at_link], w.direction[link.v], w.rate[at_link], to);
   const V none = V::zero();
   for (int c = 0; c < before; c += n) {
     at.template pass<Standing::inboard>(c, alpha.qn, alpha.qf, adds.qb.at(c), none, none, to.q, odd);
@@ -192,8 +189,8 @@ unsigned forward_dynamics_derivatives(const Links<typename S::Scalar>& links, co
   ResponseRows<S> rows{w.rows, w.rows + size, w.rows + 2 * size, stride, stride};
   if constexpr (S::width == 1 && sizeof(T) == sizeof(double))
     if (direct) rows = {reinterpret_cast<S*>(out), reinterpret_cast<S*>(at.others[0]), reinterpret_cast<S*>(at.others[1]), N, N};
-  for (int r = 0; r < ResponseColumns<S>::rows + OwnColumns<S>::rows; ++r)
-    for (int c = N; c < stride; ++c) w.z[size_t(r) * stride + c] = S(0);
+  // What blocks hold besides a link's columns is finite, and no number so small that arithmetic on it is slow.
+  for (size_t i = 0; i < size_t(ResponseColumns<S>::rows + OwnColumns<S>::rows) * stride; ++i) w.z[i] = S(0);
   for (size_t i = 0; !direct && i < 3 * size; i += stride)
     for (int c = N; c < stride; ++c) w.rows[i + c] = S(0);
   unsigned sound = S::mask(accelerate_all(links, at, w));
@@ -203,7 +200,7 @@ unsigned forward_dynamics_derivatives(const Links<typename S::Scalar>& links, co
     const Link<T>& link = links.link[k];
     with_shape(link.step, [&](auto kind) {
       using Kind = decltype(kind);
-      respond<Kind>(link, w.forward.link[k], *w.forward.of(link), w.instant[k].lying, w.direction[link.v], ResponseColumns<S>(w.z, stride), rows);
+      respond<Kind>(link, w.forward.link[k], *w.forward.of(link), w.instant[k].lying, w.direction[link.v], w.rate[k].gain, ResponseColumns<S>(w.z, stride), rows);
       respond_else(link, Kind::nv, w.nu + size_t(18) * link.v, rows, N);
     });
   }

@@ -163,20 +163,37 @@ template <class S>
 [[gnu::always_inline]] inline Spatial<S> rate_times(const Momenta<S>& c, const Vector3<S>& b) {
   return {c.rate * b - cross(c.n, b), S(2) * cross(b, c.f)};
 }
-// crf(S) F
-template <class S>
+// A += X d~, of 3x3 matrices.
+template <class X, class S>
+[[gnu::always_inline]] inline void add_times_skew(const X& x, const Vector3<S>& d, Matrix3<S>& A) {
+  for (int j = 0; j < 3; ++j) {
+    const int a = (j + 1) % 3, b = (j + 2) % 3;
+    for (int r = 0; r < 3; ++r) A(r, j) += x(r, a) * d[b] - x(r, b) * d[a];
+  }
+}
+// Whether rows of H have no linear part.
+template <class Kind>
+inline constexpr bool only_turns = Kind::pin || Kind::nv == 3;
+// I S; I χ + B S; crf(S) F: where a hinge only turns, neither S nor χ has a linear part.
+template <class Kind, class S>
+[[gnu::always_inline]] inline Spatial<S> inertia_times(const Momenta<S>& c, const Vector3<S>& angular, const Vector3<S>& linear) {
+  if constexpr (only_turns<Kind>) return {c.rotational * angular, cross(angular, c.moment)};
+  return inertia_times(c, {angular, linear});
+}
+template <class Kind, class S>
 [[gnu::always_inline]] inline Spatial<S> turned_force(const Direction<S>& k, const Carrying<S>& c) {
+  if constexpr (only_turns<Kind>) return {cross(k.s, c.torque), cross(k.s, c.force)};
   return {cross(k.s, c.torque) + cross(k.x, c.force), cross(k.s, c.force)};
 }
 
 template <class Kind, class S, class T>
 [[gnu::always_inline]] inline Direction<S> direction(const Link<T>& link, const States<T>& at, const Instant<S>* above, const Instant<S>& own, int i) {
-  constexpr bool turns = Kind::pin || Kind::nv == 3;
   const Vector3<S> none = Vector3<S>::zero();
   const HingeRow<S> h = hinge_row<Kind>(link, own.lying.axes, i);
-  const Vector3<S> omega = above ? above->omega : none, spin = above ? above->spin : none, both = Kind::pin ? S(2) * omega : omega + own.omega;
+  const Vector3<S> omega = above ? above->omega : none, spin = above ? above->spin : none, both = omega + own.omega;
   const auto carried = [&](const Vector3<S>& y) { return cross(spin, y) + cross(omega, cross(omega, y)); };  // W y
-  Direction<S> k{h.angular, h.linear, cross(omega, h.angular), {none, none}, {cross(both, h.angular), none}};
+  Direction<S> k{h.angular, h.linear, cross(omega, h.angular), {none, none}, {none, none}};
+  k.chi.angular = Kind::pin ? Vector3<S>(S(2) * k.psi) : cross(both, h.angular);  // a pin's own velocity lies along it
   k.psi_rate.angular = cross(spin, h.angular) + cross(omega, k.psi);
   if constexpr (Kind::nv == 6) {
     const Vector3<S> u = hinge_travel(link, at, own.lying.axes);
@@ -187,7 +204,7 @@ template <class Kind, class S, class T>
       k.psi_rate.linear = carried(k.x), k.chi.linear = cross(both, k.x);
   } else {
     k.psi_rate.linear = cross(own.acceleration, k.s);
-    if constexpr (!turns) k.psi_rate.linear = k.psi_rate.linear + carried(k.x), k.chi.linear = cross(both, k.x);
+    if constexpr (!only_turns<Kind>) k.psi_rate.linear = k.psi_rate.linear + carried(k.x), k.chi.linear = cross(both, k.x);
   }
   return k;
 }

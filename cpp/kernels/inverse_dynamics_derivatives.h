@@ -77,7 +77,8 @@ inline void stand_all(const Links<T>& links, const States<T>& at, const InverseD
       using Kind = decltype(kind);
       place_link<Kind>(link, at, own.motion.place);
       move_link<Kind>(link, at, above ? &above->motion.omega : nullptr, own.motion);
-      push<Kind, S, T>(link, at, nullptr, own);
+      carry<Kind, true>(link, own.motion, own.alpha, own.acceleration);
+      if (at.u) add_rates<Kind>(link, [&](int i) { return gathered<S>(at.u + link.v + i, at.u_stride, at.states); }, own.alpha, own.acceleration);
       lie_in<Kind>(link, parent ? &parent->lying : nullptr, own.motion.place, w.instant[k].lying);
       stand<Kind>(link, at, parent, own.motion.omega, own.alpha, own.acceleration, w.instant[k]);
     });
@@ -101,10 +102,12 @@ inline void own_columns(const Links<T>& links, const States<T>& at, const Invers
       for (int i = 0; i < Kind::nv; ++i) {
         const Direction<S>& along = own[i];
         const int c = link.v + i;
-        const Spatial<S> y = inertia_times(carried, {along.s, along.x}), p = inertia_times(carried, along.psi_rate) + rate_times(carried, along.psi);
-        const Spatial<S> r = inertia_times(carried, along.chi) + rate_times(carried, along.s), whole = p + turned_force(along, carried);
+        const Spatial<S> y = inertia_times<Kind>(carried, along.s, along.x), p = inertia_times(carried, along.psi_rate) + rate_times(carried, along.psi);
+        const Spatial<S> r = inertia_times<Kind>(carried, along.chi.angular, along.chi.linear) + rate_times(carried, along.s), whole = p + turned_force<Kind>(along, carried);
         to.yn.set(c, y.angular), to.yf.set(c, y.linear);
-        to.c.set(c, carried.rate * along.s + cross(carried.n, along.s) + S(2) * cross(carried.f, along.x));
+        Vector3<S> momentum = carried.rate * along.s + cross(carried.n, along.s);
+        if constexpr (!only_turns<Kind>) momentum = momentum + S(2) * cross(carried.f, along.x);
+        to.c.set(c, momentum);
         to.pn.set(c, whole.angular), to.pf.set(c, whole.linear), to.rn.set(c, r.angular), to.rf.set(c, r.linear);
         for (int j = 0; j < Kind::nv; ++j) w.within[size_t(6) * c + j] = dot(own[j].s, p.angular) + dot(own[j].x, p.linear);
       }
@@ -118,7 +121,6 @@ template <class Kind, bool moves, class S>
 [[gnu::always_inline]] inline void derivative_row(const Direction<S>& own, const Vector3<S>& arm, const Vector3<S>& drift, int first, int last, int N, const DerivativeColumns<S>& x,
                                                   const DerivativeRows<S>& to, Block<S>& odd) {
   using V = Vector3<Block<S>>;
-  constexpr bool turns = Kind::pin || Kind::nv == 3;
   const V s = in_all(own.s), slide = in_all(own.x), psi = in_all(own.psi), turn = in_all(own.psi_rate.angular), pull = in_all(own.psi_rate.linear);
   const V chi = in_all(own.chi.angular), travel = in_all(own.chi.linear), l = in_all(arm), d = in_all(S(2) * drift);
   const int room = in_place<S>(N) ? N : to.stride;
@@ -126,7 +128,7 @@ template <class Kind, bool moves, class S>
     const V yn = x.yn.at(c), yf = x.yf.at(c), cc = x.c.at(c), pn = x.pn.at(c), pf = x.pf.at(c), rn = x.rn.at(c), rf = x.rf.at(c);
     Block<S> q = dot(s, pn), v = dot(s, rn), m = dot(s, yn), later_v = dot(chi, yn) + dot(s, cc);
     const Block<S> later_q = dot(turn, yn) + dot(pull, yf) + dot(psi, cc);
-    if constexpr (!turns) q += dot(slide, pf), v += dot(slide, rf), m += dot(slide, yf), later_v += dot(travel, yf);
+    if constexpr (!only_turns<Kind>) q += dot(slide, pf), v += dot(slide, rf), m += dot(slide, yf), later_v += dot(travel, yf);
     const Block<S> sum = (q + v) + (m + later_q) + later_v;
     odd += sum - sum;
     put_first(q, to.q + c, room - c), put_first(v, to.v + c, room - c), put_first(m, to.mass + c, room - c);

@@ -67,6 +67,12 @@ Pose<double> checked_pose(const Pose<double>& pose, const std::string& what) {
   return off <= rounding ? pose : Pose<double>{nearest_rotation(pose.R), pose.p};
 }
 
+Pose<double> placed_on(const Pose<double>& frame, const Pose<double>& pose, const std::string& what) {
+  const Pose<double> checked = checked_pose(pose, what), none = Pose<double>::identity();
+  const bool moved = !std::equal(frame.R.m, frame.R.m + 9, none.R.m) || frame.p[0] != 0 || frame.p[1] != 0 || frame.p[2] != 0;
+  return moved ? checked_pose(frame * checked, what) : checked;
+}
+
 std::vector<double> checked_rotor_inertia(const Hinge& hinge, std::vector<double> values) {
   const int nv = hinge.nv();
   if (values.empty()) values.assign(nv, 0.0);

@@ -19,6 +19,10 @@ std::string short_number(double x);
 // for entries that are not finite, scalings, shears and reflections.
 Pose<double> checked_pose(const Pose<double>& pose, const std::string& what);
 
+// A pose given in a frame, as one in the axes that the frame's own pose is given in; both are checked. On a frame that is those axes the pose
+// stays what it is to the last bit, and on a long way of frames the rounding of rotations does not gather: a copy is the model bit for bit.
+Pose<double> placed_on(const Pose<double>& frame, const Pose<double>& pose, const std::string& what);
+
 // The hinge with everything settled that it leaves open: one rotor inertia stands for all coordinates, none is zeros. Throws for subhinges
 // that are not those of its kind, rotor inertias and limits of another number or out of order.
 Hinge checked_hinge(Hinge hinge);

@@ -65,7 +65,7 @@ void Multibody::add_body(Body body, const std::string& parent) {
   body.hinge = checked_hinge(std::move(body.hinge));
   check_coordinate_names(body.hinge);
   note(body.name, check_mass_properties(body.name, body.mass, body.com, body.inertia));
-  body.hinge.placement = onto.pose * body.hinge.placement;
+  body.hinge.placement = placed_on(onto.pose, body.hinge.placement, "the placement of hinge '" + body.hinge.name + "'");
   body.parent = onto.body;
   if (body.hinge.subhinges.empty() && !keep_welds_) {
     lump(body, onto);
@@ -135,9 +135,9 @@ void Multibody::add_node(const std::string& name, const std::string& body, const
   const Edit edit(*this);
   check_new_name(name, "node");
   const Node onto = find_frame(body);
-  const Pose<double> checked = checked_pose(pose, "node '" + name + "'");
+  const Pose<double> placed = placed_on(onto.pose, pose, "node '" + name + "'");
   node_numbers_[name] = static_cast<int>(nodes_.size());
-  nodes_.push_back({name, onto.body, onto.pose * checked});
+  nodes_.push_back({name, onto.body, placed});
 }
 
 void Multibody::structure_changed(const std::string& reason) {

@@ -45,6 +45,27 @@ BOOST_AUTO_TEST_CASE(bodies_are_kept_depth_first) {
   BOOST_TEST(mb->body(3).parent == 0);
 }
 
+BOOST_AUTO_TEST_CASE(what_stands_on_frames_is_a_pose_to_rounding_and_to_the_bit_on_a_body) {
+  auto mb = std::make_shared<Multibody>("frames");
+  mb->add_body(rod("a"), "");
+  const double turn = 0.7;
+  Pose<double> X{Matrix3<double>{std::cos(turn), -std::sin(turn), 0, std::sin(turn), std::cos(turn), 0, -0.0, 0, 1}, {-0.0, 1, 0}};
+  mb->add_node("n0", "a", X);
+  BOOST_TEST((std::signbit(mb->nodes()[0].pose.R.m[6]) && std::signbit(mb->nodes()[0].pose.p[0])));
+  std::string last_name = "n0";
+  for (int k = 1; k < 1000; ++k) {
+    const std::string name = last_name + "'";
+    mb->add_node(name, last_name, X);
+    last_name = name;
+  }
+  const Matrix3<double> last = mb->nodes().back().pose.R, gram = transpose(last) * last;
+  for (int i = 0; i < 9; ++i) BOOST_TEST(std::abs(gram.m[i] - (i % 4 == 0)) < 2e-14);
+  BOOST_TEST(std::abs(last.m[0] - std::cos(1000 * turn)) < 1e-10);
+  X.p[0] = 1.7e308;
+  mb->add_node("far", "a", X);
+  BOOST_CHECK_THROW(mb->add_node("farther", "far", X), ModelError);
+}
+
 BOOST_AUTO_TEST_CASE(edits_carry_the_state_and_make_operators_stale) {
   auto mb = std::make_shared<Multibody>("tree");
   mb->add_body(rod("a"), "");

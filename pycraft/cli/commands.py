@@ -23,7 +23,7 @@ app = typer.Typer(
 )
 
 MIMIC = ("refuse", "lock", "free")
-Model = Annotated[str, typer.Argument(help="A URDF or MJCF file, or the name of a robot that comes with the package (see pycraft.robots).")]
+Model = Annotated[str, typer.Argument(help="A TOML, URDF or MJCF file, or the name of a robot of the package (see pycraft.robots).")]
 Root = Annotated[str | None, typer.Option(help="fixed | free: a free hinge first; fixed if left out, of a robot by name its own.")]
 Mimic = Annotated[str, typer.Option(help="refuse | lock | free: what becomes of a file's mimic joints.")]
 
@@ -88,7 +88,7 @@ def check_seconds(**durations: float | None) -> None:
 
 @app.command()
 def tour(
-    model: Annotated[str | None, typer.Argument(help="A URDF or MJCF file, or a robot's name; the Panda by default.")] = None,
+    model: Annotated[str | None, typer.Argument(help="A TOML, URDF or MJCF file, or a robot's name; the Panda by default.")] = None,
     root: Root = None,
     mimic: Mimic = "refuse",
 ) -> None:

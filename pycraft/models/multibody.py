@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -13,6 +14,7 @@ from ..closed import Closed
 from ..dynamics.integration import IntegrationCalls
 from ..state import State, at_state, random_state
 from .handles import Body, Hinge, Named, Node, Vector
+from .pictures import Pictures
 from .with_operators import WithOperators
 
 _Z = (0.0, 0.0, 1.0)
@@ -27,7 +29,7 @@ _DEFAULT_AXES: dict[str, tuple[tuple[float, float, float], ...]] = {
 }
 
 
-class Multibody(Closed, IntegrationCalls, WithOperators):
+class Multibody(Closed, IntegrationCalls, Pictures, WithOperators):
     """A tree of bodies on hinges, with nodes, a state (`q`, `v`) and gravity (zero until it is set).
 
     Build one body by body, or load it (`pycraft.load`). Bodies are kept depth first, children in the order they were added, and
@@ -232,6 +234,36 @@ class Multibody(Closed, IntegrationCalls, WithOperators):
         [1.714, -4.286]
         """
         return _core._face["compile_call"](self, call, frame)
+
+    # ------------------------------------------------------------------ files
+    def save(self, path: str | os.PathLike[str], *, state: bool = True) -> None:
+        """Write the model to a file: TOML that a person reads and writes, which `pycraft.load` reads back bit for bit, or URDF.
+
+        Parameters
+        ----------
+        path : path of the file, ending in ".toml" or ".urdf"
+            A file that is there is replaced.
+        state : bool
+            Whether q and v are written to a TOML file, as far as they are not zero.
+
+        Raises
+        ------
+        ModelError
+            An ending that is neither, a file that cannot be written; of URDF, what it does not have: hinges by name, and the remedy.
+
+        Warns
+        -----
+        ModelWarning
+            What the model has beside bodies and hinges and URDF does not hold (gravity, a state).
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> pc.robots.panda().save("panda.toml")  # doctest: +SKIP
+        """
+        from .writers import save
+
+        save(self, path, state)
 
     # ------------------------------------------------------------------ copies
     def description(self) -> dict[str, Any]:

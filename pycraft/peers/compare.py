@@ -78,9 +78,9 @@ def compare(model: Any, other: Any, *, states: int = 5, seed: int = 0, root: str
     ----------
     model : Multibody
     other : a `pinocchio.Model` (also as `interop.export.to_pinocchio` gives it), a `mujoco.MjModel`, another Multibody, or the path of a
-        URDF or MJCF file
+        TOML, URDF or MJCF file
     states : random states, drawn from `seed`
-    root : "fixed" or "free", of a file; as `model` has it where left out
+    root : "fixed" or "free", of a URDF file; as `model` has it where left out
 
     Returns
     -------
@@ -118,11 +118,11 @@ def compare(model: Any, other: Any, *, states: int = 5, seed: int = 0, root: str
 
 def _twin(model: Any, other: Any, root: str | None) -> Twin:
     if isinstance(other, (str, PathLike)):
-        from ..models.loaders.load import load
+        from ..models.loaders.load import is_toml, load
 
         first = next(iter(model.hinges.values()), None)
         free = first is not None and first.kind == "free" and first.name == "root"
-        return OwnTwin(model, load(other, root=root or ("free" if free else "fixed")))
+        return OwnTwin(model, load(other, root=root or ("free" if free and not is_toml(other) else "fixed")))  # TOML says so itself
     if hasattr(other, "forward_dynamics") and hasattr(other, "hinges"):
         return OwnTwin(model, other)
     if isinstance(other, PinocchioModel):
@@ -133,7 +133,8 @@ def _twin(model: Any, other: Any, root: str | None) -> Twin:
     if package == "mujoco" and hasattr(other, "qpos0"):
         return MuJoCoTwin(model, other)
     raise _core.ModelError(
-        f"compare takes a pinocchio.Model, a mujoco.MjModel, a Multibody or the path of a URDF or MJCF file, not {type(other).__name__}"
+        "compare takes a pinocchio.Model, a mujoco.MjModel, a Multibody or the path of a TOML, URDF or MJCF file, "
+        f"not {type(other).__name__}"
     )
 
 

@@ -1,7 +1,7 @@
 """Damaged and hostile model files: a ModelError that names the file, or a model; never an exception of another kind, never a hang.
 
-`python tests/campaigns/loaders.py --seeds 2000`. A round writes a random robot as URDF or MJCF and damages it: bytes, attributes, names
-full of quotes, brackets and escapes, entities, prefixes, numbers that are none, elements moved, doubled and lost.
+`python tests/campaigns/loaders.py --seeds 2000`. A round writes a random robot as URDF, MJCF or TOML and damages it: bytes, attributes,
+names full of quotes, brackets and escapes, entities, prefixes, numbers that are none, elements moved, doubled and lost.
 """
 
 import sys
@@ -32,6 +32,12 @@ INSERTS = [
     "<?xml version='1.0' encoding='utf-16'?>", "<a:b:c/>", "<inertial/>", "<axis xyz='0 0 0'/>", "<dynamics damping='x'/>",
     "<limit lower='1' upper='-1' effort='inf' velocity='nan'/>", "<origin rpy='1 2'/>", "<pycraft rotor_inertia='-1'/>",
 ]  # fmt: skip
+TOML_INSERTS = [
+    "[[bodies]]", "[bodies]", "[[nodes]]", "[state]", "[", "]", "{", "}", '"""', "'''", '"', "'", "#", "\\", "\n", "\r", "=", ",",
+    ".a" * 200, "a.b.c = 1\n", "[" * 2000, "\ufeff", "1" * 5000, "nan", "2024-01-01", "true", "\x00", "parent = 'l0'\n",
+    "axes = [[0, 0, 1]]\n",
+]  # fmt: skip
+TOML_KINDS = ["pin", "slider", "screw", "universal", "ball", "free", "weld", "planar", "custom"]
 MOMENTS = {"ixx": 1, "ixy": 0, "ixz": 0, "iyy": 1, "iyz": 0, "izz": 1}
 KINDS = ["revolute", "continuous", "prismatic", "fixed", "floating", "planar", "ball", "spherical", "knee"]
 
@@ -70,14 +76,33 @@ def mjcf(rng):
     return f'<mujoco model="{name("m")}"><worldbody><body name="{name("b")}">{joints}<geom size="{size}"/></body></worldbody></mujoco>'
 
 
-def damaged(rng, text):
+def toml(rng):
+    """A TOML file, mostly right."""
+    odd = lambda usual, strange, p: str(rng.choice(strange)) if rng.random() < p else usual
+    word = lambda usual: '"' + odd(usual, NAMES, 0.03).replace('"', "'").replace("\\", "/") + '"'
+    number = lambda x: odd(str(x), NUMBERS, 0.01)
+    vector = lambda *x: f"[{', '.join(map(number, x))}]"
+    lines = [f"name = {word('r')}", f"gravity = {vector(0, 0, -9.81)}"]
+    for k in range(int(rng.integers(1, 5))):
+        kind = str(rng.choice(TOML_KINDS))
+        lines += ["[[bodies]]", f"name = {word(f'l{k}')}", f'hinge = "{kind}"']
+        lines += [f"parent = {word(f'l{int(rng.integers(k))}')}"] if k else []
+        lines += [f"position = {vector(0, 0, 1)}", f"rpy = {vector(0, 1, 0)}", f"mass = {number(1)}"]
+        lines += [f"limits = {vector(-1, 1)}"] if kind in ("pin", "slider", "screw") else []
+        if kind == "custom":
+            lines += [f"subhinges = [{{ kind = {word('pin')} }},\n  {{ kind = {word('ball')}, point = {vector(0, 0, 1)} }}]"]
+        lines += [f"inertia = {{ xx = {number(1)}, yy = 1, zz = {number(1)} }}"]
+    return "\n".join([*lines, "[[nodes]]", f"name = {word('n')}", f"body = {word('l0')}", "[state.q]"])
+
+
+def damaged(rng, text, inserts=INSERTS):
     """The bytes of a file, most of them left as they are."""
     for _ in range(int(rng.integers(0, 3))):
         at = int(rng.integers(len(text) + 1))
         kind = int(rng.integers(4))
         length = int(rng.integers(1, 30))
         if kind == 0:
-            text = text[:at] + str(rng.choice(INSERTS)) + text[at:]
+            text = text[:at] + str(rng.choice(inserts)) + text[at:]
         elif kind == 1:
             text = text[:at] + text[at + length :]
         elif kind == 2:
@@ -90,11 +115,15 @@ def damaged(rng, text):
 def one_round(seed, folder):
     """None, or what is wrong with the reading of one file."""
     rng = np.random.default_rng(seed)
-    xml = rng.random() < 0.25
-    path = Path(folder) / "robot.xml"
-    path.write_bytes(damaged(rng, mjcf(rng) if xml else urdf(rng)))
+    kind = rng.random()
+    xml, tables = kind < 0.25, kind > 0.75
+    path = Path(folder) / ("robot.toml" if tables else "robot.xml")
+    if tables:
+        path.write_bytes(damaged(rng, toml(rng), TOML_INSERTS))
+    else:
+        path.write_bytes(damaged(rng, mjcf(rng) if xml else urdf(rng)))
     options = {"mimic": str(rng.choice(["refuse", "lock", "free"])), "welds": str(rng.choice(["lump", "keep"]))}
-    if not xml:
+    if not (xml or tables):
         options["root"] = str(rng.choice(["fixed", "free"]))
     begin = time.perf_counter()
     try:

@@ -28,6 +28,18 @@ DOZEN_TESTS = [
 
 # Whose tests are to notice a change of these sources: they are tried first.
 AREAS = {
+    "pycraft/models/writers/toml_writer.py": ["models/test_toml_files.py"],
+    "pycraft/models/writers/toml_text.py": ["models/test_toml_text.py", "models/test_toml_files.py"],
+    "pycraft/models/writers/save.py": ["models/test_toml_files.py"],
+    "pycraft/models/writers/urdf_writer.py": ["models/test_urdf_export.py"],
+    "pycraft/models/loaders/left_aside.py": ["models/test_toml_files.py"],
+    "pycraft/models/loaders/toml_reader.py": ["models/test_toml_files.py", "models/test_toml_errors.py"],
+    "pycraft/models/loaders/toml_file.py": ["models/test_toml_errors.py"],
+    "pycraft/models/loaders/toml_lines.py": ["models/test_toml_errors.py"],
+    "pycraft/models/tree_diagram.py": ["models/test_tree_diagram.py"],
+    "pycraft/view/skeleton.py": ["view/test_stick_figure.py"],
+    "pycraft/view/artists.py": ["view/test_stick_figure.py"],
+    "pycraft/view/stick_figure.py": ["view/test_stick_figure.py"],
     "cpp/algebra/language/source.cpp": ["whole/test_stale_numbers.py"],
     "cpp/dynamics/workspace_pool.h": ["whole/test_stale_numbers.py"],
     "cpp/model/multibody.cpp": ["whole/test_stale_numbers.py", "models/test_arguments.py"],
@@ -160,7 +172,8 @@ AREAS = {
     ],
     "pycraft/peers/compare.py": ["peers/test_compare.py"],
     "pycraft/peers/twins.py": ["peers/test_compare.py"],
-    "pycraft/models/loaders/rotations.py": ["models/test_urdf.py", "models/test_mjcf.py"],
+    "pycraft/models/loaders/rotations.py": ["models/test_urdf.py", "models/test_mjcf.py", "models/test_toml_text.py"],
+    "pycraft/models/loaders/urdf.py": ["models/test_urdf_export.py", "models/test_urdf.py"],
     "pycraft/models/loaders/xml_file.py": ["models/test_loaders_hostile.py", "models/test_urdf.py"],
     "pycraft/cli/bench.py": ["cli/test_cli_options.py"],
     "pycraft/cli/commands.py": ["cli/test_cli_options.py"],

@@ -49,6 +49,8 @@ CHANGES = {
     "pycraft/models/loaders/rotations.py": [
         ("a quaternion's rotation with a sign wrong", "[1 - 2 * (y * y + z * z)", "[1 + 2 * (y * y + z * z)"),
         ("an inertia turned the other way", "rotation @ inertia @ rotation.T", "rotation.T @ inertia @ rotation"),
+        ("a sign of zero that is remembered", "_rotation_from_rpy(roll + 0.0, pitch + 0.0,", "_rotation_from_rpy(roll, pitch,"),
+        ("roll without its yaw", "math.atan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1])", "math.atan2(R[2, 1], R[2, 2])"),
     ],
     "pycraft/identities/checker.py": [
         (
@@ -238,6 +240,46 @@ CHANGES = {
         ("parts of no whole packs", "_PACK = 16", "_PACK = 1"),
         ("parts read what others wrote", "if out is not None and any(np.shares_memory(out, a) for a in arrays.values()):", "if False:"),
         ("errors count states by parts", "        pool.shutdown(cancel_futures=True)\n        return whole()\n", "        raise\n"),
+    ],
+    "pycraft/models/writers/toml_writer.py": [
+        ("strict models are saved as others", '        data["strict"] = True\n', "        pass\n"),
+    ],
+    "pycraft/models/writers/toml_text.py": [
+        ("rows of a matrix on one line", "if of_parts and len(line) > _LINE else line", "if False else line"),
+    ],
+    "pycraft/models/writers/save.py": [
+        ("lines end as the machine likes", 'newline="\\n"', 'newline="\\r\\n"'),
+    ],
+    "pycraft/models/writers/urdf_writer.py": [
+        ("a root link is added at each round", 'in ("root", f"root of {name}")', 'in ("root",)'),
+        ("a root link off the origin", '_is_origin(hinge["placement"])', "True"),
+        ("bounds of joints without limits are dropped", 'or (kind == "continuous" and {', 'or (kind == "fixed" and {'),
+    ],
+    "pycraft/models/loaders/left_aside.py": [
+        ("numbers of other coordinates are saved", "and len(values) != model.nv]", "and False]"),
+    ],
+    "pycraft/models/loaders/toml_reader.py": [
+        (
+            "quaternions of no length where none is given",
+            'model.zero_q() if key == "q" else np.zeros(model.nv)',
+            "np.zeros(model.nq if key == 'q' else model.nv)",
+        ),
+    ],
+    "pycraft/models/loaders/toml_lines.py": [
+        ("strings end at the first three quotes", '\\"{3,5}|', '\\"{3}|'),
+    ],
+    "pycraft/models/loaders/urdf.py": [
+        ("a heavy root link flies off another", "or self.links[self.root].mass or", "or"),
+    ],
+    "pycraft/models/tree_diagram.py": [
+        ("no lines beside branches", "(along if last is False else blank)", "blank"),
+    ],
+    "pycraft/view/skeleton.py": [
+        ("what is beside a plane is in it", "if widths[n] <= _LEVEL * widths.max()", "if True"),
+    ],
+    "pycraft/view/stick_figure.py": [
+        ("markers at other hinges", 'points["joint"][own]', 'points["joint"][: len(own)]'),
+        ("a base under what flies", "if not len(ground) and self.skeleton.names:", "if False:"),
     ],
     "pycraft/models/loaders/xml_file.py": [
         ("undeclared entities are dropped", 'if "UNDECLARED_ENTITY" in entry.type_name:', "if False:"),

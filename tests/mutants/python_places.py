@@ -8,6 +8,7 @@ from .mutant import Mutant, line_of, shown_line
 
 TARGETS = [
     "pycraft/models/**/*.py",
+    "pycraft/view/*.py",
     "pycraft/dynamics/*.py",
     "pycraft/identities/*.py",
     "pycraft/interop/*.py",

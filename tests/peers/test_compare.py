@@ -28,6 +28,13 @@ def test_a_file_beside_its_model():
     assert "No difference found." in repr(report) and "the same robot" in repr(report)
 
 
+def test_a_toml_file_beside_its_model(tmp_path):
+    """It says itself that the root flies."""
+    robot = pc.robots.a1()
+    robot.save(tmp_path / "a1.toml")
+    assert pc.compare(robot, tmp_path / "a1.toml").worst == 0
+
+
 def test_other_orders_are_converted():
     model, other = (pc.Multibody("two arms") for _ in range(2))
     for name in "ab":

@@ -232,9 +232,10 @@ RESTS_ON = {
     "closed_forms": ["proofs"],
     "sympy_bridge": ["proofs"],
     "accuracy": ["identities", "peers", "tidy"],
-    "scenes": ["models"],
+    "scenes": ["models", "accuracy"],
     "compiled": ["recursions"],
-    "face": ["accuracy", "compiled", "identities"],
+    "view": ["accuracy"],
+    "face": ["accuracy", "compiled", "identities", "view"],
     "": ["face", "kalman", "closed_forms", "scenes", "sympy_bridge"],  # pycraft itself
     "cli": [""],
 }

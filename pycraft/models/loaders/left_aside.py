@@ -7,8 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..warning import warn
+
 if TYPE_CHECKING:
     from ..multibody import Multibody
+
+QUANTITIES = ("damping", "friction", "stiffness", "effort limit", "velocity limit")
+"""What of a coordinate there is to leave aside; beside them "gravity"."""
 
 
 def by_coordinate(model: Multibody, of_hinges: Mapping[str, Mapping[str, float]]) -> dict[str, np.ndarray]:
@@ -25,6 +30,16 @@ def by_coordinate(model: Multibody, of_hinges: Mapping[str, Mapping[str, float]]
         if not np.isnan(values).all():
             arrays[quantity] = values
     return arrays
+
+
+def current(model: Multibody) -> dict[str, np.ndarray]:
+    """What of `left_aside` belongs to the coordinates that the model has now. Warns of the rest: the model was edited since."""
+    left = model.left_aside
+    stale = [quantity for quantity, values in left.items() if quantity != "gravity" and len(values) != model.nv]
+    if stale:
+        numbers = ", ".join(f"{quantity} of {len(left[quantity])} coordinates" for quantity in stale)
+        warn(f"{model.name!r} was edited since it was loaded and has {model.nv} coordinates: not saved is what was left aside, {numbers}")
+    return {quantity: values for quantity, values in left.items() if quantity not in stale}
 
 
 def told(left: Mapping[str, np.ndarray], model: Multibody) -> str:

@@ -9,9 +9,13 @@ from functools import lru_cache
 import numpy as np
 
 
-@lru_cache(maxsize=1 << 12)  # most of a large file's are few different ones
 def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> np.ndarray:
     """Rz(yaw) Ry(pitch) Rx(roll), (3, 3), read-only: turns about the fixed axes x, y, z in that order, angles in radians."""
+    return _rotation_from_rpy(roll + 0.0, pitch + 0.0, yaw + 0.0)  # -0.0 is 0.0 to what remembers, and not to sines
+
+
+@lru_cache(maxsize=1 << 12)  # most of a large file's are few different ones
+def _rotation_from_rpy(roll: float, pitch: float, yaw: float) -> np.ndarray:
     (cr, cp, cy), (sr, sp, sy) = map(math.cos, (roll, pitch, yaw)), map(math.sin, (roll, pitch, yaw))
     rotation = np.array(
         [
@@ -47,3 +51,32 @@ def turned_inertia(rotation: np.ndarray, inertia: np.ndarray) -> np.ndarray:
     """R 𝓘 R*, (3, 3), symmetric to the last bit: one rounding off it costs the accurate forms all their accuracy."""
     turned = rotation @ inertia @ rotation.T
     return (turned + turned.T) / 2
+
+
+def nearest_rpy(rotation: np.ndarray) -> tuple[float, float, float]:
+    """Roll, pitch and yaw (rad) with `rotation_from_rpy` of them the rotation to rounding, pitch within ±π/2.
+
+    Roll is found from what yaw and pitch leave, so that it keeps its digits where pitch is ±π/2 and yaw has none of its own.
+    """
+    R = np.asarray(rotation, float)
+    yaw = math.atan2(R[1, 0], R[0, 0])
+    c, s = math.cos(yaw), math.sin(yaw)
+    pitch = math.atan2(-R[2, 0], c * R[0, 0] + s * R[1, 0])
+    roll = math.atan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1])
+    return roll, pitch, yaw
+
+
+def rpy_of_rotation(rotation: np.ndarray) -> tuple[float, float, float] | None:
+    """Roll, pitch and yaw (rad) that give this rotation to the last bit, as a file's angles did; None where none are found."""
+    bits, made = np.asarray(rotation, float).tobytes(), _rotation_from_rpy.__wrapped__
+    found = nearest_rpy(rotation)
+    roll, pitch, yaw = found
+    for angles in (
+        found,
+        (roll + math.copysign(math.pi, -roll), math.copysign(math.pi, pitch) - pitch, yaw + math.copysign(math.pi, -yaw)),
+    ):
+        for digits in (15, 16, 17, 14, 12):  # angles of a file have fewer digits than rounding leaves of them
+            rounded = round(angles[0], digits) + 0.0, round(angles[1], digits) + 0.0, round(angles[2], digits) + 0.0
+            if made(*rounded).tobytes() == bits:
+                return rounded
+    return None

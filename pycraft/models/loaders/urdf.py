@@ -132,6 +132,13 @@ class _Tree:
             yield name
             stack.extend(reversed(self.children[name]))
 
+    def is_free(self) -> bool:
+        """Whether the root link is but a place for a floating joint called "root" to start from."""
+        carried = self.children[self.root]
+        if len(carried) != 1 or self.links[self.root].mass or np.any(self.links[self.root].inertia):
+            return False
+        return self.inboard[carried[0]].kind == "free" and self.inboard[carried[0]].name == "root"
+
     def _loop(self, name: str) -> Exception:
         """The error for a link that no root carries: going inboard from it ends in a loop, which is named."""
         path: dict[str, None] = {}  # in order
@@ -166,6 +173,7 @@ class _Tree:
 
 def _build(tree: _Tree, root: str, welds: str, strict: bool) -> Multibody:
     file, joints = tree.file, tree.joints
+    root = "fixed" if tree.is_free() else root
     if root == "free" and "root" in joints:
         text = 'has the name of the free hinge that root="free" adds; rename it, or load with root="fixed"'
         raise file.error(joints["root"].element, f"{label(joints['root'].element)} {text}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
@@ -35,6 +36,7 @@ _LEFT_ASIDE = {
     "dynamics": (("damping", "damping"), ("friction", "friction")),
     "limit": (("effort", "effort limit"), ("velocity", "velocity limit")),
 }
+_LARGEST = sys.float_info.max
 _EXPAND = "expand the file first: xacro file.xacro > file.urdf"
 
 
@@ -221,7 +223,9 @@ class Elements:
             text = f"its lower limit {lower:g} lies above the upper one {upper:g}; both are left out"
             self.warnings.append(f"{self.file.at(limit)}: {label(element)}: {text}")
             return None
-        return lower, upper
+        # The largest double is how a side without a limit is written where a reader takes finite numbers alone.
+        lower, upper = (-math.inf if lower <= -_LARGEST else lower), (math.inf if upper >= _LARGEST else upper)
+        return None if math.isinf(lower) and math.isinf(upper) else (lower, upper)
 
     def _rotor_inertia(self, element: Element, ours: Element | None, hinge: str) -> Sequence[float] | None:
         if ours is None:

@@ -12,6 +12,7 @@ from typing import TypeAlias
 from lxml import etree
 
 from ... import _core
+from .file_contents import contents
 
 Element: TypeAlias = "etree._Element"
 
@@ -35,20 +36,7 @@ class XmlFile:
     """
 
     def __init__(self, path: str | os.PathLike[str]):
-        try:
-            self.path = os.fsdecode(path)
-        except TypeError:
-            raise _core.ModelError(f"a model is loaded from the path of a file, not from {path!r:.80}") from None
-        if self.path.lstrip().startswith("<"):
-            begins = self.path.strip()[:40]
-            raise _core.ModelError(f"a model is loaded from the path of a file, not from its text: write {begins!r}... to a file")
-        try:
-            with open(self.path, "rb") as file:
-                data = file.read()
-        except OSError as error:
-            raise _core.ModelError(f"{self.path}: cannot be read: {error.strerror or error}") from None
-        except ValueError as error:  # a NUL in the path
-            raise _core.ModelError(f"{self.path!r}: cannot be read: {error}") from None
+        self.path, data = contents(path)
         self.root, parser = self._parse(data)
         self.root_name, self._space = local_name(self.root), _namespace(self.root)
         # Expressions of macros may hide in any element and attribute; whether there can be any is seen from the bytes.

@@ -1,0 +1,93 @@
+"""How a model looks: its tree as text, and as a figure of sticks that the rooms above draw."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .. import _core
+from .tree_diagram import TreeDiagram, tree_diagram
+
+
+class Pictures:
+    """What is printed and drawn of a model."""
+
+    def tree(self, most: int | None = 200, *, nodes: bool = False) -> TreeDiagram:
+        """The tree as text in 80 columns: each body below and right of the one that carries it, its hinge, and its places in q and v.
+
+        Parameters
+        ----------
+        most : int or None
+            Lines of bodies that are shown; the middle of a longer tree is left out. None: all.
+        nodes : bool
+            Whether nodes have lines.
+
+        Returns
+        -------
+        TreeDiagram
+            Text when it is printed. A tree of more than a dozen levels does not indent only children. Names of hinges are left out where
+            there is no room for them, and not repeated where they are their bodies'.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> print(pc.tree([-1, 0, 0], ["free", "pin", "ball"]).tree())
+        tree of 3: 3 bodies, 10 degrees of freedom
+        base
+        └─ body0     free  hinge0  q[0:7] v[0:6]
+           ├─ body1  pin   hinge1  q[7] v[6]
+           └─ body2  ball  hinge2  q[8:12] v[7:10]
+        """
+        return tree_diagram(self, most, nodes)  # type: ignore[arg-type]  # a part of the model's class
+
+    def plot(
+        self,
+        q=None,
+        ax: Any = None,
+        *,
+        view: str = "auto",
+        com: bool = False,
+        names: bool = False,
+        legend: bool = True,
+        shadow: bool = True,
+        alpha: float = 1.0,
+    ) -> Any:
+        """A stick figure of the model at a state, by Matplotlib alone: no mesh is needed.
+
+        Bones go from hinge to hinge; of a body that carries no other, to its nodes, or else to where a uniform rod of its mass and second
+        moment ends. Markers tell the kinds of hinges, lines through them their axes, dashed lines what has slid. Equal scales, metres.
+
+        Parameters
+        ----------
+        q : (nq,) or a State; the model's own where left out
+        ax : Axes of Matplotlib, in space or in the plane
+            New ones where left out. What they show already stays in view, so that several states can be laid over each other.
+        view : {"auto", "3d", "xy", "xz", "yz"}
+            "auto": the plane that a flat model never leaves, space for any other.
+        com : bool
+            Centres of mass: of each body, its area by its mass, and of all.
+        names : bool
+            Of the hinges, beside them.
+        legend, shadow, alpha : what markers mean; the shadow of the bones on the floor, in space; opacity
+
+        Returns
+        -------
+        Axes
+
+        Raises
+        ------
+        ModelError
+            A q that is none of this model's.
+        EvaluationError
+            Another view, or one that does not fit the axes.
+
+        `pycraft.view.StickFigure` is the same figure as an object that can be moved to another state, for animations.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> ax = pc.chain(3).plot([0.3, 0.3, 0.3])
+        >>> ax.get_xlabel(), ax.get_ylabel()
+        ('x (m)', 'y (m)')
+        """
+        options = dict(view=view, com=com, names=names, legend=legend, shadow=shadow, alpha=alpha)
+        return _core._face["plot_model"](self, q, ax, **options)

@@ -1,0 +1,37 @@
+"""Models to files: `save` looks at how the file's name ends."""
+
+from __future__ import annotations
+
+import os
+from pathlib import PurePath
+from typing import TYPE_CHECKING
+
+from ... import _core
+from . import toml_writer, urdf_writer
+
+if TYPE_CHECKING:
+    from ..multibody import Multibody
+
+
+def save(model: Multibody, path: str | os.PathLike[str], state: bool = True) -> None:
+    """`Multibody.save`."""
+    try:
+        shown = os.fsdecode(path)
+    except TypeError:
+        raise _core.ModelError(f"a model is saved at the path of a file, not at {path!r:.80}") from None
+    ending = PurePath(shown).suffix.lower()
+    if ending == ".toml":
+        text = toml_writer.model_text(model, state)
+    elif ending == ".urdf":
+        text = urdf_writer.model_text(model, shown)
+    else:
+        kinds = ".toml, which holds every model, and .urdf, for what URDF knows"
+        remedy = "; MJCF text is made by pycraft.interop.export.to_mjcf(model)" if ending in (".xml", ".mjcf") else ""
+        raise _core.ModelError(f"{shown}: a model's file ends in {kinds}{remedy}")
+    try:
+        with open(shown, "w", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+    except OSError as error:
+        raise _core.ModelError(f"{shown}: cannot be written: {error.strerror or error}") from None
+    except ValueError as error:  # a NUL in the path
+        raise _core.ModelError(f"{shown!r}: cannot be written: {error}") from None

@@ -1,0 +1,165 @@
+"""A model as the TOML text that `pycraft.load` reads back bit for bit (docs/models.md, Files).
+
+What is at its default is left out; which numbers those are is judged by their bits, so that -0.0 is written.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ... import _core
+from ..loaders.left_aside import current
+from ..loaders.rotations import rpy_of_rotation
+from ..loaders.toml_reader import FORMAT, MOMENTS
+from .toml_text import Inline, document
+
+if TYPE_CHECKING:
+    from ..multibody import Multibody
+
+_HEAD = "# A model of PyCraft: SI units and radians. docs/models.md, Files, says what the keys mean.\n\n"
+_ZERO = np.zeros(3)
+# Of each kind that is given axes: which of its subhinges have them, in order. (Of a plane the normal is given, the axis of the last.)
+_GIVEN_AXES = {
+    "pin": (0,),
+    "slider": (0,),
+    "screw": (0,),
+    "universal": (0, 1),
+    "gimbal": (0, 1, 2),
+    "cylindrical": (0,),
+    "planar": (2,),
+}
+
+
+def model_text(model: Multibody, state: bool = True) -> str:
+    """The file's text; `state`: with q and v, as far as they are not zero."""
+    return f"{_HEAD}{document(model_data(model, state))}\n"
+
+
+def model_data(model: Multibody, state: bool = True) -> dict[str, Any]:
+    """The file's tables as plain data."""
+    described = model.description()
+    bodies = described["bodies"]
+    names = [body["name"] for body in bodies]
+    data: dict[str, Any] = {"format": FORMAT, "name": described["name"]}
+    if not same(described["gravity"], _ZERO):
+        data["gravity"] = described["gravity"]
+    if described["welds"] != "lump":
+        data["welds"] = described["welds"]
+    if described["strict"]:
+        data["strict"] = True
+    if bodies:
+        data["bodies"] = [_body(body, names) for body in bodies]
+    if described["nodes"]:
+        data["nodes"] = [_node(node, names) for node in described["nodes"]]
+    if state and (moved := _state(model)):
+        data["state"] = moved
+    if left := _left_aside(model):
+        data["left_aside"] = left
+    return data
+
+
+def same(numbers: Any, others: Any) -> bool:
+    """Whether these are the same doubles, bit for bit."""
+    return np.asarray(numbers, float).tobytes() == np.asarray(others, float).tobytes()
+
+
+def _body(body: dict[str, Any], names: list[str]) -> dict[str, Any]:
+    hinge = body["hinge"]
+    data: dict[str, Any] = {"name": body["name"]}
+    if body["parent"] >= 0:
+        data["parent"] = names[body["parent"]]
+    data["hinge"] = hinge["kind"]
+    if hinge["name"] != body["name"]:
+        data["hinge_name"] = hinge["name"]
+    data |= _axes(hinge) | _pose(hinge["placement"])
+    if len(lower := hinge["lower"]):
+        one = len(lower) == 1
+        data["limits"] = [lower[0], hinge["upper"][0]] if one else [list(lower), list(hinge["upper"])]
+    rotor = hinge["rotor_inertia"]
+    if not same(rotor, np.zeros(len(rotor))):
+        data["rotor_inertia"] = rotor[0] if same(rotor, np.full(len(rotor), rotor[0])) else list(rotor)
+    if not same(body["mass"], 0.0):
+        data["mass"] = body["mass"]
+    if not same(body["com"], _ZERO):
+        data["com"] = body["com"]
+    places = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+    moments = Inline((key, body["inertia"][at]) for key, at in zip(MOMENTS, places, strict=True) if not same(body["inertia"][at], 0.0))
+    if moments:
+        data["inertia"] = moments
+    return data
+
+
+def _node(node: dict[str, Any], names: list[str]) -> dict[str, Any]:
+    carrier = {"body": names[node["body"]]} if node["body"] >= 0 else {}
+    return {"name": node["name"]} | carrier | _pose(node)
+
+
+def _pose(pose: dict[str, Any]) -> dict[str, Any]:
+    """Position and rotation; three angles where they give the matrix to the last bit, else its rows."""
+    data: dict[str, Any] = {}
+    if not same(pose["position"], _ZERO):
+        data["position"] = pose["position"]
+    if same(pose["rotation"], np.eye(3)):
+        return data
+    angles = rpy_of_rotation(pose["rotation"])
+    return data | ({"rotation": pose["rotation"]} if angles is None else {"rpy": angles})
+
+
+def _axes(hinge: dict[str, Any]) -> dict[str, Any]:
+    """Axes, point and pitch, where the core makes the very subhinges from them; else the subhinges one by one."""
+    kind, subhinges = hinge["kind"], hinge["subhinges"]
+    if kind != "custom":
+        axes = [subhinges[i]["axis"] for i in _GIVEN_AXES.get(kind, ())]
+        data: dict[str, Any] = {"axis": axes[0]} if len(axes) == 1 else {"axes": axes} if axes else {}
+        point = subhinges[-1]["point"] if subhinges else _ZERO
+        pitch = max((subhinge["pitch"] for subhinge in subhinges), key=abs, default=0.0)
+        if same(_subhinge_numbers(made_by(kind, axes, point, pitch)), _subhinge_numbers(subhinges)):
+            data |= {} if same(point, _ZERO) else {"point": point}
+            return data | ({} if same(pitch, 0.0) else {"pitch": pitch})
+    return {"subhinges": [_subhinge(subhinge) for subhinge in subhinges]}
+
+
+def made_by(kind: str, axes: list[Any], point: Any = None, pitch: float = 0.0) -> list[dict[str, Any]]:
+    """The subhinges that the core makes of a hinge of this kind, which is not "custom"."""
+    trial = _core.Multibody("trial", True, False)
+    trial._add_body("trial", "", kind, "", axes, point, pitch, None, None, None, 0.0, None, None, None, None, None)
+    return trial._body(0)["hinge"]["subhinges"]
+
+
+def _subhinge_numbers(subhinges: list[dict[str, Any]]) -> np.ndarray:
+    return np.array([[*s["axis"], *s["point"], s["pitch"]] for s in subhinges])
+
+
+def _subhinge(subhinge: dict[str, Any]) -> Inline:
+    kind = _core.subhinge_kinds[subhinge["kind"]]
+    data = Inline(kind=subhinge["kind"])
+    if kind.axis:
+        data["axis"] = subhinge["axis"]
+    if not same(subhinge["point"], _ZERO):
+        data["point"] = subhinge["point"]
+    if not same(subhinge["pitch"], 0.0):
+        data["pitch"] = subhinge["pitch"]
+    return data
+
+
+def _state(model: Multibody) -> dict[str, Any]:
+    """q and v by the names of hinges, without those that are at zero."""
+    parts: dict[str, Any] = {}
+    hinges = [(name, hinge.q_slice, hinge.v_slice) for name, hinge in model.hinges.items()]
+    for key, numbers, zero in (("q", model.q, model.zero_q()), ("v", model.v, np.zeros(model.nv))):
+        slices = {name: q if key == "q" else v for name, q, v in hinges}
+        part = {name: numbers[at] for name, at in slices.items() if not same(numbers[at], zero[at])}
+        if part:
+            parts[key] = {name: values[0] if len(values) == 1 else values for name, values in part.items()}
+    return parts
+
+
+def _left_aside(model: Multibody) -> dict[str, Any]:
+    """By quantity and coordinate, NaN left out."""
+    data: dict[str, Any] = {}
+    for quantity, values in current(model).items():
+        named = zip(model.coordinate_names, values, strict=True) if quantity != "gravity" else ()
+        data[quantity] = values if quantity == "gravity" else {name: value for name, value in named if not np.isnan(value)}
+    return data

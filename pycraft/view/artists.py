@@ -1,0 +1,98 @@
+"""Lines, points and labels of a picture in the plane or in space, whose places can be set again without drawing the rest anew."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+
+class Canvas:
+    """Axes with what they show of space: `columns` are the two coordinates of a plane, None for all three."""
+
+    def __init__(self, ax: Any, columns: tuple[int, int] | None):
+        self.ax, self.columns = ax, columns
+        self._shared = bool(ax.has_data())  # with what was drawn before
+
+    def _seen(self, places: np.ndarray) -> np.ndarray:
+        return places if self.columns is None else places[..., self.columns]
+
+    def lines(self, **style: Any) -> Lines:
+        """Lines of one style, none yet."""
+        return Lines(self, **style)
+
+    def points(self, **style: Any) -> Points:
+        """Markers of one style, none yet."""
+        return Points(self, **style)
+
+    def labels(self, texts: list[str], **style: Any) -> Labels:
+        """Texts beside points."""
+        return Labels(self, texts, **style)
+
+    def frame(self, low: np.ndarray, high: np.ndarray) -> None:
+        """Shows the box from `low` to `high`, (3,) each, with equal scales; what the axes showed before stays in view."""
+        names = "xyz" if self.columns is None else "xy"
+        low, high = self._seen(low), self._seen(high)
+        if self._shared:
+            shown = np.array([getattr(self.ax, f"get_{name}lim")() for name in names])
+            low, high = np.minimum(low, shown.min(axis=1)), np.maximum(high, shown.max(axis=1))
+        for name, a, b in zip(names, low, high, strict=True):
+            getattr(self.ax, f"set_{name}lim")(a, b)
+        if self.columns is None:
+            from matplotlib.ticker import MaxNLocator
+
+            self.ax.set_box_aspect(high - low, zoom=0.9)
+            for axis, share in zip((self.ax.xaxis, self.ax.yaxis, self.ax.zaxis), (high - low) / (high - low).max(), strict=True):
+                axis.set_major_locator(MaxNLocator(max(2, round(6 * share)), min_n_ticks=2))
+        else:
+            self.ax.set_aspect("equal", adjustable="box")
+
+
+class Lines:
+    """Straight lines of one style: `artist`, and `set` with the ends (n, 2, 3)."""
+
+    def __init__(self, canvas: Canvas, **style: Any):
+        from matplotlib.collections import LineCollection
+        from mpl_toolkits.mplot3d.art3d import Line3DCollection
+
+        self._canvas = canvas
+        if canvas.columns is None:
+            self.artist: Any = Line3DCollection(np.zeros((1, 2, 3)), **style)
+            canvas.ax.add_collection3d(self.artist)
+        else:
+            self.artist = LineCollection([], **style)
+            canvas.ax.add_collection(self.artist, autolim=False)
+
+    def set(self, ends: np.ndarray) -> None:
+        self.artist.set_segments(self._canvas._seen(ends))
+
+
+class Points:
+    """Markers of one style: `artist`, and `set` with the places (n, 3)."""
+
+    def __init__(self, canvas: Canvas, **style: Any):
+        self._canvas = canvas
+        (self.artist,) = canvas.ax.plot(*np.empty((2 if canvas.columns else 3, 0)), linestyle="none", **style)
+
+    def set(self, places: np.ndarray) -> None:
+        columns = self._canvas._seen(places).T
+        if self._canvas.columns is None:
+            self.artist.set_data_3d(*columns)
+        else:
+            self.artist.set_data(*columns)
+
+
+class Labels:
+    """A text beside each of several points: `artists`, and `set` with the places (n, 3)."""
+
+    def __init__(self, canvas: Canvas, texts: list[str], **style: Any):
+        self._canvas = canvas
+        at = (0.0,) * (2 if canvas.columns else 3)
+        self.artists = [canvas.ax.text(*at, text, **style) for text in texts]
+
+    def set(self, places: np.ndarray) -> None:
+        for artist, place in zip(self.artists, self._canvas._seen(places), strict=True):
+            if self._canvas.columns is None:
+                artist.set_position_3d(place)
+            else:
+                artist.set_position(place)
