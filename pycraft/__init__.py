@@ -69,7 +69,7 @@ if _TYPE_CHECKING:
     from .models.loaders import load
     from .peers import compare
     from .proofs import Exercise, Proof, derivative, exercise, prove, prove_derivative, repair, worksheet
-    from .scenes import Scene, effects
+    from .scenes import Scene, effects, load_scene
     from .sympy_bridge import from_sympy, parse, to_sympy
 
 # What takes long to import is imported when it is first asked for: the same names, each with its room.
@@ -82,7 +82,7 @@ _LATER = {
     "models.robots": ("robots",),
     "peers": ("compare",),
     "proofs": ("Exercise", "Proof", "derivative", "exercise", "prove", "prove_derivative", "repair", "worksheet"),
-    "scenes": ("Scene", "effects"),
+    "scenes": ("Scene", "effects", "load_scene"),
     "sympy_bridge": ("from_sympy", "parse", "to_sympy"),
 }
 
@@ -148,6 +148,7 @@ __all__ = [
     "interop",
     "kalman",
     "load",
+    "load_scene",
     "models",
     "parse",
     "prove",

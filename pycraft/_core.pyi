@@ -7,7 +7,7 @@ import fractions
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Binding', 'Dynamics', 'Effect', 'Error', 'EvaluationError', 'FunctionOfTime', 'GroupedOperators', 'HingeKind', 'Integration', 'Letter', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'Scalar', 'SceneCalls', 'SceneEffects', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'blockdiag', 'bushing_effect', 'checked_refinement', 'compiled_call', 'constant', 'constant_in_time', 'coordinates_named', 'coulomb_friction_effect', 'damping_effect', 'direct_call', 'direct_calls', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'gravity_effect', 'gravity_gradient_effect', 'harmonic', 'hinge_kinds', 'identity', 'implicit_damping_effect', 'implicit_spring_effect', 'instruction_set', 'instruction_sets', 'integrators', 'kernel_headers', 'kernel_tape', 'limits_effect', 'methods', 'motor_effect', 'node_damper_effect', 'node_spring_effect', 'numbers_in_q', 'operators_of', 'piecewise_polynomial', 'point_mass_gravity_effect', 'precisions', 'prepared_call', 'prescribed_effect', 'python_effect', 'python_function_of_time', 'quadratic_damping_effect', 'real_array', 'residual', 'rotor_inertia_effect', 'scalar', 'servo_effect', 'spring_effect', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_by_hand', 'time_compiled', 'time_dynamics', 'time_forward', 'time_method', 'time_packs', 'time_scene', 'torque_source_effect', 'vector', 'wider', 'wrench_effect', 'zero']
+__all__: list[str] = ['Binding', 'Dynamics', 'Effect', 'Error', 'EvaluationError', 'FunctionOfTime', 'GroupedOperators', 'HingeKind', 'Integration', 'Letter', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'Scalar', 'SceneCalls', 'SceneEffects', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'blockdiag', 'bushing_effect', 'checked_refinement', 'compiled_call', 'constant', 'constant_in_time', 'coordinates_named', 'coulomb_friction_effect', 'damping_effect', 'direct_call', 'direct_calls', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'gravity_effect', 'gravity_gradient_effect', 'harmonic', 'hinge_kinds', 'identity', 'implicit_damping_effect', 'implicit_spring_effect', 'instruction_set', 'instruction_sets', 'integrators', 'kernel_headers', 'kernel_tape', 'limits_effect', 'methods', 'motor_effect', 'node_damper_effect', 'node_spring_effect', 'numbers_in_q', 'operators_of', 'piecewise_polynomial', 'point_mass_gravity_effect', 'precisions', 'prepared_call', 'prescribed_effect', 'python_effect', 'python_function_of_time', 'quadratic_damping_effect', 'real_array', 'residual', 'rotor_inertia_effect', 'scalar', 'servo_effect', 'spring_effect', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_by_hand', 'time_compiled', 'time_dynamics', 'time_forward', 'time_method', 'time_packs', 'time_passes', 'time_scene', 'torque_source_effect', 'vector', 'wider', 'wrench_effect', 'zero']
 
 class Error(Exception): ...
 class SpaceError(Error, TypeError): ...
@@ -1006,6 +1006,11 @@ class SceneCalls:
     def simulate(self, q: typing.Any, v: typing.Any, times: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], own: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], energy: bool, integrator: str, rtol: typing.SupportsFloat | typing.SupportsIndex, atol: typing.SupportsFloat | typing.SupportsIndex, step: typing.SupportsFloat | typing.SupportsIndex, every_step: bool, normalise: bool) -> dict:
         ...
     @property
+    def states(self) -> list[int]:
+        """
+        How many states of its own each effect has that is on, what it holds among them.
+        """
+    @property
     def workers(self) -> list[int]:
         """
         Numbers of the effects whose works are counted, among those that are on.
@@ -1265,9 +1270,13 @@ def time_packs(model: Multibody, q: typing.Annotated[numpy.typing.ArrayLike, num
     """
     Seconds per state of a batch in packs: minimum, median, calls.
     """
-def time_scene(scene: SceneCalls, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2) -> dict:
+def time_passes(scene: SceneCalls, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2) -> list[float]:
     """
-    Seconds per evaluation of a scene's accelerations: minimum, median, calls.
+    Seconds of every pass of a scene's motion, in their order.
+    """
+def time_scene(scene: SceneCalls, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2, works: bool = False) -> dict:
+    """
+    Seconds per evaluation of a scene's accelerations: minimum, median, calls; with works, of the effects' powers, too.
     """
 def torque_source_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, torque: FunctionOfTime, effort_limit: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], speed_limit: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], speed_band: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
     ...

@@ -53,7 +53,7 @@ def model_data(model: Multibody, state: bool = True) -> dict[str, Any]:
         data["bodies"] = [_body(body, names) for body in bodies]
     if described["nodes"]:
         data["nodes"] = [_node(node, names) for node in described["nodes"]]
-    if state and (moved := _state(model)):
+    if state and (moved := state_data(model)):
         data["state"] = moved
     if left := _left_aside(model):
         data["left_aside"] = left
@@ -144,7 +144,7 @@ def _subhinge(subhinge: dict[str, Any]) -> Inline:
     return data
 
 
-def _state(model: Multibody) -> dict[str, Any]:
+def state_data(model: Multibody) -> dict[str, Any]:
     """q and v by the names of hinges, without those that are at zero."""
     parts: dict[str, Any] = {}
     hinges = [(name, hinge.q_slice, hinge.v_slice) for name, hinge in model.hinges.items()]
