@@ -47,7 +47,7 @@ class CostTable(TidyTable):
         return self.about["noise"]
 
     def marks(self, row: dict[str, Any]) -> str:
-        return row["because"]  # a column of words however narrow the terminal
+        return self.cell("because", row)  # a column of words however narrow the terminal
 
     def of(self, *kinds: str) -> list[dict[str, Any]]:
         """The rows of these kinds."""

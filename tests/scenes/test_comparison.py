@@ -13,6 +13,11 @@ mpl.use("Agg")
 E = pc.effects
 
 
+@pytest.fixture(autouse=True)
+def terminal(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "140")
+
+
 @pytest.fixture
 def slider():
     """A mass of 2 kg on a vertical slider: constant forces, and every error in closed form."""

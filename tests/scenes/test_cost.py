@@ -16,6 +16,11 @@ SECONDS = 0.004
 """Of each figure: what is asserted of times stands far above what this leaves of noise."""
 
 
+@pytest.fixture(autouse=True)
+def terminal(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "140")
+
+
 @pytest.fixture(scope="module")
 def arm():
     return pc.robots.panda()
@@ -165,7 +170,7 @@ def test_as_text_html_and_files(tmp_path, monkeypatch):
     assert (tmp_path / "cost.csv").read_text().splitlines()[1] == "poses,pass,3e-07,0.3,wrench,"
     monkeypatch.setenv("COLUMNS", "70")
     narrow = repr(table)
-    assert max(map(len, narrow.splitlines())) <= 70 and "500 ns" in narrow and "7 evaluations a step" in narrow and "refused" in narrow
+    assert max(map(len, narrow.splitlines())) <= 70 and "500 ns" in narrow and "7 evaluations a step" in narrow and "refused: it" in narrow
 
 
 def test_picture():

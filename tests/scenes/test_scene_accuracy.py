@@ -14,6 +14,11 @@ mpl.use("Agg")
 E = pc.effects
 
 
+@pytest.fixture(autouse=True)
+def terminal(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "140")
+
+
 @pytest.fixture(scope="module")
 def pendulum():
     model = pc.Multibody("pendulum")
