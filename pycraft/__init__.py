@@ -69,7 +69,7 @@ if _TYPE_CHECKING:
     from .models.loaders import load
     from .peers import compare
     from .proofs import Exercise, Proof, derivative, exercise, prove, prove_derivative, repair, worksheet
-    from .scenes import Scene, effects, load_scene
+    from .scenes import Checkpoint, Event, Scene, effects, load_run, load_scene, mechanisms
     from .sympy_bridge import from_sympy, parse, to_sympy
 
 # What takes long to import is imported when it is first asked for: the same names, each with its room.
@@ -82,7 +82,7 @@ _LATER = {
     "models.robots": ("robots",),
     "peers": ("compare",),
     "proofs": ("Exercise", "Proof", "derivative", "exercise", "prove", "prove_derivative", "repair", "worksheet"),
-    "scenes": ("Scene", "effects", "load_scene"),
+    "scenes": ("Checkpoint", "Event", "Scene", "effects", "load_run", "load_scene", "mechanisms"),
     "sympy_bridge": ("from_sympy", "parse", "to_sympy"),
 }
 
@@ -112,8 +112,10 @@ def cmake_dir() -> str:
 
 
 __all__ = [
+    "Checkpoint",
     "Error",
     "EvaluationError",
+    "Event",
     "Exercise",
     "ModelError",
     "ModelWarning",
@@ -148,7 +150,9 @@ __all__ = [
     "interop",
     "kalman",
     "load",
+    "load_run",
     "load_scene",
+    "mechanisms",
     "models",
     "parse",
     "prove",

@@ -2,11 +2,14 @@
 #include <chrono>
 
 #include "bindings/direct_calls.h"
+#include "bindings/python_steps.h"
 #include "model/configuration.h"
 #include "simulation/effects/damping.h"
 #include "simulation/effects/gravity.h"
 #include "simulation/effects/torque_source.h"
 #include "simulation/integrators/integrate.h"
+#include "simulation/integrators/pairing.h"
+#include "simulation/integrators/runge_kutta_steps.h"
 #include "simulation/scene_equations.h"
 
 namespace pycraft {
@@ -43,28 +46,94 @@ Scene scene_of(const std::shared_ptr<Multibody>& mb, const std::vector<double>& 
   return scene;
 }
 
+// Of equations in a wider scalar, for solvers that keep states in doubles.
 template <class S>
-py::dict trajectory(const std::shared_ptr<Multibody>& mb, const std::vector<double>& q, const std::vector<double>& v, const std::vector<double>& times,
-                    const std::vector<double>& tau, const std::vector<double>& damping, const IntegratorOptions& options, const Solving& how) {
-  const int nq = mb->nq(), nv = mb->nv();
-  const auto wide = [](const std::vector<double>& x) { return std::vector<S>(x.begin(), x.end()); };
-  const std::vector<S> q0 = wide(q), v0 = wide(v);
-  const auto count = static_cast<py::ssize_t>(times.size());
-  py::array_t<double> all_q({count, py::ssize_t(nq)}), all_v({count, py::ssize_t(nv)});
+class Narrowed : public ExplicitEquations<double> {
+ public:
+  Narrowed(Equations<S>& wide, const CompiledModel<double>& model) : ExplicitEquations<double>(model, 0), wide_(wide), q_(nq()), v_(nv()), vdot_(nv()) {}
+  void evaluate(const double& t, const double* q, const double* v, const double*, double* vdot, double*) override {
+    ++evaluations;
+    at_q_ = q, at_v_ = v;
+    std::copy_n(q, nq(), q_.begin()), std::copy_n(v, nv(), v_.begin());
+    wide_.evaluate(S(t), q_.data(), v_.data(), nullptr, vdot_.data(), nullptr);
+    for (int j = 0; j < nv(); ++j) vdot[j] = to_double(vdot_[j]);
+  }
+  std::string name_of(int i) const override { return wide_.name_of(i); }
+
+ private:
+  Equations<S>& wide_;
+  std::vector<S> q_, v_, vdot_;
+};
+
+// States at the times asked for, written where they go.
+template <class S>
+struct Samples : Watcher<S> {
+  Samples(double* q, double* v, int nq, int nv) : to_q(q), to_v(v), nq(nq), nv(nv) {}
+  void sample(const S&, const std::vector<S>& x) override {
+    for (int j = 0; j < nq; ++j) *to_q++ = to_double(x[j]);
+    for (int j = 0; j < nv; ++j) *to_v++ = to_double(x[nq + j]);
+  }
+  double *to_q, *to_v;
+  int nq, nv;
+};
+
+// What a trajectory is of.
+struct Motion {
+  std::shared_ptr<Multibody> model;
+  std::vector<double> q, v, times, tau, damping;
+  IntegratorOptions options;
+  Solving how;
+  py::object foreign, right_hand_side;  // a solver from outside of the core, accelerations of a user's own; None: no such
+};
+
+template <class S>
+void run_along(const Motion& m, Equations<S>& equations, Stepper<S>& stepper, bool end_at_times, Watcher<S>& out, RunEnd<S>& end) {
+  std::vector<S> x(m.q.begin(), m.q.end());
+  x.insert(x.end(), m.v.begin(), m.v.end());
+  integrate<S>(equations, stepper, std::move(x), RunPlan<S>{m.times, end_at_times, {}, nullptr}, m.options, out, end);
+}
+
+template <class S>
+IntegrationCost run_motion(const Motion& m, double* q, double* v) {
+  const Multibody& mb = *m.model;
+  Samples<double> doubles(q, v, mb.nq(), mb.nv());
+  RunEnd<double> end;
+  const auto numbers = mb.compiled<double>();
+  if (!m.right_hand_side.is_none()) {
+    const auto equations = python_equations(*numbers, m.right_hand_side, mb.structure().coordinate_names);
+    const auto stepper = m.foreign.is_none() ? runge_kutta_steps<double>(*equations, m.options) : python_steps(*equations, m.foreign, m.options);
+    run_along<double>(m, *equations, *stepper, m.foreign.is_none(), doubles, end);
+    return end.cost;
+  }
+  CompiledScene<S> scene(scene_of(m.model, m.tau, m.damping), m.how);
+  if (!m.foreign.is_none()) {
+    SceneEquations<S> wide(scene, false);
+    Narrowed<S> equations(wide, *numbers);
+    const auto stepper = python_steps(equations, m.foreign, m.options);
+    run_along<double>(m, equations, *stepper, false, doubles, end);
+    return end.cost;
+  }
+  Samples<S> samples(q, v, mb.nq(), mb.nv());
+  const Paired<S> pair = paired(scene, false, m.options);
+  RunEnd<S> end_of_wide;
+  run_along<S>(m, *pair.equations, *pair.stepper, true, samples, end_of_wide);
+  return end_of_wide.cost;
+}
+
+template <class S>
+py::dict trajectory(const Motion& m) {
+  const Multibody& mb = *m.model;
+  const auto count = static_cast<py::ssize_t>(m.times.size());
+  py::array_t<double> all_q({count, py::ssize_t(mb.nq())}), all_v({count, py::ssize_t(mb.nv())});
   double *to_q = all_q.mutable_data(), *to_v = all_v.mutable_data();
   IntegrationCost cost;
   double seconds;
   {
-    const ModelInUse use(*mb);
+    const ModelInUse use(mb);
     ReleasedGil release;
-    check_integration(times, options, to_double(epsilon<S>()));
-    CompiledScene<S> scene(scene_of(mb, tau, damping), how);
-    SceneEquations<S> equations(scene, false);
+    check_integration(m.times, m.options, m.foreign.is_none() ? to_double(epsilon<S>()) : 0.0);
     const auto start = std::chrono::steady_clock::now();
-    cost = integrate<S>(equations, equations.initial(S(times.front()), q0.data(), v0.data(), nullptr), times, options, [&](const S&, const std::vector<S>& x) {
-      for (int j = 0; j < nq; ++j) *to_q++ = to_double(x[j]);
-      for (int j = 0; j < nv; ++j) *to_v++ = to_double(x[nq + j]);
-    });
+    cost = run_motion<S>(m, to_q, to_v);
     seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   }
   py::dict d;
@@ -85,33 +154,29 @@ void register_integration(py::module_& m) {
       }, py::arg("q"), py::arg("v"), py::arg("precision"), py::arg("out"))
       .def("trajectory", [](Integration& d, const py::object& q, const py::object& v, const std::vector<double>& times, const py::object& tau,
                             const py::object& damping, const std::string& integrator, double rtol, double atol, double step, bool normalise,
-                            Precision precision, Form form, const py::object& refine) {
+                            Precision precision, Form form, const py::object& refine, const py::object& foreign, const py::object& right_hand_side) {
         const Multibody& mb = d.model();
-        const Solving how{form, refinement(refine, "same", precision), OnSingular::raise};
-        const IntegratorOptions options{integrator_from_name(integrator), rtol, atol, step, normalise};
         const Array q0 = numbers(q, "q"), v0 = numbers(v, "v");
         mb.check_q(q0.data(), q0.size());
         mb.check_v(v0.data(), v0.size(), "v");
-        const std::vector<double> from_q(q0.data(), q0.data() + q0.size()), from_v(v0.data(), v0.data() + v0.size());
-        const std::vector<double> force = vector_of(mb, tau, "tau"), friction = damping.is_none() ? std::vector<double>() : vector_of(mb, damping, "damping");
-        const auto at = [&]<class S>(S) { return trajectory<S>(d.shared_model(), from_q, from_v, times, force, friction, options, how); };
+        IntegratorOptions options{Integrator::dopri5, rtol, atol, step, normalise};
+        if (foreign.is_none()) options.integrator = integrator_from_name(integrator);
+        const Motion motion{d.shared_model(), {q0.data(), q0.data() + q0.size()}, {v0.data(), v0.data() + v0.size()}, times, vector_of(mb, tau, "tau"),
+                            damping.is_none() ? std::vector<double>() : vector_of(mb, damping, "damping"), options, Solving{form, refinement(refine, "same", precision), OnSingular::raise}, foreign, right_hand_side};
         switch (precision) {
-          case Precision::double_: return at(double());
-          case Precision::extended: return at(Extended());
-          case Precision::quad: return at(Quad());
+          case Precision::double_: return trajectory<double>(motion);
+          case Precision::extended: return trajectory<Extended>(motion);
+          case Precision::quad: return trajectory<Quad>(motion);
           default: break;
         }
         throw EvaluationError("trajectories are computed in precision 'double', 'extended' or 'quad', not '" + std::string(precision_name(precision)) + "'");
       }, py::arg("q"), py::arg("v"), py::arg("times"), py::arg("tau"), py::arg("damping"), py::arg("integrator"), py::arg("rtol"), py::arg("atol"),
-           py::arg("step"), py::arg("normalise"), py::arg("precision"), py::arg("form"), py::arg("refine"));
-  m.def("integrators", [](bool scenes) {
+           py::arg("step"), py::arg("normalise"), py::arg("precision"), py::arg("form"), py::arg("refine"), py::arg("foreign") = py::none(), py::arg("right_hand_side") = py::none());
+  m.def("integrators", [] {
     std::vector<std::string> names;
-    if (scenes)
-      for (const Integrator i : scene_integrators) names.push_back(integrator_name(i));
-    else
-      for (const Integrator i : integrators) names.push_back(integrator_name(i));
+    for (const IntegratorRecord& r : integrator_records) names.push_back(r.name);
     return names;
-  }, py::arg("scenes") = false, "The integrators of trajectories, or of scenes: those and what takes steps by effects that act implicitly.");
+  }, "The names of the core's integrators.");
 }
 
 }  // namespace pycraft

@@ -1,10 +1,6 @@
 // Scenes: their effects, and what is computed of them at states and along runs.
-#include <chrono>
-
 #include "bindings/direct_calls.h"
-#include "simulation/integrators/integrate.h"
 #include "simulation/scene_calls.h"
-#include "simulation/scene_equations.h"
 
 namespace pycraft {
 
@@ -77,55 +73,10 @@ py::dict evaluate(SceneCalls& calls, const Array& q, const py::object& v, double
   return result;
 }
 
-// What a run gives out, row after row.
-struct Recorded {
-  std::vector<double> t, q, v, own, work;
-};
-
 py::array_t<double> as_rows(const std::vector<double>& all, size_t rows, int width) {
   py::array_t<double> a({static_cast<py::ssize_t>(rows), static_cast<py::ssize_t>(width)});
   std::copy(all.begin(), all.end(), a.mutable_data());
   return a;
-}
-
-py::dict simulate(SceneCalls& calls, const Array& q, const Array& v, const std::vector<double>& times, const std::vector<double>& own, bool energy, const IntegratorOptions& options) {
-  const Multibody& mb = calls.scene().model();
-  mb.check_q(q.data(), q.size());
-  mb.check_v(v.data(), v.size(), "v");
-  Recorded out;
-  IntegrationCost cost;
-  std::vector<PassRecord> passes;
-  int states = 0, works = 0;
-  double seconds = 0;
-  {
-    const Undisturbed undisturbed(mb);
-    const auto start = std::chrono::steady_clock::now();
-    calls.with([&]<class S>(CompiledScene<S>& scene) {
-      SceneEquations<S> equations(scene, energy);
-      states = scene.effects().own(), works = equations.works();
-      const std::vector<S> wq = wide<S>(q.data(), q.size()), wv = wide<S>(v.data(), v.size()), y = own_states(scene, own);
-      const SceneList list = works > 0 ? SceneList::works : SceneList::motion;
-      const auto before = scene.passes(list);
-      check_integration(times, options, to_double(epsilon<S>()));
-      const auto x = equations.initial(S(times.front()), wq.data(), wv.data(), own.empty() ? nullptr : y.data());
-      cost = integrate<S>(equations, x, times, options, [&](const S& t, const std::vector<S>& at) {
-        const auto append = [&, from = at.begin()](std::vector<double>& to, int n, const S& unit) mutable {
-          for (const auto end = from + n; from != end; ++from) to.push_back(to_double(S(unit * *from)));
-        };
-        auto part = append;
-        out.t.push_back(to_double(t));
-        part(out.q, equations.nq(), S(1)), part(out.v, equations.nv(), S(1)), part(out.own, states, S(1)), part(out.work, works, SceneEquations<S>::unit_of_work());
-      });
-      passes = since(scene.passes(list), before);
-    });
-    seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  }
-  const size_t rows = out.t.size();
-  py::dict d;
-  d["t"] = to_numpy(out.t), d["q"] = as_rows(out.q, rows, mb.nq()), d["v"] = as_rows(out.v, rows, mb.nv());
-  d["own"] = as_rows(out.own, rows, states), d["work"] = as_rows(out.work, rows, works);
-  d["evaluations"] = cost.evaluations, d["steps"] = cost.steps, d["rejected"] = cost.rejected, d["seconds"] = seconds, d["passes"] = times_of(passes);
-  return d;
 }
 
 // Of states along a run: accelerations (T, nv), forces (effects, T, nv), kinetic (T,) and potential energies (T, effects).
@@ -188,11 +139,6 @@ void register_scenes(py::module_& m) {
       .def("evaluate", [](SceneCalls& c, const py::object& q, const py::object& v, double t, const std::vector<double>& own, double step) {
         return evaluate(c, numbers(q, "q"), v, t, own, step);
       }, py::arg("q"), py::arg("v"), py::arg("t"), py::arg("own"), py::arg("step"))
-      .def("simulate", [](SceneCalls& c, const py::object& q, const py::object& v, const std::vector<double>& times, const std::vector<double>& own, bool energy, const std::string& integrator,
-                          double rtol, double atol, double step, bool every_step, bool normalise) {
-        return simulate(c, numbers(q, "q"), numbers(v, "v"), times, own, energy, {integrator_from_name(integrator), rtol, atol, step, normalise, every_step});
-      }, py::arg("q"), py::arg("v"), py::arg("times"), py::arg("own"), py::arg("energy"), py::arg("integrator"), py::arg("rtol"), py::arg("atol"), py::arg("step"), py::arg("every_step"),
-           py::arg("normalise"))
       .def("along", [](SceneCalls& c, const Array& t, const Array& q, const Array& v, const Array& own) { return along(c, t, q, v, own); }, py::arg("t"), py::arg("q"), py::arg("v"), py::arg("own"))
       .def_property_readonly("workers", [](SceneCalls& c) {
         std::vector<int> workers;

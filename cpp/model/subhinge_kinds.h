@@ -15,6 +15,7 @@
 //   move(q, u, out)        q moved along u for unit time, out may be q; a quaternion keeps its length to the rounding of a product
 //   difference(p, q, out)  u with move(p, u) = q, up to the lengths of quaternions; rotations by at most π
 //   bracket(u, v, out)     [u, v] of the group: zero, ω×ω, or the cross product of twists
+//   cobracket(u, p, out)   its transpose on momenta: cobracket(u, p)·v = p·[u, v]
 //
 // A new kind is its row here, its name in the enumeration, in `with_subhinge` and in `subhinge_records`.
 #pragma once
@@ -68,6 +69,10 @@ struct OneCoordinate {
   }
   template <class S>
   static void bracket(const S*, const S*, S* out) {
+    out[0] = S(0);
+  }
+  template <class S>
+  static void cobracket(const S*, const S*, S* out) {
     out[0] = S(0);
   }
 };
@@ -155,6 +160,10 @@ struct BallSubhinge {
     const Vector3<S> w = cross(Vector3<S>{u[0], u[1], u[2]}, Vector3<S>{v[0], v[1], v[2]});
     for (int i = 0; i < 3; ++i) out[i] = w[i];
   }
+  template <class S>
+  static void cobracket(const S* u, const S* p, S* out) {
+    bracket(p, u, out);
+  }
 };
 
 // A rotation as a ball's, then a position in the axes before the step; its velocity is the twist of the body, in the body's axes.
@@ -202,6 +211,11 @@ struct FreeSubhinge {
   static void bracket(const S* u, const S* v, S* out) {
     const Vector6<S> w = cross_motion(Vector6<S>{{u[0], u[1], u[2]}, {u[3], u[4], u[5]}}, Vector6<S>{{v[0], v[1], v[2]}, {v[3], v[4], v[5]}});
     for (int i = 0; i < 6; ++i) out[i] = w[i];
+  }
+  template <class S>
+  static void cobracket(const S* u, const S* p, S* out) {
+    const Vector6<S> f = cross_force(Vector6<S>{{u[0], u[1], u[2]}, {u[3], u[4], u[5]}}, Vector6<S>{{p[0], p[1], p[2]}, {p[3], p[4], p[5]}});
+    for (int i = 0; i < 6; ++i) out[i] = -f[i];
   }
 };
 

@@ -10,7 +10,16 @@ namespace pycraft {
 
 namespace {
 
-HingeTerms terms_of(const Scene& scene) {
+std::string plural(size_t n, const char* one, const char* several) { return std::to_string(n) + " " + (n == 1 ? one : several); }
+
+template <class S>
+bool all_are_finite(const S* x, int n) {
+  return std::all_of(x, x + n, [](const S& y) { return std::isfinite(to_double(y)); });
+}
+
+}  // namespace
+
+HingeTerms hinge_terms(const Scene& scene) {
   HingeTerms terms;
   const auto nv = static_cast<unsigned>(scene.model().nv());
   for (const SceneEntry& entry : scene.entries()) {
@@ -29,25 +38,16 @@ HingeTerms terms_of(const Scene& scene) {
   return terms;
 }
 
-std::string plural(size_t n, const char* one, const char* several) { return std::to_string(n) + " " + (n == 1 ? one : several); }
-
-template <class S>
-bool all_are_finite(const S* x, int n) {
-  return std::all_of(x, x + n, [](const S& y) { return std::isfinite(to_double(y)); });
-}
-
-}  // namespace
-
 template <class S>
 CompiledScene<S>::CompiledScene(const Scene& scene, const Solving& how)
-    : scene_(scene), nv_(scene.model().nv()), forces_(scene_, scene.model().compiled<S>()), lists_(5), motion_(nv_), needed_(nv_), inertia_(nv_, S(0)), zeros_(nv_, S(0)), work_(nv_) {
+    : scene_(scene), how_(how), nv_(scene.model().nv()), forces_(scene_, scene.model().compiled<S>()), lists_(5), motion_(nv_), needed_(nv_), inertia_(nv_, S(0)), zeros_(nv_, S(0)), work_(nv_) {
   for (const auto& e : forces_.effects()) {
     if (e->declared.uniform_gravity) gravity_ = gravity_ + e->declared.gravity;
     prescribed_.insert(prescribed_.end(), e->declared.prescribed.begin(), e->declared.prescribed.end());
   }
   if (forces_.forced() || !prescribed_.empty()) u_ = forces_.tau();
   if (!forces_.wrenched().empty()) wrenches_ = forces_.wrenches();
-  solver_ = std::make_unique<HybridDynamics<S>>(scene.model(), terms_of(scene), how, gravity_, forces_.wrenched());
+  solver_ = std::make_unique<HybridDynamics<S>>(scene.model(), hinge_terms(scene), how, gravity_, forces_.wrenched());
   for (int list = 0; list < static_cast<int>(lists_.size()); ++list) plan(static_cast<SceneList>(list));
 }
 

@@ -29,6 +29,9 @@ struct PassRecord {
 // Which list of passes: of a motion; of a state at rest; of a motion whose works are counted; of either with the forces of each effect kept apart.
 enum class SceneList { motion, rest, works, apart, apart_at_rest };
 
+// What the effects that are on do at hinges: terms of D, and what is prescribed.
+HingeTerms hinge_terms(const Scene& scene);
+
 template <class S>
 class CompiledScene {
  public:
@@ -49,6 +52,8 @@ class CompiledScene {
   void set_step(const S& h);
   bool steps_implicitly() const;
 
+  const Scene& scene() const { return scene_; }
+  const Solving& how() const { return how_; }
   SceneForces<S>& effects() { return forces_; }
   const SceneForces<S>& effects() const { return forces_; }
   const CompiledModel<S>& numbers() const { return forces_.numbers(); }
@@ -90,6 +95,7 @@ class CompiledScene {
   static void count_prescribed(CompiledScene& s, Active<S>* e);
 
   Scene scene_;  // as it was
+  Solving how_;
   int nv_;
   SceneForces<S> forces_;
   std::vector<int> prescribed_;

@@ -1,8 +1,18 @@
 // What integrators integrate: ẋ = f(x, t) on x = (q, v, rest), q on the group of a model's configurations, and what else a motion has between
-// its steps. SceneEquations are those of a scene; trajectory.h has those of any accelerations.
+// its steps. How accelerations are found is a type, and so is what an integrator takes (integrators/pairing.h):
+//
+//   Equations               what all have: rates at a state, stops, events, names
+//   ExplicitEquations       v̇ at states, and nothing else
+//   ImplicitEquations       v̇ of a step of size h, with h C + h² K in D
+//   LinearizedEquations     v̇ and its derivatives
+//   VariationalEquations    momenta, and the forces that change them
+//
+// simulation/scene_equations.h has those of a scene.
 #pragma once
 
+#include <Eigen/Core>
 #include <limits>
+#include <string>
 #include <vector>
 
 #include "model/configuration.h"
@@ -20,6 +30,9 @@ class Equations {
   int nq() const { return model_.nq; }
   int nv() const { return model_.nv; }
   int rest() const { return rest_; }  // numbers of x after q and v
+  int size() const { return nq() + nv() + rest_; }
+  // Of these the last are integrals beside the motion, on which no rate depends.
+  virtual int integrals() const { return 0; }
 
   void operator()(const State& x, State& rate, const S& t) {
     const S *q = x.data(), *v = q + nq();
@@ -34,15 +47,15 @@ class Equations {
 
   // After a step to t: what is known by other means than the step.
   virtual void settle(const S&, State&) {}
-  // Accelerations of implicit steps of size h from now on, 0: plain ones.
-  virtual void set_step(const S&) {}
   // Where a step must end after t, infinite: nowhere; and what happens to x there.
   virtual bool stops() const { return false; }
   virtual double next_stop(double) const { return std::numeric_limits<double>::infinity(); }
   virtual void stop(const S&, State&) {}
-  // Functions of t and x at whose zeros the equations are others.
-  virtual int count_events() const { return 0; }
+  // Functions of t and x at whose zeros the equations are others, by whose they are: a step ends there.
+  virtual std::vector<std::string> event_names() const { return {}; }
   virtual void events(const S&, const State&, S*) {}
+  // What number i of x is, for errors.
+  virtual std::string name_of(int i) const { return "number " + std::to_string(i) + " of the state"; }
 
   long evaluations = 0;
 
@@ -52,6 +65,49 @@ class Equations {
  private:
   const CompiledModel<S>& model_;
   int rest_;
+};
+
+template <class S>
+class ExplicitEquations : public Equations<S> {
+ public:
+  using Equations<S>::Equations;
+};
+
+template <class S>
+class ImplicitEquations : public Equations<S> {
+ public:
+  using Equations<S>::Equations;
+  // v̇ = (v⁺ - v)/h of a step of size h, and the mean rates in it of what follows.
+  virtual void evaluate_step(const S& t, const S& h, const S* q, const S* v, const S* rest, S* vdot, S* rest_rate) = 0;
+};
+
+// With z = (v, y), y what the motion depends on besides, u a displacement along quasi-velocities: A ż = g, A = (ℳ + J, 1), and ∂g at ż held.
+struct Linearization {
+  Eigen::MatrixXd mass, along_u, along_z;  // A, ∂g/∂u (n x nv), ∂g/∂z (n x n)
+  Eigen::VectorXd along_t;                 // ∂ż/∂t
+  std::vector<char> known;                 // per coordinate: by other means than the step, so that no error counts
+};
+
+template <class S>
+class LinearizedEquations : public Equations<S> {
+ public:
+  using Equations<S>::Equations;
+  // At a state whose rates are these. h: of the step to come, for differences in time.
+  virtual void linearize(const S& t, const S& h, const S* q, const S* v, const S* rest, const S* vdot, const S* rest_rate, Linearization& out) = 0;
+  long linearizations = 0;
+};
+
+template <class S>
+class VariationalEquations : public Equations<S> {
+ public:
+  using Equations<S>::Equations;
+  // π = (ℳ + J) v.
+  virtual void momentum(const S* q, const S* v, S* pi) = 0;
+  // That, ∂KE/∂θ + T of all forces, and the rates of what follows v in x but for the integrals.
+  virtual void momentum_and_forces(const S& t, const S* q, const S* v, const S* rest, S* pi, S* forces, S* rest_rate) = 0;
+  // (ℳ + J) x = r.
+  virtual void solve(const S* q, const S* r, S* x) = 0;
+  long solutions = 0;
 };
 
 }  // namespace pycraft

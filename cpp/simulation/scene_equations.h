@@ -5,6 +5,8 @@
 // What controllers hold from one sample to the next is part of y and has no rate. Works are integrals beside the motion: they are kept in units of
 // 2¹⁰⁰ J, which no tolerance sees and which costs no bit, so that no step is chosen for their sake. Prescribed coordinates are where their motion
 // says at every evaluation, whatever x says; in x they are set to it after each step.
+//
+// Kind: which equations they are (simulation/equations.h). The others than explicit ones: scene_steps.h, scene_momenta.h, scene_linearized.h.
 #pragma once
 
 #include <algorithm>
@@ -17,20 +19,19 @@
 
 namespace pycraft {
 
-template <class S>
-class SceneEquations : public Equations<S> {
+template <class S, template <class> class Kind = ExplicitEquations>
+class SceneEquations : public Kind<S> {
  public:
   using typename Equations<S>::State;
-  using Equations<S>::nq;
-  using Equations<S>::nv;
-  using Equations<S>::evaluations;
+  using Equations<S>::nq, Equations<S>::nv, Equations<S>::evaluations;
   // works: whether the works of effects are part of x.
   SceneEquations(CompiledScene<S>& scene, bool works)
-      : Equations<S>(scene.numbers(), scene.effects().own() + (works ? static_cast<int>(scene.effects().workers().size()) : 0)), scene_(scene), own_(scene.effects().own()),
+      : Kind<S>(scene.numbers(), scene.effects().own() + (works ? static_cast<int>(scene.effects().workers().size()) : 0)), scene_(scene), own_(scene.effects().own()),
         works_(this->rest() - own_), q_(nq()), v_(nv()) {}
 
-  CompiledScene<S>& scene() { return scene_; }
+  CompiledScene<S>& scene() const { return scene_; }
   int works() const { return works_; }
+  int integrals() const override { return works_; }
   static S unit_of_work() { return S(std::ldexp(1.0, 100)); }
 
   // x of a state at t: own states as they are at first where own is null; samples are taken, prescribed coordinates set, works zero.
@@ -64,21 +65,42 @@ class SceneEquations : public Equations<S> {
   void settle(const S& t, State& x) override {
     if (!scene_.prescribed().empty()) scene_.effects().prescribe(t, x.data(), x.data() + nq(), nullptr);
   }
-  void set_step(const S& h) override { scene_.set_step(h); }
   bool stops() const override { return std::isfinite(next_stop(0)); }
   double next_stop(double t) const override { return scene_.effects().next_sample(t); }
   void stop(const S& t, State& x) override { scene_.effects().sample(t, false, x.data(), x.data() + nq(), x.data() + nq() + nv()); }
-  int count_events() const override { return scene_.effects().count_events(); }
+  std::vector<std::string> event_names() const override { return scene_.effects().event_names(); }
   void events(const S& t, const State& x, S* out) override {
     std::copy_n(x.data(), nq(), q_.data()), std::copy_n(x.data() + nq(), nv(), v_.data());
     scene_.effects().prescribe(t, q_.data(), v_.data(), nullptr);
     scene_.effects().events(t, q_.data(), v_.data(), x.data() + nq() + nv(), out);
   }
+  std::string name_of(int i) const override;
+
+ protected:
+  int own() const { return own_; }
 
  private:
   CompiledScene<S>& scene_;
   int own_, works_;
   State q_, v_;
 };
+
+template <class S, template <class> class Kind>
+std::string SceneEquations<S, Kind>::name_of(int i) const {
+  const Multibody& model = scene_.scene().model();
+  if (i < nq()) {
+    int k = 0;
+    while (k + 1 < model.bodies() && model.q_offset(k + 1) <= i) ++k;
+    const int first = model.q_offset(k), count = (k + 1 < model.bodies() ? model.q_offset(k + 1) : nq()) - first;
+    return "coordinate '" + model.body(k).hinge.name + (count > 1 ? "[" + std::to_string(i - first) + "]'" : "'");
+  }
+  if (i < nq() + nv()) return "the velocity of '" + model.structure().coordinate_names[i - nq()] + "'";
+  for (const auto& e : scene_.effects().effects()) {
+    const int at = i - nq() - nv() - e->first;
+    if (at >= 0 && at < e->declared.own()) return "state " + std::to_string(at) + " of effect '" + e->name + "'";
+    if (i - nq() - nv() - own_ == e->worker) return "the work of effect '" + e->name + "'";
+  }
+  return Equations<S>::name_of(i);
+}
 
 }  // namespace pycraft

@@ -167,10 +167,10 @@ double SceneForces<S>::next_sample(double t) const {
 }
 
 template <class S>
-int SceneForces<S>::count_events() const {
-  int count = 0;
-  for (const auto& e : effects_) count += e->declared.events;
-  return count;
+std::vector<std::string> SceneForces<S>::event_names() const {
+  std::vector<std::string> names;
+  for (const auto& e : effects_) names.insert(names.end(), e->declared.events, e->name);
+  return names;
 }
 
 template <class S>

@@ -75,8 +75,8 @@ class SceneForces {
   void sample(const S& t, bool first, const S* q, const S* v, S* own);
   // The first sample after t, no earlier than a rounding of it; infinite where nothing is sampled.
   double next_sample(double t) const;
-  // The functions whose zeros say where effects are others: one after another, as many as count_events().
-  int count_events() const;
+  // The functions whose zeros say where effects are others: one after another, and the names of the effects that they are of.
+  std::vector<std::string> event_names() const;
   void events(const S& t, const S* q, const S* v, const S* own, S* out);
   // EvaluationError that names the effect of forces that are not finite and the time; nothing where there is none.
   void look_for_culprits();

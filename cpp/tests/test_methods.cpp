@@ -7,7 +7,8 @@
 #include "dynamics/rigid_dynamics.h"
 #include "model/configuration.h"
 #include "robot.h"
-#include "simulation/trajectory.h"
+#include "runtime/errors.h"
+#include "simulation/integrators/integrate.h"
 
 using namespace pycraft;
 using namespace pycraft::testing;
@@ -51,34 +52,22 @@ BOOST_AUTO_TEST_CASE(moves_are_those_of_the_model) {
   for (size_t i = 0; i < q.size(); ++i) BOOST_TEST(std::abs(out[i] - expected[i]) < 1e-15);
 }
 
-// Steps of a trajectory allocate nothing: twice the time, the same count.
-BOOST_AUTO_TEST_CASE(steps_do_not_allocate) {
-  const auto mb = robot();
-  const auto model = mb->compiled<double>();
-  const std::vector<double> q = mb->zero_q(), v = random_numbers(mb->nv(), 5), tau = random_numbers(mb->nv(), 6), damping(mb->nv(), 0.1);
-  RigidDynamics<double> w(*mb);
-  const Accelerations<double> fall = [&](const double* at, const double* moving, const double* forces, double* vdot) {
-    w.forward_dynamics(at, moving, forces, vdot);
-  };
-  for (const Integrator integrator : integrators) {
-    long counts[2], steps[2];
-    for (const int twice : {0, 1}) {
-      const std::vector<double> times{0, 0.02 * (1 + twice)};
-      const TrajectoryOptions options{integrator, 1e-8, 1e-8, 1e-3, true};
-      TrajectoryCost cost;
-      counts[twice] = allocations_of([&] {
-        cost = integrate_trajectory<double>(*model, fall, q.data(), v.data(), times, tau.data(), damping.data(), options, [](int, const double*, const double*) {});
-      });
-      steps[twice] = cost.steps;
-    }
-    BOOST_TEST(steps[1] > steps[0], integrator_name(integrator));
-    const long of_boost = integrator == Integrator::bulirsch_stoer ? 2 : 0;  // a step of Boost.Odeint's own keeps two arrays of 9 numbers
-    BOOST_TEST(counts[1] - counts[0] <= of_boost * (steps[1] - steps[0]), integrator_name(integrator));
-  }
-}
+namespace {
 
-// Accelerations may be anybody's: a harmonic oscillator has no model.
-BOOST_AUTO_TEST_CASE(accelerations_are_a_callable) {
+class Oscillator : public ExplicitEquations<double> {
+ public:
+  explicit Oscillator(const CompiledModel<double>& model) : ExplicitEquations<double>(model, 0) {}
+  void evaluate(const double&, const double* q, const double* v, const double*, double* vdot, double*) override {
+    ++evaluations;
+    at_q_ = q, at_v_ = v;
+    vdot[0] = -q[0];
+  }
+};
+
+}  // namespace
+
+// Accelerations may be anybody's: a harmonic oscillator needs no scene.
+BOOST_AUTO_TEST_CASE(equations_of_ones_own) {
   const auto mb = std::make_shared<Multibody>("oscillator");
   Body b;
   b.name = "b";
@@ -86,14 +75,14 @@ BOOST_AUTO_TEST_CASE(accelerations_are_a_callable) {
   b.hinge.kind = HingeKind::slider;
   b.hinge.subhinges = subhinges_of(HingeKind::slider, {{1, 0, 0}}, {0, 0, 0}, 0, "b");
   mb->add_body(b, "");
-  const Accelerations<double> spring = [](const double* q, const double*, const double* tau, double* vdot) { vdot[0] = tau[0] - q[0]; };
-  const double q = 1, v = 0, tau = 0;
-  for (const Integrator integrator : integrators) {
+  const auto model = mb->compiled<double>();
+  for (const Integrator integrator : integrators_by(Way::at_states)) {
+    Oscillator equations(*model);
     double end = 0;
-    const TrajectoryOptions options{integrator, 1e-11, 1e-12, 1e-3, false};
-    const TrajectoryCost cost = integrate_trajectory<double>(*mb->compiled<double>(), spring, &q, &v, {0, 1}, &tau, nullptr, options,
-                                                             [&](int, const double* at, const double*) { end = at[0]; });
+    const IntegrationCost cost = integrate<double>(equations, {1, 0}, {0, 1}, {integrator, 1e-11, 1e-12, 1e-3}, [&](const double&, const std::vector<double>& x) { end = x[0]; });
     BOOST_TEST(std::abs(end - std::cos(1.0)) < 1e-9, integrator_name(integrator));
     BOOST_TEST(cost.evaluations > 0);
   }
+  Oscillator equations(*model);  // a step of an implicit method takes more than accelerations at states
+  BOOST_CHECK_THROW(integrate<double>(equations, {1, 0}, {0, 1}, {Integrator::variational2, 1e-11, 1e-12, 1e-3}, [](const double&, const std::vector<double>&) {}), EvaluationError);
 }

@@ -8,8 +8,8 @@ import numpy as np
 
 from .. import _core
 from ..state import at_state
-from .by_realization import checked_forces
 from .direct_calls import cached
+from .integrator_names import IntegratorName, integrator_named
 from .sensitivities import SensitivityCalls
 
 if TYPE_CHECKING:
@@ -58,17 +58,18 @@ class IntegrationCalls(SensitivityCalls):
         q, v : (nq,), (nv,) at times[0]; q may be a State, which brings its v where v is None; None for the model's present state
         times : (T,) s, strictly increasing or strictly decreasing
         tau, damping : (nv,) constant generalized forces, and viscous damping coefficients; zero by default
-        integrator : {"dopri5", "cash-karp54", "fehlberg78", "bulirsch-stoer", "rk4", "rkmk4", "scipy:RK45", "scipy:DOP853", ...}
-            The first four (Boost.Odeint) control their steps; "rk4" and "rkmk4" (Runge-Kutta-Munthe-Kaas, on the model's group: quaternions
-            keep their length by construction) take steps of one size. All of these end a step at every time asked for. SciPy's ("RK45",
-            "DOP853", "Radau", "BDF", "LSODA"; Radau and BDF for stiff motion) interpolate, and call from Python.
+        integrator : {"dopri5", "fehlberg78", "rosenbrock4", "rkmk4", "variational2", "dop853", "radau", "cvode", ...}
+            `pycraft.dynamics.integrator_names.integrator_names()` lists them, docs/simulation.md says when to take which. The core's end a
+            step at every time asked for. SciPy's ("scipy:RK45", "scipy:DOP853", "scipy:Radau", "scipy:BDF", "scipy:LSODA", or the last part
+            alone) and those of SUNDIALS ("sundials:BDF" or "cvode", "sundials:Adams"; extra [sundials]) interpolate, and call from Python.
         rtol, atol : tolerances on the error of one step, per component of (q, v)
         step : s
             Of one-size steps (the largest that divides the interval and is at most this); the first step of the others, chosen if left out.
         normalise : {"never", "each step"}
             Whether quaternions are set to unit length after each step. Their drift is an integrator's own error.
         precision : {"double", "extended", "quad"}
-            Of everything inside; results are float64. SciPy's solvers keep the state in double and take it for forward dynamics alone.
+            Of everything inside; results are float64. Solvers of other packages keep the state in double and take it for forward
+            dynamics alone; "rosenbrock4" takes "double".
         form, refine : as forward_dynamics takes them
 
         Raises
@@ -88,44 +89,48 @@ class IntegrationCalls(SensitivityCalls):
         >>> motion.q.shape
         (3, 2)
         """
-        from .trajectory import Trajectory, integrate_by_scipy, integrator_names
-
-        if integrator not in integrator_names():
-            raise _core.EvaluationError(f"no integrator is called {integrator!r}; there are {', '.join(map(repr, integrator_names()))}")
+        chosen = integrator_named(integrator)
         refine = _core.checked_refinement(refine, "same", precision)
         if normalise not in ("never", "each step"):
             raise _core.EvaluationError(f"normalise={normalise!r}: there are 'never' and 'each step'")
-        q, v = at_state(self, q, v)
-        times = _checked_times(times)
+        if chosen.foreign and normalise != "never":
+            raise _core.EvaluationError(f"integrator {chosen.name!r} has no normalise={normalise!r}; there is 'never'")
         if step is not None and not step > 0:
             raise _core.EvaluationError(f"step={step}: a step is a positive number of seconds")
-        if not integrator.startswith("scipy:"):
-            first, unit = float(step or 0), normalise != "never"
-            run = self._integration().trajectory(
-                q, v, times, tau, damping, integrator, float(rtol), float(atol), first, unit, precision, form, refine
-            )
-            return Trajectory(times, run["q"], run["v"], run["evaluations"], run["seconds"], run["steps"], run["rejected"])
-        if normalise != "never":
-            raise _core.EvaluationError(f"integrator {integrator!r} has no normalise={normalise!r}; there is 'never'")
-        for name, tolerance in (("rtol", rtol), ("atol", atol)):
-            if not 0 <= tolerance < np.inf:
-                raise _core.EvaluationError(f"{name}={tolerance:g}: a tolerance is a positive number")
-        increments = np.diff(times)
-        if not ((increments > 0).all() or (increments < 0).all()):
-            raise _core.EvaluationError("times are strictly increasing, or strictly decreasing")
-        self._integration().configuration_rate(q, v, "double", None)  # checks both
-        q, v = np.array(q, float), np.array(v, float)
-        given = {name: np.zeros(self.nv) if x is None else _core.real_array(x, name) for name, x in (("tau", tau), ("damping", damping))}
-        for name, x in given.items():
-            if x.shape != (self.nv,):
-                raise _core.ModelError(f"{name} of {self.name!r} takes {self.nv} numbers, not an array of shape {x.shape}")
-            checked_forces(self, x, name)
-        forces, friction = given.values()
+        q, v = at_state(self, q, v)
+        return self._trajectory(
+            chosen, q, v, _checked_times(times), tau=tau, damping=damping, rtol=rtol, atol=atol, step=step, normalise=normalise != "never",
+            precision=precision, form=form, refine=refine,
+        )  # fmt: skip
 
-        def accelerations(_: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-            return self.forward_dynamics(q, v, forces - friction * v, form=form, refine=refine, precision=precision)
+    def _trajectory(
+        self,
+        chosen: IntegratorName,
+        q,
+        v,
+        times: np.ndarray,
+        *,
+        tau=None,
+        damping=None,
+        rtol: float,
+        atol: float,
+        step: float | None = None,
+        normalise: bool = False,
+        precision: Any = "double",
+        form: str = "fast",
+        refine: Any = 0,
+        right_hand_side=None,
+    ) -> Trajectory:
+        """The same of arguments that are checked. right_hand_side: (t, q, v) -> v̇ in place of forward dynamics, for explicit methods."""
+        from .trajectory import Trajectory
 
-        return integrate_by_scipy(accelerations, self.configuration_rate, q, v, times, integrator.removeprefix("scipy:"), rtol, atol, step)
+        solver = chosen.solver(float(rtol), float(atol))
+        tolerances = (1.0, 1.0) if chosen.foreign else (float(rtol), float(atol))
+        run = self._integration().trajectory(
+            q, v, times.tolist(), tau, damping, chosen.name, *tolerances, float(step or 0), normalise, precision, form, refine, solver,
+            right_hand_side,
+        )  # fmt: skip
+        return Trajectory(times, run["q"], run["v"], run["evaluations"], run["seconds"], run["steps"], run["rejected"])
 
 
 def _checked_times(times: Any) -> np.ndarray:

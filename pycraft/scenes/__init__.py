@@ -1,7 +1,10 @@
 """Scenes: a model and the effects that act on it, each added by name; what is not named costs nothing."""
 
-from . import effects
+from . import effects, mechanisms
+from .checkpoint import Checkpoint
+from .events import Event
 from .file_reader import load_scene
+from .runs_on_disk import load_run
 from .scene import Scene
 
-__all__ = ["Scene", "effects", "load_scene"]
+__all__ = ["Checkpoint", "Event", "Scene", "effects", "load_run", "load_scene", "mechanisms"]

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import _core
+from ..dynamics.integrator_names import integrator_names
 from ..models.loaders.toml_file import TomlFile, TomlTable, nearest
 from ..models.loaders.toml_reader import MODEL, read_table, set_state
 from ..models.warning import warn
@@ -24,7 +25,8 @@ _RUN_UNITS = {"T": "in seconds", "rtol": "a tolerance", "atol": "a tolerance", "
 class PlainData:
     """Plain data in the place of a file: errors say which part of it is meant."""
 
-    path = "a scene's data"
+    def __init__(self, path: str = "a scene's data"):
+        self.path = path
 
     def at(self, place: tuple[str | int, ...]) -> str:
         """Where a value is: "a scene's data, effects[1].stiffness"."""
@@ -111,12 +113,17 @@ def _run(table: TomlTable) -> dict[str, Any]:
     options: dict[str, Any] = {}
     for key in table.data:
         if key == "integrator":
-            options[key] = table.choice(key, _core.integrators(scenes=True), "")
+            options[key] = table.choice(key, integrator_names(), "")
         elif not (number := table.number(key, 0.0, _RUN_UNITS[key])) > 0:
             raise table.error(key, f"the run: {key} = {number:g}; it is positive, {_RUN_UNITS[key]}")
         else:
             options[key] = number
     return options
+
+
+def enter(scene: Any, data: Mapping[str, Any], place: PlainData) -> None:
+    """Add one effect to a scene, of the data of an entry of `effects`."""
+    _add(scene, TomlTable(place, data, (), "the effect", None))  # type: ignore[arg-type]  # says where, as a file does
 
 
 # Effects --------------------------------------------------------------------------------------------------------------

@@ -75,7 +75,7 @@ def sampled_times(T: float) -> np.ndarray:
 
 def run_at(scene: Any, times: Sequence[float] | np.ndarray, q: Any, v: Any, **options: Any) -> Any:
     """A run that gives the states at these times alone, without an account of works."""
-    return scene.simulate(times[-1], q, v, t_eval=times, energy=False, **options)
+    return scene.simulate(times[-1], q, v, t_eval=times, energy=False, dense=False, progress=False, **options)
 
 
 def timed_run(scene: Any, times: Sequence[float] | np.ndarray, q: Any, v: Any, **options: Any) -> tuple[Any, float]:

@@ -2,78 +2,232 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from .. import _core
+from .checkpoint import Checkpoint
+from .events import EventStates
+from .motion import Motion
 
 
-def run_times(T: float, t_eval: Any) -> tuple[list[float], bool, slice]:
-    """Times for the core, whether every step is given out, and which of what comes back was asked for."""
-    if not (0 < T < np.inf):
-        raise _core.EvaluationError(f"T={T:g}: a run lasts a positive number of seconds")
-    if t_eval is None:
-        return [0.0, T], True, slice(None)
-    times = np.atleast_1d(_core.real_array(t_eval, "t_eval"))
-    if times.ndim != 1 or not times.size or not np.isfinite(times).all() or not (np.diff(times) > 0).all():
-        raise _core.EvaluationError("t_eval: a rising list of times in seconds")
-    if times[0] < 0 or times[-1] > T:
-        raise _core.EvaluationError(f"t_eval goes from {times[0]:g} to {times[-1]:g} s; the run goes from 0 to T = {T:g} s")
-    before, after = times[0] > 0, times[-1] < T
-    return [*([0.0] if before else []), *times.tolist(), *([T] if after else [])], False, slice(int(before), -1 if after else None)
-
-
-class Run:
+class Run(Motion):
     """States of a scene over time, and what follows from them.
 
     Attributes
     ----------
-    t : (K,) s
+    t : (K,) s, the times asked for, or the ends of all steps
     q, v : (K, nq), (K, nv)
     states : (K, n), the effects' own
-    statistics : evaluations, steps, rejected steps, seconds, and how often each pass ran
+    events : by name, the states at which they happened (`EventStates`)
+    ended_by : the name of the event that ended the run, None where it reached its end
+    statistics : evaluations of the accelerations, steps, rejected steps, seconds, linearizations (of integrators that solve by
+        derivatives), solutions (of variational ones: of the equations of a step), and how often each pass ran
+
+    Examples
+    --------
+    >>> import pycraft as pc
+    >>> run = pc.mechanisms.double_pendulum().simulate(2.0)
+    >>> run.energy["kinetic"].shape == run.t.shape, run.forces["gravity"].shape == run.v.shape
+    (True, True)
+    >>> run.at(0.7).frame("lower").position.shape
+    (3,)
     """
 
-    def __init__(self, model: Any, calls: _core.SceneCalls, names: list[str], found: dict[str, Any], keep: slice, energy: bool):
-        self._model, self._calls, self._names, self._counted = model, calls, names, energy
-        self.t, self.q, self.v, self.states = (found[name][keep] for name in ("t", "q", "v", "own"))
-        self._work = found["work"][keep]
-        self.statistics = {name: found[name] for name in ("evaluations", "steps", "rejected", "seconds", "passes")}
+    def __init__(
+        self, about: Mapping[str, Any], rows: Mapping[str, np.ndarray], calls: Any = None, *, steps: Mapping[str, np.ndarray] | None = None,
+        events: Mapping[str, EventStates] | None = None, ended_by: str | None = None, statistics: Mapping[str, Any] | None = None,
+        checkpoint: Checkpoint | None = None,
+    ):  # fmt: skip
+        super().__init__(about, rows, calls)
+        self._steps = None if steps is None else dict(steps)
+        self.events, self.ended_by = dict(events or {}), ended_by
+        self.statistics = dict(statistics or {})
+        self._checkpoint = checkpoint
 
-    @cached_property
-    def _along(self) -> dict[str, np.ndarray]:
-        return self._calls.along(self.t, self.q, self.v, self.states)
+    @classmethod
+    def of_record(
+        cls, scene: Any, calls: _core.SceneCalls, record: _core.RunRecord, options: Any, events: list[Any], keep: slice | None
+    ) -> Run:
+        """What the core wrote down of a run of a scene."""
+        names, integrator, precision = scene._names_on(), options.integrator.name, scene._how[3]
+        steps = record.steps
+        rows = steps if keep is None else {name: x[keep] for name, x in record.samples.items()}
+        about = {
+            "model": scene.model, "effects": names, "workers": list(calls.workers), "energy": options.energy, "integrator": integrator,
+            "options": options.told, "precision": precision,
+        }  # fmt: skip
+        kinds = [*record.own_events, *(event.name for event in events)]
+        of, states = record.events
+        happened = {}
+        for name in dict.fromkeys(kinds):
+            its = [kinds[i] == name for i in of]
+            happened[name] = EventStates(*(states[key][its] for key in ("t", "q", "v", "states")))
+        kept = record.checkpoint
+        checkpoint = Checkpoint(sum(kept["t"]), scene.model.name, tuple(names), precision, integrator, options.told, dict(kept))
+        return cls(
+            about, rows, calls, steps=steps if len(steps["t"]) else None, events=happened, statistics=record.statistics,
+            ended_by=kinds[record.ended_by] if record.ended_by >= 0 else None, checkpoint=checkpoint,
+        )  # fmt: skip
 
-    @property
-    def vdot(self) -> np.ndarray:
-        """(K, nv) accelerations."""
-        return self._along["vdot"]
+    # ------------------------------------------------------------------ between the rows
+    def at(self, t: Any) -> Motion:
+        """The states at one time, or at several.
 
-    @property
-    def forces(self) -> dict[str, np.ndarray]:
-        """(K, nv) generalized forces of every effect."""
-        return dict(zip(self._names, self._along["forces"], strict=True))
+        By the dense output of the integrator where it has one of its own ("dopri5", order 4; "rosenbrock4", order 3), else by Hermite's
+        interpolation in q, v, v̇ on the group between the ends of steps: errors of a step of size h are O(h⁶) in q, O(h⁵) in v and O(h⁴)
+        in works and effects' own states (docs/simulation.md). A run that was pickled or read from a file has the latter, and straight
+        lines for works and states.
 
-    @cached_property
-    def energy(self) -> dict[str, np.ndarray]:
-        """Energies in J: "kinetic" (K,), rotors included; "potential" (K,), of all effects that have one; "work" (K, n), of each effect of
-        `workers`, what it has done since the start besides. kinetic + potential - Σ work is constant, but for the integrator's error.
+        Parameters
+        ----------
+        t : s, one number or (K,), within the run
+
+        Raises
+        ------
+        EvaluationError
+            A time outside of the run; a run that kept no steps (dense=False).
         """
-        if not self._counted:
-            raise _core.EvaluationError("this run kept no account of works; simulate with energy=True")
-        return {"kinetic": self._along["kinetic"], "potential": self._along["potential"].sum(axis=1), "work": self._work}
+        times = _core.real_array(t, "t")
+        if times.ndim > 1:
+            raise _core.EvaluationError(f"t: a time or a list of times in seconds, not an array {times.shape}")
+        rows = self._steps
+        if rows is None:
+            raise _core.EvaluationError("this run kept the times of t_eval alone; simulate with dense=True to look between them")
+        wanted, known = np.atleast_1d(times).astype(float), rows["t"]
+        outside = wanted[~((wanted >= known[0]) & (wanted <= known[-1]))]
+        if outside.size:
+            raise _core.EvaluationError(f"t = {outside[0]:g} s is not in the run, which goes from {known[0]:g} to {known[-1]:g} s")
+        found = self._between(rows, wanted) if len(known) > 1 else {name: x[np.zeros(len(wanted), int)] for name, x in rows.items()}
+        return Motion(self._about, found, self._calls, alone=times.ndim == 0)
 
-    @property
-    def workers(self) -> list[str]:
-        """The effects whose works are counted, in the order of the columns of `energy["work"]`."""
-        return [self._names[i] for i in self._calls.workers]
+    def _between(self, rows: Mapping[str, np.ndarray], times: np.ndarray) -> dict[str, np.ndarray]:
+        order = np.argsort(times, kind="stable")
+        steps = np.clip(np.searchsorted(rows["t"], times[order], side="left") - 1, 0, len(rows["t"]) - 2)
+        if self._calls is not None:
+            integrator = self._about["integrator"] if ":" not in self._about["integrator"] else ""
+            t, q, v, states, work = (rows[name] for name in ("t", "q", "v", "states", "work"))
+            found = _core.scene_between(self._calls, integrator, t, q, v, states, work, times[order].tolist(), steps.tolist())
+        else:
+            found = self._interpolated(rows, times[order], steps)
+        back = np.argsort(order, kind="stable")
+        return {name: x[back] for name, x in found.items()}
 
-    def __len__(self) -> int:
-        return len(self.t)
+    def _interpolated(self, rows: Mapping[str, np.ndarray], times: np.ndarray, steps: np.ndarray) -> dict[str, np.ndarray]:
+        t, vdot = rows["t"], self._vdot_of_steps
+        q, v = _core.hermite_between(self.model, t, rows["q"], rows["v"], vdot, times.tolist(), steps.tolist())
+        share = ((times - t[steps]) / (t[steps + 1] - t[steps]))[:, None]
+        lines = {name: (1 - share) * rows[name][steps] + share * rows[name][steps + 1] for name in ("states", "work")}
+        return {"t": times, "q": q, "v": v, **lines}
+
+    @cached_property
+    def _vdot_of_steps(self) -> np.ndarray:
+        rows = self._steps
+        if rows is None or rows["t"] is self.t:
+            return self.vdot
+        return self._calls.along(*(rows[name] for name in ("t", "q", "v", "states")))["vdot"]
+
+    def checkpoint(self) -> Checkpoint:
+        """From where the run can go on: `scene.resume(run.checkpoint(), T)`."""
+        if self._checkpoint is None:
+            raise _core.EvaluationError(
+                "a run that was read from a file has no checkpoint; save that of the run itself: run.checkpoint().save(path)"
+            )
+        return self._checkpoint
+
+    # ------------------------------------------------------------------ ways out
+    def to_xarray(self) -> Any:
+        """The run as an xarray Dataset, with units. ImportError where xarray is missing (extra [data])."""
+        from .run_tables import to_xarray
+
+        return to_xarray(self)
+
+    def to_dataframe(self) -> Any:
+        """The run as a pandas DataFrame, a row a time. ImportError where pandas is missing (extra [data])."""
+        from .run_tables import to_dataframe
+
+        return to_dataframe(self)
+
+    def save(self, path: str | Path) -> None:
+        """Write the run, by the path's ending: ".nc" (NetCDF), ".parquet" or ".csv". `pycraft.load_run` reads the first two.
+
+        Raises
+        ------
+        EvaluationError
+            Another ending.
+        OSError
+            A path that cannot be written.
+        ImportError
+            Parquet without pyarrow (extra [data]).
+        """
+        from .runs_on_disk import save
+
+        save(self, path)
+
+    def plot(self, *what: str, coordinates: Any = None) -> Any:
+        """Pictures over time, one above the other: returns Matplotlib's figure.
+
+        Parameters
+        ----------
+        what : of "q", "v", "vdot", "energy", "balance", "forces"; "q", "v", "energy" and "forces" where left out
+        coordinates : names of coordinates or hinges, patterns, or a list of them; None: all
+        """
+        from .run_plots import plot
+
+        return plot(self, what, coordinates)
+
+    def animate(self, output: Any = None, *, fps: float = 25.0, speed: float = 1.0, trace: str | None = None, **options: Any) -> Any:
+        """The run as a moving stick figure, by Matplotlib alone.
+
+        Parameters
+        ----------
+        output : path that ends in ".html", ".gif" or ".mp4" (with ffmpeg), where it is written
+        fps : frames a second
+        speed : seconds of the run in a second of the film
+        trace : a body or node whose origin leaves its way behind
+        options : as `Multibody.plot` takes them: view, com, names, legend, shadow, ax
+
+        Returns
+        -------
+        RunAnimation
+            A notebook shows it with buttons to play it; `save` writes it, too. A run that kept no steps (dense=False) shows the last
+            state that was asked for before each frame.
+
+        Raises
+        ------
+        EvaluationError
+            Too many frames, another ending, a view that does not fit.
+        ModelError
+            A trace of what is not there.
+        OSError
+            An output that cannot be written, before a frame is drawn.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> pc.mechanisms.double_pendulum().simulate(0.2).animate(trace="lower")
+        <animation of 'double pendulum': 6 frames, 0 to 0.2 s>
+        """
+        from .run_animation import RunAnimation, checked_film
+
+        target = None if output is None else checked_film(output)
+        film = RunAnimation(self, fps, speed, trace, options)
+        if target is not None:
+            film.save(target)
+        return film
+
+    # ------------------------------------------------------------------ copies
+    def __getstate__(self) -> dict[str, Any]:
+        if self._calls is not None and self._steps is not None:
+            self._vdot_of_steps  # noqa: B018 - is kept
+        return super().__getstate__()
 
     def __repr__(self) -> str:
-        return (
-            f"<run of {self._model.name!r}: {len(self.t)} states from {self.t[0]:g} to {self.t[-1]:g} s, {self.statistics['steps']} steps>"
-        )
+        steps = self.statistics.get("steps")
+        ended = f", ended by {self.ended_by!r}" if self.ended_by else ""
+        counted = "" if steps is None else f", {steps} steps"
+        return f"<run of {self.model.name!r}: {len(self.t)} states from {self.t[0]:g} to {self.t[-1]:g} s{counted}{ended}>"

@@ -16,7 +16,8 @@ from .effects import Effect, UserEffect
 from .explain import plan_text
 from .filed import Filed
 from .measurements import Measurements
-from .run import Run, run_times
+from .run import Run
+from .simulation import RunOptions, resume, simulate
 
 
 @dataclass(frozen=True)
@@ -90,6 +91,7 @@ class Scene(Measurements, Filed, Closed):
         self._entries: dict[str, tuple[Effect, bool]] = {}
         self._how = (form, _core.checked_refinement(refine, residual, precision), residual, precision)
         self._built: tuple[Any, Any] | None = None
+        self._last_run: Run | None = None
         self._calls()
 
     # ------------------------------------------------------------------ effects
@@ -237,9 +239,14 @@ class Scene(Measurements, Filed, Closed):
         rtol: float = 1e-9,
         atol: float = 1e-12,
         step: float | None = None,
+        max_step: float | None = None,
         t_eval=None,
+        events=None,
         energy: bool = True,
         normalise: str = "never",
+        progress: bool = True,
+        dense: bool = True,
+        output=None,
     ) -> Run:
         """The motion from a state at t = 0 to T.
 
@@ -247,42 +254,71 @@ class Scene(Measurements, Filed, Closed):
         ----------
         T : s
         q, v : (nq,), (nv,) at t = 0, by the rule of direct calls; prescribed coordinates are their motion's
-        integrator : {"dopri5", "cash-karp54", "fehlberg78", "bulirsch-stoer", "rk4", "rkmk4", "semi-implicit-euler"}
-            As in `Multibody.integrate_ode`. "semi-implicit-euler" (order 1, steps of one size) takes implicit damping and stiffness into D:
-            stable for any.
+        integrator : {"dopri5", "fehlberg78", "rosenbrock4", "rkmk4", "semi-implicit-euler", "variational2", "dop853", "cvode", ...}
+            docs/simulation.md says when to take which. "rosenbrock4" is for stiff scenes, "variational2" and "variational4" for long ones;
+            "semi-implicit-euler" (order 1) takes implicit damping and stiffness into D: stable for any.
         rtol, atol : tolerances on the error of one step, per component of q, v and the effects' own states
         step : s
             Of one-size steps; the first step of the others, chosen if left out.
+        max_step : s, no controlled step is longer; None: any
         t_eval : (K,) s, rising, from 0 to T at most; the end of every step where left out
+        events : a function (t, state) -> float whose zeros are looked for, an `Event`, a list of either, or a dictionary by name
+            Functions may have SciPy's attributes `direction` and `terminal`. `Run.events` has the states at the zeros.
         energy : bool
             Whether the work of each effect is kept account of, for `Run.energy`.
         normalise : {"never", "each step"}
             Whether quaternions are set to unit length after each step.
+        progress : bool
+            Whether a run of more than a second shows how far it is, in a terminal or notebook.
+        dense : bool
+            Whether the ends of all steps are kept beside the times of t_eval, for `Run.at`; without t_eval they are.
+        output : path that ends in ".nc", ".parquet" or ".csv", where the run is written; refused before the run if it cannot be
 
         Raises
         ------
         EvaluationError
-            Unknown names, times out of order, tolerances below the precision; the time where the step size falls to rounding or the
-            state is no longer finite; an effect whose forces are not finite, by name, with the time.
+            Unknown names, times out of order, tolerances below the precision, an integrator that does not fit an effect or the precision
+            (both are named); the time where the step size falls to rounding or the state is no longer finite, with the coordinate; an
+            effect whose forces are not finite, by name, with the time; an event that gives no number.
         SingularHingeError
             Of forward dynamics, with the time.
+        OSError
+            An output that cannot be written.
+
+        What was computed before an error or Ctrl-C is the error's attribute `run`, and `scene.last_run`.
         """
-        if integrator not in _core.integrators(scenes=True):
-            raise _core.EvaluationError(
-                f"no integrator is called {integrator!r}; there are {', '.join(map(repr, _core.integrators(scenes=True)))}"
-            )
-        if normalise not in ("never", "each step"):
-            raise _core.EvaluationError(f"normalise={normalise!r}: there are 'never' and 'each step'")
-        if step is not None and not step > 0:
-            raise _core.EvaluationError(f"step={step}: a step is a positive number of seconds")
-        times, every_step, keep = run_times(one_number(T, "T"), t_eval)
-        q, v = at_state(self._model, q, v)
-        calls = self._calls()
-        found = calls.simulate(
-            q, v, times, [], energy, integrator, float(rtol), float(atol), float(step or 0), every_step, normalise != "never"
-        )  # fmt: skip
-        names = [name for name, (_, on) in self._entries.items() if on]
-        return Run(self._model, calls, names, found, keep, energy)
+        options = RunOptions.checked(integrator, rtol, atol, step, max_step, normalise, energy)
+        return simulate(self, T, q, v, options, t_eval=t_eval, events=events, progress=bool(progress), dense=bool(dense), output=output)
+
+    def resume(self, checkpoint, T: float, *, t_eval=None, events=None, progress: bool = True, dense: bool = True, output=None) -> Run:
+        """The motion goes on from a checkpoint to T, with the integrator, tolerances and accounts that it has.
+
+        For one-step methods it is bit for bit what a run to T would have been, but for "bulirsch-stoer", which remembers what order was
+        best, and for integrators of other packages. The first state is the checkpoint's: where the end of a run cut its last step short,
+        the start of that step, which is taken again. Works go on from what they were.
+
+        Parameters
+        ----------
+        checkpoint : Checkpoint, a run that has one, or the path of a saved one
+        T : s, later than the checkpoint
+        t_eval, events, progress, dense, output : as `simulate` takes them; give the same events, in the same order
+
+        Raises
+        ------
+        ModelError
+            A checkpoint of another scene: another model's name, other effects that are on, another precision.
+        EvaluationError
+            As `simulate`; a file that holds no checkpoint.
+        """
+        return resume(self, checkpoint, T, t_eval=t_eval, events=events, progress=bool(progress), dense=bool(dense), output=output)
+
+    @property
+    def last_run(self) -> Run | None:
+        """The last run, also one that an error or Ctrl-C ended; None before the first."""
+        return self._last_run
+
+    def _names_on(self) -> list[str]:
+        return [name for name, (_, on) in self._entries.items() if on]
 
     # ------------------------------------------------------------------ what it is
     def explain(self, at: str = "motion") -> str:

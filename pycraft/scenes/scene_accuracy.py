@@ -18,7 +18,6 @@ from ..accuracy.checked_options import (
 )
 from ..accuracy.rungs import Rung, epsilon, precision_name
 from ..accuracy.tables.work_precision import (
-    ONE_SIZE,
     STEPS,
     TOLERANCES,
     Integrate,
@@ -28,6 +27,7 @@ from ..accuracy.tables.work_precision import (
     trajectory_error,
 )
 from ..arguments import one_number
+from ..dynamics.integrator_names import integrator_names, takes_one_size
 from ..state import at_state
 from .measuring import effects_on, having_on, mark_front, sampled_times, timed_run
 
@@ -150,7 +150,7 @@ def _way(scene: Any, varied: str, left_out: Sequence[str] = ()) -> dict[str, Any
 
 def _integrators(scene: Any, integrators: Any, tolerances: Any, steps: Any) -> list[Way]:
     """The scene as it is, by integrators at tolerances or steps."""
-    names = checked_names(INTEGRATORS if integrators is None else integrators, "integrators", "integrator", _core.integrators(scenes=True))
+    names = checked_names(INTEGRATORS if integrators is None else integrators, "integrators", "integrator", integrator_names())
     controlled = checked_positive(TOLERANCES if tolerances is None else tolerances, "tolerances", "a positive, finite tolerance")
     sizes = checked_positive(STEPS if steps is None else steps, "steps", "a positive, finite number of seconds")
     ways: list[Way] = []
@@ -182,11 +182,6 @@ def _effects(scene: Any, without: Any) -> list[Way]:
     on = effects_on(scene)
     others = [(names, having_on(scene, set(on) - set(names))) for names in sets]
     return [(_way(other, "effects", names), other, USUAL[0], _options(*USUAL)) for names, other in others]
-
-
-def takes_one_size(integrator: str) -> bool:
-    """Whether an integrator takes steps of one size."""
-    return integrator in (*ONE_SIZE, "semi-implicit-euler")
 
 
 def _options(integrator: str, amount: float) -> dict[str, float]:

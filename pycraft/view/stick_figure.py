@@ -62,6 +62,8 @@ class StickFigure:
     artists : list
         Matplotlib's, all that a state moves.
     skeleton : Skeleton
+    canvas : Canvas
+        To draw lines and points of one's own, seen as the figure is.
 
     Raises
     ------
@@ -96,7 +98,7 @@ class StickFigure:
         self.model, self.skeleton = model, Skeleton(model)
         view = self._view(view, ax)
         self.ax = _axes(view, model) if ax is None else ax
-        self._canvas = Canvas(self.ax, VIEWS[view])
+        self.canvas = Canvas(self.ax, VIEWS[view])
         self._size, self._up, self._floor = 0.0, 2, 0.0
         self._grounded = self._is_grounded()
         self._draw(com, names, shadow and view == "3d", alpha)
@@ -130,7 +132,7 @@ class StickFigure:
     # ------------------------------------------------------------------ artists
     def _draw(self, com: bool, names: bool, shadow: bool, alpha: float) -> None:
         """Makes every artist, without places."""
-        canvas, skeleton = self._canvas, self.skeleton
+        canvas, skeleton = self.canvas, self.skeleton
         count = max(len(skeleton.names), 1)
         size = float(np.clip(7.5 * (20 / count) ** 0.4, 2.0, 7.5))
         width = float(np.clip(3.0 * (20 / count) ** 0.4, 0.8, 3.0))
@@ -163,8 +165,8 @@ class StickFigure:
         """One for each body, its area by its mass, and one for all."""
         style = dict(marker="o", mfc="#f0e442", mec="k", mew=0.6, alpha=alpha, zorder=6)
         largest = self.skeleton.masses.max(initial=0.0)
-        each = [self._canvas.points(ms=max(1.6 * size * np.sqrt(mass / largest), 1.5), **style) for mass in self.skeleton.masses]
-        return [*each, self._canvas.points(marker="P", ms=1.9 * size, mfc="#f0e442", mec="k", mew=1.0, alpha=alpha, zorder=7)]
+        each = [self.canvas.points(ms=max(1.6 * size * np.sqrt(mass / largest), 1.5), **style) for mass in self.skeleton.masses]
+        return [*each, self.canvas.points(marker="P", ms=1.9 * size, mfc="#f0e442", mec="k", mew=1.0, alpha=alpha, zorder=7)]
 
     def update(self, q: Any = None) -> list[Any]:
         """Move the figure to q (nq,), or to the model's own; returns the artists. ModelError for a q that is none. O(N · depth)."""
@@ -219,11 +221,11 @@ class StickFigure:
         low, high = everything.min(axis=0), everything.max(axis=0)
         reach = (high - low).max() or 1.0
         middle, half = (low + high) / 2, np.maximum((high - low) / 2, 0.18 * reach) + 0.06 * reach
-        self._canvas.frame(middle - half, middle + half)
+        self.canvas.frame(middle - half, middle + half)
         bones = np.linalg.norm(np.diff(placed(poses, *self.skeleton.lines["bone"]), axis=-2), axis=-1)
         typical = np.median(bones[bones > 1e-9 * reach]) if np.any(bones > 1e-9 * reach) else reach
         self._size = float(min(0.045 * reach, 0.4 * typical))
-        if self._canvas.columns is None:
+        if self.canvas.columns is None:
             self._up = int(getattr(self.ax, "_vertical_axis", 2))
             self._floor = float((self.ax.get_xlim3d, self.ax.get_ylim3d, self.ax.get_zlim3d)[self._up]()[0])
 
@@ -250,7 +252,7 @@ class StickFigure:
         entries += [(self._nodes.artist, f"node ({nodes})")] if nodes else []
         entries += [(self._masses[-1].artist, "centre of mass")] if self._masses else []
         handles, texts = [artist for artist, _ in entries], [text for _, text in entries]
-        if own_figure and self._canvas.columns is None:
+        if own_figure and self.canvas.columns is None:
             self.ax.figure.legend(handles, texts, frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(0.82, 0.5))
         else:
             self.ax.legend(handles, texts, frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))

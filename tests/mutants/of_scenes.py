@@ -1,19 +1,8 @@
-"""Changes of scenes, their effects and their integrators by hand: as of_cpp.py has them."""
+"""Changes of scenes and their effects by hand: as of_cpp.py has them."""
 
 STATEMENT = "statement"
 
 CHANGES = {
-    "cpp/simulation/integrators/integrate.cpp": [
-        ("the step after a cut step is the cut one", "cut && abs(tried) < abs(h) ? h : tried", "tried"),
-        ("lengths of quaternions walk", "scale_quaternions<S>(equations_.model(), lengths_.data(), x_.data());", ";", STATEMENT),
-        ("a sample is taken a piece too late", "std::min(stop, times_[i])", "times_[i]"),
-        ("a stepper keeps its slope over a sample", "begun && equations_.stops()", "false"),
-        ("implicit terms outlive their run", "equations.set_step(S(0));", ";", STATEMENT),
-    ],
-    "cpp/simulation/integrators/steps_on_the_group.h": [
-        ("implicit steps are explicit", "equations.set_step(h);", ";", STATEMENT),
-        ("stages are all at the step's beginning", "t + part[stage]", "t"),
-    ],
     "cpp/simulation/scene_equations.h": [
         ("works are seen by tolerances", "std::ldexp(1.0, 100)", "1.0"),
         ("prescribed coordinates drift", "scene_.effects().prescribe(t, x.data(), x.data() + nq(), nullptr);", ";", STATEMENT),

@@ -54,7 +54,7 @@ EFFECTS = [made for made in vars(pycraft.effects).values() if isinstance(made, t
 PAGES = sorted((ROOT / "docs" / "effects").glob("*.md"))
 
 
-@pytest.mark.parametrize("page", [ROOT / "docs" / "scenes.md", *PAGES], ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", [ROOT / "docs" / "scenes.md", ROOT / "docs" / "simulation.md", *PAGES], ids=lambda page: page.stem)
 def test_the_pages_of_scenes_run(page):
     result = doctest.testfile(str(page), module_relative=False, optionflags=doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS)
     assert result.failed == 0 and result.attempted > 3

@@ -232,7 +232,7 @@ RESTS_ON = {
     "closed_forms": ["proofs"],
     "sympy_bridge": ["proofs"],
     "accuracy": ["identities", "peers", "tidy"],
-    "scenes": ["models", "accuracy"],
+    "scenes": ["view"],
     "compiled": ["recursions"],
     "view": ["accuracy"],
     "face": ["accuracy", "compiled", "identities", "view"],

@@ -127,7 +127,7 @@ def test_what_slides_is_dashed_from_where_it_was():
     cart.add_body("cart", hinge="slider", axis=(1, 0, 0), position=(0, 0, 0.5), mass=1.0)
     figure = StickFigure(cart, [0.75])
     (slide,) = shown_lines(figure._lines["slide"])
-    assert figure._canvas.columns == VIEWS["xz"] and slide.tolist() == [[0, 0.5], [0.75, 0.5]]
+    assert figure.canvas.columns == VIEWS["xz"] and slide.tolist() == [[0, 0.5], [0.75, 0.5]]
     assert shown_points(figure._base).tolist() == [[0, 0]] and shown_lines(figure._lines["ground"]).tolist() == [[[0, 0], [0, 0.5]]]
 
 
@@ -236,7 +236,7 @@ def test_planes_that_models_never_leave():
     assert flat["one"] == flat["massless"] == (2,) and not any(flat[name] for name in flat if name not in ("one", "massless"))
     model = pc.Multibody("flat")
     model.add_body("cart", hinge="slider", axis=(1, 0, 0), mass=1.0)
-    assert Skeleton(model).normals() == (1, 2) and StickFigure(model)._canvas.columns == VIEWS["xz"]
+    assert Skeleton(model).normals() == (1, 2) and StickFigure(model).canvas.columns == VIEWS["xz"]
     model.add_body("pole", "cart", axis=(0, 1, 0), **ROD)
     assert Skeleton(model).normals() == (1,)
     beside = pc.Multibody.from_description(model.description())

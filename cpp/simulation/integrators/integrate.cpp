@@ -1,243 +1,231 @@
 #include "simulation/integrators/integrate.h"
 
 #include <algorithm>
-#include <boost/numeric/odeint/stepper/bulirsch_stoer.hpp>
-#include <boost/numeric/odeint/stepper/controlled_runge_kutta.hpp>
-#include <boost/numeric/odeint/stepper/runge_kutta4.hpp>
-#include <boost/numeric/odeint/stepper/runge_kutta_cash_karp54.hpp>
-#include <boost/numeric/odeint/stepper/runge_kutta_dopri5.hpp>
-#include <boost/numeric/odeint/stepper/runge_kutta_fehlberg78.hpp>
+#include <chrono>
 #include <cmath>
 
-#include "model/checks.h"
 #include "runtime/errors.h"
-#include "simulation/integrators/steps_on_the_group.h"
+#include "simulation/dense_output.h"
+#include "simulation/integrators/runge_kutta_steps.h"
 
 namespace pycraft {
 
 namespace {
 
-namespace odeint = boost::numeric::odeint;
-
-template <class S>
-bool all_finite(const std::vector<S>& x) {
-  return std::all_of(x.begin(), x.end(), [](const S& y) { return std::isfinite(to_double(y)); });
+template <class E>
+[[noreturn]] void rethrow_at(double t, E e) {  // all else that the error knows stays
+  static_cast<std::runtime_error&>(e) = std::runtime_error(e.what() + ("; integrating, at t = " + short_number(t) + " s"));
+  throw e;
 }
 
-// One run: the state, the time, and what both kinds of stepping share.
 template <class S>
 class Run {
  public:
   using State = std::vector<S>;
-  using Out = std::function<void(const S&, const State&)>;
-  Run(Equations<S>& equations, State x, const std::vector<double>& times, const IntegratorOptions& options, const Out& out)
-      : equations_(equations), x_(std::move(x)), times_(times), options_(options), out_(out), t_(times.front()) {}
+  Run(Equations<S>& equations, Stepper<S>& stepper, State x, const RunPlan<S>& plan, const IntegratorOptions& options, Watcher<S>& watcher, RunEnd<S>& end)
+      : equations_(equations), stepper_(stepper), x_(std::move(x)), plan_(plan), options_(options), watcher_(watcher), end_(end), events_(with_those_of(equations, plan.events)), watch_(events_),
+        between_(equations, record().order == 1), t_(plan.resumed ? plan.resumed->t : S(plan.times.front())), at_times_(plan.end_at_times || !record().samples_between) {}
 
-  IntegrationCost go() {
+  void go() {
     try {
-      out_(t_, x_);
-      if (times_.size() > 1) choose_stepper();
+      run();
     } catch (const RefinementError& e) {
-      rethrow_with_time(e);
+      close(), rethrow_at(to_double(t_), e);
     } catch (const SingularHingeError& e) {
-      rethrow_with_time(e);
+      close(), rethrow_at(to_double(t_), e);
     } catch (const SingularOperatorError& e) {
-      rethrow_with_time(e);
+      close(), rethrow_at(to_double(t_), e);
+    } catch (...) {
+      close();
+      throw;
     }
-    cost_.evaluations = equations_.evaluations;
-    return cost_;
+    close();
   }
 
  private:
-  std::string at_time() const { return "; integrating, at t = " + short_number(to_double(t_)) + " s"; }
-  template <class E>
-  [[noreturn]] void rethrow_with_time(E e) const {  // all else that the error knows stays
-    static_cast<std::runtime_error&>(e) = std::runtime_error(e.what() + at_time());
-    throw e;
-  }
-  [[noreturn]] void refuse(const std::string& what) const {
-    throw EvaluationError(std::string("integrator '") + integrator_name(options_.integrator) + "': " + what);
+  const IntegratorRecord& record() const { return record_of(options_.integrator); }
+  static EventFunctions<S> with_those_of(Equations<S>& equations, const EventFunctions<S>& given) {
+    EventFunctions<S> all;
+    const std::vector<std::string> own = equations.event_names();
+    for (const std::string& name : own) all.kinds.push_back({name, 0, false, true});
+    all.kinds.insert(all.kinds.end(), given.kinds.begin(), given.kinds.end());
+    const int n = static_cast<int>(own.size());
+    all.value = [&equations, &given, n, values = State(own.size())](int i, const S& t, const State& x) mutable {
+      if (i >= n) return given.value(i - n, t, x);
+      equations.events(t, x, values.data());
+      return values[i];
+    };
+    all.all = [&equations, &given, n](const S& t, const State& x, S* out) {
+      if (n > 0) equations.events(t, x, out);
+      for (size_t i = 0; i < given.kinds.size(); ++i) out[n + i] = given.value(static_cast<int>(i), t, x);
+    };
+    return all;
   }
 
-  void choose_stepper() {
-    using Dopri5 = odeint::runge_kutta_dopri5<State, S, State, S>;
-    using CashKarp = odeint::runge_kutta_cash_karp54<State, S, State, S>;
-    using Fehlberg = odeint::runge_kutta_fehlberg78<State, S, State, S>;
-    const S atol = S(options_.atol), rtol = S(options_.rtol);
-    const auto controlled = [&]<class Stepper>(Stepper) {
-      using Checker = odeint::default_error_checker<S, typename Stepper::algebra_type, typename Stepper::operations_type>;
-      with_controlled_steps(odeint::controlled_runge_kutta<Stepper>(Checker(atol, rtol, S(1), S(1))));
-    };
-    const auto on_the_group = [&](auto stepper) {
-      lengths_.resize(x_.size());
-      quaternion_lengths(equations_.model(), x_.data(), lengths_.data());
-      with_fixed_steps([&](const S& h) { stepper.do_step(equations_, x_, t_, h); });
-    };
-    switch (options_.integrator) {
-      case Integrator::dopri5: return controlled(Dopri5());
-      case Integrator::cash_karp54: return controlled(CashKarp());
-      case Integrator::fehlberg78: return controlled(Fehlberg());
-      case Integrator::bulirsch_stoer: return with_controlled_steps(odeint::bulirsch_stoer<State, S, State, S>(atol, rtol, S(1), S(1)));
-      case Integrator::rk4: {
-        odeint::runge_kutta4<State, S, State, S> stepper;
-        return with_fixed_steps([&](const S& h) { stepper.do_step(std::ref(equations_), x_, t_, h); });
-      }
-      case Integrator::rkmk4: return on_the_group(MuntheKaas4<S>(equations_));
-      case Integrator::semi_implicit_euler: return on_the_group(SemiImplicitEuler<S>(equations_));
+  void run() {
+    const std::vector<double>& times = plan_.times;
+    forwards_ = times.back() >= times.front();
+    if (record().on_group) lengths_.resize(x_.size()), quaternion_lengths(equations_.model(), x_.data(), lengths_.data());
+    keep();
+    watcher_.step(t_, x_), watcher_.sample(t_, x_);
+    if (times.size() == 1) return;
+    if (equations_.stops() && !forwards_) refuse(options_.integrator, "a sampled controller acts, and time runs backwards");
+    stepper_.start(t_, x_, S(times.back()), plan_.resumed ? &plan_.resumed->pace : nullptr);
+    watch_.begin(t_, x_, plan_.resumed ? &plan_.resumed->signs : nullptr);
+    keep();
+    while (next_ < times.size() && end_.event < 0) piece();
+  }
+
+  // To the next time at which a step must end.
+  void piece() {
+    const double target = at_times_ ? plan_.times[next_] : plan_.times.back(), stop = equations_.stops() ? equations_.next_stop(to_double(t_)) : std::numeric_limits<double>::infinity();
+    to_ = S(forwards_ ? std::min(stop, target) : target);
+    stepper_.begin(t_, x_, to_);
+    while (!there() && end_.event < 0) step();
+    if (end_.event >= 0) return;
+    t_ = to_;
+    if (stop <= target) {
+      equations_.stop(t_, x_);
+      stepper_.forget();
+      whole_ = true, fresh_ = true;
     }
+    while (next_ < plan_.times.size() && S(plan_.times[next_]) == t_) watcher_.sample(t_, x_), ++next_;
+  }
+  // What is left is no step any more, but the rounding of the times themselves.
+  bool there() const {
+    using std::abs;
+    return !(abs(to_ - t_) > S(4) * epsilon<S>() * std::max(S(abs(to_)), S(abs(t_))));
   }
 
-  void after_step() {
-    ++cost_.steps;
-    equations_.settle(t_, x_);
+  void step() {
+    keep();
+    whole_ = fresh_ = false;
+    stepper_.advance(t_, x_);
+    ++end_.cost.steps;
+    finish(t_, x_);
+    if (watch_.any())
+      look_for_events();
+    else
+      sample_to(t_, x_);
+    if (options_.normalise) stepper_.forget();
+    watcher_.step(t_, x_);
+    tell_progress();
+  }
+  void finish(const S& t, State& x) {
+    equations_.settle(t, x);
     if (options_.normalise)
-      scale_quaternions<S>(equations_.model(), nullptr, x_.data());
+      scale_quaternions<S>(equations_.model(), nullptr, x.data());
     else if (!lengths_.empty())
-      scale_quaternions<S>(equations_.model(), lengths_.data(), x_.data());
-    if (options_.every_step) out_(t_, x_);
+      scale_quaternions<S>(equations_.model(), lengths_.data(), x.data());
   }
-
-  // advance(from, to) along all pieces between the times, which stops cut.
-  template <class Advance>
-  void piece_by_piece(Advance advance) {
-    for (size_t i = 1; i < times_.size(); ++i) {
-      double from = times_[i - 1];
-      for (;;) {
-        const double stop = equations_.next_stop(from), to = std::min(stop, times_[i]);
-        advance(from, to);
-        t_ = S(to);
-        if (stop <= times_[i]) equations_.stop(t_, x_);
-        if (to == times_[i]) break;
-        from = to;
+  void look_for_events() {
+    const auto within = [&](const S& t, State& x) {
+      stepper_.within(kept_.t, kept_.x, t, x);
+      finish(t, x);
+    };
+    for (const Crossing<S>& c : watch_.in_step(kept_.t, kept_.x, t_, x_, within)) {
+      watch_.pass(c);
+      if (!c.counts) continue;
+      const EventKind& kind = events_.kinds[c.event];
+      watcher_.event(c.event, c.t, c.x);
+      if (!kind.terminal && !kind.ends_step) continue;
+      sample_to(c.t, x_);
+      t_ = c.t, x_ = c.x;
+      stepper_.forget();
+      whole_ = true, fresh_ = true;
+      if (kind.terminal)
+        end_.event = c.event;
+      else if (!there())
+        stepper_.begin(t_, x_, to_);
+      return;
+    }
+    sample_to(t_, x_);
+  }
+  // The times asked for within the last step, up to one at which it goes on; x: its own end.
+  void sample_to(const S& until, const State& x) {
+    bool set = false;
+    for (; !at_times_ && next_ < plan_.times.size(); ++next_) {
+      const S t = S(plan_.times[next_]);
+      if (forwards_ ? t > until : t < until) return;
+      if (t == to_) return;  // after what happens there
+      if (t == until && until == t_) {
+        watcher_.sample(t, x);
+        continue;
       }
-      if (!options_.every_step) out_(t_, x_);
-    }
-  }
-  template <class Advance>
-  void advance_along(Advance advance) {
-    if (equations_.stops()) {
-      if (times_.back() < times_.front()) refuse("a sampled controller acts, and time runs backwards");
-      return piece_by_piece(advance);
-    }
-    for (size_t i = 1; i < times_.size(); ++i) {
-      advance(times_[i - 1], times_[i]);
-      t_ = S(times_[i]);
-      if (!options_.every_step) out_(t_, x_);
-    }
-  }
-
-  // As many equal steps between two times as make each at most options_.step.
-  template <class Step>
-  void with_fixed_steps(Step step) {
-    advance_along([&](double begin, double end) {
-      const S from = S(begin), span = S(end) - from;
-      const long count = std::max(1L, static_cast<long>(std::ceil(std::abs(to_double(span)) / options_.step * (1 - 1e-12))));
-      const S h = span / S(count);
-      for (long j = 0; j < count; ++j) {
-        const S before = t_ = from + S(j) * h;
-        step(h);
-        t_ = j + 1 == count ? S(end) : from + S(j + 1) * h;
-        after_step();
-        if (!all_finite(x_))
-          refuse("the state is no longer finite in the step after t = " + short_number(to_double(before)) + " s of " + short_number(to_double(h)) +
-                 " s; take smaller steps (step=)");
+      if (!stepper_.interpolate(t, sampled_)) {
+        if (!set) between_.set(kept_.t, kept_.x, t_, x);
+        set = true;
+        between_.at(t, sampled_);
       }
-    });
-  }
-
-  // The first step size: a hundredth of the time in which the state would change by its own size, both measured by the tolerances.
-  S first_step() {
-    using std::abs;
-    if (options_.step > 0) return S(options_.step);
-    State rate(x_.size());
-    equations_(x_, rate, t_);
-    S size = S(0), change = S(0);
-    for (size_t i = 0; i < x_.size(); ++i) {
-      const S scale = S(options_.atol) + S(options_.rtol) * abs(x_[i]);
-      size = std::max(size, S(abs(x_[i]) / scale));
-      change = std::max(change, S(abs(rate[i]) / scale));
+      finish(t, sampled_);
+      watcher_.sample(t, sampled_);
     }
-    const S span = abs(S(times_.back()) - S(times_.front()));
-    if (!(change > S(0)) || !(size > S(0))) return span / S(1000);
-    return std::min(span, S(size / change / S(100)));
+  }
+  void tell_progress() {
+    const auto now = std::chrono::steady_clock::now();
+    if (now - told_ < std::chrono::milliseconds(100)) return;
+    told_ = now;
+    watcher_.progress(to_double(t_));
   }
 
-  template <class Stepper>
-  void with_controlled_steps(Stepper stepper) {
-    using std::abs;
-    const S direction = times_.back() < times_.front() ? S(-1) : S(1), whole = abs(S(times_.back()) - S(times_.front()));
-    S h = direction * first_step();
-    State kept;
-    bool begun = false;
-    advance_along([&](double, double end) {
-      const S to = S(end);
-      if (begun && equations_.stops()) forget(stepper);
-      begun = true;
-      // What is left is no step any more, but the rounding of the times themselves.
-      while (abs(to - t_) > S(4) * epsilon<S>() * std::max(S(abs(to)), S(abs(t_)))) {
-        const bool cut = abs(h) >= abs(to - t_);
-        S tried = cut ? to - t_ : h;
-        const S before = tried, from = t_;
-        kept = x_;
-        const bool taken = stepper.try_step(std::ref(equations_), x_, t_, tried) == odeint::success;
-        if (taken && all_finite(x_)) {
-          refusals_ = 0;
-          if (cut) t_ = to;
-          after_step();
-          if (options_.normalise) forget(stepper);
-          // A step cut short tells only whether the next may be longer.
-          h = cut && abs(tried) < abs(h) ? h : tried;
-          continue;
-        }
-        ++cost_.rejected;
-        if (taken) {  // not finite: the step was far too long
-          x_ = kept;
-          t_ = from;
-          tried = before / S(10);
-          forget(stepper);
-        }
-        h = abs(tried) < abs(before) ? tried : before / S(2);
-        if (++refusals_ > 200 || abs(h) < S(16) * epsilon<S>() * std::max(whole, S(abs(t_)))) refuse_step(h);
-      }
-    });
-  }
-  // A stepper that keeps the derivative at the end of its step, where the state has changed since.
-  template <class Stepper>
-  static void forget(Stepper& stepper) {
-    if constexpr (requires { stepper.reset(); }) stepper.reset();
-  }
-  [[noreturn]] void refuse_step(const S& h) const {
-    refuse("the step size fell to " + short_number(to_double(h)) + " s at t = " + short_number(to_double(t_)) + " s, without the error estimate " +
-           "reaching rtol = " + short_number(options_.rtol) + ", atol = " + short_number(options_.atol) +
-           "; the motion is singular or not finite there, or stiff (integrator=\"scipy:Radau\"), or the tolerances are below the "
-           "precision's rounding");
+  // Where the last step began.
+  void keep() { kept_.t = t_, kept_.x = x_, kept_.pace = stepper_.pace(), kept_.signs = watch_.signs(); }
+  // A run that goes on takes the step again that the end of this one cut short, so that its steps are those of one that never ended.
+  void close() {
+    const bool completed = next_ >= plan_.times.size() || end_.event >= 0;
+    if (completed && (whole_ || !stepper_.cut())) keep();
+    if (fresh_ && completed && !record().controlled) kept_.pace = {};
+    end_.checkpoint = kept_;
+    end_.cost.rejected = stepper_.rejected();
+    end_.cost.evaluations = equations_.evaluations;
   }
 
   Equations<S>& equations_;
-  State x_, lengths_;  // lengths_: of the quaternions at first, where they are kept
-  const std::vector<double>& times_;
+  Stepper<S>& stepper_;
+  State x_, lengths_, sampled_;  // lengths_: of the quaternions at first, where they are kept
+  const RunPlan<S>& plan_;
   const IntegratorOptions& options_;
-  const Out& out_;
-  S t_;
-  IntegrationCost cost_;
-  int refusals_ = 0;
+  Watcher<S>& watcher_;
+  RunEnd<S>& end_;
+  EventFunctions<S> events_;
+  EventWatch<S> watch_;
+  HermiteOutput<S> between_;
+  Checkpoint<S> kept_;
+  S t_, to_ = S(0);
+  size_t next_ = 1;
+  bool at_times_, forwards_ = true;
+  bool whole_ = false, fresh_ = false;  // where the run stands: a step had to end there; and what follows is counted anew
+  std::chrono::steady_clock::time_point told_ = std::chrono::steady_clock::now();
 };
 
 }  // namespace
 
 template <class S>
-IntegrationCost integrate(Equations<S>& equations, std::vector<S> x, const std::vector<double>& times, const IntegratorOptions& options,
-                          const std::function<void(const S&, const std::vector<S>&)>& out) {
+void integrate(Equations<S>& equations, Stepper<S>& stepper, std::vector<S> x, const RunPlan<S>& plan, const IntegratorOptions& options, Watcher<S>& watcher, RunEnd<S>& end) {
+  check_integration(plan.times, options, to_double(epsilon<S>()));
+  Run<S>(equations, stepper, std::move(x), plan, options, watcher, end).go();
+}
+
+template <class S>
+IntegrationCost integrate(ExplicitEquations<S>& equations, std::vector<S> x, const std::vector<double>& times, const IntegratorOptions& options,
+                          const std::function<void(const S& t, const std::vector<S>& x)>& out) {
+  struct Outputs : Watcher<S> {
+    explicit Outputs(const std::function<void(const S& t, const std::vector<S>& x)>& f) : out(f) {}
+    void sample(const S& t, const std::vector<S>& x) override { out(t, x); }
+    const std::function<void(const S& t, const std::vector<S>& x)>& out;
+  } outputs(out);
   check_integration(times, options, to_double(epsilon<S>()));
-  struct PlainSteps {  // implicit terms are those of this run alone
-    Equations<S>& equations;
-    ~PlainSteps() { equations.set_step(S(0)); }
-  } after{equations};
-  return Run<S>(equations, std::move(x), times, options, out).go();
+  const auto stepper = runge_kutta_steps(equations, options);
+  RunEnd<S> end;
+  integrate<S>(equations, *stepper, std::move(x), RunPlan<S>{times, true, {}, nullptr}, options, outputs, end);
+  return end.cost;
 }
 
 template PYCRAFT_INTEGRATE(double)
 template PYCRAFT_INTEGRATE(Extended)
 template PYCRAFT_INTEGRATE(Quad)
+template PYCRAFT_INTEGRATE_EXPLICITLY(double)
+template PYCRAFT_INTEGRATE_EXPLICITLY(Extended)
+template PYCRAFT_INTEGRATE_EXPLICITLY(Quad)
 
 }  // namespace pycraft

@@ -7,23 +7,23 @@
 
 namespace pycraft {
 
-namespace {
-
-constexpr const char* names[] = {"dopri5", "cash-karp54", "fehlberg78", "bulirsch-stoer", "rk4", "rkmk4", "semi-implicit-euler"};
-
-}  // namespace
-
-const char* integrator_name(Integrator integrator) { return names[static_cast<int>(integrator)]; }
-bool fixed_step(Integrator integrator) { return integrator >= Integrator::rk4; }
+std::vector<Integrator> integrators_by(Way way) {
+  std::vector<Integrator> found;
+  for (size_t i = 0; i < std::size(integrator_records); ++i)
+    if (integrator_records[i].way == way) found.push_back(static_cast<Integrator>(i));
+  return found;
+}
 
 Integrator integrator_from_name(const std::string& name) {
   std::string all;
-  for (const Integrator i : scene_integrators) {
-    if (name == integrator_name(i)) return i;
-    all += (all.empty() ? "'" : ", '") + std::string(integrator_name(i)) + "'";
+  for (size_t i = 0; i < std::size(integrator_records); ++i) {
+    if (name == integrator_records[i].name) return static_cast<Integrator>(i);
+    all += (all.empty() ? "'" : ", '") + std::string(integrator_records[i].name) + "'";
   }
   throw EvaluationError("no integrator is called '" + name + "'; there are " + all);
 }
+
+void refuse(Integrator integrator, const std::string& what) { throw EvaluationError(std::string("integrator '") + integrator_name(integrator) + "': " + what); }
 
 void check_integration(const std::vector<double>& times, const IntegratorOptions& o, double eps) {
   if (times.empty()) throw EvaluationError("times: give at least the time of the initial state");
@@ -34,8 +34,9 @@ void check_integration(const std::vector<double>& times, const IntegratorOptions
                             " s; times are strictly increasing, or strictly decreasing");
   }
   if (!(o.step >= 0) || !std::isfinite(o.step)) throw EvaluationError("step=" + short_number(o.step) + ": a step is a positive number of seconds");
+  if (!(o.longest >= 0)) throw EvaluationError("max_step=" + short_number(o.longest) + ": the longest step is a positive number of seconds");
   const std::string name = std::string("integrator '") + integrator_name(o.integrator) + "'";
-  if (fixed_step(o.integrator)) {
+  if (!record_of(o.integrator).controlled) {
     if (o.step == 0) throw EvaluationError(name + " takes steps of one size: give step= in seconds");
     return;
   }

@@ -27,11 +27,12 @@ template <class S>
 class MuntheKaas4 {
  public:
   using State = std::vector<S>;
-  explicit MuntheKaas4(const Equations<S>& equations) : q_(equations.nq()), rest_(equations.nv() + equations.rest()), rate_(rest_.size()), sum_(rest_.size()) {
+  using Needs = ExplicitEquations<S>;
+  explicit MuntheKaas4(const Needs& equations) : q_(equations.nq()), rest_(equations.nv() + equations.rest()), rate_(rest_.size()), sum_(rest_.size()) {
     for (State* x : {&u_, &u_rate_, &u_sum_}) x->resize(equations.nv());
   }
 
-  void do_step(Equations<S>& equations, State& x, const S& t, const S& h) {
+  void do_step(Needs& equations, State& x, const S& t, const S& h) {
     const CompiledModel<S>& model = equations.model();
     const size_t n = equations.nv(), m = rest_.size();
     S *q = x.data(), *v = x.data() + equations.nq();  // v, then what else there is
@@ -59,17 +60,18 @@ class MuntheKaas4 {
 };
 
 // v⁺ = v + h v̇, q⁺ = q exp(h v⁺), v̇ that of a step of size h: (ℳ + J + h C + h² K) v̇ = T(q + h v, v), C and K of implicit damping and stiffness.
+// Source: D. Baraff, A. Witkin, Large steps in cloth simulation, SIGGRAPH 1998, with D of the articulated bodies in place of their matrix.
 template <class S>
 class SemiImplicitEuler {
  public:
   using State = std::vector<S>;
-  explicit SemiImplicitEuler(const Equations<S>& equations) : rate_(equations.nv() + equations.rest()), u_(equations.nv()) {}
+  using Needs = ImplicitEquations<S>;
+  explicit SemiImplicitEuler(const Needs& equations) : rate_(equations.nv() + equations.rest()), u_(equations.nv()) {}
 
-  void do_step(Equations<S>& equations, State& x, const S& t, const S& h) {
+  void do_step(Needs& equations, State& x, const S& t, const S& h) {
     const size_t n = equations.nv();
     S *q = x.data(), *v = x.data() + equations.nq();
-    equations.set_step(h);
-    equations.evaluate(t, q, v, v + n, rate_.data(), rate_.data() + n);
+    equations.evaluate_step(t, h, q, v, v + n, rate_.data(), rate_.data() + n);
     for (size_t i = 0; i < rate_.size(); ++i) v[i] += h * rate_[i];
     for (size_t i = 0; i < n; ++i) u_[i] = h * v[i];
     move_configuration(equations.model(), q, u_.data(), q);

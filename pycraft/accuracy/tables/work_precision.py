@@ -9,7 +9,7 @@ import numpy as np
 
 from ... import _core
 from ...dynamics.by_realization import checked_forces
-from ...dynamics.trajectory import SCIPY, integrate_by_scipy, integrator_names
+from ...dynamics.integrator_names import integrator_named, integrator_names, takes_one_size
 from ...tidy import TidyTable, error_text, refusal_text, seconds_text
 from ..checked_options import checked_model, checked_names, checked_positive, checked_seconds
 
@@ -17,7 +17,6 @@ INTEGRATORS = ("dopri5", "fehlberg78", "bulirsch-stoer", "rkmk4", "scipy:RK45", 
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 STEPS = tuple(0.05 / 2**k for k in range(0, 10, 2))
 """Seconds: of integrators with steps of one size."""
-ONE_SIZE = ("rk4", "rkmk4")
 Run = tuple[np.ndarray, np.ndarray, int, float]
 """q and v at the sampled times, evaluations, seconds."""
 Integrate = Callable[..., Run]
@@ -116,12 +115,12 @@ def work_precision(
         The initial state and constant generalized forces, zero where left out.
     duration : s
     integrators : names that `integrate_ode` takes
-        Boost.Odeint's run in C++; SciPy's ("scipy:...") call from Python, and their time is mostly that of Python.
+        The core's run in C++; those of SciPy and SUNDIALS call from Python, and their time is mostly that of Python.
     tolerances : rtol and atol of integrators with controlled steps
-    steps : s, of those with steps of one size ("rk4", "rkmk4")
+    steps : s, of those with steps of one size ("rk4", "rkmk4", "variational2", ...)
     right_hand_side : callable (t, q, v) -> v̇ (nv,)
         Any other motion of the same coordinates: with contact, control, damping. It takes the place of forward dynamics under `tau`, for
-        SciPy's integrators alone, and is tried once at the initial state before anything is measured. This is where a scene passes its own.
+        integrators that need no more than accelerations at states, and is tried once at the initial state before anything is measured.
     energy : callable (q, v) -> J
         What the motion conserves; kinetic and potential energy of the model where neither tau nor right_hand_side is given. A row where it
         is no finite number is refused.
@@ -134,7 +133,7 @@ def work_precision(
 
     The reference is fehlberg78 in extended precision at a tolerance of 1e-16 (with a right-hand side: DOP853 at 1e-13 in double). Its own
     error is its distance to a run at a hundred times that tolerance, which the motion's sensitivity is in; rows below it are not resolved.
-    Trajectories are compared at eight times; SciPy's integrators interpolate to them, Boost.Odeint's end a step there.
+    Trajectories are compared at eight times; integrators of other packages interpolate to them, the core's end a step there.
 
     Raises
     ------
@@ -170,10 +169,7 @@ def work_precision(
     if energy is None and right_hand_side is None and (tau is None or not np.any(tau)):
         energy = _mechanical_energy(model)
 
-    if right_hand_side is None:
-        integrate = _by_forward_dynamics(model, q, v, times, tau=tau, form=form, refine=refine)
-    else:
-        integrate = _by_right_hand_side(model, q, v, times, right_hand_side)
+    integrate = _runs(model, q, v, times, tau, form, refine, right_hand_side)
     if progress is not None:
         progress("reference")
     name, wide, tolerance = ("fehlberg78", "extended", 1e-16) if right_hand_side is None else ("scipy:DOP853", "double", 1e-13)
@@ -184,7 +180,7 @@ def work_precision(
 
     rows = []
     for integrator in integrators:
-        fixed = integrator in ONE_SIZE
+        fixed = takes_one_size(integrator)
         for amount in steps if fixed else tolerances:
             if progress is not None:
                 progress(f"{integrator}, {amount:g}")
@@ -201,24 +197,13 @@ def work_precision(
     )  # fmt: skip
 
 
-def _by_forward_dynamics(model: Any, q: np.ndarray, v: np.ndarray, times: np.ndarray, **own: Any) -> Integrate:
-    """Runs of `integrate_ode`."""
+def _runs(model: Any, q: np.ndarray, v: np.ndarray, times: np.ndarray, tau: Any, form: str, refine: Any, right_hand_side: Any) -> Integrate:
+    """Runs of `integrate_ode`, of forward dynamics or of a right-hand side of one's own."""
+    own: dict[str, Any] = {"tau": tau, "form": form, "refine": refine} if right_hand_side is None else {"right_hand_side": right_hand_side}
 
-    def integrate(integrator: str, precision: str = "double", **options: Any) -> Run:
-        run = model.integrate_ode(q, v, times, integrator=integrator, precision=precision, **own, **options)
-        return run.q, run.v, run.evaluations, run.seconds
-
-    return integrate
-
-
-def _by_right_hand_side(model: Any, q: np.ndarray, v: np.ndarray, times: np.ndarray, right_hand_side: Callable[..., Any]) -> Integrate:
-    """Runs of SciPy's integrators with a right-hand side of one's own. They raise EvaluationError for any other integrator."""
-
-    def integrate(integrator: str, precision: str = "double", **options: Any) -> Run:
-        if (solver := integrator.removeprefix("scipy:")) == integrator:
-            known = ", ".join(f"'scipy:{name}'" for name in SCIPY)
-            raise _core.EvaluationError(f"integrator {integrator!r} takes no right-hand side of its own; there are {known}")
-        run = integrate_by_scipy(right_hand_side, model.configuration_rate, q, v, times, solver, options["rtol"], options["atol"], None)
+    def integrate(integrator: str, precision: str = "double", rtol: float = 1e-9, atol: float = 1e-12, step: float | None = None) -> Run:
+        chosen = integrator_named(integrator)
+        run = model._trajectory(chosen, q, v, times, precision=precision, rtol=rtol, atol=atol, step=step, **own)
         return run.q, run.v, run.evaluations, run.seconds
 
     return integrate

@@ -76,7 +76,8 @@ class CoulombFriction(Effect):
 class ImplicitDamping(Effect):
     """Viscous damping that steps of one size take implicitly: D has h c in addition ("semi-implicit-euler"), stable for any step and any c.
 
-    Other integrators, and `Scene.evaluate` without a step, see plain damping, T = -c v.
+    Integrators that solve for their steps ("rosenbrock4", "radau", ...) and `Scene.evaluate` without a step see plain damping, T = -c v;
+    explicit ones refuse it.
 
     Parameters
     ----------

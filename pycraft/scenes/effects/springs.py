@@ -41,7 +41,8 @@ class Spring(Effect):
 class ImplicitSpring(Effect):
     """Springs at pins, sliders and screws that steps of one size take implicitly: D has h² k in addition, stable for any step and any k.
 
-    Other integrators, and `Scene.evaluate` without a step, see plain springs, T = -k (q - rest).
+    Integrators that solve for their steps ("rosenbrock4", "radau", ...) and `Scene.evaluate` without a step see plain springs,
+    T = -k (q - rest); explicit ones refuse them.
 
     Parameters
     ----------

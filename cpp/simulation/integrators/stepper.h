@@ -1,0 +1,240 @@
+// What takes the steps of a run: a method, and the sizes of its steps, which are chosen by it (ControlledSteps) or all the same (FixedSteps).
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "model/checks.h"
+#include "numerics/scalar.h"
+#include "simulation/equations.h"
+#include "simulation/integrators/integrator.h"
+
+namespace pycraft {
+
+template <class S>
+bool all_finite(const std::vector<S>& x) {
+  return std::all_of(x.begin(), x.end(), [](const S& y) { return std::isfinite(to_double(y)); });
+}
+
+// What the next step depends on besides the state.
+template <class S>
+struct Pace {
+  S size = S(0);    // controlled: to be tried next, with a sign; fixed: of every step
+  S origin = S(0);  // fixed: the time from which steps are counted
+  long taken = 0;   // fixed: and how many were taken since
+};
+
+template <class S>
+class Stepper {
+ public:
+  using State = std::vector<S>;
+  virtual ~Stepper() = default;
+  // A run from (t, x) to `last`; resumed: as one that was left with this pace.
+  virtual void start(const S& t, const State& x, const S& last, const Pace<S>* resumed) = 0;
+  // The next piece of it, to `end`: no step goes beyond.
+  virtual void begin(const S& t, const State& x, const S& end) = 0;
+  // One step; t is the end itself where it is reached. EvaluationError where no step can be taken.
+  virtual void advance(S& t, State& x) = 0;
+  // Whether the last step was cut short by the end of its piece.
+  bool cut() const { return cut_; }
+  // x is another one than the last step ended with.
+  virtual void forget() {}
+
+  // The state at t within a step that began at (from, x), to the method's own accuracy.
+  virtual void within(const S& from, const State& x, const S& t, State& out) = 0;
+  // The same by the method's dense output of the last step. False where it has none.
+  virtual bool interpolate(const S&, State&) { return false; }
+  // Takes the step from (from, x) to `to` again, whatever its error, for interpolate. False where that has none.
+  virtual bool again(const S&, const State&, const S&) { return false; }
+
+  const Pace<S>& pace() const { return pace_; }
+  long rejected() const { return rejected_; }
+
+ protected:
+  Pace<S> pace_;
+  bool cut_ = false;
+  long rejected_ = 0;
+};
+
+// The component of x that changes most in no time, measured by the tolerances: what errors point at.
+template <class S>
+std::string fastest_of(Equations<S>& equations, const std::vector<S>& x, const S& t, const IntegratorOptions& options) {
+  using std::abs;
+  std::vector<S> rate(x.size());
+  equations(x, rate, t);
+  int worst = 0;
+  double most = -1;
+  for (int i = 0; i < equations.size() - equations.integrals(); ++i) {
+    const double change = to_double(S(abs(rate[i]) / (S(options.atol) + S(options.rtol) * abs(x[i]))));
+    if (!(change <= most)) most = std::isnan(change) ? HUGE_VAL : change, worst = i;
+  }
+  return x.empty() ? "nothing" : equations.name_of(worst) + " changes fastest there, by " + short_number(to_double(rate[worst])) + " a second";
+}
+
+// A method that judges its own steps.
+template <class S>
+class Attempts {
+ public:
+  using State = std::vector<S>;
+  virtual ~Attempts() = default;
+  // A step of size h, if its error allows; h is then the size for the next one, or for another try.
+  virtual bool attempt(S& t, State& x, S& h) = 0;
+  virtual void forget() {}
+  virtual bool interpolate(const S&, State&) { return false; }
+  virtual bool again(const S&, const State&, const S&) { return false; }
+};
+
+template <class S>
+class ControlledSteps : public Stepper<S> {
+ public:
+  using State = std::vector<S>;
+  // Twice the same method: one for the run, one for states within its steps.
+  ControlledSteps(Equations<S>& equations, std::unique_ptr<Attempts<S>> method, std::unique_ptr<Attempts<S>> beside, const IntegratorOptions& options)
+      : equations_(equations), method_(std::move(method)), beside_(std::move(beside)), options_(options) {}
+
+  void start(const S& t, const State& x, const S& last, const Pace<S>* resumed) override {
+    using std::abs;
+    whole_ = abs(last - t);
+    pace_.size = resumed ? resumed->size : (last < t ? S(-1) : S(1)) * first_step(t, x);
+  }
+  void begin(const S&, const State&, const S& end) override { end_ = end; }
+  void forget() override { method_->forget(); }
+  bool interpolate(const S& t, State& out) override { return method_->interpolate(t, out); }
+  bool again(const S& from, const State& x, const S& to) override { return method_->again(from, x, to); }
+
+  void advance(S& t, State& x) override {
+    using std::abs;
+    S& h = pace_.size;
+    for (int refusals = 0;;) {
+      if (options_.longest > 0 && abs(h) > S(options_.longest)) h = (h < S(0) ? S(-1) : S(1)) * S(options_.longest);
+      cut_ = abs(h) >= abs(end_ - t);
+      S tried = cut_ ? S(end_ - t) : h;
+      const S before = tried, from = t;
+      kept_ = x;
+      const bool taken = method_->attempt(t, x, tried);
+      if (taken && all_finite(x)) {
+        if (cut_) t = end_;
+        // A step cut short tells only whether the next may be longer.
+        h = cut_ && abs(tried) < abs(h) ? h : tried;
+        return;
+      }
+      ++rejected_;
+      if (taken) {  // not finite: the step was far too long
+        x = kept_, t = from;
+        tried = before / S(10);
+        method_->forget();
+      }
+      h = abs(tried) < abs(before) ? tried : S(before / S(2));
+      if (++refusals > 200 || abs(h) < S(16) * epsilon<S>() * std::max(whole_, S(abs(t)))) refuse_step(t, x);
+    }
+  }
+  void within(const S& from, const State& x, const S& t, State& out) override {
+    using std::abs;
+    out = x;
+    beside_->forget();
+    S at = from, h = t - from;
+    for (int tries = 0; at != t; ++tries) {
+      if (abs(h) >= abs(t - at)) h = t - at;
+      const bool last = h == t - at;
+      if (beside_->attempt(at, out, h)) at = last ? t : at;
+      if (tries > 1000) refuse_step(at, out);
+    }
+  }
+
+ private:
+  using Stepper<S>::pace_, Stepper<S>::cut_, Stepper<S>::rejected_;
+
+  // A hundredth of the time in which the state would change by its own size, both measured by the tolerances.
+  S first_step(const S& t, const State& x) {
+    using std::abs;
+    if (options_.step > 0) return S(options_.step);
+    State rate(x.size());
+    equations_(x, rate, t);
+    S size = S(0), change = S(0);
+    for (size_t i = 0; i < x.size(); ++i) {
+      const S scale = S(options_.atol) + S(options_.rtol) * abs(x[i]);
+      size = std::max(size, S(abs(x[i]) / scale));
+      change = std::max(change, S(abs(rate[i]) / scale));
+    }
+    if (!(change > S(0)) || !(size > S(0))) return whole_ / S(1000);
+    return std::min(whole_, S(size / change / S(100)));
+  }
+  [[noreturn]] void refuse_step(const S& t, const State& x) {
+    refuse(options_.integrator, "the step size fell to " + short_number(to_double(pace_.size)) + " s at t = " + short_number(to_double(t)) + " s, without the error estimate " +
+                                    "reaching rtol = " + short_number(options_.rtol) + ", atol = " + short_number(options_.atol) + "; " +
+                                    fastest_of(equations_, x, t, options_) +
+                                    "; the motion is singular or not finite there, or stiff (integrator=\"rosenbrock4\"), or the tolerances are below the precision's rounding");
+  }
+
+  Equations<S>& equations_;
+  std::unique_ptr<Attempts<S>> method_, beside_;
+  IntegratorOptions options_;
+  State kept_;
+  S end_ = S(0), whole_ = S(0);
+};
+
+// As many equal steps in a piece as make each at most options.step. Method::Needs says how it has accelerations found.
+template <class S, class Method>
+class FixedSteps : public Stepper<S> {
+ public:
+  using State = std::vector<S>;
+  using Needs = typename Method::Needs;
+  FixedSteps(Needs& equations, const IntegratorOptions& options) : equations_(equations), method_(equations), options_(options) {}
+
+  void start(const S&, const State&, const S&, const Pace<S>* resumed) override {
+    resumed_ = resumed != nullptr;
+    if (resumed) pace_ = *resumed;
+  }
+  void begin(const S& t, const State&, const S& end) override {
+    using std::abs;
+    end_ = end;
+    if (!resumed_) {
+      pace_ = {S(options_.step), t, 0};
+      count_ = steps_to(end);
+      if (const S whole = S(count_) * pace_.size; !(whole == end - t)) pace_.size = (end - t) / S(count_);
+    } else {
+      count_ = steps_to(end);
+    }
+    resumed_ = false;
+    const S over = pace_.origin + S(count_) * pace_.size - end;
+    shortened_ = abs(over) > S(1e-9) * abs(pace_.size);
+  }
+  void advance(S& t, State& x) override {
+    const S from = t;
+    const bool last = pace_.taken + 1 >= count_;
+    cut_ = last && shortened_;
+    const S h = cut_ ? S(end_ - t) : pace_.size;
+    method_.do_step(equations_, x, t, h);
+    t = last ? end_ : S(pace_.origin + S(++pace_.taken) * pace_.size);
+    if (last && !cut_) ++pace_.taken;
+    if (!all_finite(x)) refuse_state(from, h, x);
+  }
+  void within(const S& from, const State& x, const S& t, State& out) override {
+    out = x;
+    method_.do_step(equations_, out, from, t - from);
+  }
+
+ private:
+  using Stepper<S>::pace_, Stepper<S>::cut_;
+  long steps_to(const S& end) const {
+    return std::max(pace_.taken + 1, static_cast<long>(std::ceil(std::abs(to_double(S((end - pace_.origin) / pace_.size))) * (1 - 1e-12))));
+  }
+  [[noreturn]] void refuse_state(const S& from, const S& h, const State& x) const {
+    int i = 0;
+    while (std::isfinite(to_double(x[i]))) ++i;
+    refuse(options_.integrator, "the state is no longer finite in the step after t = " + short_number(to_double(from)) + " s of " + short_number(to_double(h)) + " s: " +
+                                    equations_.name_of(i) + " is " + short_number(to_double(x[i])) + "; take smaller steps (step=)");
+  }
+
+  Needs& equations_;
+  Method method_;
+  IntegratorOptions options_;
+  S end_ = S(0);
+  long count_ = 1;
+  bool resumed_ = false, shortened_ = false;
+};
+
+}  // namespace pycraft

@@ -1,0 +1,54 @@
+"""Integrators by name: the core's own, SciPy's and SUNDIALS'."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from .. import _core
+
+SCIPY = ("RK45", "DOP853", "Radau", "BDF", "LSODA")
+"""SciPy's solvers; as integrators they are called "scipy:RK45" and so on, or "rk45" for short."""
+SUNDIALS = ("BDF", "Adams")
+"""The methods of SUNDIALS' CVODE; "sundials:BDF", "cvode" for short, and "sundials:Adams"."""
+SHORT = {name.lower(): f"scipy:{name}" for name in SCIPY} | {"cvode": "sundials:BDF", "adams": "sundials:Adams"}
+SOLVE_FOR_STEPS = ("scipy:Radau", "scipy:BDF", "scipy:LSODA", "sundials:BDF")
+"""Those from outside of the core that take implicit steps, for stiff motion."""
+
+
+@dataclass(frozen=True)
+class IntegratorName:
+    """An integrator's full name, and whether it is not the core's own."""
+
+    name: str
+    foreign: bool
+
+    def solver(self, rtol: float, atol: float, max_step: float = 0.0) -> Any:
+        """What takes its steps, for the core; None for one of the core's own."""
+        if not self.foreign:
+            return None
+        for what, tolerance in (("rtol", rtol), ("atol", atol)):
+            if not 0 <= tolerance < float("inf"):
+                raise _core.EvaluationError(f"{what}={tolerance:g}: a tolerance is a positive number")
+        from .foreign_solvers import ScipySteps, SundialsSteps
+
+        package, _, method = self.name.partition(":")
+        return (ScipySteps if package == "scipy" else SundialsSteps)(self.name, method, rtol, atol, max_step)
+
+
+def integrator_names() -> list[str]:
+    """All integrators, the core's and those of other packages."""
+    return [*_core.integrators(), *(f"scipy:{name}" for name in SCIPY), *(f"sundials:{name}" for name in SUNDIALS)]
+
+
+def integrator_named(name: Any) -> IntegratorName:
+    """The integrator of a name, or of a short one. EvaluationError lists those there are."""
+    given = SHORT.get(name.lower(), name) if isinstance(name, str) else name
+    if given not in integrator_names():
+        raise _core.EvaluationError(f"no integrator is called {name!r}; there are {', '.join(map(repr, integrator_names()))}")
+    return IntegratorName(given, ":" in given)
+
+
+def takes_one_size(name: str) -> bool:
+    """Whether an integrator takes steps of one size, by its full name."""
+    return any(row["name"] == name and not row["controlled"] for row in _core.integrator_table())

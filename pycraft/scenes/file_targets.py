@@ -1,0 +1,28 @@
+"""Paths that something long is to be written to: looked at before it begins, not after it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from .. import _core
+
+
+def writable_target(path: Any, endings: tuple[str, ...], what: str) -> Path:
+    """The path. EvaluationError for an ending that is none of these, OSError where it cannot be written; a file there stays as it is."""
+    target = Path(path)
+    if target.suffix not in endings:
+        raise _core.EvaluationError(f"output {str(path)!r}: {what} is written to a file that ends in {', '.join(endings)}")
+    if not target.parent.is_dir():
+        raise FileNotFoundError(f"output {str(path)!r}: there is no folder {str(target.parent)!r}")
+    if target.is_dir():
+        raise IsADirectoryError(f"output {str(path)!r} is a folder")
+    there = target.exists()
+    try:
+        with target.open("ab"):
+            pass
+    except OSError as error:
+        raise type(error)(f"output {str(path)!r} cannot be written: {error.strerror}") from None
+    if not there:
+        target.unlink()
+    return target

@@ -1,0 +1,151 @@
+"""Scenes of mechanisms that everybody knows, ready to simulate: `pc.mechanisms.pendulum().simulate(10.0)`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from ..models.multibody import Multibody
+from .effects import Gravity, PointMassGravity
+from .scene import Scene
+
+DOWN = (0.0, 0.0, -9.81)
+"""m/s²"""
+EARTH = 3.986004418e14
+"""μ = G m of the Earth, m³/s² (IERS Conventions 2010)."""
+
+
+def _positive(**numbers: float) -> None:
+    for name, value in numbers.items():
+        if not 0 < float(value) < np.inf:
+            raise _core.ModelError(f"{name}={value}: a positive number")
+
+
+def _rod(length: float, mass: float, axis: int) -> dict[str, Any]:
+    """A thin rod along an axis from its hinge."""
+    direction = np.eye(3)[axis]
+    return {"mass": mass, "com": length / 2 * direction, "inertia": mass * length**2 / 12 * (np.eye(3) - np.diag(direction))}
+
+
+def pendulum(length: float = 1.0, mass: float = 1.0, angle: float = 0.0) -> Scene:
+    """A point mass on a massless rod under gravity, released at rest; at 0 the rod is horizontal.
+
+    For 1 m, 1 kg from the horizontal the period is 2.367841947576 s (IFToMM library of benchmark problems, A01).
+
+    Parameters
+    ----------
+    length, mass : m, kg
+    angle : rad, from the horizontal, positive downwards
+    """
+    _positive(length=length, mass=mass)
+    model = Multibody("pendulum")
+    model.add_body("bob", axis=(0, 1, 0), mass=mass, com=(length, 0, 0))
+    model.q = [angle]
+    return Scene(model).add(Gravity(DOWN))
+
+
+def double_pendulum(lengths: Any = (1.0, 1.0), masses: Any = (1.0, 1.0), angles: Any = (0.3, 0.5)) -> Scene:
+    """Two thin rods, one on the other's end, released at rest under gravity: chaotic where they swing far.
+
+    Parameters
+    ----------
+    lengths, masses : m, kg
+    angles : rad, of the upper rod from the horizontal, and of the lower one against it
+    """
+    _positive(lengths=min(lengths), masses=min(masses))
+    model = Multibody("double pendulum")
+    model.add_body("upper", axis=(0, 1, 0), **_rod(lengths[0], masses[0], 0))
+    model.add_body("lower", "upper", axis=(0, 1, 0), position=(lengths[0], 0, 0), **_rod(lengths[1], masses[1], 0))
+    model.q = list(angles)
+    return Scene(model).add(Gravity(DOWN))
+
+
+def heavy_top() -> Scene:
+    """A fast top whose tip is held, under gravity: 15 kg, 1 m from tip to centre of mass, spinning with 150 rad/s about it.
+
+    The benchmark of O. Brüls and A. Cardona, On the use of Lie group time integrators in multibody dynamics, J. Computational and Nonlinear
+    Dynamics 5, 2010: energy 5435.69679 J; the centre of mass is at (0.1733439641, 0.6400885921, -0.7484907911) m after 1 s.
+    """
+    model = Multibody("heavy top")
+    model.add_body("top", hinge="ball", mass=15.0, com=(0, 1, 0), inertia=np.diag([0.234375, 0.46875, 0.234375]))
+    model.v = [0.0, 150.0, -4.61538]
+    return Scene(model).add(Gravity(DOWN))
+
+
+def cart_pole(cart: float = 1.0, pole: float = 0.1, length: float = 1.0, angle: float = 0.1) -> Scene:
+    """A pole on a cart that runs on a rail: unstable upright. The hinge "rail" is what a controller drives.
+
+    The equations of A. G. Barto, R. S. Sutton, C. W. Anderson, Neuronlike adaptive elements, IEEE Trans. Systems, Man, and Cybernetics 13,
+    1983, without their friction.
+
+    Parameters
+    ----------
+    cart, pole : kg
+    length : m, of the pole, a thin rod
+    angle : rad, of the pole from upright
+    """
+    _positive(cart=cart, pole=pole, length=length)
+    model = Multibody("cart-pole")
+    model.add_body("cart", hinge="slider", axis=(1, 0, 0), mass=cart, hinge_name="rail")
+    model.add_body("pole", "cart", axis=(0, 1, 0), hinge_name="pivot", **_rod(length, pole, 2))
+    model.q = [0.0, angle]
+    return Scene(model).add(Gravity(DOWN))
+
+
+def kepler(semi_major_axis: float = 8.0e6, eccentricity: float = 0.2, mu: float = EARTH, mass: float = 1.0) -> Scene:
+    """A satellite about a point mass at the origin, at its pericentre: an ellipse, with the period 2π √(a³/μ).
+
+    Parameters
+    ----------
+    semi_major_axis : m
+    eccentricity : from 0 to below 1
+    mu : m³/s²; of the Earth by default
+    mass : kg
+    """
+    _positive(semi_major_axis=semi_major_axis, mu=mu, mass=mass)
+    if not 0 <= eccentricity < 1:
+        raise _core.ModelError(f"eccentricity={eccentricity}: an ellipse's is from 0 to below 1")
+    model = Multibody("satellite")
+    model.add_body("satellite", hinge="free", mass=mass, inertia=mass * np.eye(3))
+    speed = np.sqrt(mu / semi_major_axis * (1 + eccentricity) / (1 - eccentricity))
+    model.q, model.v = [1, 0, 0, 0, semi_major_axis * (1 - eccentricity), 0, 0], [0, 0, 0, 0, speed, 0]
+    return Scene(model).add(PointMassGravity(mu))
+
+
+def furuta(arm: float = 0.0826, pendulum: float = 0.064, angle: float = 0.1) -> Scene:
+    """Furuta's pendulum: an arm that turns about the vertical, driven at "motor", with a pendulum on its end, unstable upright.
+
+    Thin rods of 0.1 kg and 0.05 kg, the size of a desktop device. Source: K. Furuta, M. Yamakita, S. Kobayashi, Swing-up control of
+    inverted pendulum using pseudo-state feedback, J. Systems and Control Engineering 206, 1992.
+
+    Parameters
+    ----------
+    arm, pendulum : m
+    angle : rad, of the pendulum from upright
+    """
+    _positive(arm=arm, pendulum=pendulum)
+    model = Multibody("Furuta pendulum")
+    model.add_body("arm", axis=(0, 0, 1), hinge_name="motor", **_rod(arm, 0.1, 0))
+    model.add_body("pendulum", "arm", axis=(1, 0, 0), position=(arm, 0, 0), hinge_name="pivot", **_rod(pendulum, 0.05, 2))
+    model.q = [0.0, angle]
+    return Scene(model).add(Gravity(DOWN))
+
+
+def acrobot(angles: Any = (0.2, -0.1)) -> Scene:
+    """Two links hanging from a fixed "shoulder"; what drives them sits at the "elbow" alone.
+
+    Numbers of R. S. Sutton, Generalization in reinforcement learning, Advances in Neural Information Processing Systems 8, 1996: links of
+    1 m and 1 kg, centres of mass in the middle, inertias of 1 kg m² about them.
+
+    Parameters
+    ----------
+    angles : rad, of the first link from hanging down, and of the second against it
+    """
+    model = Multibody("acrobot")
+    link: dict[str, Any] = {"mass": 1.0, "com": (0, 0, -0.5), "inertia": np.eye(3)}
+    model.add_body("upper", axis=(0, 1, 0), hinge_name="shoulder", **link)
+    model.add_body("lower", "upper", axis=(0, 1, 0), position=(0, 0, -1), hinge_name="elbow", **link)
+    model.q = list(angles)
+    return Scene(model).add(Gravity(DOWN))

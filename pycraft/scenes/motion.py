@@ -1,0 +1,144 @@
+"""States of a scene over time, and what follows from them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+
+
+@dataclass(frozen=True)
+class FrameMotion:
+    """A body or node over K times: `pose` X_WF (K, 4, 4), its origin `position` (K, 3) m, its velocity `twist` (K, 6), angular first."""
+
+    pose: np.ndarray
+    twist: np.ndarray
+
+    @property
+    def position(self) -> np.ndarray:
+        return self.pose[..., :3, 3]
+
+
+class Motion:
+    """K states of a scene, and what follows from them. Of one time everything is without the axis K.
+
+    Attributes
+    ----------
+    t : (K,) s
+    q, v : (K, nq), (K, nv)
+    states : (K, n), the effects' own
+    """
+
+    def __init__(self, about: Mapping[str, Any], rows: Mapping[str, np.ndarray], calls: Any = None, alone: bool = False):
+        self._about, self._calls, self._alone = dict(about), calls, alone
+        self.t, self.q, self.v, self.states = (rows[name] for name in ("t", "q", "v", "states"))
+        self._work = rows["work"]
+        if alone:
+            self.t, self.q, self.v, self.states, self._work = (x[0] for x in (self.t, self.q, self.v, self.states, self._work))
+
+    # ------------------------------------------------------------------ what the scene was
+    @property
+    def model(self) -> Any:
+        """The model."""
+        return self._about["model"]
+
+    @property
+    def effects(self) -> list[str]:
+        """The names of the effects that were on."""
+        return list(self._about["effects"])
+
+    @property
+    def workers(self) -> list[str]:
+        """The effects whose works are counted, in the order of the columns of `energy["work"]`."""
+        return [self._about["effects"][i] for i in self._about["workers"]]
+
+    # ------------------------------------------------------------------ what follows
+    def _rows(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        t, q, v, states = self.t, self.q, self.v, self.states
+        return (np.atleast_1d(t), q[None], v[None], states[None]) if self._alone else (t, q, v, states)
+
+    @cached_property
+    def _along(self) -> dict[str, np.ndarray]:
+        if self._calls is None:
+            raise _core.EvaluationError(
+                "this motion has no scene behind it: of a run that was pickled or read from a file, accelerations, forces and energies "
+                "are known at its own times alone"
+            )
+        found = self._calls.along(*self._rows())
+        if not self._alone:
+            return found
+        return {name: x[:, 0] if name == "forces" else x[0] for name, x in found.items()}
+
+    @property
+    def vdot(self) -> np.ndarray:
+        """(K, nv) accelerations, rad/s² and m/s²."""
+        return self._along["vdot"]
+
+    @property
+    def forces(self) -> dict[str, np.ndarray]:
+        """(K, nv) generalized forces of every effect, by name."""
+        return dict(zip(self.effects, self._along["forces"], strict=True))
+
+    @property
+    def energy(self) -> dict[str, np.ndarray]:
+        """Energies in J: "kinetic" (K,), rotors included; "potential" (K,), of all effects that have one; "work" (K, n), of each effect of
+        `workers`, what it has done since the start besides. kinetic + potential - Σ work is constant, but for the integrator's error.
+        """
+        if not self._about["energy"]:
+            raise _core.EvaluationError("this run kept no account of works; simulate with energy=True")
+        return {"kinetic": self._along["kinetic"], "potential": self._along["potential"].sum(axis=-1), "work": self._work}
+
+    @property
+    def balance(self) -> np.ndarray:
+        """(K,) kinetic + potential - Σ work, J: constant, but for the integrator's error."""
+        energy = self.energy
+        return energy["kinetic"] + energy["potential"] - energy["work"].sum(axis=-1)
+
+    @cached_property
+    def momentum(self) -> dict[str, np.ndarray]:
+        """Spatial momentum (K, 6) of all bodies in the world's axes, angular first, N m s and N s: "origin", about the world's origin,
+        and "com", about the centre of mass.
+        """
+        about_origin = self.model.momentum(self.q, self.v).value
+        about_com = about_origin.copy()
+        about_com[..., :3] -= np.cross(self.centre_of_mass, about_origin[..., 3:])
+        return {"origin": about_origin, "com": about_com}
+
+    @cached_property
+    def centre_of_mass(self) -> np.ndarray:
+        """(K, 3) m, in the world."""
+        bodies = [(name, body.mass, body.com) for name, body in self.model.bodies.items() if body.mass > 0]
+        if not bodies:
+            raise _core.ModelError(f"{self.model.name!r} has no mass, and no centre of it")
+        poses = [(mass, self.model.pose(name, self.q), com) for name, mass, com in bodies]
+        moment = sum(mass * (pose[..., :3, :3] @ com + pose[..., :3, 3]) for mass, pose, com in poses)
+        return moment / sum(mass for mass, _, _ in poses)
+
+    def frame(self, name: str, *, axes: str = "body") -> FrameMotion:
+        """A body or node over time: poses in the world and velocities, in its own axes or as `Multibody.jacobian` has them.
+
+        Parameters
+        ----------
+        name : of a body or node
+        axes : {"body", "aligned", "world"}
+        """
+        jacobian = self.model.jacobian(name, self.q, axes=axes)
+        return FrameMotion(self.model.pose(name, self.q), np.einsum("...ij,...j->...i", jacobian, self.v))
+
+    def __len__(self) -> int:
+        return np.size(self.t)
+
+    # ------------------------------------------------------------------ copies
+    def __getstate__(self) -> dict[str, Any]:
+        """What it is made of: numbers that follow are found first, as what computes them stays behind."""
+        if self._calls is not None:
+            self._along  # noqa: B018 - is kept
+        return {**self.__dict__, "_calls": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)

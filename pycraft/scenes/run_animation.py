@@ -1,0 +1,141 @@
+"""Runs as moving stick figures, by Matplotlib alone: shown in a notebook, written as a web page, a GIF or a film."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from ..arguments import one_number
+from ..view import StickFigure
+from .file_targets import writable_target
+
+ENDINGS = (".html", ".gif", ".mp4")
+MOST = 2000
+"""Frames: at some tenth of a second each, three minutes of drawing."""
+LARGEST = 200.0
+"""MB of frames in one page."""
+
+
+class RunAnimation:
+    """A run as a film. In a notebook it shows itself, with buttons to play it; `save` writes it.
+
+    Attributes
+    ----------
+    times : (n,) s, of the frames
+    figure : Matplotlib's
+    animation : `matplotlib.animation.FuncAnimation`, for its other ways out
+    """
+
+    def __init__(self, run: Any, fps: Any, speed: Any, trace: Any, options: dict[str, Any]):
+        rate, faster = one_number(fps, "fps"), one_number(speed, "speed")
+        for name, value in (("fps", rate), ("speed", faster)):
+            if not 0 < value < np.inf:
+                raise _core.EvaluationError(f"{name}={value:g}: a positive number")
+        self.fps = rate
+        self.times = _frames(run, rate, faster)
+        self._q = _configurations(run, self.times)
+        self._path = None if trace is None else run.model.pose(trace, self._q)[:, :3, 3]
+        self._draw(run, options)
+
+    def _draw(self, run: Any, options: dict[str, Any]) -> None:
+        from matplotlib import pyplot
+        from matplotlib.animation import FuncAnimation
+
+        self._stick = StickFigure(run.model, self._q[0], **options)
+        self.figure = self._stick.ax.figure
+        self._stick.frame(self._q)
+        self._way = None
+        if self._path is not None:
+            self._way = self._stick.canvas.lines(colors="#0072b2", lw=1.0, zorder=2, alpha=0.7)
+        self._show(0)
+        self.animation = FuncAnimation(self.figure, self._show, frames=len(self.times), interval=1000 / self.fps, blit=False, repeat=True)
+        if options.get("ax") is None:
+            pyplot.close(self.figure)  # or notebooks would show its first frame beside the film
+
+    def _show(self, frame: int) -> list[Any]:
+        moved = list(self._stick.update(self._q[frame]))
+        self._stick.ax.set_title(f"{self._stick.model.name}, t = {self.times[frame]:.2f} s", fontsize="medium")
+        if self._way is not None and self._path is not None:
+            gone = self._path[: frame + 1]
+            self._way.set(np.stack([gone[:-1], gone[1:]], axis=1))
+            moved.append(self._way.artist)
+        return moved
+
+    def save(self, path: str | Path) -> Path:
+        """Write it, by the path's ending: ".html", a page that plays by itself in any browser; ".gif"; ".mp4" where ffmpeg is installed.
+
+        Raises
+        ------
+        EvaluationError
+            Another ending; ".mp4" without ffmpeg.
+        OSError
+            A path that cannot be written.
+        """
+        target = checked_film(path)
+        if target.suffix == ".html":
+            title = _plain(self._stick.model.name)
+            head = f"<!DOCTYPE html>\n<meta charset='utf-8'>\n<title>{title}</title>\n"
+            target.write_text(head + self._page, encoding="utf-8")
+        else:
+            from matplotlib.animation import FFMpegWriter, PillowWriter
+
+            fps: Any = self.fps  # fractions are taken, though its types know whole ones alone
+            self.animation.save(str(target), writer=(PillowWriter if target.suffix == ".gif" else FFMpegWriter)(fps=fps))
+        return target
+
+    @cached_property
+    def _page(self) -> str:
+        from matplotlib import rc_context
+
+        with rc_context({"animation.embed_limit": LARGEST}):
+            fps: Any = self.fps  # as above
+            return self.animation.to_jshtml(fps=fps)
+
+    def _repr_html_(self) -> str:
+        return self._page
+
+    def __repr__(self) -> str:
+        return f"<animation of {self._stick.model.name!r}: {len(self.times)} frames, {self.times[0]:g} to {self.times[-1]:g} s>"
+
+
+def checked_film(path: Any) -> Path:
+    """A path that a film can be written to, before a frame is drawn."""
+    target = writable_target(path, ENDINGS, "a film")
+    if target.suffix == ".mp4":
+        from matplotlib.animation import FFMpegWriter
+
+        if not FFMpegWriter.isAvailable():
+            raise _core.EvaluationError(
+                f"output {str(path)!r}: '.mp4' needs ffmpeg, which is not installed; '.html' and '.gif' need nothing"
+            )
+    return target
+
+
+def _frames(run: Any, fps: float, speed: float) -> np.ndarray:
+    """Times of frames: from the run's first to its last."""
+    first, last = float(run.t[0]), float(run.t[-1])
+    count = int(np.floor((last - first) * fps / speed * (1 + 1e-12))) + 1
+    if count > MOST:
+        raise _core.EvaluationError(
+            f"{last - first:g} s at fps={fps:g} and speed={speed:g} are {count} frames, and {MOST} at most are drawn; "
+            f"speed={speed * count / MOST:.2g} or more shows the same in less"
+        )
+    times = first + np.arange(count) * (speed / fps)
+    return np.minimum(times, last)
+
+
+def _configurations(run: Any, times: np.ndarray) -> np.ndarray:
+    """q (n, nq) at the times; of a run that kept no steps those of the last time that was asked for before each."""
+    if run._steps is not None:
+        return run.at(times).q
+    return run.q[np.searchsorted(run.t, times, side="right") - 1]
+
+
+def _plain(name: str) -> str:
+    from html import escape
+
+    return escape(name)

@@ -1,0 +1,197 @@
+"""Runs as files: NetCDF, Parquet and CSV, and back."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from ..models.multibody import Multibody
+from .coordinate_units import coordinate_units
+from .events import EventStates
+from .file_targets import writable_target
+from .run_tables import HOLDS, columns_of, variables_of
+
+FORMAT = "pycraft run 1"
+ENDINGS = (".nc", ".parquet", ".csv")
+
+
+def checked_output(path: Any) -> Path:
+    """A path that a run can be written to. EvaluationError for an ending that is none of `ENDINGS`, OSError where it cannot be written,
+    ImportError where a package is missing: before the run, not after it."""
+    target = writable_target(path, ENDINGS, "a run")
+    if target.suffix == ".parquet":
+        _pyarrow()
+    return target
+
+
+def save(run: Any, path: str | Path) -> None:
+    """Write a run by the path's ending."""
+    target = checked_output(path)
+    {".nc": _to_netcdf, ".parquet": _to_parquet, ".csv": _to_csv}[target.suffix](run, target)
+
+
+def load_run(path: str | Path) -> Any:
+    """The run that `Run.save` wrote to a NetCDF or Parquet file, with its model.
+
+    It has no scene behind it: it does not go on, and between its times there are configurations and velocities alone. Of Parquet these are
+    between the rows of the table, of NetCDF between the ends of steps.
+
+    Raises
+    ------
+    EvaluationError
+        A file of another kind.
+    OSError
+        None that can be read.
+    """
+    target = Path(path)
+    readers = {".nc": _from_netcdf, ".parquet": _from_parquet}
+    if target.suffix not in readers:
+        raise _core.EvaluationError(f"{str(path)!r}: runs are read from files that end in {' and '.join(readers)}")
+    if not target.is_file():
+        raise FileNotFoundError(f"there is no file {str(path)!r}")
+    return readers[target.suffix](target)
+
+
+# ---------------------------------------------------------------------- what is told beside the numbers
+
+
+def _about(run: Any) -> str:
+    about = {name: value for name, value in run._about.items() if name != "model"}
+    events = {name: {key: getattr(e, key).tolist() for key in ("t", "q", "v", "states")} for name, e in run.events.items()}
+    model = json.loads(json.dumps(run.model.description(), default=_plain))
+    return json.dumps(
+        {"format": FORMAT, "model": model, "about": about, "events": events, "ended_by": run.ended_by, "statistics": run.statistics},
+        default=_plain,
+    )  # fmt: skip
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if hasattr(value, "tolist") else dict(value)
+
+
+def _run(
+    text: Any, path: Path, rows: Mapping[str, np.ndarray], steps: Mapping[str, np.ndarray] | None, along: Mapping[str, np.ndarray]
+) -> Any:
+    from .run import Run
+
+    told = json.loads(text)
+    if told.get("format") != FORMAT:
+        raise _core.EvaluationError(f"{str(path)!r} holds no run of this version: its format is {told.get('format')!r}, not {FORMAT!r}")
+    about = told["about"] | {"model": Multibody.from_description(told["model"])}
+    n, nq, nv = len(rows["t"]), about["model"].nq, about["model"].nv
+    widths = {"t": (n,), "q": (n, nq), "v": (n, nv)}
+    events = {
+        name: EventStates(*(np.asarray(e[key], float).reshape(len(e["t"]), -1) if key != "t" else np.asarray(e[key], float) for key in e))
+        for name, e in told["events"].items()
+    }
+    shaped = {name: x.reshape(widths.get(name, x.shape)) for name, x in rows.items()}
+    run = Run(about, shaped, steps=steps, events=events, ended_by=told["ended_by"], statistics=told["statistics"])
+    run.__dict__["_along"] = {
+        **along,
+        "forces": along["forces"].reshape(len(about["effects"]), n, nv),
+        "vdot": along["vdot"].reshape(n, nv),
+    }
+    if steps is None:
+        run._steps = {"t": run.t, "q": run.q, "v": run.v, "states": run.states, "work": run._work}
+    return run
+
+
+# ---------------------------------------------------------------------- NetCDF
+
+
+def _to_netcdf(run: Any, path: Path) -> None:
+    from scipy.io import netcdf_file
+
+    variables = {"time": (("time",), run.t, "s"), **variables_of(run)}
+    steps = run._steps
+    if steps is not None and steps["t"] is not run.t:
+        axes_of = {"t": (), "q": ("configuration",), "v": ("coordinate",), "states": ("state",), "work": ("worker",)}
+        variables |= {f"step_{name}": (("step", *axes_of[name]), steps[name], "") for name in axes_of}
+        variables["step_vdot"] = (("step", "coordinate"), run._vdot_of_steps, "")
+    with netcdf_file(str(path), "w", version=2) as file:
+        file.about = _about(run).encode("utf-8")
+        sizes: dict[str, int] = {}
+        for axes, x, _ in variables.values():
+            sizes |= dict(zip(axes, x.shape, strict=True))
+        for axis, size in sizes.items():
+            if size > 0:  # an axis of length zero would be an unlimited one
+                file.createDimension(axis, size)
+        for name, (axes, x, unit) in variables.items():
+            if x.size:
+                variable = file.createVariable(name, "d", axes)
+                variable[:] = x
+                if unit:
+                    variable.units = unit.encode("utf-8")
+
+
+def _from_netcdf(path: Path) -> Any:
+    from scipy.io import netcdf_file
+
+    try:
+        with netcdf_file(str(path), "r", mmap=False) as file:
+            about = file.about.decode("utf-8")
+            found = {name: np.array(x[:], float) for name, x in file.variables.items()}
+    except (TypeError, AttributeError, ValueError) as error:
+        raise _core.EvaluationError(f"{str(path)!r} holds no run: {error}") from None
+    n, empty = len(found["time"]), np.zeros((len(found["time"]), 0))
+    rows = {"t": found["time"], **{name: found.get(name, empty) for name in ("q", "v", "states", "work")}}
+    along = {name: found.get(name, empty) for name in ("vdot", "forces", "potential")} | {"kinetic": found.get("kinetic", np.zeros(n))}
+    if "step_t" not in found:
+        return _run(about, path, rows, None, along)
+    empty = np.zeros((len(found["step_t"]), 0))
+    run = _run(about, path, rows, {name: found.get(f"step_{name}", empty) for name in ("t", "q", "v", "states", "work")}, along)
+    run.__dict__["_vdot_of_steps"] = found.get("step_vdot", empty)
+    return run
+
+
+# ---------------------------------------------------------------------- tables
+
+
+def _pyarrow() -> Any:
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError:
+        raise ImportError(f"Parquet needs pyarrow: {HOLDS}; '.nc' and '.csv' need nothing") from None
+    return pyarrow
+
+
+def _to_parquet(run: Any, path: Path) -> None:
+    pyarrow = _pyarrow()
+    table = pyarrow.table({name: np.ascontiguousarray(x) for name, x in columns_of(run).items()})
+    pyarrow.parquet.write_table(table.replace_schema_metadata({"pycraft": _about(run)}), str(path))
+
+
+def _from_parquet(path: Path) -> Any:
+    pyarrow = _pyarrow()
+    try:
+        table = pyarrow.parquet.read_table(str(path))
+        about = (table.schema.metadata or {})[b"pycraft"].decode("utf-8")
+    except (KeyError, pyarrow.ArrowException) as error:
+        raise _core.EvaluationError(f"{str(path)!r} holds no run: {error}") from None
+    columns = {name: table.column(name).to_numpy().astype(float) for name in table.column_names}
+    told = json.loads(about)
+    n, effects = len(columns["t"]), told["about"]["effects"]
+    model = Multibody.from_description(told["model"])
+    of_q, of_v = coordinate_units(model)[0], model.coordinate_names
+
+    def those(start: str, names: list[Any]) -> np.ndarray:
+        found = [columns[f"{start}.{name}"] for name in names if f"{start}.{name}" in columns]
+        return np.stack(found, axis=1) if found else np.zeros((n, 0))
+
+    states = those("state", [i for i in range(len(columns))])
+    rows = {"t": columns["t"], "q": those("q", of_q), "v": those("v", of_v), "states": states, "work": those("work", effects)}
+    forces = np.stack([those(f"force.{effect}", of_v) for effect in effects]) if effects else np.zeros((0, n, len(of_v)))
+    along = {"vdot": those("vdot", of_v), "forces": forces, "kinetic": columns["kinetic"], "potential": those("potential", effects)}
+    return _run(about, path, rows, None, along)
+
+
+def _to_csv(run: Any, path: Path) -> None:
+    columns = columns_of(run)
+    header = ",".join(f'"{name}"' if "," in name or '"' in name else name for name in columns)
+    np.savetxt(path, np.stack(list(columns.values()), axis=1), fmt="%.17g", delimiter=",", header=header, comments="", encoding="utf-8")

@@ -1,0 +1,136 @@
+"""Runs of scenes: what is asked of the core, and what becomes of errors and interrupts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from ..arguments import one_number
+from ..dynamics.integrator_names import IntegratorName, integrator_named
+from ..state import at_state
+from .checkpoint import Checkpoint
+from .events import Event, events_for_core, listed_events
+from .progress_bar import ProgressBar
+from .run import Run
+from .runs_on_disk import checked_output
+
+
+@dataclass
+class RunOptions:
+    """What a run is told, checked; `told` is what a checkpoint keeps of it."""
+
+    integrator: IntegratorName
+    rtol: float
+    atol: float
+    step: float
+    max_step: float
+    normalise: bool
+    energy: bool
+
+    @classmethod
+    def checked(cls, integrator: Any, rtol: Any, atol: Any, step: Any, max_step: Any, normalise: Any, energy: Any) -> RunOptions:
+        """EvaluationError for what makes no sense."""
+        chosen = integrator_named(integrator)
+        if normalise not in ("never", "each step"):
+            raise _core.EvaluationError(f"normalise={normalise!r}: there are 'never' and 'each step'")
+        if chosen.foreign and normalise != "never":
+            raise _core.EvaluationError(f"integrator {chosen.name!r} has no normalise={normalise!r}; there is 'never'")
+        sizes = []
+        for name, value in (("step", step), ("max_step", max_step)):
+            sizes.append(0.0 if value is None else one_number(value, name))
+            if value is not None and not 0 < sizes[-1] < np.inf:
+                raise _core.EvaluationError(f"{name}={value}: a step is a positive number of seconds")
+        return cls(chosen, one_number(rtol, "rtol"), one_number(atol, "atol"), sizes[0], sizes[1], normalise == "each step", bool(energy))
+
+    @property
+    def told(self) -> dict[str, Any]:
+        return {name: getattr(self, name) for name in ("rtol", "atol", "step", "max_step", "normalise", "energy")}
+
+
+def run_times(start: float, T: Any, t_eval: Any) -> tuple[list[float], slice]:
+    """Times for the core, and which of what comes back was asked for."""
+    end = one_number(T, "T")
+    if not (start < end < np.inf):
+        raise _core.EvaluationError(
+            f"T={end:g}: a run lasts a positive number of seconds" if start == 0 else f"T={end:g}: the checkpoint is at {start:g} s already"
+        )
+    if t_eval is None:
+        return [start, end], slice(None)
+    times = np.atleast_1d(_core.real_array(t_eval, "t_eval"))
+    if times.ndim != 1 or not times.size or not np.isfinite(times).all() or not (np.diff(times) > 0).all():
+        raise _core.EvaluationError("t_eval: a rising list of times in seconds")
+    if times[0] < start or times[-1] > end:
+        raise _core.EvaluationError(f"t_eval goes from {times[0]:g} to {times[-1]:g} s; the run goes from {start:g} to T = {end:g} s")
+    before, after = times[0] > start, times[-1] < end
+    return [*([start] if before else []), *times.tolist(), *([end] if after else [])], slice(int(before), len(times) + int(before))
+
+
+def simulate(
+    scene: Any, T: Any, q: Any, v: Any, options: RunOptions, *, t_eval: Any, events: Any, progress: bool, dense: bool, output: Any
+) -> Run:
+    """The motion of a scene from a state at t = 0 to T, as `Scene.simulate` says."""
+    times, keep = run_times(0.0, T, t_eval)
+    q, v = at_state(scene.model, q, v)
+    return _run(scene, options, times, keep, t_eval, events, progress, dense, output, q, v, None)
+
+
+def resume(scene: Any, checkpoint: Any, T: Any, *, t_eval: Any, events: Any, progress: bool, dense: bool, output: Any) -> Run:
+    """The motion from a checkpoint to T, as `Scene.resume` says."""
+    if isinstance(checkpoint, Run):
+        checkpoint = checkpoint.checkpoint()
+    if not isinstance(checkpoint, Checkpoint):
+        checkpoint = Checkpoint.load(checkpoint)
+    on = tuple(scene._names_on())
+    here = {"model": scene.model.name, "effects": on, "precision": scene._how[3]}
+    for what, now in here.items():
+        if getattr(checkpoint, what) != now:
+            raise _core.ModelError(f"the checkpoint is of {what} {_told(getattr(checkpoint, what))}; this scene has {_told(now)}")
+    told = checkpoint.options
+    options = RunOptions(integrator_named(checkpoint.integrator), **told)
+    times, keep = run_times(checkpoint.t, T, t_eval)
+    zero = scene.model.zero_q(), np.zeros(scene.model.nv)  # the state is the checkpoint's
+    return _run(scene, options, times, keep, t_eval, events, progress, dense, output, *zero, checkpoint.state)
+
+
+def _told(what: Any) -> str:
+    return ", ".join(what) or "none" if isinstance(what, tuple) else repr(what)
+
+
+def _run(
+    scene: Any, options: RunOptions, times: list[float], keep: slice, t_eval: Any, events: Any, progress: bool, dense: bool, output: Any,
+    q: Any, v: Any, checkpoint: dict[str, Any] | None,
+) -> Run:  # fmt: skip
+    wanted: list[Event] = listed_events(events)
+    written = None if output is None else checked_output(output)
+    calls, chosen = scene._calls(), options.integrator
+    _core.check_pairing(calls, chosen.name, chosen.foreign, chosen.name in _implicit())
+    solver = chosen.solver(options.rtol, options.atol, options.max_step)
+    tolerances = (1.0, 1.0) if chosen.foreign else (options.rtol, options.atol)
+    record = _core.RunRecord(t_eval is None or dense)
+
+    def made() -> Run:
+        return Run.of_record(scene, calls, record, options, wanted, keep if t_eval is not None else None)
+
+    with ProgressBar(times[0], times[-1], progress) as bar:
+        try:
+            _core.run_scene(
+                calls, record, q, v, times, [], options.energy, chosen.name, *tolerances, options.step, options.max_step, options.normalise,
+                events_for_core(scene.model, wanted), bar if progress else None, checkpoint, solver,
+            )  # fmt: skip
+        except (Exception, KeyboardInterrupt) as error:
+            if len(record.samples["t"]):
+                scene._last_run = error.run = made()  # type: ignore[union-attr]  # what was computed by then
+            raise
+    scene._last_run = run = made()
+    if written is not None:
+        run.save(written)
+    return run
+
+
+def _implicit() -> tuple[str, ...]:
+    from ..dynamics.integrator_names import SOLVE_FOR_STEPS
+
+    return SOLVE_FOR_STEPS

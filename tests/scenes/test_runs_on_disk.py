@@ -1,0 +1,170 @@
+"""Runs as data sets and files: names and units, there and back, and paths that cannot be written."""
+
+import builtins
+import csv
+
+import numpy as np
+import pytest
+
+import pycraft as pc
+from support.runs import CASES
+
+E = pc.effects
+
+
+@pytest.fixture(scope="module")
+def run():
+    class Lag:
+        states = (0.1,)
+
+        def __call__(self, t, state):
+            return {"boom": 0.1 * state.states[0]}
+
+        def rates(self, t, state):
+            return -state.states
+
+    return CASES["damped"]().add(Lag()).simulate(0.5, events={"turn": lambda t, s: s.v[-1]})
+
+
+def test_xarray(run):
+    pytest.importorskip("xarray", reason="extra [data]")
+    data = run.to_xarray()
+    assert data.sizes["time"] == len(run) and data.attrs["model"] == "spinning" and data["time"].attrs["units"] == "s"
+    assert np.array_equal(data["v"].sel(coordinate="boom"), run.v[:, -1])
+    assert (
+        np.array_equal(data["q"].sel(configuration="hub[4]"), run.q[:, 4]) and data["configuration_unit"].sel(configuration="hub[4]") == "m"
+    )
+    assert np.array_equal(data["forces"].sel(effect="damping"), run.forces["damping"])
+    assert np.array_equal(data["work"].sel(worker="torque_source"), run.energy["work"][:, 1])
+    assert np.array_equal(data["momentum"].sel(about="com"), run.momentum["com"])
+    assert data["coordinate_unit"].values.tolist() == ["rad"] * 3 + ["m"] * 3 + ["rad"] * 3 + ["m"] and data["force_unit"].values[-1] == "N"
+
+
+def test_pandas(run):
+    pytest.importorskip("pandas", reason="extra [data]")
+    data = run.to_dataframe()
+    assert data.index.name == "t" and np.array_equal(data.index, run.t) and np.array_equal(data["q.boom"], run.q[:, -1])
+    assert np.array_equal(data["force.gravity.hub[5]"], run.forces["gravity"][:, 5]) and np.array_equal(data["state.0"], run.states[:, 0])
+
+
+def same(run, again):
+    for name in ("t", "q", "v", "states", "vdot"):
+        assert np.array_equal(getattr(run, name), getattr(again, name)), name
+    assert run.effects == again.effects and run.workers == again.workers and run.ended_by == again.ended_by
+    assert all(np.array_equal(run.forces[name], again.forces[name]) for name in run.effects)
+    assert all(np.array_equal(run.energy[name], again.energy[name]) for name in run.energy)
+    assert run.statistics == again.statistics
+    assert all(
+        np.array_equal(a.t, b.t) and np.array_equal(a.q, b.q) for a, b in zip(run.events.values(), again.events.values(), strict=True)
+    )
+    masses = [[body["mass"] for body in one.model.description()["bodies"]] for one in (run, again)]
+    assert masses[0] == masses[1]
+    assert np.array_equal(run.momentum["origin"], again.momentum["origin"])
+
+
+@pytest.mark.parametrize("ending", ["nc", "parquet"])
+def test_there_and_back(run, ending, tmp_path):
+    if ending == "parquet":
+        pytest.importorskip("pyarrow", reason="extra [data]")
+    run.save(tmp_path / f"run.{ending}")
+    again = pc.load_run(tmp_path / f"run.{ending}")
+    same(run, again)
+    assert np.abs(again.at(0.2).q - run.at(0.2).q).max() < 1e-6
+    with pytest.raises(pc.EvaluationError, match="has no checkpoint; save that of the run itself"):
+        again.checkpoint()
+
+
+def test_of_times_asked_for(tmp_path):
+    """NetCDF holds the ends of steps beside them, to look between."""
+    scene = CASES["spinning"]()
+    run = scene.simulate(0.5, t_eval=[0.1, 0.5])
+    run.save(tmp_path / "run.nc")
+    again = pc.load_run(tmp_path / "run.nc")
+    same(run, again)
+    assert np.abs(again.at(0.3).q - run.at(0.3).q).max() < 1e-6
+
+
+@pytest.mark.parametrize("ending", ["nc", "parquet"])
+def test_small_runs(ending, tmp_path):
+    """No effects, no works, no coordinates."""
+    if ending == "parquet":
+        pytest.importorskip("pyarrow", reason="extra [data]")
+    welded = pc.Multibody("welded", welds="keep")
+    welded.add_body("a", hinge="weld", mass=1.0)
+    for scene in (pc.Scene(pc.chain(2)), pc.Scene(welded)):
+        run = scene.simulate(0.1, integrator="rk4", step=0.05)
+        run.save(tmp_path / f"run.{ending}")
+        same(run, pc.load_run(tmp_path / f"run.{ending}"))
+
+
+def test_netcdf_is_read_by_others(run, tmp_path):
+    xarray = pytest.importorskip("xarray", reason="extra [data]")
+    run.save(tmp_path / "run.nc")
+    data = xarray.open_dataset(tmp_path / "run.nc", engine="scipy")
+    assert (
+        np.array_equal(data["q"], run.q) and data["time"].attrs["units"] == "s" and data["forces"].dims == ("effect", "time", "coordinate")
+    )
+
+
+def test_csv(run, tmp_path):
+    run.save(tmp_path / "run.csv")
+    with open(tmp_path / "run.csv", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == len(run) and [float(row["v.boom"]) for row in rows] == run.v[:, -1].tolist()
+    assert float(rows[-1]["work.damping"]) == run.energy["work"][-1, 0]
+
+
+def test_the_output_of_a_run(tmp_path):
+    scene = pc.mechanisms.pendulum()
+    run = scene.simulate(0.5, output=tmp_path / "run.nc")
+    same(run, pc.load_run(tmp_path / "run.nc"))
+    longer = scene.resume(run, 1.0, output=str(tmp_path / "longer.csv"))
+    assert (tmp_path / "longer.csv").exists() and longer.t[-1] == 1.0
+
+
+def test_a_path_that_cannot_be_written_is_refused_before_the_run(tmp_path, monkeypatch):
+    called = []
+    scene = pc.Scene(pc.chain(1)).add(lambda t, s: called.append(t) or [0.0])
+    (tmp_path / "folder.nc").mkdir()
+    for output, error, text in (
+        (tmp_path / "none" / "run.nc", FileNotFoundError, "there is no folder"),
+        (tmp_path / "folder.nc", IsADirectoryError, "is a folder"),
+        ("/proc/version.nc", OSError, "'/proc/version.nc' cannot be written"),
+        (tmp_path / "run.hdf5", pc.EvaluationError, "ends in .nc, .parquet, .csv"),
+    ):
+        with pytest.raises(error, match=text):
+            scene.simulate(0.1, [0.0], [0.0], output=output)
+    assert called == [] and not (tmp_path / "none").exists()
+
+    imported = builtins.__import__
+
+    def without(name, *rest):
+        if name.split(".")[0] in ("pyarrow", "pandas", "xarray"):
+            raise ImportError(name)
+        return imported(name, *rest)
+
+    run = scene.simulate(0.1, [0.0], [0.0])
+    monkeypatch.setattr(builtins, "__import__", without)
+    called.clear()
+    with pytest.raises(ImportError, match="Parquet needs pyarrow: pip install 'pycraft-soa.data.'; '.nc' and '.csv' need nothing"):
+        scene.simulate(0.1, [0.0], [0.0], output=tmp_path / "run.parquet")
+    assert called == []
+    with pytest.raises(ImportError, match="needs pandas: pip install 'pycraft-soa.data.'"):
+        run.to_dataframe()
+    with pytest.raises(ImportError, match="needs xarray: pip install 'pycraft-soa.data.'"):
+        run.to_xarray()
+
+
+def test_files_that_hold_no_run(tmp_path):
+    from scipy.io import netcdf_file
+
+    (tmp_path / "text.nc").write_text("no NetCDF")
+    with netcdf_file(str(tmp_path / "other.nc"), "w") as file:
+        file.createDimension("x", 1)
+    for name in ("text.nc", "other.nc"):
+        with pytest.raises(pc.EvaluationError, match=f"{name}' holds no run"):
+            pc.load_run(tmp_path / name)
+    with pytest.raises(pc.EvaluationError, match="runs are read from files that end in .nc and .parquet"):
+        pc.load_run("run.csv")
+    with pytest.raises(FileNotFoundError, match="there is no file 'none.nc'"):
+        pc.load_run("none.nc")
