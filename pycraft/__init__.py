@@ -70,7 +70,7 @@ if _TYPE_CHECKING:
     from .models.loaders import load
     from .peers import compare
     from .proofs import Exercise, Proof, derivative, exercise, prove, prove_derivative, repair, worksheet
-    from .scenes import Checkpoint, Event, Scene, effects, load_run, mechanisms
+    from .scenes import Checkpoint, Event, Scene, effects, load_run, load_scene, mechanisms
     from .sympy_bridge import from_sympy, parse, to_sympy
 
 # What takes long to import is imported when it is first asked for: the same names, each with its room.
@@ -84,7 +84,7 @@ _LATER = {
     "models.robots": ("robots",),
     "peers": ("compare",),
     "proofs": ("Exercise", "Proof", "derivative", "exercise", "prove", "prove_derivative", "repair", "worksheet"),
-    "scenes": ("Checkpoint", "Event", "Scene", "effects", "load_run", "mechanisms"),
+    "scenes": ("Checkpoint", "Event", "Scene", "effects", "load_run", "load_scene", "mechanisms"),
     "sympy_bridge": ("from_sympy", "parse", "to_sympy"),
 }
 
@@ -153,6 +153,7 @@ __all__ = [
     "kalman",
     "load",
     "load_run",
+    "load_scene",
     "load_sweep",
     "mechanisms",
     "models",

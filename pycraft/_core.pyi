@@ -7,7 +7,7 @@ import fractions
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Binding', 'Dynamics', 'Effect', 'Error', 'EvaluationError', 'FunctionOfTime', 'GroupedOperators', 'HingeKind', 'Integration', 'Letter', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'Scalar', 'SceneCalls', 'SceneEffects', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'blockdiag', 'bushing_effect', 'checked_refinement', 'compiled_call', 'constant', 'constant_in_time', 'coordinates_named', 'coulomb_friction_effect', 'damping_effect', 'direct_call', 'direct_calls', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'gravity_effect', 'gravity_gradient_effect', 'harmonic', 'hinge_kinds', 'identity', 'implicit_damping_effect', 'implicit_spring_effect', 'instruction_set', 'instruction_sets', 'integrators', 'kernel_headers', 'kernel_tape', 'limits_effect', 'methods', 'motor_effect', 'node_damper_effect', 'node_spring_effect', 'numbers_in_q', 'operators_of', 'piecewise_polynomial', 'point_mass_gravity_effect', 'precisions', 'prepared_call', 'prescribed_effect', 'python_effect', 'python_function_of_time', 'quadratic_damping_effect', 'real_array', 'record_from', 'residual', 'rotor_inertia_effect', 'scalar', 'servo_effect', 'spring_effect', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_by_hand', 'time_compiled', 'time_dynamics', 'time_forward', 'time_method', 'time_packs', 'time_scene', 'torque_source_effect', 'vector', 'wider', 'wrench_effect', 'zero']
+__all__: list[str] = ['Binding', 'Dynamics', 'Effect', 'Error', 'EvaluationError', 'FunctionOfTime', 'GroupedOperators', 'HingeKind', 'Integration', 'Letter', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'RunRecord', 'Scalar', 'SceneCalls', 'SceneEffects', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'blockdiag', 'bushing_effect', 'check_pairing', 'checked_refinement', 'compiled_call', 'constant', 'constant_in_time', 'coordinates_named', 'coulomb_friction_effect', 'damping_effect', 'direct_call', 'direct_calls', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'gravity_effect', 'gravity_gradient_effect', 'harmonic', 'hermite_between', 'hinge_kinds', 'identity', 'implicit_damping_effect', 'implicit_spring_effect', 'instruction_set', 'instruction_sets', 'integrator_table', 'integrators', 'kernel_headers', 'kernel_tape', 'limits_effect', 'methods', 'motor_effect', 'node_damper_effect', 'node_spring_effect', 'numbers_in_q', 'operators_of', 'piecewise_polynomial', 'point_mass_gravity_effect', 'precisions', 'prepared_call', 'prescribed_effect', 'python_effect', 'python_function_of_time', 'quadratic_damping_effect', 'real_array', 'record_from', 'residual', 'rotor_inertia_effect', 'run_scene', 'scalar', 'scene_between', 'servo_effect', 'spring_effect', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_by_hand', 'time_compiled', 'time_dynamics', 'time_forward', 'time_method', 'time_packs', 'time_passes', 'time_scene', 'torque_source_effect', 'vector', 'wider', 'wrench_effect', 'zero']
 
 class Error(Exception): ...
 class SpaceError(Error, TypeError): ...
@@ -942,7 +942,7 @@ class Integration:
         ...
     def configuration_rate(self, q: typing.Any, v: typing.Any, precision: str | int, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
         ...
-    def trajectory(self, q: typing.Any, v: typing.Any, times: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], tau: typing.Any, damping: typing.Any, integrator: str, rtol: typing.SupportsFloat | typing.SupportsIndex, atol: typing.SupportsFloat | typing.SupportsIndex, step: typing.SupportsFloat | typing.SupportsIndex, normalise: bool, precision: str | int, form: str, refine: typing.Any) -> dict:
+    def trajectory(self, q: typing.Any, v: typing.Any, times: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], tau: typing.Any, damping: typing.Any, integrator: str, rtol: typing.SupportsFloat | typing.SupportsIndex, atol: typing.SupportsFloat | typing.SupportsIndex, step: typing.SupportsFloat | typing.SupportsIndex, normalise: bool, precision: str | int, form: str, refine: typing.Any, foreign: typing.Any = None, right_hand_side: typing.Any = None) -> dict:
         ...
 class FunctionOfTime:
     """
@@ -1003,12 +1003,54 @@ class SceneCalls:
         """
         (name, what, because) of the passes of a 'motion', at 'rest', or with 'works'.
         """
-    def simulate(self, q: typing.Any, v: typing.Any, times: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], own: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], energy: bool, integrator: str, rtol: typing.SupportsFloat | typing.SupportsIndex, atol: typing.SupportsFloat | typing.SupportsIndex, step: typing.SupportsFloat | typing.SupportsIndex, every_step: bool, normalise: bool) -> dict:
-        ...
+    @property
+    def states(self) -> list[int]:
+        """
+        How many states of its own each effect has that is on, what it holds among them.
+        """
     @property
     def workers(self) -> list[int]:
         """
         Numbers of the effects whose works are counted, among those that are on.
+        """
+class RunRecord:
+    """
+    What a run gave out, also of one that an error or an interrupt ended.
+    """
+    def __init__(self, keeps_steps: bool) -> None:
+        ...
+    def __reduce__(self) -> tuple:
+        ...
+    @property
+    def checkpoint(self) -> dict:
+        ...
+    @property
+    def ended_by(self) -> int:
+        """
+        The event that ended it, -1: none.
+        """
+    @property
+    def events(self) -> tuple[list[int], dict]:
+        """
+        Numbers of events, and the states at them.
+        """
+    @property
+    def own_events(self) -> list[str]:
+        """
+        Events of the effects' own, by the effects; those that were asked for follow them.
+        """
+    @property
+    def samples(self) -> dict:
+        """
+        The times asked for.
+        """
+    @property
+    def statistics(self) -> dict:
+        ...
+    @property
+    def steps(self) -> dict:
+        """
+        The ends of steps.
         """
 class Theorem:
     """
@@ -1092,6 +1134,10 @@ def blockdiag(operator: Operator) -> Operator:
     """
 def bushing_effect(model: Multibody, node_a: str, node_b: str, stiffness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], damping: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rotation: typing.Any, position: typing.Any) -> Effect:
     ...
+def check_pairing(calls: SceneCalls, integrator: str, foreign: bool, implicit: bool) -> None:
+    """
+    EvaluationError where they do not fit each other.
+    """
 def checked_refinement(refine: typing.Any, residual: str, precision: str | int) -> typing.Any:
     """
     The number of corrections, or 'auto'; EvaluationError for anything else.
@@ -1147,6 +1193,8 @@ def gravity_gradient_effect(model: Multibody, mu: typing.SupportsFloat | typing.
     ...
 def harmonic(amplitude: typing.SupportsFloat | typing.SupportsIndex, frequency: typing.SupportsFloat | typing.SupportsIndex, phase: typing.SupportsFloat | typing.SupportsIndex, offset: typing.SupportsFloat | typing.SupportsIndex) -> FunctionOfTime:
     ...
+def hermite_between(model: Multibody, t: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], vdot: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], times: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], at: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> tuple:
+    ...
 def identity(space: typing.Any = None) -> Operator:
     """
     I; without a space it takes that of the operator it is combined with.
@@ -1163,9 +1211,13 @@ def instruction_sets() -> list[str]:
     """
     Those that were built and that this machine has, from narrow to wide.
     """
-def integrators(scenes: bool = False) -> list[str]:
+def integrator_table() -> list:
     """
-    The integrators of trajectories, or of scenes: those and what takes steps by effects that act implicitly.
+    What the core's integrators are.
+    """
+def integrators() -> list[str]:
+    """
+    The names of the core's integrators.
     """
 def kernel_headers() -> dict:
     """
@@ -1227,7 +1279,11 @@ def residual(a: typing.Any, b: typing.Any, vectors: collections.abc.Mapping[str,
     """
 def rotor_inertia_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, inertia: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], gear_ratio: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> Effect:
     ...
+def run_scene(calls: SceneCalls, record: RunRecord, q: typing.Any, v: typing.Any, times: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], own: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], energy: bool, integrator: str, rtol: typing.SupportsFloat | typing.SupportsIndex, atol: typing.SupportsFloat | typing.SupportsIndex, step: typing.SupportsFloat | typing.SupportsIndex, max_step: typing.SupportsFloat | typing.SupportsIndex, normalise: bool, events: list, progress: typing.Any, checkpoint: typing.Any, foreign: typing.Any) -> None:
+    ...
 def scalar(value: float | fractions.Fraction) -> Scalar:
+    ...
+def scene_between(calls: SceneCalls, integrator: str, t: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], states: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], work: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], times: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], at: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> dict:
     ...
 def servo_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, stiffness: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], damping: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], target: FunctionOfTime, effort_limit: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], speed_limit: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], speed_band: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
     ...
@@ -1269,9 +1325,13 @@ def time_packs(model: Multibody, q: typing.Annotated[numpy.typing.ArrayLike, num
     """
     Seconds per state of a batch in packs: minimum, median, calls.
     """
-def time_scene(scene: SceneCalls, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2) -> dict:
+def time_passes(scene: SceneCalls, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2) -> list[float]:
     """
-    Seconds per evaluation of a scene's accelerations: minimum, median, calls.
+    Seconds of every pass of a scene's motion, in their order.
+    """
+def time_scene(scene: SceneCalls, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2, works: bool = False) -> dict:
+    """
+    Seconds per evaluation of a scene's accelerations: minimum, median, calls; with works, of the effects' powers, too.
     """
 def torque_source_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, torque: FunctionOfTime, effort_limit: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], speed_limit: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], speed_band: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
     ...

@@ -27,6 +27,8 @@ class TidyTable:
     """Headings where a terminal is narrow."""
     legend: ClassVar[dict[str, str]] = {}
     """Signs for the last column where a terminal is narrow, see `marks`."""
+    measure: ClassVar[str] = "error"
+    """The column that says "refused" where a terminal is narrow."""
     common: ClassVar[str] = ""
     """The column whose value stands in a line of its own above the rows that share it, where a terminal is narrow."""
 
@@ -113,7 +115,7 @@ class TidyTable:
             for row, texts in zip(self.rows, cells, strict=True):
                 texts[-1] = self.marks(row)
                 if isinstance(row.get("refused"), str) and row["refused"]:
-                    texts[list(titles).index("error")] = "refused"
+                    texts[list(titles).index(self.measure)] = "refused"
             if self.common:
                 at = list(titles).index(self.common)
                 heading_of = [texts.pop(at) for texts in cells]
@@ -184,6 +186,11 @@ def refusal_text(reason: str, width: int = 48) -> str:
 def error_text(error: float | None) -> str:
     """An error in two figures."""
     return "" if error is None else f"{error:.1e}"
+
+
+def share_text(share: float | None) -> str:
+    """A share in two figures: 0.35 %, 47 %."""
+    return "" if share is None else f"{100 * share:.2g} %" if abs(share) < 0.0995 else f"{100 * share:.0f} %"
 
 
 def bytes_text(count: int | None) -> str:

@@ -157,28 +157,59 @@ py::dict time_dynamics(const std::shared_ptr<Multibody>& model, const std::strin
   return result(t);
 }
 
-// Accelerations of a scene, one state after another.
-py::dict time_scene(SceneCalls& calls, const Array& q, const Array& v, double seconds) {
-  if (calls.precision() != Precision::double_) throw EvaluationError("scenes are timed in double precision");
+// States (K, nq) and (K, nv) of a scene in its scalar, and its effects' own states as they are at first.
+template <class S>
+struct StatesOfScene {
+  StatesOfScene(const CompiledScene<S>& scene, const Array& q, const Array& v, const Multibody& mb)
+      : nq(mb.nq()), nv(mb.nv()), count(states_of(q)), q(q.data(), q.data() + q.size()), v(v.data(), v.data() + v.size()), vdot(nv), powers(scene.effects().workers().size()) {
+    if (v.size() != static_cast<py::ssize_t>(count) * nv || q.size() != static_cast<py::ssize_t>(count) * nq) throw ModelError("q (states, nq) and v (states, nv) of a scene that is timed");
+    const std::vector<double> first = scene.effects().own_states();
+    own.assign(first.begin(), first.end());
+  }
+  void evaluate(CompiledScene<S>& scene, SceneList list) {
+    const S *at = q.data() + size_t(k) * nq, *rate = v.data() + size_t(k) * nv;
+    if (list == SceneList::works) scene.accelerations_and_powers(S(0), at, rate, own.data(), vdot.data(), powers.data());
+    else scene.accelerations(S(0), at, rate, own.data(), vdot.data());
+    k = (k + 1) % count;
+  }
+  int nq, nv, count, k = 0;
+  std::vector<S> q, v, own, vdot, powers;
+};
+
+// Accelerations of a scene, one state after another; with `works`, powers of its effects, too.
+py::dict time_scene(SceneCalls& calls, const Array& q, const Array& v, double seconds, bool works) {
   const Multibody& mb = calls.scene().model();
-  const int K = states_of(q), nq = mb.nq(), nv = mb.nv();
-  std::vector<double> out(nv);
-  int k = 0;
   Timing t;
   {
     const ModelInUse use(mb);
     ReleasedGil release;
     calls.with([&]<class S>(CompiledScene<S>& scene) {
-      if constexpr (std::is_same_v<S, double>) {
-        const std::vector<double> own = scene.effects().own_states();
-        t = time_calls([&] {
-          scene.accelerations(0.0, q.data() + size_t(k) * nq, v.data() + size_t(k) * nv, own.data(), out.data());
-          k = (k + 1) % K;
-        }, seconds);
-      }
+      StatesOfScene<S> states(scene, q, v, mb);
+      t = time_calls([&] { states.evaluate(scene, works ? SceneList::works : SceneList::motion); }, seconds);
     });
   }
   return result(t);
+}
+
+// Seconds of every pass of a scene's motion by itself, in their order, each over all states.
+std::vector<double> time_passes(SceneCalls& calls, const Array& q, const Array& v, double seconds) {
+  const Multibody& mb = calls.scene().model();
+  std::vector<double> found;
+  {
+    const ModelInUse use(mb);
+    ReleasedGil release;
+    calls.with([&]<class S>(CompiledScene<S>& scene) {
+      StatesOfScene<S> states(scene, q, v, mb);
+      found.assign(scene.passes(SceneList::motion).size(), 0.0);
+      const double each = seconds / (states.count * static_cast<double>(found.size()));
+      for (int k = 0; k < states.count; ++k) {
+        states.evaluate(scene, SceneList::motion);
+        for (size_t pass = found.size(); pass-- > 0;)  // accelerations first: repeated effects leave forces that are no state's
+          found[pass] += time_calls([&] { scene.repeat(SceneList::motion, pass); }, each).minimum / states.count;
+      }
+    });
+  }
+  return found;
 }
 // The same by hand, and its last result.
 std::pair<py::dict, py::array_t<double>> time_by_hand(const std::shared_ptr<Multibody>& model, const std::string& what, const Array& q, const Array& v, double seconds) {
@@ -229,7 +260,9 @@ void register_bench(py::module_& m) {
         "Seconds per forward dynamics over a set of states in rotation: minimum, median, calls.");
   m.def("time_method", &time_method, py::arg("model"), py::arg("method"), py::arg("q"), py::arg("v"), py::arg("u"), py::arg("seconds") = 0.2,
         py::arg("precision") = Precision::double_, "Seconds per forward dynamics by a method of the mass matrix: minimum, median, calls.");
-  m.def("time_scene", &time_scene, py::arg("scene"), py::arg("q"), py::arg("v"), py::arg("seconds") = 0.2, "Seconds per evaluation of a scene's accelerations: minimum, median, calls.");
+  m.def("time_scene", &time_scene, py::arg("scene"), py::arg("q"), py::arg("v"), py::arg("seconds") = 0.2, py::arg("works") = false,
+        "Seconds per evaluation of a scene's accelerations: minimum, median, calls; with works, of the effects' powers, too.");
+  m.def("time_passes", &time_passes, py::arg("scene"), py::arg("q"), py::arg("v"), py::arg("seconds") = 0.2, "Seconds of every pass of a scene's motion, in their order.");
   m.def("time_by_hand", &time_by_hand, py::arg("model"), py::arg("what"), py::arg("q"), py::arg("v"), py::arg("seconds") = 0.2,
         "Seconds per forward dynamics by the bare kernel with one effect written out by hand: minimum, median, calls; and v̇ at the first state.");
   m.def("time_packs", &time_packs, py::arg("model"), py::arg("q"), py::arg("v"), py::arg("u"), py::arg("seconds") = 0.2, py::arg("form") = Form::fast,

@@ -145,6 +145,13 @@ void register_scenes(py::module_& m) {
         c.with([&]<class S>(CompiledScene<S>& scene) { workers = scene.effects().workers(); });
         return workers;
       }, "Numbers of the effects whose works are counted, among those that are on.")
+      .def_property_readonly("states", [](SceneCalls& c) {
+        std::vector<int> states;
+        c.with([&]<class S>(CompiledScene<S>& scene) {
+          for (const auto& e : scene.effects().effects()) states.push_back(e->declared.own());
+        });
+        return states;
+      }, "How many states of its own each effect has that is on, what it holds among them.")
       .def("plan", [](SceneCalls& c, const std::string& list) { return plan(c, list); }, py::arg("list"), "(name, what, because) of the passes of a 'motion', at 'rest', or with 'works'.");
 }
 

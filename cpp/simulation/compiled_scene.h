@@ -60,6 +60,11 @@ class CompiledScene {
   const std::vector<int>& prescribed() const { return prescribed_; }
   bool by_kernels() const { return solver_->by_kernels(); }
   std::vector<PassRecord> passes(SceneList list) const;  // with how often they ran
+  // One pass of a list again, uncounted, at the state where the list ran last: for measuring it, its results are none.
+  void repeat(SceneList list, size_t pass) {
+    const Pass& again = lists_[static_cast<int>(list)][pass];
+    again.run(*this, again.of);
+  }
 
  private:
   struct Pass {

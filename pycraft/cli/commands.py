@@ -1,4 +1,4 @@
-"""The command line: pycraft tour | check | accuracy | stability | bench | peers | lab."""
+"""The command line: pycraft tour | check | run | accuracy | stability | bench | peers | lab."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
+from .runs import run as run_scene
 from .terminal import Commands, console, diagnostics, fail, note
 
 app = typer.Typer(
@@ -138,6 +139,9 @@ def _check_paper(path: str, states: int, seed: int, precision: str | int, json: 
         report = check_paper(path, states=max(states, 1), seed=seed, precision=precision, progress=status.update)
     print(report.to_json() if json else report)
     raise typer.Exit(report.status)
+
+
+app.command("run")(run_scene)
 
 
 @app.command()

@@ -3,7 +3,8 @@
 from . import effects, mechanisms
 from .checkpoint import Checkpoint
 from .events import Event
+from .file_reader import load_scene
 from .runs_on_disk import load_run
 from .scene import Scene
 
-__all__ = ["Checkpoint", "Event", "Scene", "effects", "load_run", "mechanisms"]
+__all__ = ["Checkpoint", "Event", "Scene", "effects", "load_run", "load_scene", "mechanisms"]

@@ -110,8 +110,8 @@ class Run(Motion):
         steps = np.clip(np.searchsorted(rows["t"], times[order], side="left") - 1, 0, len(rows["t"]) - 2)
         if self._calls is not None:
             integrator = self._about["integrator"] if ":" not in self._about["integrator"] else ""
-            columns = (rows[name] for name in ("t", "q", "v", "states", "work"))
-            found = _core.scene_between(self._calls, integrator, *columns, times[order].tolist(), steps.tolist())
+            t, q, v, states, work = (rows[name] for name in ("t", "q", "v", "states", "work"))
+            found = _core.scene_between(self._calls, integrator, t, q, v, states, work, times[order].tolist(), steps.tolist())
         else:
             found = self._interpolated(rows, times[order], steps)
         back = np.argsort(order, kind="stable")

@@ -83,7 +83,8 @@ class RunAnimation:
         else:
             from matplotlib.animation import FFMpegWriter, PillowWriter
 
-            self.animation.save(str(target), writer=(PillowWriter if target.suffix == ".gif" else FFMpegWriter)(fps=self.fps))
+            fps: Any = self.fps  # fractions are taken, though its types know whole ones alone
+            self.animation.save(str(target), writer=(PillowWriter if target.suffix == ".gif" else FFMpegWriter)(fps=fps))
         return target
 
     @cached_property
@@ -91,7 +92,8 @@ class RunAnimation:
         from matplotlib import rc_context
 
         with rc_context({"animation.embed_limit": LARGEST}):
-            return self.animation.to_jshtml(fps=self.fps)
+            fps: Any = self.fps  # as above
+            return self.animation.to_jshtml(fps=fps)
 
     def _repr_html_(self) -> str:
         return self._page

@@ -14,6 +14,8 @@ from ..closed import Closed
 from ..state import at_state
 from .effects import Effect, UserEffect
 from .explain import plan_text
+from .filed import Filed
+from .measurements import Measurements
 from .run import Run
 from .simulation import RunOptions, resume, simulate
 
@@ -60,7 +62,7 @@ class Effects(Mapping[str, Effect]):
         return "{" + ", ".join(self._entries) + "}"
 
 
-class Scene(Closed):
+class Scene(Measurements, Filed, Closed):
     """A model and the effects that act on it. It starts empty: nothing acts that was not added, the model's own gravity neither.
 
     Parameters
@@ -131,6 +133,12 @@ class Scene(Closed):
             raise
         self._built = None
         return self
+
+    def _enter(self, name: str | None, effect: Effect, on: bool) -> None:
+        """One effect as a file has it, on or off."""
+        called = self._fresh_core().add(name or "", effect.made_for(self._model), on)
+        self._entries[called] = (effect, on)
+        self._built = None
 
     def remove(self, *names: Any) -> Scene:
         """Take effects out, by name or themselves; returns the scene."""
@@ -334,7 +342,9 @@ class Scene(Closed):
 
     # ------------------------------------------------------------------ copies
     def __reduce__(self):
-        return _again, (type(self), self._model, list((name, effect, on) for name, (effect, on) in self._entries.items()), self._how)
+        return _again, (type(self), self._model, list((name, effect, on) for name, (effect, on) in self._entries.items()), self._how), {
+            "_run_options": self._run_options
+        }  # fmt: skip
 
 
 def _again(kind: type[Scene], model: Any, entries: list[tuple[str, Effect, bool]], how: tuple[Any, ...]) -> Scene:

@@ -9,7 +9,7 @@ import pycraft as pc
 matplotlib.use("Agg")
 from matplotlib import pyplot  # noqa: E402 - after the backend is chosen
 
-from pycraft.scenes import run_animation  # noqa: E402
+from pycraft.scenes import run_animation  # noqa: E402 - as above
 
 
 @pytest.fixture(autouse=True)

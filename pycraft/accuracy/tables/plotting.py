@@ -117,7 +117,7 @@ def _between(start: np.ndarray, end: np.ndarray, point: np.ndarray) -> float:
     return float(np.hypot(*(point - start - share * along)))
 
 
-def _no_picture(axes: Any, table: Any) -> None:
+def no_picture(axes: Any, table: Any) -> None:
     """In place of an empty frame: that everything is refused, and why."""
     reasons = [fill(reason, 70) for reason in list(table.refusals)[:3]]
     if len(table.refusals) > 3:
@@ -151,7 +151,7 @@ def accuracy_plot(table: Any, ax: Any = None) -> Any:
     ax = axes_of(ax)
     rows = [row for row in table if not row["refused"]]
     if not rows:
-        _no_picture(ax, table)
+        no_picture(ax, table)
         return ax
     times, errors = np.array([row["seconds"] for row in rows]), above_zero(row["error"] for row in rows)
     for row, x, y in zip(rows, times, errors, strict=True):
@@ -185,7 +185,7 @@ def accuracy_plot(table: Any, ax: Any = None) -> Any:
         used["way"].append(Line2D([], [], ls="", label=f"refused: {len(table) - len(rows)} of {len(table)}"))
     ax.legend(handles=[*used["precision"], *used["way"]], frameon=False, fontsize=7.5, loc="center left", bbox_to_anchor=(1.0, 0.5))
     points = list(zip(times, errors, strict=True))
-    place_labels(ax, [(x, y, _label(row)) for x, y, row in _steps(front)], [*points, *_along(front)], points)
+    place_labels(ax, [(x, y, _label(row)) for x, y, row in _steps(front)], [*points, *along_front(front)], points)
     return ax
 
 
@@ -206,7 +206,7 @@ def _steps(front: list[tuple[float, float, dict[str, Any]]]) -> list[tuple[float
     return named
 
 
-def _along(front: list[tuple[float, float, dict[str, Any]]], count: int = 24) -> list[tuple[float, float]]:
+def along_front(front: list[tuple[float, float, dict[str, Any]]], count: int = 24) -> list[tuple[float, float]]:
     """Points along the line of a front, to keep labels off it."""
     points: list[tuple[float, float]] = []
     for (x, y, _), (next_x, next_y, _) in zip(front, front[1:], strict=False):
@@ -238,7 +238,7 @@ def work_precision_plot(table: Any, axes: Any = None) -> Any:
         axes = plt.subplots(1, 2, figsize=(9.0, 3.8), layout="constrained")[1]
     rows = [row for row in table if not row["refused"]]
     if not rows:
-        _no_picture(axes[0], table)
+        no_picture(axes[0], table)
         axes[1].set_axis_off()
         return axes
     names = list(dict.fromkeys(row["integrator"] for row in rows))

@@ -37,7 +37,9 @@ class WorkPrecisionTable(TidyTable):
     `reference` is what errors are measured against, in words; `reference_error` its own error, measured as theirs.
     """
 
-    columns = ("integrator", "tolerance", "step", "error", "drift", "seconds", "evaluations", "resolved", "refused")
+    columns: ClassVar[tuple[str, ...]] = (
+        "integrator", "tolerance", "step", "error", "drift", "seconds", "evaluations", "resolved", "refused",
+    )  # fmt: skip
     shown = {
         "integrator": "integrator", "tolerance": "tolerance or step", "error": "error (rad, m)", "drift": "energy drift", "seconds": "time",
         "evaluations": "evaluations", "refused": "",
@@ -183,7 +185,7 @@ def work_precision(
             if progress is not None:
                 progress(f"{integrator}, {amount:g}")
             options = {"step": amount} if fixed else {"rtol": amount, "atol": amount}
-            rows.append(_row(model, integrator, options, integrate, truth[0], own, energy, scale, seconds))
+            rows.append(measured_row(model, integrator, options, integrate, truth[0], own, energy, scale, seconds))
     gravity = "its own right-hand side" if right_hand_side is not None else f"gravity ({', '.join(f'{g:g}' for g in model.gravity)}) m/s²"
     return WorkPrecisionTable(
         f"Integration of {model.name}, {duration:g} s, {gravity}, from {'a moving state' if np.any(v) else 'rest'}",
@@ -207,10 +209,15 @@ def _runs(model: Any, q: np.ndarray, v: np.ndarray, times: np.ndarray, tau: Any,
     return integrate
 
 
-def _row(
-    model: Any, integrator: str, options: dict[str, float], integrate: Callable, truth: np.ndarray, own: float, energy: Any, scale: float,
+def measured_row(
+    model: Any, integrator: str, options: dict[str, float], integrate: Integrate, truth: np.ndarray, own: float, energy: Any, scale: float,
     budget: float,
 ) -> dict[str, Any]:  # fmt: skip
+    """One row: a run by an integrator at a tolerance or step, its error against `truth` (K, nq), its time.
+
+    own : rad, m, the error of the truth itself. energy : a function of (q, v), or None; scale : J, what its drift is relative to.
+    budget : s, for which the run is repeated.
+    """
     row: dict[str, Any] = dict.fromkeys(WorkPrecisionTable.columns)
     row |= {"integrator": integrator, "tolerance": options.get("rtol"), "step": options.get("step"), "refused": ""}
     try:

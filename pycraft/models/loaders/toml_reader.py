@@ -61,6 +61,8 @@ def read(file: TomlFile, *, root: str, welds: str | None, strict: bool) -> tuple
     if root == "free":
         text = 'root="free" is for URDF files; in a TOML file give the body hinge = "free" and hinge_name = "root"'
         raise file.error((), text)
+    if "effects" in file.data or "model" in file.data:
+        raise file.error((), "this file is that of a scene: pycraft.load_scene reads it")
     return read_table(TomlTable(file, file.data, (), "a model", MODEL), Path(file.path).stem, welds, strict)
 
 
@@ -76,7 +78,7 @@ def read_table(table: TomlTable, name: str, welds: str | None = None, strict: bo
     if gravity is not None:
         model.gravity = gravity
     if (state := table.table("state", ("q", "v"), "the state")) is not None:
-        _set_state(model, state)
+        set_state(model, state)
     if (left := table.table("left_aside", ("gravity", "spring_rest", *QUANTITIES), "left_aside")) is not None:
         model._left_aside = _left_aside(model, left)
     model._actuators = [_actuator(model, actuator) for actuator in table.tables("actuators", ACTUATOR, "actuator", named=True) or []]
@@ -265,7 +267,7 @@ def _limits(table: TomlTable) -> tuple[list[float], list[float]] | None:
 # Beside the bodies ----------------------------------------------------------------------------------------------------
 
 
-def _set_state(model: Multibody, table: TomlTable) -> None:
+def set_state(model: Multibody, table: TomlTable) -> None:
     """q and v by the names of hinges; what is not named stays at zero."""
     for key in ("q", "v"):
         if (given := table.table(key, None, f"{key} of the state")) is None:

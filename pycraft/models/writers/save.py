@@ -15,10 +15,7 @@ if TYPE_CHECKING:
 
 def save(model: Multibody, path: str | os.PathLike[str], state: bool = True) -> None:
     """`Multibody.save`."""
-    try:
-        shown = os.fsdecode(path)
-    except TypeError:
-        raise _core.ModelError(f"a model is saved at the path of a file, not at {path!r:.80}") from None
+    shown = path_text(path, "a model")
     ending = PurePath(shown).suffix.lower()
     if ending == ".toml":
         text = toml_writer.model_text(model, state)
@@ -28,6 +25,19 @@ def save(model: Multibody, path: str | os.PathLike[str], state: bool = True) -> 
         kinds = ".toml, which holds every model, and .urdf, for what URDF knows"
         remedy = "; MJCF text is made by pycraft.interop.export.to_mjcf(model)" if ending in (".xml", ".mjcf") else ""
         raise _core.ModelError(f"{shown}: a model's file ends in {kinds}{remedy}")
+    write_text(shown, text)
+
+
+def path_text(path: str | os.PathLike[str], what: str) -> str:
+    """A path as a text. ModelError where it is none."""
+    try:
+        return os.fsdecode(path)
+    except TypeError:
+        raise _core.ModelError(f"{what} is saved at the path of a file, not at {path!r:.80}") from None
+
+
+def write_text(shown: str, text: str) -> None:
+    """Write a file, which is replaced where it is there. ModelError where it cannot be written."""
     try:
         with open(shown, "w", encoding="utf-8", newline="\n") as file:
             file.write(text)

@@ -54,7 +54,7 @@ def model_data(model: Multibody, state: bool = True) -> dict[str, Any]:
         data["bodies"] = [_body(body, names) for body in bodies]
     if described["nodes"]:
         data["nodes"] = [_node(node, names) for node in described["nodes"]]
-    if state and (moved := _state(model)):
+    if state and (moved := state_data(model)):
         data["state"] = moved
     if left := _left_aside(model):
         data["left_aside"] = left
@@ -147,7 +147,7 @@ def _subhinge(subhinge: dict[str, Any]) -> Inline:
     return data
 
 
-def _state(model: Multibody) -> dict[str, Any]:
+def state_data(model: Multibody) -> dict[str, Any]:
     """q and v by the names of hinges, without those that are at zero."""
     parts = {"q": _positions(model, model.q)}
     parts["v"] = _by_hinge({name: hinge.v_slice for name, hinge in model.hinges.items()}, model.v, np.zeros(model.nv))

@@ -74,7 +74,7 @@ def _shown(value: Any) -> str:
 
 
 def plain(value: Any) -> Any:
-    """Arrays as lists, effects' functions of time as dictionaries; ModelError for what no file can hold."""
+    """Arrays as lists, effects' functions of time as dictionaries, handles as their names; ModelError for what no file can hold."""
     if hasattr(value, "to_dict"):
         return value.to_dict()
     if isinstance(value, np.ndarray):
@@ -87,6 +87,8 @@ def plain(value: Any) -> Any:
         return [plain(item) for item in value]
     if value is None or isinstance(value, (str, bool, int, float)):
         return value
+    if isinstance(name := getattr(value, "name", None), str):
+        return name
     raise _core.ModelError(f"{value!r:.80} is no plain data: a function is Python's, and no file holds it")
 
 

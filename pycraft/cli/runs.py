@@ -1,0 +1,157 @@
+"""`pycraft run`: a scene simulated, from its file or from a model and effects of the command line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from ..tidy import seconds_text
+from .terminal import console, diagnostics, fail, note
+
+SHOWN = 500
+"""States that are kept where --every is left out."""
+
+
+def run(
+    what: Annotated[str, typer.Argument(help="A scene's TOML file; a model's file, a robot or a mechanism by name (pycraft.mechanisms).")],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the run: .nc (NetCDF), .parquet or .csv.")] = None,
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(help="Add an effect: gravity, damping:0.1, spring:2,rest=0.1,hinges=arm_*; may be repeated."),
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option("-T", "--duration", help="Seconds to simulate; what a scene's file says if left out.")
+    ] = None,
+    integrator: Annotated[str | None, typer.Option(help="dopri5 if neither this nor the scene's file says.")] = None,
+    rtol: Annotated[float | None, typer.Option(help="Relative tolerance of a step.")] = None,
+    atol: Annotated[float | None, typer.Option(help="Absolute tolerance of a step.")] = None,
+    step: Annotated[float | None, typer.Option(help="Seconds, of integrators with steps of one size.")] = None,
+    every: Annotated[
+        float | None, typer.Option(help=f"Seconds between the states that are kept; a {SHOWN}th of the run if left out.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Begin at the random state of this seed.")] = None,
+    plot: Annotated[bool, typer.Option("--plot", help="Draw coordinates, energies and forces: a PNG beside the output, or here.")] = False,
+    save: Annotated[Path | None, typer.Option(help="Write the scene, with its effects and these options, as TOML.")] = None,
+    root: Annotated[str | None, typer.Option(help="Of a model: fixed | free.")] = None,
+    mimic: Annotated[str, typer.Option(help="Of a model's file: refuse | lock | free.")] = "refuse",
+) -> None:
+    """Simulate a scene: its file, or a model with the effects that are named, and no others.
+
+    pycraft run scene.toml -o run.nc; pycraft run panda --effect gravity --effect damping:0.1 -T 5 --plot
+    """
+    from ..scenes.effect_text import add_from_text
+    from .commands import check_least, check_outputs
+
+    picture = (output or Path(Path(what).stem)).with_suffix(".png") if plot else None
+    check_outputs(output=output, plot=picture, save=save)
+    if output is not None:
+        _check_output(output)
+    scene = _scene(what, root, mimic)
+    for text in effect or []:
+        add_from_text(scene, text, f"--effect {text}")
+    if seed is not None:
+        check_least(0, seed=seed)
+        state = scene.model.random_state(seed)
+        scene.model.q, scene.model.v = state.q, state.v
+    given = {"T": duration, "integrator": integrator, "rtol": rtol, "atol": atol, "step": step, "every": every}
+    options = scene.run_options | {key: value for key, value in given.items() if value is not None}
+    if "T" not in options:
+        fail("how long? give -T SECONDS, or a scene's file T in its table [run]")
+    if save is not None:
+        scene.run_options = options
+        scene.save(save)
+        note(f"wrote {save}")
+    found = _simulated(scene, dict(options), output)
+    console.print(_told(scene, found), markup=False, highlight=False)
+    if output is not None:
+        found.save(output)
+        note(f"wrote {output}")
+    if picture is not None:
+        _draw(found, picture)
+
+
+def _check_output(path: Path) -> None:
+    from ..scenes.runs_on_disk import checked_output
+
+    try:
+        checked_output(path)
+    except (OSError, ImportError) as error:
+        fail(str(error))
+
+
+def _scene(what: str, root: str | None, mimic: str) -> Any:
+    """The scene of a file, of a mechanism, or an empty one of a model."""
+    from ..models import robots
+    from ..scenes import Scene, load_scene, mechanisms
+    from .commands import load_model
+
+    known = [name for name, made in vars(mechanisms).items() if getattr(made, "__module__", "") == mechanisms.__name__ and name.islower()]
+    is_file = Path(what).is_file()
+    if (is_file and _is_scene(what)) or (what in known and what not in robots.names() and not is_file):
+        for option, is_given in (("root", root is not None), ("mimic", mimic != "refuse")):
+            if is_given:
+                fail(f"--{option} belongs to models; a scene has its model with it")
+        return load_scene(what) if is_file else getattr(mechanisms, what)()
+    return Scene(load_model(what, root, mimic))
+
+
+def _is_scene(path: str) -> bool:
+    from ..models.loaders.load import is_toml
+    from ..models.loaders.toml_file import TomlFile
+
+    return is_toml(path) and not {"bodies", "nodes"} & set(TomlFile(path).data)
+
+
+def _simulated(scene: Any, options: dict[str, Any], output: Path | None) -> Any:
+    """The run. What was computed before an error or Ctrl-C is written all the same, where a run is written."""
+    T = options.pop("T")
+    times = _times(T, options.pop("every", None))
+    try:
+        return scene.simulate(T, t_eval=times, **options)
+    except (Exception, KeyboardInterrupt) as error:
+        before = getattr(error, "run", None)
+        if output is not None and before is not None and len(before):
+            before.save(output)
+            note(f"wrote {output}, as far as it had come: to {before.t[-1]:g} s")
+        raise
+
+
+def _times(T: float, every: float | None) -> np.ndarray | None:
+    """From 0 to T, T among them; None where T is for the scene to refuse."""
+    if every is not None and not 0 < every < float("inf"):
+        fail(f"--every {every:g}: a positive number of seconds")
+    if not 0 < T < float("inf"):
+        return None
+    if every is None:
+        return np.linspace(0.0, T, SHOWN + 1)
+    if T / every > 1e8:
+        fail(f"--every {every:g}: {T / every:.1g} states are more than memory holds")
+    times = np.arange(int(T / every * (1 + 1e-12)) + 1) * every
+    times[-1] = min(times[-1], T)
+    return times if times[-1] > T - 1e-9 * every else np.append(times, T)
+
+
+def _told(scene: Any, found: Any) -> str:
+    """What was run, in a few lines."""
+    about, energy = found.statistics, found.energy
+    drift = float(np.ptp(found.balance))
+    lines = [
+        str(scene),
+        f"  {found.t[-1]:g} s in {seconds_text(about['seconds'])}: {about['steps']} steps, {about['evaluations']} evaluations, "
+        f"{len(found)} states kept",
+        f"  kinetic energy {energy['kinetic'][0]:.4g} J at first, {energy['kinetic'][-1]:.4g} J at last; "
+        f"kinetic + potential - work within {drift:.1e} J",
+    ]
+    return "\n".join(lines)
+
+
+def _draw(found: Any, path: Path) -> None:
+    import matplotlib
+
+    matplotlib.use("Agg")
+    with diagnostics.status("drawing"):
+        found.plot().savefig(path, dpi=110)
+    note(f"wrote {path}")
