@@ -24,6 +24,8 @@ from ..tidy import seconds_text
 
 PASS, BESIDE, OFF = "#1f4e79", "#8a8a8a", "#c55a11"
 """Of passes and effects that are on; of what a step spends beside them; of what is off."""
+WIDE_SPREAD = 5.0
+"""Times that are so many times each other are drawn on a logarithmic axis."""
 BAR = 0.3
 """Inches of a bar with its gap."""
 
@@ -107,7 +109,8 @@ def comparison_plot(table: Any, axes: Any = None) -> Any:
             ax.plot(a, b, "osD"[min(several, 2)], color=colour, ms=6, mew=1.2, mfc="none" if several > 1 else colour, zorder=3)
         ax.set(yscale="log", xlabel=x, ylabel=y)
         _room(ax, times, heights)
-        ax.xaxis.set_major_locator(MaxNLocator(6))
+        if times.max() < WIDE_SPREAD * times.min():
+            ax.xaxis.set_major_locator(MaxNLocator(6))
         time_axis(ax.xaxis)
         points = list(zip(times, heights, strict=True))
         place_labels(ax, [(*point, _left_out(row)) for row, point in zip(rows, points, strict=True)], points, points)
@@ -130,7 +133,10 @@ def _left_out(row: dict[str, Any]) -> str:
 def _room(ax: Any, times: np.ndarray, heights: np.ndarray) -> None:
     """Limits of the axes that leave room for labels."""
     spread = float(np.ptp(times)) or 0.2 * float(times.max())
-    ax.set_xlim(max(times.min() - 0.25 * spread, 0.0), times.max() + 0.45 * spread)
+    if times.max() >= WIDE_SPREAD * times.min():
+        ax.set(xscale="log", xlim=(times.min() / 1.6, times.max() * 2.0))
+    else:
+        ax.set_xlim(max(times.min() - 0.25 * spread, 0.0), times.max() + 0.45 * spread)
     decades = float(np.log10(heights.max() / heights.min())) or 1.0
     ax.set_ylim(heights.min() / 10 ** (0.15 * decades), heights.max() * 10 ** (0.25 * decades))
 

@@ -5,6 +5,7 @@ import json
 import pickle
 import re
 from dataclasses import MISSING, fields
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -283,3 +284,17 @@ def test_a_file_of_the_other_kind(arm, tmp_path):
     arm.save(tmp_path / "arm.toml")
     with pytest.raises(pc.ModelError, match="a scene has no key 'name'"):
         pc.load_scene(tmp_path / "arm.toml")
+
+
+def test_the_file_of_the_page_is_read(tmp_path):
+    """docs/scenes.md shows one with all that a file may have."""
+    page = (Path(__file__).parents[2] / "docs" / "scenes.md").read_text()
+    (text,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    arm = pc.Multibody("arm")
+    arm.add_body("upper", hinge_name="shoulder", axis=(0, 1, 0), mass=1.0, com=(0, 0, 0.5), inertia=np.eye(3))
+    arm.add_body("lower", "upper", hinge_name="elbow", axis=(0, 1, 0), position=(0, 0, 1), mass=1.0, com=(0, 0, 0.5), inertia=np.eye(3))
+    arm.save(tmp_path / "arm.urdf")
+    (tmp_path / "scene.toml").write_text(text)
+    scene = pc.load_scene(tmp_path / "scene.toml")
+    assert repr(scene) == "<scene of 'arm': gravity, (grease off), torque_source>" and scene._how[0] == "ud"
+    assert scene.run_options == {"T": 10, "rtol": 1e-8} and scene.model.q.tolist() == [0.5, 0.0]
