@@ -15,8 +15,8 @@ from .. import _core
 from ..models.generators import chain
 from .bench import Figure, _elapsed, _states, in_turn
 
-PLANNED, THIRD, OVER_KERNEL, OF_KERNEL = 100.0, 50e3, 0.6, 1.15
-"""Bounds: the first evaluation of ten operators, that of a third derivative, `e @ x` beyond its kernel (in µs); ℳ⁻¹x over its kernel."""
+PLANNED, OVER_KERNEL = 100.0, 0.6
+"""Bounds in µs: the first evaluation of ten operators, `e @ x` in Python beyond the core's run."""
 NEVER = 2**31 - 1
 BATCH = 1024
 
@@ -42,7 +42,7 @@ def building(repeats: int = 2000) -> list[Figure]:
     return [
         Figure("building an expression of ten operators in Python", 1e6 * typed, "us", 50.0),
         Figure("its first evaluation", 1e6 * min(first), "us", PLANNED),
-        Figure("a third derivative of Υ, built and evaluated for the first time", 1e6 * third, "us", THIRD),
+        Figure("a third derivative of Υ, built and evaluated for the first time", 1e6 * third, "us"),
     ]
 
 
@@ -74,7 +74,7 @@ def _beside_kernels(name: str, model: Any, seconds: float) -> list[Figure]:
             f"{name}: MM^-1 @ x at new states over forward dynamics",
             own / direct,
             "x",
-            OF_KERNEL,
+            None,
             f"{1e6 * own:.2f} us and {1e6 * direct:.2f} us",
         ),
         Figure(
@@ -88,23 +88,23 @@ def _beside_kernels(name: str, model: Any, seconds: float) -> list[Figure]:
 
 
 def _requests(model: Any) -> dict[str, Callable[[Any, Any], np.ndarray]]:
-    """What is asked of batches: sweeps, kernels, realizations, derivatives, eliminations."""
+    """What is asked of batches: sweeps, kernels, realizations, derivatives, eliminations; each typed once."""
     soa, x, i = model.soa, np.ones(model.nv), model.nv - 1
-    MM, shifted = soa.MM + soa.J, soa.MM + 0.1 * soa.I
-    requests: dict[str, Callable[[Any, Any], np.ndarray]] = {
-        "MM @ x": lambda Q, V: MM.at(Q, V) @ x,
-        "MM^-1 @ x": lambda Q, V: MM.inv().at(Q, V) @ x,
-        "H psi M psi* H* @ x": lambda Q, V: (soa.H @ soa.psi @ soa.M @ soa.psi.T @ soa.H.T).at(Q, V) @ x,
-        "MM as a matrix": lambda Q, V: MM.at(Q, V).dense(),
-        "(MM + 0.1 I)^-1 @ x": lambda Q, V: shifted.inv().at(Q, V) @ x,
-        "MM.diff(i) @ x": lambda Q, V: MM.diff(i).at(Q, V) @ x,
-        "MM^-1.diff(i) @ x": lambda Q, V: MM.inv().diff(i).at(Q, V) @ x,
+    MM = soa.MM + soa.J
+    applied = {
+        "MM": MM,
+        "MM^-1": MM.inv(),
+        "H psi M psi* H*": soa.H @ soa.psi @ soa.M @ soa.psi.T @ soa.H.T,
+        "(MM + 0.1 I)^-1": (soa.MM + 0.1 * soa.I).inv(),
+        "MM.diff(i)": MM.diff(i),
+        "MM^-1.diff(i)": MM.inv().diff(i),
     }
-    if model.nv < 50:
-        requests |= {
-            "MM^-1 as a matrix": lambda Q, V: MM.inv().at(Q, V).dense(),
-            "MM.diff(i) as a matrix": lambda Q, V: MM.diff(i).at(Q, V).dense(),
-        }
+    matrices = {name: applied[name] for name in ("MM", "MM^-1", "MM.diff(i)")} if model.nv < 50 else {}
+    requests: dict[str, Callable[[Any, Any], np.ndarray]] = {}
+    for name, e in applied.items():
+        requests[f"{name} @ x"] = lambda Q, V, e=e: e.at(Q, V) @ x  # type: ignore[misc]  # e of this turn
+    for name, e in matrices.items():
+        requests[f"{name} as a matrix"] = lambda Q, V, e=e: e.at(Q, V).dense()  # type: ignore[misc]  # e of this turn
     return requests
 
 

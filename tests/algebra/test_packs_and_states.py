@@ -52,10 +52,10 @@ def test_states_without_a_value_refuse_as_by_themselves(name, at):
     for threads in (1, 3):
         bound = e.at(Q, V, threads=threads)
         ask = bound.value if name == "a pivot" else lambda: bound @ np.ones(model.nv)  # noqa: B023 - called at once
-        singly = refusal(lambda: one_by_one(ask))  # noqa: B023
+        singly = refusal(lambda: one_by_one(ask))  # noqa: B023 - called at once
         assert singly[0] is pc.SingularOperatorError
         assert f"(state {min(at)} of a batch of {STATES})" in singly[1]
-        assert refusal(lambda: in_packs(ask)) == singly  # noqa: B023
+        assert refusal(lambda: in_packs(ask)) == singly  # noqa: B023 - called at once
 
 
 def test_numbers_out_of_range_refuse_as_by_themselves():
@@ -69,9 +69,9 @@ def test_numbers_out_of_range_refuse_as_by_themselves():
         R[wrong, 1] = 1e200
         for threads in (1, 4):
             ask = lambda: MM.at(R, threads=threads) @ np.ones(2)  # noqa: B023, E731 - called at once
-            singly = refusal(lambda: one_by_one(ask))  # noqa: B023
+            singly = refusal(lambda: one_by_one(ask))  # noqa: B023 - called at once
             assert f"(state {min(wrong)} of a batch of {STATES})" in singly[1] and "beyond the range" in singly[1]
-            assert refusal(lambda: in_packs(ask)) == singly  # noqa: B023
+            assert refusal(lambda: in_packs(ask)) == singly  # noqa: B023 - called at once
         np.testing.assert_array_equal(in_packs(lambda: MM.at(Q) @ np.ones(2)), wanted)  # a refusal leaves nothing behind
 
 
@@ -85,7 +85,7 @@ def test_hinges_that_are_singular_at_some_states():
     for body in none.bodies.values():
         body.mass, body.com, body.inertia = 0.0, (0, 0, 0), np.zeros((3, 3))
     Q, V = uniform_batch(none, 9)
-    ask = lambda: none.soa.MM.inv().at(Q, V) @ np.ones(2)  # noqa: E731
+    ask = lambda: none.soa.MM.inv().at(Q, V) @ np.ones(2)  # noqa: E731 - called at once
     assert refusal(lambda: in_packs(ask)) == refusal(lambda: one_by_one(ask))
 
 
@@ -135,7 +135,7 @@ def test_bodies_that_come_and_go():
         else:
             model.remove_body(list(model.bodies)[-1])
         x = np.ones(Q.shape[1])
-        assert refusal(lambda: in_packs(lambda: bound @ x)) == refusal(lambda: one_by_one(lambda: bound @ x))  # noqa: B023
+        assert refusal(lambda: in_packs(lambda: bound @ x)) == refusal(lambda: one_by_one(lambda: bound @ x))  # noqa: B023 - called at once
 
 
 def test_an_edit_between_two_batches_of_one_binding():

@@ -163,7 +163,7 @@ def test_where_pivots_are_chosen_once(case):
             assert (np.abs(together - exact) <= allowed).all(), name
             assert (np.abs(together - one_by_one(ask)) <= allowed).all(), name
         if name != "derivative":
-            for ask in (lambda: bound.logdet().value(), lambda: bound.trace().value()):  # noqa: B023
+            for ask in (lambda: bound.logdet().value(), lambda: bound.trace().value()):  # noqa: B023 - called at once
                 np.testing.assert_allclose(in_packs(ask), one_by_one(ask), rtol=1e-9, atol=1e-9)
     gradient = (model.soa.MM + model.soa.J).at(Q, V).trace().gradient  # by a realization each
     np.testing.assert_allclose(in_packs(gradient), one_by_one(gradient), rtol=0, atol=1e-12 * np.abs(one_by_one(gradient)).max())
@@ -265,11 +265,11 @@ def test_beside_other_states_and_models():
         a.soa.MM @ a.soa.MM.at(Qa, Va).inv(),
         b.soa.MM.at(Qb, Vb) @ across @ a.soa.MM.inv().at(Qa, Va),
     ):
-        for _ in range(2):
+        for turn in range(3):
             together = in_packs(lambda: e @ np.ones(3))  # noqa: B023 - called at once
             assert packed(e)
-            np.testing.assert_array_equal(together, one_by_one(lambda: e @ np.ones(3)))  # noqa: B023
-            a.q = a.random_state(98).q
+            np.testing.assert_array_equal(together, one_by_one(lambda: e @ np.ones(3)))  # noqa: B023 - called at once
+            a.q = a.random_state(90 + turn).q  # another one each time
 
 
 def test_copies_and_pickles():
@@ -319,7 +319,7 @@ def test_what_is_not_recorded():
         (L @ soa.MM).at(Q, V),
     ):
         np.testing.assert_array_equal(in_packs(lambda: bound @ x), one_by_one(lambda: bound @ x))  # noqa: B023 - called at once
-        in_packs(lambda: bound @ x)  # noqa: B023
+        in_packs(lambda: bound @ x)  # noqa: B023 - called at once
         assert not packed(bound)
 
 

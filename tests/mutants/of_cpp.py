@@ -42,7 +42,7 @@ CHANGES = {
         ("a plan is for J = 0 once and for all", "impl_->seen[c] == parameters", "impl_->seen[c] != ~std::uint64_t(0)"),
         ("only the first model of a plan is looked at", "source.check_current();", "if (c > 0) return true;", STATEMENT),
         ("packs name no shape", "if (!done.shaped) run.shape(taped.rows, taped.columns);", ";", STATEMENT),
-        ("states that packs leave are left", "int state(int i) const { return i <", "int state(int i) const { return i + 1 <"),
+        ("states after packs begin elsewhere", "from + i - static_cast<int>(left.size())", "from + i"),
     ],
     "cpp/algebra/engine/run.h": [
         (
@@ -57,7 +57,7 @@ CHANGES = {
         ("what is out of range is returned", "in_range_ &= std::isfinite(out_[at]);", ";", STATEMENT),
     ],
     "cpp/algebra/engine/packs.cpp": [
-        ("programs outlive a parameter", "{c.source->parameters(), c.binding ?", "{std::uint64_t(0), c.binding ?"),
+        ("programs outlive a parameter", "c.source->parameters()", "std::uint64_t(0)"),
         ("programs outlive the model's state", "c.binding ? nullptr : c.source->state()", "nullptr"),
         ("x of each state is that of the first", "inputs.batched ? size_t(plan.domain.dimension()) * inputs.columns : 0", "0"),
         ("velocities are those of the first state", "batch ? size_t(c.binding->nv) : 0", "0"),
@@ -67,16 +67,11 @@ CHANGES = {
         ("no state is left to itself", "if (!sound[b]) left.push_back(states.from + b);", ";", STATEMENT),
     ],
     "cpp/lanes/program.cpp": [
-        ("places are given away before they are read", "last_[read] == k) release(read);", "last_[read] <= k + 1) release(read);"),
+        ("places are given away before they are read", "last_[read] == k", "last_[read] <= k + 1"),
     ],
     "cpp/numerics/recorded.cpp": [
         ("comparisons leave no guard", "now().require(by(what, value, a, b).id, value);", ";", STATEMENT),
-        (
-            "what zero multiplies need not be finite",
-            "if (!a.is_constant()) now().require_finite(a);\n  return std",
-            "return std",
-            STATEMENT,
-        ),
+        ("what zero multiplies need not be finite", "tape_.finite.push_back(x.id);", ";", STATEMENT),
     ],
     "cpp/algebra/engine/plan_cache.cpp": [
         ("a plan in double serves in quad", "how.precision", "Precision::double_"),

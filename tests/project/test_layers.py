@@ -44,6 +44,8 @@ PARTS = {
     "kernels/kernels_avx2",
     "kernels/kernels_avx512",
     "kernels/kernels_wide",
+    "algebra/trees/recorded_trees",  # sources of numbers at the recorded scalar
+    "operators/recorded_values",
     "algebra/planning/plan_blocks",  # class Planner, by what is planned
     "algebra/planning/plan_diagonals",
     "algebra/planning/plan_solves",

@@ -69,7 +69,7 @@ bool TreeElimination<S>::factor(Blocks&& blocks, Values&& values, S tolerated) {
     for (const Front& f : fronts_) n = std::max(n, f.n);
     return n;
   };
-  std::string where = "the pivot block of the low-rank border is singular";
+  std::string where;  // made where it is needed: a state allocates nothing
   if (dense_ || std::find(merged_with_parent_.begin(), merged_with_parent_.end(), 1) != merged_with_parent_.end()) {
     std::fill(merged_with_parent_.begin(), merged_with_parent_.end(), 0);  // what the last state asked for is no business of this one
     lay_out(false);
@@ -98,7 +98,10 @@ bool TreeElimination<S>::factor(Blocks&& blocks, Values&& values, S tolerated) {
       continue;
     }
     off_tape(growth_);
-    if (failed_ < 0) break;  // the border's own block
+    if (failed_ < 0) {
+      where = "the pivot block of the low-rank border is singular";
+      break;
+    }
     const Front& f = fronts_[failed_];
     where = "the pivot block of body '" + tree_.body_names[f.bodies[0]] + "' is singular";
     if (f.parent < 0 || f.n + fronts_[f.parent].n > elimination::largest_merged_front) break;
