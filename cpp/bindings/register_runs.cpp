@@ -38,12 +38,12 @@ py::dict passes_of(const RunRecord& r) {
 
 py::dict as_dict(const WrittenCheckpoint& c) {
   py::dict d;
-  d["t"] = c.t, d["x"] = c.x, d["size"] = c.size, d["origin"] = c.origin, d["taken"] = c.taken, d["signs"] = c.signs;
+  d["t"] = c.t, d["x"] = c.x, d["size"] = c.size, d["origin"] = c.origin, d["taken"] = c.taken, d["signs"] = c.signs, d["lengths"] = c.lengths;
   return d;
 }
 WrittenCheckpoint checkpoint_from(const py::dict& d) {
   const auto parts = [&](const char* key) { return py::cast<std::vector<double>>(d[key]); };
-  return {parts("t"), parts("size"), parts("origin"), py::cast<std::vector<std::vector<double>>>(d["x"]), py::cast<long>(d["taken"]), py::cast<std::vector<int>>(d["signs"])};
+  return {parts("t"), parts("size"), parts("origin"), py::cast<std::vector<std::vector<double>>>(d["x"]), py::cast<long>(d["taken"]), py::cast<std::vector<int>>(d["signs"]), py::cast<std::vector<std::vector<double>>>(d["lengths"])};
 }
 
 template <class S>

@@ -22,6 +22,7 @@ struct WrittenCheckpoint {
   std::vector<std::vector<double>> x;
   long taken = 0;
   std::vector<int> signs;
+  std::vector<std::vector<double>> lengths;
 };
 
 struct RunRecord {
@@ -40,8 +41,9 @@ struct RunRecord {
 
 template <class S>
 WrittenCheckpoint written(const Checkpoint<S>& c) {
-  WrittenCheckpoint w{expansion(c.t), expansion(c.pace.size), expansion(c.pace.origin), {}, c.pace.taken, c.signs};
+  WrittenCheckpoint w{expansion(c.t), expansion(c.pace.size), expansion(c.pace.origin), {}, c.pace.taken, c.signs, {}};
   for (const S& x : c.x) w.x.push_back(expansion(x));
+  for (const S& length : c.lengths) w.lengths.push_back(expansion(length));
   return w;
 }
 template <class S>
@@ -51,8 +53,9 @@ Checkpoint<S> read(const WrittenCheckpoint& w) {
     for (double part : parts) x += S(part);
     return x;
   };
-  Checkpoint<S> c{sum(w.t), {}, {sum(w.size), sum(w.origin), w.taken}, w.signs};
+  Checkpoint<S> c{sum(w.t), {}, {sum(w.size), sum(w.origin), w.taken}, w.signs, {}};
   for (const auto& parts : w.x) c.x.push_back(sum(parts));
+  for (const auto& parts : w.lengths) c.lengths.push_back(sum(parts));
   return c;
 }
 

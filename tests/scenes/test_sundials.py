@@ -66,5 +66,5 @@ def test_errors_come_through():
         return [np.nan if t > 0.1 else 0.0]
 
     for integrator in (*SUNDIALS, "scipy:RK45"):
-        with pytest.raises(pc.EvaluationError, match=r"effect 'wrong': its force on coordinate 'hinge0' is nan at t = 0\.1"):
+        with pytest.raises(pc.EvaluationError, match=r"effect 'wrong': its force on coordinate 'hinge0' is nan at t = 0\.\d+ s"):
             pc.Scene(pc.chain(1)).add(wrong).simulate(1.0, [0.0], [1.0], integrator=integrator)

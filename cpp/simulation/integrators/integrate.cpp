@@ -65,7 +65,12 @@ class Run {
   void run() {
     const std::vector<double>& times = plan_.times;
     forwards_ = times.back() >= times.front();
-    if (record().on_group) lengths_.resize(x_.size()), quaternion_lengths(equations_.model(), x_.data(), lengths_.data());
+    if (record().on_group) {
+      lengths_.resize(x_.size());
+      lengths_.resize(quaternion_lengths(equations_.model(), x_.data(), lengths_.data()));
+      if (plan_.resumed && plan_.resumed->lengths.size() == lengths_.size()) lengths_ = plan_.resumed->lengths;
+    }
+    kept_.lengths = lengths_;
     keep();
     watcher_.step(t_, x_), watcher_.sample(t_, x_);
     if (times.size() == 1) return;

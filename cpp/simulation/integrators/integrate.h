@@ -17,7 +17,8 @@ struct Checkpoint {
   S t = S(0);
   std::vector<S> x;
   Pace<S> pace;
-  std::vector<int> signs;  // of events
+  std::vector<int> signs;   // of events
+  std::vector<S> lengths;  // of quaternions at first, by methods on the group
 };
 
 // What is told of a run while it goes.

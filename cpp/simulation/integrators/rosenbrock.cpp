@@ -13,7 +13,7 @@ namespace {
 using Vector = Eigen::VectorXd;
 constexpr int stages = 6;
 constexpr double gamma = 0.25;
-constexpr double d[stages] = {0.25, -0.1043, 0.1035, 0.03620000000000023, 0, 0};
+constexpr double d[stages] = {0.25, -0.1043, 0.1035, -0.03620000000000023, 0, 0};
 constexpr double c[stages] = {0, 0.386, 0.21, 0.63, 1, 1};
 // k_j in the argument of stage i, and over h beside it. The last two arguments add k_5 to that of the one before, the result k_6 to that.
 constexpr double a[stages][5] = {{},
@@ -63,7 +63,11 @@ class Rodas : public Attempts<double> {
     out.resize(from_.size());
     move_configuration(model_, from_.data(), u_.data(), out.data());
     std::copy_n(z_.data(), n_, out.data() + nq_);
-    for (size_t i = nq_ + n_; i < out.size(); ++i) out[i] = from_[i] + s * (to_[i] - from_[i]);
+    const size_t first = nq_ + n_;
+    for (size_t i = 0; i < first_powers_.size(); ++i) {  // what a parabola through the powers at both ends and in the middle adds up to
+      const double p = first_powers_[i], bend = middle_powers_[i] - p, end = last_powers_[i] - p;
+      out[first + i] = from_[first + i] + h_ * s * (p + s * (2 * bend - end / 2 + s * (2 * end / 3 - 4 * bend / 3)));
+    }
     return true;
   }
   bool again(const double& from, const State& x, const double& to) override {
@@ -166,14 +170,15 @@ class Rodas : public Attempts<double> {
     std::copy_n(z1_.data(), n_, to_.data() + nq_);
     const int count = equations_.integrals();
     if (count == 0) return;
-    interpolate(t0_ + h / 2, middle_);
-    const auto add = [&](const State& at, double t, double weight) {
+    const auto powers = [&](const State& at, double t, State& out) {
       equations_.evaluate(t, at.data(), at.data() + nq_, at.data() + nq_ + nv_, vdot_.data(), rest_rate_.data());
-      for (int i = 0; i < count; ++i) to_[to_.size() - count + i] += weight * rest_rate_[rest_rate_.size() - count + i];
+      out.assign(rest_rate_.end() - count, rest_rate_.end());
     };
-    for (int i = 0; i < count; ++i) to_[to_.size() - count + i] += h / 6 * first_powers_[i];
-    add(middle_, t0_ + h / 2, h * 2 / 3);
-    add(to_, t0_ + h, h / 6);
+    middle_powers_ = last_powers_ = first_powers_;  // none is read yet
+    interpolate(t0_ + h / 2, middle_);
+    powers(middle_, t0_ + h / 2, middle_powers_);
+    powers(to_, t0_ + h, last_powers_);
+    for (int i = 0; i < count; ++i) to_[to_.size() - count + i] += h / 6 * (first_powers_[i] + 4 * middle_powers_[i] + last_powers_[i]);
   }
 
   LinearizedEquations<double>& equations_;
@@ -181,7 +186,7 @@ class Rodas : public Attempts<double> {
   IntegratorOptions options_;
   int nq_, nv_, n_;
   State from_, to_, middle_, rest_, rest_rate_, q_;
-  std::vector<double> first_powers_;
+  State first_powers_, middle_powers_, last_powers_;
   std::vector<Eigen::MatrixXd> lanes_;  // W of hinges of several coordinates, at the first of them
   Linearization linear_;
   Eigen::MatrixXd system_, swept_columns_;

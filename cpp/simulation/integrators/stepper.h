@@ -14,9 +14,15 @@
 
 namespace pycraft {
 
+// Of the first `count`, or of all.
 template <class S>
-bool all_finite(const std::vector<S>& x) {
-  return std::all_of(x.begin(), x.end(), [](const S& y) { return std::isfinite(to_double(y)); });
+bool all_finite(const std::vector<S>& x, int count = -1) {
+  return std::all_of(x.begin(), count < 0 ? x.end() : x.begin() + count, [](const S& y) { return std::isfinite(to_double(y)); });
+}
+// Of what the motion is; integrals beside it decide about nothing.
+template <class S>
+bool finite_motion(const Equations<S>& equations, const std::vector<S>& x) {
+  return all_finite(x, equations.size() - equations.integrals());
 }
 
 // What the next step depends on besides the state.
@@ -115,7 +121,7 @@ class ControlledSteps : public Stepper<S> {
       const S before = tried, from = t;
       kept_ = x;
       const bool taken = method_->attempt(t, x, tried);
-      if (taken && all_finite(x)) {
+      if (taken && finite_motion(equations_, x)) {
         if (cut_) t = end_;
         // A step cut short tells only whether the next may be longer.
         h = cut_ && abs(tried) < abs(h) ? h : tried;
@@ -185,7 +191,7 @@ class FixedSteps : public Stepper<S> {
   FixedSteps(Needs& equations, const IntegratorOptions& options) : equations_(equations), method_(equations), options_(options) {}
 
   void start(const S&, const State&, const S&, const Pace<S>* resumed) override {
-    resumed_ = resumed != nullptr;
+    resumed_ = resumed && !(resumed->size == S(0));  // else steps were to be counted anew
     if (resumed) pace_ = *resumed;
   }
   void begin(const S& t, const State&, const S& end) override {
@@ -210,7 +216,7 @@ class FixedSteps : public Stepper<S> {
     method_.do_step(equations_, x, t, h);
     t = last ? end_ : S(pace_.origin + S(++pace_.taken) * pace_.size);
     if (last && !cut_) ++pace_.taken;
-    if (!all_finite(x)) refuse_state(from, h, x);
+    if (!finite_motion<S>(equations_, x)) refuse_state(from, h, x);
   }
   void within(const S& from, const State& x, const S& t, State& out) override {
     out = x;
