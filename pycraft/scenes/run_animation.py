@@ -27,7 +27,6 @@ class RunAnimation:
     ----------
     times : (n,) s, of the frames
     figure : Matplotlib's
-    animation : `matplotlib.animation.FuncAnimation`, for its other ways out
     """
 
     def __init__(self, run: Any, fps: Any, speed: Any, trace: Any, options: dict[str, Any]):
@@ -43,7 +42,6 @@ class RunAnimation:
 
     def _draw(self, run: Any, options: dict[str, Any]) -> None:
         from matplotlib import pyplot
-        from matplotlib.animation import FuncAnimation
 
         self._stick = StickFigure(run.model, self._q[0], **options)
         self.figure = self._stick.ax.figure
@@ -52,7 +50,6 @@ class RunAnimation:
         if self._path is not None:
             self._way = self._stick.canvas.lines(colors="#0072b2", lw=1.0, zorder=2, alpha=0.7)
         self._show(0)
-        self.animation = FuncAnimation(self.figure, self._show, frames=len(self.times), interval=1000 / self.fps, blit=False, repeat=True)
         if options.get("ax") is None:
             pyplot.close(self.figure)  # or notebooks would show its first frame beside the film
 
@@ -64,6 +61,13 @@ class RunAnimation:
             self._way.set(np.stack([gone[:-1], gone[1:]], axis=1))
             moved.append(self._way.artist)
         return moved
+
+    @cached_property
+    def animation(self) -> Any:
+        """Matplotlib's `FuncAnimation`, for its other ways out."""
+        from matplotlib.animation import FuncAnimation
+
+        return FuncAnimation(self.figure, self._show, frames=len(self.times), interval=1000 / self.fps, blit=False, repeat=True)
 
     def save(self, path: str | Path) -> Path:
         """Write it, by the path's ending: ".html", a page that plays by itself in any browser; ".gif"; ".mp4" where ffmpeg is installed.
