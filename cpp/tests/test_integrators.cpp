@@ -155,7 +155,7 @@ BOOST_AUTO_TEST_CASE(steps_do_not_allocate) {
       Watcher<double> nobody;
       RunEnd<double> end;
       counts[twice] = allocations_of([&] {
-        integrate<double>(*pair.equations, *pair.stepper, x, RunPlan<double>{{0, 0.02 * (1 + twice)}, false, {}, nullptr}, options, nobody, end);
+        integrate<double>(*pair.equations, *pair.stepper, x, RunPlan<double>{{0, 0.2 * (1 + twice)}, false, {}, nullptr}, options, nobody, end);
       });
       steps[twice] = end.cost.steps;
     }

@@ -136,7 +136,7 @@ BOOST_AUTO_TEST_CASE(steps_allocate_nothing) {
   SceneEquations<double> equations(compiled, true);
   const std::vector<double> q = moved(*mb, 1), v = random_numbers(mb->nv(), 2), x = equations.initial(0.0, q.data(), v.data(), nullptr);
   BOOST_TEST(x.size() == q.size() + v.size() + 1 + compiled.effects().workers().size());
-  for (const Integrator integrator : scene_integrators) {
+  for (const Integrator integrator : integrators_by(Way::at_states)) {
     if (integrator == Integrator::bulirsch_stoer) continue;  // a step of Boost.Odeint's own keeps two arrays
     long counts[2];
     for (const int twice : {0, 1}) {

@@ -107,7 +107,7 @@ def test_what_makes_no_sense(run, options, error, text):
 
 
 def test_outputs_are_looked_at_before_a_frame_is_drawn(run, tmp_path, monkeypatch):
-    monkeypatch.setattr(run_animation.RunAnimation, "__init__", lambda *_: pytest.fail("drawn"))
+    monkeypatch.setattr("pycraft.scenes.run_animation.RunAnimation.__init__", lambda *_: pytest.fail("drawn"))
     with pytest.raises(FileNotFoundError, match="there is no folder"):
         run.animate(tmp_path / "none" / "run.gif")
     monkeypatch.setattr("matplotlib.animation.FFMpegWriter.isAvailable", lambda: False)
