@@ -115,10 +115,10 @@ def says(tmp_path):
          ":5: body 'arm' is on 'ar', and no body or node has this name; did you mean 'arm'?"),
         (A + "[state.q]\nb = 1", ":4: q of the state: no hinge is called 'b'; there are a"),
         (A + '[[actuators]]\nname = "m"',
-         ":4: actuator 'm' acts on no coordinate; name one: coordinate = \"...\", or say in why_not why there is none"),
-        (A + '[[actuators]]\nname = "m"\ncoordinate = "b"', ":6: actuator 'm': no coordinate is called 'b'; there are a"),
+         ":3: actuator 'm' acts on no coordinate; name one: coordinate = \"...\", or say in why_not why there is none"),
+        (A + '[[actuators]]\nname = "m"\ncoordinate = "b"', ":5: actuator 'm': no coordinate is called 'b'; there are a"),
         (A + '[[actuators]]\nname = "m"\ncoordinate = "a"\nforce_range = 3',
-         ":7: actuator 'm': force_range = 3; write two forces in N m or N: [lower, upper]"),
+         ":6: actuator 'm': force_range = 3; write two forces in N m or N: [lower, upper]"),
         (A + "[left_aside.spring_rest]\nb = 1", ":4: spring_rest in left_aside: no hinge is called 'b'; there are a"),
         (A + "[left_aside.damping]\nb = 1", ":4: damping in left_aside: no coordinate is called 'b'; there are a"),
         (

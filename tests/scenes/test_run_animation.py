@@ -9,8 +9,6 @@ import pycraft as pc
 matplotlib.use("Agg")
 from matplotlib import pyplot  # noqa: E402 - after the backend is chosen
 
-from pycraft.scenes import run_animation  # noqa: E402 - as above
-
 
 @pytest.fixture(autouse=True)
 def close():
