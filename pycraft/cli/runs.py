@@ -142,8 +142,8 @@ def _told(scene: Any, found: Any) -> str:
         str(scene),
         f"  {found.t[-1]:g} s in {seconds_text(about['seconds'])}: {about['steps']} steps, {about['evaluations']} evaluations, "
         f"{len(found)} states kept",
-        f"  kinetic energy {energy['kinetic'][0]:.4g} J at first, {energy['kinetic'][-1]:.4g} J at last; "
-        f"kinetic + potential - work within {drift:.1e} J",
+        f"  kinetic energy {energy['kinetic'][0]:.4g} J at first, {energy['kinetic'][-1]:.4g} J at last",
+        f"  kinetic + potential - work within {drift:.1e} J",
     ]
     return "\n".join(lines)
 

@@ -256,7 +256,9 @@ CHANGES = {
         ("bounds of joints without limits are dropped", 'or (kind == "continuous" and {', 'or (kind == "fixed" and {'),
     ],
     "pycraft/models/loaders/left_aside.py": [
-        ("numbers of other coordinates are saved", "and len(values) != model.nv]", "and False]"),
+        ("numbers of other coordinates are saved", "if len(values) != sizes.get(quantity, model.nv)]", "if False]"),
+        ("where springs are slack goes by velocities", '"spring rest": model.nq', '"spring rest": model.nv'),
+        ("actuators of coordinates that are gone are saved", 'if actuator["coordinate"] in names]', "if True]"),
     ],
     "pycraft/models/loaders/toml_reader.py": [
         (

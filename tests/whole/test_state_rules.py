@@ -24,6 +24,8 @@ def calls(model):
 
 
 def leaves(x):
+    if hasattr(x, "lines"):  # a picture: what it is drawn of
+        return [np.stack(line.get_data_3d()) for line in x.lines]
     return [np.asarray(y) for y in (x if isinstance(x, tuple) else x.values() if isinstance(x, dict) else (x,))]
 
 
