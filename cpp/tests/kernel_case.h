@@ -54,12 +54,12 @@ std::vector<double> by_kernel(const kernels::Kernel<T>& kernel, const Case& of, 
 
 // By the general recursions, rounded to double in the end; in single precision and above.
 template <class S>
-std::vector<double> by_recursion(const Case& of, Form form = Form::fast) {
+std::vector<double> by_recursion(const Case& of, Form form = Form::fast, const Refinement& refinement = {}) {
   RigidDynamics<S> general(*of.model);
   std::vector<S> vdot(of.v.size());
   const Applied<double> applied{of.model->gravity(), of.wrenches.data()};
   Solving how;
-  how.form = form;
+  how.form = form, how.refinement = refinement;
   general.forward_dynamics(of.q.data(), of.v.data(), of.tau.data(), vdot.data(), how, &applied);
   std::vector<double> rounded;
   for (const S& x : vdot) rounded.push_back(to_double(x));
