@@ -114,3 +114,18 @@ def test_what_is_not_there():
     for t in (-0.1, 1.2, np.nan):
         with pytest.raises(pc.EvaluationError, match=f"t = {t:g} s is not in the run, which goes from 0 to 1 s"):
             run.at(t)
+
+
+@pytest.mark.parametrize("integrator", ["rkmk4", "rosenbrock4", "dopri5"])
+def test_works_between_steps_follow_their_powers(integrator):
+    """Errors of works fall with the fourth power of the step at least; straight lines would leave the second."""
+    scene, times = CASES["damped"](), (np.arange(41) + 0.37) / 41 * 0.4
+    best = scene.simulate(0.4, integrator="fehlberg78", rtol=1e-13, atol=1e-14, t_eval=times).energy["work"]
+    found = []
+    for n in (10, 20, 40):
+        run = scene.simulate(
+            0.4, integrator=integrator, step=0.4 / n, **({} if integrator in FIXED else {"rtol": 1e6, "atol": 1e6, "max_step": 0.4 / n})
+        )
+        found.append(np.abs(run.at(times).energy["work"] - best).max())
+    orders = np.log2(np.array(found[:-1]) / found[1:])
+    assert orders[-1] > 3.5, (found, orders)

@@ -61,6 +61,14 @@ def test_terminal_events_end_the_run(integrator):
     assert every.t[-1] == every.events["ground"].t[0] and abs(every.q[-1, 0]) < 1e-14 and "ended by 'ground'" in repr(every)
 
 
+@pytest.mark.parametrize("integrator", ["rk4", "dopri5"])
+def test_times_after_a_terminal_event_in_its_step_are_not_reached(integrator):
+    ground = pc.Event(lambda t, s: s.q[0], terminal=True, name="ground")
+    T = np.sqrt(2 * 2.0 / 9.81)
+    run = fall().simulate(5.0, events=ground, integrator=integrator, step=2.5, t_eval=[T - 0.1, T - 0.01, T + 0.01, T + 0.1])
+    assert run.t.tolist() == [T - 0.1, T - 0.01] and run.q[:, 0] == pytest.approx(2.0 - 9.81 / 2 * run.t**2, abs=1e-9)
+
+
 def test_an_event_changes_no_step():
     scene = pc.mechanisms.double_pendulum()
     plain, looked = scene.simulate(2.0), scene.simulate(2.0, events=lambda t, s: s.q[0] - 1.0)
