@@ -108,7 +108,11 @@ AREAS = {
         "scenes/test_events.py",
     ],
     "cpp/simulation/integrators/steps_on_the_group.h": ["scenes/test_motions.py", "dynamics/test_integration.py"],
-    "cpp/simulation/integrators/stepper.h": ["scenes/test_checkpoints.py", "scenes/test_integrators.py", "dynamics/test_trajectory_steps.py"],
+    "cpp/simulation/integrators/stepper.h": [
+        "scenes/test_checkpoints.py",
+        "scenes/test_integrators.py",
+        "dynamics/test_trajectory_steps.py",
+    ],
     "cpp/simulation/integrators/runge_kutta_steps.cpp": ["scenes/test_dense_output.py"],
     "cpp/simulation/integrators/variational.h": ["scenes/test_variational.py", "scenes/test_integrators.py"],
     "cpp/simulation/scene_linearized.cpp": ["scenes/test_rosenbrock.py"],
