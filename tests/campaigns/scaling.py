@@ -72,9 +72,9 @@ def sweeps():
     panda = pc.Scene(pc.robots.panda()).add(pc.effects.Gravity(), pc.effects.Damping(0.5))
     by_python = pc.mechanisms.double_pendulum().add(pull)
     return {
-        "double pendulum, 1 s": (double, pc.samples.states(double.model, 4000), 1.0),
-        "panda with damping, 5 s": (panda, pc.samples.states(panda.model, 400), 5.0),
-        "double pendulum, an effect in Python, 1 s": (by_python, pc.samples.states(by_python.model, 100), 1.0),
+        "double pendulum, 1 s": (double, pc.samples.states(double.model, 40000), 1.0),
+        "panda with damping, 5 s": (panda, pc.samples.states(panda.model, 2000), 5.0),
+        "double pendulum, an effect in Python, 1 s": (by_python, pc.samples.states(by_python.model, 4000), 1.0),
     }
 
 
