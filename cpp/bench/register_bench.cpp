@@ -109,7 +109,6 @@ py::dict time_packs(const std::shared_ptr<Multibody>& model, const Array& q, con
 py::dict time_dynamics(const std::shared_ptr<Multibody>& model, const std::string& call, const Array& q, const Array& v, const Array& u, double seconds) {
   BatchDynamics w(model);
   BatchSensitivities d(model);
-  Sensitivities<double> s(*model);
   const int K = states_of(q), nq = model->nq(), nv = model->nv();
   const size_t square = size_t(nv) * nv;
   const bool vector = call == "forward_dynamics" || call == "inverse_dynamics" || call == "operational_space_inertia";  // of chains whose matrices fit nowhere
@@ -149,7 +148,7 @@ py::dict time_dynamics(const std::shared_ptr<Multibody>& model, const std::strin
     run([&](auto a, auto, auto) { sure &= w.operational_space(true, {&tip, 1}, at_q(a), out.data()); });
     if (!sure) throw EvaluationError("the operational-space inertia of a state that is timed is left to the operators");
   } else if (call == "log_determinant_gradient") {
-    run([&](auto a, auto, auto) { s.log_determinant(a, out.data(), nullptr, nullptr, nullptr); });
+    run([&](auto a, auto, auto) { d.log_determinant(GradientOver::coordinates, at_q(a), Precision::double_, out.data()); });
   } else {
     throw EvaluationError("no direct call '" + call + "' to time");
   }

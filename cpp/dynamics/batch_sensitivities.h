@@ -48,7 +48,7 @@ class BatchSensitivities : public Batches<Sensitivities> {
     if (!dynamics_.by_links(precision, {.call = kernels::Call::inverse_dynamics_derivatives, .q = q, .v = &v, .u = &vdot, .others = &out[1]}, states, static_cast<int>(square), out[0], general)) general(0, states);
   }
 
-  // Gradients of ln det(ℳ + J), batches in packs.
+  // Gradients of ln det(ℳ + J), in packs where there are states enough.
   void log_determinant(GradientOver over, const Given& q, Precision precision, double* out) {
     const auto compute = [over](auto& w, auto in, auto* y) {
       using P = decltype(y);
@@ -56,12 +56,13 @@ class BatchSensitivities : public Batches<Sensitivities> {
       w.log_determinant(in[0], wanted(GradientOver::coordinates), wanted(GradientOver::inertias), wanted(GradientOver::geometry), wanted(GradientOver::axes));
     };
     const int size = gradient_size(model(), over);
-    if (precision != Precision::double_ || q.batch < PackedGradients::least) return run(precision, {q}, size, out, compute);
+    const int states = q.batch < 0 ? 1 : q.batch;
+    if (precision != Precision::double_ || !gradients_.worth(model(), over, states)) return run(precision, {q}, size, out, compute);
     const ModelInUse use(model());
     check_given(model(), {q});
-    const std::vector<int> left = gradients_.run(model(), over, q.data, q.batch, out);
+    const std::vector<int> left = gradients_.run(model(), over, q.data, states, out);
     each<double>(0, static_cast<int>(left.size()), 1, [&](Sensitivities<double>& w, int i) {
-      naming_state(left[i], q.batch, [&] {
+      naming_state(left[i], states, [&] {
         const double* const in[] = {q.at(left[i])};
         double* const y = out + size_t(left[i]) * size;
         compute(w, in, y);

@@ -1,5 +1,6 @@
 #include "dynamics/packed_gradients.h"
 
+#include <algorithm>
 #include <mutex>
 #include <numeric>
 
@@ -50,6 +51,15 @@ std::shared_ptr<const kernels::Program> recorded_gradient(const Multibody& model
   return std::make_shared<kernels::Program>(kernels::program_of(recording.tape(), kernels::lane_set().functions.width));
 }
 
+bool PackedGradients::worth(const Multibody& model, GradientOver over, int states) {
+  const std::lock_guard<Mutex> lock(mutex_);
+  if (mutex_.abandoned()) leave_behind(kept_);
+  Kept& k = kept_[over];
+  if (k.parameters != model.parameters()) k = {model.parameters()};
+  if (k.asked < least) k.asked = std::min(least, k.asked + std::min(states, least));
+  return k.asked >= least && !(k.tried && !k.program);
+}
+
 std::vector<int> PackedGradients::run(const Multibody& model, GradientOver over, const double* q, int states, double* out) {
   std::shared_ptr<const kernels::Program> program;
   const std::uint64_t parameters = model.parameters();
@@ -58,12 +68,12 @@ std::vector<int> PackedGradients::run(const Multibody& model, GradientOver over,
     if (mutex_.abandoned()) leave_behind(kept_);
     return kept_[over];
   };
-  if (const Kept known = at_hand(); known.parameters == parameters) {
+  if (const Kept known = at_hand(); known.parameters == parameters && known.tried) {
     program = known.program;
   } else {
     program = recorded_gradient(model, over);
     const std::lock_guard<Mutex> lock(mutex_);
-    kept_[over] = {parameters, program};
+    kept_[over] = {parameters, least, true, program};
   }
   if (!program) {
     std::vector<int> all(states);

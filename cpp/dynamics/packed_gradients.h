@@ -1,5 +1,6 @@
-// Gradients of ln det(ℳ + J) of batches in packs: the recursion runs once on numbers that write down what is done to them
-// (numerics/recorded.h), and that is done again at the states, with the bits that it has by itself.
+// Gradients of ln det(ℳ + J) in packs, of batches and of one state after another: the recursion runs once on numbers that write down what is
+// done to them (numerics/recorded.h), and that is done again at the states, with the bits that it has by itself. It is the shorter way for one
+// state, too: what is zero or one in the model is left out, and nothing is decided.
 #pragma once
 
 #include <cstdint>
@@ -20,14 +21,17 @@ std::shared_ptr<const kernels::Program> recorded_gradient(const Multibody& model
 
 class PackedGradients {
  public:
-  // From so many states on.
-  static constexpr int least = 64;
+  // Whether so many more states are done in packs: from `least` on since the model's numbers changed, as long as recording takes.
+  bool worth(const Multibody& model, GradientOver over, int states);
   // Which states are left; all of them where nothing could be recorded.
   std::vector<int> run(const Multibody& model, GradientOver over, const double* q, int states, double* out);
 
  private:
+  static constexpr int least = 64;
   struct Kept {
     std::uint64_t parameters = 0;
+    int asked = 0;
+    bool tried = false;
     std::shared_ptr<const kernels::Program> program;
   };
   Mutex mutex_;
