@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
+#include <string>
 #include <unordered_map>
 
 #include "model/checks.h"
@@ -68,30 +70,62 @@ std::vector<std::string> nearest_names(const std::string& name, const std::vecto
   return near;
 }
 
-bool fits_pattern(const std::string& name, const std::string& pattern) {
-  size_t n = 0, p = 0, star = std::string::npos, from = 0;
+namespace {
+
+// Letters of a text in UTF-8: bytes that are none stand for themselves.
+std::u32string letters(const std::string& text) {
+  std::u32string all;
+  for (size_t i = 0; i < text.size();) {
+    const auto byte = [&](size_t at) { return static_cast<unsigned char>(text[at]); };
+    const int more = byte(i) >= 0xf0 ? 3 : byte(i) >= 0xe0 ? 2 : byte(i) >= 0xc0 ? 1 : 0;
+    char32_t letter = more == 0 ? byte(i) : byte(i) & (0x3f >> more);
+    size_t end = i + 1;
+    for (; end <= i + more && end < text.size() && (byte(end) & 0xc0) == 0x80; ++end) letter = letter << 6 | (byte(end) & 0x3f);
+    all += letter, i = end;
+  }
+  return all;
+}
+
+// Whether a letter is one of the set that begins at pattern[at], "[abc]", "[a-c]", "[!abc]"; at moves past it. A "]" that comes first is a letter.
+// Nothing where no "]" ends it.
+std::optional<bool> in_set(char32_t letter, const std::u32string& pattern, size_t& at) {
+  const bool none = at + 1 < pattern.size() && pattern[at + 1] == U'!';
+  const size_t first = at + 1 + none, end = pattern.find(U']', first + 1);
+  if (end == std::u32string::npos) return std::nullopt;
+  bool found = false;
+  for (size_t i = first; i < end; ++i) {
+    const bool range = i + 2 < end && pattern[i + 1] == U'-';
+    found |= range ? pattern[i] <= letter && letter <= pattern[i + 2] : pattern[i] == letter;
+    if (range) i += 2;
+  }
+  at = end + 1;
+  return found != none;
+}
+
+}  // namespace
+
+bool fits_pattern(const std::string& called, const std::string& shape) {
+  const std::u32string name = letters(called), pattern = letters(shape);
+  size_t n = 0, p = 0, star = std::u32string::npos, from = 0;
   const auto fits_one = [&](size_t& at) {  // the part of the pattern at `at` against one letter; at moves past it
-    if (pattern[at] == '?') return ++at, true;
-    if (pattern[at] != '[') return pattern[at++] == name[n];
-    const size_t end = pattern.find(']', at + 1);
-    if (end == std::string::npos) return pattern[at++] == name[n];
-    const bool found = pattern.find(name[n], at + 1) < end;
-    at = end + 1;
-    return found;
+    if (pattern[at] == U'?') return ++at, true;
+    if (pattern[at] == U'[')
+      if (const std::optional<bool> fits = in_set(name[n], pattern, at)) return *fits;
+    return pattern[at++] == name[n];
   };
   while (n < name.size()) {
     size_t next = p;
-    if (p < pattern.size() && pattern[p] == '*') {
+    if (p < pattern.size() && pattern[p] == U'*') {
       star = p++, from = n;
     } else if (p < pattern.size() && fits_one(next)) {
       p = next, ++n;
-    } else if (star != std::string::npos) {
+    } else if (star != std::u32string::npos) {
       p = star + 1, n = ++from;
     } else {
       return false;
     }
   }
-  while (p < pattern.size() && pattern[p] == '*') ++p;
+  while (p < pattern.size() && pattern[p] == U'*') ++p;
   return p == pattern.size();
 }
 

@@ -12,7 +12,7 @@ namespace pycraft {
 
 // The names that are nearest to one, the nearest first: those that most of its letters fit.
 std::vector<std::string> nearest_names(const std::string& name, const std::vector<std::string>& known, size_t most = 3);
-// Whether a name fits a pattern: * any letters, ? any one, [abc] one of these.
+// Whether a name fits a pattern: * any letters, ? any one, [abc] one of these, [a-c] one from a to c, [!abc] none of these.
 bool fits_pattern(const std::string& name, const std::string& pattern);
 
 using Names = std::optional<std::vector<std::string>>;  // none: all

@@ -37,7 +37,13 @@ CHANGES = {
     ],
     "cpp/simulation/selection.cpp": [
         ("a coordinate counts twice", "if (!there[j]) there[j] = 1, found.push_back(j);", "found.push_back(j);", STATEMENT),
-        ("a question mark is a letter", "if (pattern[at] == '?') return ++at, true;", ";", STATEMENT),
+        ("a question mark is a letter", "if (pattern[at] == U'?') return ++at, true;", ";", STATEMENT),
+        (
+            "of a range its ends alone",
+            "pattern[i] <= letter && letter <= pattern[i + 2]",
+            "pattern[i] == letter || letter == pattern[i + 2]",
+        ),
+        ("letters that are not to be there may", "return found != none;", "return found;", STATEMENT),
     ],
     "cpp/simulation/function_of_time.cpp": [
         ("tables go on beyond their ends", "before || after ? S(0) : S(1)", "S(1)"),

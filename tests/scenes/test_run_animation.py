@@ -12,6 +12,7 @@ from matplotlib import pyplot  # noqa: E402 - after the backend is chosen
 
 @pytest.fixture(autouse=True)
 def close():
+    pyplot.close("all")  # those of other tests
     yield
     pyplot.close("all")
 

@@ -3,11 +3,15 @@
 import copy
 import pickle
 import threading
+from fnmatch import fnmatchcase
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import pycraft as pc
+from pycraft import _core
 from support.mechanisms import every_kind
 
 E = pc.effects
@@ -50,6 +54,10 @@ def test_a_scene_starts_empty(arm):
         ("*_?lbow", [1, 2]),
         (["wrist[[]2]"], [5]),
         ("[lw]*", range(6)),
+        ("[a-l]*", [0, 1, 2]),
+        ("[!l]*", [3, 4, 5]),
+        ("[!a-l]rist", [3, 4, 5]),
+        ("wrist[[][0-1][]]", [3, 4]),
         (["left_shoulder", "left_*"], [0, 1, 2]),
         ([], []),
     ],
@@ -58,6 +66,27 @@ def test_names_lists_and_patterns(arm, hinges, coordinates):
     state = arm.random_state(1)
     found = pc.Scene(arm).add(E.Damping(1.0, hinges=hinges)).evaluate(state.q, state.v).forces["damping"]
     assert np.array_equal(found, np.where(np.isin(np.arange(6), list(coordinates)), -state.v, 0))
+
+
+LETTERS = "abcé]-!"
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    names=st.lists(st.text(LETTERS, min_size=1, max_size=4), min_size=1, max_size=5, unique=True),
+    pattern=st.text(LETTERS + "?*[", min_size=1, max_size=8),
+)
+def test_patterns_are_those_of_a_shell(names, pattern):
+    """As Python's fnmatch has them, ranges and sets of what is not to be there among them; a name is itself before it is a pattern."""
+    model = pc.Multibody("names")
+    for name in names:
+        model.add_body(name, mass=1.0, inertia=np.eye(3))
+    fitting = [i for i, name in enumerate(names) if name == pattern] or [i for i, name in enumerate(names) if fnmatchcase(name, pattern)]
+    if fitting:
+        assert _core.coordinates_named(model, [pattern], "an effect") == fitting
+    else:
+        with pytest.raises(pc.ModelError):
+            _core.coordinates_named(model, [pattern], "an effect")
 
 
 def test_handles_and_dictionaries(arm):
