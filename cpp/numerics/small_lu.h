@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "numerics/decisions.h"
@@ -40,23 +41,20 @@ class SmallLU {
   // Factors the n x n row-major matrix A in place; it must stay where it is. sizes: the largest number that went into each entry, so that a
   // pivot below 4 n eps of them is noise; null where nothing was added up in A. False if the matrix counts as singular.
   bool factor(S* A, int n, const Soft<S>* sizes) {
-    using std::abs, std::ldexp;
+    using std::abs;
     A_ = A;
     n_ = n;
     rows_.resize(n);
-    column_.assign(n, Soft<S>(0));
     determinant_ = {};
     sizes_.resize(size_t(n) * n);
     for (size_t i = 0; i < sizes_.size(); ++i) sizes_[i] = maximum(Soft<S>(abs(soft(A[i]))), sizes ? sizes[i] : Soft<S>(0));
     if (!scales_.find(sizes_.data(), n)) return false;
-    row_factor_.resize(n);
-    for (int i = 0; i < n; ++i) {
-      rows_[i] = i;
-      row_factor_[i] = ldexp(Soft<S>(1), scales_.row(i));
-    }
+    for (int i = 0; i < n; ++i) rows_[i] = i;
+    take_row_factors();
     if (is_recorded<S> && !sizes) take_column_sizes();
+    column_.assign(n, Soft<S>(0));
     for (int i = 0; i < n; ++i)
-      for (int j = 0; j < n; ++j) column_[j] = maximum(column_[j], Soft<S>(sizes_[size_t(i) * n + j] * row_factor_[i]));
+      for (int j = 0; j < n; ++j) column_[j] = maximum(column_[j], in_column(sizes_[size_t(i) * n + j], i, j));
     for (int k = 0; k < n; ++k) {
       check_interrupt_at(k, n);
       // The state's own equation, unless another one is much larger: the recursions that the equations stand for are stable as they are.
@@ -65,13 +63,13 @@ class SmallLU {
       int best = k, own = -1, matched = -1;
       Soft<S> largest = Soft<S>(-1);
       for (int i = k; i < n; ++i) {
-        const Soft<S> candidate = abs(soft(A[rows_[i] * n + k])) * row_factor_[rows_[i]];
+        const Soft<S> candidate = in_column(Soft<S>(abs(soft(A[rows_[i] * n + k]))), rows_[i], k);
         if (candidate > largest) largest = candidate, best = i;
         if (rows_[i] == k) own = i;
         if (rows_[i] == scales_.matched_row(k)) matched = i;
       }
       for (int i : {matched, own})
-        if (i >= 0 && abs(soft(A[rows_[i] * n + k])) * row_factor_[rows_[i]] > Soft<S>(0.1) * largest) best = i;
+        if (i >= 0 && in_column(Soft<S>(abs(soft(A[rows_[i] * n + k]))), rows_[i], k) > Soft<S>(0.1) * largest) best = i;
       if (!(largest > Soft<S>(4 * n) * epsilon<Soft<S>>() * column_[k])) return false;
       if (is_recorded<S> && !sizes && !still_chosen(k, best)) return false;
       std::swap(rows_[k], rows_[best]);
@@ -115,6 +113,23 @@ class SmallLU {
   const Equilibration& scales() const { return scales_; }
 
  private:
+  // Where couplings of 1e-170 join rows (a joint at such an angle), the rows' scales differ by more than numbers can: then with the columns'
+  // scales, with which no entry is above 2.
+  void take_row_factors() {
+    using std::abs, std::ldexp;
+    constexpr int furthest = std::numeric_limits<Soft<S>>::max_exponent / 2;
+    row_factor_.resize(n_);
+    extreme_ = false;
+    for (int i = 0; i < n_; ++i) {
+      extreme_ |= abs(scales_.row(i)) > furthest;
+      row_factor_[i] = ldexp(Soft<S>(1), scales_.row(i));
+    }
+  }
+  // |a(i,j)| beside the others of its column.
+  Soft<S> in_column(const Soft<S>& size, int i, int j) const {
+    using std::ldexp;
+    return extreme_ ? Soft<S>(ldexp(size, scales_.row(i) + scales_.column(j))) : Soft<S>(size * row_factor_[i]);
+  }
   // What a recorded factorization needs of states beside its own: that what it chose in column k by the numbers of one is neither rounding nor
   // far below the others. (An elimination over a tree measures instead what it lost, elimination_accuracy.h.)
   void take_column_sizes() {
@@ -130,7 +145,7 @@ class SmallLU {
     S largest = S(0);
     for (int i = k; i < n_; ++i)
       if (i != best) largest = maximum(largest, size(i));
-    return chosen > S(4 * n_) * epsilon<S>() * column_sizes_[k] && chosen > S(0.0625) * largest;
+    return !extreme_ && chosen > S(4 * n_) * epsilon<S>() * column_sizes_[k] && chosen > S(0.0625) * largest;
   }
 
   S* A_ = nullptr;
@@ -139,6 +154,7 @@ class SmallLU {
   std::vector<Soft<S>> column_, sizes_, row_factor_;
   std::vector<S> column_sizes_;
   Equilibration scales_;
+  bool extreme_ = false;
   Magnitude<S> determinant_;
 };
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 
 #include "algebra/engine/elimination/elimination_assembly.h"
 
@@ -90,16 +91,20 @@ void TreeElimination<S>::take_units(const S* solution) {
       const Place p = state_at_[j][k];
       const size_t first = (p.front < 0 ? total_ : fronts_[p.front].vector) + p.position;
       const size_t end = first + (r_->states[j].belongs_to_bodies() ? r_->states[j].body_size(static_cast<int>(k)) : r_->states[j].dimension());
-      S largest = S(0);
-      for (size_t i = first; i < end; ++i) largest = maximum(largest, in_units(S(abs(solution[i])), i));
-      if (!(soft(largest) > Soft<S>(0))) continue;
       if constexpr (is_recorded<S>) {
+        S largest = S(0);
+        for (size_t i = first; i < end; ++i) largest = maximum(largest, in_units(S(abs(solution[i])), i));
+        if (!(soft(largest) > Soft<S>(0))) continue;
         const S inverse = S(1) / largest;
         for (size_t i = first; i < end; ++i) natural_[i] *= inverse;
-        continue;
+      } else {
+        constexpr int none = std::numeric_limits<int>::min();
+        int size = none;  // in exponents: units may be further apart than numbers can be
+        for (size_t i = first; i < end; ++i)
+          if (const S a = abs(solution[i]); a > S(0) && a <= std::numeric_limits<S>::max()) size = std::max(size, static_cast<int>(ilogb(a)) - unit_[i]);
+        if (size == none) continue;
+        for (size_t i = first; i < end; ++i) unit_[i] += size;
       }
-      const int size = static_cast<int>(ilogb(soft(largest)));
-      for (size_t i = first; i < end; ++i) unit_[i] += size;
     }
 }
 
