@@ -17,21 +17,6 @@ py::array_t<double> array_of(const double* x, size_t n) {
   return a;
 }
 
-// f(), its errors telling the time.
-template <class F>
-void telling_time(double t, F f) {
-  const auto named = [&](const Error& e) { return e.what() + ("; integrating, at t = " + short_number(t) + " s"); };
-  try {
-    f();
-  } catch (const SingularHingeError& e) {
-    throw SingularHingeError(named(e), e.coordinate);
-  } catch (const SingularOperatorError& e) {
-    throw SingularOperatorError(named(e));
-  } catch (const RefinementError& e) {
-    throw RefinementError(named(e));
-  }
-}
-
 class PythonSteps : public Stepper<double> {
  public:
   PythonSteps(Equations<double>& equations, const py::object& solver, const IntegratorOptions& options)
@@ -42,7 +27,7 @@ class PythonSteps : public Stepper<double> {
     rates_ = held_object(py::cpp_function([own](double t, const Array& x) {
       if (!*own) throw EvaluationError("the run of these rates is over");
       State at(x.data(), x.data() + x.size()), rate(at.size());
-      telling_time(t, [&] { (**own)(at, rate, t); });
+      retelling([&] { (**own)(at, rate, t); }, [&](const Error& e) { return while_integrating(e, t); });
       return array_of(rate.data(), rate.size());
     }));
   }

@@ -39,19 +39,27 @@ struct StaleOperatorError : Error {
   using Error::Error;
 };
 
+// f(); what numbers made impossible is told in the words of `retold(error)`, and what else the error knows stays.
+template <class F, class Retold>
+void retelling(F&& f, Retold retold) {
+  try {
+    f();
+  } catch (const SingularHingeError& e) {
+    throw SingularHingeError(retold(e), e.coordinate);
+  } catch (const SingularOperatorError& e) {
+    throw SingularOperatorError(retold(e));
+  } catch (const RefinementError& e) {
+    throw RefinementError(retold(e));
+  }
+}
+
 // f(), its errors telling which state of a batch they come from.
 template <class F>
 void naming_state(int state, int states, F&& f) {
   if (states < 2) return f();
   const auto named = [&](const Error& e) { return e.what() + (" (state " + std::to_string(state) + " of a batch of " + std::to_string(states) + ")"); };
   try {
-    f();
-  } catch (const SingularHingeError& e) {
-    throw SingularHingeError(named(e), e.coordinate);
-  } catch (const SingularOperatorError& e) {
-    throw SingularOperatorError(named(e));
-  } catch (const RefinementError& e) {
-    throw RefinementError(named(e));
+    retelling(f, named);
   } catch (const EvaluationError& e) {
     throw EvaluationError(named(e));
   }

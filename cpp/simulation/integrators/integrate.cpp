@@ -12,12 +12,6 @@ namespace pycraft {
 
 namespace {
 
-template <class E>
-[[noreturn]] void rethrow_at(double t, E e) {  // all else that the error knows stays
-  static_cast<std::runtime_error&>(e) = std::runtime_error(e.what() + ("; integrating, at t = " + short_number(t) + " s"));
-  throw e;
-}
-
 template <class S>
 class Run {
  public:
@@ -28,13 +22,7 @@ class Run {
 
   void go() {
     try {
-      run();
-    } catch (const RefinementError& e) {
-      close(), rethrow_at(to_double(t_), e);
-    } catch (const SingularHingeError& e) {
-      close(), rethrow_at(to_double(t_), e);
-    } catch (const SingularOperatorError& e) {
-      close(), rethrow_at(to_double(t_), e);
+      retelling([&] { run(); }, [&](const Error& e) { return while_integrating(e, to_double(t_)); });
     } catch (...) {
       close();
       throw;

@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "model/checks.h"
 #include "numerics/scalar.h"
+#include "runtime/errors.h"
 #include "simulation/equations.h"
 #include "simulation/integrators/integrator.h"
 
@@ -24,6 +26,9 @@ template <class S>
 bool finite_motion(const Equations<S>& equations, const std::vector<S>& x) {
   return all_finite(x, equations.size() - equations.integrals());
 }
+
+// What an error says that came while a run was at t.
+inline std::string while_integrating(const Error& error, double t) { return error.what() + ("; integrating, at t = " + short_number(t) + " s"); }
 
 // What the next step depends on besides the state.
 template <class S>
