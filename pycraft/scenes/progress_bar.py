@@ -1,4 +1,4 @@
-"""How far a run has come, in a terminal or a notebook."""
+"""How far something has come that takes long, in a terminal or a notebook."""
 
 from __future__ import annotations
 
@@ -7,41 +7,47 @@ from types import TracebackType
 from typing import Any
 
 SECONDS = 1.0
-"""Runs that take no longer show nothing."""
+"""What takes no longer shows nothing."""
 
 
 class ProgressBar:
-    """A bar with the simulated time, the rate and the time left, of runs that take longer than a second.
+    """A bar with what is done, the rate and the time left, of what takes longer than a second.
 
     Nothing is shown where standard error is neither a terminal nor a notebook.
+
+    Parameters
+    ----------
+    total : how much there is to do
+    wanted : bool, False: nothing is shown
     """
 
-    def __init__(self, start: float, end: float, wanted: bool = True):
-        self._start, self._end, self._wanted, self._began = start, end, wanted, monotonic()
+    def __init__(self, total: float, wanted: bool = True):
+        self._total, self._wanted, self._began = total, wanted, monotonic()
         self._bar: Any = None
         self._task: Any = None
 
-    def __enter__(self) -> ProgressBar:
+    def __enter__(self) -> Any:
         return self
 
-    def __call__(self, t: float) -> None:
-        """The run is at t."""
-        if self._bar is None and self._wanted and monotonic() - self._began > SECONDS:
+    def show(self, done: float, at: str, unit: str, before: float = 0.0) -> None:
+        """So much is done: `at` says it in words; the rate is in `unit`, of what was not done `before`."""
+        spent = monotonic() - self._began
+        if self._bar is None and self._wanted and spent > SECONDS:
             self._open()
         if self._bar is not None:
-            spent = max(monotonic() - self._began, 1e-9)
-            rate, at = (t - self._start) / spent, f"{t:.4g} of {self._end:.4g} s"
-            self._bar.update(self._task, completed=t - self._start, rate=f"{rate:.3g} s/s", at=at)
+            self._bar.update(self._task, completed=done, rate=f"{(done - before) / max(spent, 1e-9):.3g} {unit}", at=at)
 
     def _open(self) -> None:
+        from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-        if (console := visible_console()) is None:
-            self._wanted = False
+        console = Console(stderr=True)
+        self._wanted = console.is_terminal or console.is_jupyter
+        if not self._wanted:
             return
         columns = [TextColumn("{task.fields[at]}"), BarColumn(), TextColumn("{task.fields[rate]}"), TimeRemainingColumn()]
         self._bar = Progress(*columns, console=console, transient=True)
-        self._task = self._bar.add_task("run", total=self._end - self._start, at="", rate="")
+        self._task = self._bar.add_task("", total=self._total, at="", rate="")
         self._bar.start()
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None) -> None:
@@ -49,9 +55,13 @@ class ProgressBar:
             self._bar.stop()
 
 
-def visible_console() -> Any:
-    """Where a bar is seen: standard error, if it is a terminal or a notebook; else None."""
-    from rich.console import Console
+class RunProgress(ProgressBar):
+    """Of a run, by its time."""
 
-    console = Console(stderr=True)
-    return console if console.is_terminal or console.is_jupyter else None
+    def __init__(self, start: float, end: float, wanted: bool = True):
+        super().__init__(end - start, wanted)
+        self._start, self._end = start, end
+
+    def __call__(self, t: float) -> None:
+        """The run is at t."""
+        self.show(t - self._start, f"{t:.4g} of {self._end:.4g} s", "s/s")

@@ -13,7 +13,7 @@ from ..dynamics.integrator_names import IntegratorName, integrator_named
 from ..state import at_state
 from .checkpoint import Checkpoint
 from .events import Event, events_for_core, listed_events
-from .progress_bar import ProgressBar
+from .progress_bar import RunProgress
 from .run import Run
 from .runs_on_disk import checked_output
 
@@ -114,7 +114,7 @@ def _run(
     def made() -> Run:
         return Run.of_record(scene, calls, record, options, wanted, keep if t_eval is not None else None)
 
-    with ProgressBar(times[0], times[-1], progress) as bar:
+    with RunProgress(times[0], times[-1], progress) as bar:
         try:
             _core.run_scene(
                 calls, record, q, v, times, [], options.energy, chosen.name, *tolerances, options.step, options.max_step, options.normalise,
