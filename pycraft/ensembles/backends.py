@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
@@ -25,8 +26,13 @@ WAITING = 2
 Rows = list[tuple[int, Mapping[str, Any]]]
 
 
-class Workers:
-    """An executor of `concurrent.futures`, made anew when a death has broken it."""
+class Workers(ABC):
+    """An executor of `concurrent.futures`, made anew when a death has broken it.
+
+    Parameters
+    ----------
+    count : how many runs go on at a time
+    """
 
     deadly: tuple[type[BaseException], ...] = ()
     """What a future raises when the process that had it died."""
@@ -37,16 +43,21 @@ class Workers:
         self.count = count
         self.executor = self.made()
 
+    @abstractmethod
     def made(self) -> Executor:
-        raise NotImplementedError
+        """A new executor."""
 
+    @abstractmethod
     def submit(self, work: Any, rows: Rows) -> Future:
-        raise NotImplementedError
+        """The outcomes of some rows, in time."""
 
-    def mended(self) -> None:
-        """After a death."""
+    def renew(self) -> None:
+        """Another executor in the place of one that a death has broken."""
+        self.close()
+        self.executor = self.made()
 
     def close(self) -> None:
+        """Waits for what goes on; what waits is cancelled."""
         self.executor.shutdown(wait=True, cancel_futures=True)
 
 
@@ -75,10 +86,6 @@ class Processes(Workers):
 
     def submit(self, work: Any, rows: Rows) -> Future:
         return self.executor.submit(run_packed, self._bundle, rows)
-
-    def mended(self) -> None:
-        self.executor.shutdown(wait=True, cancel_futures=True)
-        self.executor = self.made()
 
 
 class Dask(Workers):
@@ -176,7 +183,8 @@ def outcomes(work: Any, rows: Iterator[tuple[int, Mapping[str, Any]]], workers: 
             else:
                 died.append(some)
         if died:
-            workers.mended()
+            if workers.die_together:
+                workers.renew()
             suspects.extend([row] for some in died for row in some)
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import pickle
+import re
 import sqlite3
 from collections.abc import Mapping
 from hashlib import sha256
@@ -25,6 +26,8 @@ from .stores import Shapes, empty_column
 from .work import Outcome
 
 FORMAT = "pycraft sweep 1"
+OWN = re.compile(r"sweep\.json(\.new)?|samples\.parquet|parts|(journal|lock)\.sqlite.*")
+"""The names of its files."""
 ROWS = 65536
 """Rows of a part at most."""
 NUMBERS = 4_000_000
@@ -69,7 +72,8 @@ class Folder:
 
     # ------------------------------------------------------------------ which sweep it is
     def _refuse_other_files(self) -> None:
-        if self.path.is_file() or self.path.exists() and not (self.path / "sweep.json").is_file() and any(self.path.iterdir()):
+        """What a sweep leaves that was killed while it began is none of them."""
+        if self.path.is_file() or self.path.is_dir() and any(not OWN.fullmatch(each.name) for each in self.path.iterdir()):
             raise FileExistsError(f"output {str(self.path)!r} is a file, or a folder with other files; give a new or an empty folder")
 
     def _locked(self) -> sqlite3.Connection:
@@ -260,7 +264,12 @@ def _told(value: Any) -> Any:
         return value.shape, value.dtype.str, value.tobytes()
     if callable(value) and hasattr(value, "__qualname__"):
         return f"{value.__module__}.{value.__qualname__}"
-    return value if value is None or isinstance(value, (bool, int, float, str)) else repr(value)
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value
+    try:
+        return pickle.dumps(value, protocol=4)
+    except (pickle.PicklingError, AttributeError, TypeError):
+        return repr(value)
 
 
 def _pyarrow() -> Any:

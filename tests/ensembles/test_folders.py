@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -155,6 +156,24 @@ def test_folders_that_cannot_be_written(tmp_path):
     (tmp_path / "out" / "sweep.json").write_text(json.dumps(about | {"format": "pycraft sweep 0"}))
     with pytest.raises(pc.EvaluationError, match="another version, 'pycraft sweep 0'"):
         pc.load_sweep(tmp_path / "out")
+
+
+def test_a_sweep_that_was_killed_while_it_began_can_begin_again(tmp_path):
+    """Its folder has some of its own files and says nothing yet."""
+    (tmp_path / "out" / "parts").mkdir(parents=True)
+    for name in ("samples.parquet", "lock.sqlite", "sweep.json.new"):
+        (tmp_path / "out" / name).write_bytes(b"half")
+    (tmp_path / "out" / "lock.sqlite").write_bytes(b"")
+    assert pc.sweep(sweeps.square, {"x": [2]}, output=tmp_path / "out", progress=False)["square"].tolist() == [4]
+
+
+def test_samples_that_are_objects_are_known_again(tmp_path):
+    samples = {"x": [Decimal("1.5"), Decimal("2.5")]}
+    first = pc.sweep(sweeps.root_of, samples, output=tmp_path / "out", progress=False)
+    first.close()
+    assert pc.sweep(sweeps.root_of, samples, output=tmp_path / "out", progress=False).finished.all()
+    with pytest.raises(pc.EvaluationError, match="with other samples"):
+        pc.sweep(sweeps.root_of, {"x": [Decimal("1.5"), Decimal("3")]}, output=tmp_path / "out", progress=False)
 
 
 def test_names_that_are_taken(tmp_path):

@@ -16,6 +16,10 @@ def root(x):
     return x**0.5
 
 
+def root_of(x):
+    return float(x) ** 0.5
+
+
 def slow_square(x, folder):
     """Writes down that it ran."""
     time.sleep(0.02)
