@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+import math
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -40,15 +41,58 @@ class Checkpoint:
 
     @classmethod
     def load(cls, path: str | Path) -> Checkpoint:
-        """Read what `save` wrote. EvaluationError for a file that is none."""
+        """Read what `save` wrote. EvaluationError for a file that is none, or whose numbers make no sense."""
         try:
             data = json.loads(Path(path).read_text(encoding="utf-8"))
-            if data.pop("format") != FORMAT:
-                raise KeyError("format")
-            data["effects"] = tuple(data["effects"])
-            return cls(**data)
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            _check(isinstance(data, dict) and data.pop("format", None) == FORMAT, f"its format is not {FORMAT!r}")
+            _check_entries(data)
+        except ValueError as error:
             raise _core.EvaluationError(f"{str(path)!r} holds no checkpoint ({error}); `run.checkpoint().save(path)` writes one") from None
+        return cls(**data | {"effects": tuple(data["effects"])})
 
     def __repr__(self) -> str:
         return f"<checkpoint of {self.model!r} at {self.t:g} s, integrator {self.integrator!r}>"
+
+
+# ---------------------------------------------------------------------- what a file may say
+
+
+def _check(condition: bool, otherwise: str) -> None:
+    if not condition:
+        raise ValueError(otherwise)
+
+
+def _keys(given: Any, names: tuple[str, ...], what: str) -> None:
+    _check(isinstance(given, dict) and set(given) == set(names), f"{what} takes {', '.join(names)}")
+
+
+def _number(x: Any) -> bool:
+    return isinstance(x, (int, float)) and not isinstance(x, bool) and math.isfinite(x)
+
+
+def _sums(given: Any) -> bool:
+    """Whether it is a list of exact sums."""
+    return isinstance(given, list) and all(isinstance(parts, list) and parts and all(map(_number, parts)) for parts in given)
+
+
+def _check_entries(data: dict[str, Any]) -> None:
+    _keys(data, tuple(field.name for field in fields(Checkpoint)), "a checkpoint")
+    for name in ("model", "precision", "integrator"):
+        _check(isinstance(data[name], str), f"{name} is a name, not {data[name]!r:.40}")
+    effects, options, state = data["effects"], data["options"], data["state"]
+    _check(isinstance(effects, list) and all(isinstance(name, str) for name in effects), "effects is a list of names")
+    sizes, switches = ("rtol", "atol", "step", "max_step"), ("normalise", "energy")
+    _keys(options, (*sizes, *switches), "options")
+    for name in sizes:
+        _check(_number(options[name]) and options[name] >= 0, f"{name} is a positive number or zero, not {options[name]!r:.40}")
+    for name in switches:
+        _check(isinstance(options[name], bool), f"{name} is true or false, not {options[name]!r:.40}")
+    _keys(state, ("t", "x", "size", "origin", "taken", "signs", "lengths"), "state")
+    for name in ("t", "size", "origin"):
+        _check(_sums([state[name]]), f"{name} of the state is a list of finite numbers that are added up, not {state[name]!r:.40}")
+    for name in ("x", "lengths"):
+        _check(_sums(state[name]), f"{name} of the state is a list of lists of finite numbers that are added up")
+    _check(_number(data["t"]) and data["t"] == sum(state["t"]), f"t is {data['t']!r:.40}, and that of the state {sum(state['t']):g}")
+    _check(sum(state["size"]) > 0, f"size of the state is {sum(state['size']):g}; a step is a positive number of seconds")
+    _check(type(state["taken"]) is int and 0 <= state["taken"] < 2**62, f"taken of the state is a count of steps, not {state['taken']!r:.40}")
+    _check(isinstance(state["signs"], list) and all(sign in (-1, 0, 1) for sign in state["signs"]), "signs of the state are -1, 0 or 1")

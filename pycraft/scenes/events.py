@@ -75,8 +75,8 @@ def listed_events(given: Any) -> list[Event]:
         event = each if isinstance(each, Event) else Event(each, getattr(each, "direction", 0), bool(getattr(each, "terminal", False)))
         if not callable(event.function):
             raise _core.EvaluationError(f"events: an event is a function (t, state) -> float, not {event.function!r:.80}")
-        if event.direction not in DIRECTIONS and event.direction not in DIRECTIONS.values():
-            raise _core.EvaluationError(f"events: direction={event.direction!r}; there are 0, 1, -1, 'both', 'rising' and 'falling'")
+        if not isinstance(event.direction, (str, int, float, np.integer)) or event.direction not in (*DIRECTIONS, *DIRECTIONS.values()):
+            raise _core.EvaluationError(f"events: direction={event.direction!r:.80}; there are 0, 1, -1, 'both', 'rising' and 'falling'")
         called = name if name is not None else event.name if event.name is not None else unused(kind_of(event.function), events)
         if any(other.name == called for other in events):
             raise _core.EvaluationError(f"events: two are called {called!r}")

@@ -36,6 +36,7 @@ class Motion:
 
     def __init__(self, about: Mapping[str, Any], rows: Mapping[str, np.ndarray], calls: Any = None, alone: bool = False):
         self._about, self._calls, self._alone = dict(about), calls, alone
+        self._parameters: int | None = self.model._parameters  # of the model as it was; None for one that was edited since
         self.t, self.q, self.v, self.states = (rows[name] for name in ("t", "q", "v", "states"))
         self._work = rows["work"]
         if alone:
@@ -57,6 +58,15 @@ class Motion:
         """The effects whose works are counted, in the order of the columns of `energy["work"]`."""
         return [self._about["effects"][i] for i in self._about["workers"]]
 
+    def _unedited_model(self) -> Any:
+        """The model, as long as it is what it was: numbers that were not computed yet would be another model's."""
+        if self._parameters != self.model._parameters:
+            raise _core.StaleOperatorError(
+                f"{self.model.name!r} was edited since, and this motion is of the model as it was: t, q, v and states stay; simulate again for "
+                "the rest, or look at it before the edit"
+            )
+        return self.model
+
     # ------------------------------------------------------------------ what follows
     def _rows(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         t, q, v, states = self.t, self.q, self.v, self.states
@@ -69,6 +79,7 @@ class Motion:
                 "this motion has no scene behind it: of a run that was pickled or read from a file, accelerations, forces and energies "
                 "are known at its own times alone"
             )
+        self._unedited_model()
         found = self._calls.along(*self._rows())
         if not self._alone:
             return found
@@ -102,20 +113,22 @@ class Motion:
     @cached_property
     def momentum(self) -> dict[str, np.ndarray]:
         """Spatial momentum (K, 6) of all bodies in the world's axes, angular first, N m s and N s: "origin", about the world's origin,
-        and "com", about the centre of mass.
+        and "com", about the centre of mass; of a model without mass zero about any point.
         """
-        about_origin = self.model.momentum(self.q, self.v).value
+        about_origin = self._unedited_model().momentum(self.q, self.v).value
         about_com = about_origin.copy()
-        about_com[..., :3] -= np.cross(self.centre_of_mass, about_origin[..., 3:])
+        if any(body.mass > 0 for body in self.model.bodies.values()):
+            about_com[..., :3] -= np.cross(self.centre_of_mass, about_origin[..., 3:])
         return {"origin": about_origin, "com": about_com}
 
     @cached_property
     def centre_of_mass(self) -> np.ndarray:
         """(K, 3) m, in the world."""
-        bodies = [(name, body.mass, body.com) for name, body in self.model.bodies.items() if body.mass > 0]
+        model = self._unedited_model()
+        bodies = [(name, body.mass, body.com) for name, body in model.bodies.items() if body.mass > 0]
         if not bodies:
-            raise _core.ModelError(f"{self.model.name!r} has no mass, and no centre of it")
-        poses = [(mass, self.model.pose(name, self.q), com) for name, mass, com in bodies]
+            raise _core.ModelError(f"{model.name!r} has no mass, and no centre of it")
+        poses = [(mass, model.pose(name, self.q), com) for name, mass, com in bodies]
         moment = sum(mass * (pose[..., :3, :3] @ com + pose[..., :3, 3]) for mass, pose, com in poses)
         return moment / sum(mass for mass, _, _ in poses)
 
@@ -127,8 +140,9 @@ class Motion:
         name : of a body or node
         axes : {"body", "aligned", "world"}
         """
-        jacobian = self.model.jacobian(name, self.q, axes=axes)
-        return FrameMotion(self.model.pose(name, self.q), np.einsum("...ij,...j->...i", jacobian, self.v))
+        model = self._unedited_model()
+        jacobian = model.jacobian(name, self.q, axes=axes)
+        return FrameMotion(model.pose(name, self.q), np.einsum("...ij,...j->...i", jacobian, self.v))
 
     def __len__(self) -> int:
         return np.size(self.t)
@@ -136,9 +150,12 @@ class Motion:
     # ------------------------------------------------------------------ copies
     def __getstate__(self) -> dict[str, Any]:
         """What it is made of: numbers that follow are found first, as what computes them stays behind."""
-        if self._calls is not None:
+        edited = self._parameters != self.model._parameters
+        if self._calls is not None and not edited:
             self._along  # noqa: B018 - is kept
-        return {**self.__dict__, "_calls": None}
+        return {**self.__dict__, "_calls": None, "_parameters": None if edited else 0}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
+        if self._parameters is not None:  # the model's count begins anew
+            self._parameters = self.model._parameters

@@ -28,6 +28,9 @@ class Run(Motion):
     statistics : evaluations of the accelerations, steps, rejected steps, seconds, linearizations (of integrators that solve by
         derivatives), solutions (of variational ones: of the equations of a step), and how often each pass ran
 
+    What follows from the states is computed when it is first asked for, and kept. StaleOperatorError once the model was edited: the rest is of
+    the model as it was.
+
     Examples
     --------
     >>> import pycraft as pc
@@ -98,6 +101,7 @@ class Run(Motion):
         rows = self._steps
         if rows is None:
             raise _core.EvaluationError("this run kept the times of t_eval alone; simulate with dense=True to look between them")
+        self._unedited_model()
         wanted, known = np.atleast_1d(times).astype(float), rows["t"]
         outside = wanted[~((wanted >= known[0]) & (wanted <= known[-1]))]
         if outside.size:
@@ -129,6 +133,7 @@ class Run(Motion):
         rows = self._steps
         if rows is None or rows["t"] is self.t:
             return self.vdot
+        self._unedited_model()
         return self._calls.along(*(rows[name] for name in ("t", "q", "v", "states")))["vdot"]
 
     def checkpoint(self) -> Checkpoint:

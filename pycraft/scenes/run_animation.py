@@ -37,13 +37,13 @@ class RunAnimation:
         self.fps = rate
         self.times = _frames(run, rate, faster)
         self._q = _configurations(run, self.times)
-        self._path = None if trace is None else run.model.pose(trace, self._q)[:, :3, 3]
+        self._path = None if trace is None else run._unedited_model().pose(trace, self._q)[:, :3, 3]
         self._draw(run, options)
 
     def _draw(self, run: Any, options: dict[str, Any]) -> None:
         from matplotlib import pyplot
 
-        self._stick = StickFigure(run.model, self._q[0], **options)
+        self._stick = StickFigure(run._unedited_model(), self._q[0], **options)
         self.figure = self._stick.ax.figure
         self._stick.frame(self._q)
         self._way = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -17,6 +18,8 @@ from .file_targets import writable_target
 from .run_tables import HOLDS, columns_of, variables_of
 
 FORMAT = "pycraft run 1"
+ABOUT = ("effects", "workers", "energy", "integrator", "options", "precision")
+"""What a run says of itself beside its model."""
 ENDINGS = (".nc", ".parquet", ".csv")
 
 
@@ -54,7 +57,14 @@ def load_run(path: str | Path) -> Any:
         raise _core.EvaluationError(f"{str(path)!r}: runs are read from files that end in {' and '.join(readers)}")
     if not target.is_file():
         raise FileNotFoundError(f"there is no file {str(path)!r}")
-    return readers[target.suffix](target)
+    with target.open("rb"):  # OSError where it cannot be read at all
+        pass
+    try:
+        return readers[target.suffix](target)
+    except (ImportError, _core.EvaluationError):
+        raise
+    except Exception as error:  # of damaged bytes anything may come
+        raise _core.EvaluationError(f"{str(path)!r} holds no run, or a damaged one ({error}); `run.save(path)` writes one") from None
 
 
 # ---------------------------------------------------------------------- what is told beside the numbers
@@ -82,6 +92,8 @@ def _run(
     told = json.loads(text)
     if told.get("format") != FORMAT:
         raise _core.EvaluationError(f"{str(path)!r} holds no run of this version: its format is {told.get('format')!r}, not {FORMAT!r}")
+    if missing := [name for name in ABOUT if name not in told["about"]]:
+        raise ValueError(f"it does not say: {', '.join(missing)}")
     about = told["about"] | {"model": Multibody.from_description(told["model"])}
     n, nq, nv = len(rows["t"]), about["model"].nq, about["model"].nv
     widths = {"t": (n,), "q": (n, nq), "v": (n, nv)}
@@ -89,7 +101,10 @@ def _run(
         name: EventStates(*(np.asarray(e[key], float).reshape(len(e["t"]), -1) if key != "t" else np.asarray(e[key], float) for key in e))
         for name, e in told["events"].items()
     }
-    shaped = {name: x.reshape(widths.get(name, x.shape)) for name, x in rows.items()}
+    shaped = {name: x.reshape(widths.get(name, (n, *x.shape[1:]))) for name, x in rows.items()}
+    if steps is not None:
+        ends = len(steps["t"])
+        steps = {name: x.reshape((ends, *(widths[name][1:] if name in widths else x.shape[1:]))) for name, x in steps.items()}
     run = Run(about, shaped, steps=steps, events=events, ended_by=told["ended_by"], statistics=told["statistics"])
     run.__dict__["_along"] = {
         **along,
@@ -132,12 +147,9 @@ def _to_netcdf(run: Any, path: Path) -> None:
 def _from_netcdf(path: Path) -> Any:
     from scipy.io import netcdf_file
 
-    try:
-        with netcdf_file(str(path), "r", mmap=False) as file:
-            about = file.about.decode("utf-8")
-            found = {name: np.array(x[:], float) for name, x in file.variables.items()}
-    except (TypeError, AttributeError, ValueError) as error:
-        raise _core.EvaluationError(f"{str(path)!r} holds no run: {error}") from None
+    with netcdf_file(str(path), "r", mmap=False) as file:
+        about = file.about.decode("utf-8")
+        found = {name: np.array(x[:], float) for name, x in file.variables.items()}
     n, empty = len(found["time"]), np.zeros((len(found["time"]), 0))
     rows = {"t": found["time"], **{name: found.get(name, empty) for name in ("q", "v", "states", "work")}}
     along = {name: found.get(name, empty) for name in ("vdot", "forces", "potential")} | {"kinetic": found.get("kinetic", np.zeros(n))}
@@ -169,11 +181,8 @@ def _to_parquet(run: Any, path: Path) -> None:
 
 def _from_parquet(path: Path) -> Any:
     pyarrow = _pyarrow()
-    try:
-        table = pyarrow.parquet.read_table(str(path))
-        about = (table.schema.metadata or {})[b"pycraft"].decode("utf-8")
-    except (KeyError, pyarrow.ArrowException) as error:
-        raise _core.EvaluationError(f"{str(path)!r} holds no run: {error}") from None
+    table = pyarrow.parquet.read_table(str(path))
+    about = (table.schema.metadata or {})[b"pycraft"].decode("utf-8")
     columns = {name: table.column(name).to_numpy().astype(float) for name in table.column_names}
     told = json.loads(about)
     n, effects = len(columns["t"]), told["about"]["effects"]
@@ -193,5 +202,6 @@ def _from_parquet(path: Path) -> Any:
 
 def _to_csv(run: Any, path: Path) -> None:
     columns = columns_of(run)
-    header = ",".join(f'"{name}"' if "," in name or '"' in name else name for name in columns)
-    np.savetxt(path, np.stack(list(columns.values()), axis=1), fmt="%.17g", delimiter=",", header=header, comments="", encoding="utf-8")
+    with path.open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file, lineterminator="\n").writerow(columns)
+        np.savetxt(file, np.stack(list(columns.values()), axis=1), fmt="%.17g", delimiter=",")
