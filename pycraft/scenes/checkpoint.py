@@ -94,5 +94,6 @@ def _check_entries(data: dict[str, Any]) -> None:
         _check(_sums(state[name]), f"{name} of the state is a list of lists of finite numbers that are added up")
     _check(_number(data["t"]) and data["t"] == sum(state["t"]), f"t is {data['t']!r:.40}, and that of the state {sum(state['t']):g}")
     _check(sum(state["size"]) > 0, f"size of the state is {sum(state['size']):g}; a step is a positive number of seconds")
-    _check(type(state["taken"]) is int and 0 <= state["taken"] < 2**62, f"taken of the state is a count of steps, not {state['taken']!r:.40}")
+    taken = state["taken"]
+    _check(type(taken) is int and 0 <= taken < 2**62, f"taken of the state is a count of steps, not {taken!r:.40}")
     _check(isinstance(state["signs"], list) and all(sign in (-1, 0, 1) for sign in state["signs"]), "signs of the state are -1, 0 or 1")

@@ -11,12 +11,14 @@ from .. import _core
 from ..accuracy.checked_options import checked_model, checked_seconds
 from ..accuracy.tables.work_precision import trajectory_error
 from ..arguments import one_number
+from ..dynamics.integrator_names import integrator_named, takes_one_size
 from ..state import at_state
 from ..tidy import TidyTable, error_text, refusal_text, seconds_text, share_text
 from .measuring import effects_on, evaluation_of, having_on, in_turn, mark_front, run_at, sampled_times, timed_run
 
 LOOSER = 100.0
-"""The error of the whole scene's own run is its distance to one at tolerances so many times its own, as in `pycraft.work_precision`."""
+"""The error of the whole scene's own run is its distance to one at tolerances so many times its own, as in `pycraft.work_precision`; of
+steps of one size twice its distance to one of half the step."""
 
 
 class ComparisonTable(TidyTable):
@@ -129,12 +131,21 @@ class Leaving:
         return trajectory_error(self.scene.model, self.run.q, run.q)
 
     def own_error(self) -> float:
-        """rad, m: of the whole scene's run itself."""
+        """rad, m: of the whole scene's run itself, or more."""
+        if takes_one_size(integrator_named(self.options["integrator"]).name):
+            finer = self.run_without((), step=self.options["step"] / 2)
+            return 2 * self.trajectory_error(finer)  # of order one and higher, half the error at least is between them
         looser = {name: LOOSER * self.options[name] for name in ("rtol", "atol")}
-        try:
-            return self.trajectory_error(self.run_without((), **looser))
-        except (ArithmeticError, _core.Error):  # tolerances too loose for it
-            return 0.0
+        tighter = {name: self.options[name] / LOOSER for name in ("rtol", "atol")}
+        found = []
+        for tolerances in (looser, tighter):
+            try:
+                found.append(self.trajectory_error(self.run_without((), **tolerances)))
+            except (ArithmeticError, _core.Error):  # too loose for it, or too tight
+                continue
+            if found[-1] > 0:  # else the steps were the same: the largest there are
+                break
+        return max(found, default=float(np.inf))
 
 
 def compare(

@@ -116,7 +116,8 @@ class Measurements:
 
         Integrators and their tolerances or steps, of the scene as it is; forms, refinements and precisions, by an integrator of high order
         at a tolerance near rounding; effects, each left out. The reference is everything in extended precision, as in
-        `pycraft.work_precision`, whose rows these are.
+        `pycraft.work_precision`, whose rows these are. Implicit effects, which act in steps, are in the reference and in rows of the
+        arithmetic what they come to in small steps: plain damping and springs.
 
         Parameters
         ----------

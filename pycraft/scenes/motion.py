@@ -58,12 +58,17 @@ class Motion:
         """The effects whose works are counted, in the order of the columns of `energy["work"]`."""
         return [self._about["effects"][i] for i in self._about["workers"]]
 
+    @property
+    def _edited(self) -> bool:
+        """Whether the model is no more what it was."""
+        return self._parameters != self.model._parameters
+
     def _unedited_model(self) -> Any:
         """The model, as long as it is what it was: numbers that were not computed yet would be another model's."""
-        if self._parameters != self.model._parameters:
+        if self._edited:
             raise _core.StaleOperatorError(
-                f"{self.model.name!r} was edited since, and this motion is of the model as it was: t, q, v and states stay; simulate again for "
-                "the rest, or look at it before the edit"
+                f"{self.model.name!r} was edited since, and this motion is of the model as it was: t, q, v and states stay; simulate again "
+                "for the rest, or look at it before the edit"
             )
         return self.model
 
@@ -150,10 +155,9 @@ class Motion:
     # ------------------------------------------------------------------ copies
     def __getstate__(self) -> dict[str, Any]:
         """What it is made of: numbers that follow are found first, as what computes them stays behind."""
-        edited = self._parameters != self.model._parameters
-        if self._calls is not None and not edited:
+        if self._calls is not None and not self._edited:
             self._along  # noqa: B018 - is kept
-        return {**self.__dict__, "_calls": None, "_parameters": None if edited else 0}
+        return {**self.__dict__, "_calls": None, "_parameters": None if self._edited else 0}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)

@@ -28,8 +28,8 @@ class Run(Motion):
     statistics : evaluations of the accelerations, steps, rejected steps, seconds, linearizations (of integrators that solve by
         derivatives), solutions (of variational ones: of the equations of a step), and how often each pass ran
 
-    What follows from the states is computed when it is first asked for, and kept. StaleOperatorError once the model was edited: the rest is of
-    the model as it was.
+    What follows from the states is computed when it is first asked for, and kept. StaleOperatorError once the model was edited: the rest is
+    of the model as it was.
 
     Examples
     --------
@@ -227,7 +227,7 @@ class Run(Motion):
 
     # ------------------------------------------------------------------ copies
     def __getstate__(self) -> dict[str, Any]:
-        if self._calls is not None and self._steps is not None:
+        if self._calls is not None and self._steps is not None and not self._edited:
             self._vdot_of_steps  # noqa: B018 - is kept
         return super().__getstate__()
 

@@ -33,7 +33,7 @@ def plot(run: Any, what: tuple[str, ...], coordinates: Any) -> Any:
         raise _core.EvaluationError(f"plot: no picture is called {unknown[0]!r}; there are {', '.join(map(repr, WHAT))}")
     if not what:
         what = ("q", "v", *(("energy",) if run._about["energy"] else ()), "forces")
-    chosen = _core.coordinates_named(run.model, names_of(coordinates, "plot"), "plot")
+    chosen = _core.coordinates_named(run._unedited_model(), names_of(coordinates, "plot"), "plot")
     panels = [panel for name in what for panel in _panels(run, name, chosen) if panel.lines]
     if not panels:
         raise _core.EvaluationError(f"plot: there is nothing to see of {', '.join(map(repr, what))} in this run")

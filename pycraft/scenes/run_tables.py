@@ -14,7 +14,7 @@ HOLDS = "pip install 'pycraft-soa[data]'"
 def columns_of(run: Any) -> dict[str, np.ndarray]:
     """Everything of a run by column, (K,) each: "t", "q.shoulder", "v.shoulder", "vdot.shoulder", "force.gravity.shoulder", "state.0", and
     of runs that kept account of works "kinetic", "potential.gravity" and "work.damping"."""
-    (of_q, _, _), of_v = coordinate_units(run.model), run.model.coordinate_names
+    (of_q, _, _), of_v = coordinate_units(run._unedited_model()), run.model.coordinate_names
 
     def by_name(start: str, names: Any, x: np.ndarray) -> dict[str, np.ndarray]:
         return {f"{start}.{name}": x[:, i] for i, name in enumerate(names)}
@@ -56,7 +56,7 @@ def to_xarray(run: Any) -> Any:
         import xarray
     except ImportError:
         raise ImportError(f"to_xarray() needs xarray: {HOLDS}; save('run.nc') and save('run.csv') need nothing") from None
-    names, q_units, v_units = coordinate_units(run.model)
+    names, q_units, v_units = coordinate_units(run._unedited_model())
     data: dict[str, Any] = {name: (axes, x, {"units": unit} if unit else {}) for name, (axes, x, unit) in variables_of(run).items()}
     momentum = (("about", "time", "component"), np.stack(list(run.momentum.values())), {"units": "N m s, N s"})
     coordinates = {

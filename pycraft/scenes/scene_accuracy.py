@@ -38,8 +38,10 @@ REFERENCE = ("fehlberg78", 1e-16)
 """By which the reference is found, in extended precision: the integrator of high order and its tolerance."""
 FINE = ("fehlberg78", 50.0)
 """By which forms, refinements and precisions are told apart: the integrator, and its tolerance over the precision's rounding."""
-USUAL = ("dopri5", 1e-9)
-"""The integrator and tolerance of scenes that lack an effect."""
+USUAL = ("dopri5", "rosenbrock4")
+"""The integrators of scenes that lack an effect: the first that fits."""
+USUAL_TOLERANCE = 1e-9
+"""Theirs."""
 
 
 class SceneAccuracyTable(WorkPrecisionTable):
@@ -117,7 +119,7 @@ def accuracy(
     ]
 
     tell("reference")
-    wide = _as(scene, (*scene._how[:3], "extended"))
+    wide = _as(_at_states(scene), (*scene._how[:3], "extended"))
     tolerance = REFERENCE[1]
     truth, looser = (_by(wide, times, q, v)(REFERENCE[0], rtol=r, atol=r)[0] for r in (tolerance, 100 * tolerance))
     own = trajectory_error(model, truth, looser)
@@ -169,8 +171,9 @@ def _arithmetic(scene: Any, forms: Any, refinements: Any, precisions: Any) -> li
     hows = [(shape, *way, precision) for shape in shapes for way in refined]
     hows += [(form, refine, residual, width) for width in widths]
     ways: list[Way] = []
+    plain = _at_states(scene)
     for how in dict.fromkeys(hows):
-        other = _as(scene, how)
+        other = _as(plain, how)
         ways.append((_way(other, "arithmetic"), other, FINE[0], _options(FINE[0], max(FINE[1] * epsilon(how[3]), REFERENCE[1]))))
     return ways
 
@@ -181,7 +184,25 @@ def _effects(scene: Any, without: Any) -> list[Way]:
     sets = [[name] for name in effects_on(scene)] if without is None else [_checked_set(scene, one) for one in _listed(without)]
     on = effects_on(scene)
     others = [(names, having_on(scene, set(on) - set(names))) for names in sets]
-    return [(_way(other, "effects", names), other, USUAL[0], _options(*USUAL)) for names, other in others]
+    return [(_way(other, "effects", names), other, _fitting(other), _options(USUAL[0], USUAL_TOLERANCE)) for names, other in others]
+
+
+def _fitting(scene: Any) -> str:
+    """The first of `USUAL` that fits; the first of all where none does, for what it says of that."""
+    for name in USUAL:
+        try:
+            _core.check_pairing(scene._calls(), name, False, False)
+        except _core.EvaluationError:
+            continue
+        return name
+    return USUAL[0]
+
+
+def _at_states(scene: Any) -> Any:
+    """The scene whose effects all act at states, with the same equations of motion: implicit ones are those that they come to."""
+    other = _as(scene, scene._how)
+    other._entries.update({name: (effect.at_states(scene.model), on) for name, (effect, on) in scene._entries.items()})
+    return other
 
 
 def _options(integrator: str, amount: float) -> dict[str, float]:

@@ -1,6 +1,10 @@
 """Checkpoints: runs that go on bit for bit, pickles and files, and what does not fit."""
 
+import copy
+import json
+import math
 import pickle
+import re
 
 import numpy as np
 import pytest
@@ -127,7 +131,68 @@ def test_what_does_not_fit(tmp_path):
     with pytest.raises(pc.EvaluationError, match=r"T=0\.01: the checkpoint is at 0\.0\d+ s already"):
         scene.resume(checkpoint, 0.01)
     (tmp_path / "other.json").write_text("{}")
-    with pytest.raises(pc.EvaluationError, match="other.json' holds no checkpoint .'format'.; `run.checkpoint"):
+    with pytest.raises(pc.EvaluationError, match="other.json' holds no checkpoint .its format is not 'pycraft.*`run.checkpoint"):
         scene.resume(tmp_path / "other.json", 1.0)
     with pytest.raises(FileNotFoundError):
         scene.resume(tmp_path / "none.json", 1.0)
+
+
+def changed(data, path, value):
+    """The data with one entry changed; `None` takes it away."""
+    data = copy.deepcopy(data)
+    *way, last = path
+    at = data
+    for key in way:
+        at = at[key]
+    if value is None:
+        del at[last]
+    else:
+        at[last] = value
+    return data
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "text"),
+    [
+        (("format",), "pycraft run 1", "its format is not 'pycraft checkpoint 1'"),
+        (("state",), None, "a checkpoint takes t, model, effects, precision, integrator, options, state"),
+        (("more",), 1, "a checkpoint takes t, model"),
+        (("model",), 3, "model is a name, not 3"),
+        (("effects",), "gravity", "effects is a list of names"),
+        (("options", "rtol"), None, "options takes rtol, atol, step, max_step, normalise, energy"),
+        (("options", "rtol"), "small", "rtol is a positive number or zero, not 'small'"),
+        (("options", "atol"), -1e-9, "atol is a positive number or zero, not -1e-09"),
+        (("options", "step"), math.nan, "step is a positive number or zero, not nan"),
+        (("options", "energy"), 1, "energy is true or false, not 1"),
+        (("state", "x"), None, "state takes t, x, size, origin, taken, signs, lengths"),
+        (("state", "x"), [[0.0], []], "x of the state is a list of lists of finite numbers"),
+        (("state", "x"), [[0.0], [math.inf]], "x of the state is a list of lists of finite numbers"),
+        (("state", "lengths"), 0, "lengths of the state is a list of lists of finite numbers"),
+        (("state", "size"), [], "size of the state is a list of finite numbers that are added up, not []"),
+        (("state", "size"), [-0.01], "size of the state is -0.01; a step is a positive number of seconds"),
+        (("state", "size"), [0.0], "size of the state is 0; a step"),
+        (("state", "origin"), [None], "origin of the state is a list of finite numbers"),
+        (("state", "taken"), -1, "taken of the state is a count of steps, not -1"),
+        (("state", "taken"), 2**70, "taken of the state is a count of steps"),
+        (("state", "signs"), [2], "signs of the state are -1, 0 or 1"),
+        (("state", "t"), [5.0], "t is "),
+        (("t",), 5.0, "t is 5.0, and that of the state"),
+        (("t",), True, "t is True"),
+    ],
+)
+def test_files_whose_numbers_make_no_sense(tmp_path, path, value, text):
+    scene, file = CASES["damped"](), tmp_path / "run.json"
+    scene.simulate(0.3).checkpoint().save(file)
+    file.write_text(json.dumps(changed(json.loads(file.read_text()), path, value)))
+    with pytest.raises(pc.EvaluationError, match=re.escape(f"{str(file)!r} holds no checkpoint (") + ".*" + re.escape(text)):
+        scene.resume(file, 1.0)
+
+
+def test_a_checkpoint_with_other_numbers_of_a_state(tmp_path):
+    scene, file = CASES["damped"](), tmp_path / "run.json"
+    scene.simulate(0.3).checkpoint().save(file)
+    data = json.loads(file.read_text())
+    data["state"]["x"].append([0.0])
+    file.write_text(json.dumps(data))
+    with pytest.raises(pc.ModelError, match=f"the checkpoint has {len(data['state']['x'])} numbers of a state; the scene"):
+        scene.resume(file, 1.0)

@@ -221,3 +221,20 @@ def test_picture():
     assert right.get_ylabel() == "error of the accelerations, relative" and left.get_yscale() == "log"
     empty = ComparisonTable("Nothing", [], {"own_error": 0.0, "noise": 0.0}).plot()
     assert "there are no rows" in empty[0].texts[0].get_text()
+
+
+def test_own_error_of_steps_of_one_size():
+    """At least the error of the run, and not much more: what leaving out a smaller thing makes is not resolved."""
+    scene = pc.Scene(pc.chain(3)).add(E.Gravity((0, -9.81, 0)), E.Damping(1e-7))
+    for integrator, step in (("rk4", 0.02), ("rkmk4", 0.02), ("semi-implicit-euler", 0.001), ("variational2", 0.005)):
+        table = scene.compare(T=0.3, integrator=integrator, step=step, seconds=0)
+        run = scene.simulate(0.3, integrator=integrator, step=step, t_eval=[0.0, 0.3])
+        true = np.sqrt(np.mean((run.q[-1] - scene.simulate(0.3, rtol=1e-12, t_eval=[0.0, 0.3]).q[-1]) ** 2))
+        assert true <= table.own_error < 50 * true
+        row = next(row for row in table if row["left out"] == ["damping"])
+        assert not row["resolved"] and table.cell("trajectory", row).startswith("<")
+
+
+def test_own_error_where_tolerances_may_not_be_looser():
+    scene = pc.Scene(pc.chain(2)).add(E.Gravity((0, -9.81, 0)))
+    assert 0 < scene.compare(T=0.3, rtol=1e-3, atol=1e-3, seconds=0).own_error < np.inf

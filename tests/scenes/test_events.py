@@ -129,6 +129,8 @@ def test_controllers_and_events():
         (lambda t, s: np.nan if t > 0.05 else 1.0, r"event 'lambda' is nan at t = 0\.\d+ s"),
         (3.0, "events: an event is a function .*, not 3.0"),
         ([3.0], "events: an event is a function"),
+        ([pc.Event(lambda t, s: 1.0, direction=[1])], r"events: direction=\[1\]; there are 0, 1, -1, 'both', 'rising' and 'falling'"),
+        ([pc.Event(lambda t, s: 1.0, direction=None)], "events: direction=None; there are 0, 1, -1, 'both', 'rising' and 'falling'"),
         ([pc.Event(lambda t, s: 1.0, direction=2)], "events: direction=2; there are 0, 1, -1, 'both', 'rising' and 'falling'"),
         ([pc.Event(lambda t, s: 1.0, name="a"), pc.Event(lambda t, s: 1.0, name="a")], "events: two are called 'a'"),
     ],

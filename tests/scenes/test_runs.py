@@ -1,6 +1,7 @@
 """What a run says: energies, momenta, frames, forces, statistics, progress, and what is left of one that ended early."""
 
 import os
+import pickle
 import signal
 import threading
 import time
@@ -189,3 +190,64 @@ def test_progress_is_shown_in_a_terminal(monkeypatch, capsys):
 def test_arguments_that_make_no_sense(options, text):
     with pytest.raises(ValueError, match=text):
         pc.mechanisms.pendulum().simulate(**{"T": 1.0, **options})
+
+
+# ---------------------------------------------------------------------- models that were edited since
+
+WHAT_FOLLOWS = {
+    "vdot": lambda run: run.vdot,
+    "forces": lambda run: run.forces,
+    "energy": lambda run: run.energy,
+    "balance": lambda run: run.balance,
+    "momentum": lambda run: run.momentum,
+    "centre of mass": lambda run: run.centre_of_mass,
+    "frame": lambda run: run.frame("lower"),
+    "at": lambda run: run.at(0.1),
+    "plot": lambda run: run.plot("energy"),
+    "table": lambda run: run.to_dataframe(),
+}
+EDITS = {
+    "mass": lambda model: setattr(next(iter(model.bodies.values())), "mass", 3.0),
+    "body": lambda model: model.add_body("more", next(iter(model.bodies)), "pin", mass=1.0),
+}
+
+
+@pytest.mark.parametrize("edit", EDITS)
+@pytest.mark.parametrize("what", WHAT_FOLLOWS)
+def test_of_a_model_that_was_edited_since_nothing_new_follows(what, edit):
+    scene = pc.mechanisms.double_pendulum()
+    run = scene.simulate(0.2)
+    q = run.q.copy()
+    EDITS[edit](scene.model)
+    with pytest.raises(pc.StaleOperatorError, match="'double pendulum' was edited since, and this motion is of the model as it was"):
+        WHAT_FOLLOWS[what](run)
+    assert np.array_equal(run.q, q) and len(run.t) == len(run.v) and "double pendulum" in repr(run)
+
+
+def test_what_was_computed_before_an_edit_stays_also_in_pickles():
+    scene = pc.mechanisms.double_pendulum()
+    run = scene.simulate(0.2)
+    energy, late = run.energy["kinetic"].copy(), scene.simulate(0.2)
+    scene.model.bodies["lower"].mass = 5.0
+    assert np.array_equal(run.energy["kinetic"], energy)
+    for copy in (pickle.loads(pickle.dumps(run)), pickle.loads(pickle.dumps(pickle.loads(pickle.dumps(run))))):
+        assert np.array_equal(copy.energy["kinetic"], energy)
+        with pytest.raises(pc.StaleOperatorError, match="was edited since"):
+            copy.momentum  # noqa: B018 - raises
+    with pytest.raises(pc.EvaluationError, match="no scene behind it"):
+        pickle.loads(pickle.dumps(late)).energy  # noqa: B018 - raises
+    fresh = pickle.loads(pickle.dumps(scene.simulate(0.2)))
+    assert np.isfinite(fresh.momentum["com"]).all()
+
+
+@pytest.mark.parametrize("model", [pc.Multibody("nothing"), pc.tree([-1, 0], ["weld", "weld"]), pc.chain(2)])
+def test_without_mass_there_is_no_momentum(model):
+    for body in model.bodies.values():
+        body.mass, body.inertia = 0.0, np.zeros((3, 3))
+    scene = pc.Scene(model).add(*([E.RotorInertia(1.0)] if model.nv else []))
+    run = scene.simulate(0.2, None, np.ones(model.nv) if model.nv else None)
+    assert set(run.momentum) == {"origin", "com"}
+    assert all(p.shape == (len(run.t), 6) and not p.any() for p in run.momentum.values())
+    assert run.to_xarray()["momentum"].shape == (2, len(run.t), 6)
+    with pytest.raises(pc.ModelError, match="has no mass, and no centre of it"):
+        run.centre_of_mass  # noqa: B018 - raises

@@ -168,3 +168,31 @@ def test_files_that_hold_no_run(tmp_path):
         pc.load_run("run.csv")
     with pytest.raises(FileNotFoundError, match="there is no file 'none.nc'"):
         pc.load_run("none.nc")
+
+
+@pytest.mark.parametrize("ending", [".nc", ".parquet"])
+def test_damaged_files_say_so(tmp_path, ending):
+    """Bytes cut off anywhere, or overwritten anywhere: the run, or an error that names the file."""
+    whole, file = tmp_path / f"run{ending}", tmp_path / f"damaged{ending}"
+    pc.mechanisms.double_pendulum().simulate(0.2).save(whole)
+    data, drawn = whole.read_bytes(), np.random.default_rng(3)
+    refused = 0
+    for i in range(120):
+        at = int(drawn.integers(len(data)))
+        file.write_bytes(data[:at] if i % 2 else data[:at] + bytes(drawn.integers(0, 256, 8, dtype=np.uint8)) + data[at + 8 :])
+        try:
+            pc.load_run(file)
+        except pc.EvaluationError as error:
+            assert f"{str(file)!r} holds no run" in str(error)
+            refused += 1
+    assert refused > 40
+
+
+def test_names_with_quotes_and_commas_are_columns_of_csv(tmp_path):
+    model = pc.Multibody("arm")
+    model.add_body('the "upper", arm', axis=(0, 1, 0), mass=1.0, com=(0, 0, 1))
+    pc.Scene(model).simulate(0.1, [0.2], [1.0]).save(tmp_path / "run.csv")
+    with (tmp_path / "run.csv").open(newline="") as file:
+        header, *rows = csv.reader(file)
+    names = [f"{what}.{model.coordinate_names[0]}" for what in ("q", "v", "vdot")]
+    assert '"' in names[0] and header[:4] == ["t", *names] and {len(row) for row in rows} == {len(header)}

@@ -124,3 +124,22 @@ def test_picture(table):
     assert legend[:3] == ["dopri5", "fehlberg78", "rkmk4"] and "extended" in legend and "Pareto front" in legend
     empty = SceneAccuracyTable("Nothing", [], {"reference_error": 0.0}).plot()
     assert "there are no rows" in empty.texts[0].get_text()
+
+
+def test_implicit_effects_are_what_they_come_to_in_small_steps():
+    """The reference has plain damping and springs: integrators that take them implicitly converge to it."""
+    model = pc.tree([-1, 0, 1], ["pin", "ball", "slider"], seed=2)
+    scene = pc.Scene(model).add(E.Gravity(), E.ImplicitDamping(0.5), E.ImplicitSpring(20.0, rest=0.1), E.Spring({"hinge1": 3.0}))
+    table = scene.accuracy(
+        T=0.3, integrators=["rosenbrock4", "semi-implicit-euler", "dopri5"], tolerances=[1e-4, 1e-9], steps=[1e-3, 1e-4], seconds=0
+    )
+    errors = {(row["integrator"], row["tolerance"] or row["step"]): row["error"] for row in table if row["varied"] == "integrator"}
+    assert errors["rosenbrock4", 1e-9] < 1e-9 and 5 < errors["semi-implicit-euler", 1e-3] / errors["semi-implicit-euler", 1e-4] < 20
+    refused = {row["integrator"] for row in table if row["refused"]}
+    assert refused == {"dopri5"}
+    without = [row for row in table if row["varied"] == "effects"]
+    assert [row["integrator"] for row in without] == ["rosenbrock4"] * 4 and all(row["error"] > 1e-4 for row in without)
+    alone = pc.Scene(model).add(E.Gravity(), E.ImplicitDamping(0.5)).accuracy(T=0.2, integrators="rosenbrock4", tolerances=1e-6, seconds=0)
+    assert {row["left out"][0]: row["integrator"] for row in alone if row["varied"] == "effects"} == {
+        "gravity": "rosenbrock4", "implicit_damping": "dopri5",
+    }  # fmt: skip

@@ -78,6 +78,8 @@ def test_a_dictionary_by_hinge(arm):
         ("no", "effect 'bad': its forces function is not an array of numbers"),
         (None, "effect 'bad': its forces function is not an array of numbers"),
         ([0, 1j, 0], "is complex"),
+        ({"hinge0": None}, "effect 'bad': its force on 'hinge0' is not an array of numbers"),
+        ({"hinge0": [1.0, 2.0]}, r"effect 'bad': its force on 'hinge0' takes 1 number, not 2"),
     ],
 )
 def test_what_is_no_forces(arm, given, text):

@@ -31,6 +31,10 @@ class Effect(Closed):
         """The effect as the core has it, for a model. ModelError for names that are not there and numbers that make no sense."""
         raise NotImplementedError(f"{type(self).__name__} says in made_for what it is in the core")
 
+    def at_states(self, model: _core.Multibody) -> Effect:  # noqa: ARG002 - subclasses need it
+        """What it comes to in small steps: itself, or for one that acts in steps the effect that acts at states."""
+        return self
+
     def __setattr__(self, name: str, value: Any) -> None:
         super().__setattr__(name, value)
         if not name.startswith("_"):

@@ -92,3 +92,6 @@ class ImplicitDamping(Effect):
     def made_for(self, model: _core.Multibody) -> _core.Effect:
         names, values = by_hinge(self.coefficient, self.hinges, model, "implicit_damping", "coefficient")
         return _core.implicit_damping_effect(model, names, values)
+
+    def at_states(self, model: _core.Multibody) -> Damping:  # noqa: ARG002 - as its base has it
+        return Damping(self.coefficient, self.hinges)

@@ -60,6 +60,12 @@ class ImplicitSpring(Effect):
         names, values = by_hinge(self.stiffness, self.hinges, model, "implicit_spring", "stiffness")
         return _core.implicit_spring_effect(model, names, values, numbers_of(self.rest, "implicit_spring: rest"))
 
+    def at_states(self, model: _core.Multibody) -> Spring:
+        names, values = by_hinge(self.stiffness, self.hinges, model, "implicit_spring", "stiffness")
+        if names is None:  # a plain spring would take the balls, too
+            names = [name for j, name in enumerate(model.coordinate_names) if _core.numbers_in_q(model, [j]) == 1]
+        return Spring(values[0] if len(values) == 1 else values, self.rest, names)
+
 
 @dataclass(repr=False, eq=False)
 class NodeSpring(Effect):

@@ -46,7 +46,13 @@ class _Forces:
             return given
         forces = np.zeros(self.model.nv)
         for name, each in given.items():
-            forces[_core.coordinates_named(self.model, [name], self.kind)] += each
+            those = _core.coordinates_named(self.model, [name], self.kind)
+            what = f"effect {self.kind!r}: its force on {name!r}"
+            numbers = _core.real_array(each, what)
+            if numbers.ndim > 1 or numbers.size not in (1, len(those)):
+                count = f"{len(those)} number{'s' * (len(those) > 1)}"
+                raise _core.ModelError(f"{what} takes {count}, not {numbers.size if numbers.ndim < 2 else numbers.shape}")
+            forces[those] += numbers
         return forces
 
 
