@@ -7,7 +7,7 @@ import fractions
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Binding', 'Dynamics', 'Effect', 'Error', 'EvaluationError', 'FunctionOfTime', 'GroupedOperators', 'HingeKind', 'Integration', 'Letter', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'RunRecord', 'Scalar', 'SceneCalls', 'SceneEffects', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'blockdiag', 'bushing_effect', 'check_pairing', 'checked_refinement', 'compiled_call', 'constant', 'constant_in_time', 'coordinates_named', 'coulomb_friction_effect', 'damping_effect', 'direct_call', 'direct_calls', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'gravity_effect', 'gravity_gradient_effect', 'harmonic', 'hermite_between', 'hinge_kinds', 'identity', 'implicit_damping_effect', 'implicit_spring_effect', 'instruction_set', 'instruction_sets', 'integrator_table', 'integrators', 'kernel_headers', 'kernel_tape', 'limits_effect', 'methods', 'motor_effect', 'node_damper_effect', 'node_spring_effect', 'numbers_in_q', 'operators_of', 'piecewise_polynomial', 'point_mass_gravity_effect', 'precisions', 'prepared_call', 'prescribed_effect', 'python_effect', 'python_function_of_time', 'quadratic_damping_effect', 'real_array', 'record_from', 'residual', 'rotor_inertia_effect', 'run_scene', 'scalar', 'scene_between', 'servo_effect', 'spring_effect', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_by_hand', 'time_compiled', 'time_dynamics', 'time_forward', 'time_method', 'time_packs', 'time_passes', 'time_scene', 'torque_source_effect', 'vector', 'wider', 'wrench_effect', 'zero']
+__all__: list[str] = ['Binding', 'Dynamics', 'Effect', 'Error', 'EvaluationError', 'FunctionOfTime', 'GroupedOperators', 'HingeKind', 'HybridDynamics', 'Integration', 'Letter', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'RunRecord', 'Scalar', 'SceneCalls', 'SceneEffects', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'blockdiag', 'bushing_effect', 'check_pairing', 'checked_refinement', 'compiled_call', 'constant', 'constant_in_time', 'coordinates_named', 'coulomb_friction_effect', 'damping_effect', 'direct_call', 'direct_calls', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'gravity_effect', 'gravity_gradient_effect', 'harmonic', 'hermite_between', 'hinge_kinds', 'identity', 'implicit_damping_effect', 'implicit_spring_effect', 'instruction_set', 'instruction_sets', 'integrator_table', 'integrators', 'kernel_headers', 'kernel_tape', 'limits_effect', 'methods', 'motor_effect', 'node_damper_effect', 'node_spring_effect', 'numbers_in_q', 'operators_of', 'piecewise_polynomial', 'point_mass_gravity_effect', 'precisions', 'prepared_call', 'prescribed_by', 'prescribed_effect', 'python_effect', 'python_function_of_time', 'quadratic_damping_effect', 'real_array', 'record_from', 'residual', 'rotor_inertia_effect', 'run_scene', 'scalar', 'scene_between', 'servo_effect', 'spring_effect', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_by_hand', 'time_compiled', 'time_dynamics', 'time_forward', 'time_hybrid', 'time_method', 'time_packs', 'time_passes', 'time_scene', 'torque_source_effect', 'vector', 'wider', 'wrench_effect', 'zero']
 
 class Error(Exception): ...
 class SpaceError(Error, TypeError): ...
@@ -885,6 +885,18 @@ class Dynamics:
         ...
     def refinement(self, q: typing.Any, v: typing.Any, tau: typing.Any, form: str, refine: typing.Any, residual: str, precision: str | int) -> tuple[numpy.typing.NDArray[numpy.float64], list[float], typing.Any]:
         ...
+class HybridDynamics:
+    def __call__(self, q: typing.Any, v: typing.Any, tau: typing.Any, vdot: typing.Any, form: str, refine: typing.Any, residual: str, precision: str | int, threads: typing.SupportsInt | typing.SupportsIndex) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+        ...
+    def __init__(self, model: Multibody, names: collections.abc.Sequence[str]) -> None:
+        ...
+    def __reduce__(self) -> tuple:
+        ...
+    @property
+    def prescribed(self) -> list[bool]:
+        """
+        Whether each coordinate is.
+        """
 class Sensitivities:
     def __init__(self, arg0: Multibody) -> None:
         ...
@@ -1122,6 +1134,8 @@ def _rotor_parameter(arg0: MultibodyOperators, arg1: typing.SupportsInt | typing
     ...
 def _scalar_from_parts(arg0: typing.SupportsInt | typing.SupportsIndex, arg1: float | fractions.Fraction, arg2: typing.Any, arg3: collections.abc.Sequence[Scalar]) -> Scalar:
     ...
+def _some_coordinates(base: SkoSource, kept: collections.abc.Sequence[bool]) -> SkoSource:
+    ...
 def _space_from_parts(arg0: tuple) -> Space:
     ...
 def _theorem_from_parts(arg0: str, arg1: str, arg2: typing.Any, arg3: typing.Any, arg4: typing.SupportsInt | typing.SupportsIndex, arg5: str, arg6: typing.SupportsInt | typing.SupportsIndex, arg7: bool, arg8: bool, arg9: str, arg10: str, arg11: str) -> Theorem:
@@ -1257,6 +1271,10 @@ def prepared_call(function: typing.Any, name: str, dynamics: typing.Any, batch: 
     """
     A direct call of one model with its options, as `prepare` gives it. made: the tuple of three results.
     """
+def prescribed_by(model: Multibody, names: collections.abc.Sequence[str]) -> list[bool]:
+    """
+    Whether each coordinate is prescribed, by names of hinges, coordinates or patterns; ModelError for one that is named twice.
+    """
 def prescribed_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, motion: FunctionOfTime) -> Effect:
     ...
 def python_effect(model: Multibody, kind: str, coordinates: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], forces: typing.Any, rates: typing.Any, states: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], sample: typing.Any, period: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
@@ -1316,6 +1334,10 @@ def time_dynamics(model: Multibody, call: str, q: typing.Annotated[numpy.typing.
 def time_forward(model: Multibody, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2, form: str = 'fast', refine: typing.Any = 0, residual: str = 'same', precision: str | int = 'double') -> dict:
     """
     Seconds per forward dynamics over a set of states in rotation: minimum, median, calls.
+    """
+def time_hybrid(model: Multibody, prescribed: collections.abc.Sequence[bool], q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2) -> dict:
+    """
+    Seconds per hybrid dynamics over a set of states in rotation: minimum, median, calls.
     """
 def time_method(model: Multibody, method: str, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], seconds: typing.SupportsFloat | typing.SupportsIndex = 0.2, precision: str | int = 'double') -> dict:
     """

@@ -7,6 +7,7 @@
 #include "bindings/bindings.h"
 #include "bindings/compiled_library.h"
 #include "dynamics/batch_dynamics.h"
+#include "dynamics/batch_hybrid_dynamics.h"
 #include "dynamics/batch_sensitivities.h"
 #include "dynamics/methods.h"
 #include "dynamics/sensitivities.h"
@@ -59,6 +60,25 @@ py::dict time_forward(const std::shared_ptr<Multibody>& model, const Array& q, c
     ReleasedGil release;
     t = time_calls([&] {
       w.forward_dynamics({"q", Q + size_t(k) * nq, nq}, {"v", V + size_t(k) * nv, nv}, {"tau", U + size_t(k) * nv, nv}, how, precision, out.data());
+      k = (k + 1) % K;
+    }, seconds);
+  }
+  return result(t);
+}
+
+// Hybrid dynamics with these coordinates prescribed, u their accelerations and the forces of the others.
+py::dict time_hybrid(const std::shared_ptr<Multibody>& model, const std::vector<bool>& prescribed, const Array& q, const Array& v, const Array& u, double seconds) {
+  const int K = states_of(q), nq = model->nq(), nv = model->nv();
+  const double *Q = q.data(), *V = v.data(), *U = u.data();
+  std::vector<double> accelerations(nv), forces(nv);
+  BatchHybridDynamics w(model, std::vector<char>(prescribed.begin(), prescribed.end()));
+  int k = 0;
+  Timing t;
+  {
+    ReleasedGil release;
+    t = time_calls([&] {
+      const double* of_state = U + size_t(k) * nv;
+      w.run({"q", Q + size_t(k) * nq, nq}, {"v", V + size_t(k) * nv, nv}, {"tau", of_state, nv}, {"vdot", of_state, nv}, {}, Precision::double_, accelerations.data(), forces.data());
       k = (k + 1) % K;
     }, seconds);
   }
@@ -257,6 +277,8 @@ void register_bench(py::module_& m) {
   m.def("time_forward", &time_forward, py::arg("model"), py::arg("q"), py::arg("v"), py::arg("u"), py::arg("seconds") = 0.2, py::arg("form") = Form::fast,
         py::arg("refine") = 0, py::arg("residual") = "same", py::arg("precision") = Precision::double_,
         "Seconds per forward dynamics over a set of states in rotation: minimum, median, calls.");
+  m.def("time_hybrid", &time_hybrid, py::arg("model"), py::arg("prescribed"), py::arg("q"), py::arg("v"), py::arg("u"), py::arg("seconds") = 0.2,
+        "Seconds per hybrid dynamics over a set of states in rotation: minimum, median, calls.");
   m.def("time_method", &time_method, py::arg("model"), py::arg("method"), py::arg("q"), py::arg("v"), py::arg("u"), py::arg("seconds") = 0.2,
         py::arg("precision") = Precision::double_, "Seconds per forward dynamics by a method of the mass matrix: minimum, median, calls.");
   m.def("time_scene", &time_scene, py::arg("scene"), py::arg("q"), py::arg("v"), py::arg("seconds") = 0.2, py::arg("works") = false,

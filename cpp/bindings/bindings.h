@@ -31,6 +31,7 @@ void register_scalars(py::module_& m);
 void register_plans(py::module_& m);
 void register_multibody(py::module_& m);
 void register_dynamics(py::module_& m);
+void register_hybrid_dynamics(py::module_& m);
 void register_direct_calls(py::module_& m);
 void register_compiled(py::module_& m);
 void register_calculus(py::module_& m);

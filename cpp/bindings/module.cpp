@@ -42,6 +42,7 @@ PYBIND11_MODULE(_core, m) {
   pycraft::register_calculus(m);
   pycraft::register_plans(m);
   pycraft::register_dynamics(m);
+  pycraft::register_hybrid_dynamics(m);
   pycraft::register_direct_calls(m);
   pycraft::register_compiled(m);
   pycraft::register_sensitivities(m);

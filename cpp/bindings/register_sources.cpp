@@ -160,7 +160,7 @@ void register_sources(py::module_& m) {
         const auto* derived = dynamic_cast<const DerivedOperators*>(&s);
         if (!derived) throw py::type_error("operators of '" + s.name() + "' cannot be pickled or copied; make them anew where they are wanted");
         derived->base()->check_current();
-        const auto* subset = dynamic_cast<const HingeSubset*>(derived);
+        const auto* subset = dynamic_cast<const SomeCoordinates*>(derived);
         return py::make_tuple(made, py::make_tuple(derived->base(), subset ? py::cast(subset->kept()) : py::object(py::str("world frame"))));
       })
       .def_property_readonly("name", &SkoSource::name)
@@ -209,16 +209,21 @@ void register_sources(py::module_& m) {
       .def_property_readonly("model", [](const GroupedOperators& s) { return s.base()->model(); });
   m.def("operators_of", &operators_of, py::arg("model"));
   m.def("_grouped", &grouped_operators, py::arg("base"), py::arg("groups"));
-  // how: "bodies in pairs", "world frame", ("groups", the bodies of each), or which hinges move
+  m.def("_some_coordinates", [](const std::shared_ptr<SkoSource>& base, const std::vector<bool>& kept) -> std::shared_ptr<SkoSource> {
+    const auto robot = std::dynamic_pointer_cast<MultibodyOperators>(base);
+    if (!robot) throw ModelError("coordinates of '" + base->name() + "' are not prescribed: it is no multibody model of its own");
+    return std::make_shared<SomeCoordinates>(robot, std::vector<char>(kept.begin(), kept.end()));
+  }, py::arg("base"), py::arg("kept"));
+  // how: "bodies in pairs", "world frame", ("groups", the bodies of each), or which coordinates move
   m.def("_derived_operators", [](const std::shared_ptr<SkoSource>& base, const py::object& how) -> std::shared_ptr<SkoSource> {
-    const std::string kind = py::isinstance<py::str>(how) ? how.cast<std::string>() : "hinges";
+    const std::string kind = py::isinstance<py::str>(how) ? how.cast<std::string>() : "coordinates";
     if (kind == "bodies in pairs") return std::make_shared<AggregatedTree>(base);
     const auto model = std::dynamic_pointer_cast<MultibodyOperators>(base);
     if (!model) throw EvaluationError("'" + base->name() + "' is no multibody model");
     if (kind == "world frame") return std::make_shared<WorldFrame>(model);
     if (py::isinstance<py::tuple>(how))
       return std::make_shared<GroupedOperators>(model, Grouping(model->structure(), model->name(), how.cast<py::tuple>()[1].cast<std::vector<std::vector<int>>>()));
-    return std::make_shared<HingeSubset>(model, how.cast<std::vector<char>>());
+    return std::make_shared<SomeCoordinates>(model, how.cast<std::vector<char>>());
   });
   py::class_<MatrixTree, SkoSource, std::shared_ptr<MatrixTree>>(m, "MatrixTree", "A tree whose blocks E, H, M, J are given as matrices of any size.")
       .def(py::init([](const std::vector<int>& parents, const std::vector<int>& sizes, const std::vector<int>& dof, std::vector<std::vector<double>> E,

@@ -43,7 +43,9 @@ struct LinkCall {
 template <class T>
 class LinkDynamics {
  public:
-  explicit LinkDynamics(const Multibody& model) : set_(kernels::instruction_set()), model_(kernels::LinkModel<T>::of(model)), nv_(model.nv()) {
+  // What is prescribed is for forward dynamics alone, in the form fast: u and results are forces and accelerations, there the other way round.
+  explicit LinkDynamics(const Multibody& model, const HingeTerms& terms = {})
+      : set_(kernels::instruction_set()), model_(kernels::LinkModel<T>::of(model, terms)), nv_(model.nv()) {
     for (int i = 0; i < 3; ++i) gravity_[i] = static_cast<T>(model.gravity()[i]);
   }
 

@@ -10,8 +10,11 @@ SkoStructure kept_structure(const SkoStructure& t, const std::vector<char>& kept
   SkoStructure s = t;
   s.coordinate_names.clear();
   s.offset.clear(), s.dof_offset.clear();
-  for (int k = 0; k < t.bodies(); ++k)
-    if (!kept[k]) s.dof[k] = 0;
+  for (int k = 0; k < t.bodies(); ++k) {
+    s.dof[k] = 0;
+    for (int j = t.dof_offset[k]; j < t.dof_offset[k + 1]; ++j)
+      if (kept[j]) s.coordinate_names.push_back(t.coordinate_names[j]), ++s.dof[k];
+  }
   s.finish();
   return s;
 }
@@ -35,12 +38,12 @@ std::shared_ptr<MultibodyOperators> mechanics_of(const std::shared_ptr<SkoSource
   return nullptr;
 }
 
-HingeSubset::HingeSubset(std::shared_ptr<MultibodyOperators> base, std::vector<char> kept)
-    : DerivedOperators(kept_structure(base->structure(), kept), base->name() + ", some hinges", base), kept_(std::move(kept)) {
+SomeCoordinates::SomeCoordinates(std::shared_ptr<MultibodyOperators> base, std::vector<char> kept)
+    : DerivedOperators(kept_structure(base->structure(), kept), base->name() + ", some coordinates", base), kept_(std::move(kept)) {
   share_bodies_with(*base_);
 }
 #define PYCRAFT_MAKE_VALUES(S) \
-  std::unique_ptr<SkoValues<S>> HingeSubset::make_values(S) const { return std::make_unique<SubsetValues<S>>(*this, base_->structure()); }
+  std::unique_ptr<SkoValues<S>> SomeCoordinates::make_values(S) const { return std::make_unique<SubsetValues<S>>(*this, base_->structure()); }
 PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_MAKE_VALUES)
 #undef PYCRAFT_MAKE_VALUES
 

@@ -1,6 +1,6 @@
 // Models derived from a multibody model that are SKO trees again, with operators of their own that combine with the model's:
 //
-//   a subset of hinges:  H_s keeps the rows of some hinges, the others are locked (hybrid dynamics: free and prescribed hinges)
+//   some coordinates:    H_s keeps their rows of H, the others are locked (hybrid dynamics: free and prescribed coordinates)
 //   the world frame:     X = blockdiag φ(0,k):  E' = parent matrix ⊗ 1,  H' = HX⁻¹,  M' = XMX*
 #pragma once
 
@@ -35,10 +35,10 @@ class DerivedOperators : public SkoSource {
 // The operators of the robot that these are derived from, or those themselves; null for a bare tree.
 std::shared_ptr<MultibodyOperators> mechanics_of(const std::shared_ptr<SkoSource>& source);
 
-// The hinges marked in `kept` move; the others are locked.
-class HingeSubset final : public DerivedOperators {
+// The coordinates marked in `kept` move; the others are locked.
+class SomeCoordinates final : public DerivedOperators {
  public:
-  HingeSubset(std::shared_ptr<MultibodyOperators> base, std::vector<char> kept);
+  SomeCoordinates(std::shared_ptr<MultibodyOperators> base, std::vector<char> kept);
   const std::vector<char>& kept() const { return kept_; }
   PYCRAFT_FOR_EACH_SCALAR_AND_RECORDED(PYCRAFT_OVERRIDE_MAKE_VALUES)
 

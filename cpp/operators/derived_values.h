@@ -39,7 +39,7 @@ class DerivedValues : public TreeValues<RigidBlocks<S>> {
 template <class S>
 class SubsetValues final : public DerivedValues<S> {
  public:
-  SubsetValues(const HingeSubset& source, const SkoStructure& whole) : DerivedValues<S>(source.structure(), whole, source.model()), kept_(source.kept()) {}
+  SubsetValues(const SomeCoordinates& source, const SkoStructure& whole) : DerivedValues<S>(source.structure(), whole, source.model()), kept_(source.kept()) {}
 
  protected:
   void derive(const RigidBlocks<S>& all) override {
@@ -47,13 +47,13 @@ class SubsetValues final : public DerivedValues<S> {
     b.pose = all.pose;
     b.inertia = all.inertia;
     b.inertia_factors = all.inertia_factors;
-    for (int k = 0; k < this->tree_.bodies(); ++k)
-      for (int j = 0; j < this->tree_.dof[k]; ++j) {
-        const int to = this->tree_.dof_offset[k] + j, from = this->whole_.dof_offset[k] + j;
-        b.H[to] = all.H[from];
-        b.J[to] = all.J[from];
-        b.aligned[to] = all.aligned[from];
-      }
+    size_t to = 0;
+    for (size_t from = 0; from < kept_.size(); ++from) {
+      if (!kept_[from]) continue;
+      b.H[to] = all.H[from];
+      b.J[to] = all.J[from];
+      b.aligned[to++] = all.aligned[from];
+    }
   }
 
  private:

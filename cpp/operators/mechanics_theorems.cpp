@@ -103,13 +103,14 @@ struct MechanicsTheorems : Statements {
 
   void hybrid_dynamics() {
     group = "Hybrid dynamics (every third hinge prescribed)";
-    const int n = robot->structure().bodies();
-    std::vector<char> free(n), prescribed(n);
-    for (int k = 0; k < n; ++k) {
-      prescribed[k] = k % 3 == 1;
-      free[k] = !prescribed[k];
-    }
-    const auto free_hinges = std::make_shared<HingeSubset>(robot, free), prescribed_hinges = std::make_shared<HingeSubset>(robot, prescribed);
+    const SkoStructure& tree = robot->structure();
+    std::vector<char> free(tree.coordinates()), prescribed(tree.coordinates());
+    for (int k = 0; k < tree.bodies(); ++k)
+      for (int j = tree.dof_offset[k]; j < tree.dof_offset[k + 1]; ++j) {
+        prescribed[j] = k % 3 == 1;
+        free[j] = !prescribed[j];
+      }
+    const auto free_hinges = std::make_shared<SomeCoordinates>(robot, free), prescribed_hinges = std::make_shared<SomeCoordinates>(robot, prescribed);
     const Letters F(free_hinges), Q(prescribed_hinges);
     const Expression qdd_f = make_vector("vdot_f", free_hinges->theta()), qdd_p = make_vector("vdot_p", prescribed_hinges->theta());
     const Expression a_p = a + Q.H.T() * qdd_p, alpha_h = phi.T() * (F.H.T() * qdd_f + a_p), f_h = phi * (M * alpha_h + b);

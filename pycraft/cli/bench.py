@@ -236,12 +236,14 @@ def accuracy(seconds: float = 0.2) -> list[Figure]:
 def run(seconds: float = 0.1) -> dict[str, list[Figure]]:
     """All figures, by heading."""
     from .bench_expressions import expressions
+    from .bench_hybrid import hybrid
     from .bench_scenes import scenes
 
     return {
         f"O(N): time per link at {LONG} links over {SHORT}": per_link(seconds),
         "Expressions": expressions(2 * seconds),
         "Direct calls": direct_calls(2 * seconds),
+        "Hybrid dynamics": hybrid(seconds),
         "Sensitivities": sensitivities(2 * seconds),
         "What accuracy costs": accuracy(2 * seconds),
         "Scenes": scenes(2 * seconds),

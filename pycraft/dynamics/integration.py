@@ -9,6 +9,7 @@ import numpy as np
 from .. import _core
 from ..state import at_state
 from .direct_calls import cached
+from .hybrid import HybridCalls
 from .integrator_names import IntegratorName, integrator_named
 from .sensitivities import SensitivityCalls
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from .trajectory import Trajectory
 
 
-class IntegrationCalls(SensitivityCalls):
+class IntegrationCalls(SensitivityCalls, HybridCalls):
     """q̇ of (q, v), and trajectories under constant generalized forces."""
 
     nq: int

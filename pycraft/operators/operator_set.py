@@ -5,16 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial, reduce
 from operator import mul
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from .. import _core
-from ..arguments import clipped
 from ..closed import Closed
+from .letters_with_arguments import NAMES, LetterWithArguments, listed_names
 
-_NAMES = {s.name: s for s in _core.symbols}
+if TYPE_CHECKING:
+    from .free_operators import FreeOperators
+
 _PLAIN = tuple(s.name for s in _core.symbols if s.takes == "nothing")
 _OF_GROUPS = ("phi_S", "H_S")
 _SPACES = ("Theta", "V", "F")
@@ -71,8 +73,8 @@ class OperatorSet(Closed):
             return self._made[name]
         if name in _SPACES:
             return getattr(self._source, name)
-        if name in _NAMES and name not in _PLAIN:
-            return _WithArguments(self, name)
+        if name in NAMES and name not in _PLAIN:
+            return LetterWithArguments(self, name)
         if name in _PLAIN or (name in _OF_GROUPS and self._source.groups is not None):
             if name not in self._made:
                 try:
@@ -81,22 +83,22 @@ class OperatorSet(Closed):
                     raise AttributeError(str(error)) from None
             return self._made[name]
         raise AttributeError(
-            f"no operator is called {name!r}; there are {', '.join((*_NAMES, *_COMPOSED))}, I, and the spaces Theta, V, F, NodesV, NodesF"
+            f"no operator is called {name!r}; there are {', '.join((*NAMES, *_COMPOSED))}, I, and the spaces Theta, V, F, NodesV, NodesF"
         )
 
     def __dir__(self) -> Iterable[str]:
-        return [*super().__dir__(), *_NAMES, "I", *_COMPOSED, *_SPACES]
+        return [*super().__dir__(), *NAMES, "I", *_COMPOSED, *_SPACES]
 
     def _ipython_key_completions_(self) -> list[str]:
-        return [*_NAMES, "I", *_COMPOSED]
+        return [*NAMES, "I", *_COMPOSED]
 
     def NodesV(self, names: str | Sequence[str]) -> _core.Space:
         """Stacked motions of these nodes, six numbers each."""
-        return self._source.nodes_space(_listed(names), True)
+        return self._source.nodes_space(listed_names(names), True)
 
     def NodesF(self, names: str | Sequence[str]) -> _core.Space:
         """Stacked forces on these nodes, six numbers each."""
-        return self._source.nodes_space(_listed(names), False)
+        return self._source.nodes_space(listed_names(names), False)
 
     def grouped(self, groups: Iterable[Iterable[str]]) -> OperatorSet:
         """The operators of the same robot with some connected sets of bodies taken as one node each, beside single bodies.
@@ -137,6 +139,50 @@ class OperatorSet(Closed):
         named = [_listed_bodies(group, self._source.name) for group in groups]
         return OperatorSet(_core._grouped(self._source, named), self._model)
 
+    def free(self, prescribed: Any) -> FreeOperators:
+        """The operators of the coordinates that are left free where others are prescribed: ``H_f``, ``D_f``, ``ψ_f``, ...
+
+        H keeps the rows of free coordinates, and every letter that H is in follows from that; φ and M are the same, on the same spaces V
+        and F, so that they combine with those of the model and of `prescribed`. Θ is the space of the free coordinates, in their order.
+
+        Parameters
+        ----------
+        prescribed : names of hinges, coordinates or patterns, or a list of them
+            As `Multibody.hybrid_dynamics` takes them.
+
+        Raises
+        ------
+        ModelError
+            A name that is not there, a coordinate that is prescribed twice; a model that is no multibody system.
+
+        Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, the chapter on prescribed motion; docs/hybrid_dynamics.md.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> arm = pc.chain(4)
+        >>> free = arm.soa.free(["hinge1"])
+        >>> free.H
+        <H : F (24) → Θ (3)>
+        >>> jacobian = free.generalized_Jacobian("body3")
+        >>> jacobian.shape  # from the prescribed coordinate to the motion of the tip, the free ones following
+        (6, 1)
+        """
+        from .free_operators import FreeOperators
+
+        return FreeOperators(self, self._held(prescribed))
+
+    def prescribed(self, prescribed: Any) -> OperatorSet:
+        """The operators of the prescribed coordinates, ``H_p`` and what it is in, the free ones locked; arguments and errors as `free`."""
+        return some_of(self, self._held(prescribed))
+
+    def _held(self, prescribed: Any) -> list[bool]:
+        if not isinstance(self._source, _core.MultibodyOperators):
+            raise _core.ModelError(f"coordinates of {self._source.name!r} are not prescribed: it is no multibody model of its own")
+        several = [prescribed] if isinstance(prescribed, str) or not isinstance(prescribed, Iterable) else list(prescribed)
+        names = listed_names([getattr(one, "name", one) for one in several])
+        return [bool(one) for one in _core.prescribed_by(self._source.model, names)]
+
     def check(self, **options: Any):
         """Check every theorem on this model, see `pycraft.identities.check_model`."""
         return _core._face["check_model"](self, **options)
@@ -152,6 +198,11 @@ class OperatorSet(Closed):
         return _operators_again, (self._source, self._model)
 
 
+def some_of(whole: OperatorSet, kept: Sequence[bool]) -> OperatorSet:
+    """The operators of the coordinates that are kept, the others locked."""
+    return OperatorSet(_core._some_coordinates(whole._source, list(kept)), whole._model)
+
+
 def _operators_again(source: _core.SkoSource, model: Any) -> OperatorSet:
     return model.soa if isinstance(source, _core.MultibodyOperators) and model is not None else OperatorSet(source, model)
 
@@ -163,69 +214,6 @@ def _listed_bodies(group: Any, model: str) -> list[str]:
     if not names or not all(isinstance(name, str) for name in names):
         raise _core.ModelError(f"groups of {model!r}: names of one body or more in each, not {names!r}")
     return names
-
-
-class _WithArguments:
-    """soa.B, soa.Jacobian, soa.Lambda, soa.Delta: operators that take node names or a coordinate."""
-
-    def __init__(self, operators: OperatorSet, name: str):
-        self._operators, self._name = operators, name
-        self.__doc__ = _NAMES[name].meaning
-
-    def __call__(self, argument: str | int | Sequence[str], directions: Any = None) -> _core.Operator:
-        """The operator of these nodes (or, of Delta, along this coordinate).
-
-        Lambda alone takes `directions`: the rows of C (k, 6 m), on the m nodes' motions stacked, angular first in each node's axes; for
-        one node also names among "rx", "ry", "rz", "x", "y", "z". Then it is (C B*ΩB C*)⁻¹: R^k → R^k, what resists motion along them
-        alone. It has a value where B*ΩB is singular, as for an arm of fewer than six hinges, if no motion along the directions is
-        impossible.
-        """
-        source = self._operators._source
-        if directions is not None:
-            if self._name != "Lambda":
-                raise _core.EvaluationError(f"{self._name} takes no directions; Lambda does")
-            return _directed_inertia(self._operators, _listed(argument), directions)  # type: ignore[arg-type]  # _listed checks
-        if _NAMES[self._name].takes == "nodes":
-            return source.symbol(self._name, nodes=_listed(argument))  # type: ignore[arg-type]  # _listed checks
-        if isinstance(argument, str):
-            names = source.coordinate_names
-            if argument not in names:
-                raise _core.ModelError(f"no coordinate of {source.name!r} is called {argument!r}; there are {', '.join(names[:12])}")
-            argument = names.index(argument)
-        return source.symbol(self._name, coordinate=clipped(argument, f"a coordinate of {source.name!r}"))
-
-    def __repr__(self) -> str:
-        return f"<{self._name}: {_NAMES[self._name].meaning}>"
-
-
-_TWIST = ("rx", "ry", "rz", "x", "y", "z")
-
-
-def _directed_inertia(soa: OperatorSet, nodes: list[str], directions: Any) -> _core.Operator:
-    """(C B*ΩB C*)⁻¹ for the rows C of directions, or their names."""
-    named = [directions] if isinstance(directions, str) else directions
-    if all(isinstance(d, str) for d in named):
-        if len(nodes) != 1 or not set(named) <= set(_TWIST) or len(set(named)) < len(named):
-            text = f"of one node, different ones of {', '.join(_TWIST)}; of several, rows (k, 6 m)"
-            raise _core.EvaluationError(f"directions {named!r}: {text}")
-        rows = np.eye(6)[[_TWIST.index(d) for d in named]]
-    else:
-        rows = np.atleast_2d(_core.real_array(directions, "directions"))
-    if rows.ndim != 2 or rows.shape[1] != 6 * len(nodes) or not len(rows):
-        raise _core.EvaluationError(f"directions of {len(nodes)} nodes: rows (k, {6 * len(nodes)}), not {np.shape(directions)}")
-    if np.linalg.matrix_rank(rows) < len(rows):
-        raise _core.EvaluationError(f"directions: the {len(rows)} rows are linearly dependent; leave out what the others say")
-    B = soa.B(nodes)
-    C = _core.constant(rows, B.domain.dual, len(rows), "C")
-    return (C @ B.T @ soa.Omega @ B @ C.T).inv()
-
-
-def _listed(names: str | Sequence[str]) -> list[str]:
-    listed = [names] if isinstance(names, str) else list(names) if isinstance(names, Iterable) else [names]
-    for name in listed:
-        if not isinstance(name, str):
-            raise _core.ModelError(f"nodes are called by their names, not by {name!r}")
-    return listed
 
 
 # ---------------------------------------------------------------------- what the core asks for

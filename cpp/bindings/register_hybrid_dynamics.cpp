@@ -1,0 +1,53 @@
+// Hybrid dynamics on arrays: which coordinates are prescribed is said once, by an object that is called.
+#include <string>
+#include <vector>
+
+#include "bindings/direct_calls.h"
+#include "dynamics/batch_hybrid_dynamics.h"
+#include "simulation/selection.h"
+
+namespace pycraft {
+
+namespace {
+
+// Per coordinate, of names of hinges or coordinates. ModelError for a name that is not there, and for what is named twice.
+std::vector<char> prescribed_by(const Multibody& model, const std::vector<std::string>& names) {
+  std::vector<char> prescribed(model.nv(), 0);
+  for (const std::string& name : names)
+    for (int j : coordinates_named(model, Names({name}), "prescribed")) {
+      if (prescribed[j]) throw ModelError("prescribed: coordinate '" + model.structure().coordinate_names[j] + "' is prescribed twice, the second time as '" + name + "'");
+      prescribed[j] = 1;
+    }
+  return prescribed;
+}
+
+}  // namespace
+
+void register_hybrid_dynamics(py::module_& m) {
+  m.def("prescribed_by", [](const Multibody& model, const std::vector<std::string>& names) {
+    const std::vector<char> prescribed = prescribed_by(model, names);
+    return std::vector<bool>(prescribed.begin(), prescribed.end());
+  }, py::arg("model"), py::arg("names"), "Whether each coordinate is prescribed, by names of hinges, coordinates or patterns; ModelError for one that is named twice.");
+  py::class_<BatchHybridDynamics> hybrid(m, "HybridDynamics");
+  unpicklable(hybrid)
+      .def(py::init([](std::shared_ptr<Multibody> model, const std::vector<std::string>& names) {
+        std::vector<char> prescribed = prescribed_by(*model, names);
+        return std::make_unique<BatchHybridDynamics>(std::move(model), std::move(prescribed));
+      }), py::arg("model"), py::arg("names"))
+      .def_property_readonly("prescribed", [](const BatchHybridDynamics& d) { return std::vector<bool>(d.prescribed().begin(), d.prescribed().end()); }, "Whether each coordinate is.")
+      .def("__call__", [](BatchHybridDynamics& d, const py::object& q, const py::object& v, const py::object& tau, const py::object& vdot, Form form, const py::object& refine,
+                          const std::string& residual, Precision precision, int threads) {
+        const Multibody& model = d.model();
+        Arguments given(model, {{"q", q}, {"v", v}, {"tau", tau}, {"vdot", vdot}});
+        const Solving how{form, refinement(refine, residual, precision), OnSingular::raise};
+        py::array_t<double> accelerations = output(py::none(), given.batch, {model.nv()}), forces = output(py::none(), given.batch, {model.nv()});
+        double *to_accelerations = accelerations.mutable_data(), *to_forces = forces.mutable_data();
+        {
+          const Undisturbed undisturbed(model);
+          d.run(given[0], given[1], given[2], given[3], how, precision, to_accelerations, to_forces, threads);
+        }
+        return py::make_tuple(accelerations, forces);
+      }, py::arg("q"), py::arg("v"), py::arg("tau"), py::arg("vdot"), py::arg("form"), py::arg("refine"), py::arg("residual"), py::arg("precision"), py::arg("threads"));
+}
+
+}  // namespace pycraft

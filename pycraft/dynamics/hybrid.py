@@ -1,0 +1,167 @@
+"""Hybrid dynamics: motion prescribed at some coordinates, forces given at the others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .. import _core
+from ..state import at_state
+from .threads import over_threads
+
+KEPT = 16
+"""Sets of prescribed hinges whose workspaces a model keeps: a set that is switched back to costs nothing."""
+
+
+class HybridMotion(NamedTuple):
+    """Accelerations and generalized forces of all coordinates, (nv,) or (B, nv) each."""
+
+    vdot: np.ndarray
+    tau: np.ndarray
+
+
+class HybridDerivatives(NamedTuple):
+    """Derivatives of what hybrid dynamics finds by what it is given, each (nv, nv) or (B, nv, nv), rows and columns by coordinate.
+
+    Columns by tau are zero at prescribed coordinates, and columns by vdot at free ones.
+
+    vdot_q, vdot_v, vdot_tau, vdot_vdot : of the accelerations; rows of prescribed coordinates are zero but for the unit ones of vdot_vdot
+    tau_q, tau_v, tau_tau, tau_vdot : of the forces; rows of free coordinates are zero but for the unit ones of tau_tau
+    """
+
+    vdot_q: np.ndarray
+    vdot_v: np.ndarray
+    vdot_tau: np.ndarray
+    vdot_vdot: np.ndarray
+    tau_q: np.ndarray
+    tau_v: np.ndarray
+    tau_tau: np.ndarray
+    tau_vdot: np.ndarray
+
+
+def prescribed_names(prescribed: Any) -> tuple[str, ...]:
+    """Names of hinges or coordinates, one or several, handles included."""
+    several = [prescribed] if isinstance(prescribed, str) or not isinstance(prescribed, Iterable) else list(prescribed)
+    names = tuple(getattr(one, "name", one) for one in several)
+    for name in names:
+        if not isinstance(name, str):
+            raise _core.ModelError(f"prescribed takes names of hinges or coordinates, or a list of them, not {name!r:.80}")
+    return names
+
+
+def hybrid_of(model: Any, prescribed: Any) -> _core.HybridDynamics:
+    """What computes with these prescribed, made at the first call and kept until the model is edited or others are."""
+    names = prescribed_names(prescribed)
+    kept = model.__dict__.setdefault("_hybrid", {})
+    key = (names, model._parameters)
+    if key not in kept:
+        made = _core.HybridDynamics(model, names)
+        while kept and (len(kept) >= KEPT or next(iter(kept))[1] != model._parameters):
+            del kept[next(iter(kept))]
+        kept[key] = made
+    return kept[key]
+
+
+class HybridCalls:
+    """Hybrid dynamics and its derivatives."""
+
+    nv: int
+    inverse_dynamics_derivatives: Callable[..., Any]
+
+    @over_threads
+    def hybrid_dynamics(
+        self, q=None, v=None, tau=None, vdot=None, prescribed: Any = (), *, form: str = "fast", refine: int | str = 0,
+        residual: str = "same", precision: str | int = "double", threads: int = 1,
+    ) -> HybridMotion:  # fmt: skip
+        """Accelerations where forces are given, forces where accelerations are: O(N).
+
+        ℳ(q) v̇ + 𝒞(q, v) = τ with v̇ given at the prescribed coordinates and τ at the free ones, gravity and rotor inertia included. Nothing
+        prescribed is `forward_dynamics`, and everything `inverse_dynamics`, bit for bit. Any set may follow any other from call to call.
+
+        Parameters
+        ----------
+        q, v : (nq,), (nv,), each with an optional leading batch axis; v of all coordinates, prescribed ones too
+        tau : (nv,), N m and N; what it has at prescribed coordinates does not matter, but is finite. Zero where left out.
+        vdot : (nv,), rad/s² and m/s²; what it has at free coordinates does not matter, but is finite. Zero where left out.
+        prescribed : names of hinges, coordinates or patterns, or a list of them
+            A subhinge of several coordinates (a ball) is prescribed whole.
+        form, refine, residual, precision : as in `forward_dynamics`, of the solution for the free coordinates
+
+        Returns
+        -------
+        HybridMotion : vdot and tau complete
+
+        Raises
+        ------
+        ModelError
+            A name that is not there, a coordinate that is prescribed twice, part of a ball or free subhinge.
+        SingularHingeError, RefinementError
+            As `forward_dynamics`, of free coordinates: one that feels no inertia may be prescribed.
+
+        Source: hybrid (prescribed motion) dynamics [Jain 2011]; as operators `arm.soa.free(...)` and `arm.soa.prescribed(...)`.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> arm = pc.chain(2)
+        >>> motion = arm.hybrid_dynamics([0, 0], [0, 0], tau=[1, 0], vdot=[0, 2], prescribed="hinge1")
+        >>> motion.vdot.round(3).tolist(), motion.tau.round(3).tolist()
+        ([-0.25, 2.0], [1.0, 0.458])
+        """
+        q, v = at_state(self, q, v)
+        tau, vdot = (np.zeros(self.nv) if x is None else x for x in (tau, vdot))
+        return HybridMotion(*hybrid_of(self, prescribed)(q, v, tau, vdot, form, refine, residual, precision, threads))
+
+    @over_threads
+    def hybrid_dynamics_derivatives(
+        self, q=None, v=None, tau=None, vdot=None, prescribed: Any = (), *, form: str = "fast", refine: int | str = 0,
+        residual: str = "same", precision: str = "double", threads: int = 1,
+    ) -> HybridDerivatives:  # fmt: skip
+        """Derivatives of `hybrid_dynamics`, whose arguments and errors these are.
+
+        With T_q and T_v the derivatives of inverse dynamics at the accelerations found, and rows and columns f free and p prescribed,
+
+            δv̇_f = ℳ_ff⁻¹ (δτ_f - T_q,f δq - T_v,f δv - ℳ_fp δv̇_p),   δτ_p = T_q,p δq + T_v,p δv + ℳ_pf δv̇_f + ℳ_pp δv̇_p
+
+        Along q they are along quasi-velocities, as everywhere. O(N · depth + nv³), the last by a Cholesky factor of ℳ_ff.
+        """
+        motion = self.hybrid_dynamics(
+            q, v, tau, vdot, prescribed, form=form, refine=refine, residual=residual, precision=precision, threads=threads
+        )
+        q, v = at_state(self, q, v)
+        T_q, T_v, mass = self.inverse_dynamics_derivatives(q, v, motion.vdot, precision=precision)
+        return _derivatives(T_q, T_v, mass, np.array(hybrid_of(self, prescribed).prescribed))
+
+
+def _derivatives(T_q: np.ndarray, T_v: np.ndarray, mass: np.ndarray, held: np.ndarray) -> HybridDerivatives:
+    f, p = np.flatnonzero(~held), np.flatnonzero(held)
+    shape = np.broadcast_shapes(T_q.shape, mass.shape)
+    found = {name: np.zeros(shape) for name in HybridDerivatives._fields}
+    rows, columns = (..., f[:, None], f), (..., f[:, None], p)
+    if len(f):
+        all_coordinates = np.arange(shape[-1])
+        sides = [T_q[..., f[:, None], all_coordinates], T_v[..., f[:, None], all_coordinates], mass[columns]]
+        unit = np.broadcast_to(-np.eye(len(f)), (*shape[:-2], len(f), len(f)))
+        try:
+            lower = np.linalg.cholesky(mass[rows])
+        except np.linalg.LinAlgError:
+            raise _core.SingularOperatorError(
+                "the mass matrix of the free coordinates is not positive definite to rounding, and its Cholesky factor does not exist"
+            ) from None
+        solved = -np.linalg.solve(np.swapaxes(lower, -1, -2), np.linalg.solve(lower, np.concatenate([*sides, unit], axis=-1)))
+        n = shape[-1]
+        found["vdot_q"][..., f, :] = solved[..., :n]
+        found["vdot_v"][..., f, :] = solved[..., n : 2 * n]
+        found["vdot_vdot"][columns] = solved[..., 2 * n : 2 * n + len(p)]
+        found["vdot_tau"][rows] = solved[..., 2 * n + len(p) :]
+        found["tau_tau"][..., f, f] = 1.0
+    if len(p):
+        pf = mass[..., p[:, None], f]
+        found["vdot_vdot"][..., p, p] = 1.0
+        found["tau_q"][..., p, :] = T_q[..., p, :] + pf @ found["vdot_q"][..., f, :]
+        found["tau_v"][..., p, :] = T_v[..., p, :] + pf @ found["vdot_v"][..., f, :]
+        found["tau_tau"][..., p[:, None], f] = pf @ found["vdot_tau"][rows]
+        found["tau_vdot"][..., p[:, None], p] = mass[..., p[:, None], p] + pf @ found["vdot_vdot"][columns]
+    return HybridDerivatives(**found)
