@@ -41,6 +41,7 @@ void register_integration(py::module_& m);
 void register_effects(py::module_& m);
 void register_scenes(py::module_& m);
 void register_runs(py::module_& m);
+void register_linearization(py::module_& m);
 void register_theorems(py::module_& m);
 void register_bench(py::module_& m);
 

@@ -51,6 +51,7 @@ PYBIND11_MODULE(_core, m) {
   pycraft::register_effects(m);
   pycraft::register_scenes(m);
   pycraft::register_runs(m);
+  pycraft::register_linearization(m);
   pycraft::register_theorems(m);
   pycraft::register_bench(m);
   pycraft::take_plain_products(m.attr("Operator"));  // last: what is defined on a type sets its slots anew

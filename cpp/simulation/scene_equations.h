@@ -31,6 +31,7 @@ class SceneEquations : public Kind<S> {
 
   CompiledScene<S>& scene() const { return scene_; }
   int works() const { return works_; }
+  int own() const { return own_; }  // states of the effects
   int integrals() const override { return works_; }
   static S unit_of_work() { return S(std::ldexp(1.0, 100)); }
 
@@ -75,9 +76,6 @@ class SceneEquations : public Kind<S> {
     scene_.effects().events(t, q_.data(), v_.data(), x.data() + nq() + nv(), out);
   }
   std::string name_of(int i) const override;
-
- protected:
-  int own() const { return own_; }
 
  private:
   CompiledScene<S>& scene_;

@@ -11,13 +11,14 @@ from ..state import at_state
 from .direct_calls import cached
 from .hybrid import HybridCalls
 from .integrator_names import IntegratorName, integrator_named
+from .linearization import LinearizationCalls
 from .sensitivities import SensitivityCalls
 
 if TYPE_CHECKING:
     from .trajectory import Trajectory
 
 
-class IntegrationCalls(SensitivityCalls, HybridCalls):
+class IntegrationCalls(SensitivityCalls, HybridCalls, LinearizationCalls):
     """q̇ of (q, v), and trajectories under constant generalized forces."""
 
     nq: int

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from ..linear.linear_model import LinearModel
     from .comparison import ComparisonTable
     from .cost import CostTable
     from .needed import NeededTable
@@ -140,3 +141,40 @@ class Measurements:
             self, T, q, v, integrators=integrators, tolerances=tolerances, steps=steps, forms=forms, refinements=refinements,
             precisions=precisions, without=without, seconds=seconds, progress=progress,
         )  # fmt: skip
+
+    def linearize(
+        self, q=None, v=None, t: Any = 0.0, *, states: Any = None, inputs: Any = None, outputs: Any = None, dt: float | None = None,
+        method: str = "zoh",
+    ) -> LinearModel:  # fmt: skip
+        """The linear model of the scene near a state, its effects included, or near each of a batch, as of a run (`run.q, run.v, run.t`).
+
+        States, inputs and outputs are as in `Multibody.linearize`, and the effects' own states follow the velocities ("state.0", ...).
+        Inputs are generalized forces beside those of the effects. Exact: effects written in C++ by derivatives of their own arithmetic;
+        those in Python by central differences, of which about ten digits are right. Time itself is held. What is prescribed stays as it is
+        told: its rows and columns are zero, and an input there moves nothing.
+
+        Parameters
+        ----------
+        q, v : (nq,), (nv,), each with an optional leading batch axis
+        t : s, one number or one for each state
+        states : (n,) or (B, n), of the effects' own; as they are at first where left out
+        inputs, outputs, dt, method : as in `Multibody.linearize`
+
+        Raises
+        ------
+        EvaluationError
+            A scene in another precision than double.
+        ModelError
+            Names that are not there, another number of states.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> scene = pc.mechanisms.pendulum().add(pc.effects.Damping(0.5))
+        >>> near = scene.linearize([1.5707963267948966])  # hanging
+        >>> near.A.round(4).tolist()
+        [[0.0, 1.0], [-9.81, -0.5]]
+        """
+        from .linearized import linearize
+
+        return linearize(self, q, v, t, states=states, inputs=inputs, outputs=outputs, dt=dt, method=method)

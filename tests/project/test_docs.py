@@ -44,7 +44,15 @@ def test_the_readme_example_runs():
 
 
 @pytest.mark.parametrize(
-    ("page", "examples"), [("sensitivities", 20), ("comparing", 5), ("mixed_trees", 8), ("ensembles", 8), ("hybrid_dynamics", 12)]
+    ("page", "examples"),
+    [
+        ("sensitivities", 20),
+        ("comparing", 5),
+        ("mixed_trees", 8),
+        ("ensembles", 8),
+        ("hybrid_dynamics", 12),
+        ("linearization", 18),
+    ],  # fmt: skip
 )
 def test_the_pages_run(page, examples):
     options = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS

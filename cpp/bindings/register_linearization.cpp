@@ -1,0 +1,59 @@
+// A scene linearized at a state, for Python.
+#include <cmath>
+#include <vector>
+
+#include "bindings/bindings.h"
+#include "model/checks.h"
+#include "simulation/scene_calls.h"
+#include "simulation/scene_linearized.h"
+
+namespace pycraft {
+
+namespace {
+
+py::array_t<double> matrix(const Eigen::MatrixXd& A) {
+  py::array_t<double> out(std::vector<py::ssize_t>{A.rows(), A.cols()});
+  for (Eigen::Index i = 0; i < A.rows(); ++i)
+    for (Eigen::Index j = 0; j < A.cols(); ++j) out.mutable_at(i, j) = A(i, j);
+  return out;
+}
+
+py::dict linearized(SceneCalls& calls, const Array& q, const Array& v, double t, const std::vector<double>& states) {
+  const Multibody& model = calls.scene().model();
+  if (calls.precision() != Precision::double_)
+    throw EvaluationError("a scene is linearized in double precision, and this one computes in '" + std::string(precision_name(calls.precision())) + "': take precision='double'");
+  if (!std::isfinite(t)) throw EvaluationError("t is " + short_number(t) + "; a time is a finite number of seconds");
+  model.check_q(q.data(), q.size());
+  model.check_v(v.data(), v.size(), "v");
+  Linearization at;
+  std::vector<double> rates;
+  {
+    const ModelInUse use(model);
+    calls.with([&]<class S>(CompiledScene<S>& scene) {
+      if constexpr (std::is_same_v<S, double>) {
+        SceneLinearized equations(scene, false);
+        if (!states.empty() && static_cast<int>(states.size()) != equations.own())
+          throw ModelError("the effects have " + std::to_string(equations.own()) + " states of their own, not " + std::to_string(states.size()));
+        const auto x = equations.initial(t, q.data(), v.data(), states.empty() ? nullptr : states.data());
+        const double *at_q = x.data(), *at_v = at_q + model.nq(), *rest = at_v + model.nv();
+        rates.resize(model.nv() + equations.own());
+        equations.evaluate(t, at_q, at_v, rest, rates.data(), rates.data() + model.nv());
+        equations.linearize(t, 1.0, at_q, at_v, rest, rates.data(), rates.data() + model.nv(), at);
+      }
+    });
+  }
+  py::dict out;
+  out["mass"] = matrix(at.mass), out["along_q"] = matrix(at.along_u), out["along_rest"] = matrix(at.along_z);
+  out["rates"] = py::array_t<double>(static_cast<py::ssize_t>(rates.size()), rates.data());
+  out["known"] = std::vector<bool>(at.known.begin(), at.known.end());
+  return out;
+}
+
+}  // namespace
+
+void register_linearization(py::module_& m) {
+  m.def("scene_linearized", &linearized, py::arg("calls"), py::arg("q"), py::arg("v"), py::arg("t"), py::arg("states"),
+        "At a state, of A ż = g with z = (v, effects' own states): A, the derivatives of g along displacements and along z, ż, and which coordinates are prescribed.");
+}
+
+}  // namespace pycraft

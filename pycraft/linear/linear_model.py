@@ -1,0 +1,169 @@
+"""A linear model with named states, inputs and outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from ..arguments import one_number
+
+METHODS = ("zoh", "foh", "bilinear", "euler", "backward_diff", "impulse")
+"""Ways to discretise, SciPy's."""
+
+
+@dataclass(frozen=True, eq=False)
+class LinearModel:
+    """δẋ = A δx + B δu, δy = C δx + D δu near a state of a model or scene; with `dt`, δx⁺ = A δx + B δu from step to step.
+
+    Of a batch of states all arrays have a leading axis, and an index gives the model at one of them.
+
+    Attributes
+    ----------
+    A, B, C, D : (n, n), (n, m), (p, n), (p, m)
+        The states are displacements along coordinates (on ball and free hinges in the axes that v has there), velocities, and what the
+        effects of a scene have of their own.
+    rate : (n,), ẋ at the state itself: zero at an equilibrium
+    states, inputs, outputs : names
+    units : of the states, by name
+    dt : s, None where time is continuous
+    model, q, v, t : where it was taken
+    """
+
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+    D: np.ndarray
+    rate: np.ndarray
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    units: dict[str, str]
+    model: Any = field(repr=False)
+    q: np.ndarray = field(repr=False)
+    v: np.ndarray = field(repr=False)
+    t: float = 0.0
+    dt: float | None = None
+
+    def __len__(self) -> int:
+        if self.A.ndim == 2:
+            raise TypeError("a linear model at one state has no length; its arrays are .A, .B, .C, .D")
+        return len(self.A)
+
+    def __getitem__(self, index: int) -> LinearModel:
+        if self.A.ndim == 2:
+            raise TypeError("a linear model at one state takes no index; its arrays are .A, .B, .C, .D")
+        q, v = (x if x.ndim == 1 else x[index] for x in (self.q, self.v))
+        return replace(self, A=self.A[index], B=self.B[index], C=self.C[index], D=self.D[index], rate=self.rate[index], q=q, v=v)
+
+    def __repr__(self) -> str:
+        many = "" if self.A.ndim == 2 else f"{len(self.A)} of "
+        time = "" if self.dt is None else f", step {self.dt:g} s"
+        n, m, p = len(self.states), len(self.inputs), len(self.outputs)
+        return f"<linear model: {many}{self.model.name!r}, {n} states, {m} inputs, {p} outputs{time}>"
+
+    # ------------------------------------------------------------------ parts of it
+    def place(self, names: Any, of: str = "states") -> list[int]:
+        """Where states, "inputs" or "outputs" of these names are. ModelError for one that is not there, with what there is."""
+        known = list(getattr(self, of))
+        wanted = [names] if isinstance(names, str) or not isinstance(names, Iterable) else list(names)
+        for name in wanted:
+            if name not in known:
+                raise _core.ModelError(f"{self.model.name!r} linearized has no {of[:-1]} {name!r}; there are {', '.join(known[:20])}")
+        return [known.index(name) for name in wanted]
+
+    def select(self, inputs: Any = None, outputs: Any = None) -> LinearModel:
+        """The same states with some of the inputs and outputs, in the order of their names; None: all."""
+        j = list(range(len(self.inputs))) if inputs is None else self.place(inputs, "inputs")
+        i = list(range(len(self.outputs))) if outputs is None else self.place(outputs, "outputs")
+        return replace(
+            self, B=self.B[..., j], C=self.C[..., i, :], D=self.D[..., i, :][..., j], inputs=tuple(self.inputs[k] for k in j),
+            outputs=tuple(self.outputs[k] for k in i),
+        )  # fmt: skip
+
+    def one(self, what: str) -> LinearModel:
+        """Itself; ModelError for a batch, whose members `what` takes one by one."""
+        if self.A.ndim != 2:
+            raise _core.ModelError(f"{what} is of one state; this is a batch of {len(self.A)}: take one by its index")
+        return self
+
+    # ------------------------------------------------------------------ in time
+    def discrete(self, dt: float, method: str = "zoh") -> LinearModel:
+        """From step to step of dt seconds: SciPy's `cont2discrete`.
+
+        Parameters
+        ----------
+        dt : s
+        method : {"zoh", "foh", "bilinear", "euler", "backward_diff", "impulse"}
+            "zoh", inputs held over a step, is exact for such inputs.
+
+        Raises
+        ------
+        EvaluationError
+            An unknown method, a step that is no positive number, a model that is discrete already.
+        """
+        from scipy.signal import cont2discrete
+
+        step = one_number(dt, "dt")
+        if not 0 < step < np.inf:
+            raise _core.EvaluationError(f"dt={step:g}: a step is a positive number of seconds")
+        if method not in METHODS:
+            raise _core.EvaluationError(f"method={method!r}: there are {', '.join(map(repr, METHODS))}")
+        if self.dt is not None:
+            raise _core.EvaluationError(f"this linear model is discrete already, with a step of {self.dt:g} s")
+        if self.A.ndim == 2:
+            A, B, C, D, _ = cont2discrete((self.A, self.B, self.C, self.D), step, method)
+        else:
+            members = [cont2discrete(parts, step, method)[:4] for parts in zip(self.A, self.B, self.C, self.D, strict=True)]
+            shapes = (self.A.shape, self.B.shape, self.C.shape, self.D.shape)
+            A, B, C, D = (np.reshape([member[i] for member in members], shape) for i, shape in enumerate(shapes))
+        return replace(self, A=A, B=B, C=C, D=D, dt=step)
+
+    # ------------------------------------------------------------------ what it says
+    def modes(self) -> Any:
+        """Its natural modes: `pycraft.linear.modes.Modes`, with frequencies, damping ratios and shapes."""
+        from .modes import modes_of
+
+        return modes_of(self.one("modes()"))
+
+    def controllability(self, tolerance: float | None = None) -> Any:
+        """What its inputs reach: `pycraft.linear.reach.Reach`, with the directions that they do not, by name."""
+        from .reach import controllability_of
+
+        return controllability_of(self.one("controllability()"), tolerance)
+
+    def observability(self, tolerance: float | None = None) -> Any:
+        """What its outputs show: `pycraft.linear.reach.Reach`, with the directions that they do not, by name."""
+        from .reach import observability_of
+
+        return observability_of(self.one("observability()"), tolerance)
+
+    # ------------------------------------------------------------------ ways out
+    def to_scipy(self) -> Any:
+        """`scipy.signal.StateSpace`."""
+        from scipy.signal import StateSpace
+
+        one = self.one("to_scipy()")
+        return StateSpace(one.A, one.B, one.C, one.D, **({} if one.dt is None else {"dt": one.dt}))
+
+    def to_control(self) -> Any:
+        """`control.StateSpace` with the names, "q_elbow" for "q.elbow". ImportError where python-control is missing (extra [control])."""
+        try:
+            import control
+        except ImportError:
+            raise ImportError("to_control() needs python-control: pip install 'pycraft-soa[control]'; to_scipy() needs nothing") from None
+        one = self.one("to_control()")
+        names = {of: [name.replace(".", "_") for name in getattr(one, of)] for of in ("states", "inputs", "outputs")}
+        return control.ss(one.A, one.B, one.C, one.D, 0 if one.dt is None else one.dt, **names)
+
+    def to_numpy(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """(A, B, C, D)."""
+        return self.A, self.B, self.C, self.D
+
+
+def names_of_states(coordinates: Sequence[str], own: int = 0) -> tuple[str, ...]:
+    """ "q.elbow", ..., "v.elbow", ..., "state.0", ..."""
+    return (*(f"q.{name}" for name in coordinates), *(f"v.{name}" for name in coordinates), *(f"state.{i}" for i in range(own)))

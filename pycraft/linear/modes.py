@@ -1,0 +1,99 @@
+"""Natural modes of a linear model: frequencies, damping, shapes, and their pictures."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+
+from .. import _core
+from ..tidy import TidyTable
+from .linear_model import LinearModel
+
+
+class Modes(TidyTable):
+    """The modes of a linear model, slowest first: one row each, of a conjugate pair one row.
+
+    Each row is a dictionary: "eigenvalue" (1/s; of a discrete model that of the continuous one that it samples), "frequency" (Hz, of the
+    oscillation itself, |Im λ|/2π), "natural" (Hz, |λ|/2π), "damping" (ratio, -Re λ/|λ|; None for λ = 0), "stable" (Re λ < 0; None where
+    that is zero to rounding), "moves" (the coordinates that take part most, by name).
+
+    Attributes
+    ----------
+    shapes : (n, modes) complex, eigenvectors, the largest displacement being one (of modes without displacements the largest state)
+    """
+
+    columns = ("eigenvalue", "frequency", "natural", "damping", "stable", "moves")
+    shown: ClassVar[dict[str, str]] = {
+        "eigenvalue": "eigenvalue (1/s)", "frequency": "frequency (Hz)", "natural": "natural (Hz)", "damping": "damping ratio",
+        "moves": "moves",
+    }  # fmt: skip
+
+    def __init__(self, title: str, rows: list[dict[str, Any]], shapes: np.ndarray, of: LinearModel):
+        super().__init__(title, rows, {"model": of.model.name})
+        self.shapes, self._of = shapes, of
+
+    def cell(self, key: str, row: dict[str, Any]) -> str:
+        if key == "eigenvalue":
+            value = row[key]
+            real = "0" if row["stable"] is None else f"{value.real:.4g}"
+            return real + (f" ± {abs(value.imag):.4g}i" if value.imag else "")
+        if key in ("frequency", "natural"):
+            return f"{row[key]:.4g}" if row[key] else ""
+        if key == "damping":
+            return "" if row[key] is None else "0" if row["stable"] is None else f"{row[key]:.3g}"
+        return ", ".join(row[key]) if key == "moves" else super().cell(key, row)
+
+    def plot(self, mode: int, amplitude: float = 0.3, phases: int = 5, ax: Any = None) -> Any:
+        """The stick figure swung along a mode's shape, Matplotlib's axes: from one end of the swing to the other, the middle drawn darkest.
+
+        Parameters
+        ----------
+        mode : which row
+        amplitude : rad or m, of the coordinate that moves most
+        phases : figures that are drawn, an odd number so that the state itself is among them
+        """
+        of, count = self._of, max(1, phases)
+        if not -len(self) <= mode < len(self):
+            raise _core.EvaluationError(f"mode {mode} is not there; there are {len(self)}")
+        n = len(of.v)
+        shape = self.shapes[:n, mode]
+        swing = np.real(shape * np.exp(-1j * np.angle(shape[np.abs(shape).argmax()]))) if n and np.abs(shape).max() > 0 else np.zeros(n)
+        for phase in sorted(np.linspace(-1, 1, count), key=abs, reverse=True):
+            q = of.model.integrate(of.q, amplitude * phase * swing)
+            ax = of.model.plot(q, ax, legend=False, shadow=False, alpha=1.0 - 0.75 * abs(phase))
+        row = self[mode]
+        ax.set_title(f"{of.model.name}, {row['natural']:.3g} Hz: {', '.join(row['moves'])}", fontsize="medium")
+        return ax
+
+
+def modes_of(of: LinearModel) -> Modes:
+    """The modes of one linear model."""
+    values, vectors = np.linalg.eig(of.A)
+    if of.dt is not None:
+        with np.errstate(divide="ignore"):
+            values = np.log(values.astype(complex)) / of.dt
+    kept = [i for i, value in enumerate(values) if value.imag >= 0]
+    kept.sort(key=lambda i: (abs(values[i]), values[i].real))
+    n = of.v.shape[-1]
+    rounding = 10 * len(values) * np.finfo(float).eps * (np.linalg.norm(of.A) if of.dt is None else 1 / of.dt)
+    rows, shapes = [], np.zeros((len(of.states), len(kept)), complex)
+    for column, i in enumerate(kept):
+        vector, value = vectors[:, i], complex(values[i])
+        displaced = np.abs(vector[:n])
+        lead = int(displaced.argmax()) if n and displaced.max() > 1e-9 * np.abs(vector).max() else int(np.abs(vector).argmax())
+        shapes[:, column] = vector / vector[lead]
+        size = np.abs(shapes[:n, column]) if lead < n else np.abs(shapes[:, column])
+        order = [int(k) for k in np.argsort(-size, kind="stable")[:3] if size[k] > 0.2]
+        names = [of.states[k].removeprefix("q.") if lead < n else of.states[k] for k in order]
+        rows.append(
+            {
+                "eigenvalue": value,
+                "frequency": abs(value.imag) / (2 * np.pi),
+                "natural": abs(value) / (2 * np.pi),
+                "damping": -value.real / abs(value) if value else None,
+                "stable": None if abs(value.real) <= rounding else value.real < 0,
+                "moves": names,
+            }  # fmt: skip
+        )
+    return Modes(f"Modes of {of.model.name}", rows, shapes, of)

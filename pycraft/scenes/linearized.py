@@ -1,0 +1,63 @@
+"""Scenes linearized near states and along runs: their effects included."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from ..arguments import one_number
+from ..dynamics.linearization import linear_model, listed
+from ..linear.linear_model import LinearModel, names_of_states
+from ..state import at_state
+
+
+def linearize(scene: Any, q: Any, v: Any, t: Any, *, states: Any, inputs: Any, outputs: Any, dt: float | None, method: str) -> LinearModel:
+    """`Scene.linearize`."""
+    model, calls = scene.model, scene._calls()
+    q, v = at_state(model, q, v)
+    q = np.asarray(getattr(q, "q", q), float)
+    v = np.zeros(model.nv) if v is None else np.asarray(getattr(v, "v", v), float)
+    chosen = list(range(model.nv)) if inputs is None else _core.coordinates_named(model, listed(inputs, "inputs"), "inputs")
+    names = tuple(f"tau.{model.coordinate_names[j]}" for j in chosen)
+    if q.ndim == v.ndim == 1:
+        made = _at(scene, calls, q, v, one_number(t, "t"), () if states is None else states, chosen, names, outputs)
+    else:
+        made = _along(scene, calls, q, v, t, states, chosen, names, outputs)
+    return made if dt is None else made.discrete(dt, method)
+
+
+def _along(
+    scene: Any, calls: Any, q: np.ndarray, v: np.ndarray, t: Any, states: Any, chosen: list[int], names: tuple[str, ...], outputs: Any
+) -> LinearModel:
+    count = len(q) if q.ndim == 2 else len(v)
+    q, v = (np.broadcast_to(x, (count, x.shape[-1])) for x in (q, v))
+    times = np.broadcast_to(np.asarray(t, float), (count,))
+    own = np.zeros((count, 0)) if states is None else np.broadcast_to(states, (count, np.shape(states)[-1]))
+    if not count:
+        raise _core.ModelError("a linear model along no states: q has no rows")
+    each = [_at(scene, calls, q[b], v[b], float(times[b]), own[b], chosen, names, outputs) for b in range(count)]
+    first = each[0]
+    stacked = [np.stack([getattr(one, name) for one in each]) for name in ("A", "B", "C", "D", "rate", "q", "v")]
+    A, B, C, D, rate, all_q, all_v = stacked
+    return LinearModel(A, B, C, D, rate, first.states, first.inputs, first.outputs, first.units, first.model, all_q, all_v, float(times[0]))
+
+
+def _at(
+    scene: Any, calls: Any, q: np.ndarray, v: np.ndarray, t: float, states: Any, chosen: list[int], names: tuple[str, ...], outputs: Any
+) -> LinearModel:
+    model = scene.model
+    found = _core.scene_linearized(calls, q, v, t, np.asarray(states, float).ravel().tolist())
+    nv, own = model.nv, len(found["rates"]) - model.nv
+    known = [j for j, held in enumerate(found["known"]) if held]
+    given = np.zeros((nv + own, len(chosen)))
+    for column, j in enumerate(chosen):
+        given[j, column] = 0.0 if j in known else 1.0
+    sides = np.hstack([found["along_q"], found["along_rest"], given])
+    solved = np.linalg.solve(found["mass"], sides) if nv + own else sides
+    along_q, along_rest, along_inputs = np.split(solved, [nv, 2 * nv + own], axis=1)
+    for one in (along_q, along_rest, along_inputs):
+        one[known] = 0.0
+    states_named = names_of_states(model.coordinate_names, own)
+    return linear_model(model, q, v, found["rates"], along_q, along_rest, along_inputs, names, outputs, states_named, t, known)
