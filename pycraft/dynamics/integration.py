@@ -13,12 +13,13 @@ from .hybrid import HybridCalls
 from .integrator_names import IntegratorName, integrator_named
 from .linearization import LinearizationCalls
 from .sensitivities import SensitivityCalls
+from .task_space import TaskSpaceCalls
 
 if TYPE_CHECKING:
     from .trajectory import Trajectory
 
 
-class IntegrationCalls(SensitivityCalls, HybridCalls, LinearizationCalls):
+class IntegrationCalls(SensitivityCalls, HybridCalls, LinearizationCalls, TaskSpaceCalls):
     """q̇ of (q, v), and trajectories under constant generalized forces."""
 
     nq: int

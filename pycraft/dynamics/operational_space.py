@@ -7,11 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from .. import _core
 from ..arguments import text
 from ..state import at_state
 from .by_realization import output
 from .direct_calls import DirectCalls
 from .prepared import direct
+from .task_space import TWIST, told
 from .threads import over_threads
 
 
@@ -29,7 +31,7 @@ class OperationalSpaceCalls(DirectCalls):
         over all bodies and one along the way from each frame to the base: O(N + m² depth). `soa.Lambda(frame)` is the same as an
         operator, and with directions= that of fewer directions.
 
-        SingularOperatorError where the frames cannot move in every direction, as of an arm of fewer than six hinges;
+        SingularOperatorError where the frames cannot move in every direction, as of an arm of fewer than six hinges, with those directions;
         SingularHingeError as in forward_dynamics; ModelError where no body or node has the name, or where it is fixed to the base.
 
         Examples
@@ -66,12 +68,23 @@ def _of_frames(model: Any, inverse: bool, frame: Any, q: Any, precision: str | i
     names = [text(name, "a frame") for name in names]
     result = model._calls().operational_space(inverse, names, q) if precision == "double" else None
     if result is None:
-        result = _operator(model.soa, inverse, names).at(q, precision=precision).dense()
+        try:
+            result = _operator(model.soa, inverse, names).at(q, precision=precision).dense()
+        except _core.SingularOperatorError as error:
+            raise _core.SingularOperatorError(f"{error}{_what_does_not_move(model, names, q)}") from None
     if out is None:
         return result
     out = output(out, result.shape)
     out[...] = result
     return out
+
+
+def _what_does_not_move(model: Any, names: list[str], q: Any) -> str:
+    """Of one state, in words; nothing of a batch, whose error names no direction."""
+    q = np.asarray(getattr(q, "q", q), float)
+    if q.ndim != 1 or not (lost := model.task_space(dict.fromkeys(names, TWIST), q).lost):
+        return ""
+    return f". There is no motion along {told(lost)} (task_space(...).lost)"
 
 
 def _operator(soa: Any, inverse: bool, names: list[str]) -> Any:

@@ -1,0 +1,202 @@
+"""Task space: dense computations in quad precision, what cannot move by name, forward and inverse dynamics, poses near singular ones."""
+
+import re
+
+import numpy as np
+import pytest
+
+import pycraft as pc
+from support.differences import difference
+from support.kernel_cases import MODELS
+from support.mechanisms import every_kind
+from support.oracle import ROUNDING, agree
+
+NAMES = ["panda", "tree of ball", "tree of free", "tree of screw", "every kind"]
+REDUNDANT = ["panda", "tree of free"]
+
+
+def model_of(name):
+    return every_kind() if name == "every kind" else MODELS[name]
+
+
+def ends(model):
+    """A body at the end of the longest way, and one near the root."""
+    bodies = list(model.bodies)
+    return bodies[-1], bodies[len(bodies) // 2]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_against_dense_computations(name):
+    model = model_of(name)
+    state, (tip, middle) = model.random_state(3), ends(model)
+    rng = np.random.default_rng(1)
+    tau = rng.uniform(-1, 1, model.nv)
+    J = np.vstack([model.jacobian(tip, state.q)[3:], model.jacobian(middle, state.q)[[0, 5]]])
+    rate = np.vstack([model.jacobian_dot(tip, state.q, state.v)[3:], model.jacobian_dot(middle, state.q, state.v)[[0, 5]]])
+    task = model.task_space({tip: ["x", "y", "z"], middle: ["rx", "z"]}, state.q, state.v)
+    assert task.names == (*(f"{tip}.{axis}" for axis in "xyz"), f"{middle}.rx", f"{middle}.z")
+    M = model.mass_matrix(state.q)
+    compliance = J @ np.linalg.solve(M, J.T)
+    condition = np.linalg.cond(M)
+    agree(task.jacobian, J)
+    agree(task.velocity, J @ state.v)
+    agree(task.compliance, compliance, ROUNDING * condition)
+    vdot = model.forward_dynamics(state.q, state.v, tau)
+    agree(task.bias(tau), J @ vdot + rate @ state.v, ROUNDING * condition)
+    if np.linalg.matrix_rank(J) < 5:
+        assert task.rank == np.linalg.matrix_rank(J) and len(task.lost) == 5 - task.rank
+        return
+    assert task.rank == 5 and task.lost == []
+    condition *= np.linalg.cond(compliance)
+    agree(task.inertia, np.linalg.inv(compliance), ROUNDING * condition)
+    agree(task.dynamically_consistent_inverse, np.linalg.solve(M, J.T) @ np.linalg.inv(compliance), ROUNDING * condition)
+    agree(J @ task.null_space, np.zeros((5, model.nv)), ROUNDING * condition)
+    agree(task.null_space @ task.null_space, task.null_space, ROUNDING * condition)
+    agree(task.null_space.T @ M @ task.dynamically_consistent_inverse, np.zeros((model.nv, 5)), ROUNDING * condition)
+    # forces on the nodes, as hinge forces do them
+    F, wanted = rng.uniform(-1, 1, (2, 5))
+    pushed = model.forward_dynamics(state.q, state.v, tau + J.T @ F)
+    agree(task.acceleration(F, tau), J @ pushed + rate @ state.v, ROUNDING * condition)
+    agree(task.acceleration(task.force(wanted, tau), tau), wanted, ROUNDING * condition)
+    moved = model.forward_dynamics(state.q, state.v, task.torques(wanted, tau))
+    agree(J @ moved + rate @ state.v, wanted, ROUNDING * condition)
+
+
+@pytest.mark.parametrize("name", REDUNDANT)
+def test_whole_frames_are_the_direct_call(name):
+    model = model_of(name)
+    state, (tip, _) = model.random_state(5), ends(model)
+    task, inertia = model.task_space(tip, state.q), model.operational_space_inertia(tip, state.q)
+    agree(task.inertia, inertia, ROUNDING * np.linalg.cond(inertia))
+    agree(task.compliance, model.operational_space_compliance(tip, state.q), ROUNDING * np.linalg.cond(model.mass_matrix(state.q)))
+
+
+@pytest.mark.parametrize("name", REDUNDANT)
+def test_forces_of_the_null_space_accelerate_no_task(name):
+    model = model_of(name)
+    state, (tip, _) = model.random_state(4), ends(model)
+    task = model.task_space({tip: ["x", "y"]}, state.q, state.v)
+    idle = np.random.default_rng(2).uniform(-1, 1, model.nv)
+    agree(task.bias(task.null_space.T @ idle), task.bias(), ROUNDING * np.linalg.cond(model.mass_matrix(state.q)))
+    agree(task.torques(np.zeros(2), idle) - task.torques(np.zeros(2)), task.null_space.T @ idle, 1e-9)
+
+
+def test_batches_are_their_states():
+    model = MODELS["panda"]
+    states = [model.random_state(seed) for seed in range(4)]
+    Q, V = (np.array([getattr(s, x) for s in states]) for x in "qv")
+    task = model.task_space("panda_link7", Q, V)
+    wanted = np.random.default_rng(0).uniform(-1, 1, (4, 6))
+    for b, state in enumerate(states):
+        one = model.task_space("panda_link7", state.q, state.v)
+        for what in ("jacobian", "velocity", "compliance", "inertia", "dynamically_consistent_inverse", "null_space"):
+            agree(getattr(task, what)[b], getattr(one, what), 1e-9)
+        agree(task.torques(wanted)[b], one.torques(wanted[b]), 1e-9)
+    assert task.rank.tolist() == [6] * 4 and task.lost == [[]] * 4
+    empty = model.task_space("panda_link7", Q[:0], V[:0])
+    assert empty.inertia.shape == (0, 6, 6) and empty.rank.shape == (0,)
+    Q[2] = 0.0
+    Q[2, 3] = 0.0  # stretched
+    with pytest.raises(pc.SingularOperatorError, match="at state 2 of a batch of 4"):
+        model.task_space("panda_link7", Q, V).inertia  # noqa: B018 - raises
+
+
+def test_the_jacobian_rate_is_that_of_the_velocity():
+    model = MODELS["tree of ball"]
+    state, (tip, _) = model.random_state(2), ends(model)
+    vdot = np.random.default_rng(3).uniform(-1, 1, model.nv)
+    tau = model.inverse_dynamics(state.q, state.v, vdot)
+
+    def velocity(h):
+        q = model.integrate(state.q, h * state.v + h * h / 2 * vdot)
+        return model.task_space({tip: ["x", "ry"]}, q, state.v + h * vdot).velocity
+
+    agree(model.task_space({tip: ["x", "ry"]}, state.q, state.v).bias(tau), difference(velocity), 1e-6)  # of a motion to second order
+
+
+# What cannot move -----------------------------------------------------------------------------------------------------
+
+
+def test_what_cannot_move_is_named():
+    arm = pc.chain(2)
+    tip = arm.task_space({"body1": ["rz", "x", "y"]}, [0.0, 0.0])
+    assert tip.rank == 2 and tip.lost == [{"body1.x": 1.0}]
+    bent = arm.task_space({"body1": ["rz", "x", "y"]}, [0.0, 0.3])
+    assert bent.rank == 2 and len(bent.lost) == 1 and "body1.x" in bent.lost[0]
+    shares = np.array([bent.lost[0].get(name, 0.0) for name in bent.names])
+    agree(shares @ bent.jacobian, np.zeros(2))
+    for call in (lambda: tip.inertia, lambda: tip.force([0, 0, 0])):
+        with pytest.raises(pc.SingularOperatorError, match=r"of body1.rz, body1.x, body1.y no motion along body1.x$"):
+            call()
+    assert arm.task_space({"body1": ["rz", "y"]}, [0.0, 0.0]).inertia.shape == (2, 2)
+    with pytest.raises(pc.SingularOperatorError, match="There is no motion along body1.rx; body1.ry; body1.x; body1.z"):
+        arm.operational_space_inertia("body1", [0.0, 0.0])
+
+
+def test_torques_along_what_moves():
+    arm = pc.chain(2)
+    tip = arm.task_space({"body1": ["rz", "x", "y"]}, [0.0, 0.0], [0.0, 0.0])
+    vdot = arm.forward_dynamics([0, 0], [0, 0], tip.torques([1.0, 0.0, 2.0]))
+    agree(tip.jacobian @ vdot, [1.0, 0.0, 2.0])
+    with pytest.raises(pc.SingularOperatorError, match="an acceleration with parts along what cannot move"):
+        tip.torques([1.0, 0.5, 2.0])
+
+
+@pytest.mark.parametrize("power", [2, 4, 6])
+def test_near_a_singular_pose_few_digits_are_lost(power):
+    """A two-link arm at an elbow angle of 10⁻ᵖ: Λ along the arm is 10²ᵖ, and is found to about 10ᵖ roundings; by inverting Λ⁻¹ to 10²ᵖ."""
+    arm, q = pc.chain(2), [0.2, 10.0**-power]
+    arm.add_node("tip", "body1", position=(1, 0, 0))
+    found = arm.task_space({"tip": ["x", "y"]}, q).inertia
+    J = arm.soa.Jacobian("tip").at(q, precision="quad").dense(dtype=object)[[3, 4]]
+    M = arm.soa.MM.at(q, precision="quad").dense(dtype=object)
+    inverse = lambda A: np.array([[A[1, 1], -A[0, 1]], [-A[1, 0], A[0, 0]]], dtype=object) / (A[0, 0] * A[1, 1] - A[0, 1] * A[1, 0])
+    exact = inverse(J @ inverse(M) @ J.T).astype(float)
+    assert np.abs(found - exact).max() < 100 * np.finfo(float).eps * 10.0**power * np.abs(exact).max()
+    assert arm.task_space({"tip": ["x", "y"]}, q).rank == 2
+
+
+# Derivatives of the operators -----------------------------------------------------------------------------------------
+
+
+def test_derivatives_of_the_operators():
+    """∂𝒥 and ∂Λ by the tangent rule, against differences."""
+    model = MODELS["panda"]
+    state = model.random_state(6)
+    for operator in (model.soa.Jacobian("panda_link7"), model.soa.Lambda("panda_link7")):
+        for i in (0, 3):
+            moved = lambda h, i=i, of=operator: of.at(model.integrate(state.q, h * np.eye(7)[i])).dense()
+            found = operator.diff(i).at(state.q).dense()
+            agree(found, difference(moved), 1e-8 * max(1.0, np.abs(found).max()))
+
+
+@pytest.mark.parametrize(
+    ("frames", "text"),
+    [
+        ("hand", "is called 'hand'"),
+        ([], "a task space of no frames"),
+        (["body1", "body1"], "frame 'body1' is named twice"),
+        ({"body1": ["x", "w"]}, "directions of 'body1': different ones of rx, ry, rz, x, y, z, or rows (k, 6); not ['x', 'w']"),
+        ({"body1": ["x", "x"]}, "directions of 'body1': different ones"),
+        ({"body1": []}, "directions of 'body1': different ones"),
+        ({"body1": [[1, 0, 0]]}, "directions of 'body1': rows (k, 6), not (1, 3)"),
+        ({"body1": np.ones((2, 6))}, "the 2 rows are linearly dependent"),
+        ([3], "a frame"),
+    ],
+)
+def test_refusals(frames, text):
+    with pytest.raises(pc.Error, match=re.escape(text)):
+        pc.chain(2).task_space(frames, [0.0, 0.0])
+
+
+def test_refusals_of_vectors():
+    task = pc.chain(2).task_space({"body1": ["rz", "y"]}, [0.0, 0.3])
+    with pytest.raises(pc.ModelError, match=r"force takes 2 numbers, of body1.rz, body1.y; it has shape \(3,\)"):
+        task.acceleration([1, 2, 3])
+    massless = pc.chain(2)
+    for body in massless.bodies.values():
+        body.mass, body.inertia = 0.0, np.zeros((3, 3))
+    massless.take_warnings()
+    with pytest.raises(pc.SingularOperatorError, match="not positive definite to rounding"):
+        massless.task_space("body1", [0.0, 0.0]).compliance  # noqa: B018 - raises
+    assert "task space of 'chain of 2 rods': body1.rz, body1.y" in repr(task)
