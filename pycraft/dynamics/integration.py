@@ -13,13 +13,14 @@ from .hybrid import HybridCalls
 from .integrator_names import IntegratorName, integrator_named
 from .linearization import LinearizationCalls
 from .sensitivities import SensitivityCalls
+from .statistical import StatisticalCalls
 from .task_space import TaskSpaceCalls
 
 if TYPE_CHECKING:
     from .trajectory import Trajectory
 
 
-class IntegrationCalls(SensitivityCalls, HybridCalls, LinearizationCalls, TaskSpaceCalls):
+class IntegrationCalls(SensitivityCalls, HybridCalls, LinearizationCalls, StatisticalCalls, TaskSpaceCalls):
     """q̇ of (q, v), and trajectories under constant generalized forces."""
 
     nq: int

@@ -1,0 +1,101 @@
+"""Statistical dynamics: velocities in equilibrium, and the Fixman potential that undoes what constraints do to configurations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from ..arguments import LARGEST, clipped, one_number
+from ..state import at_state
+
+
+def energy_of(temperature: Any, boltzmann: Any) -> float:
+    """kT, J. EvaluationError for what is negative or not finite."""
+    numbers = one_number(temperature, "temperature"), one_number(boltzmann, "boltzmann")
+    for name, x in zip(("temperature", "boltzmann"), numbers, strict=True):
+        if not 0 <= x < np.inf:
+            raise _core.EvaluationError(f"{name}={x:g}: it is a finite number, not negative")
+    return numbers[0] * numbers[1]
+
+
+class StatisticalCalls:
+    """Velocities drawn in thermal equilibrium, the Fixman potential and its torque."""
+
+    nv: int
+    log_determinant_gradient: Callable[..., Any]
+
+    def equipartition(
+        self, q=None, temperature: float = 1.0, *, count: int | None = None, rng: Any = None, boltzmann: float = 1.0,
+        precision: str = "double",
+    ) -> np.ndarray:  # fmt: skip
+        """Velocities drawn from exp(-KE/kT), rotor inertia included: θ̇ = √(kT) [I - HψK]* D^(-*/2) n, n unit normal. O(N) a draw.
+
+        D^½ is the factor whose product with its transpose D is.
+
+        Each body has its share, and each of the innovations D^½[I + HφK]*θ̇ the energy ½kT; covariances are kT (ℳ + J)⁻¹.
+
+        Parameters
+        ----------
+        q : (nq,), or (B, nq) for a draw at each of them
+        temperature : in units of energy over `boltzmann`
+        count : how many draws at one state, (count, nv); None: one, (nv,)
+        rng : numpy Generator or a seed; a fresh one where left out
+        boltzmann : k, J/K; 1 where temperatures are energies
+
+        Raises
+        ------
+        SingularHingeError
+            A hinge that feels no inertia.
+        EvaluationError
+            A temperature that is negative or not finite.
+
+        Source: innovations factorization of ℳ⁻¹ [Jain 2011]; A. Jain, I.-H. Park, N. Vaidehi, Equipartition principle for internal
+        coordinate molecular dynamics, J. Chem. Theory Comput. 8 (2012).
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> arm = pc.chain(3)
+        >>> v = arm.equipartition([0.1, 0.2, 0.3], 2.0, count=4000, rng=1)
+        >>> round(float(arm.kinetic_energy([0.1, 0.2, 0.3], v).mean()), 1)  # three times ½ kT
+        3.0
+        """
+        model: Any = self
+        size = np.sqrt(energy_of(temperature, boltzmann))
+        draws = np.random.default_rng(rng)
+        q = at_state(model, q)[0]
+        q = np.asarray(getattr(q, "q", q), float)
+        H, K, psi, D, I = model.soa("H K psi D I")
+        factor = (I - H @ psi @ K).T @ D.sqrt().inv().T
+        if q.ndim == 2:
+            if count is not None:
+                raise _core.EvaluationError("count is of one state; a batch of states has a draw at each")
+            n = draws.standard_normal((len(q), self.nv))
+            return size * np.asarray(factor.at(q, precision=precision) @ n).reshape(len(q), self.nv)
+        many = 1 if count is None else clipped(count, "count")
+        if not 0 <= many <= LARGEST:
+            raise _core.EvaluationError(f"count={count!r}: how many draws, up to {LARGEST}")
+        n = draws.standard_normal((self.nv, many))
+        found = size * np.asarray(factor.at(q, precision=precision) @ n).reshape(self.nv, many).T
+        return found[0] if count is None else found
+
+    def fixman_potential(self, q=None, temperature: float = 1.0, *, boltzmann: float = 1.0, precision: str = "double") -> Any:
+        """½ kT ln det(ℳ + J), J, up to a constant: a number or (B,). O(N).
+
+        A system whose bonds are constraints has configurations with the density √det ℳ exp(-U/kT) in its coordinates, one whose bonds are
+        stiff springs exp(-U/kT). With this potential added to U the constrained one has that density, too.
+
+        Source: M. Fixman, Classical statistical mechanics of constraints, Proc. Nat. Acad. Sci. USA 71 (1974).
+        """
+        model: Any = self
+        soa, kT = model.soa, energy_of(temperature, boltzmann)
+        q = at_state(model, q)[0]
+        value = 0.5 * kT * np.asarray(soa.D.logdet().at(getattr(q, "q", q), precision=precision), float)  # that of ℳ + J
+        return float(value) if value.ndim == 0 else value
+
+    def fixman_torque(self, q=None, temperature: float = 1.0, *, boltzmann: float = 1.0, precision: str = "double") -> np.ndarray:
+        """-∂/∂θ of `fixman_potential`, (nv,) or (B, nv), N m and N: -½ kT ∂ln det(ℳ + J). O(N)."""
+        return -0.5 * energy_of(temperature, boltzmann) * self.log_determinant_gradient(q, precision=precision)
