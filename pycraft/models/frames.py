@@ -354,7 +354,7 @@ class Frames(Closed, Mapping):
     def _description(self) -> list[dict[str, Any]]:
         """The loose frames as plain data, each after what it stands on."""
         waiting = {
-            name: {"name": name, "on": self._core.on(name), "placement": self._core.placement(name), "motion": self._motions.get(name)}
+            name: {"name": name, "on": self._core.carrier(name), "placement": self._core.placement(name), "motion": self._motions.get(name)}
             for name in self._core.loose_names()
         }
         ordered: list[dict[str, Any]] = []
