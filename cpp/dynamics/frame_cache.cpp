@@ -76,7 +76,7 @@ FrameCache::Counts FrameCache::counts() const {
   return counts_;
 }
 
-void FrameCache::look() {
+std::shared_ptr<const StateData> FrameCache::look() {
   const Multibody& model = frames_->model();
   if (mutex_.abandoned()) {
     leave_behind(steps_, pairs_);
@@ -90,8 +90,9 @@ void FrameCache::look() {
     parameters_ = model_->parameters;
     other = true;
   }
-  if (auto state = model.state(); state != state_) {
-    state_ = std::move(state);
+  std::shared_ptr<const StateData> state = model.state();
+  if (seen_.owner_before(state) || state.owner_before(seen_)) {
+    seen_ = state;
     other = true;
   }
   if (seen_edits_ != frames_->edits()) {
@@ -100,13 +101,14 @@ void FrameCache::look() {
   }
   own_state_changed_ = false;
   if (other) ++now_;
+  return state;
 }
 
 // ------------------------------------------------------------------ steps
 
-const FrameCache::Step& FrameCache::hinge(int body, MotionPart part) {
+const FrameCache::Step& FrameCache::hinge(int body, MotionPart part, const StateData& state) {
   Step& s = steps_[body];
-  const double *q = state_->q.data() + model_->q_offset[body], *v = state_->v.data() + model_->v_offset[body];
+  const double *q = state.q.data() + model_->q_offset[body], *v = state.v.data() + model_->v_offset[body];
   if (s.looked_at != now_) {
     if (s.parts > 0 && !same(s.q, q)) s.parts = 0;
     if (s.parts > 1 && !same(s.v, v)) s.parts = 1;
@@ -117,7 +119,7 @@ const FrameCache::Step& FrameCache::hinge(int body, MotionPart part) {
   for (; s.parts <= index(part); ++s.parts) {
     if (s.parts == 0) {
       s.q.assign(q, q + (body + 1 < model_->bodies ? model_->q_offset[body + 1] : model_->nq) - model_->q_offset[body]);
-      hinge_pose(*model_, body, state_->q.data(), s.motion, s.hinge);
+      hinge_pose(*model_, body, state.q.data(), s.motion, s.hinge);
     } else if (s.parts == 1) {
       s.v.assign(v, v + model_->nv_of[body]);
       hinge_velocity(*model_, body, v, s.motion, s.hinge);
@@ -190,14 +192,14 @@ RelativeMotion<double> FrameCache::motion(FrameNumber frame, FrameNumber other, 
       ++counts_.steps[0];
     }
   std::lock_guard<Mutex> lock(mutex_);
-  look();
+  const auto state = look();
   if (pairs_.size() >= most_pairs) pairs_.clear();
   Pair& pair = pairs_[key(frame, other)];
   bool changed = pair.parts <= index(part);
   const auto see = [&](const FrameStep& step) {
     if (step.edited > pair.edits) changed = true;
     if (step.kind == FrameStep::Kind::fixed) return;
-    const Step& s = current(step, part);
+    const Step& s = step.kind == FrameStep::Kind::hinge ? hinge(step.number, part, *state) : moved(step, part);
     for (int i = 0; i <= index(part); ++i) changed |= s.changed[i] > pair.made;
   };
   for (const FrameStep& step : path.up) see(step);

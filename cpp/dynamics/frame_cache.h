@@ -62,19 +62,18 @@ class FrameCache {
     int parts = 0;
     RelativeMotion<double> motion;
   };
-  void look();                                      // at the state: whether it is another one since
+  std::shared_ptr<const StateData> look();          // the present state; whether it is another one since
   bool kept(FrameNumber frame, FrameNumber other, MotionPart part, RelativeMotion<double>& out) const;
-  const Step& hinge(int body, MotionPart part);
+  const Step& hinge(int body, MotionPart part, const StateData& state);
   const Step& moved(const FrameStep& step, MotionPart part);
   bool has_motion(const FrameStep& step);
-  const Step& current(const FrameStep& step, MotionPart part) { return step.kind == FrameStep::Kind::hinge ? hinge(step.number, part) : moved(step, part); }
   void carry_accelerations();
   void name_hinges();
 
   std::shared_ptr<FrameTree> frames_;
   mutable Mutex mutex_;
   std::shared_ptr<const CompiledModel<double>> model_;
-  std::shared_ptr<const StateData> state_;
+  std::weak_ptr<const StateData> seen_;             // the state that was looked at, which is not kept from going
   std::uint64_t parameters_ = 0, now_ = 0, seen_edits_ = 0;
   double time_ = 0;
   bool own_state_changed_ = true;                   // time or accelerations

@@ -1,6 +1,7 @@
 #include "dynamics/frame_calls.h"
 
 #include <algorithm>
+#include <type_traits>
 
 #include "runtime/errors.h"
 
@@ -13,8 +14,16 @@ using enum FrameStep::Kind;
 // The states' numbers in the workspace's scalar: q, and v and vdot where they are given.
 template <class S>
 void read(FrameWorkspace<S>& w, Givens given, int b) {
-  std::vector<S>* const to[] = {&w.q, &w.v, &w.vdot};
-  for (size_t i = 0; i < given.size(); ++i) to[i]->assign(given[i].at(b), given[i].at(b) + given[i].width);
+  const S** const to[] = {&w.q, &w.v, &w.vdot};
+  for (size_t i = 0; i < given.size(); ++i) {
+    const double* const from = given[i].at(b);
+    if constexpr (std::is_same_v<S, double>) {
+      *to[i] = from;
+    } else {
+      w.numbers[i].assign(from, from + given[i].width);
+      *to[i] = w.numbers[i].data();
+    }
+  }
 }
 
 // The motion of one step in a state that was read, with the rows of a hinge in `hinge`.
@@ -26,9 +35,9 @@ RelativeMotion<S> step_motion(FrameWorkspace<S>& w, const FrameTree& frames, con
   const CompiledModel<S>& model = *w.model;
   const int at = model.v_offset[step.number];
   RelativeMotion<S> m;
-  hinge_pose(model, step.number, w.q.data(), m, hinge);
-  if (part >= MotionPart::velocity) hinge_velocity(model, step.number, w.v.data() + at, m, hinge);
-  if (part == MotionPart::acceleration) hinge_acceleration(w.v.data() + at, w.vdot.data() + at, m, hinge);
+  hinge_pose(model, step.number, w.q, m, hinge);
+  if (part >= MotionPart::velocity) hinge_velocity(model, step.number, w.v + at, m, hinge);
+  if (part == MotionPart::acceleration) hinge_acceleration(w.v + at, w.vdot + at, m, hinge);
   return m;
 }
 

@@ -17,7 +17,8 @@ struct FrameWorkspace {
   explicit FrameWorkspace(const Multibody& model) : model(model.compiled<S>()) {}
   std::shared_ptr<const CompiledModel<S>> model;
   HingeRows<S> hinge;
-  std::vector<S> q, v, vdot;
+  const S *q = nullptr, *v = nullptr, *vdot = nullptr;
+  std::vector<S> numbers[3];                          // where the doubles that are given are converted to
 };
 template <>
 inline constexpr bool available_at<FrameWorkspace, Digits50> = false;
