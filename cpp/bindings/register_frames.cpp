@@ -158,7 +158,7 @@ py::array_t<double> motion_at(Frames& f, const FrameQuestion& asked, MotionPart 
 
 void register_frames(py::module_& m) {
   const py::arg frame("frame"), other("other"), axes("axes"), third("third"), q("q"), v("v"), t("t"), precision("precision");
-  py::class_<Frames> frames(m, "FrameTree", "The frames of a model, by name, and their motions relative to each other: pycraft.models.frames is its face.");
+  py::class_<Frames> frames(m, "FrameTree", "The frames of a model, by name, and their motions relative to each other: pycraft.models.frame_tree is its face.");
   unpicklable(frames)
       .def(py::init<std::shared_ptr<Multibody>>())
       .def("add", [](Frames& f, const std::string& name, const std::string& on, const py::object& rotation, const py::object& position, const py::object& motion) {

@@ -236,6 +236,7 @@ def accuracy(seconds: float = 0.2) -> list[Figure]:
 def run(seconds: float = 0.1) -> dict[str, list[Figure]]:
     """All figures, by heading."""
     from .bench_expressions import expressions
+    from .bench_frames import frames
     from .bench_scenes import scenes
 
     return {
@@ -244,5 +245,6 @@ def run(seconds: float = 0.1) -> dict[str, list[Figure]]:
         "Direct calls": direct_calls(2 * seconds),
         "Sensitivities": sensitivities(2 * seconds),
         "What accuracy costs": accuracy(2 * seconds),
+        "Frames": frames(2 * seconds),
         "Scenes": scenes(2 * seconds),
     }

@@ -15,8 +15,8 @@ from ..arguments import whole
 def coordinate_numbers(model: Any, given: Any) -> list[int] | None:
     """The numbers of the coordinates that are named, in their order; None, for all, where nothing is given.
 
-    Each is the name of a hinge (all its coordinates), a handle of one, the name of a coordinate, or a number. ModelError for one that is not
-    there, with the nearest name, or named twice.
+    Each is the name of a hinge (all its coordinates), a handle of one, the name of a coordinate, or a number. ModelError for one that is
+    not there, with the nearest name, or named twice.
     """
     if given is None:
         return None

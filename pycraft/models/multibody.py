@@ -269,7 +269,7 @@ class Multibody(Closed, IntegrationCalls, Pictures, WithFrames):
 
     # ------------------------------------------------------------------ copies
     def description(self) -> dict[str, Any]:
-        """The whole model as plain data: bodies with hinges, nodes, gravity, state (see `pycraft.reference` for the schema), loose frames."""
+        """The whole model as plain data: bodies, hinges, nodes, gravity, state (see `pycraft.reference` for the schema), loose frames."""
         return describe(self)
 
     @classmethod

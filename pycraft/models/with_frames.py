@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from .frames import Frame, Frames, Motion
+from .frame_tree import Frame, Frames, Motion
 from .handles import Vector
 from .with_operators import WithOperators
 
@@ -25,9 +25,10 @@ class WithFrames(WithOperators):
         return self._kept_frames
 
     def frame(self, name: Any = None) -> Frame:
-        """A frame by its name: of a body, a node, a loose frame, or the base, which None is, and "base" and "world" where nothing else is so called.
+        """A frame by its name: of a body, a node, a loose frame, or the base.
 
-        ModelError where none is called so, with the nearest name. Nothing is computed before it is asked for.
+        The base is None, and "base" and "world" where nothing else is so called. Nothing is computed before it is asked for. ModelError
+        where no frame is called so, with the nearest name.
 
         Examples
         --------
@@ -61,9 +62,9 @@ class WithFrames(WithOperators):
         position, rotation, or placement : (3,), (3, 3), (4, 4)
             Its pose on that frame, as for `add_body`.
         motion : function of time
-            In place of a pose: t (s) → the pose (4, 4), or (pose, twist), or (pose, twist, acceleration); the twist (ω; v) in the frame's own axes
-            about its origin, (X⁻¹Ẋ)^∨, the acceleration its rate. Velocities need the second, accelerations the third: no difference is taken in
-            their place. It is called when a question's way goes over the frame, once for each time, and what it returns is checked.
+            In place of a pose: t (s) → the pose (4, 4), or (pose, twist), or (pose, twist, acceleration); the twist (ω; v) in the frame's
+            own axes about its origin, (X⁻¹Ẋ)^∨, the acceleration its rate. Velocities need the second, accelerations the third: no difference
+            is taken in their place. It is called when a question goes over the frame, once a time, and what it gives is checked.
 
         Raises
         ------

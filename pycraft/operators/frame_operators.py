@@ -1,14 +1,16 @@
 """Jacobians of one frame relative to another as expressions of the letters 𝒥, B, X = φ(0,k), φ, H and of constants.
 
-A frame is given by the body k that it is fixed on, None for the base, and its pose there. With W(k) = B(k)* X⁻* φ*H*, the motion of body k in the
-world's axes about the world's origin, and T(k) = B(k)* X* 1(k), which brings such a motion to the body's own (6 × 6), the velocity of a frame a
-relative to a frame b is, in the axes of a body, L = Ad(X_ka⁻¹) a constant,
+A frame is given by the body k that it is fixed on, None for the base, and its pose there. With W(k) = B(k)* X⁻* φ*H*, the motion of body
+k in the world's axes about the world's origin, and T(k) = B(k)* X* 1(k), which brings such a motion to the body's own (6 × 6), the Jacobian
+of a frame a relative to a frame b is, L_a = Ad(X_ka⁻¹) a constant,
 
     body     L_a (𝒥(k_a) - T(k_a) W(k_b))
     world    L_b T(k_b) (W(k_a) - W(k_b))
-    aligned  with ρ(k) the blocks of T(k) on its diagonal, the rotation alone: R_b* ρ(k_b) ρ(k_a)* R_a of the first one; so in a third frame's axes
+    aligned  R_b* ρ(k_b) ρ(k_a)* R_a of the first one, ρ(k) the blocks of T(k) on its diagonal: the rotation alone; and so in the axes of a
+             third frame
 
-What is fixed on the base has neither W nor T. Source: A. Jain, Robot and Multibody Dynamics, Springer 2011 (node Jacobians; φ between any frames).
+What is fixed on the base has neither W nor T. Source: A. Jain, Robot and Multibody Dynamics, Springer 2011 (node Jacobians; φ between any
+frames).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Frames against differences of poses in 60 digits (tests/support/frame_oracle.py), on every kind of hinge, branches and welds.
 
-Tolerance: a way of up to eight hinges, each about a hundred roundings of numbers of the result's own size (poses within metres, rates near 1):
-2000 eps of the largest entry, beside 1.
+Tolerance: a way of up to eight hinges, each about a hundred roundings of numbers of the result's own size (poses within metres, rates near
+1): 2000 eps of the largest entry, beside 1.
 """
 
 import mpmath
@@ -47,8 +47,8 @@ def with_loose_frames(model, t=0.3):
     exact = lambda t: rotation_about_z(t, mpmath)[0]
     shift = np.eye(4)
     shift[:3, 3] = (0.1, 0, 0.2)
-    moved = {"swing": (last, exact), "fixed": ("swing", lambda t: X), "upon": ("fixed", exact), "wall": ("base", lambda t: X), "beside": (first, lambda t: shift)}
-    return moved
+    moved = {"swing": (last, exact), "fixed": ("swing", lambda t: X), "upon": ("fixed", exact), "wall": ("base", lambda t: X)}
+    return moved | {"beside": (first, lambda t: shift)}
 
 
 def state_of(model, seed=0):
@@ -57,7 +57,15 @@ def state_of(model, seed=0):
     return state.q, state.v, np.random.default_rng(seed).uniform(-1, 1, model.nv)
 
 
-PAIRS = [("upon", "wall"), ("upon", "swing"), ("base", "upon"), ("beside", "upon"), ("upon", "beside"), ("wall", "base"), ("fixed", "fixed")]
+PAIRS = [
+    ("upon", "wall"),
+    ("upon", "swing"),
+    ("base", "upon"),
+    ("beside", "upon"),
+    ("upon", "beside"),
+    ("wall", "base"),
+    ("fixed", "fixed"),
+]
 
 
 @pytest.mark.parametrize("seed", [0, 1])
@@ -121,7 +129,7 @@ def test_jacobians_and_their_rates(kind, shape):
 
 
 def test_velocities_are_jacobians_times_v_and_accelerations_their_rates():
-    """Without moved frames: V = Jv, and d/dt of it, Jv̇ + J̇v, is the spatial acceleration in body and world axes, the classical one in aligned."""
+    """Without moved frames V = Jv, and Jv̇ + J̇v is the spatial acceleration in body and world axes, the classical one in aligned."""
     model = every_kind(seed=3)
     q, v, vdot = state_of(model, 3)
     names = [*model.bodies, *model.nodes]
@@ -201,7 +209,8 @@ def test_batches_have_the_bits_of_single_states():
         assert np.array_equal(many["jacobian"][i], frame.jacobian(one, wrt=b, axes="world", t=t[i]))
         assert np.array_equal(many["jacobian_dot"][i], frame.jacobian_dot(one, rate, wrt=b, axes="world", t=t[i]))
         assert np.array_equal(many["bias"][i], frame.bias_acceleration(one, rate, wrt=b, t=t[i]))
-    assert frame.pose(q[0], wrt=b, t=t).shape == (3, 4, 4) and np.array_equal(frame.pose(q[0], wrt=b, t=t)[2], frame.pose(q[0], wrt=b, t=0.3))
+    of_times = frame.pose(q[0], wrt=b, t=t)
+    assert of_times.shape == (3, 4, 4) and np.array_equal(of_times[2], frame.pose(q[0], wrt=b, t=0.3))
     assert frame.velocity(q[:0], v[:0], wrt=b).shape == (0, 6)
     with pytest.raises(pc.ModelError, match="t has 3 times for 2 states"):
         frame.pose(q[:2], wrt=b, t=t)

@@ -58,7 +58,7 @@ def test_states_come_first_and_frames_by_their_word(arm):
 def test_frames_of_another_model(arm):
     other = pc.chain(2)
     for foreign in (other.frame("body1"), other.bodies["body1"], other.add_node("eye", "body1")):
-        with refused(pc.ModelError, f"frame {foreign.name!r} belongs to another model, 'chain of 2 rods', and has no pose in 'chain of 3 rods'"):
+        with refused(pc.ModelError, f"frame {foreign.name!r} belongs to another model, 'chain of 2 rods', and has no pose in 'chain"):
             arm.frame("tool").pose(wrt=foreign)
         with refused(pc.ModelError, "belongs to another model"):
             arm.add_frame("new", on=foreign)
@@ -122,7 +122,8 @@ def test_what_a_body_takes_with_it(arm):
     """A removed body leaves its loose frames standing on nothing: they say so until they are put elsewhere."""
     arm.remove_body("body2")
     for question in (lambda: arm.frame("bit").pose(), lambda: arm.frame("body0").velocity(wrt="tool"), lambda: arm.description()):
-        with refused(pc.ModelError, "frame 'tool' of 'chain of 3 rods' stood on 'body2', which is no longer there: attach it to another frame, or remove it"):
+        words = "frame 'tool' of 'chain of 3 rods' stood on 'body2', which is no longer there: attach it to another frame, or remove it"
+        with refused(pc.ModelError, words):
             question()
     arm.frame("tool").attach("body1")
     assert arm.frame("bit").pose([0, 0])[:3, 3].tolist() == [2, 0, 1]
@@ -154,9 +155,9 @@ NONSENSE = [
     (lambda t: "pose", "the pose of the motion of frame 'odd' at t = 0.5"),
     (lambda t: 1j * np.eye(4), "the pose of the motion of frame 'odd'"),
     (lambda t: (), "not a tuple of 0"),
-    (lambda t: (np.eye(4), np.zeros(6), np.zeros(6), np.zeros(6)), "returns a pose (4, 4), or (pose, twist) or (pose, twist, acceleration), not a tuple of 4"),
+    (lambda t: (np.eye(4), *np.zeros((3, 6))), "a pose (4, 4), or (pose, twist) or (pose, twist, acceleration), not a tuple of 4"),
     (lambda t: (np.eye(4), np.zeros(3)), "the twist of the motion of frame 'odd' at t = 0.5 is six numbers, angular first, not 3"),
-    (lambda t: (np.eye(4), np.zeros(6), np.full(6, np.inf)), "the acceleration of the motion of frame 'odd' at t = 0.5 has an entry that is not a number"),
+    (lambda t: (np.eye(4), np.zeros(6), np.full(6, np.inf)), "the acceleration of the motion of frame 'odd' at t = 0.5 has an entry"),
 ]
 
 
@@ -177,7 +178,7 @@ def test_no_difference_is_taken_where_a_motion_gives_no_rate(arm):
     arm.add_frame("glide", on="drift", motion=lambda t: (np.eye(4), np.zeros(6)))
     assert arm.frame("glide").velocity(wrt="drift").tolist() == [0] * 6
     for question in (arm.frame("drift").velocity, lambda: arm.frame("glide").velocity([0, 0, 0]), arm.frame("drift").jacobian_dot):
-        with refused(pc.ModelError, "the motion of frame 'drift' gives a pose and no velocity: for velocities and rates let it return (pose, twist)"):
+        with refused(pc.ModelError, "the motion of frame 'drift' gives a pose and no velocity: for velocities and rates let it return"):
             question()
     with refused(pc.ModelError, "the motion of frame 'glide' gives no acceleration"):
         arm.frame("glide").acceleration(wrt="drift")

@@ -1,8 +1,8 @@
 """Frames against Pinocchio: LOCAL, LOCAL_WORLD_ALIGNED and WORLD are ours "body", "aligned" and "world" relative to the base.
 
-Pinocchio's rates of Jacobians are those of the numbers in each of these axes, as ours; its spatial acceleration in LOCAL_WORLD_ALIGNED is the local
-one in the world's axes, as ours; the classical one v̇ + ω × v of each. Of two frames that move, Pinocchio's differences are formed here by its own
-actions: J_a - Ad(X_ab) J_b, and the rate of that, with d/dt Ad(X) = Ad(X) ad(V).
+Pinocchio's rates of Jacobians are those of the numbers in each of these axes, as ours; its spatial acceleration in LOCAL_WORLD_ALIGNED is
+the local one in the world's axes, as ours; the classical one v̇ + ω × v of each. Of two frames that move, Pinocchio's differences are formed
+here by its own actions: J_a - Ad(X_ab) J_b, and the rate of that, with d/dt Ad(X) = Ad(X) ad(V).
 
 Tolerance: as in test_peers_sensitivities, 100 N eps of the largest entry, N the number of coordinates.
 """
@@ -17,7 +17,8 @@ from peers.test_peers_sensitivities import ANGULAR_FIRST, EPS, INSIDE, STATES, P
 pytestmark = [pytest.mark.peers, pytest.mark.filterwarnings("ignore::pycraft.ModelWarning")]
 
 AXES = {"body": pin.LOCAL, "aligned": pin.LOCAL_WORLD_ALIGNED, "world": pin.WORLD}
-CASES = [(robot, root) for robot in ("panda", "allegro_right_hand", "anymal", "simple_humanoid", "talos_reduced") for root in ("fixed", "free")]
+ROBOTS = ("panda", "allegro_right_hand", "anymal", "simple_humanoid", "talos_reduced")
+CASES = [(robot, root) for robot in ROBOTS for root in ("fixed", "free")]
 
 
 class Theirs:

@@ -1,8 +1,8 @@
-"""Frames by differences of poses in 60 digits: `pycraft.reference` has the poses of hinges, everything else is here and takes nothing of the package.
+"""Frames by differences of poses in 60 digits: `pycraft.reference` has the hinges, and nothing else is of the package.
 
-Along a motion with velocities v and accelerations v̇ at time zero every hinge stands at step(q) exp(u), u = v t + ½ v̇ t² along the rows of H of
-each subhinge: on the group its twist is then v and the rate of that v̇, at t = 0. Differences are central with a step of 10⁻¹²: their error is near
-10⁻²⁴ of the poses' derivatives, and what the digits round off 10⁻³⁶, so they count as exact.
+Along a motion with velocities v and accelerations v̇ at time zero every hinge stands at step(q) exp(u), u = v t + ½ v̇ t² along the rows of H
+of each subhinge: on the group its twist is then v and the rate of that v̇, at t = 0. Differences are central with a step of 10⁻¹²: their
+error is near 10⁻²⁴ of the poses' derivatives, and what the digits round off 10⁻³⁶, so they count as exact.
 """
 
 import mpmath
@@ -37,7 +37,7 @@ def hat(V):
 
 
 class FrameOracle:
-    """Frames of a model at one state. `moved`: of loose frames what they stand on and their pose as a function of time, in mpmath numbers."""
+    """Frames of a model at one state. `moved`: of loose frames what they stand on, and their poses at a time in mpmath numbers."""
 
     def __init__(self, model, q, v=None, vdot=None, moved=None, t=0.0):
         with mpmath.workdps(DIGITS):

@@ -38,9 +38,9 @@ class Frame(Closed):
         The time of frames that a function moves; `model.frames.t` where it is left out.
     precision : "single" | "double" | "extended" | "quad"
 
-    At the present state results are kept until they are no longer current (docs/frames.md); at given states nothing is kept. Cost: the hinges
-    between the two frames. Raises ModelError for a frame that is unknown (with the nearest name), of another model, or left without what it
-    stood on; EvaluationError for axes and kinds that are not there.
+    At the present state results are kept until they are no longer current (docs/frames.md); at given states nothing is kept. Cost: the
+    hinges between the two frames. Raises ModelError for a frame that is unknown (with the nearest name), of another model, or left without
+    what it stood on; EvaluationError for axes and kinds that are not there.
 
     Examples
     --------
@@ -85,7 +85,7 @@ class Frame(Closed):
     # ------------------------------------------------------------------ loose frames
     @property
     def placement(self) -> np.ndarray:
-        """Of a loose frame its pose (4, 4) on what it stands on, at the present time of one that is moved. It can be set: then it is fixed."""
+        """Of a loose frame its pose (4, 4) on what it stands on, now if it is moved. It can be set: then it is fixed."""
         if self.kind == "moved":
             return self.pose(wrt=self.on)
         return self._frames._core.placement(self._name)
@@ -108,15 +108,17 @@ class Frame(Closed):
     def attach(self, on: Any = None, *, keep_pose: bool = False) -> None:
         """Put a loose frame on another frame. Its placement, or its motion, is then the one on that frame.
 
-        With keep_pose=True a fixed frame stays where it is at the present state, and its placement is solved for. ModelError for a frame that
-        stands on this one, and for keeping the pose of one that a function moves.
+        With keep_pose=True a fixed frame stays where it is at the present state, and its placement is solved for. ModelError for a frame
+        that stands on this one, and for keeping the pose of one that a function moves.
         """
         on = self._frames._named(on)
         if not keep_pose:
             return self._frames._core.attach(self._name, on)
         if self.kind == "moved":
-            raise _core.ModelError(f"frame {self._name!r} is moved by a function of time and keeps its motion; set its placement to fix it first")
-        held = self.pose(wrt=on) if self.kind == "fixed" else None
+            raise _core.ModelError(
+                f"frame {self._name!r} is moved by a function of time and keeps its motion; fix it first by its placement"
+            )
+        held = self.pose(wrt=on)
         self._frames._core.attach(self._name, on)
         self._frames._core.place(self._name, held[:3, :3], held[:3, 3])
 
@@ -149,13 +151,22 @@ class Frame(Closed):
         return core.velocity_at(self._name, other, axes, third, q, v, self._time(t), precision)
 
     def acceleration(
-        self, q=None, v=None, vdot=None, *, wrt: Any = None, axes: Any = "body", kind: str = "spatial", t: Any = None, precision: str = "double"
+        self,
+        q=None,
+        v=None,
+        vdot=None,
+        *,
+        wrt: Any = None,
+        axes: Any = "body",
+        kind: str = "spatial",
+        t: Any = None,
+        precision: str = "double",
     ) -> np.ndarray:
         """The acceleration relative to `wrt`, (6,) or (B, 6), rad/s² and m/s².
 
         kind : "spatial" or "classical"
-            V̇, the rate of the six numbers of V in the frame's own axes; or (ω̇; p̈), with the acceleration of the point v̇ + ω × v. Either is then
-            expressed in the axes that are asked for. Neither holds anything of how `wrt` itself moves.
+            V̇, the rate of the six numbers of V in the frame's own axes; or (ω̇; p̈), with the acceleration of the point v̇ + ω × v. Either is
+            then expressed in the axes that are asked for. Neither holds anything of how `wrt` itself moves.
         """
         core, other, (axes, third) = self._frames._core, self._frames._named(wrt), self._axes(axes)
         if not isinstance(kind, str) or kind not in KINDS:
@@ -176,7 +187,7 @@ class Frame(Closed):
     def jacobian(
         self, q=None, *, wrt: Any = None, axes: Any = "body", coordinates: Any = None, t: Any = None, precision: str = "double"
     ) -> np.ndarray:
-        """J (6, n) or (B, 6, n): velocity = J v, and what functions of time add. Exactly zero for coordinates that move both frames or neither.
+        """J (6, n) or (B, 6, n): velocity = J v, and what functions of time add. Exact zeros for what moves both frames or neither.
 
         coordinates : names or numbers, or a list of them
             Of hinges (all of their coordinates), or of single coordinates, in the order of the columns; all of the model's by default.
@@ -197,10 +208,10 @@ class Frame(Closed):
         return self._jacobian(q, v, wrt, axes, coordinates, t, precision)
 
     def jacobian_operator(self, *, wrt: Any = None, axes: Any = "body", coordinates: Any = None) -> _core.Operator:
-        """`jacobian` as an expression, Θ → R⁶ (or from the coordinates that are named): `.at(q)`, `.T`, `.diff(i)`, `.dot()` for J̇, products.
+        """`jacobian` as an expression, Θ → R⁶ (or from the coordinates that are named): `.at(q)`, `.diff(i)`, `.dot()` for J̇, products.
 
-        Made of the letters 𝒥 = B*φ*H* and X = φ(0,k) and of constants, so that every rule of the algebra holds for it; zeros of coordinates that
-        move both frames are zeros to rounding. O(N). ModelError where a frame on the way is moved by a function of time: operators know of no time.
+        Made of the letters 𝒥 = B*φ*H* and X = φ(0,k) and of constants, so that every rule of the algebra holds for it; zeros of what moves
+        both frames are zeros to rounding. O(N). ModelError where a frame is moved by a function of time: operators know of no time.
         """
         axes, third = self._axes(axes)
         names = {"frame": self._name, "wrt": self._frames._named(wrt), "axes": third if axes == "other" else None}
@@ -218,7 +229,8 @@ class Frame(Closed):
 
     def _state(self, q=None, v=None, vdot=None) -> tuple[Any, Any, Any]:
         if isinstance(q, (str, Frame, Body, Node)):
-            raise _core.ModelError(f"the frame that {self.name!r} is seen from is given as wrt={getattr(q, 'name', q)!r}; first come states")
+            seen_from = getattr(q, "name", q)
+            raise _core.ModelError(f"the frame that {self.name!r} is seen from is given as wrt={seen_from!r}; first come states")
         if vdot is None:
             vdot = self._frames.vdot if q is None else np.zeros(self._model.nv)
         return *at_state(self._model, q, v), vdot
@@ -234,7 +246,8 @@ class Frame(Closed):
             try:
                 self._frames._core.number(axes)
             except _core.ModelError as error:
-                raise _core.EvaluationError(f"axes={axes!r}: there are {', '.join(map(repr, AXES))}, and those of a frame; {error}") from None
+                known = ", ".join(map(repr, AXES))
+                raise _core.EvaluationError(f"axes={axes!r}: there are {known}, and those of a frame; {error}") from None
         return "other", self._frames._named(axes)
 
     def __repr__(self) -> str:
@@ -336,7 +349,8 @@ class Frames(Closed, Mapping):
         """The name of a frame of this model, "" of the base. Whether there is one, the core looks."""
         if isinstance(frame, (Frame, Body, Node)):
             if frame._model is not self._model:
-                raise _core.ModelError(f"frame {frame.name!r} belongs to another model, {frame._model.name!r}, and has no pose in {self._model.name!r}")
+                own, other = self._model.name, frame._model.name
+                raise _core.ModelError(f"frame {frame.name!r} belongs to another model, {other!r}, and has no pose in {own!r}")
             return frame._name
         return name_of(frame, "a frame", "")
 
@@ -346,14 +360,15 @@ class Frames(Closed, Mapping):
         frame = Frame(self, name)
         while (kind := frame.kind) not in ("body", "base"):
             if kind == "moved":
-                raise _core.ModelError(f"frame {frame.name!r} is moved by a function of time, and operators know of no time; ask for arrays")
+                what = "is moved by a function of time, and operators know of no time; ask for arrays"
+                raise _core.ModelError(f"frame {frame.name!r} {what}")
             placed = frame.placement if kind == "fixed" else frame.pose(wrt=frame.on)
             X, frame = placed @ X, frame.on  # type: ignore[assignment]  # the base ends it
         return (None if kind == "base" else frame.name), X
 
     def _description(self) -> list[dict[str, Any]]:
         """The loose frames as plain data, each after what it stands on."""
-        waiting = {
+        waiting: dict[str, dict[str, Any]] = {
             name: {"name": name, "on": self._core.carrier(name), "placement": self._core.placement(name), "motion": self._motions.get(name)}
             for name in self._core.loose_names()
         }
