@@ -12,7 +12,7 @@ import pytest
 
 pin = pytest.importorskip("pinocchio")
 
-from peers.test_peers_sensitivities import ANGULAR_FIRST, EPS, INSIDE, STATES, Pair, models  # noqa: E402 - after the check that the extra is there
+from support.pinocchio_pairs import ANGULAR_FIRST, EPS, INSIDE, STATES, Pair, models  # noqa: E402 - after the check that the extra is there
 
 pytestmark = [pytest.mark.peers, pytest.mark.filterwarnings("ignore::pycraft.ModelWarning")]
 
