@@ -164,7 +164,7 @@ bool FrameCache::kept(FrameNumber frame, FrameNumber other, MotionPart part, Rel
 }
 
 RelativeMotion<double> FrameCache::motion(FrameNumber frame, FrameNumber other, MotionPart part) {
-  const ModelInUse use(frames_->model());
+  const FrameTree::InUse use(*frames_);
   RelativeMotion<double> result;
   {
     std::lock_guard<Mutex> lock(mutex_);

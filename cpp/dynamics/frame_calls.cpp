@@ -49,7 +49,6 @@ void write(const Vector6<S>& V, double* out, int stride = 1) {
 // f(workspace, state) at the precision, with the states checked and the errors naming theirs.
 template <class F>
 void each_state(FrameCalls& calls, Givens given, Precision precision, int states, F f) {
-  const ModelInUse use(calls.model());
   check_given(calls.model(), given);
   at_precision(precision, [&]<class S>(S) {
     if constexpr (!available_at<FrameWorkspace, S>)
@@ -65,6 +64,7 @@ void each_state(FrameCalls& calls, Givens given, Precision precision, int states
 }  // namespace
 
 FrameTimes FrameCalls::times(const FrameQuestion& asked, std::vector<double> t) const {
+  const FrameTree::InUse use(*frames_);
   FrameTimes times{std::move(t), {}};
   const auto see = [&](const FramePath& path) {
     for (const auto* steps : {&path.up, &path.down})
@@ -82,6 +82,7 @@ FrameTimes FrameCalls::times(const FrameQuestion& asked, std::vector<double> t) 
 
 void FrameCalls::motion(const FrameQuestion& asked, MotionPart part, bool classical, Givens given, const FrameTimes& times, Precision precision, int states,
                         double* out) {
+  const FrameTree::InUse use(*frames_);
   const FramePath path = frames_->path(asked.frame, asked.other), aside = asked.axes == MotionAxes::other ? frames_->path(asked.frame, asked.third) : FramePath{};
   const int size = part == MotionPart::pose ? 16 : 6;
   each_state(*this, given, precision, states, [&]<class S>(FrameWorkspace<S>& w, int b) {
@@ -105,6 +106,7 @@ void FrameCalls::motion(const FrameQuestion& asked, MotionPart part, bool classi
 
 void FrameCalls::jacobian(const FrameQuestion& asked, const std::vector<int>* coordinates, bool rates, Givens given, const FrameTimes& times,
                           Precision precision, int states, double* out) {
+  const FrameTree::InUse use(*frames_);
   const FramePath path = frames_->path(asked.frame, asked.other), aside = asked.axes == MotionAxes::other ? frames_->path(asked.frame, asked.third) : FramePath{};
   const int columns = coordinates ? static_cast<int>(coordinates->size()) : model().nv(), size = 6 * columns;
   std::unordered_map<int, int> column_of;

@@ -98,7 +98,13 @@ std::vector<std::string> FrameTree::loose_names() const {
 
 // ------------------------------------------------------------------ edits
 
+FrameTree::Edit::Edit(FrameTree& frames) : use_(frames.use_) {
+  if (!use_.try_edit())
+    throw ModelError("the frames of '" + frames.model_->name() + "' are being asked about, in another thread or by a motion that this edit is made from: edit them when that is over");
+}
+
 void FrameTree::add(const std::string& name, const std::string& on, const Pose<double>& pose, FrameFunction motion) {
+  const Edit edit(*this);
   check_new(name);
   find(on);
   auto frame = std::make_unique<LooseFrame>(LooseFrame{name, on, checked_pose(pose, "frame '" + name + "'"), std::move(motion), edits_ + 1});
@@ -112,6 +118,7 @@ void FrameTree::add(const std::string& name, const std::string& on, const Pose<d
 }
 
 void FrameTree::move(const std::string& name, const Pose<double>& pose) {
+  const Edit edit(*this);
   LooseFrame& frame = of(name);
   frame.pose = checked_pose(pose, "frame '" + name + "'");
   frame.motion = nullptr;
@@ -119,12 +126,14 @@ void FrameTree::move(const std::string& name, const Pose<double>& pose) {
 }
 
 void FrameTree::move(const std::string& name, FrameFunction motion) {
+  const Edit edit(*this);
   LooseFrame& frame = of(name);
   frame.motion = std::move(motion);
   frame.edited = ++edits_;
 }
 
 void FrameTree::attach(const std::string& name, const std::string& on) {
+  const Edit edit(*this);
   LooseFrame& frame = of(name);
   std::string way;
   for (FrameNumber at = find(on); at < base_frame; at = carrier(at)) {
@@ -137,6 +146,7 @@ void FrameTree::attach(const std::string& name, const std::string& on) {
 }
 
 void FrameTree::remove(const std::string& name) {
+  const Edit edit(*this);
   loose(name);
   std::string standing;
   int count = 0;

@@ -54,6 +54,19 @@ class FrameTree {
   const Multibody& model() const { return *model_; }
   const std::shared_ptr<Multibody>& shared_model() const { return model_; }
 
+  // A question in progress: as long as it lives neither the model nor its frames are edited.
+  class InUse {
+   public:
+    explicit InUse(const FrameTree& frames) : frames_(frames), model_(*frames.model_), entered_(frames.use_.enter()) {}
+    ~InUse() { frames_.use_.leave(entered_); }
+    InUse(const InUse&) = delete;
+
+   private:
+    const FrameTree& frames_;
+    ModelInUse model_;
+    unsigned entered_;
+  };
+
   // ---- loose frames; each edit raises edits(). ModelError names the frame and leaves all as it was.
   void add(const std::string& name, const std::string& on, const Pose<double>& pose, FrameFunction motion = nullptr);
   void move(const std::string& name, const Pose<double>& pose);
@@ -74,6 +87,16 @@ class FrameTree {
   FramePath path(FrameNumber frame, FrameNumber other) const;
 
  private:
+  // Nobody asks meanwhile. Throws where somebody does: a function of time that edits frames.
+  class Edit {
+   public:
+    explicit Edit(FrameTree& frames);
+    ~Edit() { use_.end_edit(); }
+    Edit(const Edit&) = delete;
+
+   private:
+    UseCount& use_;
+  };
   std::optional<FrameNumber> known(const std::string& name) const;
   std::optional<FrameNumber> of_model(const std::string& name) const;
   void check_new(const std::string& name) const;
@@ -93,6 +116,7 @@ class FrameTree {
   };
   mutable std::map<std::string, Unknown> base_names_ = {{"base", {}}, {"world", {}}};
   mutable Mutex mutex_;
+  mutable UseCount use_;
 };
 
 }  // namespace pycraft

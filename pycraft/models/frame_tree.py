@@ -251,7 +251,10 @@ class Frame(Closed):
         return "other", self._frames._named(axes)
 
     def __repr__(self) -> str:
-        on = self.on
+        try:
+            on = self.on
+        except _core.ModelError:
+            return f"<frame {self.name!r}: not there, or left without what it stood on>"
         return f"<frame {self.name!r}: {self.kind}{'' if on is None else f' on {on.name!r}'}>"
 
 
@@ -366,10 +369,18 @@ class Frames(Closed, Mapping):
             X, frame = placed @ X, frame.on  # type: ignore[assignment]  # the base ends it
         return (None if kind == "base" else frame.name), X
 
+    def _add_again(self, loose: Mapping[str, Any]) -> None:
+        """Make a frame that `_description` tells of."""
+        moved = {"motion": loose["motion"]} if loose.get("motion") is not None else {"placement": loose["placement"]}
+        try:
+            self.add(loose["name"], loose["on"] or None, **moved)
+        except _core.ModelError as error:
+            raise _core.ModelError(f"frame {loose['name']!r} is not copied: {error}; attach it to another frame, or remove it") from None
+
     def _description(self) -> list[dict[str, Any]]:
         """The loose frames as plain data, each after what it stands on."""
         waiting: dict[str, dict[str, Any]] = {
-            name: {"name": name, "on": self._core.carrier(name), "placement": self._core.placement(name), "motion": self._motions.get(name)}
+            name: {"name": name, "on": self._core.on(name), "placement": self._core.placement(name), "motion": self._motions.get(name)}
             for name in self._core.loose_names()
         }
         ordered: list[dict[str, Any]] = []

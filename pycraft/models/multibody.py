@@ -256,7 +256,7 @@ class Multibody(Closed, IntegrationCalls, Pictures, WithFrames):
         Warns
         -----
         ModelWarning
-            What the model has beside bodies and hinges and URDF does not hold (gravity, a state).
+            What the model has beside bodies and hinges and URDF does not hold (gravity, a state); loose frames, which no file holds.
 
         Examples
         --------
@@ -304,8 +304,7 @@ class Multibody(Closed, IntegrationCalls, Pictures, WithFrames):
         for node in data.get("nodes", []):
             model._add_node(node["name"], frame(node["body"]), node["rotation"], node["position"])
         for loose in data.get("frames", []):
-            moved = {"motion": loose["motion"]} if loose.get("motion") is not None else {"placement": loose["placement"]}
-            model.add_frame(loose["name"], loose["on"] or None, **moved)
+            model.frames._add_again(loose)
         model.gravity = data.get("gravity", (0, 0, 0))
         if "q" in data:
             model.q, model.v = data["q"], data["v"]

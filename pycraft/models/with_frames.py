@@ -63,8 +63,8 @@ class WithFrames(WithOperators):
             Its pose on that frame, as for `add_body`.
         motion : function of time
             In place of a pose: t (s) → the pose (4, 4), or (pose, twist), or (pose, twist, acceleration); the twist (ω; v) in the frame's
-            own axes about its origin, (X⁻¹Ẋ)^∨, the acceleration its rate. Velocities need the second, accelerations the third: no difference
-            is taken in their place. It is called when a question goes over the frame, and what it gives is checked.
+            own axes about its origin, (X⁻¹Ẋ)^∨, the acceleration its rate. Velocities need the second, accelerations the third: no
+            difference is taken in their place. It is called when a question goes over the frame, once a time, and what it gives is checked.
 
         Raises
         ------

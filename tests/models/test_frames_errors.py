@@ -1,5 +1,6 @@
 """Bad input to frames: an error that names the frame and the remedy, and everything as it was."""
 
+import copy
 import re
 
 import numpy as np
@@ -121,10 +122,13 @@ def test_only_loose_frames_are_edited(arm):
 def test_what_a_body_takes_with_it(arm):
     """A removed body leaves its loose frames standing on nothing: they say so until they are put elsewhere."""
     arm.remove_body("body2")
-    for question in (lambda: arm.frame("bit").pose(), lambda: arm.frame("body0").velocity(wrt="tool"), lambda: arm.description()):
+    for question in (lambda: arm.frame("bit").pose(), lambda: arm.frame("body0").velocity(wrt="tool"), lambda: arm.frame("tool").on):
         words = "frame 'tool' of 'chain of 3 rods' stood on 'body2', which is no longer there: attach it to another frame, or remove it"
         with refused(pc.ModelError, words):
             question()
+    assert repr(arm.frame("tool")) == "<frame 'tool': not there, or left without what it stood on>"
+    with refused(pc.ModelError, "frame 'tool' is not copied: no frame of 'chain of 3 rods' is called 'body2'"):
+        copy.copy(arm)
     arm.frame("tool").attach("body1")
     assert arm.frame("bit").pose([0, 0])[:3, 3].tolist() == [2, 0, 1]
 
@@ -196,6 +200,27 @@ def test_errors_of_a_users_function_are_its_own(arm):
         arm.frame("odd").pose()
     with pytest.raises(KeyError, match="no data at that time"):
         arm.frame("odd").pose(np.zeros((4, 3)))
+
+
+def test_nothing_is_edited_by_a_motion_while_it_is_asked(arm):
+    edits = [lambda: arm.add_frame("new"), lambda: arm.frame("bit").remove(), lambda: arm.frame("bit").attach(None)]
+    for edit in edits:
+        if "odd" in arm.frames:
+            arm.frame("odd").remove()
+        arm.add_frame("odd", on="bit", motion=lambda t, edit=edit: [edit(), np.eye(4)][1])
+        for question in (arm.frame("odd").pose, lambda: arm.frame("odd").pose([0, 0, 0])):
+            with refused(pc.ModelError, "the frames of 'chain of 3 rods' are being asked about, in another thread or by a motion"):
+                question()
+    arm.frame("odd").motion = lambda t: [arm.add_body("new", mass=1.0), np.eye(4)][1]
+    with refused(pc.ModelError, "is being evaluated"):
+        arm.frame("odd").pose()
+    assert list(arm.bodies) == ["body0", "body1", "body2"] and "new" not in arm.frames
+
+
+def test_a_file_holds_no_loose_frames(arm, tmp_path):
+    with pytest.warns(pc.ModelWarning, match="a file does not hold loose frames: bit, tool"):
+        arm.save(tmp_path / "arm.toml")
+    assert list(pc.load(tmp_path / "arm.toml").frames) == ["body0", "body1", "body2"]
 
 
 def test_coordinates_that_are_not_there(arm):
