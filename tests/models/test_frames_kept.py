@@ -98,6 +98,29 @@ def test_only_what_is_no_longer_current_is_computed_again():
     assert n.said == {"poses": 0, "velocities": 0, "accelerations": 1, "pairs": 1}
 
 
+def test_edited_frames_take_along_what_goes_over_them():
+    arm = chain()
+    tool = arm.add_frame("tool", on="body5", position=(1, 0, 0))
+    arm.add_frame("bit", on="tool", position=(0, 0, 1)), arm.add_frame("lamp", on="tool", position=(0, 1, 0))
+    questions = [("bit", "body2"), ("body2", "bit"), ("bit", "lamp"), ("body5", "body2"), ("tool", None)]
+
+    def ask():
+        return [arm.frame(a).pose(wrt=b) for a, b in questions]
+
+    ask()
+    with Counted(arm) as n:  # placed elsewhere: three ways go over it
+        tool.placement = np.eye(4)
+        found = ask()
+    assert n.said == {"poses": 0, "velocities": 0, "accelerations": 0, "pairs": 3}
+    assert all(np.array_equal(X, arm.frame(a).pose(arm.q, wrt=b)) for X, (a, b) in zip(found, questions, strict=True))
+    with Counted(arm) as n:  # and attached elsewhere
+        tool.attach("body2")
+        found = ask()
+    assert n.pairs == 3 and found[0][:3, 3].tolist() == [0, 0, 1]
+    arm.frame("lamp").remove(), arm.add_frame("lamp", on="body0")
+    assert np.array_equal(arm.frame("bit").pose(wrt="lamp"), arm.frame("bit").pose(arm.q, wrt="body0"))
+
+
 def test_functions_of_time_are_called_when_their_time_has_come():
     arm, called = chain(), []
 
