@@ -77,7 +77,11 @@ std::string FrameTree::name(FrameNumber frame) const {
 
 void FrameTree::check_new(const std::string& name) const {
   if (name.empty()) throw ModelError("a frame of '" + model_->name() + "' has no name");
-  if (known(name))
+  // Looked for one by one: that there is none is said by an error that lists all, which takes a large model long.
+  bool taken = numbers_.count(name) || base_names_.count(name);
+  for (int k = 0; k < model_->bodies() && !taken; ++k) taken = model_->body(k).name == name;
+  for (const Node& node : model_->nodes()) taken |= node.name == name;
+  if (taken)
     throw ModelError("'" + model_->name() + "' has a frame called '" + name + "' already; give every frame a name of its own, 'base' and 'world' are the base's");
 }
 
