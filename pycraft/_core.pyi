@@ -924,6 +924,74 @@ class Sensitivities:
         ...
     def third_order(self, christoffel: bool, q: typing.Any, precision: str | int, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
         ...
+class FrameTree:
+    """
+    The frames of a model, by name, and their motions relative to each other: pycraft.models.frame_tree is its face.
+    """
+    def __init__(self, arg0: Multibody) -> None:
+        ...
+    def __reduce__(self) -> tuple:
+        ...
+    def acceleration_at(self, frame: str, other: str, axes: str, third: str, kind: str, q: typing.Any, v: typing.Any, vdot: typing.Any, t: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def add(self, name: str, on: str, rotation: typing.Any, position: typing.Any, motion: typing.Any) -> None:
+        ...
+    def attach(self, name: str, on: str) -> None:
+        ...
+    def carrier(self, name: str) -> str:
+        """
+        The name of what a frame stands on, empty for the base.
+        """
+    def counts(self) -> typing.Annotated[list[int], "FixedSize(4)"]:
+        """
+        How many poses, velocities and accelerations of steps were computed at the present state, and how many motions of pairs.
+        """
+    def is_loose(self, name: str) -> bool:
+        ...
+    def jacobian(self, frame: str, other: str, axes: str, third: str, coordinates: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None, q: typing.Any, v: typing.Any, t: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The Jacobian, or where v is given its time derivative.
+        """
+    def loose_names(self) -> list[str]:
+        ...
+    def motion(self, frame: str, other: str, axes: str, third: str, acceleration: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The velocity, or the 'spatial' or 'classical' acceleration, at the present state.
+        """
+    def number(self, name: str) -> int:
+        """
+        -1 the base, then bodies, then nodes; below -1 loose frames. ModelError with the nearest name.
+        """
+    def on(self, name: str) -> str:
+        """
+        The name of what a loose frame was put on, whether it is there or not.
+        """
+    def place(self, name: str, rotation: typing.Any, position: typing.Any) -> None:
+        ...
+    def placement(self, name: str) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def pose(self, frame: str, other: str) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def pose_at(self, frame: str, other: str, q: typing.Any, t: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def remove(self, name: str) -> None:
+        ...
+    def set_motion(self, name: str, motion: typing.Any) -> None:
+        ...
+    def velocity_at(self, frame: str, other: str, axes: str, third: str, q: typing.Any, v: typing.Any, t: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def accelerations(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @accelerations.setter
+    def accelerations(self, arg1: typing.Any) -> None:
+        ...
+    @property
+    def time(self) -> float:
+        ...
+    @time.setter
+    def time(self, arg1: typing.Any) -> None:
+        ...
 class Methods:
     """
     Forward dynamics of one model by 'cholesky', 'ldl', 'conjugate-gradients' or 'inverse'.

@@ -236,6 +236,7 @@ def accuracy(seconds: float = 0.2) -> list[Figure]:
 def run(seconds: float = 0.1) -> dict[str, list[Figure]]:
     """All figures, by heading."""
     from .bench_expressions import expressions
+    from .bench_frames import frames
     from .bench_hybrid import hybrid
     from .bench_scenes import scenes
 
@@ -246,5 +247,6 @@ def run(seconds: float = 0.1) -> dict[str, list[Figure]]:
         "Hybrid dynamics": hybrid(seconds),
         "Sensitivities": sensitivities(2 * seconds),
         "What accuracy costs": accuracy(2 * seconds),
+        "Frames": frames(2 * seconds),
         "Scenes": scenes(2 * seconds),
     }

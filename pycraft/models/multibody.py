@@ -15,7 +15,7 @@ from ..dynamics.integration import IntegrationCalls
 from ..state import State, at_state, random_state
 from .handles import Body, Hinge, Named, Node, Vector
 from .pictures import Pictures
-from .with_operators import WithOperators
+from .with_frames import WithFrames
 
 _Z = (0.0, 0.0, 1.0)
 _DEFAULT_AXES: dict[str, tuple[tuple[float, float, float], ...]] = {
@@ -29,7 +29,7 @@ _DEFAULT_AXES: dict[str, tuple[tuple[float, float, float], ...]] = {
 }
 
 
-class Multibody(Closed, IntegrationCalls, Pictures, WithOperators):
+class Multibody(Closed, IntegrationCalls, Pictures, WithFrames):
     """A tree of bodies on hinges, with nodes, a state (`q`, `v`) and gravity (zero until it is set).
 
     Build one body by body, or load it (`pycraft.load`). Bodies are kept depth first, children in the order they were added, and
@@ -118,6 +118,7 @@ class Multibody(Closed, IntegrationCalls, Pictures, WithOperators):
             it was.
         """
         name, hinge = text(name, "a body"), text(hinge, "the kind of a hinge")
+        self._check_not_a_frame(name, "body")
         if axis is not None and axes is not None:
             raise _core.ModelError(f"body {name!r}: give axis or axes, not both")
         if subhinges is not None and hinge != "custom":
@@ -152,6 +153,7 @@ class Multibody(Closed, IntegrationCalls, Pictures, WithOperators):
         placement: np.ndarray | None = None,
     ) -> Node:
         """Add a frame on a body, on a node, or on the base (None), at a pose given as for `add_body`. It invalidates no operator."""
+        self._check_not_a_frame(name, "node")
         rotation, position = pose_parts(f"node {name!r}", rotation, position, placement)
         self._add_node(text(name, "a node"), _frame_name(body), rotation, position)
         return Node(self, name)
@@ -254,7 +256,7 @@ class Multibody(Closed, IntegrationCalls, Pictures, WithOperators):
         Warns
         -----
         ModelWarning
-            What the model has beside bodies and hinges and URDF does not hold (gravity, a state).
+            What the model has beside bodies and hinges and URDF does not hold (gravity, a state); loose frames, which no file holds.
 
         Examples
         --------
@@ -267,7 +269,7 @@ class Multibody(Closed, IntegrationCalls, Pictures, WithOperators):
 
     # ------------------------------------------------------------------ copies
     def description(self) -> dict[str, Any]:
-        """The whole model as plain data: bodies with hinges, nodes, gravity, state (see `pycraft.reference` for the schema)."""
+        """The whole model as plain data: bodies, hinges, nodes, gravity, state (see `pycraft.reference` for the schema), loose frames."""
         return describe(self)
 
     @classmethod
@@ -301,6 +303,8 @@ class Multibody(Closed, IntegrationCalls, Pictures, WithOperators):
             )  # fmt: skip
         for node in data.get("nodes", []):
             model._add_node(node["name"], frame(node["body"]), node["rotation"], node["position"])
+        for loose in data.get("frames", []):
+            model.frames._add_again(loose)
         model.gravity = data.get("gravity", (0, 0, 0))
         if "q" in data:
             model.q, model.v = data["q"], data["v"]
@@ -355,6 +359,8 @@ def _frame_name(frame: str | Body | Node | None) -> str:
 
 def describe(model: _core.Multibody) -> dict[str, Any]:
     """The core's model as plain data."""
+    frames = getattr(model, "_kept_frames", None)
+    loose = frames._description() if frames is not None else []
     return {
         "name": model.name,
         "gravity": model.gravity,
@@ -364,4 +370,4 @@ def describe(model: _core.Multibody) -> dict[str, Any]:
         "strict": model.strict,
         "q": np.array(model.q),
         "v": np.array(model.v),
-    }
+    } | ({"frames": loose} if loose else {})

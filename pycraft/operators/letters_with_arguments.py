@@ -24,8 +24,10 @@ class LetterWithArguments:
         self._operators, self._name = operators, name
         self.__doc__ = NAMES[name].meaning
 
-    def __call__(self, argument: str | int | Sequence[str], directions: Any = None) -> _core.Operator:
+    def __call__(self, argument: str | int | Sequence[str], directions: Any = None, **of_frames: Any) -> _core.Operator:
         """The operator of these nodes (or, of Delta, along this coordinate).
+
+        Jacobian alone takes `relative_to`, `axes`, `coordinates`, of one frame, loose ones included: what `Frame.jacobian_operator` has.
 
         Lambda alone takes `directions`: the rows of C (k, 6 m), on the m nodes' motions stacked, angular first in each node's axes; for
         one node also names among "rx", "ry", "rz", "x", "y", "z". Then it is (C B*ΩB C*)⁻¹: R^k → R^k, what resists motion along them
@@ -33,6 +35,8 @@ class LetterWithArguments:
         impossible.
         """
         source = self._operators._source
+        if of_frames:
+            return _relative_jacobian(self._operators, self._name, listed_names(argument), **of_frames)  # type: ignore[arg-type]  # as below
         if directions is not None:
             if self._name != "Lambda":
                 raise _core.EvaluationError(f"{self._name} takes no directions; Lambda does")
@@ -48,6 +52,19 @@ class LetterWithArguments:
 
     def __repr__(self) -> str:
         return f"<{self._name}: {NAMES[self._name].meaning}>"
+
+
+def _relative_jacobian(
+    soa: OperatorSet, name: str, frames: list[str], relative_to: Any = None, axes: Any = "body", coordinates: Any = None
+) -> _core.Operator:
+    """The Jacobian of one frame relative to another."""
+    if name != "Jacobian":
+        raise _core.EvaluationError(f"{name} takes no relative_to, axes or coordinates; Jacobian does")
+    if len(frames) != 1:
+        raise _core.ModelError(f"a Jacobian relative to a frame is of one frame, not {len(frames)}")
+    if not isinstance(soa._source, _core.MultibodyOperators):
+        raise _core.ModelError(f"{soa._source.name!r} has no frames: it is no multibody model of its own")
+    return soa._model.frame(frames[0]).jacobian_operator(wrt=relative_to, axes=axes, coordinates=coordinates)
 
 
 _TWIST = ("rx", "ry", "rz", "x", "y", "z")

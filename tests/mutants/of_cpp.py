@@ -355,6 +355,13 @@ CHANGES = {
     "cpp/dynamics/batches.cpp": [
         ("only the first state of a batch is checked", "g.batch < 0 ? 1 : g.batch", "1"),
     ],
+    "cpp/dynamics/frame_cache.cpp": [
+        ("an edited frame leaves what goes over it", "step.edited > pair.edits", "false"),
+        ("a moved hinge leaves what goes over it", "s.changed[i] > pair.made", "false"),
+    ],
+    "cpp/recursions/frame_motions.h": [
+        ("the frame that columns are seen in stands still", "- cross_motion(m.V, J)", "- cross_motion(m.V, Vector6<S>::zero())"),
+    ],
     "cpp/operators/rigid_letters.h": [
         ("a selection is of the whole hinge", "s >= of.from && s < of.to", "s >= of.from"),
     ],

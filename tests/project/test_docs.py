@@ -52,7 +52,9 @@ def test_the_readme_example_runs():
         ("ensembles", 8),
         ("hybrid_dynamics", 12),
         ("linearization", 18),
-        ("task_space", 10), ("statistical_dynamics", 5),
+        ("task_space", 10),
+        ("statistical_dynamics", 5),
+        ("frames", 30),
     ],  # fmt: skip
 )
 def test_the_pages_run(page, examples):

@@ -7,6 +7,7 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 from ... import _core
+from ..warning import warn
 from . import toml_writer, urdf_writer
 
 if TYPE_CHECKING:
@@ -25,6 +26,8 @@ def save(model: Multibody, path: str | os.PathLike[str], state: bool = True) -> 
         kinds = ".toml, which holds every model, and .urdf, for what URDF knows"
         remedy = "; MJCF text is made by pycraft.interop.export.to_mjcf(model)" if ending in (".xml", ".mjcf") else ""
         raise _core.ModelError(f"{shown}: a model's file ends in {kinds}{remedy}")
+    if loose := model.frames._core.loose_names():
+        warn(f"{shown}: a file does not hold loose frames: {', '.join(loose[:6])}{', ...' if len(loose) > 6 else ''}")
     write_text(shown, text)
 
 

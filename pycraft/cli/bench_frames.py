@@ -1,0 +1,94 @@
+"""What frames cost (`pycraft bench`): a question the hinges between its frames, one that is asked again a look-up, none nothing."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from ..models.multibody import Multibody
+from .bench import Figure
+
+SMALL, GREAT = 1000, 100_000
+QUESTIONS = 64
+ASKED, KEPT, NOTHING = 4.0, 2.0, 1.1
+"""Bounds. The numbers of a hinge of a great model lie in no cache: they are a few times slower to come by than those of a small one."""
+
+
+def _branched(size: int) -> Multibody:
+    """Two bodies on every body: depth log₂ of the size."""
+    model = Multibody(f"tree of {size}")
+    for k in range(size):
+        parent = f"b{(k - 1) // 2}" if k else None
+        model.add_body(f"b{k}", parent, position=(0.1, 0.2, 0.3), axis=(0, 0.6, 0.8), mass=1.0, inertia=np.eye(3))
+    return model
+
+
+def _least(call: Callable[[int], Any], rounds: int) -> float:
+    """The least time of a call in seconds; it is told which round it is."""
+    times = []
+    for i in range(rounds):
+        begin = time.perf_counter()
+        call(i)
+        times.append(time.perf_counter() - begin)
+    return min(times)
+
+
+class _Asked:
+    """A model, leaves of it, and states that are set in turn."""
+
+    def __init__(self, size: int):
+        self.model, rng = _branched(size), np.random.default_rng(1)
+        self.frames = [self.model.frame(f"b{k}") for k in rng.integers(size // 2, size, QUESTIONS)]
+        self.depth = float(np.mean([np.floor(np.log2(int(f.name[1:]) + 1)) + 1 for f in self.frames]))
+        self.states = rng.uniform(-1, 1, (4, size))
+
+    def set(self, i: int) -> None:
+        self.model.q = self.states[i % 4]
+
+    def ask(self, i: int = 0) -> None:
+        for frame in self.frames:
+            frame.velocity()
+
+    def new(self, rounds: int) -> float:
+        """Seconds a question at a state that was not asked about, without what setting it takes."""
+        times = []
+        for i in range(rounds):
+            self.set(i)
+            times.append(_least(self.ask, 1))
+        return min(times) / QUESTIONS
+
+    def check(self) -> None:
+        for frame in self.frames[:3]:
+            if not np.abs(frame.pose() - self.model.pose(frame.name)).max() <= 1e-12:
+                raise _core.EvaluationError(f"the pose of {frame.name} is wrong in the run that times it")
+
+
+def frames(seconds: float = 0.2) -> list[Figure]:
+    """Questions at new states and at known ones on 10⁵ bodies over 10³, and a state that is set and not asked about."""
+    rounds = max(20, int(200 * seconds))
+    small, great = _Asked(SMALL), _Asked(GREAT)
+    untouched = _branched(GREAT)
+    untouched.q = great.states[0]
+    for asked in (small, great):
+        asked.new(2)
+        asked.check()
+    new = [asked.new(rounds) for asked in (small, great)]
+    kept = [_least(asked.ask, rounds) / QUESTIONS for asked in (small, great)]
+
+    def plain(i: int) -> None:
+        untouched.q = great.states[i % 4]
+
+    idle = [float("inf"), float("inf")]
+    for _ in range(5):  # in turn: a machine's speed changes
+        idle = [min(idle[0], _least(great.set, rounds)), min(idle[1], _least(plain, rounds))]
+    per_hinge = [t / asked.depth for t, asked in zip(new, (small, great), strict=True)]
+    note = f"{1e6 * new[1]:.1f} us a question over {great.depth:.0f} hinges, {1e6 * new[0]:.1f} over {small.depth:.0f}"
+    return [
+        Figure(f"velocity at a new state, per hinge: {GREAT} bodies over {SMALL}", per_hinge[1] / per_hinge[0], "x", ASKED, note),
+        Figure(f"velocity asked again: {GREAT} bodies over {SMALL}", kept[1] / kept[0], "x", KEPT, f"{1e6 * kept[1]:.2f} us"),
+        Figure(f"q set, no frame asked for, {GREAT} bodies: over none made", idle[0] / idle[1], "x", NOTHING, f"{1e6 * idle[0]:.0f} us"),
+    ]

@@ -1,0 +1,52 @@
+"""Coordinates of a model as users name them: hinges, single coordinates, numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from ..arguments import whole
+
+
+def coordinate_numbers(model: Any, given: Any) -> list[int] | None:
+    """The numbers of the coordinates that are named, in their order; None, for all, where nothing is given.
+
+    Each is the name of a hinge (all its coordinates), a handle of one, the name of a coordinate, or a number. ModelError for one that is
+    not there, with the nearest name, or named twice.
+    """
+    if given is None:
+        return None
+    if isinstance(given, (str, int, np.integer)) or hasattr(given, "v_slice"):
+        given = [given]
+    if not isinstance(given, Iterable):
+        raise _core.ModelError(f"coordinates: names of hinges or coordinates, or numbers, not {given!r}")
+    numbers: list[int] = []
+    for one in given:
+        numbers += _numbers_of(model, one)
+    if len(set(numbers)) < len(numbers):
+        twice = next(i for i in numbers if numbers.count(i) > 1)
+        raise _core.ModelError(f"coordinate {model.coordinate_names[twice]!r} of {model.name!r} is named twice")
+    return numbers
+
+
+def _numbers_of(model: Any, one: Any) -> list[int]:
+    name = getattr(one, "name", one)
+    if isinstance(name, str):
+        if name in model.hinges:
+            own = model.hinges[name].v_slice
+            return list(range(own.start, own.stop))
+        names = model.coordinate_names
+        if name in names:
+            return [names.index(name)]
+        known = [*model.hinges, *names]
+        near = get_close_matches(name, known, 1)
+        said = f"; the nearest is {near[0]!r}" if near else f"; there are {', '.join(known[:12])}"
+        raise _core.ModelError(f"no hinge or coordinate of {model.name!r} is called {name!r}{said}")
+    number = whole(one, f"a coordinate of {model.name!r}")
+    if not 0 <= number < model.nv:
+        raise _core.ModelError(f"coordinate {number} of {model.name!r}, which has {model.nv}")
+    return [number]
