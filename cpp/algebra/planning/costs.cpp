@@ -50,6 +50,7 @@ double group_flops(const SkoSource& s, unsigned group) {
       case Group::articulated: return c.congruence + 2 * a * a * n + a * a * n + n * n * n / 3;
       case Group::composite: return c.congruence;
       case Group::compliance: return c.congruence + 4 * a * a * n;
+      case Group::inverse: return c.kinematics + c.congruence + 2 * a * a * n;
       default: return 120.0;
     }
   });
@@ -65,6 +66,7 @@ double group_bytes(const SkoSource& s, unsigned group) {
       case Group::articulated: return 2 * c.square_numbers + n * a + 2 * n * n;
       case Group::composite:
       case Group::compliance: return c.square_numbers;
+      case Group::inverse: return c.kinematic_numbers + c.square_numbers + 2 * n * a;
       default: return 24.0;
     }
   });
