@@ -41,6 +41,7 @@ double resolvent_flops(const Symbol& symbol) {
 }
 
 double group_flops(const SkoSource& s, unsigned group) {
+  if (group == Group::inverse) return group_flops(s, Group::kinematics) + group_flops(s, Group::articulated);  // at most: what it is in any numbers
   const SkoStructure& t = s.structure();
   return over_bodies(t, [&](int k) {
     const double a = t.size[k], n = t.dof[k];
@@ -50,13 +51,13 @@ double group_flops(const SkoSource& s, unsigned group) {
       case Group::articulated: return c.congruence + 2 * a * a * n + a * a * n + n * n * n / 3;
       case Group::composite: return c.congruence;
       case Group::compliance: return c.congruence + 4 * a * a * n;
-      case Group::inverse: return c.kinematics + c.congruence + 2 * a * a * n;
       default: return 120.0;
     }
   });
 }
 
 double group_bytes(const SkoSource& s, unsigned group) {
+  if (group == Group::inverse) return group_bytes(s, Group::kinematics) + group_bytes(s, Group::articulated);
   const SkoStructure& t = s.structure();
   return 8 * over_bodies(t, [&](int k) {
     const double a = t.size[k], n = t.dof[k];
@@ -66,7 +67,6 @@ double group_bytes(const SkoSource& s, unsigned group) {
       case Group::articulated: return 2 * c.square_numbers + n * a + 2 * n * n;
       case Group::composite:
       case Group::compliance: return c.square_numbers;
-      case Group::inverse: return c.kinematic_numbers + c.square_numbers + 2 * n * a;
       default: return 24.0;
     }
   });
