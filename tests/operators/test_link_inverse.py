@@ -1,5 +1,8 @@
-"""ℳ⁻¹ on columns by links (cpp/kernels/link_columns.h): which plans take it, and what it gives beside NumPy and wider numbers. Its bits from one
-number of columns, batch and instruction set to another: test_many_columns.py; where it declines: cpp/tests/test_link_inverse.cpp."""
+"""ℳ⁻¹ on columns by links (cpp/kernels/link_columns.h): which plans take it, and what it gives beside NumPy and wider numbers.
+
+Its bits from one number of columns, batch and instruction set to another: test_many_columns.py; where it declines:
+cpp/tests/test_link_inverse.cpp.
+"""
 
 import numpy as np
 import pytest
@@ -43,7 +46,7 @@ def test_what_goes_by_links(arm):
 
 
 def test_what_goes_by_bodies(arm):
-    """Other forms, precisions and refinement; what needs the letters of the sweep all the same; derived models; what is evaluated as typed."""
+    """Other forms, precisions and refinement; what needs the letters of the sweep all the same; derived models; wholes of ℳ⁻¹."""
     e, soa, q = inverse_of(arm), arm.soa, arm.random_state(1).q
     for how in ({"form": "ud"}, {"form": "square-root"}, {"refine": 1}, {"precision": "quad"}, {"precision": "single"}):
         assert sweeps_of(e.at(q, **how)) == (0, 1)
@@ -70,7 +73,7 @@ def test_both_ways_are_there():
 
 
 def assert_solves(model, Q, X):
-    """As far off as solves are: rounding of n sums of up to 6 products, times the condition of ℳ, as tests/dynamics/test_kernels.py has it."""
+    """To rounding of n sums of up to 6 products, times the condition of ℳ, as tests/dynamics/test_kernels.py has it."""
     e = inverse_of(model)
     for q in Q:
         MM = model.mass_matrix(q, precision="extended")
@@ -116,7 +119,7 @@ def test_recorded_states_decide_for_themselves():
 
 @pytest.mark.parametrize("name", REGULAR)
 def test_hostile_but_regular(name):
-    """What the general recursions solve is solved, by the one or the other way, as exactly: beside quad precision no worse than ten times."""
+    """What the general recursions solve is solved, by one way or the other: beside quad precision no worse than ten times."""
     model = at_random_state(REGULAR[name]())
     e, x, q = inverse_of(model), np.ones(model.nv), model.q
     exact = np.asarray(e.at(q, precision="quad") @ x, float)
