@@ -3,6 +3,8 @@
 
 #include <cstddef>
 
+#include "kernels/links.h"
+
 namespace pycraft::kernels {
 
 // What is known of a body beyond its numbers. pin_x, pin_y, pin_z: its one row of H is that coordinate axis or its opposite, in the angular
@@ -26,13 +28,30 @@ struct Bodies {
   void (*interrupt)();    // asked in long loops; it throws to stop them
 };
 
-// On m columns, row-major, of one type: y = f(x), x and y apart from each other, in `scratch` of six numbers a body and column.
+// Links that were eliminated at a state.
 template <class T>
-using ColumnKernel = void (*)(const Bodies<T>& bodies, const T* x, T* y, int m, T* scratch);
+struct EliminatedLinks {
+  const Links<T>* links;
+  const int* room;        // where each link that branches has its six rows
+  const T* kept;          // what `eliminate` left
+  void (*interrupt)();
+};
+
+// On m columns, row-major, of one type: y = f(x), x and y apart from each other, in `scratch` of six numbers a body (of links, a room) and column.
+template <class T, class Of = Bodies<T>>
+using ColumnKernel = void (*)(const Of& of, const T* x, T* y, int m, T* scratch);
+// ℳ⁻¹ by links (link_columns.h).
+template <class T>
+struct InverseByLinks {
+  size_t (*size)(const Links<T>& links);   // of `kept`, in numbers; it is aligned to 64 bytes
+  bool (*eliminate)(const Links<T>& links, const T* q, void (*interrupt)(), T* kept);  // false where a pivot is in doubt
+  ColumnKernel<T, EliminatedLinks<T>> one, many;                                       // columns
+};
 template <class T>
 struct ColumnKernels {
   ColumnKernel<T> mass_matrix_inverse;
   ColumnKernel<T> mass_matrix[2];   // without J, with it
+  InverseByLinks<T> links;
 };
 
 }  // namespace pycraft::kernels

@@ -264,8 +264,8 @@ struct MassMatrixInverse {
 };
 
 // W columns in an instruction, a block of them at once. What is left over overlaps those before it, or goes by fewer.
-template <class Sweep, class T, int W>
-void of_columns(const Bodies<T>& b, const T* x, T* y, int m, T* scratch) {
+template <class Sweep, class T, int W, class Of>
+void of_columns(const Of& b, const T* x, T* y, int m, T* scratch) {
   constexpr int block = W == 1 ? 1 : 64;
   if constexpr (W > 1) {
     if (m < W) return of_columns<Sweep, T, W == 8 ? 4 : 1>(b, x, y, m, scratch);

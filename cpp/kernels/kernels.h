@@ -11,6 +11,7 @@
 #include "kernels/in_parts.h"
 #include "kernels/inverse_dynamics.h"
 #include "kernels/inverse_dynamics_derivatives.h"
+#include "kernels/link_columns.h"
 #include "kernels/mass_matrix_of_columns.h"
 #include "kernels/mass_matrix_of_links.h"
 #include "kernels/mass_matrix_inverse.h"
@@ -22,7 +23,8 @@ namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET {
 
 template <class T, int W>
 constexpr ColumnKernels<T> column_kernels{of_columns<MassMatrixInverse, T, W>,
-                                          {of_columns<MassMatrix<false>, T, W>, of_columns<MassMatrix<true>, T, W>}};
+                                          {of_columns<MassMatrix<false>, T, W>, of_columns<MassMatrix<true>, T, W>},
+                                          {kept_of_links<T>, eliminate_at_q<T>, of_columns<InverseOfLinks, T, 1>, of_columns<InverseOfLinks, T, W>}};
 
 template <class T, int W>
 struct KernelsOf {

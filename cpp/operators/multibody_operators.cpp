@@ -1,6 +1,7 @@
 #include "operators/multibody_operators.h"
 
 #include <algorithm>
+#include <mutex>
 
 #include "model/recorded_model.h"
 #include "operators/directions.h"
@@ -15,6 +16,18 @@ Traits MultibodyOperators::traits() const {
   bool constant = true;
   for (int k = 0; k < model_->bodies(); ++k) constant &= model_->body(k).hinge.subhinges.size() <= 1;
   return {structure().is_chain(), structure().single_dof(), constant, model_->has_rotor_inertia(), structure().free_root(), structure().equal_blocks()};
+}
+
+std::shared_ptr<const KnownLinks> MultibodyOperators::links() const {
+  {
+    std::lock_guard<Mutex> lock(mutex_);
+    if (mutex_.abandoned()) leave_behind(links_);
+    if (links_ && links_->parameters == parameters()) return links_;
+  }
+  // Outside the lock: a signal's handler, called in between, may ask for the same. Nobody edits the model meanwhile.
+  const auto made = std::make_shared<const KnownLinks>(*model_);
+  std::lock_guard<Mutex> lock(mutex_);
+  return links_ = made;
 }
 
 StateData MultibodyOperators::generic_state() const { return pycraft::generic_state(*model_); }

@@ -10,6 +10,7 @@
 #include "algebra/theorems/theorems.h"
 #include "algebra/trees/tree_values.h"
 #include "model/multibody.h"
+#include "operators/link_inverse.h"
 #include "rigid/rigid_blocks.h"
 
 namespace pycraft {
@@ -37,10 +38,15 @@ class MultibodyOperators final : public SkoSource {
   void leave_use(unsigned entered) const noexcept override { model_->leave_use(entered); }
   Space space(SpaceKind kind, const SymbolArguments& arguments) const override;
   bool tangent_of_inverse(const Expression& X, const Expression& tangent, Expression& letter, Expression& of_D) override;
+  bool inverse_by_itself() const override { return true; }
+  // As links, with the numbers that the model has now.
+  std::shared_ptr<const KnownLinks> links() const;
   PYCRAFT_FOR_EACH_SCALAR_AND_RECORDED(PYCRAFT_OVERRIDE_MAKE_VALUES)
 
  private:
   std::shared_ptr<Multibody> model_;
+  mutable Mutex mutex_;
+  mutable std::shared_ptr<const KnownLinks> links_;
 };
 
 // The model's operators, made at the first call and again after its structure changed.

@@ -39,6 +39,17 @@ class RigidValues final : public TreeValues<RigidBlocks<S>> {
       mass_matrix_inverse_apply(this->tree_, this->blocks_, x, y, m, scratch);
   }
 
+  // By links, unless they left a pivot in doubt.
+  void inverse_by_itself(const S* x, S* y, int m, S* scratch) const override {
+    if constexpr (by_columns<S>)
+      if (links_.there()) return links_.apply(x, y, m, scratch);
+    mass_matrix_inverse(x, y, m, scratch);
+  }
+  bool inverts_by_links() const {
+    if constexpr (by_columns<S>) return links_.there();
+    return false;
+  }
+
   std::unique_ptr<InverseTangent<S>> inverse_tangent() const override;
 
   const MultibodyOperators& source() const { return source_; }
@@ -52,9 +63,23 @@ class RigidValues final : public TreeValues<RigidBlocks<S>> {
 
  protected:
   void set_state(const double* q, const double* v) override {
-    compiled_ = model_.compiled<S>();
+    const std::shared_ptr<const CompiledModel<S>> now = model_.compiled<S>();
+    if constexpr (by_columns<S>) {
+      links_.leave();
+      if (now != compiled_) links_.forget();
+    }
+    compiled_ = now;
     for (size_t i = 0; i < q_.size(); ++i) q_[i] = of_state<S>(q[i], 0, static_cast<int>(i));
     for (size_t i = 0; i < v_.size(); ++i) v_[i] = of_state<S>(v[i], 1, static_cast<int>(i));
+  }
+  unsigned compute(unsigned group) override {
+    if constexpr (by_columns<S>) {
+      if (group == Group::inverse) {
+        if (!links_.taken()) links_.take(source_.links());
+        if (this->blocks_.form == Form::fast && links_.eliminate(q_.data())) return 0;
+      }
+    }
+    return TreeValues<RigidBlocks<S>>::compute(group);
   }
   void fill() override {
     kinematics(*compiled_, q_.data(), this->blocks_);
@@ -80,6 +105,7 @@ class RigidValues final : public TreeValues<RigidBlocks<S>> {
   Velocities<S> velocities_;
   std::vector<Pose<S>> world_;  // X_0k
   ManyColumns<S> columns_;
+  [[no_unique_address]] LinkInverse<S> links_;
 };
 
 }  // namespace pycraft

@@ -8,7 +8,7 @@ from .formulas import Assembled, At, Cut, DiagonalPart, Function, Inverse, Node,
 from .passes import CompositeAssembly, Equation, Term
 from .steps import Recursion, Step, writer
 
-_GROUPS = {"kinematics": 1, "articulated": 2, "composite": 4, "compliance": 8, "velocities": 16}
+_GROUPS = {"kinematics": 1, "articulated": 2, "composite": 4, "compliance": 8, "velocities": 16, "inverse": 32}
 
 
 # ---------------------------------------------------------------------- values
@@ -16,7 +16,7 @@ _GROUPS = {"kinematics": 1, "articulated": 2, "composite": 4, "compliance": 8, "
 def _values(r: Recursion, step: Step) -> None:
     """The recursions behind a group of letters; the given blocks E, H, M, J need none, velocities are written where they are read."""
     model, groups = r.models[step["context"]], step["groups"]
-    if groups & _GROUPS["articulated"]:
+    if groups & (_GROUPS["articulated"] | _GROUPS["inverse"]):
         model.articulated_inertia()
     if groups & _GROUPS["composite"]:
         model.letter("R")

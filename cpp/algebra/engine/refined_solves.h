@@ -90,6 +90,7 @@ void Workspace<S>::solve_mass_matrix(const Step& s, const std::vector<SkoValues<
   const SkoValues<S>& own = *values[s.context];
   const S* x = numbers(s.in[0]);
   S* y = numbers(s.out);
+  if (s.flag) return own.inverse_by_itself(x, y, w, scratch_.data());
   own.mass_matrix_inverse(x, y, w, scratch_.data());
   const Binding* binding = plan_->contexts[s.context].binding.get();
   if (!binding || binding->arithmetic.refinement.steps == 0) return;

@@ -76,6 +76,8 @@ class SkoSource : public std::enable_shared_from_this<SkoSource> {
 
   virtual Traits traits() const = 0;
   virtual BlockCosts costs(int body) const = 0;
+  // Whether values in double, in the form fast, have numbers of their own for ℳ⁻¹ (Group::inverse), which take less than the articulated group.
+  virtual bool inverse_by_itself() const { return false; }
   virtual int nq() const = 0;
   virtual int nv() const = 0;
   // Throws ModelError that names what is wrong with a state.

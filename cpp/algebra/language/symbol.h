@@ -25,9 +25,10 @@ enum class Pattern {
   vector           // a column: a vector of the codomain that the model provides
 };
 
-// Values are computed in groups, each by its own sweep.
+// Values are computed in groups, each by its own sweep. inverse: what ℳ⁻¹ is applied by where nothing asks for the letters of the articulated
+// group, in numbers of the source's own.
 struct Group {
-  enum : unsigned { kinematics = 1, articulated = 2, composite = 4, compliance = 8, velocities = 16 };
+  enum : unsigned { kinematics = 1, articulated = 2, composite = 4, compliance = 8, velocities = 16, inverse = 32 };
 };
 
 // Every letter there is. A letter's record stands in the room that knows what it is: `sko_symbols` here, the others in operators/.

@@ -52,10 +52,10 @@ class SkoValues {
     std::lock_guard<Mutex> lock(mutex_);
     const Computing now(*this);
     unsigned ready = ready_.load();
-    for (unsigned group : {unsigned(Group::kinematics), unsigned(Group::articulated), unsigned(Group::composite), unsigned(Group::compliance), unsigned(Group::velocities)}) {
+    for (unsigned group : {unsigned(Group::inverse), unsigned(Group::kinematics), unsigned(Group::articulated), unsigned(Group::composite), unsigned(Group::compliance), unsigned(Group::velocities)}) {
       const unsigned wanted = groups & group & ~ready;
       if (!wanted) continue;
-      compute(wanted);
+      groups |= compute(wanted);
       ready |= wanted;
     }
     ready_.store(ready, std::memory_order_release);
@@ -80,6 +80,8 @@ class SkoValues {
   // The fused kernels: y = HφMφ*H* x + J x if asked; y = [I-HψK]* D⁻¹ [I-HψK] x; HφMφ*H* as a dense matrix.
   virtual void mass_matrix(bool with_hinge_diagonal, const S* x, S* y, int columns, S* scratch) const = 0;
   virtual void mass_matrix_inverse(const S* x, S* y, int columns, S* scratch) const = 0;
+  // The latter by what Group::inverse holds.
+  virtual void inverse_by_itself(const S* x, S* y, int columns, S* scratch) const { mass_matrix_inverse(x, y, columns, scratch); }
   // r = b - (HφMφ*H* + J) x with forces gathered one scalar up, of those that know their masses to it.
   virtual bool gathers_wider() const { return false; }
   virtual void gathered_residual(const S*, const S*, S*, int, S*, std::vector<Wider<S>>&) const { throw EvaluationError("forces are not gathered in wider numbers here"); }
@@ -93,7 +95,8 @@ class SkoValues {
 
  protected:
   virtual void set_state(const double* q, const double* v) = 0;
-  virtual void compute(unsigned group) = 0;
+  // Which groups later in their order it takes besides.
+  virtual unsigned compute(unsigned group) = 0;
 
  private:
   static std::uint64_t next_generation() {

@@ -41,6 +41,7 @@ double resolvent_flops(const Symbol& symbol) {
 }
 
 double group_flops(const SkoSource& s, unsigned group) {
+  if (group == Group::inverse) return group_flops(s, Group::kinematics) + group_flops(s, Group::articulated);  // at most: what it is in any numbers
   const SkoStructure& t = s.structure();
   return over_bodies(t, [&](int k) {
     const double a = t.size[k], n = t.dof[k];
@@ -56,6 +57,7 @@ double group_flops(const SkoSource& s, unsigned group) {
 }
 
 double group_bytes(const SkoSource& s, unsigned group) {
+  if (group == Group::inverse) return group_bytes(s, Group::kinematics) + group_bytes(s, Group::articulated);
   const SkoStructure& t = s.structure();
   return 8 * over_bodies(t, [&](int k) {
     const double a = t.size[k], n = t.dof[k];

@@ -41,7 +41,7 @@ enum class StepKind {
   solve,             // y = T⁻¹-solution of a factored realization
   selected_blocks,   // the diagonal blocks of a factored realization's operator
   mass_matrix,       // fused: y = (HφMφ*H* [+ J]) x
-  mass_matrix_solve, // fused: y = [I-HψK]* D⁻¹ [I-HψK] x
+  mass_matrix_solve, // fused: y = [I-HψK]* D⁻¹ [I-HψK] x; flag: by Group::inverse
   mass_matrix_solve_tangent, // y = ∂(HφMφ*H* + J)⁻¹ x by the derivative of the Riccati sweep; where it has none, by the operand
   mass_matrix_dense, // composite-body assembly of HφMφ*H* [+ J]
   dense_factor,      // LU of an operator made dense, column by column

@@ -139,13 +139,21 @@ int Planner::emit_vector(Step s, const Space& space, int x) {
   return emit(std::move(s), {RegisterKind::vector, space, {}, nullptr, plan_.registers[x].wide});
 }
 
+// Whether the source's own numbers serve ℳ⁻¹: in double, in the form fast, unrefined. What is part of another plan knows not what that asks for.
+bool Planner::inverse_by_itself(const Symbol& model) const {
+  if (part_ || whole_ || more_digits_ || !model.source->inverse_by_itself()) return false;
+  if (!model.binding) return true;
+  const Arithmetic& how = model.binding->arithmetic;
+  return how.form == Form::fast && how.precision == Precision::double_ && how.refinement.steps == 0;
+}
+
 // A kernel of a whole model's ℳ or ℳ⁻¹ on a vector: HφMφ*H*, with J where it is asked for, or its inverse.
 int Planner::emit_kernel(StepKind kind, const Symbol& model, bool with_J, int x, const char* text) {
   const bool solves = kind == StepKind::mass_matrix_solve;
   Step s{kind};
   s.in = {x};
-  s.flag = with_J;
-  s.context = context_of(model, solves ? Group::kinematics | Group::articulated : Group::kinematics);
+  s.flag = solves ? inverse_by_itself(model) : with_J;
+  s.context = context_of(model, !solves ? Group::kinematics : s.flag ? Group::inverse : Group::kinematics | Group::articulated);
   s.flops = mass_matrix_flops(*model.source, solves);
   s.bytes = vector_bytes(model.source->theta()) + vector_bytes(model.source->motions());
   s.tier = 1;

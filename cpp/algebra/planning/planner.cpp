@@ -62,7 +62,8 @@ void Planner::emit_values() {
                                                       {Group::articulated, "P, D, G (Riccati sweep, tip to base)"},
                                                       {Group::composite, "R (composite-body sweep, tip to base)"},
                                                       {Group::compliance, "Υ (Lyapunov sweep, base to tip)"},
-                                                      {Group::velocities, "velocities (base to tip)"}};
+                                                      {Group::velocities, "velocities (base to tip)"},
+                                                      {Group::inverse, "ℳ⁻¹ over links (Riccati sweep, tip to base)"}};
     for (const auto& [group, text] : names) {
       if (!(plan_.groups[c] & group)) continue;
       Step s{StepKind::values};
@@ -142,7 +143,7 @@ bool refined_by_precision(const Plan& plan) {
     case Request::block_diagonal:
     case Request::diagonal:
     case Request::trace:
-      return std::any_of(plan.groups.begin(), plan.groups.end(), [](unsigned g) { return (g & (Group::articulated | Group::compliance)) != 0; }) ||
+      return std::any_of(plan.groups.begin(), plan.groups.end(), [](unsigned g) { return (g & (Group::articulated | Group::compliance | Group::inverse)) != 0; }) ||
              uses([](const Step& s) { return s.kind == StepKind::factor || s.kind == StepKind::dense_factor || s.kind == StepKind::invert_blocks || s.operand; });
     case Request::logdet: return true;
     default: return uses([](const Step& s) { return s.kind == StepKind::dense_factor && s.flag; });
@@ -287,8 +288,20 @@ void Planner::plan_arithmetic(const Expression& typed) {
   }
 }
 
+// Where other steps ask for P, D or G, ℳ⁻¹ goes by those, too.
+void Planner::share_articulated() {
+  for (size_t c = 0; c < plan_.contexts.size(); ++c) {
+    unsigned& groups = plan_.groups[c];
+    if (!(groups & Group::inverse) || !(groups & Group::articulated)) continue;
+    groups = (groups & ~unsigned(Group::inverse)) | Group::kinematics;
+    for (Step& s : plan_.steps)
+      if (s.kind == StepKind::mass_matrix_solve && s.context == static_cast<int>(c)) s.flag = false;
+  }
+}
+
 void Planner::finish() {
   drop_unused(plan_);
+  share_articulated();
   emit_values();
 }
 

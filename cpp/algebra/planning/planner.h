@@ -31,6 +31,7 @@ class Planner {
   Planner(const PlanOptions& options, Planner& whole) : options_(options), whole_(&whole) {}
   Plan plan_lowered(const Expression& lowered);
   void finish();
+  void share_articulated();
 
   // ---- what is asked for
   void apply_to_input(const Expression& e);
@@ -54,6 +55,7 @@ class Planner {
   size_t apply_kernel(const std::vector<Expression>& factors, size_t end, int& x);
   int emit_vector(Step s, const Space& space, int x);
   int emit_kernel(StepKind kind, const Symbol& model, bool with_J, int x, const char* text);
+  bool inverse_by_itself(const Symbol& model) const;
   int apply_sum(const Expression& e, int x);
   int apply_symbol(const Expression& letter, bool transposed, bool inverted, int x);
   int apply_inverse(const Expression& e, int x);
@@ -99,6 +101,7 @@ class Planner {
   PlanOptions options_;
   bool one_cut_ = true;              // no coordinates are cut into bodies in two ways
   bool for_costs_ = false;           // nobody reads the steps
+  bool part_ = false;                // of another plan
   bool more_digits_ = false;         // bound to a precision above double
   Plan plan_;
   std::unordered_map<Expression, int, ExpressionHash> ids_;

@@ -125,14 +125,16 @@ class TreeValues : public SkoValues<typename Blocks::Scalar> {
  protected:
   virtual void fill() = 0;                   // E, H, M, J at the state that was set
   virtual void compute_velocities() {}
-  void compute(unsigned group) override {
+  unsigned compute(unsigned group) override {
     switch (group) {
-      case Group::kinematics: fill(); return;
-      case Group::articulated: articulated_inertia_tip_to_base(tree_, blocks_); return;
-      case Group::composite: composite_inertia_tip_to_base(tree_, blocks_); return;
-      case Group::compliance: upsilon_base_to_tip(tree_, blocks_); return;
-      case Group::velocities: compute_velocities(); return;
+      case Group::kinematics: fill(); break;
+      case Group::articulated: articulated_inertia_tip_to_base(tree_, blocks_); break;
+      case Group::composite: composite_inertia_tip_to_base(tree_, blocks_); break;
+      case Group::compliance: upsilon_base_to_tip(tree_, blocks_); break;
+      case Group::velocities: compute_velocities(); break;
+      case Group::inverse: return Group::kinematics | Group::articulated;
     }
+    return 0;
   }
 
   const SkoStructure& tree_;
