@@ -216,7 +216,7 @@ BOOST_AUTO_TEST_CASE(shared_costs_are_those_of_plans) {
   const Expression full = constant(random_block(g, theta.dimension(), theta.dimension()), theta, theta, "C");
   const Expression MM = o.H * o.phi * o.M * o.phi.T() * o.H.T();
   const Expression swept = block_diagonal(o.psi * (o.M + o.E * o.P_plus * o.E.T()) * o.psi.T());
-  const std::vector<Expression> asked = {o.tau * o.P * o.tau_bar.T(), MM, MM + o.J, (MM + 0.1 * o.I).inv(), (MM + full).inv() * o.D, o.H * swept * o.H.T() + o.D, swept * o.H.T() - 2 * (o.P * o.H.T()),
+  const std::vector<Expression> asked = {o.K * o.K.T(), o.tau * o.P * o.tau_bar.T(), MM, MM + o.J, (MM + 0.1 * o.I).inv(), (MM + full).inv() * o.D, o.H * swept * o.H.T() + o.D, swept * o.H.T() - 2 * (o.P * o.H.T()),
                                          o.psi.T() * o.Upsilon * o.psi, block_diagonal(o.phi.T() * o.E.T() * o.Upsilon * o.E * o.phi), o.K * (o.D.inv() + o.I) * o.K.T(), o.phi.inv() * o.R, 3 * o.Upsilon,
                                          (o.I - o.G * o.H) * o.P * (o.I - o.H.T() * o.G.T()) + o.G * o.D * o.G.T()};
   SharedCosts together({tree, nullptr}, true);
