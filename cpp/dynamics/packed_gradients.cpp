@@ -27,7 +27,7 @@ int gradient_size(const Multibody& model, GradientOver over) {
   }
 }
 
-std::shared_ptr<const kernels::Program> recorded_gradient(const Multibody& model, GradientOver over) {
+std::shared_ptr<const GradientPrograms> recorded_gradient(const Multibody& model, GradientOver over) {
   Recording recording(most_operations);
   const auto compiled = model.compiled<Recorded>();
   const SkoStructure tree = model.structure();
@@ -48,7 +48,8 @@ std::shared_ptr<const kernels::Program> recorded_gradient(const Multibody& model
   }
   if (!recording.trusted()) return nullptr;
   for (size_t i = 0; i < y.size(); ++i) recording.result(static_cast<int>(i), y[i]);
-  return std::make_shared<kernels::Program>(kernels::program_of(recording.tape(), kernels::lane_set().functions.width));
+  const kernels::LaneFunctions& lanes = kernels::lane_set().functions;
+  return std::make_shared<const GradientPrograms>(GradientPrograms{kernels::program_of(recording.tape(), lanes.width), kernels::program_of(recording.tape(), lanes.few)});
 }
 
 bool PackedGradients::worth(const Multibody& model, GradientOver over, int states) {
@@ -57,11 +58,11 @@ bool PackedGradients::worth(const Multibody& model, GradientOver over, int state
   Kept& k = kept_[over];
   if (k.parameters != model.parameters()) k = {model.parameters()};
   if (k.asked < least) k.asked = std::min(least, k.asked + std::min(states, least));
-  return k.asked >= least && !(k.tried && !k.program);
+  return k.asked >= least && !(k.tried && !k.programs);
 }
 
 std::vector<int> PackedGradients::run(const Multibody& model, GradientOver over, const double* q, int states, double* out) {
-  std::shared_ptr<const kernels::Program> program;
+  std::shared_ptr<const GradientPrograms> programs;
   const std::uint64_t parameters = model.parameters();
   const auto at_hand = [&] {
     const std::lock_guard<Mutex> lock(mutex_);
@@ -69,18 +70,19 @@ std::vector<int> PackedGradients::run(const Multibody& model, GradientOver over,
     return kept_[over];
   };
   if (const Kept known = at_hand(); known.parameters == parameters && known.tried) {
-    program = known.program;
+    programs = known.programs;
   } else {
-    program = recorded_gradient(model, over);
+    programs = recorded_gradient(model, over);
     const std::lock_guard<Mutex> lock(mutex_);
-    kept_[over] = {parameters, least, true, program};
+    kept_[over] = {parameters, least, true, programs};
   }
-  if (!program) {
+  if (!programs) {
     std::vector<int> all(states);
     std::iota(all.begin(), all.end(), 0);
     return all;
   }
-  return kernels::replayed(*program, {{q, size_t(model.nq())}}, {0, states, 1, out, size_t(gradient_size(model, over))}, rooms_);
+  const kernels::Program& program = states <= kernels::lane_set().functions.few ? programs->of_few : programs->of_many;
+  return kernels::replayed(program, {{q, size_t(model.nq())}}, {0, states, 1, out, size_t(gradient_size(model, over))}, rooms_);
 }
 
 }  // namespace pycraft

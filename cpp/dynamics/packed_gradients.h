@@ -16,8 +16,12 @@ namespace pycraft {
 enum class GradientOver { coordinates, inertias, geometry, axes };
 int gradient_size(const Multibody& model, GradientOver over);
 
-// The recursion on q of this model; null where it cannot be recorded.
-std::shared_ptr<const kernels::Program> recorded_gradient(const Multibody& model, GradientOver over);
+// The recursion on q of a model, for many states and for few.
+struct GradientPrograms {
+  kernels::Program of_many, of_few;
+};
+// Null where it cannot be recorded.
+std::shared_ptr<const GradientPrograms> recorded_gradient(const Multibody& model, GradientOver over);
 
 class PackedGradients {
  public:
@@ -32,7 +36,7 @@ class PackedGradients {
     std::uint64_t parameters = 0;
     int asked = 0;
     bool tried = false;
-    std::shared_ptr<const kernels::Program> program;
+    std::shared_ptr<const GradientPrograms> programs;
   };
   Mutex mutex_;
   std::map<GradientOver, Kept> kept_;

@@ -15,6 +15,8 @@ struct LaneFunctions {
   Replay replays[3];     // by registers, few to many
   bool fuses;            // a product with the sum that it goes into
   void (*turn_sines)(double angle, double* out);
+  int few;               // doubles in a narrow vector: of a state or two, for which wide ones are moved about in vain
+  Replay of_few;         // of programs for those, the same bits
 };
 
 struct LaneSet {

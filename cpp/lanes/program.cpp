@@ -111,7 +111,9 @@ class Placing {
 Program program_of(const Tape& tape, int width) {
   Instructions instructions = instructions_of(tape);
   schedule(instructions);
-  return Placing(tape, instructions, width).run();
+  Program program = Placing(tape, instructions, width).run();
+  program.width = width;
+  return program;
 }
 
 }  // namespace pycraft::kernels

@@ -54,6 +54,7 @@ struct Program {
   std::vector<double> blank, fixed_values;
   std::vector<int> fixed;
   size_t places = 0, placed = 0, instructions = 0;
+  int width = 0;  // states in a vector
   ProgramText text() const {
     return {code.data(), code.data() + code.size(), constants.data(), placed, blank.empty() ? nullptr : blank.data(), fixed.data(), fixed_values.data(), fixed.size()};
   }

@@ -254,6 +254,7 @@ constexpr bool fuses_products =
 
 // W states a vector; one, several or many vectors a place.
 template <int W, int several, int many>
-constexpr LaneFunctions lane_functions{W, {Replaying<Lanes<double, W>, 1>::replay, Replaying<Lanes<double, W>, several>::replay, Replaying<Lanes<double, W>, many>::replay}, fuses_products, turn_sines<neighbours<double>>};
+constexpr LaneFunctions lane_functions{W, {Replaying<Lanes<double, W>, 1>::replay, Replaying<Lanes<double, W>, several>::replay, Replaying<Lanes<double, W>, many>::replay}, fuses_products, turn_sines<neighbours<double>>,
+                                         2, Replaying<Lanes<double, 2>, 1>::replay};
 
 }  // namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET

@@ -17,6 +17,7 @@ constexpr size_t alignment = 64 / sizeof(double);
 
 // Large blocks have less to call; but what they work on must stay near, and lanes without a state are in vain.
 const Replay& suited(const Program& program, const LaneFunctions& lanes, int states) {
+  if (program.width != lanes.width) return lanes.of_few;
   const Replay* best = &lanes.replays[0];
   for (const Replay& r : lanes.replays)
     if (program.places * r.registers * lanes.width * sizeof(double) <= near && states > (r.registers - 1) * lanes.width) best = &r;
@@ -47,7 +48,7 @@ std::vector<int> replayed(const Program& program, const std::vector<Entries>& in
   const LaneFunctions& lanes = lane_set().functions;
   const int count = states.to - states.from;
   const Replay& replay = suited(program, lanes, count);
-  const int block = replay.registers * lanes.width, blocks = (count + block - 1) / block, threads = std::clamp(states.threads, 1, std::max(blocks, 1));
+  const int block = replay.registers * program.width, blocks = (count + block - 1) / block, threads = std::clamp(states.threads, 1, std::max(blocks, 1));
   const ProgramText text = program.text();
   std::vector<unsigned char> sound(count, 1);
   struct Own {

@@ -26,7 +26,7 @@ struct StatesOfBatch {
   size_t stride; // results a state
 };
 
-// The states whose results mean nothing: those of others are at their places. A state has the same bits wherever it stands.
+// Programs are for the vectors of this machine's lanes, or for its narrow ones. The states whose results mean nothing: those of others are at their places. A state has the same bits wherever it stands.
 std::vector<int> replayed(const Program& program, const std::vector<Entries>& inputs, const StatesOfBatch& states, Rooms& rooms);
 
 }  // namespace pycraft::kernels

@@ -6,6 +6,7 @@
 #include "algebra/language/display.h"
 #include "algebra/language/lower.h"
 #include "algebra/language/properties.h"
+#include "algebra/planning/shared_costs.h"
 #include "algebra/planning/simplify.h"
 #include "algebra/theorems/polynomial.h"
 #include "random_tree.h"
@@ -204,6 +205,32 @@ BOOST_AUTO_TEST_CASE(rules_change_no_value) {
   for (const Expression& e : {MM, MM.inv(), (MM + o.J).inv(), o.psi.inv() * o.phi, o.phi * o.R * o.phi.T(), o.tau_bar * o.P * o.tau_bar.T(), o.Omega * o.M * o.Omega,
                               o.H * (o.R + o.phi_tilde * o.R + o.R * o.phi_tilde.T()) * o.H.T(), (o.I + o.H * o.phi * o.K).inv()})
     BOOST_TEST(difference(dense(e, true), dense(e, false)) < 1e-9, show(e));
+}
+
+// Whatever was asked before, and of whatever parts in common: what a plan of its own would cost. Flops in another order round once each.
+BOOST_AUTO_TEST_CASE(shared_costs_are_those_of_plans) {
+  const auto tree = random_tree(6, branched, true);
+  const Letters o(tree);
+  const Space& theta = o.D.domain();
+  std::mt19937 g(1);
+  const Expression full = constant(random_block(g, theta.dimension(), theta.dimension()), theta, theta, "C");
+  const Expression MM = o.H * o.phi * o.M * o.phi.T() * o.H.T();
+  const Expression swept = block_diagonal(o.psi * (o.M + o.E * o.P_plus * o.E.T()) * o.psi.T());
+  const std::vector<Expression> asked = {o.K * o.K.T(), o.tau * o.P * o.tau_bar.T(), MM, MM + o.J, (MM + 0.1 * o.I).inv(), (MM + full).inv() * o.D, o.H * swept * o.H.T() + o.D, swept * o.H.T() - 2 * (o.P * o.H.T()),
+                                         o.psi.T() * o.Upsilon * o.psi, block_diagonal(o.phi.T() * o.E.T() * o.Upsilon * o.E * o.phi), o.K * (o.D.inv() + o.I) * o.K.T(), o.phi.inv() * o.R, 3 * o.Upsilon,
+                                         (o.I - o.G * o.H) * o.P * (o.I - o.H.T() * o.G.T()) + o.G * o.D * o.G.T()};
+  SharedCosts together({tree, nullptr}, true);
+  for (int turn = 0; turn < 2; ++turn)
+    for (const Expression& typed : asked) {
+      const Expression e = lower(typed, false);
+      const auto own = [](const Expression& x) { return make_plan(x, Request::apply, {false})->flops(); };
+      BOOST_TEST(together.flops(e) == own(e), boost::test_tools::tolerance(1e-14) << show(e));
+      Alphabet alphabet;
+      const auto form = normal_form(e, alphabet);
+      if (!form) continue;
+      const Expression written = lower(to_expression(*form, alphabet, e.domain(), e.codomain()), false);
+      BOOST_TEST(together.flops(*form, alphabet, e.domain(), e.codomain()) == own(written), boost::test_tools::tolerance(1e-14) << show(written));
+    }
 }
 
 BOOST_AUTO_TEST_CASE(degenerate_trees) {

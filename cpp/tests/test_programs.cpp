@@ -122,9 +122,9 @@ Expected expected(const Tape& tape, const Given& given, int states, bool fuses) 
 bool same(double a, double b) { return std::memcmp(&a, &b, sizeof a) == 0; }
 
 // Results of sound states, and which are sound; memory is no number where nothing was put.
-void check(const Tape& tape, const Given& given, int states, const LaneSet& set, const Replay& replay, const Expected& e) {
-  const Program program = program_of(tape, set.functions.width);
-  const int block = replay.registers * set.functions.width;
+void check(const Tape& tape, const Given& given, int states, const LaneSet& set, int width, const Replay& replay, const Expected& e) {
+  const Program program = program_of(tape, width);
+  const int block = replay.registers * width;
   const size_t size = tape.results.size();
   std::vector<double> room(program.places * block + 8, std::numeric_limits<double>::quiet_NaN()), out(states * size);
   double* const memory = room.data() + (-reinterpret_cast<std::uintptr_t>(room.data()) & 63) / sizeof(double);
@@ -155,7 +155,8 @@ BOOST_AUTO_TEST_CASE(random_tapes) {
           if (o.does == Does::sine || o.does == Does::cosine) o.does = Does::negate;
       const Expected e = expected(own, given, states, set.functions.fuses);
       for (char s : e.sound) sound += s;
-      for (const Replay& replay : set.functions.replays) check(own, given, states, set, replay, e);
+      for (const Replay& replay : set.functions.replays) check(own, given, states, set, set.functions.width, replay, e);
+      check(own, given, states, set, set.functions.few, set.functions.of_few, e);
     }
   }
   BOOST_TEST(sound > 2000);  // that there was something to compare
@@ -167,20 +168,21 @@ BOOST_AUTO_TEST_CASE(whole_batches) {
   for (const int states : {0, 1, 2, 7, 8, 9, 31, 32, 33, 63, 64, 65, 300}) {
     const Given given(std::max(states, 1), random);
     const Tape tape = random_tape(300, random, true);
-    const Program program = program_of(tape, lane_set().functions.width);
+    const Program of_many = program_of(tape, lane_set().functions.width), of_few = program_of(tape, lane_set().functions.few);
     const Expected e = expected(tape, given, states, lane_set().functions.fuses);
     const size_t size = tape.results.size();
-    for (const int threads : {1, 3})
-      for (const int from : {0, states / 3}) {
-        std::vector<double> out(states * size, -7.0);
-        std::vector<int> wanted;
-        for (int s = from; s < states; ++s)
-          if (!e.sound[s]) wanted.push_back(s);
-        const std::vector<int> left = replayed(program, given.inputs, {from, states, threads, out.data(), size}, rooms);
-        BOOST_TEST(left == wanted, boost::test_tools::per_element());
-        for (int s = 0; s < states; ++s)
-          for (size_t i = 0; i < size; ++i) BOOST_TEST((s < from ? out[s * size + i] == -7.0 : !e.sound[s] || same(out[s * size + i], e.out[s * size + i])));
-      }
+    for (const Program* program : {&of_many, &of_few})
+      for (const int threads : {1, 3})
+        for (const int from : {0, states / 3}) {
+          std::vector<double> out(states * size, -7.0);
+          std::vector<int> wanted;
+          for (int s = from; s < states; ++s)
+            if (!e.sound[s]) wanted.push_back(s);
+          const std::vector<int> left = replayed(*program, given.inputs, {from, states, threads, out.data(), size}, rooms);
+          BOOST_TEST(left == wanted, boost::test_tools::per_element());
+          for (int s = 0; s < states; ++s)
+            for (size_t i = 0; i < size; ++i) BOOST_TEST((s < from ? out[s * size + i] == -7.0 : !e.sound[s] || same(out[s * size + i], e.out[s * size + i])));
+        }
   }
 }
 

@@ -93,3 +93,31 @@ def test_along_time_with_rotors(model):
         op = getattr(model.soa, name)
         expected = difference(lambda t, op=op: value(op, model.integrate(model.q, t * model.v), model.v + t * vdot))
         assert_close(numbers(op.dot(vdot=vdot), model.q, model.v), expected, f"d{name}/dt")
+
+
+def steps(op):
+    return [step["kind"] for step in op.plan("apply").program["steps"]]
+
+
+@pytest.mark.parametrize("name", ["R", *LETTERS])
+@pytest.mark.parametrize("coordinates", [(1,), (1, 3), (1, 3, 6)])
+def test_derivatives_of_sweeps_are_sweeps(name, coordinates, model):
+    """However often: ∂P, of which E X E* is a part, is swept like P, so that nothing is eliminated and nothing made dense."""
+    found = steps(getattr(model.soa, name).diff(*coordinates))
+    assert "lyapunov_blocks" in found
+    assert not {"factor", "selected_blocks", "solve", "dense_factor", "blocks_of_dense"}.intersection(found)
+
+
+@pytest.mark.parametrize("resolvent", ["phi", "psi"])
+def test_second_derivatives_of_what_is_swept_from_parents(resolvent, model):
+    """blockdiag(A (X + E Y E*) A*) with X and Y that are not symmetric."""
+    soa = model.soa
+    A, E = getattr(soa, resolvent), soa.E
+    X, Y = (unsymmetric(A.domain.dual, A.domain, model, seed) for seed in (3, 4))
+    op = pc.blockdiag(A @ (X + E @ Y @ E.T) @ A.T)
+    alone = pc.blockdiag(A @ E @ Y @ E.T @ A.T)
+    assert "lyapunov_blocks" in steps(alone) and "factor" not in steps(alone)
+    for e in (op, alone):
+        assert np.abs(e.dense() - e.dense().T).max() > 0.1
+        for i, j in ((1, 3), (3, 1), (5, 5)):
+            assert_close(numbers(e.diff(i, j), model.q, model.v), along(model, e.diff(i), j, model.q, model.v), f"∂_{j}∂_{i}")

@@ -22,6 +22,17 @@ def test_the_bits_do_not_change_when_a_program_takes_over(over):
 
 
 @pytest.mark.parametrize("over", OVER)
+def test_few_states_have_the_bits_of_many(over):
+    """One state or two go through narrow vectors, more through wide ones."""
+    model = every_kind(rotor_inertia=True)
+    states = np.array([model.random_state(seed).q for seed in range(MANY)])
+    together = model.log_determinant_gradient(states, over=over)
+    for some in (1, 2, 3, 5, 9):
+        assert np.array_equal(model.log_determinant_gradient(states[:some], over=over), together[:some])
+    assert np.array_equal(model.log_determinant_gradient(states[0], over=over), together[0])
+
+
+@pytest.mark.parametrize("over", OVER)
 def test_edits_are_seen(over):
     model, other = pc.robots.panda(), pc.robots.panda()
     q = model.random_state(1).q

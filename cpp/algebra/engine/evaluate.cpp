@@ -13,7 +13,7 @@
 namespace pycraft {
 
 std::shared_ptr<ExecutionPool> prepare(const Expression& e, Request request, bool rules) {
-  return e.node().memo->get<PlanCache>().find_or_make(e, request, PlanOptions{rules});
+  return e.node().memo()->get<PlanCache>().find_or_make(e, request, PlanOptions{rules});
 }
 
 void evaluate(const Expression& e, Request request, const Inputs& inputs, Result& result, bool rules, bool expansions) {

@@ -64,7 +64,7 @@ PlanCache::Made PlanCache::keep_bound(const BoundKey& key, const std::shared_ptr
 PlanCache::Made PlanCache::made(const Expression& e, Request request, const PlanOptions& options) {
   const auto all = contexts(e);
   const InUse use(all);
-  const std::shared_ptr<Memo>& origin = e.node().memo->origin();
+  const std::shared_ptr<Memo>& origin = e.node().memo()->origin();
   const std::shared_ptr<const Binding> binding = all.empty() ? nullptr : all[0].binding;
   if (!origin || !binding) return {make_plan(e, request, options), nullptr};
   e.check_current();

@@ -234,7 +234,7 @@ Expression Expression::T() const {
 Expression Expression::inv() const {
   if (!floating() && domain().dimension() != codomain().dimension())
     throw SpaceError(label(*this) + " maps " + domain().description() + " to " + codomain().description() + ": it is not square and has no inverse");
-  return make_node(Node{NodeKind::inverse, codomain(), domain(), {*this}}, node().memo->of_inverse());
+  return make_node(Node{NodeKind::inverse, codomain(), domain(), {*this}}, node().memo()->of_inverse());
 }
 
 Expression block_diagonal(const Expression& a) {
@@ -308,7 +308,7 @@ Expression Expression::at(std::shared_ptr<const Binding> binding) const {
     if (binds && !n.symbol.binding) n.symbol.binding = binding;
     for (Expression& c : n.children) c = moved.at(c.get());
     const bool whole = e.get() == get() && !bound_before;
-    moved.emplace(e.get(), make_node(std::move(n), whole ? std::make_shared<Memo>(node().memo) : nullptr));
+    moved.emplace(e.get(), make_node(std::move(n), whole ? std::make_shared<Memo>(node().memo()) : nullptr));
   });
   return moved.at(get());
 }

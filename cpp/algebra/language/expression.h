@@ -47,6 +47,26 @@ class Found {
   mutable std::atomic<int> value_{-1};
 };
 
+// The memo of a node, made when it is first asked for: most nodes are never evaluated. A copy of the node starts without one.
+class MemoPlace {
+ public:
+  MemoPlace() = default;
+  MemoPlace(const MemoPlace&) {}
+  MemoPlace(MemoPlace&& other) noexcept : kept_(other.kept_.exchange(nullptr)) {}
+  MemoPlace& operator=(const MemoPlace&) = delete;
+  ~MemoPlace() { delete kept_.load(std::memory_order_relaxed); }
+  const std::shared_ptr<Memo>& operator()() const {
+    if (const std::shared_ptr<Memo>* kept = kept_.load(std::memory_order_acquire)) return *kept;
+    return make();
+  }
+  // That of another node; only before anybody asks.
+  void share(std::shared_ptr<Memo> memo) { kept_.store(new std::shared_ptr<Memo>(std::move(memo)), std::memory_order_release); }
+
+ private:
+  const std::shared_ptr<Memo>& make() const;
+  mutable std::atomic<std::shared_ptr<Memo>*> kept_{nullptr};
+};
+
 class Expression {
  public:
   struct Node;
@@ -97,8 +117,9 @@ struct Expression::Node {
   std::shared_ptr<const ExternalData> external;
   size_t hash = 0;
   int depth = 1;                                // levels of nodes, this one included
-  std::shared_ptr<Memo> memo;                   // filled at the first evaluation; what is kept holds no expression, so no cycle
+  MemoPlace memo;                               // filled at the first evaluation; what is kept holds no expression, so no cycle
   Found triangles;                              // see properties.cpp
+  Found lowered, spelled_out;                   // that lowering leaves it as it is, without and with expanding: see lower.cpp
 };
 
 inline NodeKind Expression::kind() const { return node_->kind; }

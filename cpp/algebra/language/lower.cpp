@@ -75,35 +75,44 @@ class Lowering {
 
   // What is below comes first, so that nothing recurses; each node once as it is and once transposed.
   Expression run(const Expression& root, bool transposed) {
-    const auto& known = transposed ? transposed_ : plain_;
-    if (const auto found = known.find(root.get()); found != known.end()) return found->second;
-    std::vector<std::pair<Expression, bool>> todo = {{root, transposed}};
+    if (done(root, transposed)) return at(root, transposed);
+    std::vector<std::pair<const Expression*, bool>> todo = {{&root, transposed}};
     while (!todo.empty()) {
-      const auto [e, t] = todo.back();
-      auto& memo = t ? transposed_ : plain_;
-      if (memo.contains(e.get())) {
+      const auto [place, t] = todo.back();
+      const Expression& e = *place;
+      if (done(e, t)) {
         todo.pop_back();
         continue;
       }
       const size_t before = todo.size();
       const bool below = transposed_below(e, t);
-      const auto& done = below ? transposed_ : plain_;
       for (const Expression& c : e.children())
-        if (!done.contains(c.get())) todo.emplace_back(c, below);
+        if (!done(c, below)) todo.emplace_back(&c, below);
       if (todo.size() > before) continue;
       check_interrupt();
       Expression result = compute(e, t);
-      memo.emplace(e.get(), std::move(result));
-      alive_.push_back(e);
       todo.pop_back();
+      if (!t && result.get() == e.get()) {
+        stays(e).set(1);
+        continue;
+      }
+      if ((t ? transposed_ : plain_).emplace(e.get(), std::move(result)).second) alive_.push_back(e);
     }
-    return (transposed ? transposed_ : plain_).at(root.get());
+    return at(root, transposed);
   }
 
   // Of what is lowered already.
   static Expression inverse_of(const Expression& lowered) { return invert(lowered); }
 
  private:
+  // What lowering leaves as it is, it leaves so for ever.
+  const Found& stays(const Expression& e) const { return expand_ ? e.node().spelled_out : e.node().lowered; }
+  bool done(const Expression& e, bool t) const { return t ? transposed_.contains(e.get()) : stays(e).value() == 1 || plain_.contains(e.get()); }
+  const Expression& at(const Expression& e, bool t) const {
+    if (!t && stays(e).value() == 1) return e;
+    return (t ? transposed_ : plain_).at(e.get());
+  }
+
   static bool transposed_below(const Expression& e, bool t) {
     switch (e.kind()) {
       case NodeKind::transpose: return !t;
@@ -122,24 +131,28 @@ class Lowering {
     switch (e.kind()) {
       case NodeKind::product: return none({NodeKind::scaled, NodeKind::zero, NodeKind::identity, NodeKind::product});
       case NodeKind::scaled: return none({NodeKind::scaled, NodeKind::zero, NodeKind::identity}) && !e.node().coefficient.is_zero() && e.node().coefficient != 1;
-      case NodeKind::inverse: return parts[0].kind() == NodeKind::symbol || parts[0].kind() == NodeKind::transpose || parts[0].kind() == NodeKind::sum;
+      case NodeKind::inverse: return none({NodeKind::scaled, NodeKind::zero, NodeKind::identity, NodeKind::inverse, NodeKind::product});
+      case NodeKind::identity:
+      case NodeKind::zero: return !e.node().symbol.binding;
+      case NodeKind::square_root: return none({NodeKind::identity});
+      case NodeKind::block_diagonal: return none({NodeKind::scaled}) && !is_block_diagonal(parts[0]);
       case NodeKind::sum: {
-        constexpr size_t few = 16;
-        if (parts.size() > few || !none({NodeKind::zero, NodeKind::sum})) return false;
+        if (!none({NodeKind::zero, NodeKind::sum})) return false;
         const auto term = [&](size_t i) -> const Expression& { return parts[i].kind() == NodeKind::scaled ? parts[i].children()[0] : parts[i]; };
         for (size_t i = 0; i < parts.size(); ++i) {
           const NodeKind kind = term(i).kind();
           if (kind == NodeKind::zero || kind == NodeKind::sum || kind == NodeKind::scaled || (parts[i].kind() == NodeKind::scaled && !is_lowered(parts[i]))) return false;
-          for (size_t j = 0; j < i; ++j)
-            if (term(i).node().hash == term(j).node().hash) return false;  // to be collected
         }
-        return true;
+        std::vector<size_t> hashes;
+        for (size_t i = 0; i < parts.size(); ++i) hashes.push_back(term(i).node().hash);
+        std::sort(hashes.begin(), hashes.end());
+        return std::adjacent_find(hashes.begin(), hashes.end()) == hashes.end();  // else there may be terms to collect
       }
       default: return false;
     }
   }
   bool unchanged(const Expression& e) const {
-    return is_lowered(e) && std::all_of(e.children().begin(), e.children().end(), [&](const Expression& c) { return plain_.at(c.get()).get() == c.get(); });
+    return is_lowered(e) && std::all_of(e.children().begin(), e.children().end(), [&](const Expression& c) { return at(c, false).get() == c.get(); });
   }
 
   Expression compute(const Expression& e, bool t) {

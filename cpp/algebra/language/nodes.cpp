@@ -129,11 +129,18 @@ bool operator==(const Expression& a, const Expression& b) {
   return true;
 }
 
+// Two threads may make one at the same time: the first one's is kept.
+const std::shared_ptr<Memo>& MemoPlace::make() const {
+  auto made = std::make_unique<std::shared_ptr<Memo>>(std::make_shared<Memo>());
+  std::shared_ptr<Memo>* kept = nullptr;
+  return kept_.compare_exchange_strong(kept, made.get(), std::memory_order_acq_rel) ? *made.release() : *kept;
+}
+
 Expression make_node(Node node, std::shared_ptr<Memo> memo) {
   node.hash = hash_of(node);
   node.depth = 1;
   for (const Expression& c : node.children) node.depth = std::max(node.depth, 1 + c.node().depth);
-  node.memo = memo ? std::move(memo) : std::make_shared<Memo>();
+  if (memo) node.memo.share(std::move(memo));
   return Expression(std::make_shared<const Node>(std::move(node)));
 }
 

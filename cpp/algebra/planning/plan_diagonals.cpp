@@ -99,9 +99,8 @@ std::optional<int> Planner::diagonal_of_congruence(const Expression& e) {
   if (!left || !right || left->definition != right->definition || !same_model(*left, *right) || left_t == right_t) return std::nullopt;
   const bool edges = left->definition->pattern == Pattern::edges && left_t;
   if (left->definition->pattern != Pattern::resolvent && !edges) return std::nullopt;
-  for (size_t k = 1; k + 1 < f.size(); ++k)
-    if (!is_block_diagonal(f[k])) return std::nullopt;
   const std::vector<Expression> inside(f.begin() + 1, f.end() - 1);
+  if (!inside.empty() && !is_block_diagonal(product_of(inside))) return std::nullopt;
   Step s{edges ? StepKind::congruence_blocks : StepKind::lyapunov_blocks};
   s.in = {f.size() == 2 ? identity_blocks(f[0].domain(), f[1].codomain()) : blocks(product_of(inside))};
   s.symbol = *left;

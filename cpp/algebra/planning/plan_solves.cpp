@@ -72,6 +72,7 @@ int Planner::solve_realization(const Expression& e, int x) {
 // A plan of its own, whose values are computed with this one's.
 std::shared_ptr<const Plan> Planner::plan_operand(const Expression& operand) {
   Planner planner(options_);
+  planner.for_costs_ = for_costs_;
   planner.part_ = true;
   auto made = std::make_shared<const Plan>(planner.plan(operand, Request::apply));
   for (size_t c = 0; c < made->contexts.size(); ++c)

@@ -26,7 +26,7 @@ int Planner::new_register(RegisterKind kind, const Space& rows, const Space& col
 
 int Planner::emit(Step step, Register out) {
   check_interrupt();
-  if (plan_.steps.size() >= most_steps)
+  if (plan_.steps.size() >= most_)
     throw EvaluationError("the plan of " + plan_.text + " takes more than " + std::to_string(most_steps) +
                           " steps: parts of it are applied to many vectors; evaluate such a part, and go on with it as a constant");
   plan_.registers.push_back(std::move(out));
@@ -52,7 +52,14 @@ int Planner::context_of(const Symbol& symbol, unsigned groups) {
 
 std::string Planner::shown(const Expression& e) const { return for_costs_ ? std::string() : show(e); }
 
-int Planner::id_of(const Expression& e) { return ids_.try_emplace(e, static_cast<int>(ids_.size())).first->second; }
+int Planner::id_of(const Expression& e) {
+  const auto [known, fresh] = ids_of_nodes_.try_emplace(e.get(), -1);
+  if (fresh) {
+    met_.push_back(e);
+    known->second = ids_.try_emplace(e, static_cast<int>(ids_.size())).first->second;
+  }
+  return known->second;
+}
 
 // The sweeps that make the values go in front; a run skips those that are cached.
 void Planner::emit_values() {
@@ -90,16 +97,7 @@ void drop_unused(Plan& plan) {
   std::vector<Step> kept;
   for (auto s = plan.steps.rbegin(); s != plan.steps.rend(); ++s) {
     if (s->out >= 0 && !needed[s->out]) continue;
-    for (int r : s->in) needed[r] = 1;
-    if (s->operand)
-      for (const Register& r : s->operand->registers)
-        if (r.shared >= 0) needed[r.shared] = 1;
-    if (s->realization) {
-      for (const auto* terms : {&s->realization->terms, &s->realization->inputs, &s->realization->outputs})
-        for (const Realization::Term& t : *terms)
-          for (int r : {t.left, t.right})
-            if (r >= 0) needed[r] = 1;
-    }
+    each_register_read(*s, [&](int r) { needed[r] = 1; });
     kept.push_back(std::move(*s));
   }
   std::reverse(kept.begin(), kept.end());
@@ -170,7 +168,7 @@ Precision wider(Precision precision) {
 Plan Planner::plan(const Expression& typed, Request request) {
   plan_ = Plan{};
   plan_.request = request;
-  plan_.text = show(typed);
+  plan_.text = shown(typed);
   typed.check_current();
   more_digits_ = precision_of(typed) > Precision::double_;
   Expression e = lower(typed, false);
@@ -314,19 +312,6 @@ Plan Planner::plan_lowered(const Expression& e) {
   apply_to_input(e);
   finish();
   return std::move(plan_);
-}
-
-double Planner::lowered_flops(const Expression& e) {
-  for_costs_ = true;
-  plan_ = Plan{};
-  plan_.request = Request::apply;
-  more_digits_ = precision_of(e) > Precision::double_;
-  one_cut_ = cut_in_one_way(e);
-  plan_.domain = e.domain();
-  plan_.codomain = e.codomain();
-  apply_to_input(e);
-  finish();
-  return plan_.flops();
 }
 
 std::shared_ptr<const Plan> make_plan(const Expression& e, Request request, const PlanOptions& options) {

@@ -2,6 +2,7 @@
 // dense constant, somebody else's operator under an inverse, or (found at run time) a singular pivot goes to a dense factorization.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <unordered_map>
@@ -9,11 +10,15 @@
 #include <vector>
 
 #include "algebra/language/expression.h"
+#include "algebra/language/mixed_hash.h"
 #include "algebra/language/scalar_expression.h"
 #include "algebra/planning/plan.h"
 #include "algebra/planning/realization.h"
 
 namespace pycraft {
+
+// Steps of one plan; beyond it a shared part occurs too many times over.
+constexpr size_t most_steps = 200000;
 
 class Planner {
  public:
@@ -21,14 +26,13 @@ class Planner {
 
   // The request as a plan. Recurses as deep as the expression is nested (with_stack_for).
   Plan plan(const Expression& e, Request request);
-  // Of a lowered expression, applied as it stands.
-  double lowered_flops(const Expression& e);
 
  private:
   friend class RealizationBuilder;
+  friend class SharedCosts;
 
   // The operand of a dense factorization, lowered, for the plan of `whole`, which holds the factors of what is dense inside it.
-  Planner(const PlanOptions& options, Planner& whole) : options_(options), whole_(&whole) {}
+  Planner(const PlanOptions& options, Planner& whole) : options_(options), for_costs_(whole.for_costs_), whole_(&whole) {}
   Plan plan_lowered(const Expression& lowered);
   void finish();
   void share_articulated();
@@ -94,27 +98,30 @@ class Planner {
   std::optional<std::vector<int>> logdet_of_factors(const std::vector<Expression>& factors);
   std::optional<int> logdet_by_structure(const Expression& e);
 
-  int id_of(const Expression& e);
+  int id_of(const Expression& e);                // the same for equal expressions
   std::string shown(const Expression& e) const;  // as steps have it
   double vector_bytes(const Space& space) const { return 8.0 * space.dimension(); }
 
+  struct PairHash {
+    size_t operator()(const std::pair<int, int>& p) const { return mix(size_t(p.first), size_t(p.second)); }
+  };
+
   PlanOptions options_;
   bool one_cut_ = true;              // no coordinates are cut into bodies in two ways
-  bool for_costs_ = false;           // nobody reads the steps
+  bool for_costs_ = false;           // nobody reads what steps and plans say of themselves
   bool part_ = false;                // of another plan
   bool more_digits_ = false;         // bound to a precision above double
   Plan plan_;
+  size_t most_ = most_steps;         // steps that the plan may have
   std::unordered_map<Expression, int, ExpressionHash> ids_;
-  std::map<std::pair<int, int>, int> vector_memo_;
-  std::map<int, int> block_memo_;
-  std::map<std::pair<int, int>, int> block_product_memo_;
-  std::map<int, std::optional<int>> diagonal_memo_;
+  std::unordered_map<const Expression::Node*, int> ids_of_nodes_;   // of those in met_
+  std::vector<Expression> met_;
+  std::unordered_map<std::pair<int, int>, int, PairHash> vector_memo_, block_product_memo_;
+  std::unordered_map<int, int> block_memo_;
+  std::unordered_map<int, std::optional<int>> diagonal_memo_;
   Planner* whole_ = nullptr;                // null: this is the whole plan
   std::map<int, int> dense_memo_;           // of the whole plan: factors by operand
   std::map<int, int> imported_;             // of an operand's plan: its registers for those of the whole
 };
-
-// Steps of one plan; beyond it a shared part occurs too many times over.
-constexpr size_t most_steps = 200000;
 
 }  // namespace pycraft

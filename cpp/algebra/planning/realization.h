@@ -46,6 +46,20 @@ struct Realization {
   double entries() const;
 };
 
+// Calls f on every register that a step reads: its own, and those of the blocks of its realization, and of its operand's factors.
+template <class F>
+void each_register_read(const Step& step, F f) {
+  for (int r : step.in) f(r);
+  if (step.operand)
+    for (const Register& r : step.operand->registers)
+      if (r.shared >= 0) f(r.shared);
+  if (!step.realization) return;
+  for (const auto* terms : {&step.realization->terms, &step.realization->inputs, &step.realization->outputs})
+    for (const Realization::Term& t : *terms)
+      for (int r : {t.left, t.right})
+        if (r >= 0) f(r);
+}
+
 class Planner;
 
 // The realization of y = e x; emits the block registers it needs through the planner. On failure `reason` says why.

@@ -1,6 +1,7 @@
 // What the theorems do for plans: recognise the forms that have kernels however they are spelled, invert by factors, let resolvents
 // meet their inverses. None of it changes a result; all of it changes the cost.
 #include <algorithm>
+#include <deque>
 #include <unordered_map>
 
 #include "algebra/language/display.h"
@@ -9,6 +10,7 @@
 #include "algebra/language/properties.h"
 #include "algebra/planning/planner.h"
 #include "algebra/planning/recognise.h"
+#include "algebra/planning/shared_costs.h"
 #include "algebra/theorems/polynomial.h"
 #include "algebra/theorems/rules.h"
 #include "algebra/theorems/theorems.h"
@@ -69,32 +71,22 @@ bool is_mass_matrix_inverse(const Expression& e) {
   return f == mass_matrix_inverse_of(f[1].children()[0].node().symbol);
 }
 
-// Of what is lowered, as it stands.
-double plan_flops(const Expression& e) { return Planner({false}).lowered_flops(e); }
-
-struct HashOfExpression {
-  size_t operator()(const Expression& e) const { return e.node().hash; }
-};
-
 // What is longer has no normal form that would be found in time, and no kernel of its own.
 constexpr size_t most_letters = 1000;
 
-// Nodes of the expression written out as a tree, as far as most_letters.
-size_t written_length(const Expression& e) {
-  size_t length = 0;
-  std::vector<const Expression*> todo = {&e};
-  while (!todo.empty() && length <= most_letters) {
-    const Expression& x = *todo.back();
-    todo.pop_back();
-    ++length;
-    for (const Expression& c : x.children()) todo.push_back(&c);
-  }
-  return length;
-}
+// Beyond words that cost as much, to rounding: sums of flops in another order.
+constexpr double same_cost = 1 - 1e-12;
+
+// What is known of a node from the nodes below it.
+struct Sketch {
+  size_t length = 1;                // nodes, written out as a tree, as far as most_letters + 1
+  const Symbol* model = nullptr;    // one that has its model and state
+  bool several_models = false, resolvents = false;
+};
 
 class Optimiser {
  public:
-  explicit Optimiser(std::vector<std::string>& notes) : notes_(notes) {}
+  Optimiser(const Expression& whole, std::vector<std::string>& notes) : notes_(notes), one_cut_(cut_in_one_way(whole)) {}
 
   Expression run(const Expression& e) {
     const auto known = done_.find(e);
@@ -111,7 +103,7 @@ class Optimiser {
       case NodeKind::inverse: {
         const Expression& inner = e.children()[0];
         if (inner.kind() == NodeKind::symbol || inner.kind() == NodeKind::transpose) return e;
-        if (!is_block_diagonal(inner) && written_length(inner) <= most_letters) {
+        if (!is_block_diagonal(inner) && sketch(inner).length <= most_letters) {
           if (const auto known = invert_by_theorem(inner)) {
             note(known->theorem + ": (" + show(inner) + ")⁻¹ = " + show(known->inverse));
             return is_mass_matrix_inverse(known->inverse) ? known->inverse : run_parts(known->inverse);
@@ -180,26 +172,22 @@ class Optimiser {
 
   // HφMφ*H* (+ J) in any spelling, and whatever the normal form makes cheaper.
   Expression recognise(const Expression& e) {
-    if (mass_matrix_model(e) || is_mass_matrix_inverse(e) || written_length(e) > most_letters) return e;
-    const auto models = contexts(e);
-    if (models.size() != 1 || !e.domain().belongs_to_bodies()) return e;
-    bool resolvents = false;
-    visit(e, [&](const Expression& x) {
-      resolvents |= x.kind() == NodeKind::symbol && (x.node().symbol.definition->pattern == Pattern::resolvent || x.node().symbol.definition->pattern == Pattern::compound);
-    });
-    if (!resolvents) return e;
+    if (mass_matrix_model(e) || is_mass_matrix_inverse(e)) return e;
+    const Sketch of = sketch(e);
+    if (of.length > most_letters || !of.model || of.several_models || !of.resolvents || !e.domain().belongs_to_bodies()) return e;
+    const Context model{of.model->source, of.model->binding};
     Alphabet alphabet;
     const auto form = normal_form(e, alphabet);
     if (!form) return e;
     const size_t most_words = 5;  // HφMφ*H* is HφKD + HφKDK*φ*H* + D + DK*φ*H* - J
-    if (form->size() <= most_words && e.domain() == models[0].source->theta() && e.codomain() == models[0].source->theta()) {
-      const auto letter = [&](SymbolId id) { return make_symbol(id, models[0].source, models[0].binding); };
+    if (form->size() <= most_words && e.domain() == model.source->theta() && e.codomain() == model.source->theta()) {
+      const auto letter = [&](SymbolId id) { return make_symbol(id, model.source, model.binding); };
       const Expression H = letter(SymbolId::H), phi = letter(SymbolId::phi), J = letter(SymbolId::J);
       const Expression mass_matrix = product_of({H, phi, letter(SymbolId::M), phi.T(), H.T()});
       const auto own = normal_form(mass_matrix, alphabet);
       const Word j{alphabet.letter(J)};
       Polynomial with_J = *own;
-      if (models[0].source->traits().hinge_diagonal) {
+      if (model.source->traits().hinge_diagonal) {
         with_J[j] += 1;
         if (with_J[j] == 0) with_J.erase(j);
       }
@@ -213,9 +201,40 @@ class Optimiser {
       if (const Coefficient f = multiple(*own); f != 0) return found(e, f == 1 ? mass_matrix : f * mass_matrix);
       if (const Coefficient f = multiple(with_J); f != 0) return found(e, lower(f * (mass_matrix + J), false));
     }
+    SharedCosts& costs = costs_of(model, one_cut_ || cut_in_one_way(e));
+    const double least = same_cost * costs.flops(e);
+    if (costs.flops(*form, alphabet, e.domain(), e.codomain()) >= least) return e;
     const Expression normal = lower(to_expression(*form, alphabet, e.domain(), e.codomain()), false);
-    if (normal == e || plan_flops(normal) >= plan_flops(e)) return e;
+    if (normal == e || costs.flops(normal) >= least) return e;
     return found(e, normal);
+  }
+
+  Sketch sketch(const Expression& e) {
+    const auto known = sketches_.find(e.get());
+    if (known != sketches_.end()) return known->second;
+    Sketch made;
+    const auto meet = [&](const Symbol& s) {
+      if (!made.model) made.model = &s;
+      made.several_models |= !same_model(s, *made.model);
+    };
+    const Symbol& own = e.node().symbol;
+    if (own.source) meet(own);
+    if (e.kind() == NodeKind::symbol) made.resolvents = own.definition->pattern == Pattern::resolvent || own.definition->pattern == Pattern::compound;
+    for (const Expression& c : e.children()) {
+      const Sketch part = sketch(c);
+      made.length = std::min(made.length + part.length, most_letters + 1);
+      if (part.model) meet(*part.model);
+      made.several_models |= part.several_models;
+      made.resolvents |= part.resolvents;
+    }
+    met_.push_back(e);
+    return sketches_[e.get()] = made;
+  }
+
+  SharedCosts& costs_of(const Context& model, bool one_cut) {
+    for (SharedCosts& costs : costs_)
+      if (costs.are_of(model, one_cut)) return costs;
+    return costs_.emplace_back(model, one_cut);
   }
 
   Expression found(const Expression& e, const Expression& better) {
@@ -225,11 +244,15 @@ class Optimiser {
   }
 
   std::vector<std::string>& notes_;
-  std::unordered_map<Expression, Expression, HashOfExpression> done_;  // a part that occurs again is another node as often as not
+  bool one_cut_;
+  std::unordered_map<Expression, Expression, ExpressionHash> done_;  // a part that occurs again is another node as often as not
+  std::unordered_map<const Expression::Node*, Sketch> sketches_;     // of those in met_
+  std::vector<Expression> met_;
+  std::deque<SharedCosts> costs_;
 };
 
 }  // namespace
 
-Expression optimise(const Expression& lowered, std::vector<std::string>& notes) { return Optimiser(notes).run(lowered); }
+Expression optimise(const Expression& lowered, std::vector<std::string>& notes) { return Optimiser(lowered, notes).run(lowered); }
 
 }  // namespace pycraft

@@ -165,8 +165,7 @@ struct Differentiator::State {
     if (!first || !last || first->definition != last->definition || first->definition->pattern != Pattern::resolvent || first_t == last_t ||
         !same_model(*first, *last))
       return std::nullopt;
-    for (size_t i = 1; i + 1 < f.size(); ++i)
-      if (!is_block_diagonal(f[i])) return std::nullopt;
+    if (f.size() > 2 && !is_block_diagonal(product_of(std::vector<Expression>(f.begin() + 1, f.end() - 1)))) return std::nullopt;
     const Letters o(first->source, first->binding);
     const bool articulated = first->definition->id == SymbolId::psi;
     const Expression middle = f.size() == 2 ? identity(f[0].domain()) : times(std::vector<Expression>(f.begin() + 1, f.end() - 1));
