@@ -7,7 +7,7 @@ import fractions
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Binding', 'Dynamics', 'Effect', 'Error', 'EvaluationError', 'FunctionOfTime', 'GroupedOperators', 'HingeKind', 'Integration', 'Letter', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'RunRecord', 'Scalar', 'SceneCalls', 'SceneEffects', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'blockdiag', 'bushing_effect', 'check_pairing', 'checked_refinement', 'compiled_call', 'constant', 'constant_in_time', 'coordinates_named', 'coulomb_friction_effect', 'damping_effect', 'direct_call', 'direct_calls', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'gravity_effect', 'gravity_gradient_effect', 'harmonic', 'hermite_between', 'hinge_kinds', 'identity', 'implicit_damping_effect', 'implicit_spring_effect', 'instruction_set', 'instruction_sets', 'integrator_table', 'integrators', 'kernel_headers', 'kernel_tape', 'limits_effect', 'methods', 'motor_effect', 'node_damper_effect', 'node_spring_effect', 'numbers_in_q', 'operators_of', 'piecewise_polynomial', 'point_mass_gravity_effect', 'precisions', 'prepared_call', 'prescribed_effect', 'python_effect', 'python_function_of_time', 'quadratic_damping_effect', 'real_array', 'record_from', 'residual', 'rotor_inertia_effect', 'run_scene', 'scalar', 'scene_between', 'servo_effect', 'spring_effect', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_by_hand', 'time_compiled', 'time_dynamics', 'time_forward', 'time_method', 'time_packs', 'time_passes', 'time_scene', 'torque_source_effect', 'vector', 'wider', 'wrench_effect', 'zero']
+__all__: list[str] = ['Binding', 'Centroidal', 'Dynamics', 'Effect', 'Error', 'EvaluationError', 'FunctionOfTime', 'GroupedOperators', 'HingeKind', 'Integration', 'Letter', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'RunRecord', 'Scalar', 'SceneCalls', 'SceneEffects', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'blockdiag', 'bushing_effect', 'check_pairing', 'checked_refinement', 'compiled_call', 'constant', 'constant_in_time', 'coordinates_named', 'coulomb_friction_effect', 'damping_effect', 'direct_call', 'direct_calls', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'gravity_effect', 'gravity_gradient_effect', 'harmonic', 'hermite_between', 'hinge_kinds', 'identity', 'implicit_damping_effect', 'implicit_spring_effect', 'instruction_set', 'instruction_sets', 'integrator_table', 'integrators', 'kernel_headers', 'kernel_tape', 'limits_effect', 'methods', 'motor_effect', 'node_damper_effect', 'node_spring_effect', 'numbers_in_q', 'operators_of', 'piecewise_polynomial', 'point_mass_gravity_effect', 'precisions', 'prepared_call', 'prescribed_effect', 'python_effect', 'python_function_of_time', 'quadratic_damping_effect', 'real_array', 'record_from', 'residual', 'rotor_inertia_effect', 'run_scene', 'scalar', 'scene_between', 'servo_effect', 'spring_effect', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_by_hand', 'time_compiled', 'time_dynamics', 'time_forward', 'time_method', 'time_packs', 'time_passes', 'time_scene', 'torque_source_effect', 'vector', 'wider', 'wrench_effect', 'zero']
 
 class Error(Exception): ...
 class SpaceError(Error, TypeError): ...
@@ -62,7 +62,11 @@ class Multibody:
     """
     A multibody model in the core; pycraft.Multibody is its Python face.
     """
+    @typing.overload
     def __init__(self, name: str = 'multibody', keep_welds: bool = False, strict: bool = False) -> None:
+        ...
+    @typing.overload
+    def __init__(self, whole: Multibody, name: str, bodies: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], moving_base: bool) -> None:
         ...
     def __reduce__(self) -> tuple:
         ...
@@ -74,6 +78,12 @@ class Multibody:
         ...
     def _body_index(self, arg0: str) -> int:
         ...
+    def _follow_base(self) -> None:
+        ...
+    def _frame_body(self, arg0: str) -> int:
+        """
+        The number of the body that a body or node is on, -1 for the base.
+        """
     def _hinge_index(self, arg0: str) -> int:
         ...
     def _hinge_sizes(self) -> tuple[list[str], list[int]]:
@@ -85,6 +95,10 @@ class Multibody:
     def _node_index(self, arg0: str) -> int:
         ...
     def _nodes(self) -> list:
+        ...
+    def _outboard_of(self, root: typing.SupportsInt | typing.SupportsIndex, without: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> list[int]:
+        ...
+    def _path_between(self, a: typing.SupportsInt | typing.SupportsIndex, b: typing.SupportsInt | typing.SupportsIndex) -> list[int]:
         ...
     def _set_limits(self, arg0: typing.SupportsInt | typing.SupportsIndex, arg1: typing.Any, arg2: typing.Any) -> None:
         ...
@@ -120,6 +134,11 @@ class Multibody:
     def _parameters(self) -> int:
         ...
     @property
+    def _part(self) -> typing.Any:
+        """
+        Of a part: its bodies in the whole, its base and where its coordinates are there; None for a model of its own.
+        """
+    @property
     def _size(self) -> int:
         ...
     @property
@@ -142,6 +161,11 @@ class Multibody:
     def keeps_welds(self) -> bool:
         ...
     @property
+    def mass(self) -> float:
+        """
+        Of all bodies, kg.
+        """
+    @property
     def name(self) -> str:
         ...
     @property
@@ -157,7 +181,7 @@ class Multibody:
     @property
     def q(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Generalized coordinates (nq,): copied in when set, read-only when read.
+        Generalized coordinates (nq,): copied in when set, a read-only view when read.
         """
     @q.setter
     def q(self, arg1: typing.Any) -> None:
@@ -168,7 +192,7 @@ class Multibody:
     @property
     def v(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Generalized velocities (nv,): copied in when set, read-only when read.
+        Generalized velocities (nv,): copied in when set, a read-only view when read.
         """
     @v.setter
     def v(self, arg1: typing.Any) -> None:
@@ -912,6 +936,22 @@ class Sensitivities:
         ...
     def third_order(self, christoffel: bool, q: typing.Any, precision: str | int, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
         ...
+class Centroidal:
+    """
+    Centre of mass of one model and what is about it.
+    """
+    def __init__(self, arg0: Multibody) -> None:
+        ...
+    def __reduce__(self) -> tuple:
+        ...
+    def columns(self, q: typing.Any, v: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The centroidal momentum matrix, its rate, and the momentum's derivative, (6, nv) each.
+        """
+    def sums(self, q: typing.Any, v: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Centre of mass (3), its velocity (3), inertia about it (9), momentum about it (6).
+        """
 class Methods:
     """
     Forward dynamics of one model by 'cholesky', 'ldl', 'conjugate-gradients' or 'inverse'.

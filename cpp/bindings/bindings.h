@@ -35,6 +35,7 @@ void register_direct_calls(py::module_& m);
 void register_compiled(py::module_& m);
 void register_calculus(py::module_& m);
 void register_sensitivities(py::module_& m);
+void register_centroidal(py::module_& m);
 void register_methods(py::module_& m);
 void register_integration(py::module_& m);
 void register_effects(py::module_& m);

@@ -87,9 +87,9 @@ std::shared_ptr<const Binding> make_binding(const std::vector<Expression>& opera
     for (const auto& s : sources) {
       if (!s->nq() && !s->nv()) continue;
       const auto now = s->state();
-      const std::vector<double> v = v_given.is_none() ? now->v : one_state(v_given, "v");
-      if (taken && (binding->q != now->q || binding->v != v)) throw EvaluationError("operators of two models: bind each with its own .at(q)");
-      binding->q = now->q, binding->v = v, taken = true;
+      const std::vector<double> q = now->q.copy(), v = v_given.is_none() ? now->v.copy() : one_state(v_given, "v");
+      if (taken && (binding->q != q || binding->v != v)) throw EvaluationError("operators of two models: bind each with its own .at(q)");
+      binding->q = q, binding->v = v, taken = true;
       s->check_state(binding->q.data(), binding->q.size(), binding->v.data(), binding->v.size());
     }
   } else {

@@ -8,15 +8,15 @@ import numpy as np
 
 from .. import _core
 from ..state import at_state
+from .centroidal import CentroidalCalls
 from .direct_calls import cached
 from .integrator_names import IntegratorName, integrator_named
-from .sensitivities import SensitivityCalls
 
 if TYPE_CHECKING:
     from .trajectory import Trajectory
 
 
-class IntegrationCalls(SensitivityCalls):
+class IntegrationCalls(CentroidalCalls):
     """q̇ of (q, v), and trajectories under constant generalized forces."""
 
     nq: int

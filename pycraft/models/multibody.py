@@ -14,8 +14,8 @@ from ..closed import Closed
 from ..dynamics.integration import IntegrationCalls
 from ..state import State, at_state, random_state
 from .handles import Body, Hinge, Named, Node, Vector
+from .parts import Parts
 from .pictures import Pictures
-from .with_operators import WithOperators
 
 _Z = (0.0, 0.0, 1.0)
 _DEFAULT_AXES: dict[str, tuple[tuple[float, float, float], ...]] = {
@@ -29,7 +29,7 @@ _DEFAULT_AXES: dict[str, tuple[tuple[float, float, float], ...]] = {
 }
 
 
-class Multibody(Closed, IntegrationCalls, Pictures, WithOperators):
+class Multibody(Closed, IntegrationCalls, Pictures, Parts):
     """A tree of bodies on hinges, with nodes, a state (`q`, `v`) and gravity (zero until it is set).
 
     Build one body by body, or load it (`pycraft.load`). Bodies are kept depth first, children in the order they were added, and
@@ -336,7 +336,12 @@ class Multibody(Closed, IntegrationCalls, Pictures, WithOperators):
         return copy
 
     def __repr__(self) -> str:
-        return f"<multibody {self.name!r}: {self._size} bodies, {self.nv} degrees of freedom>"
+        if self._whole is None:
+            return f"<multibody {self.name!r}: {self._size} bodies, {self.nv} degrees of freedom>"
+        try:
+            return f"<part {self.name!r} of {self._whole.name!r}: {self._size} bodies, {self.nv} degrees of freedom>"
+        except _core.StaleOperatorError:
+            return f"<part {self.name!r} of {self._whole.name!r}, which has changed since>"
 
 
 def _again(description: Mapping[str, Any], left_aside: Mapping[str, np.ndarray], actuators: Sequence[dict[str, Any]] = ()) -> Multibody:
