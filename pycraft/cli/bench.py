@@ -236,6 +236,7 @@ def accuracy(seconds: float = 0.2) -> list[Figure]:
 def run(seconds: float = 0.1) -> dict[str, list[Figure]]:
     """All figures, by heading."""
     from .bench_expressions import expressions
+    from .bench_parts import parts
     from .bench_scenes import scenes
 
     return {
@@ -245,4 +246,5 @@ def run(seconds: float = 0.1) -> dict[str, list[Figure]]:
         "Sensitivities": sensitivities(2 * seconds),
         "What accuracy costs": accuracy(2 * seconds),
         "Scenes": scenes(2 * seconds),
+        "Parts": parts(2 * seconds),
     }
