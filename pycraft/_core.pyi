@@ -229,7 +229,7 @@ class SkoSource:
     @property
     def derived_from(self) -> typing.Any:
         """
-        How this tree was made of a model's, "hinge subset", "world frame" or "groups of bodies", and that model's source; None for a model's own.
+        How this tree was made of a model's, "hinge subset", "world frame", "cut tree" or "groups of bodies", and that model's source; None for a model's own.
         """
     @property
     def dof(self) -> list[int]:
