@@ -36,7 +36,7 @@ std::shared_ptr<const kernels::Program> recorded_gradient(const Multibody& model
   for (int i = 0; i < static_cast<int>(compiled->subhinges.size()); ++i) subhinge_of.insert(subhinge_of.end(), record_of(compiled->subhinges[i].kind).nv, i);
   const StateData at = generic_state(model);
   std::vector<Recorded> q, y(gradient_size(model, over));
-  for (size_t i = 0; i < at.q.size(); ++i) q.push_back(recording.input(at.q.data()[i], 0, static_cast<int>(i)));
+  for (size_t i = 0; i < at.q.size(); ++i) q.push_back(recording.input(at.q[i], 0, static_cast<int>(i)));
   const auto wanted = [&](GradientOver one) { return one == over ? y.data() : nullptr; };
   try {
     log_determinant_gradient(*compiled, tree, blocks, subhinge_of, q.data(),

@@ -289,6 +289,31 @@ def test_scenes_run_on_parts():
     assert np.array_equal(run[0].q, run[1].q) and np.array_equal(run[0].q[0], state.q)
 
 
+def test_a_base_that_moves_by_a_function_of_time():
+    """A cart driven along x under a double pendulum: in a scene of the pendulum alone its base goes where the cart goes."""
+    cart = pc.Multibody("cart")
+    cart.add_body("cart", hinge="slider", axis=(1, 0, 0), mass=2.0, inertia=np.eye(3))
+    for name, parent in (("upper", "cart"), ("lower", "upper")):
+        cart.add_body(name, parent, hinge="pin", axis=(0, 1, 0), position=(0, 0, -0.5), mass=1.0, com=(0, 0, -0.3), inertia=0.1 * np.eye(3))
+    pendulum = cart.subgraph(root="upper", base="moving")
+    along = np.array([0.0, 0, 0, 0, 1, 0, 0])
+
+    def base(t):
+        return np.r_[1.0, np.zeros(6)] + along * np.sin(3 * t), 3 * along * np.cos(3 * t), -9 * along * np.sin(3 * t)
+
+    def drive(t):
+        return tuple(x[4:5] for x in base(t))
+
+    start, gravity = pc.State(np.array([0, 0.3, 0.4]), np.array([3.0, 0.5, -0.2])), pc.effects.Gravity()
+    options = {"t_eval": [0.5, 1.0], "rtol": 1e-11, "atol": 1e-12, "progress": False}
+    runs = [
+        pc.Scene(model).add(gravity, pc.effects.Prescribed(hinge, motion)).simulate(1.0, state.q, state.v, **options)
+        for model, hinge, motion, state in ((cart, "cart", drive, start), (pendulum, "base", base, pendulum.state_of(start)))
+    ]
+    assert np.abs(runs[1].q[:, 7:] - runs[0].q[:, 1:]).max() < 1e-9 and np.abs(runs[1].q[:, 4] - runs[0].q[:, 0]).max() < 1e-15
+    assert np.abs(runs[0].q[1, 1:] - start.q[1:]).max() > 0.1
+
+
 def test_what_a_file_says_beside_the_model_goes_along():
     arm = pc.robots.panda()
     wrist = arm.subgraph(root="panda_link5")

@@ -43,7 +43,9 @@ def test_the_readme_example_runs():
     assert names["MM"].shape == (7, 7)
 
 
-@pytest.mark.parametrize(("page", "examples"), [("sensitivities", 20), ("comparing", 5), ("mixed_trees", 8), ("ensembles", 8), ("subgraphs", 20)])
+@pytest.mark.parametrize(
+    ("page", "examples"), [("sensitivities", 20), ("comparing", 5), ("mixed_trees", 8), ("ensembles", 8), ("subgraphs", 20)]
+)
 def test_the_pages_run(page, examples):
     options = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
     result = doctest.testfile(str(ROOT / "docs" / f"{page}.md"), module_relative=False, optionflags=options)

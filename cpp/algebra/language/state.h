@@ -1,6 +1,7 @@
 // A state of a model: immutable once made, so that readers in several threads need no lock.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <memory>
 #include <utility>
@@ -19,6 +20,9 @@ class SharedNumbers {
     part.first_ = first_ + first, part.size_ = size;
     return part;
   }
+  operator std::vector<double>() const { return copy(); }  // NOLINT: where a vector is wanted
+  const double& operator[](size_t i) const { return data()[i]; }
+  bool operator==(const std::vector<double>& other) const { return std::equal(begin(), end(), other.begin(), other.end()); }
   const double* data() const { return held_->data() + first_; }
   size_t size() const { return size_; }
   const double* begin() const { return data(); }
