@@ -62,7 +62,11 @@ class Multibody:
     """
     A multibody model in the core; pycraft.Multibody is its Python face.
     """
+    @typing.overload
     def __init__(self, name: str = 'multibody', keep_welds: bool = False, strict: bool = False) -> None:
+        ...
+    @typing.overload
+    def __init__(self, whole: Multibody, name: str, bodies: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], moving_base: bool) -> None:
         ...
     def __reduce__(self) -> tuple:
         ...
@@ -74,6 +78,12 @@ class Multibody:
         ...
     def _body_index(self, arg0: str) -> int:
         ...
+    def _follow_base(self) -> None:
+        ...
+    def _frame_body(self, arg0: str) -> int:
+        """
+        The number of the body that a body or node is on, -1 for the base.
+        """
     def _hinge_index(self, arg0: str) -> int:
         ...
     def _hinge_sizes(self) -> tuple[list[str], list[int]]:
@@ -85,6 +95,10 @@ class Multibody:
     def _node_index(self, arg0: str) -> int:
         ...
     def _nodes(self) -> list:
+        ...
+    def _outboard_of(self, root: typing.SupportsInt | typing.SupportsIndex, without: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> list[int]:
+        ...
+    def _path_between(self, a: typing.SupportsInt | typing.SupportsIndex, b: typing.SupportsInt | typing.SupportsIndex) -> list[int]:
         ...
     def _set_limits(self, arg0: typing.SupportsInt | typing.SupportsIndex, arg1: typing.Any, arg2: typing.Any) -> None:
         ...
@@ -120,6 +134,11 @@ class Multibody:
     def _parameters(self) -> int:
         ...
     @property
+    def _part(self) -> typing.Any:
+        """
+        Of a part: its bodies in the whole, its base and where its coordinates are there; None for a model of its own.
+        """
+    @property
     def _size(self) -> int:
         ...
     @property
@@ -142,6 +161,11 @@ class Multibody:
     def keeps_welds(self) -> bool:
         ...
     @property
+    def mass(self) -> float:
+        """
+        Of all bodies, kg.
+        """
+    @property
     def name(self) -> str:
         ...
     @property
@@ -157,7 +181,7 @@ class Multibody:
     @property
     def q(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Generalized coordinates (nq,): copied in when set, read-only when read.
+        Generalized coordinates (nq,): copied in when set, a read-only view when read.
         """
     @q.setter
     def q(self, arg1: typing.Any) -> None:
@@ -168,7 +192,7 @@ class Multibody:
     @property
     def v(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Generalized velocities (nv,): copied in when set, read-only when read.
+        Generalized velocities (nv,): copied in when set, a read-only view when read.
         """
     @v.setter
     def v(self, arg1: typing.Any) -> None:
@@ -205,7 +229,7 @@ class SkoSource:
     @property
     def derived_from(self) -> typing.Any:
         """
-        How this tree was made of a model's, "hinge subset", "world frame" or "groups of bodies", and that model's source; None for a model's own.
+        How this tree was made of a model's, "hinge subset", "world frame", "cut tree" or "groups of bodies", and that model's source; None for a model's own.
         """
     @property
     def dof(self) -> list[int]:

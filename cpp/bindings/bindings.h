@@ -37,6 +37,7 @@ void register_compiled(py::module_& m);
 void register_calculus(py::module_& m);
 void register_sensitivities(py::module_& m);
 void register_frames(py::module_& m);
+void register_centroidal(py::module_& m);
 void register_methods(py::module_& m);
 void register_integration(py::module_& m);
 void register_effects(py::module_& m);

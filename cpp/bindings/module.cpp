@@ -47,6 +47,7 @@ PYBIND11_MODULE(_core, m) {
   pycraft::register_compiled(m);
   pycraft::register_sensitivities(m);
   pycraft::register_frames(m);
+  pycraft::register_centroidal(m);
   pycraft::register_methods(m);
   pycraft::register_integration(m);
   pycraft::register_effects(m);

@@ -24,6 +24,15 @@ py::dict node_dict(const Node& n) {
   return d;
 }
 
+// Read-only, and without a copy: the array keeps the numbers alive.
+py::array_t<double> view(const SharedNumbers& numbers) {
+  using Held = std::shared_ptr<const void>;
+  const py::capsule holder(new Held(numbers.holder()), [](void* held) { delete static_cast<Held*>(held); });
+  py::array_t<double> a(static_cast<py::ssize_t>(numbers.size()), numbers.data(), holder);
+  a.attr("setflags")(py::arg("write") = false);
+  return a;
+}
+
 std::string subhinge_kinds() {
   std::string all;
   for (const SubhingeRecord& row : subhinge_records) all += (all.empty() ? "" : ", ") + std::string(row.name);
@@ -90,11 +99,17 @@ void register_multibody(py::module_& m) {
   m.attr("hinge_kinds") = hinges;
   declared<py::class_<Multibody, std::shared_ptr<Multibody>>>(m, "Multibody")
       .def(py::init<std::string, bool, bool>(), py::arg("name") = "multibody", py::arg("keep_welds") = false, py::arg("strict") = false)
+      .def(py::init(&Multibody::part_of), py::arg("whole"), py::arg("name"), py::arg("bodies"), py::arg("moving_base"))
       .def_property_readonly("name", &Multibody::name)
       .def_property_readonly("keeps_welds", &Multibody::keeps_welds)
       .def_property_readonly("strict", &Multibody::strict)
       .def_property_readonly("nq", &Multibody::nq, "Numbers in q: 4 for a ball, 7 for a free hinge, else one a coordinate.")
       .def_property_readonly("nv", &Multibody::nv, "Generalized velocities: the degrees of freedom.")
+      .def_property_readonly("mass", [](const Multibody& mb) {
+        double all = 0;
+        for (int k = mb.bodies() - 1; k >= 0; --k) all += mb.body(k).mass;
+        return all;
+      }, "Of all bodies, kg.")
       .def_property_readonly("_size", &Multibody::bodies)
       .def_property_readonly("_parameters", &Multibody::parameters)
       .def("_add_body",
@@ -209,21 +224,17 @@ void register_multibody(py::module_& m) {
                     [](Multibody& mb, const py::object& g) { mb.set_gravity(to_vector3(g, "gravity")); },
                     "Gravity acceleration in world axes, m/s²; zero until it is set.")
       .def_property("q", [](const Multibody& mb) {
-        py::array_t<double> a = to_numpy(mb.state()->q);
-        a.attr("setflags")(py::arg("write") = false);
-        return a;
+        return view(mb.state()->q);
       }, [](Multibody& mb, const py::object& given) {
         mb.set_q(one_state(given, "q"));
       },
-         "Generalized coordinates (nq,): copied in when set, read-only when read.")
+         "Generalized coordinates (nq,): copied in when set, a read-only view when read.")
       .def_property("v", [](const Multibody& mb) {
-        py::array_t<double> a = to_numpy(mb.state()->v);
-        a.attr("setflags")(py::arg("write") = false);
-        return a;
+        return view(mb.state()->v);
       }, [](Multibody& mb, const py::object& given) {
         mb.set_v(one_state(given, "v"));
       },
-         "Generalized velocities (nv,): copied in when set, read-only when read.")
+         "Generalized velocities (nv,): copied in when set, a read-only view when read.")
       .def("zero_q", [](const Multibody& mb) { return to_numpy(mb.zero_q()); }, "All coordinates zero, quaternions (1, 0, 0, 0).")
       .def("integrate", [](const Multibody& mb, const py::object& at, const py::object& along) {
         const std::vector<double> q = one_state(at, "q"), dv = one_state(along, "dv");
@@ -246,6 +257,18 @@ void register_multibody(py::module_& m) {
         mb.check_q(q.data(), q.size());
       })
       .def("take_warnings", &Multibody::take_warnings)
+      .def("_frame_body", [](const Multibody& mb, const std::string& name) { return mb.node(mb.node_index(name)).body; },
+           "The number of the body that a body or node is on, -1 for the base.")
+      .def("_outboard_of", &outboard_of, py::arg("root"), py::arg("without"))
+      .def("_path_between", &path_between, py::arg("a"), py::arg("b"))
+      .def("_follow_base", &Multibody::follow_base)
+      .def_property_readonly("_part", [](const Multibody& mb) -> py::object {
+        if (!mb.part()) return py::none();
+        const PartOf& of = *mb.part();
+        mb.nq();  // StaleOperatorError where the whole has changed
+        return py::dict(py::arg("bodies") = of.bodies, py::arg("moving_base") = of.moving_base, py::arg("carrier") = of.carrier,
+                        py::arg("q_runs") = of.q_runs, py::arg("v_runs") = of.v_runs);
+      }, "Of a part: its bodies in the whole, its base and where its coordinates are there; None for a model of its own.")
       // A model whose Python face is gone (an operator held alone) is pickled as its face would be.
       .def("__reduce__", [](const py::object& self) -> py::tuple {
         return py::make_tuple(of_face("model_from_description"), py::make_tuple(of_face("describe")(self)));

@@ -87,9 +87,9 @@ std::shared_ptr<const Binding> make_binding(const std::vector<Expression>& opera
     for (const auto& s : sources) {
       if (!s->nq() && !s->nv()) continue;
       const auto now = s->state();
-      const std::vector<double> v = v_given.is_none() ? now->v : one_state(v_given, "v");
-      if (taken && (binding->q != now->q || binding->v != v)) throw EvaluationError("operators of two models: bind each with its own .at(q)");
-      binding->q = now->q, binding->v = v, taken = true;
+      const std::vector<double> q = now->q.copy(), v = v_given.is_none() ? now->v.copy() : one_state(v_given, "v");
+      if (taken && (binding->q != q || binding->v != v)) throw EvaluationError("operators of two models: bind each with its own .at(q)");
+      binding->q = q, binding->v = v, taken = true;
       s->check_state(binding->q.data(), binding->q.size(), binding->v.data(), binding->v.size());
     }
   } else {
@@ -160,6 +160,7 @@ void register_sources(py::module_& m) {
         const auto* derived = dynamic_cast<const DerivedOperators*>(&s);
         if (!derived) throw py::type_error("operators of '" + s.name() + "' cannot be pickled or copied; make them anew where they are wanted");
         derived->base()->check_current();
+        if (const auto* cut = dynamic_cast<const CutTree*>(derived)) return py::make_tuple(made, py::make_tuple(cut->base(), py::make_tuple("cut", cut->body())));
         const auto* subset = dynamic_cast<const SomeCoordinates*>(derived);
         return py::make_tuple(made, py::make_tuple(derived->base(), subset ? py::cast(subset->kept()) : py::object(py::str("world frame"))));
       })
@@ -179,9 +180,12 @@ void register_sources(py::module_& m) {
       .def_property_readonly("derived_from", [](const SkoSource& s) -> py::object {
         const auto* derived = dynamic_cast<const DerivedOperators*>(&s);
         if (derived == nullptr) return py::none();
-        const char* how = dynamic_cast<const WorldFrame*>(&s) ? "world frame" : dynamic_cast<const GroupedOperators*>(&s) ? "groups of bodies" : "hinge subset";
+        const char* how = dynamic_cast<const WorldFrame*>(&s)         ? "world frame"
+                          : dynamic_cast<const GroupedOperators*>(&s) ? "groups of bodies"
+                          : dynamic_cast<const CutTree*>(&s)          ? "cut tree"
+                                                                      : "hinge subset";
         return py::make_tuple(how, derived->base());
-      }, "How this tree was made of a model's, \"hinge subset\", \"world frame\" or \"groups of bodies\", and that model's source; None for a model's own.")
+      }, "How this tree was made of a model's, \"hinge subset\", \"world frame\", \"cut tree\" or \"groups of bodies\", and that model's source; None for a model's own.")
       .def_property_readonly("groups", [](const SkoSource& s) -> py::object {
         const auto* grouped = dynamic_cast<const GroupedOperators*>(&s);
         return grouped ? py::cast(grouped->groups()) : py::object(py::none());
@@ -214,13 +218,15 @@ void register_sources(py::module_& m) {
     if (!robot) throw ModelError("coordinates of '" + base->name() + "' are not prescribed: it is no multibody model of its own");
     return std::make_shared<SomeCoordinates>(robot, std::vector<char>(kept.begin(), kept.end()));
   }, py::arg("base"), py::arg("kept"));
-  // how: "bodies in pairs", "world frame", ("groups", the bodies of each), or which coordinates move
+  // how: "bodies in pairs", "world frame", ("groups", the bodies of each), ("cut", at the hinge of which body), or which coordinates move
   m.def("_derived_operators", [](const std::shared_ptr<SkoSource>& base, const py::object& how) -> std::shared_ptr<SkoSource> {
     const std::string kind = py::isinstance<py::str>(how) ? how.cast<std::string>() : "coordinates";
     if (kind == "bodies in pairs") return std::make_shared<AggregatedTree>(base);
     const auto model = std::dynamic_pointer_cast<MultibodyOperators>(base);
     if (!model) throw EvaluationError("'" + base->name() + "' is no multibody model");
     if (kind == "world frame") return std::make_shared<WorldFrame>(model);
+    if (py::isinstance<py::tuple>(how) && how.cast<py::tuple>()[0].cast<std::string>() == "cut")
+      return std::make_shared<CutTree>(model, how.cast<py::tuple>()[1].cast<int>());
     if (py::isinstance<py::tuple>(how))
       return std::make_shared<GroupedOperators>(model, Grouping(model->structure(), model->name(), how.cast<py::tuple>()[1].cast<std::vector<std::vector<int>>>()));
     return std::make_shared<SomeCoordinates>(model, how.cast<std::vector<char>>());

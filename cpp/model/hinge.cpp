@@ -124,4 +124,12 @@ Subhinge subhinge_of(SubhingeKind kind, const Vector3<double>& axis, const Vecto
   return subhinge_along(kind, record_of(kind).axis ? unit(axis, hinge) : Vector3<double>{0, 0, 1}, point, pitch);
 }
 
+void append_zero(const Hinge& hinge, std::vector<double>& q) {
+  for (const Subhinge& s : hinge.subhinges) {
+    const size_t at = q.size();
+    q.resize(at + s.nq(), 0.0);
+    if (s.record().quaternion >= 0) q[at + s.record().quaternion] = 1;
+  }
+}
+
 }  // namespace pycraft

@@ -47,6 +47,9 @@ struct Hinge {
   int nv() const;
 };
 
+// The hinge's coordinates at zero, after those that are there: a quaternion is that of no rotation.
+void append_zero(const Hinge& hinge, std::vector<double>& q);
+
 // The subhinges of a kind from its axes, as many as it takes. Axes are normalised; one of zero length is an error that names the hinge.
 std::vector<Subhinge> subhinges_of(HingeKind kind, const std::vector<Vector3<double>>& axes, const Vector3<double>& point, double pitch,
                                    const std::string& hinge_name);

@@ -15,27 +15,26 @@
 
 namespace pycraft {
 
-namespace {
-
-// The hinge's coordinates at zero: a quaternion is that of no rotation.
-void append_zero(const Hinge& hinge, std::vector<double>& q) {
-  for (const Subhinge& s : hinge.subhinges) {
-    const size_t at = q.size();
-    q.resize(at + s.nq(), 0.0);
-    if (s.record().quaternion >= 0) q[at + s.record().quaternion] = 1;
-  }
-}
-
-}  // namespace
-
 Multibody::Multibody(std::string name, bool keep_welds, bool strict) : name_(std::move(name)), keep_welds_(keep_welds), strict_(strict) {
   q_offset_ = v_offset_ = {0};
   state_ = std::make_shared<StateData>();
 }
 
-Multibody::Edit::Edit(Multibody& model) : use_(model.use_) {
-  if (!use_.try_edit())
-    throw ModelError("'" + model.name_ + "' is being evaluated, in another thread or by a call that this edit is made from: edit it when that is over");
+Multibody::Edit::Edit(Multibody& model) {
+  begin(model);
+  model.with_parts(parts_);
+  for (const auto& part : parts_) begin(*part);
+}
+
+void Multibody::Edit::end() {
+  for (UseCount* use : edited_) use->end_edit();
+  edited_.clear();
+}
+
+void Multibody::Edit::begin(Multibody& model) {
+  if (model.use_.try_edit()) return edited_.push_back(&model.use_);
+  end();
+  throw ModelError("'" + model.name_ + "' is being evaluated, in another thread or by a call that this edit is made from: edit it when that is over");
 }
 
 // ------------------------------------------------------------------ structure
@@ -56,6 +55,7 @@ Node Multibody::find_frame(const std::string& name) const {
 }
 
 void Multibody::add_body(Body body, const std::string& parent) {
+  require_whole("add body '" + body.name + "'");
   const Edit edit(*this);
   check_new_name(body.name, "body");
   if (body.hinge.name.empty()) body.hinge.name = body.name;
@@ -109,13 +109,13 @@ void Multibody::lump(const Body& body, const Node& onto) {
   const Pose<double> X = body.hinge.placement;  // in the body that moves it
   if (onto.body >= 0 && (body.mass != 0 || std::any_of(body.inertia.s, body.inertia.s + 6, [](double x) { return x != 0; }))) {
     bodies_[onto.body] = lumped(bodies_[onto.body], X, body);
-    ++parameters_;
+    body_changed(onto.body);
   }
-  node_numbers_[body.name] = static_cast<int>(nodes_.size());
-  nodes_.push_back({body.name, onto.body, X});
+  node_added({body.name, onto.body, X});
 }
 
 void Multibody::remove_body(const std::string& name) {
+  require_whole("remove body '" + name + "'");
   const Edit edit(*this);
   settle();
   const int first = body_index(name);
@@ -132,22 +132,30 @@ void Multibody::remove_body(const std::string& name) {
 }
 
 void Multibody::add_node(const std::string& name, const std::string& body, const Pose<double>& pose) {
+  if (part_) {
+    const Node onto = (settled(), find_frame(body));
+    if (onto.body >= 0) number_in_whole(onto.body);  // not on a moving base
+    if (onto.body < 0 && !part_->has(-1))
+      throw ModelError("the base of '" + name_ + "' is a body of '" + part_->whole->name() + "': put node '" + name + "' on '" + part_->whole->body(part_->carrier).name + "' there");
+    return part_->whole->add_node(name, body, pose);
+  }
   const Edit edit(*this);
   check_new_name(name, "node");
   const Node onto = find_frame(body);
   const Pose<double> placed = placed_on(onto.pose, pose, "node '" + name + "'");
-  node_numbers_[name] = static_cast<int>(nodes_.size());
-  nodes_.push_back({name, onto.body, placed});
+  node_added({name, onto.body, placed});
 }
 
 void Multibody::structure_changed(const std::string& reason) {
   if (const auto source = operators_.lock()) source->invalidate(reason);
   operators_.reset();
   ++parameters_;
+  for_each_part([&](Multibody& part) { part.whole_changed(reason); });
+  parts_.clear();  // stale, they follow no more
   if (!settled_.load()) return;
   for (int k = 0; k < bodies(); ++k) {
-    const auto &q = state_->q, &v = state_->v;
-    carried_[bodies_[k].hinge.name] = {{q.begin() + q_offset_[k], q.begin() + q_offset_[k + 1]}, {v.begin() + v_offset_[k], v.begin() + v_offset_[k + 1]}};
+    const double *q = state_->q.data(), *v = state_->v.data();
+    carried_[bodies_[k].hinge.name] = {{q + q_offset_[k], q + q_offset_[k + 1]}, {v + v_offset_[k], v + v_offset_[k + 1]}};
   }
   settled_.store(false);
 }
@@ -159,6 +167,7 @@ void Multibody::settle_once() const {
 
 void Multibody::settle() {
   if (settled_.load()) return;
+  if (!stale_.empty()) throw StaleOperatorError(stale_);
   const int n = bodies();
   std::vector<std::vector<int>> children(n + 1);
   for (int k = 0; k < n; ++k) children[bodies_[k].parent + 1].push_back(k);
@@ -183,7 +192,7 @@ void Multibody::settle() {
   body_numbers_.clear(), hinge_numbers_.clear(), node_numbers_.clear();
   q_offset_ = v_offset_ = {0};
   quaternions_.clear();
-  auto state = std::make_shared<StateData>();
+  std::vector<double> q, v;
   for (int k = 0; k < n; ++k) {
     const Hinge& h = bodies_[k].hinge;
     body_numbers_[bodies_[k].name] = k;
@@ -196,16 +205,16 @@ void Multibody::settle() {
     v_offset_.push_back(v_offset_.back() + h.nv());
     const auto old = carried_.find(h.name);
     if (old != carried_.end() && static_cast<int>(old->second.first.size()) == h.nq()) {
-      state->q.insert(state->q.end(), old->second.first.begin(), old->second.first.end());
-      state->v.insert(state->v.end(), old->second.second.begin(), old->second.second.end());
+      q.insert(q.end(), old->second.first.begin(), old->second.first.end());
+      v.insert(v.end(), old->second.second.begin(), old->second.second.end());
     } else {
-      append_zero(h, state->q);
-      state->v.resize(state->v.size() + h.nv(), 0.0);
+      append_zero(h, q);
+      v.resize(v.size() + h.nv(), 0.0);
     }
   }
   for (size_t i = 0; i < nodes_.size(); ++i) node_numbers_[nodes_[i].name] = static_cast<int>(i);
   carried_.clear();
-  state_ = state;
+  state_ = std::make_shared<StateData>(StateData{std::move(q), std::move(v)});
   settled_.store(true, std::memory_order_release);
 }
 
@@ -256,37 +265,41 @@ SkoStructure Multibody::structure() const {
 // ------------------------------------------------------------------ parameters
 
 void Multibody::set_mass_properties(int k, double mass, const Vector3<double>& com, const Symmetric3<double>& inertia) {
+  if (part_) return part_->whole->set_mass_properties(number_in_whole(k), mass, com, inertia);
   const Edit edit(*this);
   note(body(k).name, check_mass_properties(body(k).name, mass, com, inertia));
   bodies_[k].mass = mass;
   bodies_[k].com = com;
   bodies_[k].inertia = inertia;
-  ++parameters_;
+  body_changed(k);
 }
 void Multibody::set_placement(int k, const Pose<double>& placement) {
+  if (part_) return part_->whole->set_placement(number_in_whole(k), placement);
   const Edit edit(*this);
   const Pose<double> checked = checked_pose(placement, "the placement of hinge '" + body(k).hinge.name + "'");
   bodies_[k].hinge.placement = checked;
-  ++parameters_;
+  body_changed(k);
 }
 void Multibody::set_rotor_inertia(int k, const std::vector<double>& values) {
+  if (part_) return part_->whole->set_rotor_inertia(number_in_whole(k), values);
   const Edit edit(*this);
   std::vector<double> checked = checked_rotor_inertia(body(k).hinge, values);
   bodies_[k].hinge.rotor_inertia = std::move(checked);
-  ++parameters_;
+  body_changed(k);
 }
 void Multibody::set_limits(int k, const std::vector<double>& lower, const std::vector<double>& upper) {
+  if (part_) return part_->whole->set_limits(number_in_whole(k), lower, upper);
   const Edit edit(*this);
   check_limits(body(k).hinge, lower, upper);
   bodies_[k].hinge.lower = lower, bodies_[k].hinge.upper = upper;
-  ++parameters_;
+  body_changed(k);
 }
 void Multibody::set_gravity(const Vector3<double>& g) {
+  if (part_) return part_->whole->set_gravity(g);
   const Edit edit(*this);
   for (int i = 0; i < 3; ++i)
     if (!std::isfinite(g[i])) throw ModelError("gravity of '" + name_ + "' has an entry that is " + short_number(g[i]));
-  gravity_ = g;
-  ++parameters_;
+  gravity_changed(g);
 }
 bool Multibody::has_rotor_inertia() const {
   settled();
@@ -297,6 +310,7 @@ bool Multibody::has_rotor_inertia() const {
 
 std::vector<std::pair<std::string, std::string>> Multibody::take_warnings() {
   settled();
+  if (part_) return part_->whole->take_warnings();
   auto all = std::move(warnings_);
   warnings_.clear();
   for (const Body& b : bodies_)
@@ -305,66 +319,6 @@ std::vector<std::pair<std::string, std::string>> Multibody::take_warnings() {
                     "' has no mass: what needs D⁻¹ (forward dynamics, ℳ⁻¹) works only where the bodies outboard give the hinge inertia");
   return all;
 }
-
-// ------------------------------------------------------------------ state
-
-std::shared_ptr<const StateData> Multibody::state() const {
-  settled();
-  std::lock_guard<Mutex> lock(mutex_);
-  return state_;
-}
-
-void Multibody::check_q(const double* q, size_t size) const {
-  if (static_cast<int>(size) != nq())
-    throw ModelError("q of '" + name_ + "' takes " + std::to_string(nq()) + " numbers (" + std::to_string(bodies()) + " hinges), not " + std::to_string(size));
-  const auto directed = [q](int at) { return q[at] * q[at] + q[at + 1] * q[at + 1] + q[at + 2] * q[at + 2] + q[at + 3] * q[at + 3] > 1e-12; };
-  if (all_finite(q, size) && std::all_of(quaternions_.begin(), quaternions_.end(), directed)) return;  // the rule; else hinge by hinge
-  for (int k = 0; k < bodies(); ++k)
-    check_configuration(bodies_[k].hinge, q + q_offset_[k]);
-}
-
-void Multibody::check_v(const double* v, size_t size, const char* what) const {
-  if (static_cast<int>(size) != nv())
-    throw ModelError(std::string(what) + " of '" + name_ + "' takes " + std::to_string(nv()) + " numbers, not " + std::to_string(size));
-  if (all_finite(v, size)) return;
-  for (int k = 0; k < bodies(); ++k)
-    check_rates(bodies_[k].hinge, v + v_offset_[k], what);
-}
-
-void Multibody::set_q(const std::vector<double>& q) {
-  check_q(q.data(), q.size());
-  auto next = std::make_shared<StateData>();
-  next->q = q;
-  std::lock_guard<Mutex> lock(mutex_);
-  next->v = state_->v;
-  state_ = next;
-}
-void Multibody::set_v(const std::vector<double>& v) {
-  check_v(v.data(), v.size(), "v");
-  auto next = std::make_shared<StateData>();
-  next->v = v;
-  std::lock_guard<Mutex> lock(mutex_);
-  next->q = state_->q;
-  state_ = next;
-}
-
-std::vector<double> Multibody::zero_q() const {
-  settled();
-  std::vector<double> q;
-  for (const Body& b : bodies_) append_zero(b.hinge, q);
-  return q;
-}
-
-void Multibody::integrate(const double* q, const double* dv, double* out) const {
-  const auto model = compiled<double>();
-  // A product of quaternions keeps the length up to rounding; over many steps that would walk, so it is set to what it was.
-  std::vector<double> lengths(model->subhinges.size());
-  quaternion_lengths(*model, q, lengths.data());
-  move_configuration(*model, q, dv, out);
-  scale_quaternions<double>(*model, lengths.data(), out);
-}
-
-void Multibody::difference(const double* q0, const double* q1, double* out) const { configuration_difference(*compiled<double>(), q0, q1, out); }
 
 // ------------------------------------------------------------------ flat arrays
 

@@ -12,6 +12,7 @@
 
 #include "algebra/language/source.h"
 #include "model/hinge.h"
+#include "model/part.h"
 #include "runtime/mutex.h"
 #include "spatial/rigid_inertia.h"
 
@@ -87,6 +88,14 @@ class Multibody : public std::enable_shared_from_this<Multibody> {
   void integrate(const double* q, const double* dv, double* out) const;          // q moved by the velocity dv for unit time
   void difference(const double* q0, const double* q1, double* out) const;        // dv with integrate(q0, dv) = q1
 
+  // ---- parts (part.h)
+  // Some of the bodies of `whole`, by number, as a model of their own that follows its parameters and shares its state. An edit of a body here is
+  // one there; an edit of the whole's structure makes the part stale (StaleOperatorError). ModelError where the bodies do not hang together.
+  static std::shared_ptr<Multibody> part_of(const std::shared_ptr<Multibody>& whole, const std::string& name, std::vector<int> bodies, bool moving_base);
+  const PartOf* part() const { return part_.get(); }  // null: no part
+  // The state of a moving base is the carrier's again, after it was set here.
+  void follow_base();
+
   // What is legal but worth a word, and of which body: triangle inequalities, massless bodies on hinges. Said once.
   std::vector<std::pair<std::string, std::string>> take_warnings();
 
@@ -103,15 +112,18 @@ class Multibody : public std::enable_shared_from_this<Multibody> {
   void keep_operators(const std::shared_ptr<SkoSource>& source);
 
  private:
-  // An edit in progress: nobody evaluates meanwhile. Throws where somebody does.
+  // An edit in progress: nobody evaluates meanwhile, the model or a part of it. Throws where somebody does.
   class Edit {
    public:
     explicit Edit(Multibody& model);
-    ~Edit() { use_.end_edit(); }
+    ~Edit() { end(); }
     Edit(const Edit&) = delete;
 
    private:
-    UseCount& use_;
+    void begin(Multibody& model);
+    void end();
+    std::vector<std::shared_ptr<Multibody>> parts_;
+    std::vector<UseCount*> edited_;
   };
   void note(const std::string& body, const std::string& text);
   void check_coordinate_names(const Hinge& hinge) const;
@@ -119,6 +131,21 @@ class Multibody : public std::enable_shared_from_this<Multibody> {
   Node find_frame(const std::string& name) const;   // a node, or a body's own frame
   void lump(const Body& body, const Node& onto);
   void structure_changed(const std::string& reason);
+  // Of parts: what they are told, and what is theirs alone.
+  void with_parts(std::vector<std::shared_ptr<Multibody>>& all) const;  // parts, and parts of parts
+  template <class F>
+  void for_each_part(F f) {
+    for (const auto& known : parts_)
+      if (const auto part = known.lock()) f(*part);
+  }
+  void body_changed(int k);
+  void node_added(const Node& node);
+  void gravity_changed(const Vector3<double>& g);
+  void whole_changed(const std::string& reason);
+  int number_in_whole(int k) const;
+  void require_whole(const std::string& edit) const;
+  std::shared_ptr<const StateData> state_of_part() const;
+  void set_in_whole(const std::vector<double>& numbers, bool of_q);
   // Bodies are put in depth-first order, coordinates numbered and q, v carried over by hinge name: at the first look after an edit.
   const Multibody& settled() const {
     if (!settled_.load(std::memory_order_acquire)) settle_once();
@@ -135,7 +162,7 @@ class Multibody : public std::enable_shared_from_this<Multibody> {
   std::vector<int> q_offset_, v_offset_;    // one longer than bodies
   std::vector<int> quaternions_;            // where in q they begin
   Vector3<double> gravity_{0, 0, 0};
-  std::shared_ptr<const StateData> state_;
+  mutable std::shared_ptr<const StateData> state_;
   mutable Mutex mutex_;
   mutable UseCount use_;
   std::atomic<std::uint64_t> parameters_ = 1;  // read beside edits
@@ -144,6 +171,13 @@ class Multibody : public std::enable_shared_from_this<Multibody> {
   std::unordered_map<std::string, std::pair<std::vector<double>, std::vector<double>>> carried_;  // q, v by hinge, across an edit
   std::atomic<bool> settled_{true};
   std::weak_ptr<SkoSource> operators_;
+  std::vector<std::weak_ptr<Multibody>> parts_;
+  std::unique_ptr<const PartOf> part_;
+  std::string stale_;                       // of a part: why it is none any more
+  mutable std::shared_ptr<const StateData> whole_state_;  // of which, at that version, state_ was made
+  mutable std::uint64_t whole_version_ = 0;
+  std::uint64_t base_given_ = 0;            // grows with what is given to a moving base
+  std::vector<double> base_q_, base_v_;     // given to it; empty: the carrier's
   template <class S>
   using CompiledPointer = std::shared_ptr<const CompiledModel<S>>;
   mutable PerScalar<CompiledPointer> compiled_;

@@ -15,11 +15,10 @@ std::shared_ptr<const CompiledModel<Recorded>> Multibody::compiled<Recorded>() c
 StateData generic_state(const Multibody& model) {
   constexpr double golden = 0.6180339887498949;
   const auto number = [](int i) { return (i % 3 == 1 ? -1 : 1) * (0.4 + 0.6 * std::fmod(golden * (i + 1), 1.0)); };
-  StateData at{model.zero_q(), {}};
-  std::vector<double> along;
-  for (int i = 0; i < model.nv(); ++i) along.push_back(number(i)), at.v.push_back(number(i + model.nv()));
-  model.integrate(model.zero_q().data(), along.data(), at.q.data());
-  return at;
+  std::vector<double> q = model.zero_q(), along, v;
+  for (int i = 0; i < model.nv(); ++i) along.push_back(number(i)), v.push_back(number(i + model.nv()));
+  model.integrate(model.zero_q().data(), along.data(), q.data());
+  return {std::move(q), std::move(v)};
 }
 
 }  // namespace pycraft

@@ -19,6 +19,15 @@ SkoStructure kept_structure(const SkoStructure& t, const std::vector<char>& kept
   return s;
 }
 
+SkoStructure cut_structure(const SkoStructure& t, int body) {
+  SkoStructure s = t;
+  s.coordinate_names.clear();
+  s.offset.clear(), s.dof_offset.clear();
+  s.parent[body] = -1;
+  s.finish();
+  return s;
+}
+
 }  // namespace
 
 DerivedOperators::DerivedOperators(SkoStructure structure, const std::string& name, std::shared_ptr<MultibodyOperators> base)
@@ -44,6 +53,16 @@ SomeCoordinates::SomeCoordinates(std::shared_ptr<MultibodyOperators> base, std::
 }
 #define PYCRAFT_MAKE_VALUES(S) \
   std::unique_ptr<SkoValues<S>> SomeCoordinates::make_values(S) const { return std::make_unique<SubsetValues<S>>(*this, base_->structure()); }
+PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_MAKE_VALUES)
+#undef PYCRAFT_MAKE_VALUES
+
+CutTree::CutTree(std::shared_ptr<MultibodyOperators> base, int body)
+    : DerivedOperators(cut_structure(base->structure(), body), base->name() + ", cut", base), body_(body) {
+  share_bodies_with(*base_);
+  share_coordinates_with(*base_);
+}
+#define PYCRAFT_MAKE_VALUES(S) \
+  std::unique_ptr<SkoValues<S>> CutTree::make_values(S) const { return std::make_unique<CutValues<S>>(*this); }
 PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_MAKE_VALUES)
 #undef PYCRAFT_MAKE_VALUES
 

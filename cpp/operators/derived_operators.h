@@ -2,6 +2,7 @@
 //
 //   some coordinates:    H_s keeps their rows of H, the others are locked (hybrid dynamics: free and prescribed coordinates)
 //   the world frame:     X = blockdiag φ(0,k):  E' = parent matrix ⊗ 1,  H' = HX⁻¹,  M' = XMX*
+//   a cut at a hinge:    E_c = E without the block of that body: all outboard of it and the rest, each a part with a fixed base of its own
 #pragma once
 
 #include <memory>
@@ -44,6 +45,17 @@ class SomeCoordinates final : public DerivedOperators {
 
  private:
   std::vector<char> kept_;
+};
+
+// Two parts: a body with all outboard of it, and the rest. The body must be inboard of the last one, or that: then its part is a run at the end.
+class CutTree final : public DerivedOperators {
+ public:
+  CutTree(std::shared_ptr<MultibodyOperators> base, int body);
+  int body() const { return body_; }
+  PYCRAFT_FOR_EACH_SCALAR_AND_RECORDED(PYCRAFT_OVERRIDE_MAKE_VALUES)
+
+ private:
+  int body_;
 };
 
 // Everything in world axes about the world's origin.

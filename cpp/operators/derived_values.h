@@ -61,6 +61,21 @@ class SubsetValues final : public DerivedValues<S> {
 };
 
 template <class S>
+class CutValues final : public DerivedValues<S> {
+ public:
+  explicit CutValues(const CutTree& source) : DerivedValues<S>(source.structure(), source.base()->structure(), source.model()) {}
+
+ protected:
+  void derive(const RigidBlocks<S>& all) override {
+    RigidBlocks<S>& b = this->blocks_;
+    b.pose = all.pose;
+    b.inertia = all.inertia;
+    b.inertia_factors = all.inertia_factors;
+    b.H = all.H, b.J = all.J, b.aligned = all.aligned;
+  }
+};
+
+template <class S>
 class WorldValues final : public DerivedValues<S> {
  public:
   explicit WorldValues(const WorldFrame& source) : DerivedValues<S>(source.structure(), source.structure(), source.model()) {}

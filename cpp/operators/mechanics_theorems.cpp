@@ -1,4 +1,4 @@
-// Theorems that need mechanics: velocities and forces, innovations, Coriolis matrices, gravity, hybrid dynamics, the world frame.
+// Theorems that need mechanics: velocities and forces, innovations, Coriolis matrices, gravity, hybrid dynamics, the world frame, subgraphs.
 // Those that need loops or flexible bodies are listed as waiting; the calculus is in calculus_theorems.cpp.
 #include "operators/derived_operators.h"
 #include "operators/directions.h"
@@ -135,6 +135,30 @@ struct MechanicsTheorems : Statements {
     shown("ln det ℳ = ln det ℳ_ff + ln det(ℳ_pp - ℳ_pf(ℳ_ff)⁻¹ℳ_fp)", "\\ln\\det\\mathcal{M} = \\ln\\det\\mathcal{M}_{ff}+\\ln\\det(\\mathcal{M}_{pp}-\\mathcal{M}_{pf}\\mathcal{M}_{ff}^{-1}\\mathcal{M}_{fp})");
   }
 
+  // Halfway on the way from the base to the last body the tree is cut: X = E - E_c is the one block that joins the two parts. What has X before
+  // it is read at the cut body and outboard of it alone.
+  void subgraphs() {
+    group = "Subgraphs (all outboard of a body, and the rest: cut at its hinge)";
+    std::vector<int> way;
+    for (int k = robot->structure().bodies() - 1; k >= 0; k = robot->structure().parent[k]) way.push_back(k);
+    if (way.empty()) return;
+    const Letters C(std::make_shared<CutTree>(robot, way[(way.size() - 1) / 2]));
+    const Expression X = E - C.E;
+    state("the whole by its parts", C.phi + C.phi * X * phi, phi, no_hypothesis, "resolvents of E and E_c");
+    shown("φ_c + φ_c(E - E_c)φ = φ", "\\phi_c + \\phi_c(\\mathcal{E}-\\mathcal{E}_c)\\phi = \\phi");
+    state("φ of a subgraph is a block of φ", C.phi + C.phi * X * C.phi, phi, no_hypothesis, "a way leads over the cut once");
+    shown("φ_c + φ_c(E - E_c)φ_c = φ", "\\phi_c + \\phi_c(\\mathcal{E}-\\mathcal{E}_c)\\phi_c = \\phi");
+    state("ψ of the whole by its parts", C.psi + C.psi * (E_psi - C.E_psi) * psi, psi, no_hypothesis, "resolvents of E_ψ and E_ψc");
+    shown("ψ_c + ψ_c(E_ψ - E_ψc)ψ = ψ", "\\psi_c + \\psi_c(\\mathcal{E}_\\psi-\\mathcal{E}_{\\psi c})\\psi = \\psi");
+    state("mass matrix of the whole by its parts", H * (I + C.phi * X) * C.phi * M * C.phi.T() * (I + X.T() * C.phi.T()) * H.T(), MM, no_hypothesis,
+          "a way leads over the cut once");
+    shown("H(I + φ_cX)φ_cMφ_c*(I + X*φ_c*)H* = ℳ,  X = E - E_c", "H(I+\\phi_cX)\\phi_cM\\phi_c^*(I+X^*\\phi_c^*)H^* = \\mathcal{M},\\quad X=\\mathcal{E}-\\mathcal{E}_c");
+    state("composite inertia of all outboard of a body", X * C.R, X * R, no_hypothesis, "the recursion of R goes tip to base");
+    shown("(E - E_c)R_c = (E - E_c)R", "(\\mathcal{E}-\\mathcal{E}_c)\\mathcal{R}_c = (\\mathcal{E}-\\mathcal{E}_c)\\mathcal{R}");
+    state("articulated inertia of all outboard of a body", X * C.P, X * P, no_hypothesis, "the recursion of P goes tip to base");
+    shown("(E - E_c)P_c = (E - E_c)P", "(\\mathcal{E}-\\mathcal{E}_c)\\mathcal{P}_c = (\\mathcal{E}-\\mathcal{E}_c)\\mathcal{P}");
+  }
+
   void waiting() {
     group = "Waiting";
     const std::string loops = "loops", flexible = "flexible bodies";
@@ -161,6 +185,7 @@ std::vector<Theorem> mechanics_theorems(const std::shared_ptr<MultibodyOperators
   all.gravity();
   all.world_frame();
   all.hybrid_dynamics();
+  all.subgraphs();
   for (Theorem& t : calculus_theorems(source)) all.list.push_back(std::move(t));
   all.waiting();
   return std::move(all.list);

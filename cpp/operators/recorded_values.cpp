@@ -9,6 +9,7 @@ namespace pycraft {
 
 std::unique_ptr<SkoValues<Recorded>> MultibodyOperators::make_values(Recorded) const { return std::make_unique<RigidValues<Recorded>>(*this); }
 std::unique_ptr<SkoValues<Recorded>> SomeCoordinates::make_values(Recorded) const { return std::make_unique<SubsetValues<Recorded>>(*this, base_->structure()); }
+std::unique_ptr<SkoValues<Recorded>> CutTree::make_values(Recorded) const { return std::make_unique<CutValues<Recorded>>(*this); }
 std::unique_ptr<SkoValues<Recorded>> WorldFrame::make_values(Recorded) const { return std::make_unique<WorldValues<Recorded>>(*this); }
 std::unique_ptr<SkoValues<Recorded>> GroupedOperators::make_values(Recorded) const { return std::make_unique<GroupedValues<Recorded>>(*this); }
 

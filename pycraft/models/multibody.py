@@ -14,6 +14,7 @@ from ..closed import Closed
 from ..dynamics.integration import IntegrationCalls
 from ..state import State, at_state, random_state
 from .handles import Body, Hinge, Named, Node, Vector
+from .parts import Parts
 from .pictures import Pictures
 from .with_frames import WithFrames
 
@@ -29,7 +30,7 @@ _DEFAULT_AXES: dict[str, tuple[tuple[float, float, float], ...]] = {
 }
 
 
-class Multibody(Closed, IntegrationCalls, Pictures, WithFrames):
+class Multibody(Closed, IntegrationCalls, Pictures, Parts, WithFrames):
     """A tree of bodies on hinges, with nodes, a state (`q`, `v`) and gravity (zero until it is set).
 
     Build one body by body, or load it (`pycraft.load`). Bodies are kept depth first, children in the order they were added, and
@@ -340,7 +341,12 @@ class Multibody(Closed, IntegrationCalls, Pictures, WithFrames):
         return copy
 
     def __repr__(self) -> str:
-        return f"<multibody {self.name!r}: {self._size} bodies, {self.nv} degrees of freedom>"
+        if self._whole is None:
+            return f"<multibody {self.name!r}: {self._size} bodies, {self.nv} degrees of freedom>"
+        try:
+            return f"<part {self.name!r} of {self._whole.name!r}: {self._size} bodies, {self.nv} degrees of freedom>"
+        except _core.StaleOperatorError:
+            return f"<part {self.name!r} of {self._whole.name!r}, which has changed since>"
 
 
 def _again(description: Mapping[str, Any], left_aside: Mapping[str, np.ndarray], actuators: Sequence[dict[str, Any]] = ()) -> Multibody:

@@ -8,7 +8,7 @@ from .equations import Equation, Step, Use, numbered
 from .expand import Problem
 from .normal_form import Rules, Setting, normal_form, rule_from, rules_for, weight
 from .presuppositions import ALWAYS, is_positive_constant, is_regular_constant
-from .relations import at_the_roots, compliance_facts, crosses_with_axes, in_world
+from .relations import at_the_roots, compliance_facts, crosses_with_axes, in_world, of_a_cut
 from .words import ONE, Alphabet, Polynomial, Word, inverse_of, inverted, plain, ratio, split, underived
 
 UNIT: Polynomial = {(): ONE}
@@ -56,7 +56,7 @@ class LocalRules:
         for name in named:
             if name not in theory().alphabet.letters:
                 self.add_pairs(name)
-        for equation, word in (*compliance_facts(problem, setting.hypotheses), *crosses_with_axes(problem)):
+        for equation, word in (*of_a_cut(problem), *compliance_facts(problem, setting.hypotheses), *crosses_with_axes(problem)):
             self.add(equation, word)
 
     # ------------------------------------------------------------------ what is asked

@@ -1,8 +1,9 @@
-"""Trees that were made of another: the same bodies with some hinges locked, and the same model in world axes.
+"""Trees that were made of another: the same bodies with some hinges locked, cut at a hinge, and the same model in world axes.
 
-With hinges locked, E_φ and M are the model's own, and so is what is made of them alone. In world axes every letter is the model's between
-the frames' changes X = blockdiag φ(0,k): E_φ' = XE_φX⁻¹, H' = HX⁻¹, M' = XMX*, J' = J; and what the axioms determine from these follows
-them, since the axioms are the same equations again between X's.
+With hinges locked, E_φ and M are the model's own, and so is what is made of them alone. Cut at a hinge, E_φ has lost one block, and M, H
+and J are the model's own; a way leads over the cut once, and sweeps from the tips have not met it where they come to the body behind it. In
+world axes every letter is the model's between the frames' changes X = blockdiag φ(0,k): E_φ' = XE_φX⁻¹, H' = HX⁻¹, M' = XMX*, J' = J; and
+what the axioms determine from these follows them, since the axioms are the same equations again between X's.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from .blocks import diagonal_part
 from .equations import Equation
 from .normal_form import Setting, normal_form, rules_for
 from .values import LARGEST
-from .words import Polynomial, Word, add_to, monomial, of_model, parse, plain, split
+from .words import FURTHER, Polynomial, Word, add_to, monomial, of_model, parse, plain, split
 
 _GIVEN = ("E_φ", "H", "M", "J")
 """Letters that a tree is made of; the axioms determine the others."""
@@ -91,6 +92,50 @@ def _without_ends(word: Word) -> tuple[Word, Word, Word]:
     left = word[:1] if word[:1] in (("X",), ("X⁻*",)) else ()
     right = word[-1:] if word[-1:] in (("X⁻¹",), ("X*",)) else ()
     return left, word[len(left) : len(word) - len(right)], right
+
+
+_CUT = [
+    ("φ₂ E_φ φ₂ = φ + φ₂ E_φ₂ φ₂ − φ₂", "a way from one part to the other leads over the cut, and over it once: φ = φ₂ + φ₂(E_φ − E_φ₂)φ₂"),
+    ("E_φ R₂ = E_φ R + E_φ₂ R₂ − E_φ₂ R", "R is summed from the tips: behind the cut it is the same, and E_φ − E_φ₂ is read there alone"),
+    ("E_φ P₂ = E_φ P + E_φ₂ P₂ − E_φ₂ P", "P is swept from the tips: behind the cut it is the same, and E_φ − E_φ₂ is read there alone"),
+]
+"""What is so of a tree (₂) that was made of another by leaving out one block of E_φ, and why."""
+
+
+def of_a_cut(problem: Any) -> Iterator[tuple[Equation, Word]]:
+    """Letters of a tree that is cut at a hinge by those of its model: (equation, the word that it replaces)."""
+    for mark, how, base in problem.relations:
+        if how != "cut tree":
+            continue
+        for x in ("H", "M", "J"):
+            own, of_base = of_model(x, mark), of_model(x, base)
+            yield Equation("definition", f"{own} = {of_base}", monomial(own), monomial(of_base)), (own,)
+        cut, whole = (problem.contexts[["", *FURTHER].index(m)][0].parents for m in (mark, base))
+        for text, note in _CUT:
+            lhs, rhs = (_of_two(side, mark, base) for side in text.split(" = "))
+            (word,) = lhs
+            shown = f"{problem.alphabet.text(lhs)} = {problem.alphabet.text(rhs)}"
+            yield Equation("structure", shown, lhs, rhs, note=note, check=functools.partial(_one_block_less, cut, whole)), word
+
+
+def _of_two(text: str, mark: str, base: str) -> Polynomial:
+    """A sum of words, ₂ the mark of the cut tree's letters, as of these two trees."""
+    found: Polynomial = {}
+    sign = 1
+    word: list[str] = []
+    for x in [*text.split(), "+"]:
+        if x in "+−":
+            add_to(found, tuple(word), sign)
+            sign, word = (1 if x == "+" else -1), []
+        else:
+            word.append(of_model(x[:-1], mark) if x.endswith("₂") else of_model(x, base))
+    return found
+
+
+def _one_block_less(cut: Sequence[int], whole: Sequence[int]) -> bool:
+    """Whether a tree is the other but for one body at most, which has become a root."""
+    other = [c for c, w in zip(cut, whole, strict=True) if c != w]
+    return not other or other == [-1]
 
 
 def at_the_roots(letter: str, e: Any, source: Any) -> Iterator[tuple[Equation, Word]]:

@@ -20,22 +20,42 @@ CHANGES = {
     ],
     "cpp/model/multibody.cpp": [
         ("compiled models outlive a parameter", "kept->parameters == parameters_", "true"),
-        ("a mass is no new version", "bodies_[k].inertia = inertia;\n  ++parameters_;", "bodies_[k].inertia = inertia;", STATEMENT),
+        ("a mass is no new version", "bodies_[k].inertia = inertia;\n  body_changed(k);", "bodies_[k].inertia = inertia;", STATEMENT),
         (
             "a placement is no new version",
-            "bodies_[k].hinge.placement = checked;\n  ++parameters_;",
+            "bodies_[k].hinge.placement = checked;\n  body_changed(k);",
             "bodies_[k].hinge.placement = checked;",
             STATEMENT,
         ),
         (
             "a rotor inertia is no new version",
-            "bodies_[k].hinge.rotor_inertia = std::move(checked);\n  ++parameters_;",
+            "bodies_[k].hinge.rotor_inertia = std::move(checked);\n  body_changed(k);",
             "bodies_[k].hinge.rotor_inertia = std::move(checked);",
             STATEMENT,
         ),
-        ("gravity is no new version", "gravity_ = g;\n  ++parameters_;", "gravity_ = g;", STATEMENT),
         ("limits are not checked when set", "check_limits(body(k).hinge, lower, upper);", ";", STATEMENT),
+    ],
+    "cpp/model/multibody_state.cpp": [
         ("lengths of quaternions walk as a state is moved", "scale_quaternions<double>(*model, lengths.data(), out);", ";", STATEMENT),
+        ("a state set on a part stays there", "if (part_) return set_in_whole(q, true);", ";", STATEMENT),
+    ],
+    "cpp/model/part.cpp": [
+        ("gravity is no new version", "gravity_ = g;\n  ++parameters_;", "gravity_ = g;", STATEMENT),
+        ("parts follow no gravity", "part.gravity_changed(g);", ";", STATEMENT),
+        ("parts follow no edit of a body", "part.body_changed(own);", ";", STATEMENT),
+        ("bodies need not hang together", "if (!missing.empty())", "if (false)"),
+        ("a path leaves out the common ancestor", "if (a >= 0) found.push_back(a);", ";", STATEMENT),
+        ("a part has the state that the whole had first", "whole_state_ == of_whole && whole_version_ == version", "whole_state_"),
+        ("a moving base stays where a placement was", "whole_version_ == version", "true"),
+    ],
+    "cpp/recursions/mass_centre.h": [
+        ("the centre of mass stands still in Ȧ", "cross(speed_of_all_ - travel, own.linear)", "cross(S(0) * speed_of_all_, own.linear)"),
+        (
+            "a displacement leaves the centre of mass where it is",
+            "cross(column.linear, speed_of_all_)",
+            "cross(S(0) * speed_of_all_, own.linear)",
+        ),
+        ("roots travel alike", "changed.angular = changed.angular + cross(own.linear, travel);", ";", STATEMENT),
     ],
     "cpp/algebra/engine/engine.cpp": [
         ("plans for J = 0 kept", "source.traits().hinge_diagonal != plan_->hinge_diagonal[c]", "false"),

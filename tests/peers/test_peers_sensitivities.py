@@ -167,6 +167,25 @@ def test_momentum(pairs):
         agree(p, mine, p.call(pin.computeCentroidalDynamicsDerivatives, p.v, p.u)[0] @ p.S)
 
 
+def test_centroidal_momentum(pairs):
+    for p in pairs:
+        h, data = p.model.centroidal_momentum(p.q, p.v), p.pin_model.createData()
+        rate = pin.dccrba(p.pin_model, data, p.pq, p.S @ p.v) @ p.S
+        agree(p, h.matrix[ANGULAR_FIRST], data.Ag @ p.S)
+        agree(p, h.value[ANGULAR_FIRST], np.array(data.hg))
+        agree(p, h.matrix_dot[ANGULAR_FIRST], rate)
+        agree(p, h.dq[ANGULAR_FIRST], p.call(pin.computeCentroidalDynamicsDerivatives, p.v, p.u)[0] @ p.S)
+        varied = p.call(lambda *given: pin.computeCentroidalMomentumTimeVariation(*given).np, p.v, p.u)
+        agree(p, (h.matrix @ p.u + h.matrix_dot @ p.v)[ANGULAR_FIRST], varied, terms=np.abs(h.matrix) @ np.abs(p.u))
+        pin.ccrba(p.pin_model, data, p.pq, p.S @ p.v)
+        agree(p, p.model.composite_inertia(p.q)[:3, :3], data.Ig.inertia)
+        agree(p, p.model.mass, data.Ig.mass)
+        pin.centerOfMass(p.pin_model, data, p.pq, p.S @ p.v)
+        agree(p, p.model.centre_of_mass(p.q), data.com[0])
+        agree(p, p.model.centre_of_mass_velocity(p.q, p.v), data.vcom[0])
+        agree(p, p.model.centre_of_mass_jacobian(p.q), p.call(pin.jacobianCenterOfMass) @ p.S)
+
+
 def test_jacobian_rate(pairs):
     for p in pairs:
         data = p.pin_model.createData()

@@ -44,6 +44,7 @@ PARTS = {
     "kernels/kernels_avx2",
     "kernels/kernels_avx512",
     "kernels/kernels_wide",
+    "model/multibody_state",  # class Multibody: its state
     "algebra/trees/recorded_trees",  # sources of numbers at the recorded scalar
     "operators/recorded_values",
     "algebra/planning/plan_blocks",  # class Planner, by what is planned

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "algebra/language/space.h"
+#include "algebra/language/state.h"
 #include "algebra/language/symbol.h"
 #include "numerics/arithmetic.h"
 #include "numerics/scalar.h"
@@ -19,11 +20,6 @@ template <class S>
 class SkoValues;
 template <class S>
 class ValuesInUse;
-
-// A state of a model: immutable once made, so that readers in several threads need no lock.
-struct StateData {
-  std::vector<double> q, v;
-};
 
 // The numerical blocks at one state, shared by all expressions that are evaluated there.
 template <class S>
