@@ -109,6 +109,14 @@ std::vector<PassRecord> CompiledScene<S>::passes(SceneList list) const {
   return records;
 }
 
+template <class S>
+std::string CompiledScene<S>::alone() const {
+  for (const auto& e : forces_.effects())
+    if (e->declared.foreign) return "effect '" + e->name + "' is written in Python";
+  if constexpr (std::is_same_v<S, double>) return solver_->links() ? solver_->links()->alone() : "accelerations are found by the general recursions";
+  return "packs are of states in double precision";
+}
+
 // ------------------------------------------------------------------ at a state
 
 template <class S>

@@ -59,6 +59,11 @@ class CompiledScene {
   const CompiledModel<S>& numbers() const { return forces_.numbers(); }
   const std::vector<int>& prescribed() const { return prescribed_; }
   bool by_kernels() const { return solver_->by_kernels(); }
+  // Accelerations wait in a fiber for those of other runs, from now on; null: no more (dynamics/states_together.h).
+  void wait_for(StatesTogether* others) { solver_->wait_for(others); }
+  // Why they cannot, in words; empty: they can.
+  std::string alone() const;
+  long in_packs() const { return solver_->links() ? solver_->links()->in_packs() : 0; }  // how many of them came from packs
   std::vector<PassRecord> passes(SceneList list) const;  // with how often they ran
   // One pass of a list again, uncounted, at the state where the list ran last: for measuring it, its results are none.
   void repeat(SceneList list, size_t pass) {

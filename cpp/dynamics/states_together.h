@@ -1,0 +1,44 @@
+// Dynamics of one state from each of several runs at once. Each run is in a fiber (runtime/fiber.h) and waits with what it asks; when all of them
+// wait, what fits together goes through the kernels side by side, in packs of as many states as a register holds, with the bits that each would
+// have by itself. What differs from lane to lane: the state, forces and wrenches, gravity. What must not: the model, and terms at its hinges.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <new>
+#include <vector>
+
+#include "dynamics/hybrid_dynamics.h"
+
+namespace pycraft {
+
+class StatesTogether {
+ public:
+  // In a fiber: waits for answer(), then as links.run.
+  bool run(PreparedLinks& links, const double* q, const double* v, const double* u, const Vector6<double>* wrenches, double* out);
+  // Outside of fibers: what all of them wait for.
+  void answer();
+
+  static int width() { return kernels::instruction_set().pack.lanes; }
+
+ private:
+  struct Asked {
+    PreparedLinks* links;
+    bool sound = false;
+  };
+  void answer_pack();
+  double* work(size_t numbers);
+  struct Free {
+    void operator()(double* x) const { ::operator delete(x, std::align_val_t(64)); }
+  };
+  std::vector<Asked*> waiting_, pack_, left_;
+  std::vector<double> q_, v_, u_, wrenches_, gravity_, out_;
+  std::unique_ptr<double, Free> work_;
+  size_t size_ = 0;
+};
+
+// Calls run(0), ..., run(count - 1), `lanes` at a time in fibers of this thread: where one is over, the next begins in its place. answer() is called
+// whenever all of them wait. What run or answer throws ends all; an interrupt does. Runs handle the errors that are theirs.
+void side_by_side(int count, int lanes, const std::function<void(int)>& run, const std::function<void()>& answer);
+
+}  // namespace pycraft
