@@ -34,7 +34,7 @@ class Fiber {
   void switch_in();
   void switch_out();
 
-  std::byte* memory_ = nullptr;
+  std::byte *memory_ = nullptr, *top_ = nullptr;
   void *own_ = nullptr, *other_ = nullptr;  // where the stacks were left: the call's, and that of who resumed it
   std::function<void()> f_;
   std::exception_ptr error_;

@@ -55,10 +55,12 @@ BOOST_AUTO_TEST_CASE(calls_take_turns_and_keep_what_they_hold) {
     any = false;
     for (int i = 0; i < 5; ++i)
       if (turns[i] >= 0) {
-        if (fibers[i]->resume())
+        if (fibers[i]->resume()) {
           ++turns[i], any = true;
-        else
-          BOOST_TEST(turns[i] == i + 1), turns[i] = -1;
+        } else {
+          BOOST_TEST(turns[i] == i + 1);
+          turns[i] = -1;
+        }
       }
   }
   BOOST_TEST(order == "012341234234344");
@@ -162,7 +164,7 @@ BOOST_AUTO_TEST_CASE(runs_wait_for_each_other_and_the_next_takes_a_place_that_is
       });
   BOOST_TEST(answered == asks, boost::test_tools::per_element());
   BOOST_TEST(most == 3);
-  BOOST_TEST(sizes == "33333110" || sizes.starts_with("33333"));
+  BOOST_TEST(sizes == "3333311");
 }
 
 BOOST_AUTO_TEST_CASE(an_error_ends_all) {

@@ -42,7 +42,7 @@ EFFECTS = {
     "between nodes": lambda: [E.NodeSpring("tip", "eye", 40.0, length=0.3), E.NodeDamper("tip", "eye", 2.0), E.Bushing("eye", None, STIFF, STIFF)],
     "drives": lambda: [E.TorqueSource(E.Harmonic(0.4, 0.9), hinges="boom"), E.Servo(8.0, 0.3, 0.5, hinges=PINS), E.RotorInertia(0.2, hinges=PINS)],
     "motor": lambda: [E.Motor(0.4, 1.0, 20.0, 3.0, 0.01, hinges=PINS, effort_limit=2.0)],
-    "limits": lambda: [E.Gravity(), E.Limits(300.0, 0.2, lower=-0.1, upper=0.1, hinges=PINS)],
+    "limits": lambda: [E.Gravity(), E.Limits(20.0, 0.2, lower=-0.1, upper=0.1, hinges=PINS)],
     "wrench": lambda: [E.Gravity(), E.Wrench("tip", [1, 2, 3, 4, 5, 6], axes="eye"), E.Wrench("eye", [0, 0, 1, 3, 0, 0])],
     "prescribed": lambda: [E.Gravity(), E.Prescribed("boom", E.Harmonic(0.3, 1.0)), E.Prescribed("left", E.Harmonic(0.5, 0.7)), E.Damping(0.1)],
 }
@@ -136,6 +136,7 @@ def test_parameters_of_effects_are_each_lane_s():
 
 
 @pytest.mark.parametrize("integrator", ["dopri5", "rk4"])
+@pytest.mark.filterwarnings("ignore:quadratic_damping")
 def test_a_lane_that_fails_disturbs_no_other(integrator):
     """One that is no state, one that blows up: reasons and times are those of runs by themselves."""
     with pytest.warns(pc.ModelWarning):
@@ -149,17 +150,17 @@ def test_a_lane_that_fails_disturbs_no_other(integrator):
     assert_same(found, one_by_one(scene, samples, 0.1, **options))
     reasons = {failure.sample: failure.reason for failure in found.failures}
     assert {1, 3} <= set(reasons) and len(reasons) < samples.count - 3
-    assert "nan" in reasons[1] and "at t = " in reasons[3] or "after t = " in reasons[3]
+    assert "entry 2 is nan" in reasons[1] and ("step size fell" if integrator == "dopri5" else "overflows") in reasons[3]
 
 
 def test_a_lane_that_is_singular_is_decided_by_itself():
-    """A massless link carries a point mass: at a right angle the mass is on the link's axis."""
+    """A massless link carries a point mass: upright, the mass is on the link's axis."""
     model = pc.Multibody("on the axis")
     model.add_body("massless", hinge="pin", axis=(0, 0, 1))
-    model.add_body("mass", "massless", "pin", axis=(0, 1, 0), mass=1.0, com=(1, 0, 0))
+    model.add_body("mass", "massless", "pin", axis=(0, 1, 0), mass=1.0, com=(0, 0, 1))
     scene = pc.Scene(model).add(E.Gravity())
-    angles = np.linspace(-1, 1, WIDTH + 1)
-    angles[2] = -np.pi / 2
+    angles = np.linspace(0.3, 1, WIDTH + 1)
+    angles[2] = 0
     samples = pc.samples.Samples({"q": np.column_stack([0 * angles, angles])})
     found = pc.sweep(scene, samples, 0.01, measure=everything, workers=1, progress=False, t_eval=[0.0, 0.01], rtol=1e-6)
     assert_same(found, one_by_one(scene, samples, 0.01, t_eval=[0.0, 0.01], rtol=1e-6))
