@@ -80,7 +80,14 @@ class HybridDynamics {
   bool by_kernels() const { return links_ != nullptr; }
   // From now on states wait in a fiber for those of others (states_together.h); null: no more. By kernels alone.
   void wait_for(StatesTogether* others) { others_ = others; }
+  StatesTogether* others() const { return others_; }
   const PreparedLinks* links() const { return links_.get(); }
+  // run(), by kernels alone, in two halves: between them the kernels answer what was asked.
+  PreparedLinks* ask(const S* q, const S* v, const S* u, const Vector6<S>* wrenches, S* out) {
+    if constexpr (std::is_same_v<S, double>) links_->ask(q, v, u, wrenches, out);
+    return links_.get();
+  }
+  bool answer(bool sound, const S* q, const S* v, const S* u, const Vector6<S>* wrenches, S* out) { return sound || generally(q, v, u, wrenches, out); }
 
  private:
   enum class Given { forces, accelerations, both };

@@ -30,7 +30,40 @@ bool StatesTogether::run(PreparedLinks& links, const double* q, const double* v,
   return asked.sound;
 }
 
+void StatesTogether::run(StatesInTurn& states) {
+  Turns turns{&states};
+  turns_.push_back(&turns);
+  Fiber::pause();
+  if (turns.error) std::rethrow_exception(turns.error);
+}
+
 void StatesTogether::answer() {
+  // f() of those of a run, false at their end; an error is the run's own, and ends them.
+  const auto each = [this](auto f) {
+    std::erase_if(turns_, [&](Turns* of) {
+      try {
+        return !f(*of);
+      } catch (const std::exception&) {
+        of->error = std::current_exception();
+        return true;
+      }
+    });
+  };
+  do {
+    each([this](Turns& of) {
+      of.asked.links = of.states->ask();
+      if (of.asked.links) waiting_.push_back(&of.asked);
+      return of.asked.links != nullptr;
+    });
+    answer_waiting();
+    each([](Turns& of) {
+      of.states->answer(of.asked.sound);
+      return true;
+    });
+  } while (!turns_.empty());
+}
+
+void StatesTogether::answer_waiting() {
   while (!waiting_.empty()) {
     pack_.clear(), left_.clear();
     for (Asked* a : waiting_) (pack_.empty() || (pack_.size() < static_cast<size_t>(width()) && a->links->fits(*pack_.front()->links)) ? pack_ : left_).push_back(a);
