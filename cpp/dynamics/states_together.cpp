@@ -4,8 +4,6 @@
 
 #include "numerics/finite.h"
 #include "runtime/fiber.h"
-#include "runtime/interrupt.h"
-#include "runtime/without_interrupts.h"
 
 namespace pycraft {
 
@@ -106,31 +104,6 @@ double* StatesTogether::work(size_t numbers) {
     size_ = numbers;
   }
   return work_.get();
-}
-
-void side_by_side(int count, int lanes, const std::function<void(int)>& run, const std::function<void()>& answer) {
-  std::vector<std::unique_ptr<Fiber>> fibers;
-  for (int i = 0; i < std::min(lanes, count); ++i) fibers.push_back(std::make_unique<Fiber>());
-  int next = 0;
-  const auto begin = [&](Fiber& fiber) {
-    fiber.begin([&run, i = next] { run(i); });
-    ++next;
-  };
-  for (auto& fiber : fibers) begin(*fiber);
-  for (int rounds = 0; !fibers.empty(); ++rounds) {
-    {
-      const WithoutInterrupts until_all_wait;  // handlers have this thread's own stack
-      std::erase_if(fibers, [&](const auto& fiber) {
-        while (!fiber->resume()) {
-          if (next == count) return true;
-          begin(*fiber);
-        }
-        return false;
-      });
-    }
-    if (!fibers.empty()) answer();
-    if (rounds % 16 == 15) check_interrupt();
-  }
 }
 
 }  // namespace pycraft

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <exception>
-#include <functional>
 #include <memory>
 #include <new>
 #include <vector>
@@ -54,9 +53,5 @@ class StatesTogether {
   std::unique_ptr<double, Free> work_;
   size_t size_ = 0;
 };
-
-// Calls run(0), ..., run(count - 1), `lanes` at a time in fibers of this thread: where one is over, the next begins in its place. answer() is called
-// whenever all of them wait. What run or answer throws ends all; an interrupt does. Runs handle the errors that are theirs.
-void side_by_side(int count, int lanes, const std::function<void(int)>& run, const std::function<void()>& answer);
 
 }  // namespace pycraft

@@ -1,13 +1,26 @@
 #include "runtime/fiber.h"
 
+#include <algorithm>
 #include <atomic>
+#include <memory>
 #include <new>
 #include <utility>
+#include <vector>
 
 #include "runtime/errors.h"
+#include "runtime/interrupt.h"
+#include "runtime/without_interrupts.h"
 
 #if defined(__x86_64__) && !defined(_WIN32)
 #include <sys/mman.h>
+#endif
+#if defined(__has_feature)  // Clang's names
+#if __has_feature(address_sanitizer)
+#define __SANITIZE_ADDRESS__
+#endif
+#if __has_feature(thread_sanitizer)
+#define __SANITIZE_THREAD__
+#endif
 #endif
 #if defined(__SANITIZE_ADDRESS__)
 #include <sanitizer/common_interface_defs.h>
@@ -157,5 +170,30 @@ bool Fiber::resume() { return false; }
 void Fiber::pause() {}
 
 #endif
+
+void side_by_side(int count, int lanes, const std::function<void(int)>& run, const std::function<void()>& answer) {
+  std::vector<std::unique_ptr<Fiber>> fibers;
+  for (int i = 0; i < std::min(lanes, count); ++i) fibers.push_back(std::make_unique<Fiber>());
+  int next = 0;
+  const auto begin = [&](Fiber& fiber) {
+    fiber.begin([&run, i = next] { run(i); });
+    ++next;
+  };
+  for (auto& fiber : fibers) begin(*fiber);
+  for (int rounds = 0; !fibers.empty(); ++rounds) {
+    {
+      const WithoutInterrupts until_all_wait;  // handlers have this thread's own stack
+      std::erase_if(fibers, [&](const auto& fiber) {
+        while (!fiber->resume()) {
+          if (next == count) return true;
+          begin(*fiber);
+        }
+        return false;
+      });
+    }
+    if (!fibers.empty()) answer();
+    if (rounds % 16 == 15) check_interrupt();
+  }
+}
 
 }  // namespace pycraft

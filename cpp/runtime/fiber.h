@@ -45,4 +45,8 @@ class Fiber {
   std::size_t size_below_ = 0;
 };
 
+// Calls run(0), ..., run(count - 1), `lanes` at a time in fibers of this thread: where one is over, the next begins in its place. answer() is called
+// whenever all of them wait. What run or answer throws ends all; an interrupt does. Runs handle the errors that are theirs.
+void side_by_side(int count, int lanes, const std::function<void(int)>& run, const std::function<void()>& answer);
+
 }  // namespace pycraft

@@ -1,5 +1,6 @@
 // Fibers: turns, errors, calls that are left for good; and runs that wait for each other. Meant for the address and thread sanitizers, too.
 #define BOOST_TEST_MODULE fibers
+#include <algorithm>
 #include <boost/test/included/unit_test.hpp>
 #include <cstdint>
 #include <memory>
@@ -8,7 +9,6 @@
 #include <thread>
 #include <vector>
 
-#include "dynamics/states_together.h"
 #include "runtime/fiber.h"
 
 using namespace pycraft;

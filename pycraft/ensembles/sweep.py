@@ -121,4 +121,3 @@ def _work(work: Any, samples: Samples, T: Any, measure: Any, options: dict[str, 
     if T is not None or measure is not None or options:
         raise _core.EvaluationError("T, measure and options are of a sweep of a scene; a function has its samples alone")
     return FunctionWork(work)
-

@@ -8,6 +8,7 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 from hashlib import sha256
 from time import perf_counter
 from typing import Any
@@ -114,12 +115,11 @@ class SceneWork:
             return outcomes
         _, _, calls, q, v = zip(*ready, strict=True)
         start = perf_counter()
-        runs = simulate_together(
-            self.scene, self.T, list(calls), np.stack(q), np.stack(v), self._run, t_eval=self.options.get("t_eval"), dense=self.options.get("dense", True)
-        )
+        what = {"t_eval": self.options.get("t_eval"), "dense": self.options.get("dense", True)}
+        runs = simulate_together(self.scene, self.T, list(calls), np.stack(q), np.stack(v), self._run, **what)
         each = (perf_counter() - start) / len(runs)
         for (sample, seconds, *_), run in zip(ready, runs, strict=True):
-            outcomes.append(_outcome(sample, lambda run=run: self._measured(run), seconds + each))
+            outcomes.append(_outcome(sample, partial(self._measured, run), seconds + each))
         return outcomes
 
     def _prepared(self, row: Values) -> tuple[Any, np.ndarray, np.ndarray] | None:

@@ -38,16 +38,16 @@ Starting workers is part of the time: {starts}. All give the same bits.
 
 ## Side by side in packs
 
-A thread takes {width} runs at a time and computes their accelerations together ([ensembles.md](ensembles.md)). One thread, {runs} runs, the best of
-{rounds} sweeps each, taken in turns; all give the same bits:
+A thread takes {width} runs at a time and computes their accelerations together ([ensembles.md](ensembles.md)). One thread, {runs} runs,
+the best of {rounds} sweeps each, taken in turns; all give the same bits:
 
 | sweep | runs/s, one by one | runs/s, in packs | gain |
 | --- | ---: | ---: | ---: |
 {packs}
 
-Accelerations are most of a run, and only they are done together: effects, the integrator's own sums, and what Python does with a run are
-done for each. Effects that push bodies read poses and twists, which are found for each run by itself. So the gain is less than the number of
-lanes, and less for runs that are short.
+Only accelerations are done together. They are most of a run by itself, and the smaller part of one in a pack: effects with the poses and
+twists that they read, the integrator's sums, the change from run to run, and what Python does with each run stay as they are. So the gain
+is far less than the number of lanes, and less for short runs and small models.
 
 ## On a cluster
 
