@@ -1,6 +1,5 @@
 #include "simulation/integrators/runge_kutta_steps.h"
 
-#include <array>
 #include <boost/numeric/odeint/stepper/bulirsch_stoer.hpp>
 #include <boost/numeric/odeint/stepper/controlled_runge_kutta.hpp>
 #include <boost/numeric/odeint/stepper/runge_kutta_cash_karp54.hpp>
@@ -88,7 +87,7 @@ class DormandPrince : public Attempts<S> {
       h = adjuster_.decrease_step(h, error, 4);
       return false;
     }
-    keep(t, t + h);
+    t_from_ = t, t_to_ = t + h;
     x = stages_.last();
     t += h;
     h = adjuster_.increase_step(h, error, 5);
@@ -105,10 +104,11 @@ class DormandPrince : public Attempts<S> {
     const S b[] = {A * r(35, 384) - C * X(5, 2558722523, 31403016, 11282082432) + D, A * r(500, 1113) + C * X(100, 882725551, 15701508, 32700410799),
                    A * r(125, 192) - C * X(25, 443332067, 31403016, 1880347072),     A * r(-2187, 6784) + C * X(32805, 23143187, 3489224, 199316789632),
                    A * r(11, 84) - C * X(55, 29972135, 7076736, 822651844),          B + C * X(10, 7414447, 829305, 29380423)};
-    out.resize(from_.size());
+    static constexpr int of[] = {6, 2, 3, 4, 5, 0};  // first and last have changed places
+    out.resize(start_.size());
     for (size_t i = 0; i < out.size(); ++i) {
-      S y = from_[i];
-      for (int j = 0; j < 6; ++j) y += h * b[j] * between_[j][i];
+      S y = start_[i];
+      for (int j = 0; j < 6; ++j) y += h * b[j] * stages_.k(of[j])[i];
       out[i] = y;
     }
     return true;
@@ -117,24 +117,18 @@ class DormandPrince : public Attempts<S> {
     start_ = x, known_ = false;
     stages_.begin(start_, from, to - from);
     equations_.go_through(stages_);
-    keep(from, to);
+    stages_.k(0).swap(stages_.k(6));
+    t_from_ = from, t_to_ = to;
     return true;
   }
 
  private:
-  // What is between the ends of a step that was taken.
-  void keep(const S& from, const S& to) {
-    static constexpr int of[] = {0, 2, 3, 4, 5, 6};
-    for (int j = 0; j < 6; ++j) between_[j] = stages_.k(of[j]);
-    from_ = start_, t_from_ = from, t_to_ = to;
-  }
   ExplicitEquations<S>& equations_;
   Stages<S> stages_;
   odeint::range_algebra algebra_;
   odeint::default_error_checker<S, odeint::range_algebra, odeint::default_operations> checker_;
   odeint::default_step_adjuster<S, S> adjuster_;
-  State start_, error_, from_;
-  std::array<State, 6> between_;
+  State start_, error_;
   S t_from_ = S(0), t_to_ = S(1);
   bool known_ = false;  // the first rate is that of x
 };

@@ -56,10 +56,10 @@ class Stages {
   State& k(int i) { return k_[i]; }
   const State& last() const { return at_; }  // the last stage's
   const Tableau<S>& tableau() const { return tableau_; }
-  // h Σ weights k, from zero.
+  // h Σ weights k.
   void sum(const Weights<S>& weights, State& out) const {
-    out.assign(at_.size(), S(0));
-    add(weights, out.data(), out);
+    out.resize(at_.size());
+    add(weights, nullptr, out);
   }
 
  private:
@@ -80,9 +80,23 @@ class Stages {
   static void add(const S* by, const S* const* k, const S* x, State& out) {
     S* const to = out.data();
     const size_t size = out.size();
+    S own[n];  // which nothing that is written can be
+    const S* from[n];
+    for (int j = 0; j < n; ++j) own[j] = by[j], from[j] = k[j];
+    if (!x) {
+      for (size_t i = 0; i < size; ++i) {
+        S y = own[0] * from[0][i];
+        for (int j = 1; j < n; ++j) y += own[j] * from[j][i];
+        to[i] = y;
+      }
+      return;
+    }
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC ivdep
+#endif
     for (size_t i = 0; i < size; ++i) {
       S y = x[i];
-      for (int j = 0; j < n; ++j) y += by[j] * k[j][i];
+      for (int j = 0; j < n; ++j) y += own[j] * from[j][i];
       to[i] = y;
     }
   }
