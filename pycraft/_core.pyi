@@ -1125,6 +1125,10 @@ class RunRecord:
         ...
     def __reduce__(self) -> tuple:
         ...
+    def raise_error(self) -> None:
+        """
+        What ended one run among several is raised.
+        """
     @property
     def checkpoint(self) -> dict:
         ...
@@ -1234,6 +1238,10 @@ def _theorem_from_parts(arg0: str, arg1: str, arg2: typing.Any, arg3: typing.Any
     ...
 def _twist_parameter(arg0: MultibodyOperators, arg1: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]], arg2: str) -> Parameter:
     ...
+def alone(calls: SceneCalls, integrator: str) -> str:
+    """
+    Why runs cannot be side by side, in words; empty: they can.
+    """
 def blockdiag(operator: Operator) -> Operator:
     """
     The operator's diagonal blocks, body by body, zero elsewhere.
@@ -1351,6 +1359,10 @@ def numbers_in_q(model: Multibody, coordinates: collections.abc.Sequence[typing.
     """
 def operators_of(model: Multibody) -> MultibodyOperators:
     ...
+def pack_width() -> int:
+    """
+    States in a pack, in double precision.
+    """
 def piecewise_polynomial(breaks: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], coefficients: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], size: typing.SupportsInt | typing.SupportsIndex) -> FunctionOfTime:
     ...
 def point_mass_gravity_effect(model: Multibody, mu: typing.SupportsFloat | typing.SupportsIndex, position: typing.Any, bodies: collections.abc.Sequence[str] | None) -> Effect:
@@ -1391,6 +1403,10 @@ def rotor_inertia_effect(model: Multibody, hinges: collections.abc.Sequence[str]
     ...
 def run_scene(calls: SceneCalls, record: RunRecord, q: typing.Any, v: typing.Any, times: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], own: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], energy: bool, integrator: str, rtol: typing.SupportsFloat | typing.SupportsIndex, atol: typing.SupportsFloat | typing.SupportsIndex, step: typing.SupportsFloat | typing.SupportsIndex, max_step: typing.SupportsFloat | typing.SupportsIndex, normalise: bool, events: list, progress: typing.Any, checkpoint: typing.Any, foreign: typing.Any) -> None:
     ...
+def run_scenes(calls: collections.abc.Sequence[SceneCalls], records: collections.abc.Sequence[RunRecord], q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], times: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], energy: bool, integrator: str, rtol: typing.SupportsFloat | typing.SupportsIndex, atol: typing.SupportsFloat | typing.SupportsIndex, step: typing.SupportsFloat | typing.SupportsIndex, max_step: typing.SupportsFloat | typing.SupportsIndex, normalise: bool) -> None:
+    """
+    Runs side by side, in packs of states; RunRecord.raise_error says what ended one.
+    """
 def scalar(value: float | fractions.Fraction) -> Scalar:
     ...
 def scene_between(calls: SceneCalls, integrator: str, t: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], states: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], work: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], times: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], at: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> dict:

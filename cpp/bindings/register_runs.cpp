@@ -4,6 +4,8 @@
 #include "bindings/direct_calls.h"
 #include "bindings/python_steps.h"
 #include "bindings/run_record.h"
+#include "dynamics/states_together.h"
+#include "runtime/fiber.h"
 #include "simulation/dense_output.h"
 #include "simulation/integrators/pairing.h"
 #include "simulation/scene_calls.h"
@@ -60,11 +62,23 @@ struct Asked {
   const py::object* progress;  // null: not wanted
   const py::object* foreign;   // null: an integrator of the core
   const WrittenCheckpoint* checkpoint;
+  StatesTogether* others = nullptr;  // null: a run by itself
+};
+
+// Accelerations wait for those of other runs as long as it lives.
+template <class S>
+struct Waiting {
+  Waiting(CompiledScene<S>& of, StatesTogether* others) : scene(of) { scene.wait_for(others); }
+  ~Waiting() { scene.wait_for(nullptr); }
+  CompiledScene<S>& scene;
 };
 
 // One run in the scalar of the scene. What is known of it by then is in the record where an error ends it.
 template <class S>
 void run_in(CompiledScene<S>& scene, const std::vector<double>& q, const std::vector<double>& v, const Asked& asked, RunRecord& record) {
+  check_integration(asked.times, asked.options, to_double(epsilon<S>()));
+  const Waiting<S> waiting(scene, asked.others);
+  const long packed_before = scene.in_packs();
   const bool works = asked.energy && !scene.effects().workers().empty();
   Paired<S> pair;
   if (asked.foreign) {
@@ -98,6 +112,7 @@ void run_in(CompiledScene<S>& scene, const std::vector<double>& q, const std::ve
   const auto start = std::chrono::steady_clock::now();
   const auto close = [&] {
     record.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    record.in_packs = scene.in_packs() - packed_before;
     record.cost = end.cost, record.ended_by = end.event, record.checkpoint = written(end.checkpoint);
     record.passes = scene.passes(list);
     for (size_t i = 0; i < before.size(); ++i) record.passes[i].times -= before[i].times;
@@ -119,10 +134,42 @@ void run(SceneCalls& calls, RunRecord& record, const Array& q, const Array& v, c
   mb.check_v(v.data(), v.size(), "v");
   const std::vector<double> from_q(q.data(), q.data() + q.size()), from_v(v.data(), v.data() + v.size());
   const Undisturbed undisturbed(mb);
-  calls.with([&]<class S>(CompiledScene<S>& scene) {
-    check_integration(asked.times, asked.options, to_double(epsilon<S>()));
-    run_in(scene, from_q, from_v, asked, record);
-  });
+  calls.with([&]<class S>(CompiledScene<S>& scene) { run_in(scene, from_q, from_v, asked, record); });
+}
+
+// Several runs of one model side by side. What ends one of them is in its record.
+void run_together(const std::vector<SceneCalls*>& calls, const std::vector<RunRecord*>& records, const Array& q, const Array& v, Asked asked) {
+  const Multibody& mb = calls.front()->scene().model();
+  const size_t nq = q.shape(1), nv = v.shape(1);
+  for (const SceneCalls* each : calls)
+    if (&each->scene().model() != &mb) throw ModelError("runs side by side are of one model");
+  StatesTogether together;
+  asked.others = &together;
+  const Undisturbed undisturbed(mb);
+  const auto start = std::chrono::steady_clock::now();
+  const auto run = [&](int i) {
+    try {
+      const double *qi = q.data() + i * nq, *vi = v.data() + i * nv;
+      mb.check_q(qi, nq), mb.check_v(vi, nv, "v");
+      calls[i]->with([&]<class S>(CompiledScene<S>& scene) { run_in(scene, {qi, qi + nq}, {vi, vi + nv}, asked, *records[i]); });
+    } catch (const std::exception&) {
+      records[i]->error = std::current_exception();
+    }
+  };
+  side_by_side(static_cast<int>(calls.size()), StatesTogether::width(), run, [&] { together.answer(); });
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  for (RunRecord* record : records) record->seconds = seconds / static_cast<double>(records.size());
+}
+
+// Why runs of a scene cannot be side by side, empty: they can.
+std::string alone(SceneCalls& calls, const std::string& integrator) {
+  const IntegratorRecord& record = record_of(integrator_from_name(integrator));
+  if (!Fiber::there || StatesTogether::width() < 2) return "this machine has no packs of states";
+  if (record.way == Way::by_momenta) return std::string("integrator '") + record.name + "' solves for momenta";
+  std::string why;
+  const ModelInUse use(calls.scene().model());
+  calls.with([&]<class S>(CompiledScene<S>& scene) { why = scene.alone(); });
+  return why;
 }
 
 // The states at `times`, each within the step between rows at[i] and at[i] + 1: by the integrator's dense output, or by Hermite's.
@@ -252,9 +299,10 @@ void register_runs(py::module_& m) {
       .def_property_readonly("statistics", [](const RunRecord& r) {
         py::dict d;
         d["evaluations"] = r.cost.evaluations, d["steps"] = r.cost.steps, d["rejected"] = r.cost.rejected, d["seconds"] = r.seconds, d["linearizations"] = r.linearizations;
-        d["solutions"] = r.solutions, d["passes"] = passes_of(r);
+        d["solutions"] = r.solutions, d["in_packs"] = r.in_packs, d["passes"] = passes_of(r);
         return d;
-      });
+      })
+      .def("raise_error", [](const RunRecord& r) { if (r.error) std::rethrow_exception(r.error); }, "What ended one run among several is raised.");
   m.def("run_scene", [](SceneCalls& calls, RunRecord& record, const py::object& q, const py::object& v, const std::vector<double>& times, const std::vector<double>& own, bool energy,
                         const std::string& integrator, double rtol, double atol, double step, double max_step, bool normalise, const py::list& events, const py::object& progress,
                         const py::object& checkpoint, const py::object& foreign) {
@@ -273,6 +321,18 @@ void register_runs(py::module_& m) {
         {times, own, energy, false, options, looked_for, progress.is_none() ? nullptr : &progress, foreign.is_none() ? nullptr : &foreign, checkpoint.is_none() ? nullptr : &from});
   }, py::arg("calls"), py::arg("record"), py::arg("q"), py::arg("v"), py::arg("times"), py::arg("own"), py::arg("energy"), py::arg("integrator"), py::arg("rtol"), py::arg("atol"), py::arg("step"),
      py::arg("max_step"), py::arg("normalise"), py::arg("events"), py::arg("progress"), py::arg("checkpoint"), py::arg("foreign"));
+  m.def("run_scenes", [](const std::vector<SceneCalls*>& calls, const std::vector<RunRecord*>& records, const Array& q, const Array& v, const std::vector<double>& times, bool energy,
+                         const std::string& integrator, double rtol, double atol, double step, double max_step, bool normalise) {
+    if (calls.empty()) return;
+    if (q.ndim() != 2 || v.ndim() != 2 || records.size() != calls.size() || size_t(q.shape(0)) != calls.size() || size_t(v.shape(0)) != calls.size())
+      throw ModelError("runs side by side have a record, a row of q and a row of v each");
+    IntegratorOptions options{integrator_from_name(integrator), rtol, atol, step, normalise, max_step};
+    const PythonEvents none(py::list(), 0, 0, 0);
+    run_together(calls, records, q, v, {times, {}, energy, false, options, none, nullptr, nullptr, nullptr});
+  }, py::arg("calls"), py::arg("records"), py::arg("q"), py::arg("v"), py::arg("times"), py::arg("energy"), py::arg("integrator"), py::arg("rtol"), py::arg("atol"), py::arg("step"), py::arg("max_step"),
+     py::arg("normalise"), "Runs side by side, in packs of states; RunRecord.raise_error says what ended one.");
+  m.def("pack_width", &StatesTogether::width, "States in a pack, in double precision.");
+  m.def("alone", &alone, py::arg("calls"), py::arg("integrator"), "Why runs cannot be side by side, in words; empty: they can.");
   m.def("check_pairing", [](SceneCalls& calls, const std::string& integrator, bool foreign, bool implicit) {
     if (foreign)
       check_foreign_pairing(calls.scene(), calls.precision(), integrator, implicit);

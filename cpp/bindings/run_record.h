@@ -2,6 +2,7 @@
 // computed in it.
 #pragma once
 
+#include <exception>
 #include <memory>
 #include <string>
 #include <vector>
@@ -33,10 +34,11 @@ struct RunRecord {
   std::vector<std::string> own_events;  // by the effects that they are of; those that were asked for follow
   int nq = 0, nv = 0, own = 0, works = 0, ended_by = -1;
   IntegrationCost cost;
-  long linearizations = 0, solutions = 0;
+  long linearizations = 0, solutions = 0, in_packs = 0;
   double seconds = 0;
   std::vector<PassRecord> passes;
   WrittenCheckpoint checkpoint;
+  std::exception_ptr error;  // of one run among several: what ended it
 };
 
 template <class S>

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "dynamics/link_dynamics.h"
+#include "dynamics/states_together.h"
 #include "numerics/finite.h"
 #include "runtime/interrupt.h"
 
@@ -22,14 +23,14 @@ HingeTerms without_prescribed(HingeTerms terms) {
 }  // namespace
 
 PreparedLinks::PreparedLinks(const Multibody& model, const HingeTerms& terms, const Solving& how, const Vector3<double>& gravity, const std::vector<int>& wrenched)
-    : model_(kernels::LinkModel<double>::of(model, terms)), nv_(model.nv()), wrenched_(wrenched) {
+    : of_(model), terms_(terms), model_(kernels::LinkModel<double>::of(model, terms)), nv_(model.nv()), wrenched_(wrenched) {
   using kernels::Call;
   const bool inverse = all_prescribed(model, terms);  // nothing is solved for: in any form
   const bool regular = how.on_singular == OnSingular::raise && !how.refinement.wider();
   const Call solving = forward_dynamics_call(how.form, how.refinement);
   if (!model_ || !(inverse || (regular && (solving == Call::forward_dynamics || !terms.prescribes())))) return;
   const Call call = inverse ? Call::inverse_dynamics : solving;
-  kernel_ = kernels::instruction_set().one[call];
+  kernel_ = kernels::instruction_set().one[call], call_ = call;
   if (!kernel_.run) return;
   if (call >= Call::forward_dynamics_ud) model_->find_factors();
   std::copy_n(gravity.v, 3, gravity_);
@@ -54,11 +55,29 @@ void PreparedLinks::carry(const Vector6<double>* wrenches) {
   }
 }
 
-bool PreparedLinks::run(const double* q, const double* v, const double* u, const Vector6<double>* wrenches, double* out) {
-  states_.q = q, states_.v = v;
+void PreparedLinks::add_to_hinges(const double* inertia) {
+  added_.assign(inertia, inertia + nv_);
+  model_->add_to_hinges(inertia);
+}
+
+void PreparedLinks::ask(const double* q, const double* v, const double* u, const Vector6<double>* wrenches, double* out) {
+  states_.q = q, states_.v = v, out_ = out;
   states_.u = u || no_forces_.empty() ? u : no_forces_.data();
   if (!wrenched_.empty()) carry(wrenches);
-  return (kernel_.run(model_->links(), states_, out, nv_, work_.get()) & 1) && all_finite(out, nv_);
+}
+
+bool PreparedLinks::answer() { return (kernel_.run(model_->links(), states_, out_, nv_, work_.get()) & 1) && all_finite(out_, nv_); }
+
+bool PreparedLinks::fits(const PreparedLinks& other) const {
+  return &of_ == &other.of_ && call_ == other.call_ && states_.steps == other.states_.steps && !states_.v == !other.states_.v && !states_.u == !other.states_.u &&
+         !states_.wrenches == !other.states_.wrenches && terms_.inertia == other.terms_.inertia && terms_.driven == other.terms_.driven && terms_.prescribed == other.terms_.prescribed &&
+         added_ == other.added_ && (call_ == kernels::Call::forward_dynamics || std::equal(gravity_, gravity_ + 3, other.gravity_));
+}
+
+std::string PreparedLinks::alone() const {
+  if (!kernels::instruction_set().pack[call_].run) return "there is no kernel for packs of states";
+  if (call_ != kernels::Call::forward_dynamics && states_.wrenches) return "effects push bodies, and in another form than 'fast', refined, or with all coordinates prescribed packs have one wrench for all states";
+  return {};
 }
 
 template <class S>
@@ -78,7 +97,7 @@ HybridDynamics<S>::HybridDynamics(const Multibody& model, const HingeTerms& term
 template <class S>
 bool HybridDynamics<S>::run(const S* q, const S* v, const S* u, const Vector6<S>* wrenches, S* out) {
   if constexpr (std::is_same_v<S, double>)
-    if (links_ && links_->run(q, v, u, wrenches, out)) return true;
+    if (links_ && (others_ ? others_->run(*links_, q, v, u, wrenches, out) : links_->run(q, v, u, wrenches, out))) return true;
   return generally(q, v, u, wrenches, out);
 }
 

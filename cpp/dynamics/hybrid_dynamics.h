@@ -8,6 +8,7 @@
 
 #include <memory>
 #include <new>
+#include <string>
 #include <vector>
 
 #include "dynamics/rigid_dynamics.h"
@@ -15,6 +16,8 @@
 #include "kernels/link_model.h"
 
 namespace pycraft {
+
+class StatesTogether;
 
 // Where kernels are asked for one state: their memory, and all that is the same for every state.
 class PreparedLinks {
@@ -25,21 +28,40 @@ class PreparedLinks {
   // Whether there is a kernel for it.
   bool there() const { return kernel_.run; }
   // False where the state is in doubt, or a number left its range.
-  bool run(const double* q, const double* v, const double* u, const Vector6<double>* wrenches, double* out);
-  void add_to_hinges(const double* inertia) { model_->add_to_hinges(inertia); }
+  bool run(const double* q, const double* v, const double* u, const Vector6<double>* wrenches, double* out) {
+    ask(q, v, u, wrenches, out);
+    return answer();
+  }
+  void add_to_hinges(const double* inertia);
+
+  // The same in two steps: what is asked is kept until it is answered.
+  void ask(const double* q, const double* v, const double* u, const Vector6<double>* wrenches, double* out);
+  bool answer();
+
+  // Whether two states, as they were asked, can be in one pack: of one call, of links that have the same numbers.
+  bool fits(const PreparedLinks& other) const;
+  // Why a state cannot be in a pack with any other, empty: it can.
+  std::string alone() const;
+  long in_packs() const { return in_packs_; }  // how many states of it were
 
  private:
   void carry(const Vector6<double>* wrenches);
   struct Free {
     void operator()(double* x) const { ::operator delete(x, std::align_val_t(64)); }
   };
+  const Multibody& of_;
+  HingeTerms terms_;
+  kernels::Call call_ = kernels::Call::forward_dynamics;
   std::unique_ptr<kernels::LinkModel<double>> model_;
   kernels::Kernel<double> kernel_{};
   kernels::States<double> states_{};
   double gravity_[3];
   int nv_;
   std::vector<int> wrenched_;
-  std::vector<double> on_links_, no_forces_;
+  std::vector<double> on_links_, no_forces_, added_;  // added_: to J, where steps are implicit
+  double* out_ = nullptr;
+  long in_packs_ = 0;
+  friend class StatesTogether;
   std::unique_ptr<double, Free> work_;
 };
 
@@ -56,6 +78,16 @@ class HybridDynamics {
   void add_to_hinges(const S* inertia);
   // Whether kernels are asked first.
   bool by_kernels() const { return links_ != nullptr; }
+  // From now on states wait in a fiber for those of others (states_together.h); null: no more. By kernels alone.
+  void wait_for(StatesTogether* others) { others_ = others; }
+  StatesTogether* others() const { return others_; }
+  const PreparedLinks* links() const { return links_.get(); }
+  // run(), by kernels alone, in two halves: between them the kernels answer what was asked.
+  PreparedLinks* ask(const S* q, const S* v, const S* u, const Vector6<S>* wrenches, S* out) {
+    if constexpr (std::is_same_v<S, double>) links_->ask(q, v, u, wrenches, out);
+    return links_.get();
+  }
+  bool answer(bool sound, const S* q, const S* v, const S* u, const Vector6<S>* wrenches, S* out) { return sound || generally(q, v, u, wrenches, out); }
 
  private:
   enum class Given { forces, accelerations, both };
@@ -68,6 +100,7 @@ class HybridDynamics {
   Applied<S> applied_;
   std::vector<int> wrenched_;
   std::unique_ptr<PreparedLinks> links_;
+  StatesTogether* others_ = nullptr;
   std::unique_ptr<RigidDynamics<S>> general_;  // made where it is first needed
   std::vector<int> free_;
   std::vector<S> none_, forces_, results_, added_;

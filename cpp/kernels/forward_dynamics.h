@@ -15,9 +15,16 @@
 
 namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET {
 
+// Three numbers of what acts from outside.
+template <class S, class T>
+[[gnu::always_inline]] inline Vector3<S> acting(const T* x, size_t stride, int states) {
+  if constexpr (std::is_same_v<T, double> && S::width > 1)
+    if (stride) [[unlikely]] return {gathered<S>(x, stride, states), gathered<S>(x + 1, stride, states), gathered<S>(x + 2, stride, states)};
+  return spread<S>(x);
+}
 // P += M, z += b' - what is applied. forces: whether z is wanted at all, here and below.
 template <bool forces, class S, class T>
-[[gnu::always_inline]] inline void add_own(const Link<T>& link, const Vector3<S>& omega, const T* wrench, Inertia<S>& P) {
+[[gnu::always_inline]] inline void add_own(const Link<T>& link, const States<T>& at, int k, const Vector3<S>& omega, Inertia<S>& P) {
   const Symmetric3<S> I = rotational_of<S>(link);
   const Vector3<S> h = spread<S>(link.moment);
   const S m(link.mass);
@@ -27,7 +34,9 @@ template <bool forces, class S, class T>
   if constexpr (!forces) return;
   P.n = P.n + gyroscopic(omega, I);
   P.f = P.f + twice_crossed(omega, h);
-  if (wrench) P.n = P.n - spread<S>(wrench), P.f = P.f - spread<S>(wrench + 3);
+  if (!at.wrenches) return;
+  const T* const wrench = at.wrenches + 6 * k;
+  P.n = P.n - acting<S>(wrench, at.wrench_stride, at.states), P.f = P.f - acting<S>(wrench + 3, at.wrench_stride, at.states);
 }
 
 // P⁺ and z⁺ of a pin, P in its axes and of it.
@@ -251,7 +260,7 @@ template <bool forces, class S, class T, class Keep = KeepsNothing>
     const Link<T>& link = links.link[k];
     ForwardLink<S>& own = w.link[k];
     start_inward(links, w, k, last, P);
-    add_own<forces>(link, own.motion.omega, at.wrenches ? at.wrenches + 6 * k : nullptr, P);
+    add_own<forces>(link, at, k, own.motion.omega, P);
     if (forces && link.prescribed) [[unlikely]]
       pass_inward(link, own, w.of(link), P);
     else if (link.rotor)
@@ -326,7 +335,7 @@ template <class S, class T, class Kept, class Visit>
 
 template <class S, class T>
 [[gnu::always_inline]] inline void accelerate_links(const Links<T>& links, const States<T>& at, const ForwardWork<S>& w, int first, int last, double* out, size_t stride) {
-  outward(links, first, last, Vector3<S>(-spread<S>(at.gravity)), w.link, [&](int k, Vector3<S>& alpha, Vector3<S>& acceleration) {
+  outward(links, first, last, Vector3<S>(-acting<S>(at.gravity, at.gravity_stride, at.states)), w.link, [&](int k, Vector3<S>& alpha, Vector3<S>& acceleration) {
     const Link<T>& link = links.link[k];
     if (link.prescribed) [[unlikely]] return pass_outward(link, at, w.link[k], w.of(link), alpha, acceleration, out, stride);
     with_step(link.step, [&](auto kind) { accelerate<decltype(kind)>(link, at, w.link[k], w.of(link), alpha, acceleration, out, stride); });

@@ -94,6 +94,7 @@ struct States {
   const T *cosines = nullptr, *sines = nullptr;  // of one state: of every coordinate
   T gone = 0;                                    // of one state in parts: what sliders add to lengths
   int steps = 0;             // of a refined call: corrections at most
+  size_t gravity_stride = 0, wrench_stride = 0;  // of plain forward dynamics in packs of doubles: where each state has its own; 0: all have the same
 };
 
 // What a call is: `run` writes the results to out + b out_stride, in `work`, aligned to 64 bytes and of as many numbers as the other function

@@ -40,7 +40,7 @@ HingeTerms hinge_terms(const Scene& scene) {
 
 template <class S>
 CompiledScene<S>::CompiledScene(const Scene& scene, const Solving& how)
-    : scene_(scene), how_(how), nv_(scene.model().nv()), forces_(scene_, scene.model().compiled<S>()), lists_(5), motion_(nv_), needed_(nv_), inertia_(nv_, S(0)), zeros_(nv_, S(0)), work_(nv_) {
+    : scene_(scene), how_(how), nv_(scene.model().nv()), forces_(scene_, scene.model().compiled<S>()), lists_(5), solving_(5), motion_(nv_), needed_(nv_), inertia_(nv_, S(0)), zeros_(nv_, S(0)), work_(nv_) {
   for (const auto& e : forces_.effects()) {
     if (e->declared.uniform_gravity) gravity_ = gravity_ + e->declared.gravity;
     prescribed_.insert(prescribed_.end(), e->declared.prescribed.begin(), e->declared.prescribed.end());
@@ -99,6 +99,7 @@ void CompiledScene<S>::plan(SceneList list) {
   }
   for (const auto& e : forces_.effects())
     if (!e->declared.prescribed.empty()) passes.push_back({prescribe, e.get(), {e->name, described(*e), {e->name}}});
+  solving_[static_cast<int>(list)] = passes.size();
   add_accelerations(passes, works);
 }
 
@@ -109,18 +110,45 @@ std::vector<PassRecord> CompiledScene<S>::passes(SceneList list) const {
   return records;
 }
 
+template <class S>
+std::string CompiledScene<S>::alone() const {
+  for (const auto& e : forces_.effects())
+    if (e->declared.foreign) return "effect '" + e->name + "' is written in Python";
+  if constexpr (std::is_same_v<S, double>) return solver_->links() ? solver_->links()->alone() : "accelerations are found by the general recursions";
+  return "packs are of states in double precision";
+}
+
 // ------------------------------------------------------------------ at a state
 
 template <class S>
-bool CompiledScene<S>::run(SceneList list, const S& t, const S* q, const S* v, const S* own, S* vdot) {
+void CompiledScene<S>::start(SceneList list, const S& t, const S* q, const S* v, const S* own, S* vdot) {
   forces_.start(t, q, v, own);
-  v_ = v, vdot_ = vdot;
-  for (Pass& pass : lists_[static_cast<int>(list)]) {
-    pass.run(*this, pass.of);
-    ++pass.record.times;
-  }
-  if (!finite_ && all_are_finite(q, numbers().nq) && (!v || all_are_finite(v, nv_))) forces_.look_for_culprits();
+  list_ = list, v_ = v, vdot_ = vdot;
+}
+
+template <class S>
+bool CompiledScene<S>::finish() {
+  if (!finite_ && all_are_finite(forces_.at().q, numbers().nq) && (!v_ || all_are_finite(v_, nv_))) forces_.look_for_culprits();
   return finite_;
+}
+
+template <class S>
+PreparedLinks* CompiledScene<S>::ask(const S& t, const S* q, const S* v, const S* own, S* vdot, S* powers) {
+  if (powers) powers_ = powers;
+  start(powers ? SceneList::works : SceneList::motion, t, q, v, own, vdot);
+  run(0, solving());
+  give_prescribed();
+  return solver_->ask(q, v_, u_, wrenches_, vdot_);
+}
+
+template <class S>
+bool CompiledScene<S>::answer(bool sound) {
+  std::vector<Pass>& passes = lists_[static_cast<int>(list_)];
+  finite_ = solver_->answer(sound, forces_.at().q, v_, u_, wrenches_, vdot_);
+  take_prescribed();
+  ++passes[solving()].record.times;
+  run(solving() + 1, passes.size());
+  return finish();
 }
 
 template <class S>
@@ -158,11 +186,13 @@ void CompiledScene<S>::add_structural_forces(const S* q, const S* vdot, S* rows)
 }
 
 template <class S>
-void CompiledScene<S>::accelerate_and_prescribe(CompiledScene& s, Active<S>*) {
-  S* const u = s.forces_.tau();
-  for (int j : s.prescribed_) s.needed_[j] = s.forces_.forced() ? u[j] : S(0), u[j] = s.motion_[j];
-  s.finite_ = s.solver_->run(s.forces_.at().q, s.v_, u, s.wrenches_, s.vdot_);
-  for (int j : s.prescribed_) s.needed_[j] = s.vdot_[j] - s.needed_[j], s.vdot_[j] = s.motion_[j];
+void CompiledScene<S>::give_prescribed() {
+  S* const u = forces_.tau();
+  for (int j : prescribed_) needed_[j] = forces_.forced() ? u[j] : S(0), u[j] = motion_[j];
+}
+template <class S>
+void CompiledScene<S>::take_prescribed() {
+  for (int j : prescribed_) needed_[j] = vdot_[j] - needed_[j], vdot_[j] = motion_[j];
 }
 
 template <class S>

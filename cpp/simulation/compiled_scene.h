@@ -59,6 +59,15 @@ class CompiledScene {
   const CompiledModel<S>& numbers() const { return forces_.numbers(); }
   const std::vector<int>& prescribed() const { return prescribed_; }
   bool by_kernels() const { return solver_->by_kernels(); }
+  // Accelerations wait in a fiber for those of other runs, from now on; null: no more (dynamics/states_together.h).
+  void wait_for(StatesTogether* others) { solver_->wait_for(others); }
+  StatesTogether* others() const { return solver_->others(); }
+  // Accelerations in two halves, between them the kernels answer what is asked; powers null where they are not counted.
+  PreparedLinks* ask(const S& t, const S* q, const S* v, const S* own, S* vdot, S* powers);
+  bool answer(bool sound);
+  // Why they cannot, in words; empty: they can.
+  std::string alone() const;
+  long in_packs() const { return solver_->links() ? solver_->links()->in_packs() : 0; }  // how many of them came from packs
   std::vector<PassRecord> passes(SceneList list) const;  // with how often they ran
   // One pass of a list again, uncounted, at the state where the list ran last: for measuring it, its results are none.
   void repeat(SceneList list, size_t pass) {
@@ -76,7 +85,21 @@ class CompiledScene {
   void add_reach(std::vector<Pass>& passes, const Reach& reach, bool moving, bool works);
   void add_accelerations(std::vector<Pass>& passes, bool works);
   std::string described(const Active<S>& effect) const;
-  bool run(SceneList list, const S& t, const S* q, const S* v, const S* own, S* vdot);
+  void start(SceneList list, const S& t, const S* q, const S* v, const S* own, S* vdot);
+  void run(size_t from, size_t to) {
+    std::vector<Pass>& passes = lists_[static_cast<int>(list_)];
+    for (size_t i = from; i < to; ++i) {
+      passes[i].run(*this, passes[i].of);
+      ++passes[i].record.times;
+    }
+  }
+  bool finish();
+  bool run(SceneList list, const S& t, const S* q, const S* v, const S* own, S* vdot) {
+    start(list, t, q, v, own, vdot);
+    run(0, lists_[static_cast<int>(list)].size());
+    return finish();
+  }
+  size_t solving() const { return solving_[static_cast<int>(list_)]; }
   void add_structural_forces(const S* q, const S* vdot, S* rows);
   RigidDynamics<S>& whole_model();
 
@@ -91,7 +114,13 @@ class CompiledScene {
   static void act_and_keep(CompiledScene& s, Active<S>* e) { s.forces_.act_and_keep(*e, s.rows_ + size_t(e->number) * s.nv_); }
   static void prescribe(CompiledScene& s, Active<S>* e) { s.forces_.prescribe(*e, s.forces_.at().t, nullptr, nullptr, s.motion_.data()); }
   static void accelerate(CompiledScene& s, Active<S>*) { s.finite_ = s.solver_->run(s.forces_.at().q, s.v_, s.u_, s.wrenches_, s.vdot_); }
-  static void accelerate_and_prescribe(CompiledScene& s, Active<S>*);
+  static void accelerate_and_prescribe(CompiledScene& s, Active<S>*) {
+    s.give_prescribed();
+    s.finite_ = s.solver_->run(s.forces_.at().q, s.v_, s.u_, s.wrenches_, s.vdot_);
+    s.take_prescribed();
+  }
+  void give_prescribed();  // accelerations to the solver, and forces from it
+  void take_prescribed();
   static void count_prescribed(CompiledScene& s, Active<S>* e);
 
   Scene scene_;  // as it was
@@ -101,6 +130,7 @@ class CompiledScene {
   std::vector<int> prescribed_;
   Vector3<double> gravity_{0, 0, 0};
   std::vector<std::vector<Pass>> lists_;
+  std::vector<size_t> solving_;  // where accelerations are in each list
   std::unique_ptr<HybridDynamics<S>> solver_;
   std::unique_ptr<RigidDynamics<S>> whole_model_;  // made where it is first needed
   // ---- of the state that is being worked at
@@ -108,6 +138,7 @@ class CompiledScene {
   const Vector6<S>* wrenches_ = nullptr;
   S *vdot_ = nullptr, *powers_ = nullptr, *rows_ = nullptr;
   bool finite_ = true;
+  SceneList list_ = SceneList::motion;
   S step_ = S(0);
   std::vector<S> motion_, needed_, inertia_, zeros_, work_;  // of prescribed coordinates: θ̈, and the forces that they need; J; a model's forces
 };

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "model/configuration.h"
+#include "simulation/integrators/stages.h"
 
 namespace pycraft {
 
@@ -42,6 +43,10 @@ class Equations {
   }
   // v̇ and the rates of what follows it, by parts: for methods that move q on its group.
   virtual void evaluate(const S& t, const S* q, const S* v, const S* rest, S* vdot, S* rest_rate) = 0;
+  // The rates of all stages of a step.
+  virtual void go_through(Stages<S>& stages) {
+    while (stages.next()) (*this)(stages.at(), stages.rate(), stages.time());
+  }
   // The velocities at which that was done.
   const S* velocities() const { return at_v_; }
 

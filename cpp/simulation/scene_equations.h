@@ -13,6 +13,7 @@
 #include <cmath>
 #include <vector>
 
+#include "dynamics/states_together.h"
 #include "runtime/interrupt.h"
 #include "simulation/compiled_scene.h"
 #include "simulation/equations.h"
@@ -49,18 +50,21 @@ class SceneEquations : public Kind<S> {
 
   void evaluate(const S& t, const S* q, const S* v, const S* rest, S* vdot, S* rest_rate) override {
     if ((++evaluations & 63) == 0) check_interrupt();
-    this->at_q_ = q, this->at_v_ = v;
-    if (!scene_.prescribed().empty()) {
-      std::copy_n(q, nq(), q_.data()), std::copy_n(v, nv(), v_.data());
-      scene_.effects().prescribe(t, q_.data(), v_.data(), nullptr);
-      this->at_q_ = q_.data(), this->at_v_ = v_.data();
-    }
+    place(t, q, v);
     if (works_ > 0)
       scene_.accelerations_and_powers(t, this->at_q_, this->at_v_, rest, vdot, rest_rate + own_);
     else
       scene_.accelerations(t, this->at_q_, this->at_v_, rest, vdot);
-    for (int i = 0; i < works_; ++i) rest_rate[own_ + i] /= unit_of_work();
-    if (own_ > 0) scene_.effects().rates(rest_rate);
+    follow(rest_rate);
+  }
+  // Beside those of other runs where there are such.
+  void go_through(Stages<S>& stages) override {
+    if constexpr (std::is_same_v<S, double>)
+      if (StatesTogether* const others = scene_.others()) {
+        InTurn states(*this, stages);
+        return others->run(states);
+      }
+    Kind<S>::go_through(stages);
   }
 
   void settle(const S& t, State& x) override {
@@ -78,6 +82,38 @@ class SceneEquations : public Kind<S> {
   std::string name_of(int i) const override;
 
  private:
+  struct InTurn : StatesInTurn {
+    InTurn(SceneEquations& of, Stages<S>& given) : equations(of), stages(given) {}
+    PreparedLinks* ask() override { return stages.next() ? equations.ask(stages.time(), stages.at(), stages.rate()) : nullptr; }
+    void answer(bool sound) override { equations.answer(sound, stages.rate()); }
+    SceneEquations& equations;
+    Stages<S>& stages;
+  };
+  PreparedLinks* ask(const S& t, const State& x, State& rate) {
+    ++evaluations;
+    const S *q = x.data(), *v = q + nq();
+    S *const vdot = rate.data() + nq(), *const rest_rate = vdot + nv();
+    place(t, q, v);
+    return scene_.ask(t, this->at_q_, this->at_v_, v + nv(), vdot, works_ > 0 ? rest_rate + own_ : nullptr);
+  }
+  void answer(bool sound, State& rate) {
+    scene_.answer(sound);
+    follow(rate.data() + nq() + nv());
+    configuration_rate(this->model(), this->at_q_, this->at_v_, rate.data());
+  }
+  // Where accelerations are asked for.
+  void place(const S& t, const S* q, const S* v) {
+    this->at_q_ = q, this->at_v_ = v;
+    if (scene_.prescribed().empty()) return;
+    std::copy_n(q, nq(), q_.data()), std::copy_n(v, nv(), v_.data());
+    scene_.effects().prescribe(t, q_.data(), v_.data(), nullptr);
+    this->at_q_ = q_.data(), this->at_v_ = v_.data();
+  }
+  // The rates of what follows velocities, powers there.
+  void follow(S* rest_rate) {
+    for (int i = 0; i < works_; ++i) rest_rate[own_ + i] /= unit_of_work();
+    if (own_ > 0) scene_.effects().rates(rest_rate);
+  }
   CompiledScene<S>& scene_;
   int own_, works_;
   State q_, v_;

@@ -146,15 +146,16 @@ def workers_on(on: Any, count: Any, work: Any) -> Workers:
     return Dask(on, count, packed(work))
 
 
-def outcomes(work: Any, rows: Iterator[tuple[int, Mapping[str, Any]]], workers: Workers) -> Iterator[list[Outcome]]:
-    """Outcomes as they come, some at a time, of rows that are taken as workers get free.
+def outcomes(work: Any, rows: Iterator[tuple[int, Mapping[str, Any]]], count: int, workers: Workers) -> Iterator[list[Outcome]]:
+    """Outcomes as they come, some at a time, of so many rows, which are taken as workers get free.
 
     Where a process died, what it and its kind had is run again, one row at a time: a row whose process then dies is told of as failed,
     and no other is lost.
     """
     waiting: dict[Future, Rows] = {}
     suspects: deque[Rows] = deque()
-    size = 1
+    least = min(work.lanes, -(-count // workers.count))  # runs side by side come together, but no worker stays idle for that
+    size = least
     while True:
         alone = bool(suspects) and not waiting
         if alone:
@@ -173,7 +174,7 @@ def outcomes(work: Any, rows: Iterator[tuple[int, Mapping[str, Any]]], workers: 
             error = future.exception()
             if error is None:
                 found = future.result()
-                size = _size(found)
+                size = _size(found, least)
                 yield found
             elif not isinstance(error, workers.deadly):
                 raise error
@@ -192,7 +193,7 @@ def _next(rows: Iterator[tuple[int, Mapping[str, Any]]], size: int) -> Rows:
     return [row for _, row in zip(range(size), rows, strict=False)]
 
 
-def _size(found: list[Outcome]) -> int:
+def _size(found: list[Outcome], least: int) -> int:
     """As many rows as take `SECONDS`."""
     each = sum(outcome.seconds for outcome in found) / len(found)
-    return max(1, min(LARGEST, 8 * len(found), int(SECONDS / max(each, 1e-9))))
+    return max(least, min(LARGEST, 8 * len(found), int(SECONDS / max(each, 1e-9))))

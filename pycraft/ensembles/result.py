@@ -40,8 +40,8 @@ class SweepResult(Mapping[str, np.ndarray]):
     (<sweep of 2 samples: all finished>, (2, 1))
     """
 
-    def __init__(self, store: Any):
-        self._store = store
+    def __init__(self, store: Any, how: str = "read from a folder"):
+        self._store, self._how = store, how
         self.samples: Samples = store.samples
         self.finished: np.ndarray = store.finished
         self.seconds: np.ndarray = store.seconds
@@ -63,6 +63,10 @@ class SweepResult(Mapping[str, np.ndarray]):
 
     def __len__(self) -> int:
         return len(self._store.shapes.known)
+
+    def explain(self) -> str:
+        """How the runs are done: side by side in packs of states, or one by one, and why."""
+        return f"{self.samples.count} runs, {self._how}"
 
     def to_dataframe(self) -> Any:
         """A row a sample: inputs, values (arrays by component), error, seconds. ImportError where pandas is missing (extra [data])."""

@@ -17,7 +17,7 @@ from .result import SweepResult
 from .samples import Samples
 from .stores import Memory
 from .targets import Targets
-from .work import FunctionWork, SceneWork, end_of_run, trajectory
+from .work import DEFAULTS, FunctionWork, SceneWork, end_of_run, trajectory
 
 
 def sweep(
@@ -71,7 +71,8 @@ def sweep(
     samples = samples if isinstance(samples, Samples) else Samples(samples)
     doing = _work(work, samples, T, measure, options)
     store = Memory(samples) if output is None else Folder(output, samples, doing, overwrite)
-    result = SweepResult(store)
+    why = doing.one_by_one()
+    result = SweepResult(store, f"one by one: {why}" if why else f"side by side in packs of {doing.lanes} states")
     rows = ((i, samples.row(i)) for i in range(samples.count) if not store.finished[i])
     left = samples.count - int(store.finished.sum())
     try:
@@ -82,7 +83,7 @@ def sweep(
     try:
         if crew is not None:
             with SweepProgress(samples.count, samples.count - left, progress) as bar:
-                for found in outcomes(doing, rows, crew):
+                for found in outcomes(doing, rows, left, crew):
                     store.add(found)
                     bar.add(len(found), sum(each.error is not None for each in found))
     except BaseException as error:
@@ -106,8 +107,8 @@ def _work(work: Any, samples: Samples, T: Any, measure: Any, options: dict[str, 
         if T is None:
             raise _core.EvaluationError("a sweep of a scene takes T, how long each run is, in seconds")
         run_times(0.0, T, options.get("t_eval"))
-        RunOptions.checked(**{**_DEFAULTS, **{name: value for name, value in options.items() if name in _DEFAULTS}})
-        known = [*_DEFAULTS, "t_eval", "events", "dense"]
+        RunOptions.checked(**{**DEFAULTS, **{name: value for name, value in options.items() if name in DEFAULTS}})
+        known = [*DEFAULTS, "t_eval", "events", "dense"]
         if unknown := set(options) - set(known):
             raise _core.EvaluationError(f"Scene.simulate has no {min(unknown)!r}; there are {', '.join(known)}")
         if measure is None:
@@ -120,8 +121,3 @@ def _work(work: Any, samples: Samples, T: Any, measure: Any, options: dict[str, 
     if T is not None or measure is not None or options:
         raise _core.EvaluationError("T, measure and options are of a sweep of a scene; a function has its samples alone")
     return FunctionWork(work)
-
-
-_DEFAULTS: dict[str, Any] = {
-    "integrator": "dopri5", "rtol": 1e-9, "atol": 1e-12, "step": None, "max_step": None, "normalise": "never", "energy": True,
-}  # fmt: skip

@@ -8,6 +8,7 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 from hashlib import sha256
 from time import perf_counter
 from typing import Any
@@ -16,9 +17,19 @@ import numpy as np
 
 from .. import _core
 from ..scenes.scene import Scene
+from ..scenes.simulation import RunOptions, alone, simulate_together
+from ..state import at_state
 from .targets import Targets
 
 Values = Mapping[str, Any]
+Rows = Sequence[tuple[int, Values]]
+
+DEFAULTS: dict[str, Any] = {
+    "integrator": "dopri5", "rtol": 1e-9, "atol": 1e-12, "step": None, "max_step": None, "normalise": "never", "energy": True,
+}  # fmt: skip
+"""Of `Scene.simulate`."""
+PACKS = 32
+"""Runs for each lane that are prepared, run and measured in one go: enough that lanes seldom wait for the last ones, few enough to keep."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +66,8 @@ class SceneWork:
     options: dict[str, Any]
     measure: Callable[[Any], Values]
     _targets: Targets | None = field(default=None, init=False, repr=False, compare=False)
+    _known: Any = field(default=None, init=False, repr=False, compare=False)  # calls that are for packs
+    _lanes: int = field(default=0, init=False, repr=False, compare=False)
 
     def __call__(self, row: Values) -> Values:
         if self._targets is None:
@@ -62,9 +75,77 @@ class SceneWork:
         q, v = self._targets.set(row)
         return self.measure(self.scene.simulate(self.T, q, v, progress=False, **self.options))
 
+    def __post_init__(self) -> None:
+        self._run = RunOptions.checked(**{**DEFAULTS, **{name: value for name, value in self.options.items() if name in DEFAULTS}})
+
+    def one_by_one(self) -> str:
+        """Why runs are not side by side in packs of states, in words; "" if they are."""
+        if self.options.get("events"):
+            return "events are looked for"
+        if edits := [name for name in self.names if name.partition(".")[0] in ("bodies", "hinges")]:
+            return f"samples set {edits[0]!r}, and packs are of one model"
+        return alone(self.scene._calls(), self._run)
+
+    @property
+    def lanes(self) -> int:
+        """How many runs are side by side."""
+        if self._lanes == 0:
+            self._lanes = 1 if self.one_by_one() else _core.pack_width()
+        return self._lanes
+
+    def together(self, rows: Rows) -> list[Outcome]:
+        """`run_rows`, in packs of states where a sample allows it."""
+        each = PACKS * self.lanes
+        return [outcome for i in range(0, len(rows), each) for outcome in self._some(rows[i : i + each])]
+
+    def _some(self, rows: Rows) -> list[Outcome]:
+        outcomes, ready = [], []
+        for sample, row in rows:
+            start, found = perf_counter(), None
+            try:
+                found = self._prepared(row)
+            except Exception as error:
+                outcomes.append(Outcome(sample, None, _told(error), perf_counter() - start))
+                continue
+            if found is None:
+                outcomes.append(run_row(self, sample, row))
+            else:
+                ready.append((sample, perf_counter() - start, *found))
+        if not ready:
+            return outcomes
+        _, _, calls, q, v = zip(*ready, strict=True)
+        start = perf_counter()
+        what = {"t_eval": self.options.get("t_eval"), "dense": self.options.get("dense", True)}
+        runs = simulate_together(self.scene, self.T, list(calls), np.stack(q), np.stack(v), self._run, **what)
+        each = (perf_counter() - start) / len(runs)
+        for (sample, seconds, *_), run in zip(ready, runs, strict=True):
+            outcomes.append(_outcome(sample, partial(self._measured, run), seconds + each))
+        return outcomes
+
+    def _prepared(self, row: Values) -> tuple[Any, np.ndarray, np.ndarray] | None:
+        """The scene as a sample has it, compiled, with its state; None if the sample makes something of it that is not for packs."""
+        if self._targets is None:
+            self._targets = Targets(self.scene, self.names)
+        q, v = at_state(self.scene.model, *self._targets.set(row))
+        calls = self.scene._calls()
+        if calls is not self._known:
+            _core.check_pairing(calls, self._run.integrator.name, False, False)
+            if alone(calls, self._run):
+                return None
+            self._known = calls
+        return calls, q, v
+
+    def _measured(self, run: Any) -> Values:
+        if isinstance(run, Exception):
+            raise run
+        return self.measure(run)
+
     def own(self) -> SceneWork:
         """The same with a scene and a model of its own, as it sets them."""
         return SceneWork(copy.deepcopy(self.scene), self.names, self.T, self.options, self.measure)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return SceneWork, (self.scene, self.names, self.T, self.options, self.measure)
 
     def parts(self) -> dict[str, Any]:
         """What makes two sweeps the same."""
@@ -81,6 +162,12 @@ class FunctionWork:
         found = self.function(**row)
         return found if isinstance(found, Mapping) else {"value": found}
 
+    lanes = 1
+
+    def one_by_one(self) -> str:
+        """Why they are not side by side."""
+        return "they are calls of a function"
+
     def own(self) -> FunctionWork:
         return self
 
@@ -88,17 +175,29 @@ class FunctionWork:
         return {"function": self.function}
 
 
-def run_rows(work: Any, rows: Sequence[tuple[int, Values]]) -> list[Outcome]:
-    """The outcomes of some samples, one after the other; an error of one is told of it and ends no other."""
-    outcomes = []
-    for sample, row in rows:
-        start, values, error = perf_counter(), None, None
-        try:
-            values = {str(name): _kept(name, value) for name, value in _named(work(row)).items()}
-        except Exception as failure:
-            error = f"{type(failure).__name__}: {failure}"
-        outcomes.append(Outcome(sample, values, error, perf_counter() - start))
-    return outcomes
+def run_rows(work: Any, rows: Rows) -> list[Outcome]:
+    """The outcomes of some samples, one after the other or side by side; an error of one is told of it and ends no other."""
+    if len(rows) > 1 and work.lanes > 1:
+        return work.together(rows)
+    return [run_row(work, *row) for row in rows]
+
+
+def run_row(work: Any, sample: int, row: Values) -> Outcome:
+    """The outcome of one sample."""
+    return _outcome(sample, lambda: work(row), 0.0)
+
+
+def _outcome(sample: int, found: Callable[[], Any], seconds: float) -> Outcome:
+    start, values, error = perf_counter(), None, None
+    try:
+        values = {str(name): _kept(name, value) for name, value in _named(found()).items()}
+    except Exception as failure:
+        error = _told(failure)
+    return Outcome(sample, values, error, seconds + perf_counter() - start)
+
+
+def _told(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}"
 
 
 def _named(found: Any) -> Values:
@@ -128,7 +227,7 @@ _own = threading.local()
 """The work that a thread last did, as its own: scenes are set by samples, one at a time."""
 
 
-def run_in_thread(work: Any, rows: Sequence[tuple[int, Values]]) -> list[Outcome]:
+def run_in_thread(work: Any, rows: Rows) -> list[Outcome]:
     """`run_rows` with this thread's own copy of the work."""
     if getattr(_own, "of", None) is not work:
         _own.of, _own.work = work, work.own()
@@ -150,7 +249,7 @@ def packed(work: Any) -> bytes:
         ) from None
 
 
-def run_packed(bundle: bytes, rows: Sequence[tuple[int, Values]]) -> list[Outcome]:
+def run_packed(bundle: bytes, rows: Rows) -> list[Outcome]:
     """`run_rows` of a work that came as bytes; kept, so that the next rows find it ready."""
     key = sha256(bundle).digest()
     if getattr(_own, "of", None) != key:

@@ -26,7 +26,8 @@ class Run(Motion):
     events : by name, the states at which they happened (`EventStates`)
     ended_by : the name of the event that ended the run, None where it reached its end
     statistics : evaluations of the accelerations, steps, rejected steps, seconds, linearizations (of integrators that solve by
-        derivatives), solutions (of variational ones: of the equations of a step), and how often each pass ran
+        derivatives), solutions (of variational ones: of the equations of a step), in_packs (accelerations that were found beside those of
+        other runs of a sweep), and how often each pass ran
 
     What follows from the states is computed when it is first asked for, and kept. StaleOperatorError once the model was edited: the rest is
     of the model as it was.

@@ -130,6 +130,38 @@ def _run(
     return run
 
 
+def simulate_together(
+    scene: Any, T: Any, calls: list[Any], q: np.ndarray, v: np.ndarray, options: RunOptions, *, t_eval: Any, dense: bool
+) -> list[Run | Exception]:
+    """Runs of one model side by side in packs of states, each bit for bit what `simulate` gives, or what ended it.
+
+    Parameters
+    ----------
+    calls : of the scene as it is in each run; none of which `alone` says that it is not for packs
+    q, v : (n, nq), (n, nv) at t = 0
+    """
+    times, keep = run_times(0.0, T, t_eval)
+    records = [_core.RunRecord(t_eval is None or dense) for _ in calls]
+    how = (options.integrator.name, options.rtol, options.atol, options.step, options.max_step, options.normalise)
+    _core.run_scenes(calls, records, q, v, times, options.energy, *how)
+    return [_found(scene, *each, options, keep if t_eval is not None else None) for each in zip(calls, records, strict=True)]
+
+
+def _found(scene: Any, calls: Any, record: Any, options: RunOptions, keep: slice | None) -> Run | Exception:
+    try:
+        record.raise_error()
+    except Exception as error:
+        return error
+    return Run.of_record(scene, calls, record, options, [], keep)
+
+
+def alone(calls: Any, options: RunOptions) -> str:
+    """Why runs are not for packs, in words; "" if they are."""
+    if options.integrator.foreign:
+        return f"integrator {options.integrator.name!r} is another package's"
+    return str(_core.alone(calls, options.integrator.name))
+
+
 def _implicit() -> tuple[str, ...]:
     from ..dynamics.integrator_names import SOLVE_FOR_STEPS
 

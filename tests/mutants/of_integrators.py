@@ -31,7 +31,8 @@ CHANGES = {
         ("stages are all at the step's beginning", "t + part[stage]", "t"),
     ],
     "cpp/simulation/integrators/runge_kutta_steps.cpp": [
-        ("dense output begins at the step's end", "t_from_ = before, t_to_ = t;", "t_from_ = t, t_to_ = t;", STATEMENT),
+        ("dense output begins at the step's end", "t_from_ = t, t_to_ = t + h;", "t_from_ = t + h, t_to_ = t + h;", STATEMENT),
+        ("a first rate counts twice", "{1, r(1, 3)}, {2, r(1, 3)}", "{0, r(1, 3)}, {2, r(1, 3)}"),
     ],
     "cpp/simulation/integrators/variational.h": [
         ("momenta are not carried along", "for (int i = 0; i < n_; ++i) r_[i] += half * part_[i];", ";", STATEMENT),

@@ -25,7 +25,7 @@ CHANGES = {
         ("wrenches pile up", "for (int k : wrenched_) wrench_[k] = Vector6<S>::zero();", ";", STATEMENT),
     ],
     "cpp/simulation/compiled_scene.cpp": [
-        ("what prescribed motion needs counts other forces twice", "s.needed_[j] = s.vdot_[j] - s.needed_[j]", "s.needed_[j] = s.vdot_[j]"),
+        ("what prescribed motion needs counts other forces twice", "needed_[j] = vdot_[j] - needed_[j]", "needed_[j] = vdot_[j]"),
         ("rotors have no energy", "*kinetic += S(h.inertia) * moving[h.coordinate] * moving[h.coordinate] / S(2);", ";", STATEMENT),
         ("at rest everything acts", "(!moving && e->declared.only_in_motion)", "false"),
         ("h² K is h K", "h * (S(term.damping) + h * S(term.stiffness))", "h * (S(term.damping) + S(term.stiffness))"),

@@ -26,7 +26,7 @@ def test_shapes_and_names(run):
     assert list(run.forces) == run.effects == ["gravity", "spring", "damping", "torque_source"]
     assert all(force.shape == (K, model.nv) for force in run.forces.values())
     assert run.workers == ["damping", "torque_source"] and run.energy["work"].shape == (K, 2)
-    assert set(run.statistics) == {"evaluations", "steps", "rejected", "seconds", "linearizations", "solutions", "passes"}
+    assert set(run.statistics) == {"evaluations", "steps", "rejected", "seconds", "linearizations", "solutions", "in_packs", "passes"}
     assert run.statistics["steps"] == K - 1 and run.statistics["passes"]["accelerations"] == run.statistics["evaluations"]
     assert repr(run) == f"<run of 'spinning': {K} states from 0 to 1 s, {K - 1} steps>" and len(run) == K
 

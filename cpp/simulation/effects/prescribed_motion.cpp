@@ -80,7 +80,7 @@ PrescribedMotion::PrescribedMotion(const Multibody& model, const Names& hinges, 
 
 Declaration PrescribedMotion::declaration() const {
   Declaration d;
-  d.time = !motion->constant();
+  d.time = !motion->constant(), d.foreign = motion->foreign();
   d.prescribed = coordinates_;
   d.work = true;
   return d;

@@ -2,10 +2,10 @@
 
 #include <boost/numeric/odeint/stepper/bulirsch_stoer.hpp>
 #include <boost/numeric/odeint/stepper/controlled_runge_kutta.hpp>
-#include <boost/numeric/odeint/stepper/runge_kutta4.hpp>
 #include <boost/numeric/odeint/stepper/runge_kutta_cash_karp54.hpp>
-#include <boost/numeric/odeint/stepper/runge_kutta_dopri5.hpp>
 #include <boost/numeric/odeint/stepper/runge_kutta_fehlberg78.hpp>
+#include <initializer_list>
+#include <utility>
 
 #include "simulation/integrators/steps_on_the_group.h"
 
@@ -37,61 +37,122 @@ class OdeintAttempts : public Attempts<S> {
   Controlled stepper_;
 };
 
+template <class S>
+S ratio(double a, double b) {
+  return S(a) / S(b);
+}
+template <class S>
+Weights<S> weights(std::initializer_list<std::pair<int, S>> all) {
+  Weights<S> w;
+  for (const auto& [rate, weight] : all) w.add(rate, weight);
+  return w;
+}
+
+template <class S>
+const Tableau<S>& dormand_prince() {
+  const auto r = ratio<S>;
+  static const Tableau<S> tableau{
+      7,
+      {S(0), r(1, 5), r(3, 10), r(4, 5), r(8, 9), S(1), S(1)},
+      {{},
+       weights<S>({{0, r(1, 5)}}),
+       weights<S>({{0, r(3, 40)}, {1, r(9, 40)}}),
+       weights<S>({{0, r(44, 45)}, {1, r(-56, 15)}, {2, r(32, 9)}}),
+       weights<S>({{0, r(19372, 6561)}, {1, r(-25360, 2187)}, {2, r(64448, 6561)}, {3, r(-212, 729)}}),
+       weights<S>({{0, r(9017, 3168)}, {1, r(-355, 33)}, {2, r(46732, 5247)}, {3, r(49, 176)}, {4, r(-5103, 18656)}}),
+       weights<S>({{0, r(35, 384)}, {2, r(500, 1113)}, {3, r(125, 192)}, {4, r(-2187, 6784)}, {5, r(11, 84)}})},
+      {},
+      weights<S>({{0, r(35, 384) - r(5179, 57600)}, {2, r(500, 1113) - r(7571, 16695)}, {3, r(125, 192) - r(393, 640)}, {4, r(-2187, 6784) - r(-92097, 339200)},
+                  {5, r(11, 84) - r(187, 2100)}, {6, r(-1, 40)}})};
+  return tableau;
+}
+
 // Dormand and Prince's, whose derivative at the end of a step is that of the next one's start, and whose stages give what is between: a continuous
-// extension of order 4. Source: E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, Springer 1993, II.6.
+// extension of order 4. Steps are chosen as Boost.Odeint does.
+// Source: E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, Springer 1993, II.5, II.6.
 template <class S>
 class DormandPrince : public Attempts<S> {
  public:
   using State = std::vector<S>;
-  using Method = odeint::runge_kutta_dopri5<State, S, State, S>;
-  DormandPrince(ExplicitEquations<S>& equations, const IntegratorOptions& o) : equations_(equations), stepper_(controlled<Method, S>(o)) {}
+  DormandPrince(ExplicitEquations<S>& equations, const IntegratorOptions& o) : equations_(equations), stages_(dormand_prince<S>()), checker_(S(o.atol), S(o.rtol), S(1), S(1)) {}
 
   bool attempt(S& t, State& x, S& h) override {
-    make_room(x.size());
-    if (!known_) equations_(x, rate_, t);
+    start_ = x;
+    stages_.begin(start_, t, h, known_);
+    equations_.go_through(stages_);
     known_ = true;
-    const S before = t;
-    if (stepper_.try_step(std::ref(equations_), x, rate_, t, to_, rate_to_, h) != odeint::success) return false;
-    from_.swap(x), x = to_;
-    rate_from_.swap(rate_), rate_ = rate_to_;
-    t_from_ = before, t_to_ = t;
+    stages_.sum(stages_.tableau().error, error_);
+    const S error = checker_.error(algebra_, start_, stages_.k(0), error_, h);
+    if (error > S(1)) {
+      h = adjuster_.decrease_step(h, error, 4);
+      return false;
+    }
+    t_from_ = t, t_to_ = t + h;
+    x = stages_.last();
+    t += h;
+    h = adjuster_.increase_step(h, error, 5);
+    stages_.k(0).swap(stages_.k(6));
     return true;
   }
   void forget() override { known_ = false; }
+  // y(θ) = y + h Σ b(i, θ) k(i).
   bool interpolate(const S& t, State& out) override {
-    out.resize(from_.size());
-    stepper_.stepper().calc_state(t, out, from_, rate_from_, t_from_, to_, rate_to_, t_to_);
+    const auto r = ratio<S>;
+    const S h = t_to_ - t_from_, u = (t - t_from_) / h, less = u - S(1), square = u * u;
+    const S A = square * (S(3) - S(2) * u), B = square * less, C = square * less * less, D = u * less * less;
+    const auto X = [&](double by, double a, double b, double whole) { return S(by) * (S(a) - S(b) * u) / S(whole); };
+    const S b[] = {A * r(35, 384) - C * X(5, 2558722523, 31403016, 11282082432) + D, A * r(500, 1113) + C * X(100, 882725551, 15701508, 32700410799),
+                   A * r(125, 192) - C * X(25, 443332067, 31403016, 1880347072),     A * r(-2187, 6784) + C * X(32805, 23143187, 3489224, 199316789632),
+                   A * r(11, 84) - C * X(55, 29972135, 7076736, 822651844),          B + C * X(10, 7414447, 829305, 29380423)};
+    static constexpr int of[] = {6, 2, 3, 4, 5, 0};  // first and last have changed places
+    out.resize(start_.size());
+    for (size_t i = 0; i < out.size(); ++i) {
+      S y = start_[i];
+      for (int j = 0; j < 6; ++j) y += h * b[j] * stages_.k(of[j])[i];
+      out[i] = y;
+    }
     return true;
   }
   bool again(const S& from, const State& x, const S& to) override {
-    make_room(x.size());
-    from_ = x, t_from_ = from, t_to_ = to, known_ = false;
-    equations_(x, rate_from_, from);
-    stepper_.stepper().do_step(std::ref(equations_), from_, rate_from_, from, to_, rate_to_, S(to - from));
+    start_ = x, known_ = false;
+    stages_.begin(start_, from, to - from);
+    equations_.go_through(stages_);
+    stages_.k(0).swap(stages_.k(6));
+    t_from_ = from, t_to_ = to;
     return true;
   }
 
  private:
-  void make_room(size_t n) {
-    for (State* x : {&from_, &to_, &rate_, &rate_from_, &rate_to_}) x->resize(n);
-  }
-  using Controlled = decltype(controlled<Method, S>(IntegratorOptions()));
   ExplicitEquations<S>& equations_;
-  Controlled stepper_;
-  State from_, to_, rate_, rate_from_, rate_to_;
+  Stages<S> stages_;
+  odeint::range_algebra algebra_;
+  odeint::default_error_checker<S, odeint::range_algebra, odeint::default_operations> checker_;
+  odeint::default_step_adjuster<S, S> adjuster_;
+  State start_, error_;
   S t_from_ = S(0), t_to_ = S(1);
-  bool known_ = false;
+  bool known_ = false;  // the first rate is that of x
 };
 
+template <class S>
+const Tableau<S>& classical() {
+  const auto r = ratio<S>;
+  static const Tableau<S> tableau{4, {S(0), r(1, 2), r(1, 2), S(1)}, {{}, weights<S>({{0, r(1, 2)}}), weights<S>({{1, r(1, 2)}}), weights<S>({{2, S(1)}})},
+                                  weights<S>({{0, r(1, 6)}, {1, r(1, 3)}, {2, r(1, 3)}, {3, r(1, 6)}}), {}};
+  return tableau;
+}
 template <class S>
 class ClassicalRungeKutta {
  public:
   using Needs = ExplicitEquations<S>;
-  explicit ClassicalRungeKutta(const Needs&) {}
-  void do_step(Needs& equations, std::vector<S>& x, const S& t, const S& h) { stepper_.do_step(std::ref(equations), x, t, h); }
+  explicit ClassicalRungeKutta(const Needs&) : stages_(classical<S>()) {}
+  void do_step(Needs& equations, std::vector<S>& x, const S& t, const S& h) {
+    stages_.begin(x, t, h);
+    equations.go_through(stages_);
+    stages_.combine(stages_.tableau().last, x);
+  }
 
  private:
-  odeint::runge_kutta4<std::vector<S>, S, std::vector<S>, S> stepper_;
+  Stages<S> stages_;
 };
 
 }  // namespace
