@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <unordered_map>
-#include <unordered_set>
 
 #include "algebra/language/display.h"
 #include "algebra/language/memo.h"
+#include "algebra/language/mixed_hash.h"
 #include "algebra/language/nodes.h"
 #include "algebra/language/properties.h"
 #include "algebra/language/source.h"
@@ -278,15 +278,47 @@ Expression power(const Expression& a, int exponent) {
 
 // ------------------------------------------------------------------ walks
 
+namespace {
+
+// Nodes met, in a table with open addressing: a walk looks up every part of every node, and does little else.
+class Met {
+ public:
+  // Whether it was not there.
+  bool add(const Node* node) {
+    if (2 * count_ >= places_.size()) grow();
+    const Node*& place = place_of(node);
+    if (place == node) return false;
+    place = node;
+    return ++count_;
+  }
+
+ private:
+  const Node*& place_of(const Node* node) {
+    size_t at = mix(0, reinterpret_cast<size_t>(node)) >> 16;
+    while (places_[at & (places_.size() - 1)] && places_[at & (places_.size() - 1)] != node) ++at;
+    return places_[at & (places_.size() - 1)];
+  }
+  void grow() {
+    std::vector<const Node*> before(2 * places_.size());
+    before.swap(places_);
+    for (const Node* node : before)
+      if (node) place_of(node) = node;
+  }
+  std::vector<const Node*> places_ = std::vector<const Node*>(64);  // a power of two, half of them empty
+  size_t count_ = 0;
+};
+
+}  // namespace
+
 void visit(const Expression& e, const std::function<void(const Expression&)>& f) {
   if (e.children().empty()) return f(e);
   // Derivatives share most of their parts: each is visited once.
-  std::unordered_set<const Node*> seen;
+  Met seen;
   std::vector<const Expression*> todo = {&e};
   while (!todo.empty()) {
     const Expression& x = *todo.back();
     todo.pop_back();
-    if (!x.children().empty() && !seen.insert(x.get()).second) continue;
+    if (!x.children().empty() && !seen.add(x.get())) continue;
     f(x);
     for (auto c = x.children().rbegin(); c != x.children().rend(); ++c) todo.push_back(&*c);
   }

@@ -1,6 +1,7 @@
 #include "algebra/theorems/differentiate.h"
 #include "runtime/interrupt.h"
 
+#include <deque>
 #include <optional>
 #include <unordered_map>
 
@@ -34,7 +35,16 @@ struct Differentiator::State {
   std::vector<Expression> alive;
   std::unordered_map<const void*, Expression> articulated_factor;  // F of ∂E_ψ = E F, by binding
 
+  std::deque<std::pair<Context, Letters>> letters;                   // of the models and states met
+
   explicit State(const Direction& d) : direction(d) {}
+
+  const Letters& letters_of(const Symbol& s) {
+    const Context model{s.source, s.binding};
+    for (const auto& [known, of_model] : letters)
+      if (known == model) return of_model;
+    return letters.emplace_back(model, Letters(s.source, s.binding)).second;
+  }
 
   Expression run(const Expression& e) {
     const auto found = done.find(e.get());
@@ -100,7 +110,7 @@ struct Differentiator::State {
       if (s.definition->pattern == Pattern::compound) return run(lower(s.definition->expand(s), false));
       return direction.tangent(e, *owner);
     }
-    const Letters o(s.source, s.binding);
+    const Letters& o = letters_of(s);
     switch (s.definition->id) {
       case SymbolId::H:
       case SymbolId::M:
@@ -140,7 +150,7 @@ struct Differentiator::State {
 
   // - G ∂H P⁺ - P⁺ ∂H* G* + G ∂J G*
   Expression hinge_terms(const Symbol& s) {
-    const Letters o(s.source, s.binding);
+    const Letters& o = letters_of(s);
     return plus({minus(with_transpose(times({o.G, run(o.H), o.P_plus}))), times({o.G, run(o.J), o.G.T()})});
   }
 
@@ -148,7 +158,7 @@ struct Differentiator::State {
   Expression edge_factor_of_psi(const Symbol& s) {
     const auto known = articulated_factor.find(s.binding.get());
     if (known != articulated_factor.end() && known->second.domain() == s.source->forces()) return known->second;
-    const Letters o(s.source, s.binding);
+    const Letters& o = letters_of(s);
     const Expression bar = plus({identity(o.H.domain()), minus(times({o.G, o.H}))});
     const Expression F = plus({times({direction.edge_factor(s), bar}), minus(times({run(o.G), o.H})), minus(times({o.G, run(o.H)}))});
     articulated_factor[s.binding.get()] = F;
@@ -166,7 +176,7 @@ struct Differentiator::State {
         !same_model(*first, *last))
       return std::nullopt;
     if (f.size() > 2 && !is_block_diagonal(product_of(std::vector<Expression>(f.begin() + 1, f.end() - 1)))) return std::nullopt;
-    const Letters o(first->source, first->binding);
+    const Letters& o = letters_of(*first);
     const bool articulated = first->definition->id == SymbolId::psi;
     const Expression middle = f.size() == 2 ? identity(f[0].domain()) : times(std::vector<Expression>(f.begin() + 1, f.end() - 1));
     const Expression bar = articulated ? plus({identity(o.H.domain()), minus(times({o.G, o.H}))}) : identity(o.H.domain());
