@@ -1,5 +1,5 @@
-// Explicit methods as steppers: Boost.Odeint's controlled Runge-Kutta pairs, its extrapolated midpoint rule and the classical method, and that of
-// Munthe-Kaas.
+// Explicit methods as steppers: Dormand and Prince's and the classical one by their tableaus (stages.h), other controlled Runge-Kutta pairs and the
+// extrapolated midpoint rule of Boost.Odeint, and that of Munthe-Kaas.
 #pragma once
 
 #include <memory>
