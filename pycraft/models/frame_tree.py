@@ -27,8 +27,7 @@ class Frame(Closed):
 
     Arguments that all of these share:
 
-    wrt : name, Frame, Body or Node, or None for the base
-        What the frame is seen from.
+    wrt : what the frame is seen from: a name, Frame, Body or Node, or None for the base
     axes : "body" | "aligned" | "world" | a frame
         The frame's own axes; those of `wrt`; those of `wrt`, of the point of the frame that is at its origin; those of a third frame. Where
         it is not "world", the linear part is that of the frame's origin. A frame that is called by one of these words is given as `Frame`.
