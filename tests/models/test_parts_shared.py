@@ -8,6 +8,7 @@ import pytest
 
 import pycraft as pc
 from support.mechanisms import every_kind, random_tree, uniform_batch
+from support.oracle import ROUNDING, agree
 from support.parts import alone
 
 
@@ -332,3 +333,23 @@ def test_programs_and_prepared_calls_of_parts(seed):
     state, tau = part.random_state(1), np.arange(part.nv) / 3
     assert np.array_equal(part.prepare("forward_dynamics")(state.q, state.v, tau), part.forward_dynamics(state, tau=tau))
     assert "def" in str((part.soa.MM @ pc.vector("x", part.soa.Theta)).algorithm("python"))
+
+
+def test_a_part_that_its_carrier_moves_accelerates_as_in_the_whole():
+    """Hybrid dynamics with the base's motion prescribed, the carrier's in the whole: the same accelerations; in a batch, too."""
+    robot = pc.tree([-1, 0, 1, 0, 3, 0, 5], ["free", "pin", "ball", "pin", "ball", "universal", "pin"], seed=1)
+    robot.gravity = (0.5, -1.0, -9.81)
+    tau = np.random.default_rng(0).uniform(-1, 1, robot.nv)
+    for seed in range(3):
+        state = robot.random_state(seed)
+        vdot = robot.forward_dynamics(state.q, state.v, tau)
+        condition = np.linalg.cond(robot.mass_matrix(state.q))
+        for root in ("body1", "body3", "body6"):
+            part, own = robot.subgraph(root=root, base="moving"), robot.subgraph(root=root).v_index
+            at, given = part.state_of(state), part.accelerations_of(vdot, state)
+            forces = np.r_[np.zeros(6), tau[own]]
+            found = part.hybrid_dynamics(at.q, at.v, forces, given, ["base"])
+            agree(found.vdot[6:], vdot[own], ROUNDING * condition)
+            agree(found.tau, part.inverse_dynamics(at.q, at.v, given), ROUNDING * condition)
+            batch = part.hybrid_dynamics(np.array([at.q] * 3), np.array([at.v] * 3), forces, given, ["base"])
+            assert np.array_equal(batch.vdot, [found.vdot] * 3)

@@ -6,9 +6,19 @@ import numpy as np
 import pytest
 
 import pycraft as pc
+from pycraft.dynamics.task_space import TaskSpace
+from pycraft.linear.linear_model import LinearModel
 from support.mechanisms import every_kind, uniform_batch
 
-FRAMES = {"jacobian", "pose", "jacobian_dot", "jacobian_derivative", "operational_space_inertia", "operational_space_compliance"}
+FRAMES = {
+    "task_space",
+    "jacobian",
+    "pose",
+    "jacobian_dot",
+    "jacobian_derivative",
+    "operational_space_inertia",
+    "operational_space_compliance",
+}
 NOT_OF_A_STATE = {"inertial_parameters", "prepare"}
 
 
@@ -24,6 +34,10 @@ def calls(model):
 
 
 def leaves(x):
+    if isinstance(x, LinearModel):
+        return [x.A, x.B, x.C, x.D, x.rate, x.q, x.v]
+    if isinstance(x, TaskSpace):
+        return [x.jacobian, x.velocity, x.bias()]
     if hasattr(x, "lines"):  # a picture: what it is drawn of
         return [np.stack(line.get_data_3d()) for line in x.lines]
     return [np.asarray(y) for y in (x if isinstance(x, tuple) else x.values() if isinstance(x, dict) else (x,))]
@@ -44,7 +58,7 @@ def test_every_direct_call_takes_a_state_or_the_models_own(name):
         model.q, model.v = now.q, now.v
     frame = ("body7",) if name.startswith("operational") else ("body1",) if name in FRAMES else ()  # body7 moves in every direction
     options = {"tau": np.arange(model.nv) / 10, "vdot": np.arange(model.nv) / 5, "p": np.ones(model.nv)}
-    inputs = {key: options[key] for key in others if key != "v"}
+    inputs = {key: options[key] for key in others if key != "v"} | ({"rng": 1} if name == "equipartition" else {})
     call = getattr(model, name)
 
     def at(q, v):
@@ -59,7 +73,7 @@ def test_every_direct_call_takes_a_state_or_the_models_own(name):
         assert same(call(*frame, v=state.v, **inputs), at(now.q, state.v))
         assert same(call(*frame, state, now, **inputs), at(state.q, now.v))
     for key in inputs:
-        if key != "p":
+        if key not in ("p", "rng"):
             rest = {k: x for k, x in inputs.items() if k != key}
             assert same(call(*frame, state, **rest), call(*frame, state, **rest, **{key: np.zeros(model.nv)}))
 
