@@ -266,7 +266,7 @@ def _listed(frames: Any) -> list[tuple[str, Any]]:
 
 
 def _rows(frame: str, directions: Any) -> tuple[np.ndarray, list[str]]:
-    several = [directions] if isinstance(directions, str) else list(directions)
+    several = [directions] if isinstance(directions, str) or not isinstance(directions, Iterable) else list(directions)
     if all(isinstance(one, str) for one in several):
         unknown = [one for one in several if one not in TWIST]
         if unknown or not several or len(set(several)) < len(several):

@@ -45,7 +45,7 @@ class LinearModel:
     model: Any = field(repr=False)
     q: np.ndarray = field(repr=False)
     v: np.ndarray = field(repr=False)
-    t: float = 0.0
+    t: Any = 0.0
     dt: float | None = None
 
     def __len__(self) -> int:
@@ -57,7 +57,17 @@ class LinearModel:
         if self.A.ndim == 2:
             raise TypeError("a linear model at one state takes no index; its arrays are .A, .B, .C, .D")
         q, v = (x if x.ndim == 1 else x[index] for x in (self.q, self.v))
-        return replace(self, A=self.A[index], B=self.B[index], C=self.C[index], D=self.D[index], rate=self.rate[index], q=q, v=v)
+        return replace(
+            self,
+            A=self.A[index],
+            B=self.B[index],
+            C=self.C[index],
+            D=self.D[index],
+            rate=self.rate[index],
+            q=q,
+            v=v,
+            t=self.t if np.ndim(self.t) == 0 else float(self.t[index]),
+        )
 
     def __repr__(self) -> str:
         many = "" if self.A.ndim == 2 else f"{len(self.A)} of "

@@ -32,23 +32,28 @@ def _along(
     scene: Any, calls: Any, q: np.ndarray, v: np.ndarray, t: Any, states: Any, chosen: list[int], names: tuple[str, ...], outputs: Any
 ) -> LinearModel:
     count = len(q) if q.ndim == 2 else len(v)
-    q, v = (np.broadcast_to(x, (count, x.shape[-1])) for x in (q, v))
-    times = np.broadcast_to(np.asarray(t, float), (count,))
-    own = np.zeros((count, 0)) if states is None else np.broadcast_to(states, (count, np.shape(states)[-1]))
+    times, own = _core.real_array(t, "t"), np.zeros((count, 0)) if states is None else np.atleast_1d(_core.real_array(states, "states"))
+    for name, x, axes in (("q", q, 2), ("v", v, 2), ("t", times, 1), ("states", own, 2)):
+        if x.ndim > axes or (x.ndim == axes and len(x) != count):
+            raise _core.ModelError(f"{name} of {scene.model.name!r} has the shape {x.shape}; there are {count} states, or one for all")
+    q, v, own = (np.broadcast_to(x, (count, x.shape[-1])) for x in (q, v, own))
+    times = np.broadcast_to(times, (count,))
     if not count:
         raise _core.ModelError("a linear model along no states: q has no rows")
     each = [_at(scene, calls, q[b], v[b], float(times[b]), own[b], chosen, names, outputs) for b in range(count)]
     first = each[0]
     stacked = [np.stack([getattr(one, name) for one in each]) for name in ("A", "B", "C", "D", "rate", "q", "v")]
     A, B, C, D, rate, all_q, all_v = stacked
-    return LinearModel(A, B, C, D, rate, first.states, first.inputs, first.outputs, first.units, first.model, all_q, all_v, float(times[0]))
+    return LinearModel(A, B, C, D, rate, first.states, first.inputs, first.outputs, first.units, first.model, all_q, all_v, times.copy())
 
 
 def _at(
     scene: Any, calls: Any, q: np.ndarray, v: np.ndarray, t: float, states: Any, chosen: list[int], names: tuple[str, ...], outputs: Any
 ) -> LinearModel:
-    model = scene.model
-    found = _core.scene_linearized(calls, q, v, t, np.asarray(states, float).ravel().tolist())
+    model, states = scene.model, np.atleast_1d(_core.real_array(states, "states")) if np.size(states) else np.zeros(0)
+    if not np.isfinite(states).all():
+        raise _core.ModelError(f"states: entry {int(np.flatnonzero(~np.isfinite(states))[0])} is {states[~np.isfinite(states)][0]}")
+    found = _core.scene_linearized(calls, q, v, t, states.ravel().tolist())
     nv, own = model.nv, len(found["rates"]) - model.nv
     known = [j for j, held in enumerate(found["known"]) if held]
     given = np.zeros((nv + own, len(chosen)))

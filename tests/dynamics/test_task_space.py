@@ -178,6 +178,7 @@ def test_derivatives_of_the_operators():
         (["body1", "body1"], "frame 'body1' is named twice"),
         ({"body1": ["x", "w"]}, "directions of 'body1': different ones of rx, ry, rz, x, y, z, or rows (k, 6); not ['x', 'w']"),
         ({"body1": ["x", "x"]}, "directions of 'body1': different ones"),
+        ({"body1": 3}, "directions of 'body1': rows (k, 6), not ()"),
         ({"body1": []}, "directions of 'body1': different ones"),
         ({"body1": [[1, 0, 0]]}, "directions of 'body1': rows (k, 6), not (1, 3)"),
         ({"body1": np.ones((2, 6))}, "the 2 rows are linearly dependent"),

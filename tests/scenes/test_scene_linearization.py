@@ -118,3 +118,18 @@ def test_refusals(model):
         pc.Scene(model).linearize(inputs="elbow")
     with pytest.raises(pc.ModelError, match="entry 1 is nan|is nan"):
         pc.Scene(model).linearize(model.zero_q(), np.full(model.nv, np.nan))
+
+
+def test_members_of_a_batch_and_what_does_not_fit(model):
+    scene = pc.Scene(model).add(Actuator())
+    states = [model.random_state(seed) for seed in range(3)]
+    Q, V = (np.array([getattr(s, x) for s in states]) for x in "qv")
+    whole = scene.linearize(Q, V, [0.0, 1.0, 2.0], states=[[0.1], [0.2], [0.3]])
+    assert whole.t.tolist() == [0.0, 1.0, 2.0] and whole[1].t == 1.0 and np.array_equal(whole[1].q, Q[1])
+    agree(whole[2].A, scene.linearize(Q[2], V[2], 2.0, states=[0.3]).A)
+    with pytest.raises(pc.ModelError, match="has the shape .2, 6.; there are 3 states, or one for all"):
+        scene.linearize(Q, V[:2])
+    with pytest.raises(pc.ModelError, match="there are 3 states, or one for all"):
+        scene.linearize(Q, V, [0.0, 1.0])
+    with pytest.raises(pc.ModelError, match="states: entry 0 is nan"):
+        scene.linearize(Q[0], V[0], states=[np.nan])
