@@ -122,20 +122,14 @@ class Motion:
         """
         about_origin = self._unedited_model().momentum(self.q, self.v).value
         about_com = about_origin.copy()
-        if any(body.mass > 0 for body in self.model.bodies.values()):
+        if self.model.mass > 0:
             about_com[..., :3] -= np.cross(self.centre_of_mass, about_origin[..., 3:])
         return {"origin": about_origin, "com": about_com}
 
     @cached_property
     def centre_of_mass(self) -> np.ndarray:
         """(K, 3) m, in the world."""
-        model = self._unedited_model()
-        bodies = [(name, body.mass, body.com) for name, body in model.bodies.items() if body.mass > 0]
-        if not bodies:
-            raise _core.ModelError(f"{model.name!r} has no mass, and no centre of it")
-        poses = [(mass, model.pose(name, self.q), com) for name, mass, com in bodies]
-        moment = sum(mass * (pose[..., :3, :3] @ com + pose[..., :3, 3]) for mass, pose, com in poses)
-        return moment / sum(mass for mass, _, _ in poses)
+        return self._unedited_model().centre_of_mass(self.q)
 
     def frame(self, name: str, *, axes: str = "body") -> FrameMotion:
         """A body or node over time: poses in the world and velocities, in its own axes or as `Multibody.jacobian` has them.

@@ -249,5 +249,5 @@ def test_without_mass_there_is_no_momentum(model):
     assert set(run.momentum) == {"origin", "com"}
     assert all(p.shape == (len(run.t), 6) and not p.any() for p in run.momentum.values())
     assert run.to_xarray()["momentum"].shape == (2, len(run.t), 6)
-    with pytest.raises(pc.ModelError, match="has no mass, and no centre of it"):
+    with pytest.raises(pc.ModelError, match="has no mass and so no centre of mass"):
         run.centre_of_mass  # noqa: B018 - raises
