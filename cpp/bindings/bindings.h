@@ -30,6 +30,7 @@ void register_pickling(py::module_& m);
 void register_scalars(py::module_& m);
 void register_plans(py::module_& m);
 void register_multibody(py::module_& m);
+void register_structure(py::module_& m);
 void register_dynamics(py::module_& m);
 void register_hybrid_dynamics(py::module_& m);
 void register_direct_calls(py::module_& m);

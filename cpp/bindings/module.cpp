@@ -34,6 +34,7 @@ PYBIND11_MODULE(_core, m) {
   pycraft::declare_types(m);
   pycraft::register_spaces(m);
   pycraft::register_multibody(m);
+  pycraft::register_structure(m);
   pycraft::register_sources(m);
   pycraft::register_operators(m);
   pycraft::register_constants(m);
