@@ -14,7 +14,7 @@ namespace {
 std::vector<char> prescribed_by(const Multibody& model, const std::vector<std::string>& names) {
   std::vector<char> prescribed(model.nv(), 0);
   for (const std::string& name : names)
-    for (int j : coordinates_named(model, Names({name}), "prescribed")) {
+    for (int j : coordinates_named(model, Names({name}), "prescribed", true)) {
       if (prescribed[j]) throw ModelError("prescribed: coordinate '" + model.structure().coordinate_names[j] + "' is prescribed twice, the second time as '" + name + "'");
       prescribed[j] = 1;
     }

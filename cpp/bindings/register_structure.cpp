@@ -1,5 +1,6 @@
 // Edits of a structure that stands, as pycraft.models.structure calls them.
 #include "bindings/hinge_arguments.h"
+#include "bindings/register_locking.h"
 #include "model/structure_edits.h"
 
 namespace pycraft {
@@ -17,6 +18,7 @@ void register_structure(py::module_& m) {
            py::arg("body"), py::arg("parent"), py::arg("hinge"), py::arg("hinge_name"), py::arg("axes"), py::arg("point"), py::arg("pitch"),
            py::arg("subhinges"), py::arg("rotation"), py::arg("position"), py::arg("rotor_inertia"), py::arg("lower"), py::arg("upper"), py::arg("q"),
            py::arg("v"));
+  register_locking(m);
 }
 
 }  // namespace pycraft

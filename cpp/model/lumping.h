@@ -7,5 +7,7 @@ namespace pycraft {
 
 // `body` with `welded` on it, X the pose of welded's frame in body's. ModelError where the sum is no rigid body.
 Body lumped(Body body, const Pose<double>& X, const Body& welded);
+// `body` without `welded`, which is part of it. ModelError where what is left is no rigid body.
+Body parted(Body body, const Pose<double>& X, const Body& welded);
 
 }  // namespace pycraft

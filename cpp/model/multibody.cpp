@@ -224,7 +224,7 @@ int Multibody::body_index(const std::string& name) const {
   if (found != body_numbers_.end()) return found->second;
   const auto node = node_numbers_.find(name);
   if (node != node_numbers_.end() && nodes_[node->second].body >= 0)
-    throw ModelError("'" + name + "' is welded to body '" + bodies_[nodes_[node->second].body].name + "' and is a node of it; load with welds=\"keep\" to have it as a body");
+    throw ModelError("'" + name + "' is welded to body '" + bodies_[nodes_[node->second].body].name + "' and is a node of it; load with welds=\"keep\" to have it as a body, or split it off where it was coalesced");
   throw_unknown("body", name, name_, body_numbers_);
 }
 int Multibody::hinge_index(const std::string& name) const {

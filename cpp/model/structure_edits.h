@@ -14,6 +14,9 @@ struct StructureEdits {
   // name and its placement on `parent`; q and v are its coordinates there. A hinge of no coordinates leaves a body that is welded.
   static void rehang(Multibody& model, const std::string& body, const std::string& parent, Hinge hinge, const std::vector<double>& q,
                      const std::vector<double>& v);
+
+  struct LockedHinges;  // locked_hinges.h
+  struct Coalescing;    // coalescing.h
 };
 
 }  // namespace pycraft

@@ -42,6 +42,10 @@ bool is_pattern(const std::string& name) { return name.find_first_of("*?[") != s
   throw ModelError(text + (near.empty() ? "; there is none" : "?"));
 }
 
+[[noreturn]] void throw_without_coordinates(const std::string& effect, const std::string& hinge) {
+  throw ModelError(effect + ": hinge '" + hinge + "' has no coordinates, it is locked or a weld: unlock it where it was locked, unlock('" + hinge + "'), or leave it out");
+}
+
 // From which coordinate to which, by names of coordinates and of hinges, which go before.
 std::unordered_map<std::string, std::pair<int, int>> coordinate_numbers(const Multibody& model) {
   std::unordered_map<std::string, std::pair<int, int>> numbers;
@@ -129,7 +133,7 @@ bool fits_pattern(const std::string& called, const std::string& shape) {
   return p == pattern.size();
 }
 
-std::vector<int> coordinates_named(const Multibody& model, const Names& names, const std::string& effect) {
+std::vector<int> coordinates_named(const Multibody& model, const Names& names, const std::string& effect, bool welds_too) {
   std::vector<int> found;
   if (!names) {
     found.resize(model.nv());
@@ -144,6 +148,7 @@ std::vector<int> coordinates_named(const Multibody& model, const Names& names, c
   const auto numbers = coordinate_numbers(model);
   for (const std::string& name : *names) {
     if (const auto exact = numbers.find(name); exact != numbers.end()) {
+      if (!welds_too && exact->second.first == exact->second.second) throw_without_coordinates(effect, name);
       add(exact->second.first, exact->second.second);
       continue;
     }
@@ -154,6 +159,9 @@ std::vector<int> coordinates_named(const Multibody& model, const Names& names, c
     std::sort(fitting.begin(), fitting.end());
     for (const auto& [from, to] : fitting) add(from, to);
     if (!fitting.empty()) continue;
+    // A coordinate, "elbow[1]", of a hinge that has none now.
+    if (const auto hinge = numbers.find(name.substr(0, name.rfind('['))); hinge != numbers.end() && hinge->second.first == hinge->second.second)
+      throw_without_coordinates(effect, hinge->first);
     if (const std::string text = moved_by(model, name); !text.empty()) throw ModelError(effect + ": no hinge of '" + model.name() + "' is called '" + name + "'" + text);
     std::vector<std::string> known;
     for (const auto& [other, _] : numbers) known.push_back(other);

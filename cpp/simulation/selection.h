@@ -17,8 +17,9 @@ bool fits_pattern(const std::string& name, const std::string& pattern);
 
 using Names = std::optional<std::vector<std::string>>;  // none: all
 
-// The coordinates of the hinges, or coordinates, of these names, each once and in the order of the names.
-std::vector<int> coordinates_named(const Multibody& model, const Names& names, const std::string& effect);
+// The coordinates of the hinges, or coordinates, of these names, each once and in the order of the names. A hinge that has none, locked or a weld,
+// is refused where it is named, but for welds_too: then it adds none.
+std::vector<int> coordinates_named(const Multibody& model, const Names& names, const std::string& effect, bool welds_too = false);
 // The bodies that hinges of these names move.
 std::vector<int> hinges_named(const Multibody& model, const Names& names, const std::string& effect);
 // The bodies of these names.

@@ -13,6 +13,7 @@ from ..arguments import limit_pair, listed, pose_parts, text
 from ..closed import Closed
 from ..dynamics.integration import IntegrationCalls
 from ..state import State, at_state, random_state
+from .coalescing import Coalescing
 from .handles import Body, Hinge, Named, Node, Vector
 from .parts import Parts
 from .pictures import Pictures
@@ -30,7 +31,7 @@ _DEFAULT_AXES: dict[str, tuple[tuple[float, float, float], ...]] = {
 }
 
 
-class Multibody(Closed, IntegrationCalls, Pictures, Parts, WithFrames):
+class Multibody(Closed, IntegrationCalls, Pictures, Parts, Coalescing, WithFrames):
     """A tree of bodies on hinges, with nodes, a state (`q`, `v`) and gravity (zero until it is set).
 
     Build one body by body, or load it (`pycraft.load`). Bodies are kept depth first, children in the order they were added, and
@@ -270,7 +271,8 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, WithFrames):
 
     # ------------------------------------------------------------------ copies
     def description(self) -> dict[str, Any]:
-        """The whole model as plain data: bodies, hinges, nodes, gravity, state (see `pycraft.reference` for the schema), loose frames."""
+        """The whole model as plain data: bodies, hinges, nodes, gravity, state (see `pycraft.reference` for the schema), loose frames, and
+        what unlocks hinges and splits bodies."""
         return describe(self)
 
     @classmethod
@@ -306,6 +308,7 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, WithFrames):
             model._add_node(node["name"], frame(node["body"]), node["rotation"], node["position"])
         for loose in data.get("frames", []):
             model.frames._add_again(loose)
+        model._hinges_before, model._bodies_before = dict(data.get("locked", {})), dict(data.get("coalesced", {}))
         model.gravity = data.get("gravity", (0, 0, 0))
         if "q" in data:
             model.q, model.v = data["q"], data["v"]
@@ -367,13 +370,17 @@ def describe(model: _core.Multibody) -> dict[str, Any]:
     """The core's model as plain data."""
     frames = getattr(model, "_kept_frames", None)
     loose = frames._description() if frames is not None else []
-    return {
-        "name": model.name,
-        "gravity": model.gravity,
-        "bodies": [model._body(k) for k in range(model._size)],
-        "nodes": model._nodes(),
-        "welds": "keep" if model.keeps_welds else "lump",
-        "strict": model.strict,
-        "q": np.array(model.q),
-        "v": np.array(model.v),
-    } | ({"frames": loose} if loose else {})
+    return (
+        {
+            "name": model.name,
+            "gravity": model.gravity,
+            "bodies": [model._body(k) for k in range(model._size)],
+            "nodes": model._nodes(),
+            "welds": "keep" if model.keeps_welds else "lump",
+            "strict": model.strict,
+            "q": np.array(model.q),
+            "v": np.array(model.v),
+        }
+        | ({"frames": loose} if loose else {})
+        | getattr(model, "_described_edits", dict)()
+    )

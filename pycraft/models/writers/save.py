@@ -28,6 +28,8 @@ def save(model: Multibody, path: str | os.PathLike[str], state: bool = True) -> 
         raise _core.ModelError(f"{shown}: a model's file ends in {kinds}{remedy}")
     if loose := model.frames._core.loose_names():
         warn(f"{shown}: a file does not hold loose frames: {', '.join(loose[:6])}{', ...' if len(loose) > 6 else ''}")
+    if kept := [*model.locked, *model.coalesced]:
+        warn(f"{shown}: a file does not hold what unlocks and splits: {', '.join(kept[:6])}{', ...' if len(kept) > 6 else ''}")
     write_text(shown, text)
 
 

@@ -46,8 +46,8 @@ def model_data(model: Multibody, state: bool = True) -> dict[str, Any]:
     data: dict[str, Any] = {"format": FORMAT, "name": described["name"]}
     if not same(described["gravity"], _ZERO):
         data["gravity"] = described["gravity"]
-    if described["welds"] != "lump":
-        data["welds"] = described["welds"]
+    if described["welds"] != "lump" or any(not body["hinge"]["subhinges"] for body in bodies):  # locked hinges, say
+        data["welds"] = "keep"
     if described["strict"]:
         data["strict"] = True
     if bodies:

@@ -1,0 +1,296 @@
+"""Bodies that are joined rigidly made one, split again, and massless leaves pruned."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from copy import deepcopy
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from ..arguments import text
+from .handles import Body, Node
+from .locking import Locking
+
+Mass = tuple[float, np.ndarray, np.ndarray]
+Pose = tuple[np.ndarray, np.ndarray]
+
+
+class Coalescing(Locking):
+    """Bodies that became one with what carries them, and come back."""
+
+    _bodies_before: Mapping[str, dict[str, Any]] = {}
+    """Of each coalesced body, in the order in which they were: "body" as it was; "carrier", empty for the base; "next", the body that
+    stood after it there; mass properties of the carrier "before" and "after"; "children" that hung on it, each with its placement there and
+    the one that it has since; "nodes" that were on it, each with its pose there."""
+
+    def coalesce(self, bodies: Any = None) -> list[str]:
+        """Make bodies that hang on a weld one with what carries them, all where none are named.
+
+        The carrier takes their mass properties; what hung on them, and their nodes, are where they were, and their names are nodes. So it
+        is with welds of a file that is loaded with welds="lump". Mass matrix, motions, momentum and energy stay, to rounding; on the base
+        the body's mass is no longer there, which moves nothing (potential energy counts from elsewhere). Coordinates and their order stay.
+
+        Parameters
+        ----------
+        bodies : names or handles of bodies, one or several
+
+        Returns
+        -------
+        list of str : names of the bodies that are nodes now, in the model's order
+
+        Raises
+        ------
+        ModelError
+            An unknown body, one that hangs on a hinge that moves (lock it first), a part. The model is as it was.
+
+        Cost: O(N) once, that of some forward dynamics; each evaluation takes a body's step less for each of them.
+
+        Examples
+        --------
+        >>> import numpy as np, pycraft as pc
+        >>> arm = pc.chain(4)
+        >>> arm.q = [0.1, 0.2, 0.3, 0.4]
+        >>> stop = arm.lock("hinge2")
+        >>> before = arm.mass_matrix()
+        >>> arm.coalesce()
+        ['body2']
+        >>> list(arm.bodies), bool(np.allclose(arm.mass_matrix(), before))
+        (['body0', 'body1', 'body3'], True)
+        >>> arm.split("body2"), arm.unlock("hinge2"), list(arm.q)
+        (['body2'], ['hinge2'], [0.1, 0.2, 0.3, 0.4])
+        """
+        if bodies is None:
+            numbers = [k for k, size in enumerate(self._hinge_sizes()[1]) if not size]
+        else:
+            numbers = sorted({self._body_index(name) for name in _names(bodies, "a body")})
+        return self._coalesced_now(numbers)
+
+    def split(self, bodies: Any = None) -> list[str]:
+        """Split coalesced bodies off, all where none are named: each is a body on its weld again, and what was on it is on it again.
+
+        In any order: what is in the way, a carrier that is coalesced itself or what hung on the body and was coalesced later, is split off
+        and coalesced again. A hinge that was locked can then be unlocked.
+
+        Where nobody set the carrier's mass properties since, they and all placements are what they were to the last bit. Else the body's
+        own are taken from them; placements that were set move along.
+
+        Parameters
+        ----------
+        bodies : names of bodies, or handles of their nodes, one or several
+
+        Returns
+        -------
+        list of str : names of the bodies that are split off, the last coalesced first
+
+        Raises
+        ------
+        ModelError
+            A body that is not coalesced; what remains is no possible body (a mass below zero, an inertia with a negative moment); a hinge
+            that is called as the body's own was added meanwhile; a part. The model is as it was.
+
+        Cost: as of `coalesce`.
+        """
+        self._split([])  # a part refuses
+        there = self.coalesced
+        wanted = there if bodies is None else list(dict.fromkeys(_names(bodies, "a body")))
+        for name in wanted:
+            if name not in self._bodies_before:
+                raise _core.ModelError(f"body {name!r} of {self.name!r} is not coalesced; coalesced are {', '.join(there[:12]) or 'none'}")
+        opened = self._in_the_way(wanted)
+        records, left = self._plan_of(opened)
+        self._split(records)
+        self._bodies_before = left
+        again = [name for name in reversed(opened) if name not in set(wanted)]
+        self._coalesced_now(sorted(self._body_index(name) for name in again))
+        return [name for name in opened if name in set(wanted)]
+
+    def prune(self) -> list[str]:
+        """Make massless leaves nodes of what carries them, where they are, and again until there are none.
+
+        A leaf has nothing outboard; it is massless where it has neither mass nor inertia, and its hinge no rotor inertia. Such bodies move
+        nothing, and forward dynamics refuses the hinges that move them. Their names, nodes and frames stay, fixed to the body that carries
+        them. They are locked and coalesced, so that `split` and `unlock` bring them back.
+
+        Returns
+        -------
+        list of str : names of the bodies that are nodes now, in the model's order
+
+        Raises
+        ------
+        ModelError
+            A part, whose structure is the whole's.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> arm = pc.chain(2)
+        >>> finger = arm.add_body("finger", parent="body1", position=(1, 0, 0))
+        >>> nail = arm.add_body("nail", parent="finger", position=(0.1, 0, 0))
+        >>> arm.prune(), list(arm.bodies), list(arm.nodes)
+        (['finger', 'nail'], ['body0', 'body1'], ['finger', 'nail'])
+        """
+        data = [self._body(k) for k in range(self._size)]
+        outboard = [0] * len(data)
+        for body in data:
+            if body["parent"] >= 0:
+                outboard[body["parent"]] += 1
+        pruned = []
+        for k in range(len(data) - 1, -1, -1):
+            body = data[k]
+            if not outboard[k] and not body["mass"] and not body["inertia"].any() and not body["hinge"]["rotor_inertia"].any():
+                pruned.append(k)
+                if body["parent"] >= 0:
+                    outboard[body["parent"]] -= 1
+        pruned.reverse()
+        self._locked_now([k for k in pruned if data[k]["hinge"]["subhinges"]], np.array(self.v))  # massless: nothing else moves otherwise
+        return self._coalesced_now(pruned)
+
+    @property
+    def coalesced(self) -> list[str]:
+        """Names of the bodies that are coalesced, in the order in which they were; of a part those that are its own."""
+        if self._whole is not None:
+            own = {node["name"] for node in self._nodes()}
+            return [name for name in self._whole.coalesced if name in own]
+        return list(self._bodies_before)
+
+    def remove_body(self, name: Any) -> None:
+        """`Multibody.remove_body`: what was locked or coalesced there is gone with it."""
+        super().remove_body(name)
+        if not self._bodies_before and not self._hinges_before:
+            return
+        (bodies, hinges), nodes = map(set, self._names()), {node["name"] for node in self._nodes()}
+        kept = {name: one for name, one in self._bodies_before.items() if name in nodes}
+        for name, one in kept.items():
+            kept[name] = one | {"children": {child: poses for child, poses in one["children"].items() if child in bodies or child in kept}}
+        self._bodies_before = kept
+        self._hinges_before = {name: one for name, one in self._hinges_before.items() if name in hinges or one["body"] in kept}
+
+    # ------------------------------------------------------------------ coalescing
+    def _coalesced_now(self, numbers: list[int]) -> list[str]:
+        data = [self._body(k) for k in numbers]
+        records = dict(self._bodies_before)
+        for body, one in zip(data, self._coalesce(numbers), strict=True):
+            rotation, position = one.pop("placement")
+            body["hinge"]["placement"] = {"rotation": rotation, "position": position}
+            records[body["name"]] = one | {"body": body}
+        self._bodies_before = records
+        return [body["name"] for body in data]
+
+    # ------------------------------------------------------------------ splitting
+    def _in_the_way(self, wanted: list[str]) -> list[str]:
+        """What has to be split off for these, the last coalesced first.
+
+        What carries one that is coalesced was so later, and so was what hung on it.
+        """
+        records, found, open_ = self._bodies_before, set(wanted), list(wanted)
+        while open_:
+            one = records[open_.pop()]
+            for name in (one["carrier"], *one["children"]):
+                if name in records and name not in found:
+                    found.add(name)
+                    open_.append(name)
+        return [name for name in reversed(list(records)) if name in found]
+
+    def _plan_of(self, opened: list[str]) -> tuple[list[dict[str, Any]], dict[str, dict[str, Any]]]:
+        """What the core is told of each, and the records that are left."""
+        left = {name: dict(one) for name, one in self._bodies_before.items()}
+        on: dict[str, list[str]] = {}
+        for name, one in left.items():
+            on.setdefault(one["carrier"], []).append(name)
+        masses: dict[str, Mass] = {}
+        placements: dict[str, Pose] = {}
+        plan = []
+        for name in opened:
+            one = left.pop(name)
+            body, carrier, X = one["body"], one["carrier"], _pose(one["body"]["hinge"])
+            after = on[carrier][on[carrier].index(name) + 1 :]
+            on[carrier].remove(name)
+            if carrier:
+                masses[carrier] = self._mass_without(one, [left[later] for later in after], masses)
+            masses[name] = _mass(body)
+            children = {}
+            for child, (before, made) in one["children"].items():
+                now = placements.get(child) or self._placement_of(child)
+                if now is not None:
+                    children[child] = placements[child] = before if _same(now, made) else _product(_inverse(X), now)
+            placements[name] = X
+            places = [*children, *self._places(one["next"], left)]
+            plan.append({
+                "body": body, "carrier": carrier, "places": places, "mass": masses.get(carrier, _NO_MASS), "children": children,
+                "nodes": one["nodes"],
+            })  # fmt: skip
+        return plan, left
+
+    def _mass_without(self, one: dict[str, Any], later: list[dict[str, Any]], masses: dict[str, Mass]) -> Mass:
+        """The carrier's mass properties without this body: what they were, and what came later joined again, if nobody set any."""
+        carrier = one["carrier"]
+        now = masses[carrier] if carrier in masses else _mass(self._body(self._body_index(carrier)))
+        steps = [one, *later]
+        ends = [*(step["before"] for step in later), now]
+        if not all(_same(step["after"], end) for step, end in zip(steps, ends, strict=True)):
+            return _core._parted(now, carrier, _pose(one["body"]["hinge"]), _mass(one["body"]), one["body"]["name"])
+        mass: Mass = one["before"]
+        for step in later:
+            step["before"] = mass
+            if not _massless(step["body"]):
+                mass = _core._joined(mass, carrier, _pose(step["body"]["hinge"]), _mass(step["body"]), step["body"]["name"])
+            step["after"] = mass
+        return mass
+
+    def _placement_of(self, body: str) -> Pose | None:
+        """Of its hinge; None where there is no such body."""
+        try:
+            return _pose(self._body(self._body_index(body))["hinge"])
+        except _core.ModelError:
+            return None
+
+    def _places(self, following: str, left: Mapping[str, dict[str, Any]]) -> list[str]:
+        """What a body without children stands before: what followed it; where that is coalesced, what hung on it or followed it."""
+        places: list[str] = []
+        while following in left:
+            places += left[following]["children"]
+            following = left[following]["next"]
+        return [*places, following] if following else places
+
+    # ------------------------------------------------------------------ files and copies
+    def _described_edits(self) -> dict[str, Any]:
+        """What a copy needs to unlock and split; of a part what is its own."""
+        of_whole = self if self._whole is None else self._whole
+        locked, coalesced = set(self.locked), {name: of_whole._bodies_before[name] for name in self.coalesced}
+        hinges = {name: one for name, one in of_whole._hinges_before.items() if name in locked or one["body"] in coalesced}
+        return deepcopy({key: value for key, value in (("locked", hinges), ("coalesced", coalesced)) if value})
+
+
+_NO_MASS: Mass = (0.0, np.zeros(3), np.zeros((3, 3)))
+
+
+def _names(given: Any, what: str) -> list[str]:
+    several = [given] if isinstance(given, (str, Body, Node)) or not isinstance(given, Iterable) else given
+    return [one.name if isinstance(one, (Body, Node)) else text(one, what) for one in several]
+
+
+def _mass(body: dict[str, Any]) -> Mass:
+    return body["mass"], body["com"], body["inertia"]
+
+
+def _massless(body: dict[str, Any]) -> bool:
+    return not body["mass"] and not body["inertia"].any()
+
+
+def _pose(hinge: dict[str, Any]) -> Pose:
+    return hinge["placement"]["rotation"], hinge["placement"]["position"]
+
+
+def _product(X: Pose, Y: Pose) -> Pose:
+    return X[0] @ Y[0], X[1] + X[0] @ Y[1]
+
+
+def _inverse(X: Pose) -> Pose:
+    return X[0].T, -X[0].T @ X[1]
+
+
+def _same(a: Iterable[Any], b: Iterable[Any]) -> bool:
+    """To the last bit but the sign of zero."""
+    return all(np.array_equal(x, y) for x, y in zip(a, b, strict=True))
