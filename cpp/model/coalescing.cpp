@@ -22,6 +22,23 @@ std::string happened(const std::string& first, size_t count, const char* what) {
   return "body '" + first + "'" + (count > 1 ? " and " + std::to_string(count - 1) + " more were " : " was ") + what;
 }
 
+// Who hangs on whom: a body's children and nodes by number, and which of its parent's children comes next, -1 for none.
+struct Carried {
+  std::vector<std::vector<int>> children, nodes;
+  std::vector<int> next;
+};
+Carried carried_by(const std::vector<Body>& bodies, const std::vector<Node>& nodes) {
+  const int n = static_cast<int>(bodies.size());
+  Carried all{std::vector<std::vector<int>>(n), std::vector<std::vector<int>>(n), std::vector<int>(n, -1)};
+  std::vector<int> latest(n + 1, -1);
+  for (int k = n - 1; k >= 0; --k) all.next[k] = std::exchange(latest[bodies[k].parent + 1], k);
+  for (int k = 0; k < n; ++k)
+    if (bodies[k].parent >= 0) all.children[bodies[k].parent].push_back(k);
+  for (size_t i = 0; i < nodes.size(); ++i)
+    if (nodes[i].body >= 0) all.nodes[nodes[i].body].push_back(static_cast<int>(i));
+  return all;
+}
+
 // The bodies that are left, in their order, and parents and nodes by their new numbers.
 void renumber(std::vector<Body>& bodies, std::vector<Node>& nodes, const std::vector<int>& order) {
   std::vector<int> place(bodies.size(), -1);
@@ -43,15 +60,8 @@ std::vector<StructureEdits::Coalescing::Coalesced> StructureEdits::Coalescing::c
   model.settle();
   std::vector<Body> bodies = model.bodies_;
   std::vector<Node> nodes = model.nodes_;
+  auto [children, own_nodes, next] = carried_by(bodies, nodes);
   const int n = model.bodies();
-  std::vector<std::vector<int>> children(n), own_nodes(n);
-  std::vector<int> next(n, -1), latest(n + 1, -1);
-  for (int k = n - 1; k >= 0; --k) next[k] = std::exchange(latest[bodies[k].parent + 1], k);
-  for (int k = 0; k < n; ++k)
-    if (bodies[k].parent >= 0) children[bodies[k].parent].push_back(k);
-  for (size_t i = 0; i < nodes.size(); ++i)
-    if (nodes[i].body >= 0) own_nodes[nodes[i].body].push_back(static_cast<int>(i));
-
   std::vector<char> gone(n, 0);
   std::vector<Coalesced> all;
   for (int k : chosen) {
