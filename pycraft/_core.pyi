@@ -78,12 +78,18 @@ class Multibody:
         ...
     def _body_index(self, arg0: str) -> int:
         ...
+    def _branch(self, root: typing.SupportsInt | typing.SupportsIndex) -> tuple[list[str], list[str], list[str]]:
+        """
+        Names of a body and all outboard of it (-1: of all), of their hinges, and of the nodes on them.
+        """
     def _follow_base(self) -> None:
         ...
     def _frame_body(self, arg0: str) -> int:
         """
         The number of the body that a body or node is on, -1 for the base.
         """
+    def _graft(self, source: Multibody, root: typing.SupportsInt | typing.SupportsIndex, parent: str, rotation: typing.Any, position: typing.Any, places_hinge: bool, bodies: collections.abc.Sequence[str], hinges: collections.abc.Sequence[str], nodes: collections.abc.Sequence[str]) -> None:
+        ...
     def _hinge_index(self, arg0: str) -> int:
         ...
     def _hinge_sizes(self) -> tuple[list[str], list[int]]:
@@ -102,6 +108,10 @@ class Multibody:
         ...
     def _rehang(self, body: str, parent: str, hinge: str, hinge_name: str, axes: collections.abc.Sequence[typing.Any], point: typing.Any, pitch: typing.Any, subhinges: typing.Any, rotation: typing.Any, position: typing.Any, rotor_inertia: typing.Any, lower: typing.Any, upper: typing.Any, q: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], v: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> None:
         ...
+    def _reroot(self, body: str, rates: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> list[tuple[str, list[float]]]:
+        """
+        Returns the accelerations of the hinges that were turned, by name.
+        """
     def _set_limits(self, arg0: typing.SupportsInt | typing.SupportsIndex, arg1: typing.Any, arg2: typing.Any) -> None:
         ...
     def _set_mass_properties(self, arg0: typing.SupportsInt | typing.SupportsIndex, arg1: typing.Any, arg2: typing.Any, arg3: typing.Any) -> None:
