@@ -108,6 +108,10 @@ class Multibody:
         ...
     def _rehang(self, body: str, parent: str, hinge: str, hinge_name: str, axes: collections.abc.Sequence[typing.Any], point: typing.Any, pitch: typing.Any, subhinges: typing.Any, rotation: typing.Any, position: typing.Any, rotor_inertia: typing.Any, lower: typing.Any, upper: typing.Any, q: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], v: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> None:
         ...
+    def _remove_body(self, name: str) -> None:
+        ...
+    def _require_new(self, bodies: collections.abc.Sequence[str], hinges: collections.abc.Sequence[str], nodes: collections.abc.Sequence[str], frames: collections.abc.Sequence[str], loose: collections.abc.Sequence[str]) -> None:
+        ...
     def _reroot(self, body: str, rates: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> list[tuple[str, list[float]]]:
         """
         Returns the accelerations of the hinges that were turned, by name.
@@ -131,10 +135,6 @@ class Multibody:
     def integrate(self, q: typing.Any, dv: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
         """
         q moved along the velocity dv for unit time: on the group for ball and free hinges (exponential of the body twist).
-        """
-    def remove_body(self, name: str) -> None:
-        """
-        Removes a body with everything outboard of it. Operators made before are stale; q and v are carried over by hinge name.
         """
     def take_warnings(self) -> list[tuple[str, str]]:
         ...

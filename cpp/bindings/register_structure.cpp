@@ -26,6 +26,12 @@ void register_structure(py::module_& m) {
              return py::make_tuple(names.bodies, names.hinges, names.nodes);
            },
            py::arg("root"), "Names of a body and all outboard of it (-1: of all), of their hinges, and of the nodes on them.")
+      .def("_require_new",
+           [](const Multibody& mb, const std::vector<std::string>& bodies, const std::vector<std::string>& hinges, const std::vector<std::string>& nodes,
+              const std::vector<std::string>& frames, const std::vector<std::string>& loose) {
+             StructureEdits::require_new(mb, {bodies, hinges, nodes}, frames, loose);
+           },
+           py::arg("bodies"), py::arg("hinges"), py::arg("nodes"), py::arg("frames"), py::arg("loose"))
       .def("_graft",
            [](Multibody& mb, const Multibody& source, int root, const std::string& parent, const py::object& rotation, const py::object& position,
               bool places_hinge, const std::vector<std::string>& bodies, const std::vector<std::string>& hinges, const std::vector<std::string>& nodes) {

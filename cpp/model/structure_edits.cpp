@@ -118,15 +118,16 @@ Copies copies_of(const Multibody& source, const StructureEdits::Branch& from, in
 
 }  // namespace
 
-void StructureEdits::require_new(const Multibody& model, const Names& names) {
+void StructureEdits::require_new(const Multibody& model, const Names& names, const std::vector<std::string>& frames, const std::vector<std::string>& loose) {
   std::vector<std::string> taken;
-  std::unordered_set<std::string> frames, hinges;
+  std::unordered_set<std::string> standing(loose.begin(), loose.end()), hinges;
+  model.settled();
   const auto look = [&](const std::string& name, bool there, std::unordered_set<std::string>& among) {
-    if (name.empty()) throw ModelError("a body, hinge or node of the copy in '" + model.name_ + "' has no name");
+    if (name.empty()) throw ModelError("a body, hinge, node or frame of the copy in '" + model.name_ + "' has no name");
     if (there || !among.insert(name).second) taken.push_back(name);
   };
-  for (const auto* called : {&names.bodies, &names.nodes})
-    for (const std::string& name : *called) look(name, model.body_numbers_.count(name) || model.node_numbers_.count(name), frames);
+  for (const auto* called : {&names.bodies, &names.nodes, &frames})
+    for (const std::string& name : *called) look(name, model.body_numbers_.count(name) || model.node_numbers_.count(name), standing);
   for (const std::string& name : names.hinges) look(name, model.hinge_numbers_.count(name), hinges);
   if (taken.empty()) return;
   std::sort(taken.begin(), taken.end());
@@ -142,7 +143,7 @@ void StructureEdits::graft(Multibody& model, const Multibody& source, int root, 
   if (names.bodies.size() != size || names.hinges.size() != size || names.nodes.size() != from.nodes.size())
     throw ModelError("a copy of " + std::to_string(size) + " bodies and " + std::to_string(from.nodes.size()) + " nodes takes a name for each, and for each hinge");
   model.settle();
-  require_new(model, names);
+  require_new(model, names, {}, {});
   const int before = model.bodies();
   Copies made = copies_of(source, from, before, model.find_frame(parent), X, places_hinge, names);
   const Multibody::Edit edit(model);

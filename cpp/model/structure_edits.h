@@ -28,6 +28,9 @@ struct StructureEdits {
     std::vector<int> nodes;
   };
   static Branch branch(const Multibody& model, int root);
+  // ModelError that lists all names of copies that are taken, in the model or among themselves: `frames` are those of copied loose frames, and
+  // `loose` those of frames that there are.
+  static void require_new(const Multibody& model, const Names& names, const std::vector<std::string>& frames, const std::vector<std::string>& loose);
   // Copies of a branch of `source`, which may be the model itself, with its coordinates as they are. Its root hangs on `parent`: what carries it
   // in the source is at X there, or where X is the placement of its hinge, that is at X.
   static void graft(Multibody& model, const Multibody& source, int root, const std::string& parent, const Pose<double>& X, bool places_hinge,
@@ -38,7 +41,6 @@ struct StructureEdits {
   static std::vector<std::pair<std::string, std::vector<double>>> reroot(Multibody& model, const std::string& body, const std::vector<double>& rates);
 
  private:
-  static void require_new(const Multibody& model, const Names& names);  // ModelError that lists all that are taken
   // The free hinge of the last body on a way to the root, over which the root can move to the first.
   static const Hinge& hinge_of_root(const Multibody& model, const std::vector<int>& way);
 };

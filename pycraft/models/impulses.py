@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from .grafting import roots_of
 
 
 @dataclass(frozen=True)
@@ -70,10 +71,9 @@ def twists_of(model: Any) -> np.ndarray:
 
 def _momentum(model: Any, gathered: np.ndarray) -> np.ndarray:
     """Of all that hangs on the base: what φ has gathered at its roots, moved to the world's origin."""
-    total, k = np.zeros(6), 0
-    while k < model._size:  # depth first: what a root carries is a run
+    total = np.zeros(6)
+    for k in roots_of(model):
         X = model.pose(model._body(k)["name"], model.q)
         angular, linear = X[:3, :3] @ gathered[6 * k : 6 * k + 3], X[:3, :3] @ gathered[6 * k + 3 : 6 * k + 6]
         total += np.r_[angular + np.cross(X[:3, 3], linear), linear]
-        k += len(model._outboard_of(k, []))
     return total

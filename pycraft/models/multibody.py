@@ -13,15 +13,16 @@ from ..arguments import pose_parts, text
 from ..closed import Closed
 from ..dynamics.integration import IntegrationCalls
 from ..state import State, at_state, random_state
+from .grafting import Grafting
 from .handles import Body, Hinge, Named, Node, Vector
-from .hinge_arguments import body_name, frame_name, hinge_arguments
+from .hinge_arguments import frame_name, hinge_arguments
 from .parts import Parts
 from .pictures import Pictures
 from .structure import Structure
 from .with_frames import WithFrames
 
 
-class Multibody(Closed, IntegrationCalls, Pictures, Parts, Structure, WithFrames):
+class Multibody(Closed, IntegrationCalls, Pictures, Parts, Structure, Grafting, WithFrames):
     """A tree of bodies on hinges, with nodes, a state (`q`, `v`) and gravity (zero until it is set).
 
     Build one body by body, or load it (`pycraft.load`). Bodies are kept depth first, children in the order they were added, and
@@ -119,10 +120,6 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, Structure, WithFrames
         self._add_body(name=name, parent=frame_name(parent), hinge_name=called, mass=mass, com=com, inertia=inertia, **given)
         return Body(self, name)
 
-    def remove_body(self, name: str | Body) -> None:
-        """Remove a body with everything outboard of it. Operators made before are stale; q and v are carried over by hinge name."""
-        super().remove_body(body_name(name))
-
     def add_node(
         self,
         name: str,
@@ -136,6 +133,8 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, Structure, WithFrames
         self._check_not_a_frame(name, "node")
         rotation, position = pose_parts(f"node {name!r}", rotation, position, placement)
         self._add_node(text(name, "a node"), frame_name(body), rotation, position)
+        whole = self._of_whole()
+        whole._added_nodes |= {name}
         return Node(self, name)
 
     @property
@@ -310,13 +309,13 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, Structure, WithFrames
         return [dict(actuator) for actuator in self._actuators]
 
     def __reduce__(self):
-        return _again, (self.description(), self._left_aside, self._actuators)
+        return _again, (self.description(), self._left_aside, self._actuators, self._added_nodes)
 
     def __copy__(self) -> Multibody:
-        return _again(self.description(), self._left_aside, self._actuators)
+        return _again(self.description(), self._left_aside, self._actuators, self._added_nodes)
 
     def __deepcopy__(self, memo) -> Multibody:
-        memo[id(self)] = copy = _again(self.description(), self._left_aside, self._actuators)
+        memo[id(self)] = copy = _again(self.description(), self._left_aside, self._actuators, self._added_nodes)
         return copy
 
     def __repr__(self) -> str:
@@ -328,10 +327,16 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, Structure, WithFrames
             return f"<part {self.name!r} of {self._whole.name!r}, which has changed since>"
 
 
-def _again(description: Mapping[str, Any], left_aside: Mapping[str, np.ndarray], actuators: Sequence[dict[str, Any]] = ()) -> Multibody:
-    """A copy of a model from its description and what its file said beside it."""
+def _again(
+    description: Mapping[str, Any],
+    left_aside: Mapping[str, np.ndarray],
+    actuators: Sequence[dict[str, Any]] = (),
+    added_nodes: frozenset[str] = frozenset(),
+) -> Multibody:
+    """A copy of a model from its description, what its file said beside it, and which nodes were added since."""
     model = Multibody.from_description(description)
     model._left_aside, model._actuators = dict(left_aside), [dict(actuator) for actuator in actuators]
+    model._added_nodes = added_nodes
     return model
 
 

@@ -7,6 +7,7 @@ import pytest
 
 import pycraft as pc
 from support.descriptions import KINDS, random_description, random_subhinges
+from support.edits import refused
 from support.mechanisms import every_kind
 from support.motions import Motions
 
@@ -126,16 +127,6 @@ def test_limits_say_where_to_look():
     arm.q = [0, -1.0]
     done = arm.reattach("body1", "body0", "pin", position=(1, 0, 0), limits=(4, 7))
     assert done.q[0] == pytest.approx(2 * np.pi - 1) and arm.hinges["hinge1"].limits[0] == [4]
-
-
-def refused(model, edit, *words, kind=pc.ModelError):
-    """An edit is refused with these words, and the model, its state and its operators are as they were."""
-    MM, before = model.soa.MM, repr(model.description())
-    with pytest.raises(kind) as error:
-        edit()
-    assert repr(model.description()) == before and MM.check_current() is None
-    for word in words:
-        assert word in str(error.value), str(error.value)
 
 
 def test_what_is_not_possible_is_refused_with_what_is_missing():
