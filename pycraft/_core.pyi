@@ -78,6 +78,10 @@ class Multibody:
         ...
     def _body_index(self, arg0: str) -> int:
         ...
+    def _branch(self, root: typing.SupportsInt | typing.SupportsIndex) -> tuple[list[str], list[str], list[str]]:
+        """
+        Names of a body and all outboard of it (-1: of all), of their hinges, and of the nodes on them.
+        """
     def _coalesce(self, bodies: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> list:
         ...
     def _follow_base(self) -> None:
@@ -86,6 +90,8 @@ class Multibody:
         """
         The number of the body that a body or node is on, -1 for the base.
         """
+    def _graft(self, source: Multibody, root: typing.SupportsInt | typing.SupportsIndex, parent: str, rotation: typing.Any, position: typing.Any, places_hinge: bool, bodies: collections.abc.Sequence[str], hinges: collections.abc.Sequence[str], nodes: collections.abc.Sequence[str]) -> None:
+        ...
     def _hinge_index(self, arg0: str) -> int:
         ...
     def _hinge_sizes(self) -> tuple[list[str], list[int]]:
@@ -106,6 +112,14 @@ class Multibody:
         ...
     def _rehang(self, body: str, parent: str, hinge: str, hinge_name: str, axes: collections.abc.Sequence[typing.Any], point: typing.Any, pitch: typing.Any, subhinges: typing.Any, rotation: typing.Any, position: typing.Any, rotor_inertia: typing.Any, lower: typing.Any, upper: typing.Any, q: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], v: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> None:
         ...
+    def _remove_body(self, name: str) -> None:
+        ...
+    def _require_new(self, bodies: collections.abc.Sequence[str], hinges: collections.abc.Sequence[str], nodes: collections.abc.Sequence[str], frames: collections.abc.Sequence[str], loose: collections.abc.Sequence[str]) -> None:
+        ...
+    def _reroot(self, body: str, rates: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> list[tuple[str, list[float]]]:
+        """
+        Returns the accelerations of the hinges that were turned, by name.
+        """
     def _set_limits(self, arg0: typing.SupportsInt | typing.SupportsIndex, arg1: typing.Any, arg2: typing.Any) -> None:
         ...
     def _set_mass_properties(self, arg0: typing.SupportsInt | typing.SupportsIndex, arg1: typing.Any, arg2: typing.Any, arg3: typing.Any) -> None:
@@ -133,10 +147,6 @@ class Multibody:
     def integrate(self, q: typing.Any, dv: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
         """
         q moved along the velocity dv for unit time: on the group for ball and free hinges (exponential of the body twist).
-        """
-    def remove_body(self, name: str) -> None:
-        """
-        Removes a body with everything outboard of it. Operators made before are stale; q and v are carried over by hinge name.
         """
     def take_warnings(self) -> list[tuple[str, str]]:
         ...

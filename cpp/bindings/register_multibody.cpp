@@ -94,8 +94,7 @@ void register_multibody(py::module_& m) {
            py::arg("name"), py::arg("parent"), py::arg("hinge"), py::arg("hinge_name"), py::arg("axes"), py::arg("point"), py::arg("pitch"),
            py::arg("subhinges"), py::arg("rotation"), py::arg("position"), py::arg("mass"), py::arg("com"), py::arg("inertia"), py::arg("rotor_inertia"),
            py::arg("lower"), py::arg("upper"))
-      .def("remove_body", &Multibody::remove_body, py::arg("name"),
-           "Removes a body with everything outboard of it. Operators made before are stale; q and v are carried over by hinge name.")
+      .def("_remove_body", &Multibody::remove_body, py::arg("name"))
       .def("_add_node", [](Multibody& mb, const std::string& name, const std::string& body, const py::object& rotation, const py::object& position) {
         mb.add_node(name, body, pose_from(rotation, position, "node '" + name + "'"));
       })

@@ -10,6 +10,8 @@ import numpy as np
 
 from .. import _core
 from ..arguments import text
+from .asides import Asides
+from .grafting import Removed
 from .handles import Body, Node
 from .locking import Locking
 
@@ -100,7 +102,9 @@ class Coalescing(Locking):
                 raise _core.ModelError(f"body {name!r} of {self.name!r} is not coalesced; coalesced are {', '.join(there[:12]) or 'none'}")
         opened = self._in_the_way(wanted)
         records, left = self._plan_of(opened)
+        aside = Asides(self)
         self._split(records)
+        aside.put(self)
         self._bodies_before = left
         again = [name for name in reversed(opened) if name not in set(wanted)]
         self._coalesced_now(sorted(self._body_index(name) for name in again))
@@ -155,26 +159,27 @@ class Coalescing(Locking):
             return [name for name in self._whole.coalesced if name in own]
         return list(self._bodies_before)
 
-    def remove_body(self, name: Any) -> None:
-        """`Multibody.remove_body`: what was locked or coalesced there is gone with it."""
-        super().remove_body(name)
+    def remove_body(self, name: str | Body, *, with_uses: bool = False) -> Removed:  # what was locked or coalesced there goes along
+        removed = super().remove_body(name, with_uses=with_uses)
         if not self._bodies_before and not self._hinges_before:
-            return
+            return removed
         (bodies, hinges), nodes = map(set, self._names()), {node["name"] for node in self._nodes()}
         kept = {name: one for name, one in self._bodies_before.items() if name in nodes}
         for name, one in kept.items():
             kept[name] = one | {"children": {child: poses for child, poses in one["children"].items() if child in bodies or child in kept}}
         self._bodies_before = kept
         self._hinges_before = {name: one for name, one in self._hinges_before.items() if name in hinges or one["body"] in kept}
+        return removed
 
     # ------------------------------------------------------------------ coalescing
     def _coalesced_now(self, numbers: list[int]) -> list[str]:
-        data = [self._body(k) for k in numbers]
+        data, aside = [self._body(k) for k in numbers], Asides(self)
         records = dict(self._bodies_before)
         for body, one in zip(data, self._coalesce(numbers), strict=True):
             rotation, position = one.pop("placement")
             body["hinge"]["placement"] = {"rotation": rotation, "position": position}
             records[body["name"]] = one | {"body": body}
+        aside.put(self)
         self._bodies_before = records
         return [body["name"] for body in data]
 

@@ -10,8 +10,9 @@ import numpy as np
 
 from .. import _core
 from ..arguments import text
+from .asides import Asides
+from .grafting import Grafting
 from .handles import Hinge
-from .with_operators import WithOperators
 
 if TYPE_CHECKING:
     from .multibody import Multibody
@@ -37,12 +38,13 @@ class Stop(NamedTuple):
     impulses: dict[str, np.ndarray]
 
 
-class Locking(WithOperators):
+class Locking(Grafting):
     """Hinges that are locked, and unlocked."""
 
     _whole: Multibody | None
     _hinges_before: Mapping[str, dict[str, Any]] = {}
-    """Of each locked hinge "hinge" and "q" as they were, "body" that it moves, and "welded", its placement since."""
+    """Of each locked hinge "hinge" and "q" as they were, "body" that it moves, "welded", its placement since; what the model's file said of
+    its coordinates, "left aside" and "actuators"."""
     kinetic_energy: Callable[..., Any]
     momentum: Callable[..., Any]
     _sums: Callable[..., np.ndarray]
@@ -135,7 +137,11 @@ class Locking(WithOperators):
         locked = self.locked
         chosen = locked if hinges is None else self._named_among(hinges, locked, self._why_not_unlocked)
         names = [name for name in locked if name in set(chosen)]
+        aside = Asides(self)
         self._unlock([self._hinges_before[name] for name in names])
+        aside.put(self)
+        for name in names:
+            aside.put_back(self, name, self._hinges_before[name])
         self._hinges_before = {name: one for name, one in self._hinges_before.items() if name not in set(names)}
         return names
 
@@ -150,11 +156,13 @@ class Locking(WithOperators):
 
     def _locked_now(self, numbers: list[int], v: np.ndarray) -> None:
         """Locks the hinges of these bodies, velocities of the others from v."""
-        kept = dict(self._hinges_before)
+        kept, aside = dict(self._hinges_before), Asides(self)
         for k in numbers:
             body = self._body(k)
-            kept[body["hinge"]["name"]] = {"hinge": body["hinge"], "q": np.array(self.q[self._slices(k)[0]]), "body": body["name"]}
+            name, q = body["hinge"]["name"], np.array(self.q[self._slices(k)[0]])
+            kept[name] = {"hinge": body["hinge"], "q": q, "body": body["name"]} | aside.of(name)
         self._lock(numbers, v)
+        aside.put(self)
         for k in numbers:
             now = self._body(k)["hinge"]
             kept[now["name"]]["welded"] = (now["placement"]["rotation"], now["placement"]["position"])

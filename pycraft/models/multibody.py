@@ -9,29 +9,20 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..arguments import limit_pair, listed, pose_parts, text
+from ..arguments import pose_parts, text
 from ..closed import Closed
 from ..dynamics.integration import IntegrationCalls
 from ..state import State, at_state, random_state
 from .coalescing import Coalescing
 from .handles import Body, Hinge, Named, Node, Vector
+from .hinge_arguments import frame_name, hinge_arguments
 from .parts import Parts
 from .pictures import Pictures
+from .structure import Structure
 from .with_frames import WithFrames
 
-_Z = (0.0, 0.0, 1.0)
-_DEFAULT_AXES: dict[str, tuple[tuple[float, float, float], ...]] = {
-    "pin": (_Z,),
-    "slider": (_Z,),
-    "screw": (_Z,),
-    "universal": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
-    "gimbal": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
-    "cylindrical": (_Z,),
-    "planar": (_Z,),
-}
 
-
-class Multibody(Closed, IntegrationCalls, Pictures, Parts, Coalescing, WithFrames):
+class Multibody(Closed, IntegrationCalls, Pictures, Parts, Structure, Coalescing, WithFrames):
     """A tree of bodies on hinges, with nodes, a state (`q`, `v`) and gravity (zero until it is set).
 
     Build one body by body, or load it (`pycraft.load`). Bodies are kept depth first, children in the order they were added, and
@@ -119,31 +110,15 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, Coalescing, WithFrame
             is not symmetric positive semidefinite, limits the wrong way round: names body or hinge and number, and leaves the model as
             it was.
         """
-        name, hinge = text(name, "a body"), text(hinge, "the kind of a hinge")
+        name = text(name, "a body")
         self._check_not_a_frame(name, "body")
-        if axis is not None and axes is not None:
-            raise _core.ModelError(f"body {name!r}: give axis or axes, not both")
-        if subhinges is not None and hinge != "custom":
-            raise _core.ModelError(f"body {name!r}: subhinges belong to a hinge of kind 'custom', not {hinge!r}")
-        if hinge == "custom" and (subhinges is None or not (axis is axes is point is None)):
-            raise _core.ModelError(
-                f"body {name!r}: a custom hinge takes subhinges=[...], each with its kind, axis and point, and nothing beside"
-            )
-        rotation, position = pose_parts(f"body {name!r}", rotation, position, placement)
-        directions = [axis] if axis is not None else axes if axes is not None else _DEFAULT_AXES.get(hinge, ())
-        lower, upper = limit_pair(f"body {name!r}", limits)
-        self._add_body(
-            text(name, "a body"), _frame_name(parent), text(hinge, "the kind of a hinge"),
-            "" if hinge_name is None else text(hinge_name, "a hinge"),
-            listed(directions, f"axes of body {name!r}"), point, pitch,
-            None if subhinges is None else listed(subhinges, f"subhinges of body {name!r}"),
-            rotation, position, mass, com, inertia, rotor_inertia, lower, upper,
+        given = hinge_arguments(
+            f"body {name!r}", hinge, axis=axis, axes=axes, point=point, pitch=pitch, subhinges=subhinges, position=position,
+            rotation=rotation, placement=placement, rotor_inertia=rotor_inertia, limits=limits,
         )  # fmt: skip
+        called = "" if hinge_name is None else text(hinge_name, "a hinge")
+        self._add_body(name=name, parent=frame_name(parent), hinge_name=called, mass=mass, com=com, inertia=inertia, **given)
         return Body(self, name)
-
-    def remove_body(self, name: str | Body) -> None:
-        """Remove a body with everything outboard of it. Operators made before are stale; q and v are carried over by hinge name."""
-        super().remove_body(name.name if isinstance(name, Body) else text(name, "a body"))
 
     def add_node(
         self,
@@ -157,7 +132,9 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, Coalescing, WithFrame
         """Add a frame on a body, on a node, or on the base (None), at a pose given as for `add_body`. It invalidates no operator."""
         self._check_not_a_frame(name, "node")
         rotation, position = pose_parts(f"node {name!r}", rotation, position, placement)
-        self._add_node(text(name, "a node"), _frame_name(body), rotation, position)
+        self._add_node(text(name, "a node"), frame_name(body), rotation, position)
+        whole = self._of_whole()
+        whole._added_nodes |= {name}
         return Node(self, name)
 
     @property
@@ -334,13 +311,13 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, Coalescing, WithFrame
         return [dict(actuator) for actuator in self._actuators]
 
     def __reduce__(self):
-        return _again, (self.description(), self._left_aside, self._actuators)
+        return _again, (self.description(), self._left_aside, self._actuators, self._added_nodes)
 
     def __copy__(self) -> Multibody:
-        return _again(self.description(), self._left_aside, self._actuators)
+        return _again(self.description(), self._left_aside, self._actuators, self._added_nodes)
 
     def __deepcopy__(self, memo) -> Multibody:
-        memo[id(self)] = copy = _again(self.description(), self._left_aside, self._actuators)
+        memo[id(self)] = copy = _again(self.description(), self._left_aside, self._actuators, self._added_nodes)
         return copy
 
     def __repr__(self) -> str:
@@ -352,18 +329,17 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, Coalescing, WithFrame
             return f"<part {self.name!r} of {self._whole.name!r}, which has changed since>"
 
 
-def _again(description: Mapping[str, Any], left_aside: Mapping[str, np.ndarray], actuators: Sequence[dict[str, Any]] = ()) -> Multibody:
-    """A copy of a model from its description and what its file said beside it."""
+def _again(
+    description: Mapping[str, Any],
+    left_aside: Mapping[str, np.ndarray],
+    actuators: Sequence[dict[str, Any]] = (),
+    added_nodes: frozenset[str] = frozenset(),
+) -> Multibody:
+    """A copy of a model from its description, what its file said beside it, and which nodes were added since."""
     model = Multibody.from_description(description)
     model._left_aside, model._actuators = dict(left_aside), [dict(actuator) for actuator in actuators]
+    model._added_nodes = added_nodes
     return model
-
-
-def _frame_name(frame: str | Body | Node | None) -> str:
-    """The name of the body or node that something is put on; empty for the base."""
-    if frame is None:
-        return ""
-    return frame.name if isinstance(frame, (Body, Node)) else text(frame, "a parent")
 
 
 def describe(model: _core.Multibody) -> dict[str, Any]:

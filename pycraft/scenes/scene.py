@@ -11,6 +11,7 @@ import numpy as np
 from .. import _core
 from ..arguments import one_number, text
 from ..closed import Closed
+from ..models.grafting import Grafting
 from ..state import at_state
 from .effects import Effect, UserEffect
 from .explain import plan_text
@@ -93,6 +94,8 @@ class Scene(Measurements, Filed, Closed):
         self._built: tuple[Any, Any] | None = None
         self._last_run: Run | None = None
         self._calls()
+        if isinstance(model, Grafting):
+            model._used_by(self)
 
     # ------------------------------------------------------------------ effects
     @property
@@ -133,6 +136,11 @@ class Scene(Measurements, Filed, Closed):
             raise
         self._built = None
         return self
+
+    def _effects_on(self, names: set[str]) -> dict[str, list[str]]:
+        """Effects that name one of these bodies, hinges, coordinates or nodes, each with those that it names."""
+        found = {name: sorted(effect.named() & names) for name, (effect, _) in self._entries.items()}
+        return {name: named for name, named in found.items() if named}
 
     def _enter(self, name: str | None, effect: Effect, on: bool) -> None:
         """One effect as a file has it, on or off."""

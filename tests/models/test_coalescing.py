@@ -309,7 +309,7 @@ def test_massless_leaves_are_pruned_until_there_are_none():
     model.add_body("wheel", parent="body0", rotor_inertia=0.1)
     model.add_body("dish", parent="body0", inertia=np.eye(3))
     model.add_body("stand", parent="body0")
-    model.add_body("cup", parent="stand", position=(0.3, 0, 0), mass=0.1, com=(0.1, 0, 0))
+    model.add_body("cup", parent="stand", position=(0.3, 0, 0), mass=0.1, inertia=np.eye(3))
     model.add_node("mark", "nail", position=(0, 0, 1))
     v = np.arange(1.0, model.nv + 1)
     model.v = v

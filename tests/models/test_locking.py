@@ -324,6 +324,18 @@ def test_frames_and_scenes_go_on():
     assert scene.simulate(0.1, progress=False).q.shape[1] == 2
 
 
+def test_what_the_file_said_of_a_locked_hinge_comes_back():
+    model = pc.robots.panda()
+    left, actuators = {key: np.array(values) for key, values in model.left_aside.items()}, model.actuators
+    hinge = list(model.hinges)[2]
+    model.lock(hinge)
+    assert all(len(values) == model.nv for key, values in model.left_aside.items() if key not in ("gravity", "spring rest"))
+    model.unlock()
+    assert left.keys() == model.left_aside.keys() and left
+    assert all(np.array_equal(values, model.left_aside[key], equal_nan=True) for key, values in left.items())
+    assert sorted(map(repr, model.actuators)) == sorted(map(repr, actuators))
+
+
 def test_batches_of_the_locked_model():
     model = pc.chain(3, seed=1)
     model.lock("hinge1")

@@ -294,10 +294,14 @@ def test_a_scene_sees_edits_of_its_model(arm):
     fresh = pc.Scene(arm).add(E.Gravity(), E.PointMassGravity(1.0, (9, 0, 0))).evaluate(state.q, state.v)
     assert np.array_equal(after.vdot, fresh.vdot) and not np.array_equal(after.vdot, before.vdot)
     scene.add(E.Damping(0.1, hinges="wrist"))
-    arm.remove_body("hand")
+    with pytest.raises(pc.ModelError, match="body 'hand' is in use: node 'tip' is on 'hand'; effect 'damping' of a scene names 'wrist'"):
+        arm.remove_body("hand")
+    arm.detach("hand", hinge_name="flight")
     with pytest.raises(pc.ModelError, match="'wrist'"):
         scene.evaluate()
-    assert scene.disable("gravity").remove("damping").evaluate(np.zeros(3), np.zeros(3)).vdot.shape == (3,)
+    scene.remove("damping")
+    assert arm.remove_body("hand", with_uses=True).nodes == ["tip"]
+    assert scene.disable("gravity").evaluate(np.zeros(3), np.zeros(3)).vdot.shape == (3,)
 
 
 @pytest.mark.parametrize("again", [copy.copy, copy.deepcopy, lambda s: pickle.loads(pickle.dumps(s))], ids=["copy", "deepcopy", "pickle"])

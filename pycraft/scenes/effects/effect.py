@@ -40,6 +40,23 @@ class Effect(Closed):
         if not name.startswith("_"):
             object.__setattr__(self, "_changes", self._changes + 1)
 
+    def named(self) -> set[str]:
+        """What its fields name of a model: bodies, nodes, hinges, and of coordinates "hinge[j]" the hinge, too."""
+        found: set[str] = set()
+
+        def look(value: Any) -> None:
+            if isinstance(value, Mapping):
+                value = [*value, *value.values()]
+            if isinstance(value, (list, tuple, set, frozenset)):
+                for item in value:
+                    look(item)
+            elif isinstance(name := getattr(value, "name", value), str):
+                found.update({name, name.partition("[")[0]})
+
+        for field in fields(self):  # type: ignore[arg-type]  # subclasses are dataclasses
+            look(getattr(self, field.name))
+        return found
+
     def parameters(self) -> dict[str, Any]:
         """The fields that are not at their defaults, by name."""
         given = {}

@@ -1,0 +1,264 @@
+"""Branches of a model: removed with what is on them, copied, and taken from another model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+from weakref import WeakSet
+
+import numpy as np
+
+from .. import _core
+from ..arguments import pose_parts, text
+from .asides import Asides
+from .handles import Body, Node, Vector
+from .hinge_arguments import body_name, frame_name
+from .with_frames import WithFrames
+
+
+class Removed(NamedTuple):
+    """Names of what was removed. `effects` are pairs of a scene and the name of an effect that was taken out of it."""
+
+    bodies: list[str]
+    hinges: list[str]
+    nodes: list[str]
+    effects: list[tuple[Any, str]]
+
+
+class Grafting(WithFrames):
+    """Edits that take bodies off and put bodies on. Each leaves the model as it was where it is refused; operators and parts are stale."""
+
+    _left_aside: dict[str, np.ndarray]
+    _actuators: list[dict[str, Any]]
+    _added_nodes: frozenset[str] = frozenset()
+    _scenes: WeakSet[Any] | None = None
+
+    def remove_body(self, name: str | Body, *, with_uses: bool = False) -> Removed:
+        """Remove a body with everything outboard of it. Operators made before are stale; q and v are carried over by hinge name.
+
+        Welded links of the model's file that are nodes of these bodies go along. Nodes that were added here (`add_node`), and effects of
+        scenes of this model that name one of the bodies, hinges or nodes, are uses of them. Loose frames that stand on them stay, and say
+        so when they are asked (docs/frames.md).
+
+        Parameters
+        ----------
+        name : of the body, or its handle
+        with_uses : whether what uses them goes along, nodes and effects; else a body in use is refused
+
+        Raises
+        ------
+        ModelError
+            A body that is in use: says by what.
+
+        Cost: O(bodies), and the effects of the model's scenes.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> arm = pc.chain(3)
+        >>> eye = arm.add_node("eye", "body2")
+        >>> arm.remove_body("body1")
+        Traceback (most recent call last):
+            ...
+        pycraft.ModelError: body 'body1' is in use: node 'eye' is on 'body2'; remove_body('body1', with_uses=True) removes these along
+        >>> arm.remove_body("body1", with_uses=True).bodies
+        ['body1', 'body2']
+        """
+        name = body_name(name)
+        bodies, hinges, nodes = self._branch(self._body_index(name))
+        gone = {*bodies, *hinges, *nodes}
+        used = [(scene, effect, names[0]) for scene in self._scenes or () for effect, names in scene._effects_on(gone).items()]
+        added = [node for node in nodes if node in self._added_nodes]
+        if not with_uses and (added or used):
+            carrier = {node: self._body(self._frame_body(node))["name"] for node in added}
+            uses = [f"node {node!r} is on {carrier[node]!r}" for node in added]
+            uses += [f"effect {effect!r} of a scene names {what!r}" for _, effect, what in used]
+            remedy = f"remove_body({name!r}, with_uses=True) removes these along"
+            raise _core.ModelError(f"body {name!r} is in use: {'; '.join(uses)}; {remedy}")
+        aside = Asides(self)
+        self._remove_body(name)
+        aside.put(self)
+        self._added_nodes -= gone
+        for scene, effect, _ in used:
+            scene.remove(effect)
+        return Removed(bodies, hinges, nodes, [(scene, effect) for scene, effect, _ in used])
+
+    def copy_subtree(
+        self,
+        body: str | Body,
+        parent: str | Body | Node | None = None,
+        *,
+        prefix: str = "",
+        suffix: str = "",
+        rename: Callable[[str], str] | None = None,
+        position: Vector | None = None,
+        rotation: np.ndarray | None = None,
+        placement: np.ndarray | None = None,
+    ) -> Body:
+        """A copy of a body with everything outboard of it, hung on another body by a copy of its hinge.
+
+        Bodies, hinges with their limits and rotors, nodes, loose frames that stand on them, and what the model's file said of their
+        coordinates are copied. So is the state: the copy stands and moves against its parent as the original does now.
+
+        Parameters
+        ----------
+        body : by its name or handle
+        parent : name of a body or node, a Body or Node, or None for the base
+        prefix, suffix : before and after the names of all that is copied
+        rename : function of a name, in their place
+        position, rotation, or placement : the pose of the copied hinge's inboard frame on the parent; as of the original where left out
+
+        Returns
+        -------
+        Body : the copy of the body
+
+        Raises
+        ------
+        ModelError
+            Names that are taken, all of them, and the remedy; an unknown parent, a pose that is none.
+
+        Cost: O(bodies), in the core.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> robot = pc.chain(3)
+        >>> robot.copy_subtree("body1", "body0", prefix="left ", position=(0, 1, 0))
+        <body 'left body1': 1 kg on hinge 'left hinge1' of 'body0'>
+        >>> list(robot.bodies)
+        ['body0', 'body1', 'body2', 'left body1', 'left body2']
+        """
+        name = body_name(body)
+        rotation, position = pose_parts(f"the copy of body {name!r}", rotation, position, placement)
+        placed = rotation is not None or position is not None
+        called = _renaming(prefix, suffix, rename)
+        self._take(self, self._body_index(name), frame_name(parent), rotation, position, placed, called)
+        return Body(self, called(name))
+
+    def merge(
+        self,
+        other: Any,
+        parent: str | Body | Node | None = None,
+        *,
+        prefix: str = "",
+        suffix: str = "",
+        rename: Callable[[str], str] | None = None,
+        position: Vector | None = None,
+        rotation: np.ndarray | None = None,
+        placement: np.ndarray | None = None,
+    ) -> list[Body]:
+        """Take in all of another model, its base put on a body of this one. The other model stays as it is.
+
+        Bodies, hinges with their limits and rotors, nodes (those on its base, too), loose frames, what its file said of its coordinates,
+        and its present state are copied; its gravity is not, this model has its own.
+
+        Parameters
+        ----------
+        other : a model, or a part of one
+        parent : name of a body or node, a Body or Node, or None for the base
+        prefix, suffix, rename : what its names are called here, as of `copy_subtree`
+        position, rotation, or placement : the pose of the other model's base on the parent
+
+        Returns
+        -------
+        list of Body : those that hung on the other model's base
+
+        Raises
+        ------
+        ModelError
+            As of `copy_subtree`; a loose frame of the other model's base that a function moves.
+
+        Cost: O(bodies of both), in the core.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> cart, arm = pc.Multibody("cart"), pc.chain(2)
+        >>> plate = cart.add_body("plate", None, "slider", axis=(1, 0, 0), mass=3.0)
+        >>> cart.merge(arm, "plate", prefix="arm/", position=(0, 0, 0.5))
+        [<body 'arm/body0': 1 kg on hinge 'arm/hinge0' of 'plate'>]
+        >>> cart.coordinate_names
+        ['plate', 'arm/hinge0', 'arm/hinge1']
+        """
+        if not isinstance(other, WithFrames):
+            raise _core.ModelError(f"{self.name!r} takes in a model, not {other!r:.80}")
+        rotation, position = pose_parts(f"the base of {other.name!r}", rotation, position, placement)
+        called = _renaming(prefix, suffix, rename)
+        roots = [other._body(k)["name"] for k in roots_of(other)]
+        self._take(other, -1, frame_name(parent), rotation, position, False, called)
+        return [Body(self, called(root)) for root in roots]
+
+    # ------------------------------------------------------------------ how
+    def _used_by(self, scene: Any) -> None:
+        """A scene acts on the model, as long as somebody has it."""
+        if self._scenes is None:
+            self._scenes = WeakSet()
+        self._scenes.add(scene)
+
+    def _take(
+        self, source: Any, root: int, parent: str, rotation: Any, position: Any, places_hinge: bool, called: Callable[[str], str]
+    ) -> None:
+        """Copies of a branch of a model, root -1: of all, and of what stands on it."""
+        bodies, hinges, nodes = source._branch(root)
+        frames = _frames_on(source, {*bodies, *nodes}, root < 0)
+        for moved in frames if root < 0 else ():
+            if not moved["on"] and moved["motion"] is not None and (parent or rotation is not None or position is not None):
+                what = f"frame {moved['name']!r} is moved by a function of time, which says where it is on the base of {source.name!r}"
+                raise _core.ModelError(f"{what}: put it on a node there first")
+        new_bodies, new_hinges, new_nodes = ([_called(called, name) for name in names] for names in (bodies, hinges, nodes))
+        made = [frame | {"name": _called(called, frame["name"])} for frame in frames]
+        loose = [] if self._kept_frames is None else self._kept_frames._core.loose_names()
+        self._require_new(new_bodies, new_hinges, new_nodes, [frame["name"] for frame in made], loose)
+        own, its = Asides(self), Asides(source)
+        added = frozenset(map(called, set(nodes) & getattr(source, "_added_nodes", frozenset())))
+        X = _placed(rotation, position)
+        self._graft(source, root, parent, rotation, position, places_hinge, new_bodies, new_hinges, new_nodes)
+        self._added_nodes |= added
+        copies = {frame["name"] for frame in frames} | {*bodies, *nodes}
+        for frame in made:
+            on = called(frame["on"]) if frame["on"] in copies else parent
+            self.frames._add_again(frame | {"on": on} | ({} if frame["on"] else {"placement": X @ frame["placement"]}))
+        own.put(self)
+        its.add(self, dict(zip(hinges, new_hinges, strict=True)), called)
+
+
+def _frames_on(model: Any, carriers: set[str], with_base: bool) -> list[dict[str, Any]]:
+    """Loose frames that stand on these, or on one another there, each after what it stands on; of the base by its name ""."""
+    found, names, kept = [], set(carriers), model._kept_frames
+    for frame in [] if kept is None else kept._description():
+        on_base = not frame["on"] or (frame["on"] in ("base", "world") and kept._core.number(frame["on"]) == -1)
+        if on_base and with_base or frame["on"] in names:
+            found.append(frame | {"on": "" if on_base else frame["on"]})
+            names.add(frame["name"])
+    return found
+
+
+def roots_of(model: Any) -> list[int]:
+    """Numbers of the bodies on the base: depth first, what each carries is a run."""
+    roots, k = [], 0
+    while k < model._size:
+        roots.append(k)
+        k += len(model._outboard_of(k, []))
+    return roots
+
+
+def _renaming(prefix: str, suffix: str, rename: Callable[[str], str] | None) -> Callable[[str], str]:
+    if rename is None:
+        before, after = text(prefix, "a prefix of names"), text(suffix, "a suffix of names")
+        return lambda name: before + name + after
+    if prefix or suffix:
+        raise _core.ModelError("give prefix and suffix, or rename, not both")
+    if not callable(rename):
+        raise _core.ModelError(f"rename is a function of a name, not {rename!r:.80}")
+    return rename
+
+
+def _called(rename: Callable[[str], str], name: str) -> str:
+    return text(rename(name), f"the copy of {name!r}")
+
+
+def _placed(rotation: Any, position: Any) -> np.ndarray:
+    X = np.eye(4)
+    X[:3, :3] = X[:3, :3] if rotation is None else rotation
+    X[:3, 3] = X[:3, 3] if position is None else position
+    return X

@@ -1,0 +1,293 @@
+"""A structure that stands is changed: bodies attached, detached, hung on other hinges, and seen from another root."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from ..arguments import one_number, text
+from .asides import Asides
+from .handles import Body, Node, Vector
+from .hinge_arguments import body_name, frame_name, hinge_arguments
+from .hinge_fit import HingeFit, OneHinge, fitted
+from .impulses import Impulse, impulse_into, twists_of
+from .with_frames import WithFrames
+
+
+@dataclass(frozen=True)
+class Reattachment:
+    """A body on its new hinge.
+
+    Attributes
+    ----------
+    body : Body
+    q, v : coordinates and velocities of the new hinge
+    pose_error, velocity_error : (6,) what they leave of the body's pose and twist, in its axes, angular first: rad and m, rad/s and m/s.
+        Of an impulse the velocity error is what the impulse took.
+    impulse : Impulse, or None where velocities were kept
+    """
+
+    body: Body
+    q: np.ndarray
+    v: np.ndarray
+    pose_error: np.ndarray
+    velocity_error: np.ndarray
+    impulse: Impulse | None = None
+
+
+class Structure(WithFrames):
+    """Edits that hang bodies elsewhere. Each leaves the model as it was where it is refused, and makes operators and parts stale."""
+
+    _left_aside: dict[str, np.ndarray]
+    _actuators: list[dict[str, Any]]
+
+    def reattach(
+        self,
+        body: str | Body,
+        parent: str | Body | Node | None = None,
+        hinge: str = "pin",
+        *,
+        axis: Vector | None = None,
+        axes: Sequence[Vector] | None = None,
+        point: Vector | None = None,
+        pitch: float = 0.0,
+        subhinges: Sequence[Mapping[str, Any]] | None = None,
+        position: Vector | None = None,
+        rotation: np.ndarray | None = None,
+        placement: np.ndarray | str | None = None,
+        rotor_inertia: float | Vector | None = None,
+        limits: tuple[float | Vector, float | Vector] | None = None,
+        hinge_name: str | None = None,
+        q: Vector | None = None,
+        velocity: str = "keep",
+        tolerance: float = 1e-9,
+    ) -> Reattachment:
+        """Hang a body, with all outboard of it, on another hinge of another body, or of the same, where it is and as it moves now.
+
+        The coordinates of the new hinge are solved for so that the body's pose stays, and its velocities so that its twist stays; of all
+        other bodies both stay then, too. Momentum and kinetic energy do not change, but for the rotors of the hinge that it leaves.
+
+        Parameters
+        ----------
+        body : by its name or handle
+        parent : name of a body or node, a Body or Node, or None for the base
+        hinge, axis, axes, point, pitch, subhinges, position, rotation, rotor_inertia, limits : the new hinge, as of `add_body`
+        placement : (4, 4), or "here"
+            "here": the hinge's inboard frame is put where the body is at the coordinates q, zero where they are left out.
+        hinge_name : by default the name that its hinge has
+        q : (n,) coordinates of the new hinge near which they are looked for: of several that put the body there, those that the iteration
+            finds from q are taken, angles of pins by whole turns nearest to q. Zero, or the nearest limit, where left out.
+        velocity : {"keep", "impulse"}
+            "keep": a twist that the hinge does not permit is refused. "impulse": the body is caught by the hinge, a plastic impact that
+            changes all velocities at once. Momentum is kept along every motion of the new structure, kinetic energy falls by what
+            `Reattachment.impulse` says, ½ δ*Mδ; a rotor of the new hinge is at rest before.
+        tolerance : of the error of pose and twist, rad and rad/s; in metres and m/s times 1 + the distance, or speed
+
+        Returns
+        -------
+        Reattachment
+
+        Raises
+        ------
+        ModelError
+            A body hung outboard of itself, names that are taken or unknown, a hinge that is none; a pose or a twist that the hinge does not
+            have, with what is missing and the remedy. The model is as it was.
+        SingularHingeError
+            Of an impulse, as forward dynamics.
+
+        Cost: the hinges between the two bodies, and O(bodies) at the next look at the model (docs/structure.md); an impulse O(bodies).
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> arm = pc.chain(3)
+        >>> arm.q, arm.v = [0, 0.5, 0], [0, 0, 1]
+        >>> done = arm.reattach("body2", "body0", "planar", position=(1, 0, 0))
+        >>> done.q.round(3).tolist(), done.v.round(3).tolist()
+        ([0.878, 0.479, 0.5], [0.0, 0.0, 1.0])
+        """
+        name, onto = body_name(body), frame_name(parent)
+        number = self._body_index(name)
+        was = self._body(number)["hinge"]["name"]
+        if onto and number in self._path_between(-1, self._frame_body(onto)):
+            where = "is on the body itself" if self._frame_body(onto) == number else "is outboard of it"
+            raise _core.ModelError(f"body {name!r} cannot hang on {onto!r}, which {where}")
+        called = was if hinge_name is None else text(hinge_name, "a hinge")
+        if not isinstance(velocity, str) or velocity not in ("keep", "impulse"):
+            raise _core.ModelError(f"velocity={velocity!r}: there are 'keep' and 'impulse'")
+        here = isinstance(placement, str)
+        if here and (placement != "here" or position is not None or rotation is not None):
+            raise _core.ModelError(f"hinge {called!r}: placement is a pose (4, 4), or 'here' without position and rotation")
+        pose: Any = None if here else placement
+        given = hinge_arguments(
+            f"hinge {called!r}", hinge, axis=axis, axes=axes, point=point, pitch=pitch, subhinges=subhinges, position=position,
+            rotation=rotation, placement=pose, rotor_inertia=rotor_inertia, limits=limits,
+        )  # fmt: skip
+        fit = self._fit(name, onto, called, given, here, q, one_number(tolerance, "tolerance"), velocity)
+        impulse = self._caught(name, onto, called, given, fit) if velocity == "impulse" else None
+        aside = Asides(self)
+        self._rehang(name, onto, hinge_name=called, q=fit.q.tolist(), v=fit.v.tolist(), **given)
+        if impulse is not None:
+            self.v = impulse.v
+        aside.put(self, changed=[was, called])
+        self._set_accelerations({called: np.zeros(len(fit.v))})
+        v = np.array(self.v[self._slices(self._hinge_index(called))[1]])
+        return Reattachment(Body(self, name), fit.q, v, fit.pose_error, fit.velocity_error, impulse)
+
+    def attach(self, body: str | Body, parent: str | Body | Node, hinge: str = "weld", **options: Any) -> Reattachment:
+        """Join a body that flies freely to another: `reattach` by a hinge where it is now, by default a weld.
+
+        What is detached is attached again so. A body is free where it hangs on the base by a free hinge; of several bodies that fly
+        together another one is made the first by `reroot`.
+
+        Parameters
+        ----------
+        body, parent, hinge, options : as of `reattach`, but that placement is "here" unless a pose is given
+
+        Raises
+        ------
+        ModelError
+            A body that is not free, and the remedy; as `reattach`, twists that differ among them: velocity="impulse" catches the body.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> arm = pc.chain(2)
+        >>> tool = arm.add_body("tool", None, "free", mass=1.0, inertia=np.eye(3))
+        >>> arm.q = [0, 0, 1, 0, 0, 0, 2, 0, 0]
+        >>> arm.v = [1, 0, 0, 0, 0, 0, 0, 0]
+        >>> hit = arm.attach("tool", "body1", velocity="impulse")
+        >>> arm.nv, round(hit.impulse.energy_before, 3), round(hit.impulse.energy_after, 3)
+        (2, 1.333, 0.764)
+        """
+        name = body_name(body)
+        data = self._body(self._body_index(name))
+        if data["parent"] >= 0 or data["hinge"]["kind"] != "free":
+            on = "the base" if data["parent"] < 0 else repr(self._body(data["parent"])["name"])
+            remedy = f"detach({name!r}) first, reroot({name!r}) where it is carried by a free body, or reattach it"
+            raise _core.ModelError(f"body {name!r} is not free to be attached: it hangs on {on} by a {data['hinge']['kind']}; {remedy}")
+        if all(options.get(pose) is None for pose in ("position", "rotation", "placement")):
+            options["placement"] = "here"
+        return self.reattach(name, parent, hinge, **options)
+
+    def detach(self, body: str | Body, hinge_name: str | None = None) -> Reattachment:
+        """Let a body go, with all outboard of it: it hangs on the base by a free hinge, where it is and as it moves now.
+
+        body : by its name or handle; hinge_name : of the free hinge, by default the name that the body's hinge has. Momentum and energy are
+        kept but for the rotors of the hinge. Cost and errors as of `reattach`.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> arm = pc.chain(2)
+        >>> arm.q, arm.v = [0, 0], [1, 0]
+        >>> arm.detach("body1").v.tolist(), arm.nv
+        ([0.0, 0.0, 1.0, 0.0, 1.0, 0.0], 7)
+        """
+        return self.reattach(body, None, "free", hinge_name=hinge_name)
+
+    def reroot(self, body: str | Body) -> Body:
+        """Make a body the first of a tree that flies freely: the same motion, seen from another base body.
+
+        The free hinge moves to the body and has its pose and twist; hinges on the way from the old root are turned round, so that what was
+        inboard is outboard. Their subhinges are in the other order and their axes reversed: coordinates, velocities, limits, forces and
+        rotors keep their numbers. Of balls and free subhinges on the way, quaternions and positions are inverted, and velocities are those
+        of the other body, in its axes. All poses, velocities, accelerations, energies and momenta are the same, to rounding. A planar hinge
+        that is turned round is pin, slider, slider, a custom hinge. Masses, names, frames and nodes of bodies stay.
+
+        Raises
+        ------
+        ModelError
+            A root that is not on a free hinge (detach it first); rotors that would act between other axes: of the free hinge itself, and of
+            a ball or free hinge on the way that has different ones about different axes. The model is as it was.
+
+        Cost: the hinges on the way, and O(bodies) at the next look at the model.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> robot = pc.tree([-1, 0, 1], ["free", "pin", "ball"], seed=1)
+        >>> before = robot.kinetic_energy(robot.random_state(0))
+        >>> robot.q, robot.v = robot.random_state(0).q, robot.random_state(0).v
+        >>> robot.reroot("body2"), list(robot.hinges)
+        (<body 'body2': 2.15089 kg on hinge 'hinge0' of 'the base'>, ['hinge0', 'hinge2', 'hinge1'])
+        >>> bool(np.isclose(robot.kinetic_energy(), before))
+        True
+        """
+        name, frames = body_name(body), self._kept_frames
+        rates = np.zeros(self.nv) if frames is None else np.array(frames.vdot)
+        first = self.frame(name).acceleration() if rates.any() else np.zeros(6)
+        aside = Asides(self)
+        turned = dict(self._reroot(name, rates.tolist()))
+        aside.put(self, turned=turned)
+        if turned:
+            self._set_accelerations({self._body(self._body_index(name))["hinge"]["name"]: first, **turned})
+        return Body(self, name)
+
+    # ------------------------------------------------------------------ how
+    def _fit(
+        self, name: str, onto: str, called: str, given: dict[str, Any], here: bool, guess: Any, tolerance: float, velocity: str
+    ) -> HingeFit:
+        """The new hinge's coordinates and velocities; where the hinge is to be "here", its placement, too."""
+        hinge, frame = OneHinge(name, called, given), self.frame(name)
+        X, V = frame.pose(wrt=onto or None), frame.velocity(wrt=onto or None)
+        near = hinge.guess() if guess is None else _core.real_array(guess, f"q of hinge {called!r}")
+        hinge.check_q(near)
+        if here:
+            placed = X @ np.linalg.inv(hinge.pose(name, near))
+            given["rotation"], given["position"] = placed[:3, :3], placed[:3, 3]
+            hinge = OneHinge(name, called, given)
+        fit = fitted(hinge, X, V, near, tolerance)
+        far = _beyond(fit.pose_error, tolerance, X[:3, 3])
+        fast = velocity == "keep" and _beyond(fit.velocity_error, tolerance, V)
+        if far or fast:
+            remedies = ['another placement, or placement="here"'] * far + ['velocity="impulse" to have the hinge catch it'] * fast
+            cannot = "be where it is" if far else "move as it moves"
+            on = f"hinge {called!r} ({given['hinge']}) of {repr(onto) if onto else 'the base'}"
+            pose, twist = _off(fit.pose_error, "rad", "m"), _off(fit.velocity_error, "rad/s", "m/s")
+            raise _core.ModelError(
+                f"body {name!r} cannot {cannot} on {on}: the nearest that was found is off by {pose}, and its twist by {twist}"
+                f" (in the body's axes); give {'; '.join(remedies)}"
+            )
+        return fit
+
+    def _caught(self, name: str, onto: str, called: str, given: dict[str, Any], fit: HingeFit) -> Impulse:
+        """The impulse of a body that its new hinge catches, found on a copy. The rotor of the new hinge is at rest before."""
+        from .multibody import Multibody
+
+        twists = dict(zip(self._names()[0], twists_of(self).reshape(-1, 6), strict=True))
+        trial = Multibody(self.name, welds="keep")
+        trial._graft(self, -1, "", None, None, False, *self._branch(-1))
+        trial._rehang(name, onto, hinge_name=called, q=fit.q.tolist(), v=[0.0] * len(fit.v), **given)
+        trial.take_warnings()  # said of this model already, or to be said of it
+        return impulse_into(trial, np.array([twists[other] for other in trial._names()[0]]).ravel())
+
+    def _set_accelerations(self, by_hinge: Mapping[str, Any]) -> None:
+        """Present accelerations of hinges that are other ones now, where any are kept."""
+        if self._kept_frames is None:
+            return
+        vdot = np.array(self._kept_frames.vdot)
+        if not vdot.any() and not any(np.any(values) for values in by_hinge.values()):
+            return
+        for hinge, values in by_hinge.items():
+            vdot[self._slices(self._hinge_index(hinge))[1]] = values
+        self._kept_frames.vdot = vdot
+
+
+def _beyond(error: np.ndarray, tolerance: float, sizes: np.ndarray) -> bool:
+    """Whether an angular part, or a linear part over the scale of what it is a part of, is larger than the tolerance or no number."""
+    return not (np.linalg.norm(error[:3]) <= tolerance and np.linalg.norm(error[3:]) <= tolerance * (1 + np.linalg.norm(sizes)))
+
+
+def _off(error: np.ndarray, angular: str, linear: str) -> str:
+    """What is missing in words: "0.3 rad about (0, 0, 1) and 0.1 m along (1, 0, 0)"."""
+    parts = []
+    for half, unit, way in ((error[:3], angular, "about"), (error[3:], linear, "along")):
+        size = float(np.linalg.norm(half))
+        axis = ", ".join(f"{x:.3g}" for x in half / size + 0.0) if size else ""
+        parts.append(f"{size:.3g} {unit} {way} ({axis})" if size > 1e-12 else f"0 {unit}")
+    return " and ".join(parts)
