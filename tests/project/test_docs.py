@@ -51,7 +51,7 @@ def test_the_readme_example_runs():
         ("mixed_trees", 8),
         ("ensembles", 8),
         ("hybrid_dynamics", 12),
-        ("linearization", 18),
+        ("linearization", 30),
         ("task_space", 10),
         ("statistical_dynamics", 5),
         ("frames", 30),
