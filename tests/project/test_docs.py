@@ -52,7 +52,7 @@ def test_the_readme_example_runs():
         ("ensembles", 8),
         ("hybrid_dynamics", 12),
         ("linearization", 30),
-        ("task_space", 10),
+        ("task_space", 14),
         ("statistical_dynamics", 5),
         ("frames", 30),
         ("subgraphs", 20),
