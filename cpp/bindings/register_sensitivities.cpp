@@ -1,5 +1,6 @@
 // Derivatives of the direct calls, on arrays. Results of several arrays come as one block per state and are cut here.
 #include "bindings/direct_calls.h"
+#include "dynamics/batch_curvature.h"
 #include "dynamics/batch_sensitivities.h"
 
 namespace pycraft {
@@ -128,6 +129,24 @@ void register_sensitivities(py::module_& m) {
         const auto& [which, shape] = all[named - names];
         return written(mb, given, py::none(), shape, [&](double* target) { d.log_determinant(which, given[0], precision, target); });
       }, py::arg("over"), q, precision);
+  py::class_<BatchCurvature> curvature(m, "Curvature");
+  unpicklable(curvature)
+      .def(py::init<std::shared_ptr<Multibody>>())
+      .def("inverse_dynamics", [](BatchCurvature& d, const py::object& q, const py::object& v, const py::object& vdot, const Array& mu, Precision precision) {
+        const Multibody& mb = d.model();
+        Arguments given(mb, {{"q", q}, {"v", v}, {"vdot", vdot}});
+        const py::ssize_t states = given.batch < 0 ? 1 : given.batch, n = mb.nv();
+        if (mu.ndim() != 3 || mu.shape(0) != states || mu.shape(2) != n)
+          throw ModelError("mu of '" + mb.name() + "': an array (" + std::to_string(states) + ", m, " + std::to_string(n) + "), states, virtual velocities, coordinates");
+        const int count = static_cast<int>(mu.shape(1));
+        py::array_t<double> out(std::vector<py::ssize_t>{states, count, BatchCurvature::blocks, n, n});
+        double* const to = out.mutable_data();
+        const double* const along = mu.data();
+        const Undisturbed undisturbed(mb);
+        d.inverse_dynamics(given[0], given[1], given[2], along, count, precision, to);
+        return out;
+      }, py::arg("q"), py::arg("v"), py::arg("vdot"), py::arg("mu"), py::arg("precision"),
+         "Second derivatives of the power of virtual velocities mu (states, m, nv): (states, m, 4, nv, nv), along q and q, q and v, q and v̇, v and v.");
 }
 
 }  // namespace pycraft

@@ -7,9 +7,9 @@
 
 #include <vector>
 
+#include "dynamics/tangent_directions.h"
 #include "model/multibody.h"
 #include "numerics/arithmetic.h"
-#include "numerics/tangent.h"
 #include "recursions/applied.h"
 #include "recursions/point_accelerations.h"
 #include "rigid/rigid_blocks.h"
@@ -29,8 +29,6 @@ class TangentDynamics {
   bool forward_dynamics(const double* q, const double* v, const double* tau, Form form, T* dq, T* dv, const Applied<double>* applied = nullptr);
 
  private:
-  void seed(const T* q, const T* v, int first, int count);
-
   const SkoStructure tree_;
   std::shared_ptr<const CompiledModel<T>> values_;
   CompiledModel<S> model_;
@@ -38,8 +36,9 @@ class TangentDynamics {
   PointAccelerations<S> points_;
   std::vector<Vector6<S>> alpha_, force_;
   std::vector<Vector6<S>> wrenches_;
-  std::vector<S> q_, v_, tau_, vdot_;
-  std::vector<T> at_, velocity_, direction_, rate_;
+  TangentDirections<T, width> state_;
+  std::vector<S> tau_, vdot_;
+  std::vector<T> at_, velocity_;
 };
 
 #define PYCRAFT_EXTERN(S) extern template class TangentDynamics<S>;

@@ -10,6 +10,7 @@ import numpy as np
 from .. import _core
 from ..linear.linear_model import LinearModel, names_of_states
 from ..state import at_state
+from .displacements import brackets
 
 OUTPUTS = ("q", "v", "vdot", "position", "rotation", "velocity")
 """What may be asked for, each of something: coordinates, then bodies and nodes."""
@@ -116,29 +117,6 @@ def listed(names: Any, what: str) -> list[str]:
         if not isinstance(name, str):
             raise _core.ModelError(f"{what} takes names, or a list of them, not {name!r:.80}")
     return found
-
-
-def brackets(model: Any, v: np.ndarray) -> np.ndarray:
-    """ad(v) (..., nv, nv): the brackets of the twists of ball and free subhinges with v's, zero elsewhere."""
-    out, at = np.zeros((*v.shape, v.shape[-1])), 0
-    for hinge in model.hinges.values():
-        for subhinge in hinge.subhinges:
-            n = _core.subhinge_kinds[subhinge["kind"]].nv
-            if subhinge["kind"] in ("ball", "free"):
-                angular = _skew(v[..., at : at + 3])
-                out[..., at : at + 3, at : at + 3] = angular
-                if n == 6:
-                    out[..., at + 3 : at + 6, at + 3 : at + 6] = angular
-                    out[..., at + 3 : at + 6, at : at + 3] = _skew(v[..., at + 3 : at + 6])
-            at += n
-    return out
-
-
-def _skew(x: np.ndarray) -> np.ndarray:
-    out = np.zeros((*x.shape, 3))
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        out[..., i, j], out[..., j, i] = -x[..., k], x[..., k]
-    return out
 
 
 def units_of(model: Any, own: int) -> list[str]:

@@ -23,13 +23,14 @@ class OperationalSpaceCalls(DirectCalls):
     @direct
     @over_threads
     def operational_space_inertia(
-        self, frame: str | Sequence[str], q=None, *, precision: str | int = "double", threads: int = 1, out=None
+        self, frame: str | Sequence[str], q=None, *, form: str = "fast", precision: str | int = "double", threads: int = 1, out=None
     ) -> np.ndarray:
         """Λ = (B*ΩB)⁻¹ = (𝒥(ℳ + J)⁻¹𝒥*)⁻¹ of bodies or nodes, by name: what resists accelerations there, (6, 6) or (B, 6, 6).
 
         In each frame's own axes about its origin, angular first, as `jacobian` has it; of m names (6 m, 6 m), in their order. One sweep
         over all bodies and one along the way from each frame to the base: O(N + m² depth). `soa.Lambda(frame)` is the same as an
-        operator, and with directions= that of fewer directions.
+        operator, and with directions= that of fewer directions. `form` is that of the sweep: in other forms and
+        precisions than these the operators compute it, and so they do where kernels are not sure, near singular poses.
 
         SingularOperatorError where the frames cannot move in every direction, as of an arm of fewer than six hinges, with those directions;
         SingularHingeError as in forward_dynamics; ModelError where no body or node has the name, or where it is fixed to the base.
@@ -42,12 +43,12 @@ class OperationalSpaceCalls(DirectCalls):
         >>> body.operational_space_inertia("body").diagonal().tolist()  # nothing but its own
         [1.0, 2.0, 3.0, 2.0, 2.0, 2.0]
         """
-        return _of_frames(self, True, frame, at_state(self, q)[0], precision, out)
+        return _of_frames(self, True, frame, at_state(self, q)[0], form, precision, out)
 
     @direct
     @over_threads
     def operational_space_compliance(
-        self, frame: str | Sequence[str], q=None, *, precision: str | int = "double", threads: int = 1, out=None
+        self, frame: str | Sequence[str], q=None, *, form: str = "fast", precision: str | int = "double", threads: int = 1, out=None
     ) -> np.ndarray:
         """B*ΩB = 𝒥(ℳ + J)⁻¹𝒥* of bodies or nodes, by name: accelerations there by forces there, (6, 6) or (B, 6, 6).
 
@@ -59,17 +60,17 @@ class OperationalSpaceCalls(DirectCalls):
         >>> pc.chain(2).operational_space_compliance("body1", [0, 0])[[2, 4]][:, [2, 4]].round(3).tolist()  # about z, along y
         [[6.857, -2.571], [-2.571, 1.714]]
         """
-        return _of_frames(self, False, frame, at_state(self, q)[0], precision, out)
+        return _of_frames(self, False, frame, at_state(self, q)[0], form, precision, out)
 
 
-def _of_frames(model: Any, inverse: bool, frame: Any, q: Any, precision: str | int, out: Any) -> np.ndarray:
+def _of_frames(model: Any, inverse: bool, frame: Any, q: Any, form: str, precision: str | int, out: Any) -> np.ndarray:
     """By kernels, or where they are not sure or know no such precision, by the operators, which say what is singular."""
     names = [frame] if isinstance(frame, str) or not isinstance(frame, Iterable) else list(frame)
     names = [text(name, "a frame") for name in names]
-    result = model._calls().operational_space(inverse, names, q) if precision == "double" else None
+    result = model._calls().operational_space(inverse, names, q) if (form, precision) == ("fast", "double") else None
     if result is None:
         try:
-            result = _operator(model.soa, inverse, names).at(q, precision=precision).dense()
+            result = _operator(model.soa, inverse, names).at(q, form=form, precision=precision).dense()
         except _core.SingularOperatorError as error:
             raise _core.SingularOperatorError(f"{error}{_what_does_not_move(model, names, q)}") from None
     if out is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -12,22 +12,30 @@ from .. import _core
 from ..arguments import text
 from ..closed import Closed
 from ..state import at_state
+from .direct_calls import cached
 
 TWIST = ("rx", "ry", "rz", "x", "y", "z")
 """Directions of a frame in its own axes, angular first."""
+SHARED = 2.0**-8
+"""Of a direction's compliance, what must be its own beside the others': else two digits would go, which the decomposition keeps."""
 
 
 class TaskSpace(Closed):
     """The motion of nodes along some directions at a state, or at each of a batch: ẍ = Λ⁻¹F + J v̇₀ + J̇v.
 
     ẋ = J v are the components of the nodes' velocities along the directions, each in its frame's own axes, F the forces on the nodes along
-    them, and v̇₀ what gravity, velocities and hinge forces τ make of the accelerations by themselves. With ℳ + J_rotors = LL* and W = J L⁻*
-    all is W's singular value decomposition, rows in units in which each direction alone has unit compliance:
+    them, and v̇₀ what gravity, velocities and hinge forces τ make of the accelerations by themselves. By Ω's recursion, O(N + m depth) for m
+    nodes, and O(N k) for Y,
 
-        Λ⁻¹ = WW*,    Λ = (W⁺)*W⁺,    J̄ = L⁻*W⁺ = ℳ⁻¹J*Λ,    N = 1 - J̄J
+        Λ⁻¹ = C B*ΩB C* = R⁻¹R⁻*,    Λ = R*R,    Y = (ℳ + J_rotors)⁻¹J*,    J̄ = YΛ,    N = 1 - J̄J
 
-    so that near singular poses half as many digits are lost as by inverting Λ⁻¹. Everything has a leading axis for a batch. Cost O(nv³) a
-    state; Λ alone costs O(N + m² depth), by `Multibody.operational_space_inertia`.
+    C the directions in the nodes' motions, R from Λ⁻¹'s Cholesky factor in units in which each direction alone has unit compliance. Where a
+    pivot there is less than `SHARED`, or kernels are not sure, all is the singular value decomposition of W = J L⁻*, LL* = ℳ + J_rotors,
+
+        Λ⁻¹ = WW*,    Λ = (W⁺)*W⁺,    J̄ = L⁻*W⁺
+
+    so that near singular poses half as many digits are lost as by inverting Λ⁻¹; that costs O(nv³). Everything has a leading axis for a
+    batch.
 
     Attributes
     ----------
@@ -36,9 +44,24 @@ class TaskSpace(Closed):
     velocity : (k,), J v
     """
 
-    def __init__(self, model: Any, q: Any, v: Any, names: Sequence[str], jacobian: np.ndarray, rate: np.ndarray):
-        self._model, self._q, self._v = model, q, v
-        self._names, self._jacobian, self._rate = tuple(names), jacobian, rate
+    def __init__(self, model: Any, q: Any, v: Any, directions: Mapping[str, tuple[np.ndarray, list[str]]]):
+        self._model, self._directions = model, {frame: rows for frame, (rows, _) in directions.items()}
+        self._names = tuple(name for _, called in directions.values() for name in called)
+        whole = [model.jacobian(frame, q) for frame in self._directions]
+        rates = [rows @ model.jacobian_dot(frame, q, v) for frame, rows in self._directions.items()]
+        q, v = (np.asarray(getattr(x, name, x), float) for x, name in ((q, "q"), (v, "v")))
+        self._batch = np.broadcast_shapes(whole[0].shape[:-2], rates[0].shape[:-2], v.shape[:-1])
+        self._q, self._v = (np.broadcast_to(x, (*self._batch, x.shape[-1])) for x in (q, v))
+        self._jacobian = self._stacked([rows @ J for rows, J in zip(self._directions.values(), whole, strict=True)])
+        self._rate = self._stacked(rates)
+        # of each direction what its row is a sum of, so that rounding in place of no motion is told from motion
+        halves = [np.abs(J).reshape(*J.shape[:-2], 2, 3 * model.nv).max(axis=-1, initial=0.0) for J in whole]  # angular, linear
+        sizes = [np.repeat(half, 3, axis=-1)[..., None] for half in halves]
+        self._size = self._stacked([np.abs(rows) @ size for rows, size in zip(self._directions.values(), sizes, strict=True)])[..., 0]
+
+    def _stacked(self, parts: Sequence[np.ndarray]) -> np.ndarray:
+        """Arrays of the frames, one below the other, for every state."""
+        return np.concatenate([np.broadcast_to(x, (*self._batch, *x.shape[-2:])) for x in parts], axis=-2)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -55,6 +78,49 @@ class TaskSpace(Closed):
         """(k,) J v, rad/s and m/s."""
         return np.einsum("...ij,...j->...i", self._jacobian, self._v)
 
+    # ------------------------------------------------------------------ through the articulated bodies
+    @cached_property
+    def _by_recursion(self) -> np.ndarray | None:
+        """C B*ΩB C* (..., k, k); None where kernels are not sure."""
+        found = self._model._calls().operational_space(False, list(self._directions), self._q)
+        if found is None:
+            return None
+        C = np.zeros((len(self._names), found.shape[-1]))
+        row = 0
+        for i, rows in enumerate(self._directions.values()):
+            C[row : row + len(rows), 6 * i : 6 * i + 6] = rows
+            row += len(rows)
+        return C @ found @ C.T
+
+    @cached_property
+    def _factor(self) -> np.ndarray | None:
+        """R (..., k, k), Λ = R*R; None where the decomposition is asked, of all states of a batch."""
+        compliance = self._by_recursion
+        if compliance is None or not self._moving.all():
+            return None
+        units = np.sqrt(np.diagonal(compliance, axis1=-2, axis2=-1))[..., None]
+        with np.errstate(all="ignore"):
+            scaled = compliance / (units * np.swapaxes(units, -1, -2))
+        try:
+            lower = np.linalg.cholesky(scaled)
+        except np.linalg.LinAlgError:
+            return None
+        if not (np.diagonal(lower, axis1=-2, axis2=-1) ** 2 >= SHARED).all():
+            return None
+        return np.linalg.inv(lower) / np.swapaxes(units, -1, -2)
+
+    @property
+    def _moving(self) -> np.ndarray:
+        """Which directions move at all, (..., k): rows of J that are more than the rounding of what they are sums of."""
+        return np.abs(self._jacobian).max(axis=-1, initial=0.0) > 64 * max(self._model.nv, 6) * np.finfo(float).eps * self._size
+
+    @cached_property
+    def _answers(self) -> np.ndarray:
+        """Y = (ℳ + J_rotors)⁻¹J* (..., nv, k)."""
+        H, phi, M, J = self._model.soa("H phi M J")
+        inverse = (H @ phi @ M @ phi.T @ H.T + J).inv()
+        return np.asarray(inverse.at(self._q) @ np.swapaxes(self._jacobian, -1, -2))
+
     # ------------------------------------------------------------------ the decomposition
     @cached_property
     def _parts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -70,7 +136,8 @@ class TaskSpace(Closed):
         W = self._jacobian @ back
         units = np.linalg.norm(W, axis=-1)
         size = np.abs(self._jacobian).max(axis=-1, initial=0.0) * np.abs(back).max(axis=(-1, -2), initial=0.0)[..., None]
-        units = np.where(units > 64 * W.shape[-1] * np.finfo(float).eps * size, units, np.inf)  # of what does not move at all: no row
+        moving = self._moving & (units > 64 * W.shape[-1] * np.finfo(float).eps * size)
+        units = np.where(moving, units, np.inf)  # of what does not move at all: no row
         U, sigma, Vt = np.linalg.svd(W / units[..., None], full_matrices=False)
         return back, units, U, sigma, Vt
 
@@ -83,7 +150,7 @@ class TaskSpace(Closed):
     @property
     def rank(self) -> Any:
         """How many directions can move independently: an integer, of a batch (B,)."""
-        count = self._kept.sum(axis=-1)
+        count = np.full(self._batch, len(self._names)) if self._factor is not None else self._kept.sum(axis=-1)
         return int(count) if count.ndim == 0 else count
 
     @property
@@ -92,7 +159,9 @@ class TaskSpace(Closed):
 
         Combinations are those of the directions in their units: a motion along one of them is no motion of the mechanism.
         """
-        if self._jacobian.ndim == 2:
+        if self._factor is not None:
+            return [[] for _ in range(self._batch[0])] if self._batch else []
+        if not self._batch:
             return self._lost_of(self._parts[1], self._parts[2], self._kept)
         return [self._lost_of(*one) for one in zip(self._parts[1], self._parts[2], self._kept, strict=True)]
 
@@ -118,26 +187,62 @@ class TaskSpace(Closed):
     @property
     def compliance(self) -> np.ndarray:
         """Λ⁻¹ = J(ℳ + J)⁻¹J* (k, k): accelerations by forces."""
+        if self._by_recursion is not None:
+            return self._by_recursion
         W = self._jacobian @ self._parts[0]
         return W @ np.swapaxes(W, -1, -2)
 
     @property
     def inertia(self) -> np.ndarray:
         """Λ (k, k). SingularOperatorError where not all directions can move independently, with those that cannot."""
-        self._require_full("Λ")
-        inverse = self._pseudo_inverse()
+        if (inverse := self._factor) is None:
+            self._require_full("Λ")
+            inverse = self._pseudo_inverse()
         return np.swapaxes(inverse, -1, -2) @ inverse
 
     def _require_full(self, what: str) -> None:
         short = np.atleast_1d(self.rank) < len(self._names)
         if short.any():
             b = int(short.argmax())
-            lost, at = (self.lost, "this state") if self._jacobian.ndim == 2 else (self.lost[b], f"state {b} of a batch of {len(short)}")
+            lost, at = (self.lost, "this state") if not self._batch else (self.lost[b], f"state {b} of a batch of {len(short)}")
             raise _core.SingularOperatorError(f"{what} does not exist at {at}: of {', '.join(self._names)} no motion along {told(lost)}")
+
+    # ------------------------------------------------------------------ derivatives
+    @property
+    def jacobian_derivative(self) -> np.ndarray:
+        """∂J (k, nv, nv), the last axis the coordinate that it is along, on ball and free hinges a quasi-velocity. O(N + depth²)."""
+        parts = [
+            np.einsum("ij,...jkl->...ikl", rows, self._model.jacobian_derivative(of, self._q)) for of, rows in self._directions.items()
+        ]
+        return np.concatenate(parts, axis=-3)
+
+    @property
+    def compliance_derivative(self) -> np.ndarray:
+        """∂(Λ⁻¹) = ∂J Y + (∂J Y)* - Y*∂ℳ Y (k, k, nv), the last axis the coordinate.
+
+        Y*∂ℳ are second derivatives of inverse dynamics, by q and v̇, of the power of Y: O(N nv k).
+        """
+        Y, states = self._answers, self._batch or (1,)
+        n, k = Y.shape[-2:]
+        moved = np.einsum("...ijl,...jm->...iml", self.jacobian_derivative, Y)
+        core, rest = cached(self._model, "_curvature", _core.Curvature), np.zeros((*states, n))
+        along = core.inverse_dynamics(
+            self._q.reshape(*states, self._q.shape[-1]), rest, rest, np.swapaxes(Y, -1, -2).reshape(*states, k, n).copy(), "double"
+        )
+        of_mass = np.einsum("...ilj,...jm->...iml", along[:, :, 2].reshape(*self._batch, k, n, n), Y)  # ∂ of Y*ℳ along l, times Y
+        return moved + np.swapaxes(moved, -2, -3) - (of_mass + np.swapaxes(of_mass, -2, -3)) / 2
+
+    @property
+    def inertia_derivative(self) -> np.ndarray:
+        """∂Λ = -Λ ∂(Λ⁻¹) Λ (k, k, nv), the last axis the coordinate. SingularOperatorError as `inertia`."""
+        inertia = self.inertia
+        return -np.einsum("...ij,...jkl,...km->...iml", inertia, self.compliance_derivative, inertia)
 
     @property
     def dynamically_consistent_inverse(self) -> np.ndarray:
         """J̄ (nv, k): the velocities of least kinetic energy that move the nodes so; where directions are lost, along the others."""
+        if self._factor is not None:
+            return self._answers @ self.inertia
         return self._parts[0] @ self._pseudo_inverse()
 
     @property
@@ -165,7 +270,7 @@ class TaskSpace(Closed):
         """
         wanted = self._vector(acceleration, "acceleration")
         short = wanted - self.bias(tau)
-        inverse = self._pseudo_inverse()
+        inverse = self._pseudo_inverse() if self._factor is None else self._factor
         force = np.einsum("...ji,...j->...i", inverse, np.einsum("...ij,...j->...i", inverse, short))
         left = short - np.einsum("...ij,...j->...i", self.compliance, force)
         if np.any(np.abs(left) > 1e-8 * np.maximum(1.0, np.abs(wanted).max(initial=0.0))):
@@ -198,9 +303,6 @@ def told(lost: Iterable[Mapping[str, float]]) -> str:
 
 class TaskSpaceCalls:
     """The task space of nodes."""
-
-    jacobian: Callable[..., Any]
-    jacobian_dot: Callable[..., Any]
 
     def task_space(self, frames: Any, q=None, v=None) -> TaskSpace:
         """The motion of bodies and nodes along directions: inertia, inverse, null space, forward and inverse dynamics.
@@ -235,19 +337,7 @@ class TaskSpaceCalls:
         """
         model: Any = self
         q, v = at_state(model, q, v)
-        names: list[str] = []
-        jacobians: list[np.ndarray] = []
-        rates: list[np.ndarray] = []
-        for frame, directions in _listed(frames):
-            rows, called = _rows(frame, directions)
-            names += called
-            jacobians.append(rows @ self.jacobian(frame, q))
-            rates.append(rows @ self.jacobian_dot(frame, q, v))
-        v = np.asarray(getattr(v, "v", v), float)
-        batch = np.broadcast_shapes(jacobians[0].shape[:-2], rates[0].shape[:-2], v.shape[:-1])
-        whole = [np.concatenate([np.broadcast_to(x, (*batch, *x.shape[-2:])) for x in parts], axis=-2) for parts in (jacobians, rates)]
-        q = np.asarray(getattr(q, "q", q), float)
-        return TaskSpace(model, np.broadcast_to(q, (*batch, q.shape[-1])), np.broadcast_to(v, (*batch, v.shape[-1])), names, *whole)
+        return TaskSpace(model, q, v, {frame: _rows(frame, directions) for frame, directions in _listed(frames)})
 
 
 def _listed(frames: Any) -> list[tuple[str, Any]]:

@@ -183,3 +183,16 @@ def test_places_of_results_and_other_numbers():
     np.testing.assert_array_equal(model.operational_space_compliance(tip), known[1])
     single = model.operational_space_compliance(tip, Q[0], precision="single")
     assert 0 < np.abs(single - known[0]).max() <= 1e-2 * np.abs(known[0]).max()
+
+
+@pytest.mark.parametrize("form", ["fast", "ud", "square-root"])
+def test_forms(form):
+    """Of the sweep that Ω takes; one that is not there is named."""
+    model = MODELS["g1"]
+    q, tip = model.random_state(2).q, moving(model)[-1]
+    exact, bound = of_mass_matrix(model, [tip], q)
+    assert np.abs(model.operational_space_compliance(tip, q, form=form) - exact).max() <= bound
+    known = np.linalg.inv(exact)
+    assert np.abs(model.operational_space_inertia(tip, q, form=form) - known).max() <= bound * np.linalg.cond(exact) * np.abs(known).max()
+    with pytest.raises(pc.EvaluationError, match="form"):
+        model.operational_space_inertia(tip, q, form="slow")

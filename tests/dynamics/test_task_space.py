@@ -114,6 +114,29 @@ def test_the_jacobian_rate_is_that_of_the_velocity():
     agree(model.task_space({tip: ["x", "ry"]}, state.q, state.v).bias(tau), difference(velocity), 1e-6)  # of a motion to second order
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_the_recursion_and_the_decomposition_agree(name, monkeypatch):
+    """Everything by Ω's recursion, and by the singular values of J L⁻*, which states near singular poses are left to."""
+    model = model_of(name)
+    states = [model.random_state(seed) for seed in range(3)]
+    Q, V = (np.array([getattr(s, x) for s in states]) for x in "qv")
+    tip, middle = ends(model)
+    directions = {tip: ["x", "y", "z"]} if name == "panda" else {tip: [[0.0, 0, 0, 1, 0.5, 0], [0.2, 0, 0, 0, 1, 0]], middle: ["rx"]}
+    task = model.task_space(directions, Q, V)
+    if task._factor is None:
+        assert task.rank.min() < len(task.names)
+        return
+    condition = max(np.linalg.cond(model.mass_matrix(q)) for q in Q) * max(np.linalg.cond(one) for one in task.compliance)
+    monkeypatch.setattr(pc.dynamics.task_space, "SHARED", 2.0)  # no pivot is that
+    other = model.task_space(directions, Q, V)
+    monkeypatch.setattr(pc.dynamics.task_space.TaskSpace, "_by_recursion", None)
+    assert other._factor is None and other.rank.tolist() == task.rank.tolist() and other.lost == task.lost
+    wanted = np.random.default_rng(1).uniform(-1, 1, (3, len(task.names)))
+    for what in ("compliance", "inertia", "dynamically_consistent_inverse", "null_space"):
+        agree(getattr(other, what), getattr(task, what), ROUNDING * condition)
+    agree(other.torques(wanted), task.torques(wanted), ROUNDING * condition)
+
+
 # What cannot move -----------------------------------------------------------------------------------------------------
 
 
@@ -131,6 +154,25 @@ def test_what_cannot_move_is_named():
     assert arm.task_space({"body1": ["rz", "y"]}, [0.0, 0.0]).inertia.shape == (2, 2)
     with pytest.raises(pc.SingularOperatorError, match="There is no motion along body1.rx; body1.ry; body1.x; body1.z"):
         arm.operational_space_inertia("body1", [0.0, 0.0])
+
+
+def test_what_rounding_moves_does_not_move():
+    """A planar arm in a plane that is no coordinate plane: out of it the Jacobian is rounding, which is no motion."""
+    R = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
+    R *= np.linalg.det(R)
+    arm = pc.Multibody("tilted")
+    for k in range(4):
+        position = R[:, 0] if k else (0, 0, 0)
+        arm.add_body(
+            f"b{k}", f"b{k - 1}" if k else None, axis=R[:, 2], position=position, mass=1.0, com=R[:, 0] / 2, inertia=np.eye(3) / 10
+        )
+    arm.add_node("tip", "b3", rotation=R)
+    q = [0.3, 0.5, -0.7, 0.4]
+    whole = arm.task_space("tip", q)
+    assert whole.rank == 3 and whole.lost == [{"tip.rx": 1.0}, {"tip.ry": 1.0}, {"tip.z": 1.0}] and whole.jacobian[5].any()
+    assert arm.task_space({"tip": ["rz", "x", "y"]}, q).rank == 3
+    with pytest.raises(pc.SingularOperatorError, match="of tip.rz, tip.x, tip.z no motion along tip.z$"):
+        arm.task_space({"tip": ["rz", "x", "z"]}, q).inertia  # noqa: B018 - raises
 
 
 def test_torques_along_what_moves():
@@ -168,6 +210,41 @@ def test_derivatives_of_the_operators():
             moved = lambda h, i=i, of=operator: of.at(model.integrate(state.q, h * np.eye(7)[i])).dense()
             found = operator.diff(i).at(state.q).dense()
             agree(found, difference(moved), 1e-8 * max(1.0, np.abs(found).max()))
+
+
+@pytest.mark.parametrize("name", ["panda", "tree of ball", "tree of free"])
+def test_derivatives(name):
+    """∂J, ∂(Λ⁻¹) and ∂Λ along coordinates and quasi-velocities, against differences of what is rounded to double."""
+    model = MODELS[name]
+    state, (tip, middle) = model.random_state(6), ends(model)
+    directions = {tip: ["x", "y"], middle: ["rx"]}
+    task = model.task_space(directions, state.q)
+    assert task.rank == 3
+    size = ROUNDING * 1e3 * np.linalg.cond(model.mass_matrix(state.q)) * np.linalg.cond(task.compliance)
+    for i, e in enumerate(np.eye(model.nv)):
+        at = lambda h, e=e: model.task_space(directions, model.integrate(state.q, h * e))
+        agree(task.jacobian_derivative[..., i], difference(lambda h, at=at: at(h).jacobian), 1e-9)
+        for what in ("compliance", "inertia"):
+            agree(getattr(task, f"{what}_derivative")[..., i], difference(lambda h, at=at, what=what: getattr(at(h), what)), size)
+    batch = model.task_space(directions, np.array([state.q, model.random_state(7).q]))
+    for what in ("jacobian_derivative", "compliance_derivative", "inertia_derivative"):
+        agree(getattr(batch, what)[0], getattr(task, what), 1e-10)
+
+
+def test_derivatives_with_rotors_and_of_the_operator():
+    """Of whole frames they are those of the operator Λ; rotor inertias are in Λ and not in what changes."""
+    model = MODELS["panda"]
+    for hinge in model.hinges.values():
+        hinge.rotor_inertia = 0.2
+    try:
+        state = model.random_state(6)
+        found, operator = model.task_space("panda_link7", state.q).inertia_derivative, model.soa.Lambda("panda_link7")
+        for i in range(7):
+            known = operator.diff(i).at(state.q).dense()
+            agree(found[..., i], known, ROUNDING * np.linalg.cond(operator.at(state.q).dense()))
+    finally:
+        for hinge in model.hinges.values():
+            hinge.rotor_inertia = 0.0
 
 
 @pytest.mark.parametrize(

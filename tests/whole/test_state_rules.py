@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import pycraft as pc
+from pycraft.dynamics.quadratic import QuadraticModel
 from pycraft.dynamics.task_space import TaskSpace
 from pycraft.linear.linear_model import LinearModel
 from support.mechanisms import every_kind, uniform_batch
@@ -36,6 +37,8 @@ def calls(model):
 def leaves(x):
     if isinstance(x, LinearModel):
         return [x.A, x.B, x.C, x.D, x.rate, x.q, x.v]
+    if isinstance(x, QuadraticModel):
+        return [*leaves(x.linear), *x.tensors()]
     if isinstance(x, TaskSpace):
         return [x.jacobian, x.velocity, x.bias()]
     if hasattr(x, "lines"):  # a picture: what it is drawn of

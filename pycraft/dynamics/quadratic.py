@@ -1,0 +1,200 @@
+"""Quadratic models of the equations of motion near states, and of steps of integrators: exact, on the group."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .. import _core
+from ..arguments import one_number
+from ..closed import Closed
+from ..linear.linear_model import LinearModel
+from ..state import State, at_state
+from .linearization import LinearizationCalls
+from .second_order import STEPS, Nominal, StateEquation, Step
+
+
+class Hessian(NamedTuple):
+    """Second derivatives by states and states, states and inputs, inputs and inputs.
+
+    Of one function (n, n), (n, k), (k, k); of each state's rate an axis more before these, of a batch of states one before all.
+    """
+
+    xx: np.ndarray
+    xu: np.ndarray
+    uu: np.ndarray
+
+
+class QuadraticModel(Closed):
+    """δẋ = A δx + B δu + ½ (δx, δu)*∂²ẋ(δx, δu) near a state; with `dt`, the same of δx⁺ after a step of an integrator.
+
+    The states are x = (δq, v): δq are exponential coordinates about the motion that passes through the state, q = q₀ exp(δq), as
+    `integrate` takes them and `difference` gives them. Of a batch of states all arrays have a leading axis.
+
+    Attributes
+    ----------
+    linear : LinearModel, the first order, whose names and arrays are `states`, `inputs`, `A`, `B`
+    after : State, where a step ends; None where time is continuous
+    """
+
+    def __init__(self, linear: LinearModel, curvature: Any, at: Nominal, after: State | None = None):
+        self._linear, self._curvature, self._at, self._after = linear, curvature, at, after
+
+    @property
+    def linear(self) -> LinearModel:
+        """The model to first order."""
+        return self._linear
+
+    @property
+    def A(self) -> np.ndarray:
+        """(n, n)"""
+        return self._linear.A
+
+    @property
+    def B(self) -> np.ndarray:
+        """(n, k)"""
+        return self._linear.B
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states."""
+        return self._linear.states
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the inputs."""
+        return self._linear.inputs
+
+    @property
+    def dt(self) -> float | None:
+        """s, of a step; None where time is continuous."""
+        return self._linear.dt
+
+    @property
+    def after(self) -> State | None:
+        """Where the step ends."""
+        return self._after
+
+    def contracted(self, costate: Any) -> Hessian:
+        """The Hessian of costate*ẋ, or costate*x⁺, that differential dynamic programming asks for: no tensor is formed.
+
+        costate : (n,), or (B, n) beside a batch of states. Cost O(N · nv), and products of matrices (n, n); of a step for each stage.
+
+        ModelError for a costate of another size, or with entries that are not finite.
+        """
+        given, n = _core.real_array(costate, "costate"), len(self.states)
+        batch = self.A.shape[:-2]
+        if given.shape not in {(n,), (*batch, n)}:
+            shapes = " or ".join(dict.fromkeys((f"({n},)", str((*batch, n)))))
+            names = ", ".join(self.states[:12]) + (", ..." if n > 12 else "")
+            raise _core.ModelError(f"costate of {self._linear.model.name!r} takes numbers {shapes}, of {names}; it has shape {given.shape}")
+        if not np.isfinite(given).all():
+            raise _core.ModelError(f"costate: entry {int(np.flatnonzero(~np.isfinite(given))[0])} is not finite")
+        states = batch[0] if batch else 1
+        found = self._curvature.hessians(np.broadcast_to(given, (states, n))[:, None, :])[:, 0]
+        return self._cut(found if batch else found[0])
+
+    def tensors(self) -> Hessian:
+        """∂²ẋ, or ∂²x⁺, whole: (n, n, n), (n, n, k), (n, k, k), the first index that of the rate's component. O(N · nv²) and products."""
+        batch, n = self.A.shape[:-2], len(self.states)
+        states = batch[0] if batch else 1
+        found = self._curvature.hessians(np.broadcast_to(np.eye(n), (states, n, n)))
+        return self._cut(found if batch else found[0])
+
+    def _cut(self, whole: np.ndarray) -> Hessian:
+        n = len(self.states)
+        return Hessian(whole[..., :n, :n], whole[..., :n, n:], whole[..., n:, n:])
+
+    def discrete(self, dt: float, integrator: str = "rkmk4") -> QuadraticModel:
+        """Of one step of dt seconds with inputs held, to second order: exactly that of the integrator, by chaining the rules of its stages.
+
+        Parameters
+        ----------
+        dt : s
+        integrator : {"euler", "semi-implicit-euler", "rkmk4"}
+            q⁺ = q exp(h v) and v⁺ = v + h v̇; q⁺ = q exp(h v⁺), the core's "semi-implicit-euler" without implicit effects; the classical
+            method of order 4 in exponential coordinates, the core's "rkmk4", which is its "rk4" where no ball or free hinge is.
+
+        Returns
+        -------
+        QuadraticModel : of the step, `.after` where it ends
+
+        Raises
+        ------
+        EvaluationError
+            An unknown integrator, a step that is no positive number, a model that is discrete already.
+        SingularHingeError
+            As `forward_dynamics`, at a stage.
+        """
+        h = one_number(dt, "dt")
+        if not 0 < h < np.inf:
+            raise _core.EvaluationError(f"dt={h:g}: a step is a positive number of seconds")
+        if integrator not in STEPS:
+            raise _core.EvaluationError(f"integrator={integrator!r}: steps to second order are of {', '.join(map(repr, STEPS))}")
+        if self.dt is not None:
+            raise _core.EvaluationError(f"this quadratic model is discrete already, with a step of {self.dt:g} s")
+        step, linear = Step(self._at, h, integrator), self._linear
+        n, batch = len(linear.states), self.A.ndim == 3
+        slopes, q, v = (x if batch else x[0] for x in (step.slopes, step.q, step.v))
+        return QuadraticModel(replace(linear, A=slopes[..., :n], B=slopes[..., n:], dt=h), step, self._at, State(q, v))
+
+    def __repr__(self) -> str:
+        return repr(self._linear).replace("linear", "quadratic", 1)
+
+
+class QuadraticCalls(LinearizationCalls):
+    """Quadratic models of a model's equations of motion."""
+
+    def quadratic_model(
+        self, q=None, v=None, tau=None, *, inputs: Any = None, form: str = "fast", precision: str = "double"
+    ) -> QuadraticModel:
+        """The model of v̇ = forward_dynamics(q, v, τ) to second order near a state, or near each of a batch: what iLQR and DDP ask for.
+
+        `linearize` is its first order. To second order
+
+            δq̇ = δv - ad(v₀) δq + ½ [δq, δv],    δv̇ = G z + ½ z*∂²v̇ z,    z = (δq, δv, δτ),
+
+        with the bracket of ball and free hinges, zero elsewhere, and ∂²v̇ along exponential coordinates, exact by derivatives of inverse
+        dynamics' closed forms. Of the model with generalized forces τ and gravity; effects of scenes have first derivatives alone.
+
+        Parameters
+        ----------
+        q, v, tau : (nq,), (nv,), (nv,), each with an optional leading batch axis; what is left out as in `forward_dynamics`
+        inputs : names of hinges, coordinates or patterns, or a list of them, whose generalized forces are inputs; None: all
+        form, precision : as in `forward_dynamics`, of accelerations and first derivatives; up to "quad". What one step hands to the next
+            is rounded to double.
+
+        Returns
+        -------
+        QuadraticModel : A (2 nv, 2 nv), B (2 nv, k); `contracted(costate)`, `tensors()`, `discrete(dt, integrator)`
+
+        Raises
+        ------
+        ModelError
+            Names that are not there.
+        SingularHingeError
+            As `forward_dynamics`.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> arm = pc.chain(1)
+        >>> arm.gravity = (9.81, 0, 0)  # along the rod at q = 0: v̇ = 3 τ - 14.715 sin q
+        >>> near = arm.quadratic_model([0.5], [0.0])
+        >>> near.contracted([0.0, 1.0]).xx.round(4).tolist()  # 14.715 sin(0.5)
+        [[7.0547, 0.0], [0.0, 0.0]]
+        >>> near.discrete(0.01)
+        <quadratic model: 'chain of 1 rods', 2 states, 1 inputs, 2 outputs, step 0.01 s>
+        """
+        model: Any = self
+        q, v = at_state(model, q, v)
+        tau = np.zeros(self.nv) if tau is None else tau
+        linear = self.linearize(q, v, tau, inputs=inputs, form=form, precision=precision)
+        given = [np.asarray(x, float) for x in (getattr(q, "q", q), v, tau)]
+        states = len(linear.A) if linear.A.ndim == 3 else 1
+        q, v, tau = (np.broadcast_to(x, (states, x.shape[-1])) for x in given)
+        chosen = [model.coordinate_names.index(name.removeprefix("tau.")) for name in linear.inputs]
+        at = Nominal(model, q, v, tau, chosen, {"form": form, "precision": precision})
+        return QuadraticModel(linear, StateEquation(at), at)
