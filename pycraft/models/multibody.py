@@ -16,6 +16,7 @@ from ..state import State, at_state, random_state
 from .handles import Body, Hinge, Named, Node, Vector
 from .parts import Parts
 from .pictures import Pictures
+from .planning import Planning
 from .with_frames import WithFrames
 
 _Z = (0.0, 0.0, 1.0)
@@ -30,7 +31,7 @@ _DEFAULT_AXES: dict[str, tuple[tuple[float, float, float], ...]] = {
 }
 
 
-class Multibody(Closed, IntegrationCalls, Pictures, Parts, WithFrames):
+class Multibody(Closed, IntegrationCalls, Pictures, Parts, Planning, WithFrames):
     """A tree of bodies on hinges, with nodes, a state (`q`, `v`) and gravity (zero until it is set).
 
     Build one body by body, or load it (`pycraft.load`). Bodies are kept depth first, children in the order they were added, and
