@@ -63,6 +63,13 @@ def check_model(*arguments: Any, **options: Any) -> Any:
     return check(*arguments, **options)
 
 
+def solve_ik(*arguments: Any, **options: Any) -> Any:
+    """`Multibody.solve_ik`."""
+    from .kinematics import solve_ik as solve
+
+    return solve(*arguments, **options)
+
+
 def attach() -> None:
     """Puts the functions where the core and the lower rooms find them."""
     _core._face.update(
@@ -82,5 +89,6 @@ def attach() -> None:
         scalar_at=operator_set.scalar_at,
         scalar_gradient=operator_set.scalar_gradient,
         shared_out=shared_out,
+        solve_ik=solve_ik,
         thread_count=thread_count,
     )

@@ -167,7 +167,16 @@ _JOINTS = {"pin": "hinge", "slider": "slide", "ball": "ball"}
 
 
 def to_mjcf(model: Described) -> str:
-    """The model as MJCF text: bodies, joints, inertias with 17 digits, no geometry, contacts and constraints off.
+    """The model as MJCF text for comparisons: `mjcf_elements`, contacts and constraints off. `Multibody.save` writes files."""
+    from lxml import etree
+
+    root, _ = mjcf_elements(model)
+    etree.SubElement(root.find("option"), "flag", constraint="disable", contact="disable")
+    return etree.tostring(root, encoding="unicode")
+
+
+def mjcf_elements(model: Described) -> tuple[Any, list[Any]]:
+    """The model's `<mujoco>` element, and in it the elements of its bodies, in order: joints, inertias with 17 digits, no geometry.
 
     Raises PeerRefusal for a screw, for a free hinge that is not alone on the base, and for rotor inertias that differ within a ball or
     free hinge: MuJoCo has none of them.
@@ -176,31 +185,33 @@ def to_mjcf(model: Described) -> str:
 
     root = etree.Element("mujoco", model=model.name)
     etree.SubElement(root, "compiler", _COMPILER)
-    option = etree.SubElement(root, "option", gravity=_numbers(model.gravity))
-    etree.SubElement(option, "flag", constraint="disable", contact="disable")
+    etree.SubElement(root, "option", gravity=numbers_text(model.gravity))
     elements: list[Any] = []
     world = etree.SubElement(root, "worldbody")
     for body in _bodies(model):
         hinge, parent = body["hinge"], body["parent"]
         rotation = np.asarray(hinge["placement"]["rotation"], float)
         element = etree.SubElement(
-            elements[parent] if parent >= 0 else world, "body", name=body["name"], pos=_numbers(hinge["placement"]["position"])
+            elements[parent] if parent >= 0 else world, "body", name=body["name"], pos=numbers_text(hinge["placement"]["position"])
         )
         if not np.array_equal(rotation, np.eye(3)):
-            element.set("quat", _numbers(convention._quaternion(rotation)))
-        inertia = np.asarray(body["inertia"], float)
-        inertial = etree.SubElement(element, "inertial", pos=_numbers(body["com"]), mass=repr(float(body["mass"])))
-        if np.count_nonzero(inertia - np.diag(np.diag(inertia))):
-            inertial.set("fullinertia", _numbers(inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]))
-        else:
-            inertial.set("diaginertia", _numbers(np.diag(inertia)))
+            element.set("quat", numbers_text(convention._quaternion(rotation)))
+        inertial = etree.SubElement(element, "inertial", pos=numbers_text(body["com"]), mass=numbers_text(body["mass"]))
+        inertial.set(*inertia_attribute(np.asarray(body["inertia"], float)))
         at = 0
         for i, subhinge in enumerate(hinge["subhinges"]):
             size = _core.subhinge_kinds[subhinge["kind"]].nv
             _mujoco_joint(element, hinge, i, subhinge, np.asarray(hinge["rotor_inertia"], float)[at : at + size], parent)
             at += size
         elements.append(element)
-    return etree.tostring(root, encoding="unicode")
+    return root, elements
+
+
+def inertia_attribute(inertia: np.ndarray) -> tuple[str, str]:
+    """The attribute of `<inertial>` that holds an inertia (3, 3), and its text."""
+    if np.count_nonzero(inertia - np.diag(np.diag(inertia))):
+        return "fullinertia", numbers_text(inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
+    return "diaginertia", numbers_text(np.diag(inertia))
 
 
 def _mujoco_joint(element: Any, hinge: dict, i: int, subhinge: dict, rotor: np.ndarray, parent: int) -> None:
@@ -211,19 +222,20 @@ def _mujoco_joint(element: Any, hinge: dict, i: int, subhinge: dict, rotor: np.n
         raise PeerRefusal(f"MuJoCo has no screw: hinge {hinge['name']!r}")
     if np.any(rotor != rotor[:1]):
         raise PeerRefusal(f"MuJoCo takes one armature for all coordinates of {subhinge['kind']} hinge {hinge['name']!r}, not {rotor}")
-    common = dict(name=name, armature=repr(float(rotor[0])))
+    common = dict(name=name, armature=numbers_text(rotor[0]))
     if subhinge["kind"] == "free":
         if parent >= 0 or len(hinge["subhinges"]) > 1:
             raise PeerRefusal(f"MuJoCo has free joints on the base alone: hinge {hinge['name']!r}")
-        etree.SubElement(element, "joint", common, type="free")
+        etree.SubElement(element, "joint", common | dict(type="free"))
         return
-    joint = etree.SubElement(element, "joint", common, type=_JOINTS[subhinge["kind"]], pos=_numbers(subhinge["point"]))
+    joint = etree.SubElement(element, "joint", common | dict(type=_JOINTS[subhinge["kind"]], pos=numbers_text(subhinge["point"])))
     if subhinge["kind"] != "ball":
-        joint.set("axis", _numbers(subhinge["axis"]))
+        joint.set("axis", numbers_text(subhinge["axis"]))
 
 
-def _numbers(values: Any) -> str:
-    return " ".join(repr(float(x)) for x in np.ravel(values))
+def numbers_text(values: Any) -> str:
+    """Numbers as attributes of XML have them, with all their digits."""
+    return " ".join(repr(float(x)).removesuffix(".0") for x in np.ravel(values))
 
 
 def mujoco_peer(model: Described) -> Peer:

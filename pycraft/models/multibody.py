@@ -18,11 +18,12 @@ from .handles import Body, Hinge, Named, Node, Vector
 from .hinge_arguments import frame_name, hinge_arguments
 from .parts import Parts
 from .pictures import Pictures
+from .planning import Planning
 from .structure import Structure
 from .with_frames import WithFrames
 
 
-class Multibody(Closed, IntegrationCalls, Pictures, Parts, Structure, Coalescing, WithFrames):
+class Multibody(Closed, IntegrationCalls, Pictures, Parts, Planning, Structure, Coalescing, WithFrames):
     """A tree of bodies on hinges, with nodes, a state (`q`, `v`) and gravity (zero until it is set).
 
     Build one body by body, or load it (`pycraft.load`). Bodies are kept depth first, children in the order they were added, and
@@ -218,24 +219,25 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, Structure, Coalescing
 
     # ------------------------------------------------------------------ files
     def save(self, path: str | os.PathLike[str], *, state: bool = True) -> None:
-        """Write the model to a file: TOML that a person reads and writes, which `pycraft.load` reads back bit for bit, or URDF.
+        """Write the model to a file: TOML that a person reads and writes, which `pycraft.load` reads back bit for bit, URDF or MJCF.
 
         Parameters
         ----------
-        path : path of the file, ending in ".toml" or ".urdf"
+        path : path of the file, ending in ".toml", ".urdf", or ".xml" or ".mjcf" for MJCF
             A file that is there is replaced.
         state : bool
-            Whether q and v are written to a TOML file, as far as they are not zero.
+            Whether q and v are written to a TOML or MJCF file, as far as they are not zero.
 
         Raises
         ------
         ModelError
-            An ending that is neither, a file that cannot be written; of URDF, what it does not have: hinges by name, and the remedy.
+            Another ending, a file that cannot be written; what URDF or MJCF does not have: hinges and bodies by name, and the remedy.
 
         Warns
         -----
         ModelWarning
-            What the model has beside bodies and hinges and URDF does not hold (gravity, a state); loose frames, which no file holds.
+            What the model has beside bodies and hinges and the format does not hold (URDF: gravity, a state); loose frames, which no file
+            holds.
 
         Examples
         --------

@@ -55,6 +55,7 @@ def test_the_readme_example_runs():
         ("task_space", 14),
         ("statistical_dynamics", 5),
         ("frames", 30),
+        ("inverse_kinematics", 25),
         ("subgraphs", 20),
     ],  # fmt: skip
 )

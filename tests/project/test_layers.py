@@ -234,6 +234,7 @@ RESTS_ON = {
     "interop": ["_core"],
     "models": ["operators", "dynamics", "interop"],
     "kalman": ["models"],
+    "kinematics": ["models"],
     "recursions": ["models", "formula_nodes"],
     "identities": ["models", "formula_nodes", "reference"],
     "peers": ["models"],
@@ -245,7 +246,7 @@ RESTS_ON = {
     "ensembles": ["scenes"],
     "compiled": ["recursions"],
     "view": ["accuracy"],
-    "face": ["accuracy", "compiled", "identities", "view"],
+    "face": ["accuracy", "compiled", "identities", "kinematics", "view"],
     "": ["face", "kalman", "closed_forms", "ensembles", "sympy_bridge"],  # pycraft itself
     "cli": [""],
 }

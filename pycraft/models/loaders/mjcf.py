@@ -9,10 +9,12 @@ several           custom    those of its joints, in their order
 none              weld      none
 
 Names. Bodies have the file's names ("body3", by MuJoCo's number, without one). A hinge has its joint's name, or its body's
-name where the joint has none or there are several (the first joint's where some joint is called like the body). A site with
-a name is a node, with "_site" added where a body has its name already.
+name where the joint has none or there are several (the first joint's where some joint is called like the body). Several that
+are called name[0], name[1], ... are the hinge "name". A site with a name is a node, with "_site" added where a body has its
+name already.
 
-Coordinates are MuJoCo's numbers: a joint's `ref` goes into the placement of its hinge, and the model's state is MuJoCo's qpos0.
+Coordinates are MuJoCo's numbers: a joint's `ref` goes into the placement of its hinge, and the model's state is MuJoCo's qpos0,
+or the keyframe called "state" where there is one. A limit that is the largest double is none.
 `pycraft.interop.mujoco` has the order and the velocities of free hinges. `armature` is the rotor inertia.
 
 Not in the model, as they are effects: gravity (zero until it is set), springs, damping and friction of joints, which
@@ -23,6 +25,7 @@ Equality constraints, tendons and flexes are left out with a warning that names 
 from __future__ import annotations
 
 import logging
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +39,9 @@ from .rotations import rotation_about, rotation_from_quaternion, turned_inertia
 from .xml_file import XmlFile
 
 log = logging.getLogger(__name__)
+
+STATE = "state"
+"""The keyframe that is the model's state."""
 
 _FREE, _BALL, _SLIDE, _HINGE = range(4)  # mjtJoint
 _KINDS = {_FREE: "free", _BALL: "ball", _SLIDE: "slider", _HINGE: "pin"}
@@ -97,11 +103,18 @@ class _Reader:
             self._add_sites(model)
         except _core.ModelError as error:
             raise _core.ModelError(f"{self.path}: {error}") from None
-        model.q = conventions.from_mujoco(model, m.qpos0, np.zeros(m.nv))[0]
+        model.q, model.v = self._state(model)
         self._left_out()
         model._left_aside = self._left_aside(model)
         model._actuators = read_actuators(self.m, model)
         return model, self.warnings + [f"{self.path}: {text}" for _, text in model.take_warnings()]
+
+    def _state(self, model: Multibody) -> tuple[np.ndarray, np.ndarray]:
+        """The keyframe "state", which `Multibody.save` writes; else qpos0, at rest."""
+        for k in range(self.m.nkey):
+            if self.m.key(k).name == STATE:
+                return conventions.from_mujoco(model, self.m.key_qpos[k], self.m.key_qvel[k])
+        return conventions.from_mujoco(model, self.m.qpos0, np.zeros(self.m.nv))
 
     def _add_sites(self, model: Multibody) -> None:
         m, frames = self.m, set(self.bodies)
@@ -122,8 +135,16 @@ class _Reader:
         joints = self._joints(b)
         if len(joints) == 1 and self.m.joint(joints[0]).name:
             return self.m.joint(joints[0]).name
+        if len(joints) > 1 and (common := self._common_name(joints)) and common not in taken:
+            return common
         body, first = self.bodies[b], self.m.joint(joints[0]).name if joints else ""
         return body if body not in taken else first or _unused(f"{body}_joint", taken)
+
+    def _common_name(self, joints: range) -> str:
+        """The name of joints that are called name[0], name[1], ..., as `Multibody.save` calls those of one hinge; else empty."""
+        names = [self.m.joint(j).name for j in joints]
+        common = names[0].removesuffix("[0]")
+        return common if names == [f"{common}[{i}]" for i in range(len(names))] else ""
 
     def _hinge(self, b: int) -> dict[str, Any]:
         """How the body moves, as `Multibody.add_body` takes it."""
@@ -154,7 +175,7 @@ class _Reader:
         limited = [bool(m.jnt_limited[j]) and kind != _BALL for j, kind in zip(joints, kinds, strict=True)]
         if any(limited):
             pairs = [m.jnt_range[j] if has else (-np.inf, np.inf) for j, has in zip(joints, limited, strict=True)]
-            options["limits"] = tuple(np.array(pairs).T)
+            options["limits"] = tuple(np.where(np.abs(pairs) < sys.float_info.max, pairs, np.sign(pairs) * np.inf).T)
         return options
 
     def _absorb_references(self, placement: np.ndarray, joints: range) -> tuple[np.ndarray, list[dict[str, Any]]]:

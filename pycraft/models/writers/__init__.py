@@ -1,4 +1,4 @@
-"""Models to files: TOML for every model, URDF for what URDF knows."""
+"""Models to files: TOML for every model, URDF and MJCF for what they know."""
 
 from .save import save
 

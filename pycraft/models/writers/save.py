@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ... import _core
 from ..warning import warn
-from . import toml_writer, urdf_writer
+from . import mjcf_writer, toml_writer, urdf_writer
 
 if TYPE_CHECKING:
     from ..multibody import Multibody
@@ -22,10 +22,11 @@ def save(model: Multibody, path: str | os.PathLike[str], state: bool = True) -> 
         text = toml_writer.model_text(model, state)
     elif ending == ".urdf":
         text = urdf_writer.model_text(model, shown)
+    elif ending in (".xml", ".mjcf"):
+        text = mjcf_writer.model_text(model, shown, state)
     else:
-        kinds = ".toml, which holds every model, and .urdf, for what URDF knows"
-        remedy = "; MJCF text is made by pycraft.interop.export.to_mjcf(model)" if ending in (".xml", ".mjcf") else ""
-        raise _core.ModelError(f"{shown}: a model's file ends in {kinds}{remedy}")
+        kinds = ".toml, which holds every model, .urdf, for what URDF knows, or .xml, for what MJCF knows"
+        raise _core.ModelError(f"{shown}: a model's file ends in {kinds}")
     if loose := model.frames._core.loose_names():
         warn(f"{shown}: a file does not hold loose frames: {', '.join(loose[:6])}{', ...' if len(loose) > 6 else ''}")
     if kept := [*model.locked, *model.coalesced]:

@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ... import _core
+from ...interop.export import numbers_text
 from ..loaders.left_aside import current
 from ..loaders.rotations import nearest_rpy
 from ..loaders.xml_file import abbreviated
@@ -96,9 +97,15 @@ def _lacking(hinge: dict[str, Any]) -> str:
     return f"{name} is of kind {kinds[0]!r}" if kinds and kinds[0] not in _TYPES else ""
 
 
+def not_xml(name: str) -> str:
+    """What of a name XML does not take; empty where it takes all."""
+    lacking = any(not (" " <= c or c in "\t\n\r") or c in "\ufffe\uffff" for c in name)
+    return "has a character that XML does not have" if lacking else ""
+
+
 def _unwritable(name: str) -> str:
-    if any(not (" " <= c or c in "\t\n\r") or c in "\ufffe\uffff" for c in name):
-        return "has a character that XML does not have"
+    if bad := not_xml(name):
+        return bad
     if name.strip() != name:
         return "begins or ends with a blank, which readers of URDF take off"
     return "reads as an expression of xacro" if "${" in name or "$(" in name else ""
@@ -198,10 +205,10 @@ class _Links:
         on = self.carried[parent] if parent >= 0 else self.root
         joint = _joint(hinge["name"], kind, on, self.carried[k], position, placement["rotation"])
         if kind not in ("fixed", "floating"):
-            etree.SubElement(joint, "axis", xyz=_numbers(subhinges[-1]["axis"]))
+            etree.SubElement(joint, "axis", xyz=numbers_text(subhinges[-1]["axis"]))
         _add_extras(joint, kind, lower, upper, self.extras.get(hinge["name"], {}))
         if not same(hinge["rotor_inertia"], np.zeros(len(hinge["rotor_inertia"]))):
-            etree.SubElement(joint, "pycraft", rotor_inertia=_numbers(hinge["rotor_inertia"]))
+            etree.SubElement(joint, "pycraft", rotor_inertia=numbers_text(hinge["rotor_inertia"]))
         return joint
 
 
@@ -232,10 +239,6 @@ def _unused(name: str, taken: set[str]) -> str:
 # Elements -------------------------------------------------------------------------------------------------------------
 
 
-def _numbers(values: Any) -> str:
-    return " ".join(repr(float(x)).removesuffix(".0") for x in np.ravel(values))
-
-
 def _link(name: str, body: dict[str, Any] | None = None, origin: np.ndarray = _ZERO) -> Element:
     """A link; `origin` is where its origin is in the body's frame."""
     from lxml import etree
@@ -243,10 +246,10 @@ def _link(name: str, body: dict[str, Any] | None = None, origin: np.ndarray = _Z
     link = etree.Element("link", name=name)
     if body is not None and (body["mass"] or body["inertia"].any()):
         inertial, moments = etree.SubElement(link, "inertial"), body["inertia"]
-        etree.SubElement(inertial, "origin", xyz=_numbers(body["com"] - origin if origin.any() else body["com"]))
-        etree.SubElement(inertial, "mass", value=_numbers(body["mass"]))
+        etree.SubElement(inertial, "origin", xyz=numbers_text(body["com"] - origin if origin.any() else body["com"]))
+        etree.SubElement(inertial, "mass", value=numbers_text(body["mass"]))
         names = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
-        etree.SubElement(inertial, "inertia", {name: _numbers(moments[at]) for name, at in names.items()})
+        etree.SubElement(inertial, "inertia", {name: numbers_text(moments[at]) for name, at in names.items()})
     return link
 
 
@@ -258,7 +261,9 @@ def _joint(name: str, kind: str, parent: str, child: str, position: np.ndarray, 
     etree.SubElement(joint, "child", link=child)
     turned = not np.array_equal(rotation, np.eye(3))
     if turned or position.any():
-        etree.SubElement(joint, "origin", {"xyz": _numbers(position)} | ({"rpy": _numbers(nearest_rpy(rotation))} if turned else {}))
+        etree.SubElement(
+            joint, "origin", {"xyz": numbers_text(position)} | ({"rpy": numbers_text(nearest_rpy(rotation))} if turned else {})
+        )
     return joint
 
 
@@ -269,6 +274,6 @@ def _add_extras(joint: Element, kind: str, lower: float, upper: float, extras: d
     if kind in ("revolute", "prismatic") or (kind == "continuous" and {"effort limit", "velocity limit"} & extras.keys()):
         sides = {"lower": max(lower, -_NO_LIMIT), "upper": min(upper, _NO_LIMIT)} if kind != "continuous" else {}
         bounds = {name: extras.get(f"{name} limit", 0.0) for name in ("effort", "velocity")}
-        etree.SubElement(joint, "limit", {name: _numbers(value) for name, value in (sides | bounds).items()})
-    if own := {name: _numbers(extras[name]) for name in ("damping", "friction") if name in extras}:
+        etree.SubElement(joint, "limit", {name: numbers_text(value) for name, value in (sides | bounds).items()})
+    if own := {name: numbers_text(extras[name]) for name in ("damping", "friction") if name in extras}:
         etree.SubElement(joint, "dynamics", own)

@@ -1,0 +1,6 @@
+"""Inverse kinematics: configurations at which frames are where targets want them (docs/inverse_kinematics.md)."""
+
+from .inverse_kinematics import solve_ik
+from .solution import Solution
+
+__all__ = ["Solution", "solve_ik"]

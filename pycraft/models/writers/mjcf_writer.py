@@ -1,0 +1,227 @@
+"""A model as MJCF, as far as MJCF has what the model has; `pycraft.load` reads it back to rounding, MuJoCo as it reads every file.
+
+hinge                                    joints of its body
+weld                                     none
+pin, slider, ball                        hinge, slide, ball, with the hinge's name
+free, on the base                        free
+universal, gimbal, cylindrical,
+planar, custom of pins and sliders       one a subhinge, called name[0], name[1], ..., read back as a custom hinge of that name
+
+Nodes are sites, rotor inertia is armature. The largest double stands for a side without a limit. Damping, friction, stiffness and where
+springs are slack, which a file before said, go back into joints, actuators into actuators; the state is a keyframe called "state". There is
+no geometry, and MuJoCo's compiler is told to leave masses and inertias alone; those that are not diagonal it turns into principal axes.
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ... import _core
+from ...interop.export import inertia_attribute, mjcf_elements, numbers_text
+from ...interop.mujoco import _quaternion, to_mujoco
+from ..loaders.left_aside import current, current_actuators
+from ..loaders.mjcf import STATE
+from ..loaders.xml_file import abbreviated
+from ..warning import warn
+from .toml_writer import same
+from .urdf_writer import not_xml
+
+if TYPE_CHECKING:
+    from ..multibody import Multibody
+
+LEAST = 1e-15
+"""MuJoCo's mjMINVAL: less mass or inertia than this it takes for none."""
+ROUNDING = 16 * np.finfo(float).eps
+"""Over the largest moment: what rounding makes of the triangle inequality of a flat body."""
+_JOINT_KEYS = {"damping": "damping", "friction": "frictionloss", "stiffness": "stiffness"}
+_NO_LIMIT = sys.float_info.max
+
+
+def model_text(model: Multibody, path: str, state: bool) -> str:
+    """The file's text. `path`: where it goes, for what is said about it.
+
+    Raises
+    ------
+    ModelError
+        Hinges, limits, inertias and names that MJCF does not have: names them, and says what to do.
+
+    Warns
+    -----
+    ModelWarning
+        What the model has beside that and MJCF does not hold.
+    """
+    from lxml import etree
+
+    described = model.description()
+    _refuse(model, described, path)
+    root, elements = mjcf_elements(model)
+    unsaid = _unsaid(described)
+    for body, element in zip(described["bodies"], elements, strict=True):
+        _add_limits(body["hinge"], element)
+        _add_flat_inertia(body, element)
+    for node in described["nodes"]:
+        site = etree.SubElement(elements[node["body"]] if node["body"] >= 0 else root.find("worldbody"), "site", name=node["name"])
+        site.set("pos", numbers_text(node["position"]))
+        if not np.array_equal(node["rotation"], np.eye(3)):
+            site.set("quat", numbers_text(_quaternion(node["rotation"])))
+    joints = [joint for element in elements for joint in element.findall("joint")]
+    unsaid += _add_left_aside(model, root, joints)
+    unsaid += _add_actuators(model, root, joints)
+    if state and not (same(model.q, model.zero_q()) and same(model.v, np.zeros(model.nv))):
+        qpos, qvel = to_mujoco(model, model.q, model.v)
+        etree.SubElement(etree.SubElement(root, "keyframe"), "key", name=STATE, qpos=numbers_text(qpos), qvel=numbers_text(qvel))
+    if unsaid:
+        warn(f"{path}: an MJCF file does not hold {', '.join(unsaid)}; a .toml file does")
+    etree.indent(root)
+    return f"<!-- Written by PyCraft. SI units and radians. -->\n{etree.tostring(root, encoding='unicode')}\n"
+
+
+# What MJCF does not have ----------------------------------------------------------------------------------------------
+
+
+def _refuse(model: Multibody, described: dict[str, Any], path: str) -> None:
+    bodies = described["bodies"]
+    if lacking := [text for body in bodies if (text := _lacking(body))]:
+        kinds = "MJCF has joints of type hinge, slide and ball, several on a body with a ball last, and free ones alone on the base"
+        raise _core.ModelError(f"{path}: {abbreviated(lacking, '; ', 4)}. {kinds}; save the model as .toml, which holds every hinge")
+    if light := [body["name"] for k, body in enumerate(bodies) if body["hinge"]["subhinges"] and not _heavy(bodies, k)]:
+        base = model.moving_base
+        remedy = "take the part with base='fixed', or " if base is not None and base.name in light else ""
+        text = f"bodies {abbreviated([repr(name) for name in light], ', ', 4)} move and have no mass, or no inertia about some axis"
+        given = f"{remedy}give them some (model.bodies[{light[0]!r}].inertia = ...), or save the model as .toml"
+        raise _core.ModelError(f"{path}: {text}, which MuJoCo refuses (less than {LEAST:g} kg and kg m²); {given}")
+    if unreal := [body["name"] for body in bodies if _excess(body["inertia"]) > ROUNDING]:
+        text = f"inertias of {abbreviated([repr(name) for name in unreal], ', ', 4)} violate the triangle inequality"
+        raise _core.ModelError(f"{path}: {text}, and MuJoCo refuses them; set inertias that a body can have, or save the model as .toml")
+    for name in [described["name"], *(x["name"] for part in ("bodies", "nodes") for x in described[part]), *model.hinges]:
+        if bad := not_xml(name):
+            raise _core.ModelError(f"{path}: the name {name!r} {bad}; rename it, or save the model as .toml, which holds every name")
+    if "world" in model.bodies:
+        raise _core.ModelError(f"{path}: a body is called 'world', which in MJCF is the base; rename it, or save the model as .toml")
+
+
+def _lacking(body: dict[str, Any]) -> str:
+    """What of a body's hinge MJCF has not; empty where it has all."""
+    hinge, kinds = body["hinge"], [s["kind"] for s in body["hinge"]["subhinges"]]
+    name, sizes = f"hinge {hinge['name']!r}", [_core.subhinge_kinds[kind].nv for kind in kinds]
+    if "screw" in kinds:
+        return f"{name} is a screw" if len(kinds) == 1 else f"{name} has a screw"
+    if "free" in kinds and (len(kinds) > 1 or body["parent"] >= 0):
+        return f"{name} is free and not alone on the base"
+    if "ball" in kinds and {"pin", "ball"} & set(kinds[kinds.index("ball") + 1 :]):
+        return f"{name} turns after its ball"
+    for first, size in zip(np.cumsum([0, *sizes]), sizes, strict=False):
+        if len(set(hinge["rotor_inertia"][first : first + size])) > 1:
+            return f"{name} has different rotor inertias in one {kinds[-1]}"
+    return ""
+
+
+def _heavy(bodies: list[dict[str, Any]], k: int) -> bool:
+    """Whether MuJoCo takes body k for one that may move: it, or what is welded to it, has mass and inertia about all axes."""
+    if bodies[k]["mass"] >= LEAST and np.linalg.eigvalsh(bodies[k]["inertia"])[0] >= LEAST:
+        return True
+    welded = (i for i, body in enumerate(bodies) if body["parent"] == k and not body["hinge"]["subhinges"])
+    return any(_heavy(bodies, i) for i in welded)
+
+
+def _excess(inertia: np.ndarray) -> float:
+    """What the largest principal moment is above the sum of the others, over itself: negative but for flat and unreal bodies."""
+    a, b, c = np.linalg.eigvalsh(inertia)
+    return (c - a - b) / c if c else -1.0
+
+
+def _add_flat_inertia(body: dict[str, Any], element: Any) -> None:
+    """Of a flat body rounding is added to the moments: MuJoCo takes none that violate the triangle inequality, be it by rounding."""
+    inertia = body["inertia"]
+    if abs(_excess(inertia)) <= ROUNDING:
+        element.find("inertial").set(*inertia_attribute(inertia + 2 * ROUNDING * np.trace(inertia) * np.eye(3)))
+
+
+def _unsaid(described: dict[str, Any]) -> list[str]:
+    said = []
+    for body in described["bodies"]:
+        hinge, placement = body["hinge"], body["hinge"]["placement"]
+        moved = placement["position"].any() or not np.array_equal(placement["rotation"], np.eye(3))
+        if hinge["kind"] == "free" and moved:
+            said.append(f"the placement of free hinge {hinge['name']!r} (its coordinates there are the body's pose in the world)")
+        if len(hinge["lower"]) and np.any(hinge["lower"] == hinge["upper"]):
+            said.append(f"limits of hinge {hinge['name']!r} that are equal")
+        if not hinge["subhinges"] and hinge["name"] != body["name"]:
+            said.append(f"the name of weld {hinge['name']!r} (there it has its body's)")
+    return said
+
+
+# What it has ----------------------------------------------------------------------------------------------------------
+
+
+def _add_limits(hinge: dict[str, Any], element: Any) -> None:
+    if not len(hinge["lower"]):
+        return
+    for joint, subhinge, *sides in zip(element.findall("joint"), hinge["subhinges"], hinge["lower"], hinge["upper"], strict=True):
+        if _core.subhinge_kinds[subhinge["kind"]].nq == 1 and np.isfinite(sides).any() and sides[0] < sides[1]:
+            joint.set("limited", "true")
+            joint.set("range", numbers_text(np.clip(sides, -_NO_LIMIT, _NO_LIMIT)))
+
+
+def _add_left_aside(model: Multibody, root: Any, joints: list[Any]) -> list[str]:
+    """What an earlier file said beside the model goes into joints; what does not is told."""
+    unsaid = []
+    for quantity, values in current(model).items():
+        if quantity == "gravity":
+            if model.gravity.any():
+                unsaid.append("the gravity left aside")
+            else:
+                root.find("option").set("gravity", numbers_text(values))
+        elif quantity == "spring rest":
+            for joint, q, _ in _places(joints):
+                if q.stop - q.start == 1 and values[q.start]:
+                    joint.set("springref", numbers_text(values[q]))
+                elif q.stop - q.start > 1 and not same(values[q], model.zero_q()[q]):
+                    unsaid.append(f"where the spring of joint {joint.get('name')!r} is slack")
+        elif quantity in _JOINT_KEYS:
+            for joint, _, v in _places(joints):
+                own = values[v]
+                if len(set(own[~np.isnan(own)])) > 1 or np.isnan(own).any() and not np.isnan(own).all():
+                    unsaid.append(f"{quantity} of joint {joint.get('name')!r}, which differs among its coordinates")
+                elif not np.isnan(own).any() and len(own):
+                    joint.set(_JOINT_KEYS[quantity], numbers_text(own[:1]))
+        else:
+            unsaid.append(f"the {quantity} left aside")
+    return unsaid
+
+
+def _places(joints: list[Any]) -> list[tuple[Any, slice, slice]]:
+    """Every joint with its places in q and v."""
+    places, q, v = [], 0, 0
+    for joint in joints:
+        nq, nv = {"ball": (4, 3), "free": (7, 6)}.get(joint.get("type"), (1, 1))
+        places.append((joint, slice(q, q + nq), slice(v, v + nv)))
+        q, v = q + nq, v + nv
+    return places
+
+
+def _add_actuators(model: Multibody, root: Any, joints: list[Any]) -> list[str]:
+    """Actuators on joints of one coordinate whose force is a straight line; the names of the others."""
+    from lxml import etree
+
+    of_coordinate = {model.coordinate_names[v.start]: joint.get("name") for joint, _, v in _places(joints) if v.stop - v.start == 1}
+    section, unsaid = etree.Element("actuator"), []
+    for actuator in current_actuators(model):
+        if actuator["why not"] is not None or actuator["coordinate"] not in of_coordinate:
+            unsaid.append(f"actuator {actuator['name']!r}")
+            continue
+        element = etree.SubElement(section, "general", name=actuator["name"], joint=of_coordinate[actuator["coordinate"]])
+        element.set("gear", numbers_text(actuator["gear"]))
+        element.set("gainprm", numbers_text(actuator["gain"]))
+        if np.any(actuator["bias"]):
+            element.set("biastype", "affine")
+            element.set("biasprm", numbers_text(actuator["bias"]))
+        if np.isfinite(actuator["force range"]).any():
+            element.set("forcelimited", "true")
+            element.set("forcerange", numbers_text(np.clip(actuator["force range"], -_NO_LIMIT, _NO_LIMIT)))
+    if len(section):
+        root.append(section)
+    return unsaid
