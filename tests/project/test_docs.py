@@ -51,6 +51,8 @@ def test_the_readme_example_runs():
         ("mixed_trees", 8),
         ("ensembles", 8),
         ("hybrid_dynamics", 12),
+        ("interbody_forces", 12),
+        ("statics", 18),
         ("linearization", 18),
         ("task_space", 10),
         ("statistical_dynamics", 5),
