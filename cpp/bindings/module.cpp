@@ -3,6 +3,7 @@
 #include "algebra/planning/explain.h"
 #include "bindings/bindings.h"
 #include "bindings/plain_products.h"
+#include "bindings/register_interbody_forces.h"
 #include "model/multibody.h"
 
 namespace pycraft {
@@ -55,6 +56,7 @@ PYBIND11_MODULE(_core, m) {
   pycraft::register_scenes(m);
   pycraft::register_runs(m);
   pycraft::register_linearization(m);
+  pycraft::register_interbody_forces(m);
   pycraft::register_theorems(m);
   pycraft::register_bench(m);
   pycraft::take_plain_products(m.attr("Operator"));  // last: what is defined on a type sets its slots anew

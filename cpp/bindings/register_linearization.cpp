@@ -1,4 +1,4 @@
-// A scene linearized at a state, for Python.
+// A scene linearized at a state, and at rest, for Python.
 #include <cmath>
 #include <vector>
 
@@ -6,6 +6,7 @@
 #include "model/checks.h"
 #include "simulation/scene_calls.h"
 #include "simulation/scene_linearized.h"
+#include "simulation/scene_statics.h"
 
 namespace pycraft {
 
@@ -18,12 +19,40 @@ py::array_t<double> matrix(const Eigen::MatrixXd& A) {
   return out;
 }
 
-py::dict linearized(SceneCalls& calls, const Array& q, const Array& v, double t, const std::vector<double>& states) {
-  const Multibody& model = calls.scene().model();
+void check(const SceneCalls& calls, const Array& q, double t) {
   if (calls.precision() != Precision::double_)
     throw EvaluationError("a scene is linearized in double precision, and this one computes in '" + std::string(precision_name(calls.precision())) + "': take precision='double'");
   if (!std::isfinite(t)) throw EvaluationError("t is " + short_number(t) + "; a time is a finite number of seconds");
-  model.check_q(q.data(), q.size());
+  calls.scene().model().check_q(q.data(), q.size());
+}
+
+// The effects' own states where they are given; null: as they are at first.
+const double* own_states(const std::vector<double>& states, int own) {
+  if (!states.empty() && static_cast<int>(states.size()) != own)
+    throw ModelError("the effects have " + std::to_string(own) + " states of their own, not " + std::to_string(states.size()));
+  return states.empty() ? nullptr : states.data();
+}
+
+py::dict at_rest(SceneCalls& calls, const Array& q, double t, const std::vector<double>& states) {
+  check(calls, q, t);
+  Statics found;
+  {
+    const ModelInUse use(calls.scene().model());
+    calls.with([&]<class S>(CompiledScene<S>& scene) {
+      if constexpr (std::is_same_v<S, double>) found = statics(scene, t, q.data(), own_states(states, scene.effects().own()));
+    });
+  }
+  py::dict out;
+  out["q"] = to_numpy(found.q), out["residual"] = to_numpy(found.residual), out["size"] = found.size;
+  const auto nv = static_cast<Eigen::Index>(found.residual.size());
+  out["along_q"] = matrix(found.at.along_u.topRows(nv)), out["mass"] = matrix(found.at.mass.topLeftCorner(nv, nv));
+  out["known"] = std::vector<bool>(found.at.known.begin(), found.at.known.end());
+  return out;
+}
+
+py::dict linearized(SceneCalls& calls, const Array& q, const Array& v, double t, const std::vector<double>& states) {
+  check(calls, q, t);
+  const Multibody& model = calls.scene().model();
   model.check_v(v.data(), v.size(), "v");
   Linearization at;
   std::vector<double> rates;
@@ -32,9 +61,7 @@ py::dict linearized(SceneCalls& calls, const Array& q, const Array& v, double t,
     calls.with([&]<class S>(CompiledScene<S>& scene) {
       if constexpr (std::is_same_v<S, double>) {
         SceneLinearized equations(scene, false);
-        if (!states.empty() && static_cast<int>(states.size()) != equations.own())
-          throw ModelError("the effects have " + std::to_string(equations.own()) + " states of their own, not " + std::to_string(states.size()));
-        const auto x = equations.initial(t, q.data(), v.data(), states.empty() ? nullptr : states.data());
+        const auto x = equations.initial(t, q.data(), v.data(), own_states(states, equations.own()));
         const double *at_q = x.data(), *at_v = at_q + model.nq(), *rest = at_v + model.nv();
         rates.resize(model.nv() + equations.own());
         equations.evaluate(t, at_q, at_v, rest, rates.data(), rates.data() + model.nv());
@@ -54,6 +81,8 @@ py::dict linearized(SceneCalls& calls, const Array& q, const Array& v, double t,
 void register_linearization(py::module_& m) {
   m.def("scene_linearized", &linearized, py::arg("calls"), py::arg("q"), py::arg("v"), py::arg("t"), py::arg("states"),
         "At a state, of A ż = g with z = (v, effects' own states): A, the derivatives of g along displacements and along z, ż, and which coordinates are prescribed.");
+  m.def("scene_at_rest", &at_rest, py::arg("calls"), py::arg("q"), py::arg("t"), py::arg("states"),
+        "At a configuration at rest: what is left of all forces, its derivative along displacements, ℳ + J, and which coordinates are prescribed.");
 }
 
 }  // namespace pycraft

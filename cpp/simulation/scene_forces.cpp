@@ -47,7 +47,7 @@ SceneForces<S>::SceneForces(const Scene& scene, std::shared_ptr<const CompiledMo
   };
   read_ = reach({}, moved);
   join(moved, counted);
-  works_ = reach({}, counted), whole_ = reach(wrenched_, moved);
+  works_ = reach({}, counted), whole_ = reach(wrenched_, moved), whole_.gathered = true;
   tau_.assign(nv, S(0)), alone_tau_.assign(nv, S(0)), rest_.assign(nv, S(0));
   if (!wrenched_.empty()) wrench_.assign(numbers_->bodies, Vector6<S>::zero()), alone_wrench_ = wrench_;
   if (!whole_.placed.empty()) kinematics_.make_room();

@@ -50,7 +50,7 @@ class SceneForces {
   void start(const S& t, const S* q, const S* v, const S* own);        // v null: at rest
   void set_step(const S& h) { at_.step = h; }
   const At<S>& at() const { return at_; }
-  void place(const Reach& reach) { kinematics_.place(reach.placed, at_.q); }
+  void place(const Reach& reach) { reach.poses_alone() ? kinematics_.place_alone(reach.placed, at_.q) : kinematics_.place(reach.placed, at_.q); }
   void move(const Reach& reach) { kinematics_.move(reach.moved, at_.v); }
   void act(Active<S>& effect) { effect.bound->forces(at_of(effect), sum_); }
   void act_and_look(Active<S>& effect);                 // at what comes from outside

@@ -15,6 +15,9 @@ namespace pycraft {
 // Bodies that are placed, in their order, and those of them whose twists are found.
 struct Reach {
   std::vector<int> placed, moved;
+  bool gathered = false;  // whether forces go from them to the base
+  // Whether where bodies are is all: neither twists nor forces go along their hinges.
+  bool poses_alone() const { return moved.empty() && !gathered; }
 };
 
 // All bodies on the ways from these to the base, in their order; -1 among them is the base itself.
@@ -42,6 +45,19 @@ class SceneKinematics {
       joint_[k] = hinge_kinematics(model_, k, q, rows_.data() + model_.v_offset[k]);
       const int p = model_.parent[k];
       pose_[k] = p < 0 ? joint_[k] : pose_[p] * joint_[k];
+    }
+  }
+  // The same bits of the poses, and nothing for `move` or `gather`.
+  void place_alone(const std::vector<int>& bodies, const S* q) {
+    for (int k : bodies) {
+      Pose<S> X = model_.placement[k];
+      const S* qk = q + model_.q_offset[k];
+      for (int i = model_.first_subhinge[k]; i < model_.first_subhinge[k + 1]; ++i) {
+        const CompiledSubhinge<S>& h = model_.subhinges[i];
+        with_subhinge(h.kind, [&](auto row) { X = X * row.step(h, qk), qk += row.nq; });
+      }
+      const int p = model_.parent[k];
+      pose_[k] = p < 0 ? X : pose_[p] * X;
     }
   }
   // Of bodies that are placed.

@@ -12,7 +12,9 @@ from .centroidal import CentroidalCalls
 from .direct_calls import cached
 from .hybrid import HybridCalls
 from .integrator_names import IntegratorName, integrator_named
+from .interbody import InterbodyCalls
 from .quadratic import QuadraticCalls
+from .statics import StaticsCalls
 from .statistical import StatisticalCalls
 from .task_space import TaskSpaceCalls
 
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
     from .trajectory import Trajectory
 
 
-class IntegrationCalls(CentroidalCalls, HybridCalls, QuadraticCalls, StatisticalCalls, TaskSpaceCalls):
+class IntegrationCalls(CentroidalCalls, HybridCalls, InterbodyCalls, QuadraticCalls, StaticsCalls, StatisticalCalls, TaskSpaceCalls):
     """q̇ of (q, v), and trajectories under constant generalized forces."""
 
     nq: int

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..dynamics.interbody import forces_of_scene
 
 
 @dataclass(frozen=True)
@@ -77,15 +78,19 @@ class Motion:
         t, q, v, states = self.t, self.q, self.v, self.states
         return (np.atleast_1d(t), q[None], v[None], states[None]) if self._alone else (t, q, v, states)
 
-    @cached_property
-    def _along(self) -> dict[str, np.ndarray]:
+    def _scene(self) -> Any:
+        """What computes."""
         if self._calls is None:
             raise _core.EvaluationError(
                 "this motion has no scene behind it: of a run that was pickled or read from a file, accelerations, forces and energies "
                 "are known at its own times alone"
             )
         self._unedited_model()
-        found = self._calls.along(*self._rows())
+        return self._calls
+
+    @cached_property
+    def _along(self) -> dict[str, np.ndarray]:
+        found = self._scene().along(*self._rows())
         if not self._alone:
             return found
         return {name: x[:, 0] if name == "forces" else x[0] for name, x in found.items()}
@@ -130,6 +135,28 @@ class Motion:
     def centre_of_mass(self) -> np.ndarray:
         """(K, 3) m, in the world."""
         return self._unedited_model().centre_of_mass(self.q)
+
+    def interbody_forces(self, hinges: Any = None, *, axes: Any = "body", about: Any = None, part: str = "whole") -> np.ndarray:
+        """The spatial forces (moment; force) that parents put on their children through the hinges, under all effects: N m and N.
+
+        Parameters
+        ----------
+        hinges : a name or `Hinge`, or a list of them; None: all, in the model's order
+        axes, about, part : as in `Multibody.interbody_forces`; frames that a function moves are where they are at the motion's times
+
+        Returns
+        -------
+        (K, N, 6); of one hinge (K, 6)
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> run = pc.mechanisms.pendulum().simulate(1.0)
+        >>> run.interbody_forces(next(iter(run.model.hinges)), axes="world").shape == (len(run.t), 6)
+        True
+        """
+        f = forces_of_scene(self._scene(), self.model, *self._rows(), hinges, axes, about, part)
+        return f[0] if self._alone else f
 
     def frame(self, name: str, *, axes: str = "body") -> FrameMotion:
         """A body or node over time: poses in the world and velocities, in its own axes or as `Multibody.jacobian` has them.

@@ -18,6 +18,7 @@ from .explain import plan_text
 from .filed import Filed
 from .measurements import Measurements
 from .run import Run
+from .scene_statics import Statics
 from .simulation import RunOptions, resume, simulate
 
 
@@ -63,7 +64,7 @@ class Effects(Mapping[str, Effect]):
         return "{" + ", ".join(self._entries) + "}"
 
 
-class Scene(Measurements, Filed, Closed):
+class Scene(Measurements, Statics, Filed, Closed):
     """A model and the effects that act on it. It starts empty: nothing acts that was not added, the model's own gravity neither.
 
     Parameters

@@ -53,6 +53,8 @@ def test_the_readme_example_runs():
         ("hybrid_dynamics", 12),
         ("linearization", 30),
         ("task_space", 14),
+        ("interbody_forces", 12),
+        ("statics", 18),
         ("statistical_dynamics", 5),
         ("frames", 30),
         ("inverse_kinematics", 25),

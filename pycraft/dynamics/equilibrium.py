@@ -1,0 +1,278 @@
+"""The search for configurations at which forces balance, of models and scenes, and what becomes of small displacements there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .. import _core
+from .linearization import brackets
+
+INDIFFERENT = 1e-9
+"""Eigenvalues of stiffness below this part of the largest are taken for zero."""
+TOLERANCE = 1e-9
+"""What may be left of forces, as a part of the largest of those that balance."""
+
+FAR = 1e4
+"""Radians and metres beyond which a model that goes down the slope of its forces is taken to go on without end."""
+
+
+class Mode(NamedTuple):
+    """One way in which a mechanism leaves an equilibrium, or swings about it.
+
+    eigenvalue : rad²/s², μ of K φ = μ (ℳ + J) φ: swings with √μ where it is positive, leaves with √-μ where it is negative; complex where
+        forces have no potential. Where ℳ + J is not positive definite it is that of K alone, N m and N.
+    shape : (nv,), φ, its largest entry 1; zero at held coordinates
+    coordinates : names of those that move by half as much as the largest or more
+    stability : "stable", "unstable" or "indifferent" (to second order)
+    """
+
+    eigenvalue: complex
+    shape: np.ndarray
+    coordinates: tuple[str, ...]
+    stability: str
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """A configuration at which all forces balance.
+
+    Attributes
+    ----------
+    q : (nq,)
+    residual : (nv,) N m and N, what is left at free coordinates: rounding
+    holding : (nv,) N m and N, what holds the coordinates that were to be held; zero at the others
+    stiffness : (nv, nv), K = -∂(forces)/∂q along quasi-velocities: what a displacement asks for
+    modes : of the free coordinates, by rising eigenvalue
+    stability : "unstable" where one mode is, "indifferent" where none is unstable and one is indifferent, else "stable"
+    """
+
+    q: np.ndarray
+    residual: np.ndarray
+    holding: np.ndarray
+    stiffness: np.ndarray
+    modes: tuple[Mode, ...] = field(repr=False)
+
+    @property
+    def stability(self) -> str:
+        found = {mode.stability for mode in self.modes}
+        return next((kind for kind in ("unstable", "indifferent") if kind in found), "stable")
+
+
+class Balance(NamedTuple):
+    """Forces at rest: `left` (nv,), what is not balanced; `along_q` (nv, nv), its derivative; `mass`, ℳ + J; `size` of what balances."""
+
+    left: np.ndarray
+    along_q: np.ndarray
+    mass: np.ndarray
+    size: float
+
+
+def solved(
+    model: Any, at: Callable[[np.ndarray], Balance], q0: np.ndarray, held: Iterable[int], limits: bool, stable: bool, tolerance: float
+) -> Equilibrium:  # fmt: skip
+    """The equilibrium that is found from q0, of forces at rest as `at` has them. EvaluationError where there is none."""
+    free = np.setdiff1d(np.arange(model.nv), list(held))
+    search = _Search(model, at, np.array(q0, float), free, limits)
+    if not stable:
+        return search.found(tolerance)
+    for _ in range(2 + len(free)):
+        search.go_down()
+        found = search.found(tolerance)
+        if found.stability != "unstable":
+            return found
+        search.push(found.modes[0].shape)  # away from where it would leave by itself
+    left = [mode.coordinates for mode in found.modes if mode.stability == "unstable"]
+    raise _core.EvaluationError(
+        f"{model.name!r}: no stable equilibrium was found; the last leaves by {' and by '.join(', '.join(names) for names in left)}: start "
+        "elsewhere (q0=), hold these coordinates (hold=), or take what there is (stable=False)"
+    )
+
+
+class _Search:
+    """On displacements x of free coordinates from q0: with q = q0 exp(x), δq = J(x) δx, J = (1 - e^-ad)/ad."""
+
+    def __init__(self, model: Any, at: Callable[[np.ndarray], Balance], q0: np.ndarray, free: np.ndarray, limits: bool):
+        self.model, self.q, self.free, self._at = model, q0, free, at
+        self._last: tuple[np.ndarray, Balance] | None = None
+        self.curved = bool(brackets(model, np.ones(model.nv)).any())
+        self.limits = limits
+
+    def at(self, q: np.ndarray) -> Balance:
+        """What balances there: kept for the question after."""
+        if self._last is None or not np.array_equal(self._last[0], q):
+            self._last = (q, self._at(q))
+        return self._last[1]
+
+    def moved(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """All of x, and q there."""
+        whole = np.zeros(self.model.nv)
+        whole[self.free] = x
+        return whole, self.model.integrate(self.q, whole)
+
+    def left(self, x: np.ndarray) -> np.ndarray:
+        """What is not balanced, at free coordinates."""
+        return self.at(self.moved(x)[1]).left[self.free]
+
+    def slope(self, x: np.ndarray) -> np.ndarray:
+        """Its derivative by x."""
+        whole, q = self.moved(x)
+        along = self.at(q).along_q[self.free]
+        return along[:, self.free] if not self.curved else along @ self._turns(whole)[:, self.free]
+
+    def _turns(self, whole: np.ndarray) -> np.ndarray:
+        """J(x), from the exponential of [[-ad, 1], [0, 0]]."""
+        from scipy.linalg import expm
+
+        n = len(whole)
+        block = np.zeros((2 * n, 2 * n))
+        block[:n, :n], block[:n, n:] = -brackets(self.model, whole), np.eye(n)
+        return np.asarray(expm(block)[:n, n:])
+
+    def found(self, tolerance: float) -> Equilibrium:
+        """By SciPy's solvers, then by steps of Newton to rounding."""
+        from scipy.optimize import least_squares, root
+
+        if len(self.free):
+            start, (lower, upper) = np.zeros(len(self.free)), self.bounds()
+            if not np.isfinite(np.r_[lower, upper]).any():
+                self.take(root(self.left, start, jac=self.slope, method="hybr", options={"xtol": 1e-13, "factor": 0.5}).x)
+            if not self.balanced(tolerance):
+                start, (lower, upper) = np.zeros(len(self.free)), self.bounds()
+                tight = {"ftol": 1e-15, "xtol": 1e-15, "gtol": 1e-15}
+                self.take(least_squares(self.left, np.clip(start, lower, upper), jac=self.slope, bounds=(lower, upper), **tight).x)
+            self.sharpen()
+        now = self.at(self.q)
+        if not self.balanced(tolerance):
+            self.refuse(now)
+        residual, holding = np.zeros(self.model.nv), -now.left
+        residual[self.free], holding[self.free] = now.left[self.free], 0.0
+        return Equilibrium(self.q, residual, holding + 0.0, -now.along_q + 0.0, modes(self.model, now, self.free))
+
+    def take(self, x: np.ndarray) -> None:
+        """Go on from there: only where less is left."""
+        whole, q = self.moved(x)
+        if np.isfinite(whole).all() and self.size_of(q) <= self.size_of(self.q):
+            self.q = q
+
+    def size_of(self, q: np.ndarray) -> float:
+        return float(np.linalg.norm(self.at(q).left[self.free]))
+
+    def sharpen(self) -> None:
+        """Newton's steps as long as less is left: at x = 0 J is the unit."""
+        lower, upper = self.bounds()
+        for _ in range(5):
+            now, before = self.at(self.q), self.q
+            step = -np.linalg.lstsq(now.along_q[np.ix_(self.free, self.free)], now.left[self.free], rcond=INDIFFERENT)[0]
+            if not (np.isfinite(step).all() and (step >= lower).all() and (step <= upper).all()):
+                return
+            self.take(step)
+            if self.size_of(self.q) >= self.size_of(before):
+                return
+
+    def balanced(self, tolerance: float) -> bool:
+        now = self.at(self.q)
+        return bool(np.abs(now.left[self.free]).max(initial=0.0) <= tolerance * now.size)
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Of x: what is left to the limits of hinges, infinite where there are none or they are not asked for."""
+        lower, upper = np.full(self.model.nv, -np.inf), np.full(self.model.nv, np.inf)
+        for hinge in self.model.hinges.values() if self.limits else ():
+            if hinge.limits is None:
+                continue
+            q, v = hinge.q_slice.start, hinge.v_slice.start
+            for subhinge, low, high in zip(hinge.subhinges, *hinge.limits, strict=True):
+                kind = _core.subhinge_kinds[subhinge["kind"]]
+                if kind.nq == 1:
+                    lower[v], upper[v] = min(low - self.q[q], 0.0), max(high - self.q[q], 0.0)
+                q, v = q + kind.nq, v + kind.nv
+        return lower[self.free], upper[self.free]
+
+    def go_down(self) -> None:
+        """Along ẋ = W J* (what is not balanced), W one over the diagonal of ℳ + J: downhill where forces have a potential."""
+        from scipy.integrate import solve_ivp
+
+        if not len(self.free):
+            return
+        first = self.at(self.q)
+        weight = np.diag(first.mass)[self.free]
+        weight = 1 / np.where(weight > 0, weight, 1.0)
+
+        def turned(x: np.ndarray) -> np.ndarray:
+            return self._turns(self.moved(x)[0])[np.ix_(self.free, self.free)] if self.curved else np.eye(len(x))
+
+        def rate(_: float, x: np.ndarray) -> np.ndarray:
+            return weight * (turned(x).T @ self.left(x))
+
+        def jacobian(_: float, x: np.ndarray) -> np.ndarray:
+            return weight[:, None] * (turned(x).T @ self.slope(x))
+
+        def settled(_: float, x: np.ndarray) -> float:
+            now = self.at(self.moved(x)[1])
+            return float(np.abs(now.left[self.free]).max()) - 1e-6 * now.size
+
+        def gone(_: float, x: np.ndarray) -> float:
+            return float(FAR - np.abs(x).max())
+
+        settled.terminal = gone.terminal = True  # type: ignore[attr-defined]  # as SciPy's events say it
+        if settled(0.0, np.zeros(len(self.free))) <= 0:
+            return
+        slowest = 1e6 / max(np.abs(weight[:, None] * first.along_q[np.ix_(self.free, self.free)]).max(), 1e-300)
+        still = np.zeros(len(self.free))
+        way = solve_ivp(rate, (0.0, slowest), still, method="BDF", jac=jacobian, events=(settled, gone), rtol=1e-3, atol=1e-6)
+        end = way.y[:, -1]
+        if len(way.t_events[1]):
+            name = self.model.coordinate_names[self.free[np.argmax(np.abs(end))]]
+            raise _core.EvaluationError(
+                f"{self.model.name!r}: no stable equilibrium was found: down the slope of its forces {name!r} goes on without end; hold it "
+                "(hold=), or balance it by tau, wrenches or effects"
+            )
+        self.q = self.moved(np.clip(end, *self.bounds()))[1]
+
+    def push(self, shape: np.ndarray) -> None:
+        """A tenth of a radian or metre along a mode."""
+        self.q = self.moved(0.1 * np.real(shape)[self.free])[1]
+
+    def refuse(self, now: Balance) -> None:
+        names, left = self.model.coordinate_names, now.left
+        worst = sorted((j for j in self.free if abs(left[j]) > TOLERANCE * now.size), key=lambda j: -abs(left[j]))
+        told = ", ".join(f"{names[j]!r} {left[j]:.3g}" for j in worst[:5]) + (", ..." if len(worst) > 5 else "")
+        lower, upper = self.bounds()
+        at_limit = [repr(names[j]) for j, low, high in zip(self.free, lower, upper, strict=True) if min(-low, high) < 1e-9]
+        stops = f"; {', '.join(at_limit)} is at its limit" if at_limit else ""
+        raise _core.EvaluationError(
+            f"{self.model.name!r}: no equilibrium was found. Where the search ended there is left (N m and N) at {told}{stops}: balance it "
+            "by tau, wrenches or effects, hold these coordinates (hold=), or start elsewhere (q0=)"
+        )
+
+
+def modes(model: Any, at: Balance, free: np.ndarray) -> tuple[Mode, ...]:
+    """How the free coordinates leave an equilibrium, or swing about it, by rising eigenvalue."""
+    from scipy.linalg import eig, eigh
+
+    if not len(free):
+        return ()
+    chosen = np.ix_(free, free)
+    stiffness, mass = -at.along_q[chosen], at.mass[chosen]
+    try:
+        np.linalg.cholesky(mass)
+    except np.linalg.LinAlgError:
+        mass = np.eye(len(free))  # the signs of eigenvalues are the same
+    size = max(np.abs(stiffness).max(), INDIFFERENT * at.size)
+    if np.abs(stiffness - stiffness.T).max() <= INDIFFERENT * size:
+        values, shapes = eigh((stiffness + stiffness.T) / 2, mass)
+    else:
+        values, shapes = eig(stiffness, mass)
+    zero = INDIFFERENT * max(np.abs(values).max(), np.abs(at.size / np.diag(mass).max()) * INDIFFERENT)
+    found = []
+    for i in np.argsort(np.real(values), kind="stable"):
+        value = values[i]
+        kind = "indifferent" if abs(value) <= zero else "unstable" if np.real(value) < 0 or abs(np.imag(value)) > zero else "stable"
+        shape = np.zeros(model.nv, shapes.dtype)
+        shape[free] = shapes[:, i] / shapes[np.argmax(np.abs(shapes[:, i])), i]
+        moving = tuple(model.coordinate_names[j] for j in np.flatnonzero(np.abs(shape) >= 0.5))
+        found.append(Mode(complex(value) if np.iscomplexobj(values) else float(value), shape, moving, kind))
+    return tuple(found)

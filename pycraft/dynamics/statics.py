@@ -1,0 +1,158 @@
+"""Statics: equilibria of a model, and the forces that hold it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .. import _core
+from ..arguments import one_number
+from ..state import at_state
+from .equilibrium import TOLERANCE, Balance, Equilibrium, solved
+from .interbody import pushed
+from .linearization import listed
+
+
+class Counterbalance(NamedTuple):
+    """Forces that hold a model at rest.
+
+    tau : (nv,) or (B, nv) N m and N, zero where nothing is actuated
+    residual : likewise, what is left at the others: the least that any forces of these actuators leave
+    unbalanced : names of coordinates at which something is left, beyond rounding, at any of the states
+    """
+
+    tau: np.ndarray
+    residual: np.ndarray
+    unbalanced: tuple[str, ...]
+
+
+class StaticsCalls:
+    """Equilibria of a model and forces that hold it."""
+
+    nv: int
+
+    def equilibrium(
+        self, tau: Any = None, q0: Any = None, *, wrenches: Mapping[Any, Any] | None = None, wrench_axes: str = "world", hold: Any = (),
+        limits: bool = False, stable: bool = False, tolerance: float = TOLERANCE,
+    ) -> Any:  # fmt: skip
+        """A configuration at which the model stays at rest: τ = T(q, 0, 0), gravity and wrenches included.
+
+        From q0 by SciPy's `root` and `least_squares` with the exact derivative of T, on displacements that the group takes (ball and free
+        hinges too). Of several equilibria the one that the solver comes to, near q0 where that is near one; with stable=True the model
+        first goes down its forces' slope, and the equilibrium is one that it comes back to.
+
+        Parameters
+        ----------
+        tau : (nv,) N m and N, constant generalized forces; zero where left out
+        q0 : (nq,) or a State, where the search starts, or (B, nq); the model's present state where left out
+        wrenches, wrench_axes : as in `interbody_forces`; in the world's axes they keep their direction as the model moves
+        hold : names of hinges, coordinates or patterns, or a list of them, that stay where q0 has them
+        limits : whether q is to be within the hinges' limits
+        stable : whether only a stable or indifferent equilibrium will do
+        tolerance : what may be left, as a part of the largest force
+
+        Returns
+        -------
+        Equilibrium, or a list of them for a batch: with its stability and modes
+
+        Raises
+        ------
+        EvaluationError
+            None was found, with what is left by coordinate; none that is stable.
+        ModelError
+            Names that are not there; numbers that are not finite.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> arm = pc.chain(1)
+        >>> arm.gravity = (0, -10, 0)
+        >>> found = arm.equilibrium(tau=[2.5], q0=[-1.0])  # half the torque that holds it level
+        >>> found.q.round(6).tolist(), found.stability  # π/3 below
+        ([-1.047198], 'stable')
+        """
+        model: Any = self
+        q0, _ = at_state(model, q0)
+        tau = np.zeros(self.nv) if tau is None else tau
+        given = np.asarray(_core.real_array(tau, "tau"), float)
+        names, in_world, numbers = pushed(wrenches, wrench_axes)
+        held = _core.coordinates_named(model, listed(hold, "hold"), "hold")
+        starts = np.asarray(_core.real_array(q0, "q"), float)
+        if given.ndim not in (1, 2) or given.shape[-1] != self.nv:
+            raise _core.ModelError(
+                f"tau of {model.name!r} takes {self.nv} numbers, or (B, {self.nv}) for a batch, not an array {given.shape}"
+            )
+        if not np.isfinite(given).all():
+            named = model.coordinate_names[np.argwhere(~np.isfinite(given))[0][-1]]
+            raise _core.ModelError(f"tau of {model.name!r} is not finite at {named!r}")
+        states = [x.shape[0] for x, axes in ((starts, 2), (given, 2), (numbers, 3)) if x.ndim == axes]
+        if len(set(states)) > 1:
+            raise _core.ModelError(f"batches of {' and '.join(map(str, sorted(set(states))))} states in one call")
+
+        def one(q: np.ndarray, force: np.ndarray, pushes: np.ndarray) -> Equilibrium:
+            weight = model.mass * float(np.linalg.norm(model.gravity))
+            size = max(weight, np.abs(force).max(initial=0.0), np.abs(pushes).max(initial=0.0))
+
+            def at(q: np.ndarray) -> Balance:
+                return _at_rest(model, q, force, names, in_world, pushes, size)
+
+            return solved(model, at, q, held, bool(limits), bool(stable), one_number(tolerance, "tolerance"))
+
+        if not states:
+            return one(starts, given, numbers)
+        rows = [np.broadcast_to(x, (states[0], *x.shape[-axes:])) for x, axes in ((starts, 1), (given, 1), (numbers, 2))]
+        return [one(*each) for each in zip(*rows, strict=True)]
+
+    def counterbalance(
+        self, q=None, *, wrenches: Mapping[Any, Any] | None = None, wrench_axes: str = "world", actuated: Any = None,
+        tolerance: float = TOLERANCE,
+    ) -> Counterbalance:  # fmt: skip
+        """The generalized forces that hold the model at rest against gravity and wrenches, T(q, 0, 0): O(N).
+
+        Parameters
+        ----------
+        q : (nq,) or (B, nq), or a State; the model's present one where left out
+        wrenches, wrench_axes : as in `interbody_forces`
+        actuated : names of hinges, coordinates or patterns, or a list of them, that can be driven; None: all
+            A force at one coordinate balances no other, so that what the others need is left.
+        tolerance : what may be left, as a part of the largest force
+
+        Raises ModelError for names that are not there, and as `interbody_forces`.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> arm = pc.chain(2)
+        >>> arm.gravity = (0, -10, 0)
+        >>> arm.counterbalance([0, 0]).tau.tolist()
+        [20.0, 5.0]
+        >>> arm.counterbalance([0, 0], actuated="hinge0").unbalanced
+        ('hinge1',)
+        """
+        model: Any = self
+        q, _ = at_state(model, q)
+        still, (names, in_world, numbers) = np.zeros(self.nv), pushed(wrenches, wrench_axes)
+        f, _, needed, _ = model._interbody().after(q, still, still, names, in_world, numbers, False, "double")
+        driven = np.zeros(self.nv, bool)
+        chosen = None if actuated is None else listed(actuated, "actuated")
+        driven[_core.coordinates_named(model, chosen, "actuated") if chosen is not None else slice(None)] = True
+        left = np.where(driven, 0.0, needed)
+        size = np.abs(f).max(initial=0.0, axis=(-2, -1))[..., None]
+        beyond = np.abs(left) > tolerance * size
+        beyond = beyond.any(axis=tuple(range(beyond.ndim - 1)))
+        return Counterbalance(np.where(driven, needed, 0.0), left, tuple(model.coordinate_names[j] for j in np.flatnonzero(beyond)))
+
+
+def _at_rest(
+    model: Any, q: np.ndarray, tau: np.ndarray, names: list[str], in_world: bool, wrenches: np.ndarray, size: float
+) -> Balance:  # fmt: skip
+    still = np.zeros(model.nv)
+    if names:
+        needed = model._interbody().after(q, still, still, names, in_world, wrenches, False, "double")[2]
+        along_q, mass = model._interbody().derivatives(q, still, still, names, in_world, wrenches, True)[1][0], model.mass_matrix(q)
+    else:
+        needed, (along_q, _, mass) = model.inverse_dynamics(q, still, still), model.inverse_dynamics_derivatives(q, still, still)
+    size = max(size, np.abs(needed).max(initial=0.0), np.abs(along_q).max(initial=0.0))
+    return Balance(tau - needed, -along_q, mass, size)

@@ -1,0 +1,105 @@
+"""Scenes at rest, and the forces that hinges carry under their effects."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from ..arguments import one_number
+from ..dynamics.equilibrium import TOLERANCE, Balance, Equilibrium, solved
+from ..dynamics.interbody import forces_of_scene
+from ..dynamics.linearization import listed
+from ..state import at_state
+
+
+class Statics:
+    """What hinges carry, and where everything balances."""
+
+    model: Any
+    _calls: Any
+
+    def interbody_forces(
+        self, hinges: Any = None, q=None, v=None, t: float = 0.0, *, states: Any = None, axes: Any = "body", about: Any = None,
+        part: str = "whole",
+    ) -> np.ndarray:  # fmt: skip
+        """The spatial forces (moment; force) that parents put on their children at a state, under all effects: N m and N.
+
+        Parameters
+        ----------
+        hinges : a name or `Hinge`, or a list of them; None: all, in the model's order
+        q, v : (nq,), (nv,), by the rule of direct calls
+        t, states : as in `evaluate`
+        axes, about, part : as in `Multibody.interbody_forces`; frames that a function moves are where they are at t
+
+        Returns
+        -------
+        (N, 6); of one hinge (6,). Along a run: `Run.interbody_forces`.
+
+        Raises what `evaluate` and `Multibody.interbody_forces` raise.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> scene = pc.Scene(pc.chain(1)).add(pc.effects.Gravity(g=(0, -10, 0)))
+        >>> scene.interbody_forces("hinge0", [0.0]).tolist()  # falling from level, the pin carries a quarter of the weight
+        [0.0, 0.0, 0.0, 0.0, 2.5, 0.0]
+        """
+        q, v = (np.asarray(_core.real_array(x, name), float) for x, name in zip(at_state(self.model, q, v), "qv", strict=True))
+        for x, name, width in ((q, "q", self.model.nq), (v, "v", self.model.nv)):
+            if x.shape != (width,):
+                raise _core.ModelError(f"{name} of {self.model.name!r} takes {width} numbers here, not an array {x.shape}")
+        time, own = np.array([one_number(t, "t")]), np.zeros(0) if states is None else np.atleast_1d(_core.real_array(states, "states"))
+        return forces_of_scene(self._calls(), self.model, time, q[None], v[None], own, hinges, axes, about, part)[0]
+
+    def equilibrium(
+        self, q0: Any = None, t: float = 0.0, *, states: Any = None, hold: Any = (), limits: bool = False, stable: bool = False,
+        tolerance: float = TOLERANCE,
+    ) -> Any:  # fmt: skip
+        """A configuration at which all effects balance and nothing moves: found, judged and refused as `Multibody.equilibrium`.
+
+        The model's own gravity counts for nothing; effects that act in motion alone give no force. Effects' own states are held, and
+        prescribed coordinates are where their motion has them at t.
+
+        Parameters
+        ----------
+        q0 : (nq,) or a State, or (B, nq); the model's present state where left out
+        t : s
+        states : of the effects' own; as they are at first where left out
+        hold, limits, stable, tolerance : as in `Multibody.equilibrium`
+
+        Raises
+        ------
+        EvaluationError
+            As `Multibody.equilibrium`; a scene in another precision than double.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> scene = pc.Scene(pc.chain(1)).add(pc.effects.Gravity(g=(0, -10, 0)), pc.effects.Spring(100.0))
+        >>> found = scene.equilibrium([0.0])
+        >>> bool(abs(100 * found.q[0] + 5 * np.cos(found.q[0])) < 1e-12), found.stability
+        (True, 'stable')
+        """
+        calls, time = self._calls(), one_number(t, "t")
+        own = [] if states is None else np.atleast_1d(_core.real_array(states, "states")).ravel().tolist()
+        held = _core.coordinates_named(self.model, listed(hold, "hold"), "hold")
+        starts = np.asarray(_core.real_array(at_state(self.model, q0)[0], "q"), float)
+        margin = one_number(tolerance, "tolerance")
+
+        def at(q: np.ndarray) -> Balance:
+            found = _core.scene_at_rest(calls, q, time, own)
+            size = max(found["size"], np.abs(found["along_q"]).max(initial=0.0))
+            return Balance(found["residual"], found["along_q"], found["mass"], size)
+
+        def one(q: np.ndarray) -> Equilibrium:
+            placed = _core.scene_at_rest(calls, q, time, own)  # with prescribed coordinates where they are at t
+            fixed = {*held, *np.flatnonzero(placed["known"])}
+            return solved(self.model, at, placed["q"], fixed, bool(limits), bool(stable), margin)
+
+        if starts.ndim > 2:
+            raise _core.ModelError(
+                f"q of {self.model.name!r} takes {self.model.nq} numbers, or (B, {self.model.nq}), not an array {starts.shape}"
+            )
+        return [one(q) for q in starts] if starts.ndim == 2 else one(starts)
