@@ -11,6 +11,7 @@ from ..state import at_state
 from .centroidal import CentroidalCalls
 from .direct_calls import cached
 from .hybrid import HybridCalls
+from .identification import IdentificationCalls
 from .integrator_names import IntegratorName, integrator_named
 from .linearization import LinearizationCalls
 from .statistical import StatisticalCalls
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from .trajectory import Trajectory
 
 
-class IntegrationCalls(CentroidalCalls, HybridCalls, LinearizationCalls, StatisticalCalls, TaskSpaceCalls):
+class IntegrationCalls(CentroidalCalls, HybridCalls, IdentificationCalls, LinearizationCalls, StatisticalCalls, TaskSpaceCalls):
     """q̇ of (q, v), and trajectories under constant generalized forces."""
 
     nq: int

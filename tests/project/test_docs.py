@@ -54,6 +54,7 @@ def test_the_readme_example_runs():
         ("linearization", 18),
         ("task_space", 10),
         ("statistical_dynamics", 5),
+        ("identification", 20),
         ("frames", 30),
         ("subgraphs", 20),
     ],  # fmt: skip
