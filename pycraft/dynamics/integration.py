@@ -11,6 +11,7 @@ from ..state import at_state
 from .centroidal import CentroidalCalls
 from .direct_calls import cached
 from .hybrid import HybridCalls
+from .identification import IdentificationCalls
 from .integrator_names import IntegratorName, integrator_named
 from .interbody import InterbodyCalls
 from .quadratic import QuadraticCalls
@@ -22,7 +23,9 @@ if TYPE_CHECKING:
     from .trajectory import Trajectory
 
 
-class IntegrationCalls(CentroidalCalls, HybridCalls, InterbodyCalls, QuadraticCalls, StaticsCalls, StatisticalCalls, TaskSpaceCalls):
+class IntegrationCalls(
+    CentroidalCalls, HybridCalls, IdentificationCalls, InterbodyCalls, QuadraticCalls, StaticsCalls, StatisticalCalls, TaskSpaceCalls
+):
     """q̇ of (q, v), and trajectories under constant generalized forces."""
 
     nq: int

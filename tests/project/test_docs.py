@@ -56,6 +56,7 @@ def test_the_readme_example_runs():
         ("interbody_forces", 12),
         ("statics", 18),
         ("statistical_dynamics", 5),
+        ("identification", 20),
         ("frames", 30),
         ("inverse_kinematics", 25),
         ("subgraphs", 20),
