@@ -14,23 +14,13 @@ from ..closed import Closed
 from ..dynamics.integration import IntegrationCalls
 from ..state import State, at_state, random_state
 from .handles import Body, Hinge, Named, Node, Vector
+from .hinge_axes import hinge_axes
 from .parts import Parts
 from .pictures import Pictures
-from .with_frames import WithFrames
-
-_Z = (0.0, 0.0, 1.0)
-_DEFAULT_AXES: dict[str, tuple[tuple[float, float, float], ...]] = {
-    "pin": (_Z,),
-    "slider": (_Z,),
-    "screw": (_Z,),
-    "universal": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
-    "gimbal": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
-    "cylindrical": (_Z,),
-    "planar": (_Z,),
-}
+from .with_loops import WithLoops
 
 
-class Multibody(Closed, IntegrationCalls, Pictures, Parts, WithFrames):
+class Multibody(Closed, IntegrationCalls, Pictures, Parts, WithLoops):
     """A tree of bodies on hinges, with nodes, a state (`q`, `v`) and gravity (zero until it is set).
 
     Build one body by body, or load it (`pycraft.load`). Bodies are kept depth first, children in the order they were added, and
@@ -120,21 +110,13 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, WithFrames):
         """
         name, hinge = text(name, "a body"), text(hinge, "the kind of a hinge")
         self._check_not_a_frame(name, "body")
-        if axis is not None and axes is not None:
-            raise _core.ModelError(f"body {name!r}: give axis or axes, not both")
-        if subhinges is not None and hinge != "custom":
-            raise _core.ModelError(f"body {name!r}: subhinges belong to a hinge of kind 'custom', not {hinge!r}")
-        if hinge == "custom" and (subhinges is None or not (axis is axes is point is None)):
-            raise _core.ModelError(
-                f"body {name!r}: a custom hinge takes subhinges=[...], each with its kind, axis and point, and nothing beside"
-            )
+        directions = hinge_axes(f"body {name!r}", hinge, axis, axes, point, subhinges)
         rotation, position = pose_parts(f"body {name!r}", rotation, position, placement)
-        directions = [axis] if axis is not None else axes if axes is not None else _DEFAULT_AXES.get(hinge, ())
         lower, upper = limit_pair(f"body {name!r}", limits)
         self._add_body(
             text(name, "a body"), _frame_name(parent), text(hinge, "the kind of a hinge"),
             "" if hinge_name is None else text(hinge_name, "a hinge"),
-            listed(directions, f"axes of body {name!r}"), point, pitch,
+            directions, point, pitch,
             None if subhinges is None else listed(subhinges, f"subhinges of body {name!r}"),
             rotation, position, mass, com, inertia, rotor_inertia, lower, upper,
         )  # fmt: skip
@@ -270,7 +252,7 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, WithFrames):
 
     # ------------------------------------------------------------------ copies
     def description(self) -> dict[str, Any]:
-        """The whole model as plain data: bodies, hinges, nodes, gravity, state (see `pycraft.reference` for the schema), loose frames."""
+        """The whole model as plain data: bodies, hinges, nodes, gravity, state (see `pycraft.reference`), loose frames, loops."""
         return describe(self)
 
     @classmethod
@@ -306,6 +288,8 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, WithFrames):
             model._add_node(node["name"], frame(node["body"]), node["rotation"], node["position"])
         for loose in data.get("frames", []):
             model.frames._add_again(loose)
+        for loop in data.get("loops", []):
+            model.loops._add_again(loop)
         model.gravity = data.get("gravity", (0, 0, 0))
         if "q" in data:
             model.q, model.v = data["q"], data["v"]
@@ -367,6 +351,8 @@ def describe(model: _core.Multibody) -> dict[str, Any]:
     """The core's model as plain data."""
     frames = getattr(model, "_kept_frames", None)
     loose = frames._description() if frames is not None else []
+    loops = getattr(model, "_kept_loops", None)
+    declared = loops._description() if loops is not None else []
     return {
         "name": model.name,
         "gravity": model.gravity,
@@ -376,4 +362,4 @@ def describe(model: _core.Multibody) -> dict[str, Any]:
         "strict": model.strict,
         "q": np.array(model.q),
         "v": np.array(model.v),
-    } | ({"frames": loose} if loose else {})
+    } | {name: those for name, those in (("frames", loose), ("loops", declared)) if those}
