@@ -140,6 +140,11 @@ class Loops(Closed, Mapping):
         """Q̇θ̇ (rows,) or (B, rows): what is left of the rows' second derivatives at θ̈ = 0."""
         return self._core.bias(*at_state(self._model, q, v), precision)
 
+    def coupled(self, name: str) -> list[int]:
+        """The numbers of the coordinates that a coupling is of, in its order. KeyError where there is none of that name."""
+        terms = self._declared[name].get("terms", ())
+        return [self._model.hinges[hinge].v_slice.start + coordinate for hinge, coordinate, _ in terms]
+
     # ------------------------------------------------------------------ edits
     def remove(self, name: str | Loop) -> None:
         """Remove a loop. ModelError where there is none of that name."""

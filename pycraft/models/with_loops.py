@@ -8,8 +8,11 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..state import State
+from .assembly import assembled, branches
 from .handles import Body, Node, Vector
 from .loop_set import Loop, Loops, Relation
+from .mobility import Mobility, mobility
 from .with_frames import WithFrames
 
 
@@ -188,3 +191,103 @@ class WithLoops(WithFrames):
         ([0.5], [4.0])
         """
         return self.loops.add_coupling(coordinates, constant, function, name)
+
+    # ------------------------------------------------------------------ states on the loops
+    def assemble(
+        self,
+        q0: Any = None,
+        v0: Any = None,
+        *,
+        fix: Any = (),
+        starts: int = 20,
+        seed: int | np.random.Generator = 0,
+        tolerance: float = 1e-10,
+    ) -> State:
+        """A state on all loops, near q0 where there is one, and velocities that keep them. The model's own state is not set.
+
+        Parameters
+        ----------
+        q0, v0 : (nq,), (nv,), or a State; the model's present state where they are left out
+            One state, from which others are tried, further and further off.
+        fix : names or numbers of coordinates, or hinges, or a list of them
+            Those keep what they are in q0 and v0, to the last bit. Of a ball or free hinge all coordinates, or none.
+        starts : int
+            How many are tried, q0 the first.
+        seed : int or numpy.random.Generator
+        tolerance : float
+            The largest residual that counts as closed (m, rad); what is found is then refined to rounding.
+
+        Returns
+        -------
+        State
+            From each start by damped least squares on the model's group, with exact Jacobians; v is the nearest to v0 with Q v = 0, rows of
+            velocities included.
+
+        Raises
+        ------
+        ModelError
+            None was found: which loops cannot be closed by themselves, or which not together, and the rows that are left, by how much.
+            Velocities that are kept and break rows, which are named.
+
+        Cost: some ten evaluations of the rows and dense least squares, O(rows² nv) each, a start.
+
+        Examples
+        --------
+        >>> import numpy as np, pycraft as pc
+        >>> bars = pc.chain(3)
+        >>> closure = bars.add_loop("body2", hinge="pin", point=(1, 0, 0), name="closure")
+        >>> state = bars.assemble([1.0, -1.4, -1.5], [1.0, 0, 0], fix="hinge0")
+        >>> state.q.round(6).tolist(), state.v.round(6).tolist()  # a rhombus
+        ([1.0, -1.0, -2.141593], [1.0, -1.0, 1.0])
+        """
+        return assembled(self, q0, v0, fix, starts, seed, tolerance)
+
+    def assembly_branches(
+        self,
+        q0: Any = None,
+        v0: Any = None,
+        *,
+        fix: Any = (),
+        starts: int = 60,
+        seed: int | np.random.Generator = 0,
+        tolerance: float = 1e-10,
+    ) -> list[State]:
+        """The different states on all loops that are found from many starts, the nearest to q0 first; as many as there are, or fewer.
+
+        Arguments as of `assemble`; angles of pins that no coupling winds are told apart up to whole turns. ModelError as there, and where
+        the loops leave degrees of freedom: fix as many coordinates.
+
+        Examples
+        --------
+        >>> import numpy as np, pycraft as pc
+        >>> arm = pc.chain(2)
+        >>> target = arm.add_loop("body1", hinge="ball", point=(1, 0, 0), position=(0.5, 0, 0))
+        >>> [state.q.round(6).tolist() for state in arm.assembly_branches([0.5, -1.0])]  # the elbow on either side
+        [[0.722734, -1.445468], [-0.722734, 1.445468]]
+        """
+        return branches(self, q0, v0, fix, starts, seed, tolerance)
+
+    def mobility(self, q: Any = None, *, tolerance: float = 1e-8) -> Mobility:
+        """What the loops leave free at a state on them: degrees of freedom, redundant rows by name, how far it is to a singular one.
+
+        Parameters
+        ----------
+        q : (nq,), or a State; the model's present state where it is left out
+        tolerance : float
+            Singular values of Q, by the length of its longest row, count as zero below it.
+
+        Raises ModelError where q is not on the loops, with the row that is most off. Cost: a pivoted factor and singular values of Q,
+        O(rows² nv), and singular values at four neighbouring states.
+
+        Examples
+        --------
+        >>> import numpy as np, pycraft as pc
+        >>> bars = pc.chain(3)
+        >>> closure = bars.add_loop("body2", hinge="pin", point=(1, 0, 0), name="closure")
+        >>> square = bars.mobility([np.pi / 2, -np.pi / 2, -np.pi / 2])
+        >>> square.degrees_of_freedom, square.redundant
+        (1, ['closure: about x', 'closure: about y', 'closure: along z'])
+        >>> bars.mobility([0, 0, np.pi]).singular  # flat: it may fold one way or the other
+        True
+        """
+        return mobility(self, q, tolerance)
