@@ -4,6 +4,7 @@
 #include "bindings/bindings.h"
 #include "bindings/plain_products.h"
 #include "bindings/register_interbody_forces.h"
+#include "bindings/register_loops.h"
 #include "model/multibody.h"
 
 namespace pycraft {
@@ -49,6 +50,7 @@ PYBIND11_MODULE(_core, m) {
   pycraft::register_compiled(m);
   pycraft::register_sensitivities(m);
   pycraft::register_frames(m);
+  pycraft::register_loops(m);
   pycraft::register_centroidal(m);
   pycraft::register_methods(m);
   pycraft::register_integration(m);

@@ -120,7 +120,7 @@ void FrameCalls::jacobian(const FrameQuestion& asked, const std::vector<int>* co
     };
     std::vector<Column> made;  // of the coordinates on the way; the axes are known at its end
     const RelativeMotion<S> m = jacobian_along(
-        *w.model, path, rates, [&](const FrameStep& step, HingeRows<S>& hinge) { return step_motion(w, *frames_, times, b, step, part, hinge); },
+        *w.model, path, rates, w.hinge, [&](const FrameStep& step, HingeRows<S>& hinge) { return step_motion(w, *frames_, times, b, step, part, hinge); },
         [&](int i, const Vector6<S>& J, const Vector6<S>& rate) {
           if (!coordinates) return made.push_back({i, J, rate});
           if (const auto found = column_of.find(i); found != column_of.end()) made.push_back({found->second, J, rate});

@@ -127,12 +127,11 @@ RelativeMotion<S> along(const FramePath& path, MotionPart part, F motion) {
 }
 
 // Calls column(i, 𝒥_i, 𝒥̇_i) for every coordinate on the way, 𝒥̇_i where rates are wanted, and returns the motion, of its velocity where they are.
-// motion(step, rows): that of one step, with the rows of a hinge in `rows`.
+// motion(step, rows): that of one step, with the rows of a hinge in `rows`, here `hinge`.
 template <class S, class F, class C>
-RelativeMotion<S> jacobian_along(const CompiledModel<S>& model, const FramePath& path, bool rates, F motion, C column) {
+RelativeMotion<S> jacobian_along(const CompiledModel<S>& model, const FramePath& path, bool rates, HingeRows<S>& hinge, F motion, C column) {
   const MotionPart part = rates ? MotionPart::velocity : MotionPart::pose;
   RelativeMotion<S> m;
-  HingeRows<S> hinge;
   const auto columns = [&](int k, const S& sign) {
     for (int j = 0; j < model.nv_of[k]; ++j) {
       const Vector6<S> J = sign * motion_to_child(m.X, hinge.rows[j]);

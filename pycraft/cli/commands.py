@@ -23,10 +23,10 @@ app = typer.Typer(
     "files and pipes, which have no width of their own, get 140 columns.",
 )
 
-MIMIC = ("refuse", "lock", "free")
+MIMIC = ("refuse", "couple", "lock", "free")
 Model = Annotated[str, typer.Argument(help="A TOML, URDF or MJCF file, or the name of a robot of the package (see pycraft.robots).")]
 Root = Annotated[str | None, typer.Option(help="fixed | free: a free hinge first; fixed if left out, of a robot by name its own.")]
-Mimic = Annotated[str, typer.Option(help="refuse | lock | free: what becomes of a file's mimic joints.")]
+Mimic = Annotated[str, typer.Option(help="refuse | couple | lock | free: what becomes of a file's mimic joints.")]
 
 
 def load_model(name: str, root: str | None = None, mimic: str = "refuse") -> Any:

@@ -36,7 +36,7 @@ def run(
     plot: Annotated[bool, typer.Option("--plot", help="Draw coordinates, energies and forces: a PNG beside the output, or here.")] = False,
     save: Annotated[Path | None, typer.Option(help="Write the scene, with its effects and these options, as TOML.")] = None,
     root: Annotated[str | None, typer.Option(help="Of a model: fixed | free.")] = None,
-    mimic: Annotated[str, typer.Option(help="Of a model's file: refuse | lock | free.")] = "refuse",
+    mimic: Annotated[str, typer.Option(help="Of a model's file: refuse | couple | lock | free.")] = "refuse",
 ) -> None:
     """Simulate a scene: its file, or a model with the effects that are named, and no others.
 

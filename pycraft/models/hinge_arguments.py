@@ -7,20 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from .. import _core
 from ..arguments import limit_pair, listed, pose_parts, text
 from .handles import Body, Node, Vector
-
-_Z = (0.0, 0.0, 1.0)
-_DEFAULT_AXES: dict[str, tuple[tuple[float, float, float], ...]] = {
-    "pin": (_Z,),
-    "slider": (_Z,),
-    "screw": (_Z,),
-    "universal": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
-    "gimbal": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
-    "cylindrical": (_Z,),
-    "planar": (_Z,),
-}
+from .hinge_axes import hinge_axes
 
 
 def hinge_arguments(
@@ -43,18 +32,12 @@ def hinge_arguments(
     ModelError where arguments exclude one another or are of another kind of hinge.
     """
     hinge = text(hinge, "the kind of a hinge")
-    if axis is not None and axes is not None:
-        raise _core.ModelError(f"{what}: give axis or axes, not both")
-    if subhinges is not None and hinge != "custom":
-        raise _core.ModelError(f"{what}: subhinges belong to a hinge of kind 'custom', not {hinge!r}")
-    if hinge == "custom" and (subhinges is None or not (axis is axes is point is None)):
-        raise _core.ModelError(f"{what}: a custom hinge takes subhinges=[...], each with its kind, axis and point, and nothing beside")
+    directions = hinge_axes(what, hinge, axis, axes, point, subhinges)
     rotation, position = pose_parts(what, rotation, position, placement)
-    directions = [axis] if axis is not None else axes if axes is not None else _DEFAULT_AXES.get(hinge, ())
     lower, upper = limit_pair(what, limits)
     return {
         "hinge": hinge,
-        "axes": listed(directions, f"axes of {what}"),
+        "axes": directions,
         "point": point,
         "pitch": pitch,
         "subhinges": None if subhinges is None else listed(subhinges, f"subhinges of {what}"),

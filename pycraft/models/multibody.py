@@ -20,10 +20,10 @@ from .parts import Parts
 from .pictures import Pictures
 from .planning import Planning
 from .structure import Structure
-from .with_frames import WithFrames
+from .with_loops import WithLoops
 
 
-class Multibody(Closed, IntegrationCalls, Pictures, Parts, Planning, Structure, Coalescing, WithFrames):
+class Multibody(Closed, IntegrationCalls, Pictures, Parts, Planning, Structure, Coalescing, WithLoops):
     """A tree of bodies on hinges, with nodes, a state (`q`, `v`) and gravity (zero until it is set).
 
     Build one body by body, or load it (`pycraft.load`). Bodies are kept depth first, children in the order they were added, and
@@ -250,8 +250,8 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, Planning, Structure, 
 
     # ------------------------------------------------------------------ copies
     def description(self) -> dict[str, Any]:
-        """The whole model as plain data: bodies, hinges, nodes, gravity, state (see `pycraft.reference` for the schema), loose frames, and
-        what unlocks hinges and splits bodies."""
+        """The whole model as plain data: bodies, hinges, nodes, gravity, state (see `pycraft.reference` for the schema), loose frames,
+        loops, and what unlocks hinges and splits bodies."""
         return describe(self)
 
     @classmethod
@@ -287,6 +287,8 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, Planning, Structure, 
             model._add_node(node["name"], frame(node["body"]), node["rotation"], node["position"])
         for loose in data.get("frames", []):
             model.frames._add_again(loose)
+        for loop in data.get("loops", []):
+            model.loops._add_again(loop)
         model._hinges_before, model._bodies_before = dict(data.get("locked", {})), dict(data.get("coalesced", {}))
         model.gravity = data.get("gravity", (0, 0, 0))
         if "q" in data:
@@ -348,6 +350,8 @@ def describe(model: _core.Multibody) -> dict[str, Any]:
     """The core's model as plain data."""
     frames = getattr(model, "_kept_frames", None)
     loose = frames._description() if frames is not None else []
+    loops = getattr(model, "_kept_loops", None)
+    declared = loops._description() if loops is not None else []
     return (
         {
             "name": model.name,
@@ -359,6 +363,6 @@ def describe(model: _core.Multibody) -> dict[str, Any]:
             "q": np.array(model.q),
             "v": np.array(model.v),
         }
-        | ({"frames": loose} if loose else {})
+        | {name: those for name, those in (("frames", loose), ("loops", declared)) if those}
         | getattr(model, "_described_edits", dict)()
     )

@@ -214,7 +214,8 @@ def robot(*lines):
 def test_mimic_is_refused_by_name(tmp_path):
     assert text_of(tmp_path / "hand.urdf", robot(*MIMIC)) == (
         ":8: mimic joints are not coupled to the joints they follow: 'follower' follows 'elbow' (line 8); "
-        'load with mimic="lock" to weld them at their offsets, or with mimic="free" to have them move on their own'
+        'load with mimic="couple" to have loops of the model that couple them, with mimic="lock" to weld them at their offsets, or '
+        'with mimic="free" to have them move on their own'
     )
 
 
@@ -230,8 +231,15 @@ def test_mimic_is_refused_by_name(tmp_path):
 )
 def test_bad_mimic(tmp_path, mimic, kind, says):
     lines = [*MIMIC[:-1], joint(mimic, "follower", kind, "arm", "tip")]
-    text = text_of(tmp_path / "hand.urdf", robot(*lines), mimic="lock")
-    assert text.startswith(":8: ") and says in text
+    for how in ("lock", "couple"):
+        text = text_of(tmp_path / "hand.urdf", robot(*lines), mimic=how)
+        assert text.startswith(":8: ") and says in text
+
+
+def test_a_joint_that_follows_one_of_many_coordinates(tmp_path):
+    lines = [*MIMIC[:3], joint(kind="planar"), joint('<mimic joint="elbow"/>', name="follower", parent="arm", child="tip")]
+    text = text_of(tmp_path / "hand.urdf", robot(*lines), mimic="couple")
+    assert text.startswith(":8: ") and "joint 'follower' follows 'elbow', which has no single coordinate; load with mimic=\"free\"" in text
 
 
 def test_a_joint_called_root_under_a_free_root(tmp_path):
@@ -249,7 +257,7 @@ def test_a_violated_triangle_inequality_under_strict(tmp_path):
     ("option", "value", "says"),
     [
         ("root", "floating", "root='floating': there are 'fixed', 'free'"),
-        ("mimic", "couple", "mimic='couple': there are 'refuse', 'lock', 'free'"),
+        ("mimic", "follow", "mimic='follow': there are 'refuse', 'couple', 'lock', 'free'"),
         ("welds", "drop", "welds='drop': there are 'lump', 'keep'"),
     ],
 )

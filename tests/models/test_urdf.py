@@ -296,6 +296,22 @@ def test_locked_mimic_joints_stand_where_their_leader_at_zero_puts_them(load):
     agree(kept.mass_matrix([0.7]), locked.mass_matrix([0.7]))
 
 
+def test_coupled_mimic_joints_follow(load):
+    model, free = load(*FINGERS, mimic="couple"), load(*FINGERS, mimic="free")
+    assert model.coordinate_names == free.coordinate_names and list(model.loops) == ["turn", "slide"]
+    state = model.assemble([0.7, 0.0, 0.0], [1.0, 0.0, 0.0], fix="leader")
+    agree(state.q, np.array([0.7, -2 * 0.7 + 0.3, 0.5 * (-2 * 0.7 + 0.3)]))
+    agree(state.v, np.array([1.0, -2.0, -1.0]))
+    agree(model.loops.jacobian(), np.array([[2.0, 1.0, 0.0], [0.0, -0.5, 1.0]]))
+    of_a_weld = load(
+        *(link(n) for n in "abc"),
+        joint("w", "a", "b", "fixed"),
+        joint("j", "b", "c", inside='<mimic joint="w" offset="0.2"/>'),
+        mimic="couple",
+    )
+    agree(of_a_weld.assemble().q, np.array([0.2]))
+
+
 def test_mimic_elements_are_passed_over_when_free(load):
     model = load(link("a"), link("b"), joint("j", "a", "b", inside='<mimic joint="nowhere"/>'), mimic="free")
     assert model.nv == 1

@@ -60,6 +60,7 @@ def test_the_readme_example_runs():
         ("frames", 30),
         ("inverse_kinematics", 25),
         ("subgraphs", 20),
+        ("loops", 18),
     ],  # fmt: skip
 )
 def test_the_pages_run(page, examples):

@@ -43,7 +43,7 @@ class FrameOracle:
         with mpmath.workdps(DIGITS):
             self.one = mpmath.mpf(1)
             self.q = np.asarray(q, float) * self.one
-            plain = {key: value for key, value in model.description().items() if key != "frames"}
+            plain = {key: value for key, value in model.description().items() if key not in ("frames", "loops")}
             self.description = in_the_numbers_of(self.q, plain) if len(self.q) else plain
         self.nv, self.t = model.nv, mpmath.mpf(t)
         self.v, self.vdot = (np.zeros(self.nv) if x is None else np.asarray(x, float) for x in (v, vdot))

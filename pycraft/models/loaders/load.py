@@ -17,7 +17,7 @@ from .left_aside import told
 from .toml_file import TomlFile
 from .xml_file import XmlFile
 
-_OPTIONS = {"root": ("fixed", "free"), "mimic": ("refuse", "lock", "free"), "welds": ("lump", "keep", None)}
+_OPTIONS = {"root": ("fixed", "free"), "mimic": ("refuse", "couple", "lock", "free"), "welds": ("lump", "keep", None)}
 
 
 def load(
@@ -46,9 +46,9 @@ def load(
         What carries the root link: the base, or a free hinge called "root" whose body has the root link's name. A link of no
         mass with a floating joint called "root" is free already. MJCF and TOML files say so themselves; for them there is
         only "fixed".
-    mimic : {"refuse", "lock", "free"}
-        A joint that follows another: an error that names it; a weld where it stands when the other joint is at zero; a
-        joint that moves on its own.
+    mimic : {"refuse", "couple", "lock", "free"}
+        A joint that follows another: an error that names it; a joint of its own with a coupling in `Multibody.loops`, called
+        as the joint is; a weld where it stands when the other joint is at zero; a joint that moves on its own.
     welds : {"lump", "keep"}
         A link on a fixed joint becomes part of the body that moves it and a node with its name (a fixed root link becomes
         a node of the base), or stays a body with no coordinates. Both give the same mass matrix. Left out: what a TOML file

@@ -19,7 +19,8 @@ or the keyframe called "state" where there is one. A limit that is the largest d
 
 Not in the model, as they are effects: gravity (zero until it is set), springs, damping and friction of joints, which
 are in `Multibody.left_aside`, and actuators, in `Multibody.actuators`; contacts and fluid forces, which are not read.
-Equality constraints, tendons and flexes are left out with a warning that names them.
+Equality constraints connect, weld and joint are in `Multibody.loops`, with a warning, as dynamics of the tree does not keep them;
+others, tendons and flexes are left out with one that names them.
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ from ... import _core
 from ...interop import mujoco as conventions
 from ..multibody import Multibody
 from .mjcf_actuators import read_actuators
+from .mjcf_equalities import add_equalities
 from .rotations import rotation_about, rotation_from_quaternion, turned_inertia
 from .xml_file import XmlFile
 
@@ -46,7 +48,6 @@ STATE = "state"
 _FREE, _BALL, _SLIDE, _HINGE = range(4)  # mjtJoint
 _KINDS = {_FREE: "free", _BALL: "ball", _SLIDE: "slider", _HINGE: "pin"}
 _V_SIZE = {_FREE: 6, _BALL: 3, _SLIDE: 1, _HINGE: 1}
-_EQUALITIES = ("connect", "weld", "joint", "tendon", "flex", "flexvert", "flexstrain", "distance")  # mjtEq
 
 
 def read(file: XmlFile, *, root: str, welds: str, strict: bool) -> tuple[Multibody, list[str]]:
@@ -104,7 +105,7 @@ class _Reader:
         except _core.ModelError as error:
             raise _core.ModelError(f"{self.path}: {error}") from None
         model.q, model.v = self._state(model)
-        self._left_out()
+        self._left_out(model)
         model._left_aside = self._left_aside(model)
         model._actuators = read_actuators(self.m, model)
         return model, self.warnings + [f"{self.path}: {text}" for _, text in model.take_warnings()]
@@ -219,29 +220,20 @@ class _Reader:
             left["spring rest"] = rest
         return left
 
-    def _left_out(self) -> None:
+    def _left_out(self, model: Multibody) -> None:
         m = self.m
-        constraints = [self._equality(e) for e in range(m.neq)]
+        constraints = add_equalities(m, model, self.bodies)
+        if len(model.loops):
+            names = ", ".join(map(repr, model.loops))
+            self.warnings.append(
+                f"{self.path}: equality constraints are loops of the model, which direct calls and scenes do not keep: {names}"
+            )
         constraints += [f"tendon {m.tendon(t).name or t!r}" for t in range(m.ntendon)]
         constraints += [f"flex {f}" for f in range(m.nflex)]
         if constraints:
-            self.warnings.append(f"{self.path}: left out, as a model is a tree of rigid bodies: {', '.join(constraints)}")
+            self.warnings.append(f"{self.path}: left out: {', '.join(constraints)}")
         if m.npair or np.any((m.geom_contype != 0) | (m.geom_conaffinity != 0)):
             log.info("%s: contacts between its %d geoms are not read; they are effects", self.path, m.ngeom)
-
-    def _equality(self, e: int) -> str:
-        m = self.m
-        kind = _EQUALITIES[int(m.eq_type[e])]
-        ids = [int(i) for i in (m.eq_obj1id[e], m.eq_obj2id[e]) if i >= 0]
-        if kind in ("joint", "tendon"):
-            objects = [(m.joint(i) if kind == "joint" else m.tendon(i)).name or str(i) for i in ids]
-        elif kind in ("connect", "weld"):
-            sites = int(m.eq_objtype[e]) == 6  # mjOBJ_SITE
-            objects = [(m.site(i).name or str(i)) if sites else self.bodies[i] for i in ids]
-        else:
-            objects = []
-        name = m.equality(e).name
-        return f"equality {kind}{f' {name!r}' if name else ''}{' of ' + ' and '.join(map(repr, objects)) if objects else ''}"
 
 
 def _pose(rotation: np.ndarray, position: np.ndarray) -> np.ndarray:

@@ -42,6 +42,8 @@ def read(file: XmlFile, *, root: str, mimic: str, welds: str, strict: bool) -> t
     _settle_mimics(file, elements.joints, mimic)
     tree = _Tree(file, elements.links, elements.joints)
     model = _build(tree, root, welds, strict)
+    if mimic == "couple":
+        _couple(file, elements.joints, model)
     model._left_aside = by_coordinate(model, elements.left_aside)
     return model, elements.warnings + [tree.with_line(body, text) for body, text in model.take_warnings()]
 
@@ -50,19 +52,20 @@ def read(file: XmlFile, *, root: str, mimic: str, welds: str, strict: bool) -> t
 
 
 def _settle_mimics(file: XmlFile, joints: dict[str, Joint], mimic: str) -> None:
-    """Refuse joints that follow others, or weld them where they stand when the joint they follow is at zero."""
+    """Refuse joints that follow others, weld them where they stand when the joint they follow is at zero, or check what will be coupled."""
     followers = {joint: joint.mimic for joint in joints.values() if joint.mimic}
     if followers and mimic == "refuse":
         pairs = abbreviated(f"{j.name!r} follows {m.follows!r} (line {m.element.sourceline})" for j, m in followers.items())
         raise file.error(
             next(iter(followers.values())).element,
             f"mimic joints are not coupled to the joints they follow: {pairs}; "
-            'load with mimic="lock" to weld them at their offsets, or with mimic="free" to have them move on their own',
+            'load with mimic="couple" to have loops of the model that couple them, with mimic="lock" to weld them at their offsets, or '
+            'with mimic="free" to have them move on their own',
         )
     positions: dict[str, float] = {}
     for joint in followers:
         _lock(file, joints, joint, positions)
-    for joint in followers:
+    for joint in followers if mimic == "lock" else ():
         axis = np.asarray(joint.axis) / np.linalg.norm(joint.axis)
         if joint.kind == "pin":
             joint.rotation = joint.rotation @ rotation_about(axis, positions[joint.name])
@@ -91,6 +94,21 @@ def _lock(file: XmlFile, joints: dict[str, Joint], joint: Joint, positions: dict
     for follower in reversed(waiting.values()):
         assert follower.mimic
         position = positions[follower.name] = follower.mimic.multiplier * position + follower.mimic.offset
+
+
+def _couple(file: XmlFile, joints: dict[str, Joint], model: Multibody) -> None:
+    """q = multiplier · (that of the joint that is followed) + offset, as loops with the names of the joints that follow."""
+    for joint in joints.values():
+        if joint.mimic is None:
+            continue
+        leader = joints[joint.mimic.follows]
+        terms = {joint.name: 1.0}
+        if leader.kind in ("pin", "slider"):
+            terms[leader.name] = -joint.mimic.multiplier
+        elif leader.kind != "weld":  # which stands at zero
+            text = f'{label(joint.element)} follows {leader.name!r}, which has no single coordinate; load with mimic="free"'
+            raise file.error(joint.mimic.element, text)
+        model.add_coupling(terms, constant=-joint.mimic.offset, name=joint.name)
 
 
 # The tree -------------------------------------------------------------------------------------------------------------

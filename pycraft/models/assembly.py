@@ -1,0 +1,217 @@
+"""States on the loops of a model: found from near and far, or said why there are none (docs/loops.md)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from ..arguments import clipped, one_number, seed_of
+from ..state import State, at_state
+from .coordinates import coordinate_numbers
+
+_ITERATIONS = 200
+_RANK = 1e-10  # relative: singular values below are rounding, of rows that hang on others
+
+
+class Assembler:
+    """The positions of a model's loops as equations for the coordinates that are not kept.
+
+    Levenberg's method with the damping of Nielsen on the model's group: q moves along δ,  (QᵀQ + μ)δ = -Qᵀr,  and at last along the
+    shortest δ with Qδ = -r in the least-squares sense, so that coordinates around no loop stay. Source: K. Madsen, H. Nielsen, O. Tingleff,
+    Methods for Non-Linear Least Squares Problems, 2004, 3.2.
+    """
+
+    def __init__(self, model: Any, q: Any, fix: Any, tolerance: Any):
+        self.model, self.q = model, np.array(q, float)
+        self.positions = model.loops.of_positions
+        self.tolerance = one_number(tolerance, "tolerance")
+        if not self.tolerance > 0:
+            raise _core.ModelError(f"tolerance: a positive number, not {tolerance!r}")
+        if self.q.ndim != 1:
+            raise _core.ModelError(f"assembly starts from one state, not from an array {self.q.shape}; give its rows one by one")
+        self.kept = coordinate_numbers(model, [] if fix is None else fix) or []
+        self._check_kept()
+        self.free = np.setdiff1d(np.arange(model.nv), self.kept)
+        model.loops.residual(self.q)  # what is wrong with q is said here
+        moves = sum((model.loops.jacobian(at) != 0).any(axis=0) for at in (self.q, model.random_state().q))
+        self.around = self.free[moves[self.free] > 0]
+
+    def _check_kept(self) -> None:
+        """A rotation is kept whole, or not: one of its three velocities alone says nothing of where it is."""
+        for hinge in self.model.hinges.values():
+            own = range(hinge.v_slice.start, hinge.v_slice.stop)
+            some = set(own) & set(self.kept)
+            if 0 < len(some) < len(own) and hinge.q_slice.stop - hinge.q_slice.start != len(own):
+                raise _core.ModelError(
+                    f"hinge {hinge.name!r} has a rotation, of which single coordinates cannot be kept; fix all of it: {hinge.name!r}"
+                )
+
+    def equations(self, q: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """r and Q of these rows, by the coordinates that may move."""
+        return self.model.loops.residual(q)[rows], self.model.loops.jacobian(q)[rows][:, self.free]
+
+    def moved(self, q: np.ndarray, step: np.ndarray) -> np.ndarray:
+        """q moved along a step of the coordinates that may move; the others to the last bit what they were."""
+        whole = np.zeros(self.model.nv)
+        whole[self.free] = step
+        return self.model.integrate(q, whole)
+
+    def solve(self, q: np.ndarray, rows: np.ndarray | None = None) -> tuple[np.ndarray, float]:
+        """The state reached from q, and the largest residual left there."""
+        rows = np.flatnonzero(self.positions) if rows is None else rows
+        r, Q = self.equations(q, rows)
+        if not r.size or not Q.size:
+            return q, float(np.abs(r).max(initial=0))
+        mu, grow = 1e-3 * max((Q * Q).sum(axis=0).max(), 1e-30), 2.0
+        for _ in range(_ITERATIONS):
+            if np.abs(r).max() <= self.tolerance or np.abs(Q.T @ r).max() <= 1e-14 * np.abs(r).max():
+                break
+            damped = np.vstack([Q, np.sqrt(mu) * np.eye(Q.shape[1])])
+            step = np.linalg.lstsq(damped, np.concatenate([-r, np.zeros(Q.shape[1])]), rcond=None)[0]
+            onto = self.moved(q, step)
+            r_onto, Q_onto = self.equations(onto, rows)
+            gain = (r @ r - r_onto @ r_onto) / (step @ (mu * step - Q.T @ r))
+            if gain > 0:
+                q, r, Q = onto, r_onto, Q_onto
+                mu, grow = mu * max(1 / 3, 1 - (2 * gain - 1) ** 3), 2.0
+            else:
+                mu, grow = mu * grow, 2 * grow
+                if np.abs(step).max() < 1e-15:
+                    break
+        return self.refined(q, r, Q, rows)
+
+    def refined(self, q: np.ndarray, r: np.ndarray, Q: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, float]:
+        """To rounding, from where the rows are kept to the tolerance: undamped steps as long as each leaves less than half."""
+        left = float(np.abs(r).max())
+        while 0 < left <= self.tolerance:
+            onto = self.moved(q, np.linalg.lstsq(Q, -r, rcond=_RANK)[0])
+            r, Q = self.equations(onto, rows)
+            if not np.abs(r).max() < left / 2:
+                break
+            q, left = onto, float(np.abs(r).max())
+        return q, left
+
+    def starts(self, count: int, rng: np.random.Generator) -> Any:
+        """q, and then states about it, further and further off: by a tenth of a radian or metre at first, by π at last."""
+        yield self.q
+        for width in np.geomspace(0.1, np.pi, max(count - 1, 1))[: count - 1]:
+            step = np.zeros(len(self.free))
+            step[np.isin(self.free, self.around)] = width * rng.uniform(-1, 1, len(self.around))
+            yield self.moved(self.q, step)
+
+    # ------------------------------------------------------------------ velocities
+    def velocities(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """The velocities that keep all rows with the least change of those that may change. ModelError where there are none."""
+        Q = self.model.loops.jacobian(q)
+        v = np.array(v, float)
+        if Q.size and self.free.size:
+            v[self.free] += np.linalg.lstsq(Q[:, self.free], -(Q @ v), rcond=_RANK)[0]
+        off = np.abs(Q @ v)
+        if off.max(initial=0) > self.tolerance * (1 + np.abs(v).max(initial=0)) * max(1, np.abs(Q).max(initial=0)):
+            said = _worst(self.model.loops.rows, off)
+            raise _core.ModelError(
+                f"no velocities of {self.model.name!r} keep its loops{self.keeping()}: left are {said}; fix fewer, or give others"
+            )
+        return v
+
+    # ------------------------------------------------------------------ what is said
+    def keeping(self) -> str:
+        """Which coordinates are kept."""
+        names = self.model.coordinate_names
+        return f" with {', '.join(repr(names[i]) for i in self.kept[:6])}{', ...' if len(self.kept) > 6 else ''} kept" if self.kept else ""
+
+    def refusal(self, q: np.ndarray, count: int) -> _core.ModelError:
+        """Why nothing was found, from the state with the smallest residual: loops that cannot be closed, or not together."""
+        loops, rows = self.model.loops, self.model.loops.rows
+        residual = np.abs(loops.residual(q))
+        alone = []
+        for loop in loops.values():
+            own = np.arange(len(rows))[loop.slice]
+            own = own[self.positions[own]]
+            if own.size and self.solve(q, own)[1] > self.tolerance:
+                alone.append(loop.name)
+        open_ = [loop.name for loop in loops.values() if residual[loop.slice].max(initial=0) > self.tolerance]
+        why = (
+            f"{_named(alone)} cannot be closed even without the others"
+            if alone
+            else f"each can be closed by itself, and {_named(open_)} not together with the others"
+        )
+        return _core.ModelError(
+            f"{self.model.name!r} cannot be assembled{self.keeping()}, from {count} start{'s' if count > 1 else ''}: {why}. At the nearest "
+            f"that was found, left are {_worst(rows, residual)}; change lengths or kept values, or start elsewhere (q0, starts=)"
+        )
+
+
+def _named(names: list[str]) -> str:
+    return ", ".join(f"loop {name!r}" for name in names[:6]) + (", ..." if len(names) > 6 else "")
+
+
+def _worst(rows: list[str], off: np.ndarray) -> str:
+    """The rows that are most off, with how much."""
+    order = [i for i in np.argsort(-off)[:4] if off[i] > 0.01 * off.max()]
+    return ", ".join(f"{off[i]:.3g} of {rows[i]!r}" for i in order)
+
+
+def assembled(model: Any, q0: Any, v0: Any, fix: Any, starts: Any, seed: Any, tolerance: Any) -> State:
+    """`Multibody.assemble`."""
+    q, v = at_state(model, q0, v0)
+    assembler, count, rng = Assembler(model, q, fix, tolerance), clipped(starts, "starts"), seed_of(seed)
+    if count < 1:
+        raise _core.ModelError(f"starts: how many are tried, at least 1, not {starts!r}")
+    best, smallest = assembler.q, np.inf
+    for start in assembler.starts(count, rng):
+        found, left = assembler.solve(start)
+        if left <= assembler.tolerance:
+            return State(found, assembler.velocities(found, v))
+        if left < smallest:
+            best, smallest = found, left
+    raise assembler.refusal(best, count)
+
+
+def branches(model: Any, q0: Any, v0: Any, fix: Any, starts: Any, seed: Any, tolerance: Any) -> list[State]:
+    """`Multibody.assembly_branches`."""
+    q, v = at_state(model, q0, v0)
+    assembler, rng = Assembler(model, q, fix, tolerance), seed_of(seed)
+    first = assembled(model, q, v, fix, starts, rng, tolerance)
+    _, Q = assembler.equations(first.q, np.flatnonzero(assembler.positions))
+    around = np.isin(assembler.free, assembler.around)
+    freedoms = int(around.sum()) - (int(np.linalg.matrix_rank(Q[:, around], 1e-8)) if Q.size else 0)
+    if freedoms:
+        names = ", ".join(repr(model.coordinate_names[i]) for i in assembler.around[:6])
+        degrees = f"{freedoms} degree{'s' if freedoms > 1 else ''} of freedom"
+        raise _core.ModelError(
+            f"the loops of {model.name!r} leave {degrees}{assembler.keeping()}, and a continuum of states: fix as many of the coordinates "
+            f"around them, {names}{', ...' if len(assembler.around) > 6 else ''}"
+        )
+    found = [first.q]
+    turns = _turns(model)
+    for start in assembler.starts(clipped(starts, "starts"), rng):
+        onto, left = assembler.solve(start)
+        if left <= assembler.tolerance and all(np.abs(_between(model, one, onto, turns)).max(initial=0) > 1e-5 for one in found):
+            found.append(model.integrate(q, _between(model, q, onto, turns)))
+    found.sort(key=lambda one: float(np.linalg.norm(_between(model, q, one, turns))))
+    return [State(one, assembler.velocities(one, v)) for one in found]
+
+
+def _turns(model: Any) -> np.ndarray:
+    """Which coordinates are angles that may be wound by whole turns: pins in no coupling."""
+    turns = np.zeros(model.nv, bool)
+    for hinge in model.hinges.values():
+        at = hinge.v_slice.start
+        for subhinge in hinge.subhinges:
+            count = _core.subhinge_kinds[subhinge["kind"]].nv
+            turns[at : at + count] = subhinge["kind"] == "pin"
+            at += count
+    for loop in model.loops.values():
+        if loop.kind == "coupling":
+            turns[model.loops.coupled(loop.name)] = False
+    return turns
+
+
+def _between(model: Any, p: np.ndarray, q: np.ndarray, turns: np.ndarray) -> np.ndarray:
+    """The way from p to q, by the shorter turn."""
+    way = np.array(model.difference(p, q))
+    way[turns] -= 2 * np.pi * np.round(way[turns] / (2 * np.pi))
+    return way

@@ -1,0 +1,268 @@
+"""Loops of a model and their rows: what closes its chains, rolls, or couples its coordinates (docs/loops.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from ..arguments import listed, name_of, one_number, pose_parts, text
+from ..closed import Closed
+from ..state import at_state
+from .coordinates import coordinate_numbers
+from .handles import Body, Node
+from .hinge_axes import hinge_axes
+
+Relation = Callable[[np.ndarray], Any]
+"""A function of coordinates (n,): (r, its gradient (n,), its second derivatives (n, n))."""
+
+
+class Loop(Closed):
+    """A loop of a model, by its name: `.kind`, `.rows`, and its own rows of `residual`, `jacobian` and `bias`.
+
+    Arguments and costs are those of the calls of all loops, `Loops`, of which these are slices.
+
+    Examples
+    --------
+    >>> import pycraft as pc
+    >>> arm = pc.chain(3)
+    >>> arm.add_loop("body2", hinge="ball", position=(1.5, 0, 0))
+    <loop 'base to body2': ball, 3 rows>
+    >>> arm.loops["base to body2"].residual([0, 0, 0]).tolist()
+    [0.5, 0.0, 0.0]
+    """
+
+    def __init__(self, loops: Loops, name: str):
+        self._loops, self._name = loops, name
+
+    @property
+    def name(self) -> str:
+        """The loop's name in its model."""
+        return self._name
+
+    @property
+    def kind(self) -> str:
+        """Of its hinge ("pin", ...; "ball" of a gimbal, too), or "blade", "wheel", "rolling ball", "surface", "coupling"."""
+        return self._loops._core.kind(self._name)
+
+    @property
+    def slice(self) -> slice:
+        """Where its rows stand among those of all loops."""
+        first = self._loops._core.first_rows()
+        place = self._loops._place(self._name)
+        return slice(first[place], first[place + 1])
+
+    @property
+    def rows(self) -> list[str]:
+        """Names of its rows: "loop: direction"."""
+        return self._loops.rows[self.slice]
+
+    def residual(self, q=None, *, precision: str = "double") -> np.ndarray:
+        """r (rows,) or (B, rows): see `Loops.residual`."""
+        return self._loops.residual(q, precision=precision)[..., self.slice]
+
+    def jacobian(self, q=None, *, precision: str = "double") -> np.ndarray:
+        """Q (rows, nv) or (B, rows, nv): see `Loops.jacobian`."""
+        return self._loops.jacobian(q, precision=precision)[..., self.slice, :]
+
+    def bias(self, q=None, v=None, *, precision: str = "double") -> np.ndarray:
+        """Q̇θ̇ (rows,) or (B, rows): see `Loops.bias`."""
+        return self._loops.bias(q, v, precision=precision)[..., self.slice]
+
+    def remove(self) -> None:
+        """Remove the loop from its model."""
+        self._loops.remove(self._name)
+
+    def __repr__(self) -> str:
+        try:
+            rows = len(self.rows)
+        except _core.ModelError:
+            return f"<loop {self._name!r}: not there, or left without what it was declared on>"
+        return f"<loop {self._name!r}: {self.kind}, {rows} row{'' if rows == 1 else 's'}>"
+
+
+class Loops(Closed, Mapping):
+    """The loops of a model by name, in order of declaration, and the rows of all of them.
+
+    A row of positions has a residual r(q), zero where it is kept; with θ̇ the model's v, it asks Q θ̇ = 0 and Q θ̈ + Q̇θ̇ = 0. A row of
+    velocities (rolling, blades) asks the last two alone. Q is the derivative of r exactly, where the loops are open too.
+
+    The calls take q and v as direct calls do: one state, a batch (B, ...), a `State`, or without any the model's present one; and
+    precision "single" to "quad". Cost: the hinges around the loops, a state. ModelError for a loop that lost a body, node or hinge of
+    its own: it names the loop.
+
+    Examples
+    --------
+    >>> import pycraft as pc
+    >>> arm = pc.chain(3)
+    >>> loop = arm.add_loop("body2", hinge="pin", position=(1, 0, 0), name="close")
+    >>> arm.loops.rows
+    ['close: about x', 'close: about y', 'close: along x', 'close: along y', 'close: along z']
+    >>> arm.loops["close"].residual([0, 0, 0])[2:].tolist()
+    [1.0, 0.0, 0.0]
+    """
+
+    def __init__(self, model: Any):
+        self._model, self._core = model, _core.LoopSet(model)
+        self._declared: dict[str, dict[str, Any]] = {}
+
+    # ------------------------------------------------------------------ rows
+    @property
+    def rows(self) -> list[str]:
+        """Names of all rows: "loop: direction", of couplings the name alone. x, y, z are axes of the hinge, z along its own axis."""
+        return self._core.rows()[0]
+
+    @property
+    def of_positions(self) -> np.ndarray:
+        """Which rows (rows,) are of positions, and not of velocities alone."""
+        return np.array(self._core.rows()[1], dtype=bool)
+
+    def residual(self, q=None, *, precision: str = "double") -> np.ndarray:
+        """r (rows,) or (B, rows), zero where the loops are closed, and of rows of velocities; metres, and radians to first order."""
+        return self._core.residual(at_state(self._model, q)[0], precision)
+
+    def jacobian(self, q=None, *, precision: str = "double") -> np.ndarray:
+        """Q (rows, nv) or (B, rows, nv): ṙ = Q θ̇, and of rows of velocities what is zero. Exact zeros for hinges that are around no loop.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> arm = pc.chain(2)
+        >>> gear = arm.add_coupling({"hinge0": 1.0, "hinge1": -3.0}, name="gear")
+        >>> arm.loops.jacobian([0.5, 0.25]).tolist(), arm.loops.residual([0.5, 0.25]).tolist()
+        ([[1.0, -3.0]], [-0.25])
+        """
+        return self._core.jacobian(at_state(self._model, q)[0], precision)
+
+    def bias(self, q=None, v=None, *, precision: str = "double") -> np.ndarray:
+        """Q̇θ̇ (rows,) or (B, rows): what is left of the rows' second derivatives at θ̈ = 0."""
+        return self._core.bias(*at_state(self._model, q, v), precision)
+
+    def coupled(self, name: str) -> list[int]:
+        """The numbers of the coordinates that a coupling is of, in its order. KeyError where there is none of that name."""
+        terms = self._declared[name].get("terms", ())
+        return [self._model.hinges[hinge].v_slice.start + coordinate for hinge, coordinate, _ in terms]
+
+    # ------------------------------------------------------------------ edits
+    def remove(self, name: str | Loop) -> None:
+        """Remove a loop. ModelError where there is none of that name."""
+        name = name.name if isinstance(name, Loop) else text(name, "a loop")
+        self._core.remove(name)
+        self._declared.pop(name)
+
+    def add_hinge(self, b: Any, a: Any, hinge: str, given: Mapping[str, Any], name: str | None) -> Loop:
+        """Close a chain by a hinge: see `Multibody.add_loop`."""
+        a, b, hinge = self._frame(a), self._frame(b), text(hinge, "the kind of a hinge")
+        name = name_of(name, "a loop", f"{a or 'base'} to {b or 'base'}")
+        what = f"loop {name!r}"
+        axes = hinge_axes(what, hinge, given["axis"], given["axes"], given["point"], given["subhinges"])
+        subhinges = None if given["subhinges"] is None else listed(given["subhinges"], f"subhinges of {what}")
+        rotation, position = pose_parts(what, given["rotation"], given["position"], given["placement"])
+        numbers = (hinge, axes, given["point"], given["pitch"], subhinges, rotation, position)
+        self._core.add_hinge(name, a, b, *numbers)
+        return self._keep(name, {"how": "hinge", "a": a, "b": b, "numbers": _copied(numbers)})
+
+    def add_pair(self, b: Any, a: Any, kind: str, radius: Any, quadric: tuple[Any, Any, Any] | None, name: str | None) -> Loop:
+        """Rows between two frames that are no hinge's: see `Multibody.add_rolling` and `Multibody.add_surface`."""
+        a, b, kind = self._frame(a), self._frame(b), text(kind, "the kind of a loop")
+        name = name_of(name, "a loop", f"{a or 'base'} to {b or 'base'}")
+        self._core.add_pair(name, a, b, kind, radius, quadric)
+        return self._keep(name, {"how": "pair", "a": a, "b": b, "numbers": _copied((kind, radius, quadric))})
+
+    def add_coupling(self, coordinates: Any, constant: Any, function: Relation | None, name: str | None) -> Loop:
+        """A relation of coordinates: see `Multibody.add_coupling`."""
+        name = name_of(name, "a coupling", "coupling")
+        if function is None and not isinstance(coordinates, Mapping):
+            raise _core.ModelError(f"coupling {name!r}: coefficients by coordinate, {{'a': 1.0, 'b': -2.0}}, or coordinates and function=")
+        if function is not None and (isinstance(coordinates, Mapping) or not callable(function)):
+            raise _core.ModelError(f"coupling {name!r}: a list of coordinates beside a function that can be called, not {function!r}")
+        listed_ = (
+            list(coordinates.items()) if isinstance(coordinates, Mapping) else [(one, 0.0) for one in listed(coordinates, "coordinates")]
+        )
+        terms, numbers = [], []
+        for coordinate, given in listed_:
+            number = self._coordinate(coordinate, name)
+            if number in numbers:
+                raise _core.ModelError(f"coupling {name!r} names coordinate {self._model.coordinate_names[number]!r} twice; give it once")
+            numbers.append(number)
+            terms.append((*self._of_hinge(number), _coefficients(given, f"coefficients of {coordinate!r} in coupling {name!r}")))
+        self._core.add_coupling(name, terms, one_number(constant, f"the constant of coupling {name!r}"), function)
+        return self._keep(name, {"how": "coupling", "terms": terms, "constant": constant, "function": function})
+
+    # ------------------------------------------------------------------ as a mapping
+    def __getitem__(self, name: str) -> Loop:
+        if name not in self._declared:
+            raise KeyError(f"{self._model.name!r} has no loop called {name!r}; there are {', '.join(map(repr, self._declared)) or 'none'}")
+        return Loop(self, name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._core.names())
+
+    def __len__(self) -> int:
+        return len(self._core.names())
+
+    def _ipython_key_completions_(self) -> Sequence[str]:
+        return list(self)
+
+    def __repr__(self) -> str:
+        return f"<loops of {self._model.name!r}: {', '.join(map(repr, self)) or 'none'}>"
+
+    # ------------------------------------------------------------------ what they share
+    def _place(self, name: str) -> int:
+        try:
+            return self._core.names().index(name)
+        except ValueError:
+            raise _core.ModelError(f"{self._model.name!r} has no loop called {name!r} any more") from None
+
+    def _frame(self, frame: Any) -> str:
+        """The name of a body or node of this model, "" of the base."""
+        if isinstance(frame, (Body, Node)):
+            if frame._model is not self._model:
+                raise _core.ModelError(f"frame {frame.name!r} belongs to another model, {frame._model.name!r}, not to {self._model.name!r}")
+            return frame.name
+        return name_of(frame, "an end of a loop", "")
+
+    def _coordinate(self, coordinate: Any, name: str) -> int:
+        found = coordinate_numbers(self._model, [coordinate]) or []
+        if len(found) != 1:
+            raise _core.ModelError(f"coupling {name!r}: hinge {coordinate!r} has {len(found)} coordinates; name one of them")
+        return found[0]
+
+    def _of_hinge(self, number: int) -> tuple[str, int]:
+        """Whose coordinate that is, and which of its own."""
+        return next((h.name, number - h.v_slice.start) for h in self._model.hinges.values() if h.v_slice.start <= number < h.v_slice.stop)
+
+    def _keep(self, name: str, declaration: dict[str, Any]) -> Loop:
+        self._declared[name] = {"name": name, **declaration}
+        return Loop(self, name)
+
+    def _description(self) -> list[dict[str, Any]]:
+        """The loops as plain data (functions of couplings as they are), in order."""
+        return [dict(self._declared[name]) for name in self]
+
+    def _add_again(self, declared: Mapping[str, Any]) -> None:
+        """Declare a loop that `_description` tells of."""
+        name, how = declared["name"], declared["how"]
+        if how == "coupling":
+            self._core.add_coupling(name, declared["terms"], declared["constant"], declared["function"])
+        else:
+            add = self._core.add_hinge if how == "hinge" else self._core.add_pair
+            add(name, declared["a"], declared["b"], *declared["numbers"])
+        self._keep(name, {key: value for key, value in declared.items() if key != "name"})
+
+
+def _coefficients(given: Any, what: str) -> list[float]:
+    """Of 1, q, q², ...; a number alone is that of q."""
+    numbers = _core.real_array(given, what)
+    if numbers.ndim > 1:
+        raise _core.ModelError(f"{what}: one number, or those of 1, q, q², ..., not an array {numbers.shape}")
+    return [0.0, float(numbers)] if numbers.ndim == 0 else [float(c) for c in numbers]
+
+
+def _copied(numbers: Any) -> Any:
+    """What was given, as the arrays that it was then."""
+    if isinstance(numbers, (tuple, list)):
+        return type(numbers)(_copied(one) for one in numbers)
+    return np.array(numbers) if isinstance(numbers, np.ndarray) else numbers
