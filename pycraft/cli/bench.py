@@ -238,6 +238,7 @@ def run(seconds: float = 0.1) -> dict[str, list[Figure]]:
     from .bench_expressions import expressions
     from .bench_frames import frames
     from .bench_hybrid import hybrid
+    from .bench_locking import locking
     from .bench_parts import parts
     from .bench_scenes import scenes
 
@@ -251,4 +252,5 @@ def run(seconds: float = 0.1) -> dict[str, list[Figure]]:
         "Frames": frames(2 * seconds),
         "Scenes": scenes(2 * seconds),
         "Parts": parts(2 * seconds),
+        "Locking": locking(2 * seconds),
     }

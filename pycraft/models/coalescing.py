@@ -60,7 +60,7 @@ class Coalescing(Locking):
         ['body2']
         >>> list(arm.bodies), bool(np.allclose(arm.mass_matrix(), before))
         (['body0', 'body1', 'body3'], True)
-        >>> arm.split("body2"), arm.unlock("hinge2"), list(arm.q)
+        >>> arm.split("body2"), arm.unlock("hinge2"), arm.q.tolist()
         (['body2'], ['hinge2'], [0.1, 0.2, 0.3, 0.4])
         """
         if bodies is None:

@@ -61,6 +61,7 @@ def test_the_readme_example_runs():
         ("inverse_kinematics", 25),
         ("subgraphs", 20),
         ("loops", 18),
+        ("locking", 14),
     ],  # fmt: skip
 )
 def test_the_pages_run(page, examples):
