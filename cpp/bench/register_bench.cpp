@@ -132,7 +132,7 @@ py::dict time_dynamics(const std::shared_ptr<Multibody>& model, const std::strin
   const int K = states_of(q), nq = model->nq(), nv = model->nv();
   const size_t square = size_t(nv) * nv;
   const bool vector = call == "forward_dynamics" || call == "inverse_dynamics" || call == "operational_space_inertia";  // of chains whose matrices fit nowhere
-  std::vector<double> out(vector ? std::max(size_t(nv), size_t(36)) : std::max(3 * square, size_t(6) * nv));
+  std::vector<double> out(std::max(size_t(144), vector ? size_t(nv) : std::max(3 * square, size_t(6) * nv)));
   int k = 0;
   const auto next = [&] { k = (k + 1) % K; };
   const double *Q = q.data(), *V = v.data(), *U = u.data();
@@ -162,10 +162,12 @@ py::dict time_dynamics(const std::shared_ptr<Multibody>& model, const std::strin
     });
   } else if (call == "coriolis_matrix") {
     run([&](auto a, auto b, auto) { d.coriolis_matrix(false, at_q(a), at_v(b), Precision::double_, out.data()); });
-  } else if (call == "operational_space_inertia") {  // of the last body
-    const Node tip = model->node(model->node_index(model->body(model->bodies() - 1).name));
+  } else if (call == "operational_space_inertia" || call == "operational_space_inertia_of_two") {  // of the last body, and of that in the middle
+    const auto of_body = [&](int k) { return model->node(model->node_index(model->body(k).name)); };
+    const Node nodes[] = {of_body(model->bodies() - 1), of_body(model->bodies() / 2)};
+    const size_t count = call == "operational_space_inertia" ? 1 : 2;
     bool sure = true;
-    run([&](auto a, auto, auto) { sure &= w.operational_space(true, {&tip, 1}, at_q(a), out.data()); });
+    run([&](auto a, auto, auto) { sure &= w.operational_space(true, {nodes, count}, at_q(a), out.data()); });
     if (!sure) throw EvaluationError("the operational-space inertia of a state that is timed is left to the operators");
   } else if (call == "log_determinant_gradient") {
     run([&](auto a, auto, auto) { d.log_determinant(GradientOver::coordinates, at_q(a), Precision::double_, out.data()); });

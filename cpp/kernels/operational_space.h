@@ -5,8 +5,10 @@
 //
 // z in the axes of one link after another, six columns a node. Cost O(N) for the sweep, and for m nodes m² of the links between them and the base.
 //
-// Λ by L d L*. Where a pivot is less than `shared` of what stands on the diagonal, what the nodes' motions have in common takes too many digits: such
-// states are left to the general way, which has factors of Hψ to take.
+// Λ in its place, pivot by pivot, by the symmetric sweep operator A <- [-d⁻¹, d⁻¹a*; d⁻¹a, A - a d⁻¹ a*], after all of which A is -A⁻¹: every step goes
+// along rows, so that registers take several columns of one state. Source: J. H. Goodnight, A tutorial on the SWEEP operator, The American
+// Statistician 33 (1979). The pivots are those of L d L*. Where one is less than `shared` of what stood on the diagonal, what the nodes' motions have in
+// common takes too many digits: such states are left to the general way, which has factors of Hψ to take.
 #pragma once
 
 #include "kernels/columns.h"
@@ -22,18 +24,18 @@ template <class S>
 struct NodeWork {
   S *z, *w, *solved;     // six rows of columns each
   S *compliance;         // (6 m, columns); of nodes in the order of their links, from their own columns on
-  S *inverse, *pivots;   // (6 m, 6 m), 6 m
+  S* diagonal;           // 6 m, of the compliance
   int columns;
   template <class T>
   static size_t size(const Links<T>&, int nodes) {
     const size_t n = size_t(6) * nodes, columns = size_t(node_columns) * nodes;
-    return ((18 + n) * columns + n * n + n) * sizeof(S);
+    return ((18 + n) * columns + n) * sizeof(S);
   }
   template <class T>
   NodeWork(int nodes, T* work) : z(reinterpret_cast<S*>(work)), columns(node_columns * nodes) {
     const size_t n = size_t(6) * nodes;
     w = z + size_t(6) * columns, solved = w + size_t(6) * columns, compliance = solved + size_t(6) * columns;
-    inverse = compliance + n * columns, pivots = inverse + n * n;
+    diagonal = compliance + n * columns;
   }
   // f(c) of the nodes from `first` to `last`: six columns each, as many at a time as fit.
   template <class F>
@@ -137,39 +139,35 @@ inline void nodes_to_base(const Links<T>& links, const States<T>& at, const Forw
   }
 }
 
-// A <- A⁻¹ of n rows; which lanes are sound. size: n, or a constant of its kind.
-template <class S, class Size>
-inline typename S::Bits invert(S* A, S* pivots, Size size) {
+// The compliance of the nodes, in its place, to -Λ; which lanes are sound. Row k holds what stands right of the columns of nodes before its own.
+template <class S>
+inline typename S::Bits invert(int nodes, const NodeWork<S>& to) {
+  using V = Block<S>;
   using T = typename S::Scalar;
-  const int n = size;
+  const size_t row = to.columns;
+  const auto column = [](int i) { return node_columns * (i / 6) + i % 6; };
+  S* const a = to.w;  // the pivot's row, whole
   typename S::Bits sound = S::all();
-  for (int j = 0; j < n; ++j) {  // L below the diagonal, d⁻¹ apart
-    S pivot = A[j * n + j];
-    for (int a = 0; a < j; ++a) {
-      const S scaled = A[j * n + a];  // times d
-      A[j * n + a] = scaled * pivots[a];
-      pivot -= A[j * n + a] * scaled;
-    }
-    sound = sound & greater(pivot, S(shared<T>) * A[j * n + j]);
-    pivots[j] = S(1) / pivot;
-    for (int i = j + 1; i < n; ++i) {
-      S x = A[i * n + j];
-      for (int a = 0; a < j; ++a) x -= A[i * n + a] * A[j * n + a];
-      A[i * n + j] = x;
+  for (int c = 0; c < to.columns; ++c) a[c] = S(0);
+  for (int i = 0; i < 6 * nodes; ++i) to.diagonal[i] = to.compliance[i * row + column(i)];
+  for (int k = 0; k < 6 * nodes; ++k) {
+    const int own = k / 6, at = column(k);
+    S* const pivots = to.compliance + k * row;
+    for (int i = 0; i < 6 * own; ++i) a[column(i)] = to.compliance[i * row + at];
+    to.each(own, nodes, [&](int c) __attribute__((always_inline)) { stored(loaded<V>(pivots + c), a + c); });
+    const S pivot = a[at], inverse = S(1) / pivot;
+    sound = sound & greater(pivot, S(shared<T>) * to.diagonal[k]);
+    for (int i = 0; i < 6 * nodes; ++i) {
+      S* const x = to.compliance + i * row;
+      const S scaled = inverse * a[column(i)];
+      const V by = wide<V>(scaled);
+      if (i == k)
+        to.each(own, nodes, [&](int c) __attribute__((always_inline)) { stored(V(wide<V>(inverse) * loaded<V>(a + c)), x + c); });
+      else
+        to.each(i / 6, nodes, [&](int c) __attribute__((always_inline)) { stored(V(loaded<V>(x + c) - by * loaded<V>(a + c)), x + c); });
+      if (i / 6 <= own) x[at] = i == k ? -inverse : scaled;
     }
   }
-  for (int i = 0; i < n; ++i)  // L⁻¹ in its place
-    for (int j = 0; j < i; ++j) {
-      S x = -A[i * n + j];
-      for (int a = j + 1; a < i; ++a) x -= A[i * n + a] * A[a * n + j];
-      A[i * n + j] = x;
-    }
-  for (int i = 0; i < n; ++i)
-    for (int j = i; j < n; ++j) {
-      S x = j == i ? pivots[j] : S(A[j * n + i] * pivots[j]);
-      for (int a = j + 1; a < n; ++a) x += S(A[a * n + i] * pivots[a]) * A[a * n + j];
-      A[i * n + j] = x;
-    }
   return sound;
 }
 
@@ -185,20 +183,13 @@ unsigned operational_space(const Links<typename S::Scalar>& links, const States<
   }
   typename S::Bits sound = articulated_tip_to_base<false>(links, at, forward);
   nodes_to_base(links, at, forward, to);
+  if constexpr (inverse) sound = sound & invert(at.nodes, to);
   const int n = 6 * at.nodes;
-  const auto found = [&](int i, int j) -> const S& { return to.compliance[size_t(i) * to.columns + node_columns * (j / 6) + j % 6]; };
-  if constexpr (inverse) {
-    for (int i = 0; i < n; ++i)
-      for (int j = i; j < n; ++j) to.inverse[size_t(j) * n + i] = found(i, j);
-    if (n == 6)
-      sound = sound & invert(to.inverse, to.pivots, std::integral_constant<int, 6>());
-    else
-      sound = sound & invert(to.inverse, to.pivots, n);
-  }
   const auto place = [&](int i) { return 6 * at.node[i / 6].place + i % 6; };
   for (int i = 0; i < n; ++i)
     for (int j = i; j < n; ++j) {
-      const S& x = inverse ? to.inverse[size_t(i) * n + j] : found(i, j);
+      const S& found = to.compliance[size_t(i) * to.columns + node_columns * (j / 6) + j % 6];
+      const S x = inverse ? S(-found) : found;
       scattered(x, out + size_t(place(i)) * n + place(j), stride, at.states);
       if (j > i) scattered(x, out + size_t(place(j)) * n + place(i), stride, at.states);
     }

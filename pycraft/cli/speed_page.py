@@ -17,6 +17,7 @@ CALLS = {
     "forward_dynamics_derivatives": "derivatives of forward dynamics",
     "coriolis_matrix": "Coriolis matrix",
     "operational_space_inertia": "operational-space inertia Λ",
+    "operational_space_inertia_of_two": "Λ of two nodes",
     "mass_matrix_inverse_product": f"ℳ⁻¹X, {COLUMNS} columns",
 }
 COMPARED: dict[str, dict[str, str]] = {
@@ -32,6 +33,7 @@ COMPARED: dict[str, dict[str, str]] = {
     "forward_dynamics_derivatives": {"Pinocchio": "`computeABADerivatives`"},
     "coriolis_matrix": {"Pinocchio": "`computeCoriolisMatrix`"},
     "operational_space_inertia": {"Pinocchio": "`computeDelassusMatrix`, not inverted"},
+    "operational_space_inertia_of_two": {"Pinocchio": "`computeDelassusMatrix`, not inverted"},
     "mass_matrix_inverse_product": {
         "Pinocchio": "`computeMinverse`, its product with X by NumPy",
         "MuJoCo": "`mj_kinematics`, `mj_comPos`, `mj_crb`, `mj_factorM`, `mj_solveM`",
@@ -144,7 +146,10 @@ def _markdown(head: list[str], lines: list[list[str]], words: int = 1) -> str:
 
 def _compared(found: Measured) -> str:
     others = packages(found)
-    own = {call: f"`{call}`" for call in CALLS} | {"mass_matrix_inverse_product": "`(H φ M φ* H* + J)⁻¹ @ X`"}
+    own = {call: f"`{call}`" for call in CALLS} | {
+        "operational_space_inertia_of_two": "`operational_space_inertia`, two names",
+        "mass_matrix_inverse_product": "`(H φ M φ* H* + J)⁻¹ @ X`",
+    }
     lines = [[title, own[call], *(COMPARED[call].get(name, "") for name in others)] for call, title in CALLS.items()]
     return _markdown(["call", "here", *others], lines, words=2 + len(others))
 
@@ -153,8 +158,8 @@ def _calls(found: Measured) -> str:
     others = packages(found)
     parts = []
     for call, title in CALLS.items():
-        cpp, python = GOALS[call]
-        said = f"Goals: {cpp:g} in C++, {python:g} from Python." if cpp and python else "No goal."
+        wanted = [f"{goal:g} {where}" for goal, where in zip(GOALS[call], ("in C++", "from Python"), strict=True) if goal]
+        said = f"Goals: {', '.join(wanted)}." if wanted else "No goal."
         parts.append(f"### {title[0].upper()}{title[1:]}\n\n{said}\n")
         parts.append(_markdown(headings(found), [cells(row, others) for row in of_call(found, call)]))
     return "\n".join(parts)
@@ -188,8 +193,9 @@ from Python on arrays that are ready; the ratio is over the fastest package.
 ℳ and ℳ⁻¹ are full and symmetric here; Pinocchio's `crba` from Python fills both triangles, too, and that is counted. MuJoCo's calls leave
 contacts and constraints off; its `mj_forward` computes positions, inertias, their factors and accelerations, and no state is set while the
 clock runs. Pins of the chains turn about y, x and z in turn, the axes for which other packages have their fastest joints; robots are as
-their files have them, legged ones on a free base. Λ is that of the last body, 6 × 6; Pinocchio's time is that of its inverse alone, which
-is then to be inverted, less that on a model of one joint.
+their files have them, legged ones on a free base. Λ is that of the last body, 6 × 6, and of it and the one in the middle, 12 × 12,
+where both move in every direction; Pinocchio's time is that of its inverse alone, which is then to be inverted, less that on a model of
+one joint.
 
 ## Goals
 

@@ -5,6 +5,7 @@ Ball and free subhinges turn; displacements along all others are numbers, whose 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -24,18 +25,18 @@ def turning(model: Any) -> list[slice]:
     return found
 
 
-def brackets(model: Any, v: np.ndarray) -> np.ndarray:
-    """ad(v) (..., nv, nv): the brackets of the twists of ball and free subhinges with v's, zero elsewhere."""
+def brackets(turns: Sequence[slice], v: np.ndarray) -> np.ndarray:
+    """ad(v) (..., nv, nv): the brackets of the twists of ball and free subhinges, at `turns`, with v's; zero elsewhere."""
     out = np.zeros((*v.shape, v.shape[-1]))
-    for of in turning(model):
+    for of in turns:
         out[..., of, of] = _bracket(v[..., of])
     return out
 
 
-def cobrackets(model: Any, costate: np.ndarray) -> np.ndarray:
+def cobrackets(turns: Sequence[slice], costate: np.ndarray) -> np.ndarray:
     """C (..., nv, nv) with x*C y = costate*[x, y]: skew, -[[n~, f~], [f~, 0]] on free hinges, -n~ on balls."""
     out = np.zeros((*costate.shape, costate.shape[-1]))
-    for of in turning(model):
+    for of in turns:
         moment, at = _skew(costate[..., of][..., :3]), of.start
         out[..., at : at + 3, at : at + 3] = -moment
         if of.stop - at == 6:
@@ -77,13 +78,13 @@ class Moved:
     adjoint, differential : Ad and J, (..., nv, nv)
     """
 
-    def __init__(self, model: Any, u: np.ndarray):
+    def __init__(self, turns: Sequence[slice], u: np.ndarray):
         from scipy.linalg import expm
 
-        self._model, self._u = model, u
+        self._turns, self._u = turns, u
         ones = np.broadcast_to(np.eye(u.shape[-1]), (*u.shape, u.shape[-1]))
         self.adjoint, self.differential = ones.copy(), ones.copy()
-        for of in turning(model):
+        for of in turns:
             both = expm(_beside_one(-_bracket(u[..., of])))  # exp [[A, 1], [0, 0]] = [[exp A, φ₁(A)], [0, 1]]
             n = of.stop - of.start
             self.adjoint[..., of, of], self.differential[..., of, of] = both[..., :n, :n], both[..., :n, n:]
@@ -93,9 +94,9 @@ class Moved:
         from scipy.linalg import expm
 
         ad, differential = self.adjoint[..., None, :, :], self.differential[..., None, :, :]
-        both = 0.5 * np.swapaxes(ad, -1, -2) @ cobrackets(self._model, costate) @ differential
+        both = 0.5 * np.swapaxes(ad, -1, -2) @ cobrackets(self._turns, costate) @ differential
         own = np.zeros_like(both)
-        for of in turning(self._model):
+        for of in self._turns:
             n = of.stop - of.start
             M = _beside_one(-_bracket(self._u[..., of]))
             for i in range(n):

@@ -10,7 +10,7 @@ import numpy as np
 from .. import _core
 from ..linear.linear_model import LinearModel, names_of_states
 from ..state import at_state
-from .displacements import brackets
+from .displacements import brackets, turning
 
 OUTPUTS = ("q", "v", "vdot", "position", "rotation", "velocity")
 """What may be asked for, each of something: coordinates, then bodies and nodes."""
@@ -97,7 +97,7 @@ def linear_model(
     batch = np.broadcast_shapes(rates.shape[:-1], along_q.shape[:-2])
     A = np.zeros((*batch, nv + k, nv + k))
     B = np.zeros((*batch, nv + k, along_inputs.shape[-1]))
-    A[..., :nv, :nv] = -brackets(model, v)
+    A[..., :nv, :nv] = -brackets(turning(model), v)
     A[..., :nv, nv : 2 * nv] = np.eye(nv)
     for j in known:
         A[..., j, :] = 0.0

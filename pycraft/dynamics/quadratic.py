@@ -12,6 +12,7 @@ from ..arguments import one_number
 from ..closed import Closed
 from ..linear.linear_model import LinearModel
 from ..state import State, at_state
+from .displacements import turning
 from .linearization import LinearizationCalls
 from .second_order import STEPS, Nominal, StateEquation, Step
 
@@ -31,7 +32,8 @@ class QuadraticModel(Closed):
     """δẋ = A δx + B δu + ½ (δx, δu)*∂²ẋ(δx, δu) near a state; with `dt`, the same of δx⁺ after a step of an integrator.
 
     The states are x = (δq, v): δq are exponential coordinates about the motion that passes through the state, q = q₀ exp(δq), as
-    `integrate` takes them and `difference` gives them. Of a batch of states all arrays have a leading axis.
+    `integrate` takes them and `difference` gives them. Of a batch of states all arrays have a leading axis. Second derivatives are those of
+    the model when they are asked for: make a new one after an edit.
 
     Attributes
     ----------
@@ -196,5 +198,5 @@ class QuadraticCalls(LinearizationCalls):
         states = len(linear.A) if linear.A.ndim == 3 else 1
         q, v, tau = (np.broadcast_to(x, (states, x.shape[-1])) for x in given)
         chosen = [model.coordinate_names.index(name.removeprefix("tau.")) for name in linear.inputs]
-        at = Nominal(model, q, v, tau, chosen, {"form": form, "precision": precision})
+        at = Nominal(model, q, v, tau, chosen, {"form": form, "precision": precision}, turning(model))
         return QuadraticModel(linear, StateEquation(at), at)

@@ -32,7 +32,7 @@ def taken_back(costate: np.ndarray, slope: np.ndarray) -> np.ndarray:
 
 
 class Nominal(NamedTuple):
-    """Where a model is expanded: states (B, nq), (B, nv), forces (B, nv), which coordinates' forces are inputs, form and precision."""
+    """Where a model is expanded: states and forces (B, ...), which coordinates' forces are inputs, form and precision, what turns."""
 
     model: Any
     q: np.ndarray
@@ -40,6 +40,7 @@ class Nominal(NamedTuple):
     tau: np.ndarray
     inputs: list[int]
     how: dict[str, Any]
+    turns: list[slice]
 
 
 class Accelerations:
@@ -57,7 +58,7 @@ class Accelerations:
     """
 
     def __init__(self, at: Nominal):
-        model, q, v, tau, _, how = at
+        model, q, v, tau, _, how, _ = at
         self._model, self._q, self._v, self._precision = model, q, v, how["precision"]
         self.value = model.forward_dynamics(q, v, tau, **how)
         self.slopes = np.concatenate(model.forward_dynamics_derivatives(q, v, tau, **how), axis=-1)
@@ -86,14 +87,14 @@ class StateEquation:
 
     def __init__(self, at: Nominal):
         n = at.model.nv
-        self._model, self._kept = at.model, [*range(2 * n), *(2 * n + j for j in at.inputs)]
+        self._turns, self._kept = at.turns, [*range(2 * n), *(2 * n + j for j in at.inputs)]
         self.accelerations = Accelerations(at)
 
     def hessians(self, costate: np.ndarray) -> np.ndarray:
         """costate*∂²ẋ/∂(x, u)∂(x, u), (B, m, n + k, n + k), of costates (B, m, n) and k inputs."""
-        n = self._model.nv
+        n = costate.shape[-1] // 2
         out = self.accelerations.hessians(costate[..., n:])
-        turned = cobrackets(self._model, costate[..., :n]) / 2
+        turned = cobrackets(self._turns, costate[..., :n]) / 2
         out[..., :n, n : 2 * n] += turned
         out[..., n : 2 * n, :n] += transposed(turned)
         return out[..., self._kept, :][..., self._kept]
@@ -120,7 +121,7 @@ class Step:
 
     def __init__(self, at: Nominal, dt: float, method: str):
         model, v = at.model, at.v
-        self._model, self._dt = model, dt
+        self._dt = dt
         self._parts, self._weights = STEPS[method]
         self._implicit = method == "semi-implicit-euler"
         states, n, k = len(v), model.nv, len(at.inputs)
@@ -142,13 +143,13 @@ class Step:
         if self._implicit:
             u, along_u = dt * after, dt * along_v
         self._start, self._along_u = start[:, :n], along_u
-        self._moved = Moved(model, u)
+        self._moved = Moved(at.turns, u)
         self.q, self.v = displaced(model, at.q, u), after
         self.slopes = np.concatenate([self._moved.adjoint @ self._start + self._moved.differential @ along_u, along_v], axis=-2)
 
     def hessians(self, costate: np.ndarray) -> np.ndarray:
         """costate*∂²x⁺/∂(x, u)∂(x, u), (B, m, n + k, n + k), of costates (B, m, n) and k inputs."""
-        n, h = self._model.nv, self._dt
+        n, h = costate.shape[-1] // 2, self._dt
         of_q, of_v = costate[..., :n], costate[..., n:]
         out = weighed(self._moved, of_q, self._start, self._along_u)
         of_u = taken_back(of_q, self._moved.differential)
@@ -169,24 +170,23 @@ class Stage:
     def __init__(
         self, at: Nominal, u: np.ndarray, v: np.ndarray, along_q: np.ndarray, along_u: np.ndarray, along_v: np.ndarray, given: np.ndarray
     ):
-        model = at.model
-        self._model, self._v, self._u = model, v, u
+        self._turns, self._v, self._u = at.turns, v, u
         self._along_q, self._along_u, self._along_v = along_q, along_u, along_v
-        self._moved = Moved(model, u)
-        self.accelerations = Accelerations(at._replace(q=displaced(model, at.q, u), v=v))
+        self._moved = Moved(at.turns, u)
+        self.accelerations = Accelerations(at._replace(q=displaced(at.model, at.q, u), v=v))
         here = self._moved.adjoint @ along_q + self._moved.differential @ along_u
         self._along_all = np.concatenate([here, along_v, given], axis=-2)
         self.along_vdot = self.accelerations.slopes @ self._along_all
-        by_u, by_v, ones = brackets(model, u), brackets(model, v), np.eye(model.nv)
+        by_u, by_v, ones = brackets(at.turns, u), brackets(at.turns, v), np.eye(v.shape[-1])
         self._rate_by_v = ones + by_u / 2 + by_u @ by_u / 12
-        twice = brackets(model, np.einsum("...ij,...j->...i", by_u, v))
+        twice = brackets(at.turns, np.einsum("...ij,...j->...i", by_u, v))
         self._rate_by_u = -by_v / 2 - (twice + by_u @ by_v) / 12
         self.rate = np.einsum("...ij,...j->...i", self._rate_by_v, v)
         self.along_rate = self._rate_by_u @ along_u + self._rate_by_v @ along_v
 
     def back(self, of_rate: np.ndarray, of_vdot: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Of costates (B, m, nv) of the rate and of v̇ what second derivatives they weigh, and the costates of u and v."""
-        n = self._model.nv
+        n = of_rate.shape[-1]
         out = chained(self._along_all, self._along_all, self.accelerations.hessians(of_vdot))
         through = taken_back(of_vdot, self.accelerations.slopes)
         of_q = through[..., :n]
@@ -196,11 +196,11 @@ class Stage:
 
     def _of_rate(self, costate: np.ndarray) -> np.ndarray:
         """λ*∂²r of r = v + ½ [u, v] + 1/12 [u, [u, v]]."""
-        by_u = brackets(self._model, self._u)
-        C = cobrackets(self._model, costate)
-        carried = cobrackets(self._model, taken_back(costate, by_u))
+        by_u = brackets(self._turns, self._u)
+        C = cobrackets(self._turns, costate)
+        carried = cobrackets(self._turns, taken_back(costate, by_u))
         u_and_v = C / 2 + (C @ by_u[..., None, :, :] + carried) / 12
-        u_and_u = -both_ways(C @ brackets(self._model, self._v)[..., None, :, :]) / 12
+        u_and_u = -both_ways(C @ brackets(self._turns, self._v)[..., None, :, :]) / 12
         mixed = chained(self._along_u, self._along_v, u_and_v)
         return both_ways(mixed) + chained(self._along_u, self._along_u, u_and_u)
 

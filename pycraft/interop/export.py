@@ -37,14 +37,21 @@ def _bodies(model: Described) -> list[dict[str, Any]]:
 class PinocchioModel:
     """Pinocchio's model with the order of its numbers: `q[..., of_q]` and `v[..., of_v]` are Pinocchio's, quaternions made unit.
 
-    `tip`: the joint that carries the last body, and where the body's frame is in the joint's.
+    `bodies`: of each the joint that carries it, and where the body's frame is in the joint's.
     """
 
     model: Any
     of_q: np.ndarray
     of_v: np.ndarray
     quaternions: tuple[int, ...]
-    tip: tuple[int, Any]
+    bodies: tuple[tuple[int, Any], ...]
+
+    @property
+    def tip(self) -> tuple[int, Any]:
+        """The joint and the place of the last body, or of the base."""
+        import pinocchio as pin
+
+        return self.bodies[-1] if self.bodies else (0, pin.SE3.Identity())
 
     def q(self, q: Vector) -> Vector:
         """Pinocchio's configuration (nq,) of ours."""
@@ -110,8 +117,8 @@ def to_pinocchio(model: Described) -> PinocchioModel:
         armature.extend(hinge["rotor_inertia"])
     out.armature = np.array(armature, float)[of_v]
     out.gravity.linear = np.array(model.gravity, float)
-    tip = (joints[-1], placements[-1]) if joints else (0, pin.SE3.Identity())
-    return PinocchioModel(out, np.array(of_q, int), np.array(of_v, int), tuple(quaternions), tip)
+    bodies = tuple(zip(joints, placements, strict=True))
+    return PinocchioModel(out, np.array(of_q, int), np.array(of_v, int), tuple(quaternions), bodies)
 
 
 def _pinocchio_joint(subhinge: dict[str, Any]) -> Any:

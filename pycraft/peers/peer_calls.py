@@ -6,7 +6,7 @@ A call that is timed gets what it takes in the package's own order: nothing is c
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from importlib.util import find_spec
 from typing import Any, NamedTuple, TypeAlias
 
@@ -52,16 +52,20 @@ class PinocchioCalls:
 
     def calls(self, q: np.ndarray, v: np.ndarray, u: np.ndarray, X: np.ndarray) -> dict[str, Call]:
         of_v = self.twin.of_v
-        return self._calls(self.twin.q(q), v[of_v], u[of_v], X[of_v], np.argsort(of_v), self.twin.tip)
+        return self._calls(self.twin.q(q), v[of_v], u[of_v], X[of_v], np.argsort(of_v), self.twin.bodies)
 
-    def _calls(self, q: np.ndarray, v: np.ndarray, u: np.ndarray, X: np.ndarray, back: np.ndarray, tip: tuple[int, Any]) -> dict[str, Call]:
+    def _calls(
+        self, q: np.ndarray, v: np.ndarray, u: np.ndarray, X: np.ndarray, back: np.ndarray, bodies: tuple[tuple[int, Any], ...]
+    ) -> dict[str, Call]:
         pin, model, data = self.pin, self.model, self.data
-        held, held_data = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
-        held.append(pin.RigidConstraintModel(pin.ContactType.CONTACT_6D, model, *tip, pin.LOCAL))
-        held_data.append(held[0].createData())
+        tip, both = self._held(bodies[-1:]), self._held((bodies[-1], bodies[len(bodies) // 2]))
 
         def square(matrix: np.ndarray) -> np.ndarray:
             return np.asarray(matrix)[np.ix_(back, back)]
+
+        def inertia(held: tuple[Any, Any], count: int) -> tuple[np.ndarray, ...]:
+            order = [6 * i + j for i in range(count) for j in _ANGULAR]
+            return (np.linalg.inv(pin.computeDelassusMatrix(model, data, q, *held))[np.ix_(order, order)],)
 
         def derivatives(found: Any) -> tuple[np.ndarray, ...]:
             along_q, along_v, third = found
@@ -100,8 +104,12 @@ class PinocchioCalls:
                 copies=1,
             ),
             "operational_space_inertia": Call(  # without the inverse, which is NumPy's from Python and takes longer there
-                lambda: pin.computeDelassusMatrix(model, data, q, held, held_data),
-                lambda: (np.linalg.inv(pin.computeDelassusMatrix(model, data, q, held, held_data))[np.ix_(_ANGULAR, _ANGULAR)],),
+                lambda: pin.computeDelassusMatrix(model, data, q, *tip),
+                lambda: inertia(tip, 1),
+            ),
+            "operational_space_inertia_of_two": Call(
+                lambda: pin.computeDelassusMatrix(model, data, q, *both),
+                lambda: inertia(both, 2),
             ),
             "mass_matrix_inverse_product": Call(
                 lambda: pin.computeMinverse(model, data, q) @ X,
@@ -109,16 +117,24 @@ class PinocchioCalls:
             ),
         }
 
+    def _held(self, bodies: Iterable[tuple[int, Any]]) -> tuple[Any, Any]:
+        """Constraints of these bodies in all directions, and their data: what a Delassus matrix is of."""
+        pin, held, data = self.pin, self.pin.StdVec_RigidConstraintModel(), self.pin.StdVec_RigidConstraintData()
+        for joint, placement in bodies:
+            held.append(pin.RigidConstraintModel(pin.ContactType.CONTACT_6D, self.model, joint, placement, pin.LOCAL))
+            data.append(held[len(held) - 1].createData())
+        return held, data
+
     def bindings(self, call: str) -> Callable[[], Any]:
         """The call on a model without joints: what that takes is not the call's own work. One joint where it needs one."""
         pin, empty = self.pin, object.__new__(PinocchioCalls)
         empty.pin, empty.model = pin, pin.Model()
-        if call == "operational_space_inertia":
+        if call.startswith("operational_space_inertia"):
             empty.model.addJoint(0, pin.JointModelRX(), pin.SE3.Identity(), "one")
             empty.model.appendBodyToJoint(1, pin.Inertia.Identity(), pin.SE3.Identity())
         empty.data = empty.model.createData()
         none = np.zeros(empty.model.nv)
-        return empty._calls(none, none, none, np.zeros((len(none), 1)), np.arange(len(none)), (len(none), pin.SE3.Identity()))[call].run
+        return empty._calls(none, none, none, np.zeros((len(none), 1)), np.arange(len(none)), ((len(none), pin.SE3.Identity()),))[call].run
 
     def in_cpp(self, call: str, q: np.ndarray, v: np.ndarray, u: np.ndarray) -> tuple[Clock, int] | None:
         """A clock of so many states (q, v, u) in a loop in C++ on one thread; None where the package has no such loop."""

@@ -39,6 +39,7 @@ GOALS: dict[str, tuple[float | None, float | None]] = {  # times faster than the
     "forward_dynamics_derivatives": (2.0, 2.0),
     "coriolis_matrix": (1.3, 1.3),
     "operational_space_inertia": (1.5, 1.5),
+    "operational_space_inertia_of_two": (1.5, None),
     "mass_matrix_inverse_product": (None, None),
 }
 BATCH_GOALS = {"baseline": (None, None), "avx2": (6.0, 10.0), "avx512": (12.0, 20.0)}
@@ -133,9 +134,20 @@ class OwnCalls:
         n = model.nv
         self.X = np.random.default_rng(0).uniform(-1, 1, (n, COLUMNS)) if n <= max(CHAINS) else np.empty((n, 0))
         self.vector, self.matrix, self.square = np.empty(n), np.empty((n, n) if n <= max(CHAINS) else (0, 0)), np.empty((6, 6))
-        self.tip = list(model.bodies)[-1]
+        bodies = list(model.bodies)
+        self.tip, self.both = bodies[-1], [bodies[-1], bodies[len(bodies) // 2]]
         H, phi, M, J = model.soa("H phi M J")
         self.inverse = (H @ phi @ M @ phi.T @ H.T + J).inv()
+
+    @property
+    def calls(self) -> list[str]:
+        """Of `GOALS` what the model has at every state: two nodes may not move in every direction independently."""
+        Q = self.states[0]
+        try:
+            self.model.operational_space_inertia(self.both, Q)
+        except _core.SingularOperatorError:
+            return [call for call in GOALS if call != "operational_space_inertia_of_two"]
+        return list(GOALS)
 
     def run(self, call: str) -> Any:
         """The call itself."""
@@ -149,6 +161,8 @@ class OwnCalls:
                 return model.coriolis_matrix(q, v, out=self.matrix)
             case "operational_space_inertia":
                 return model.operational_space_inertia(self.tip, q, out=self.square)
+            case "operational_space_inertia_of_two":
+                return model.operational_space_inertia(self.both, q)
             case "mass_matrix_inverse_product":
                 model.q = q
                 return self.inverse @ self.X
@@ -168,7 +182,7 @@ class OwnCalls:
                 return lambda: own(q, v, out=matrix)  # type: ignore[misc]  # a call of the model
             case "operational_space_inertia":
                 return lambda: own(tip, q, out=square)  # type: ignore[misc]  # a call of the model
-            case "mass_matrix_inverse_product":
+            case "operational_space_inertia_of_two" | "mass_matrix_inverse_product":
                 return lambda: self.run(call)
         return lambda: own(q, v, u)  # type: ignore[misc]  # a call of the model
 
@@ -206,6 +220,9 @@ def _checked_alone(name: str, call: str, own: OwnCalls) -> float:
             return _checked(name, call, own.run(call), (exact(q, v),), "that of extended precision")
         case "operational_space_inertia":
             return _checked(name, call, own.run(call), (exact(own.tip, q),), "that of extended precision")
+        case "operational_space_inertia_of_two":
+            other = model.operational_space_inertia(own.both, q, precision="extended")
+            return _checked(name, call, own.run(call), (other,), "that of extended precision")
         case "mass_matrix_inverse_product":
             return _checked(name, call, own.run(call), (exact(q) @ own.X,), "that of extended precision")
     slopes = model.forward_dynamics_derivatives(q, v, u)
@@ -291,7 +308,7 @@ def measure(seconds: float = 0.1, quick: bool = False, progress: Callable[[str],
             except PeerRefusal as refusal:
                 found.leave_out(f"{make.name} on {name}: {refusal}")
         theirs = {peer: package.calls(own.q, own.v, own.u, own.X) for peer, package in packages.items()}
-        for call in GOALS:
+        for call in own.calls:
             progress(f"{name}: {call.replace('_', ' ')}")
             peers = {peer: calls[call] for peer, calls in theirs.items() if call in calls}
             found.rows.append(measured_row(name, own, call, peers, seconds, packages.get("Pinocchio")))

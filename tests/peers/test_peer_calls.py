@@ -35,8 +35,11 @@ def test_every_call_is_the_same(package, name):
         "mujoco": {"forward_dynamics", "inverse_dynamics", "mass_matrix", "mass_matrix_inverse_product"},
     }
     assert set(theirs) == least.get(package, {"forward_dynamics", "inverse_dynamics", "mass_matrix"})
+    assert "operational_space_inertia_of_two" not in own.calls or name == "g1"
     for call, other in theirs.items():
         other.run()
+        if call not in own.calls:
+            continue
         assert speed._checked(name, call, own.run(call), other.value(), package) < 1e-10, call
 
 
