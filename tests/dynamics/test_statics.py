@@ -39,6 +39,42 @@ def test_pendulum_both_ways():
     close(model.equilibrium([torque], [1.0], stable=True).q, [-np.arccos(0.3)], 1e-9)
 
 
+def test_it_leaves_an_unstable_equilibrium():
+    model = chain(3)
+    upright = model.equilibrium(q0=[np.pi / 2, 0, 0])
+    assert [mode.stability for mode in upright.modes] == ["unstable"] * 3
+    hanging = model.equilibrium(q0=upright.q, stable=True)
+    assert hanging.stability == "stable"
+    close(model.centre_of_mass(hanging.q), [0, -1.5, 0], 1e-9)
+
+
+def test_what_counts_as_balanced_follows_the_size_of_forces():
+    """Grains and ships: the same pendulum, and half of the force that cannot be balanced is left at both."""
+    for size in (1e-12, 1e12):
+        model = pc.Multibody("pendulum")
+        model.add_body("rod", mass=size, com=(0.5, 0, 0), inertia=size * np.diag([0, 1 / 12, 1 / 12]))
+        model.gravity = (0, -G, 0)
+        close(model.equilibrium([0.3 * size * G / 2], [-1.0]).q, [-np.arccos(0.3)])
+        with pytest.raises(pc.EvaluationError, match="'rod'"):
+            model.equilibrium([size * G], [-1.0])
+
+
+def test_flutter():
+    """Ziegler's column, a force that follows the last rod, on springs: a complex pair at a load at which real parts are positive."""
+    model = chain(2)
+    model.add_node("end", "body1", position=(1, 0, 0))
+    found = {
+        load: pc.Scene(model).add(E.Spring(1.0), E.Wrench("end", (0, 0, 0, -load, 0, 0), axes="body")).equilibrium([0.0, 0.0])
+        for load in (0.5, 3.0)
+    }
+    assert found[0.5].stability == "stable" and all(np.isreal(mode.eigenvalue) for mode in found[0.5].modes)
+    values = [mode.eigenvalue for mode in found[3.0].modes]
+    assert found[3.0].stability == "unstable" and abs(np.imag(values[0])) > 1
+    close(np.real(values), np.full(2, 9 / 7))  # μ² - 18/7 μ + 36/7 = 0
+    expected = np.linalg.eigvals(np.linalg.solve(model.mass_matrix([0, 0]), found[3.0].stiffness))
+    close(np.sort_complex(values), np.sort_complex(expected))
+
+
 def test_pendulum_with_spring():
     model = chain(1)
     for k in (5.0, 40.0):  # stiffer than gravity: one equilibrium
