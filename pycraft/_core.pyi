@@ -7,7 +7,7 @@ import fractions
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Binding', 'Centroidal', 'Dynamics', 'Effect', 'Error', 'EvaluationError', 'FrameTree', 'FunctionOfTime', 'GroupedOperators', 'HingeKind', 'HybridDynamics', 'Integration', 'InterbodyForces', 'Letter', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'RunRecord', 'Scalar', 'SceneCalls', 'SceneEffects', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'alone', 'blockdiag', 'bushing_effect', 'check_pairing', 'checked_refinement', 'compiled_call', 'constant', 'constant_in_time', 'coordinates_named', 'coulomb_friction_effect', 'damping_effect', 'direct_call', 'direct_calls', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'gravity_effect', 'gravity_gradient_effect', 'harmonic', 'hermite_between', 'hinge_kinds', 'identity', 'implicit_damping_effect', 'implicit_spring_effect', 'instruction_set', 'instruction_sets', 'integrator_table', 'integrators', 'kernel_headers', 'kernel_tape', 'limits_effect', 'methods', 'motor_effect', 'node_damper_effect', 'node_spring_effect', 'numbers_in_q', 'operators_of', 'pack_width', 'piecewise_polynomial', 'point_mass_gravity_effect', 'precisions', 'prepared_call', 'prescribed_by', 'prescribed_effect', 'python_effect', 'python_function_of_time', 'quadratic_damping_effect', 'real_array', 'record_from', 'residual', 'rotor_inertia_effect', 'run_scene', 'run_scenes', 'scalar', 'scene_at_rest', 'scene_between', 'scene_interbody_forces', 'scene_linearized', 'servo_effect', 'spring_effect', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_by_hand', 'time_compiled', 'time_dynamics', 'time_forward', 'time_hybrid', 'time_method', 'time_packs', 'time_passes', 'time_scene', 'torque_source_effect', 'vector', 'wider', 'wrench_effect', 'zero']
+__all__: list[str] = ['Binding', 'Centroidal', 'Dynamics', 'Effect', 'Error', 'EvaluationError', 'FrameTree', 'FunctionOfTime', 'GroupedOperators', 'HingeKind', 'HybridDynamics', 'Integration', 'InterbodyForces', 'Letter', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'PreparedHybridDynamics', 'RefinementError', 'RunRecord', 'Scalar', 'SceneCalls', 'SceneEffects', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'alone', 'blockdiag', 'bushing_effect', 'check_pairing', 'checked_refinement', 'compiled_call', 'constant', 'constant_in_time', 'coordinates_named', 'coulomb_friction_effect', 'damping_effect', 'direct_call', 'direct_calls', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'gravity_effect', 'gravity_gradient_effect', 'harmonic', 'hermite_between', 'hinge_kinds', 'identity', 'implicit_damping_effect', 'implicit_spring_effect', 'instruction_set', 'instruction_sets', 'integrator_table', 'integrators', 'kernel_headers', 'kernel_tape', 'limits_effect', 'methods', 'motor_effect', 'node_damper_effect', 'node_spring_effect', 'numbers_in_q', 'operators_of', 'pack_width', 'piecewise_polynomial', 'point_mass_gravity_effect', 'precisions', 'prepared_call', 'prescribed_by', 'prescribed_effect', 'python_effect', 'python_function_of_time', 'quadratic_damping_effect', 'real_array', 'record_from', 'residual', 'rotor_inertia_effect', 'run_scene', 'run_scenes', 'scalar', 'scene_at_rest', 'scene_between', 'scene_interbody_forces', 'scene_linearized', 'servo_effect', 'spring_effect', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_by_hand', 'time_compiled', 'time_dynamics', 'time_forward', 'time_hybrid', 'time_method', 'time_packs', 'time_passes', 'time_scene', 'torque_source_effect', 'vector', 'wider', 'wrench_effect', 'zero']
 
 class Error(Exception): ...
 class SpaceError(Error, TypeError): ...
@@ -911,6 +911,16 @@ class Dynamics:
         ...
     def refinement(self, q: typing.Any, v: typing.Any, tau: typing.Any, form: str, refine: typing.Any, residual: str, precision: str | int) -> tuple[numpy.typing.NDArray[numpy.float64], list[float], typing.Any]:
         ...
+class PreparedHybridDynamics:
+    """
+    Hybrid dynamics whose options were read once.
+    """
+    def __call__(self, q: typing.Any, v: typing.Any, tau: typing.Any, vdot: typing.Any) -> typing.Any:
+        """
+        Accelerations and forces; None where an argument is not a plain array, there are other states than was said, or the model was edited since.
+        """
+    def __reduce__(self) -> tuple:
+        ...
 class HybridDynamics:
     def __call__(self, q: typing.Any, v: typing.Any, tau: typing.Any, vdot: typing.Any, form: str, refine: typing.Any, residual: str, precision: str | int, threads: typing.SupportsInt | typing.SupportsIndex) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
         ...
@@ -918,6 +928,10 @@ class HybridDynamics:
         ...
     def __reduce__(self) -> tuple:
         ...
+    def prepared(self, form: str, refine: typing.Any, residual: str, precision: str | int, states: typing.SupportsInt | typing.SupportsIndex) -> PreparedHybridDynamics:
+        """
+        For loops, of one state (-1) or so many a call.
+        """
     @property
     def prescribed(self) -> list[bool]:
         """
