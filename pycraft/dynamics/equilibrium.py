@@ -100,6 +100,10 @@ class _Search:
         self._last: tuple[np.ndarray, Balance] | None = None
         self.curved = bool(brackets(model, np.ones(model.nv)).any())
         self.limits = limits
+        if limits:  # start within them; where both are one there is nothing to search for
+            lower, upper = self.bounds()
+            self.q = self.moved(np.clip(0.0, lower, upper))[1]
+            self.free = free[lower < upper]
 
     def at(self, q: np.ndarray) -> Balance:
         """What balances there: kept for the question after."""
@@ -187,7 +191,7 @@ class _Search:
             for subhinge, low, high in zip(hinge.subhinges, *hinge.limits, strict=True):
                 kind = _core.subhinge_kinds[subhinge["kind"]]
                 if kind.nq == 1:
-                    lower[v], upper[v] = min(low - self.q[q], 0.0), max(high - self.q[q], 0.0)
+                    lower[v], upper[v] = low - self.q[q], high - self.q[q]
                 q, v = q + kind.nq, v + kind.nv
         return lower[self.free], upper[self.free]
 
@@ -257,16 +261,15 @@ def modes(model: Any, at: Balance, free: np.ndarray) -> tuple[Mode, ...]:
         return ()
     chosen = np.ix_(free, free)
     stiffness, mass = -at.along_q[chosen], at.mass[chosen]
-    try:
-        np.linalg.cholesky(mass)
-    except np.linalg.LinAlgError:
-        mass = np.eye(len(free))  # the signs of eigenvalues are the same
-    size = max(np.abs(stiffness).max(), INDIFFERENT * at.size)
-    if np.abs(stiffness - stiffness.T).max() <= INDIFFERENT * size:
+    lightest, heaviest = np.linalg.eigvalsh(mass)[[0, -1]]
+    if lightest <= len(free) * np.finfo(float).eps * heaviest:
+        mass, lightest = np.eye(len(free)), 1.0  # the signs of eigenvalues are the same
+    rounding = 1e3 * np.finfo(float).eps * at.size  # of forces, sums over the bodies
+    if np.abs(stiffness - stiffness.T).max() <= max(INDIFFERENT * np.abs(stiffness).max(), rounding):
         values, shapes = eigh((stiffness + stiffness.T) / 2, mass)
     else:
         values, shapes = eig(stiffness, mass)
-    zero = INDIFFERENT * max(np.abs(values).max(), np.abs(at.size / np.diag(mass).max()) * INDIFFERENT)
+    zero = max(INDIFFERENT * np.abs(values).max(), rounding / lightest)
     found = []
     for i in np.argsort(np.real(values), kind="stable"):
         value = values[i]

@@ -33,6 +33,7 @@ def test_pendulum_both_ways():
     above, below = model.equilibrium([torque], [1.0]), model.equilibrium([torque], [-1.0])
     close(above.q, [np.arccos(0.3)])
     close(below.q, [-np.arccos(0.3)])
+    close(model.equilibrium(torque, [-1.0]).q, below.q)
     assert (above.stability, below.stability) == ("unstable", "stable")
     close(below.stiffness, [[G / 2 * np.sin(np.arccos(0.3))]])
     close(below.modes[0].eigenvalue, G / 2 * np.sin(np.arccos(0.3)) * 3)  # ℳ = 1/3
@@ -253,6 +254,15 @@ def test_limits():
     model.hinges["hinge0"].limits = (-2.0, 1.0)
     found = model.equilibrium(q0=[-0.5, -0.5], limits=True)
     close(found.q, [-np.pi / 2, 0.0])
+    close(model.equilibrium(q0=[-3.0, 0.1], limits=True).q, [-np.pi / 2, 0.0])  # from outside of them
+    model.hinges["hinge0"].limits = (0.3, 0.3)
+    locked = model.equilibrium(q0=[0.0, -1.0], limits=True)
+    close(locked.q, [0.3, -np.pi / 2 - 0.3])
+    close(locked.holding, [G * 1.5 * np.cos(0.3), 0.0])
+    ball = pc.tree([-1, 0], ["ball", "pin"], seed=2)  # a ball has none
+    ball.gravity = (0, 0, -G)
+    ball.hinges["hinge1"].limits = (-10.0, 10.0)
+    assert ball.equilibrium(limits=True, stable=True).stability == "indifferent"
 
 
 def test_held_coordinates():
@@ -297,6 +307,10 @@ def test_degenerate_models():
         wrenches={"body0": np.r_[np.cross(floating.centre_of_mass() - floating.pose("body0")[:3, 3], lift), lift]}
     )
     close(carried.q, floating.q)
+    assert carried.stability == "indifferent"
+    floating.gravity = (0, 0, 0)  # three forces that balance to rounding: 0.1 + 0.2 - 0.3 is not zero
+    pulled = pc.Scene(floating).add(*(E.Wrench("body0", (0, 0, 0, x, 0, 0)) for x in (0.1, 0.2, -0.3))).equilibrium()
+    assert pulled.stability == "indifferent" and 0 < np.abs(pulled.residual).max() < 1e-15
     massless = pc.Multibody("feather")
     massless.add_body("feather")
     assert pc.Scene(massless).add(E.Spring(2.0, 0.4)).equilibrium([0.1]).q == pytest.approx([0.4])
@@ -332,6 +346,7 @@ def test_refusals():
         ({"tau": [0.0]}, "tau"),
         ({"tau": [np.nan] * 7}, "tau|finite"),
         ({"q0": [0.0]}, "q"),
+        ({"q0": np.full(8, np.nan)}, "q|hinge0"),
         ({"wrenches": {"body9": np.zeros(6)}}, "body9"),
         ({"tau": np.zeros((2, 7)), "q0": np.zeros((3, 8))}, "2 and 3"),
     ):
