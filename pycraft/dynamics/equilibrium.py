@@ -19,6 +19,9 @@ TOLERANCE = 1e-9
 FAR = 1e4
 """Radians and metres beyond which a model that goes down the slope of its forces is taken to go on without end."""
 
+STEPS = 5000
+"""Of a model that goes down the slope of its forces, at most."""
+
 
 class Mode(NamedTuple):
     """One way in which a mechanism leaves an equilibrium, or swings about it.
@@ -141,11 +144,11 @@ class _Search:
         from scipy.optimize import least_squares, root
 
         if len(self.free):
-            start, (lower, upper) = np.zeros(len(self.free)), self.bounds()
-            if not np.isfinite(np.r_[lower, upper]).any():
+            start = np.zeros(len(self.free))
+            if not np.isfinite(self.bounds()).any():
                 self.take(root(self.left, start, jac=self.slope, method="hybr", options={"xtol": 1e-13, "factor": 0.5}).x)
             if not self.balanced(tolerance):
-                start, (lower, upper) = np.zeros(len(self.free)), self.bounds()
+                lower, upper = self.bounds()
                 tight = {"ftol": 1e-15, "xtol": 1e-15, "gtol": 1e-15}
                 self.take(least_squares(self.left, np.clip(start, lower, upper), jac=self.slope, bounds=(lower, upper), **tight).x)
             self.sharpen()
@@ -214,7 +217,14 @@ class _Search:
         def jacobian(_: float, x: np.ndarray) -> np.ndarray:
             return weight[:, None] * (turned(x).T @ self.slope(x))
 
+        steps = iter(range(STEPS))
+
         def settled(_: float, x: np.ndarray) -> float:
+            if next(steps, None) is None:
+                raise _core.EvaluationError(
+                    f"{self.model.name!r}: no stable equilibrium was found in {STEPS} steps down the slope of its forces: where they have "
+                    "no potential it may go round; start elsewhere (q0=), or take what there is (stable=False)"
+                )
             now = self.at(self.moved(x)[1])
             return float(np.abs(now.left[self.free]).max()) - 1e-6 * now.size
 
@@ -242,7 +252,7 @@ class _Search:
 
     def refuse(self, now: Balance) -> None:
         names, left = self.model.coordinate_names, now.left
-        worst = sorted((j for j in self.free if abs(left[j]) > TOLERANCE * now.size), key=lambda j: -abs(left[j]))
+        worst = sorted((j for j in self.free if left[j] != 0), key=lambda j: -abs(left[j]))
         told = ", ".join(f"{names[j]!r} {left[j]:.3g}" for j in worst[:5]) + (", ..." if len(worst) > 5 else "")
         lower, upper = self.bounds()
         at_limit = [repr(names[j]) for j, low, high in zip(self.free, lower, upper, strict=True) if min(-low, high) < 1e-9]
