@@ -78,6 +78,8 @@ def solved(
     model: Any, at: Callable[[np.ndarray], Balance], q0: np.ndarray, held: Iterable[int], limits: bool, stable: bool, tolerance: float
 ) -> Equilibrium:  # fmt: skip
     """The equilibrium that is found from q0, of forces at rest as `at` has them. EvaluationError where there is none."""
+    if not 0 < tolerance < 1:
+        raise _core.EvaluationError(f"tolerance={tolerance}: what may be left, as a part of the largest force, between 0 and 1")
     free = np.setdiff1d(np.arange(model.nv), list(held))
     search = _Search(model, at, np.array(q0, float), free, limits)
     if not stable:

@@ -365,6 +365,9 @@ def test_refusals():
             model.equilibrium(**options)
     with pytest.raises(pc.ModelError, match="elbow"):
         model.counterbalance(actuated="elbow")
+    for tolerance in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(pc.EvaluationError, match="tolerance="):
+            chain(1).equilibrium(q0=[-1.0], tolerance=tolerance)
     with pytest.raises(pc.EvaluationError, match="double"):
         pc.Scene(chain(1), precision="quad").equilibrium([0.0])
     assert np.array_equal(model.q, before)
