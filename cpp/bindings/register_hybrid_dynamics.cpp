@@ -1,8 +1,11 @@
 // Hybrid dynamics on arrays: which coordinates are prescribed is said once, by an object that is called.
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "bindings/direct_calls.h"
+#include "bindings/plain_arrays.h"
 #include "dynamics/batch_hybrid_dynamics.h"
 #include "simulation/selection.h"
 
@@ -21,6 +24,41 @@ std::vector<char> prescribed_by(const Multibody& model, const std::vector<std::s
   return prescribed;
 }
 
+// Calls in loops: options are read once, and arrays are taken that are plain.
+struct PreparedHybrid {
+  py::object owner;  // of what computes
+  BatchHybridDynamics* dynamics;
+  Solving how;
+  Precision precision;
+  int states;          // -1: one
+  std::uint64_t made;  // for these parameters of the model
+
+  // (v̇, T); None where something is not plain, there are other states than was said, or the model was edited since.
+  py::object call(py::handle q, py::handle v, py::handle tau, py::handle vdot) const {
+    const Multibody& model = dynamics->model();
+    if (model.parameters() != made) return py::none();
+    const int nv = model.nv();
+    const std::optional<Given> given[] = {plain_argument(q.ptr(), "q", model.nq()), plain_argument(v.ptr(), "v", nv), plain_argument(tau.ptr(), "tau", nv), plain_argument(vdot.ptr(), "vdot", nv)};
+    int batch = -1;
+    for (const auto& one : given) {
+      if (!one || (one->batch >= 0 && one->batch != states)) return py::none();
+      batch = std::max(batch, one->batch);
+    }
+    if (batch != states) return py::none();
+    py::array_t<double> accelerations = output(py::none(), states, {nv}), forces = output(py::none(), states, {nv});
+    double *const to_accelerations = accelerations.mutable_data(), *const to_forces = forces.mutable_data();
+    const auto compute = [&] { dynamics->run(*given[0], *given[1], *given[2], *given[3], how, precision, to_accelerations, to_forces); };
+    if (model.bodies() * std::max(states, 1) <= kept) {
+      compute();
+    } else {
+      const Undisturbed undisturbed(model);
+      compute();
+    }
+    return py::make_tuple(accelerations, forces);
+  }
+  static constexpr long kept = 64;  // bodies times states below which letting the GIL go would cost more than it gives to others
+};
+
 }  // namespace
 
 void register_hybrid_dynamics(py::module_& m) {
@@ -28,6 +66,9 @@ void register_hybrid_dynamics(py::module_& m) {
     const std::vector<char> prescribed = prescribed_by(model, names);
     return std::vector<bool>(prescribed.begin(), prescribed.end());
   }, py::arg("model"), py::arg("names"), "Whether each coordinate is prescribed, by names of hinges, coordinates or patterns; ModelError for one that is named twice.");
+  py::class_<PreparedHybrid> prepared(m, "PreparedHybridDynamics", "Hybrid dynamics whose options were read once.");
+  unpicklable(prepared).def("__call__", &PreparedHybrid::call, py::arg("q"), py::arg("v"), py::arg("tau"), py::arg("vdot"),
+                            "Accelerations and forces; None where an argument is not a plain array, there are other states than was said, or the model was edited since.");
   py::class_<BatchHybridDynamics> hybrid(m, "HybridDynamics");
   unpicklable(hybrid)
       .def(py::init([](std::shared_ptr<Multibody> model, const std::vector<std::string>& names) {
@@ -35,6 +76,10 @@ void register_hybrid_dynamics(py::module_& m) {
         return std::make_unique<BatchHybridDynamics>(std::move(model), std::move(prescribed));
       }), py::arg("model"), py::arg("names"))
       .def_property_readonly("prescribed", [](const BatchHybridDynamics& d) { return std::vector<bool>(d.prescribed().begin(), d.prescribed().end()); }, "Whether each coordinate is.")
+      .def("prepared", [](const py::object& self, Form form, const py::object& refine, const std::string& residual, Precision precision, int states) {
+        auto& d = py::cast<BatchHybridDynamics&>(self);
+        return PreparedHybrid{self, &d, {form, refinement(refine, residual, precision), OnSingular::raise}, precision, states, d.model().parameters()};
+      }, py::arg("form"), py::arg("refine"), py::arg("residual"), py::arg("precision"), py::arg("states"), "For loops, of one state (-1) or so many a call.")
       .def("__call__", [](BatchHybridDynamics& d, const py::object& q, const py::object& v, const py::object& tau, const py::object& vdot, Form form, const py::object& refine,
                           const std::string& residual, Precision precision, int threads) {
         const Multibody& model = d.model();

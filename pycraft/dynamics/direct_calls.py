@@ -131,18 +131,20 @@ class DirectCalls:
         ----------
         call : {"forward_dynamics", "inverse_dynamics", "bias_forces", "mass_matrix", "mass_matrix_inverse", "jacobian", "pose", \
 "coriolis_matrix", "operational_space_inertia", "operational_space_compliance", "inverse_dynamics_derivatives", \
-"forward_dynamics_derivatives"}
+"forward_dynamics_derivatives", "hybrid_dynamics"}
         batch : int, optional
             Every call takes so many states, and each argument a leading axis of that length or stands for all; else one state a call.
         options
-            As the call itself has them: form, refine, residual, precision, on_singular; frame=, a name, of what is a frame's.
+            As the call itself has them: form, refine, residual, precision, on_singular; frame=, a name, of what is a frame's;
+            prescribed=, names, of hybrid dynamics.
 
         Returns
         -------
         callable
             Of q, v, tau for forward dynamics and its derivatives; of q, v, vdot for inverse dynamics and its; of q, v for bias forces
-            and Coriolis matrices; of q for the others; each but derivatives with out=. Arrays that are contiguous float64 cost least. It
-            follows later edits of the model. ModelError for another number of states, and what the call itself raises.
+            and Coriolis matrices; of q, v, tau, vdot for hybrid dynamics; of q for the others; each but derivatives and hybrid dynamics
+            with out=. Arrays that are contiguous float64 cost least. It follows later edits of the model. ModelError for another number
+            of states, and what the call itself raises.
 
         Examples
         --------

@@ -19,6 +19,9 @@ TOLERANCE = 1e-9
 FAR = 1e4
 """Radians and metres beyond which a model that goes down the slope of its forces is taken to go on without end."""
 
+STEPS = 5000
+"""Of a model that goes down the slope of its forces, at most."""
+
 
 class Mode(NamedTuple):
     """One way in which a mechanism leaves an equilibrium, or swings about it.
@@ -75,6 +78,8 @@ def solved(
     model: Any, at: Callable[[np.ndarray], Balance], q0: np.ndarray, held: Iterable[int], limits: bool, stable: bool, tolerance: float
 ) -> Equilibrium:  # fmt: skip
     """The equilibrium that is found from q0, of forces at rest as `at` has them. EvaluationError where there is none."""
+    if not 0 < tolerance < 1:
+        raise _core.EvaluationError(f"tolerance={tolerance}: what may be left, as a part of the largest force, between 0 and 1")
     free = np.setdiff1d(np.arange(model.nv), list(held))
     search = _Search(model, at, np.array(q0, float), free, limits)
     if not stable:
@@ -100,6 +105,10 @@ class _Search:
         self._last: tuple[np.ndarray, Balance] | None = None
         self.curved = bool(brackets(model, np.ones(model.nv)).any())
         self.limits = limits
+        if limits:  # start within them; where both are one there is nothing to search for
+            lower, upper = self.bounds()
+            self.q = self.moved(np.clip(0.0, lower, upper))[1]
+            self.free = free[lower < upper]
 
     def at(self, q: np.ndarray) -> Balance:
         """What balances there: kept for the question after."""
@@ -137,11 +146,11 @@ class _Search:
         from scipy.optimize import least_squares, root
 
         if len(self.free):
-            start, (lower, upper) = np.zeros(len(self.free)), self.bounds()
-            if not np.isfinite(np.r_[lower, upper]).any():
+            start = np.zeros(len(self.free))
+            if not np.isfinite(self.bounds()).any():
                 self.take(root(self.left, start, jac=self.slope, method="hybr", options={"xtol": 1e-13, "factor": 0.5}).x)
             if not self.balanced(tolerance):
-                start, (lower, upper) = np.zeros(len(self.free)), self.bounds()
+                lower, upper = self.bounds()
                 tight = {"ftol": 1e-15, "xtol": 1e-15, "gtol": 1e-15}
                 self.take(least_squares(self.left, np.clip(start, lower, upper), jac=self.slope, bounds=(lower, upper), **tight).x)
             self.sharpen()
@@ -187,7 +196,7 @@ class _Search:
             for subhinge, low, high in zip(hinge.subhinges, *hinge.limits, strict=True):
                 kind = _core.subhinge_kinds[subhinge["kind"]]
                 if kind.nq == 1:
-                    lower[v], upper[v] = min(low - self.q[q], 0.0), max(high - self.q[q], 0.0)
+                    lower[v], upper[v] = low - self.q[q], high - self.q[q]
                 q, v = q + kind.nq, v + kind.nv
         return lower[self.free], upper[self.free]
 
@@ -210,7 +219,14 @@ class _Search:
         def jacobian(_: float, x: np.ndarray) -> np.ndarray:
             return weight[:, None] * (turned(x).T @ self.slope(x))
 
+        steps = iter(range(STEPS))
+
         def settled(_: float, x: np.ndarray) -> float:
+            if next(steps, None) is None:
+                raise _core.EvaluationError(
+                    f"{self.model.name!r}: no stable equilibrium was found in {STEPS} steps down the slope of its forces: where they have "
+                    "no potential it may go round; start elsewhere (q0=), or take what there is (stable=False)"
+                )
             now = self.at(self.moved(x)[1])
             return float(np.abs(now.left[self.free]).max()) - 1e-6 * now.size
 
@@ -238,7 +254,7 @@ class _Search:
 
     def refuse(self, now: Balance) -> None:
         names, left = self.model.coordinate_names, now.left
-        worst = sorted((j for j in self.free if abs(left[j]) > TOLERANCE * now.size), key=lambda j: -abs(left[j]))
+        worst = sorted((j for j in self.free if left[j] != 0), key=lambda j: -abs(left[j]))
         told = ", ".join(f"{names[j]!r} {left[j]:.3g}" for j in worst[:5]) + (", ..." if len(worst) > 5 else "")
         lower, upper = self.bounds()
         at_limit = [repr(names[j]) for j, low, high in zip(self.free, lower, upper, strict=True) if min(-low, high) < 1e-9]
@@ -257,16 +273,15 @@ def modes(model: Any, at: Balance, free: np.ndarray) -> tuple[Mode, ...]:
         return ()
     chosen = np.ix_(free, free)
     stiffness, mass = -at.along_q[chosen], at.mass[chosen]
-    try:
-        np.linalg.cholesky(mass)
-    except np.linalg.LinAlgError:
-        mass = np.eye(len(free))  # the signs of eigenvalues are the same
-    size = max(np.abs(stiffness).max(), INDIFFERENT * at.size)
-    if np.abs(stiffness - stiffness.T).max() <= INDIFFERENT * size:
+    lightest, heaviest = np.linalg.eigvalsh(mass)[[0, -1]]
+    if lightest <= len(free) * np.finfo(float).eps * heaviest:
+        mass, lightest = np.eye(len(free)), 1.0  # the signs of eigenvalues are the same
+    rounding = 1e3 * np.finfo(float).eps * at.size  # of forces, sums over the bodies
+    if np.abs(stiffness - stiffness.T).max() <= max(INDIFFERENT * np.abs(stiffness).max(), rounding):
         values, shapes = eigh((stiffness + stiffness.T) / 2, mass)
     else:
         values, shapes = eig(stiffness, mass)
-    zero = INDIFFERENT * max(np.abs(values).max(), np.abs(at.size / np.diag(mass).max()) * INDIFFERENT)
+    zero = max(INDIFFERENT * np.abs(values).max(), rounding / lightest)
     found = []
     for i in np.argsort(np.real(values), kind="stable"):
         value = values[i]

@@ -9,10 +9,15 @@ import numpy as np
 
 from .. import _core
 from ..state import at_state
+from .prepared_states import refuse_other_states
 from .threads import over_threads
 
 KEPT = 16
 """Sets of prescribed hinges whose workspaces a model keeps: a set that is switched back to costs nothing."""
+
+
+HYBRID_OPTIONS = ("prescribed", "form", "refine", "residual", "precision")
+"""Of a prepared call."""
 
 
 class HybridMotion(NamedTuple):
@@ -62,6 +67,34 @@ def hybrid_of(model: Any, prescribed: Any) -> _core.HybridDynamics:
             del kept[next(iter(kept))]
         kept[key] = made
     return kept[key]
+
+
+def prepared_hybrid(model: Any, states: int | None, options: dict[str, Any]) -> Callable[..., HybridMotion]:
+    """What `Multibody.prepare` gives of hybrid dynamics; options are those of the call."""
+    defaults: dict[str, Any] = {"prescribed": (), "form": "fast", "refine": 0, "residual": "same", "precision": "double"}
+    options = defaults | options
+    options["prescribed"] = prescribed_names(options["prescribed"])  # once, as what is listed may be gone then
+
+    def made() -> _core.PreparedHybridDynamics:
+        how = {name: options[name] for name in HYBRID_OPTIONS[1:]}
+        return hybrid_of(model, options["prescribed"]).prepared(**how, states=-1 if states is None else states)
+
+    ready = [made()]
+
+    def call(*given: Any) -> HybridMotion:
+        if len(given) != 4:
+            raise TypeError(f"a prepared hybrid_dynamics takes q, v, tau, vdot; it was given {len(given)} arguments")
+        found = ready[0](*given)
+        if found is None:
+            refuse_other_states("hybrid_dynamics", states, given)
+            ready[0] = made()  # of the model as it is now
+            return model.hybrid_dynamics(*given, **options)
+        return HybridMotion._make(found)
+
+    call.__name__ = call.__qualname__ = "prepared_hybrid_dynamics"
+    each = "one state" if states is None else f"{states} states"
+    call.__doc__ = f"hybrid_dynamics(q, v, tau, vdot) of '{model.name}', {each} a call."
+    return call
 
 
 class HybridCalls:

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Callable
-from contextlib import suppress
 from functools import partial
 from typing import Any, TypeVar
 
-import numpy as np
-
 from .. import _core
-from ..arguments import LARGEST, text
+from ..arguments import text
 from .by_realization import output
+from .hybrid import HYBRID_OPTIONS, prepared_hybrid
+from .prepared_states import refuse_other_states, states_of
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -36,28 +34,17 @@ def direct_of(made: type) -> Callable[[F], F]:
     return mark
 
 
-def _states_of(batch: Any) -> int | None:
-    """How many states each call takes, None for one. EvaluationError where that is no number of states."""
-    if batch is None:
-        return None
-    states = -1
-    if not isinstance(batch, (bool, np.bool_)):
-        with suppress(TypeError):
-            states = operator.index(batch)
-    if not 0 <= states <= LARGEST:
-        raise _core.EvaluationError(f"batch={batch!r}: how many states each call takes, up to {LARGEST}, or None for one state")
-    return states
-
-
 def prepared(model: Any, call: str, batch: int | None, options: dict[str, Any]) -> Callable[..., Any]:
     """What `Multibody.prepare` gives."""
-    if not isinstance(call, str) or call not in _CALLS:
-        raise _core.EvaluationError(f"prepare takes {', '.join(map(repr, _CALLS))}, not {call!r}")
-    arrays, known = _CALLS[call]
+    if not isinstance(call, str) or call not in (*_CALLS, "hybrid_dynamics"):
+        raise _core.EvaluationError(f"prepare takes {', '.join(map(repr, _CALLS))}, 'hybrid_dynamics', not {call!r}")
+    arrays, known = _CALLS.get(call, ((), HYBRID_OPTIONS))
     for name in options:
         if name not in known:
             raise _core.EvaluationError(f"a prepared {call} has no option {name!r}; there are {', '.join(known)}")
-    batch = _states_of(batch)
+    batch = states_of(batch)
+    if call == "hybrid_dynamics":
+        return prepared_hybrid(model, batch, options)
     frame = []
     if "frame" in known:
         if "frame" not in options:
@@ -71,10 +58,7 @@ def prepared(model: Any, call: str, batch: int | None, options: dict[str, Any]) 
             raise TypeError(
                 f"a prepared {call} takes {', '.join(arrays)}{'' if call in _MADE else ', and out='}; it was given {len(given)} arguments"
             )
-        states = {np.shape(x)[0] for x in given if np.ndim(x) == 2}
-        if states != (set() if batch is None else {batch}):
-            asked, found = ("one state" if n is None else f"{n} states" for n in (batch, min(states, default=None)))
-            raise _core.ModelError(f"{call} was prepared for {asked} and is given {found}")
+        refuse_other_states(call, batch, given)
         if out is None:
             return ordinary(*given)
         if call in _MADE:

@@ -45,7 +45,7 @@ class StaticsCalls:
 
         Parameters
         ----------
-        tau : (nv,) N m and N, constant generalized forces; zero where left out
+        tau : (nv,) N m and N, or (B, nv), or one number for all: constant generalized forces; zero where left out
         q0 : (nq,) or a State, where the search starts, or (B, nq); the model's present state where left out
         wrenches, wrench_axes : as in `interbody_forces`; in the world's axes they keep their direction as the model moves
         hold : names of hinges, coordinates or patterns, or a list of them, that stay where q0 has them
@@ -77,6 +77,7 @@ class StaticsCalls:
         q0, _ = at_state(model, q0)
         tau = np.zeros(self.nv) if tau is None else tau
         given = np.asarray(_core.real_array(tau, "tau"), float)
+        given = np.full(self.nv, given) if given.ndim == 0 else given
         names, in_world, numbers = pushed(wrenches, wrench_axes)
         held = _core.coordinates_named(model, listed(hold, "hold"), "hold")
         starts = np.asarray(_core.real_array(q0, "q"), float)

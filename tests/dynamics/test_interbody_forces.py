@@ -12,6 +12,8 @@ from pycraft import reference
 from support.differences import difference
 from support.mechanisms import build, every_kind, massless_inner_bodies, uniform_batch
 
+pytestmark = pytest.mark.filterwarnings("ignore::pycraft.ModelWarning")
+
 ROUNDING, DIFFERENCE = 1e-12, 1e-9
 MODELS = {
     "every kind": lambda: every_kind(rotor_inertia=True),

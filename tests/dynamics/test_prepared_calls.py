@@ -73,6 +73,48 @@ def test_prepared_coriolis_matrices(form, monkeypatch):
     same(model.coriolis_matrix(q, v, form=form, precision="double"), wanted["double"])
 
 
+@pytest.mark.parametrize("prescribed", [(), "panda_joint2", ["panda_joint1", "panda_joint4"], ["panda_joint*"]])
+@pytest.mark.parametrize("how", [{}, {"form": "ud"}, {"refine": 1}, {"precision": "quad"}])
+def test_prepared_hybrid_dynamics(prescribed, how, monkeypatch):
+    model, rng = panda(), np.random.default_rng(3)
+    Q, (V, U, A) = np.array([model.random_state(s).q for s in range(4)]), rng.normal(size=(3, 4, 7))
+    for arrays, batch in (((Q, V, U, A), 4), ((Q[0], V[0], U[0], A[0]), None), ((Q, V[0], U, A[0]), 4), ((Q[:0], V[:0], U[:0], A[:0]), 0)):
+        wanted = model.hybrid_dynamics(*arrays, prescribed, **how)
+        ready = model.prepare("hybrid_dynamics", batch=batch, prescribed=prescribed, **how)
+        lists = [a.tolist() if batch != 0 else a for a in arrays]
+        by_the_method = ready(*lists), ready(*map(strided, arrays))
+        with monkeypatch.context() as m:
+            m.setattr(type(model), "hybrid_dynamics", lambda *_, **__: pytest.fail("by the method"))
+            found = ready(*arrays)
+        for other in (found, *by_the_method):
+            assert type(other) is type(wanted)
+            for a, b in zip(other, wanted, strict=True):
+                same(a, b)
+    assert "hybrid_dynamics" in ready.__doc__
+
+
+def test_prepared_hybrid_dynamics_follows_edits(monkeypatch):
+    model, rng = pc.chain(3), np.random.default_rng(4)
+    q, v, tau, vdot = rng.normal(size=(4, 3))
+    ready = model.prepare("hybrid_dynamics", prescribed=(name for name in ["hinge1"]))
+    before = ready(q, v, tau, vdot)
+    model.bodies["body2"].mass = 5.0
+    after, wanted = ready(q, v, tau, vdot), model.hybrid_dynamics(q, v, tau, vdot, "hinge1")
+    assert np.array_equal(after.tau, wanted.tau) and not np.array_equal(after.tau, before.tau)
+    model.add_body("tip", parent="body2", position=(1, 0, 0), mass=1.0, com=(0.5, 0, 0), inertia=np.diag([0, 0.1, 0.1]))
+    with pytest.raises(pc.ModelError, match="q .*takes 4"):
+        ready(q, v, tau, vdot)
+    q, v, tau, vdot = rng.normal(size=(4, 4))
+    wanted = model.hybrid_dynamics(q, v, tau, vdot, "hinge1")
+    assert np.array_equal(ready(q, v, tau, vdot).vdot, wanted.vdot)
+    with monkeypatch.context() as m:  # and from then on without the method again
+        m.setattr(type(model), "hybrid_dynamics", lambda *_, **__: pytest.fail("by the method"))
+        assert np.array_equal(ready(q, v, tau, vdot).vdot, wanted.vdot)
+    model.remove_body("body1")
+    with pytest.raises(pc.ModelError, match="hinge1"):
+        ready(q[:1], v[:1], tau[:1], vdot[:1])
+
+
 @pytest.mark.parametrize(
     "ask, error, words",
     [
@@ -106,6 +148,15 @@ def test_prepared_coriolis_matrices(form, monkeypatch):
         (lambda m: m.prepare("mass_matrix")(np.tile(m.q, (2, 1))), pc.ModelError, "one state and is given 2 states"),
         (lambda m: m.prepare("mass_matrix", batch=3)(np.tile(m.q, (2, 1))), pc.ModelError, "3 states and is given 2 states"),
         (lambda m: m.prepare("forward_dynamics")(m.q, m.v, m.v, form="ud"), TypeError, "form"),
+        (lambda m: m.prepare("hybrid_dynamics", prescribed="elbow"), pc.ModelError, "elbow"),
+        (lambda m: m.prepare("hybrid_dynamics", prescribed=["panda_joint1"] * 2), pc.ModelError, "twice"),
+        (lambda m: m.prepare("hybrid_dynamics", form="udu"), pc.EvaluationError, "udu"),
+        (lambda m: m.prepare("hybrid_dynamics", refine=-1), pc.EvaluationError, "refine"),
+        (lambda m: m.prepare("hybrid_dynamics", frame="panda_link7"), pc.EvaluationError, "no option 'frame'; there are prescribed"),
+        (lambda m: m.prepare("hybrid_dynamics", batch=-1), pc.EvaluationError, "batch=-1"),
+        (lambda m: m.prepare("hybrid_dynamics")(m.q, m.v), TypeError, "takes q, v, tau, vdot; it was given 2"),
+        (lambda m: m.prepare("hybrid_dynamics", batch=3)(m.q, m.v, m.v, m.v), pc.ModelError, "3 states and is given one state"),
+        (lambda m: m.prepare("hybrid_dynamics")(m.q, np.full(7, np.nan), m.v, m.v), pc.ModelError, "v"),
     ],
 )
 def test_prepared_says_what_is_wrong(ask, error, words):

@@ -33,10 +33,58 @@ def test_pendulum_both_ways():
     above, below = model.equilibrium([torque], [1.0]), model.equilibrium([torque], [-1.0])
     close(above.q, [np.arccos(0.3)])
     close(below.q, [-np.arccos(0.3)])
+    close(model.equilibrium(torque, [-1.0]).q, below.q)
     assert (above.stability, below.stability) == ("unstable", "stable")
     close(below.stiffness, [[G / 2 * np.sin(np.arccos(0.3))]])
     close(below.modes[0].eigenvalue, G / 2 * np.sin(np.arccos(0.3)) * 3)  # ℳ = 1/3
     close(model.equilibrium([torque], [1.0], stable=True).q, [-np.arccos(0.3)], 1e-9)
+
+
+def test_it_leaves_an_unstable_equilibrium():
+    model = chain(3)
+    upright = model.equilibrium(q0=[np.pi / 2, 0, 0])
+    assert [mode.stability for mode in upright.modes] == ["unstable"] * 3
+    hanging = model.equilibrium(q0=upright.q, stable=True)
+    assert hanging.stability == "stable"
+    close(model.centre_of_mass(hanging.q), [0, -1.5, 0], 1e-9)
+
+
+def test_what_counts_as_balanced_follows_the_size_of_forces():
+    """Grains and ships: the same pendulum, and half of the force that cannot be balanced is left at both."""
+    for size in (1e-12, 1e12):
+        model = pc.Multibody("pendulum")
+        model.add_body("rod", mass=size, com=(0.5, 0, 0), inertia=size * np.diag([0, 1 / 12, 1 / 12]))
+        model.gravity = (0, -G, 0)
+        close(model.equilibrium([0.3 * size * G / 2], [-1.0]).q, [-np.arccos(0.3)])
+        with pytest.raises(pc.EvaluationError, match="'rod'"):
+            model.equilibrium([size * G], [-1.0])
+
+
+def test_flutter():
+    """Ziegler's column, a force that follows the last rod, on springs: a complex pair at a load at which real parts are positive."""
+    model = chain(2)
+    model.add_node("end", "body1", position=(1, 0, 0))
+    found = {
+        load: pc.Scene(model).add(E.Spring(1.0), E.Wrench("end", (0, 0, 0, -load, 0, 0), axes="body")).equilibrium([0.0, 0.0])
+        for load in (0.5, 3.0)
+    }
+    assert found[0.5].stability == "stable" and all(np.isreal(mode.eigenvalue) for mode in found[0.5].modes)
+    values = [mode.eigenvalue for mode in found[3.0].modes]
+    assert found[3.0].stability == "unstable" and abs(np.imag(values[0])) > 1
+    close(np.real(values), np.full(2, 9 / 7))  # μ² - 18/7 μ + 36/7 = 0
+    expected = np.linalg.eigvals(np.linalg.solve(model.mass_matrix([0, 0]), found[3.0].stiffness))
+    close(np.sort_complex(values), np.sort_complex(expected))
+
+
+def test_what_has_no_end_is_given_up(monkeypatch):
+    model = chain(2)
+    model.add_node("end", "body1", position=(1, 0, 0))
+    column = pc.Scene(model).add(E.Spring(1.0), E.Wrench("end", (0, 0, 0, -3, 0, 0), axes="body"))
+    with pytest.raises(pc.EvaluationError, match="no stable equilibrium .*leaves by hinge1"):
+        column.equilibrium([0.0, 0.0], stable=True)
+    monkeypatch.setattr("pycraft.dynamics.equilibrium.STEPS", 2)
+    with pytest.raises(pc.EvaluationError, match="in 2 steps"):
+        model.equilibrium(q0=[0.5, 0.0], stable=True)
 
 
 def test_pendulum_with_spring():
@@ -217,6 +265,15 @@ def test_limits():
     model.hinges["hinge0"].limits = (-2.0, 1.0)
     found = model.equilibrium(q0=[-0.5, -0.5], limits=True)
     close(found.q, [-np.pi / 2, 0.0])
+    close(model.equilibrium(q0=[-3.0, 0.1], limits=True).q, [-np.pi / 2, 0.0])  # from outside of them
+    model.hinges["hinge0"].limits = (0.3, 0.3)
+    locked = model.equilibrium(q0=[0.0, -1.0], limits=True)
+    close(locked.q, [0.3, -np.pi / 2 - 0.3])
+    close(locked.holding, [G * 1.5 * np.cos(0.3), 0.0])
+    ball = pc.tree([-1, 0], ["ball", "pin"], seed=2)  # a ball has none
+    ball.gravity = (0, 0, -G)
+    ball.hinges["hinge1"].limits = (-10.0, 10.0)
+    assert ball.equilibrium(limits=True, stable=True).stability == "indifferent"
 
 
 def test_held_coordinates():
@@ -261,6 +318,10 @@ def test_degenerate_models():
         wrenches={"body0": np.r_[np.cross(floating.centre_of_mass() - floating.pose("body0")[:3, 3], lift), lift]}
     )
     close(carried.q, floating.q)
+    assert carried.stability == "indifferent"
+    floating.gravity = (0, 0, 0)  # three forces that balance to rounding: 0.1 + 0.2 - 0.3 is not zero
+    pulled = pc.Scene(floating).add(*(E.Wrench("body0", (0, 0, 0, x, 0, 0)) for x in (0.1, 0.2, -0.3))).equilibrium()
+    assert pulled.stability == "indifferent" and 0 < np.abs(pulled.residual).max() < 1e-15
     massless = pc.Multibody("feather")
     massless.add_body("feather")
     assert pc.Scene(massless).add(E.Spring(2.0, 0.4)).equilibrium([0.1]).q == pytest.approx([0.4])
@@ -296,6 +357,7 @@ def test_refusals():
         ({"tau": [0.0]}, "tau"),
         ({"tau": [np.nan] * 7}, "tau|finite"),
         ({"q0": [0.0]}, "q"),
+        ({"q0": np.full(8, np.nan)}, "q|hinge0"),
         ({"wrenches": {"body9": np.zeros(6)}}, "body9"),
         ({"tau": np.zeros((2, 7)), "q0": np.zeros((3, 8))}, "2 and 3"),
     ):
@@ -303,6 +365,9 @@ def test_refusals():
             model.equilibrium(**options)
     with pytest.raises(pc.ModelError, match="elbow"):
         model.counterbalance(actuated="elbow")
+    for tolerance in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(pc.EvaluationError, match="tolerance="):
+            chain(1).equilibrium(q0=[-1.0], tolerance=tolerance)
     with pytest.raises(pc.EvaluationError, match="double"):
         pc.Scene(chain(1), precision="quad").equilibrium([0.0])
     assert np.array_equal(model.q, before)

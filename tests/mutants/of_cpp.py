@@ -385,4 +385,7 @@ CHANGES = {
     "cpp/operators/rigid_letters.h": [
         ("a selection is of the whole hinge", "s >= of.from && s < of.to", "s >= of.from"),
     ],
+    "cpp/dynamics/interbody_forces.cpp": [
+        ("a direction that depends on others counts", "length > dependent<S>()", "length > S(0)"),
+    ],
 }

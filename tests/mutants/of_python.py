@@ -287,4 +287,17 @@ CHANGES = {
         ("undeclared entities are dropped", 'if "UNDECLARED_ENTITY" in entry.type_name:', "if False:"),
         ("entities are expanded", "resolve_entities=False", "resolve_entities=True"),
     ],
+    "pycraft/dynamics/equilibrium.py": [
+        ("flutter is stable", "or abs(np.imag(value)) > zero", ""),
+        ("an unstable equilibrium is not left", "search.push(found.modes[0].shape)", "search.push(0 * found.modes[0].shape)"),
+        ("grains balance under any force", "<= tolerance * now.size)", "<= tolerance)"),
+        ("balls turn the other way", "-brackets(self.model, whole), np.eye(n)", "brackets(self.model, whole), np.eye(n)"),
+    ],
+    "pycraft/dynamics/interbody.py": [
+        ("accelerations do not follow q", "f_q - by_tau @ T_q[..., None, :, :]", "f_q"),
+        ("frames stand where they are now", "model.frame(frame).pose(q, t=t)", "model.frame(frame).pose(q)"),
+    ],
+    "pycraft/dynamics/hybrid.py": [
+        ("prepared calls of an edited model stay slow", "ready[0] = made()  # of the model as it is now", "pass"),
+    ],
 }

@@ -95,4 +95,10 @@ CHANGES = {
         ),
         ("z⁺ forgets P a'", "P.n = P.n + P.A * m.turning, P.f = P.f + transpose_times(P.B, m.turning);", ";", STATEMENT),
     ],
+    "cpp/simulation/scene_statics.h": [
+        ("forces that cancel have no size", "size = std::max(size, std::abs(one[j]))", "size = std::max(size, 0.0)"),
+    ],
+    "cpp/simulation/scene_interbody_forces.h": [
+        ("fields pull the other way", "applied.gravity + cast<S>(e->declared.gravity)", "applied.gravity - cast<S>(e->declared.gravity)"),
+    ],
 }
