@@ -7,7 +7,7 @@ import fractions
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Binding', 'Centroidal', 'Dynamics', 'Effect', 'Error', 'EvaluationError', 'FrameTree', 'FunctionOfTime', 'GroupedOperators', 'HingeKind', 'HybridDynamics', 'Integration', 'Letter', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'RunRecord', 'Scalar', 'SceneCalls', 'SceneEffects', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'alone', 'blockdiag', 'bushing_effect', 'check_pairing', 'checked_refinement', 'compiled_call', 'constant', 'constant_in_time', 'coordinates_named', 'coulomb_friction_effect', 'damping_effect', 'direct_call', 'direct_calls', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'gravity_effect', 'gravity_gradient_effect', 'harmonic', 'hermite_between', 'hinge_kinds', 'identity', 'implicit_damping_effect', 'implicit_spring_effect', 'instruction_set', 'instruction_sets', 'integrator_table', 'integrators', 'kernel_headers', 'kernel_tape', 'limits_effect', 'methods', 'motor_effect', 'node_damper_effect', 'node_spring_effect', 'numbers_in_q', 'operators_of', 'pack_width', 'piecewise_polynomial', 'point_mass_gravity_effect', 'precisions', 'prepared_call', 'prescribed_by', 'prescribed_effect', 'python_effect', 'python_function_of_time', 'quadratic_damping_effect', 'real_array', 'record_from', 'residual', 'rotor_inertia_effect', 'run_scene', 'run_scenes', 'scalar', 'scene_between', 'scene_linearized', 'servo_effect', 'spring_effect', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_by_hand', 'time_compiled', 'time_dynamics', 'time_forward', 'time_hybrid', 'time_method', 'time_packs', 'time_passes', 'time_scene', 'torque_source_effect', 'vector', 'wider', 'wrench_effect', 'zero']
+__all__: list[str] = ['Binding', 'Centroidal', 'Dynamics', 'Effect', 'Error', 'EvaluationError', 'FrameTree', 'FunctionOfTime', 'GroupedOperators', 'HingeKind', 'HybridDynamics', 'Integration', 'Letter', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'RunRecord', 'Scalar', 'SceneCalls', 'SceneEffects', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'alone', 'blockdiag', 'bushing_effect', 'check_pairing', 'checked_refinement', 'compiled_call', 'constant', 'constant_in_time', 'coordinates_named', 'coulomb_friction_effect', 'damping_effect', 'direct_call', 'direct_calls', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'fixman_effect', 'float128', 'forms', 'gravity_effect', 'gravity_gradient_effect', 'harmonic', 'hermite_between', 'hinge_kinds', 'identity', 'implicit_damping_effect', 'implicit_spring_effect', 'instruction_set', 'instruction_sets', 'integrator_table', 'integrators', 'kernel_headers', 'kernel_tape', 'langevin_effect', 'limits_effect', 'methods', 'motor_effect', 'node_damper_effect', 'node_spring_effect', 'nose_hoover_effect', 'numbers_in_q', 'operators_of', 'pack_width', 'piecewise_polynomial', 'point_mass_gravity_effect', 'precisions', 'prepared_call', 'prescribed_by', 'prescribed_effect', 'python_effect', 'python_function_of_time', 'quadratic_damping_effect', 'real_array', 'record_from', 'residual', 'rotor_inertia_effect', 'run_scene', 'run_scenes', 'scalar', 'scene_between', 'scene_linearized', 'servo_effect', 'spring_effect', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_by_hand', 'time_compiled', 'time_dynamics', 'time_forward', 'time_hybrid', 'time_method', 'time_packs', 'time_passes', 'time_scene', 'torque_source_effect', 'vector', 'wider', 'wrench_effect', 'zero']
 
 class Error(Exception): ...
 class SpaceError(Error, TypeError): ...
@@ -1315,6 +1315,8 @@ def euclidean(dimension: typing.Any) -> Space:
     """
 def external(product: typing.Any, transposed: typing.Any, domain: Space, codomain: Space, name: str) -> Operator:
     ...
+def fixman_effect(model: Multibody, kT: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
+    ...
 def forms() -> list[str]:
     """
     The forms of the articulated-inertia sweep.
@@ -1359,6 +1361,8 @@ def kernel_tape(model: Multibody, call: str) -> typing.Any:
     """
     What the kernel of a direct call does for this model, operation by operation; None where no kernel knows the model's hinges.
     """
+def langevin_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, kT: typing.SupportsFloat | typing.SupportsIndex, friction: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], period: typing.SupportsFloat | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> Effect:
+    ...
 def limits_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, stiffness: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], dissipation: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], lower: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], upper: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> Effect:
     ...
 def methods() -> list[str]:
@@ -1370,6 +1374,8 @@ def motor_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None,
 def node_damper_effect(model: Multibody, node_a: str, node_b: str, coefficient: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
     ...
 def node_spring_effect(model: Multibody, node_a: str, node_b: str, stiffness: typing.SupportsFloat | typing.SupportsIndex, length: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
+    ...
+def nose_hoover_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, kT: typing.SupportsFloat | typing.SupportsIndex, time_constant: typing.SupportsFloat | typing.SupportsIndex, chain: typing.SupportsInt | typing.SupportsIndex) -> Effect:
     ...
 def numbers_in_q(model: Multibody, coordinates: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> int:
     """

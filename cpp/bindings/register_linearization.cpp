@@ -31,6 +31,8 @@ py::dict linearized(SceneCalls& calls, const Array& q, const Array& v, double t,
     const ModelInUse use(model);
     calls.with([&]<class S>(CompiledScene<S>& scene) {
       if constexpr (std::is_same_v<S, double>) {
+        for (const auto& e : scene.effects().effects())
+          if (e->declared.impulse_period > 0) throw EvaluationError("effect '" + e->name + "' acts by impulses between steps, which no linear model has: disable it, or take Damping in its place");
         SceneLinearized equations(scene, false);
         if (!states.empty() && static_cast<int>(states.size()) != equations.own())
           throw ModelError("the effects have " + std::to_string(equations.own()) + " states of their own, not " + std::to_string(states.size()));
