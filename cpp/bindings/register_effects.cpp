@@ -5,14 +5,17 @@
 #include "simulation/effects/bushing.h"
 #include "simulation/effects/coulomb_friction.h"
 #include "simulation/effects/damping.h"
+#include "simulation/effects/fixman.h"
 #include "simulation/effects/gravity.h"
 #include "simulation/effects/gravity_gradient.h"
 #include "simulation/effects/implicit_damping.h"
 #include "simulation/effects/implicit_spring.h"
+#include "simulation/effects/langevin.h"
 #include "simulation/effects/limits.h"
 #include "simulation/effects/motor.h"
 #include "simulation/effects/node_damper.h"
 #include "simulation/effects/node_spring.h"
+#include "simulation/effects/nose_hoover.h"
 #include "simulation/effects/point_mass_gravity.h"
 #include "simulation/effects/prescribed_motion.h"
 #include "simulation/effects/quadratic_damping.h"
@@ -129,6 +132,13 @@ void register_effects(py::module_& m) {
                                   const std::vector<double>& upper) {
     return effect(std::make_shared<Limits>(model, hinges, stiffness, dissipation, lower, upper));
   }, py::arg("model"), py::arg("hinges"), py::arg("stiffness"), py::arg("dissipation"), py::arg("lower"), py::arg("upper"));
+  m.def("langevin_effect", [effect](const Multibody& model, const Names& hinges, double kT, const std::vector<double>& friction, double period, std::uint64_t seed) {
+    return effect(std::make_shared<Langevin>(model, hinges, kT, friction, period, seed));
+  }, py::arg("model"), py::arg("hinges"), py::arg("kT"), py::arg("friction"), py::arg("period"), py::arg("seed"));
+  m.def("nose_hoover_effect", [effect](const Multibody& model, const Names& hinges, double kT, double time_constant, int chain) {
+    return effect(std::make_shared<NoseHoover>(model, hinges, kT, time_constant, chain));
+  }, py::arg("model"), py::arg("hinges"), py::arg("kT"), py::arg("time_constant"), py::arg("chain"), py::keep_alive<0, 1>());
+  m.def("fixman_effect", [effect](const Multibody& model, double kT) { return effect(std::make_shared<Fixman>(model, kT)); }, py::arg("model"), py::arg("kT"), py::keep_alive<0, 1>());
   m.def("python_effect", [effect](const Multibody& model, const std::string& kind, std::vector<int> coordinates, const py::object& forces, const py::object& rates, std::vector<double> states,
                                   const py::object& sample, double period) {
     return effect(std::make_shared<PythonEffect>(kind, model.nq(), model.nv(), std::move(coordinates), forces, rates, std::move(states), sample, period));

@@ -60,6 +60,8 @@ py::dict linearized(SceneCalls& calls, const Array& q, const Array& v, double t,
     const ModelInUse use(model);
     calls.with([&]<class S>(CompiledScene<S>& scene) {
       if constexpr (std::is_same_v<S, double>) {
+        for (const auto& e : scene.effects().effects())
+          if (e->declared.impulse_period > 0) throw EvaluationError("effect '" + e->name + "' acts by impulses between steps, which no linear model has: disable it, or take Damping in its place");
         SceneLinearized equations(scene, false);
         const auto x = equations.initial(t, q.data(), v.data(), own_states(states, equations.own()));
         const double *at_q = x.data(), *at_v = at_q + model.nq(), *rest = at_v + model.nv();

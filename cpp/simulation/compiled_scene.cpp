@@ -19,28 +19,9 @@ bool all_are_finite(const S* x, int n) {
 
 }  // namespace
 
-HingeTerms hinge_terms(const Scene& scene) {
-  HingeTerms terms;
-  const auto nv = static_cast<unsigned>(scene.model().nv());
-  for (const SceneEntry& entry : scene.entries()) {
-    if (!entry.on) continue;
-    const Declaration d = entry.effect->declaration();
-    for (const HingeTerm& h : d.hinges) {
-      if (terms.inertia.empty()) terms.inertia.assign(nv, 0.0), terms.driven.assign(nv, 0);
-      terms.inertia[h.coordinate] += h.inertia;
-      if (h.damping != 0 || h.stiffness != 0) terms.driven[h.coordinate] = 1;
-    }
-    for (int j : d.prescribed) {
-      if (terms.prescribed.empty()) terms.prescribed.assign(nv, 0);
-      terms.prescribed[j] = 1;
-    }
-  }
-  return terms;
-}
-
 template <class S>
 CompiledScene<S>::CompiledScene(const Scene& scene, const Solving& how)
-    : scene_(scene), how_(how), nv_(scene.model().nv()), forces_(scene_, scene.model().compiled<S>()), lists_(5), solving_(5), motion_(nv_), needed_(nv_), inertia_(nv_, S(0)), zeros_(nv_, S(0)), work_(nv_) {
+    : scene_(scene), how_(how), nv_(scene.model().nv()), forces_(scene_, scene.model().compiled<S>()), lists_(5), solving_(5), motion_(nv_), needed_(nv_), inertia_(nv_, S(0)), zeros_(nv_, S(0)), work_(nv_), change_(nv_) {
   for (const auto& e : forces_.effects()) {
     if (e->declared.uniform_gravity) gravity_ = gravity_ + e->declared.gravity;
     prescribed_.insert(prescribed_.end(), e->declared.prescribed.begin(), e->declared.prescribed.end());
@@ -48,6 +29,13 @@ CompiledScene<S>::CompiledScene(const Scene& scene, const Solving& how)
   if (forces_.forced() || !prescribed_.empty()) u_ = forces_.tau();
   if (!forces_.wrenched().empty()) wrenches_ = forces_.wrenches();
   solver_ = std::make_unique<HybridDynamics<S>>(scene.model(), hinge_terms(scene), how, gravity_, forces_.wrenched());
+  for (const auto& e : forces_.effects()) {
+    if (!(e->declared.impulse_period > 0) || nv_ == 0) continue;
+    HingeTerms terms = hinge_terms(scene);
+    terms.inertia.resize(nv_, 0.0), terms.driven.resize(nv_, 0);
+    for (const HingeTerm& h : e->declared.resists) terms.inertia[h.coordinate] += h.damping;
+    impulsive_.push_back({e.get(), std::make_unique<HybridDynamics<S>>(scene.model(), terms, how, Vector3<double>{0, 0, 0})});
+  }
   for (int list = 0; list < static_cast<int>(lists_.size()); ++list) plan(static_cast<SceneList>(list));
 }
 
@@ -134,7 +122,7 @@ bool CompiledScene<S>::finish() {
 
 template <class S>
 PreparedLinks* CompiledScene<S>::ask(const S& t, const S* q, const S* v, const S* own, S* vdot, S* powers) {
-  if (powers) powers_ = powers;
+  if (powers) powers_ = powers, std::fill_n(powers, forces_.workers().size(), S(0));
   start(powers ? SceneList::works : SceneList::motion, t, q, v, own, vdot);
   run(0, solving());
   give_prescribed();
@@ -154,6 +142,7 @@ bool CompiledScene<S>::answer(bool sound) {
 template <class S>
 bool CompiledScene<S>::accelerations_and_powers(const S& t, const S* q, const S* v, const S* own, S* vdot, S* powers) {
   powers_ = powers;
+  std::fill_n(powers, forces_.workers().size(), S(0));  // of those whose work is by impulses alone
   return run(SceneList::works, t, q, v, own, vdot);
 }
 
@@ -241,6 +230,31 @@ void CompiledScene<S>::set_step(const S& h) {
   for (const auto& e : forces_.effects())
     for (const HingeTerm& term : e->declared.hinges) inertia_[term.coordinate] += h * (S(term.damping) + h * S(term.stiffness));
   solver_->add_to_hinges(inertia_.data());
+}
+
+// The work of an impulse is that of what acted, p - C Δv, at the mean of the velocities before and after.
+template <class S>
+void CompiledScene<S>::give_impulses(const S& t, const S* q, S* v, const S* own, S* gained) {
+  std::fill_n(gained, forces_.workers().size(), S(0));
+  for (const Impulsive& each : impulsive_) {
+    const Active<S>& e = *each.effect;
+    const double T = e.declared.impulse_period, before = std::round(to_double(t) / T - 0.5);
+    if (!(std::abs(to_double(t) - (before + 0.5) * T) < 1e-9 * T)) continue;
+    std::fill(work_.begin(), work_.end(), S(0));
+    forces_.start(t, q, v, own);
+    forces_.impulses(*each.effect, static_cast<std::uint64_t>(before), work_.data());
+    for (int j : prescribed_) work_[j] = S(0);
+    each.solver->run(q, nullptr, work_.data(), nullptr, change_.data());
+    for (const auto& other : forces_.effects())  // impulses that keep what is prescribed as it is
+      for (int j : other->declared.prescribed) {
+        if (other->worker >= 0) gained[other->worker] += change_[j] * v[j];
+        change_[j] = S(0);
+      }
+    for (const HingeTerm& h : e.declared.resists) work_[h.coordinate] -= S(h.damping) * change_[h.coordinate];
+    S energy = S(0);
+    for (int j = 0; j < nv_; ++j) energy += work_[j] * (v[j] + change_[j] / S(2)), v[j] += change_[j];
+    if (e.worker >= 0) gained[e.worker] += energy;
+  }
 }
 
 #define PYCRAFT_INSTANTIATE(S) template class CompiledScene<S>;

@@ -29,9 +29,6 @@ struct PassRecord {
 // Which list of passes: of a motion; of a state at rest; of a motion whose works are counted; of either with the forces of each effect kept apart.
 enum class SceneList { motion, rest, works, apart, apart_at_rest };
 
-// What the effects that are on do at hinges: terms of D, and what is prescribed.
-HingeTerms hinge_terms(const Scene& scene);
-
 template <class S>
 class CompiledScene {
  public:
@@ -50,6 +47,9 @@ class CompiledScene {
 
   // Accelerations of implicit steps of size h from now on (0: plain ones): D has h C + h² K in addition.
   void set_step(const S& h);
+  // Impulses that fall on t change v; gained: the kinetic energy that each effect which does work gave by them. SingularHingeError as above.
+  void give_impulses(const S& t, const S* q, S* v, const S* own, S* gained);
+  bool gives_impulses() const { return !impulsive_.empty(); }
   bool steps_implicitly() const;
 
   const Scene& scene() const { return scene_; }
@@ -133,6 +133,11 @@ class CompiledScene {
   std::vector<size_t> solving_;  // where accelerations are in each list
   std::unique_ptr<HybridDynamics<S>> solver_;
   std::unique_ptr<RigidDynamics<S>> whole_model_;  // made where it is first needed
+  struct Impulsive {
+    Active<S>* effect;
+    std::unique_ptr<HybridDynamics<S>> solver;  // of ℳ + J + C
+  };
+  std::vector<Impulsive> impulsive_;
   // ---- of the state that is being worked at
   const S *v_ = nullptr, *u_ = nullptr;  // u: what the solver is given; null, as wrenches, where no effect gives any
   const Vector6<S>* wrenches_ = nullptr;
@@ -140,7 +145,7 @@ class CompiledScene {
   bool finite_ = true;
   SceneList list_ = SceneList::motion;
   S step_ = S(0);
-  std::vector<S> motion_, needed_, inertia_, zeros_, work_;  // of prescribed coordinates: θ̈, and the forces that they need; J; a model's forces
+  std::vector<S> motion_, needed_, inertia_, zeros_, work_, change_;  // of prescribed coordinates: θ̈, and the forces that they need; J; a model's forces; Δv
 };
 
 #define PYCRAFT_EXTERN(S) extern template class CompiledScene<S>;

@@ -9,11 +9,13 @@
 // which belongs to which (simulation/effects/ has examples, docs/scenes.md follows one).
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "model/hinge_terms.h"
 #include "model/multibody.h"
 #include "numerics/scalar.h"
 #include "numerics/tangent.h"
@@ -51,6 +53,9 @@ struct Declaration {
   std::vector<double> states;        // what they are at first: rates() says how they change
   std::vector<double> held;          // after these, kept from one sample to the next
   double period = 0;                 // s between samples; 0: none
+  // ---- impulses, between steps: (ℳ + J + C) Δv = p, p what impulses() gives, C the damping of what resists
+  double impulse_period = 0;         // s from one to the next, the first after half of it; 0: none
+  std::vector<HingeTerm> resists;
   int events = 0;                    // functions of the state at whose zeros it is another one
   bool foreign = false;              // calls from outside of the core: what it gives is looked at each time
   int own() const { return static_cast<int>(states.size() + held.size()); }
@@ -81,12 +86,15 @@ template <class S>
 class BoundEffect {
  public:
   virtual ~BoundEffect() = default;
+  // Told once, before any state: what all effects of the scene do at hinges.
+  virtual void begin(const HingeTerms&) {}
   virtual void forces(const At<S>&, const Forces<S>&) {}
   virtual S potential(const At<S>&) { return S(0); }
   // The power of what has no potential, of all its forces' `whole`.
   virtual S power(const At<S>&, const S& whole) { return whole; }
   virtual void rates(const At<S>&, S*) {}
   virtual void sample(const At<S>&, S*) {}  // to what it holds
+  virtual void impulses(const At<S>&, std::uint64_t, S*) {}  // number so and so, added to generalized impulses (nv)
   virtual void events(const At<S>&, S*) {}
   // Positions, velocities and accelerations of its prescribed coordinates, to their places among all; what is null is not asked for. Whether they
   // are finite.

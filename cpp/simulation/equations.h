@@ -52,10 +52,11 @@ class Equations {
 
   // After a step to t: what is known by other means than the step.
   virtual void settle(const S&, State&) {}
-  // Where a step must end after t, infinite: nowhere; and what happens to x there.
+  // Where a step must end after t, infinite: nowhere; what happens to x there, and whether velocities are others then.
   virtual bool stops() const { return false; }
   virtual double next_stop(double) const { return std::numeric_limits<double>::infinity(); }
   virtual void stop(const S&, State&) {}
+  virtual bool jumps() const { return false; }
   // Functions of t and x at whose zeros the equations are others, by whose they are: a step ends there.
   virtual std::vector<std::string> event_names() const { return {}; }
   virtual void events(const S&, const State&, S*) {}

@@ -49,4 +49,23 @@ void Scene::refuse_conflicts(const std::string& name, const Effect& effect) cons
   }
 }
 
+HingeTerms hinge_terms(const Scene& scene) {
+  HingeTerms terms;
+  const auto nv = static_cast<unsigned>(scene.model().nv());
+  for (const SceneEntry& entry : scene.entries()) {
+    if (!entry.on) continue;
+    const Declaration d = entry.effect->declaration();
+    for (const HingeTerm& h : d.hinges) {
+      if (terms.inertia.empty()) terms.inertia.assign(nv, 0.0), terms.driven.assign(nv, 0);
+      terms.inertia[h.coordinate] += h.inertia;
+      if (h.damping != 0 || h.stiffness != 0) terms.driven[h.coordinate] = 1;
+    }
+    for (int j : d.prescribed) {
+      if (terms.prescribed.empty()) terms.prescribed.assign(nv, 0);
+      terms.prescribed[j] = 1;
+    }
+  }
+  return terms;
+}
+
 }  // namespace pycraft

@@ -41,4 +41,7 @@ class Scene {
   std::vector<SceneEntry> entries_;
 };
 
+// What the effects that are on do at hinges: terms of D, and what is prescribed.
+HingeTerms hinge_terms(const Scene& scene);
+
 }  // namespace pycraft

@@ -28,7 +28,7 @@ class SceneEquations : public Kind<S> {
   // works: whether the works of effects are part of x.
   SceneEquations(CompiledScene<S>& scene, bool works)
       : Kind<S>(scene.numbers(), scene.effects().own() + (works ? static_cast<int>(scene.effects().workers().size()) : 0)), scene_(scene), own_(scene.effects().own()),
-        works_(this->rest() - own_), q_(nq()), v_(nv()) {}
+        works_(this->rest() - own_), q_(nq()), v_(nv()), gained_(scene.effects().workers().size()) {}
 
   CompiledScene<S>& scene() const { return scene_; }
   int works() const { return works_; }
@@ -71,8 +71,16 @@ class SceneEquations : public Kind<S> {
     if (!scene_.prescribed().empty()) scene_.effects().prescribe(t, x.data(), x.data() + nq(), nullptr);
   }
   bool stops() const override { return std::isfinite(next_stop(0)); }
-  double next_stop(double t) const override { return scene_.effects().next_sample(t); }
-  void stop(const S& t, State& x) override { scene_.effects().sample(t, false, x.data(), x.data() + nq(), x.data() + nq() + nv()); }
+  double next_stop(double t) const override { return scene_.effects().next_stop(t); }
+  bool jumps() const override { return scene_.gives_impulses(); }
+  void stop(const S& t, State& x) override {
+    S *const v = x.data() + nq(), *const own = v + nv();
+    if (jumps()) {
+      scene_.give_impulses(t, x.data(), v, own, gained_.data());
+      for (int i = 0; i < works_; ++i) own[own_ + i] += gained_[i] / unit_of_work();
+    }
+    scene_.effects().sample(t, false, x.data(), v, own);
+  }
   std::vector<std::string> event_names() const override { return scene_.effects().event_names(); }
   void events(const S& t, const State& x, S* out) override {
     std::copy_n(x.data(), nq(), q_.data()), std::copy_n(x.data() + nq(), nv(), v_.data());
@@ -116,7 +124,7 @@ class SceneEquations : public Kind<S> {
   }
   CompiledScene<S>& scene_;
   int own_, works_;
-  State q_, v_;
+  State q_, v_, gained_;
 };
 
 template <class S, template <class> class Kind>

@@ -28,10 +28,12 @@ SceneForces<S>::SceneForces(const Scene& scene, std::shared_ptr<const CompiledMo
   const SkoStructure tree = scene.model().structure();
   coordinate_names_ = tree.coordinate_names, body_names_ = tree.body_names;
   const int nv = numbers_->nv;
+  const HingeTerms terms = hinge_terms(scene);
   std::vector<int> placed, moved, counted;
   for (const SceneEntry& entry : scene.entries()) {
     if (!entry.on) continue;
     auto made = std::make_unique<Active<S>>(Active<S>{entry.name, entry.effect->declaration(), entry.effect->bind(S()), own_, static_cast<int>(effects_.size()), -1, {}, {}});
+    made->bound->begin(terms);
     const Declaration& d = made->declared;
     own_ += d.own();
     if (d.work) made->worker = static_cast<int>(workers_.size()), workers_.push_back(made->number), join(d.wrenches, counted);
@@ -154,15 +156,15 @@ void SceneForces<S>::sample(const S& t, bool first, const S* q, const S* v, S* o
 }
 
 template <class S>
-double SceneForces<S>::next_sample(double t) const {
+double SceneForces<S>::next_stop(double t) const {
   double next = std::numeric_limits<double>::infinity();
-  for (const auto& e : effects_) {
-    const double T = e->declared.period;
-    if (!(T > 0)) continue;
-    double k = std::floor(t / T) + 1;
-    if (k * T - t < 1e-9 * T) k += 1;  // t is that sample, but for a rounding
-    next = std::min(next, k * T);
-  }
+  const auto look = [&](double T, double phase) {  // at all (k + phase) T
+    if (!(T > 0)) return;
+    double k = std::floor(t / T - phase) + 1;
+    if ((k + phase) * T - t < 1e-9 * T) k += 1;  // t is that one, but for a rounding
+    next = std::min(next, (k + phase) * T);
+  };
+  for (const auto& e : effects_) look(e->declared.period, 0), look(e->declared.impulse_period, 0.5);
   return next;
 }
 

@@ -57,6 +57,7 @@ class SceneForces {
   S act_and_count(Active<S>& effect);                   // its power
   void act_and_keep(Active<S>& effect, S* row);         // its generalized forces (nv) added to a row, its wrenches kept
   void gather_kept(Active<S>& effect, S* row) { kinematics_.gather(effect.ways, effect.declared.wrenches, effect.kept.data(), row); }
+  void impulses(Active<S>& effect, std::uint64_t number, S* out) { effect.bound->impulses(at_of(effect), number, out); }
   S potential(Active<S>& effect) { return effect.bound->potential(at_of(effect)); }
   S* tau() { return tau_.data(); }
   const Vector6<S>* wrenches() const { return wrench_.data(); }
@@ -73,8 +74,8 @@ class SceneForces {
   }
   // Controllers whose sample falls on t (all of them where `first`): what they hold, in place in `own`.
   void sample(const S& t, bool first, const S* q, const S* v, S* own);
-  // The first sample after t, no earlier than a rounding of it; infinite where nothing is sampled.
-  double next_sample(double t) const;
+  // The first sample or impulse after t, no earlier than a rounding of it; infinite where there is none.
+  double next_stop(double t) const;
   // The functions whose zeros say where effects are others: one after another, and the names of the effects that they are of.
   std::vector<std::string> event_names() const;
   void events(const S& t, const S* q, const S* v, const S* own, S* out);

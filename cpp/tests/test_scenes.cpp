@@ -8,14 +8,17 @@
 #include "simulation/effects/bushing.h"
 #include "simulation/effects/coulomb_friction.h"
 #include "simulation/effects/damping.h"
+#include "simulation/effects/fixman.h"
 #include "simulation/effects/gravity.h"
 #include "simulation/effects/gravity_gradient.h"
 #include "simulation/effects/implicit_damping.h"
 #include "simulation/effects/implicit_spring.h"
+#include "simulation/effects/langevin.h"
 #include "simulation/effects/limits.h"
 #include "simulation/effects/motor.h"
 #include "simulation/effects/node_damper.h"
 #include "simulation/effects/node_spring.h"
+#include "simulation/effects/nose_hoover.h"
 #include "simulation/effects/point_mass_gravity.h"
 #include "simulation/effects/prescribed_motion.h"
 #include "simulation/effects/quadratic_damping.h"
@@ -147,6 +150,35 @@ BOOST_AUTO_TEST_CASE(steps_allocate_nothing) {
   }
 }
 
+// Impulses, thermostats with states of their own, the Fixman potential: once they have their room.
+BOOST_AUTO_TEST_CASE(thermostats_allocate_nothing) {
+  const auto mb = machine();
+  Scene scene(mb);
+  scene.add("", std::make_shared<Langevin>(*mb, all, 0.7, std::vector<double>{0.4}, 0.2, 3));
+  scene.add("", std::make_shared<NoseHoover>(*mb, all, 0.7, 0.3, 3));
+  scene.add("", std::make_shared<Fixman>(*mb, 0.7));
+  scene.add("", std::make_shared<RotorInertia>(*mb, all, std::vector<double>{0.2}, std::vector<double>{2.0}));
+  CompiledScene<double> compiled(scene, Solving{});
+  const std::vector<double> q = moved(*mb, 1), own(compiled.effects().own(), 0.3);
+  std::vector<double> v = random_numbers(mb->nv(), 2), out(mb->nv()), rates(own.size()), gained(1), potential(4);
+  double kinetic = 0, after = 0;
+  for (int time = 0; time < 2; ++time) {
+    const int allocations = allocations_of([&] {
+      compiled.accelerations(0.1, q.data(), v.data(), own.data(), out.data());
+      compiled.effects().rates(rates.data());
+      compiled.energies(0.1, q.data(), v.data(), own.data(), &kinetic, potential.data());
+      compiled.give_impulses(0.1, q.data(), v.data(), own.data(), gained.data());
+    });
+    if (time == 1) BOOST_TEST(allocations == 0);
+  }
+  compiled.energies(0.1, q.data(), v.data(), own.data(), &after, potential.data());
+  BOOST_TEST(std::abs(after - kinetic - gained[0]) < 1e-12 * (after + kinetic));  // the heat of an impulse
+  BOOST_TEST(std::abs(gained[0]) > 1e-3);
+  const std::vector<double> before = v;
+  compiled.give_impulses(0.2, q.data(), v.data(), own.data(), gained.data());  // none falls on that time
+  BOOST_TEST((v == before && gained[0] == 0));
+}
+
 BOOST_AUTO_TEST_CASE(an_effect_of_ones_own_with_a_state) {
   const auto mb = std::make_shared<Multibody>("cart");
   Body b;
@@ -174,7 +206,9 @@ BOOST_AUTO_TEST_CASE(derivatives_of_forces) {
   const auto with_derivatives = std::make_shared<const CompiledModel<WithDerivatives>>(broadcast<WithDerivatives>(*numbers));
   const int nq = mb->nq(), nv = mb->nv();
   const std::vector<double> q = moved(*mb, 3), v = random_numbers(nv, 4);
-  for (const EffectPointer& effect : every_effect(*mb)) {
+  std::vector<EffectPointer> effects = every_effect(*mb);
+  effects.push_back(std::make_shared<Fixman>(*mb, 1.7));
+  for (const EffectPointer& effect : effects) {
     Scene scene(mb);
     scene.add("", effect);
     SceneForces<double> plain(scene, numbers);

@@ -119,6 +119,9 @@ class Run(Motion):
             found = _core.scene_between(self._calls, integrator, t, q, v, states, work, times[order].tolist(), steps.tolist())
         else:
             found = self._interpolated(rows, times[order], steps)
+        last = np.searchsorted(rows["t"], times[order], side="right") - 1
+        jumped = (rows["t"][last] == times[order]) & (rows["t"][last - 1] == times[order]) & (last > 0)  # after an impulse
+        found = {name: np.where(jumped.reshape(-1, *[1] * (x.ndim - 1)), rows[name][last], x) for name, x in found.items()}
         back = np.argsort(order, kind="stable")
         return {name: x[back] for name, x in found.items()}
 

@@ -57,6 +57,7 @@ EFFECTS = {
     "motor": lambda: [E.Motor(0.4, 1.0, 20.0, 3.0, 0.01, hinges=PINS, effort_limit=2.0)],
     "limits": lambda: [E.Gravity(), E.Limits(20.0, 0.2, lower=-0.1, upper=0.1, hinges=PINS)],
     "wrench": lambda: [E.Gravity(), E.Wrench("tip", [1, 2, 3, 4, 5, 6], axes="eye"), E.Wrench("eye", [0, 0, 1, 3, 0, 0])],
+    "thermostats": lambda: [E.Langevin(0.7, 0.4, 0.07, seed=5), E.NoseHoover(0.7, 0.3, hinges=PINS), E.Fixman(0.5)],
     "prescribed": lambda: [
         E.Gravity(),
         E.Prescribed("boom", E.Harmonic(0.3, 1.0)),

@@ -8,8 +8,8 @@ CHANGES = {
         ("a sample is taken a piece too late", "forwards_ ? std::min(stop, target) : target", "target"),
         (
             "a stepper keeps its slope over a sample",
-            "equations_.stop(t_, x_);\n      stepper_.forget();",
-            "equations_.stop(t_, x_);",
+            "watcher_.step(t_, x_);\n      stepper_.forget();",
+            "watcher_.step(t_, x_);",
             STATEMENT,
         ),
         ("a run goes on from where its last step was cut short", "whole_ || !stepper_.cut()", "true"),

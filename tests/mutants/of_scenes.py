@@ -21,15 +21,37 @@ CHANGES = {
             STATEMENT,
         ),
         ("wrenches do no work", "power += dot(alone_wrench_[k], at_.twist[k])", "power"),
-        ("samples fall a hair late", "k * T - t < 1e-9 * T", "false"),
+        ("impulses fall on whole multiples", "look(e->declared.impulse_period, 0.5)", "look(e->declared.impulse_period, 0)"),
+        ("samples fall a hair late", "(k + phase) * T - t < 1e-9 * T", "false"),
         ("wrenches pile up", "for (int k : wrenched_) wrench_[k] = Vector6<S>::zero();", ";", STATEMENT),
     ],
     "cpp/simulation/compiled_scene.cpp": [
         ("what prescribed motion needs counts other forces twice", "needed_[j] = vdot_[j] - needed_[j]", "needed_[j] = vdot_[j]"),
         ("rotors have no energy", "*kinetic += S(h.inertia) * moving[h.coordinate] * moving[h.coordinate] / S(2);", ";", STATEMENT),
+        ("nothing resists an impulse", "terms.inertia[h.coordinate] += h.damping;", ";", STATEMENT),
+        ("the work of an impulse is at the velocity before", "(v[j] + change_[j] / S(2))", "v[j]"),
+        ("impulses move what is prescribed", "for (int j : prescribed_) work_[j] = S(0);", ";", STATEMENT),
+        ("what holds against an impulse does no work", "gained[other->worker] += change_[j] * v[j];", ";", STATEMENT),
         ("at rest everything acts", "(!moving && e->declared.only_in_motion)", "false"),
         ("h² K is h K", "h * (S(term.damping) + h * S(term.stiffness))", "h * (S(term.damping) + S(term.stiffness))"),
         ("a second gravity is the first", "gravity_ = gravity_ + e->declared.gravity", "gravity_ = e->declared.gravity"),
+    ],
+    "cpp/simulation/effects/langevin.cpp": [
+        ("noise is one number for all coordinates", "static_cast<std::uint64_t>(j)", "0"),
+        ("noise has half its size", "sqrt(S(2) * S(of.kT) * brake_.back())", "sqrt(S(of.kT) * brake_.back())"),
+    ],
+    "cpp/simulation/effects/nose_hoover.cpp": [
+        ("the second thermostat counts as the others", "(i == 1 ? n_ : S(1))", "S(1)"),
+        ("prescribed coordinates are warmed", "if (!terms.is_prescribed(j)) coordinates_", "coordinates_"),
+        (
+            "the momenta are of the model's own rotors",
+            "numbers_ = model_with_rotors<S>(of_.model, terms);",
+            "numbers_ = model_with_rotors<S>(of_.model, {});",
+        ),
+    ],
+    "cpp/simulation/effects/fixman.cpp": [
+        ("the determinant is of the model's own rotors", "model_with_rotors<S>(of_.model, terms)", "model_with_rotors<S>(of_.model, {})"),
+        ("the Fixman potential is twice itself", "half_(S(of.kT) / S(2))", "half_(S(of.kT))"),
     ],
     "cpp/simulation/scene.cpp": [
         ("a coordinate is prescribed twice", "if (on) refuse_conflicts(called, *effect);", ";", STATEMENT),

@@ -21,14 +21,17 @@ EVERY = {
     "Bushing": lambda: E.Bushing(None, HAND, np.diag([1.0, 2, 3, 4, 5, 6]), [0.1] * 6, rest=np.eye(4)),
     "CoulombFriction": lambda: E.CoulombFriction({"panda_joint1": 0.3, "panda_joint2": 0.1}, 0.02),
     "Damping": lambda: E.Damping([0.1, 0.2], hinges=["panda_joint1", "panda_joint3"]),
+    "Fixman": lambda: E.Fixman(300.0, boltzmann=1.4e-23),
     "Gravity": lambda: E.Gravity(g=(0.1, -0.0, -9.81)),
     "GravityGradient": lambda: E.GravityGradient(3.0, position=(4.0, 0, 0), bodies="panda_link[1-4]"),
     "ImplicitDamping": lambda: E.ImplicitDamping(0.4),
     "ImplicitSpring": lambda: E.ImplicitSpring(2.0, rest=0.1),
+    "Langevin": lambda: E.Langevin(0.7, {"panda_joint1": 0.3}, 0.02, seed=2**53 - 1),
     "Limits": lambda: E.Limits(50.0, 0.2, lower=-0.1, upper=0.1, hinges="panda_joint1"),
     "Motor": lambda: E.Motor(E.Harmonic(0.5, 2.0), 5.0, 10.0, gear_ratio=50.0, rotor_inertia=1e-5, effort_limit=3.0),
     "NodeDamper": lambda: E.NodeDamper("panda_link3", HAND, 0.7),
     "NodeSpring": lambda: E.NodeSpring(HAND, None, 3.0, 0.2),
+    "NoseHoover": lambda: E.NoseHoover(0.7, 0.2, chain=4, hinges="panda_joint[1-4]"),
     "PointMassGravity": lambda: E.PointMassGravity(2.0, (3, 0, 0)),
     "Prescribed": lambda: E.Prescribed("panda_joint5", E.Spline([0, 1, 2], [0.0, 1 / 3, 0.1], ends="natural")),
     "QuadraticDamping": lambda: E.QuadraticDamping(0.3),
@@ -60,7 +63,7 @@ def same_numbers(one, other, seed=1):
 
 
 def test_no_effect_is_forgotten():
-    assert set(EVERY) == set(KINDS) and len(EVERY) == 19
+    assert set(EVERY) == set(KINDS) and len(EVERY) == 22
 
 
 @pytest.mark.parametrize("name", EVERY)
@@ -83,7 +86,7 @@ def test_a_whole_scene(arm, tmp_path):
     scene = pc.Scene(arm, form="ud", refine=1, residual="wider", precision="double")
     for name, made in EVERY.items():
         scene.add(made(), name=f'the {name.lower()} "it" has')
-    scene.add(E.Damping(0.3, hinges=arm.hinges["panda_joint6"]), E.Gravity()).disable("gravity")
+    scene.add(E.Damping(0.3, hinges=arm.hinges["panda_joint6"]), E.Gravity()).disable("gravity", 'the fixman "it" has')
     scene.run_options = {"T": 2.5, "integrator": "fehlberg78", "rtol": 1e-10, "every": 0.1}
     scene.save(tmp_path / "named.toml", model="panda")
     same_numbers(scene, pc.load_scene(tmp_path / "named.toml"))

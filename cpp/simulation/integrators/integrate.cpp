@@ -62,7 +62,7 @@ class Run {
     keep();
     watcher_.step(t_, x_), watcher_.sample(t_, x_);
     if (times.size() == 1) return;
-    if (equations_.stops() && !forwards_) refuse(options_.integrator, "a sampled controller acts, and time runs backwards");
+    if (equations_.stops() && !forwards_) refuse(options_.integrator, "a controller is sampled or an impulse acts, and time runs backwards");
     stepper_.start(t_, x_, S(times.back()), plan_.resumed ? &plan_.resumed->pace : nullptr);
     watch_.begin(t_, x_, plan_.resumed ? &plan_.resumed->signs : nullptr);
     keep();
@@ -79,6 +79,7 @@ class Run {
     t_ = to_;
     if (stop <= target) {
       equations_.stop(t_, x_);
+      if (equations_.jumps()) watcher_.step(t_, x_);
       stepper_.forget();
       whole_ = true, fresh_ = true;
     }

@@ -205,7 +205,8 @@ class FixedSteps : public Stepper<S> {
     if (!resumed_) {
       pace_ = {S(options_.step), t, 0};
       count_ = steps_to(end);
-      if (const S whole = S(count_) * pace_.size; !(whole == end - t)) pace_.size = (end - t) / S(count_);
+      // What is no more than the rounding of the times themselves makes no step another one.
+      if (const S off = S(count_) * pace_.size - (end - t); abs(off) > S(4) * epsilon<S>() * std::max(S(abs(end)), S(abs(t)))) pace_.size = (end - t) / S(count_);
     } else {
       count_ = steps_to(end);
     }

@@ -9,6 +9,7 @@ from .gravities import Gravity, GravityGradient, PointMassGravity
 from .motions import Prescribed
 from .springs import Bushing, ImplicitSpring, NodeDamper, NodeSpring, Spring
 from .stops import Limits
+from .thermostats import Fixman, Langevin, NoseHoover
 from .user_effects import EffectState, Sampled, UserEffect
 from .wrenches import Wrench
 
@@ -18,15 +19,18 @@ __all__ = [
     "Damping",
     "Effect",
     "EffectState",
+    "Fixman",
     "Gravity",
     "GravityGradient",
     "Harmonic",
     "ImplicitDamping",
     "ImplicitSpring",
+    "Langevin",
     "Limits",
     "Motor",
     "NodeDamper",
     "NodeSpring",
+    "NoseHoover",
     "Offered",
     "PointMassGravity",
     "Prescribed",

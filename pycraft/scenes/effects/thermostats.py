@@ -1,0 +1,113 @@
+"""Thermostats, and what undoes in configurations what constraints do to them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ... import _core
+from ...arguments import clipped, one_number, whole
+from .effect import Effect, by_hinge, names_of
+
+
+def _energy(effect: Any, kind: str, positive: bool = False) -> float:
+    """kT, J."""
+    numbers = []
+    for name in ("temperature", "boltzmann"):
+        number = one_number(getattr(effect, name), f"{kind}: {name}")
+        if not 0 <= number < np.inf or (positive and number == 0):
+            raise _core.ModelError(f"{kind}: {name} is {number:g}; it is a finite number, {'positive' if positive else 'not negative'}")
+        numbers.append(number)
+    return numbers[0] * numbers[1]
+
+
+def _seconds(value: Any, what: str) -> float:
+    number = one_number(value, what)
+    if not 0 < number < np.inf:
+        raise _core.ModelError(f"{what} is {number:g}; it is a positive number of seconds")
+    return number
+
+
+@dataclass(repr=False, eq=False)
+class Langevin(Effect):
+    """A Langevin thermostat: friction -friction v and white noise that belongs to it, by an impulse every `period` seconds.
+
+    The density √det(ℳ + J) exp(-H/kT) of coordinates and velocities stays what it is, whatever the period, but for the integrator's error
+    between impulses. They act at (k + ½) period; integrators end a step there.
+
+    Parameters
+    ----------
+    temperature : in units of energy over `boltzmann`
+    friction : N m s/rad or N s/m
+        One number, one for each coordinate, or a dictionary by hinge; not negative.
+    period : s between impulses
+    hinges : names of hinges, coordinates, patterns, or a list of them; None: all
+    seed : the noise is a function of it, of the number of the impulse and of the coordinate
+    boltzmann : k, J/K; 1 where temperatures are energies
+    """
+
+    temperature: float
+    friction: Any
+    period: float
+    hinges: Any = None
+    seed: int = 0
+    boltzmann: float = 1.0
+
+    def made_for(self, model: _core.Multibody) -> _core.Effect:
+        names, values = by_hinge(self.friction, self.hinges, model, "langevin", "friction")
+        given: Any = self.seed
+        seed = whole(int(given) if isinstance(given, float) and given.is_integer() else given, "langevin: seed")  # samples are floats
+        if not 0 <= seed < 2**53:
+            raise _core.ModelError(f"langevin: seed is {seed}; it is a whole number from 0 to 2⁵³ - 1")
+        return _core.langevin_effect(model, names, _energy(self, "langevin"), values, _seconds(self.period, "langevin: period"), seed)
+
+
+@dataclass(repr=False, eq=False)
+class NoseHoover(Effect):
+    """A chain of Nosé-Hoover thermostats on the momenta p = (ℳ + J)v of coordinates: T = -ξ₁ p, ξ driven by what Σ v p is beyond n kT.
+
+    Its potential is the energy that it holds, so that `run.balance` is the extended energy, constant but for the integrator's error.
+
+    Parameters
+    ----------
+    temperature : in units of energy over `boltzmann`
+    time_constant : s
+        τ; the masses of the chain are n kT τ², kT τ², ... About the time in which the system moves from one configuration to another.
+    chain : how many there are one on the other; of 1 alone motion may stay in a part of its states
+    hinges : names of hinges, coordinates, patterns, or a list of them; None: all
+    boltzmann : k, J/K; 1 where temperatures are energies
+    """
+
+    temperature: float
+    time_constant: float
+    chain: int = 3
+    hinges: Any = None
+    boltzmann: float = 1.0
+
+    def made_for(self, model: _core.Multibody) -> _core.Effect:
+        chain = clipped(self.chain, "nose_hoover: chain")
+        if not 1 <= chain <= 100:
+            raise _core.ModelError(f"nose_hoover: chain is {self.chain}; it is a whole number from 1 to 100")
+        kT, slow = _energy(self, "nose_hoover", positive=True), _seconds(self.time_constant, "nose_hoover: time_constant")
+        return _core.nose_hoover_effect(model, names_of(self.hinges, "nose_hoover"), kT, slow, chain)
+
+
+@dataclass(repr=False, eq=False)
+class Fixman(Effect):
+    """The Fixman potential ½ kT ln det(ℳ + J) and its force.
+
+    Configurations then have the density exp(-U/kT), as if bonds were stiff springs, and not √det(ℳ + J) exp(-U/kT).
+
+    Parameters
+    ----------
+    temperature : in units of energy over `boltzmann`
+    boltzmann : k, J/K; 1 where temperatures are energies
+    """
+
+    temperature: float
+    boltzmann: float = 1.0
+
+    def made_for(self, model: _core.Multibody) -> _core.Effect:
+        return _core.fixman_effect(model, _energy(self, "fixman"))
