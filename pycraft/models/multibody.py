@@ -239,7 +239,8 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, WithLoops):
         Warns
         -----
         ModelWarning
-            What the model has beside bodies and hinges and URDF does not hold (gravity, a state); loose frames, which no file holds.
+            What the model has beside bodies and hinges and URDF does not hold (gravity, a state, loops); loose frames and couplings by
+            functions, which no file holds.
 
         Examples
         --------
@@ -289,7 +290,7 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, WithLoops):
         for loose in data.get("frames", []):
             model.frames._add_again(loose)
         for loop in data.get("loops", []):
-            model.loops._add_again(loop)
+            model.loops._declare(loop)
         model.gravity = data.get("gravity", (0, 0, 0))
         if "q" in data:
             model.q, model.v = data["q"], data["v"]

@@ -28,6 +28,9 @@ def save(model: Multibody, path: str | os.PathLike[str], state: bool = True) -> 
         raise _core.ModelError(f"{shown}: a model's file ends in {kinds}{remedy}")
     if loose := model.frames._core.loose_names():
         warn(f"{shown}: a file does not hold loose frames: {', '.join(loose[:6])}{', ...' if len(loose) > 6 else ''}")
+    functions = [loop["name"] for loop in model.loops._description() if loop.get("function") is not None]
+    if functions and ending == ".toml":
+        warn(f"{shown}: a file does not hold couplings by functions: {', '.join(functions[:6])}{', ...' if len(functions) > 6 else ''}")
     write_text(shown, text)
 
 
