@@ -8,6 +8,7 @@ import pytest
 import pycraft as pc
 from pycraft.dynamics.task_space import TaskSpace
 from pycraft.linear.linear_model import LinearModel
+from pycraft.models.mobility import Mobility
 from support.mechanisms import every_kind, uniform_batch
 
 FRAMES = {
@@ -36,6 +37,8 @@ def calls(model):
 def leaves(x):
     if isinstance(x, LinearModel):
         return [x.A, x.B, x.C, x.D, x.rate, x.q, x.v]
+    if isinstance(x, Mobility):
+        return [x.singular_values, x.freedoms]
     if isinstance(x, TaskSpace):
         return [x.jacobian, x.velocity, x.bias()]
     if hasattr(x, "lines"):  # a picture: what it is drawn of
