@@ -154,22 +154,30 @@ class Loops(Closed, Mapping):
 
     def add_hinge(self, b: Any, a: Any, hinge: str, given: Mapping[str, Any], name: str | None) -> Loop:
         """Close a chain by a hinge: see `Multibody.add_loop`."""
-        a, b, hinge = self._frame(a), self._frame(b), text(hinge, "the kind of a hinge")
-        name = name_of(name, "a loop", f"{a or 'base'} to {b or 'base'}")
-        what = f"loop {name!r}"
-        axes = hinge_axes(what, hinge, given["axis"], given["axes"], given["point"], given["subhinges"])
-        subhinges = None if given["subhinges"] is None else listed(given["subhinges"], f"subhinges of {what}")
+        hinge = text(hinge, "the kind of a hinge")
+        declared = self._ends(a, b, name) | {"kind": hinge}
+        what = f"loop {declared['name']!r}"
+        if hinge == "custom":
+            remedy = "add a body without mass on that hinge to the tree, and close the loop from it by a weld"
+            raise _core.ModelError(f"{what}: a custom hinge has no rows of its own: {remedy}")
+        axes = hinge_axes(what, hinge, given["axis"], given["axes"], given["point"], None)
+        declared["axes"] = [_numbers(axis, f"axis of {what}") for axis in axes]
         rotation, position = pose_parts(what, given["rotation"], given["position"], given["placement"])
-        numbers = (hinge, axes, given["point"], given["pitch"], subhinges, rotation, position)
-        self._core.add_hinge(name, a, b, *numbers)
-        return self._keep(name, {"how": "hinge", "a": a, "b": b, "numbers": _copied(numbers)})
+        parts = {"point": given["point"], "rotation": rotation, "position": position}
+        declared |= {key: None if part is None else _numbers(part, f"{key} of {what}") for key, part in parts.items()}
+        return self._declare(declared | {"pitch": one_number(given["pitch"], f"the pitch of {what}")})
 
-    def add_pair(self, b: Any, a: Any, kind: str, radius: Any, quadric: tuple[Any, Any, Any] | None, name: str | None) -> Loop:
-        """Rows between two frames that are no hinge's: see `Multibody.add_rolling` and `Multibody.add_surface`."""
-        a, b, kind = self._frame(a), self._frame(b), text(kind, "the kind of a loop")
-        name = name_of(name, "a loop", f"{a or 'base'} to {b or 'base'}")
-        self._core.add_pair(name, a, b, kind, radius, quadric)
-        return self._keep(name, {"how": "pair", "a": a, "b": b, "numbers": _copied((kind, radius, quadric))})
+    def add_pair(self, b: Any, a: Any, kind: str, radius: Any, name: str | None) -> Loop:
+        """Something that rolls: see `Multibody.add_rolling`."""
+        return self._declare(self._ends(a, b, name) | {"kind": kind, "radius": one_number(radius, "radius")})
+
+    def add_surface(self, b: Any, a: Any, quadratic: Any, linear: Any, constant: Any, name: str | None) -> Loop:
+        """A surface for a point: see `Multibody.add_surface`."""
+        declared = self._ends(a, b, name) | {"kind": "surface"}
+        what = f"of the surface of {declared['name']!r}"
+        A = np.zeros((3, 3)) if quadratic is None else _numbers(quadratic, f"A {what}")
+        slopes = np.zeros(3) if linear is None else _numbers(linear, f"b {what}")
+        return self._declare(declared | {"quadratic": A, "linear": slopes, "constant": one_number(constant, f"c {what}")})
 
     def add_coupling(self, coordinates: Any, constant: Any, function: Relation | None, name: str | None) -> Loop:
         """A relation of coordinates: see `Multibody.add_coupling`."""
@@ -178,18 +186,38 @@ class Loops(Closed, Mapping):
             raise _core.ModelError(f"coupling {name!r}: coefficients by coordinate, {{'a': 1.0, 'b': -2.0}}, or coordinates and function=")
         if function is not None and (isinstance(coordinates, Mapping) or not callable(function)):
             raise _core.ModelError(f"coupling {name!r}: a list of coordinates beside a function that can be called, not {function!r}")
-        listed_ = (
-            list(coordinates.items()) if isinstance(coordinates, Mapping) else [(one, 0.0) for one in listed(coordinates, "coordinates")]
+        by_coordinate = (
+            coordinates.items() if isinstance(coordinates, Mapping) else [(one, 0.0) for one in listed(coordinates, "coordinates")]
         )
         terms, numbers = [], []
-        for coordinate, given in listed_:
+        for coordinate, given in by_coordinate:
             number = self._coordinate(coordinate, name)
             if number in numbers:
                 raise _core.ModelError(f"coupling {name!r} names coordinate {self._model.coordinate_names[number]!r} twice; give it once")
             numbers.append(number)
             terms.append((*self._of_hinge(number), _coefficients(given, f"coefficients of {coordinate!r} in coupling {name!r}")))
-        self._core.add_coupling(name, terms, one_number(constant, f"the constant of coupling {name!r}"), function)
-        return self._keep(name, {"how": "coupling", "terms": terms, "constant": constant, "function": function})
+        constant = one_number(constant, f"the constant of coupling {name!r}")
+        return self._declare({"name": name, "kind": "coupling", "terms": terms, "constant": constant, "function": function})
+
+    def _ends(self, a: Any, b: Any, name: str | None) -> dict[str, Any]:
+        a, b = self._frame(a), self._frame(b)
+        return {"name": name_of(name, "a loop", f"{a or 'base'} to {b or 'base'}"), "a": a, "b": b}
+
+    def _declare(self, declared: Mapping[str, Any]) -> Loop:
+        """The loop that plain data tells of, as `_description` has it."""
+        name, kind = declared["name"], declared["kind"]
+        if kind == "coupling":
+            self._core.add_coupling(name, declared["terms"], declared["constant"], declared["function"])
+        elif kind == "surface":
+            surface = (declared["quadratic"], declared["linear"], declared["constant"])
+            self._core.add_pair(name, declared["a"], declared["b"], kind, 0.0, surface)
+        elif "radius" in declared:
+            self._core.add_pair(name, declared["a"], declared["b"], kind, declared["radius"], None)
+        else:
+            shape = [declared[key] for key in ("axes", "point", "pitch", "rotation", "position")]
+            self._core.add_hinge(name, declared["a"], declared["b"], kind, *shape)
+        self._declared[name] = dict(declared)
+        return Loop(self, name)
 
     # ------------------------------------------------------------------ as a mapping
     def __getitem__(self, name: str) -> Loop:
@@ -234,23 +262,13 @@ class Loops(Closed, Mapping):
         """Whose coordinate that is, and which of its own."""
         return next((h.name, number - h.v_slice.start) for h in self._model.hinges.values() if h.v_slice.start <= number < h.v_slice.stop)
 
-    def _keep(self, name: str, declaration: dict[str, Any]) -> Loop:
-        self._declared[name] = {"name": name, **declaration}
-        return Loop(self, name)
-
     def _description(self) -> list[dict[str, Any]]:
         """The loops as plain data (functions of couplings as they are), in order."""
         return [dict(self._declared[name]) for name in self]
 
-    def _add_again(self, declared: Mapping[str, Any]) -> None:
-        """Declare a loop that `_description` tells of."""
-        name, how = declared["name"], declared["how"]
-        if how == "coupling":
-            self._core.add_coupling(name, declared["terms"], declared["constant"], declared["function"])
-        else:
-            add = self._core.add_hinge if how == "hinge" else self._core.add_pair
-            add(name, declared["a"], declared["b"], *declared["numbers"])
-        self._keep(name, {key: value for key, value in declared.items() if key != "name"})
+
+def _numbers(given: Any, what: str) -> np.ndarray:
+    return np.array(_core.real_array(given, what))
 
 
 def _coefficients(given: Any, what: str) -> list[float]:
@@ -259,10 +277,3 @@ def _coefficients(given: Any, what: str) -> list[float]:
     if numbers.ndim > 1:
         raise _core.ModelError(f"{what}: one number, or those of 1, q, q², ..., not an array {numbers.shape}")
     return [0.0, float(numbers)] if numbers.ndim == 0 else [float(c) for c in numbers]
-
-
-def _copied(numbers: Any) -> Any:
-    """What was given, as the arrays that it was then."""
-    if isinstance(numbers, (tuple, list)):
-        return type(numbers)(_copied(one) for one in numbers)
-    return np.array(numbers) if isinstance(numbers, np.ndarray) else numbers

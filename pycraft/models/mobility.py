@@ -16,7 +16,7 @@ _CLOSED = 1e-6  # residuals above are no state on the loops
 _NEIGHBOURS, _STEP = 4, 1e-2
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Mobility(Closed):
     """What loops leave free at a state.
 

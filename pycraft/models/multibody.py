@@ -236,8 +236,8 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, Planning, Structure, 
         Warns
         -----
         ModelWarning
-            What the model has beside bodies and hinges and the format does not hold (URDF: gravity, a state); loose frames, which no file
-            holds.
+            What the model has beside bodies and hinges and the format does not hold (URDF: gravity, a state; both of the others: loops);
+            loose frames, couplings by functions, and what unlocks and splits, which no file holds.
 
         Examples
         --------
@@ -288,7 +288,7 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, Planning, Structure, 
         for loose in data.get("frames", []):
             model.frames._add_again(loose)
         for loop in data.get("loops", []):
-            model.loops._add_again(loop)
+            model.loops._declare(loop)
         model._hinges_before, model._bodies_before = dict(data.get("locked", {})), dict(data.get("coalesced", {}))
         model.gravity = data.get("gravity", (0, 0, 0))
         if "q" in data:

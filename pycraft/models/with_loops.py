@@ -38,7 +38,6 @@ class WithLoops(WithFrames):
         axes: Sequence[Vector] | None = None,
         point: Vector | None = None,
         pitch: float = 0.0,
-        subhinges: Sequence[Mapping[str, Any]] | None = None,
         position: Vector | None = None,
         rotation: np.ndarray | None = None,
         placement: np.ndarray | None = None,
@@ -77,7 +76,7 @@ class WithLoops(WithFrames):
         >>> bar.loops.jacobian([0, 0, 0]).shape
         (5, 3)
         """
-        given = {"axis": axis, "axes": axes, "point": point, "pitch": pitch, "subhinges": subhinges}
+        given = {"axis": axis, "axes": axes, "point": point, "pitch": pitch}
         return self.loops.add_hinge(b, a, hinge, given | {"position": position, "rotation": rotation, "placement": placement}, name)
 
     def add_rolling(
@@ -117,7 +116,7 @@ class WithLoops(WithFrames):
             raise _core.ModelError(f"kind={kind!r} of what rolls: there are {', '.join(map(repr, kinds))}")
         if (radius is None) != (kind == "blade"):
             raise _core.ModelError(f"a {kind} {'has no radius' if kind == 'blade' else 'rolls on its radius: give radius= in metres'}")
-        return self.loops.add_pair(b, ground, kinds[kind], 0.0 if radius is None else radius, None, name)
+        return self.loops.add_pair(b, ground, kinds[kind], 0.0 if radius is None else radius, name)
 
     def add_surface(
         self,
@@ -149,8 +148,7 @@ class WithLoops(WithFrames):
         >>> arm.add_surface("tip", b=(0, 1, 0), c=-0.5, name="rail").residual([0, 0]).tolist()  # the line y = 0.5 in the plane of the arm
         [-0.5]
         """
-        matrix = np.zeros((3, 3)) if A is None else A
-        return self.loops.add_pair(point, on, "surface", 0.0, (matrix, (0.0, 0.0, 0.0) if b is None else b, c), name)
+        return self.loops.add_surface(point, on, A, b, c, name)
 
     def add_coupling(
         self,

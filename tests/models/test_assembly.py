@@ -155,6 +155,14 @@ def test_couplings_are_assembled_and_keep_their_winding():
     assert [s.q.tolist() for s in model.assembly_branches([20.0, 0.0], fix="hinge0")] == [pytest.approx([20.0, 20.5 / 3])]
 
 
+def test_turns_that_a_coupling_tells_apart_are_branches():
+    """r = q² - 2πq is zero at 0 and at 2π, which are one pose and two states."""
+    model = pc.chain(2)
+    model.add_coupling({"hinge1": [0.0, -2 * np.pi, 1.0]}, name="cam")
+    found = [state.q[1] for state in model.assembly_branches([0.3, 2.5], fix="hinge0")]
+    assert found == pytest.approx([0, 2 * np.pi], abs=CLOSE)
+
+
 def test_velocities_keep_rows_of_velocities():
     model = pc.Multibody("skate")
     model.add_body("skate", hinge="planar", mass=1.0, inertia=np.eye(3))
@@ -297,6 +305,13 @@ def test_redundant_loops_of_couplings():
     signs = {"01": 1.0, "12": 1.0, "02": -1.0}
     ((row, terms),) = found.dependencies.items()
     assert {name: round(c, 12) for name, c in terms.items()} == {name: -signs[name] / signs[row] for name in signs if name != row}
+
+
+def test_rank_does_not_hang_on_the_units_of_rows():
+    model = pc.chain(2)
+    model.add_coupling({0: 1e-12, 1: -1e-12}, name="small")
+    found = model.mobility([0.3, 0.3])
+    assert (found.rank, found.redundant) == (1, []) and found.distance == pytest.approx(1)
 
 
 def test_mobility_off_the_loops_is_refused():

@@ -192,6 +192,17 @@ def test_couplings():
     assert_close(cam.bias(q, v), [4 * q[0] * v[0] * v[1] + 2 * q[1] * v[0] ** 2])
 
 
+def test_a_coupling_of_the_second_coordinate_of_a_hinge():
+    """Behind a ball, whose q is longer than its v, and of a hinge of several: each has its own place in q and in v."""
+    model = pc.tree([-1, 0, 1], ["ball", "planar", "pin"])
+    model.add_coupling({"hinge1[1]": [0.0, 2.0, 3.0], "hinge2": -1.0}, name="second")
+    state = model.random_state(4)
+    x, at = state.q[5], model.loops.jacobian(state)[0]
+    assert_close(model.loops.residual(state), [2 * x + 3 * x * x - state.q[7]])
+    assert_close(at, [0, 0, 0, 0, 2 + 6 * x, 0, -1])
+    assert_close(model.loops.bias(state), [6 * state.v[4] ** 2])
+
+
 # ------------------------------------------------------------------ states, copies, edits
 
 

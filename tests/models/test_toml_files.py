@@ -359,6 +359,7 @@ def test_the_file_of_the_page(tmp_path):
     assert set(re.findall(r"^(\w+)", re.sub(r"\[.*?\]", "", text), re.M)) >= {"limits", "rotor_inertia", "subhinges", "rpy", "com"}
     assert (arm.nv, arm.coordinate_names) == (3, ["shoulder", "lower[0]", "lower[1]"])
     assert arm.q.tolist() == [0.1, 0.2, 0.05] and arm.left_aside["damping"][0] == 0.5 and arm.nodes["tip"].body.name == "lower"
+    assert arm.loops.rows[4:] == ["closure: along z", "gear"] and arm.loops["gear"].jacobian().tolist() == [[1.0, 0.0, -3.0]]
     assert lost(arm, tmp_path / "again.toml") == []
     for key in BODY:
         assert re.search(rf"`?\b{key}\b", page), key

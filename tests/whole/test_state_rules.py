@@ -9,6 +9,7 @@ import pycraft as pc
 from pycraft.dynamics.quadratic import QuadraticModel
 from pycraft.dynamics.task_space import TaskSpace
 from pycraft.linear.linear_model import LinearModel
+from pycraft.models.mobility import Mobility
 from support.mechanisms import every_kind, uniform_batch
 
 FRAMES = {
@@ -40,6 +41,8 @@ def leaves(x):
         return [x.A, x.B, x.C, x.D, x.rate, x.q, x.v]
     if isinstance(x, QuadraticModel):
         return [*leaves(x.linear), *x.tensors()]
+    if isinstance(x, Mobility):
+        return [x.singular_values, x.freedoms]
     if isinstance(x, TaskSpace):
         return [x.jacobian, x.velocity, x.bias()]
     if hasattr(x, "lines"):  # a picture: what it is drawn of

@@ -1,7 +1,7 @@
 """TOML files read into a `Multibody`: what `Multibody.save` writes, and what a person writes (docs/models.md, Files).
 
-A table [[bodies]] has the arguments of `Multibody.add_body` by their names, [[nodes]] those of `add_node`. Bodies and nodes may stand in
-any order; children of a body come in the order of their tables.
+A table [[bodies]] has the arguments of `Multibody.add_body` by their names, [[nodes]] those of `add_node`; [[loops]] are those of
+`toml_loops`. Bodies and nodes may stand in any order; children of a body come in the order of their tables.
 """
 
 from __future__ import annotations
@@ -16,11 +16,12 @@ from ..multibody import Multibody
 from .left_aside import QUANTITIES
 from .rotations import rotation_from_quaternion, rotation_from_rpy
 from .toml_file import TomlFile, TomlTable, nearest
+from .toml_loops import LOOP, add_loop
 from .xml_file import abbreviated
 
 FORMAT = 1
 """Raised when a file means something else than it did."""
-MODEL = ("format", "name", "gravity", "welds", "strict", "bodies", "nodes", "state", "left_aside", "actuators")
+MODEL = ("format", "name", "gravity", "welds", "strict", "bodies", "nodes", "loops", "state", "left_aside", "actuators")
 POSE = ("position", "rotation", "rpy", "quaternion")
 BODY = (
     "name", "parent", "hinge", "hinge_name", "axis", "axes", "point", "pitch", "subhinges", *POSE, "limits", "rotor_inertia", "mass", "com",
@@ -74,6 +75,8 @@ def read_table(table: TomlTable, name: str, welds: str | None = None, strict: bo
     model = Multibody(table.text("name", name, empty=True), welds=welds or kept, strict=strict or table.flag("strict"))
     tables = (table.tables("bodies", BODY, "body", named=True) or []) + (table.tables("nodes", NODE, "node", named=True) or [])
     _add_all(model, tables)
+    for loop in table.tables("loops", (*LOOP, *POSE), "loop", named=True) or []:
+        add_loop(model, loop, *_pose(loop))
     gravity = table.vector("gravity", 3, f"{_VECTOR} in m/s²")
     if gravity is not None:
         model.gravity = gravity

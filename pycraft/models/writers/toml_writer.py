@@ -54,6 +54,8 @@ def model_data(model: Multibody, state: bool = True) -> dict[str, Any]:
         data["bodies"] = [_body(body, names) for body in bodies]
     if described["nodes"]:
         data["nodes"] = [_node(node, names) for node in described["nodes"]]
+    if loops := [loop_data(model, loop) for loop in described.get("loops", []) if loop.get("function") is None]:
+        data["loops"] = loops
     if state and (moved := state_data(model)):
         data["state"] = moved
     if left := _left_aside(model):
@@ -97,6 +99,22 @@ def _body(body: dict[str, Any], names: list[str]) -> dict[str, Any]:
 def _node(node: dict[str, Any], names: list[str]) -> dict[str, Any]:
     carrier = {"body": names[node["body"]]} if node["body"] >= 0 else {}
     return {"name": node["name"]} | carrier | _pose(node)
+
+
+def loop_data(model: Multibody, loop: dict[str, Any]) -> dict[str, Any]:
+    """A loop as plain data, by the keys that toml_loops reads."""
+    data: dict[str, Any] = {"name": loop["name"], "kind": loop["kind"]} | {end: loop[end] for end in ("a", "b") if loop.get(end)}
+    if loop["kind"] == "coupling":
+        numbers = model.loops.coupled(loop["name"])
+        data["coordinates"] = Inline((model.coordinate_names[i], list(of)) for i, (*_, of) in zip(numbers, loop["terms"], strict=True))
+    elif "axes" in loop:
+        axes = loop["axes"]
+        data |= {"axis": axes[0]} if len(axes) == 1 else {"axes": axes} if axes else {}
+        data |= {} if loop["point"] is None else {"point": loop["point"]}
+        rotation, position = (zero if loop[key] is None else loop[key] for key, zero in (("rotation", np.eye(3)), ("position", _ZERO)))
+        data |= _pose({"rotation": rotation, "position": position})
+    data |= {key: loop[key] for key in ("quadratic", "linear") if key in loop}
+    return data | {key: loop[key] for key in ("radius", "pitch", "constant") if not same(loop.get(key, 0.0), 0.0)}
 
 
 def _pose(pose: dict[str, Any]) -> dict[str, Any]:

@@ -116,6 +116,7 @@ def _unsaid(model: Multibody) -> list[str]:
     if not (same(model.q, model.zero_q()) and same(model.v, np.zeros(model.nv))):
         said.append("the state q, v")
     said += ["its actuators"] if model.actuators else []
+    said += [f"its loops {', '.join(map(repr, model.loops))}"] if len(model.loops) else []
     return said + [f"the {name} left aside" for name in ("gravity", "stiffness") if name in model.left_aside]
 
 

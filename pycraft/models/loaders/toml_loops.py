@@ -1,0 +1,77 @@
+"""Loops of a model in TOML: tables [[loops]], each with its kind, the frames a and b, and what the kind has (docs/models.md, Files).
+
+Of a hinge the arguments of `Multibody.add_loop` by their names; of "wheel" and "rolling ball" the radius; of "surface" quadratic, linear
+and constant; of "coupling" coordinates = { name = coefficients of 1, q, q², ... } and constant.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ... import _core
+from ..multibody import Multibody
+from .toml_file import TomlTable
+
+_HINGE = ("axis", "axes", "point", "pitch", "position", "rotation", "rpy", "quaternion")
+_KEYS: dict[str, tuple[str, ...]] = {kind: _HINGE for kind in _core.hinge_kinds if kind != "custom"} | {
+    "blade": (),
+    "wheel": ("radius",),
+    "rolling ball": ("radius",),
+    "surface": ("quadratic", "linear", "constant"),
+    "coupling": ("coordinates", "constant"),
+}
+LOOP = ("name", "kind", "a", "b", "axis", "axes", "point", "pitch", "radius", "quadratic", "linear", "constant", "coordinates")
+_VECTOR = "three finite numbers: [x, y, z]"
+
+
+def add_loop(model: Multibody, table: TomlTable, rotation: Any, position: Any) -> None:
+    """Declares what a table tells of. ModelError with file, line, loop and key."""
+    kind, name = table.choice("kind", tuple(_KEYS), "pin"), table.text("name")
+    keys = _KEYS[kind] if kind == "coupling" else ("a", "b", *_KEYS[kind])
+    if wrong := [key for key in table.data if key not in ("name", "kind", *keys)]:
+        raise table.error(wrong[0], f"{table.label} of kind {kind!r} has no {wrong[0]}; it has {', '.join(keys)}")
+    a, b = (table.text(end, "", empty=True) or None for end in ("a", "b"))
+    parts = _parts(table, kind)
+    try:
+        if kind == "coupling":
+            model.loops.add_coupling(parts["coordinates"], parts["constant"], None, name)
+        elif kind == "surface":
+            model.loops.add_surface(b, a, parts["quadratic"], parts["linear"], parts["constant"], name)
+        elif kind in ("blade", "wheel", "rolling ball"):
+            model.loops.add_pair(b, a, kind, parts["radius"], name)
+        else:
+            model.loops.add_hinge(b, a, kind, parts | {"rotation": rotation, "position": position, "placement": None}, name)
+    except _core.ModelError as error:
+        raise table.error(None, str(error)) from None
+
+
+def _parts(table: TomlTable, kind: str) -> dict[str, Any]:
+    """What the table says of its kind, beside a hinge's placement."""
+    if kind == "coupling":
+        return {"coordinates": _coefficients(table), "constant": table.number("constant", 0.0, "that of the relation")}
+    if kind == "surface":
+        A = table.vectors("quadratic", 3, "three rows of three finite numbers: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]")
+        return {
+            "quadratic": A,
+            "linear": table.vector("linear", 3, _VECTOR),
+            "constant": table.number("constant", 0.0, "that of the surface"),
+        }
+    if kind in ("blade", "wheel", "rolling ball"):
+        return {"radius": table.number("radius", 0.0, "in m")}
+    return {
+        "axis": table.vector("axis", 3, _VECTOR),
+        "axes": table.vectors("axes", None, "a list of axes: [[1, 0, 0], [0, 1, 0]]"),
+        "point": table.vector("point", 3, f"{_VECTOR} in m, in the hinge's frame"),
+        "pitch": table.number("pitch", 0.0, "in metres per radian"),
+    }
+
+
+def _coefficients(table: TomlTable) -> dict[str, Any]:
+    given = table.table("coordinates", None, f"{table.label}: coordinates")
+    if given is None:
+        raise table.error(None, f"{table.label} has no coordinates; write coordinates = {{ motor = 1, wheel = -3 }}")
+    wanted = "that of q, or a list of those of 1, q, q², ...: [0, 1]"
+    return {
+        name: given.vector(name, None, wanted) if isinstance(given.data[name], list) else given.number(name, 0.0, wanted)
+        for name in given.data
+    }
