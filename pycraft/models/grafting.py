@@ -13,7 +13,7 @@ from ..arguments import pose_parts, text
 from .asides import Asides
 from .handles import Body, Node, Vector
 from .hinge_arguments import body_name, frame_name
-from .with_frames import WithFrames
+from .with_loops import WithLoops
 
 
 class Removed(NamedTuple):
@@ -23,9 +23,10 @@ class Removed(NamedTuple):
     hinges: list[str]
     nodes: list[str]
     effects: list[tuple[Any, str]]
+    loops: list[str]
 
 
-class Grafting(WithFrames):
+class Grafting(WithLoops):
     """Edits that take bodies off and put bodies on. Each leaves the model as it was where it is refused; operators and parts are stale."""
 
     _left_aside: dict[str, np.ndarray]
@@ -36,14 +37,14 @@ class Grafting(WithFrames):
     def remove_body(self, name: str | Body, *, with_uses: bool = False) -> Removed:
         """Remove a body with everything outboard of it. Operators made before are stale; q and v are carried over by hinge name.
 
-        Welded links of the model's file that are nodes of these bodies go along. Nodes that were added here (`add_node`), and effects of
-        scenes of this model that name one of the bodies, hinges or nodes, are uses of them. Loose frames that stand on them stay, and say
-        so when they are asked (docs/frames.md).
+        Welded links of the model's file that are nodes of these bodies go along. Nodes that were added here (`add_node`), and loops and
+        effects of scenes of this model that name one of the bodies, hinges or nodes, are uses of them. Loose frames that stand on them
+        stay, and say so when they are asked (docs/frames.md).
 
         Parameters
         ----------
         name : of the body, or its handle
-        with_uses : whether what uses them goes along, nodes and effects; else a body in use is refused
+        with_uses : whether what uses them goes along, nodes, loops and effects; else a body in use is refused
 
         Raises
         ------
@@ -69,19 +70,23 @@ class Grafting(WithFrames):
         gone = {*bodies, *hinges, *nodes}
         used = [(scene, effect, names[0]) for scene in self._scenes or () for effect, names in scene._effects_on(gone).items()]
         added = [node for node in nodes if node in self._added_nodes]
-        if not with_uses and (added or used):
+        closed = [loop for loop in self._kept_loops or () if self.loops._stands_on(loop) & gone]
+        if not with_uses and (added or used or closed):
             carrier = {node: self._body(self._frame_body(node))["name"] for node in added}
             uses = [f"node {node!r} is on {carrier[node]!r}" for node in added]
+            uses += [f"loop {loop!r} is closed there" for loop in closed]
             uses += [f"effect {effect!r} of a scene names {what!r}" for _, effect, what in used]
             remedy = f"remove_body({name!r}, with_uses=True) removes these along"
             raise _core.ModelError(f"body {name!r} is in use: {'; '.join(uses)}; {remedy}")
         aside = Asides(self)
+        for loop in closed:
+            self.loops.remove(loop)
         self._remove_body(name)
         aside.put(self)
         self._added_nodes -= gone
         for scene, effect, _ in used:
             scene.remove(effect)
-        return Removed(bodies, hinges, nodes, [(scene, effect) for scene, effect, _ in used])
+        return Removed(bodies, hinges, nodes, [(scene, effect) for scene, effect, _ in used], closed)
 
     def copy_subtree(
         self,
@@ -97,8 +102,8 @@ class Grafting(WithFrames):
     ) -> Body:
         """A copy of a body with everything outboard of it, hung on another body by a copy of its hinge.
 
-        Bodies, hinges with their limits and rotors, nodes, loose frames that stand on them, and what the model's file said of their
-        coordinates are copied. So is the state: the copy stands and moves against its parent as the original does now.
+        Bodies, hinges with their limits and rotors, nodes, loose frames that stand on them, loops among them, and what the model's file
+        said of their coordinates are copied. So is the state: the copy stands and moves against its parent as the original does now.
 
         Parameters
         ----------
@@ -149,8 +154,8 @@ class Grafting(WithFrames):
     ) -> list[Body]:
         """Take in all of another model, its base put on a body of this one. The other model stays as it is.
 
-        Bodies, hinges with their limits and rotors, nodes (those on its base, too), loose frames, what its file said of its coordinates,
-        and its present state are copied; its gravity is not, this model has its own.
+        Bodies, hinges with their limits and rotors, nodes (those on its base, too), loose frames, loops, what its file said of its
+        coordinates, and its present state are copied; its gravity is not, this model has its own.
 
         Parameters
         ----------
@@ -166,7 +171,7 @@ class Grafting(WithFrames):
         Raises
         ------
         ModelError
-            As of `copy_subtree`; a loose frame of the other model's base that a function moves.
+            As of `copy_subtree`; of the other model's base, where that is put elsewhere: a loose frame that a function moves, a loop.
 
         Cost: O(bodies of both), in the core.
 
@@ -180,7 +185,7 @@ class Grafting(WithFrames):
         >>> cart.coordinate_names
         ['plate', 'arm/hinge0', 'arm/hinge1']
         """
-        if not isinstance(other, WithFrames):
+        if not isinstance(other, WithLoops):
             raise _core.ModelError(f"{self.name!r} takes in a model, not {other!r:.80}")
         rotation, position = pose_parts(f"the base of {other.name!r}", rotation, position, placement)
         called = _renaming(prefix, suffix, rename)
@@ -206,7 +211,17 @@ class Grafting(WithFrames):
                 what = f"frame {moved['name']!r} is moved by a function of time, which says where it is on the base of {source.name!r}"
                 raise _core.ModelError(f"{what}: put it on a node there first")
         new_bodies, new_hinges, new_nodes = ([_called(called, name) for name in names] for names in (bodies, hinges, nodes))
+        loops = _loops_on(source, {*bodies, *hinges, *nodes}, root < 0)
+        for loop in loops if parent or rotation is not None or position is not None else ():
+            if "" in source.loops._stands_on(loop["name"]):
+                what = f"loop {loop['name']!r} is closed at the base of {source.name!r}, which is put elsewhere here"
+                raise _core.ModelError(f"{what}: declare it on a node there first")
         made = [frame | {"name": _called(called, frame["name"])} for frame in frames]
+        closed = [_renamed(loop, called) for loop in loops]
+        if taken := [loop["name"] for loop in closed if loop["name"] in (self._kept_loops or ())]:
+            raise _core.ModelError(
+                f"{self.name!r} has loops called {', '.join(map(repr, taken))} already; give a prefix, a suffix, or rename"
+            )
         loose = [] if self._kept_frames is None else self._kept_frames._core.loose_names()
         self._require_new(new_bodies, new_hinges, new_nodes, [frame["name"] for frame in made], loose)
         own, its = Asides(self), Asides(source)
@@ -218,6 +233,8 @@ class Grafting(WithFrames):
         for frame in made:
             on = called(frame["on"]) if frame["on"] in copies else parent
             self.frames._add_again(frame | {"on": on} | ({} if frame["on"] else {"placement": X @ frame["placement"]}))
+        for loop in closed:
+            self.loops._declare(loop)
         own.put(self)
         its.add(self, dict(zip(hinges, new_hinges, strict=True)), called)
 
@@ -231,6 +248,23 @@ def _frames_on(model: Any, carriers: set[str], with_base: bool) -> list[dict[str
             found.append(frame | {"on": "" if on_base else frame["on"]})
             names.add(frame["name"])
     return found
+
+
+def _loops_on(model: Any, carriers: set[str], with_base: bool) -> list[dict[str, Any]]:
+    """Loops that are declared on these alone, and on the base, "", where that is among them."""
+    kept = model._kept_loops
+    grounds = carriers | {""} if with_base else carriers
+    return [] if kept is None else [loop for loop in kept._description() if kept._stands_on(loop["name"]) <= grounds]
+
+
+def _renamed(loop: dict[str, Any], called: Callable[[str], str]) -> dict[str, Any]:
+    """A loop of things that are called otherwise."""
+    on = lambda name: called(name) if name else ""
+    if "terms" in loop:
+        where: dict[str, Any] = {"terms": [(on(hinge), *rest) for hinge, *rest in loop["terms"]]}
+    else:
+        where = {"a": on(loop["a"]), "b": on(loop["b"])}
+    return loop | where | {"name": _called(called, loop["name"])}
 
 
 def roots_of(model: Any) -> list[int]:

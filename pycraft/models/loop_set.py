@@ -262,6 +262,11 @@ class Loops(Closed, Mapping):
         """Whose coordinate that is, and which of its own."""
         return next((h.name, number - h.v_slice.start) for h in self._model.hinges.values() if h.v_slice.start <= number < h.v_slice.stop)
 
+    def _stands_on(self, name: str) -> set[str]:
+        """What a loop was declared on: bodies, nodes and hinges by name, "" for the base."""
+        declared = self._declared[name]
+        return {hinge for hinge, _, _ in declared["terms"]} if "terms" in declared else {declared["a"], declared["b"]}
+
     def _description(self) -> list[dict[str, Any]]:
         """The loops as plain data (functions of couplings as they are), in order."""
         return [dict(self._declared[name]) for name in self]

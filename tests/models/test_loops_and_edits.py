@@ -1,0 +1,84 @@
+"""Loops when the structure changes: what they are declared on is in use, copies of bodies have copies of them, files and copies keep them."""
+
+import numpy as np
+import pytest
+
+import pycraft as pc
+
+
+def closed():
+    """Two legs of two rods: a pin between the tips, a gear between the hips, a ball of one knee on the base."""
+    model = pc.Multibody("legs")
+    rod = dict(mass=1.0, com=(0.5, 0, 0), inertia=np.diag([0.0, 0.1, 0.1]))
+    trunk = model.add_body("trunk", None, "slider", axis=(1, 0, 0), mass=2.0)
+    for side in "lr":
+        model.add_body(f"{side} thigh", trunk, "pin", position=(0, 1.0 if side == "l" else -1.0, 0), **rod)
+        model.add_body(f"{side} shin", f"{side} thigh", "pin", position=(1, 0, 0), **rod)
+        model.add_node(f"{side} foot", f"{side} shin", position=(1, 0, 0))
+    model.add_loop("r foot", "l foot", "pin", name="feet")
+    model.add_coupling({"l thigh": 1.0, "r thigh": -2.0}, name="gear")
+    model.add_loop("l shin", hinge="ball", position=(0.3, 0.2, 0.1), name="ground")
+    model.q, model.v = [0.1, 0.2, 0.3, 0.4, 0.5], [1, 2, 3, 4, 5]
+    return model
+
+
+def rows(model, *names):
+    """Residuals and what coordinates' velocities make of the rows: of loops that are copied they are the same numbers."""
+    return np.concatenate([np.r_[model.loops[n].residual(), model.loops[n].jacobian() @ model.v, model.loops[n].bias()] for n in names])
+
+
+def test_a_body_that_a_loop_is_closed_at_is_in_use():
+    model = closed()
+    with pytest.raises(pc.ModelError, match=r"'r thigh' is in use: .*loop 'feet' is closed there; loop 'gear' is closed there"):
+        model.remove_body("r thigh")
+    assert list(model.loops) == ["feet", "gear", "ground"] and len(model.bodies) == 5
+    removed = model.remove_body("r thigh", with_uses=True)
+    assert removed.loops == ["feet", "gear"] and list(model.loops) == ["ground"]
+    assert rows(model, "ground").shape == (9,)
+
+
+def test_loops_among_copied_bodies_are_copied():
+    model = closed()
+    model.copy_subtree("trunk", prefix="twin ")
+    assert list(model.loops) == ["feet", "gear", "ground", "twin feet", "twin gear"]  # not the one on the base
+    # The same sums of the same numbers, but that the tree may be walked in another order: some roundings of lengths and rates up to 10.
+    np.testing.assert_allclose(rows(model, "twin feet", "twin gear"), rows(model, "feet", "gear"), atol=100 * 10 * 2.2e-16)
+    model.copy_subtree("l thigh", "trunk", suffix=" again")
+    assert len(model.loops) == 5
+
+
+def test_a_name_that_a_loop_has_is_refused_and_nothing_is_copied():
+    model = closed()
+    model.add_coupling({"l shin": 1.0, "r shin": -1.0}, name="twin gear")
+    with pytest.raises(pc.ModelError, match="loops called 'twin gear' already; give a prefix"):
+        model.copy_subtree("trunk", prefix="twin ")
+    assert len(model.bodies) == 5 and len(model.loops) == 4
+
+
+def test_merged_models_bring_their_loops():
+    other, model = closed(), pc.chain(2)
+    with pytest.raises(pc.ModelError, match="loop 'ground' is closed at the base of 'legs', which is put elsewhere here"):
+        model.merge(other, "body1")
+    assert len(model.bodies) == 2 and not len(model.loops)
+    model.merge(other, prefix="his ")
+    assert list(model.loops) == ["his feet", "his gear", "his ground"]
+    bound = 100 * 10 * 2.2e-16
+    np.testing.assert_allclose(rows(model, *model.loops), rows(other, *other.loops), atol=bound)
+    other.loops["ground"].remove()
+    mounted = pc.chain(2)
+    mounted.merge(other, "body1", position=(1, 2, 3))
+    np.testing.assert_allclose(rows(mounted, "feet", "gear"), rows(other, "feet", "gear"), atol=bound)
+
+
+def test_edits_that_keep_motions_keep_what_loops_say_of_them():
+    model = closed()
+    before = rows(model, "feet", "ground")
+    model.reattach("l shin", "l thigh", "ball", position=(1, 0, 0))
+    np.testing.assert_allclose(model.loops["feet"].residual(), before[:5], atol=1e-8)  # to the tolerance of the new hinge
+    locked = closed()
+    locked.v = [1, 2, 0, 4, 5]
+    said = rows(locked, "feet", "gear", "ground")
+    locked.lock("l shin")
+    np.testing.assert_allclose(locked.loops.residual(), closed().loops.residual(), atol=1e-13)
+    with_lock = [locked.loops[n].jacobian() @ locked.v for n in ("feet", "gear", "ground")]
+    np.testing.assert_allclose(np.concatenate(with_lock), np.r_[said[5:10], said[16:17], said[21:24]], atol=1e-13)
