@@ -9,7 +9,7 @@ import numpy as np
 from ...models.generators import tree
 from ...models.multibody import Multibody
 from .case import EITHER, EVERY_DOUBLE, REFUSED, RUNGS, SINGLE_MAY_REFUSE, Bound, Case, DynamicsCase, Rung, Sample
-from .chains import direction, links, solid, states
+from .chains import direction, links, solid, states, wrist
 from .shared_bounds import ROUNDING, WITHIN_PEERS
 
 FAMILY = "configurations"
@@ -88,13 +88,7 @@ def _wrist(mass: float) -> DynamicsCase:
 
 
 def _draw_wrist(mass: float, rng: np.random.Generator, count: int) -> Sample:
-    model = Multibody("arm with a spherical wrist")
-    skew = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    axes = [skew @ axis for axis in np.array([(0, 0, 1), (0, 1, 0), (0, 1, 0), (1, 0, 0), (0, 1, 0), (1, 0, 0)], float)]
-    offsets = [(0, 0, 0), (0, 0.1, 0.3), (0.1, 0, 0.4), (0, 0, 0.4), (0, 0, 0), (0, 0, 0)]
-    masses = [5.0, 4.0, 3.0, 1.0, mass, 1.0]
-    for k in range(6):
-        model.add_body(f"link{k}", f"link{k - 1}" if k else None, axis=axes[k], position=offsets[k], **solid(rng, masses[k], 0.1))
+    model = wrist(mass, rng)
     q, v = states(model, rng, count)
     q[:, 4] = 0.0
     return Sample(model, q, v, rng.normal(size=v.shape))

@@ -20,6 +20,7 @@ def catalogue(sizes: Iterable[int] = SIZES) -> list[Case]:
         cases_motion,
         cases_ratios,
         cases_refinement,
+        cases_task_space,
         cases_trajectories,
         cases_units,
     )
@@ -34,6 +35,7 @@ def catalogue(sizes: Iterable[int] = SIZES) -> list[Case]:
         cases_units,
         cases_elimination,
         cases_groups,
+        cases_task_space,
         cases_motion,
         cases_trajectories,
     )

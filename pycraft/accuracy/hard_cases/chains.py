@@ -54,6 +54,18 @@ def direction(rng: np.random.Generator) -> np.ndarray:
     return x / np.linalg.norm(x)
 
 
+def wrist(mass: float, rng: np.random.Generator) -> Multibody:
+    """Six pins, the last three axes through a point, the fourth and sixth in one line at q[4] = 0; the link between them of that mass."""
+    model = Multibody("arm with a spherical wrist")
+    skew = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    axes = [skew @ axis for axis in np.array([(0, 0, 1), (0, 1, 0), (0, 1, 0), (1, 0, 0), (0, 1, 0), (1, 0, 0)], float)]
+    offsets = [(0, 0, 0), (0, 0.1, 0.3), (0.1, 0, 0.4), (0, 0, 0.4), (0, 0, 0), (0, 0, 0)]
+    masses = [5.0, 4.0, 3.0, 1.0, mass, 1.0]
+    for k in range(6):
+        model.add_body(f"link{k}", f"link{k - 1}" if k else None, axis=axes[k], position=offsets[k], **solid(rng, masses[k], 0.1))
+    return model
+
+
 def states(model: Multibody, rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
     """q (count, nq) and v (count, nv) of random states, see `Multibody.random_state`."""
     drawn = [model.random_state(rng) for _ in range(count)]
