@@ -1,4 +1,4 @@
-"""Loops when the structure changes: what they are declared on is in use, copies of bodies have copies of them, files and copies keep them."""
+"""Loops when the structure changes: what they stand on is in use; copies of bodies and merged models bring copies of them."""
 
 import numpy as np
 import pytest
