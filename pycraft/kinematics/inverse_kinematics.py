@@ -96,11 +96,12 @@ def _searched(problem: Problem, start: np.ndarray, iterations: int, restarts: in
             _take_better(problem, best, some, found)
         begun[left] += several
         tried += several
-    if not len(left := np.flatnonzero(~best.reached)):
-        return best, begun
-    ended = descend(problem, best.q[left], left, 10 * iterations, STATIONARY)  # a minimum that is none of zero is come to linearly
-    best.take(left, ended)
-    best.iterations[left] += ended.iterations
+    for newton in (False, True):
+        left = np.flatnonzero(~best.reached)
+        for some in np.array_split(left, -(-len(left) * (2 * len(held) if newton else 1) // TOGETHER) or 1):
+            ended = descend(problem, best.q[some], some, iterations, STATIONARY, newton)
+            best.take(some, ended)
+            best.iterations[some] += ended.iterations
     return best, begun
 
 

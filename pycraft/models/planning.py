@@ -111,7 +111,7 @@ class Planning(WithOperators):
         limits : bool
             Whether limits hold.
         tolerance : rad and m, or a pair (rad, m)
-        iterations : of one descent; ten times as many until what is not reached is stationary
+        iterations : of one descent; as many again, and as many of Newton's, until what is not reached is stationary
         restarts : from how many random configurations, where that is needed
         seed : of these
         unreached : {"answer", "raise"}

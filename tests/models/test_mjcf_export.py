@@ -142,7 +142,7 @@ BESIDE = """\
         <joint name="k" type="ball" damping=".125"/>
         <body name="c">
           <inertial pos="0 0 .1" mass="1" diaginertia=".1 .2 .25"/>
-          <joint name="l[0]" type="slide" stiffness="7"/>
+          <joint name="l[0]" type="slide" stiffness="7" springref=".25"/>
           <joint name="l[1]" axis="1 0 0" frictionloss="2"/>
           <site name="tip" pos="0 0 .5"/>
         </body>
@@ -212,7 +212,7 @@ def test_flat_bodies(tmp_path):
     """A plate has A + B = C, or more by rounding, which MuJoCo refuses: rounding is added."""
     for turned in (np.eye(3), rotation_from_rpy(0.3, 0.7, -0.2)):
         plate = pc.Multibody("plate")
-        moments = turned @ np.diag([0.1, 0.7, 0.1 + 0.7]) @ turned.T
+        moments = turned @ np.diag([0.1, 0.7, np.nextafter(0.1 + 0.7, 1)]) @ turned.T
         plate.add_body("plate", mass=3, inertia=(moments + moments.T) / 2)
         again = saved_and_loaded(plate, tmp_path / "plate.xml")
         assert np.abs(again.bodies["plate"].inertia - moments).max() < 1e-13
