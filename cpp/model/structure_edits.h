@@ -18,6 +18,14 @@ struct StructureEdits {
   static void rehang(Multibody& model, const std::string& body, const std::string& parent, Hinge hinge, const std::vector<double>& q,
                      const std::vector<double>& v);
 
+  // Pose of a body on a body, node, or the base (empty), and its twist against it in the body's axes, at the present state. By the hinges between
+  // the two alone, whatever the model's size.
+  struct Motion {
+    Pose<double> pose = Pose<double>::identity();
+    Vector6<double> velocity = Vector6<double>::zero();
+  };
+  static Motion relative_motion(const Multibody& model, const std::string& body, const std::string& frame);
+
   // What copies are called, each in the order of the originals.
   struct Names {
     std::vector<std::string> bodies, hinges, nodes;

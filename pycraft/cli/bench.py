@@ -240,6 +240,7 @@ def run(seconds: float = 0.1) -> dict[str, list[Figure]]:
     from .bench_hybrid import hybrid
     from .bench_parts import parts
     from .bench_scenes import scenes
+    from .bench_structure import structure
 
     return {
         f"O(N): time per link at {LONG} links over {SHORT}": per_link(seconds),
@@ -251,4 +252,5 @@ def run(seconds: float = 0.1) -> dict[str, list[Figure]]:
         "Frames": frames(2 * seconds),
         "Scenes": scenes(2 * seconds),
         "Parts": parts(2 * seconds),
+        "Structure": structure(),
     }
