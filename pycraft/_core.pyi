@@ -112,6 +112,10 @@ class Multibody:
         ...
     def _rehang(self, body: str, parent: str, hinge: str, hinge_name: str, axes: collections.abc.Sequence[typing.Any], point: typing.Any, pitch: typing.Any, subhinges: typing.Any, rotation: typing.Any, position: typing.Any, rotor_inertia: typing.Any, lower: typing.Any, upper: typing.Any, q: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], v: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> None:
         ...
+    def _relative_motion(self, body: str, frame: str) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+        """
+        Rotation, position and twist of a body against a body, node, or the base (empty).
+        """
     def _remove_body(self, name: str) -> None:
         ...
     def _require_new(self, bodies: collections.abc.Sequence[str], hinges: collections.abc.Sequence[str], nodes: collections.abc.Sequence[str], frames: collections.abc.Sequence[str], loose: collections.abc.Sequence[str]) -> None:
@@ -253,7 +257,7 @@ class SkoSource:
     @property
     def derived_from(self) -> typing.Any:
         """
-        How this tree was made of a model's, "hinge subset", "world frame", "cut tree" or "groups of bodies", and that model's source; None for a model's own.
+        How this tree was made of a model's, "hinge subset", "world frame", "cut tree", "another root" or "groups of bodies", and that model's source; None for a model's own.
         """
     @property
     def dof(self) -> list[int]:

@@ -8,6 +8,7 @@
 #include "operators/derived_operators.h"
 #include "operators/directions.h"
 #include "operators/grouped_operators.h"
+#include "operators/rerooted_tree.h"
 #include "runtime/errors.h"
 
 namespace pycraft {
@@ -161,6 +162,8 @@ void register_sources(py::module_& m) {
         if (!derived) throw py::type_error("operators of '" + s.name() + "' cannot be pickled or copied; make them anew where they are wanted");
         derived->base()->check_current();
         if (const auto* cut = dynamic_cast<const CutTree*>(derived)) return py::make_tuple(made, py::make_tuple(cut->base(), py::make_tuple("cut", cut->body())));
+        if (const auto* turned = dynamic_cast<const RerootedTree*>(derived))
+          return py::make_tuple(made, py::make_tuple(turned->base(), py::make_tuple("root", turned->root())));
         const auto* subset = dynamic_cast<const SomeCoordinates*>(derived);
         return py::make_tuple(made, py::make_tuple(derived->base(), subset ? py::cast(subset->kept()) : py::object(py::str("world frame"))));
       })
@@ -183,9 +186,10 @@ void register_sources(py::module_& m) {
         const char* how = dynamic_cast<const WorldFrame*>(&s)         ? "world frame"
                           : dynamic_cast<const GroupedOperators*>(&s) ? "groups of bodies"
                           : dynamic_cast<const CutTree*>(&s)          ? "cut tree"
+                          : dynamic_cast<const RerootedTree*>(&s)     ? "another root"
                                                                       : "hinge subset";
         return py::make_tuple(how, derived->base());
-      }, "How this tree was made of a model's, \"hinge subset\", \"world frame\", \"cut tree\" or \"groups of bodies\", and that model's source; None for a model's own.")
+      }, "How this tree was made of a model's, \"hinge subset\", \"world frame\", \"cut tree\", \"another root\" or \"groups of bodies\", and that model's source; None for a model's own.")
       .def_property_readonly("groups", [](const SkoSource& s) -> py::object {
         const auto* grouped = dynamic_cast<const GroupedOperators*>(&s);
         return grouped ? py::cast(grouped->groups()) : py::object(py::none());
@@ -218,13 +222,15 @@ void register_sources(py::module_& m) {
     if (!robot) throw ModelError("coordinates of '" + base->name() + "' are not prescribed: it is no multibody model of its own");
     return std::make_shared<SomeCoordinates>(robot, std::vector<char>(kept.begin(), kept.end()));
   }, py::arg("base"), py::arg("kept"));
-  // how: "bodies in pairs", "world frame", ("groups", the bodies of each), ("cut", at the hinge of which body), or which coordinates move
+  // how: "bodies in pairs", "world frame", ("groups", the bodies of each), ("cut", at the hinge of which body), ("root", which body), or which coordinates move
   m.def("_derived_operators", [](const std::shared_ptr<SkoSource>& base, const py::object& how) -> std::shared_ptr<SkoSource> {
     const std::string kind = py::isinstance<py::str>(how) ? how.cast<std::string>() : "coordinates";
     if (kind == "bodies in pairs") return std::make_shared<AggregatedTree>(base);
     const auto model = std::dynamic_pointer_cast<MultibodyOperators>(base);
     if (!model) throw EvaluationError("'" + base->name() + "' is no multibody model");
     if (kind == "world frame") return std::make_shared<WorldFrame>(model);
+    if (py::isinstance<py::tuple>(how) && how.cast<py::tuple>()[0].cast<std::string>() == "root")
+      return std::make_shared<RerootedTree>(model, how.cast<py::tuple>()[1].cast<int>());
     if (py::isinstance<py::tuple>(how) && how.cast<py::tuple>()[0].cast<std::string>() == "cut")
       return std::make_shared<CutTree>(model, how.cast<py::tuple>()[1].cast<int>());
     if (py::isinstance<py::tuple>(how))

@@ -18,6 +18,14 @@ void register_structure(py::module_& m) {
            py::arg("body"), py::arg("parent"), py::arg("hinge"), py::arg("hinge_name"), py::arg("axes"), py::arg("point"), py::arg("pitch"),
            py::arg("subhinges"), py::arg("rotation"), py::arg("position"), py::arg("rotor_inertia"), py::arg("lower"), py::arg("upper"), py::arg("q"),
            py::arg("v"))
+      .def("_relative_motion",
+           [](const Multibody& mb, const std::string& body, const std::string& frame) {
+             const StructureEdits::Motion motion = StructureEdits::relative_motion(mb, body, frame);
+             std::vector<double> twist;
+             for (int i = 0; i < 6; ++i) twist.push_back(motion.velocity[i]);
+             return py::make_tuple(to_numpy(motion.pose.R), to_numpy(motion.pose.p), to_numpy(twist));
+           },
+           py::arg("body"), py::arg("frame"), "Rotation, position and twist of a body against a body, node, or the base (empty).")
       .def("_branch",
            [](const Multibody& mb, int root) {
              const StructureEdits::Branch branch = StructureEdits::branch(mb, root);

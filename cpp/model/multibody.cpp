@@ -165,19 +165,36 @@ void Multibody::settle_once() const {
   if (!settled_.load()) const_cast<Multibody*>(this)->settle();
 }
 
+namespace {
+
+// Numbers of bodies, each before its children, and these in their order.
+std::vector<int> depth_first(const std::vector<Body>& bodies) {
+  const int n = static_cast<int>(bodies.size());
+  std::vector<int> first(n + 1, -1), next(n, -1);  // the first child of each, the base's at the front, and the next one of the same parent
+  for (int k = n - 1; k >= 0; --k) {
+    int& child = first[bodies[k].parent + 1];
+    next[k] = std::exchange(child, k);
+  }
+  std::vector<int> order, stack;
+  const auto visit = [&](int k) {
+    if (k >= 0) stack.push_back(k);
+  };
+  for (visit(first[0]); !stack.empty();) {
+    const int k = stack.back();
+    stack.pop_back();
+    order.push_back(k);
+    visit(next[k]), visit(first[k + 1]);
+  }
+  return order;
+}
+
+}  // namespace
+
 void Multibody::settle() {
   if (settled_.load()) return;
   if (!stale_.empty()) throw StaleOperatorError(stale_);
   const int n = bodies();
-  std::vector<std::vector<int>> children(n + 1);
-  for (int k = 0; k < n; ++k) children[bodies_[k].parent + 1].push_back(k);
-  std::vector<int> order, stack(children[0].rbegin(), children[0].rend());
-  while (!stack.empty()) {
-    const int k = stack.back();
-    stack.pop_back();
-    order.push_back(k);
-    stack.insert(stack.end(), children[k + 1].rbegin(), children[k + 1].rend());
-  }
+  const std::vector<int> order = depth_first(bodies_);
   std::vector<int> place(n);
   for (int i = 0; i < n; ++i) place[order[i]] = i;
   std::vector<Body> sorted;
@@ -189,7 +206,7 @@ void Multibody::settle() {
   bodies_ = std::move(sorted);
   for (Node& node : nodes_)
     if (node.body >= 0) node.body = place[node.body];
-  body_numbers_.clear(), hinge_numbers_.clear(), node_numbers_.clear();
+  node_numbers_.clear();
   q_offset_ = v_offset_ = {0};
   quaternions_.clear();
   std::vector<double> q, v;
@@ -212,6 +229,13 @@ void Multibody::settle() {
       v.resize(v.size() + h.nv(), 0.0);
     }
   }
+  // Names that are there keep their entries; where there are more entries than bodies, some are of bodies that are gone.
+  const auto forget = [&](std::unordered_map<std::string, int>& numbers, auto name) {
+    if (static_cast<int>(numbers.size()) > n)
+      std::erase_if(numbers, [&](const auto& entry) { return entry.second >= n || name(bodies_[entry.second]) != entry.first; });
+  };
+  forget(body_numbers_, [](const Body& b) -> const std::string& { return b.name; });
+  forget(hinge_numbers_, [](const Body& b) -> const std::string& { return b.hinge.name; });
   for (size_t i = 0; i < nodes_.size(); ++i) node_numbers_[nodes_[i].name] = static_cast<int>(i);
   carried_.clear();
   state_ = std::make_shared<StateData>(StateData{std::move(q), std::move(v)});

@@ -21,7 +21,43 @@ std::string listed(const std::vector<std::string>& names) {
   return names.size() > most ? text + ", ... (" + std::to_string(names.size()) + " in all)" : text;
 }
 
+// Of a body against one that it hangs on, over any number of hinges, -1: the base. They are compiled as a model of their own.
+StructureEdits::Motion motion_along(const Multibody& model, int body, int inboard) {
+  std::vector<int> way;
+  for (int k = body; k != inboard; k = model.body(k).parent) way.push_back(k);
+  if (way.empty()) return {};
+  const auto state = model.state();
+  Multibody hinges("way", true);
+  std::vector<double> q, v;
+  std::string on;
+  std::for_each(way.rbegin(), way.rend(), [&](int k) {
+    const Body& b = model.body(k);
+    hinges.add_body(b, on);
+    on = b.name;
+    q.insert(q.end(), state->q.data() + model.q_offset(k), state->q.data() + model.q_offset(k) + b.hinge.nq());
+    v.insert(v.end(), state->v.data() + model.v_offset(k), state->v.data() + model.v_offset(k) + b.hinge.nv());
+  });
+  double pose[7], velocity[6];
+  motion_of_body(hinges, static_cast<int>(way.size()) - 1, StateData{std::move(q), std::move(v)}, pose, velocity);
+  return {{quaternion_rotation(Quaternion<double>{pose[0], pose[1], pose[2], pose[3]}), {pose[4], pose[5], pose[6]}},
+          {{velocity[0], velocity[1], velocity[2]}, {velocity[3], velocity[4], velocity[5]}}};
+}
+
 }  // namespace
+
+StructureEdits::Motion StructureEdits::relative_motion(const Multibody& model, const std::string& body, const std::string& frame) {
+  const ModelInUse use(model);
+  const int k = model.body_index(body);
+  const Node onto = model.find_frame(frame);
+  int a = k, b = onto.body;
+  while (a != b) {
+    int& outer = a > b ? a : b;  // a parent's number is lower
+    outer = model.body(outer).parent;
+  }
+  const Motion one = motion_along(model, k, a), other = motion_along(model, onto.body, a);
+  const Pose<double> X = inverse(other.pose) * one.pose;
+  return {inverse(onto.pose) * X, one.velocity - motion_to_child(X, other.velocity)};
+}
 
 void StructureEdits::rehang(Multibody& model, const std::string& body, const std::string& parent, Hinge hinge, const std::vector<double>& q,
                             const std::vector<double>& v) {
@@ -280,8 +316,7 @@ std::vector<std::pair<std::string, std::vector<double>>> StructureEdits::reroot(
   // The body's motion as the free hinge's: X_WB = P S, hence S = P⁻¹ X_WB; its twist is the hinge's velocity.
   const int k = model.body_index(body);
   const auto state = model.state();
-  double pose[7], velocity[6];
-  motion_of_body(model, k, *state, pose, velocity);
+  const Motion motion = motion_along(model, k, -1);
   const Multibody::Edit edit(model);
   std::vector<int> way{k};  // to the root
   while (model.bodies_[way.back()].parent >= 0) way.push_back(model.bodies_[way.back()].parent);
@@ -295,7 +330,8 @@ std::vector<std::pair<std::string, std::vector<double>>> StructureEdits::reroot(
   std::vector<std::pair<std::string, std::vector<double>>> turned_rates;
   if (hinges.empty()) return turned_rates;
   model.structure_changed("the root was moved to body '" + body + "'");
-  const Pose<double> S = inverse(base.placement) * Pose<double>{quaternion_rotation(Quaternion<double>{pose[0], pose[1], pose[2], pose[3]}), {pose[4], pose[5], pose[6]}};
+  const Pose<double> S = inverse(base.placement) * motion.pose;
+  const std::vector<double> twist{motion.velocity[0], motion.velocity[1], motion.velocity[2], motion.velocity[3], motion.velocity[4], motion.velocity[5]};
   const Quaternion<double> turn = rotation_quaternion(S.R);
   for (size_t i = 0; i < hinges.size(); ++i) {
     TurnedHinge& to = hinges[i];
@@ -305,7 +341,7 @@ std::vector<std::pair<std::string, std::vector<double>>> StructureEdits::reroot(
     inboard.parent = way[i];
     inboard.hinge = std::move(to.hinge);
   }
-  model.carried_[base.name] = {{turn.w, turn.x, turn.y, turn.z, S.p[0], S.p[1], S.p[2]}, {velocity, velocity + 6}};
+  model.carried_[base.name] = {{turn.w, turn.x, turn.y, turn.z, S.p[0], S.p[1], S.p[2]}, twist};
   model.bodies_[k].parent = -1;
   model.bodies_[k].hinge = base;
   model.settle();

@@ -20,6 +20,13 @@ struct StructureEdits {
 
   struct LockedHinges;  // locked_hinges.h
   struct Coalescing;    // coalescing.h
+  // Pose of a body on a body, node, or the base (empty), and its twist against it in the body's axes, at the present state. By the hinges between
+  // the two alone, whatever the model's size.
+  struct Motion {
+    Pose<double> pose = Pose<double>::identity();
+    Vector6<double> velocity = Vector6<double>::zero();
+  };
+  static Motion relative_motion(const Multibody& model, const std::string& body, const std::string& frame);
 
   // What copies are called, each in the order of the originals.
   struct Names {

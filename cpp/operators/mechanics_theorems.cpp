@@ -1,7 +1,8 @@
-// Theorems that need mechanics: velocities and forces, innovations, Coriolis matrices, gravity, hybrid dynamics, the world frame, subgraphs.
+// Theorems that need mechanics: velocities and forces, innovations, Coriolis matrices, gravity, hybrid dynamics, the world frame, subgraphs, other roots.
 // Those that need loops or flexible bodies are listed as waiting; the calculus is in calculus_theorems.cpp.
 #include "operators/derived_operators.h"
 #include "operators/directions.h"
+#include "operators/rerooted_tree.h"
 
 namespace pycraft {
 
@@ -159,6 +160,30 @@ struct MechanicsTheorems : Statements {
     shown("(E - E_c)P_c = (E - E_c)P", "(\\mathcal{E}-\\mathcal{E}_c)\\mathcal{P}_c = (\\mathcal{E}-\\mathcal{E}_c)\\mathcal{P}");
   }
 
+  // The last body is made the root: what of the two models is about the same bodies. Υ(k)⁻¹ has all bodies outboard of k as P(k) has them, and
+  // all others through the hinges between; with k for root there are no others.
+  void another_root() {
+    group = "Another root (the last body first)";
+    if (!robot->traits().free_root) return;
+    const int last = robot->structure().bodies() - 1;
+    const auto turned = std::make_shared<RerootedTree>(robot, last);
+    const int first = static_cast<int>(std::find(turned->order().begin(), turned->order().end(), 0) - turned->order().begin());
+    const Letters W(turned);
+    const auto rows = [](const SkoSource& of, const Space& space, int body) {
+      std::vector<double> pick(size_t(6) * of.structure().dimension(), 0.0);
+      for (int i = 0; i < 6; ++i) pick[size_t(i) * of.structure().dimension() + of.structure().offset[body] + i] = 1;
+      return constant(std::move(pick), space, Space::euclidean(6), of.structure().body_names[body]);
+    };
+    const Expression root = rows(*turned, turned->forces(), 0), here = rows(*robot, robot->motions(), last), old = rows(*robot, robot->motions(), 0);
+    const Expression root_there = rows(*turned, turned->motions(), 0), old_there = rows(*turned, turned->motions(), first);
+    state("articulated inertia with a body for root", root * W.P * root.T() * here * Upsilon * here.T(), I, free_root | no_hinge_diagonal, "soa.md #58");
+    shown("P_r(k) Υ(k) = I,  k the root of P_r", "\\mathcal{P}_r(k)\\,\\Upsilon(k) = I,\\quad k\\text{ the root of }\\mathcal{P}_r");
+    state("compliance between two bodies knows no root", root_there * W.Omega * old_there.T(), here * Omega * old.T(), free_root | no_hinge_diagonal, "Ω = φ*H*ℳ⁻¹Hφ");
+    shown("Ω_r(k,0) = Ω(k,0)", "\\Omega_r(k,0) = \\Omega(k,0)");
+    state("ln det ℳ knows no root", logdet(W.H * W.phi * W.M * W.phi.T() * W.H.T()), logdet(MM), free_root | no_hinge_diagonal, "the map of velocities has determinant 1");
+    shown("ln det ℳ_r = ln det ℳ", "\\ln\\det\\mathcal{M}_r = \\ln\\det\\mathcal{M}");
+  }
+
   void waiting() {
     group = "Waiting";
     const std::string loops = "loops", flexible = "flexible bodies";
@@ -186,6 +211,7 @@ std::vector<Theorem> mechanics_theorems(const std::shared_ptr<MultibodyOperators
   all.world_frame();
   all.hybrid_dynamics();
   all.subgraphs();
+  all.another_root();
   for (Theorem& t : calculus_theorems(source)) all.list.push_back(std::move(t));
   all.waiting();
   return std::move(all.list);

@@ -241,6 +241,7 @@ def run(seconds: float = 0.1) -> dict[str, list[Figure]]:
     from .bench_locking import locking
     from .bench_parts import parts
     from .bench_scenes import scenes
+    from .bench_structure import structure
 
     return {
         f"O(N): time per link at {LONG} links over {SHORT}": per_link(seconds),
@@ -253,4 +254,5 @@ def run(seconds: float = 0.1) -> dict[str, list[Figure]]:
         "Scenes": scenes(2 * seconds),
         "Parts": parts(2 * seconds),
         "Locking": locking(2 * seconds),
+        "Structure": structure(),
     }

@@ -18,7 +18,7 @@ ASKED, KEPT, NOTHING = 4.0, 2.0, 1.1
 """Bounds. The numbers of a hinge of a great model lie in no cache: they are a few times slower to come by than those of a small one."""
 
 
-def _branched(size: int) -> Multibody:
+def branched(size: int) -> Multibody:
     """Two bodies on every body: depth log₂ of the size."""
     model = Multibody(f"tree of {size}")
     for k in range(size):
@@ -41,7 +41,7 @@ class _Asked:
     """A model, leaves of it, and states that are set in turn."""
 
     def __init__(self, size: int):
-        self.model, rng = _branched(size), np.random.default_rng(1)
+        self.model, rng = branched(size), np.random.default_rng(1)
         self.states = rng.uniform(-1, 1, (4, size))
         self.before = _least(self.set, 200)  # before there is any frame, and on the same pages of memory as after
         leaves = rng.integers(size // 2, size, QUESTIONS)

@@ -233,8 +233,8 @@ class Structure(WithFrames):
         self, name: str, onto: str, called: str, given: dict[str, Any], here: bool, guess: Any, tolerance: float, velocity: str
     ) -> HingeFit:
         """The new hinge's coordinates and velocities; where the hinge is to be "here", its placement, too."""
-        hinge, frame = OneHinge(name, called, given), self.frame(name)
-        X, V = frame.pose(wrt=onto or None), frame.velocity(wrt=onto or None)
+        hinge, X = OneHinge(name, called, given), np.eye(4)
+        X[:3, :3], X[:3, 3], V = self._relative_motion(name, onto)
         near = hinge.guess() if guess is None else _core.real_array(guess, f"q of hinge {called!r}")
         hinge.check_q(near)
         if here:

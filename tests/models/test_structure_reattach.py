@@ -6,32 +6,13 @@ import numpy as np
 import pytest
 
 import pycraft as pc
-from support.descriptions import KINDS, random_description, random_subhinges
-from support.edits import refused
+from support.descriptions import KINDS, random_description
+from support.edits import options_of, refused
 from support.mechanisms import every_kind
 from support.motions import Motions
 
 BOUND = 1e-9
 """Of poses and twists after a hinge was solved for: the tolerance that is asked for by default."""
-
-
-def options_of(kind, rng):
-    """A hinge of a kind as `reattach` takes it."""
-    drawn = random_subhinges(kind, rng)
-    if kind == "custom":
-        return {"subhinges": drawn}
-    first = drawn[0] if drawn else {}
-    axes = {"universal": 2, "gimbal": 3}.get(kind)
-    options = {"axes": [s["axis"] for s in drawn[:axes]]} if axes else {}
-    if kind in ("pin", "slider", "screw", "cylindrical"):
-        options["axis"] = first["axis"]
-    if kind == "planar":
-        options["axis"] = drawn[2]["axis"]
-    if kind in ("pin", "screw", "universal", "gimbal", "cylindrical", "ball"):
-        options["point"] = first["point"]
-    if kind == "screw":
-        options["pitch"] = first["pitch"]
-    return options
 
 
 def alone(kind, options, state):

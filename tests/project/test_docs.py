@@ -62,6 +62,7 @@ def test_the_readme_example_runs():
         ("subgraphs", 20),
         ("loops", 18),
         ("locking", 14),
+        ("structure", 25),
     ],  # fmt: skip
 )
 def test_the_pages_run(page, examples):
