@@ -56,6 +56,7 @@ def test_the_readme_example_runs():
         ("statistical_dynamics", 5),
         ("frames", 30),
         ("subgraphs", 20),
+        ("divide_and_conquer", 1),
     ],  # fmt: skip
 )
 def test_the_pages_run(page, examples):
