@@ -1071,7 +1071,7 @@ class Centroidal:
         """
 class Methods:
     """
-    Forward dynamics of one model by 'cholesky', 'ldl', 'conjugate-gradients' or 'inverse'.
+    Forward dynamics of one model by 'cholesky', 'ldl', 'conjugate-gradients', 'inverse' or 'divide-and-conquer'.
     """
     def __init__(self, arg0: Multibody) -> None:
         ...
@@ -1081,7 +1081,7 @@ class Methods:
         """
         (accelerations, iterations, relative residuals), each per state.
         """
-    def forward_dynamics(self, method: str, q: typing.Any, v: typing.Any, tau: typing.Any, precision: str | int, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+    def forward_dynamics(self, method: str, q: typing.Any, v: typing.Any, tau: typing.Any, precision: str | int, out: typing.Any, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> numpy.typing.NDArray[numpy.float64]:
         """
         Accelerations (nv,) or (B, nv).
         """

@@ -12,15 +12,15 @@ using Methods = Batches<DynamicsMethods>;
 
 void register_methods(py::module_& m) {
   const py::arg q("q"), v("v"), tau("tau"), precision("precision");
-  py::class_<Methods> methods_class(m, "Methods", "Forward dynamics of one model by 'cholesky', 'ldl', 'conjugate-gradients' or 'inverse'.");
+  py::class_<Methods> methods_class(m, "Methods", "Forward dynamics of one model by 'cholesky', 'ldl', 'conjugate-gradients', 'inverse' or 'divide-and-conquer'.");
   unpicklable(methods_class)
       .def(py::init<std::shared_ptr<Multibody>>())
       .def("forward_dynamics", [](Methods& d, const std::string& method, const py::object& q, const py::object& v, const py::object& tau,
-                                  Precision precision, const py::object& out) {
+                                  Precision precision, const py::object& out, int threads) {
         const Method by = method_from_name(method);
         Arguments given(d.model(), {{"q", q}, {"v", v}, {"tau", tau}});
-        return run(d, precision, given, out, {d.model().nv()}, [by](auto& w, auto in, auto* y) { w.forward_dynamics(by, in[0], in[1], in[2], y); });
-      }, py::arg("method"), q, v, tau, precision, py::arg("out"), "Accelerations (nv,) or (B, nv).")
+        return run(d, precision, given, out, {d.model().nv()}, [by, threads](auto& w, auto in, auto* y) { w.forward_dynamics(by, in[0], in[1], in[2], y, nullptr, threads); });
+      }, py::arg("method"), q, v, tau, precision, py::arg("out"), py::arg("threads") = 1, "Accelerations (nv,) or (B, nv).")
       .def("conjugate_gradients", [](Methods& d, const py::object& q, const py::object& v, const py::object& tau, Precision precision) {
         const int nv = d.model().nv();
         Arguments given(d.model(), {{"q", q}, {"v", v}, {"tau", tau}});

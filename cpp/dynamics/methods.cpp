@@ -5,6 +5,7 @@
 
 #include "algebra/trees/sweeps/articulated_inertia.h"
 #include "algebra/trees/sweeps/mass_matrix.h"
+#include "dynamics/divided_dynamics.h"
 #include "dynamics/tree_factors.h"
 #include "recursions/composite_mass_matrix.h"
 #include "recursions/kinematics.h"
@@ -15,7 +16,7 @@ namespace pycraft {
 
 namespace {
 
-constexpr const char* names[] = {"cholesky", "ldl", "conjugate-gradients", "inverse"};
+constexpr const char* names[] = {"cholesky", "ldl", "conjugate-gradients", "inverse", "divide-and-conquer"};
 constexpr const char* remedy = "method=\"articulated\" with form=\"ud\", with refine=1, or in a wider precision is more accurate";
 
 }  // namespace
@@ -26,19 +27,30 @@ Method method_from_name(const std::string& name) {
   for (const Method m : methods)
     if (name == method_name(m)) return m;
   throw EvaluationError("no method of forward dynamics is called '" + name +
-                        "'; there are 'articulated', 'cholesky', 'ldl', 'conjugate-gradients', 'inverse' and 'realization'");
+                        "'; there are 'articulated', 'cholesky', 'ldl', 'conjugate-gradients', 'inverse', 'divide-and-conquer' and 'realization'");
 }
 
 template <class S>
 DynamicsMethods<S>::DynamicsMethods(const Multibody& model)
-    : tree_(model.structure()), model_(model.compiled<S>()), blocks_(tree_), order_(tree_), alpha_(tree_.bodies()), force_(tree_.bodies()),
+    : source_(model), tree_(model.structure()), model_(model.compiled<S>()), blocks_(tree_), order_(tree_), alpha_(tree_.bodies()), force_(tree_.bodies()),
       right_side_(tree_.coordinates()), work_(2 * size_t(tree_.coordinates())) {}
 
 template <class S>
-void DynamicsMethods<S>::forward_dynamics(Method method, const S* q, const S* v, const S* tau, S* vdot, const Applied<S>* applied) {
+DynamicsMethods<S>::~DynamicsMethods() = default;
+
+template <class S>
+DividedDynamics<S>& DynamicsMethods<S>::divided() {
+  if (!divided_) divided_ = std::make_unique<DividedDynamics<S>>(source_);
+  return *divided_;
+}
+
+template <class S>
+void DynamicsMethods<S>::forward_dynamics(Method method, const S* q, const S* v, const S* tau, S* vdot, const Applied<S>* applied, int threads) {
+  const Applied<S> acting = applied ? *applied : own_gravity(*model_);
+  if (method == Method::divide_and_conquer) return divided().forward_dynamics(q, v, tau, vdot, acting, threads);
   kinematics(*model_, q, blocks_);
   point_accelerations_base_to_tip(*model_, blocks_.pose.data(), blocks_.H.data(), v, OwnTerms::absorbed, points_);
-  newton_euler(*model_, blocks_, points_, applied ? *applied : own_gravity(*model_), static_cast<const S*>(nullptr), right_side_.data(), alpha_, force_);  // 𝒞
+  newton_euler(*model_, blocks_, points_, acting, static_cast<const S*>(nullptr), right_side_.data(), alpha_, force_);  // 𝒞
   for (int i = 0; i < model_->nv; ++i) right_side_[i] = tau[i] - right_side_[i];
   switch (method) {
     case Method::cholesky:
@@ -48,6 +60,7 @@ void DynamicsMethods<S>::forward_dynamics(Method method, const S* q, const S* v,
       break;
     case Method::conjugate_gradients: solve_by_gradients(right_side_.data(), vdot); break;
     case Method::inverse: multiply_by_inverse(right_side_.data(), vdot); break;
+    case Method::divide_and_conquer: break;
   }
   for (int i = 0; i < model_->nv; ++i) vdot[i] -= points_.absorbed[i];
 }
@@ -120,7 +133,7 @@ void DynamicsMethods<S>::multiply_by_inverse(const S* b, S* x) {
 }
 
 template <class S>
-size_t DynamicsMethods<S>::memory(Method method) const {
+size_t DynamicsMethods<S>::memory(Method method) {
   const size_t n = model_->nv, bodies = model_->bodies, six = sizeof(Vector6<S>);
   size_t d = 0;  // D(k) and its factor
   for (int count : tree_.dof) d += 2 * size_t(count) * count;
@@ -131,6 +144,7 @@ size_t DynamicsMethods<S>::memory(Method method) const {
     case Method::ldl: return common + composite + square + 2 * n * (sizeof(S) + sizeof(int));
     case Method::conjugate_gradients: return common + composite + (gradients_.numbers(int(n)) + n) * sizeof(S) + bodies * six;
     case Method::inverse: return common + 2 * composite + n * six + d * sizeof(S) + 2 * square + bodies * n * six;
+    case Method::divide_and_conquer: return divided().memory();
   }
   return 0;
 }

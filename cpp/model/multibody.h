@@ -170,8 +170,6 @@ class Multibody : public std::enable_shared_from_this<Multibody> {
   std::vector<std::pair<std::string, std::string>> warnings_;
   std::set<std::string> said_massless_;
   std::unordered_map<std::string, std::pair<std::vector<double>, std::vector<double>>> carried_;  // q, v by hinge, across an edit
-  std::unordered_map<std::string, Hinge> locked_;    // hinges that are locked, as they were before, by name
-  std::unordered_map<std::string, Body> coalesced_;  // bodies that are nodes of another now, as they were before, by name
   std::atomic<bool> settled_{true};
   std::weak_ptr<SkoSource> operators_;
   std::vector<std::weak_ptr<Multibody>> parts_;

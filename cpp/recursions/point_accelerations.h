@@ -32,6 +32,10 @@ struct PointAccelerations {
   std::vector<Vector3<S>> angular_velocity;  // per body, in its axes
   std::vector<Vector6<S>> a, b;              // per body
   std::vector<S> absorbed;                   // per coordinate: x
+  void resize(int bodies, int coordinates) {
+    angular_velocity.resize(bodies), a.resize(bodies), b.resize(bodies);
+    absorbed.assign(coordinates, S(0));
+  }
 };
 
 // Whether hinges take up the linear part of their own a' where they can: for equations that are solved for θ̈.
@@ -51,38 +55,43 @@ inline Vector6<S> gyroscopic_part(const RigidInertia<S>& M, const Vector3<S>& om
   return {cross(omega, M.rotational * omega), cross(omega, cross(omega, M.moment))};
 }
 
+// ω, a', b' and x of body k from the angular velocity of its parent, in the parent's axes; null: the base.
+template <class S>
+inline void point_acceleration(const CompiledModel<S>& model, int k, const Vector3<S>* parents, const Pose<S>* pose, const Vector6<S>* H, const S* v,
+                               OwnTerms own, PointAccelerations<S>& out) {
+  const Pose<S>& X = pose[k];
+  Vector3<S> omega = Vector3<S>::zero();  // W_i, then the body's
+  Vector6<S> a = Vector6<S>::zero();
+  if (parents) {
+    omega = transpose_times(X.R, *parents);
+    a.linear = transpose_times(X.R, cross(*parents, cross(*parents, X.p)));
+  }
+  int j = model.v_offset[k];
+  for (int i = model.first_subhinge[k]; i < model.first_subhinge[k + 1]; ++i) {
+    Vector6<S> relative = v[j] * H[j];
+    for (const int end = j++ + record_of(model.subhinges[i].kind).nv; j < end; ++j) relative = relative + v[j] * H[j];
+    a.angular = a.angular + cross(omega, relative.angular);
+    a.linear = a.linear + cross(S(2) * omega + relative.angular, relative.linear);
+    omega = omega + relative.angular;
+  }
+  if (const auto& t = model.translations[k]; own == OwnTerms::absorbed && t[0] >= 0) {
+    const Vector3<S> lines[] = {H[t[0]].linear, H[t[1]].linear, H[t[2]].linear}, x = components_along(lines, a.linear);
+    for (int i = 0; i < 3; ++i) out.absorbed[t[i]] = x[i];
+    a.linear = Vector3<S>::zero();
+  }
+  out.angular_velocity[k] = omega;
+  out.a[k] = a;
+  out.b[k] = gyroscopic_part(model.inertia[k], omega);
+}
+
 template <class S>
 void point_accelerations_base_to_tip(const CompiledModel<S>& model, const Pose<S>* pose, const Vector6<S>* H, const S* v, OwnTerms own,
                                      PointAccelerations<S>& out) {
-  out.angular_velocity.resize(model.bodies), out.a.resize(model.bodies), out.b.resize(model.bodies);
-  out.absorbed.assign(model.nv, S(0));
+  out.resize(model.bodies, model.nv);
   for (int k = 0; k < model.bodies; ++k) {
     check_interrupt_at(k);
     const int p = model.parent[k];
-    const Pose<S>& X = pose[k];
-    Vector3<S> omega = Vector3<S>::zero();  // W_i, then the body's
-    Vector6<S> a = Vector6<S>::zero();
-    if (p >= 0) {
-      const Vector3<S>& parents = out.angular_velocity[p];
-      omega = transpose_times(X.R, parents);
-      a.linear = transpose_times(X.R, cross(parents, cross(parents, X.p)));
-    }
-    int j = model.v_offset[k];
-    for (int i = model.first_subhinge[k]; i < model.first_subhinge[k + 1]; ++i) {
-      Vector6<S> relative = v[j] * H[j];
-      for (const int end = j++ + record_of(model.subhinges[i].kind).nv; j < end; ++j) relative = relative + v[j] * H[j];
-      a.angular = a.angular + cross(omega, relative.angular);
-      a.linear = a.linear + cross(S(2) * omega + relative.angular, relative.linear);
-      omega = omega + relative.angular;
-    }
-    if (const auto& t = model.translations[k]; own == OwnTerms::absorbed && t[0] >= 0) {
-      const Vector3<S> lines[] = {H[t[0]].linear, H[t[1]].linear, H[t[2]].linear}, x = components_along(lines, a.linear);
-      for (int i = 0; i < 3; ++i) out.absorbed[t[i]] = x[i];
-      a.linear = Vector3<S>::zero();
-    }
-    out.angular_velocity[k] = omega;
-    out.a[k] = a;
-    out.b[k] = gyroscopic_part(model.inertia[k], omega);
+    point_acceleration(model, k, p < 0 ? nullptr : &out.angular_velocity[p], pose, H, v, own, out);
   }
 }
 

@@ -10,7 +10,7 @@ from .. import _core
 FORMS = ("fast", "ud", "square-root")
 """Forms of the articulated-inertia sweep."""
 
-OTHER_METHODS = ("cholesky", "ldl", "conjugate-gradients", "inverse", "realization")
+OTHER_METHODS = ("cholesky", "ldl", "conjugate-gradients", "inverse", "divide-and-conquer", "realization")
 """Methods of forward dynamics beside the articulated-body algorithm; they have no forms."""
 
 REFERENCE = "quad"

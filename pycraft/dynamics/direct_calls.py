@@ -23,11 +23,11 @@ def cached(model: Any, name: str, make: Callable[[Any], Any]) -> Any:
     return getattr(model, name)
 
 
-def by_method(model: Any, method: str, q, v, tau, precision: str | int, out) -> np.ndarray:
+def by_method(model: Any, method: str, q, v, tau, precision: str | int, out, threads: int) -> np.ndarray:
     """Forward dynamics by another method than the articulated-body recursion."""
     if method == "realization":
         return by_realization(model, q, v, tau, precision, out)
-    return cached(model, "_methods", _core.Methods).forward_dynamics(method, q, v, tau, precision, out)
+    return cached(model, "_methods", _core.Methods).forward_dynamics(method, q, v, tau, precision, out, threads)
 
 
 class DirectCalls:
@@ -38,7 +38,8 @@ class DirectCalls:
     velocities, forces and accelerations that are left out are zero. SI units and radians. Generalized velocities of ball and free
     hinges are in the axes of the body that the hinge moves, angular first. Results are float64, in `out` (writeable, C-ordered) where
     one is given. `threads` shares the states of a batch out over so many threads, of a single state of a large tree its subtrees (forward
-    and inverse dynamics, bias forces, double precision); every state has the bits that it has with one.
+    and inverse dynamics, bias forces, double precision), or the pieces of "divide-and-conquer"; every state has the bits that it has with
+    one.
     Everywhere a ModelError names an argument of the wrong shape or with an entry that is not finite, and EvaluationError an unknown
     option, and a result beyond the range of its numbers; errors at a state of a batch tell which.
     """
@@ -83,9 +84,10 @@ class DirectCalls:
             nothing.
         precision : {"single", "double", "extended", "quad", 50, 100}
             The scalar of the whole computation; results are rounded to double.
-        method : {"articulated", "cholesky", "ldl", "conjugate-gradients", "inverse", "realization"}
-            "articulated" is the O(N) recursion; the others solve the equations of motion by the mass matrix (see docs/accuracy.md)
-            and take no form and no refinement.
+        method : {"articulated", "cholesky", "ldl", "conjugate-gradients", "inverse", "divide-and-conquer", "realization"}
+            "articulated" is the O(N) recursion; "divide-and-conquer" joins pieces of the tree two by two, O(N) on a way of O(log N), in
+            threads (see docs/divide_and_conquer.md); the others solve the equations of motion by the mass matrix (see docs/accuracy.md).
+            None of them takes a form or a refinement.
         on_singular : {"raise", "minimum-norm"}
             What becomes of a hinge that feels no inertia: an error that names it, or the accelerations of least norm among those that
             fit the forces best.
@@ -99,7 +101,7 @@ class DirectCalls:
         SingularHingeError
             D(k) is singular at the rounding bound of the form in use.
         SingularOperatorError
-            Of the other methods: the mass matrix is not positive definite to rounding.
+            Of the other methods: the mass matrix is not positive definite to rounding; "divide-and-conquer" has lost its digits.
         RefinementError
             The first correction is more than 0.3 of the solution, or the corrections do not shrink.
 
@@ -122,7 +124,7 @@ class DirectCalls:
             raise _core.EvaluationError(
                 f"method {method!r} has no form, no refinement and no other answer to singular hinges; those are the articulated method's"
             )
-        return by_method(self, method, q, v, tau, precision, out)
+        return by_method(self, method, q, v, tau, precision, out, threads)
 
     def prepare(self, call: str, *, batch: int | None = None, **options: Any) -> Callable[..., Any]:
         """A direct call for loops, with its options read once: it takes arrays at their places, and `out=`.

@@ -31,6 +31,7 @@ FORWARD = [
     {"method": "ldl"},
     {"method": "conjugate-gradients"},
     {"method": "inverse"},
+    {"method": "divide-and-conquer"},
     {"method": "realization"},
 ]
 SOLVED = [o for o in FORWARD if "method" not in o]

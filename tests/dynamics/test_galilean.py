@@ -13,7 +13,7 @@ from pycraft.accuracy.exact import exact_dynamics
 EPS = np.finfo(float).eps
 SPEED, FAR = 7.7e3, 1e8  # m/s, m
 FORMS = ("fast", "ud", "square-root")
-METHODS = ("cholesky", "ldl", "inverse", "conjugate-gradients")
+METHODS = ("cholesky", "ldl", "inverse", "conjugate-gradients", "divide-and-conquer")
 LINKS = ("pin", "pin", "ball", "slider", "universal", "screw")
 TURNING = [{"kind": "pin", "axis": axis} for axis in ([0, 0, 1.0], [0, 1.0, 0], [1.0, 0, 0])]
 SLIDING = [{"kind": "slider", "axis": axis} for axis in ([1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0])]

@@ -63,6 +63,7 @@ def test_the_readme_example_runs():
         ("loops", 18),
         ("locking", 14),
         ("structure", 25),
+        ("divide_and_conquer", 1),
     ],  # fmt: skip
 )
 def test_the_pages_run(page, examples):

@@ -324,7 +324,7 @@ THERE_ARE = {
     "precision": ("double-double", ("single", "double", "extended", "quad", "50", "100")),
     "residual": ("narrower", ("same", "gather", "wider")),
     "refine": ("sometimes", ("auto",)),
-    "method": ("magic", ("articulated", "cholesky", "ldl", "conjugate-gradients", "inverse", "realization")),
+    "method": ("magic", ("articulated", "cholesky", "ldl", "conjugate-gradients", "inverse", "divide-and-conquer", "realization")),
     "on_singular": ("ignore", ("raise", "minimum-norm")),
 }
 

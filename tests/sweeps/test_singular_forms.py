@@ -324,7 +324,7 @@ def test_what_leaves_the_range_of_its_numbers_is_no_result():
         for options in (dict(), dict(precision="single"), dict(refine=1)):
             with pytest.raises(pc.Error, match="range|overflows"):
                 arm.forward_dynamics(arm.q, 1e160 * x, x, form=form, **options)
-    for method in ("cholesky", "ldl", "inverse", "realization"):
+    for method in ("cholesky", "ldl", "inverse", "divide-and-conquer", "realization"):
         with pytest.raises(pc.Error, match="range|overflows|positive definite"):
             arm.forward_dynamics(arm.q, 1e160 * x, x, method=method)
     states = np.tile(arm.q, (9, 1)), np.tile(x, (9, 1)), np.tile(x, (9, 1))

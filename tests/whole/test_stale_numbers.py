@@ -67,7 +67,7 @@ DIRECT = {
     "forward_dynamics, packs of single": lambda m: m.forward_dynamics(Q, V, TAU, precision="single"),
     **{
         f"forward_dynamics, {method}": lambda m, method=method: m.forward_dynamics(q, v, tau, method=method)
-        for method in ("cholesky", "ldl", "conjugate-gradients", "inverse", "realization")
+        for method in ("cholesky", "ldl", "conjugate-gradients", "inverse", "divide-and-conquer", "realization")
     },
     "inverse_dynamics": lambda m: m.inverse_dynamics(q, v, tau),
     "inverse_dynamics, batch": lambda m: m.inverse_dynamics(Q, V, TAU),

@@ -35,6 +35,7 @@ OTHER_PRECISIONS = (
     Rung("ud", precision="extended"),
 )
 RUNGS = DOUBLE + OTHER_PRECISIONS
+DIVIDED = Rung(method="divide-and-conquer")
 UNREFINED = tuple(rung.label for rung in DOUBLE if not rung.refine)
 EVERY_DOUBLE = tuple(rung.label for rung in DOUBLE)
 REFINED_WIDER = {form: Rung(form, refine="auto", residual="wider").label for form in FORMS}

@@ -17,6 +17,7 @@ from ... import _core
 from ...models.multibody import Multibody
 from ..rungs import epsilon
 from .case import (
+    DIVIDED,
     EITHER,
     EVERY_DOUBLE,
     FORMS,
@@ -67,6 +68,10 @@ def cases() -> list[Case]:
 # Cases ----------------------------------------------------------------------------------------------------------------
 
 
+WITH_DIVIDED = (*RUNGS, DIVIDED)
+"""Segments that end in a massless link are singular by themselves."""
+
+
 def _legal(name: str, hard: str, build: Build) -> DynamicsCase:
     """Solved. Axes start across each other and turn by at most 0.3 rad: no pivot comes close to nothing."""
     return DynamicsCase(
@@ -76,17 +81,19 @@ def _legal(name: str, hard: str, build: Build) -> DynamicsCase:
         {"N": 4},
         partial(_draw, build, 0.1),
         (
-            Bound(EVERY_DOUBLE, "p95", "100 eps √N", lambda m: 100 * m.eps * np.sqrt(m.N)),
-            at_most(EVERY_DOUBLE, "worst", "1e-11", 1e-11),
+            Bound((*EVERY_DOUBLE, DIVIDED.label), "p95", "100 eps √N", lambda m: 100 * m.eps * np.sqrt(m.N)),
+            at_most((*EVERY_DOUBLE, DIVIDED.label), "worst", "1e-11", 1e-11),
             *WITHIN_PEERS,
         ),
         RULING,
         verdict=SINGLE_MAY_REFUSE,
+        rungs=WITH_DIVIDED,
     )
 
 
 def _refused(name: str, hard: str, build: Build, fault: str) -> DynamicsCase:
-    return DynamicsCase(name, FAMILY, hard, {"N": 3}, partial(_draw, build, 1.0), (), RULING, verdict=REFUSED, fault=fault)
+    draw = partial(_draw, build, 1.0)
+    return DynamicsCase(name, FAMILY, hard, {"N": 3}, draw, (), RULING, verdict=REFUSED, fault=fault, rungs=WITH_DIVIDED)
 
 
 def _prismatic(light: float, heavy: float) -> DynamicsCase:

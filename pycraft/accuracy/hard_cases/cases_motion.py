@@ -24,6 +24,7 @@ WAYS: dict[str, dict[str, Any]] = {
     "square-root": {"form": "square-root"},
     "cholesky": {"method": "cholesky"},
     "ldl": {"method": "ldl"},
+    "divide-and-conquer": {"method": "divide-and-conquer"},
 }
 FACTORED = ("ud", "square-root")
 

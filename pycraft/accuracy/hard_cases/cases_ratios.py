@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from .case import EITHER, SINGLE_MAY_REFUSE, Bound, Case, DynamicsCase, Rung, Sample
+from .case import DIVIDED, EITHER, SINGLE_MAY_REFUSE, Bound, Case, DynamicsCase, Measured, Rung, Sample, quantile
 from .chains import links, states
 from .shared_bounds import FAST_REFINED, REFINED_FLOOR, UD_FLOOR, UD_UNREFINED, WITHIN_PEERS
 
@@ -24,6 +24,14 @@ REFINABLE, BOUNDED = 1e9, 1e12
 DENSE = tuple(Rung(method=method) for method in ("cholesky", "ldl"))
 """What a dense factorization of ℳ makes of these, for comparison: no bound."""
 
+
+def _as_fast(measured: Measured) -> float | None:
+    """Divide and conquer eliminates rows from inertias as `fast` does, in another order: its errors are of that size."""
+    worst = quantile(measured.errors["fast"], 1.0)
+    return float(np.maximum(10 * worst, 100 * measured.eps * np.sqrt(measured.N))) if np.isfinite(worst) else None
+
+
+AS_FAST = (Bound((DIVIDED.label,), "worst", "10 × the worst of fast, or 100 eps √N", _as_fast),)
 
 Masses = Callable[[], tuple[Sequence[float], Sequence[float]]]
 
@@ -73,8 +81,11 @@ def _case(name: str, hard: str, n: int, ratio: float, masses: Masses, axes: str 
         bounds += UD_FLOOR if alike else UD_UNREFINED
     if ratio <= REFINABLE:
         bounds += REFINED_FLOOR if alike else FAST_REFINED
+    if ratio < REFINABLE:
+        bounds += AS_FAST
     extreme = {rung.label: EITHER for rung in DynamicsCase.rungs if rung.form == "fast" and rung.precision != "extended"}
     extreme |= {rung.label: EITHER for rung in DynamicsCase.rungs if rung.precision == "single"}
+    divided = {DIVIDED.label: EITHER} if ratio >= REFINABLE else {}  # from there on fewer than six digits may be left
     return DynamicsCase(
         name,
         FAMILY,
@@ -83,9 +94,9 @@ def _case(name: str, hard: str, n: int, ratio: float, masses: Masses, axes: str 
         partial(_draw, masses, axes, np.pi, alike),
         bounds,
         SOURCE,
-        verdict={rung.label: EITHER for rung in DENSE} | (extreme if ratio > BOUNDED else SINGLE_MAY_REFUSE),
+        verdict={rung.label: EITHER for rung in DENSE} | divided | (extreme if ratio > BOUNDED else SINGLE_MAY_REFUSE),
         floor=alike,
-        rungs=DynamicsCase.rungs + DENSE,
+        rungs=(*DynamicsCase.rungs, *DENSE, DIVIDED),
     )
 
 

@@ -12,7 +12,7 @@ COLOURS = {"single": "#8a8a8a", "double": "#1f4e79", "extended": "#c55a11", "qua
 """Of precisions; others take WIDE."""
 WIDE = "#6b3fa0"
 MARKERS = {"fast": "o", "ud": "s", "square-root": "D"}
-OTHERS = {"cholesky": "^", "ldl": "v", "conjugate-gradients": "P", "inverse": "X", "realization": "*"}
+OTHERS = {"cholesky": "^", "ldl": "v", "conjugate-gradients": "P", "inverse": "X", "divide-and-conquer": "d", "realization": "*"}
 SERIES = ("#1f4e79", "#c55a11", "#4d7c2a", "#6b3fa0", "#8a8a8a", "#a8324a", "#2a9d8f", "#b8860b")
 """Of series that have no colour of their own."""
 WORTH = 3.0
