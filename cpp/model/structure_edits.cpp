@@ -89,7 +89,6 @@ void StructureEdits::rehang(Multibody& model, const std::string& body, const std
   model.structure_changed("body '" + body + "' was hung on " + onto_text(parent) + " by hinge '" + hinge.name + "'");
   model.carried_.erase(before);
   model.carried_[hinge.name] = {q, v};
-  model.locked_.erase(before);
   std::vector<Body>& bodies = model.bodies_;
   bodies[k].hinge = std::move(hinge);
   if (bodies[k].parent != onto.body) {  // the last one on its new parent
@@ -304,9 +303,6 @@ const Hinge& StructureEdits::hinge_of_root(const Multibody& model, const std::ve
   if (std::any_of(base.rotor_inertia.begin(), base.rotor_inertia.end(), [](double j) { return j != 0; }))
     throw ModelError("hinge '" + base.name + "' has rotors against the base, which would act on '" + body + "' instead of '" + root +
                      "'; set its rotor inertia to zero first");
-  for (size_t i = 0; i + 1 < way.size(); ++i)
-    if (const std::string& name = model.bodies_[way[i]].hinge.name; model.locked_.count(name))
-      throw ModelError("hinge '" + name + "' between root '" + root + "' and body '" + body + "' is locked: unlock it before the root is moved over it");
   return base;
 }
 

@@ -15,7 +15,7 @@ from .handles import Body, Node, Vector
 from .hinge_arguments import body_name, frame_name, hinge_arguments
 from .hinge_fit import HingeFit, OneHinge, fitted
 from .impulses import Impulse, impulse_into, twists_of
-from .with_frames import WithFrames
+from .locking import Locking
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Reattachment:
     impulse: Impulse | None = None
 
 
-class Structure(WithFrames):
+class Structure(Locking):
     """Edits that hang bodies elsewhere. Each leaves the model as it was where it is refused, and makes operators and parts stale."""
 
     _left_aside: dict[str, np.ndarray]
@@ -202,8 +202,8 @@ class Structure(WithFrames):
         Raises
         ------
         ModelError
-            A root that is not on a free hinge (detach it first); rotors that would act between other axes: of the free hinge itself, and of
-            a ball or free hinge on the way that has different ones about different axes. The model is as it was.
+            A root that is not on a free hinge (detach it first); locked hinges on the way; rotors that would act between other axes: of the
+            free hinge itself, and of a ball or free hinge on the way that has different ones about different axes. The model is as it was.
 
         Cost: the hinges on the way, and O(bodies) at the next look at the model.
 
@@ -219,6 +219,11 @@ class Structure(WithFrames):
         True
         """
         name, frames = body_name(body), self._kept_frames
+        way = {self._body(k)["hinge"]["name"] for k in self._path_between(-1, self._body_index(name))}
+        if turned := ", ".join(repr(hinge) for hinge in self.locked if hinge in way):
+            raise _core.ModelError(
+                f"between the root and body {name!r} there are locked hinges, {turned}: unlock them before they are turned"
+            )
         rates = np.zeros(self.nv) if frames is None else np.array(frames.vdot)
         first = self.frame(name).acceleration() if rates.any() else np.zeros(6)
         aside = Asides(self)

@@ -82,3 +82,15 @@ def test_edits_that_keep_motions_keep_what_loops_say_of_them():
     np.testing.assert_allclose(locked.loops.residual(), closed().loops.residual(), atol=1e-13)
     with_lock = [locked.loops[n].jacobian() @ locked.v for n in ("feet", "gear", "ground")]
     np.testing.assert_allclose(np.concatenate(with_lock), np.r_[said[5:10], said[16:17], said[21:24]], atol=1e-13)
+
+
+def test_the_root_does_not_move_over_locked_hinges():
+    robot = pc.tree([-1, 0, 1, 1], ["free", "pin", "ball", "pin"], seed=1)
+    robot.lock("hinge2")
+    robot.reroot("body3")  # not over it
+    with pytest.raises(pc.ModelError, match=r"between the root and body 'body2' there are locked hinges, 'hinge2': unlock them"):
+        robot.reroot("body2")
+    assert robot.locked == ["hinge2"] and robot.bodies["body3"].parent is None
+    robot.unlock()
+    robot.reroot("body2")
+    assert robot.bodies["body2"].parent is None
