@@ -143,6 +143,8 @@ def test_a_model_alone_a_part_and_none():
     assert twice == ["body0 again"] and empty.nv == 2 * other.nv and "eye again" in empty.frames
     empty.merge(empty.subgraph(root="body2 again"), "body1", prefix="own part/")
     assert empty.bodies["own part/body3 again"].parent.name == "own part/body2 again"
+    empty.merge(other, "body0", suffix=" put", position=(0, 0, 2))
+    assert empty.frame("mark put").on.name == "body0" and empty.frame("mark put").placement[:3, 3].tolist() == [1, 2, 5]
     leg = other.subgraph(root="body2")
     assert [body.name for body in empty.merge(leg, "body4", prefix="leg/")] == ["leg/body2"]
     refused(empty, lambda: empty.merge("other"), "takes in a model")

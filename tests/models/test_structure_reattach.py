@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import pycraft as pc
+from pycraft.models.hinge_arguments import hinge_arguments
+from pycraft.models.hinge_fit import OneHinge
 from support.descriptions import KINDS, random_description
 from support.edits import options_of, refused
 from support.mechanisms import every_kind
@@ -256,3 +258,18 @@ def test_nothing_moves_any_more():
     assert hits[0].loss == hits[0].energy_before - hits[0].energy_after == pytest.approx(4.5)
     assert hits[1].energy_after == 0 and np.array_equal(hits[1].momentum_after, np.zeros(6))
     assert copy.copy(pair).nv == 0 and pair.detach("a").body.hinge.kind == "free"
+
+
+def test_turns_that_are_nearest_to_a_guess():
+    hinge = OneHinge("b", "h", hinge_arguments("hinge 'h'", "gimbal"))
+    near = hinge.nearest_turn(np.array([7.0, -4.0, 0.1]), np.array([0.5, 2.2, 6.3]))
+    assert np.allclose(near, [7 - 2 * np.pi, 2 * np.pi - 4, 2 * np.pi + 0.1], rtol=0, atol=1e-15)
+    ball = OneHinge("b", "h", hinge_arguments("hinge 'h'", "ball"))
+    assert ball.nearest_turn(np.array([0.6, 0, 0.8, 0]), np.array([-1.0, 0, 0, 0])).tolist() == [-0.6, 0, -0.8, 0]
+
+
+def test_what_the_file_said_is_not_said_of_another_hinge_of_the_name():
+    arm = pc.chain(2)
+    arm._left_aside = {"damping": np.array([1.0, 2.0])}
+    arm.reattach("body1", "body0", "pin", position=(1, 0, 0))
+    assert np.array_equal(arm.left_aside["damping"], [1, np.nan], equal_nan=True)
