@@ -140,3 +140,9 @@ def test_rotation_vectors_of_all_turns():
     phi = way / np.linalg.norm(way, axis=1, keepdims=True) * rng.choice([1e-9, 1e-4, 1, 3, np.pi - 1e-9], (200, 1))
     assert np.abs(rotation_vectors(turn(phi)) - phi).max() < 1e-14
     assert rotation_vectors(np.zeros((0, 3, 3))).shape == (0, 3)
+
+
+def test_weights_and_tolerances_are_of_angles_first(model):
+    given = dict(pose=np.eye(4), directions=["rx", "y"], weight=(2, 3), tolerance=(0.1, 0.2))
+    (rows,), _ = rows_of(model, {"hand": given}, None, 1e-9)
+    assert rows.weights.tolist() == [2, 3] and rows.tolerance == (0.1, 0.2) and rows.angular.tolist() == [True, False]
