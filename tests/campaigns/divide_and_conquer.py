@@ -7,6 +7,7 @@ many rounds. The bits of both numbers of threads are compared, and the values wi
 """
 
 import argparse
+import os
 import platform
 from collections.abc import Callable
 from math import log2
@@ -80,6 +81,9 @@ conquer over the articulated method, one thread each. Apart: the difference of t
 | tree | links | articulated | on {threads} threads | divide and conquer | on {threads} threads | over | apart |
 | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |
 {rows}
+
+Load average of the last five minutes at the end: {load}. Above 1 other work took part of the cores, and the columns on two threads, what
+they gain and what Amdahl's law makes of it are no property of the method; the page wants a quiet machine.
 
 It does not pay here. A join takes 1,400 to 4,000 operations and its segment a kilobyte; a link of the articulated method takes some 400,
 in kernels of the machine's instruction set. On a chain of {links} links that is {ratio} times the time on one thread; two threads gain
@@ -156,6 +160,7 @@ def main() -> None:
     serial = max(0.0, min(1.0, 2 / gain - 1))  # Amdahl on two threads: gain = 1 / (s + (1 - s)/2)
     least = (1 - serial) / (1 / ratio - serial) if serial * ratio < 1 else None
     page = PAGE.format(
+        load=f"{os.getloadavg()[1]:.1f}",
         machine=platform.machine(),
         cores=cores(),
         python=platform.python_version(),
