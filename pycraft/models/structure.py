@@ -220,9 +220,9 @@ class Structure(Locking):
         """
         name, frames = body_name(body), self._kept_frames
         way = {self._body(k)["hinge"]["name"] for k in self._path_between(-1, self._body_index(name))}
-        if turned := ", ".join(repr(hinge) for hinge in self.locked if hinge in way):
+        if locked := ", ".join(repr(hinge) for hinge in self.locked if hinge in way):
             raise _core.ModelError(
-                f"between the root and body {name!r} there are locked hinges, {turned}: unlock them before they are turned"
+                f"between the root and body {name!r} there are locked hinges, {locked}: unlock them before they are turned"
             )
         rates = np.zeros(self.nv) if frames is None else np.array(frames.vdot)
         first = self.frame(name).acceleration() if rates.any() else np.zeros(6)
