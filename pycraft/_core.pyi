@@ -7,7 +7,7 @@ import fractions
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Binding', 'Centroidal', 'Curvature', 'Dynamics', 'Effect', 'Error', 'EvaluationError', 'FrameTree', 'FunctionOfTime', 'GroupedOperators', 'HingeKind', 'HybridDynamics', 'Integration', 'Letter', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'RefinementError', 'RunRecord', 'Scalar', 'SceneCalls', 'SceneEffects', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'alone', 'blockdiag', 'bushing_effect', 'check_pairing', 'checked_refinement', 'compiled_call', 'constant', 'constant_in_time', 'coordinates_named', 'coulomb_friction_effect', 'damping_effect', 'direct_call', 'direct_calls', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'float128', 'forms', 'gravity_effect', 'gravity_gradient_effect', 'harmonic', 'hermite_between', 'hinge_kinds', 'identity', 'implicit_damping_effect', 'implicit_spring_effect', 'instruction_set', 'instruction_sets', 'integrator_table', 'integrators', 'kernel_headers', 'kernel_tape', 'limits_effect', 'methods', 'motor_effect', 'node_damper_effect', 'node_spring_effect', 'numbers_in_q', 'operators_of', 'pack_width', 'piecewise_polynomial', 'point_mass_gravity_effect', 'precisions', 'prepared_call', 'prescribed_by', 'prescribed_effect', 'python_effect', 'python_function_of_time', 'quadratic_damping_effect', 'real_array', 'record_from', 'residual', 'rotor_inertia_effect', 'run_scene', 'run_scenes', 'scalar', 'scene_between', 'scene_linearized', 'servo_effect', 'spring_effect', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_by_hand', 'time_compiled', 'time_dynamics', 'time_forward', 'time_hybrid', 'time_method', 'time_packs', 'time_passes', 'time_scene', 'torque_source_effect', 'vector', 'wider', 'wrench_effect', 'zero']
+__all__: list[str] = ['Binding', 'Centroidal', 'Curvature', 'Dynamics', 'Effect', 'Error', 'EvaluationError', 'FrameTree', 'FunctionOfTime', 'GroupedOperators', 'HingeKind', 'HybridDynamics', 'Integration', 'InterbodyForces', 'Letter', 'LoopSet', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'PreparedHybridDynamics', 'RefinementError', 'RunRecord', 'Scalar', 'SceneCalls', 'SceneEffects', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'alone', 'blockdiag', 'bushing_effect', 'check_pairing', 'checked_refinement', 'compiled_call', 'constant', 'constant_in_time', 'coordinates_named', 'coulomb_friction_effect', 'damping_effect', 'direct_call', 'direct_calls', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'fixman_effect', 'float128', 'forms', 'gravity_effect', 'gravity_gradient_effect', 'harmonic', 'hermite_between', 'hinge_kinds', 'identity', 'implicit_damping_effect', 'implicit_spring_effect', 'instruction_set', 'instruction_sets', 'integrator_table', 'integrators', 'kernel_headers', 'kernel_tape', 'langevin_effect', 'limits_effect', 'methods', 'motor_effect', 'node_damper_effect', 'node_spring_effect', 'nose_hoover_effect', 'numbers_in_q', 'operators_of', 'pack_width', 'piecewise_polynomial', 'point_mass_gravity_effect', 'precisions', 'prepared_call', 'prescribed_by', 'prescribed_effect', 'python_effect', 'python_function_of_time', 'quadratic_damping_effect', 'real_array', 'record_from', 'residual', 'rotor_inertia_effect', 'run_scene', 'run_scenes', 'scalar', 'scene_at_rest', 'scene_between', 'scene_interbody_forces', 'scene_linearized', 'servo_effect', 'spring_effect', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_by_hand', 'time_compiled', 'time_dynamics', 'time_forward', 'time_hybrid', 'time_method', 'time_packs', 'time_passes', 'time_scene', 'torque_source_effect', 'vector', 'wider', 'wrench_effect', 'zero']
 
 class Error(Exception): ...
 class SpaceError(Error, TypeError): ...
@@ -937,6 +937,16 @@ class Dynamics:
         ...
     def refinement(self, q: typing.Any, v: typing.Any, tau: typing.Any, form: str, refine: typing.Any, residual: str, precision: str | int) -> tuple[numpy.typing.NDArray[numpy.float64], list[float], typing.Any]:
         ...
+class PreparedHybridDynamics:
+    """
+    Hybrid dynamics whose options were read once.
+    """
+    def __call__(self, q: typing.Any, v: typing.Any, tau: typing.Any, vdot: typing.Any) -> typing.Any:
+        """
+        Accelerations and forces; None where an argument is not a plain array, there are other states than was said, or the model was edited since.
+        """
+    def __reduce__(self) -> tuple:
+        ...
 class HybridDynamics:
     def __call__(self, q: typing.Any, v: typing.Any, tau: typing.Any, vdot: typing.Any, form: str, refine: typing.Any, residual: str, precision: str | int, threads: typing.SupportsInt | typing.SupportsIndex) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
         ...
@@ -944,6 +954,10 @@ class HybridDynamics:
         ...
     def __reduce__(self) -> tuple:
         ...
+    def prepared(self, form: str, refine: typing.Any, residual: str, precision: str | int, states: typing.SupportsInt | typing.SupportsIndex) -> PreparedHybridDynamics:
+        """
+        For loops, of one state (-1) or so many a call.
+        """
     @property
     def prescribed(self) -> list[bool]:
         """
@@ -1053,6 +1067,42 @@ class FrameTree:
     @time.setter
     def time(self, arg1: typing.Any) -> None:
         ...
+class LoopSet:
+    """
+    The loops of a model, by name, and their rows at given states: pycraft.models.loop_set is its face.
+    """
+    def __init__(self, arg0: Multibody) -> None:
+        ...
+    def __reduce__(self) -> tuple:
+        ...
+    def add_coupling(self, name: str, coordinates: collections.abc.Sequence[tuple[str, typing.SupportsInt | typing.SupportsIndex, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]], constant: typing.Any, function: typing.Any) -> None:
+        ...
+    def add_hinge(self, name: str, a: str, b: str, hinge: str, axes: collections.abc.Sequence[typing.Any], point: typing.Any, pitch: typing.Any, rotation: typing.Any, position: typing.Any) -> None:
+        ...
+    def add_pair(self, name: str, a: str, b: str, kind: str, number: typing.Any, quadric: typing.Any) -> None:
+        ...
+    def bias(self, q: typing.Any, v: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def first_rows(self) -> list[int]:
+        """
+        Where each loop's rows begin, and the number of all.
+        """
+    def jacobian(self, q: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def kind(self, name: str) -> str:
+        ...
+    def names(self) -> list[str]:
+        """
+        In order of declaration.
+        """
+    def remove(self, name: str) -> None:
+        ...
+    def residual(self, q: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def rows(self) -> tuple[list[str], list[bool]]:
+        """
+        Names of all rows, and which are of positions.
+        """
 class Centroidal:
     """
     Centre of mass of one model and what is about it.
@@ -1213,6 +1263,26 @@ class RunRecord:
         """
         The ends of steps.
         """
+class InterbodyForces:
+    """
+    Forces of hinges on the bodies that they move, with wrenches on nodes of these names.
+    """
+    def __init__(self, arg0: Multibody) -> None:
+        ...
+    def __reduce__(self) -> tuple:
+        ...
+    def after(self, q: typing.Any, v: typing.Any, vdot: typing.Any, names: collections.abc.Sequence[str], in_world: bool, wrenches: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], reaction: bool, precision: str | int) -> tuple:
+        """
+        f, X_WB, T and v̇, of accelerations.
+        """
+    def derivatives(self, q: typing.Any, v: typing.Any, vdot: typing.Any, names: collections.abc.Sequence[str], in_world: bool, wrenches: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], along_q: bool) -> tuple:
+        """
+        Of f and of T, along q, v and v̇, or along q alone.
+        """
+    def under(self, q: typing.Any, v: typing.Any, tau: typing.Any, names: collections.abc.Sequence[str], in_world: bool, wrenches: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], reaction: bool, form: str, refine: typing.Any, residual: str, precision: str | int) -> tuple:
+        """
+        f, X_WB, T and v̇, of generalized forces.
+        """
 class Theorem:
     """
     A theorem as data: both sides as expressions, its hypotheses, its source.
@@ -1358,6 +1428,8 @@ def euclidean(dimension: typing.Any) -> Space:
     """
 def external(product: typing.Any, transposed: typing.Any, domain: Space, codomain: Space, name: str) -> Operator:
     ...
+def fixman_effect(model: Multibody, kT: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
+    ...
 def forms() -> list[str]:
     """
     The forms of the articulated-inertia sweep.
@@ -1402,6 +1474,8 @@ def kernel_tape(model: Multibody, call: str) -> typing.Any:
     """
     What the kernel of a direct call does for this model, operation by operation; None where no kernel knows the model's hinges.
     """
+def langevin_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, kT: typing.SupportsFloat | typing.SupportsIndex, friction: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], period: typing.SupportsFloat | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> Effect:
+    ...
 def limits_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, stiffness: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], dissipation: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], lower: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], upper: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> Effect:
     ...
 def methods() -> list[str]:
@@ -1413,6 +1487,8 @@ def motor_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None,
 def node_damper_effect(model: Multibody, node_a: str, node_b: str, coefficient: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
     ...
 def node_spring_effect(model: Multibody, node_a: str, node_b: str, stiffness: typing.SupportsFloat | typing.SupportsIndex, length: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
+    ...
+def nose_hoover_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, kT: typing.SupportsFloat | typing.SupportsIndex, time_constant: typing.SupportsFloat | typing.SupportsIndex, chain: typing.SupportsInt | typing.SupportsIndex) -> Effect:
     ...
 def numbers_in_q(model: Multibody, coordinates: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> int:
     """
@@ -1470,8 +1546,16 @@ def run_scenes(calls: collections.abc.Sequence[SceneCalls], records: collections
     """
 def scalar(value: float | fractions.Fraction) -> Scalar:
     ...
+def scene_at_rest(calls: SceneCalls, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], t: typing.SupportsFloat | typing.SupportsIndex, states: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
+    """
+    At a configuration at rest: what is left of all forces, its derivative along displacements, ℳ + J, and which coordinates are prescribed.
+    """
 def scene_between(calls: SceneCalls, integrator: str, t: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], states: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], work: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], times: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], at: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> dict:
     ...
+def scene_interbody_forces(calls: SceneCalls, t: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], own: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], reaction: bool) -> tuple:
+    """
+    f in the bodies' axes and X_WB, of states along a run.
+    """
 def scene_linearized(calls: SceneCalls, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], t: typing.SupportsFloat | typing.SupportsIndex, states: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
     """
     At a state, of A ż = g with z = (v, effects' own states): A, the derivatives of g along displacements and along z, ż, and which coordinates are prescribed.
