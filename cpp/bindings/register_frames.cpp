@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "bindings/direct_calls.h"
+#include "bindings/hinge_arguments.h"
 #include "dynamics/frame_cache.h"
 #include "dynamics/frame_calls.h"
 #include "model/checks.h"
@@ -69,13 +70,6 @@ FrameFunction motion_function(const py::object& f, const std::string& frame) {
   if (f.is_none()) return nullptr;
   auto held = std::make_shared<PythonMotion>(f, frame);
   return [held](double t) { return (*held)(t); };
-}
-
-Pose<double> pose_from(const py::object& rotation, const py::object& position, const std::string& frame) {
-  Pose<double> X = Pose<double>::identity();
-  if (!rotation.is_none()) X.R = to_matrix3(rotation, ("rotation of frame '" + frame + "'").c_str());
-  if (!position.is_none()) X.p = to_vector3(position, ("position of frame '" + frame + "'").c_str());
-  return X;
 }
 
 py::array_t<double> to_numpy(const Pose<double>& X) {
@@ -162,10 +156,10 @@ void register_frames(py::module_& m) {
   unpicklable(frames)
       .def(py::init<std::shared_ptr<Multibody>>())
       .def("add", [](Frames& f, const std::string& name, const std::string& on, const py::object& rotation, const py::object& position, const py::object& motion) {
-        f.tree->add(name, on, pose_from(rotation, position, name), motion_function(motion, name));
+        f.tree->add(name, on, pose_from(rotation, position, "frame '" + name + "'"), motion_function(motion, name));
       }, py::arg("name"), py::arg("on"), py::arg("rotation"), py::arg("position"), py::arg("motion"))
       .def("place", [](Frames& f, const std::string& name, const py::object& rotation, const py::object& position) {
-        f.tree->move(name, pose_from(rotation, position, name));
+        f.tree->move(name, pose_from(rotation, position, "frame '" + name + "'"));
       }, py::arg("name"), py::arg("rotation"), py::arg("position"))
       .def("set_motion", [](Frames& f, const std::string& name, const py::object& motion) { f.tree->move(name, motion_function(motion, name)); }, py::arg("name"), py::arg("motion"))
       .def("attach", [](Frames& f, const std::string& name, const std::string& on) { f.tree->attach(name, on); }, py::arg("name"), py::arg("on"))

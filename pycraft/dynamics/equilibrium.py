@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import _core
-from .linearization import brackets
+from .displacements import brackets, turning
 
 INDIFFERENT = 1e-9
 """Eigenvalues of stiffness below this part of the largest are taken for zero."""
@@ -103,7 +103,7 @@ class _Search:
     def __init__(self, model: Any, at: Callable[[np.ndarray], Balance], q0: np.ndarray, free: np.ndarray, limits: bool):
         self.model, self.q, self.free, self._at = model, q0, free, at
         self._last: tuple[np.ndarray, Balance] | None = None
-        self.curved = bool(brackets(model, np.ones(model.nv)).any())
+        self.curved = bool(brackets(turning(model), np.ones(model.nv)).any())
         self.limits = limits
         if limits:  # start within them; where both are one there is nothing to search for
             lower, upper = self.bounds()
@@ -138,7 +138,7 @@ class _Search:
 
         n = len(whole)
         block = np.zeros((2 * n, 2 * n))
-        block[:n, :n], block[:n, n:] = -brackets(self.model, whole), np.eye(n)
+        block[:n, :n], block[:n, n:] = -brackets(turning(self.model), whole), np.eye(n)
         return np.asarray(expm(block)[:n, n:])
 
     def found(self, tolerance: float) -> Equilibrium:

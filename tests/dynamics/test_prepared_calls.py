@@ -177,7 +177,8 @@ def test_the_core_takes_what_the_method_takes(call):
     arrays, options = _core.direct_calls()[call]
     method = inspect.signature(getattr(pc.Multibody, call)).parameters
     assert [name for name in method if name in arrays] == list(arrays)
-    assert set(method) - {"self", "out", "threads", "method", "axes", "relative_to"} == {*arrays, *options}
+    other = {"self", "out", "threads", "method", "axes", "relative_to"} | ({"form"} - set(options))  # in other forms by operators
+    assert set(method) - other == {*arrays, *options}
     defaults = {name: method[name].default for name in options if name != "frame"}
     model = panda()
     frame = {"frame": "panda_link7"} if "frame" in options else {}

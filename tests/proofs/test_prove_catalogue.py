@@ -25,6 +25,9 @@ NOT_DERIVED = {
     "quasi-derivatives do not commute",
     "C is the Christoffel matrix",
     "∂P' and ∂P",
+    "articulated inertia with a body for root",  # of two trees
+    "compliance between two bodies knows no root",
+    "ln det ℳ knows no root",
 }
 MODELS = [
     ([-1, 0, 1, 1], ["free", "universal", "ball", "pin"], True),

@@ -9,6 +9,7 @@ import pycraft as pc
 from pycraft.dynamics.quadratic import QuadraticModel
 from pycraft.dynamics.task_space import TaskSpace
 from pycraft.linear.linear_model import LinearModel
+from pycraft.models.limits import LimitDistances
 from pycraft.models.mobility import Mobility
 from support.mechanisms import every_kind, uniform_batch
 
@@ -22,6 +23,7 @@ FRAMES = {
     "operational_space_compliance",
 }
 TAU_OR_VDOT = {"interbody_forces", "interbody_forces_derivatives"}  # one of them, tau here
+OTHERWISE = {"integrate_ode", "certify", "identify", "reattach"}  # from a state on, of a whole log, of one hinge
 NOT_OF_A_STATE = {"inertial_parameters", "prepare"}
 
 
@@ -30,7 +32,7 @@ def calls(model):
     found = {}
     for name, function in inspect.getmembers(type(model), lambda member: inspect.isfunction(inspect.unwrap(member))):
         parameters = inspect.signature(function).parameters
-        if name.startswith("_") or "q" not in parameters or name in ("integrate_ode", "certify"):
+        if name.startswith("_") or "q" not in parameters or name in OTHERWISE:
             continue
         found[name] = [p for p in parameters if p in ("v", "tau", "vdot", "p") and not (p == "vdot" and name in TAU_OR_VDOT)]
     return found
@@ -41,6 +43,8 @@ def leaves(x):
         return [x.A, x.B, x.C, x.D, x.rate, x.q, x.v]
     if isinstance(x, QuadraticModel):
         return [*leaves(x.linear), *x.tensors()]
+    if isinstance(x, LimitDistances):
+        return [x.lower, x.upper]
     if isinstance(x, Mobility):
         return [x.singular_values, x.freedoms]
     if isinstance(x, TaskSpace):
