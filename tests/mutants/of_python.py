@@ -291,7 +291,7 @@ CHANGES = {
         ("flutter is stable", "or abs(np.imag(value)) > zero", ""),
         ("an unstable equilibrium is not left", "search.push(found.modes[0].shape)", "search.push(0 * found.modes[0].shape)"),
         ("grains balance under any force", "<= tolerance * now.size)", "<= tolerance)"),
-        ("balls turn the other way", "-brackets(self.model, whole), np.eye(n)", "brackets(self.model, whole), np.eye(n)"),
+        ("balls turn the other way", "-brackets(turning(self.model), whole), np.eye(n)", "brackets(turning(self.model), whole), np.eye(n)"),
     ],
     "pycraft/dynamics/interbody.py": [
         ("accelerations do not follow q", "f_q - by_tau @ T_q[..., None, :, :]", "f_q"),
