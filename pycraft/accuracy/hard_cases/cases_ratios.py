@@ -26,8 +26,8 @@ DENSE = tuple(Rung(method=method) for method in ("cholesky", "ldl"))
 
 
 def _as_fast(measured: Measured) -> float | None:
-    """Divide and conquer eliminates rows from inertias as `fast` does, but of segments, which see the ratios of all that they join: two digits
-    more may go (measured: a factor of 20)."""
+    """Divide and conquer eliminates rows from inertias as `fast` does, but of segments, which see the ratios of all that they join: two
+    digits more may go (measured: a factor of 20)."""
     worst = quantile(measured.errors["fast"], 1.0)
     return float(np.maximum(100 * worst, 100 * measured.eps * np.sqrt(measured.N))) if np.isfinite(worst) else None
 
