@@ -5,7 +5,7 @@ import pytest
 
 import pycraft as pc
 from support.differences import difference
-from support.mechanisms import every_kind
+from support.mechanisms import every_kind, four_atoms
 from support.oracle import agree
 
 DRAWS = 20000
@@ -71,21 +71,10 @@ def test_draws_of_one_state_and_of_a_batch():
     assert pc.Multibody("nothing").equipartition(count=3).shape == (3, 0)
 
 
-def chain_of_four_atoms():
-    """Bodies by bonds: a rigid right angle of three atoms, free in space, and the fourth atom turning about the middle bond."""
-    model = pc.Multibody("four atoms")
-    atoms = np.array([(0, 1, 0), (0, 0, 0), (1, 0, 0)], float)
-    centre = atoms.mean(axis=0)
-    inertia = sum((a - centre) @ (a - centre) * np.eye(3) - np.outer(a - centre, a - centre) for a in atoms)
-    model.add_body("angle", hinge="free", mass=3.0, com=centre, inertia=inertia)
-    model.add_body("end", "angle", "pin", axis=(1, 0, 0), position=(1, 0, 0), mass=1.0, com=(0, 1, 0), inertia=np.zeros((3, 3)))
-    return model
-
-
 @pytest.mark.parametrize("torsion", [0.0, 0.4, 1.3, 2.0, np.pi])
 def test_four_atoms_in_closed_form(torsion):
     """Unit masses and bonds, right angles, the torsion free: det ℳ = 70 - 8c - 32c² + 2c⁴, c its cosine, 0 = cis."""
-    model, kT = chain_of_four_atoms(), 0.6
+    model, kT = four_atoms(), 0.6
     q = np.concatenate([model.zero_q()[:7], [torsion]])
     c, s = np.cos(torsion), np.sin(torsion)
     det, slope = 70 - 8 * c - 32 * c**2 + 2 * c**4, s * (8 + 64 * c - 8 * c**3)

@@ -10,20 +10,10 @@ import pytest
 from scipy.stats import kstest
 
 import pycraft as pc
+from support.mechanisms import four_atoms
 
 E = pc.effects
 SIGMAS, LIKELY = 4, 1e-3
-
-
-def four_atoms():
-    """A rigid right angle of three atoms, free in space, and the fourth atom turning about the middle bond; unit masses and bonds."""
-    model = pc.Multibody("four atoms")
-    atoms = np.array([(0, 1, 0), (0, 0, 0), (1, 0, 0)], float)
-    centre = atoms.mean(axis=0)
-    inertia = sum((a - centre) @ (a - centre) * np.eye(3) - np.outer(a - centre, a - centre) for a in atoms)
-    model.add_body("angle", hinge="free", mass=3.0, com=centre, inertia=inertia)
-    model.add_body("end", "angle", "pin", axis=(1, 0, 0), position=(1, 0, 0), mass=1.0, com=(0, 1, 0), inertia=np.zeros((3, 3)))
-    return model
 
 
 def torsion_mean(f, fixman):
