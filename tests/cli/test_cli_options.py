@@ -101,10 +101,13 @@ def measured(monkeypatch):
     return calls
 
 
-@pytest.mark.parametrize(("command", "option"), [(c, o) for c, options in BEFORE.items() for o in options])
+NEEDS = {"peers": pytest.mark.peers}
+
+
+@pytest.mark.parametrize(
+    ("command", "option"), [pytest.param(c, o, marks=NEEDS.get(c, ())) for c, options in BEFORE.items() for o in options]
+)
 def test_an_option_reaches_what_is_measured(command, option, measured, tmp_path):
-    if command == "peers":
-        pytest.importorskip("pinocchio")
     model = tmp_path / "mimicking.urdf"
     model.write_text(MIMICKING.format(links=LINK.format("first") + LINK.format("second")))
     takes_model = any(p.name == "model" for p in COMMANDS[command].params) and option != "model"

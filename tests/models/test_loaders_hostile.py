@@ -115,6 +115,7 @@ def test_paths_may_be_bytes(tmp_path):
         pc.load(bytes(path))
 
 
+@pytest.mark.peers
 def test_mjcf_in_latin_1(tmp_path):
     pytest.importorskip("mujoco")
     path = tmp_path / "r.xml"

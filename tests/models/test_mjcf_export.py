@@ -4,7 +4,9 @@ Tolerance: inertias that are not diagonal go through MuJoCo's principal axes and
 a few eps; results of trees of seven bodies, with entries up to 100, stay within 1e-12 of their largest entry.
 """
 
+import doctest
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +19,7 @@ from pycraft.models.loaders.rotations import rotation_from_rpy
 from support.saved_models import differences, loaded, saved_and_loaded
 
 mujoco = pytest.importorskip("mujoco")
+pytestmark = pytest.mark.peers
 
 KINDS = ("pin", "slider", "weld", "ball", "universal", "gimbal", "cylindrical", "planar", "custom")
 AGREE = 1e-12
@@ -342,3 +345,10 @@ def test_paths(tmp_path):
         assert again.coordinate_names == path.coordinate_names
         close(again.mass_matrix(path.q), path.mass_matrix(path.q))
         close(again.pose("RL_foot", path.q), path.pose("RL_foot", path.q))
+
+
+def test_the_page_on_mjcf_files_runs(tmp_path, monkeypatch):
+    page = Path(__file__).parents[2] / "docs" / "mjcf.md"
+    monkeypatch.chdir(tmp_path)
+    result = doctest.testfile(str(page), module_relative=False, optionflags=doctest.NORMALIZE_WHITESPACE)
+    assert result.failed == 0 and result.attempted > 8

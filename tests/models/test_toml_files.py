@@ -110,6 +110,7 @@ def test_robots_of_the_package(tmp_path, name, welds):
     assert "rotation" not in (tmp_path / "robot.toml").read_text() or name == "ur5"  # rpy as in their URDF files
 
 
+@pytest.mark.peers
 def test_a_model_of_a_mujoco_file(tmp_path):
     pytest.importorskip("mujoco")
     text = (
@@ -124,6 +125,7 @@ def test_a_model_of_a_mujoco_file(tmp_path):
     assert loaded(tmp_path / "m.toml", gravity="file").gravity.tolist() == [0, 0, -9.81]
 
 
+@pytest.mark.peers
 def test_springs_and_actuators_of_a_mujoco_file(tmp_path):
     """Where springs are slack goes by the coordinates q, which a ball has more of; actuators that are no effects keep their reason."""
     pytest.importorskip("mujoco")

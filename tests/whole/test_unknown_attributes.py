@@ -98,6 +98,7 @@ def test_a_file_without_anything_to_leave_aside_is_silent(tmp_path, recwarn):
     assert not pc.load(path).left_aside and not recwarn.list
 
 
+@pytest.mark.peers
 def test_mjcf_gravity_and_damping(tmp_path):
     pytest.importorskip("mujoco")
     path = tmp_path / "r.xml"
