@@ -25,7 +25,7 @@ SLOW = {
         item.originalname in ("test_second_derivatives", "test_along_time", "test_along_parameters")
         or (item.originalname == "test_along_every_coordinate" and item.callspec.params["name"] not in ("E", "D", "ℳ"))
     ),
-    "test_cli": lambda item: item.originalname == "test_tour",
+    "test_cli": lambda item: item.originalname in ("test_tour", "test_bench_holds_its_bounds"),
     "test_reference": lambda item: any(f"[{name}" in item.nodeid for name in ("every kind", "sequences, rotors")),
     "test_robots": lambda item: item.originalname == "test_agrees_with_the_oracle" and item.callspec.params["seed"],
     "test_prove": lambda item: item.originalname.startswith(("test_random", "test_nothing_false", "test_what_is_proved_of_perturbed")),
@@ -62,6 +62,25 @@ SLOW = {
     "test_statements": lambda item: item.originalname == "test_the_smallest_counterexample" and not item.callspec.params["rotor"],
     "test_sympy_bridge": lambda item: "random" in item.originalname,
     "test_properties": lambda item: item.originalname == "test_values_of_deeper_expressions",
+    "test_mixed_trees": lambda item: (
+        item.originalname == "test_the_catalogue"
+        and "rotors" not in item.name
+        and "one body" not in item.name
+        or item.name.endswith(("[fork within, rotors]", "[several roots, rotors]", "[coordinates apart, rotors]", "[chain, two, rotors]"))
+    ),
+    "test_packs_of_expressions": lambda item: (
+        item.originalname == "test_where_pivots_are_chosen_once"
+        and item.name.endswith(("[every kind]", "[rotors]", "[legs]", "[chain askew]"))
+    ),
+    "test_parts": lambda item: item.name.endswith(("bodies_alone[1]", "bodies_alone[2]", "bodies_alone[4]")),
+    "test_nested": lambda item: item.originalname in ("test_a_run_within_a_signals_handler", "test_a_run_within_an_operator_from_outside"),
+    "test_compiled_calls": lambda item: item.originalname in ("test_what_cannot_be_compiled", "test_a_library_is_built_once"),
+    "test_written_helpers_cpp": lambda item: item.originalname == "test_a_header_compiles_by_itself_without_a_warning",
+    "test_frames": lambda item: item.originalname == "test_jacobians_and_their_rates" and "tree" not in item.name,
+    "test_loops": lambda item: item.name.startswith("test_rows_of_hinges[1-"),
+    "test_speed": lambda item: item.originalname == "test_a_plot_is_drawn",
+    "test_judge": lambda item: item.name == "test_hard_models_are_decided[heavy_tip]",
+    "test_folders": lambda item: item.originalname == "test_a_process_that_is_killed_loses_no_finished_run",
 }
 
 
