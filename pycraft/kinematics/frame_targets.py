@@ -10,7 +10,8 @@ import numpy as np
 
 from .. import _core
 from ..dynamics.task_space import TWIST
-from .target_rows import MassCentreRows, PointingRows, PoseRows, Rows
+from ..models.limits import pin_coordinates
+from .target_rows import LoopRows, MassCentreRows, PointingRows, PoseRows, Rows
 
 WHAT = ("pose", "position", "orientation", "axis")
 KEYS = (*WHAT, "along", "wrt", "directions", "axes", "weight", "tolerance")
@@ -48,7 +49,27 @@ def rows_of(model: Any, targets: Any, centre_of_mass: Any, tolerance: Any) -> tu
     if len(set(counts.values())) > 1:
         told = ", ".join(f"{count} of {what}" for what, count in counts.items())
         raise _core.ModelError(f"targets of batches of different sizes: {told}")
-    return rows, next(iter(counts.values()), None)
+    return [*rows, *_loop_rows(model, overall)], next(iter(counts.values()), None)
+
+
+def _loop_rows(model: Any, overall: tuple[float, float]) -> list[Rows]:
+    """Every loop's rows of positions: a configuration with the loops open is none of the model's.
+
+    Angles are rows about axes, and couplings of angles alone.
+    """
+    found: list[Rows] = []
+    for loop in model.loops.values():
+        chosen = loop.slice.start + np.flatnonzero(model.loops.of_positions[loop.slice])
+        if not len(chosen):
+            continue
+        names = tuple(model.loops.rows[i] for i in chosen)
+        if loop.kind == "coupling":
+            angular = np.array([pin_coordinates(model)[model.loops.coupled(loop.name)].all()])
+        else:
+            angular = np.array([name.removeprefix(f"{loop.name}: ").startswith(("about", "between")) for name in names])
+        common = dict(name=f"loop {loop.name!r}", names=names, angular=angular, tolerance=overall, weights=np.ones(len(names)))
+        found.append(LoopRows(**common, model=model, chosen=chosen))
+    return found
 
 
 def _counts(given: dict[str, Any], name: str) -> dict[str, int]:

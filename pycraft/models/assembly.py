@@ -10,6 +10,7 @@ from .. import _core
 from ..arguments import clipped, one_number, seed_of
 from ..state import State, at_state
 from .coordinates import coordinate_numbers
+from .limits import pin_coordinates
 
 _ITERATIONS = 200
 _RANK = 1e-10  # relative: singular values below are rounding, of rows that hang on others
@@ -197,13 +198,7 @@ def branches(model: Any, q0: Any, v0: Any, fix: Any, starts: Any, seed: Any, tol
 
 def _turns(model: Any) -> np.ndarray:
     """Which coordinates are angles that may be wound by whole turns: pins in no coupling."""
-    turns = np.zeros(model.nv, bool)
-    for hinge in model.hinges.values():
-        at = hinge.v_slice.start
-        for subhinge in hinge.subhinges:
-            count = _core.subhinge_kinds[subhinge["kind"]].nv
-            turns[at : at + count] = subhinge["kind"] == "pin"
-            at += count
+    turns = pin_coordinates(model)
     for loop in model.loops.values():
         if loop.kind == "coupling":
             turns[model.loops.coupled(loop.name)] = False
