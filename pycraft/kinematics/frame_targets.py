@@ -67,8 +67,8 @@ def _loop_rows(model: Any, overall: tuple[float, float]) -> list[Rows]:
             angular = np.array([pin_coordinates(model)[model.loops.coupled(loop.name)].all()])
         else:
             angular = np.array([name.removeprefix(f"{loop.name}: ").startswith(("about", "between")) for name in names])
-        common = dict(name=f"loop {loop.name!r}", names=names, angular=angular, tolerance=overall, weights=np.ones(len(names)))
-        found.append(LoopRows(**common, model=model, chosen=chosen))
+        name, weights = f"loop {loop.name!r}", np.ones(len(names))
+        found.append(LoopRows(name, names, angular, tolerance=overall, weights=weights, model=model, chosen=chosen))
     return found
 
 
