@@ -18,6 +18,8 @@ def text(name: Any, what: str) -> str:
     """A name. ModelError where it is no text."""
     if not isinstance(name, str):
         raise _core.ModelError(f"{what} is called by a text, not by {name!r}")
+    if any("\ud800" <= c <= "\udfff" for c in name):
+        raise _core.ModelError(f"{what} is called by a text, and {name!r} has half a character, which no file holds")
     return name
 
 

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import _core
+from ..arguments import text
 from ..state import at_state
 from .prepared_states import refuse_other_states
 from .threads import over_threads
@@ -53,6 +54,7 @@ def prescribed_names(prescribed: Any) -> tuple[str, ...]:
     for name in names:
         if not isinstance(name, str):
             raise _core.ModelError(f"prescribed takes names of hinges or coordinates, or a list of them, not {name!r:.80}")
+        text(name, "what is prescribed")
     return names
 
 

@@ -10,12 +10,15 @@ import numpy as np
 
 from .. import _core
 from ..dynamics.task_space import TWIST
-from .target_rows import MassCentreRows, PointingRows, PoseRows, Rows
+from ..models.limits import pin_coordinates
+from .target_rows import LoopRows, MassCentreRows, PointingRows, PoseRows, Rows
 
 WHAT = ("pose", "position", "orientation", "axis")
 KEYS = (*WHAT, "along", "wrt", "directions", "axes", "weight", "tolerance")
 MASS_CENTRE_KEYS = ("position", "wrt", "directions", "weight", "tolerance")
 MASS_CENTRE = "centre of mass"
+LARGEST, WEIGHTS = 1e100, (1e-30, 1e30)
+"""Of numbers in targets, and of weights: the square of their product, times the largest damping, is still a double."""
 SHAPES = {"pose": (4, 4), "orientation": (3, 3), "position": (3,), "along": (3,), "axis": (3,)}
 DIGITS = 1e-6
 """How far from orthogonal the rotation of a target may be: six digits, as of the poses of a model."""
@@ -46,7 +49,27 @@ def rows_of(model: Any, targets: Any, centre_of_mass: Any, tolerance: Any) -> tu
     if len(set(counts.values())) > 1:
         told = ", ".join(f"{count} of {what}" for what, count in counts.items())
         raise _core.ModelError(f"targets of batches of different sizes: {told}")
-    return rows, next(iter(counts.values()), None)
+    return [*rows, *_loop_rows(model, overall)], next(iter(counts.values()), None)
+
+
+def _loop_rows(model: Any, overall: tuple[float, float]) -> list[Rows]:
+    """Every loop's rows of positions: a configuration with the loops open is none of the model's.
+
+    Angles are rows about axes, and couplings of angles alone.
+    """
+    found: list[Rows] = []
+    for loop in model.loops.values():
+        chosen = loop.slice.start + np.flatnonzero(model.loops.of_positions[loop.slice])
+        if not len(chosen):
+            continue
+        names = tuple(model.loops.rows[i] for i in chosen)
+        if loop.kind == "coupling":
+            angular = np.array([pin_coordinates(model)[model.loops.coupled(loop.name)].all()])
+        else:
+            angular = np.array([name.removeprefix(f"{loop.name}: ").startswith(("about", "between")) for name in names])
+        name, weights = f"loop {loop.name!r}", np.ones(len(names))
+        found.append(LoopRows(name, names, angular, tolerance=overall, weights=weights, model=model, chosen=chosen))
+    return found
 
 
 def _counts(given: dict[str, Any], name: str) -> dict[str, int]:
@@ -93,6 +116,8 @@ def _values(given: dict[str, Any], key: str, what: str) -> np.ndarray:
     if not np.isfinite(array).all():
         at = np.argwhere(~np.isfinite(array))[0].tolist()
         raise _core.ModelError(f"{key} of the {what}: entry {at} is {array[tuple(at)]}")
+    if np.abs(array).max(initial=0.0) > LARGEST:
+        raise _core.ModelError(f"{key} of the {what}: {np.abs(array).max():.0e} is beyond {LARGEST:.0e}; take other units")
     return array[None] if array.ndim == len(shape) else array
 
 
@@ -121,6 +146,8 @@ def _weights(given: dict[str, Any], angular: np.ndarray, what: str) -> np.ndarra
     pair = np.atleast_1d(_core.real_array(given.get("weight", 1.0), f"weight of the {what}")).tolist()
     if len(pair) not in (1, 2) or not all(x > 0 and np.isfinite(x) for x in pair):
         raise _core.ModelError(f"weight of the {what}: a positive number, or a pair (1/rad, 1/m), not {given['weight']!r}")
+    if not all(WEIGHTS[0] <= x <= WEIGHTS[1] for x in pair):
+        raise _core.ModelError(f"weight of the {what}: from {WEIGHTS[0]:.0e} to {WEIGHTS[1]:.0e}, not {given['weight']!r}")
     return np.where(angular, pair[0], pair[-1])
 
 

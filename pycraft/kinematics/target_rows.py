@@ -6,6 +6,7 @@ In the axes of the frame that a target is seen from, R and p the frame's rotatio
     position   x = p - p_t                          ẋ = R v
     pointing   r = (θ / sin θ) E u,  u = R a        u̇ = Rω × u               E: two rows across b; cos θ = b·u, |r| = θ
     mass       x = c - c_t
+    loop       r: the rows of its positions,         ṙ = Q v
 
 and in other axes C, which may turn with ω_C, r = C* x,  ṙ = C* (ẋ + x × ω_C).
 """
@@ -140,3 +141,15 @@ class MassCentreRows(Rows):
             dx = back @ (dx - J[:, 3:] + skew(x) @ J[:, :3])
             x = np.einsum("bij,bj->bi", back, x)
         return (x - member(self.position, of))[:, self.chosen], dx[:, self.chosen]
+
+
+@dataclass(frozen=True)
+class LoopRows(Rows):
+    """A loop of the model that is to be closed: those of its rows that are of positions, (k,) among all rows of the model's loops."""
+
+    model: Any
+    chosen: np.ndarray
+
+    def evaluate(self, q: np.ndarray, of: np.ndarray) -> Evaluated:
+        loops = self.model.loops
+        return loops.residual(q)[:, self.chosen], loops.jacobian(q)[:, self.chosen]

@@ -10,6 +10,7 @@ from .. import _core
 from ..arguments import clipped, one_number, seed_of
 from ..state import State, at_state
 from .coordinates import coordinate_numbers
+from .limits import pin_coordinates
 
 _ITERATIONS = 200
 _RANK = 1e-10  # relative: singular values below are rounding, of rows that hang on others
@@ -154,9 +155,15 @@ def _worst(rows: list[str], off: np.ndarray) -> str:
     return ", ".join(f"{off[i]:.3g} of {rows[i]!r}" for i in order)
 
 
+def _finite(model: Any, q: Any, v: Any) -> tuple[np.ndarray, np.ndarray]:
+    """q and v of one state by the core's own rules: ModelError names the hinge of what is no number."""
+    model.configuration_rate(q, v)
+    return q, v
+
+
 def assembled(model: Any, q0: Any, v0: Any, fix: Any, starts: Any, seed: Any, tolerance: Any) -> State:
     """`Multibody.assemble`."""
-    q, v = at_state(model, q0, v0)
+    q, v = _finite(model, *at_state(model, q0, v0))
     assembler, count, rng = Assembler(model, q, fix, tolerance), clipped(starts, "starts"), seed_of(seed)
     if count < 1:
         raise _core.ModelError(f"starts: how many are tried, at least 1, not {starts!r}")
@@ -172,7 +179,7 @@ def assembled(model: Any, q0: Any, v0: Any, fix: Any, starts: Any, seed: Any, to
 
 def branches(model: Any, q0: Any, v0: Any, fix: Any, starts: Any, seed: Any, tolerance: Any) -> list[State]:
     """`Multibody.assembly_branches`."""
-    q, v = at_state(model, q0, v0)
+    q, v = _finite(model, *at_state(model, q0, v0))
     assembler, rng = Assembler(model, q, fix, tolerance), seed_of(seed)
     first = assembled(model, q, v, fix, starts, rng, tolerance)
     _, Q = assembler.equations(first.q, np.flatnonzero(assembler.positions))
@@ -197,13 +204,7 @@ def branches(model: Any, q0: Any, v0: Any, fix: Any, starts: Any, seed: Any, tol
 
 def _turns(model: Any) -> np.ndarray:
     """Which coordinates are angles that may be wound by whole turns: pins in no coupling."""
-    turns = np.zeros(model.nv, bool)
-    for hinge in model.hinges.values():
-        at = hinge.v_slice.start
-        for subhinge in hinge.subhinges:
-            count = _core.subhinge_kinds[subhinge["kind"]].nv
-            turns[at : at + count] = subhinge["kind"] == "pin"
-            at += count
+    turns = pin_coordinates(model)
     for loop in model.loops.values():
         if loop.kind == "coupling":
             turns[model.loops.coupled(loop.name)] = False

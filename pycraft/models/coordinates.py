@@ -42,7 +42,7 @@ def _numbers_of(model: Any, one: Any) -> list[int]:
         names = model.coordinate_names
         if name in names:
             return [names.index(name)]
-        known = [*model.hinges, *names]
+        known = list(dict.fromkeys([*model.hinges, *names]))
         near = get_close_matches(name, known, 1)
         said = f"; the nearest is {near[0]!r}" if near else f"; there are {', '.join(known[:12])}"
         raise _core.ModelError(f"no hinge or coordinate of {model.name!r} is called {name!r}{said}")

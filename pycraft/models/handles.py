@@ -252,7 +252,7 @@ class Named(Mapping):
         if not isinstance(name, str):
             raise KeyError(f"by name, not by {name!r}")
         try:
-            self._find(name)  # raises with the names there are
+            self._find(text(name, "what is asked for"))  # raises with the names there are
         except _core.ModelError as error:
             raise KeyError(str(error)) from None
         return self._make(name)

@@ -44,6 +44,11 @@ def subhinges(model: Any) -> Iterator[Subhinge]:
             q, v = q + kind.nq, v + kind.nv
 
 
+def pin_coordinates(model: Any) -> np.ndarray:
+    """Which coordinates (nv,) are angles of pins. O(N)."""
+    return np.concatenate([np.zeros(0, bool), *(np.full(one.v.stop - one.v.start, one.kind == "pin") for one in subhinges(model))])
+
+
 def coordinate_limits(model: Any) -> CoordinateLimits:
     """The limits of a model's coordinates. O(N)."""
     lower, upper, q_index = np.full(model.nv, -np.inf), np.full(model.nv, np.inf), np.full(model.nv, -1)

@@ -72,6 +72,8 @@ def mobility(model: Any, q: Any, tolerance: Any) -> Mobility:
     """`Multibody.mobility`."""
     q = np.array(at_state(model, q)[0], float)
     tolerance = one_number(tolerance, "tolerance")
+    if not 0 < tolerance < 1:
+        raise _core.ModelError(f"tolerance: between 0 and 1, of singular values over the longest row, not {tolerance!r}")
     if q.ndim != 1:
         raise _core.ModelError(f"mobility is that of one state, not of an array {q.shape}; give its rows one by one")
     loops, rows = model.loops, model.loops.rows

@@ -279,12 +279,13 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, Planning, Structure, 
         for body in data["bodies"]:
             hinge = body["hinge"]
             model._add_body(
-                body["name"], frame(body["parent"]), hinge.get("kind", "custom"), hinge["name"], [], None, 0.0,
+                text(body["name"], "a body"), frame(body["parent"]), hinge.get("kind", "custom"), text(hinge["name"], "a hinge"),
+                [], None, 0.0,
                 [dict(s) for s in hinge["subhinges"]], hinge["placement"]["rotation"], hinge["placement"]["position"],
                 body["mass"], body["com"], body["inertia"], hinge.get("rotor_inertia"), hinge.get("lower"), hinge.get("upper"),
             )  # fmt: skip
         for node in data.get("nodes", []):
-            model._add_node(node["name"], frame(node["body"]), node["rotation"], node["position"])
+            model._add_node(text(node["name"], "a node"), frame(node["body"]), node["rotation"], node["position"])
         for loose in data.get("frames", []):
             model.frames._add_again(loose)
         for loop in data.get("loops", []):

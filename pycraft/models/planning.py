@@ -86,7 +86,8 @@ class Planning(WithOperators):
 
         Damped Gauss-Newton steps on the group with exact Jacobians, limits as bounds of every step. From q0 first; where that ends in a
         local minimum, from random configurations within limits, each descent to its end. What is reached is reached to the tolerance;
-        what is not is the best of all descents, carried on until it is stationary, and `why` says what stands in the way.
+        what is not is the best of all descents, carried on until it is stationary, and `why` says what stands in the way. Loops of the
+        model are to be closed as targets are to be reached, to the same tolerance (their rows of positions, each of weight 1).
 
         Parameters
         ----------

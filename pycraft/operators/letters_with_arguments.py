@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import _core
-from ..arguments import clipped
+from ..arguments import clipped, text
 
 if TYPE_CHECKING:
     from .operator_set import OperatorSet
@@ -95,4 +95,5 @@ def listed_names(names: str | Sequence[str]) -> list[str]:
     for name in listed:
         if not isinstance(name, str):
             raise _core.ModelError(f"nodes are called by their names, not by {name!r}")
+        text(name, "a node")
     return listed

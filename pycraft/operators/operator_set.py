@@ -11,6 +11,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from .. import _core
+from ..arguments import text
 from ..closed import Closed
 from .letters_with_arguments import NAMES, LetterWithArguments, listed_names
 
@@ -180,7 +181,7 @@ class OperatorSet(Closed):
         if not isinstance(self._source, _core.MultibodyOperators):
             raise _core.ModelError(f"coordinates of {self._source.name!r} are not prescribed: it is no multibody model of its own")
         several = [prescribed] if isinstance(prescribed, str) or not isinstance(prescribed, Iterable) else list(prescribed)
-        names = listed_names([getattr(one, "name", one) for one in several])
+        names = [text(getattr(one, "name", one), "what is prescribed") for one in several]
         return [bool(one) for one in _core.prescribed_by(self._source.model, names)]
 
     def check(self, **options: Any):

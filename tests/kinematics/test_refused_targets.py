@@ -38,6 +38,13 @@ CASES = {
     "unknown axes": (dict(targets={"tip": dict(pose=X, axes="boby0")}), "the nearest is 'body0'"),
     "an unknown wrt": (dict(targets={"tip": dict(pose=X, wrt="elbow")}), "'elbow'"),
     "a weight": (dict(targets={"tip": dict(pose=X, weight=0)}), "weight of the target of 'tip': a positive number"),
+    "a number whose square is none": (dict(targets={"tip": (1e160, 0, 0)}), "position of the target of 'tip': 1e\\+160 is beyond 1e\\+100"),
+    "an axis whose square is none": (
+        dict(targets={"tip": dict(axis=(1e300, 0, 0), along=(0, 1, 0))}),
+        "axis of the target of 'tip': 1e\\+300 is beyond",
+    ),
+    "a weight whose square is none": (dict(targets={"tip": dict(position=X[:3, 3], weight=1e200)}), "weight of the target of 'tip': from"),
+    "a weight that is nothing": (dict(targets={"tip": dict(position=X[:3, 3], weight=1e-200)}), "weight of the target of 'tip': from"),
     "three weights": (dict(targets={"tip": dict(pose=X, weight=(1, 2, 3))}), "weight of the target of 'tip': a positive number"),
     "a tolerance": (dict(targets={"tip": X}, tolerance=-1), "tolerance: a positive number for rad and m"),
     "a target's tolerance": (dict(targets={"tip": dict(pose=X, tolerance=(1, np.nan))}), "tolerance of the target of 'tip'"),

@@ -322,3 +322,18 @@ def test_mobility_off_the_loops_is_refused():
         model.mobility([0.0, 0.0, 0.0])
     with pytest.raises(pc.ModelError, match=r"mobility is that of one state, not of an array \(2, 3\)"):
         model.mobility(np.zeros((2, 3)))
+
+
+@pytest.mark.parametrize("call", ["assemble", "assembly_branches"])
+def test_velocities_that_are_no_numbers(call):
+    arm = pc.chain(3)
+    arm.add_node("tip", "body2", position=(1, 0, 0))
+    arm.add_loop("tip", None, "pin", axis=(0, 0, 1), position=(2, 0, 0))
+    with pytest.raises(pc.ModelError, match="v of hinge 'hinge1': entry 0 is nan"):
+        getattr(arm, call)([0.5, -0.8, 0.4], [0, np.nan, 0], fix=["hinge0"])
+
+
+@pytest.mark.parametrize("tolerance", [np.nan, -1.0, 0.0, 1.0])
+def test_the_tolerance_of_mobility(tolerance):
+    with pytest.raises(pc.ModelError, match="tolerance: between 0 and 1"):
+        pc.chain(2).mobility(tolerance=tolerance)

@@ -118,7 +118,7 @@ class _Reader:
         return conventions.from_mujoco(model, self.m.qpos0, np.zeros(self.m.nv))
 
     def _add_sites(self, model: Multibody) -> None:
-        m, frames = self.m, set(self.bodies)
+        m, frames = self.m, set(self.bodies[1:])
         for s in range(m.nsite):
             if not (name := m.site(s).name):
                 continue  # nothing could refer to it

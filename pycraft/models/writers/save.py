@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import shutil
+import tempfile
 from pathlib import PurePath
 from typing import TYPE_CHECKING
 
@@ -48,11 +50,31 @@ def path_text(path: str | os.PathLike[str], what: str) -> str:
 
 
 def write_text(shown: str, text: str) -> None:
-    """Write a file, which is replaced where it is there. ModelError where it cannot be written."""
+    """Write a file, which is replaced where it is there, whole or not at all. ModelError where it cannot be written."""
     try:
-        with open(shown, "w", encoding="utf-8", newline="\n") as file:
-            file.write(text)
+        content, path = text.encode("utf-8"), os.path.realpath(shown)  # a symbolic link stays one
+        new = not os.path.exists(path)
+        beside = (new or os.path.isfile(path)) and os.access(os.path.dirname(path), os.W_OK)
+        with open(path, "ab" if beside else "wb") as file:  # what may not be written is not replaced either
+            if not beside:  # a pipe, a device, or a folder that takes no file
+                file.write(content)
+        if beside:
+            _replace(path, content, new)
     except OSError as error:
         raise _core.ModelError(f"{shown}: cannot be written: {error.strerror or error}") from None
-    except ValueError as error:  # a NUL in the path
+    except ValueError as error:  # a NUL in the path, half a character in the text
         raise _core.ModelError(f"{shown!r}: cannot be written: {error}") from None
+
+
+def _replace(path: str, content: bytes, new: bool) -> None:
+    """By a file beside it that takes its place once it is written, with its permissions; a new one that fails is taken away."""
+    number, beside = tempfile.mkstemp(dir=os.path.dirname(path), prefix=".saving-")
+    try:
+        with os.fdopen(number, "wb") as file:
+            file.write(content)
+        shutil.copymode(path, beside)
+        os.replace(beside, path)
+    except BaseException:
+        for left in (beside, path) if new else (beside,):
+            os.unlink(left)
+        raise
