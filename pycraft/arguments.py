@@ -48,6 +48,14 @@ def one_number(value: Any, what: str) -> float:
     return float(number)
 
 
+def moment(t: Any) -> float:
+    """A time, s. EvaluationError where it is not finite."""
+    number = one_number(t, "t")
+    if not np.isfinite(number):
+        raise _core.EvaluationError(f"t is {number:g}; a time is a finite number of seconds")
+    return number
+
+
 def clipped(value: Any, what: str) -> int:
     """A whole number, the nearest one that the core's integers hold: it says what is wrong with one that is too large."""
     return max(-LARGEST, min(whole(value, what), LARGEST))

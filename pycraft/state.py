@@ -36,6 +36,15 @@ def at_state(model: Any, q: Any = None, v: Any = None) -> tuple[Any, Any]:
     return q, np.zeros(model.nv) if v is None else getattr(v, "v", v)
 
 
+def names_of_q(model: Any) -> list[str]:
+    """Of the numbers of q: those of hinges, numbered where these have several."""
+    names: list[str] = []
+    for name, hinge in model.hinges.items():
+        count = hinge.q_slice.stop - hinge.q_slice.start
+        names += [name] if count == 1 else [f"{name}[{i}]" for i in range(count)]
+    return names
+
+
 def random_state(model: _core.Multibody, seed: int | np.random.Generator = 0) -> State:
     """A random state of `model`, the same for the same seed.
 

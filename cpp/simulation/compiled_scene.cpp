@@ -236,13 +236,15 @@ void CompiledScene<S>::set_step(const S& h) {
 template <class S>
 void CompiledScene<S>::give_impulses(const S& t, const S* q, S* v, const S* own, S* gained) {
   std::fill_n(gained, forces_.workers().size(), S(0));
-  for (const Impulsive& each : impulsive_) {
+  for (size_t place = 0; place < impulsive_.size(); ++place) {
+    const Impulsive& each = impulsive_[place];
     const Active<S>& e = *each.effect;
     const double T = e.declared.impulse_period, before = std::round(to_double(t) / T - 0.5);
     if (!(std::abs(to_double(t) - (before + 0.5) * T) < 1e-9 * T)) continue;
     std::fill(work_.begin(), work_.end(), S(0));
     forces_.start(t, q, v, own);
-    forces_.impulses(*each.effect, static_cast<std::uint64_t>(before), work_.data());
+    // No number is that of another effect: their noise is independent where their seeds are the same, too.
+    forces_.impulses(*each.effect, static_cast<std::uint64_t>(static_cast<std::int64_t>(before)) ^ (static_cast<std::uint64_t>(place) << 54), work_.data());
     for (int j : prescribed_) work_[j] = S(0);
     each.solver->run(q, nullptr, work_.data(), nullptr, change_.data());
     for (const auto& other : forces_.effects())  // impulses that keep what is prescribed as it is

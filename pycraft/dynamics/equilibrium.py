@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import _core
+from ..arguments import one_number
 from .displacements import brackets, turning
 
 INDIFFERENT = 1e-9
@@ -73,13 +74,25 @@ class Balance(NamedTuple):
     mass: np.ndarray
     size: float
 
+    @property
+    def sizes(self) -> np.ndarray:
+        """Of what balances at each coordinate, (nv,): `size`, or what a radian or metre changes there: stiff springs count at their own."""
+        return np.maximum(self.size, np.abs(self.along_q).max(axis=1, initial=0.0))
+
+
+def checked_tolerance(tolerance: Any) -> float:
+    """What may be left of forces, as a number. EvaluationError where it is no part of them."""
+    number = one_number(tolerance, "tolerance")
+    if not 0 < number < 1:
+        raise _core.EvaluationError(f"tolerance={number}: what may be left, as a part of the largest force, between 0 and 1")
+    return number
+
 
 def solved(
-    model: Any, at: Callable[[np.ndarray], Balance], q0: np.ndarray, held: Iterable[int], limits: bool, stable: bool, tolerance: float
+    model: Any, at: Callable[[np.ndarray], Balance], q0: np.ndarray, held: Iterable[int], limits: bool, stable: bool, tolerance: Any
 ) -> Equilibrium:  # fmt: skip
     """The equilibrium that is found from q0, of forces at rest as `at` has them. EvaluationError where there is none."""
-    if not 0 < tolerance < 1:
-        raise _core.EvaluationError(f"tolerance={tolerance}: what may be left, as a part of the largest force, between 0 and 1")
+    tolerance = checked_tolerance(tolerance)
     free = np.setdiff1d(np.arange(model.nv), list(held))
     search = _Search(model, at, np.array(q0, float), free, limits)
     if not stable:
@@ -120,6 +133,11 @@ class _Search:
         """All of x, and q there."""
         whole = np.zeros(self.model.nv)
         whole[self.free] = x
+        if not np.isfinite(whole).all():
+            raise _core.EvaluationError(
+                f"{self.model.name!r}: the search for an equilibrium leaves the range of numbers at "
+                f"{self.model.coordinate_names[np.argmin(np.isfinite(whole))]!r}: take other units, or start elsewhere (q0=)"
+            )
         return whole, self.model.integrate(self.q, whole)
 
     def left(self, x: np.ndarray) -> np.ndarray:
@@ -163,8 +181,8 @@ class _Search:
 
     def take(self, x: np.ndarray) -> None:
         """Go on from there: only where less is left."""
-        whole, q = self.moved(x)
-        if np.isfinite(whole).all() and self.size_of(q) <= self.size_of(self.q):
+        _, q = self.moved(x)
+        if self.size_of(q) <= self.size_of(self.q):
             self.q = q
 
     def size_of(self, q: np.ndarray) -> float:
@@ -184,7 +202,7 @@ class _Search:
 
     def balanced(self, tolerance: float) -> bool:
         now = self.at(self.q)
-        return bool(np.abs(now.left[self.free]).max(initial=0.0) <= tolerance * now.size)
+        return bool((np.abs(now.left) <= tolerance * now.sizes)[self.free].all())
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Of x: what is left to the limits of hinges, infinite where there are none or they are not asked for."""
@@ -228,7 +246,7 @@ class _Search:
                     "no potential it may go round; start elsewhere (q0=), or take what there is (stable=False)"
                 )
             now = self.at(self.moved(x)[1])
-            return float(np.abs(now.left[self.free]).max()) - 1e-6 * now.size
+            return float((np.abs(now.left) - 1e-6 * now.sizes)[self.free].max())
 
         def gone(_: float, x: np.ndarray) -> float:
             return float(FAR - np.abs(x).max())

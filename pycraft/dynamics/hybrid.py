@@ -162,12 +162,13 @@ class HybridCalls:
 
         Along q they are along quasi-velocities, as everywhere. O(N · depth + nv³), the last by a Cholesky factor of ℳ_ff.
         """
+        prescribed = prescribed_names(prescribed)  # once, as what is listed may be gone then
         motion = self.hybrid_dynamics(
             q, v, tau, vdot, prescribed, form=form, refine=refine, residual=residual, precision=precision, threads=threads
         )
         q, v = at_state(self, q, v)
         T_q, T_v, mass = self.inverse_dynamics_derivatives(q, v, motion.vdot, precision=precision)
-        return _derivatives(T_q, T_v, mass, np.array(hybrid_of(self, prescribed).prescribed))
+        return _derivatives(T_q, T_v, mass, np.array(hybrid_of(self, prescribed).prescribed, bool))
 
 
 def _derivatives(T_q: np.ndarray, T_v: np.ndarray, mass: np.ndarray, held: np.ndarray) -> HybridDerivatives:

@@ -85,9 +85,10 @@ class Identification:
     def predict(self, q: Any = None, v: Any = None, vdot: Any = None) -> np.ndarray:
         """T (nv,) or (B, nv) of the fit: inverse dynamics with its parameters, and its friction. O(N · depth)."""
         q, v = at_state(self.model, q, v)
-        vdot = np.zeros(self.model.nv) if vdot is None else np.asarray(vdot, float)
+        given = (("v", v), ("vdot", np.zeros(self.model.nv) if vdot is None else vdot))
+        v, vdot = (np.asarray(_core.real_array(x, name), float) for name, x in given)
         forces = self.model.inertial_regressor(q, v, vdot) @ self.parameters
-        return forces + self.rotor_inertia * vdot + self.viscous * np.asarray(v, float) + self.coulomb * np.sign(v)
+        return forces + self.rotor_inertia * vdot + self.viscous * v + self.coulomb * np.sign(v)
 
     def apply(self) -> Any:
         """Gives the model these bodies and rotors; returns it. Friction is an effect's: `pc.effects.Damping(found.viscous)`.
@@ -167,7 +168,7 @@ class IdentificationCalls:
         ModelError
             Sizes, names, numbers that are not finite (with the row and the coordinate).
         EvaluationError
-            A log that does not excite a combination, which is named.
+            A log that does not excite a combination, which is named; numbers whose squares are beyond the range of doubles.
         ImportError
             The semidefinite program is needed, and clarabel is missing (extra [identify]).
 
@@ -193,8 +194,11 @@ class IdentificationCalls:
         base = unknown.base(model)
         weights = np.ones(model.nv) if deviations is None else 1.0 / deviations
         rows = unknown.rows(model, q, v, vdot)
-        b = (tau - unknown.known(model, q, v, vdot)) * weights
-        found = least_squares((rows * weights[:, None])[:, :, base.columns].reshape(b.size, len(base.columns)), b.ravel())
+        with np.errstate(over="ignore"):  # which is refused
+            b = (tau - unknown.known(model, q, v, vdot)) * weights
+            equations = (rows * weights[:, None])[:, :, base.columns].reshape(b.size, len(base.columns))
+            _refuse_beyond_range(model, equations, b)
+        found = least_squares(equations, b.ravel())
         _refuse_unexcited(model, unknown, base, found, len(q))
         sigma = np.sqrt(found.left) if deviations is None else 1.0
         prior = unknown.prior(model)
@@ -343,6 +347,16 @@ def _written(row: np.ndarray, names: list[str], most: int = 0) -> str:
         parts = [*parts[:most], "..."]
     written = " ".join(parts)
     return written.removeprefix("+ ")
+
+
+def _refuse_beyond_range(model: Any, *given: np.ndarray) -> None:
+    for x in given:
+        squares = float((x**2).sum())
+        if not np.isfinite(squares) or (squares == 0 and x.any()):
+            raise _core.EvaluationError(
+                f"identify: squares of the log of {model.name!r} are beyond the range of numbers, of forces over their noise or of what "
+                f"parameters make of motion (the largest is {np.abs(x).max():.3g}): take other units"
+            )
 
 
 def _refuse_unexcited(model: Any, unknown: _Unknowns, base: Base, found: LeastSquares, count: int) -> None:

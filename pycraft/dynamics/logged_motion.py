@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from .. import _core
 from ..arguments import listed
-from ..state import at_state
+from ..state import at_state, names_of_q
 
 
 def logged_motion(model: Any, q: Any, v: Any, vdot: Any, tau: Any) -> tuple[np.ndarray, ...]:
@@ -29,7 +30,7 @@ def logged_motion(model: Any, q: Any, v: Any, vdot: Any, tau: Any) -> tuple[np.n
         bad = np.argwhere(~np.isfinite(x))
         if len(bad):
             row, column = bad[0]
-            of = model.coordinate_names[column] if name != "q" else f"q[{column}]"
+            of = (names_of_q(model) if name == "q" else model.coordinate_names)[column]
             raise _core.ModelError(
                 f"identify: row {row} of {name} is {x[row, column]} at {of!r}; leave such rows out ({len(set(bad[:, 0]))} of {len(x)})"
             )
@@ -53,15 +54,14 @@ def _of_effects(forces: Any, names: Any) -> list[np.ndarray]:
 
 
 def _of_table(model: Any, table: Any, names: Any) -> tuple[np.ndarray, ...]:
-    """Columns by coordinate: q in the order of the table."""
+    """Columns by coordinate, in whatever order the table has them."""
     columns = [str(name) for name in table.columns]
 
-    def by_name(start: str) -> np.ndarray:
-        wanted = [f"{start}.{name}" for name in model.coordinate_names]
+    def by_name(start: str, of: Sequence[str] = model.coordinate_names) -> np.ndarray:
+        wanted = [f"{start}.{name}" for name in of]
         if missing := [name for name in wanted if name not in columns]:
             raise _core.ModelError(f"identify: the table has no column {missing[0]!r}")
-        return np.asarray(table[wanted], float)
+        return np.column_stack([_core.real_array(table[name], name) for name in wanted]) if wanted else np.zeros((len(table), 0))
 
     starts = ["tau"] if names is None else [f"force.{name}" for name in ([names] if isinstance(names, str) else listed(names, "tau"))]
-    q = np.asarray(table[[name for name in table.columns if str(name).startswith("q.")]], float)
-    return q, by_name("v"), by_name("vdot"), sum(map(by_name, starts), np.zeros(()))
+    return by_name("q", names_of_q(model)), by_name("v"), by_name("vdot"), sum(map(by_name, starts), np.zeros(()))

@@ -8,9 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import _core
-from ..arguments import one_number
 from ..state import at_state
-from .equilibrium import TOLERANCE, Balance, Equilibrium, solved
+from .equilibrium import TOLERANCE, Balance, Equilibrium, checked_tolerance, solved
 from .interbody import pushed
 from .linearization import listed
 
@@ -99,7 +98,7 @@ class StaticsCalls:
             def at(q: np.ndarray) -> Balance:
                 return _at_rest(model, q, force, names, in_world, pushes, size)
 
-            return solved(model, at, q, held, bool(limits), bool(stable), one_number(tolerance, "tolerance"))
+            return solved(model, at, q, held, bool(limits), bool(stable), tolerance)
 
         if not states:
             return one(starts, given, numbers)
@@ -120,7 +119,7 @@ class StaticsCalls:
             A force at one coordinate balances no other, so that what the others need is left.
         tolerance : what may be left, as a part of the largest force
 
-        Raises ModelError for names that are not there, and as `interbody_forces`.
+        Raises ModelError for names that are not there, EvaluationError for a tolerance that is none, and as `interbody_forces`.
 
         Examples
         --------
@@ -140,8 +139,10 @@ class StaticsCalls:
         chosen = None if actuated is None else listed(actuated, "actuated")
         driven[_core.coordinates_named(model, chosen, "actuated") if chosen is not None else slice(None)] = True
         left = np.where(driven, 0.0, needed)
-        size = np.abs(f).max(initial=0.0, axis=(-2, -1))[..., None]
-        beyond = np.abs(left) > tolerance * size
+        weight = model.mass * float(np.linalg.norm(model.gravity))  # what balances, where hinges carry nothing
+        pushes = np.abs(numbers).max(initial=0.0, axis=(-2, -1))
+        size = np.maximum(np.abs(f).max(initial=0.0, axis=(-2, -1)), np.maximum(weight, pushes))[..., None]
+        beyond = np.abs(left) > checked_tolerance(tolerance) * size
         beyond = beyond.any(axis=tuple(range(beyond.ndim - 1)))
         return Counterbalance(np.where(driven, needed, 0.0), left, tuple(model.coordinate_names[j] for j in np.flatnonzero(beyond)))
 
@@ -155,5 +156,4 @@ def _at_rest(
         along_q, mass = model._interbody().derivatives(q, still, still, names, in_world, wrenches, True)[1][0], model.mass_matrix(q)
     else:
         needed, (along_q, _, mass) = model.inverse_dynamics(q, still, still), model.inverse_dynamics_derivatives(q, still, still)
-    size = max(size, np.abs(needed).max(initial=0.0), np.abs(along_q).max(initial=0.0))
-    return Balance(tau - needed, -along_q, mass, size)
+    return Balance(tau - needed, -along_q, mass, max(size, np.abs(needed).max(initial=0.0)))

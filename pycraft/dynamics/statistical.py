@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..arguments import LARGEST, clipped, one_number
+from ..arguments import LARGEST, clipped, one_number, seed_of
 from ..state import at_state
 
 
@@ -18,7 +18,10 @@ def energy_of(temperature: Any, boltzmann: Any) -> float:
     for name, x in zip(("temperature", "boltzmann"), numbers, strict=True):
         if not 0 <= x < np.inf:
             raise _core.EvaluationError(f"{name}={x:g}: it is a finite number, not negative")
-    return numbers[0] * numbers[1]
+    kT = numbers[0] * numbers[1]
+    if not np.isfinite(kT):
+        raise _core.EvaluationError(f"temperature={numbers[0]:g} by boltzmann={numbers[1]:g} is {kT:g} J: take other units")
+    return kT
 
 
 class StatisticalCalls:
@@ -51,6 +54,8 @@ class StatisticalCalls:
             A hinge that feels no inertia.
         EvaluationError
             A temperature that is negative or not finite.
+        ModelError
+            q of another size or not finite; a seed that is none.
 
         Source: innovations factorization of ℳ⁻¹ [Jain 2011]; A. Jain, I.-H. Park, N. Vaidehi, Equipartition principle for internal
         coordinate molecular dynamics, J. Chem. Theory Comput. 8 (2012).
@@ -65,9 +70,9 @@ class StatisticalCalls:
         """
         model: Any = self
         size = np.sqrt(energy_of(temperature, boltzmann))
-        draws = np.random.default_rng(rng)
+        draws = np.random.default_rng() if rng is None else seed_of(rng)
         q = at_state(model, q)[0]
-        q = np.asarray(getattr(q, "q", q), float)
+        q = np.asarray(_core.real_array(getattr(q, "q", q), "q"), float)
         H, K, psi, D, I = model.soa("H K psi D I")
         factor = (I - H @ psi @ K).T @ D.sqrt().inv().T
         if q.ndim == 2:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import functools
 import inspect
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
@@ -31,6 +31,9 @@ def over_threads(method: F) -> F:
         count = thread_count(threads)
         if count == 1:  # nothing to look at
             return method(self, *given, **options)
+        # What can be gone through once alone, every thread goes through.
+        given = tuple(list(x) if isinstance(x, Iterator) else x for x in given)
+        options = {name: list(x) if isinstance(x, Iterator) else x for name, x in options.items()}
         bound = functools.partial(method, self)
         return shared_out(bound, names, given, options, count, functools.partial(bound, *given, **options, threads=count))
 

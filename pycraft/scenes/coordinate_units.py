@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from .. import _core
+from ..state import names_of_q
 
 POWER = {"rad": "N m", "m": "N"}
 """Units of a generalized force, by the coordinate's."""
@@ -12,12 +13,9 @@ POWER = {"rad": "N m", "m": "N"}
 
 def coordinate_units(model: Any) -> tuple[list[str], list[str], list[str]]:
     """Names of the numbers of q, their units ("" of quaternions), and the units of the coordinates of v ("rad" or "m", a second less)."""
-    names: list[str] = []
     of_q: list[str] = []
     of_v: list[str] = []
-    for name, hinge in model.hinges.items():
-        count = hinge.q_slice.stop - hinge.q_slice.start
-        names += [name] if count == 1 else [f"{name}[{i}]" for i in range(count)]
+    for hinge in model.hinges.values():
         for subhinge in hinge.subhinges:
             kind = _core.subhinge_kinds[subhinge["kind"]]
             if kind.nq == 1:
@@ -26,4 +24,4 @@ def coordinate_units(model: Any) -> tuple[list[str], list[str], list[str]]:
             else:
                 of_q += [""] * 4 + ["m"] * (kind.nq - 4)
                 of_v += ["rad"] * 3 + ["m"] * (kind.nv - 3)
-    return names, of_q, of_v
+    return names_of_q(model), of_q, of_v

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..arguments import one_number, text
+from ..arguments import moment, one_number, text
 from ..closed import Closed
 from ..models.grafting import Grafting
 from ..state import at_state
@@ -228,14 +228,14 @@ class Scene(Measurements, Statics, Filed, Closed):
         ModelError
             q or v of another size, not finite.
         EvaluationError
-            An effect whose forces are not finite, by name, with the time.
+            An effect whose forces are not finite, by name, with the time; a time that is not.
         SingularHingeError
             As forward dynamics.
         """
         resting = v is None and q is not None and not hasattr(q, "v")
         q, v = at_state(self._model, q, v)
         own = [] if states is None else np.asarray(_core.real_array(states, "states")).tolist()
-        found = self._calls().evaluate(q, None if resting else v, one_number(t, "t"), own, one_number(step, "step"))
+        found = self._calls().evaluate(q, None if resting else v, moment(t), own, one_number(step, "step"))
         return Evaluation(found["vdot"], found["forces"], found["passes"])
 
     def simulate(

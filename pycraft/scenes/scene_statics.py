@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..arguments import one_number
+from ..arguments import moment
 from ..dynamics.equilibrium import TOLERANCE, Balance, Equilibrium, solved
 from ..dynamics.interbody import forces_of_scene
 from ..dynamics.linearization import listed
@@ -29,13 +29,13 @@ class Statics:
         Parameters
         ----------
         hinges : a name or `Hinge`, or a list of them; None: all, in the model's order
-        q, v : (nq,), (nv,), by the rule of direct calls
+        q, v : (nq,), (nv,), each with an optional leading batch axis, by the rule of direct calls
         t, states : as in `evaluate`
         axes, about, part : as in `Multibody.interbody_forces`; frames that a function moves are where they are at t
 
         Returns
         -------
-        (N, 6); of one hinge (6,). Along a run: `Run.interbody_forces`.
+        (N, 6) or (B, N, 6); of one hinge (6,) or (B, 6). Along a run: `Run.interbody_forces`.
 
         Raises what `evaluate` and `Multibody.interbody_forces` raise.
 
@@ -48,10 +48,17 @@ class Statics:
         """
         q, v = (np.asarray(_core.real_array(x, name), float) for x, name in zip(at_state(self.model, q, v), "qv", strict=True))
         for x, name, width in ((q, "q", self.model.nq), (v, "v", self.model.nv)):
-            if x.shape != (width,):
-                raise _core.ModelError(f"{name} of {self.model.name!r} takes {width} numbers here, not an array {x.shape}")
-        time, own = np.array([one_number(t, "t")]), np.zeros(0) if states is None else np.atleast_1d(_core.real_array(states, "states"))
-        return forces_of_scene(self._calls(), self.model, time, q[None], v[None], own, hinges, axes, about, part)[0]
+            if x.ndim not in (1, 2) or x.shape[-1] != width:
+                raise _core.ModelError(
+                    f"{name} of {self.model.name!r} takes {width} numbers, or (B, {width}) for a batch, not an array {x.shape}"
+                )
+        own = np.zeros(0) if states is None else np.atleast_1d(_core.real_array(states, "states"))
+        many = sorted({len(x) for x in (q, v, own) if x.ndim == 2})
+        if len(many) > 1 or own.ndim > 2:
+            raise _core.ModelError(f"batches of q {q.shape}, v {v.shape} and states {own.shape} in one call")
+        time, q, v, own = (np.broadcast_to(x, (*(many or [1]), x.shape[-1])) for x in (np.array([moment(t)]), q, v, own))
+        f = forces_of_scene(self._calls(), self.model, time[:, 0], q, v, own, hinges, axes, about, part)
+        return f if many else f[0]
 
     def equilibrium(
         self, q0: Any = None, t: float = 0.0, *, states: Any = None, hold: Any = (), limits: bool = False, stable: bool = False,
@@ -82,21 +89,19 @@ class Statics:
         >>> bool(abs(100 * found.q[0] + 5 * np.cos(found.q[0])) < 1e-12), found.stability
         (True, 'stable')
         """
-        calls, time = self._calls(), one_number(t, "t")
+        calls, time = self._calls(), moment(t)
         own = [] if states is None else np.atleast_1d(_core.real_array(states, "states")).ravel().tolist()
         held = _core.coordinates_named(self.model, listed(hold, "hold"), "hold")
         starts = np.asarray(_core.real_array(at_state(self.model, q0)[0], "q"), float)
-        margin = one_number(tolerance, "tolerance")
 
         def at(q: np.ndarray) -> Balance:
             found = _core.scene_at_rest(calls, q, time, own)
-            size = max(found["size"], np.abs(found["along_q"]).max(initial=0.0))
-            return Balance(found["residual"], found["along_q"], found["mass"], size)
+            return Balance(found["residual"], found["along_q"], found["mass"], found["size"])
 
         def one(q: np.ndarray) -> Equilibrium:
             placed = _core.scene_at_rest(calls, q, time, own)  # with prescribed coordinates where they are at t
             fixed = {*held, *np.flatnonzero(placed["known"])}
-            return solved(self.model, at, placed["q"], fixed, bool(limits), bool(stable), margin)
+            return solved(self.model, at, placed["q"], fixed, bool(limits), bool(stable), tolerance)
 
         if starts.ndim > 2:
             raise _core.ModelError(

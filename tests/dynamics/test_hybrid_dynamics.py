@@ -221,6 +221,22 @@ def test_derivatives_at_the_extremes_and_of_batches():
 # Operators ------------------------------------------------------------------------------------------------------------
 
 
+def test_names_that_are_listed_once_and_models_without_coordinates():
+    arm, rng = pc.chain(3), np.random.default_rng(2)
+    q, v, tau, vdot = rng.normal(size=(4, 8, 3))
+    for x, y in zip(
+        arm.hybrid_dynamics_derivatives(q, v, tau, vdot, iter(["hinge0"])), arm.hybrid_dynamics_derivatives(q, v, tau, vdot, "hinge0"),
+        strict=True,
+    ):  # fmt: skip
+        assert np.array_equal(x, y)
+    shared = arm.hybrid_dynamics(q, v, tau, vdot, iter(["hinge0"]), threads=2)
+    assert np.array_equal(shared.tau, arm.hybrid_dynamics(q, v, tau, vdot, "hinge0").tau)
+    post = pc.Multibody("post", welds="keep")
+    post.add_body("post", hinge="weld", mass=1.0)
+    for model in (pc.Multibody("nothing"), post):
+        assert {x.shape for x in model.hybrid_dynamics_derivatives()} == {(0, 0)}
+
+
 @pytest.mark.parametrize("name", ["panda", "tree of ball", "tree of universal"])
 def test_operators(name):
     model = MODELS[name]

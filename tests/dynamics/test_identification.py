@@ -292,6 +292,11 @@ def test_of_runs_and_their_tables():
     of_run, of_table = model.identify(run, tau=measured), model.identify(table, tau=measured)
     for name in ("parameters", "residuals"):
         assert np.array_equal(getattr(of_run, name), getattr(of_table, name))
+    assert np.array_equal(model.identify(table[table.columns[::-1]], tau=measured).parameters, of_table.parameters)  # in any order
+    with pytest.raises(pc.ModelError, match="the table has no column 'q.lower'"):
+        model.identify(table.drop(columns="q.lower"), tau=measured)
+    with pytest.raises(pc.ModelError, match="v.upper is not an array of numbers"):
+        model.identify(table.astype({"v.upper": object}).replace({"v.upper": {0.0: "fast"}}), tau=measured)
     first = next(iter(model.bodies.values()))
     first.mass *= 1.4
     again = model.identify(table, tau=measured)
@@ -360,6 +365,12 @@ def test_refusals():
     ]:
         with pytest.raises(pc.ModelError, match=message):
             arm.identify(q, v, vdot, tau, **options)
+    found = arm.identify(q, v, vdot, tau)
+    with pytest.raises(pc.ModelError, match="vdot is not an array of numbers"):
+        found.predict(q[0], v[0], "fast")
+    for large in ((q, v, vdot, 1e200 * tau), (q, v, vdot, 1e-200 * tau), (q, v, 1e200 * vdot, tau)):
+        with pytest.raises(pc.EvaluationError, match="squares of the log of 'chain of 2 rods' are beyond the range of numbers"):
+            arm.identify(*large)
     for options, message in [
         (dict(regularizer="entropy"), "regularizer='entropy': there are 'metric' and 'frobenius'"),
         (dict(regularization=0.0), "regularization=0: it is a positive number"),

@@ -257,6 +257,25 @@ def test_parts_carry_what_the_whole_does():
     close(own, mb.interbody_forces(state, vdot=vdot, hinges=["hinge3", "hinge4"]))
 
 
+def test_closed_loops_by_their_multipliers():
+    """A four-bar that moves: with the closing pin's force nothing drives the hinges, and the ground gives what the whole gains."""
+    bars = pc.chain(3)
+    bars.gravity = (0.5, -9.81, 0)
+    bars.add_loop("body2", hinge="pin", point=(1, 0, 0), position=(0.3, 0, 0))
+    bars.add_node("end", "body2", position=(1, 0, 0))
+    state = bars.assemble([1.0, -1.4, -1.5], [1.0, 0, 0], fix="hinge0")
+    Q, inverse = bars.loops.jacobian(state), bars.mass_matrix_inverse(state.q)
+    free = bars.forward_dynamics(state, tau=np.zeros(3))
+    rows = np.linalg.lstsq(Q @ inverse @ Q.T, -(Q @ free + bars.loops.bias(state)), rcond=1e-10)[0]
+    vdot, end = free + inverse @ Q.T @ rows, {"end": np.r_[0, 0, 0, rows[2:]]}
+    f = bars.interbody_forces(state, vdot=vdot, wrenches=end)
+    close(bars.soa.H.at(state.q).dense() @ f.ravel(), np.zeros(3), 1e-11 * np.abs(f).max())
+    ground = bars.base_reaction(state, vdot=vdot, wrenches=end)[3:] + rows[2:]
+    momentum = lambda h: bars.mass * bars.centre_of_mass_jacobian(state.q + h * state.v) @ (state.v + h * vdot)
+    close(ground + bars.mass * np.array(bars.gravity), difference(momentum), DIFFERENCE)
+    assert np.abs(rows[2:4]).min() > 1 and np.abs(state.v).min() > 0.1
+
+
 def test_refusals():
     mb = pc.chain(2)
     refused = [

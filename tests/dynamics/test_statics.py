@@ -60,6 +60,16 @@ def test_what_counts_as_balanced_follows_the_size_of_forces():
             model.equilibrium([size * G], [-1.0])
 
 
+def test_a_stiff_spring_excuses_no_other_coordinate():
+    """Half a newton that nothing balances beside 10¹⁰ N/m."""
+    model = pc.Multibody("two ways")
+    model.add_body("a", hinge="slider", axis=(1, 0, 0), mass=1.0)
+    model.add_body("b", hinge="slider", axis=(0, 1, 0), mass=1.0)
+    scene = pc.Scene(model).add(E.Spring(1e10, hinges="a"), E.Wrench("b", (0, 0, 0, 0, 0.5, 0)))
+    with pytest.raises(pc.EvaluationError, match="there is left .* at 'b' 0.5"):
+        scene.equilibrium([0.1, 0.0])
+
+
 def test_flutter():
     """Ziegler's column, a force that follows the last rod, on springs: a complex pair at a load at which real parts are positive."""
     model = chain(2)
@@ -340,6 +350,16 @@ def test_counterbalance_of_some():
     close(pushed.tau, whole.tau - model.jacobian("body2", q, axes="aligned").T @ (0, 0, 1, 0, 5, 0))
 
 
+def test_weights_that_are_carried_leave_rounding_alone():
+    tree = pc.tree([-1, 0, 1], ["pin", "pin", "slider"], seed=3)
+    tree.gravity, q, lifts = (0.1, 2, -G), tree.random_state(1).q, {}
+    for name, body in tree.bodies.items():
+        lift = -body.mass * np.array(tree.gravity)
+        lifts[name] = np.r_[np.cross(tree.pose(name, q)[:3, :3] @ body.com, lift), lift]
+    carried = tree.counterbalance(q, wrenches=lifts, actuated=[])
+    assert carried.unbalanced == () and 0 < np.abs(carried.residual).max() < 1e-14
+
+
 def test_refusals():
     model = pc.tree([-1, 0], ["free", "pin"], seed=1)
     model.gravity = (0, 0, -G)
@@ -368,6 +388,12 @@ def test_refusals():
     for tolerance in (0.0, -1.0, np.nan, np.inf):
         with pytest.raises(pc.EvaluationError, match="tolerance="):
             chain(1).equilibrium(q0=[-1.0], tolerance=tolerance)
+        with pytest.raises(pc.EvaluationError, match="tolerance="):
+            chain(1).counterbalance(tolerance=tolerance)
+    with pytest.raises(pc.ModelError, match="tolerance"):
+        chain(1).counterbalance(tolerance="small")
+    with pytest.raises(pc.EvaluationError, match="leaves the range of numbers at 'hinge0': take other units"):
+        chain(2).equilibrium(1e300, [0.1, 0.0])
     with pytest.raises(pc.EvaluationError, match="double"):
         pc.Scene(chain(1), precision="quad").equilibrium([0.0])
     assert np.array_equal(model.q, before)

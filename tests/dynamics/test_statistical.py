@@ -108,6 +108,14 @@ def test_refusals():
         model.equipartition([0, 0], count=-1)
     with pytest.raises(pc.ModelError, match="takes 2 numbers"):
         model.equipartition([0, 0, 0])
+    for q in ("bent", {}, [1j, 0]):
+        with pytest.raises(pc.ModelError, match="q is "):
+            model.equipartition(q)
+    with pytest.raises(pc.ModelError, match="seed: a whole number, not 'dice'"):
+        model.equipartition([0, 0], rng="dice")
+    for call in (model.equipartition, model.fixman_potential, model.fixman_torque):
+        with pytest.raises(pc.EvaluationError, match=r"temperature=1e\+200 by boltzmann=1e\+200 is inf J: take other units"):
+            call([0, 0], 1e200, boltzmann=1e200)
     massless = pc.chain(2)
     massless.bodies["body1"].mass, massless.bodies["body1"].inertia = 0.0, np.zeros((3, 3))
     massless.take_warnings()

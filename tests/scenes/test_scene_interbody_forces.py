@@ -95,8 +95,27 @@ def test_frames_that_move_are_where_they_are():
         close(seen[i], np.r_[R.T @ (world[i, :3] - np.cross([t, 0, 0], world[i, 3:])), R.T @ world[i, 3:]])
 
 
+def test_batches_are_rows():
+    model, scene, _ = pushed_model()
+    scene.add(E.NoseHoover(2.0, 0.5))
+    states = [model.random_state(i) for i in range(3)]
+    q, v, own = np.array([s.q for s in states]), np.array([s.v for s in states]), np.arange(18.0).reshape(3, 6) / 9
+    for axes, hinge in (("body", None), ("world", list(model.hinges)[2]), ("body3", None)):
+        each = [scene.interbody_forces(hinge, q[b], v[b], 0.3, states=own[b], axes=axes) for b in range(3)]
+        close(scene.interbody_forces(hinge, q, v, 0.3, states=own, axes=axes), np.array(each))
+    close(scene.interbody_forces(None, q[0], v)[2], scene.interbody_forces(None, q[0], v[2]))
+    close(scene.interbody_forces(None, q[:1]), scene.interbody_forces(None, q[0])[None])
+    assert scene.interbody_forces(None, q[:0], v[:0], states=own[:0], axes="world").shape == (0, len(model.bodies), 6)
+    with pytest.raises(pc.ModelError, match=r"batches of q \(3, \d+\), v \(2, \d+\) and states"):
+        scene.interbody_forces(None, q, v[:2])
+
+
 def test_refusals():
     model, scene, _ = pushed_model()
+    for t in (np.nan, np.inf):
+        for call in (scene.interbody_forces, scene.evaluate, scene.equilibrium):
+            with pytest.raises(pc.EvaluationError, match=f"t is {t}; a time is a finite number of seconds"):
+                call(t=t)
     with pytest.raises(pc.ModelError, match="elbow"):
         scene.interbody_forces("elbow")
     with pytest.raises(pc.EvaluationError, match="'reaction'"):

@@ -82,6 +82,22 @@ def test_without_noise_it_is_damping_of_order_two():
     assert 3.6 < errors[0] / errors[1] < 4.4 and 3.8 < errors[1] / errors[2] < 4.2
 
 
+def test_two_thermostats_of_one_coordinate_have_noise_of_their_own():
+    """Seeds the same: the mean of n n' over 4000 impulses, 1 if they were one, and the first's noise as if it were alone."""
+    model, count = block(), 4000
+    options = dict(integrator="rk4", step=0.5, dense=False, energy=False, progress=False)
+    two, alone = [], []
+    for scene, jumps in (
+        (pc.Scene(model).add(E.Langevin(1.0, 1e-9, 1.0, seed=4), E.Langevin(1.0, 1e-9, 1.0, seed=4)), two),
+        (pc.Scene(model).add(E.Langevin(1.0, 1e-9, 1.0, seed=4)), alone),
+    ):
+        v = scene.simulate(count, [0.0], [0.0], t_eval=np.arange(count + 1.0), **options).v[:, 0]
+        jumps.append(np.diff(v) * 2.0 / np.sqrt(2e-9))
+    first, second = alone[0], two[0] - alone[0]
+    sigma = 5 / np.sqrt(count)
+    assert abs(np.mean(first * second)) < sigma and abs(np.mean(second**2) - 1) < np.sqrt(2) * sigma
+
+
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_every_integrator_has_the_same_impulses(integrator):
     """The noise is the same, and so is the path, to the integrator's error; heat is counted."""
@@ -150,6 +166,15 @@ def test_sweeps_have_noise_of_their_own():
     for i in (0, 7):
         alone = warm(seed=i).simulate(1.0, integrator="rkmk4", step=0.05, t_eval=[0.0, 1.0], dense=False)
         assert np.array_equal(found["end.q"][i], alone.q[-1]) and np.array_equal(found["end.v"][i], alone.v[-1])
+
+
+def test_chains_are_swept():
+    """Their lengths are whole numbers, which samples have as floats."""
+    scene = pc.mechanisms.double_pendulum().add(E.NoseHoover(1.0, 0.5))
+    found = pc.sweep(scene, {"effects.nose_hoover.chain": [1, 2]}, 0.3, progress=False)
+    for i in range(2):
+        alone = pc.mechanisms.double_pendulum().add(E.NoseHoover(1.0, 0.5, chain=i + 1)).simulate(0.3)
+        assert found["end.v"][i] == pytest.approx(alone.v[-1], rel=1e-9)
 
 
 def test_some_hinges_and_what_is_prescribed():
@@ -283,6 +308,10 @@ def test_the_fixman_potential_balances_its_force(integrator):
         (E.Langevin(1.0, 1.0, 0.1, seed=-1), "langevin: seed is -1; it is a whole number from 0 to"),
         (E.Langevin(1.0, 1.0, 0.1, seed=2.5), "langevin: seed: a whole number, not 2.5"),
         (E.Langevin(1.0, 1.0, 0.1, hinges="hinge"), "langevin: no hinge or coordinate"),
+        (E.Langevin(1e200, 1.0, 0.1, boltzmann=1e200), "langevin: temperature 1e[+]200 by boltzmann 1e[+]200 is inf J; take other units"),
+        (E.NoseHoover(1e-200, 1.0, boltzmann=1e-200), "nose_hoover: temperature 1e-200 by boltzmann 1e-200 is 0 J"),
+        (E.NoseHoover(1.0, 1e160), "nose_hoover: kT τ² of 1 J and a time_constant of 1e[+]160 s is beyond the range"),
+        (E.NoseHoover(1.0, 1e-160), "nose_hoover: kT τ² of 1 J and a time_constant of 1e-160 s is beyond the range"),
         (E.NoseHoover(0.0, 1.0), "nose_hoover: temperature is 0; it is a finite number, positive"),
         (E.NoseHoover(1.0, -1.0), "nose_hoover: time_constant is -1; it is a positive number of seconds"),
         (E.NoseHoover(1.0, 1.0, chain=0), "nose_hoover: chain is 0; it is a whole number from 1 to 100"),

@@ -7,7 +7,8 @@
 // Z = ℳ + J and A = ½hΓ it is (Z - A) Z⁻¹ (Z - A) + 4A = (Z + A) Z⁻¹ (Z + A). So the density √det Z exp(-H/kT) stays what it is but for the
 // integrator's error between impulses; without noise, motions at whole multiples of h differ from those with damping by O(h²). Cost O(N).
 //
-// Noise is a function of the seed, the number of the impulse and the coordinate: the same whenever, and from wherever, a run comes there.
+// Noise is a function of the seed, the number of the impulse, the coordinate, and which of the scene's effects with impulses it is of: the same
+// whenever, and from wherever, a run comes there, and independent between two thermostats of one coordinate.
 // Source: B. Leimkuhler, C. Matthews, Molecular Dynamics, Springer 2015, the chapter on splittings of Langevin dynamics.
 #pragma once
 

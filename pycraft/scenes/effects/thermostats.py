@@ -20,7 +20,10 @@ def _energy(effect: Any, kind: str, positive: bool = False) -> float:
         if not 0 <= number < np.inf or (positive and number == 0):
             raise _core.ModelError(f"{kind}: {name} is {number:g}; it is a finite number, {'positive' if positive else 'not negative'}")
         numbers.append(number)
-    return numbers[0] * numbers[1]
+    kT = numbers[0] * numbers[1]
+    if not np.isfinite(kT) or (positive and kT == 0):
+        raise _core.ModelError(f"{kind}: temperature {numbers[0]:g} by boltzmann {numbers[1]:g} is {kT:g} J; take other units")
+    return kT
 
 
 def _seconds(value: Any, what: str) -> float:
@@ -28,6 +31,11 @@ def _seconds(value: Any, what: str) -> float:
     if not 0 < number < np.inf:
         raise _core.ModelError(f"{what} is {number:g}; it is a positive number of seconds")
     return number
+
+
+def _sampled(number: Any) -> Any:
+    """A whole number as it was before it was one of a sweep's samples, which are floats."""
+    return int(number) if isinstance(number, float) and number.is_integer() else number
 
 
 @dataclass(repr=False, eq=False)
@@ -57,8 +65,7 @@ class Langevin(Effect):
 
     def made_for(self, model: _core.Multibody) -> _core.Effect:
         names, values = by_hinge(self.friction, self.hinges, model, "langevin", "friction")
-        given: Any = self.seed
-        seed = whole(int(given) if isinstance(given, float) and given.is_integer() else given, "langevin: seed")  # samples are floats
+        seed = whole(_sampled(self.seed), "langevin: seed")
         if not 0 <= seed < 2**53:
             raise _core.ModelError(f"langevin: seed is {seed}; it is a whole number from 0 to 2⁵³ - 1")
         return _core.langevin_effect(model, names, _energy(self, "langevin"), values, _seconds(self.period, "langevin: period"), seed)
@@ -87,10 +94,14 @@ class NoseHoover(Effect):
     boltzmann: float = 1.0
 
     def made_for(self, model: _core.Multibody) -> _core.Effect:
-        chain = clipped(self.chain, "nose_hoover: chain")
+        chain = clipped(_sampled(self.chain), "nose_hoover: chain")
         if not 1 <= chain <= 100:
             raise _core.ModelError(f"nose_hoover: chain is {self.chain}; it is a whole number from 1 to 100")
         kT, slow = _energy(self, "nose_hoover", positive=True), _seconds(self.time_constant, "nose_hoover: time_constant")
+        if not all(np.finfo(float).tiny < square < np.inf for square in (slow * slow, kT * slow * slow)):
+            raise _core.ModelError(
+                f"nose_hoover: kT τ² of {kT:g} J and a time_constant of {slow:g} s is beyond the range of numbers: take other units"
+            )
         return _core.nose_hoover_effect(model, names_of(self.hinges, "nose_hoover"), kT, slow, chain)
 
 
