@@ -197,7 +197,8 @@ class Structure(Locking):
         inboard is outboard. Their subhinges are in the other order and their axes reversed: coordinates, velocities, limits, forces and
         rotors keep their numbers. Of balls and free subhinges on the way, quaternions and positions are inverted, and velocities are those
         of the other body, in its axes. All poses, velocities, accelerations, energies and momenta are the same, to rounding. A planar hinge
-        that is turned round is pin, slider, slider, a custom hinge. Masses, names, frames and nodes of bodies stay.
+        that is turned round is pin, slider, slider, a custom hinge. Masses, names, frames and nodes of bodies stay, and couplings stay on
+        the coordinates that they are of.
 
         Raises
         ------
@@ -229,6 +230,8 @@ class Structure(Locking):
         aside = Asides(self)
         turned = dict(self._reroot(name, rates.tolist()))
         aside.put(self, turned=turned)
+        if self._kept_loops is not None:
+            self._kept_loops._turned({hinge: len(v) for hinge, v in turned.items() if self.hinges[hinge].kind != "cylindrical"})
         if turned:
             self._set_accelerations({self._body(self._body_index(name))["hinge"]["name"]: first, **turned})
         return Body(self, name)

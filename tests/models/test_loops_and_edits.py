@@ -94,3 +94,16 @@ def test_the_root_does_not_move_over_locked_hinges():
     robot.unlock()
     robot.reroot("body2")
     assert robot.bodies["body2"].parent is None
+
+
+@pytest.mark.parametrize("kind", ["universal", "gimbal", "cylindrical", "planar"])
+def test_couplings_follow_the_coordinates_of_hinges_that_are_turned_round(kind):
+    robot = pc.tree([-1, 0, 1], ["free", kind, "pin"], seed=2)
+    robot.q, robot.v = robot.random_state(1).q, robot.random_state(1).v
+    robot.add_coupling({"hinge1[0]": 1.0, "hinge2": [0.5, 2.0]}, name="gear")
+    robot.add_loop("body2", hinge="ball", name="ground")
+    robot.add_coupling([robot.coordinate_names[-2]], function=lambda q: (np.sin(q[0]), [np.cos(q[0])], [[-np.sin(q[0])]]), name="cam")
+    before = rows(robot, "gear", "cam")
+    robot.reroot("body2")
+    assert list(robot.loops) == ["gear", "ground", "cam"]
+    np.testing.assert_array_equal(rows(robot, "gear", "cam"), before)  # the coordinates keep their numbers
