@@ -107,3 +107,16 @@ def test_couplings_follow_the_coordinates_of_hinges_that_are_turned_round(kind):
     robot.reroot("body2")
     assert list(robot.loops) == ["gear", "ground", "cam"]
     np.testing.assert_array_equal(rows(robot, "gear", "cam"), before)  # the coordinates keep their numbers
+
+
+def test_a_coupled_hinge_is_not_left_for_another_one_of_its_name():
+    model = closed()
+    before = rows(model, *model.loops)
+    slide = lambda: model.reattach("r thigh", "trunk", "slider", placement="here", velocity="impulse")
+    for edit in (slide, lambda: model.detach("r thigh")):
+        with pytest.raises(pc.ModelError, match=r"'r thigh' is in use: its coordinates are those of coupling 'gear'; remove that first"):
+            edit()
+    np.testing.assert_array_equal(rows(model, *model.loops), before)
+    model.loops["gear"].remove()
+    slide()
+    assert model.hinges["r thigh"].kind == "slider"
