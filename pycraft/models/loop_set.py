@@ -267,6 +267,17 @@ class Loops(Closed, Mapping):
         declared = self._declared[name]
         return {hinge for hinge, _, _ in declared["terms"]} if "terms" in declared else {declared["a"], declared["b"]}
 
+    def _turned(self, hinges: Mapping[str, int]) -> None:
+        """Couplings follow the coordinates of hinges of so many that have them in the other order now; the loops' order stays."""
+        before = self._description()
+        if not any(hinges.get(hinge, 1) > 1 for loop in before for hinge, *_ in loop.get("terms", ())):
+            return
+        for loop in before:
+            self.remove(loop["name"])
+        for loop in before:
+            terms = [(hinge, hinges[hinge] - 1 - j if hinge in hinges else j, given) for hinge, j, given in loop.get("terms", ())]
+            self._declare(loop | ({"terms": terms} if terms else {}))
+
     def _description(self) -> list[dict[str, Any]]:
         """The loops as plain data (functions of couplings as they are), in order."""
         return [dict(self._declared[name]) for name in self]

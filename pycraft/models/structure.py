@@ -94,8 +94,8 @@ class Structure(Locking):
         Raises
         ------
         ModelError
-            A body hung outboard of itself, names that are taken or unknown, a hinge that is none; a pose or a twist that the hinge does not
-            have, with what is missing and the remedy. The model is as it was.
+            A body hung outboard of itself, names that are taken or unknown, a hinge that is none; a coupling of the one that is left; a
+            pose or a twist that the hinge does not have, with what is missing and the remedy. The model is as it was.
         SingularHingeError
             Of an impulse, as forward dynamics.
 
@@ -127,6 +127,7 @@ class Structure(Locking):
             f"hinge {called!r}", hinge, axis=axis, axes=axes, point=point, pitch=pitch, subhinges=subhinges, position=position,
             rotation=rotation, placement=pose, rotor_inertia=rotor_inertia, limits=limits,
         )  # fmt: skip
+        self._require_uncoupled(was)
         fit = self._fit(name, onto, called, given, here, q, one_number(tolerance, "tolerance"), velocity)
         impulse = self._caught(name, onto, called, given, fit) if velocity == "impulse" else None
         aside = Asides(self)
@@ -197,7 +198,8 @@ class Structure(Locking):
         inboard is outboard. Their subhinges are in the other order and their axes reversed: coordinates, velocities, limits, forces and
         rotors keep their numbers. Of balls and free subhinges on the way, quaternions and positions are inverted, and velocities are those
         of the other body, in its axes. All poses, velocities, accelerations, energies and momenta are the same, to rounding. A planar hinge
-        that is turned round is pin, slider, slider, a custom hinge. Masses, names, frames and nodes of bodies stay.
+        that is turned round is pin, slider, slider, a custom hinge. Masses, names, frames and nodes of bodies stay, and couplings stay on
+        the coordinates that they are of.
 
         Raises
         ------
@@ -229,6 +231,8 @@ class Structure(Locking):
         aside = Asides(self)
         turned = dict(self._reroot(name, rates.tolist()))
         aside.put(self, turned=turned)
+        if self._kept_loops is not None:
+            self._kept_loops._turned({hinge: len(v) for hinge, v in turned.items() if self._kind_of(hinge) != "cylindrical"})
         if turned:
             self._set_accelerations({self._body(self._body_index(name))["hinge"]["name"]: first, **turned})
         return Body(self, name)
@@ -270,6 +274,13 @@ class Structure(Locking):
         trial._rehang(name, onto, hinge_name=called, q=fit.q.tolist(), v=[0.0] * len(fit.v), **given)
         trial.take_warnings()  # said of this model already, or to be said of it
         return impulse_into(trial, np.array([twists[other] for other in trial._names()[0]]).ravel())
+
+    def _require_uncoupled(self, hinge: str) -> None:
+        """What couples a coordinate of a hinge would couple another one, metres for radians, when another hinge has its name."""
+        for name in self._kept_loops or ():
+            if self.loops[name].kind == "coupling" and hinge in self.loops._stands_on(name):
+                what = f"hinge {hinge!r} is in use: its coordinates are those of coupling {name!r}"
+                raise _core.ModelError(f"{what}; remove that first, and declare it anew")
 
     def _set_accelerations(self, by_hinge: Mapping[str, Any]) -> None:
         """Present accelerations of hinges that are other ones now, where any are kept."""

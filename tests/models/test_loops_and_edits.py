@@ -94,3 +94,29 @@ def test_the_root_does_not_move_over_locked_hinges():
     robot.unlock()
     robot.reroot("body2")
     assert robot.bodies["body2"].parent is None
+
+
+@pytest.mark.parametrize("kind", ["universal", "gimbal", "cylindrical", "planar"])
+def test_couplings_follow_the_coordinates_of_hinges_that_are_turned_round(kind):
+    robot = pc.tree([-1, 0, 1], ["free", kind, "pin"], seed=2)
+    robot.q, robot.v = robot.random_state(1).q, robot.random_state(1).v
+    robot.add_coupling({"hinge1[0]": 1.0, "hinge2": [0.5, 2.0]}, name="gear")
+    robot.add_loop("body2", hinge="ball", name="ground")
+    robot.add_coupling([robot.coordinate_names[-2]], function=lambda q: (np.sin(q[0]), [np.cos(q[0])], [[-np.sin(q[0])]]), name="cam")
+    before = rows(robot, "gear", "cam")
+    robot.reroot("body2")
+    assert list(robot.loops) == ["gear", "ground", "cam"]
+    np.testing.assert_array_equal(rows(robot, "gear", "cam"), before)  # the coordinates keep their numbers
+
+
+def test_a_coupled_hinge_is_not_left_for_another_one_of_its_name():
+    model = closed()
+    before = rows(model, *model.loops)
+    slide = lambda: model.reattach("r thigh", "trunk", "slider", placement="here", velocity="impulse")
+    for edit in (slide, lambda: model.detach("r thigh")):
+        with pytest.raises(pc.ModelError, match=r"'r thigh' is in use: its coordinates are those of coupling 'gear'; remove that first"):
+            edit()
+    np.testing.assert_array_equal(rows(model, *model.loops), before)
+    model.loops["gear"].remove()
+    slide()
+    assert model.hinges["r thigh"].kind == "slider"
