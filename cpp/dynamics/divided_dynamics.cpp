@@ -6,8 +6,6 @@
 
 #include "model/hinge_kinematics.h"
 #include "model/multibody.h"
-#include "recursions/articulated_body.h"
-#include "recursions/kinematics.h"
 #include "runtime/errors.h"
 
 namespace pycraft {
@@ -25,11 +23,27 @@ double largest_growth() {
   return common_ratio * to_double(faint_error<S>()) / to_double(epsilon<S>());
 }
 
+// Ratio of the inertias of a model from which on they may be: a light segment that is joined to a heavy one is rounded at what that weighs, and
+// where no pivot cancels growth says nothing of it.
+template <class S>
+double largest_spread() {
+  return to_double(faint_error<S>()) / to_double(epsilon<S>());
+}
+
+// Of numbers in one unit, those that are none left out, the largest over the smallest.
+struct Spread {
+  double least = HUGE_VAL, most = 0;
+  void add(double x) {
+    if (x > 0) least = std::min(least, x), most = std::max(most, x);
+  }
+  double ratio() const { return most > 0 ? most / least : 1; }
+};
+
 }  // namespace
 
 template <class S>
 DividedDynamics<S>::DividedDynamics(const Multibody& model)
-    : tree_(model.structure()), model_(model.compiled<S>()), assembly_(model_->parent) {
+    : source_(model), tree_(model.structure()), model_(model.compiled<S>()), assembly_(model_->parent) {
   const size_t bodies = model_->bodies, coordinates = model_->nv, nodes = assembly_.nodes().size();
   pose_.resize(bodies), lent_.resize(bodies);
   size_t numbers = 0;
@@ -45,9 +59,11 @@ DividedDynamics<S>::DividedDynamics(const Multibody& model)
 template <class S>
 void DividedDynamics<S>::lend_inertias() {
   std::vector<LentInertia<S>> own(model_->bodies), carried(model_->bodies);
+  Spread masses, rotational;
   for (int k = model_->bodies - 1; k >= 0; --k) {
     const RigidInertia<S>& M = model_->inertia[k];
     const S trace = M.rotational(0, 0) + M.rotational(1, 1) + M.rotational(2, 2);
+    masses.add(to_double(M.mass)), rotational.add(to_double(trace));
     own[k] = {M.mass > S(0) ? M.mass : carried[k].mass, trace > S(0) ? S(trace / S(2)) : carried[k].rotational};
     const Vector3<S>& l = model_->placement[k].p;
     const LentInertia<S> seen{own[k].mass, own[k].rotational + own[k].mass * dot(l, l)};
@@ -56,6 +72,7 @@ void DividedDynamics<S>::lend_inertias() {
     carried[p].mass += seen.mass, carried[p].rotational += seen.rotational;
     if (assembly_.next()[p] == k) lent_[p] = seen;
   }
+  spread_ = std::max(masses.ratio(), rotational.ratio());
 }
 
 template <class S>
@@ -104,7 +121,7 @@ void DividedDynamics<S>::forward_dynamics(const S* q, const S* v, const S* tau, 
   double growth = 1;
   for (const int root : assembly_.roots()) growth = std::max(growth, growth_[root]);
   if (std::isfinite(growth)) outwards(threads, [&](int i) { take_apart(call, i); });
-  if (growth > largest_growth<S>()) judge(call, growth);
+  if (growth > largest_growth<S>() || spread_ > largest_spread<S>()) judge(call, growth);
   for (int i = 0; i < model_->nv; ++i) vdot[i] -= points_.absorbed[i];
 }
 
@@ -234,29 +251,33 @@ void DividedDynamics<S>::take_apart(const Call& call, int i) {
 template <class S>
 void DividedDynamics<S>::judge(const Call& call, double growth) {
   using std::sqrt;
-  if (!articulated_) articulated_ = std::make_unique<Articulated>(tree_);
-  auto& [blocks, z, alpha, expected] = *articulated_;
-  std::copy(pose_.begin(), pose_.end(), blocks.pose.begin()), std::copy(H_.begin(), H_.end(), blocks.H.begin());
-  set_constants(*model_, blocks);
-  articulated_body(tree_, *model_, blocks, points_, call.applied, call.tau, expected.data(), z, alpha);
+  if (!articulated_) articulated_ = std::make_unique<RigidDynamics<S>>(source_);
+  expected_.resize(model_->nv);
+  articulated_->forward_dynamics(call.q, call.v, call.tau, expected_.data(), {.form = Form::ud}, &call.applied);
   double off = 1;
+  int worst = 0;
   if (std::isfinite(growth)) {
-    S squares = S(0), all = S(0);
+    S squares = S(0), all = S(0), most = S(0);
     for (int i = 0; i < model_->nv; ++i) {
-      const S difference = call.vdot[i] - expected[i];
-      squares += difference * difference, all += expected[i] * expected[i];
+      expected_[i] += points_.absorbed[i];
+      const S difference = call.vdot[i] - expected_[i], square = difference * difference;
+      squares += square, all += expected_[i] * expected_[i];
+      if (square > most) most = square, worst = i;
     }
     off = to_double(S(sqrt(ratio_or_zero(squares, all))));
   }
-  if (!(off <= to_double(faint_limit<S>()))) refuse(off);
+  if (!(off <= to_double(faint_limit<S>()))) refuse(off, worst);
 }
 
-// At the first node where growth is too large, which those that contain it inherit.
+// At the first node where growth is too large, which those that contain it inherit; where none is, at the coordinate that is off most.
 template <class S>
-void DividedDynamics<S>::refuse(double off) const {
+void DividedDynamics<S>::refuse(double off, int worst) const {
   const auto at = std::find_if(growth_.begin(), growth_.end(), [](double growth) { return growth > largest_growth<S>(); });
-  const AssemblyNode& node = assembly_.nodes()[at - growth_.begin()];
-  const int k = node.kind == Kind::join ? assembly_.next()[node.body] : node.body;
+  int k = static_cast<int>(std::upper_bound(model_->v_offset.begin(), model_->v_offset.end(), worst) - model_->v_offset.begin()) - 1;
+  if (at != growth_.end()) {
+    const AssemblyNode& node = assembly_.nodes()[at - growth_.begin()];
+    k = node.kind == Kind::join ? assembly_.next()[node.body] : node.body;
+  }
   char numbers[120];
   std::snprintf(numbers, sizeof numbers, "accelerations are off by %.2g of those of the articulated method, %.2g at most is let through", off,
                 to_double(faint_limit<S>()));

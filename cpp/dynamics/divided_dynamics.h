@@ -3,8 +3,8 @@
 // Four passes over the assembly tree: rotations inwards and velocities outwards, segments inwards, motions and forces outwards. A node has to
 // do with what is inside it and with nothing beside it, so pieces of the tree go to threads, and every node has the same bits in any number.
 //
-// Where a pivot is so small against what was added up in it that few digits may be left, the articulated-body algorithm decides: it names the
-// hinge that feels no inertia, and accelerations that are not its own to six digits are refused.
+// Where a pivot is so small against what was added up in it that few digits may be left, or inertias are so far apart, the articulated-body
+// algorithm in its form ud decides: it names the hinge that feels no inertia, and accelerations that are not its own to six digits are refused.
 //
 // No allocation after the first call, but for threads.
 #pragma once
@@ -13,10 +13,10 @@
 #include <vector>
 
 #include "dynamics/assembly_tree.h"
+#include "dynamics/rigid_dynamics.h"
 #include "recursions/applied.h"
 #include "recursions/divide_and_conquer.h"
 #include "recursions/point_accelerations.h"
-#include "rigid/rigid_blocks.h"
 
 namespace pycraft {
 
@@ -60,8 +60,9 @@ class DividedDynamics {
   template <class F>
   void outwards(int threads, F f);
   void judge(const Call& call, double growth);  // by the articulated-body algorithm
-  [[noreturn]] void refuse(double off) const;
+  [[noreturn]] void refuse(double off, int worst) const;
 
+  const Multibody& source_;
   const SkoStructure tree_;
   std::shared_ptr<const CompiledModel<S>> model_;
   const AssemblyTree assembly_;
@@ -82,13 +83,9 @@ class DividedDynamics {
   std::vector<Segment<S>> segments_;
   std::vector<Vector6<S>> motion_, force_;  // of what it hangs on, and of what hangs on it
   std::vector<double> growth_;              // of rounding, in it and inside of it; infinite: a pivot was not positive
-  struct Articulated {
-    explicit Articulated(const SkoStructure& tree) : blocks(tree), z(tree.bodies()), alpha(tree.bodies()), vdot(tree.coordinates()) {}
-    RigidBlocks<S> blocks;
-    std::vector<Vector6<S>> z, alpha;
-    std::vector<S> vdot;
-  };
-  std::unique_ptr<Articulated> articulated_;  // from where it is asked first
+  double spread_ = 1;                       // of inertias
+  std::unique_ptr<RigidDynamics<S>> articulated_;  // from where it is asked first
+  std::vector<S> expected_;
 };
 
 #define PYCRAFT_EXTERN(S) extern template class DividedDynamics<S>;

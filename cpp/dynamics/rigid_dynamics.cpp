@@ -390,7 +390,10 @@ S RigidDynamics<S>::potential_energy(const S* q, const Vector3<S>& datum, const 
   template std::vector<std::pair<int, S>> RigidDynamics<S>::forward_dynamics_of_points(const double*, const double*, const double*, S*, const Solving&, const Applied<double>*);
 PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_INSTANTIATE)
 #undef PYCRAFT_INSTANTIATE
+template void RigidDynamics<Single>::forward_dynamics(const Single*, const Single*, const Single*, Single*, const Solving&, const Applied<Single>*);
 template void RigidDynamics<Extended>::forward_dynamics(const Extended*, const Extended*, const Extended*, Extended*, const Solving&, const Applied<Extended>*);
 template void RigidDynamics<Quad>::forward_dynamics(const Quad*, const Quad*, const Quad*, Quad*, const Solving&, const Applied<Quad>*);
+template void RigidDynamics<Digits50>::forward_dynamics(const Digits50*, const Digits50*, const Digits50*, Digits50*, const Solving&, const Applied<Digits50>*);
+template void RigidDynamics<Digits100>::forward_dynamics(const Digits100*, const Digits100*, const Digits100*, Digits100*, const Solving&, const Applied<Digits100>*);
 
 }  // namespace pycraft

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import _core
-from ..arguments import one_number
 from ..closed import Closed
 from ..linear.linear_model import LinearModel
 from ..state import State, at_state
@@ -130,13 +129,9 @@ class QuadraticModel(Closed):
         SingularHingeError
             As `forward_dynamics`, at a stage.
         """
-        h = one_number(dt, "dt")
-        if not 0 < h < np.inf:
-            raise _core.EvaluationError(f"dt={h:g}: a step is a positive number of seconds")
-        if integrator not in STEPS:
+        h = self._linear.step_of(dt, "quadratic")
+        if integrator not in tuple(STEPS):
             raise _core.EvaluationError(f"integrator={integrator!r}: steps to second order are of {', '.join(map(repr, STEPS))}")
-        if self.dt is not None:
-            raise _core.EvaluationError(f"this quadratic model is discrete already, with a step of {self.dt:g} s")
         step, linear = Step(self._at, h, integrator), self._linear
         n, batch = len(linear.states), self.A.ndim == 3
         slopes, q, v = (x if batch else x[0] for x in (step.slopes, step.q, step.v))

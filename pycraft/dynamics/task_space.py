@@ -282,6 +282,8 @@ class TaskSpace(Closed):
         x = _core.real_array(given, what)
         if x.ndim == 0 or x.shape[-1] != len(self._names):
             raise _core.ModelError(f"{what} takes {len(self._names)} numbers, of {', '.join(self._names)}; it has shape {x.shape}")
+        if not np.isfinite(x).all():
+            raise _core.ModelError(f"{what}: entry {self._names[int(np.argwhere(~np.isfinite(x))[0, -1])]!r} is not finite")
         return x
 
     def __repr__(self) -> str:
@@ -365,6 +367,8 @@ def _rows(frame: str, directions: Any) -> tuple[np.ndarray, list[str]]:
     rows = np.atleast_2d(_core.real_array(directions, f"directions of {frame!r}"))
     if rows.ndim != 2 or rows.shape[1] != 6 or not len(rows):
         raise _core.ModelError(f"directions of {frame!r}: rows (k, 6), not {np.shape(directions)}")
+    if not np.isfinite(rows).all():
+        raise _core.ModelError(f"directions of {frame!r}: row {int(np.argwhere(~np.isfinite(rows))[0, 0])} is not finite")
     if np.linalg.matrix_rank(rows) < len(rows):
         raise _core.ModelError(f"directions of {frame!r}: the {len(rows)} rows are linearly dependent; leave out what the others say")
     return rows, [f"{frame}.{i}" for i in range(len(rows))]

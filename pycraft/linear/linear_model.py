@@ -101,6 +101,15 @@ class LinearModel:
         return self
 
     # ------------------------------------------------------------------ in time
+    def step_of(self, dt: Any, order: str) -> float:
+        """dt as a number of seconds. EvaluationError for one that is no step, and where this model of some order is discrete already."""
+        step = one_number(dt, "dt")
+        if not 0 < step < np.inf:
+            raise _core.EvaluationError(f"dt={step:g}: a step is a positive number of seconds")
+        if self.dt is not None:
+            raise _core.EvaluationError(f"this {order} model is discrete already, with a step of {self.dt:g} s")
+        return step
+
     def discrete(self, dt: float, method: str = "zoh") -> LinearModel:
         """From step to step of dt seconds: SciPy's `cont2discrete`.
 
@@ -113,23 +122,23 @@ class LinearModel:
         Raises
         ------
         EvaluationError
-            An unknown method, a step that is no positive number, a model that is discrete already.
+            An unknown method, a step that is no positive number, or over which the model leaves the range of its numbers, a model that is
+            discrete already.
         """
         from scipy.signal import cont2discrete
 
-        step = one_number(dt, "dt")
-        if not 0 < step < np.inf:
-            raise _core.EvaluationError(f"dt={step:g}: a step is a positive number of seconds")
+        step = self.step_of(dt, "linear")
         if method not in METHODS:
             raise _core.EvaluationError(f"method={method!r}: there are {', '.join(map(repr, METHODS))}")
-        if self.dt is not None:
-            raise _core.EvaluationError(f"this linear model is discrete already, with a step of {self.dt:g} s")
-        if self.A.ndim == 2:
-            A, B, C, D, _ = cont2discrete((self.A, self.B, self.C, self.D), step, method)
-        else:
-            members = [cont2discrete(parts, step, method)[:4] for parts in zip(self.A, self.B, self.C, self.D, strict=True)]
-            shapes = (self.A.shape, self.B.shape, self.C.shape, self.D.shape)
-            A, B, C, D = (np.reshape([member[i] for member in members], shape) for i, shape in enumerate(shapes))
+        with np.errstate(all="ignore"):
+            if self.A.ndim == 2:
+                A, B, C, D, _ = cont2discrete((self.A, self.B, self.C, self.D), step, method)
+            else:
+                members = [cont2discrete(parts, step, method)[:4] for parts in zip(self.A, self.B, self.C, self.D, strict=True)]
+                shapes = (self.A.shape, self.B.shape, self.C.shape, self.D.shape)
+                A, B, C, D = (np.reshape([member[i] for member in members], shape) for i, shape in enumerate(shapes))
+        if not all(np.isfinite(x).all() for x in (A, B, C, D)):
+            raise _core.EvaluationError(f"dt={step:g}: by {method!r} {self.model.name!r} leaves the range of its numbers over such a step")
         return replace(self, A=A, B=B, C=C, D=D, dt=step)
 
     # ------------------------------------------------------------------ what it says

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import pycraft as pc
-from support.descriptions import subhinge
+from support.descriptions import random_description, subhinge
 from support.mechanisms import build, massless_inner_bodies
 from support.singular_hinges import REGULAR, SINGULAR, at_random_state, heavy_tip, links
 
@@ -133,6 +133,23 @@ def test_digits_that_are_lost_are_not_returned():
     assert all(np.array_equal(a, b) for a, b in zip(before, (q, v, tau), strict=True))
     with pytest.raises(pc.SingularOperatorError, match=r"\(state 1 of a batch of 2\)"):
         model.forward_dynamics(np.stack([q, q]), np.stack([0 * v, v]), np.stack([0 * tau, tau]), **WAY)  # at rest nothing is lost
+
+
+def test_digits_that_no_pivot_shows_are_not_returned():
+    """No pivot cancels here, and yet a light arm under a heavy tip loses twelve digits: the spread of inertias calls for the comparison."""
+    refused = 0
+    for seed in range(20):
+        model = build(random_description([-1, 0, 1], ["pin"] * 3, seed))
+        tip = model.bodies["body2"]
+        inertia = 1e12 * np.asarray(tip.inertia)
+        tip.mass, tip.inertia = 1e12 * tip.mass, inertia
+        q = model.random_state(seed).q
+        tau = model.inverse_dynamics(q, np.zeros(3), np.ones(3))
+        try:
+            assert errors(model, q, np.zeros(3), tau)[0] <= 1e-6
+        except pc.SingularOperatorError as error:
+            refused += "loses its digits at hinge 'hinge" in str(error)
+    assert refused
 
 
 @pytest.mark.parametrize("precision", ["single", "double", "extended", "quad", 50])

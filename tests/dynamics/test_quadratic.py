@@ -244,6 +244,7 @@ def test_degenerate_models():
         (lambda m, f: f.discrete(-1.0), "dt=-1: a step is a positive number of seconds"),
         (lambda m, f: f.discrete([0.1, 0.2]), "dt takes one number"),
         (lambda m, f: f.discrete(0.1, "dopri5"), "integrator='dopri5': steps to second order are of 'euler', 'semi-impl"),
+        (lambda m, f: f.discrete(0.1, ["euler"]), "integrator=['euler']: steps to second order"),
         (lambda m, f: f.discrete(0.1).discrete(0.1), "is discrete already, with a step of 0.1 s"),
     ],
 )  # fmt: skip

@@ -259,6 +259,7 @@ def test_derivatives_with_rotors_and_of_the_operator():
         ({"body1": []}, "directions of 'body1': different ones"),
         ({"body1": [[1, 0, 0]]}, "directions of 'body1': rows (k, 6), not (1, 3)"),
         ({"body1": np.ones((2, 6))}, "the 2 rows are linearly dependent"),
+        ({"body1": [[1, 0, 0, 0, 0, 0], [0, np.nan, 0, 0, 0, 0]]}, "directions of 'body1': row 1 is not finite"),
         ([3], "a frame"),
     ],
 )
@@ -271,6 +272,9 @@ def test_refusals_of_vectors():
     task = pc.chain(2).task_space({"body1": ["rz", "y"]}, [0.0, 0.3])
     with pytest.raises(pc.ModelError, match=r"force takes 2 numbers, of body1.rz, body1.y; it has shape \(3,\)"):
         task.acceleration([1, 2, 3])
+    for call, what in ((task.acceleration, "force"), (task.force, "acceleration"), (task.torques, "acceleration")):
+        with pytest.raises(pc.ModelError, match=f"{what}: entry 'body1.y' is not finite"):
+            call([1.0, np.nan])
     massless = pc.chain(2)
     for body in massless.bodies.values():
         body.mass, body.inertia = 0.0, np.zeros((3, 3))

@@ -263,6 +263,7 @@ def test_to_scipy_and_control():
         (lambda m, f: m.linearize(outputs="vdot.elbow"), "has no vdot.elbow; after 'vdot' there are hinge0, hinge1"),
         (lambda m, f: m.linearize(outputs="position.hand"), "no node or body of 'chain of 2 rods' is called 'hand'"),
         (lambda m, f: f.discrete(0), "dt=0: a step is a positive number of seconds"),
+        (lambda m, f: f.discrete(1e300), "dt=1e+300: by 'zoh' 'chain of 2 rods' leaves the range of its numbers"),
         (lambda m, f: f.discrete(0.1, "exact"), "method='exact': there are 'zoh'"),
         (lambda m, f: f.discrete(0.1).discrete(0.1), "is discrete already, with a step of 0.1 s"),
         (lambda m, f: f.select(inputs="tau.elbow"), "has no input 'tau.elbow'; there are tau.hinge0, tau.hinge1"),
