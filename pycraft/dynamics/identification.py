@@ -11,7 +11,7 @@ import numpy as np
 from .. import _core
 from ..arguments import listed, one_number, text
 from ..state import at_state
-from .inertial_fit import Base, LeastSquares, base_of, distance, is_consistent, least_squares, nearest, nearest_bodies
+from .inertial_fit import Base, LeastSquares, base_of, distance, is_consistent, least_squares, nearest, nearest_bodies, without_rounding
 from .logged_motion import logged_motion
 
 PARAMETERS = ("mass", "mx", "my", "mz", "ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -209,6 +209,7 @@ class IdentificationCalls:
         if not 0 < weight < np.inf:
             raise _core.EvaluationError(f"regularization={weight:g}: it is a positive number")
         theta, by = nearest(prior, W, base, found.beta), "least squares"
+        theta[:many] = without_rounding(theta[:many].reshape(-1, 10), prior[:many].reshape(-1, 10)).ravel()
         if consistent and not unknown.consistent(theta, typical):
             floor = 1e-4 * np.sqrt(np.mean(b**2))
             theta, by = nearest_bodies(prior, W, base, found, max(sigma, floor), weight, len(unknown.bodies)), "clarabel"

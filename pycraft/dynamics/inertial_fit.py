@@ -60,6 +60,12 @@ def is_consistent(pi: np.ndarray) -> bool:
     return bool((np.linalg.eigvalsh(L)[:, 0] >= -CONSISTENT * np.abs(np.trace(L, axis1=1, axis2=2))).all()) if len(pi) else True
 
 
+def without_rounding(pi: np.ndarray, prior: np.ndarray) -> np.ndarray:
+    """Parameters (n, 10), those of bodies without mass zero where nothing but the rounding of the others was found of them."""
+    size = np.abs(pi).max(axis=1, initial=0.0)
+    return np.where((~prior.any(axis=1) & (size < ROUNDING * size.max(initial=0.0)))[:, None], 0.0, pi)
+
+
 @dataclass
 class Base:
     """What can be told of parameters: β = combinations @ θ, by the columns that stand for it."""
@@ -170,6 +176,9 @@ def nearest_bodies(
 ) -> np.ndarray:
     """θ of bodies, their scalars not negative: the least ‖R(β - β̂)‖²/σ² + weight ‖θ - θ₀‖². A semidefinite program, by Clarabel.
 
+    What is added to the plain fit is S C⁻¹ y, S the sizes of the prior and C triangular, C*C = S (B*R*RB/(weight σ²) + W) S from a QR that
+    squares nothing: the objective is ½‖y‖² and a linear part, whatever the log's part and the prior's are to each other.
+
     Raises
     ------
     ImportError
@@ -183,12 +192,12 @@ def nearest_bodies(
         raise ImportError(
             f"a fit that is to be of bodies, where least squares are of none, needs clarabel: {HOLDS}; consistent=False does not"
         ) from None
-    from scipy import sparse
+    from scipy import linalg, sparse
 
     told = found.R @ base.combinations / sigma
     size, plain = 1.0 / np.sqrt(np.diag(W)), nearest(prior, W, base, found.beta)
-    P = (told.T @ told / weight + W) * np.outer(size, size)  # of what is added to the plain fit, in units of the prior
-    linear = W @ (plain - prior) * size
+    stacked = np.vstack([told * size / np.sqrt(weight), np.linalg.cholesky(W * np.outer(size, size)).T])
+    to = size[:, None] * linalg.solve_triangular(np.linalg.qr(stacked, mode="r"), np.eye(len(prior)))  # S C⁻¹
     upper = np.triu_indices(4)
     order = np.lexsort((upper[0], upper[1]))  # column by column
     i, j = upper[0][order], upper[1][order]
@@ -209,11 +218,12 @@ def nearest_bodies(
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-9
+    settings.tol_infeas_abs = settings.tol_infeas_rel = 1e-300  # bodies there are: the prior is one
     positive = np.vstack(rows)
-    G = sparse.csc_matrix(-positive * size)
     solution: Any = clarabel.DefaultSolver(
-        sparse.csc_matrix(np.triu(P)), linear, G, positive @ plain - np.concatenate(least), cones, settings
-    ).solve()
+        sparse.eye(len(prior), format="csc"), to.T @ (W @ (plain - prior)), sparse.csc_matrix(-positive @ to),
+        positive @ plain - np.concatenate(least), cones, settings,
+    ).solve()  # fmt: skip
     if str(solution.status) not in ("Solved", "AlmostSolved"):
         raise _core.EvaluationError(f"the nearest bodies to this fit are not found: Clarabel says {solution.status}")
-    return plain + np.asarray(solution.x) * size
+    return plain + to @ np.asarray(solution.x)

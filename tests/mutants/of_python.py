@@ -290,7 +290,7 @@ CHANGES = {
     "pycraft/dynamics/equilibrium.py": [
         ("flutter is stable", "or abs(np.imag(value)) > zero", ""),
         ("an unstable equilibrium is not left", "search.push(found.modes[0].shape)", "search.push(0 * found.modes[0].shape)"),
-        ("grains balance under any force", "<= tolerance * now.size)", "<= tolerance)"),
+        ("grains balance under any force", "<= tolerance * now.sizes)", "<= tolerance)"),
         ("balls turn the other way", "-brackets(turning(self.model), whole), np.eye(n)", "brackets(turning(self.model), whole), np.eye(n)"),
     ],
     "pycraft/dynamics/interbody.py": [
