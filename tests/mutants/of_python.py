@@ -248,7 +248,7 @@ CHANGES = {
         ("rows of a matrix on one line", "if of_parts and len(line) > _LINE else line", "if False else line"),
     ],
     "pycraft/models/writers/save.py": [
-        ("lines end as the machine likes", 'newline="\\n"', 'newline="\\r\\n"'),
+        ("what fails leaves its half", "for left in (beside, path) if new else (beside,):", "for left in ():"),
     ],
     "pycraft/models/writers/urdf_writer.py": [
         ("a root link is added at each round", 'in ("root", f"root of {name}")', 'in ("root",)'),
