@@ -40,7 +40,7 @@ class InterbodyCalls:
 
     def interbody_forces(
         self, q=None, v=None, tau=None, *, vdot=None, hinges: Any = None, wrenches: Mapping[Any, Any] | None = None,
-        wrench_axes: str = "world", axes: Any = "body", about: Any = None, part: str = "whole", form: str = "fast",
+        wrench_axes: str = "world", axes: Any = "body", about: Any = None, part: str = "whole", loops: bool = False, form: str = "fast",
         refine: int | str = 0, residual: str = "same", precision: str = "double",
     ) -> np.ndarray:  # fmt: skip
         """The spatial forces (moment; force) that parents put on their children through the hinges: O(N).
@@ -63,6 +63,8 @@ class InterbodyCalls:
         about : a frame, or (3,) in the world's axes: another point for the moments
         part : {"whole", "reaction"}
             "reaction" is what does no work along the hinge's coordinates, f - H⁺H f with H⁺ = H*(HH*)⁻¹ about the child's origin, in metres
+        loops : bool
+            Whether the loops' forces act too: after `constrained_dynamics` under `tau`. A coupling's are along its hinges, in Hf.
         form, refine, residual : as in `forward_dynamics`, of the accelerations
         precision : {"single", "double", "extended", "quad"}, of everything
 
@@ -73,7 +75,7 @@ class InterbodyCalls:
         Raises
         ------
         ModelError
-            A hinge, node or frame that is not there; tau beside vdot; wrenches of another shape, not finite, or on the base.
+            A hinge, node or frame that is not there; tau or loops beside vdot; wrenches of another shape, not finite, or on the base.
         EvaluationError
             Axes and parts that are not there.
         SingularHingeError
@@ -93,7 +95,15 @@ class InterbodyCalls:
         q, v = at_state(self, q, v)
         pushes = pushed(wrenches, wrench_axes)
         rows = hinge_numbers(self, hinges)
-        if known:
+        if loops:
+            if known:
+                raise _core.ModelError("interbody forces on the loops follow from tau: accelerations alone do not tell the loops' forces")
+            how: dict[str, Any] = {"form": form, "refine": refine, "residual": residual, "precision": precision}
+            model: Any = self
+            on_loops = model.constrained_dynamics(q, v, tau, wrenches=wrenches, wrench_axes=wrench_axes, **how)
+            pushes = with_wrenches(pushes, loop_wrenches(self, on_loops.forces, q, pushes[1]))
+            f, X, *_ = self._interbody().after(q, v, on_loops.vdot, *pushes, reaction, precision)
+        elif known:
             f, X, *_ = self._interbody().after(q, v, vdot, *pushes, reaction, precision)
         else:
             tau = np.zeros(self.nv) if tau is None else tau
@@ -176,6 +186,30 @@ def pushed(wrenches: Mapping[Any, Any] | None, wrench_axes: str) -> tuple[list[s
         return [], True, np.zeros((0, 6))
     shape = (*batches, 6)
     return names, wrench_axes == "world", np.stack([np.broadcast_to(one, shape) for one in each], axis=-2)
+
+
+def with_wrenches(pushes: tuple[list[str], bool, np.ndarray], more: list[tuple[str, np.ndarray]]) -> tuple[list[str], bool, np.ndarray]:
+    """What `pushed` gives, and wrenches (..., 6) by name in the same axes beside it."""
+    names, in_world, given = pushes
+    each = [given[..., i, :] for i in range(len(names))] + [wrench for _, wrench in more]
+    if not each:
+        return pushes
+    shape = np.broadcast_shapes(*(one.shape for one in each))
+    return [*names, *(name for name, _ in more)], in_world, np.stack([np.broadcast_to(one, shape) for one in each], axis=-2)
+
+
+def loop_wrenches(model: Any, forces: Mapping[str, Any], q: Any, in_world: bool) -> list[tuple[str, np.ndarray]]:
+    """The loops' forces by the names of the bodies and nodes that they act on, in the world's axes or the node's own; none on the base."""
+    found = []
+    for name, pair in forces.items():
+        for frame, wrench in zip(model.loops.ends(name), pair, strict=True):
+            if not frame:
+                continue
+            if in_world:
+                R = model.frame(frame).pose(q)[..., :3, :3]
+                wrench = np.concatenate([np.einsum("...ij,...j->...i", R, part) for part in (wrench[..., :3], wrench[..., 3:])], axis=-1)
+            found.append((frame, wrench))
+    return found
 
 
 def forces_of_scene(
