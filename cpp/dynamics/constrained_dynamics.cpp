@@ -46,7 +46,9 @@ void ConstrainedWorkspace<S>::set_loops(const std::shared_ptr<const ResolvedLoop
   lambda_.assign(loops->rows, S(0));
   if (loops_ == loops) return;
   groups_ = LoopGroups::of(*model_, *loops);
-  systems_.resize(groups_.groups.size());
+  systems_.resize(groups_.groups.size()), active_.resize(groups_.groups.size());
+  loop_of_.resize(loops->rows);
+  for (size_t l = 0; l < loops->loops.size(); ++l) std::fill_n(loop_of_.begin() + loops->loops[l].first_row, loops->loops[l].rows, int(l));
   loops_ = loops;
 }
 
@@ -55,17 +57,16 @@ void ConstrainedWorkspace<S>::factor() {
   using std::sqrt;
   dense_.assign(model_->nv, S(0));
   unit_.assign(loops_->rows, S(1));
-  std::vector<int> loops_of_rows(loops_->rows);
-  for (size_t l = 0; l < loops_->loops.size(); ++l) std::fill_n(loops_of_rows.begin() + loops_->loops[l].first_row, loops_->loops[l].rows, int(l));
   for (size_t g = 0; g < groups_.groups.size(); ++g) {
     const auto& group = groups_.groups[g];
     const int n = group.coordinates, m = static_cast<int>(group.rows.size());
     S* const W = systems_[g].columns(n, m);
-    scale_.assign(m, S(1));
-    for (int c = 0; c < m; ++c) {
-      check_interrupt_at(c, n);
-      const int row = group.rows[c];
-      const std::vector<int>& reach = groups_.reach[loops_of_rows[row]];
+    scale_.resize(m);
+    active_[g].clear();
+    for (const int row : group.rows) {
+      check_interrupt_at(row, n);
+      const std::vector<int>& reach = groups_.reach[loop_of_[row]];
+      const size_t c = active_[g].size();
       // What rounding of the row itself is, by epsilon: of all entries at once, or of the largest by its own hinge's inertia.
       S square = S(0), own = S(0);
       for (const auto& e : rows_.entries[row]) dense_[e.coordinate] = e.size;
@@ -74,14 +75,19 @@ void ConstrainedWorkspace<S>::factor() {
         const S size = dense_[model_->v_offset[k] + i], d = model_->nv_of[k] == 1 ? blocks_.D[blocks_.d_offsets()[k]] : blocks_.pivots(k)[i];
         own += size * size / d;
       });
-      if (const S size = sqrt(maximum(square, own)); size > S(0)) scale_[c] = size;
+      const S unit = maximum(square, own) > S(0) ? S(sqrt(maximum(square, own))) : S(1);
+      S left = S(0);
       for (const auto& e : rows_.entries[row]) dense_[e.coordinate] = e.value;
       half_inverse_tip_to_base(*model_, blocks_, reach, dense_.data(), z_, epsilon_,
-                               [&](int k, int i, const S& w) { W[size_t(c) * n + groups_.place[k] + i] = w / scale_[c]; });
+                               [&](int k, int i, const S& w) { left += (w / unit) * (w / unit), W[c * n + groups_.place[k] + i] = w / unit; });
       for (const auto& e : rows_.entries[row]) dense_[e.coordinate] = S(0);
-      unit_[row] = scale_[c];
+      unit_[row] = unit;
+      if (sqrt(left) > rank_tolerance<S>())  // the next row takes the place of one that asks nothing here
+        scale_[c] = unit, active_[g].push_back(row);
+      else
+        std::fill_n(W + c * n, n, S(0));
     }
-    systems_[g].factor(scale_.data(), rank_tolerance<S>());
+    systems_[g].factor(static_cast<int>(active_[g].size()), scale_.data(), rank_tolerance<S>());
   }
 }
 
@@ -120,23 +126,24 @@ void ConstrainedWorkspace<S>::meet(const S* target, bool first) {
   using std::abs;
   const int nv = model_->nv;
   part_.assign(loops_->rows, S(0)), off_.assign(loops_->rows, S(0));
+  if (first) sizes_.assign(loops_->rows, S(0));
   S worst = S(0);
   for (size_t g = 0; g < systems_.size(); ++g) {
-    const auto& group = groups_.groups[g];
-    const size_t m = group.rows.size();
+    const auto& rows = groups_.groups[g].rows;
+    const size_t m = active_[g].size();
     b_.resize(m), scale_.resize(m), conflict_.resize(m);
-    for (size_t c = 0; c < m; ++c) b_[c] = -(rows_.product(group.rows[c], x_.data()) + target[group.rows[c]]);
+    const auto asked = [&](int row) { return S(-(rows_.product(row, x_.data()) + target[row])); };
+    for (size_t c = 0; c < m; ++c) b_[c] = asked(active_[g][c]);
     systems_[g].solve(b_.data(), scale_.data(), conflict_.data());
+    for (size_t c = 0; c < m; ++c) part_[active_[g][c]] = scale_[c];
+    if (!first) continue;
     S size = S(0);
-    for (size_t c = 0; c < m && first; ++c) {
-      const int row = group.rows[c];
-      size = maximum(size, S((rows_.product_size(row, x_.data()) + bias_[row]) / unit_[row]));
-    }
-    for (size_t c = 0; c < m; ++c) {
-      part_[group.rows[c]] = scale_[c];
-      if (!first || abs(conflict_[c]) <= certified<S>() * size) continue;
-      off_[group.rows[c]] = abs(conflict_[c]);
-      worst = maximum(worst, off_[group.rows[c]]);
+    for (const int row : rows) size = maximum(size, S((rows_.product_size(row, x_.data()) + bias_[row]) / unit_[row]));
+    for (const int row : rows) sizes_[row] = size, off_[row] = abs(asked(row)) / unit_[row];
+    for (size_t c = 0; c < m; ++c) off_[active_[g][c]] = abs(conflict_[c]);
+    for (const int row : rows) {
+      if (off_[row] <= certified<S>() * size) off_[row] = S(0);
+      worst = maximum(worst, off_[row]);
     }
   }
   if (worst > S(0))
@@ -199,17 +206,17 @@ template <class S>
 bool ConstrainedWorkspace<S>::sure(const Asked& asked, const Applied<S>& applied, bool refuse) {
   using std::abs;
   const int nv = model_->nv;
+  if (std::any_of(x_.begin(), x_.end(), [](const S& x) { return !std::isfinite(to_double(x)); })) return true;  // batches say what left its range
   off_.assign(loops_->rows, S(0));
   S worst = S(0);
   for (const auto& group : groups_.groups) {
-    S size = S(0);
-    for (const int row : group.rows) size = maximum(size, S((rows_.product_size(row, x_.data()) + bias_[row]) / unit_[row]));
+    S size = S(0);  // what has cancelled in the rows: the tree's own accelerations, or those of the result
+    for (const int row : group.rows) size = maximum(size, maximum(sizes_[row], S((rows_.product_size(row, x_.data()) + bias_[row]) / unit_[row])));
     for (const int row : group.rows) {
       const S left = abs(rows_.product(row, x_.data()) + c_[row]) / unit_[row];
       if (left <= certified<S>() * size) continue;
       off_[row] = left;
       worst = maximum(worst, left);
-      if (!(left == left)) worst = S(1), off_[row] = S(1);
     }
   }
   if (worst > S(0)) {

@@ -67,9 +67,10 @@ class ConstrainedWorkspace {
   LoopBuffers<S> buffers_;
   LoopRows<S> rows_;
   std::vector<MinimumNormSystem<S>> systems_;
-  std::vector<int> all_;
+  std::vector<std::vector<int>> active_;      // of every group: rows of which columns are not rounding
+  std::vector<int> all_, loop_of_;            // bodies, tips first; of rows
   std::vector<Vector6<S>> z_, alpha_;
-  std::vector<S> x_, lambda_, c_, unit_, dense_, epsilon_, scratch_, target_, part_, b_, conflict_, scale_, off_, r_, delta_, bias_;
+  std::vector<S> x_, lambda_, c_, unit_, dense_, epsilon_, scratch_, target_, part_, b_, conflict_, scale_, sizes_, off_, r_, delta_, bias_;
   std::unique_ptr<RigidDynamics<Wider<S>>> wider_;
 };
 template <>

@@ -94,14 +94,14 @@ struct Reflections {
 template <class S>
 class MinimumNormSystem {
  public:
-  // The columns are to be written here, then factor().
+  // The columns are to be written here, then factor() of the first `count` of them.
   S* columns(int n, int m) {
     V_.resize(n, m);
     return V_.A.data();
   }
   int rank() const { return V_.rank; }
-  void factor(const S* unit, const S& tolerance) {
-    const int m = V_.columns;
+  void factor(int count, const S* unit, const S& tolerance) {
+    const int m = V_.columns = count;
     unit_.assign(unit, unit + m);
     V_.factor(true, tolerance);
     if (V_.rank == m) return;

@@ -167,6 +167,7 @@ class ConstrainedCalls:
 def _by_loop(
     loops: Any, x: np.ndarray, multipliers: np.ndarray, forces: np.ndarray, rank: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray], dict[str, LoopForce], np.ndarray]:  # fmt: skip
-    by_loop = {name: multipliers[..., loop.slice] for name, loop in loops.items()}
+    first = loops._core.first_rows()
+    by_loop = {name: multipliers[..., first[i] : first[i + 1]] for i, name in enumerate(loops)}
     each = {name: LoopForce(forces[..., i, 0, :], forces[..., i, 1, :]) for i, name in enumerate(loops)}
     return x, multipliers, by_loop, each, rank

@@ -101,7 +101,7 @@ class InterbodyCalls:
             how: dict[str, Any] = {"form": form, "refine": refine, "residual": residual, "precision": precision}
             model: Any = self
             on_loops = model.constrained_dynamics(q, v, tau, wrenches=wrenches, wrench_axes=wrench_axes, **how)
-            pushes = with_wrenches(pushes, loop_wrenches(self, on_loops.forces, q, pushes[1]))
+            pushes = with_wrenches(pushes, loop_wrenches(self, on_loops.forces, q, pushes[1])[0])
             f, X, *_ = self._interbody().after(q, v, on_loops.vdot, *pushes, reaction, precision)
         elif known:
             f, X, *_ = self._interbody().after(q, v, vdot, *pushes, reaction, precision)
@@ -111,7 +111,8 @@ class InterbodyCalls:
         return in_axes(self, q, f[..., rows, :], X[..., rows, :, :], axes, about)
 
     def base_reaction(self, q=None, v=None, tau=None, *, axes: Any = "world", about: Any = None, **options: Any) -> np.ndarray:
-        """What the base puts on the model, (6,) or (B, 6): the sum of the forces of the hinges on it, by default about the world's origin.
+        """What the base puts on the model, (6,) or (B, 6): the sum of the forces of the hinges on it, by default about the world's origin;
+        with loops=True, of the loops that end there, too.
 
         Arguments are those of `interbody_forces`; axes "body" and "aligned" are of no one body here and are refused. A model that floats
         is carried by nothing: zero to rounding.
@@ -130,7 +131,15 @@ class InterbodyCalls:
             raise _core.EvaluationError("a base reaction is of all hinges on the base; interbody_forces takes hinges=")
         model: Any = self
         on_base = [name for name, hinge in model.hinges.items() if hinge.body.parent is None]
-        return self.interbody_forces(q, v, tau, hinges=on_base, axes=axes, about=about, **options).sum(axis=-2)
+        reaction = self.interbody_forces(q, v, tau, hinges=on_base, axes=axes, about=about, **options).sum(axis=-2)
+        if not options.pop("loops", False):
+            return reaction
+        of_hinges = {"part": options.pop("part", "whole")}
+        if is_reaction(of_hinges["part"]):
+            raise _core.EvaluationError("part='reaction' of a base reaction is of hinges; loops=True takes part='whole'")
+        q, v = at_state(self, q, v)
+        on_base_by_loops = loop_wrenches(self, model.constrained_dynamics(q, v, tau, **options).forces, q, True)[1]
+        return reaction - in_axes(self, q, on_base_by_loops, np.eye(4), axes, about)
 
     def interbody_forces_derivatives(
         self, q=None, v=None, tau=None, *, vdot=None, wrenches: Mapping[Any, Any] | None = None, wrench_axes: str = "world",
@@ -198,18 +207,25 @@ def with_wrenches(pushes: tuple[list[str], bool, np.ndarray], more: list[tuple[s
     return [*names, *(name for name, _ in more)], in_world, np.stack([np.broadcast_to(one, shape) for one in each], axis=-2)
 
 
-def loop_wrenches(model: Any, forces: Mapping[str, Any], q: Any, in_world: bool) -> list[tuple[str, np.ndarray]]:
-    """The loops' forces by the names of the bodies and nodes that they act on, in the world's axes or the node's own; none on the base."""
-    found = []
+def loop_wrenches(model: Any, forces: Mapping[str, Any], q: Any, in_world: bool) -> tuple[list[tuple[str, np.ndarray]], np.ndarray]:
+    """The loops' forces by the names of the bodies and nodes that they act on, in the world's axes or the node's own; and the sum of those
+    on the base and nodes on it, about the world's origin in its axes."""
+    moved, on_base = [], np.zeros(6)
     for name, pair in forces.items():
         for frame, wrench in zip(model.loops.ends(name), pair, strict=True):
-            if not frame:
+            held = not frame or (frame in model.nodes and model.nodes[frame].body is None)
+            if held and not frame:
+                on_base = on_base + wrench
                 continue
-            if in_world:
-                R = model.frame(frame).pose(q)[..., :3, :3]
-                wrench = np.concatenate([np.einsum("...ij,...j->...i", R, part) for part in (wrench[..., :3], wrench[..., 3:])], axis=-1)
-            found.append((frame, wrench))
-    return found
+            if held or in_world:
+                X = model.frame(frame).pose(q)
+                n, f = (np.einsum("...ij,...j->...i", X[..., :3, :3], part) for part in (wrench[..., :3], wrench[..., 3:]))
+                wrench = np.concatenate([n + np.cross(X[..., :3, 3], f) if held else n, f], axis=-1)
+            if held:
+                on_base = on_base + wrench
+            else:
+                moved.append((frame, wrench))
+    return moved, on_base
 
 
 def forces_of_scene(

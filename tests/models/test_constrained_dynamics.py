@@ -280,3 +280,41 @@ def test_interbody_forces_on_loops_follow_from_forces():
     bars, state = four_bar()
     with pytest.raises(pc.ModelError, match="tau"):
         bars.interbody_forces(state.q, state.v, vdot=np.zeros(3), loops=True)
+
+
+def test_what_stands_still_by_a_loop_stands_still():
+    # Nothing is left of the tree's own accelerations but rounding, which is not measured by itself.
+    mb = pc.Multibody("held")
+    mb.add_body("box", hinge="free", mass=2.0, inertia=np.eye(3))
+    mb.add_loop("box", hinge="weld", name="held")
+    mb.gravity = (0, 0, -10)
+    got = mb.constrained_dynamics()
+    assert np.abs(got.vdot).max() < 100 * EPS
+    assert np.abs(got.by_loop["held"] - [0, 0, 0, 0, 0, 20]).max() < 1e-13
+    assert np.abs(mb.interbody_forces(loops=True)).max() < 1e-13  # the hinge carries nothing
+    assert np.abs(mb.base_reaction(loops=True) - [0, 0, 0, 0, 0, 20]).max() < 1e-13
+
+
+def test_the_base_carries_what_hinges_and_loops_put_on_it():
+    # The rate of momentum: a four-bar's own, whether its loop ends on the base or on a node of it.
+    for on_node in (False, True):
+        bars = pc.chain(3)
+        bars.gravity = (0, -9.81, 0)
+        anchor = bars.add_node("anchor", None, position=(1, 0, 0), rotation=[[0, -1, 0], [1, 0, 0], [0, 0, 1]]) if on_node else None
+        end = bars.add_node("end", "body2", position=(1, 0, 0))
+        place = {} if on_node else {"position": (1, 0, 0)}
+        bars.add_loop(end, anchor, hinge="pin", **place)
+        state = bars.assemble([1.0, -1.4, -1.5], [2.0, 0, 0], fix="hinge0")
+        a = bars.constrained_dynamics(state).vdot
+        for about in (None, (1.0, 2.0, 0)):
+            carried = bars.base_reaction(state, loops=True, about=about)
+            wanted = bars.base_reaction(state, vdot=a, about=about)  # the tree's hinge would have to carry all of it
+            close(carried, wanted, 1e-12)
+        batch = bars.base_reaction(np.tile(state.q, (2, 1)), state.v, loops=True)
+        close(batch[1], bars.base_reaction(state, loops=True), 1e-14)
+
+
+def test_out_of_range_is_said():
+    bars, state = four_bar()
+    with pytest.raises(pc.EvaluationError, match="beyond the range"):
+        bars.constrained_dynamics(state, tau=[1e308, 1e308, 1e308])
