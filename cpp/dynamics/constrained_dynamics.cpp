@@ -15,11 +15,12 @@ namespace pycraft {
 namespace {
 
 // Of unit columns of W that of which less is left counts as dependent: what noise, ε/σ² in λ and ε/σ in θ̈, and what is left out, σ in the
-// rows, are of one size there.
+// rows, are of one size there. States and models are doubles: in a wider scalar their rounding would make a direction of what has none, as of the
+// redundant row of a spatial linkage.
 template <class S>
 S rank_tolerance() {
   using std::sqrt;
-  return sqrt(epsilon<S>());
+  return maximum(S(sqrt(epsilon<S>())), S(64 * epsilon<double>()));
 }
 // The most by which what is returned may miss a row or an equation of motion, of the largest number in it.
 template <class S>

@@ -110,8 +110,8 @@ class ConstrainedCalls:
         ModelError
             Arrays of another shape, not finite; a loop that has lost a body; alpha or beta below zero.
 
-        Rows count as dependent where in units of their own, and of energy, less than √ε of them is left beside the others; a row or an
-        equation is missed from 64 √ε of its largest term on.
+        Rows count as dependent where in units of their own, and of energy, less than √ε of them is left beside the others (in
+        "quad" 64 ε of a double: states are doubles); a row or an equation is missed from 64 times that of its largest term on.
 
         Cost: O(N), O(depth) a row, and rows² · coordinates in each group.
         Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, ch. 11; J. Baumgarte 1972.

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import pycraft as pc
+from support.mechanisms import random_tree
 
 EPS = float(np.finfo(float).eps)
 
@@ -280,6 +281,80 @@ def test_interbody_forces_on_loops_follow_from_forces():
     bars, state = four_bar()
     with pytest.raises(pc.ModelError, match="tau"):
         bars.interbody_forces(state.q, state.v, vdot=np.zeros(3), loops=True)
+
+
+def bricard():
+    """Six bars along edges of a cube, each pin across both of its bars: rank 4 of 5 rows, and no one row is the redundant one."""
+    corners = np.array([(0, 0, 0), (1, 0, 0), (1, -1, 0), (1, -1, 1), (0, -1, 1), (0, 0, 1)], float)
+    edges = np.roll(corners, -1, axis=0) - corners
+    mb = pc.Multibody("bricard")
+    for i in range(5):
+        axis, place = np.cross(edges[i - 1], edges[i]), corners[0] if i == 0 else edges[i - 1]
+        mb.add_body(f"bar{i}", f"bar{i - 1}" if i else None, hinge="pin", axis=axis, position=place, mass=1.0, com=edges[i] / 2,
+                    inertia=(np.eye(3) - np.outer(edges[i], edges[i])) / 3)  # fmt: skip
+    mb.add_loop("bar4", hinge="pin", axis=np.cross(edges[4], edges[5]), point=edges[4], position=corners[5] - edges[4], name="loop")
+    mb.gravity = (0, -9.81, 0)
+    return mb
+
+
+@pytest.mark.parametrize("precision", ["double", "extended", "quad"])
+def test_bricard_s_redundant_row_is_no_particular_one(precision):
+    mb = bricard()
+    assert np.abs(mb.loops.residual(np.zeros(5))).max() < 1e-15
+    mobility = mb.mobility(np.zeros(5))
+    assert mobility.degrees_of_freedom == 1 and mobility.rank == 4
+    state = mb.assemble(mb.integrate(np.zeros(5), 0.2 * mobility.freedoms[:, 0]))
+    for q in (np.zeros(5), state.q):
+        v = 2.0 * mb.mobility(q).freedoms[:, 0]
+        got = mb.constrained_dynamics(q, v, precision=precision)
+        vdot, lam = dense(mb, q, v, np.zeros(5))
+        assert got.rank == 4
+        close(got.vdot, vdot), close(got.multipliers, lam)
+        power = v @ mb.inverse_dynamics(q, v, got.vdot)
+        assert abs(power) < 1e-11  # the loop's forces do no work
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_random_trees_with_random_loops(seed):
+    # Open loops of all sorts, some redundant, some that conflict: refused is what has no solution, everything else is the dense one.
+    rng = np.random.default_rng(seed)
+    mb = random_tree(rng, int(rng.integers(2, 12)))
+    names = list(mb.bodies)
+    for i in range(int(rng.integers(1, 4))):
+        kind = str(rng.choice(["weld", "pin", "slider", "screw", "universal", "cylindrical", "planar", "ball"]))
+        axes = {"axis": rng.normal(size=3)} if kind in ("pin", "slider", "screw", "cylindrical", "planar") else {}
+        axes |= {"axes": rng.normal(size=(2, 3))} if kind == "universal" else {}
+        try:
+            mb.add_loop(str(rng.choice(names)), None if rng.random() < 0.4 else str(rng.choice(names)), hinge=kind, name=f"l{i}",
+                        position=rng.normal(size=3), **axes)  # fmt: skip
+        except pc.ModelError:
+            continue  # of one body with itself
+    q, v, tau = np.array(mb.q), np.array(mb.v), rng.normal(size=mb.nv)
+    form = str(rng.choice(["fast", "ud", "square-root"]))
+    try:
+        vdot, lam = dense(mb, q, v, tau)
+        left = np.abs(mb.loops.jacobian(q) @ vdot + mb.loops.bias(q, v)).max(initial=0)
+    except np.linalg.LinAlgError:
+        return  # nothing moves
+    if left > 1e-6 * (1 + np.abs(vdot).max(initial=0)):
+        with pytest.raises(pc.EvaluationError, match="different accelerations"):
+            mb.constrained_dynamics(q, v, tau, form=form)
+        return
+    got = mb.constrained_dynamics(q, v, tau, form=form)
+    close(got.vdot, vdot, 1e-9), close(got.multipliers, lam, 1e-9)
+
+
+def test_rows_that_only_a_light_body_joins_are_resolved_or_refused():
+    # Two of 1e20 kg, each held to one of 1 kg: the columns are parallel to 1e-10, which quad tells apart and double refuses.
+    mb = pc.Multibody("train")
+    for name, mass in (("a", 1e20), ("b", 1e20), ("link", 1.0)):
+        mb.add_body(name, hinge="slider", axis=(1, 0, 0), mass=mass, inertia=np.eye(3))
+    for name in "ab":
+        mb.add_coupling({name: 1.0, "link": -1.0}, name=f"to {name}")
+    force = [1e20, 0.0, 0.0]
+    close(mb.constrained_dynamics([0, 0, 0], [0, 0, 0], force, precision="quad").vdot, np.full(3, 0.5), 1e-15)
+    with pytest.raises(pc.EvaluationError, match="'to a', 'to b'"):
+        mb.constrained_dynamics([0, 0, 0], [0, 0, 0], force)
 
 
 def test_what_stands_still_by_a_loop_stands_still():
