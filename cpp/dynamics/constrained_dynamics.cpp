@@ -61,7 +61,7 @@ void ConstrainedWorkspace<S>::factor() {
   for (size_t g = 0; g < groups_.groups.size(); ++g) {
     const auto& group = groups_.groups[g];
     const int n = group.coordinates, m = static_cast<int>(group.rows.size());
-    S* const W = systems_[g].columns(n, m);
+    systems_[g].begin(n);
     scale_.resize(m);
     active_[g].clear();
     for (const int row : group.rows) {
@@ -78,17 +78,18 @@ void ConstrainedWorkspace<S>::factor() {
       });
       const S unit = maximum(square, own) > S(0) ? S(sqrt(maximum(square, own))) : S(1);
       S left = S(0);
+      systems_[g].add_column();
       for (const auto& e : rows_.entries[row]) dense_[e.coordinate] = e.value;
       half_inverse_tip_to_base(*model_, blocks_, reach, dense_.data(), z_, epsilon_,
-                               [&](int k, int i, const S& w) { left += (w / unit) * (w / unit), W[c * n + groups_.place[k] + i] = w / unit; });
+                               [&](int k, int i, const S& w) { left += (w / unit) * (w / unit), systems_[g].add_entry(groups_.place[k] + i, w / unit); });
       for (const auto& e : rows_.entries[row]) dense_[e.coordinate] = S(0);
       unit_[row] = unit;
       if (sqrt(left) > rank_tolerance<S>())  // the next row takes the place of one that asks nothing here
         scale_[c] = unit, active_[g].push_back(row);
       else
-        std::fill_n(W + c * n, n, S(0));
+        systems_[g].drop_column();
     }
-    systems_[g].factor(static_cast<int>(active_[g].size()), scale_.data(), rank_tolerance<S>());
+    systems_[g].factor(scale_.data(), rank_tolerance<S>());
   }
 }
 

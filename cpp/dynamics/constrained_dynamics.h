@@ -7,7 +7,7 @@
 // accelerations of the same motion are refused by name. What is returned was put into both equations (recursions/loop_columns.h,
 // numerics/rank_factors.h). The same factors take velocities onto the rows: Q v⁺ = 0 after an impulse of the loops, v⁺ = v + (ℳ + J)⁻¹Q*λ.
 //
-// Cost O(N) and O(depth) a row, and rows² · coordinates of each group of loops that share hinges inboard of them.
+// Cost O(N) and O(depth) a row, and the factors of each group of loops that share hinges inboard of them (numerics/rank_factors.h).
 // Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, ch. 11 (tree augmentation); J. Baumgarte, Stabilization of constraints, 1972.
 #pragma once
 

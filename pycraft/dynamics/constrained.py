@@ -113,7 +113,8 @@ class ConstrainedCalls:
         Rows count as dependent where in units of their own, and of energy, less than √ε of them is left beside the others (in
         "quad" 64 ε of a double: states are doubles); a row or an equation is missed from 64 times that of its largest term on.
 
-        Cost: O(N), O(depth) a row, and rows² · coordinates in each group.
+        Cost: O(N), O(depth) a row, and up to rows² · coordinates in each group; linear in loops
+        that share hinges with a few others (docs/loops.md).
         Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, ch. 11; J. Baumgarte 1972.
 
         Examples
