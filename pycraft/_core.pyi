@@ -1075,6 +1075,10 @@ class LoopSet:
         ...
     def __reduce__(self) -> tuple:
         ...
+    def accelerations(self, q: typing.Any, v: typing.Any, tau: typing.Any, names: collections.abc.Sequence[str], in_world: bool, wrenches: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], form: str, refine: typing.Any, residual: str, precision: str | int, alpha: typing.SupportsFloat | typing.SupportsIndex, beta: typing.SupportsFloat | typing.SupportsIndex) -> tuple:
+        """
+        v̇, λ, forces of loops on b and on a, rank.
+        """
     def add_coupling(self, name: str, coordinates: collections.abc.Sequence[tuple[str, typing.SupportsInt | typing.SupportsIndex, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]], constant: typing.Any, function: typing.Any) -> None:
         ...
     def add_hinge(self, name: str, a: str, b: str, hinge: str, axes: collections.abc.Sequence[typing.Any], point: typing.Any, pitch: typing.Any, rotation: typing.Any, position: typing.Any) -> None:
@@ -1102,6 +1106,10 @@ class LoopSet:
     def rows(self) -> tuple[list[str], list[bool]]:
         """
         Names of all rows, and which are of positions.
+        """
+    def velocities(self, q: typing.Any, v: typing.Any, impulse: typing.Any, form: str, precision: str | int) -> tuple:
+        """
+        v⁺, impulses λ, impulses of loops on b and on a, rank.
         """
 class Centroidal:
     """

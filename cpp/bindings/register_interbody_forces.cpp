@@ -12,15 +12,6 @@ namespace {
 
 using Calls = BatchInterbodyForces;
 
-PushedNodes pushed_nodes(const Multibody& model, const std::vector<std::string>& names, bool in_world) {
-  PushedNodes pushed{{}, in_world};
-  for (const std::string& name : names) {
-    pushed.nodes.push_back(node_named(model, name, "wrenches"));
-    if (pushed.nodes.back().body < 0) throw ModelError("wrenches: '" + name + "' is on the base, which no wrench moves");
-  }
-  return pushed;
-}
-
 // What is given, and who holds it.
 struct Held {
   Arguments arguments;
@@ -107,6 +98,15 @@ py::tuple along(SceneCalls& calls, const Array& t, const Array& q, const Array& 
 }
 
 }  // namespace
+
+PushedNodes pushed_nodes(const Multibody& model, const std::vector<std::string>& names, bool in_world) {
+  PushedNodes pushed{{}, in_world};
+  for (const std::string& name : names) {
+    pushed.nodes.push_back(node_named(model, name, "wrenches"));
+    if (pushed.nodes.back().body < 0) throw ModelError("wrenches: '" + name + "' is on the base, which no wrench moves");
+  }
+  return pushed;
+}
 
 void register_interbody_forces(py::module_& m) {
   const py::arg q("q"), v("v"), vdot("vdot"), tau("tau"), names("names"), in_world("in_world"), wrenches("wrenches"), reaction("reaction");

@@ -4,6 +4,8 @@
 
 #include "bindings/direct_calls.h"
 #include "bindings/hinge_arguments.h"
+#include "bindings/register_interbody_forces.h"
+#include "dynamics/constrained_dynamics.h"
 #include "dynamics/loop_calls.h"
 
 namespace pycraft {
@@ -53,9 +55,10 @@ PairKind kind_named(const std::string& name) {
 
 // Of one model: its loops and their rows.
 struct Loops {
-  explicit Loops(std::shared_ptr<Multibody> model) : set(std::make_shared<LoopSet>(std::move(model))), calls(set) {}
+  explicit Loops(std::shared_ptr<Multibody> model) : set(std::make_shared<LoopSet>(std::move(model))), calls(set), dynamics(set) {}
   std::shared_ptr<LoopSet> set;
   LoopCalls calls;
+  ConstrainedDynamics dynamics;
   int rows() const {
     const ModelInUse use(set->model());
     return set->resolved()->rows;
@@ -66,6 +69,25 @@ template <class F>
 py::array_t<double> rows_at(Loops& loops, const std::vector<std::pair<const char*, py::object>>& state, const std::vector<py::ssize_t>& shape, F f) {
   Arguments given(loops.set->model(), state);
   return written(loops.set->model(), given, py::none(), shape, [&](double* out) { f(given, out); });
+}
+
+// x, λ, forces (loops, 2, 6) on b and on a, the rank of Q, a state.
+py::tuple on_loops(Loops& loops, Arguments& given, ConstrainedDynamics::Asked asked, const PushedNodes& pushed, const Array& wrenches) {
+  const Multibody& model = loops.set->model();
+  asked.q = given[0], asked.v = given[1], asked.input = given[2], asked.pushed = &pushed;
+  asked.wrenches = {"wrenches", wrenches.data(), 6 * static_cast<int>(pushed.nodes.size()), wrenches.ndim() == 3 ? static_cast<int>(wrenches.shape(0)) : -1};
+  const int batch = common_batch({asked.q, asked.v, asked.input, asked.wrenches});
+  const auto count = static_cast<py::ssize_t>(loops.set->names().size());
+  py::array_t<double> x = output(py::none(), batch, {model.nv()}), multipliers = output(py::none(), batch, {loops.rows()}), forces = output(py::none(), batch, {count, 2, 6});
+  std::vector<py::ssize_t> shape;
+  if (batch >= 0) shape.push_back(batch);
+  py::array_t<int> rank(shape);
+  const ConstrainedDynamics::Results out{x.mutable_data(), multipliers.mutable_data(), forces.mutable_data(), rank.mutable_data()};
+  {
+    const Undisturbed undisturbed(model);
+    loops.dynamics.run(asked, out);
+  }
+  return py::make_tuple(x, multipliers, forces, rank);
 }
 
 }  // namespace
@@ -129,7 +151,22 @@ void register_loops(py::module_& m) {
       }, q, precision)
       .def("bias", [](Loops& l, const py::object& q, const py::object& v, Precision precision) {
         return rows_at(l, {{"q", q}, {"v", v}}, {l.rows()}, [&](Arguments& given, double* out) { l.calls.bias(precision, given[0], given[1], out); });
-      }, q, v, precision);
+      }, q, v, precision)
+      .def("accelerations", [](Loops& l, const py::object& q, const py::object& v, const py::object& tau, const std::vector<std::string>& names, bool in_world,
+                               const Array& wrenches, Form form, const py::object& refine, const std::string& residual, Precision precision, double alpha, double beta) {
+        const Multibody& model = l.set->model();
+        Arguments given(model, {{"q", q}, {"v", v}, {"tau", tau}});
+        ConstrainedDynamics::Asked asked;
+        asked.form = form, asked.refinement = refinement(refine, residual, precision), asked.precision = precision, asked.alpha = alpha, asked.beta = beta;
+        return on_loops(l, given, asked, pushed_nodes(model, names, in_world), wrenches);
+      }, q, v, py::arg("tau"), py::arg("names"), py::arg("in_world"), py::arg("wrenches"), py::arg("form"), py::arg("refine"), py::arg("residual"), precision,
+         py::arg("alpha"), py::arg("beta"), "v̇, λ, forces of loops on b and on a, rank.")
+      .def("velocities", [](Loops& l, const py::object& q, const py::object& v, const py::object& impulse, Form form, Precision precision) {
+        Arguments given(l.set->model(), {{"q", q}, {"v", v}, {"impulse", impulse}});
+        ConstrainedDynamics::Asked asked;
+        asked.form = form, asked.precision = precision, asked.velocities = true;
+        return on_loops(l, given, asked, {}, Array(std::vector<py::ssize_t>{0, 6}));
+      }, q, v, py::arg("impulse"), py::arg("form"), precision, "v⁺, impulses λ, impulses of loops on b and on a, rank.");
 }
 
 }  // namespace pycraft

@@ -223,13 +223,14 @@ void loop_residuals(const CompiledModel<S>& model, const ResolvedLoops& loops, c
   }
 }
 
-// entry(row, coordinate, number) of Q at q, for those that may be other than zero.
-template <class S, class F>
-void loop_jacobian(const CompiledModel<S>& model, const ResolvedLoops& loops, const S* q, LoopBuffers<S>& w, F entry) {
+// Calls coupling(loop, i, slope) for every coordinate of a coupling, and pair(loop, X) for a pair, whose rows' gradients are w.rows and whose 𝒥
+// is w.columns then.
+template <class S, class C, class P>
+void visit_loop_rows(const CompiledModel<S>& model, const ResolvedLoops& loops, const S* q, LoopBuffers<S>& w, C coupling, P pair) {
   for (const ResolvedLoop& loop : loops.loops) {
     if (loop.loop->is_coupling()) {
       S rate;
-      coupling_row(loop, q, static_cast<const S*>(nullptr), w, rate, [&](int i, const S& slope) { entry(loop.first_row, loop.v[i], slope); });
+      coupling_row(loop, q, static_cast<const S*>(nullptr), w, rate, [&](int i, const S& slope) { coupling(loop, i, slope); });
       continue;
     }
     w.columns.clear();
@@ -239,9 +240,19 @@ void loop_jacobian(const CompiledModel<S>& model, const ResolvedLoops& loops, co
         [&](int i, const Vector6<S>& J, const Vector6<S>&) { w.columns.emplace_back(i, J); });
     std::fill_n(w.rows, loop.rows, PairRow<S>());
     pair_rows(loop.loop->pair, m, w.rows);
-    for (int r = 0; r < loop.rows; ++r)
-      for (const auto& [i, J] : w.columns) entry(loop.first_row + r, i, dot(w.rows[r].gradient, J));
+    pair(loop, m.X);
   }
+}
+
+// entry(row, coordinate, number) of Q at q, for those that may be other than zero.
+template <class S, class F>
+void loop_jacobian(const CompiledModel<S>& model, const ResolvedLoops& loops, const S* q, LoopBuffers<S>& w, F entry) {
+  visit_loop_rows(
+      model, loops, q, w, [&](const ResolvedLoop& loop, int i, const S& slope) { entry(loop.first_row, loop.v[i], slope); },
+      [&](const ResolvedLoop& loop, const Pose<S>&) {
+        for (int r = 0; r < loop.rows; ++r)
+          for (const auto& [i, J] : w.columns) entry(loop.first_row + r, i, dot(w.rows[r].gradient, J));
+      });
 }
 
 // Q̇θ̇ (rows), at q and v.

@@ -239,6 +239,7 @@ def run(seconds: float = 0.1) -> dict[str, list[Figure]]:
     from .bench_frames import frames
     from .bench_hybrid import hybrid
     from .bench_locking import locking
+    from .bench_loops import loops
     from .bench_parts import parts
     from .bench_scenes import scenes
     from .bench_structure import structure
@@ -255,4 +256,5 @@ def run(seconds: float = 0.1) -> dict[str, list[Figure]]:
         "Parts": parts(2 * seconds),
         "Locking": locking(2 * seconds),
         "Structure": structure(),
+        "Loops": loops(),
     }

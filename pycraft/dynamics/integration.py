@@ -9,6 +9,7 @@ import numpy as np
 from .. import _core
 from ..state import at_state
 from .centroidal import CentroidalCalls
+from .constrained import ConstrainedCalls
 from .direct_calls import cached
 from .hybrid import HybridCalls
 from .identification import IdentificationCalls
@@ -24,7 +25,15 @@ if TYPE_CHECKING:
 
 
 class IntegrationCalls(
-    CentroidalCalls, HybridCalls, IdentificationCalls, InterbodyCalls, QuadraticCalls, StaticsCalls, StatisticalCalls, TaskSpaceCalls
+    CentroidalCalls,
+    ConstrainedCalls,
+    HybridCalls,
+    IdentificationCalls,
+    InterbodyCalls,
+    QuadraticCalls,
+    StaticsCalls,
+    StatisticalCalls,
+    TaskSpaceCalls,
 ):
     """q̇ of (q, v), and trajectories under constant generalized forces."""
 

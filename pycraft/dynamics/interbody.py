@@ -40,7 +40,7 @@ class InterbodyCalls:
 
     def interbody_forces(
         self, q=None, v=None, tau=None, *, vdot=None, hinges: Any = None, wrenches: Mapping[Any, Any] | None = None,
-        wrench_axes: str = "world", axes: Any = "body", about: Any = None, part: str = "whole", form: str = "fast",
+        wrench_axes: str = "world", axes: Any = "body", about: Any = None, part: str = "whole", loops: bool = False, form: str = "fast",
         refine: int | str = 0, residual: str = "same", precision: str = "double",
     ) -> np.ndarray:  # fmt: skip
         """The spatial forces (moment; force) that parents put on their children through the hinges: O(N).
@@ -63,6 +63,8 @@ class InterbodyCalls:
         about : a frame, or (3,) in the world's axes: another point for the moments
         part : {"whole", "reaction"}
             "reaction" is what does no work along the hinge's coordinates, f - H⁺H f with H⁺ = H*(HH*)⁻¹ about the child's origin, in metres
+        loops : bool
+            Whether the loops' forces act too: after `constrained_dynamics` under `tau`. A coupling's are along its hinges, in Hf.
         form, refine, residual : as in `forward_dynamics`, of the accelerations
         precision : {"single", "double", "extended", "quad"}, of everything
 
@@ -73,7 +75,7 @@ class InterbodyCalls:
         Raises
         ------
         ModelError
-            A hinge, node or frame that is not there; tau beside vdot; wrenches of another shape, not finite, or on the base.
+            A hinge, node or frame that is not there; tau or loops beside vdot; wrenches of another shape, not finite, or on the base.
         EvaluationError
             Axes and parts that are not there.
         SingularHingeError
@@ -93,7 +95,15 @@ class InterbodyCalls:
         q, v = at_state(self, q, v)
         pushes = pushed(wrenches, wrench_axes)
         rows = hinge_numbers(self, hinges)
-        if known:
+        if loops:
+            if known:
+                raise _core.ModelError("interbody forces on the loops follow from tau: accelerations alone do not tell the loops' forces")
+            how: dict[str, Any] = {"form": form, "refine": refine, "residual": residual, "precision": precision}
+            model: Any = self
+            on_loops = model.constrained_dynamics(q, v, tau, wrenches=wrenches, wrench_axes=wrench_axes, **how)
+            pushes = with_wrenches(pushes, loop_wrenches(self, on_loops.forces, q, pushes[1])[0])
+            f, X, *_ = self._interbody().after(q, v, on_loops.vdot, *pushes, reaction, precision)
+        elif known:
             f, X, *_ = self._interbody().after(q, v, vdot, *pushes, reaction, precision)
         else:
             tau = np.zeros(self.nv) if tau is None else tau
@@ -101,7 +111,8 @@ class InterbodyCalls:
         return in_axes(self, q, f[..., rows, :], X[..., rows, :, :], axes, about)
 
     def base_reaction(self, q=None, v=None, tau=None, *, axes: Any = "world", about: Any = None, **options: Any) -> np.ndarray:
-        """What the base puts on the model, (6,) or (B, 6): the sum of the forces of the hinges on it, by default about the world's origin.
+        """What the base puts on the model, (6,) or (B, 6): the sum of the forces of the hinges on it, by default about the world's origin;
+        with loops=True, of the loops that end there, too.
 
         Arguments are those of `interbody_forces`; axes "body" and "aligned" are of no one body here and are refused. A model that floats
         is carried by nothing: zero to rounding.
@@ -120,7 +131,15 @@ class InterbodyCalls:
             raise _core.EvaluationError("a base reaction is of all hinges on the base; interbody_forces takes hinges=")
         model: Any = self
         on_base = [name for name, hinge in model.hinges.items() if hinge.body.parent is None]
-        return self.interbody_forces(q, v, tau, hinges=on_base, axes=axes, about=about, **options).sum(axis=-2)
+        reaction = self.interbody_forces(q, v, tau, hinges=on_base, axes=axes, about=about, **options).sum(axis=-2)
+        if not options.pop("loops", False):
+            return reaction
+        of_hinges = {"part": options.pop("part", "whole")}
+        if is_reaction(of_hinges["part"]):
+            raise _core.EvaluationError("part='reaction' of a base reaction is of hinges; loops=True takes part='whole'")
+        q, v = at_state(self, q, v)
+        on_base_by_loops = loop_wrenches(self, model.constrained_dynamics(q, v, tau, **options).forces, q, True)[1]
+        return reaction - in_axes(self, q, on_base_by_loops, np.eye(4), axes, about)
 
     def interbody_forces_derivatives(
         self, q=None, v=None, tau=None, *, vdot=None, wrenches: Mapping[Any, Any] | None = None, wrench_axes: str = "world",
@@ -176,6 +195,37 @@ def pushed(wrenches: Mapping[Any, Any] | None, wrench_axes: str) -> tuple[list[s
         return [], True, np.zeros((0, 6))
     shape = (*batches, 6)
     return names, wrench_axes == "world", np.stack([np.broadcast_to(one, shape) for one in each], axis=-2)
+
+
+def with_wrenches(pushes: tuple[list[str], bool, np.ndarray], more: list[tuple[str, np.ndarray]]) -> tuple[list[str], bool, np.ndarray]:
+    """What `pushed` gives, and wrenches (..., 6) by name in the same axes beside it."""
+    names, in_world, given = pushes
+    each = [given[..., i, :] for i in range(len(names))] + [wrench for _, wrench in more]
+    if not each:
+        return pushes
+    shape = np.broadcast_shapes(*(one.shape for one in each))
+    return [*names, *(name for name, _ in more)], in_world, np.stack([np.broadcast_to(one, shape) for one in each], axis=-2)
+
+
+def loop_wrenches(model: Any, forces: Mapping[str, Any], q: Any, in_world: bool) -> tuple[list[tuple[str, np.ndarray]], np.ndarray]:
+    """The loops' forces by the names of the bodies and nodes that they act on, in the world's axes or the node's own; and the sum of those
+    on the base and nodes on it, about the world's origin in its axes."""
+    moved, on_base = [], np.zeros(6)
+    for name, pair in forces.items():
+        for frame, wrench in zip(model.loops.ends(name), pair, strict=True):
+            held = not frame or (frame in model.nodes and model.nodes[frame].body is None)
+            if held and not frame:
+                on_base = on_base + wrench
+                continue
+            if held or in_world:
+                X = model.frame(frame).pose(q)
+                n, f = (np.einsum("...ij,...j->...i", X[..., :3, :3], part) for part in (wrench[..., :3], wrench[..., 3:]))
+                wrench = np.concatenate([n + np.cross(X[..., :3, 3], f) if held else n, f], axis=-1)
+            if held:
+                on_base = on_base + wrench
+            else:
+                moved.append((frame, wrench))
+    return moved, on_base
 
 
 def forces_of_scene(

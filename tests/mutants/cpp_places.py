@@ -18,6 +18,7 @@ TARGETS = [
     "cpp/numerics/tangent.h",
     "cpp/numerics/orthogonalisation.h",
     "cpp/numerics/semidefinite_factors.h",
+    "cpp/numerics/rank_factors.h",
     "cpp/algebra/language/residual_sizes.h",
     "cpp/model/configuration.h",
     "cpp/model/subhinge_kinds.h",

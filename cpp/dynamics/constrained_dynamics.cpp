@@ -1,0 +1,371 @@
+#include "dynamics/constrained_dynamics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "algebra/trees/sweeps/articulated_inertia.h"
+#include "algebra/trees/sweeps/mass_matrix.h"
+#include "model/checks.h"
+#include "recursions/articulated_body.h"
+#include "recursions/kinematics.h"
+
+namespace pycraft {
+
+namespace {
+
+// Of unit columns of W that of which less is left counts as dependent: what noise, ε/σ² in λ and ε/σ in θ̈, and what is left out, σ in the
+// rows, are of one size there. States and models are doubles: in a wider scalar their rounding would make a direction of what has none, as of the
+// redundant row of a spatial linkage.
+template <class S>
+S rank_tolerance() {
+  using std::sqrt;
+  return maximum(S(sqrt(epsilon<S>())), S(64 * epsilon<double>()));
+}
+// The most by which what is returned may miss a row or an equation of motion, of the largest number in it.
+template <class S>
+S certified() {
+  return S(64) * rank_tolerance<S>();
+}
+
+template <class T, class S>
+void take(const std::vector<S>& from, std::vector<T>& to) {
+  to.resize(from.size());
+  for (size_t i = 0; i < from.size(); ++i) to[i] = T(from[i]);
+}
+
+}  // namespace
+
+template <class S>
+ConstrainedWorkspace<S>::ConstrainedWorkspace(const Multibody& model)
+    : source_(model), tree_(model.structure()), model_(model.compiled<S>()), blocks_(tree_), forces_(tree_, model_), z_(tree_.bodies()), alpha_(tree_.bodies()) {
+  for (int k = tree_.bodies() - 1; k >= 0; --k) all_.push_back(k);
+}
+
+template <class S>
+void ConstrainedWorkspace<S>::set_loops(const std::shared_ptr<const ResolvedLoops>& loops) {
+  lambda_.assign(loops->rows, S(0));
+  if (loops_ == loops) return;
+  groups_ = LoopGroups::of(*model_, *loops);
+  systems_.resize(groups_.groups.size()), active_.resize(groups_.groups.size());
+  loop_of_.resize(loops->rows);
+  for (size_t l = 0; l < loops->loops.size(); ++l) std::fill_n(loop_of_.begin() + loops->loops[l].first_row, loops->loops[l].rows, int(l));
+  loops_ = loops;
+}
+
+template <class S>
+void ConstrainedWorkspace<S>::factor() {
+  using std::sqrt;
+  dense_.assign(model_->nv, S(0));
+  unit_.assign(loops_->rows, S(1));
+  for (size_t g = 0; g < groups_.groups.size(); ++g) {
+    const auto& group = groups_.groups[g];
+    const int n = group.coordinates, m = static_cast<int>(group.rows.size());
+    systems_[g].begin(n);
+    scale_.resize(m);
+    active_[g].clear();
+    for (const int row : group.rows) {
+      check_interrupt_at(row, n);
+      const std::vector<int>& reach = groups_.reach[loop_of_[row]];
+      const size_t c = active_[g].size();
+      // What rounding of the row itself is, by epsilon: of all entries at once, or of the largest by its own hinge's inertia.
+      S square = S(0), own = S(0);
+      for (const auto& e : rows_.entries[row]) dense_[e.coordinate] = e.size;
+      half_inverse_tip_to_base(*model_, blocks_, reach, dense_.data(), z_, epsilon_, [&](int k, int i, const S& w) {
+        square += w * w;
+        const S size = dense_[model_->v_offset[k] + i], d = model_->nv_of[k] == 1 ? blocks_.D[blocks_.d_offsets()[k]] : blocks_.pivots(k)[i];
+        own += size * size / d;
+      });
+      const S unit = maximum(square, own) > S(0) ? S(sqrt(maximum(square, own))) : S(1);
+      S left = S(0);
+      systems_[g].add_column();
+      for (const auto& e : rows_.entries[row]) dense_[e.coordinate] = e.value;
+      half_inverse_tip_to_base(*model_, blocks_, reach, dense_.data(), z_, epsilon_,
+                               [&](int k, int i, const S& w) { left += (w / unit) * (w / unit), systems_[g].add_entry(groups_.place[k] + i, w / unit); });
+      for (const auto& e : rows_.entries[row]) dense_[e.coordinate] = S(0);
+      unit_[row] = unit;
+      if (sqrt(left) > rank_tolerance<S>())  // the next row takes the place of one that asks nothing here
+        scale_[c] = unit, active_[g].push_back(row);
+      else
+        systems_[g].drop_column();
+    }
+    systems_[g].factor(scale_.data(), rank_tolerance<S>());
+  }
+}
+
+template <class S>
+int ConstrainedWorkspace<S>::rank() const {
+  int sum = 0;
+  for (const auto& system : systems_) sum += system.rank();
+  return sum;
+}
+
+template <class S>
+void ConstrainedWorkspace<S>::solve(const S* r, S* x) {
+  scratch_.resize(std::max(scratch_.size(), size_t(6) * model_->bodies));
+  mass_matrix_inverse_apply(tree_, blocks_, r, x, 1, scratch_.data());
+}
+
+template <class S>
+S ConstrainedWorkspace<S>::energy_norm(const S* x) {
+  using std::sqrt;
+  S square = S(0);
+  half_inverse_tip_to_base(*model_, blocks_, all_, x, z_, epsilon_, [&](int, int, const S& w) { square += w * w; });
+  return sqrt(square);
+}
+
+template <class S>
+void ConstrainedWorkspace<S>::refuse_rows(const std::vector<S>& off, const S& worst, const char* what) const {
+  std::string named;
+  for (int r = 0; r < loops_->rows; ++r)
+    if (S(2) * off[r] >= worst) named += (named.empty() ? "'" : ", '") + loops_->names[r] + "'";
+  throw EvaluationError(std::string(what) + " of '" + source_.name() + "': " + named);
+}
+
+// Of every group by itself. Where `first`, what the rows ask of one motion and cannot have together is refused.
+template <class S>
+void ConstrainedWorkspace<S>::meet(const S* target, bool first) {
+  using std::abs;
+  const int nv = model_->nv;
+  part_.assign(loops_->rows, S(0)), off_.assign(loops_->rows, S(0));
+  if (first) sizes_.assign(loops_->rows, S(0));
+  S worst = S(0);
+  for (size_t g = 0; g < systems_.size(); ++g) {
+    const auto& rows = groups_.groups[g].rows;
+    const size_t m = active_[g].size();
+    b_.resize(m), scale_.resize(m), conflict_.resize(m);
+    const auto asked = [&](int row) { return S(-(rows_.product(row, x_.data()) + target[row])); };
+    for (size_t c = 0; c < m; ++c) b_[c] = asked(active_[g][c]);
+    systems_[g].solve(b_.data(), scale_.data(), conflict_.data());
+    for (size_t c = 0; c < m; ++c) part_[active_[g][c]] = scale_[c];
+    if (!first) continue;
+    S size = S(0);
+    for (const int row : rows) size = maximum(size, S((rows_.product_size(row, x_.data()) + bias_[row]) / unit_[row]));
+    for (const int row : rows) sizes_[row] = size, off_[row] = abs(asked(row)) / unit_[row];
+    for (size_t c = 0; c < m; ++c) off_[active_[g][c]] = abs(conflict_[c]);
+    for (const int row : rows) {
+      if (off_[row] <= certified<S>() * size) off_[row] = S(0);
+      worst = maximum(worst, off_[row]);
+    }
+  }
+  if (worst > S(0))
+    refuse_rows(off_, worst, "rows of loops hang together and ask for different accelerations of one motion, at a singular state or by functions that conflict,");
+  delta_.assign(nv, S(0)), r_.assign(nv, S(0));
+  rows_.add_transposed(part_.data(), r_.data());
+  solve(r_.data(), delta_.data());
+  for (int i = 0; i < nv; ++i) x_[i] += delta_[i];
+  for (int r = 0; r < loops_->rows; ++r) lambda_[r] += part_[r];
+}
+
+// One step of refinement of both equations: r = T + Q*λ - (the forces of x), and what the rows are off by.
+template <class S>
+void ConstrainedWorkspace<S>::correct(const Asked& asked, const Applied<S>& applied) {
+  const int nv = model_->nv;
+  const bool wider = asked.refinement.wider() || asked.refinement.gathers_wider();
+  r_.assign(nv, S(0)), target_.resize(loops_->rows);
+  if constexpr (!std::is_same_v<S, Quad>) {
+    if (wider) {
+      using T = Wider<S>;
+      const auto model = source_.compiled<T>();
+      const int bodies = model_->bodies;
+      std::vector<T> q(asked.q, asked.q + model_->nq), v(asked.v, asked.v + nv), x, lambda, force(nv), load(asked.tau, asked.tau + nv), c(loops_->rows), r(loops_->rows);
+      std::vector<Vector6<T>> pushed;
+      const Applied<T> same = converted(applied, bodies, pushed);
+      LoopBuffers<T> buffers;
+      LoopRows<T> rows;
+      take(x_, x), take(lambda_, lambda);
+      rows.find(*model, *loops_, q.data(), buffers);
+      loop_bias(*model, *loops_, q.data(), v.data(), buffers, c.data());
+      if (asked.beta != 0) loop_residuals(*model, *loops_, q.data(), buffers, r.data());
+      for (int i = 0; i < loops_->rows; ++i)
+        target_[i] = static_cast<S>(T(rows.product(i, x.data()) + c[i] + T(2 * asked.alpha) * rows.product(i, v.data()) + T(asked.beta) * T(asked.beta) * r[i]));
+      if (!wider_) wider_ = std::make_unique<RigidDynamics<T>>(source_);
+      wider_->inverse_dynamics(q.data(), v.data(), x.data(), force.data(), &same);
+      rows.add_transposed(lambda.data(), load.data());
+      for (int i = 0; i < nv; ++i) r_[i] = static_cast<S>(T(load[i] - force[i]));
+      std::vector<S> kept = x_, start = target_;
+      solve(r_.data(), x_.data());
+      for (int i = 0; i < loops_->rows; ++i) target_[i] = start[i];
+      meet(target_.data(), false);
+      for (int i = 0; i < nv; ++i) x_[i] += kept[i];
+      return;
+    }
+  }
+  if (wider) throw EvaluationError("accelerations on loops in precision 'quad' have no wider residual; ask for residual='same'");
+  forces_.find(asked.v, x_.data(), applied);
+  for (int i = 0; i < nv; ++i) r_[i] = asked.tau[i] - forces_.generalized()[i];
+  rows_.add_transposed(lambda_.data(), r_.data());
+  for (int i = 0; i < loops_->rows; ++i) target_[i] = rows_.product(i, x_.data()) + c_[i];
+  std::vector<S> kept = x_;
+  solve(r_.data(), x_.data());
+  const std::vector<S> start = target_;
+  meet(start.data(), false);
+  for (int i = 0; i < nv; ++i) x_[i] += kept[i];
+}
+
+// Whether θ̈ and λ keep both equations, in units of energy: what is off in the rows, and in the equations of motion.
+template <class S>
+bool ConstrainedWorkspace<S>::sure(const Asked& asked, const Applied<S>& applied, bool refuse) {
+  using std::abs;
+  const int nv = model_->nv;
+  if (std::any_of(x_.begin(), x_.end(), [](const S& x) { return !std::isfinite(to_double(x)); })) return true;  // batches say what left its range
+  off_.assign(loops_->rows, S(0));
+  S worst = S(0);
+  for (const auto& group : groups_.groups) {
+    S size = S(0);  // what has cancelled in the rows: the tree's own accelerations, or those of the result
+    for (const int row : group.rows) size = maximum(size, maximum(sizes_[row], S((rows_.product_size(row, x_.data()) + bias_[row]) / unit_[row])));
+    for (const int row : group.rows) {
+      const S left = abs(rows_.product(row, x_.data()) + c_[row]) / unit_[row];
+      if (left <= certified<S>() * size) continue;
+      off_[row] = left;
+      worst = maximum(worst, left);
+    }
+  }
+  if (worst > S(0)) {
+    if (refuse) refuse_rows(off_, worst, "no sure accelerations, near a singular state or by rounding (take refine='auto', or a wider precision): off are rows");
+    return false;
+  }
+  std::vector<S> load(nv, S(0)), rest(nv, S(0));
+  forces_.find(asked.v, rest.data(), applied);
+  rest = forces_.generalized();
+  S size = energy_norm(rest.data()) + energy_norm(asked.tau);
+  rows_.add_transposed(lambda_.data(), load.data());
+  size += energy_norm(load.data());
+  forces_.find(asked.v, x_.data(), applied);
+  for (int i = 0; i < nv; ++i) load[i] += asked.tau[i] - forces_.generalized()[i];
+  if (const S left = energy_norm(load.data()); !(left <= certified<S>() * size)) {
+    if (!refuse) return false;
+    int most = 0;
+    for (int i = 1; i < nv; ++i)
+      if (abs(load[i]) > abs(load[most])) most = i;
+    int k = 0;
+    while (k + 1 < model_->bodies && model_->v_offset[k + 1] <= most) ++k;
+    throw EvaluationError("no sure accelerations of '" + source_.name() + "': its equations of motion are left off, most at hinge '" + source_.body(k).hinge.name +
+                          "' (take refine='auto', or a wider precision)");
+  }
+  return true;
+}
+
+template <class S>
+void ConstrainedWorkspace<S>::accelerate(const std::shared_ptr<const ResolvedLoops>& loops, const Asked& asked) {
+  using std::abs;
+  set_loops(loops);
+  const int nv = model_->nv, rows = loops->rows;
+  kinematics(*model_, asked.q, blocks_);
+  point_accelerations_base_to_tip(*model_, blocks_.pose.data(), blocks_.H.data(), asked.v, OwnTerms::absorbed, points_);
+  forces_.place(asked.q);
+  Applied<S> applied = own_gravity(*model_);
+  if (asked.wrenches) applied.wrenches = forces_.on_bodies(*asked.pushed, asked.wrenches);
+  blocks_.form = asked.form;
+  x_.resize(nv);
+  articulated_body(tree_, *model_, blocks_, points_, applied, asked.tau, x_.data(), z_, alpha_);
+  if (blocks_.faint().body >= 0) throw_faint_hinge(tree_, blocks_.faint());
+  for (int i = 0; i < nv; ++i) x_[i] -= points_.absorbed[i];
+  rows_.find(*model_, *loops, asked.q, buffers_);
+  // c, and what it is the sum of
+  c_.assign(rows, S(0)), bias_.assign(rows, S(0));
+  loop_bias(*model_, *loops, asked.q, asked.v, buffers_, c_.data());
+  S fastest = S(0);
+  for (int i = 0; i < nv; ++i) fastest = maximum(fastest, S(abs(asked.v[i])));
+  for (int r = 0; r < rows; ++r) bias_[r] = abs(c_[r]) + fastest * rows_.product_size(r, asked.v);
+  if (asked.alpha != 0)
+    for (int r = 0; r < rows; ++r) c_[r] += S(2 * asked.alpha) * rows_.product(r, asked.v), bias_[r] += S(2 * std::abs(asked.alpha)) * rows_.product_size(r, asked.v);
+  if (asked.beta != 0) {
+    target_.assign(rows, S(0));
+    loop_residuals(*model_, *loops, asked.q, buffers_, target_.data());
+    for (int r = 0; r < rows; ++r) c_[r] += S(asked.beta) * S(asked.beta) * target_[r], bias_[r] += abs(S(asked.beta) * S(asked.beta) * target_[r]);
+  }
+  factor();
+  meet(c_.data(), true);
+  const int steps = asked.refinement.steps == Refinement::automatic ? 5 : asked.refinement.steps;
+  S last = S(0);
+  for (int step = 0; step < steps; ++step) {
+    std::vector<S> before = x_;
+    correct(asked, applied);
+    S moved = S(0), size = S(0);
+    for (int i = 0; i < nv; ++i) moved = maximum(moved, S(abs(x_[i] - before[i]))), size = maximum(size, S(abs(x_[i])));
+    if (moved <= S(4) * epsilon<S>() * size || (step > 0 && S(2) * moved > last)) break;
+    last = moved;
+  }
+  for (int more = 0; !sure(asked, applied, more == 3); ++more) correct(asked, applied);
+}
+
+template <class S>
+void ConstrainedWorkspace<S>::project(const std::shared_ptr<const ResolvedLoops>& loops, const S* q, const S* v, const S* p, Form form) {
+  using std::abs;
+  set_loops(loops);
+  const int nv = model_->nv, rows = loops->rows;
+  kinematics(*model_, q, blocks_);
+  blocks_.form = form;
+  articulated_inertia_tip_to_base(tree_, blocks_);
+  if (blocks_.faint().body >= 0) throw_faint_hinge(tree_, blocks_.faint());
+  rows_.find(*model_, *loops, q, buffers_);
+  factor();
+  x_.resize(nv);
+  solve(p, x_.data());
+  for (int i = 0; i < nv; ++i) x_[i] += v[i];
+  c_.assign(rows, S(0)), bias_.assign(rows, S(0));
+  for (int r = 0; r < rows; ++r) bias_[r] = rows_.product_size(r, x_.data());
+  for (int time = 0; time < 2; ++time) meet(c_.data(), false);  // twice: what is left of the rows is rounding
+  off_.assign(rows, S(0));
+  S worst = S(0);
+  for (const auto& group : groups_.groups) {
+    S size = S(0);
+    for (const int row : group.rows) size = maximum(size, S(bias_[row] / unit_[row]));
+    for (const int row : group.rows)
+      if (const S left = abs(rows_.product(row, x_.data())) / unit_[row]; !(left <= certified<S>() * size)) off_[row] = left == left ? left : S(1), worst = maximum(worst, off_[row]);
+  }
+  if (worst > S(0)) refuse_rows(off_, worst, "no sure velocities on the loops, near a singular state or by rounding (take a wider precision): off are rows");
+}
+
+template <class S>
+Vector6<S> ConstrainedWorkspace<S>::force(int loop, bool on_a) const {
+  const ResolvedLoop& of = loops_->loops[loop];
+  Vector6<S> f = Vector6<S>::zero();
+  if (of.loop->is_coupling()) return f;
+  for (int r = of.first_row; r < of.first_row + of.rows; ++r) f = f + lambda_[r] * rows_.gradients[r];
+  if (!on_a) return force_to_parent(cast<S>(of.loop->pair.end_b), f);
+  return force_to_parent(cast<S>(of.loop->pair.end_a), S(-1) * force_to_parent(rows_.ends[loop], f));
+}
+
+void ConstrainedDynamics::run(const Asked& asked, const Results& out) {
+  const ModelInUse use(model());
+  check_given(model(), {asked.q, asked.v, asked.input});
+  for (int b = 0; b < (asked.wrenches.batch < 0 ? 1 : asked.wrenches.batch); ++b)
+    for (int i = 0; i < asked.wrenches.width; ++i)
+      if (!std::isfinite(asked.wrenches.at(b)[i])) throw ModelError("the wrench on '" + asked.pushed->nodes[i / 6].name + "' has an entry that is not finite");
+  if (!std::isfinite(asked.alpha) || !std::isfinite(asked.beta) || asked.alpha < 0 || asked.beta < 0)
+    throw ModelError("Baumgarte's alpha and beta are finite numbers, zero or more (1/s), not " + short_number(asked.alpha) + " and " + short_number(asked.beta));
+  const auto loops = loops_->resolved();
+  const int common = common_batch({asked.q, asked.v, asked.input, asked.wrenches}), states = common < 0 ? 1 : common;
+  const int nv = model().nv(), rows = loops->rows, count = static_cast<int>(loops->loops.size());
+  at_precision(asked.precision, [&]<class S>(S) {
+    if constexpr (!available_at<ConstrainedWorkspace, S>) {
+      throw EvaluationError(to_quad);
+    } else {
+      std::vector<S> q, v, input, wrenches;
+      each<S>(0, states, states, [&](ConstrainedWorkspace<S>& w, int b) {
+        const auto read = [b](const Given& given, std::vector<S>& to) { to.assign(given.at(b), given.at(b) + given.width); };
+        read(asked.q, q), read(asked.v, v), read(asked.input, input), read(asked.wrenches, wrenches);
+        if (asked.velocities)
+          w.project(loops, q.data(), v.data(), input.data(), asked.form);
+        else
+          w.accelerate(loops, {q.data(), v.data(), input.data(), wrenches.empty() ? nullptr : wrenches.data(), asked.pushed, asked.form, asked.refinement, asked.alpha, asked.beta});
+        for (int i = 0; i < nv; ++i) out.x[size_t(b) * nv + i] = to_double(w.result()[i]);
+        for (int r = 0; r < rows; ++r) out.multipliers[size_t(b) * rows + r] = to_double(w.multipliers()[r]);
+        for (int l = 0; l < count; ++l)
+          for (int side = 0; side < 2; ++side) write(w.force(l, side == 1), out.forces + ((size_t(b) * count + l) * 2 + side) * 6);
+        out.rank[b] = w.rank();
+        require_finite(out.x + size_t(b) * nv, nv, model());
+        require_finite(out.multipliers + size_t(b) * rows, rows, model());
+      });
+    }
+  });
+}
+
+template class ConstrainedWorkspace<Single>;
+template class ConstrainedWorkspace<double>;
+template class ConstrainedWorkspace<Extended>;
+template class ConstrainedWorkspace<Quad>;
+
+}  // namespace pycraft

@@ -1,0 +1,174 @@
+"""Forward dynamics and impacts of models on their loops, by tree augmentation (docs/loops.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .. import _core
+from ..arguments import one_number, text
+from ..state import at_state
+from .interbody import pushed
+
+METHODS = ("augment",)
+
+
+class LoopForce(NamedTuple):
+    """What a loop puts on the two frames that it joins, the moment first, each in its frame's axes about its origin (N m, N).
+
+    b, a : (6,) or (B, 6); zeros of couplings, whose forces are those along their coordinates, Q*λ. Of velocities: impulses (N m s, N s).
+    """
+
+    b: np.ndarray
+    a: np.ndarray
+
+
+@dataclass(frozen=True)
+class ConstrainedDynamics:
+    """Accelerations of a model on its loops, with a leading axis (B, ...) for batches.
+
+    Attributes
+    ----------
+    vdot : (nv,)
+    multipliers : (rows,) in the order of `loops.rows`: (ℳ + J) v̇ + 𝒞 = τ + Q*λ. Of a row along a direction λ is the force on b by a there
+        (N), of one about it the moment (N m).
+    by_loop : the same by the loops' names, (rows of the loop,) each
+    forces : `LoopForce` by the loops' names
+    rank : () the rank of Q that was found; rows - rank multipliers are a choice, the least Σ λ²
+    """
+
+    vdot: np.ndarray
+    multipliers: np.ndarray
+    by_loop: Mapping[str, np.ndarray]
+    forces: Mapping[str, LoopForce]
+    rank: np.ndarray
+
+
+@dataclass(frozen=True)
+class ConstrainedVelocities:
+    """Velocities that keep the rows of all loops, after the impulse that takes a model there, with a leading axis for batches.
+
+    Attributes
+    ----------
+    v : (nv,) with Q v = 0
+    multipliers : (rows,) impulses: (ℳ + J)(v - v⁻) = p + Q*λ
+    by_loop, forces, rank : as of `ConstrainedDynamics`
+    """
+
+    v: np.ndarray
+    multipliers: np.ndarray
+    by_loop: Mapping[str, np.ndarray]
+    forces: Mapping[str, LoopForce]
+    rank: np.ndarray
+
+
+class ConstrainedCalls:
+    """Equations of motion with the loops' forces in them."""
+
+    nv: int
+    loops: Any
+
+    def constrained_dynamics(
+        self, q=None, v=None, tau=None, *, wrenches: Mapping[Any, Any] | None = None, wrench_axes: str = "world", method: str = "augment",
+        form: str = "fast", refine: int | str = 0, residual: str = "same", precision: str = "double", alpha: float = 0.0, beta: float = 0.0,
+    ) -> ConstrainedDynamics:  # fmt: skip
+        """Forward dynamics on the loops: v̇ that keeps every row, and the loops' forces. No mass matrix is formed.
+
+        (ℳ + J) v̇ + 𝒞 = τ + Q*λ,   Q v̇ + Q̇v + 2α Qv + β² r = 0,   by   Q(ℳ + J)⁻¹Q* λ = -(Q v̇_free + ...):
+
+        v̇_free and the factors of Q(ℳ + J)⁻¹Q* by the articulated bodies, of each group of loops that share hinges by itself. Dependent
+        rows are found by rank, and have the multipliers of least Σ λ²; v̇ does not hang on that choice.
+
+        Parameters
+        ----------
+        q, v : (nq,), (nv,), each with an optional leading batch axis; states on the loops (`assemble`) where λ is to mean something
+        tau : (nv,), N m and N; zeros by default
+        wrenches, wrench_axes : as in `interbody_forces`
+        method : {"augment"}
+        form : {"fast", "ud", "square-root"}, of the tree's sweep
+        refine, residual : int or "auto", {"same", "wider"}
+            Steps of refinement of both equations, with residuals in the same or the next wider precision ("wider" to "extended").
+        precision : {"single", "double", "extended", "quad"}, of everything
+        alpha, beta : float, 1/s
+            Baumgarte's: r̈ + 2α ṙ + β² r = 0, of rows of velocities ṙ alone.
+
+        Returns
+        -------
+        ConstrainedDynamics
+
+        Raises
+        ------
+        EvaluationError
+            Rows that ask different accelerations of one motion (at singular states, where v leaves no branch; functions that conflict), by
+            name. Results that miss a row or an equation of motion, near singular states, by name: what is returned was put into both. A
+            method that is not there.
+        SingularHingeError
+            As `forward_dynamics`, of the tree alone; also where a coordinate feels hardly any inertia.
+        ModelError
+            Arrays of another shape, not finite; a loop that has lost a body; alpha or beta below zero.
+
+        Rows count as dependent where in units of their own, and of energy, less than √ε of them is left beside the others (in
+        "quad" 64 ε of a double: states are doubles); a row or an equation is missed from 64 times that of its largest term on.
+
+        Cost: O(N), O(depth) a row, and up to rows² · coordinates in each group; linear in loops
+        that share hinges with a few others (docs/loops.md).
+        Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, ch. 11; J. Baumgarte 1972.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> bars = pc.chain(3)
+        >>> closure = bars.add_loop("body2", hinge="pin", point=(1, 0, 0), name="closure")
+        >>> bars.gravity = (0, -10, 0)
+        >>> square = bars.constrained_dynamics([np.pi / 2, -np.pi / 2, -np.pi / 2], [0, 0, 0])  # balanced: cranks upright
+        >>> (square.forces["closure"].b.round(9) + 0).tolist()  # a crank of 1 kg and half of the rod on top, carried by the ground
+        [0.0, 0.0, 0.0, -15.0, 0.0, 0.0]
+        >>> int(square.rank), bars.loops.rows[0], float(square.multipliers[0])  # planar: three rows ask nothing
+        (2, 'closure: about x', 0.0)
+        """
+        text(method, "method")
+        if method not in METHODS:
+            raise _core.EvaluationError(f"method={method!r} of constrained dynamics: there are {', '.join(map(repr, METHODS))}")
+        q, v = at_state(self, q, v)
+        tau = np.zeros(self.nv) if tau is None else tau
+        numbers = one_number(alpha, "alpha"), one_number(beta, "beta")
+        given = self.loops._core.accelerations(q, v, tau, *pushed(wrenches, wrench_axes), form, refine, residual, precision, *numbers)
+        return ConstrainedDynamics(*_by_loop(self.loops, *given))
+
+    def constrained_velocities(
+        self, q=None, v=None, impulse=None, *, form: str = "fast", precision: str = "double"
+    ) -> ConstrainedVelocities:  # fmt: skip
+        """Velocities taken onto the rows of all loops by an impulse of the loops: what is nearest in kinetic energy, and loses least.
+
+        (ℳ + J)(v⁺ - v) = p + Q*λ,   Q v⁺ = 0: a plastic impact, as when loops close; rows of velocities are kept, too.
+
+        Parameters
+        ----------
+        q, v : (nq,), (nv,), each with an optional leading batch axis
+        impulse : (nv,), p along the coordinates, N m s and N s; zeros by default
+        form, precision : as in `constrained_dynamics`, whose factors, errors and cost these are
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> gears = pc.chain(2)
+        >>> gear = gears.add_coupling({"hinge0": 1.0, "hinge1": -1.0}, name="gear")
+        >>> after = gears.constrained_velocities([0, 0], [1.0, 0.0])
+        >>> after.v.round(6).tolist()
+        [0.75, 0.75]
+        """
+        q, v = at_state(self, q, v)
+        impulse = np.zeros(self.nv) if impulse is None else impulse
+        return ConstrainedVelocities(*_by_loop(self.loops, *self.loops._core.velocities(q, v, impulse, form, precision)))
+
+
+def _by_loop(
+    loops: Any, x: np.ndarray, multipliers: np.ndarray, forces: np.ndarray, rank: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray], dict[str, LoopForce], np.ndarray]:  # fmt: skip
+    first = loops._core.first_rows()
+    by_loop = {name: multipliers[..., first[i] : first[i + 1]] for i, name in enumerate(loops)}
+    each = {name: LoopForce(forces[..., i, 0, :], forces[..., i, 1, :]) for i, name in enumerate(loops)}
+    return x, multipliers, by_loop, each, rank
