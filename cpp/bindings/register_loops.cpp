@@ -5,6 +5,7 @@
 #include "bindings/direct_calls.h"
 #include "bindings/hinge_arguments.h"
 #include "dynamics/loop_calls.h"
+#include "operators/embedded_operators.h"
 
 namespace pycraft {
 
@@ -130,6 +131,14 @@ void register_loops(py::module_& m) {
       .def("bias", [](Loops& l, const py::object& q, const py::object& v, Precision precision) {
         return rows_at(l, {{"q", q}, {"v", v}}, {l.rows()}, [&](Arguments& given, double* out) { l.calls.bias(precision, given[0], given[1], out); });
       }, q, v, precision);
+  m.def("_embedded", [](const std::shared_ptr<MultibodyOperators>& base, const Loops& l,
+                        const std::vector<std::tuple<std::vector<int>, std::vector<int>, std::vector<int>>>& sets) {
+    const ModelInUse use(l.set->model());
+    std::vector<EmbeddedLoops> embedded;
+    for (const auto& [bodies, rows, dependent] : sets) embedded.push_back({bodies, rows, dependent});
+    return embedded_operators(base, l.set, std::move(embedded));
+  }, py::arg("base"), py::arg("loops"), py::arg("sets"), "Of each set: bodies, rows of loops, dependent coordinates, by number.");
+  m.def("_embedded_again", [](const py::object& model, const py::object& sets) { return of_face("embedded_source")(model, sets); }, "As it was pickled.");
 }
 
 }  // namespace pycraft
