@@ -42,16 +42,22 @@ def embedded_accelerations(model: Any, q: Any = None, v: Any = None, tau: Any = 
     >>> bool(np.abs(bars.loops.jacobian(state) @ vdot + bars.loops.bias(state)).max() < 1e-12)
     True
     """
-    q, v = (np.asarray(part, float) for part in at_state(model, q, v))
-    if v.shape[-1:] != (model.nv,) or q.shape[-1:] != (model.nq,):
-        raise _core.ModelError(f"states of {model.name!r} have {model.nq} numbers q and {model.nv} v, not arrays {q.shape} and {v.shape}")
-    tau = np.zeros(model.nv) if tau is None else _core.real_array(tau, "tau")
-    if tau.shape[-1:] != (model.nv,) or not np.isfinite(tau).all():
-        raise _core.ModelError(f"tau of {model.name!r} takes {model.nv} finite numbers a state, not an array {tau.shape}")
-    batch = np.broadcast_shapes(q.shape[:-1], v.shape[:-1], tau.shape[:-1])
-    if 0 in batch:
+    q, v = at_state(model, q, v)
+    given = {"q": (q, model.nq), "v": (v, model.nv), "tau": (np.zeros(model.nv) if tau is None else tau, model.nv)}
+    arrays = {name: np.asarray(_core.real_array(part, name), float) for name, (part, _) in given.items()}
+    for name, (_, width) in given.items():
+        if arrays[name].ndim not in (1, 2) or arrays[name].shape[-1] != width:
+            raise _core.ModelError(f"{name} of {model.name!r} takes {width} numbers a state, not an array {arrays[name].shape}")
+    q, v, tau = arrays.values()
+    if not np.isfinite(tau).all():
+        raise _core.ModelError(f"tau of {model.name!r} takes {model.nv} finite numbers a state")
+    try:
+        batch = np.broadcast_shapes(q.shape[:-1], v.shape[:-1], tau.shape[:-1])
+    except ValueError:
+        raise _core.ModelError(f"q, v and tau are of as many states, not arrays {q.shape}, {v.shape} and {tau.shape}") from None
+    if 0 in batch or model.nv == 0:
         return np.zeros((*batch, model.nv))
-    soa = model.soa.embedded(independent, q.reshape(-1, model.nq)[0])
+    soa = model.soa.embedded(independent, q if q.ndim == 1 else q[0])
     bias = soa.H @ soa.phi @ (soa.M @ soa.phi.T @ (soa.a + soa.gravity_base) + soa.b)
     rate = soa.X_r_dot @ soa.theta_dot
     felt = bias + soa.X_r.T @ soa.unconstrained.J @ rate

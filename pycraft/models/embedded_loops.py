@@ -123,6 +123,7 @@ def embedded(whole: OperatorSet, independent: Any, q: Any) -> EmbeddedOperators:
     model: Any = whole._model
     if model is None or not isinstance(whole._source, _core.MultibodyOperators):
         raise _core.ModelError(f"loops of {whole._source.name!r} are not embedded: it is no multibody model of its own")
+    q = _core.real_array(at_state(model, q)[0], "q")
     mobility = model.mobility(q)  # refuses states that are off the loops
     if mobility.singular:
         lost = ", ".join(map(repr, mobility.lost))
@@ -131,7 +132,7 @@ def embedded(whole: OperatorSet, independent: Any, q: Any) -> EmbeddedOperators:
             "embed them at a state beside it, q="
         )
     wanted = _wanted(model, independent)
-    Q = model.loops.jacobian(model.q if q is None else getattr(q, "q", q))
+    Q = model.loops.jacobian(q)
     sets: list[Set] = []
     for bodies, rows in _bodies_around(model, Q):
         coordinates = [i for k in bodies for i in _coordinates(whole._source, k)]

@@ -169,6 +169,51 @@ def test_states_of_independent_coordinates():
         soa.state([1.0], [np.nan])
 
 
+@pytest.mark.parametrize("name", ["four-bar", "spatial"])
+def test_written_out(name):
+    """The recursion in Python, run, gives the numbers; X_r is given."""
+    soa = MODELS[name]().soa.embedded()
+    for op in ((soa.MM + soa.J).inv(), soa.MM, soa.X_r, soa.X_r.T @ soa.unconstrained.MM @ soa.X_r):
+        x, names = np.random.default_rng(9).normal(size=op.shape[1]), {"__name__": "written"}
+        written = op.algorithm("python")
+        exec(compile(written.python(), "written.py", "exec"), names)
+        expected = op @ x
+        assert np.allclose(names["algorithm"](written.data(), x), expected, rtol=1e-11, atol=1e-11 * np.abs(expected).max())
+
+
+def test_bodies_and_coordinates_of_each_set():
+    """Overlapping loops are one node; what is on two roots is, too; what hangs outboard is no part of it."""
+    names = two_loops().soa.embedded()._source.body_names
+    assert names == ["body0+body1+body2+body3+body4+body5", "body6+body7+body8"]
+    source = spatial().soa.embedded()._source
+    assert source.body_names == ["body0", "body1+body2+body3+body5+body6", "body4"] and source.parents == [-1, 0, 1]
+    nested = pc.tree([-1, 0, 1, 2, 3], ["pin"] * 5, seed=1)
+    nested.add_coupling({"hinge0": 1.0, "hinge1": -1.0}, name="inner")
+    nested.add_coupling({"hinge3": 1.0, "hinge4": 2.0}, name="outer")
+    nested.q = np.zeros(5)
+    assert nested.soa.embedded()._source.body_names == ["body0+body1", "body2", "body3+body4"]
+
+
+def test_bad_states_and_welds():
+    model = closed_four_bar()
+    for call in (
+        lambda: model.soa.embedded(q="x"),
+        lambda: embedded_accelerations(model, "x"),
+        lambda: embedded_accelerations(model, tau="x"),
+    ):
+        with pytest.raises(pc.ModelError, match="not an array of numbers"):
+            call()
+    with pytest.raises(pc.ModelError, match="of as many states"):
+        embedded_accelerations(model, np.tile(model.q, (2, 1)), np.zeros((3, 3)))
+    weld = pc.Multibody("weld")
+    weld.add_body("a", None, "weld", mass=1.0)
+    assert embedded_accelerations(weld).shape == (0,)
+    held = pc.chain(2)
+    held.add_coupling({"hinge0": 1.0}, name="first")
+    held.add_coupling({"hinge1": 1.0}, name="second")
+    assert held.soa.embedded().X_r.shape == (2, 0) and not embedded_accelerations(held, tau=[1.0, 2.0]).any()
+
+
 def test_copies_and_edits():
     model = closed_four_bar()
     soa = model.soa.embedded()
