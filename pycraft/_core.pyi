@@ -7,7 +7,7 @@ import fractions
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Binding', 'Centroidal', 'Curvature', 'Dynamics', 'Effect', 'Error', 'EvaluationError', 'FrameTree', 'FunctionOfTime', 'GroupedOperators', 'HingeKind', 'HybridDynamics', 'Integration', 'InterbodyForces', 'Letter', 'LoopSet', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'PreparedHybridDynamics', 'RefinementError', 'RunRecord', 'Scalar', 'SceneCalls', 'SceneEffects', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'alone', 'blockdiag', 'bushing_effect', 'check_pairing', 'checked_refinement', 'compiled_call', 'constant', 'constant_in_time', 'coordinates_named', 'coulomb_friction_effect', 'damping_effect', 'direct_call', 'direct_calls', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'fixman_effect', 'float128', 'forms', 'gravity_effect', 'gravity_gradient_effect', 'harmonic', 'hermite_between', 'hinge_kinds', 'identity', 'implicit_damping_effect', 'implicit_spring_effect', 'instruction_set', 'instruction_sets', 'integrator_table', 'integrators', 'kernel_headers', 'kernel_tape', 'langevin_effect', 'limits_effect', 'methods', 'motor_effect', 'node_damper_effect', 'node_spring_effect', 'nose_hoover_effect', 'numbers_in_q', 'operators_of', 'pack_width', 'piecewise_polynomial', 'point_mass_gravity_effect', 'precisions', 'prepared_call', 'prescribed_by', 'prescribed_effect', 'python_effect', 'python_function_of_time', 'quadratic_damping_effect', 'real_array', 'record_from', 'residual', 'rotor_inertia_effect', 'run_scene', 'run_scenes', 'scalar', 'scene_at_rest', 'scene_between', 'scene_interbody_forces', 'scene_linearized', 'servo_effect', 'spring_effect', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_by_hand', 'time_compiled', 'time_dynamics', 'time_forward', 'time_hybrid', 'time_method', 'time_packs', 'time_passes', 'time_scene', 'torque_source_effect', 'vector', 'wider', 'wrench_effect', 'zero']
+__all__: list[str] = ['Binding', 'Centroidal', 'Curvature', 'Dynamics', 'Effect', 'EmbeddedOperators', 'Error', 'EvaluationError', 'FrameTree', 'FunctionOfTime', 'GroupedOperators', 'HingeKind', 'HybridDynamics', 'Integration', 'InterbodyForces', 'Letter', 'LoopSet', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'PreparedHybridDynamics', 'RefinementError', 'RunRecord', 'Scalar', 'SceneCalls', 'SceneEffects', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'alone', 'blockdiag', 'bushing_effect', 'check_pairing', 'checked_refinement', 'compiled_call', 'constant', 'constant_in_time', 'coordinates_named', 'coulomb_friction_effect', 'damping_effect', 'direct_call', 'direct_calls', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'fixman_effect', 'float128', 'forms', 'gravity_effect', 'gravity_gradient_effect', 'harmonic', 'hermite_between', 'hinge_kinds', 'identity', 'implicit_damping_effect', 'implicit_spring_effect', 'instruction_set', 'instruction_sets', 'integrator_table', 'integrators', 'kernel_headers', 'kernel_tape', 'langevin_effect', 'limits_effect', 'methods', 'motor_effect', 'node_damper_effect', 'node_spring_effect', 'nose_hoover_effect', 'numbers_in_q', 'operators_of', 'pack_width', 'piecewise_polynomial', 'point_mass_gravity_effect', 'precisions', 'prepared_call', 'prescribed_by', 'prescribed_effect', 'python_effect', 'python_function_of_time', 'quadratic_damping_effect', 'real_array', 'record_from', 'residual', 'rotor_inertia_effect', 'run_scene', 'run_scenes', 'scalar', 'scene_at_rest', 'scene_between', 'scene_interbody_forces', 'scene_linearized', 'servo_effect', 'spring_effect', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_by_hand', 'time_compiled', 'time_dynamics', 'time_forward', 'time_hybrid', 'time_method', 'time_packs', 'time_passes', 'time_scene', 'torque_source_effect', 'vector', 'wider', 'wrench_effect', 'zero']
 
 class Error(Exception): ...
 class SpaceError(Error, TypeError): ...
@@ -257,7 +257,7 @@ class SkoSource:
     @property
     def derived_from(self) -> typing.Any:
         """
-        How this tree was made of a model's, "hinge subset", "world frame", "cut tree", "another root" or "groups of bodies", and that model's source; None for a model's own.
+        How this tree was made of a model's, "hinge subset", "world frame", "cut tree", "another root", "groups of bodies" or "embedded loops", and that model's source; None for a model's own.
         """
     @property
     def dof(self) -> list[int]:
@@ -793,6 +793,33 @@ class GroupedOperators(SkoSource):
     @property
     def model(self) -> Multibody:
         ...
+class EmbeddedOperators(SkoSource):
+    """
+    The source of a multibody model's operators with its loops embedded.
+    """
+    @property
+    def dependent(self) -> list[list[int]]:
+        """
+        Of each set of loops that hang together: the tree's coordinates that follow from the others.
+        """
+    @property
+    def grouped(self) -> GroupedOperators:
+        """
+        The same groups of bodies, nothing embedded.
+        """
+    @property
+    def independent(self) -> list[int]:
+        """
+        The tree's coordinate of each of Θ.
+        """
+    @property
+    def model(self) -> Multibody:
+        ...
+    @property
+    def rows(self) -> list[list[int]]:
+        """
+        Of each set: the rows of loops that these are solved from.
+        """
 class MatrixTree(SkoSource):
     """
     A tree whose blocks E, H, M, J are given as matrices of any size.
@@ -1347,6 +1374,14 @@ def _binding_from_parts(arg0: typing.SupportsInt | typing.SupportsIndex, arg1: t
     ...
 def _derived_operators(arg0: SkoSource, arg1: typing.Any) -> SkoSource:
     ...
+def _embedded(base: MultibodyOperators, loops: LoopSet, sets: collections.abc.Sequence[tuple[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]]]) -> EmbeddedOperators:
+    """
+    Of each set: bodies, rows of loops, dependent coordinates, by number.
+    """
+def _embedded_again(arg0: typing.Any, arg1: typing.Any) -> typing.Any:
+    """
+    As it was pickled.
+    """
 def _function(arg0: SkoSource, arg1: str, arg2: Binding, arg3: Operator) -> Operator:
     ...
 def _grouped(base: MultibodyOperators, groups: collections.abc.Sequence[collections.abc.Sequence[str]]) -> GroupedOperators:

@@ -9,6 +9,7 @@ from typing import Any
 
 from . import _core
 from .dynamics.threads import shared_out, thread_count
+from .models.embedded_loops import embedded, source_again
 from .models.multibody import Multibody, describe
 from .operators import operator_set
 from .operators.block_view import block_view
@@ -81,6 +82,8 @@ def attach() -> None:
         compile_call=compile_call,
         compile_expression=compile_expression,
         describe=describe,
+        embedded=embedded,
+        embedded_source=source_again,
         exact_numbers=operator_set.exact_numbers,
         explain=operator_set.explain,
         model_from_description=Multibody.from_description,

@@ -5,6 +5,7 @@
 #include "bindings/bindings.h"
 #include "operators/derived_operators.h"
 #include "operators/directions.h"
+#include "operators/embedded_operators.h"
 #include "runtime/errors.h"
 
 namespace pycraft {
@@ -26,6 +27,19 @@ std::shared_ptr<MultibodyOperators> model_of(const std::vector<Expression>& oper
   return found;
 }
 
+// The embedded loops that an expression has letters of; null where it has none.
+std::shared_ptr<EmbeddedOperators> embedding_of(const std::vector<Expression>& operands) {
+  std::shared_ptr<EmbeddedOperators> found;
+  for (const Expression& e : operands)
+    for (const Context& c : contexts(e)) {
+      const auto own = std::dynamic_pointer_cast<EmbeddedOperators>(c.source);
+      if (own && found && own != found)
+        throw EvaluationError("operators of two embeddings of '" + own->base()->name() + "': differentiate along a coordinate of either before they are combined");
+      if (own) found = own;
+    }
+  return found;
+}
+
 std::vector<Expression> operands_of(const Expression& e) { return {e}; }
 std::vector<Expression> operands_of(const Scalar& s) {
   std::vector<Expression> all;
@@ -44,7 +58,7 @@ Scalar nothing_of(const Scalar& s) {
   return number(0);
 }
 
-int coordinate_of(const MultibodyOperators& model, const py::object& direction) {
+int coordinate_of(const SkoSource& model, const py::object& direction) {
   const auto& names = model.structure().coordinate_names;
   if (!py::isinstance<py::str>(direction)) {
     const int i = clipped(direction);
@@ -74,6 +88,13 @@ T diff_in_turn(const T& operand, const py::args& directions, const std::string& 
     const auto model = model_of(operands_of(operand));
     if (!model) {
       result = nothing_of(result);
+      continue;
+    }
+    if (const auto embedded = embedding_of(operands_of(operand))) {
+      const int i = coordinate_of(*embedded, direction);
+      if (i < 0 || i >= embedded->theta().dimension())
+        throw ModelError("coordinate " + std::to_string(i) + " of '" + embedded->name() + "', which has " + std::to_string(embedded->theta().dimension()));
+      result = along(result, *independent_direction(embedded, i), frame == "world");
       continue;
     }
     result = along(result, *coordinate_direction(model, coordinate_of(*model, direction)), frame == "world");

@@ -7,6 +7,7 @@
 #include "bindings/register_interbody_forces.h"
 #include "dynamics/constrained_dynamics.h"
 #include "dynamics/loop_calls.h"
+#include "operators/embedded_operators.h"
 
 namespace pycraft {
 
@@ -167,6 +168,14 @@ void register_loops(py::module_& m) {
         asked.form = form, asked.precision = precision, asked.velocities = true;
         return on_loops(l, given, asked, {}, Array(std::vector<py::ssize_t>{0, 6}));
       }, q, v, py::arg("impulse"), py::arg("form"), precision, "v⁺, impulses λ, impulses of loops on b and on a, rank.");
+  m.def("_embedded", [](const std::shared_ptr<MultibodyOperators>& base, const Loops& l,
+                        const std::vector<std::tuple<std::vector<int>, std::vector<int>, std::vector<int>>>& sets) {
+    const ModelInUse use(l.set->model());
+    std::vector<EmbeddedLoops> embedded;
+    for (const auto& [bodies, rows, dependent] : sets) embedded.push_back({bodies, rows, dependent});
+    return embedded_operators(base, l.set, std::move(embedded));
+  }, py::arg("base"), py::arg("loops"), py::arg("sets"), "Of each set: bodies, rows of loops, dependent coordinates, by number.");
+  m.def("_embedded_again", [](const py::object& model, const py::object& sets) { return of_face("embedded_source")(model, sets); }, "As it was pickled.");
 }
 
 }  // namespace pycraft

@@ -7,6 +7,7 @@
 #include "operators/alphabet.h"
 #include "operators/derived_operators.h"
 #include "operators/directions.h"
+#include "operators/embedded_operators.h"
 #include "operators/grouped_operators.h"
 #include "operators/rerooted_tree.h"
 #include "runtime/errors.h"
@@ -55,6 +56,15 @@ Expression source_symbol(const std::shared_ptr<SkoSource>& source, const std::st
     if (!std::dynamic_pointer_cast<GroupedOperators>(source)) throw EvaluationError("'" + name + "' is a letter of grouped bodies; '" + source->name() + "' has none");
     return make_symbol(d, source);
   }
+  const auto embedded = std::dynamic_pointer_cast<EmbeddedOperators>(source);
+  if (d.kind() == LetterKind::embedding) {
+    if (!embedded) throw EvaluationError("'" + name + "' is a letter of embedded loops; '" + source->name() + "' has none");
+    if (d.takes == Takes::nothing) return make_symbol(d, source);
+    if (coordinate < 0 || coordinate >= source->theta().dimension())
+      throw ModelError("coordinate " + std::to_string(coordinate) + " of '" + source->name() + "', which has " + std::to_string(source->theta().dimension()));
+    return make_symbol(d, source, OfCoordinate{coordinate}, source->structure().coordinate_names[coordinate]);
+  }
+  if (embedded) return embedded_letter(embedded, d, nodes, coordinate);
   if (!std::dynamic_pointer_cast<MultibodyOperators>(source) && !std::dynamic_pointer_cast<GroupedOperators>(source))
     throw EvaluationError("'" + name + "' is an operator of mechanics; '" + source->name() + (mechanics_of(source) ? "' has none" : "' is a bare tree of matrices"));
   switch (d.takes) {
@@ -158,6 +168,12 @@ void register_sources(py::module_& m) {
           grouped->base()->check_current();
           return py::make_tuple(made, py::make_tuple(grouped->base(), py::make_tuple("groups", grouped->groups())));
         }
+        if (const auto* embedded = dynamic_cast<const EmbeddedOperators*>(&s)) {  // loops are the model's face's
+          embedded->check_current();
+          py::list sets;
+          for (const EmbeddedLoops& set : embedded->sets()) sets.append(py::make_tuple(set.bodies, set.rows, set.dependent));
+          return py::make_tuple(py::module_::import("pycraft._core").attr("_embedded_again"), py::make_tuple(embedded->base()->model(), sets));
+        }
         const auto* derived = dynamic_cast<const DerivedOperators*>(&s);
         if (!derived) throw py::type_error("operators of '" + s.name() + "' cannot be pickled or copied; make them anew where they are wanted");
         derived->base()->check_current();
@@ -185,11 +201,12 @@ void register_sources(py::module_& m) {
         if (derived == nullptr) return py::none();
         const char* how = dynamic_cast<const WorldFrame*>(&s)         ? "world frame"
                           : dynamic_cast<const GroupedOperators*>(&s) ? "groups of bodies"
+                          : dynamic_cast<const EmbeddedOperators*>(&s) ? "embedded loops"
                           : dynamic_cast<const CutTree*>(&s)          ? "cut tree"
                           : dynamic_cast<const RerootedTree*>(&s)     ? "another root"
                                                                       : "hinge subset";
         return py::make_tuple(how, derived->base());
-      }, "How this tree was made of a model's, \"hinge subset\", \"world frame\", \"cut tree\", \"another root\" or \"groups of bodies\", and that model's source; None for a model's own.")
+      }, "How this tree was made of a model's, \"hinge subset\", \"world frame\", \"cut tree\", \"another root\", \"groups of bodies\" or \"embedded loops\", and that model's source; None for a model's own.")
       .def_property_readonly("groups", [](const SkoSource& s) -> py::object {
         const auto* grouped = dynamic_cast<const GroupedOperators*>(&s);
         return grouped ? py::cast(grouped->groups()) : py::object(py::none());
@@ -215,6 +232,20 @@ void register_sources(py::module_& m) {
       });
   py::class_<GroupedOperators, SkoSource, std::shared_ptr<GroupedOperators>>(m, "GroupedOperators", "The source of a multibody model's operators with its bodies in groups.")
       .def_property_readonly("model", [](const GroupedOperators& s) { return s.base()->model(); });
+  py::class_<EmbeddedOperators, SkoSource, std::shared_ptr<EmbeddedOperators>>(m, "EmbeddedOperators", "The source of a multibody model's operators with its loops embedded.")
+      .def_property_readonly("model", [](const EmbeddedOperators& s) { return s.base()->model(); })
+      .def_property_readonly("grouped", [](const EmbeddedOperators& s) { return s.grouped(); }, "The same groups of bodies, nothing embedded.")
+      .def_property_readonly("independent", &EmbeddedOperators::independent, "The tree's coordinate of each of Θ.")
+      .def_property_readonly("dependent", [](const EmbeddedOperators& s) {
+        std::vector<std::vector<int>> all;
+        for (const EmbeddedLoops& set : s.sets()) all.push_back(set.dependent);
+        return all;
+      }, "Of each set of loops that hang together: the tree's coordinates that follow from the others.")
+      .def_property_readonly("rows", [](const EmbeddedOperators& s) {
+        std::vector<std::vector<int>> all;
+        for (const EmbeddedLoops& set : s.sets()) all.push_back(set.rows);
+        return all;
+      }, "Of each set: the rows of loops that these are solved from.");
   m.def("operators_of", &operators_of, py::arg("model"));
   m.def("_grouped", &grouped_operators, py::arg("base"), py::arg("groups"));
   m.def("_some_coordinates", [](const std::shared_ptr<SkoSource>& base, const std::vector<bool>& kept) -> std::shared_ptr<SkoSource> {
@@ -254,7 +285,7 @@ void register_sources(py::module_& m) {
                               py::make_tuple(s.parent, s.size, s.dof, t.E, t.H, t.M, t.J, s.body_names, t.name()));
       });
 
-  static const char* const spaces[] = {"Θ", "V", "F", "W", "NodesV", "NodesF", "R^1"};
+  static const char* const spaces[] = {"Θ", "V", "F", "W", "NodesV", "NodesF", "R^1", "Θ of the tree"};
   static const char* const takes[] = {"nothing", "nodes", "coordinate", "selection", "inertia", "direction"};
   py::class_<SymbolDefinition>(m, "SymbolDefinition", "What is said of a letter without numbers: names, spaces, what it is of.")
       .def_readonly("name", &SymbolDefinition::ascii, "In ASCII: the attribute of an operator set.")

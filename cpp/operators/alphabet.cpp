@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "operators/directions.h"
+#include "operators/embedded_operators.h"
 #include "operators/grouped_operators.h"
 #include "operators/multibody_operators.h"
 #include "runtime/errors.h"
@@ -12,7 +13,7 @@ namespace pycraft {
 const std::vector<const SymbolDefinition*>& alphabet() {
   static const std::vector<const SymbolDefinition*> all = [] {
     std::vector<const SymbolDefinition*> found;
-    for (const auto* table : {&sko_symbols(), &mechanics_symbols(), &derivative_symbols(), &grouped_symbols()})
+    for (const auto* table : {&sko_symbols(), &mechanics_symbols(), &derivative_symbols(), &grouped_symbols(), &embedding_symbols()})
       for (const SymbolDefinition& d : *table) found.push_back(&d);
     std::sort(found.begin(), found.end(), [](const auto* a, const auto* b) { return a->id < b->id; });
     return found;

@@ -5,6 +5,10 @@
 //   a fixed twist    inserted in hinge k before subhinge p, in the axes there: as a locked coordinate would be. p = 0 moves the
 //                    placement; a twist before a subhinge and its opposite after it turn or shift the subhinge's axis
 //   mass, centre of mass, inertia of a body: ∂M;  rotor inertia of a coordinate: ∂J
+//   independent coordinate i of embedded loops: along the tree's velocities w = X e_i, all hinges around the loops moving,
+//                    ∂E = E crf(H*w), ∂H = Σ_s Π_<s H crf(H*Π_s w) over subhinges s, and ∂X
+//
+// Of embedded loops H_C = X*H_g, J_C = X*J_g X:  ∂H_C = ∂X*H_g + X*∂H_g,  ∂J_C = ∂X*J_g X + X*∂J_g X + X*J_g ∂X.
 //
 // What lies inboard in the same hinge moves with what lies outboard: ∂_iΔ_a = Δ_aΔ_i - Δ_iΔ_a where a stands before i. So the leaves are
 // closed under differentiation, and second derivatives need no new kernel. Derivatives along ball and free coordinates are along
@@ -41,6 +45,8 @@ struct Parameter {
 
 std::unique_ptr<Direction> twist_direction(const std::shared_ptr<MultibodyOperators>& source, Twists twists);
 std::unique_ptr<Direction> coordinate_direction(const std::shared_ptr<MultibodyOperators>& source, int coordinate);
+class EmbeddedOperators;
+std::unique_ptr<Direction> independent_direction(const std::shared_ptr<EmbeddedOperators>& source, int coordinate);
 // vdot: a vector of Θ; empty: refused where it is needed.
 std::unique_ptr<Direction> time_direction(const std::shared_ptr<MultibodyOperators>& source, const Expression& vdot);
 std::unique_ptr<Direction> parameter_direction(const Parameter& parameter);

@@ -44,7 +44,7 @@ def check_model(operators: Any, *, states: int = 3, seed: int = 0, precision: st
     rng = np.random.default_rng(seed)
     drawn = [
         BoundState(operators, s)
-        for s in ([None] if model is None else [_present(model), *(model.random_state(rng) for _ in range(states))])
+        for s in ([None] if model is None else [_present(model), *(operators.random_state(rng) for _ in range(states))])
     ]
     for theorem in operators.theorems():
         if progress is not None:
@@ -261,6 +261,6 @@ def run(read: Statement, operators: Any, states: int, seed: int, precision: str 
     """The verdict on a statement at random states of one model."""
     model = operators._model
     rng = np.random.default_rng(seed)
-    drawn = [BoundState(operators, s) for s in ([None] if model is None else [model.random_state(rng) for _ in range(states)])]
+    drawn = [BoundState(operators, s) for s in ([None] if model is None else [operators.random_state(rng) for _ in range(states)])]
     vectors = [drawn_vectors(read.rhs, rng, drawn_vectors(read.lhs, rng, {})) for _ in drawn]
     return judge_states(read.lhs, read.rhs, drawn, vectors, precisions=ladder(precision))

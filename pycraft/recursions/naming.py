@@ -209,7 +209,7 @@ _SQUARE = (
     *("M", "P", "P_plus", "R", "Upsilon", "V_tilde", "V_bar", "Delta_theta_dot", "momentum_cross", "X_world", "Delta", "tau_bar", "dM"),
     "phi_S",
 )
-_GIVEN = ("E", "H", "M", "J", "H_dot", "B", "theta_dot", "gravity_base", "dM", "Pi", "phi_S", "H_S")
+_GIVEN = ("E", "H", "M", "J", "H_dot", "B", "theta_dot", "gravity_base", "dM", "Pi", "phi_S", "H_S", "X_r", "X_r_dot", "dX_r")
 _GIVEN_OF_GROUPS = ("V_tilde", "V_bar", "Delta_theta_dot", "momentum_cross", "X_world", "Delta", "h", "a", "b", "gravity_field")
 """Of groups of bodies: what is made body by body within them."""
 
@@ -245,6 +245,8 @@ class Model:
             "Pi": {"rows": self.theta, "columns": self.theta},
             "theta_dot": {"rows": self.theta, "columns": 1},
         }
+        if name in ("X_r", "X_r_dot", "dX_r"):  # from Θ_r of embedded loops to Θ of the tree
+            shapes[name] = {"rows": self.book.cut(self.source.grouped.Theta), "columns": self.theta}
         vector = {"rows": self.bodies, "columns": 1}
         chosen = shape or shapes.get(name) or (square if name in _SQUARE else vector)
         made = self.book.new(name, tree=self.tree, **chosen)

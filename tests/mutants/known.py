@@ -212,6 +212,7 @@ AREAS = {
     "cpp/algebra/trees/mixed_blocks.h": ["algebra/test_mixed_trees.py"],
     "cpp/algebra/trees/reordered_values.h": ["algebra/test_mixed_trees.py"],
     "cpp/algebra/trees/grouping.h": ["algebra/test_mixed_trees.py"],
+    "cpp/operators/embedded_values.h": ["operators/test_embedded.py"],
     "cpp/operators/grouped_values.h": ["algebra/test_mixed_trees.py"],
 }
 

@@ -128,6 +128,15 @@ CHANGES = {
             STATEMENT,
         ),
     ],
+    "cpp/operators/embedded_values.h": [
+        ("the sign of dependent velocities", "map[place * r + j] = -sum;", "map[place * r + j] = sum;"),
+        ("states off the loops have numbers", "off <= std::max(off_the_loops,", "off >= 0 * std::max(off_the_loops,"),
+        (
+            "rotors around a loop are not felt",
+            "transposed_multiply_add(maps_[g].data(), JX.data(),",
+            "if (n < 0) transposed_multiply_add(maps_[g].data(), JX.data(),",
+        ),
+    ],
     "cpp/operators/grouped_values.h": [
         (
             "a of a group is that of its bodies",

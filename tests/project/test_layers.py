@@ -54,6 +54,7 @@ PARTS = {
     "operators/calculus_theorems",  # rows of the catalogue
     "operators/mechanics_theorems",
     "operators/mechanics_symbols",
+    "operators/independent_direction",  # a direction, declared with the others in directions.h
 }
 PEERS = {"pinocchio", "mujoco", "example_robot_data"}
 

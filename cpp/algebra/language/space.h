@@ -11,8 +11,9 @@ namespace pycraft {
 
 // Θ generalized coordinates' velocities and forces; V, F stacked body motions and forces; NodesV, NodesF stacked node motions and
 // forces; Whitened: where square roots of V -> F operators start (M = M^½ M^½*); Euclidean: R^n, a user's
-// own. V and F are dual, NodesV and NodesF too; the others are their own dual.
-enum class SpaceKind { Theta, V, F, Whitened, NodesV, NodesF, Euclidean };
+// own. V and F are dual, NodesV and NodesF too; the others are their own dual. TreeTheta is said in records of letters alone: the space Θ of
+// the tree beneath, where a tree has fewer coordinates than that (operators/embedded_operators.h).
+enum class SpaceKind { Theta, V, F, Whitened, NodesV, NodesF, Euclidean, TreeTheta };
 
 // How a space is cut into blocks. Block j belongs to a body (-1: to none) and covers [offset, offset + size) of a vector.
 struct SpaceLayout {

@@ -63,13 +63,21 @@ enum class SymbolId {
   inverse_tangent,        // ∂(ℳ + J)⁻¹ in plans: operators/inverse_tangent.h
   // of grouped bodies
   inner_phi,              // φ_S
-  inner_H                 // H_S
+  inner_H,                // H_S
+  // of embedded loops
+  coordinate_map,         // X: θ̇ = X θ̇_r
+  coordinate_map_rate,    // Ẋ along θ̇
+  coordinate_map_tangent  // ∂X along an independent coordinate, or one of the tree's
 };
 
-// Who has a letter: any tree, a multibody model, expressions that were differentiated, grouped bodies.
-enum class LetterKind { sko, mechanics, derivatives, groups };
+// Who has a letter: any tree, a multibody model, expressions that were differentiated, grouped bodies, embedded loops.
+enum class LetterKind { sko, mechanics, derivatives, groups, embedding };
 constexpr LetterKind kind_of(SymbolId id) {
-  return id < SymbolId::B ? LetterKind::sko : id < SymbolId::inertia_derivative ? LetterKind::mechanics : id < SymbolId::inner_phi ? LetterKind::derivatives : LetterKind::groups;
+  return id < SymbolId::B                    ? LetterKind::sko
+         : id < SymbolId::inertia_derivative ? LetterKind::mechanics
+         : id < SymbolId::inner_phi          ? LetterKind::derivatives
+         : id < SymbolId::coordinate_map     ? LetterKind::groups
+                                             : LetterKind::embedding;
 }
 
 struct Symbol;

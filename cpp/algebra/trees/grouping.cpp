@@ -13,7 +13,8 @@ std::vector<std::vector<int>> pairs_of_bodies(const SkoStructure& t) {
   return groups;
 }
 
-Grouping::Grouping(const SkoStructure& t, const std::string& name, const std::vector<std::vector<int>>& named) : group_of(t.bodies(), -1), row_of(t.bodies(), 0) {
+Grouping::Grouping(const SkoStructure& t, const std::string& name, const std::vector<std::vector<int>>& named, bool siblings)
+    : group_of(t.bodies(), -1), row_of(t.bodies(), 0) {
   std::vector<int> set_of(t.bodies(), -1);  // of bodies that are named
   for (size_t set = 0; set < named.size(); ++set)
     for (int k : named[set]) {
@@ -24,7 +25,8 @@ Grouping::Grouping(const SkoStructure& t, const std::string& name, const std::ve
   for (int k = 0; k < t.bodies(); ++k) {
     const int set = set_of[k], p = t.parent[k];
     if (set >= 0 && started[set] >= 0) {
-      if (p < 0 || set_of[p] != set)
+      const bool carried = p >= 0 && set_of[p] == set, beside = siblings && p == t.parent[groups[started[set]][0]];
+      if (!carried && !beside)
         throw ModelError("groups of '" + name + "': '" + t.body_names[k] + "' and '" + t.body_names[groups[started[set]][0]] +
                          "' are named as one and do not hang together; name " + (p < 0 ? "bodies on one root" : "'" + t.body_names[p] + "', which carries it, too"));
       group_of[k] = started[set];

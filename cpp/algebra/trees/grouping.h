@@ -3,7 +3,7 @@
 //   φ_S = (I - E_S)⁻¹,  H_C = H_S φ_S,  M_C = M_S,  J_C = J_S,  E(q,C) = A φ_S
 //
 // A the row of E that leads to p, in the rows of p in its own group q. Nothing is constrained, so nothing outside changes: H_C φ_C = H φ. Compound
-// bodies of any kind are built in this way.
+// bodies of any kind are built in this way. Several bodies of S may be carried by p, or stand on the base: then A has a block for each.
 #pragma once
 
 #include <algorithm>
@@ -16,8 +16,9 @@
 namespace pycraft {
 
 struct Grouping {
-  // Bodies that no group names stay by themselves. Throws ModelError for a body that is named twice and for a group that is not connected.
-  Grouping(const SkoStructure& tree, const std::string& name, const std::vector<std::vector<int>>& named);
+  // Bodies that no group names stay by themselves. Throws ModelError for a body that is named twice and for a group that is not connected;
+  // with siblings, children of one parent count as that.
+  Grouping(const SkoStructure& tree, const std::string& name, const std::vector<std::vector<int>>& named, bool siblings = false);
 
   std::vector<std::vector<int>> groups;  // each in the order of the tree, by their first bodies
   std::vector<int> group_of, row_of;     // of each body: its group, and its first row there
@@ -37,7 +38,7 @@ void inner_blocks(const SkoStructure& tree, const Grouping& grouping, int g, Get
   int first_row = 0;
   for (int k : grouping.groups[g]) {
     const int at = grouping.row_of[k], p = tree.parent[k];
-    if (k != grouping.groups[g][0]) {  // the column of k is that of its parent, carried on
+    if (p >= 0 && grouping.group_of[p] == g) {  // the column of k is that of its parent, carried on
       const std::vector<S> E = get(SymbolId::E, k);
       for (int i = 0; i < at; ++i)
         for (int j = 0; j < tree.size[k]; ++j)
@@ -72,10 +73,13 @@ void fill_group(const SkoStructure& tree, const Grouping& grouping, int g, Get&&
 // E(q,C), of a group that has a parent.
 template <class S, class Get>
 void fill_edge(const SkoStructure& tree, const Grouping& grouping, int g, Get&& get, const std::vector<S>& phi, S* out) {
-  const int first = grouping.groups[g][0], p = tree.parent[first], s = grouping.structure.size[g], rows = tree.size[p], columns = tree.size[first];
+  const int p = tree.parent[grouping.groups[g][0]], s = grouping.structure.size[g];
   std::fill_n(out, size_t(grouping.structure.size[grouping.group_of[p]]) * s, S(0));
-  const std::vector<S> E = get(SymbolId::E, first);
-  multiply_add(E.data(), phi.data(), out + size_t(grouping.row_of[p]) * s, rows, columns, s);  // φ_S has the rows of the first body on top
+  for (int k : grouping.groups[g]) {
+    if (tree.parent[k] != p) continue;
+    const std::vector<S> E = get(SymbolId::E, k);
+    multiply_add(E.data(), phi.data() + size_t(grouping.row_of[k]) * s, out + size_t(grouping.row_of[p]) * s, tree.size[p], tree.size[k], s);
+  }
 }
 
 }  // namespace pycraft

@@ -1,0 +1,334 @@
+// The numbers of embedded loops, from those of the grouped tree and from the rows of loops.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "algebra/trees/mixed_blocks.h"
+#include "algebra/trees/tree_values.h"
+#include "model/configuration.h"
+#include "numerics/tangent.h"
+#include "operators/embedded_operators.h"
+#include "operators/grouped_values.h"
+#include "recursions/loop_rows.h"
+
+namespace pycraft {
+
+constexpr double off_the_loops = 1e-6;         // larger residuals are no state on the loops, as mobility has it (pycraft/models/mobility.py)
+constexpr double singular_of_loops = 1e-10;    // pivots below it, by the largest entry, are none
+
+inline std::vector<char> rigid_nodes(const EmbeddedOperators& source) {
+  std::vector<char> rigid;
+  for (int g = 0; g < source.structure().bodies(); ++g) rigid.push_back(source.is_rigid(g));
+  return rigid;
+}
+
+// A⁻¹ of an n x n matrix by elimination with complete pivoting; false where a pivot is below singular_of_loops of the largest entry.
+template <class S>
+bool invert_with_complete_pivoting(std::vector<S> A, int n, std::vector<S>& inverse) {
+  using std::abs;
+  S largest(0);
+  for (const S& a : A) largest = maximum(largest, S(abs(a)));
+  inverse.assign(size_t(n) * n, S(0));
+  for (int i = 0; i < n; ++i) inverse[size_t(i) * n + i] = S(1);
+  std::vector<int> column_of(n), free_columns(n);
+  for (int j = 0; j < n; ++j) free_columns[j] = j;
+  for (int k = 0; k < n; ++k) {
+    int row = k, place = 0;
+    for (int i = k; i < n; ++i)
+      for (size_t c = 0; c < free_columns.size(); ++c)
+        if (abs(A[size_t(i) * n + free_columns[c]]) > abs(A[size_t(row) * n + free_columns[place]])) row = i, place = static_cast<int>(c);
+    const int column = free_columns[place];
+    const S pivot = A[size_t(row) * n + column];
+    if (!(abs(pivot) > S(singular_of_loops) * largest)) return false;
+    free_columns.erase(free_columns.begin() + place);
+    column_of[k] = column;
+    for (int j = 0; j < n; ++j) std::swap(A[size_t(row) * n + j], A[size_t(k) * n + j]), std::swap(inverse[size_t(row) * n + j], inverse[size_t(k) * n + j]);
+    for (int i = 0; i < n; ++i) {
+      if (i == k) continue;
+      const S factor = A[size_t(i) * n + column] / pivot;
+      for (int j = 0; j < n; ++j) {
+        A[size_t(i) * n + j] -= factor * A[size_t(k) * n + j];
+        inverse[size_t(i) * n + j] -= factor * inverse[size_t(k) * n + j];
+      }
+    }
+    for (int j = 0; j < n; ++j) inverse[size_t(k) * n + j] /= pivot;
+    for (int j = 0; j < n; ++j) A[size_t(k) * n + j] /= pivot;
+  }
+  const std::vector<S> rows = inverse;  // row k is that of unknown column_of[k]
+  for (int k = 0; k < n; ++k) std::copy_n(rows.begin() + size_t(k) * n, n, inverse.begin() + size_t(column_of[k]) * n);
+  return true;
+}
+
+template <class S>
+class EmbeddedValues final : public TreeValues<MixedBlocks<RigidBlocks<S>>> {
+  using Base = TreeValues<MixedBlocks<RigidBlocks<S>>>;
+
+ public:
+  explicit EmbeddedValues(const EmbeddedOperators& source)
+      : Base(source.structure(), rigid_nodes(source)), source_(source), robot_(source.base()->structure()), grouped_(*source.grouped()),
+        maps_(source.structure().bodies()), rates_(source.structure().bodies()), inverses_(source.structure().bodies()), factors_(source.structure().bodies()) {
+    this->blocks_.structured.inertia_factors = &factors_;
+  }
+
+  void block(const Symbol& symbol, int g, S* out) const override {
+    switch (symbol.definition->id) {
+      case SymbolId::coordinate_map: std::copy(maps_[g].begin(), maps_[g].end(), out); return;
+      case SymbolId::coordinate_map_rate: std::copy(rates_[g].begin(), rates_[g].end(), out); return;
+      case SymbolId::coordinate_map_tangent: {
+        const std::vector<S> tangent = map_tangent(g, velocity_of(std::get<OfCoordinate>(symbol.arguments).coordinate));
+        std::copy(tangent.begin(), tangent.end(), out);
+        return;
+      }
+      default: Base::block(symbol, g, out);
+    }
+  }
+  void vector(const Symbol& symbol, S* out) const override {
+    if (symbol.definition->id == SymbolId::theta_dot) {
+      for (int i : source_.independent()) *out++ = v_[i];
+      return;
+    }
+    grouped_.vector(symbol, out);  // a_g, and H_g* Ẋ θ̇_r
+    for (int g = 0; g < this->tree_.bodies(); ++g) {
+      const std::vector<S> H = block_of(SymbolId::H, g);
+      const int s = this->tree_.size[g], n = static_cast<int>(source_.coordinates_of(g).size());
+      std::vector<S> theta;
+      for (int place : source_.independent_of(g)) theta.push_back(v_[source_.coordinates_of(g)[place]]);
+      std::vector<S> rate(n, S(0));
+      multiply_add(rates_[g].data(), theta.data(), rate.data(), n, static_cast<int>(theta.size()), 1);
+      transposed_multiply_add(H.data(), rate.data(), out + this->tree_.offset[g], s, n, 1);
+    }
+  }
+  void use(Form form) override { Base::use(form), grouped_.use(form); }
+
+ protected:
+  void set_state(const double* q, const double* v) override {
+    grouped_.move_to(q, v);
+    compiled_ = source_.model().compiled<S>();
+    loops_ = source_.loops()->resolved();
+    convert(q, compiled_->nq, q_), convert(v, compiled_->nv, v_);
+  }
+
+  void fill() override {
+    grouped_.require(Group::kinematics);
+    LoopBuffers<S> buffers;
+    check_on_the_loops(buffers);
+    Q_.assign(size_t(loops_->rows) * compiled_->nv, S(0));
+    loop_jacobian(*compiled_, *loops_, q_.data(), buffers, [&](int row, int i, const S& number) { Q_[size_t(row) * compiled_->nv + i] = number; });
+    for (int g = 0; g < this->tree_.bodies(); ++g) {
+      fill_map(g);
+      if (source_.is_rigid(g))
+        fill_rigid(g);
+      else
+        fill_node(g);
+      if (this->tree_.parent[g] >= 0 && !this->blocks_.is_structured_edge(g)) grouped_.blocks().block(SymbolId::E, g, this->blocks_.dense.edge(g));
+    }
+  }
+
+  void compute_velocities() override {
+    grouped_.require(Group::kinematics | Group::velocities);
+    check_velocities();
+    for (int g = 0; g < this->tree_.bodies(); ++g) rates_[g] = map_tangent(g, v_);
+  }
+
+ private:
+  std::vector<S> block_of(SymbolId id, int g) const {
+    const SkoStructure& tree = source_.grouped()->structure();
+    const int s = tree.size[g], n = tree.dof[g];
+    std::vector<S> out(id == SymbolId::M ? size_t(s) * s : size_t(n) * (id == SymbolId::H ? s : n));
+    if (!out.empty()) grouped_.blocks().block(id, g, out.data());
+    return out;
+  }
+
+  // X = [1; -Q_d⁻¹ Q_r], rows in the order of the node's coordinates.
+  void fill_map(int g) {
+    const std::vector<int>& independent = source_.independent_of(g);
+    const size_t n = source_.coordinates_of(g).size(), r = independent.size();
+    maps_[g].assign(n * r, S(0));
+    for (size_t j = 0; j < r; ++j) maps_[g][independent[j] * r + j] = S(1);
+    const EmbeddedLoops* const loops = source_.loops_of(g);
+    if (!loops) return;
+    const size_t m = loops->rows.size(), nv = compiled_->nv;
+    std::vector<S> of_dependent(m * m), of_independent(m * r);
+    for (size_t i = 0; i < m; ++i) {
+      const S* const row = Q_.data() + loops->rows[i] * nv;
+      for (size_t j = 0; j < m; ++j) of_dependent[i * m + j] = row[loops->dependent[j]];
+      for (size_t j = 0; j < r; ++j) of_independent[i * r + j] = row[source_.coordinates_of(g)[independent[j]]];
+    }
+    if (!invert_with_complete_pivoting(of_dependent, static_cast<int>(m), inverses_[g])) refuse(g);
+    put_dependent(g, of_independent, maps_[g]);
+  }
+  // The dependent rows of a map get -Q_d⁻¹ B.
+  void put_dependent(int g, const std::vector<S>& B, std::vector<S>& map) const {
+    const EmbeddedLoops& loops = *source_.loops_of(g);
+    const size_t m = loops.rows.size(), r = source_.independent_of(g).size();
+    const std::vector<int>& coordinates = source_.coordinates_of(g);
+    for (size_t i = 0; i < m; ++i) {
+      const size_t place = std::find(coordinates.begin(), coordinates.end(), loops.dependent[i]) - coordinates.begin();
+      for (size_t j = 0; j < r; ++j) {
+        S sum(0);
+        for (size_t a = 0; a < m; ++a) sum += inverses_[g][i * m + a] * B[a * r + j];
+        map[place * r + j] = -sum;
+      }
+    }
+  }
+  // ∂X along w: Q_d ∂X_d = -∂Q X.
+  std::vector<S> map_tangent(int g, const std::vector<S>& w) const {
+    const size_t n = source_.coordinates_of(g).size(), r = source_.independent_of(g).size();
+    std::vector<S> tangent(n * r, S(0));
+    const EmbeddedLoops* const loops = source_.loops_of(g);
+    if (!loops || std::all_of(source_.coordinates_of(g).begin(), source_.coordinates_of(g).end(), [&](int i) { return w[i] == S(0); })) return tangent;
+    const std::vector<S> rate = jacobian_rate(w);
+    std::vector<S> moved(loops->rows.size() * r, S(0));
+    for (size_t i = 0; i < loops->rows.size(); ++i)
+      for (size_t a = 0; a < n; ++a) {
+        const S& entry = rate[size_t(loops->rows[i]) * compiled_->nv + source_.coordinates_of(g)[a]];
+        for (size_t j = 0; j < r; ++j) moved[i * r + j] += entry * maps_[g][a * r + j];
+      }
+    put_dependent(g, moved, tangent);
+    return tangent;
+  }
+  // ∂Q along velocities w of the tree: the rows' own code with derivatives carried along; of a user's function its second derivatives.
+  std::vector<S> jacobian_rate(const std::vector<S>& w) const {
+    using T = Tangent<S, 1>;
+    const size_t nv = compiled_->nv;
+    std::vector<S> rate(size_t(loops_->rows) * nv, S(0)), q_dot(q_.size());
+    configuration_rate(*compiled_, q_.data(), w.data(), q_dot.data());
+    std::vector<T> q(q_.begin(), q_.end());
+    for (size_t i = 0; i < q.size(); ++i) q[i].d[0] = q_dot[i];
+    ResolvedLoops by_rule;
+    by_rule.rows = loops_->rows;
+    for (const ResolvedLoop& loop : loops_->loops) {
+      const Coupling& of = loop.loop->coupling;
+      if (!of.function) {
+        by_rule.loops.push_back(loop);
+        continue;
+      }
+      const size_t n = loop.v.size();
+      std::vector<double> at(n), gradient(n), second(n * n);
+      for (size_t i = 0; i < n; ++i) at[i] = to_double(q_[loop.q[i]]);
+      double r = 0;
+      of.function(at.data(), &r, gradient.data(), second.data());
+      for (size_t i = 0; i < n; ++i)
+        for (size_t j = 0; j < n; ++j) rate[loop.first_row * nv + loop.v[i]] += S(second[i * n + j]) * w[loop.v[j]];
+    }
+    LoopBuffers<T> buffers;
+    loop_jacobian(broadcast<T>(*compiled_), by_rule, q.data(), buffers, [&](int row, int i, const T& number) { rate[row * nv + i] = number.d[0]; });
+    return rate;
+  }
+  // Of the tree, where only independent coordinate i moves.
+  std::vector<S> velocity_of(int i) const {
+    int g = 0;
+    while (this->tree_.dof_offset[g + 1] <= i) ++g;
+    std::vector<S> w(compiled_->nv, S(0));
+    const size_t r = this->tree_.dof[g];
+    for (size_t a = 0; a < source_.coordinates_of(g).size(); ++a) w[source_.coordinates_of(g)[a]] = maps_[g][a * r + i - this->tree_.dof_offset[g]];
+    return w;
+  }
+
+  void fill_node(int g) {
+    DenseBlocks<S>& to = this->blocks_.dense;
+    const int s = this->tree_.size[g], n = static_cast<int>(source_.coordinates_of(g).size()), r = this->tree_.dof[g];
+    grouped_.blocks().block(SymbolId::M, g, to.mass(g));
+    const std::vector<S> H = block_of(SymbolId::H, g), J = block_of(SymbolId::J, g);
+    std::fill_n(to.hinge_map(g), size_t(r) * s, S(0));
+    transposed_multiply_add(maps_[g].data(), H.data(), to.hinge_map(g), r, n, s);
+    std::vector<S> JX(size_t(n) * r, S(0));
+    multiply_add(J.data(), maps_[g].data(), JX.data(), n, n, r);
+    std::fill_n(to.hinge_diagonal(g), size_t(r) * r, S(0));
+    transposed_multiply_add(maps_[g].data(), JX.data(), to.hinge_diagonal(g), r, n, r);
+  }
+  void fill_rigid(int g) {
+    const RigidBlocks<S>& from = grouped_.blocks().structured;
+    RigidBlocks<S>& own = this->blocks_.structured;
+    own.pose[g] = from.pose[g], own.inertia[g] = from.inertia[g], factors_[g] = (*from.inertia_factors)[g];
+    for (int j = 0; j < this->tree_.dof[g]; ++j) {
+      const int to = this->tree_.dof_offset[g] + j, at = source_.grouped()->structure().dof_offset[g] + j;
+      own.H[to] = from.H[at], own.J[to] = from.J[at], own.aligned[to] = from.aligned[at];
+    }
+  }
+
+  void check_on_the_loops(LoopBuffers<S>& buffers) const {
+    std::vector<S> residual(loops_->rows);
+    loop_residuals(*compiled_, *loops_, q_.data(), buffers, residual.data());
+    for (int row = 0; row < loops_->rows; ++row)
+      if (const double off = std::abs(to_double(residual[row])); !(off <= std::max(off_the_loops, 64 * to_double(epsilon<S>()))))
+        throw EvaluationError("'" + source_.model().name() + "' is not on its loops: row '" + loops_->names[row] + "' is off by " + std::to_string(off) +
+                              "; embedded loops have numbers at states of assemble()");
+  }
+  void check_velocities() const {
+    using std::abs;
+    for (int row = 0; row < loops_->rows; ++row) {
+      S sum(0), size(0);
+      for (int i = 0; i < compiled_->nv; ++i) {
+        const S term = Q_[size_t(row) * compiled_->nv + i] * v_[i];
+        sum += term, size += abs(term);
+      }
+      if (!(abs(sum) <= S(off_the_loops) * (S(1) + size)))
+        throw EvaluationError("the velocities of '" + source_.model().name() + "' break row '" + loops_->names[row] + "', which goes at " + std::to_string(to_double(sum)) +
+                              "; those of assemble() keep the loops");
+    }
+  }
+  // Which coordinates the rows may be solved for here, of all around these loops: by complete pivoting, row after row.
+  [[noreturn]] void refuse(int g) const {
+    const EmbeddedLoops& loops = *source_.loops_of(g);
+    const std::vector<int>& coordinates = source_.coordinates_of(g);
+    const size_t m = loops.rows.size(), n = coordinates.size();
+    std::vector<double> A(m * n);
+    double largest = 0;
+    for (size_t i = 0; i < m; ++i)
+      for (size_t j = 0; j < n; ++j) {
+        A[i * n + j] = to_double(Q_[size_t(loops.rows[i]) * compiled_->nv + coordinates[j]]);
+        largest = std::max(largest, std::abs(A[i * n + j]));
+      }
+    std::vector<char> row_taken(m, 0), column_taken(n, 0);
+    size_t rank = 0;
+    for (; rank < m; ++rank) {
+      double best = 1e-8 * largest;
+      size_t row = m, column = n;
+      for (size_t i = 0; i < m; ++i)
+        for (size_t j = 0; j < n; ++j)
+          if (!row_taken[i] && !column_taken[j] && std::abs(A[i * n + j]) > best) best = std::abs(A[i * n + j]), row = i, column = j;
+      if (row == m) break;
+      row_taken[row] = column_taken[column] = 1;
+      for (size_t i = 0; i < m; ++i) {
+        if (row_taken[i]) continue;
+        const double factor = A[i * n + column] / A[row * n + column];
+        for (size_t j = 0; j < n; ++j) A[i * n + j] -= factor * A[row * n + j];
+      }
+    }
+    const auto listed = [](const std::vector<std::string>& names) {
+      std::string text;
+      for (const std::string& name : names) text += (text.empty() ? "'" : ", '") + name + "'";
+      return text.empty() ? std::string("none") : text;
+    };
+    std::vector<std::string> own, others, lost;
+    for (int place : source_.independent_of(g)) own.push_back(robot_.coordinate_names[coordinates[place]]);
+    for (size_t j = 0; j < n; ++j)
+      if (!column_taken[j]) others.push_back(robot_.coordinate_names[coordinates[j]]);
+    for (size_t i = 0; i < m; ++i)
+      if (!row_taken[i]) lost.push_back(loops_->names[loops.rows[i]]);
+    if (rank < m)
+      throw EvaluationError("loops of '" + source_.model().name() + "' are singular at this state: row" + (lost.size() > 1 ? "s " : " ") + listed(lost) +
+                            " hang on the others here and not elsewhere, and no coordinates describe what is free");
+    std::vector<std::string> rows;
+    for (int row : loops.rows) rows.push_back(loops_->names[row]);
+    throw EvaluationError("loops of '" + source_.model().name() + "': at this state rows " + listed(rows) + " do not follow from " + listed(own) +
+                          ", which are no independent coordinates here; " + listed(others) + " are, soa.embedded(independent=...)");
+  }
+
+  const EmbeddedOperators& source_;
+  const SkoStructure& robot_;
+  GroupedValues<S> grouped_;
+  std::shared_ptr<const CompiledModel<S>> compiled_;
+  std::shared_ptr<const ResolvedLoops> loops_;
+  std::vector<S> q_, v_, Q_;
+  std::vector<std::vector<S>> maps_, rates_, inverses_;  // X, Ẋ, Q_d⁻¹, node by node
+  std::vector<InertiaFactors<S>> factors_;
+};
+
+}  // namespace pycraft
