@@ -128,16 +128,6 @@ CHANGES = {
             STATEMENT,
         ),
     ],
-    "cpp/operators/embedded_values.h": [
-        ("the sign of dependent velocities", "map[place * r + j] = -sum;", "map[place * r + j] = sum;"),
-        ("states off the loops have numbers", "std::max(off_the_loops, 64 * to_double(epsilon<S>()))", "1e300"),
-        (
-            "rotors around a loop are not felt",
-            "transposed_multiply_add(maps_[g].data(), JX.data(), to.hinge_diagonal(g), r, n, r);",
-            "static_cast<void>(JX);",
-            STATEMENT,
-        ),
-    ],
     "cpp/operators/grouped_values.h": [
         (
             "a of a group is that of its bodies",

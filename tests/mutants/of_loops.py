@@ -1,4 +1,4 @@
-"""Changes by hand of dynamics on loops, as of_cpp.py has them."""
+"""Changes by hand of loops, as of_cpp.py has them."""
 
 from .of_cpp import STATEMENT
 
@@ -25,5 +25,15 @@ CHANGES = {
     ],
     "cpp/numerics/rank_factors.h": [
         ("multipliers are the least in units of rounding", "unit_[V_.order[i]] * V_.upper(j, i)", "V_.upper(j, i)"),
+    ],
+    "cpp/operators/embedded_values.h": [
+        ("the sign of dependent velocities", "map[place * r + j] = -sum;", "map[place * r + j] = sum;"),
+        ("states off the loops have numbers", "std::max(off_the_loops, 64 * to_double(epsilon<S>()))", "1e300"),
+        (
+            "rotors around a loop are not felt",
+            "transposed_multiply_add(maps_[g].data(), JX.data(), to.hinge_diagonal(g), r, n, r);",
+            "static_cast<void>(JX);",
+            STATEMENT,
+        ),
     ],
 }
