@@ -1094,50 +1094,6 @@ class FrameTree:
     @time.setter
     def time(self, arg1: typing.Any) -> None:
         ...
-class LoopSet:
-    """
-    The loops of a model, by name, and their rows at given states: pycraft.models.loop_set is its face.
-    """
-    def __init__(self, arg0: Multibody) -> None:
-        ...
-    def __reduce__(self) -> tuple:
-        ...
-    def accelerations(self, q: typing.Any, v: typing.Any, tau: typing.Any, names: collections.abc.Sequence[str], in_world: bool, wrenches: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], form: str, refine: typing.Any, residual: str, precision: str | int, alpha: typing.SupportsFloat | typing.SupportsIndex, beta: typing.SupportsFloat | typing.SupportsIndex) -> tuple:
-        """
-        v̇, λ, forces of loops on b and on a, rank.
-        """
-    def add_coupling(self, name: str, coordinates: collections.abc.Sequence[tuple[str, typing.SupportsInt | typing.SupportsIndex, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]], constant: typing.Any, function: typing.Any) -> None:
-        ...
-    def add_hinge(self, name: str, a: str, b: str, hinge: str, axes: collections.abc.Sequence[typing.Any], point: typing.Any, pitch: typing.Any, rotation: typing.Any, position: typing.Any) -> None:
-        ...
-    def add_pair(self, name: str, a: str, b: str, kind: str, number: typing.Any, quadric: typing.Any) -> None:
-        ...
-    def bias(self, q: typing.Any, v: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
-        ...
-    def first_rows(self) -> list[int]:
-        """
-        Where each loop's rows begin, and the number of all.
-        """
-    def jacobian(self, q: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
-        ...
-    def kind(self, name: str) -> str:
-        ...
-    def names(self) -> list[str]:
-        """
-        In order of declaration.
-        """
-    def remove(self, name: str) -> None:
-        ...
-    def residual(self, q: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
-        ...
-    def rows(self) -> tuple[list[str], list[bool]]:
-        """
-        Names of all rows, and which are of positions.
-        """
-    def velocities(self, q: typing.Any, v: typing.Any, impulse: typing.Any, form: str, precision: str | int) -> tuple:
-        """
-        v⁺, impulses λ, impulses of loops on b and on a, rank.
-        """
 class Centroidal:
     """
     Centre of mass of one model and what is about it.
@@ -1216,6 +1172,59 @@ class Effect:
     def work(self) -> bool:
         """
         Whether some of its forces have none.
+        """
+class LoopSet:
+    """
+    The loops of a model, by name, and their rows at given states: pycraft.models.loop_set is its face.
+    """
+    def __init__(self, arg0: Multibody) -> None:
+        ...
+    def __reduce__(self) -> tuple:
+        ...
+    def accelerations(self, q: typing.Any, v: typing.Any, tau: typing.Any, names: collections.abc.Sequence[str], in_world: bool, wrenches: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], form: str, refine: typing.Any, residual: str, precision: str | int, alpha: typing.SupportsFloat | typing.SupportsIndex, beta: typing.SupportsFloat | typing.SupportsIndex) -> tuple:
+        """
+        v̇, λ, forces of loops on b and on a, rank.
+        """
+    def add_coupling(self, name: str, coordinates: collections.abc.Sequence[tuple[str, typing.SupportsInt | typing.SupportsIndex, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]], constant: typing.Any, function: typing.Any) -> None:
+        ...
+    def add_hinge(self, name: str, a: str, b: str, hinge: str, axes: collections.abc.Sequence[typing.Any], point: typing.Any, pitch: typing.Any, rotation: typing.Any, position: typing.Any) -> None:
+        ...
+    def add_pair(self, name: str, a: str, b: str, kind: str, number: typing.Any, quadric: typing.Any) -> None:
+        ...
+    def bias(self, q: typing.Any, v: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def effect(self, names: collections.abc.Sequence[str], alpha: typing.SupportsFloat | typing.SupportsIndex, beta: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
+        """
+        What keeps these loops in a scene, all without names.
+        """
+    def first_rows(self) -> list[int]:
+        """
+        Where each loop's rows begin, and the number of all.
+        """
+    def jacobian(self, q: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def kind(self, name: str) -> str:
+        ...
+    def names(self) -> list[str]:
+        """
+        In order of declaration.
+        """
+    def remove(self, name: str) -> None:
+        ...
+    def residual(self, q: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def rows(self) -> tuple[list[str], list[bool]]:
+        """
+        Names of all rows, and which are of positions.
+        """
+    def velocities(self, q: typing.Any, v: typing.Any, impulse: typing.Any, form: str, precision: str | int) -> tuple:
+        """
+        v⁺, impulses λ, impulses of loops on b and on a, rank.
+        """
+    @property
+    def edits(self) -> int:
+        """
+        Another number after every change of the set.
         """
 class SceneEffects:
     """

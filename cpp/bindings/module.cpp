@@ -50,11 +50,11 @@ PYBIND11_MODULE(_core, m) {
   pycraft::register_compiled(m);
   pycraft::register_sensitivities(m);
   pycraft::register_frames(m);
-  pycraft::register_loops(m);
   pycraft::register_centroidal(m);
   pycraft::register_methods(m);
   pycraft::register_integration(m);
   pycraft::register_effects(m);
+  pycraft::register_loops(m);
   pycraft::register_scenes(m);
   pycraft::register_runs(m);
   pycraft::register_linearization(m);

@@ -64,7 +64,7 @@ py::tuple derivatives(Calls& calls, const py::object& q, const py::object& v, co
 
 // Along a run: f (T, bodies, 6), in the bodies' axes, and X_WB (T, bodies, 4, 4). The effects' own states are as they are at first where `own` is
 // empty.
-py::tuple along(SceneCalls& calls, const Array& t, const Array& q, const Array& v, const Array& own, bool reaction) {
+py::tuple along_a_run(SceneCalls& calls, const Array& t, const Array& q, const Array& v, const Array& own, bool reaction) {
   const Multibody& model = calls.scene().model();
   const auto rows = static_cast<int>(t.size());
   const int N = model.bodies(), nv = model.nv(), nq = model.nq();
@@ -74,6 +74,7 @@ py::tuple along(SceneCalls& calls, const Array& t, const Array& q, const Array& 
   {
     const Undisturbed undisturbed(model);
     calls.with([&]<class S>(CompiledScene<S>& scene) {
+      scene.refuse_loops("interbody forces");
       InterbodyForces<S> on(model.structure(), model.compiled<S>());
       std::vector<S> vdot(nv);
       const size_t states = scene.effects().own();
@@ -121,7 +122,7 @@ void register_interbody_forces(py::module_& m) {
         return forces(c, q, v, "tau", tau, names, in_world, wrenches, reaction, {form, refinement(refine, residual, precision), OnSingular::raise}, precision);
       }, q, v, tau, names, in_world, wrenches, reaction, py::arg("form"), py::arg("refine"), py::arg("residual"), py::arg("precision"), "f, X_WB, T and v̇, of generalized forces.")
       .def("derivatives", &derivatives, q, v, vdot, names, in_world, wrenches, py::arg("along_q"), "Of f and of T, along q, v and v̇, or along q alone.");
-  m.def("scene_interbody_forces", &along, py::arg("calls"), py::arg("t"), q, v, py::arg("own"), reaction, "f in the bodies' axes and X_WB, of states along a run.");
+  m.def("scene_interbody_forces", &along_a_run, py::arg("calls"), py::arg("t"), q, v, py::arg("own"), reaction, "f in the bodies' axes and X_WB, of states along a run.");
 }
 
 }  // namespace pycraft

@@ -39,6 +39,7 @@ py::dict at_rest(SceneCalls& calls, const Array& q, double t, const std::vector<
   {
     const ModelInUse use(calls.scene().model());
     calls.with([&]<class S>(CompiledScene<S>& scene) {
+      scene.refuse_loops("equilibrium");
       if constexpr (std::is_same_v<S, double>) found = statics(scene, t, q.data(), own_states(states, scene.effects().own()));
     });
   }
@@ -59,6 +60,7 @@ py::dict linearized(SceneCalls& calls, const Array& q, const Array& v, double t,
   {
     const ModelInUse use(model);
     calls.with([&]<class S>(CompiledScene<S>& scene) {
+      scene.refuse_loops("linear model");
       if constexpr (std::is_same_v<S, double>) {
         for (const auto& e : scene.effects().effects())
           if (e->declared.impulse_period > 0) throw EvaluationError("effect '" + e->name + "' acts by impulses between steps, which no linear model has: disable it, or take Damping in its place");

@@ -14,20 +14,6 @@ namespace pycraft {
 
 namespace {
 
-// Of unit columns of W that of which less is left counts as dependent: what noise, ε/σ² in λ and ε/σ in θ̈, and what is left out, σ in the
-// rows, are of one size there. States and models are doubles: in a wider scalar their rounding would make a direction of what has none, as of the
-// redundant row of a spatial linkage.
-template <class S>
-S rank_tolerance() {
-  using std::sqrt;
-  return maximum(S(sqrt(epsilon<S>())), S(64 * epsilon<double>()));
-}
-// The most by which what is returned may miss a row or an equation of motion, of the largest number in it.
-template <class S>
-S certified() {
-  return S(64) * rank_tolerance<S>();
-}
-
 template <class T, class S>
 void take(const std::vector<S>& from, std::vector<T>& to) {
   to.resize(from.size());
@@ -37,8 +23,9 @@ void take(const std::vector<S>& from, std::vector<T>& to) {
 }  // namespace
 
 template <class S>
-ConstrainedWorkspace<S>::ConstrainedWorkspace(const Multibody& model)
-    : source_(model), tree_(model.structure()), model_(model.compiled<S>()), blocks_(tree_), forces_(tree_, model_), z_(tree_.bodies()), alpha_(tree_.bodies()) {
+ConstrainedWorkspace<S>::ConstrainedWorkspace(const Multibody& model, const HingeTerms& terms)
+    : source_(model), tree_(model.structure()), model_(terms.empty() ? model.compiled<S>() : compile_model<S>(model, terms)), blocks_(tree_), forces_(tree_, model_), z_(tree_.bodies()),
+      alpha_(tree_.bodies()), rank_tolerance_(least_rank_tolerance<S>()), terms_(terms) {
   for (int k = tree_.bodies() - 1; k >= 0; --k) all_.push_back(k);
 }
 
@@ -84,12 +71,12 @@ void ConstrainedWorkspace<S>::factor() {
                                [&](int k, int i, const S& w) { left += (w / unit) * (w / unit), systems_[g].add_entry(groups_.place[k] + i, w / unit); });
       for (const auto& e : rows_.entries[row]) dense_[e.coordinate] = S(0);
       unit_[row] = unit;
-      if (sqrt(left) > rank_tolerance<S>())  // the next row takes the place of one that asks nothing here
+      if (sqrt(left) > rank_tolerance_)  // the next row takes the place of one that asks nothing here
         scale_[c] = unit, active_[g].push_back(row);
       else
         systems_[g].drop_column();
     }
-    systems_[g].factor(scale_.data(), rank_tolerance<S>());
+    systems_[g].factor(scale_.data(), rank_tolerance_);
   }
 }
 
@@ -144,7 +131,7 @@ void ConstrainedWorkspace<S>::meet(const S* target, bool first) {
     for (const int row : rows) sizes_[row] = size, off_[row] = abs(asked(row)) / unit_[row];
     for (size_t c = 0; c < m; ++c) off_[active_[g][c]] = abs(conflict_[c]);
     for (const int row : rows) {
-      if (off_[row] <= certified<S>() * size) off_[row] = S(0);
+      if (off_[row] <= certified() * size) off_[row] = S(0);
       worst = maximum(worst, off_[row]);
     }
   }
@@ -176,10 +163,12 @@ void ConstrainedWorkspace<S>::correct(const Asked& asked, const Applied<S>& appl
       take(x_, x), take(lambda_, lambda);
       rows.find(*model, *loops_, q.data(), buffers);
       loop_bias(*model, *loops_, q.data(), v.data(), buffers, c.data());
-      if (asked.beta != 0) loop_residuals(*model, *loops_, q.data(), buffers, r.data());
-      for (int i = 0; i < loops_->rows; ++i)
-        target_[i] = static_cast<S>(T(rows.product(i, x.data()) + c[i] + T(2 * asked.alpha) * rows.product(i, v.data()) + T(asked.beta) * T(asked.beta) * r[i]));
-      if (!wider_) wider_ = std::make_unique<RigidDynamics<T>>(source_);
+      if (asked.gains) loop_residuals(*model, *loops_, q.data(), buffers, r.data());
+      for (int i = 0; i < loops_->rows; ++i) {
+        const Baumgarte of = asked.gains ? (*asked.gains)[i] : Baumgarte{};
+        target_[i] = static_cast<S>(T(rows.product(i, x.data()) + c[i] + T(2 * of.alpha) * rows.product(i, v.data()) + T(of.beta) * T(of.beta) * r[i]));
+      }
+      if (!wider_) wider_ = std::make_unique<RigidDynamics<T>>(source_, terms_);
       wider_->inverse_dynamics(q.data(), v.data(), x.data(), force.data(), &same);
       rows.add_transposed(lambda.data(), load.data());
       for (int i = 0; i < nv; ++i) r_[i] = static_cast<S>(T(load[i] - force[i]));
@@ -216,7 +205,7 @@ bool ConstrainedWorkspace<S>::sure(const Asked& asked, const Applied<S>& applied
     for (const int row : group.rows) size = maximum(size, maximum(sizes_[row], S((rows_.product_size(row, x_.data()) + bias_[row]) / unit_[row])));
     for (const int row : group.rows) {
       const S left = abs(rows_.product(row, x_.data()) + c_[row]) / unit_[row];
-      if (left <= certified<S>() * size) continue;
+      if (left <= certified() * size) continue;
       off_[row] = left;
       worst = maximum(worst, left);
     }
@@ -233,7 +222,7 @@ bool ConstrainedWorkspace<S>::sure(const Asked& asked, const Applied<S>& applied
   size += energy_norm(load.data());
   forces_.find(asked.v, x_.data(), applied);
   for (int i = 0; i < nv; ++i) load[i] += asked.tau[i] - forces_.generalized()[i];
-  if (const S left = energy_norm(load.data()); !(left <= certified<S>() * size)) {
+  if (const S left = energy_norm(load.data()); !(left <= certified() * size)) {
     if (!refuse) return false;
     int most = 0;
     for (int i = 1; i < nv; ++i)
@@ -254,7 +243,7 @@ void ConstrainedWorkspace<S>::accelerate(const std::shared_ptr<const ResolvedLoo
   kinematics(*model_, asked.q, blocks_);
   point_accelerations_base_to_tip(*model_, blocks_.pose.data(), blocks_.H.data(), asked.v, OwnTerms::absorbed, points_);
   forces_.place(asked.q);
-  Applied<S> applied = own_gravity(*model_);
+  Applied<S> applied = asked.applied ? *asked.applied : own_gravity(*model_);
   if (asked.wrenches) applied.wrenches = forces_.on_bodies(*asked.pushed, asked.wrenches);
   blocks_.form = asked.form;
   x_.resize(nv);
@@ -268,13 +257,18 @@ void ConstrainedWorkspace<S>::accelerate(const std::shared_ptr<const ResolvedLoo
   S fastest = S(0);
   for (int i = 0; i < nv; ++i) fastest = maximum(fastest, S(abs(asked.v[i])));
   for (int r = 0; r < rows; ++r) bias_[r] = abs(c_[r]) + fastest * rows_.product_size(r, asked.v);
-  if (asked.alpha != 0)
-    for (int r = 0; r < rows; ++r) c_[r] += S(2 * asked.alpha) * rows_.product(r, asked.v), bias_[r] += S(2 * std::abs(asked.alpha)) * rows_.product_size(r, asked.v);
-  if (asked.beta != 0) {
+  if (asked.gains) {
     target_.assign(rows, S(0));
     loop_residuals(*model_, *loops, asked.q, buffers_, target_.data());
-    for (int r = 0; r < rows; ++r) c_[r] += S(asked.beta) * S(asked.beta) * target_[r], bias_[r] += abs(S(asked.beta) * S(asked.beta) * target_[r]);
+    for (int r = 0; r < rows; ++r) {
+      const Baumgarte& of = (*asked.gains)[r];
+      const S drawn = S(of.beta) * S(of.beta) * target_[r];
+      c_[r] += S(2 * of.alpha) * rows_.product(r, asked.v) + drawn;
+      bias_[r] += S(2 * of.alpha) * rows_.product_size(r, asked.v) + abs(drawn);
+    }
   }
+  rank_tolerance_ = least_rank_tolerance<S>();
+  if (asked.near) trust_near(loops, asked.q, asked.v);
   factor();
   meet(c_.data(), true);
   const int steps = asked.refinement.steps == Refinement::automatic ? 5 : asked.refinement.steps;
@@ -288,34 +282,6 @@ void ConstrainedWorkspace<S>::accelerate(const std::shared_ptr<const ResolvedLoo
     last = moved;
   }
   for (int more = 0; !sure(asked, applied, more == 3); ++more) correct(asked, applied);
-}
-
-template <class S>
-void ConstrainedWorkspace<S>::project(const std::shared_ptr<const ResolvedLoops>& loops, const S* q, const S* v, const S* p, Form form) {
-  using std::abs;
-  set_loops(loops);
-  const int nv = model_->nv, rows = loops->rows;
-  kinematics(*model_, q, blocks_);
-  blocks_.form = form;
-  articulated_inertia_tip_to_base(tree_, blocks_);
-  if (blocks_.faint().body >= 0) throw_faint_hinge(tree_, blocks_.faint());
-  rows_.find(*model_, *loops, q, buffers_);
-  factor();
-  x_.resize(nv);
-  solve(p, x_.data());
-  for (int i = 0; i < nv; ++i) x_[i] += v[i];
-  c_.assign(rows, S(0)), bias_.assign(rows, S(0));
-  for (int r = 0; r < rows; ++r) bias_[r] = rows_.product_size(r, x_.data());
-  for (int time = 0; time < 2; ++time) meet(c_.data(), false);  // twice: what is left of the rows is rounding
-  off_.assign(rows, S(0));
-  S worst = S(0);
-  for (const auto& group : groups_.groups) {
-    S size = S(0);
-    for (const int row : group.rows) size = maximum(size, S(bias_[row] / unit_[row]));
-    for (const int row : group.rows)
-      if (const S left = abs(rows_.product(row, x_.data())) / unit_[row]; !(left <= certified<S>() * size)) off_[row] = left == left ? left : S(1), worst = maximum(worst, off_[row]);
-  }
-  if (worst > S(0)) refuse_rows(off_, worst, "no sure velocities on the loops, near a singular state or by rounding (take a wider precision): off are rows");
 }
 
 template <class S>
@@ -339,6 +305,7 @@ void ConstrainedDynamics::run(const Asked& asked, const Results& out) {
   const auto loops = loops_->resolved();
   const int common = common_batch({asked.q, asked.v, asked.input, asked.wrenches}), states = common < 0 ? 1 : common;
   const int nv = model().nv(), rows = loops->rows, count = static_cast<int>(loops->loops.size());
+  const std::vector<Baumgarte> gains(rows, {asked.alpha, asked.beta});
   at_precision(asked.precision, [&]<class S>(S) {
     if constexpr (!available_at<ConstrainedWorkspace, S>) {
       throw EvaluationError(to_quad);
@@ -350,7 +317,8 @@ void ConstrainedDynamics::run(const Asked& asked, const Results& out) {
         if (asked.velocities)
           w.project(loops, q.data(), v.data(), input.data(), asked.form);
         else
-          w.accelerate(loops, {q.data(), v.data(), input.data(), wrenches.empty() ? nullptr : wrenches.data(), asked.pushed, asked.form, asked.refinement, asked.alpha, asked.beta});
+          w.accelerate(loops, {q.data(), v.data(), input.data(), wrenches.empty() ? nullptr : wrenches.data(), asked.pushed, nullptr, asked.form, asked.refinement,
+                              asked.alpha != 0 || asked.beta != 0 ? &gains : nullptr});
         for (int i = 0; i < nv; ++i) out.x[size_t(b) * nv + i] = to_double(w.result()[i]);
         for (int r = 0; r < rows; ++r) out.multipliers[size_t(b) * rows + r] = to_double(w.multipliers()[r]);
         for (int l = 0; l < count; ++l)

@@ -22,23 +22,46 @@
 
 namespace pycraft {
 
+// Of unit columns of W that of which less is left counts as dependent: what noise, ε/σ² in λ and ε/σ in θ̈, and what is left out, σ in the
+// rows, are of one size there. States and models are doubles: in a wider scalar their rounding would make a direction of what has none, as of the
+// redundant row of a spatial linkage.
+template <class S>
+S least_rank_tolerance() {
+  using std::sqrt;
+  return maximum(S(sqrt(epsilon<S>())), S(64 * epsilon<double>()));
+}
+
+// r̈ + 2α ṙ + β² r = 0
+struct Baumgarte {
+  double alpha = 0, beta = 0;
+};
+
 // What computes at one state.
 template <class S>
 class ConstrainedWorkspace {
  public:
-  explicit ConstrainedWorkspace(const Multibody& model);
+  explicit ConstrainedWorkspace(const Multibody& model, const HingeTerms& terms = {});
 
   struct Asked {
     const S *q, *v, *tau;                     // tau null: v is taken onto the rows; v null there: none
     const S* wrenches = nullptr;              // six numbers a node
     const PushedNodes* pushed = nullptr;
+    const Applied<S>* applied = nullptr;      // null: the model's gravity and those wrenches
     Form form = Form::fast;
     Refinement refinement;
-    double alpha = 0, beta = 0;
+    const std::vector<Baumgarte>* gains = nullptr;  // of rows; null: none
+    bool near = false;                        // the state is meant to be on the loops: what it is off them by makes no directions
   };
   void accelerate(const std::shared_ptr<const ResolvedLoops>& loops, const Asked& asked);
   // Q v⁺ = 0, v⁺ = v + (ℳ + J)⁻¹ (p + Q*λ)
   void project(const std::shared_ptr<const ResolvedLoops>& loops, const S* q, const S* v, const S* p, Form form);
+  // q onto the rows of positions by Newton's steps, each the shortest in kinetic energy, then v onto all. EvaluationError that names a row where
+  // a state is further off than those reach.
+  void take_onto(const std::shared_ptr<const ResolvedLoops>& loops, S* q, S* v, Form form);
+  // How far a state is off each row, by the size of the row's entries: of positions r, of all Qθ̇; v null: not those.
+  void find_off(const std::shared_ptr<const ResolvedLoops>& loops, const S* q, const S* v, std::vector<S>& positions, std::vector<S>& velocities);
+  // += Q*λ of some rows.
+  void add_forces(int first, int end, S* out) const;
 
   const std::vector<S>& result() const { return x_; }        // θ̈ or v⁺
   const std::vector<S>& multipliers() const { return lambda_; }
@@ -52,6 +75,11 @@ class ConstrainedWorkspace {
   void meet(const S* target, bool first);     // x += (ℳ + J)⁻¹Q*λ such that Q x + target = 0, and adds λ
   void correct(const Asked& asked, const Applied<S>& applied);
   bool sure(const Asked& asked, const Applied<S>& applied, bool refuse);
+  // The most by which what is returned may miss a row or an equation of motion, of the largest number in it.
+  S certified() const { return S(64) * rank_tolerance_; }
+  void trust(const S& off);                   // sets the rank's tolerance
+  void trust_near(const std::shared_ptr<const ResolvedLoops>& loops, const S* q, const S* v);
+  static S largest(const std::vector<S>& of);
   void solve(const S* r, S* x);
   S energy_norm(const S* x);                  // (x* (ℳ + J)⁻¹ x)^½
   [[noreturn]] void refuse_rows(const std::vector<S>& off, const S& worst, const char* what) const;
@@ -70,7 +98,9 @@ class ConstrainedWorkspace {
   std::vector<std::vector<int>> active_;      // of every group: rows of which columns are not rounding
   std::vector<int> all_, loop_of_;            // bodies, tips first; of rows
   std::vector<Vector6<S>> z_, alpha_;
-  std::vector<S> x_, lambda_, c_, unit_, dense_, epsilon_, scratch_, target_, part_, b_, conflict_, scale_, sizes_, off_, r_, delta_, bias_;
+  std::vector<S> x_, lambda_, c_, unit_, dense_, epsilon_, scratch_, target_, part_, b_, conflict_, scale_, sizes_, off_, r_, delta_, bias_, moved_, gone_, slip_;
+  S rank_tolerance_;                          // what is left of a unit column beside the others, and is none
+  const HingeTerms terms_;
   std::unique_ptr<RigidDynamics<Wider<S>>> wider_;
 };
 template <>

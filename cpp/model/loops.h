@@ -105,6 +105,7 @@ class LoopSet {
   void remove(const std::string& name);
   std::vector<std::string> names() const;        // in order of declaration
   const Loop& loop(const std::string& name) const;
+  std::uint64_t edits() const { return edits_; } // another number after every change of the set
   // ModelError that names the loop where a body, node or hinge of one is no longer there. Kept until the structure or a parameter changes.
   std::shared_ptr<const ResolvedLoops> resolved() const;
 

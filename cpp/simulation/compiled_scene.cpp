@@ -29,6 +29,8 @@ CompiledScene<S>::CompiledScene(const Scene& scene, const Solving& how)
   if (forces_.forced() || !prescribed_.empty()) u_ = forces_.tau();
   if (!forces_.wrenched().empty()) wrenches_ = forces_.wrenches();
   solver_ = std::make_unique<HybridDynamics<S>>(scene.model(), hinge_terms(scene), how, gravity_, forces_.wrenched());
+  if (std::any_of(forces_.effects().begin(), forces_.effects().end(), [](const auto& e) { return e->declared.loops != nullptr; }))
+    loops_ = std::make_unique<SceneLoops<S>>(scene.model(), hinge_terms(scene), how, forces_.effects());
   for (const auto& e : forces_.effects()) {
     if (!(e->declared.impulse_period > 0) || nv_ == 0) continue;
     HingeTerms terms = hinge_terms(scene);
@@ -67,10 +69,10 @@ template <class S>
 void CompiledScene<S>::add_accelerations(std::vector<Pass>& passes, bool works) {
   std::vector<std::string> because;
   for (const auto& e : forces_.effects())
-    if (e->declared.uniform_gravity || !e->declared.hinges.empty() || !e->declared.prescribed.empty()) because.push_back(e->name);
+    if (e->declared.uniform_gravity || !e->declared.hinges.empty() || !e->declared.prescribed.empty() || e->declared.loops) because.push_back(e->name);
   const bool hybrid = !prescribed_.empty(), all = hybrid && static_cast<int>(prescribed_.size()) == nv_;
-  const std::string what = std::string(all ? "inverse" : hybrid ? "hybrid" : "forward") + " dynamics, " + (by_kernels() ? "by kernels" : "by recursions");
-  passes.push_back({hybrid ? accelerate_and_prescribe : accelerate, nullptr, {"accelerations", what, because}});
+  const std::string what = std::string(all ? "inverse" : hybrid ? "hybrid" : "forward") + " dynamics" + (loops_ ? " on loops" : "") + ", " + (by_kernels() ? "by kernels" : "by recursions");
+  passes.push_back({loops_ ? accelerate_on_loops : hybrid ? accelerate_and_prescribe : accelerate, nullptr, {"accelerations", what, because}});
   for (const auto& e : forces_.effects())
     if (works && e->worker >= 0 && !e->declared.prescribed.empty()) passes.push_back({count_prescribed, e.get(), {e->name + " work", "its power", {e->name}}});
 }
@@ -102,6 +104,7 @@ template <class S>
 std::string CompiledScene<S>::alone() const {
   for (const auto& e : forces_.effects())
     if (e->declared.foreign) return "effect '" + e->name + "' is written in Python";
+  if (loops_) return "accelerations on loops are found one by one";
   if constexpr (std::is_same_v<S, double>) return solver_->links() ? solver_->links()->alone() : "accelerations are found by the general recursions";
   return "packs are of states in double precision";
 }
@@ -171,6 +174,7 @@ void CompiledScene<S>::add_structural_forces(const S* q, const S* vdot, S* rows)
     }
     for (const HingeTerm& h : d.hinges) row[h.coordinate] -= (S(h.inertia) + step_ * (S(h.damping) + step_ * S(h.stiffness))) * vdot[h.coordinate];
     for (int j : d.prescribed) row[j] += needed_[j];
+    if (d.loops) loops_->add_forces(e->number, row);
   }
 }
 

@@ -3,7 +3,7 @@
 //   poses          X_WB of the bodies that somebody reads, along their ways to the base and no others, with the rows of H there
 //   twists         V of the bodies whose velocities somebody reads, likewise
 //   <effect>       forces, wrenches or prescribed accelerations of one effect
-//   accelerations  forward dynamics, or hybrid where coordinates are prescribed; a uniform gravity is a number in it, and rotors are in its D
+//   accelerations  forward dynamics, hybrid where coordinates are prescribed, on loops where some are kept; a uniform gravity is a number in it, and rotors are in its D
 //
 // A pass is there because of an effect that is on; what is off or absent leaves no pass, no branch and no memory. A state at rest has a list of
 // its own, without what needs velocities, and so has a run that keeps account of the work of each effect. Every pass counts how often it ran.
@@ -11,12 +11,15 @@
 // One thread works with one compiled scene: it holds the numbers of the state that it was asked for last. No allocation after the first state.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "dynamics/hybrid_dynamics.h"
 #include "simulation/scene_forces.h"
+#include "simulation/scene_loops.h"
 
 namespace pycraft {
 
@@ -49,6 +52,13 @@ class CompiledScene {
   void set_step(const S& h);
   // Impulses that fall on t change v; gained: the kinetic energy that each effect which does work gave by them. SingularHingeError as above.
   void give_impulses(const S& t, const S* q, S* v, const S* own, S* gained);
+  // Where effects keep loops: a start that is off them is refused, what drifts off them is taken back.
+  SceneLoops<S>* loops() { return loops_.get(); }
+  // EvaluationError where there are loops: what is not found on them.
+  void refuse_loops(const std::string& what) const {
+    for (const auto& e : forces_.effects())
+      if (e->declared.loops) throw EvaluationError("effect '" + e->name + "' keeps loops, and a scene has no " + what + " on loops: disable it for those of the tree");
+  }
   bool gives_impulses() const { return !impulsive_.empty(); }
   bool steps_implicitly() const;
 
@@ -58,7 +68,7 @@ class CompiledScene {
   const SceneForces<S>& effects() const { return forces_; }
   const CompiledModel<S>& numbers() const { return forces_.numbers(); }
   const std::vector<int>& prescribed() const { return prescribed_; }
-  bool by_kernels() const { return solver_->by_kernels(); }
+  bool by_kernels() const { return !loops_ && solver_->by_kernels(); }
   // Accelerations wait in a fiber for those of other runs, from now on; null: no more (dynamics/states_together.h).
   void wait_for(StatesTogether* others) { solver_->wait_for(others); }
   StatesTogether* others() const { return solver_->others(); }
@@ -114,6 +124,10 @@ class CompiledScene {
   static void act_and_keep(CompiledScene& s, Active<S>* e) { s.forces_.act_and_keep(*e, s.rows_ + size_t(e->number) * s.nv_); }
   static void prescribe(CompiledScene& s, Active<S>* e) { s.forces_.prescribe(*e, s.forces_.at().t, nullptr, nullptr, s.motion_.data()); }
   static void accelerate(CompiledScene& s, Active<S>*) { s.finite_ = s.solver_->run(s.forces_.at().q, s.v_, s.u_, s.wrenches_, s.vdot_); }
+  static void accelerate_on_loops(CompiledScene& s, Active<S>*) {
+    s.loops_->accelerate(s.forces_.at().q, s.v_, s.u_, {cast<S>(s.gravity_), s.wrenches_}, s.vdot_);
+    s.finite_ = std::all_of(s.vdot_, s.vdot_ + s.nv_, [](const S& x) { return std::isfinite(to_double(x)); });
+  }
   static void accelerate_and_prescribe(CompiledScene& s, Active<S>*) {
     s.give_prescribed();
     s.finite_ = s.solver_->run(s.forces_.at().q, s.v_, s.u_, s.wrenches_, s.vdot_);
@@ -132,6 +146,7 @@ class CompiledScene {
   std::vector<std::vector<Pass>> lists_;
   std::vector<size_t> solving_;  // where accelerations are in each list
   std::unique_ptr<HybridDynamics<S>> solver_;
+  std::unique_ptr<SceneLoops<S>> loops_;  // null: no effect keeps any
   std::unique_ptr<RigidDynamics<S>> whole_model_;  // made where it is first needed
   struct Impulsive {
     Active<S>* effect;

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "model/hinge_terms.h"
+#include "model/loops.h"
 #include "model/multibody.h"
 #include "numerics/scalar.h"
 #include "numerics/tangent.h"
@@ -33,6 +34,14 @@ struct HingeTerm {
   double inertia = 0, damping = 0, stiffness = 0;
 };
 
+// Loops of a model that a scene keeps, all where no name is given, with Baumgarte's α and β (1/s).
+struct KeptLoops {
+  std::shared_ptr<const LoopSet> set;
+  std::vector<std::string> names;
+  double alpha = 0, beta = 0;
+  std::vector<std::string> kept() const { return names.empty() ? set->names() : names; }
+};
+
 struct Declaration {
   // ---- needs
   bool time = false;                 // whether it is another one at another time
@@ -46,6 +55,7 @@ struct Declaration {
   bool uniform_gravity = false;
   std::vector<HingeTerm> hinges;
   std::vector<int> prescribed;       // coordinates, all of a subhinge or none
+  std::shared_ptr<const KeptLoops> loops;  // rows that accelerations keep to
   // ---- energy
   bool potential = false;            // whether it has one
   bool work = false;                 // whether some of its forces have none

@@ -37,11 +37,34 @@ void Scene::set_on(const std::string& name, bool on) {
   entry.on = on;
 }
 
+namespace {
+
+// Of two effects that are on, one of which keeps loops: the same loop twice, and what is found without the other.
+void refuse_beside_loops(const std::string& a, const Declaration& keeps, const std::string& b, const Declaration& other, const Multibody& model) {
+  if (!keeps.loops) return;
+  if (other.loops) {
+    const std::vector<std::string> mine = keeps.loops->kept();
+    for (const std::string& loop : other.loops->kept())
+      if (std::find(mine.begin(), mine.end(), loop) != mine.end())
+        throw ModelError("effects '" + a + "' and '" + b + "' both keep loop '" + loop + "' of '" + model.name() + "'; disable or remove one of them");
+  }
+  if (!other.prescribed.empty())
+    throw ModelError("effect '" + b + "' prescribes '" + model.structure().coordinate_names[other.prescribed[0]] + "', and effect '" + a + "' keeps loops of '" + model.name() +
+                     "': prescribe it by a coupling, model.add_coupling, or drive it by a Servo");
+  if (other.impulse_period > 0)
+    throw ModelError("effect '" + b + "' acts by impulses on the coordinates of the tree, and effect '" + a + "' keeps loops of '" + model.name() + "': disable or remove one of them");
+}
+
+}  // namespace
+
 void Scene::refuse_conflicts(const std::string& name, const Effect& effect) const {
-  const std::vector<int> prescribed = effect.declaration().prescribed;
+  const Declaration own = effect.declaration();
+  const std::vector<int>& prescribed = own.prescribed;
   for (const SceneEntry& other : entries_) {
     if (!other.on || other.name == name) continue;
-    const std::vector<int> claimed = other.effect->declaration().prescribed;
+    const Declaration others = other.effect->declaration();
+    refuse_beside_loops(other.name, others, name, own, *model_), refuse_beside_loops(name, own, other.name, others, *model_);
+    const std::vector<int>& claimed = others.prescribed;
     for (int j : prescribed)
       if (std::find(claimed.begin(), claimed.end(), j) != claimed.end())
         throw ModelError("effects '" + other.name + "' and '" + name + "' both prescribe coordinate '" + model_->structure().coordinate_names[j] + "' of '" + model_->name() +

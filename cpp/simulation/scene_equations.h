@@ -4,7 +4,7 @@
 //
 // What controllers hold from one sample to the next is part of y and has no rate. Works are integrals beside the motion: they are kept in units of
 // 2¹⁰⁰ J, which no tolerance sees and which costs no bit, so that no step is chosen for their sake. Prescribed coordinates are where their motion
-// says at every evaluation, whatever x says; in x they are set to it after each step.
+// says at every evaluation, whatever x says; in x they are set to it after each step. Likewise states are taken onto the loops that are kept.
 //
 // Kind: which equations they are (simulation/equations.h). The others than explicit ones: scene_steps.h, scene_momenta.h, scene_linearized.h.
 #pragma once
@@ -43,6 +43,7 @@ class SceneEquations : public Kind<S> {
     for (double y : scene_.effects().own_states()) x.push_back(S(y));
     if (own) std::copy_n(own, own_, x.data() + nq() + nv());
     x.insert(x.end(), works_, S(0));
+    if (scene_.loops()) scene_.loops()->check_start(x.data(), x.data() + nq());
     settle(t, x);
     if (stops()) scene_.effects().sample(t, own == nullptr, x.data(), x.data() + nq(), x.data() + nq() + nv());
     return x;
@@ -69,6 +70,7 @@ class SceneEquations : public Kind<S> {
 
   void settle(const S& t, State& x) override {
     if (!scene_.prescribed().empty()) scene_.effects().prescribe(t, x.data(), x.data() + nq(), nullptr);
+    if (scene_.loops()) scene_.loops()->take_onto(x.data(), x.data() + nq());
   }
   bool stops() const override { return std::isfinite(next_stop(0)); }
   double next_stop(double t) const override { return scene_.effects().next_stop(t); }

@@ -7,12 +7,15 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..models import linkages
 from ..models.multibody import Multibody
-from .effects import Gravity, PointMassGravity
+from .effects import Gravity, Loop, NodeSpring, PointMassGravity, TorqueSource
 from .scene import Scene
 
 DOWN = (0.0, 0.0, -9.81)
 """m/s²"""
+ALONG_Y = (0.0, -9.81, 0.0)
+"""m/s², of what moves in the plane of x and y"""
 EARTH = 3.986004418e14
 """μ = G m of the Earth, m³/s² (IERS Conventions 2010)."""
 
@@ -149,3 +152,73 @@ def acrobot(angles: Any = (0.2, -0.1)) -> Scene:
     model.add_body("lower", "upper", axis=(0, 1, 0), position=(0, 0, -1), hinge_name="elbow", **link)
     model.q = list(angles)
     return Scene(model).add(Gravity(DOWN))
+
+
+def n_four_bar(N: int = 2, method: str = "augment") -> Scene:
+    """N four-bars side by side in a vertical plane: N + 1 cranks of 1 m on the ground, N rods between their tips, 1 kg each.
+
+    Cranks start upright, with 1 rad/s: for N = 2 the energy is 35.835 J. Within 10 s they pass the line with the ground, a singular state,
+    ten times; then the first tip is at (0.3284581115, 0.9445185382) m for N = 2, at (0.180512227, 0.983572741) m for N = 40. Coordinate 0
+    is the angle of the first crank from +x. Source: as `pycraft.models.linkages.n_four_bar`.
+
+    Parameters
+    ----------
+    N : 1 or more
+    method : of `effects.Loop`
+    """
+    model = linkages.n_four_bar(N)
+    model.v = [-1.0, 1.0] * N + [-1.0]
+    return Scene(model).add(Gravity(ALONG_Y), Loop(method=method))
+
+
+def andrews(method: str = "augment") -> Scene:
+    """Andrews' squeezer: seven bodies within centimetres, driven by 0.033 N m, for 30 ms, in which the crank turns two and a half times.
+
+    The angles at 0.03 s of the test set for initial value problems: β = 15.81077, Θ = -15.75637, γ = 0.0408224, δ = 0.524410,
+    φ = -0.534730, ε = 1.048081, ω = 0.534730 rad, in the model's order. Source: as `pycraft.models.linkages.andrews`.
+    """
+    model = linkages.andrews()
+    spring = NodeSpring("anchor", "spring", 4530.0, 0.07785)
+    return Scene(model).add(TorqueSource(0.033, hinges="K1"), spring, Loop(method=method))
+
+
+def bricard(method: str = "augment") -> Scene:
+    """Bricard's linkage under gravity along -y: one degree of freedom, and one redundant row that is no particular one.
+
+    Source: as `pycraft.models.linkages.bricard`.
+    """
+    return Scene(linkages.bricard()).add(Gravity(ALONG_Y), Loop(method=method))
+
+
+def slider_crank(speed: float = 10.0, method: str = "augment") -> Scene:
+    """A crank of 0.15 m that turns freely, and the block of 0.5 kg that its rod pushes along x; no gravity.
+
+    Parameters
+    ----------
+    speed : rad/s, of the crank at first
+    """
+    model = linkages.slider_crank()
+    model.v = model.assemble(model.q, [speed, 0, 0], fix="crank").v
+    return Scene(model).add(Loop(method=method))
+
+
+def peaucellier(speed: float = 1.0, method: str = "augment") -> Scene:
+    """Peaucellier's linkage, turning about its centre line: node "pen" stays on a straight line, to rounding. No gravity.
+
+    Parameters
+    ----------
+    speed : rad/s, of the crank at first
+    """
+    model = linkages.peaucellier()
+    model.v = model.assemble(model.q, [speed, *[0.0] * (model.nv - 1)], fix="crank").v
+    return Scene(model).add(Loop(method=method))
+
+
+def five_bar(method: str = "augment") -> Scene:
+    """A planar parallel robot under gravity along -y, at rest at first, its two motors off."""
+    return Scene(linkages.five_bar()).add(Gravity(ALONG_Y), Loop(method=method))
+
+
+def stewart(method: str = "augment") -> Scene:
+    """A hexapod under gravity along -z, at rest at first, its six legs free to slide."""
+    return Scene(linkages.stewart()).add(Gravity(DOWN), Loop(method=method))

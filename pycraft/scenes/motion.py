@@ -120,6 +120,17 @@ class Motion:
         energy = self.energy
         return energy["kinetic"] + energy["potential"] - energy["work"].sum(axis=-1)
 
+    @property
+    def drift(self) -> dict[str, np.ndarray]:
+        """(K,) by the loops of the model that have residuals: the largest, m and rad; whether effects keep the loop or not."""
+        model = self._unedited_model()
+        found = {}
+        for name, loop in model.loops.items():
+            rows = model.loops.of_positions[loop.slice]
+            if rows.any():
+                found[name] = np.abs(loop.residual(self.q)[..., rows]).max(axis=-1)
+        return found
+
     @cached_property
     def momentum(self) -> dict[str, np.ndarray]:
         """Spatial momentum (K, 6) of all bodies in the world's axes, angular first, N m s and N s: "origin", about the world's origin,

@@ -13,7 +13,7 @@ from ..arguments import moment, one_number, text
 from ..closed import Closed
 from ..models.grafting import Grafting
 from ..state import at_state
-from .effects import Effect, UserEffect
+from .effects import Effect, Loop, UserEffect
 from .explain import plan_text
 from .filed import Filed
 from .measurements import Measurements
@@ -89,7 +89,7 @@ class Scene(Measurements, Statics, Filed, Closed):
     def __init__(self, model: Any, *, form: str = "fast", refine: Any = 0, residual: str = "same", precision: Any = "double"):
         if not isinstance(model, _core.Multibody):
             raise _core.ModelError(f"a scene is of a model, not of {model!r:.80}")
-        self._model = model
+        self._model: Any = model
         self._entries: dict[str, tuple[Effect, bool]] = {}
         self._how = (form, _core.checked_refinement(refine, residual, precision), residual, precision)
         self._built: tuple[Any, Any] | None = None
@@ -204,11 +204,17 @@ class Scene(Measurements, Statics, Filed, Closed):
             self._model._parameters,
             self._how,
             tuple((name, id(effect), effect._changes, on) for name, (effect, on) in self._entries.items()),
+            self._loop_edits(),
         )
         if self._built is None or self._built[0] != now:
             form, refine, residual, precision = self._how
             self._built = (now, _core.SceneCalls(self._fresh_core(), form, refine, residual, precision))
         return self._built[1]
+
+    def _loop_edits(self) -> int:
+        """What the model's loops count of their changes, where they are kept: they are no part of the model's own numbers."""
+        kept = any(isinstance(effect, Loop) for effect, _ in self._entries.values())
+        return self._model.loops._core.edits if kept else 0
 
     # ------------------------------------------------------------------ states and runs
     def evaluate(self, q=None, v=None, t: float = 0.0, *, states=None, step: float = 0.0) -> Evaluation:

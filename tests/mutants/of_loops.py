@@ -12,7 +12,7 @@ CHANGES = {
         ),
         (
             "rows of loops that conflict are averaged",
-            "if (off_[row] <= certified<S>() * size) off_[row] = S(0);",
+            "if (off_[row] <= certified() * size) off_[row] = S(0);",
             "off_[row] = S(0);",
             STATEMENT,
         ),
@@ -21,7 +21,24 @@ CHANGES = {
             "maximum(sizes_[row], S((rows_.product_size(row, x_.data()) + bias_[row]) / unit_[row]))",
             "S((rows_.product_size(row, x_.data()) + bias_[row]) / unit_[row])",
         ),
+    ],
+    "cpp/dynamics/constrained_dynamics.h": [
         ("in quad the rounding of states is a direction", "S(64 * epsilon<double>())", "S(0)"),
+    ],
+    "cpp/dynamics/states_on_loops.cpp": [
+        ("positions are left where steps have brought them", "std::copy_n(moved_.data(), model_->nq, q);", ";", STATEMENT),
+        ("velocities are left where steps have brought them", "std::copy_n(x_.data(), model_->nv, v);", ";", STATEMENT),
+        ("a state within a step is trusted to rounding", "S(S(of_off) * sqrt(off))", "S(0)"),
+        ("a state that is far off is on its loops", "if (!(off <= S(reach_of_steps)))", "if (!(off <= S(1e300)))"),
+    ],
+    "cpp/simulation/scene_loops.h": [
+        (
+            "Baumgarte's gains of one effect are all effects'",
+            "gains_.resize(to.rows, {kept.alpha, kept.beta});",
+            "gains_.assign(to.rows, {kept.alpha, kept.beta});",
+            STATEMENT,
+        ),
+        ("a start off the loops is taken", "if (!(to_double(off[r]) <= far))", "if (to_double(off[r]) > 1e300)"),
     ],
     "cpp/numerics/rank_factors.h": [
         ("multipliers are the least in units of rounding", "unit_[V_.order[i]] * V_.upper(j, i)", "V_.upper(j, i)"),

@@ -63,7 +63,7 @@ def same_numbers(one, other, seed=1):
 
 
 def test_no_effect_is_forgotten():
-    assert set(EVERY) == set(KINDS) and len(EVERY) == 22
+    assert set(EVERY) == set(KINDS) - {"Loop"} and len(EVERY) == 22  # of a model with loops: test_kept_loops.py
 
 
 @pytest.mark.parametrize("name", EVERY)

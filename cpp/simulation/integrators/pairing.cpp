@@ -37,6 +37,11 @@ void refuse_implicit_effects(const Scene& scene, const std::string& integrator) 
                           "that acts at states (Damping, Spring)");
 }
 
+void refuse_loops(const Scene& scene, const std::string& integrator, const std::string& why) {
+  if (const SceneEntry* e = effect_with(scene, [](const Declaration& d) { return d.loops != nullptr; }))
+    throw EvaluationError(integrator + " " + why + ", and effect '" + e->name + "' keeps loops, by accelerations at states that are taken back onto them after each step: take integrator 'dopri5', 'fehlberg78' or 'rkmk4'");
+}
+
 std::string quoted(const std::string& name) { return "integrator '" + name + "'"; }
 
 template <class Method, class S, PairsWith<Method> Way>
@@ -53,6 +58,7 @@ void check_pairing(const Scene& scene, Precision precision, Integrator integrato
   if (record.way == Way::with_derivatives && precision != Precision::double_)
     throw EvaluationError(name + " solves by derivatives of accelerations, which are in double precision, and the scene computes in '" + precision_name(precision) +
                           "': take precision='double', or integrator 'fehlberg78'");
+  if (record.way != Way::at_states) refuse_loops(scene, name, record.way == Way::of_steps ? "takes implicit steps" : record.way == Way::by_momenta ? "steps by momenta" : "solves by derivatives of the tree's accelerations");
   if (record.way == Way::at_states || record.way == Way::by_momenta) refuse_implicit_effects(scene, name);
   if (record.way != Way::by_momenta) return;
   if (const SceneEntry* e = effect_with(scene, [](const Declaration& d) { return !d.prescribed.empty(); }))
@@ -63,6 +69,7 @@ void check_pairing(const Scene& scene, Precision precision, Integrator integrato
 void check_foreign_pairing(const Scene& scene, Precision precision, const std::string& name, bool implicit) {
   if (precision != Precision::double_)
     throw EvaluationError(quoted(name) + " keeps states in double precision, and the scene computes in '" + precision_name(precision) + "': take precision='double', or integrator 'fehlberg78'");
+  refuse_loops(scene, quoted(name), "takes its steps outside of the core");
   if (!implicit) refuse_implicit_effects(scene, quoted(name));
 }
 

@@ -6,6 +6,7 @@ from .frictions import CoulombFriction, Damping, ImplicitDamping, QuadraticDampi
 from .from_model import Offered, from_model
 from .functions_of_time import Harmonic, Spline, Table
 from .gravities import Gravity, GravityGradient, PointMassGravity
+from .loops import Loop
 from .motions import Prescribed
 from .springs import Bushing, ImplicitSpring, NodeDamper, NodeSpring, Spring
 from .stops import Limits
@@ -27,6 +28,7 @@ __all__ = [
     "ImplicitSpring",
     "Langevin",
     "Limits",
+    "Loop",
     "Motor",
     "NodeDamper",
     "NodeSpring",

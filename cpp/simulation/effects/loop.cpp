@@ -1,0 +1,43 @@
+#include "simulation/effects/loop.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "model/checks.h"
+#include "runtime/errors.h"
+
+namespace pycraft {
+
+namespace {
+
+// What it does is done by the accelerations.
+template <class S>
+class BoundLoops : public BoundEffect<S> {
+ public:
+  explicit BoundLoops(const KeepLoops&) {}
+};
+
+}  // namespace
+
+KeepLoops::KeepLoops(std::shared_ptr<const LoopSet> set, std::vector<std::string> names, double alpha, double beta) {
+  for (size_t i = 0; i < names.size(); ++i) {
+    set->loop(names[i]);
+    if (std::find(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(i), names[i]) != names.begin() + static_cast<std::ptrdiff_t>(i))
+      throw ModelError("loop: '" + names[i] + "' is named twice");
+  }
+  if (names.empty() && set->names().empty()) throw ModelError("loop: '" + set->model().name() + "' has no loops; declare them, add_loop(...)");
+  if (!std::isfinite(alpha) || !std::isfinite(beta) || alpha < 0 || beta < 0)
+    throw ModelError("loop: Baumgarte's alpha and beta are finite numbers, zero or more (1/s), not " + short_number(alpha) + " and " + short_number(beta));
+  kept_ = std::make_shared<KeptLoops>(KeptLoops{std::move(set), std::move(names), alpha, beta});
+}
+
+Declaration KeepLoops::declaration() const {
+  Declaration d;
+  d.velocities = true;
+  d.loops = kept_;
+  return d;
+}
+
+PYCRAFT_BIND_EFFECT(KeepLoops, BoundLoops)
+
+}  // namespace pycraft

@@ -1,0 +1,228 @@
+"""Models of linkages that everybody knows: trees with their loops declared (docs/loops.md), at a state on them.
+
+Bodies are thin rods where nothing else is said; lengths in m, masses in kg.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from .multibody import Multibody
+
+
+def rod(length: float = 1.0, mass: float = 1.0, direction: Any = (1, 0, 0)) -> dict[str, Any]:
+    """A thin rod from its hinge along a direction: mass, com and inertia of `add_body`."""
+    along = np.asarray(direction, float) / np.linalg.norm(direction)
+    return {"mass": mass, "com": length / 2 * along, "inertia": mass * length**2 / 12 * (np.eye(3) - np.outer(along, along))}
+
+
+def _heading(way: np.ndarray) -> float:
+    return float(np.arctan2(way[1], way[0]))
+
+
+def _on_circle(radius: float, angle: float, height: float) -> np.ndarray:
+    return np.array([radius * np.cos(angle), radius * np.sin(angle), height])
+
+
+def n_four_bar(windows: int = 1, angle: float = np.pi / 2) -> Multibody:
+    """N four-bars side by side: N + 1 cranks on the ground, joined at their tips by N rods, all of 1 m and 1 kg, in the plane of x and y.
+
+    Coordinate 0 is the angle of the first crank from +x. In line (angle 0) the linkage is singular: there every rhombus may become an
+    antiparallelogram.
+
+    Source: M. González, F. González, A. Luaces, J. Cuadrado, A collaborative benchmarking framework for multibody system dynamics,
+    Engineering with Computers 26, 2010 (IFToMM library of benchmark problems, A02).
+
+    Parameters
+    ----------
+    windows : N, 1 or more
+    angle : rad, of all cranks
+    """
+    if int(windows) != windows or windows < 1:
+        raise _core.ModelError(f"windows={windows}: a whole number, 1 or more")
+    model = Multibody(f"{windows} four-bars")
+    for i in range(windows + 1):
+        model.add_body(f"crank{i}", None, position=(i, 0, 0), **rod())
+        tip = model.add_node(f"tip{i}", f"crank{i}", position=(1, 0, 0))
+        if i:
+            model.add_loop(model.add_node(f"end{i}", f"rod{i}", position=(1, 0, 0)), tip, hinge="pin", name=f"loop{i}")
+        if i < windows:
+            model.add_body(f"rod{i + 1}", f"crank{i}", position=(1, 0, 0), **rod())
+    model.q = [angle, -angle] * int(windows) + [angle]
+    return model
+
+
+def bricard() -> Multibody:
+    """Bricard's linkage: six bars of 1 m along edges of a cube, one of them the ground, each pin across both of its bars.
+
+    One degree of freedom, where rows would leave none: one of five is redundant at every state, and no particular one is.
+    Source: as `n_four_bar`, A04.
+    """
+    corners = np.array([(0, 0, 0), (1, 0, 0), (1, -1, 0), (1, -1, 1), (0, -1, 1), (0, 0, 1)], float)
+    edges = np.roll(corners, -1, axis=0) - corners
+    model = Multibody("bricard")
+    for i in range(5):
+        axis, place = np.cross(edges[i - 1], edges[i]), corners[0] if i == 0 else edges[i - 1]
+        model.add_body(f"bar{i}", f"bar{i - 1}" if i else None, axis=axis, position=place, **rod(direction=edges[i]))
+    model.add_loop("bar4", hinge="pin", axis=np.cross(edges[4], edges[5]), point=edges[4], position=corners[5] - edges[4], name="loop")
+    return model
+
+
+def slider_crank(crank: float = 0.15, connecting_rod: float = 0.2, slider: float = 0.5, angle: float = np.pi / 4) -> Multibody:
+    """A crank turns about z, its rod pushes a block along x.
+
+    Parameters
+    ----------
+    crank, connecting_rod : m, of 1 kg a metre; the rod is the longer one
+    slider : kg
+    angle : rad, of the crank from x
+    """
+    if not 0 < crank < connecting_rod < np.inf:
+        raise _core.ModelError(
+            f"crank={crank}, connecting_rod={connecting_rod}: positive, and the rod the longer one, or it does not turn around"
+        )
+    model = Multibody("slider-crank")
+    model.add_body("crank", **rod(crank, crank))
+    model.add_body("rod", "crank", position=(crank, 0, 0), **rod(connecting_rod, connecting_rod))
+    model.add_body("block", hinge="slider", axis=(1, 0, 0), mass=slider)
+    model.add_loop(model.add_node("end", "rod", position=(connecting_rod, 0, 0)), "block", hinge="pin", name="wrist")
+    bend = -np.arcsin(crank * np.sin(angle) / connecting_rod)
+    model.q = [angle, bend - angle, crank * np.cos(angle) + connecting_rod * np.cos(bend)]
+    return model
+
+
+def peaucellier(long: float = 1.0, short: float = 0.4, crank: float = 0.35, angle: float = 0.3) -> Multibody:
+    """Peaucellier's and Lipkin's linkage: node "pen" of body "far0" goes along a straight line, x = (long² - short²)/(2 crank).
+
+    Two bars of the length `long` turn about the origin, a rhombus of the side `short` hangs between them, whose near corner a crank carries
+    on a circle through the origin: near and far corner are inverse to each other.
+
+    Parameters
+    ----------
+    long, short, crank : m, of 1 kg a metre; 2 crank < long - short and more for a pen in reach
+    angle : rad, of the crank from x
+    """
+    near = crank * np.array([1 + np.cos(angle), np.sin(angle)])
+    reach = np.linalg.norm(near)
+    if not (0 < short < long < np.inf and long - short < reach < long + short):
+        raise _core.ModelError(
+            f"long={long}, short={short}, crank={crank}, angle={angle}: the bars do not reach from the origin to the crank's end"
+        )
+    model = Multibody("peaucellier")
+    model.add_body("crank", position=(crank, 0, 0), **rod(crank, crank))
+    end = model.add_node("near", "crank", position=(crank, 0, 0))
+    out = near / reach
+    along = (reach**2 + long**2 - short**2) / (2 * reach)
+    far = (long**2 - short**2) / reach * out  # inverse to near
+    corners = [along * out + side * np.sqrt(long**2 - along**2) * np.array([-out[1], out[0]]) for side in (1, -1)]
+    q = [angle]
+    for i, corner in enumerate(corners):
+        model.add_body(f"long{i}", **rod(long, long))
+        model.add_body(f"near{i}", f"long{i}", position=(long, 0, 0), **rod(short, short))
+        model.add_body(f"far{i}", f"long{i}", position=(long, 0, 0), **rod(short, short))
+        first = _heading(corner)
+        q += [first, _heading(near - corner) - first, _heading(far - corner) - first]
+        model.add_loop(model.add_node(f"end{i}", f"near{i}", position=(short, 0, 0)), end, hinge="pin", name=f"near{i}")
+    pen = model.add_node("pen", "far0", position=(short, 0, 0))
+    model.add_loop(model.add_node("other", "far1", position=(short, 0, 0)), pen, hinge="pin", name="far")
+    model.q = q
+    return model
+
+
+def five_bar(base: float = 0.3, inner: float = 0.2, outer: float = 0.3, angles: Any = (2.0, 1.1)) -> Multibody:
+    """A planar parallel robot: two motors on the ground, two arms that hold one tip, node "tip" of body "outer0".
+
+    Parameters
+    ----------
+    base, inner, outer : m, between the motors and of the bars, of 1 kg a metre
+    angles : rad, of the two motors from x
+    """
+    model = Multibody("five-bar")
+    elbows = [np.array([side * base / 2, 0]) + inner * np.array([np.cos(a), np.sin(a)]) for side, a in zip((-1, 1), angles, strict=True)]
+    between = (elbows[1] - elbows[0]) / 2
+    half = np.linalg.norm(between)
+    if not 0 < half < outer:
+        raise _core.ModelError(f"base={base}, inner={inner}, outer={outer}, angles={tuple(angles)}: the outer bars do not reach each other")
+    tip = elbows[0] + between + np.sqrt(outer**2 - half**2) * np.array([-between[1], between[0]]) / half
+    q = []
+    for i, elbow in enumerate(elbows):
+        model.add_body(f"inner{i}", position=((-1, 1)[i] * base / 2, 0, 0), **rod(inner, inner))
+        model.add_body(f"outer{i}", f"inner{i}", position=(inner, 0, 0), **rod(outer, outer))
+        way = tip - elbow
+        q += [angles[i], float(np.arctan2(way[1], way[0])) - angles[i]]
+    node = model.add_node("tip", "outer0", position=(outer, 0, 0))
+    model.add_loop(model.add_node("end", "outer1", position=(outer, 0, 0)), node, hinge="pin", name="tip")
+    model.q = q
+    return model
+
+
+def stewart(base: float = 1.0, plate: float = 0.6, height: float = 1.0) -> Multibody:
+    """A hexapod: a plate flies freely, six legs stand on universal hinges, slide, and hold it by balls; node "plate" is its centre.
+
+    Parameters
+    ----------
+    base, plate : m, radii of the legs' feet and of their heads, in pairs 120° apart
+    height : m, of the plate at its state
+    """
+    for name, value in (("base", base), ("plate", plate), ("height", height)):
+        if not 0 < value < np.inf:
+            raise _core.ModelError(f"{name}={value}: a positive length")
+    model = Multibody("stewart")
+    model.add_body("platform", hinge="free", mass=2.0, inertia=plate**2 * np.diag([0.5, 0.5, 1.0]))
+    model.add_node("plate", "platform")
+    pairs = np.repeat(np.arange(3), 2) * 2 * np.pi / 3
+    feet = pairs + np.tile([-0.25, 0.25], 3)
+    heads = pairs + np.tile([-np.pi / 3 + 0.25, np.pi / 3 - 0.25], 3)
+    q = [1.0, 0, 0, 0, 0, 0, height]
+    for i in range(6):
+        foot, head = _on_circle(base, feet[i], 0), _on_circle(plate, heads[i], height)
+        way = head - foot
+        length = float(np.linalg.norm(way))
+        x, y, z = way / length
+        model.add_body(f"lower{i}", hinge="universal", axes=[(1, 0, 0), (0, 1, 0)], position=foot, **rod(0.5, 0.4, (0, 0, 1)))
+        model.add_body(
+            f"upper{i}", f"lower{i}", hinge="slider", axis=(0, 0, 1), mass=0.3, com=(0, 0, -0.25), inertia=0.3 * 0.25**2 * np.eye(3)
+        )
+        model.add_loop(
+            f"upper{i}", model.add_node(f"head{i}", "platform", position=_on_circle(plate, heads[i], 0)), hinge="ball", name=f"leg{i}"
+        )
+        q += [float(np.arctan2(-y, z)), float(np.arcsin(x)), length]  # R_x(a) R_y(b) takes z there
+    model.q = q
+    return model
+
+
+def andrews() -> Multibody:
+    """Andrews' squeezer: seven bodies in a plane, three loops that end in one point, within 30 ms and some centimetres.
+
+    Nodes "spring" of "K3" and "anchor" of the base are what its spring hangs between, of 4530 N/m and 0.07785 m at rest; "K1" is driven by
+    0.033 N m. No gravity.
+    Source: F. Mazzia, C. Magherini, Test set for initial value problem solvers, 2008, "Andrews' squeezing mechanism" (IFToMM A03).
+    """
+    model = Multibody("andrews")
+    A, B = (-0.06934, -0.00227, 0), (-0.03635, 0.03273, 0)
+    model.add_body("K1", mass=0.04325, com=(92e-5, 0, 0), inertia=2.194e-6 * np.eye(3))
+    model.add_body("K2", "K1", position=(7e-3, 0, 0), mass=0.00365, com=(-115e-4, 0, 0), inertia=4.410e-7 * np.eye(3))
+    model.add_body("K3", position=B, mass=0.02373, com=(1043e-5, -1874e-5, 0), inertia=5.255e-6 * np.eye(3))
+    model.add_body("K5", position=A, mass=0.07050, com=(2308e-5, 916e-5, 0), inertia=1.169e-5 * np.eye(3))
+    model.add_body("K4", "K5", position=(4e-2, 0, 0), mass=0.00706, com=(0, -(2e-2 - 1421e-5), 0), inertia=5.667e-7 * np.eye(3))
+    model.add_body("K7", position=A, mass=0.05498, com=(-449e-5, -1228e-5, 0), inertia=1.912e-5 * np.eye(3))
+    model.add_body("K6", "K7", position=(0, -4e-2, 0), mass=0.00706, com=(2e-2 - 1421e-5, 0, 0), inertia=5.667e-7 * np.eye(3))
+    point = model.add_node("E", "K2", position=(-28e-3, 0, 0))
+    for name, body, end in (("BE", "K3", (0, -35e-3, 0)), ("K4E", "K4", (0, -2e-2, 0)), ("K6E", "K6", (2e-2, 0, 0))):
+        model.add_loop(model.add_node(f"end of {body}", body, position=end), point, hinge="pin", name=name)
+    model.add_node("spring", "K3", position=(2e-2, -18e-3, 0))
+    model.add_node("anchor", None, position=(0.014, 0.072, 0))
+    phi, epsilon = 0.222668390165885884674473185609, 1.23054744454982119249735015568
+    model.q = [
+        -0.0617138900142764496358948458001,
+        0.0,
+        0.455279819163070380255912382449,
+        0.487364979543842550225598953530,
+        phi,
+        epsilon,
+        -phi,
+    ]
+    return model

@@ -1,0 +1,237 @@
+"""Scenes on loops against closed forms and published benchmarks; energy, drift, redundant rows, singular states; what is refused.
+
+Tolerances: where nothing is said, a hundred times that of the run's steps, the errors of which add up over the motion.
+"""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import pycraft as pc
+from pycraft.models import linkages
+from support.linkages import close, dense
+
+E, M = pc.effects, pc.mechanisms
+MECHANISMS = {"n_four_bar": 5, "andrews": 7, "bricard": 5, "slider_crank": 3, "peaucellier": 7, "five_bar": 4, "stewart": 24}
+FREE = {"n_four_bar": 1, "andrews": 1, "bricard": 1, "slider_crank": 1, "peaucellier": 1, "five_bar": 2, "stewart": 6}
+
+
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_mechanisms_start_on_their_loops_and_stay_there(name):
+    scene = getattr(M, name)()
+    model = scene.model
+    assert model.nv == MECHANISMS[name] and model.mobility(model.q).degrees_of_freedom == FREE[name]
+    run = scene.simulate(0.01 if name == "andrews" else 0.3, rtol=1e-9, atol=1e-11, progress=False)
+    size = np.abs(run.energy["kinetic"]).max() + np.abs(run.energy["potential"]).max()
+    assert np.ptp(run.balance) < 1e-6 * size
+    assert max(drift.max() for drift in run.drift.values()) < 1e-13
+    Qv = np.array([model.loops.jacobian(q) @ v for q, v in zip(run.q, run.v, strict=True)])
+    assert np.abs(Qv).max() < 1e-12 * np.abs(run.v).max()
+    assert np.abs(run.q - run.q[0]).max() > 1e-3  # it moves
+
+
+def test_two_four_bars_pass_the_line_on_their_branch():
+    """IFToMM A02: cranks turn as one, (N + 1)/3 + N of inertia and (N + 1)/2 + N of weight."""
+    reference = solve_ivp(
+        lambda t, y: [y[1], -9.81 * 3.5 / 3 * np.cos(y[0])], (0, 10), [np.pi / 2, -1.0], method="DOP853", rtol=1e-13, atol=1e-13
+    )
+    angle = reference.y[0, -1]
+    assert np.abs([np.cos(angle) - 0.3284581115, np.sin(angle) - 0.9445185382]).max() < 1e-9  # as published
+    for rtol, error in ((1e-6, 3e-3), (1e-8, 1e-5), (1e-10, 1e-6)):  # near the line the step's own error over the distance is felt
+        run = M.n_four_bar(2).simulate(10.0, rtol=rtol, atol=rtol, progress=False)
+        assert abs(run.balance[0] - 35.835) < 1e-12
+        assert abs(run.q[-1, 0] - angle) < error
+        assert np.ptp(run.balance) < 10 * error
+        assert np.abs(run.q[:, 0] + run.q[:, 1]).max() < 10 * error  # the rod stays level
+
+
+def test_forty_four_bars():
+    run = M.n_four_bar(40).simulate(10.0, rtol=1e-8, atol=1e-8, progress=False, energy=False)
+    assert np.abs([np.cos(run.q[-1, 0]) - 0.180512227, np.sin(run.q[-1, 0]) - 0.983572741]).max() < 1e-5
+
+
+def test_andrews_squeezer_is_where_the_test_set_has_it():
+    run = M.andrews().simulate(0.03, rtol=1e-10, atol=1e-10, progress=False)
+    published = [15.81077119629904, -15.75637105984298, 0.04082224013073101, 0.5244099658805304, -0.5347301163226948, 1.048080741042263]
+    assert np.abs(run.q[-1, :6] - published).max() < 1e-7
+    assert abs(run.q[-1, 6] - 0.5347301163226948) < 1e-7
+
+
+def test_bricard_keeps_its_energy():
+    run = M.bricard().simulate(10.0, rtol=1e-9, atol=1e-10, progress=False)
+    assert np.ptp(run.balance) < 1e-6 * 29.43 and np.ptp(run.energy["kinetic"]) > 1
+
+
+def test_a_peaucellier_draws_a_straight_line():
+    run = M.peaucellier().simulate(0.4, rtol=1e-8, progress=False)
+    pen = run.frame("pen").position
+    assert np.abs(pen[:, 0] - (1.0 - 0.4**2) / (2 * 0.35)).max() < 1e-12
+    assert np.ptp(pen[:, 1]) > 0.2
+
+
+@pytest.mark.parametrize("integrator", ["dopri5", "cash-karp54", "fehlberg78", "bulirsch-stoer", "rk4", "rkmk4"])
+def test_a_slider_crank_by_every_integrator_at_states(integrator):
+    step = 1e-4 if integrator in ("rk4", "rkmk4") else None
+    run = M.slider_crank(20.0).simulate(
+        0.5, integrator=integrator, step=step, rtol=1e-10, atol=1e-12, t_eval=[0.1, 0.3, 0.5], progress=False
+    )
+    crank, _, block = run.q.T
+    assert np.abs(block - (0.15 * np.cos(crank) + np.sqrt(0.2**2 - (0.15 * np.sin(crank)) ** 2))).max() < 1e-14
+    # One coordinate: ½ I(t) ṫ² is constant, so time is an integral.
+    reference = _crank_angles([0.1, 0.3, 0.5], 20.0)
+    assert np.abs(crank - reference).max() < 1e-7
+
+
+def _crank_angles(times, speed):
+    """Of the slider-crank by its one equation, kinetic energy from the model's mass matrix and the closed-form rates."""
+    model = linkages.slider_crank()
+
+    def rates(t):
+        bend = np.arcsin(-0.15 * np.sin(t) / 0.2)
+        bend_rate = -0.15 * np.cos(t) / (0.2 * np.cos(bend))
+        q = [t, bend - t, 0.15 * np.cos(t) + 0.2 * np.cos(bend)]
+        J = np.array([1, bend_rate - 1, -0.15 * np.sin(t) - 0.2 * np.sin(bend) * bend_rate])
+        return J @ model.mass_matrix(q) @ J
+
+    c = rates(np.pi / 4) * speed**2
+    return solve_ivp(
+        lambda _, t: [np.sqrt(c / rates(t[0]))], (0, 0.5), [np.pi / 4], t_eval=times, method="DOP853", rtol=1e-11, atol=1e-12
+    ).y[0]
+
+
+@pytest.mark.parametrize("precision", ["double", "extended", "quad"])
+def test_evaluations_keep_both_equations(precision):
+    model = linkages.stewart()
+    assert not np.any(model.gravity)
+    state = model.assemble(model.q, np.random.default_rng(2).normal(size=model.nv))
+    others = [E.Gravity(), E.RotorInertia(0.3, hinges="upper*"), E.Damping(0.2), E.Wrench("platform", (1, 2, 3, 4, 5, 6))]
+    said = pc.Scene(model, precision=precision).add(*others, E.Loop()).evaluate(state.q, state.v)
+    close(sum(said.forces.values()), model.inverse_dynamics(state.q, state.v, said.vdot))  # rotors take what they take
+    Q, c = model.loops.jacobian(state.q), model.loops.bias(state.q, state.v)
+    assert np.abs(Q @ said.vdot + c).max() < 1e-12 * np.abs(said.vdot).max()
+    multipliers = np.linalg.lstsq(Q.T, said.forces["loop"], rcond=None)[0]
+    close(Q.T @ multipliers, said.forces["loop"])  # in the rows' span
+    alone = pc.Scene(model).add(*others).evaluate(state.q, state.v)
+    assert np.abs(alone.vdot - said.vdot).max() > 0.1
+    assert said.passes["accelerations"] == 1 and "loop" not in said.passes
+
+
+def test_gains_are_those_of_their_effects():
+    """Velocities that are 1e-5 off are drawn back by 2α Qv, of each effect's loops by its own α."""
+    model = linkages.n_four_bar(2, 1.0)
+    on = model.assemble(model.q, [1.0, -1, 1, -1, 1])
+    v = on.v + 1e-5 * np.array([0.0, 0.3, 1.0, -0.5, 0.7])
+    drawn = np.repeat([1e4, 2e3], 5) * 2 * (model.loops.jacobian(on.q) @ v)
+    scene = pc.Scene(model).add(E.Gravity((0, -9.81, 0)), E.Loop("loop1", alpha=1e4), E.Loop("loop2", alpha=2e3))
+    vdot = scene.evaluate(on.q, v).vdot
+    left = model.loops.jacobian(on.q) @ vdot + model.loops.bias(on.q, v) + drawn
+    assert np.abs(left).max() < 1e-11 and np.abs(drawn).max() > 0.01
+    model.gravity = (0, -9.81, 0)
+    close(pc.Scene(model).add(E.Gravity((0, -9.81, 0)), E.Loop()).evaluate(on.q, on.v).vdot, dense(model, on.q, on.v, np.zeros(5))[0])
+
+
+def test_a_scene_keeps_what_it_is_told_to():
+    model = linkages.n_four_bar(2, 1.0)
+    one = pc.Scene(model).add(E.Gravity((0, -9.81, 0)), E.Loop("loop2")).simulate(0.3, progress=False)
+    assert one.drift["loop2"].max() < 1e-14 < 1e-2 < one.drift["loop1"].max()
+    scene = pc.Scene(model).add(E.Gravity((0, -9.81, 0)), E.Loop())
+    both = scene.simulate(0.3, progress=False)
+    assert both.drift["loop1"].max() < 1e-14
+    scene.disable("loop")
+    assert (
+        scene.evaluate(model.q, np.zeros(5)).passes == pc.Scene(model).add(E.Gravity((0, -9.81, 0))).evaluate(model.q, np.zeros(5)).passes
+    )
+    free = scene.simulate(0.3, progress=False)
+    assert free.drift["loop1"].max() > 1e-2
+    scene.enable("loop")
+    model.loops.remove("loop1")  # a scene sees what became of the loops
+    assert np.array_equal(scene.simulate(0.3, progress=False).q, one.q)
+
+
+def test_rolling_is_kept():
+    """A disc rolls upright around a circle, its centre at the speed ρω; what it moves along is no position's."""
+    disc = pc.Multibody("disc")
+    disc.add_body("disc", hinge="free", mass=2.0, inertia=np.diag([0.1, 0.1, 0.2]), position=(0, 0, 0.5))
+    disc.add_rolling("disc", None, "wheel", radius=0.5, name="ground")
+    tilt = np.array([np.cos(np.pi / 4), np.sin(np.pi / 4), 0, 0])  # the disc's z is horizontal
+    q = np.array([*tilt, 0, 0, 0])
+    state = disc.assemble(q, [0, 0.3, 2.0, 1.0, 0, 0])
+    run = pc.Scene(disc).add(E.Gravity(), E.Loop()).simulate(3.0, state.q, state.v, rtol=1e-10, progress=False)
+    assert np.ptp(run.balance) < 1e-7 * abs(run.balance[0])
+    Qv = [disc.loops.jacobian(q) @ v for q, v in zip(run.q, run.v, strict=True)]
+    assert np.abs(Qv).max() < 1e-13 * np.abs(run.v).max()
+    assert np.ptp(run.q[:, 4:6], axis=0).max() > 0.5
+
+
+def test_events_checkpoints_and_states_between_steps_are_on_the_loops():
+    scene = M.slider_crank(20.0)
+    whole = scene.simulate(0.6, rtol=1e-9, progress=False, events={"right": lambda t, s: np.sin(s.q[0])})
+    found = whole.events["right"]
+    assert len(found.t) > 2 and np.abs(np.sin(found.q[:, 0])).max() < 1e-9
+    assert np.abs([scene.model.loops.residual(q) for q in found.q]).max() < 1e-14
+    half = scene.simulate(0.3, rtol=1e-9, progress=False)
+    on = scene.resume(half, 0.6, progress=False)
+    assert np.array_equal(on.q[-1], whole.q[-1]) or np.abs(on.q[-1] - whole.q[-1]).max() < 1e-9
+    between = whole.at(np.linspace(0.01, 0.59, 50))
+    assert np.abs([scene.model.loops.residual(q) for q in between.q]).max() < 1e-6  # interpolated, not taken back
+
+
+def test_files_and_sweeps_have_the_effect(tmp_path):
+    scene = M.n_four_bar(2)
+    scene.save(tmp_path / "bars.toml")
+    again = pc.load_scene(tmp_path / "bars.toml")
+    a, b = (s.simulate(1.0, progress=False) for s in (scene, again))
+    assert np.array_equal(a.q, b.q)
+    assert repr(E.Loop("loop1", beta=2.0)) == "Loop(loops='loop1', beta=2.0)"
+
+
+REFUSED = {
+    "twice": (lambda m: pc.Scene(m).add(E.Loop(), E.Loop()), pc.ModelError, "'loop' and 'loop_2' both keep loop 'wrist'"),
+    "named twice": (lambda m: pc.Scene(m).add(E.Loop(["wrist", "wrist"])), pc.ModelError, "named twice"),
+    "unknown": (lambda m: pc.Scene(m).add(E.Loop("wirst")), pc.ModelError, "no loop called 'wirst'"),
+    "empty": (lambda m: pc.Scene(m).add(E.Loop([])), pc.ModelError, r"loops=\[\] keeps none"),
+    "no loops": (lambda m: pc.Scene(pc.chain(2)).add(E.Loop()), pc.ModelError, "has no loops"),
+    "method": (lambda m: pc.Scene(m).add(E.Loop(method="penalty")), pc.EvaluationError, "method='penalty'"),
+    "gains": (lambda m: pc.Scene(m).add(E.Loop(alpha=-1.0)), pc.ModelError, "alpha and beta are finite numbers"),
+    "prescribed": (
+        lambda m: pc.Scene(m).add(E.Loop(), E.Prescribed("crank", 0.1)),
+        pc.ModelError,
+        "'prescribed' prescribes 'crank', and effect 'loop'",
+    ),
+    "impulses": (lambda m: pc.Scene(m).add(E.Langevin(1.0, 0.1, 0.01), E.Loop()), pc.ModelError, "'langevin' acts by impulses"),
+    "off": (lambda m: _run(m, q=[0, 0, 0.3]), pc.ModelError, "start is off row 'wrist: along x'.*assemble"),
+    "moves off": (lambda m: _run(m, q=m.q, v=[1, 0, 0]), pc.ModelError, "moves off row 'wrist"),
+    "momenta": (lambda m: _run(m, integrator="variational2"), pc.EvaluationError, "'variational2' steps by momenta, and effect 'loop'"),
+    "implicit": (lambda m: _run(m, integrator="semi-implicit-euler"), pc.EvaluationError, "takes implicit steps, and effect 'loop'"),
+    "derivatives": (lambda m: _run(m, integrator="rosenbrock4"), pc.EvaluationError, "solves by derivatives.*effect 'loop'"),
+    "foreign": (lambda m: _run(m, integrator="dop853"), pc.EvaluationError, "outside of the core, and effect 'loop'"),
+    "linear": (lambda m: pc.Scene(m).add(E.Loop()).linearize(), pc.EvaluationError, "no linear model on loops"),
+    "statics": (lambda m: pc.Scene(m).add(E.Loop()).equilibrium(), pc.EvaluationError, "no equilibrium on loops"),
+    "interbody": (lambda m: pc.Scene(m).add(E.Loop()).interbody_forces(), pc.EvaluationError, "no interbody forces on loops"),
+}
+
+
+def _run(model, **options):
+    return pc.Scene(model).add(E.Loop()).simulate(0.1, progress=False, **options)
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_refusals_name_what_it_is(what):
+    call, error, text = REFUSED[what]
+    with pytest.raises(error, match=text):
+        call(linkages.slider_crank())
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: linkages.n_four_bar(0),
+        lambda: linkages.slider_crank(0.3, 0.2),
+        lambda: linkages.peaucellier(crank=2.0),
+        lambda: linkages.five_bar(base=3.0),
+        lambda: linkages.stewart(height=-1.0),
+    ],
+)
+def test_linkages_that_do_not_close_are_refused(call):
+    with pytest.raises(pc.ModelError):
+        call()
