@@ -16,6 +16,7 @@ def catalogue(sizes: Iterable[int] = SIZES) -> list[Case]:
         cases_configurations,
         cases_elimination,
         cases_groups,
+        cases_loops,
         cases_massless,
         cases_motion,
         cases_ratios,
@@ -36,6 +37,7 @@ def catalogue(sizes: Iterable[int] = SIZES) -> list[Case]:
         cases_elimination,
         cases_groups,
         cases_task_space,
+        cases_loops,
         cases_motion,
         cases_trajectories,
     )
