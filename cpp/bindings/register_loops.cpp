@@ -29,6 +29,7 @@ struct PythonCoupling {
       throw ModelError(what + " returns (r, gradient, second derivatives), of shapes (), (n,), (n, n); no difference is taken in their place");
     const py::tuple parts = given;
     *r = one_number(parts[0], ("r of " + what).c_str());
+    if (!std::isfinite(*r)) throw ModelError("r of " + what + " is not a finite number");
     copy(parts[1], "the gradient of " + what, {n}, gradient);
     copy(parts[2], "the second derivatives of " + what, {n, n}, second);
   }
