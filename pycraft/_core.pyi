@@ -257,7 +257,7 @@ class SkoSource:
     @property
     def derived_from(self) -> typing.Any:
         """
-        How this tree was made of a model's, "hinge subset", "world frame", "cut tree", "another root" or "groups of bodies", and that model's source; None for a model's own.
+        How this tree was made of a model's, "hinge subset", "world frame", "cut tree", "another root", "loops" or "groups of bodies", and that model's source; None for a model's own.
         """
     @property
     def dof(self) -> list[int]:
@@ -1083,6 +1083,10 @@ class LoopSet:
         ...
     def bias(self, q: typing.Any, v: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
         ...
+    def ends(self, operators: SkoSource) -> tuple[list[str], list[list[int]]]:
+        """
+        The bodies and nodes that A is of, and by body the rows of `operators`.
+        """
     def first_rows(self) -> list[int]:
         """
         Where each loop's rows begin, and the number of all.
@@ -1094,6 +1098,10 @@ class LoopSet:
     def names(self) -> list[str]:
         """
         In order of declaration.
+        """
+    def operators(self, base: MultibodyOperators) -> SkoSource:
+        """
+        The source of rows as operators, Q and A by body: pycraft/operators/loop_letters.py.
         """
     def remove(self, name: str) -> None:
         ...
@@ -1351,6 +1359,10 @@ def _joined(mass: tuple, name: str, pose: tuple, welded: tuple, welded_name: str
     """
 def _leaf_from_parts(arg0: str, arg1: typing.Any) -> Operator:
     ...
+def _loop_operators_again(arg0: typing.Any) -> typing.Any:
+    """
+    As it was pickled.
+    """
 def _make(arg0: str, arg1: collections.abc.Sequence[Operator], arg2: float | fractions.Fraction) -> Operator:
     ...
 def _parted(mass: tuple, name: str, pose: tuple, welded: tuple, welded_name: str) -> tuple:

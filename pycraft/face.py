@@ -10,7 +10,7 @@ from typing import Any
 from . import _core
 from .dynamics.threads import shared_out, thread_count
 from .models.multibody import Multibody, describe
-from .operators import operator_set
+from .operators import loop_letters, operator_set
 from .operators.block_view import block_view
 
 
@@ -83,6 +83,7 @@ def attach() -> None:
         describe=describe,
         exact_numbers=operator_set.exact_numbers,
         explain=operator_set.explain,
+        loop_source=loop_letters.loop_source,
         model_from_description=Multibody.from_description,
         operator_from_nodes=operator_set.operator_from_nodes,
         plot_model=plot_model,

@@ -5,6 +5,7 @@
 #include "bindings/direct_calls.h"
 #include "bindings/hinge_arguments.h"
 #include "dynamics/loop_calls.h"
+#include "operators/loop_operators.h"
 
 namespace pycraft {
 
@@ -72,6 +73,7 @@ py::array_t<double> rows_at(Loops& loops, const std::vector<std::pair<const char
 }  // namespace
 
 void register_loops(py::module_& m) {
+  m.def("_loop_operators_again", [](const py::object& model) { return of_face("loop_source")(model); }, "As it was pickled.");
   const py::arg name("name"), a("a"), b("b"), q("q"), v("v"), precision("precision");
   py::class_<Loops> loops(m, "LoopSet", "The loops of a model, by name, and their rows at given states: pycraft.models.loop_set is its face.");
   unpicklable(loops)
@@ -122,6 +124,16 @@ void register_loops(py::module_& m) {
         first.push_back(all->rows);
         return first;
       }, "Where each loop's rows begin, and the number of all.")
+      .def("operators", [](Loops& l, const std::shared_ptr<MultibodyOperators>& base) -> std::shared_ptr<SkoSource> {
+        const ModelInUse use(l.set->model());
+        return std::make_shared<LoopOperators>(base, l.set);
+      }, py::arg("base"), "The source of rows as operators, Q and A by body: pycraft/operators/loop_letters.py.")
+      .def("ends", [](const Loops&, const std::shared_ptr<SkoSource>& operators) {
+        const auto of = std::dynamic_pointer_cast<LoopOperators>(operators);
+        std::vector<std::vector<int>> rows;
+        for (int k = 0; k < of->structure().bodies(); ++k) rows.push_back(of->rows_of(k));
+        return py::make_tuple(of->end_names(), rows);
+      }, py::arg("operators"), "The bodies and nodes that A is of, and by body the rows of `operators`.")
       .def("residual", [](Loops& l, const py::object& q, Precision precision) {
         return rows_at(l, {{"q", q}}, {l.rows()}, [&](Arguments& given, double* out) { l.calls.residual(precision, given[0], out); });
       }, q, precision)

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "algebra/language/display.h"
 #include "algebra/language/lower.h"
@@ -9,6 +10,7 @@
 #include "operators/alphabet.h"
 #include "operators/grouped_operators.h"
 #include "operators/inverse_tangent.h"
+#include "operators/loop_operators.h"
 #include "runtime/errors.h"
 
 namespace pycraft {
@@ -158,6 +160,7 @@ class MechanicsDirection : public Direction {
     if (e.kind() == NodeKind::block_function)
       return l.function(e.node().symbol.definition->id, rules(e.children()[0]));
     const Symbol& s = e.node().symbol;
+    if (const auto loops = std::dynamic_pointer_cast<LoopOperators>(s.source)) return loops->tangent(e, moving());
     const Expression theta = l.letter(theta_dot), relative = times({l.own_H().T(), theta}), V = times({l.o.phi.T(), l.o.H.T(), theta});
     switch (s.definition->id) {
       case Delta: return moved(l, l.delta(place_in(s.arguments)), place_in(s.arguments));
@@ -196,6 +199,7 @@ class MechanicsDirection : public Direction {
   }
 
  protected:
+  virtual std::optional<OfDirection> moving() const = 0;  // nothing where inertias change alone
   // Of the model's own letters.
   virtual Expression body_edge_factor(const MechanicsLetters& l) const = 0;
   virtual Expression tangent_of_block(const MechanicsLetters& l, SymbolId id) const = 0;
@@ -240,6 +244,7 @@ class TwistDirection : public MechanicsDirection {
   }
 
  protected:
+  std::optional<OfDirection> moving() const override { return OfDirection{false, twists_}; }
   Expression body_edge_factor(const MechanicsLetters& l) const override {
     std::vector<Expression> terms = {zero(l.o.M.codomain(), l.o.M.codomain())};
     for (const auto& [c, direction] : twists_)
@@ -282,6 +287,7 @@ class TimeDirection final : public MechanicsDirection {
   Expression frame_motion(const Symbol& like) const override { return letters(like).letter(V_bar); }
 
  protected:
+  std::optional<OfDirection> moving() const override { return OfDirection{true, {}}; }
   Expression body_edge_factor(const MechanicsLetters& l) const override {
     bool any = false;
     for (int p : source_->structure().parent) any |= p >= 0;
@@ -315,6 +321,7 @@ class InertiaDirection final : public MechanicsDirection {
   Expression frame_motion(const Symbol& like) const override { return nothing(letters(like)); }
 
  protected:
+  std::optional<OfDirection> moving() const override { return std::nullopt; }
   Expression body_edge_factor(const MechanicsLetters& l) const override { return nothing(l); }
   Expression root_motion(const MechanicsLetters& l) const override { return nothing(l); }
   Expression outboard_motion(const MechanicsLetters& l, const TwistPlace&) const override { return nothing(l); }
