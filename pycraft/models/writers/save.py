@@ -36,7 +36,7 @@ def save(model: Multibody, path: str | os.PathLike[str], state: bool = True) -> 
     if len(model.loops) and ending in (".xml", ".mjcf"):
         warn(f"{shown}: the file does not hold loops: {', '.join(map(repr, model.loops))}")
     functions = [loop["name"] for loop in model.loops._description() if loop.get("function") is not None]
-    if functions and ending == ".toml":
+    if functions and ending in (".toml", ".urdf"):
         warn(f"{shown}: a file does not hold couplings by functions: {', '.join(functions[:6])}{', ...' if len(functions) > 6 else ''}")
     write_text(shown, text)
 
