@@ -168,6 +168,7 @@ class WithLoops(WithFrames):
         constant : float
         function : function of the coordinates (n,)
             Returns (r, gradient (n,), second derivatives (n, n)); rows are then there in double precision. It is called at every state.
+            `pycraft.Spline` is one through points.
         name : str
             By default "coupling".
 

@@ -49,6 +49,9 @@ CHANGES = {
     "pycraft/models/loaders/urdf_loops.py": [
         ("loops placed without their turn", "rotation_from_rpy(*angles) if any(angles) else None", "None"),
     ],
+    "pycraft/models/splines.py": [
+        ("a spline that stops at its ends", "s, bend = s + slope * (q[0] - x), 0.0", "bend = 0.0"),
+    ],
     "pycraft/models/mobility_along.py": [
         ("singular states at samples alone", "else motion.least(low, high)", "else float(i)"),
         ("the greatest distance is sought", "            if at_a < at_b:\n", "            if at_a > at_b:\n"),
