@@ -167,6 +167,7 @@ def assembled(model: Any, q0: Any, v0: Any, fix: Any, starts: Any, seed: Any, to
     if np.ndim(q) == np.ndim(v) == 1:
         return _assembled_one(model, q, v, fix, starts, seed_of(seed), tolerance)
     several = max(len(one) for one in (q, v) if np.ndim(one) == 2)
+    Assembler(model, model.zero_q(), fix, tolerance)  # what is wrong with these is said of no state
     rng, states = seed_of(seed), State(np.zeros((several, model.nq)), np.zeros((several, model.nv)))
     for i, (one, along) in enumerate(zip(np.broadcast_to(q, states.q.shape), np.broadcast_to(v, states.v.shape), strict=True)):
         try:

@@ -46,7 +46,7 @@ class MobilityAlong(Closed):
     rank, degrees_of_freedom : (B,), at each sample
     singular_values : (B, rows), of Q over the length of its longest row, from the largest
     distance : (B,), the one of these that is the smallest where the rank is generic; zero where a sample is singular, inf without rows
-    singular_states : the states between or on the samples where it reaches zero, in order
+    singular_states : the states between or on the samples where it reaches zero, in order; the first of several samples that all are such
     """
 
     generic_rank: int
@@ -132,9 +132,14 @@ def mobility_along(model: Any, q: Any, tolerance: Any) -> MobilityAlong:
         own = np.linalg.svd(np.stack([scaled(one) for one in Q]), compute_uv=False)
         values[:, : own.shape[1]] = own
     rank = (values > tolerance).sum(axis=1)
-    generic = max(int(rank.max()), mobility(model, q[0], tolerance).generic_rank) if len(q) else 0
+    first = mobility(model, q[0], tolerance) if len(q) else None
+    generic = max(int(rank.max()), first.generic_rank) if first else 0
     distance = values[:, generic - 1] if generic else np.full(len(q), np.inf)
-    found = _found(_Motion(model, q, generic), distance, tolerance) if generic and len(q) > 1 else []
+    found: list[SingularState] = []
+    if first and generic and not (distance > tolerance).any():  # all of the motion is singular, and nothing of it is beside
+        found = [SingularState(0.0, q[0], float(distance[0]), first.lost)]
+    elif generic and len(q) > 1:
+        found = _found(_Motion(model, q, generic), distance, tolerance)
     return MobilityAlong(generic, rank, model.nv - rank, values, distance, found)
 
 
@@ -147,7 +152,7 @@ def _found(motion: _Motion, distance: np.ndarray, tolerance: float) -> list[Sing
         if distance[i] > min(distance[low], distance[high]):
             continue
         at = float(i) if distance[i] <= tolerance else motion.least(low, high)
-        if motion.distance(at) > tolerance or not len(regular):
+        if motion.distance(at) > tolerance:
             continue
         known = found and (at - found[-1].at < 1e-6 or (distance[low] <= tolerance and distance[i] <= tolerance))
         if not known:

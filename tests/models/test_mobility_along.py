@@ -68,6 +68,13 @@ def test_models_without_rows_and_motions_of_none():
     assert not none.singular_states and str(none) == "generic rank 0, no samples"
 
 
+@pytest.mark.parametrize("count", [1, 3])
+def test_a_motion_that_is_singular_everywhere(count):
+    along = four_bar(1.0, 1.0, 1.0, 1.0).mobility_along([[0.0, 0.0, -np.pi]] * count)
+    (one,) = along.singular_states
+    assert one.at == 0 and list(one.lost) == ["closure: along x"] and along.rank.tolist() == [1] * count and along.generic_rank == 2
+
+
 @pytest.mark.parametrize(
     ("q", "said"),
     [
@@ -118,6 +125,14 @@ def test_batches_of_assemblies_are_their_states():
         assert np.array_equal(model.assemble(start[i], np.eye(9, 3)[i], fix="crank").v, states.v[i])
     assert model.assemble(start[0], np.eye(9, 3), fix="crank").q.shape == (9, 3)
     assert model.assemble(np.zeros((0, 3))).q.shape == (0, 3)
+
+
+@pytest.mark.parametrize("count", [0, 2])
+def test_what_is_no_coordinate_is_told_of_no_state(count):
+    with pytest.raises(pc.ModelError, match="^no hinge or coordinate of 'four-bar' is called 'piston'"):
+        four_bar(1.0, 1.0, 1.0, 1.0).assemble(np.zeros((count, 3)), fix="piston")
+    with pytest.raises(pc.ModelError, match="^tolerance: a positive number"):
+        four_bar(1.0, 1.0, 1.0, 1.0).assemble(np.zeros((count, 3)), tolerance=-1)
 
 
 def test_the_state_of_a_batch_that_cannot_be_assembled_is_told():
