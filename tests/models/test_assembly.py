@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pycraft as pc
-from support.linkages import four_bar, four_bar_angles, off, slider_crank
+from support.planar_linkages import four_bar, four_bar_angles, off, slider_crank
 
 EPS = float(np.finfo(float).eps)
 CLOSE = 5000 * EPS

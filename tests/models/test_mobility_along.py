@@ -9,7 +9,7 @@ import pytest
 
 import pycraft as pc
 from pycraft.models.assembly import Assembler
-from support.linkages import four_bar, four_bar_angles, off, slider_crank
+from support.planar_linkages import four_bar, four_bar_angles, off, slider_crank
 
 PLACE = 1e-5
 

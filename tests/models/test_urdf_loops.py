@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import pycraft as pc
-from support.linkages import four_bar
+from support.planar_linkages import four_bar
 
 AGREE = 1e-13
 INERTIAL = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
