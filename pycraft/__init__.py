@@ -68,6 +68,7 @@ if _TYPE_CHECKING:
     from .identities import UndecidedError, check, truth
     from .models import robots
     from .models.loaders import load
+    from .models.splines import Spline
     from .peers import compare
     from .proofs import Exercise, Proof, derivative, exercise, prove, prove_derivative, repair, worksheet
     from .scenes import Checkpoint, Event, Scene, effects, load_run, load_scene, mechanisms
@@ -82,6 +83,7 @@ _LATER = {
     "identities": ("UndecidedError", "check", "truth"),
     "models.loaders": ("load",),
     "models.robots": ("robots",),
+    "models.splines": ("Spline",),
     "peers": ("compare",),
     "proofs": ("Exercise", "Proof", "derivative", "exercise", "prove", "prove_derivative", "repair", "worksheet"),
     "scenes": ("Checkpoint", "Event", "Scene", "effects", "load_run", "load_scene", "mechanisms"),
@@ -132,6 +134,7 @@ __all__ = [
     "SingularOperatorError",
     "Space",
     "SpaceError",
+    "Spline",
     "StaleOperatorError",
     "State",
     "UndecidedError",

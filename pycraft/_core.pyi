@@ -1403,6 +1403,10 @@ def _joined(mass: tuple, name: str, pose: tuple, welded: tuple, welded_name: str
     """
 def _leaf_from_parts(arg0: str, arg1: typing.Any) -> Operator:
     ...
+def _loop_operators_again(arg0: typing.Any) -> typing.Any:
+    """
+    As it was pickled.
+    """
 def _make(arg0: str, arg1: collections.abc.Sequence[Operator], arg2: float | fractions.Fraction) -> Operator:
     ...
 def _parted(mass: tuple, name: str, pose: tuple, welded: tuple, welded_name: str) -> tuple:

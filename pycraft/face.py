@@ -11,7 +11,7 @@ from . import _core
 from .dynamics.threads import shared_out, thread_count
 from .models.embedded_loops import embedded, source_again
 from .models.multibody import Multibody, describe
-from .operators import operator_set
+from .operators import loop_letters, operator_set
 from .operators.block_view import block_view
 
 
@@ -86,6 +86,7 @@ def attach() -> None:
         embedded_source=source_again,
         exact_numbers=operator_set.exact_numbers,
         explain=operator_set.explain,
+        loop_source=loop_letters.loop_source,
         model_from_description=Multibody.from_description,
         operator_from_nodes=operator_set.operator_from_nodes,
         plot_model=plot_model,

@@ -8,6 +8,7 @@
 #include "dynamics/constrained_dynamics.h"
 #include "dynamics/loop_calls.h"
 #include "operators/embedded_operators.h"
+#include "operators/loop_operators.h"
 #include "simulation/effects/loop.h"
 
 namespace pycraft {
@@ -33,6 +34,7 @@ struct PythonCoupling {
       throw ModelError(what + " returns (r, gradient, second derivatives), of shapes (), (n,), (n, n); no difference is taken in their place");
     const py::tuple parts = given;
     *r = one_number(parts[0], ("r of " + what).c_str());
+    if (!std::isfinite(*r)) throw ModelError("r of " + what + " is not a finite number");
     copy(parts[1], "the gradient of " + what, {n}, gradient);
     copy(parts[2], "the second derivatives of " + what, {n, n}, second);
   }
@@ -95,6 +97,7 @@ py::tuple on_loops(Loops& loops, Arguments& given, ConstrainedDynamics::Asked as
 }  // namespace
 
 void register_loops(py::module_& m) {
+  m.def("_loop_operators_again", [](const py::object& model) { return of_face("loop_source")(model); }, "As it was pickled.");
   const py::arg name("name"), a("a"), b("b"), q("q"), v("v"), precision("precision");
   py::class_<Loops> loops(m, "LoopSet", "The loops of a model, by name, and their rows at given states: pycraft.models.loop_set is its face.");
   unpicklable(loops)
@@ -145,6 +148,16 @@ void register_loops(py::module_& m) {
         first.push_back(all->rows);
         return first;
       }, "Where each loop's rows begin, and the number of all.")
+      .def("operators", [](Loops& l, const std::shared_ptr<MultibodyOperators>& base) -> std::shared_ptr<SkoSource> {
+        const ModelInUse use(l.set->model());
+        return std::make_shared<LoopOperators>(base, l.set);
+      }, py::arg("base"), "The source of rows as operators, Q and A by body: pycraft/operators/loop_letters.py.")
+      .def("ends", [](const Loops&, const std::shared_ptr<SkoSource>& operators) {
+        const auto of = std::dynamic_pointer_cast<LoopOperators>(operators);
+        std::vector<std::vector<int>> rows;
+        for (int k = 0; k < of->structure().bodies(); ++k) rows.push_back(of->rows_of(k));
+        return py::make_tuple(of->end_names(), rows);
+      }, py::arg("operators"), "The bodies and nodes that A is of, and by body the rows of `operators`.")
       .def("residual", [](Loops& l, const py::object& q, Precision precision) {
         return rows_at(l, {{"q", q}}, {l.rows()}, [&](Arguments& given, double* out) { l.calls.residual(precision, given[0], out); });
       }, q, precision)

@@ -9,6 +9,7 @@
 #include "operators/directions.h"
 #include "operators/embedded_operators.h"
 #include "operators/grouped_operators.h"
+#include "operators/loop_operators.h"
 #include "operators/rerooted_tree.h"
 #include "runtime/errors.h"
 
@@ -45,10 +46,15 @@ Expression symbol_again(const std::shared_ptr<SkoSource>& source, const std::str
     return source_symbol(source, name, nodes, -1);
   }
   source->check_current();
+  if (const auto loops = std::dynamic_pointer_cast<LoopOperators>(source)) return loops->letter(name, arguments_from_data(arguments), text);
   return make_symbol(definition_named(name), source, arguments_from_data(arguments), text);
 }
 
 Expression source_symbol(const std::shared_ptr<SkoSource>& source, const std::string& name, const std::vector<std::string>& nodes, int coordinate) {
+  if (const auto loops = std::dynamic_pointer_cast<LoopOperators>(source)) {
+    source->check_current();
+    return loops->letter(name);
+  }
   const SymbolDefinition& d = definition_named(name);
   source->check_current();
   if (d.kind() == LetterKind::sko) return make_symbol(d, source);
@@ -174,6 +180,10 @@ void register_sources(py::module_& m) {
           for (const EmbeddedLoops& set : embedded->sets()) sets.append(py::make_tuple(set.bodies, set.rows, set.dependent));
           return py::make_tuple(py::module_::import("pycraft._core").attr("_embedded_again"), py::make_tuple(embedded->base()->model(), sets));
         }
+        if (const auto* loops = dynamic_cast<const LoopOperators*>(&s)) {  // loops are the model's face's
+          loops->check_current();
+          return py::make_tuple(py::module_::import("pycraft._core").attr("_loop_operators_again"), py::make_tuple(loops->base()->model()));
+        }
         const auto* derived = dynamic_cast<const DerivedOperators*>(&s);
         if (!derived) throw py::type_error("operators of '" + s.name() + "' cannot be pickled or copied; make them anew where they are wanted");
         derived->base()->check_current();
@@ -202,11 +212,12 @@ void register_sources(py::module_& m) {
         const char* how = dynamic_cast<const WorldFrame*>(&s)         ? "world frame"
                           : dynamic_cast<const GroupedOperators*>(&s) ? "groups of bodies"
                           : dynamic_cast<const EmbeddedOperators*>(&s) ? "embedded loops"
+                          : dynamic_cast<const LoopOperators*>(&s)    ? "loops"
                           : dynamic_cast<const CutTree*>(&s)          ? "cut tree"
                           : dynamic_cast<const RerootedTree*>(&s)     ? "another root"
                                                                       : "hinge subset";
         return py::make_tuple(how, derived->base());
-      }, "How this tree was made of a model's, \"hinge subset\", \"world frame\", \"cut tree\", \"another root\", \"groups of bodies\" or \"embedded loops\", and that model's source; None for a model's own.")
+      }, "How this tree was made of a model's, \"hinge subset\", \"world frame\", \"cut tree\", \"another root\", \"loops\", \"groups of bodies\" or \"embedded loops\", and that model's source; None for a model's own.")
       .def_property_readonly("groups", [](const SkoSource& s) -> py::object {
         const auto* grouped = dynamic_cast<const GroupedOperators*>(&s);
         return grouped ? py::cast(grouped->groups()) : py::object(py::none());

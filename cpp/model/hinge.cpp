@@ -10,8 +10,11 @@ namespace pycraft {
 namespace {
 
 Vector3<double> unit(const Vector3<double>& axis, const std::string& hinge) {
+  for (int i = 0; i < 3; ++i)
+    if (!std::isfinite(axis[i])) throw ModelError("hinge '" + hinge + "': its axis has an entry that is not a number");
+  const double largest = std::max({std::abs(axis[0]), std::abs(axis[1]), std::abs(axis[2])});
+  if (largest > 1e150) return unit({axis[0] / largest, axis[1] / largest, axis[2] / largest}, hinge);  // whose square is no number
   const double length = norm(axis);
-  if (!std::isfinite(length)) throw ModelError("hinge '" + hinge + "': its axis has an entry that is not a number");
   if (!(length > 1e-12)) throw ModelError("hinge '" + hinge + "': its axis has length " + std::to_string(length) + "; give a direction");
   // A length that is one to rounding is left alone: an axis along a coordinate stays exactly so.
   if (std::abs(length - 1) <= 4e-16) return axis;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "algebra/language/display.h"
 #include "algebra/language/lower.h"
@@ -50,6 +51,7 @@ class TwistDirection : public MechanicsDirection {
   }
 
  protected:
+  std::optional<OfDirection> moving() const override { return OfDirection{false, twists_}; }
   Expression body_edge_factor(const MechanicsLetters& l) const override {
     std::vector<Expression> terms = {zero(l.o.M.codomain(), l.o.M.codomain())};
     for (const auto& [c, direction] : twists_)
@@ -94,6 +96,7 @@ class TimeDirection final : public MechanicsDirection {
   Expression frame_motion(const Symbol& like) const override { return letters(like).letter(V_bar); }
 
  protected:
+  std::optional<OfDirection> moving() const override { return OfDirection{true, {}}; }
   Expression body_edge_factor(const MechanicsLetters& l) const override {
     bool any = false;
     for (int p : source_->structure().parent) any |= p >= 0;
@@ -130,6 +133,7 @@ class InertiaDirection final : public MechanicsDirection {
   Expression frame_motion(const Symbol& like) const override { return nothing(letters(like)); }
 
  protected:
+  std::optional<OfDirection> moving() const override { return std::nullopt; }
   Expression body_edge_factor(const MechanicsLetters& l) const override { return nothing(l); }
   Expression root_motion(const MechanicsLetters& l) const override { return nothing(l); }
   Expression outboard_motion(const MechanicsLetters& l, const TwistPlace&) const override { return nothing(l); }

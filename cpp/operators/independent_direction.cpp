@@ -19,6 +19,9 @@ class IndependentDirection final : public MechanicsDirection {
   }
 
  protected:
+  std::optional<OfDirection> moving() const override {
+    throw EvaluationError("rows of loops of '" + source_->name() + "' are differentiated along coordinates of the tree, not along independent ones of embedded loops");
+  }
   Expression body_edge_factor(const MechanicsLetters& l) const override { return l.crf(times({l.own_H().T(), along(l)})); }
   Expression root_motion(const MechanicsLetters& l) const override { return body_edge_factor(l); }
   Expression tangent_of_block(const MechanicsLetters& l, SymbolId id) const override {

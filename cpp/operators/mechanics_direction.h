@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,6 +16,7 @@
 #include "operators/directions.h"
 #include "operators/embedded_operators.h"
 #include "operators/grouped_operators.h"
+#include "operators/loop_operators.h"
 #include "runtime/errors.h"
 
 namespace pycraft {
@@ -159,6 +161,7 @@ class MechanicsDirection : public Direction {
     if (e.kind() == NodeKind::block_function)
       return l.function(e.node().symbol.definition->id, rules(e.children()[0]));
     const Symbol& s = e.node().symbol;
+    if (const auto loops = std::dynamic_pointer_cast<LoopOperators>(s.source)) return loops->tangent(e, moving());
     const Expression theta = l.letter(theta_dot), relative = times({l.own_H().T(), theta}), V = times({l.o.phi.T(), l.o.H.T(), theta});
     switch (s.definition->id) {
       case Delta: return moved(l, l.delta(place_in(s.arguments)), place_in(s.arguments));
@@ -197,6 +200,7 @@ class MechanicsDirection : public Direction {
   }
 
  protected:
+  virtual std::optional<OfDirection> moving() const = 0;  // nothing where inertias change alone
   // Of the model's own letters.
   virtual Expression body_edge_factor(const MechanicsLetters& l) const = 0;
   virtual Expression tangent_of_block(const MechanicsLetters& l, SymbolId id) const = 0;

@@ -28,7 +28,7 @@ class Assembler:
         self.model, self.q = model, np.array(q, float)
         self.positions = model.loops.of_positions
         self.tolerance = one_number(tolerance, "tolerance")
-        if not self.tolerance > 0:
+        if not 0 < self.tolerance < np.inf:
             raise _core.ModelError(f"tolerance: a positive number, not {tolerance!r}")
         if self.q.ndim != 1:
             raise _core.ModelError(f"assembly starts from one state, not from an array {self.q.shape}; give its rows one by one")
@@ -164,7 +164,22 @@ def _finite(model: Any, q: Any, v: Any) -> tuple[np.ndarray, np.ndarray]:
 def assembled(model: Any, q0: Any, v0: Any, fix: Any, starts: Any, seed: Any, tolerance: Any) -> State:
     """`Multibody.assemble`."""
     q, v = _finite(model, *at_state(model, q0, v0))
-    assembler, count, rng = Assembler(model, q, fix, tolerance), clipped(starts, "starts"), seed_of(seed)
+    if np.ndim(q) == np.ndim(v) == 1:
+        return _assembled_one(model, q, v, fix, starts, seed_of(seed), tolerance)
+    several = max(len(one) for one in (q, v) if np.ndim(one) == 2)
+    Assembler(model, model.zero_q(), fix, tolerance)  # what is wrong with these is said of no state
+    rng, states = seed_of(seed), State(np.zeros((several, model.nq)), np.zeros((several, model.nv)))
+    for i, (one, along) in enumerate(zip(np.broadcast_to(q, states.q.shape), np.broadcast_to(v, states.v.shape), strict=True)):
+        try:
+            found = _assembled_one(model, one, along, fix, starts, rng, tolerance)
+        except _core.ModelError as error:
+            raise _core.ModelError(f"state {i} of {several}: {error}") from None
+        states.q[i], states.v[i] = found.q, found.v
+    return states
+
+
+def _assembled_one(model: Any, q: Any, v: Any, fix: Any, starts: Any, rng: np.random.Generator, tolerance: Any) -> State:
+    assembler, count = Assembler(model, q, fix, tolerance), clipped(starts, "starts")
     if count < 1:
         raise _core.ModelError(f"starts: how many are tried, at least 1, not {starts!r}")
     best, smallest = assembler.q, np.inf
@@ -193,16 +208,16 @@ def branches(model: Any, q0: Any, v0: Any, fix: Any, starts: Any, seed: Any, tol
             f"around them, {names}{', ...' if len(assembler.around) > 6 else ''}"
         )
     found = [first.q]
-    turns = _turns(model)
+    turns = turns_of(model)
     for start in assembler.starts(clipped(starts, "starts"), rng):
         onto, left = assembler.solve(start)
-        if left <= assembler.tolerance and all(np.abs(_between(model, one, onto, turns)).max(initial=0) > 1e-5 for one in found):
-            found.append(model.integrate(q, _between(model, q, onto, turns)))
-    found.sort(key=lambda one: float(np.linalg.norm(_between(model, q, one, turns))))
+        if left <= assembler.tolerance and all(np.abs(between(model, one, onto, turns)).max(initial=0) > 1e-5 for one in found):
+            found.append(model.integrate(q, between(model, q, onto, turns)))
+    found.sort(key=lambda one: float(np.linalg.norm(between(model, q, one, turns))))
     return [State(one, assembler.velocities(one, v)) for one in found]
 
 
-def _turns(model: Any) -> np.ndarray:
+def turns_of(model: Any) -> np.ndarray:
     """Which coordinates are angles that may be wound by whole turns: pins in no coupling."""
     turns = pin_coordinates(model)
     for loop in model.loops.values():
@@ -211,7 +226,7 @@ def _turns(model: Any) -> np.ndarray:
     return turns
 
 
-def _between(model: Any, p: np.ndarray, q: np.ndarray, turns: np.ndarray) -> np.ndarray:
+def between(model: Any, p: np.ndarray, q: np.ndarray, turns: np.ndarray) -> np.ndarray:
     """The way from p to q, by the shorter turn."""
     way = np.array(model.difference(p, q))
     way[turns] -= 2 * np.pi * np.round(way[turns] / (2 * np.pi))

@@ -119,6 +119,11 @@ class Loops(Closed, Mapping):
         """Which rows (rows,) are of positions, and not of velocities alone."""
         return np.array(self._core.rows()[1], dtype=bool)
 
+    @property
+    def ends(self) -> list[str]:
+        """Bodies and nodes that loops of two ends were declared on, each once, the base left out: those that `soa.A` is of."""
+        return self._core.ends(self._core.operators(self._model.soa._source))[0]
+
     def residual(self, q=None, *, precision: str = "double") -> np.ndarray:
         """r (rows,) or (B, rows), zero where the loops are closed, and of rows of velocities; metres, and radians to first order."""
         return self._core.residual(at_state(self._model, q)[0], precision)

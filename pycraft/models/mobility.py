@@ -58,7 +58,7 @@ class Mobility(Closed):
         return "\n".join(lines)
 
 
-def _scaled(Q: np.ndarray) -> np.ndarray:
+def scaled(Q: np.ndarray) -> np.ndarray:
     """Q by the length of its longest row: not each by its own, or a row that is about to vanish would not be seen to."""
     longest = np.linalg.norm(Q, axis=1).max(initial=0)
     return Q / longest if longest else Q
@@ -68,6 +68,16 @@ def _rank(values: np.ndarray, tolerance: float) -> int:
     return int((values > tolerance).sum())
 
 
+def check_closed(model: Any, q: np.ndarray) -> None:
+    """ModelError where a state, or one of a batch, is not on the loops: with the row that is most off."""
+    rows, off = model.loops.rows, np.abs(model.loops.residual(q))
+    if off.max(initial=0) > _CLOSED:
+        *sample, worst = np.unravel_index(int(off.argmax()), off.shape)
+        where = f" at sample {sample[0]}" if sample else ""
+        said = f"{rows[worst]!r} is off by {off.max():.3g}; mobility is asked at states of assemble()"
+        raise _core.ModelError(f"{model.name!r} is not on its loops{where}: {said}")
+
+
 def mobility(model: Any, q: Any, tolerance: Any) -> Mobility:
     """`Multibody.mobility`."""
     q = np.array(at_state(model, q)[0], float)
@@ -75,15 +85,10 @@ def mobility(model: Any, q: Any, tolerance: Any) -> Mobility:
     if not 0 < tolerance < 1:
         raise _core.ModelError(f"tolerance: between 0 and 1, of singular values over the longest row, not {tolerance!r}")
     if q.ndim != 1:
-        raise _core.ModelError(f"mobility is that of one state, not of an array {q.shape}; give its rows one by one")
+        raise _core.ModelError(f"mobility is that of one state, not of an array {q.shape}; mobility_along is of many")
+    check_closed(model, q)
     loops, rows = model.loops, model.loops.rows
-    off = np.abs(loops.residual(q))
-    if off.max(initial=0) > _CLOSED:
-        worst = int(off.argmax())
-        raise _core.ModelError(
-            f"{model.name!r} is not on its loops: {rows[worst]!r} is off by {off[worst]:.3g}; mobility is asked at states of assemble()"
-        )
-    Q = _scaled(loops.jacobian(q))
+    Q = scaled(loops.jacobian(q))
     left, values, right = np.linalg.svd(Q, full_matrices=True)
     values = np.concatenate([values, np.zeros(len(rows) - len(values))])
     rank = _rank(values, tolerance)
@@ -139,14 +144,14 @@ def _neighbours(model: Any, q: np.ndarray, rank: int, null: np.ndarray, freedoms
         near, residual = assembler.solve(model.integrate(q, _STEP * along / np.linalg.norm(along)))
         if residual > assembler.tolerance:
             continue
-        left, values, _ = np.linalg.svd(_scaled(model.loops.jacobian(near)))
+        left, values, _ = np.linalg.svd(scaled(model.loops.jacobian(near)))
         there = _rank(values, tolerance)
         if there > generic:
-            generic, lost = there, _shares(null, left[:, there:], there - rank)
+            generic, lost = there, shares(null, left[:, there:], there - rank)
     return generic, lost
 
 
-def _shares(null: np.ndarray, null_there: np.ndarray, count: int) -> np.ndarray:
+def shares(null: np.ndarray, null_there: np.ndarray, count: int) -> np.ndarray:
     """How much each row has in the `count` combinations of rows that vanish here and least there."""
     vectors, _, _ = np.linalg.svd(null - null_there @ (null_there.T @ null), full_matrices=False)
     return np.linalg.norm(vectors[:, :count], axis=1)

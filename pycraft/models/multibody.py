@@ -236,7 +236,7 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, Planning, Structure, 
         Warns
         -----
         ModelWarning
-            What the model has beside bodies and hinges and the format does not hold (URDF: gravity, a state; both of the others: loops);
+            What the model has beside bodies and hinges and the format does not hold (URDF: gravity, a state; MJCF: some loops);
             loose frames, couplings by functions, and what unlocks and splits, which no file holds.
 
         Examples

@@ -13,6 +13,7 @@ from .assembly import assembled, branches
 from .handles import Body, Node, Vector
 from .loop_set import Loop, Loops, Relation
 from .mobility import Mobility, mobility
+from .mobility_along import MobilityAlong, mobility_along
 from .with_frames import WithFrames
 
 
@@ -167,6 +168,7 @@ class WithLoops(WithFrames):
         constant : float
         function : function of the coordinates (n,)
             Returns (r, gradient (n,), second derivatives (n, n)); rows are then there in double precision. It is called at every state.
+            `pycraft.Spline` is one through points.
         name : str
             By default "coupling".
 
@@ -206,7 +208,7 @@ class WithLoops(WithFrames):
         Parameters
         ----------
         q0, v0 : (nq,), (nv,), or a State; the model's present state where they are left out
-            One state, from which others are tried, further and further off.
+            From which others are tried, further and further off. Of a batch (B, nq), (B, nv) each state by itself, one after the other.
         fix : names or numbers of coordinates, or hinges, or a list of them
             Those keep what they are in q0 and v0, to the last bit. Of a ball or free hinge all coordinates, or none.
         starts : int
@@ -219,13 +221,13 @@ class WithLoops(WithFrames):
         -------
         State
             From each start by damped least squares on the model's group, with exact Jacobians; v is the nearest to v0 with Q v = 0, rows of
-            velocities included.
+            velocities included. Of a batch (B, nq) and (B, nv).
 
         Raises
         ------
         ModelError
             None was found: which loops cannot be closed by themselves, or which not together, and the rows that are left, by how much.
-            Velocities that are kept and break rows, which are named.
+            Velocities that are kept and break rows, which are named. Of a batch, at which state.
 
         Cost: some ten evaluations of the rows and dense least squares, O(rows² nv) each, a start.
 
@@ -289,3 +291,43 @@ class WithLoops(WithFrames):
         True
         """
         return mobility(self, q, tolerance)
+
+    def mobility_along(self, q: Any, *, tolerance: float = 1e-6) -> MobilityAlong:
+        """Rank and degrees of freedom at the samples of a motion, and the singular states on it, found between samples too.
+
+        Parameters
+        ----------
+        q : (B, nq), or a State or Trajectory of so many
+            States on the loops, in order of the motion: those of `assemble`. Between two of them the way is the straight one on the group,
+            by the shorter turn, brought back onto the loops.
+        tolerance : float
+            Singular values of Q, by the length of its longest row, count as zero below it. At a singular state of the loops q is no better
+            than the root of its residuals' rounding, 1e-8, and so is what is zero there.
+
+        Returns
+        -------
+        MobilityAlong
+            Rank, degrees of freedom, singular values and distance at each sample; `singular_states`, each with its place, its state and the
+            rows that are lost there. A singular state is found where the distance has its least value between neighbouring samples:
+            two within one sample's width may be taken for one.
+
+        Raises
+        ------
+        ModelError
+            A sample that is not on the loops, with its number and the row that is most off; no state on them was found between two samples.
+
+        Cost: singular values of Q at every sample, O(rows² nv); some sixty states on the loops for each place where the distance is least.
+
+        Examples
+        --------
+        >>> import numpy as np, pycraft as pc
+        >>> bars = pc.chain(3)
+        >>> closure = bars.add_loop("body2", hinge="pin", point=(1, 0, 0), name="closure")
+        >>> crank = np.linspace(-0.5, 0.7, 10)  # a rhombus, flat at 0
+        >>> motion = bars.mobility_along(np.column_stack([crank, -crank, crank - np.pi]))
+        >>> motion.degrees_of_freedom.tolist()
+        [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]
+        >>> [(round(one.at, 6), (one.q.round(6) + 0.0).tolist()) for one in motion.singular_states]
+        [(3.75, [0.0, 0.0, -3.141593])]
+        """
+        return mobility_along(self, q, tolerance)

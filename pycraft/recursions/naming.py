@@ -265,6 +265,10 @@ class Model:
         """The quantity of a letter, its recursion written where this is the first use of it."""
         if (name, arguments) in self._made:
             return self._made[name, arguments]
+        if (self.source.derived_from or ("",))[0] == "loops":
+            raise _core.EvaluationError(
+                f"no recursion is written for {name}, rows of loops: write out the rest, and put what model.loops.jacobian gives between"
+            )
         inserted = name == "h" and arguments[0] == "twist"  # within a hinge: given
         if name in _GIVEN or inserted or (self.source.groups is not None and name in _GIVEN_OF_GROUPS):
             shape: dict[str, Any] = {"rows": self.bodies, "columns": columns} if name == "B" else {}

@@ -8,53 +8,10 @@ import numpy as np
 import pytest
 
 import pycraft as pc
+from support.planar_linkages import four_bar, four_bar_angles, off, slider_crank
 
 EPS = float(np.finfo(float).eps)
 CLOSE = 5000 * EPS
-
-
-def four_bar(crank, coupler, rocker, ground):
-    """Three bars from the origin; the end of the last is pinned at (ground, 0, 0)."""
-    model = pc.Multibody("four-bar")
-    parent, at = None, 0.0
-    for name, length in (("crank", crank), ("coupler", coupler), ("rocker", rocker)):
-        model.add_body(name, parent, position=(at, 0, 0), mass=1.0, inertia=np.eye(3))
-        parent, at = name, length
-    model.add_loop("rocker", hinge="pin", point=(rocker, 0, 0), position=(ground - rocker, 0, 0), name="closure")
-    return model
-
-
-def four_bar_angles(lengths, angle):
-    """Relative angles of coupler and rocker at a crank angle, both branches; none where the triangle does not close."""
-    a, b, c, g = lengths
-    end, goal = a * np.exp(1j * angle), g + 0j
-    way = goal - end
-    d = abs(way)
-    cosine = (b * b + d * d - c * c) / (2 * b * d)
-    if abs(cosine) > 1:
-        return []
-    out = []
-    for sign in (1, -1):
-        coupler = np.angle(way) + sign * np.arccos(cosine)
-        rocker = np.angle(goal - (end + b * np.exp(1j * coupler)))
-        out.append([coupler - angle, rocker - coupler])
-    return out
-
-
-def off(a, b):
-    """Of angles, by the shorter turn."""
-    way = np.asarray(a) - b
-    return np.abs(way - 2 * np.pi * np.round(way / (2 * np.pi))).max()
-
-
-def slider_crank(r=0.4, rod=1.0):
-    """A crank, a rod, and a slider along x that the rod's end is pinned to."""
-    model = pc.Multibody("slider-crank")
-    model.add_body("crank", mass=1.0, inertia=np.eye(3))
-    model.add_body("rod", "crank", position=(r, 0, 0), mass=1.0, inertia=np.eye(3))
-    model.add_body("piston", hinge="slider", axis=(1, 0, 0), mass=1.0, inertia=np.eye(3))
-    model.add_loop("rod", "piston", "pin", point=(rod, 0, 0), position=(-rod, 0, 0), name="gudgeon")
-    return model
 
 
 @pytest.mark.parametrize("seed", range(25))
@@ -205,13 +162,13 @@ def test_velocities_that_conflict_are_named():
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        (dict(q0=np.zeros((2, 3))), r"assembly starts from one state, not from an array \(2, 3\)"),
         (dict(q0=[0.0]), r"q of 'four-bar'"),
         (dict(fix="piston"), r"no hinge or coordinate of 'four-bar' is called 'piston'"),
         (dict(starts=0), r"starts: how many are tried, at least 1, not 0"),
         (dict(starts=1.5), r"starts: a whole number"),
         (dict(tolerance=0), r"tolerance: a positive number, not 0"),
         (dict(tolerance=np.nan), r"tolerance: a positive number"),
+        (dict(tolerance=np.inf), r"tolerance: a positive number, not inf"),
         (dict(seed="x"), r"seed: a whole number"),
     ],
 )
@@ -219,6 +176,11 @@ def test_arguments_that_are_none(given, said):
     model = four_bar(0.4, 1.0, 0.8, 1.0)
     with pytest.raises(pc.ModelError, match=said):
         model.assemble(**given)
+
+
+def test_branches_are_of_one_state():
+    with pytest.raises(pc.ModelError, match=r"assembly starts from one state, not from an array \(2, 3\)"):
+        four_bar(0.4, 1.0, 0.8, 1.0).assembly_branches(np.zeros((2, 3)), fix="crank")
 
 
 def test_part_of_a_rotation_is_not_kept():

@@ -125,6 +125,7 @@ def test_a_loop_whose_body_is_gone():
         (lambda q: (q[0], [1.0]), r"returns \(r, gradient, second derivatives\)"),
         (lambda q: (q[0], [1.0, 2.0], [[0.0]]), r"the gradient of the function of coupling 'cam'"),
         (lambda q: (q[0], [1.0], [0.0]), r"the second derivatives of the function of coupling 'cam'"),
+        (lambda q: (np.nan, [1.0], [[0.0]]), r"r of the function of coupling 'cam' is not a finite number"),
         (lambda q: (q[0], [np.nan], [[0.0]]), r"the gradient of the function of coupling 'cam' has an entry that is not a finite number"),
     ],
 )
@@ -148,3 +149,11 @@ def test_states_and_precisions_that_are_none():
         model.loops.residual(precision="quad")
     with pytest.raises(pc.ModelError, match="takes no 'rows'"):
         model.loops.rows = []
+
+
+@pytest.mark.parametrize("size", [1e300, 1e-9])
+def test_an_axis_of_any_length_is_a_direction(size):
+    huge, unit = pc.chain(3), pc.chain(3)
+    huge.add_loop("body2", axis=(size, -size, 0))
+    unit.add_loop("body2", axis=(np.sqrt(0.5), -np.sqrt(0.5), 0))
+    assert np.abs(huge.loops.residual([0.1, 0.2, 0.3]) - unit.loops.residual([0.1, 0.2, 0.3])).max() < 1e-15

@@ -46,7 +46,7 @@ def test_what_files_do_not_hold_is_said(tmp_path):
     with pytest.warns(pc.ModelWarning, match="a file does not hold couplings by functions: cam"):
         model.save(tmp_path / "model.toml")
     assert list(pc.load(tmp_path / "model.toml").loops) == []
-    with pytest.warns(pc.ModelWarning, match="a URDF file does not hold its loops 'cam'"):
+    with pytest.warns(pc.ModelWarning, match="a file does not hold couplings by functions: cam"):
         model.save(tmp_path / "model.urdf")
 
 

@@ -46,6 +46,16 @@ CHANGES = {
         ("a fraction read upside down", "return decimal(parts[0]) / decimal(parts[1])", "return decimal(parts[1]) / decimal(parts[0])"),
         ("a star that does not transpose", "return lambda x: x.T", "return lambda x: x"),
     ],
+    "pycraft/models/loaders/urdf_loops.py": [
+        ("loops placed without their turn", "rotation_from_rpy(*angles) if any(angles) else None", "None"),
+    ],
+    "pycraft/models/splines.py": [
+        ("a spline that stops at its ends", "s, bend = s + slope * (q[0] - x), 0.0", "bend = 0.0"),
+    ],
+    "pycraft/models/mobility_along.py": [
+        ("singular states at samples alone", "else motion.least(low, high)", "else float(i)"),
+        ("the greatest distance is sought", "            if at_a < at_b:\n", "            if at_a > at_b:\n"),
+    ],
     "pycraft/models/loaders/rotations.py": [
         ("a quaternion's rotation with a sign wrong", "[1 - 2 * (y * y + z * z)", "[1 + 2 * (y * y + z * z)"),
         ("an inertia turned the other way", "rotation @ inertia @ rotation.T", "rotation.T @ inertia @ rotation"),

@@ -9,9 +9,9 @@ floating                    free      quaternion, position
 fixed                       weld      none
 
 Visuals, collision shapes, materials, transmissions and gazebo blocks are not read. Damping, friction and bounds on
-efforts and velocities are effects: they are in `Multibody.left_aside`. One element is our own, inside a joint:
-`<pycraft rotor_inertia="1.14"/>`, one value per coordinate in kg m² or kg as seen at the joint; other readers pass over
-it.
+efforts and velocities are effects: they are in `Multibody.left_aside`. Two elements are our own, which other readers pass over: inside a
+joint `<pycraft rotor_inertia="1.14"/>`, one value per coordinate in kg m² or kg as seen at the joint; in the robot `<pycraft>` with its
+loops (`urdf_loops`).
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from ..multibody import Multibody
 from .left_aside import by_coordinate
 from .rotations import rotation_about
 from .urdf_elements import Elements, Joint, Link
+from .urdf_loops import add_loops
 from .xml_file import XmlFile, abbreviated, label
 
 _CUT = "a model is a tree: take one joint out"
@@ -44,6 +45,7 @@ def read(file: XmlFile, *, root: str, mimic: str, welds: str, strict: bool) -> t
     model = _build(tree, root, welds, strict)
     if mimic == "couple":
         _couple(file, elements.joints, model)
+    add_loops(file, model, tree.root)
     model._left_aside = by_coordinate(model, elements.left_aside)
     return model, elements.warnings + [tree.with_line(body, text) for body, text in model.take_warnings()]
 

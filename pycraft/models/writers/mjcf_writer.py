@@ -8,8 +8,9 @@ universal, gimbal, cylindrical,
 planar, custom of pins and sliders       one a subhinge, called name[0], name[1], ..., read back as a custom hinge of that name
 
 Nodes are sites, rotor inertia is armature. The largest double stands for a side without a limit. Damping, friction, stiffness and where
-springs are slack, which a file before said, go back into joints, actuators into actuators; the state is a keyframe called "state". There is
-no geometry, and MuJoCo's compiler is told to leave masses and inertias alone; those that are not diagonal it turns into principal axes.
+springs are slack, which a file before said, go back into joints, actuators into actuators; loops are equality constraints as far as
+MJCF has them (`equality_elements`); the state is a keyframe called "state". There is no geometry, and MuJoCo's compiler is told to leave
+masses and inertias alone; those that are not diagonal it turns into principal axes.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from ..loaders.left_aside import current, current_actuators
 from ..loaders.mjcf import STATE
 from ..loaders.xml_file import abbreviated
 from ..warning import warn
+from .equality_elements import add_equalities
 from .toml_writer import same
 from .urdf_writer import not_xml
 
@@ -69,7 +71,9 @@ def model_text(model: Multibody, path: str, state: bool) -> str:
             site.set("quat", numbers_text(_quaternion(node["rotation"])))
     joints = [joint for element in elements for joint in element.findall("joint")]
     unsaid += _add_left_aside(model, root, joints)
-    unsaid += _add_actuators(model, root, joints)
+    of_coordinate = {model.coordinate_names[v.start]: joint.get("name") for joint, _, v in _places(joints) if v.stop - v.start == 1}
+    unsaid += _add_actuators(model, root, of_coordinate)
+    unsaid += add_equalities(model, described, root, elements, of_coordinate)
     if state and not (same(model.q, model.zero_q()) and same(model.v, np.zeros(model.nv))):
         qpos, qvel = to_mujoco(model, model.q, model.v)
         etree.SubElement(etree.SubElement(root, "keyframe"), "key", name=STATE, qpos=numbers_text(qpos), qvel=numbers_text(qvel))
@@ -96,7 +100,7 @@ def _refuse(model: Multibody, described: dict[str, Any], path: str) -> None:
     if unreal := [body["name"] for body in bodies if _excess(body["inertia"]) > ROUNDING]:
         text = f"inertias of {abbreviated([repr(name) for name in unreal], ', ', 4)} violate the triangle inequality"
         raise _core.ModelError(f"{path}: {text}, and MuJoCo refuses them; set inertias that a body can have, or save the model as .toml")
-    for name in [described["name"], *(x["name"] for part in ("bodies", "nodes") for x in described[part]), *model.hinges]:
+    for name in [described["name"], *(x["name"] for part in ("bodies", "nodes", "loops") for x in described.get(part, [])), *model.hinges]:
         if bad := not_xml(name):
             raise _core.ModelError(f"{path}: the name {name!r} {bad}; rename it, or save the model as .toml, which holds every name")
     if "world" in model.bodies:
@@ -203,11 +207,10 @@ def _places(joints: list[Any]) -> list[tuple[Any, slice, slice]]:
     return places
 
 
-def _add_actuators(model: Multibody, root: Any, joints: list[Any]) -> list[str]:
+def _add_actuators(model: Multibody, root: Any, of_coordinate: dict[str, str]) -> list[str]:
     """Actuators on joints of one coordinate whose force is a straight line; the names of the others."""
     from lxml import etree
 
-    of_coordinate = {model.coordinate_names[v.start]: joint.get("name") for joint, _, v in _places(joints) if v.stop - v.start == 1}
     section, unsaid = etree.Element("actuator"), []
     for actuator in current_actuators(model):
         if actuator["why not"] is not None or actuator["coordinate"] not in of_coordinate:

@@ -33,10 +33,8 @@ def save(model: Multibody, path: str | os.PathLike[str], state: bool = True) -> 
         warn(f"{shown}: a file does not hold loose frames: {', '.join(loose[:6])}{', ...' if len(loose) > 6 else ''}")
     if kept := [*model.locked, *model.coalesced]:
         warn(f"{shown}: a file does not hold what unlocks and splits: {', '.join(kept[:6])}{', ...' if len(kept) > 6 else ''}")
-    if len(model.loops) and ending in (".xml", ".mjcf"):
-        warn(f"{shown}: the file does not hold loops: {', '.join(map(repr, model.loops))}")
     functions = [loop["name"] for loop in model.loops._description() if loop.get("function") is not None]
-    if functions and ending == ".toml":
+    if functions and ending in (".toml", ".urdf"):
         warn(f"{shown}: a file does not hold couplings by functions: {', '.join(functions[:6])}{', ...' if len(functions) > 6 else ''}")
     write_text(shown, text)
 

@@ -11,7 +11,7 @@ A joint's axis passes through its child link's origin. Where a pin's axis misses
 whose origin is the pin's point and which has the body's mass; the body's own frame is fixed to it, a massless link of the body's name.
 Nodes are massless links on fixed joints. Bodies on the base hang on a massless root link, called "world" if no node of the base is at its
 origin. A side without a limit is the largest double, which every reader takes; `pycraft.load` reads it as none. Bounds on efforts and
-velocities that nobody gave are 0, which readers take for "unknown". Rotor inertia stands in our own element (see `loaders.urdf`).
+velocities that nobody gave are 0, which readers take for "unknown". Rotor inertia and loops stand in our own elements (see `loaders.urdf`).
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from ..loaders.left_aside import current
 from ..loaders.rotations import nearest_rpy
 from ..loaders.xml_file import abbreviated
 from ..warning import warn
+from .loop_elements import loops_element
 from .toml_writer import made_by, same
 
 if TYPE_CHECKING:
@@ -59,8 +60,11 @@ def model_text(model: Multibody, path: str) -> str:
     described = model.description()
     _refuse(described, path)
     robot = etree.Element("robot", name=described["name"])
-    for link in _Links(described, _joint_extras(model)).elements():
+    links = _Links(described, _joint_extras(model))
+    for link in links.elements():
         robot.append(link)
+    if (loops := loops_element(model, described, links.root)) is not None:
+        robot.append(loops)
     if unsaid := _unsaid(model):
         warn(f"{path}: a URDF file does not hold {', '.join(unsaid)}; a .toml file does")
     etree.indent(robot)
@@ -76,7 +80,7 @@ def _refuse(described: dict[str, Any], path: str) -> None:
     if lacking:
         kinds = "URDF has joints of type revolute, continuous, prismatic, fixed, planar and floating alone"
         raise _core.ModelError(f"{path}: {abbreviated(lacking, '; ', 4)}. {kinds}; save the model as .toml, which holds every hinge")
-    names = [described["name"], *(x["name"] for part in ("bodies", "nodes") for x in described[part])]
+    names = [described["name"], *(x["name"] for part in ("bodies", "nodes", "loops") for x in described.get(part, []))]
     for name in [*names, *(body["hinge"]["name"] for body in described["bodies"])]:
         if bad := _unwritable(name):
             raise _core.ModelError(f"{path}: the name {name!r} {bad}; rename it, or save the model as .toml, which holds every name")
@@ -116,7 +120,6 @@ def _unsaid(model: Multibody) -> list[str]:
     if not (same(model.q, model.zero_q()) and same(model.v, np.zeros(model.nv))):
         said.append("the state q, v")
     said += ["its actuators"] if model.actuators else []
-    said += [f"its loops {', '.join(map(repr, model.loops))}"] if len(model.loops) else []
     return said + [f"the {name} left aside" for name in ("gravity", "stiffness") if name in model.left_aside]
 
 

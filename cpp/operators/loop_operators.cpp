@@ -1,0 +1,116 @@
+#include "operators/loop_operators.h"
+
+#include <algorithm>
+#include <set>
+
+#include "operators/loop_values.h"
+#include "runtime/errors.h"
+
+namespace pycraft {
+
+namespace {
+
+// NodesF: the rows by body. A letter of one's own source, with numbers of its own.
+const std::vector<SymbolDefinition>& records() {
+  using S = SpaceKind;
+  static const std::vector<SymbolDefinition> table = {
+      {loop_letters::Q, "Q", "Q", "Q", "rows of loops by velocities, body by body", S::Theta, S::NodesF, Pattern::block_diagonal},
+      {loop_letters::dQ, "dQ", "∂Q", "\\partial Q", "derivative of Q along coordinates or time", S::Theta, S::NodesF, Pattern::block_diagonal, {.takes = Takes::direction}},
+      {loop_letters::A, "A", "A", "A", "rows of loops by motions of their ends, body by body", S::NodesV, S::NodesF, Pattern::block_diagonal},
+      {loop_letters::dA, "dA", "∂A", "\\partial A", "derivative of A along coordinates or time", S::NodesV, S::NodesF, Pattern::block_diagonal, {.takes = Takes::direction}},
+  };
+  return table;
+}
+
+}  // namespace
+
+int LoopOperators::place_of(const std::string& frame) {
+  if (frame.empty()) return -1;
+  const Multibody& model = *base_->model();
+  const int index = model.node_index(frame), nodes = static_cast<int>(model.nodes().size());
+  if (model.node(index).body < 0) return -1;
+  const int node = index < nodes ? index : -1 - (index - nodes);
+  const auto known = std::find(ends_.begin(), ends_.end(), node);
+  if (known != ends_.end()) return static_cast<int>(known - ends_.begin());
+  ends_.push_back(node), end_names_.push_back(frame);
+  return static_cast<int>(ends_.size()) - 1;
+}
+
+LoopOperators::LoopOperators(std::shared_ptr<MultibodyOperators> base, std::shared_ptr<LoopSet> loops)
+    : DerivedOperators(base->structure(), base->name() + ", loops", base), loops_(std::move(loops)), rows_(structure().bodies()) {
+  share_bodies_with(*base_);
+  share_coordinates_with(*base_);
+  const auto resolved = loops_->resolved();
+  auto layout = std::make_shared<SpaceLayout>();
+  std::vector<std::vector<std::pair<int, const ResolvedLoop*>>> at(structure().bodies());
+  for (const ResolvedLoop& loop : resolved->loops) {
+    declared_.push_back(loop.loop);
+    std::set<int> bodies;
+    for (const auto* side : {&loop.path.up, &loop.path.down})
+      for (const FrameStep& step : *side)
+        if (step.kind == FrameStep::Kind::hinge) bodies.insert(step.number);
+    for (int i : loop.v) bodies.insert(static_cast<int>(std::upper_bound(structure().dof_offset.begin(), structure().dof_offset.end(), i) - structure().dof_offset.begin()) - 1);
+    if (!loop.loop->is_coupling()) {
+      const Ends ends{place_of(loop.loop->pair.a), place_of(loop.loop->pair.b)};
+      ends_of_[loop.loop->name] = ends;
+      for (int place : {ends.a, ends.b})
+        if (place >= 0) bodies.insert(ends_[place] >= 0 ? model().node(ends_[place]).body : -1 - ends_[place]);
+    }
+    for (int k : bodies) at[k].emplace_back(loop.first_row, &loop);
+  }
+  layout->owner = this, layout->owner_name = name();
+  layout->bodies = motions().layout().bodies;
+  layout->of_body.resize(structure().bodies());
+  for (int k = 0; k < structure().bodies(); ++k)
+    for (const auto& [first, loop] : at[k]) {
+      if (!loop->rows) continue;
+      layout->of_body[k].push_back(static_cast<int>(layout->blocks.size()));
+      layout->blocks.push_back({k, layout->dimension, loop->rows, loop->loop->name});
+      layout->dimension += loop->rows;
+      for (int i = 0; i < loop->rows; ++i) rows_[k].push_back(first + i);
+    }
+  row_layout_ = layout;
+}
+
+Space LoopOperators::space(SpaceKind kind, const SymbolArguments& arguments) const {
+  if (kind == SpaceKind::NodesF) return Space(kind, row_layout_);
+  if (kind == SpaceKind::NodesV) return base_->space(kind, OfNodes{ends_});
+  return SkoSource::space(kind, arguments);
+}
+
+void LoopOperators::check_current() const {
+  base_->check_current();
+  const auto now = loops_->resolved();
+  const bool same = std::equal(now->loops.begin(), now->loops.end(), declared_.begin(), declared_.end(), [](const ResolvedLoop& a, const auto& b) { return a.loop == b; });
+  if (!same) throw StaleOperatorError("these operators were made before the loops of '" + base_->name() + "' changed; take them anew, soa.Q, soa.A");
+}
+
+Expression LoopOperators::letter(const std::string& ascii, const SymbolArguments& arguments, const std::string& text) const {
+  for (const SymbolDefinition& d : records())
+    if (d.ascii == ascii) return make_symbol(d, std::const_pointer_cast<SkoSource>(shared_from_this()), arguments, text);
+  throw EvaluationError("'" + ascii + "' is no letter of loops: there are Q and A");
+}
+
+Expression LoopOperators::tangent(const Expression& e, const std::optional<OfDirection>& along) const {
+  if (!along) return zero(e.domain(), e.codomain());
+  const Symbol& s = e.node().symbol;
+  const SymbolId id = s.definition->id;
+  if (id == loop_letters::dQ || id == loop_letters::dA)
+    throw EvaluationError("rows of loops are differentiated once: ∂Q and ∂A have no derivative; differences of them at nearby states have");
+  std::string text;
+  for (const auto& [c, place] : along->twists) {
+    const auto* of = std::get_if<OfCoordinate>(&place);
+    if (!of) throw EvaluationError("rows of loops are differentiated along coordinates and time, not along parameters of hinges");
+    if (!text.empty()) text += ", ";
+    text += structure().coordinate_names[of->coordinate];
+  }
+  const Expression made = letter(id == loop_letters::Q ? "dQ" : "dA", *along, along->time ? std::string("time") : text);
+  return s.binding ? made.at(s.binding) : made;
+}
+
+#define PYCRAFT_MAKE_VALUES(S) \
+  std::unique_ptr<SkoValues<S>> LoopOperators::make_values(S) const { return std::make_unique<LoopValues<S>>(*this); }
+PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_MAKE_VALUES)
+#undef PYCRAFT_MAKE_VALUES
+
+}  // namespace pycraft

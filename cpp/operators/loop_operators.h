@@ -1,0 +1,63 @@
+// Rows of loops (model/loops.h) as operators of the tree that they are declared beside:
+//
+//   Q = Σ Q_k,        Q_k the columns of the hinge of body k, in the rows that it is around            Θ → rows
+//   A = Σ A_k,        A_k the columns of the ends on body k, in the rows of their loops                NodesV(ends) → rows
+//   Q = A B* φ* H*    where all loops are of two ends: their rows are g·V, V = V_b - Ad(X⁻¹) V_a, X the pose of the end frame on b in that on a
+//
+// Q_k and A_k are block diagonal, between Θ, NodesV(ends) and the rows by body: every body has those of the loops that it is around or an end of.
+// Σ, ones, adds them up. Ends are bodies and nodes as loops were declared on them; B is their letter. Along coordinates and time
+//
+//   ∂Q, ∂A            the rows' own code (recursions/loop_rows.h) with derivatives carried along; of a user's function its second derivatives
+//
+// Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, ch. 11.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "model/loops.h"
+#include "operators/derived_operators.h"
+
+namespace pycraft {
+
+class LoopOperators final : public DerivedOperators {
+ public:
+  LoopOperators(std::shared_ptr<MultibodyOperators> base, std::shared_ptr<LoopSet> loops);
+
+  const LoopSet& loops() const { return *loops_; }
+  // The rows of loops that body k is around or an end of, by number, in order.
+  const std::vector<int>& rows_of(int k) const { return rows_[k]; }
+  // The bodies and nodes that are ends, as OfNodes has them, without the base; the places of a loop's own a and b among them, -1: the base.
+  const std::vector<int>& ends() const { return ends_; }
+  const std::vector<std::string>& end_names() const { return end_names_; }
+  struct Ends {
+    int a = -1, b = -1;
+  };
+  const Ends& ends_of(const Loop& loop) const { return ends_of_.at(loop.name); }
+
+  // "Q", "A", "dQ" or "dA"; EvaluationError where it is none of them.
+  Expression letter(const std::string& ascii, const SymbolArguments& arguments = {}, const std::string& text = "") const;
+  // ∂ of a letter along coordinates or time, zero where nothing moves. EvaluationError of twists that are no coordinates, and of ∂Q and ∂A.
+  Expression tangent(const Expression& letter, const std::optional<OfDirection>& along) const;
+
+  Space space(SpaceKind kind, const SymbolArguments& arguments) const override;
+  // StaleOperatorError where loops were added or taken away since.
+  void check_current() const override;
+  PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_OVERRIDE_MAKE_VALUES)
+
+ private:
+  int place_of(const std::string& frame);
+
+  std::shared_ptr<LoopSet> loops_;
+  std::vector<std::shared_ptr<const Loop>> declared_;
+  std::vector<std::vector<int>> rows_;
+  std::vector<int> ends_;
+  std::vector<std::string> end_names_;
+  std::map<std::string, Ends> ends_of_;
+  std::shared_ptr<const SpaceLayout> row_layout_;
+};
+
+}  // namespace pycraft

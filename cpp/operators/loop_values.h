@@ -1,0 +1,132 @@
+// The numbers of rows of loops as operators, from the rows' own recursions.
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include "algebra/trees/tree_values.h"
+#include "model/configuration.h"
+#include "numerics/tangent.h"
+#include "operators/loop_operators.h"
+#include "recursions/loop_rows.h"
+#include "rigid/rigid_blocks.h"
+
+namespace pycraft {
+
+// The letters' numbers: a source's own (algebra/language/symbol.h).
+namespace loop_letters {
+constexpr SymbolId Q = static_cast<SymbolId>(1001), dQ = static_cast<SymbolId>(1002), A = static_cast<SymbolId>(1003), dA = static_cast<SymbolId>(1004);
+}
+
+// put(loop, end, row, g): the rows of pairs on the twists of what their ends stand on, 0: a, 1: b; a row is g_a·V_a + g_b·V_b.
+template <class S, class F>
+void loop_rows_on_ends(const CompiledModel<S>& model, const ResolvedLoops& loops, const S* q, LoopBuffers<S>& w, F put) {
+  for (const ResolvedLoop& loop : loops.loops) {
+    if (loop.loop->is_coupling()) continue;
+    const auto m = along<S>(loop.path, MotionPart::pose, [&](const FrameStep& step) { return loop_step<S>(model, step, q, nullptr, MotionPart::pose, w.hinge, w.at_rest); });
+    std::fill_n(w.rows, loop.rows, PairRow<S>());
+    pair_rows(loop.loop->pair, m, w.rows);
+    for (int i = 0; i < loop.rows; ++i) {
+      const Vector6<S>& g = w.rows[i].gradient;
+      put(loop, 1, loop.first_row + i, force_to_parent(cast<S>(loop.loop->pair.end_b), g));
+      put(loop, 0, loop.first_row + i, S(-1) * force_to_parent(cast<S>(loop.loop->pair.end_a), force_to_parent(m.X, g)));
+    }
+  }
+}
+
+template <class S>
+class LoopValues final : public TreeValues<RigidBlocks<S>> {
+ public:
+  explicit LoopValues(const LoopOperators& source) : TreeValues<RigidBlocks<S>>(source.structure()), source_(source) {
+    body_of_.resize(this->tree_.coordinates());
+    for (int k = 0; k < this->tree_.bodies(); ++k) std::fill(body_of_.begin() + this->tree_.dof_offset[k], body_of_.begin() + this->tree_.dof_offset[k + 1], k);
+    column_of_.resize(source.ends().size()), end_body_.resize(source.ends().size()), columns_.assign(this->tree_.bodies(), 0);
+    for (size_t i = 0; i < source.ends().size(); ++i) {
+      const int node = source.ends()[i];
+      end_body_[i] = node >= 0 ? source.model().node(node).body : -1 - node;
+      column_of_[i] = columns_[end_body_[i]], columns_[end_body_[i]] += 6;
+    }
+  }
+
+  void block(const Symbol& symbol, int k, S* out) const override {
+    const SymbolId id = symbol.definition->id;
+    const bool jacobian = id == loop_letters::Q || id == loop_letters::dQ;
+    std::fill_n(out, source_.rows_of(k).size() * (jacobian ? this->tree_.dof[k] : columns_[k]), S(0));
+    const ResolvedLoops own = loops_of(k);
+    if (id == loop_letters::Q || id == loop_letters::A) return put(own, *compiled_, q_, jacobian, k, out, [](const S& x) { return x; });
+    using T = Tangent<S, 1>;
+    const std::vector<S> w = velocity(std::get<OfDirection>(symbol.arguments));
+    std::vector<S> rate(q_.size());
+    configuration_rate(*compiled_, q_.data(), w.data(), rate.data());
+    std::vector<T> q(q_.begin(), q_.end());
+    for (size_t i = 0; i < q.size(); ++i) q[i].d[0] = rate[i];
+    ResolvedLoops by_rule;
+    by_rule.rows = own.rows;
+    for (const ResolvedLoop& loop : own.loops)
+      if (!loop.loop->coupling.function)
+        by_rule.loops.push_back(loop);
+      else if (jacobian)
+        second_derivatives(loop, w, k, out);
+    put(by_rule, broadcast<T>(*compiled_), q, jacobian, k, out, [](const T& x) { return x.d[0]; });
+  }
+
+ protected:
+  void set_state(const double* q, const double* v) override {
+    compiled_ = source_.model().compiled<S>();
+    loops_ = source_.loops().resolved();
+    convert(q, compiled_->nq, q_), convert(v, compiled_->nv, v_);
+  }
+  void fill() override {}
+
+ private:
+  // Of the loops that have rows at body k.
+  ResolvedLoops loops_of(int k) const {
+    ResolvedLoops own;
+    own.rows = loops_->rows;
+    for (const ResolvedLoop& loop : loops_->loops)
+      if (loop.rows && std::binary_search(source_.rows_of(k).begin(), source_.rows_of(k).end(), loop.first_row)) own.loops.push_back(loop);
+    return own;
+  }
+  int row_at(int k, int row) const { return static_cast<int>(std::lower_bound(source_.rows_of(k).begin(), source_.rows_of(k).end(), row) - source_.rows_of(k).begin()); }
+
+  // Block k of Q or A in any scalar, what `take` takes of its entries.
+  template <class T, class F>
+  void put(const ResolvedLoops& loops, const CompiledModel<T>& model, const std::vector<T>& q, bool jacobian, int k, S* out, F take) const {
+    LoopBuffers<T> buffers;
+    if (jacobian)
+      return loop_jacobian(model, loops, q.data(), buffers, [&](int row, int i, const T& number) {
+        if (body_of_[i] == k) out[row_at(k, row) * this->tree_.dof[k] + i - this->tree_.dof_offset[k]] += take(number);
+      });
+    loop_rows_on_ends(model, loops, q.data(), buffers, [&](const ResolvedLoop& loop, int end, int row, const Vector6<T>& g) {
+      const LoopOperators::Ends& ends = source_.ends_of(*loop.loop);
+      const int place = end ? ends.b : ends.a;
+      if (place < 0 || end_body_[place] != k) return;
+      for (int i = 0; i < 6; ++i) out[row_at(k, row) * columns_[k] + column_of_[place] + i] += take(g[i]);
+    });
+  }
+  void second_derivatives(const ResolvedLoop& loop, const std::vector<S>& w, int k, S* out) const {
+    const size_t n = loop.v.size();
+    std::vector<double> at(n), gradient(n), second(n * n);
+    for (size_t i = 0; i < n; ++i) at[i] = to_double(q_[loop.q[i]]);
+    double r = 0;
+    loop.loop->coupling.function(at.data(), &r, gradient.data(), second.data());
+    for (size_t i = 0; i < n; ++i)
+      for (size_t j = 0; body_of_[loop.v[i]] == k && j < n; ++j)
+        out[row_at(k, loop.first_row) * this->tree_.dof[k] + loop.v[i] - this->tree_.dof_offset[k]] += S(second[i * n + j]) * w[loop.v[j]];
+  }
+  std::vector<S> velocity(const OfDirection& along) const {
+    if (along.time) return v_;
+    std::vector<S> w(v_.size(), S(0));
+    for (const auto& [c, place] : along.twists) w[std::get<OfCoordinate>(place).coordinate] += S(c);
+    return w;
+  }
+
+  const LoopOperators& source_;
+  std::shared_ptr<const CompiledModel<S>> compiled_;
+  std::shared_ptr<const ResolvedLoops> loops_;
+  std::vector<S> q_, v_;
+  std::vector<int> body_of_;                         // coordinates
+  std::vector<int> column_of_, end_body_, columns_;  // of ends, in their body's block of A; how many a body has
+};
+
+}  // namespace pycraft

@@ -1,0 +1,54 @@
+"""Rows of loops as operators, beside the letters of the tree that they are declared on (docs/loops.md).
+
+    Q = Σ Q_k : Θ → R^rows          A = Σ A_k : NodesV(ends) → R^rows          Q = A B* φ* H*   of loops of two ends
+
+Q_k and A_k are the letters of the core, block diagonal, to the rows by body; Σ, ones, adds the parts of a row up.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+
+NAMES = ("Q", "A")
+
+
+def loop_letter(source: Any, model: Any, name: str, made: dict[str, Any]) -> _core.Operator:
+    """Q or A of a model's loops; `made` keeps them as long as its loops stay."""
+    if not isinstance(source, _core.MultibodyOperators) or model is None:
+        raise AttributeError(f"rows of loops are operators of a whole model, model.soa.{name}: {source.name!r} is none")
+    loops = made.get("loops")
+    try:
+        if loops is not None:
+            loops.check_current()
+    except _core.StaleOperatorError:
+        loops = None
+    if loops is None:
+        loops = made["loops"] = model.loops._core.operators(source)
+        for letter in NAMES:
+            made.pop(letter, None)
+    if name not in made:
+        made[name] = _whole(source, loops, model, name)
+    return made[name]
+
+
+def loop_source(model: Any) -> _core.SkoSource:
+    """A source as it was pickled."""
+    made: dict[str, Any] = model.soa._made
+    loop_letter(model.soa._source, model, "Q", made)
+    return made["loops"]
+
+
+def _whole(source: Any, loops: Any, model: Any, name: str) -> _core.Operator:
+    ends, by_body = model.loops._core.ends(loops)
+    count = len(model.loops.rows)
+    if not count or (name == "A" and not ends):
+        return _core.zero(source.Theta if name == "Q" else _core.euclidean(0), _core.euclidean(count))
+    letter = loops.symbol(name)
+    rows = [row for own in by_body for row in own]
+    sums = np.zeros((count, len(rows)))
+    sums[rows, range(len(rows))] = 1
+    return _core.constant(sums, letter.codomain, count, "Σ") @ letter
