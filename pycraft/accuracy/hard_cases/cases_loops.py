@@ -106,7 +106,7 @@ def _dense(model: Multibody, q: np.ndarray, v: np.ndarray, tau: np.ndarray, rank
 
         M = exact(model.soa.MM.at(q, precision=DIGITS).dense(dtype=object))
         force = tau - model.inverse_dynamics(q, v, np.zeros(model.nv), precision="quad")
-        Q, c = exact(model.loops.jacobian(q, precision="quad")), exact(model.loops.bias(q, v, precision="quad")).T
+        Q, c = exact(model.soa.Q.at(q, precision=DIGITS).dense(dtype=object)), exact(model.loops.bias(q, v, precision="quad")).T
         rows = _independent(Q, rank)
         A, b = mpmath.matrix(rank, model.nv), mpmath.matrix(rank, 1)
         for i, row in enumerate(rows):
@@ -291,7 +291,7 @@ def _caught_errors(ratio: float, rng: np.random.Generator) -> dict[str, float]:
     v = rng.normal(size=5)
     with mpmath.workdps(DIGITS):
         M = mpmath.matrix(model.soa.MM.at(model.q, precision=DIGITS).dense(dtype=object).tolist())
-        A = mpmath.matrix(np.asarray(model.loops.jacobian(model.q, precision="quad"), dtype=object)[2:4].tolist())
+        A = mpmath.matrix(model.soa.Q.at(model.q, precision=DIGITS).dense(dtype=object)[2:4].tolist())
         before = mpmath.matrix(v.tolist())
         after = before - M**-1 * A.T * ((A * M**-1 * A.T) ** -1 * (A * before))
         exact = np.array(after.tolist(), float).ravel()
