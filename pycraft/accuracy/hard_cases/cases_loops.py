@@ -278,6 +278,10 @@ def _closing() -> list[MeasuredCase]:
     ]
 
 
+def _of_extended(measured: Measured) -> float:
+    return max(10 * measured.eps, 100 * float(np.finfo(np.longdouble).eps) * measured.parameters["ratio"])
+
+
 def _caught_errors(ratio: float, rng: np.random.Generator) -> dict[str, float]:
     model = Multibody("chain")
     for i in range(5):
