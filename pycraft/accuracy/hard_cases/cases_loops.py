@@ -271,7 +271,10 @@ def _closing() -> list[MeasuredCase]:
             {"N": 5, "ratio": ratio},
             partial(_caught_errors, ratio),
             f"the dense equations in {DIGITS} digits",
-            (Bound(ALL, "worst", "1e-12", lambda m: 1e-12),),
+            (
+                Bound(DOUBLE, "worst", "1e-13, or 100 eps ratio", lambda m: max(1e-13, 100 * m.eps * m.parameters["ratio"])),
+                Bound((EXTENDED,), "worst", "10 eps, or 100 eps of extended ratio", _of_extended),
+            ),
             "relative error of the velocities, 2-norm",
         )
         for ratio in (1e-9, 1.0, 1e6)
