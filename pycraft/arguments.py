@@ -69,6 +69,13 @@ def thermal_energy(temperature: Any, boltzmann: Any, refusal: type[Exception], o
     return kT
 
 
+def chosen(name: Any, what: str) -> str:
+    """One of the names that an option has; the core knows which. EvaluationError where it is no text."""
+    if not isinstance(name, str):
+        raise _core.EvaluationError(f"{what}={name!r:.80}: a name")
+    return name
+
+
 def clipped(value: Any, what: str) -> int:
     """A whole number, the nearest one that the core's integers hold: it says what is wrong with one that is too large."""
     return max(-LARGEST, min(whole(value, what), LARGEST))
