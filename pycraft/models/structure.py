@@ -128,7 +128,10 @@ class Structure(Locking):
             rotation=rotation, placement=pose, rotor_inertia=rotor_inertia, limits=limits,
         )  # fmt: skip
         self._require_uncoupled(was)
-        fit = self._fit(name, onto, called, given, here, q, one_number(tolerance, "tolerance"), velocity)
+        allowed = one_number(tolerance, "tolerance")
+        if not 0 <= allowed < np.inf:
+            raise _core.ModelError(f"tolerance={allowed:g}: it is a finite number, not negative")
+        fit = self._fit(name, onto, called, given, here, q, allowed, velocity)
         impulse = self._caught(name, onto, called, given, fit) if velocity == "impulse" else None
         aside = Asides(self)
         self._rehang(name, onto, hinge_name=called, q=fit.q.tolist(), v=fit.v.tolist(), **given)
