@@ -56,6 +56,26 @@ def moment(t: Any) -> float:
     return number
 
 
+def thermal_energy(temperature: Any, boltzmann: Any, refusal: type[Exception], of: str = "", positive: bool = False) -> float:
+    """kT, J. `refusal` for what is negative or not finite, or zero where it is to be positive. `of` what it belongs to, for errors."""
+    numbers = {name: one_number(x, f"{of}{name}") for name, x in (("temperature", temperature), ("boltzmann", boltzmann))}
+    for name, x in numbers.items():
+        if not 0 <= x < np.inf or (positive and x == 0):
+            raise refusal(f"{of}{name}={x:g}: it is a finite number, {'positive' if positive else 'not negative'}")
+    T, k = numbers.values()
+    kT = T * k
+    if not np.isfinite(kT) or (positive and kT == 0):
+        raise refusal(f"{of}temperature={T:g} by boltzmann={k:g} is {kT:g} J: take other units")
+    return kT
+
+
+def chosen(name: Any, what: str) -> str:
+    """One of the names that an option has; the core knows which. EvaluationError where it is no text."""
+    if not isinstance(name, str):
+        raise _core.EvaluationError(f"{what}={name!r:.80}: a name")
+    return name
+
+
 def clipped(value: Any, what: str) -> int:
     """A whole number, the nearest one that the core's integers hold: it says what is wrong with one that is too large."""
     return max(-LARGEST, min(whole(value, what), LARGEST))

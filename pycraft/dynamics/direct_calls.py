@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..arguments import text
+from ..arguments import chosen, text
 from ..state import at_state
 from .by_realization import by_realization, output
 from .jacobians import resolved_jacobian
@@ -117,7 +117,8 @@ class DirectCalls:
         q, v = at_state(self, q, v)
         tau = np.zeros(self.nv) if tau is None else tau
         if isinstance(method, str) and method == "articulated":
-            return self._calls().forward_dynamics(q, v, tau, form, refine, residual, precision, on_singular, out, threads)
+            how = form, refine, chosen(residual, "residual"), precision, chosen(on_singular, "on_singular")
+            return self._calls().forward_dynamics(q, v, tau, *how, out, threads)
         if not isinstance(method, str):
             raise _core.EvaluationError(f"method={method!r}: a name, 'articulated', 'cholesky', ...")
         if form != "fast" or refine != 0 or residual != "same" or on_singular != "raise":
@@ -187,7 +188,7 @@ class DirectCalls:
         """
         q, v = at_state(self, q, v)
         tau = np.zeros(self.nv) if tau is None else tau
-        value, corrections, error = self._calls().refinement(q, v, tau, form, refine, residual, precision)
+        value, corrections, error = self._calls().refinement(q, v, tau, form, refine, chosen(residual, "residual"), precision)
         return {"value": value, "steps": len(corrections), "corrections": corrections, "error": error}
 
     @direct
@@ -258,7 +259,8 @@ class DirectCalls:
         >>> pc.chain(2).mass_matrix_inverse([0, 0]).round(3).tolist()
         [[1.714, -4.286], [-4.286, 13.714]]
         """
-        return self._calls().mass_matrix_inverse(at_state(self, q)[0], form, refine, residual, precision, on_singular, out)
+        how = form, refine, chosen(residual, "residual"), precision, chosen(on_singular, "on_singular")
+        return self._calls().mass_matrix_inverse(at_state(self, q)[0], *how, out)
 
     @direct
     @over_threads

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import _core
-from ..arguments import text
+from ..arguments import chosen, text
 from ..state import at_state
 from .prepared_states import refuse_other_states
 from .threads import over_threads
@@ -147,7 +147,7 @@ class HybridCalls:
         """
         q, v = at_state(self, q, v)
         tau, vdot = (np.zeros(self.nv) if x is None else x for x in (tau, vdot))
-        return HybridMotion(*hybrid_of(self, prescribed)(q, v, tau, vdot, form, refine, residual, precision, threads))
+        return HybridMotion(*hybrid_of(self, prescribed)(q, v, tau, vdot, form, refine, chosen(residual, "residual"), precision, threads))
 
     @over_threads
     def hybrid_dynamics_derivatives(

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import _core
-from ..arguments import text
+from ..arguments import chosen, text
 from ..state import at_state
 from .direct_calls import cached
 
@@ -107,7 +107,7 @@ class InterbodyCalls:
             f, X, *_ = self._interbody().after(q, v, vdot, *pushes, reaction, precision)
         else:
             tau = np.zeros(self.nv) if tau is None else tau
-            f, X, *_ = self._interbody().under(q, v, tau, *pushes, reaction, form, refine, residual, precision)
+            f, X, *_ = self._interbody().under(q, v, tau, *pushes, reaction, form, refine, chosen(residual, "residual"), precision)
         return in_axes(self, q, f[..., rows, :], X[..., rows, :, :], axes, about)
 
     def base_reaction(self, q=None, v=None, tau=None, *, axes: Any = "world", about: Any = None, **options: Any) -> np.ndarray:
@@ -159,7 +159,7 @@ class InterbodyCalls:
         pushes = pushed(wrenches, wrench_axes)
         if not known:
             tau = np.zeros(self.nv) if tau is None else tau
-            vdot = self._interbody().under(q, v, tau, *pushes, False, form, refine, residual, "double")[3]
+            vdot = self._interbody().under(q, v, tau, *pushes, False, form, refine, chosen(residual, "residual"), "double")[3]
         (f_q, f_v, f_vdot), (T_q, T_v, _) = self._interbody().derivatives(q, v, vdot, *pushes, False)
         if known:
             return InterbodyDerivatives(f_q, f_v, f_vdot)

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any, TypeVar
 
 from .. import _core
-from ..arguments import text
+from ..arguments import chosen, text
 from .by_realization import output
 from .hybrid import HYBRID_OPTIONS, prepared_hybrid
 from .prepared_states import refuse_other_states, states_of
@@ -42,6 +42,8 @@ def prepared(model: Any, call: str, batch: int | None, options: dict[str, Any]) 
     for name in options:
         if name not in known:
             raise _core.EvaluationError(f"a prepared {call} has no option {name!r}; there are {', '.join(known)}")
+        if name in ("residual", "on_singular"):
+            chosen(options[name], name)
     batch = states_of(batch)
     if call == "hybrid_dynamics":
         return prepared_hybrid(model, batch, options)

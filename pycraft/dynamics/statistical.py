@@ -8,20 +8,8 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..arguments import LARGEST, clipped, one_number, seed_of
+from ..arguments import LARGEST, clipped, seed_of, thermal_energy
 from ..state import at_state
-
-
-def energy_of(temperature: Any, boltzmann: Any) -> float:
-    """kT, J. EvaluationError for what is negative or not finite."""
-    numbers = one_number(temperature, "temperature"), one_number(boltzmann, "boltzmann")
-    for name, x in zip(("temperature", "boltzmann"), numbers, strict=True):
-        if not 0 <= x < np.inf:
-            raise _core.EvaluationError(f"{name}={x:g}: it is a finite number, not negative")
-    kT = numbers[0] * numbers[1]
-    if not np.isfinite(kT):
-        raise _core.EvaluationError(f"temperature={numbers[0]:g} by boltzmann={numbers[1]:g} is {kT:g} J: take other units")
-    return kT
 
 
 class StatisticalCalls:
@@ -69,7 +57,7 @@ class StatisticalCalls:
         3.0
         """
         model: Any = self
-        size = np.sqrt(energy_of(temperature, boltzmann))
+        size = np.sqrt(thermal_energy(temperature, boltzmann, _core.EvaluationError))
         draws = np.random.default_rng() if rng is None else seed_of(rng)
         q = at_state(model, q)[0]
         q = np.asarray(_core.real_array(getattr(q, "q", q), "q"), float)
@@ -96,11 +84,11 @@ class StatisticalCalls:
         Source: M. Fixman, Classical statistical mechanics of constraints, Proc. Nat. Acad. Sci. USA 71 (1974).
         """
         model: Any = self
-        soa, kT = model.soa, energy_of(temperature, boltzmann)
+        soa, kT = model.soa, thermal_energy(temperature, boltzmann, _core.EvaluationError)
         q = at_state(model, q)[0]
         value = 0.5 * kT * np.asarray(soa.D.logdet().at(getattr(q, "q", q), precision=precision), float)  # that of ℳ + J
         return float(value) if value.ndim == 0 else value
 
     def fixman_torque(self, q=None, temperature: float = 1.0, *, boltzmann: float = 1.0, precision: str = "double") -> np.ndarray:
         """-∂/∂θ of `fixman_potential`, (nv,) or (B, nv), N m and N: -½ kT ∂ln det(ℳ + J). O(N)."""
-        return -0.5 * energy_of(temperature, boltzmann) * self.log_determinant_gradient(q, precision=precision)
+        return -0.5 * thermal_energy(temperature, boltzmann, _core.EvaluationError) * self.log_determinant_gradient(q, precision=precision)

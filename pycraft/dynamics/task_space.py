@@ -19,6 +19,9 @@ TWIST = ("rx", "ry", "rz", "x", "y", "z")
 SHARED = 2.0**-8
 """Of a direction's compliance, what must be its own beside the others': else two digits would go, which the decomposition keeps."""
 
+LARGEST_ROW = 1e100
+"""Largest row of directions, and one over the smallest: squares are in Λ⁻¹, and leave the range of numbers from 1e154 on."""
+
 
 class TaskSpace(Closed):
     """The motion of nodes along some directions at a state, or at each of a batch: ẍ = Λ⁻¹F + J v̇₀ + J̇v.
@@ -371,4 +374,10 @@ def _rows(frame: str, directions: Any) -> tuple[np.ndarray, list[str]]:
         raise _core.ModelError(f"directions of {frame!r}: row {int(np.argwhere(~np.isfinite(rows))[0, 0])} is not finite")
     if np.linalg.matrix_rank(rows) < len(rows):
         raise _core.ModelError(f"directions of {frame!r}: the {len(rows)} rows are linearly dependent; leave out what the others say")
+    sizes = np.abs(rows).max(axis=1)
+    if (out := (sizes < 1 / LARGEST_ROW) | (sizes > LARGEST_ROW)).any():
+        row = int(out.argmax())
+        raise _core.ModelError(
+            f"directions of {frame!r}: row {row}, of size {sizes[row]:.3g}, leaves the range of numbers: take other units"
+        )
     return rows, [f"{frame}.{i}" for i in range(len(rows))]

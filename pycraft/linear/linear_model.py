@@ -78,6 +78,8 @@ class LinearModel:
     # ------------------------------------------------------------------ parts of it
     def place(self, names: Any, of: str = "states") -> list[int]:
         """Where states, "inputs" or "outputs" of these names are. ModelError for one that is not there, with what there is."""
+        if of not in ("states", "inputs", "outputs"):
+            raise _core.ModelError(f"of={of!r:.80}: there are 'states', 'inputs' and 'outputs'")
         known = list(getattr(self, of))
         wanted = [names] if isinstance(names, str) or not isinstance(names, Iterable) else list(names)
         for name in wanted:

@@ -128,7 +128,10 @@ class Structure(Locking):
             rotation=rotation, placement=pose, rotor_inertia=rotor_inertia, limits=limits,
         )  # fmt: skip
         self._require_uncoupled(was)
-        fit = self._fit(name, onto, called, given, here, q, one_number(tolerance, "tolerance"), velocity)
+        allowed = one_number(tolerance, "tolerance")
+        if not 0 <= allowed < np.inf:
+            raise _core.ModelError(f"tolerance={allowed:g}: it is a finite number, not negative")
+        fit = self._fit(name, onto, called, given, here, q, allowed, velocity)
         impulse = self._caught(name, onto, called, given, fit) if velocity == "impulse" else None
         aside = Asides(self)
         self._rehang(name, onto, hinge_name=called, q=fit.q.tolist(), v=fit.v.tolist(), **given)
@@ -197,15 +200,16 @@ class Structure(Locking):
         The free hinge moves to the body and has its pose and twist; hinges on the way from the old root are turned round, so that what was
         inboard is outboard. Their subhinges are in the other order and their axes reversed: coordinates, velocities, limits, forces and
         rotors keep their numbers. Of balls and free subhinges on the way, quaternions and positions are inverted, and velocities are those
-        of the other body, in its axes. All poses, velocities, accelerations, energies and momenta are the same, to rounding. A planar hinge
-        that is turned round is pin, slider, slider, a custom hinge. Masses, names, frames and nodes of bodies stay, and couplings stay on
-        the coordinates that they are of.
+        of the other body, in its axes. All poses, velocities, energies and momenta are the same, to rounding, and accelerations where
+        `frames.vdot` has them. A planar hinge that is turned round is pin, slider, slider, a custom hinge. Masses, names, frames and
+        nodes of bodies stay, and couplings stay on the coordinates that they are of.
 
         Raises
         ------
         ModelError
             A root that is not on a free hinge (detach it first); locked hinges on the way; rotors that would act between other axes: of the
-            free hinge itself, and of a ball or free hinge on the way that has different ones about different axes. The model is as it was.
+            free hinge itself, and of a ball or free hinge on the way that has different ones about different axes; an effect of a scene
+            that takes coordinates of hinges on the way one by one, or all in their order. The model is as it was.
 
         Cost: the hinges on the way, and O(bodies) at the next look at the model.
 
@@ -226,6 +230,7 @@ class Structure(Locking):
             raise _core.ModelError(
                 f"between the root and body {name!r} there are locked hinges, {locked}: unlock them before they are turned"
             )
+        self._require_whole(way, name)
         rates = np.zeros(self.nv) if frames is None else np.array(frames.vdot)
         first = self.frame(name).acceleration() if rates.any() else np.zeros(6)
         aside = Asides(self)
@@ -281,6 +286,19 @@ class Structure(Locking):
             if self.loops[name].kind == "coupling" and hinge in self.loops._stands_on(name):
                 what = f"hinge {hinge!r} is in use: its coordinates are those of coupling {name!r}"
                 raise _core.ModelError(f"{what}; remove that first, and declare it anew")
+
+    def _require_whole(self, way: set[str], body: str) -> None:
+        """Effects that take coordinates one by one would take other ones of hinges that are turned, and of the free one another body's."""
+        if len(way) < 2:
+            return
+        sizes = {hinge: self._slices(self._hinge_index(hinge))[1] for hinge in way}
+        apart = {hinge for hinge, v in sizes.items() if v.stop - v.start > 1 and self._kind_of(hinge) != "cylindrical"} | {""}
+        for scene in self._scenes or ():
+            for effect, hinges in scene._by_coordinate(apart).items():
+                what = f"coordinates of {hinges[0]!r} one by one" if hinges[0] else "all coordinates one by one, in their order"
+                raise _core.ModelError(
+                    f"effect {effect!r} of a scene takes {what}, which are others when {body!r} is the root: remove it, and add it anew"
+                )
 
     def _set_accelerations(self, by_hinge: Mapping[str, Any]) -> None:
         """Present accelerations of hinges that are other ones now, where any are kept."""

@@ -143,6 +143,11 @@ class Scene(Measurements, Statics, Filed, Closed):
         found = {name: sorted(effect.named() & names) for name, (effect, _) in self._entries.items()}
         return {name: named for name, named in found.items() if named}
 
+    def _by_coordinate(self, hinges: set[str]) -> dict[str, list[str]]:
+        """Effects that take coordinates of one of these hinges one by one, each with those hinges; "" is all, in their order."""
+        found = {name: sorted(effect.by_coordinate() & hinges, reverse=True) for name, (effect, _) in self._entries.items()}
+        return {name: named for name, named in found.items() if named}
+
     def _enter(self, name: str | None, effect: Effect, on: bool) -> None:
         """One effect as a file has it, on or off."""
         called = self._fresh_core().add(name or "", effect.made_for(self._model), on)

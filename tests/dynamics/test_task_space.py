@@ -282,3 +282,14 @@ def test_refusals_of_vectors():
     with pytest.raises(pc.SingularOperatorError, match="not positive definite to rounding"):
         massless.task_space("body1", [0.0, 0.0]).compliance  # noqa: B018 - raises
     assert "task space of 'chain of 2 rods': body1.rz, body1.y" in repr(task)
+
+
+@pytest.mark.parametrize("size", [1e300, 1e160, 1e-160, 1e-300])
+def test_rows_whose_squares_are_no_numbers_are_refused(size):
+    """Large ones overflowed with a warning of NumPy's, small ones were said not to move."""
+    arm, row = pc.chain(3), np.array([[0, 0, 0, 1.0, 0, 0]])
+    with pytest.raises(pc.ModelError, match="directions of 'body2': row 0, of size .* leaves the range of numbers: take other units"):
+        arm.task_space({"body2": size * row}, [0.0, 0.5, 1.0])
+    scaled = 1e99 if size > 1 else 1e-99
+    Λ, found = (arm.task_space({"body2": by * row}, [0.0, 0.5, 1.0]).inertia for by in (1.0, scaled))
+    assert np.allclose(found * scaled * scaled, Λ, rtol=1e-12, atol=0)

@@ -266,6 +266,8 @@ def test_to_scipy_and_control():
         (lambda m, f: f.discrete(1e300), "dt=1e+300: by 'zoh' 'chain of 2 rods' leaves the range of its numbers"),
         (lambda m, f: f.discrete(0.1, "exact"), "method='exact': there are 'zoh'"),
         (lambda m, f: f.discrete(0.1).discrete(0.1), "is discrete already, with a step of 0.1 s"),
+        (lambda m, f: f.place("v.hinge0", of="zz"), "of='zz': there are 'states', 'inputs' and 'outputs'"),
+        (lambda m, f: f.place("v.hinge0", of=None), "of=None: there are 'states', 'inputs' and 'outputs'"),
         (lambda m, f: f.select(inputs="tau.elbow"), "has no input 'tau.elbow'; there are tau.hinge0, tau.hinge1"),
         (lambda m, f: m.linearize([[0, 0]]).modes(), "modes() is of one state; this is a batch of 1: take one by its index"),
         (lambda m, f: m.linearize([[0, 0]]).to_scipy(), "to_scipy() is of one state"),

@@ -273,3 +273,10 @@ def test_what_the_file_said_is_not_said_of_another_hinge_of_the_name():
     arm._left_aside = {"damping": np.array([1.0, 2.0])}
     arm.reattach("body1", "body0", "pin", position=(1, 0, 0))
     assert np.array_equal(arm.left_aside["damping"], [1, np.nan], equal_nan=True)
+
+
+@pytest.mark.parametrize("tolerance", [np.nan, -1, np.inf, -np.inf])
+def test_a_tolerance_is_a_finite_number(tolerance):
+    """No number and a negative one refused what was possible as off by 0, and an infinite one took what was not."""
+    arm = pc.chain(3)
+    refused(arm, lambda: arm.reattach("body2", "body0", "planar", tolerance=tolerance), f"tolerance={tolerance:g}: it is a finite number")

@@ -191,3 +191,32 @@ def test_what_the_file_said_of_coordinates_turns_with_them():
     damping = dict(zip(robot.coordinate_names, robot.left_aside["damping"], strict=True))
     assert (damping["b1[0]"], damping["b1[1]"], damping["b2"]) == (2, 1, 3) and np.isnan(damping["b0[3]"])
     assert [actuator["coordinate"] for actuator in robot.actuators] == ["b1[1]", None]
+
+
+@pytest.mark.parametrize("kind", ["universal", "gimbal", "planar"])
+@pytest.mark.parametrize(
+    ("made", "words"),
+    [
+        (lambda n, nv: pc.effects.Spring(2.0, hinges=["hinge1[0]"]), "of 'hinge1' one by one"),
+        (lambda n, nv: pc.effects.Damping({"hinge1": np.ones(n)}), "of 'hinge1' one by one"),
+        (lambda n, nv: pc.effects.Damping(np.ones(n), hinges="hinge1"), "of 'hinge1' one by one"),
+        (lambda n, nv: pc.effects.Damping(np.ones(nv), hinges="*"), "all coordinates one by one, in their order"),
+        (lambda n, nv: pc.effects.RotorInertia(np.ones(nv)), "all coordinates one by one, in their order"),
+    ],
+)
+def test_effects_of_single_coordinates_are_not_turned_without_a_word(kind, made, words):
+    """A spring at the first axis of a universal hinge would be at the second one's afterwards."""
+    several = pc.tree([-1, 0, 1], ["free", kind, "pin"], seed=1)
+    v = several.hinges["hinge1"].v_slice
+    effect = made(v.stop - v.start, several.nv)
+    scene = pc.Scene(several).add(effect, name="it")
+    refused(several, lambda: several.reroot("body2"), "effect 'it' of a scene takes", words, "'body2' is the root")
+    several.reroot("body0")  # the root that it has
+    scene.remove("it").add(pc.effects.Spring(2.0), pc.effects.Damping(0.3, hinges=["hinge1", "hinge2"]))
+    state = several.random_state(2)
+    several.q, several.v = state.q, state.v
+    before = scene.evaluate(several.q, several.v)
+    power = {name: forces @ several.v for name, forces in before.forces.items()}
+    several.reroot("body2")
+    for name, forces in scene.evaluate(several.q, several.v).forces.items():
+        assert forces @ several.v == pytest.approx(power[name], rel=1e-12)

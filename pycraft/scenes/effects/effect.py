@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, fields
 from typing import Any
 
@@ -42,19 +42,23 @@ class Effect(Closed):
 
     def named(self) -> set[str]:
         """What its fields name of a model: bodies, nodes, hinges, and of coordinates "hinge[j]" the hinge, too."""
+        named = [name for field in fields(self) for name in _each_text(getattr(self, field.name))]  # type: ignore[arg-type]  # dataclasses
+        return {*named, *(name.partition("[")[0] for name in named)}
+
+    def by_coordinate(self) -> set[str]:
+        """Hinges whose coordinates it takes one by one: "hinge[j]", and lists of numbers by hinge; "" where a list is of those of all."""
         found: set[str] = set()
-
-        def look(value: Any) -> None:
+        values = [getattr(self, field.name) for field in fields(self)]  # type: ignore[arg-type]  # subclasses are dataclasses
+        for value in values:
+            for name in _each_text(value):
+                hinge, bracket, _ = name.partition("[")
+                found.update({hinge} if bracket else ())
             if isinstance(value, Mapping):
-                value = [*value, *value.values()]
-            if isinstance(value, (list, tuple, set, frozenset)):
-                for item in value:
-                    look(item)
-            elif isinstance(name := getattr(value, "name", value), str):
-                found.update({name, name.partition("[")[0]})
-
-        for field in fields(self):  # type: ignore[arg-type]  # subclasses are dataclasses
-            look(getattr(self, field.name))
+                found.update(str(getattr(key, "name", key)) for key, each in value.items() if np.size(each) > 1)
+        listed = any(isinstance(value, (list, tuple, np.ndarray)) and not set(_each_text(value)) for value in values)
+        if listed and hasattr(self, "hinges"):
+            chosen = self.hinges
+            found.update({""} if chosen is None else ("" if set(name) & set("*?") else name for name in _each_text(chosen)))
         return found
 
     def parameters(self) -> dict[str, Any]:
@@ -74,6 +78,17 @@ class Effect(Closed):
     def __repr__(self) -> str:
         shown = ", ".join(f"{name}={_shown(value)}" for name, value in self.parameters().items())
         return f"{type(self).__name__}({shown})"
+
+
+def _each_text(value: Any) -> Iterator[str]:
+    """Texts, and names of handles, in a value, its items and its keys."""
+    if isinstance(value, Mapping):
+        value = [*value, *value.values()]
+    if isinstance(value, (list, tuple, set, frozenset)):
+        for item in value:
+            yield from _each_text(item)
+    elif isinstance(name := getattr(value, "name", value), str):
+        yield name
 
 
 def _same(value: Any, default: Any) -> bool:

@@ -8,22 +8,13 @@ from typing import Any
 import numpy as np
 
 from ... import _core
-from ...arguments import clipped, one_number, whole
+from ...arguments import clipped, one_number, thermal_energy, whole
 from .effect import Effect, by_hinge, names_of
 
 
 def _energy(effect: Any, kind: str, positive: bool = False) -> float:
     """kT, J."""
-    numbers = []
-    for name in ("temperature", "boltzmann"):
-        number = one_number(getattr(effect, name), f"{kind}: {name}")
-        if not 0 <= number < np.inf or (positive and number == 0):
-            raise _core.ModelError(f"{kind}: {name} is {number:g}; it is a finite number, {'positive' if positive else 'not negative'}")
-        numbers.append(number)
-    kT = numbers[0] * numbers[1]
-    if not np.isfinite(kT) or (positive and kT == 0):
-        raise _core.ModelError(f"{kind}: temperature {numbers[0]:g} by boltzmann {numbers[1]:g} is {kT:g} J; take other units")
-    return kT
+    return thermal_energy(effect.temperature, effect.boltzmann, _core.ModelError, f"{kind}: ", positive)
 
 
 def _seconds(value: Any, what: str) -> float:
