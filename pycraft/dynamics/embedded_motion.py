@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..arguments import one_number
 from ..state import at_state
 from .embedding import EmbeddedDynamics
 
 INTEGRATORS = ("DOP853", "RK45", "RK23", "Radau", "BDF")
 _WORST, _GOOD = 10.0, 2.0  # entries of X_r in units of energy: where a choice is given up, and what a new one is brought below
 _NEWTON = 20
+_LEAST_RTOL = 100 * np.finfo(float).eps  # SciPy's
 _STEP = 2.0**-26  # √ε: rounding and second derivatives are of one size
 
 
@@ -80,6 +82,7 @@ def embedded_motion(
     >>> bool(np.abs(bars.loops.residual(motion.q[-1])).max() < 1e-14)
     True
     """
+    _check_model(model)
     q, v = (np.array(_core.real_array(part, name), float) for name, part in zip("qv", at_state(model, q, v), strict=True))
     model.configuration_rate(q, v)  # the core's own checks
     if q.ndim != 1:
@@ -87,15 +90,20 @@ def embedded_motion(
     times = np.array(_core.real_array(times, "times"), float)
     if times.ndim != 1 or not times.size or not np.isfinite(times).all() or not (np.diff(times) > 0).all():
         raise _core.EvaluationError("times: finite, increasing, at least one")
-    for name, number in (("rtol", rtol), ("atol", atol)):
-        if not isinstance(number, (int, float)) or not 0 < number < np.inf:
-            raise _core.EvaluationError(f"{name}={number!r}: a positive number")
+    rtol, atol = one_number(rtol, "rtol"), one_number(atol, "atol")
+    if not (_LEAST_RTOL <= rtol < np.inf and 0 < atol < np.inf):
+        raise _core.EvaluationError(f"rtol={rtol}, atol={atol}: positive numbers, and rtol at least {_LEAST_RTOL:.2g}, what doubles have")
     known = integrator.removeprefix("scipy:") if isinstance(integrator, str) else integrator
     if known not in INTEGRATORS:
         raise _core.EvaluationError(f"integrator {integrator!r} of motions by embedding: there are {', '.join(INTEGRATORS)}")
     run = _Run(model, tau, independent, q)
     run.accelerations(times[0], q, v)  # what is wrong at first is said as it is
     return run.along(times, q, v, known, rtol, atol)
+
+
+def _check_model(model: Any) -> None:
+    if not isinstance(model, _core.Multibody):
+        raise _core.ModelError(f"a motion is of a model, not of {model!r:.80}")
 
 
 class _Run:
