@@ -257,7 +257,7 @@ class SkoSource:
     @property
     def derived_from(self) -> typing.Any:
         """
-        How this tree was made of a model's, "hinge subset", "world frame", "cut tree", "another root", "groups of bodies" or "embedded loops", and that model's source; None for a model's own.
+        How this tree was made of a model's, "hinge subset", "world frame", "cut tree", "another root", "loops", "groups of bodies" or "embedded loops", and that model's source; None for a model's own.
         """
     @property
     def dof(self) -> list[int]:
@@ -1197,6 +1197,10 @@ class LoopSet:
         """
         What keeps these loops in a scene, all without names.
         """
+    def ends(self, operators: SkoSource) -> tuple[list[str], list[list[int]]]:
+        """
+        The bodies and nodes that A is of, and by body the rows of `operators`.
+        """
     def first_rows(self) -> list[int]:
         """
         Where each loop's rows begin, and the number of all.
@@ -1208,6 +1212,10 @@ class LoopSet:
     def names(self) -> list[str]:
         """
         In order of declaration.
+        """
+    def operators(self, base: MultibodyOperators) -> SkoSource:
+        """
+        The source of rows as operators, Q and A by body: pycraft/operators/loop_letters.py.
         """
     def remove(self, name: str) -> None:
         ...

@@ -212,7 +212,7 @@ def loop_wrenches(model: Any, forces: Mapping[str, Any], q: Any, in_world: bool)
     on the base and nodes on it, about the world's origin in its axes."""
     moved, on_base = [], np.zeros(6)
     for name, pair in forces.items():
-        for frame, wrench in zip(model.loops.ends(name), pair, strict=True):
+        for frame, wrench in zip(model.loops.ends_of(name), pair, strict=True):
             held = not frame or (frame in model.nodes and model.nodes[frame].body is None)
             if held and not frame:
                 on_base = on_base + wrench

@@ -150,7 +150,7 @@ class Loops(Closed, Mapping):
         terms = self._declared[name].get("terms", ())
         return [self._model.hinges[hinge].v_slice.start + coordinate for hinge, coordinate, _ in terms]
 
-    def ends(self, name: str) -> tuple[str, str]:
+    def ends_of(self, name: str) -> tuple[str, str]:
         """The bodies or nodes b and a that a loop joins: "" of the base, and twice of a coupling. KeyError where none has that name."""
         declared = self._declared[name]
         return declared.get("b", ""), declared.get("a", "")

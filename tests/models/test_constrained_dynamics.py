@@ -129,7 +129,7 @@ def test_forces_of_loops_act_on_both_bodies_and_do_what_the_loop_does():
     coupled = mb.loops["gear"].jacobian(q).T @ got.by_loop["gear"]
     push = {}
     for name, pair in got.forces.items():
-        for frame, wrench in zip(mb.loops.ends(name), pair, strict=True):
+        for frame, wrench in zip(mb.loops.ends_of(name), pair, strict=True):
             if frame:
                 push[frame] = push.get(frame, 0) + wrench
     f = mb.interbody_forces(q, v, vdot=got.vdot, wrenches=push, wrench_axes="body")
