@@ -73,7 +73,7 @@ class SceneEquations : public Kind<S> {
 
   void settle(const S& t, State& x) override {
     prescribe(t, x);
-    if (settles()) scene_.loops()->take_onto(x.data(), x.data() + nq());
+    if (settles()) scene_.loops()->take_onto(t, x.data(), x.data() + nq());
   }
   bool settles() const override { return scene_.loops() && scene_.loops()->settles(); }
   bool stops() const override { return std::isfinite(next_stop(0)); }

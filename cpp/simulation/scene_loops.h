@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "dynamics/constrained_dynamics.h"
+#include "model/checks.h"
 #include "runtime/errors.h"
 #include "simulation/scene_forces.h"
 
@@ -35,7 +36,7 @@ class SceneLoops {
   }
 
   // q, v, tau (null: none), what acts on bodies, θ̈ of prescribed coordinates by coordinate: θ̈ of all, and what their motion needs beside tau.
-  void accelerate(const S* q, const S* v, const S* tau, const Applied<S>& applied, const S* motion, S* needed, S* vdot) {
+  void accelerate(const S& t, const S* q, const S* v, const S* tau, const Applied<S>& applied, const S* motion, S* needed, S* vdot) {
     if (!v) v = zeros_.data();
     std::copy_n(tau ? tau : zeros_.data(), zeros_.size(), load_.data());
     set_rates(v);
@@ -44,7 +45,7 @@ class SceneLoops {
     asked.applied = &applied, asked.form = how_.form, asked.refinement = how_.refinement, asked.near = near_;
     asked.driven = driven_.data(), asked.rates = rates_.data();
     if (drawn_) asked.gains = &gains_;
-    workspace_.accelerate(loops_, asked);
+    telling_time(t, [&] { workspace_.accelerate(loops_, asked); });
     std::copy_n(workspace_.result().data(), zeros_.size(), vdot);
     for (size_t i = 0; i < held_.size(); ++i) needed[held_[i]] = workspace_.multipliers()[first_.back() + i], vdot[held_[i]] = motion[held_[i]];
   }
@@ -53,9 +54,9 @@ class SceneLoops {
   void add_forces(int effect, S* out) const { workspace_.add_forces(first_[effect], first_[effect + 1], out); }
   // Whether states are taken onto the rows: not where all of them are drawn there by Baumgarte's gains.
   bool settles() const { return kept_; }
-  void take_onto(S* q, S* v) {
+  void take_onto(const S& t, S* q, S* v) {
     set_rates(v);
-    workspace_.take_onto(loops_, q, v, rates_.data(), how_.form);
+    telling_time(t, [&] { workspace_.take_onto(loops_, q, v, rates_.data(), how_.form); });
   }
   // A state of a step, taken there as far as that is sure: accelerations there are a smooth function of the states about the loops. Off them they are
   // none near singular states, where what a state is off by is divided by the square of the way to those.
@@ -80,6 +81,14 @@ class SceneLoops {
  private:
   static constexpr double far = 1e-6;  // as mobility has it: larger residuals are no state on the loops
 
+  template <class F>
+  static void telling_time(const S& t, F f) {
+    try {
+      f();
+    } catch (const EvaluationError& e) {
+      throw EvaluationError(e.what() + (", at t = " + short_number(to_double(t)) + " s"));
+    }
+  }
   static HingeTerms free_terms(HingeTerms terms) {
     terms.prescribed.clear();
     return terms;

@@ -90,7 +90,7 @@ def test_what_loops_and_prescribed_motion_ask_differently_is_refused_by_both_nam
     state = bars.assemble([1.0, -1.0, 1.0 - np.pi], [0.5, 0, 0], fix="hinge0")
     scene = scene_of(bars, E.Prescribed("hinge0", lambda t: (1.0 + 0.5 * t, 0.5, 0.0)))
     scene.add(E.Prescribed("hinge1", lambda t: (-1.0 - 0.5 * t, -0.5, 3.0)))
-    with pytest.raises(pc.EvaluationError, match="different accelerations.*'closure: along"):
+    with pytest.raises(pc.EvaluationError, match="different accelerations.*'closure: along.*, at t = 0 s"):
         scene.evaluate(state.q, state.v)
 
 
@@ -114,5 +114,5 @@ def test_a_first_step_that_is_far_too_long_is_taken_again():
 
 
 def test_steps_that_leave_the_loops_are_refused():
-    with pytest.raises(pc.EvaluationError, match="has left its loops.*'wrist: along x'"):
+    with pytest.raises(pc.EvaluationError, match="has left its loops.*'wrist: along x', at t = .* s"):
         M.slider_crank().simulate(4.0, integrator="rk4", step=0.2, progress=False)
