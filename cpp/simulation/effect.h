@@ -108,7 +108,7 @@ class BoundEffect {
   virtual void impulses(const At<S>&, std::uint64_t, S*) {}  // number so and so, added to generalized impulses (nv)
   virtual void events(const At<S>&, S*) {}
   // Positions, velocities and accelerations of its prescribed coordinates, to their places among all; what is null is not asked for. Whether they
-  // are finite.
+  // are finite, and quaternions have a direction.
   virtual bool prescribe(const S&, S*, S*, S*) { return true; }
 };
 

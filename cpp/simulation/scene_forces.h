@@ -70,7 +70,7 @@ class SceneForces {
   // they are not finite.
   void prescribe(const S& t, S* q, S* v, S* vdot);
   void prescribe(Active<S>& effect, const S& t, S* q, S* v, S* vdot) {
-    if (!effect.bound->prescribe(t, q, v, vdot)) blame(effect, "its motion is not finite", t);
+    if (!effect.bound->prescribe(t, q, v, vdot)) blame(effect, "its motion is not finite (or is a quaternion of length 0)", t);
   }
   // Controllers whose sample falls on t (all of them where `first`): what they hold, in place in `own`.
   void sample(const S& t, bool first, const S* q, const S* v, S* own);

@@ -57,19 +57,30 @@ def embedded_accelerations(model: Any, q: Any = None, v: Any = None, tau: Any = 
         raise _core.ModelError(f"q, v and tau are of as many states, not arrays {q.shape}, {v.shape} and {tau.shape}") from None
     if 0 in batch or model.nv == 0:
         return np.zeros((*batch, model.nv))
-    soa = model.soa.embedded(independent, q if q.ndim == 1 else q[0])
-    bias = soa.H @ soa.phi @ (soa.M @ soa.phi.T @ (soa.a + soa.gravity_base) + soa.b)
-    rate = soa.X_r_dot @ soa.theta_dot
-    felt = bias + soa.X_r.T @ soa.unconstrained.J @ rate
     if batch:
         q, v = np.broadcast_to(q, (*batch, model.nq)), np.broadcast_to(v, (*batch, model.nv))
+    return EmbeddedDynamics(model.soa.embedded(independent, q if q.ndim == 1 else q[0])).accelerations(q, v, tau, **how)
 
-    def at(expression: Any) -> np.ndarray:
-        return expression.at(q, v, **how).dense()
 
-    X, inverse = at(soa.X_r), at((soa.MM + soa.J).inv())
-    forces = np.swapaxes(X, -1, -2) @ np.broadcast_to(tau, (*batch, model.nv))[..., None] - _column(at(felt))
-    return (X @ (inverse @ forces) + _column(at(rate)))[..., 0]
+class EmbeddedDynamics:
+    """The expressions of θ̈ for one choice of independent coordinates, made once for many states. `soa` : of `soa.embedded`."""
+
+    def __init__(self, soa: Any):
+        self.soa = soa
+        self._rate = soa.X_r_dot @ soa.theta_dot
+        bias = soa.H @ soa.phi @ (soa.M @ soa.phi.T @ (soa.a + soa.gravity_base) + soa.b)
+        self._felt = bias + soa.X_r.T @ soa.unconstrained.J @ self._rate
+        self._inverse = (soa.MM + soa.J).inv()
+
+    def accelerations(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, **how: Any) -> np.ndarray:
+        """θ̈ (nv,) or (B, nv), as of `embedded_accelerations`; q and v are of as many states, tau of as many or of one."""
+
+        def at(expression: Any) -> np.ndarray:
+            return expression.at(q, v, **how).dense()
+
+        X, inverse = at(self.soa.X_r), at(self._inverse)
+        forces = np.swapaxes(X, -1, -2) @ np.broadcast_to(tau, (*q.shape[:-1], tau.shape[-1]))[..., None] - _column(at(self._felt))
+        return (X @ (inverse @ forces) + _column(at(self._rate)))[..., 0]
 
 
 def _column(x: np.ndarray) -> np.ndarray:

@@ -39,6 +39,11 @@ class EmbeddedOperators(OperatorSet):
         return list(self._source.independent)
 
     @property
+    def sets(self) -> list[Set]:
+        """Of loops that hang together: bodies, the rows that are solved, dependent coordinates, by number."""
+        return [(list(bodies), list(rows), list(dependent)) for bodies, rows, dependent in self._sets]
+
+    @property
     def unconstrained(self) -> OperatorSet:
         """The same groups of bodies with nothing embedded: H = X_r* H_g on the same spaces V and F."""
         return OperatorSet(self._source.grouped, self._model)

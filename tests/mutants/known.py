@@ -216,6 +216,7 @@ AREAS = {
     "cpp/algebra/trees/reordered_values.h": ["algebra/test_mixed_trees.py"],
     "cpp/algebra/trees/grouping.h": ["algebra/test_mixed_trees.py"],
     "cpp/operators/embedded_values.h": ["operators/test_embedded.py"],
+    "pycraft/dynamics/embedded_motion.py": ["dynamics/test_embedded_motion.py"],
     "cpp/operators/grouped_values.h": ["algebra/test_mixed_trees.py"],
 }
 

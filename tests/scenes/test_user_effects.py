@@ -111,7 +111,7 @@ def test_functions_of_time_that_are_not_finite_name_the_effect(arm):
     for effect, text in (
         (E.TorqueSource(late), "effect 'torque_source': its force on coordinate 'hinge0' is nan at t = 0"),
         (E.Wrench("tip", lambda t: np.full(6, late(t))), "effect 'wrench': its moment on body 'body2' is nan at t = 0"),
-        (E.Prescribed("hinge1", late, step=1e-9), "effect 'prescribed': its motion is not finite at t = 0"),
+        (E.Prescribed("hinge1", late, step=1e-9), "effect 'prescribed': its motion is not finite .* at t = 0"),
         (E.Sampled(lambda t, s: np.full(3, late(t)), 0.1), "effect 'sampled': number 0 of its sample is nan at t = 0.3 s"),
         (E.Motor(late, 1.0, 1.0), "effect 'motor': its force on coordinate 'hinge0' is nan at t = 0"),
         (E.Servo(1.0, target=late), "effect 'servo': its force on coordinate 'hinge0' is nan at t = 0"),
@@ -207,3 +207,13 @@ def test_a_run_in_threads_with_python_effects(arm):
     threads = [threading.Thread(target=work, args=(i,)) for i in range(6)]
     [t.start() for t in threads], [t.join() for t in threads]
     assert all(np.array_equal(a, b) for a, b in zip(alone, found, strict=True))
+
+
+def test_a_prescribed_quaternion_without_a_direction_names_the_effect():
+    top = pc.mechanisms.heavy_top().model
+    for motion, time in ((np.zeros(4), "0"), (lambda t: np.array([1.0, 0, 0, 0]) * (t < 0.05), "0")):
+        scene = pc.Scene(top).add(E.Prescribed("top", motion))
+        with pytest.raises(
+            pc.EvaluationError, match=f"effect 'prescribed': its motion is not finite .*quaternion of length 0.* at t = {time}"
+        ):
+            scene.simulate(0.1, integrator="rk4", step=0.01, progress=False)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import pycraft as pc
+from pycraft.dynamics.constrained import ConstrainedDynamics, ConstrainedVelocities
 from pycraft.dynamics.quadratic import QuadraticModel
 from pycraft.dynamics.task_space import TaskSpace
 from pycraft.linear.linear_model import LinearModel
@@ -23,7 +24,13 @@ FRAMES = {
     "operational_space_compliance",
 }
 TAU_OR_VDOT = {"interbody_forces", "interbody_forces_derivatives"}  # one of them, tau here
-OTHERWISE = {"integrate_ode", "certify", "identify", "reattach"}  # from a state on, of a whole log, of one hinge
+OTHERWISE = {
+    "integrate_ode",
+    "certify",
+    "identify",
+    "reattach",
+    "mobility_along",
+}  # from a state on, of a whole log or motion, of one hinge
 NOT_OF_A_STATE = {"inertial_parameters", "prepare"}
 
 
@@ -43,6 +50,8 @@ def leaves(x):
         return [x.A, x.B, x.C, x.D, x.rate, x.q, x.v]
     if isinstance(x, QuadraticModel):
         return [*leaves(x.linear), *x.tensors()]
+    if isinstance(x, (ConstrainedDynamics, ConstrainedVelocities)):
+        return [x.vdot if isinstance(x, ConstrainedDynamics) else x.v, x.multipliers]
     if isinstance(x, LimitDistances):
         return [x.lower, x.upper]
     if isinstance(x, Mobility):

@@ -19,6 +19,12 @@ class BoundPrescribedMotion : public BoundEffect<S> {
     for (size_t i = 0; i < value_.size(); ++i) odd += (value_[i] - value_[i]) + (rate_[i] - rate_[i]) + (second_[i] - second_[i]);
     if (!(odd == S(0))) return false;
     const S *x = value_.data(), *y = rate_.data(), *z = second_.data();
+    for (const PrescribedMotion::Part& part : parts_) {  // a quaternion of length 0 has no direction
+      const SubhingeRecord& record = record_of(part.kind);
+      if (record.quaternion >= 0 && !(x[0] * x[0] + x[1] * x[1] + x[2] * x[2] + x[3] * x[3] > S(0))) return false;
+      x += record.nq;
+    }
+    x = value_.data();
     for (const PrescribedMotion::Part& part : parts_) {
       const SubhingeRecord& record = record_of(part.kind);
       if (q) std::copy_n(x, record.nq, q + part.q);
