@@ -41,6 +41,20 @@ void ConstrainedWorkspace<S>::set_loops(const std::shared_ptr<const ResolvedLoop
 }
 
 template <class S>
+void ConstrainedWorkspace<S>::place(const S* q, Form form) {
+  kinematics(*model_, q, blocks_);
+  for (size_t j = 0; j < added_.size(); ++j) blocks_.J[j] += added_[j];
+  blocks_.form = form;
+}
+
+template <class S>
+void ConstrainedWorkspace<S>::find_forces(const Asked& asked, const S* x, const Applied<S>& applied) {
+  forces_.find(asked.v, x, applied);
+  generalized_ = forces_.generalized();
+  for (size_t j = 0; j < added_.size(); ++j) generalized_[j] += added_[j] * x[j];
+}
+
+template <class S>
 void ConstrainedWorkspace<S>::factor() {
   using std::sqrt;
   dense_.assign(model_->nv, S(0));
@@ -166,11 +180,12 @@ void ConstrainedWorkspace<S>::correct(const Asked& asked, const Applied<S>& appl
       if (asked.gains) loop_residuals(*model, *loops_, q.data(), buffers, r.data());
       for (int i = 0; i < loops_->rows; ++i) {
         const Baumgarte of = asked.gains ? (*asked.gains)[i] : Baumgarte{};
-        target_[i] = static_cast<S>(T(rows.product(i, x.data()) + c[i] + T(2 * of.alpha) * rows.product(i, v.data()) + T(of.beta) * T(of.beta) * r[i]));
+        target_[i] = static_cast<S>(T(rows.product(i, x.data()) + c[i] + T(2 * of.alpha) * rows.product(i, v.data()) + T(of.beta) * T(of.beta) * r[i] - (asked.driven ? T(asked.driven[i]) : T(0))));
       }
       if (!wider_) wider_ = std::make_unique<RigidDynamics<T>>(source_, terms_);
       wider_->inverse_dynamics(q.data(), v.data(), x.data(), force.data(), &same);
       rows.add_transposed(lambda.data(), load.data());
+      for (size_t j = 0; j < added_.size(); ++j) force[j] += T(added_[j]) * x[j];
       for (int i = 0; i < nv; ++i) r_[i] = static_cast<S>(T(load[i] - force[i]));
       std::vector<S> kept = x_, start = target_;
       solve(r_.data(), x_.data());
@@ -181,8 +196,8 @@ void ConstrainedWorkspace<S>::correct(const Asked& asked, const Applied<S>& appl
     }
   }
   if (wider) throw EvaluationError("accelerations on loops in precision 'quad' have no wider residual; ask for residual='same'");
-  forces_.find(asked.v, x_.data(), applied);
-  for (int i = 0; i < nv; ++i) r_[i] = asked.tau[i] - forces_.generalized()[i];
+  find_forces(asked, x_.data(), applied);
+  for (int i = 0; i < nv; ++i) r_[i] = asked.tau[i] - generalized_[i];
   rows_.add_transposed(lambda_.data(), r_.data());
   for (int i = 0; i < loops_->rows; ++i) target_[i] = rows_.product(i, x_.data()) + c_[i];
   std::vector<S> kept = x_;
@@ -215,13 +230,12 @@ bool ConstrainedWorkspace<S>::sure(const Asked& asked, const Applied<S>& applied
     return false;
   }
   std::vector<S> load(nv, S(0)), rest(nv, S(0));
-  forces_.find(asked.v, rest.data(), applied);
-  rest = forces_.generalized();
-  S size = energy_norm(rest.data()) + energy_norm(asked.tau);
+  find_forces(asked, rest.data(), applied);
+  S size = energy_norm(generalized_.data()) + energy_norm(asked.tau);
   rows_.add_transposed(lambda_.data(), load.data());
   size += energy_norm(load.data());
-  forces_.find(asked.v, x_.data(), applied);
-  for (int i = 0; i < nv; ++i) load[i] += asked.tau[i] - forces_.generalized()[i];
+  find_forces(asked, x_.data(), applied);
+  for (int i = 0; i < nv; ++i) load[i] += asked.tau[i] - generalized_[i];
   if (const S left = energy_norm(load.data()); !(left <= certified() * size)) {
     if (!refuse) return false;
     int most = 0;
@@ -240,17 +254,17 @@ void ConstrainedWorkspace<S>::accelerate(const std::shared_ptr<const ResolvedLoo
   using std::abs;
   set_loops(loops);
   const int nv = model_->nv, rows = loops->rows;
-  kinematics(*model_, asked.q, blocks_);
+  place(asked.q, asked.form);
   point_accelerations_base_to_tip(*model_, blocks_.pose.data(), blocks_.H.data(), asked.v, OwnTerms::absorbed, points_);
   forces_.place(asked.q);
   Applied<S> applied = asked.applied ? *asked.applied : own_gravity(*model_);
   if (asked.wrenches) applied.wrenches = forces_.on_bodies(*asked.pushed, asked.wrenches);
-  blocks_.form = asked.form;
   x_.resize(nv);
   articulated_body(tree_, *model_, blocks_, points_, applied, asked.tau, x_.data(), z_, alpha_);
   if (blocks_.faint().body >= 0) throw_faint_hinge(tree_, blocks_.faint());
   for (int i = 0; i < nv; ++i) x_[i] -= points_.absorbed[i];
   rows_.find(*model_, *loops, asked.q, buffers_);
+  if (asked.near && std::any_of(x_.begin(), x_.end(), [](const S& x) { return !std::isfinite(to_double(x)); })) return;  // a step was too long: nothing to judge
   // c, and what it is the sum of
   c_.assign(rows, S(0)), bias_.assign(rows, S(0));
   loop_bias(*model_, *loops, asked.q, asked.v, buffers_, c_.data());
@@ -267,8 +281,10 @@ void ConstrainedWorkspace<S>::accelerate(const std::shared_ptr<const ResolvedLoo
       bias_[r] += S(2 * of.alpha) * rows_.product_size(r, asked.v) + abs(drawn);
     }
   }
+  if (asked.driven)
+    for (int r = 0; r < rows; ++r) c_[r] -= asked.driven[r], bias_[r] += abs(asked.driven[r]);
   rank_tolerance_ = least_rank_tolerance<S>();
-  if (asked.near) trust_near(loops, asked.q, asked.v);
+  if (asked.near) trust_near(asked);
   factor();
   meet(c_.data(), true);
   const int steps = asked.refinement.steps == Refinement::automatic ? 5 : asked.refinement.steps;

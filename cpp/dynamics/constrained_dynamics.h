@@ -40,10 +40,11 @@ struct Baumgarte {
 template <class S>
 class ConstrainedWorkspace {
  public:
+  // terms: what is added to J; nothing is prescribed here but as a row.
   explicit ConstrainedWorkspace(const Multibody& model, const HingeTerms& terms = {});
 
   struct Asked {
-    const S *q, *v, *tau;                     // tau null: v is taken onto the rows; v null there: none
+    const S *q, *v, *tau;
     const S* wrenches = nullptr;              // six numbers a node
     const PushedNodes* pushed = nullptr;
     const Applied<S>* applied = nullptr;      // null: the model's gravity and those wrenches
@@ -51,15 +52,20 @@ class ConstrainedWorkspace {
     Refinement refinement;
     const std::vector<Baumgarte>* gains = nullptr;  // of rows; null: none
     bool near = false;                        // the state is meant to be on the loops: what it is off them by makes no directions
+    const S *driven = nullptr, *rates = nullptr;  // (rows) Q θ̈ + c = driven, and where it is near Q θ̇ = rates; null: zero
   };
   void accelerate(const std::shared_ptr<const ResolvedLoops>& loops, const Asked& asked);
   // Q v⁺ = 0, v⁺ = v + (ℳ + J)⁻¹ (p + Q*λ)
   void project(const std::shared_ptr<const ResolvedLoops>& loops, const S* q, const S* v, const S* p, Form form);
-  // q onto the rows of positions by Newton's steps, each the shortest in kinetic energy, then v onto all. EvaluationError that names a row where
-  // a state is further off than those reach.
-  void take_onto(const std::shared_ptr<const ResolvedLoops>& loops, S* q, S* v, Form form);
-  // How far a state is off each row, by the size of the row's entries: of positions r, of all Qθ̇; v null: not those.
-  void find_off(const std::shared_ptr<const ResolvedLoops>& loops, const S* q, const S* v, std::vector<S>& positions, std::vector<S>& velocities);
+  // q onto the rows of positions by Newton's steps, each the shortest in kinetic energy, then v onto all, Q v = rates (null: zero); as far as
+  // that is sure.
+  void bring(const std::shared_ptr<const ResolvedLoops>& loops, S* q, S* v, const S* rates, Form form);
+  // The same; EvaluationError names a row where a state is further off than these steps reach.
+  void take_onto(const std::shared_ptr<const ResolvedLoops>& loops, S* q, S* v, const S* rates, Form form);
+  // How far a state is off each row, by the size of the row's entries: of positions r, of all Qθ̇ - rates; v null: not those.
+  void find_off(const std::shared_ptr<const ResolvedLoops>& loops, const S* q, const S* v, const S* rates, std::vector<S>& positions, std::vector<S>& velocities);
+  // What J has in addition at coordinates that are driven, until it is set again; of all coordinates.
+  void add_to_hinges(const S* inertia) { added_.assign(inertia, inertia + model_->nv); }
   // += Q*λ of some rows.
   void add_forces(int first, int end, S* out) const;
 
@@ -77,8 +83,12 @@ class ConstrainedWorkspace {
   bool sure(const Asked& asked, const Applied<S>& applied, bool refuse);
   // The most by which what is returned may miss a row or an equation of motion, of the largest number in it.
   S certified() const { return S(64) * rank_tolerance_; }
-  void trust(const S& off);                   // sets the rank's tolerance
-  void trust_near(const std::shared_ptr<const ResolvedLoops>& loops, const S* q, const S* v);
+  void trust(const S& off, const S& slip);    // sets the rank's tolerance
+  void trust_near(const Asked& asked);
+  bool close(S* q);
+  S size_of(int row) const;
+  void place(const S* q, Form form);
+  void find_forces(const Asked& asked, const S* x, const Applied<S>& applied);  // of the motion θ̈ = x, to generalized_
   static S largest(const std::vector<S>& of);
   void solve(const S* r, S* x);
   S energy_norm(const S* x);                  // (x* (ℳ + J)⁻¹ x)^½
@@ -98,7 +108,7 @@ class ConstrainedWorkspace {
   std::vector<std::vector<int>> active_;      // of every group: rows of which columns are not rounding
   std::vector<int> all_, loop_of_;            // bodies, tips first; of rows
   std::vector<Vector6<S>> z_, alpha_;
-  std::vector<S> x_, lambda_, c_, unit_, dense_, epsilon_, scratch_, target_, part_, b_, conflict_, scale_, sizes_, off_, r_, delta_, bias_, moved_, gone_, slip_;
+  std::vector<S> x_, lambda_, c_, unit_, dense_, epsilon_, scratch_, target_, part_, b_, conflict_, scale_, sizes_, off_, r_, delta_, bias_, moved_, gone_, slip_, added_, generalized_;
   S rank_tolerance_;                          // what is left of a unit column beside the others, and is none
   const HingeTerms terms_;
   std::unique_ptr<RigidDynamics<Wider<S>>> wider_;

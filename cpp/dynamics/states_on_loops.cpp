@@ -11,12 +11,13 @@ namespace pycraft {
 
 namespace {
 
-// A state that is δ off its loops has directions up to √δ where it should have none: near a singular state, where rows are quadratic in the way to
-// it. What is solved for along those is off by δ/σ², so that one with σ = √δ · this is off by a thousandth.
-constexpr double of_off = 30;
+// With r off the positions and s off the velocities, shares of |θ̇|, what is solved for along a direction of size σ is off by r/σ³ and s/σ²: near a
+// singular state, where rows are quadratic in the way to it. Directions where that is more than a thousandth are none.
+constexpr double most_off = 1e-3;
 constexpr double largest_rank_tolerance = 0.1;
-constexpr double reach_of_steps = 1e-2;  // of Newton's: a state further off, in angles or the lengths of a row's entries, is on other loops
+constexpr double reach_of_steps = 1e-4;  // in angles, or lengths of a row's entries: a state that steps leave further off is on other loops
 constexpr int most_steps = 8;
+
 template <class S>
 S largest_size(const S* x, int n) {
   using std::abs;
@@ -26,6 +27,14 @@ S largest_size(const S* x, int n) {
 }
 
 }  // namespace
+
+// The longest of a row's entries, by what they are the sums of.
+template <class S>
+S ConstrainedWorkspace<S>::size_of(int row) const {
+  S size = S(0);
+  for (const auto& e : rows_.entries[row]) size = maximum(size, e.size);
+  return size;
+}
 
 template <class S>
 S ConstrainedWorkspace<S>::largest(const std::vector<S>& of) {
@@ -39,14 +48,14 @@ void ConstrainedWorkspace<S>::project(const std::shared_ptr<const ResolvedLoops>
   using std::abs;
   set_loops(loops);
   const int nv = model_->nv, rows = loops->rows;
-  kinematics(*model_, q, blocks_);
-  blocks_.form = form;
+  place(q, form);
   articulated_inertia_tip_to_base(tree_, blocks_);
   if (blocks_.faint().body >= 0) throw_faint_hinge(tree_, blocks_.faint());
   rows_.find(*model_, *loops, q, buffers_);
+  rank_tolerance_ = least_rank_tolerance<S>();
   factor();
-  x_.assign(nv, S(0));
-  if (p) solve(p, x_.data());
+  x_.resize(nv);
+  solve(p, x_.data());
   for (int i = 0; i < nv; ++i) x_[i] += v[i];
   c_.assign(rows, S(0)), bias_.assign(rows, S(0));
   for (int r = 0; r < rows; ++r) bias_[r] = rows_.product_size(r, x_.data());
@@ -63,63 +72,91 @@ void ConstrainedWorkspace<S>::project(const std::shared_ptr<const ResolvedLoops>
 }
 
 template <class S>
-void ConstrainedWorkspace<S>::trust(const S& off) {
-  using std::sqrt;
-  rank_tolerance_ = std::min(S(largest_rank_tolerance), maximum(least_rank_tolerance<S>(), S(S(of_off) * sqrt(off))));
+void ConstrainedWorkspace<S>::trust(const S& off, const S& slip) {
+  using std::cbrt, std::sqrt;
+  const S trusted = maximum(S(cbrt(S(maximum(off, epsilon<S>()) / S(most_off)))), S(sqrt(S(slip / S(most_off)))));
+  rank_tolerance_ = std::min(S(largest_rank_tolerance), maximum(least_rank_tolerance<S>(), trusted));
 }
 
 // Velocities off by δ are felt as δ|θ̇| beside what accelerates, |θ̇|² and θ̈ of the tree alone.
 template <class S>
-void ConstrainedWorkspace<S>::trust_near(const std::shared_ptr<const ResolvedLoops>& loops, const S* q, const S* v) {
-  find_off(loops, q, v, gone_, slip_);
-  const S fastest = largest_size(v, model_->nv), scale = fastest * fastest + largest_size(x_.data(), model_->nv);
-  trust(maximum(largest(gone_), scale > S(0) ? S(largest(slip_) * fastest / scale) : S(0)));
+void ConstrainedWorkspace<S>::trust_near(const Asked& asked) {
+  find_off(loops_, asked.q, asked.v, asked.rates, gone_, slip_);
+  const S fastest = largest_size(asked.v, model_->nv), scale = fastest * fastest + largest_size(x_.data(), model_->nv);
+  trust(largest(gone_), scale > S(0) ? S(largest(slip_) * fastest / scale) : S(0));
 }
 
 template <class S>
-void ConstrainedWorkspace<S>::find_off(const std::shared_ptr<const ResolvedLoops>& loops, const S* q, const S* v, std::vector<S>& positions, std::vector<S>& velocities) {
+void ConstrainedWorkspace<S>::find_off(const std::shared_ptr<const ResolvedLoops>& loops, const S* q, const S* v, const S* rates, std::vector<S>& positions, std::vector<S>& velocities) {
   using std::abs;
   rows_.find(*model_, *loops, q, buffers_);
   positions.assign(loops->rows, S(0)), velocities.assign(v ? loops->rows : 0, S(0));
   loop_residuals(*model_, *loops, q, buffers_, positions.data());
   for (int r = 0; r < loops->rows; ++r) {
-    S size = S(0);
-    for (const auto& e : rows_.entries[r]) size = maximum(size, e.size);
-    positions[r] = size > S(0) ? S(abs(positions[r]) / size) : S(0);
-    if (v) velocities[r] = size > S(0) ? S(abs(rows_.product(r, v)) / size) : S(0);
+    const S size = size_of(r);
+    positions[r] = size > S(0) && loops->of_positions[r] ? S(abs(positions[r]) / size) : S(0);
+    if (v) velocities[r] = size > S(0) ? S(abs(rows_.product(r, v) - (rates ? rates[r] : S(0))) / size) : S(0);
   }
 }
 
+// Newton's steps of one factor from q, as long as each leaves less than half. Where the first does not, it would lead to another branch, and q stays.
 template <class S>
-void ConstrainedWorkspace<S>::take_onto(const std::shared_ptr<const ResolvedLoops>& loops, S* q, S* v, Form form) {
-  set_loops(loops);
-  rank_tolerance_ = least_rank_tolerance<S>();
-  S before = S(0);
-  for (int step = 0; step <= most_steps; ++step) {
-    find_off(loops, q, nullptr, gone_, slip_);
-    const S off = largest(gone_);
-    if (!(off <= S(reach_of_steps))) refuse_rows(gone_, off, "a state has left its loops, off are rows");
-    if (off <= S(4) * epsilon<S>() || step == most_steps || (step > 0 && !(S(2) * off <= before))) break;
-    before = off;
-    trust(off);
-    kinematics(*model_, q, blocks_);
-    blocks_.form = form;
-    articulated_inertia_tip_to_base(tree_, blocks_);
-    if (blocks_.faint().body >= 0) throw_faint_hinge(tree_, blocks_.faint());
-    target_.assign(loops->rows, S(0));
-    loop_residuals(*model_, *loops, q, buffers_, target_.data());
-    factor();
+bool ConstrainedWorkspace<S>::close(S* q) {
+  using std::abs;
+  const auto off = [&](const S* at) {  // to target_, and the largest, in units of the rows
+    S most = S(0);
+    target_.assign(loops_->rows, S(0));
+    loop_residuals(*model_, *loops_, at, buffers_, target_.data());
+    for (int r = 0; r < loops_->rows; ++r) {
+      if (!loops_->of_positions[r]) target_[r] = S(0);
+      if (size_of(r) > S(0)) most = maximum(most, S(abs(target_[r]) / size_of(r)));
+    }
+    return most;
+  };
+  S left = off(q);
+  moved_.resize(model_->nq);
+  for (int step = 0; step < most_steps && left > S(0); ++step) {
     x_.assign(model_->nv, S(0));
     meet(target_.data(), false);
-    moved_.resize(model_->nq);
     move_configuration(*model_, q, x_.data(), moved_.data());
+    const S now = off(moved_.data());
+    if (!(S(2) * now < left)) return step > 0 || left <= S(4) * epsilon<S>();
+    left = now;
     std::copy_n(moved_.data(), model_->nq, q);
   }
-  find_off(loops, q, v, gone_, slip_);
-  const S fastest = largest_size(v, model_->nv);
-  trust(maximum(largest(gone_), fastest > S(0) ? S(largest(slip_) / fastest) : S(0)));
-  project(loops, q, v, nullptr, form);
-  std::copy_n(x_.data(), model_->nv, v);
+  return true;
+}
+
+template <class S>
+void ConstrainedWorkspace<S>::bring(const std::shared_ptr<const ResolvedLoops>& loops, S* q, S* v, const S* rates, Form form) {
+  set_loops(loops);
+  const int nv = model_->nv, rows = loops->rows;
+  find_off(loops, q, v, rates, gone_, slip_);
+  const S fastest = largest_size(v, nv), off = largest(gone_), slip = largest(slip_);
+  if (!(off > S(4) * epsilon<S>()) && !(slip > S(4) * epsilon<S>() * fastest)) return;  // nothing is off, or nothing is a number
+  place(q, form);
+  articulated_inertia_tip_to_base(tree_, blocks_);
+  if (blocks_.faint().body >= 0) throw_faint_hinge(tree_, blocks_.faint());
+  rank_tolerance_ = least_rank_tolerance<S>();
+  factor();
+  if (!close(q)) {
+    trust(off, fastest > S(0) ? S(slip / fastest) : S(0));
+    rows_.find(*model_, *loops, q, buffers_);
+    factor();
+    close(q);
+  }
+  rows_.find(*model_, *loops, q, buffers_);
+  x_.assign(v, v + nv), target_.assign(rows, S(0));
+  for (int r = 0; rates && r < rows; ++r) target_[r] = -rates[r];
+  for (int time = 0; time < 3; ++time) meet(target_.data(), false);
+  std::copy_n(x_.data(), nv, v);
+}
+
+template <class S>
+void ConstrainedWorkspace<S>::take_onto(const std::shared_ptr<const ResolvedLoops>& loops, S* q, S* v, const S* rates, Form form) {
+  bring(loops, q, v, rates, form);
+  find_off(loops, q, nullptr, nullptr, gone_, slip_);
+  if (const S off = largest(gone_); !(off <= S(reach_of_steps))) refuse_rows(gone_, off, "a state has left its loops, off are rows");
 }
 
 template <class S>
@@ -129,12 +166,15 @@ void ConstrainedWorkspace<S>::add_forces(int first, int end, S* out) const {
 }
 
 #define PYCRAFT_INSTANTIATE(S)                                                                                                                              \
+  template S ConstrainedWorkspace<S>::size_of(int) const;                                                                                                   \
   template S ConstrainedWorkspace<S>::largest(const std::vector<S>&);                                                                                       \
   template void ConstrainedWorkspace<S>::project(const std::shared_ptr<const ResolvedLoops>&, const S*, const S*, const S*, Form);                          \
-  template void ConstrainedWorkspace<S>::trust(const S&);                                                                                                   \
-  template void ConstrainedWorkspace<S>::trust_near(const std::shared_ptr<const ResolvedLoops>&, const S*, const S*);                                       \
-  template void ConstrainedWorkspace<S>::find_off(const std::shared_ptr<const ResolvedLoops>&, const S*, const S*, std::vector<S>&, std::vector<S>&);       \
-  template void ConstrainedWorkspace<S>::take_onto(const std::shared_ptr<const ResolvedLoops>&, S*, S*, Form);                                              \
+  template void ConstrainedWorkspace<S>::trust(const S&, const S&);                                                                                         \
+  template void ConstrainedWorkspace<S>::trust_near(const Asked&);                                                                                          \
+  template void ConstrainedWorkspace<S>::find_off(const std::shared_ptr<const ResolvedLoops>&, const S*, const S*, const S*, std::vector<S>&, std::vector<S>&); \
+  template bool ConstrainedWorkspace<S>::close(S*);                                                                                                         \
+  template void ConstrainedWorkspace<S>::bring(const std::shared_ptr<const ResolvedLoops>&, S*, S*, const S*, Form);                                        \
+  template void ConstrainedWorkspace<S>::take_onto(const std::shared_ptr<const ResolvedLoops>&, S*, S*, const S*, Form);                                    \
   template void ConstrainedWorkspace<S>::add_forces(int, int, S*) const;
 PYCRAFT_FOR_EACH_SCALAR_TO_QUAD(PYCRAFT_INSTANTIATE)
 #undef PYCRAFT_INSTANTIATE

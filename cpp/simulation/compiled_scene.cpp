@@ -234,6 +234,7 @@ void CompiledScene<S>::set_step(const S& h) {
   for (const auto& e : forces_.effects())
     for (const HingeTerm& term : e->declared.hinges) inertia_[term.coordinate] += h * (S(term.damping) + h * S(term.stiffness));
   solver_->add_to_hinges(inertia_.data());
+  if (loops_) loops_->add_to_hinges(inertia_.data());
 }
 
 // The work of an impulse is that of what acted, p - C Δv, at the mean of the velocities before and after.

@@ -125,7 +125,7 @@ class CompiledScene {
   static void prescribe(CompiledScene& s, Active<S>* e) { s.forces_.prescribe(*e, s.forces_.at().t, nullptr, nullptr, s.motion_.data()); }
   static void accelerate(CompiledScene& s, Active<S>*) { s.finite_ = s.solver_->run(s.forces_.at().q, s.v_, s.u_, s.wrenches_, s.vdot_); }
   static void accelerate_on_loops(CompiledScene& s, Active<S>*) {
-    s.loops_->accelerate(s.forces_.at().q, s.v_, s.u_, {cast<S>(s.gravity_), s.wrenches_}, s.vdot_);
+    s.loops_->accelerate(s.forces_.at().t, s.forces_.at().q, s.v_, s.u_, {cast<S>(s.gravity_), s.wrenches_}, s.motion_.data(), s.needed_.data(), s.vdot_);
     s.finite_ = std::all_of(s.vdot_, s.vdot_ + s.nv_, [](const S& x) { return std::isfinite(to_double(x)); });
   }
   static void accelerate_and_prescribe(CompiledScene& s, Active<S>*) {

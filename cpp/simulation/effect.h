@@ -56,6 +56,7 @@ struct Declaration {
   std::vector<HingeTerm> hinges;
   std::vector<int> prescribed;       // coordinates, all of a subhinge or none
   std::shared_ptr<const KeptLoops> loops;  // rows that accelerations keep to
+  bool of_trees = false;             // what it gives is of all coordinates of a tree: not beside loops
   // ---- energy
   bool potential = false;            // whether it has one
   bool work = false;                 // whether some of its forces have none

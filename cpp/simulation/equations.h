@@ -52,6 +52,8 @@ class Equations {
 
   // After a step to t: what is known by other means than the step.
   virtual void settle(const S&, State&) {}
+  // Whether that changes what later rates depend on.
+  virtual bool settles() const { return false; }
   // Where a step must end after t, infinite: nowhere; what happens to x there, and whether velocities are others then.
   virtual bool stops() const { return false; }
   virtual double next_stop(double) const { return std::numeric_limits<double>::infinity(); }

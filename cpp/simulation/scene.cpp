@@ -48,9 +48,8 @@ void refuse_beside_loops(const std::string& a, const Declaration& keeps, const s
       if (std::find(mine.begin(), mine.end(), loop) != mine.end())
         throw ModelError("effects '" + a + "' and '" + b + "' both keep loop '" + loop + "' of '" + model.name() + "'; disable or remove one of them");
   }
-  if (!other.prescribed.empty())
-    throw ModelError("effect '" + b + "' prescribes '" + model.structure().coordinate_names[other.prescribed[0]] + "', and effect '" + a + "' keeps loops of '" + model.name() +
-                     "': prescribe it by a coupling, model.add_coupling, or drive it by a Servo");
+  if (other.of_trees)
+    throw ModelError("effect '" + b + "' counts the coordinates of the tree, and effect '" + a + "' keeps loops of '" + model.name() + "', which leave fewer: disable or remove one of them");
   if (other.impulse_period > 0)
     throw ModelError("effect '" + b + "' acts by impulses on the coordinates of the tree, and effect '" + a + "' keeps loops of '" + model.name() + "': disable or remove one of them");
 }

@@ -4,7 +4,8 @@
 //
 // What controllers hold from one sample to the next is part of y and has no rate. Works are integrals beside the motion: they are kept in units of
 // 2¹⁰⁰ J, which no tolerance sees and which costs no bit, so that no step is chosen for their sake. Prescribed coordinates are where their motion
-// says at every evaluation, whatever x says; in x they are set to it after each step. Likewise states are taken onto the loops that are kept.
+// says at every evaluation, whatever x says; in x they are set to it after each step. Likewise states are taken onto the loops that are kept, at every
+// evaluation as far as that is sure.
 //
 // Kind: which equations they are (simulation/equations.h). The others than explicit ones: scene_steps.h, scene_momenta.h, scene_linearized.h.
 #pragma once
@@ -43,6 +44,7 @@ class SceneEquations : public Kind<S> {
     for (double y : scene_.effects().own_states()) x.push_back(S(y));
     if (own) std::copy_n(own, own_, x.data() + nq() + nv());
     x.insert(x.end(), works_, S(0));
+    prescribe(t, x);
     if (scene_.loops()) scene_.loops()->check_start(x.data(), x.data() + nq());
     settle(t, x);
     if (stops()) scene_.effects().sample(t, own == nullptr, x.data(), x.data() + nq(), x.data() + nq() + nv());
@@ -51,6 +53,7 @@ class SceneEquations : public Kind<S> {
 
   void evaluate(const S& t, const S* q, const S* v, const S* rest, S* vdot, S* rest_rate) override {
     if ((++evaluations & 63) == 0) check_interrupt();
+    const OnLoops on_loops(scene_.loops());
     place(t, q, v);
     if (works_ > 0)
       scene_.accelerations_and_powers(t, this->at_q_, this->at_v_, rest, vdot, rest_rate + own_);
@@ -69,9 +72,10 @@ class SceneEquations : public Kind<S> {
   }
 
   void settle(const S& t, State& x) override {
-    if (!scene_.prescribed().empty()) scene_.effects().prescribe(t, x.data(), x.data() + nq(), nullptr);
-    if (scene_.loops()) scene_.loops()->take_onto(x.data(), x.data() + nq());
+    prescribe(t, x);
+    if (settles()) scene_.loops()->take_onto(t, x.data(), x.data() + nq());
   }
+  bool settles() const override { return scene_.loops() && scene_.loops()->settles(); }
   bool stops() const override { return std::isfinite(next_stop(0)); }
   double next_stop(double t) const override { return scene_.effects().next_stop(t); }
   bool jumps() const override { return scene_.gives_impulses(); }
@@ -92,6 +96,17 @@ class SceneEquations : public Kind<S> {
   std::string name_of(int i) const override;
 
  private:
+  void prescribe(const S& t, State& x) {
+    if (!scene_.prescribed().empty()) scene_.effects().prescribe(t, x.data(), x.data() + nq(), nullptr);
+  }
+  struct OnLoops {  // while a state of a step is worked at
+    explicit OnLoops(SceneLoops<S>* of) : loops(of) { mean(true); }
+    ~OnLoops() { mean(false); }
+    void mean(bool meant) const {
+      if (loops) loops->mean_on_loops(meant);
+    }
+    SceneLoops<S>* loops;
+  };
   struct InTurn : StatesInTurn {
     InTurn(SceneEquations& of, Stages<S>& given) : equations(of), stages(given) {}
     PreparedLinks* ask() override { return stages.next() ? equations.ask(stages.time(), stages.at(), stages.rate()) : nullptr; }
@@ -114,9 +129,10 @@ class SceneEquations : public Kind<S> {
   // Where accelerations are asked for.
   void place(const S& t, const S* q, const S* v) {
     this->at_q_ = q, this->at_v_ = v;
-    if (scene_.prescribed().empty()) return;
+    if (scene_.prescribed().empty() && !settles()) return;
     std::copy_n(q, nq(), q_.data()), std::copy_n(v, nv(), v_.data());
-    scene_.effects().prescribe(t, q_.data(), v_.data(), nullptr);
+    if (!scene_.prescribed().empty()) scene_.effects().prescribe(t, q_.data(), v_.data(), nullptr);
+    if (settles()) scene_.loops()->bring(q_.data(), v_.data());
     this->at_q_ = q_.data(), this->at_v_ = v_.data();
   }
   // The rates of what follows velocities, powers there.

@@ -1,4 +1,8 @@
-// Accelerations of a scene on the loops that its effects keep, and states taken onto them.
+// Accelerations of a scene on the loops that its effects keep, and states taken onto them:
+//
+//   (ℳ + J) θ̈ + 𝒞 = T + Q*λ,   Q θ̈ + Q̇θ̇ = 0,   θ̈(j) = motion(j) of every prescribed coordinate
+//
+// What loops and prescribed motion ask of one motion, differently, is refused by the names of rows.
 #pragma once
 
 #include <memory>
@@ -7,6 +11,7 @@
 #include <vector>
 
 #include "dynamics/constrained_dynamics.h"
+#include "model/checks.h"
 #include "runtime/errors.h"
 #include "simulation/scene_forces.h"
 
@@ -16,32 +21,56 @@ template <class S>
 class SceneLoops {
  public:
   SceneLoops(const Multibody& model, const HingeTerms& terms, const Solving& how, const std::vector<std::unique_ptr<Active<S>>>& effects)
-      : how_(how), workspace_(model, terms), zeros_(model.nv(), S(0)) {
+      : how_(how), workspace_(model, free_terms(terms)), zeros_(model.nv(), S(0)), load_(zeros_) {
     auto loops = std::make_shared<ResolvedLoops>();
     for (const auto& e : effects) {
       first_.push_back(loops->rows);
       if (e->declared.loops) take(*e->declared.loops, *loops);
     }
     first_.push_back(loops->rows);
+    const std::vector<std::string> names = model.structure().coordinate_names;
+    for (int j = 0; j < model.nv(); ++j)
+      if (terms.is_prescribed(j)) hold(j, names[j], *loops);
+    driven_.assign(loops->rows, S(0)), rates_ = driven_;
     loops_ = std::move(loops);
   }
 
-  // q, v, tau (null: none), what acts on bodies: θ̈.
-  void accelerate(const S* q, const S* v, const S* tau, const Applied<S>& applied, S* vdot) {
-    typename ConstrainedWorkspace<S>::Asked asked;
-    asked.q = q, asked.v = v ? v : zeros_.data(), asked.tau = tau ? tau : zeros_.data();
-    asked.applied = &applied, asked.form = how_.form, asked.refinement = how_.refinement, asked.near = true;
+  // q, v, tau (null: none), what acts on bodies, θ̈ of prescribed coordinates by coordinate: θ̈ of all, and what their motion needs beside tau.
+  void accelerate(const S& t, const S* q, const S* v, const S* tau, const Applied<S>& applied, const S* motion, S* needed, S* vdot) {
+    if (!v) v = zeros_.data();
+    std::copy_n(tau ? tau : zeros_.data(), zeros_.size(), load_.data());
+    set_rates(v);
+    for (size_t i = 0; i < held_.size(); ++i) driven_[first_.back() + i] = motion[held_[i]];
+    typename ConstrainedWorkspace<S>::Asked asked{q, v, load_.data()};
+    asked.applied = &applied, asked.form = how_.form, asked.refinement = how_.refinement, asked.near = near_;
+    asked.driven = driven_.data(), asked.rates = rates_.data();
     if (drawn_) asked.gains = &gains_;
-    workspace_.accelerate(loops_, asked);
+    telling_time(t, [&] { workspace_.accelerate(loops_, asked); });
     std::copy_n(workspace_.result().data(), zeros_.size(), vdot);
+    for (size_t i = 0; i < held_.size(); ++i) needed[held_[i]] = workspace_.multipliers()[first_.back() + i], vdot[held_[i]] = motion[held_[i]];
   }
+  void add_to_hinges(const S* inertia) { workspace_.add_to_hinges(inertia); }
   // Q*λ of an effect's loops at the last state, added.
   void add_forces(int effect, S* out) const { workspace_.add_forces(first_[effect], first_[effect + 1], out); }
-  void take_onto(S* q, S* v) { workspace_.take_onto(loops_, q, v, how_.form); }
+  // Whether states are taken onto the rows: not where all of them are drawn there by Baumgarte's gains.
+  bool settles() const { return kept_; }
+  void take_onto(const S& t, S* q, S* v) {
+    set_rates(v);
+    telling_time(t, [&] { workspace_.take_onto(loops_, q, v, rates_.data(), how_.form); });
+  }
+  // A state of a step, taken there as far as that is sure: accelerations there are a smooth function of the states about the loops. Off them they are
+  // none near singular states, where what a state is off by is divided by the square of the way to those.
+  void bring(S* q, S* v) {
+    set_rates(v);
+    workspace_.bring(loops_, q, v, rates_.data(), how_.form);
+  }
+  // Whether states are meant to be on the loops, as those of steps: what they are off by makes no directions.
+  void mean_on_loops(bool meant) { near_ = meant && settles(); }
   // ModelError that names the row where a state is off the loops, or moves off them: by more than steps are off.
   void check_start(const S* q, const S* v) {
     std::vector<S> positions, velocities;
-    workspace_.find_off(loops_, q, v, positions, velocities);
+    set_rates(v);
+    workspace_.find_off(loops_, q, v, rates_.data(), positions, velocities);
     refuse(positions, "is off", "its rows are kept from a state that is on them");
     S fastest = S(0);
     for (size_t i = 0; i < zeros_.size(); ++i) fastest = maximum(fastest, S(v[i] < S(0) ? -v[i] : v[i]));
@@ -52,6 +81,31 @@ class SceneLoops {
  private:
   static constexpr double far = 1e-6;  // as mobility has it: larger residuals are no state on the loops
 
+  template <class F>
+  static void telling_time(const S& t, F f) {
+    try {
+      f();
+    } catch (const EvaluationError& e) {
+      throw EvaluationError(e.what() + (", at t = " + short_number(to_double(t)) + " s"));
+    }
+  }
+  static HingeTerms free_terms(HingeTerms terms) {
+    terms.prescribed.clear();
+    return terms;
+  }
+  // A prescribed coordinate is a row more, θ̈ as its motion says, and its multiplier what that needs.
+  void hold(int j, const std::string& name, ResolvedLoops& to) {
+    auto row = std::make_shared<Loop>();
+    row->name = "prescribed: " + name;
+    row->coupling.coordinates.push_back({name, 0, {0.0, 1.0}});
+    to.names.push_back(row->name), to.of_positions.push_back(false);
+    to.loops.push_back({row, to.rows++, 1, {}, {0}, {j}});
+    gains_.resize(to.rows);
+    held_.push_back(j);
+  }
+  void set_rates(const S* v) {
+    for (size_t i = 0; i < held_.size(); ++i) rates_[first_.back() + i] = v[held_[i]];
+  }
   void take(const KeptLoops& kept, ResolvedLoops& to) {
     const std::shared_ptr<const ResolvedLoops> all = kept.set->resolved();
     whole_.push_back(all);
@@ -63,7 +117,7 @@ class SceneLoops {
         for (int r = loop.first_row; r < loop.first_row + loop.rows; ++r) to.names.push_back(all->names[r]), to.of_positions.push_back(all->of_positions[r]);
         to.rows += loop.rows;
         gains_.resize(to.rows, {kept.alpha, kept.beta});
-        drawn_ |= kept.alpha != 0 || kept.beta != 0;
+        (kept.alpha != 0 || kept.beta != 0 ? drawn_ : kept_) = true;
         to.loops.push_back(std::move(own));
       }
   }
@@ -79,8 +133,9 @@ class SceneLoops {
   std::vector<std::shared_ptr<const ResolvedLoops>> whole_;  // poses that paths point to
   std::vector<int> first_;                                   // rows of effects
   std::vector<Baumgarte> gains_;
-  bool drawn_ = false;
-  std::vector<S> zeros_;
+  std::vector<int> held_;                                    // prescribed coordinates, of rows after those of effects
+  bool drawn_ = false, kept_ = false, near_ = false;         // drawn_: some rows are, by gains; kept_: some are not
+  std::vector<S> zeros_, load_, driven_, rates_;
 };
 
 }  // namespace pycraft

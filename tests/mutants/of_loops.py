@@ -21,15 +21,16 @@ CHANGES = {
             "maximum(sizes_[row], S((rows_.product_size(row, x_.data()) + bias_[row]) / unit_[row]))",
             "S((rows_.product_size(row, x_.data()) + bias_[row]) / unit_[row])",
         ),
+        ("what implicit steps add is not in the residual", "generalized_[j] += added_[j] * x[j]", "static_cast<void>(x)"),
     ],
     "cpp/dynamics/constrained_dynamics.h": [
         ("in quad the rounding of states is a direction", "S(64 * epsilon<double>())", "S(0)"),
     ],
     "cpp/dynamics/states_on_loops.cpp": [
         ("positions are left where steps have brought them", "std::copy_n(moved_.data(), model_->nq, q);", ";", STATEMENT),
-        ("velocities are left where steps have brought them", "std::copy_n(x_.data(), model_->nv, v);", ";", STATEMENT),
-        ("a state within a step is trusted to rounding", "S(S(of_off) * sqrt(off))", "S(0)"),
-        ("a state that is far off is on its loops", "if (!(off <= S(reach_of_steps)))", "if (!(off <= S(1e300)))"),
+        ("velocities are left where steps have brought them", "std::copy_n(x_.data(), nv, v);", ";", STATEMENT),
+        ("prescribed velocities are brought to rest", "target_[r] = -rates[r];", ";", STATEMENT),
+        ("a state that is far off is on its loops", "!(off <= S(reach_of_steps))", "!(off <= S(1e300))"),
     ],
     "cpp/simulation/scene_loops.h": [
         (
@@ -37,6 +38,11 @@ CHANGES = {
             "gains_.resize(to.rows, {kept.alpha, kept.beta});",
             "gains_.assign(to.rows, {kept.alpha, kept.beta});",
             STATEMENT,
+        ),
+        (
+            "loops are not asked for what prescribed motion says",
+            "driven_[first_.back() + i] = motion[held_[i]];",
+            "driven_[first_.back() + i] = S(0);",
         ),
         ("a start off the loops is taken", "if (!(to_double(off[r]) <= far))", "if (to_double(off[r]) > 1e300)"),
     ],

@@ -5,6 +5,8 @@ STATEMENT = "statement"
 CHANGES = {
     "cpp/simulation/scene_equations.h": [
         ("works are seen by tolerances", "std::ldexp(1.0, 100)", "1.0"),
+        ("states within steps are off the loops", "if (settles()) scene_.loops()->bring(q_.data(), v_.data());", ";", STATEMENT),
+        ("what is taken onto the loops goes on as it was", "scene_.loops() && scene_.loops()->settles()", "scene_.loops() != nullptr"),
         ("prescribed coordinates drift", "scene_.effects().prescribe(t, x.data(), x.data() + nq(), nullptr);", ";", STATEMENT),
         (
             "a controller is not asked at the start",

@@ -60,7 +60,7 @@ class BoundFixman : public BoundEffect<S> {
 
 Declaration Fixman::declaration() const {
   Declaration d;
-  d.potential = true;
+  d.potential = d.of_trees = true;
   d.coordinates.resize(model.nv());
   std::iota(d.coordinates.begin(), d.coordinates.end(), 0);
   return d;

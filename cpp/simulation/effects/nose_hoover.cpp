@@ -61,7 +61,7 @@ NoseHoover::NoseHoover(const Multibody& of, const Names& hinges, double energy, 
 
 Declaration NoseHoover::declaration() const {
   Declaration d;
-  d.velocities = d.only_in_motion = d.potential = true;
+  d.velocities = d.only_in_motion = d.potential = d.of_trees = true;
   d.coordinates = coordinates;
   d.states.assign(2 * static_cast<size_t>(chain), 0.0);
   return d;

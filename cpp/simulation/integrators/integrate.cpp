@@ -101,7 +101,7 @@ class Run {
       look_for_events();
     else
       sample_to(t_, x_);
-    if (options_.normalise) stepper_.forget();
+    if (options_.normalise || equations_.settles()) stepper_.forget();
     watcher_.step(t_, x_);
     tell_progress();
   }

@@ -58,7 +58,7 @@ void check_pairing(const Scene& scene, Precision precision, Integrator integrato
   if (record.way == Way::with_derivatives && precision != Precision::double_)
     throw EvaluationError(name + " solves by derivatives of accelerations, which are in double precision, and the scene computes in '" + precision_name(precision) +
                           "': take precision='double', or integrator 'fehlberg78'");
-  if (record.way != Way::at_states) refuse_loops(scene, name, record.way == Way::of_steps ? "takes implicit steps" : record.way == Way::by_momenta ? "steps by momenta" : "solves by derivatives of the tree's accelerations");
+  if (record.way == Way::by_momenta || record.way == Way::with_derivatives) refuse_loops(scene, name, record.way == Way::by_momenta ? "steps by momenta" : "solves by derivatives of the tree's accelerations");
   if (record.way == Way::at_states || record.way == Way::by_momenta) refuse_implicit_effects(scene, name);
   if (record.way != Way::by_momenta) return;
   if (const SceneEntry* e = effect_with(scene, [](const Declaration& d) { return !d.prescribed.empty(); }))

@@ -6,7 +6,7 @@
 //   VariationalEquations   variational2, variational4                                       scene_momenta.h
 //
 // so that no other pair compiles. What a scene's effects make of it is known when it runs: effects that act in implicit steps fit integrators that
-// take such steps or solve by derivatives, prescribed motion fits all but variational ones, loops those at states. Else an EvaluationError names integrator and effect.
+// take such steps or solve by derivatives, prescribed motion fits all but variational ones, loops those that need accelerations alone. Else an EvaluationError names integrator and effect.
 #pragma once
 
 #include <concepts>

@@ -16,18 +16,18 @@ METHODS = ("augment",)
 class Loop(Effect):
     """Loops of the model (`add_loop`, `add_coupling`, `add_rolling`, ...) are kept: without it a scene is of the tree alone.
 
-    Tree augmentation: (ℳ + J) v̇ + 𝒞 = τ + Q*λ with Q v̇ + Q̇v = 0 at every evaluation, and after each step the state is taken back onto the
-    loops, positions by the way that is shortest in kinetic energy, velocities by an impulse of the loops: nothing drifts. The forces Q*λ do
-    no work; of redundant rows λ is the least.
+    Tree augmentation: (ℳ + J) v̇ + 𝒞 = τ + Q*λ with Q v̇ + Q̇v = 0 at every evaluation. Before it, and after each step, the state is taken
+    back onto the loops, positions by the way that is shortest in kinetic energy, velocities by an impulse of the loops: nothing drifts, and
+    singular states are passed on the velocity's branch. The forces Q*λ do no work; of redundant rows λ is the least. Prescribed
+    coordinates are rows beside those of the loops.
 
-    A start off the loops is an error; `model.assemble(q, v)` has states on them. What a state within a step is off them by counts: of
-    the rows' singular values only those above its root mean something, so that singular states are passed on the velocity's branch.
+    A start off the loops is an error; `model.assemble(q, v)` has states on them.
 
     Parameters
     ----------
     loops : name of a loop, a loop, or a list of them; None: all that the model has
     method : {"augment"}
-    alpha, beta : 1/s, Baumgarte's r̈ + 2α ṙ + β² r = 0 besides
+    alpha, beta : 1/s, Baumgarte's r̈ + 2α ṙ + β² r = 0 of these loops; where all have it, no state is taken back
     """
 
     loops: Any = None
