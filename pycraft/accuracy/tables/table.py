@@ -144,8 +144,8 @@ def accuracy(
     >>> import pycraft as pc
     >>> from pycraft.accuracy.tables.table import accuracy
     >>> table = accuracy(pc.chain(5, seed=1), precisions=["double", "quad"], methods=["articulated"], forms=["fast"], seconds=0.001)
-    >>> table.fastest(1e-10)["way"], table.fastest(1e-25)["precision"]
-    ('fast', 'quad')
+    >>> table.fastest(1e-10)["precision"], table.fastest(1e-25)["precision"]
+    ('double', 'quad')
     """
     checked_model(model, "accuracy")
     seconds = checked_seconds(seconds)
