@@ -10,11 +10,9 @@
 
 #include "algebra/trees/mixed_blocks.h"
 #include "algebra/trees/tree_values.h"
-#include "model/configuration.h"
-#include "numerics/tangent.h"
 #include "operators/embedded_operators.h"
 #include "operators/grouped_values.h"
-#include "recursions/loop_rows.h"
+#include "recursions/loop_tangents.h"
 
 namespace pycraft {
 
@@ -192,32 +190,11 @@ class EmbeddedValues final : public TreeValues<MixedBlocks<RigidBlocks<S>>> {
     put_dependent(g, moved, tangent);
     return tangent;
   }
-  // ∂Q along velocities w of the tree: the rows' own code with derivatives carried along; of a user's function its second derivatives.
+  // ∂Q along velocities w of the tree.
   std::vector<S> jacobian_rate(const std::vector<S>& w) const {
-    using T = Tangent<S, 1>;
     const size_t nv = compiled_->nv;
-    std::vector<S> rate(size_t(loops_->rows) * nv, S(0)), q_dot(q_.size());
-    configuration_rate(*compiled_, q_.data(), w.data(), q_dot.data());
-    std::vector<T> q(q_.begin(), q_.end());
-    for (size_t i = 0; i < q.size(); ++i) q[i].d[0] = q_dot[i];
-    ResolvedLoops by_rule;
-    by_rule.rows = loops_->rows;
-    for (const ResolvedLoop& loop : loops_->loops) {
-      const Coupling& of = loop.loop->coupling;
-      if (!of.function) {
-        by_rule.loops.push_back(loop);
-        continue;
-      }
-      const size_t n = loop.v.size();
-      std::vector<double> at(n), gradient(n), second(n * n);
-      for (size_t i = 0; i < n; ++i) at[i] = to_double(q_[loop.q[i]]);
-      double r = 0;
-      of.function(at.data(), &r, gradient.data(), second.data());
-      for (size_t i = 0; i < n; ++i)
-        for (size_t j = 0; j < n; ++j) rate[loop.first_row * nv + loop.v[i]] += S(second[i * n + j]) * w[loop.v[j]];
-    }
-    LoopBuffers<T> buffers;
-    loop_jacobian(broadcast<T>(*compiled_), by_rule, q.data(), buffers, [&](int row, int i, const T& number) { rate[row * nv + i] = number.d[0]; });
+    std::vector<S> rate(size_t(loops_->rows) * nv, S(0));
+    LoopTangents<S>(*compiled_, *loops_, q_, w).jacobian([&](int row, int i, const S& entry) { rate[row * nv + i] += entry; });
     return rate;
   }
   // Of the tree, where only independent coordinate i moves.

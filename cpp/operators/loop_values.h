@@ -5,10 +5,8 @@
 #include <vector>
 
 #include "algebra/trees/tree_values.h"
-#include "model/configuration.h"
-#include "numerics/tangent.h"
 #include "operators/loop_operators.h"
-#include "recursions/loop_rows.h"
+#include "recursions/loop_tangents.h"
 #include "rigid/rigid_blocks.h"
 
 namespace pycraft {
@@ -54,20 +52,10 @@ class LoopValues final : public TreeValues<RigidBlocks<S>> {
     std::fill_n(out, source_.rows_of(k).size() * (jacobian ? this->tree_.dof[k] : columns_[k]), S(0));
     const ResolvedLoops own = loops_of(k);
     if (id == loop_letters::Q || id == loop_letters::A) return put(own, *compiled_, q_, jacobian, k, out, [](const S& x) { return x; });
-    using T = Tangent<S, 1>;
     const std::vector<S> w = velocity(std::get<OfDirection>(symbol.arguments));
-    std::vector<S> rate(q_.size());
-    configuration_rate(*compiled_, q_.data(), w.data(), rate.data());
-    std::vector<T> q(q_.begin(), q_.end());
-    for (size_t i = 0; i < q.size(); ++i) q[i].d[0] = rate[i];
-    ResolvedLoops by_rule;
-    by_rule.rows = own.rows;
-    for (const ResolvedLoop& loop : own.loops)
-      if (!loop.loop->coupling.function)
-        by_rule.loops.push_back(loop);
-      else if (jacobian)
-        second_derivatives(loop, w, k, out);
-    put(by_rule, broadcast<T>(*compiled_), q, jacobian, k, out, [](const T& x) { return x.d[0]; });
+    const LoopTangents<S> moved(*compiled_, own, q_, w);
+    if (jacobian) return moved.jacobian([&](int row, int i, const S& entry) { put_entry(row, i, k, entry, out); });
+    put(moved.by_rule, moved.model, moved.q, jacobian, k, out, [](const typename LoopTangents<S>::T& x) { return x.d[0]; });
   }
 
  protected:
@@ -94,9 +82,7 @@ class LoopValues final : public TreeValues<RigidBlocks<S>> {
   void put(const ResolvedLoops& loops, const CompiledModel<T>& model, const std::vector<T>& q, bool jacobian, int k, S* out, F take) const {
     LoopBuffers<T> buffers;
     if (jacobian)
-      return loop_jacobian(model, loops, q.data(), buffers, [&](int row, int i, const T& number) {
-        if (body_of_[i] == k) out[row_at(k, row) * this->tree_.dof[k] + i - this->tree_.dof_offset[k]] += take(number);
-      });
+      return loop_jacobian(model, loops, q.data(), buffers, [&](int row, int i, const T& number) { put_entry(row, i, k, take(number), out); });
     loop_rows_on_ends(model, loops, q.data(), buffers, [&](const ResolvedLoop& loop, int end, int row, const Vector6<T>& g) {
       const LoopOperators::Ends& ends = source_.ends_of(*loop.loop);
       const int place = end ? ends.b : ends.a;
@@ -104,15 +90,8 @@ class LoopValues final : public TreeValues<RigidBlocks<S>> {
       for (int i = 0; i < 6; ++i) out[row_at(k, row) * columns_[k] + column_of_[place] + i] += take(g[i]);
     });
   }
-  void second_derivatives(const ResolvedLoop& loop, const std::vector<S>& w, int k, S* out) const {
-    const size_t n = loop.v.size();
-    std::vector<double> at(n), gradient(n), second(n * n);
-    for (size_t i = 0; i < n; ++i) at[i] = to_double(q_[loop.q[i]]);
-    double r = 0;
-    loop.loop->coupling.function(at.data(), &r, gradient.data(), second.data());
-    for (size_t i = 0; i < n; ++i)
-      for (size_t j = 0; body_of_[loop.v[i]] == k && j < n; ++j)
-        out[row_at(k, loop.first_row) * this->tree_.dof[k] + loop.v[i] - this->tree_.dof_offset[k]] += S(second[i * n + j]) * w[loop.v[j]];
+  void put_entry(int row, int i, int k, const S& entry, S* out) const {
+    if (body_of_[i] == k) out[row_at(k, row) * this->tree_.dof[k] + i - this->tree_.dof_offset[k]] += entry;
   }
   std::vector<S> velocity(const OfDirection& along) const {
     if (along.time) return v_;

@@ -80,6 +80,7 @@ AREAS = {
     "cpp/dynamics/states_on_loops.cpp": ["scenes/test_kept_loops.py", "scenes/test_steps_on_loops.py"],
     "cpp/simulation/scene_loops.h": ["scenes/test_kept_loops.py", "scenes/test_steps_on_loops.py"],
     "cpp/numerics/rank_factors.h": ["models/test_constrained_dynamics.py"],
+    "cpp/recursions/loop_tangents.h": ["operators/test_loop_operators.py", "operators/test_embedded.py"],
     "cpp/recursions/loop_columns.h": ["models/test_constrained_dynamics.py"],
     "pycraft/dynamics/constrained.py": ["models/test_constrained_dynamics.py"],
     "cpp/dynamics/singular_hinges.h": ["sweeps/test_minimum_norm.py", "sweeps/test_singular_forms.py"],

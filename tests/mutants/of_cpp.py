@@ -158,7 +158,6 @@ CHANGES = {
             "S(-1) * force_to_parent(cast<S>(loop.loop->pair.end_a), force_to_parent(m.X, g))",
             "S(-1) * force_to_parent(cast<S>(loop.loop->pair.end_a), g)",
         ),
-        ("∂Q of functions without their second derivatives", "second_derivatives(loop, w, k, out);", ";", STATEMENT),
     ],
     "cpp/dynamics/rigid_dynamics.cpp": [
         ("minimum norm refined without the added inertia", "r[j] += inertia * x[j];", "(void)inertia;", STATEMENT),

@@ -46,6 +46,9 @@ CHANGES = {
         ),
         ("a start off the loops is taken", "if (!(to_double(off[r]) <= far))", "if (to_double(off[r]) > 1e300)"),
     ],
+    "cpp/recursions/loop_tangents.h": [
+        ("∂Q of functions without their second derivatives", "of_function(loop, put);", ";", STATEMENT),
+    ],
     "cpp/numerics/rank_factors.h": [
         ("multipliers are the least in units of rounding", "unit_[V_.order[i]] * V_.upper(j, i)", "V_.upper(j, i)"),
     ],
