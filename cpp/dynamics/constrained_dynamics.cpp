@@ -25,7 +25,7 @@ void take(const std::vector<S>& from, std::vector<T>& to) {
 template <class S>
 ConstrainedWorkspace<S>::ConstrainedWorkspace(const Multibody& model, const HingeTerms& terms)
     : source_(model), tree_(model.structure()), model_(terms.empty() ? model.compiled<S>() : compile_model<S>(model, terms)), blocks_(tree_), forces_(tree_, model_), z_(tree_.bodies()),
-      alpha_(tree_.bodies()), rank_tolerance_(least_rank_tolerance<S>()), terms_(terms) {
+      alpha_(tree_.bodies()), terms_(terms) {
   for (int k = tree_.bodies() - 1; k >= 0; --k) all_.push_back(k);
 }
 
@@ -85,12 +85,12 @@ void ConstrainedWorkspace<S>::factor() {
                                [&](int k, int i, const S& w) { left += (w / unit) * (w / unit), systems_[g].add_entry(groups_.place[k] + i, w / unit); });
       for (const auto& e : rows_.entries[row]) dense_[e.coordinate] = S(0);
       unit_[row] = unit;
-      if (sqrt(left) > rank_tolerance_)  // the next row takes the place of one that asks nothing here
+      if (sqrt(left) > rank_tolerance<S>())  // the next row takes the place of one that asks nothing here
         scale_[c] = unit, active_[g].push_back(row);
       else
         systems_[g].drop_column();
     }
-    systems_[g].factor(scale_.data(), rank_tolerance_);
+    systems_[g].factor(scale_.data(), rank_tolerance<S>());
   }
 }
 
@@ -187,12 +187,7 @@ void ConstrainedWorkspace<S>::correct(const Asked& asked, const Applied<S>& appl
       rows.add_transposed(lambda.data(), load.data());
       for (size_t j = 0; j < added_.size(); ++j) force[j] += T(added_[j]) * x[j];
       for (int i = 0; i < nv; ++i) r_[i] = static_cast<S>(T(load[i] - force[i]));
-      std::vector<S> kept = x_, start = target_;
-      solve(r_.data(), x_.data());
-      for (int i = 0; i < loops_->rows; ++i) target_[i] = start[i];
-      meet(target_.data(), false);
-      for (int i = 0; i < nv; ++i) x_[i] += kept[i];
-      return;
+      return add_correction();
     }
   }
   if (wider) throw EvaluationError("accelerations on loops in precision 'quad' have no wider residual; ask for residual='same'");
@@ -200,11 +195,16 @@ void ConstrainedWorkspace<S>::correct(const Asked& asked, const Applied<S>& appl
   for (int i = 0; i < nv; ++i) r_[i] = asked.tau[i] - generalized_[i];
   rows_.add_transposed(lambda_.data(), r_.data());
   for (int i = 0; i < loops_->rows; ++i) target_[i] = rows_.product(i, x_.data()) + c_[i];
-  std::vector<S> kept = x_;
+  add_correction();
+}
+
+// Of the residuals r_ and target_.
+template <class S>
+void ConstrainedWorkspace<S>::add_correction() {
+  before_ = x_;
   solve(r_.data(), x_.data());
-  const std::vector<S> start = target_;
-  meet(start.data(), false);
-  for (int i = 0; i < nv; ++i) x_[i] += kept[i];
+  meet(target_.data(), false);
+  for (size_t i = 0; i < x_.size(); ++i) x_[i] += before_[i];
 }
 
 // Whether θ̈ and λ keep both equations, in units of energy: what is off in the rows, and in the equations of motion.
@@ -229,18 +229,18 @@ bool ConstrainedWorkspace<S>::sure(const Asked& asked, const Applied<S>& applied
     if (refuse) refuse_rows(off_, worst, "no sure accelerations, near a singular state or by rounding (take refine='auto', or a wider precision): off are rows");
     return false;
   }
-  std::vector<S> load(nv, S(0)), rest(nv, S(0));
-  find_forces(asked, rest.data(), applied);
+  load_.assign(nv, S(0));
+  find_forces(asked, load_.data(), applied);
   S size = energy_norm(generalized_.data()) + energy_norm(asked.tau);
-  rows_.add_transposed(lambda_.data(), load.data());
-  size += energy_norm(load.data());
+  rows_.add_transposed(lambda_.data(), load_.data());
+  size += energy_norm(load_.data());
   find_forces(asked, x_.data(), applied);
-  for (int i = 0; i < nv; ++i) load[i] += asked.tau[i] - generalized_[i];
-  if (const S left = energy_norm(load.data()); !(left <= certified() * size)) {
+  for (int i = 0; i < nv; ++i) load_[i] += asked.tau[i] - generalized_[i];
+  if (const S left = energy_norm(load_.data()); !(left <= certified() * size)) {
     if (!refuse) return false;
     int most = 0;
     for (int i = 1; i < nv; ++i)
-      if (abs(load[i]) > abs(load[most])) most = i;
+      if (abs(load_[i]) > abs(load_[most])) most = i;
     int k = 0;
     while (k + 1 < model_->bodies && model_->v_offset[k + 1] <= most) ++k;
     throw EvaluationError("no sure accelerations of '" + source_.name() + "': its equations of motion are left off, most at hinge '" + source_.body(k).hinge.name +
@@ -264,7 +264,7 @@ void ConstrainedWorkspace<S>::accelerate(const std::shared_ptr<const ResolvedLoo
   if (blocks_.faint().body >= 0) throw_faint_hinge(tree_, blocks_.faint());
   for (int i = 0; i < nv; ++i) x_[i] -= points_.absorbed[i];
   rows_.find(*model_, *loops, asked.q, buffers_);
-  if (asked.near && std::any_of(x_.begin(), x_.end(), [](const S& x) { return !std::isfinite(to_double(x)); })) return;  // a step was too long: nothing to judge
+  if (std::any_of(x_.begin(), x_.end(), [](const S& x) { return !std::isfinite(to_double(x)); })) return;  // callers say what left its range
   // c, and what it is the sum of
   c_.assign(rows, S(0)), bias_.assign(rows, S(0));
   loop_bias(*model_, *loops, asked.q, asked.v, buffers_, c_.data());
@@ -283,8 +283,6 @@ void ConstrainedWorkspace<S>::accelerate(const std::shared_ptr<const ResolvedLoo
   }
   if (asked.driven)
     for (int r = 0; r < rows; ++r) c_[r] -= asked.driven[r], bias_[r] += abs(asked.driven[r]);
-  rank_tolerance_ = least_rank_tolerance<S>();
-  if (asked.near) trust_near(asked);
   factor();
   meet(c_.data(), true);
   const int steps = asked.refinement.steps == Refinement::automatic ? 5 : asked.refinement.steps;

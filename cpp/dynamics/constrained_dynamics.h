@@ -26,7 +26,7 @@ namespace pycraft {
 // rows, are of one size there. States and models are doubles: in a wider scalar their rounding would make a direction of what has none, as of the
 // redundant row of a spatial linkage.
 template <class S>
-S least_rank_tolerance() {
+S rank_tolerance() {
   using std::sqrt;
   return maximum(S(sqrt(epsilon<S>())), S(64 * epsilon<double>()));
 }
@@ -51,8 +51,7 @@ class ConstrainedWorkspace {
     Form form = Form::fast;
     Refinement refinement;
     const std::vector<Baumgarte>* gains = nullptr;  // of rows; null: none
-    bool near = false;                        // the state is meant to be on the loops: what it is off them by makes no directions
-    const S *driven = nullptr, *rates = nullptr;  // (rows) Q θ̈ + c = driven, and where it is near Q θ̇ = rates; null: zero
+    const S* driven = nullptr;                // (rows) Q θ̈ + c = driven; null: zero
   };
   void accelerate(const std::shared_ptr<const ResolvedLoops>& loops, const Asked& asked);
   // Q v⁺ = 0, v⁺ = v + (ℳ + J)⁻¹ (p + Q*λ)
@@ -80,12 +79,11 @@ class ConstrainedWorkspace {
   void factor();                              // the rows' columns, of the tree's factors
   void meet(const S* target, bool first);     // x += (ℳ + J)⁻¹Q*λ such that Q x + target = 0, and adds λ
   void correct(const Asked& asked, const Applied<S>& applied);
+  void add_correction();
   bool sure(const Asked& asked, const Applied<S>& applied, bool refuse);
   // The most by which what is returned may miss a row or an equation of motion, of the largest number in it.
-  S certified() const { return S(64) * rank_tolerance_; }
-  void trust(const S& off, const S& slip);    // sets the rank's tolerance
-  void trust_near(const Asked& asked);
-  bool close(S* q);
+  static S certified() { return S(64) * rank_tolerance<S>(); }
+  void close(S* q);
   S size_of(int row) const;
   void place(const S* q, Form form);
   void find_forces(const Asked& asked, const S* x, const Applied<S>& applied);  // of the motion θ̈ = x, to generalized_
@@ -108,8 +106,7 @@ class ConstrainedWorkspace {
   std::vector<std::vector<int>> active_;      // of every group: rows of which columns are not rounding
   std::vector<int> all_, loop_of_;            // bodies, tips first; of rows
   std::vector<Vector6<S>> z_, alpha_;
-  std::vector<S> x_, lambda_, c_, unit_, dense_, epsilon_, scratch_, target_, part_, b_, conflict_, scale_, sizes_, off_, r_, delta_, bias_, moved_, gone_, slip_, added_, generalized_;
-  S rank_tolerance_;                          // what is left of a unit column beside the others, and is none
+  std::vector<S> x_, lambda_, c_, unit_, dense_, epsilon_, scratch_, target_, part_, b_, conflict_, scale_, sizes_, off_, r_, delta_, bias_, moved_, gone_, slip_, added_, generalized_, before_, load_;
   const HingeTerms terms_;
   std::unique_ptr<RigidDynamics<Wider<S>>> wider_;
 };

@@ -11,10 +11,6 @@ namespace pycraft {
 
 namespace {
 
-// With r off the positions and s off the velocities, shares of |θ̇|, what is solved for along a direction of size σ is off by r/σ³ and s/σ²: near a
-// singular state, where rows are quadratic in the way to it. Directions where that is more than a thousandth are none.
-constexpr double most_off = 1e-3;
-constexpr double largest_rank_tolerance = 0.1;
 constexpr double reach_of_steps = 1e-4;  // in angles, or lengths of a row's entries: a state that steps leave further off is on other loops
 constexpr int most_steps = 8;
 
@@ -52,7 +48,6 @@ void ConstrainedWorkspace<S>::project(const std::shared_ptr<const ResolvedLoops>
   articulated_inertia_tip_to_base(tree_, blocks_);
   if (blocks_.faint().body >= 0) throw_faint_hinge(tree_, blocks_.faint());
   rows_.find(*model_, *loops, q, buffers_);
-  rank_tolerance_ = least_rank_tolerance<S>();
   factor();
   x_.resize(nv);
   solve(p, x_.data());
@@ -72,21 +67,6 @@ void ConstrainedWorkspace<S>::project(const std::shared_ptr<const ResolvedLoops>
 }
 
 template <class S>
-void ConstrainedWorkspace<S>::trust(const S& off, const S& slip) {
-  using std::cbrt, std::sqrt;
-  const S trusted = maximum(S(cbrt(S(maximum(off, epsilon<S>()) / S(most_off)))), S(sqrt(S(slip / S(most_off)))));
-  rank_tolerance_ = std::min(S(largest_rank_tolerance), maximum(least_rank_tolerance<S>(), trusted));
-}
-
-// Velocities off by δ are felt as δ|θ̇| beside what accelerates, |θ̇|² and θ̈ of the tree alone.
-template <class S>
-void ConstrainedWorkspace<S>::trust_near(const Asked& asked) {
-  find_off(loops_, asked.q, asked.v, asked.rates, gone_, slip_);
-  const S fastest = largest_size(asked.v, model_->nv), scale = fastest * fastest + largest_size(x_.data(), model_->nv);
-  trust(largest(gone_), scale > S(0) ? S(largest(slip_) * fastest / scale) : S(0));
-}
-
-template <class S>
 void ConstrainedWorkspace<S>::find_off(const std::shared_ptr<const ResolvedLoops>& loops, const S* q, const S* v, const S* rates, std::vector<S>& positions, std::vector<S>& velocities) {
   using std::abs;
   rows_.find(*model_, *loops, q, buffers_);
@@ -101,7 +81,7 @@ void ConstrainedWorkspace<S>::find_off(const std::shared_ptr<const ResolvedLoops
 
 // Newton's steps of one factor from q, as long as each leaves less than half. Where the first does not, it would lead to another branch, and q stays.
 template <class S>
-bool ConstrainedWorkspace<S>::close(S* q) {
+void ConstrainedWorkspace<S>::close(S* q) {
   using std::abs;
   const auto off = [&](const S* at) {  // to target_, and the largest, in units of the rows
     S most = S(0);
@@ -120,11 +100,10 @@ bool ConstrainedWorkspace<S>::close(S* q) {
     meet(target_.data(), false);
     move_configuration(*model_, q, x_.data(), moved_.data());
     const S now = off(moved_.data());
-    if (!(S(2) * now < left)) return step > 0 || left <= S(4) * epsilon<S>();
+    if (!(S(2) * now < left)) return;
     left = now;
     std::copy_n(moved_.data(), model_->nq, q);
   }
-  return true;
 }
 
 template <class S>
@@ -137,14 +116,8 @@ void ConstrainedWorkspace<S>::bring(const std::shared_ptr<const ResolvedLoops>& 
   place(q, form);
   articulated_inertia_tip_to_base(tree_, blocks_);
   if (blocks_.faint().body >= 0) throw_faint_hinge(tree_, blocks_.faint());
-  rank_tolerance_ = least_rank_tolerance<S>();
   factor();
-  if (!close(q)) {
-    trust(off, fastest > S(0) ? S(slip / fastest) : S(0));
-    rows_.find(*model_, *loops, q, buffers_);
-    factor();
-    close(q);
-  }
+  close(q);
   rows_.find(*model_, *loops, q, buffers_);
   x_.assign(v, v + nv), target_.assign(rows, S(0));
   for (int r = 0; rates && r < rows; ++r) target_[r] = -rates[r];
@@ -169,10 +142,8 @@ void ConstrainedWorkspace<S>::add_forces(int first, int end, S* out) const {
   template S ConstrainedWorkspace<S>::size_of(int) const;                                                                                                   \
   template S ConstrainedWorkspace<S>::largest(const std::vector<S>&);                                                                                       \
   template void ConstrainedWorkspace<S>::project(const std::shared_ptr<const ResolvedLoops>&, const S*, const S*, const S*, Form);                          \
-  template void ConstrainedWorkspace<S>::trust(const S&, const S&);                                                                                         \
-  template void ConstrainedWorkspace<S>::trust_near(const Asked&);                                                                                          \
   template void ConstrainedWorkspace<S>::find_off(const std::shared_ptr<const ResolvedLoops>&, const S*, const S*, const S*, std::vector<S>&, std::vector<S>&); \
-  template bool ConstrainedWorkspace<S>::close(S*);                                                                                                         \
+  template void ConstrainedWorkspace<S>::close(S*);                                                                                                         \
   template void ConstrainedWorkspace<S>::bring(const std::shared_ptr<const ResolvedLoops>&, S*, S*, const S*, Form);                                        \
   template void ConstrainedWorkspace<S>::take_onto(const std::shared_ptr<const ResolvedLoops>&, S*, S*, const S*, Form);                                    \
   template void ConstrainedWorkspace<S>::add_forces(int, int, S*) const;

@@ -53,7 +53,6 @@ class SceneEquations : public Kind<S> {
 
   void evaluate(const S& t, const S* q, const S* v, const S* rest, S* vdot, S* rest_rate) override {
     if ((++evaluations & 63) == 0) check_interrupt();
-    const OnLoops on_loops(scene_.loops());
     place(t, q, v);
     if (works_ > 0)
       scene_.accelerations_and_powers(t, this->at_q_, this->at_v_, rest, vdot, rest_rate + own_);
@@ -99,14 +98,6 @@ class SceneEquations : public Kind<S> {
   void prescribe(const S& t, State& x) {
     if (!scene_.prescribed().empty()) scene_.effects().prescribe(t, x.data(), x.data() + nq(), nullptr);
   }
-  struct OnLoops {  // while a state of a step is worked at
-    explicit OnLoops(SceneLoops<S>* of) : loops(of) { mean(true); }
-    ~OnLoops() { mean(false); }
-    void mean(bool meant) const {
-      if (loops) loops->mean_on_loops(meant);
-    }
-    SceneLoops<S>* loops;
-  };
   struct InTurn : StatesInTurn {
     InTurn(SceneEquations& of, Stages<S>& given) : equations(of), stages(given) {}
     PreparedLinks* ask() override { return stages.next() ? equations.ask(stages.time(), stages.at(), stages.rate()) : nullptr; }

@@ -39,11 +39,9 @@ class SceneLoops {
   void accelerate(const S& t, const S* q, const S* v, const S* tau, const Applied<S>& applied, const S* motion, S* needed, S* vdot) {
     if (!v) v = zeros_.data();
     std::copy_n(tau ? tau : zeros_.data(), zeros_.size(), load_.data());
-    set_rates(v);
     for (size_t i = 0; i < held_.size(); ++i) driven_[first_.back() + i] = motion[held_[i]];
     typename ConstrainedWorkspace<S>::Asked asked{q, v, load_.data()};
-    asked.applied = &applied, asked.form = how_.form, asked.refinement = how_.refinement, asked.near = near_;
-    asked.driven = driven_.data(), asked.rates = rates_.data();
+    asked.applied = &applied, asked.form = how_.form, asked.refinement = how_.refinement, asked.driven = driven_.data();
     if (drawn_) asked.gains = &gains_;
     telling_time(t, [&] { workspace_.accelerate(loops_, asked); });
     std::copy_n(workspace_.result().data(), zeros_.size(), vdot);
@@ -64,8 +62,6 @@ class SceneLoops {
     set_rates(v);
     workspace_.bring(loops_, q, v, rates_.data(), how_.form);
   }
-  // Whether states are meant to be on the loops, as those of steps: what they are off by makes no directions.
-  void mean_on_loops(bool meant) { near_ = meant && settles(); }
   // ModelError that names the row where a state is off the loops, or moves off them: by more than steps are off.
   void check_start(const S* q, const S* v) {
     std::vector<S> positions, velocities;
@@ -134,7 +130,7 @@ class SceneLoops {
   std::vector<int> first_;                                   // rows of effects
   std::vector<Baumgarte> gains_;
   std::vector<int> held_;                                    // prescribed coordinates, of rows after those of effects
-  bool drawn_ = false, kept_ = false, near_ = false;         // drawn_: some rows are, by gains; kept_: some are not
+  bool drawn_ = false, kept_ = false;                        // drawn_: some rows are, by gains; kept_: some are not
   std::vector<S> zeros_, load_, driven_, rates_;
 };
 

@@ -4,30 +4,22 @@ from __future__ import annotations
 
 import math
 import time
-from typing import Any
 
 import numpy as np
 
 from .. import _core
+from ..models.linkages import n_four_bar, rod
 from ..models.multibody import Multibody
 from .bench import Figure
 
 SIZES = (30, 300)
 GROWTH = 1.1
 """Exponent of the time over a tenfold of loops: one, and what larger models lose in caches."""
-ROD: dict[str, Any] = {"hinge": "pin", "mass": 1.0, "com": (0.5, 0, 0), "inertia": np.eye(3) / 12}
 
 
 def ladder(rungs: int) -> Multibody:
     """Cranks on the ground, each joined to the next by a rod: every loop shares its cranks with its neighbours."""
-    model = Multibody(f"ladder of {rungs}")
-    for i in range(rungs + 1):
-        model.add_body(f"crank{i}", None, position=(i, 0, 0), **ROD)
-        tip = model.add_node(f"tip{i}", f"crank{i}", position=(1, 0, 0))
-        if i:
-            model.add_loop(model.add_node(f"end{i}", f"rod{i}", position=(1, 0, 0)), tip, hinge="pin", name=f"rung{i}")
-        if i < rungs:
-            model.add_body(f"rod{i + 1}", f"crank{i}", position=(1, 0, 0), **ROD)
+    model = n_four_bar(rungs)
     model.gravity = (0, -9.81, 0)
     return model
 
@@ -38,7 +30,7 @@ def apart(loops: int) -> Multibody:
     for i in range(loops):
         inboard = None
         for j in range(3):
-            model.add_body(f"rod{i}.{j}", inboard, position=(0, 0, i) if j == 0 else (1, 0, 0), **ROD)
+            model.add_body(f"rod{i}.{j}", inboard, position=(0, 0, i) if j == 0 else (1, 0, 0), **rod())
             inboard = f"rod{i}.{j}"
         model.add_loop(model.add_node(f"end{i}", inboard, position=(1, 0, 0)), hinge="pin", position=(0, 0, i), name=f"loop{i}")
     model.gravity = (0, -9.81, 0)

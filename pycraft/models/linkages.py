@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..arguments import one_number, whole
 from .multibody import Multibody
 
 
@@ -17,6 +18,10 @@ def rod(length: float = 1.0, mass: float = 1.0, direction: Any = (1, 0, 0)) -> d
     """A thin rod from its hinge along a direction: mass, com and inertia of `add_body`."""
     along = np.asarray(direction, float) / np.linalg.norm(direction)
     return {"mass": mass, "com": length / 2 * along, "inertia": mass * length**2 / 12 * (np.eye(3) - np.outer(along, along))}
+
+
+def _numbers(**given: Any) -> list[float]:
+    return [one_number(value, name) for name, value in given.items()]
 
 
 def _heading(way: np.ndarray) -> float:
@@ -41,7 +46,8 @@ def n_four_bar(windows: int = 1, angle: float = np.pi / 2) -> Multibody:
     windows : N, 1 or more
     angle : rad, of all cranks
     """
-    if int(windows) != windows or windows < 1:
+    windows, angle = whole(windows, "windows"), one_number(angle, "angle")
+    if windows < 1:
         raise _core.ModelError(f"windows={windows}: a whole number, 1 or more")
     model = Multibody(f"{windows} four-bars")
     for i in range(windows + 1):
@@ -51,7 +57,7 @@ def n_four_bar(windows: int = 1, angle: float = np.pi / 2) -> Multibody:
             model.add_loop(model.add_node(f"end{i}", f"rod{i}", position=(1, 0, 0)), tip, hinge="pin", name=f"loop{i}")
         if i < windows:
             model.add_body(f"rod{i + 1}", f"crank{i}", position=(1, 0, 0), **rod())
-    model.q = [angle, -angle] * int(windows) + [angle]
+    model.q = [angle, -angle] * windows + [angle]
     return model
 
 
@@ -80,6 +86,7 @@ def slider_crank(crank: float = 0.15, connecting_rod: float = 0.2, slider: float
     slider : kg
     angle : rad, of the crank from x
     """
+    crank, connecting_rod, slider, angle = _numbers(crank=crank, connecting_rod=connecting_rod, slider=slider, angle=angle)
     if not 0 < crank < connecting_rod < np.inf:
         raise _core.ModelError(
             f"crank={crank}, connecting_rod={connecting_rod}: positive, and the rod the longer one, or it does not turn around"
@@ -105,6 +112,7 @@ def peaucellier(long: float = 1.0, short: float = 0.4, crank: float = 0.35, angl
     long, short, crank : m, of 1 kg a metre; 2 crank < long - short and more for a pen in reach
     angle : rad, of the crank from x
     """
+    long, short, crank, angle = _numbers(long=long, short=short, crank=crank, angle=angle)
     near = crank * np.array([1 + np.cos(angle), np.sin(angle)])
     reach = np.linalg.norm(near)
     if not (0 < short < long < np.inf and long - short < reach < long + short):
@@ -140,12 +148,18 @@ def five_bar(base: float = 0.3, inner: float = 0.2, outer: float = 0.3, angles: 
     base, inner, outer : m, between the motors and of the bars, of 1 kg a metre
     angles : rad, of the two motors from x
     """
+    base, inner, outer = _numbers(base=base, inner=inner, outer=outer)
+    angles = _core.real_array(angles, "angles")
+    if angles.shape != (2,):
+        raise _core.ModelError(f"angles: two, of the motors, not an array {angles.shape}")
     model = Multibody("five-bar")
     elbows = [np.array([side * base / 2, 0]) + inner * np.array([np.cos(a), np.sin(a)]) for side, a in zip((-1, 1), angles, strict=True)]
     between = (elbows[1] - elbows[0]) / 2
     half = np.linalg.norm(between)
     if not 0 < half < outer:
-        raise _core.ModelError(f"base={base}, inner={inner}, outer={outer}, angles={tuple(angles)}: the outer bars do not reach each other")
+        raise _core.ModelError(
+            f"base={base}, inner={inner}, outer={outer}, angles={angles.tolist()}: the outer bars do not reach each other"
+        )
     tip = elbows[0] + between + np.sqrt(outer**2 - half**2) * np.array([-between[1], between[0]]) / half
     q = []
     for i, elbow in enumerate(elbows):
@@ -167,6 +181,7 @@ def stewart(base: float = 1.0, plate: float = 0.6, height: float = 1.0) -> Multi
     base, plate : m, radii of the legs' feet and of their heads, in pairs 120° apart
     height : m, of the plate at its state
     """
+    base, plate, height = _numbers(base=base, plate=plate, height=height)
     for name, value in (("base", base), ("plate", plate), ("height", height)):
         if not 0 < value < np.inf:
             raise _core.ModelError(f"{name}={value}: a positive length")

@@ -78,12 +78,18 @@ def check_closed(model: Any, q: np.ndarray) -> None:
         raise _core.ModelError(f"{model.name!r} is not on its loops{where}: {said}")
 
 
+def checked_tolerance(tolerance: Any) -> float:
+    """Of singular values over the longest row. ModelError where it is not between 0 and 1."""
+    checked = one_number(tolerance, "tolerance")
+    if not 0 < checked < 1:
+        raise _core.ModelError(f"tolerance: between 0 and 1, of singular values over the longest row, not {checked!r}")
+    return checked
+
+
 def mobility(model: Any, q: Any, tolerance: Any) -> Mobility:
     """`Multibody.mobility`."""
     q = np.array(at_state(model, q)[0], float)
-    tolerance = one_number(tolerance, "tolerance")
-    if not 0 < tolerance < 1:
-        raise _core.ModelError(f"tolerance: between 0 and 1, of singular values over the longest row, not {tolerance!r}")
+    tolerance = checked_tolerance(tolerance)
     if q.ndim != 1:
         raise _core.ModelError(f"mobility is that of one state, not of an array {q.shape}; mobility_along is of many")
     check_closed(model, q)

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..arguments import one_number
 from ..closed import Closed
 from ..state import at_state
 from .assembly import Assembler, between, turns_of
-from .mobility import check_closed, mobility, scaled, shares
+from .mobility import check_closed, checked_tolerance, mobility, scaled, shares
 
 _WIDTH = 1e-12  # of the last bracket, in samples
 _FLAT = 1e-9  # what distances over a bracket differ by where there is nothing to search: a single row's, gears', is 1 everywhere
@@ -119,9 +118,7 @@ class _Motion:
 def mobility_along(model: Any, q: Any, tolerance: Any) -> MobilityAlong:
     """`Multibody.mobility_along`."""
     q = np.array(_core.real_array(at_state(model, q)[0], "q"))
-    tolerance = one_number(tolerance, "tolerance")
-    if not 0 < tolerance < 1:
-        raise _core.ModelError(f"tolerance: between 0 and 1, of singular values over the longest row, not {tolerance!r}")
+    tolerance = checked_tolerance(tolerance)
     if q.ndim != 2:
         raise _core.ModelError(f"mobility along a motion is of its samples (B, {model.nq}), not of an array {q.shape}")
     check_closed(model, q)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..arguments import whole
 from ..models import linkages
 from ..models.multibody import Multibody
 from .effects import Gravity, Loop, NodeSpring, PointMassGravity, TorqueSource
@@ -166,6 +167,7 @@ def n_four_bar(N: int = 2, method: str = "augment") -> Scene:
     N : 1 or more
     method : of `effects.Loop`
     """
+    N = whole(N, "N")
     model = linkages.n_four_bar(N)
     model.v = [-1.0, 1.0] * N + [-1.0]
     return Scene(model).add(Gravity(ALONG_Y), Loop(method=method))

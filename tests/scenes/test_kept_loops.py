@@ -220,6 +220,13 @@ def test_refusals_name_what_it_is(what):
     "call",
     [
         lambda: linkages.n_four_bar(0),
+        lambda: linkages.n_four_bar("two"),
+        lambda: linkages.n_four_bar(None),
+        lambda: M.n_four_bar(2.5),
+        lambda: linkages.n_four_bar(2, np.nan),
+        lambda: linkages.slider_crank(slider="heavy"),
+        lambda: linkages.five_bar(angles=(1.0,)),
+        lambda: linkages.peaucellier(angle=np.nan),
         lambda: linkages.slider_crank(0.3, 0.2),
         lambda: linkages.peaucellier(crank=2.0),
         lambda: linkages.five_bar(base=3.0),

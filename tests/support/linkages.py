@@ -3,6 +3,7 @@
 import numpy as np
 
 import pycraft as pc
+from pycraft.models import linkages
 
 
 def dense(model, q, v, tau, gains=(0.0, 0.0), wrench=0.0):
@@ -57,14 +58,6 @@ def spatial(floating):
 
 
 def bricard():
-    """Six bars along edges of a cube, each pin across both of its bars: rank 4 of 5 rows, and no one row is the redundant one."""
-    corners = np.array([(0, 0, 0), (1, 0, 0), (1, -1, 0), (1, -1, 1), (0, -1, 1), (0, 0, 1)], float)
-    edges = np.roll(corners, -1, axis=0) - corners
-    mb = pc.Multibody("bricard")
-    for i in range(5):
-        axis, place = np.cross(edges[i - 1], edges[i]), corners[0] if i == 0 else edges[i - 1]
-        mb.add_body(f"bar{i}", f"bar{i - 1}" if i else None, hinge="pin", axis=axis, position=place, mass=1.0, com=edges[i] / 2,
-                    inertia=(np.eye(3) - np.outer(edges[i], edges[i])) / 3)  # fmt: skip
-    mb.add_loop("bar4", hinge="pin", axis=np.cross(edges[4], edges[5]), point=edges[4], position=corners[5] - edges[4], name="loop")
+    mb = linkages.bricard()
     mb.gravity = (0, -9.81, 0)
     return mb
