@@ -21,12 +21,20 @@ Timed = Callable[[float], float]
 """Seconds of one call of something, measured for so many seconds."""
 
 
+def _drawn(scene: Any, rng: np.random.Generator) -> Any:
+    """A random state; on the loops that the scene keeps, about the model's present one."""
+    model = scene.model
+    if not scene._keeps_loops():
+        return model.random_state(rng)
+    return model.assemble(model.integrate(model.q, 0.1 * rng.normal(size=model.nv)), rng.normal(size=model.nv))
+
+
 def measured_states(scene: Any, q: Any, v: Any) -> tuple[np.ndarray, np.ndarray]:
     """States (K, nq), (K, nv): those given, one or several, or as many random ones as `pycraft.accuracy` draws."""
     model = scene.model
     checked_model(model, "a measurement of a scene")
     if q is None and v is None:
-        drawn = [model.random_state(np.random.default_rng([0, i])) for i in range(STATES)]
+        drawn = [_drawn(scene, np.random.default_rng([0, i])) for i in range(STATES)]
         return np.array([s.q for s in drawn]), np.array([s.v for s in drawn])
     if q is None:
         raise _core.ModelError("v is given without q; give both, or neither for random states")

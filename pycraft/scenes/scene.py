@@ -216,6 +216,10 @@ class Scene(Measurements, Statics, Filed, Closed):
             self._built = (now, _core.SceneCalls(self._fresh_core(), form, refine, residual, precision))
         return self._built[1]
 
+    def _keeps_loops(self) -> bool:
+        """Whether an effect that is on keeps loops."""
+        return any(on and isinstance(effect, Loop) for effect, on in self._entries.values())
+
     def _loop_edits(self) -> int:
         """What the model's loops count of their changes, where they are kept: they are no part of the model's own numbers."""
         kept = any(isinstance(effect, Loop) for effect, _ in self._entries.values())

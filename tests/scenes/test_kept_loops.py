@@ -185,6 +185,12 @@ def test_files_and_sweeps_have_the_effect(tmp_path):
     assert repr(E.Loop("loop1", beta=2.0)) == "Loop(loops='loop1', beta=2.0)"
 
 
+def test_what_loops_cost_and_buy_is_measured_on_them():
+    scene = M.five_bar().add(E.Damping(0.05))
+    assert "loop" in str(scene.cost())
+    assert all("damping" in str(said) for said in (scene.compare(without=["damping"]), scene.needed(1e-6)))
+
+
 REFUSED = {
     "twice": (lambda m: pc.Scene(m).add(E.Loop(), E.Loop()), pc.ModelError, "'loop' and 'loop_2' both keep loop 'wrist'"),
     "named twice": (lambda m: pc.Scene(m).add(E.Loop(["wrist", "wrist"])), pc.ModelError, "named twice"),
