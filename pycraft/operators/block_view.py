@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
 from html import escape
 
 import numpy as np
 
 from .. import _core
+from .block_picture import block_picture, colour
 
 ENTRIES = 12
 """Up to so many rows and columns every entry is shown; beyond, one number a block."""
 BLOCKS = 40
-"""Blocks a row or column of the HTML table; the text shows as many columns as fit."""
+"""Blocks a row or column of the HTML table, beyond which it is a picture; the text shows as many columns as fit."""
+_COLUMNS = 256
+"""That an operator is applied to at a time where its blocks are looked at and not kept."""
+_KEPT = 4_000_000
+"""Numbers of a dense form up to which it is formed to look at its blocks."""
 WIDTH = 100
 LEGEND = "largest entry of each block, with its sign"
 
@@ -23,12 +29,19 @@ class BlockView:
     `view["link2", "link3"]` is the block in that row and column; `view.rows`, `view.columns` are the labels. With
     `order="tip-to-base"` the last body comes first, so that φ is lower triangular as in the book. Up to 12 rows and columns every entry
     is shown, lines part the blocks; beyond, each block shows its largest entry with its sign. In a notebook blue cells are positive, orange
-    ones negative, deeper where the logarithm of their size is larger.
+    ones negative, deeper where the logarithm of their size is larger; beyond 40 blocks it is a picture of all of them, several to a cell.
+
+    `view.values` are the numbers, dense, formed when they are asked for; what is shown of large operators needs them not, and is found from
+    256 columns at a time: of n blocks that takes O(n²), in memory n² numbers.
     """
 
-    def __init__(self, values: np.ndarray, rows: list[tuple[str, slice]], columns: list[tuple[str, slice]], title: str):
-        self.values, self.title = values, title
+    def __init__(self, operator: _core.Operator, rows: list[tuple[str, slice]], columns: list[tuple[str, slice]], title: str):
+        self.title, self._operator = title, operator
         self._rows, self._columns = dict(rows), dict(columns)
+
+    @cached_property
+    def values(self) -> np.ndarray:
+        return self._operator.dense()
 
     @property
     def rows(self) -> list[str]:
@@ -50,11 +63,26 @@ class BlockView:
 
     def largest(self) -> np.ndarray:
         """The entry of largest magnitude of each block, with its sign, (rows, columns); zero for blocks without entries."""
-        out = np.zeros((len(self._rows), len(self._columns)))
-        for i, r in enumerate(self._rows):
-            for j, c in enumerate(self._columns):
-                block = self[r, c].ravel()
-                out[i, j] = block[np.abs(block).argmax()] if block.size else 0.0
+        return self._largest.copy()
+
+    @cached_property
+    def _largest(self) -> np.ndarray:
+        rows, columns = list(self._rows.values()), list(self._columns.values())
+        if np.prod(self._shape) <= _KEPT:
+            return _signed(_signed(self.values, rows, 0), columns, 1)
+        out = np.zeros((len(rows), len(columns)))
+        count = max((where.stop for where in columns), default=0)
+        ordered = sorted(range(len(columns)), key=lambda j: columns[j].start)
+        while ordered:
+            first = columns[ordered[0]].start
+            taken = [j for j in ordered if columns[j].stop <= max(first + _COLUMNS, columns[ordered[0]].stop)]
+            ordered = ordered[len(taken) :]
+            slab = np.zeros((count, columns[taken[-1]].stop - first))
+            slab[first : columns[taken[-1]].stop] = np.eye(slab.shape[1])
+            if not slab.size:
+                continue
+            numbers = self._operator @ slab
+            out[:, taken] = _signed(_signed(numbers, rows, 0), [slice(columns[j].start - first, columns[j].stop - first) for j in taken], 1)
         return out
 
     def norms(self) -> np.ndarray:
@@ -62,11 +90,15 @@ class BlockView:
         return np.abs(self.largest())
 
     # ------------------------------------------------------------------ what is shown
+    @property
+    def _shape(self) -> tuple[int, int]:
+        height, width = (max((where.stop for where in blocks.values()), default=0) for blocks in (self._rows, self._columns))
+        return height, width
 
     def _cells(self) -> tuple[np.ndarray, list[str], list[str], list[bool], list[bool]]:
         """Numbers, labels of rows and columns, and where a block begins in each: entries of small operators, else one number a block."""
-        if max(self.values.shape, default=0) > ENTRIES:
-            return self.largest(), self.rows, self.columns, [False] * len(self.rows), [False] * len(self.columns)
+        if max(self._shape) > ENTRIES:
+            return self._largest, self.rows, self.columns, [False] * len(self.rows), [False] * len(self.columns)
         (of_row, rows, top), (of_column, columns, left) = (_entries(blocks) for blocks in (self._rows, self._columns))
         return self.values[np.ix_(of_row, of_column)], rows, columns, top, left
 
@@ -83,26 +115,45 @@ class BlockView:
         ]
         counts = ((len(rows) - BLOCKS, "rows"), (len(columns) - shown, "columns"))
         left_out = [f"{more} more {what}" for more, what in counts if more > 0]
-        if max(self.values.shape, default=0) > ENTRIES:
+        if max(self._shape) > ENTRIES:
             left_out.insert(0, f"{LEGEND}; · is an exact zero")
         return "\n".join([*lines, "; ".join(left_out)] if left_out else lines)
 
     def _repr_html_(self) -> str:
+        if max(len(self._rows), len(self._columns)) > BLOCKS:
+            picture = block_picture(self._largest, self.rows, self.columns)
+            return f"<p>{escape(self.title)}</p>{picture}<div style='font-size:80%'>{escape(LEGEND)}; blank is an exact zero</div>"
         numbers, rows, columns, top, left = self._cells()
         scale = np.abs(numbers).max(initial=0.0)
-        head = "".join(f"<th style='writing-mode:vertical-rl;text-align:left;padding:4px'>{escape(c)}</th>" for c in columns[:BLOCKS])
+        head = "".join(f"<th style='writing-mode:vertical-rl;text-align:left;padding:4px'>{escape(c)}</th>" for c in columns)
         body = "".join(
             f"<tr><th style='text-align:left;position:sticky;left:0;white-space:nowrap'>{escape(r)}</th>"
-            + "".join(_cell(x, scale, top[i], left[j]) for j, x in enumerate(numbers[i, :BLOCKS]))
+            + "".join(_cell(x, scale, top[i], left[j]) for j, x in enumerate(numbers[i]))
             + "</tr>"
-            for i, r in enumerate(rows[:BLOCKS])
+            for i, r in enumerate(rows)
         )
-        notes = [f"{LEGEND}; blank is an exact zero"] if max(self.values.shape, default=0) > ENTRIES else []
-        if max(len(rows), len(columns)) > BLOCKS:
-            notes.append(f"the first {BLOCKS} of {len(rows)} × {len(columns)} blocks")
+        notes = [f"{LEGEND}; blank is an exact zero"] if max(self._shape) > ENTRIES else []
         caption = f"<div style='font-size:80%'>{escape('; '.join(notes))}</div>" if notes else ""
         table = f"<table style='border-collapse:collapse;font-size:80%;color:inherit'><tr><th></th>{head}</tr>{body}</table>"
         return f"<p>{escape(self.title)}</p><div style='overflow-x:auto;max-width:100%'>{table}</div>{caption}"
+
+
+def _signed(numbers: np.ndarray, parts: list[slice], axis: int) -> np.ndarray:
+    """Of each part of an axis the entry of largest magnitude, with its sign; 0 of an empty part."""
+    shape = [*numbers.shape]
+    shape[axis] = len(parts)
+    out = np.zeros(shape)
+    filled = sorted((i for i, part in enumerate(parts) if part.stop > part.start), key=lambda i: parts[i].start)
+    if not filled:
+        return out
+    begins = [parts[i].start for i in filled]
+    most, least = (of.reduceat(numbers, begins, axis=axis) for of in (np.maximum, np.minimum))
+    found = np.where(most >= -least, most, least)
+    if axis == 0:
+        out[filled] = found
+    else:
+        out[:, filled] = found
+    return out
 
 
 def _entries(blocks: dict[str, slice]) -> tuple[list[int], list[str], list[bool]]:
@@ -123,9 +174,7 @@ def _cell(x: float, scale: float, top: bool, left: bool) -> str:
     lines = "".join(f"border-{side}:1px solid;" for side, there in (("top", top), ("left", left)) if there)
     if x == 0:
         return f"<td style='{lines}text-align:center;padding:2px 6px'></td>"
-    depth = 0.45 * min(1.0, max(0.15, 1 + np.log10(abs(x) / scale) / 8))
-    color = "60,130,220" if x > 0 else "230,120,30"
-    return f"<td style='{lines}background:rgba({color},{depth:.2f});text-align:right;padding:2px 6px;white-space:nowrap'>{x:.3g}</td>"
+    return f"<td style='{lines}background:{colour(x, scale)};text-align:right;padding:2px 6px;white-space:nowrap'>{x:.3g}</td>"
 
 
 def block_view(operator: _core.Operator, order: str = "base-to-tip") -> BlockView:
@@ -138,8 +187,8 @@ def block_view(operator: _core.Operator, order: str = "base-to-tip") -> BlockVie
     """
     if order not in ("base-to-tip", "tip-to-base"):
         raise _core.EvaluationError(f"order={order!r}: there are 'base-to-tip' and 'tip-to-base'")
-    values = operator.dense()
-    if values.ndim == 3:
+    operator.check_current()
+    if operator.batch is not None:
         raise _core.EvaluationError("blocks() shows one state; bind one with .at(q)")
 
     def labels(space: _core.Space) -> list[tuple[str, slice]]:
@@ -147,4 +196,4 @@ def block_view(operator: _core.Operator, order: str = "base-to-tip") -> BlockVie
         return blocks if order == "base-to-tip" else blocks[::-1]
 
     title = f"{operator.text()} : {operator.domain.name} → {operator.codomain.name}"
-    return BlockView(values, labels(operator.codomain), labels(operator.domain), title)
+    return BlockView(operator, labels(operator.codomain), labels(operator.domain), title)

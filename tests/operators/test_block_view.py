@@ -57,7 +57,37 @@ def test_wide_models_stay_within_the_page():
     view = pc.chain(45).soa.phi.blocks()
     assert max(map(len, repr(view).split("\n"))) <= 100 and "5 more rows" in repr(view) and "more columns" in repr(view)
     html = view._repr_html_()
-    assert "overflow-x:auto" in html and "the first 40 of 45 × 45 blocks" in html and html.count("<tr>") == 41
+    assert "max-width:100%" in html and "45 × 45 blocks<" in html and html.count("<title>") == 45 * 46 // 2
+
+
+def test_a_picture_of_many_blocks_shows_all_of_them_several_to_a_cell():
+    """Of a chain bent at right angles, φ has entries of either sign; cells are checked by what pointing at them tells."""
+    model = pc.chain(101)
+    model.q = np.linspace(0, 3, 101)
+    view = model.soa.phi.blocks()
+    largest, told = view.largest(), re.findall(r"<title>([^<]*)</title>", view._repr_html_())
+    bodies = list(model.bodies)
+    assert len(told) == sum(1 for i in range(34) for j in range(34) if np.any(largest[3 * i : 3 * i + 3, 3 * j : 3 * j + 3]))
+    for text in told:
+        row, column, number = re.fullmatch(r"(\w+)(?: … \w+)? × (\w+)(?: … \w+)?: (\S+)", text).groups()
+        cell = largest[bodies.index(row) :][:3, bodies.index(column) :][:, :3]
+        assert float(number) == pytest.approx(cell.ravel()[np.abs(cell).argmax()], rel=6e-3)  # three digits
+    assert any(text.split(": ")[1].startswith("-") for text in told)
+    assert f"{bodies[99]} … {bodies[100]} × " in " ".join(told)  # the last cell has two
+
+
+def test_large_operators_are_looked_at_without_their_dense_form(monkeypatch):
+    model = pc.tree([-1, 0, 1, 1, 3, 0], ["pin", "ball", "weld", "free", "pin", "slider"])
+    model.q = model.random_state(seed=2).q
+    H, phi = model.soa("H phi")
+    for operator in (phi, H, H.T, H @ phi):
+        kept = operator.blocks("tip-to-base").largest()
+        monkeypatch.setattr("pycraft.operators.block_view._KEPT", 0)
+        monkeypatch.setattr("pycraft.operators.block_view._COLUMNS", 7)
+        view = operator.blocks("tip-to-base")
+        np.testing.assert_allclose(view.largest(), kept, rtol=0, atol=1e-14 * np.abs(kept).max())  # of sums of up to six terms
+        assert "values" not in vars(view) and np.array_equal(view.values, operator.dense())
+        monkeypatch.undo()
 
 
 def test_operators_without_entries():
