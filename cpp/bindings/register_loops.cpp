@@ -183,9 +183,9 @@ void register_loops(py::module_& m) {
         return on_loops(l, given, asked, {}, Array(std::vector<py::ssize_t>{0, 6}));
       }, q, v, py::arg("impulse"), py::arg("form"), precision, "v⁺, impulses λ, impulses of loops on b and on a, rank.");
   loops.def_property_readonly("edits", [](const Loops& l) { return l.set->edits(); }, "Another number after every change of the set.")
-      .def("effect", [](const Loops& l, std::vector<std::string> names, double alpha, double beta) -> std::shared_ptr<Effect> {
-        return std::make_shared<KeepLoops>(l.set, std::move(names), alpha, beta);
-      }, py::arg("names"), py::arg("alpha"), py::arg("beta"), "What keeps these loops in a scene, all without names.");
+      .def("effect", [](const Loops& l, std::vector<std::string> names, double alpha, double beta, bool embedded) -> std::shared_ptr<Effect> {
+        return std::make_shared<KeepLoops>(l.set, std::move(names), alpha, beta, embedded);
+      }, py::arg("names"), py::arg("alpha"), py::arg("beta"), py::arg("embedded"), "What keeps these loops in a scene, all without names.");
   m.def("_embedded", [](const std::shared_ptr<MultibodyOperators>& base, const Loops& l,
                         const std::vector<std::tuple<std::vector<int>, std::vector<int>, std::vector<int>>>& sets) {
     const ModelInUse use(l.set->model());

@@ -71,7 +71,7 @@ void CompiledScene<S>::add_accelerations(std::vector<Pass>& passes, bool works) 
   for (const auto& e : forces_.effects())
     if (e->declared.uniform_gravity || !e->declared.hinges.empty() || !e->declared.prescribed.empty() || e->declared.loops) because.push_back(e->name);
   const bool hybrid = !prescribed_.empty(), all = hybrid && static_cast<int>(prescribed_.size()) == nv_;
-  const std::string what = std::string(all ? "inverse" : hybrid ? "hybrid" : "forward") + " dynamics" + (loops_ ? " on loops" : "") + ", " + (by_kernels() ? "by kernels" : "by recursions");
+  const std::string what = std::string(all ? "inverse" : hybrid ? "hybrid" : "forward") + " dynamics" + (loops_ ? loops_->embeds() ? " on embedded loops" : " on loops" : "") + ", " + (by_kernels() ? "by kernels" : "by recursions");
   passes.push_back({loops_ ? accelerate_on_loops : hybrid ? accelerate_and_prescribe : accelerate, nullptr, {"accelerations", what, because}});
   for (const auto& e : forces_.effects())
     if (works && e->worker >= 0 && !e->declared.prescribed.empty()) passes.push_back({count_prescribed, e.get(), {e->name + " work", "its power", {e->name}}});

@@ -34,11 +34,12 @@ struct HingeTerm {
   double inertia = 0, damping = 0, stiffness = 0;
 };
 
-// Loops of a model that a scene keeps, all where no name is given, with Baumgarte's α and β (1/s).
+// Loops of a model that a scene keeps, all where no name is given, with Baumgarte's α and β (1/s), or embedded.
 struct KeptLoops {
   std::shared_ptr<const LoopSet> set;
   std::vector<std::string> names;
   double alpha = 0, beta = 0;
+  bool embedded = false;
   std::vector<std::string> kept() const { return names.empty() ? set->names() : names; }
 };
 

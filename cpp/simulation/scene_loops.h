@@ -2,7 +2,8 @@
 //
 //   (ℳ + J) θ̈ + 𝒞 = T + Q*λ,   Q θ̈ + Q̇θ̇ = 0,   θ̈(j) = motion(j) of every prescribed coordinate
 //
-// What loops and prescribed motion ask of one motion, differently, is refused by the names of rows.
+// by tree augmentation, or without multipliers on the tree that the loops are embedded in (dynamics/embedded_dynamics.h). What loops and prescribed
+// motion ask of one motion, differently, is refused by the names of rows.
 #pragma once
 
 #include <memory>
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include "dynamics/constrained_dynamics.h"
+#include "dynamics/embedded_dynamics.h"
 #include "model/checks.h"
 #include "runtime/errors.h"
 #include "simulation/scene_forces.h"
@@ -23,7 +25,9 @@ class SceneLoops {
   SceneLoops(const Multibody& model, const HingeTerms& terms, const Solving& how, const std::vector<std::unique_ptr<Active<S>>>& effects)
       : how_(how), workspace_(model, free_terms(terms)), zeros_(model.nv(), S(0)), load_(zeros_) {
     auto loops = std::make_shared<ResolvedLoops>();
+    const Active<S>*embeds = nullptr, *augments = nullptr;
     for (const auto& e : effects) {
+      if (e->declared.loops) (e->declared.loops->embedded ? embeds : augments) = e.get();
       first_.push_back(loops->rows);
       if (e->declared.loops) take(*e->declared.loops, *loops);
     }
@@ -33,6 +37,11 @@ class SceneLoops {
       if (terms.is_prescribed(j)) hold(j, names[j], *loops);
     driven_.assign(loops->rows, S(0)), rates_ = driven_;
     loops_ = std::move(loops);
+    if (!embeds) return;
+    if (augments) throw EvaluationError("effect '" + embeds->name + "' embeds its loops and effect '" + augments->name + "' augments: a scene keeps all of its loops by one method");
+    if (how.form != Form::fast || how.refinement.wider() || how.refinement.gathers_wider())
+      throw EvaluationError("effect '" + embeds->name + "' embeds its loops, by form 'fast' and residuals of the same precision: take those, or method='augment'");
+    embedded_ = std::make_unique<EmbeddedWorkspace<S>>(model, free_terms(terms));
   }
 
   // q, v, tau (null: none), what acts on bodies, θ̈ of prescribed coordinates by coordinate: θ̈ of all, and what their motion needs beside tau.
@@ -43,24 +52,49 @@ class SceneLoops {
     typename ConstrainedWorkspace<S>::Asked asked{q, v, load_.data()};
     asked.applied = &applied, asked.form = how_.form, asked.refinement = how_.refinement, asked.driven = driven_.data();
     if (drawn_) asked.gains = &gains_;
-    telling_time(t, [&] { workspace_.accelerate(loops_, asked); });
-    std::copy_n(workspace_.result().data(), zeros_.size(), vdot);
-    for (size_t i = 0; i < held_.size(); ++i) needed[held_[i]] = workspace_.multipliers()[first_.back() + i], vdot[held_[i]] = motion[held_[i]];
+    const auto by = [&](auto& workspace) {
+      telling_time(t, [&] { workspace.accelerate(loops_, asked); });
+      std::copy_n(workspace.result().data(), zeros_.size(), vdot);
+      for (size_t i = 0; i < held_.size(); ++i) needed[held_[i]] = workspace.multipliers()[first_.back() + i], vdot[held_[i]] = motion[held_[i]];
+    };
+    if (embedded_)
+      by(*embedded_);
+    else
+      by(workspace_);
   }
-  void add_to_hinges(const S* inertia) { workspace_.add_to_hinges(inertia); }
+  void add_to_hinges(const S* inertia) {
+    if (embedded_)
+      embedded_->add_to_hinges(inertia);
+    else
+      workspace_.add_to_hinges(inertia);
+  }
   // Q*λ of an effect's loops at the last state, added.
-  void add_forces(int effect, S* out) const { workspace_.add_forces(first_[effect], first_[effect + 1], out); }
+  void add_forces(int effect, S* out) const {
+    if (embedded_)
+      embedded_->add_forces(first_[effect], first_[effect + 1], out);
+    else
+      workspace_.add_forces(first_[effect], first_[effect + 1], out);
+  }
+  bool embeds() const { return embedded_ != nullptr; }
   // Whether states are taken onto the rows: not where all of them are drawn there by Baumgarte's gains.
   bool settles() const { return kept_; }
   void take_onto(const S& t, S* q, S* v) {
     set_rates(v);
-    telling_time(t, [&] { workspace_.take_onto(loops_, q, v, rates_.data(), how_.form); });
+    telling_time(t, [&] {
+      if (embedded_)
+        embedded_->take_onto(loops_, q, v, rates_.data());
+      else
+        workspace_.take_onto(loops_, q, v, rates_.data(), how_.form);
+    });
   }
   // A state of a step, taken there as far as that is sure: accelerations there are a smooth function of the states about the loops. Off them they are
   // none near singular states, where what a state is off by is divided by the square of the way to those.
   void bring(S* q, S* v) {
     set_rates(v);
-    workspace_.bring(loops_, q, v, rates_.data(), how_.form);
+    if (embedded_)
+      embedded_->bring(loops_, q, v, rates_.data());
+    else
+      workspace_.bring(loops_, q, v, rates_.data(), how_.form);
   }
   // ModelError that names the row where a state is off the loops, or moves off them: by more than steps are off.
   void check_start(const S* q, const S* v) {
@@ -125,6 +159,7 @@ class SceneLoops {
 
   Solving how_;
   ConstrainedWorkspace<S> workspace_;
+  std::unique_ptr<EmbeddedWorkspace<S>> embedded_;           // null: by augmentation
   std::shared_ptr<const ResolvedLoops> loops_;
   std::vector<std::shared_ptr<const ResolvedLoops>> whole_;  // poses that paths point to
   std::vector<int> first_;                                   // rows of effects

@@ -9,7 +9,7 @@ from ... import _core
 from ...arguments import one_number, text
 from .effect import Effect, names_of
 
-METHODS = ("augment",)
+METHODS = ("augment", "embed")
 
 
 @dataclass(repr=False, eq=False)
@@ -21,13 +21,18 @@ class Loop(Effect):
     singular states are passed on the velocity's branch. The forces Q*λ do no work; of redundant rows λ is the least. Prescribed
     coordinates are rows beside those of the loops.
 
+    Constraint embedding: the bodies around loops that hang together are one body of a tree without loops, X*(ℳ + J)X v̇_r = X*(τ - ...), v = X v_r.
+    At every evaluation, and after each step, what depends is found anew from the independent coordinates, which so follow a differential
+    equation of their own, whatever the integrator. They are chosen anew after each step, where X is smallest in units of energy. Of redundant
+    rows λ is that of as many as are independent.
+
     A start off the loops is an error; `model.assemble(q, v)` has states on them.
 
     Parameters
     ----------
     loops : name of a loop, a loop, or a list of them; None: all that the model has
-    method : {"augment"}
-    alpha, beta : 1/s, Baumgarte's r̈ + 2α ṙ + β² r = 0 of these loops; where all have it, no state is taken back
+    method : {"augment", "embed"}, one for all loops of a scene; "embed" has form "fast" alone
+    alpha, beta : 1/s, Baumgarte's r̈ + 2α ṙ + β² r = 0 of these loops by augmentation; where all have it, no state is taken back
     """
 
     loops: Any = None
@@ -42,4 +47,4 @@ class Loop(Effect):
         if names is not None and not names:
             raise _core.ModelError("loop: loops=[] keeps none; leave loops out for all")
         numbers = one_number(self.alpha, "loop: alpha"), one_number(self.beta, "loop: beta")
-        return model.loops._core.effect(names or [], *numbers)  # type: ignore[attr-defined]  # the face's
+        return model.loops._core.effect(names or [], *numbers, self.method == "embed")  # type: ignore[attr-defined]  # the face's

@@ -1,0 +1,318 @@
+#include "dynamics/embedded_dynamics.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "algebra/trees/sweeps/composite_inertia.h"
+#include "model/checks.h"
+#include "model/configuration.h"
+#include "recursions/kinematics.h"
+
+namespace pycraft {
+
+namespace {
+
+constexpr double reach_of_steps = 1e-4;      // as of states taken onto loops by augmentation (states_on_loops.cpp)
+constexpr double dependent_row = 1e-8;       // of pivots, by the largest: rows that are left below it hang on those before
+constexpr int most_steps = 8;
+
+}  // namespace
+
+template <class S>
+EmbeddedWorkspace<S>::EmbeddedWorkspace(const Multibody& model, const HingeTerms& terms)
+    : source_(model), tree_(model.structure()), model_(terms.empty() ? model.compiled<S>() : compile_model<S>(model, terms)), blocks_(tree_), forces_(tree_, model_) {}
+
+template <class S>
+void EmbeddedWorkspace<S>::set_loops(const std::shared_ptr<const ResolvedLoops>& loops) {
+  if (loops_ == loops) return;
+  nodes_ = embedded_nodes(*model_, *loops);
+  choices_ = std::vector<Choice>(nodes_.size());
+  embedded_.begin(*model_, nodes_);
+  dense_.assign(model_->nv, S(0));
+  loops_ = loops, chosen_ = false;
+}
+
+template <class S>
+void EmbeddedWorkspace<S>::place(const S* q) {
+  kinematics(*model_, q, blocks_);
+  for (size_t j = 0; j < added_.size(); ++j) blocks_.J[j] += added_[j];
+  rows_.find(*model_, *loops_, q, buffers_);
+}
+
+template <class S>
+S EmbeddedWorkspace<S>::size_of(int row) const {
+  S size = S(0);
+  for (const auto& e : rows_.entries[row]) size = maximum(size, e.size);
+  return size;
+}
+
+// ------------------------------------------------------------------ which are independent
+// Complete pivoting of the node's rows at rows_: weights_ are √ℳ_ii.
+template <class S>
+void EmbeddedWorkspace<S>::choose_of(size_t node) {
+  using std::abs;
+  const EmbeddedNode& at = nodes_[node];
+  Choice& to = choices_[node];
+  const size_t m = at.rows.size(), n = at.coordinates.size();
+  std::vector<S> A(m * n, S(0));
+  for (size_t i = 0; i < m; ++i) {
+    for (const auto& e : rows_.entries[at.rows[i]]) dense_[e.coordinate] = e.value / weights_[e.coordinate];
+    S size = S(0);
+    for (size_t j = 0; j < n; ++j) size = maximum(size, S(abs(dense_[at.coordinates[j]])));
+    for (size_t j = 0; j < n; ++j) A[i * n + j] = size > S(0) ? S(dense_[at.coordinates[j]] / size) : S(0);
+    for (const auto& e : rows_.entries[at.rows[i]]) dense_[e.coordinate] = S(0);
+  }
+  std::vector<char> row_taken(m, 0), dependent(n, 0);
+  to.rows.clear(), to.dependent.clear(), to.independent.clear();
+  for (size_t rank = 0; rank < std::min(m, n); ++rank) {
+    check_interrupt_at(static_cast<int>(rank), static_cast<int>(n));
+    size_t row = m, column = n;
+    S best = S(dependent_row);
+    for (size_t i = 0; i < m; ++i)
+      for (size_t j = 0; !row_taken[i] && j < n; ++j)
+        if (!dependent[j] && abs(A[i * n + j]) > best) best = abs(A[i * n + j]), row = i, column = j;
+    if (row == m) break;
+    row_taken[row] = dependent[column] = 1;
+    to.rows.push_back(at.rows[row]), to.dependent.push_back(static_cast<int>(column));
+    for (size_t i = 0; i < m; ++i) {
+      const S factor = A[i * n + column] / A[row * n + column];
+      for (size_t j = 0; !row_taken[i] && j < n; ++j) A[i * n + j] -= factor * A[row * n + j];
+    }
+  }
+  for (size_t j = 0; j < n; ++j)
+    if (!dependent[j]) to.independent.push_back(static_cast<int>(j));
+  const size_t d = to.rows.size(), r = to.independent.size();
+  to.Q_d.resize(d * d), to.transposed.resize(d * d), to.Q_r.resize(d * (r + 1)), to.work.resize(d * (r + 1));
+  embedded_.factors[node].resize(static_cast<int>(n), static_cast<int>(r));
+  for (size_t a = 0; a < r; ++a) embedded_.factors[node].X[size_t(to.independent[a]) * r + a] = S(1);
+}
+
+template <class S>
+void EmbeddedWorkspace<S>::choose(const std::shared_ptr<const ResolvedLoops>& loops, const S* q) {
+  using std::sqrt;
+  set_loops(loops);
+  place(q);
+  composite_inertia_tip_to_base(tree_, blocks_);
+  weights_.assign(model_->nv, S(1));
+  for (int k = 0; k < model_->bodies; ++k)
+    for (int i = model_->v_offset[k]; i < model_->v_offset[k] + model_->nv_of[k]; ++i)
+      if (const S felt = dot(blocks_.H[i], blocks_.R[k] * blocks_.H[i]) + blocks_.J[i]; felt > S(0)) weights_[i] = sqrt(felt);
+  for (size_t n = 0; n < nodes_.size(); ++n) choose_of(n);
+  chosen_ = true;
+}
+
+template <class S>
+std::vector<int> EmbeddedWorkspace<S>::independent() const {
+  std::vector<int> all;
+  for (size_t n = 0; chosen_ && n < nodes_.size(); ++n)
+    for (const int place : choices_[n].independent) all.push_back(nodes_[n].coordinates[place]);
+  return all;
+}
+
+// ------------------------------------------------------------------ X, and what follows from it
+template <class S>
+void EmbeddedWorkspace<S>::find_maps() {
+  for (size_t n = 0; n < nodes_.size(); ++n) {
+    Choice& of = choices_[n];
+    const size_t d = of.rows.size(), r = of.independent.size();
+    if (d == 0) continue;
+    for (size_t i = 0; i < d; ++i) {
+      for (const auto& e : rows_.entries[of.rows[i]]) dense_[e.coordinate] = e.value;
+      for (size_t j = 0; j < d; ++j) of.Q_d[i * d + j] = dense_[nodes_[n].coordinates[of.dependent[j]]];
+      for (size_t j = 0; j < r; ++j) of.Q_r[i * r + j] = dense_[nodes_[n].coordinates[of.independent[j]]];
+      for (const auto& e : rows_.entries[of.rows[i]]) dense_[e.coordinate] = S(0);
+    }
+    if (!of.lu.factor(of.Q_d.data(), static_cast<int>(d), nullptr)) {
+      std::string named;
+      for (const int row : of.rows) named += (named.empty() ? "'" : ", '") + loops_->names[row] + "'";
+      throw EvaluationError("loops of '" + source_.name() + "' are singular at this state, by rows " + named + ": no coordinates describe what is free (method 'augment' goes through)");
+    }
+    of.lu.solve(of.Q_r.data(), static_cast<int>(r), of.work.data());
+    for (size_t i = 0; i < d; ++i)
+      for (size_t a = 0; a < r; ++a) embedded_.factors[n].X[size_t(of.dependent[i]) * r + a] = -of.Q_r[i * r + a];
+  }
+}
+
+// target: of all rows; x of the dependent coordinates, of all nodes.
+template <class S>
+void EmbeddedWorkspace<S>::put_dependent(S* target, S* x) {
+  for (size_t n = 0; n < nodes_.size(); ++n) {
+    Choice& of = choices_[n];
+    if (of.rows.empty()) continue;
+    for (size_t i = 0; i < of.rows.size(); ++i) of.Q_r[i] = target[of.rows[i]];
+    of.lu.solve(of.Q_r.data(), 1, of.work.data());
+    for (size_t i = 0; i < of.rows.size(); ++i) x[nodes_[n].coordinates[of.dependent[i]]] = -of.Q_r[i];
+  }
+}
+
+template <class S>
+void EmbeddedWorkspace<S>::velocities(S* v, const S* rates) {
+  for (size_t n = 0; n < nodes_.size(); ++n)
+    for (const int place : choices_[n].dependent) v[nodes_[n].coordinates[place]] = S(0);
+  c_.resize(loops_->rows);
+  for (int row = 0; row < loops_->rows; ++row) c_[row] = rows_.product(row, v) - (rates ? rates[row] : S(0));
+  put_dependent(c_.data(), v);
+}
+
+template <class S>
+S EmbeddedWorkspace<S>::off(const S* q) {
+  using std::abs;
+  residual_.assign(loops_->rows, S(0));
+  loop_residuals(*model_, *loops_, q, buffers_, residual_.data());
+  S most = S(0);
+  for (int row = 0; row < loops_->rows; ++row) {
+    if (!loops_->of_positions[row]) residual_[row] = S(0);
+    if (const S size = size_of(row); size > S(0)) most = maximum(most, S(abs(residual_[row]) / size));
+  }
+  return most;
+}
+
+template <class S>
+void EmbeddedWorkspace<S>::bring(const std::shared_ptr<const ResolvedLoops>& loops, S* q, S* v, const S* rates) {
+  set_loops(loops);
+  if (!chosen_) choose(loops, q);
+  rows_.find(*model_, *loops_, q, buffers_);
+  find_maps();
+  S left = off(q);
+  moved_.resize(model_->nq), delta_.resize(model_->nv);
+  for (int step = 0; step < most_steps && left > S(0); ++step) {  // Newton, as long as each step leaves less than half
+    std::fill(delta_.begin(), delta_.end(), S(0));
+    put_dependent(residual_.data(), delta_.data());
+    move_configuration(*model_, q, delta_.data(), moved_.data());
+    const S now = off(moved_.data());
+    if (!(S(2) * now < left)) break;
+    left = now;
+    std::copy_n(moved_.data(), model_->nq, q);
+    rows_.find(*model_, *loops_, q, buffers_);
+    find_maps();
+  }
+  velocities(v, rates);
+}
+
+template <class S>
+void EmbeddedWorkspace<S>::take_onto(const std::shared_ptr<const ResolvedLoops>& loops, S* q, S* v, const S* rates) {
+  using std::abs;
+  bring(loops, q, v, rates);
+  const S left = off(q);
+  if (!(left <= S(reach_of_steps))) {
+    off_.assign(loops_->rows, S(0));
+    for (int row = 0; row < loops_->rows; ++row)
+      if (const S size = size_of(row); size > S(0)) off_[row] = abs(residual_[row]) / size;
+    refuse_rows(off_, left, "a state has left its loops, off are rows");
+  }
+  choose(loops, q);
+}
+
+template <class S>
+void EmbeddedWorkspace<S>::refuse_rows(const std::vector<S>& off, const S& worst, const char* what) const {
+  std::string named;
+  for (int r = 0; r < loops_->rows; ++r)
+    if (S(2) * off[r] >= worst) named += (named.empty() ? "'" : ", '") + loops_->names[r] + "'";
+  throw EvaluationError(std::string(what) + " of '" + source_.name() + "': " + named);
+}
+
+// ------------------------------------------------------------------ accelerations
+template <class S>
+void EmbeddedWorkspace<S>::find_forces(const Asked& asked, const S* x, const Applied<S>& applied) {
+  forces_.find(asked.v, x, applied);
+  generalized_ = forces_.generalized();
+  for (size_t j = 0; j < added_.size(); ++j) generalized_[j] += added_[j] * x[j];
+}
+
+template <class S>
+void EmbeddedWorkspace<S>::accelerate(const std::shared_ptr<const ResolvedLoops>& loops, const Asked& asked) {
+  using std::abs, std::sqrt;
+  set_loops(loops);
+  if (!chosen_) choose(loops, asked.q);
+  const int nv = model_->nv, rows = loops->rows;
+  place(asked.q);
+  find_maps();
+  if (const int faint = embedded_.factor(blocks_); faint >= 0)
+    throw SingularHingeError("nothing with mass moves along coordinate '" + tree_.coordinate_names[faint] + "' of '" + source_.name() + "' on its loops", faint);
+  forces_.place(asked.q);
+  Applied<S> applied = asked.applied ? *asked.applied : own_gravity(*model_);
+  if (asked.wrenches) applied.wrenches = forces_.on_bodies(*asked.pushed, asked.wrenches);
+  c_.assign(rows, S(0)), bias_.assign(rows, S(0));
+  loop_bias(*model_, *loops, asked.q, asked.v, buffers_, c_.data());
+  S fastest = S(0);
+  for (int i = 0; i < nv; ++i) fastest = maximum(fastest, S(abs(asked.v[i])));
+  for (int r = 0; r < rows; ++r) bias_[r] = abs(c_[r]) + fastest * rows_.product_size(r, asked.v);
+  for (int r = 0; asked.driven && r < rows; ++r) c_[r] -= asked.driven[r], bias_[r] += abs(asked.driven[r]);
+  x_.assign(nv, S(0)), delta_.resize(nv), load_.resize(nv);
+  put_dependent(c_.data(), x_.data());
+  // Steps of refinement of the same equations: the first is the solution.
+  const int more = asked.refinement.steps == Refinement::automatic ? 5 : asked.refinement.steps;
+  S size = S(0), last = S(0);
+  for (int step = 0; step <= more; ++step) {
+    find_forces(asked, x_.data(), applied);
+    for (int i = 0; i < nv; ++i) load_[i] = asked.tau[i] - generalized_[i];
+    const S energy = embedded_.solve(blocks_, load_.data(), delta_.data());
+    if (step == 0) size = sqrt(energy) + sqrt(embedded_.size(asked.tau)) + sqrt(embedded_.size(generalized_.data()));
+    if (step > 0 && (!(energy > S(0)) || (last > S(0) && S(4) * energy > last))) break;
+    for (int i = 0; i < nv; ++i) x_[i] += delta_[i];
+    last = energy;
+  }
+  find_forces(asked, x_.data(), applied);
+  if (std::any_of(x_.begin(), x_.end(), [](const S& x) { return !std::isfinite(to_double(x)); })) return;  // callers say what left its range
+  certify(asked, size);
+  find_multipliers(asked);
+}
+
+// Whether θ̈ keeps all rows and X* of the equations of motion, in units of energy; `size`: what has cancelled there.
+template <class S>
+void EmbeddedWorkspace<S>::certify(const Asked& asked, const S& size) {
+  using std::abs, std::sqrt;
+  off_.assign(loops_->rows, S(0));
+  S worst = S(0);
+  for (const EmbeddedNode& node : nodes_) {
+    S most = S(0);
+    for (const int row : node.rows)
+      if (const S unit = size_of(row); unit > S(0)) most = maximum(most, S((rows_.product_size(row, x_.data()) + bias_[row]) / unit));
+    for (const int row : node.rows) {
+      const S unit = size_of(row);
+      const S left = unit > S(0) ? S(abs(rows_.product(row, x_.data()) + c_[row]) / unit) : S(abs(c_[row]));
+      if (left <= certified() * most) continue;
+      off_[row] = left == left ? left : S(1), worst = maximum(worst, off_[row]);
+    }
+  }
+  if (worst > S(0))
+    refuse_rows(off_, worst, "no sure accelerations on loops, at a singular state, by rows that ask for different accelerations of one motion or by rounding: off are rows");
+  for (size_t i = 0; i < load_.size(); ++i) load_[i] = asked.tau[i] - generalized_[i];
+  const S energy = embedded_.solve(blocks_, load_.data(), nullptr);
+  if (!(sqrt(maximum(energy, S(0))) <= certified() * size))
+    throw EvaluationError("no sure accelerations of '" + source_.name() + "' on its loops: its equations of motion are left off (take refine='auto', or a wider precision)");
+}
+
+// Q_d* λ = (forces - T)_d, by the transpose of Q_d; of rows that hang on others zero.
+template <class S>
+void EmbeddedWorkspace<S>::find_multipliers(const Asked& asked) {
+  lambda_.assign(loops_->rows, S(0));
+  for (size_t n = 0; n < nodes_.size(); ++n) {
+    Choice& of = choices_[n];
+    const size_t d = of.rows.size();
+    if (d == 0) continue;
+    for (size_t i = 0; i < d; ++i) {
+      for (const auto& e : rows_.entries[of.rows[i]]) dense_[e.coordinate] = e.value;
+      for (size_t j = 0; j < d; ++j) of.transposed[j * d + i] = dense_[nodes_[n].coordinates[of.dependent[j]]];
+      for (const auto& e : rows_.entries[of.rows[i]]) dense_[e.coordinate] = S(0);
+      const int coordinate = nodes_[n].coordinates[of.dependent[i]];
+      of.Q_r[i] = generalized_[coordinate] - asked.tau[coordinate];
+    }
+    if (!of.of_transposed.factor(of.transposed.data(), static_cast<int>(d), nullptr)) continue;  // Q_d has factors: so has this
+    of.of_transposed.solve(of.Q_r.data(), 1, of.work.data());
+    for (size_t i = 0; i < d; ++i) lambda_[of.rows[i]] = of.Q_r[i];
+  }
+}
+
+template <class S>
+void EmbeddedWorkspace<S>::add_forces(int first, int end, S* out) const {
+  for (int r = first; r < end; ++r)
+    for (const auto& e : rows_.entries[r]) out[e.coordinate] += e.value * lambda_[r];
+}
+
+template class EmbeddedWorkspace<Single>;
+template class EmbeddedWorkspace<double>;
+template class EmbeddedWorkspace<Extended>;
+template class EmbeddedWorkspace<Quad>;
+
+}  // namespace pycraft
