@@ -1193,6 +1193,10 @@ class LoopSet:
         ...
     def bias(self, q: typing.Any, v: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
         ...
+    def derivatives(self, q: typing.Any, v: typing.Any, vdot: typing.Any, multipliers: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        One under the other ∂(Qv)/∂q, ∂(Q v̇ + Q̇v)/∂q and ∂(Q̇v)/∂v, a row each, and ∂(Q*λ)/∂q.
+        """
     def effect(self, names: collections.abc.Sequence[str], alpha: typing.SupportsFloat | typing.SupportsIndex, beta: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
         """
         What keeps these loops in a scene, all without names.
@@ -1622,7 +1626,7 @@ def scene_interbody_forces(calls: SceneCalls, t: typing.Annotated[numpy.typing.A
     """
 def scene_linearized(calls: SceneCalls, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], t: typing.SupportsFloat | typing.SupportsIndex, states: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
     """
-    At a state, of A ż = g with z = (v, effects' own states): A, the derivatives of g along displacements and along z, ż, and which coordinates are prescribed.
+    At a state, of A ż = g with z = (v, effects' own states): A, the derivatives of g along displacements and along z, ż, which coordinates are prescribed, and what is not in g, the forces of loops; q and v are on these.
     """
 def servo_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, stiffness: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], damping: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], target: FunctionOfTime, effort_limit: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], speed_limit: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], speed_band: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
     ...

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..arguments import whole
-from ..models import linkages
+from ..arguments import one_number, whole
+from ..models import linkages, vehicles
 from ..models.multibody import Multibody
 from .effects import Gravity, Loop, NodeSpring, PointMassGravity, TorqueSource
 from .scene import Scene
@@ -224,3 +224,28 @@ def five_bar(method: str = "augment") -> Scene:
 def stewart(method: str = "augment") -> Scene:
     """A hexapod under gravity along -z, at rest at first, its six legs free to slide."""
     return Scene(linkages.stewart()).add(Gravity(DOWN), Loop(method=method))
+
+
+def bicycle(speed: float = 4.6, lean_rate: float = 0.0, method: str = "augment") -> Scene:
+    """The Whipple bicycle with its rider, benchmark parameters, rolling upright along x without a hand on it; wheels do not slip.
+
+    Coordinate "frame[0]" is its lean, "steer" its steer, both positive to the right. By itself it keeps upright from 4.292 m/s (weave) to
+    6.024 m/s (capsize). Source: as `pycraft.models.vehicles.bicycle`.
+
+    Parameters
+    ----------
+    speed : m/s
+    lean_rate : rad/s, at first
+
+    Examples
+    --------
+    >>> import pycraft as pc
+    >>> running = pc.mechanisms.bicycle(speed=5.0).linearize(inputs="steer")
+    >>> len(running.states)  # seven displacements, three velocities
+    10
+    """
+    model = vehicles.bicycle()
+    speed, lean_rate = one_number(speed, "speed"), one_number(lean_rate, "lean_rate")
+    model.v = [lean_rate, 0, 0, speed, 0, 0, speed / 0.3, 0, speed / 0.35]
+    model.v = model.assemble(model.q, model.v, fix=["rear wheel"]).v
+    return Scene(model).add(Gravity(DOWN), Loop(method=method))

@@ -35,6 +35,11 @@ class Loop(Effect):
     alpha: float = 0.0
     beta: float = 0.0
 
+    def kept(self, model: Any) -> list[str]:
+        """The names of its loops."""
+        names = names_of(self.loops, "loop", "loops")
+        return list(model.loops) if names is None else names
+
     def made_for(self, model: _core.Multibody) -> _core.Effect:
         if text(self.method, "loop: method") not in METHODS:
             raise _core.EvaluationError(f"loop: method={self.method!r}: there are {', '.join(map(repr, METHODS))}")
