@@ -12,8 +12,28 @@ from pycraft.models import linkages
 from support.linkages import close, dense
 
 E, M = pc.effects, pc.mechanisms
-MECHANISMS = {"n_four_bar": 5, "andrews": 7, "bricard": 5, "slider_crank": 3, "peaucellier": 7, "five_bar": 4, "stewart": 24, "bicycle": 9}
-FREE = {"n_four_bar": 1, "andrews": 1, "bricard": 1, "slider_crank": 1, "peaucellier": 1, "five_bar": 2, "stewart": 6, "bicycle": 3}
+MECHANISMS = {
+    "n_four_bar": 5,
+    "andrews": 7,
+    "bricard": 5,
+    "slider_crank": 3,
+    "peaucellier": 7,
+    "five_bar": 4,
+    "stewart": 24,
+    "delta": 21,
+    "bicycle": 9,
+}
+FREE = {
+    "n_four_bar": 1,
+    "andrews": 1,
+    "bricard": 1,
+    "slider_crank": 1,
+    "peaucellier": 1,
+    "five_bar": 2,
+    "stewart": 6,
+    "delta": 3,
+    "bicycle": 3,
+}
 
 
 @pytest.mark.parametrize("name", MECHANISMS)
@@ -234,6 +254,9 @@ def test_refusals_name_what_it_is(what):
         lambda: linkages.peaucellier(crank=2.0),
         lambda: linkages.five_bar(base=3.0),
         lambda: linkages.stewart(height=-1.0),
+        lambda: linkages.delta(position=(0, 0, -2)),
+        lambda: linkages.delta(position=(0, 0)),
+        lambda: linkages.delta(upper=np.nan),
     ],
 )
 def test_linkages_that_do_not_close_are_refused(call):
