@@ -6,9 +6,9 @@ import pytest
 pytest.importorskip("pinocchio")
 
 import pycraft as pc  # noqa: E402 - after the check that the extra is there
-from pycraft.dynamics.embedding import embedded_accelerations  # noqa: E402
-from pycraft.peers import peers  # noqa: E402
-from support.cassie import cassie  # noqa: E402
+from pycraft.dynamics.embedding import embedded_accelerations  # noqa: E402 - after the check that the extra is there
+from pycraft.peers import peers  # noqa: E402 - after the check that the extra is there
+from support.cassie import cassie  # noqa: E402 - after the check that the extra is there
 
 pytestmark = pytest.mark.peers
 

@@ -13,7 +13,7 @@ mujoco = pytest.importorskip("mujoco")
 pytest.importorskip("pinocchio")
 
 from pycraft.interop import mujoco as conventions  # noqa: E402 - after the check that the extra is there
-from pycraft.models import linkages  # noqa: E402
+from pycraft.models import linkages  # noqa: E402 - after the check that the extra is there
 
 pytestmark = pytest.mark.peers
 MECHANISMS = {
