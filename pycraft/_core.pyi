@@ -356,8 +356,7 @@ class Operator:
         """
     def animate(self, x: typing.Any = None, *, on: str = 'tree', request: str = 'apply') -> typing.Any:
         """
-        The sweeps of the plan as a film: the tree (on="robot": the model as it stands), the recursion's line lit, blocks appearing as they are
-        computed for x (ones where it is left out). Shown in a notebook; save("film.html") writes a page. See pycraft.view.SweepFilm.
+        The sweeps of the plan for x (ones where it is left out) as a film on the tree, or on="robot", with a page by save. See pycraft.view.SweepFilm.
         """
     def at(self, q: typing.Any = None, v: typing.Any = None, *, form: str = 'fast', refine: typing.Any = 0, residual: str = 'same', precision: str | int = 'double', threads: typing.Any = 1) -> Operator:
         """
@@ -433,7 +432,7 @@ class Operator:
         """
     def play(self, x: typing.Any = None) -> typing.Any:
         """
-        `animate` on the model as it stands, articulated inertias as ellipses.
+        `animate` on the model as it stands.
         """
     def python(self) -> str:
         """
