@@ -356,8 +356,7 @@ class Operator:
         """
     def animate(self, x: typing.Any = None, *, on: str = 'tree', request: str = 'apply') -> typing.Any:
         """
-        The sweeps of the plan as a film: the tree (on="robot": the model as it stands), the recursion's line lit, blocks appearing as they are
-        computed for x (ones where it is left out). Shown in a notebook; save("film.html") writes a page. See pycraft.view.SweepFilm.
+        The sweeps of the plan for x (ones where it is left out) as a film on the tree, or on="robot", with a page by save. See pycraft.view.SweepFilm.
         """
     def at(self, q: typing.Any = None, v: typing.Any = None, *, form: str = 'fast', refine: typing.Any = 0, residual: str = 'same', precision: str | int = 'double', threads: typing.Any = 1) -> Operator:
         """
@@ -433,7 +432,7 @@ class Operator:
         """
     def play(self, x: typing.Any = None) -> typing.Any:
         """
-        `animate` on the model as it stands, articulated inertias as ellipses.
+        `animate` on the model as it stands.
         """
     def python(self) -> str:
         """
@@ -1206,6 +1205,10 @@ class LoopSet:
         ...
     def bias(self, q: typing.Any, v: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
         ...
+    def derivatives(self, q: typing.Any, v: typing.Any, vdot: typing.Any, multipliers: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        One under the other ∂(Qv)/∂q, ∂(Q v̇ + Q̇v)/∂q and ∂(Q̇v)/∂v, a row each, and ∂(Q*λ)/∂q.
+        """
     def effect(self, names: collections.abc.Sequence[str], alpha: typing.SupportsFloat | typing.SupportsIndex, beta: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
         """
         What keeps these loops in a scene, all without names.
@@ -1635,7 +1638,7 @@ def scene_interbody_forces(calls: SceneCalls, t: typing.Annotated[numpy.typing.A
     """
 def scene_linearized(calls: SceneCalls, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], t: typing.SupportsFloat | typing.SupportsIndex, states: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
     """
-    At a state, of A ż = g with z = (v, effects' own states): A, the derivatives of g along displacements and along z, ż, and which coordinates are prescribed.
+    At a state, of A ż = g with z = (v, effects' own states): A, the derivatives of g along displacements and along z, ż, which coordinates are prescribed, and what is not in g, the forces of loops; q and v are on these.
     """
 def servo_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, stiffness: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], damping: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], target: FunctionOfTime, effort_limit: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], speed_limit: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], speed_band: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
     ...

@@ -74,7 +74,6 @@ py::tuple along_a_run(SceneCalls& calls, const Array& t, const Array& q, const A
   {
     const Undisturbed undisturbed(model);
     calls.with([&]<class S>(CompiledScene<S>& scene) {
-      scene.refuse_loops("interbody forces");
       InterbodyForces<S> on(model.structure(), model.compiled<S>());
       std::vector<S> vdot(nv);
       const size_t states = scene.effects().own();

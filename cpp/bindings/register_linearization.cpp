@@ -39,7 +39,6 @@ py::dict at_rest(SceneCalls& calls, const Array& q, double t, const std::vector<
   {
     const ModelInUse use(calls.scene().model());
     calls.with([&]<class S>(CompiledScene<S>& scene) {
-      scene.refuse_loops("equilibrium");
       if constexpr (std::is_same_v<S, double>) found = statics(scene, t, q.data(), own_states(states, scene.effects().own()));
     });
   }
@@ -56,25 +55,28 @@ py::dict linearized(SceneCalls& calls, const Array& q, const Array& v, double t,
   const Multibody& model = calls.scene().model();
   model.check_v(v.data(), v.size(), "v");
   Linearization at;
-  std::vector<double> rates;
+  std::vector<double> rates, x, forces(model.nv(), 0.0);
   {
     const ModelInUse use(model);
     calls.with([&]<class S>(CompiledScene<S>& scene) {
-      scene.refuse_loops("linear model");
       if constexpr (std::is_same_v<S, double>) {
         for (const auto& e : scene.effects().effects())
           if (e->declared.impulse_period > 0) throw EvaluationError("effect '" + e->name + "' acts by impulses between steps, which no linear model has: disable it, or take Damping in its place");
         SceneLinearized equations(scene, false);
-        const auto x = equations.initial(t, q.data(), v.data(), own_states(states, equations.own()));
+        x = equations.initial(t, q.data(), v.data(), own_states(states, equations.own()));
         const double *at_q = x.data(), *at_v = at_q + model.nq(), *rest = at_v + model.nv();
         rates.resize(model.nv() + equations.own());
         equations.evaluate(t, at_q, at_v, rest, rates.data(), rates.data() + model.nv());
+        for (const auto& e : scene.effects().effects())
+          if (e->declared.loops) scene.loops()->add_forces(e->number, forces.data());
         equations.linearize(t, 1.0, at_q, at_v, rest, rates.data(), rates.data() + model.nv(), at);
       }
     });
   }
   py::dict out;
   out["mass"] = matrix(at.mass), out["along_q"] = matrix(at.along_u), out["along_rest"] = matrix(at.along_z);
+  out["q"] = to_numpy(std::vector<double>(x.begin(), x.begin() + model.nq())), out["v"] = to_numpy(std::vector<double>(x.begin() + model.nq(), x.begin() + model.nq() + model.nv()));
+  out["forces"] = to_numpy(forces);
   out["rates"] = py::array_t<double>(static_cast<py::ssize_t>(rates.size()), rates.data());
   out["known"] = std::vector<bool>(at.known.begin(), at.known.end());
   return out;
@@ -84,7 +86,8 @@ py::dict linearized(SceneCalls& calls, const Array& q, const Array& v, double t,
 
 void register_linearization(py::module_& m) {
   m.def("scene_linearized", &linearized, py::arg("calls"), py::arg("q"), py::arg("v"), py::arg("t"), py::arg("states"),
-        "At a state, of A ż = g with z = (v, effects' own states): A, the derivatives of g along displacements and along z, ż, and which coordinates are prescribed.");
+        "At a state, of A ż = g with z = (v, effects' own states): A, the derivatives of g along displacements and along z, ż, which coordinates are prescribed, and what "
+        "is not in g, the forces of loops; q and v are on these.");
   m.def("scene_at_rest", &at_rest, py::arg("calls"), py::arg("q"), py::arg("t"), py::arg("states"),
         "At a configuration at rest: what is left of all forces, its derivative along displacements, ℳ + J, and which coordinates are prescribed.");
 }

@@ -167,6 +167,12 @@ void register_loops(py::module_& m) {
       .def("bias", [](Loops& l, const py::object& q, const py::object& v, Precision precision) {
         return rows_at(l, {{"q", q}, {"v", v}}, {l.rows()}, [&](Arguments& given, double* out) { l.calls.bias(precision, given[0], given[1], out); });
       }, q, v, precision)
+      .def("derivatives", [](Loops& l, const py::object& q, const py::object& v, const py::object& vdot, const Array& multipliers, Precision precision) {
+        if (multipliers.ndim() != 1 || multipliers.size() != l.rows()) throw ModelError("multipliers are as many as rows, " + std::to_string(l.rows()) + ", not " + shape_text(multipliers));
+        const py::ssize_t n = l.set->model().nv();
+        return rows_at(l, {{"q", q}, {"v", v}, {"vdot", vdot}}, {3 * l.rows() + n, n},
+                       [&](Arguments& given, double* out) { l.calls.derivatives(precision, given[0], given[1], given[2], multipliers.data(), out); });
+      }, q, v, py::arg("vdot"), py::arg("multipliers"), precision, "One under the other ∂(Qv)/∂q, ∂(Q v̇ + Q̇v)/∂q and ∂(Q̇v)/∂v, a row each, and ∂(Q*λ)/∂q.")
       .def("accelerations", [](Loops& l, const py::object& q, const py::object& v, const py::object& tau, const std::vector<std::string>& names, bool in_world,
                                const Array& wrenches, Form form, const py::object& refine, const std::string& residual, Precision precision, double alpha, double beta) {
         const Multibody& model = l.set->model();

@@ -2,7 +2,53 @@
 
 #include <algorithm>
 
+#include "recursions/loop_tangents.h"
+
 namespace pycraft {
+
+namespace {
+
+// Q̇v of a function is Σ ∂²r/∂q_i∂q_j v_i v_j: its derivatives vanish at rest alone.
+template <class S>
+void refuse_moving_functions(const ResolvedLoops& loops, const S* v) {
+  for (const ResolvedLoop& loop : loops.loops)
+    if (loop.loop->coupling.function && std::any_of(loop.v.begin(), loop.v.end(), [&](int j) { return v[j] != S(0); }))
+      throw EvaluationError("coupling '" + loop.loop->name + "' is a function, which has no third derivatives, and its coordinates move: what it asks has derivatives at rest; give polynomials for others");
+}
+
+// One state. The rows' own code, with derivatives along one coordinate after the other, then along one velocity after the other.
+template <class S>
+void differentiate(const CompiledModel<S>& model, const ResolvedLoops& loops, const S* const* given, const double* multipliers, S* out) {
+  const int nv = model.nv, rows = loops.rows, size = rows * nv;
+  const std::vector<S> q(given[0], given[0] + model.nq), v(given[1], given[1] + nv);
+  const S* const vdot = given[2];
+  S *const slip = out, *const along_q = slip + size, *const along_v = along_q + size, *const forces = along_v + size;
+  std::fill_n(out, 3 * size + nv * nv, S(0));
+  refuse_moving_functions(loops, v.data());
+  using T = typename LoopTangents<S>::T;
+  LoopBuffers<T> buffers;
+  std::vector<S> direction(nv, S(0));
+  std::vector<T> moving(v.begin(), v.end()), bias(rows, T(S(0)));
+  for (int j = 0; j < nv; ++j) {
+    direction[j] = S(1);
+    const LoopTangents<S> there(model, loops, q, direction);
+    there.jacobian([&](int row, int i, const S& number) {
+      slip[row * nv + j] += number * v[i], along_q[row * nv + j] += number * vdot[i], forces[i * nv + j] += number * S(multipliers[row]);
+    });
+    loop_bias(there.model, there.by_rule, there.q.data(), moving.data(), buffers, bias.data());
+    for (int row = 0; row < rows; ++row) along_q[row * nv + j] += bias[row].d[0];
+    direction[j] = S(0);
+  }
+  const LoopTangents<S> still(model, loops, q, direction);
+  for (int j = 0; j < nv; ++j) {
+    moving[j].d[0] = S(1);
+    loop_bias(still.model, still.by_rule, still.q.data(), moving.data(), buffers, bias.data());
+    moving[j].d[0] = S(0);
+    for (int row = 0; row < rows; ++row) along_v[row * nv + j] = bias[row].d[0];
+  }
+}
+
+}  // namespace
 
 // The model's use is entered before its loops are resolved: no edit comes between.
 void LoopCalls::residual(Precision precision, Given q, double* out) {
@@ -26,6 +72,14 @@ void LoopCalls::bias(Precision precision, Given q, Given v, double* out) {
   const auto loops = loops_->resolved();
   run(precision, {q, v}, loops->rows, out,
       [&]<class S>(LoopWorkspace<S>& w, const S* const* given, S* bias) { loop_bias(*w.model, *loops, given[0], given[1], w.buffers, bias); });
+}
+
+void LoopCalls::derivatives(Precision precision, Given q, Given v, Given vdot, const double* multipliers, double* out) {
+  const ModelInUse use(model());
+  const auto loops = loops_->resolved();
+  const int n = model().nv();
+  run(precision, {q, v, vdot}, (3 * loops->rows + n) * n, out,
+      [&]<class S>(LoopWorkspace<S>& w, const S* const* given, S* to) { differentiate(*w.model, *loops, given, multipliers, to); });
 }
 
 }  // namespace pycraft

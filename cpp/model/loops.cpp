@@ -29,7 +29,7 @@ Pose<double> frame_along(const Vector3<double>& axis, const Vector3<double>& poi
 // The kind of the pair that a hinge closes. ModelError for hinges that have none.
 PairKind kind_of(const Hinge& hinge, const std::string& loop) {
   const auto across = [&](int i, int j) { return std::abs(dot(hinge.subhinges[i].axis, hinge.subhinges[j].axis)) < 1e-9; };
-  const char* const remedy = ": add a body without mass on that hinge to the tree, and close the loop from it by a weld";
+  const char* const remedy = ": put that hinge into the tree, and close the loop at another one of its hinges";
   switch (hinge.kind) {
     case HingeKind::weld: return PairKind::weld;
     case HingeKind::pin: return PairKind::pin;

@@ -14,7 +14,7 @@
 //   screw         about x, y; along x, y; along and about z
 //
 // A universal hinge has z along its first axis in a, along its second in b. Three axes of a gimbal reach every rotation where the middle one is
-// across the others, and are refused where it is not, as are custom hinges: a body without mass carries those in the tree, welded to b.
+// across the others, and are refused where it is not, as are custom hinges: those stand in the tree, and the loop is closed at another hinge.
 #pragma once
 
 #include <cstdint>

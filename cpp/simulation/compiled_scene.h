@@ -54,11 +54,6 @@ class CompiledScene {
   void give_impulses(const S& t, const S* q, S* v, const S* own, S* gained);
   // Where effects keep loops: a start that is off them is refused, what drifts off them is taken back.
   SceneLoops<S>* loops() { return loops_.get(); }
-  // EvaluationError where there are loops: what is not found on them.
-  void refuse_loops(const std::string& what) const {
-    for (const auto& e : forces_.effects())
-      if (e->declared.loops) throw EvaluationError("effect '" + e->name + "' keeps loops, and a scene has no " + what + " on loops: disable it for those of the tree");
-  }
   bool gives_impulses() const { return !impulsive_.empty(); }
   bool steps_implicitly() const;
 

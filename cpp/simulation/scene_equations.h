@@ -39,15 +39,16 @@ class SceneEquations : public Kind<S> {
 
   // x of a state at t: own states as they are at first where own is null; samples are taken, prescribed coordinates set, works zero.
   State initial(const S& t, const S* q, const S* v, const S* own) {
-    State x(q, q + nq());
-    x.insert(x.end(), v, v + nv());
-    for (double y : scene_.effects().own_states()) x.push_back(S(y));
-    if (own) std::copy_n(own, own_, x.data() + nq() + nv());
-    x.insert(x.end(), works_, S(0));
-    prescribe(t, x);
+    State x = placed(t, q, v, own);
     if (scene_.loops()) scene_.loops()->check_start(x.data(), x.data() + nq());
     settle(t, x);
-    if (stops()) scene_.effects().sample(t, own == nullptr, x.data(), x.data() + nq(), x.data() + nq() + nv());
+    sample(t, own == nullptr, x);
+    return x;
+  }
+  // The same on no loops, for what is asked of a configuration alone.
+  State initial_of_tree(const S& t, const S* q, const S* v, const S* own) {
+    State x = placed(t, q, v, own);
+    sample(t, own == nullptr, x);
     return x;
   }
 
@@ -95,6 +96,18 @@ class SceneEquations : public Kind<S> {
   std::string name_of(int i) const override;
 
  private:
+  State placed(const S& t, const S* q, const S* v, const S* own) {
+    State x(q, q + nq());
+    x.insert(x.end(), v, v + nv());
+    for (double y : scene_.effects().own_states()) x.push_back(S(y));
+    if (own) std::copy_n(own, own_, x.data() + nq() + nv());
+    x.insert(x.end(), works_, S(0));
+    prescribe(t, x);
+    return x;
+  }
+  void sample(const S& t, bool first, State& x) {
+    if (stops()) scene_.effects().sample(t, first, x.data(), x.data() + nq(), x.data() + nq() + nv());
+  }
   void prescribe(const S& t, State& x) {
     if (!scene_.prescribed().empty()) scene_.effects().prescribe(t, x.data(), x.data() + nq(), nullptr);
   }

@@ -76,6 +76,9 @@ class SceneLoops {
       workspace_.add_forces(first_[effect], first_[effect + 1], out);
   }
   bool embeds() const { return embedded_ != nullptr; }
+  // At the last state, as the workspace has it.
+  const ResolvedLoops& kept() const { return *loops_; }
+  Vector6<S> force(int loop, bool on_a) const { return embedded_ ? embedded_->force(loop, on_a) : workspace_.force(loop, on_a); }
   // Whether states are taken onto the rows: not where all of them are drawn there by Baumgarte's gains.
   bool settles() const { return kept_; }
   void take_onto(const S& t, S* q, S* v) {
@@ -105,7 +108,7 @@ class SceneLoops {
     S fastest = S(0);
     for (size_t i = 0; i < zeros_.size(); ++i) fastest = maximum(fastest, S(v[i] < S(0) ? -v[i] : v[i]));
     for (S& off : velocities) off = fastest > S(0) ? S(off / fastest) : S(0);
-    refuse(velocities, "moves off", "Q v = 0 holds at a start");
+    refuse(velocities, "moves off", "Q v = 0 holds of a velocity");
   }
 
  private:
@@ -154,7 +157,7 @@ class SceneLoops {
   void refuse(const std::vector<S>& off, const std::string& how, const std::string& rule) const {
     for (int r = 0; r < loops_->rows; ++r)
       if (!(to_double(off[r]) <= far))
-        throw ModelError("a run's start " + how + " row '" + loops_->names[r] + "' by " + short_number(to_double(off[r])) + ": " + rule + "; model.assemble(q, v) finds one");
+        throw ModelError("the state given " + how + " row '" + loops_->names[r] + "' by " + short_number(to_double(off[r])) + ": " + rule + "; model.assemble(q, v) finds one");
   }
 
   Solving how_;

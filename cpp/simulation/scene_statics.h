@@ -2,7 +2,7 @@
 //
 //   g(q) = T(q, 0) - ID(q, 0, 0),    ∂g/∂q of simulation/scene_linearized.h at v = v̇ = 0.
 //
-// Effects' own states are held, and so are prescribed coordinates, where their motion has them at t: their rows are zero.
+// Where loops are kept their forces are left out: they are what balances g across the states on them. Effects' own states are held, and so are prescribed coordinates, where their motion has them at t: their rows are zero.
 #pragma once
 
 #include <algorithm>
@@ -40,7 +40,7 @@ inline Statics statics(CompiledScene<double>& scene, double t, const double* q, 
   SceneLinearized equations(scene, false);
   const Multibody& model = scene.scene().model();
   const int nq = model.nq(), nv = model.nv();
-  const std::vector<double> still(nv, 0.0), x = equations.initial(t, q, still.data(), own);
+  const std::vector<double> still(nv, 0.0), x = equations.initial_of_tree(t, q, still.data(), own);
   const double* const rest = x.data() + nq + nv;
   Statics found;
   found.q.assign(x.begin(), x.begin() + nq);

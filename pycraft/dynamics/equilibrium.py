@@ -177,7 +177,7 @@ class _Search:
             self.refuse(now)
         residual, holding = np.zeros(self.model.nv), -now.left
         residual[self.free], holding[self.free] = now.left[self.free], 0.0
-        return Equilibrium(self.q, residual, holding + 0.0, -now.along_q + 0.0, modes(self.model, now, self.free))
+        return Equilibrium(self.q, residual, holding + 0.0, -now.along_q + 0.0, modes(self.model, now, np.eye(self.model.nv)[:, self.free]))
 
     def take(self, x: np.ndarray) -> None:
         """Go on from there: only where less is left."""
@@ -283,17 +283,17 @@ class _Search:
         )
 
 
-def modes(model: Any, at: Balance, free: np.ndarray) -> tuple[Mode, ...]:
-    """How the free coordinates leave an equilibrium, or swing about it, by rising eigenvalue."""
+def modes(model: Any, at: Balance, basis: np.ndarray) -> tuple[Mode, ...]:
+    """How displacements along the columns of a basis (nv, k) leave an equilibrium, or swing about it, by rising eigenvalue."""
     from scipy.linalg import eig, eigh
 
-    if not len(free):
+    count = basis.shape[1]
+    if not count:
         return ()
-    chosen = np.ix_(free, free)
-    stiffness, mass = -at.along_q[chosen], at.mass[chosen]
+    stiffness, mass = -basis.T @ at.along_q @ basis, basis.T @ at.mass @ basis
     lightest, heaviest = np.linalg.eigvalsh(mass)[[0, -1]]
-    if lightest <= len(free) * np.finfo(float).eps * heaviest:
-        mass, lightest = np.eye(len(free)), 1.0  # the signs of eigenvalues are the same
+    if lightest <= count * np.finfo(float).eps * heaviest:
+        mass, lightest = np.eye(count), 1.0  # the signs of eigenvalues are the same
     rounding = 1e3 * np.finfo(float).eps * at.size  # of forces, sums over the bodies
     if np.abs(stiffness - stiffness.T).max() <= max(INDIFFERENT * np.abs(stiffness).max(), rounding):
         values, shapes = eigh((stiffness + stiffness.T) / 2, mass)
@@ -304,8 +304,8 @@ def modes(model: Any, at: Balance, free: np.ndarray) -> tuple[Mode, ...]:
     for i in np.argsort(np.real(values), kind="stable"):
         value = values[i]
         kind = "indifferent" if abs(value) <= zero else "unstable" if np.real(value) < 0 or abs(np.imag(value)) > zero else "stable"
-        shape = np.zeros(model.nv, shapes.dtype)
-        shape[free] = shapes[:, i] / shapes[np.argmax(np.abs(shapes[:, i])), i]
+        shape = basis @ shapes[:, i]
+        shape = shape / shape[np.argmax(np.abs(shape))]
         moving = tuple(model.coordinate_names[j] for j in np.flatnonzero(np.abs(shape) >= 0.5))
         found.append(Mode(complex(value) if np.iscomplexobj(values) else float(value), shape, moving, kind))
     return tuple(found)

@@ -26,7 +26,7 @@ class LinearizationCalls:
 
     def linearize(
         self, q=None, v=None, tau=None, *, inputs: Any = None, outputs: Any = None, form: str = "fast", precision: str = "double",
-        dt: float | None = None, method: str = "zoh",
+        dt: float | None = None, method: str = "zoh", loops: bool = False, independent: Any = None,
     ) -> LinearModel:  # fmt: skip
         """The linear model of v̇ = forward_dynamics(q, v, τ) near a state, or near each of a batch: δẋ = A δx + B δu, x = (q, v).
 
@@ -46,15 +46,22 @@ class LinearizationCalls:
             the frame's axes), "velocity.hand" (6, the frame's axes, angular first) of bodies and nodes.
         form, precision : as in `forward_dynamics`
         dt, method : s, where the model is to be discrete, and how (`LinearModel.discrete`)
+        loops : whether the loops are kept: of `constrained_dynamics`, at a state on them, in independent coordinates (docs/loops.md)
+            States are then the displacements and velocities of as many coordinates as there are freedoms; where rows are of velocities
+            (rolling), of more displacements than velocities.
+        independent : names of the coordinates whose displacements are states, with loops=True; None: those that tell the others best
 
         Returns
         -------
-        LinearModel : A (2 nv, 2 nv), B (2 nv, m), C, D; `.rate` is ẋ at the state, zero at an equilibrium
+        LinearModel : A (2 nv, 2 nv), B (2 nv, m), C, D; `.rate` is ẋ at the state, zero at an equilibrium; on loops fewer states,
+            and `.tangent` (2 nv, n)
 
         Raises
         ------
         ModelError
-            Names that are not there.
+            Names that are not there; with loops a state off them, coordinates that do not tell where the others are.
+        EvaluationError
+            With loops: a singular state; a coupling by a function whose coordinates move.
         SingularHingeError
             As `forward_dynamics`.
 
@@ -73,14 +80,20 @@ class LinearizationCalls:
         q, v = at_state(model, q, v)
         tau = np.zeros(self.nv) if tau is None else tau
         how = {"form": form, "precision": precision}
+        chosen = list(range(self.nv)) if inputs is None else _core.coordinates_named(model, listed(inputs, "inputs"), "inputs")
+        names = model.coordinate_names
+        named = tuple(f"tau.{names[j]}" for j in chosen)
+        if loops:
+            from .linear_on_loops import linearize_on_loops
+
+            made = linearize_on_loops(model, q, v, tau, chosen, named, outputs, independent, how)
+            return made if dt is None else made.discrete(dt, method)
+        if independent is not None:
+            raise _core.ModelError("independent: coordinates of a tree are all independent; with loops=True its loops are kept")
         dq, dv, inverse = self.forward_dynamics_derivatives(q, v, tau, **how)
         vdot = self.forward_dynamics(q, v, tau, **how)
         v = np.asarray(getattr(v, "v", v), float)
-        chosen = list(range(self.nv)) if inputs is None else _core.coordinates_named(model, listed(inputs, "inputs"), "inputs")
-        names = model.coordinate_names
-        made = linear_model(
-            model, q, v, vdot, dq, dv, inverse[..., chosen], tuple(f"tau.{names[j]}" for j in chosen), outputs, names_of_states(names)
-        )
+        made = linear_model(model, q, v, vdot, dq, dv, inverse[..., chosen], named, outputs, names_of_states(names))
         return made if dt is None else made.discrete(dt, method)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from .. import _core
 from ..state import at_state
 from .equilibrium import TOLERANCE, Balance, Equilibrium, checked_tolerance, solved
+from .equilibrium_on_loops import solved_on_loops
 from .interbody import pushed
 from .linearization import listed
 
@@ -34,7 +35,7 @@ class StaticsCalls:
 
     def equilibrium(
         self, tau: Any = None, q0: Any = None, *, wrenches: Mapping[Any, Any] | None = None, wrench_axes: str = "world", hold: Any = (),
-        limits: bool = False, stable: bool = False, tolerance: float = TOLERANCE,
+        limits: bool = False, stable: bool = False, tolerance: float = TOLERANCE, loops: bool = False,
     ) -> Any:  # fmt: skip
         """A configuration at which the model stays at rest: τ = T(q, 0, 0), gravity and wrenches included.
 
@@ -51,6 +52,7 @@ class StaticsCalls:
         limits : whether q is to be within the hinges' limits
         stable : whether only a stable or indifferent equilibrium will do
         tolerance : what may be left, as a part of the largest force
+        loops : whether the loops are kept: the search starts at the state on them near q0, and their forces balance, too; not with limits
 
         Returns
         -------
@@ -78,6 +80,8 @@ class StaticsCalls:
         given = np.asarray(_core.real_array(tau, "tau"), float)
         given = np.full(self.nv, given) if given.ndim == 0 else given
         names, in_world, numbers = pushed(wrenches, wrench_axes)
+        if loops and limits:
+            raise _core.EvaluationError("limits of hinges are not kept to on loops: look at q, or hold coordinates (hold=)")
         held = _core.coordinates_named(model, listed(hold, "hold"), "hold")
         starts = np.asarray(_core.real_array(q0, "q"), float)
         if given.ndim not in (1, 2) or given.shape[-1] != self.nv:
@@ -98,6 +102,8 @@ class StaticsCalls:
             def at(q: np.ndarray) -> Balance:
                 return _at_rest(model, q, force, names, in_world, pushes, size)
 
+            if loops:
+                return solved_on_loops(model, at, q, model.loops, held, bool(stable), tolerance)
             return solved(model, at, q, held, bool(limits), bool(stable), tolerance)
 
         if not states:

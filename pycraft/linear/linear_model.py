@@ -31,6 +31,8 @@ class LinearModel:
     units : of the states, by name
     dt : s, None where time is continuous
     model, q, v, t : where it was taken
+    tangent : (2 nv + ..., n), of a model on its loops, whose states are independent coordinates: what the tree's states are by these, to
+        first order; None where the states are all of them
     """
 
     A: np.ndarray
@@ -47,6 +49,12 @@ class LinearModel:
     v: np.ndarray = field(repr=False)
     t: Any = 0.0
     dt: float | None = None
+    tangent: np.ndarray | None = field(default=None, repr=False)
+
+    @property
+    def displacements(self) -> int:
+        """How many of the states are displacements: the first ones."""
+        return sum(name.startswith("q.") for name in self.states)
 
     def __len__(self) -> int:
         if self.A.ndim == 2:
@@ -67,6 +75,7 @@ class LinearModel:
             q=q,
             v=v,
             t=self.t if np.ndim(self.t) == 0 else float(self.t[index]),
+            tangent=None if self.tangent is None else self.tangent[index],
         )
 
     def __repr__(self) -> str:
@@ -183,6 +192,15 @@ class LinearModel:
     def to_numpy(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """(A, B, C, D)."""
         return self.A, self.B, self.C, self.D
+
+
+def stacked(each: list[LinearModel]) -> LinearModel:
+    """A batch of linear models of the same states, inputs and outputs."""
+    first = each[0]
+    A, B, C, D, rate, q, v = (np.stack([getattr(one, name) for one in each]) for name in ("A", "B", "C", "D", "rate", "q", "v"))
+    tangent = None if first.tangent is None else np.stack([one.tangent for one in each if one.tangent is not None])
+    t = np.array([one.t for one in each])
+    return LinearModel(A, B, C, D, rate, first.states, first.inputs, first.outputs, first.units, first.model, q, v, t, tangent=tangent)
 
 
 def names_of_states(coordinates: Sequence[str], own: int = 0) -> tuple[str, ...]:

@@ -56,11 +56,13 @@ class Modes(TidyTable):
         of, count = self._of, max(1, phases)
         if not -len(self) <= mode < len(self):
             raise _core.EvaluationError(f"mode {mode} is not there; there are {len(self)}")
-        n = len(of.v)
-        shape = self.shapes[:n, mode]
+        n = of.displacements
+        shape = self.shapes[:n, mode] if of.tangent is None else of.tangent[: len(of.v)] @ self.shapes[:, mode]
         swing = np.real(shape * np.exp(-1j * np.angle(shape[np.abs(shape).argmax()]))) if n and np.abs(shape).max() > 0 else np.zeros(n)
         for phase in sorted(np.linspace(-1, 1, count), key=abs, reverse=True):
             q = of.model.integrate(of.q, amplitude * phase * swing)
+            if of.tangent is not None:
+                q = of.model.assemble(q).q
             ax = of.model.plot(q, ax, legend=False, shadow=False, alpha=1.0 - 0.75 * abs(phase))
         row = self[mode]
         ax.set_title(f"{of.model.name}, {row['natural']:.3g} Hz: {', '.join(row['moves'])}", fontsize="medium")
@@ -75,7 +77,7 @@ def modes_of(of: LinearModel) -> Modes:
             values = np.log(values.astype(complex)) / of.dt
     kept = [i for i, value in enumerate(values) if value.imag >= 0]
     kept.sort(key=lambda i: (abs(values[i]), values[i].real))
-    n = of.v.shape[-1]
+    n = of.displacements
     rounding = 10 * len(values) * np.finfo(float).eps * (np.linalg.norm(of.A) if of.dt is None else 1 / of.dt)
     rows, shapes = [], np.zeros((len(of.states), len(kept)), complex)
     for column, i in enumerate(kept):

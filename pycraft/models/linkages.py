@@ -209,6 +209,51 @@ def stewart(base: float = 1.0, plate: float = 0.6, height: float = 1.0) -> Multi
     return model
 
 
+def delta(base: float = 0.2, plate: float = 0.05, upper: float = 0.3, lower: float = 0.6, position: Any = (0.0, 0.0, -0.5)) -> Multibody:
+    """A Delta robot: three motors on the ground turn arms, each holds the plate by two parallel rods, so that it moves without turning.
+
+    Node "plate" is the centre of its body "platform". Coordinates are those of the platform, free, then of each arm its angle below the
+    horizontal and those of its two rods, universal hinges.
+
+    Source: R. Clavel, Conception d'un robot parallèle rapide à 4 degrés de liberté, thèse 925, EPFL, 1991.
+
+    Parameters
+    ----------
+    base, plate : m, radii of the motors and of the rods' ends
+    upper, lower : m, of the arms and of the rods, 1 kg a metre
+    position : (3,) m, of the plate at its state, below the motors; elbows point outward
+    """
+    base, plate, upper, lower = _numbers(base=base, plate=plate, upper=upper, lower=lower)
+    place = np.asarray(_core.real_array(position, "position"), float)
+    if place.shape != (3,) or not (min(base, plate, upper, lower) > 0 and np.isfinite([base, plate, upper, lower, *place]).all()):
+        raise _core.ModelError("delta: base, plate, upper and lower are positive lengths, position is three finite numbers")
+    model, apart, z = Multibody("delta"), min(plate, base) / 2, np.array([0.0, 0, 1])
+    model.add_body("platform", hinge="free", mass=0.5, inertia=0.5 * plate**2 * np.diag([0.25, 0.25, 0.5]))
+    model.add_node("plate", "platform")
+    q = [1.0, 0, 0, 0, *place]
+    for i in range(3):
+        out = _on_circle(1.0, 2 * np.pi * i / 3, 0)
+        side = np.cross(z, out)
+        way = place + (plate - base) * out  # from the motor to where the rods end
+        along, down = way @ out, -way @ z
+        cosine = (way @ way + upper**2 - lower**2) / (2 * upper * np.hypot(along, down))
+        if not abs(cosine) <= 1:
+            raise _core.ModelError(f"delta: position={place.tolist()} is out of the reach of arm {i}")
+        angle = float(np.arctan2(down, along) - np.arccos(cosine))
+        rest = (way - upper * (np.cos(angle) * out - np.sin(angle) * z)) / lower
+        model.add_body(f"arm{i}", axis=side, position=base * out, **rod(upper, upper, out))
+        q.append(angle)
+        for j, off in enumerate((apart * side, -apart * side)):
+            model.add_body(
+                f"rod{i}{j}", f"arm{i}", hinge="universal", axes=[side, out], position=upper * out + off, **rod(lower, lower, -z)
+            )
+            end = model.add_node(f"end{i}{j}", f"rod{i}{j}", position=-lower * z)
+            model.add_loop(end, model.add_node(f"hold{i}{j}", "platform", position=plate * out + off), hinge="ball", name=f"rod{i}{j}")
+            q += [float(np.arctan2(-rest @ out, -rest @ z)) - angle, float(np.arcsin(rest @ side))]  # R_side(a) R_out(b) takes -z there
+    model.q = q
+    return model
+
+
 def andrews() -> Multibody:
     """Andrews' squeezer: seven bodies in a plane, three loops that end in one point, within 30 ms and some centimetres.
 
@@ -240,4 +285,39 @@ def andrews() -> Multibody:
         epsilon,
         -phi,
     ]
+    return model
+
+
+def _box(mass: float, *sides: float) -> np.ndarray:
+    """The inertia of a solid box about its centre of mass, kg m²."""
+    squares = np.square(sides)
+    return np.asarray(mass / 12 * np.diag(squares.sum() - squares))
+
+
+def flyball_governor(rigid: bool = False) -> Multibody:
+    """Watt's governor: a shaft turns about z, a slider goes along it, two rods hang from its top, of 1 m, with 5 kg at their ends.
+
+    Nodes "middle0" and "middle1" of the rods and "collar0" and "collar1" of the slider are 0.5 m from each other, which springs and dampers
+    keep them, or with rigid=True loops, "coupler0" and "coupler1". Coordinates are the shaft's angle, the slider's height and the angles
+    of the rods below the horizontal, 0.5 m and 30° at first.
+
+    Source: M. González, D. Dopico, U. Lugrís, J. Cuadrado, A benchmarking system for MBS simulation software, Multibody System Dynamics 16,
+    2006 (IFToMM library of benchmark problems, A05, "stiff flyball governor"), whose couplers are springs.
+    """
+    model, density, thin = Multibody("flyball governor"), 3000.0, 0.01
+    bar, ball = density * thin**2, 5.0
+    model.add_body("shaft", axis=(0, 0, 1), mass=bar, com=(0, 0, 0.5), inertia=_box(bar, thin, thin, 1.0))
+    cube = density * 0.1**3
+    model.add_body("slider", "shaft", hinge="slider", axis=(0, 0, 1), mass=cube, inertia=_box(cube, 0.1, 0.1, 0.1))
+    for i, side in enumerate((1.0, -1.0)):
+        centre = (bar / 2 + ball) / (bar + ball)
+        off = bar * (centre - 0.5) ** 2 + ball * (1 - centre) ** 2
+        inertia = _box(bar, 1.0, thin, thin) + off * np.diag([0.0, 1.0, 1.0])
+        rod_body: dict[str, Any] = {"mass": bar + ball, "com": (side * centre, 0, 0), "inertia": inertia}
+        model.add_body(f"rod{i}", "shaft", axis=(0, side, 0), position=(0.05 * side, 0, 1.0), **rod_body)
+        middle = model.add_node(f"middle{i}", f"rod{i}", position=(0.5 * side, 0, 0))
+        collar = model.add_node(f"collar{i}", "slider", position=(0.05 * side, 0, 0))
+        if rigid:
+            model.add_surface(middle, collar, A=np.eye(3), b=(0, 0, 0), c=-0.25, name=f"coupler{i}")
+    model.q = [0.0, 0.5, np.pi / 6, np.pi / 6]
     return model

@@ -168,7 +168,7 @@ class Loops(Closed, Mapping):
         declared = self._ends(a, b, name) | {"kind": hinge}
         what = f"loop {declared['name']!r}"
         if hinge == "custom":
-            remedy = "add a body without mass on that hinge to the tree, and close the loop from it by a weld"
+            remedy = "put that hinge into the tree, and close the loop at another one of its hinges"
             raise _core.ModelError(f"{what}: a custom hinge has no rows of its own: {remedy}")
         axes = hinge_axes(what, hinge, given["axis"], given["axes"], given["point"], None)
         declared["axes"] = [_numbers(axis, f"axis of {what}") for axis in axes]

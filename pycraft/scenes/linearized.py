@@ -8,12 +8,16 @@ import numpy as np
 
 from .. import _core
 from ..arguments import one_number
+from ..dynamics.linear_on_loops import chosen_numbers, independent_numbers, linear_model_on_loops
 from ..dynamics.linearization import linear_model, listed
-from ..linear.linear_model import LinearModel, names_of_states
+from ..dynamics.loop_tangents import TreeDerivatives, kept_rows
+from ..linear.linear_model import LinearModel, names_of_states, stacked
 from ..state import at_state
 
 
-def linearize(scene: Any, q: Any, v: Any, t: Any, *, states: Any, inputs: Any, outputs: Any, dt: float | None, method: str) -> LinearModel:
+def linearize(
+    scene: Any, q: Any, v: Any, t: Any, *, states: Any, inputs: Any, outputs: Any, dt: float | None, method: str, independent: Any
+) -> LinearModel:
     """`Scene.linearize`."""
     model, calls = scene.model, scene._calls()
     q, v = at_state(model, q, v)
@@ -21,16 +25,20 @@ def linearize(scene: Any, q: Any, v: Any, t: Any, *, states: Any, inputs: Any, o
     v = np.zeros(model.nv) if v is None else np.asarray(getattr(v, "v", v), float)
     chosen = list(range(model.nv)) if inputs is None else _core.coordinates_named(model, listed(inputs, "inputs"), "inputs")
     names = tuple(f"tau.{model.coordinate_names[j]}" for j in chosen)
+    if independent is not None and not scene._keeps_loops():
+        raise _core.ModelError("independent: coordinates of a tree are all independent; with effects.Loop() a scene keeps loops")
+    numbers = independent_numbers(model, independent)
     if q.ndim == v.ndim == 1:
-        made = _at(scene, calls, q, v, one_number(t, "t"), () if states is None else states, chosen, names, outputs)
+        made = _at(scene, calls, q, v, one_number(t, "t"), () if states is None else states, chosen, names, outputs, numbers)
     else:
-        made = _along(scene, calls, q, v, t, states, chosen, names, outputs)
+        made = _along(scene, calls, q, v, t, states, chosen, names, outputs, numbers)
     return made if dt is None else made.discrete(dt, method)
 
 
 def _along(
-    scene: Any, calls: Any, q: np.ndarray, v: np.ndarray, t: Any, states: Any, chosen: list[int], names: tuple[str, ...], outputs: Any
-) -> LinearModel:
+    scene: Any, calls: Any, q: np.ndarray, v: np.ndarray, t: Any, states: Any, chosen: list[int], names: tuple[str, ...], outputs: Any,
+    independent: list[int] | None,
+) -> LinearModel:  # fmt: skip
     count = len(q) if q.ndim == 2 else len(v)
     times, own = _core.real_array(t, "t"), np.zeros((count, 0)) if states is None else np.atleast_1d(_core.real_array(states, "states"))
     for name, x, axes in (("q", q, 2), ("v", v, 2), ("t", times, 1), ("states", own, 2)):
@@ -40,16 +48,17 @@ def _along(
     times = np.broadcast_to(times, (count,))
     if not count:
         raise _core.ModelError("a linear model along no states: q has no rows")
-    each = [_at(scene, calls, q[b], v[b], float(times[b]), own[b], chosen, names, outputs) for b in range(count)]
-    first = each[0]
-    stacked = [np.stack([getattr(one, name) for one in each]) for name in ("A", "B", "C", "D", "rate", "q", "v")]
-    A, B, C, D, rate, all_q, all_v = stacked
-    return LinearModel(A, B, C, D, rate, first.states, first.inputs, first.outputs, first.units, first.model, all_q, all_v, times.copy())
+    each: list[LinearModel] = []
+    for b in range(count):
+        each.append(_at(scene, calls, q[b], v[b], float(times[b]), own[b], chosen, names, outputs, independent))
+        independent = independent or (chosen_numbers(each[0]) if each[0].tangent is not None else None)
+    return stacked(each)
 
 
 def _at(
-    scene: Any, calls: Any, q: np.ndarray, v: np.ndarray, t: float, states: Any, chosen: list[int], names: tuple[str, ...], outputs: Any
-) -> LinearModel:
+    scene: Any, calls: Any, q: np.ndarray, v: np.ndarray, t: float, states: Any, chosen: list[int], names: tuple[str, ...], outputs: Any,
+    independent: list[int] | None,
+) -> LinearModel:  # fmt: skip
     model, states = scene.model, np.atleast_1d(_core.real_array(states, "states")) if np.size(states) else np.zeros(0)
     if not np.isfinite(states).all():
         raise _core.ModelError(f"states: entry {int(np.flatnonzero(~np.isfinite(states))[0])} is {states[~np.isfinite(states)][0]}")
@@ -59,6 +68,11 @@ def _at(
     given = np.zeros((nv + own, len(chosen)))
     for column, j in enumerate(chosen):
         given[j, column] = 0.0 if j in known else 1.0
+    if scene._keeps_loops():
+        given[:nv] = np.eye(nv)[:, chosen]  # what is prescribed takes what acts there
+        mass, along_q, along_rest = found["mass"], found["along_q"], found["along_rest"]
+        tree = TreeDerivatives(mass, along_q, along_rest, given, found["v"], found["rates"], found["forces"])
+        return linear_model_on_loops(kept_rows(model, found["q"], scene._kept_loops(), known), tree, names, outputs, independent, t)
     sides = np.hstack([found["along_q"], found["along_rest"], given])
     solved = np.linalg.solve(found["mass"], sides) if nv + own else sides
     along_q, along_rest, along_inputs = np.split(solved, [nv, 2 * nv + own], axis=1)

@@ -144,28 +144,29 @@ class Measurements:
 
     def linearize(
         self, q=None, v=None, t: Any = 0.0, *, states: Any = None, inputs: Any = None, outputs: Any = None, dt: float | None = None,
-        method: str = "zoh",
+        method: str = "zoh", independent: Any = None,
     ) -> LinearModel:  # fmt: skip
         """The linear model of the scene near a state, its effects included, or near each of a batch, as of a run (`run.q, run.v, run.t`).
 
         States, inputs and outputs are as in `Multibody.linearize`, and the effects' own states follow the velocities ("state.0", ...).
         Inputs are generalized forces beside those of the effects. Exact: effects written in C++ by derivatives of their own arithmetic;
         those in Python by central differences, of which about ten digits are right. Time itself is held. What is prescribed stays as it is
-        told: its rows and columns are zero, and an input there moves nothing.
+        told: its rows and columns are zero, and an input there moves nothing. Where effects keep loops the states are displacements and
+        velocities on them, in independent coordinates, as of `Multibody.linearize` with loops=True.
 
         Parameters
         ----------
         q, v : (nq,), (nv,), each with an optional leading batch axis
         t : s, one number or one for each state
         states : (n,) or (B, n), of the effects' own; as they are at first where left out
-        inputs, outputs, dt, method : as in `Multibody.linearize`
+        inputs, outputs, dt, method, independent : as in `Multibody.linearize`
 
         Raises
         ------
         EvaluationError
-            A scene in another precision than double.
+            A scene in another precision than double; a singular state of loops.
         ModelError
-            Names that are not there, another number of states.
+            Names that are not there, another number of states; a state off the loops, coordinates that do not tell where the others are.
 
         Examples
         --------
@@ -177,4 +178,4 @@ class Measurements:
         """
         from .linearized import linearize
 
-        return linearize(self, q, v, t, states=states, inputs=inputs, outputs=outputs, dt=dt, method=method)
+        return linearize(self, q, v, t, states=states, inputs=inputs, outputs=outputs, dt=dt, method=method, independent=independent)

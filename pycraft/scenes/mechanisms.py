@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..arguments import whole
-from ..models import linkages
+from ..arguments import one_number, whole
+from ..models import linkages, vehicles
 from ..models.multibody import Multibody
-from .effects import Gravity, Loop, NodeSpring, PointMassGravity, TorqueSource
+from .effects import Gravity, Loop, NodeDamper, NodeSpring, PointMassGravity, TorqueSource
 from .scene import Scene
 
 DOWN = (0.0, 0.0, -9.81)
@@ -224,3 +224,64 @@ def five_bar(method: str = "augment") -> Scene:
 def stewart(method: str = "augment") -> Scene:
     """A hexapod under gravity along -z, at rest at first, its six legs free to slide."""
     return Scene(linkages.stewart()).add(Gravity(DOWN), Loop(method=method))
+
+
+def delta(method: str = "augment") -> Scene:
+    """A Delta robot under gravity along -z, at rest at first, its three motors off: its plate falls and swings without turning.
+
+    Source: as `pycraft.models.linkages.delta`.
+    """
+    return Scene(linkages.delta(position=(0.05, 0.02, -0.5))).add(Gravity(DOWN), Loop(method=method))
+
+
+def flyball_governor(rigid: bool = False, method: str = "augment") -> Scene:
+    """Watt's governor, its shaft turning freely with 2π rad/s at first, under gravity: balls fly out, the slider rises, and they swing.
+
+    Its couplers are springs of 8e5 N/m and dampers of 4e4 N s/m, stiff: take integrator="rosenbrock4"; or rigid, as loops.
+    Source: as `pycraft.models.linkages.flyball_governor`.
+
+    Parameters
+    ----------
+    rigid : whether the couplers have no give
+    method : of `effects.Loop`, of rigid couplers
+
+    Examples
+    --------
+    >>> import pycraft as pc
+    >>> run = pc.mechanisms.flyball_governor(rigid=True).simulate(0.2)
+    >>> bool(abs(run.q[-1, 1] - (1 - np.sin(run.q[-1, 2]))) < 1e-12)  # the height, of a rhombus
+    True
+    """
+    model = linkages.flyball_governor(rigid)
+    model.v = [2 * np.pi, 0, 0, 0]
+    scene = Scene(model).add(Gravity(DOWN))
+    if rigid:
+        return scene.add(Loop(method=method))
+    for i in range(2):
+        scene.add(NodeSpring(f"middle{i}", f"collar{i}", 8e5, 0.5), NodeDamper(f"middle{i}", f"collar{i}", 4e4))
+    return scene
+
+
+def bicycle(speed: float = 4.6, lean_rate: float = 0.0, method: str = "augment") -> Scene:
+    """The Whipple bicycle with its rider, benchmark parameters, rolling upright along x without a hand on it; wheels do not slip.
+
+    Coordinate "frame[0]" is its lean, "steer" its steer, both positive to the right. By itself it keeps upright from 4.292 m/s (weave) to
+    6.024 m/s (capsize). Source: as `pycraft.models.vehicles.bicycle`.
+
+    Parameters
+    ----------
+    speed : m/s
+    lean_rate : rad/s, at first
+
+    Examples
+    --------
+    >>> import pycraft as pc
+    >>> running = pc.mechanisms.bicycle(speed=5.0).linearize(inputs="steer")
+    >>> len(running.states)  # seven displacements, three velocities
+    10
+    """
+    model = vehicles.bicycle()
+    speed, lean_rate = one_number(speed, "speed"), one_number(lean_rate, "lean_rate")
+    model.v = [lean_rate, 0, 0, speed, 0, 0, speed / 0.3, 0, speed / 0.35]
+    model.v = model.assemble(model.q, model.v, fix=["rear wheel"]).v
+    return Scene(model).add(Gravity(DOWN), Loop(method=method))

@@ -216,6 +216,10 @@ class Scene(Measurements, Statics, Filed, Closed):
             self._built = (now, _core.SceneCalls(self._fresh_core(), form, refine, residual, precision))
         return self._built[1]
 
+    def _kept_loops(self) -> list[str]:
+        """The loops that effects which are on keep, by name."""
+        return [name for effect, on in self._entries.values() if on and isinstance(effect, Loop) for name in effect.kept(self._model)]
+
     def _keeps_loops(self) -> bool:
         """Whether an effect that is on keeps loops."""
         return any(on and isinstance(effect, Loop) for effect, on in self._entries.values())

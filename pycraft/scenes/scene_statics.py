@@ -9,6 +9,7 @@ import numpy as np
 from .. import _core
 from ..arguments import moment
 from ..dynamics.equilibrium import TOLERANCE, Balance, Equilibrium, solved
+from ..dynamics.equilibrium_on_loops import solved_on_loops
 from ..dynamics.interbody import forces_of_scene
 from ..dynamics.linearization import listed
 from ..state import at_state
@@ -19,6 +20,8 @@ class Statics:
 
     model: Any
     _calls: Any
+    _keeps_loops: Any
+    _kept_loops: Any
 
     def interbody_forces(
         self, hinges: Any = None, q=None, v=None, t: float = 0.0, *, states: Any = None, axes: Any = "body", about: Any = None,
@@ -67,7 +70,8 @@ class Statics:
         """A configuration at which all effects balance and nothing moves: found, judged and refused as `Multibody.equilibrium`.
 
         The model's own gravity counts for nothing; effects that act in motion alone give no force. Effects' own states are held, and
-        prescribed coordinates are where their motion has them at t.
+        prescribed coordinates are where their motion has them at t. Where effects keep loops the search starts at the state on them near
+        q0, and what balances forces are the loops', too (docs/loops.md); limits are not kept to there.
 
         Parameters
         ----------
@@ -101,6 +105,10 @@ class Statics:
         def one(q: np.ndarray) -> Equilibrium:
             placed = _core.scene_at_rest(calls, q, time, own)  # with prescribed coordinates where they are at t
             fixed = {*held, *np.flatnonzero(placed["known"])}
+            if self._keeps_loops():
+                if limits:
+                    raise _core.EvaluationError("limits of hinges are not kept to on loops: look at q, or take effects.Limits")
+                return solved_on_loops(self.model, at, placed["q"], self._kept_loops(), fixed, bool(stable), tolerance)
             return solved(self.model, at, placed["q"], fixed, bool(limits), bool(stable), tolerance)
 
         if starts.ndim > 2:

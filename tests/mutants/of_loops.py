@@ -26,6 +26,14 @@ CHANGES = {
     "cpp/dynamics/constrained_dynamics.h": [
         ("in quad the rounding of states is a direction", "S(64 * epsilon<double>())", "S(0)"),
     ],
+    "cpp/dynamics/loop_calls.cpp": [
+        ("functions that move have derivatives", "refuse_moving_functions(loops, v.data());", ";", STATEMENT),
+        ("Q̇v is the same beside a state", "along_q[row * nv + j] += bias[row].d[0];", ";", STATEMENT),
+    ],
+    "cpp/simulation/scene_interbody_forces.h": [
+        ("the base of a loop is a body", "loop.is_coupling() || node.body < 0", "loop.is_coupling() || node.body < 1"),
+        ("what effects push with is forgotten on loops", "applied.wrenches ? applied.wrenches[k] + pushed[k] : pushed[k]", "pushed[k]"),
+    ],
     "cpp/dynamics/states_on_loops.cpp": [
         ("positions are left where steps have brought them", "std::copy_n(moved_.data(), model_->nq, q);", ";", STATEMENT),
         ("velocities are left where steps have brought them", "std::copy_n(x_.data(), nv, v);", ";", STATEMENT),

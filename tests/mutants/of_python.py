@@ -6,6 +6,22 @@ CHANGES = {
         ("dependent coordinates stay where steps have brought them", "if not self.rows.size:", "if True:"),
         ("θ̇_r of the old choice goes on", "np.concatenate([q, v[self.independent]])", "np.concatenate([q, v[: len(self.independent)]])"),
     ],
+    "pycraft/dynamics/loop_tangents.py": [
+        ("linear models on loops without what bends their forces", "    sides[0][:nv] += bent @ X\n", ""),
+        ("velocities on loops do not follow displacements", "(slip @ X)", "(0 * slip @ X)"),
+        ("rows of loops have no derivative along velocities", "np.hstack([-(rows_v @ Z), own])", "np.hstack([0 * (rows_v @ Z), own])"),
+        ("singular states have derivatives", "if asked > SMOOTH *", "if asked > 1e300 *"),
+        ("displacements are those that velocities reach", "j = _first_of(i, N)", "j, P = _first_of(i, N), N"),
+    ],
+    "pycraft/dynamics/equilibrium_on_loops.py": [
+        ("what loops bend is no stiffness", "given.along_q + bent", "given.along_q"),
+        (
+            "anything balances near singular states",
+            "sizes = given._replace(size=size).sizes",
+            "sizes = given._replace(size=1e12 + size).sizes",
+        ),
+        ("an unstable equilibrium on loops is stable", 'if not stable or made.stability != "unstable":', "if True:"),
+    ],
     "pycraft/identities/report.py": [
         ("a report counts what fails as passed", 'PASSED = ("holds", ', 'PASSED = ("fails", "holds", '),
         ("a report is always true", "        return self.status == 0\n", "        return True\n"),

@@ -10,7 +10,7 @@ CHANGES = {
         ("prescribed coordinates drift", "scene_.effects().prescribe(t, x.data(), x.data() + nq(), nullptr);", ";", STATEMENT),
         (
             "a controller is not asked at the start",
-            "if (stops()) scene_.effects().sample(t, own == nullptr, x.data(), x.data() + nq(), x.data() + nq() + nv());",
+            "if (stops()) scene_.effects().sample(t, first, x.data(), x.data() + nq(), x.data() + nq() + nv());",
             ";",
             STATEMENT,
         ),

@@ -1,6 +1,6 @@
 """Forward dynamics on loops beside the dense equations with Pinocchio's mass matrix, bias forces, Jacobians and accelerations of frames.
 
-Its own constraintDynamics is not called: the wheels of 4.1 take no Python list of constraints. Tolerance: both are right to eps times the
+Its own constraintDynamics is called in test_peers_mechanisms.py, of other models. Tolerance: both are right to eps times the
 condition of Q ℳ⁻¹ Q*, below 1e6 here.
 """
 

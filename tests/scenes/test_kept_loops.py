@@ -12,8 +12,28 @@ from pycraft.models import linkages
 from support.linkages import close, dense
 
 E, M = pc.effects, pc.mechanisms
-MECHANISMS = {"n_four_bar": 5, "andrews": 7, "bricard": 5, "slider_crank": 3, "peaucellier": 7, "five_bar": 4, "stewart": 24}
-FREE = {"n_four_bar": 1, "andrews": 1, "bricard": 1, "slider_crank": 1, "peaucellier": 1, "five_bar": 2, "stewart": 6}
+MECHANISMS = {
+    "n_four_bar": 5,
+    "andrews": 7,
+    "bricard": 5,
+    "slider_crank": 3,
+    "peaucellier": 7,
+    "five_bar": 4,
+    "stewart": 24,
+    "delta": 21,
+    "bicycle": 9,
+}
+FREE = {
+    "n_four_bar": 1,
+    "andrews": 1,
+    "bricard": 1,
+    "slider_crank": 1,
+    "peaucellier": 1,
+    "five_bar": 2,
+    "stewart": 6,
+    "delta": 3,
+    "bicycle": 3,
+}
 
 
 @pytest.mark.parametrize("name", MECHANISMS)
@@ -200,14 +220,11 @@ REFUSED = {
     "method": (lambda m: pc.Scene(m).add(E.Loop(method="penalty")), pc.EvaluationError, "method='penalty'"),
     "gains": (lambda m: pc.Scene(m).add(E.Loop(alpha=-1.0)), pc.ModelError, "alpha and beta are finite numbers"),
     "impulses": (lambda m: pc.Scene(m).add(E.Langevin(1.0, 0.1, 0.01), E.Loop()), pc.ModelError, "'langevin' acts by impulses"),
-    "off": (lambda m: _run(m, q=[0, 0, 0.3]), pc.ModelError, "start is off row 'wrist: along x'.*assemble"),
+    "off": (lambda m: _run(m, q=[0, 0, 0.3]), pc.ModelError, "is off row 'wrist: along x'.*assemble"),
     "moves off": (lambda m: _run(m, q=m.q, v=[1, 0, 0]), pc.ModelError, "moves off row 'wrist"),
     "momenta": (lambda m: _run(m, integrator="variational2"), pc.EvaluationError, "'variational2' steps by momenta, and effect 'loop'"),
     "derivatives": (lambda m: _run(m, integrator="rosenbrock4"), pc.EvaluationError, "solves by derivatives.*effect 'loop'"),
     "foreign": (lambda m: _run(m, integrator="dop853"), pc.EvaluationError, "outside of the core, and effect 'loop'"),
-    "linear": (lambda m: pc.Scene(m).add(E.Loop()).linearize(), pc.EvaluationError, "no linear model on loops"),
-    "statics": (lambda m: pc.Scene(m).add(E.Loop()).equilibrium(), pc.EvaluationError, "no equilibrium on loops"),
-    "interbody": (lambda m: pc.Scene(m).add(E.Loop()).interbody_forces(), pc.EvaluationError, "no interbody forces on loops"),
 }
 
 
@@ -237,6 +254,9 @@ def test_refusals_name_what_it_is(what):
         lambda: linkages.peaucellier(crank=2.0),
         lambda: linkages.five_bar(base=3.0),
         lambda: linkages.stewart(height=-1.0),
+        lambda: linkages.delta(position=(0, 0, -2)),
+        lambda: linkages.delta(position=(0, 0)),
+        lambda: linkages.delta(upper=np.nan),
     ],
 )
 def test_linkages_that_do_not_close_are_refused(call):

@@ -21,10 +21,10 @@ class Loop(Effect):
     singular states are passed on the velocity's branch. The forces Q*λ do no work; of redundant rows λ is the least. Prescribed
     coordinates are rows beside those of the loops.
 
-    Constraint embedding: the bodies around loops that hang together are one body of a tree without loops, X*(ℳ + J)X v̇_r = X*(τ - ...), v = X v_r.
-    At every evaluation, and after each step, what depends is found anew from the independent coordinates, which so follow a differential
-    equation of their own, whatever the integrator. They are chosen anew after each step, where X is smallest in units of energy. Of redundant
-    rows λ is that of as many as are independent.
+    Constraint embedding: the bodies around loops that hang together are one body of a tree without loops, v = X v_r and
+    X*(ℳ + J)X v̇_r = X*(τ - 𝒞 - (ℳ + J)Ẋv_r). At every evaluation, and after each step, what depends is found anew from the independent
+    coordinates, which so follow a differential equation of their own, whatever the integrator. They are chosen anew after each step, where X
+    is smallest in units of energy. Of redundant rows λ is that of as many as are independent.
 
     A start off the loops is an error; `model.assemble(q, v)` has states on them.
 
@@ -39,6 +39,11 @@ class Loop(Effect):
     method: str = "augment"
     alpha: float = 0.0
     beta: float = 0.0
+
+    def kept(self, model: Any) -> list[str]:
+        """The names of its loops."""
+        names = names_of(self.loops, "loop", "loops")
+        return list(model.loops) if names is None else names
 
     def made_for(self, model: _core.Multibody) -> _core.Effect:
         if text(self.method, "loop: method") not in METHODS:

@@ -1,0 +1,171 @@
+"""The search for configurations on the loops at which forces balance (docs/loops.md), of models and scenes.
+
+With g what is left of forces at rest and N a basis of Q N = 0, of all rows, those of velocities too,
+
+    N*g = 0,   g + Q*λ = 0,     and along y with δq = N y:   ∂(N*g) = N*(∂g + ∂(Q*λ)) N
+
+The steps are Newton's, or towards where forces push, (1/h + K) y = N*g with h growing as N*g shrinks (pseudo-transient continuation: C. T.
+Kelley, D. E. Keyes, SIAM J. Numerical Analysis 35, 1998); after each the state is taken onto the loops.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from copy import deepcopy
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from .equilibrium import Balance, Equilibrium, checked_tolerance, modes
+from .loop_tangents import KeptRows, kept_rows
+
+STEPS = 500
+FARTHEST = 0.3
+"""Radians and metres of one step."""
+
+
+@dataclass(frozen=True)
+class _State:
+    """At q: the balance of forces with those of the rows in it, sizes of what balances, the rows, N of unit inertia, N*g, and λ."""
+
+    q: np.ndarray
+    balance: Balance
+    sizes: np.ndarray
+    rows: KeptRows
+    basis: np.ndarray
+    pushes: np.ndarray
+    multipliers: np.ndarray
+
+    @property
+    def size(self) -> float:
+        return float(np.linalg.norm(self.pushes))
+
+    def stiffness(self) -> np.ndarray:
+        return np.asarray(-self.basis.T @ self.balance.along_q @ self.basis)
+
+
+def solved_on_loops(
+    model: Any, at: Callable[[np.ndarray], Balance], q0: np.ndarray, loops: Iterable[str], held: Iterable[int], stable: bool, tolerance: Any
+) -> Equilibrium:
+    """The equilibrium that is found from the state on the loops near q0. EvaluationError where there is none."""
+    search = _Search(model, at, list(loops), sorted(held), checked_tolerance(tolerance))
+    first = search.start(q0)
+    found = None if stable else search.newton(first)
+    if found is None or not search.balanced(found):
+        found = search.follow(first)
+    for _ in range(3 + len(first.pushes)):
+        found = search.newton(found) or found
+        if not search.balanced(found):
+            search.refuse(found)
+        made = search.equilibrium(found)
+        if not stable or made.stability != "unstable":
+            return made
+        away = search.moved(found, 0.1 * np.real(made.modes[0].shape))  # from where it would leave by itself
+        found = search.follow(away)
+    left = [mode.coordinates for mode in made.modes if mode.stability == "unstable"]
+    raise _core.EvaluationError(
+        f"{model.name!r}: no stable equilibrium was found on the loops; the last leaves by "
+        f"{' and by '.join(', '.join(one) for one in left)}: start elsewhere (q0=), hold these coordinates (hold=), or take what there is "
+        "(stable=False)"
+    )
+
+
+class _Search:
+    def __init__(self, model: Any, at: Callable[[np.ndarray], Balance], loops: list[str], held: list[int], tolerance: float):
+        self.model, self._at, self.loops, self.held, self.tolerance = model, at, loops, held, tolerance
+        self.names = [model.coordinate_names[j] for j in held]
+        self.closing = model if set(model.loops) == set(loops) else deepcopy(model)  # of the loops that are kept alone
+        for name in set(self.closing.loops) - set(loops):
+            self.closing.loops.remove(name)
+
+    def start(self, q0: np.ndarray) -> _State:
+        return self.state(self.closed(q0))
+
+    def closed(self, q: np.ndarray) -> np.ndarray:
+        """The state on the loops near q."""
+        return np.asarray(self.closing.assemble(q, fix=self.names).q)
+
+    def state(self, q: np.ndarray) -> _State:
+        given, rows = self._at(q), kept_rows(self.model, q, self.loops, self.held)
+        multipliers = rows.multipliers(-given.left)
+        still = np.zeros(self.model.nv)
+        bent = rows.derivatives(still, still, multipliers)[3]
+        carried = rows.Q.T @ multipliers
+        size = max(given.size, np.abs(carried).max(initial=0.0))
+        sizes = given._replace(size=size).sizes  # without what loops bend: near singular states that would let pass all
+        balance = Balance(given.left + carried, given.along_q + bent, given.mass, size)
+        N = rows.null
+        mass = N.T @ given.mass @ N
+        values, vectors = np.linalg.eigh(mass) if N.size else (np.ones(0), np.zeros((0, 0)))
+        if N.size and values[0] > len(values) * np.finfo(float).eps * values[-1]:
+            N = N @ vectors / np.sqrt(values)
+        return _State(q, balance, sizes, rows, N, N.T @ given.left, multipliers)
+
+    def moved(self, state: _State, along: np.ndarray) -> _State:
+        return self.state(self.closed(self.model.integrate(state.q, along)))
+
+    def balanced(self, state: _State) -> bool:
+        return bool((np.abs(state.balance.left) <= self.tolerance * state.sizes).all())
+
+    def newton(self, state: _State) -> _State | None:
+        """Steps of Newton, shortened until less is left, to rounding; None where that leads nowhere."""
+        for _ in range(STEPS):
+            step = state.basis @ np.linalg.lstsq(state.stiffness(), state.pushes, rcond=1e-12)[0]
+            longest = np.abs(step).max(initial=0.0)
+            step *= min(1.0, FARTHEST / longest) if longest else 1.0
+            for _ in range(12):
+                after = self.tried(state, step)
+                if after is not None and after.size < state.size:
+                    break
+                step = step / 2
+            else:
+                return state if self.balanced(state) else None
+            if after.size > 0.9 * state.size and self.balanced(after):
+                return after
+            state = after
+        return None
+
+    def tried(self, state: _State, step: np.ndarray) -> _State | None:
+        """The state after a step; None where the loops do not reach so far, or only singular."""
+        try:
+            return self.moved(state, step)
+        except (_core.ModelError, _core.EvaluationError):
+            return None
+
+    def follow(self, state: _State) -> _State:
+        """Where forces push, until they are small."""
+        first = state.size
+        stiff = np.abs(np.linalg.eigvals(state.stiffness())).max(initial=0.0)
+        h = 1.0 / stiff if stiff else 1.0
+        for _ in range(STEPS):
+            if state.size <= 1e-6 * first or self.balanced(state):
+                return state
+            step = state.basis @ np.linalg.lstsq(np.eye(len(state.pushes)) / h + state.stiffness(), state.pushes, rcond=None)[0]
+            if (state.basis.T @ state.balance.mass @ step) @ state.pushes <= 0:  # where K is negative by more than 1/h
+                h = h / 4
+                continue
+            longest = np.abs(step).max(initial=0.0)
+            after = self.tried(state, step * min(1.0, FARTHEST / longest))
+            if after is None:
+                h = h / 4
+                continue
+            h = h * min(4.0, max(0.25, state.size / after.size if after.size else 4.0))
+            state = after
+        return state
+
+    def equilibrium(self, state: _State) -> Equilibrium:
+        holding = np.zeros(self.model.nv)
+        holding[self.held] = state.multipliers[len(state.rows.chosen) :]
+        found = modes(self.model, state.balance, state.rows.null)
+        return Equilibrium(state.q, state.balance.left, holding, -state.balance.along_q + 0.0, found)
+
+    def refuse(self, state: _State) -> None:
+        left, names = state.balance.left, self.model.coordinate_names
+        worst = sorted((j for j in range(len(left)) if left[j] != 0), key=lambda j: -abs(left[j]))
+        told = ", ".join(f"{names[j]!r} {left[j]:.3g}" for j in worst[:5]) + (", ..." if len(worst) > 5 else "")
+        raise _core.EvaluationError(
+            f"{self.model.name!r}: no equilibrium was found on its loops. Where the search ended there is left (N m and N) at {told}: "
+            "balance it by tau, wrenches or effects, hold these coordinates (hold=), or start elsewhere (q0=)"
+        )
