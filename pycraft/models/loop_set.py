@@ -122,7 +122,7 @@ class Loops(Closed, Mapping):
     @property
     def ends(self) -> list[str]:
         """Bodies and nodes that loops of two ends were declared on, each once, the base left out: those that `soa.A` is of."""
-        return self._core.ends(self._core.operators(self._model.soa._source))[0]
+        return self._core.ends(self._core.operators(self._model.soa._source))
 
     def residual(self, q=None, *, precision: str = "double") -> np.ndarray:
         """r (rows,) or (B, rows), zero where the loops are closed, and of rows of velocities; metres, and radians to first order."""
