@@ -367,3 +367,4 @@ def test_what_is_each_loop_s_own_goes_by_name():
     assert np.array_equal(again.by_loop["closure"], got.by_loop["closure"]) and "closure" in repr(again.forces)
     with pytest.raises(KeyError, match="more"):
         got.by_loop["more"]
+    assert list(model.constrained_dynamics(q[0], np.zeros(3)).by_loop) == ["gear", "closure", "more"]
