@@ -257,7 +257,7 @@ class SkoSource:
     @property
     def derived_from(self) -> typing.Any:
         """
-        How this tree was made of a model's, "hinge subset", "world frame", "cut tree", "another root", "loops", "groups of bodies" or "embedded loops", and that model's source; None for a model's own.
+        How this tree was made of a model's, "hinge subset", "world frame", "cut tree", "another root", "loops", "groups of bodies" or "embedded loops", and that model's source, of embedded loops that of the groups; None for a model's own.
         """
     @property
     def dof(self) -> list[int]:
@@ -1213,9 +1213,9 @@ class LoopSet:
         """
         What keeps these loops in a scene, all without names.
         """
-    def ends(self, operators: SkoSource) -> tuple[list[str], list[list[int]]]:
+    def ends(self, operators: SkoSource) -> list[str]:
         """
-        The bodies and nodes that A is of, and by body the rows of `operators`.
+        The bodies and nodes that A is of.
         """
     def first_rows(self) -> list[int]:
         """
@@ -1439,6 +1439,10 @@ def _parted(mass: tuple, name: str, pose: tuple, welded: tuple, welded_name: str
     """
 def _rotor_parameter(arg0: MultibodyOperators, arg1: typing.SupportsInt | typing.SupportsIndex, arg2: str) -> Parameter:
     ...
+def _rows_by_ends(loops: SkoSource) -> Operator | None:
+    """
+    A B* φ* H*, which Q of a source of rows is where all loops are of two ends; None where they are not.
+    """
 def _scalar_from_parts(arg0: typing.SupportsInt | typing.SupportsIndex, arg1: float | fractions.Fraction, arg2: typing.Any, arg3: collections.abc.Sequence[Scalar]) -> Scalar:
     ...
 def _some_coordinates(base: SkoSource, kept: collections.abc.Sequence[bool]) -> SkoSource:
@@ -1447,8 +1451,16 @@ def _space_from_parts(arg0: tuple) -> Space:
     ...
 def _theorem_from_parts(arg0: str, arg1: str, arg2: typing.Any, arg3: typing.Any, arg4: typing.SupportsInt | typing.SupportsIndex, arg5: str, arg6: typing.SupportsInt | typing.SupportsIndex, arg7: bool, arg8: bool, arg9: str, arg10: str, arg11: str) -> Theorem:
     ...
+def _theorems_of_rows(loops: SkoSource) -> list[Theorem]:
+    """
+    What holds of a source of rows and of the tree that they are declared on.
+    """
 def _twist_parameter(arg0: MultibodyOperators, arg1: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]], arg2: str) -> Parameter:
     ...
+def _whole_rows(loops: SkoSource, letter: str) -> Operator:
+    """
+    Q or A of a source of rows, to R^rows.
+    """
 def alone(calls: SceneCalls, integrator: str) -> str:
     """
     Why runs cannot be side by side, in words; empty: they can.

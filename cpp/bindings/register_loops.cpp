@@ -153,11 +153,8 @@ void register_loops(py::module_& m) {
         return std::make_shared<LoopOperators>(base, l.set);
       }, py::arg("base"), "The source of rows as operators, Q and A by body: pycraft/operators/loop_letters.py.")
       .def("ends", [](const Loops&, const std::shared_ptr<SkoSource>& operators) {
-        const auto of = std::dynamic_pointer_cast<LoopOperators>(operators);
-        std::vector<std::vector<int>> rows;
-        for (int k = 0; k < of->structure().bodies(); ++k) rows.push_back(of->rows_of(k));
-        return py::make_tuple(of->end_names(), rows);
-      }, py::arg("operators"), "The bodies and nodes that A is of, and by body the rows of `operators`.")
+        return std::dynamic_pointer_cast<LoopOperators>(operators)->end_names();
+      }, py::arg("operators"), "The bodies and nodes that A is of.")
       .def("residual", [](Loops& l, const py::object& q, Precision precision) {
         return rows_at(l, {{"q", q}}, {l.rows()}, [&](Arguments& given, double* out) { l.calls.residual(precision, given[0], out); });
       }, q, precision)

@@ -216,8 +216,9 @@ void register_sources(py::module_& m) {
                           : dynamic_cast<const CutTree*>(&s)          ? "cut tree"
                           : dynamic_cast<const RerootedTree*>(&s)     ? "another root"
                                                                       : "hinge subset";
+        if (const auto* embedded = dynamic_cast<const EmbeddedOperators*>(&s)) return py::make_tuple(how, std::static_pointer_cast<SkoSource>(embedded->grouped()));
         return py::make_tuple(how, derived->base());
-      }, "How this tree was made of a model's, \"hinge subset\", \"world frame\", \"cut tree\", \"another root\", \"loops\", \"groups of bodies\" or \"embedded loops\", and that model's source; None for a model's own.")
+      }, "How this tree was made of a model's, \"hinge subset\", \"world frame\", \"cut tree\", \"another root\", \"loops\", \"groups of bodies\" or \"embedded loops\", and that model's source, of embedded loops that of the groups; None for a model's own.")
       .def_property_readonly("groups", [](const SkoSource& s) -> py::object {
         const auto* grouped = dynamic_cast<const GroupedOperators*>(&s);
         return grouped ? py::cast(grouped->groups()) : py::object(py::none());

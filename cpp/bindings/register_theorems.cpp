@@ -4,9 +4,21 @@
 #include "algebra/language/display.h"
 #include "algebra/trees/matrix_tree.h"
 #include "bindings/bindings.h"
+#include "operators/loop_theorems.h"
 #include "operators/multibody_operators.h"
+#include "runtime/errors.h"
 
 namespace pycraft {
+
+namespace {
+
+std::shared_ptr<LoopOperators> rows_of(const std::shared_ptr<SkoSource>& source) {
+  auto rows = std::dynamic_pointer_cast<LoopOperators>(source);
+  if (!rows) throw EvaluationError("'" + source->name() + "' is no source of rows of loops");
+  return rows;
+}
+
+}  // namespace
 
 void register_theorems(py::module_& m) {
   const auto side = [](const Side& s) -> py::object {
@@ -61,8 +73,18 @@ void register_theorems(py::module_& m) {
       const std::vector<Theorem> more = mechanics_theorems(mechanics);
       all.insert(all.end(), more.begin(), more.end());
     }
+    if (const auto embedded = std::dynamic_pointer_cast<EmbeddedOperators>(source)) {
+      const std::vector<Theorem> more = embedding_theorems(embedded);
+      all.insert(all.end(), more.begin(), more.end());
+    }
     return all;
   }, py::arg("source"), "Every theorem, stated on the letters of one model.");
+  m.def("_theorems_of_rows", [](const std::shared_ptr<SkoSource>& loops) { return augmentation_theorems(rows_of(loops)); }, py::arg("loops"),
+        "What holds of a source of rows and of the tree that they are declared on.");
+  m.def("_whole_rows", [](const std::shared_ptr<SkoSource>& loops, const std::string& letter) { return rows_of(loops)->whole(letter); }, py::arg("loops"), py::arg("letter"),
+        "Q or A of a source of rows, to R^rows.");
+  m.def("_rows_by_ends", [](const std::shared_ptr<SkoSource>& loops) { return rows_of(loops)->by_ends(); }, py::arg("loops"),
+        "A B* φ* H*, which Q of a source of rows is where all loops are of two ends; None where they are not.");
   m.def("residual", [](const py::object& a, const py::object& b, const std::map<std::string, std::vector<double>>& vectors, bool on_one_path, bool at_most) {
     Residual r;
     if (py::isinstance<Scalar>(a)) {

@@ -7,6 +7,7 @@
 #include "algebra/trees/sweeps/articulated_inertia.h"
 #include "algebra/trees/sweeps/mass_matrix.h"
 #include "model/checks.h"
+#include "model/unit_data.h"
 #include "recursions/articulated_body.h"
 #include "recursions/kinematics.h"
 
@@ -304,8 +305,8 @@ Vector6<S> ConstrainedWorkspace<S>::force(int loop, bool on_a) const {
   Vector6<S> f = Vector6<S>::zero();
   if (of.loop->is_coupling()) return f;
   for (int r = of.first_row; r < of.first_row + of.rows; ++r) f = f + lambda_[r] * rows_.gradients[r];
-  if (!on_a) return force_to_parent(cast<S>(of.loop->pair.end_b), f);
-  return force_to_parent(cast<S>(of.loop->pair.end_a), S(-1) * force_to_parent(rows_.ends[loop], f));
+  if (!on_a) return force_to_parent(renormalised<S>(of.loop->pair.end_b), f);
+  return force_to_parent(renormalised<S>(of.loop->pair.end_a), S(-1) * force_to_parent(rows_.ends[loop], f));
 }
 
 void ConstrainedDynamics::run(const Asked& asked, const Results& out) {

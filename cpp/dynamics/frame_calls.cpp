@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <type_traits>
 
+#include "model/unit_data.h"
 #include "runtime/errors.h"
 
 namespace pycraft {
@@ -30,7 +31,7 @@ void read(FrameWorkspace<S>& w, Givens given, int b) {
 template <class S>
 RelativeMotion<S> step_motion(FrameWorkspace<S>& w, const FrameTree& frames, const FrameTimes& times, int b, const FrameStep& step, MotionPart part,
                               HingeRows<S>& hinge) {
-  if (step.kind == fixed) return {cast<S>(*step.pose)};
+  if (step.kind == fixed) return {renormalised<S>(*step.pose)};
   if (step.kind == moved) return motion_of<S>(frames.loose(step.number), times.at(step.number, b), part);
   const CompiledModel<S>& model = *w.model;
   const int at = model.v_offset[step.number];

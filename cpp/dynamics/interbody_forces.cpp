@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "model/configuration.h"
+#include "model/unit_data.h"
 #include "recursions/kinematics.h"
 #include "recursions/newton_euler.h"
 #include "runtime/errors.h"
@@ -44,7 +45,7 @@ const Vector6<S>* InterbodyForces<S>::on_bodies(const PushedNodes& pushed, const
   for (const Node& node : pushed.nodes) {
     Vector6<S> w = six(wrenches);
     wrenches += 6;
-    Pose<S> at = cast<S>(node.pose);
+    Pose<S> at = renormalised<S>(node.pose);
     if (pushed.in_world) at.R = transpose(world_[node.body].R);  // from the world's axes to the body's, about the node
     wrench_[node.body] = wrench_[node.body] + force_to_parent(at, w);
   }

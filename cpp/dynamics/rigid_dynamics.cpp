@@ -3,6 +3,7 @@
 #include "algebra/trees/sweeps/articulated_inertia.h"
 #include "algebra/trees/sweeps/mass_matrix.h"
 #include "dynamics/singular_hinges.h"
+#include "model/unit_data.h"
 #include "numerics/small_matrix.h"
 #include "recursions/articulated_body.h"
 #include "recursions/composite_mass_matrix.h"
@@ -334,7 +335,7 @@ void RigidDynamics<S>::jacobian(const Node& node, const S* q, S* out) {
   const int N = model_->nv;
   kinematics(*model_, q, blocks_);
   std::fill_n(out, size_t(6) * N, S(0));
-  Pose<S> X = cast<S>(node.pose);  // X_aN for the ancestor a
+  Pose<S> X = renormalised<S>(node.pose);  // X_aN for the ancestor a
   for (int a = node.body; a >= 0; a = model_->parent[a]) {
     for (int j = model_->v_offset[a]; j < model_->v_offset[a] + model_->nv_of[a]; ++j) {
       const Vector6<S> column = motion_to_child(X, blocks_.H[j]);
@@ -347,7 +348,7 @@ void RigidDynamics<S>::jacobian(const Node& node, const S* q, S* out) {
 template <class S>
 Pose<S> RigidDynamics<S>::pose(const Node& node, const S* q) {
   kinematics(*model_, q, blocks_);
-  Pose<S> X = cast<S>(node.pose);
+  Pose<S> X = renormalised<S>(node.pose);
   for (int a = node.body; a >= 0; a = model_->parent[a]) X = blocks_.pose[a] * X;
   return X;
 }

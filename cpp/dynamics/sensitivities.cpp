@@ -4,6 +4,7 @@
 
 #include "algebra/trees/sweeps/articulated_inertia.h"
 #include "dynamics/parameter_sensitivities.h"
+#include "model/unit_data.h"
 #include "recursions/kinematics.h"
 #include "runtime/interrupt.h"
 
@@ -339,7 +340,7 @@ void Sensitivities<S>::jacobian_derivative(const Node& node, const S* q, S* out)
 // From its body's origin, in the frame's axes.
 template <class S>
 Pose<S> Sensitivities<S>::node_in_axes(const Node& node) const {
-  return Pose<S>{frame_.axes[node.body], Vector3<S>::zero()} * cast<S>(node.pose);
+  return Pose<S>{frame_.axes[node.body], Vector3<S>::zero()} * renormalised<S>(node.pose);
 }
 
 #define PYCRAFT_INSTANTIATE(S) template class Sensitivities<S>;

@@ -6,6 +6,7 @@
 
 #include "algebra/trees/sweeps/singular_pivot.h"
 #include "model/compiled_model.h"
+#include "model/unit_data.h"
 #include "runtime/interrupt.h"
 
 namespace pycraft::kernels {
@@ -261,7 +262,7 @@ OnLink<T> LinkModel<T>::on_link(const Node& node) const {
     return fixed;
   }
   const Carried& body = bodies_[node.body];
-  const Pose<T> pose = body.pose * cast<T>(node.pose);
+  const Pose<T> pose = body.pose * renormalised<T>(node.pose);
   OnLink<T> carried{body.link};
   put(pose.R.m, carried.R), put(pose.p.v, carried.p);
   return carried;

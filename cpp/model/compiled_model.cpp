@@ -3,26 +3,12 @@
 #include <algorithm>
 
 #include "model/multibody.h"
+#include "model/unit_data.h"
 #include "runtime/interrupt.h"
 
 namespace pycraft {
 
 namespace {
-
-// Unit axes and orthogonal rotations are so to the rounding of S, not of the doubles they were given in.
-template <class S>
-Vector3<S> renormalised(const Vector3<double>& a) {
-  const Vector3<S> x = cast<S>(a);
-  if constexpr (std::is_same_v<S, double>) return x;
-  return (S(1) / norm(x)) * x;
-}
-template <class S>
-Pose<S> renormalised(const Pose<double>& X) {
-  if constexpr (std::is_same_v<S, double>) return X;
-  const Pose<S> wide = cast<S>(X);
-  const Quaternion<S> q = rotation_quaternion(wide.R);
-  return {quaternion_rotation(q), wide.p};
-}
 
 // Coordinates of a hinge that move its body along any line whatever the others are, numbered from `first`: a free subhinge's, or three
 // sliders'. None where one of them is prescribed, or has a rotor, whose inertia a change of the body's velocity does not share.

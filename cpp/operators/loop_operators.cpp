@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <set>
 
+#include "operators/alphabet.h"
 #include "operators/loop_values.h"
 #include "runtime/errors.h"
 
@@ -70,6 +71,12 @@ LoopOperators::LoopOperators(std::shared_ptr<MultibodyOperators> base, std::shar
       for (int i = 0; i < loop->rows; ++i) rows_[k].push_back(first + i);
     }
   row_layout_ = layout;
+  const int rows = resolved->rows, parts = static_cast<int>(layout->dimension);
+  std::vector<double> ones(size_t(rows) * parts, 0.0);
+  int part = 0;
+  for (const std::vector<int>& own : rows_)
+    for (int row : own) ones[size_t(row) * parts + part++] = 1;
+  sums_ = constant(std::move(ones), Space(SpaceKind::NodesF, row_layout_), Space::euclidean(rows), "Σ");
 }
 
 Space LoopOperators::space(SpaceKind kind, const SymbolArguments& arguments) const {
@@ -89,6 +96,20 @@ Expression LoopOperators::letter(const std::string& ascii, const SymbolArguments
   for (const SymbolDefinition& d : records())
     if (d.ascii == ascii) return make_symbol(d, std::const_pointer_cast<SkoSource>(shared_from_this()), arguments, text);
   throw EvaluationError("'" + ascii + "' is no letter of loops: there are Q and A");
+}
+
+Expression LoopOperators::whole(const std::string& ascii) const {
+  if (row_layout_->dimension == 0 || (ascii == "A" && ends_.empty())) return zero(ascii == "Q" ? base_->theta() : Space::euclidean(0), sums_.codomain());
+  return sums_ * letter(ascii);
+}
+
+std::optional<Expression> LoopOperators::by_ends() const {
+  if (row_layout_->dimension == 0 || ends_.empty() || std::any_of(declared_.begin(), declared_.end(), [](const auto& loop) { return loop->is_coupling(); })) return std::nullopt;
+  std::string names;
+  for (const std::string& name : end_names_) names += (names.empty() ? "" : ", ") + name;
+  const std::shared_ptr<SkoSource> tree = base_;
+  const Expression B = make_symbol(definition_of(SymbolId::B), tree, OfNodes{ends_}, names);
+  return whole("A") * B.T() * make_symbol(definition_of(SymbolId::phi), tree).T() * make_symbol(definition_of(SymbolId::H), tree).T();
 }
 
 Expression LoopOperators::tangent(const Expression& e, const std::optional<OfDirection>& along) const {

@@ -40,6 +40,10 @@ class LoopOperators final : public DerivedOperators {
 
   // "Q", "A", "dQ" or "dA"; EvaluationError where it is none of them.
   Expression letter(const std::string& ascii, const SymbolArguments& arguments = {}, const std::string& text = "") const;
+  // Q or A with the parts of each row added up, Σ Q_k or Σ A_k: to R^rows.
+  Expression whole(const std::string& ascii) const;
+  // A B* φ* H*, which Q is where all loops are of two ends; nothing where they are not.
+  std::optional<Expression> by_ends() const;
   // ∂ of a letter along coordinates or time, zero where nothing moves. EvaluationError of twists that are no coordinates, and of ∂Q and ∂A.
   Expression tangent(const Expression& letter, const std::optional<OfDirection>& along) const;
 
@@ -58,6 +62,7 @@ class LoopOperators final : public DerivedOperators {
   std::vector<std::string> end_names_;
   std::map<std::string, Ends> ends_of_;
   std::shared_ptr<const SpaceLayout> row_layout_;
+  Expression sums_;  // Σ
 };
 
 }  // namespace pycraft

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "algebra/trees/tree_values.h"
+#include "model/unit_data.h"
 #include "operators/loop_operators.h"
 #include "recursions/loop_tangents.h"
 #include "rigid/rigid_blocks.h"
@@ -26,8 +27,8 @@ void loop_rows_on_ends(const CompiledModel<S>& model, const ResolvedLoops& loops
     pair_rows(loop.loop->pair, m, w.rows);
     for (int i = 0; i < loop.rows; ++i) {
       const Vector6<S>& g = w.rows[i].gradient;
-      put(loop, 1, loop.first_row + i, force_to_parent(cast<S>(loop.loop->pair.end_b), g));
-      put(loop, 0, loop.first_row + i, S(-1) * force_to_parent(cast<S>(loop.loop->pair.end_a), force_to_parent(m.X, g)));
+      put(loop, 1, loop.first_row + i, force_to_parent(renormalised<S>(loop.loop->pair.end_b), g));
+      put(loop, 0, loop.first_row + i, S(-1) * force_to_parent(renormalised<S>(loop.loop->pair.end_a), force_to_parent(m.X, g)));
     }
   }
 }

@@ -1,5 +1,5 @@
 // Theorems that need mechanics: velocities and forces, innovations, Coriolis matrices, gravity, hybrid dynamics, the world frame, subgraphs, other roots.
-// Those that need loops or flexible bodies are listed as waiting; the calculus is in calculus_theorems.cpp.
+// Those that need flexible bodies are listed as waiting; the calculus is in calculus_theorems.cpp, loops are in loop_theorems.cpp.
 #include "operators/derived_operators.h"
 #include "operators/directions.h"
 #include "operators/rerooted_tree.h"
@@ -186,10 +186,7 @@ struct MechanicsTheorems : Statements {
 
   void waiting() {
     group = "Waiting";
-    const std::string loops = "loops", flexible = "flexible bodies";
-    wait("compound bodies: their mass matrix, accelerations and calculus", loops, "soa.md #60");
-    wait("tree augmentation", loops, "soa.md #63");
-    wait("modal blocks and their calculus", flexible, "soa.md, One algebra, three kinds of body");
+    wait("modal blocks and their calculus", "flexible bodies", "soa.md, One algebra, three kinds of body");
   }
 
   const std::shared_ptr<MultibodyOperators> robot;

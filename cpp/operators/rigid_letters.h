@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "model/unit_data.h"
 #include "operators/directions.h"
 #include "operators/inverse_tangent.h"
 #include "operators/rigid_values.h"
@@ -67,7 +68,7 @@ void RigidValues<S>::block(const Symbol& symbol, int k, S* out) const {
         if ((node >= 0 ? model_.node(node).body : -1 - node) == k) here.push_back(node);
       const int columns = 6 * static_cast<int>(here.size());
       for (size_t j = 0; j < here.size(); ++j)
-        force_transform_block(here[j] >= 0 ? cast<S>(model_.node(here[j]).pose) : Pose<S>::identity(), out, columns, 6 * static_cast<int>(j));
+        force_transform_block(here[j] >= 0 ? renormalised<S>(model_.node(here[j]).pose) : Pose<S>::identity(), out, columns, 6 * static_cast<int>(j));
       return;
     }
     case SymbolId::Delta: {

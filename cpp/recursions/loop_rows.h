@@ -29,6 +29,7 @@
 #include <vector>
 
 #include "model/loops.h"
+#include "model/unit_data.h"
 #include "recursions/motion_functions.h"
 #include "runtime/errors.h"
 
@@ -164,7 +165,7 @@ struct LoopBuffers {
 template <class S>
 RelativeMotion<S> loop_step(const CompiledModel<S>& model, const FrameStep& step, const S* q, const S* v, MotionPart part, HingeRows<S>& hinge,
                             const std::vector<S>& at_rest) {
-  if (step.pose) return {cast<S>(*step.pose)};
+  if (step.pose) return {renormalised<S>(*step.pose)};
   RelativeMotion<S> m;
   hinge_pose(model, step.number, q, m, hinge);
   const S* const own = v + model.v_offset[step.number];

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -165,10 +165,48 @@ class ConstrainedCalls:
         return ConstrainedVelocities(*_by_loop(self.loops, *self.loops._core.velocities(q, v, impulse, form, precision)))
 
 
+class _OfLoops(Mapping[str, Any]):
+    """What is each loop's own, by name, made when it is asked for: most callers ask for none."""
+
+    def __init__(self, places: Mapping[str, int]):
+        self._places = places
+
+    def _own(self, place: int) -> Any:
+        raise NotImplementedError
+
+    def __getitem__(self, name: str) -> Any:
+        return self._own(self._places[name])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._places)
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    def __repr__(self) -> str:
+        return repr(dict(self))
+
+
+class _Multipliers(_OfLoops):
+    def __init__(self, places: Mapping[str, int], first: Sequence[int], multipliers: np.ndarray):
+        super().__init__(places)
+        self._first, self._multipliers = first, multipliers
+
+    def _own(self, place: int) -> np.ndarray:
+        return self._multipliers[..., self._first[place] : self._first[place + 1]]
+
+
+class _Forces(_OfLoops):
+    def __init__(self, places: Mapping[str, int], forces: np.ndarray):
+        super().__init__(places)
+        self._forces = forces
+
+    def _own(self, place: int) -> LoopForce:
+        return LoopForce(self._forces[..., place, 0, :], self._forces[..., place, 1, :])
+
+
 def _by_loop(
     loops: Any, x: np.ndarray, multipliers: np.ndarray, forces: np.ndarray, rank: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray], dict[str, LoopForce], np.ndarray]:  # fmt: skip
-    first = loops._core.first_rows()
-    by_loop = {name: multipliers[..., first[i] : first[i + 1]] for i, name in enumerate(loops)}
-    each = {name: LoopForce(forces[..., i, 0, :], forces[..., i, 1, :]) for i, name in enumerate(loops)}
-    return x, multipliers, by_loop, each, rank
+) -> tuple[np.ndarray, np.ndarray, Mapping[str, np.ndarray], Mapping[str, LoopForce], np.ndarray]:  # fmt: skip
+    places, first = loops.numbered()
+    return x, multipliers, _Multipliers(places, first, multipliers), _Forces(places, forces), rank

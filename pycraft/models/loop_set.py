@@ -107,12 +107,20 @@ class Loops(Closed, Mapping):
     def __init__(self, model: Any):
         self._model, self._core = model, _core.LoopSet(model)
         self._declared: dict[str, dict[str, Any]] = {}
+        self._numbered: tuple[int, dict[str, int], list[int]] | None = None
 
     # ------------------------------------------------------------------ rows
     @property
     def rows(self) -> list[str]:
         """Names of all rows: "loop: direction", of couplings the name alone. x, y, z are axes of the hinge, z along its own axis."""
         return self._core.rows()[0]
+
+    def numbered(self) -> tuple[Mapping[str, int], Sequence[int]]:
+        """The loops' numbers by name, and where the rows of each begin, one more: the end. Kept until a loop is added or taken away."""
+        edits = self._core.edits
+        if self._numbered is None or self._numbered[0] != edits:
+            self._numbered = edits, {name: i for i, name in enumerate(self._core.names())}, self._core.first_rows()
+        return self._numbered[1:]
 
     @property
     def of_positions(self) -> np.ndarray:
@@ -122,7 +130,7 @@ class Loops(Closed, Mapping):
     @property
     def ends(self) -> list[str]:
         """Bodies and nodes that loops of two ends were declared on, each once, the base left out: those that `soa.A` is of."""
-        return self._core.ends(self._core.operators(self._model.soa._source))[0]
+        return self._core.ends(self._core.operators(self._model.soa._source))
 
     def residual(self, q=None, *, precision: str = "double") -> np.ndarray:
         """r (rows,) or (B, rows), zero where the loops are closed, and of rows of velocities; metres, and radians to first order."""

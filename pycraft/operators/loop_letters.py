@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from .. import _core
 
 NAMES = ("Q", "A")
@@ -31,7 +29,7 @@ def loop_letter(source: Any, model: Any, name: str, made: dict[str, Any]) -> _co
         for letter in NAMES:
             made.pop(letter, None)
     if name not in made:
-        made[name] = _whole(source, loops, model, name)
+        made[name] = _core._whole_rows(loops, name)
     return made[name]
 
 
@@ -40,15 +38,3 @@ def loop_source(model: Any) -> _core.SkoSource:
     made: dict[str, Any] = model.soa._made
     loop_letter(model.soa._source, model, "Q", made)
     return made["loops"]
-
-
-def _whole(source: Any, loops: Any, model: Any, name: str) -> _core.Operator:
-    ends, by_body = model.loops._core.ends(loops)
-    count = len(model.loops.rows)
-    if not count or (name == "A" and not ends):
-        return _core.zero(source.Theta if name == "Q" else _core.euclidean(0), _core.euclidean(count))
-    letter = loops.symbol(name)
-    rows = [row for own in by_body for row in own]
-    sums = np.zeros((count, len(rows)))
-    sums[rows, range(len(rows))] = 1
-    return _core.constant(sums, letter.codomain, count, "Σ") @ letter

@@ -233,8 +233,13 @@ class OperatorSet(Closed):
         return _core._face["check_model"](self, **options)
 
     def theorems(self) -> list[_core.Theorem]:
-        """Every theorem as data: name, both sides as expressions, hypotheses, source."""
-        return _core.theorems(self._source)
+        """Every theorem as data: name, both sides as expressions, hypotheses, source. Of loops, too, where the model has some."""
+        theorems = list(_core.theorems(self._source))
+        if isinstance(self._source, _core.MultibodyOperators) and len(getattr(self._model, "loops", ())):
+            loop_letter(self._source, self._model, "Q", self._made)
+            rows: Any = self._made["loops"]
+            theorems += _core._theorems_of_rows(rows)
+        return theorems
 
     def __repr__(self) -> str:
         return f"<operators of {self._source.name!r}: {self._source.Theta.dimension} degrees of freedom>"

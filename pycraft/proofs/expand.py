@@ -23,6 +23,7 @@ from .walk import GaveUp, Walk, carried_out
 from .words import (
     FURTHER,
     ONE,
+    SAME_EDGES,
     SHARED,
     Alphabet,
     Letter,
@@ -250,11 +251,11 @@ class Problem:
         source, ascii, arguments, binding = symbol_parts(e)
         text, _ = _TABLE.get(ascii, (e.text(), ""))
         made = source.derived_from
-        if made is not None and made[0] == "hinge subset" and text in SHARED:
+        if made is not None and (made[0] == "loops" or made[0] in SAME_EDGES and text in SHARED):
             source, made = made[1], None
-        mark = self._mark_of(source, binding)
+        mark = self.mark_of(source, binding)
         if made is not None and (mark, made[0]) not in [(m, kind) for m, kind, _ in self.relations]:
-            self.relations.append((mark, made[0], self._mark_of(made[1], binding)))
+            self.relations.append((mark, made[0], self.mark_of(made[1], binding)))
         known = self.alphabet.letters.get(text + mark)
         if known is not None and known.ascii == ascii and not arguments:
             self.alphabet.add(Letter(known.name, known.text, known.latex, known.symmetric, known.shape, known.ascii, e))
@@ -262,7 +263,7 @@ class Problem:
         shape = "diagonal" if e.is_block_diagonal else shape_of(text)
         return self._named(f"‹{e.text()}›{mark}", Letter("", e.text() + mark, e.latex(), bool(e.is_symmetric), shape, None, e))
 
-    def _mark_of(self, source: Any, binding: Any) -> str:
+    def mark_of(self, source: Any, binding: Any) -> str:
         """The mark of a model at a state."""
         for i, (s, b) in enumerate(self.contexts):
             if s is source and _same_state(b, binding):
@@ -315,7 +316,7 @@ class Problem:
     def _factor(self, inner: Polynomial) -> str:
         """The name of A = I + HφK, where these words are that: the innovations factor of a model goes by one name."""
         for mark in self.marks:
-            base = next((base for m, how, base in self.relations if m == mark and how == "hinge subset"), mark)
+            base = next((base for m, how, base in self.relations if m == mark and how in SAME_EDGES), mark)
             if inner == factors.of(factors.FACTOR, mark, base) and factors.name_of(mark) not in self.alphabet.letters:
                 return factors.name_of(mark)
         return ""

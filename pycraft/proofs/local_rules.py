@@ -7,9 +7,10 @@ from .axioms import theory
 from .equations import Equation, Step, Use, numbered
 from .expand import Problem
 from .normal_form import Rules, Setting, normal_form, rule_from, rules_for, weight
+from .of_loops import of_embedded, of_rows
 from .presuppositions import ALWAYS, is_positive_constant, is_regular_constant
 from .relations import at_the_roots, compliance_facts, crosses_with_axes, in_world, of_a_cut
-from .words import ONE, Alphabet, Polynomial, Word, inverse_of, inverted, plain, ratio, split, underived
+from .words import ONE, SAME_EDGES, Alphabet, Polynomial, Word, inverse_of, inverted, plain, ratio, split, underived
 
 UNIT: Polynomial = {(): ONE}
 """I."""
@@ -26,14 +27,14 @@ class LocalRules:
     definite : letters that are symmetric and positive definite
     needs : of letters that have an inverse where others have, which these are
     inverted : the inverses that stand in the statement
-    locked : (mark, the mark of its model) of trees with hinges locked
+    locked : (mark, the mark of its model) of trees with hinges locked, or loops embedded
     """
 
     def __init__(self, problem: Problem, setting: Setting, extra: list[tuple[Equation, Word]]):
         self.problem, self.setting = problem, setting
         self.alphabet: Alphabet = problem.alphabet
         self.equations: list[Equation] = []
-        self.locked = tuple((mark, base) for mark, how, base in problem.relations if how == "hinge subset")
+        self.locked = tuple((mark, base) for mark, how, base in problem.relations if how in SAME_EDGES)
         self.rules: Rules = rules_for(setting, problem.marks, self.locked).copy()
         blocks = Setting(setting.hypotheses, composite=True, compliance=True)
         diagonal_parts = any(o.kind == "blockdiag" for o in problem.opaque)
@@ -56,7 +57,8 @@ class LocalRules:
         for name in named:
             if name not in theory().alphabet.letters:
                 self.add_pairs(name)
-        for equation, word in (*of_a_cut(problem), *compliance_facts(problem, setting.hypotheses), *crosses_with_axes(problem)):
+        made_of_another = (*of_rows(problem), *of_embedded(problem), *of_a_cut(problem))
+        for equation, word in (*made_of_another, *compliance_facts(problem, setting.hypotheses), *crosses_with_axes(problem)):
             self.add(equation, word)
 
     # ------------------------------------------------------------------ what is asked

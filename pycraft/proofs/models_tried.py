@@ -19,6 +19,8 @@ def operators_of(model: Any) -> OperatorSet:
 def operators_of_sources(sources: Iterable[_core.SkoSource]) -> OperatorSet | None:
     """The operators of the model that the first of these is of; None without any. It has states where it is a Multibody."""
     for source in sources:
+        made = source.derived_from
+        source = made[1] if made is not None and made[0] == "loops" else source  # rows are of a tree, and none
         model = source.model if isinstance(source, _core.MultibodyOperators) else None
         return OperatorSet(source, model if isinstance(model, Multibody) else None)
     return None

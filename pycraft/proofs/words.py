@@ -25,6 +25,8 @@ FURTHER = "₂₃₄₅₆₇₈₉"
 """Marks of the letters of a second model, a third, ..., in one statement."""
 SHARED = ("E_φ", "φ", "φ̃", "M", "R")
 """Letters that do not depend on which hinges move: of a tree with some locked they are those of its model."""
+SAME_EDGES = ("hinge subset", "embedded loops")
+"""How trees are made that share these letters: with hinges locked, and with loops embedded in groups of bodies."""
 NUMBERS = ("tr", "ln det", "norm", "ln", "1", "×", "1/")
 """First letters of words that stand for numbers: see `scalars`."""
 NUMBER: Word = ("1",)

@@ -1,5 +1,7 @@
 """Forward dynamics on loops by tree augmentation, against dense equations with the mass matrix, Lagrange's equations and conservation."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -347,3 +349,22 @@ def test_a_ladder_moves_by_its_closed_form(rungs):
     vdot, lam = dense(model, q, v, np.zeros(model.nv))
     close(got.vdot, vdot), close(got.multipliers, lam)
     assert got.rank == 2 * n
+
+
+def test_what_is_each_loop_s_own_goes_by_name():
+    """Of results, when it is asked for; it stays what it was where loops are added since."""
+    model = pc.chain(3)
+    model.add_coupling({"hinge0": 1.0, "hinge1": -3.0}, name="gear")
+    model.add_loop("body2", hinge="pin", point=(1, 0, 0), position=(0, 0, 0), name="closure")
+    model.gravity = (0, -10, 0)
+    q = [[1.0, -1.0, -2.141592653589793]] * 2
+    got = model.constrained_dynamics(q, np.zeros((2, 3)))
+    model.add_loop("body1", hinge="pin", name="more")
+    assert list(got.by_loop) == list(got.forces) == ["gear", "closure"] and len(got.by_loop) == 2
+    assert np.array_equal(got.by_loop["gear"], got.multipliers[:, :1]) and np.array_equal(got.by_loop["closure"], got.multipliers[:, 1:6])
+    assert got.forces["closure"].b.shape == (2, 6) and not got.forces["gear"].a.any() and got.forces["closure"].b.any()
+    again = pickle.loads(pickle.dumps(got))
+    assert np.array_equal(again.by_loop["closure"], got.by_loop["closure"]) and "closure" in repr(again.forces)
+    with pytest.raises(KeyError, match="more"):
+        got.by_loop["more"]
+    assert list(model.constrained_dynamics(q[0], np.zeros(3)).by_loop) == ["gear", "closure", "more"]

@@ -155,8 +155,8 @@ CHANGES = {
     "cpp/operators/loop_values.h": [
         (
             "an end's row without its way to the other end",
-            "S(-1) * force_to_parent(cast<S>(loop.loop->pair.end_a), force_to_parent(m.X, g))",
-            "S(-1) * force_to_parent(cast<S>(loop.loop->pair.end_a), g)",
+            "S(-1) * force_to_parent(renormalised<S>(loop.loop->pair.end_a), force_to_parent(m.X, g))",
+            "S(-1) * force_to_parent(renormalised<S>(loop.loop->pair.end_a), g)",
         ),
     ],
     "cpp/dynamics/rigid_dynamics.cpp": [

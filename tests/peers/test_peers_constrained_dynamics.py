@@ -1,6 +1,7 @@
 """Forward dynamics on loops beside the dense equations with Pinocchio's mass matrix, bias forces, Jacobians and accelerations of frames.
 
-Its own constraintDynamics is called in test_peers_mechanisms.py, of other models. Tolerance: both are right to eps times the
+Its own constraintDynamics iterates where rows are redundant; test_peers_mechanisms.py calls it, too, and `pycraft bench` has it on a ladder.
+Tolerance: both are right to eps times the
 condition of Q ℳ⁻¹ Q*, below 1e6 here.
 """
 
@@ -9,6 +10,8 @@ import pytest
 
 pin = pytest.importorskip("pinocchio")
 
+from pycraft.cli.bench_loops import BESIDE, beside_pinocchio, ladder  # noqa: E402 - after the check that the extra is there
+from pycraft.peers.pinocchio_loops import PinocchioLoops  # noqa: E402 - after the check that the extra is there
 from support.pinocchio_pairs import Pair, models  # noqa: E402 - after the check that the extra is there
 
 pytestmark = pytest.mark.peers
@@ -53,3 +56,16 @@ def test_accelerations_are_those_of_pinocchio_s_equations(robot, root, kind):
     assert np.abs(ours - free).max() <= 1e-9 * np.abs(free).max()
     assert np.abs(got.vdot - free).max() > 0.1 * np.abs(free).max()  # the loop does something
     assert np.abs(got.vdot - expected).max() <= 1e-9 * np.abs(expected).max()
+
+
+def test_its_own_constraint_dynamics_on_the_ladder_that_is_timed():
+    """As `pycraft bench` takes it: balls for pins, whose rows across the plane are redundant; it iterates to 1e-10, ours is exact."""
+    model = ladder(3)
+    q, rng = np.array([1.0, -1.0] * 3 + [1.0]), np.random.default_rng(1)
+    v = model.constrained_velocities(q, rng.normal(size=model.nv)).v
+    tau = rng.normal(size=model.nv)
+    peer = PinocchioLoops(model, [((f"crank{i}", (1, 0, 0)), (f"rod{i}", (1, 0, 0))) for i in range(1, 4)])
+    expected = model.constrained_dynamics(q, v, tau).vdot
+    assert np.abs(peer.ours(peer.call(q, v, tau)()) - expected).max() <= 1e-7 * np.abs(expected).max()
+    (figure,) = beside_pinocchio(seconds=0.01)
+    assert figure.value > 0 and figure.bound == BESIDE

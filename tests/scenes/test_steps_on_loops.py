@@ -116,3 +116,15 @@ def test_a_first_step_that_is_far_too_long_is_taken_again():
 def test_steps_that_leave_the_loops_are_refused():
     with pytest.raises(pc.EvaluationError, match="has left its loops.*'wrist: along x', at t = .* s"):
         M.slider_crank().simulate(4.0, integrator="rk4", step=0.2, progress=False)
+
+
+@pytest.mark.parametrize("integrator", ["dopri5", "fehlberg78"])
+@pytest.mark.parametrize("torque", [1e100, 1e300])
+def test_a_torque_beyond_all_measure_ends_the_run_with_its_time(torque, integrator):
+    """Of 1e300 N m the first step that errors allow is nothing at all, and each was taken: the run went on until it was interrupted."""
+    model = pc.mechanisms.n_four_bar(1).model
+    scene = pc.Scene(model)
+    scene.add(pc.effects.Loop())
+    scene.add(pc.effects.TorqueSource(torque, "crank0"))
+    with pytest.raises(pc.EvaluationError, match=r"at t = .* s, without the error estimate reaching .*'crank0' changes fastest"):
+        scene.simulate(0.01, integrator=integrator, progress=False)

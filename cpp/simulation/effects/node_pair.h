@@ -1,6 +1,7 @@
 // Two nodes that something is stretched between: where they are, how fast they part, and equal and opposite forces on them.
 #pragma once
 
+#include "model/unit_data.h"
 #include "simulation/effect.h"
 #include "simulation/selection.h"
 
@@ -19,7 +20,7 @@ template <class S>
 struct PlacedNode {
   int body;
   Pose<S> pose;  // in its body
-  explicit PlacedNode(const Node& node) : body(node.body), pose(cast<S>(node.pose)) {}
+  explicit PlacedNode(const Node& node) : body(node.body), pose(renormalised<S>(node.pose)) {}
 
   Pose<S> in_world(const At<S>& at) const { return body < 0 ? pose : at.pose[body] * pose; }
   Vector3<S> position(const At<S>& at) const { return body < 0 ? pose.p : at.pose[body].p + at.pose[body].R * pose.p; }

@@ -1,5 +1,6 @@
 #include "simulation/effects/wrench.h"
 
+#include "model/unit_data.h"
 #include "runtime/errors.h"
 
 namespace pycraft {
@@ -10,7 +11,7 @@ template <class S>
 class BoundWrench : public BoundEffect<S> {
  public:
   explicit BoundWrench(const Wrench& of)
-      : body_(of.node.body), other_(of.axes.body), fixed_(of.fixed), origin_(cast<S>(of.node.pose.p)), turn_(cast<S>(of.axes.pose.R)), wrench_(of.wrench) {}
+      : body_(of.node.body), other_(of.axes.body), fixed_(of.fixed), origin_(cast<S>(of.node.pose.p)), turn_(renormalised<S>(of.axes.pose).R), wrench_(of.wrench) {}
 
   void forces(const At<S>& at, const Forces<S>& out) override {
     S w[6];

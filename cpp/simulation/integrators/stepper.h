@@ -128,6 +128,8 @@ class ControlledSteps : public Stepper<S> {
       const bool taken = method_->attempt(t, x, tried);
       if (taken && finite_motion(equations_, x)) {
         if (cut_) t = end_;
+        short_ = !cut_ && abs(t - from) < shortest(t) ? short_ + 1 : 0;
+        if (short_ == patience) refuse_step(t, x, std::to_string(patience) + " steps in a row were as short as " + short_number(to_double(before)) + " s");
         // A step cut short tells only whether the next may be longer.
         h = cut_ && abs(tried) < abs(h) ? h : tried;
         return;
@@ -139,7 +141,7 @@ class ControlledSteps : public Stepper<S> {
         method_->forget();
       }
       h = abs(tried) < abs(before) ? tried : S(before / S(2));
-      if (++refusals > 200 || abs(h) < S(16) * epsilon<S>() * std::max(whole_, S(abs(t)))) refuse_step(t, x);
+      if (++refusals > 200 || abs(h) < shortest(t)) refuse_step(t, x);
     }
   }
   void within(const S& from, const State& x, const S& t, State& out) override {
@@ -158,6 +160,13 @@ class ControlledSteps : public Stepper<S> {
  private:
   using Stepper<S>::pace_, Stepper<S>::cut_, Stepper<S>::rejected_;
 
+  // A step so short is the rounding of times, and no way to the end. First ones may be: threefold each time they have grown from the least double to
+  // one in 700 steps.
+  static constexpr int patience = 1000;
+  S shortest(const S& t) const {
+    using std::abs;
+    return S(16) * epsilon<S>() * std::max(whole_, S(abs(t)));
+  }
   // A hundredth of the time in which the state would change by its own size, both measured by the tolerances.
   S first_step(const S& t, const State& x) {
     using std::abs;
@@ -174,9 +183,11 @@ class ControlledSteps : public Stepper<S> {
     return std::min(whole_, S(size / change / S(100)));
   }
   [[noreturn]] void refuse_step(const S& t, const State& x) {
-    refuse(options_.integrator, "the step size fell to " + short_number(to_double(pace_.size)) + " s at t = " + short_number(to_double(t)) + " s, without the error estimate " +
-                                    "reaching rtol = " + short_number(options_.rtol) + ", atol = " + short_number(options_.atol) + "; " +
-                                    fastest_of(equations_, x, t, options_) +
+    refuse_step(t, x, "the step size fell to " + short_number(to_double(pace_.size)) + " s");
+  }
+  [[noreturn]] void refuse_step(const S& t, const State& x, const std::string& what) {
+    refuse(options_.integrator, what + " at t = " + short_number(to_double(t)) + " s, without the error estimate reaching rtol = " + short_number(options_.rtol) +
+                                    ", atol = " + short_number(options_.atol) + "; " + fastest_of(equations_, x, t, options_) +
                                     "; the motion is singular or not finite there, or stiff (integrator=\"rosenbrock4\"), or the tolerances are below the precision's rounding");
   }
 
@@ -185,6 +196,7 @@ class ControlledSteps : public Stepper<S> {
   IntegratorOptions options_;
   State kept_;
   S end_ = S(0), whole_ = S(0);
+  int short_ = 0;  // steps in a row that were as short as times are rounded
 };
 
 // As many equal steps in a piece as make each at most options.step. Method::Needs says how it has accelerations found.
