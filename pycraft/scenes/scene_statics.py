@@ -10,7 +10,7 @@ from .. import _core
 from ..arguments import moment
 from ..dynamics.equilibrium import TOLERANCE, Balance, Equilibrium, solved
 from ..dynamics.interbody import forces_of_scene
-from ..dynamics.linearization import listed
+from ..dynamics.statics import held_by
 from ..state import at_state
 
 
@@ -91,7 +91,7 @@ class Statics:
         """
         calls, time = self._calls(), moment(t)
         own = [] if states is None else np.atleast_1d(_core.real_array(states, "states")).ravel().tolist()
-        held = _core.coordinates_named(self.model, listed(hold, "hold"), "hold")
+        held = held_by(self.model, hold)
         starts = np.asarray(_core.real_array(at_state(self.model, q0)[0], "q"), float)
 
         def at(q: np.ndarray) -> Balance:
