@@ -38,11 +38,12 @@ def _along(
             raise _core.ModelError(f"{name} of {scene.model.name!r} has the shape {x.shape}; there are {count} states, or one for all")
     q, v, own = (np.broadcast_to(x, (count, x.shape[-1])) for x in (q, v, own))
     times = np.broadcast_to(times, (count,))
-    if not count:
-        raise _core.ModelError("a linear model along no states: q has no rows")
-    each = [_at(scene, calls, q[b], v[b], float(times[b]), own[b], chosen, names, outputs) for b in range(count)]
+    if count:
+        each = [_at(scene, calls, q[b], v[b], float(times[b]), own[b], chosen, names, outputs) for b in range(count)]
+    else:  # the sizes of one
+        each = [_at(scene, calls, scene.model.zero_q(), np.zeros(scene.model.nv), 0.0, np.zeros(own.shape[-1]), chosen, names, outputs)]
     first = each[0]
-    stacked = [np.stack([getattr(one, name) for one in each]) for name in ("A", "B", "C", "D", "rate", "q", "v")]
+    stacked = [np.stack([getattr(one, name) for one in each])[:count] for name in ("A", "B", "C", "D", "rate", "q", "v")]
     A, B, C, D, rate, all_q, all_v = stacked
     return LinearModel(A, B, C, D, rate, first.states, first.inputs, first.outputs, first.units, first.model, all_q, all_v, times.copy())
 
