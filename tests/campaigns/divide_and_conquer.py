@@ -70,7 +70,7 @@ most 100 eps √nv |θ̈|, which is what is lost where nothing cancels, the solu
 more than the rounding of r can have made, and what may be left is bounded: the last δ, or the most that this rounding makes of a
 correction in any direction (`cpp/algebra/trees/sweeps/residual_rounding.h`). What may be off by more than six digits (64 √eps) is refused
 by an error that names the hinge where the digits went. So a tip of 10⁹ times the mass is solved to rounding, one of 10¹² on ten links to
-six digits, and from 10¹³ on rounding hides from the residual what is lost, and it is refused; `form="ud"` of the articulated method has
+six digits or refused, and of more rounding hides from the residual what is lost; `form="ud"` of the articulated method has
 them all. `tests/dynamics/test_divide_and_conquer.py` holds it to this, and on well-proportioned trees to ten times the errors of the fast
 form, or to 100 eps √N where that has luck.
 
@@ -96,7 +96,7 @@ they gain and what Amdahl's law makes of it are no property of the method; the p
 It does not pay here. A join takes 1,400 to 4,000 operations and its segment a kilobyte; a link of the articulated method takes some 400,
 in kernels of the machine's instruction set. On a chain of {links} links that is {ratio} times the time on one thread; two threads gain
 {gain}. With no other loss it takes {ideal} cores to draw level; by Amdahl's law, with the share of {serial} that two threads leave serial
-here, {least}. The critical path is {depth} joins a pass instead of {links} links, but threads are started four times a state, some 50 µs
+here, {least}. The critical path is {depth} joins a pass instead of {links} links, but threads are started six times a state, some 50 µs
 each time, and the residual is one thread's sweep: below 10⁴ links they gain nothing.
 
 Batches want none of this: states are shared out by `threads=` with the articulated method, in packs. Trees with several large subtrees
