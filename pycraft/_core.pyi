@@ -1604,7 +1604,7 @@ def prepared_call(function: typing.Any, name: str, dynamics: typing.Any, batch: 
     """
     A direct call of one model with its options, as `prepare` gives it. made: the tuple of three results.
     """
-def prescribed_by(model: Multibody, names: collections.abc.Sequence[str]) -> list[bool]:
+def prescribed_by(model: Multibody, names: collections.abc.Sequence[str], option: str = 'prescribed') -> list[bool]:
     """
     Whether each coordinate is prescribed, by names of hinges, coordinates or patterns; ModelError for one that is named twice.
     """

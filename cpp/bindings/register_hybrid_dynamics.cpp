@@ -13,12 +13,15 @@ namespace pycraft {
 
 namespace {
 
-// Per coordinate, of names of hinges or coordinates. ModelError for a name that is not there, and for what is named twice.
-std::vector<char> prescribed_by(const Multibody& model, const std::vector<std::string>& names) {
+// Per coordinate, of names of hinges or coordinates; hinges that have none, locked or welds, are where they are told to be. ModelError for a name
+// that is not there, and for what is named twice. option: which one the names are of, for errors.
+std::vector<char> prescribed_by(const Multibody& model, const std::vector<std::string>& names, const std::string& option = "prescribed") {
   std::vector<char> prescribed(model.nv(), 0);
   for (const std::string& name : names)
-    for (int j : coordinates_named(model, Names({name}), "prescribed", true)) {
-      if (prescribed[j]) throw ModelError("prescribed: coordinate '" + model.structure().coordinate_names[j] + "' is prescribed twice, the second time as '" + name + "'");
+    for (int j : coordinates_named(model, Names({name}), option, true)) {
+      if (prescribed[j])
+        throw ModelError(option + ": coordinate '" + model.structure().coordinate_names[j] + "' is " + (option == "prescribed" ? option : "named") +
+                         " twice, the second time as '" + name + "'");
       prescribed[j] = 1;
     }
   return prescribed;
@@ -62,10 +65,10 @@ struct PreparedHybrid {
 }  // namespace
 
 void register_hybrid_dynamics(py::module_& m) {
-  m.def("prescribed_by", [](const Multibody& model, const std::vector<std::string>& names) {
-    const std::vector<char> prescribed = prescribed_by(model, names);
+  m.def("prescribed_by", [](const Multibody& model, const std::vector<std::string>& names, const std::string& option) {
+    const std::vector<char> prescribed = prescribed_by(model, names, option);
     return std::vector<bool>(prescribed.begin(), prescribed.end());
-  }, py::arg("model"), py::arg("names"), "Whether each coordinate is prescribed, by names of hinges, coordinates or patterns; ModelError for one that is named twice.");
+  }, py::arg("model"), py::arg("names"), py::arg("option") = "prescribed", "Whether each coordinate is prescribed, by names of hinges, coordinates or patterns; ModelError for one that is named twice.");
   py::class_<PreparedHybrid> prepared(m, "PreparedHybridDynamics", "Hybrid dynamics whose options were read once.");
   unpicklable(prepared).def("__call__", &PreparedHybrid::call, py::arg("q"), py::arg("v"), py::arg("tau"), py::arg("vdot"),
                             "Accelerations and forces; None where an argument is not a plain array, there are other states than was said, or the model was edited since.");

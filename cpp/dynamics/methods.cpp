@@ -144,7 +144,7 @@ size_t DynamicsMethods<S>::memory(Method method) {
     case Method::ldl: return common + composite + square + 2 * n * (sizeof(S) + sizeof(int));
     case Method::conjugate_gradients: return common + composite + (gradients_.numbers(int(n)) + n) * sizeof(S) + bodies * six;
     case Method::inverse: return common + 2 * composite + n * six + d * sizeof(S) + 2 * square + bodies * n * six;
-    case Method::divide_and_conquer: return divided().memory();
+    case Method::divide_and_conquer: return bytes_of_blocks(*model_) + bodies * (5 * six + 3 * sizeof(S)) + n * 4 * sizeof(S) + divided().memory();
   }
   return 0;
 }

@@ -48,7 +48,8 @@ class DynamicsMethods {
   int iterations() const { return gradients_.iterations; }
   S residual() const { return gradients_.residual; }
 
-  // Bytes that a method reads and writes at one evaluation: kinematics, velocities, what it factors and its vectors.
+  // Bytes that a method reads and writes at one evaluation: kinematics, velocities, what it factors and its vectors; of divide and conquer
+  // what is held in all, most of it read and written.
   size_t memory(Method method);
 
  private:

@@ -179,28 +179,18 @@ void RigidDynamics<S>::size_residual(const RigidDynamics<T>& formed, const T* vd
   newton_euler_sizes(tree_, *formed.model_, formed.blocks_, formed.points_, formed.applied_, formed.v_.data(), vdot, tau_.data(), formed.alpha_, formed.force_, units_of<S>(how), sizes_);
 }
 
-// From the direction given, or any other, the worst signs along it and what they make are found in turn: each is at least as long as
-// the one before (W. W. Hager, Condition estimates, 1984, in the 2-norm), and two turns come close to the longest.
 template <class S>
 S RigidDynamics<S>::floor(const S* direction) {
-  using std::sqrt;
-  const int n = model_->nv;
-  r_.assign(direction, direction + n);
-  S reached = S(0);
-  for (int turn = 0; turn < 3; ++turn) {
-    S size = length(r_.data());
-    if (!(size > S(0))) {  // no direction: all coordinates, with signs that alternate
-      for (int i = 0; i < n; ++i) r_[i] = i % 2 ? S(-1) : S(1);
-      size = sqrt(S(n));
-    }
-    reached = maximum(reached, turn ? size : S(0));
-    for (S& y : r_) y /= size;
-    S along;
-    rounding_along(tree_, blocks_, r_.data(), 1, sizes_, &along);
-    reached = maximum(reached, along);
-    worst_correction(tree_, blocks_, sizes_, r_.data());
-  }
-  return reached;
+  r_.assign(direction, direction + model_->nv);
+  const auto along = [&](const S* w) {
+    S bound;
+    rounding_along(tree_, blocks_, w, 1, sizes_, &bound);
+    return bound;
+  };
+  return most_rounding(r_, along, [&](S* w) {
+    worst_residual(tree_, blocks_, sizes_, w);
+    mass_matrix_inverse_apply(tree_, blocks_, sizes_.y.data(), w, 1, sizes_.g.data());
+  });
 }
 
 template <class S>

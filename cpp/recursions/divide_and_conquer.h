@@ -168,32 +168,34 @@ inline void add_branch(const Segment<S>& branch, Symmetric6<S>& P, Vector6<S>& z
   sizes = sizes + branch.sizes;
 }
 
-// Of one body. rows: its hinge's; eta: T, then η. annihilates(i): whether row i of P⁺ and τ̄ is exactly zero. Returns what eliminate() does.
-template <class S, class Annihilates>
-S segment_of_body(const Pose<S>& X, Symmetric6<S> P, const Vector6<S>& sizes, const Vector6<S>& z, const Vector6<S>& a, const Rows<S>& rows, S* eta, S* work,
-                  const Annihilates& annihilates, Segment<S>& out) {
-  const int n = rows.n;
-  const S least = eliminate(P, sizes, rows, work);
-  if (!(least > S(0))) return least;
-  forward_substitute(rows.L, n, eta, 1);
-  take_out(rows, P);
+// z and y of one body, of which the rows are eliminated; z: z(k). eta: T, then η.
+template <class S>
+void bias_of_body(const Pose<S>& X, const Vector6<S>& z, const Vector6<S>& a, const Rows<S>& rows, S* eta, Segment<S>& out) {
+  forward_substitute(rows.L, rows.n, eta, 1);
   Vector6<S> plus = z;
   out.y = a;
-  out.Y = Symmetric6<S>::zero();
-  for (int i = 0; i < n; ++i) {
+  for (int i = 0; i < rows.n; ++i) {
     eta[i] -= dot(rows.b[i], z);
-    const Vector6<S> scaled = (S(1) / rows.x[i]) * rows.b[i];
     plus = plus + (eta[i] / rows.x[i]) * rows.p[i];
-    out.y = out.y + eta[i] * scaled;
-    add_symmetric_product(out.Y, S(0.5) * scaled, rows.b[i]);
+    out.y = out.y + eta[i] * ((S(1) / rows.x[i]) * rows.b[i]);
   }
+  out.z = force_to_parent(X, plus);
+}
+
+// Of one body, but for its biases. rows: its hinge's. annihilates(i): whether row i of P⁺ and τ̄ is exactly zero. Returns what eliminate() does.
+template <class S, class Annihilates>
+S segment_of_body(const Pose<S>& X, Symmetric6<S> P, const Vector6<S>& sizes, const Rows<S>& rows, S* work, const Annihilates& annihilates, Segment<S>& out) {
+  const S least = eliminate(P, sizes, rows, work);
+  if (!(least > S(0))) return least;
+  take_out(rows, P);
+  out.Y = Symmetric6<S>::zero();
+  for (int i = 0; i < rows.n; ++i) add_symmetric_product(out.Y, S(0.5) * ((S(1) / rows.x[i]) * rows.b[i]), rows.b[i]);
   for (int i = 0; i < 6; ++i)
     if (annihilates(i)) annihilate(P, i);
   out.P = to_parent(X, P);
   Symmetric6<S> rounded = Symmetric6<S>::zero();
   for (int i = 0; i < 3; ++i) rounded.A(i, i) = sizes.angular[i], rounded.C(i, i) = sizes.linear[i];
   out.sizes = diagonal(to_parent(X, rounded));
-  out.z = force_to_parent(X, plus);
   for (int c = 0; c < 6; ++c) {
     Vector6<S> unit = Vector6<S>::zero();
     unit[c] = S(1);
@@ -258,6 +260,16 @@ inline Symmetric6<S> without(const LentInertia<S>& lent, const Segment<S>& segme
   return P;
 }
 
+// z and y of two, P̃ that of the outboard one, of which the rows are eliminated.
+template <class S>
+void join_biases(const Segment<S>& one, const Segment<S>& two, const Symmetric6<S>& P, const Rows<S>& rows, Segment<S>& out) {
+  const Vector6<S> g = two.z + P * one.y;
+  Vector6<S> y = one.y;
+  for (int i = 0; i < rows.n; ++i) y = y - dot(rows.b[i], g) * ((S(1) / rows.x[i]) * rows.b[i]);
+  out.z = one.z + one.psi * passed(rows, g);
+  out.y = two.y + transpose_times(two.psi, y);
+}
+
 // end: with the rows of Υ₁, from rows_of_compliance, or of the one body that 1 is. Returns what eliminate() does.
 template <class S>
 S join(const Segment<S>& one, const Segment<S>& two, const LentInertia<S>& lent, End<S>& end, Segment<S>& out) {
@@ -267,16 +279,14 @@ S join(const Segment<S>& one, const Segment<S>& two, const LentInertia<S>& lent,
   S work[12];
   const S least = eliminate(P, sizes, rows, work);
   if (!(least > S(0))) return least;
-  const Vector6<S> g = two.z + P * one.y;
+  join_biases(one, two, P, rows, out);
   Transition<S> through = two.psi;  // τ̄ψ₂
-  Vector6<S> y = one.y;
   out.Y = two.Y;
   for (int i = 0; i < rows.n; ++i) {
-    const Vector6<S>&b = rows.b[i], scaled = (S(1) / rows.x[i]) * b, seen = transpose_times(two.psi, b), seen_scaled = (S(1) / rows.x[i]) * seen;
+    const Vector6<S> seen = transpose_times(two.psi, rows.b[i]), seen_scaled = (S(1) / rows.x[i]) * seen;
     for (int r = 0; r < 6; ++r)
       for (int c = 0; c < 6; ++c) through(r, c) -= rows.p[i][r] * seen_scaled[c];
     add_symmetric_product(out.Y, S(0.5) * seen_scaled, seen);
-    y = y - dot(b, g) * scaled;
   }
   take_out(rows, P);
   out.P = congruence(one.psi, P);
@@ -285,9 +295,18 @@ S join(const Segment<S>& one, const Segment<S>& two, const LentInertia<S>& lent,
   for (int i = 0; i < 6; ++i)
     for (int j = 0; j < 6; ++j) out.sizes[i] += one.psi(i, j) * one.psi(i, j) * sizes[j];
   out.psi = one.psi * through;
-  out.z = one.z + one.psi * passed(rows, g);
-  out.y = two.y + transpose_times(two.psi, y);
   return least;
+}
+
+// The biases alone again, of other forces.
+template <class S>
+void join_again(const Segment<S>& one, const Segment<S>& two, const LentInertia<S>& lent, End<S>& end, Segment<S>& out) {
+  Vector6<S> sizes;
+  const Symmetric6<S> P = without(lent, two, sizes);
+  const Rows<S> rows = end.rows();
+  S work[12];
+  eliminate(P, sizes, rows, work);
+  join_biases(one, two, P, rows, out);
 }
 
 // From motion and force at the handles of both: the motion between them, and felt = hF₁ = -Jt of the force that the outboard one puts on the other.

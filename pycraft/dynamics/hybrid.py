@@ -47,14 +47,14 @@ class HybridDerivatives(NamedTuple):
     tau_vdot: np.ndarray
 
 
-def prescribed_names(prescribed: Any) -> tuple[str, ...]:
-    """Names of hinges or coordinates, one or several, handles included."""
+def prescribed_names(prescribed: Any, option: str = "prescribed") -> tuple[str, ...]:
+    """Names of hinges or coordinates, one or several, handles included; of which option, for errors."""
     several = [prescribed] if isinstance(prescribed, str) or not isinstance(prescribed, Iterable) else list(prescribed)
     names = tuple(getattr(one, "name", one) for one in several)
     for name in names:
         if not isinstance(name, str):
-            raise _core.ModelError(f"prescribed takes names of hinges or coordinates, or a list of them, not {name!r:.80}")
-        text(name, "what is prescribed")
+            raise _core.ModelError(f"{option} takes names of hinges or coordinates, or a list of them, not {name!r:.80}")
+        text(name, "what is prescribed" if option == "prescribed" else option)
     return names
 
 
@@ -121,7 +121,8 @@ class HybridCalls:
         tau : (nv,), N m and N; what it has at prescribed coordinates does not matter, but is finite. Zero where left out.
         vdot : (nv,), rad/s² and m/s²; what it has at free coordinates does not matter, but is finite. Zero where left out.
         prescribed : names of hinges, coordinates or patterns, or a list of them
-            A subhinge of several coordinates (a ball) is prescribed whole.
+            A subhinge of several coordinates (a ball) is prescribed whole. Locked hinges and welds, which have none, may be among them:
+            their bodies do not move against each other as it is.
         form, refine, residual, precision : as in `forward_dynamics`, of the solution for the free coordinates
 
         Returns

@@ -42,7 +42,7 @@ def prepared(model: Any, call: str, batch: int | None, options: dict[str, Any]) 
     for name in options:
         if name not in known:
             raise _core.EvaluationError(f"a prepared {call} has no option {name!r}; there are {', '.join(known)}")
-        if name in ("residual", "on_singular"):
+        if name in ("form", "residual", "on_singular"):
             chosen(options[name], name)
     batch = states_of(batch)
     if call == "hybrid_dynamics":

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import _core
-from ..arguments import text
+from ..arguments import chosen, text
 from ..state import at_state
 from .by_realization import checked_forces, output
 from .direct_calls import cached
@@ -79,7 +79,9 @@ class SensitivityCalls(OperationalSpaceCalls):
         """
         q, v = at_state(self, q, v)
         tau = np.zeros(self.nv) if tau is None else tau
-        return DynamicsDerivatives(*self._sensitivities().forward_dynamics(q, v, tau, form, refine, residual, precision))
+        return DynamicsDerivatives(
+            *self._sensitivities().forward_dynamics(q, v, tau, form, refine, chosen(residual, "residual"), precision)
+        )
 
     @over_threads
     def mass_matrix_derivative(self, q=None, *, precision: str = "double", threads: int = 1, out=None) -> np.ndarray:

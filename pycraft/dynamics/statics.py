@@ -11,6 +11,7 @@ from .. import _core
 from ..state import at_state
 from .equilibrium import TOLERANCE, Balance, Equilibrium, checked_tolerance, solved
 from .equilibrium_on_loops import solved_on_loops
+from .hybrid import prescribed_names
 from .interbody import pushed
 from .linearization import listed
 
@@ -26,6 +27,11 @@ class Counterbalance(NamedTuple):
     tau: np.ndarray
     residual: np.ndarray
     unbalanced: tuple[str, ...]
+
+
+def held_by(model: Any, hold: Any) -> list[int]:
+    """Coordinates that stay where they are, by the rule of what hybrid dynamics has prescribed."""
+    return np.flatnonzero(_core.prescribed_by(model, prescribed_names(hold, "hold"), "hold")).tolist()
 
 
 class StaticsCalls:
@@ -48,7 +54,8 @@ class StaticsCalls:
         tau : (nv,) N m and N, or (B, nv), or one number for all: constant generalized forces; zero where left out
         q0 : (nq,) or a State, where the search starts, or (B, nq); the model's present state where left out
         wrenches, wrench_axes : as in `interbody_forces`; in the world's axes they keep their direction as the model moves
-        hold : names of hinges, coordinates or patterns, or a list of them, that stay where q0 has them
+        hold : names of hinges, coordinates or patterns, or a list of them, that stay where q0 has them, each once
+            Locked hinges and welds stay as they are, named or not; the rule is that of `hybrid_dynamics(prescribed=)`.
         limits : whether q is to be within the hinges' limits
         stable : whether only a stable or indifferent equilibrium will do
         tolerance : what may be left, as a part of the largest force
@@ -82,7 +89,7 @@ class StaticsCalls:
         names, in_world, numbers = pushed(wrenches, wrench_axes)
         if loops and limits:
             raise _core.EvaluationError("limits of hinges are not kept to on loops: look at q, or hold coordinates (hold=)")
-        held = _core.coordinates_named(model, listed(hold, "hold"), "hold")
+        held = held_by(model, hold)
         starts = np.asarray(_core.real_array(q0, "q"), float)
         if given.ndim not in (1, 2) or given.shape[-1] != self.nv:
             raise _core.ModelError(

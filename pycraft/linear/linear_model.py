@@ -194,13 +194,21 @@ class LinearModel:
         return self.A, self.B, self.C, self.D
 
 
-def stacked(each: list[LinearModel]) -> LinearModel:
-    """A batch of linear models of the same states, inputs and outputs."""
-    first = each[0]
+def stacked(each: list[LinearModel], count: int | None = None) -> LinearModel:
+    """A batch of linear models of the same states, inputs and outputs; of the first `count`, 0: none, with the sizes of one."""
+    first, each = each[0], each[:count]
+    if not each:
+        return _none_like(first)
     A, B, C, D, rate, q, v = (np.stack([getattr(one, name) for one in each]) for name in ("A", "B", "C", "D", "rate", "q", "v"))
     tangent = None if first.tangent is None else np.stack([one.tangent for one in each if one.tangent is not None])
     t = np.array([one.t for one in each])
     return LinearModel(A, B, C, D, rate, first.states, first.inputs, first.outputs, first.units, first.model, q, v, t, tangent=tangent)
+
+
+def _none_like(one: LinearModel) -> LinearModel:
+    A, B, C, D, rate, q, v = (np.zeros((0, *getattr(one, name).shape)) for name in ("A", "B", "C", "D", "rate", "q", "v"))
+    tangent = None if one.tangent is None else np.zeros((0, *one.tangent.shape))
+    return LinearModel(A, B, C, D, rate, one.states, one.inputs, one.outputs, one.units, one.model, q, v, np.zeros(0), tangent=tangent)
 
 
 def names_of_states(coordinates: Sequence[str], own: int = 0) -> tuple[str, ...]:

@@ -316,14 +316,19 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, Planning, Structure, 
         return [dict(actuator) for actuator in self._actuators]
 
     def __reduce__(self):
-        return _again, (self.description(), self._left_aside, self._actuators, self._added_nodes)
+        return _again, self._told()
 
     def __copy__(self) -> Multibody:
-        return _again(self.description(), self._left_aside, self._actuators, self._added_nodes)
+        return _again(*self._told())
 
     def __deepcopy__(self, memo) -> Multibody:
-        memo[id(self)] = copy = _again(self.description(), self._left_aside, self._actuators, self._added_nodes)
+        memo[id(self)] = copy = _again(*self._told())
         return copy
+
+    def _told(self) -> tuple[Any, ...]:
+        frames = self._kept_frames
+        moment = None if frames is None else (frames.t, np.array(frames.vdot))
+        return self.description(), self._left_aside, self._actuators, self._added_nodes, moment
 
     def __repr__(self) -> str:
         if self._whole is None:
@@ -339,11 +344,14 @@ def _again(
     left_aside: Mapping[str, np.ndarray],
     actuators: Sequence[dict[str, Any]] = (),
     added_nodes: frozenset[str] = frozenset(),
+    moment: tuple[float, np.ndarray] | None = None,
 ) -> Multibody:
-    """A copy of a model from its description, what its file said beside it, and which nodes were added since."""
+    """A copy of a model from its description, what its file said beside it, which nodes were added since, and its frames' t and vdot."""
     model = Multibody.from_description(description)
     model._left_aside, model._actuators = dict(left_aside), [dict(actuator) for actuator in actuators]
     model._added_nodes = added_nodes
+    if moment is not None:
+        model.frames.t, model.frames.vdot = moment
     return model
 
 

@@ -209,7 +209,8 @@ class Structure(Locking):
         ModelError
             A root that is not on a free hinge (detach it first); locked hinges on the way; rotors that would act between other axes: of the
             free hinge itself, and of a ball or free hinge on the way that has different ones about different axes; an effect of a scene
-            that takes coordinates of hinges on the way one by one, or all in their order. The model is as it was.
+            that acts on the coordinates of the free hinge, alone or among all, or that takes coordinates of hinges on the way one by one,
+            or all in their order. The model is as it was.
 
         Cost: the hinges on the way, and O(bodies) at the next look at the model.
 
@@ -298,6 +299,14 @@ class Structure(Locking):
                 what = f"coordinates of {hinges[0]!r} one by one" if hinges[0] else "all coordinates one by one, in their order"
                 raise _core.ModelError(
                     f"effect {effect!r} of a scene takes {what}, which are others when {body!r} is the root: remove it, and add it anew"
+                )
+        root = self._body(self._path_between(-1, self._body_index(body))[0])
+        free = self._slices(self._hinge_index(root["hinge"]["name"]))[1]
+        for scene in self._scenes or ():
+            for effect in scene._acting_on(set(range(free.start, free.stop))):
+                raise _core.ModelError(
+                    f"effect {effect!r} of a scene acts on the coordinates of the free hinge {root['hinge']['name']!r}, which are those of"
+                    f" {root['name']!r}, and would be those of {body!r}: remove it, and add it anew"
                 )
 
     def _set_accelerations(self, by_hinge: Mapping[str, Any]) -> None:

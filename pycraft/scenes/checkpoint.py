@@ -10,7 +10,7 @@ from typing import Any
 
 from .. import _core
 
-FORMAT = "pycraft checkpoint 1"
+FORMAT = "pycraft checkpoint 2"
 
 
 @dataclass(frozen=True)
@@ -23,6 +23,7 @@ class Checkpoint:
     ----------
     t : s, where the resumed run begins: the start of the last step if that was cut short by the end of the run
     model, effects : what the scene was: its model's name, the names of the effects that were on
+    coordinates : what the numbers of the state are of: "elbow of forearm", a coordinate of the hinge of that body
     integrator, options : what the run was told
     state : for the core
     """
@@ -30,6 +31,7 @@ class Checkpoint:
     t: float
     model: str
     effects: tuple[str, ...]
+    coordinates: tuple[str, ...]
     precision: str
     integrator: str
     options: dict[str, Any]
@@ -48,10 +50,17 @@ class Checkpoint:
             _check_entries(data)
         except ValueError as error:
             raise _core.EvaluationError(f"{str(path)!r} holds no checkpoint ({error}); `run.checkpoint().save(path)` writes one") from None
-        return cls(**data | {"effects": tuple(data["effects"])})
+        return cls(**data | {name: tuple(data[name]) for name in ("effects", "coordinates")})
 
     def __repr__(self) -> str:
         return f"<checkpoint of {self.model!r} at {self.t:g} s, integrator {self.integrator!r}>"
+
+
+def coordinates_of(model: Any) -> tuple[str, ...]:
+    """What each number of v is of. An edit that hangs bodies elsewhere, or moves the root, may leave as many of them."""
+    bodies, hinges = model._names()[:2]
+    moved = dict(zip(hinges, bodies, strict=True))
+    return tuple(f"{name} of {moved[name if name in moved else name[: name.rindex('[')]]}" for name in model.coordinate_names)
 
 
 # ---------------------------------------------------------------------- what a file may say
@@ -79,8 +88,9 @@ def _check_entries(data: dict[str, Any]) -> None:
     _keys(data, tuple(field.name for field in fields(Checkpoint)), "a checkpoint")
     for name in ("model", "precision", "integrator"):
         _check(isinstance(data[name], str), f"{name} is a name, not {data[name]!r:.40}")
-    effects, options, state = data["effects"], data["options"], data["state"]
-    _check(isinstance(effects, list) and all(isinstance(name, str) for name in effects), "effects is a list of names")
+    options, state = data["options"], data["state"]
+    for what in ("effects", "coordinates"):
+        _check(isinstance(data[what], list) and all(isinstance(name, str) for name in data[what]), f"{what} is a list of names")
     sizes, switches = ("rtol", "atol", "step", "max_step"), ("normalise", "energy")
     _keys(options, (*sizes, *switches), "options")
     for name in sizes:

@@ -46,8 +46,11 @@ def _along(
             raise _core.ModelError(f"{name} of {scene.model.name!r} has the shape {x.shape}; there are {count} states, or one for all")
     q, v, own = (np.broadcast_to(x, (count, x.shape[-1])) for x in (q, v, own))
     times = np.broadcast_to(times, (count,))
-    if not count:
-        raise _core.ModelError("a linear model along no states: q has no rows")
+    if not count:  # the sizes of one
+        q0 = scene.model.zero_q()
+        q0 = scene.model.assemble(q0).q if scene._keeps_loops() else q0
+        one = _at(scene, calls, q0, np.zeros(scene.model.nv), 0.0, np.zeros(own.shape[-1]), chosen, names, outputs, independent)
+        return stacked([one], 0)
     each: list[LinearModel] = []
     for b in range(count):
         each.append(_at(scene, calls, q[b], v[b], float(times[b]), own[b], chosen, names, outputs, independent))

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from .checkpoint import Checkpoint
+from .checkpoint import Checkpoint, coordinates_of
 from .events import EventStates
 from .motion import Motion
 
@@ -72,7 +72,8 @@ class Run(Motion):
             its = [kinds[i] == name for i in of]
             happened[name] = EventStates(*(states[key][its] for key in ("t", "q", "v", "states")))
         kept = record.checkpoint
-        checkpoint = Checkpoint(sum(kept["t"]), scene.model.name, tuple(names), precision, integrator, options.told, dict(kept))
+        what = scene.model.name, tuple(names), coordinates_of(scene.model), precision
+        checkpoint = Checkpoint(sum(kept["t"]), *what, integrator, options.told, dict(kept))
         return cls(
             about, rows, calls, steps=steps if len(steps["t"]) else None, events=happened, statistics=record.statistics,
             ended_by=kinds[record.ended_by] if record.ended_by >= 0 else None, checkpoint=checkpoint,

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..arguments import moment, one_number, text
+from ..arguments import chosen, moment, one_number, text
 from ..closed import Closed
 from ..models.grafting import Grafting
 from ..state import at_state
 from .effects import Effect, Loop, UserEffect
+from .effects.meanings import Meanings, acted_on
 from .explain import plan_text
 from .filed import Filed
 from .measurements import Measurements
@@ -91,7 +92,8 @@ class Scene(Measurements, Statics, Filed, Closed):
             raise _core.ModelError(f"a scene is of a model, not of {model!r:.80}")
         self._model: Any = model
         self._entries: dict[str, tuple[Effect, bool]] = {}
-        self._how = (form, _core.checked_refinement(refine, residual, precision), residual, precision)
+        self._meanings = Meanings()
+        self._how = (form, _core.checked_refinement(refine, chosen(residual, "residual"), precision), residual, precision)
         self._built: tuple[Any, Any] | None = None
         self._last_run: Run | None = None
         self._calls()
@@ -131,6 +133,7 @@ class Scene(Measurements, Statics, Filed, Closed):
                 effect = given if isinstance(given, Effect) else UserEffect(given)
                 called = core.add("" if name is None else text(name, "an effect"), effect.made_for(self._model), True)
                 self._entries[called] = (effect, True)
+                self._meanings.keep(called, effect, self._model)
         except BaseException:
             self._entries.clear()
             self._entries.update(before)
@@ -148,16 +151,22 @@ class Scene(Measurements, Statics, Filed, Closed):
         found = {name: sorted(effect.by_coordinate() & hinges, reverse=True) for name, (effect, _) in self._entries.items()}
         return {name: named for name, named in found.items() if named}
 
+    def _acting_on(self, coordinates: set[int]) -> list[str]:
+        """Effects that act on one of these coordinates as such."""
+        return [name for name, (effect, _) in self._entries.items() if acted_on(effect, self._model) & coordinates]
+
     def _enter(self, name: str | None, effect: Effect, on: bool) -> None:
         """One effect as a file has it, on or off."""
         called = self._fresh_core().add(name or "", effect.made_for(self._model), on)
         self._entries[called] = (effect, on)
+        self._meanings.keep(called, effect, self._model)
         self._built = None
 
     def remove(self, *names: Any) -> Scene:
         """Take effects out, by name or themselves; returns the scene."""
         for name in [self._name(name) for name in names]:
             del self._entries[name]
+            self._meanings.forget(name)
         self._built = None
         return self
 
@@ -201,6 +210,7 @@ class Scene(Measurements, Statics, Filed, Closed):
         core = _core.SceneEffects(self._model)
         for name, (effect, on) in self._entries.items():
             core.add(name, effect.made_for(self._model), on)
+            self._meanings.keep(name, effect, self._model)
         return core
 
     def _calls(self) -> _core.SceneCalls:

@@ -11,7 +11,7 @@ from ..arguments import moment
 from ..dynamics.equilibrium import TOLERANCE, Balance, Equilibrium, solved
 from ..dynamics.equilibrium_on_loops import solved_on_loops
 from ..dynamics.interbody import forces_of_scene
-from ..dynamics.linearization import listed
+from ..dynamics.statics import held_by
 from ..state import at_state
 
 
@@ -95,7 +95,7 @@ class Statics:
         """
         calls, time = self._calls(), moment(t)
         own = [] if states is None else np.atleast_1d(_core.real_array(states, "states")).ravel().tolist()
-        held = _core.coordinates_named(self.model, listed(hold, "hold"), "hold")
+        held = held_by(self.model, hold)
         starts = np.asarray(_core.real_array(at_state(self.model, q0)[0], "q"), float)
 
         def at(q: np.ndarray) -> Balance:

@@ -11,7 +11,7 @@ from .. import _core
 from ..arguments import one_number
 from ..dynamics.integrator_names import IntegratorName, integrator_named
 from ..state import at_state
-from .checkpoint import Checkpoint
+from .checkpoint import Checkpoint, coordinates_of
 from .events import Event, events_for_core, listed_events
 from .progress_bar import RunProgress
 from .run import Run
@@ -88,6 +88,13 @@ def resume(scene: Any, checkpoint: Any, T: Any, *, t_eval: Any, events: Any, pro
     for what, now in here.items():
         if getattr(checkpoint, what) != now:
             raise _core.ModelError(f"the checkpoint is of {what} {_told(getattr(checkpoint, what))}; this scene has {_told(now)}")
+    were, are = checkpoint.coordinates, coordinates_of(scene.model)
+    if were != are:
+        first = next((pair for pair in zip(were, are, strict=False) if pair[0] != pair[1]), None)
+        but = f"{len(were)}, and there are {len(are)}" if first is None else f"{first[0]!r} where this model has {first[1]!r}"
+        raise _core.ModelError(
+            f"the checkpoint is of {scene.model.name!r} before an edit of its structure: of the coordinates {but}; simulate anew"
+        )
     told = checkpoint.options
     options = RunOptions(integrator_named(checkpoint.integrator), **told)
     times, keep = run_times(checkpoint.t, T, t_eval)

@@ -59,18 +59,26 @@ velocities, inertias and accelerations all go along it: four passes, none of whi
 
 ## Accuracy
 
-Near that of the fast form on well-proportioned trees and heavy tips: errors grow with eps times the mass ratio, not its square, as they do
-where the force of a heavy segment is handed on to the light one inboard of it. Only what that one feels of it, hF = -Jt, is handed on.
-`tests/dynamics/test_divide_and_conquer.py` holds it to ten times the errors of the fast form for tips of 10⁻⁹ to 10⁹ times the mass and on
-stretched chains (where up to six times were seen), and to 100 eps √N where that has luck.
+No pivot and no spread of inertias says how many digits of a solution are left; its residual does. After every solution θ̈
 
-It is worse elsewhere. On a chain of thin rods with massless links between them, 61 links on pins across each other, errors up to 8·10⁻¹¹
-were seen where the fast form has 10⁻¹⁵, and up to 2·10⁻¹⁰ at random angles. There is no form and no refinement.
+```
+r = T - (ℳ + J) θ̈ - 𝒞        δ = (ℳ + J)⁻¹ r
+```
 
-Where pivots are so small against what was added up in them that eight digits are no longer sure, the articulated-body algorithm is run,
-too, one thread, O(N): it names the hinge that feels no inertia, and accelerations that have not six digits in common with its plain form
-are refused by an error that names the hinge where they went. What calls for this is an estimate, no bound, and the plain form has errors of
-its own: of a pin 10⁶ m from its body 1.4·10⁻⁶ came through.
+are formed, r by Newton–Euler's two sweeps with forces gathered in a wider precision, δ by the segments that are there. Where |δ| is at
+most 100 eps √nv |θ̈|, which is what is lost where nothing cancels, the solution stands. Else δ is added, as long as it shrinks and is
+more than the rounding of r can have made, and what may be left is bounded: the last δ, or the most that this rounding makes of a
+correction in any direction (`cpp/algebra/trees/sweeps/residual_rounding.h`). What may be off by more than six digits (64 √eps) is refused
+by an error that names the hinge where the digits went. So a tip of 10⁹ times the mass is solved to rounding, one of 10¹² on ten links to
+six digits or refused, and of more rounding hides from the residual what is lost; `form="ud"` of the articulated method has
+them all. `tests/dynamics/test_divide_and_conquer.py` holds it to this, and on well-proportioned trees to ten times the errors of the fast
+form, or to 100 eps √N where that has luck.
+
+Accelerations that are zero but for rounding, of what rests under forces that cancel, have no digits of their own: what is let through is
+100 eps √nv of gravity, ω² and forces over inertias.
+
+Where a pivot is so small that it may be noise, the articulated-body algorithm is run, too, one thread, O(N): it names the hinge that
+feels no inertia. There is no form and no option of refinement.
 
 ## Cost
 
@@ -88,8 +96,8 @@ they gain and what Amdahl's law makes of it are no property of the method; the p
 It does not pay here. A join takes 1,400 to 4,000 operations and its segment a kilobyte; a link of the articulated method takes some 400,
 in kernels of the machine's instruction set. On a chain of {links} links that is {ratio} times the time on one thread; two threads gain
 {gain}. With no other loss it takes {ideal} cores to draw level; by Amdahl's law, with the share of {serial} that two threads leave serial
-here, {least}. The critical path is {depth} joins a pass instead of {links} links, but threads are started four times a state, some 50 µs
-each time: below 10⁴ links they gain nothing.
+here, {least}. The critical path is {depth} joins a pass instead of {links} links, but threads are started six times a state, some 50 µs
+each time, and the residual is one thread's sweep: below 10⁴ links they gain nothing.
 
 Batches want none of this: states are shared out by `threads=` with the articulated method, in packs. Trees with several large subtrees
 are shared out by it, too. What is left is one state of one very long chain on a machine of many cores.

@@ -2,8 +2,11 @@
 
 Tolerances. Every step eliminates rows from a positive definite inertia, as the articulated-body algorithm does, and errs as that does: eps
 times what was added up in a pivot over the pivot, times the number of steps. So it is held to ten times what the fast form errs by, or to
-rounding, 100 eps √N, where that has luck; but not among massless links and thin rods, where it is the worse of the two.
+rounding, 100 eps √N, where that has luck. What loses more than that is corrected by its residual or refused: what comes back has six
+digits, 64 √eps = 9.5e-7 (`PROMISED`), however far apart the bodies' masses are.
 """
+
+import resource
 
 import numpy as np
 import pytest
@@ -15,6 +18,7 @@ from support.singular_hinges import REGULAR, SINGULAR, at_random_state, heavy_ti
 
 EPS = np.finfo(float).eps
 WAY = dict(method="divide-and-conquer")
+PROMISED = 64 * np.sqrt(EPS)
 
 
 def errors(model, q, v, tau):
@@ -92,9 +96,9 @@ def test_massless_links_within():
     chain = at_random_state(links(*bodies))
     for seed in range(5):
         q, v, tau = state(chain, seed)
-        # Thin rods and massless links by turns: here it loses digits that the fast form keeps, 8e-11 was seen where that has 1e-15. Six are
-        # what it promises.
-        assert errors(chain, 0.1 * q, v, tau)[0] <= 1e-6
+        # Thin rods and massless links by turns: unrefined it loses digits that the fast form keeps, 8e-11 was seen where that has 1e-15.
+        # What stands may be off by 100 eps √N, and by as much again of rounding that no residual shows.
+        assert errors(chain, 0.1 * q, v, tau)[0] <= 200 * EPS * np.sqrt(chain.nv)
 
 
 @pytest.mark.parametrize("name", REGULAR)
@@ -124,10 +128,12 @@ def test_what_is_singular_is_refused_at_the_hinge(name):
 
 
 def test_digits_that_are_lost_are_not_returned():
-    model = at_random_state(heavy_tip(10, 1e12))
+    model = at_random_state(heavy_tip(60, 1e14))
     q, v, tau = state(model, 0)
     before = q.copy(), v.copy(), tau.copy()
-    words = r"loses its digits at hinge '.*' of body 'b\d+' \(accelerations are off by .* 9.5e-07 at most .*form=\"ud\""
+    words = (
+        r"loses its digits at hinge '.*' of body 'b\d+' \(by their residual accelerations may be off by .* 9.5e-07 at most .*form=\"ud\""
+    )
     with pytest.raises(pc.SingularOperatorError, match=words):
         model.forward_dynamics(q, v, tau, **WAY)
     assert all(np.array_equal(a, b) for a, b in zip(before, (q, v, tau), strict=True))
@@ -135,9 +141,38 @@ def test_digits_that_are_lost_are_not_returned():
         model.forward_dynamics(np.stack([q, q]), np.stack([0 * v, v]), np.stack([0 * tau, tau]), **WAY)  # at rest nothing is lost
 
 
-def test_digits_that_no_pivot_shows_are_not_returned():
-    """No pivot cancels here, and yet a light arm under a heavy tip loses twelve digits: the spread of inertias calls for the comparison."""
-    refused = 0
+@pytest.mark.parametrize("ratio", [1e12, 1e13, 1e14, 1e15])
+def test_a_residual_decides_what_comes_back(ratio):
+    """Unrefined, errors are eps times the ratio: corrections find the digits again, as far as rounding lets the residual see."""
+    solved = refused = 0
+    for links_there in (3, 10, 20):
+        model = at_random_state(heavy_tip(links_there, ratio))
+        for seed in range(10):
+            try:
+                assert errors(model, *state(model, seed))[0] <= PROMISED
+                solved += 1
+                # Rounding may make more of corrections there than six digits: eps times the ratio times the motions of 20 links.
+                assert ratio == 1e12 or links_there < 20
+            except pc.SingularOperatorError as error:
+                refused += "loses its digits at hinge 'b" in str(error)
+    assert solved + refused == 30 and solved >= 10 and (ratio == 1e12 or refused >= 10)
+
+
+@pytest.mark.parametrize("legs", [1, 2, 3, 5])
+def test_corrections_of_what_branches(legs):
+    """Heavy tips at the ends of legs of one body: each loses eps times the ratio, and corrections go through branches as solutions do."""
+    parents = [-1, 0, 1, *[2] * legs, *range(3, 3 + 7 * legs)]
+    for seed in range(6):
+        model = pc.tree(parents, "pin", seed=seed)
+        for tip in list(model.bodies.values())[-legs:]:
+            inertia = 1e8 * np.asarray(tip.inertia)
+            tip.mass, tip.inertia = 1e8 * tip.mass, inertia
+        # What stands, and as much again of rounding that no residual shows, times the condition of a few links in a row.
+        assert errors(model, *state(model, seed))[0] <= 1e3 * EPS * np.sqrt(model.nv)
+
+
+def test_digits_that_no_pivot_shows_are_found_again():
+    """No pivot cancels here, and yet a light arm under a heavy tip loses twelve digits, of which corrections find at least six."""
     for seed in range(20):
         model = build(random_description([-1, 0, 1], ["pin"] * 3, seed))
         tip = model.bodies["body2"]
@@ -145,11 +180,47 @@ def test_digits_that_no_pivot_shows_are_not_returned():
         tip.mass, tip.inertia = 1e12 * tip.mass, inertia
         q = model.random_state(seed).q
         tau = model.inverse_dynamics(q, np.zeros(3), np.ones(3))
-        try:
-            assert errors(model, q, np.zeros(3), tau)[0] <= 1e-6
-        except pc.SingularOperatorError as error:
-            refused += "loses its digits at hinge 'hinge" in str(error)
-    assert refused
+        assert errors(model, q, np.zeros(3), tau)[0] <= PROMISED
+
+
+@pytest.mark.parametrize("inertia", [1e6, 1e12, 1e15])
+def test_heavy_rotors(inertia):
+    """Rotors stand on the diagonal of ℳ + J: a light hinge between them feels the rest of the tree through no large number."""
+    for seed in range(8):
+        parents = [-1, 0, 1, 2, 1, 4, 5, 4, 7, 8]
+        model = pc.tree(parents, [("pin", "slider", "universal")[k % 3] for k in range(10)], seed=seed)
+        for k in range(seed % 3, 10, 3):
+            model.hinges[f"hinge{k}"].rotor_inertia = inertia
+        check(model, *state(model, seed))
+
+
+@pytest.mark.parametrize("kind", ["pin", "slider", "ball"])
+@pytest.mark.parametrize("links_there", [1, 2, 50, 400])
+def test_what_rests_is_not_refused_for_having_no_digits(kind, links_there):
+    """Accelerations that are zero but for rounding, of N² g/l at most: the largest force over the inertia of one link."""
+    model = pc.tree(list(range(-1, links_there - 1)), kind, seed=3)
+    model.gravity = (0, 0, -9.81)
+    q, zero = model.random_state(3).q, np.zeros(model.nv)
+    tau = model.inverse_dynamics(q, zero, zero)
+    found = model.forward_dynamics(q, zero, tau, **WAY)
+    assert np.abs(found).max() <= 100 * EPS * max(10.0, np.abs(model.forward_dynamics(q, zero, 0 * tau)).max()) * links_there**2
+    at_rest = model.forward_dynamics(q, zero, tau, precision="single", **WAY)
+    assert np.isfinite(at_rest).all()
+
+
+def test_numbers_whose_squares_no_double_holds():
+    model = pc.chain(3)
+    zero = np.zeros(3)
+    found = model.forward_dynamics(zero, zero, np.full(3, 1e200), **WAY)
+    assert np.allclose(found / 1e200, model.forward_dynamics(zero, zero, np.ones(3)), rtol=1e-13)
+    with pytest.raises(pc.EvaluationError, match="overflows"):
+        model.forward_dynamics(zero, np.full(3, 1e200), zero, **WAY)
+
+
+def test_nothing_to_move():
+    welded = pc.tree([-1, 0, 1], "weld", seed=1)
+    assert welded.forward_dynamics(np.zeros(0), np.zeros(0), np.zeros(0), **WAY).shape == (0,)
+    assert welded.forward_dynamics(np.zeros((3, 0)), np.zeros((3, 0)), np.zeros((3, 0)), threads=2, **WAY).shape == (3, 0)
 
 
 @pytest.mark.parametrize("precision", ["single", "double", "extended", "quad", 50])
@@ -194,7 +265,22 @@ def test_it_takes_no_form():
         model.forward_dynamics(threads=0, **WAY)
 
 
-def test_memory_grows_with_the_tree():
-    """No square of the number of bodies anywhere: 20 000 links of 4 kB."""
-    bytes_of = pc._core.Methods(pc.chain(20_000)).memory("divide-and-conquer", "double")
-    assert 20_000 * 1000 < bytes_of < 20_000 * 4096
+def test_memory_is_what_is_held():
+    """No square of the number of bodies anywhere; what is counted is what the process takes up, but for names and the allocator's."""
+    links_there = 100_000
+    model = pc.chain(links_there)
+    zero = np.zeros(links_there)
+    model.forward_dynamics(zero, zero, zero)  # what the model and the articulated method hold is there
+    calls = pc._core.Methods(model)
+    before = resident()
+    found = calls.forward_dynamics("divide-and-conquer", zero, zero, zero, "double", None)
+    taken = resident() - before
+    counted = calls.memory("divide-and-conquer", "double")
+    assert found.shape == (links_there,)
+    assert 0.8 * taken <= counted <= 1.05 * taken
+
+
+def resident() -> int:
+    """Bytes of this process that are in memory."""
+    with open("/proc/self/statm") as file:
+        return int(file.read().split()[1]) * resource.getpagesize()

@@ -257,3 +257,55 @@ def test_a_motion_may_ask_for_other_frames():
     arm.add_frame("ouroboros", motion=lambda t: arm.frame("ouroboros").pose())
     with pytest.raises(RecursionError):
         arm.frame("ouroboros").pose()
+
+
+@pytest.mark.parametrize(
+    "copied", [copy.copy, copy.deepcopy, lambda model: pickle.loads(pickle.dumps(model))], ids=["copy", "deepcopy", "pickle"]
+)
+def test_copies_are_at_the_same_moment(copied):
+    """The present state is q, v, v̇ and t: a frame that a function moves is where it is in the original."""
+    arm = chain()
+    arm.add_frame("turning", on="body2", motion=turning)
+    arm.frames.t, arm.frames.vdot = 0.7, np.arange(1.0, 1.0 + arm.nv)
+    again = copied(arm)
+    for ask in (lambda m: m.frame("turning").pose(), lambda m: m.frame("turning").velocity(), lambda m: m.frame("turning").acceleration()):
+        assert np.array_equal(ask(again), ask(arm))
+    again.frames.t = 0.1
+    assert arm.frames.t == 0.7
+
+
+EDITS = {
+    "reroot": lambda m: m.reroot("body2"),
+    "detach what carries it": lambda m: m.detach("body2"),
+    "detach what is inboard": lambda m: m.detach("body1"),
+    "hang another elsewhere": lambda m: m.reattach("body4", "body0", "pin", placement="here", velocity="impulse"),
+    "lock and coalesce": lambda m: (m.lock("hinge4", impulsive=True), m.coalesce()),
+    "remove another": lambda m: m.remove_body("body4"),
+    "copy a branch": lambda m: m.copy_subtree("body1", "body0", prefix="copied ", position=(0, 1, 0)),
+}
+
+
+@pytest.mark.parametrize("edit", EDITS.values(), ids=EDITS)
+def test_a_motion_goes_on_over_edits_of_the_structure(edit):
+    """Poses stay to rounding, sums of a few numbers of size 1; velocities where no impulse changes them."""
+    flying = pc.tree([-1, 0, 1, 0, 3], ["free", "pin", "ball", "pin", "pin"], seed=1)
+    state = flying.random_state(0)
+    flying.q, flying.v = state.q, state.v
+    flying.add_frame("turning", on="body2", motion=turning)
+    lens = flying.add_frame("lens", on="turning", position=(0, 0, 1))
+    flying.frames.t = 0.7
+    pose, on_body, rates = lens.pose(), lens.pose(wrt="body2"), lens.velocity(wrt="body2")
+    edit(flying)
+    assert flying.frames.t == 0.7
+    np.testing.assert_allclose(lens.pose(), pose, atol=1e-14)
+    np.testing.assert_allclose(lens.pose(wrt="body2"), on_body, atol=1e-15)
+    np.testing.assert_allclose(lens.velocity(wrt="body2"), rates, atol=1e-15)
+    flying.frames.t = 0.9
+    assert not np.allclose(lens.pose(wrt="body2"), on_body, atol=1e-3)
+
+
+def turning(t):
+    """About z by t, and along x by sin t."""
+    c, s = np.cos(t), np.sin(t)
+    pose = np.array([[c, -s, 0, s], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
+    return pose, np.array([0, 0, 1, c * c, -s * c, 0]), np.array([0, 0, 0, -2 * c * s, s * s - c * c, 0])

@@ -112,6 +112,10 @@ AREAS = {
         "sweeps/test_refinement_rounding.py",
     ],
     "cpp/dynamics/methods.cpp": ["dynamics/test_methods.py"],
+    "cpp/dynamics/divided_dynamics.cpp": ["dynamics/test_divide_and_conquer.py"],
+    "cpp/recursions/divide_and_conquer.h": ["dynamics/test_divide_and_conquer.py"],
+    "pycraft/scenes/effects/meanings.py": ["scenes/test_effects_over_edits.py"],
+    "pycraft/scenes/checkpoint.py": ["scenes/test_checkpoints.py"],
     "cpp/simulation/integrators/integrate.cpp": [
         "dynamics/test_trajectory_steps.py",
         "dynamics/test_integration.py",

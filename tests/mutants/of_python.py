@@ -331,4 +331,25 @@ CHANGES = {
     "pycraft/dynamics/hybrid.py": [
         ("prepared calls of an edited model stay slow", "ready[0] = made()  # of the model as it is now", "pass"),
     ],
+    "pycraft/models/structure.py": [
+        ("a root moves away from what acts on it", "in scene._acting_on(set(range(free.start, free.stop)))", "in ()"),
+    ],
+    "pycraft/scenes/effects/meanings.py": [
+        ("effects mean what there is", "if of is not effect or changes != effect._changes:", "if True:"),
+        ("effects that were changed mean what they did", "or changes != effect._changes:", "or False:"),
+        ("numbers by coordinate are of any", "if listed:", "if False:"),
+        ("stops hold what has no limit", 'effect.kind() == "limits"', "False"),
+    ],
+    "pycraft/scenes/simulation.py": [
+        ("a state is taken for one of other coordinates", "if were != are:", "if False:"),
+    ],
+    "pycraft/scenes/checkpoint.py": [
+        ("a checkpoint knows of no bodies", "f\"{name} of {moved[name if name in moved else name[: name.rindex('[')]]}\"", "name"),
+    ],
+    "pycraft/models/multibody.py": [
+        ("copies are at no moment", "if moment is not None:", "if False:"),
+    ],
+    "pycraft/dynamics/prepared.py": [
+        ("form=None is a default", 'if name in ("form", "residual", "on_singular"):', 'if name in ("residual", "on_singular"):'),
+    ],
 }

@@ -154,9 +154,9 @@ def changed(data, path, value):
 @pytest.mark.parametrize(
     ("path", "value", "text"),
     [
-        (("format",), "pycraft run 1", "its format is not 'pycraft checkpoint 1'"),
-        (("state",), None, "a checkpoint takes t, model, effects, precision, integrator, options, state"),
-        (("more",), 1, "a checkpoint takes t, model"),
+        (("format",), "pycraft run 1", "its format is not 'pycraft checkpoint 2'"),
+        (("state",), None, "a checkpoint takes t, model, effects, coordinates, precision, integrator, options, state"),
+        (("more",), 1, "a checkpoint takes t, model, effects, coordinates"),
         (("model",), 3, "model is a name, not 3"),
         (("effects",), "gravity", "effects is a list of names"),
         (("options", "rtol"), None, "options takes rtol, atol, step, max_step, normalise, energy"),
@@ -196,3 +196,31 @@ def test_a_checkpoint_with_other_numbers_of_a_state(tmp_path):
     file.write_text(json.dumps(data))
     with pytest.raises(pc.ModelError, match=f"the checkpoint has {len(data['state']['x'])} numbers of a state; the scene"):
         scene.resume(file, 1.0)
+
+
+@pytest.mark.parametrize("saved", [False, True])
+def test_a_state_is_not_taken_for_one_of_other_coordinates(tmp_path, saved):
+    """Edits of the structure may leave as many coordinates, in another order or of another body."""
+    edits = {
+        "hinge1 of body1' where this model has 'hinge2 of body2": lambda m: m.reattach(
+            "body1", "body3", "pin", placement="here", velocity="impulse"
+        ),
+        "hinge0[0] of body0' where this model has 'hinge0[0] of body2": lambda m: m.reroot("body2"),
+        "10, and there are 9": lambda m: m.lock("hinge3", impulsive=True),
+    }
+    for words, edit in edits.items():
+        parents = [-1, 0, 0, 0, 2] if "10" in words else [-1, 0, 0, 0] if "hinge1" in words else [-1, 0, 1, 2]
+        model = pc.tree(parents, ["free", *["pin"] * (len(parents) - 1)], seed=1)
+        state = model.random_state(0)
+        scene = pc.Scene(model).add(pc.effects.Gravity(g=(0, 0, -9.81)))
+        run = scene.simulate(0.1, state.q, state.v, progress=False)
+        model.bodies["body1"].mass = 2.0  # other numbers are the user's business
+        assert scene.resume(run, 0.15, progress=False).t[-1] == 0.15
+        checkpoint = run.checkpoint()
+        if saved:
+            checkpoint.save(tmp_path / "run.json")
+            checkpoint = tmp_path / "run.json"
+        model.q, model.v = state.q, state.v
+        edit(model)
+        with pytest.raises(pc.ModelError, match="before an edit of its structure: of the coordinates .*" + re.escape(words)):
+            scene.resume(checkpoint, 0.2)

@@ -133,3 +133,15 @@ def test_members_of_a_batch_and_what_does_not_fit(model):
         scene.linearize(Q, V, [0.0, 1.0])
     with pytest.raises(pc.ModelError, match="states: entry 0 is nan"):
         scene.linearize(Q[0], V[0], states=[np.nan])
+
+
+def test_along_no_states():
+    """A batch of none is one of no rows, as `Multibody.linearize` has it."""
+    model = pc.tree([-1, 0], ["free", "ball"], seed=1)
+    scene = pc.Scene(model).add(pc.effects.Gravity(), pc.effects.Damping(0.1))
+    none = np.zeros((0, model.nq)), np.zeros((0, model.nv))
+    for dt in (None, 0.1):
+        found, plain = scene.linearize(*none, inputs=["hinge1"], dt=dt), model.linearize(*none, inputs=["hinge1"], dt=dt)
+        for name in ("A", "B", "C", "D"):
+            assert getattr(found, name).shape == getattr(plain, name).shape
+        assert found.states == plain.states and len(found.A) == 0

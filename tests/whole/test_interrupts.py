@@ -123,6 +123,15 @@ def one_large_state():
     return lambda: model.forward_dynamics(model.q, zero, zero, form="ud", precision=100)
 
 
+def divide_and_conquer(threads):
+    def made():
+        model = pc.chain(20_000)
+        zero = np.zeros(model.nv)
+        return lambda: model.forward_dynamics(model.q, zero, zero, method="divide-and-conquer", precision=100, threads=threads)
+
+    return made
+
+
 def sensitivities():
     model = pc.chain(800)
     zero = np.zeros(model.nv)
@@ -169,6 +178,8 @@ CALLS = {
     "a batch in 100 digits": a_batch,
     "a batch in threads": a_batch_in_threads,
     "one large state in 100 digits": one_large_state,
+    "divide and conquer": divide_and_conquer(1),
+    "divide and conquer in threads": divide_and_conquer(2),
     "sensitivities": sensitivities,
     "a trajectory": a_trajectory,
     "an operator from outside": an_operator_from_outside,
