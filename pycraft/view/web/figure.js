@@ -5,7 +5,11 @@
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 const along = (a, s, b) => [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]];
-const colourOf = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+
+// Colours of the style sheet by name, looked up once, and again when the system's mode changes.
+let colours = {};
+const colourOf = (name) => (colours[name] ??= getComputedStyle(document.documentElement).getPropertyValue(name).trim());
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { colours = {}; });
 
 // Single-precision numbers from text, little-endian as every browser's machine.
 function numbers(text) {
@@ -173,10 +177,10 @@ class Figure {
     data.axes.of.forEach((owner, i) => {
       const p = placed(poses, owner, data.axes.at[i]), d = turned(poses, owner, data.axes.along[i]);
       const ends = [this.seen(along(p, -size, d)), this.seen(along(p, size, d))];
-      items.push({ depth: (ends[0][2] + ends[1][2]) / 2, ends, stroke: colour || data.colours[data.axes.hinge[i]], width: 0.6 * width, dashes: [], body: -1 });
+      items.push({ depth: (ends[0][2] + ends[1][2]) / 2, ends, stroke: colour || data.colours[data.axes.hinge[i]] || colourOf("--text"), width: 0.6 * width, dashes: [], body: -1 });
     });
     const joints = data.points.joint.of.map((owner, i) => this.seen(placed(poses, owner, data.points.joint.at[i])));
-    joints.forEach((at, i) => items.push({ depth: at[2], dot: at, fill: colour || data.colours[i], body: i, radius: 1.7 * width }));
+    joints.forEach((at, i) => items.push({ depth: at[2], dot: at, fill: colour || data.colours[i] || colourOf("--text"), body: i, radius: 1.7 * width }));
     for (const [kind, share] of [["node", 0.9]]) {
       const { of, at } = data.points[kind];
       of.forEach((owner, i) => {
