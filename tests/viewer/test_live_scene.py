@@ -286,6 +286,19 @@ def test_refusals(session):
         one.blocks("Z")
 
 
+def test_a_parameter_that_cannot_be_is_as_it_was(session):
+    scene = pc.Scene(pc.chain(2)).add(pc.effects.NoseHoover(temperature=1.0, time_constant=0.1))
+    one = session(scene)
+    with pytest.raises(pc.ModelError, match="time_constant"):
+        one.do("parameter", effect="nose_hoover", field="time_constant", value=-1.0)
+    assert scene.effects["nose_hoover"].time_constant == 0.1
+    one.do("step")
+    one.do("parameter", effect="nose_hoover", field="chain", value=5)
+    assert scene.effects["nose_hoover"].chain == 5 and type(scene.effects["nose_hoover"].chain) is int
+    one.do("step")
+    assert len(one.live.own_states()) == sum(scene._calls().states)
+
+
 def test_numbers_of_a_body(session):
     panda = pc.robots.panda()
     state = panda.random_state(1)

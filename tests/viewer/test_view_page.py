@@ -47,6 +47,17 @@ def test_sliders_move_the_figure(browser, view, dark, tmp_path):
         assert asked <= {"", "do", "setup", "state?arrows="} and len(asked) >= 3  # nothing from elsewhere
 
 
+def test_a_slider_leaves_whole_turns(browser, view):
+    view.session.live.put([20.0, -9.0], [0.0, 0.0])
+    with shown_page(browser, view) as page:
+        ready(page)
+        turns = 6 * np.pi
+        assert float(page.input_value("#u0")) == pytest.approx(20.0 - turns)
+        page.fill("#u0", "1.5")
+        until(page, "state.u[0] !== 20")
+        assert view.session.live.u == pytest.approx([1.5 + turns, -9.0])
+
+
 def test_play_plays(browser, view):
     with shown_page(browser, view) as page:
         ready(page)

@@ -87,7 +87,7 @@ function buildSliders() {
     let wanted = null;
     range.addEventListener("input", async () => { // the last of many moves counts
       const first = wanted === null;
-      wanted = +range.value;
+      wanted = +range.value + coordinate.turns;
       if (!first) return;
       while (wanted !== null) {
         const to = wanted;
@@ -95,9 +95,12 @@ function buildSliders() {
         if (wanted === to) wanted = null;
       }
     });
+    coordinate.turns = 0; // whole turns of an angle without limits, which the slider leaves as they are
     coordinate.show = (u) => {
       value.textContent = `${u.toFixed(3)} ${coordinate.unit}`;
-      if (document.activeElement !== range || state.playing) range.value = u;
+      if (wanted !== null) return;
+      if (coordinate.unit === "rad" && !coordinate.bounded) coordinate.turns = 2 * Math.PI * Math.round(u / (2 * Math.PI));
+      range.value = u - coordinate.turns;
     };
   }
   buildSliders.shown = shown;
