@@ -137,6 +137,16 @@ def test_loops_are_kept_by_hand_and_in_time():
     assert np.abs(model.loops.residual(live.q)).max() < 1e-6
 
 
+def test_a_long_way_stays_on_its_branch():
+    """A crank that is turned by three radians at once: where three hundred small turns bring it, and not to the rod's other side."""
+    live = LiveScene(pc.mechanisms.slider_crank())
+    model, q = live.model, live.q
+    live.move(0, live.u[0] + 3.0)
+    for _ in range(300):
+        q = model.assemble(model.integrate(q, [0.01, 0, 0]), fix=model.coordinate_names[0], starts=1).q
+    np.testing.assert_allclose(live.q, q, atol=1e-8)
+
+
 def test_a_slider_stops_where_the_loops_end():
     scene = pc.mechanisms.slider_crank()
     live = LiveScene(scene)
@@ -245,6 +255,15 @@ def test_it_plays_in_real_time_and_pauses_when_nobody_looks(session, monkeypatch
     t = one.live.t
     time.sleep(0.1)
     assert one.live.t == t
+
+
+def test_seconds_of_the_scene_are_those_of_the_clock_times_the_scale(session):
+    one = session(pc.mechanisms.pendulum())
+    one.scale = 2.0
+    one._go_on(0.03)
+    assert one.live.t == pytest.approx(0.06) and one.rate == pytest.approx(2.0)
+    one._go_on(5.0)  # too late: a tenth of a second of the clock is made up for, and the rate falls
+    assert one.live.t == pytest.approx(0.26) and one.rate < 2.0
 
 
 def test_what_stops_a_scene_is_said(session):
