@@ -2,6 +2,7 @@
 #   make tour                   set up, then the main job on a real robot (MODEL=path.urdf for your own)
 #   make test                   set up, then all tests, C++ and Python, that need no peer packages
 #   make test-peers             the same robots against Pinocchio and MuJoCo (extra [peers]), and a dozen mutants
+#   make test-browser           pages in headless Chromium (extra [browser]; needs chromium: apt install chromium, or CHROMIUM=/path/to/it)
 #   make check                  the everyday subset, under three minutes
 #   make lint                   what ruff and mypy have to say of Python; fails on the first
 #   make lab | bench            JupyterLab in notebooks; the bounds measured
@@ -22,7 +23,7 @@ SOURCES := $(shell find cpp pycraft -name '*.h' -o -name '*.cpp' -o -name '*.py'
 # What is compiled: a change in any of these rebuilds. Python sources are used where they lie.
 COMPILED := $(shell find cpp -name '*.h' -o -name '*.cpp' -o -name '*.in' -o -name '*.py') CMakeLists.txt pyproject.toml
 
-.PHONY: FORCE tour test test-cpp test-python test-peers check lab bench performance stability campaigns lint clean wheel mutants \
+.PHONY: FORCE tour test test-cpp test-python test-peers test-browser check lab bench performance stability campaigns lint clean wheel mutants \
         test-address test-undefined test-thread test-clang
 
 tour: .venv/installed
@@ -48,6 +49,9 @@ test-peers: .venv/peers
 	$(BIN)/python -m pytest $(PARALLEL) -m peers
 	$(BIN)/python tests/mutation.py --dozen --jobs $(JOBS)
 	$(BIN)/pycraft peers --output tests/peers/robots.md
+
+test-browser: .venv/browser
+	$(BIN)/python -m pytest -m browser
 
 # The C++ tests in build trees of their own. A sanitized test takes several times as long; -O1 keeps the build short.
 CPP_TESTS = $(BIN)/cmake -S . -B build/$@ -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN))/ninja -DPython_EXECUTABLE=$(abspath $(BIN))/python $(1) \
@@ -121,6 +125,10 @@ FORCE:
 
 .venv/peers: .venv/tested
 	CMAKE_BUILD_PARALLEL_LEVEL=$(JOBS) $(BIN)/python -m pip install --quiet --no-build-isolation --editable ".[test,peers]" -C build-dir=build
+	touch $@
+
+.venv/browser: .venv/tested
+	CMAKE_BUILD_PARALLEL_LEVEL=$(JOBS) $(BIN)/python -m pip install --quiet --no-build-isolation --editable ".[test,browser]" -C build-dir=build
 	touch $@
 
 .venv/lab: .venv/installed

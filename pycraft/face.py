@@ -78,6 +78,20 @@ def solve_ik(*arguments: Any, **options: Any) -> Any:
     return solve(*arguments, **options)
 
 
+def view_scene(*arguments: Any, **options: Any) -> Any:
+    """`Scene.view`."""
+    from .viewer import view_scene as view
+
+    return view(*arguments, **options)
+
+
+def view_model(*arguments: Any, **options: Any) -> Any:
+    """`Multibody.view`."""
+    from .viewer import view_model as view
+
+    return view(*arguments, **options)
+
+
 def attach() -> None:
     """Puts the functions where the core and the lower rooms find them."""
     _core._face.update(
@@ -103,4 +117,6 @@ def attach() -> None:
         shared_out=shared_out,
         solve_ik=solve_ik,
         thread_count=thread_count,
+        view_model=view_model,
+        view_scene=view_scene,
     )

@@ -91,8 +91,19 @@ SLOW = {
 }
 
 
+@pytest.fixture(scope="module")
+def browser():
+    """Headless Chromium; tests that ask for it are marked `browser`."""
+    from support.browser import chromium
+
+    with chromium() as opened:
+        yield opened
+
+
 def pytest_collection_modifyitems(items):
     for item in items:
+        if "browser" in getattr(item, "fixturenames", ()):
+            item.add_marker(pytest.mark.browser)
         slow = SLOW.get(item.path.stem)
         if slow and slow(item):
             item.add_marker(pytest.mark.slow)

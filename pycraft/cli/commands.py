@@ -1,4 +1,4 @@
-"""The command line: pycraft tour | check | run | accuracy | stability | bench | peers | lab."""
+"""The command line: pycraft tour | check | run | view | accuracy | stability | bench | peers | lab."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
+from .live import view as view_scene
 from .runs import run as run_scene
 from .terminal import Commands, console, diagnostics, fail, note
 
@@ -142,6 +143,7 @@ def _check_paper(path: str, states: int, seed: int, precision: str | int, json: 
 
 
 app.command("run")(run_scene)
+app.command("view")(view_scene)
 
 
 @app.command()

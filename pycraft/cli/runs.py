@@ -49,7 +49,7 @@ def run(
     check_outputs(output=output, plot=picture, save=save)
     if output is not None:
         _check_output(output)
-    scene = _scene(what, root, mimic)
+    scene = loaded_scene(what, root, mimic)
     for text in effect or []:
         add_from_text(scene, text, f"--effect {text}")
     if seed is not None:
@@ -82,7 +82,7 @@ def _check_output(path: Path) -> None:
         fail(str(error))
 
 
-def _scene(what: str, root: str | None, mimic: str) -> Any:
+def loaded_scene(what: str, root: str | None, mimic: str) -> Any:
     """The scene of a file, of a mechanism, or an empty one of a model."""
     from ..models import robots
     from ..scenes import Scene, load_scene, mechanisms

@@ -1,4 +1,4 @@
-"""How a model looks: its tree as text, and as a figure of sticks that the rooms above draw."""
+"""How a model looks: its tree as text, and as figures of sticks that the rooms above draw, still or live."""
 
 from __future__ import annotations
 
@@ -91,3 +91,31 @@ class Pictures:
         """
         options = dict(view=view, com=com, names=names, legend=legend, shadow=shadow, alpha=alpha)
         return _core._face["plot_model"](self, q, ax, **options)
+
+    def view(self, q=None, v=None, *, host: str = "127.0.0.1", port: int = 0) -> Any:
+        """The model in a live viewer: `Scene.view` of a scene that has nothing but the model's own gravity, if it has one.
+
+        Parameters
+        ----------
+        q, v : (nq,), (nv,), or a State; the model's own where left out
+        host, port : as `Scene.view` takes them
+
+        Returns
+        -------
+        View
+
+        Raises
+        ------
+        ModelError
+            A q or v that is none of this model's.
+        EvaluationError
+            A port that is taken, a host that is none.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> with pc.chain(3).view() as view:
+        ...     view.is_local
+        True
+        """
+        return _core._face["view_model"](self, q, v, host=host, port=port)

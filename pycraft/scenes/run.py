@@ -191,7 +191,8 @@ class Run(Motion):
         return plot(self, what, coordinates)
 
     def animate(self, output: Any = None, *, fps: float = 25.0, speed: float = 1.0, trace: str | None = None, **options: Any) -> Any:
-        """The run as a moving stick figure, by Matplotlib alone.
+        """The run as a moving stick figure, by Matplotlib alone: pictures, one a frame, for talks and papers. `to_html` writes numbers that
+        the browser draws: many times smaller, it can be turned and slowed down, and has plots.
 
         Parameters
         ----------
@@ -229,6 +230,53 @@ class Run(Motion):
         if target is not None:
             film.save(target)
         return film
+
+    def to_html(
+        self, output: Any = None, *what: str, fps: float = 30.0, speed: float = 1.0, trace: str | None = None, coordinates: Any = None
+    ) -> Any:
+        """The run as one page of HTML that plays by itself, without a network: a figure that can be turned, a slider of time, and plots.
+
+        The browser draws it from the bodies' poses in single precision: 64 bytes a body and frame, and some 30 kB besides. The page's own
+        policy forbids it to send requests. `animate` makes pictures, films and GIFs instead.
+
+        Parameters
+        ----------
+        output : path that ends in ".html", where it is written
+        what : plots, as `plot` takes them; "energy" where left out, "q" of a run that kept no account of works
+        fps : frames a second of the film
+        speed : seconds of the run in a second of the film, at first; the page has a choice of speeds
+        trace : a body or node whose origin leaves its way behind
+        coordinates : of the plots, as `plot` takes them
+
+        Returns
+        -------
+        RunPage
+            A notebook shows it; `html` is the page, `save` writes it. A run that kept no steps (dense=False) shows the last state that was
+            asked for before each frame.
+
+        Raises
+        ------
+        EvaluationError
+            More than 100 MB of poses, another ending, plots that there are none of.
+        ModelError
+            A trace of what is not there.
+        OSError
+            An output that cannot be written.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> page = pc.mechanisms.double_pendulum().simulate(0.2).to_html(trace="lower")
+        >>> len(page.times), page.html.startswith("<!DOCTYPE html>")
+        (7, True)
+        """
+        from .run_page import RunPage, checked_page
+
+        target = None if output is None else checked_page(output)
+        page = RunPage(self, fps, speed, trace, what, coordinates)
+        if target is not None:
+            page.save(target)
+        return page
 
     # ------------------------------------------------------------------ copies
     def __getstate__(self) -> dict[str, Any]:

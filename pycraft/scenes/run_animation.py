@@ -30,13 +30,10 @@ class RunAnimation:
     """
 
     def __init__(self, run: Any, fps: Any, speed: Any, trace: Any, options: dict[str, Any]):
-        rate, faster = one_number(fps, "fps"), one_number(speed, "speed")
-        for name, value in (("fps", rate), ("speed", faster)):
-            if not 0 < value < np.inf:
-                raise _core.EvaluationError(f"{name}={value:g}: a positive number")
+        rate, faster = positive(fps, "fps"), positive(speed, "speed")
         self.fps = rate
         self.times = _frames(run, rate, faster)
-        self._q = _configurations(run, self.times)
+        self._q = configurations(run, self.times)
         self._path = None if trace is None else run._unedited_model().pose(trace, self._q)[:, :3, 3]
         self._draw(run, options)
 
@@ -119,6 +116,14 @@ def checked_film(path: Any) -> Path:
     return target
 
 
+def positive(given: Any, name: str) -> float:
+    """A positive number. EvaluationError for any other."""
+    value = one_number(given, name)
+    if not 0 < value < np.inf:
+        raise _core.EvaluationError(f"{name}={value:g}: a positive number")
+    return value
+
+
 def _frames(run: Any, fps: float, speed: float) -> np.ndarray:
     """Times of frames: from the run's first to its last."""
     first, last = float(run.t[0]), float(run.t[-1])
@@ -132,7 +137,7 @@ def _frames(run: Any, fps: float, speed: float) -> np.ndarray:
     return np.minimum(times, last)
 
 
-def _configurations(run: Any, times: np.ndarray) -> np.ndarray:
+def configurations(run: Any, times: np.ndarray) -> np.ndarray:
     """q (n, nq) at the times; of a run that kept no steps those of the last time that was asked for before each."""
     if run._steps is not None:
         return run.at(times).q

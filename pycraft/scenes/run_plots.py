@@ -28,16 +28,21 @@ class Panel:
 
 def plot(run: Any, what: tuple[str, ...], coordinates: Any) -> Any:
     """The figure of `Run.plot`."""
+    if not what:
+        what = ("q", "v", *(("energy",) if run._about["energy"] else ()), "forces")
+    return _figure(run, chosen_panels(run, what, coordinates))
+
+
+def chosen_panels(run: Any, what: tuple[str, ...], coordinates: Any) -> list[Panel]:
+    """Pictures of a run, as `Run.plot` takes them. EvaluationError for what is no picture, and where there is nothing to see."""
     unknown = [name for name in what if name not in WHAT]
     if unknown:
         raise _core.EvaluationError(f"plot: no picture is called {unknown[0]!r}; there are {', '.join(map(repr, WHAT))}")
-    if not what:
-        what = ("q", "v", *(("energy",) if run._about["energy"] else ()), "forces")
     chosen = _core.coordinates_named(run._unedited_model(), names_of(coordinates, "plot"), "plot")
     panels = [panel for name in what for panel in _panels(run, name, chosen) if panel.lines]
     if not panels:
         raise _core.EvaluationError(f"plot: there is nothing to see of {', '.join(map(repr, what))} in this run")
-    return _figure(run, panels)
+    return panels
 
 
 def _panels(run: Any, name: str, chosen: list[int]) -> list[Panel]:

@@ -21,6 +21,7 @@ from .measurements import Measurements
 from .run import Run
 from .scene_statics import Statics
 from .simulation import RunOptions, resume, simulate
+from .viewed import Viewed
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ class Effects(Mapping[str, Effect]):
         return "{" + ", ".join(self._entries) + "}"
 
 
-class Scene(Measurements, Statics, Filed, Closed):
+class Scene(Measurements, Statics, Filed, Viewed, Closed):
     """A model and the effects that act on it. It starts empty: nothing acts that was not added, the model's own gravity neither.
 
     Parameters

@@ -77,6 +77,19 @@ def simulate(
     return _run(scene, options, times, keep, t_eval, events, progress, dense, output, q, v, None)
 
 
+def continued(scene: Any, t: float, T: float, q: Any, v: Any, states: Any, options: RunOptions) -> Run:
+    """The motion from any state at any time to T: its ends alone, without a checkpoint. A viewer's scene goes on in such pieces.
+
+    Parameters
+    ----------
+    t, T : s
+    q, v : (nq,), (nv,)
+    states : of the effects' own, as many as those that are on have; as they are at first where empty
+    """
+    times, keep = run_times(t, T, [t, T])
+    return _run(scene, options, times, keep, times, None, False, False, None, q, v, None, states)
+
+
 def resume(scene: Any, checkpoint: Any, T: Any, *, t_eval: Any, events: Any, progress: bool, dense: bool, output: Any) -> Run:
     """The motion from a checkpoint to T, as `Scene.resume` says."""
     if isinstance(checkpoint, Run):
@@ -108,7 +121,7 @@ def _told(what: Any) -> str:
 
 def _run(
     scene: Any, options: RunOptions, times: list[float], keep: slice, t_eval: Any, events: Any, progress: bool, dense: bool, output: Any,
-    q: Any, v: Any, checkpoint: dict[str, Any] | None,
+    q: Any, v: Any, checkpoint: dict[str, Any] | None, states: Any = (),
 ) -> Run:  # fmt: skip
     wanted: list[Event] = listed_events(events)
     written = None if output is None else checked_output(output)
@@ -124,8 +137,8 @@ def _run(
     with RunProgress(times[0], times[-1], progress) as bar:
         try:
             _core.run_scene(
-                calls, record, q, v, times, [], options.energy, chosen.name, *tolerances, options.step, options.max_step, options.normalise,
-                events_for_core(scene.model, wanted), bar if progress else None, checkpoint, solver,
+                calls, record, q, v, times, [*states], options.energy, chosen.name, *tolerances, options.step, options.max_step,
+                options.normalise, events_for_core(scene.model, wanted), bar if progress else None, checkpoint, solver,
             )  # fmt: skip
         except (Exception, KeyboardInterrupt) as error:
             if len(record.samples["t"]):

@@ -21,6 +21,8 @@ from .. import _core
 
 BASE = -1
 """In place of a body's number."""
+_FAR = 10.0
+"""A base farther off than this many times what it carries is not shown at its origin."""
 _LEVEL = 1e-9
 """Of a plane's normal: how far axes and points may be off it."""
 
@@ -114,6 +116,14 @@ class Skeleton:
         for k, body in enumerate(self.bodies):
             poses[..., k, :, :] = self.model.pose(body, q)
         return poses
+
+    def is_grounded(self) -> bool:
+        """Whether the base is shown at its origin: unless that lies far off what it carries."""
+        poses = self.poses(self.model.zero_q())
+        hinges = placed(poses, *self.lines["ground"])[:, 1]
+        carried = np.concatenate([hinges, *(placed(poses, *self.points[kind]) for kind in ("joint", "mass"))])
+        reach = np.ptp(carried, axis=0).max() if len(carried) else 0.0
+        return reach == 0 or not len(hinges) or bool(np.linalg.norm(hinges, axis=1).min() <= _FAR * reach)
 
     def normals(self) -> tuple[int, ...]:
         """Normals (0, 1, 2 for x, y, z) of the coordinate planes that the model can never leave; none for most models."""

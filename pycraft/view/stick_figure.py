@@ -29,8 +29,6 @@ HINGES = {
 }
 """Marker and colour of a hinge, colours told apart by colour-blind readers [Okabe and Ito 2008]; the markers tell them, too."""
 _LARGER = {"ball": 1.25, "free": 1.9, "planar": 1.2, "universal": 1.2, "gimbal": 1.2}
-_FAR = 10.0
-"""A base farther off than this many times what it carries is not shown at its origin."""
 _BONE, _TIE, _FLOOR = "#404040", "#8c8c8c", "#d9d9d9"
 
 
@@ -100,7 +98,7 @@ class StickFigure:
         self.ax = _axes(view, model) if ax is None else ax
         self.canvas = Canvas(self.ax, VIEWS[view])
         self._size, self._up, self._floor = 0.0, 2, 0.0
-        self._grounded = self._is_grounded()
+        self._grounded = self.skeleton.is_grounded()
         self._draw(com, names, shadow and view == "3d", alpha)
         self.frame(q)
         self.update(q)
@@ -195,14 +193,6 @@ class StickFigure:
         if self._texts is not None:
             self._texts.set(points["joint"])
         return self.artists
-
-    def _is_grounded(self) -> bool:
-        """Whether the base is shown at its origin: unless that lies far off what it carries."""
-        poses = self.skeleton.poses(self.model.zero_q())
-        hinges = placed(poses, *self.skeleton.lines["ground"])[:, 1]
-        carried = np.concatenate([hinges, *(placed(poses, *self.skeleton.points[kind]) for kind in ("joint", "mass"))])
-        reach = np.ptp(carried, axis=0).max() if len(carried) else 0.0
-        return reach == 0 or not len(hinges) or bool(np.linalg.norm(hinges, axis=1).min() <= _FAR * reach)
 
     def _base_points(self, ground: np.ndarray) -> np.ndarray:
         """The base's origin, or the hinges that it carries far off; nothing where all that there is flies."""

@@ -1,6 +1,19 @@
 """Changes of Python by hand: file -> (name, what stands there, what is put there)."""
 
 CHANGES = {
+    "pycraft/viewer/live_scene.py": [
+        ("every piece begins at t = 0", "continued(self.scene, self.t, self.t + seconds", "continued(self.scene, 0.0, seconds"),
+        ("effects' own states are not kept", "self._keep(run.states[-1])", "pass"),
+        ("the ghost has all effects", " and called != name)", ")"),
+        ("velocities are those of the bodies' origins", " + np.cross(V[:, :3], places)", ""),
+    ],
+    "pycraft/viewer/server.py": [
+        ("foreign origins are answered", "if known and not foreign and", "if known and"),
+        ("foreign names of this machine are answered", "host.hostname in LOCAL if", "bool(host.hostname) if"),
+    ],
+    "pycraft/viewer/effect_fields.py": [("a refused parameter stays", "        setattr(changed, field, before)\n", "        pass\n")],
+    "pycraft/scenes/run_page.py": [("the end of a run is no frame", "np.append(times, last) if", "times if")],
+    "pycraft/view/web_page.py": [("names are markup", '.replace("<", "\\\\u003c")', "")],
     "pycraft/dynamics/embedded_motion.py": [
         ("independent coordinates are never exchanged", "<= worst:", "<= 1e300:"),
         ("dependent coordinates stay where steps have brought them", "if not self.rows.size:", "if True:"),

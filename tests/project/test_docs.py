@@ -64,6 +64,7 @@ def test_the_readme_example_runs():
         ("locking", 14),
         ("structure", 25),
         ("divide_and_conquer", 1),
+        ("viewing", 12),
     ],  # fmt: skip
 )
 def test_the_pages_run(page, examples):

@@ -248,7 +248,8 @@ RESTS_ON = {
     "ensembles": ["scenes"],
     "compiled": ["recursions"],
     "view": ["accuracy", "recursions"],
-    "face": ["accuracy", "compiled", "identities", "kinematics", "view"],
+    "viewer": ["scenes"],
+    "face": ["accuracy", "compiled", "identities", "kinematics", "viewer"],
     "": ["face", "kalman", "closed_forms", "ensembles", "sympy_bridge"],  # pycraft itself
     "cli": [""],
 }

@@ -1,0 +1,49 @@
+"""`pycraft view`: a scene or a model in the live viewer."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import Annotated, Any
+
+import typer
+
+from .runs import loaded_scene
+from .terminal import note
+
+
+def view(
+    what: Annotated[str, typer.Argument(help="A scene's TOML file; a model's file, a robot or a mechanism by name (pycraft.mechanisms).")],
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(help="Add an effect: gravity, damping:0.1, spring:2,rest=0.1,hinges=arm_*; may be repeated."),
+    ] = None,
+    beside: Annotated[str | None, typer.Option(help="A second scene, as the first is given: a ghost that plays with it.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Begin at the random state of this seed.")] = None,
+    host: Annotated[str, typer.Option(help="The address that is listened at; this machine alone unless another is given.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="Of that address; 0 is a free one.")] = 0,
+    browser: Annotated[bool, typer.Option(help="Whether the page is opened in the browser.")] = True,
+    root: Annotated[str | None, typer.Option(help="Of a model: fixed | free.")] = None,
+    mimic: Annotated[str, typer.Option(help="Of a model's file: refuse | couple | lock | free.")] = "refuse",
+) -> None:
+    """Look at a scene or a model in a page that is live: sliders, time, effects on and off, plots, numbers of picked bodies.
+
+    pycraft view panda --effect gravity --effect damping:0.5; pycraft view scene.toml. Ctrl-C ends it.
+    """
+    from ..scenes.effect_text import add_from_text
+    from .commands import check_least
+
+    scene = loaded_scene(what, root, mimic)
+    for text in effect or []:
+        add_from_text(scene, text, f"--effect {text}")
+    other = None if beside is None else loaded_scene(beside, None, "refuse")
+    state: Any = None
+    if seed is not None:
+        check_least(0, seed=seed)
+        state = scene.model.random_state(seed)
+    with suppress(KeyboardInterrupt), scene.view(state, beside=other, host=host, port=port) as shown:  # interrupted: how it ends
+        note(f"{scene.model.name} at {shown.said}; Ctrl-C ends it")
+        if browser:
+            import webbrowser
+
+            webbrowser.open(shown.address)
+        shown.wait()

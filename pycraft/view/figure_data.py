@@ -1,0 +1,88 @@
+"""A model's skeleton as plain data for a page, which draws it by itself: points and lines fixed on bodies, and the bodies' poses."""
+
+from __future__ import annotations
+
+import base64
+from typing import Any
+
+import numpy as np
+
+from .skeleton import Skeleton, placed
+from .stick_figure import HINGES
+
+_FLAT_AXES = {1: (0, 2), 2: (0, 1), 0: (1, 2)}
+"""To the right and upwards, of a plane by its normal."""
+_THIN = 0.18
+"""Of the largest width: what the narrow ones of a box are at least."""
+
+
+def figure_data(skeleton: Skeleton, q: np.ndarray) -> dict[str, Any]:
+    """What `web/figure.js` draws.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    q : (..., nq)
+        States whose bodies the first view has in its box.
+
+    Returns
+    -------
+    dict
+        Plain data: names of bodies, the number of what carries each (-1 the base), their hinges; points and lines by what they are, with
+        the numbers of bodies ("of") and places in their frames ("at", m); axes of hinges and half the length that they are drawn with,
+        m; the camera's axes "right" and "up" in the world, the box in view ("centre" and "half", m), the height of the floor.
+    """
+    described = skeleton.model.description()["bodies"]
+    hinge, owner, point, direction = skeleton.axes
+    flat = skeleton.normals()
+    right, up = _FLAT_AXES[next(n for n in _FLAT_AXES if n in flat)] if flat else _upright(skeleton.model)
+    colours = [None if kind == "custom" else HINGES[kind][1] for kind in skeleton.kinds]
+    data: dict[str, Any] = {
+        "name": skeleton.model.name, "bodies": skeleton.bodies, "parents": [body["parent"] for body in described],
+        "hinges": skeleton.names, "kinds": skeleton.kinds, "colours": colours, "flat": bool(flat), "grounded": skeleton.is_grounded(),
+        "points": {kind: {"of": of.tolist(), "at": _rounded(at)} for kind, (of, at) in skeleton.points.items()},
+        "lines": {kind: {"of": of.tolist(), "at": _rounded(at)} for kind, (of, at) in skeleton.lines.items()},
+        "axes": {"hinge": hinge.tolist(), "of": owner.tolist(), "at": _rounded(point), "along": _rounded(direction)},
+        "right": np.eye(3)[right].tolist(), "up": np.eye(3)[up].tolist(),
+    }  # fmt: skip
+    return data | _box(skeleton, np.asarray(q, float), data["grounded"], up)
+
+
+def pose_rows(skeleton: Skeleton, q: np.ndarray) -> np.ndarray:
+    """Poses of all bodies at q (..., nq) as rows (..., 12 n) of [R p], one body after the other, in single precision."""
+    poses = skeleton.poses(q)[..., :-1, :3, :]
+    return poses.reshape(*poses.shape[:-3], -1).astype("<f4")
+
+
+def number_text(x: Any) -> str:
+    """Numbers in single precision as text, for `numbers` of `web/figure.js`."""
+    return base64.b64encode(np.ascontiguousarray(x, "<f4").tobytes()).decode("ascii")
+
+
+def _upright(model: Any) -> tuple[int, int]:
+    """The axis that gravity is nearest to is upright."""
+    gravity = np.abs(model.gravity)
+    up = int(np.argmax(gravity)) if gravity.any() else 2
+    return (up + 1) % 3, up
+
+
+def _rounded(x: np.ndarray) -> Any:
+    """With the digits of single precision."""
+    return [float(f"{number:.7g}") for number in x] if x.ndim == 1 else [_rounded(row) for row in x]
+
+
+def _box(skeleton: Skeleton, q: np.ndarray, grounded: bool, up: int) -> dict[str, Any]:
+    poses = skeleton.poses(q)
+    kinds = [kind for kind in skeleton.lines if kind != "ground" or grounded]
+    shown = (*skeleton.points.values(), *(skeleton.lines[kind] for kind in kinds))
+    everything = np.concatenate([*(placed(poses, *at).reshape(-1, 3) for at in shown), np.zeros((int(grounded), 3))])
+    everything = everything[np.isfinite(everything).all(axis=1)]
+    low, high = (everything.min(axis=0), everything.max(axis=0)) if len(everything) else (np.zeros(3), np.zeros(3))
+    reach = float((high - low).max()) or 1.0
+    half = np.maximum((high - low) / 2, _THIN * reach) + 0.06 * reach
+    bones = np.linalg.norm(np.diff(placed(poses, *skeleton.lines["bone"]), axis=-2), axis=-1)
+    typical = float(np.median(bones[bones > 1e-9 * reach])) if np.any(bones > 1e-9 * reach) else reach
+    return {
+        "centre": _rounded((low + high) / 2), "half": _rounded(half), "floor": float(f"{low[up]:.7g}"),
+        "tick": float(f"{min(0.045 * reach, 0.4 * typical):.7g}"),
+    }  # fmt: skip

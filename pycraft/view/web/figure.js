@@ -1,0 +1,267 @@
+"use strict";
+// The stick figure of a model on a canvas: points and lines that are fixed on bodies, placed by the bodies' poses, seen by a camera that is
+// turned (drag), moved (Shift and drag) and brought nearer (wheel). Parallel projection: lengths in the plane of the picture are true.
+
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+const along = (a, s, b) => [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]];
+
+// Colours of the style sheet by name, looked up once, and again when the system's mode changes.
+let colours = {};
+const colourOf = (name) => (colours[name] ??= getComputedStyle(document.documentElement).getPropertyValue(name).trim());
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { colours = {}; });
+
+// Single-precision numbers from text, little-endian as every browser's machine.
+function numbers(text) {
+  const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  return new Float32Array(bytes.buffer);
+}
+
+// A point (owner, place) in the world: poses are rows of [R p], 12 numbers a body; the base, -1, stands still.
+function placed(poses, owner, p) {
+  if (owner < 0) return p;
+  const X = poses.subarray(12 * owner, 12 * owner + 12);
+  return [0, 4, 8].map((i) => X[i] * p[0] + X[i + 1] * p[1] + X[i + 2] * p[2] + X[i + 3]);
+}
+function turned(poses, owner, d) {
+  if (owner < 0) return d;
+  const X = poses.subarray(12 * owner, 12 * owner + 12);
+  return [0, 4, 8].map((i) => X[i] * d[0] + X[i + 1] * d[1] + X[i + 2] * d[2]);
+}
+
+class Figure {
+  // data: what pycraft/view/figure_data.py says of a model; picked(body): a body was clicked, -1 for none
+  constructor(canvas, data, picked = () => {}) {
+    Object.assign(this, { canvas, data, picked, poses: new Float32Array(), ghosts: [], arrows: [], way: null, chosen: -1 });
+    this.context = canvas.getContext("2d");
+    this.look();
+    this.listen();
+    new ResizeObserver(() => this.draw()).observe(canvas);
+  }
+
+  // The camera as at first: the plane of a flat model, else from the side and above.
+  look() {
+    [this.yaw, this.pitch] = this.data.flat ? [0, 0] : [0.6, 0.35];
+    this.zoom = 1;
+    this.centre = this.data.centre;
+    this.draw();
+  }
+
+  basis() {
+    const [right, up] = [this.data.right, this.data.up], front = cross(right, up);
+    const [c, s] = [Math.cos(this.yaw), Math.sin(this.yaw)];
+    const level = along(right.map((x) => s * x), c, front);
+    const toward = along(level.map((x) => Math.cos(this.pitch) * x), Math.sin(this.pitch), up);
+    const across = along(right.map((x) => c * x), -s, front);
+    return [across, cross(toward, across), toward];
+  }
+
+  listen() {
+    const { canvas } = this;
+    let from = null, moved = 0;
+    canvas.addEventListener("pointerdown", (event) => {
+      [from, moved] = [[event.offsetX, event.offsetY], 0];
+      canvas.setPointerCapture(event.pointerId);
+    });
+    canvas.addEventListener("pointermove", (event) => {
+      if (!from) return;
+      const [dx, dy] = [event.offsetX - from[0], event.offsetY - from[1]];
+      from = [event.offsetX, event.offsetY];
+      moved += Math.abs(dx) + Math.abs(dy);
+      if (moved < 4) return;
+      if (event.shiftKey || event.buttons > 1) {
+        const [across, up] = this.basis();
+        this.centre = along(along(this.centre, -dx / this.scale, across), dy / this.scale, up);
+      } else {
+        this.yaw -= 0.008 * dx;
+        this.pitch = Math.max(-1.57, Math.min(1.57, this.pitch + 0.008 * dy));
+      }
+      this.draw();
+    });
+    canvas.addEventListener("pointerup", (event) => {
+      if (from && moved < 4) this.picked(this.bodyAt(event.offsetX, event.offsetY));
+      from = null;
+    });
+    canvas.addEventListener("pointercancel", () => { from = null; });
+    canvas.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      this.zoom *= Math.exp(-0.0012 * event.deltaY);
+      this.draw();
+    }, { passive: false });
+    canvas.addEventListener("dblclick", () => this.look());
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
+  }
+
+  // Pixels a metre, and where things are seen.
+  prepare() {
+    const { canvas, data } = this, ratio = devicePixelRatio || 1;
+    const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+    if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
+      [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
+    }
+    const span = (axis) => 2 * axis.reduce((sum, x, i) => sum + Math.abs(x) * data.half[i], 0);
+    const axes = this.basis();
+    this.scale = this.zoom * 0.9 * Math.min(width / span(axes[0]), height / span(axes[1]));
+    this.seen = (p) => {
+      const d = along(p, -1, this.centre);
+      return [width / 2 + this.scale * dot(d, axes[0]), height / 2 - this.scale * dot(d, axes[1]), dot(d, axes[2])];
+    };
+    this.context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    this.context.clearRect(0, 0, width, height);
+  }
+
+  show(poses) {
+    this.poses = poses;
+    this.draw();
+  }
+
+  draw() {
+    if (!this.canvas.clientWidth || !this.canvas.clientHeight) return;
+    this.prepare();
+    if (!this.data.flat) this.drawFloor();
+    if (this.way) this.drawLine(this.way, colourOf("--way"), 1.2);
+    for (const ghost of this.ghosts) this.drawModel(ghost.data, ghost.poses, 0.4, colourOf("--ghost"));
+    this.drawModel(this.data, this.poses, 1, null);
+    for (const arrow of this.arrows) this.drawArrow(arrow);
+    this.drawScale();
+  }
+
+  drawLine(points, colour, width) {
+    const { context } = this;
+    context.beginPath();
+    for (const point of points) context.lineTo(...this.seen(point).slice(0, 2));
+    context.strokeStyle = colour;
+    context.lineWidth = width;
+    context.stroke();
+  }
+
+  drawFloor() {
+    const { floor, half, centre, right, up } = this.data, front = cross(right, up);
+    const reach = Math.max(...half), pitch = niceStep(reach / 4), lines = 6;
+    const middle = along(centre, floor - dot(centre, up), up);
+    for (let i = -lines; i <= lines; i++) {
+      for (const [a, b] of [[right, front], [front, right]]) {
+        const at = along(middle, i * pitch, a);
+        this.drawLine([along(at, -lines * pitch, b), along(at, lines * pitch, b)], colourOf("--grid"), 1);
+      }
+    }
+  }
+
+  // A length in the picture, in metres.
+  drawScale() {
+    const { context } = this, height = this.canvas.clientHeight, length = niceStep(90 / this.scale);
+    context.fillStyle = context.strokeStyle = colourOf("--faint");
+    context.lineWidth = 1.5;
+    context.setLineDash([]);
+    context.strokeRect(14, height - 14, length * this.scale, 0);
+    context.font = "12px system-ui, sans-serif";
+    context.fillText(`${+length.toPrecision(6)} m`, 14, height - 20);
+  }
+
+  drawModel(data, poses, alpha, colour) {
+    if (poses.length < 12 * data.bodies.length) return;
+    const { context } = this, items = [];
+    const width = Math.min(3.5, Math.max(1, 3.5 * (20 / Math.max(data.bodies.length, 1)) ** 0.4));
+    const styles = { ground: ["--faint", 0.5, [2, 4]], tie: ["--tie", 0.4, []], slide: ["--slide", 0.7, [5, 3]], bone: ["--bone", 1, []] };
+    for (const [kind, [name, share, dashes]] of Object.entries(styles)) {
+      if (kind === "ground" && !data.grounded) continue;
+      const { of, at } = data.lines[kind];
+      of.forEach((owners, i) => {
+        const ends = owners.map((owner, j) => this.seen(placed(poses, owner, at[i][j])));
+        const own = !colour && kind === "bone" && owners.includes(this.chosen) && owners[0] === this.chosen;
+        items.push({ depth: (ends[0][2] + ends[1][2]) / 2, ends, stroke: colour || colourOf(own ? "--chosen" : name),
+          width: width * share * (own ? 1.6 : 1), dashes, body: owners[0] });
+      });
+    }
+    const size = data.tick;
+    data.axes.of.forEach((owner, i) => {
+      const p = placed(poses, owner, data.axes.at[i]), d = turned(poses, owner, data.axes.along[i]);
+      const ends = [this.seen(along(p, -size, d)), this.seen(along(p, size, d))];
+      items.push({ depth: (ends[0][2] + ends[1][2]) / 2, ends, stroke: colour || data.colours[data.axes.hinge[i]] || colourOf("--text"), width: 0.6 * width, dashes: [], body: -1 });
+    });
+    const joints = data.points.joint.of.map((owner, i) => this.seen(placed(poses, owner, data.points.joint.at[i])));
+    joints.forEach((at, i) => items.push({ depth: at[2], dot: at, fill: colour || data.colours[i] || colourOf("--text"), body: i, radius: 1.7 * width }));
+    for (const [kind, share] of [["node", 0.9]]) {
+      const { of, at } = data.points[kind];
+      of.forEach((owner, i) => {
+        const seen = this.seen(placed(poses, owner, at[i]));
+        items.push({ depth: seen[2], dot: seen, fill: colour || colourOf("--tie"), body: owner, radius: share * width });
+      });
+    }
+    if (data.grounded) { // the base
+      const seen = this.seen([0, 0, 0]);
+      items.push({ depth: seen[2], dot: seen, fill: colourOf("--faint"), body: -1, radius: 1.3 * width });
+    }
+    items.sort((a, b) => a.depth - b.depth);
+    context.globalAlpha = alpha;
+    context.lineCap = "round";
+    for (const item of items) this.drawItem(item);
+    context.setLineDash([]);
+    context.globalAlpha = 1;
+    if (!colour) this.items = items;
+  }
+
+  drawItem({ ends, dot: at, stroke, fill, width, dashes, radius, body }) {
+    const { context } = this;
+    context.beginPath();
+    if (ends) {
+      context.setLineDash(dashes);
+      context.strokeStyle = stroke;
+      context.lineWidth = width;
+      context.moveTo(ends[0][0], ends[0][1]);
+      context.lineTo(ends[1][0], ends[1][1]);
+      context.stroke();
+      return;
+    }
+    context.setLineDash([]);
+    context.arc(at[0], at[1], radius * (body >= 0 && body === this.chosen ? 1.5 : 1), 0, 2 * Math.PI);
+    context.fillStyle = fill;
+    context.fill();
+    context.strokeStyle = colourOf("--page");
+    context.lineWidth = 1;
+    context.stroke();
+  }
+
+  // { at, along, colour }: from a point along a vector, both in metres
+  drawArrow({ at, along: vector, colour }) {
+    const { context } = this, [x, y] = this.seen(at), [u, v] = this.seen(along(at, 1, vector));
+    const length = Math.hypot(u - x, v - y);
+    if (!(length > 1)) return;
+    const head = Math.min(9, 0.4 * length), [a, b] = [(u - x) / length, (v - y) / length];
+    context.strokeStyle = context.fillStyle = colour;
+    context.lineWidth = 2;
+    context.beginPath();
+    context.moveTo(x, y);
+    context.lineTo(u - 0.8 * head * a, v - 0.8 * head * b);
+    context.stroke();
+    context.beginPath();
+    context.moveTo(u, v);
+    context.lineTo(u - head * (a - 0.45 * b), v - head * (b + 0.45 * a));
+    context.lineTo(u - head * (a + 0.45 * b), v - head * (b - 0.45 * a));
+    context.fill();
+  }
+
+  // The body whose hinge or line is nearest to a place in the picture, within 14 pixels; -1 for none.
+  bodyAt(x, y) {
+    let nearest = -1, least = 14;
+    for (const { ends, dot: at, body } of this.items || []) {
+      if (body < 0) continue;
+      let distance;
+      if (at) {
+        distance = Math.hypot(at[0] - x, at[1] - y) - 4; // a hinge before the lines that meet at it
+      } else {
+        const [u, v] = [ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]];
+        const share = Math.max(0, Math.min(1, ((x - ends[0][0]) * u + (y - ends[0][1]) * v) / (u * u + v * v || 1)));
+        distance = Math.hypot(ends[0][0] + share * u - x, ends[0][1] + share * v - y);
+      }
+      if (distance < least) [nearest, least] = [body, distance];
+    }
+    return nearest;
+  }
+}
+
+// 1, 2 or 5 times a power of ten, at most the given length.
+function niceStep(length) {
+  const power = 10 ** Math.floor(Math.log10(length));
+  return power * [5, 2, 1].find((factor) => factor * power <= length * (1 + 1e-9));
+}

@@ -1,0 +1,48 @@
+"""Pages that hold all that they need: no request leaves them, and their own policy forbids any but to the server that they came from."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from html import escape
+from pathlib import Path
+from string import Template
+from typing import Any
+
+WEB = Path(__file__).parent / "web"
+
+
+def web_page(name: str, title: str, data: dict[str, Any], texts: dict[str, str], *, asks: bool = False) -> str:
+    """A page of `web/NAME.html` and `web/NAME.js`, with styles, scripts and data inside.
+
+    Parameters
+    ----------
+    name : "film" or "viewer"
+    title : shown in the page and its tab
+    data : plain data, for the script
+    texts : HTML by the names that the page has for them
+    asks : whether the page may ask the server that it came from; else it can send no request at all
+
+    Examples
+    --------
+    >>> from pycraft.view.web_page import web_page
+    >>> "<script>" in web_page("film", "a < b", {"key": "</script>"}, {"said": "", "speeds": ""}).split("</script>")[0]
+    False
+    """
+    own = "'self'" if asks else "'none'"
+    policy = f"default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; connect-src {own}"
+    body = Template(_text(f"{name}.html")).substitute({"title": escape(title), **texts})
+    held = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
+    scripts = "\n".join(_text(f"{script}.js") for script in ("figure", "plots", name)).replace('"use strict";\n', "")
+    return (
+        f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
+        f'<meta name="viewport" content="width=device-width">\n<link rel="icon" href="data:,">\n<title>{escape(title)}</title>\n'
+        f'<style>\n{_text("style.css")}</style>\n</head>\n<body>\n{body}<script type="application/json" id="data">{held}</script>\n'
+        f'<script>\n"use strict";\n{scripts}</script>\n</body>\n</html>\n'
+    )
+
+
+@cache
+def _text(name: str) -> str:
+    return (WEB / name).read_text(encoding="utf-8")

@@ -1,0 +1,52 @@
+"""Parameters of effects as fields of a page: what can be shown as a number or numbers, and set again while a scene goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+
+
+def shown_fields(effect: Any) -> list[dict[str, Any]]:
+    """Of each parameter its name, its value, and whether it can be set: a number, a list of numbers, or the text of anything else."""
+    return [{"name": name, **_shown(value)} for name, value in _parameters(effect)]
+
+
+def set_field(scene: Any, effect: str, field: str, value: Any) -> None:
+    """One parameter of an effect to a number or a list of numbers. ModelError for what cannot be: the effect is then as it was."""
+    changed = scene.effects[effect]
+    before = dict(_parameters(changed)).get(field)
+    if before is None or "value" not in _shown(before):
+        raise _core.ModelError(f"{effect} has no number {field!r} that can be set here")
+    given = np.asarray(_core.real_array(value, f"{effect}: {field}"))
+    if given.shape != np.shape(before):
+        raise _core.ModelError(f"{effect}: {field} has the shape {np.shape(before)}, not {given.shape}")
+    if not np.isfinite(given).all():
+        raise _core.ModelError(f"{effect}: {field} takes finite numbers")
+    new = type(before)(given.item()) if np.ndim(before) == 0 else given.tolist()
+    try:
+        setattr(changed, field, new)
+        scene._calls()
+    except BaseException:
+        setattr(changed, field, before)
+        raise
+
+
+def _parameters(effect: Any) -> Iterator[tuple[str, Any]]:
+    for field in fields(effect):
+        if not field.name.startswith("_"):
+            yield field.name, getattr(effect, field.name)
+
+
+def _shown(value: Any) -> dict[str, Any]:
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return {"value": value}
+    if isinstance(value, (list, tuple, np.ndarray)) and len(value):
+        numbers = np.asarray(value) if all(isinstance(x, (int, float, np.number)) for x in np.ravel(value)) else np.zeros(0)
+        if numbers.ndim == 1 and numbers.size and numbers.dtype.kind in "if":
+            return {"value": numbers.tolist()}
+    return {"text": repr(value)[:120]}

@@ -1,0 +1,59 @@
+"""Numbers of a scene at its present state, for the page: a body's M, P, D and frames, and the blocks of operators."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from .live_scene import LiveScene
+
+LETTERS = {
+    "ℳ": "MM", "ℳ⁻¹": "MM_inv", "M": "M", "P": "P", "D": "D", "φ": "phi", "ψ": "psi", "Υ": "Upsilon", "Ω": "Omega",
+}  # fmt: skip
+"""Operators whose blocks are shown, and their names in an operator set."""
+MOST = 600
+"""Rows of an operator that is formed for its picture."""
+
+
+def body_numbers(live: LiveScene, name: str) -> dict[str, Any]:
+    """A body's hinge, pose and velocity, the diagonal blocks M, P of it and D of its hinge, and its frames. ModelError for another name.
+
+    Returns
+    -------
+    dict
+        "pose" X_WB (4, 4); "twist" (6,) in its own axes, angular first; "M", "P" (6, 6), "D" (n, n), None of more than MOST rows; "frames",
+        nodes on it by name with their places in it, m.
+    """
+    model = live.model
+    if name not in model.bodies:
+        raise _core.ModelError(f"{model.name!r} has no body {name!r}")
+    k = live.skeleton.bodies.index(name)
+    described = model.description()
+    body = described["bodies"][k]
+    hinge = live.skeleton.names[k]
+    at = live.model.soa
+    found: dict[str, Any] = {
+        "name": name, "hinge": hinge, "kind": live.skeleton.kinds[k], "mass": float(body["mass"]),
+        "parent": live.skeleton.bodies[body["parent"]] if body["parent"] >= 0 else None,
+        "com": np.asarray(body["com"], float).tolist(), "pose": model.pose(name, live.q).tolist(),
+        "frames": {node["name"]: np.asarray(node["position"]).tolist() for node in described["nodes"] if node["body"] == k},
+    }  # fmt: skip
+    found["twist"] = (model.jacobian(name, live.q) @ live.v).tolist() if model.nv else [0.0] * 6
+    for letter, block in (("M", name), ("P", name), ("D", hinge)):
+        operator = getattr(at, letter)
+        small = max(operator.shape) <= MOST and (letter != "D" or model.hinges[hinge].v_slice.stop > model.hinges[hinge].v_slice.start)
+        found[letter] = operator.at(live.q).blocks()[block, block].tolist() if small else None
+    return found
+
+
+def blocks_of(live: LiveScene, letter: str) -> dict[str, Any]:
+    """The largest entry of each block of an operator at the state: "rows", "columns", "values". EvaluationError for what is not shown."""
+    if letter not in LETTERS:
+        raise _core.EvaluationError(f"no blocks of {letter!r} are shown; there are {', '.join(LETTERS)}")
+    operator = getattr(live.model.soa, LETTERS[letter])
+    if max(operator.shape, default=0) > MOST:
+        raise _core.EvaluationError(f"{letter} has {max(operator.shape)} rows; blocks of up to {MOST} are shown")
+    view = operator.at(live.q).blocks()
+    return {"rows": view.rows, "columns": view.columns, "values": view.largest().tolist()}

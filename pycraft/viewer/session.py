@@ -1,0 +1,271 @@
+"""What a page of the viewer asks and does: one scene that plays, beside it a ghost, and what is seen of both."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from ..arguments import one_number
+from ..models.limits import coordinate_limits
+from ..scenes.coordinate_units import coordinate_units
+from ..view.figure_data import figure_data, number_text
+from .effect_fields import set_field, shown_fields
+from .inspection import LETTERS, blocks_of, body_numbers
+from .live_scene import LiveScene, without
+
+PIECE = 1 / 60
+"""s between two looks at the clock while it plays."""
+LATE = 0.1
+"""s of the clock that are made up for at most: a scene that cannot keep up plays slower."""
+UNSEEN = 10.0
+"""s without a page that asks after which it stops playing."""
+SCALES = (1e-3, 1e3)
+SEEN_STATES = 8
+"""Random ones that the first look has in view, beside the present and the neutral one."""
+
+
+class Session:
+    """A scene in the viewer. Every call takes its turn: the pages' threads and the one that plays share it.
+
+    Parameters
+    ----------
+    scene : Scene
+    beside : Scene, optional
+        A second one, which is drawn as a ghost and plays with it: at the same coordinates, if it has the same.
+    """
+
+    def __init__(self, scene: Any, beside: Any = None, q: Any = None, v: Any = None):
+        self.live = LiveScene(scene, q, v)
+        self._beside = None if beside is None else LiveScene(beside)
+        self.ghost: LiveScene | None = None
+        self.ghost_name = ""
+        self.lock = threading.RLock()
+        self.playing, self.scale, self.rate, self.message = False, 1.0, 0.0, ""
+        self._edits, self._asked, self._seeds = 0, time.monotonic(), 0
+        self._ended = threading.Event()
+        self._wake = threading.Event()
+        self._thread = threading.Thread(target=self._play, name="pycraft viewer", daemon=True)
+        if self._beside is not None:
+            self._set_ghost("beside")
+        self._thread.start()
+
+    # ------------------------------------------------------------------ what is shown
+    def setup(self) -> dict[str, Any]:
+        """What does not change from moment to moment: the figure, the coordinates, effects with their parameters, letters."""
+        with self.lock:
+            live, model = self.live, self.live.model
+            states = np.array([model.zero_q(), live.q, *(model.random_state(seed).q for seed in range(SEEN_STATES))])
+            ghost = self.ghost
+            other = None if ghost is None else figure_data(ghost.skeleton, np.array([ghost.q]))
+            names = list(live.scene.effects)
+            return {
+                "edits": self._edits, "figure": figure_data(live.skeleton, states), "ghost": other, "coordinates": self._coordinates(),
+                "effects": [{"name": name, "kind": type(live.scene.effects[name]).__name__, "on": live.scene.is_on(name),
+                             "fields": shown_fields(live.scene.effects[name])} for name in names],
+                "ghosts": [*(["beside"] if self._beside is not None else []), *(f"without {name}" for name in names)],
+                "ghost_name": self.ghost_name, "letters": list(LETTERS), "loops": list(model.loops),
+            }  # fmt: skip
+
+    def _coordinates(self) -> list[dict[str, Any]]:
+        model = self.live.model
+        limits, units = coordinate_limits(model), coordinate_units(model)[2]
+        reach = float(max(figure_data(self.live.skeleton, model.zero_q())["half"]))
+        owners = {j: k for k, hinge in enumerate(model.hinges.values()) for j in range(hinge.v_slice.start, hinge.v_slice.stop)}
+        rows = []
+        for j, name in enumerate(model.coordinate_names):
+            wide = np.pi if units[j] == "rad" else 2 * reach
+            low, high = limits.lower[j], limits.upper[j]
+            bounded = bool(np.isfinite(low) and np.isfinite(high))
+            rows.append({
+                "name": name, "unit": units[j], "body": owners[j], "bounded": bounded,
+                "low": float(low if np.isfinite(low) else min(-wide, high)), "high": float(high if np.isfinite(high) else max(wide, low)),
+            })  # fmt: skip
+        return rows
+
+    def state(self, arrows: tuple[str, ...] = ()) -> dict[str, Any]:
+        """What changes: time, coordinates, poses, energies; arrows of "velocity" and "force" where they are asked for."""
+        with self.lock:
+            self._asked = time.monotonic()
+            live, ghost = self.live, self.ghost
+            found = live.along()
+            kinetic, potential = float(found["kinetic"]), float(np.sum(found["potential"]))
+            drawn, missing = _arrows(live, arrows)
+            return _finite({
+                "edits": self._edits, "t": live.t, "playing": self.playing, "scale": self.scale, "rate": self.rate, "message": self.message,
+                "u": live.u.tolist(), "v": live.v.tolist(), "vdot": found["vdot"].tolist(), "poses": number_text(live.poses()),
+                "ghost": None if ghost is None else number_text(ghost.poses()),
+                "energy": [kinetic, potential, kinetic + potential - live.work],
+                "arrows": drawn, "missing": missing,
+            })  # fmt: skip
+
+    def body(self, name: str) -> dict[str, Any]:
+        """Numbers of one body: M, P, D, its pose, velocity and frames."""
+        with self.lock:
+            return _finite(body_numbers(self.live, name))
+
+    def blocks(self, letter: str) -> dict[str, Any]:
+        """The magnitudes of an operator's blocks."""
+        with self.lock:
+            return _finite(blocks_of(self.live, letter))
+
+    # ------------------------------------------------------------------ what is done
+    def do(self, action: str, **given: Any) -> None:
+        """One action by name, with what it is given. ModelError and EvaluationError, with the remedy, for what cannot be."""
+        actions: dict[str, Callable[..., None]] = {
+            "play": self._start, "pause": self.pause, "step": self._step, "reset": self._reset, "neutral": self._neutral,
+            "random": self._random, "rest": self._rest, "move": self._move, "scale": self._set_scale, "effect": self._turn,
+            "parameter": self._set, "ghost": self._set_ghost,
+        }  # fmt: skip
+        if action not in actions:
+            raise _core.EvaluationError(f"the viewer has no action {action!r}; there are {', '.join(actions)}")
+        with self.lock:
+            self.message = ""
+            try:
+                actions[action](**given)
+            except TypeError as error:
+                raise _core.EvaluationError(f"{action}: {error}") from None
+
+    def _start(self) -> None:
+        self.playing, self._asked = True, time.monotonic()
+        self._wake.set()
+
+    def pause(self) -> None:
+        """Stop playing."""
+        self.playing, self.rate = False, 0.0
+
+    def _step(self) -> None:
+        self.pause()
+        self._advance(self.scale / 30)
+
+    def _reset(self) -> None:
+        self.live.reset()
+        self._ghost_follows()
+
+    def _neutral(self) -> None:
+        self._at_rest(self.live.model.neutral())
+
+    def _random(self) -> None:
+        self._seeds += 1
+        self._at_rest(self.live.model.random_state(self._seeds).q)
+
+    def _rest(self) -> None:
+        self._at_rest(self.live.q)
+
+    def _at_rest(self, q: Any) -> None:
+        self.live.rest_at(q)
+        self._ghost_follows()
+
+    def _move(self, coordinate: Any, to: Any) -> None:
+        j, value = int(one_number(coordinate, "coordinate")), one_number(to, "to")
+        if not 0 <= j < self.live.model.nv or not np.isfinite(value):
+            raise _core.EvaluationError(
+                f"move: coordinate {coordinate} to {to}: there are {self.live.model.nv}, and they take finite numbers"
+            )
+        self.live.move(j, value)
+        self._ghost_follows()
+
+    def _set_scale(self, to: Any) -> None:
+        value = one_number(to, "scale")
+        if not SCALES[0] <= value <= SCALES[1]:
+            raise _core.EvaluationError(f"scale={value:g}: seconds of the scene in a second, from {SCALES[0]:g} to {SCALES[1]:g}")
+        self.scale = value
+
+    def _turn(self, name: Any, on: Any) -> None:
+        scene = self.live.scene
+        if on:
+            scene.enable(name)
+        else:
+            scene.disable(name)
+        self._edits += 1
+        if self.ghost is not None and self.ghost_name != "beside":
+            self._set_ghost(self.ghost_name)
+
+    def _set(self, effect: Any, field: Any, value: Any) -> None:
+        set_field(self.live.scene, effect, field, value)
+        self._edits += 1
+
+    def _set_ghost(self, name: Any) -> None:
+        if name == "beside" and self._beside is not None:
+            self.ghost = self._beside
+        elif isinstance(name, str) and name.startswith("without "):
+            self.ghost = LiveScene(without(self.live.scene, name.removeprefix("without ")), self.live.q, self.live.v)
+        elif not name:
+            self.ghost = None
+        else:
+            raise _core.ModelError(f"there is no ghost {name!r}; there are 'without EFFECT', and 'beside' where a second scene was given")
+        self.ghost_name = name if self.ghost is not None else ""
+        self._edits += 1
+        self._ghost_follows()
+
+    def _ghost_follows(self) -> None:
+        if self.ghost is not None:
+            self.ghost.put_as(self.live)
+
+    # ------------------------------------------------------------------ time
+    def _advance(self, seconds: float) -> None:
+        self.live.advance(seconds)
+        if self.ghost is not None:
+            self.ghost.advance(seconds)
+
+    def _play(self) -> None:
+        last = time.monotonic()
+        while not self._ended.is_set():
+            if not self.playing:
+                self._wake.wait()
+                self._wake.clear()
+                last = time.monotonic()
+                continue
+            time.sleep(PIECE)
+            now = time.monotonic()
+            with self.lock:
+                if self.playing:
+                    self._go_on(now - last)
+            last = now
+
+    def _go_on(self, elapsed: float) -> None:
+        if time.monotonic() - self._asked > UNSEEN:
+            self.pause()
+            self.message = f"paused: no page has asked for {UNSEEN:g} s"
+            return
+        seconds = min(elapsed, LATE) * self.scale
+        try:
+            self._advance(seconds)
+        except Exception as error:  # shown in the page: a thread has nobody to tell
+            self.pause()
+            self.message = f"stopped at {self.live.t:.4g} s: {error}"
+            return
+        self.rate = 0.8 * (self.rate or self.scale) + 0.2 * seconds / max(elapsed, 1e-9)
+
+    def close(self) -> None:
+        """Ends the thread that plays."""
+        self._ended.set()
+        self._wake.set()
+        if threading.current_thread() is not self._thread:
+            self._thread.join(timeout=5)
+
+
+def _arrows(live: LiveScene, kinds: tuple[str, ...]) -> tuple[dict[str, Any], list[str]]:
+    """Arrows of these kinds, and why others are missing: hinge forces of scenes that keep loops are."""
+    made, drawn, missing = {"velocity": live.velocities, "force": live.forces}, {}, []
+    for kind in kinds:
+        try:
+            drawn.update({kind: made[kind]()} if kind in made else {})
+        except _core.Error as error:
+            missing.append(f"no arrows of {kind}: {error}")
+    return drawn, missing
+
+
+def _finite(value: Any) -> Any:
+    """Plain data for JSON, which has no infinities: None in their place."""
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(item) for item in value]
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,234 @@
+"""The viewer in a real browser: sliders move the figure, play plays, picking picks, and the page does not grow."""
+
+import time
+
+import numpy as np
+import pytest
+
+import pycraft as pc
+from support.browser import differing, opened, pixels, until
+
+MOVED = 200
+"""Pixels: some lengths of a bone that is drawn 3 wide."""
+
+
+@pytest.fixture
+def view():
+    with pc.mechanisms.double_pendulum().add(pc.effects.Damping(0.1)).view(q=[1.0, 2.0]) as shown:
+        yield shown
+
+
+def shown_page(browser, view, **options):
+    return opened(browser, view.address, size=(1280, 760), **options)
+
+
+def ready(page):
+    until(page, "state !== null")
+
+
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+def test_sliders_move_the_figure(browser, view, dark, tmp_path):
+    with shown_page(browser, view, dark=dark) as page:
+        ready(page)
+        first = pixels(page)
+        page.fill("#u0", "-0.4")
+        until(page, "Math.abs(state.u[0] + 0.4) < 1e-9")
+        assert view.session.live.u == pytest.approx([-0.4, 2.0]) and differing(first, pixels(page)) > MOVED
+        assert page.inner_text(".slider output >> nth=0") == "-0.400 rad"
+        page.fill("#u0", "1")
+        until(page, "state.u[0] === 1")
+        assert differing(first, pixels(page)) == 0
+        page.click("#neutral")
+        until(page, "state.u[1] === 0")
+        page.click("#random")
+        until(page, "state.u[1] !== 0")
+        page.screenshot(path=tmp_path / "viewer.png")
+        asked = {address.removeprefix(view.address) for address in page.asked}
+        assert asked <= {"", "do", "setup", "state?arrows="} and len(asked) >= 3  # nothing from elsewhere
+
+
+def test_a_slider_leaves_whole_turns(browser, view):
+    view.session.live.put([20.0, -9.0], [0.0, 0.0])
+    with shown_page(browser, view) as page:
+        ready(page)
+        turns = 6 * np.pi
+        assert float(page.input_value("#u0")) == pytest.approx(20.0 - turns)
+        page.fill("#u0", "1.5")
+        until(page, "state.u[0] !== 20")
+        assert view.session.live.u == pytest.approx([1.5 + turns, -9.0])
+
+
+def test_play_plays(browser, view):
+    with shown_page(browser, view) as page:
+        ready(page)
+        first = pixels(page)
+        page.click("#play")
+        until(page, "state.t > 0.3")
+        assert view.session.playing and differing(first, pixels(page)) > MOVED
+        page.click("#play")
+        until(page, "!state.playing")
+        t = view.session.live.t
+        page.click("#step")
+        until(page, f"state.t > {t!r}")
+        assert view.session.live.t == pytest.approx(t + 1 / 30)
+        page.click("#reset")
+        until(page, "state.t === 0")
+        assert differing(first, pixels(page)) == 0
+        page.fill("#scale", "0.01")
+        page.press("#scale", "Enter")
+        until(page, "state.scale === 0.01")
+
+
+def test_picking_picks(browser, view):
+    view.session.live.put([0.3, 0.9], [0.0, 0.0])
+    with shown_page(browser, view) as page:
+        ready(page)
+        pose, box = view.session.live.model.pose("lower", [0.3, 0.9]), page.locator("#figure").bounding_box()
+        middle = (pose @ [0.5, 0, 0, 1])[:3].tolist()
+        x, y, _ = page.evaluate("p => figure.seen(p)", middle)
+        page.mouse.click(box["x"] + x, box["y"] + y)
+        until(page, "document.querySelector('#numbers table') !== null")
+        assert page.inner_text("#picked_name") == "lower" and page.inner_text("#tree .picked").startswith("lower")
+        numbers = page.inner_text("#numbers")
+        assert "pin lower on upper" in numbers and f"{pose[0, 3]:.4g}" in numbers.replace("−", "-")
+        assert {"M", "P", "D"} <= set(numbers.split())
+        x, y, _ = page.evaluate("p => figure.seen(p)", (view.session.live.model.pose("upper", [0.3, 0.9]) @ [0.4, 0, 0, 1])[:3].tolist())
+        page.mouse.click(box["x"] + x, box["y"] + y)
+        until(page, "document.getElementById('picked_name').textContent === 'upper'")
+        page.mouse.click(box["x"] + 10, box["y"] + 60)
+        until(page, "document.getElementById('picked_name').textContent === 'no body picked'")
+        page.click("#tree button >> nth=1")
+        until(page, "document.getElementById('picked_name').textContent === 'lower'")
+
+
+def test_blocks_follow_the_pose(browser, view):
+    with shown_page(browser, view) as page:
+        ready(page)
+        page.select_option("#letter", "ℳ")
+        until(page, "document.getElementById('blocks').onpointermove !== null")
+        first = pixels(page, "#blocks")
+        page.fill("#u1", "0.1")
+        until(page, "Math.abs(state.u[1] - 0.1) < 1e-9")
+        page.wait_for_timeout(700)  # blocks are asked for some times a second
+        assert differing(first, pixels(page, "#blocks")) > 30
+        box = page.locator("#blocks").bounding_box()
+        page.mouse.move(box["x"] + 20, box["y"] + 20)
+        largest = view.session.live.model.mass_matrix(view.session.live.q)[0, 0]
+        name, shown = page.inner_text("#block").rsplit(": ", 1)
+        assert name == "upper, upper" and float(shown) == pytest.approx(largest, rel=1e-12)
+
+
+def test_effects_and_their_parameters(browser, view):
+    scene = view.session.live.scene
+    with shown_page(browser, view) as page:
+        ready(page)
+        page.uncheck("#on_gravity")
+        until(page, "setup.effects.find(effect => effect.name === 'gravity').on === false")
+        assert not scene.is_on("gravity") and page.inner_text("#said") == "damping"
+        page.fill("#damping_coefficient", "2.5")
+        page.press("#damping_coefficient", "Enter")
+        until(page, "setup.effects.find(effect => effect.name === 'damping').fields[0].value === 2.5")
+        assert scene.effects["damping"].coefficient == 2.5
+        page.fill("#damping_coefficient", "much")
+        page.press("#damping_coefficient", "Enter")
+        until(page, "document.getElementById('message').textContent !== ''")
+        assert scene.effects["damping"].coefficient == 2.5
+
+
+def test_ghosts_and_arrows(browser, view, tmp_path):
+    view.session.live.put([1.0, 2.0], [1.0, -1.0])
+    with shown_page(browser, view) as page:
+        ready(page)
+        first = pixels(page)
+        page.check("#velocity")
+        until(page, "figure.arrows.length === 2")
+        with_velocities = pixels(page)
+        assert differing(first, with_velocities) > 60
+        page.check("#force")
+        until(page, "figure.arrows.length === 4")
+        assert "longest velocity" in page.inner_text("#longest") and " N" in page.inner_text("#longest")
+        page.select_option("#ghost", "without gravity")
+        until(page, "figure.ghosts.length === 1")
+        page.click("#step")
+        page.click("#step")
+        page.uncheck("#velocity")
+        page.uncheck("#force")
+        until(page, "figure.arrows.length === 0")
+        both = pixels(page)
+        page.select_option("#ghost", "")
+        until(page, "figure.ghosts.length === 0")
+        assert differing(both, pixels(page)) > 30
+        page.screenshot(path=tmp_path / "ghost.png")
+
+
+def test_a_loop_follows_its_slider(browser):
+    with pc.mechanisms.five_bar().view() as view, shown_page(browser, view) as page:
+        ready(page)
+        to = float(view.session.live.u[0] - 0.4)
+        page.fill("#u0", repr(to))
+        until(page, f"Math.abs(state.u[0] - {to!r}) < 1e-9")
+        live = view.session.live
+        assert np.abs(live.model.loops.residual(live.q)).max() < 1e-10 and "tip" in page.inner_text("#loops")
+
+
+def test_many_coordinates_are_those_of_the_picked_body(browser):
+    with pc.chain(100).view() as view, shown_page(browser, view) as page:
+        ready(page)
+        assert page.locator(".slider").count() == 0 and "100 coordinates" in page.inner_text("#sliders")
+        page.click("#tree button >> nth=41")
+        until(page, "document.querySelectorAll('.slider').length === 1")
+        assert page.locator("#u41").count() == 1
+
+
+def test_a_page_left_open_does_not_grow(browser, view):
+    """Ten thousand states at once, as an hour or more gives: what is kept of them is bounded, and so are the elements."""
+    with shown_page(browser, view) as page:
+        ready(page)
+        elements = page.evaluate("document.querySelectorAll('*').length")
+        page.evaluate("for (let i = 1; i <= 10000; i++) { const now = { ...state, t: state.t + 0.033 }; kept.push(now); state = now;"
+                      " if (kept.length > KEPT) show(now); }")  # fmt: skip
+        assert page.evaluate("kept.length") <= page.evaluate("KEPT")
+        assert page.evaluate("kept.every((entry, i) => i === 0 || entry.t > kept[i - 1].t)")
+        assert page.evaluate("kept[0].t") < 0.1  # the whole time is in view
+        assert page.evaluate("document.querySelectorAll('*').length") == elements
+
+
+def test_the_page_says_that_the_viewer_is_gone(browser):
+    view = pc.chain(2).view()
+    page = browser.new_page()
+    page.goto(view.address)
+    ready(page)
+    view.close()
+    until(page, "document.getElementById('message').textContent.includes('was closed')")
+    page.close()
+
+
+def test_a_notebook_shows_it_in_its_cell(browser, view, tmp_path):
+    """The frame that a notebook has in a cell, here in a page of another local server's origin."""
+    from http.server import BaseHTTPRequestHandler, HTTPServer
+    from threading import Thread
+
+    class Notebook(BaseHTTPRequestHandler):
+        def do_GET(self):
+            self.send_response(200)
+            self.send_header("Content-Type", "text/html")
+            self.end_headers()
+            self.wfile.write(view._repr_html_().encode() if self.path == "/" else b"")
+
+        def log_message(self, *_):
+            pass
+
+    server = HTTPServer(("127.0.0.1", 0), Notebook)
+    Thread(target=server.serve_forever, daemon=True).start()
+    page = browser.new_page()
+    page.goto(f"http://localhost:{server.server_address[1]}/")
+    frame = page.frame(url=view.address)
+    began = time.monotonic()
+    while not frame.evaluate("typeof state !== 'undefined' && state !== null") and time.monotonic() - began < 10:
+        page.wait_for_timeout(50)
+    frame.click("#step")
+    page.wait_for_timeout(500)
+    assert view.session.live.t == pytest.approx(1 / 30)
+    page.close()
+    server.shutdown()
+    server.server_close()
