@@ -43,29 +43,49 @@ def test_the_readme_example_runs():
     assert names["MM"].shape == (7, 7)
 
 
-@pytest.mark.parametrize(
-    ("page", "examples"),
-    [
-        ("sensitivities", 20),
-        ("comparing", 5),
-        ("mixed_trees", 8),
-        ("ensembles", 8),
-        ("hybrid_dynamics", 12),
-        ("linearization", 30),
-        ("task_space", 14),
-        ("interbody_forces", 12),
-        ("statics", 18),
-        ("statistical_dynamics", 5),
-        ("identification", 20),
-        ("frames", 30),
-        ("inverse_kinematics", 25),
-        ("subgraphs", 20),
-        ("loops", 18),
-        ("locking", 14),
-        ("structure", 25),
-        ("divide_and_conquer", 1),
-    ],  # fmt: skip
-)
+# Pages of examples that print, run as doctests, and how many there are at least.
+EXAMPLES = {
+    "index": 4,
+    "sensitivities": 20,
+    "comparing": 5,
+    "mixed_trees": 8,
+    "ensembles": 8,
+    "hybrid_dynamics": 12,
+    "linearization": 30,
+    "task_space": 14,
+    "interbody_forces": 12,
+    "statics": 18,
+    "statistical_dynamics": 5,
+    "identification": 20,
+    "frames": 30,
+    "inverse_kinematics": 25,
+    "subgraphs": 20,
+    "loops": 18,
+    "locking": 14,
+    "structure": 25,
+    "divide_and_conquer": 1,
+}
+# Pages whose blocks are run one after the other.
+BLOCKS = ["symbolic", "kalman", "accuracy", "evaluation", "statements", "teaching", "proofs", "compiled"]
+# Pages that other tests run.
+ELSEWHERE = {
+    "algorithm": "project/test_docs.py",
+    "models": "models/test_urdf.py",
+    "mjcf": "models/test_mjcf_export.py",
+    "scenes": "project/test_docs.py",
+    "simulation": "project/test_docs.py",
+}
+
+
+def test_no_page_with_examples_is_left_out():
+    """Every block of Python in a page runs in some test."""
+    pages = {path.stem for path in (ROOT / "docs").glob("*.md") if "```python\n" in path.read_text()}
+    assert pages == {*EXAMPLES, *BLOCKS, *ELSEWHERE, "scaling"}  # whose blocks need a cluster
+    for page, test in ELSEWHERE.items():
+        assert re.search(rf'"{page}(\.md)?"', (ROOT / "tests" / test).read_text()), page
+
+
+@pytest.mark.parametrize(("page", "examples"), EXAMPLES.items())
 def test_the_pages_run(page, examples):
     options = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
     result = doctest.testfile(str(ROOT / "docs" / f"{page}.md"), module_relative=False, optionflags=options)
@@ -130,7 +150,7 @@ def test_the_other_packages_of_the_page_of_comparisons(tmp_path, monkeypatch):
     assert len(compared) == 3 and all(eval(line, names) for line in compared)
 
 
-@pytest.mark.parametrize("page", ["symbolic", "kalman", "accuracy", "evaluation", "statements", "teaching", "proofs", "compiled"])
+@pytest.mark.parametrize("page", BLOCKS)
 def test_the_blocks_of_a_page_run(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names = {}
