@@ -5,7 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from . import contents, offline
+from . import contents, generated, offline
 from .plain_index import plain_index
 
 FORWARD = '<!doctype html><meta charset="utf-8"><title>PyCraft</title><meta http-equiv="refresh" content="0; url=docs/index.html">\n'
@@ -20,32 +20,32 @@ def written(path: Path, text: str) -> None:
 
 def assembled(folder: Path) -> dict[str, str]:
     """The sources of the site in one folder; returns the text of the pages that were generated."""
-    kept = set()
-    for path in contents.committed():
-        copy = folder / path.relative_to(contents.ROOT)
-        written(copy, path.read_text(encoding="utf-8"))
-        kept.add(copy)
+    texts = {folder / path.relative_to(contents.ROOT): path.read_text(encoding="utf-8") for path in contents.committed()}
+    made = generated.pages()
+    texts |= {folder / f"{page}.md": text for page, text in made.items()}
+    for path, text in texts.items():
+        written(path, text)
     for copy in folder.rglob("*"):
-        if copy.suffix in (".md", ".ipynb") and copy not in kept:
+        if copy.suffix in (".md", ".ipynb") and copy not in texts:
             copy.unlink()  # a page that is no more
-    return {}
+    return made
 
 
 def main(folder: Path) -> int:
-    generated = assembled(folder / "source")
+    made = assembled(folder / "source")
     site, here = folder / "html", Path(__file__).parent
-    made = subprocess.run(
+    built = subprocess.run(
         [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-c", here, "-d", folder / "doctrees", folder / "source", site]
     )
-    if made.returncode:
-        return made.returncode
+    if built.returncode:
+        return built.returncode
     written(site / "index.html", FORWARD)
-    written(site / "llms.txt", plain_index(generated))
+    written(site / "llms.txt", plain_index(made))
     shutil.rmtree(site / ".doctrees", ignore_errors=True)
     asked = offline.not_offline(site)
     for line in asked:
         print(f"would ask the network: {line}", file=sys.stderr)
-    print(f"{len(contents.listed())} pages: {site / 'index.html'}")
+    print(f"{len(list(site.rglob('*.html')))} pages: {site / 'index.html'}")
     return 1 if asked else 0
 
 

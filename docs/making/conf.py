@@ -9,8 +9,8 @@ author = "the authors of PyCraft"
 html_title = "PyCraft"
 root_doc = "docs/index"
 
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax"]
-suppress_warnings = ["config.cache"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax", "making.docstrings"]
+suppress_warnings = ["ref.python"]  # a type in a docstring is words, of which some are names of two classes' members
 
 # ---- pages
 myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence"]
@@ -23,8 +23,9 @@ nb_ipywidgets_js = {}
 nb_merge_streams = True
 
 # ---- docstrings: plain text with the star of the adjoint; `docs/making/docstrings.py` says what is markup in them
-autodoc_typehints = "description"
-autodoc_typehints_description_target = "documented"
+autodoc_typehints = "signature"
+autodoc_typehints_format = "short"
+python_maximum_signature_line_length = 90
 autodoc_member_order = "bysource"
 default_role = "code"
 napoleon_google_docstring = False

@@ -8,13 +8,13 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 INDEX = ROOT / "docs" / "index.md"
 # What follows from the code is written when the site is made; docs/index.md names it beside what is committed.
-GENERATED: tuple[str, ...] = ()
+GENERATED = ("docs/operators/index", "docs/theorems", "docs/api/index")
 
 
 def listed() -> list[str]:
     """The pages that docs/index.md lists, in order, as paths from the root without their suffix."""
     pages = [INDEX.relative_to(ROOT).with_suffix("").as_posix()]
-    for options, entries in re.findall(r"```\{toctree\}\n((?::.*\n)*)\n((?:.+\n)+)```", INDEX.read_text(encoding="utf-8")):
+    for options, entries in re.findall(r"```\{toctree\}\n((?::[^\n]*\n)*)(.*?)```", INDEX.read_text(encoding="utf-8"), re.S):
         for entry in entries.split():
             place = (INDEX.parent / entry).resolve().relative_to(ROOT)
             if ":glob:" not in options:
