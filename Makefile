@@ -39,7 +39,7 @@ test-python: .venv/tested
 	$(BIN)/python -m pytest $(PARALLEL) -m "not peers"
 
 check: .venv/tested
-	$(BIN)/ruff check pycraft tests cpp docs/making
+	$(BIN)/ruff check pycraft tests cpp docs/making docs/gallery
 	$(BIN)/cmake --build build --target test_allocation test_kernels -j $(JOBS)
 	build/test_allocation
 	build/test_kernels
@@ -99,8 +99,8 @@ campaigns: .venv/tested
 	$(BIN)/python tests/campaigns/refinement.py --seeds 5000 --jobs $(JOBS) --verbose
 
 lint: .venv/tested
-	$(BIN)/ruff check pycraft tests cpp docs/making
-	$(BIN)/ruff format --check pycraft tests cpp docs/making
+	$(BIN)/ruff check pycraft tests cpp docs/making docs/gallery
+	$(BIN)/ruff format --check pycraft tests cpp docs/making docs/gallery
 	$(BIN)/mypy
 
 # ---- environments. The build requirements are installed into the environment once, so that rebuilding is incremental.

@@ -28,6 +28,7 @@ def assembled(folder: Path) -> dict[str, str]:
     for copy in folder.rglob("*"):
         if copy.suffix in (".md", ".ipynb") and copy not in texts:
             copy.unlink()  # a page that is no more
+    generated.pictures(folder)
     return made
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import mathjax  # django-static-mathjax: MathJax as files, so that pages ask nobody for it
 
 project = "PyCraft"
-author = "the authors of PyCraft"
+author = "the PyCraft authors"
 html_title = "PyCraft"
 root_doc = "docs/index"
 

@@ -5,6 +5,7 @@ from typing import Any
 
 # What reStructuredText would read as markup in plain text: emphasis, substitutions, footnotes and references.
 MARKUP = re.compile(r"\\|\*|\||(?<=\w)_(?!\w)|\[(?=\d+\]_)")
+LISTS = ("Parameters", "Other Parameters", "Attributes", "Returns", "Yields", "Raises", "Warns")
 LITERAL = re.compile(r"(``.*?``|`[^`]*`)")
 
 
@@ -14,13 +15,35 @@ def escaped(line: str) -> str:
     return "".join(part if number % 2 else MARKUP.sub(r"\\\g<0>", part) for number, part in enumerate(parts))
 
 
+def with_notes(lines: list[str]) -> list[str]:
+    """A docstring whose paragraphs after a list of parameters, returns or errors are notes, and not read as more of these."""
+    made: list[str] = []
+    listing = False
+    for number, line in enumerate(lines):
+        following = lines[number + 1] if number + 1 < len(lines) else ""
+        if re.fullmatch(r"-{3,}", following.strip()):
+            listing = line.strip() in LISTS
+        elif listing and line.strip() and made and not made[-1].strip():
+            item = re.match(r"\s*[\w*, ]+ : ", line) or _indent(following) > _indent(line)
+            if not item and _indent(line) == _indent(lines[0]):
+                made += ["Notes", "-----"]
+                listing = False
+        made.append(line)
+    return made
+
+
+def _indent(line: str) -> int:
+    return len(line) - len(line.lstrip())
+
+
 def as_markup(lines: list[str]) -> list[str]:
     """A docstring as reStructuredText: examples and indented displays are kept as they are."""
+    lines = with_notes(lines)
     made: list[str] = []
     example = False
     display: int | None = None  # the indentation below which a display ends
     for number, line in enumerate(lines):
-        indent = len(line) - len(line.lstrip())
+        indent = _indent(line)
         blank = not line.strip()
         if display is not None and not blank and indent <= display:
             display = None
@@ -48,9 +71,9 @@ def _opens_display(lines: list[str], number: int) -> bool:
     line, rest = lines[number], lines[number + 1 :]
     if not line.strip() or len(rest) < 2 or rest[0].strip():
         return False
-    indent = len(line) - len(line.lstrip())
+    indent = _indent(line)
     after = next((text for text in rest if text.strip()), "")
-    return len(after) - len(after.lstrip()) >= indent + 4 and not after.lstrip().startswith(">>>")
+    return _indent(after) >= indent + 4 and not after.lstrip().startswith(">>>")
 
 
 def setup(app: Any) -> None:

@@ -9,7 +9,7 @@ import pycraft as pc
 from pycraft import _core
 from pycraft.proofs.axioms import AXIOMS, DEFINITIONS
 
-WIDTH = 96
+WIDTH = 84
 COORDINATE = "hinge1[0]"
 
 
@@ -88,7 +88,7 @@ def page(symbol: Any) -> str:
         parts += ["An abbreviation:", formula(made.definition, name)]
     assumed = [line for line in [*AXIOMS, *DEFINITIONS] if symbol.text in tokens(line)]
     if assumed:
-        parts += ["What [proofs](../proofs.md) take as its definition:", "```text\n" + "\n".join(assumed) + "\n```"]
+        parts += ["What [proofs](../proofs.md) assume of it:", "```text\n" + "\n".join(assumed) + "\n```"]
     moved = made.diff(COORDINATE)
     parts += ["## Derivative", f"Along a coordinate i of another hinge, here {COORDINATE} ([sensitivities](../sensitivities.md)):"]
     parts += [formula(moved, rf"\partial_i {name}")]

@@ -15,13 +15,13 @@ def source(said: str) -> str:
         return "Source: A. Jain, *Robot and Multibody Dynamics*, Springer 2011"
     if said == "general J":
         return "The form with rotor inertia J of a theorem in A. Jain, *Robot and Multibody Dynamics*, Springer 2011"
-    return "Derived for PyCraft" if said.startswith("soa.md") else f"Derived for PyCraft: {said}"
+    return "Derived for PyCraft" if said.startswith("soa.md") else f"Derived for PyCraft: {plain(said)}"
 
 
 def entry(number: int, theorem: Any) -> str:
     """One theorem: its formula, where it holds, and why."""
     where = [*theorem.hypotheses, *(["between bodies on one path from the root"] if theorem.on_one_path else [])]
-    said = [f"holds where {', '.join(where)}" if where else "no hypothesis"]
+    said = [f"Holds where {', '.join(where)}" if where else "No hypothesis"]
     said += [USES[theorem.use]] if USES.get(theorem.use) else []
     parts = [f"(theorem-{number})=\n### {plain(theorem.name)}", f"$$\n{theorem.latex}\n$$", f"{'; '.join(said)}. {source(theorem.source)}."]
     proof = pc.prove(theorem.lhs, theorem.rhs)

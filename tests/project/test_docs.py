@@ -46,6 +46,12 @@ def test_the_readme_example_runs():
 # Pages of examples that print, run as doctests, and how many there are at least.
 EXAMPLES = {
     "index": 4,
+    "start": 20,
+    "tour_researcher": 12,
+    "tour_teacher": 15,
+    "tour_engineer": 14,
+    "troubleshooting": 25,
+    "conventions": 20,
     "sensitivities": 20,
     "comparing": 5,
     "mixed_trees": 8,
@@ -83,6 +89,25 @@ def test_no_page_with_examples_is_left_out():
     assert pages == {*EXAMPLES, *BLOCKS, *ELSEWHERE, "scaling"}  # whose blocks need a cluster
     for page, test in ELSEWHERE.items():
         assert re.search(rf'"{page}(\.md)?"', (ROOT / "tests" / test).read_text()), page
+
+
+def test_the_figures_of_the_readme_are_those_of_the_page_of_speed():
+    """They are made by a command there, and nowhere typed by hand."""
+    goals = re.search(r"## Goals\n(.*?)\n## ", (ROOT / "docs" / "performance.md").read_text(), re.S).group(1)
+    made = {cells[0]: cells[1:4] for line in goals.splitlines() if len(cells := [c.strip() for c in line.strip("|").split("|")]) == 7}
+    shown = re.search(r"\| call \| goal \|.*?\n\|[-:|]+\|\n(.*?)\n\n", (ROOT / "README.md").read_text(), re.S).group(1)
+    rows = [[c.strip() for c in line.strip("|").split("|")] for line in shown.splitlines()]
+    assert len(rows) > 5
+    for call, goal, ratios, met in rows:
+        assert [goal, met, ratios] == made[call], call
+
+
+@pytest.mark.slow
+def test_the_picture_of_the_readme_is_drawn(tmp_path):
+    from making import landing
+
+    landing.draw(tmp_path / "landing.png")
+    assert (tmp_path / "landing.png").stat().st_size > 20_000 < landing.PICTURE.stat().st_size < 200_000
 
 
 @pytest.mark.parametrize(("page", "examples"), EXAMPLES.items())

@@ -6,7 +6,7 @@ import re
 import pytest
 
 import pycraft as pc
-from making import api, contents, docstrings, generated, operators, theorems
+from making import api, contents, docstrings, gallery, generated, operators, theorems
 from pycraft import _core
 
 
@@ -28,7 +28,9 @@ def test_links_between_them_lead_somewhere(pages):
     for page, text in pages.items():
         for target in re.findall(r"(?<!\\)\]\(([^)\s]+)\)", text):
             file, _, anchor = target.partition("#")
-            if file:
+            if file.endswith(".png"):
+                assert page == "docs/gallery", (page, target)
+            elif file:
                 place = ((contents.ROOT / page).parent / file).resolve()
                 assert place.is_file() or place.relative_to(contents.ROOT).with_suffix("").as_posix() in pages, (page, target)
             else:
@@ -50,7 +52,7 @@ def test_every_letter_has_its_page(symbol, pages):
 
 def test_what_proofs_take_as_definitions_is_said(pages):
     assert "D = H P H* + J" in pages["docs/operators/D"] and "φ⁻¹ = I − E_φ" in pages["docs/operators/phi"]
-    assert "M = R" not in re.findall(r"definition:\n\n```text\n(.*?)```", pages["docs/operators/H"], re.S)[0]
+    assert "M = R" not in re.findall(r"assume of it:\n\n```text\n(.*?)```", pages["docs/operators/H"], re.S)[0]
     assert operators.tokens("M = P − E_ψ P E_φ*") >= {"M", "P", "E_ψ", "E_φ"} and "φ" not in operators.tokens("E_φ*")
 
 
@@ -100,3 +102,55 @@ def test_examples_and_displays_in_docstrings_are_kept():
     assert docstrings.as_markup(["Text", ">>> a * b", "c*", "", "d*"]) == ["Text", "", ">>> a * b", "c*", "", r"d\*"]
     assert docstrings.as_markup(["As::", "", "    a * b", "", "c*"]) == ["As::", "", "    a * b", "", r"c\*"]
     assert docstrings.as_markup(["Equation", "", "    a* = b", "", "c*"]) == ["Equation", "", "::", "", "    a* = b", "", r"c\*"]
+
+
+def test_paragraphs_after_a_list_of_parameters_are_notes():
+    written = [
+        "One",
+        "",
+        "Parameters",
+        "----------",
+        "a : int",
+        "    What.",
+        "",
+        "b : float",
+        "",
+        "Prose goes on.",
+        "More.",
+        "",
+        "Raises",
+        "------",
+    ]
+    assert docstrings.with_notes(written) == [*written[:9], "Notes", "-----", *written[9:]]
+    raised = ["Raises", "------", "Error", "    Why.", "", "OtherError", "    Why.", "", "Source: a book."]
+    assert docstrings.with_notes(raised) == [*raised[:8], "Notes", "-----", raised[8]]
+
+
+def test_the_gallery_has_twenty_short_examples(pages):
+    assert len(gallery.SCRIPTS) == 20
+    for script in gallery.SCRIPTS:
+        written = script.read_text()
+        assert len(written.splitlines()) < 30 and max(map(len, written.splitlines())) <= 140, script.name
+        assert gallery.said(script).endswith(".") and "import pycraft as pc" in written, script.name
+        assert f"(gallery/{script.stem}.png)" in pages["docs/gallery"] and gallery.said(script) in pages["docs/gallery"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("script", gallery.SCRIPTS, ids=lambda s: s.stem)
+def test_every_example_of_the_gallery_draws(script, tmp_path):
+    gallery.draw(script, tmp_path / "picture.png")
+    picture = (tmp_path / "picture.png").read_bytes()
+    assert picture.startswith(b"\x89PNG") and len(picture) > 5000
+
+
+def test_an_example_that_draws_nothing_is_an_error(tmp_path):
+    (tmp_path / "nothing.py").write_text('"""Nothing."""\n')
+    with pytest.raises(ValueError, match="nothing.py leaves no figure"):
+        gallery.draw(tmp_path / "nothing.py", tmp_path / "nothing.png")
+
+
+def test_citation_and_package_say_the_same():
+    cff, project = (contents.ROOT / "CITATION.cff").read_text(), (contents.ROOT / "pyproject.toml").read_text()
+    version = re.search(r'^version = "(.*)"$', project, re.M)[1]
+    assert f"\nversion: {version}\n" in cff and f"version = {{{version}}}" in (contents.ROOT / "docs" / "cite.md").read_text()
+    assert pc.__version__ == version
