@@ -47,6 +47,7 @@ def test_every_letter_has_its_page(symbol, pages):
         assert f"\n## {section}\n" in text
     assert str(made.algorithm()).strip() in text and str(made.explain()).strip() in text
     assert made.blocks()._repr_html_() in text
+    assert operators.formula(made.diff("hinge1[0]"), rf"\partial_i {made.latex()}") in text
     assert symbol.is_vector or "\n## Theorems\n" in text or symbol.name in {"B", "V_bar", "Lambda", "Jacobian", "V_tilde", "H_dot"}
 
 
@@ -54,6 +55,13 @@ def test_what_proofs_take_as_definitions_is_said(pages):
     assert "D = H P H* + J" in pages["docs/operators/D"] and "φ⁻¹ = I − E_φ" in pages["docs/operators/phi"]
     assert "M = R" not in re.findall(r"assume of it:\n\n```text\n(.*?)```", pages["docs/operators/H"], re.S)[0]
     assert operators.tokens("M = P − E_ψ P E_φ*") >= {"M", "P", "E_ψ", "E_φ"} and "φ" not in operators.tokens("E_φ*")
+
+
+def test_a_letter_lists_the_theorems_with_it_on_either_side(pages):
+    number = {theorem.name: n for n, theorem in enumerate(operators.example().soa.theorems())}
+    for name in ("φG = G+φK", "gain shifted to the parent", "φKHψ = φ-ψ"):  # K on the right, on the right alone, on the left
+        assert f"(#theorem-{number[name]})" in pages["docs/operators/K"]
+    assert f"(#theorem-{number['Eφ = φ-I']})" not in pages["docs/operators/K"]
 
 
 def test_every_theorem_is_there_with_its_hypotheses_and_its_proof(pages):
