@@ -1,6 +1,5 @@
 """Makes the site: `python -m making build/docs`; its first page is build/docs/html/index.html."""
 
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -42,7 +41,6 @@ def main(folder: Path) -> int:
         return built.returncode
     written(site / "index.html", FORWARD)
     written(site / "llms.txt", plain_index(made))
-    shutil.rmtree(site / ".doctrees", ignore_errors=True)
     asked = offline.not_offline(site)
     for line in asked:
         print(f"would ask the network: {line}", file=sys.stderr)
