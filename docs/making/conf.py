@@ -6,6 +6,7 @@ import mathjax  # django-static-mathjax: MathJax as files, so that pages ask nob
 
 project = "PyCraft"
 author = "the PyCraft authors"
+copyright = author
 html_title = "PyCraft"
 root_doc = "docs/index"
 
