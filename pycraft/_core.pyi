@@ -354,6 +354,11 @@ class Operator:
         The plan written out as the textbook recursion: language "text", "latex", or "python" (NumPy alone) and "cpp" (Eigen alone),
         source that runs by itself. See pycraft.recursions.
         """
+    def animate(self, x: typing.Any = None, *, on: str = 'tree', request: str = 'apply') -> typing.Any:
+        """
+        The sweeps of the plan as a film: the tree (on="robot": the model as it stands), the recursion's line lit, blocks appearing as they are
+        computed for x (ones where it is left out). Shown in a notebook; save("film.html") writes a page. See pycraft.view.SweepFilm.
+        """
     def at(self, q: typing.Any = None, v: typing.Any = None, *, form: str = 'fast', refine: typing.Any = 0, residual: str = 'same', precision: str | int = 'double', threads: typing.Any = 1) -> Operator:
         """
         The same expression bound to a state: q (nq,) or a batch (B, nq), v likewise (zero if left out); q=None takes the model's present state.
@@ -425,6 +430,10 @@ class Operator:
     def plan(self, request: str = 'apply', rules: bool = True) -> Plan:
         """
         The plan: what is run, step by step, with its cost.
+        """
+    def play(self, x: typing.Any = None) -> typing.Any:
+        """
+        `animate` on the model as it stands, articulated inertias as ellipses.
         """
     def python(self) -> str:
         """
@@ -595,6 +604,10 @@ class Scalar:
     def algorithm(self, language: str = 'text') -> typing.Any:
         """
         The recursion that computes it: "text", "latex", "python" or "cpp". See pycraft.recursions.
+        """
+    def animate(self, *, on: str = 'tree') -> typing.Any:
+        """
+        As of operators: the sweeps of the plan as a film.
         """
     def at(self, *args, **kwargs) -> typing.Any:
         ...

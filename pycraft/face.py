@@ -22,6 +22,13 @@ def algorithm(expression: _core.Operator | _core.Scalar, language: str = "text",
     return written(expression, language, request)
 
 
+def animate(expression: _core.Operator | _core.Scalar, x: Any, on: str, request: str) -> Any:
+    """`Operator.animate`, `Operator.play` and `Scalar.animate`."""
+    from .view import SweepFilm
+
+    return SweepFilm(expression, x, on, request)
+
+
 def certify_expression(*arguments: Any, **options: Any) -> Any:
     """`Operator.certify` and `Scalar.certify`."""
     from .accuracy.certificates.certify import certify_expression as certify
@@ -75,6 +82,7 @@ def attach() -> None:
     """Puts the functions where the core and the lower rooms find them."""
     _core._face.update(
         algorithm=algorithm,
+        animate=animate,
         block_view=block_view,
         certify_dynamics=certify_dynamics,
         certify_expression=certify_expression,

@@ -276,6 +276,10 @@ void define_planning(py::class_<Expression>& op) {
       }, py::arg("language") = "text", py::arg("request") = "apply",
            "The plan written out as the textbook recursion: language \"text\", \"latex\", or \"python\" (NumPy alone) and \"cpp\" (Eigen alone),\n"
            "source that runs by itself. See pycraft.recursions.")
+      .def("animate", [](const Expression& e, const py::object& x, const std::string& on, const std::string& request) { return of_face("animate")(e, x, on, request); },
+           py::arg("x") = py::none(), py::kw_only(), py::arg("on") = "tree", py::arg("request") = "apply",
+           "The sweeps of the plan for x (ones where it is left out) as a film on the tree, or on=\"robot\", with a page by save. See pycraft.view.SweepFilm.")
+      .def("play", [](const Expression& e, const py::object& x) { return of_face("animate")(e, x, "robot", "apply"); }, py::arg("x") = py::none(), "`animate` on the model as it stands.")
       .def("compile", [](const Expression& e, const std::string& request) { return of_face("compile_expression")(e, request); },
            py::arg("request") = "apply",
            "The plan written out as straight-line C++, built and loaded: a callable of q, of v where velocities matter, of x for \"apply\" and not\n"

@@ -110,6 +110,8 @@ void register_scalars(py::module_& m) {
       .def("__ge__", [](const Scalar& a, double b) { return single(a) >= b; })
       .def("__eq__", [](const Scalar& a, const Scalar& b) { return a == b; })
       .def("__hash__", [](const Scalar& a) { return std::hash<std::string>()(show(a)); })
+      .def("animate", [](const Scalar& a, const std::string& on) { return of_face("animate")(a, py::none(), on, "apply"); }, py::kw_only(), py::arg("on") = "tree",
+           "As of operators: the sweeps of the plan as a film.")
       .def("algorithm", [](const Scalar& a, const std::string& language) {
         return of_face("algorithm")(a, language);
       }, py::arg("language") = "text", "The recursion that computes it: \"text\", \"latex\", \"python\" or \"cpp\". See pycraft.recursions.")

@@ -24,8 +24,9 @@ from .passes import Equation, Once, Operator, Program, Term, fused, pruned, read
 from .python_source import PythonSource
 from .recursion import Latex, Line, Text
 from .steps import Recursion
+from .steps_taken import Step, taken_steps
 
-__all__ = ["LANGUAGES", "Algorithm", "algorithm"]
+__all__ = ["LANGUAGES", "Algorithm", "Step", "algorithm"]
 
 LANGUAGES = ("text", "latex", "python", "cpp")
 _RESULTS = {"apply": "vector", "dense": "matrix", "diagonal": "vector", "blockdiag": "blocks"}
@@ -185,6 +186,46 @@ class Algorithm:
         _check_name(name)
         source = CppSource(self._book, self._arguments(), self._needed)
         return source.file(self._program, self.title, self._shape(), self.data() if with_data else None, name)
+
+    # ------------------------------------------------------------------ steps
+    def lines(self) -> list[tuple[int, str]]:
+        """The recursion line by line, with how deep each stands: what `text` shows without its head."""
+        return self._lines(Text())
+
+    def steps(self, x: Any = None, q: Any = None, v: Any = None, *, state: int = 0) -> list[Step]:
+        """What the recursion computes on its way, equation by equation and body by body, in the order of its passes.
+
+        Parameters
+        ----------
+        x : (n,) or (n, m), what the operator is applied to; ones where it is left out
+        q, v, state : as of `data`
+
+        Returns
+        -------
+        list of Step
+            Of eliminations and of recursions inside the recursion one each, of no body: what is inside is not told apart.
+
+        Raises
+        ------
+        EvaluationError
+            A vector that the expression does not take; an operator from outside, of which no equations are known.
+
+        Cost: that of the Python source, once.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> H, phi, M = pc.chain(2).soa("H phi M")
+        >>> written = (H @ phi @ M @ phi.T @ H.T).algorithm()
+        >>> for step in written.steps()[:3]:
+        ...     print(step.body, written.lines()[step.line][1])
+        0 α(k) = E*(p,k) α(p) + H*(k) x(k)
+        1 α(k) = E*(p,k) α(p) + H*(k) x(k)
+        1 f(k) = M(k) α(k) + Σ_c E(k,c) f(c)
+        """
+        source = PythonSource(self._book, self._arguments(), self._needed)
+        written = source.module(self._program, self.title, "everything", None, "algorithm")
+        return taken_steps(self._program, self._arguments(), written, self.data(q, v, state=state), x)
 
     def _arguments(self) -> list[Quantity]:
         return [*self._program.inputs, *self._vectors]

@@ -157,7 +157,7 @@ class PythonSource(Passes):
 
     # ------------------------------------------------------------------ the module
     def module(self, program: Program, title: str, shape: str, data: dict[str, Any] | None, name: str) -> str:
-        """The source; `shape` says what is returned: "vector", "matrix", "blocks", "scalar"."""
+        """The source; `shape` says what is returned: "vector", "matrix", "blocks", "scalar", or "everything" by its name."""
         given = self.parameters(program)
         body = self.prologue()
         for q in self.inputs:
@@ -182,6 +182,8 @@ class PythonSource(Passes):
 
     def returned(self, program: Program, shape: str) -> list[str]:
         """What the function returns: where one vector was given, one vector."""
+        if shape == "everything":
+            return ["return locals()"]
         if shape == "blocks":
             return [f"return {program.result.name}"]
         result = self.result(program)

@@ -252,7 +252,8 @@ class Passes(Source):
         for leaf in self.leaves:
             where = f" ({self.book.models[leaf.context].words})" if leaf.context > 0 else ""
             lines.append(f"    {leaf.quantity.name}: {meaning(leaf.quantity, where)}")
-        returned = {"vector": "a vector", "matrix": "a matrix", "blocks": "one block per body", "scalar": "a number"}[shape]
+        shapes = {"vector": "a vector", "matrix": "a matrix", "blocks": "one block per body", "scalar": "a number"}
+        returned = shapes.get(shape, "everything that is computed, by its name")
         if program.inputs and not program.identity_columns:
             lines.append(f"{program.inputs[0].name}: a vector, or the columns of a matrix.")
         lines += [f"{q.name}: the vector {WORDS.letter(q)}." for q in self.inputs if q not in program.inputs]

@@ -247,7 +247,7 @@ RESTS_ON = {
     "scenes": ["view"],
     "ensembles": ["scenes"],
     "compiled": ["recursions"],
-    "view": ["accuracy"],
+    "view": ["accuracy", "recursions"],
     "face": ["accuracy", "compiled", "identities", "kinematics", "view"],
     "": ["face", "kalman", "closed_forms", "ensembles", "sympy_bridge"],  # pycraft itself
     "cli": [""],

@@ -1,0 +1,82 @@
+"""What a recursion computes on its way: its Python source is run once and every block kept, in the order in which passes make them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from .formulas import Quantity
+from .naming import total
+from .passes import Item, Program, Sweep, writes
+from .recursion import Text
+
+
+@dataclass(frozen=True)
+class Step:
+    """One equation at one body, or what is computed as a whole.
+
+    Attributes
+    ----------
+    line : of `Algorithm.lines()`; of a whole the first one of several
+    lines : how many lines say it
+    number, direction : of the pass, -1 tip to base, 1 base to tip, 0 in any order
+    tree, body : the body's number in that tree of the plan's; -1 of a whole
+    letter, name : of the quantity, as text shows it and as source calls it
+    value : (rows, columns) of the block; nothing, (0, 0), of a whole
+    """
+
+    line: int
+    lines: int
+    number: int
+    direction: int
+    tree: int
+    body: int
+    letter: str
+    name: str
+    value: np.ndarray
+
+
+def taken_steps(program: Program, arguments: list[Quantity], source: str, data: dict[str, Any], x: Any) -> list[Step]:
+    """`Algorithm.steps`; source: of a function `algorithm(data, ...)` that returns everything by its name."""
+    names: dict[str, Any] = {}
+    exec(compile(source, "<recursion>", "exec"), names)
+    given = [] if program.identity_columns else [_given(quantity, x, quantity in program.inputs) for quantity in arguments]
+    kept = names["algorithm"](data, *given)
+    steps: list[Step] = []
+    line = 0
+    for number, item in enumerate(program.items):
+        count = len(Text().item(item))
+        steps += _of_sweep(item, number, line, kept) if isinstance(item, Sweep) else [_whole(item, number, line, count)]
+        line += count
+    return steps
+
+
+def _of_sweep(sweep: Sweep, number: int, line: int, kept: dict[str, Any]) -> list[Step]:
+    blocks = [kept[equation.target.name] for equation in sweep.equations]
+    bodies = range(len(blocks[0]) if blocks else 0)
+    words = [Text().letter(equation.target) for equation in sweep.equations]
+    return [
+        Step(line + 1 + i, 1, number, sweep.direction, sweep.tree, k, words[i], equation.target.name, np.asarray(blocks[i][k]))
+        for k in (reversed(bodies) if sweep.direction < 0 else bodies)
+        for i, equation in enumerate(sweep.equations)
+    ]
+
+
+def _whole(item: Item, number: int, line: int, count: int) -> Step:
+    written = writes(item)
+    return Step(
+        line, count, number, 0, -1, -1, ", ".join(Text().letter(q) for q in written), ", ".join(q.name for q in written), np.zeros((0, 0))
+    )
+
+
+def _given(quantity: Quantity, x: Any, is_input: bool) -> np.ndarray:
+    n = total(quantity.rows)
+    if x is None or not is_input:
+        return np.ones(n)
+    given = np.asarray(_core.real_array(x, "x"), float)
+    if given.ndim not in (1, 2) or given.shape[0] != n or not np.isfinite(given).all():
+        raise _core.EvaluationError(f"x takes {n} finite numbers, or columns of as many, not an array {given.shape}")
+    return given

@@ -1,0 +1,114 @@
+"""The sweeps of an expression's plan as a film: on the model or its tree, the recursion's line lit, blocks appearing as they are computed.
+
+A page by itself, or a notebook's cell: pictures in SVG with some sixty lines of script, nothing from elsewhere. Where scripts do not run
+(saved notebooks that are not trusted, static pages) the last step stands, with everything computed.
+"""
+
+from __future__ import annotations
+
+import json
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from ..recursions import Step, algorithm
+from .plane_layout import PlaneLayout, model_layout, tree_layout
+from .sweep_picture import HEIGHT, RADIUS, WIDTH, SweepPicture, told_value
+
+MOST = 250
+"""Bodies of a film: a column of the picture each."""
+
+
+class SweepFilm:
+    """`Operator.animate` and `Operator.play`: shows itself in a notebook; `save` writes a page that plays in any browser, offline.
+
+    Parameters
+    ----------
+    expression : Operator or Scalar, of a model; at the state that it is bound to (of a batch the first), else at the model's present one
+    x : (n,) or (n, m), what an operator is applied to; ones where it is left out
+    on : {"robot", "tree"}
+        The model as it stands, linear blocks of its first symmetric 6 × 6 quantity (articulated inertias) as ellipses; or a diagram
+        of the tree, which is shown for trees that are no model's, too.
+    request : as of `Operator.algorithm`
+
+    Attributes
+    ----------
+    steps : list of Step, in the order in which they are shown
+    title : str
+
+    Raises
+    ------
+    EvaluationError
+        An expression of no model, of more than 250 bodies, or that computes nothing body by body; an x that it does not take; another `on`.
+
+    Examples
+    --------
+    >>> import pycraft as pc
+    >>> H, phi, M = pc.chain(3).soa("H phi M")
+    >>> (H @ phi @ M @ phi.T @ H.T).inv().animate()
+    <film of y = (H φ M φ* H*)⁻¹ x: 33 steps over 3 bodies>
+    """
+
+    def __init__(self, expression: Any, x: Any = None, on: str = "robot", request: str = "apply"):
+        if on not in ("robot", "tree"):
+            raise _core.EvaluationError(f"on={on!r}: there are 'robot', the model as it stands, and 'tree'")
+        self._written = algorithm(expression, "text", request)
+        models = self._written._book.models
+        if not models:
+            raise _core.EvaluationError(f"{expression.text()} is of no model: there is no tree to sweep over")
+        self._parents, self._tree = list(models[0].source.parents), models[0].tree
+        self._names = list(models[0].source.body_names)
+        if len(self._names) > MOST:
+            raise _core.EvaluationError(
+                f"a film of {len(self._names)} bodies: {MOST} at most are drawn; one of a part, model.subgraph(...), shows the same sweeps"
+            )
+        self.title = self._written.title
+        self.steps: list[Step] = self._written.steps(x)
+        if not self.steps:
+            raise _core.EvaluationError(f"{expression.text()} takes no step: nothing is computed body by body")
+        self._layout = self._laid_out(expression, models[0].source, on)
+
+    def _laid_out(self, expression: Any, source: Any, on: str) -> PlaneLayout:
+        model = getattr(source, "model", None)
+        if on == "robot" and isinstance(model, _core.Multibody) and list(getattr(model, "bodies", ())) == self._names:
+            state = getattr(expression, "_state", None)
+            q = np.asarray(model.q if state is None else state[0], float)
+            return model_layout(model, q.reshape(-1, q.shape[-1])[0], WIDTH, HEIGHT, 4 * RADIUS, RADIUS)
+        return tree_layout(self._parents, WIDTH, HEIGHT, 4 * RADIUS)
+
+    def save(self, path: str | Path) -> Path:
+        """Write a page, ".html", 10 kB and some 300 bytes a block. EvaluationError for another ending, OSError if it cannot be written."""
+        target = Path(path)
+        if target.suffix != ".html":
+            raise _core.EvaluationError(f"output {str(path)!r}: a film of sweeps is written to '.html'")
+        head = "<!DOCTYPE html>\n<html lang='en'><meta charset='utf-8'><meta name='color-scheme' content='light dark'>"
+        page = f"{head}<title>{escape(self.title)}</title><body style='margin:16px'>{self._repr_html_()}</body></html>\n"
+        target.write_text(page, encoding="utf-8")
+        return target
+
+    def __repr__(self) -> str:
+        return f"<film of {self.title}: {len(self.steps)} steps over {len(self._names)} bodies>"
+
+    def _repr_html_(self) -> str:
+        code = {name: files(__package__).joinpath(f"sweep_film.{name}").read_text(encoding="utf-8") for name in ("html", "css", "js")}
+        picture = SweepPicture(self._layout, self._parents, self._names, self.steps, self._tree)
+        film = {"parents": self._parents, "steps": [self._told(step) for step in self.steps]}
+        lines = (f"<div class='line'>{escape('  ' * depth + text)}</div>" for depth, text in self._written.lines())
+        return Template(code["html"]).substitute(
+            style=code["css"], script=code["js"], title=escape(self.title), figure=picture.figure(), strip=picture.strip(),
+            lines="".join(lines), last=len(self.steps) - 1, data=json.dumps(film).replace("</", "<\\/"),
+        )  # fmt: skip
+
+    def _told(self, step: Step) -> list[Any]:
+        """A step as the script reads it: line, lines, pass, direction, body, words."""
+        text = self._written.lines()[step.line][1]
+        if step.body < 0:
+            return [step.line, step.lines, step.number, 0, -1, text]
+        here = step.tree == self._tree  # plans may pass over others, as of a model with another root
+        words = f"{self._names[step.body] if here else f'body {step.body} of another tree'}:  {text}\n{told_value(step)}"
+        return [step.line, step.lines, step.number, step.direction, step.body if here else -1, words]
