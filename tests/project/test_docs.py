@@ -72,7 +72,7 @@ EXAMPLES = {
     "divide_and_conquer": 1,
 }
 # Pages whose blocks are run one after the other.
-BLOCKS = ["symbolic", "kalman", "accuracy", "evaluation", "statements", "teaching", "proofs", "compiled"]
+BLOCKS = ["symbolic", "kalman", "accuracy", "evaluation", "statements", "teaching", "proofs", "compiled", "pictures"]
 # Pages that other tests run.
 ELSEWHERE = {
     "algorithm": "project/test_docs.py",
