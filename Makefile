@@ -5,6 +5,7 @@
 #   make test-browser           pages in headless Chromium (extra [browser]; needs chromium: apt install chromium, or CHROMIUM=/path/to/it)
 #   make check                  the everyday subset, under three minutes
 #   make lint                   what ruff and mypy have to say of Python; fails on the first
+#   make docs                   the site, from these pages and the code; build/docs/html, which needs no network (extra [docs])
 #   make lab | bench            JupyterLab in notebooks; the bounds measured
 #   make performance            speed beside Pinocchio and MuJoCo (extra [peers]); writes docs/performance.md
 #   make test-address | test-undefined | test-thread   the C++ tests under a sanitizer (GCC's or Clang's)
@@ -23,7 +24,7 @@ SOURCES := $(shell find cpp pycraft -name '*.h' -o -name '*.cpp' -o -name '*.py'
 # What is compiled: a change in any of these rebuilds. Python sources are used where they lie.
 COMPILED := $(shell find cpp -name '*.h' -o -name '*.cpp' -o -name '*.in' -o -name '*.py') CMakeLists.txt pyproject.toml
 
-.PHONY: FORCE tour test test-cpp test-python test-peers test-browser check lab bench performance stability campaigns lint clean wheel mutants \
+.PHONY: FORCE docs tour test test-cpp test-python test-peers test-browser check lab bench performance stability campaigns lint clean wheel mutants \
         test-address test-undefined test-thread test-clang
 
 tour: .venv/installed
@@ -39,7 +40,7 @@ test-python: .venv/tested
 	$(BIN)/python -m pytest $(PARALLEL) -m "not peers"
 
 check: .venv/tested
-	$(BIN)/ruff check pycraft tests cpp
+	$(BIN)/ruff check pycraft tests cpp docs/making docs/gallery
 	$(BIN)/cmake --build build --target test_allocation test_kernels -j $(JOBS)
 	build/test_allocation
 	build/test_kernels
@@ -80,6 +81,9 @@ wheel: .venv/installed
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/auditwheel repair --wheel-dir dist build/wheel/*.whl
 	$(BIN)/auditwheel show dist/*.whl
 
+docs: .venv/docs
+	PYTHONPATH=docs $(BIN)/python -m making build/docs
+
 lab: .venv/lab
 	$(BIN)/jupyter lab --notebook-dir=. --LabApp.default_url=/lab/tree/notebooks/00_tour.ipynb
 
@@ -99,8 +103,8 @@ campaigns: .venv/tested
 	$(BIN)/python tests/campaigns/refinement.py --seeds 5000 --jobs $(JOBS) --verbose
 
 lint: .venv/tested
-	$(BIN)/ruff check pycraft tests cpp
-	$(BIN)/ruff format --check pycraft tests cpp
+	$(BIN)/ruff check pycraft tests cpp docs/making docs/gallery
+	$(BIN)/ruff format --check pycraft tests cpp docs/making docs/gallery
 	$(BIN)/mypy
 
 # ---- environments. The build requirements are installed into the environment once, so that rebuilding is incremental.
@@ -129,6 +133,10 @@ FORCE:
 
 .venv/browser: .venv/tested
 	CMAKE_BUILD_PARALLEL_LEVEL=$(JOBS) $(BIN)/python -m pip install --quiet --no-build-isolation --editable ".[test,browser]" -C build-dir=build
+	touch $@
+
+.venv/docs: .venv/installed
+	CMAKE_BUILD_PARALLEL_LEVEL=$(JOBS) $(BIN)/python -m pip install --quiet --no-build-isolation --editable ".[docs]" -C build-dir=build
 	touch $@
 
 .venv/lab: .venv/installed

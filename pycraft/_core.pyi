@@ -1209,7 +1209,7 @@ class LoopSet:
         """
         One under the other ∂(Qv)/∂q, ∂(Q v̇ + Q̇v)/∂q and ∂(Q̇v)/∂v, a row each, and ∂(Q*λ)/∂q.
         """
-    def effect(self, names: collections.abc.Sequence[str], alpha: typing.SupportsFloat | typing.SupportsIndex, beta: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
+    def effect(self, names: collections.abc.Sequence[str], alpha: typing.SupportsFloat | typing.SupportsIndex, beta: typing.SupportsFloat | typing.SupportsIndex, embedded: bool) -> Effect:
         """
         What keeps these loops in a scene, all without names.
         """

@@ -301,12 +301,7 @@ void ConstrainedWorkspace<S>::accelerate(const std::shared_ptr<const ResolvedLoo
 
 template <class S>
 Vector6<S> ConstrainedWorkspace<S>::force(int loop, bool on_a) const {
-  const ResolvedLoop& of = loops_->loops[loop];
-  Vector6<S> f = Vector6<S>::zero();
-  if (of.loop->is_coupling()) return f;
-  for (int r = of.first_row; r < of.first_row + of.rows; ++r) f = f + lambda_[r] * rows_.gradients[r];
-  if (!on_a) return force_to_parent(renormalised<S>(of.loop->pair.end_b), f);
-  return force_to_parent(renormalised<S>(of.loop->pair.end_a), S(-1) * force_to_parent(rows_.ends[loop], f));
+  return rows_.force(*loops_, lambda_, loop, on_a);
 }
 
 void ConstrainedDynamics::run(const Asked& asked, const Results& out) {

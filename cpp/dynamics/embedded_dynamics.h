@@ -43,6 +43,7 @@ class EmbeddedWorkspace {
 
   void add_to_hinges(const S* inertia) { added_.assign(inertia, inertia + model_->nv); }
   void add_forces(int first, int end, S* out) const;   // += Q*λ of some rows
+  Vector6<S> force(int loop, bool on_a) const { return rows_.force(*loops_, lambda_, loop, on_a); }
   const std::vector<S>& result() const { return x_; }  // θ̈
   const std::vector<S>& multipliers() const { return lambda_; }
   // Coordinates of the tree that are independent now, none chosen: empty.

@@ -15,6 +15,7 @@
 #include <cmath>
 #include <vector>
 
+#include "model/unit_data.h"
 #include "numerics/small_ldl.h"
 #include "recursions/loop_rows.h"
 #include "rigid/rigid_blocks.h"
@@ -66,6 +67,15 @@ struct LoopRows {
   void add_transposed(const S* lambda, S* x) const {
     for (size_t r = 0; r < entries.size(); ++r)
       for (const Entry& e : entries[r]) x[e.coordinate] += e.value * lambda[r];
+  }
+  // What a loop puts on b, or on a, in its axes about its origin; nothing of a coupling.
+  Vector6<S> force(const ResolvedLoops& loops, const std::vector<S>& lambda, int loop, bool on_a) const {
+    const ResolvedLoop& of = loops.loops[loop];
+    Vector6<S> f = Vector6<S>::zero();
+    if (of.loop->is_coupling()) return f;
+    for (int r = of.first_row; r < of.first_row + of.rows; ++r) f = f + lambda[r] * gradients[r];
+    if (!on_a) return force_to_parent(renormalised<S>(of.loop->pair.end_b), f);
+    return force_to_parent(renormalised<S>(of.loop->pair.end_a), S(-1) * force_to_parent(ends[loop], f));
   }
 };
 

@@ -1,8 +1,7 @@
 """Forward dynamics on loops beside the dense equations with Pinocchio's mass matrix, bias forces, Jacobians and accelerations of frames.
 
-Its own constraintDynamics iterates where rows are redundant; test_peers_mechanisms.py calls it, too, and `pycraft bench` has it on a ladder.
-Tolerance: both are right to eps times the
-condition of Q ℳ⁻¹ Q*, below 1e6 here.
+Its own constraintDynamics iterates where rows are redundant; test_peers_mechanisms.py calls it, and `pycraft bench` has it on a ladder.
+Tolerance: both are right to eps times the condition of Q ℳ⁻¹ Q*, below 1e6 here.
 """
 
 import numpy as np

@@ -43,30 +43,75 @@ def test_the_readme_example_runs():
     assert names["MM"].shape == (7, 7)
 
 
-@pytest.mark.parametrize(
-    ("page", "examples"),
-    [
-        ("sensitivities", 20),
-        ("comparing", 5),
-        ("mixed_trees", 8),
-        ("ensembles", 8),
-        ("hybrid_dynamics", 12),
-        ("linearization", 30),
-        ("task_space", 14),
-        ("interbody_forces", 12),
-        ("statics", 18),
-        ("statistical_dynamics", 5),
-        ("identification", 20),
-        ("frames", 30),
-        ("inverse_kinematics", 25),
-        ("subgraphs", 20),
-        ("loops", 18),
-        ("locking", 14),
-        ("structure", 25),
-        ("divide_and_conquer", 1),
-        ("viewing", 12),
-    ],  # fmt: skip
-)
+# Pages of examples that print, run as doctests, and how many there are at least.
+EXAMPLES = {
+    "index": 4,
+    "start": 20,
+    "tour_researcher": 12,
+    "tour_teacher": 15,
+    "tour_engineer": 14,
+    "troubleshooting": 25,
+    "conventions": 20,
+    "sensitivities": 20,
+    "comparing": 5,
+    "mixed_trees": 8,
+    "ensembles": 8,
+    "hybrid_dynamics": 12,
+    "linearization": 30,
+    "task_space": 14,
+    "interbody_forces": 12,
+    "statics": 18,
+    "statistical_dynamics": 5,
+    "identification": 20,
+    "frames": 30,
+    "inverse_kinematics": 25,
+    "subgraphs": 20,
+    "loops": 18,
+    "locking": 14,
+    "structure": 25,
+    "divide_and_conquer": 1,
+    "viewing": 12,
+}
+# Pages whose blocks are run one after the other.
+BLOCKS = ["symbolic", "kalman", "accuracy", "evaluation", "statements", "teaching", "proofs", "compiled", "pictures"]
+# Pages that other tests run.
+ELSEWHERE = {
+    "algorithm": "project/test_docs.py",
+    "models": "models/test_urdf.py",
+    "mjcf": "models/test_mjcf_export.py",
+    "scenes": "project/test_docs.py",
+    "simulation": "project/test_docs.py",
+}
+
+
+def test_no_page_with_examples_is_left_out():
+    """Every block of Python in a page runs in some test."""
+    pages = {path.stem for path in (ROOT / "docs").glob("*.md") if "```python\n" in path.read_text()}
+    assert pages == {*EXAMPLES, *BLOCKS, *ELSEWHERE, "scaling"}  # whose blocks need a cluster
+    for page, test in ELSEWHERE.items():
+        assert re.search(rf'"{page}(\.md)?"', (ROOT / "tests" / test).read_text()), page
+
+
+def test_the_figures_of_the_readme_are_those_of_the_page_of_speed():
+    """They are made by a command there, and nowhere typed by hand."""
+    goals = re.search(r"## Goals\n(.*?)\n## ", (ROOT / "docs" / "performance.md").read_text(), re.S).group(1)
+    made = {cells[0]: cells[1:4] for line in goals.splitlines() if len(cells := [c.strip() for c in line.strip("|").split("|")]) == 7}
+    shown = re.search(r"\| call \| goal \|.*?\n\|[-:|]+\|\n(.*?)\n\n", (ROOT / "README.md").read_text(), re.S).group(1)
+    rows = [[c.strip() for c in line.strip("|").split("|")] for line in shown.splitlines()]
+    assert len(rows) > 5
+    for call, goal, ratios, met in rows:
+        assert [goal, met, ratios] == made[call], call
+
+
+@pytest.mark.slow
+def test_the_picture_of_the_readme_is_drawn(tmp_path):
+    from making import landing
+
+    landing.draw(tmp_path / "landing.png")
+    assert (tmp_path / "landing.png").stat().st_size > 20_000 < landing.PICTURE.stat().st_size < 200_000
+
+
+@pytest.mark.parametrize(("page", "examples"), EXAMPLES.items())
 def test_the_pages_run(page, examples):
     options = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
     result = doctest.testfile(str(ROOT / "docs" / f"{page}.md"), module_relative=False, optionflags=options)
@@ -131,7 +176,7 @@ def test_the_other_packages_of_the_page_of_comparisons(tmp_path, monkeypatch):
     assert len(compared) == 3 and all(eval(line, names) for line in compared)
 
 
-@pytest.mark.parametrize("page", ["symbolic", "kalman", "accuracy", "evaluation", "statements", "teaching", "proofs", "compiled"])
+@pytest.mark.parametrize("page", BLOCKS)
 def test_the_blocks_of_a_page_run(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names = {}

@@ -1,0 +1,54 @@
+"""Makes the site: `python -m making build/docs`; its first page is build/docs/html/index.html."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+from . import contents, generated, offline
+from .plain_index import plain_index
+
+FORWARD = '<!doctype html><meta charset="utf-8"><title>PyCraft</title><meta http-equiv="refresh" content="0; url=docs/index.html">\n'
+
+
+def written(path: Path, text: str) -> None:
+    """Written where it is another text: Sphinx reads again what is newer."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if not path.is_file() or path.read_text(encoding="utf-8") != text:
+        path.write_text(text, encoding="utf-8")
+
+
+def assembled(folder: Path) -> dict[str, str]:
+    """The sources of the site in one folder; returns the text of the pages that were generated."""
+    texts = {folder / path.relative_to(contents.ROOT): path.read_text(encoding="utf-8") for path in contents.committed()}
+    made = generated.pages()
+    texts |= {folder / f"{page}.md": text for page, text in made.items()}
+    for path, text in texts.items():
+        written(path, text)
+    for copy in folder.rglob("*"):
+        if copy.suffix in (".md", ".ipynb") and copy not in texts:
+            copy.unlink()  # a page that is no more
+    generated.pictures(folder)
+    return made
+
+
+def main(folder: Path) -> int:
+    made = assembled(folder / "source")
+    site, here = folder / "html", Path(__file__).parent
+    built = subprocess.run(
+        [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-c", here, "-d", folder / "doctrees", folder / "source", site]
+    )
+    if built.returncode:
+        return built.returncode
+    written(site / "index.html", FORWARD)
+    written(site / "llms.txt", plain_index(made))
+    asked = offline.not_offline(site)
+    for line in asked:
+        print(f"would ask the network: {line}", file=sys.stderr)
+    print(f"{len(list(site.rglob('*.html')))} pages: {site / 'index.html'}")
+    return 1 if asked else 0
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        sys.exit("python -m making FOLDER: the site is made in FOLDER/html")
+    sys.exit(main(Path(sys.argv[1]).resolve()))

@@ -1,0 +1,61 @@
+"""The reference of all public names, with their types, from the names themselves."""
+
+import inspect
+from types import ModuleType
+from typing import Any
+
+import pycraft as pc
+
+
+def public() -> dict[str, Any]:
+    """What `import pycraft as pc` promises, by name."""
+    return {name: getattr(pc, name) for name in pc.__all__}
+
+
+def first_sentence(thing: Any) -> str:
+    """Of its docstring, as a cell of a table; a signature that stands first is passed over."""
+    lines = [line.strip() for line in (inspect.getdoc(thing) or "").splitlines() if line.strip()]
+    lines = lines[1:] if lines and "->" in lines[0] and "(" in lines[0] else lines
+    sentence = " ".join(lines).split(". ")[0].rstrip(".") if lines else ""
+    return (sentence[:160] + " …" if len(sentence) > 160 else sentence).replace("|", r"\|").replace("``", "`").replace("*", r"\*")
+
+
+def of_class(name: str, kind: type) -> str:
+    page = f"# {name}\n\n```{{eval-rst}}\n.. autoclass:: pycraft.{name}\n   :members:\n"
+    return page + ("   :inherited-members: pybind11_object, object, Exception, Warning, tuple, dict, str\n```\n")
+
+
+def of_module(name: str, module: ModuleType) -> str:
+    own = [n for n in vars(module) if not n.startswith("_") and getattr(vars(module)[n], "__module__", "").startswith(module.__name__)]
+    made = getattr(module, "__all__", own)
+    parts = [f"# {name}", first_sentence(module) + "."]
+    for member in made:
+        thing = getattr(module, member)
+        if inspect.isclass(thing):
+            parts += [f"```{{eval-rst}}\n.. autoclass:: {module.__name__}.{member}\n```"]
+        elif inspect.isroutine(thing):
+            parts += [f"```{{eval-rst}}\n.. autofunction:: {module.__name__}.{member}\n```"]
+    return "\n\n".join(parts) + "\n"
+
+
+def pages() -> dict[str, str]:
+    """A page for every class and module, one for all functions, one for all errors; the list of them first."""
+    names = public()
+    errors = {n: t for n, t in names.items() if inspect.isclass(t) and issubclass(t, Exception)}
+    classes = {n: t for n, t in names.items() if inspect.isclass(t) and n not in errors}
+    modules = {n: t for n, t in names.items() if isinstance(t, ModuleType)}
+    functions = {n: t for n, t in names.items() if n not in errors and n not in classes and n not in modules}
+    made = {f"docs/api/{n}": of_class(n, t) for n, t in classes.items()} | {
+        f"docs/api/{n}_module": of_module(n, t) for n, t in modules.items()
+    }
+    listed = "\n\n".join(f"```{{eval-rst}}\n.. autofunction:: pycraft.{n}\n```" for n in functions)
+    made["docs/api/functions"] = f"# Functions\n\nWhat `pycraft` has beside its classes.\n\n{listed}\n"
+    listed = "\n\n".join(f"```{{eval-rst}}\n.. autoexception:: pycraft.{n}\n   :show-inheritance:\n```" for n in errors)
+    made["docs/api/errors"] = f"# Errors and warnings\n\nWhat `pycraft` raises.\n\n{listed}\n"
+    place = (
+        {n: n for n in classes} | {n: f"{n}_module" for n in modules} | {n: "functions" for n in functions} | {n: "errors" for n in errors}
+    )
+    rows = [f"| [`{n}`]({place[n]}.md) | {first_sentence(names[n])} |" for n in names]
+    table = "\n".join(["| name | what it is |", "|---|---|", *rows])
+    tree = "```{toctree}\n:hidden:\n\n" + "\n".join(page.removeprefix("docs/api/") for page in made) + "\n```"
+    return {"docs/api/index": f"# Every public name\n\nWhat `import pycraft as pc` has, with types.\n\n{table}\n\n{tree}\n", **made}

@@ -1,0 +1,49 @@
+"""The catalogue of theorems as a page, each with its hypotheses, its source and its proof from the definitions."""
+
+from typing import Any
+
+import pycraft as pc
+
+from .operators import example, plain
+
+USES = {"check": "", "rewrite": "a rule of simplification", "inverse": "the planner inverts by it"}
+
+
+def source(said: str) -> str:
+    """Where a theorem is from, as the catalogue says it in short."""
+    if said == "Jain 2011":
+        return "Source: A. Jain, *Robot and Multibody Dynamics*, Springer 2011"
+    if said == "general J":
+        return "The form with rotor inertia J of a theorem in A. Jain, *Robot and Multibody Dynamics*, Springer 2011"
+    return "Derived for PyCraft" if said.startswith("soa.md") else f"Derived for PyCraft: {plain(said)}"
+
+
+def entry(number: int, theorem: Any) -> str:
+    """One theorem: its formula, where it holds, and why."""
+    where = [*theorem.hypotheses, *(["between bodies on one path from the root"] if theorem.on_one_path else [])]
+    said = [f"Holds where {', '.join(where)}" if where else "No hypothesis"]
+    said += [USES[theorem.use]] if USES.get(theorem.use) else []
+    parts = [f"(theorem-{number})=\n### {plain(theorem.name)}", f"$$\n{theorem.latex}\n$$", f"{'; '.join(said)}. {source(theorem.source)}."]
+    proof = pc.prove(theorem.lhs, theorem.rhs)
+    if proof:
+        parts += [f"<details><summary>Proof</summary>\n\n```text\n{str(proof).strip()}\n```\n\n</details>"]
+    else:
+        parts += ["`pc.prove` finds no proof of this one from the definitions; `soa.check()` checks it with numbers."]
+    return "\n\n".join(parts)
+
+
+def pages() -> dict[str, str]:
+    """The page, group by group."""
+    theorems = list(enumerate(example().soa.theorems()))
+    text = [
+        "# The theorems",
+        "The catalogue as the planner and `arm.soa.check()` have it, each theorem with its hypotheses and, where `pc.prove` finds one, "
+        "with its proof from the definitions ([proofs](proofs.md)).",
+    ]
+    for group in dict.fromkeys(theorem.group for _, theorem in theorems):
+        text += [f"## {plain(group)}"]
+        for number, theorem in theorems:
+            if theorem.group == group:
+                waiting = f"- {plain(theorem.name)}: waits for {theorem.waiting}"
+                text += [waiting if theorem.waiting else entry(number, theorem)]
+    return {"docs/theorems": "\n\n".join(text) + "\n"}
