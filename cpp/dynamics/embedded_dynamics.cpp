@@ -219,6 +219,24 @@ void EmbeddedWorkspace<S>::find_forces(const Asked& asked, const S* x, const App
   for (size_t j = 0; j < added_.size(); ++j) generalized_[j] += added_[j] * x[j];
 }
 
+// How large X* x may be, in units of energy, before anything cancels in it: by entries of X, and by what they round at, w_a/w_i.
+template <class S>
+S EmbeddedWorkspace<S>::energy_size(const S* x) const {
+  using std::abs, std::sqrt;
+  S square = S(0);
+  for (size_t n = 0; n < nodes_.size(); ++n) {
+    const EmbeddedFactors<S>& f = embedded_.factors[n];
+    const std::vector<int>& coordinates = nodes_[n].coordinates;
+    for (int a = 0; a < f.r; ++a) {
+      const S& own = weights_[coordinates[choices_[n].independent[a]]];
+      S sum = S(0);
+      for (int i = 0; i < f.n; ++i) sum += (abs(f.X[size_t(i) * f.r + a]) + own / weights_[coordinates[i]]) * abs(x[coordinates[i]]);
+      square += sum * sum / embedded_.diagonal(f, a);
+    }
+  }
+  return sqrt(square);
+}
+
 template <class S>
 void EmbeddedWorkspace<S>::accelerate(const std::shared_ptr<const ResolvedLoops>& loops, const Asked& asked) {
   using std::abs, std::sqrt;
@@ -247,7 +265,7 @@ void EmbeddedWorkspace<S>::accelerate(const std::shared_ptr<const ResolvedLoops>
     find_forces(asked, x_.data(), applied);
     for (int i = 0; i < nv; ++i) load_[i] = asked.tau[i] - generalized_[i];
     const S energy = embedded_.solve(blocks_, load_.data(), delta_.data());
-    if (step == 0) size = sqrt(energy) + sqrt(embedded_.size(asked.tau)) + sqrt(embedded_.size(generalized_.data()));
+    if (step == 0) size = sqrt(energy) + energy_size(asked.tau) + energy_size(generalized_.data());
     if (step > 0 && (!(energy > S(0)) || (last > S(0) && S(4) * energy > last))) break;
     for (int i = 0; i < nv; ++i) x_[i] += delta_[i];
     last = energy;

@@ -63,6 +63,7 @@ class EmbeddedWorkspace {
   void put_dependent(S* rows_target, S* x);  // x_d = -Q_d⁻¹ target
   void velocities(S* v, const S* rates);
   void find_forces(const Asked& asked, const S* x, const Applied<S>& applied);
+  S energy_size(const S* x) const;
   void certify(const Asked& asked, const S& size);
   void find_multipliers(const Asked& asked);
   S off(const S* q);                         // to residual_, and the largest, in units of the rows

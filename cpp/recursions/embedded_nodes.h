@@ -14,7 +14,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <vector>
 
 #include "model/loops.h"
@@ -156,20 +155,11 @@ class EmbeddedTree {
     return energy;
   }
 
-  // Of what solve takes: how large that is, in the same unit, before anything cancels in X* x.
-  S size(const S* x) const {
-    using std::abs;
-    S square = S(0);
-    for (size_t n = 0; n < nodes_->size(); ++n) {
-      const EmbeddedFactors<S>& f = factors[n];
-      for (int a = 0; a < f.r; ++a) {
-        S sum = S(0), felt = S(0);
-        for (int i = 0; i < f.n; ++i) sum += abs(f.X[size_t(i) * f.r + a] * x[(*nodes_)[n].coordinates[i]]);
-        for (int b = 0; b <= a; ++b) felt += f.pivots[b] * (b == a ? S(1) : f.D[size_t(a) * f.r + b] * f.D[size_t(a) * f.r + b]);
-        square += sum * sum / felt;
-      }
-    }
-    return square;
+  // D(a,a) of a node, from its factors.
+  S diagonal(const EmbeddedFactors<S>& f, int a) const {
+    S felt = S(0);
+    for (int b = 0; b <= a; ++b) felt += f.pivots[b] * (b == a ? S(1) : f.D[size_t(a) * f.r + b] * f.D[size_t(a) * f.r + b]);
+    return felt;
   }
 
   std::vector<EmbeddedFactors<S>> factors;   // of nodes

@@ -36,9 +36,13 @@ FREE = {
 }
 
 
+by_each_method = pytest.mark.parametrize("method", ["augment", "embed"])
+
+
+@by_each_method
 @pytest.mark.parametrize("name", MECHANISMS)
-def test_mechanisms_start_on_their_loops_and_stay_there(name):
-    scene = getattr(M, name)()
+def test_mechanisms_start_on_their_loops_and_stay_there(name, method):
+    scene = getattr(M, name)(method=method)
     model = scene.model
     assert model.nv == MECHANISMS[name] and model.mobility(model.q).degrees_of_freedom == FREE[name]
     run = scene.simulate(0.01 if name == "andrews" else 0.3, rtol=1e-9, atol=1e-11, progress=False)
@@ -50,7 +54,8 @@ def test_mechanisms_start_on_their_loops_and_stay_there(name):
     assert np.abs(run.q - run.q[0]).max() > 1e-3  # it moves
 
 
-def test_two_four_bars_pass_the_line_on_their_branch():
+@by_each_method
+def test_two_four_bars_pass_the_line_on_their_branch(method):
     """IFToMM A02: cranks turn as one, (N + 1)/3 + N of inertia and (N + 1)/2 + N of weight."""
     reference = solve_ivp(
         lambda t, y: [y[1], -9.81 * 3.5 / 3 * np.cos(y[0])], (0, 10), [np.pi / 2, -1.0], method="DOP853", rtol=1e-13, atol=1e-13
@@ -58,27 +63,30 @@ def test_two_four_bars_pass_the_line_on_their_branch():
     angle = reference.y[0, -1]
     assert np.abs([np.cos(angle) - 0.3284581115, np.sin(angle) - 0.9445185382]).max() < 1e-9  # as published
     for rtol, error in ((1e-6, 3e-3), (1e-8, 1e-5), (1e-10, 1e-6)):  # near the line the step's own error over the distance is felt
-        run = M.n_four_bar(2).simulate(10.0, rtol=rtol, atol=rtol, progress=False)
+        run = M.n_four_bar(2, method).simulate(10.0, rtol=rtol, atol=rtol, progress=False)
         assert abs(run.balance[0] - 35.835) < 1e-12
         assert abs(run.q[-1, 0] - angle) < error
         assert np.ptp(run.balance) < 10 * error
         assert np.abs(run.q[:, 0] + run.q[:, 1]).max() < 10 * error  # the rod stays level
 
 
-def test_forty_four_bars():
-    run = M.n_four_bar(40).simulate(10.0, rtol=1e-8, atol=1e-8, progress=False, energy=False)
+@by_each_method
+def test_forty_four_bars(method):
+    run = M.n_four_bar(40, method).simulate(10.0, rtol=1e-8, atol=1e-8, progress=False, energy=False)
     assert np.abs([np.cos(run.q[-1, 0]) - 0.180512227, np.sin(run.q[-1, 0]) - 0.983572741]).max() < 1e-5
 
 
-def test_andrews_squeezer_is_where_the_test_set_has_it():
-    run = M.andrews().simulate(0.03, rtol=1e-10, atol=1e-10, progress=False)
+@by_each_method
+def test_andrews_squeezer_is_where_the_test_set_has_it(method):
+    run = M.andrews(method).simulate(0.03, rtol=1e-10, atol=1e-10, progress=False)
     published = [15.81077119629904, -15.75637105984298, 0.04082224013073101, 0.5244099658805304, -0.5347301163226948, 1.048080741042263]
     assert np.abs(run.q[-1, :6] - published).max() < 1e-7
     assert abs(run.q[-1, 6] - 0.5347301163226948) < 1e-7
 
 
-def test_bricard_keeps_its_energy():
-    run = M.bricard().simulate(10.0, rtol=1e-9, atol=1e-10, progress=False)
+@by_each_method
+def test_bricard_keeps_its_energy(method):
+    run = M.bricard(method).simulate(10.0, rtol=1e-9, atol=1e-10, progress=False)
     assert np.ptp(run.balance) < 1e-6 * 29.43 and np.ptp(run.energy["kinetic"]) > 1
 
 
@@ -89,10 +97,11 @@ def test_a_peaucellier_draws_a_straight_line():
     assert np.ptp(pen[:, 1]) > 0.2
 
 
+@by_each_method
 @pytest.mark.parametrize("integrator", ["dopri5", "cash-karp54", "fehlberg78", "bulirsch-stoer", "rk4", "rkmk4"])
-def test_a_slider_crank_by_every_integrator_at_states(integrator):
+def test_a_slider_crank_by_every_integrator_at_states(integrator, method):
     step = 1e-4 if integrator in ("rk4", "rkmk4") else None
-    run = M.slider_crank(20.0).simulate(
+    run = M.slider_crank(20.0, method=method).simulate(
         0.5, integrator=integrator, step=step, rtol=1e-10, atol=1e-12, t_eval=[0.1, 0.3, 0.5], progress=False
     )
     crank, _, block = run.q.T
@@ -119,13 +128,14 @@ def _crank_angles(times, speed):
     ).y[0]
 
 
+@by_each_method
 @pytest.mark.parametrize("precision", ["double", "extended", "quad"])
-def test_evaluations_keep_both_equations(precision):
+def test_evaluations_keep_both_equations(precision, method):
     model = linkages.stewart()
     assert not np.any(model.gravity)
     state = model.assemble(model.q, np.random.default_rng(2).normal(size=model.nv))
     others = [E.Gravity(), E.RotorInertia(0.3, hinges="upper*"), E.Damping(0.2), E.Wrench("platform", (1, 2, 3, 4, 5, 6))]
-    said = pc.Scene(model, precision=precision).add(*others, E.Loop()).evaluate(state.q, state.v)
+    said = pc.Scene(model, precision=precision).add(*others, E.Loop(method=method)).evaluate(state.q, state.v)
     close(sum(said.forces.values()), model.inverse_dynamics(state.q, state.v, said.vdot))  # rotors take what they take
     Q, c = model.loops.jacobian(state.q), model.loops.bias(state.q, state.v)
     assert np.abs(Q @ said.vdot + c).max() < 1e-12 * np.abs(said.vdot).max()
@@ -150,11 +160,12 @@ def test_gains_are_those_of_their_effects():
     close(pc.Scene(model).add(E.Gravity((0, -9.81, 0)), E.Loop()).evaluate(on.q, on.v).vdot, dense(model, on.q, on.v, np.zeros(5))[0])
 
 
-def test_a_scene_keeps_what_it_is_told_to():
+@by_each_method
+def test_a_scene_keeps_what_it_is_told_to(method):
     model = linkages.n_four_bar(2, 1.0)
-    one = pc.Scene(model).add(E.Gravity((0, -9.81, 0)), E.Loop("loop2")).simulate(0.3, progress=False)
+    one = pc.Scene(model).add(E.Gravity((0, -9.81, 0)), E.Loop("loop2", method=method)).simulate(0.3, progress=False)
     assert one.drift["loop2"].max() < 1e-14 < 1e-2 < one.drift["loop1"].max()
-    scene = pc.Scene(model).add(E.Gravity((0, -9.81, 0)), E.Loop())
+    scene = pc.Scene(model).add(E.Gravity((0, -9.81, 0)), E.Loop(method=method))
     both = scene.simulate(0.3, progress=False)
     assert both.drift["loop1"].max() < 1e-14
     scene.disable("loop")
@@ -168,7 +179,8 @@ def test_a_scene_keeps_what_it_is_told_to():
     assert np.array_equal(scene.simulate(0.3, progress=False).q, one.q)
 
 
-def test_rolling_is_kept():
+@by_each_method
+def test_rolling_is_kept(method):
     """A disc rolls upright around a circle, its centre at the speed ρω; what it moves along is no position's."""
     disc = pc.Multibody("disc")
     disc.add_body("disc", hinge="free", mass=2.0, inertia=np.diag([0.1, 0.1, 0.2]), position=(0, 0, 0.5))
@@ -176,15 +188,16 @@ def test_rolling_is_kept():
     tilt = np.array([np.cos(np.pi / 4), np.sin(np.pi / 4), 0, 0])  # the disc's z is horizontal
     q = np.array([*tilt, 0, 0, 0])
     state = disc.assemble(q, [0, 0.3, 2.0, 1.0, 0, 0])
-    run = pc.Scene(disc).add(E.Gravity(), E.Loop()).simulate(3.0, state.q, state.v, rtol=1e-10, progress=False)
+    run = pc.Scene(disc).add(E.Gravity(), E.Loop(method=method)).simulate(3.0, state.q, state.v, rtol=1e-10, progress=False)
     assert np.ptp(run.balance) < 1e-7 * abs(run.balance[0])
     Qv = [disc.loops.jacobian(q) @ v for q, v in zip(run.q, run.v, strict=True)]
     assert np.abs(Qv).max() < 1e-13 * np.abs(run.v).max()
     assert np.ptp(run.q[:, 4:6], axis=0).max() > 0.5
 
 
-def test_events_checkpoints_and_states_between_steps_are_on_the_loops():
-    scene = M.slider_crank(20.0)
+@by_each_method
+def test_events_checkpoints_and_states_between_steps_are_on_the_loops(method):
+    scene = M.slider_crank(20.0, method=method)
     whole = scene.simulate(0.6, rtol=1e-9, progress=False, events={"right": lambda t, s: np.sin(s.q[0])})
     found = whole.events["right"]
     assert len(found.t) > 2 and np.abs(np.sin(found.q[:, 0])).max() < 1e-9
@@ -196,13 +209,41 @@ def test_events_checkpoints_and_states_between_steps_are_on_the_loops():
     assert np.abs([scene.model.loops.residual(q) for q in between.q]).max() < 1e-6  # interpolated, not taken back
 
 
-def test_files_and_sweeps_have_the_effect(tmp_path):
-    scene = M.n_four_bar(2)
+@by_each_method
+def test_files_and_sweeps_have_the_effect(tmp_path, method):
+    scene = M.n_four_bar(2, method)
     scene.save(tmp_path / "bars.toml")
     again = pc.load_scene(tmp_path / "bars.toml")
     a, b = (s.simulate(1.0, progress=False) for s in (scene, again))
     assert np.array_equal(a.q, b.q)
     assert repr(E.Loop("loop1", beta=2.0)) == "Loop(loops='loop1', beta=2.0)"
+
+
+def test_both_methods_agree_at_a_state():
+    """Every mechanism, moving, under forces that are drawn: θ̈ is one, whatever the way; of rows that are independent λ, too."""
+    for name in MECHANISMS:
+        scene = getattr(M, name)()
+        model, rng = scene.model, np.random.default_rng(5)
+        state = model.assemble(model.q, rng.normal(size=model.nv))
+        tau = E.TorqueSource(rng.normal(size=model.nv))
+        said = [pc.Scene(model).add(E.Gravity((1, -2, -9)), tau, E.Loop(method=m)).evaluate(state.q, state.v) for m in ("augment", "embed")]
+        close(said[1].vdot, said[0].vdot)
+        close(said[1].forces["loop"], said[0].forces["loop"])
+
+
+def test_prescribed_motion_beside_embedded_loops():
+    """A crank that turns evenly: the other coordinates follow, and what it needs is what augmentation says."""
+    ends = []
+    for method in ("augment", "embed"):
+        model = linkages.slider_crank()
+        v0 = model.assemble(model.q, [3.0, 0, 0], fix="crank").v
+        scene = pc.Scene(model).add(E.Gravity((0, -9.81, 0)), E.Prescribed("crank", lambda t: np.pi / 4 + 3.0 * t), E.Loop(method=method))
+        run = scene.simulate(0.5, model.q, v0, rtol=1e-10, progress=False)
+        assert abs(run.q[-1, 0] - (np.pi / 4 + 1.5)) < 1e-14 and run.drift["wrist"].max() < 1e-14
+        ends.append((run.q[-1], run.v[-1], scene.evaluate(run.q[-1], run.v[-1], t=0.5).forces))
+    close(ends[1][0], ends[0][0])
+    for name in ends[0][2]:
+        np.testing.assert_allclose(ends[1][2][name], ends[0][2][name], atol=1e-6)  # a hundred times rtol of states, times 100 N
 
 
 def test_what_loops_cost_and_buy_is_measured_on_them():
@@ -219,6 +260,9 @@ REFUSED = {
     "no loops": (lambda m: pc.Scene(pc.chain(2)).add(E.Loop()), pc.ModelError, "has no loops"),
     "method": (lambda m: pc.Scene(m).add(E.Loop(method="penalty")), pc.EvaluationError, "method='penalty'"),
     "gains": (lambda m: pc.Scene(m).add(E.Loop(alpha=-1.0)), pc.ModelError, "alpha and beta are finite numbers"),
+    "gains of what is embedded": (lambda m: pc.Scene(m).add(E.Loop(method="embed", beta=1.0)), pc.ModelError, "'augment'"),
+    "form": (lambda m: _embedded(m, form="ud"), pc.EvaluationError, "by form 'fast'.*method='augment'"),
+    "two methods": (lambda m: _two_methods(), pc.EvaluationError, "by one method"),
     "impulses": (lambda m: pc.Scene(m).add(E.Langevin(1.0, 0.1, 0.01), E.Loop()), pc.ModelError, "'langevin' acts by impulses"),
     "off": (lambda m: _run(m, q=[0, 0, 0.3]), pc.ModelError, "is off row 'wrist: along x'.*assemble"),
     "moves off": (lambda m: _run(m, q=m.q, v=[1, 0, 0]), pc.ModelError, "moves off row 'wrist"),
@@ -226,6 +270,15 @@ REFUSED = {
     "derivatives": (lambda m: _run(m, integrator="rosenbrock4"), pc.EvaluationError, "solves by derivatives.*effect 'loop'"),
     "foreign": (lambda m: _run(m, integrator="dop853"), pc.EvaluationError, "outside of the core, and effect 'loop'"),
 }
+
+
+def _embedded(model, **how):
+    return pc.Scene(model, **how).add(E.Loop(method="embed")).evaluate(model.q, np.zeros(model.nv))
+
+
+def _two_methods():
+    model = linkages.n_four_bar(2)
+    return pc.Scene(model).add(E.Loop("loop1"), E.Loop("loop2", method="embed")).evaluate(model.q, np.zeros(model.nv))
 
 
 def _run(model, **options):

@@ -22,9 +22,9 @@ class Loop(Effect):
     coordinates are rows beside those of the loops.
 
     Constraint embedding: the bodies around loops that hang together are one body of a tree without loops, v = X v_r and
-    X*(ℳ + J)X v̇_r = X*(τ - 𝒞 - (ℳ + J)Ẋv_r). At every evaluation, and after each step, what depends is found anew from the independent
-    coordinates, which so follow a differential equation of their own, whatever the integrator. They are chosen anew after each step, where X
-    is smallest in units of energy. Of redundant rows λ is that of as many as are independent.
+    X*(ℳ + J)X v̇_r = X*(τ - 𝒞 - (ℳ + J)Ẋv_r). At every evaluation, and after each step, what depends is found from the independent
+    coordinates, which so follow a differential equation of their own, whatever the integrator. They are chosen anew after each step, where
+    X is smallest in units of energy. Of redundant rows λ is that of as many as are independent.
 
     A start off the loops is an error; `model.assemble(q, v)` has states on them.
 
