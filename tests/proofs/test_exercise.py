@@ -230,7 +230,7 @@ def test_a_line_between_other_spaces_is_wrong(innovations):
         ("HψM = 0", "no proof to leave a line out of: H ψ M = 0"),
         ("det of the innovations factor is 1", "said of numbers"),
         ("Ω decomposed by Υ, blocks on one path", "blocks on one path"),
-        ("tree augmentation", "waits"),
+        ("modal blocks and their calculus", "waits"),
         ("mass matrix invers", "near it: 'mass matrix inverse'"),
         ("HψM", "no theorem is called"),
         ("HψM == == D", "does not read"),

@@ -30,6 +30,7 @@ OTHERWISE = {
     "identify",
     "reattach",
     "mobility_along",
+    "view",
 }  # from a state on, of a whole log or motion, of one hinge
 NOT_OF_A_STATE = {"inertial_parameters", "prepare"}
 
