@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -166,13 +167,13 @@ class ConstrainedCalls:
 
 
 class _OfLoops(Mapping[str, Any]):
-    """What is each loop's own, by name, made when it is asked for: most callers ask for none."""
+    """What is each loop's own, by name, made when it is asked for: most callers ask for none. Classes, as results are pickled."""
 
     def __init__(self, places: Mapping[str, int]):
         self._places = places
 
-    def _own(self, place: int) -> Any:
-        raise NotImplementedError
+    @abstractmethod
+    def _own(self, place: int) -> Any: ...
 
     def __getitem__(self, name: str) -> Any:
         return self._own(self._places[name])

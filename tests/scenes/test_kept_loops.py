@@ -231,6 +231,50 @@ def test_both_methods_agree_at_a_state():
         close(said[1].forces["loop"], said[0].forces["loop"])
 
 
+def by_what_is_free(model, q, v, gravity, rotors=0.0):
+    """θ̈ by a basis N of what Q leaves free: N*(ℳ + J)N y = N*(-𝒞 - (ℳ + J)θ̈₀), Q θ̈₀ = -Q̇θ̇."""
+    Q, c = model.loops.jacobian(q), model.loops.bias(q, v)
+    model.gravity = gravity
+    M, h = model.mass_matrix(q) + rotors * np.eye(model.nv), model.inverse_dynamics(q, v, np.zeros(model.nv))
+    model.gravity = (0, 0, 0)
+    U, s, V = np.linalg.svd(Q)
+    rank = int((s > 1e-9 * s[0]).sum())
+    particular, N = -V[:rank].T @ ((U.T @ c)[:rank] / s[:rank]), V[rank:].T
+    return particular + N @ np.linalg.solve(N.T @ M @ N, N.T @ (-h - M @ particular))
+
+
+def test_embedded_loops_carry_bodies_without_mass():
+    """A crank and a rocker without mass, which a tree refuses: on the loop the coupler moves with them."""
+    bars = pc.Multibody("bars")
+    bars.add_body("crank", hinge="pin", axis=(0, 0, 1))
+    bars.add_body("coupler", parent="crank", hinge="pin", axis=(0, 0, 1), position=(1, 0, 0), mass=2.0, inertia=0.1 * np.eye(3))
+    bars.add_body("rocker", parent="coupler", hinge="pin", axis=(0, 0, 1), position=(1, 0, 0))
+    bars.add_loop("rocker", hinge="pin", axis=(0, 0, 1), point=(1, 0, 0))
+    on = bars.assemble([1.0, -1.4, -1.5], [0.7, 0, 0], fix="crank")
+    said = pc.Scene(bars).add(E.Gravity((0, -9.81, 0)), E.Loop(method="embed")).evaluate(on.q, on.v)
+    close(said.vdot, by_what_is_free(bars, on.q, on.v, (0, -9.81, 0)))
+    nothing = pc.Multibody("nothing")
+    for name, carrier in (("crank", None), ("coupler", "crank"), ("rocker", "coupler")):
+        nothing.add_body(name, parent=carrier, hinge="pin", axis=(0, 0, 1), position=(1, 0, 0) if carrier else (0, 0, 0))
+    nothing.add_loop("rocker", hinge="pin", axis=(0, 0, 1), point=(1, 0, 0))
+    with pytest.raises(pc.SingularHingeError, match="nothing with mass moves along coordinate '(crank|coupler|rocker)'"):
+        pc.Scene(nothing).add(E.Loop(method="embed")).evaluate(on.q, on.v)
+
+
+def test_embedded_loops_at_a_singular_state_beside_rotors_and_a_coupling():
+    """At the flat four-bars, where a row hangs on others, and with hinges that gears tie."""
+    bars = linkages.n_four_bar(2)
+    flat, v = np.zeros(5), np.array([1.0, -1, 1, -1, 1])
+    said = pc.Scene(bars).add(E.Gravity((0, -9.81, 0)), E.RotorInertia(0.2), E.Loop(method="embed")).evaluate(flat, v)
+    close(said.vdot, by_what_is_free(bars, flat, v, (0, -9.81, 0), rotors=0.2))
+    tree = pc.tree([-1, 0, 0, 2, 3], ["free", "ball", "pin", "universal", "slider"], seed=3)
+    tree.gravity = (0, 0, 0)
+    tree.add_coupling({tree.coordinate_names[9]: 1.0, tree.coordinate_names[12]: -2.5}, name="rack")
+    on = tree.assemble(tree.random_state(seed=4).q, np.linspace(-1, 1, tree.nv))
+    said = pc.Scene(tree).add(E.Gravity((1, -2, -9)), E.Loop(method="embed")).evaluate(on.q, on.v)
+    close(said.vdot, by_what_is_free(tree, on.q, on.v, (1, -2, -9)))
+
+
 def test_prescribed_motion_beside_embedded_loops():
     """A crank that turns evenly: the other coordinates follow, and what it needs is what augmentation says."""
     ends = []
