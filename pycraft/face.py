@@ -13,6 +13,8 @@ from .models.embedded_loops import embedded, source_again
 from .models.multibody import Multibody, describe
 from .operators import loop_letters, operator_set
 from .operators.block_view import block_view
+from .operators.explanation import Explanation, explain
+from .operators.shown_expression import expression_latex, formula_latex
 
 
 def algorithm(expression: _core.Operator | _core.Scalar, language: str = "text", request: str = "apply") -> Any:
@@ -57,6 +59,13 @@ def compile_expression(*arguments: Any, **options: Any) -> Any:
     return compiled(*arguments, **options)
 
 
+def plan_html(explanation: Explanation) -> str:
+    """`Explanation._repr_html_`."""
+    from .view.plan_picture import plan_html as shown
+
+    return shown(explanation)
+
+
 def plot_model(*arguments: Any, **options: Any) -> Any:
     """`Multibody.plot`."""
     from .view import plot_model as plot
@@ -69,6 +78,13 @@ def check_model(*arguments: Any, **options: Any) -> Any:
     from .identities.checker import check_model as check
 
     return check(*arguments, **options)
+
+
+def theorem_html(theorem: _core.Theorem) -> str:
+    """`Theorem._repr_html_`."""
+    from .identities.findings_page import theorem_html as shown
+
+    return shown(theorem)
 
 
 def solve_ik(*arguments: Any, **options: Any) -> Any:
@@ -107,15 +123,19 @@ def attach() -> None:
         embedded=embedded,
         embedded_source=source_again,
         exact_numbers=operator_set.exact_numbers,
-        explain=operator_set.explain,
+        explain=explain,
+        expression_latex=expression_latex,
+        formula_latex=formula_latex,
         loop_source=loop_letters.loop_source,
         model_from_description=Multibody.from_description,
         operator_from_nodes=operator_set.operator_from_nodes,
+        plan_html=plan_html,
         plot_model=plot_model,
         scalar_at=operator_set.scalar_at,
         scalar_gradient=operator_set.scalar_gradient,
         shared_out=shared_out,
         solve_ik=solve_ik,
+        theorem_html=theorem_html,
         thread_count=thread_count,
         view_model=view_model,
         view_scene=view_scene,

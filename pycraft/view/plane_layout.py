@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..models.tree_places import tree_places
 from .skeleton import Skeleton, placed
 
 _AZIMUTH, _ELEVATION = -60.0, 20.0  # degrees, as figures in space are seen
@@ -33,27 +34,8 @@ class PlaneLayout:
 
 def tree_layout(parents: Sequence[int], width: float, height: float, margin: float) -> PlaneLayout:
     """Leaves side by side, a body above the middle of what it carries, the base at the foot. O(N)."""
-    n = len(parents)
-    children: list[list[int]] = [[] for _ in range(n + 1)]
-    for k, p in enumerate(parents):
-        children[p].append(k)  # -1: the base, last
-    depth = np.zeros(n + 1)
-    for k, p in enumerate(parents):
-        depth[k] = depth[p] + 1 if p >= 0 else 1
-    x, leaves, stack = np.zeros(n + 1), 0, [-1]
-    order: list[int] = []
-    while stack:
-        k = stack.pop()
-        order.append(k)
-        if not children[k]:
-            x[k], leaves = leaves, leaves + 1
-        stack += reversed(children[k])
-    for k in reversed(order):
-        if children[k]:
-            x[k] = np.mean(x[children[k]])
-    spread = (x + 0.5) / max(leaves, 1)
-    level = depth / max(depth.max(), 1)
-    places = np.column_stack([margin + spread * (width - 2 * margin), height - margin - level * (height - 2 * margin)])
+    x, level = tree_places(parents).T
+    places = np.column_stack([margin + x * (width - 2 * margin), height - margin - level * (height - 2 * margin)])
     return PlaneLayout(places[:-1], places[-1], np.zeros((0, 2, 2)), None)
 
 
