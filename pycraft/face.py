@@ -59,6 +59,13 @@ def compile_expression(*arguments: Any, **options: Any) -> Any:
     return compiled(*arguments, **options)
 
 
+def linked_blocks(view: Any, on: str) -> Any:
+    """`BlockView.on_robot`."""
+    from .view.linked_blocks import LinkedBlocks
+
+    return LinkedBlocks(view, on)
+
+
 def plan_html(explanation: Explanation) -> str:
     """`Explanation._repr_html_`."""
     from .view.plan_picture import plan_html as shown
@@ -126,6 +133,7 @@ def attach() -> None:
         explain=explain,
         expression_latex=expression_latex,
         formula_latex=formula_latex,
+        linked_blocks=linked_blocks,
         loop_source=loop_letters.loop_source,
         model_from_description=Multibody.from_description,
         operator_from_nodes=operator_set.operator_from_nodes,

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import _core
 from ..models.tree_places import tree_places
 from .skeleton import Skeleton, placed
 
@@ -30,6 +31,17 @@ class PlaneLayout:
     base: np.ndarray
     bones: np.ndarray
     axes: np.ndarray | None
+
+
+def layout_of(expression: Any, source: Any, on: str, width: float, height: float, radius: float) -> PlaneLayout:
+    """Of the bodies of a source: its model at the state that the expression is bound to, of a batch the first, else as it stands; or,
+    on="tree" and where the bodies are no model's own, a diagram of the tree."""
+    model = getattr(source, "model", None)
+    if on == "robot" and isinstance(model, _core.Multibody) and list(getattr(model, "bodies", ())) == list(source.body_names):
+        state = getattr(expression, "_state", None)
+        q = np.asarray(model.q if state is None else state[0], float)
+        return model_layout(model, q.reshape(-1, q.shape[-1])[0], width, height, 4 * radius, radius)
+    return tree_layout(list(source.parents), width, height, 4 * radius)
 
 
 def tree_layout(parents: Sequence[int], width: float, height: float, margin: float) -> PlaneLayout:
