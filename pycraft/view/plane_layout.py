@@ -53,13 +53,18 @@ def tree_layout(parents: Sequence[int], width: float, height: float, margin: flo
 
 def model_layout(model: Any, q: Any, width: float, height: float, margin: float, radius: float) -> PlaneLayout:
     """The model's sticks at q, seen as `StickFigure` shows them; hinge points at one place are drawn side by side. O(N · depth)."""
+    return model_layouts(model, np.asarray(q, float)[None], width, height, margin, radius)[0]
+
+
+def model_layouts(model: Any, q: np.ndarray, width: float, height: float, margin: float, radius: float) -> list[PlaneLayout]:
+    """The same at several states (n, nq), all in one box: what stays where it is, stays in the picture."""
     skeleton = Skeleton(model)
-    poses = skeleton.poses(np.asarray(q, float))
+    poses = skeleton.poses(q)
     seen = _seen(skeleton, model)
     hinges = placed(poses, *skeleton.points["joint"]) @ seen.T
     lines = [placed(poses, *skeleton.lines[kind]) @ seen.T for kind in ("bone", "slide", "ground", "tie") if len(skeleton.lines[kind][0])]
-    bones = np.concatenate(lines) if lines else np.zeros((0, 2, 2))
-    everything = np.concatenate([hinges, bones.reshape(-1, 2), np.zeros((1, 2))])
+    bones = np.concatenate(lines, axis=1) if lines else np.zeros((len(q), 0, 2, 2))
+    everything = np.concatenate([hinges.reshape(-1, 2), bones.reshape(-1, 2), np.zeros((1, 2))])
     low, high = everything.min(axis=0), everything.max(axis=0)
     scale = min((width - 2 * margin) / max(high[0] - low[0], 1e-12), (height - 2 * margin) / max(high[1] - low[1], 1e-12))
     scale = scale if np.isfinite(scale) and (high > low).any() else 1.0
@@ -69,11 +74,14 @@ def model_layout(model: Any, q: Any, width: float, height: float, margin: float,
         moved = (points - middle) * scale
         return np.stack([width / 2 + moved[..., 0], height / 2 - moved[..., 1]], axis=-1)
 
-    bodies = _side_by_side(picture(hinges), 2.2 * radius)
-    flip = np.array([[1.0], [-1.0]])
-    return PlaneLayout(
-        bodies, picture(np.zeros(2)), picture(bones), np.array([flip * (seen @ poses[k, :3, :3]) for k in range(len(bodies))])
-    )
+    flip, base = np.array([[1.0], [-1.0]]), picture(np.zeros(2))
+    return [
+        PlaneLayout(
+            _side_by_side(picture(hinges[i]), 2.2 * radius), base, picture(bones[i]),
+            np.array([flip * (seen @ poses[i, k, :3, :3]) for k in range(hinges.shape[1])]),
+        )
+        for i in range(len(q))
+    ]  # fmt: skip
 
 
 def _seen(skeleton: Skeleton, model: Any) -> np.ndarray:
