@@ -66,6 +66,13 @@ def linked_blocks(view: Any, on: str) -> Any:
     return LinkedBlocks(view, on)
 
 
+def model_html(model: Any) -> str:
+    """`Multibody._repr_html_`."""
+    from .view.model_picture import model_html as shown
+
+    return shown(model)
+
+
 def plan_html(explanation: Explanation) -> str:
     """`Explanation._repr_html_`."""
     from .view.plan_picture import plan_html as shown
@@ -136,6 +143,7 @@ def attach() -> None:
         linked_blocks=linked_blocks,
         loop_source=loop_letters.loop_source,
         model_from_description=Multibody.from_description,
+        model_html=model_html,
         operator_from_nodes=operator_set.operator_from_nodes,
         plan_html=plan_html,
         plot_model=plot_model,

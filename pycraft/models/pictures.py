@@ -11,6 +11,9 @@ from .tree_diagram import TreeDiagram, tree_diagram
 class Pictures:
     """What is printed and drawn of a model."""
 
+    def _repr_html_(self) -> str:
+        return str(_core._face["model_html"](self))
+
     def tree(self, most: int | None = 200, *, nodes: bool = False) -> TreeDiagram:
         """The tree as text in 80 columns: each body below and right of the one that carries it, its hinge, and its places in q and v.
 
