@@ -45,19 +45,21 @@ def finding_html(found: Any) -> str:
 
 
 def report_html(report: Any) -> str:
-    """A report as a table, what is wrong first, with buttons for verdicts and a field for words of statements, names and hypotheses."""
-    findings: Sequence[Any] = report.findings
+    """A report as a table, what does not simply hold before the groups, with buttons for verdicts and a field for words."""
+    exceptions: Sequence[Any] = report.exceptions
     counts = report.counts()
     buttons = "".join(
         f'<button type="button" data-verdict="{escape(verdict)}" aria-pressed="true">{verdict_html(verdict)} {count}</button>'
         for verdict, count in counts.items()
     )
-    rows, group = [], None
-    for found in findings:
-        if found.group != group:
-            group = found.group
-            rows.append(f'<tr class="group"><th colspan="4">{escape(group)}</th></tr>')
-        rows.append(_row(found))
+    groups: dict[str, list[Any]] = {"What does not simply hold": list(exceptions)}
+    for found in report.findings:
+        if found not in exceptions:
+            groups.setdefault(found.group, []).append(found)
+    rows = []
+    for group, findings in groups.items():
+        rows += [f'<tr class="group"><th colspan="4">{escape(group)}</th></tr>'] if findings else []
+        rows += map(_row, findings)
     head = '<tr><th>verdict</th><th>theorem</th><th class="number">residual</th><th class="number">bound</th></tr>'
     summary = escape(report.summary()).replace("\n", "<br>")
     return (

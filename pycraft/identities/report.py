@@ -137,7 +137,7 @@ class Report:
         raise KeyError(f"no theorem is called {name!r}; .findings has all, each with its name")
 
     @property
-    def _exceptions(self) -> list[Finding]:
+    def exceptions(self) -> list[Finding]:
         """What does not simply hold."""
         return [f for f in self.findings if f.verdict not in (HOLDS, "holds anyway")]
 
@@ -147,7 +147,7 @@ class Report:
 
     def lines(self, width: int = WIDTH) -> Any:
         """The findings as a rich text, one line a theorem and the verdict first; what does not simply hold comes before the others."""
-        exceptions = self._exceptions
+        exceptions = self.exceptions
         parts = [exceptions, [f for f in self.findings if f not in exceptions]]
         return Text("\n").join(findings_lines(part, width) for part in parts if part)
 
@@ -170,9 +170,9 @@ class Report:
         return f"{self.summary()}\n\n{text_of(self.table())}"
 
     def __repr__(self) -> str:
-        if not self._exceptions:
+        if not self.exceptions:
             return self.summary()
-        return f"{self.summary()}\n\n{text_of(findings_lines(self._exceptions))}"
+        return f"{self.summary()}\n\n{text_of(findings_lines(self.exceptions))}"
 
     def _repr_html_(self) -> str:
         return report_html(self)
