@@ -86,10 +86,8 @@ void SceneCurvature::differentiate(double t, const double* q, const double* v, c
             double sum = 0;
             for (int r = 0; r < rows; ++r) sum += mu[size_t(m) * rows + r] * F[r].d[j].d[i];
             double *const to = out + size_t(m) * n * n, &ij = to[(a.first + i) * n + b.first + j], &ji = to[(b.first + j) * n + a.first + i];
-            if (both_orders)
-              ij += sum / 2, ji += sum / 2;
-            else
-              ij = ji = sum;
+            ij = sum;
+            if (!both_orders) ji = sum;
           }
     }
   }

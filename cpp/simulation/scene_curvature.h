@@ -3,8 +3,8 @@
 //
 //   μ*∂²F/∂z∂z    and those of μ*ID (dynamics/curvature.h) in the scene's uniform gravity
 //
-// F on numbers with derivatives along four directions of derivatives along four others. On ball and free hinges quasi-velocities do not commute:
-// along δ it is the mean of both orders. Where an effect is written in Python F is differenced instead: centrally, with steps h = ε^¼ of four values
+// F on numbers with derivatives along four directions of derivatives along four others: along displacements of ball and free hinges, which do not commute,
+// one order in (i, j) and the other in (j, i), of which those along exponential coordinates are the mean. Where an effect is written in Python F is differenced instead: centrally, with steps h = ε^¼ of four values
 // that are right to a rounding each, so that of functions of the size of their arguments 4ε/h² + h²/6 of their size, 1e-7, is wrong. Directions of
 // prescribed coordinates, and what μ has there, count for nothing. Cost O(N n²) for n directions.
 // Source: A. Griewank, A. Walther, Evaluating Derivatives, SIAM 2008, second derivatives by the forward mode over itself; the step of second
@@ -28,7 +28,7 @@ class SceneCurvature {
   explicit SceneCurvature(CompiledScene<double>& scene);
 
   int directions() const { return 2 * nv() + own(); }
-  // For each of `count` μ (nv + own) a symmetric matrix (n x n).
+  // For each of `count` μ (nv + own) a matrix (n x n).
   void forces(double t, const double* q, const double* v, const double* own, const double* mu, int count, double* out);
   // And four blocks (nv x nv), those of Curvature.
   void motion(const double* q, const double* v, const double* vdot, const double* mu, int count, double* out);
