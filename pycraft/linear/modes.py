@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from .. import _core
-from ..arguments import whole
+from ..arguments import one_number, whole
 from ..tidy import TidyTable
 from .linear_model import LinearModel
 
@@ -55,6 +55,8 @@ class Modes(TidyTable):
         phases : figures that are drawn, an odd number so that the state itself is among them
         """
         of, count, mode = self._of, max(1, whole(phases, "phases")), whole(mode, "mode")
+        if not np.isfinite(amplitude := one_number(amplitude, "amplitude")):
+            raise _core.EvaluationError(f"amplitude={amplitude:g}: how far the coordinate swings that moves most, rad or m")
         if not -len(self) <= mode < len(self):
             raise _core.EvaluationError(f"mode {mode} is not there; there are {len(self)}")
         n = of.displacements

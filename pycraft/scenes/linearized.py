@@ -12,7 +12,7 @@ from ..dynamics.linear_on_loops import chosen_numbers, independent_numbers, line
 from ..dynamics.linearization import linear_model, listed
 from ..dynamics.loop_tangents import TreeDerivatives, kept_rows
 from ..linear.linear_model import LinearModel, names_of_states, stacked
-from ..state import at_state
+from ..state import at_state, moment_of
 
 
 def linearize(
@@ -20,6 +20,7 @@ def linearize(
 ) -> LinearModel:
     """`Scene.linearize`."""
     model, calls = scene.model, scene._calls()
+    t, states = moment_of(q, t, states)
     q, v = at_state(model, q, v)
     q = np.asarray(getattr(q, "q", q), float)
     v = np.zeros(model.nv) if v is None else np.asarray(getattr(v, "v", v), float)
@@ -40,7 +41,10 @@ def _along(
     independent: list[int] | None,
 ) -> LinearModel:  # fmt: skip
     count = len(q) if q.ndim == 2 else len(v)
-    times, own = _core.real_array(t, "t"), np.zeros((count, 0)) if states is None else np.atleast_1d(_core.real_array(states, "states"))
+    times, own = (
+        _core.real_array(t, "t"),
+        np.zeros((count, 0)) if states is None else np.atleast_1d(_core.real_array(states, "states")),
+    )
     for name, x, axes in (("q", q, 2), ("v", v, 2), ("t", times, 1), ("states", own, 2)):
         if x.ndim > axes or (x.ndim == axes and len(x) != count):
             raise _core.ModelError(f"{name} of {scene.model.name!r} has the shape {x.shape}; there are {count} states, or one for all")

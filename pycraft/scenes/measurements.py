@@ -144,10 +144,10 @@ class Measurements:
         )  # fmt: skip
 
     def linearize(
-        self, q=None, v=None, t: Any = 0.0, *, states: Any = None, inputs: Any = None, outputs: Any = None, dt: float | None = None,
+        self, q=None, v=None, t: Any = None, *, states: Any = None, inputs: Any = None, outputs: Any = None, dt: float | None = None,
         method: str = "zoh", independent: Any = None,
     ) -> LinearModel:  # fmt: skip
-        """The linear model of the scene near a state, its effects included, or near each of a batch, as of a run (`run.q, run.v, run.t`).
+        """The linear model of the scene near a state, its effects included, or near each of a batch or a run (`scene.linearize(run)`).
 
         States, inputs and outputs are as in `Multibody.linearize`, and the effects' own states follow the velocities ("state.0", ...).
         Inputs are generalized forces beside those of the effects. Exact: effects written in C++ by derivatives of their own arithmetic;
@@ -159,8 +159,8 @@ class Measurements:
         Parameters
         ----------
         q, v : (nq,), (nv,), each with an optional leading batch axis
-        t : s, one number or one for each state
-        states : (n,) or (B, n), of the effects' own; as they are at first where left out
+        t : s, one number or one for each state; where left out that of the run that q is, else 0
+        states : (n,) or (B, n), of the effects' own; where left out those of the run that q is, else as they are at first
         inputs, outputs, dt, method, independent : as in `Multibody.linearize`
 
         Raises
@@ -183,7 +183,7 @@ class Measurements:
 
         return linearize(self, q, v, t, states=states, inputs=inputs, outputs=outputs, dt=dt, method=method, independent=independent)
 
-    def quadratic_model(self, q=None, v=None, t: Any = 0.0, *, states: Any = None, inputs: Any = None) -> QuadraticModel:
+    def quadratic_model(self, q=None, v=None, t: Any = None, *, states: Any = None, inputs: Any = None) -> QuadraticModel:
         """The model of the scene to second order near a state, its effects included, or near each of a batch: what iLQR and DDP ask for.
 
         `linearize` is its first order; `Multibody.quadratic_model` is the same of a model without effects. Exact: effects written in C++ by
@@ -194,8 +194,8 @@ class Measurements:
         Parameters
         ----------
         q, v : (nq,), (nv,), each with an optional leading batch axis
-        t : s, one number or one for each state
-        states : (n,) or (B, n), of the effects' own; as they are at first where left out
+        t : s, one number or one for each state; where left out that of the run that q is, else 0
+        states : (n,) or (B, n), of the effects' own; where left out those of the run that q is, else as they are at first
         inputs : names of hinges, coordinates or patterns, or a list of them, whose generalized forces are inputs; None: all
 
         Returns

@@ -10,6 +10,7 @@ from .. import _core
 from ..dynamics.displacements import turning
 from ..dynamics.quadratic import QuadraticModel
 from ..dynamics.second_order import Nominal, StateEquation, curved
+from ..state import moment_of
 from .linearized import known_coordinates, linearize, solved
 
 
@@ -19,11 +20,12 @@ def quadratic_model(scene: Any, q: Any, v: Any, t: Any, *, states: Any, inputs: 
         raise _core.EvaluationError(
             f"scene of {scene.model.name!r}: it keeps loops, of which quadratic models are not made; linearize is of the first order"
         )
-    model = scene.model
+    model, (t, states) = scene.model, moment_of(q, t, states)
     linear = linearize(scene, q, v, t, states=states, inputs=inputs, outputs=None, dt=None, method="zoh", independent=None)
-    count, own = len(linear) if linear.A.ndim == 3 else 1, len(linear.states) - 2 * model.nv
+    count = len(linear) if linear.A.ndim == 3 else 1
     q, v = (np.broadcast_to(x, (count, x.shape[-1])) for x in (linear.q, linear.v))
-    given = np.broadcast_to(np.zeros(0) if states is None else np.asarray(states, float), (count, 0 if states is None else own))
+    own = np.zeros(0) if states is None else np.atleast_1d(_core.real_array(states, "states"))
+    given = np.broadcast_to(own, (count, own.shape[-1]))
     begun = SceneRates(scene, q, np.hstack([v, given]), np.broadcast_to(np.asarray(linear.t, float), (count,)), between=False)
     chosen = [model.coordinate_names.index(name.removeprefix("tau.")) for name in linear.inputs]
     at = Nominal(model, begun.q, begun.rest, chosen, turning(model), begun.later, begun.known, begun.implicit, begun.placed)
