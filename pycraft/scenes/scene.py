@@ -12,7 +12,7 @@ from .. import _core
 from ..arguments import chosen, moment, one_number, text
 from ..closed import Closed
 from ..models.grafting import Grafting
-from ..state import at_state
+from ..state import at_state, moment_of
 from .effects import Effect, Loop, UserEffect
 from .effects.meanings import Meanings, acted_on
 from .explain import plan_text
@@ -241,15 +241,15 @@ class Scene(Measurements, Statics, Filed, Viewed, Closed):
         return self._model.loops._core.edits if kept else 0
 
     # ------------------------------------------------------------------ states and runs
-    def evaluate(self, q=None, v=None, t: float = 0.0, *, states=None, step: float = 0.0) -> Evaluation:
+    def evaluate(self, q=None, v=None, t: float | None = None, *, states=None, step: float = 0.0) -> Evaluation:
         """Accelerations and forces at a state.
 
         Parameters
         ----------
         q, v : (nq,), (nv,), by the rule of direct calls; beside an array q without v the model is at rest, and no pass that needs
             velocities runs
-        t : s
-        states : of the effects' own; as they are at first where left out
+        t : s; where left out that of the run's state that q is, else 0
+        states : of the effects' own; where left out those of the run's state that q is, else as they are at first
         step : s
             Accelerations of an implicit step of this size: D has h C + h² K of implicit damping and stiffness in addition.
 
@@ -263,6 +263,7 @@ class Scene(Measurements, Statics, Filed, Viewed, Closed):
             As forward dynamics.
         """
         resting = v is None and q is not None and not hasattr(q, "v")
+        t, states = moment_of(q, t, states)
         q, v = at_state(self._model, q, v)
         own = [] if states is None else np.asarray(_core.real_array(states, "states")).tolist()
         found = self._calls().evaluate(q, None if resting else v, moment(t), own, one_number(step, "step"))
