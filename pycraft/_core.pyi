@@ -1213,6 +1213,10 @@ class LoopSet:
         """
         What keeps these loops in a scene, all without names.
         """
+    def embedded_accelerations(self, q: typing.Any, v: typing.Any, tau: typing.Any, names: collections.abc.Sequence[str], in_world: bool, wrenches: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], independent: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], refine: typing.Any, precision: str | int) -> tuple:
+        """
+        The same by independent coordinates, given by number or, without any, chosen at each state.
+        """
     def ends(self, operators: SkoSource) -> list[str]:
         """
         The bodies and nodes that A is of.
@@ -1233,6 +1237,10 @@ class LoopSet:
         """
         The source of rows as operators, Q and A by body: pycraft/operators/loop_letters.py.
         """
+    def penalty(self, names: collections.abc.Sequence[str], frequency: typing.SupportsFloat | typing.SupportsIndex, damping_ratio: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
+        """
+        What holds these loops in a scene by springs and dampers, all without names.
+        """
     def remove(self, name: str) -> None:
         ...
     def residual(self, q: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
@@ -1240,6 +1248,10 @@ class LoopSet:
     def rows(self) -> tuple[list[str], list[bool]]:
         """
         Names of all rows, and which are of positions.
+        """
+    def springs(self, names: collections.abc.Sequence[str], frequency: typing.SupportsFloat | typing.SupportsIndex, damping_ratio: typing.SupportsFloat | typing.SupportsIndex) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+        """
+        Stiffness and damping of the rows of such an effect that is alone.
         """
     def velocities(self, q: typing.Any, v: typing.Any, impulse: typing.Any, form: str, precision: str | int) -> tuple:
         """

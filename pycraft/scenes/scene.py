@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -220,7 +220,7 @@ class Scene(Measurements, Statics, Filed, Viewed, Closed):
             self._model._parameters,
             self._how,
             tuple((name, id(effect), effect._changes, on) for name, (effect, on) in self._entries.items()),
-            self._loop_edits(),
+            self._loops_now(),
         )
         if self._built is None or self._built[0] != now:
             form, refine, residual, precision = self._how
@@ -229,16 +229,17 @@ class Scene(Measurements, Statics, Filed, Viewed, Closed):
 
     def _kept_loops(self) -> list[str]:
         """The loops that effects which are on keep, by name."""
-        return [name for effect, on in self._entries.values() if on and isinstance(effect, Loop) for name in effect.kept(self._model)]
+        return [name for effect, on in self._entries.values() if on and _keeps(effect) for name in effect.kept(self._model)]
 
     def _keeps_loops(self) -> bool:
         """Whether an effect that is on keeps loops."""
-        return any(on and isinstance(effect, Loop) for effect, on in self._entries.values())
+        return any(on and _keeps(effect) for effect, on in self._entries.values())
 
-    def _loop_edits(self) -> int:
-        """What the model's loops count of their changes, where they are kept: they are no part of the model's own numbers."""
-        kept = any(isinstance(effect, Loop) for effect, _ in self._entries.values())
-        return self._model.loops._core.edits if kept else 0
+    def _loops_now(self) -> tuple[int, bytes]:
+        """What its loops count of their changes, and where springs hold them the present q: they are no part of the model's numbers."""
+        loops = [effect for effect, _ in self._entries.values() if isinstance(effect, Loop)]
+        held = any(not effect.keeps for effect in loops)
+        return self._model.loops._core.edits if loops else 0, np.asarray(self._model.q).tobytes() if held else b""
 
     # ------------------------------------------------------------------ states and runs
     def evaluate(self, q=None, v=None, t: float | None = None, *, states=None, step: float = 0.0) -> Evaluation:
@@ -385,6 +386,11 @@ class Scene(Measurements, Statics, Filed, Viewed, Closed):
         return _again, (type(self), self._model, list((name, effect, on) for name, (effect, on) in self._entries.items()), self._how), {
             "_run_options": self._run_options
         }  # fmt: skip
+
+
+def _keeps(effect: Effect) -> TypeGuard[Loop]:
+    """Whether it keeps loops."""
+    return isinstance(effect, Loop) and effect.keeps
 
 
 def _again(kind: type[Scene], model: Any, entries: list[tuple[str, Effect, bool]], how: tuple[Any, ...]) -> Scene:
