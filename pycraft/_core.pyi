@@ -1241,6 +1241,10 @@ class LoopSet:
         """
         Names of all rows, and which are of positions.
         """
+    def tape(self, q: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], v: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], tau: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], most: typing.SupportsInt | typing.SupportsIndex) -> tuple:
+        """
+        What accelerations on the loops are, operation by operation, at states that are decided as this one (tapes.h).
+        """
     def velocities(self, q: typing.Any, v: typing.Any, impulse: typing.Any, form: str, precision: str | int) -> tuple:
         """
         v⁺, impulses λ, impulses of loops on b and on a, rank.
