@@ -1253,6 +1253,10 @@ class LoopSet:
         """
         Stiffness and damping of the rows of such an effect that is alone.
         """
+    def tape(self, q: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], v: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], tau: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], most: typing.SupportsInt | typing.SupportsIndex) -> tuple:
+        """
+        What accelerations on the loops are, operation by operation, at states that are decided as this one (tapes.h).
+        """
     def velocities(self, q: typing.Any, v: typing.Any, impulse: typing.Any, form: str, precision: str | int) -> tuple:
         """
         v⁺, impulses λ, impulses of loops on b and on a, rank.

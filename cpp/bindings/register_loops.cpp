@@ -5,8 +5,10 @@
 #include "bindings/direct_calls.h"
 #include "bindings/hinge_arguments.h"
 #include "bindings/register_interbody_forces.h"
+#include "bindings/tapes.h"
 #include "dynamics/calls_on_loops.h"
 #include "dynamics/loop_calls.h"
+#include "dynamics/recorded_on_loops.h"
 #include "operators/embedded_operators.h"
 #include "operators/loop_operators.h"
 #include "simulation/effects/loop.h"
@@ -134,6 +136,12 @@ void register_loops(py::module_& m) {
       }, name, py::arg("coordinates"), py::arg("constant"), py::arg("function"))
       .def("remove", [](Loops& l, const std::string& name) { l.set->remove(name); }, name)
       .def("names", [](const Loops& l) { return l.set->names(); }, "In order of declaration.")
+      .def("tape", [](const Loops& l, const std::vector<double>& at_q, const std::vector<double>& at_v, const std::vector<double>& tau, size_t most) {
+        const Multibody& model = l.set->model();
+        const ModelInUse use(model);
+        model.check_q(at_q.data(), at_q.size()), model.check_v(at_v.data(), at_v.size(), "v"), model.check_v(tau.data(), tau.size(), "tau");
+        return plain_tape(recorded_on_loops(model, l.set->resolved(), at_q.data(), at_v.data(), tau.data(), most));
+      }, q, v, py::arg("tau"), py::arg("most"), "What accelerations on the loops are, operation by operation, at states that are decided as this one (tapes.h).")
       .def("kind", [](const Loops& l, const std::string& name) {
         const Loop& loop = l.set->loop(name);
         return std::string(loop.is_coupling() ? "coupling" : record_of(loop.pair.kind).name);

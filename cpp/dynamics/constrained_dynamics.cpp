@@ -7,7 +7,10 @@
 #include "algebra/trees/sweeps/articulated_inertia.h"
 #include "algebra/trees/sweeps/mass_matrix.h"
 #include "model/checks.h"
+#include "model/recorded_model.h"
 #include "model/unit_data.h"
+#include "numerics/decisions.h"
+#include "numerics/recorded.h"
 #include "recursions/articulated_body.h"
 #include "recursions/kinematics.h"
 
@@ -165,7 +168,7 @@ void ConstrainedWorkspace<S>::correct(const Asked& asked, const Applied<S>& appl
   const int nv = model_->nv;
   const bool wider = asked.refinement.wider() || asked.refinement.gathers_wider();
   r_.assign(nv, S(0)), target_.resize(loops_->rows);
-  if constexpr (!std::is_same_v<S, Quad>) {
+  if constexpr (!std::is_same_v<S, Quad> && !is_recorded<S>) {
     if (wider) {
       using T = Wider<S>;
       const auto model = source_.compiled<T>();
@@ -213,7 +216,7 @@ template <class S>
 bool ConstrainedWorkspace<S>::sure(const Asked& asked, const Applied<S>& applied, bool refuse) {
   using std::abs;
   const int nv = model_->nv;
-  if (std::any_of(x_.begin(), x_.end(), [](const S& x) { return !std::isfinite(to_double(x)); })) return true;  // batches say what left its range
+  if (std::any_of(x_.begin(), x_.end(), [](const S& x) { return !is_finite(x); })) return true;  // batches say what left its range
   off_.assign(loops_->rows, S(0));
   S worst = S(0);
   for (const auto& group : groups_.groups) {
@@ -231,13 +234,16 @@ bool ConstrainedWorkspace<S>::sure(const Asked& asked, const Applied<S>& applied
     return false;
   }
   load_.assign(nv, S(0));
-  find_forces(asked, load_.data(), applied);
-  S size = energy_norm(generalized_.data()) + energy_norm(asked.tau);
   rows_.add_transposed(lambda_.data(), load_.data());
-  size += energy_norm(load_.data());
+  S size = energy_norm(load_.data()) + energy_norm(asked.tau);
   find_forces(asked, x_.data(), applied);
   for (int i = 0; i < nv; ++i) load_[i] += asked.tau[i] - generalized_[i];
-  if (const S left = energy_norm(load_.data()); !(left <= certified() * size)) {
+  const S left = energy_norm(load_.data());
+  if (!is_recorded<S> && left <= certified() * size) return true;  // of less than all that has cancelled: the rest costs as much again
+  off_.assign(nv, S(0));
+  find_forces(asked, off_.data(), applied);
+  size += energy_norm(generalized_.data());
+  if (!(left <= certified() * size)) {
     if (!refuse) return false;
     int most = 0;
     for (int i = 1; i < nv; ++i)
@@ -265,7 +271,7 @@ void ConstrainedWorkspace<S>::accelerate(const std::shared_ptr<const ResolvedLoo
   if (blocks_.faint().body >= 0) throw_faint_hinge(tree_, blocks_.faint());
   for (int i = 0; i < nv; ++i) x_[i] -= points_.absorbed[i];
   rows_.find(*model_, *loops, asked.q, buffers_);
-  if (std::any_of(x_.begin(), x_.end(), [](const S& x) { return !std::isfinite(to_double(x)); })) return;  // callers say what left its range
+  if (std::any_of(x_.begin(), x_.end(), [](const S& x) { return !is_finite(x); })) return;  // callers say what left its range
   // c, and what it is the sum of
   c_.assign(rows, S(0)), bias_.assign(rows, S(0));
   loop_bias(*model_, *loops, asked.q, asked.v, buffers_, c_.data());
@@ -308,5 +314,6 @@ template class ConstrainedWorkspace<Single>;
 template class ConstrainedWorkspace<double>;
 template class ConstrainedWorkspace<Extended>;
 template class ConstrainedWorkspace<Quad>;
+template class ConstrainedWorkspace<Recorded>;  // accelerate alone (recorded_on_loops.h)
 
 }  // namespace pycraft

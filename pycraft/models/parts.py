@@ -24,6 +24,7 @@ class Parts(WithOperators):
 
     _whole: Multibody | None = None
     _left_aside: dict[str, np.ndarray]
+    _added_nodes: set[str]
     _actuators: list[dict[str, Any]]
 
     # ------------------------------------------------------------------ taking one
@@ -133,7 +134,7 @@ class Parts(WithOperators):
                 aside[key] = np.r_[self.zero_q()[: 7 * self._moves], values[self.q_index]]
             else:
                 aside[key] = np.r_[np.full(6 * self._moves, np.nan), values[self.v_index]]
-        self._left_aside = aside
+        self._left_aside, self._added_nodes = aside, set()
         own = set(self.coordinate_names)
         self._actuators = [dict(actuator) for actuator in whole._actuators if actuator["coordinate"] in own]
 
