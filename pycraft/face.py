@@ -57,6 +57,13 @@ def compile_expression(*arguments: Any, **options: Any) -> Any:
     return compiled(*arguments, **options)
 
 
+def dof_shares(*arguments: Any) -> Any:
+    """`Multibody.dof_shares`."""
+    from .view.shares import dof_shares as shares
+
+    return shares(*arguments)
+
+
 def plot_model(*arguments: Any, **options: Any) -> Any:
     """`Multibody.plot`."""
     from .view import plot_model as plot
@@ -104,6 +111,7 @@ def attach() -> None:
         compile_call=compile_call,
         compile_expression=compile_expression,
         describe=describe,
+        dof_shares=dof_shares,
         embedded=embedded,
         embedded_source=source_again,
         exact_numbers=operator_set.exact_numbers,

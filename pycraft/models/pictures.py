@@ -92,6 +92,44 @@ class Pictures:
         options = dict(view=view, com=com, names=names, legend=legend, shadow=shadow, alpha=alpha)
         return _core._face["plot_model"](self, q, ax, **options)
 
+    def dof_shares(self, q=None) -> Any:
+        """Each body's share of the degrees of freedom, tr(Υ(k)M(k)), as numbers and as colour on the robot. O(N); with rotors O(N²).
+
+        The shares of bodies, and those of rotors tr(ℳ⁻¹(k,k)J(k)), add up to the number of coordinates N. Loops are not looked at: they are
+        the tree's shares.
+
+        Parameters
+        ----------
+        q : (nq,) or a State; the model's own where left out
+
+        Returns
+        -------
+        Shares
+            `by_body`, `of_bodies`, `of_rotors`, `total`; a table when printed, a picture with a colour bar in a notebook, `plot()` one by
+            Matplotlib.
+
+        Raises
+        ------
+        ModelError
+            A q that is none of this model's.
+        SingularHingeError
+            A hinge that moves without inertia.
+
+        Source: A. Jain, Robot and Multibody Dynamics, Springer 2011 (operational space inertias); `soa.theorems()`, "the bodies' shares
+        add up to N".
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> print(pc.chain(3, seed=1).dof_shares())
+        shares of the degrees of freedom of 'chain of 3', tr Υ(k)M(k)
+          body0   0.0585  █
+          body1   1.1511  ███████████████
+          body2   1.7903  ████████████████████████
+          together 3 of N = 3
+        """
+        return _core._face["dof_shares"](self, q)
+
     def view(self, q=None, v=None, *, host: str = "127.0.0.1", port: int = 0) -> Any:
         """The model in a live viewer: `Scene.view` of a scene that has nothing but the model's own gravity, if it has one.
 

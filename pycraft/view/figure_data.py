@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from .colour_scale import ramp
 from .skeleton import Skeleton, placed
 from .stick_figure import HINGES
 
@@ -30,7 +31,8 @@ def figure_data(skeleton: Skeleton, q: np.ndarray) -> dict[str, Any]:
     dict
         Plain data: names of bodies, the number of what carries each (-1 the base), their hinges; points and lines by what they are, with
         the numbers of bodies ("of") and places in their frames ("at", m); axes of hinges and half the length that they are drawn with,
-        m; the camera's axes "right" and "up" in the world, the box in view ("centre" and "half", m), the height of the floor.
+        m; the camera's axes "right" and "up" in the world, the box in view ("centre" and "half", m), the height of the floor; "ramp", the
+        colours of numbers.
     """
     described = skeleton.model.description()["bodies"]
     hinge, owner, point, direction = skeleton.axes
@@ -43,7 +45,7 @@ def figure_data(skeleton: Skeleton, q: np.ndarray) -> dict[str, Any]:
         "points": {kind: {"of": of.tolist(), "at": _rounded(at)} for kind, (of, at) in skeleton.points.items()},
         "lines": {kind: {"of": of.tolist(), "at": _rounded(at)} for kind, (of, at) in skeleton.lines.items()},
         "axes": {"hinge": hinge.tolist(), "of": owner.tolist(), "at": _rounded(point), "along": _rounded(direction)},
-        "right": np.eye(3)[right].tolist(), "up": np.eye(3)[up].tolist(),
+        "right": np.eye(3)[right].tolist(), "up": np.eye(3)[up].tolist(), "ramp": ramp(),
     }  # fmt: skip
     return data | _box(skeleton, np.asarray(q, float), data["grounded"], up)
 
