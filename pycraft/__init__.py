@@ -73,6 +73,7 @@ if _TYPE_CHECKING:
     from .proofs import Exercise, Proof, derivative, exercise, prove, prove_derivative, repair, worksheet
     from .scenes import Checkpoint, Event, Scene, effects, load_run, load_scene, mechanisms
     from .sympy_bridge import from_sympy, parse, to_sympy
+    from .view.hypothesis_page import hypothesis_switches
 
 # What takes long to import is imported when it is first asked for: the same names, each with its room.
 _LATER = {
@@ -88,6 +89,7 @@ _LATER = {
     "proofs": ("Exercise", "Proof", "derivative", "exercise", "prove", "prove_derivative", "repair", "worksheet"),
     "scenes": ("Checkpoint", "Event", "Scene", "effects", "load_run", "load_scene", "mechanisms"),
     "sympy_bridge": ("from_sympy", "parse", "to_sympy"),
+    "view.hypothesis_page": ("hypothesis_switches",),
 }
 
 
@@ -150,6 +152,7 @@ __all__ = [
     "euclidean",
     "exercise",
     "from_sympy",
+    "hypothesis_switches",
     "identity",
     "instruction_set",
     "interop",
