@@ -78,6 +78,13 @@ def check_model(*arguments: Any, **options: Any) -> Any:
     return check(*arguments, **options)
 
 
+def rerootings(*arguments: Any) -> Any:
+    """`Multibody.rerootings`."""
+    from .view.rerooting_page import rerootings as seen
+
+    return seen(*arguments)
+
+
 def solve_ik(*arguments: Any, **options: Any) -> Any:
     """`Multibody.solve_ik`."""
     from .kinematics import solve_ik as solve
@@ -120,6 +127,7 @@ def attach() -> None:
         model_from_description=Multibody.from_description,
         operator_from_nodes=operator_set.operator_from_nodes,
         plot_model=plot_model,
+        rerootings=rerootings,
         scalar_at=operator_set.scalar_at,
         scalar_gradient=operator_set.scalar_gradient,
         shared_out=shared_out,

@@ -130,6 +130,39 @@ class Pictures:
         """
         return _core._face["dof_shares"](self, q)
 
+    def rerootings(self, q=None, v=None) -> Any:
+        """The same motion seen from every base body in turn: a page with a slider for the base, and what changes with it and what stays.
+
+        The tree, coordinates and P(k) belong to the base that was chosen; poses, velocities, accelerations, energy, momentum, ln det ℳ
+        and Υ(k) do not: a body of a free tree is felt as Υ(k)⁻¹ = P(k) + S⁺(k), of which the base decides what is outboard.
+
+        Parameters
+        ----------
+        q, v : (nq,), (nv,), or a State; the model's own where left out
+
+        Returns
+        -------
+        RerootingPage
+            A notebook shows it; `save("bases.html")` writes a page that opens offline; `stays` and `changes` are its numbers. O(N²):
+            every body is made the base of a copy, by `reroot`; O(N⁴) for the condition numbers.
+
+        Raises
+        ------
+        ModelError
+            A tree whose root is not on a free hinge, and what else `reroot` refuses; a q or v that is none of this model's.
+        EvaluationError
+            More than 60 bodies.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> robot = pc.tree([-1, 0, 1], ["free", "pin", "ball"], seed=1)
+        >>> page = robot.rerootings(robot.random_state(0).q)
+        >>> page.bases, page.changes["bodies on the longest path"]
+        (['body0', 'body1', 'body2'], [3.0, 2.0, 3.0])
+        """
+        return _core._face["rerootings"](self, q, v)
+
     def view(self, q=None, v=None, *, host: str = "127.0.0.1", port: int = 0) -> Any:
         """The model in a live viewer: `Scene.view` of a scene that has nothing but the model's own gravity, if it has one.
 

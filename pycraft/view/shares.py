@@ -113,7 +113,7 @@ def rotor_shares(model: Any, q: np.ndarray) -> float:
     if not model.nv:
         return 0.0
     soa = model.soa
-    if soa._source.traits["J = 0"]:
+    if not model.has_rotor_inertia:
         return 0.0
     H, phi, M, J, I = soa("H phi M J I")
     product = (H @ phi @ M @ phi.T @ H.T + J).inv() @ J
