@@ -64,6 +64,13 @@ def dof_shares(*arguments: Any) -> Any:
     return shares(*arguments)
 
 
+def play_smoother(*arguments: Any) -> Any:
+    """`StateSpace.play`."""
+    from .view.kalman_page import play_smoother as play
+
+    return play(*arguments)
+
+
 def plot_model(*arguments: Any, **options: Any) -> Any:
     """`Multibody.plot`."""
     from .view import plot_model as plot
@@ -126,6 +133,7 @@ def attach() -> None:
         loop_source=loop_letters.loop_source,
         model_from_description=Multibody.from_description,
         operator_from_nodes=operator_set.operator_from_nodes,
+        play_smoother=play_smoother,
         plot_model=plot_model,
         rerootings=rerootings,
         scalar_at=operator_set.scalar_at,
