@@ -5,11 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 from .. import _core
+from .shapes import Shape
 from .tree_diagram import TreeDiagram, tree_diagram
 
 
 class Pictures:
     """What is printed and drawn of a model."""
+
+    _shapes: list[Shape]
 
     def tree(self, most: int | None = 200, *, nodes: bool = False) -> TreeDiagram:
         """The tree as text in 80 columns: each body below and right of the one that carries it, its hinge, and its places in q and v.
@@ -129,6 +132,21 @@ class Pictures:
           together 3 of N = 3
         """
         return _core._face["dof_shares"](self, q)
+
+    @property
+    def shapes(self) -> list[Shape]:
+        """What the model's file gives its bodies to be seen by, in the file's order; none of a model that was not loaded.
+
+        Visuals of a URDF file, geoms of the groups 0 to 2 of an MJCF file. The viewer and pages of runs draw them; meshes are looked for
+        and read then (extra `meshes`). `Multibody.save` leaves them out.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> pc.chain(2).shapes
+        []
+        """
+        return list(self._shapes)
 
     def rerootings(self, q=None, v=None) -> Any:
         """The same motion seen from every base body in turn: a page with a slider for the base, and what changes with it and what stays.

@@ -53,7 +53,7 @@ class RunPage(Page):
              "lines": [number_text(values[shown]) for values in panel.lines.values()]}
             for panel in self._panels
         ]  # fmt: skip
-        data = {
+        data: dict[str, Any] = {
             "figure": figure_data(self._skeleton, self._q), "times": number_text(self.times),
             "poses": number_text(pose_rows(self._skeleton, self._q)), "panels": panels,
             "way": None if self._way is None else number_text(self._way),
@@ -63,7 +63,8 @@ class RunPage(Page):
             f'<option value="{speed:g}"{" selected" if speed == self.speed else ""}>×{speed:g}</option>'
             for speed in sorted({*SPEEDS, self.speed})
         )
-        said = escape(f"{', '.join(run.effects) or 'no effects'}; {first:g} to {last:g} s")
+        told = [f"{', '.join(run.effects) or 'no effects'}; {first:g} to {last:g} s", *data["figure"]["unshown"]]
+        said = escape("; ".join(told))
         return web_page("film", run.model.name, data, {"said": said, "speeds": speeds})
 
     def save(self, path: str | Path) -> Path:

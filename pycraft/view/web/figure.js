@@ -32,7 +32,7 @@ function turned(poses, owner, d) {
 class Figure {
   // data: what pycraft/view/figure_data.py says of a model; picked(body): a body was clicked, -1 for none
   constructor(canvas, data, picked = () => {}) {
-    Object.assign(this, { canvas, data, picked, poses: new Float32Array(), ghosts: [], arrows: [], way: null, chosen: -1, shade: null });
+    Object.assign(this, { canvas, data, picked, poses: new Float32Array(), ghosts: [], arrows: [], way: null, chosen: -1, shade: null, solid: true });
     this.context = canvas.getContext("2d");
     this.look();
     this.listen();
@@ -225,11 +225,47 @@ class Figure {
     }
     items.sort((a, b) => a.depth - b.depth);
     context.globalAlpha = alpha;
+    const faces = this.solid && data.solids.length ? this.faces(data, poses, colour) : [];
+    for (const face of faces) this.drawFace(face);
+    if (!colour) this.drawn = faces;
     context.lineCap = "round";
     for (const item of items) this.drawItem(item);
     context.setLineDash([]);
     context.globalAlpha = 1;
     if (!colour) this.items = items;
+  }
+
+  // Triangles of the bodies' shapes as they are seen, from back to front, lit from where they are looked at.
+  faces(data, poses, colour) {
+    const found = [];
+    for (const solid of data.solids) {
+      solid.read ??= { vertices: numbers(solid.vertices), faces: numbers(solid.faces) };
+      const { vertices, faces } = solid.read, seen = [];
+      for (let i = 0; i < vertices.length; i += 3) seen.push(this.seen(placed(poses, solid.of, vertices.subarray(i, i + 3))));
+      const own = colour || (solid.of === this.chosen && solid.of >= 0 ? colourOf("--chosen") : this.shadeOf(solid.of)) || solid.colour || colourOf("--solid");
+      const parts = (own.match(/^#/) ? [1, 3, 5].map((i) => parseInt(own.slice(i, i + 2), 16)) : own.match(/[\d.]+/g).map(Number)).slice(0, 3);
+      for (let i = 0; i < faces.length; i += 3) {
+        const points = [seen[faces[i]], seen[faces[i + 1]], seen[faces[i + 2]]];
+        const [a, b, c] = points, [u, v] = [along(b, -1, a), along(c, -1, a)].map(([x, y, z]) => [x, y, z * this.scale]);
+        const normal = cross(u, v), size = Math.hypot(...normal);
+        if (!(size > 1e-9)) continue;
+        const light = 0.45 + 0.55 * Math.abs(normal[2]) / size; // of both sides: meshes do not all say which is out
+        found.push({ depth: a[2] + b[2] + c[2], points, body: solid.of, fill: `rgb(${parts.map((x) => Math.round(light * x)).join(", ")})` });
+      }
+    }
+    return found.sort((a, b) => a.depth - b.depth);
+  }
+
+  drawFace({ points, fill }) {
+    const { context } = this;
+    context.setLineDash([]);
+    context.beginPath();
+    for (const [x, y] of points) context.lineTo(x, y);
+    context.closePath();
+    context.fillStyle = context.strokeStyle = fill;
+    context.lineWidth = 0.7; // no light between neighbours
+    context.fill();
+    context.stroke();
   }
 
   drawItem({ ends, dot: at, stroke, fill, width, dashes, radius, body }) {
@@ -272,7 +308,7 @@ class Figure {
     context.fill();
   }
 
-  // The body whose hinge or line is nearest to a place in the picture, within 14 pixels; -1 for none.
+  // The body whose hinge or line is nearest to a place in the picture, within 14 pixels, or whose shape is seen there; -1 for none.
   bodyAt(x, y) {
     let nearest = -1, least = 14;
     for (const { ends, dot: at, body } of this.items || []) {
@@ -287,7 +323,13 @@ class Figure {
       }
       if (distance < least) [nearest, least] = [body, distance];
     }
-    return nearest;
+    if (nearest >= 0) return nearest;
+    const side = ([ax, ay], [bx, by]) => (bx - ax) * (y - ay) - (by - ay) * (x - ax);
+    const hit = (this.drawn || []).findLast(({ points: [a, b, c] }) => {
+      const sides = [side(a, b), side(b, c), side(c, a)];
+      return sides.every((s) => s >= 0) || sides.every((s) => s <= 0);
+    });
+    return hit ? hit.body : -1;
   }
 }
 

@@ -206,7 +206,7 @@ function arrows() {
     const share = longest[kind] ? (0.6 * reach) / longest[kind] : 0;
     for (const [at, vector] of list) figure.arrows.push({ at, along: vector.map((x) => share * x), colour: colourOf(styles[kind]) });
     return `longest ${kind}: ${+now.toPrecision(3)} ${units[kind]}`;
-  }).concat(state.missing).join("; ");
+  }).concat(state.missing, setup.figure.unshown).join("; ");
 }
 
 function show(now) {
@@ -265,6 +265,9 @@ for (const action of ["step", "reset", "neutral", "random", "rest"]) byId(action
 byId("scale").addEventListener("change", (event) => act("scale", { to: +event.target.value }));
 byId("ghost").addEventListener("change", (event) => act("ghost", { name: event.target.value }));
 for (const kind of ["velocity", "force", "shade"]) byId(kind).addEventListener("change", refresh);
+byId("solid").addEventListener("change", (event) => { figure.solid = event.target.checked; figure.draw(); });
+byId("solids").hidden = !setup.figure.solids.length;
+byId("said").title = setup.figure.unshown.join("; ");
 byId("look").addEventListener("click", () => figure.look());
 build();
 buildTree();
