@@ -74,6 +74,7 @@ if _TYPE_CHECKING:
     from .scenes import Checkpoint, Event, Scene, effects, load_run, load_scene, mechanisms
     from .scenes.loop_comparison import loops_compared
     from .sympy_bridge import from_sympy, parse, to_sympy
+    from .view.hypothesis_page import hypothesis_switches
 
 # What takes long to import is imported when it is first asked for: the same names, each with its room.
 _LATER = {
@@ -90,6 +91,7 @@ _LATER = {
     "scenes": ("Checkpoint", "Event", "Scene", "effects", "load_run", "load_scene", "mechanisms"),
     "scenes.loop_comparison": ("loops_compared",),
     "sympy_bridge": ("from_sympy", "parse", "to_sympy"),
+    "view.hypothesis_page": ("hypothesis_switches",),
 }
 
 
@@ -152,6 +154,7 @@ __all__ = [
     "euclidean",
     "exercise",
     "from_sympy",
+    "hypothesis_switches",
     "identity",
     "instruction_set",
     "interop",

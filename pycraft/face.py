@@ -57,6 +57,20 @@ def compile_expression(*arguments: Any, **options: Any) -> Any:
     return compiled(*arguments, **options)
 
 
+def dof_shares(*arguments: Any) -> Any:
+    """`Multibody.dof_shares`."""
+    from .view.shares import dof_shares as shares
+
+    return shares(*arguments)
+
+
+def play_smoother(*arguments: Any) -> Any:
+    """`StateSpace.play`."""
+    from .view.kalman_page import play_smoother as play
+
+    return play(*arguments)
+
+
 def plot_model(*arguments: Any, **options: Any) -> Any:
     """`Multibody.plot`."""
     from .view import plot_model as plot
@@ -69,6 +83,13 @@ def check_model(*arguments: Any, **options: Any) -> Any:
     from .identities.checker import check_model as check
 
     return check(*arguments, **options)
+
+
+def rerootings(*arguments: Any) -> Any:
+    """`Multibody.rerootings`."""
+    from .view.rerooting_page import rerootings as seen
+
+    return seen(*arguments)
 
 
 def solve_ik(*arguments: Any, **options: Any) -> Any:
@@ -104,6 +125,7 @@ def attach() -> None:
         compile_call=compile_call,
         compile_expression=compile_expression,
         describe=describe,
+        dof_shares=dof_shares,
         embedded=embedded,
         embedded_source=source_again,
         exact_numbers=operator_set.exact_numbers,
@@ -111,7 +133,9 @@ def attach() -> None:
         loop_source=loop_letters.loop_source,
         model_from_description=Multibody.from_description,
         operator_from_nodes=operator_set.operator_from_nodes,
+        play_smoother=play_smoother,
         plot_model=plot_model,
+        rerootings=rerootings,
         scalar_at=operator_set.scalar_at,
         scalar_gradient=operator_set.scalar_gradient,
         shared_out=shared_out,

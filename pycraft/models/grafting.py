@@ -13,6 +13,7 @@ from ..arguments import pose_parts, text
 from .asides import Asides
 from .handles import Body, Node, Vector
 from .hinge_arguments import body_name, frame_name
+from .shapes import Shape, renamed
 from .with_loops import WithLoops
 
 
@@ -31,6 +32,7 @@ class Grafting(WithLoops):
 
     _left_aside: dict[str, np.ndarray]
     _actuators: list[dict[str, Any]]
+    _shapes: list[Shape]
     _added_nodes: set[str]
     _scenes: WeakSet[Any] | None = None
 
@@ -237,6 +239,7 @@ class Grafting(WithLoops):
             self.loops._declare(loop)
         own.put(self)
         its.add(self, dict(zip(hinges, new_hinges, strict=True)), called)
+        self._shapes = [*self._shapes, *renamed(source._shapes, {*bodies, *nodes}, called)]
 
 
 def _frames_on(model: Any, carriers: set[str], with_base: bool) -> list[dict[str, Any]]:

@@ -19,6 +19,7 @@ from .hinge_arguments import frame_name, hinge_arguments
 from .parts import Parts
 from .pictures import Pictures
 from .planning import Planning
+from .shapes import Shape
 from .structure import Structure
 from .with_loops import WithLoops
 
@@ -55,6 +56,7 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, Planning, Structure, 
         self._left_aside: dict[str, np.ndarray] = {}
         self._added_nodes: set[str] = set()
         self._actuators: list[dict[str, Any]] = []
+        self._shapes: list[Shape] = []
 
     # ------------------------------------------------------------------ structure
     def add_body(
@@ -332,7 +334,7 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, Planning, Structure, 
     def _told(self) -> tuple[Any, ...]:
         frames = self._kept_frames
         moment = None if frames is None else (frames.t, np.array(frames.vdot))
-        return self.description(), self._left_aside, self._actuators, self._added_nodes, moment
+        return self.description(), self._left_aside, self._actuators, self._added_nodes, moment, self._shapes
 
     def __repr__(self) -> str:
         if self._whole is None:
@@ -349,11 +351,12 @@ def _again(
     actuators: Sequence[dict[str, Any]] = (),
     added_nodes: Collection[str] = (),
     moment: tuple[float, np.ndarray] | None = None,
+    shapes: Sequence[Shape] = (),
 ) -> Multibody:
     """A copy of a model from its description, what its file said beside it, which nodes were added since, and its frames' t and vdot."""
     model = Multibody.from_description(description)
     model._left_aside, model._actuators = dict(left_aside), [dict(actuator) for actuator in actuators]
-    model._added_nodes = set(added_nodes)
+    model._added_nodes, model._shapes = set(added_nodes), list(shapes)
     if moment is not None:
         model.frames.t, model.frames.vdot = moment
     return model

@@ -22,12 +22,14 @@ class PlaneLayout:
     bodies : (n, 2)
     base : (2,)
     bones : (m, 2, 2) lines of the figure beside those from body to body; none of a diagram
+    owners : (m,) numbers of the bodies that the bones are fixed on at their first end, -1 the base
     axes : (n, 2, 3) what is seen of each body's frame: rows are the picture's x and y, columns the frame's axes; None of a diagram
     """
 
     bodies: np.ndarray
     base: np.ndarray
     bones: np.ndarray
+    owners: np.ndarray
     axes: np.ndarray | None
 
 
@@ -54,7 +56,7 @@ def tree_layout(parents: Sequence[int], width: float, height: float, margin: flo
     spread = (x + 0.5) / max(leaves, 1)
     level = depth / max(depth.max(), 1)
     places = np.column_stack([margin + spread * (width - 2 * margin), height - margin - level * (height - 2 * margin)])
-    return PlaneLayout(places[:-1], places[-1], np.zeros((0, 2, 2)), None)
+    return PlaneLayout(places[:-1], places[-1], np.zeros((0, 2, 2)), np.zeros(0, int), None)
 
 
 def model_layout(model: Any, q: Any, width: float, height: float, margin: float, radius: float) -> PlaneLayout:
@@ -63,8 +65,10 @@ def model_layout(model: Any, q: Any, width: float, height: float, margin: float,
     poses = skeleton.poses(np.asarray(q, float))
     seen = _seen(skeleton, model)
     hinges = placed(poses, *skeleton.points["joint"]) @ seen.T
-    lines = [placed(poses, *skeleton.lines[kind]) @ seen.T for kind in ("bone", "slide", "ground", "tie") if len(skeleton.lines[kind][0])]
+    kinds = ("bone", "slide", "ground", "tie")
+    lines = [placed(poses, *skeleton.lines[kind]) @ seen.T for kind in kinds if len(skeleton.lines[kind][0])]
     bones = np.concatenate(lines) if lines else np.zeros((0, 2, 2))
+    owners = np.concatenate([skeleton.lines[kind][0][:, 0] for kind in kinds])
     everything = np.concatenate([hinges, bones.reshape(-1, 2), np.zeros((1, 2))])
     low, high = everything.min(axis=0), everything.max(axis=0)
     scale = min((width - 2 * margin) / max(high[0] - low[0], 1e-12), (height - 2 * margin) / max(high[1] - low[1], 1e-12))
@@ -77,9 +81,8 @@ def model_layout(model: Any, q: Any, width: float, height: float, margin: float,
 
     bodies = _side_by_side(picture(hinges), 2.2 * radius)
     flip = np.array([[1.0], [-1.0]])
-    return PlaneLayout(
-        bodies, picture(np.zeros(2)), picture(bones), np.array([flip * (seen @ poses[k, :3, :3]) for k in range(len(bodies))])
-    )
+    axes = np.array([flip * (seen @ poses[k, :3, :3]) for k in range(len(bodies))])
+    return PlaneLayout(bodies, picture(np.zeros(2)), picture(bones), owners, axes)
 
 
 def _seen(skeleton: Skeleton, model: Any) -> np.ndarray:
