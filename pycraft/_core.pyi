@@ -344,7 +344,9 @@ class Operator:
     def _parts(self) -> tuple:
         ...
     def _repr_latex_(self) -> typing.Any:
-        ...
+        """
+        The formula, broken where it is long, and below it spaces, structure and cost.
+        """
     def _with_operand(self, arg0: Operator) -> Operator:
         """
         The same function of another operand.
@@ -598,7 +600,7 @@ class Scalar:
         ...
     def _parts(self) -> tuple[int, typing.Any, typing.Any, typing.Any]:
         ...
-    def _repr_latex_(self) -> str:
+    def _repr_latex_(self) -> typing.Any:
         ...
     def algorithm(self, language: str = 'text') -> typing.Any:
         """
@@ -1374,6 +1376,8 @@ class Theorem:
     def __reduce__(self) -> tuple:
         ...
     def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> typing.Any:
         ...
     def unmet(self, arg0: SkoSource) -> list[str]:
         """

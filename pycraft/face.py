@@ -13,6 +13,8 @@ from .models.embedded_loops import embedded, source_again
 from .models.multibody import Multibody, describe
 from .operators import loop_letters, operator_set
 from .operators.block_view import block_view
+from .operators.explanation import Explanation, explain
+from .operators.shown_expression import expression_latex, formula_latex
 
 
 def algorithm(expression: _core.Operator | _core.Scalar, language: str = "text", request: str = "apply") -> Any:
@@ -64,6 +66,20 @@ def dof_shares(*arguments: Any) -> Any:
     return shares(*arguments)
 
 
+def linked_blocks(view: Any, on: str) -> Any:
+    """`BlockView.on_robot`."""
+    from .view.linked_blocks import LinkedBlocks
+
+    return LinkedBlocks(view, on)
+
+
+def plan_html(explanation: Explanation) -> str:
+    """`Explanation._repr_html_`."""
+    from .view.plan_picture import plan_html as shown
+
+    return shown(explanation)
+
+
 def play_smoother(*arguments: Any) -> Any:
     """`StateSpace.play`."""
     from .view.kalman_page import play_smoother as play
@@ -90,6 +106,13 @@ def rerootings(*arguments: Any) -> Any:
     from .view.rerooting_page import rerootings as seen
 
     return seen(*arguments)
+
+
+def theorem_html(theorem: _core.Theorem) -> str:
+    """`Theorem._repr_html_`."""
+    from .identities.findings_page import theorem_html as shown
+
+    return shown(theorem)
 
 
 def solve_ik(*arguments: Any, **options: Any) -> Any:
@@ -129,10 +152,14 @@ def attach() -> None:
         embedded=embedded,
         embedded_source=source_again,
         exact_numbers=operator_set.exact_numbers,
-        explain=operator_set.explain,
+        explain=explain,
+        expression_latex=expression_latex,
+        formula_latex=formula_latex,
+        linked_blocks=linked_blocks,
         loop_source=loop_letters.loop_source,
         model_from_description=Multibody.from_description,
         operator_from_nodes=operator_set.operator_from_nodes,
+        plan_html=plan_html,
         play_smoother=play_smoother,
         plot_model=plot_model,
         rerootings=rerootings,
@@ -140,6 +167,7 @@ def attach() -> None:
         scalar_gradient=operator_set.scalar_gradient,
         shared_out=shared_out,
         solve_ik=solve_ik,
+        theorem_html=theorem_html,
         thread_count=thread_count,
         view_model=view_model,
         view_scene=view_scene,

@@ -364,10 +364,10 @@ void define_text(py::class_<Expression>& op) {
         if (e.floating()) return "<" + text + ">";
         return "<" + text + " : " + e.domain().description() + " → " + e.codomain().description() + ">";
       })
-      .def("_repr_latex_", [](const Expression& e) -> py::object {
-        const std::string text = show(e, Style::latex, 20000);  // half a formula is no LaTeX: what is longer shows as its repr
-        return text.ends_with(" …") ? py::object(py::none()) : py::cast("$\\displaystyle " + text + "$");
-      })
+      .def("_repr_latex_", [](const py::object& e) -> py::object {
+        const std::string text = show(e.cast<const Expression&>(), Style::latex, 20000);  // half a formula is no LaTeX: what is longer shows as its repr
+        return text.ends_with(" …") ? py::object(py::none()) : of_face("expression_latex")(e, text);
+      }, "The formula, broken where it is long, and below it spaces, structure and cost.")
       .def("_parts", &parts)
       .def("__reduce__", [](const Expression& e) -> py::tuple {
         return py::make_tuple(of_face("operator_from_nodes"), py::make_tuple(all_parts(e)));

@@ -120,7 +120,7 @@ void register_scalars(py::module_& m) {
            "Multibody.compile.")
       .def("text", [](const Scalar& a) { return show(a); })
       .def("latex", [](const Scalar& a) { return show(a, Style::latex); })
-      .def("_repr_latex_", [](const Scalar& a) { return "$" + show(a, Style::latex) + shown_value(a, " = ") + "$"; })
+      .def("_repr_latex_", [](const Scalar& a) { return of_face("formula_latex")(show(a, Style::latex) + shown_value(a, " = ")); })
       .def("__repr__", [](const Scalar& a) { return "<scalar " + show(a) + shown_value(a, " = ") + ">"; })
       // ---- the tree, to be read
       .def_property_readonly("kind", [](const Scalar& a) { return scalar_kind_name(a.node().kind); },

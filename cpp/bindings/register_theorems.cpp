@@ -57,6 +57,7 @@ void register_theorems(py::module_& m) {
                               py::make_tuple(t.name, t.group, waits ? py::none() : side(t.lhs), waits ? py::none() : side(t.rhs),
                                              static_cast<unsigned>(t.hypotheses), t.source, static_cast<int>(t.use), t.on_one_path, t.at_most, t.waiting, t.text, t.latex));
       })
+      .def("_repr_html_", [](const Theorem& t) { return of_face("theorem_html")(t); })
       .def("__repr__", [](const Theorem& t) { return "<theorem " + t.name + ">"; });
   m.def("_theorem_from_parts", [](std::string name, std::string group, const py::object& lhs, const py::object& rhs, unsigned hypotheses, std::string source,
                                   int use, bool on_one_path, bool at_most, std::string waiting, std::string text, std::string latex) {

@@ -106,19 +106,21 @@ def check(
     states: Annotated[int, typer.Option(help="Random states beside the present one.")] = 3,
     seed: Annotated[int, typer.Option(help="Seed of the states.")] = 0,
     precision: Annotated[str, typer.Option(help="The first scalar beside double: extended | quad | 50 | 100 (digits).")] = "extended",
-    full: Annotated[bool, typer.Option("--full", help="Every theorem, not the summary and the exceptions alone.")] = False,
+    every: Annotated[bool, typer.Option("--all", help="The long form: residuals, bounds, hypotheses and notes of every theorem.")] = False,
     json: Annotated[bool, typer.Option("--json", help="The report as JSON.")] = False,
     root: Root = None,
     mimic: Mimic = "refuse",
 ) -> None:
     """Check every theorem on a model, or the displayed equations of a LaTeX paper (a .tex file, on random trees).
 
+    One line a theorem, the verdict first, what does not simply hold before the others.
+
     Exit status 1 if something fails that should hold, 3 if something is undecided, or undefined on the model.
     """
     check_least(0, states=states, seed=seed)
     wide = int(precision) if precision.isdecimal() else precision
     if model.endswith(".tex"):
-        for option, given in (("full", full), ("root", root is not None), ("mimic", mimic != "refuse")):
+        for option, given in (("all", every), ("root", root is not None), ("mimic", mimic != "refuse")):
             if given:
                 fail(f"--{option} belongs to models; a paper is checked on random trees, and shown in full")
         _check_paper(model, states, seed, wide, json)
@@ -129,7 +131,7 @@ def check(
         print(report.to_json())
     else:
         console.print(report.summary(), markup=False, highlight=False)
-        console.print(report.table(full))
+        console.print(report.table() if every else report.lines(console.width))
     raise typer.Exit(report.status)
 
 

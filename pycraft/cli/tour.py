@@ -186,9 +186,8 @@ def _show_theorems(robot: Any, soa: Any, say: Say) -> None:
     say.heading("Every theorem, checked on this robot")
     robot.v = robot.random_state(seed=1).v
     report = soa.check(states=1)
-    say.text(report.summary())
-    say.show(report.table(full=False))
-    say.text("Every one of them: soa.check().full(), or pycraft check --full.")
+    say.text(repr(report))
+    say.text("Every one of them: soa.check().full(), or pycraft check --all.")
     say.heading("A conjecture, typed, tested and refuted")
     for statement in ("HψMψ*H* == D", "Ω = Υ + ψ̃*Υ + Υψ̃"):
         say.code(f'pc.check("{statement}")', repr(check(statement)))

@@ -6,8 +6,11 @@ import json
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from rich.text import Text
+
+from .findings_page import finding_html, report_html, statement_html
 from .judge import FAILS, HOLDS, UNDECIDED, UndecidedError, Verdict
-from .terminal_report import WIDTH, findings_table, monospace, precision_text, read_as, text_of, wrapped
+from .terminal_report import WIDTH, findings_lines, findings_table, monospace, precision_text, read_as, text_of, wrapped
 
 UNDEFINED = "undefined"
 OPEN = ("fails", "undecided", "undefined")
@@ -64,6 +67,9 @@ class Finding:
     def passed(self) -> bool:
         return self.verdict in PASSED
 
+    def _repr_html_(self) -> str:
+        return finding_html(self)
+
 
 @dataclass
 class Report:
@@ -71,8 +77,8 @@ class Report:
 
     As a condition: true if all that should hold does, false if something fails that should hold, or is undefined, or if nothing holds
     at all: what was not shown is not true; UndecidedError where nothing fails and something is undecided. `.status` says the same as an
-    exit status, 0, 1 (something fails) or 3 (something was not shown). Printed, it is the summary and the exceptions; `.full()` has every
-    theorem.
+    exit status, 0, 1 (something fails) or 3 (something was not shown). Printed, it is the summary and a line for each exception;
+    `.lines()` has a line for every theorem, `.full()` the long form. `report[name]` is the finding of one theorem.
     """
 
     model: str
@@ -124,9 +130,26 @@ class Report:
             indent=1,
         )
 
-    def table(self, full: bool = True) -> Any:
-        """The findings as a rich table; without `full` only those that do not simply hold."""
-        return findings_table([f for f in self.findings if full or f.verdict not in (HOLDS, "holds anyway")])
+    def __getitem__(self, name: str) -> Finding:
+        for found in self.findings:
+            if found.name == name:
+                return found
+        raise KeyError(f"no theorem is called {name!r}; .findings has all, each with its name")
+
+    @property
+    def _exceptions(self) -> list[Finding]:
+        """What does not simply hold."""
+        return [f for f in self.findings if f.verdict not in (HOLDS, "holds anyway")]
+
+    def table(self) -> Any:
+        """The findings as a rich table, the long form."""
+        return findings_table(self.findings)
+
+    def lines(self, width: int = WIDTH) -> Any:
+        """The findings as a rich text, one line a theorem and the verdict first; what does not simply hold comes before the others."""
+        exceptions = self._exceptions
+        parts = [exceptions, [f for f in self.findings if f not in exceptions]]
+        return Text("\n").join(findings_lines(part, width) for part in parts if part)
 
     def summary(self) -> str:
         """How many of each verdict, in one or two lines; what is wrong comes first."""
@@ -143,45 +166,16 @@ class Report:
         return "\n".join(map(wrapped, (found, *known.split("\n"))))
 
     def full(self) -> str:
-        """Every theorem as text, in 80 columns."""
+        """Every theorem in the long form as text, in 80 columns."""
         return f"{self.summary()}\n\n{text_of(self.table())}"
 
     def __repr__(self) -> str:
-        if all(f.verdict in (HOLDS, "holds anyway") for f in self.findings):
+        if not self._exceptions:
             return self.summary()
-        return f"{self.summary()}\n\n{text_of(self.table(full=False))}"
+        return f"{self.summary()}\n\n{text_of(findings_lines(self._exceptions))}"
 
     def _repr_html_(self) -> str:
-        from html import escape
-
-        rows, group = [], None
-        color = {
-            "holds": "#2a7",
-            "fails": "#c22",
-            "undecided": "#c90",
-            "expected to fail": "#28a",
-            "holds anyway": "#2a7",
-            "waiting": "#999",
-            "undefined": "#c90",
-        }
-        for f in self.findings:
-            if f.group != group:
-                group = f.group
-                rows.append(f"<tr><th colspan=6 style='text-align:left;padding-top:8px'>{escape(group)}</th></tr>")
-            numbers = (
-                "<td></td><td></td><td></td>"
-                if not f.states
-                else f"<td>{f.in_double}</td><td>{f.wide_residual:.1e} ({f.wide_precision})</td><td>{f.wide_bound:.0e}</td>"
-            )
-            note = f" ({escape(', '.join(f.unmet))} not met)" if f.unmet else f" ({escape(f.note)})" if f.note else ""
-            rows.append(
-                f"<tr><td style='text-align:left'>${f.latex}$</td>"
-                f"<td style='text-align:left'>{escape(', '.join(f.hypotheses))}</td>{numbers}"
-                f"<td style='text-align:left;color:{color[f.verdict]}'>{f.verdict}{note}</td></tr>"
-            )
-        left = "<th style='text-align:left'>"
-        head = f"<tr>{left}theorem</th>{left}hypotheses</th><th>double</th><th>decided</th><th>bound</th>{left}verdict</th></tr>"
-        return f"<p><b>{escape(self.summary()).replace(chr(10), '<br>')}</b></p><table style='font-size:85%'>{head}{''.join(rows)}</table>"
+        return report_html(self)
 
 
 @dataclass
@@ -252,6 +246,9 @@ class CheckReport:
 
     def __repr__(self) -> str:
         return "\n".join([*map(wrapped, monospace(self.statement).split("\n")), *self.details()])
+
+    def _repr_html_(self) -> str:
+        return statement_html(self)
 
     def details(self) -> list[str]:
         """What the report says below the statement, line by line."""

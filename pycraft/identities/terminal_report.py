@@ -10,6 +10,8 @@ from functools import lru_cache
 from io import StringIO
 from typing import Any
 
+from rich.cells import cell_len
+
 from .. import _core
 
 WIDTH = 80
@@ -66,8 +68,28 @@ def precision_text(precision: str | int) -> str:
     return f"{precision} digits" if str(precision).isdigit() else str(precision)
 
 
+def findings_lines(findings: Sequence[Any], width: int = WIDTH) -> Any:
+    """One line a theorem, the verdict first: its statement, or its name where that has no room, and what it needs where that is not met.
+
+    Nothing is cut and nothing goes on in a second line; `findings_table` is the long form.
+    """
+    from rich.text import Text
+
+    edge = max((len(f.verdict) for f in findings), default=0) + 2
+    lines = Text(no_wrap=True, overflow="ignore")
+    for i, f in enumerate(findings):
+        lines.append("\n" if i else "").append(f"{f.verdict:<{edge}}", style=STYLES[f.verdict])
+        statement = monospace(f.statement).replace("\n", " ")
+        need = f"  needs {', '.join(f.unmet)}" if f.unmet else f"  waits for {f.note}" if f.verdict == "waiting" else ""
+        name = monospace(f.name)
+        said = [(statement, need), (name, need), (statement, ""), (name, "")]
+        shown, note = next((pair for pair in said if cell_len("".join(pair)) <= width - edge), (name, ""))
+        lines.append(shown).append(note, style="dim")
+    return lines
+
+
 def findings_table(findings: Sequence[Any]) -> Any:
-    """Theorems by group: statement, the residual and bound that decided and in which precision, the verdict."""
+    """The long form, theorems by group: statement, the residual and bound that decided and in which precision, the verdict."""
     from rich.padding import Padding
     from rich.table import Table
     from rich.text import Text
@@ -104,48 +126,3 @@ def text_of(renderable: Any, width: int = WIDTH) -> str:
     console = Console(file=StringIO(), width=width, color_system=None, force_jupyter=False)
     console.print(renderable)
     return "\n".join(line.rstrip() for line in console.file.getvalue().splitlines()).strip("\n")  # type: ignore[attr-defined]  # a StringIO
-
-
-_COLORS = {"true": "#2a7", "FALSE": "#c22", "undecided": "#c90", "not said": "#999"}
-
-
-def _grid(found: Any) -> tuple[list[tuple[str, str, str]], list[str], dict[Any, Any]]:
-    """(rows (shape, J, base), columns (hinges), cells by row and column) of a truth map."""
-    rows = list(dict.fromkeys((c.cell.shape, c.cell.J, c.cell.base) for c in found.cells))
-    columns = list(dict.fromkeys(c.cell.hinges for c in found.cells))
-    return rows, columns, {((c.cell.shape, c.cell.J, c.cell.base), c.cell.hinges): c for c in found.cells}
-
-
-def truth_html(found: Any) -> str:
-    """A truth map as an HTML table."""
-    from html import escape
-
-    rows, columns, cells = _grid(found)
-    head = "".join(f"<th>{escape(c)}</th>" for c in ("tree", "J", "base", *columns))
-    lines = []
-    for row in rows:
-        words = [(cells[row, column].word, _COLORS[cells[row, column].verdict]) for column in columns]
-        data = "".join(f"<td style='text-align:left;color:{color}'>{escape(word)}</td>" for word, color in words)
-        lines.append(f"<tr>{''.join(f'<th>{escape(name)}</th>' for name in row)}{data}</tr>")
-    return f"<table style='font-size:85%'><tr>{head}</tr>{''.join(lines)}</table>"
-
-
-def truth_plot(found: Any, ax: Any = None) -> Any:
-    """A truth map as a picture: one tile a cell, with the smallest case in each false one; returns the axes."""
-    import matplotlib.pyplot as plt
-
-    rows, columns, cells = _grid(found)
-    if ax is None:
-        _, ax = plt.subplots(figsize=(2.6 * len(columns) + 1.5, 0.5 * len(rows) + 1), layout="constrained")
-    for i, row in enumerate(rows):
-        for j, column in enumerate(columns):
-            cell = cells[row, column]
-            ax.add_patch(plt.Rectangle((j, i), 1, 1, facecolor=_COLORS[cell.verdict], alpha=0.25, edgecolor="white", linewidth=2))
-            ax.text(j + 0.5, i + 0.5, cell.word.replace(": ", ":\n"), ha="center", va="center", fontsize=7)
-    ax.set(xlim=(0, len(columns)), ylim=(len(rows), 0), title=f"{found.statement}\n{found.verdict}")
-    ax.set_xticks([j + 0.5 for j in range(len(columns))], columns)
-    ax.set_yticks([i + 0.5 for i in range(len(rows))], [", ".join(row) for row in rows])
-    ax.tick_params(length=0)
-    for side in ax.spines.values():
-        side.set_visible(False)
-    return ax

@@ -7,7 +7,6 @@ import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from html import escape
 from typing import Any
 
 from .. import _core
@@ -17,6 +16,7 @@ from .judge import FAILS, HOLDS, UNDECIDED
 from .parse import Statements, as_text
 from .search import Counterexample, judged, smallest, understood
 from .terminal_report import STYLES, monospace, read_as, text_of, wrapped
+from .truth_picture import truth_html, truth_plot
 
 TRUE, FALSE, UNREAD = "true", "FALSE", "not said"
 _WORDS = {HOLDS: TRUE, FAILS: FALSE, UNDECIDED: UNDECIDED}
@@ -121,14 +121,10 @@ class TruthMap:
         return f"{head}\n\n{text_of(self.table())}"
 
     def _repr_html_(self) -> str:
-        from .terminal_report import truth_html
-
-        return f"<p><b>{escape(self.statement)}</b><br>{escape(self.verdict)}</p>" + truth_html(self)
+        return truth_html(self)
 
     def plot(self, ax: Any = None) -> Any:
-        """The map as a picture: green where true, red where false with the smallest case; returns the axes."""
-        from .terminal_report import truth_plot
-
+        """The map as a picture: true and false tiles, in the false ones the smallest cases drawn as trees; returns the axes."""
         return truth_plot(self, ax)
 
 

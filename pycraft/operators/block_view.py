@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import cached_property
 from html import escape
+from typing import Any
 
 import numpy as np
 
@@ -36,12 +37,12 @@ class BlockView:
     """
 
     def __init__(self, operator: _core.Operator, rows: list[tuple[str, slice]], columns: list[tuple[str, slice]], title: str):
-        self.title, self._operator = title, operator
+        self.title, self.operator = title, operator
         self._rows, self._columns = dict(rows), dict(columns)
 
     @cached_property
     def values(self) -> np.ndarray:
-        return self._operator.dense()
+        return self.operator.dense()
 
     @property
     def rows(self) -> list[str]:
@@ -81,13 +82,20 @@ class BlockView:
             slab[first : columns[taken[-1]].stop] = np.eye(slab.shape[1])
             if not slab.size:
                 continue
-            numbers = self._operator @ slab
+            numbers = self.operator @ slab
             out[:, taken] = _signed(_signed(numbers, rows, 0), [slice(columns[j].start - first, columns[j].stop - first) for j in taken], 1)
         return out
 
     def norms(self) -> np.ndarray:
         """The magnitude of the largest entry of each block, (rows, columns)."""
         return np.abs(self.largest())
+
+    def on_robot(self, on: str = "robot") -> Any:
+        """The blocks beside the model as it stands, or its tree: pointing at a block lights the path between its bodies.
+
+        A `LinkedBlocks`, which shows itself in a notebook and is saved as a page; see there for what it takes.
+        """
+        return _core._face["linked_blocks"](self, on)
 
     # ------------------------------------------------------------------ what is shown
     @property

@@ -385,15 +385,3 @@ def _is_mass_matrix(operand: _core.Operator) -> bool:
     H, phi, M, J, D = letters
     whole = H @ phi @ M @ phi.T @ H.T + J
     return len(operand.sources) == 1 and (operand == D or (operand.domain == H.codomain and _core.equal_by_theorems(operand, whole)))
-
-
-class Explanation(str):
-    """A plan as text: prints as a table, and shows as one at the end of a notebook cell."""
-
-    def __repr__(self) -> str:
-        return str(self)
-
-
-def explain(operator: _core.Operator, request: str = "apply") -> Explanation:
-    """The plan of an expression as a table of steps, tiers and costs; after a run, with what the run reported."""
-    return Explanation(str(operator.plan(request)))

@@ -10,12 +10,13 @@ from typing import Any, TypeVar
 
 from .. import _core
 from ..identities.parse import Statements
+from ..operators.latex_text import escaped
 from .axioms import replaced_everywhere, solved
 from .derivation import DerivativeProblem
 from .equations import Step, chain_holds, opened
 from .models_tried import example, operators_of, operators_of_sources
 from .proof import Proof
-from .shown import GAP, aligned, escaped
+from .shown import GAP, aligned
 from .words import Polynomial
 
 _Own = TypeVar("_Own", bound="WithGaps")

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import _core
-from .shown import MATHEMATICS
+from ..operators.latex_text import MATHEMATICS
 
 _ACCENTS = {"\u0303": r"\~{}", "\u0304": r"\={}", "\u0307": r"\.{}", "\u0308": r"\"{}"}
 """Set over the letter before them."""

@@ -6,12 +6,14 @@ import copy
 from collections.abc import Sequence
 from typing import Any
 
+from ..operators.latex_lines import in_lines
+from ..operators.latex_text import escaped
 from .derivative import Formula
 from .equations import Equation, Step, chain_holds, foundations, numbered
 from .expand import Opaque, Problem, Spelling
 from .models_tried import example, examples, operators_of
 from .presuppositions import nowhere
-from .shown import FullProof, aligned, escaped, lines, page
+from .shown import FullProof, aligned, lines, page
 from .values import LARGEST, Values
 from .words import Alphabet, Polynomial, combine
 
@@ -265,7 +267,8 @@ class Proof:
     def latex(self) -> str:
         """The chain of steps as an aligned display, or both normal forms."""
         if not self:
-            return " \\ne ".join(self._alphabet.latex(p) for p in self._forms) if not self.note else f"\\text{{{escaped(self.note)}}}"
+            apart = in_lines(" \\ne ".join(self._alphabet.latex(p) for p in self._forms))
+            return apart if not self.note else f"\\text{{{escaped(self.note)}}}"
         return aligned(self.steps)
 
     def full(self) -> FullProof:
@@ -281,7 +284,7 @@ class Proof:
     def _repr_latex_(self) -> str:
         where = f" where {' and '.join(self.hypotheses)}" if self.hypotheses else ""
         verdict = f"proved{where}: " if self else "no proof found; normal forms of both sides: " if not self.note else "no proof found: "
-        return f"$$\\begin{{gathered}}{self._latex}\\\\ \\text{{{escaped(verdict)}}}\\\\ {self.latex()}\\end{{gathered}}$$"
+        return f"$$\\begin{{gathered}}{in_lines(self._latex)}\\\\ \\text{{{escaped(verdict)}}}\\\\ {self.latex()}\\end{{gathered}}$$"
 
 
 def _unmet(hypotheses: Sequence[str], operators: Any) -> list[str]:

@@ -6,6 +6,10 @@ import html
 from collections.abc import Collection, Sequence
 from typing import Protocol
 
+from ..identities.verdict_html import verdict_html
+from ..operators.formula_html import formula_html
+from ..operators.latex_lines import lines_of
+from ..operators.latex_text import escaped
 from .equations import Step
 
 
@@ -20,6 +24,12 @@ class Shown(Protocol):
 
     @property
     def hypotheses(self) -> list[str]: ...
+
+    @property
+    def axioms(self) -> list[str]: ...
+
+    @property
+    def worst(self) -> float | None: ...
 
     def all_lemmas(self) -> Sequence[Shown]: ...
 
@@ -79,30 +89,18 @@ def aligned(steps: Sequence[Step], cited: dict[str, int] | None = None, blanks: 
     if not steps:
         return "\\begin{aligned}\\end{aligned}"
     beside = max(len(s.after_text()) for s in steps) + max(len(s.reason) for s in steps) <= WIDTH
-    rows = [f"& {steps[0].before_latex()}"]
+    rows = _set_in("", steps[0].before_latex())
     for i, s in enumerate(steps, 1):
         line, number = GAP if i in blanks else s.after_latex(), f"\\text{{{i}.}}\\;"
         why = number if i in blanks else number + reason_latex(s, cited)
-        rows += [f"={{}}& {line} && {why}"] if beside else [f"={{}}& {line}", f"& \\qquad {why}"]
+        rows += [f"={{}}& {line} && {why}"] if beside else [*_set_in("={}", line), *_set_in("", f"\\qquad {why}")]
     return "\\begin{aligned}" + "\\\\\n".join(rows) + "\\end{aligned}"
 
 
-def escaped(text: str) -> str:
-    """Plain text for LaTeX's \\text: letters of the algebra as mathematics."""
-    text = text.replace("\\", "").replace("_", "\\_").replace("⁻¹", "$^{-1}$").replace("*", "$^*$")
-    for letter, latex in MATHEMATICS.items():
-        text = text.replace(letter, f"${latex}$")
-    return text.replace("$$", "")
-
-
-MATHEMATICS = {
-    **{"φ": r"\phi", "ψ": r"\psi", "τ": r"\tau", "θ": r"\theta", "γ": r"\gamma", "ν": r"\nu", "Υ": r"\Upsilon", "Ω": r"\Omega"},
-    **{"Λ": r"\Lambda", "Δ": r"\Delta", "ℳ": r"\mathcal{M}", "𝒥": r"\mathcal{J}", "𝓑": r"\mathcal{B}", "∂": r"\partial", "√": r"\surd"},
-    **{"−": "-", "·": r"\cdot", "×": r"\times", "‖": r"\Vert", "½": r"\frac12", "≥": r"\geq", "≤": r"\leq", "ℓ": r"\ell"},
-    **{"⁻": "{}^-", "⁺": "{}^+", "¹": "{}^1", "²": "{}^2", "³": "{}^3", "ᵀ": r"{}^\top"},
-    **{letter: f"{{}}_{digit}" for digit, letter in enumerate("₀₁₂₃₄₅₆₇₈₉")},
-}
-"""Letters that fonts of LaTeX may not have, in its mathematics."""
+def _set_in(sign: str, latex: str) -> list[str]:
+    """The rows of an aligned display that a line takes, with the sign before it."""
+    first, *others = lines_of(latex)
+    return [f"{sign}& {first}", *(f"& \\quad {other}" for other in others)]
 
 
 class FullProof:
@@ -157,15 +155,22 @@ def page(proof: Shown) -> str:
 
 
 def _section(proof: Shown, number: int | None, cited: dict[str, int]) -> str:
-    """One proof: its statement, and its steps as a list."""
+    """One proof: verdict, statement and hypotheses, and its steps as a list."""
     label = f"({number}) " if number is not None else ""
-    head = f"<b>{html.escape(label + proof.statement + where(proof))}</b>"
+    hypotheses = f"where {' and '.join(proof.hypotheses)}" if proof.hypotheses else "no hypothesis"
+    said = verdict_html("proved", f"proved, {hypotheses}" if number is None else hypotheses) if proof else verdict_html("no proof found")
+    head = f"{said} &ensp; <b>{label}{formula_html(proof.statement)}</b>"
     if not proof:
-        return f"<p>{head}<br>{html.escape(str(proof).partition(chr(10))[2].strip())}</p>"
-    first = f"<div>{html.escape(proof.steps[0].before_text())}</div>" if proof.steps else ""
+        why = html.escape(str(proof).partition("\n")[2].partition("no proof found")[2].lstrip(": \n"))
+        return f'<p>{head}</p><div style="white-space:pre-wrap">{why}</div>'
+    first = f"<div>{formula_html(proof.steps[0].before_text())}</div>" if proof.steps else ""
     items = "".join(
-        f'<li>= {html.escape(s.after_text())} <span class="reason">[{html.escape(reason(s, cited))}]</span></li>' for s in proof.steps
+        f'<li>= {formula_html(s.after_text())} <span class="reason">[{formula_html(reason(s, cited))}]</span></li>' for s in proof.steps
     )
-    note = f"<div>{html.escape(proof.note)}</div>" if proof.note else ""
-    presupposed = f"<div>presupposes {html.escape(', '.join(proof.presupposes))}</div>" if proof.presupposes else ""
-    return f"<p>{head}</p>{first}<ol>{items}</ol>{note}{presupposed}"
+    notes = [proof.note, f"presupposes {', '.join(proof.presupposes)}" if proof.presupposes else ""]
+    if number is None and proof.axioms:
+        notes.append(f"rests on {'; '.join(proof.axioms)}")
+    if number is None and proof.worst is not None:
+        notes.append(f"largest residual of a step at a random state: {proof.worst:.1e}")
+    told = "".join(f'<div class="reason">{html.escape(note)}</div>' for note in notes if note)
+    return f"<p>{head}</p>{first}<ol>{items}</ol>{told}"

@@ -24,9 +24,9 @@ from .passes import Equation, Once, Operator, Program, Term, fused, pruned, read
 from .python_source import PythonSource
 from .recursion import Latex, Line, Text
 from .steps import Recursion
-from .steps_taken import Step, taken_steps
+from .steps_taken import Pass, Step, taken_steps, told_passes
 
-__all__ = ["LANGUAGES", "Algorithm", "Step", "algorithm"]
+__all__ = ["LANGUAGES", "Algorithm", "Pass", "Step", "algorithm"]
 
 LANGUAGES = ("text", "latex", "python", "cpp")
 _RESULTS = {"apply": "vector", "dense": "matrix", "diagonal": "vector", "blockdiag": "blocks"}
@@ -191,6 +191,18 @@ class Algorithm:
     def lines(self) -> list[tuple[int, str]]:
         """The recursion line by line, with how deep each stands: what `text` shows without its head."""
         return self._lines(Text())
+
+    def passes(self) -> list[Pass]:
+        """The passes over trees that make the recursion, one after the other: direction, tree and lines of each.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> soa = pc.chain(2).soa
+        >>> [(one.ways, one.parents) for one in soa.MM.inv().algorithm().passes()]
+        [((-1,), (-1, 0)), ((1,), (-1, 0))]
+        """
+        return told_passes(self._program, self._book.trees)
 
     def steps(self, x: Any = None, q: Any = None, v: Any = None, *, state: int = 0) -> list[Step]:
         """What the recursion computes on its way, equation by equation and body by body, in the order of its passes.

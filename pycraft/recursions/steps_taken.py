@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,8 +11,8 @@ import numpy as np
 from .. import _core
 from .formulas import Quantity
 from .naming import total
-from .passes import Item, Program, Sweep, writes
-from .recursion import Text
+from .passes import CompositeAssembly, Elimination, Item, Program, Selected, Solution, Sweep, writes
+from .recursion import Line, Text
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,43 @@ class Step:
     letter: str
     name: str
     value: np.ndarray
+
+
+@dataclass(frozen=True)
+class Pass:
+    """One pass of a recursion over a tree, or what is computed as a whole.
+
+    Attributes
+    ----------
+    ways : directions in which the tree is passed one after the other, -1 tip to base, 1 base to tip; none where the order is free
+    parents : of the tree that is passed, -1 the base; None of what is computed as a whole
+    lines : how deep each line of it stands, and the line, as in `Algorithm.lines()`
+    """
+
+    ways: tuple[int, ...]
+    parents: tuple[int, ...] | None
+    lines: list[Line]
+
+
+def told_passes(program: Program, trees: Sequence[Any]) -> list[Pass]:
+    """`Algorithm.passes`."""
+    return [Pass(*_passed(item, trees), Text().item(item)) for item in program.items]
+
+
+def _passed(item: Item, trees: Sequence[Any]) -> tuple[tuple[int, ...], tuple[int, ...] | None]:
+    """Ways and parents of a pass."""
+    match item:
+        case Sweep():
+            return (item.direction,) if item.direction else (), tuple(trees[item.tree].parents)
+        case Elimination():
+            return (-1,), tuple(trees[item.system.tree].parents)
+        case Solution():
+            return (-1, 1), tuple(trees[item.system.tree].parents)
+        case Selected():
+            return (1,), tuple(trees[item.system.tree].parents)
+        case CompositeAssembly():
+            return (-1,), tuple(trees[item.tree].parents)
+    return (), None
 
 
 def taken_steps(program: Program, arguments: list[Quantity], source: str, data: dict[str, Any], x: Any) -> list[Step]:

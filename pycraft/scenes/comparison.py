@@ -64,6 +64,21 @@ class ComparisonTable(TidyTable):
 
         return comparison_plot(self, axes)
 
+    def stack(self, axes: Any = None) -> Any:
+        """The effects as a stack: what each costs of an evaluation, and in the same colours what the run is off by without it.
+
+        Parameters
+        ----------
+        axes : two Axes of Matplotlib, side by side; new ones where left out
+
+        Returns
+        -------
+        The axes. What passes share, none of their effects costs alone: it is in "all the rest".
+        """
+        from .effect_stack import effect_stack
+
+        return effect_stack(self, axes)
+
     def label(self, row: dict[str, Any]) -> str:
         names = row["left out"]
         if names and row["together"]:

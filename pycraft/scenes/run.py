@@ -278,6 +278,36 @@ class Run(Motion):
             page.save(target)
         return page
 
+    def lost_digits(self, states: int = 8, **options: Any) -> Any:
+        """Where the forward dynamics of the run's states loses digits, as colour on the robot over time, with the next rung and its price.
+
+        The tree's forward dynamics, by the generalized forces that give the run's accelerations, certified at some states: error, digits
+        gone in each D(k), and the first step up that at least halves the error, with its error and its time (`Multibody.certify`).
+
+        Parameters
+        ----------
+        states : how many of the run's, 1 to 200, evenly among its rows, the first and the last with them
+        options : of `Multibody.certify`: form, refine, residual, precision (the run's where left out), seed, seconds
+
+        Returns
+        -------
+        LostDigits
+            A notebook shows it; `save("digits.html")` writes a page that needs no network; `t`, `hinges`, `digits`, `certificates`.
+
+        Raises what `certify` raises, and EvaluationError for another number of states. Cost: a certificate each.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> run = pc.mechanisms.double_pendulum().simulate(0.5)
+        >>> lost = run.lost_digits(2)
+        >>> lost.hinges, len(lost.certificates)
+        (['upper', 'lower'], 2)
+        """
+        from .lost_digits import LostDigits
+
+        return LostDigits(self, states, options)
+
     # ------------------------------------------------------------------ copies
     def __getstate__(self) -> dict[str, Any]:
         if self._calls is not None and self._steps is not None and not self._edited:

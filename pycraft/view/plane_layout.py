@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from .. import _core
+from ..models.tree_places import tree_places
 from .skeleton import Skeleton, placed
 
 _AZIMUTH, _ELEVATION = -60.0, 20.0  # degrees, as figures in space are seen
@@ -33,43 +35,40 @@ class PlaneLayout:
     axes: np.ndarray | None
 
 
+def layout_of(expression: Any, source: Any, on: str, width: float, height: float, radius: float) -> PlaneLayout:
+    """Of the bodies of a source: its model at the state that the expression is bound to, of a batch the first, else as it stands; or,
+    on="tree" and where the bodies are no model's own, a diagram of the tree."""
+    model = getattr(source, "model", None)
+    if on == "robot" and isinstance(model, _core.Multibody) and list(getattr(model, "bodies", ())) == list(source.body_names):
+        state = getattr(expression, "_state", None)
+        q = np.asarray(model.q if state is None else state[0], float)
+        return model_layout(model, q.reshape(-1, q.shape[-1])[0], width, height, 4 * radius, radius)
+    return tree_layout(list(source.parents), width, height, 4 * radius)
+
+
 def tree_layout(parents: Sequence[int], width: float, height: float, margin: float) -> PlaneLayout:
     """Leaves side by side, a body above the middle of what it carries, the base at the foot. O(N)."""
-    n = len(parents)
-    children: list[list[int]] = [[] for _ in range(n + 1)]
-    for k, p in enumerate(parents):
-        children[p].append(k)  # -1: the base, last
-    depth = np.zeros(n + 1)
-    for k, p in enumerate(parents):
-        depth[k] = depth[p] + 1 if p >= 0 else 1
-    x, leaves, stack = np.zeros(n + 1), 0, [-1]
-    order: list[int] = []
-    while stack:
-        k = stack.pop()
-        order.append(k)
-        if not children[k]:
-            x[k], leaves = leaves, leaves + 1
-        stack += reversed(children[k])
-    for k in reversed(order):
-        if children[k]:
-            x[k] = np.mean(x[children[k]])
-    spread = (x + 0.5) / max(leaves, 1)
-    level = depth / max(depth.max(), 1)
-    places = np.column_stack([margin + spread * (width - 2 * margin), height - margin - level * (height - 2 * margin)])
+    x, level = tree_places(parents).T
+    places = np.column_stack([margin + x * (width - 2 * margin), height - margin - level * (height - 2 * margin)])
     return PlaneLayout(places[:-1], places[-1], np.zeros((0, 2, 2)), np.zeros(0, int), None)
 
 
 def model_layout(model: Any, q: Any, width: float, height: float, margin: float, radius: float) -> PlaneLayout:
     """The model's sticks at q, seen as `StickFigure` shows them; hinge points at one place are drawn side by side. O(N · depth)."""
+    return model_layouts(model, np.asarray(q, float)[None], width, height, margin, radius)[0]
+
+
+def model_layouts(model: Any, q: np.ndarray, width: float, height: float, margin: float, radius: float) -> list[PlaneLayout]:
+    """The same at several states (n, nq), all in one box: what stays where it is, stays in the picture."""
     skeleton = Skeleton(model)
-    poses = skeleton.poses(np.asarray(q, float))
+    poses = skeleton.poses(q)
     seen = _seen(skeleton, model)
     hinges = placed(poses, *skeleton.points["joint"]) @ seen.T
     kinds = ("bone", "slide", "ground", "tie")
     lines = [placed(poses, *skeleton.lines[kind]) @ seen.T for kind in kinds if len(skeleton.lines[kind][0])]
-    bones = np.concatenate(lines) if lines else np.zeros((0, 2, 2))
+    bones = np.concatenate(lines, axis=1) if lines else np.zeros((len(q), 0, 2, 2))
     owners = np.concatenate([skeleton.lines[kind][0][:, 0] for kind in kinds])
-    everything = np.concatenate([hinges, bones.reshape(-1, 2), np.zeros((1, 2))])
+    everything = np.concatenate([hinges.reshape(-1, 2), bones.reshape(-1, 2), np.zeros((1, 2))])
     low, high = everything.min(axis=0), everything.max(axis=0)
     scale = min((width - 2 * margin) / max(high[0] - low[0], 1e-12), (height - 2 * margin) / max(high[1] - low[1], 1e-12))
     scale = scale if np.isfinite(scale) and (high > low).any() else 1.0
@@ -79,10 +78,14 @@ def model_layout(model: Any, q: Any, width: float, height: float, margin: float,
         moved = (points - middle) * scale
         return np.stack([width / 2 + moved[..., 0], height / 2 - moved[..., 1]], axis=-1)
 
-    bodies = _side_by_side(picture(hinges), 2.2 * radius)
-    flip = np.array([[1.0], [-1.0]])
-    axes = np.array([flip * (seen @ poses[k, :3, :3]) for k in range(len(bodies))])
-    return PlaneLayout(bodies, picture(np.zeros(2)), picture(bones), owners, axes)
+    flip, base = np.array([[1.0], [-1.0]]), picture(np.zeros(2))
+    return [
+        PlaneLayout(
+            _side_by_side(picture(hinges[i]), 2.2 * radius), base, picture(bones[i]), owners,
+            np.array([flip * (seen @ poses[i, k, :3, :3]) for k in range(hinges.shape[1])]),
+        )
+        for i in range(len(q))
+    ]  # fmt: skip
 
 
 def _seen(skeleton: Skeleton, model: Any) -> np.ndarray:

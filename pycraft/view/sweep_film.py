@@ -13,11 +13,9 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
-import numpy as np
-
 from .. import _core
 from ..recursions import Step, algorithm
-from .plane_layout import PlaneLayout, model_layout, tree_layout
+from .plane_layout import layout_of
 from .sweep_picture import HEIGHT, RADIUS, WIDTH, SweepPicture, told_value
 
 MOST = 250
@@ -71,15 +69,7 @@ class SweepFilm:
         self.steps: list[Step] = self._written.steps(x)
         if not self.steps:
             raise _core.EvaluationError(f"{expression.text()} takes no step: nothing is computed body by body")
-        self._layout = self._laid_out(expression, models[0].source, on)
-
-    def _laid_out(self, expression: Any, source: Any, on: str) -> PlaneLayout:
-        model = getattr(source, "model", None)
-        if on == "robot" and isinstance(model, _core.Multibody) and list(getattr(model, "bodies", ())) == self._names:
-            state = getattr(expression, "_state", None)
-            q = np.asarray(model.q if state is None else state[0], float)
-            return model_layout(model, q.reshape(-1, q.shape[-1])[0], WIDTH, HEIGHT, 4 * RADIUS, RADIUS)
-        return tree_layout(self._parents, WIDTH, HEIGHT, 4 * RADIUS)
+        self._layout = layout_of(expression, models[0].source, on, WIDTH, HEIGHT, RADIUS)
 
     def save(self, path: str | Path) -> Path:
         """Write a page, ".html", 10 kB and some 300 bytes a block. EvaluationError for another ending, OSError if it cannot be written."""

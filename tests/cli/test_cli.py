@@ -1,6 +1,7 @@
 """The command line: what it prints, and how it ends."""
 
 import json
+import re
 from importlib import import_module
 
 import pytest
@@ -44,14 +45,19 @@ def test_check_ends_with_one_where_a_theorem_fails(monkeypatch):
     monkeypatch.setattr(OperatorSet, "check", lambda self, **_: made)
     for verdict, status in [("holds", 0), ("expected to fail", 0), ("fails", 1), ("undecided", 3), ("undefined", 3)]:
         made.findings[0].verdict = verdict
-        for options in ([], ["--full"], ["--json"]):
+        for options in ([], ["--all"], ["--json"]):
             result = runner.invoke(app, ["check", "panda", *options])
             assert result.exit_code == status and verdict in result.output + " holds", (verdict, options)
 
 
-def test_check_shows_the_exceptions_and_all_by_full(few_theorems):
-    short, full = (runner.invoke(app, ["check", "puma560", "--states", "0", *more]).output for more in ([], ["--full"]))
-    assert "φ = I + E_φ φ" not in short and "φ = I + E_φ φ" in full and short.splitlines()[0] == full.splitlines()[0]
+def test_check_has_a_line_for_each_theorem_and_the_long_form_by_all(few_theorems, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    short, full = (runner.invoke(app, ["check", "puma560", "--states", "0", *more]).output for more in ([], ["--all"]))
+    verdicts = ("holds ", "fails ", "expected to fail ", "waiting ")
+    lines = [line for line in short.splitlines() if line.startswith(verdicts)]
+    assert any(line.split(None, 1) == ["holds", "φ = I + E_φ φ"] for line in lines) and "bound" not in lines[-1]
+    assert len(lines) == sum(int(n) for n in re.findall(r"(\d+) (?:holds|expected|waiting)", short.splitlines()[0]))
+    assert short.splitlines()[0] == full.splitlines()[0] and re.search(r"φ = I \+ E_φ φ +\S+e[+-]\d+ +\S+e-\d+ \w+ +holds", full)
 
 
 def test_precision_that_is_not_there_is_named():

@@ -55,7 +55,7 @@ BEFORE = {
 }
 # What changes the output of one measurement is tested below, or where it says.
 AFTER = {
-    "check": {"json", "full"},
+    "check": {"json", "every"},
     "accuracy": {"error", "csv", "json", "plot"},  # also test_cli.py
     "stability": {"output", "csv", "json"},
     "bench": {"peers", "quick", "json", "plot", "page"},  # test_speed.py
@@ -136,7 +136,7 @@ def test_options_reach_the_check_of_a_paper(monkeypatch, tmp_path):
     for given in ([], ["--states", "1"], ["--seed", "2"], ["--precision", "quad"], ["--precision", "50"]):
         assert runner.invoke(app, ["check", "p.tex", *given]).exit_code == 1
     assert len({str({k: v for k, v in c.items() if k != "progress"}) for c in calls}) == 5
-    for given in (["--full"], ["--root", "free"], ["--mimic", "lock"]):
+    for given in (["--all"], ["--root", "free"], ["--mimic", "lock"]):
         result = runner.invoke(app, ["check", "p.tex", *given])
         assert result.exit_code == 2 and f"{given[0]} belongs to models" in result.output and len(calls) == 5
 

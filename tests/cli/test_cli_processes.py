@@ -62,7 +62,7 @@ def test_tour_of_names_that_look_like_markup(odd):
 
 
 def test_an_ascii_terminal():
-    done = pycraft("check", "panda", "--states", "0", "--full", PYTHONIOENCODING="ascii", LC_ALL="C")
+    done = pycraft("check", "panda", "--states", "0", "--all", PYTHONIOENCODING="ascii", LC_ALL="C")
     assert done.returncode == 0, done.stderr
     assert done.stdout.isascii() and "\\u03c6" in done.stdout  # φ, escaped and not lost
 

@@ -45,6 +45,28 @@ def test_the_report_of_theorems_fits():
     assert "undefined: an inverse in them does not exist here" in repr(made)
 
 
+def test_one_line_a_theorem_verdict_first():
+    """Of every theorem of the catalogue, whatever was found; nothing is cut, none goes on in a second line."""
+    soa = pc.tree([-1, 0, 0], ["free", "ball", "pin"], seed=1, rotor_inertia=True).soa
+    every = ["J = 0", "serial chain", "single-DOF hinges", "constant H", "free root"]
+    for verdict, unmet in (("holds", []), ("expected to fail", every[:1]), ("holds anyway", every)):
+        findings = [Finding(t.name, t.group, t.text, t.latex, t.hypotheses, unmet, verdict) for t in soa.theorems()]
+        lines = text_of(Report("arm", {}, findings).lines()).splitlines()
+        fits("\n".join(lines).replace("(…)", "(...)"))  # a formula's own
+        assert len(lines) == len(findings) > 100
+        for line, found in zip(lines, findings, strict=True):
+            assert line.startswith(verdict + "  ")
+            said = line.removeprefix(verdict).strip().split("  needs ")[0]
+            assert said in (monospace(found.statement).replace("\n", " "), monospace(found.name)), line
+    short = Report(
+        "arm", {}, [Finding("n", "g", "a = b", "x", [], ["J = 0"], "expected to fail"), Finding("m", "g", "c = d", "x", [], [], "holds")]
+    )
+    assert text_of(short.lines()).splitlines() == ["expected to fail  a = b  needs J = 0", "holds  c = d"]
+    long_name = Finding("the name", "g", "a" * 70 + " = b", "x", [], ["J = 0"], "fails")
+    assert text_of(Report("arm", {}, [long_name]).lines()) == "fails  the name  needs J = 0"
+    assert repr(Report("arm", {}, [])) == Report("arm", {}, []).summary() and text_of(Report("arm", {}, []).lines()) == ""
+
+
 def test_a_theorem_that_goes_on_is_no_heading():
     """The second line of a long one began where headings begin."""
     headings = {f.group for f in report().findings} | {"theorem", "arm:", "largest"}
@@ -92,7 +114,7 @@ def test_the_summary_of_a_page_has_its_lines():
 def test_the_summary_and_the_exceptions_come_first():
     made = report()
     assert repr(made).startswith("arm: 1 fails, 1 undecided, 1 undefined,")
-    assert f"{monospace(LONG)[:20]}" in repr(made) and "phi_tilde 0" not in repr(made) and "needs single-DOF hinges" in repr(made)
+    assert "t3  needs single-DOF hinges" in repr(made) and "t0" not in repr(made) and f"{monospace(LONG)[:20]}" in made.full()
     assert repr(made).count("waits for loops") == 1 and len(made.full()) > len(repr(made))
     good = Report("arm", {}, [made.findings[0]])
     assert repr(good) == good.summary() and "1 holds" in good.summary() and "50 digits" in good.full()
