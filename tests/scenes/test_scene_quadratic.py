@@ -6,6 +6,9 @@ truncation: NEAR. First differences of exact first derivatives: 1e-8. Second der
 which 1e-7 of the forces' size is wrong (cpp/simulation/scene_curvature.h); the mass matrix's inverse, 1e1 here, makes it 1e-6.
 """
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 
@@ -299,6 +302,15 @@ def test_batches_are_their_states(model, dt):
     empty = ways(scene.quadratic_model(Q[:0], V[:0], states=own[:0]))
     n = 2 * model.nv + own.shape[1]
     assert empty.contracted(costates[:0]).xx.shape == (0, n, n) and empty.tensors().xu.shape == (0, n, n, model.nv)
+
+
+def test_copies_and_pickles(model):
+    scene = pc.Scene(model).add(E.Gravity(), E.QuadraticDamping(0.3))
+    state = model.random_state(1)
+    for near in (scene.quadratic_model(state.q, state.v), model.quadratic_model(state.q, state.v)):
+        for other in (pickle.loads(pickle.dumps(near)), copy.deepcopy(near.discrete(0.02))):
+            one = near if other.dt is None else near.discrete(0.02)
+            agree(other.contracted(np.ones(2 * model.nv)).xx, one.contracted(np.ones(2 * model.nv)).xx, 1e-12)
 
 
 def test_degenerate_scenes():
