@@ -96,7 +96,5 @@ class SceneRates:
         along, forces = np.zeros((count, m, 4, nv, nv)), np.zeros((count, m, nv + rows, nv + rows))
         for b in range(count):
             q, v, own, vdot = self.q[b], self.rest[b, :nv], self.rest[b, nv:].tolist(), self.value[b, :nv]
-            forces[b], along[b] = _core.scene_curvature(
-                self._scene._calls(), q, v, float(self._t[b]), own, vdot, np.ascontiguousarray(mu[b])
-            )
+            forces[b], along[b] = _core.scene_curvature(calls, q, v, float(self._t[b]), own, vdot, np.ascontiguousarray(mu[b]))
         return along, forces
