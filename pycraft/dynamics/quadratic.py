@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -207,6 +208,6 @@ class QuadraticCalls(LinearizationCalls):
         states = len(linear.A) if linear.A.ndim == 3 else 1
         q, v, tau = (np.broadcast_to(x, (states, x.shape[-1])) for x in given)
         chosen = [model.coordinate_names.index(name.removeprefix("tau.")) for name in linear.inputs]
-        rates = lambda q, v, later: Accelerations(model, {"form": form, "precision": precision}, q, v, tau)  # noqa: ARG005 - of no time
+        rates = partial(Accelerations, model, {"form": form, "precision": precision}, tau)
         at = Nominal(model, q, v, chosen, turning(model), rates)
         return QuadraticModel(linear, StateEquation(at), at)

@@ -32,6 +32,11 @@ def taken_back(costate: np.ndarray, slope: np.ndarray) -> np.ndarray:
     return costate @ slope
 
 
+def as_they_are(q: np.ndarray, rest: np.ndarray, _: float) -> tuple[np.ndarray, np.ndarray]:
+    """Nothing is prescribed."""
+    return q, rest
+
+
 class Nominal(NamedTuple):
     """Where a model or scene is expanded.
 
@@ -54,7 +59,7 @@ class Nominal(NamedTuple):
     rates: Callable[[np.ndarray, np.ndarray, float], Any]
     known: Sequence[int] = ()
     implicit: Sequence[str] = ()
-    placed: Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray]] = lambda q, rest, later: (q, rest)
+    placed: Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray]] = as_they_are
 
 
 class Accelerations:
@@ -71,7 +76,7 @@ class Accelerations:
     Transactions on Robotics 40 (2024); for contraction the source of cpp/dynamics/curvature.h.
     """
 
-    def __init__(self, model: Any, how: dict[str, Any], q: np.ndarray, v: np.ndarray, tau: np.ndarray):
+    def __init__(self, model: Any, how: dict[str, Any], tau: np.ndarray, q: np.ndarray, v: np.ndarray, _: float = 0.0):
         self._model, self._q, self._precision = model, q, how["precision"]
         self.rest = self._v = v
         self.value = model.forward_dynamics(q, v, tau, **how)

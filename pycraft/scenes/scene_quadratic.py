@@ -49,10 +49,10 @@ class SceneRates:
 
     def __init__(self, scene: Any, q: np.ndarray, rest: np.ndarray, t: np.ndarray, between: bool = True):
         """between : between the ends of a step, where controllers take no samples; else `rest` may be v alone, y as it is at first."""
-        self._scene, self._calls, self._t = scene, scene._calls(), t
+        self._scene, self._t, calls = scene, t, scene._calls()
         self._nv = nv = scene.model.nv
         states = zip(q, rest[:, :nv], t.tolist(), rest[:, nv:].tolist(), strict=True)
-        self._found = [_core.scene_linearized(self._calls, *state, between) for state in states]
+        self._found = [_core.scene_linearized(calls, *state, between) for state in states]
         own = len(self._found[0]["own"]) if self._found else rest.shape[-1] - nv
         stacked = lambda name, *shape: np.array([one[name] for one in self._found]).reshape(len(q), *shape)
         self.q, self.value = stacked("q", q.shape[-1]), stacked("rates", nv + own)
@@ -92,9 +92,9 @@ class SceneRates:
         return curved(along, self.slopes, forces)
 
     def _curvature(self, mu: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        (count, m, rows), nv = mu.shape, self._nv
+        (count, m, rows), nv, calls = mu.shape, self._nv, self._scene._calls()
         along, forces = np.zeros((count, m, 4, nv, nv)), np.zeros((count, m, nv + rows, nv + rows))
         for b in range(count):
             q, v, own, vdot = self.q[b], self.rest[b, :nv], self.rest[b, nv:].tolist(), self.value[b, :nv]
-            forces[b], along[b] = _core.scene_curvature(self._calls, q, v, float(self._t[b]), own, vdot, np.ascontiguousarray(mu[b]))
+            forces[b], along[b] = _core.scene_curvature(calls, q, v, float(self._t[b]), own, vdot, np.ascontiguousarray(mu[b]))
         return along, forces

@@ -19,6 +19,24 @@ CHANGES = {
         ("dependent coordinates stay where steps have brought them", "if not self.rows.size:", "if True:"),
         ("θ̇_r of the old choice goes on", "np.concatenate([q, v[self.independent]])", "np.concatenate([q, v[: len(self.independent)]])"),
     ],
+    "pycraft/dynamics/second_order.py": [
+        ("effects bend twice", "out[..., :n, :n] -= forces / 2", "out[..., :n, :n] -= forces"),
+        ("stages are all at the step's beginning", "Stage(at, part * dt,", "Stage(at, 0 * dt,"),
+        ("a step leaves prescribed coordinates", "at.placed(displaced(model, at.q, u), after, dt)", "displaced(model, at.q, u), after"),
+        ("prescribed coordinates are displaced", "start[:, [j, n + j]] = 0.0", "pass"),
+    ],
+    "pycraft/scenes/scene_quadratic.py": [
+        ("controllers are asked within a step", "*state, between) for", "*state, False) for"),
+        ("pushes move what is prescribed", "given[known_coordinates(one)] = 0.0", "pass"),
+    ],
+    "pycraft/state.py": [("a run is at t = 0", 'getattr(q, "t", 0.0) if t is None', "0.0 if t is None")],
+    "pycraft/kinematics/solution.py": [
+        (
+            "a batch is true",
+            '        if self._batch:\n            raise _core.ModelError(f"a batch',
+            '        if False:\n            raise _core.ModelError(f"a batch',
+        )
+    ],
     "pycraft/dynamics/loop_tangents.py": [
         ("linear models on loops without what bends their forces", "    sides[0][:nv] += bent @ X\n", ""),
         ("velocities on loops do not follow displacements", "(slip @ X)", "(0 * slip @ X)"),

@@ -6,7 +6,8 @@ truncation: NEAR. First differences of exact first derivatives: 1e-8. Second der
 which 1e-7 of the forces' size is wrong (cpp/simulation/scene_curvature.h); the mass matrix's inverse, 1e1 here, makes it 1e-6.
 """
 
-import re
+import copy
+import pickle
 
 import numpy as np
 import pytest
@@ -68,7 +69,6 @@ EFFECTS = {
     "states": lambda: [E.Gravity(), Actuator()],
     "thermostat": lambda: [E.NoseHoover(0.8, 0.5)],
 }  # fmt: skip
-NONE = "has no second derivatives at this state, t = 0 s"
 BY_DIFFERENCES = ("python", "states")
 
 
@@ -142,6 +142,27 @@ def test_every_entry_against_differences_of_first_derivatives(model, name):
     agree(found.xu, rows[:, n:], near)
     assert np.array_equal(found.xx, found.xx.T) or np.allclose(found.xx, found.xx.T, atol=1e-12)
     assert not found.uu.any()
+
+
+def test_every_effect_is_tried(model):
+    """All but loops, which are refused, impulses, which are no forces, and samples, which have a test of their own."""
+    offered = {one for one in vars(E).values() if isinstance(one, type) and issubclass(one, E.Effect)}
+    tried = {type(one) for make in EFFECTS.values() for one in make()}
+    assert {one.__name__ for one in offered - tried} == {"Effect", "Loop", "Langevin", "Sampled", "UserEffect"}
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-3, 0.05])
+def test_small_rotations_of_springs(angle):
+    """Where a rotation vector is a series: a ball's spring and a bushing, all of T(exp(δ)) against differences in quad."""
+    model = pc.tree([-1, 0], ["ball", "pin"], seed=1)
+    model.add_node("there", "", position=(0.1, 0.2, 0.3), rotation=model.frame("body0").pose()[:3, :3])
+    effects = [E.Spring(2.0, hinges="hinge0"), E.Bushing("there", "body0", 3.0, 0.4)]
+    q = model.integrate(model.zero_q(), angle * np.array([0.48, 0.6, -0.64, 0.0]))
+    v, costate, quad = np.array([0.3, -0.5, 0.7, 0.2]), np.array([0.3, 0.5, -0.7, 0.4]), pc.Scene(model, precision="quad").add(*effects)
+    near = pc.Scene(model).add(*effects).quadratic_model(q, v)
+    for z in np.random.default_rng(1).uniform(-0.5, 0.5, (3, 8)):
+        bent = second(lambda s, z=z: costate @ quad.evaluate(model.integrate(q, s * z[:4]), v + s * z[4:]).vdot)
+        agree(along(near.contracted(np.r_[np.zeros(4), costate]), np.r_[z, np.zeros(4)], 8), bent, NEAR)
 
 
 def test_gravity_alone_is_the_models_own(model):
@@ -283,6 +304,15 @@ def test_batches_are_their_states(model, dt):
     assert empty.contracted(costates[:0]).xx.shape == (0, n, n) and empty.tensors().xu.shape == (0, n, n, model.nv)
 
 
+def test_copies_and_pickles(model):
+    scene = pc.Scene(model).add(E.Gravity(), E.QuadraticDamping(0.3))
+    state = model.random_state(1)
+    for near in (scene.quadratic_model(state.q, state.v), model.quadratic_model(state.q, state.v)):
+        for other in (pickle.loads(pickle.dumps(near)), copy.deepcopy(near.discrete(0.02))):
+            one = near if other.dt is None else near.discrete(0.02)
+            agree(other.contracted(np.ones(2 * model.nv)).xx, one.contracted(np.ones(2 * model.nv)).xx, 1e-12)
+
+
 def test_degenerate_scenes():
     for nothing in (pc.Multibody("nothing"), pc.tree([-1, 0], ["weld", "weld"], seed=1)):
         near = pc.Scene(nothing).add(E.Gravity()).quadratic_model()
@@ -290,86 +320,6 @@ def test_degenerate_scenes():
     one = pc.chain(1)  # v̇ = 3 τ - 2 sin q of a spring between nodes, which is gravity's like
     every = pc.Scene(one).add(E.Prescribed("hinge0", 0.3)).quadratic_model([0.1], [0.2])
     assert not every.tensors().xx.any() and not every.B.any()
-
-
-@pytest.mark.parametrize(
-    ("effects", "state", "text"),
-    [
-        (lambda: [E.QuadraticDamping(0.2)], ([0.1, 0.2], [0.0, 1.0]), f"'quadratic_damping' {NONE}: coordinate 'hinge0' is at rest"),
-        (
-            lambda: [E.Limits(9.0, lower=-1, upper=0.2)],
-            ([0.1, 0.2], [0.0, 1.0]),
-            f"{NONE}: coordinate 'hinge1' is just at its stop",
-        ),
-        (lambda: [E.Limits(9.0, 2.0, lower=-1, upper=0.1)], ([0.0, 0.2], [0.0, -0.5]), "leaves its stop just as fast"),
-        (lambda: [E.Servo(1.0, target=0.5, hinges="hinge0", effort_limit=0.25)], ([0.25, 0.2], [0.0, 1.0]), "is just at its effort limit"),
-        (lambda: [E.TorqueSource(1.0, "hinge1", speed_limit=2.0, speed_band=0.5)], ([0.1, 0.2], [0.0, 1.0]), "'hinge1' is just at an end"),
-        (lambda: [E.Motor(0.5, 1.0, 2.0, hinges="hinge1", speed_limit=1.0)], ([0.1, 0.2], [0.0, 1.0]), "driven by nothing at a speed"),
-        (
-            lambda: [E.NodeSpring("here", "there", 1.0, 0.5)],
-            ([0.0, 0.0], [1.0, 1.0]),
-            "'node_spring' has no derivatives at this state",
-        ),
-        (lambda: [E.NodeDamper("here", "there", 1.0)], ([0.0, 0.0], [1.0, 1.0]), "its nodes are at one place"),
-        (lambda: [E.Langevin(1.0, 0.1, 0.01)], ([0.0, 0.0], [1.0, 1.0]), "'langevin' acts by impulses"),
-        (lambda: [lambda t, s: np.sqrt(s.q - 0.1)], ([0.1, 0.2], [1.0, 1.0]), "its force on coordinate 'hinge0' is "),
-    ],
-)
-def test_edges_are_refused_by_name(effects, state, text):
-    model = pc.chain(2)
-    model.add_node("here", "body1", position=(0.5, 0, 0))
-    model.add_node("there", "", position=(1.5, 0, 0))
-    with np.errstate(invalid="ignore"), pytest.raises(pc.EvaluationError, match=re.escape(text)):
-        pc.Scene(model).add(*effects()).quadratic_model(*state).contracted(np.ones(4))
-
-
-def test_a_ball_half_a_turn_from_its_springs_rest():
-    model = pc.tree([-1], ["ball"], seed=1)
-    scene = pc.Scene(model).add(E.Spring(2.0))
-    with pytest.raises(pc.EvaluationError, match=re.escape(f"{NONE}: coordinate 'hinge0[0]' is turned by half a turn")):
-        scene.quadratic_model([0.0, 0.6, 0.0, 0.8])
-    assert np.isfinite(scene.quadratic_model([1e-3, 0.6, 0.0, 0.8]).tensors().xx).all()
-
-
-@pytest.mark.parametrize("effect", [E.NodeSpring("here", "there", 1.0, 0.5), E.NodeDamper("here", "there", 1.0)])
-def test_linear_models_where_nodes_are_at_one_place(effect):
-    """A force along a direction that there is none of has no derivatives on any side: it was taken for zero."""
-    model = pc.chain(2)
-    model.add_node("here", "body1", position=(0.5, 0, 0))
-    model.add_node("there", "", position=(1.5, 0, 0))
-    scene = pc.Scene(model).add(effect)
-    with pytest.raises(pc.EvaluationError, match="has no derivatives at this state, t = 0 s: its nodes are at one place; move"):
-        scene.linearize([0.0, 0.0], [1.0, 1.0])
-    scene.linearize([0.0, 1e-6], [1.0, 1.0])
-    pc.Scene(model).add(E.NodeSpring("here", "there", 1.0)).quadratic_model([0.0, 0.0])  # of length 0: linear in the way between them
-
-
-@pytest.mark.parametrize(
-    ("effects", "state"),
-    [
-        (lambda: [E.Limits(9.0, lower=-1, upper=0.2)], ([0.1, 0.1], [0.0, 1.0])),
-        (lambda: [E.Servo(1.0, 0.3, hinges="hinge0", effort_limit=9, speed_limit=2.0)], ([0.0, 0.0], [0.0, 0.0])),
-        (lambda: [E.TorqueSource(0.0, speed_limit=1.0)], ([0.0, 0.0], [1.0, -1.0])),
-        (lambda: [E.TorqueSource(1.0, effort_limit=1.0)], ([0.0, 0.0], [1.0, -1.0])),
-        (lambda: [E.Prescribed("hinge0", 0.2), E.QuadraticDamping(0.2)], ([0.0, 0.0], [0.0, -1.0])),
-    ],
-)
-def test_beside_an_edge_there_are_second_derivatives(effects, state):
-    assert np.isfinite(pc.Scene(pc.chain(2)).add(*effects()).quadratic_model(*state).contracted(np.ones(4)).xx).all()
-
-
-def test_refusals():
-    model = pc.chain(2)
-    with pytest.raises(pc.EvaluationError, match="linearized in double precision, and this one computes in 'quad'"):
-        pc.Scene(model, precision="quad").quadratic_model()
-    with pytest.raises(pc.EvaluationError, match="keeps loops, of which quadratic models are not made"):
-        pc.mechanisms.n_four_bar().quadratic_model()
-    with pytest.raises(pc.ModelError, match="inputs: no hinge or coordinate"):
-        pc.Scene(model).quadratic_model(inputs="elbow")
-    with pytest.raises(pc.EvaluationError, match="takes 'implicit_damping' at the end of a step: 'rkmk4' and 'euler' do not"):
-        pc.Scene(model).add(E.ImplicitDamping(0.2)).quadratic_model().discrete(0.1, "semi-implicit-euler")
-    with pytest.raises(pc.ModelError, match="the effects have 0 states of their own, not 1"):
-        pc.Scene(model).quadratic_model(states=[1.0])
 
 
 def test_the_linear_model_is_where_prescribed_coordinates_are():
