@@ -125,7 +125,7 @@ function table(rows) {
   const made = document.createElement("table");
   for (const row of rows) {
     const line = make("tr", made);
-    for (const x of row) make("td", line, x === null ? "-" : `${+x.toPrecision(4)}`);
+    for (const x of row) make("td", line, x === null ? "-" : `${+x.toPrecision(row.length > 4 ? 3 : 4)}`, { title: `${x}` });
   }
   return made;
 }
