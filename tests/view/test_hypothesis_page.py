@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import pycraft as pc
-from pycraft.view.hypothesis_page import SWITCHES, _in_motion, _spec
+from pycraft.view.hypothesis_page import SWITCHES, _in_motion, _spec, _state
 from support.browser import differing, opened, pixels, until
 
 FIRST = ("J = 0", "chain", "single-DOF", "fixed")
@@ -59,6 +59,12 @@ def test_what_breaks_breaks_by_a_hypothesis_that_is_not_met(page):
     assert {"C is the Christoffel matrix"} <= {f.name for f in page.broken("J = 0", "chain", "ball", "free")}
     with pytest.raises(pc.EvaluationError, match="one of each of J: 'J = 0', 'J > 0'; tree"):
         page.broken("J = 0")
+
+
+def test_an_inverse_that_is_not_there_is_said_to_be_none(page):
+    (finding,) = page.broken(*FIRST)
+    assert _state(finding) == "undefined" and finding.states == 0 and "singular" in finding.note
+    assert {_state(f) for f in page.report(*FIRST).findings if f.verdict == "holds"} == {"holds"}
 
 
 def test_by_how_much(page):

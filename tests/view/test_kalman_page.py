@@ -68,6 +68,12 @@ def test_steps_go_side_by_side(page):
     assert {step.letter for step in page.filter_steps} == set(WORDS)
 
 
+def test_the_page_counts_time_from_the_tip(page):
+    data = json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', page.html, re.S).group(1))
+    assert [step[1:4] for step in data["steps"][:9:8]] == [[0, 5, "P"], [1, 4, "P"]] and data["steps"][-1][1:4] == [0, 5, "α"]
+    assert data["measured"][1] == pytest.approx(page.measurements[1, 0], rel=1e-5) and len(data["words"]) == 11
+
+
 def test_other_chains_and_forces():
     model = pc.tree([-1, 0, 1], ["pin", "slider", "pin"], seed=4)  # no rotors: J is zero
     page = track(3).play([1.0, 2.0, 3.0], model, [1.0, 0.0, 0.0])

@@ -122,6 +122,7 @@ class Figure {
     if (this.way) this.drawLine(this.way, colourOf("--way"), 1.2);
     for (const ghost of this.ghosts) this.drawModel(ghost.data, ghost.poses, 0.4, colourOf("--ghost"));
     this.drawModel(this.data, this.poses, 1, null);
+    if (this.chosen >= 0 && this.poses.length) this.drawFrame(this.chosen);
     for (const arrow of this.arrows) this.drawArrow(arrow);
     this.drawScale();
     if (this.shade) this.drawShade();
@@ -158,6 +159,20 @@ class Figure {
     context.font = "12px system-ui, sans-serif";
     context.textAlign = "left";
     context.fillText(`${+length.toPrecision(6)} m`, 14, height - 20);
+  }
+
+  // The axes of a body's frame, with their names.
+  drawFrame(body) {
+    const { context } = this, origin = placed(this.poses, body, [0, 0, 0]), length = Math.max(2 * this.data.tick, 34 / this.scale);
+    ["x", "y", "z"].forEach((name, i) => {
+      const d = turned(this.poses, body, [0, 1, 2].map((j) => (i === j ? length : 0))), colour = colourOf(`--line${[1, 2, 0][i]}`);
+      this.drawArrow({ at: origin, along: d, colour });
+      const [x, y] = this.seen(along(origin, 1.18, d));
+      context.fillStyle = colour;
+      context.font = "12px system-ui, sans-serif";
+      context.textAlign = "center";
+      context.fillText(name, x, y + 4);
+    });
   }
 
   // The colours of numbers: a strip with the numbers of its ends and what they are of.

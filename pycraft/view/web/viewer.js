@@ -79,7 +79,8 @@ function buildSliders() {
   if (shown.length < all.length) make("p", byId("sliders"), `${all.length} coordinates: those of the picked body`, { className: "faint" });
   for (const coordinate of shown) {
     const box = make("label", byId("sliders"), "", { className: "slider" });
-    make("span", box, coordinate.name, { title: coordinate.bounded ? "its limits" : "no limits" });
+    const name = make("span", box, coordinate.name), [low, high] = [coordinate.low, coordinate.high].map((x) => +x.toPrecision(3));
+    make("small", name, coordinate.bounded ? ` ${low} … ${high}` : " no limits", { className: "faint" });
     const value = make("output", box), range = make("input", box, "", {
       type: "range", min: coordinate.low, max: coordinate.high, step: "any", id: `u${coordinate.j}`,
     });
@@ -124,7 +125,7 @@ function table(rows) {
   const made = document.createElement("table");
   for (const row of rows) {
     const line = make("tr", made);
-    for (const x of row) make("td", line, x === null ? "-" : `${+x.toPrecision(4)}`);
+    for (const x of row) make("td", line, x === null ? "-" : `${+x.toPrecision(row.length > 4 ? 3 : 4)}`, { title: `${x}` });
   }
   return made;
 }
