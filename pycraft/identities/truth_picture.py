@@ -64,15 +64,19 @@ def _draw(ax: Any, case: Any, left: float, top: float) -> None:
     """The tree of a smallest case in the unit tile at (left, top), root to the left."""
     places = tree_places(case.parents)
     x, y = left + 0.3 + 0.58 * places[:, 1], top + 0.22 + 0.5 * places[:, 0]
-    if len(case.parents) > 2:
+    if len(set(case.parents)) < len(case.parents):  # a branch, with names to its right
         x -= 0.14
     for k, p in enumerate(case.parents):  # -1, the base, is the last place
         ax.plot([x[p], x[k]], [y[p], y[k]], color="0.35", lw=1.2, zorder=2)
     ax.plot(x[-1:], y[-1:], "s", color="k", ms=4, zorder=3)
     ring = dict(mec=ORANGE, mew=1.6) if case.rotor_inertia else dict(mec="white", mew=0.5)
     ax.plot(x[:-1], y[:-1], "o", color=BLUE, ms=6, zorder=3, **ring)
+    leaves = set(range(len(case.parents))) - set(case.parents)
     for k, kind in enumerate(case.kinds):
-        ax.text(x[k], y[k] + 0.1, kind, ha="center", va="top", fontsize=6)
+        if k in leaves and len(leaves) > 1:  # others stand above and below
+            ax.text(x[k] + 0.03, y[k], kind, ha="left", va="center", fontsize=6)
+        else:
+            ax.text(x[k], y[k] + 0.1, kind, ha="center", va="top", fontsize=6)
 
 
 def _grid(found: Any) -> tuple[list[tuple[str, str, str]], list[str], dict[Any, Any]]:

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import re
 import sys
 from types import SimpleNamespace
 
@@ -175,3 +176,27 @@ def test_what_nothing_saves_is_refuted_where_most_hypotheses_are_met(monkeypatch
         monkeypatch.setattr(MODULE, "truth_within", lambda *_, found=found: found)
         explained("φ = ψ")
         assert asked.pop() == meets.least and len(meets.least) >= 3
+
+
+def test_smallest_cases_are_drawn_as_their_trees():
+    """Each false cell has its case: as many bodies and links as it has, hinges by name, rotors ringed; none of the names overlap."""
+    found = pc.truth("Ω = Υ + ψ̃*Υ + Υψ̃", budget=1.0)
+    page = found._repr_html_()
+    rows = list(dict.fromkeys((c.cell.shape, c.cell.J, c.cell.base) for c in found))
+    false = [c for c in found if c.example is not None]
+    false.sort(key=lambda c: rows.index((c.cell.shape, c.cell.J, c.cell.base)))  # as the table goes
+    drawn = re.findall(r"<svg .*?</svg>", page)
+    assert len(drawn) == len(false) > 0
+    for picture, cell in zip(drawn, false, strict=True):
+        assert picture.count("<circle") == picture.count("<line") == cell.example.bodies
+        assert (
+            re.findall(r">([a-z]+)</text>", picture) == cell.example.kinds
+            and (' stroke-width="3"' in picture) == cell.example.rotor_inertia
+        )
+        places = [(float(x), float(y)) for x, y in re.findall(r'<text x="(\d+)" y="(\d+)"', picture)]
+        assert all(abs(a - c) > 30 or abs(b - d) > 10 for (a, b), (c, d) in itertools.combinations(places, 2))
+    assert page.count("✗ FALSE") == len(false) and page.count("✓ true") == len(CELLS) - len(false)
+    ax = found.plot()
+    ax.figure.canvas.draw()
+    boxes = [t.get_window_extent() for t in ax.texts]
+    assert not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
