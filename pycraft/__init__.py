@@ -72,7 +72,9 @@ if _TYPE_CHECKING:
     from .peers import compare
     from .proofs import Exercise, Proof, derivative, exercise, prove, prove_derivative, repair, worksheet
     from .scenes import Checkpoint, Event, Scene, effects, load_run, load_scene, mechanisms
+    from .scenes.loop_comparison import loops_compared
     from .sympy_bridge import from_sympy, parse, to_sympy
+    from .view.hypothesis_page import hypothesis_switches
 
 # What takes long to import is imported when it is first asked for: the same names, each with its room.
 _LATER = {
@@ -87,7 +89,9 @@ _LATER = {
     "peers": ("compare",),
     "proofs": ("Exercise", "Proof", "derivative", "exercise", "prove", "prove_derivative", "repair", "worksheet"),
     "scenes": ("Checkpoint", "Event", "Scene", "effects", "load_run", "load_scene", "mechanisms"),
+    "scenes.loop_comparison": ("loops_compared",),
     "sympy_bridge": ("from_sympy", "parse", "to_sympy"),
+    "view.hypothesis_page": ("hypothesis_switches",),
 }
 
 
@@ -150,6 +154,7 @@ __all__ = [
     "euclidean",
     "exercise",
     "from_sympy",
+    "hypothesis_switches",
     "identity",
     "instruction_set",
     "interop",
@@ -158,6 +163,7 @@ __all__ = [
     "load_run",
     "load_scene",
     "load_sweep",
+    "loops_compared",
     "mechanisms",
     "models",
     "parse",

@@ -7,7 +7,7 @@ import fractions
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Binding', 'Centroidal', 'Curvature', 'Dynamics', 'Effect', 'EmbeddedOperators', 'Error', 'EvaluationError', 'FrameTree', 'FunctionOfTime', 'GroupedOperators', 'HingeKind', 'HybridDynamics', 'Integration', 'InterbodyForces', 'Letter', 'LoopSet', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'PreparedHybridDynamics', 'RefinementError', 'RunRecord', 'Scalar', 'SceneCalls', 'SceneEffects', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'alone', 'blockdiag', 'bushing_effect', 'check_pairing', 'checked_refinement', 'compiled_call', 'constant', 'constant_in_time', 'coordinates_named', 'coulomb_friction_effect', 'damping_effect', 'direct_call', 'direct_calls', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'fixman_effect', 'float128', 'forms', 'gravity_effect', 'gravity_gradient_effect', 'harmonic', 'hermite_between', 'hinge_kinds', 'identity', 'implicit_damping_effect', 'implicit_spring_effect', 'instruction_set', 'instruction_sets', 'integrator_table', 'integrators', 'kernel_headers', 'kernel_tape', 'langevin_effect', 'limits_effect', 'methods', 'motor_effect', 'node_damper_effect', 'node_spring_effect', 'nose_hoover_effect', 'numbers_in_q', 'operators_of', 'pack_width', 'piecewise_polynomial', 'point_mass_gravity_effect', 'precisions', 'prepared_call', 'prescribed_by', 'prescribed_effect', 'python_effect', 'python_function_of_time', 'quadratic_damping_effect', 'real_array', 'record_from', 'residual', 'rotor_inertia_effect', 'run_scene', 'run_scenes', 'scalar', 'scene_at_rest', 'scene_between', 'scene_interbody_forces', 'scene_linearized', 'servo_effect', 'spring_effect', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_by_hand', 'time_compiled', 'time_dynamics', 'time_forward', 'time_hybrid', 'time_method', 'time_packs', 'time_passes', 'time_scene', 'torque_source_effect', 'vector', 'wider', 'wrench_effect', 'zero']
+__all__: list[str] = ['Binding', 'Centroidal', 'Curvature', 'Dynamics', 'Effect', 'EmbeddedOperators', 'Error', 'EvaluationError', 'FrameTree', 'FunctionOfTime', 'GroupedOperators', 'HingeKind', 'HybridDynamics', 'Integration', 'InterbodyForces', 'Letter', 'LoopSet', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'PreparedHybridDynamics', 'RefinementError', 'RunRecord', 'Scalar', 'SceneCalls', 'SceneEffects', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'alone', 'blockdiag', 'bushing_effect', 'check_pairing', 'checked_refinement', 'compiled_call', 'constant', 'constant_in_time', 'coordinates_named', 'coulomb_friction_effect', 'damping_effect', 'direct_call', 'direct_calls', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'fixman_effect', 'float128', 'forms', 'gravity_effect', 'gravity_gradient_effect', 'harmonic', 'hermite_between', 'hinge_kinds', 'identity', 'implicit_damping_effect', 'implicit_spring_effect', 'instruction_set', 'instruction_sets', 'integrator_table', 'integrators', 'kernel_headers', 'kernel_tape', 'langevin_effect', 'limits_effect', 'methods', 'motor_effect', 'node_damper_effect', 'node_spring_effect', 'nose_hoover_effect', 'numbers_in_q', 'operators_of', 'pack_width', 'piecewise_polynomial', 'point_mass_gravity_effect', 'precisions', 'prepared_call', 'prescribed_by', 'prescribed_effect', 'python_effect', 'python_function_of_time', 'quadratic_damping_effect', 'real_array', 'record_from', 'residual', 'rotor_inertia_effect', 'run_scene', 'run_scenes', 'scalar', 'scene_at_rest', 'scene_between', 'scene_curvature', 'scene_interbody_forces', 'scene_linearized', 'servo_effect', 'spring_effect', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_by_hand', 'time_compiled', 'time_dynamics', 'time_forward', 'time_hybrid', 'time_method', 'time_packs', 'time_passes', 'time_scene', 'torque_source_effect', 'vector', 'wider', 'wrench_effect', 'zero']
 
 class Error(Exception): ...
 class SpaceError(Error, TypeError): ...
@@ -1215,6 +1215,10 @@ class LoopSet:
         """
         What keeps these loops in a scene, all without names.
         """
+    def embedded_accelerations(self, q: typing.Any, v: typing.Any, tau: typing.Any, names: collections.abc.Sequence[str], in_world: bool, wrenches: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], independent: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], refine: typing.Any, precision: str | int) -> tuple:
+        """
+        The same by independent coordinates, given by number or, without any, chosen at each state.
+        """
     def ends(self, operators: SkoSource) -> list[str]:
         """
         The bodies and nodes that A is of.
@@ -1235,6 +1239,10 @@ class LoopSet:
         """
         The source of rows as operators, Q and A by body: pycraft/operators/loop_letters.py.
         """
+    def penalty(self, names: collections.abc.Sequence[str], frequency: typing.SupportsFloat | typing.SupportsIndex, damping_ratio: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
+        """
+        What holds these loops in a scene by springs and dampers, all without names.
+        """
     def remove(self, name: str) -> None:
         ...
     def residual(self, q: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
@@ -1242,6 +1250,14 @@ class LoopSet:
     def rows(self) -> tuple[list[str], list[bool]]:
         """
         Names of all rows, and which are of positions.
+        """
+    def springs(self, names: collections.abc.Sequence[str], frequency: typing.SupportsFloat | typing.SupportsIndex, damping_ratio: typing.SupportsFloat | typing.SupportsIndex) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+        """
+        Stiffness and damping of the rows of such an effect that is alone.
+        """
+    def tape(self, q: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], v: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], tau: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], most: typing.SupportsInt | typing.SupportsIndex) -> tuple:
+        """
+        What accelerations on the loops are, operation by operation, at states that are decided as this one (tapes.h).
         """
     def velocities(self, q: typing.Any, v: typing.Any, impulse: typing.Any, form: str, precision: str | int) -> tuple:
         """
@@ -1648,13 +1664,17 @@ def scene_at_rest(calls: SceneCalls, q: typing.Annotated[numpy.typing.ArrayLike,
     """
 def scene_between(calls: SceneCalls, integrator: str, t: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], states: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], work: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], times: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], at: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> dict:
     ...
+def scene_curvature(calls: SceneCalls, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], t: typing.SupportsFloat | typing.SupportsIndex, own: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], vdot: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], mu: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple:
+    """
+    Second derivatives at a state, contracted with mu (m, nv + own): of the effects' forces and rates along (displacements, v, own), (m, n, n), and of inverse dynamics as Curvature has them, (m, 4, nv, nv).
+    """
 def scene_interbody_forces(calls: SceneCalls, t: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], own: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], reaction: bool) -> tuple:
     """
     f in the bodies' axes and X_WB, of states along a run.
     """
-def scene_linearized(calls: SceneCalls, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], t: typing.SupportsFloat | typing.SupportsIndex, states: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
+def scene_linearized(calls: SceneCalls, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], t: typing.SupportsFloat | typing.SupportsIndex, states: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], between: bool = False) -> dict:
     """
-    At a state, of A ż = g with z = (v, effects' own states): A, the derivatives of g along displacements and along z, ż, which coordinates are prescribed, and what is not in g, the forces of loops; q and v are on these.
+    At a state, of A ż = g with z = (v, effects' own states): A, the derivatives of g along displacements and along z, ż, which coordinates are prescribed, and what is not in g, the forces of loops; q and v are on these, own the effects' states there, and implicit names effects that steps may take implicitly.
     """
 def servo_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, stiffness: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], damping: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], target: FunctionOfTime, effort_limit: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], speed_limit: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], speed_band: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
     ...

@@ -59,6 +59,13 @@ def compile_expression(*arguments: Any, **options: Any) -> Any:
     return compiled(*arguments, **options)
 
 
+def dof_shares(*arguments: Any) -> Any:
+    """`Multibody.dof_shares`."""
+    from .view.shares import dof_shares as shares
+
+    return shares(*arguments)
+
+
 def linked_blocks(view: Any, on: str) -> Any:
     """`BlockView.on_robot`."""
     from .view.linked_blocks import LinkedBlocks
@@ -80,6 +87,13 @@ def plan_html(explanation: Explanation) -> str:
     return shown(explanation)
 
 
+def play_smoother(*arguments: Any) -> Any:
+    """`StateSpace.play`."""
+    from .view.kalman_page import play_smoother as play
+
+    return play(*arguments)
+
+
 def plot_model(*arguments: Any, **options: Any) -> Any:
     """`Multibody.plot`."""
     from .view import plot_model as plot
@@ -92,6 +106,13 @@ def check_model(*arguments: Any, **options: Any) -> Any:
     from .identities.checker import check_model as check
 
     return check(*arguments, **options)
+
+
+def rerootings(*arguments: Any) -> Any:
+    """`Multibody.rerootings`."""
+    from .view.rerooting_page import rerootings as seen
+
+    return seen(*arguments)
 
 
 def theorem_html(theorem: _core.Theorem) -> str:
@@ -134,6 +155,7 @@ def attach() -> None:
         compile_call=compile_call,
         compile_expression=compile_expression,
         describe=describe,
+        dof_shares=dof_shares,
         embedded=embedded,
         embedded_source=source_again,
         exact_numbers=operator_set.exact_numbers,
@@ -146,7 +168,9 @@ def attach() -> None:
         model_html=model_html,
         operator_from_nodes=operator_set.operator_from_nodes,
         plan_html=plan_html,
+        play_smoother=play_smoother,
         plot_model=plot_model,
+        rerootings=rerootings,
         scalar_at=operator_set.scalar_at,
         scalar_gradient=operator_set.scalar_gradient,
         shared_out=shared_out,

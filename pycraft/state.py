@@ -36,6 +36,14 @@ def at_state(model: Any, q: Any = None, v: Any = None) -> tuple[Any, Any]:
     return q, np.zeros(model.nv) if v is None else getattr(v, "v", v)
 
 
+def moment_of(q: Any, t: Any, states: Any) -> tuple[Any, Any]:
+    """The t and the effects' own states that a call means where they are left out: a run's, else 0 and None, as they are at first."""
+    of_run = getattr(q, "states", np.zeros(0))
+    if states is None and of_run.shape[-1]:
+        states = of_run
+    return getattr(q, "t", 0.0) if t is None else t, states
+
+
 def names_of_q(model: Any) -> list[str]:
     """Of the numbers of q: those of hinges, numbered where these have several."""
     names: list[str] = []

@@ -92,6 +92,7 @@ PythonEffect::PythonEffect(std::string kind, int nq, int nv, std::vector<int> co
 Declaration PythonEffect::declaration() const {
   Declaration d;
   d.time = d.velocities = d.work = d.foreign = true;
+  d.differentiable = false;
   d.coordinates = calls_.coordinates;
   d.states = states_;
   if (calls_.sample) d.held.assign(calls_.coordinates.size(), 0.0), d.period = period_;

@@ -5,6 +5,7 @@
 
 #include "bindings/compiled_library.h"
 #include "bindings/plain_arrays.h"
+#include "bindings/tapes.h"
 #include "kernels/link_model.h"
 #include "kernels/taped_calls.h"
 #include "model/multibody.h"
@@ -140,7 +141,6 @@ py::object compiled_call(const py::object& behind, const std::string& library, c
   return py::reinterpret_steal<py::object>(reinterpret_cast<PyObject*>(c));
 }
 
-// (what, first, second, number) of every operation, the operation of every result, that of the truth that they are sound.
 py::object tape(const Multibody& model, const std::string& call) {
   using kernels::Call;
   const bool bias = call == "bias_forces", matrix = call == "mass_matrix" || call == "mass_matrix_inverse";
@@ -150,20 +150,7 @@ py::object tape(const Multibody& model, const std::string& call) {
   double gravity[3];
   for (int i = 0; i < 3; ++i) gravity[i] = model.gravity()[i];
   const kernels::Tape made = tape_of(links->links(), which, gravity, !bias, matrix ? model.nv() * model.nv() : model.nv());
-  const auto n = static_cast<py::ssize_t>(made.operations.size());
-  py::array_t<int> first(n), second(n);
-  py::list what;
-  const py::str arrays[] = {"q", "v", "u"};
-  std::vector<py::str> names(std::begin(kernels::names_of_operations), std::end(kernels::names_of_operations));
-  py::array_t<double> number(n);
-  for (py::ssize_t i = 0; i < n; ++i) {
-    const kernels::Operation& o = made.operations[i];
-    what.append(o.does == kernels::Does::input ? arrays[o.second] : names[static_cast<size_t>(o.does)]);
-    first.mutable_at(i) = o.first, second.mutable_at(i) = o.second, number.mutable_at(i) = o.number;
-  }
-  std::vector<int> results;
-  for (const kernels::TapedResult& r : made.results) results.push_back(r.from);
-  return py::make_tuple(what, first, second, number, results, made.guards.empty() ? -1 : made.guards[0].truth);
+  return plain_tape(made);
 }
 
 }  // namespace

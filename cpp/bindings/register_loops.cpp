@@ -5,11 +5,14 @@
 #include "bindings/direct_calls.h"
 #include "bindings/hinge_arguments.h"
 #include "bindings/register_interbody_forces.h"
-#include "dynamics/constrained_dynamics.h"
+#include "bindings/tapes.h"
+#include "dynamics/calls_on_loops.h"
 #include "dynamics/loop_calls.h"
+#include "dynamics/recorded_on_loops.h"
 #include "operators/embedded_operators.h"
 #include "operators/loop_operators.h"
 #include "simulation/effects/loop.h"
+#include "simulation/effects/loop_penalty.h"
 
 namespace pycraft {
 
@@ -59,10 +62,11 @@ PairKind kind_named(const std::string& name) {
 
 // Of one model: its loops and their rows.
 struct Loops {
-  explicit Loops(std::shared_ptr<Multibody> model) : set(std::make_shared<LoopSet>(std::move(model))), calls(set), dynamics(set) {}
+  explicit Loops(std::shared_ptr<Multibody> model) : set(std::make_shared<LoopSet>(std::move(model))), calls(set), dynamics(set), embedded(set) {}
   std::shared_ptr<LoopSet> set;
   LoopCalls calls;
   ConstrainedDynamics dynamics;
+  EmbeddedDynamics embedded;
   int rows() const {
     const ModelInUse use(set->model());
     return set->resolved()->rows;
@@ -76,7 +80,8 @@ py::array_t<double> rows_at(Loops& loops, const std::vector<std::pair<const char
 }
 
 // x, λ, forces (loops, 2, 6) on b and on a, the rank of Q, a state.
-py::tuple on_loops(Loops& loops, Arguments& given, ConstrainedDynamics::Asked asked, const PushedNodes& pushed, const Array& wrenches) {
+template <class Calls>
+py::tuple on_loops(Loops& loops, Calls& calls, Arguments& given, AskedOnLoops asked, const PushedNodes& pushed, const Array& wrenches) {
   const Multibody& model = loops.set->model();
   asked.q = given[0], asked.v = given[1], asked.input = given[2], asked.pushed = &pushed;
   asked.wrenches = {"wrenches", wrenches.data(), 6 * static_cast<int>(pushed.nodes.size()), wrenches.ndim() == 3 ? static_cast<int>(wrenches.shape(0)) : -1};
@@ -86,10 +91,10 @@ py::tuple on_loops(Loops& loops, Arguments& given, ConstrainedDynamics::Asked as
   std::vector<py::ssize_t> shape;
   if (batch >= 0) shape.push_back(batch);
   py::array_t<int> rank(shape);
-  const ConstrainedDynamics::Results out{x.mutable_data(), multipliers.mutable_data(), forces.mutable_data(), rank.mutable_data()};
+  const ResultsOnLoops out{x.mutable_data(), multipliers.mutable_data(), forces.mutable_data(), rank.mutable_data()};
   {
     const Undisturbed undisturbed(model);
-    loops.dynamics.run(asked, out);
+    calls.run(asked, out);
   }
   return py::make_tuple(x, multipliers, forces, rank);
 }
@@ -131,6 +136,12 @@ void register_loops(py::module_& m) {
       }, name, py::arg("coordinates"), py::arg("constant"), py::arg("function"))
       .def("remove", [](Loops& l, const std::string& name) { l.set->remove(name); }, name)
       .def("names", [](const Loops& l) { return l.set->names(); }, "In order of declaration.")
+      .def("tape", [](const Loops& l, const std::vector<double>& at_q, const std::vector<double>& at_v, const std::vector<double>& tau, size_t most) {
+        const Multibody& model = l.set->model();
+        const ModelInUse use(model);
+        model.check_q(at_q.data(), at_q.size()), model.check_v(at_v.data(), at_v.size(), "v"), model.check_v(tau.data(), tau.size(), "tau");
+        return plain_tape(recorded_on_loops(model, l.set->resolved(), at_q.data(), at_v.data(), tau.data(), most));
+      }, q, v, py::arg("tau"), py::arg("most"), "What accelerations on the loops are, operation by operation, at states that are decided as this one (tapes.h).")
       .def("kind", [](const Loops& l, const std::string& name) {
         const Loop& loop = l.set->loop(name);
         return std::string(loop.is_coupling() ? "coupling" : record_of(loop.pair.kind).name);
@@ -174,21 +185,37 @@ void register_loops(py::module_& m) {
                                const Array& wrenches, Form form, const py::object& refine, const std::string& residual, Precision precision, double alpha, double beta) {
         const Multibody& model = l.set->model();
         Arguments given(model, {{"q", q}, {"v", v}, {"tau", tau}});
-        ConstrainedDynamics::Asked asked;
+        AskedOnLoops asked;
         asked.form = form, asked.refinement = refinement(refine, residual, precision), asked.precision = precision, asked.alpha = alpha, asked.beta = beta;
-        return on_loops(l, given, asked, pushed_nodes(model, names, in_world), wrenches);
+        return on_loops(l, l.dynamics, given, asked, pushed_nodes(model, names, in_world), wrenches);
       }, q, v, py::arg("tau"), py::arg("names"), py::arg("in_world"), py::arg("wrenches"), py::arg("form"), py::arg("refine"), py::arg("residual"), precision,
          py::arg("alpha"), py::arg("beta"), "v̇, λ, forces of loops on b and on a, rank.")
+      .def("embedded_accelerations", [](Loops& l, const py::object& q, const py::object& v, const py::object& tau, const std::vector<std::string>& names, bool in_world,
+                                        const Array& wrenches, std::vector<int> independent, const py::object& refine, Precision precision) {
+        const Multibody& model = l.set->model();
+        Arguments given(model, {{"q", q}, {"v", v}, {"tau", tau}});
+        AskedOnLoops asked;
+        asked.independent = std::move(independent), asked.refinement = refinement(refine, "same", precision), asked.precision = precision;
+        return on_loops(l, l.embedded, given, asked, pushed_nodes(model, names, in_world), wrenches);
+      }, q, v, py::arg("tau"), py::arg("names"), py::arg("in_world"), py::arg("wrenches"), py::arg("independent"), py::arg("refine"), precision,
+         "The same by independent coordinates, given by number or, without any, chosen at each state.")
       .def("velocities", [](Loops& l, const py::object& q, const py::object& v, const py::object& impulse, Form form, Precision precision) {
         Arguments given(l.set->model(), {{"q", q}, {"v", v}, {"impulse", impulse}});
-        ConstrainedDynamics::Asked asked;
+        AskedOnLoops asked;
         asked.form = form, asked.precision = precision, asked.velocities = true;
-        return on_loops(l, given, asked, {}, Array(std::vector<py::ssize_t>{0, 6}));
+        return on_loops(l, l.dynamics, given, asked, {}, Array(std::vector<py::ssize_t>{0, 6}));
       }, q, v, py::arg("impulse"), py::arg("form"), precision, "v⁺, impulses λ, impulses of loops on b and on a, rank.");
   loops.def_property_readonly("edits", [](const Loops& l) { return l.set->edits(); }, "Another number after every change of the set.")
       .def("effect", [](const Loops& l, std::vector<std::string> names, double alpha, double beta, bool embedded) -> std::shared_ptr<Effect> {
         return std::make_shared<KeepLoops>(l.set, std::move(names), alpha, beta, embedded);
-      }, py::arg("names"), py::arg("alpha"), py::arg("beta"), py::arg("embedded"), "What keeps these loops in a scene, all without names.");
+      }, py::arg("names"), py::arg("alpha"), py::arg("beta"), py::arg("embedded"), "What keeps these loops in a scene, all without names.")
+      .def("penalty", [](const Loops& l, const std::vector<std::string>& names, double frequency, double damping_ratio) -> std::shared_ptr<Effect> {
+        return std::make_shared<LoopPenalty>(l.set, names, frequency, damping_ratio);
+      }, py::arg("names"), py::arg("frequency"), py::arg("damping_ratio"), "What holds these loops in a scene by springs and dampers, all without names.")
+      .def("springs", [](const Loops& l, const std::vector<std::string>& names, double frequency, double damping_ratio) {
+        const LoopPenalty::Springs found = LoopPenalty(l.set, names, frequency, damping_ratio).springs({});
+        return py::make_tuple(to_numpy(found.stiffness), to_numpy(found.damping));
+      }, py::arg("names"), py::arg("frequency"), py::arg("damping_ratio"), "Stiffness and damping of the rows of such an effect that is alone.");
   m.def("_embedded", [](const std::shared_ptr<MultibodyOperators>& base, const Loops& l,
                         const std::vector<std::tuple<std::vector<int>, std::vector<int>, std::vector<int>>>& sets) {
     const ModelInUse use(l.set->model());

@@ -7,7 +7,10 @@
 #include "algebra/trees/sweeps/articulated_inertia.h"
 #include "algebra/trees/sweeps/mass_matrix.h"
 #include "model/checks.h"
+#include "model/recorded_model.h"
 #include "model/unit_data.h"
+#include "numerics/decisions.h"
+#include "numerics/recorded.h"
 #include "recursions/articulated_body.h"
 #include "recursions/kinematics.h"
 
@@ -165,7 +168,7 @@ void ConstrainedWorkspace<S>::correct(const Asked& asked, const Applied<S>& appl
   const int nv = model_->nv;
   const bool wider = asked.refinement.wider() || asked.refinement.gathers_wider();
   r_.assign(nv, S(0)), target_.resize(loops_->rows);
-  if constexpr (!std::is_same_v<S, Quad>) {
+  if constexpr (!std::is_same_v<S, Quad> && !is_recorded<S>) {
     if (wider) {
       using T = Wider<S>;
       const auto model = source_.compiled<T>();
@@ -213,7 +216,7 @@ template <class S>
 bool ConstrainedWorkspace<S>::sure(const Asked& asked, const Applied<S>& applied, bool refuse) {
   using std::abs;
   const int nv = model_->nv;
-  if (std::any_of(x_.begin(), x_.end(), [](const S& x) { return !std::isfinite(to_double(x)); })) return true;  // batches say what left its range
+  if (std::any_of(x_.begin(), x_.end(), [](const S& x) { return !is_finite(x); })) return true;  // batches say what left its range
   off_.assign(loops_->rows, S(0));
   S worst = S(0);
   for (const auto& group : groups_.groups) {
@@ -231,13 +234,16 @@ bool ConstrainedWorkspace<S>::sure(const Asked& asked, const Applied<S>& applied
     return false;
   }
   load_.assign(nv, S(0));
-  find_forces(asked, load_.data(), applied);
-  S size = energy_norm(generalized_.data()) + energy_norm(asked.tau);
   rows_.add_transposed(lambda_.data(), load_.data());
-  size += energy_norm(load_.data());
+  S size = energy_norm(load_.data()) + energy_norm(asked.tau);
   find_forces(asked, x_.data(), applied);
   for (int i = 0; i < nv; ++i) load_[i] += asked.tau[i] - generalized_[i];
-  if (const S left = energy_norm(load_.data()); !(left <= certified() * size)) {
+  const S left = energy_norm(load_.data());
+  if (!is_recorded<S> && left <= certified() * size) return true;  // of less than all that has cancelled: the rest costs as much again
+  off_.assign(nv, S(0));
+  find_forces(asked, off_.data(), applied);
+  size += energy_norm(generalized_.data());
+  if (!(left <= certified() * size)) {
     if (!refuse) return false;
     int most = 0;
     for (int i = 1; i < nv; ++i)
@@ -265,7 +271,7 @@ void ConstrainedWorkspace<S>::accelerate(const std::shared_ptr<const ResolvedLoo
   if (blocks_.faint().body >= 0) throw_faint_hinge(tree_, blocks_.faint());
   for (int i = 0; i < nv; ++i) x_[i] -= points_.absorbed[i];
   rows_.find(*model_, *loops, asked.q, buffers_);
-  if (std::any_of(x_.begin(), x_.end(), [](const S& x) { return !std::isfinite(to_double(x)); })) return;  // callers say what left its range
+  if (std::any_of(x_.begin(), x_.end(), [](const S& x) { return !is_finite(x); })) return;  // callers say what left its range
   // c, and what it is the sum of
   c_.assign(rows, S(0)), bias_.assign(rows, S(0));
   loop_bias(*model_, *loops, asked.q, asked.v, buffers_, c_.data());
@@ -304,46 +310,10 @@ Vector6<S> ConstrainedWorkspace<S>::force(int loop, bool on_a) const {
   return rows_.force(*loops_, lambda_, loop, on_a);
 }
 
-void ConstrainedDynamics::run(const Asked& asked, const Results& out) {
-  const ModelInUse use(model());
-  check_given(model(), {asked.q, asked.v, asked.input});
-  for (int b = 0; b < (asked.wrenches.batch < 0 ? 1 : asked.wrenches.batch); ++b)
-    for (int i = 0; i < asked.wrenches.width; ++i)
-      if (!std::isfinite(asked.wrenches.at(b)[i])) throw ModelError("the wrench on '" + asked.pushed->nodes[i / 6].name + "' has an entry that is not finite");
-  if (!std::isfinite(asked.alpha) || !std::isfinite(asked.beta) || asked.alpha < 0 || asked.beta < 0)
-    throw ModelError("Baumgarte's alpha and beta are finite numbers, zero or more (1/s), not " + short_number(asked.alpha) + " and " + short_number(asked.beta));
-  const auto loops = loops_->resolved();
-  const int common = common_batch({asked.q, asked.v, asked.input, asked.wrenches}), states = common < 0 ? 1 : common;
-  const int nv = model().nv(), rows = loops->rows, count = static_cast<int>(loops->loops.size());
-  const std::vector<Baumgarte> gains(rows, {asked.alpha, asked.beta});
-  at_precision(asked.precision, [&]<class S>(S) {
-    if constexpr (!available_at<ConstrainedWorkspace, S>) {
-      throw EvaluationError(to_quad);
-    } else {
-      std::vector<S> q, v, input, wrenches;
-      each<S>(0, states, states, [&](ConstrainedWorkspace<S>& w, int b) {
-        const auto read = [b](const Given& given, std::vector<S>& to) { to.assign(given.at(b), given.at(b) + given.width); };
-        read(asked.q, q), read(asked.v, v), read(asked.input, input), read(asked.wrenches, wrenches);
-        if (asked.velocities)
-          w.project(loops, q.data(), v.data(), input.data(), asked.form);
-        else
-          w.accelerate(loops, {q.data(), v.data(), input.data(), wrenches.empty() ? nullptr : wrenches.data(), asked.pushed, nullptr, asked.form, asked.refinement,
-                              asked.alpha != 0 || asked.beta != 0 ? &gains : nullptr});
-        for (int i = 0; i < nv; ++i) out.x[size_t(b) * nv + i] = to_double(w.result()[i]);
-        for (int r = 0; r < rows; ++r) out.multipliers[size_t(b) * rows + r] = to_double(w.multipliers()[r]);
-        for (int l = 0; l < count; ++l)
-          for (int side = 0; side < 2; ++side) write(w.force(l, side == 1), out.forces + ((size_t(b) * count + l) * 2 + side) * 6);
-        out.rank[b] = w.rank();
-        require_finite(out.x + size_t(b) * nv, nv, model());
-        require_finite(out.multipliers + size_t(b) * rows, rows, model());
-      });
-    }
-  });
-}
-
 template class ConstrainedWorkspace<Single>;
 template class ConstrainedWorkspace<double>;
 template class ConstrainedWorkspace<Extended>;
 template class ConstrainedWorkspace<Quad>;
+template class ConstrainedWorkspace<Recorded>;  // accelerate alone (recorded_on_loops.h)
 
 }  // namespace pycraft

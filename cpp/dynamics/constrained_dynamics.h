@@ -115,30 +115,6 @@ inline constexpr bool available_at<ConstrainedWorkspace, Digits50> = false;
 template <>
 inline constexpr bool available_at<ConstrainedWorkspace, Digits100> = false;
 
-class ConstrainedDynamics : public Batches<ConstrainedWorkspace> {
- public:
-  explicit ConstrainedDynamics(std::shared_ptr<LoopSet> loops) : Batches(loops->shared_model()), loops_(std::move(loops)) {}
-
-  struct Asked {
-    Given q, v, input, wrenches;              // input: T of accelerations, an impulse p of velocities
-    const PushedNodes* pushed = nullptr;
-    Form form = Form::fast;
-    Refinement refinement;
-    Precision precision = Precision::double_;
-    double alpha = 0, beta = 0;
-    bool velocities = false;
-  };
-  // A state: θ̈ or v⁺ (nv), λ (rows), of each loop the force on b and on a (6 each, in their axes about their origins), the rank of Q.
-  struct Results {
-    double *x, *multipliers, *forces;
-    int* rank;
-  };
-  void run(const Asked& asked, const Results& out);
-
- private:
-  std::shared_ptr<LoopSet> loops_;
-};
-
 extern template class ConstrainedWorkspace<Single>;
 extern template class ConstrainedWorkspace<double>;
 extern template class ConstrainedWorkspace<Extended>;

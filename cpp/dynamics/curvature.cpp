@@ -13,8 +13,9 @@ Curvature<T>::Curvature(const Multibody& model)
       momentum_(tree_.bodies()), chi_(tree_.coordinates()), couple_(tree_.bodies()) {}
 
 template <class T>
-void Curvature<T>::inverse_dynamics(const T* q, const T* v, const T* vdot, const T* mu, int count, T* out) {
+void Curvature<T>::inverse_dynamics(const T* q, const T* v, const T* vdot, const T* mu, int count, T* out, const Vector3<T>* gravity) {
   const int N = model_.nv;
+  const Vector3<S> field = gravity ? cast<S>(*gravity) : model_.gravity;
   const size_t square = size_t(N) * N;
   vdot_.assign(vdot, vdot + N);
   for (int first = 0; first < 2 * N;) {
@@ -22,7 +23,7 @@ void Curvature<T>::inverse_dynamics(const T* q, const T* v, const T* vdot, const
     const int directions = std::min(width, (along_q ? N : 2 * N) - first);
     state_.seed(*values_, q, v, first, directions);
     kinematics(model_, state_.q.data(), blocks_);
-    frame_.fill(model_, blocks_, model_.gravity, state_.v.data(), vdot_.data());
+    frame_.fill(model_, blocks_, field, state_.v.data(), vdot_.data());
     for (int m = 0; m < count; ++m) {
       contract(mu + size_t(m) * N);
       T* const to = out + size_t(m) * blocks * square;

@@ -36,8 +36,8 @@ class Curvature {
   explicit Curvature(const Multibody& model);
 
   // For each of `count` virtual velocities μ (nv) the four blocks (nv x nv), entry (i, j) the derivative along the first's i of that along the
-  // second's j. Gravity is the model's.
-  void inverse_dynamics(const T* q, const T* v, const T* vdot, const T* mu, int count, T* out);
+  // second's j. Gravity null: the model's.
+  void inverse_dynamics(const T* q, const T* v, const T* vdot, const T* mu, int count, T* out, const Vector3<T>* gravity = nullptr);
 
  private:
   void contract(const T* mu);

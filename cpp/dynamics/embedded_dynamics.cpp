@@ -47,9 +47,9 @@ S EmbeddedWorkspace<S>::size_of(int row) const {
 }
 
 // ------------------------------------------------------------------ which are independent
-// Complete pivoting of the node's rows at rows_: weights_ are √ℳ_ii.
+// Complete pivoting of the node's rows at rows_: weights_ are √ℳ_ii. given: no coordinate that is wanted as an independent one is eliminated.
 template <class S>
-void EmbeddedWorkspace<S>::choose_of(size_t node) {
+void EmbeddedWorkspace<S>::choose_of(size_t node, bool given) {
   using std::abs;
   const EmbeddedNode& at = nodes_[node];
   Choice& to = choices_[node];
@@ -62,7 +62,8 @@ void EmbeddedWorkspace<S>::choose_of(size_t node) {
     for (size_t j = 0; j < n; ++j) A[i * n + j] = size > S(0) ? S(dense_[at.coordinates[j]] / size) : S(0);
     for (const auto& e : rows_.entries[at.rows[i]]) dense_[e.coordinate] = S(0);
   }
-  std::vector<char> row_taken(m, 0), dependent(n, 0);
+  std::vector<char> row_taken(m, 0), dependent(n, 0), kept(n, 0);
+  for (size_t j = 0; given && j < n; ++j) kept[j] = wanted_[at.coordinates[j]];
   to.rows.clear(), to.dependent.clear(), to.independent.clear();
   for (size_t rank = 0; rank < std::min(m, n); ++rank) {
     check_interrupt_at(static_cast<int>(rank), static_cast<int>(n));
@@ -70,7 +71,7 @@ void EmbeddedWorkspace<S>::choose_of(size_t node) {
     S best = S(dependent_row);
     for (size_t i = 0; i < m; ++i)
       for (size_t j = 0; !row_taken[i] && j < n; ++j)
-        if (!dependent[j] && abs(A[i * n + j]) > best) best = abs(A[i * n + j]), row = i, column = j;
+        if (!dependent[j] && !kept[j] && abs(A[i * n + j]) > best) best = abs(A[i * n + j]), row = i, column = j;
     if (row == m) break;
     row_taken[row] = dependent[column] = 1;
     to.rows.push_back(at.rows[row]), to.dependent.push_back(static_cast<int>(column));
@@ -79,8 +80,12 @@ void EmbeddedWorkspace<S>::choose_of(size_t node) {
       for (size_t j = 0; !row_taken[i] && j < n; ++j) A[i * n + j] -= factor * A[row * n + j];
     }
   }
-  for (size_t j = 0; j < n; ++j)
+  for (size_t j = 0; j < n; ++j) {
+    if (given && !kept[j] && !dependent[j]) refuse_choice(node, "'" + tree_.coordinate_names[at.coordinates[j]] + "' does not follow");
+    for (size_t i = 0; given && i < m; ++i)
+      if (!row_taken[i] && abs(A[i * n + j]) > S(dependent_row)) refuse_choice(node, "row '" + loops_->names[at.rows[i]] + "' holds '" + tree_.coordinate_names[at.coordinates[j]] + "'");
     if (!dependent[j]) to.independent.push_back(static_cast<int>(j));
+  }
   const size_t d = to.rows.size(), r = to.independent.size();
   to.Q_d.resize(d * d), to.transposed.resize(d * d), to.Q_r.resize(d * (r + 1)), to.work.resize(d * (r + 1));
   embedded_.factors[node].resize(static_cast<int>(n), static_cast<int>(r));
@@ -88,16 +93,35 @@ void EmbeddedWorkspace<S>::choose_of(size_t node) {
 }
 
 template <class S>
-void EmbeddedWorkspace<S>::choose(const std::shared_ptr<const ResolvedLoops>& loops, const S* q) {
+void EmbeddedWorkspace<S>::refuse_choice(size_t node, const std::string& what) {
+  const auto listed = [&](auto fits) {
+    std::string all;
+    for (size_t j = 0; j < nodes_[node].coordinates.size(); ++j)
+      if (const int i = nodes_[node].coordinates[j]; fits(static_cast<int>(j), i)) all += (all.empty() ? "'" : ", '") + tree_.coordinate_names[i] + "'";
+    return all.empty() ? std::string("none") : all;
+  };
+  const std::string given = listed([&](int, int i) { return wanted_[i] != 0; });
+  choose_of(node, false);
+  const std::vector<int>& good = choices_[node].independent;
+  throw EvaluationError("loops of '" + source_.name() + "': " + given + " are no independent coordinates at this state, as " + what + "; there " +
+                        listed([&](int j, int) { return std::find(good.begin(), good.end(), j) != good.end(); }) + " are");
+}
+
+template <class S>
+void EmbeddedWorkspace<S>::choose(const std::shared_ptr<const ResolvedLoops>& loops, const S* q, const std::vector<int>& given) {
   using std::sqrt;
   set_loops(loops);
+  chosen_ = false;
   place(q);
   composite_inertia_tip_to_base(tree_, blocks_);
   weights_.assign(model_->nv, S(1));
   for (int k = 0; k < model_->bodies; ++k)
     for (int i = model_->v_offset[k]; i < model_->v_offset[k] + model_->nv_of[k]; ++i)
       if (const S felt = dot(blocks_.H[i], blocks_.R[k] * blocks_.H[i]) + blocks_.J[i]; felt > S(0)) weights_[i] = sqrt(felt);
-  for (size_t n = 0; n < nodes_.size(); ++n) choose_of(n);
+  wanted_.assign(model_->nv, 0);
+  for (const int i : given) wanted_[i] = 1;
+  for (size_t n = 0; n < nodes_.size(); ++n)
+    choose_of(n, std::any_of(nodes_[n].coordinates.begin(), nodes_[n].coordinates.end(), [&](int i) { return wanted_[i] != 0; }));
   chosen_ = true;
 }
 
@@ -107,6 +131,13 @@ std::vector<int> EmbeddedWorkspace<S>::independent() const {
   for (size_t n = 0; chosen_ && n < nodes_.size(); ++n)
     for (const int place : choices_[n].independent) all.push_back(nodes_[n].coordinates[place]);
   return all;
+}
+
+template <class S>
+int EmbeddedWorkspace<S>::rank() const {
+  size_t sum = 0;
+  for (const Choice& of : choices_) sum += of.rows.size();
+  return static_cast<int>(sum);
 }
 
 // ------------------------------------------------------------------ X, and what follows from it
@@ -256,7 +287,7 @@ void EmbeddedWorkspace<S>::accelerate(const std::shared_ptr<const ResolvedLoops>
   for (int i = 0; i < nv; ++i) fastest = maximum(fastest, S(abs(asked.v[i])));
   for (int r = 0; r < rows; ++r) bias_[r] = abs(c_[r]) + fastest * rows_.product_size(r, asked.v);
   for (int r = 0; asked.driven && r < rows; ++r) c_[r] -= asked.driven[r], bias_[r] += abs(asked.driven[r]);
-  x_.assign(nv, S(0)), delta_.resize(nv), load_.resize(nv);
+  x_.assign(nv, S(0)), lambda_.assign(rows, S(0)), delta_.resize(nv), load_.resize(nv);
   put_dependent(c_.data(), x_.data());
   // Steps of refinement of the same equations: the first is the solution.
   const int more = asked.refinement.steps == Refinement::automatic ? 5 : asked.refinement.steps;
@@ -304,7 +335,6 @@ void EmbeddedWorkspace<S>::certify(const Asked& asked, const S& size) {
 // Q_d* λ = (forces - T)_d, by the transpose of Q_d; of rows that hang on others zero.
 template <class S>
 void EmbeddedWorkspace<S>::find_multipliers(const Asked& asked) {
-  lambda_.assign(loops_->rows, S(0));
   for (size_t n = 0; n < nodes_.size(); ++n) {
     Choice& of = choices_[n];
     const size_t d = of.rows.size();

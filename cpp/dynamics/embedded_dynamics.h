@@ -8,7 +8,7 @@
 // The loops' forces are known afterwards, Q_d* λ = (forces - T)_d; of rows that hang on others λ is zero.
 //
 // Which coordinates are independent is chosen at a state, by elimination of Q with complete pivoting in units of energy: columns by 1/√ℳ_ii, rows by
-// their sizes, so that entries of X are of order one. Positions off the loops go back by Newton's steps of the dependent coordinates alone, velocities
+// their sizes, so that entries of X are of order one; or given, of a node as many as are free, and then the others are eliminated. Positions off the loops go back by Newton's steps of the dependent coordinates alone, velocities
 // by X: what is independent stays, and follows an ordinary differential equation.
 //
 // Cost O(N) and O(n³) of a node of n coordinates. Form fast; others are in operators (soa.embedded()).
@@ -34,8 +34,9 @@ class EmbeddedWorkspace {
   explicit EmbeddedWorkspace(const Multibody& model, const HingeTerms& terms = {});
 
   void accelerate(const std::shared_ptr<const ResolvedLoops>& loops, const Asked& asked);
-  // Independent coordinates anew, as they are best at q. EvaluationError names rows where the state is off its loops.
-  void choose(const std::shared_ptr<const ResolvedLoops>& loops, const S* q);
+  // Independent coordinates anew, as they are best at q, or those given (numbers), of nodes that have any among them. EvaluationError names
+  // coordinates that are no independent ones at q, and such as are.
+  void choose(const std::shared_ptr<const ResolvedLoops>& loops, const S* q, const std::vector<int>& given = {});
   // The dependent parts of q and v anew by the independent ones, Q v = rates (null: zero); as far as that is sure.
   void bring(const std::shared_ptr<const ResolvedLoops>& loops, S* q, S* v, const S* rates);
   // The same, and independent coordinates anew; EvaluationError names a row where a state is further off than these steps reach.
@@ -48,6 +49,8 @@ class EmbeddedWorkspace {
   const std::vector<S>& multipliers() const { return lambda_; }
   // Coordinates of the tree that are independent now, none chosen: empty.
   std::vector<int> independent() const;
+  // Of Q: as many rows as are solved.
+  int rank() const;
 
  private:
   // Of a node with loops: which of its rows, which of its coordinates by place, and Q_d in factors.
@@ -59,7 +62,8 @@ class EmbeddedWorkspace {
   void set_loops(const std::shared_ptr<const ResolvedLoops>& loops);
   void place(const S* q);
   void find_maps();                          // X of every node at rows_
-  void choose_of(size_t node);
+  void choose_of(size_t node, bool given);
+  [[noreturn]] void refuse_choice(size_t node, const std::string& what);
   void put_dependent(S* rows_target, S* x);  // x_d = -Q_d⁻¹ target
   void velocities(S* v, const S* rates);
   void find_forces(const Asked& asked, const S* x, const Applied<S>& applied);
@@ -80,6 +84,7 @@ class EmbeddedWorkspace {
   std::vector<EmbeddedNode> nodes_;
   std::vector<Choice> choices_;              // of nodes
   bool chosen_ = false;
+  std::vector<char> wanted_;                 // coordinates that are to be independent; empty: none is asked for
   EmbeddedTree<S> embedded_;
   LoopBuffers<S> buffers_;
   LoopRows<S> rows_;

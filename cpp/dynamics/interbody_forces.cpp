@@ -5,6 +5,7 @@
 
 #include "model/configuration.h"
 #include "model/unit_data.h"
+#include "numerics/recorded.h"
 #include "recursions/kinematics.h"
 #include "recursions/newton_euler.h"
 #include "runtime/errors.h"
@@ -173,6 +174,7 @@ template class InterbodyForces<Single>;
 template class InterbodyForces<double>;
 template class InterbodyForces<Extended>;
 template class InterbodyForces<Quad>;
+template class InterbodyForces<Recorded>;
 template class InterbodyForces<Tangent<double, 4>>;
 
 }  // namespace pycraft

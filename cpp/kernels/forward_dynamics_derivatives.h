@@ -67,14 +67,18 @@ template <class Kind, class S>
     pass(z.qn, z.qf, to.q), pass(z.vn, z.vf, to.v), pass(z.mn, z.mf, to.m);
   });
 }
-// What else is in those rows: ν of the link's own coordinates, and nothing elsewhere.
+// What else is in those rows, to their ends: ν of the link's own coordinates, and nothing elsewhere.
 template <class S>
-inline void respond_else(const LinkOf<S>& link, int nv, const S* nu, const ResponseRows<S>& rows, int N) {
+inline void respond_else(const LinkOf<S>& link, int nv, const S* nu, const ResponseRows<S>& rows) {
+  constexpr int n = BlockOf<S>::columns;
+  const Block<S> nothing(typename S::Scalar(0));
+  const int before = link.v - link.v % n, after = (link.end + n - 1) / n * n;
   for (int i = 0; i < nv; ++i) {
     const ResponseRows<S> to = rows.of(link.v + i);
-    for (int c = link.v - link.v % BlockOf<S>::columns; c < link.v; ++c) to.q[c] = to.v[c] = to.m[c] = S(0);
+    for (int c = before; c < link.v; ++c) to.q[c] = to.v[c] = to.m[c] = S(0);
     for (int c = 0; c < nv; ++c) to.q[link.v + c] = nu[18 * c + i], to.v[link.v + c] = nu[18 * c + 6 + i], to.m[link.v + c] = nu[18 * c + 12 + i];
-    for (int c = link.end; c < N; ++c) to.q[c] = to.v[c] = to.m[c] = S(0);
+    for (int c = link.end; c < after && c < to.room; ++c) to.q[c] = to.v[c] = to.m[c] = S(0);
+    for (int c = after; c < to.room; c += n) put_first(nothing, to.q + c, to.room - c), put_first(nothing, to.v + c, to.room - c), put_first(nothing, to.m + c, to.room - c);
   }
 }
 
@@ -89,16 +93,17 @@ struct Finisher {
   V l, d, s, slide, turn, pull;
   Matrix3<B> axes, gain, above, below;
   int stride, room;
+  std::ptrdiff_t from_parent;  // from the parent's columns to the link's
 
-  Finisher(const LinkOf<S>& link, const ForwardMultiple<S>& multiple, const Instant<S>& instant, const Direction<S>& own, const ArticulatedRate<S>& K, const ResponseRows<S>& rows)
+  Finisher(const LinkOf<S>& link, const ForwardMultiple<S>& multiple, const Instant<S>& instant, const Direction<S>& own, const ArticulatedRate<S>& K, const ResponseRows<S>& rows, std::ptrdiff_t from_parent)
       : l(in_all(link.parent < 0 ? Vector3<S>::zero() : instant.lying.arm)), d(in_all(S(2) * instant.drift)), s(in_all(own.s)), slide(in_all(own.x)), turn(in_all(K.gain.angular)), pull(in_all(K.gain.linear)), axes(in_all(instant.lying.axes)),
-        gain(in_all(multiple.gain)), above(in_all(K.kappa[0])), below(in_all(K.kappa[1])), stride(rows.stride), room(rows.room) {
+        gain(in_all(multiple.gain)), above(in_all(K.kappa[0])), below(in_all(K.kappa[1])), stride(rows.stride), room(rows.room), from_parent(from_parent) {
   }
 
   // b: of inboard coordinates, else zero; y: of its own.
   template <Standing where>
   [[gnu::always_inline]] void pass(int c, const Rows3<S>& angulars, const Rows3<S>& linears, const V& b, const V& y_angular, const V& y_linear, S* row, B& odd) const {
-    V angular = angulars.at(c), linear = linears.at(c);
+    V angular = angulars.at(c - from_parent), linear = linears.at(c - from_parent);
     linear = linear + cross(angular, l);
     if constexpr (where != Standing::else_where) linear = linear + cross(b, d);
     if constexpr (where == Standing::own) linear = linear + y_linear, angular = angular + y_angular;
@@ -143,10 +148,12 @@ template <class Kind, class S, class T>
   const Link<T>& link = links.link[at_link];
   const int N = links.nv, own_end = link.v + Kind::nv, before = link.v - link.v % n, after = (own_end + n - 1) / n * n;
   const size_t stride = row_of(N);
-  const ResponseColumns<S> alpha(w.alpha + stride * ResponseColumns<S>::rows * link.slot, stride);
+  const size_t size = stride * ResponseColumns<S>::rows;
+  const std::ptrdiff_t from_parent = link.parent < 0 ? 0 : std::ptrdiff_t(size) * (link.slot - links.link[link.parent].slot);
+  const ResponseColumns<S> alpha(w.alpha + size * link.slot, stride);
   const OwnColumns<S> adds(w.own, stride);
   const ResponseRows<S> to = rows.of(link.v);
-  const Finisher<Kind, S> at(link, *w.forward.of(link), w.instant[at_link], w.direction[link.v], w.rate[at_link], to);
+  const Finisher<Kind, S> at(link, *w.forward.of(link), w.instant[at_link], w.direction[link.v], w.rate[at_link], to, from_parent);
   const V none = V::zero();
   for (int c = 0; c < before; c += n) {
     at.template pass<Standing::inboard>(c, alpha.qn, alpha.qf, adds.qb.at(c), none, none, to.q, odd);
@@ -165,14 +172,14 @@ template <class Kind, class S, class T>
   }
 }
 
-// What a link's columns start from: its parent's, or nothing; b of other branches is none of it.
+// What the columns of a root start from: nothing. Of other branches b is none of a link's.
 template <class S, class T>
 inline void begin_columns(const Links<T>& links, int k, const ForwardDerivativeWork<S>& w) {
   const Link<T>& link = links.link[k];
   const size_t stride = row_of(links.nv), size = stride * ResponseColumns<S>::rows;
-  const int above = link.parent < 0 ? -1 : links.link[link.parent].slot;
-  if (above != link.slot)
-    for (size_t i = 0; i < size; ++i) w.alpha[size * link.slot + i] = above < 0 ? S(0) : w.alpha[size * above + i];
+  const Block<S> nothing(typename S::Scalar(0));
+  if (link.parent < 0)
+    for (size_t i = 0; i < size; i += BlockOf<S>::columns) put_block<S>(nothing, w.alpha + size * link.slot + i);
   if (link.parent == k - 1) return;
   for (int r = 0; r < 6; ++r)
     for (int c = link.parent < 0 ? 0 : links.link[link.parent + 1].v; c < link.v; ++c) w.own[r * stride + c] = S(0);
@@ -190,9 +197,7 @@ unsigned forward_dynamics_derivatives(const Links<typename S::Scalar>& links, co
   if constexpr (S::width == 1 && sizeof(T) == sizeof(double))
     if (direct) rows = {reinterpret_cast<S*>(out), reinterpret_cast<S*>(at.others[0]), reinterpret_cast<S*>(at.others[1]), N, N};
   // What blocks hold besides a link's columns is finite, and no number so small that arithmetic on it is slow.
-  for (size_t i = 0; i < size_t(ResponseColumns<S>::rows + OwnColumns<S>::rows) * stride; ++i) w.z[i] = S(0);
-  for (size_t i = 0; !direct && i < 3 * size; i += stride)
-    for (int c = N; c < stride; ++c) w.rows[i + c] = S(0);
+  for (size_t i = 0; i < size_t(ResponseColumns<S>::rows + OwnColumns<S>::rows) * stride; i += BlockOf<S>::columns) put_block<S>(Block<S>(T(0)), w.z + i);
   unsigned sound = S::mask(accelerate_all(links, at, w));
   start_all(links, at, w);
   for (int k = links.count - 1; k >= 0; --k) {
@@ -201,7 +206,7 @@ unsigned forward_dynamics_derivatives(const Links<typename S::Scalar>& links, co
     with_shape(link.step, [&](auto kind) {
       using Kind = decltype(kind);
       respond<Kind>(link, w.forward.link[k], *w.forward.of(link), w.instant[k].lying, w.direction[link.v], w.rate[k].gain, ResponseColumns<S>(w.z, stride), rows);
-      respond_else(link, Kind::nv, w.nu + size_t(18) * link.v, rows, N);
+      respond_else(link, Kind::nv, w.nu + size_t(18) * link.v, rows);
     });
   }
   Block<S> odd(T(0));

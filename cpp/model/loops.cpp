@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "model/checks.h"
+#include "model/structure_edits.h"
 #include "runtime/errors.h"
 
 namespace pycraft {
@@ -73,21 +74,22 @@ const PairRecord& record_of(PairKind kind) {
 
 // ------------------------------------------------------------------ edits
 
-int LoopSet::body_of(const std::string& frame) const {
-  FrameNumber at = frames_.find(frame);
-  while (at >= model().bodies()) at = frames_.carrier(at);
-  return at;
+std::string LoopSet::body_of(const std::string& frame) const {
+  if (frame.empty()) return frame;
+  if (const auto body = StructureEdits::body_of(model(), frame)) return *body;
+  frames_.find(frame);  // names of the base; else it says which there are
+  return {};
 }
 
 void LoopSet::check_new(const std::string& name) const {
   if (name.empty()) throw ModelError("a loop of '" + model().name() + "' has no name");
-  for (const auto& known : loops_)
-    if (known->name == name) throw ModelError("'" + model().name() + "' has a loop called '" + name + "' already; give every loop a name of its own");
+  if (by_name_.count(name)) throw ModelError("'" + model().name() + "' has a loop called '" + name + "' already; give every loop a name of its own");
 }
 
 void LoopSet::keep(Loop loop) {
   std::lock_guard<Mutex> lock(mutex_);
   loops_.push_back(std::make_shared<const Loop>(std::move(loop)));
+  by_name_[loops_.back()->name] = loops_.back();
   ++edits_;
 }
 
@@ -128,9 +130,9 @@ void LoopSet::add_pair(const std::string& name, FramePair pair) {
     if (!std::isfinite(sum + slopes)) throw ModelError(what + ": its surface has a number that is not finite");
     if (slopes == 0) throw ModelError(what + ": p·A p + b·p + c with A and b zero is no surface");
   }
-  const int body = body_of(pair.a);
+  const std::string body = body_of(pair.a);
   if (body == body_of(pair.b))
-    throw ModelError(what + " is of " + called(body < 0 ? "" : model().body(body).name) + " with itself: " + called(pair.a) + " and " + called(pair.b) +
+    throw ModelError(what + " is of " + called(body) + " with itself: " + called(pair.a) + " and " + called(pair.b) +
                      " stand on it both; close a chain between two bodies, or a body and the base");
   keep({name, std::move(pair), {}});
 }
@@ -158,15 +160,14 @@ void LoopSet::remove(const std::string& name) {
   loop(name);
   std::lock_guard<Mutex> lock(mutex_);
   std::erase_if(loops_, [&](const auto& known) { return known->name == name; });
+  by_name_.erase(name);
   ++edits_;
 }
 
 const Loop& LoopSet::loop(const std::string& name) const {
+  if (const auto known = by_name_.find(name); known != by_name_.end()) return *known->second;
   std::string all;
-  for (const auto& known : loops_) {
-    if (known->name == name) return *known;
-    all += (all.empty() ? "'" : ", '") + known->name + "'";
-  }
+  for (const auto& known : loops_) all += (all.empty() ? "'" : ", '") + known->name + "'";
   throw ModelError("'" + model().name() + "' has no loop called '" + name + "'; " + (all.empty() ? "it has none" : "there are " + all));
 }
 

@@ -24,6 +24,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "model/frames.h"
@@ -112,11 +113,12 @@ class LoopSet {
  private:
   void check_new(const std::string& name) const;
   void keep(Loop loop);
-  int body_of(const std::string& frame) const;   // -1: the base
+  std::string body_of(const std::string& frame) const;  // empty: the base
   ResolvedLoop resolve(const std::shared_ptr<const Loop>& loop, std::deque<Pose<double>>& poses) const;
 
   FrameTree frames_;
   std::vector<std::shared_ptr<const Loop>> loops_;
+  std::unordered_map<std::string, std::shared_ptr<const Loop>> by_name_;
   std::uint64_t edits_ = 0;
   mutable std::shared_ptr<const ResolvedLoops> resolved_;
   mutable std::uint64_t parameters_ = 0, seen_edits_ = 0;

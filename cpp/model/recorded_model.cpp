@@ -12,6 +12,11 @@ std::shared_ptr<const CompiledModel<Recorded>> Multibody::compiled<Recorded>() c
   return std::make_shared<CompiledModel<Recorded>>(broadcast<Recorded>(*compiled<double>()));
 }
 
+template <>
+std::shared_ptr<const CompiledModel<Recorded>> compile_model<Recorded>(const Multibody& model, const HingeTerms& terms) {
+  return std::make_shared<CompiledModel<Recorded>>(broadcast<Recorded>(*compile_model<double>(model, terms)));
+}
+
 StateData generic_state(const Multibody& model) {
   constexpr double golden = 0.6180339887498949;
   const auto number = [](int i) { return (i % 3 == 1 ? -1 : 1) * (0.4 + 0.6 * std::fmod(golden * (i + 1), 1.0)); };

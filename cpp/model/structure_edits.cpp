@@ -45,6 +45,15 @@ StructureEdits::Motion motion_along(const Multibody& model, int body, int inboar
 
 }  // namespace
 
+std::optional<std::string> StructureEdits::body_of(const Multibody& model, const std::string& frame) {
+  if (model.part_) model.settled();  // stale ones say so
+  if (model.body_numbers_.count(frame)) return frame;
+  const auto node = model.node_numbers_.find(frame);
+  if (node == model.node_numbers_.end()) return std::nullopt;
+  const int body = model.nodes_[node->second].body;
+  return body < 0 ? std::string() : model.bodies_[body].name;
+}
+
 StructureEdits::Motion StructureEdits::relative_motion(const Multibody& model, const std::string& body, const std::string& frame) {
   const ModelInUse use(model);
   const int k = model.body_index(body);

@@ -3,6 +3,7 @@
 // model.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -17,6 +18,10 @@ struct StructureEdits {
   // body it hangs after what hangs there, as a body that is added does.
   static void rehang(Multibody& model, const std::string& body, const std::string& parent, Hinge hinge, const std::vector<double>& q,
                      const std::vector<double>& v);
+
+  // The name of the body that a body or node belongs to, empty of the base; nothing where none is called so. O(1), between edits too: numbers, which
+  // an edit makes invalid, are not asked for.
+  static std::optional<std::string> body_of(const Multibody& model, const std::string& frame);
 
   struct LockedHinges;  // locked_hinges.h
   struct Coalescing;    // coalescing.h

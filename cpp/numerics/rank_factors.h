@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "numerics/decisions.h"
 #include "numerics/scalar.h"
 
 namespace pycraft {
@@ -47,14 +48,14 @@ struct Reflections {
       int best = k;
       S most = square(k, k);
       for (int j = k + 1; j < columns && pivoting; ++j)
-        if (const S other = square(j, k); other > most) best = j, most = other;
+        if (const S other = square(j, k); soft(other) > soft(most)) best = j, most = other;
       if (!(sqrt(most) > tolerance)) return;
       if (best != k) {
         std::swap_ranges(&at(top[k], k), &at(top[k], k) + rows, &at(top[best], best));
         std::swap(order[k], order[best]);
       }
       const S length = sqrt(most);
-      diagonal[k] = at(k, k) > S(0) ? S(-length) : length;
+      diagonal[k] = where_less(S(0), at(k, k), S(-length), length);
       at(k, k) -= diagonal[k];
       const S size = square(k, k);
       beta[k] = size > S(0) ? S(S(2) / size) : S(0);
@@ -125,7 +126,7 @@ class MinimumNormSystem {
   void factor(const S* unit, const S& tolerance) {
     const int m = count_;
     unit_.assign(unit, unit + m);
-    if (m > few && factor_in_order(S(1000) * tolerance)) return;
+    if ((m > few || is_recorded<S>) && factor_in_order(S(1000) * tolerance)) return;
     V_.resize(n_, m);
     for (int j = 0; j < m; ++j)
       for (const auto& [i, value] : given_[j]) V_.at(i, j) = value;

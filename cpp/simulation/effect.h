@@ -3,7 +3,7 @@
 // An effect is made for a model: names are resolved then, parameters are checked. Before any state is seen it declares what it needs and what it
 // gives, by structure, and a scene is compiled from these declarations alone (simulation/compiled_scene.h). At a state it does no more than its
 // own arithmetic, in the scalar of the scene, by one virtual call: `BoundEffect<S>`, one for every scalar in which scenes run and for numbers
-// with derivatives.
+// with derivatives, first ones and second ones.
 //
 // A new effect is a class that derives from Effect, a class template that derives from BoundEffect, and a line PYCRAFT_BIND_EFFECT that says
 // which belongs to which (simulation/effects/ has examples, docs/scenes.md follows one).
@@ -11,6 +11,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -25,8 +26,9 @@
 namespace pycraft {
 
 using WithDerivatives = Tangent<double, 4>;
+using WithCurvature = Tangent<WithDerivatives, 4>;
 #define PYCRAFT_FOR_EACH_SCENE_SCALAR(X) X(double) X(Extended) X(Quad)
-#define PYCRAFT_FOR_EACH_EFFECT_SCALAR(X) PYCRAFT_FOR_EACH_SCENE_SCALAR(X) X(WithDerivatives)
+#define PYCRAFT_FOR_EACH_EFFECT_SCALAR(X) PYCRAFT_FOR_EACH_SCENE_SCALAR(X) X(WithDerivatives) X(WithCurvature)
 
 // A term on the diagonal of D at a coordinate: J always, and h C + h² K in a step of size h that is taken implicitly.
 struct HingeTerm {
@@ -70,6 +72,7 @@ struct Declaration {
   std::vector<HingeTerm> resists;
   int events = 0;                    // functions of the state at whose zeros it is another one
   bool foreign = false;              // calls from outside of the core: what it gives is looked at each time
+  bool differentiable = true;        // whether its forces and rates can be taken on numbers with derivatives
   int own() const { return static_cast<int>(states.size() + held.size()); }
 };
 
@@ -94,6 +97,12 @@ struct Forces {
   Vector6<S>* wrench;
 };
 
+// Why an effect has no second derivatives at a state, and the coordinate where: -1, of all of it.
+struct Edge {
+  const char* why;
+  int coordinate = -1;
+};
+
 template <class S>
 class BoundEffect {
  public:
@@ -108,6 +117,7 @@ class BoundEffect {
   virtual void sample(const At<S>&, S*) {}  // to what it holds
   virtual void impulses(const At<S>&, std::uint64_t, S*) {}  // number so and so, added to generalized impulses (nv)
   virtual void events(const At<S>&, S*) {}
+  virtual std::optional<Edge> edge(const At<S>&) { return {}; }
   // Positions, velocities and accelerations of its prescribed coordinates, to their places among all; what is null is not asked for. Whether they
   // are finite, and quaternions have a direction.
   virtual bool prescribe(const S&, S*, S*, S*) { return true; }
@@ -122,6 +132,7 @@ class Effect {
   virtual std::unique_ptr<BoundEffect<Extended>> bind(Extended) const = 0;
   virtual std::unique_ptr<BoundEffect<Quad>> bind(Quad) const = 0;
   virtual std::unique_ptr<BoundEffect<WithDerivatives>> bind(WithDerivatives) const = 0;
+  virtual std::unique_ptr<BoundEffect<WithCurvature>> bind(WithCurvature) const = 0;
 };
 
 // Declares, in a class, that it binds to every scalar.
@@ -129,12 +140,14 @@ class Effect {
   std::unique_ptr<BoundEffect<double>> bind(double) const override;                        \
   std::unique_ptr<BoundEffect<Extended>> bind(Extended) const override;                    \
   std::unique_ptr<BoundEffect<Quad>> bind(Quad) const override;                            \
-  std::unique_ptr<BoundEffect<WithDerivatives>> bind(WithDerivatives) const override;
+  std::unique_ptr<BoundEffect<WithDerivatives>> bind(WithDerivatives) const override;      \
+  std::unique_ptr<BoundEffect<WithCurvature>> bind(WithCurvature) const override;
 // Says that Bound<S>(const Class&) is what Class binds to.
 #define PYCRAFT_BIND_EFFECT(Class, Bound)                                                                                                    \
   std::unique_ptr<BoundEffect<double>> Class::bind(double) const { return std::make_unique<Bound<double>>(*this); }                          \
   std::unique_ptr<BoundEffect<Extended>> Class::bind(Extended) const { return std::make_unique<Bound<Extended>>(*this); }                    \
   std::unique_ptr<BoundEffect<Quad>> Class::bind(Quad) const { return std::make_unique<Bound<Quad>>(*this); }                                \
-  std::unique_ptr<BoundEffect<WithDerivatives>> Class::bind(WithDerivatives) const { return std::make_unique<Bound<WithDerivatives>>(*this); }
+  std::unique_ptr<BoundEffect<WithDerivatives>> Class::bind(WithDerivatives) const { return std::make_unique<Bound<WithDerivatives>>(*this); } \
+  std::unique_ptr<BoundEffect<WithCurvature>> Class::bind(WithCurvature) const { return std::make_unique<Bound<WithCurvature>>(*this); }
 
 }  // namespace pycraft

@@ -59,7 +59,7 @@ inline void values_at(const FunctionOfTime& f, const S& t, S* value, S* rate = n
   if constexpr (requires { t.d; }) {  // with derivatives, of which time has none
     const int n = f.size();
     std::vector<double> of(size_t(3) * n);
-    f.at(t.x, of.data(), of.data() + n, of.data() + 2 * n);
+    f.at(to_double(t), of.data(), of.data() + n, of.data() + 2 * n);
     S* const given[] = {value, rate, second};
     for (int i = 0; i < 3; ++i)
       for (int j = 0; given[i] && j < n; ++j) given[i][j] = S(of[i * n + j]);

@@ -52,6 +52,9 @@ class SceneEquations : public Kind<S> {
     return x;
   }
 
+  // Between the ends of a step, where no samples are taken and states need not be on loops.
+  State initial_between(const S& t, const S* q, const S* v, const S* own) { return placed(t, q, v, own); }
+
   void evaluate(const S& t, const S* q, const S* v, const S* rest, S* vdot, S* rest_rate) override {
     if ((++evaluations & 63) == 0) check_interrupt();
     place(t, q, v);

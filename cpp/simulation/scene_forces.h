@@ -58,6 +58,7 @@ class SceneForces {
   void act_and_keep(Active<S>& effect, S* row);         // its generalized forces (nv) added to a row, its wrenches kept
   void gather_kept(Active<S>& effect, S* row) { kinematics_.gather(effect.ways, effect.declared.wrenches, effect.kept.data(), row); }
   void impulses(Active<S>& effect, std::uint64_t number, S* out) { effect.bound->impulses(at_of(effect), number, out); }
+  std::optional<Edge> edge(Active<S>& effect) { return effect.bound->edge(at_of(effect)); }
   S potential(Active<S>& effect) { return effect.bound->potential(at_of(effect)); }
   S* tau() { return tau_.data(); }
   const Vector6<S>* wrenches() const { return wrench_.data(); }

@@ -7,14 +7,14 @@ namespace pycraft {
 
 SceneLinearized::SceneLinearized(CompiledScene<double>& scene, bool works)
     : SceneEquations(scene, works), J_(nv(), 0.0), along_q_(nv(), nv()), along_v_(nv(), nv()), mass_(nv(), nv()), links_(scene.scene().model()), sensitivities_(scene.scene().model()),
-      dynamics_(scene.scene().model()), direction_(nv()), rate_(nq()), moved_(nq()), faster_(nv()), other_(rest()), column_(nv() + rest()), vdot_(nv()), rest_rate_(rest()) {
+      dynamics_(scene.scene().model()), direction_(nv()), moved_(nq()), faster_(nv()), other_(rest()), column_(nv() + rest()), vdot_(nv()), rest_rate_(rest()) {
   for (const auto& e : scene.effects().effects()) {
     const Declaration& d = e->declared;
     if (d.uniform_gravity) gravity_ = gravity_ + d.gravity;
     for (const HingeTerm& term : d.hinges) J_[term.coordinate] += term.inertia;
-    acts_ |= e->acts() || !d.states.empty(), foreign_ |= d.foreign && (e->acts() || !d.states.empty()), in_time_ |= d.time;
+    acts_ |= e->acts() || !d.states.empty(), differenced_ |= !d.differentiable && (e->acts() || !d.states.empty()), in_time_ |= d.time;
   }
-  if (!acts_ || foreign_) return;
+  if (!acts_ || differenced_) return;
   const auto numbers = std::make_shared<const CompiledModel<WithDerivatives>>(broadcast<WithDerivatives>(scene.numbers()));
   forces_ = std::make_unique<SceneForces<WithDerivatives>>(scene.scene(), numbers);
   sum_.resize(nv()), y_rate_.resize(own());
@@ -61,20 +61,9 @@ void SceneLinearized::differentiate_forces(double t, const double* q, const doub
   constexpr int width = static_cast<int>(std::extent_v<decltype(WithDerivatives::d)>);
   const int N = nv(), count = 2 * N + own();
   for (int first = 0; first < count; first += width) {
-    q_.assign(q, q + nq()), v_.assign(v, v + N), y_.assign(rest, rest + own());
     const int several = std::min(width, count - first);
-    for (int i = 0; i < several; ++i) {
-      const int k = first + i;
-      if (k < N) {
-        std::fill(direction_.begin(), direction_.end(), 0.0);
-        direction_[k] = 1;
-        configuration_rate(model(), q, direction_.data(), rate_.data());
-        for (int j = 0; j < nq(); ++j) q_[j].d[i] = rate_[j];
-      } else {
-        (k < 2 * N ? v_[k - N] : y_[k - 2 * N]).d[i] = 1;
-      }
-    }
-    forces_->generalized_forces(WithDerivatives(t), q_.data(), v_.data(), y_.data(), sum_.data());
+    seeded_.seed(model(), own(), q, v, rest, first, several);
+    forces_->generalized_forces(WithDerivatives(t), seeded_.q.data(), seeded_.v.data(), seeded_.y.data(), sum_.data());
     if (own() > 0) forces_->rates(y_rate_.data());
     for (int i = 0; i < several; ++i) {
       for (int j = 0; j < N; ++j) column_[j] = sum_[j].d[i];

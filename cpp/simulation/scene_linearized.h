@@ -4,7 +4,7 @@
 //
 // ID = ℳv̇ + 𝒞 with gravity, at v̇ held: its derivatives are those of the kernels (O(N²) numbers), of the recursions where these are in doubt. T, the
 // forces of all effects as generalized ones, is differentiated by its own arithmetic on numbers with derivatives, four directions at once, and by
-// differences where an effect is not written in C++. Along time by differences, where an effect depends on it. Prescribed coordinates are known:
+// differences where an effect is written in Python. Along time by differences, where an effect depends on it. Prescribed coordinates are known:
 // their rows are the identity's, and nothing is taken along them.
 #pragma once
 
@@ -14,6 +14,7 @@
 #include "dynamics/link_dynamics.h"
 #include "dynamics/sensitivities.h"
 #include "simulation/scene_equations.h"
+#include "simulation/tangent_states.h"
 
 namespace pycraft {
 
@@ -33,15 +34,16 @@ class SceneLinearized : public SceneEquations<double, LinearizedEquations> {
   void add_column(int direction, const double* along, Linearization& out) const;
 
   Vector3<double> gravity_{0, 0, 0};
-  bool acts_ = false, foreign_ = false, in_time_ = false;
+  bool acts_ = false, differenced_ = false, in_time_ = false;
   std::vector<double> J_;  // of rotors that effects bring
   Matrix along_q_, along_v_, mass_;
   LinkDynamics<double> links_;
   Sensitivities<double> sensitivities_;
   RigidDynamics<double> dynamics_;
   std::unique_ptr<SceneForces<WithDerivatives>> forces_;
-  std::vector<WithDerivatives> q_, v_, y_, sum_, y_rate_;
-  State direction_, rate_, moved_, faster_, other_, column_, vdot_, rest_rate_;
+  TangentStates<double, 4> seeded_;
+  std::vector<WithDerivatives> sum_, y_rate_;
+  State direction_, moved_, faster_, other_, column_, vdot_, rest_rate_;
 };
 
 }  // namespace pycraft

@@ -16,6 +16,7 @@
 #include "model/checks.h"
 #include "runtime/errors.h"
 #include "simulation/scene_forces.h"
+#include "simulation/taken_loops.h"
 
 namespace pycraft {
 
@@ -140,19 +141,10 @@ class SceneLoops {
     for (size_t i = 0; i < held_.size(); ++i) rates_[first_.back() + i] = v[held_[i]];
   }
   void take(const KeptLoops& kept, ResolvedLoops& to) {
-    const std::shared_ptr<const ResolvedLoops> all = kept.set->resolved();
-    whole_.push_back(all);
-    for (const std::string& name : kept.kept())
-      for (const ResolvedLoop& loop : all->loops) {
-        if (loop.loop->name != name) continue;
-        ResolvedLoop own = loop;
-        own.first_row = to.rows;
-        for (int r = loop.first_row; r < loop.first_row + loop.rows; ++r) to.names.push_back(all->names[r]), to.of_positions.push_back(all->of_positions[r]);
-        to.rows += loop.rows;
-        gains_.resize(to.rows, {kept.alpha, kept.beta});
-        (kept.alpha != 0 || kept.beta != 0 ? drawn_ : kept_) = true;
-        to.loops.push_back(std::move(own));
-      }
+    const size_t before = to.loops.size();
+    whole_.push_back(take_loops(*kept.set, kept.kept(), to));
+    gains_.resize(to.rows, {kept.alpha, kept.beta});
+    if (to.loops.size() > before) (kept.alpha != 0 || kept.beta != 0 ? drawn_ : kept_) = true;
   }
   void refuse(const std::vector<S>& off, const std::string& how, const std::string& rule) const {
     for (int r = 0; r < loops_->rows; ++r)

@@ -17,7 +17,7 @@ from ..models.multibody import describe
 from .build import built
 from .expressions import ExpressionGraph
 from .frames import frame_graph
-from .kernels import INPUTS, kernel_graph
+from .kernels import INPUTS, ON_LOOPS, kernel_graph, loops_graph
 from .source import FUNCTION, written
 from .trace import Graph
 
@@ -74,14 +74,18 @@ def _callable(behind: Compiled, arguments: Sequence[tuple[str, int]]) -> Any:
 
 def compile_call(model: Any, call: str, frame: str | None = None) -> Any:
     """What `Multibody.compile` gives."""
-    if not isinstance(call, str) or call not in (*INPUTS, *_OF_FRAMES):
-        raise _core.EvaluationError(f"compile takes {', '.join(map(repr, (*INPUTS, *_OF_FRAMES)))}, not {call!r}")
+    known = (*INPUTS, ON_LOOPS, *_OF_FRAMES)
+    if not isinstance(call, str) or call not in known:
+        raise _core.EvaluationError(f"compile takes {', '.join(map(repr, known))}, not {call!r}")
     if (frame is not None) != (call in _OF_FRAMES):
         raise _core.EvaluationError(
             f"a compiled {call} is that of a frame: compile({call!r}, frame=...)" if frame is None else f"a compiled {call} has no frame"
         )
     held = copy.deepcopy(model)  # later edits change neither what is compiled nor what answers in its place
-    if frame is None:
+    if call == ON_LOOPS:
+        graph, results = loops_graph(held, 4 * MOST_OPERATIONS)  # what no result needs is among them
+        ordinary, name = partial(_on_loops, held), call
+    elif frame is None:
         graph, results = kernel_graph(held, call)
         ordinary, name = getattr(held, call), call
     else:
@@ -89,8 +93,19 @@ def compile_call(model: Any, call: str, frame: str | None = None) -> Any:
         held.pose(frame)  # ModelError where no body or node has the name
         graph, results = frame_graph(held, call, frame)
         ordinary, name = partial(_of_frame, held, call, frame), f"{call} of {frame}"
-    arguments = [(a, held.nq if a == "q" else held.nv) for a in INPUTS.get(call, ("q",))]
+    inputs = INPUTS["forward_dynamics"] if call == ON_LOOPS else INPUTS.get(call, ("q",))
+    arguments = [(a, held.nq if a == "q" else held.nv) for a in inputs]
     return _callable(Compiled(f"{held.name}: {name}", graph, results, arguments, ordinary), arguments)
+
+
+def _on_loops(model: Any, q: Any, v: Any, tau: Any, out: Any = None) -> Any:
+    """By the ordinary call, which says what is wrong."""
+    vdot = model.constrained_dynamics(q, v, tau).vdot
+    if out is None:
+        return vdot
+    _check_out(out, vdot.shape)
+    out[...] = vdot
+    return out
 
 
 def _of_frame(model: Any, call: str, frame: str, q: Any, out: Any = None) -> Any:
@@ -133,10 +148,14 @@ def _evaluated(expression: Any, request: str, made: ExpressionGraph, numbers: by
         result[... if count is None else b] = bound.value(**vectors) if vectors else _requested(bound, request, x)
     if out is None:
         return result
-    if not isinstance(out, np.ndarray) or out.shape != result.shape or out.dtype != float or not out.flags.writeable:
-        raise _core.ModelError(f"out= takes a writeable float64 array of shape {result.shape}")
+    _check_out(out, result.shape)
     out[...] = result
     return out
+
+
+def _check_out(out: Any, shape: tuple[int, ...]) -> None:
+    if not isinstance(out, np.ndarray) or out.shape != shape or out.dtype != float or not out.flags.writeable:
+        raise _core.ModelError(f"out= takes a writeable float64 array of shape {shape}")
 
 
 def _requested(bound: Any, request: str, x: np.ndarray | None) -> Any:

@@ -1,4 +1,5 @@
-"""Direct calls as straight-line code: what their kernels do for one model (cpp/kernels/taped_calls.h), with its numbers folded in."""
+"""Direct calls as straight-line code: what their kernels do for one model (cpp/kernels/taped_calls.h), with its numbers folded in, and what
+dynamics on loops does at a state on them (cpp/dynamics/recorded_on_loops.h)."""
 
 from __future__ import annotations
 
@@ -9,6 +10,11 @@ import numpy as np
 from .. import _core
 from .trace import Graph
 
+BESIDE = 0.1
+"""How far, in radians and metres, the state at which dynamics on loops is written down is moved from the model's own."""
+
+ON_LOOPS = "constrained_dynamics"
+"""The call whose tape is written by no kernel, of the inputs of forward dynamics."""
 INPUTS = {
     "forward_dynamics": ("q", "v", "tau"),
     "inverse_dynamics": ("q", "v", "vdot"),
@@ -26,27 +32,70 @@ def kernel_graph(model: Any, call: str) -> tuple[Graph, np.ndarray]:
             f"{call} of {model.name!r} cannot be compiled: no kernel knows a rotor on a ball or free hinge, nor some sliders behind "
             "other subhinges; its expressions can be"
         )
-    graph, third = Graph(), INPUTS[call][-1]
-    does, first, second, number, results, sound = tape
+    graph, results = _graph_of(tape, INPUTS[call][-1])
+    shape = (model.nv, model.nv) if call in ("mass_matrix", "mass_matrix_inverse") else (model.nv,)
+    return graph, results.reshape(shape)
+
+
+def loops_graph(model: Any, most: int) -> tuple[Graph, np.ndarray]:
+    """The graph of accelerations on loops, and the nodes of its result, as they are decided beside the model's own state.
+
+    That is moved a little, as special states decide as no other does. ModelError where `most` operations are not enough, or the loops have
+    what cannot be compiled, or cannot be assembled.
+    """
+    generator = np.random.default_rng(0)
+    beside = model.integrate(model.q, generator.uniform(-BESIDE, BESIDE, model.nv))
+    state = model.assemble(beside, generator.uniform(-1, 1, model.nv))
+    tape = model.loops._core.tape(state.q, state.v, generator.uniform(-1, 1, model.nv), most)
+    return _graph_of(tape, "tau")
+
+
+def _graph_of(tape: Any, third: str) -> tuple[Graph, np.ndarray]:
+    """A tape (cpp/bindings/tapes.h) as a graph; `third` is what its third array is called."""
+    graph = Graph()
+    does, taken, number, results, guards = tape
     made: list[int] = []
     truths: dict[int, list[int]] = {}
-    for at, (what, a, b, x) in enumerate(zip(does, first.tolist(), second.tolist(), number.tolist(), strict=True)):
+    for at, (what, (a, b, c), x) in enumerate(zip(does, taken.tolist(), number.tolist(), strict=True)):
         node = -1
         match what:
             case "number":
                 node = graph.number(x).index
             case "q" | "v" | "u":
                 node = graph.input(third if what == "u" else what, a).index
-            case "greater":
-                truths[at] = [graph.put("greater", made[a], made[b])]
             case "both":
                 truths[at] = truths[a] + truths[b]
+            case "equal":
+                pass  # a guard, of what is compared
+            case "root" | "logarithm":
+                node = graph.put("sqrt" if what == "root" else "log", made[a])
             case "negate" | "sine" | "cosine" | "magnitude":
                 node = graph.put(what, made[a])
+            case "fused":
+                node = graph.put("add", graph.put("multiply", made[a], made[b]), made[c])
+            case "choose":
+                node = graph.put("choose", made[a], made[b], made[c])
             case _:
                 node = graph.put(what, made[a], made[b])
+        if what in ("greater", "at_least"):
+            truths[at] = [node]
         made.append(node)
-    if sound >= 0:
-        graph.guards = list(dict.fromkeys(truths[sound]))
-    shape = (model.nv, model.nv) if call in ("mass_matrix", "mass_matrix_inverse") else (model.nv,)
-    return graph, np.array([made[r] for r in results], int).reshape(shape)
+    for truth, holds in guards:
+        a, b = (made[i] for i in taken[truth][:2].tolist())
+        graph.guards += truths[truth] if holds and truth in truths else _instead(graph, does[truth], a, b, holds)
+    graph.guards = list(dict.fromkeys(graph.guards))
+    return graph, np.array([made[r] for r in results], int)
+
+
+def _instead(graph: Graph, what: str, a: int, b: int, holds: bool) -> list[int]:
+    """Guards that hold where a comparison does not, or where it is an equality that does."""
+    match what, holds:
+        case "greater", False:
+            return [graph.put("at_least", b, a)]
+        case "at_least", False:
+            return [graph.put("greater", b, a)]
+        case "equal", True:
+            return [graph.put("at_least", a, b), graph.put("at_least", b, a)]
+        case "equal", False:
+            return [graph.put("greater", graph.put("magnitude", graph.put("subtract", a, b)), graph.zero)]
+    raise _core.EvaluationError(f"a guard of kind {what!r} is not known")  # no tape leaves one

@@ -21,6 +21,7 @@ _LONGEST = 75
 _PIECE = 1000
 _SIGNS = {"add": " + ", "subtract": " - ", "multiply": " * ", "divide": " / "}
 _STRENGTH = {"add": 1, "subtract": 1, "negate": 2, "multiply": 3, "divide": 3}
+_COMPARED = {"greater": " > ", "at_least": " >= "}
 _CALLED = {"magnitude": "magnitude_of", "larger": "larger_of", "sqrt": "root_of", "log": "log_of", "sine": "sine_of", "cosine": "cosine_of"}
 
 
@@ -171,7 +172,7 @@ class _Lines:
             self.text[node] = (f"{name[0]}[{self.early.index(taken[0])}]", 4)
             return
         expression, strength = self._expression(name, taken)
-        if name == "greater" or node in self.of_inputs or (self.uses[node] == 1 and len(expression) < _LONGEST):
+        if name in _COMPARED or node in self.of_inputs or (self.uses[node] == 1 and len(expression) < _LONGEST):
             self.text[node] = (expression, strength)
         else:
             self.statements.append(f"const S t{node} = {expression};")
@@ -208,8 +209,10 @@ class _Lines:
     def _expression(self, name: str, taken: list[int]) -> tuple[str, int]:
         if name in _CALLED:
             return f"{_CALLED[name]}({', '.join(map(self._whole, taken))})", 4
-        if name == "greater":
-            return " > ".join(map(self._whole, taken)), 0
+        if name in _COMPARED:
+            return _COMPARED[name].join(map(self._whole, taken)), 0
+        if name == "choose":
+            return f"({self.text[taken[0]][0]}) ? {self._whole(taken[1])} : {self._whole(taken[2])}", 0
         strength = _STRENGTH[name]
         if name == "negate":
             return f"-{self._bracketed(taken[0], 2)}", 2

@@ -97,7 +97,7 @@ class Graph:
     Attributes
     ----------
     operations : list of (name, *operands): ("constant", number), ("input", array, entry), ("add", a, b), ("sine", a), ...
-    guards : nodes of ("greater", a, b), or 1 or 0 where that is known; they must hold for the results to be trusted
+    guards : nodes of ("greater", a, b) or ("at_least", a, b), or 1 or 0 where that is known; they must hold for the results to be trusted
     """
 
     def __init__(self) -> None:
@@ -245,6 +245,16 @@ class Graph:
     def _greater(self, a: int, b: int) -> int:
         known = self._of_constants(a, b, lambda x, y: float(x > y))
         return self._node("greater", a, b) if known is None else known
+
+    def _at_least(self, a: int, b: int) -> int:
+        known = self._of_constants(a, b, lambda x, y: float(x >= y))
+        return self._node("at_least", a, b) if known is None else known
+
+    def _choose(self, truth: int, a: int, b: int) -> int:
+        known = self.constant_of(truth)
+        if known is None:
+            return a if a == b else self._node("choose", truth, a, b)
+        return a if known else b
 
     # ------------------------------------------------------------------ what is used
     def needed(self, results: Iterable[int]) -> list[int]:

@@ -1,4 +1,4 @@
-"""Forward dynamics and impacts of models on their loops, by tree augmentation (docs/loops.md)."""
+"""Forward dynamics and impacts of models on their loops, by tree augmentation or constraint embedding (docs/loops.md)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..arguments import one_number, text
 from ..state import at_state
 from .interbody import pushed
 
-METHODS = ("augment",)
+METHODS = ("augment", "embed")
 
 
 class LoopForce(NamedTuple):
@@ -38,7 +38,7 @@ class ConstrainedDynamics:
         (N), of one about it the moment (N m).
     by_loop : the same by the loops' names, (rows of the loop,) each
     forces : `LoopForce` by the loops' names
-    rank : () the rank of Q that was found; rows - rank multipliers are a choice, the least Σ λ²
+    rank : () the rank of Q that was found; rows - rank multipliers are a choice, the least Σ λ², by embedding zero of rows left out
     """
 
     vdot: np.ndarray
@@ -75,6 +75,7 @@ class ConstrainedCalls:
     def constrained_dynamics(
         self, q=None, v=None, tau=None, *, wrenches: Mapping[Any, Any] | None = None, wrench_axes: str = "world", method: str = "augment",
         form: str = "fast", refine: int | str = 0, residual: str = "same", precision: str = "double", alpha: float = 0.0, beta: float = 0.0,
+        independent: Any = None,
     ) -> ConstrainedDynamics:  # fmt: skip
         """Forward dynamics on the loops: v̇ that keeps every row, and the loops' forces. No mass matrix is formed.
 
@@ -83,18 +84,29 @@ class ConstrainedCalls:
         v̇_free and the factors of Q(ℳ + J)⁻¹Q* by the articulated bodies, of each group of loops that share hinges by itself. Dependent
         rows are found by rank, and have the multipliers of least Σ λ²; v̇ does not hang on that choice.
 
+        By "embed" the bodies around loops that hang together are one body of a tree without loops, v = X v_r, γ = Ẋv_r:
+
+        X*(ℳ + J)X v̇_r = X*(τ - 𝒞 - (ℳ + J)γ),   v̇ = X v̇_r + γ
+
+        no multiplier is solved for, and bodies without mass are fine that move with others. λ follows from v̇: zero of rows that hang on
+        others and are left out. Singular states are refused where no coordinates describe what is free.
+
         Parameters
         ----------
         q, v : (nq,), (nv,), each with an optional leading batch axis; states on the loops (`assemble`) where λ is to mean something
         tau : (nv,), N m and N; zeros by default
         wrenches, wrench_axes : as in `interbody_forces`
-        method : {"augment"}
-        form : {"fast", "ud", "square-root"}, of the tree's sweep
+        method : {"augment", "embed"}
+        form : {"fast", "ud", "square-root"}, of the tree's sweep; by "embed" "fast" alone
         refine, residual : int or "auto", {"same", "wider"}
-            Steps of refinement of both equations, with residuals in the same or the next wider precision ("wider" to "extended").
+            Steps of refinement of both equations, with residuals in the same or the next wider precision ("wider" to "extended"); by
+            "embed" the same alone.
         precision : {"single", "double", "extended", "quad"}, of everything
         alpha, beta : float, 1/s
-            Baumgarte's: r̈ + 2α ṙ + β² r = 0, of rows of velocities ṙ alone.
+            Baumgarte's: r̈ + 2α ṙ + β² r = 0, of rows of velocities ṙ alone; by "augment".
+        independent : names of coordinates or hinges, by "embed"
+            Around loops that hang together as many as are free, or none of them: then they are chosen at each state, by complete pivoting
+            in units of energy.
 
         Returns
         -------
@@ -105,9 +117,9 @@ class ConstrainedCalls:
         EvaluationError
             Rows that ask different accelerations of one motion (at singular states, where v leaves no branch; functions that conflict), by
             name. Results that miss a row or an equation of motion, near singular states, by name: what is returned was put into both. A
-            method that is not there.
+            method that is not there, and what "embed" has not. Coordinates that are not independent at a state, with such as are.
         SingularHingeError
-            As `forward_dynamics`, of the tree alone; also where a coordinate feels hardly any inertia.
+            As `forward_dynamics`, of the tree alone; also where a coordinate feels hardly any inertia. By "embed" of what is independent.
         ModelError
             Arrays of another shape, not finite; a loop that has lost a body; alpha or beta below zero.
 
@@ -115,8 +127,8 @@ class ConstrainedCalls:
         "quad" 64 ε of a double: states are doubles); a row or an equation is missed from 64 times that of its largest term on.
 
         Cost: O(N), O(depth) a row, and up to rows² · coordinates in each group; linear in loops
-        that share hinges with a few others (docs/loops.md).
-        Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, ch. 11; J. Baumgarte 1972.
+        that share hinges with a few others (docs/loops.md). By "embed" O(N), and n³ of loops that hang together around n coordinates.
+        Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, ch. 11 and the chapter on constraint embedding; J. Baumgarte 1972.
 
         Examples
         --------
@@ -129,6 +141,9 @@ class ConstrainedCalls:
         [0.0, 0.0, 0.0, -15.0, 0.0, 0.0]
         >>> int(square.rank), bars.loops.rows[0], float(square.multipliers[0])  # planar: three rows ask nothing
         (2, 'closure: about x', 0.0)
+        >>> by_crank = bars.constrained_dynamics([1, -1, 1 - np.pi], [1, -1, 1], method="embed", independent=["hinge0"])
+        >>> bool(np.allclose(by_crank.vdot, bars.constrained_dynamics([1, -1, 1 - np.pi], [1, -1, 1]).vdot, atol=1e-12))
+        True
         """
         text(method, "method")
         if method not in METHODS:
@@ -136,7 +151,17 @@ class ConstrainedCalls:
         q, v = at_state(self, q, v)
         tau = np.zeros(self.nv) if tau is None else tau
         numbers = one_number(alpha, "alpha"), one_number(beta, "beta")
-        given = self.loops._core.accelerations(q, v, tau, *pushed(wrenches, wrench_axes), form, refine, residual, precision, *numbers)
+        pushes = pushed(wrenches, wrench_axes)
+        if method == "embed":
+            from .linear_on_loops import independent_numbers  # which imports linear models
+
+            _check_embedding(form, residual, *numbers)
+            chosen = independent_numbers(self, independent) or []
+            given = self.loops._core.embedded_accelerations(q, v, tau, *pushes, chosen, refine, precision)
+            return ConstrainedDynamics(*_by_loop(self.loops, *given))
+        if independent is not None:
+            raise _core.EvaluationError("independent= is of method='embed'; method='augment' has no independent coordinates")
+        given = self.loops._core.accelerations(q, v, tau, *pushes, form, refine, residual, precision, *numbers)
         return ConstrainedDynamics(*_by_loop(self.loops, *given))
 
     def constrained_velocities(
@@ -164,6 +189,17 @@ class ConstrainedCalls:
         q, v = at_state(self, q, v)
         impulse = np.zeros(self.nv) if impulse is None else impulse
         return ConstrainedVelocities(*_by_loop(self.loops, *self.loops._core.velocities(q, v, impulse, form, precision)))
+
+
+def _check_embedding(form: str, residual: str, alpha: float, beta: float) -> None:
+    if text(form, "form") != "fast":
+        raise _core.EvaluationError(f"form={form!r} of method='embed': it has 'fast' alone; take method='augment', or soa.embedded()")
+    if text(residual, "residual") != "same":
+        raise _core.EvaluationError(
+            f"residual={residual!r} of method='embed': it has 'same' alone; take a wider precision, or method='augment'"
+        )
+    if alpha or beta:
+        raise _core.EvaluationError("alpha and beta are of method='augment': they draw states to loops; assemble(q, v) takes them there")
 
 
 class _OfLoops(Mapping[str, Any]):

@@ -168,6 +168,8 @@ def rows_of(
             D = np.zeros((*batch, C.shape[-2], m))
             names += [f"{name}.{axis}" for axis in AXES[what]]
         rows.append((C, D))
+    if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
+        raise _core.ModelError(f"outputs: {twice[0]!r} is named twice")
     if not rows:
         return np.zeros((*batch, 0, n)), np.zeros((*batch, 0, m)), ()
     return np.concatenate([C for C, _ in rows], axis=-2), np.concatenate([D for _, D in rows], axis=-2), tuple(names)

@@ -82,6 +82,8 @@ def _of_frames(model: Any, inverse: bool, frame: Any, q: Any, form: str, precisi
 
 def _what_does_not_move(model: Any, names: list[str], q: Any) -> str:
     """Of one state, in words; nothing of a batch, whose error names no direction."""
+    if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
+        return f". {', '.join(map(repr, twice))} is named twice, whose rows are the same"
     q = np.asarray(getattr(q, "q", q), float)
     if q.ndim != 1 or not (lost := model.task_space(dict.fromkeys(names, TWIST), q).lost):
         return ""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ from ..linear.linear_model import LinearModel
 from ..state import State, at_state
 from .displacements import turning
 from .linearization import LinearizationCalls
-from .second_order import STEPS, Nominal, StateEquation, Step
+from .second_order import STEPS, Accelerations, Nominal, StateEquation, Step
 
 
 class Hessian(NamedTuple):
@@ -38,10 +39,13 @@ class QuadraticModel(Closed):
     ----------
     linear : LinearModel, the first order, whose names and arrays are `states`, `inputs`, `A`, `B`
     after : State, where a step ends; None where time is continuous
+    states_after : (own,), what effects of a scene have of their own there; None where time is continuous
     """
 
-    def __init__(self, linear: LinearModel, curvature: Any, at: Nominal, after: State | None = None):
-        self._linear, self._curvature, self._at, self._after = linear, curvature, at, after
+    def __init__(
+        self, linear: LinearModel, curvature: Any, at: Nominal, after: State | None = None, states_after: np.ndarray | None = None
+    ):
+        self._linear, self._curvature, self._at, self._after, self._states_after = linear, curvature, at, after, states_after
 
     @property
     def linear(self) -> LinearModel:
@@ -78,10 +82,16 @@ class QuadraticModel(Closed):
         """Where the step ends."""
         return self._after
 
+    @property
+    def states_after(self) -> np.ndarray | None:
+        """What effects of a scene have of their own where the step ends, (own,): of a model nothing."""
+        return self._states_after
+
     def contracted(self, costate: Any) -> Hessian:
         """The Hessian of costate*ẋ, or costate*x⁺, that differential dynamic programming asks for: no tensor is formed.
 
-        costate : (n,), or (B, n) beside a batch of states. Cost O(N · nv), and products of matrices (n, n); of a step for each stage.
+        costate : (n,), or (B, n) beside a batch of states. Cost O(N · nv), and products of matrices (n, n); of a step for each stage. Of a
+        scene whose effects give forces O(N · n²).
 
         ModelError for a costate of another size, or with entries that are not finite.
         """
@@ -125,17 +135,22 @@ class QuadraticModel(Closed):
         Raises
         ------
         EvaluationError
-            An unknown integrator, a step that is no positive number, a model that is discrete already.
+            An unknown integrator, a step that is no positive number, a model that is discrete already; "semi-implicit-euler" of a scene
+            with effects that it would take implicitly.
         SingularHingeError
             As `forward_dynamics`, at a stage.
         """
         h = self._linear.step_of(dt, "quadratic")
         if integrator not in tuple(STEPS):
             raise _core.EvaluationError(f"integrator={integrator!r}: steps to second order are of {', '.join(map(repr, STEPS))}")
+        if integrator == "semi-implicit-euler" and self._at.implicit:
+            named = ", ".join(map(repr, self._at.implicit))
+            raise _core.EvaluationError(f"integrator='semi-implicit-euler' takes {named} at the end of a step: 'rkmk4' and 'euler' do not")
         step, linear = Step(self._at, h, integrator), self._linear
-        n, batch = len(linear.states), self.A.ndim == 3
-        slopes, q, v = (x if batch else x[0] for x in (step.slopes, step.q, step.v))
-        return QuadraticModel(replace(linear, A=slopes[..., :n], B=slopes[..., n:], dt=h), step, self._at, State(q, v))
+        n, nv, batch = len(linear.states), self._at.model.nv, self.A.ndim == 3
+        slopes, q, rest = (x if batch else x[0] for x in (step.slopes, step.q, step.rest))
+        discrete = replace(linear, A=slopes[..., :n], B=slopes[..., n:], dt=h)
+        return QuadraticModel(discrete, step, self._at, State(q, rest[..., :nv]), rest[..., nv:])
 
     def __repr__(self) -> str:
         return repr(self._linear).replace("linear", "quadratic", 1)
@@ -154,7 +169,7 @@ class QuadraticCalls(LinearizationCalls):
             δq̇ = δv - ad(v₀) δq + ½ [δq, δv],    δv̇ = G z + ½ z*∂²v̇ z,    z = (δq, δv, δτ),
 
         with the bracket of ball and free hinges, zero elsewhere, and ∂²v̇ along exponential coordinates, exact by derivatives of inverse
-        dynamics' closed forms. Of the model with generalized forces τ and gravity; effects of scenes have first derivatives alone.
+        dynamics' closed forms. Of the model with generalized forces τ and gravity; `Scene.quadratic_model` has effects.
 
         Parameters
         ----------
@@ -193,5 +208,6 @@ class QuadraticCalls(LinearizationCalls):
         states = len(linear.A) if linear.A.ndim == 3 else 1
         q, v, tau = (np.broadcast_to(x, (states, x.shape[-1])) for x in given)
         chosen = [model.coordinate_names.index(name.removeprefix("tau.")) for name in linear.inputs]
-        at = Nominal(model, q, v, tau, chosen, {"form": form, "precision": precision}, turning(model))
+        rates = partial(Accelerations, model, {"form": form, "precision": precision}, tau)
+        at = Nominal(model, q, v, chosen, turning(model), rates)
         return QuadraticModel(linear, StateEquation(at), at)

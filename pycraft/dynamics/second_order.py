@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,16 +32,34 @@ def taken_back(costate: np.ndarray, slope: np.ndarray) -> np.ndarray:
     return costate @ slope
 
 
+def as_they_are(q: np.ndarray, rest: np.ndarray, _: float) -> tuple[np.ndarray, np.ndarray]:
+    """Nothing is prescribed."""
+    return q, rest
+
+
 class Nominal(NamedTuple):
-    """Where a model is expanded: states and forces (B, ...), which coordinates' forces are inputs, form and precision, what turns."""
+    """Where a model or scene is expanded.
+
+    Attributes
+    ----------
+    q, rest : (B, nq), (B, m): states, `rest` the velocities and what effects have of their own
+    inputs : the coordinates whose generalized forces are inputs
+    turns : where ball and free subhinges stand in v
+    known : coordinates that go where they are told
+    implicit : names of effects that "semi-implicit-euler" takes at the end of the step
+    rates : `Accelerations` of q, rest and the seconds since, or the like of a scene
+    placed : of the same, the q and rest that known coordinates make of them
+    """
 
     model: Any
     q: np.ndarray
-    v: np.ndarray
-    tau: np.ndarray
+    rest: np.ndarray
     inputs: list[int]
-    how: dict[str, Any]
     turns: list[slice]
+    rates: Callable[[np.ndarray, np.ndarray, float], Any]
+    known: Sequence[int] = ()
+    implicit: Sequence[str] = ()
+    placed: Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray]] = as_they_are
 
 
 class Accelerations:
@@ -57,9 +76,9 @@ class Accelerations:
     Transactions on Robotics 40 (2024); for contraction the source of cpp/dynamics/curvature.h.
     """
 
-    def __init__(self, at: Nominal):
-        model, q, v, tau, _, how, _ = at
-        self._model, self._q, self._v, self._precision = model, q, v, how["precision"]
+    def __init__(self, model: Any, how: dict[str, Any], tau: np.ndarray, q: np.ndarray, v: np.ndarray, _: float = 0.0):
+        self._model, self._q, self._precision = model, q, how["precision"]
+        self.rest = self._v = v
         self.value = model.forward_dynamics(q, v, tau, **how)
         self.slopes = np.concatenate(model.forward_dynamics_derivatives(q, v, tau, **how), axis=-1)
 
@@ -69,16 +88,24 @@ class Accelerations:
         inverse = self.slopes[..., 2 * n :]
         core = cached(self._model, "_curvature", _core.Curvature)
         mu = np.ascontiguousarray(costate @ inverse)
-        along = core.inverse_dynamics(self._q, self._v, self.value, mu, self._precision)
-        out = np.zeros((*costate.shape[:-1], 3 * n, 3 * n))
-        qq, qv, with_vdot, vv = (along[..., i, :, :] for i in range(4))
-        out[..., :n, :n], out[..., :n, n : 2 * n], out[..., n : 2 * n, n : 2 * n] = qq / 2, qv, vv / 2
-        out[..., :n, :] += with_vdot @ self.slopes[..., None, :, :]
-        return 0.0 - both_ways(out)  # no -0
+        return curved(core.inverse_dynamics(self._q, self._v, self.value, mu, self._precision), self.slopes)
+
+
+def curved(along: np.ndarray, slopes: np.ndarray, forces: np.ndarray | None = None) -> np.ndarray:
+    """λ*∂²/∂z∂z of rates, of blocks (B, m, 4, nv, nv) of p, of first derivatives, v̇'s first, and of forces that p has not (B, m, n, n)."""
+    nv = along.shape[-1]
+    out = np.zeros((*along.shape[:2], slopes.shape[-1], slopes.shape[-1]))
+    qq, qv, with_vdot, vv = (along[..., i, :, :] for i in range(4))
+    out[..., :nv, :nv], out[..., :nv, nv : 2 * nv], out[..., nv : 2 * nv, nv : 2 * nv] = qq / 2, qv, vv / 2
+    out[..., :nv, :] += with_vdot @ slopes[..., None, :nv, :]
+    if forces is not None:
+        n = forces.shape[-1]
+        out[..., :n, :n] -= forces / 2
+    return 0.0 - both_ways(out)  # no -0
 
 
 class StateEquation:
-    """ẋ = (δq̇, v̇) of displacements δq from the motion that passes through the state, and v, at states (B, ...).
+    """ẋ = (δq̇, v̇, ẏ) of displacements δq from the motion that passes through the state, v, and effects' own states y, at states (B, ...).
 
         δq̇ = δv - ad(v₀) δq + ½ [δq, δv] + (third order),    v̇ as `Accelerations`
 
@@ -86,15 +113,17 @@ class StateEquation:
     """
 
     def __init__(self, at: Nominal):
-        n = at.model.nv
-        self._turns, self._kept = at.turns, [*range(2 * n), *(2 * n + j for j in at.inputs)]
-        self.accelerations = Accelerations(at)
+        self._nv = at.model.nv
+        states = self._nv + at.rest.shape[-1]
+        self._turns, self._known, self._kept = at.turns, list(at.known), [*range(states), *(states + j for j in at.inputs)]
+        self.rates = at.rates(at.q, at.rest, 0.0)
 
     def hessians(self, costate: np.ndarray) -> np.ndarray:
         """costate*∂²ẋ/∂(x, u)∂(x, u), (B, m, n + k, n + k), of costates (B, m, n) and k inputs."""
-        n = costate.shape[-1] // 2
-        out = self.accelerations.hessians(costate[..., n:])
-        turned = cobrackets(self._turns, costate[..., :n]) / 2
+        n, of_q = self._nv, np.array(costate[..., : self._nv])
+        of_q[..., self._known] = 0.0
+        out = self.rates.hessians(costate[..., n:])
+        turned = cobrackets(self._turns, of_q) / 2
         out[..., :n, n : 2 * n] += turned
         out[..., n : 2 * n, :n] += transposed(turned)
         return out[..., self._kept, :][..., self._kept]
@@ -115,84 +144,91 @@ class Step:
 
         rₛ = vₛ + ½ [uₛ, vₛ] + 1/12 [uₛ, [uₛ, vₛ]],    v̇ₛ = FD(q₀ exp(uₛ), vₛ, τ),    u⁺ = h Σ wₛ rₛ,    v⁺ = v + h Σ wₛ v̇ₛ
 
-    or u⁺ = h v⁺, semi-implicit. Each of these maps has its first and second derivatives by rule; first ones are chained forward, costates
+    or u⁺ = h v⁺, semi-implicit; what effects have of their own goes as v does, known coordinates are placed at every stage and at
+    the end. Each of these maps has its first and second derivatives by rule; first ones are chained forward, costates
     backward, and the second ones of all are summed between first ones: λ*∂²x⁺ = Σ (∂zₛ)* (λₛ*∂²zₛ₊₁) (∂zₛ). Nothing is differenced.
     """
 
     def __init__(self, at: Nominal, dt: float, method: str):
-        model, v = at.model, at.v
-        self._dt = dt
+        model, rest = at.model, at.rest
+        self._dt, self._nv = dt, at.model.nv
         self._parts, self._weights = STEPS[method]
         self._implicit = method == "semi-implicit-euler"
-        states, n, k = len(v), model.nv, len(at.inputs)
-        start = np.broadcast_to(np.eye(2 * n, 2 * n + k), (states, 2 * n, 2 * n + k))
-        given = np.zeros((states, n, 2 * n + k))
-        given[:, at.inputs, range(2 * n, 2 * n + k)] = 1.0
+        (states, m), n, k = rest.shape, model.nv, len(at.inputs)
+        start = np.tile(np.eye(n + m, n + m + k), (states, 1, 1))
+        for j in at.known:
+            start[:, [j, n + j]] = 0.0
+        given = np.zeros((states, n, n + m + k))
+        given[:, at.inputs, range(n + m, n + m + k)] = 1.0
         self._stages: list[Stage] = []
-        u, after, along_u, along_v = np.zeros_like(v), v, np.zeros((states, n, 2 * n + k)), start[:, n:]
+        u, after, along_u, along_rest = np.zeros((states, n)), rest, np.zeros_like(given), start[:, n:]
         for part, weight in zip(self._parts, self._weights, strict=True):
-            stage_u, stage_v, along = np.zeros_like(v), v, (np.zeros_like(given), start[:, n:])
+            stage_u, stage_rest, along = np.zeros_like(u), rest, (np.zeros_like(given), start[:, n:])
             if part:
                 last, h = self._stages[-1], part * dt
-                stage_u, stage_v = h * last.rate, v + h * last.accelerations.value
-                along = (h * last.along_rate, start[:, n:] + h * last.along_vdot)
-            stage = Stage(at, stage_u, stage_v, start[:, :n], *along, given)
+                stage_u, stage_rest = h * last.rate, rest + h * last.rates.value
+                along = (h * last.along_rate, start[:, n:] + h * last.along_rates)
+            stage = Stage(at, part * dt, stage_u, stage_rest, start[:, :n], *along, given)
             self._stages.append(stage)
             u, along_u = u + weight * dt * stage.rate, along_u + weight * dt * stage.along_rate
-            after, along_v = after + weight * dt * stage.accelerations.value, along_v + weight * dt * stage.along_vdot
+            after, along_rest = after + weight * dt * stage.rates.value, along_rest + weight * dt * stage.along_rates
         if self._implicit:
-            u, along_u = dt * after, dt * along_v
+            u, along_u = dt * after[:, :n], dt * along_rest[:, :n]
         self._start, self._along_u = start[:, :n], along_u
         self._moved = Moved(at.turns, u)
-        self.q, self.v = displaced(model, at.q, u), after
-        self.slopes = np.concatenate([self._moved.adjoint @ self._start + self._moved.differential @ along_u, along_v], axis=-2)
+        self.q, self.rest = at.placed(displaced(model, at.q, u), after, dt)
+        self.slopes = np.concatenate([self._moved.adjoint @ self._start + self._moved.differential @ along_u, along_rest], axis=-2)
 
     def hessians(self, costate: np.ndarray) -> np.ndarray:
         """costate*∂²x⁺/∂(x, u)∂(x, u), (B, m, n + k, n + k), of costates (B, m, n) and k inputs."""
-        n, h = costate.shape[-1] // 2, self._dt
-        of_q, of_v = costate[..., :n], costate[..., n:]
+        n, h = self._nv, self._dt
+        of_q, of_rest = costate[..., :n], np.array(costate[..., n:])
         out = weighed(self._moved, of_q, self._start, self._along_u)
         of_u = taken_back(of_q, self._moved.differential)
         if self._implicit:
-            of_u, of_v = np.zeros_like(of_u), of_v + h * of_u
-        later_rate, later_vdot = np.zeros_like(of_u), np.zeros_like(of_v)
+            of_rest[..., :n] += h * of_u
+            of_u = np.zeros_like(of_u)
+        later_rate, later_rates = np.zeros_like(of_u), np.zeros_like(of_rest)
         for s in reversed(range(len(self._stages))):
             stage, weight = self._stages[s], self._weights[s] * h
-            more, at_u, at_v = stage.back(weight * of_u + later_rate, weight * of_v + later_vdot)
+            more, at_u, at_rest = stage.back(weight * of_u + later_rate, weight * of_rest + later_rates)
             out = out + more
-            later_rate, later_vdot = self._parts[s] * h * at_u, self._parts[s] * h * at_v
+            later_rate, later_rates = self._parts[s] * h * at_u, self._parts[s] * h * at_rest
         return out
 
 
 class Stage:
-    """Of a step: u and v there, the rate of u and v̇, and the derivatives of all along (x, inputs), (B, nv, n + k)."""
+    """Of a step: u and the rest there, the rates of both, and the derivatives of all along (x, inputs), (B, ..., n + k)."""
 
     def __init__(
-        self, at: Nominal, u: np.ndarray, v: np.ndarray, along_q: np.ndarray, along_u: np.ndarray, along_v: np.ndarray, given: np.ndarray
-    ):
-        self._turns, self._v, self._u = at.turns, v, u
-        self._along_q, self._along_u, self._along_v = along_q, along_u, along_v
+        self, at: Nominal, later: float, u: np.ndarray, rest: np.ndarray, along_q: np.ndarray, along_u: np.ndarray, along_rest: np.ndarray,
+        given: np.ndarray,
+    ):  # fmt: skip
         self._moved = Moved(at.turns, u)
-        self.accelerations = Accelerations(at._replace(q=displaced(at.model, at.q, u), v=v))
+        self.rates = at.rates(displaced(at.model, at.q, u), rest, later)
+        v = self.rates.rest[:, : u.shape[-1]]
+        self._turns, self._v, self._u = at.turns, v, u
+        self._along_q, self._along_u, self._along_v = along_q, along_u, along_rest[:, : u.shape[-1]]
         here = self._moved.adjoint @ along_q + self._moved.differential @ along_u
-        self._along_all = np.concatenate([here, along_v, given], axis=-2)
-        self.along_vdot = self.accelerations.slopes @ self._along_all
+        self._along_all = np.concatenate([here, along_rest, given], axis=-2)
+        self.along_rates = self.rates.slopes @ self._along_all
         by_u, by_v, ones = brackets(at.turns, u), brackets(at.turns, v), np.eye(v.shape[-1])
         self._rate_by_v = ones + by_u / 2 + by_u @ by_u / 12
         twice = brackets(at.turns, np.einsum("...ij,...j->...i", by_u, v))
         self._rate_by_u = -by_v / 2 - (twice + by_u @ by_v) / 12
         self.rate = np.einsum("...ij,...j->...i", self._rate_by_v, v)
-        self.along_rate = self._rate_by_u @ along_u + self._rate_by_v @ along_v
+        self.along_rate = self._rate_by_u @ along_u + self._rate_by_v @ self._along_v
 
-    def back(self, of_rate: np.ndarray, of_vdot: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of costates (B, m, nv) of the rate and of v̇ what second derivatives they weigh, and the costates of u and v."""
+    def back(self, of_rate: np.ndarray, of_rates: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of costates of u's rate (B, m, nv) and of the rest's what second derivatives they weigh, and the costates of u and the rest."""
         n = of_rate.shape[-1]
-        out = chained(self._along_all, self._along_all, self.accelerations.hessians(of_vdot))
-        through = taken_back(of_vdot, self.accelerations.slopes)
-        of_q = through[..., :n]
+        out = chained(self._along_all, self._along_all, self.rates.hessians(of_rates))
+        through = taken_back(of_rates, self.rates.slopes)
+        of_q, of_rest = through[..., :n], through[..., n : n + of_rates.shape[-1]]
+        of_rest[..., :n] += taken_back(of_rate, self._rate_by_v)
         out = out + weighed(self._moved, of_q, self._along_q, self._along_u) + self._of_rate(of_rate)
         of_u = taken_back(of_q, self._moved.differential) + taken_back(of_rate, self._rate_by_u)
-        return out, of_u, through[..., n : 2 * n] + taken_back(of_rate, self._rate_by_v)
+        return out, of_u, of_rest
 
     def _of_rate(self, costate: np.ndarray) -> np.ndarray:
         """λ*∂²r of r = v + ½ [u, v] + 1/12 [u, [u, v]]."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Protocol
 
+from .. import _core
+
 
 class Described(Protocol):
     """A model by its sizes, its hinges (with `q_slice`, `v_slice`, `kind`, `subhinges`) and its description as plain data."""
@@ -20,3 +22,18 @@ class Described(Protocol):
     @property
     def hinges(self) -> Mapping[str, Any]: ...
     def description(self) -> dict[str, Any]: ...
+
+
+def described(model: Any, by: str) -> Described:
+    """The model itself. ModelError, which names the call, for what is none."""
+    if not callable(getattr(model, "description", None)):
+        hint = "; that of a scene is scene.model" if hasattr(model, "simulate") else ""
+        raise _core.ModelError(f"{by} takes a model, not {model!r:.60}{hint}")
+    return model
+
+
+def theirs(given: Any, attribute: str, by: str, what: str) -> Any:
+    """Another tool's model, which has this attribute. ModelError, which names the call, for what is none."""
+    if not hasattr(given, attribute):
+        raise _core.ModelError(f"{by} takes {what}, not {given!r:.60}")
+    return given

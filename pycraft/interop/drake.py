@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from .described import Described
+from .described import Described, described
+from .packages import MissingPackageError
 from .peer import Peer, PeerRefusal
 
 
@@ -15,7 +16,11 @@ def drake_plant(model: Described) -> tuple[Any, np.ndarray, np.ndarray]:
 
     Raises PeerRefusal for hinges other than pin, slider and screw, and for what Drake refuses.
     """
-    from pydrake.multibody.plant import MultibodyPlant
+    described(model, "drake_plant")
+    try:
+        from pydrake.multibody.plant import MultibodyPlant
+    except ImportError:
+        raise MissingPackageError("a plant of Drake needs the package drake, which is not installed: pip install drake") from None
 
     plant = MultibodyPlant(0.0)
     try:

@@ -18,8 +18,9 @@ import numpy as np
 
 from .. import _core
 from . import mujoco as convention
-from .described import Described
+from .described import Described, described
 from .drake import drake_peer
+from .packages import required
 from .peer import Peer, PeerRefusal, Vector
 
 _PINOCCHIO_BYTES = 64
@@ -66,7 +67,7 @@ def to_pinocchio(model: Described) -> PinocchioModel:
 
     Raises PeerRefusal for what Pinocchio refuses. All hinge kinds go over.
     """
-    import pinocchio as pin
+    pin, _ = required("pinocchio", "peers", "a hand-over to Pinocchio needs"), described(model, "to_pinocchio")
 
     out = pin.Model()
     joints: list[int] = []
@@ -150,7 +151,7 @@ def refuse_large(nv: int) -> None:
 
 def pinocchio_peer(model: Described) -> Peer:
     """Pinocchio's articulated-body algorithm (`aba`) on the model. Raises PeerRefusal where its work space takes over 2 GB."""
-    import pinocchio as pin
+    pin, _ = required("pinocchio", "peers", "a hand-over to Pinocchio needs"), described(model, "pinocchio_peer")
 
     refuse_large(model.nv)
     twin = to_pinocchio(model)
@@ -190,7 +191,7 @@ def mjcf_elements(model: Described) -> tuple[Any, list[Any]]:
     """
     from lxml import etree
 
-    root = etree.Element("mujoco", model=model.name)
+    root = etree.Element("mujoco", model=described(model, "MJCF").name)
     etree.SubElement(root, "compiler", _COMPILER)
     etree.SubElement(root, "option", gravity=numbers_text(model.gravity))
     elements: list[Any] = []

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import _core
-from .described import Described
+from .described import Described, described, theirs
 from .packages import required
 
 
@@ -34,7 +34,9 @@ def compiled(path: str) -> Any:
     ModelError
         What MuJoCo refuses, in its words.
     """
-    mujoco = required("mujoco", "mjcf", f"{path}: MJCF files are read by")
+    if not isinstance(path, (str, Path)):
+        raise _core.ModelError(f"a file is called by its path, not by {path!r:.60}")
+    mujoco, path = required("mujoco", "mjcf", f"{path}: MJCF files are read by"), str(path)
     try:
         return mujoco.MjSpec.from_file(path).compile()
     except ValueError as error:
@@ -53,7 +55,7 @@ class _Free(NamedTuple):
 
 
 def _free_hinges(model: Described) -> Iterator[_Free]:
-    for hinge in model.hinges.values():
+    for hinge in described(model, "a conversion of coordinates").hinges.values():
         if all(subhinge["kind"] != "free" for subhinge in hinge.subhinges):
             continue
         if len(hinge.subhinges) > 1 or hinge.body.parent is not None:
@@ -68,8 +70,9 @@ def permutation(model: Described) -> tuple[np.ndarray, np.ndarray]:
     This is the whole conversion of positions where free hinges are placed at the world's origin; linear velocities of free
     hinges must be turned as well: see `to_mujoco`. Raises ModelError for a free hinge that is not on the base.
     """
+    free_hinges = list(_free_hinges(model))
     i, j = np.arange(model.nq), np.arange(model.nv)
-    for free in _free_hinges(model):
+    for free in free_hinges:
         i[free.q : free.q + 7] = free.q + np.array([4, 5, 6, 0, 1, 2, 3])
         j[free.v : free.v + 6] = free.v + np.array([3, 4, 5, 0, 1, 2])
     return i, j
@@ -88,8 +91,8 @@ def to_mujoco(model: Described, q, v) -> tuple[np.ndarray, np.ndarray]:
     >>> mujoco.to_mujoco(body, [1, 0, 0, 0, 5, 6, 7], [0, 0, 1, 2, 0, 0])[0]
     array([5., 6., 7., 1., 0., 0., 0.])
     """
-    q, v = _sized(model, q, model.nq, "q"), _sized(model, v, model.nv, "v")
     i, j = permutation(model)
+    q, v = _sized(model, q, model.nq, "q"), _sized(model, v, model.nv, "v")
     qpos, qvel = q[..., i], v[..., j]
     for free in _free_hinges(model):
         R = free.placement[:3, :3]
@@ -103,8 +106,8 @@ def to_mujoco(model: Described, q, v) -> tuple[np.ndarray, np.ndarray]:
 
 def from_mujoco(model: Described, qpos, qvel) -> tuple[np.ndarray, np.ndarray]:
     """The state q (..., nq), v (..., nv) of MuJoCo's qpos (..., nq), qvel (..., nv): the inverse of `to_mujoco`."""
-    qpos, qvel = _sized(model, qpos, model.nq, "qpos"), _sized(model, qvel, model.nv, "qvel")
     i, j = permutation(model)
+    qpos, qvel = _sized(model, qpos, model.nq, "qpos"), _sized(model, qvel, model.nv, "qvel")
     q, v = np.empty(qpos.shape), np.empty(qvel.shape)
     q[..., i], v[..., j] = qpos, qvel
     for free in _free_hinges(model):
@@ -123,7 +126,7 @@ def velocity_map(model: Described, q) -> np.ndarray:
 
     Forces follow by duality, qfrc = T tau, and MuJoCo's mass matrix is T (ℳ + J) T*.
     """
-    q = _sized(model, q, model.nq, "q")
+    q = _sized(model, q, described(model, "velocity_map").nq, "q")
     return to_mujoco(model, np.broadcast_to(q, (model.nv, model.nq)), np.eye(model.nv))[1].T
 
 
@@ -132,7 +135,7 @@ def acceleration_to_mujoco(model: Described, q, v, vdot) -> np.ndarray:
 
     MuJoCo's linear acceleration is that of the body's origin in world axes, R(v̇ + ω × v).
     """
-    v, vdot = _sized(model, v, model.nv, "v"), np.array(_sized(model, vdot, model.nv, "vdot"))
+    v, vdot = _sized(model, v, described(model, "acceleration_to_mujoco").nv, "v"), np.array(_sized(model, vdot, model.nv, "vdot"))
     for free in _free_hinges(model):
         angular, linear = slice(free.v, free.v + 3), slice(free.v + 3, free.v + 6)
         vdot[linear] += np.cross(v[angular], v[linear])
@@ -141,7 +144,7 @@ def acceleration_to_mujoco(model: Described, q, v, vdot) -> np.ndarray:
 
 def name_of(compiled_model: Any) -> str:
     """The name of an MjModel: the first of its names."""
-    return bytes(compiled_model.names).split(b"\0", 1)[0].decode() or "model"
+    return bytes(theirs(compiled_model, "njnt", "name_of", "an MjModel").names).split(b"\0", 1)[0].decode() or "model"
 
 
 def joint_names(hinge: Any) -> list[str]:
@@ -155,7 +158,8 @@ def order(model: Described, compiled_model: Any) -> tuple[np.ndarray, np.ndarray
     Hinges are matched by the name of their first joint, else by the name of the body. Raises ModelError for what only one of the two
     has, and where the coordinates of a match differ in number.
     """
-    import mujoco
+    mujoco = required("mujoco", "mjcf", "the order of MuJoCo's coordinates needs")
+    theirs(compiled_model, "njnt", "order", "an MjModel")
 
     of_joint, of_body = (
         {mujoco.mj_id2name(compiled_model, kind, i) or f"{what}{i}": i for i in range(count)}
@@ -166,7 +170,7 @@ def order(model: Described, compiled_model: Any) -> tuple[np.ndarray, np.ndarray
     )
     q, v, first = [], [], {}
     taken = 0
-    for hinge in model.hinges.values():
+    for hinge in described(model, "order").hinges.values():
         size = hinge.v_slice.stop - hinge.v_slice.start
         if size == 0:
             continue
@@ -191,7 +195,7 @@ def order(model: Described, compiled_model: Any) -> tuple[np.ndarray, np.ndarray
 
 
 def _sized(model: Described, x, size: int, name: str) -> np.ndarray:
-    x = np.asarray(x, float)
+    x = _core.real_array(x, f"{name} of {model.name!r}")
     if x.shape[-1:] != (size,):
         raise _core.ModelError(f"{name} of {model.name!r} takes {size} numbers, not an array {x.shape}")
     return x

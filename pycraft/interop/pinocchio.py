@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from importlib.resources import as_file, files
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from .. import _core
-from .described import Described
+from .described import Described, described, theirs
 from .packages import required
 
 _SWAP = np.array([3, 4, 5, 0, 1, 2])
@@ -23,11 +24,14 @@ def build(path: str, root: str = "fixed") -> Any:
     """Pinocchio's model of a URDF file, with a free flyer for root="free"."""
     pinocchio = required("pinocchio", "peers", "comparison with Pinocchio needs")
 
-    return (
-        pinocchio.buildModelFromUrdf(str(path), pinocchio.JointModelFreeFlyer())
-        if root == "free"
-        else pinocchio.buildModelFromUrdf(str(path))
-    )
+    if root not in ("fixed", "free"):
+        raise _core.ModelError(f"root={root!r:.60}: there are 'fixed' and 'free'")
+    if not isinstance(path, (str, Path)) or not Path(path).is_file():
+        raise _core.ModelError(f"{path!r:.60} is no file")
+    try:
+        return pinocchio.buildModelFromUrdf(str(path), *([pinocchio.JointModelFreeFlyer()] if root == "free" else []))
+    except ValueError as error:
+        raise _core.ModelError(f"{path}: Pinocchio refuses the file: {error}") from None
 
 
 @dataclass
@@ -149,9 +153,9 @@ def _unit(quaternion: np.ndarray) -> np.ndarray:
 
 def coordinates(model: Described, pin_model: Any) -> Coordinates:
     """Match hinges and joints by name. Raises ModelError for a joint that only one of the two has."""
-    hinges = model.hinges
+    hinges = described(model, "coordinates").hinges
     joints = []
-    for j in range(1, pin_model.njoints):
+    for j in range(1, theirs(pin_model, "njoints", "coordinates", "a model of Pinocchio's").njoints):
         name = pin_model.names[j]
         own = "root" if name == "root_joint" and "root" in hinges and "root_joint" not in hinges else name
         if own not in hinges:

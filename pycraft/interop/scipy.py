@@ -27,6 +27,8 @@ def to_scipy(operator: _core.Operator) -> LinearOperator:
     """
     from scipy.sparse.linalg import LinearOperator
 
+    if not isinstance(operator, _core.Operator):
+        raise _core.SpaceError(f"to_scipy takes an operator of a model, as arm.soa.phi, not {operator!r:.60}")
     if operator.domain is None:
         raise _core.SpaceError("I has no space yet: combine it with an operator first")
     if operator.batch is not None:
@@ -51,13 +53,22 @@ def from_scipy(linear_operator: Any, domain: _core.Space, codomain: _core.Space,
 
     A `LinearOperator` is applied as it is, in double precision, and its inverse is dense (`explain()` says so); a matrix becomes a
     constant, which keeps its block structure.
+
+    SpaceError for another shape, and where spaces are none; ModelError for what is neither an operator nor a matrix of numbers.
     """
-    shape = (codomain.dimension, domain.dimension)
-    if tuple(linear_operator.shape) != shape:
-        raise _core.SpaceError(f"{name!r} has shape {tuple(linear_operator.shape)}; from {domain} to {codomain} it takes {shape}")
     from scipy.sparse.linalg import LinearOperator
 
-    if not isinstance(linear_operator, LinearOperator):
-        dense = linear_operator.toarray() if hasattr(linear_operator, "toarray") else np.asarray(linear_operator, float)
-        return _core.constant(dense, domain, codomain, name)
+    if not isinstance(name, str):
+        raise _core.ModelError(f"an operator is called by a text, not by {name!r:.60}")
+    for what, space in (("domain", domain), ("codomain", codomain)):
+        if not isinstance(space, _core.Space):
+            raise _core.SpaceError(f"from_scipy: {what} is a space, as arm.soa.phi.{what}, not {space!r:.60}")
+    given = linear_operator
+    if not isinstance(given, LinearOperator):
+        given = _core.real_array(given.toarray() if hasattr(given, "toarray") else given, f"from_scipy: {name!r}")
+    shape = (codomain.dimension, domain.dimension)
+    if tuple(given.shape) != shape:
+        raise _core.SpaceError(f"{name!r} has shape {tuple(given.shape)}; from {domain} to {codomain} it takes {shape}")
+    if not isinstance(given, LinearOperator):
+        return _core.constant(given, domain, codomain, name)
     return _core.external(linear_operator.matmat, linear_operator.rmatmat, domain, codomain, name)

@@ -299,6 +299,37 @@ class StateSpace:
         phi, M, Omega = self.soa("phi M Omega")
         return phi @ (M - M @ Omega @ M) @ phi.T
 
+    def play(self, y: Any = None, model: Any = None, tau: Any = None) -> Any:
+        """The dictionary running: filter and smoother over time beside forward dynamics of a chain, by one recursion, step by step. O(N).
+
+        Parameters
+        ----------
+        y : (N, m) measurements, those given to `kalman` where left out; NaN where one is missing
+        model : Multibody, a serial chain of N bodies; one on pins with rotors where left out
+        tau : (nv,) of its hinges, N m and N; ones where left out
+
+        Returns
+        -------
+        KalmanPage
+            A notebook shows it; `save("kalman.html")` writes a page that opens offline.
+
+        Raises
+        ------
+        EvaluationError
+            More than 60 steps.
+        ModelError
+            Measurements that are needed; a model that is no chain of N bodies.
+        SingularHingeError
+            A D that is singular, as in `filter`.
+
+        Examples
+        --------
+        >>> from pycraft.kalman import kalman
+        >>> kalman(1.0, 1.0, 1.0, 1.0, 1.0, x0=0.0, P0=1.0, measurements=[1.0, 2.0]).play()
+        <filter beside 'tree of 2': 22 steps of 2 times and bodies>
+        """
+        return _core._face["play_smoother"](self, y, model, tau)
+
     def sample(self, seed: int | np.random.Generator = 0) -> tuple[np.ndarray, np.ndarray]:
         """States (N, n) and measurements (N, m) drawn from the model: x = φ(noises + x0), y = Hx + v. O(N)."""
         rng = np.random.default_rng(seed)

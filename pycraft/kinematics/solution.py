@@ -147,6 +147,12 @@ class Solution(Closed):
         direction = {name: float(x) for name, x in zip(self._problem.names, shares, strict=True) if abs(x) >= 0.05}
         return f"no motion lessens it along {told([dict(sorted(direction.items(), key=lambda one: -abs(one[1])))])}"
 
+    def __bool__(self) -> bool:
+        """Whether it is reached: `if arm.solve_ik(...):`. ModelError for a batch, whose members may differ."""
+        if self._batch:
+            raise _core.ModelError(f"a batch of {len(self._q)} is neither reached nor not: take .reached.all() or .reached.any()")
+        return bool(self.reached)
+
     # ------------------------------------------------------------------ a batch
     def __len__(self) -> int:
         if not self._batch:

@@ -56,6 +56,9 @@ class LinearModel:
         """How many of the states are displacements: the first ones."""
         return sum(name.startswith("q.") for name in self.states)
 
+    def __bool__(self) -> bool:
+        return self.A.ndim == 2 or len(self.A) > 0
+
     def __len__(self) -> int:
         if self.A.ndim == 2:
             raise TypeError("a linear model at one state has no length; its arrays are .A, .B, .C, .D")

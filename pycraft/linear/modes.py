@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from .. import _core
+from ..arguments import one_number, whole
 from ..tidy import TidyTable
 from .linear_model import LinearModel
 
@@ -53,7 +54,9 @@ class Modes(TidyTable):
         amplitude : rad or m, of the coordinate that moves most
         phases : figures that are drawn, an odd number so that the state itself is among them
         """
-        of, count = self._of, max(1, phases)
+        of, count, mode = self._of, max(1, whole(phases, "phases")), whole(mode, "mode")
+        if not np.isfinite(amplitude := one_number(amplitude, "amplitude")):
+            raise _core.EvaluationError(f"amplitude={amplitude:g}: how far the coordinate swings that moves most, rad or m")
         if not -len(self) <= mode < len(self):
             raise _core.EvaluationError(f"mode {mode} is not there; there are {len(self)}")
         n = of.displacements

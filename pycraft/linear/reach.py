@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import _core
 from ..arguments import one_number
 from .linear_model import LinearModel
 
@@ -66,6 +67,8 @@ def _reach(kind: str, A: np.ndarray, B: np.ndarray, states: tuple[str, ...], tol
     """
     n = len(A)
     relative = n**1.5 * np.finfo(float).eps if tolerance is None else one_number(tolerance, "tolerance")
+    if not 0 <= relative < np.inf:
+        raise _core.EvaluationError(f"tolerance={relative:g}: below which share a singular value is zero, a number not negative")
     scale = balanced(A)
     A, B = A * (1 / scale)[:, None] * scale, B / scale[:, None]
     lengths = np.linalg.norm(B, axis=0)

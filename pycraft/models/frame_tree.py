@@ -127,8 +127,10 @@ class Frame(Closed):
         self._frames._motions.pop(self._name, None)
 
     # ------------------------------------------------------------------ motions
-    def pose(self, q=None, *, wrt: Any = None, t: Any = None, precision: str = "double") -> np.ndarray:
-        """X (4, 4) or (B, 4, 4): the frame's axes as columns and its origin (m), in the axes of `wrt`.
+    def pose(self, q=None, *, wrt: Any = None, axes: Any = None, t: Any = None, precision: str = "double") -> np.ndarray:
+        """X (4, 4) or (B, 4, 4): the frame's axes as columns and its origin (m), seen from that of `wrt`, in the axes of `wrt`.
+
+        axes : a frame in whose axes both are instead
 
         Examples
         --------
@@ -137,6 +139,10 @@ class Frame(Closed):
         [2.0, 0.0, 0.0]
         """
         core, other = self._frames._core, self._frames._named(wrt)
+        if axes is not None:
+            X = self.pose(q, wrt=wrt, t=t, precision=precision).copy()
+            X[..., :3, :] = Frame(self._frames, other).pose(q, wrt=axes, t=t, precision=precision)[..., :3, :3] @ X[..., :3, :]
+            return X
         if self._present(q, None, None, t, precision):
             return core.pose(self._name, other)
         return core.pose_at(self._name, other, self._state(q)[0], self._time(t), precision)
@@ -150,17 +156,9 @@ class Frame(Closed):
         return core.velocity_at(self._name, other, axes, third, q, v, self._time(t), precision)
 
     def acceleration(
-        self,
-        q=None,
-        v=None,
-        vdot=None,
-        *,
-        wrt: Any = None,
-        axes: Any = "body",
-        kind: str = "spatial",
-        t: Any = None,
+        self, q=None, v=None, vdot=None, *, wrt: Any = None, axes: Any = "body", kind: str = "spatial", t: Any = None,
         precision: str = "double",
-    ) -> np.ndarray:
+    ) -> np.ndarray:  # fmt: skip
         """The acceleration relative to `wrt`, (6,) or (B, 6), rad/s² and m/s².
 
         kind : "spatial" or "classical"

@@ -13,6 +13,7 @@ from ..arguments import pose_parts, text
 from .asides import Asides
 from .handles import Body, Node, Vector
 from .hinge_arguments import body_name, frame_name
+from .shapes import Shape, renamed
 from .with_loops import WithLoops
 
 
@@ -31,7 +32,8 @@ class Grafting(WithLoops):
 
     _left_aside: dict[str, np.ndarray]
     _actuators: list[dict[str, Any]]
-    _added_nodes: frozenset[str] = frozenset()
+    _shapes: list[Shape]
+    _added_nodes: set[str]
     _scenes: WeakSet[Any] | None = None
 
     def remove_body(self, name: str | Body, *, with_uses: bool = False) -> Removed:
@@ -225,7 +227,7 @@ class Grafting(WithLoops):
         loose = [] if self._kept_frames is None else self._kept_frames._core.loose_names()
         self._require_new(new_bodies, new_hinges, new_nodes, [frame["name"] for frame in made], loose)
         own, its = Asides(self), Asides(source)
-        added = frozenset(map(called, set(nodes) & getattr(source, "_added_nodes", frozenset())))
+        added = set(map(called, set(nodes) & getattr(source, "_added_nodes", set())))
         X = _placed(rotation, position)
         self._graft(source, root, parent, rotation, position, places_hinge, new_bodies, new_hinges, new_nodes)
         self._added_nodes |= added
@@ -237,6 +239,7 @@ class Grafting(WithLoops):
             self.loops._declare(loop)
         own.put(self)
         its.add(self, dict(zip(hinges, new_hinges, strict=True)), called)
+        self._shapes = [*self._shapes, *renamed(source._shapes, {*bodies, *nodes}, called)]
 
 
 def _frames_on(model: Any, carriers: set[str], with_base: bool) -> list[dict[str, Any]]:

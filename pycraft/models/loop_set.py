@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
@@ -278,7 +279,13 @@ class Loops(Closed, Mapping):
 
     def _of_hinge(self, number: int) -> tuple[str, int]:
         """Whose coordinate that is, and which of its own."""
-        return next((h.name, number - h.v_slice.start) for h in self._model.hinges.values() if h.v_slice.start <= number < h.v_slice.stop)
+        model = self._model
+
+        def first(body: int) -> int:
+            return model._slices(body)[1].start
+
+        body = bisect_right(range(model._size), number, key=first) - 1  # the last that begins there or before: no weld does
+        return model._body(body)["hinge"]["name"], number - first(body)
 
     def _stands_on(self, name: str) -> set[str]:
         """What a loop was declared on: bodies, nodes and hinges by name, "" for the base."""

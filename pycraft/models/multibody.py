@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from .hinge_arguments import frame_name, hinge_arguments
 from .parts import Parts
 from .pictures import Pictures
 from .planning import Planning
+from .shapes import Shape
 from .structure import Structure
 from .with_loops import WithLoops
 
@@ -53,7 +54,9 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, Planning, Structure, 
             raise _core.ModelError(f"welds={welds!r}: there are 'lump' and 'keep'")
         super().__init__(text(name, "a model"), welds == "keep", strict)
         self._left_aside: dict[str, np.ndarray] = {}
+        self._added_nodes: set[str] = set()
         self._actuators: list[dict[str, Any]] = []
+        self._shapes: list[Shape] = []
 
     # ------------------------------------------------------------------ structure
     def add_body(
@@ -134,8 +137,7 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, Planning, Structure, 
         self._check_not_a_frame(name, "node")
         rotation, position = pose_parts(f"node {name!r}", rotation, position, placement)
         self._add_node(text(name, "a node"), frame_name(body), rotation, position)
-        whole = self._of_whole()
-        whole._added_nodes |= {name}
+        self._of_whole()._added_nodes.add(name)
         return Node(self, name)
 
     @property
@@ -186,24 +188,28 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, Planning, Structure, 
 
         Parameters
         ----------
-        call : {"forward_dynamics", "inverse_dynamics", "bias_forces", "mass_matrix", "mass_matrix_inverse", "jacobian", "pose"}
+        call : {"forward_dynamics", "inverse_dynamics", "bias_forces", "mass_matrix", "mass_matrix_inverse", "constrained_dynamics",
+            "jacobian", "pose"}
         frame : str, optional
             Of Jacobians and poses: a body or node by its name.
 
         Returns
         -------
         callable
-            Of q, v, tau for forward dynamics; of q, v, vdot for inverse dynamics; of q, v for bias forces; of q for the others; each with
-            out=, of one state or with a leading batch axis. Contiguous float64 arrays take it; others, and states whose pivots may be
-            rounding or whose results are not finite, are computed as usual and raise what is usual. Its attributes: source, library,
-            operations. Results agree with those of the call to its own rounding.
+            Of q, v, tau for forward dynamics, and for the accelerations of constrained dynamics, on the loops that there are now; of q, v,
+            vdot for inverse dynamics; of q, v for bias forces; of q for the others; each with out=, of one state or with a leading batch
+            axis. Contiguous float64 arrays take it; others, and states whose pivots may be rounding or whose results are not finite, are
+            computed as usual and raise what is usual. Its attributes: source, library, operations. Results agree with those of the call to
+            its own rounding; on loops they were put into the rows and the equations of motion, as by the call, which answers where the
+            rank of the rows is another than beside the model's own state.
 
         Raises
         ------
         EvaluationError
             No C++ compiler (the variable CXX names one), another call, a model of too many operations.
         ModelError
-            No body or node of that name; hinges that no kernel knows (a rotor on a ball or free hinge).
+            No body or node of that name; hinges that no kernel knows (a rotor on a ball or free hinge); loops that cannot be assembled
+            beside the model's state, and those of a screw or of a function.
 
         Cost: seconds for the compiler, once; then a third to a half of the call's own time.
 
@@ -328,7 +334,7 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, Planning, Structure, 
     def _told(self) -> tuple[Any, ...]:
         frames = self._kept_frames
         moment = None if frames is None else (frames.t, np.array(frames.vdot))
-        return self.description(), self._left_aside, self._actuators, self._added_nodes, moment
+        return self.description(), self._left_aside, self._actuators, self._added_nodes, moment, self._shapes
 
     def __repr__(self) -> str:
         if self._whole is None:
@@ -343,13 +349,14 @@ def _again(
     description: Mapping[str, Any],
     left_aside: Mapping[str, np.ndarray],
     actuators: Sequence[dict[str, Any]] = (),
-    added_nodes: frozenset[str] = frozenset(),
+    added_nodes: Collection[str] = (),
     moment: tuple[float, np.ndarray] | None = None,
+    shapes: Sequence[Shape] = (),
 ) -> Multibody:
     """A copy of a model from its description, what its file said beside it, which nodes were added since, and its frames' t and vdot."""
     model = Multibody.from_description(description)
     model._left_aside, model._actuators = dict(left_aside), [dict(actuator) for actuator in actuators]
-    model._added_nodes = added_nodes
+    model._added_nodes, model._shapes = set(added_nodes), list(shapes)
     if moment is not None:
         model.frames.t, model.frames.vdot = moment
     return model

@@ -11,6 +11,7 @@ from .. import _core
 from ..arguments import listed, text
 from ..state import State, at_state
 from .handles import Body, Node
+from .shapes import Shape
 from .with_operators import WithOperators
 
 if TYPE_CHECKING:
@@ -24,7 +25,9 @@ class Parts(WithOperators):
 
     _whole: Multibody | None = None
     _left_aside: dict[str, np.ndarray]
+    _added_nodes: set[str]
     _actuators: list[dict[str, Any]]
+    _shapes: list[Shape]
 
     # ------------------------------------------------------------------ taking one
     def subgraph(
@@ -133,8 +136,10 @@ class Parts(WithOperators):
                 aside[key] = np.r_[self.zero_q()[: 7 * self._moves], values[self.q_index]]
             else:
                 aside[key] = np.r_[np.full(6 * self._moves, np.nan), values[self.v_index]]
-        self._left_aside = aside
+        self._left_aside, self._added_nodes = aside, set()
         own = set(self.coordinate_names)
+        here = {*self.bodies, *self.nodes} if whole._shapes else set()  # type: ignore[attr-defined]  # of a Multibody
+        self._shapes = [shape for shape in whole._shapes if shape.body in here]
         self._actuators = [dict(actuator) for actuator in whole._actuators if actuator["coordinate"] in own]
 
     # ------------------------------------------------------------------ being one

@@ -5,11 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 from .. import _core
+from .shapes import Shape
 from .tree_diagram import TreeDiagram, tree_diagram
 
 
 class Pictures:
     """What is printed and drawn of a model."""
+
+    _shapes: list[Shape]
 
     def _repr_html_(self) -> str:
         return str(_core._face["model_html"](self))
@@ -94,6 +97,92 @@ class Pictures:
         """
         options = dict(view=view, com=com, names=names, legend=legend, shadow=shadow, alpha=alpha)
         return _core._face["plot_model"](self, q, ax, **options)
+
+    def dof_shares(self, q=None) -> Any:
+        """Each body's share of the degrees of freedom, tr(Υ(k)M(k)), as numbers and as colour on the robot. O(N); with rotors O(N²).
+
+        The shares of bodies, and those of rotors tr(ℳ⁻¹(k,k)J(k)), add up to the number of coordinates N. Loops are not looked at: they are
+        the tree's shares.
+
+        Parameters
+        ----------
+        q : (nq,) or a State; the model's own where left out
+
+        Returns
+        -------
+        Shares
+            `by_body`, `of_bodies`, `of_rotors`, `total`; a table when printed, a picture with a colour bar in a notebook, `plot()` one by
+            Matplotlib.
+
+        Raises
+        ------
+        ModelError
+            A q that is none of this model's.
+        SingularHingeError
+            A hinge that moves without inertia.
+
+        Source: A. Jain, Robot and Multibody Dynamics, Springer 2011 (operational space inertias); `soa.theorems()`, "the bodies' shares
+        add up to N".
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> print(pc.chain(3, seed=1).dof_shares())
+        shares of the degrees of freedom of 'chain of 3', tr Υ(k)M(k)
+          body0   0.0585  █
+          body1   1.1511  ███████████████
+          body2   1.7903  ████████████████████████
+          together 3 of N = 3
+        """
+        return _core._face["dof_shares"](self, q)
+
+    @property
+    def shapes(self) -> list[Shape]:
+        """What the model's file gives its bodies to be seen by, in the file's order; none of a model that was not loaded.
+
+        Visuals of a URDF file, geoms of the groups 0 to 2 of an MJCF file. The viewer and pages of runs draw them; meshes are looked for
+        and read then (extra `meshes`). `Multibody.save` leaves them out.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> pc.chain(2).shapes
+        []
+        """
+        return list(self._shapes)
+
+    def rerootings(self, q=None, v=None) -> Any:
+        """The same motion seen from every base body in turn: a page with a slider for the base, and what changes with it and what stays.
+
+        The tree, coordinates and P(k) belong to the base that was chosen; poses, velocities, accelerations, energy, momentum, ln det ℳ
+        and Υ(k) do not: a body of a free tree is felt as Υ(k)⁻¹ = P(k) + S⁺(k), of which the base decides what is outboard.
+
+        Parameters
+        ----------
+        q, v : (nq,), (nv,), or a State; the model's own where left out
+
+        Returns
+        -------
+        RerootingPage
+            A notebook shows it; `save("bases.html")` writes a page that opens offline; `stays` and `changes` are its numbers. O(N²):
+            every body is made the base of a copy, by `reroot`; O(N⁴) for the condition numbers.
+
+        Raises
+        ------
+        ModelError
+            A tree whose root is not on a free hinge, and what else `reroot` refuses; a q or v that is none of this model's.
+        EvaluationError
+            More than 60 bodies.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> robot = pc.tree([-1, 0, 1], ["free", "pin", "ball"], seed=1)
+        >>> page = robot.rerootings(robot.random_state(0).q)
+        >>> page.bases, page.changes["bodies on the longest path"]
+        (['body0', 'body1', 'body2'], [3.0, 2.0, 3.0])
+        """
+        return _core._face["rerootings"](self, q, v)
 
     def view(self, q=None, v=None, *, host: str = "127.0.0.1", port: int = 0) -> Any:
         """The model in a live viewer: `Scene.view` of a scene that has nothing but the model's own gravity, if it has one.

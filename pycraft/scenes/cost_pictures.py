@@ -198,3 +198,51 @@ def _legend_of_points(rows: list[dict[str, Any]], line: Any) -> list[Any]:
     if any(row["varied"] == "effects" for row in rows):
         handles.append(line([], [], marker="x", ls="", color="#a8324a", mew=1.6, label="without an effect"))
     return [*handles, line([], [], **{**RING, "ls": "-", "ms": 9}, color="k", lw=0.8, alpha=0.6, label="Pareto front")]
+
+
+METHOD_STYLES = {"augment": ("#1f4e79", "o"), "embed": ("#c55a11", "s"), "penalty": ("#4d7c2a", "^")}
+"""Colour and marker of what keeps loops, told apart by either."""
+
+
+def loops_plot(table: Any, axes: Any = None) -> Any:
+    """Three panels against the time of a run: error of the trajectory, drift of the rows, energy error; a line a method and integrator."""
+    if axes is None:
+        import matplotlib.pyplot as plt
+
+        axes = plt.subplots(1, 3, figsize=(12.5, 4.0), layout="constrained")[1]
+    rows = [row for row in table if not row["refused"]]
+    if not rows:
+        no_picture(axes[0], table)
+        for ax in axes[1:]:
+            ax.set_axis_off()
+        return axes
+    ways = list(dict.fromkeys((row["method"], row["integrator"]) for row in rows))
+    several = list(dict.fromkeys(integrator for _, integrator in ways))
+    labels = {
+        "error": "error of the trajectory (rad, m; rms)", "drift": "drift of the loops' rows (rad, m)",
+        "energy error": "energy error, relative",
+    }  # fmt: skip
+    for ax, (key, label) in zip(axes, labels.items(), strict=True):
+        there = [row for row in rows if row[key] is not None]
+        heights = dict(zip(map(id, there), above_zero(row[key] for row in there), strict=True))
+        for method, integrator in ways:
+            line = [row for row in there if (row["method"], row["integrator"]) == (method, integrator)]
+            colour, marker = METHOD_STYLES[method]
+            place = several.index(integrator)
+            style = dict(
+                color=colour, marker=marker, ms=5.5, lw=1.1, mfc="white" if place else colour, ls=("-", "--", ":", "-.")[place % 4]
+            )
+            points = [row["seconds"] for row in line], [heights[id(row)] for row in line]
+            ax.plot(*points, label=f"{method}, {integrator}", zorder=3, **style)
+        ax.set(xscale="log", yscale="log", xlabel="time of a run", ylabel=label)
+        time_axis(ax.xaxis)
+        if not there:
+            ax.set_axis_off()
+            ax.text(0.5, 0.5, "nothing moves here", transform=ax.transAxes, ha="center", color="0.4")
+    floor, bottom = table.reference_error, min(row["error"] for row in rows)
+    if floor > 0:
+        axes[0].set_ylim(bottom=min(floor, bottom or floor) / 4)
+        axes[0].axhspan(axes[0].get_ylim()[0], floor, color="0.9", zorder=0, label="below the reference's own error")
+    axes[0].set_title(table.title, fontsize="medium", loc="left")
+    axes[2].legend(*axes[0].get_legend_handles_labels(), frameon=False, fontsize=7.5, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return axes

@@ -12,7 +12,7 @@ from ..dynamics.linear_on_loops import chosen_numbers, independent_numbers, line
 from ..dynamics.linearization import linear_model, listed
 from ..dynamics.loop_tangents import TreeDerivatives, kept_rows
 from ..linear.linear_model import LinearModel, names_of_states, stacked
-from ..state import at_state
+from ..state import at_state, moment_of
 
 
 def linearize(
@@ -20,6 +20,7 @@ def linearize(
 ) -> LinearModel:
     """`Scene.linearize`."""
     model, calls = scene.model, scene._calls()
+    t, states = moment_of(q, t, states)
     q, v = at_state(model, q, v)
     q = np.asarray(getattr(q, "q", q), float)
     v = np.zeros(model.nv) if v is None else np.asarray(getattr(v, "v", v), float)
@@ -40,7 +41,10 @@ def _along(
     independent: list[int] | None,
 ) -> LinearModel:  # fmt: skip
     count = len(q) if q.ndim == 2 else len(v)
-    times, own = _core.real_array(t, "t"), np.zeros((count, 0)) if states is None else np.atleast_1d(_core.real_array(states, "states"))
+    times, own = (
+        _core.real_array(t, "t"),
+        np.zeros((count, 0)) if states is None else np.atleast_1d(_core.real_array(states, "states")),
+    )
     for name, x, axes in (("q", q, 2), ("v", v, 2), ("t", times, 1), ("states", own, 2)):
         if x.ndim > axes or (x.ndim == axes and len(x) != count):
             raise _core.ModelError(f"{name} of {scene.model.name!r} has the shape {x.shape}; there are {count} states, or one for all")
@@ -67,7 +71,7 @@ def _at(
         raise _core.ModelError(f"states: entry {int(np.flatnonzero(~np.isfinite(states))[0])} is {states[~np.isfinite(states)][0]}")
     found = _core.scene_linearized(calls, q, v, t, states.ravel().tolist())
     nv, own = model.nv, len(found["rates"]) - model.nv
-    known = [j for j, held in enumerate(found["known"]) if held]
+    known = known_coordinates(found)
     given = np.zeros((nv + own, len(chosen)))
     for column, j in enumerate(chosen):
         given[j, column] = 0.0 if j in known else 1.0
@@ -76,10 +80,20 @@ def _at(
         mass, along_q, along_rest = found["mass"], found["along_q"], found["along_rest"]
         tree = TreeDerivatives(mass, along_q, along_rest, given, found["v"], found["rates"], found["forces"])
         return linear_model_on_loops(kept_rows(model, found["q"], scene._kept_loops(), known), tree, names, outputs, independent, t)
-    sides = np.hstack([found["along_q"], found["along_rest"], given])
-    solved = np.linalg.solve(found["mass"], sides) if nv + own else sides
-    along_q, along_rest, along_inputs = np.split(solved, [nv, 2 * nv + own], axis=1)
-    for one in (along_q, along_rest, along_inputs):
-        one[known] = 0.0
+    along_q, along_rest, along_inputs = np.split(solved(found, given), [nv, 2 * nv + own], axis=1)
     states_named = names_of_states(model.coordinate_names, own)
-    return linear_model(model, q, v, found["rates"], along_q, along_rest, along_inputs, names, outputs, states_named, t, known)
+    at_q, at_v = found["q"], found["v"]
+    return linear_model(model, at_q, at_v, found["rates"], along_q, along_rest, along_inputs, names, outputs, states_named, t, known)
+
+
+def known_coordinates(found: dict[str, Any]) -> list[int]:
+    """Of `_core.scene_linearized`: the coordinates that go where they are told."""
+    return [j for j, held in enumerate(found["known"]) if held]
+
+
+def solved(found: dict[str, Any], given: np.ndarray) -> np.ndarray:
+    """Of `_core.scene_linearized`: derivatives of (v̇, ẏ) along displacements, (v, y), and generalized forces `given` as columns."""
+    sides = np.hstack([found["along_q"], found["along_rest"], given])
+    slopes = np.linalg.solve(found["mass"], sides) if len(sides) else sides
+    slopes[known_coordinates(found)] = 0.0
+    return slopes

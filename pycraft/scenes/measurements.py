@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from ..dynamics.quadratic import QuadraticModel
     from ..linear.linear_model import LinearModel
     from .comparison import ComparisonTable
     from .cost import CostTable
@@ -143,28 +144,30 @@ class Measurements:
         )  # fmt: skip
 
     def linearize(
-        self, q=None, v=None, t: Any = 0.0, *, states: Any = None, inputs: Any = None, outputs: Any = None, dt: float | None = None,
+        self, q=None, v=None, t: Any = None, *, states: Any = None, inputs: Any = None, outputs: Any = None, dt: float | None = None,
         method: str = "zoh", independent: Any = None,
     ) -> LinearModel:  # fmt: skip
-        """The linear model of the scene near a state, its effects included, or near each of a batch, as of a run (`run.q, run.v, run.t`).
+        """The linear model of the scene near a state, its effects included, or near each of a batch or a run (`scene.linearize(run)`).
 
         States, inputs and outputs are as in `Multibody.linearize`, and the effects' own states follow the velocities ("state.0", ...).
         Inputs are generalized forces beside those of the effects. Exact: effects written in C++ by derivatives of their own arithmetic;
-        those in Python by central differences, of which about ten digits are right. Time itself is held. What is prescribed stays as it is
+        those in Python by central differences, of which about ten digits are right. At the edge of a stop or of a drive's limit they are
+        those of the side that the forces are of. Time itself is held. What is prescribed stays as it is
         told: its rows and columns are zero, and an input there moves nothing. Where effects keep loops the states are displacements and
         velocities on them, in independent coordinates, as of `Multibody.linearize` with loops=True.
 
         Parameters
         ----------
         q, v : (nq,), (nv,), each with an optional leading batch axis
-        t : s, one number or one for each state
-        states : (n,) or (B, n), of the effects' own; as they are at first where left out
+        t : s, one number or one for each state; where left out that of the run that q is, else 0
+        states : (n,) or (B, n), of the effects' own; where left out those of the run that q is, else as they are at first
         inputs, outputs, dt, method, independent : as in `Multibody.linearize`
 
         Raises
         ------
         EvaluationError
-            A scene in another precision than double; a singular state of loops.
+            A scene in another precision than double; a singular state of loops; nodes of a spring or damper at one place, where no side
+            has derivatives.
         ModelError
             Names that are not there, another number of states; a state off the loops, coordinates that do not tell where the others are.
 
@@ -179,3 +182,45 @@ class Measurements:
         from .linearized import linearize
 
         return linearize(self, q, v, t, states=states, inputs=inputs, outputs=outputs, dt=dt, method=method, independent=independent)
+
+    def quadratic_model(self, q=None, v=None, t: Any = None, *, states: Any = None, inputs: Any = None) -> QuadraticModel:
+        """The model of the scene to second order near a state, its effects included, or near each of a batch: what iLQR and DDP ask for.
+
+        `linearize` is its first order; `Multibody.quadratic_model` is the same of a model without effects. Exact: effects written in C++ by
+        second derivatives of their own arithmetic. Where one is written in Python all effects are differenced, centrally, with steps of
+        2⁻¹³: of functions of the size of their arguments 1e-7 is wrong. Time itself is held, but that a step of an integrator
+        (`discrete`) ends later; what is prescribed stays as it is told, and what controllers hold stays over a step.
+
+        Parameters
+        ----------
+        q, v : (nq,), (nv,), each with an optional leading batch axis
+        t : s, one number or one for each state; where left out that of the run that q is, else 0
+        states : (n,) or (B, n), of the effects' own; where left out those of the run that q is, else as they are at first
+        inputs : names of hinges, coordinates or patterns, or a list of them, whose generalized forces are inputs; None: all
+
+        Returns
+        -------
+        QuadraticModel : `contracted(costate)` and `tensors()`, at O(N · n²) a state for n = 2 nv + own, `discrete(dt, integrator)`
+
+        Raises
+        ------
+        EvaluationError
+            A scene that keeps loops, one in another precision than double, one that acts by impulses; an effect that has no second
+            derivatives at this state, by name: a coordinate just at its stop or at a limit of its drive, `QuadraticDamping` at rest,
+            nodes of a spring or damper at one place, a ball half a turn from its spring's rest.
+        ModelError
+            Names that are not there, another number of states.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> scene = pc.mechanisms.pendulum().add(pc.effects.QuadraticDamping(0.5))  # v̇ = 9.81 cos q - 0.5 |v| v
+        >>> near = scene.quadratic_model([0.5], [2.0])
+        >>> near.contracted([0.0, 1.0]).xx.round(4).tolist()
+        [[-8.6091, 0.0], [0.0, -1.0]]
+        >>> near.discrete(0.01)
+        <quadratic model: 'pendulum', 2 states, 1 inputs, 2 outputs, step 0.01 s>
+        """
+        from .scene_quadratic import quadratic_model
+
+        return quadratic_model(self, q, v, t, states=states, inputs=inputs)

@@ -11,6 +11,7 @@ import numpy as np
 
 from .. import _core
 from ..view.figure_data import figure_data, number_text, pose_rows
+from ..view.page import Page
 from ..view.skeleton import Skeleton
 from ..view.web_page import web_page
 from .file_targets import writable_target
@@ -22,11 +23,9 @@ LARGEST = 100.0
 POINTS = 1000
 """Of a line of a plot: of more of the run's own times, so many are shown, evenly by their number."""
 SPEEDS = (0.1, 0.25, 0.5, 1, 2, 5, 10)
-HEIGHT = 480
-"""Pixels of a page in a notebook."""
 
 
-class RunPage:
+class RunPage(Page):
     """A run as a page of HTML. In a notebook it shows itself; `save` writes it.
 
     Attributes
@@ -54,7 +53,7 @@ class RunPage:
              "lines": [number_text(values[shown]) for values in panel.lines.values()]}
             for panel in self._panels
         ]  # fmt: skip
-        data = {
+        data: dict[str, Any] = {
             "figure": figure_data(self._skeleton, self._q), "times": number_text(self.times),
             "poses": number_text(pose_rows(self._skeleton, self._q)), "panels": panels,
             "way": None if self._way is None else number_text(self._way),
@@ -64,7 +63,8 @@ class RunPage:
             f'<option value="{speed:g}"{" selected" if speed == self.speed else ""}>×{speed:g}</option>'
             for speed in sorted({*SPEEDS, self.speed})
         )
-        said = escape(f"{', '.join(run.effects) or 'no effects'}; {first:g} to {last:g} s")
+        told = [f"{', '.join(run.effects) or 'no effects'}; {first:g} to {last:g} s", *data["figure"]["unshown"]]
+        said = escape("; ".join(told))
         return web_page("film", run.model.name, data, {"said": said, "speeds": speeds})
 
     def save(self, path: str | Path) -> Path:
@@ -72,9 +72,6 @@ class RunPage:
         target = checked_page(path)
         target.write_text(self.html, encoding="utf-8")
         return target
-
-    def _repr_html_(self) -> str:
-        return f'<iframe srcdoc="{escape(self.html)}" style="width: 100%; height: {HEIGHT}px; border: 0" title="run"></iframe>'
 
     def __repr__(self) -> str:
         times = f"{len(self.times)} frames, {self.times[0]:g} to {self.times[-1]:g} s"

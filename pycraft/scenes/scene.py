@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from .. import _core
 from ..arguments import chosen, moment, one_number, text
 from ..closed import Closed
 from ..models.grafting import Grafting
-from ..state import at_state
+from ..state import at_state, moment_of
 from .effects import Effect, Loop, UserEffect
 from .effects.meanings import Meanings, acted_on
 from .explain import plan_text
@@ -220,7 +220,7 @@ class Scene(Measurements, Statics, Filed, Viewed, Closed):
             self._model._parameters,
             self._how,
             tuple((name, id(effect), effect._changes, on) for name, (effect, on) in self._entries.items()),
-            self._loop_edits(),
+            self._loops_now(),
         )
         if self._built is None or self._built[0] != now:
             form, refine, residual, precision = self._how
@@ -229,27 +229,28 @@ class Scene(Measurements, Statics, Filed, Viewed, Closed):
 
     def _kept_loops(self) -> list[str]:
         """The loops that effects which are on keep, by name."""
-        return [name for effect, on in self._entries.values() if on and isinstance(effect, Loop) for name in effect.kept(self._model)]
+        return [name for effect, on in self._entries.values() if on and _keeps(effect) for name in effect.kept(self._model)]
 
     def _keeps_loops(self) -> bool:
         """Whether an effect that is on keeps loops."""
-        return any(on and isinstance(effect, Loop) for effect, on in self._entries.values())
+        return any(on and _keeps(effect) for effect, on in self._entries.values())
 
-    def _loop_edits(self) -> int:
-        """What the model's loops count of their changes, where they are kept: they are no part of the model's own numbers."""
-        kept = any(isinstance(effect, Loop) for effect, _ in self._entries.values())
-        return self._model.loops._core.edits if kept else 0
+    def _loops_now(self) -> tuple[int, bytes]:
+        """What its loops count of their changes, and where springs hold them the present q: they are no part of the model's numbers."""
+        loops = [effect for effect, _ in self._entries.values() if isinstance(effect, Loop)]
+        held = any(not effect.keeps for effect in loops)
+        return self._model.loops._core.edits if loops else 0, np.asarray(self._model.q).tobytes() if held else b""
 
     # ------------------------------------------------------------------ states and runs
-    def evaluate(self, q=None, v=None, t: float = 0.0, *, states=None, step: float = 0.0) -> Evaluation:
+    def evaluate(self, q=None, v=None, t: float | None = None, *, states=None, step: float = 0.0) -> Evaluation:
         """Accelerations and forces at a state.
 
         Parameters
         ----------
         q, v : (nq,), (nv,), by the rule of direct calls; beside an array q without v the model is at rest, and no pass that needs
             velocities runs
-        t : s
-        states : of the effects' own; as they are at first where left out
+        t : s; where left out that of the run's state that q is, else 0
+        states : of the effects' own; where left out those of the run's state that q is, else as they are at first
         step : s
             Accelerations of an implicit step of this size: D has h C + h² K of implicit damping and stiffness in addition.
 
@@ -263,6 +264,7 @@ class Scene(Measurements, Statics, Filed, Viewed, Closed):
             As forward dynamics.
         """
         resting = v is None and q is not None and not hasattr(q, "v")
+        t, states = moment_of(q, t, states)
         q, v = at_state(self._model, q, v)
         own = [] if states is None else np.asarray(_core.real_array(states, "states")).tolist()
         found = self._calls().evaluate(q, None if resting else v, moment(t), own, one_number(step, "step"))
@@ -384,6 +386,11 @@ class Scene(Measurements, Statics, Filed, Viewed, Closed):
         return _again, (type(self), self._model, list((name, effect, on) for name, (effect, on) in self._entries.items()), self._how), {
             "_run_options": self._run_options
         }  # fmt: skip
+
+
+def _keeps(effect: Effect) -> TypeGuard[Loop]:
+    """Whether it keeps loops."""
+    return isinstance(effect, Loop) and effect.keeps
 
 
 def _again(kind: type[Scene], model: Any, entries: list[tuple[str, Effect, bool]], how: tuple[Any, ...]) -> Scene:

@@ -12,7 +12,7 @@ from ..dynamics.equilibrium import TOLERANCE, Balance, Equilibrium, solved
 from ..dynamics.equilibrium_on_loops import solved_on_loops
 from ..dynamics.interbody import forces_of_scene
 from ..dynamics.statics import held_by
-from ..state import at_state
+from ..state import at_state, moment_of
 
 
 class Statics:
@@ -24,7 +24,7 @@ class Statics:
     _kept_loops: Any
 
     def interbody_forces(
-        self, hinges: Any = None, q=None, v=None, t: float = 0.0, *, states: Any = None, axes: Any = "body", about: Any = None,
+        self, hinges: Any = None, q=None, v=None, t: Any = None, *, states: Any = None, axes: Any = "body", about: Any = None,
         part: str = "whole",
     ) -> np.ndarray:  # fmt: skip
         """The spatial forces (moment; force) that parents put on their children at a state, under all effects: N m and N.
@@ -33,7 +33,7 @@ class Statics:
         ----------
         hinges : a name or `Hinge`, or a list of them; None: all, in the model's order
         q, v : (nq,), (nv,), each with an optional leading batch axis, by the rule of direct calls
-        t, states : as in `evaluate`
+        t, states : as in `evaluate`, one or one for each state
         axes, about, part : as in `Multibody.interbody_forces`; frames that a function moves are where they are at t
 
         Returns
@@ -49,6 +49,7 @@ class Statics:
         >>> scene.interbody_forces("hinge0", [0.0]).tolist()  # falling from level, the pin carries a quarter of the weight
         [0.0, 0.0, 0.0, 0.0, 2.5, 0.0]
         """
+        t, states = moment_of(q, t, states)
         q, v = (np.asarray(_core.real_array(x, name), float) for x, name in zip(at_state(self.model, q, v), "qv", strict=True))
         for x, name, width in ((q, "q", self.model.nq), (v, "v", self.model.nv)):
             if x.ndim not in (1, 2) or x.shape[-1] != width:
@@ -56,10 +57,12 @@ class Statics:
                     f"{name} of {self.model.name!r} takes {width} numbers, or (B, {width}) for a batch, not an array {x.shape}"
                 )
         own = np.zeros(0) if states is None else np.atleast_1d(_core.real_array(states, "states"))
-        many = sorted({len(x) for x in (q, v, own) if x.ndim == 2})
+        times = np.expand_dims(np.array([moment(one) for one in t] if np.ndim(t) == 1 else moment(t)), -1)
+        many = sorted({len(x) for x in (times, q, v, own) if x.ndim == 2})
         if len(many) > 1 or own.ndim > 2:
-            raise _core.ModelError(f"batches of q {q.shape}, v {v.shape} and states {own.shape} in one call")
-        time, q, v, own = (np.broadcast_to(x, (*(many or [1]), x.shape[-1])) for x in (np.array([moment(t)]), q, v, own))
+            times_too = f", t {times.shape[:-1]}" if times.ndim == 2 else ""
+            raise _core.ModelError(f"batches of q {q.shape}, v {v.shape} and states {own.shape}{times_too} in one call")
+        time, q, v, own = (np.broadcast_to(x, (*(many or [1]), x.shape[-1])) for x in (times, q, v, own))
         f = forces_of_scene(self._calls(), self.model, time[:, 0], q, v, own, hinges, axes, about, part)
         return f if many else f[0]
 

@@ -25,6 +25,10 @@ class Canvas:
         """Markers of one style, none yet."""
         return Points(self, **style)
 
+    def discs(self, colours: list[str], size: float, **style: Any) -> Discs:
+        """Discs of a colour each, `size` points wide."""
+        return Discs(self, colours, size, **style)
+
     def labels(self, texts: list[str], **style: Any) -> Labels:
         """Texts beside points."""
         return Labels(self, texts, **style)
@@ -80,6 +84,23 @@ class Points:
             self.artist.set_data_3d(*columns)
         else:
             self.artist.set_data(*columns)
+
+
+class Discs:
+    """Discs of a colour each: `artist`, and `set` with the places (n, 3)."""
+
+    def __init__(self, canvas: Canvas, colours: list[str], size: float, **style: Any):
+        self._canvas = canvas
+        at = np.zeros((2 if canvas.columns else 3, len(colours)))
+        in_depth: dict[str, Any] = {} if canvas.columns else {"depthshade": False}
+        self.artist = canvas.ax.scatter(*at, s=size**2, c=colours, **in_depth, **style)
+
+    def set(self, places: np.ndarray) -> None:
+        seen = self._canvas._seen(places)
+        if self._canvas.columns is None:
+            self.artist._offsets3d = tuple(seen.T)
+        else:
+            self.artist.set_offsets(seen)
 
 
 class Labels:

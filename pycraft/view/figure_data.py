@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from .colour_scale import ramp
 from .skeleton import Skeleton, placed
+from .solids import solids
 from .stick_figure import HINGES
 
 _FLAT_AXES = {1: (0, 2), 2: (0, 1), 0: (1, 2)}
@@ -30,22 +32,25 @@ def figure_data(skeleton: Skeleton, q: np.ndarray) -> dict[str, Any]:
     dict
         Plain data: names of bodies, the number of what carries each (-1 the base), their hinges; points and lines by what they are, with
         the numbers of bodies ("of") and places in their frames ("at", m); axes of hinges and half the length that they are drawn with,
-        m; the camera's axes "right" and "up" in the world, the box in view ("centre" and "half", m), the height of the floor.
+        m; the camera's axes "right" and "up" in the world, the box in view ("centre" and "half", m), the height of the floor; "ramp", the
+        colours of numbers; "solids", triangles of shapes by their bodies, and "unshown", why others are not there.
     """
     described = skeleton.model.description()["bodies"]
     hinge, owner, point, direction = skeleton.axes
     flat = skeleton.normals()
     right, up = _FLAT_AXES[next(n for n in _FLAT_AXES if n in flat)] if flat else _upright(skeleton.model)
     colours = [None if kind == "custom" else HINGES[kind][1] for kind in skeleton.kinds]
+    shapes, missing = solids(skeleton.model)
     data: dict[str, Any] = {
         "name": skeleton.model.name, "bodies": skeleton.bodies, "parents": [body["parent"] for body in described],
         "hinges": skeleton.names, "kinds": skeleton.kinds, "colours": colours, "flat": bool(flat), "grounded": skeleton.is_grounded(),
         "points": {kind: {"of": of.tolist(), "at": _rounded(at)} for kind, (of, at) in skeleton.points.items()},
         "lines": {kind: {"of": of.tolist(), "at": _rounded(at)} for kind, (of, at) in skeleton.lines.items()},
         "axes": {"hinge": hinge.tolist(), "of": owner.tolist(), "at": _rounded(point), "along": _rounded(direction)},
-        "right": np.eye(3)[right].tolist(), "up": np.eye(3)[up].tolist(),
+        "right": np.eye(3)[right].tolist(), "up": np.eye(3)[up].tolist(), "ramp": ramp(), "unshown": missing,
+        "solids": [solid | {name: number_text(solid[name]) for name in ("vertices", "faces")} for solid in shapes],
     }  # fmt: skip
-    return data | _box(skeleton, np.asarray(q, float), data["grounded"], up)
+    return data | _box(skeleton, np.asarray(q, float), data["grounded"], up, [(solid["of"], solid["vertices"]) for solid in shapes])
 
 
 def pose_rows(skeleton: Skeleton, q: np.ndarray) -> np.ndarray:
@@ -71,11 +76,18 @@ def _rounded(x: np.ndarray) -> Any:
     return [float(f"{number:.7g}") for number in x] if x.ndim == 1 else [_rounded(row) for row in x]
 
 
-def _box(skeleton: Skeleton, q: np.ndarray, grounded: bool, up: int) -> dict[str, Any]:
+def _corners(vertices: np.ndarray) -> np.ndarray:
+    """(8, 3) of the box that they are in."""
+    ends = np.array([vertices.min(axis=0), vertices.max(axis=0)])
+    return np.array([[ends[i, 0], ends[j, 1], ends[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+
+
+def _box(skeleton: Skeleton, q: np.ndarray, grounded: bool, up: int, solid: list[tuple[int, np.ndarray]]) -> dict[str, Any]:
     poses = skeleton.poses(q)
     kinds = [kind for kind in skeleton.lines if kind != "ground" or grounded]
     shown = (*skeleton.points.values(), *(skeleton.lines[kind] for kind in kinds))
-    everything = np.concatenate([*(placed(poses, *at).reshape(-1, 3) for at in shown), np.zeros((int(grounded), 3))])
+    corners = [(np.full(8, of), _corners(vertices)) for of, vertices in solid]
+    everything = np.concatenate([*(placed(poses, *at).reshape(-1, 3) for at in (*shown, *corners)), np.zeros((int(grounded), 3))])
     everything = everything[np.isfinite(everything).all(axis=1)]
     low, high = (everything.min(axis=0), everything.max(axis=0)) if len(everything) else (np.zeros(3), np.zeros(3))
     reach = float((high - low).max()) or 1.0

@@ -24,12 +24,14 @@ class PlaneLayout:
     bodies : (n, 2)
     base : (2,)
     bones : (m, 2, 2) lines of the figure beside those from body to body; none of a diagram
+    owners : (m,) numbers of the bodies that the bones are fixed on at their first end, -1 the base
     axes : (n, 2, 3) what is seen of each body's frame: rows are the picture's x and y, columns the frame's axes; None of a diagram
     """
 
     bodies: np.ndarray
     base: np.ndarray
     bones: np.ndarray
+    owners: np.ndarray
     axes: np.ndarray | None
 
 
@@ -48,7 +50,7 @@ def tree_layout(parents: Sequence[int], width: float, height: float, margin: flo
     """Leaves side by side, a body above the middle of what it carries, the base at the foot. O(N)."""
     x, level = tree_places(parents).T
     places = np.column_stack([margin + x * (width - 2 * margin), height - margin - level * (height - 2 * margin)])
-    return PlaneLayout(places[:-1], places[-1], np.zeros((0, 2, 2)), None)
+    return PlaneLayout(places[:-1], places[-1], np.zeros((0, 2, 2)), np.zeros(0, int), None)
 
 
 def model_layout(model: Any, q: Any, width: float, height: float, margin: float, radius: float) -> PlaneLayout:
@@ -62,8 +64,10 @@ def model_layouts(model: Any, q: np.ndarray, width: float, height: float, margin
     poses = skeleton.poses(q)
     seen = _seen(skeleton, model)
     hinges = placed(poses, *skeleton.points["joint"]) @ seen.T
-    lines = [placed(poses, *skeleton.lines[kind]) @ seen.T for kind in ("bone", "slide", "ground", "tie") if len(skeleton.lines[kind][0])]
+    kinds = ("bone", "slide", "ground", "tie")
+    lines = [placed(poses, *skeleton.lines[kind]) @ seen.T for kind in kinds if len(skeleton.lines[kind][0])]
     bones = np.concatenate(lines, axis=1) if lines else np.zeros((len(q), 0, 2, 2))
+    owners = np.concatenate([skeleton.lines[kind][0][:, 0] for kind in kinds])
     everything = np.concatenate([hinges.reshape(-1, 2), bones.reshape(-1, 2), np.zeros((1, 2))])
     low, high = everything.min(axis=0), everything.max(axis=0)
     scale = min((width - 2 * margin) / max(high[0] - low[0], 1e-12), (height - 2 * margin) / max(high[1] - low[1], 1e-12))
@@ -77,7 +81,7 @@ def model_layouts(model: Any, q: np.ndarray, width: float, height: float, margin
     flip, base = np.array([[1.0], [-1.0]]), picture(np.zeros(2))
     return [
         PlaneLayout(
-            _side_by_side(picture(hinges[i]), 2.2 * radius), base, picture(bones[i]),
+            _side_by_side(picture(hinges[i]), 2.2 * radius), base, picture(bones[i]), owners,
             np.array([flip * (seen @ poses[i, k, :3, :3]) for k in range(hinges.shape[1])]),
         )
         for i in range(len(q))

@@ -8,7 +8,8 @@ import numpy as np
 
 from .. import _core
 from ..state import at_state
-from .artists import Canvas, Labels, Lines, Points
+from .artists import Canvas, Discs, Labels, Lines, Points
+from .colour_scale import ramp, shade
 from .skeleton import Skeleton, placed, turned
 
 VIEWS = {"3d": None, "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
@@ -98,6 +99,7 @@ class StickFigure:
         self.ax = _axes(view, model) if ax is None else ax
         self.canvas = Canvas(self.ax, VIEWS[view])
         self._size, self._up, self._floor = 0.0, 2, 0.0
+        self._painted: Discs | None = None
         self._grounded = self.skeleton.is_grounded()
         self._draw(com, names, shadow and view == "3d", alpha)
         self.frame(q)
@@ -168,7 +170,7 @@ class StickFigure:
 
     def update(self, q: Any = None) -> list[Any]:
         """Move the figure to q (nq,), or to the model's own; returns the artists. ModelError for a q that is none. O(N · depth)."""
-        poses = self.skeleton.poses(self._checked(self.model, q))
+        poses = self._poses = self.skeleton.poses(self._checked(self.model, q))
         ends = {kind: placed(poses, *lines) for kind, lines in self.skeleton.lines.items()}
         points = {kind: placed(poses, *at) for kind, at in self.skeleton.points.items()}
         for kind, lines in self._lines.items():
@@ -190,9 +192,37 @@ class StickFigure:
             for part, place in zip(self._masses, points["mass"], strict=False):
                 part.set(place[None])
             self._masses[-1].set(np.average(points["mass"], axis=0, weights=masses)[None] if len(masses) else np.empty((0, 3)))
+        if self._painted is not None:
+            self._painted.set(points["joint"])
         if self._texts is not None:
             self._texts.set(points["joint"])
         return self.artists
+
+    def paint(self, values: Any, label: str, low: float = 0.0, high: float | None = None) -> None:
+        """Colour the bodies by a number each, in their order, with a colour bar from `low` to `high` (the largest); grey: not finite."""
+        numbers = _core.real_array(values, "values")
+        if numbers.shape != (len(self.skeleton.bodies),):
+            raise _core.EvaluationError(f"values {numbers.shape}: one a body of {self.model.name!r}, ({len(self.skeleton.bodies)},)")
+        high = float(np.max(numbers[np.isfinite(numbers)], initial=low)) if high is None else high
+        colours = [shade(x, low, high) for x in numbers]
+        owners = self.skeleton.lines["bone"][0][:, 0]
+        self._lines["bone"].artist.set_color([colours[k] if k >= 0 else _BONE for k in owners])
+        for part, _ in self._joints.values():
+            part.artist.set_visible(False)
+        if self._painted is None:
+            size = 1.5 * float(self._base.artist.get_markersize())
+            self._painted = self.canvas.discs(colours, size, edgecolors="k", linewidths=0.6, zorder=5)
+            self.artists.append(self._painted.artist)
+        self._painted.artist.set_facecolor(colours)
+        self._painted.set(placed(self._poses, *self.skeleton.points["joint"]))
+        self._colour_bar(label, low, high)
+
+    def _colour_bar(self, label: str, low: float, high: float) -> None:
+        from matplotlib.cm import ScalarMappable
+        from matplotlib.colors import LinearSegmentedColormap, Normalize
+
+        scale = ScalarMappable(Normalize(low, high), LinearSegmentedColormap.from_list("bodies", ramp()))
+        self.ax.figure.colorbar(scale, ax=self.ax, label=label, shrink=0.7, pad=0.12 if self.canvas.columns is None else 0.03)
 
     def _base_points(self, ground: np.ndarray) -> np.ndarray:
         """The base's origin, or the hinges that it carries far off; nothing where all that there is flies."""

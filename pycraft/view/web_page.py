@@ -17,7 +17,7 @@ def web_page(name: str, title: str, data: dict[str, Any], texts: dict[str, str],
 
     Parameters
     ----------
-    name : "film" or "viewer"
+    name : of the page, "film" of a run, "viewer", "switches" of hypotheses, "bases" of a motion, "kalman"
     title : shown in the page and its tab
     data : plain data, for the script
     texts : HTML by the names that the page has for them

@@ -90,7 +90,7 @@ class _Handler(BaseHTTPRequestHandler):
             return self._answer(200, self.server.page, "text/html; charset=utf-8")
         answers = {
             "/setup": session.setup,
-            "/state": lambda: session.state(tuple(given.get("arrows", "").split(","))),
+            "/state": lambda: session.state(tuple(given.get("arrows", "").split(",")), given.get("shade", "")),
             "/body": lambda: session.body(given.get("name", "")),
             "/blocks": lambda: session.blocks(given.get("of", "")),
         }

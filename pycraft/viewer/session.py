@@ -14,6 +14,7 @@ from ..arguments import one_number
 from ..models.limits import coordinate_limits
 from ..scenes.coordinate_units import coordinate_units
 from ..view.figure_data import figure_data, number_text
+from ..view.shares import share_values
 from .effect_fields import set_field, shown_fields
 from .inspection import LETTERS, blocks_of, body_numbers
 from .live_scene import LiveScene, without
@@ -87,20 +88,21 @@ class Session:
             })  # fmt: skip
         return rows
 
-    def state(self, arrows: tuple[str, ...] = ()) -> dict[str, Any]:
-        """What changes: time, coordinates, poses, energies; arrows of "velocity" and "force" where they are asked for."""
+    def state(self, arrows: tuple[str, ...] = (), shade: str = "") -> dict[str, Any]:
+        """What changes: time, coordinates, poses, energies; where asked for, arrows of "velocity" and "force", colours by "shares"."""
         with self.lock:
             self._asked = time.monotonic()
             live, ghost = self.live, self.ghost
             found = live.along()
             kinetic, potential = float(found["kinetic"]), float(np.sum(found["potential"]))
             drawn, missing = _arrows(live, arrows)
+            shaded, why = _shade(live, shade)
             return _finite({
                 "edits": self._edits, "t": live.t, "playing": self.playing, "scale": self.scale, "rate": self.rate, "message": self.message,
                 "u": live.u.tolist(), "v": live.v.tolist(), "vdot": found["vdot"].tolist(), "poses": number_text(live.poses()),
                 "ghost": None if ghost is None else number_text(ghost.poses()),
                 "energy": [kinetic, potential, kinetic + potential - live.work],
-                "arrows": drawn, "missing": missing,
+                "arrows": drawn, "missing": missing + why, "shade": shaded,
             })  # fmt: skip
 
     def body(self, name: str) -> dict[str, Any]:
@@ -258,6 +260,19 @@ def _arrows(live: LiveScene, kinds: tuple[str, ...]) -> tuple[dict[str, Any], li
         except _core.Error as error:
             missing.append(f"no arrows of {kind}: {error}")
     return drawn, missing
+
+
+def _shade(live: LiveScene, name: str) -> tuple[dict[str, Any] | None, list[str]]:
+    """The bodies' numbers that are shown as colours, with what they are of, and why there are none."""
+    if name != "shares":
+        return None, []
+    try:
+        values = share_values(live.model, live.q)
+    except _core.Error as error:
+        return None, [f"no shares: {error}"]
+    high = float(values.max(initial=0.0)) or 1.0
+    label = f"tr Υ(k)M(k): {values.sum():.4g} of N = {live.model.nv}"
+    return {"values": values.tolist(), "low": 0.0, "high": high, "label": label}, []
 
 
 def _finite(value: Any) -> Any:

@@ -163,6 +163,8 @@ def test_what_is_asked_wrongly():
             getattr(model, call)("panda_link7", q, out=np.empty((6, 7)))
         with pytest.raises(pc.EvaluationError, match="precision"):
             getattr(model, call)("panda_link7", q, precision="half")
+    with pytest.raises(pc.SingularOperatorError, match="'panda_link7' is named twice, whose rows are the same"):
+        model.operational_space_inertia(["panda_link7", "panda_link7"], q)
     model.add_node("stand", None)
     with pytest.raises(pc.ModelError, match="stand"):
         model.operational_space_compliance("stand", q)

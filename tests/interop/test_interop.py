@@ -66,3 +66,86 @@ def test_what_does_not_fit_is_refused(arm):
     only_forward = pc.interop.from_scipy(LinearOperator((arm.nv, arm.nv), matvec=lambda x: x), theta, theta, "L")
     with pytest.raises(pc.EvaluationError, match="double precision only"):
         (only_forward @ mass_matrix(arm)).at(arm.q, precision="quad").dense()
+
+
+NEITHER = [3, None, "arm", np.eye(2), [1]]
+
+
+@pytest.mark.parametrize("given", NEITHER)
+def test_what_is_no_operator_space_or_matrix(arm, given):
+    """Said by name: no attribute that something has not, no signature of the core."""
+    phi = arm.soa.phi
+    with pytest.raises(pc.SpaceError, match="to_scipy takes an operator of a model, as arm.soa.phi, not"):
+        pc.interop.to_scipy(given)
+    with pytest.raises(pc.SpaceError, match=r"from_scipy: codomain is a space, as arm.soa.phi.codomain, not"):
+        pc.interop.from_scipy(phi.dense(), phi.domain, given)
+    with pytest.raises(pc.Error, match="'L' has shape|from_scipy: 'L' is not an array of numbers|it takes"):
+        pc.interop.from_scipy(given, phi.domain, phi.codomain)
+    if not isinstance(given, str):
+        with pytest.raises(pc.ModelError, match="an operator is called by a text, not by"):
+            pc.interop.from_scipy(phi.dense(), phi.domain, phi.codomain, given)
+
+
+@pytest.mark.parametrize("given", [*NEITHER, pc.mechanisms.pendulum()])
+def test_what_is_no_model(given):
+    from pycraft.interop import drake, export, mujoco, pinocchio
+
+    calls = [export.to_mjcf, export.mjcf_elements, drake.drake_plant, mujoco.permutation, lambda m: mujoco.to_mujoco(m, [0.0], [0.0])]
+    calls += [lambda m: mujoco.velocity_map(m, [0.0]), lambda m: mujoco.acceleration_to_mujoco(m, [0.0], [0.0], [0.0])]
+    calls += [lambda m: mujoco.from_mujoco(m, [0.0], [0.0]), lambda m: pinocchio.coordinates(m, None)]
+    for call in calls:
+        with pytest.raises(pc.ModelError, match="takes a model, not"):
+            call(given)
+    with pytest.raises(pc.ModelError, match="is called by its path, not by"):
+        mujoco.compiled(given if not isinstance(given, str) else 4)
+    with pytest.raises(pc.ModelError, match="name_of takes an MjModel, not"):
+        mujoco.name_of(given)
+    with pytest.raises(pc.ModelError, match="coordinates takes a model of Pinocchio's, not"):
+        pinocchio.coordinates(pc.chain(1), given)
+    if not isinstance(given, (str, list, np.ndarray)):
+        with pytest.raises(pc.ModelError, match="q of 'chain of 1 rods'"):
+            mujoco.to_mujoco(pc.chain(1), given, [0.0])
+
+
+def test_a_scene_is_told_where_its_model_is():
+    with pytest.raises(pc.ModelError, match="MJCF takes a model, not <scene.*that of a scene is scene.model"):
+        pc.interop.export.to_mjcf(pc.mechanisms.pendulum())
+
+
+def test_a_plant_of_drake_says_what_is_missing(monkeypatch):
+    import sys
+
+    monkeypatch.setitem(sys.modules, "pydrake.multibody.plant", None)
+    with pytest.raises(ImportError, match="a plant of Drake needs the package drake, which is not installed: pip install drake"):
+        from pycraft.interop.drake import drake_plant
+
+        drake_plant(pc.chain(1))
+
+
+@pytest.mark.peers
+@pytest.mark.parametrize("given", NEITHER)
+def test_what_pinocchio_and_mujoco_are_handed(given):
+    from pycraft.interop import export, mujoco, pinocchio
+
+    with pytest.raises(pc.ModelError, match="to_pinocchio takes a model, not"):
+        export.to_pinocchio(given)
+    with pytest.raises(pc.ModelError, match="pinocchio_peer takes a model, not"):
+        export.pinocchio_peer(given)
+    with pytest.raises(pc.ModelError, match="takes a model, not"):
+        export.mujoco_peer(given)
+    with pytest.raises(pc.ModelError, match="order takes an MjModel, not"):
+        mujoco.order(pc.chain(1), given)
+    with pytest.raises(pc.ModelError, match="is no file"):
+        pinocchio.build(given)
+
+
+@pytest.mark.peers
+def test_files_that_pinocchio_refuses(tmp_path):
+    from pycraft.interop import pinocchio
+
+    path = tmp_path / "no.urdf"
+    path.write_text("<robot/>")
+    with pytest.raises(pc.ModelError, match="Pinocchio refuses the file"):
+        pinocchio.build(path)
+    with pytest.raises(pc.ModelError, match="root='floating': there are 'fixed' and 'free'"):
+        pinocchio.build(path, "floating")

@@ -81,3 +81,15 @@ def test_a_posture_is_of_hinges_and_not_of_where_the_base_is():
     there[4:7] = (5, 5, 5)
     found = [model.solve_ik(target, model.neutral(), posture=posture).q for posture in (here, there)]
     assert np.abs(found[0] - found[1]).max() < 1e-12 and np.abs(found[0][7:] - here[7:]).max() < 1e-6
+
+
+def test_whether_it_is_reached_is_its_truth():
+    """`if arm.solve_ik(...)` asked for a length, which one solution has not; a batch was true where none was reached."""
+    arm = pc.chain(3)
+    arm.add_node("tip", "body2", position=(1, 0, 0))
+    assert arm.solve_ik({"tip": (1.5, 1.0, 0.0)}, [0.1, 0.2, 0.3])
+    assert not arm.solve_ik({"tip": (9.0, 0.0, 0.0)}, [0.1, 0.2, 0.3])
+    both = arm.solve_ik({"tip": [(1.5, 1.0, 0.0), (9.0, 0.0, 0.0)]}, [0.1, 0.2, 0.3])
+    with pytest.raises(pc.ModelError, match=r"a batch of 2 is neither reached nor not: take .reached.all\(\) or .reached.any\(\)"):
+        bool(both)
+    assert both[0] and not both[1]

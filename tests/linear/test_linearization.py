@@ -185,6 +185,12 @@ def test_modes_as_text_and_pictures(monkeypatch):
     mpl.pyplot.close("all")
     with pytest.raises(pc.EvaluationError, match="mode 5 is not there; there are 2"):
         modes.plot(5)
+    with pytest.raises(pc.ModelError, match="mode: a whole number, not 'first'"):
+        modes.plot("first")
+    with pytest.raises(pc.ModelError, match="amplitude is not an array of numbers"):
+        modes.plot(0, amplitude="wide")
+    with pytest.raises(pc.EvaluationError, match="amplitude=nan: how far the coordinate swings"):
+        modes.plot(0, amplitude=np.nan)
     free = pc.tree([-1], ["free"], seed=1)
     drifting = free.linearize(free.zero_q(), np.zeros(6)).modes()
     assert len(drifting) == 12 and all(row["damping"] is None for row in drifting)
@@ -253,6 +259,11 @@ def test_to_scipy_and_control():
     assert all(a is b for a, b in zip(found.to_numpy(), (found.A, found.B, found.C, found.D), strict=True))
 
 
+def test_a_linear_model_is_true_but_of_no_states():
+    model = pc.chain(2)
+    assert model.linearize() and model.linearize(np.zeros((3, 2))) and not model.linearize(np.zeros((0, 2)))
+
+
 @pytest.mark.parametrize(
     ("call", "text"),
     [
@@ -262,6 +273,9 @@ def test_to_scipy_and_control():
         (lambda m, f: m.linearize(outputs="q.elbow"), "has no q.elbow; after 'q' there are hinge0, hinge1"),
         (lambda m, f: m.linearize(outputs="vdot.elbow"), "has no vdot.elbow; after 'vdot' there are hinge0, hinge1"),
         (lambda m, f: m.linearize(outputs="position.hand"), "no node or body of 'chain of 2 rods' is called 'hand'"),
+        (lambda m, f: m.linearize(outputs=["q.hinge0", "v.hinge0", "q.hinge0"]), "outputs: 'q.hinge0' is named twice"),
+        (lambda m, f: f.controllability(np.nan), "tolerance=nan: below which share a singular value is zero"),
+        (lambda m, f: f.observability(-1.0), "tolerance=-1: below which share a singular value is zero"),
         (lambda m, f: f.discrete(0), "dt=0: a step is a positive number of seconds"),
         (lambda m, f: f.discrete(1e300), "dt=1e+300: by 'zoh' 'chain of 2 rods' leaves the range of its numbers"),
         (lambda m, f: f.discrete(0.1, "exact"), "method='exact': there are 'zoh'"),

@@ -172,6 +172,30 @@ def test_columns_of_what_moves_both_or_neither_are_zero():
         assert not J[:, still].any() and not rate[:, still].any() and (J[:, ~still] != 0).any(axis=0).all()
 
 
+def test_poses_in_the_axes_of_a_third():
+    """Its rotation to the third's axes, and the way between the two origins there; of the present state, of one given, of a batch."""
+    model = every_kind(seed=6)
+    with_loose_frames(model)
+    q, other = model.random_state(6).q, model.random_state(7).q
+    for a, b, c in (
+        ("upon", "body3", "beside"),
+        ("body10", "wall", "body7"),
+        ("body5", "base", "body10"),
+        ("body2", "body9", "body2"),
+        ("base", "body4", "body1"),
+    ):
+        of = lambda x, wrt, q: model.frame(x).pose(q, wrt=wrt, t=0.3)
+        X, R, B = model.frame(a).pose(q, wrt=b, axes=c, t=0.3), of(a, c, q)[:3, :3], of(b, c, q)[:3, 3]
+        assert_close(X[:3, :3], R)
+        assert_close(X[:3, 3], of(a, c, q)[:3, 3] - B)
+        assert np.array_equal(X[3], [0, 0, 0, 1])
+        model.q, model.frames.t = q, 0.3
+        assert_close(model.frame(a).pose(wrt=b, axes=c), X)
+        both = model.frame(a).pose(np.array([q, other]), wrt=b, axes=model.frame(c), t=0.3)
+        assert_close(both[0], X)
+    assert_close(model.frame(a).pose(q, wrt=b, axes=b, t=0.3), of(a, b, q))
+
+
 def test_some_coordinates():
     """Hinges by name and handle, coordinates by name and number: the columns of the whole, in the order that is asked for."""
     model = every_kind(seed=6)

@@ -13,11 +13,53 @@ CHANGES = {
     ],
     "pycraft/viewer/effect_fields.py": [("a refused parameter stays", "        setattr(changed, field, before)\n", "        pass\n")],
     "pycraft/scenes/run_page.py": [("the end of a run is no frame", "np.append(times, last) if", "times if")],
+    "pycraft/view/shares.py": [
+        ("shares without the bodies' inertias", "(soa.Upsilon @ soa.M).at(q)", "(soa.Upsilon @ soa.M @ soa.M).at(q)"),
+        ("rotors have no share", "if not model.has_rotor_inertia:", "if True:"),
+    ],
+    "pycraft/view/rerooting_page.py": [
+        ("shares in the order of the tree", "share_values(model, q)[order]", "share_values(model, q)"),
+        ("all of P is felt", "np.trace(np.linalg.inv(blocks[name, name])[3:, 3:])", "np.trace(inertias[name, name][3:, 3:])"),
+    ],
+    "pycraft/view/kalman_page.py": [
+        ("time runs from the base", "self.track.steps - 1 - a.body", "a.body"),
+        ("another recursion beside the filter's", "(H @ phi @ M @ phi.T @ H.T + J).inv()", "(H @ phi @ M @ phi.T @ H.T + J + J).inv()"),
+    ],
+    "pycraft/view/hypothesis_page.py": [
+        ("an inverse that is not there is a residual", '"breaks" if finding.states else "undefined"', '"breaks"'),
+        ("branches are chains", "(-1, 0, *(max(0, k - 2) for k in range(2, count)))", "tuple(range(-1, count - 1))"),
+    ],
+    "pycraft/view/solids.py": [
+        ("shapes of lumped bodies are at their carrier's origin", "X @ shape.placement", "shape.placement"),
+        (
+            "meshes have no scale",
+            "return vertices * np.array(shape.size), faces\n\n\ndef _turned",
+            "return vertices, faces\n\n\ndef _turned",
+        ),
+    ],
     "pycraft/view/web_page.py": [("names are markup", '.replace("<", "\\\\u003c")', "")],
     "pycraft/dynamics/embedded_motion.py": [
         ("independent coordinates are never exchanged", "<= worst:", "<= 1e300:"),
         ("dependent coordinates stay where steps have brought them", "if not self.rows.size:", "if True:"),
         ("θ̇_r of the old choice goes on", "np.concatenate([q, v[self.independent]])", "np.concatenate([q, v[: len(self.independent)]])"),
+    ],
+    "pycraft/dynamics/second_order.py": [
+        ("effects bend twice", "out[..., :n, :n] -= forces / 2", "out[..., :n, :n] -= forces"),
+        ("stages are all at the step's beginning", "Stage(at, part * dt,", "Stage(at, 0 * dt,"),
+        ("a step leaves prescribed coordinates", "at.placed(displaced(model, at.q, u), after, dt)", "displaced(model, at.q, u), after"),
+        ("prescribed coordinates are displaced", "start[:, [j, n + j]] = 0.0", "pass"),
+    ],
+    "pycraft/scenes/scene_quadratic.py": [
+        ("controllers are asked within a step", "*state, between) for", "*state, False) for"),
+        ("pushes move what is prescribed", "given[known_coordinates(one)] = 0.0", "pass"),
+    ],
+    "pycraft/state.py": [("a run is at t = 0", 'getattr(q, "t", 0.0) if t is None', "0.0 if t is None")],
+    "pycraft/kinematics/solution.py": [
+        (
+            "a batch is true",
+            '        if self._batch:\n            raise _core.ModelError(f"a batch',
+            '        if False:\n            raise _core.ModelError(f"a batch',
+        )
     ],
     "pycraft/dynamics/loop_tangents.py": [
         ("linear models on loops without what bends their forces", "    sides[0][:nv] += bent @ X\n", ""),

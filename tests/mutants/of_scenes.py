@@ -81,6 +81,7 @@ CHANGES = {
         ("a speed limit brakes", "!(force * v > S(0))", "false"),
     ],
     "cpp/simulation/effects/limits.cpp": [
+        ("a stop that is touched is smooth", 'if (d == S(0)) return Edge{"is just at its stop", s.v};', ";", STATEMENT),
         ("stops pull", "factor > S(0) ? factor : S(0)", "factor"),
         ("what a stop stores counts as work", "(pushed(at, s) - S(1))", "pushed(at, s)"),
     ],
@@ -118,6 +119,13 @@ CHANGES = {
             "m.sliding + Vector3<S>{given(3), given(4), given(5)}",
         ),
         ("z⁺ forgets P a'", "P.n = P.n + P.A * m.turning, P.f = P.f + transpose_times(P.B, m.turning);", ";", STATEMENT),
+    ],
+    "cpp/simulation/scene_curvature.cpp": [
+        ("what is prescribed feels forces that bend", "if (known_[j]) weights[size_t(m) * (N + own()) + j] = 0;", ";", STATEMENT),
+        ("what is prescribed feels inertias that bend", "known_[j] ? 0.0 : mu[size_t(m) * rows + j]", "mu[size_t(m) * rows + j]"),
+        ("gravity bends nothing", "&gravity_", "nullptr"),
+        ("second differences are halved", "(h * h)", "(2 * h * h)"),
+        ("what commutes is taken once in all", "b.first < a.first && a.first >= N", "b.first < a.first"),
     ],
     "cpp/simulation/scene_statics.h": [
         ("forces that cancel have no size", "size = std::max(size, std::abs(one[j]))", "size = std::max(size, 0.0)"),

@@ -315,7 +315,7 @@ REFUSED = {
     "unknown": (lambda m: pc.Scene(m).add(E.Loop("wirst")), pc.ModelError, "no loop called 'wirst'"),
     "empty": (lambda m: pc.Scene(m).add(E.Loop([])), pc.ModelError, r"loops=\[\] keeps none"),
     "no loops": (lambda m: pc.Scene(pc.chain(2)).add(E.Loop()), pc.ModelError, "has no loops"),
-    "method": (lambda m: pc.Scene(m).add(E.Loop(method="penalty")), pc.EvaluationError, "method='penalty'"),
+    "method": (lambda m: pc.Scene(m).add(E.Loop(method="springs")), pc.EvaluationError, "method='springs'"),
     "gains": (lambda m: pc.Scene(m).add(E.Loop(alpha=-1.0)), pc.ModelError, "alpha and beta are finite numbers"),
     "gains of what is embedded": (lambda m: pc.Scene(m).add(E.Loop(method="embed", beta=1.0)), pc.ModelError, "'augment'"),
     "form": (lambda m: _embedded(m, form="ud"), pc.EvaluationError, "by form 'fast'.*method='augment'"),

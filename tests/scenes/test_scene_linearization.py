@@ -145,3 +145,28 @@ def test_along_no_states():
         for name in ("A", "B", "C", "D"):
             assert getattr(found, name).shape == getattr(plain, name).shape
         assert found.states == plain.states and len(found.A) == 0
+
+
+def test_a_run_brings_its_times_and_the_states_of_its_effects():
+    """They were taken for t = 0 and the states at first: another model than that of the motion, and nothing said so."""
+    model = pc.chain(2)
+    push = E.Table([0, 1], [[0] * 6, [0, 0, 9, 3, 2, 0]])
+    scene = pc.Scene(model).add(E.Gravity((9.81, 0, 0)), E.Wrench("body1", push), E.NoseHoover(1.0, 0.3))
+    run = scene.simulate(0.2, [0.3, 0.4], [0.5, 0.6], t_eval=np.linspace(0, 0.2, 5))
+    told = scene.linearize(run.q, run.v, run.t, states=run.states)
+    found = scene.linearize(run)
+    agree(found.A, told.A)
+    agree(found.rate, told.rate)
+    agree(found.t, run.t)
+    assert np.abs(found.rate - scene.linearize(run.q, run.v).rate).max() > 1e-2
+    agree(scene.linearize(run, t=0.0, states=np.zeros(6)).rate, scene.linearize(run.q, run.v).rate)
+    curved, known = (
+        one.contracted(np.ones(10)) for one in (scene.quadratic_model(run), scene.quadratic_model(run.q, run.v, run.t, states=run.states))
+    )
+    agree(curved.xx, known.xx)
+    late = run.at(0.15)
+    agree(scene.evaluate(late).vdot, scene.evaluate(late.q, late.v, 0.15, states=late.states).vdot)
+    agree(scene.interbody_forces(None, run), run.interbody_forces(), 1e-9)
+    agree(scene.interbody_forces("hinge0", run)[2], scene.interbody_forces("hinge0", run.q[2], run.v[2], run.t[2], states=run.states[2]))
+    with pytest.raises(pc.ModelError, match="batches of q .5, 2., v .5, 2. and states .5, 6., t .3,. in one call"):
+        scene.interbody_forces(None, run, t=[0.0, 0.1, 0.2])

@@ -17,6 +17,8 @@ FUNCTIONS = {
     "magnitude": np.abs,
     "larger": np.maximum,
     "greater": operator.gt,
+    "at_least": operator.ge,
+    "choose": np.where,
 }
 
 

@@ -232,3 +232,37 @@ def test_a_notebook_shows_it_in_its_cell(browser, view, tmp_path):
     page.close()
     server.shutdown()
     server.server_close()
+
+
+def test_bodies_are_coloured_by_their_shares(browser, view):
+    with shown_page(browser, view) as page:
+        ready(page)
+        first = pixels(page)
+        page.select_option("#shade", "shares")
+        until(page, "figure.shade !== null")
+        shares = view.session.live.model.dof_shares(view.session.live.q)
+        assert page.evaluate("figure.shade.values") == pytest.approx(list(shares.values))
+        assert page.evaluate("figure.shade.label") == "tr Υ(k)M(k): 2 of N = 2" and differing(first, pixels(page)) > MOVED
+        colours = page.evaluate("[0, 1].map((k) => figure.shadeOf(k))")
+        assert len(set(colours)) == 2 and colours[int(np.argmax(shares.values))] == "rgb(189, 223, 38)"
+        page.select_option("#shade", "")
+        until(page, "figure.shade === null")
+        assert differing(first, pixels(page)) == 0
+
+
+def test_limits_and_the_frame_of_what_is_picked(browser):
+    arm = pc.robots.panda()
+    with arm.view() as view, shown_page(browser, view) as page:
+        ready(page)
+        first = page.inner_text(".slider span >> nth=0")
+        low, high = (float(x) for x in first.removeprefix("panda_joint1").split("…"))
+        assert [low, high] == pytest.approx([float(page.get_attribute("#u0", end)) for end in ("min", "max")], rel=5e-3)
+        without = pixels(page)
+        page.click("#tree button >> nth=3")
+        until(page, "figure.chosen === 3")
+        tips = page.evaluate("[0, 1, 2].map((i) => figure.seen(placed(figure.poses, 3, [0, 1, 2].map((j) => (i === j ? 0.05 : 0)))))")
+        picture = pixels(page)
+        for (x, y, _), colour in zip(tips, ([213, 94, 0], [0, 158, 115], [0, 114, 178]), strict=True):
+            near = picture[int(y) - 3 : int(y) + 4, int(x) - 3 : int(x) + 4]
+            assert (np.abs(near - np.array(colour) / 255).max(axis=-1) < 0.1).any()  # x, y and z of its frame in their colours
+        assert differing(without, picture) > 60

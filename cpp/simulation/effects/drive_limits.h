@@ -27,6 +27,22 @@ struct DriveLimits {
     const S left = (fastest - (v > S(0) ? v : S(-v))) / (S(band) * fastest);
     return left > S(1) ? force : left > S(0) ? S(left * force) : S(0);
   }
+  // Why what is bounded has no derivatives at this force and speed, in words; null: it has them. Of a force that depends on the state; the second of
+  // one that is given.
+  template <class S>
+  const char* edge(size_t i, const S& force, const S& v) const {
+    const S most(effort[i]);
+    if (any && std::isfinite(effort[i]) && (force == most || force == -most)) return "is just at its effort limit";
+    return edge_of_speed(i, force, v);
+  }
+  template <class S>
+  const char* edge_of_speed(size_t i, const S& force, const S& v) const {
+    if (!any || std::isinf(speed[i])) return nullptr;
+    const S fastest(speed[i]), fast = v > S(0) ? v : S(-v), from = (S(1) - S(band)) * fastest, driven = force * v;
+    if (from > fast) return nullptr;
+    if (driven == S(0)) return "is driven by nothing at a speed in the band below its limit";
+    return driven > S(0) && (fast == from || fast == fastest) ? "is just at an end of the band below its speed limit" : nullptr;
+  }
 };
 
 }  // namespace pycraft

@@ -1,7 +1,6 @@
 #include "simulation/effects/fixman.h"
 
 #include <cmath>
-#include <iterator>
 #include <numeric>
 
 #include "recursions/log_determinant.h"
@@ -17,10 +16,10 @@ S logarithm(const S& x) {
   using std::log;
   return log(x);
 }
-template <>
-WithDerivatives logarithm(const WithDerivatives& x) {
-  WithDerivatives y(std::log(x.x));
-  for (size_t i = 0; i < std::size(y.d); ++i) y.d[i] = x.d[i] / x.x;
+template <class T, int W>
+Tangent<T, W> logarithm(const Tangent<T, W>& x) {
+  Tangent<T, W> y(logarithm(x.x));
+  for (int i = 0; i < W; ++i) y.d[i] = x.d[i] / x.x;
   return y;
 }
 
@@ -42,7 +41,7 @@ class BoundFixman : public BoundEffect<S> {
     articulated_inertia_tip_to_base(tree_, blocks_);
     S sum = S(0);
     for (int k = 0; k < tree_.bodies(); ++k)
-      for (int j = 0; j < tree_.dof[k]; ++j) sum += logarithm<S>(blocks_.pivots(k)[j]);
+      for (int j = 0; j < tree_.dof[k]; ++j) sum += logarithm(blocks_.pivots(k)[j]);
     return half_ * sum;
   }
 

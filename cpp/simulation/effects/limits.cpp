@@ -46,6 +46,15 @@ class BoundLimits : public BoundEffect<S> {
   void events(const At<S>& at, S* out) override {
     for (const Stop& s : stops_) *out++ = -beyond(at, s);
   }
+  std::optional<Edge> edge(const At<S>& at) override {
+    for (const Stop& s : stops_) {
+      const S d = beyond(at, s);
+      if (s.k == S(0) || S(0) > d) continue;
+      if (d == S(0)) return Edge{"is just at its stop", s.v};
+      if (S(1) == s.a * s.inward * at.v[s.v]) return Edge{"leaves its stop just as fast as that lets go", s.v};
+    }
+    return {};
+  }
 
  private:
   struct Stop {

@@ -1,10 +1,10 @@
 #include "simulation/effects/loop.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "model/checks.h"
 #include "runtime/errors.h"
+#include "simulation/taken_loops.h"
 
 namespace pycraft {
 
@@ -20,12 +20,7 @@ class BoundLoops : public BoundEffect<S> {
 }  // namespace
 
 KeepLoops::KeepLoops(std::shared_ptr<const LoopSet> set, std::vector<std::string> names, double alpha, double beta, bool embedded) {
-  for (size_t i = 0; i < names.size(); ++i) {
-    set->loop(names[i]);
-    if (std::find(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(i), names[i]) != names.begin() + static_cast<std::ptrdiff_t>(i))
-      throw ModelError("loop: '" + names[i] + "' is named twice");
-  }
-  if (names.empty() && set->names().empty()) throw ModelError("loop: '" + set->model().name() + "' has no loops; declare them, add_loop(...)");
+  check_names(*set, names);
   if (!std::isfinite(alpha) || !std::isfinite(beta) || alpha < 0 || beta < 0)
     throw ModelError("loop: Baumgarte's alpha and beta are finite numbers, zero or more (1/s), not " + short_number(alpha) + " and " + short_number(beta));
   if (embedded && (alpha != 0 || beta != 0)) throw ModelError("loop: Baumgarte's alpha and beta draw states to loops that are kept by method 'augment'; embedded ones are not left");

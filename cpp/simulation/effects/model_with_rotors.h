@@ -2,7 +2,6 @@
 #pragma once
 
 #include <memory>
-#include <type_traits>
 
 #include "model/compiled_model.h"
 #include "simulation/effect.h"
@@ -12,7 +11,7 @@ namespace pycraft {
 template <class S>
 std::shared_ptr<const CompiledModel<S>> model_with_rotors(const Multibody& model, const HingeTerms& terms) {
   const HingeTerms rotors{.inertia = terms.inertia};
-  if constexpr (std::is_same_v<S, WithDerivatives>)
+  if constexpr (requires(S x) { x.d; })
     return std::make_shared<const CompiledModel<S>>(broadcast<S>(*compile_model<double>(model, rotors)));
   else
     return compile_model<S>(model, rotors);

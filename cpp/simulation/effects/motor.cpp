@@ -20,16 +20,22 @@ class BoundMotor : public BoundEffect<S> {
   }
   void forces(const At<S>& at, const Forces<S>& out) override {
     if (!command_->constant()) values_at(*command_, at.t, u_.data());
-    for (size_t i = 0; i < coordinates_.size(); ++i) {
-      const int j = coordinates_[i];
-      S u = u_[u_.size() == 1 ? 0 : i];
-      if (u > S(1)) u = S(1);
-      if (S(-1) > u) u = S(-1);
-      out.generalized[j] += limits_.bounded(i, S(stall_[i] * (u - slope_[i] * at.v[j])), at.v[j]);
-    }
+    for (size_t i = 0; i < coordinates_.size(); ++i) out.generalized[coordinates_[i]] += limits_.bounded(i, unbounded(at, i), at.v[coordinates_[i]]);
+  }
+  std::optional<Edge> edge(const At<S>& at) override {
+    if (!command_->constant()) values_at(*command_, at.t, u_.data());
+    for (size_t i = 0; i < coordinates_.size(); ++i)
+      if (const char* why = limits_.edge(i, unbounded(at, i), at.v[coordinates_[i]])) return Edge{why, coordinates_[i]};
+    return {};
   }
 
  private:
+  S unbounded(const At<S>& at, size_t i) const {
+    S u = u_[u_.size() == 1 ? 0 : i];
+    if (u > S(1)) u = S(1);
+    if (S(-1) > u) u = S(-1);
+    return stall_[i] * (u - slope_[i] * at.v[coordinates_[i]]);
+  }
   std::vector<int> coordinates_;
   TimeFunction command_;
   DriveLimits limits_;

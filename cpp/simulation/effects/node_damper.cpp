@@ -19,6 +19,11 @@ class BoundNodeDamper : public BoundEffect<S> {
     a_.push(at, none, pull, out);
     b_.push(at, none, -pull, out);
   }
+  std::optional<Edge> edge(const At<S>& at) override {
+    const Vector3<S> d = b_.position(at) - a_.position(at);
+    if (c_ == S(0) || dot(d, d) > S(0)) return {};
+    return Edge{"its nodes are at one place"};
+  }
 
  private:
   PlacedNode<S> a_, b_;

@@ -29,6 +29,11 @@ class BoundNodeSpring : public BoundEffect<S> {
     const S off = span_of(d).length - rest_;
     return k_ * off * off / S(2);
   }
+  std::optional<Edge> edge(const At<S>& at) override {
+    const Vector3<S> d = b_.position(at) - a_.position(at);
+    if (rest_ == S(0) || k_ == S(0) || dot(d, d) > S(0)) return {};
+    return Edge{"its nodes are at one place"};
+  }
 
  private:
   PlacedNode<S> a_, b_;

@@ -17,6 +17,11 @@ class BoundQuadraticDamping : public BoundEffect<S> {
       out.generalized[coordinates_[i]] -= c_[i] * S(abs(v)) * v;
     }
   }
+  std::optional<Edge> edge(const At<S>& at) override {
+    for (size_t i = 0; i < c_.size(); ++i)
+      if (at.v[coordinates_[i]] == S(0) && !(c_[i] == S(0))) return Edge{"is at rest, where |v| v bends", coordinates_[i]};
+    return {};
+  }
 
  private:
   std::vector<int> coordinates_;

@@ -17,10 +17,10 @@ inline S angle_over_sine(const S& square, const S& w) {
     return S(atan2(r, w)) / r;
   }
   S power = S(1), sum = S(1);  // Σ (-y)^k/(2k + 1)
-  for (int k = 1; k < 60; ++k) {
+  for (int k = 1, nothing = 0; k < 60 && nothing < 3; ++k) {
     power *= -y;
     const S next = sum + power / S(2 * k + 1);
-    if (next == sum && k > 2) break;  // two terms more: derivatives are of them, too
+    if (next == sum) ++nothing;  // two terms more: first and second derivatives are of them, too
     sum = next;
   }
   return sum / w;
@@ -55,11 +55,11 @@ inline S rotation_vector_kappa(const S& square) {
     return (S(1) - S(sin(angle)) / angle / (S(2) * c)) / square;
   }
   S power = S(1), factorial = S(2);
-  for (int k = 1; k < 40; ++k) {
+  for (int k = 1, nothing = 0; k < 40 && nothing < 3; ++k) {
     power *= -square;
     factorial *= S(2 * k + 1) * S(2 * k + 2);
     const S next = cosc + power / factorial;
-    if (next == cosc && k > 2) break;
+    if (next == cosc) ++nothing;
     cosc = next;
     sum += S(2 * (k + 1)) * power / (factorial * S(2 * k + 3) * S(2 * k + 4));
   }

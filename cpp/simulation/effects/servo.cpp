@@ -17,13 +17,23 @@ class BoundServo : public BoundEffect<S> {
   void forces(const At<S>& at, const Forces<S>& out) override {
     if (!target_->constant()) values_at(*target_, at.t, r_.data(), rate_.data());
     for (size_t i = 0; i < coordinates_.size(); ++i) {
-      const auto [q, v] = coordinates_[i];
-      const size_t own = r_.size() == 1 ? 0 : i;
-      out.generalized[v] += limits_.bounded(i, S(kp_[i] * (r_[own] - at.q[q]) + kd_[i] * (rate_[own] - at.v[v])), at.v[v]);
+      const int v = coordinates_[i].v;
+      out.generalized[v] += limits_.bounded(i, unbounded(at, i), at.v[v]);
     }
+  }
+  std::optional<Edge> edge(const At<S>& at) override {
+    if (!target_->constant()) values_at(*target_, at.t, r_.data(), rate_.data());
+    for (size_t i = 0; i < coordinates_.size(); ++i)
+      if (const char* why = limits_.edge(i, unbounded(at, i), at.v[coordinates_[i].v])) return Edge{why, coordinates_[i].v};
+    return {};
   }
 
  private:
+  S unbounded(const At<S>& at, size_t i) const {
+    const auto [q, v] = coordinates_[i];
+    const size_t own = r_.size() == 1 ? 0 : i;
+    return kp_[i] * (r_[own] - at.q[q]) + kd_[i] * (rate_[own] - at.v[v]);
+  }
   std::vector<SingleCoordinate> coordinates_;
   std::vector<S> kp_, kd_;
   TimeFunction target_;

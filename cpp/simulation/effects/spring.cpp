@@ -35,11 +35,18 @@ class BoundSpring : public BoundEffect<S> {
     return sum;
   }
 
- private:
-  static Vector3<S> turned(const HingeSpring& s, const S* q) {
-    const Quaternion<S> rest{S(s.rest[0]), S(s.rest[1]), S(s.rest[2]), S(s.rest[3])}, now{q[s.q], q[s.q + 1], q[s.q + 2], q[s.q + 3]};
-    return rotation_vector(conjugate(rest) * now);
+  std::optional<Edge> edge(const At<S>& at) override {
+    for (const HingeSpring& s : springs_)
+      if (s.ball && s.stiffness != 0 && from_rest(s, at.q).w == S(0)) return Edge{"is turned by half a turn from its rest", s.v};
+    return {};
   }
+
+ private:
+  static Quaternion<S> from_rest(const HingeSpring& s, const S* q) {
+    const Quaternion<S> rest{S(s.rest[0]), S(s.rest[1]), S(s.rest[2]), S(s.rest[3])}, now{q[s.q], q[s.q + 1], q[s.q + 2], q[s.q + 3]};
+    return conjugate(rest) * now;
+  }
+  static Vector3<S> turned(const HingeSpring& s, const S* q) { return rotation_vector(from_rest(s, q)); }
   std::vector<HingeSpring> springs_;
 };
 

@@ -19,6 +19,15 @@ class BoundTorqueSource : public BoundEffect<S> {
       out.generalized[j] += limits_.bounded(i, u_[u_.size() == 1 ? 0 : i], at.v[j]);
     }
   }
+  std::optional<Edge> edge(const At<S>& at) override {
+    if (!torque_->constant()) values_at(*torque_, at.t, u_.data());
+    for (size_t i = 0; i < coordinates_.size(); ++i) {
+      const S& u = u_[u_.size() == 1 ? 0 : i];
+      if (u == S(0)) continue;
+      if (const char* why = limits_.edge_of_speed(i, u, at.v[coordinates_[i]])) return Edge{why, coordinates_[i]};
+    }
+    return {};
+  }
 
  private:
   std::vector<int> coordinates_;

@@ -54,8 +54,8 @@ def load(
         a node of the base), or stays a body with no coordinates. Both give the same mass matrix. Left out: what a TOML file
         says, "lump" of others.
     package_dirs : folders
-        Where packages of "package://" names lie. No mesh is opened to load a URDF file: see
-        `pycraft.models.loaders.urdf.resolve_package`.
+        Where packages of "package://" names lie. No mesh is opened to load a URDF file; the viewer looks for those of `Multibody.shapes`
+        there: see `pycraft.models.loaders.urdf.resolve_package`.
     strict : bool
         An inertia that violates the triangle inequality is an error instead of a warning.
     gravity : (3,) m/s², or "file"
@@ -119,7 +119,7 @@ def read(
     with _no_collection():
         if is_toml(path):
             return toml_reader.read(TomlFile(path), root=root, welds=welds, strict=strict)
-        return _read(XmlFile(path), root, mimic, welds or "lump", strict)
+        return _read(XmlFile(path), root, mimic, welds or "lump", strict, package_dirs)
 
 
 def is_toml(path: object) -> bool:
@@ -139,10 +139,12 @@ def _no_collection() -> Iterator[None]:
             gc.enable()
 
 
-def _read(file: XmlFile, root: str, mimic: str, welds: str, strict: bool) -> tuple[Multibody, list[str]]:
+def _read(
+    file: XmlFile, root: str, mimic: str, welds: str, strict: bool, package_dirs: Sequence[str | os.PathLike[str]]
+) -> tuple[Multibody, list[str]]:
     if file.root_name == "robot":
         with np.errstate(over="ignore", invalid="ignore"):  # what is not finite then is refused, with its line
-            return urdf.read(file, root=root, mimic=mimic, welds=welds, strict=strict)
+            return urdf.read(file, root=root, mimic=mimic, welds=welds, strict=strict, package_dirs=package_dirs)
     if file.root_name == "mujoco":
         from . import mjcf  # its package is an extra
 

@@ -37,6 +37,7 @@ from ...interop import mujoco as conventions
 from ..multibody import Multibody
 from .mjcf_actuators import read_actuators
 from .mjcf_equalities import add_equalities
+from .mjcf_shapes import shapes_of
 from .rotations import rotation_about, rotation_from_quaternion, turned_inertia
 from .xml_file import XmlFile
 
@@ -108,6 +109,7 @@ class _Reader:
         self._left_out(model)
         model._left_aside = self._left_aside(model)
         model._actuators = read_actuators(self.m, model)
+        model._shapes = shapes_of(self.m, self.bodies)
         return model, self.warnings + [f"{self.path}: {text}" for _, text in model.take_warnings()]
 
     def _state(self, model: Multibody) -> tuple[np.ndarray, np.ndarray]:

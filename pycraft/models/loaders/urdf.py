@@ -8,7 +8,7 @@ ball, spherical             ball      quaternion (w, x, y, z); not in the specif
 floating                    free      quaternion, position
 fixed                       weld      none
 
-Visuals, collision shapes, materials, transmissions and gazebo blocks are not read. Damping, friction and bounds on
+Visuals are `Multibody.shapes`; collision shapes, transmissions and gazebo blocks are not read. Damping, friction and bounds on
 efforts and velocities are effects: they are in `Multibody.left_aside`. Two elements are our own, which other readers pass over: inside a
 joint `<pycraft rotor_inertia="1.14"/>`, one value per coordinate in kg m² or kg as seen at the joint; in the robot `<pycraft>` with its
 loops (`urdf_loops`).
@@ -29,12 +29,15 @@ from .left_aside import by_coordinate
 from .rotations import rotation_about
 from .urdf_elements import Elements, Joint, Link
 from .urdf_loops import add_loops
+from .urdf_shapes import shapes_of
 from .xml_file import XmlFile, abbreviated, label
 
 _CUT = "a model is a tree: take one joint out"
 
 
-def read(file: XmlFile, *, root: str, mimic: str, welds: str, strict: bool) -> tuple[Multibody, list[str]]:
+def read(
+    file: XmlFile, *, root: str, mimic: str, welds: str, strict: bool, package_dirs: Iterable[str | os.PathLike[str]] = ()
+) -> tuple[Multibody, list[str]]:
     """The model of a URDF file, and what is worth a warning about it (each text with file and line).
 
     Parameters are those of `pycraft.load`. Raises ModelError, with file, line and element, for what the file gets wrong.
@@ -47,7 +50,8 @@ def read(file: XmlFile, *, root: str, mimic: str, welds: str, strict: bool) -> t
         _couple(file, elements.joints, model)
     add_loops(file, model, tree.root)
     model._left_aside = by_coordinate(model, elements.left_aside)
-    return model, elements.warnings + [tree.with_line(body, text) for body, text in model.take_warnings()]
+    model._shapes, unread = shapes_of(file, elements, package_dirs)
+    return model, elements.warnings + unread + [tree.with_line(body, text) for body, text in model.take_warnings()]
 
 
 # Mimic joints ---------------------------------------------------------------------------------------------------------

@@ -32,7 +32,7 @@ function turned(poses, owner, d) {
 class Figure {
   // data: what pycraft/view/figure_data.py says of a model; picked(body): a body was clicked, -1 for none
   constructor(canvas, data, picked = () => {}) {
-    Object.assign(this, { canvas, data, picked, poses: new Float32Array(), ghosts: [], arrows: [], way: null, chosen: -1 });
+    Object.assign(this, { canvas, data, picked, poses: new Float32Array(), ghosts: [], arrows: [], way: null, chosen: -1, shade: null, solid: true });
     this.context = canvas.getContext("2d");
     this.look();
     this.listen();
@@ -122,8 +122,10 @@ class Figure {
     if (this.way) this.drawLine(this.way, colourOf("--way"), 1.2);
     for (const ghost of this.ghosts) this.drawModel(ghost.data, ghost.poses, 0.4, colourOf("--ghost"));
     this.drawModel(this.data, this.poses, 1, null);
+    if (this.chosen >= 0 && this.poses.length) this.drawFrame(this.chosen);
     for (const arrow of this.arrows) this.drawArrow(arrow);
     this.drawScale();
+    if (this.shade) this.drawShade();
   }
 
   drawLine(points, colour, width) {
@@ -155,7 +157,51 @@ class Figure {
     context.setLineDash([]);
     context.strokeRect(14, height - 14, length * this.scale, 0);
     context.font = "12px system-ui, sans-serif";
+    context.textAlign = "left";
     context.fillText(`${+length.toPrecision(6)} m`, 14, height - 20);
+  }
+
+  // The axes of a body's frame, with their names.
+  drawFrame(body) {
+    const { context } = this, origin = placed(this.poses, body, [0, 0, 0]), length = Math.max(2 * this.data.tick, 34 / this.scale);
+    ["x", "y", "z"].forEach((name, i) => {
+      const d = turned(this.poses, body, [0, 1, 2].map((j) => (i === j ? length : 0))), colour = colourOf(`--line${[1, 2, 0][i]}`);
+      this.drawArrow({ at: origin, along: d, colour });
+      const [x, y] = this.seen(along(origin, 1.18, d));
+      context.fillStyle = colour;
+      context.font = "12px system-ui, sans-serif";
+      context.textAlign = "center";
+      context.fillText(name, x, y + 4);
+    });
+  }
+
+  // The colours of numbers: a strip with the numbers of its ends and what they are of.
+  drawShade() {
+    const { context } = this, { low, high, label } = this.shade, [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
+    const long = Math.min(240, 0.5 * width), [left, top] = [width - long - 14, height - 30];
+    const gradient = context.createLinearGradient(left, 0, left + long, 0);
+    this.data.ramp.forEach((stop, i) => gradient.addColorStop(i / (this.data.ramp.length - 1), stop));
+    context.fillStyle = gradient;
+    context.fillRect(left, top, long, 10);
+    context.fillStyle = colourOf("--text");
+    context.font = "12px system-ui, sans-serif";
+    for (const [share, align] of [[0, "left"], [0.5, "center"], [1, "right"]]) {
+      context.textAlign = align;
+      context.fillText(`${+(low + share * (high - low)).toPrecision(3)}`, left + share * long, height - 6);
+    }
+    context.textAlign = "right";
+    context.fillText(label, left + long, top - 6);
+    context.textAlign = "left";
+  }
+
+  // The colour of a body by its number in `shade`: { values, low, high, label }; null where there is none.
+  shadeOf(body) {
+    if (!this.shade || body < 0) return null;
+    const { values, low, high } = this.shade, { ramp } = this.data, value = values[body];
+    if (!Number.isFinite(value)) return colourOf("--faint");
+    const place = (ramp.length - 1) * Math.max(0, Math.min(1, high > low ? (value - low) / (high - low) : 0));
+    const k = Math.min(Math.floor(place), ramp.length - 2), part = (stop, i) => parseInt(stop.slice(i, i + 2), 16);
+    return `rgb(${[1, 3, 5].map((i) => Math.round(part(ramp[k], i) + (place - k) * (part(ramp[k + 1], i) - part(ramp[k], i)))).join(", ")})`;
   }
 
   drawModel(data, poses, alpha, colour) {
@@ -169,7 +215,7 @@ class Figure {
       of.forEach((owners, i) => {
         const ends = owners.map((owner, j) => this.seen(placed(poses, owner, at[i][j])));
         const own = !colour && kind === "bone" && owners.includes(this.chosen) && owners[0] === this.chosen;
-        items.push({ depth: (ends[0][2] + ends[1][2]) / 2, ends, stroke: colour || colourOf(own ? "--chosen" : name),
+        items.push({ depth: (ends[0][2] + ends[1][2]) / 2, ends, stroke: colour || (own ? colourOf("--chosen") : (kind === "bone" && this.shadeOf(owners[0])) || colourOf(name)),
           width: width * share * (own ? 1.6 : 1), dashes, body: owners[0] });
       });
     }
@@ -180,7 +226,7 @@ class Figure {
       items.push({ depth: (ends[0][2] + ends[1][2]) / 2, ends, stroke: colour || data.colours[data.axes.hinge[i]] || colourOf("--text"), width: 0.6 * width, dashes: [], body: -1 });
     });
     const joints = data.points.joint.of.map((owner, i) => this.seen(placed(poses, owner, data.points.joint.at[i])));
-    joints.forEach((at, i) => items.push({ depth: at[2], dot: at, fill: colour || data.colours[i] || colourOf("--text"), body: i, radius: 1.7 * width }));
+    joints.forEach((at, i) => items.push({ depth: at[2], dot: at, fill: colour || this.shadeOf(i) || data.colours[i] || colourOf("--text"), body: i, radius: 1.7 * width }));
     for (const [kind, share] of [["node", 0.9]]) {
       const { of, at } = data.points[kind];
       of.forEach((owner, i) => {
@@ -194,11 +240,47 @@ class Figure {
     }
     items.sort((a, b) => a.depth - b.depth);
     context.globalAlpha = alpha;
+    const faces = this.solid && data.solids.length ? this.faces(data, poses, colour) : [];
+    for (const face of faces) this.drawFace(face);
+    if (!colour) this.drawn = faces;
     context.lineCap = "round";
     for (const item of items) this.drawItem(item);
     context.setLineDash([]);
     context.globalAlpha = 1;
     if (!colour) this.items = items;
+  }
+
+  // Triangles of the bodies' shapes as they are seen, from back to front, lit from where they are looked at.
+  faces(data, poses, colour) {
+    const found = [];
+    for (const solid of data.solids) {
+      solid.read ??= { vertices: numbers(solid.vertices), faces: numbers(solid.faces) };
+      const { vertices, faces } = solid.read, seen = [];
+      for (let i = 0; i < vertices.length; i += 3) seen.push(this.seen(placed(poses, solid.of, vertices.subarray(i, i + 3))));
+      const own = colour || (solid.of === this.chosen && solid.of >= 0 ? colourOf("--chosen") : this.shadeOf(solid.of)) || solid.colour || colourOf("--solid");
+      const parts = (own.match(/^#/) ? [1, 3, 5].map((i) => parseInt(own.slice(i, i + 2), 16)) : own.match(/[\d.]+/g).map(Number)).slice(0, 3);
+      for (let i = 0; i < faces.length; i += 3) {
+        const points = [seen[faces[i]], seen[faces[i + 1]], seen[faces[i + 2]]];
+        const [a, b, c] = points, [u, v] = [along(b, -1, a), along(c, -1, a)].map(([x, y, z]) => [x, y, z * this.scale]);
+        const normal = cross(u, v), size = Math.hypot(...normal);
+        if (!(size > 1e-9)) continue;
+        const light = 0.45 + 0.55 * Math.abs(normal[2]) / size; // of both sides: meshes do not all say which is out
+        found.push({ depth: a[2] + b[2] + c[2], points, body: solid.of, fill: `rgb(${parts.map((x) => Math.round(light * x)).join(", ")})` });
+      }
+    }
+    return found.sort((a, b) => a.depth - b.depth);
+  }
+
+  drawFace({ points, fill }) {
+    const { context } = this;
+    context.setLineDash([]);
+    context.beginPath();
+    for (const [x, y] of points) context.lineTo(x, y);
+    context.closePath();
+    context.fillStyle = context.strokeStyle = fill;
+    context.lineWidth = 0.7; // no light between neighbours
+    context.fill();
+    context.stroke();
   }
 
   drawItem({ ends, dot: at, stroke, fill, width, dashes, radius, body }) {
@@ -241,7 +323,7 @@ class Figure {
     context.fill();
   }
 
-  // The body whose hinge or line is nearest to a place in the picture, within 14 pixels; -1 for none.
+  // The body whose hinge or line is nearest to a place in the picture, within 14 pixels, or whose shape is seen there; -1 for none.
   bodyAt(x, y) {
     let nearest = -1, least = 14;
     for (const { ends, dot: at, body } of this.items || []) {
@@ -256,7 +338,13 @@ class Figure {
       }
       if (distance < least) [nearest, least] = [body, distance];
     }
-    return nearest;
+    if (nearest >= 0) return nearest;
+    const side = ([ax, ay], [bx, by]) => (bx - ax) * (y - ay) - (by - ay) * (x - ax);
+    const hit = (this.drawn || []).findLast(({ points: [a, b, c] }) => {
+      const sides = [side(a, b), side(b, c), side(c, a)];
+      return sides.every((s) => s >= 0) || sides.every((s) => s <= 0);
+    });
+    return hit ? hit.body : -1;
   }
 }
 

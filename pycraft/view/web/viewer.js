@@ -79,7 +79,8 @@ function buildSliders() {
   if (shown.length < all.length) make("p", byId("sliders"), `${all.length} coordinates: those of the picked body`, { className: "faint" });
   for (const coordinate of shown) {
     const box = make("label", byId("sliders"), "", { className: "slider" });
-    make("span", box, coordinate.name, { title: coordinate.bounded ? "its limits" : "no limits" });
+    const name = make("span", box, coordinate.name), [low, high] = [coordinate.low, coordinate.high].map((x) => +x.toPrecision(3));
+    make("small", name, coordinate.bounded ? ` ${low} … ${high}` : " no limits", { className: "faint" });
     const value = make("output", box), range = make("input", box, "", {
       type: "range", min: coordinate.low, max: coordinate.high, step: "any", id: `u${coordinate.j}`,
     });
@@ -124,7 +125,7 @@ function table(rows) {
   const made = document.createElement("table");
   for (const row of rows) {
     const line = make("tr", made);
-    for (const x of row) make("td", line, x === null ? "-" : `${+x.toPrecision(4)}`);
+    for (const x of row) make("td", line, x === null ? "-" : `${+x.toPrecision(row.length > 4 ? 3 : 4)}`, { title: `${x}` });
   }
   return made;
 }
@@ -206,7 +207,7 @@ function arrows() {
     const share = longest[kind] ? (0.6 * reach) / longest[kind] : 0;
     for (const [at, vector] of list) figure.arrows.push({ at, along: vector.map((x) => share * x), colour: colourOf(styles[kind]) });
     return `longest ${kind}: ${+now.toPrecision(3)} ${units[kind]}`;
-  }).concat(state.missing).join("; ");
+  }).concat(state.missing, setup.figure.unshown).join("; ");
 }
 
 function show(now) {
@@ -216,6 +217,7 @@ function show(now) {
   else kept[kept.length - 1] = now;
   if (kept.length > KEPT) kept = kept.filter((_, i) => i % 2 === 0 || i > KEPT / 2); // the older half thins out
   arrows();
+  figure.shade = now.shade;
   if (figure.ghosts.length && now.ghost) figure.ghosts[0].poses = numbers(now.ghost);
   figure.show(numbers(now.poses));
   buildSliders.shown.forEach((coordinate) => coordinate.show(now.u[coordinate.j]));
@@ -232,7 +234,7 @@ async function refresh() {
   busy = true;
   try {
     const kinds = ["velocity", "force"].filter((kind) => byId(kind).checked).join(",");
-    const now = await ask(`/state?arrows=${kinds}`);
+    const shade = byId("shade").value, now = await ask(`/state?arrows=${kinds}${shade && `&shade=${shade}`}`);
     if (now.edits !== setup.edits) {
       setup = await ask("/setup");
       build();
@@ -263,7 +265,10 @@ byId("play").addEventListener("click", () => act(state.playing ? "pause" : "play
 for (const action of ["step", "reset", "neutral", "random", "rest"]) byId(action).addEventListener("click", () => act(action));
 byId("scale").addEventListener("change", (event) => act("scale", { to: +event.target.value }));
 byId("ghost").addEventListener("change", (event) => act("ghost", { name: event.target.value }));
-for (const kind of ["velocity", "force"]) byId(kind).addEventListener("change", refresh);
+for (const kind of ["velocity", "force", "shade"]) byId(kind).addEventListener("change", refresh);
+byId("solid").addEventListener("change", (event) => { figure.solid = event.target.checked; figure.draw(); });
+byId("solids").hidden = !setup.figure.solids.length;
+byId("said").title = setup.figure.unshown.join("; ");
 byId("look").addEventListener("click", () => figure.look());
 build();
 buildTree();

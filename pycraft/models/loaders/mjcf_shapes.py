@@ -1,0 +1,43 @@
+"""The geoms of a compiled MJCF file as shapes: those that MuJoCo's viewer shows at first, groups 0 to 2; it holds the meshes, too."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..shapes import Shape, hex_colour
+from .rotations import rotation_from_quaternion
+
+_SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH = range(2, 8)  # mjtGeom; planes and height fields, 0 and 1, are no bodies' shapes
+_SHOWN_GROUPS = 3
+
+
+def shapes_of(m: Any, bodies: list[str]) -> list[Shape]:
+    """All shapes; `bodies` are the names by MuJoCo's numbers, of which 0 is the world."""
+    made = []
+    for g in range(m.ngeom):
+        kind, size, on = int(m.geom_type[g]), np.array(m.geom_size[g]), int(m.geom_bodyid[g])
+        if not _SPHERE <= kind <= _MESH or int(m.geom_group[g]) >= _SHOWN_GROUPS:
+            continue
+        placement = np.eye(4)
+        placement[:3, :3], placement[:3, 3] = rotation_from_quaternion(m.geom_quat[g]), m.geom_pos[g]
+        said: dict[int, tuple[str, tuple[float, ...]]] = {
+            _SPHERE: ("sphere", (size[0],)),
+            _CAPSULE: ("capsule", (size[0], 2 * size[1])),
+            _ELLIPSOID: ("ellipsoid", tuple(size)),
+            _CYLINDER: ("cylinder", (size[0], 2 * size[1])),
+            _BOX: ("box", tuple(2 * size)),
+            _MESH: ("mesh", (1.0, 1.0, 1.0)),
+        }
+        name, sizes = said[kind]
+        triangles = _triangles(m, int(m.geom_dataid[g])) if kind == _MESH else None
+        body = bodies[on] if on else ""
+        made.append(Shape(body, name, tuple(map(float, sizes)), placement, hex_colour(m.geom_rgba[g]), triangles=triangles))
+    return made
+
+
+def _triangles(m: Any, mesh: int) -> tuple[np.ndarray, np.ndarray]:
+    first, count = int(m.mesh_vertadr[mesh]), int(m.mesh_vertnum[mesh])
+    face, faces = int(m.mesh_faceadr[mesh]), int(m.mesh_facenum[mesh])
+    return np.array(m.mesh_vert[first : first + count], float), np.array(m.mesh_face[face : face + faces], int)

@@ -1,0 +1,129 @@
+"""Each body's share of the degrees of freedom, as colour on the robot.
+
+share of body k          tr(Υ(k) M(k))
+share of hinge k's rotor tr(ℳ⁻¹(k,k) J(k)),  ℳ⁻¹ of the mass matrix with J in it
+together                 Σ tr(Υ(k) M(k)) + Σ tr(ℳ⁻¹(k,k) J(k)) = tr(ℳ⁻¹ (HφMφ*H* + J)) = N
+
+Υ(k) is what a force on body k gives it in acceleration, so that Υ(k) M(k) is how much of its own inertia is felt there: a body that is free
+of all others has share 6 (or as many directions as its inertia has), one that cannot move has none. [A. Jain, Robot and Multibody
+Dynamics, Springer 2011, operational space inertias; the sum is the catalogue's "the bodies' shares add up to N"]
+"""
+
+from __future__ import annotations
+
+from html import escape
+from typing import Any
+
+import numpy as np
+
+from ..state import at_state
+from .colour_scale import colour_bar, shade
+from .plane_layout import model_layout
+from .stick_figure import StickFigure
+from .sweep_picture import HEIGHT, RADIUS, WIDTH
+
+LABEL = "share of the degrees of freedom, tr Υ(k)M(k)"
+_SHOWN = 24
+"""Bodies with a line each; of more, those with the largest shares."""
+_COLUMNS = 256
+"""Of I, that ℳ⁻¹J is applied to at once: no N × N matrix is kept of a large model."""
+
+
+class Shares:
+    """`Multibody.dof_shares`: prints as a table, shows as a picture in a notebook; `plot` is one by Matplotlib.
+
+    Attributes
+    ----------
+    by_body : dict, name of the body to tr(Υ(k)M(k)), between 0 and 6
+    of_bodies, of_rotors, total : float; their sums, and both together, which is N
+    coordinates : N
+    """
+
+    def __init__(self, model: Any, q: Any = None):
+        self.model, self.q = model, np.array(at_state(model, q)[0], float)
+        model.check_q(self.q)
+        self.values = share_values(model, self.q)
+        self.by_body = dict(zip(model.bodies, self.values.tolist(), strict=True))
+        self.coordinates = int(model.nv)
+        self.of_bodies, self.of_rotors = float(self.values.sum()), rotor_shares(model, self.q)
+        self.total = self.of_bodies + self.of_rotors
+
+    def plot(self, ax: Any = None, **options: Any) -> Any:
+        """The stick figure with its bodies coloured, and the colour bar; returns the axes. Options as of `Multibody.plot`."""
+        figure = StickFigure(self.model, self.q, ax, **{"legend": False, **options})
+        figure.paint(self.values, LABEL)
+        figure.ax.set_title(f"{self.model.name}: {self.said}", fontsize="medium")
+        return figure.ax
+
+    @property
+    def said(self) -> str:
+        """What the sum is."""
+        parts = f"bodies {self.of_bodies:.6g} and rotors {self.of_rotors:.6g}, " if self.of_rotors else ""
+        return f"{parts}together {self.total:.6g} of N = {self.coordinates}"
+
+    def _largest(self) -> list[tuple[str, float]]:
+        return sorted(self.by_body.items(), key=lambda item: -item[1])[:_SHOWN]
+
+    def __repr__(self) -> str:
+        rows = list(self.by_body.items()) if len(self.by_body) <= _SHOWN else self._largest()
+        width = max((len(name) for name, _ in rows), default=0)
+        high = max((x for _, x in rows), default=0.0) or 1.0
+        lines = [f"  {name:<{width}}  {x:7.4f}  {'█' * round(24 * x / high)}".rstrip() for name, x in rows]
+        more = len(self.by_body) - len(rows)
+        lines += [f"  and {more} more, with less each"] if more else []
+        return "\n".join([f"shares of the degrees of freedom of {self.model.name!r}, tr Υ(k)M(k)", *lines, f"  {self.said}"])
+
+    def _repr_html_(self) -> str:
+        layout = model_layout(self.model, self.q, WIDTH, HEIGHT - 50, 4 * RADIUS, RADIUS)
+        high = max(self.by_body.values(), default=0.0) or 1.0
+        colours = [shade(x, 0, high) for x in self.values]
+        parts = [
+            f"<line x1='{a[0]:.1f}' y1='{a[1]:.1f}' x2='{b[0]:.1f}' y2='{b[1]:.1f}' stroke='{colours[k] if k >= 0 else 'currentColor'}'"
+            f" stroke-width='{5 if k >= 0 else 1.5}' stroke-linecap='round'/>"
+            for (a, b), k in zip(layout.bones, layout.owners, strict=True)
+        ]
+        x, y = layout.base
+        parts.append(f"<rect x='{x - 6:.1f}' y='{y - 6:.1f}' width='12' height='12' fill='currentColor'><title>base</title></rect>")
+        parts += [
+            f"<circle cx='{x:.1f}' cy='{y:.1f}' r='{RADIUS:g}' fill='{colour}' stroke='currentColor'>"
+            f"<title>{escape(name)}: {value:.4g}</title></circle>"
+            for (x, y), colour, (name, value) in zip(layout.bodies, colours, self.by_body.items(), strict=True)
+        ]
+        bar = colour_bar(4 * RADIUS, HEIGHT - 28, 220, 0.0, high, LABEL)
+        style = f"max-width:{WIDTH:g}px;width:100%;height:auto;color:inherit;font:12px system-ui,sans-serif"
+        svg = (
+            f"<svg viewBox='0 0 {WIDTH:g} {HEIGHT:g}' style='{style}' fill='currentColor' role='img' "
+            f"aria-label='shares of the bodies'>{''.join(parts)}{bar}</svg>"
+        )
+        return f"<div><div>{escape(self.model.name)}: {escape(self.said)}</div>{svg}</div>"
+
+
+def share_values(model: Any, q: np.ndarray) -> np.ndarray:
+    """tr(Υ(k)M(k)) of every body, (n,). O(N). SingularHingeError where a D(k) is singular."""
+    n = len(model.bodies)
+    if not n or not model.nv:
+        return np.zeros(n)
+    soa = model.soa
+    blocks = (soa.Upsilon @ soa.M).at(q) @ np.tile(np.eye(6), (n, 1))
+    return np.trace(blocks.reshape(n, 6, 6), axis1=1, axis2=2)
+
+
+def rotor_shares(model: Any, q: np.ndarray) -> float:
+    """Σ tr(ℳ⁻¹(k,k) J(k)) of all rotors; zero of a model without. Some columns at once, O(N²)."""
+    if not model.nv:
+        return 0.0
+    soa = model.soa
+    if not model.has_rotor_inertia:
+        return 0.0
+    H, phi, M, J, I = soa("H phi M J I")
+    product = (H @ phi @ M @ phi.T @ H.T + J).inv() @ J
+    bound, total = product.at(q), 0.0
+    for first in range(0, model.nv, _COLUMNS):
+        columns = np.eye(model.nv, min(_COLUMNS, model.nv - first), -first)
+        total += float(np.sum(columns * (bound @ columns)))
+    return total
+
+
+def dof_shares(model: Any, q: Any = None) -> Shares:
+    """`Multibody.dof_shares`."""
+    return Shares(model, q)

@@ -1,0 +1,139 @@
+"""Shapes of bodies as triangles for a page: primitives of some dozens, meshes read from their files, thinned to what a page can draw."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from ..models.loaders.urdf import resolve_package
+from ..models.shapes import Shape
+
+ROUND = 16
+"""Sides of what is round."""
+MOST = 6000
+"""Triangles of a figure: a canvas draws and sorts them some dozens of times a second."""
+
+
+def solids(model: Any) -> tuple[list[dict[str, Any]], list[str]]:
+    """Vertices (n, 3) and faces (m, 3) of the model's shapes in the frames of their bodies, and why others are not shown.
+
+    Each is a dictionary: "of", the number of the body, -1 the base; "vertices", "faces", "colour". A shape on a body that was taken out
+    is not shown; one on a body that is lumped with another is where its node is.
+    """
+    shapes = model.shapes
+    if not shapes:
+        return [], []
+    described = model.description()
+    numbers = {body["name"]: k for k, body in enumerate(described["bodies"])} | {"": -1}
+    nodes = {node["name"]: node for node in described["nodes"]}
+    made: list[dict[str, Any]] = []
+    missing: dict[str, None] = {}
+    for shape in shapes:
+        placed = _placed(shape, numbers, nodes)
+        if placed is None:
+            continue
+        try:
+            vertices, faces = triangles(shape)
+        except _core.Error as error:
+            missing[str(error)] = None
+            continue
+        owner, X = placed
+        made.append({"of": owner, "vertices": vertices @ X[:3, :3].T + X[:3, 3], "faces": faces, "colour": shape.colour})
+    return _thinned(made), list(missing)
+
+
+def triangles(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and faces of one shape in its own frame, m. ModelError for a mesh that is not found or cannot be read."""
+    if shape.kind == "box":
+        corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * np.array(shape.size) / 2
+        sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+        return corners, np.array([half for a, b, c, d in sides for half in ((a, b, c), (a, c, d))])
+    if shape.kind == "cylinder":
+        radius, length = shape.size
+        return _turned([(0.0, -length / 2), (radius, -length / 2), (radius, length / 2), (0.0, length / 2)])
+    if shape.kind == "capsule":
+        radius, length = shape.size
+        arc = [(radius * np.cos(a), radius * np.sin(a) + length / 2) for a in np.linspace(0, np.pi / 2, ROUND // 4 + 1)]
+        return _turned([*((r, -z) for r, z in reversed(arc)), *arc])
+    if shape.kind in ("sphere", "ellipsoid"):
+        arc = [(np.cos(a), np.sin(a)) for a in np.linspace(-np.pi / 2, np.pi / 2, ROUND // 2 + 1)]
+        vertices, faces = _turned(arc)
+        return vertices * np.array(shape.size), faces
+    vertices, faces = shape.triangles if shape.triangles is not None else _read(shape)
+    return vertices * np.array(shape.size), faces
+
+
+def _turned(profile: list[tuple[float, float]]) -> tuple[np.ndarray, np.ndarray]:
+    """What a line of (radius, z) sweeps about z; outsides are on the right of the line."""
+    angles = 2 * np.pi * np.arange(ROUND) / ROUND
+    vertices = np.array([(r * np.cos(a), r * np.sin(a), z) for r, z in profile for a in angles])
+    thin = 1e-9 * max(r for r, _ in profile)  # a ring of one point
+    faces = []
+    for i in range(len(profile) - 1):
+        first, second = (int(r > thin) for r, _ in profile[i : i + 2])
+        for j in range(ROUND):
+            a, b = ROUND * i + j, ROUND * i + (j + 1) % ROUND
+            faces += [(a, b, b + ROUND)] * first + [(a, b + ROUND, a + ROUND)] * second
+    return vertices, np.array(faces)
+
+
+def _read(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
+    """A mesh from its file, by trimesh: STL, OBJ, PLY, OFF, glTF."""
+    path = resolve_package(shape.file, *shape.beside)
+    try:
+        import trimesh
+    except ImportError:
+        raise _core.ModelError(
+            "meshes are read by the package trimesh, which is not installed: pip install 'pycraft-soa[meshes]'"
+        ) from None
+    try:
+        mesh: Any = trimesh.load(path, force="mesh", process=False)
+        vertices, faces = np.asarray(mesh.vertices, float), np.asarray(mesh.faces, int)
+    except Exception as error:  # whatever a reader of foreign files says
+        raise _core.ModelError(f"{shape.file} is no mesh that trimesh reads: {str(error) or type(error).__name__}") from None
+    if not len(faces) or not np.isfinite(vertices).all():
+        raise _core.ModelError(f"{shape.file} is no mesh that can be drawn: it has no triangles, or places that are not finite")
+    return vertices, faces
+
+
+def _placed(shape: Shape, numbers: dict[str, int], nodes: dict[str, Any]) -> tuple[int, np.ndarray] | None:
+    """The body that a shape is on and its pose there; None where it is on nothing that is left."""
+    if shape.body in numbers:
+        return numbers[shape.body], shape.placement
+    if shape.body not in nodes:
+        return None
+    node, X = nodes[shape.body], np.eye(4)
+    X[:3, :3], X[:3, 3] = node["rotation"], node["position"]
+    return node["body"], X @ shape.placement
+
+
+def _thinned(made: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Together at most MOST triangles: meshes lose theirs, by their numbers, before others."""
+    total = sum(len(solid["faces"]) for solid in made)
+    if total <= MOST:
+        return made
+    return [_thin(solid, max(32, int(MOST * len(solid["faces"]) / total))) for solid in made]
+
+
+def _thin(solid: dict[str, Any], most: int) -> dict[str, Any]:
+    """Vertices that share a cell of a grid become one, of coarser and coarser grids, until there are few enough triangles.
+
+    [J. Rossignac and P. Borrel, "Multi-resolution 3D approximations for rendering complex scenes", 1993]
+    """
+    vertices, faces = solid["vertices"], solid["faces"]
+    low, span = vertices.min(axis=0), float(np.ptp(vertices, axis=0).max()) or 1.0
+    cells = 64
+    while len(faces) > most and cells >= 2:
+        grid = np.floor((solid["vertices"] - low) / span * cells).astype(int)
+        _, cell = np.unique(grid, axis=0, return_inverse=True)
+        cell = cell.reshape(-1)
+        counts = np.bincount(cell)
+        vertices = np.column_stack([np.bincount(cell, solid["vertices"][:, i]) / counts for i in range(3)])
+        faces = cell[solid["faces"]]
+        faces = faces[(faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])]
+        _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
+        faces = faces[np.sort(first)]
+        cells = int(cells / 1.3)
+    return solid | {"vertices": vertices, "faces": faces}

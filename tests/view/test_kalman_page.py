@@ -1,0 +1,125 @@
+"""The Kalman dictionary running: both sides take one recursion, and its numbers are the filter's, the smoother's and the mechanism's."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+import pycraft as pc
+from pycraft.view.kalman_page import WORDS
+from support.browser import differing, opened, pixels, until
+
+STEP = 0.5
+
+
+def track(steps=6):
+    return pc.kalman(
+        A=[[1, STEP], [0, 1]], B=[[STEP**2 / 2], [STEP]], C=[[1, 0]], Q=0.5, R=0.2, x0=[1, 0], P0=np.eye(2), steps=steps
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def page():
+    model = track()
+    y = model.sample(seed=1)[1]
+    y[3] = np.nan
+    return model.play(y)
+
+
+def by_letter(steps, letter, count):
+    """Values of a quantity, from the base to the tip."""
+    found = {step.body: step.value for step in steps if step.letter == letter}
+    return [found[k] for k in range(count)]
+
+
+def test_the_recursion_is_the_filters(page):
+    f, s, y = page.track.filter(page.measurements), page.track.smooth(page.measurements), page.measurements
+    P, P_plus, D, G, z, innovation, adjoint = (
+        by_letter(page.filter_steps, letter, 6)[::-1] for letter in ("P", "P⁺", "D", "G", "z", "ε", "α")
+    )
+    mean = np.array([1.0, 0.0])  # of a track that begins at rest: it stays
+    size = dict(rtol=0, atol=1e-13 * 10)  # some sums of numbers below ten
+    np.testing.assert_allclose(P, f.predicted_covariance, **size)
+    np.testing.assert_allclose(P_plus, f.filtered_covariance, **size)
+    np.testing.assert_allclose(np.array(z)[..., 0] + mean, f.predicted, **size)
+    np.testing.assert_allclose(np.array(z)[..., 0] + mean + np.einsum("tij,tj->ti", P, np.array(adjoint)[..., 0]), s.states, **size)
+    for t in (0, 1, 2, 4, 5):
+        np.testing.assert_allclose(innovation[t][0, 0], y[t, 0] - f.predicted[t, 0], **size)
+        np.testing.assert_allclose(D[t], f.innovation_covariance[t], **size)
+        np.testing.assert_allclose(G[t], f.gain[t], **size)
+    assert innovation[3].size == 0 and D[3].size == 0  # nothing was measured
+
+
+def test_the_recursion_is_the_chains(page):
+    model, n = page.model, 6
+    P = model.soa.P.dense()
+    for k, block in enumerate(by_letter(page.mechanics_steps, "P", n)):
+        np.testing.assert_allclose(block, P[6 * k : 6 * k + 6, 6 * k : 6 * k + 6], rtol=0, atol=1e-12 * np.abs(P).max())
+    y = np.ravel(by_letter(page.mechanics_steps, "y", n))
+    at_rest = np.linalg.solve(model.mass_matrix(), np.ones(n))  # ℳ of mass_matrix has J in it
+    np.testing.assert_allclose(y, at_rest, rtol=1e-13 * np.linalg.cond(model.mass_matrix()))
+
+
+def test_steps_go_side_by_side(page):
+    assert len(page.filter_steps) == len(page.mechanics_steps) == 11 * 6 and len(page.lines) == 13
+    for a, b in zip(page.filter_steps, page.mechanics_steps, strict=True):
+        assert (a.line, a.body, a.letter, a.direction) == (b.line, b.body, b.letter, b.direction)
+    assert {step.letter for step in page.filter_steps} == set(WORDS)
+
+
+def test_the_page_counts_time_from_the_tip(page):
+    data = json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', page.html, re.S).group(1))
+    assert [step[1:4] for step in data["steps"][:9:8]] == [[0, 5, "P"], [1, 4, "P"]] and data["steps"][-1][1:4] == [0, 5, "α"]
+    assert data["measured"][1] == pytest.approx(page.measurements[1, 0], rel=1e-5) and len(data["words"]) == 11
+
+
+def test_other_chains_and_forces():
+    model = pc.tree([-1, 0, 1], ["pin", "slider", "pin"], seed=4)  # no rotors: J is zero
+    page = track(3).play([1.0, 2.0, 3.0], model, [1.0, 0.0, 0.0])
+    y = np.ravel(by_letter(page.mechanics_steps, "y", 3))
+    np.testing.assert_allclose(y, np.linalg.solve(model.mass_matrix(), [1.0, 0, 0]), rtol=1e-10)
+    one = track(1).play([1.0])
+    assert (
+        repr(one) == "<filter beside 'tree of 1': 11 steps of 1 times and bodies>" and "NaN" not in one.html.split('id="data">')[1][:2000]
+    )
+    pair = pc.kalman(A=np.eye(2), B=None, C=np.eye(2), Q=np.eye(2), R=np.eye(2), P0=np.eye(2), measurements=np.ones((4, 2))).play()
+    assert pair.filter_steps[1].value.shape == (2, 2)
+
+
+def test_refusals():
+    with pytest.raises(pc.EvaluationError, match="61 time steps: 60 at most"):
+        track(61).play(np.ones(61))
+    with pytest.raises(pc.ModelError, match="no measurements"):
+        track().play()
+    with pytest.raises(pc.ModelError, match="no serial chain of 6 bodies"):
+        track().play(np.ones(6), pc.chain(5))
+    with pytest.raises(pc.ModelError, match="no serial chain of 6 bodies"):
+        track().play(np.ones(6), pc.tree([-1, 0, 0, 1, 1, 2], ["pin"] * 6))
+    with pytest.raises(pc.ModelError, match="a Multibody, not 'arm'"):
+        track().play(np.ones(6), "arm")
+    with pytest.raises(pc.ModelError, match=r"one number a coordinate.*\(6,\)"):
+        track().play(np.ones(6), tau=[1.0])
+    with pytest.raises(pc.SingularHingeError, match="step 1"):
+        pc.kalman(1.0, 1.0, 1.0, 0.0, 0.0, P0=1.0, measurements=[1.0, 2.0]).play()
+
+
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+def test_it_plays_in_a_browser(browser, page, dark, tmp_path):
+    address = page.save(tmp_path / "kalman.html").as_uri()
+    data = json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', page.html, re.S).group(1))
+    assert data["measured"][3] is None and data["deviation"][3] is None and None not in data["smoothed"]
+    with opened(browser, address, size=(1200, 760), dark=dark) as shown:
+        assert shown.inner_text("#now") == "66 of 66" and shown.inner_text("#at_time") == "at t = 0"
+        whole, chain = pixels(shown, "#track"), pixels(shown)
+        shown.fill("#time", "1")  # D of the first time step, at the tip
+        assert shown.inner_text("#rows .lit").startswith("D(k) = H(k) P(k) H*(k) + J(k)") and shown.inner_text("#at_body") == "at body5"
+        assert float(shown.inner_text("#rows .lit td >> nth=2").strip("= ")) == pytest.approx(1.2, rel=1e-3)  # P0 + R
+        assert differing(whole, pixels(shown, "#track")) > 200 and differing(chain, pixels(shown)) > 100
+        shown.click("#next")
+        assert shown.inner_text("#rows .lit").startswith("G(k)")
+        shown.select_option("#pace", "20")
+        shown.click("#play")
+        until(shown, "now > 6")
+        shown.click("#play")
+        assert shown.evaluate("timer") is None and shown.asked == [address]
