@@ -134,8 +134,8 @@ def test_paragraphs_after_a_list_of_parameters_are_notes():
     assert docstrings.with_notes(raised) == [*raised[:8], "Notes", "-----", raised[8]]
 
 
-def test_the_gallery_has_twenty_short_examples(pages):
-    assert len(gallery.SCRIPTS) == 20
+def test_the_gallery_has_short_examples(pages):
+    assert len(gallery.SCRIPTS) >= 20
     for script in gallery.SCRIPTS:
         written = script.read_text()
         assert len(written.splitlines()) < 30 and max(map(len, written.splitlines())) <= 140, script.name
