@@ -134,7 +134,7 @@ def test_paragraphs_after_a_list_of_parameters_are_notes():
     assert docstrings.with_notes(raised) == [*raised[:8], "Notes", "-----", raised[8]]
 
 
-def test_the_gallery_has_short_examples(pages):
+def test_the_gallery_has_twenty_short_examples_or_more(pages):
     assert len(gallery.SCRIPTS) >= 20
     for script in gallery.SCRIPTS:
         written = script.read_text()
