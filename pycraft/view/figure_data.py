@@ -9,7 +9,6 @@ import numpy as np
 
 from .colour_scale import ramp
 from .skeleton import Skeleton, placed
-from .solids import solids
 from .stick_figure import HINGES
 
 _FLAT_AXES = {1: (0, 2), 2: (0, 1), 0: (1, 2)}
@@ -40,7 +39,7 @@ def figure_data(skeleton: Skeleton, q: np.ndarray) -> dict[str, Any]:
     flat = skeleton.normals()
     right, up = _FLAT_AXES[next(n for n in _FLAT_AXES if n in flat)] if flat else _upright(skeleton.model)
     colours = [None if kind == "custom" else HINGES[kind][1] for kind in skeleton.kinds]
-    shapes, missing = solids(skeleton.model)
+    shapes, missing = skeleton.solids
     data: dict[str, Any] = {
         "name": skeleton.model.name, "bodies": skeleton.bodies, "parents": [body["parent"] for body in described],
         "hinges": skeleton.names, "kinds": skeleton.kinds, "colours": colours, "flat": bool(flat), "grounded": skeleton.is_grounded(),

@@ -13,11 +13,13 @@ principal axes of S, of such lengths.
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from .. import _core
+from .solids import solids
 
 BASE = -1
 """In place of a body's number."""
@@ -116,6 +118,11 @@ class Skeleton:
         for k, body in enumerate(self.bodies):
             poses[..., k, :, :] = self.model.pose(body, q)
         return poses
+
+    @cached_property
+    def solids(self) -> tuple[list[dict[str, Any]], list[str]]:
+        """Triangles of the model's shapes, and why others are not shown: see `solids`."""
+        return solids(self.model)
 
     def is_grounded(self) -> bool:
         """Whether the base is shown at its origin: unless that lies far off what it carries."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +15,7 @@ from ..models.shapes import Shape
 ROUND = 16
 """Sides of what is round."""
 MOST = 6000
-"""Triangles of a figure: a canvas draws and sorts them some dozens of times a second."""
+"""Triangles of a figure: a canvas without a graphics card draws and sorts so many some twenty times a second."""
 
 
 def solids(model: Any) -> tuple[list[dict[str, Any]], list[str]]:
@@ -82,6 +84,12 @@ def _turned(profile: list[tuple[float, float]]) -> tuple[np.ndarray, np.ndarray]
 def _read(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
     """A mesh from its file, by trimesh: STL, OBJ, PLY, OFF, glTF."""
     path = resolve_package(shape.file, *shape.beside)
+    return _mesh(path, path.stat().st_mtime_ns, shape.file)
+
+
+@lru_cache(maxsize=64)
+def _mesh(path: Path, changed: int, called: str) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and faces of a file as it was at a time: pages of one model ask for the same meshes again."""
     try:
         import trimesh
     except ImportError:
@@ -92,9 +100,9 @@ def _read(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
         mesh: Any = trimesh.load(path, force="mesh", process=False)
         vertices, faces = np.asarray(mesh.vertices, float), np.asarray(mesh.faces, int)
     except Exception as error:  # whatever a reader of foreign files says
-        raise _core.ModelError(f"{shape.file} is no mesh that trimesh reads: {str(error) or type(error).__name__}") from None
+        raise _core.ModelError(f"{called} is no mesh that trimesh reads: {str(error) or type(error).__name__}") from None
     if not len(faces) or not np.isfinite(vertices).all():
-        raise _core.ModelError(f"{shape.file} is no mesh that can be drawn: it has no triangles, or places that are not finite")
+        raise _core.ModelError(f"{called} is no mesh that can be drawn: it has no triangles, or places that are not finite")
     return vertices, faces
 
 

@@ -1,5 +1,6 @@
 """The Kalman dictionary running: both sides take one recursion, and its numbers are the filter's, the smoother's and the mechanism's."""
 
+import html
 import json
 import re
 
@@ -72,6 +73,8 @@ def test_the_page_counts_time_from_the_tip(page):
     data = json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', page.html, re.S).group(1))
     assert [step[1:4] for step in data["steps"][:9:8]] == [[0, 5, "P"], [1, 4, "P"]] and data["steps"][-1][1:4] == [0, 5, "α"]
     assert data["measured"][1] == pytest.approx(page.measurements[1, 0], rel=1e-5) and len(data["words"]) == 11
+    shown = page._repr_html_()  # a frame that holds the page as an attribute: in a notebook it needs no file and no server
+    assert shown.count("<") == 2 and html.unescape(shown.split('srcdoc="')[1].split('" style')[0]) == page.html
 
 
 def test_other_chains_and_forces():

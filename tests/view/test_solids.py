@@ -2,6 +2,7 @@
 
 import copy
 import json
+import os
 import pickle
 import re
 
@@ -151,6 +152,20 @@ def test_what_is_wrong_is_said_and_the_rest_is_shown(path, model):
     assert len(made) == 4 and len(missing) == 1 and "package://parts/ball.obj is no mesh" in missing[0]
     (path.parents[1] / "parts" / "ball.obj").unlink()
     assert "is not found in" in solids(model)[1][0] and "package_dirs" in solids(model)[1][0]
+
+
+def test_meshes_are_read_once_and_again_when_they_changed(path, model, monkeypatch):
+    trimesh = pytest.importorskip("trimesh")
+    read, load = [], trimesh.load
+    monkeypatch.setattr(trimesh, "load", lambda *given, **options: read.append(given) or load(*given, **options))
+    first = solids(model)[0][3]["vertices"]
+    for _ in range(2):
+        figure_data(Skeleton(model), model.zero_q())
+    assert len(read) == 1
+    ball = path.parents[1] / "parts" / "ball.obj"
+    ball.write_text(BALL.replace("v 0 0 1", "v 0 0 2"))
+    os.utime(ball, ns=(0, ball.stat().st_mtime_ns + 1))
+    assert solids(model)[0][3]["vertices"][:, 2].max() == pytest.approx(0.85) != first[:, 2].max() and len(read) == 2
 
 
 def test_without_the_package_that_reads_meshes(model, monkeypatch):
