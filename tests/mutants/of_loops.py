@@ -21,7 +21,7 @@ CHANGES = {
             "maximum(sizes_[row], S((rows_.product_size(row, x_.data()) + bias_[row]) / unit_[row]))",
             "S((rows_.product_size(row, x_.data()) + bias_[row]) / unit_[row])",
         ),
-        ("what implicit steps add is not in the residual", "generalized_[j] += added_[j] * x[j]", "static_cast<void>(x)"),
+        ("what implicit steps add is not in the residual", "generalized_[j] += added_[j] * x[j];", "static_cast<void>(x);", STATEMENT),
     ],
     "cpp/dynamics/constrained_dynamics.h": [
         ("in quad the rounding of states is a direction", "S(64 * epsilon<double>())", "S(0)"),
@@ -83,7 +83,12 @@ CHANGES = {
             "bias_[r] += abs(asked.driven[r]);",
             STATEMENT,
         ),
-        ("what implicit steps add is not felt by embedded loops", "generalized_[j] += added_[j] * x[j]", "static_cast<void>(x)"),
+        (
+            "what implicit steps add is not felt by embedded loops",
+            "generalized_[j] += added_[j] * x[j];",
+            "static_cast<void>(x);",
+            STATEMENT,
+        ),
         ("what implicit steps add is not in J of embedded loops", "blocks_.J[j] += added_[j];", ";", STATEMENT),
         ("rows that embedding leaves out may conflict", "if (left <= certified() * most) continue;", "continue;", STATEMENT),
         ("dependent velocities forget what drives them", "(rates ? rates[row] : S(0))", "S(0)"),
