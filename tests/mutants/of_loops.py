@@ -107,8 +107,8 @@ CHANGES = {
         ("springs of loops push one body alone", "push(of_.a[l].body, a_[l], S(-1) * force_to_parent(motion_.X, F), out);", ";", STATEMENT),
         (
             "prescribed coordinates give way to springs",
-            "asks_nothing * e.size && !terms.is_prescribed(e.coordinate)",
-            "asks_nothing * e.size",
+            "std::abs(e.value) > asks_nothing * e.size && !terms.is_prescribed(e.coordinate)",
+            "std::abs(e.value) > asks_nothing * e.size",
         ),
         ("springs in radians are those in metres", "(turns ? 1 : 0)", "0"),
         ("a loop's last row has its spring", "most = std::max(most, C);", "most = C;", STATEMENT),
