@@ -1290,6 +1290,10 @@ class SceneCalls:
         ...
     def along(self, t: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], own: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> dict:
         ...
+    def close(self, q: typing.Any, v: typing.Any, t: typing.SupportsFloat | typing.SupportsIndex) -> tuple:
+        """
+        q and v on the loops that are kept, v by an impulse of the loops.
+        """
     def evaluate(self, q: typing.Any, v: typing.Any, t: typing.SupportsFloat | typing.SupportsIndex, own: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], step: typing.SupportsFloat | typing.SupportsIndex) -> dict:
         ...
     def plan(self, list: str) -> list:

@@ -37,6 +37,24 @@ std::vector<S> own_states(CompiledScene<S>& scene, const std::vector<double>& gi
   return wide<S>(own.data(), own.size());
 }
 
+py::tuple close(SceneCalls& calls, const Array& q, const Array& v, double t) {
+  const Multibody& mb = calls.scene().model();
+  mb.check_q(q.data(), q.size()), mb.check_v(v.data(), v.size(), "v");
+  std::vector<double> on_q(q.size()), on_v(v.size());
+  {
+    const Undisturbed undisturbed(mb);
+    calls.with([&]<class S>(CompiledScene<S>& scene) {
+      std::vector<S> wq = wide<S>(q.data(), q.size()), wv = wide<S>(v.data(), v.size());
+      scene.effects().prescribe(S(t), wq.data(), wv.data(), nullptr);
+      scene.loops()->close(S(t), wq.data(), wv.data());
+      scene.loops()->check_start(wq.data(), wv.data());
+      narrow(wq.data(), wq.size(), on_q.data()), narrow(wv.data(), wv.size(), on_v.data());
+    });
+    require_finite(on_q.data(), on_q.size(), mb), require_finite(on_v.data(), on_v.size(), mb);
+  }
+  return py::make_tuple(to_numpy(on_q), to_numpy(on_v));
+}
+
 py::dict evaluate(SceneCalls& calls, const Array& q, const py::object& v, double t, const std::vector<double>& own, double step) {
   const Multibody& mb = calls.scene().model();
   const int nv = mb.nv();
@@ -139,6 +157,8 @@ void register_scenes(py::module_& m) {
       .def("evaluate", [](SceneCalls& c, const py::object& q, const py::object& v, double t, const std::vector<double>& own, double step) {
         return evaluate(c, numbers(q, "q"), v, t, own, step);
       }, py::arg("q"), py::arg("v"), py::arg("t"), py::arg("own"), py::arg("step"))
+      .def("close", [](SceneCalls& c, const py::object& q, const py::object& v, double t) { return close(c, numbers(q, "q"), numbers(v, "v"), t); }, py::arg("q"), py::arg("v"), py::arg("t"),
+           "q and v on the loops that are kept, v by an impulse of the loops.")
       .def("along", [](SceneCalls& c, const Array& t, const Array& q, const Array& v, const Array& own) { return along(c, t, q, v, own); }, py::arg("t"), py::arg("q"), py::arg("v"), py::arg("own"))
       .def_property_readonly("workers", [](SceneCalls& c) {
         std::vector<int> workers;

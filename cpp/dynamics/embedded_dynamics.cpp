@@ -54,17 +54,17 @@ void EmbeddedWorkspace<S>::choose_of(size_t node, bool given) {
   const EmbeddedNode& at = nodes_[node];
   Choice& to = choices_[node];
   const size_t m = at.rows.size(), n = at.coordinates.size();
-  std::vector<S> A(m * n, S(0));
+  std::vector<S> A(m * n, S(0)), sizes(m, S(0));
   for (size_t i = 0; i < m; ++i) {
     for (const auto& e : rows_.entries[at.rows[i]]) dense_[e.coordinate] = e.value / weights_[e.coordinate];
-    S size = S(0);
+    S& size = sizes[i];
     for (size_t j = 0; j < n; ++j) size = maximum(size, S(abs(dense_[at.coordinates[j]])));
     for (size_t j = 0; j < n; ++j) A[i * n + j] = size > S(0) ? S(dense_[at.coordinates[j]] / size) : S(0);
     for (const auto& e : rows_.entries[at.rows[i]]) dense_[e.coordinate] = S(0);
   }
   std::vector<char> row_taken(m, 0), dependent(n, 0), kept(n, 0);
   for (size_t j = 0; given && j < n; ++j) kept[j] = wanted_[at.coordinates[j]];
-  to.rows.clear(), to.dependent.clear(), to.independent.clear();
+  to.rows.clear(), to.sizes.clear(), to.dependent.clear(), to.independent.clear();
   for (size_t rank = 0; rank < std::min(m, n); ++rank) {
     check_interrupt_at(static_cast<int>(rank), static_cast<int>(n));
     size_t row = m, column = n;
@@ -74,7 +74,7 @@ void EmbeddedWorkspace<S>::choose_of(size_t node, bool given) {
         if (!dependent[j] && !kept[j] && abs(A[i * n + j]) > best) best = abs(A[i * n + j]), row = i, column = j;
     if (row == m) break;
     row_taken[row] = dependent[column] = 1;
-    to.rows.push_back(at.rows[row]), to.dependent.push_back(static_cast<int>(column));
+    to.rows.push_back(at.rows[row]), to.sizes.push_back(sizes[row]), to.dependent.push_back(static_cast<int>(column));
     for (size_t i = 0; i < m; ++i) {
       const S factor = A[i * n + column] / A[row * n + column];
       for (size_t j = 0; !row_taken[i] && j < n; ++j) A[i * n + j] -= factor * A[row * n + j];
@@ -87,7 +87,7 @@ void EmbeddedWorkspace<S>::choose_of(size_t node, bool given) {
     if (!dependent[j]) to.independent.push_back(static_cast<int>(j));
   }
   const size_t d = to.rows.size(), r = to.independent.size();
-  to.Q_d.resize(d * d), to.transposed.resize(d * d), to.Q_r.resize(d * (r + 1)), to.work.resize(d * (r + 1));
+  to.Q_d.resize(d * d), to.Q_r.resize(d * (r + 1)), to.work.resize(d * (r + 1));
   embedded_.factors[node].resize(static_cast<int>(n), static_cast<int>(r));
   for (size_t a = 0; a < r; ++a) embedded_.factors[node].X[size_t(to.independent[a]) * r + a] = S(1);
 }
@@ -153,7 +153,7 @@ void EmbeddedWorkspace<S>::find_maps() {
       for (size_t j = 0; j < r; ++j) of.Q_r[i * r + j] = dense_[nodes_[n].coordinates[of.independent[j]]];
       for (const auto& e : rows_.entries[of.rows[i]]) dense_[e.coordinate] = S(0);
     }
-    if (!of.lu.factor(of.Q_d.data(), static_cast<int>(d), nullptr)) {
+    if (!of.lu.factor(of.Q_d.data(), static_cast<int>(d), of.sizes.data())) {
       std::string named;
       for (const int row : of.rows) named += (named.empty() ? "'" : ", '") + loops_->names[row] + "'";
       throw EvaluationError("loops of '" + source_.name() + "' are singular at this state, by rows " + named + ": no coordinates describe what is free (method 'augment' goes through)");
@@ -332,7 +332,7 @@ void EmbeddedWorkspace<S>::certify(const Asked& asked, const S& size) {
     throw EvaluationError("no sure accelerations of '" + source_.name() + "' on its loops: its equations of motion are left off (take refine='auto', or a wider precision)");
 }
 
-// Q_d* λ = (forces - T)_d, by the transpose of Q_d; of rows that hang on others zero.
+// Q_d* λ = (forces - T)_d, by the factors of Q_d; of rows that hang on others zero.
 template <class S>
 void EmbeddedWorkspace<S>::find_multipliers(const Asked& asked) {
   for (size_t n = 0; n < nodes_.size(); ++n) {
@@ -340,14 +340,10 @@ void EmbeddedWorkspace<S>::find_multipliers(const Asked& asked) {
     const size_t d = of.rows.size();
     if (d == 0) continue;
     for (size_t i = 0; i < d; ++i) {
-      for (const auto& e : rows_.entries[of.rows[i]]) dense_[e.coordinate] = e.value;
-      for (size_t j = 0; j < d; ++j) of.transposed[j * d + i] = dense_[nodes_[n].coordinates[of.dependent[j]]];
-      for (const auto& e : rows_.entries[of.rows[i]]) dense_[e.coordinate] = S(0);
       const int coordinate = nodes_[n].coordinates[of.dependent[i]];
       of.Q_r[i] = generalized_[coordinate] - asked.tau[coordinate];
     }
-    if (!of.of_transposed.factor(of.transposed.data(), static_cast<int>(d), nullptr)) continue;  // Q_d has factors: so has this
-    of.of_transposed.solve(of.Q_r.data(), 1, of.work.data());
+    of.lu.solve_transposed(of.Q_r.data());
     for (size_t i = 0; i < d; ++i) lambda_[of.rows[i]] = of.Q_r[i];
   }
 }

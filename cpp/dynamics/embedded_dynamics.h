@@ -19,7 +19,7 @@
 #include <vector>
 
 #include "dynamics/constrained_dynamics.h"
-#include "numerics/small_lu.h"
+#include "numerics/row_pivots.h"
 #include "recursions/embedded_nodes.h"
 
 namespace pycraft {
@@ -56,8 +56,8 @@ class EmbeddedWorkspace {
   // Of a node with loops: which of its rows, which of its coordinates by place, and Q_d in factors.
   struct Choice {
     std::vector<int> rows, dependent, independent;
-    std::vector<S> Q_d, Q_r, work, transposed;
-    SmallLU<S> lu, of_transposed;
+    std::vector<S> sizes, Q_d, Q_r, work;  // sizes: of rows, in units of energy
+    RowPivotLU<S> lu;
   };
   void set_loops(const std::shared_ptr<const ResolvedLoops>& loops);
   void place(const S* q);

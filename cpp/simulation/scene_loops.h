@@ -91,6 +91,12 @@ class SceneLoops {
         workspace_.take_onto(loops_, q, v, rates_.data(), how_.form);
     });
   }
+  // Loops that close on a state: positions within what steps reach, velocities any, taken onto them by the loops' impulse, which takes the least
+  // kinetic energy there is to take. By the tree's factors, whatever the method.
+  void close(const S& t, S* q, S* v) {
+    set_rates(v);
+    telling_time(t, [&] { workspace_.take_onto(loops_, q, v, rates_.data(), how_.form); });
+  }
   // A state of a step, taken there as far as that is sure: accelerations there are a smooth function of the states about the loops. Off them they are
   // none near singular states, where what a state is off by is divided by the square of the way to those.
   void bring(S* q, S* v) {

@@ -216,9 +216,7 @@ class _Comparison:
             form, refine, residual, _ = plain._how
             runs = {}
             for method in ("augment", "embed"):
-                other, own = self.by(method, _as(plain, (form, refine, residual, precision)))
-                for name in own:
-                    other._entries[name] = (replace(other._entries[name][0], alpha=0.0, beta=0.0), True)
+                other, _ = self.by(method, _as(plain, (form, refine, residual, precision)))
                 try:
                     runs[method] = self._tight(other, 1.0)
                     runs.setdefault("looser", self._tight(other, 100.0))

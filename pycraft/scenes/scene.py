@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeGuard
+from typing import Any
 
 import numpy as np
 
@@ -13,12 +13,13 @@ from ..arguments import chosen, moment, one_number, text
 from ..closed import Closed
 from ..models.grafting import Grafting
 from ..state import at_state, moment_of
-from .effects import Effect, Loop, UserEffect
+from .effects import Effect, UserEffect
 from .effects.meanings import Meanings, acted_on
 from .explain import plan_text
 from .filed import Filed
 from .measurements import Measurements
 from .run import Run
+from .scene_on_loops import OnLoops
 from .scene_statics import Statics
 from .simulation import RunOptions, resume, simulate
 from .viewed import Viewed
@@ -66,7 +67,7 @@ class Effects(Mapping[str, Effect]):
         return "{" + ", ".join(self._entries) + "}"
 
 
-class Scene(Measurements, Statics, Filed, Viewed, Closed):
+class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed):
     """A model and the effects that act on it. It starts empty: nothing acts that was not added, the model's own gravity neither.
 
     Parameters
@@ -227,20 +228,6 @@ class Scene(Measurements, Statics, Filed, Viewed, Closed):
             self._built = (now, _core.SceneCalls(self._fresh_core(), form, refine, residual, precision))
         return self._built[1]
 
-    def _kept_loops(self) -> list[str]:
-        """The loops that effects which are on keep, by name."""
-        return [name for effect, on in self._entries.values() if on and _keeps(effect) for name in effect.kept(self._model)]
-
-    def _keeps_loops(self) -> bool:
-        """Whether an effect that is on keeps loops."""
-        return any(on and _keeps(effect) for effect, on in self._entries.values())
-
-    def _loops_now(self) -> tuple[int, bytes]:
-        """What its loops count of their changes, and where springs hold them the present q: they are no part of the model's numbers."""
-        loops = [effect for effect, _ in self._entries.values() if isinstance(effect, Loop)]
-        held = any(not effect.keeps for effect in loops)
-        return self._model.loops._core.edits if loops else 0, np.asarray(self._model.q).tobytes() if held else b""
-
     # ------------------------------------------------------------------ states and runs
     def evaluate(self, q=None, v=None, t: float | None = None, *, states=None, step: float = 0.0) -> Evaluation:
         """Accelerations and forces at a state.
@@ -386,11 +373,6 @@ class Scene(Measurements, Statics, Filed, Viewed, Closed):
         return _again, (type(self), self._model, list((name, effect, on) for name, (effect, on) in self._entries.items()), self._how), {
             "_run_options": self._run_options
         }  # fmt: skip
-
-
-def _keeps(effect: Effect) -> TypeGuard[Loop]:
-    """Whether it keeps loops."""
-    return isinstance(effect, Loop) and effect.keeps
 
 
 def _again(kind: type[Scene], model: Any, entries: list[tuple[str, Effect, bool]], how: tuple[Any, ...]) -> Scene:

@@ -111,6 +111,16 @@ def test_ladder():
         assert near(model.constrained_dynamics(q, np.zeros(model.nv), method="embed", independent=independent).vdot, expected)
 
 
+def test_two_hundred_rows_of_one_node_are_factored_without_growth():
+    """A ladder of a hundred, 0.86 rad from the line: cond Q_d is 343, and pivots that are a tenth of the largest lost all digits of it."""
+    n, angle = 100, 0.8582751372901797
+    model = n_four_bar(n)
+    model.gravity = (0, -9.81, 0)
+    signs = np.array([1.0, -1.0] * n + [1.0])
+    expected = -9.81 * np.cos(angle) * ((n + 1) / 2 + n) / ((n + 1) / 3 + n) * signs
+    assert near(model.constrained_dynamics(angle * signs, signs, method="embed").vdot, expected)
+
+
 @pytest.mark.filterwarnings("ignore::pycraft.ModelWarning")
 def test_bodies_without_mass():
     """Of a four-bar whose crank alone has mass no tree has accelerations: embedded it is a pendulum, θ̈ = m g L/2 cos(q) / (m L²/3)."""

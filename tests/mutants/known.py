@@ -230,6 +230,8 @@ AREAS = {
     "cpp/algebra/trees/reordered_values.h": ["algebra/test_mixed_trees.py"],
     "cpp/algebra/trees/grouping.h": ["algebra/test_mixed_trees.py"],
     "cpp/operators/embedded_values.h": ["operators/test_embedded.py"],
+    "cpp/dynamics/embedded_dynamics.cpp": ["dynamics/test_embedded_dynamics.py", "scenes/test_kept_loops.py"],
+    "cpp/simulation/effects/loop_penalty.cpp": ["scenes/test_penalty_loops.py"],
     "pycraft/dynamics/embedded_motion.py": ["dynamics/test_embedded_motion.py"],
     "cpp/operators/grouped_values.h": ["algebra/test_mixed_trees.py"],
 }

@@ -50,6 +50,8 @@ def test_both_ways_and_pinocchio_give_the_same_accelerations(robot):
         assert augmented.rank == 10
         size = np.abs(augmented.vdot).max()
         assert np.abs(augmented.vdot - embedded_accelerations(robot, state.q, state.v, tau)).max() < 1e-9 * size
+        direct = robot.constrained_dynamics(state.q, state.v, tau, method="embed")
+        assert direct.rank == 10 and np.abs(augmented.vdot - direct.vdot).max() < 1e-9 * size
         assert np.abs(augmented.vdot - twin.constrained_accelerations(state, tau, 1e-5)).max() < 3e-5 * size
         Q, c = robot.loops.jacobian(state.q), robot.loops.bias(state.q, state.v)
         kept = [i for i, name in enumerate(robot.loops.rows) if name not in robot.mobility(state.q).redundant]

@@ -219,6 +219,13 @@ def test_files_and_sweeps_have_the_effect(tmp_path, method):
     assert repr(E.Loop("loop1", beta=2.0)) == "Loop(loops='loop1', beta=2.0)"
 
 
+@by_each_method
+def test_steps_that_leave_the_loops_are_refused(method):
+    """A third of a turn a step, by steps of one size: Newton's steps reach no loop that the state is surely on."""
+    with pytest.raises(pc.EvaluationError, match=r"a state has left its loops, off are rows of 'slider-crank': 'wrist: along .*, at t = "):
+        pc.mechanisms.slider_crank(20.0, method=method).simulate(3.0, integrator="rk4", step=0.05, progress=False)
+
+
 def test_both_methods_agree_at_a_state():
     """Every mechanism, moving, under forces that are drawn: θ̈ is one, whatever the way; of rows that are independent λ, too."""
     for name in MECHANISMS:

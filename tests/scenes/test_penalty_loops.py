@@ -72,6 +72,16 @@ def test_rotors_and_what_is_prescribed_are_in_it():
     assert -driven.evaluate([0.0, 0.1]).forces["loop"][1] / 0.1 == pytest.approx(900 * 2.0, rel=1e-13)
 
 
+def test_what_is_prescribed_is_held_where_masses_couple_it():
+    """A chain whose first hinge is driven: the row is felt by the second alone, M₁₁, and not by what the first would give way."""
+    model = pc.chain(2)
+    model.q = [0.3, 0.8]
+    model.add_coupling({"hinge0": 1.0, "hinge1": 1.0}, constant=-1.1, name="gear")
+    scene = pc.Scene(model).add(E.Prescribed("hinge0", 0.3), E.Loop(method="penalty", frequency=30.0, damping_ratio=0.0))
+    pull = -scene.evaluate([0.3, 0.9]).forces["loop"][1] / 0.1
+    assert pull == pytest.approx(900 * model.mass_matrix(model.q)[1, 1], rel=1e-12)
+
+
 def test_one_spring_a_loop_and_unit():
     """No direction is stiffer than another; the one that is felt least swings at ω; a row that never asks has none."""
     model = closed_four_bar()

@@ -13,6 +13,7 @@ def catalogue(sizes: Iterable[int] = SIZES) -> list[Case]:
     """Every case, the chains with these numbers of links; other cases larger than the largest are left out."""
     from . import (
         cases_chains,
+        cases_closures,
         cases_configurations,
         cases_elimination,
         cases_groups,
@@ -38,6 +39,7 @@ def catalogue(sizes: Iterable[int] = SIZES) -> list[Case]:
         cases_groups,
         cases_task_space,
         cases_loops,
+        cases_closures,
         cases_motion,
         cases_trajectories,
     )
