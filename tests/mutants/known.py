@@ -229,7 +229,10 @@ AREAS = {
     "cpp/algebra/trees/mixed_blocks.h": ["algebra/test_mixed_trees.py"],
     "cpp/algebra/trees/reordered_values.h": ["algebra/test_mixed_trees.py"],
     "cpp/algebra/trees/grouping.h": ["algebra/test_mixed_trees.py"],
-    "cpp/operators/embedded_values.h": ["operators/test_embedded.py"],
+    "cpp/operators/embedded_values.h": ["operators/test_embedded.py", "operators/test_loop_second_derivatives.py"],
+    "cpp/operators/independent_direction.cpp": ["operators/test_loop_second_derivatives.py"],
+    "cpp/recursions/custom_rows.cpp": ["models/test_custom_loops.py"],
+    "cpp/dynamics/embedded_dynamics.cpp": ["scenes/test_rows_of_rounding.py"],
     "pycraft/dynamics/embedded_motion.py": ["dynamics/test_embedded_motion.py"],
     "cpp/operators/grouped_values.h": ["algebra/test_mixed_trees.py"],
 }
