@@ -408,7 +408,7 @@ class Operator:
     def dot(self, vdot: typing.Any = None, *, frame: str = 'body') -> Operator:
         """
         The time derivative along the model's velocity v; what depends on v itself needs the accelerations: vdot, an array (nv,) or a
-        vector of Θ. EvaluationError without them.
+        vector of Θ, of embedded loops θ̈_r. EvaluationError without them.
         """
     def explain(self, request: str = 'apply') -> typing.Any:
         """
@@ -1201,7 +1201,7 @@ class LoopSet:
         """
     def add_coupling(self, name: str, coordinates: collections.abc.Sequence[tuple[str, typing.SupportsInt | typing.SupportsIndex, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]], constant: typing.Any, function: typing.Any) -> None:
         ...
-    def add_hinge(self, name: str, a: str, b: str, hinge: str, axes: collections.abc.Sequence[typing.Any], point: typing.Any, pitch: typing.Any, rotation: typing.Any, position: typing.Any) -> None:
+    def add_hinge(self, name: str, a: str, b: str, hinge: str, axes: collections.abc.Sequence[typing.Any], point: typing.Any, pitch: typing.Any, subhinges: typing.Any, rotation: typing.Any, position: typing.Any) -> None:
         ...
     def add_pair(self, name: str, a: str, b: str, kind: str, number: typing.Any, quadric: typing.Any) -> None:
         ...

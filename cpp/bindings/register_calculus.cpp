@@ -80,7 +80,9 @@ T diff_in_turn(const T& operand, const py::args& directions, const std::string& 
   for (const auto& item : directions) {
     const py::object direction = py::reinterpret_borrow<py::object>(item);
     if (py::isinstance<Parameter>(direction)) {
-      result = along(result, *parameter_direction(direction.cast<const Parameter&>()), frame == "world");
+      const auto& parameter = direction.cast<const Parameter&>();
+      const auto embedded = embedding_of(operands_of(operand));
+      result = along(result, embedded ? *parameter_on_loops(embedded, parameter) : *parameter_direction(parameter), frame == "world");
       continue;
     }
     if (!py::isinstance<py::str>(direction) && !py::isinstance<py::int_>(direction) && !py::hasattr(direction, "__index__"))
@@ -117,19 +119,21 @@ T time_derivative(const T& operand, const py::object& vdot, const std::string& f
   if (frame != "body" && frame != "world") throw EvaluationError("frame '" + frame + "': derivatives are taken in \"body\" or \"world\" axes");
   const auto model = model_of(operands_of(operand));
   if (!model) return nothing_of(operand);
+  const auto embedded = embedding_of(operands_of(operand));
   Expression accelerations;
   if (py::isinstance<Expression>(vdot)) {
     accelerations = vdot.cast<Expression>();
   } else if (!vdot.is_none()) {
     const Array a = numbers(vdot, "vdot");
-    if (a.ndim() != 1 || a.shape(0) != model->nv())
-      throw ModelError("vdot of '" + model->name() + "' takes " + std::to_string(model->nv()) + " numbers, or a vector of " + model->theta().description());
+    const SkoSource& own = embedded ? static_cast<const SkoSource&>(*embedded) : *model;
+    if (a.ndim() != 1 || a.shape(0) != own.theta().dimension())
+      throw ModelError("vdot of '" + own.name() + "' takes " + std::to_string(own.theta().dimension()) + " numbers, or a vector of " + own.theta().description());
     for (py::ssize_t i = 0; i < a.size(); ++i)
       if (!std::isfinite(a.data()[i]))
-        throw ModelError("vdot of '" + model->name() + "': coordinate '" + model->structure().coordinate_names[i] + "' is not a finite number");
-    accelerations = constant(std::vector<double>(a.data(), a.data() + a.size()), Space::euclidean(1), model->theta(), "θ̈");
+        throw ModelError("vdot of '" + own.name() + "': coordinate '" + own.structure().coordinate_names[i] + "' is not a finite number");
+    accelerations = constant(std::vector<double>(a.data(), a.data() + a.size()), Space::euclidean(1), own.theta(), "θ̈");
   }
-  return along(operand, *time_direction(model, accelerations), frame == "world");
+  return along(operand, *time_direction(model, accelerations, embedded), frame == "world");
 }
 
 }  // namespace
@@ -142,7 +146,7 @@ void register_calculus(py::module_& m) {
       "frame=\"world\": of the operator as resolved in world axes, given in body axes; spaces and shape are the operator's own.";
   const char* dot_text =
       "The time derivative along the model's velocity v; what depends on v itself needs the accelerations: vdot, an array (nv,) or a\n"
-      "vector of Θ. EvaluationError without them.";
+      "vector of Θ, of embedded loops θ̈_r. EvaluationError without them.";
   declared<py::class_<Expression>>(m, "Operator")
       .def("diff", &diff<Expression>, py::arg("frame") = "body", diff_text)
       .def("dot", &time_derivative<Expression>, py::arg("vdot") = py::none(), py::kw_only(), py::arg("frame") = "body", dot_text);

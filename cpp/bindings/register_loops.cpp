@@ -108,11 +108,11 @@ void register_loops(py::module_& m) {
   unpicklable(loops)
       .def(py::init<std::shared_ptr<Multibody>>())
       .def("add_hinge", [](Loops& l, const std::string& name, const std::string& a, const std::string& b, const std::string& hinge,
-                           const std::vector<py::object>& axes, const py::object& point, const py::object& pitch, const py::object& rotation,
-                           const py::object& position) {
+                           const std::vector<py::object>& axes, const py::object& point, const py::object& pitch, const py::object& subhinges,
+                           const py::object& rotation, const py::object& position) {
         const py::none none;
-        l.set->add_hinge(name, a, b, hinge_from(name, hinge, axes, point, pitch, none, rotation, position, none, none, none));
-      }, name, a, b, py::arg("hinge"), py::arg("axes"), py::arg("point"), py::arg("pitch"), py::arg("rotation"), py::arg("position"))
+        l.set->add_hinge(name, a, b, hinge_from(name, hinge, axes, point, pitch, subhinges, rotation, position, none, none, none));
+      }, name, a, b, py::arg("hinge"), py::arg("axes"), py::arg("point"), py::arg("pitch"), py::arg("subhinges"), py::arg("rotation"), py::arg("position"))
       .def("add_pair", [](Loops& l, const std::string& name, const std::string& a, const std::string& b, const std::string& kind, const py::object& number,
                           const py::object& quadric) {
         FramePair pair{a, b, kind_named(kind)};

@@ -5,6 +5,7 @@
 #include "bindings/bindings.h"
 #include "operators/alphabet.h"
 #include "operators/directions.h"
+#include "operators/embedded_operators.h"
 #include "operators/grouped_operators.h"
 #include "runtime/errors.h"
 
@@ -88,7 +89,7 @@ SymbolArguments arguments_from_data(const py::tuple& data) {
 py::tuple space_parts(const Space& s) {
   if (s.kind() == SpaceKind::Euclidean) return py::make_tuple(py::none(), static_cast<int>(s.kind()), s.dimension(), py::list());
   auto source = source_owning(s);
-  if (s.layout().bodies != s.layout().owner) {  // coordinates and nodes of grouped bodies are the robot's, cut into groups
+  if (s.layout().bodies != s.layout().owner && !std::dynamic_pointer_cast<EmbeddedOperators>(source)) {  // coordinates and nodes of grouped bodies are the robot's, cut into groups
     auto cut = std::make_shared<SpaceLayout>(s.layout());
     cut->owner = s.layout().bodies;
     if (const auto grouped = std::dynamic_pointer_cast<GroupedOperators>(source_owning(Space(s.kind(), cut)))) source = grouped;

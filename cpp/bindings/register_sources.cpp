@@ -66,6 +66,7 @@ Expression source_symbol(const std::shared_ptr<SkoSource>& source, const std::st
   if (d.kind() == LetterKind::embedding) {
     if (!embedded) throw EvaluationError("'" + name + "' is a letter of embedded loops; '" + source->name() + "' has none");
     if (d.takes == Takes::nothing) return make_symbol(d, source);
+    if (d.takes == Takes::direction) throw EvaluationError("'" + name + "' comes up in derivatives alone: X_r.diff(i, j)");
     if (coordinate < 0 || coordinate >= source->theta().dimension())
       throw ModelError("coordinate " + std::to_string(coordinate) + " of '" + source->name() + "', which has " + std::to_string(source->theta().dimension()));
     return make_symbol(d, source, OfCoordinate{coordinate}, source->structure().coordinate_names[coordinate]);

@@ -47,7 +47,8 @@ S EmbeddedWorkspace<S>::size_of(int row) const {
 }
 
 // ------------------------------------------------------------------ which are independent
-// Complete pivoting of the node's rows at rows_: weights_ are √ℳ_ii. given: no coordinate that is wanted as an independent one is eliminated.
+// Complete pivoting of the node's rows at rows_: weights_ are √ℳ_ii. Rows are in units of what their entries are sums of: one that asks nothing but
+// for rounding, as of a planar loop in any plane, stays as small as it is. given: no coordinate that is wanted as an independent one is eliminated.
 template <class S>
 void EmbeddedWorkspace<S>::choose_of(size_t node, bool given) {
   using std::abs;
@@ -56,9 +57,8 @@ void EmbeddedWorkspace<S>::choose_of(size_t node, bool given) {
   const size_t m = at.rows.size(), n = at.coordinates.size();
   std::vector<S> A(m * n, S(0)), sizes(m, S(0));
   for (size_t i = 0; i < m; ++i) {
-    for (const auto& e : rows_.entries[at.rows[i]]) dense_[e.coordinate] = e.value / weights_[e.coordinate];
     S& size = sizes[i];
-    for (size_t j = 0; j < n; ++j) size = maximum(size, S(abs(dense_[at.coordinates[j]])));
+    for (const auto& e : rows_.entries[at.rows[i]]) dense_[e.coordinate] = e.value / weights_[e.coordinate], size = maximum(size, S(e.size / weights_[e.coordinate]));
     for (size_t j = 0; j < n; ++j) A[i * n + j] = size > S(0) ? S(dense_[at.coordinates[j]] / size) : S(0);
     for (const auto& e : rows_.entries[at.rows[i]]) dense_[e.coordinate] = S(0);
   }

@@ -27,17 +27,17 @@ void differentiate(const CompiledModel<S>& model, const ResolvedLoops& loops, co
   refuse_moving_functions(loops, v.data());
   using T = typename LoopTangents<S>::T;
   LoopBuffers<T> buffers;
-  std::vector<S> direction(nv, S(0));
+  LoopMotion<S> direction{std::vector<S>(nv, S(0)), {}};
   std::vector<T> moving(v.begin(), v.end()), bias(rows, T(S(0)));
   for (int j = 0; j < nv; ++j) {
-    direction[j] = S(1);
+    direction.w[j] = S(1);
     const LoopTangents<S> there(model, loops, q, direction);
     there.jacobian([&](int row, int i, const S& number) {
       slip[row * nv + j] += number * v[i], along_q[row * nv + j] += number * vdot[i], forces[i * nv + j] += number * S(multipliers[row]);
     });
     loop_bias(there.model, there.by_rule, there.q.data(), moving.data(), buffers, bias.data());
     for (int row = 0; row < rows; ++row) along_q[row * nv + j] += bias[row].d[0];
-    direction[j] = S(0);
+    direction.w[j] = S(0);
   }
   const LoopTangents<S> still(model, loops, q, direction);
   for (int j = 0; j < nv; ++j) {

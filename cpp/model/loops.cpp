@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "model/checks.h"
+#include "model/hinge_kinematics.h"
+#include "model/spanned_twists.h"
 #include "model/structure_edits.h"
 #include "runtime/errors.h"
 
@@ -30,7 +32,6 @@ Pose<double> frame_along(const Vector3<double>& axis, const Vector3<double>& poi
 // The kind of the pair that a hinge closes. ModelError for hinges that have none.
 PairKind kind_of(const Hinge& hinge, const std::string& loop) {
   const auto across = [&](int i, int j) { return std::abs(dot(hinge.subhinges[i].axis, hinge.subhinges[j].axis)) < 1e-9; };
-  const char* const remedy = ": put that hinge into the tree, and close the loop at another one of its hinges";
   switch (hinge.kind) {
     case HingeKind::weld: return PairKind::weld;
     case HingeKind::pin: return PairKind::pin;
@@ -43,12 +44,33 @@ PairKind kind_of(const Hinge& hinge, const std::string& loop) {
     case HingeKind::universal:
       if (norm(cross(hinge.subhinges[0].axis, hinge.subhinges[1].axis)) > 1e-6) return PairKind::universal;
       throw ModelError("loop '" + loop + "': the axes of its universal hinge are parallel, and it moves as a pin alone; give a pin, or axes that are not");
-    case HingeKind::gimbal:
-      if (across(0, 1) && across(1, 2)) return PairKind::ball;
-      throw ModelError("loop '" + loop + "': the middle axis of its gimbal hinge is not across the others, so that it does not reach every rotation" + remedy);
+    case HingeKind::gimbal: return across(0, 1) && across(1, 2) ? PairKind::ball : PairKind::custom;
     case HingeKind::custom: break;
   }
-  throw ModelError("loop '" + loop + "': a custom hinge has no rows of its own" + remedy);
+  return PairKind::custom;
+}
+
+// One body on a hinge that has no rows by its kind. ModelError where some of its subhinges move nothing that others do not, wherever it stands.
+std::shared_ptr<const Multibody> permitted_by(Hinge hinge, const std::string& loop) {
+  const int freedoms = hinge.nv();
+  for (const Subhinge& s : hinge.subhinges)
+    if (s.kind == SubhingeKind::free) throw ModelError("loop '" + loop + "': a free subhinge of its custom hinge leaves nothing to close");
+  hinge.placement = Pose<double>::identity();
+  const auto made = std::make_shared<Multibody>("loop " + loop, true);
+  made->add_body({loop, -1, 0, {0, 0, 0}, {0, 0, 0, 0, 0, 0}, hinge}, "");
+  const auto model = made->compiled<double>();
+  std::vector<double> q;
+  append_zero(hinge, q);
+  std::vector<Vector6<double>> rows(freedoms);
+  for (size_t i = 0; i < q.size(); ++i) q[i] += 0.7 + 0.4 * double(i);  // no place of its own
+  hinge_kinematics(*model, 0, q.data(), rows.data());
+  const int rank = orthonormal(rows);
+  const std::string count = std::to_string(freedoms);
+  if (rank < freedoms)
+    throw ModelError("loop '" + loop + "': of the " + count + " freedoms of its " + record_of(hinge.kind).name + " hinge only " + std::to_string(rank) +
+                     " move it differently; leave out subhinges that move it as others do");
+  if (rank == 6) throw ModelError("loop '" + loop + "': the 6 freedoms of its custom hinge leave nothing to close");
+  return made;
 }
 
 }  // namespace
@@ -64,6 +86,7 @@ const PairRecord& record_of(PairKind kind) {
       {"planar", {"about x", "about y", "along z"}},
       {"ball", {"along x", "along y", "along z"}},
       {"free", {}},
+      {"custom", {"about x", "about y", "about z", "along x", "along y", "along z"}},
       {"blade", {"sideways"}, 1},
       {"wheel", {"contact", "rolling", "sideways"}, 2},
       {"rolling ball", {"contact", "rolling along x", "rolling along y"}, 2},
@@ -100,6 +123,7 @@ void LoopSet::add_hinge(const std::string& name, const std::string& a, const std
   Pose<double> in_a = Pose<double>::identity(), in_b = in_a;
   switch (pair.kind) {
     case PairKind::weld: case PairKind::free: break;
+    case PairKind::custom: pair.permitted = permitted_by(hinge, name); break;
     case PairKind::ball: in_a.p = in_b.p = hinge.subhinges[0].point; break;
     case PairKind::universal:
       in_a = frame_along(hinge.subhinges[0].axis, hinge.subhinges[0].point), in_b = frame_along(hinge.subhinges[1].axis, hinge.subhinges[1].point);

@@ -12,9 +12,10 @@
 //   slider        about x, y, z; along x, y           planar         about x, y; along z
 //   cylindrical   about x, y; along x, y              free           none
 //   screw         about x, y; along x, y; along and about z
+//   custom        about x, y, z; along x, y, z: of these as many as it has freedoms hang on the others
 //
 // A universal hinge has z along its first axis in a, along its second in b. Three axes of a gimbal reach every rotation where the middle one is
-// across the others, and are refused where it is not, as are custom hinges: those stand in the tree, and the loop is closed at another hinge.
+// across the others; where it is not, a gimbal is a custom hinge, with end frames as a weld has.
 #pragma once
 
 #include <cstdint>
@@ -31,7 +32,7 @@
 
 namespace pycraft {
 
-enum class PairKind { weld, pin, slider, screw, universal, cylindrical, planar, ball, free, blade, wheel, rolling_ball, surface };
+enum class PairKind { weld, pin, slider, screw, universal, cylindrical, planar, ball, free, custom, blade, wheel, rolling_ball, surface };
 // A row of the table of kinds: what its rows are called, and how many of the last ones are of velocities.
 struct PairRecord {
   const char* name;
@@ -53,6 +54,7 @@ struct FramePair {
   Pose<double> end_a = Pose<double>::identity(), end_b = Pose<double>::identity();  // of the end frames on a and on b
   double number = 0;                             // screw: pitch, m/rad; universal: cosine between the axes; wheels and balls: radius, m
   Quadric surface;                               // of a surface, on a
+  std::shared_ptr<const Multibody> permitted;    // of a custom hinge: one body on it
 };
 
 // One coordinate of a coupling, and the polynomial of it that the coupling adds: coefficients of 1, q, q², ...

@@ -88,11 +88,10 @@ class TwistDirection : public MechanicsDirection {
   Twists twists_;
 };
 
-Expression no_map_tangent(const std::shared_ptr<EmbeddedOperators>& embedded) { return zero(embedded->theta(), embedded->grouped()->theta()); }
-
 class TimeDirection final : public MechanicsDirection {
  public:
-  TimeDirection(std::shared_ptr<MultibodyOperators> source, Expression vdot) : MechanicsDirection(std::move(source)), vdot_(std::move(vdot)) {}
+  TimeDirection(std::shared_ptr<MultibodyOperators> source, Expression vdot, std::shared_ptr<EmbeddedOperators> embedded)
+      : MechanicsDirection(std::move(source)), vdot_(std::move(vdot)), embedded_(std::move(embedded)) {}
   Expression frame_motion(const Symbol& like) const override { return letters(like).letter(V_bar); }
 
  protected:
@@ -113,16 +112,36 @@ class TimeDirection final : public MechanicsDirection {
     if (from >= count) return zero(l.o.M.codomain(), l.o.M.codomain());
     return l.crf(times({l.own_H().T(), l.selection(OfSubhinges{own.body, from, count}), l.letter(theta_dot)}));
   }
-  Expression velocity_tangent(const MechanicsLetters&, const Expression&) const override {
-    if (!vdot_) throw EvaluationError("the time derivative of what depends on v needs the accelerations: .dot(vdot=...)");
-    return vdot_;
+  // θ̈, of embedded loops X θ̈_r + Ẋ θ̇_r
+  Expression velocity_tangent(const MechanicsLetters& l, const Expression&) const override {
+    if (!embedded_) return accelerations();
+    const auto own = [&](SymbolId id) { return l.bound(make_symbol(definition_of(id), embedded_)); };
+    return plus({times({own(coordinate_map), accelerations()}), times({own(coordinate_map_rate), own(theta_dot)})});
   }
   Expression map_tangent(const std::shared_ptr<EmbeddedOperators>& embedded, const MechanicsLetters& l) const override {
     return l.bound(make_symbol(definition_of(coordinate_map_rate), embedded));
   }
+  Expression independent_rates(const std::shared_ptr<EmbeddedOperators>&, const MechanicsLetters&) const override { return accelerations(); }
+  // Along v twice, and ∂X along the accelerations.
+  Expression second_map_tangent(const std::shared_ptr<EmbeddedOperators>& embedded, const MechanicsLetters& l, const Expression& e) const override {
+    std::vector<Expression> terms = {second_map(embedded, l, e, {{1.0, along_time}}, "time")};
+    if (e.node().symbol.definition->id != coordinate_map_rate || is_zero(accelerations())) return terms[0];
+    if (accelerations().kind() != NodeKind::constant)
+      throw EvaluationError("the second time derivative of X_r takes accelerations that are numbers: .dot(vdot=array), not " + show(accelerations()));
+    const std::vector<double>& given = accelerations().node().constant->dense;
+    for (size_t i = 0; i < given.size(); ++i)
+      if (given[i] != 0)
+        terms.push_back(given[i] * l.bound(make_symbol(definition_of(coordinate_map_tangent), embedded, OfCoordinate{int(i)}, embedded->structure().coordinate_names[i])));
+    return plus(terms);
+  }
 
  private:
+  const Expression& accelerations() const {
+    if (!vdot_) throw EvaluationError("the time derivative of what depends on v needs the accelerations: .dot(vdot=...)");
+    return vdot_;
+  }
   Expression vdot_;
+  std::shared_ptr<EmbeddedOperators> embedded_;
 };
 
 // Mass properties and rotor inertias: nothing moves but M or J.
@@ -137,8 +156,9 @@ class InertiaDirection final : public MechanicsDirection {
   Expression body_edge_factor(const MechanicsLetters& l) const override { return nothing(l); }
   Expression root_motion(const MechanicsLetters& l) const override { return nothing(l); }
   Expression outboard_motion(const MechanicsLetters& l, const TwistPlace&) const override { return nothing(l); }
-  Expression map_tangent(const std::shared_ptr<EmbeddedOperators>& embedded, const MechanicsLetters&) const override { return no_map_tangent(embedded); }
-  Expression embedded_tangent(const Expression& e) const override { return zero(e.domain(), e.codomain()); }
+  Expression map_tangent(const std::shared_ptr<EmbeddedOperators>& embedded, const MechanicsLetters&) const override {
+    return zero(embedded->theta(), embedded->grouped()->theta());
+  }
   Expression tangent_of_block(const MechanicsLetters& l, SymbolId id) const override {
     if (id == SymbolId::M && rotor_ < 0) return derivative(l, OfInertia{body_, {parameter_}});
     if (id == SymbolId::J && rotor_ >= 0) return l.selection(OfCoordinate{rotor_});
@@ -193,20 +213,25 @@ std::unique_ptr<Direction> coordinate_direction(const std::shared_ptr<MultibodyO
   return twist_direction(source, {{1.0, OfCoordinate{coordinate}}});
 }
 
-std::unique_ptr<Direction> time_direction(const std::shared_ptr<MultibodyOperators>& source, const Expression& vdot) {
-  if (vdot && !(vdot.codomain() == source->theta() && vdot.domain() == Space::euclidean(1)))
-    throw SpaceError("vdot: the accelerations are a vector of " + source->theta().description() + ", not " + show(vdot));
-  return std::make_unique<TimeDirection>(source, vdot);
+std::unique_ptr<Direction> time_direction(const std::shared_ptr<MultibodyOperators>& source, const Expression& vdot, const std::shared_ptr<EmbeddedOperators>& embedded) {
+  const Space theta = embedded ? embedded->theta() : source->theta();
+  if (vdot && !(vdot.codomain() == theta && vdot.domain() == Space::euclidean(1)))
+    throw SpaceError("vdot: the accelerations are a vector of " + theta.description() + ", not " + show(vdot));
+  return std::make_unique<TimeDirection>(source, vdot, embedded);
+}
+
+Twists twists_of(const Parameter& p) {
+  Twists twists;
+  for (const InsertedTwist& t : p.twists)
+    for (int c = 0; c < 6; ++c)
+      if (t.twist[c] != 0) twists.emplace_back(t.twist[c], OfTwist{t.body, t.position, c});
+  return twists;
 }
 
 std::unique_ptr<Direction> parameter_direction(const Parameter& p) {
   p.source->check_current();
   if (p.twists.empty()) return std::make_unique<InertiaDirection>(p.source, p.inertia_body, p.inertia, p.rotor);
-  Twists twists;
-  for (const InsertedTwist& t : p.twists)
-    for (int c = 0; c < 6; ++c)
-      if (t.twist[c] != 0) twists.emplace_back(t.twist[c], OfTwist{t.body, t.position, c});
-  return twist_direction(p.source, std::move(twists));
+  return twist_direction(p.source, twists_of(p));
 }
 
 }  // namespace pycraft

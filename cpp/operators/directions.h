@@ -6,7 +6,8 @@
 //                    placement; a twist before a subhinge and its opposite after it turn or shift the subhinge's axis
 //   mass, centre of mass, inertia of a body: ∂M;  rotor inertia of a coordinate: ∂J
 //   independent coordinate i of embedded loops: along the tree's velocities w = X e_i, all hinges around the loops moving,
-//                    ∂E = E crf(H*w), ∂H = Σ_s Π_<s H crf(H*Π_s w) over subhinges s, and ∂X
+//                    ∂E = E crf(H*w), ∂H = Σ_s Π_<s H crf(H*Π_s w) over subhinges s, and ∂X; tree's θ̇ = X θ̇_r with ∂X, as θ̇_r stays
+//   a twist in a hinge of embedded loops: as of the tree, and along the w with which dependent coordinates keep the loops
 //
 // Of embedded loops H_C = X*H_g, J_C = X*J_g X:  ∂H_C = ∂X*H_g + X*∂H_g,  ∂J_C = ∂X*J_g X + X*∂J_g X + X*J_g ∂X.
 //
@@ -47,9 +48,12 @@ std::unique_ptr<Direction> twist_direction(const std::shared_ptr<MultibodyOperat
 std::unique_ptr<Direction> coordinate_direction(const std::shared_ptr<MultibodyOperators>& source, int coordinate);
 class EmbeddedOperators;
 std::unique_ptr<Direction> independent_direction(const std::shared_ptr<EmbeddedOperators>& source, int coordinate);
-// vdot: a vector of Θ; empty: refused where it is needed.
-std::unique_ptr<Direction> time_direction(const std::shared_ptr<MultibodyOperators>& source, const Expression& vdot);
+// Of a mass property or rotor inertia that of the tree; along twists in hinges dependent coordinates keep the loops.
+std::unique_ptr<Direction> parameter_on_loops(const std::shared_ptr<EmbeddedOperators>& source, const Parameter& parameter);
+// vdot: a vector of Θ, of embedded loops θ̈_r; empty: refused where it is needed.
+std::unique_ptr<Direction> time_direction(const std::shared_ptr<MultibodyOperators>& source, const Expression& vdot, const std::shared_ptr<EmbeddedOperators>& embedded = nullptr);
 std::unique_ptr<Direction> parameter_direction(const Parameter& parameter);
+Twists twists_of(const Parameter& parameter);
 
 // The coordinates of a hinge inboard of where a twist stands: these rows of H move with it.
 int coordinates_before(const MultibodyOperators& source, const TwistPlace& twist);

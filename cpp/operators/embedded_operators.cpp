@@ -11,13 +11,22 @@ namespace pycraft {
 
 const std::vector<SymbolDefinition>& embedding_symbols() {
   using enum SymbolId;
+  using namespace embedding_letters;
   using S = SpaceKind;
   const unsigned moving = Group::kinematics | Group::velocities;
   static const std::vector<SymbolDefinition> table = {
       {coordinate_map, "X_r", "X_r", "X_r", "velocities by independent ones on loops, θ̇ = X_r θ̇_r", S::Theta, S::TreeTheta, Pattern::block_diagonal},
       {coordinate_map_rate, "X_r_dot", "Ẋ_r", "\\dot{X}_r", "rate of X_r along θ̇", S::Theta, S::TreeTheta, Pattern::block_diagonal, {.groups = moving}},
-      {coordinate_map_tangent, "dX_r", "∂X_r", "\\partial X_r", "derivative of X_r along an independent coordinate", S::Theta, S::TreeTheta, Pattern::block_diagonal,
-       {.takes = Takes::place}},
+      {coordinate_map_tangent, "dX_r", "∂X_r", "\\partial X_r", "derivative of X_r along an independent coordinate", S::Theta, S::TreeTheta,
+       Pattern::block_diagonal, {.takes = Takes::place}},
+      {second_map_tangent, "ddX_r", "∂²X_r", "\\partial^2 X_r", "second derivative of X_r, along a coordinate and what comes after it", S::Theta, S::TreeTheta, Pattern::block_diagonal,
+       {.takes = Takes::direction}},
+      {second_map_rate, "dX_r_dot", "∂Ẋ_r", "\\partial\\dot{X}_r", "second derivative of X_r, along time among others", S::Theta, S::TreeTheta, Pattern::block_diagonal,
+       {.groups = moving, .takes = Takes::direction}},
+      {dependent_shift, "dtheta_d", "∂θ_d", "\\partial\\theta_d", "how dependent coordinates follow twists in hinges", S::Euclidean, S::TreeTheta, Pattern::vector,
+       {.takes = Takes::direction}},
+      {parameter_map_tangent, "dX_r_p", "∂ₚX_r", "\\partial_p X_r", "derivative of X_r along twists in hinges", S::Theta, S::TreeTheta, Pattern::block_diagonal,
+       {.takes = Takes::direction}},
   };
   return table;
 }

@@ -10,6 +10,12 @@
 //   Q_d ∂X_d = -∂Q X,  ∂X_r = 0                        ∂H_C = ∂X* H_g + X* ∂H_g
 //   a_C = a_g + H_g* Ẋ θ̇_r
 //
+// and once more, w the velocities of the tree along each of two directions (X e_i, θ̇, or what follows a twist in a hinge):
+//
+//   Q_d ∂₂∂₁X_d = -(∂₂(∂₁Q) X + ∂₁Q ∂₂X + ∂₂Q ∂₁X),  ∂₂w₁ = ∂₂X e_i, or ∂₂X θ̇_r
+//
+// Along a twist in a hinge, as placements and axes are, independent coordinates stay and dependent ones keep the loops: Q_d ∂θ_d = -∂r.
+//
 // Letters that the robot has body by body are those of the grouped tree, on the same spaces V and F. q stays the tree's: at states that are off the
 // loops nothing is evaluated, nor what depends on v where v breaks them. Choices of bodies, rows and coordinates: pycraft/models/embedded_loops.py.
 //
@@ -24,6 +30,12 @@
 #include "operators/grouped_operators.h"
 
 namespace pycraft {
+
+// Letters that only derivatives of embedded loops bring up: after all in SymbolId.
+namespace embedding_letters {
+constexpr SymbolId second_map_tangent = static_cast<SymbolId>(1021), second_map_rate = static_cast<SymbolId>(1022), dependent_shift = static_cast<SymbolId>(1023),
+                   parameter_map_tangent = static_cast<SymbolId>(1024);
+}
 
 // Records of the letters that embedded loops alone have.
 const std::vector<SymbolDefinition>& embedding_symbols();

@@ -12,6 +12,7 @@
 #include "algebra/trees/tree_values.h"
 #include "operators/embedded_operators.h"
 #include "operators/grouped_values.h"
+#include "operators/loop_operators.h"
 #include "recursions/loop_tangents.h"
 
 namespace pycraft {
@@ -74,22 +75,22 @@ class EmbeddedValues final : public TreeValues<MixedBlocks<RigidBlocks<S>>> {
   }
 
   void block(const Symbol& symbol, int g, S* out) const override {
-    switch (symbol.definition->id) {
-      case SymbolId::coordinate_map: std::copy(maps_[g].begin(), maps_[g].end(), out); return;
-      case SymbolId::coordinate_map_rate: std::copy(rates_[g].begin(), rates_[g].end(), out); return;
-      case SymbolId::coordinate_map_tangent: {
-        const std::vector<S> tangent = map_tangent(g, velocity_of(std::get<OfCoordinate>(symbol.arguments).coordinate));
-        std::copy(tangent.begin(), tangent.end(), out);
-        return;
-      }
-      default: Base::block(symbol, g, out);
-    }
+    using namespace embedding_letters;
+    const SymbolId id = symbol.definition->id;
+    if (id == SymbolId::coordinate_map) return copy(maps_[g], out);
+    if (id == SymbolId::coordinate_map_rate) return copy(rates_[g], out);
+    if (id == SymbolId::coordinate_map_tangent) return copy(map_tangent(g, motion({false, {{1.0, std::get<OfCoordinate>(symbol.arguments)}}})), out);
+    if (id == parameter_map_tangent) return copy(map_tangent(g, motion(std::get<OfDirection>(symbol.arguments))), out);
+    if (id != second_map_tangent && id != second_map_rate) return Base::block(symbol, g, out);
+    const Twists& along = std::get<OfDirection>(symbol.arguments).twists;
+    copy(second_tangent(g, along[0].second, {false, {along.begin() + 1, along.end()}}), out);
   }
   void vector(const Symbol& symbol, S* out) const override {
     if (symbol.definition->id == SymbolId::theta_dot) {
       for (int i : source_.independent()) *out++ = v_[i];
       return;
     }
+    if (symbol.definition->id == embedding_letters::dependent_shift) return copy(motion(std::get<OfDirection>(symbol.arguments)).w, out);
     grouped_.vector(symbol, out);  // a_g, and H_g* Ẋ θ̇_r
     for (int g = 0; g < this->tree_.bodies(); ++g) {
       const std::vector<S> H = block_of(SymbolId::H, g);
@@ -130,7 +131,7 @@ class EmbeddedValues final : public TreeValues<MixedBlocks<RigidBlocks<S>>> {
   void compute_velocities() override {
     grouped_.require(Group::kinematics | Group::velocities);
     check_velocities();
-    for (int g = 0; g < this->tree_.bodies(); ++g) rates_[g] = map_tangent(g, v_);
+    for (int g = 0; g < this->tree_.bodies(); ++g) rates_[g] = map_tangent(g, {v_, {}});
   }
 
  private:
@@ -174,37 +175,101 @@ class EmbeddedValues final : public TreeValues<MixedBlocks<RigidBlocks<S>>> {
       }
     }
   }
-  // ∂X along w: Q_d ∂X_d = -∂Q X.
-  std::vector<S> map_tangent(int g, const std::vector<S>& w) const {
-    const size_t n = source_.coordinates_of(g).size(), r = source_.independent_of(g).size();
-    std::vector<S> tangent(n * r, S(0));
-    const EmbeddedLoops* const loops = source_.loops_of(g);
-    if (!loops || std::all_of(source_.coordinates_of(g).begin(), source_.coordinates_of(g).end(), [&](int i) { return w[i] == S(0); })) return tangent;
-    const std::vector<S> rate = jacobian_rate(w);
-    std::vector<S> moved(loops->rows.size() * r, S(0));
-    for (size_t i = 0; i < loops->rows.size(); ++i)
-      for (size_t a = 0; a < n; ++a) {
-        const S& entry = rate[size_t(loops->rows[i]) * compiled_->nv + source_.coordinates_of(g)[a]];
-        for (size_t j = 0; j < r; ++j) moved[i * r + j] += entry * maps_[g][a * r + j];
-      }
+  static void copy(const std::vector<S>& from, S* out) { std::copy(from.begin(), from.end(), out); }
+  // ∂X along a motion: Q_d ∂X_d = -∂Q X.
+  std::vector<S> map_tangent(int g, const LoopMotion<S>& along) const {
+    std::vector<S> tangent(source_.coordinates_of(g).size() * source_.independent_of(g).size(), S(0));
+    if (!moves(g, along)) return tangent;
+    const ResolvedLoops own = loops_of(g);
+    std::vector<S> moved(source_.loops_of(g)->rows.size() * source_.independent_of(g).size(), S(0));
+    LoopTangents<S>(*compiled_, own, q_, along).jacobian([&](int row, int i, const S& entry) { add_product(g, row, i, entry, maps_[g], moved); });
     put_dependent(g, moved, tangent);
     return tangent;
   }
-  // ∂Q along velocities w of the tree.
-  std::vector<S> jacobian_rate(const std::vector<S>& w) const {
-    const size_t nv = compiled_->nv;
-    std::vector<S> rate(size_t(loops_->rows) * nv, S(0));
-    LoopTangents<S>(*compiled_, *loops_, q_, w).jacobian([&](int row, int i, const S& entry) { rate[row * nv + i] += entry; });
-    return rate;
+  // first: an independent coordinate, or time; second: as motion() has it.
+  std::vector<S> second_tangent(int g, const TwistPlace& first, const OfDirection& second) const {
+    std::vector<S> tangent(source_.coordinates_of(g).size() * source_.independent_of(g).size(), S(0));
+    const LoopMotion<S> along = motion({false, {{1.0, first}}}), then = motion(second);
+    if (!source_.loops_of(g) || (!moves(g, along) && !moves(g, then))) return tangent;
+    const std::vector<S> of_first = map_tangent(g, along), of_second = map_tangent(g, then);
+    const ResolvedLoops own = loops_of(g);
+    const LoopTangents<S> there(*compiled_, own, q_, then);
+    LoopMotion<Tangent<S, 1>> moving{{along.w.begin(), along.w.end()}, along.twists};
+    const int r = this->tree_.dof[g];
+    for (size_t a = 0; a < source_.coordinates_of(g).size(); ++a)
+      for (int j = 0; j < r; ++j) {
+        const int i = this->tree_.dof_offset[g] + j;
+        const S rate = is_time(first) ? v_[source_.coordinates_of(g)[source_.independent_of(g)[j]]] : S(first == TwistPlace(OfCoordinate{i}) ? 1 : 0);
+        moving.w[source_.coordinates_of(g)[a]].d[0] += of_second[a * r + j] * rate;
+      }
+    std::vector<S> moved(source_.loops_of(g)->rows.size() * size_t(r), S(0));
+    LoopTangents<Tangent<S, 1>>(there.model, own, there.q, moving, there.inserted).jacobian([&](int row, int i, const Tangent<S, 1>& entry) {
+      add_product(g, row, i, entry.d[0], maps_[g], moved), add_product(g, row, i, entry.x, of_second, moved);
+    });
+    there.jacobian([&](int row, int i, const S& entry) { add_product(g, row, i, entry, of_first, moved); });
+    put_dependent(g, moved, tangent);
+    return tangent;
   }
-  // Of the tree, where only independent coordinate i moves.
-  std::vector<S> velocity_of(int i) const {
+  // to += the part of row `row` of Q X that comes from this entry, where that row is solved in node g.
+  void add_product(int g, int row, int i, const S& entry, const std::vector<S>& X, std::vector<S>& to) const {
+    const std::vector<int>&rows = source_.loops_of(g)->rows, &coordinates = source_.coordinates_of(g);
+    const auto at = std::lower_bound(rows.begin(), rows.end(), row);
+    const auto column = std::find(coordinates.begin(), coordinates.end(), i);
+    if (at == rows.end() || *at != row || column == coordinates.end()) return;
+    const size_t r = source_.independent_of(g).size(), a = column - coordinates.begin(), b = at - rows.begin();
+    for (size_t j = 0; j < r; ++j) to[b * r + j] += entry * X[a * r + j];
+  }
+  bool moves(int g, const LoopMotion<S>& along) const {
+    const std::vector<int>& own = source_.coordinates_of(g);
+    return source_.loops_of(g) && (!along.twists.empty() || std::any_of(own.begin(), own.end(), [&](int i) { return along.w[i] != S(0); }));
+  }
+  // The loops whose rows are solved in node g.
+  ResolvedLoops loops_of(int g) const {
+    const std::vector<int>& rows = source_.loops_of(g)->rows;
+    ResolvedLoops own;
+    own.rows = loops_->rows;
+    for (const ResolvedLoop& loop : loops_->loops) {
+      const auto at = std::lower_bound(rows.begin(), rows.end(), loop.first_row);
+      if (at != rows.end() && *at < loop.first_row + loop.rows) own.loops.push_back(loop);
+    }
+    return own;
+  }
+  // Of the tree on its loops: along an independent coordinate, along time, or along twists in hinges.
+  LoopMotion<S> motion(const OfDirection& given) const {
+    if (is_time(given.twists[0].second)) return {v_, {}};
+    LoopMotion<S> along{std::vector<S>(compiled_->nv, S(0)), {}};
+    if (std::holds_alternative<OfTwist>(given.twists[0].second)) {
+      for (const auto& [c, place] : given.twists) along.twists.emplace_back(c, std::get<OfTwist>(place));
+      follow(along);
+      return along;
+    }
+    const int i = std::get<OfCoordinate>(given.twists[0].second).coordinate;
     int g = 0;
     while (this->tree_.dof_offset[g + 1] <= i) ++g;
-    std::vector<S> w(compiled_->nv, S(0));
     const size_t r = this->tree_.dof[g];
-    for (size_t a = 0; a < source_.coordinates_of(g).size(); ++a) w[source_.coordinates_of(g)[a]] = maps_[g][a * r + i - this->tree_.dof_offset[g]];
-    return w;
+    for (size_t a = 0; a < source_.coordinates_of(g).size(); ++a) along.w[source_.coordinates_of(g)[a]] = maps_[g][a * r + i - this->tree_.dof_offset[g]];
+    return along;
+  }
+  // w of the dependent coordinates, Q_d w_d = -∂r. EvaluationError where other rows do not follow.
+  void follow(LoopMotion<S>& along) const {
+    using std::abs;
+    const LoopTangents<S> moved(*compiled_, *loops_, q_, along);
+    LoopBuffers<Tangent<S, 1>> buffers;
+    buffers.inserted = moved.inserted;
+    std::vector<Tangent<S, 1>> residual(loops_->rows, Tangent<S, 1>(S(0)));
+    loop_residuals(moved.model, moved.by_rule, moved.q.data(), buffers, residual.data());
+    for (int g = 0; g < this->tree_.bodies(); ++g) {
+      const EmbeddedLoops* const set = source_.loops_of(g);
+      for (size_t i = 0; set && i < set->rows.size(); ++i)
+        for (size_t a = 0; a < set->rows.size(); ++a) along.w[set->dependent[i]] -= inverses_[g][i * set->rows.size() + a] * residual[set->rows[a]].d[0];
+    }
+    for (int row = 0; row < loops_->rows; ++row) {
+      S left = residual[row].d[0], size = S(1) + abs(left);
+      for (int i = 0; i < compiled_->nv; ++i) left += Q_[size_t(row) * compiled_->nv + i] * along.w[i], size += abs(Q_[size_t(row) * compiled_->nv + i] * along.w[i]);
+      if (!loops_->of_positions[row] || !(abs(left) <= S(off_the_loops) * size))
+        throw EvaluationError("embedded loops of '" + source_.model().name() + "' have no derivative along that parameter: row '" + loops_->names[row] + "' " +
+                              (loops_->of_positions[row] ? "hangs on the others, and is broken where the parameter changes" : "is of velocities, and no state follows from independent coordinates"));
+    }
   }
 
   void fill_node(int g) {

@@ -2,7 +2,11 @@
 
 #include <algorithm>
 #include <set>
+#include <string>
 
+#include "algebra/language/display.h"
+#include "algebra/language/lower.h"
+#include "model/checks.h"
 #include "operators/alphabet.h"
 #include "operators/loop_values.h"
 #include "runtime/errors.h"
@@ -14,11 +18,15 @@ namespace {
 // NodesF: the rows by body. A letter of one's own source, with numbers of its own.
 const std::vector<SymbolDefinition>& records() {
   using S = SpaceKind;
+  using namespace loop_letters;
+  constexpr auto diagonal = Pattern::block_diagonal;
   static const std::vector<SymbolDefinition> table = {
-      {loop_letters::Q, "Q", "Q", "Q", "rows of loops by velocities, body by body", S::Theta, S::NodesF, Pattern::block_diagonal},
-      {loop_letters::dQ, "dQ", "∂Q", "\\partial Q", "derivative of Q along coordinates or time", S::Theta, S::NodesF, Pattern::block_diagonal, {.takes = Takes::direction}},
-      {loop_letters::A, "A", "A", "A", "rows of loops by motions of their ends, body by body", S::NodesV, S::NodesF, Pattern::block_diagonal},
-      {loop_letters::dA, "dA", "∂A", "\\partial A", "derivative of A along coordinates or time", S::NodesV, S::NodesF, Pattern::block_diagonal, {.takes = Takes::direction}},
+      {Q, "Q", "Q", "Q", "rows of loops by velocities, body by body", S::Theta, S::NodesF, diagonal},
+      {dQ, "dQ", "∂Q", "\\partial Q", "derivative of Q along coordinates, twists in hinges or time", S::Theta, S::NodesF, diagonal, {.takes = Takes::direction}},
+      {A, "A", "A", "A", "rows of loops by motions of their ends, body by body", S::NodesV, S::NodesF, diagonal},
+      {dA, "dA", "∂A", "\\partial A", "derivative of A along coordinates, twists in hinges or time", S::NodesV, S::NodesF, diagonal, {.takes = Takes::direction}},
+      {ddQ, "ddQ", "∂²Q", "\\partial^2 Q", "second derivative of Q, along one after the other", S::Theta, S::NodesF, diagonal, {.takes = Takes::direction}},
+      {ddA, "ddA", "∂²A", "\\partial^2 A", "second derivative of A, along one after the other", S::NodesV, S::NodesF, diagonal, {.takes = Takes::direction}},
   };
   return table;
 }
@@ -112,21 +120,55 @@ std::optional<Expression> LoopOperators::by_ends() const {
   return whole("A") * B.T() * make_symbol(definition_of(SymbolId::phi), tree).T() * make_symbol(definition_of(SymbolId::H), tree).T();
 }
 
-Expression LoopOperators::tangent(const Expression& e, const std::optional<OfDirection>& along) const {
+Expression LoopOperators::tangent(const Expression& e, const std::optional<OfDirection>& along, const std::function<Expression()>& accelerations) const {
   if (!along) return zero(e.domain(), e.codomain());
   const Symbol& s = e.node().symbol;
   const SymbolId id = s.definition->id;
-  if (id == loop_letters::dQ || id == loop_letters::dA)
-    throw EvaluationError("rows of loops are differentiated once: ∂Q and ∂A have no derivative; differences of them at nearby states have");
-  std::string text;
-  for (const auto& [c, place] : along->twists) {
-    const auto* of = std::get_if<OfCoordinate>(&place);
-    if (!of) throw EvaluationError("rows of loops are differentiated along coordinates and time, not along parameters of hinges");
-    if (!text.empty()) text += ", ";
-    text += structure().coordinate_names[of->coordinate];
+  const bool of_Q = s.definition->domain == SpaceKind::Theta;
+  const auto made = [&](const char* ascii, const OfDirection& of, const std::string& text) {
+    const Expression whole = letter(ascii, of, text);
+    return s.binding ? whole.at(s.binding) : whole;
+  };
+  const auto once = [&](const OfDirection& of) { return made(of_Q ? "dQ" : "dA", of, of.time ? "time" : text_of(of.twists)); };
+  if (id == loop_letters::Q || id == loop_letters::A) return once(*along);
+  if (id != loop_letters::dQ && id != loop_letters::dA)
+    throw EvaluationError("rows of loops are differentiated twice: '" + s.definition->ascii + "' has no derivative; differences of it at nearby states have");
+  // ∂∂ is linear in either direction.
+  const auto each = [](const OfDirection& of) { return of.time ? Twists{{1.0, along_time}} : of.twists; };
+  const OfDirection& first = std::get<OfDirection>(s.arguments);
+  std::vector<Expression> terms = {zero(e.domain(), e.codomain())};
+  for (const auto& one : each(first))
+    for (const auto& other : each(*along))
+      terms.push_back(one.first * other.first * made(of_Q ? "ddQ" : "ddA", {false, {{1.0, one.second}, {1.0, other.second}}}, text_of({{1.0, one.second}}) + ", " + text_of({{1.0, other.second}})));
+  if (first.time && along->time) {
+    const OfDirection change = along_numbers(accelerations());
+    if (!change.twists.empty()) terms.push_back(once(change));
   }
-  const Expression made = letter(id == loop_letters::Q ? "dQ" : "dA", *along, along->time ? std::string("time") : text);
-  return s.binding ? made.at(s.binding) : made;
+  return lowered_sum(terms, e.domain(), e.codomain());
+}
+
+// Accelerations that are numbers, as a direction.
+OfDirection LoopOperators::along_numbers(const Expression& vdot) const {
+  if (vdot.kind() == NodeKind::zero) return {};
+  if (vdot.kind() != NodeKind::constant)
+    throw EvaluationError("the second time derivative of rows of loops takes accelerations that are numbers: .dot(vdot=array), not " + show(vdot));
+  const std::vector<double>& given = vdot.node().constant->dense;
+  OfDirection along;
+  for (size_t i = 0; i < given.size(); ++i)
+    if (given[i] != 0) along.twists.emplace_back(given[i], OfCoordinate{static_cast<int>(i)});
+  return along;
+}
+
+std::string LoopOperators::text_of(const Twists& twists) const {
+  static const char* components[] = {"rx", "ry", "rz", "x", "y", "z"};
+  std::string text;
+  for (const auto& [c, place] : twists) {
+    if (!text.empty()) text += " + ";
+    if (c != 1) text += short_number(c) + " ";
+    if (const auto* of = std::get_if<OfCoordinate>(&place)) text += of->coordinate < 0 ? "time" : structure().coordinate_names[of->coordinate];
+    if (const auto* of = std::get_if<OfTwist>(&place)) text += structure().hinge_names[of->body] + "@" + std::to_string(of->position) + "." + components[of->component];
+  }
+  return text;
 }
 
 #define PYCRAFT_MAKE_VALUES(S) \

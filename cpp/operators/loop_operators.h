@@ -5,13 +5,16 @@
 //   Q = A B* φ* H*    where all loops are of two ends: their rows are g·V, V = V_b - Ad(X⁻¹) V_a, X the pose of the end frame on b in that on a
 //
 // Q_k and A_k are block diagonal, between Θ, NodesV(ends) and the rows by body: every body has those of the loops that it is around or an end of.
-// Σ, ones, adds them up. Ends are bodies and nodes as loops were declared on them; B is their letter. Along coordinates and time
+// Σ, ones, adds them up. Ends are bodies and nodes as loops were declared on them; B is their letter. Along coordinates, twists in hinges (which placements and
+// axes are) and time
 //
-//   ∂Q, ∂A            the rows' own code (recursions/loop_rows.h) with derivatives carried along; of a user's function its second derivatives
+//   ∂Q, ∂A, ∂²Q, ∂²A  the rows' own code (recursions/loop_rows.h) with derivatives carried along; of a user's function its second derivatives
+//   ∂ₜ∂ₜQ             along v twice, and ∂Q along accelerations
 //
 // Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, ch. 11.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -22,6 +25,11 @@
 #include "operators/derived_operators.h"
 
 namespace pycraft {
+
+// Letters of second derivatives are along one place after the other, each a coordinate, a twist, or time, which is coordinate -1 there.
+constexpr OfCoordinate along_time{-1};
+inline bool is_time(const TwistPlace& place) { return place == TwistPlace(along_time); }
+inline OfDirection direction_at(const TwistPlace& place) { return is_time(place) ? OfDirection{true, {}} : OfDirection{false, {{1.0, place}}}; }
 
 class LoopOperators final : public DerivedOperators {
  public:
@@ -38,14 +46,15 @@ class LoopOperators final : public DerivedOperators {
   };
   const Ends& ends_of(const Loop& loop) const { return ends_of_.at(loop.name); }
 
-  // "Q", "A", "dQ" or "dA"; EvaluationError where it is none of them.
+  // "Q", "A", or a derivative of one (loop_operators.cpp); EvaluationError where it is none of them.
   Expression letter(const std::string& ascii, const SymbolArguments& arguments = {}, const std::string& text = "") const;
   // Q or A with the parts of each row added up, Σ Q_k or Σ A_k: to R^rows.
   Expression whole(const std::string& ascii) const;
   // A B* φ* H*, which Q is where all loops are of two ends; nothing where they are not.
   std::optional<Expression> by_ends() const;
-  // ∂ of a letter along coordinates or time, zero where nothing moves. EvaluationError of twists that are no coordinates, and of ∂Q and ∂A.
-  Expression tangent(const Expression& letter, const std::optional<OfDirection>& along) const;
+  // ∂ of a letter along coordinates, twists in hinges or time, zero where nothing moves. accelerations: of the tree, for the second time
+  // derivative. EvaluationError of what is a second derivative already, and where accelerations are no numbers.
+  Expression tangent(const Expression& letter, const std::optional<OfDirection>& along, const std::function<Expression()>& accelerations) const;
 
   Space space(SpaceKind kind, const SymbolArguments& arguments) const override;
   // StaleOperatorError where loops were added or taken away since.
@@ -54,6 +63,8 @@ class LoopOperators final : public DerivedOperators {
 
  private:
   int place_of(const std::string& frame);
+  OfDirection along_numbers(const Expression& vdot) const;
+  std::string text_of(const Twists& twists) const;
 
   std::shared_ptr<LoopSet> loops_;
   std::vector<std::shared_ptr<const Loop>> declared_;

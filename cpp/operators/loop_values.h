@@ -15,14 +15,15 @@ namespace pycraft {
 // The letters' numbers: a source's own (algebra/language/symbol.h).
 namespace loop_letters {
 constexpr SymbolId Q = static_cast<SymbolId>(1001), dQ = static_cast<SymbolId>(1002), A = static_cast<SymbolId>(1003), dA = static_cast<SymbolId>(1004);
-}
+constexpr SymbolId ddQ = static_cast<SymbolId>(1005), ddA = static_cast<SymbolId>(1006);
+}  // namespace loop_letters
 
 // put(loop, end, row, g): the rows of pairs on the twists of what their ends stand on, 0: a, 1: b; a row is g_a·V_a + g_b·V_b.
 template <class S, class F>
 void loop_rows_on_ends(const CompiledModel<S>& model, const ResolvedLoops& loops, const S* q, LoopBuffers<S>& w, F put) {
   for (const ResolvedLoop& loop : loops.loops) {
     if (loop.loop->is_coupling()) continue;
-    const auto m = along<S>(loop.path, MotionPart::pose, [&](const FrameStep& step) { return loop_step<S>(model, step, q, nullptr, MotionPart::pose, w.hinge, w.at_rest); });
+    const auto m = along<S>(loop.path, MotionPart::pose, [&](const FrameStep& step) { return loop_step<S>(model, step, q, nullptr, MotionPart::pose, w.hinge, w); });
     std::fill_n(w.rows, loop.rows, PairRow<S>());
     pair_rows(loop.loop->pair, m, w.rows);
     for (int i = 0; i < loop.rows; ++i) {
@@ -49,14 +50,22 @@ class LoopValues final : public TreeValues<RigidBlocks<S>> {
 
   void block(const Symbol& symbol, int k, S* out) const override {
     const SymbolId id = symbol.definition->id;
-    const bool jacobian = id == loop_letters::Q || id == loop_letters::dQ;
+    const bool jacobian = symbol.definition->domain == SpaceKind::Theta;
     std::fill_n(out, source_.rows_of(k).size() * (jacobian ? this->tree_.dof[k] : columns_[k]), S(0));
     const ResolvedLoops own = loops_of(k);
-    if (id == loop_letters::Q || id == loop_letters::A) return put(own, *compiled_, q_, jacobian, k, out, [](const S& x) { return x; });
-    const std::vector<S> w = velocity(std::get<OfDirection>(symbol.arguments));
-    const LoopTangents<S> moved(*compiled_, own, q_, w);
-    if (jacobian) return moved.jacobian([&](int row, int i, const S& entry) { put_entry(row, i, k, entry, out); });
-    put(moved.by_rule, moved.model, moved.q, jacobian, k, out, [](const typename LoopTangents<S>::T& x) { return x.d[0]; });
+    if (id == loop_letters::Q || id == loop_letters::A) return put(own, *compiled_, q_, {}, jacobian, k, out, [](const S& x) { return x; });
+    const OfDirection& given = std::get<OfDirection>(symbol.arguments);
+    if (id == loop_letters::dQ || id == loop_letters::dA) {
+      const LoopTangents<S> moved(*compiled_, own, q_, motion(given));
+      if (jacobian) return moved.jacobian([&](int row, int i, const S& entry) { put_entry(row, i, k, entry, out); });
+      return put(moved.by_rule, moved.model, moved.q, moved.inserted, jacobian, k, out, [](const Tangent<S, 1>& x) { return x.d[0]; });
+    }
+    const LoopMotion<S> first = motion(direction_at(given.twists[0].second));  // which stays along the second
+    const LoopTangents<S> there(*compiled_, own, q_, motion(direction_at(given.twists[1].second)));
+    const LoopMotion<Tangent<S, 1>> kept{{first.w.begin(), first.w.end()}, first.twists};
+    const LoopTangents<Tangent<S, 1>> moved(there.model, own, there.q, kept, there.inserted);
+    if (jacobian) return moved.jacobian([&](int row, int i, const Tangent<S, 1>& entry) { put_entry(row, i, k, entry.d[0], out); });
+    put(moved.by_rule, moved.model, moved.q, moved.inserted, jacobian, k, out, [](const Tangent<Tangent<S, 1>, 1>& x) { return x.d[0].d[0]; });
   }
 
  protected:
@@ -80,8 +89,10 @@ class LoopValues final : public TreeValues<RigidBlocks<S>> {
 
   // Block k of Q or A in any scalar, what `take` takes of its entries.
   template <class T, class F>
-  void put(const ResolvedLoops& loops, const CompiledModel<T>& model, const std::vector<T>& q, bool jacobian, int k, S* out, F take) const {
+  void put(const ResolvedLoops& loops, const CompiledModel<T>& model, const std::vector<T>& q, const std::vector<InsertedMotion<T>>& inserted, bool jacobian, int k, S* out,
+           F take) const {
     LoopBuffers<T> buffers;
+    buffers.inserted = inserted;
     if (jacobian)
       return loop_jacobian(model, loops, q.data(), buffers, [&](int row, int i, const T& number) { put_entry(row, i, k, take(number), out); });
     loop_rows_on_ends(model, loops, q.data(), buffers, [&](const ResolvedLoop& loop, int end, int row, const Vector6<T>& g) {
@@ -94,11 +105,13 @@ class LoopValues final : public TreeValues<RigidBlocks<S>> {
   void put_entry(int row, int i, int k, const S& entry, S* out) const {
     if (body_of_[i] == k) out[row_at(k, row) * this->tree_.dof[k] + i - this->tree_.dof_offset[k]] += entry;
   }
-  std::vector<S> velocity(const OfDirection& along) const {
-    if (along.time) return v_;
-    std::vector<S> w(v_.size(), S(0));
-    for (const auto& [c, place] : along.twists) w[std::get<OfCoordinate>(place).coordinate] += S(c);
-    return w;
+  LoopMotion<S> motion(const OfDirection& along) const {
+    if (along.time) return {v_, {}};
+    LoopMotion<S> made{std::vector<S>(v_.size(), S(0)), {}};
+    for (const auto& [c, place] : along.twists)
+      if (const auto* of = std::get_if<OfCoordinate>(&place)) made.w[of->coordinate] += S(c);
+      else made.twists.emplace_back(c, std::get<OfTwist>(place));
+    return made;
   }
 
   const LoopOperators& source_;

@@ -110,6 +110,20 @@ inline Expression own_H_dot(const MechanicsLetters& l) {
   return plus(terms);
 }
 
+// ∂ of a letter of ∂X or Ẋ of embedded loops: along an independent coordinate, time (coordinate -1), or twists in hinges. EvaluationError of what
+// is along twists, or a second derivative already.
+inline Expression second_map(const std::shared_ptr<EmbeddedOperators>& embedded, const MechanicsLetters& l, const Expression& e, const Twists& second, const std::string& text) {
+  const Symbol& s = e.node().symbol;
+  const auto* const along = std::get_if<OfCoordinate>(&s.arguments);
+  if (s.definition->id != coordinate_map_rate && (s.definition->id != coordinate_map_tangent || !along))
+    throw EvaluationError("'" + s.definition->ascii + "' of '" + embedded->name() + "' has no derivative: the map of coordinates is differentiated twice, and by parameters last");
+  const TwistPlace first = along ? *along : along_time;
+  Twists both = {{1.0, first}};
+  both.insert(both.end(), second.begin(), second.end());
+  const SymbolId id = is_time(first) || is_time(second[0].second) ? embedding_letters::second_map_rate : embedding_letters::second_map_tangent;
+  return l.bound(make_symbol(definition_of(id), embedded, OfDirection{false, both}, (along ? s.argument_text : "time") + ", " + text));
+}
+
 // What is common: symbols that are functions of others.
 class MechanicsDirection : public Direction {
  public:
@@ -155,13 +169,19 @@ class MechanicsDirection : public Direction {
   Expression tangent(const Expression& e, Differentiator& rules) const override {
     const MechanicsLetters l = letters(e.node().symbol);
     if (const auto embedded = std::dynamic_pointer_cast<EmbeddedOperators>(e.node().symbol.source)) {
-      if (e.node().symbol.definition->id == coordinate_map) return map_tangent(embedded, l);
-      return embedded_tangent(e);
+      const auto own = [&](SymbolId id) { return l.bound(make_symbol(definition_of(id), embedded)); };
+      switch (e.node().symbol.definition->id) {
+        case coordinate_map: return map_tangent(embedded, l);
+        case theta_dot: return independent_rates(embedded, l);
+        case coriolis_acceleration:  // a_g + H_g* Ẋ θ̇_r
+          return rules(plus({l.letter(coriolis_acceleration), times({l.o.H.T(), own(coordinate_map_rate), own(theta_dot)})}));
+        default: return second_map_tangent(embedded, l, e);
+      }
     }
     if (e.kind() == NodeKind::block_function)
       return l.function(e.node().symbol.definition->id, rules(e.children()[0]));
     const Symbol& s = e.node().symbol;
-    if (const auto loops = std::dynamic_pointer_cast<LoopOperators>(s.source)) return loops->tangent(e, moving());
+    if (const auto loops = std::dynamic_pointer_cast<LoopOperators>(s.source)) return loops->tangent(e, moving(), [&] { return velocity_tangent(l, l.letter(theta_dot)); });
     const Expression theta = l.letter(theta_dot), relative = times({l.own_H().T(), theta}), V = times({l.o.phi.T(), l.o.H.T(), theta});
     switch (s.definition->id) {
       case Delta: return moved(l, l.delta(place_in(s.arguments)), place_in(s.arguments));
@@ -199,24 +219,26 @@ class MechanicsDirection : public Direction {
     }
   }
 
- protected:
-  virtual std::optional<OfDirection> moving() const = 0;  // nothing where inertias change alone
   // Of the model's own letters.
   virtual Expression body_edge_factor(const MechanicsLetters& l) const = 0;
   virtual Expression tangent_of_block(const MechanicsLetters& l, SymbolId id) const = 0;
   // ∂Δ_a = Δ_a W - W Δ_a and ∂h_a = W* h_a, W what moves outboard of a in its hinge.
   virtual Expression outboard_motion(const MechanicsLetters& l, const TwistPlace& direction) const = 0;
-  virtual Expression velocity_tangent(const MechanicsLetters&, const Expression& e) const { return zero(e.domain(), e.codomain()); }
-  virtual Expression inertia_tangent(const MechanicsLetters&, const Symbol& s) const { return zero(s.source->motions(), s.source->forces()); }
   // crf of what moves a body relative to its parent, roots included.
   virtual Expression root_motion(const MechanicsLetters& l) const = 0;
-  // ∂X of embedded loops; ∂ of their other letters.
+
+ protected:
+  virtual std::optional<OfDirection> moving() const = 0;  // nothing where inertias change alone
+  virtual Expression velocity_tangent(const MechanicsLetters&, const Expression& e) const { return zero(e.domain(), e.codomain()); }
+  virtual Expression inertia_tangent(const MechanicsLetters&, const Symbol& s) const { return zero(s.source->motions(), s.source->forces()); }
+  // ∂X of embedded loops; ∂θ̇_r; ∂ of ∂X and Ẋ.
   virtual Expression map_tangent(const std::shared_ptr<EmbeddedOperators>& embedded, const MechanicsLetters&) const {
-    throw EvaluationError("'" + embedded->name() + "' has derivatives along its independent coordinates, along time and by inertias: not along what moves the tree off its loops");
+    throw EvaluationError("'" + embedded->name() + "' has derivatives along its independent coordinates, along time and by parameters: not along what moves the tree off its loops");
   }
-  virtual Expression embedded_tangent(const Expression& e) const {
-    throw EvaluationError("'" + e.node().symbol.definition->ascii + "' of '" + e.node().symbol.source->name() + "' has no derivative: the map of coordinates is differentiated once");
+  virtual Expression independent_rates(const std::shared_ptr<EmbeddedOperators>& embedded, const MechanicsLetters&) const {
+    return zero(Space::euclidean(1), embedded->theta());
   }
+  virtual Expression second_map_tangent(const std::shared_ptr<EmbeddedOperators>&, const MechanicsLetters&, const Expression& e) const { return zero(e.domain(), e.codomain()); }
 
   MechanicsLetters letters(const Symbol& s) const {
     if (const auto embedded = std::dynamic_pointer_cast<EmbeddedOperators>(s.source); embedded && embedded->base() == source_) return {embedded->grouped(), source_, s.binding};

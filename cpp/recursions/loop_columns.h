@@ -44,8 +44,10 @@ struct LoopRows {
           for (int r = 0; r < loop.rows; ++r) {
             const Vector6<S>& g = gradients[loop.first_row + r] = w.rows[r].gradient;
             for (const auto& [i, J] : w.columns) {
-              // Of lengths, and not of entries: a direction along which nothing moves has the rounding of those along which something does.
-              const S size = norm(g.angular) * norm(J.angular) + norm(g.linear) * norm(J.linear);
+              // Of lengths, and not of entries: a direction along which nothing moves has the rounding of those along which something does. A custom
+              // hinge's row is what a projection leaves of one of length 1 (custom_rows.h).
+              const bool projected = loop.loop->pair.kind == PairKind::custom;
+              const S size = projected ? norm(J.angular) + norm(J.linear) : norm(g.angular) * norm(J.angular) + norm(g.linear) * norm(J.linear);
               entries[loop.first_row + r].push_back({i, dot(g, J), size});
             }
           }

@@ -10,6 +10,7 @@
 //   about x, y, z   2ε                                                       g = (w ω + ε × ω),  ġ·V = -½ |ω|² ε
 //   about x, y      (-R_yz, R_xz)/√((1 + R_zz)/2): |r| = 2 sin(angle between the axes / 2)
 //   along x, y, z   p;   between the axes   R_zz - cos;   along and about z   p_z - pitch (angle about z + 2π n), n such that |r| is least
+//   custom          what is left of about and along all axes at the nearest place of the hinge (custom_rows.h)
 //   across          the quadric of p;   contact   the height of the wheel's or ball's lowest point
 //
 // Each is zero where the loop is closed and nowhere else, and smooth but where a turn of half a circle is missing: there 2ε changes its sign,
@@ -30,6 +31,7 @@
 
 #include "model/loops.h"
 #include "model/unit_data.h"
+#include "recursions/custom_rows.h"
 #include "recursions/motion_functions.h"
 #include "runtime/errors.h"
 
@@ -146,11 +148,47 @@ void pair_rows(const FramePair& pair, const RelativeMotion<S>& m, PairRow<S>* ou
     case PairKind::wheel: return wheel_rows(pair, m, out);
     case PairKind::rolling_ball: return ball_rows(m, S(pair.number), out);
     case PairKind::surface: out[0] = quadric_row(m, pair.surface); return;
+    case PairKind::custom: {
+      S residual[most_pair_rows], rates[most_pair_rows];
+      Vector6<S> gradients[most_pair_rows];
+      custom_rows(*pair.permitted, m.X, m.V, residual, gradients, rates);
+      for (int i = 0; i < most_pair_rows; ++i) out[i].residual = residual[i], out[i].gradient = gradients[i], out[i].rate = rates[i];
+      return;
+    }
     case PairKind::free: return;
   }
 }
 
 // ------------------------------------------------------------------ all rows at a state
+
+// A twist fixed in the hinge of a body before one of its subhinges, in the axes there, by an amount of which derivatives alone are taken
+// (operators/directions.h): X <- X (1 + ξ~), ξ carried outboard by the steps that follow, and rows of H inboard of it move along.
+template <class S>
+struct InsertedMotion {
+  int body, position;
+  Vector6<S> twist;
+};
+template <class S>
+void insert_motion(const CompiledModel<S>& model, const S* q, const InsertedMotion<S>& inserted, RelativeMotion<S>& m, HingeRows<S>& hinge) {
+  const int k = inserted.body, first = model.first_subhinge[k];
+  const S* at = q + model.q_offset[k];
+  Pose<S> later = Pose<S>::identity();
+  int before = 0;
+  for (int i = first; i < model.first_subhinge[k + 1]; ++i) {
+    const CompiledSubhinge<S>& h = model.subhinges[i];
+    if (i - first >= inserted.position) later = later * subhinge_step(h, at);
+    else before += record_of(h.kind).nv;
+    at += record_of(h.kind).nq;
+  }
+  const Vector6<S> xi = motion_to_child(later, inserted.twist);
+  for (int j = 0; j < before; ++j) hinge.rows[j] = hinge.rows[j] - cross_motion(xi, hinge.rows[j]);
+  Matrix3<S> turned = m.X.R;
+  for (int i = 0; i < 3; ++i) {
+    const Vector3<S> turning = cross(row_of(m.X.R, i), xi.angular);
+    for (int j = 0; j < 3; ++j) turned(i, j) += turning[j];
+  }
+  m.X.p = m.X.p + m.X.R * xi.linear, m.X.R = turned;
+}
 
 template <class S>
 struct LoopBuffers {
@@ -159,18 +197,21 @@ struct LoopBuffers {
   PairRow<S> rows[most_pair_rows];
   std::vector<S> at_rest;                              // zeros
   std::vector<double> coordinates, gradient, second;   // of a function of the user's
+  std::vector<InsertedMotion<S>> inserted;             // inboard first where they are of one hinge
 };
 
-// The motion of a step at q; its V and A at rest accelerations, as far as `part` wants them.
+// The motion of a step at q; its V and A at rest accelerations, as far as `part` wants them. hinge: w.hinge.
 template <class S>
 RelativeMotion<S> loop_step(const CompiledModel<S>& model, const FrameStep& step, const S* q, const S* v, MotionPart part, HingeRows<S>& hinge,
-                            const std::vector<S>& at_rest) {
+                            const LoopBuffers<S>& w) {
   if (step.pose) return {renormalised<S>(*step.pose)};
   RelativeMotion<S> m;
   hinge_pose(model, step.number, q, m, hinge);
+  for (const InsertedMotion<S>& inserted : w.inserted)
+    if (inserted.body == step.number) insert_motion(model, q, inserted, m, hinge);
   const S* const own = v + model.v_offset[step.number];
   if (part >= MotionPart::velocity) hinge_velocity(model, step.number, own, m, hinge);
-  if (part == MotionPart::acceleration) hinge_acceleration(own, at_rest.data(), m, hinge);
+  if (part == MotionPart::acceleration) hinge_acceleration(own, w.at_rest.data(), m, hinge);
   return m;
 }
 
@@ -217,7 +258,7 @@ void loop_residuals(const CompiledModel<S>& model, const ResolvedLoops& loops, c
       residual[loop.first_row] = coupling_row(loop, q, static_cast<const S*>(nullptr), w, rate, [](int, const S&) {});
       continue;
     }
-    const auto m = along<S>(loop.path, MotionPart::pose, [&](const FrameStep& step) { return loop_step<S>(model, step, q, nullptr, MotionPart::pose, w.hinge, w.at_rest); });
+    const auto m = along<S>(loop.path, MotionPart::pose, [&](const FrameStep& step) { return loop_step<S>(model, step, q, nullptr, MotionPart::pose, w.hinge, w); });
     std::fill_n(w.rows, loop.rows, PairRow<S>());
     pair_rows(loop.loop->pair, m, w.rows);
     for (int i = 0; i < loop.rows; ++i) residual[loop.first_row + i] = w.rows[i].residual;
@@ -237,7 +278,7 @@ void visit_loop_rows(const CompiledModel<S>& model, const ResolvedLoops& loops, 
     w.columns.clear();
     const auto m = jacobian_along(
         model, loop.path, false, w.hinge,
-        [&](const FrameStep& step, HingeRows<S>& hinge) { return loop_step<S>(model, step, q, nullptr, MotionPart::pose, hinge, w.at_rest); },
+        [&](const FrameStep& step, HingeRows<S>& hinge) { return loop_step<S>(model, step, q, nullptr, MotionPart::pose, hinge, w); },
         [&](int i, const Vector6<S>& J, const Vector6<S>&) { w.columns.emplace_back(i, J); });
     std::fill_n(w.rows, loop.rows, PairRow<S>());
     pair_rows(loop.loop->pair, m, w.rows);
@@ -266,7 +307,7 @@ void loop_bias(const CompiledModel<S>& model, const ResolvedLoops& loops, const 
       continue;
     }
     const auto m = along<S>(loop.path, MotionPart::acceleration,
-                            [&](const FrameStep& step) { return loop_step(model, step, q, v, MotionPart::acceleration, w.hinge, w.at_rest); });
+                            [&](const FrameStep& step) { return loop_step(model, step, q, v, MotionPart::acceleration, w.hinge, w); });
     std::fill_n(w.rows, loop.rows, PairRow<S>());
     pair_rows(loop.loop->pair, m, w.rows);
     for (int i = 0; i < loop.rows; ++i) bias[loop.first_row + i] = dot(w.rows[i].gradient, m.A) + w.rows[i].rate;

@@ -155,7 +155,16 @@ class SceneLoops {
   void refuse(const std::vector<S>& off, const std::string& how, const std::string& rule) const {
     for (int r = 0; r < loops_->rows; ++r)
       if (!(to_double(off[r]) <= far))
-        throw ModelError("the state given " + how + " row '" + loops_->names[r] + "' by " + short_number(to_double(off[r])) + ": " + rule + "; model.assemble(q, v) finds one");
+        throw ModelError("the state given" + prescribed() + " " + how + " row '" + loops_->names[r] + "' by " + short_number(to_double(off[r])) + ": " + rule +
+                         "; model.assemble(q, v, fix=[...]) finds one");
+  }
+
+  // What was put where its motion has it, before the state was looked at.
+  std::string prescribed() const {
+    std::string names;
+    for (size_t i = 0; i < held_.size(); ++i)
+      names += (i ? ", '" : "'") + loops_->names[first_.back() + i].substr(std::string("prescribed: ").size()) + "'";
+    return names.empty() ? names : ", with " + names + " as prescribed,";
   }
 
   Solving how_;

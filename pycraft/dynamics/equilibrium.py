@@ -80,6 +80,21 @@ class Balance(NamedTuple):
         return np.maximum(self.size, np.abs(self.along_q).max(axis=1, initial=0.0))
 
 
+def hinge_limits(model: Any, asked: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Limits (nv,) below and above, infinite where there are none or they are not asked for, and where a limited coordinate is in q."""
+    lower, upper, places = np.full(model.nv, -np.inf), np.full(model.nv, np.inf), np.zeros(model.nv, int)
+    for hinge in model.hinges.values() if asked else ():
+        if hinge.limits is None:
+            continue
+        q, v = hinge.q_slice.start, hinge.v_slice.start
+        for subhinge, low, high in zip(hinge.subhinges, *hinge.limits, strict=True):
+            kind = _core.subhinge_kinds[subhinge["kind"]]
+            if kind.nq == 1:
+                lower[v], upper[v], places[v] = low, high, q
+            q, v = q + kind.nq, v + kind.nv
+    return lower, upper, places
+
+
 def checked_tolerance(tolerance: Any) -> float:
     """What may be left of forces, as a number. EvaluationError where it is no part of them."""
     number = one_number(tolerance, "tolerance")
@@ -206,17 +221,8 @@ class _Search:
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Of x: what is left to the limits of hinges, infinite where there are none or they are not asked for."""
-        lower, upper = np.full(self.model.nv, -np.inf), np.full(self.model.nv, np.inf)
-        for hinge in self.model.hinges.values() if self.limits else ():
-            if hinge.limits is None:
-                continue
-            q, v = hinge.q_slice.start, hinge.v_slice.start
-            for subhinge, low, high in zip(hinge.subhinges, *hinge.limits, strict=True):
-                kind = _core.subhinge_kinds[subhinge["kind"]]
-                if kind.nq == 1:
-                    lower[v], upper[v] = low - self.q[q], high - self.q[q]
-                q, v = q + kind.nq, v + kind.nv
-        return lower[self.free], upper[self.free]
+        lower, upper, places = hinge_limits(self.model, self.limits)
+        return (lower - self.q[places])[self.free], (upper - self.q[places])[self.free]
 
     def go_down(self) -> None:
         """Along ẋ = W J* (what is not balanced), W one over the diagonal of ℳ + J: downhill where forces have a potential."""

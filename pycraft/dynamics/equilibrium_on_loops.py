@@ -18,12 +18,14 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from .equilibrium import Balance, Equilibrium, checked_tolerance, modes
+from .equilibrium import Balance, Equilibrium, checked_tolerance, hinge_limits, modes
 from .loop_tangents import KeptRows, kept_rows
 
 STEPS = 500
 FARTHEST = 0.3
 """Radians and metres of one step."""
+ROUNDING = 1e-12
+"""Radians and metres by which a coordinate that stands at its limit may be beyond it."""
 
 
 @dataclass(frozen=True)
@@ -47,10 +49,13 @@ class _State:
 
 
 def solved_on_loops(
-    model: Any, at: Callable[[np.ndarray], Balance], q0: np.ndarray, loops: Iterable[str], held: Iterable[int], stable: bool, tolerance: Any
-) -> Equilibrium:
+    model: Any, at: Callable[[np.ndarray], Balance], q0: np.ndarray, loops: Iterable[str], held: Iterable[int], limits: bool, stable: bool,
+    tolerance: Any,
+) -> Equilibrium:  # fmt: skip
     """The equilibrium that is found from the state on the loops near q0. EvaluationError where there is none."""
-    search = _Search(model, at, list(loops), sorted(held), checked_tolerance(tolerance))
+    low, high, _ = hinge_limits(model, limits)
+    stuck = np.flatnonzero(low == high).tolist()
+    search = _Search(model, at, list(loops), sorted({*held, *stuck}), limits, checked_tolerance(tolerance))
     first = search.start(q0)
     found = None if stable else search.newton(first)
     if found is None or not search.balanced(found):
@@ -62,7 +67,10 @@ def solved_on_loops(
         made = search.equilibrium(found)
         if not stable or made.stability != "unstable":
             return made
-        away = search.moved(found, 0.1 * np.real(made.modes[0].shape))  # from where it would leave by itself
+        leaving = 0.1 * np.real(made.modes[0].shape)  # from where it would leave by itself
+        away = search.tried(found, leaving) or search.tried(found, -leaving)
+        if away is None:
+            break
         found = search.follow(away)
     left = [mode.coordinates for mode in made.modes if mode.stability == "unstable"]
     raise _core.EvaluationError(
@@ -73,19 +81,43 @@ def solved_on_loops(
 
 
 class _Search:
-    def __init__(self, model: Any, at: Callable[[np.ndarray], Balance], loops: list[str], held: list[int], tolerance: float):
+    def __init__(self, model: Any, at: Callable[[np.ndarray], Balance], loops: list[str], held: list[int], limits: bool, tolerance: float):
         self.model, self._at, self.loops, self.held, self.tolerance = model, at, loops, held, tolerance
+        self.limits = limits
         self.names = [model.coordinate_names[j] for j in held]
         self.closing = model if set(model.loops) == set(loops) else deepcopy(model)  # of the loops that are kept alone
         for name in set(self.closing.loops) - set(loops):
             self.closing.loops.remove(name)
 
-    def start(self, q0: np.ndarray) -> _State:
-        return self.state(self.closed(q0))
+        self.lower, self.upper, self.places = hinge_limits(model, limits)
 
-    def closed(self, q: np.ndarray) -> np.ndarray:
-        """The state on the loops near q."""
-        return np.asarray(self.closing.assemble(q, fix=self.names).q)
+    def start(self, q0: np.ndarray) -> _State:
+        """At the state on the loops near q0, or near where q0 is within the limits. EvaluationError where it is not within them."""
+        own = np.asarray(q0)[self.places]
+        into = np.clip(own, self.lower, self.upper) - own
+        within = self.model.integrate(q0, into)
+        try:
+            q = self.closed(within, [self.model.coordinate_names[j] for j in np.flatnonzero(into)])
+        except _core.ModelError:
+            q = self.closed(within)
+        beyond = self.beyond(q)
+        if beyond.any():
+            j = int(np.argmax(beyond))
+            raise _core.EvaluationError(
+                f"{self.model.name!r}: the state on the loops near q0 has {self.model.coordinate_names[j]!r} beyond its limits by "
+                f"{beyond[j]:.3g}: start elsewhere (q0=), or hold coordinates (hold=)"
+            )
+        return self.state(q)
+
+    def beyond(self, q: np.ndarray) -> np.ndarray:
+        """How far each coordinate is beyond its limits, by more than a limit's rounding."""
+        own = np.asarray(q)[self.places]
+        off = np.maximum(np.maximum(self.lower - own, own - self.upper), 0.0)
+        return np.where(off > ROUNDING, off, 0.0)
+
+    def closed(self, q: np.ndarray, kept: Iterable[str] = ()) -> np.ndarray:
+        """The state on the loops near q, these coordinates and the held ones as they are."""
+        return np.asarray(self.closing.assemble(q, fix=[*self.names, *(name for name in kept if name not in self.names)]).q)
 
     def state(self, q: np.ndarray) -> _State:
         given, rows = self._at(q), kept_rows(self.model, q, self.loops, self.held)
@@ -110,7 +142,7 @@ class _Search:
         return bool((np.abs(state.balance.left) <= self.tolerance * state.sizes).all())
 
     def newton(self, state: _State) -> _State | None:
-        """Steps of Newton, shortened until less is left, to rounding; None where that leads nowhere."""
+        """Steps of Newton, shortened until less is left, within limits, to rounding; None where that leads nowhere."""
         for _ in range(STEPS):
             step = state.basis @ np.linalg.lstsq(state.stiffness(), state.pushes, rcond=1e-12)[0]
             longest = np.abs(step).max(initial=0.0)
@@ -128,9 +160,10 @@ class _Search:
         return None
 
     def tried(self, state: _State, step: np.ndarray) -> _State | None:
-        """The state after a step; None where the loops do not reach so far, or only singular."""
+        """The state after a step; None where the loops do not reach so far, or only singular, or the limits do not."""
         try:
-            return self.moved(state, step)
+            q = self.closed(self.model.integrate(state.q, step))
+            return None if self.beyond(q).any() else self.state(q)
         except (_core.ModelError, _core.EvaluationError):
             return None
 
@@ -166,6 +199,7 @@ class _Search:
         worst = sorted((j for j in range(len(left)) if left[j] != 0), key=lambda j: -abs(left[j]))
         told = ", ".join(f"{names[j]!r} {left[j]:.3g}" for j in worst[:5]) + (", ..." if len(worst) > 5 else "")
         raise _core.EvaluationError(
-            f"{self.model.name!r}: no equilibrium was found on its loops. Where the search ended there is left (N m and N) at {told}: "
+            f"{self.model.name!r}: no equilibrium was found on its loops{' within limits' if self.limits else ''}. Where the "
+            f"search ended there is left (N m and N) at {told}: "
             "balance it by tau, wrenches or effects, hold these coordinates (hold=), or start elsewhere (q0=)"
         )

@@ -59,7 +59,7 @@ class StaticsCalls:
         limits : whether q is to be within the hinges' limits
         stable : whether only a stable or indifferent equilibrium will do
         tolerance : what may be left, as a part of the largest force
-        loops : whether the loops are kept: the search starts at the state on them near q0, and their forces balance, too; not with limits
+        loops : whether the loops are kept: the search starts at the state on them near q0, and their forces balance, too
 
         Returns
         -------
@@ -87,8 +87,6 @@ class StaticsCalls:
         given = np.asarray(_core.real_array(tau, "tau"), float)
         given = np.full(self.nv, given) if given.ndim == 0 else given
         names, in_world, numbers = pushed(wrenches, wrench_axes)
-        if loops and limits:
-            raise _core.EvaluationError("limits of hinges are not kept to on loops: look at q, or hold coordinates (hold=)")
         held = held_by(model, hold)
         starts = np.asarray(_core.real_array(q0, "q"), float)
         if given.ndim not in (1, 2) or given.shape[-1] != self.nv:
@@ -110,7 +108,7 @@ class StaticsCalls:
                 return _at_rest(model, q, force, names, in_world, pushes, size)
 
             if loops:
-                return solved_on_loops(model, at, q, model.loops, held, bool(stable), tolerance)
+                return solved_on_loops(model, at, q, model.loops, held, bool(limits), bool(stable), tolerance)
             return solved(model, at, q, held, bool(limits), bool(stable), tolerance)
 
         if not states:

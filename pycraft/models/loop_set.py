@@ -45,7 +45,8 @@ class Loop(Closed):
 
     @property
     def kind(self) -> str:
-        """Of its hinge ("pin", ...; "ball" of a gimbal, too), or "blade", "wheel", "rolling ball", "surface", "coupling"."""
+        """Of its hinge ("pin", ...; "ball" of a gimbal, too, "custom" of one with oblique axes), or "blade", "wheel",
+        "rolling ball", "surface", "coupling"."""
         return self._loops._core.kind(self._name)
 
     @property
@@ -176,14 +177,13 @@ class Loops(Closed, Mapping):
         hinge = text(hinge, "the kind of a hinge")
         declared = self._ends(a, b, name) | {"kind": hinge}
         what = f"loop {declared['name']!r}"
-        if hinge == "custom":
-            remedy = "put that hinge into the tree, and close the loop at another one of its hinges"
-            raise _core.ModelError(f"{what}: a custom hinge has no rows of its own: {remedy}")
-        axes = hinge_axes(what, hinge, given["axis"], given["axes"], given["point"], None)
+        axes = hinge_axes(what, hinge, given["axis"], given["axes"], given["point"], given["subhinges"])
         declared["axes"] = [_numbers(axis, f"axis of {what}") for axis in axes]
         rotation, position = pose_parts(what, given["rotation"], given["position"], given["placement"])
         parts = {"point": given["point"], "rotation": rotation, "position": position}
         declared |= {key: None if part is None else _numbers(part, f"{key} of {what}") for key, part in parts.items()}
+        if given["subhinges"] is not None:
+            declared["subhinges"] = [_subhinge(one, what) for one in listed(given["subhinges"], f"subhinges of {what}")]
         return self._declare(declared | {"pitch": one_number(given["pitch"], f"the pitch of {what}")})
 
     def add_pair(self, b: Any, a: Any, kind: str, radius: Any, name: str | None) -> Loop:
@@ -233,7 +233,7 @@ class Loops(Closed, Mapping):
         elif "radius" in declared:
             self._core.add_pair(name, declared["a"], declared["b"], kind, declared["radius"], None)
         else:
-            shape = [declared[key] for key in ("axes", "point", "pitch", "rotation", "position")]
+            shape: list[Any] = [declared.get(key) for key in ("axes", "point", "pitch", "subhinges", "rotation", "position")]
             self._core.add_hinge(name, declared["a"], declared["b"], kind, *shape)
         self._declared[name] = dict(declared)
         return Loop(self, name)
@@ -310,6 +310,15 @@ class Loops(Closed, Mapping):
 
 def _numbers(given: Any, what: str) -> np.ndarray:
     return np.array(_core.real_array(given, what))
+
+
+def _subhinge(given: Any, what: str) -> Any:
+    """A copy of what a subhinge is given by, lists as tuples; the core says what is wrong with it."""
+    if not isinstance(given, Mapping):
+        return given
+    return {
+        key: tuple(_numbers(part, f"{key} of a subhinge of {what}")) if key in ("axis", "point") else part for key, part in given.items()
+    }
 
 
 def _coefficients(given: Any, what: str) -> list[float]:

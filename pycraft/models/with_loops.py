@@ -39,6 +39,7 @@ class WithLoops(WithFrames):
         axes: Sequence[Vector] | None = None,
         point: Vector | None = None,
         pitch: float = 0.0,
+        subhinges: Sequence[Mapping[str, Any]] | None = None,
         position: Vector | None = None,
         rotation: np.ndarray | None = None,
         placement: np.ndarray | None = None,
@@ -50,9 +51,10 @@ class WithLoops(WithFrames):
         ----------
         b, a : names of bodies or nodes, Body, Node, or None for the base
             Of two bodies. Which is which: a hinge's axes, point and placement are given as for a body b on its parent a.
-        hinge : {"weld", "pin", "slider", "screw", "universal", "gimbal", "cylindrical", "planar", "ball", "free"}
-            The motion that is permitted. A universal hinge's axes are not parallel, the middle one of a gimbal's is across the others.
-        axis, axes, point, pitch, position, rotation, placement
+        hinge : {"weld", "pin", "slider", "screw", "universal", "gimbal", "cylindrical", "planar", "ball", "free", "custom"}
+            The motion that is permitted. A universal hinge's axes are not parallel. Gimbals whose middle axis is not across the others,
+            which do not reach every rotation, and custom hinges have six rows, of which as many as their freedoms hang on the others.
+        axis, axes, point, pitch, subhinges, position, rotation, placement
             As for `add_body`: the pose of b in a is placement · (the hinge's motion).
         name : str
             By default "a to b".
@@ -65,8 +67,8 @@ class WithLoops(WithFrames):
         Raises
         ------
         ModelError
-            Ends on one body (a loop of a body with itself), names that are unknown or taken, a hinge that has no rows (custom: the remedy
-            is a body without mass on it, in the tree), and what `add_body` raises of a hinge. The model stays as it was.
+            Ends on one body (a loop of a body with itself), names that are unknown or taken, a custom hinge some of whose subhinges move
+            nothing that others do not, and what `add_body` raises of a hinge. The model stays as it was.
 
         Examples
         --------
@@ -77,7 +79,7 @@ class WithLoops(WithFrames):
         >>> bar.loops.jacobian([0, 0, 0]).shape
         (5, 3)
         """
-        given = {"axis": axis, "axes": axes, "point": point, "pitch": pitch}
+        given = {"axis": axis, "axes": axes, "point": point, "pitch": pitch, "subhinges": subhinges}
         return self.loops.add_hinge(b, a, hinge, given | {"position": position, "rotation": rotation, "placement": placement}, name)
 
     def add_rolling(

@@ -18,6 +18,7 @@ from .effects.meanings import Meanings, acted_on
 from .explain import plan_text
 from .filed import Filed
 from .measurements import Measurements
+from .off_loops import warn_off_the_loops
 from .run import Run
 from .scene_on_loops import OnLoops
 from .scene_statics import Statics
@@ -249,12 +250,18 @@ class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed):
             An effect whose forces are not finite, by name, with the time; a time that is not.
         SingularHingeError
             As forward dynamics.
+
+        Warns
+        -----
+        ModelWarning
+            A state that is off loops which are kept, or moves off them, with the row and how far; none where gains draw it back.
         """
         resting = v is None and q is not None and not hasattr(q, "v")
         t, states = moment_of(q, t, states)
         q, v = at_state(self._model, q, v)
         own = [] if states is None else np.asarray(_core.real_array(states, "states")).tolist()
         found = self._calls().evaluate(q, None if resting else v, moment(t), own, one_number(step, "step"))
+        warn_off_the_loops(self._model, [effect for effect, on in self._entries.values() if on], q, None if resting else v)
         return Evaluation(found["vdot"], found["forces"], found["passes"])
 
     def simulate(

@@ -74,7 +74,7 @@ class Statics:
 
         The model's own gravity counts for nothing; effects that act in motion alone give no force. Effects' own states are held, and
         prescribed coordinates are where their motion has them at t. Where effects keep loops the search starts at the state on them near
-        q0, and what balances forces are the loops', too (docs/loops.md); limits are not kept to there.
+        q0, and what balances forces are the loops', too (docs/loops.md).
 
         Parameters
         ----------
@@ -109,9 +109,7 @@ class Statics:
             placed = _core.scene_at_rest(calls, q, time, own)  # with prescribed coordinates where they are at t
             fixed = {*held, *np.flatnonzero(placed["known"])}
             if self._keeps_loops():
-                if limits:
-                    raise _core.EvaluationError("limits of hinges are not kept to on loops: look at q, or take effects.Limits")
-                return solved_on_loops(self.model, at, placed["q"], self._kept_loops(), fixed, bool(stable), tolerance)
+                return solved_on_loops(self.model, at, placed["q"], self._kept_loops(), fixed, bool(limits), bool(stable), tolerance)
             return solved(self.model, at, placed["q"], fixed, bool(limits), bool(stable), tolerance)
 
         if starts.ndim > 2:

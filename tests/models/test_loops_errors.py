@@ -29,10 +29,10 @@ LOOPS = [
     (dict(b="body2", placement=np.eye(3)), r"placement of loop 'base to body2' takes a \(4, 4\) pose"),
     (dict(b="body2", hinge="universal", axes=[(0, 0, 1), (0, 0, 2)]), r"axes of its universal hinge are parallel"),
     (
-        dict(b="body2", hinge="gimbal", axes=[(0, 0, 1), (0, 1, 1), (1, 0, 0)]),
-        r"middle axis of its gimbal hinge is not across .* put that hinge into the tree",
+        dict(b="body2", hinge="gimbal", axes=[(0, 0, 1), (0, 1, 1), (0, 0, 1)], pitch=1.0, point=(0, 0, np.nan)),
+        r"hinge 'base to body2'",
     ),
-    (dict(b="body2", hinge="custom"), r"loop 'base to body2': a custom hinge has no rows of its own: put that hinge into the tree"),
+    (dict(b="body2", hinge="custom"), r"loop 'base to body2': a custom hinge takes subhinges=\[...\]"),
     (dict(b="body2", hinge="screw", pitch=np.nan), r"pitch|not finite"),
     (dict(b="body2", name=""), r"a loop of 'chain of 3 rods' has no name"),
     (dict(b="body2", name="taken"), r"'chain of 3 rods' has a loop called 'taken' already"),

@@ -74,7 +74,13 @@ BODY = '[[bodies]]\nname = "arm"\n'
             6,
             "loop 'x' of kind 'coupling' has no a; it has coordinates, constant",
         ),
-        ('name = "x"\nkind = "custom"\nb = "arm"', 5, "loop 'x': kind = 'custom'; there are weld, pin"),
+        ('name = "x"\nkind = "custom"\nb = "arm"', 3, "loop 'x': a custom hinge takes subhinges=[...]"),
+        ('name = "x"\nkind = "custom"\nb = "arm"\nsubhinges = [{axis = [0, 0, 1]}]', 7, 'has no kind; give it one: kind = "pin"'),
+        (
+            'name = "x"\nkind = "custom"\nb = "arm"\naxis = [0, 0, 1]',
+            7,
+            "loop 'x' of kind 'custom' has no axis; it has a, b, subhinges, position",
+        ),
     ],
 )
 def test_what_a_file_gets_wrong(tmp_path, loop, line, said):

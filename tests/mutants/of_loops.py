@@ -54,6 +54,29 @@ CHANGES = {
         ),
         ("a start off the loops is taken", "if (!(to_double(off[r]) <= far))", "if (to_double(off[r]) > 1e300)"),
     ],
+    "cpp/recursions/custom_rows.cpp": [
+        ("a custom hinge permits nothing", "g = g - (basis[b][i] * basis[b][k]) * off.G[k];", ";", STATEMENT),
+        ("a custom hinge's place is that of doubles", "s = moved(hinge, s, times(slope, off.slopes()));", ";", STATEMENT),
+    ],
+    "cpp/dynamics/embedded_dynamics.cpp": [
+        (
+            "rows of rounding are rows",
+            "size = maximum(size, S(e.size / weights_[e.coordinate]));",
+            "size = maximum(size, S(abs(dense_[e.coordinate])));",
+            STATEMENT,
+        ),
+    ],
+    "cpp/operators/independent_direction.cpp": [
+        (
+            "velocities of the tree stay along independent coordinates",
+            "return times({map_tangent(embedded_, l), l.bound(make_symbol(definition_of(theta_dot), embedded_))});",
+            "return zero(Space::euclidean(1), embedded_->grouped()->theta());",
+            STATEMENT,
+        ),
+    ],
+    "cpp/recursions/loop_rows.h": [
+        ("rows of H inboard of a twist stay", "hinge.rows[j] = hinge.rows[j] - cross_motion(xi, hinge.rows[j]);", ";", STATEMENT),
+    ],
     "cpp/recursions/loop_tangents.h": [
         ("∂Q of functions without their second derivatives", "of_function(loop, put);", ";", STATEMENT),
     ],
@@ -61,6 +84,7 @@ CHANGES = {
         ("multipliers are the least in units of rounding", "unit_[V_.order[i]] * V_.upper(j, i)", "V_.upper(j, i)"),
     ],
     "cpp/operators/embedded_values.h": [
+        ("∂₂∂₁X without what moves X beside ∂₁Q", "add_product(g, row, i, entry.x, of_second, moved);", ";", STATEMENT),
         ("the sign of dependent velocities", "map[place * r + j] = -sum;", "map[place * r + j] = sum;"),
         ("states off the loops have numbers", "std::max(off_the_loops, 64 * to_double(epsilon<S>()))", "1e300"),
         (

@@ -102,8 +102,6 @@ def test_where_forces_lead_into_a_singular_state_nothing_is_found():
 
 
 REFUSED = {
-    "limits": (lambda: M.five_bar().equilibrium(limits=True), pc.EvaluationError, "limits of hinges are not kept to on loops"),
-    "of a model": (lambda: linkages.five_bar().equilibrium(loops=True, limits=True), pc.EvaluationError, "limits of hinges"),
     "none": (
         lambda: linkages.n_four_bar(2, 1.0).equilibrium([1.0, 0, 0, 0, 0], loops=True), pc.EvaluationError, "no equilibrium.*'crank0'"
     ),
@@ -119,6 +117,43 @@ def test_refusals_name_what_it_is(what):
     call, error, text = REFUSED[what]
     with pytest.raises(error, match=text):
         call()
+
+
+def rhombus(low, high):
+    """Rods that swing as one on two cranks, hanging or upright; the first crank within limits."""
+    bars = pc.chain(3)
+    bars.gravity = (0, -9.81, 0)
+    bars.add_loop("body2", hinge="pin", point=(1, 0, 0), name="closure")
+    bars.hinges["hinge0"].limits = (low, high)
+    return bars
+
+
+def at(crank):
+    return [crank, -crank, crank - np.pi]
+
+
+@pytest.mark.parametrize("scene", [False, True])
+def test_within_limits(scene):
+    """The upright one alone, from inside and from outside of the limits; the hanging one is beyond them."""
+    bars = rhombus(0.4, 2.9)
+    by = pc.Scene(bars).add(DOWN, E.Loop()).equilibrium if scene else lambda *given, **more: bars.equilibrium(*given, loops=True, **more)
+    for start in (0.5, 2.8, -1.2):
+        found = by(q0=at(start), limits=True)
+        close(found.q, [np.pi / 2, -np.pi / 2, -np.pi / 2])
+        assert found.stability == "unstable"
+    with pytest.raises(pc.EvaluationError, match="no stable equilibrium|within limits"):
+        by(q0=at(1.0), limits=True, stable=True)
+    assert by(q0=at(1.0), stable=True).q[0] < 0
+    bars.hinges["hinge0"].limits = (0.2, 1.0)
+    with pytest.raises(pc.EvaluationError, match="no equilibrium was found on its loops within limits"):
+        by(q0=at(0.5), limits=True)
+    bars.hinges["hinge0"].limits = (0.7, 0.7)
+    stuck = by(q0=at(0.5), limits=True)
+    assert stuck.q[0] == 0.7 and abs(stuck.holding[0]) > 1.0
+    bars.hinges["hinge0"].limits = (0.2, 1.0)
+    bars.hinges["hinge1"].limits = (0.5, 1.0)  # where the first is within its own, the second is not
+    with pytest.raises(pc.EvaluationError, match="the state on the loops near q0 has 'hinge[01]' beyond its limits by 0"):
+        by(q0=at(0.5), limits=True)
 
 
 # ------------------------------------------------------------------ interbody forces

@@ -94,6 +94,19 @@ def test_what_loops_and_prescribed_motion_ask_differently_is_refused_by_both_nam
         scene.evaluate(state.q, state.v)
 
 
+@pytest.mark.parametrize("method", ["augment", "embed"])
+def test_a_start_that_prescribed_motion_takes_off_the_loops_names_it(method):
+    """The crank is put where its motion has it, and the loop is open there: not by the state that was given."""
+    bars, _ = four_bar()
+    state = bars.assemble([1.0, -1.0, 1.0 - np.pi], [0.5, 0, 0], fix="hinge0")
+    scene = pc.Scene(bars).add(E.Prescribed("hinge0", lambda t: (1.2, 0.5, 0.0)), E.Loop(method=method))
+    said = r"the state given, with 'hinge0' as prescribed, is off row 'closure: along [xy]' by 0.0\d+: .*fix="
+    with pytest.raises(pc.ModelError, match=said):
+        scene.simulate(0.1, state.q, state.v)
+    with pytest.raises(pc.ModelError, match="the state given is off row"):
+        pc.Scene(bars).add(E.Loop(method=method)).simulate(0.1, state.q + [0.2, 0, 0], state.v)
+
+
 def test_states_that_gains_draw_are_not_taken_back():
     bars, state = four_bar()
     drawn = pc.Scene(bars).add(E.Gravity(bars.gravity), E.Loop(alpha=20.0, beta=20.0))

@@ -1,7 +1,8 @@
 """Loops of a model in TOML: tables [[loops]], each with its kind, the frames a and b, and what the kind has (docs/models.md, Files).
 
-Of a hinge the arguments of `Multibody.add_loop` by their names; of "wheel" and "rolling ball" the radius; of "surface" quadratic, linear
-and constant; of "coupling" coordinates = { name = coefficients of 1, q, q², ... } and constant.
+Of a hinge the arguments of `Multibody.add_loop` by their names, of a custom one its subhinges; of "wheel" and
+"rolling ball" the radius; of "surface" quadratic, linear and constant; of "coupling" constant and
+coordinates = { name = coefficients of 1, q, q², ... }.
 """
 
 from __future__ import annotations
@@ -11,16 +12,18 @@ from typing import Any
 from ... import _core
 from ..multibody import Multibody
 from .toml_file import TomlTable
+from .toml_subhinges import subhinges_of
 
 _HINGE = ("axis", "axes", "point", "pitch", "position", "rotation", "rpy", "quaternion")
-_KEYS: dict[str, tuple[str, ...]] = {kind: _HINGE for kind in _core.hinge_kinds if kind != "custom"} | {
+_KEYS: dict[str, tuple[str, ...]] = {kind: _HINGE for kind in _core.hinge_kinds} | {
+    "custom": ("subhinges", "position", "rotation", "rpy", "quaternion"),
     "blade": (),
     "wheel": ("radius",),
     "rolling ball": ("radius",),
     "surface": ("quadratic", "linear", "constant"),
     "coupling": ("coordinates", "constant"),
 }
-LOOP = ("name", "kind", "a", "b", "axis", "axes", "point", "pitch", "radius", "quadratic", "linear", "constant", "coordinates")
+LOOP = ("name", "kind", "a", "b", "axis", "axes", "point", "pitch", "subhinges", "radius", "quadratic", "linear", "constant", "coordinates")
 _VECTOR = "three finite numbers: [x, y, z]"
 
 
@@ -63,6 +66,7 @@ def _parts(table: TomlTable, kind: str) -> dict[str, Any]:
         "axes": table.vectors("axes", None, "a list of axes: [[1, 0, 0], [0, 1, 0]]"),
         "point": table.vector("point", 3, f"{_VECTOR} in m, in the hinge's frame"),
         "pitch": table.number("pitch", 0.0, "in metres per radian"),
+        "subhinges": subhinges_of(table),
     }
 
 

@@ -17,6 +17,7 @@ from .left_aside import QUANTITIES
 from .rotations import rotation_from_quaternion, rotation_from_rpy
 from .toml_file import TomlFile, TomlTable, nearest
 from .toml_loops import LOOP, add_loop
+from .toml_subhinges import subhinges_of
 from .xml_file import abbreviated
 
 FORMAT = 1
@@ -29,7 +30,6 @@ BODY = (
 )  # fmt: skip
 NODE = ("name", "body", *POSE)
 ACTUATOR = ("name", "coordinate", "gear", "gain", "bias", "force_range", "why_not")
-SUBHINGE = ("kind", "axis", "point", "pitch")
 MOMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 _VECTOR = "three finite numbers: [x, y, z]"
 _LIMITS = "[lower, upper], or [[lower, ...], [upper, ...]] with one of each a subhinge; -inf and inf are no limit"
@@ -203,26 +203,14 @@ def _hinge(table: TomlTable, kind: str) -> dict[str, Any]:
         options["point"] = point
     if "pitch" in table:
         options["pitch"] = table.number("pitch", 0.0, "in metres per radian")
-    subhinges = table.tables("subhinges", SUBHINGE, f"{table.label}: subhinge")
+    subhinges = subhinges_of(table)
     if subhinges is not None:
         if other := [key for key in options if key in table]:
             raise table.error(other[0], f"{table.label} has subhinges and {other[0]}; each subhinge has its own")
-        options["subhinges"] = [_subhinge(subhinge) for subhinge in subhinges]
+        options["subhinges"] = subhinges
     elif kind == "custom":
         raise table.error("hinge", f'{table.label}: a custom hinge has subhinges = [{{kind = "pin", axis = [0, 0, 1]}}, ...]')
     return options
-
-
-def _subhinge(table: TomlTable) -> dict[str, Any]:
-    if "kind" not in table:
-        raise table.error(None, f'{table.label} has no kind; give it one: kind = "pin"')
-    made: dict[str, Any] = {"kind": table.choice("kind", tuple(_core.subhinge_kinds), "")}
-    for key in ("axis", "point"):
-        if (numbers := table.vector(key, 3, _VECTOR)) is not None:
-            made[key] = numbers
-    if "pitch" in table:
-        made["pitch"] = table.number("pitch", 0.0, "in metres per radian")
-    return made
 
 
 def _pose(table: TomlTable) -> tuple[Any, list[float] | None]:

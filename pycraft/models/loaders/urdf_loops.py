@@ -5,11 +5,12 @@
       <loop name="gear" kind="coupling" constant="0.1">
         <coordinate name="motor" coefficients="0 1"/> <coordinate name="wheel" coefficients="0 -3"/>
       </loop>
+      <loop name="slot" kind="custom" b="rocker"><subhinge kind="slider" axis="1 0 0"/> <subhinge kind="pin" axis="0 0 1"/></loop>
     </pycraft>
 
 a and b are links, the root link where one is not given. Of a hinge the arguments of `Multibody.add_loop`: axis (three numbers an axis),
-point, pitch, and the placement as xyz and rpy; of "wheel" and "rolling ball" the radius; of "surface" quadratic (nine), linear and
-constant; of "coupling" coordinates with coefficients of 1, q, q², ..., and constant.
+point, pitch, and the placement as xyz and rpy; of a custom one the placement and its subhinges; of "wheel" and "rolling ball"
+the radius; of "surface" quadratic (nine), linear and constant; of "coupling" coordinates with coefficients of 1, q, q², ..., and constant.
 """
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ from .rotations import rotation_from_rpy
 from .xml_file import Element, XmlFile, label, local_name
 
 _HINGE = ("axis", "point", "pitch", "xyz", "rpy")
-KEYS: dict[str, tuple[str, ...]] = {kind: ("a", "b", *_HINGE) for kind in _core.hinge_kinds if kind != "custom"} | {
+KEYS: dict[str, tuple[str, ...]] = {kind: ("a", "b", *_HINGE) for kind in _core.hinge_kinds} | {
+    "custom": ("a", "b", "xyz", "rpy"),
     "blade": ("a", "b"),
     "wheel": ("a", "b", "radius"),
     "rolling ball": ("a", "b", "radius"),
@@ -52,7 +54,7 @@ def _add(file: XmlFile, model: Multibody, root: str, element: Element) -> None:
         raise file.error(element, f"{label(element)} is of kind {kind!r}; there are {', '.join(KEYS)}")
     if wrong := [key for key in element.attrib if key not in ("name", "kind", *KEYS[kind])]:
         raise file.error(element, f"{label(element)} of kind {kind!r} has no {wrong[0]}; it has {', '.join(KEYS[kind])}")
-    if kind != "coupling" and len(element):
+    if kind not in ("coupling", "custom") and len(element):
         raise file.error(
             element[0], f"{label(element)} of kind {kind!r} has the element <{local_name(element[0])}>; a coupling has coordinates"
         )
@@ -87,10 +89,25 @@ def _hinge(file: XmlFile, element: Element) -> dict[str, Any]:
         "axis": axes if axes.size == 3 else None,
         "axes": list(axes.reshape(-1, 3)) if axes.size > 3 else None,
         "point": file.numbers(element, "point", 3, element) if element.get("point") is not None else None,
+        "subhinges": (_subhinges(file, element) or None) if element.get("kind") == "custom" else None,
         "position": file.numbers(element, "xyz", 3, element, zero),
         "rotation": rotation_from_rpy(*angles) if any(angles) else None,
         "placement": None,
     }
+
+
+def _subhinges(file: XmlFile, element: Element) -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = []
+    for inner in element:
+        if local_name(inner) != "subhinge":
+            raise file.error(inner, f"{label(element)} has the element <{local_name(inner)}>; there is <subhinge>")
+        if wrong := [key for key in inner.attrib if key not in ("kind", "axis", "point", "pitch")]:
+            raise file.error(inner, f"<subhinge> of {label(element)} has no {wrong[0]}; it has kind, axis, point, pitch")
+        found.append({"kind": file.text(inner, "kind", element)})
+        found[-1] |= {key: file.numbers(inner, key, 3, element) for key in ("axis", "point") if inner.get(key) is not None}
+        if inner.get("pitch") is not None:
+            found[-1]["pitch"] = file.number(inner, "pitch", element, 0.0)
+    return found
 
 
 def _coordinates(file: XmlFile, element: Element) -> dict[str, Any]:

@@ -35,6 +35,11 @@ def loops_element(model: Multibody, described: dict[str, Any], root: str) -> Ele
                 element.set(end, loop[end] or root)
         for key, value in _numbers(loop).items():
             element.set(key, numbers_text(np.ravel(value)))
+        for one in loop.get("subhinges") or ():
+            subhinge = etree.SubElement(element, "subhinge", kind=one["kind"])
+            for key in ("axis", "point", "pitch"):
+                if key in one:
+                    subhinge.set(key, numbers_text(np.ravel(one[key])))
     return ours
 
 

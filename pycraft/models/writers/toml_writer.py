@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 _HEAD = "# A model of PyCraft: SI units and radians. docs/models.md, Files, says what the keys mean.\n\n"
 _SILENT = {"bias": [0.0, 0.0, 0.0], "force range": [-np.inf, np.inf]}
-_ZERO = np.zeros(3)
+_ZERO, _Z = np.zeros(3), np.array([0.0, 0.0, 1.0])
 # Of each kind that is given axes: which of its subhinges have them, in order. (Of a plane the normal is given, the axis of the last.)
 _GIVEN_AXES = {
     "pin": (0,),
@@ -111,6 +111,8 @@ def loop_data(model: Multibody, loop: dict[str, Any]) -> dict[str, Any]:
         axes = loop["axes"]
         data |= {"axis": axes[0]} if len(axes) == 1 else {"axes": axes} if axes else {}
         data |= {} if loop["point"] is None else {"point": loop["point"]}
+        if "subhinges" in loop:
+            data["subhinges"] = [_subhinge({"axis": _Z, "point": _ZERO, "pitch": 0.0} | one) for one in loop["subhinges"]]
         rotation, position = (zero if loop[key] is None else loop[key] for key, zero in (("rotation", np.eye(3)), ("position", _ZERO)))
         data |= _pose({"rotation": rotation, "position": position})
     data |= {key: loop[key] for key in ("quadratic", "linear") if key in loop}

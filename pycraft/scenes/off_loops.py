@@ -1,0 +1,37 @@
+"""States that are off the loops which a scene keeps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from ..models.warning import warn
+from .effects.effect import Effect
+from .effects.loops import Loop
+
+FAR = 1e-6
+"""Residuals from here on are no state on the loops, as starts of runs have it."""
+
+
+def warn_off_the_loops(model: Any, effects: Iterable[Effect], q: np.ndarray, v: np.ndarray | None) -> None:
+    """A ModelWarning that names the row that a state misses most, by its residual or, at velocities v, by its rate, of loops that are kept.
+
+    Of those that gains draw back (Baumgarte's) none: a state off them is what they are for.
+
+    Accelerations there keep what is missed as it is; what they say is of a mechanism that has come apart. Cost: the rows and Q.
+    """
+    keeping = [effect for effect in effects if isinstance(effect, Loop) and not (effect.alpha or effect.beta)]
+    if not keeping:
+        return
+    loops, kept = model.loops, [name for effect in keeping for name in effect.kept(model)]
+    rows = [row for name in kept for row in range(loops[name].slice.start, loops[name].slice.stop)]
+    for off, how in ((loops.residual(q), "is off"), (np.zeros(len(loops.rows)) if v is None else loops.jacobian(q) @ v, "moves off")):
+        worst = rows[int(np.argmax(np.abs(off[rows])))] if rows else None
+        if worst is not None and abs(off[worst]) > FAR:
+            warn(
+                f"the state {how} row {loops.rows[worst]!r} of {model.name!r} by {abs(off[worst]):.3g}: its accelerations keep that; "
+                "model.assemble(q, v) has a state on the loops"
+            )
+            return
