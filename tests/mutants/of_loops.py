@@ -102,6 +102,11 @@ CHANGES = {
             "asked.tau[coordinate] - generalized_[coordinate]",
         ),
         ("embedded coordinates are chosen by their units", "e.value / weights_[e.coordinate]", "e.value"),
+        (
+            "rows that are rounding are directions of embedded loops",
+            "S(e.size / weights_[e.coordinate])",
+            "S(abs(e.value) / weights_[e.coordinate])",
+        ),
     ],
     "cpp/simulation/effects/loop_penalty.cpp": [
         ("springs of loops push one body alone", "push(of_.a[l].body, a_[l], S(-1) * force_to_parent(motion_.X, F), out);", ";", STATEMENT),
