@@ -13,7 +13,6 @@ namespace pycraft {
 namespace {
 
 constexpr double reach_of_steps = 1e-4;      // as of states taken onto loops by augmentation (states_on_loops.cpp)
-constexpr double dependent_row = 1e-8;       // of pivots, by the largest: rows that are left below it hang on those before
 constexpr int most_steps = 8;
 
 }  // namespace
@@ -47,8 +46,9 @@ S EmbeddedWorkspace<S>::size_of(int row) const {
 }
 
 // ------------------------------------------------------------------ which are independent
-// Complete pivoting of the node's rows at rows_: weights_ are √ℳ_ii. Rows are in units of what their entries are sums of: one that asks nothing but
-// for rounding, as of a planar loop in any plane, stays as small as it is. given: no coordinate that is wanted as an independent one is eliminated.
+// Complete pivoting of the node's rows at rows_: weights_ are √ℳ_ii. Rows are in units of what their entries are sums of, and what is left of one
+// below rank_tolerance hangs on those before, as by augmentation: a row that asks nothing but for rounding, as of a planar loop in any plane, is
+// no direction. given: no coordinate that is wanted as an independent one is eliminated.
 template <class S>
 void EmbeddedWorkspace<S>::choose_of(size_t node, bool given) {
   using std::abs;
@@ -68,7 +68,7 @@ void EmbeddedWorkspace<S>::choose_of(size_t node, bool given) {
   for (size_t rank = 0; rank < std::min(m, n); ++rank) {
     check_interrupt_at(static_cast<int>(rank), static_cast<int>(n));
     size_t row = m, column = n;
-    S best = S(dependent_row);
+    S best = rank_tolerance<S>();
     for (size_t i = 0; i < m; ++i)
       for (size_t j = 0; !row_taken[i] && j < n; ++j)
         if (!dependent[j] && !kept[j] && abs(A[i * n + j]) > best) best = abs(A[i * n + j]), row = i, column = j;
@@ -83,7 +83,7 @@ void EmbeddedWorkspace<S>::choose_of(size_t node, bool given) {
   for (size_t j = 0; j < n; ++j) {
     if (given && !kept[j] && !dependent[j]) refuse_choice(node, "'" + tree_.coordinate_names[at.coordinates[j]] + "' does not follow");
     for (size_t i = 0; given && i < m; ++i)
-      if (!row_taken[i] && abs(A[i * n + j]) > S(dependent_row)) refuse_choice(node, "row '" + loops_->names[at.rows[i]] + "' holds '" + tree_.coordinate_names[at.coordinates[j]] + "'");
+      if (!row_taken[i] && abs(A[i * n + j]) > rank_tolerance<S>()) refuse_choice(node, "row '" + loops_->names[at.rows[i]] + "' holds '" + tree_.coordinate_names[at.coordinates[j]] + "'");
     if (!dependent[j]) to.independent.push_back(static_cast<int>(j));
   }
   const size_t d = to.rows.size(), r = to.independent.size();

@@ -65,36 +65,6 @@ CHANGES = {
             "size = maximum(size, S(abs(dense_[e.coordinate])));",
             STATEMENT,
         ),
-    ],
-    "cpp/operators/independent_direction.cpp": [
-        (
-            "velocities of the tree stay along independent coordinates",
-            "return times({map_tangent(embedded_, l), l.bound(make_symbol(definition_of(theta_dot), embedded_))});",
-            "return zero(Space::euclidean(1), embedded_->grouped()->theta());",
-            STATEMENT,
-        ),
-    ],
-    "cpp/recursions/loop_rows.h": [
-        ("rows of H inboard of a twist stay", "hinge.rows[j] = hinge.rows[j] - cross_motion(xi, hinge.rows[j]);", ";", STATEMENT),
-    ],
-    "cpp/recursions/loop_tangents.h": [
-        ("∂Q of functions without their second derivatives", "of_function(loop, put);", ";", STATEMENT),
-    ],
-    "cpp/numerics/rank_factors.h": [
-        ("multipliers are the least in units of rounding", "unit_[V_.order[i]] * V_.upper(j, i)", "V_.upper(j, i)"),
-    ],
-    "cpp/operators/embedded_values.h": [
-        ("∂₂∂₁X without what moves X beside ∂₁Q", "add_product(g, row, i, entry.x, of_second, moved);", ";", STATEMENT),
-        ("the sign of dependent velocities", "map[place * r + j] = -sum;", "map[place * r + j] = sum;"),
-        ("states off the loops have numbers", "std::max(off_the_loops, 64 * to_double(epsilon<S>()))", "1e300"),
-        (
-            "rotors around a loop are not felt",
-            "transposed_multiply_add(maps_[g].data(), JX.data(), to.hinge_diagonal(g), r, n, r);",
-            "static_cast<void>(JX);",
-            STATEMENT,
-        ),
-    ],
-    "cpp/dynamics/embedded_dynamics.cpp": [
         (
             "embedded rows without what velocities ask",
             "loop_bias(*model_, *loops, asked.q, asked.v, buffers_, c_.data());",
@@ -126,6 +96,39 @@ CHANGES = {
             "asked.tau[coordinate] - generalized_[coordinate]",
         ),
         ("embedded coordinates are chosen by their units", "e.value / weights_[e.coordinate]", "e.value"),
+        (
+            "rows that are rounding are directions of embedded loops",
+            "S(e.size / weights_[e.coordinate])",
+            "S(abs(e.value) / weights_[e.coordinate])",
+        ),
+    ],
+    "cpp/operators/independent_direction.cpp": [
+        (
+            "velocities of the tree stay along independent coordinates",
+            "return times({map_tangent(embedded_, l), l.bound(make_symbol(definition_of(theta_dot), embedded_))});",
+            "return zero(Space::euclidean(1), embedded_->grouped()->theta());",
+            STATEMENT,
+        ),
+    ],
+    "cpp/recursions/loop_rows.h": [
+        ("rows of H inboard of a twist stay", "hinge.rows[j] = hinge.rows[j] - cross_motion(xi, hinge.rows[j]);", ";", STATEMENT),
+    ],
+    "cpp/recursions/loop_tangents.h": [
+        ("∂Q of functions without their second derivatives", "of_function(loop, put);", ";", STATEMENT),
+    ],
+    "cpp/numerics/rank_factors.h": [
+        ("multipliers are the least in units of rounding", "unit_[V_.order[i]] * V_.upper(j, i)", "V_.upper(j, i)"),
+    ],
+    "cpp/operators/embedded_values.h": [
+        ("∂₂∂₁X without what moves X beside ∂₁Q", "add_product(g, row, i, entry.x, of_second, moved);", ";", STATEMENT),
+        ("the sign of dependent velocities", "map[place * r + j] = -sum;", "map[place * r + j] = sum;"),
+        ("states off the loops have numbers", "std::max(off_the_loops, 64 * to_double(epsilon<S>()))", "1e300"),
+        (
+            "rotors around a loop are not felt",
+            "transposed_multiply_add(maps_[g].data(), JX.data(), to.hinge_diagonal(g), r, n, r);",
+            "static_cast<void>(JX);",
+            STATEMENT,
+        ),
     ],
     "cpp/simulation/effects/loop_penalty.cpp": [
         ("springs of loops push one body alone", "push(of_.a[l].body, a_[l], S(-1) * force_to_parent(motion_.X, F), out);", ";", STATEMENT),
