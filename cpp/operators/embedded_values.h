@@ -204,7 +204,8 @@ class EmbeddedValues final : public TreeValues<MixedBlocks<RigidBlocks<S>>> {
       }
     std::vector<S> moved(source_.loops_of(g)->rows.size() * size_t(r), S(0));
     LoopTangents<Tangent<S, 1>>(there.model, own, there.q, moving, there.inserted).jacobian([&](int row, int i, const Tangent<S, 1>& entry) {
-      add_product(g, row, i, entry.d[0], maps_[g], moved), add_product(g, row, i, entry.x, of_second, moved);
+      add_product(g, row, i, entry.d[0], maps_[g], moved);
+      add_product(g, row, i, entry.x, of_second, moved);
     });
     there.jacobian([&](int row, int i, const S& entry) { add_product(g, row, i, entry, of_first, moved); });
     put_dependent(g, moved, tangent);
