@@ -249,5 +249,9 @@ void custom_rows(const Multibody& permitted, const Pose<S>& X, const Vector6<S>&
   template void custom_rows(const Multibody&, const Pose<Tangent<Tangent<S, 1>, 1>>&, const Vector6<Tangent<Tangent<S, 1>, 1>>&, Tangent<Tangent<S, 1>, 1>*, \
                             Vector6<Tangent<Tangent<S, 1>, 1>>*, Tangent<Tangent<S, 1>, 1>*);
 PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_CUSTOM_ROWS_AND_DERIVATIVES)
+using Derivatives = Tangent<double, 4>;  // as effects of scenes carry them
+using SecondDerivatives = Tangent<Derivatives, 4>;
+PYCRAFT_CUSTOM_ROWS(Derivatives)
+PYCRAFT_CUSTOM_ROWS(SecondDerivatives)
 
 }  // namespace pycraft
