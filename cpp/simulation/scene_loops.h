@@ -8,6 +8,7 @@
 
 #include <memory>
 #include <string>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -142,9 +143,11 @@ class SceneLoops {
   void take(const KeptLoops& kept, ResolvedLoops& to) {
     const std::shared_ptr<const ResolvedLoops> all = kept.set->resolved();
     whole_.push_back(all);
+    std::unordered_map<std::string, const ResolvedLoop*> by_name;
+    for (const ResolvedLoop& loop : all->loops) by_name[loop.loop->name] = &loop;
     for (const std::string& name : kept.kept())
-      for (const ResolvedLoop& loop : all->loops) {
-        if (loop.loop->name != name) continue;
+      if (const auto known = by_name.find(name); known != by_name.end()) {
+        const ResolvedLoop& loop = *known->second;
         ResolvedLoop own = loop;
         own.first_row = to.rows;
         for (int r = loop.first_row; r < loop.first_row + loop.rows; ++r) to.names.push_back(all->names[r]), to.of_positions.push_back(all->of_positions[r]);
