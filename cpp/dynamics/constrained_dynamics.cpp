@@ -82,11 +82,12 @@ void ConstrainedWorkspace<S>::factor() {
         own += size * size / d;
       });
       const S unit = maximum(square, own) > S(0) ? S(sqrt(maximum(square, own))) : S(1);
+      const S per = S(1) / unit;
       S left = S(0);
       systems_[g].add_column();
       for (const auto& e : rows_.entries[row]) dense_[e.coordinate] = e.value;
       half_inverse_tip_to_base(*model_, blocks_, reach, dense_.data(), z_, epsilon_,
-                               [&](int k, int i, const S& w) { left += (w / unit) * (w / unit), systems_[g].add_entry(groups_.place[k] + i, w / unit); });
+                               [&](int k, int i, const S& w) { left += (w * per) * (w * per), systems_[g].add_entry(groups_.place[k] + i, w * per); });
       for (const auto& e : rows_.entries[row]) dense_[e.coordinate] = S(0);
       unit_[row] = unit;
       if (sqrt(left) > rank_tolerance<S>())  // the next row takes the place of one that asks nothing here

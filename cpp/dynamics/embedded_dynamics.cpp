@@ -14,6 +14,7 @@ namespace {
 
 constexpr double reach_of_steps = 1e-4;      // as of states taken onto loops by augmentation (states_on_loops.cpp)
 constexpr int most_steps = 8;
+constexpr int most_at_once = 32;             // rows of a node whose pivots are looked for among all of them
 
 }  // namespace
 
@@ -48,48 +49,96 @@ S EmbeddedWorkspace<S>::size_of(int row) const {
 // ------------------------------------------------------------------ which are independent
 // Complete pivoting of the node's rows at rows_: weights_ are √ℳ_ii. Rows are in units of what their entries are sums of, and what is left of one
 // below rank_tolerance hangs on those before, as by augmentation: a row that asks nothing but for rounding, as of a planar loop in any plane, is
-// no direction. given: no coordinate that is wanted as an independent one is eliminated.
+// no direction. may_depend: what may be eliminated.
 template <class S>
-void EmbeddedWorkspace<S>::choose_of(size_t node, bool given) {
+void EmbeddedWorkspace<S>::choose_few(size_t node, bool given) {
   using std::abs;
   const EmbeddedNode& at = nodes_[node];
   Choice& to = choices_[node];
   const size_t m = at.rows.size(), n = at.coordinates.size();
-  std::vector<S> A(m * n, S(0)), sizes(m, S(0));
+  std::vector<S> A(m * n, S(0));
   for (size_t i = 0; i < m; ++i) {
-    S& size = sizes[i];
-    for (const auto& e : rows_.entries[at.rows[i]]) dense_[e.coordinate] = e.value / weights_[e.coordinate], size = maximum(size, S(e.size / weights_[e.coordinate]));
+    for (const auto& e : rows_.entries[at.rows[i]]) dense_[e.coordinate] = e.value / weights_[e.coordinate];
+    const S size = size_beside_weights(at.rows[i]);
     for (size_t j = 0; j < n; ++j) A[i * n + j] = size > S(0) ? S(dense_[at.coordinates[j]] / size) : S(0);
     for (const auto& e : rows_.entries[at.rows[i]]) dense_[e.coordinate] = S(0);
   }
-  std::vector<char> row_taken(m, 0), dependent(n, 0), kept(n, 0);
-  for (size_t j = 0; given && j < n; ++j) kept[j] = wanted_[at.coordinates[j]];
-  to.rows.clear(), to.sizes.clear(), to.dependent.clear(), to.independent.clear();
+  std::vector<char> row_taken(m, 0);
   for (size_t rank = 0; rank < std::min(m, n); ++rank) {
-    check_interrupt_at(static_cast<int>(rank), static_cast<int>(n));
     size_t row = m, column = n;
     S best = rank_tolerance<S>();
     for (size_t i = 0; i < m; ++i)
       for (size_t j = 0; !row_taken[i] && j < n; ++j)
-        if (!dependent[j] && !kept[j] && abs(A[i * n + j]) > best) best = abs(A[i * n + j]), row = i, column = j;
+        if (!to.depends[j] && to.may_depend[j] && abs(A[i * n + j]) > best) best = abs(A[i * n + j]), row = i, column = j;
     if (row == m) break;
-    row_taken[row] = dependent[column] = 1;
-    to.rows.push_back(at.rows[row]), to.sizes.push_back(sizes[row]), to.dependent.push_back(static_cast<int>(column));
+    row_taken[row] = to.depends[column] = 1;
+    to.rows.push_back(at.rows[row]);
     for (size_t i = 0; i < m; ++i) {
       const S factor = A[i * n + column] / A[row * n + column];
       for (size_t j = 0; !row_taken[i] && j < n; ++j) A[i * n + j] -= factor * A[row * n + j];
     }
   }
-  for (size_t j = 0; j < n; ++j) {
-    if (given && !kept[j] && !dependent[j]) refuse_choice(node, "'" + tree_.coordinate_names[at.coordinates[j]] + "' does not follow");
-    for (size_t i = 0; given && i < m; ++i)
-      if (!row_taken[i] && abs(A[i * n + j]) > rank_tolerance<S>()) refuse_choice(node, "row '" + loops_->names[at.rows[i]] + "' holds '" + tree_.coordinate_names[at.coordinates[j]] + "'");
-    if (!dependent[j]) to.independent.push_back(static_cast<int>(j));
+  for (size_t i = 0; given && i < m; ++i)
+    for (size_t j = 0; !row_taken[i] && j < n; ++j)
+      if (abs(A[i * n + j]) > rank_tolerance<S>()) refuse_held(node, at.rows[i], static_cast<int>(j));
+}
+
+// Row after row, as they are declared.
+template <class S>
+void EmbeddedWorkspace<S>::choose_many(size_t node, bool given) {
+  const EmbeddedNode& at = nodes_[node];
+  Choice& to = choices_[node];
+  to.elimination.begin(static_cast<int>(at.coordinates.size()));
+  for (const int row : at.rows) {
+    check_interrupt_at(row, static_cast<int>(at.coordinates.size()));
+    const S least = rank_tolerance<S>() * size_beside_weights(row);
+    enter(row, to.elimination);
+    if (const int pivot = to.elimination.eliminate(to.weights.data(), to.may_depend.data(), least); pivot >= 0) {
+      to.depends[pivot] = 1, to.rows.push_back(row);
+    } else if (given) {
+      enter(row, to.elimination);
+      if (const int held = to.elimination.eliminate(to.weights.data(), nullptr, least); held >= 0) refuse_held(node, row, held);
+    }
   }
-  const size_t d = to.rows.size(), r = to.independent.size();
-  to.Q_d.resize(d * d), to.Q_r.resize(d * (r + 1)), to.work.resize(d * (r + 1));
+}
+
+// given: no coordinate that is wanted as an independent one is eliminated.
+template <class S>
+void EmbeddedWorkspace<S>::choose_of(size_t node, bool given) {
+  const EmbeddedNode& at = nodes_[node];
+  Choice& to = choices_[node];
+  const size_t n = at.coordinates.size();
+  to.rows.clear(), to.dependent.clear(), to.independent.clear();
+  to.depends.assign(n, 0), to.may_depend.assign(n, 1), to.weights.resize(n);
+  for (size_t j = 0; j < n; ++j) to.weights[j] = weights_[at.coordinates[j]], to.may_depend[j] = !given || !wanted_[at.coordinates[j]];
+  if (at.rows.size() > most_at_once)
+    choose_many(node, given);
+  else
+    choose_few(node, given);
+  for (size_t j = 0; j < n; ++j) {
+    if (given && to.may_depend[j] && !to.depends[j]) refuse_choice(node, "'" + tree_.coordinate_names[at.coordinates[j]] + "' does not follow");
+    (to.depends[j] ? to.dependent : to.independent).push_back(static_cast<int>(j));
+  }
+  const size_t r = to.independent.size();
   embedded_.factors[node].resize(static_cast<int>(n), static_cast<int>(r));
   for (size_t a = 0; a < r; ++a) embedded_.factors[node].X[size_t(to.independent[a]) * r + a] = S(1);
+}
+
+// What entries of a row are sums of, in units of energy, at most.
+template <class S>
+S EmbeddedWorkspace<S>::size_beside_weights(int row) const {
+  S size = S(0);
+  for (const auto& e : rows_.entries[row]) size = maximum(size, S(e.size / weights_[e.coordinate]));
+  return size;
+}
+template <class S>
+void EmbeddedWorkspace<S>::enter(int row, SparseElimination<S>& elimination) const {
+  for (const auto& e : rows_.entries[row]) elimination.entry(embedded_.place(e.coordinate), e.value);
+}
+
+template <class S>
+void EmbeddedWorkspace<S>::refuse_held(size_t node, int row, int place) {
+  refuse_choice(node, "row '" + loops_->names[row] + "' holds '" + tree_.coordinate_names[nodes_[node].coordinates[place]] + "'");
 }
 
 template <class S>
@@ -141,27 +190,29 @@ int EmbeddedWorkspace<S>::rank() const {
 }
 
 // ------------------------------------------------------------------ X, and what follows from it
+// Q_d of every node, pivots among the dependent coordinates.
 template <class S>
-void EmbeddedWorkspace<S>::find_maps() {
+void EmbeddedWorkspace<S>::factor_rows() {
   for (size_t n = 0; n < nodes_.size(); ++n) {
     Choice& of = choices_[n];
-    const size_t d = of.rows.size(), r = of.independent.size();
-    if (d == 0) continue;
-    for (size_t i = 0; i < d; ++i) {
-      for (const auto& e : rows_.entries[of.rows[i]]) dense_[e.coordinate] = e.value;
-      for (size_t j = 0; j < d; ++j) of.Q_d[i * d + j] = dense_[nodes_[n].coordinates[of.dependent[j]]];
-      for (size_t j = 0; j < r; ++j) of.Q_r[i * r + j] = dense_[nodes_[n].coordinates[of.independent[j]]];
-      for (const auto& e : rows_.entries[of.rows[i]]) dense_[e.coordinate] = S(0);
-    }
-    if (!of.lu.factor(of.Q_d.data(), static_cast<int>(d), of.sizes.data())) {
+    if (of.rows.empty()) continue;
+    of.elimination.begin(static_cast<int>(of.weights.size()));
+    const S noise = S(4 * std::min<int>(static_cast<int>(of.rows.size()), most_at_once)) * epsilon<S>();  // of sums of so many products
+    for (const int row : of.rows) {
+      enter(row, of.elimination);
+      if (of.elimination.eliminate(of.weights.data(), of.depends.data(), noise * size_beside_weights(row)) >= 0) continue;
       std::string named;
-      for (const int row : of.rows) named += (named.empty() ? "'" : ", '") + loops_->names[row] + "'";
+      for (const int each : of.rows) named += (named.empty() ? "'" : ", '") + loops_->names[each] + "'";
       throw EvaluationError("loops of '" + source_.name() + "' are singular at this state, by rows " + named + ": no coordinates describe what is free (method 'augment' goes through)");
     }
-    of.lu.solve(of.Q_r.data(), static_cast<int>(r), of.work.data());
-    for (size_t i = 0; i < d; ++i)
-      for (size_t a = 0; a < r; ++a) embedded_.factors[n].X[size_t(of.dependent[i]) * r + a] = -of.Q_r[i * r + a];
   }
+}
+
+template <class S>
+void EmbeddedWorkspace<S>::find_maps() {
+  factor_rows();
+  for (size_t n = 0; n < nodes_.size(); ++n)
+    if (!choices_[n].rows.empty()) choices_[n].elimination.complete(embedded_.factors[n].X.data(), embedded_.factors[n].r);
 }
 
 // target: of all rows; x of the dependent coordinates, of all nodes.
@@ -170,9 +221,11 @@ void EmbeddedWorkspace<S>::put_dependent(S* target, S* x) {
   for (size_t n = 0; n < nodes_.size(); ++n) {
     Choice& of = choices_[n];
     if (of.rows.empty()) continue;
-    for (size_t i = 0; i < of.rows.size(); ++i) of.Q_r[i] = target[of.rows[i]];
-    of.lu.solve(of.Q_r.data(), 1, of.work.data());
-    for (size_t i = 0; i < of.rows.size(); ++i) x[nodes_[n].coordinates[of.dependent[i]]] = -of.Q_r[i];
+    by_rows_.resize(std::max(by_rows_.size(), of.rows.size()));
+    std::vector<S>& own = embedded_.factors[n].full;
+    for (size_t i = 0; i < of.rows.size(); ++i) by_rows_[i] = target[of.rows[i]];
+    of.elimination.solve(by_rows_.data(), own.data());
+    for (const int place : of.dependent) x[nodes_[n].coordinates[place]] = -own[place];
   }
 }
 
@@ -203,7 +256,7 @@ void EmbeddedWorkspace<S>::bring(const std::shared_ptr<const ResolvedLoops>& loo
   set_loops(loops);
   if (!chosen_) choose(loops, q);
   rows_.find(*model_, *loops_, q, buffers_);
-  find_maps();
+  factor_rows();
   S left = off(q);
   moved_.resize(model_->nq), delta_.resize(model_->nv);
   for (int step = 0; step < most_steps && left > S(0); ++step) {  // Newton, as long as each step leaves less than half
@@ -215,7 +268,7 @@ void EmbeddedWorkspace<S>::bring(const std::shared_ptr<const ResolvedLoops>& loo
     left = now;
     std::copy_n(moved_.data(), model_->nq, q);
     rows_.find(*model_, *loops_, q, buffers_);
-    find_maps();
+    factor_rows();
   }
   velocities(v, rates);
 }
@@ -337,14 +390,12 @@ template <class S>
 void EmbeddedWorkspace<S>::find_multipliers(const Asked& asked) {
   for (size_t n = 0; n < nodes_.size(); ++n) {
     Choice& of = choices_[n];
-    const size_t d = of.rows.size();
-    if (d == 0) continue;
-    for (size_t i = 0; i < d; ++i) {
-      const int coordinate = nodes_[n].coordinates[of.dependent[i]];
-      of.Q_r[i] = generalized_[coordinate] - asked.tau[coordinate];
-    }
-    of.lu.solve_transposed(of.Q_r.data());
-    for (size_t i = 0; i < d; ++i) lambda_[of.rows[i]] = of.Q_r[i];
+    if (of.rows.empty()) continue;
+    by_rows_.resize(std::max(by_rows_.size(), of.rows.size()));
+    std::vector<S>& own = embedded_.factors[n].full;
+    for (const int place : of.dependent) own[place] = generalized_[nodes_[n].coordinates[place]] - asked.tau[nodes_[n].coordinates[place]];
+    of.elimination.solve_transposed(own.data(), by_rows_.data());
+    for (size_t i = 0; i < of.rows.size(); ++i) lambda_[of.rows[i]] = by_rows_[i];
   }
 }
 

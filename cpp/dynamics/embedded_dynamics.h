@@ -8,10 +8,12 @@
 // The loops' forces are known afterwards, Q_d* λ = (forces - T)_d; of rows that hang on others λ is zero.
 //
 // Which coordinates are independent is chosen at a state, by elimination of Q with complete pivoting in units of energy: columns by 1/√ℳ_ii, rows by
-// their sizes, so that entries of X are of order one; or given, of a node as many as are free, and then the others are eliminated. Positions off the loops go back by Newton's steps of the dependent coordinates alone, velocities
-// by X: what is independent stays, and follows an ordinary differential equation.
+// their sizes, so that entries of X are of order one; of nodes of many rows, row after row, each with the largest of its entries for pivot; or given,
+// of a node as many as are free, and then the others are eliminated. Positions off the loops go back by Newton's steps of the dependent coordinates
+// alone, velocities by X: what is independent stays, and follows an ordinary differential equation.
 //
-// Cost O(N) and O(n³) of a node of n coordinates. Form fast; others are in operators (soa.embedded()).
+// Cost O(N), of a node of n coordinates with r independent ones O(n r²), and what its rows cost to eliminate: linear where each shares coordinates with a
+// few before it, as in a ladder; never more than O(n³). Form fast; others are in operators (soa.embedded()).
 // Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, the chapter on constraint embedding.
 #pragma once
 
@@ -19,7 +21,7 @@
 #include <vector>
 
 #include "dynamics/constrained_dynamics.h"
-#include "numerics/row_pivots.h"
+#include "numerics/sparse_elimination.h"
 #include "recursions/embedded_nodes.h"
 
 namespace pycraft {
@@ -56,13 +58,20 @@ class EmbeddedWorkspace {
   // Of a node with loops: which of its rows, which of its coordinates by place, and Q_d in factors.
   struct Choice {
     std::vector<int> rows, dependent, independent;
-    std::vector<S> sizes, Q_d, Q_r, work;  // sizes: of rows, in units of energy
-    RowPivotLU<S> lu;
+    std::vector<char> depends, may_depend;   // of all its coordinates
+    std::vector<S> weights;                  // of them
+    SparseElimination<S> elimination;
   };
   void set_loops(const std::shared_ptr<const ResolvedLoops>& loops);
   void place(const S* q);
-  void find_maps();                          // X of every node at rows_
+  void factor_rows();                        // of every node, at rows_
+  void find_maps();                          // and X
+  void choose_many(size_t node, bool given);
+  void choose_few(size_t node, bool given);
   void choose_of(size_t node, bool given);
+  S size_beside_weights(int row) const;
+  void enter(int row, SparseElimination<S>& elimination) const;
+  [[noreturn]] void refuse_held(size_t node, int row, int place);
   [[noreturn]] void refuse_choice(size_t node, const std::string& what);
   void put_dependent(S* rows_target, S* x);  // x_d = -Q_d⁻¹ target
   void velocities(S* v, const S* rates);
@@ -88,7 +97,7 @@ class EmbeddedWorkspace {
   EmbeddedTree<S> embedded_;
   LoopBuffers<S> buffers_;
   LoopRows<S> rows_;
-  std::vector<S> x_, lambda_, c_, bias_, generalized_, load_, delta_, added_, residual_, moved_, unit_, weights_, off_, dense_;
+  std::vector<S> x_, lambda_, c_, bias_, generalized_, load_, delta_, added_, residual_, moved_, unit_, weights_, off_, dense_, by_rows_;
 };
 template <>
 inline constexpr bool available_at<EmbeddedWorkspace, Digits50> = false;

@@ -39,7 +39,7 @@ struct Reflections {
   S& at(int i, int j) { return A[start[j] + (i - top[j])]; }
   const S& at(int i, int j) const { return A[start[j] + (i - top[j])]; }
 
-  // Pivoting: the column of which most is left comes next. Ends where none has more than `tolerance` left, or the next one has not: at the rank.
+  // Pivoting: the column of which most is left comes next. Without it the order may be tried, and a recording has no guard of it. Ends where none has more than `tolerance` left, or the next one has not: at the rank.
   void factor(bool pivoting, const S& tolerance) {
     using std::sqrt;
     diagonal.assign(columns, S(0)), beta.assign(columns, S(0));
@@ -49,12 +49,12 @@ struct Reflections {
       S most = square(k, k);
       for (int j = k + 1; j < columns && pivoting; ++j)
         if (const S other = square(j, k); soft(other) > soft(most)) best = j, most = other;
-      if (!(sqrt(most) > tolerance)) return;
+      const S length = sqrt(most);
+      if (pivoting ? !(length > tolerance) : !(soft(length) > soft(tolerance))) return;
       if (best != k) {
         std::swap_ranges(&at(top[k], k), &at(top[k], k) + rows, &at(top[best], best));
         std::swap(order[k], order[best]);
       }
-      const S length = sqrt(most);
       diagonal[k] = where_less(S(0), at(k, k), S(-length), length);
       at(k, k) -= diagonal[k];
       const S size = square(k, k);
@@ -162,6 +162,7 @@ class MinimumNormSystem {
 
  private:
   bool factor_in_order(const S& tolerance) {
+    using std::abs;
     const int m = count_;
     std::vector<int> order(m), lowest(m, n_), first(n_, m), last(n_, -1), row(n_), place(n_);
     for (int j = 0; j < m; ++j) {
@@ -188,7 +189,8 @@ class MinimumNormSystem {
       for (const auto& [i, value] : given_[order[j]]) V_.at(place[i], j) = value;
     V_.order = order;
     V_.factor(false, tolerance);
-    return V_.rank == m;
+    if (V_.rank < m) return false;
+    return std::all_of(V_.diagonal.begin(), V_.diagonal.end(), [&](const S& d) { return abs(d) > tolerance; });  // of recorded ones from here on
   }
 
   int n_ = 0, count_ = 0;

@@ -4,12 +4,12 @@
 // its own with X = 1. X is that of operators/embedded_operators.h. With the articulated inertias of what is outboard put in at the node's bodies, tip
 // to base inside the node and from node to node:
 //
-//   R(k) = P(k) + Σ_{c in n} φ(k,c) R(c) φ(k,c)*,   P(k) = M(k) + Σ_{nodes on k} P⁺
-//   ℳ_n, F: composite bodies R,  h_j at body k: f = R(k) h_j*,  ℳ_n(i,j) = h_i f on the way to p, where f is column j of F
-//   D = X*(ℳ_n + J)X,   G = F X,   P⁺ = Σ_{roots of n} φ R φ* - G D⁻¹ G*
+//   P(k) = M(k) + Σ_{nodes on k} P⁺
+//   of every column x of X:  α(k) = φ*α + H*x,  f(k) = P(k) α(k) + Σ_{c in n} φ(k,c) f(c),  (ℳ_n X)(k) = H(k) f(k),  G = Σ_{roots of n} φ f
+//   D = X*(ℳ_n + J)X,   R(k) = P(k) + Σ_{c in n} φ(k,c) R(c) φ(k,c)*,   P⁺ = Σ_{roots of n} φ R φ* - G D⁻¹ G*
 //   z(k) = Σ φ z(c),  ε = X*(x - H z),  ν = D⁻¹ε,  z(p) <- z(p) + Σ φ z + G ν;      base to tip:  y = ν - D⁻¹G* α(p),  α(k) = φ*α + H*X y
 //
-// Cost O(N) over nodes, of a node O(n depth) and the cube of its coordinates.
+// Cost O(N) over nodes, of a node of n coordinates with r independent ones O(n r²) and O(r³).
 // Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, the chapter on constraint embedding.
 #pragma once
 
@@ -86,12 +86,12 @@ std::vector<EmbeddedNode> embedded_nodes(const Model& model, const ResolvedLoops
 template <class S>
 struct EmbeddedFactors {
   int n = 0, r = 0;
-  std::vector<S> X, mass, MX, D, pivots, epsilon, nu, full;
-  std::vector<Vector6<S>> F, G, K;           // K = D⁻¹G*
+  std::vector<S> X, MX, D, pivots, epsilon, nu, full;
+  std::vector<Vector6<S>> G, K;              // K = D⁻¹G*
   void resize(int coordinates, int independent) {
     n = coordinates, r = independent;
-    X.assign(size_t(n) * r, S(0)), mass.resize(size_t(n) * n), MX.resize(size_t(n) * r), D.resize(size_t(r) * r), pivots.resize(r);
-    epsilon.resize(r), nu.resize(r), full.resize(n), F.resize(n), G.resize(r), K.resize(r);
+    X.assign(size_t(n) * r, S(0)), MX.resize(size_t(n) * r), D.resize(size_t(r) * r), pivots.resize(r);
+    epsilon.resize(r), nu.resize(r), full.resize(n), G.resize(r), K.resize(r);
   }
 };
 
@@ -115,14 +115,8 @@ class EmbeddedTree {
     for (size_t n = nodes_->size(); n-- > 0;) {
       const EmbeddedNode& node = (*nodes_)[n];
       EmbeddedFactors<S>& f = factors[n];
-      for (size_t b = node.bodies.size(); b-- > 0;)
-        if (const int k = node.bodies[b]; inside_[k]) add(P_[model_->parent[k]], to_parent(blocks.pose[k], P_[k]));
-      find_mass(blocks, node, f);
+      for (int a = 0; a < f.r; ++a) find_column(blocks, node, f, a);
       project(f);
-      for (int a = 0; a < f.r; ++a) {
-        f.G[a] = Vector6<S>::zero();
-        for (int i = 0; i < f.n; ++i) f.G[a] = f.G[a] + f.X[size_t(i) * f.r + a] * f.F[i];
-      }
       if (const int bad = ldl_in_place(f.D.data(), f.r, f.pivots.data()); bad < f.r) return coordinate_of(node, f, bad);
       if (node.parent >= 0) take_off(blocks, node, f);
     }
@@ -162,33 +156,29 @@ class EmbeddedTree {
     return felt;
   }
 
+  int place(int coordinate) const { return place_[coordinate]; }  // of the tree's, in its node
+
   std::vector<EmbeddedFactors<S>> factors;   // of nodes
 
  private:
-  void find_mass(const RigidBlocks<S>& blocks, const EmbeddedNode& node, EmbeddedFactors<S>& f) {
-    std::fill(f.mass.begin(), f.mass.end(), S(0));
-    for (const int k : node.bodies)
-      for (int j = model_->v_offset[k]; j < model_->v_offset[k] + model_->nv_of[k]; ++j) {
-        check_interrupt_at(place_[j], f.n);
-        Vector6<S> g = P_[k] * blocks.H[j];
-        int a = k;
-        for (;; a = model_->parent[a]) {
-          const int first = model_->v_offset[a], last = a == k ? j + 1 : first + model_->nv_of[a];
-          for (int i = first; i < last; ++i) f.mass[size_t(place_[i]) * f.n + place_[j]] = f.mass[size_t(place_[j]) * f.n + place_[i]] = dot(blocks.H[i], g);
-          g = force_to_parent(blocks.pose[a], g);
-          if (!inside_[a]) break;
-        }
-        f.F[place_[j]] = g;
-        f.mass[size_t(place_[j]) * f.n + place_[j]] += blocks.J[j];
-      }
+  // Column a of (ℳ_n + J)X, and of G.
+  void find_column(const RigidBlocks<S>& blocks, const EmbeddedNode& node, EmbeddedFactors<S>& f, int a) {
+    check_interrupt_at(a, f.n);
+    for (const int k : node.bodies) {
+      alpha_[k] = inside_[k] ? motion_to_child(blocks.pose[k], alpha_[model_->parent[k]]) : Vector6<S>::zero();
+      for (int i = model_->v_offset[k]; i < model_->v_offset[k] + model_->nv_of[k]; ++i) alpha_[k] = alpha_[k] + f.X[size_t(place_[i]) * f.r + a] * blocks.H[i];
+      z_[k] = P_[k] * alpha_[k];
+    }
+    f.G[a] = Vector6<S>::zero();
+    for (size_t b = node.bodies.size(); b-- > 0;) {
+      const int k = node.bodies[b];
+      for (int i = model_->v_offset[k]; i < model_->v_offset[k] + model_->nv_of[k]; ++i)
+        f.MX[size_t(place_[i]) * f.r + a] = dot(blocks.H[i], z_[k]) + blocks.J[i] * f.X[size_t(place_[i]) * f.r + a];
+      Vector6<S>& onto = inside_[k] ? z_[model_->parent[k]] : f.G[a];
+      onto = onto + force_to_parent(blocks.pose[k], z_[k]);
+    }
   }
   void project(EmbeddedFactors<S>& f) {
-    for (int i = 0; i < f.n; ++i)
-      for (int a = 0; a < f.r; ++a) {
-        S sum = S(0);
-        for (int j = 0; j < f.n; ++j) sum += f.mass[size_t(i) * f.n + j] * f.X[size_t(j) * f.r + a];
-        f.MX[size_t(i) * f.r + a] = sum;
-      }
     for (int a = 0; a < f.r; ++a)
       for (int b = 0; b <= a; ++b) {
         S sum = S(0);
@@ -198,8 +188,10 @@ class EmbeddedTree {
   }
   void take_off(const RigidBlocks<S>& blocks, const EmbeddedNode& node, EmbeddedFactors<S>& f) {
     Symmetric6<S>& P = P_[node.parent];
-    for (const int k : node.bodies)
-      if (!inside_[k]) add(P, to_parent(blocks.pose[k], P_[k]));
+    for (size_t b = node.bodies.size(); b-- > 0;) {  // composite: P_ becomes R inside the node
+      const int k = node.bodies[b];
+      add(P_[model_->parent[k]], to_parent(blocks.pose[k], P_[k]));
+    }
     // L⁻¹G*, by rows: P - Σ w w*/d
     for (int a = 0; a < f.r; ++a) {
       f.K[a] = f.G[a];

@@ -164,7 +164,8 @@ void half_inverse_tip_to_base(const CompiledModel<S>& model, const RigidBlocks<S
     }
     const size_t d = blocks.d_offsets()[k];
     if (n == 1) {
-      out(k, 0, S(epsilon[0] / sqrt(blocks.D[d])));
+      const S by = S(1) / sqrt(blocks.D[d]);  // of all rows
+      out(k, 0, S(epsilon[0] * by));
     } else {
       forward_substitute(blocks.L.data() + d, n, epsilon.data(), 1);
       for (int i = 0; i < n; ++i) out(k, i, S(epsilon[i] / sqrt(blocks.pivots(k)[i])));

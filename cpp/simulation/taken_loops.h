@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <memory>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "model/loops.h"
@@ -24,9 +25,11 @@ inline void check_names(const LoopSet& set, const std::vector<std::string>& name
 // Loops of these names after those that `to` has. What is returned has the poses that their paths point to, and is kept as long as they are.
 inline std::shared_ptr<const ResolvedLoops> take_loops(const LoopSet& set, const std::vector<std::string>& names, ResolvedLoops& to) {
   std::shared_ptr<const ResolvedLoops> all = set.resolved();
+  std::unordered_map<std::string, const ResolvedLoop*> by_name;
+  for (const ResolvedLoop& loop : all->loops) by_name[loop.loop->name] = &loop;
   for (const std::string& name : names)
-    for (const ResolvedLoop& loop : all->loops) {
-      if (loop.loop->name != name) continue;
+    if (const auto known = by_name.find(name); known != by_name.end()) {
+      const ResolvedLoop& loop = *known->second;
       ResolvedLoop own = loop;
       own.first_row = to.rows;
       for (int r = loop.first_row; r < loop.first_row + loop.rows; ++r) to.names.push_back(all->names[r]), to.of_positions.push_back(all->of_positions[r]);
