@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import _core
 from ..interop.export import to_pinocchio
 from ..interop.packages import required
 
@@ -40,6 +41,18 @@ class PinocchioLoops:
         self._work = self._twin.model.createData()
         pin.initConstraintDynamics(self._twin.model, self._work, self._rows, self._data)
         self._settings = pin.ProximalSettings(accuracy, 1e-8, 10)
+
+    @classmethod
+    def of_balls(cls, model: Any, accuracy: float = 1e-10) -> PinocchioLoops:
+        """With the loops of a model, each a ball between two bodies. ModelError names another one."""
+        together: list[tuple[Point, Point]] = []
+        for loop in model.loops._description():
+            if loop["kind"] != "ball" or not {loop["a"], loop["b"]} <= set(model.bodies):
+                raise _core.ModelError(f"loop {loop['name']!r} is no ball between two bodies")
+            given = {key: part for key, part in loop.items() if part is not None}
+            point, turned = given.get("point", np.zeros(3)), given.get("rotation", np.eye(3))
+            together.append(((loop["b"], point), (loop["a"], given.get("position", np.zeros(3)) + turned @ point)))
+        return cls(model, together, accuracy)
 
     def call(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> Callable[[], np.ndarray]:
         """Accelerations at a state, in Pinocchio's order: nothing is converted while a clock runs."""

@@ -7,17 +7,14 @@ pytest.importorskip("pinocchio")
 
 import pycraft as pc  # noqa: E402 - after the check that the extra is there
 from pycraft.dynamics.embedding import embedded_accelerations  # noqa: E402 - after the check that the extra is there
-from pycraft.peers import peers  # noqa: E402 - after the check that the extra is there
-from support.cassie import cassie  # noqa: E402 - after the check that the extra is there
+from pycraft.peers.cassie import cassie  # noqa: E402 - after the check that the extra is there
 
 pytestmark = pytest.mark.peers
 
 
 @pytest.fixture(scope="module")
 def robot():
-    folder = next(f for f in peers.robot_files() if "robots" in f.parts).parents
-    robots = next(f for f in folder if f.name == "robots" and f.parent.name == "example-robot-data")
-    model = cassie(robots / "cassie_description" / "robots" / "cassie_v2.sdf")
+    model = cassie()
     model.gravity = (0, 0, -9.81)
     return model
 
