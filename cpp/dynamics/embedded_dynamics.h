@@ -82,6 +82,7 @@ class EmbeddedWorkspace {
   S off(const S* q);                         // to residual_, and the largest, in units of the rows
   S size_of(int row) const;
   [[noreturn]] void refuse_rows(const std::vector<S>& off, const S& worst, const char* what) const;
+  static constexpr int most_at_once = 32;    // rows of a node whose pivots are looked for among all of them
   static S certified() { return S(64) * rank_tolerance<S>(); }
 
   const Multibody& source_;

@@ -16,9 +16,11 @@ namespace {
 void check_rows(const ResolvedLoops& loops) {
   for (const ResolvedLoop& one : loops.loops) {
     const Loop& loop = *one.loop;
-    const bool screw = !loop.is_coupling() && loop.pair.kind == PairKind::screw;
-    if (screw || loop.coupling.function)
-      throw ModelError("loop '" + loop.name + "' cannot be compiled: " + (screw ? "a screw counts its turns" : "it is a function of Python's") + "; constrained_dynamics() keeps it");
+    const char* const why = loop.coupling.function ? "it is a function of Python's"
+                            : !loop.is_coupling() && loop.pair.kind == PairKind::screw ? "a screw counts its turns"
+                            : !loop.is_coupling() && loop.pair.kind == PairKind::custom ? "the nearest place of its hinge is sought"
+                                                                                        : nullptr;
+    if (why) throw ModelError("loop '" + loop.name + "' cannot be compiled: " + why + "; constrained_dynamics() keeps it");
   }
 }
 

@@ -8,7 +8,9 @@
 #include "model/configuration.h"
 #include "model/hinge_kinematics.h"
 #include "model/spanned_twists.h"
+#include "numerics/recorded.h"
 #include "numerics/tangent.h"
+#include "runtime/errors.h"
 
 namespace pycraft {
 
@@ -240,6 +242,12 @@ void custom_rows(const Multibody& permitted, const Pose<S>& X, const Vector6<S>&
     rates[i] = S(0);
     for (int k = 0; k < 6; ++k) gradients[i][k] = g[k].x, rates[i] += g[k].d[0] * V[k];
   }
+}
+
+// A search is not written down; loops of such hinges are refused before (dynamics/recorded_on_loops.cpp).
+template <>
+void custom_rows(const Multibody&, const Pose<Recorded>&, const Vector6<Recorded>&, Recorded*, Vector6<Recorded>*, Recorded*) {
+  throw EvaluationError("rows of a hinge that is any sequence of subhinges are sought, and cannot be written down");
 }
 
 #define PYCRAFT_CUSTOM_ROWS(S) template void custom_rows(const Multibody&, const Pose<S>&, const Vector6<S>&, S*, Vector6<S>*, S*);

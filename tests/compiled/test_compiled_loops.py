@@ -157,6 +157,11 @@ def test_what_cannot_be_compiled_says_so():
     screw.add_loop("body5", hinge="screw", pitch=0.1, position=(5.0, 0, 0), name="screw")
     with pytest.raises(pc.ModelError, match="loop 'screw' cannot be compiled: a screw counts its turns; constrained_dynamics"):
         screw.compile("constrained_dynamics")
+    arm = pc.chain(6)
+    rail = [{"kind": "pin", "axis": (0, 0, 1)}, {"kind": "slider", "axis": (1, 0, 0)}]
+    arm.add_loop("body5", hinge="custom", subhinges=rail, position=(5.0, 0, 0), name="rail")
+    with pytest.raises(pc.ModelError, match="loop 'rail' cannot be compiled: the nearest place of its hinge is sought"):
+        arm.compile("constrained_dynamics")
     cam = pc.chain(2)
     cam.add_coupling(["hinge0", "hinge1"], function=lambda q: (q[0] - q[1], [1.0, -1.0], np.zeros((2, 2))), name="cam")
     with pytest.raises(pc.ModelError, match="loop 'cam' cannot be compiled: it is a function of Python's"):

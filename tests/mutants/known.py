@@ -232,6 +232,11 @@ AREAS = {
     "cpp/operators/embedded_values.h": ["operators/test_embedded.py", "operators/test_loop_second_derivatives.py"],
     "cpp/operators/independent_direction.cpp": ["operators/test_loop_second_derivatives.py"],
     "cpp/recursions/custom_rows.cpp": ["models/test_custom_loops.py"],
+    "cpp/dynamics/embedded_choice.cpp": [
+        "dynamics/test_embedded_dynamics.py",
+        "scenes/test_kept_loops.py",
+        "scenes/test_rows_of_rounding.py",
+    ],
     "cpp/dynamics/embedded_dynamics.cpp": [
         "dynamics/test_embedded_dynamics.py",
         "scenes/test_kept_loops.py",

@@ -58,13 +58,17 @@ CHANGES = {
         ("a custom hinge permits nothing", "g = g - (basis[b][i] * basis[b][k]) * off.G[k];", ";", STATEMENT),
         ("a custom hinge's place is that of doubles", "s = moved(hinge, s, times(slope, off.slopes()));", ";", STATEMENT),
     ],
-    "cpp/dynamics/embedded_dynamics.cpp": [
+    "cpp/dynamics/embedded_choice.cpp": [
+        ("given independent coordinates are eliminated", "!given || !wanted_[at.coordinates[j]]", "true"),
+        ("rows that hold what is given as independent pass", "given && i < m", "false"),
+        ("embedded coordinates are chosen by their units", "e.value / weights_[e.coordinate]", "e.value"),
         (
-            "rows of rounding are rows",
-            "size = maximum(size, S(e.size / weights_[e.coordinate]));",
-            "size = maximum(size, S(abs(dense_[e.coordinate])));",
-            STATEMENT,
+            "rows that are rounding are directions of embedded loops",
+            "S(e.size / weights_[e.coordinate])",
+            "S(abs(e.value) / weights_[e.coordinate])",
         ),
+    ],
+    "cpp/dynamics/embedded_dynamics.cpp": [
         (
             "embedded rows without what velocities ask",
             "loop_bias(*model_, *loops, asked.q, asked.v, buffers_, c_.data());",
@@ -88,18 +92,10 @@ CHANGES = {
         ("dependent velocities forget what drives them", "(rates ? rates[row] : S(0))", "S(0)"),
         ("dependent positions stay where they are", "if (!(S(2) * now < left)) break;", "break;", STATEMENT),
         ("a state that is far off embedded loops is on them", "!(left <= S(reach_of_steps))", "!(left <= S(1e300))"),
-        ("given independent coordinates are eliminated", "!dependent[j] && !kept[j]", "!dependent[j]"),
-        ("rows that hold what is given as independent pass", "given && i < m", "false"),
         (
             "multipliers of embedding have the wrong sign",
-            "generalized_[coordinate] - asked.tau[coordinate]",
-            "asked.tau[coordinate] - generalized_[coordinate]",
-        ),
-        ("embedded coordinates are chosen by their units", "e.value / weights_[e.coordinate]", "e.value"),
-        (
-            "rows that are rounding are directions of embedded loops",
-            "S(e.size / weights_[e.coordinate])",
-            "S(abs(e.value) / weights_[e.coordinate])",
+            "= generalized_[nodes_[n].coordinates[place]] - asked.tau",
+            "= -generalized_[nodes_[n].coordinates[place]] + asked.tau",
         ),
     ],
     "cpp/operators/independent_direction.cpp": [

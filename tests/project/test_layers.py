@@ -51,6 +51,7 @@ PARTS = {
     "algebra/planning/plan_diagonals",
     "algebra/planning/plan_solves",
     "algebra/planning/plan_vectors",
+    "dynamics/embedded_choice",
     "dynamics/states_on_loops",  # class ConstrainedWorkspace: states taken onto loops
     "operators/calculus_theorems",  # rows of the catalogue
     "operators/mechanics_theorems",
