@@ -18,11 +18,11 @@ FAR = 1e-6
 def warn_off_the_loops(model: Any, effects: Iterable[Effect], q: np.ndarray, v: np.ndarray | None) -> None:
     """A ModelWarning that names the row that a state misses most, by its residual or, at velocities v, by its rate, of loops that are kept.
 
-    Of those that gains draw back (Baumgarte's) none: a state off them is what they are for.
+    Of those that gains draw back (Baumgarte's) or springs hold none: a state off them is what they are for.
 
     Accelerations there keep what is missed as it is; what they say is of a mechanism that has come apart. Cost: the rows and Q.
     """
-    keeping = [effect for effect in effects if isinstance(effect, Loop) and not (effect.alpha or effect.beta)]
+    keeping = [effect for effect in effects if isinstance(effect, Loop) and effect.keeps and not (effect.alpha or effect.beta)]
     if not keeping:
         return
     loops, kept = model.loops, [name for effect in keeping for name in effect.kept(model)]

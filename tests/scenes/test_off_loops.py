@@ -32,7 +32,7 @@ def test_positions_and_velocities(method):
 
 
 def test_what_keeps_no_loops_says_nothing():
-    """The tree alone, an effect that is off, other loops than those that are missed, and gains, which draw the state back."""
+    """The tree alone, an effect that is off, other loops than those that are missed, and gains or springs, which draw the state back."""
     bars, state = four_bar()
     bars.add_coupling({"hinge0": 1.0, "hinge1": 1.0}, name="parallel")
     off = np.array(state.q) + [0.0, 0.0, 0.3]
@@ -41,6 +41,7 @@ def test_what_keeps_no_loops_says_nothing():
         pc.Scene(bars).add(E.Loop()).disable("loop"),
         pc.Scene(bars).add(E.Loop("parallel")),
         pc.Scene(bars).add(E.Loop(alpha=10.0, beta=10.0)),
+        pc.Scene(bars).add(E.Loop("closure", method="penalty", frequency=100.0)),
     ]
     with warnings.catch_warnings():
         warnings.simplefilter("error")

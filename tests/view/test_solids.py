@@ -177,6 +177,7 @@ def test_without_the_package_that_reads_meshes(model, monkeypatch):
     assert missing[0] in figure_data(Skeleton(model), model.zero_q())["unshown"]
 
 
+@pytest.mark.peers
 def test_geoms_are_shapes(tmp_path):
     pytest.importorskip("mujoco")
     (tmp_path / "ball.obj").write_text(BALL)

@@ -12,6 +12,7 @@ from pycraft.dynamics.task_space import TaskSpace
 from pycraft.linear.linear_model import LinearModel
 from pycraft.models.limits import LimitDistances
 from pycraft.models.mobility import Mobility
+from pycraft.view.shares import Shares
 from support.mechanisms import every_kind, uniform_batch
 
 FRAMES = {
@@ -31,7 +32,8 @@ OTHERWISE = {
     "reattach",
     "mobility_along",
     "view",
-}  # from a state on, of a whole log or motion, of one hinge
+    "rerootings",
+}  # from a state on, of a whole log or motion, of one hinge, of a tree on a free root
 NOT_OF_A_STATE = {"inertial_parameters", "prepare"}
 
 
@@ -53,6 +55,8 @@ def leaves(x):
         return [*leaves(x.linear), *x.tensors()]
     if isinstance(x, (ConstrainedDynamics, ConstrainedVelocities)):
         return [x.vdot if isinstance(x, ConstrainedDynamics) else x.v, x.multipliers]
+    if isinstance(x, Shares):
+        return [x.values]
     if isinstance(x, LimitDistances):
         return [x.lower, x.upper]
     if isinstance(x, Mobility):

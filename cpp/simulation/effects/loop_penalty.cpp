@@ -127,7 +127,7 @@ Declaration LoopPenalty::declaration() const {
   d.velocities = d.work = damping_ratio_ > 0 && loops.rows > 0;
   for (size_t l = 0; l < loops.loops.size(); ++l) {
     const ResolvedLoop& loop = loops.loops[l];
-    d.foreign |= static_cast<bool>(loop.loop->coupling.function);
+    if (loop.loop->coupling.function) d.foreign = true, d.differentiable = false;  // a function in doubles
     d.coordinates.insert(d.coordinates.end(), loop.v.begin(), loop.v.end());
     for (const End& end : {a[l], b[l]})
       if (end.body >= 0) d.wrenches.push_back(end.body);
