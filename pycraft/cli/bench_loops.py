@@ -123,7 +123,7 @@ def _beside(name: str, ours: Callable[[], np.ndarray], theirs: Callable[[], np.n
     return Figure(f"dynamics on loops, {name}, over Pinocchio's", own / other, "x", BESIDE, f"{1e6 * own:.2f} of {1e6 * other:.2f} us")
 
 
-def beside_pinocchio(seconds: float = 0.1) -> list[Figure]:
+def beside_pinocchio(seconds: float = 0.1, ladders: tuple[int, ...] = (*COMPILED, RUNGS)) -> list[Figure]:
     """Accelerations on loops over Pinocchio's `constraintDynamics`: of ladders, balls for pins, and of Cassie; nothing without it."""
     if find_spec("pinocchio") is None:
         return []
@@ -132,7 +132,7 @@ def beside_pinocchio(seconds: float = 0.1) -> list[Figure]:
 
     figures = []
     tip = (1, 0, 0)  # rows across the plane ask nothing, so that it iterates: to the accuracy that is asked of ours
-    for rungs in (*COMPILED, RUNGS):
+    for rungs in ladders:
         model = ladder(rungs)
         (q, _), v = _cranks(1.0, rungs), np.zeros(model.nv)
         peer = PinocchioLoops(model, [((f"crank{i}", tip), (f"rod{i}", tip)) for i in range(1, rungs + 1)])

@@ -66,5 +66,6 @@ def test_its_own_constraint_dynamics_on_the_ladder_that_is_timed():
     peer = PinocchioLoops(model, [((f"crank{i}", (1, 0, 0)), (f"rod{i}", (1, 0, 0))) for i in range(1, 4)])
     expected = model.constrained_dynamics(q, v, tau).vdot
     assert np.abs(peer.ours(peer.call(q, v, tau)()) - expected).max() <= 1e-7 * np.abs(expected).max()
-    (figure,) = beside_pinocchio(seconds=0.01)
-    assert figure.value > 0 and figure.bound == BESIDE
+    figures = beside_pinocchio(seconds=0.01, ladders=(1, 100))
+    assert [figure.name.split(", ")[1] for figure in figures] == ["ladder of 1", "ladder of 100", "Cassie"]
+    assert all(figure.value > 0 and figure.bound == BESIDE for figure in figures)
