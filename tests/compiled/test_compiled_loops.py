@@ -170,6 +170,9 @@ def test_what_cannot_be_compiled_says_so():
     apart.add_loop("body0", hinge="ball", position=(0, 0, 2), name="off")
     with pytest.raises(pc.ModelError, match="cannot be assembled"):
         apart.compile("constrained_dynamics")
+
+
+def test_what_is_too_large_says_so():
     with pytest.raises(pc.ModelError, match="come to more than 400000 operations"):
         n_four_bar(600).compile("constrained_dynamics")
 
