@@ -249,7 +249,7 @@ class Sizes:
             columns = np.zeros((len(locked), max(sizes, default=0)))  # entry a of every body in column a: H has one block in a row
             columns[np.arange(len(locked)), [a for size in sizes for a in range(size)]] = 1
             rows = np.abs(np.asarray(self._bind(H) @ columns, float))
-            largest = (columns * locked[:, None]).max(axis=0)
+            largest = (columns * locked[:, None]).max(axis=0, initial=0.0)
             bodies = {body: where for _, where, body in M.codomain.blocks}
             reach = rows @ largest  # where hinges are not numbered as the bodies are
             for _, hinge, body in H.codomain.blocks if len(bodies) == len(H.codomain.blocks) else ():

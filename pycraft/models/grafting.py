@@ -86,6 +86,7 @@ class Grafting(WithLoops):
         self._remove_body(name)
         aside.put(self)
         self._added_nodes -= gone
+        self._shapes = [shape for shape in self._shapes if shape.body not in gone]
         for scene, effect, _ in used:
             scene.remove(effect)
         return Removed(bodies, hinges, nodes, [(scene, effect) for scene, effect, _ in used], closed)

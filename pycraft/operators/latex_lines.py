@@ -8,9 +8,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import accumulate
 
 WIDTH = 64
 """Letters of a line: some 40 em, what a notebook's cell and a page of text have beside their margins."""
+DEEPEST = 60
+"""Brackets within brackets beyond which it stays as it is."""
 LONGEST = 20_000
 """Characters of a formula beyond which it stays as it is."""
 _TOKEN = re.compile(r"\\(?:left|right)(?![A-Za-z])\s*(?:\\[A-Za-z]+|\\.|.)|\\[A-Za-z]+\s*|\\.|\s+|.", re.S)
@@ -59,7 +62,8 @@ def in_lines(latex: str, width: int = WIDTH) -> str:
     """A formula whose lines have some `width` letters at most: itself where it is as short, else an aligned environment.
 
     Without line ends and marks of alignment it is the same formula, piece by piece. What has an environment of its own, or more than
-    20 000 characters, is left alone. Time and memory in proportion to the formula's length, times how deep its brackets go.
+    20 000 characters or 60 brackets within each other, is left alone. Time and memory in proportion to the formula's length, times how
+    deep its brackets go.
 
     Examples
     --------
@@ -79,7 +83,11 @@ def lines_of(latex: str, width: int = WIDTH) -> list[str]:
     """The lines of `in_lines`, for an environment of one's own."""
     if len(latex) > LONGEST or "\\begin" in latex or formula_width(latex) <= width:
         return [latex]
-    return _rows(_pieces(iter(_TOKEN.findall(latex)))[0], width)
+    tokens = _TOKEN.findall(latex)
+    steps = [bool(bare == "{" or _OPENS.match(bare)) - bool(bare == "}" or _CLOSES.match(bare)) for bare in map(str.strip, tokens)]
+    if max(accumulate(steps), default=0) > DEEPEST:
+        return [latex]
+    return _rows(_pieces(iter(tokens))[0], width)
 
 
 def formula_width(latex: str) -> float:

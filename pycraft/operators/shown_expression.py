@@ -85,12 +85,14 @@ def flops_text(flops: float) -> str:
     Examples
     --------
     >>> from pycraft.operators.shown_expression import flops_text
-    >>> flops_text(890.4), flops_text(2888.3), flops_text(4.1e6)
-    ('890 flop', '2.9 kflop', '4.1 Mflop')
+    >>> flops_text(890.4), flops_text(2888.3), flops_text(4.1e6), flops_text(1.3e13)
+    ('890 flop', '2.9 kflop', '4.1 Mflop', '13.0 Tflop')
+    >>> flops_text(999.7), flops_text(99_960), flops_text(999_900)
+    ('1.0 kflop', '100 kflop', '1.0 Mflop')
     """
-    for unit, size in (("Gflop", 1e9), ("Mflop", 1e6), ("kflop", 1e3)):
-        if flops >= size:
-            return f"{flops / size:.3g} {unit}" if flops >= 100 * size else f"{flops / size:.1f} {unit}"
+    for unit, size in (("Tflop", 1e12), ("Gflop", 1e9), ("Mflop", 1e6), ("kflop", 1e3)):
+        if flops >= 0.9995 * size:
+            return f"{flops / size:.0f} {unit}" if flops >= 99.95 * size else f"{flops / size:.1f} {unit}"
     return f"{flops:.0f} flop"
 
 

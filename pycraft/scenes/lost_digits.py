@@ -13,9 +13,9 @@ import numpy as np
 from .. import _core
 from ..accuracy.certificates.certify import certify_dynamics
 from ..arguments import one_number
+from ..file_targets import writable_target
 from ..tidy import error_text
 from ..view.plane_layout import PlaneLayout, model_layouts
-from .file_targets import writable_target
 
 MOST = 200
 """States of a run that are looked at, each with a certificate of its own."""
@@ -46,7 +46,7 @@ class LostDigits:
 
     def __init__(self, run: Any, states: Any, options: dict[str, Any]):
         count = one_number(states, "states")
-        if count != int(count) or not 1 <= count <= MOST:
+        if not 1 <= count <= MOST or count != int(count):
             raise _core.EvaluationError(f"states={states!r}: a whole number from 1 to {MOST}, of states that are looked at")
         model = run._unedited_model()
         rows = np.unique(np.linspace(0, len(run.t) - 1, int(count)).round().astype(int))

@@ -10,8 +10,8 @@ import numpy as np
 
 from .. import _core
 from ..arguments import one_number
+from ..file_targets import writable_target
 from ..view import StickFigure
-from .file_targets import writable_target
 
 ENDINGS = (".html", ".gif", ".mp4")
 MOST = 2000

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..file_targets import writable_target
 from ..view.figure_data import figure_data, number_text, pose_rows
 from ..view.page import Page
 from ..view.skeleton import Skeleton
 from ..view.web_page import web_page
-from .file_targets import writable_target
 from .run_animation import configurations, positive
 from .run_plots import chosen_panels
 

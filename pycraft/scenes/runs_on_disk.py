@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..file_targets import writable_target
 from ..models.multibody import Multibody
 from .coordinate_units import coordinate_units
 from .events import EventStates
-from .file_targets import writable_target
 from .run_tables import HOLDS, columns_of, variables_of
 
 FORMAT = "pycraft run 1"

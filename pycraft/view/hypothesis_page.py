@@ -110,7 +110,7 @@ def hypothesis_switches(bodies: int = 4, seed: int = 0, *, progress: Callable[[s
     """A page with switches for the hypotheses of theorems: J, chain or branch, the kind of hinges, fixed or free base.
 
     Flipping one shows which theorems of the catalogue break, and by how much. Every combination is a model, 24 of them, on which the
-    theorems are checked as `soa.check` checks them, when it is first asked for: about a second each at four bodies; the page asks for all.
+    theorems are checked as `soa.check` checks them, when it is first asked for: half a second each at four bodies; the page asks for all.
 
     Parameters
     ----------

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..file_targets import writable_target
 from ..operators.block_picture import colour
 from .plane_layout import PlaneLayout, layout_of
 from .sweep_picture import HEIGHT, RADIUS, WIDTH
@@ -47,6 +48,8 @@ class LinkedBlocks:
         if not operator.sources:
             raise _core.EvaluationError(f"{operator.text()} is of no model: its blocks are shown by blocks() alone")
         source = operator.sources[0]
+        if not view.rows or not view.columns:
+            raise _core.EvaluationError(f"{operator.text()} has no blocks: there is nothing to point at")
         self._rows, self._columns = (_bodies_of(names, source, operator) for names in (view.rows, view.columns))
         if max(len(view.rows), len(view.columns)) > MOST:
             raise _core.EvaluationError(
@@ -61,9 +64,7 @@ class LinkedBlocks:
 
     def save(self, path: str | Path) -> Path:
         """Write a page, ".html". EvaluationError for another ending, OSError if it cannot be written."""
-        target = Path(path)
-        if target.suffix != ".html":
-            raise _core.EvaluationError(f"output {str(path)!r}: linked blocks are written to '.html'")
+        target = writable_target(path, (".html",), "a page")
         head = "<!DOCTYPE html>\n<html lang='en'><meta charset='utf-8'><meta name='color-scheme' content='light dark'>"
         page = f"{head}<title>{escape(self._view.title)}</title><body style='margin:16px'>{self._repr_html_()}</body></html>\n"
         target.write_text(page, encoding="utf-8")
@@ -71,7 +72,7 @@ class LinkedBlocks:
 
     def _repr_html_(self) -> str:
         code = {name: files(__package__).joinpath(f"linked_blocks.{name}").read_text(encoding="utf-8") for name in ("css", "js")}
-        data = json.dumps({"parents": self._parents, "names": self._names}).replace("</", "<\\/")
+        data = json.dumps({"parents": self._parents, "names": self._names}).replace("<", "\\u003c")
         return (
             f'<div class="pycraft-linked"><style>{code["css"]}</style><p>{escape(self._view.title)}</p>'
             f'<div class="both"><div class="blocks">{self._picture()}</div><div class="figure">{self._figure()}</div></div>'

@@ -8,11 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from .plane_layout import PlaneLayout, model_layout
+from .plane_layout import MOST, PlaneLayout, model_layout
 from .stick_figure import HINGES
 
-MOST = 300
-"""Bodies of a figure: where hinges are side by side is looked for pair by pair."""
 LISTED = 80
 """Bodies of the tree that is written out."""
 _WIDTH, _HEIGHT, _SIZE = 420.0, 320.0, 5.5

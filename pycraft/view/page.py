@@ -7,7 +7,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from .. import _core
+from ..file_targets import writable_target
 
 
 class Page:
@@ -27,12 +27,7 @@ class Page:
 
     def save(self, path: Any) -> Path:
         """Write it to a path that ends in ".html". EvaluationError for another ending, OSError where it cannot be written."""
-        try:
-            target = Path(path)
-        except TypeError:
-            raise _core.EvaluationError(f"output {path!r:.80}: a path that ends in .html") from None
-        if target.suffix != ".html":
-            raise _core.EvaluationError(f"output {str(path)!r}: a page is written to a path that ends in .html")
+        target = writable_target(path, (".html",), "a page")
         target.write_text(self.html, encoding="utf-8")
         return target
 

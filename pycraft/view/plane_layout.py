@@ -12,6 +12,8 @@ from .. import _core
 from ..models.tree_places import tree_places
 from .skeleton import Skeleton, placed
 
+MOST = 300
+"""Hinges up to which those at one place are drawn side by side: all pairs of them are looked at."""
 _AZIMUTH, _ELEVATION = -60.0, 20.0  # degrees, as figures in space are seen
 
 
@@ -102,7 +104,9 @@ def _seen(skeleton: Skeleton, model: Any) -> np.ndarray:
 
 
 def _side_by_side(places: np.ndarray, apart: float) -> np.ndarray:
-    """Points nearer than `apart` to one before them go to its right."""
+    """Points nearer than `apart` to one before them go to its right; of more than `MOST` none. O(n²)."""
+    if len(places) > MOST:
+        return places
     out = np.array(places)
     for k in range(len(out)):
         while k and (near := np.linalg.norm(out[:k] - out[k], axis=1) < 0.95 * apart).any():

@@ -11,6 +11,7 @@ Dynamics, Springer 2011, operational space inertias; the sum is the catalogue's 
 
 from __future__ import annotations
 
+import copy
 from html import escape
 from typing import Any
 
@@ -18,7 +19,7 @@ import numpy as np
 
 from ..state import at_state
 from .colour_scale import colour_bar, shade
-from .plane_layout import model_layout
+from .plane_layout import MOST, model_layout
 from .stick_figure import StickFigure
 from .sweep_picture import HEIGHT, RADIUS, WIDTH
 
@@ -40,7 +41,7 @@ class Shares:
     """
 
     def __init__(self, model: Any, q: Any = None):
-        self.model, self.q = model, np.array(at_state(model, q)[0], float)
+        self.model, self.q = copy.copy(model), np.array(at_state(model, q)[0], float)
         model.check_q(self.q)
         self.values = share_values(model, self.q)
         self.by_body = dict(zip(model.bodies, self.values.tolist(), strict=True))
@@ -74,6 +75,8 @@ class Shares:
         return "\n".join([f"shares of the degrees of freedom of {self.model.name!r}, tr Υ(k)M(k)", *lines, f"  {self.said}"])
 
     def _repr_html_(self) -> str:
+        if len(self.values) > MOST:
+            return f"<pre>{escape(repr(self))}</pre>"
         layout = model_layout(self.model, self.q, WIDTH, HEIGHT - 50, 4 * RADIUS, RADIUS)
         high = max(self.by_body.values(), default=0.0) or 1.0
         colours = [shade(x, 0, high) for x in self.values]

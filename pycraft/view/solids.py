@@ -118,11 +118,14 @@ def _placed(shape: Shape, numbers: dict[str, int], nodes: dict[str, Any]) -> tup
 
 
 def _thinned(made: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Together at most MOST triangles: meshes lose theirs, by their numbers, before others."""
+    """Together some MOST triangles: meshes lose theirs, by their numbers, and primitives none."""
+    primitive = 16 * ROUND  # what one has at most
     total = sum(len(solid["faces"]) for solid in made)
     if total <= MOST:
         return made
-    return [_thin(solid, max(32, int(MOST * len(solid["faces"]) / total))) for solid in made]
+    few = sum(len(solid["faces"]) for solid in made if len(solid["faces"]) <= primitive)
+    share = max(0, MOST - few) / max(1, total - few)
+    return [solid if len(solid["faces"]) <= primitive else _thin(solid, max(32, int(share * len(solid["faces"])))) for solid in made]
 
 
 def _thin(solid: dict[str, Any], most: int) -> dict[str, Any]:

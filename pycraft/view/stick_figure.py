@@ -100,6 +100,7 @@ class StickFigure:
         self.canvas = Canvas(self.ax, VIEWS[view])
         self._size, self._up, self._floor = 0.0, 2, 0.0
         self._painted: Discs | None = None
+        self._bar: Any = None  # of the colours
         self._grounded = self.skeleton.is_grounded()
         self._draw(com, names, shadow and view == "3d", alpha)
         self.frame(q)
@@ -222,7 +223,9 @@ class StickFigure:
         from matplotlib.colors import LinearSegmentedColormap, Normalize
 
         scale = ScalarMappable(Normalize(low, high), LinearSegmentedColormap.from_list("bodies", ramp()))
-        self.ax.figure.colorbar(scale, ax=self.ax, label=label, shrink=0.7, pad=0.12 if self.canvas.columns is None else 0.03)
+        if self._bar is not None:
+            self._bar.remove()
+        self._bar = self.ax.figure.colorbar(scale, ax=self.ax, label=label, shrink=0.7, pad=0.12 if self.canvas.columns is None else 0.03)
 
     def _base_points(self, ground: np.ndarray) -> np.ndarray:
         """The base's origin, or the hinges that it carries far off; nothing where all that there is flies."""

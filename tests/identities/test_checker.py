@@ -348,3 +348,9 @@ def test_a_statement_checked_in_double_alone_is_refused():
     assert pc.check("1.0000000000000002*phi == phi", model, search=False).held is False
     with pytest.raises(pc.EvaluationError, match="wider"):
         pc.check("1.0000000000000002*phi == phi", model, search=False, precision="double")
+
+
+@pytest.mark.parametrize("model", [pc.Multibody("none"), pc.tree([-1, 0], ["weld", "weld"])], ids=["no bodies", "welds"])
+def test_a_model_without_bodies_is_checked(model):
+    report = model.soa.check()
+    assert report and not {finding.verdict for finding in report.findings} & {"fails", "undecided", "undefined"}

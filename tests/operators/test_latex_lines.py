@@ -152,3 +152,13 @@ def test_no_letter_is_left_in_text_that_latex_has_not():
 )
 def test_formulas_in_html(text, shown):
     assert formula_html(text).endswith(f">{shown}</span>")
+
+
+def test_brackets_without_end_stay_as_they_are():
+    deep = "\\left(" * 600 + "a + b" + "\\right)" * 600
+    assert in_lines(deep) == deep
+    S = pc.chain(2).soa
+    x = S.MM
+    for _ in range(250):
+        x = (x + S.D).inv()
+    assert "\\left" in x._repr_latex_()

@@ -229,6 +229,7 @@ RESTS_ON = {
     "arguments": ["_core"],
     "formula_nodes": [],
     "tidy": ["_core"],
+    "file_targets": ["_core"],
     "state": ["arguments", "closed"],
     "reference": [],
     "operators": ["arguments", "closed"],
@@ -248,7 +249,7 @@ RESTS_ON = {
     "scenes": ["view"],
     "ensembles": ["scenes"],
     "compiled": ["recursions"],
-    "view": ["accuracy", "recursions"],
+    "view": ["accuracy", "recursions", "file_targets"],
     "viewer": ["scenes"],
     "face": ["accuracy", "compiled", "identities", "kinematics", "viewer"],
     "": ["face", "kalman", "closed_forms", "ensembles", "sympy_bridge"],  # pycraft itself

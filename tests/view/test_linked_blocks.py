@@ -2,6 +2,7 @@
 
 import re
 
+import numpy as np
 import pytest
 
 import pycraft as pc
@@ -47,7 +48,7 @@ def test_what_cannot_be_linked_is_refused(tmp_path):
         TREE.soa.velocity.blocks().on_robot()
     with pytest.raises(pc.EvaluationError, match=r"61 × 61 blocks: 60 a row at most"):
         pc.chain(61).soa.MM.blocks().on_robot()
-    with pytest.raises(pc.EvaluationError, match="'.html'"):
+    with pytest.raises(pc.EvaluationError, match="ends in .html"):
         TREE.soa.phi.blocks().on_robot().save(tmp_path / "blocks.png")
 
 
@@ -107,3 +108,13 @@ def test_a_report_of_theorems_is_filtered(browser, tmp_path):
         assert rows.count() == 3
         page.fill("input", "nothing like it")
         assert rows.count() == 0 and page.locator("tr.group:visible").count() == 0
+
+
+def test_names_stay_names_and_nothing_is_nothing():
+    odd = pc.Multibody("odd")
+    odd.add_body("<!--<script>", None, "pin", mass=1.0, inertia=np.eye(3))
+    assert "<!--" not in odd.soa.phi.blocks().on_robot()._repr_html_()
+    with pytest.raises(pc.EvaluationError, match="there is nothing to point at"):
+        pc.tree([-1, 0], ["weld", "weld"]).soa.phi.blocks().on_robot()
+    with pytest.raises(FileNotFoundError, match="there is no folder"):
+        odd.soa.phi.blocks().on_robot().save("/nonexistent/blocks.html")

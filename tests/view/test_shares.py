@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import pycraft as pc
+from pycraft.view import StickFigure
 from pycraft.view.colour_scale import ramp, shade
 from pycraft.view.shares import share_values
 from support.mechanisms import every_kind
@@ -140,3 +141,23 @@ def test_values_are_of_the_state_that_is_given():
     model.q = [0.1, 0.2, 0.3]
     assert not np.allclose(share_values(model, np.zeros(3)), model.dof_shares().values)
     np.testing.assert_array_equal(share_values(model, np.array([0.1, 0.2, 0.3])), model.dof_shares().values)
+
+
+def test_pictures_of_many_bodies_are_tables():
+    many = pc.chain(301).dof_shares()
+    assert many._repr_html_().startswith("<pre>") and "more, with less each" in many._repr_html_()
+
+
+def test_shares_are_of_the_model_as_it_was():
+    arm = pc.chain(2)
+    shares = arm.dof_shares()
+    shown = shares._repr_html_()
+    arm.add_body("more", "body1", "pin", mass=1.0)
+    assert shares._repr_html_() == shown
+
+
+def test_painting_again_replaces_the_bar():
+    figure = StickFigure(pc.chain(2))
+    for high in (1.0, 2.0):
+        figure.paint([0.1, 0.2], "shares", 0.0, high)
+    assert len(figure.ax.figure.axes) == 2

@@ -90,8 +90,10 @@ def test_many_triangles_are_thinned():
     faces = np.concatenate([np.column_stack([a, a + 1, a + 201]), np.column_stack([a, a + 201, a + 200])])
     model = pc.chain(1)
     model._shapes = [Shape("body0", "mesh", (1, 1, 1), np.eye(4), triangles=(flat, faces)), Shape("body0", "box", (1, 1, 1), np.eye(4))]
-    thin, box = solids(model)[0]
-    assert 500 < len(thin["faces"]) and len(thin["faces"]) + len(box["faces"]) <= MOST and len(box["faces"]) == 12
+    model._shapes.append(Shape("body0", "sphere", (1,) * 3, np.eye(4)))
+    thin, box, ball = solids(model)[0]
+    assert 500 < len(thin["faces"]) and sum(len(solid["faces"]) for solid in (thin, box, ball)) <= MOST
+    assert len(box["faces"]) == 12 and len(ball["faces"]) == len(triangles(model._shapes[2])[1])
     assert thin["faces"].max() < len(thin["vertices"]) and np.ptp(thin["vertices"], axis=0) == pytest.approx([1.99, 0.99, 0], abs=0.1)
 
 
@@ -133,6 +135,9 @@ def test_shapes_go_with_their_bodies(model):
     assert {"left_arm", "left_hand", "left_tool"} <= {s.body for s in twice.shapes}
     model.remove_body("hand")
     assert [solid["of"] for solid in solids(model)[0]] == [-1, 0]
+    assert {s.body for s in model.shapes} == {"base", "arm"}
+    model.add_body("hand", "arm", "pin", mass=1.0)
+    assert [solid["of"] for solid in solids(model)[0]] == [-1, 0]  # another hand
     assert pc.chain(2).shapes == [] and solids(pc.chain(2)) == ([], [])
 
 
@@ -181,10 +186,13 @@ def test_without_the_package_that_reads_meshes(model, monkeypatch):
 def test_geoms_are_shapes(tmp_path):
     pytest.importorskip("mujoco")
     (tmp_path / "ball.obj").write_text(BALL)
-    (tmp_path / "shaped.xml").write_text("""<mujoco model="shaped"><asset><mesh name="ball" file="ball.obj" scale="0.1 0.1 0.1"/></asset>
+    (tmp_path / "shaped.xml").write_text("""<mujoco model="shaped"><asset><mesh name="ball" file="ball.obj" scale="0.1 0.1 0.1"/>
+      <material name="green" rgba="0 1 0 1"/></asset>
       <worldbody><geom type="plane" size="1 1 1"/><geom type="box" size="0.1 0.2 0.3" rgba="1 0 0 1"/>
       <body name="a"><joint name="j"/><geom type="capsule" size="0.1 0.3" pos="0 0 0.3"/><geom type="sphere" size="0.1" group="3"/>
-        <geom type="ellipsoid" size="0.1 0.2 0.3"/><geom type="cylinder" size="0.1 0.4"/><geom type="mesh" mesh="ball" pos="0 0 1"/></body>
+        <geom type="box" size="1 1 1" rgba="0 0 1 0"/>
+        <geom type="ellipsoid" size="0.1 0.2 0.3" material="green"/>
+        <geom type="cylinder" size="0.1 0.4"/><geom type="mesh" mesh="ball" pos="0 0 1"/></body>
       </worldbody></mujoco>""")
     with pytest.warns(pc.ModelWarning):
         model = pc.load(tmp_path / "shaped.xml")
@@ -192,7 +200,7 @@ def test_geoms_are_shapes(tmp_path):
         ("", "box", (0.2, 0.4, 0.6)), ("a", "capsule", (0.1, 0.6)), ("a", "ellipsoid", (0.1, 0.2, 0.3)), ("a", "cylinder", (0.1, 0.8)),
         ("a", "mesh", (1.0, 1.0, 1.0)),
     ]  # fmt: skip
-    assert model.shapes[0].colour == "#ff0000"
+    assert model.shapes[0].colour == "#ff0000" and model.shapes[2].colour == "#00ff00"
     made, missing = solids(model)
     mesh = made[4]["vertices"]
     assert missing == [] and [solid["of"] for solid in made] == [-1, 0, 0, 0, 0]

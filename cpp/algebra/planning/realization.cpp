@@ -82,7 +82,7 @@ class RealizationBuilder {
   }
 
   void count_rows(const Space& space) {
-    const int bodies = r_->tree ? r_->tree->structure().bodies() : 1;
+    const int bodies = std::max(1, r_->tree ? r_->tree->structure().bodies() : 1);
     if (space.belongs_to_bodies()) rows_ += (space.dimension() + bodies - 1) / bodies;
   }
 

@@ -9,6 +9,7 @@ import numpy as np
 from ..shapes import Shape, hex_colour
 from .rotations import rotation_from_quaternion
 
+_NO_COLOUR = (0.5, 0.5, 0.5, 1.0)  # what MuJoCo gives a geom that says none
 _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH = range(2, 8)  # mjtGeom; planes and height fields, 0 and 1, are no bodies' shapes
 _SHOWN_GROUPS = 3
 
@@ -32,8 +33,13 @@ def shapes_of(m: Any, bodies: list[str]) -> list[Shape]:
         }
         name, sizes = said[kind]
         triangles = _triangles(m, int(m.geom_dataid[g])) if kind == _MESH else None
+        material, colour = int(m.geom_matid[g]), m.geom_rgba[g]
+        if material >= 0 and np.array_equal(colour, _NO_COLOUR):
+            colour = m.mat_rgba[material]
+        if colour[3] == 0:  # not to be seen
+            continue
         body = bodies[on] if on else ""
-        made.append(Shape(body, name, tuple(map(float, sizes)), placement, hex_colour(m.geom_rgba[g]), triangles=triangles))
+        made.append(Shape(body, name, tuple(map(float, sizes)), placement, hex_colour(colour), triangles=triangles))
     return made
 
 

@@ -24,7 +24,10 @@ _SIZES = {
 def shapes_of(file: XmlFile, elements: Elements, package_dirs: Iterable[Any]) -> tuple[list[Shape], list[str]]:
     """All shapes of the file, on bodies and nodes called as the links are, and warnings of those that cannot be read."""
     folders = [package_dirs] if isinstance(package_dirs, (str, bytes, os.PathLike)) else package_dirs
-    beside = (os.path.abspath(os.fsdecode(file.path)), tuple(os.path.abspath(os.fsdecode(folder)) for folder in folders))
+    try:
+        beside = (os.path.abspath(os.fsdecode(file.path)), tuple(os.path.abspath(os.fsdecode(folder)) for folder in folders))
+    except TypeError:
+        raise _core.ModelError(f"package_dirs={package_dirs!r:.60}: folders, by their paths") from None
     colours = {material.get("name", ""): colour for material in file.children(file.root, "material") if (colour := _colour(file, material))}
     found, warnings = [], []
     for name, link in elements.links.items():

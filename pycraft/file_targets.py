@@ -5,12 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from .. import _core
+from . import _core
 
 
 def writable_target(path: Any, endings: tuple[str, ...], what: str) -> Path:
     """The path. EvaluationError for an ending that is none of these, OSError where it cannot be written; a file there stays as it is."""
-    target = Path(path)
+    try:
+        target = Path(path)
+    except TypeError:
+        raise _core.EvaluationError(f"output {path!r:.80}: {what} is written to a path that ends in {', '.join(endings)}") from None
+    if "\0" in str(target):
+        raise _core.EvaluationError(f"output {str(path)!r:.80}: no path has a zero in it")
     if target.suffix not in endings:
         raise _core.EvaluationError(f"output {str(path)!r}: {what} is written to a file that ends in {', '.join(endings)}")
     if not target.parent.is_dir():
