@@ -64,7 +64,7 @@ def _guarded(run: Callable[[], Any]) -> Any:
         fail(f"{error.filename or 'the output'}: {error.strerror or error}")
     except KeyboardInterrupt:
         fail("interrupted", INTERRUPTED)
-    except Exception as error:
+    except Exception as error:  # whatever nobody expected is one line, too
         _tell_usage(error)
         if os.environ.get("PYCRAFT_TRACEBACK") or type(error).__module__.startswith(("click", "typer")):
             raise

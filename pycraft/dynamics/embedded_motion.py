@@ -127,7 +127,7 @@ class _Run:
     def accelerations(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         try:
             given = self.tau(t, q, v)
-        except Exception as error:
+        except Exception as error:  # the user's own, kept for when SciPy has let go
             self.raised = error
             raise
         tau = np.asarray(_core.real_array(given, "tau"), float)

@@ -17,6 +17,8 @@ from ..models.loaders.rotations import rotation_from_rpy
 from ..models.multibody import Multibody
 from .peers import robot_files
 
+_HINGES = {"revolute": "pin", "ball": "ball"}
+
 
 def cassie_file() -> Path:
     """Where the installed example-robot-data has it. ModelError where it has none."""
@@ -28,7 +30,7 @@ def cassie_file() -> Path:
 
 
 def cassie(path: Path | None = None, root: str = "pelvis") -> Multibody:
-    """The model, at the pose that the file has it in; "free" at its root."""
+    """The model, at the pose that the file has it in; "free" at its root. ModelError names a joint of another type, or out of reach."""
     file = _found(ET.parse(cassie_file() if path is None else path).getroot(), "model")
     links = {link.attrib["name"]: link for link in file.findall("link")}
     where = {name: _pose(link) for name, link in links.items()}
@@ -36,12 +38,15 @@ def cassie(path: Path | None = None, root: str = "pelvis") -> Multibody:
     model.add_body(root, hinge="free", hinge_name="root", **_inertial(links[root]))
     waiting = list(file.findall("joint"))
     while waiting:
-        joint = next(j for j in waiting if _text(j, "parent") in model.bodies)
+        joint = next((j for j in waiting if _text(j, "parent") in model.bodies), waiting[0])
+        if _text(joint, "parent") not in model.bodies or joint.attrib["type"] not in _HINGES:
+            name, kind = joint.attrib["name"], joint.attrib["type"]
+            raise _core.ModelError(f"joint {name!r} of type {kind!r}: joints are revolute or ball, and {root!r} reaches them")
         waiting.remove(joint)
         parent, child, kind, name = _text(joint, "parent"), _text(joint, "child"), joint.attrib["type"], joint.attrib["name"]
         X, at = np.linalg.inv(where[parent]) @ where[child], _pose(joint)
         how: dict[str, Any] = {
-            "hinge": {"revolute": "pin", "ball": "ball"}[kind],
+            "hinge": _HINGES[kind],
             "point": at[:3, 3],
             "rotation": X[:3, :3],
             "position": X[:3, 3],
