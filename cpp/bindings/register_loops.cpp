@@ -172,6 +172,9 @@ void register_loops(py::module_& m) {
       .def("jacobian", [](Loops& l, const py::object& q, Precision precision) {
         return rows_at(l, {{"q", q}}, {l.rows(), l.set->model().nv()}, [&](Arguments& given, double* out) { l.calls.jacobian(precision, given[0], out); });
       }, q, precision)
+      .def("rates", [](Loops& l, const py::object& q, const py::object& v, Precision precision) {
+        return rows_at(l, {{"q", q}, {"v", v}}, {l.rows()}, [&](Arguments& given, double* out) { l.calls.rates(precision, given[0], given[1], out); });
+      }, q, v, precision)
       .def("bias", [](Loops& l, const py::object& q, const py::object& v, Precision precision) {
         return rows_at(l, {{"q", q}, {"v", v}}, {l.rows()}, [&](Arguments& given, double* out) { l.calls.bias(precision, given[0], given[1], out); });
       }, q, v, precision)

@@ -38,7 +38,7 @@ void ConstrainedWorkspace<S>::set_loops(const std::shared_ptr<const ResolvedLoop
   lambda_.assign(loops->rows, S(0));
   if (loops_ == loops) return;
   groups_ = LoopGroups::of(*model_, *loops);
-  systems_.resize(groups_.groups.size()), active_.resize(groups_.groups.size());
+  systems_.resize(groups_.groups.size()), active_.resize(groups_.groups.size()), asking_.resize(groups_.groups.size());
   loop_of_.resize(loops->rows);
   for (size_t l = 0; l < loops->loops.size(); ++l) std::fill_n(loop_of_.begin() + loops->loops[l].first_row, loops->loops[l].rows, int(l));
   loops_ = loops;
@@ -59,7 +59,7 @@ void ConstrainedWorkspace<S>::find_forces(const Asked& asked, const S* x, const 
 }
 
 template <class S>
-void ConstrainedWorkspace<S>::factor() {
+void ConstrainedWorkspace<S>::factor(const S* bias) {
   using std::sqrt;
   dense_.assign(model_->nv, S(0));
   unit_.assign(loops_->rows, S(1));
@@ -68,8 +68,12 @@ void ConstrainedWorkspace<S>::factor() {
     const int n = group.coordinates, m = static_cast<int>(group.rows.size());
     systems_[g].begin(n);
     scale_.resize(m);
-    active_[g].clear();
+    active_[g].clear(), asking_[g].clear();
     for (const int row : group.rows) {
+      // What is zero exactly asks nothing and loses nothing to rounding, as across the plane of a linkage.
+      const auto& entries = rows_.entries[row];
+      if ((!bias || vanishes(bias[row])) && std::all_of(entries.begin(), entries.end(), [](const auto& e) { return vanishes(e.value); })) continue;
+      asking_[g].push_back(row);
       check_interrupt_at(row, n);
       const std::vector<int>& reach = groups_.reach[loop_of_[row]];
       const size_t c = active_[g].size();
@@ -137,7 +141,7 @@ void ConstrainedWorkspace<S>::meet(const S* target, bool first) {
   if (first) sizes_.assign(loops_->rows, S(0));
   S worst = S(0);
   for (size_t g = 0; g < systems_.size(); ++g) {
-    const auto& rows = groups_.groups[g].rows;
+    const auto& rows = asking_[g];
     const size_t m = active_[g].size();
     b_.resize(m), scale_.resize(m), conflict_.resize(m);
     const auto asked = [&](int row) { return S(-(rows_.product(row, x_.data()) + target[row])); };
@@ -220,10 +224,10 @@ bool ConstrainedWorkspace<S>::sure(const Asked& asked, const Applied<S>& applied
   if (std::any_of(x_.begin(), x_.end(), [](const S& x) { return !is_finite(x); })) return true;  // batches say what left its range
   off_.assign(loops_->rows, S(0));
   S worst = S(0);
-  for (const auto& group : groups_.groups) {
+  for (const auto& rows : asking_) {
     S size = S(0);  // what has cancelled in the rows: the tree's own accelerations, or those of the result
-    for (const int row : group.rows) size = maximum(size, maximum(sizes_[row], S((rows_.product_size(row, x_.data()) + bias_[row]) / unit_[row])));
-    for (const int row : group.rows) {
+    for (const int row : rows) size = maximum(size, maximum(sizes_[row], S((rows_.product_size(row, x_.data()) + bias_[row]) / unit_[row])));
+    for (const int row : rows) {
       const S left = abs(rows_.product(row, x_.data()) + c_[row]) / unit_[row];
       if (left <= certified() * size) continue;
       off_[row] = left;
@@ -240,10 +244,12 @@ bool ConstrainedWorkspace<S>::sure(const Asked& asked, const Applied<S>& applied
   find_forces(asked, x_.data(), applied);
   for (int i = 0; i < nv; ++i) load_[i] += asked.tau[i] - generalized_[i];
   const S left = energy_norm(load_.data());
-  if (!is_recorded<S> && left <= certified() * size) return true;  // of less than all that has cancelled: the rest costs as much again
-  off_.assign(nv, S(0));
-  find_forces(asked, off_.data(), applied);
-  size += energy_norm(generalized_.data());
+  if constexpr (!is_recorded<S>) {  // of less than all that has cancelled: the rest costs as much again, and is left to the call itself
+    if (left <= certified() * size) return true;
+    off_.assign(nv, S(0));
+    find_forces(asked, off_.data(), applied);
+    size += energy_norm(generalized_.data());
+  }
   if (!(left <= certified() * size)) {
     if (!refuse) return false;
     int most = 0;
@@ -291,7 +297,7 @@ void ConstrainedWorkspace<S>::accelerate(const std::shared_ptr<const ResolvedLoo
   }
   if (asked.driven)
     for (int r = 0; r < rows; ++r) c_[r] -= asked.driven[r], bias_[r] += abs(asked.driven[r]);
-  factor();
+  factor(c_.data());
   meet(c_.data(), true);
   const int steps = asked.refinement.steps == Refinement::automatic ? 5 : asked.refinement.steps;
   S last = S(0);

@@ -76,7 +76,7 @@ class ConstrainedWorkspace {
 
  private:
   void set_loops(const std::shared_ptr<const ResolvedLoops>& loops);
-  void factor();                              // the rows' columns, of the tree's factors
+  void factor(const S* bias);                 // the rows' columns, of the tree's factors; of accelerations with Q̇θ̇, else null
   void meet(const S* target, bool first);     // x += (ℳ + J)⁻¹Q*λ such that Q x + target = 0, and adds λ
   void correct(const Asked& asked, const Applied<S>& applied);
   void add_correction();
@@ -103,7 +103,8 @@ class ConstrainedWorkspace {
   LoopBuffers<S> buffers_;
   LoopRows<S> rows_;
   std::vector<MinimumNormSystem<S>> systems_;
-  std::vector<std::vector<int>> active_;      // of every group: rows of which columns are not rounding
+  std::vector<std::vector<int>> asking_;      // of every group: rows that are not zero
+  std::vector<std::vector<int>> active_;      // of those: rows of which columns are not rounding
   std::vector<int> all_, loop_of_;            // bodies, tips first; of rows
   std::vector<Vector6<S>> z_, alpha_;
   std::vector<S> x_, lambda_, c_, unit_, dense_, epsilon_, scratch_, target_, part_, b_, conflict_, scale_, sizes_, off_, r_, delta_, bias_, moved_, gone_, slip_, added_, generalized_, before_, load_;

@@ -67,6 +67,15 @@ void LoopCalls::jacobian(Precision precision, Given q, double* out) {
   });
 }
 
+void LoopCalls::rates(Precision precision, Given q, Given v, double* out) {
+  const ModelInUse use(model());
+  const auto loops = loops_->resolved();
+  run(precision, {q, v}, loops->rows, out, [&]<class S>(LoopWorkspace<S>& w, const S* const* given, S* rates) {
+    std::fill_n(rates, loops->rows, S(0));
+    loop_jacobian(*w.model, *loops, given[0], w.buffers, [&](int row, int i, const S& number) { rates[row] += number * given[1][i]; });
+  });
+}
+
 void LoopCalls::bias(Precision precision, Given q, Given v, double* out) {
   const ModelInUse use(model());
   const auto loops = loops_->resolved();

@@ -26,6 +26,7 @@ class LoopCalls : public Batches<LoopWorkspace> {
 
   void residual(Precision precision, Given q, double* out);          // (rows) a state, zeros of rows of velocities
   void jacobian(Precision precision, Given q, double* out);          // Q, (rows x nv) a state
+  void rates(Precision precision, Given q, Given v, double* out);    // Qθ̇, (rows) a state
   void bias(Precision precision, Given q, Given v, double* out);     // Q̇θ̇, (rows) a state
   // Along displacements, and once along velocities: ∂(Qv)/∂q, ∂(Q v̇ + Q̇v)/∂q, ∂(Q̇v)/∂v (rows x nv each), then ∂(Q*λ)/∂q (nv x nv), a state; λ
   // (rows) is of all states. Cost: nv times the rows. EvaluationError names a function of which third derivatives would be needed.

@@ -48,7 +48,7 @@ void ConstrainedWorkspace<S>::project(const std::shared_ptr<const ResolvedLoops>
   articulated_inertia_tip_to_base(tree_, blocks_);
   if (blocks_.faint().body >= 0) throw_faint_hinge(tree_, blocks_.faint());
   rows_.find(*model_, *loops, q, buffers_);
-  factor();
+  factor(nullptr);
   x_.resize(nv);
   solve(p, x_.data());
   for (int i = 0; i < nv; ++i) x_[i] += v[i];
@@ -116,7 +116,7 @@ void ConstrainedWorkspace<S>::bring(const std::shared_ptr<const ResolvedLoops>& 
   place(q, form);
   articulated_inertia_tip_to_base(tree_, blocks_);
   if (blocks_.faint().body >= 0) throw_faint_hinge(tree_, blocks_.faint());
-  factor();
+  factor(nullptr);
   close(q);
   rows_.find(*model_, *loops, q, buffers_);
   x_.assign(v, v + nv), target_.assign(rows, S(0));

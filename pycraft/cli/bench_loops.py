@@ -13,8 +13,10 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..compiled.source import FUNCTION
 from ..models.linkages import n_four_bar, rod
 from ..models.multibody import Multibody
+from ..peers import four_bar_by_sympy
 from ..peers.clock import elapsed
 from ..scenes import Scene
 from ..scenes.effects import Gravity
@@ -28,6 +30,9 @@ TREE = 1.1
 """Of a direct call of a model with loops over the same without: one, and what clocks miss."""
 RUNGS, COMPILED, BESIDE = 100, (1, 3, 10, 30), 1 / 3
 """Of ladders that are computed by Pinocchio too, by the call and by the call compiled, and the share of its time that is ours at most."""
+
+BY_HAND = 2.0
+"""Of a four-bar's accelerations compiled, over its own equations compiled."""
 
 
 def ladder(rungs: int) -> Multibody:
@@ -45,7 +50,7 @@ def apart(loops: int) -> Multibody:
         for j in range(3):
             model.add_body(f"rod{i}.{j}", inboard, position=(0, 0, i) if j == 0 else (1, 0, 0), **rod())
             inboard = f"rod{i}.{j}"
-        model.add_loop(model.add_node(f"end{i}", inboard, position=(1, 0, 0)), hinge="pin", position=(0, 0, i), name=f"loop{i}")
+        model.add_loop(model.add_node(f"end{i}", inboard, position=(1, 0, 0)), hinge="pin", position=(1, 0, i), name=f"loop{i}")
     model.gravity = (0, -9.81, 0)
     return model
 
@@ -114,6 +119,25 @@ def tree_with_loops(seconds: float = 0.1) -> Figure:
     return Figure("direct calls of a tree with loops declared, over one without", declared / without, "x", TREE, f"{1e6 * declared:.1f} us")
 
 
+def four_bar_by_hand(seconds: float = 0.1) -> Figure:
+    """A four-bar's accelerations compiled over the equations that SymPy derives and prints for it, which certify nothing; both in C++."""
+    model, rng = ladder(1), np.random.default_rng(0)
+    compiled, library = model.compile("constrained_dynamics"), four_bar_by_sympy.library(9.81)
+    angles, speeds = rng.uniform(0.4, 2.6, 8), rng.normal(size=8)
+    given = [np.column_stack([x, -x, x]) for x in (angles, speeds)] + [rng.normal(size=(8, 3))]
+    by_hand = four_bar_by_sympy.accelerations(library, *given)
+    wanted = np.array([compiled(*one) for one in zip(*given, strict=True)])
+    if not np.abs(by_hand - wanted).max() <= 1e-10 * np.abs(wanted).max():  # rounding times what an angle of 0.4 rad leaves of rows
+        raise _core.EvaluationError("a four-bar's own equations and its accelerations disagree, in the run that times them")
+
+    def elapsed_in_core(place: str) -> float:
+        return _core.time_compiled(place, FUNCTION, given, 3, seconds)["median"]
+
+    own, other = (elapsed_in_core(place) for place in (str(compiled.library), library))
+    told = f"{1e9 * own:.0f} and {1e9 * other:.0f} ns"
+    return Figure("dynamics on loops, a four-bar compiled, over its equations by SymPy, compiled", own / other, "x", BY_HAND, told)
+
+
 def _beside(name: str, ours: Callable[[], np.ndarray], theirs: Callable[[], np.ndarray], near: float, peer: Any, seconds: float) -> Figure:
     """A call of ours over Pinocchio's; `near`: how far off it may be, of the largest acceleration."""
     wanted = ours()
@@ -152,4 +176,4 @@ def beside_pinocchio(seconds: float = 0.1, ladders: tuple[int, ...] = (*COMPILED
 
 def loops() -> list[Figure]:
     """All of them."""
-    return [*growth(), tree_with_loops(), *beside_pinocchio()]
+    return [*growth(), tree_with_loops(), four_bar_by_hand(), *beside_pinocchio()]

@@ -215,8 +215,19 @@ class _Lines:
             return f"({self.text[taken[0]][0]}) ? {self._whole(taken[1])} : {self._whole(taken[2])}", 0
         strength = _STRENGTH[name]
         if name == "negate":
+            inside, *swapped = self.graph.operations[taken[0]]
+            if inside == "subtract" and self.uses[taken[0]] == 1:
+                return self._expression("subtract", swapped[::-1])
             return f"-{self._bracketed(taken[0], 2)}", 2
         first, second = taken
+        if name == "multiply":
+            for one, other in ((first, second), (second, first)):
+                operation = self.graph.operations[one]
+                # A quotient of a number that is there before its divisor; else the reciprocal is not waited for.
+                if operation[0] == "divide" and self.uses[one] == 1 and operation[2] > other:
+                    return self._bracketed(other, strength - 1) + _SIGNS["divide"] + self._bracketed(operation[2], strength), strength
+                if operation[0] == "divide" and one is second:
+                    first, second = second, first
         left = self._bracketed(first, strength - 1)
         return left + _SIGNS[name] + self._bracketed(second, strength - (name in ("add", "multiply"))), strength
 

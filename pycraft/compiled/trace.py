@@ -157,8 +157,6 @@ class Graph:
                 return self.number(-operation[1]).index
             case "negate":
                 return operation[1]
-            case "subtract":
-                return self._node("subtract", operation[2], operation[1])
         return self._node("negate", a)
 
     def _negated(self, a: int) -> int | None:
@@ -180,7 +178,18 @@ class Graph:
         negative = self._negated(a)
         if negative is not None:
             return self._subtract(b, negative)
+        if self._are_one(a, b) or self._are_one(b, a):
+            return self.number(1).index
         return self._node("add", *sorted((a, b)))
+
+    def _are_one(self, a: int, b: int) -> bool:
+        """Whether it is cos x + 2 sin² x/2, which a turn about an axis has along it."""
+        cosine, product = self.operations[a], self.operations[b]
+        if cosine[0] != "cosine" or product[0] != "multiply":
+            return False
+        half = self.put("multiply", self.number(0.5).index, cosine[1])
+        sine = self._known.get(("sine", half))
+        return sine is not None and b == self._multiply(self._multiply(self.number(2).index, sine), sine)
 
     def _subtract(self, a: int, b: int) -> int:
         if a == b:
@@ -193,7 +202,10 @@ class Graph:
         if known is not None:
             return known
         negative = self._negated(b)
-        return self._add(a, negative) if negative is not None else self._node("subtract", a, b)
+        if negative is not None:
+            return self._add(a, negative)
+        swapped = self._known.get(("subtract", b, a))
+        return self._node("subtract", a, b) if swapped is None else self._negate(swapped)
 
     def _multiply(self, a: int, b: int) -> int:
         if self.zero in (a, b):
@@ -227,10 +239,18 @@ class Graph:
         known = self._of_constants(a, b, lambda x, y: x / y if y else math.nan)
         if known is not None:
             return known
-        if self.constant_of(b) == 1:
-            return a
+        if self.constant_of(b) is not None:
+            return self._multiply(a, self.number(1 / divisor if (divisor := self.constant_of(b)) else math.nan).index)
         negative = self._negated(a)
-        return self._negate(self._divide(negative, b)) if negative is not None else self._node("divide", a, b)
+        if negative is not None:
+            return self._negate(self._divide(negative, b))
+        return self._multiply(a, self._node("divide", self.number(1).index, b))  # one reciprocal, whatever is divided by b
+
+    def _sqrt(self, a: int) -> int:
+        operation = self.operations[a]
+        if operation[0] == "multiply" and operation[1] == operation[2]:
+            return self._magnitude(operation[1])
+        return self._function("sqrt", a)
 
     def _magnitude(self, a: int) -> int:
         negative = self._negated(a)

@@ -151,9 +151,28 @@ class Loops(Closed, Mapping):
         """
         return self._core.jacobian(at_state(self._model, q)[0], precision)
 
+    def rates(self, q=None, v=None, *, precision: str = "double") -> np.ndarray:
+        """Qθ̇ (rows,) or (B, rows): ṙ, and of rows of velocities what is zero. Cost: the rows' entries; no Q is made.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> arm = pc.chain(2)
+        >>> gear = arm.add_coupling({"hinge0": 1.0, "hinge1": -3.0}, name="gear")
+        >>> arm.loops.rates([0.5, 0.25], [3.0, 1.5]).tolist()
+        [-1.5]
+        """
+        return self._core.rates(*at_state(self._model, q, v), precision)
+
     def bias(self, q=None, v=None, *, precision: str = "double") -> np.ndarray:
         """Q̇θ̇ (rows,) or (B, rows): what is left of the rows' second derivatives at θ̈ = 0."""
         return self._core.bias(*at_state(self._model, q, v), precision)
+
+    @property
+    def slices(self) -> dict[str, slice]:
+        """Where each loop's rows stand among those of all, by its name."""
+        first = self._core.first_rows()
+        return {name: slice(first[i], first[i + 1]) for i, name in enumerate(self._core.names())}
 
     def coupled(self, name: str) -> list[int]:
         """The numbers of the coordinates that a coupling is of, in its order. KeyError where there is none of that name."""

@@ -124,12 +124,9 @@ class Motion:
     def drift(self) -> dict[str, np.ndarray]:
         """(K,) by the loops of the model that have residuals: the largest, m and rad; whether effects keep the loop or not."""
         model = self._unedited_model()
-        found = {}
-        for name, loop in model.loops.items():
-            rows = model.loops.of_positions[loop.slice]
-            if rows.any():
-                found[name] = np.abs(loop.residual(self.q)[..., rows]).max(axis=-1)
-        return found
+        residual, of_positions = np.abs(model.loops.residual(self.q)), np.asarray(model.loops.of_positions, bool)
+        own = {name: np.arange(len(of_positions))[rows][of_positions[rows]] for name, rows in model.loops.slices.items()}
+        return {name: residual[..., rows].max(axis=-1) for name, rows in own.items() if len(rows)}
 
     @cached_property
     def momentum(self) -> dict[str, np.ndarray]:

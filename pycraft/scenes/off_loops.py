@@ -20,14 +20,15 @@ def warn_off_the_loops(model: Any, effects: Iterable[Effect], q: np.ndarray, v: 
 
     Of those that gains draw back (Baumgarte's) or springs hold none: a state off them is what they are for.
 
-    Accelerations there keep what is missed as it is; what they say is of a mechanism that has come apart. Cost: the rows and Q.
+    Accelerations there keep what is missed as it is; what they say is of a mechanism that has come apart. Cost: the rows.
     """
     keeping = [effect for effect in effects if isinstance(effect, Loop) and effect.keeps and not (effect.alpha or effect.beta)]
     if not keeping:
         return
     loops, kept = model.loops, [name for effect in keeping for name in effect.kept(model)]
-    rows = [row for name in kept for row in range(loops[name].slice.start, loops[name].slice.stop)]
-    for off, how in ((loops.residual(q), "is off"), (np.zeros(len(loops.rows)) if v is None else loops.jacobian(q) @ v, "moves off")):
+    slices, size = loops.slices, len(loops.rows)
+    rows = [row for name in kept for row in range(size)[slices[name]]]
+    for off, how in ((loops.residual(q), "is off"), (np.zeros(size) if v is None else loops.rates(q, v), "moves off")):
         worst = rows[int(np.argmax(np.abs(off[rows])))] if rows else None
         if worst is not None and abs(off[worst]) > FAR:
             warn(
