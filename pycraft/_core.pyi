@@ -1243,6 +1243,8 @@ class LoopSet:
         """
         What holds these loops in a scene by springs and dampers, all without names.
         """
+    def rates(self, q: typing.Any, v: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
+        ...
     def remove(self, name: str) -> None:
         ...
     def residual(self, q: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]:

@@ -16,7 +16,6 @@ from .. import _core
 from ..compiled.source import FUNCTION
 from ..models.linkages import n_four_bar, rod
 from ..models.multibody import Multibody
-from ..peers import four_bar_by_sympy
 from ..peers.clock import elapsed
 from ..scenes import Scene
 from ..scenes.effects import Gravity
@@ -121,6 +120,8 @@ def tree_with_loops(seconds: float = 0.1) -> Figure:
 
 def four_bar_by_hand(seconds: float = 0.1) -> Figure:
     """A four-bar's accelerations compiled over the equations that SymPy derives and prints for it, which certify nothing; both in C++."""
+    from ..sympy_bridge import four_bar_by_sympy
+
     model, rng = ladder(1), np.random.default_rng(0)
     compiled, library = model.compile("constrained_dynamics"), four_bar_by_sympy.library(9.81)
     angles, speeds = rng.uniform(0.4, 2.6, 8), rng.normal(size=8)

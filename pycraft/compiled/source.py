@@ -40,10 +40,9 @@ def _headers() -> str:
 def written(graph: Graph, results: np.ndarray, arguments: Sequence[tuple[str, int]], title: str) -> tuple[str, int]:
     """The source, and how many operations a state takes. `arguments`: names and widths of the inputs, `results` nodes of any shape."""
     lines = _Lines(graph, results.ravel().tolist())
-    starts = np.cumsum([0, *(n for _, n in arguments)]).tolist()
-    places = [f"input + {start}" for start, _ in zip(starts, arguments, strict=False)]
+    places = [f"from[{i}]" for i in range(len(arguments))]
     blanks = {
-        "@INPUTS@": max(starts[-1], 1),
+        "@INPUTS@": max(sum(n for _, n in arguments), 1),
         "@OUTPUTS@": max(results.size, 1),
         "@ARRAYS@": len(arguments),
         "@PLACES@": ", ".join([*places, "y"]),

@@ -1,8 +1,9 @@
 """Numbers that remember how they came about: what is computed with them becomes straight-line code.
 
 A `Traced` is a node of a graph: a constant, an input, or an operation on nodes. Operations on constants are carried out, what adds zero or
-multiplies by zero or one is left out, and equal operations are one node. So loops, tables and zeros of a recursion that runs on such
-numbers are gone from what it leaves behind.
+multiplies by zero or one is left out, and equal operations are one node. What is divided by one number is multiplied by its one
+reciprocal, which rounds once more; the root of a square is a magnitude, and cos x + 2 sin² x/2 is one. So loops, tables and zeros of a
+recursion that runs on such numbers are gone from what it leaves behind.
 
 Leaving out 0 x is exact for finite x alone; what is built of a graph looks through its inputs and results for others (source.py).
 """

@@ -5,7 +5,7 @@ import pytest
 
 from pycraft.cli.bench_loops import ladder
 from pycraft.compiled.build import FLAGS
-from pycraft.peers import four_bar_by_sympy
+from pycraft.sympy_bridge import four_bar_by_sympy
 
 
 @pytest.fixture(scope="module")

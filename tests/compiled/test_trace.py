@@ -69,6 +69,42 @@ def test_equal_operations_are_one():
     assert twice == 3.0 * (0.1 * 0.7) != (3.0 * 0.1) * 0.7  # rounded in the order that was written
 
 
+def test_differences_the_other_way_round_are_the_same_but_for_a_sign():
+    graph = Graph()
+    x, y, z = graph.inputs("x", 3)
+    assert (z + (y - x)).index == (z - (x - y)).index
+    assert (-(x - y)).index == (y - x).index
+    assert ((x - y) * (y - x)).index == (-((x - y) * (x - y))).index
+
+
+def test_a_turn_is_one_along_its_axis():
+    graph = Graph()
+    x, y = graph.inputs("x", 2)
+    half = (x * 0.5).function("sine")
+    assert (x.function("cosine") + 2 * half * half).value == 1 and (2 * half * half + x.function("cosine")).value == 1
+    assert (y.function("cosine") + 2 * half * half).value is None  # of another angle
+    assert (x.function("cosine") + 3 * half * half).value is None
+
+
+def test_the_root_of_a_square_is_a_magnitude():
+    graph = Graph()
+    x, y = graph.inputs("x", 2)
+    assert (x * x).function("sqrt").index == abs(x).index
+    made = (x * y).function("sqrt")
+    (found,), _ = evaluated(graph, np.array(made.index), {"x": np.array([[2.0, 8.0]])})
+    assert found == 4.0
+
+
+def test_what_is_divided_by_one_number_has_its_one_reciprocal():
+    graph = Graph()
+    x, y, z = graph.inputs("x", 3)
+    made = [x / z, y / z, 1 / z]
+    assert sum(operation[0] == "divide" for operation in graph.operations) == 1
+    (found,), _ = evaluated(graph, np.array([m.index for m in made]), {"x": np.array([[3.0, -5.0, 7.0]])})
+    np.testing.assert_allclose(found, [3 / 7, -5 / 7, 1 / 7], rtol=2 * np.finfo(float).eps)  # of the reciprocal and of the product
+    assert (x / 4).index == (x * 0.25).index
+
+
 def test_decisions_are_not_taken():
     graph = Graph()
     x = graph.input("x", 0)

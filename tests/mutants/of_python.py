@@ -263,9 +263,19 @@ CHANGES = {
     ],
     "pycraft/compiled/trace.py": [
         (
-            "a negated difference is itself",
-            'return self._node("subtract", operation[2], operation[1])',
-            'return self._node("subtract", *operation[1:])',
+            "a difference the other way round is the same",
+            'return self._node("subtract", a, b) if swapped is None else self._negate(swapped)',
+            'return self._node("subtract", a, b) if swapped is None else swapped',
+        ),
+        (
+            "a turn is one along any axis",
+            "return sine is not None and b == self._multiply",
+            "return sine is not None or b == self._multiply",
+        ),
+        (
+            "the root of a product is a magnitude",
+            'operation[0] == "multiply" and operation[1] == operation[2]',
+            'operation[0] == "multiply"',
         ),
         ("products lose a sign", "return product if None not in negatives else self._negate(product)", "return product"),
         ("any factor is a power of two", " and math.log2(factor) == int(math.log2(factor)):", ":"),

@@ -244,7 +244,7 @@ RESTS_ON = {
     "peers": ["models"],
     "proofs": ["identities"],
     "closed_forms": ["proofs"],
-    "sympy_bridge": ["proofs"],
+    "sympy_bridge": ["compiled", "proofs"],
     "accuracy": ["identities", "peers", "tidy"],
     "scenes": ["view"],
     "ensembles": ["scenes"],

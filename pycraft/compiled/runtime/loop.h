@@ -1,15 +1,19 @@
 // `taken` states from state b on; how many of them are in doubt: where a guard fails, or an input or a result is not finite.
 template <class S>
 inline std::int64_t run(const double* const* given, const std::int64_t* strides, double* out, std::int64_t b, int taken) {
-  S input[@INPUTS@], y[@OUTPUTS@], odd = S{};
-  for (int i = 0, first = 0; i < @ARRAYS@; first += widths[i++])
-    for (int j = 0; j < widths[i]; ++j) {
-      const double* const from = given[i] + b * strides[i] + j;
-      S& to = input[first + j];
-      if constexpr (lanes<S> == 1) to = *from;
-      else for (int l = 0; l < lanes<S>; ++l) to[l] = from[(l < taken ? l : taken - 1) * strides[i]];
-      odd += to - to;
+  S y[@OUTPUTS@], odd = S{};
+  const S* from[@ARRAYS@ + 1];
+  [[maybe_unused]] S input[lanes<S> == 1 ? 1 : @INPUTS@];
+  for (int i = 0, first = 0; i < @ARRAYS@; first += widths[i++]) {
+    const double* const array = given[i] + b * strides[i];
+    if constexpr (lanes<S> == 1) from[i] = array;
+    else {
+      from[i] = input + first;
+      for (int j = 0; j < widths[i]; ++j)
+        for (int l = 0; l < lanes<S>; ++l) input[first + j][l] = array[(l < taken ? l : taken - 1) * strides[i] + j];
     }
+    for (int j = 0; j < widths[i]; ++j) odd += from[i][j] - from[i][j];
+  }
   const auto held = evaluate<S>(@PLACES@);
   for (int i = 0; i < @OUTPUTS@; ++i) odd += y[i] - y[i];
   const auto sound = held & (odd == S{});

@@ -1,3 +1,5 @@
+#include <utility>
+
 namespace {
 
 using pycraft::kernels::compiled::Lanes;
@@ -41,20 +43,23 @@ template <class S>
 inline S sine_of(const S& x) { return sine_cosine(wide(x)).sine.v; }
 template <class S>
 inline S cosine_of(const S& x) { return sine_cosine(wide(x)).cosine.v; }
+// As many angles as a pack has, from `first` on, side by side: put together in registers, as what goes by memory waits for it.
+template <int first, int n, int... b>
+inline void pack_of_sines_and_cosines(const double (&angle)[n], double (&s)[n], double (&c)[n], std::integer_sequence<int, b...>) {
+  constexpr auto there = [](int i) { return first + i < n ? first + i : n - 1; };
+  const auto of = sine_cosine(wide(Pack{angle[there(b)]...}));
+  ((s[there(b)] = of.sine.lane(b), c[there(b)] = of.cosine.lane(b)), ...);
+}
 // Of n angles: packs of states angle by angle; of one state, several angles at once.
-template <int n, class S>
+template <int first = 0, int n, class S>
 inline void sines_and_cosines(const S (&angle)[n], S (&s)[n], S (&c)[n]) {
   if constexpr (lanes<S> > 1) {
     for (int i = 0; i < n; ++i) {
       const auto of = sine_cosine(wide(angle[i]));
       s[i] = of.sine.v, c[i] = of.cosine.v;
     }
-  } else {
-    for (int i = 0; i < n; i += width) {
-      LanesOf<Pack> x(0.0);
-      for (int b = 0; b < width && i + b < n; ++b) x.set(b, angle[i + b]);
-      const auto of = sine_cosine(x);
-      for (int b = 0; b < width && i + b < n; ++b) s[i + b] = of.sine.lane(b), c[i + b] = of.cosine.lane(b);
-    }
+  } else if constexpr (first < n) {
+    pack_of_sines_and_cosines<first>(angle, s, c, std::make_integer_sequence<int, width>());
+    sines_and_cosines<first + width>(angle, s, c);
   }
 }
