@@ -89,7 +89,7 @@ class ConstrainedWorkspace {
   void find_forces(const Asked& asked, const S* x, const Applied<S>& applied);  // of the motion θ̈ = x, to generalized_
   static S largest(const std::vector<S>& of);
   void solve(const S* r, S* x);
-  S energy_norm(const S* x);                  // (x* (ℳ + J)⁻¹ x)^½
+  S energy(const S* x);                       // x* (ℳ + J)⁻¹ x
   [[noreturn]] void refuse_rows(const std::vector<S>& off, const S& worst, const char* what) const;
 
   const Multibody& source_;

@@ -47,7 +47,7 @@ struct LoopRows {
               // Of lengths, and not of entries: a direction along which nothing moves has the rounding of those along which something does. A custom
               // hinge's row is what a projection leaves of one of length 1 (custom_rows.h).
               const bool projected = loop.loop->pair.kind == PairKind::custom;
-              const S size = projected ? norm(J.angular) + norm(J.linear) : norm(g.angular) * norm(J.angular) + norm(g.linear) * norm(J.linear);
+              const S size = projected ? length(J.angular) + length(J.linear) : length(g.angular) * length(J.angular) + length(g.linear) * length(J.linear);
               entries[loop.first_row + r].push_back({i, dot(g, J), size});
             }
           }
@@ -69,6 +69,12 @@ struct LoopRows {
   void add_transposed(const S* lambda, S* x) const {
     for (size_t r = 0; r < entries.size(); ++r)
       for (const Entry& e : entries[r]) x[e.coordinate] += e.value * lambda[r];
+  }
+  // Of recorded numbers a sum of magnitudes, at most √3 times as much: a root takes longer than all of it.
+  static S length(const Vector3<S>& x) {
+    using std::abs;
+    if constexpr (is_recorded<S>) return abs(x[0]) + abs(x[1]) + abs(x[2]);
+    else return norm(x);
   }
   // What a loop puts on b, or on a, in its axes about its origin; nothing of a coupling.
   Vector6<S> force(const ResolvedLoops& loops, const std::vector<S>& lambda, int loop, bool on_a) const {
