@@ -18,8 +18,8 @@ CHANGES = {
         ),
         (
             "residuals of loops are measured by what is left",
-            "maximum(sizes_[row], S((rows_.product_size(row, x_.data()) + bias_[row]) / unit_[row]))",
-            "S((rows_.product_size(row, x_.data()) + bias_[row]) / unit_[row])",
+            "if (!is_recorded<S>) size = maximum(size, sizes_[row]);",
+            "",
         ),
         ("what implicit steps add is not in the residual", "generalized_[j] += added_[j] * x[j];", "static_cast<void>(x);", STATEMENT),
     ],
