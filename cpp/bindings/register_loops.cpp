@@ -1,5 +1,6 @@
 #include "bindings/register_loops.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "bindings/direct_calls.h"
@@ -9,6 +10,7 @@
 #include "dynamics/calls_on_loops.h"
 #include "dynamics/loop_calls.h"
 #include "dynamics/recorded_on_loops.h"
+#include "model/checks.h"
 #include "operators/embedded_operators.h"
 #include "operators/loop_operators.h"
 #include "simulation/effects/loop.h"
@@ -40,9 +42,20 @@ struct PythonCoupling {
     if (!std::isfinite(*r)) throw ModelError("r of " + what + " is not a finite number");
     copy(parts[1], "the gradient of " + what, {n}, gradient);
     copy(parts[2], "the second derivatives of " + what, {n, n}, second);
+    check_symmetric(n, second, what);
   }
 
  private:
+  // ∂²r/∂i∂j is ∂²r/∂j∂i: what is further apart than differences leave is no second derivatives, as one triangle of them.
+  static void check_symmetric(int n, const double* second, const std::string& what) {
+    double most = 0;
+    for (int i = 0; i < n * n; ++i) most = std::max(most, std::abs(second[i]));
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < i; ++j)
+        if (const double above = second[j * n + i], below = second[i * n + j]; std::abs(above - below) > 1e-4 * most)
+          throw ModelError("the second derivatives of " + what + " are not symmetric: entries (" + std::to_string(j) + ", " + std::to_string(i) + ") and (" +
+                           std::to_string(i) + ", " + std::to_string(j) + ") are " + short_number(above) + " and " + short_number(below));
+  }
   static void copy(const py::handle& given, const std::string& what, const std::vector<py::ssize_t>& shape, double* to) {
     const Array a = numbers(given, what.c_str());
     if (a.ndim() != static_cast<py::ssize_t>(shape.size()) || !std::equal(shape.begin(), shape.end(), a.shape()))

@@ -70,11 +70,11 @@ template <class S>
 void ConstrainedWorkspace<S>::find_off(const std::shared_ptr<const ResolvedLoops>& loops, const S* q, const S* v, const S* rates, std::vector<S>& positions, std::vector<S>& velocities) {
   using std::abs;
   rows_.find(*model_, *loops, q, buffers_);
-  positions.assign(loops->rows, S(0)), velocities.assign(v ? loops->rows : 0, S(0));
+  positions.assign(loops->rows, S(0)), velocities.assign(loops->rows, S(0));
   loop_residuals(*model_, *loops, q, buffers_, positions.data());
   for (int r = 0; r < loops->rows; ++r) {
-    const S size = size_of(r);
-    positions[r] = size > S(0) && loops->of_positions[r] ? S(abs(positions[r]) / size) : S(0);
+    const S size = size_of(r);  // 0: no coordinate moves the row, as where all hinges around its loop are locked, and it is off as far as it is
+    positions[r] = loops->of_positions[r] ? S(abs(positions[r]) / (size > S(0) ? size : S(1))) : S(0);
     if (v) velocities[r] = size > S(0) ? S(abs(rows_.product(r, v) - (rates ? rates[r] : S(0))) / size) : S(0);
   }
 }

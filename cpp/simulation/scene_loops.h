@@ -113,21 +113,25 @@ class SceneLoops {
     set_rates(v);
     workspace_.find_off(loops_, q, v, rates_.data(), positions, velocities);
     refuse(positions, "is off", "its rows are kept from a state that is on them");
-    S fastest = S(0);
+    S fastest = held_.empty() ? S(0) : S(slow);
     for (size_t i = 0; i < zeros_.size(); ++i) fastest = maximum(fastest, S(v[i] < S(0) ? -v[i] : v[i]));
     for (S& off : velocities) off = fastest > S(0) ? S(off / fastest) : S(0);
     refuse(velocities, "moves off", "Q v = 0 holds of a velocity");
   }
 
  private:
-  static constexpr double far = 1e-6;  // as mobility has it: larger residuals are no state on the loops
+  static constexpr double far = 1e-6;   // as mobility has it: larger residuals are no state on the loops
+  static constexpr double slow = 1e-3;  // motions of values alone have rates by differences, at rest ε |q| over their step: some 1e-12, of 1e-6 · slow
 
   template <class F>
-  static void telling_time(const S& t, F f) {
+  void telling_time(const S& t, F f) const {
     try {
       f();
     } catch (const EvaluationError& e) {
-      throw EvaluationError(e.what() + (", at t = " + short_number(to_double(t)) + " s"));
+      std::string said = e.what();
+      said += held_.empty() ? "," : prescribed();
+      said.append(" at t = ").append(short_number(to_double(t))).append(" s");
+      throw EvaluationError(said);
     }
   }
   static HingeTerms free_terms(HingeTerms terms) {

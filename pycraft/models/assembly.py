@@ -13,6 +13,7 @@ from .coordinates import coordinate_numbers
 from .limits import pin_coordinates
 
 _ITERATIONS = 200
+_LARGEST = 1e150  # of residuals and rows: squares are within doubles; there is no way from what is further off
 _RANK = 1e-10  # relative: singular values below are rounding, of rows that hang on others
 
 
@@ -63,7 +64,7 @@ class Assembler:
         """The state reached from q, and the largest residual left there."""
         rows = np.flatnonzero(self.positions) if rows is None else rows
         r, Q = self.equations(q, rows)
-        if not r.size or not Q.size:
+        if not r.size or not Q.size or max(np.abs(r).max(), np.abs(Q).max()) > _LARGEST:
             return q, float(np.abs(r).max(initial=0))
         mu, grow = 1e-3 * max((Q * Q).sum(axis=0).max(), 1e-30), 2.0
         for _ in range(_ITERATIONS):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from typing import Any
 
@@ -22,6 +22,10 @@ def coordinate_numbers(model: Any, given: Any) -> list[int] | None:
         return None
     if isinstance(given, (str, int, np.integer)) or hasattr(given, "v_slice"):
         given = [given]
+    if isinstance(given, Mapping):
+        raise _core.ModelError(
+            f"coordinates are named by a list, without values, which are those of a state: {list(given)!r}, not {dict(given)!r}"
+        )
     if not isinstance(given, Iterable):
         raise _core.ModelError(f"coordinates: names of hinges or coordinates, or numbers, not {given!r}")
     numbers: list[int] = []

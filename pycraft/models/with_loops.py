@@ -181,7 +181,7 @@ class WithLoops(WithFrames):
         ------
         ModelError
             Coordinates that are unknown, named twice, or no single number in q (of ball and free hinges); coefficients that are all zero; a
-            function that cannot be called, or does not return the three.
+            function that cannot be called, or does not return the three, second derivatives symmetric to differences of 1e-4.
 
         Examples
         --------

@@ -4,6 +4,8 @@ Tolerances: a refined state leaves residuals of some roundings of lengths near o
 conditioning of the loop, at the states below under a hundred.
 """
 
+import re
+
 import numpy as np
 import pytest
 
@@ -164,6 +166,7 @@ def test_velocities_that_conflict_are_named():
     [
         (dict(q0=[0.0]), r"q of 'four-bar'"),
         (dict(fix="piston"), r"no hinge or coordinate of 'four-bar' is called 'piston'"),
+        (dict(fix={"crank": 0.4}), r"named by a list, without values, which are those of a state: \['crank'\], not \{'crank': 0.4\}"),
         (dict(starts=0), r"starts: how many are tried, at least 1, not 0"),
         (dict(starts=1.5), r"starts: a whole number"),
         (dict(tolerance=0), r"tolerance: a positive number, not 0"),
@@ -176,6 +179,17 @@ def test_arguments_that_are_none(given, said):
     model = four_bar(0.4, 1.0, 0.8, 1.0)
     with pytest.raises(pc.ModelError, match=said):
         model.assemble(**given)
+
+
+@pytest.mark.parametrize("far", [1e160, 1e308])
+def test_what_is_beyond_all_reach_is_said_in_metres(far):
+    """Squares of such residuals are no doubles."""
+    model = pc.chain(3)
+    model.add_loop("body2", hinge="ball", position=(far, 0, 0), name="away")
+    with pytest.raises(
+        pc.ModelError, match=rf"loop 'away' cannot be closed even without the others.*left .*{re.escape(f'{far:g}')} of 'away: along x'"
+    ):
+        model.assemble([0.1, 0.2, 0.3], starts=3)
 
 
 def test_branches_are_of_one_state():

@@ -127,6 +127,7 @@ def test_a_loop_whose_body_is_gone():
         (lambda q: (q[0], [1.0], [0.0]), r"the second derivatives of the function of coupling 'cam'"),
         (lambda q: (np.nan, [1.0], [[0.0]]), r"r of the function of coupling 'cam' is not a finite number"),
         (lambda q: (q[0], [np.nan], [[0.0]]), r"the gradient of the function of coupling 'cam' has an entry that is not a finite number"),
+        (lambda q: (q[0], [1j], [[0.0]]), r"the gradient of the function of coupling 'cam' is complex"),
     ],
 )
 def test_functions_that_return_what_they_should_not(function, said):
@@ -134,6 +135,19 @@ def test_functions_that_return_what_they_should_not(function, said):
     model.add_coupling(["hinge0"], function=function, name="cam")
     with pytest.raises(pc.ModelError, match=said):
         model.loops.jacobian()
+
+
+def test_second_derivatives_of_one_triangle():
+    """They are symmetric, to what differences leave: a bias by one triangle would be right, and a derivative of the row by it wrong."""
+    model = pc.chain(2)
+    model.add_coupling(["hinge0", "hinge1"], function=lambda q: (q[0] * q[1], [q[1], q[0]], [[0.0, 2.0], [0.0, 0.0]]), name="cam")
+    with pytest.raises(
+        pc.ModelError, match=r"of the function of coupling 'cam' are not symmetric: entries \(0, 1\) and \(1, 0\) are 2 and 0"
+    ):
+        model.loops.bias([0.1, 0.2], [1.0, 1.0])
+    model.loops.remove("cam")
+    model.add_coupling(["hinge0", "hinge1"], function=lambda q: (q[0] * q[1], [q[1], q[0]], [[0.0, 1.0], [1.0 + 1e-6, 0.0]]))
+    assert abs(model.loops.bias([0.1, 0.2], [1.0, 1.0])[0] - 2) < 1e-5  # by differences
 
 
 def test_states_and_precisions_that_are_none():
