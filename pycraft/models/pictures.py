@@ -155,7 +155,8 @@ class Pictures:
         """The same motion seen from every base body in turn: a page with a slider for the base, and what changes with it and what stays.
 
         The tree, coordinates and P(k) belong to the base that was chosen; poses, velocities, accelerations, energy, momentum, ln det ℳ
-        and Υ(k) do not: a body of a free tree is felt as Υ(k)⁻¹ = P(k) + S⁺(k), of which the base decides what is outboard.
+        and Υ(k) do not: a body of a free tree is felt as Υ(k)⁻¹ = P(k) + S⁺(k), of which the base decides what is outboard. Loops are not
+        looked at: all numbers are the tree's.
 
         Parameters
         ----------
