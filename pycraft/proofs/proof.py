@@ -182,7 +182,8 @@ class Proof:
         pycraft.identities.search.Counterexample or None
             None also for derivatives, and for constants, which belong to their own model.
         """
-        from ..identities.search import named_vectors, smallest, statement_text
+        from ..identities.search import named_vectors, smallest
+        from ..identities.statement_text import statement_text
 
         if self._read is None or any(isinstance(side, Formula) for side in (self._read.lhs, self._read.rhs)):
             return None
