@@ -140,8 +140,9 @@ class Pictures:
     def shapes(self) -> list[Shape]:
         """What the model's file gives its bodies to be seen by, in the file's order; none of a model that was not loaded.
 
-        Visuals of a URDF file, geoms of the groups 0 to 2 of an MJCF file. The viewer and pages of runs draw them; meshes are looked for
-        and read then (extra `meshes`). `Multibody.save` leaves them out.
+        Visuals of a URDF file, geoms of the groups 0 to 2 of an MJCF file, `[[shapes]]` of a TOML file. The viewer and pages of runs draw
+        them; meshes are looked for and read then (extra `meshes`). `Multibody.save` keeps them in TOML, but for meshes that were in an
+        MJCF file itself.
 
         Examples
         --------
