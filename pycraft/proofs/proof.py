@@ -6,6 +6,7 @@ import copy
 from collections.abc import Sequence
 from typing import Any
 
+from ..identities.terminal_report import wrapped
 from ..operators.latex_lines import in_lines
 from ..operators.latex_text import escaped
 from .derivative import Formula
@@ -252,7 +253,7 @@ class Proof:
         title += f"; not met by the model at hand: {' and '.join(self.unmet)}" if self.unmet else ""
         shown = [title, *lines(self.steps)]
         shown += [f"  {self.note}"] if self.note else []
-        shown += [f"  rests on {'; '.join(self.axioms)}"] if self.axioms else []
+        shown += [wrapped(f"  rests on {'; '.join(self.axioms)}")] if self.axioms else []
         shown += [f"  largest residual of a step at a random state: {self.worst:.1e}"] if self.worst is not None else []
         return "\n".join(shown)
 

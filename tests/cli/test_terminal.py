@@ -81,7 +81,8 @@ def test_plans_fit():
     H, phi, M = arm.soa("H phi M")
     MM = H @ phi @ M @ phi.T @ H.T
     for op in (MM.inv(), (MM + 0.1 * arm.soa.I).inv(), MM.inv().diff(0)):
-        rows = str(op.explain()).split("  #  step", 1)[1]
+        notes, rows = str(op.explain()).split("\n", 1)[1].split("  #  step", 1)
+        fits(notes, 77)
         fits(rows, 77)
         assert len({line.index(" flop") for line in rows.splitlines() if " flop" in line}) <= 3  # of flop, kflop, Mflop
         assert all(s["text"].replace(" ", "") in rows.replace(" ", "").replace("\n", "") or len(s["text"]) > 36 for s in op.plan().steps)
