@@ -6,7 +6,6 @@ import copy
 from collections.abc import Sequence
 from typing import Any
 
-from ..identities.terminal_report import wrapped
 from ..operators.latex_lines import in_lines
 from ..operators.latex_text import escaped
 from .derivative import Formula
@@ -14,7 +13,7 @@ from .equations import Equation, Step, chain_holds, foundations, numbered
 from .expand import Opaque, Problem, Spelling
 from .models_tried import example, examples, operators_of
 from .presuppositions import nowhere
-from .shown import FullProof, aligned, lines, page
+from .shown import FullProof, aligned, fitted, lines, page
 from .values import LARGEST, Values
 from .words import Alphabet, Polynomial, combine
 
@@ -246,14 +245,15 @@ class Proof:
 
     # ------------------------------------------------------------------ how it is shown
     def __str__(self) -> str:
-        if not self:
-            return f"{self.statement}\n  no proof found{self._reason()}"
+        return fitted(self._text() if self else f"{self.statement}\n  no proof found{self._reason()}")
+
+    def _text(self) -> str:
         title = f"{self.statement}\n  proved" + (f" where {' and '.join(self.hypotheses)}" if self.hypotheses else ", no hypothesis")
         title += f"; presupposes {', '.join(self.presupposes)}" if self.presupposes else ""
         title += f"; not met by the model at hand: {' and '.join(self.unmet)}" if self.unmet else ""
         shown = [title, *lines(self.steps)]
         shown += [f"  {self.note}"] if self.note else []
-        shown += [wrapped(f"  rests on {'; '.join(self.axioms)}")] if self.axioms else []
+        shown += [f"  rests on {'; '.join(self.axioms)}"] if self.axioms else []
         shown += [f"  largest residual of a step at a random state: {self.worst:.1e}"] if self.worst is not None else []
         return "\n".join(shown)
 
