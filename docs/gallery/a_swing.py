@@ -1,6 +1,8 @@
-"""A double pendulum: coordinates, energies and their balance, with units."""
+"""A double pendulum: coordinates, energies and their balance, with units; and the run as a page by itself."""
 
 import pycraft as pc
 
 scene = pc.mechanisms.double_pendulum().add(pc.effects.Damping(0.05))
-scene.simulate(6.0, rtol=1e-9).plot()
+run = scene.simulate(6.0, q=[2.0, 1.0], rtol=1e-9)
+run.plot()
+page = run.to_html(trace="lower")

@@ -1,4 +1,4 @@
-"""φ reaches every ancestor; ψ fades where free hinges let go: the norms of their blocks on a chain."""
+"""φ reaches every ancestor; ψ fades where free hinges let go: the norms of their blocks on a chain, and ψ's beside it: point at a block."""
 
 import matplotlib.pyplot as plt
 from matplotlib.colors import LogNorm
@@ -11,3 +11,4 @@ for axes, name in zip(panels, ("phi", "psi"), strict=True):
     drawn = axes.imshow(getattr(chain.soa, name).blocks().norms(), norm=LogNorm(1e-3, 10), cmap="viridis")
     axes.set(title=f"norms of the blocks of {name}", xlabel="body", ylabel="body")
 figure.colorbar(drawn, ax=panels)
+page = chain.soa.psi.blocks().on_robot()

@@ -40,6 +40,8 @@ def main(folder: Path) -> int:
     if built.returncode:
         return built.returncode
     written(site / "index.html", FORWARD)
+    for page in generated.playing(folder / "source"):
+        written(site / page.relative_to(folder / "source"), page.read_text(encoding="utf-8"))
     written(site / "llms.txt", plain_index(made))
     asked = offline.not_offline(site)
     for line in asked:

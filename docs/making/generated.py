@@ -17,3 +17,8 @@ def pictures(folder: Path) -> None:
     """The pictures of these pages, drawn into the folder that they are in."""
     for script in gallery.SCRIPTS:
         gallery.draw(script, folder / "docs" / "gallery" / f"{script.stem}.png")
+
+
+def playing(folder: Path) -> list[Path]:
+    """The pages that were made beside them, which Sphinx does not copy: a frame shows each."""
+    return [folder / "docs" / "gallery" / f"{script.stem}.html" for script in gallery.SCRIPTS if gallery.plays(script)]

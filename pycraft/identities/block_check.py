@@ -17,6 +17,7 @@ from .block_values import ANY, Blocks, place_text, value
 from .family import HYPOTHESES, Spec, family
 from .judge import FAILS, HOLDS, UNDECIDED, BoundState, Judgement, Taken, Verdict, decided, ladder
 from .report import CheckReport
+from .statement_text import telling
 from .vocabulary import ParseError
 
 WORST = 8
@@ -121,6 +122,7 @@ def _judged(
     found = Judgement(state=at.state)
     apart: list[float] = []
     among = list(range(len(chosen)))
+    decides = telling(read.text)
     for step, name in enumerate(ladder(precision)):
         blocks = Blocks(at, operators, name)
         with mpmath.workdps(_DIGITS):
@@ -136,11 +138,11 @@ def _judged(
             narrow = found.taken[0]
             falls = max(narrow.residual / narrow.epsilon, 1.0) * found.taken[1].epsilon
             apart = [x if x > max(b, 64 * falls) or x > 1e-9 else 0.0 for x, b in zip(far, bounds, strict=True)]
-        found.verdict = decided(found.taken, blocks.growth)
+        found.verdict = decided(found.taken, blocks.growth, decides=decides)
         if found.verdict != UNDECIDED and (found.verdict == FAILS or len(among) == len(chosen)):
             break
     if found.verdict == UNDECIDED:
-        found.verdict = decided(found.taken, blocks.growth, last=True)
+        found.verdict = decided(found.taken, blocks.growth, last=True, decides=decides)
     return found, apart
 
 

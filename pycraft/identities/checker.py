@@ -17,6 +17,7 @@ from .drawn_vectors import drawn_vectors
 from .judge import FAILS, BoundState, Verdict, judge_states, ladder
 from .parse import Statement, Statements, check_has_space
 from .report import UNDEFINED, CheckReport, Finding, Report
+from .statement_text import statement_text, telling_of
 from .vocabulary import is_operator
 
 
@@ -142,6 +143,7 @@ def check(
         refute it; where no hypothesis saves it, for the smallest that meets all of them
     precision : the first scalar beside double in which residuals are taken, "extended", "quad", 50 or 100 digits. Where it does not decide,
         the wider ones are tried in turn: extended costs about twice a run in double, quad 20, 50 digits 60 and 100 digits 100 times.
+        Numbers in the statement that are near each other, or near 0 or 1 (1e-40), ask for one that tells them apart.
     budget : CPU seconds for each part of that search: where it is true, and the smallest refutation. The report says where it ended one.
 
     Returns
@@ -150,13 +152,20 @@ def check(
         True or false as a condition, with `.worst` and `.counterexample`. As a condition it raises UndecidedError where 100 digits do not
         tell.
 
+    Notes
+    -----
+    Numbers are compared, at states that were drawn: a difference below the report's bound is not seen, unless the statement's own numbers
+    say how small it may be. What holds at every state is shown by `pycraft.prove`.
+
     Examples
     --------
     >>> import pycraft as pc
     >>> bool(pc.check("HψMψ*H* == D", pc.chain(4)))
     True
+    >>> bool(pc.check("phi == phi + 1e-40*phi", pc.chain(4)))
+    False
     """
-    from .search import named_vectors, statement_text
+    from .search import named_vectors
 
     check_wider(precision)
     if whole(states, "states") < 1:
@@ -263,4 +272,4 @@ def run(read: Statement, operators: Any, states: int, seed: int, precision: str 
     rng = np.random.default_rng(seed)
     drawn = [BoundState(operators, s) for s in ([None] if model is None else [operators.random_state(rng) for _ in range(states)])]
     vectors = [drawn_vectors(read.rhs, rng, drawn_vectors(read.lhs, rng, {})) for _ in drawn]
-    return judge_states(read.lhs, read.rhs, drawn, vectors, precisions=ladder(precision))
+    return judge_states(read.lhs, read.rhs, drawn, vectors, precisions=ladder(precision), decides=telling_of(read))

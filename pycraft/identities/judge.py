@@ -9,7 +9,9 @@ Of a true statement the residual is rounding, and falls with epsilon. Of a false
 - *undecided*: neither, up to the widest scalar.
 
 A bound says what rounding can do; no bound, however large, makes a residual true that does not fall: in the widest scalar, where it can
-be explained by nothing else, it fails. A scalar in which an inverse is refused as singular says nothing; the next one is asked.
+be explained by nothing else, it fails. Where numbers of a statement are nearer to each other than `DECIDES` (φ = φ + 10⁻⁴⁰φ), a bound
+decides where it tells them apart; what no scalar tells apart is undecided. A scalar in which an inverse is refused as singular says
+nothing; the next one is asked.
 """
 
 from __future__ import annotations
@@ -112,6 +114,7 @@ def judge(
     precisions: Iterable[str | int] | None = None,
     on_one_path: bool = False,
     at_most: bool = False,
+    decides: float = DECIDES,
 ) -> Judgement:
     """Judge lhs = rhs (lhs <= rhs, entry by entry, if `at_most`) at one state.
 
@@ -120,6 +123,7 @@ def judge(
     vectors : values of the named vectors of the statement
     precisions : double and wider ones, tried in this order until one decides; see `ladder`
     on_one_path : only blocks (i, j) with i and j on one path to the base count
+    decides : the largest bound that decides; of a statement with numbers as `statement_text.telling` says
 
     Raises
     ------
@@ -142,15 +146,15 @@ def judge(
                 break
             continue
         found.zero = zero and not said_zero
-        found.verdict = decided(found.taken, amplified)
+        found.verdict = decided(found.taken, amplified, decides=decides)
         if found.verdict != UNDECIDED:
             break
     if not found.taken:
         assert refusal is not None
         raise refusal
     if found.verdict == UNDECIDED:
-        found.verdict = decided(found.taken, amplified, last=True)
-    if found.verdict == HOLDS and found.decisive.bound > DECIDES:
+        found.verdict = decided(found.taken, amplified, last=True, decides=decides)
+    if found.verdict == HOLDS and found.decisive.bound > decides:
         found.taken[-1] = replace(found.decisive, bound=seen_bound(found.taken))
     return found
 
@@ -217,7 +221,7 @@ class Scales:
         return self._made[precision]
 
 
-def decided(taken: list[Taken], amplified: float = 1.0, *, last: bool = False) -> str:
+def decided(taken: list[Taken], amplified: float = 1.0, *, last: bool = False, decides: float = DECIDES) -> str:
     """The verdict on residuals in wider and wider scalars, as far as they go; `last` where none follows."""
     if len(taken) < 2 or not np.isfinite(taken[-1].residual):
         return UNDECIDED
@@ -225,9 +229,9 @@ def decided(taken: list[Taken], amplified: float = 1.0, *, last: bool = False) -
     pairs = list(zip(taken[:-1], taken[1:], strict=True))
     falls = [_falls(taken[:i], taken[i], amplified) for i in range(1, len(taken))]
     explained = wide.residual <= wide.bound
-    if max(wide.residual, wide.bound) <= DECIDES and falls[-1] and (explained or len(falls) > 1 and falls[-2]):
+    if max(wide.residual, wide.bound) <= decides and falls[-1] and (explained or len(falls) > 1 and falls[-2]):
         return HOLDS
-    if len(falls) >= RUNNING and all(falls[-RUNNING:]) and wide.residual <= DECIDES:
+    if len(falls) >= RUNNING and all(falls[-RUNNING:]) and max(wide.residual, SCATTER * wide.epsilon) <= decides:
         return HOLDS
     stays = [STAYS * n.residual <= w.residual and w.residual > 0 and not f for (n, w), f in zip(pairs, falls, strict=True)]
     if all(stays[-2:]) and (len(stays) > 1 and not explained or last):

@@ -10,10 +10,8 @@ have not what the statement names say nothing, and are passed over.
 from __future__ import annotations
 
 import itertools
-import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -24,11 +22,10 @@ from .budget import Budget
 from .drawn_vectors import drawn_vectors
 from .family import DOF, HYPOTHESES, Spec, family, named_vectors, read_on
 from .judge import FAILS, BoundState, Verdict, judge, ladder
-from .parse import Statement
+from .statement_text import telling_of
 from .terminal_report import wrapped
-from .vocabulary import is_number
 
-__all__ = ["Counterexample", "named_vectors", "refutation", "smallest", "statement_text"]
+__all__ = ["Counterexample", "named_vectors", "refutation", "smallest"]
 
 STATES = 3
 KINDS = tuple(sorted(DOF, key=lambda kind: DOF[kind]))
@@ -108,29 +105,6 @@ class Counterexample:
         return "\n".join(wrapped(f"  {line}") for line in lines)
 
 
-def statement_text(read: Statement) -> str:
-    """The statement in Python's spelling, to be read on another model."""
-    if read.reading != "expressions":
-        return read.text
-    return " == ".join(map(_side_text, (read.lhs, read.rhs)))
-
-
-def _side_text(side: Any) -> str:
-    """A side as text; doubles that are not the decimals that they are written as by their ratios."""
-    if is_number(side):
-        return str(Fraction(side))
-    in_python = isinstance(side, _core.Operator)
-
-    def exactly(found: re.Match[str]) -> str:
-        double = Fraction(float(found[0]))
-        if double == Fraction(found[0]):
-            return found[0]
-        return f"Fraction({double.numerator}, {double.denominator})" if in_python else f"({double.numerator}/{double.denominator})"
-
-    text = side.python() if in_python else side.text()
-    return re.sub(r"(?<![\w.])\d+(\.\d+)?(e[+-]?\d+)?(?=[* ])", exactly, text)
-
-
 def understood(text: str) -> str:
     """How a text reads on a small tree, in the package's own letters; empty where it reads on a model of its own alone."""
     spec = Spec((-1, 0), ("pin", "pin"), True, 1)
@@ -151,11 +125,12 @@ def judged(
     if read is None or read.rhs is None:
         return None
     rng = np.random.default_rng(spec.seed)
+    options: dict[str, Any] = dict(precisions=ladder(precision), decides=telling_of(read))
     found = Verdict()
     for state in spec.states(model, states):
         drawn = drawn_vectors(read.rhs, rng, drawn_vectors(read.lhs, rng, {}))
         try:
-            found.judgements.append(judge(read.lhs, read.rhs, BoundState(model.soa, state), drawn, precisions=ladder(precision)))
+            found.judgements.append(judge(read.lhs, read.rhs, BoundState(model.soa, state), drawn, **options))
         except ArithmeticError:
             continue
         if found.judgements[-1].verdict == FAILS:

@@ -311,7 +311,8 @@ class StateSpace:
         Returns
         -------
         KalmanPage
-            A notebook shows it; `save("kalman.html")` writes a page that opens offline.
+            A notebook shows it; `save("kalman.html")` writes a page that opens offline. Of several measurements a step it draws the one
+            that is chosen in it; the recursion takes all.
 
         Raises
         ------

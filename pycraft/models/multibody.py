@@ -242,8 +242,9 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, Planning, Structure, 
         Warns
         -----
         ModelWarning
-            What the model has beside bodies and hinges and the format does not hold (URDF: gravity, a state; MJCF: some loops);
-            loose frames, couplings by functions, and what unlocks and splits, which no file holds.
+            What the model has beside bodies and hinges and the format does not hold (URDF: gravity, a state; MJCF: some loops; both:
+            `shapes`); loose frames, couplings by functions, meshes that an MJCF file held itself, and what unlocks and splits, which no
+            file holds.
 
         Examples
         --------

@@ -140,8 +140,9 @@ class Pictures:
     def shapes(self) -> list[Shape]:
         """What the model's file gives its bodies to be seen by, in the file's order; none of a model that was not loaded.
 
-        Visuals of a URDF file, geoms of the groups 0 to 2 of an MJCF file. The viewer and pages of runs draw them; meshes are looked for
-        and read then (extra `meshes`). `Multibody.save` leaves them out.
+        Visuals of a URDF file, geoms of the groups 0 to 2 of an MJCF file, `[[shapes]]` of a TOML file. The viewer and pages of runs draw
+        them; meshes are looked for and read then (extra `meshes`). `Multibody.save` keeps them in TOML, but for meshes that were in an
+        MJCF file itself.
 
         Examples
         --------
@@ -155,7 +156,8 @@ class Pictures:
         """The same motion seen from every base body in turn: a page with a slider for the base, and what changes with it and what stays.
 
         The tree, coordinates and P(k) belong to the base that was chosen; poses, velocities, accelerations, energy, momentum, ln det ℳ
-        and Υ(k) do not: a body of a free tree is felt as Υ(k)⁻¹ = P(k) + S⁺(k), of which the base decides what is outboard.
+        and Υ(k) do not: a body of a free tree is felt as Υ(k)⁻¹ = P(k) + S⁺(k), of which the base decides what is outboard. Loops are not
+        looked at: all numbers are the tree's.
 
         Parameters
         ----------

@@ -20,7 +20,7 @@ _COLUMNS = 256
 """That an operator is applied to at a time where its blocks are looked at and not kept."""
 _KEPT = 4_000_000
 """Numbers of a dense form up to which it is formed to look at its blocks."""
-WIDTH = 100
+WIDTH = 80
 LEGEND = "largest entry of each block, with its sign"
 
 

@@ -13,7 +13,7 @@ from .equations import Equation, Step, chain_holds, foundations, numbered
 from .expand import Opaque, Problem, Spelling
 from .models_tried import example, examples, operators_of
 from .presuppositions import nowhere
-from .shown import FullProof, aligned, lines, page
+from .shown import FullProof, aligned, fitted, lines, page
 from .values import LARGEST, Values
 from .words import Alphabet, Polynomial, combine
 
@@ -182,7 +182,8 @@ class Proof:
         pycraft.identities.search.Counterexample or None
             None also for derivatives, and for constants, which belong to their own model.
         """
-        from ..identities.search import named_vectors, smallest, statement_text
+        from ..identities.search import named_vectors, smallest
+        from ..identities.statement_text import statement_text
 
         if self._read is None or any(isinstance(side, Formula) for side in (self._read.lhs, self._read.rhs)):
             return None
@@ -244,8 +245,9 @@ class Proof:
 
     # ------------------------------------------------------------------ how it is shown
     def __str__(self) -> str:
-        if not self:
-            return f"{self.statement}\n  no proof found{self._reason()}"
+        return fitted(self._text() if self else f"{self.statement}\n  no proof found{self._reason()}")
+
+    def _text(self) -> str:
         title = f"{self.statement}\n  proved" + (f" where {' and '.join(self.hypotheses)}" if self.hypotheses else ", no hypothesis")
         title += f"; presupposes {', '.join(self.presupposes)}" if self.presupposes else ""
         title += f"; not met by the model at hand: {' and '.join(self.unmet)}" if self.unmet else ""

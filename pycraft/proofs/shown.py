@@ -6,6 +6,9 @@ import html
 from collections.abc import Collection, Sequence
 from typing import Protocol
 
+from rich.cells import cell_len
+
+from ..identities.terminal_report import WIDTH, wrapped
 from ..identities.verdict_html import verdict_html
 from ..operators.formula_html import formula_html
 from ..operators.latex_lines import lines_of
@@ -36,7 +39,10 @@ class Shown(Protocol):
     def __bool__(self) -> bool: ...
 
 
-WIDTH = 76
+ASIDE = 76
+"""Characters of a step and its reason that a display sets side by side."""
+GUTTER = 3
+"""Columns between a step and its reason, at least."""
 GAP = "\\boxed{\\;?\\;}"
 """What stands for a line left out."""
 _STYLE = (
@@ -46,19 +52,23 @@ _STYLE = (
 
 
 def lines(steps: Sequence[Step], cited: dict[str, int] | None = None) -> list[str]:
-    """The chain, one step a line, reasons in a column; with the numbers of the lemmas that are cited, where these are given."""
+    """The chain, one step a line of 80 columns, reasons in a column, or below what leaves no room for them; with the numbers of the lemmas
+    that are cited, where these are given."""
     if not steps:
         return []
-    rows = [("", steps[0].before_text(), "")]
-    rows += [(f"{s.number}.", f"= {s.after_text()}", f"[{reason(s, cited)}]") for s in steps]
-    width = min(WIDTH, max(len(middle) for _, middle, _ in rows))
-    made = []
-    for number, middle, why in rows:
-        line = f"  {number:>3} {middle}"
-        if why:
-            line = f"{line:<{width + 6}}   {why}" if len(middle) <= width else f"{line}\n{'':>{width + 6}}   {why}"
-        made.append(line)
+    made = [wrapped(f"      {steps[0].before_text()}")]
+    rows = [(f"  {f'{s.number}.':>3} = {s.after_text()}", f"[{reason(s, cited)}]") for s in steps]
+    column = max((cell_len(step) for step, why in rows if cell_len(step) + cell_len(why) + GUTTER <= WIDTH), default=0) + GUTTER
+    for step, why in rows:
+        gap = column - cell_len(step)
+        beside = gap >= GUTTER and column + cell_len(why) <= WIDTH
+        made.append(f"{step}{' ' * gap}{why}" if beside else f"{wrapped(step)}\n{wrapped(' ' * 8 + why)}")
     return made
+
+
+def fitted(text: str) -> str:
+    """The text with the lines broken that do not fit a terminal."""
+    return "\n".join(wrapped(line) if cell_len(line) > WIDTH else line for line in text.split("\n"))
 
 
 def reason(step: Step, cited: dict[str, int] | None = None) -> str:
@@ -88,7 +98,7 @@ def aligned(steps: Sequence[Step], cited: dict[str, int] | None = None, blanks: 
     """The chain as an aligned display, a box for the lines left out; reasons beside the lines, or below them where a page is too narrow."""
     if not steps:
         return "\\begin{aligned}\\end{aligned}"
-    beside = max(len(s.after_text()) for s in steps) + max(len(s.reason) for s in steps) <= WIDTH
+    beside = max(len(s.after_text()) for s in steps) + max(len(s.reason) for s in steps) <= ASIDE
     rows = _set_in("", steps[0].before_latex())
     for i, s in enumerate(steps, 1):
         line, number = GAP if i in blanks else s.after_latex(), f"\\text{{{i}.}}\\;"
@@ -122,7 +132,7 @@ class FullProof:
             notes = [f"      {lemma.note}"] if lemma.note else []
             parts.append("\n".join([head, *lines(lemma.steps, self._numbers), *notes]))
         own = "\n".join([f"{self.proof.statement}{where(self.proof)}", *lines(self.proof.steps, self._numbers)])
-        return "\n\n".join([*parts, own if self.proof else str(self.proof)])
+        return fitted("\n\n".join([*parts, own if self.proof else str(self.proof)]))
 
     __repr__ = __str__
 

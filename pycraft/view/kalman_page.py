@@ -79,16 +79,16 @@ class KalmanPage(Page):
         ]
         data = {
             "lines": self.lines, "steps": steps, "words": [[letter, *words] for letter, words in WORDS.items()],
-            "measured": _plain(self.measurements[:, 0]), "predicted": _plain(seen[0]), "smoothed": _plain(seen[1]),
-            "deviation": _plain(np.sqrt(filtered.innovation_covariance[:, 0, 0])),
+            "measured": _rows(self.measurements), "predicted": _rows(seen[0]), "smoothed": _rows(seen[1]),
+            "deviation": _rows(np.sqrt(np.diagonal(filtered.innovation_covariance, axis1=1, axis2=2))),
             "figure": figure_data(skeleton, q), "poses": number_text(pose_rows(skeleton, q)), "names": [str(b) for b in self.model.bodies],
         }  # fmt: skip
         said = "one recursion, y = (HφMφ*H* + J)⁻¹ x: a smoother over time, and forward dynamics of a chain from tip to base and back"
         return web_page("kalman", "The Kalman dictionary", data, {"said": said})
 
     def _measured(self, states: np.ndarray) -> np.ndarray:
-        """The first row of C x at every step."""
-        return np.einsum("ti,ti->t", self.track._C[:, 0], states)
+        """C x at every step."""
+        return np.einsum("tmi,ti->tm", self.track._C, states)
 
     def __repr__(self) -> str:
         return f"<filter beside {self.model.name!r}: {len(self.filter_steps)} steps of {self.track.steps} times and bodies>"
@@ -125,10 +125,6 @@ def _size(a: Step, b: Step) -> float | None:
     return float(np.trace(b.value[3:, 3:])) / 3 if b.letter == "P" else None
 
 
-def _plain(x: np.ndarray) -> list[float | None]:
-    return [float(f"{value:.6g}") if np.isfinite(value) else None for value in x]
-
-
-def play_smoother(track: Any, y: Any, model: Any, tau: Any) -> KalmanPage:
-    """`StateSpace.play`."""
-    return KalmanPage(track, y, model, tau)
+def _rows(x: np.ndarray) -> list[list[float | None]]:
+    """A row for each of what is measured, over time."""
+    return [[float(f"{value:.6g}") if np.isfinite(value) else None for value in row] for row in x.T]

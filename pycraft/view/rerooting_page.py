@@ -149,8 +149,3 @@ def _depth(parents: list[Any], bodies: list[str]) -> int:
         return count
 
     return max(map(level, bodies), default=0)
-
-
-def rerootings(model: Any, q: Any = None, v: Any = None) -> RerootingPage:
-    """`Multibody.rerootings`."""
-    return RerootingPage(model, q, v)

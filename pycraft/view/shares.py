@@ -125,8 +125,3 @@ def rotor_shares(model: Any, q: np.ndarray) -> float:
         columns = np.eye(model.nv, min(_COLUMNS, model.nv - first), -first)
         total += float(np.sum(columns * (bound @ columns)))
     return total
-
-
-def dof_shares(model: Any, q: Any = None) -> Shares:
-    """`Multibody.dof_shares`."""
-    return Shares(model, q)

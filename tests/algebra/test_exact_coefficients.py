@@ -10,7 +10,7 @@ import pytest
 
 import pycraft as pc
 from pycraft.identities.parse import Statement, Statements
-from pycraft.identities.search import statement_text
+from pycraft.identities.statement_text import statement_text
 
 DIGITS = 50
 TOLERANCE = mpmath.mpf(10) ** -44

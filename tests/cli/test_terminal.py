@@ -11,6 +11,7 @@ from pycraft.accuracy.tables.table import AccuracyTable
 from pycraft.identities.parse import Statements
 from pycraft.identities.report import Finding, Report
 from pycraft.identities.terminal_report import monospace, precision_text, text_of, wrapped
+from pycraft.proofs.shown import lines
 
 LONG = "ℳ_pp - ℳ_pf(ℳ_ff)⁻¹ℳ_fp = H_pY*MYH_p*,  Y = ψ_f* - Ω_fP_f and so on and on, in the blocks on one path to the base of φ̃"
 
@@ -81,7 +82,8 @@ def test_plans_fit():
     H, phi, M = arm.soa("H phi M")
     MM = H @ phi @ M @ phi.T @ H.T
     for op in (MM.inv(), (MM + 0.1 * arm.soa.I).inv(), MM.inv().diff(0)):
-        rows = str(op.explain()).split("  #  step", 1)[1]
+        notes, rows = str(op.explain()).split("\n", 1)[1].split("  #  step", 1)
+        fits(notes, 77)
         fits(rows, 77)
         assert len({line.index(" flop") for line in rows.splitlines() if " flop" in line}) <= 3  # of flop, kflop, Mflop
         assert all(s["text"].replace(" ", "") in rows.replace(" ", "").replace("\n", "") or len(s["text"]) > 36 for s in op.plan().steps)
@@ -191,3 +193,14 @@ def test_tables_of_integrators_and_of_hard_cases_fit():
     text = text_of(Stability([row, row | {"method": "fast", "passed": True}]).table(80))
     fits(text)
     assert text.count("a wrist at its singularity") == 1 and "! a bound does not hold" in text and "2 of 20" in text
+
+
+def test_proofs_fit():
+    """Steps with their reasons beside them where there is room, statements and what they rest on whole; so do the blocks of a robot."""
+    arm = pc.robots.panda()
+    proofs = [pc.prove(statement) for statement in ("ℳ⁻¹ = (I-HψK)* D⁻¹ (I-HψK)", "ψ⁻¹ = φ⁻¹ + 𝒦H", "φMφ* = ψPψ* + 2 φ P φ* + E_psi P")]
+    for text in (*map(str, proofs), str(proofs[0].full()), repr(arm.soa.phi.blocks())):
+        assert max(map(cell_len, text.splitlines())) <= 80, text
+    steps = proofs[0].steps
+    shown = "".join("".join(lines(steps)).split())
+    assert all("".join(f"={step.after_text()}".split()) in shown for step in steps)  # nothing is cut

@@ -28,7 +28,7 @@ DOZEN_TESTS = [
 
 # Whose tests are to notice a change of these sources: they are tried first.
 AREAS = {
-    "pycraft/models/writers/toml_writer.py": ["models/test_toml_files.py"],
+    "pycraft/models/writers/toml_writer.py": ["models/test_toml_files.py", "models/test_toml_shapes.py"],
     "pycraft/models/writers/toml_text.py": ["models/test_toml_text.py", "models/test_toml_files.py"],
     "pycraft/models/writers/save.py": ["models/test_toml_files.py"],
     "pycraft/models/writers/urdf_writer.py": ["models/test_urdf_export.py"],
@@ -191,7 +191,7 @@ AREAS = {
     "cpp/bindings/direct_calls.h": ["dynamics/test_overlaps.py"],
     "cpp/runtime/interrupt.cpp": ["whole/test_interrupts.py", "algebra/test_threads_of_expressions.py"],
     "pycraft/identities/report.py": ["identities/test_failing_reports.py", "identities/test_judge.py", "cli/test_terminal.py"],
-    "pycraft/identities/judge.py": ["identities/test_judge.py"],
+    "pycraft/identities/judge.py": ["identities/test_judge.py", "identities/test_statement_text.py"],
     "pycraft/identities/checker.py": ["identities/test_judge.py", "identities/test_failing_reports.py", "identities/test_checker.py"],
     "pycraft/identities/residual_bounds.py": ["identities/test_judge.py"],
     "pycraft/identities/book.py": ["identities/test_readings.py"],

@@ -62,10 +62,11 @@ CHANGES = {
         ("what is wrong comes last", '(verdict not in OPEN, verdict == "waiting"', '(verdict in OPEN, verdict == "waiting"'),
     ],
     "pycraft/identities/judge.py": [
+        ("three falls to zero hold", "max(wide.residual, SCATTER * wide.epsilon) <= decides", "wide.residual <= decides"),
         ("undecided at a bound of 1", "DECIDES = 1e-12", "DECIDES = 1.0"),
         ("the residual need not fall", " and falls[-1] and (", " and ("),
         ("any bound explains a residual", "explained = wide.residual <= wide.bound", "explained = True"),
-        ("the fall of what holds is not its bound", "found.verdict == HOLDS and found.decisive.bound > DECIDES", "False"),
+        ("the fall of what holds is not its bound", "found.verdict == HOLDS and found.decisive.bound > decides", "False"),
         ("what stays need not stay", "STAYS = 0.5", "STAYS = 0.0"),
         ("two falls running decide", "RUNNING = 3", "RUNNING = 2"),
         ("norms of double are always trusted", 'return made.bound(relative, "double") <= ROUNDING_NORMS', "return True"),
@@ -314,6 +315,7 @@ CHANGES = {
         ("errors count states by parts", "        pool.shutdown(cancel_futures=True)\n        return whole()\n", "        raise\n"),
     ],
     "pycraft/models/writers/toml_writer.py": [
+        ("paths of meshes are written as they came", "[os.path.abspath(os.fsdecode(place)) for", "[os.fsdecode(place) for"),
         ("strict models are saved as others", '        data["strict"] = True\n', "        pass\n"),
     ],
     "pycraft/models/writers/toml_text.py": [

@@ -12,6 +12,15 @@ CHANGES = {
     "pycraft/view/kalman_page.py": [
         ("time runs from the base", "self.track.steps - 1 - a.body", "a.body"),
         ("another recursion beside the filter's", "(H @ phi @ M @ phi.T @ H.T + J).inv()", "(H @ phi @ M @ phi.T @ H.T + J + J).inv()"),
+        ("the deviation of the first measurement is that of all", "axis1=1, axis2=2))),", "axis1=1, axis2=2)[:, [0, 0]])),"),
+    ],
+    "pycraft/models/loaders/toml_shapes.py": [
+        ("meshes are looked for from the working folder", "[table.file.path] if", '["model.toml"] if'),
+        ("a reflection is a rotation", "or np.linalg.det(placement[:3, :3]) < 0", ""),
+    ],
+    "pycraft/identities/statement_text.py": [
+        ("numbers near 1 are not told apart", "found = {Fraction(0), Fraction(1)}", "found = {Fraction(0)}"),
+        ("a statement is its text alone", "telling(statement_text(read), *(", "telling(statement_text(read), *() and ("),
     ],
     "pycraft/view/hypothesis_page.py": [
         ("an inverse that is not there is a residual", '"breaks" if finding.states else "undefined"', '"breaks"'),

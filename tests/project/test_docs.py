@@ -213,3 +213,5 @@ def test_troubleshooting_knows_every_class_of_error():
         assert f"`{c.__name__}`" in page, c
         if c.__name__ in rows:
             assert rows[c.__name__] in {base.__name__ for base in c.__mro__}, c
+    shown = {name for name in rows if re.search(rf"^pycraft\.[\w.]*\b{name}: ", page, re.M)}
+    assert set(rows) - shown == {"MissingPackageError", "PeerRefusal"}  # by what is installed: elsewhere another

@@ -6,7 +6,7 @@ import re
 import pytest
 
 import pycraft as pc
-from making import api, contents, docstrings, gallery, generated, operators, theorems
+from making import api, contents, docstrings, gallery, generated, offline, operators, theorems
 from pycraft import _core
 
 
@@ -135,11 +135,12 @@ def test_paragraphs_after_a_list_of_parameters_are_notes():
 
 
 def test_the_gallery_has_twenty_short_examples_or_more(pages):
-    assert len(gallery.SCRIPTS) >= 20
+    assert len(gallery.SCRIPTS) >= 20 and len(generated.playing(contents.ROOT)) >= 3
     for script in gallery.SCRIPTS:
         written = script.read_text()
         assert len(written.splitlines()) < 30 and max(map(len, written.splitlines())) <= 140, script.name
         assert gallery.said(script).endswith(".") and "import pycraft as pc" in written, script.name
+        assert (f'src="gallery/{script.stem}.html"' in pages["docs/gallery"]) == gallery.plays(script)
         assert f"(gallery/{script.stem}.png)" in pages["docs/gallery"] and gallery.said(script) in pages["docs/gallery"]
 
 
@@ -149,6 +150,11 @@ def test_every_example_of_the_gallery_draws(script, tmp_path):
     gallery.draw(script, tmp_path / "picture.png")
     picture = (tmp_path / "picture.png").read_bytes()
     assert picture.startswith(b"\x89PNG") and len(picture) > 5000
+    page = tmp_path / "picture.html"
+    assert page.is_file() == gallery.plays(script)
+    if page.is_file():  # whole, small, and it asks nobody
+        text = page.read_text(encoding="utf-8")
+        assert "<script" in text and len(text) < 500_000 and offline.asked_of_others(text) == []
 
 
 def test_an_example_that_draws_nothing_is_an_error(tmp_path):

@@ -2,6 +2,7 @@
 
 import ast
 import functools
+import importlib
 import pathlib
 import re
 import subprocess
@@ -317,6 +318,14 @@ def test_what_is_imported_later_is_what_types_see():
         assert getattr(pycraft, name).__name__.split(".")[-1] == name
     # a room has the name of a function
     assert printed("import pycraft as pc; pc.chain(2).certify(); print(callable(pc.accuracy), callable(pc.kalman))") == "True True"
+
+
+def test_what_is_attached_later_is_there():
+    """`pycraft/face.py` names modules that its types do not see."""
+    from pycraft import face
+
+    for module, name in face.LATER.values():
+        assert module.split(".")[0] in resting_on("face") and callable(getattr(importlib.import_module(f"pycraft.{module}"), name)), module
 
 
 def test_every_module_is_in_a_room():

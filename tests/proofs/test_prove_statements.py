@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import pycraft as pc
+from pycraft.identities.terminal_report import wrapped
 from pycraft.proofs import Proof, derivative, prove, prove_derivative
 from pycraft.proofs.blocks import diagonal_blocks
 from pycraft.proofs.models_tried import example
@@ -163,7 +164,7 @@ def test_a_proof_reads_well(arm):
    3. = H ψ G D + D G* ψ* H* − D        [G D = P H*, at 2 places]
    4. = H G D + D G* H* − D             [ψ G = G, at 2 places]
    5. = D                               [H G = I, at 2 places]
-  rests on {"; ".join(proof.axioms)}
+{wrapped("  rests on " + "; ".join(proof.axioms))}
   largest residual of a step at a random state: {residual}"""
     assert text == expected
     first = proof.steps[0]

@@ -28,6 +28,11 @@ def page():
     return model.play(y)
 
 
+def told(page):
+    """What the page's script is given."""
+    return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', page.html, re.S).group(1))
+
+
 def by_letter(steps, letter, count):
     """Values of a quantity, from the base to the tip."""
     found = {step.body: step.value for step in steps if step.letter == letter}
@@ -70,9 +75,9 @@ def test_steps_go_side_by_side(page):
 
 
 def test_the_page_counts_time_from_the_tip(page):
-    data = json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', page.html, re.S).group(1))
+    data = told(page)
     assert [step[1:4] for step in data["steps"][:9:8]] == [[0, 5, "P"], [1, 4, "P"]] and data["steps"][-1][1:4] == [0, 5, "α"]
-    assert data["measured"][1] == pytest.approx(page.measurements[1, 0], rel=1e-5) and len(data["words"]) == 11
+    assert data["measured"][0][1] == pytest.approx(page.measurements[1, 0], rel=1e-5) and len(data["words"]) == 11
     shown = page._repr_html_()  # a frame that holds the page as an attribute: in a notebook it needs no file and no server
     assert shown.count("<") == 2 and html.unescape(shown.split('srcdoc="')[1].split('" style')[0]) == page.html
 
@@ -83,11 +88,39 @@ def test_other_chains_and_forces():
     y = np.ravel(by_letter(page.mechanics_steps, "y", 3))
     np.testing.assert_allclose(y, np.linalg.solve(model.mass_matrix(), [1.0, 0, 0]), rtol=1e-10)
     one = track(1).play([1.0])
-    assert (
-        repr(one) == "<filter beside 'tree of 1': 11 steps of 1 times and bodies>" and "NaN" not in one.html.split('id="data">')[1][:2000]
+    assert repr(one) == "<filter beside 'tree of 1': 11 steps of 1 times and bodies>"
+    data = told(one)
+    assert [data[name] for name in ("measured", "predicted", "smoothed")] == [[[1.0]]] * 3  # x0 is what was measured
+    assert data["deviation"] == [[pytest.approx(np.sqrt(1.2), rel=1e-5)]] and not any(
+        "nan" in text for step in data["steps"] for text in step[4:6]
     )
-    pair = pc.kalman(A=np.eye(2), B=None, C=np.eye(2), Q=np.eye(2), R=np.eye(2), P0=np.eye(2), measurements=np.ones((4, 2))).play()
-    assert pair.filter_steps[1].value.shape == (2, 2)
+
+
+def pair():
+    y = np.array([[1.0, 8.0], [2.0, np.nan], [np.nan, 6.0], [4.0, 5.0]])
+    return pc.kalman(A=np.eye(2), B=None, C=[[1, 0], [1, 2]], Q=np.eye(2), R=np.diag([1.0, 3.0]), P0=np.eye(2), measurements=y).play()
+
+
+def test_all_of_several_measurements_are_told():
+    page = pair()
+    assert page.filter_steps[1].value.shape == (2, 2)
+    data, f, s = told(page), page.track.filter(), page.track.smooth()
+    assert data["measured"] == [[1, 2, None, 4], [8, None, 6, 5]]
+    np.testing.assert_allclose(data["predicted"], [[1, 0], [1, 2]] @ f.predicted.T, rtol=1e-5, atol=1e-9)  # six digits are told
+    np.testing.assert_allclose(data["smoothed"], [[1, 0], [1, 2]] @ s.states.T, rtol=1e-5)
+    np.testing.assert_allclose(np.array(data["deviation"], float) ** 2, f.innovation_covariance[:, [0, 1], [0, 1]].T, rtol=1e-4)
+
+
+def test_the_drawn_row_is_chosen(browser, page, tmp_path):
+    with opened(browser, page.save(tmp_path / "one.html").as_uri(), size=(1200, 760)) as shown:
+        assert not shown.is_visible("#row")
+    with opened(browser, pair().save(tmp_path / "two.html").as_uri(), size=(1200, 760)) as shown:
+        assert shown.inner_text("#row").split() == ["1", "2"]
+        first = pixels(shown, "#track")
+        shown.select_option("#row", index=1)
+        assert differing(first, pixels(shown, "#track")) > 200
+        shown.select_option("#row", index=0)
+        assert differing(first, pixels(shown, "#track")) == 0
 
 
 def test_refusals():
@@ -110,8 +143,8 @@ def test_refusals():
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
 def test_it_plays_in_a_browser(browser, page, dark, tmp_path):
     address = page.save(tmp_path / "kalman.html").as_uri()
-    data = json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', page.html, re.S).group(1))
-    assert data["measured"][3] is None and data["deviation"][3] is None and None not in data["smoothed"]
+    data = told(page)
+    assert data["measured"][0][3] is None and data["deviation"][0][3] is None and None not in data["smoothed"][0]
     with opened(browser, address, size=(1200, 760), dark=dark) as shown:
         assert shown.inner_text("#now") == "66 of 66" and shown.inner_text("#at_time") == "at t = 0"
         whole, chain = pixels(shown, "#track"), pixels(shown)

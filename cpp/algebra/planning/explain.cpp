@@ -114,8 +114,14 @@ std::string explain(const Plan& plan) {
   if (plan.batched) out << ", at " << plan.batch << " states";
   if (plan.precision != Precision::double_) out << ", in " << precision_name(plan.precision) << (plan.precision < Precision::digits50 ? " precision" : " digits");
   out << "\n";
-  for (const std::string& note : plan.notes) out << "  by " << note << "\n";
-  // The table fits a terminal of 80 columns, with three to spare for who sets it in.
+  // It fits a terminal of 80 columns, with three to spare for who sets it in.
+  for (const std::string& note : plan.notes) {
+    const char* before = "  by ";
+    for (const std::string& line : lines_of(note, 72)) {
+      out << before << line << "\n";
+      before = "     ";
+    }
+  }
   size_t widest = 20;
   for (const Step& s : plan.steps) widest = std::max(widest, std::min<size_t>(display_width(s.text), 36));
   out << "  #  " << padded("step", widest + 2) << padded("tier", 13) << padded("flops", 12) << "memory\n";

@@ -17,12 +17,13 @@ from .left_aside import QUANTITIES
 from .rotations import rotation_from_quaternion, rotation_from_rpy
 from .toml_file import TomlFile, TomlTable, nearest
 from .toml_loops import LOOP, add_loop
+from .toml_shapes import SHAPE, shape_of
 from .toml_subhinges import subhinges_of
 from .xml_file import abbreviated
 
 FORMAT = 1
 """Raised when a file means something else than it did."""
-MODEL = ("format", "name", "gravity", "welds", "strict", "bodies", "nodes", "loops", "state", "left_aside", "actuators")
+MODEL = ("format", "name", "gravity", "welds", "strict", "bodies", "nodes", "loops", "state", "left_aside", "actuators", "shapes")
 POSE = ("position", "rotation", "rpy", "quaternion")
 BODY = (
     "name", "parent", "hinge", "hinge_name", "axis", "axes", "point", "pitch", "subhinges", *POSE, "limits", "rotor_inertia", "mass", "com",
@@ -85,6 +86,7 @@ def read_table(table: TomlTable, name: str, welds: str | None = None, strict: bo
     if (left := table.table("left_aside", ("gravity", "spring_rest", *QUANTITIES), "left_aside")) is not None:
         model._left_aside = _left_aside(model, left)
     model._actuators = [_actuator(model, actuator) for actuator in table.tables("actuators", ACTUATOR, "actuator", named=True) or []]
+    model._shapes = [shape_of(model, shape, *_pose(shape)) for shape in table.tables("shapes", (*SHAPE, *POSE), "shape", named=True) or []]
     lines = {body.data["name"]: body for body in tables}
     return model, [f"{lines[body].at() if body in lines else table.at()}: {text}" for body, text in model.take_warnings()]
 

@@ -33,6 +33,10 @@ def save(model: Multibody, path: str | os.PathLike[str], state: bool = True) -> 
         warn(f"{shown}: a file does not hold loose frames: {', '.join(loose[:6])}{', ...' if len(loose) > 6 else ''}")
     if kept := [*model.locked, *model.coalesced]:
         warn(f"{shown}: a file does not hold what unlocks and splits: {', '.join(kept[:6])}{', ...' if len(kept) > 6 else ''}")
+    unseen = len([shape for shape in model.shapes if shape.triangles is not None or ending != ".toml"])
+    if unseen:
+        what = "meshes that were in the model's own file" if ending == ".toml" else "shapes to be seen by, which .toml does"
+        warn(f"{shown}: a file does not hold {what}: {unseen}")
     functions = [loop["name"] for loop in model.loops._description() if loop.get("function") is not None]
     if functions and ending in (".toml", ".urdf"):
         warn(f"{shown}: a file does not hold couplings by functions: {', '.join(functions[:6])}{', ...' if len(functions) > 6 else ''}")

@@ -5,6 +5,7 @@ What is at its default is left out; which numbers those are is judged by their b
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from .toml_text import Inline, document
 
 if TYPE_CHECKING:
     from ..multibody import Multibody
+    from ..shapes import Shape
 
 _HEAD = "# A model of PyCraft: SI units and radians. docs/models.md, Files, says what the keys mean.\n\n"
 _SILENT = {"bias": [0.0, 0.0, 0.0], "force range": [-np.inf, np.inf]}
@@ -62,6 +64,8 @@ def model_data(model: Multibody, state: bool = True) -> dict[str, Any]:
         data["left_aside"] = left
     if actuators := current_actuators(model):
         data["actuators"] = [_actuator(actuator) for actuator in actuators]
+    if shapes := [_shape(shape) for shape in model.shapes if shape.triangles is None]:
+        data["shapes"] = shapes
     return data
 
 
@@ -203,4 +207,19 @@ def _actuator(actuator: dict[str, Any]) -> dict[str, Any]:
         value = actuator[key]
         if value is not None and not (key in _SILENT and same(value, _SILENT[key])):
             data[key.replace(" ", "_")] = value
+    return data
+
+
+def _shape(shape: Shape) -> dict[str, Any]:
+    """A mesh is looked for where it was: the path of its model's file is written whole."""
+    data: dict[str, Any] = {"kind": shape.kind}
+    if shape.body:
+        data["body"] = shape.body
+    data["size"] = shape.size
+    data |= _pose({"position": shape.placement[:3, 3], "rotation": shape.placement[:3, :3]})
+    if shape.colour is not None:
+        data["colour"] = shape.colour
+    if shape.kind == "mesh":
+        path, folders = shape.beside
+        data |= {"file": shape.file, "beside": [os.path.abspath(os.fsdecode(place)) for place in (path, *folders)]}
     return data

@@ -6,7 +6,7 @@ const byId = (id) => document.getElementById(id), last = told.steps.length - 1;
 const figure = new Figure(byId("figure"), told.figure), track = byId("track");
 figure.poses = numbers(told.poses);
 const masses = told.steps.filter((step) => step[6] !== null).map((step) => step[6]);
-let now = 0, timer = null;
+let now = 0, timer = null, seen = 0; // seen: which of what is measured at each step is drawn
 
 const rows = told.words.map(([letter, filter, mechanics]) => {
   const row = byId("rows").insertRow(), first = told.steps.find((step) => step[3] === letter);
@@ -33,10 +33,11 @@ function drawTrack() {
   if (!width || !height) return;
   [track.width, track.height] = [Math.round(width * ratio), Math.round(height * ratio)];
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
-  const all = [...told.measured, ...told.smoothed, ...told.predicted.flatMap((z, t) => [z - 2 * (told.deviation[t] || 0), z + 2 * (told.deviation[t] || 0)])]
+  const [measured, predicted, smoothed, deviation] = [told.measured, told.predicted, told.smoothed, told.deviation].map((rows) => rows[seen]);
+  const all = [...measured, ...smoothed, ...predicted.flatMap((z, t) => [z - 2 * (deviation[t] || 0), z + 2 * (deviation[t] || 0)])]
     .filter((x) => x !== null);
   const [low, high] = [Math.min(...all), Math.max(...all)], [left, right, top, bottom] = [58, width - 14, 10, height - 24];
-  const count = told.measured.length, x = (t) => left + ((t + 0.5) / count) * (right - left);
+  const count = measured.length, x = (t) => left + ((t + 0.5) / count) * (right - left);
   const y = (value) => bottom - ((value - low) / (high - low || 1)) * (bottom - top);
   const step = niceStep((high - low || 1) / 4);
   context.font = "11px system-ui, sans-serif";
@@ -65,26 +66,25 @@ function drawTrack() {
     context.fill();
   };
   for (const t of found.predicted) {
-    const deviation = told.deviation[t];
     context.strokeStyle = colourOf("--line0");
     context.lineWidth = 3;
     context.globalAlpha = 0.45;
-    if (deviation !== null) {
+    if (deviation[t] !== null) {
       context.beginPath();
-      context.moveTo(x(t), y(told.predicted[t] - 2 * deviation));
-      context.lineTo(x(t), y(told.predicted[t] + 2 * deviation));
+      context.moveTo(x(t), y(predicted[t] - 2 * deviation[t]));
+      context.lineTo(x(t), y(predicted[t] + 2 * deviation[t]));
       context.stroke();
     }
     context.globalAlpha = 1;
-    dot(t, told.predicted[t], "--line0", 4);
-    dot(t, told.measured[t], "--text", 3);
+    dot(t, predicted[t], "--line0", 4);
+    dot(t, measured[t], "--text", 3);
   }
   context.strokeStyle = colourOf("--line2");
   context.lineWidth = 2;
   context.beginPath();
-  for (const t of [...found.smoothed].sort((a, b) => a - b)) context.lineTo(x(t), y(told.smoothed[t]));
+  for (const t of [...found.smoothed].sort((a, b) => a - b)) context.lineTo(x(t), y(smoothed[t]));
   context.stroke();
-  for (const t of found.smoothed) dot(t, told.smoothed[t], "--line2", 4);
+  for (const t of found.smoothed) dot(t, smoothed[t], "--line2", 4);
 }
 
 function show(k) {
@@ -124,6 +124,9 @@ function start() {
   timer = setInterval(() => (now === last ? stop() : show(now + 1)), 1000 / byId("pace").value);
 }
 
+byId("of").hidden = told.measured.length < 2;
+told.measured.forEach((_, row) => byId("row").add(new Option(row + 1, row)));
+byId("row").addEventListener("change", () => { seen = +byId("row").value; drawTrack(); });
 byId("time").max = last;
 byId("time").addEventListener("input", (event) => { stop(); show(+event.target.value); });
 byId("play").addEventListener("click", () => (timer ? stop() : start()));

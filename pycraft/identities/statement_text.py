@@ -1,0 +1,53 @@
+"""A statement as text again, and the numbers in it: which of them a check has to tell apart."""
+
+from __future__ import annotations
+
+import re
+from fractions import Fraction
+from itertools import pairwise
+from typing import Any
+
+from .. import _core
+from .judge import DECIDES
+from .parse import Statement
+from .vocabulary import decimal, is_number
+
+TELLS = 1e-3
+"""A bound of this part of the distance of two numbers tells them apart, also in a term that is a small part of the sides."""
+
+
+def statement_text(read: Statement) -> str:
+    """The statement in Python's spelling, to be read on another model."""
+    if read.reading != "expressions":
+        return read.text
+    return " == ".join(map(_side_text, (read.lhs, read.rhs)))
+
+
+def _side_text(side: Any) -> str:
+    """A side as text; doubles that are not the decimals that they are written as by their ratios."""
+    if is_number(side):
+        return str(Fraction(side))
+    in_python = isinstance(side, _core.Operator)
+
+    def exactly(found: re.Match[str]) -> str:
+        double = Fraction(float(found[0]))
+        if double == Fraction(found[0]):
+            return found[0]
+        return f"Fraction({double.numerator}, {double.denominator})" if in_python else f"({double.numerator}/{double.denominator})"
+
+    text = side.python() if in_python else side.text()
+    return re.sub(r"(?<![\w.])\d+(\.\d+)?(e[+-]?\d+)?(?=[* ])", exactly, text)
+
+
+def telling(*texts: str) -> float:
+    """The largest bound that decides a statement, of which these are the texts: one that tells its numbers apart from each other, from 0
+    and from 1, which stands in front of what has none. Of a and b by |a - b| / max(1, a, b): a sum is mostly of what has no number."""
+    found = {Fraction(0), Fraction(1)}
+    for text in texts:
+        found |= {decimal(number) for number in re.findall(r"(?<![\w.])[0-9]+\.?[0-9]*(?:[eE][+-]?[0-9]+)?", text)}
+    return min(DECIDES, TELLS * float(min((b - a) / max(Fraction(1), b) for a, b in pairwise(sorted(found)))))
+
+
+def telling_of(read: Statement) -> float:
+    """`telling` of a statement as it is typed and as it was read: 10**-40 is 1e-40."""
+    return telling(statement_text(read), *(str(side) if is_number(side) else side.text() for side in (read.lhs, read.rhs)))
