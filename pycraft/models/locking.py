@@ -72,8 +72,8 @@ class Locking(Grafting):
         Raises
         ------
         ModelError
-            A name that is not there, a hinge without coordinates, a hinge that moves where `impulsive` is False; a part, whose structure
-            is the whole's. The model is as it was.
+            A name that is not there, a hinge without coordinates, one whose coordinates a coupling of `loops` is of, a hinge that moves
+            where `impulsive` is False; a part, whose structure is the whole's. The model is as it was.
         SingularHingeError
             Of impulsive locking: a coordinate that stays feels no inertia.
 
@@ -95,6 +95,8 @@ class Locking(Grafting):
         ['hinge2', 'hinge0']
         """
         chosen = self._hinges_to_lock(hinges)
+        for name in chosen:
+            self._require_uncoupled(name)
         numbers = sorted(self._hinge_index(name) for name in chosen)
         data = [self._body(k) for k in numbers]
         names = tuple(body["hinge"]["name"] for body in data)
@@ -167,6 +169,14 @@ class Locking(Grafting):
             now = self._body(k)["hinge"]
             kept[now["name"]]["welded"] = (now["placement"]["rotation"], now["placement"]["position"])
         self._hinges_before = kept
+
+    def _require_uncoupled(self, hinge: str) -> None:
+        """What couples a coordinate of a hinge would couple another one, metres for radians, when another hinge has its name, and none
+        when it is locked."""
+        for name in self._kept_loops or ():
+            if self.loops[name].kind == "coupling" and hinge in self.loops._stands_on(name):
+                what = f"hinge {hinge!r} is in use: its coordinates are those of coupling {name!r}"
+                raise _core.ModelError(f"{what}; remove that first, and declare it anew")
 
     # ------------------------------------------------------------------ which hinges
     def _hinges_to_lock(self, hinges: Any) -> list[str]:
