@@ -109,7 +109,7 @@ class SensitivityCalls(OperationalSpaceCalls):
         form="christoffel": C = Hφ(M𝒥̇ + ½(𝓑 + V̄M + MṼ)𝒥) = Γ v, the one for which also ∂(Cv)/∂v = 2C on hinges of one coordinate each;
         "skew": C = Hφ(M𝒥̇ + 𝓑𝒥), 𝒥 = φ*H*, which is skew-consistent too and not Christoffel's.
         """
-        q, v = at_state(self, q, v)
+        q, v, form = *at_state(self, q, v), chosen(form, "form")
         if form == "skew" and str(precision).isdigit():  # of so many digits, as operators are
             return self._coriolis_operator(q, v, precision, out)
         return self._sensitivities().coriolis_matrix(q, v, form, precision, out)
@@ -226,4 +226,4 @@ class SensitivityCalls(OperationalSpaceCalls):
         placement: 2 tr(P⁺WΔ), W = blockdiag(E*ΥE); "axes" (nv, 6), by the rows of H in the body's axes, poses held: 2(I - P⁺W)G.
         """
         q, _ = at_state(self, q)
-        return self._sensitivities().log_determinant(over, q, precision)
+        return self._sensitivities().log_determinant(chosen(over, "over"), q, precision)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..arguments import text
+from ..arguments import several, text
 from .asides import Asides
 from .grafting import Removed
 from .handles import Body, Node
@@ -302,8 +302,7 @@ _NO_MASS: Mass = (0.0, np.zeros(3), np.zeros((3, 3)))
 
 
 def _names(given: Any, what: str) -> list[str]:
-    several = [given] if isinstance(given, (str, Body, Node)) or not isinstance(given, Iterable) else given
-    return [one.name if isinstance(one, (Body, Node)) else text(one, what) for one in several]
+    return [one.name if isinstance(one, (Body, Node)) else text(one, what) for one in several(given, (str, Body, Node))]
 
 
 def _mass(body: dict[str, Any]) -> Mass:

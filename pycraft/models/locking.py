@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from .. import _core
-from ..arguments import text
+from ..arguments import several, switch, text
 from .asides import Asides
 from .grafting import Grafting
 from .handles import Hinge
@@ -94,7 +94,7 @@ class Locking(Grafting):
         >>> arm.unlock()
         ['hinge2', 'hinge0']
         """
-        chosen = self._hinges_to_lock(hinges)
+        chosen, impulsive = self._hinges_to_lock(hinges), switch(impulsive, "impulsive")
         for name in chosen:
             self._require_uncoupled(name)
         numbers = sorted(self._hinge_index(name) for name in chosen)
@@ -186,10 +186,9 @@ class Locking(Grafting):
 
     def _named_among(self, given: Any, known: list[str], why_not: Callable[[str], str]) -> list[str]:
         """The names among those known that are given, each once. ModelError for one that is not, and for a pattern that fits none."""
-        several = [given] if isinstance(given, (str, Hinge)) or not isinstance(given, Iterable) else list(given)
         found: dict[str, None] = {}
         there = set(known)
-        for one in several:
+        for one in several(given, (str, Hinge)):
             name = one.name if isinstance(one, Hinge) else text(one, "a hinge")
             if name in there:
                 found[name] = None
