@@ -25,9 +25,21 @@ def text(name: Any, what: str) -> str:
 
 def listed(items: Any, what: str) -> list[Any]:
     """The items of a list. ModelError where it is none."""
-    if isinstance(items, (str, bytes, dict)) or not isinstance(items, Iterable):
+    if isinstance(items, (str, bytes, dict)) or not isinstance(items, Iterable) or getattr(items, "shape", None) == ():
         raise _core.ModelError(f"{what}: a list, not {items!r}")
     return list(items)
+
+
+def several(given: Any, alone: type | tuple[type, ...] = str) -> list[Any]:
+    """What is given alone, or several of it in a list, as a list. `alone`: what is one, though it could be gone through."""
+    return [given] if isinstance(given, alone) or not isinstance(given, Iterable) or getattr(given, "shape", None) == () else list(given)
+
+
+def switch(value: Any, what: str) -> bool:
+    """What is on or off. ModelError where it is neither True nor False: "no" would be on."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise _core.ModelError(f"{what}={value!r:.80}: True or False")
+    return bool(value)
 
 
 def whole(value: Any, what: str) -> int:

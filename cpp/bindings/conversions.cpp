@@ -238,7 +238,7 @@ Refinement refinement(const py::object& refine, const std::string& residual, Pre
   if (py::isinstance<py::str>(refine) && py::cast<std::string>(refine) == "auto") {
     r.steps = Refinement::automatic;
   } else {
-    const bool whole = PyIndex_Check(refine.ptr()) && !py::isinstance<py::bool_>(refine);
+    const bool whole = PyIndex_Check(refine.ptr()) && !py::isinstance<py::bool_>(refine) && !py::isinstance<py::array>(refine);
     r.steps = whole ? clipped(refine) : -1;
     if (r.steps < 0 || r.steps > most_steps)
       throw EvaluationError("refine=" + py::cast<std::string>(py::repr(refine)) + ": a number of corrections, 0, 1, 2, ..., " + std::to_string(most_steps) + ", or 'auto'");

@@ -22,7 +22,7 @@ def by_realization(model: Any, q, v, tau, precision: str | int, out) -> np.ndarr
     H, phi, M, J, a, b, base = model.soa("H phi M J a b gravity_base")
     T = _core.vector("T", model.soa.Theta)
     formula = (H @ phi @ M @ phi.T @ H.T + J).inv() @ (T - H @ phi @ (M @ phi.T @ (a + base) + b))
-    states = [np.broadcast_to(x, (*batch, x.shape[-1])).reshape(-1, x.shape[-1]) for x in (q, v, tau)]
+    states = [x.reshape(-1, x.shape[-1]) for x in (q, v, tau)]
     flat = np.empty((len(states[0]), model.nv))
     for i in range(len(flat)):
         try:
@@ -34,7 +34,9 @@ def by_realization(model: Any, q, v, tau, precision: str | int, out) -> np.ndarr
 
 
 def motion_state(model: Any, q: Any, v: Any, tau: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[int, ...]]:
-    """q (nq,), v (nv,), tau (nv,), each with an optional leading batch axis, as arrays, and the shape of the batch: () or (B,).
+    """q (nq,), v (nv,), tau (nv,), or (B, ...) all three where one of them is, as arrays, and the shape of the batch: () or (B,).
+
+    What is of one state is repeated for a batch: operators at one q would take v (nv, nv) for so many columns.
 
     Raises ModelError, in the words of the core's direct calls, for wrong shapes, batches that differ and entries that are not finite.
     """
@@ -44,7 +46,9 @@ def motion_state(model: Any, q: Any, v: Any, tau: Any) -> tuple[np.ndarray, np.n
     for size in sizes[1:]:
         if size != sizes[0]:
             raise _core.ModelError(f"batches of {sizes[0]} and {size} states in one call")
-    return q, v, tau, tuple(sizes[:1])
+    batch = tuple(sizes[:1])
+    q, v, tau = (np.broadcast_to(x, (*batch, x.shape[-1])) for x in (q, v, tau))
+    return q, v, tau, batch
 
 
 def checked_forces(model: Any, tau: Any, name: str = "tau") -> np.ndarray:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import _core
-from ..arguments import one_number, text
+from ..arguments import chosen, one_number, text
 from ..state import at_state
 from .interbody import pushed
 
@@ -156,12 +156,12 @@ class ConstrainedCalls:
             from .linear_on_loops import independent_numbers  # which imports linear models
 
             _check_embedding(form, residual, *numbers)
-            chosen = independent_numbers(self, independent) or []
-            given = self.loops._core.embedded_accelerations(q, v, tau, *pushes, chosen, refine, precision)
+            numbers_of = independent_numbers(self, independent) or []
+            given = self.loops._core.embedded_accelerations(q, v, tau, *pushes, numbers_of, refine, precision)
             return ConstrainedDynamics(*_by_loop(self.loops, *given))
         if independent is not None:
             raise _core.EvaluationError("independent= is of method='embed'; method='augment' has no independent coordinates")
-        given = self.loops._core.accelerations(q, v, tau, *pushes, form, refine, residual, precision, *numbers)
+        given = self.loops._core.accelerations(q, v, tau, *pushes, form, refine, chosen(residual, "residual"), precision, *numbers)
         return ConstrainedDynamics(*_by_loop(self.loops, *given))
 
     def constrained_velocities(

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from .. import _core
-from ..arguments import chosen, text
+from ..arguments import chosen, several, text
 from ..state import at_state
 from .prepared_states import refuse_other_states
 from .threads import over_threads
@@ -49,8 +49,7 @@ class HybridDerivatives(NamedTuple):
 
 def prescribed_names(prescribed: Any, option: str = "prescribed") -> tuple[str, ...]:
     """Names of hinges or coordinates, one or several, handles included; of which option, for errors."""
-    several = [prescribed] if isinstance(prescribed, str) or not isinstance(prescribed, Iterable) else list(prescribed)
-    names = tuple(getattr(one, "name", one) for one in several)
+    names = tuple(getattr(one, "name", one) for one in several(prescribed))
     for name in names:
         if not isinstance(name, str):
             raise _core.ModelError(f"{option} takes names of hinges or coordinates, or a list of them, not {name!r:.80}")
@@ -173,6 +172,7 @@ class HybridCalls:
 
 
 def _derivatives(T_q: np.ndarray, T_v: np.ndarray, mass: np.ndarray, held: np.ndarray) -> HybridDerivatives:
+    """Every product of matrices that lie row by row, as BLAS multiplies others otherwise, and a state has the bits that it has alone."""
     f, p = np.flatnonzero(~held), np.flatnonzero(held)
     shape = np.broadcast_shapes(T_q.shape, mass.shape)
     found = {name: np.zeros(shape) for name in HybridDerivatives._fields}
@@ -195,10 +195,14 @@ def _derivatives(T_q: np.ndarray, T_v: np.ndarray, mass: np.ndarray, held: np.nd
         found["vdot_tau"][rows] = solved[..., 2 * n + len(p) :]
         found["tau_tau"][..., f, f] = 1.0
     if len(p):
-        pf = mass[..., p[:, None], f]
+        pf = np.ascontiguousarray(mass[..., p[:, None], f])
+
+        def carried(block: np.ndarray) -> np.ndarray:
+            return pf @ np.ascontiguousarray(block)
+
         found["vdot_vdot"][..., p, p] = 1.0
-        found["tau_q"][..., p, :] = T_q[..., p, :] + pf @ found["vdot_q"][..., f, :]
-        found["tau_v"][..., p, :] = T_v[..., p, :] + pf @ found["vdot_v"][..., f, :]
-        found["tau_tau"][..., p[:, None], f] = pf @ found["vdot_tau"][rows]
-        found["tau_vdot"][..., p[:, None], p] = mass[..., p[:, None], p] + pf @ found["vdot_vdot"][columns]
+        found["tau_q"][..., p, :] = T_q[..., p, :] + carried(found["vdot_q"][..., f, :])
+        found["tau_v"][..., p, :] = T_v[..., p, :] + carried(found["vdot_v"][..., f, :])
+        found["tau_tau"][..., p[:, None], f] = carried(found["vdot_tau"][rows])
+        found["tau_vdot"][..., p[:, None], p] = mass[..., p[:, None], p] + carried(found["vdot_vdot"][columns])
     return HybridDerivatives(**found)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import _core
+from ..arguments import chosen, one_number
 from ..state import at_state
 from .centroidal import CentroidalCalls
 from .constrained import ConstrainedCalls
@@ -107,18 +108,19 @@ class IntegrationCalls(
         >>> motion.q.shape
         (3, 2)
         """
-        chosen = integrator_named(integrator)
+        integrates = integrator_named(integrator)
         refine = _core.checked_refinement(refine, "same", precision)
-        if normalise not in ("never", "each step"):
+        if chosen(normalise, "normalise") not in ("never", "each step"):
             raise _core.EvaluationError(f"normalise={normalise!r}: there are 'never' and 'each step'")
-        if chosen.foreign and normalise != "never":
-            raise _core.EvaluationError(f"integrator {chosen.name!r} has no normalise={normalise!r}; there is 'never'")
+        if integrates.foreign and normalise != "never":
+            raise _core.EvaluationError(f"integrator {integrates.name!r} has no normalise={normalise!r}; there is 'never'")
+        step, rtol, atol = None if step is None else one_number(step, "step"), one_number(rtol, "rtol"), one_number(atol, "atol")
         if step is not None and not step > 0:
             raise _core.EvaluationError(f"step={step}: a step is a positive number of seconds")
         q, v = at_state(self, q, v)
         return self._trajectory(
-            chosen, q, v, _checked_times(times), tau=tau, damping=damping, rtol=rtol, atol=atol, step=step, normalise=normalise != "never",
-            precision=precision, form=form, refine=refine,
+            integrates, q, v, _checked_times(times), tau=tau, damping=damping, rtol=rtol, atol=atol, step=step,
+            normalise=normalise != "never", precision=precision, form=form, refine=refine,
         )  # fmt: skip
 
     def _trajectory(

@@ -44,7 +44,7 @@ def integrator_names() -> list[str]:
 def integrator_named(name: Any) -> IntegratorName:
     """The integrator of a name, or of a short one. EvaluationError lists those there are."""
     given = SHORT.get(name.lower(), name) if isinstance(name, str) else name
-    if given not in integrator_names():
+    if not isinstance(given, str) or given not in integrator_names():
         raise _core.EvaluationError(f"no integrator is called {name!r}; there are {', '.join(map(repr, integrator_names()))}")
     return IntegratorName(given, ":" in given)
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import _core
-from ..arguments import chosen, text
+from ..arguments import chosen, switch, text
 from ..state import at_state
 from .direct_calls import cached
 
@@ -95,7 +95,7 @@ class InterbodyCalls:
         q, v = at_state(self, q, v)
         pushes = pushed(wrenches, wrench_axes)
         rows = hinge_numbers(self, hinges)
-        if loops:
+        if switch(loops, "loops"):
             if known:
                 raise _core.ModelError("interbody forces on the loops follow from tau: accelerations alone do not tell the loops' forces")
             how: dict[str, Any] = {"form": form, "refine": refine, "residual": residual, "precision": precision}

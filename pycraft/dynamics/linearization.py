@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from .. import _core
+from ..arguments import several, switch
 from ..linear.linear_model import LinearModel, names_of_states
 from ..state import at_state
 from .displacements import brackets, turning
@@ -83,7 +84,7 @@ class LinearizationCalls:
         chosen = list(range(self.nv)) if inputs is None else _core.coordinates_named(model, listed(inputs, "inputs"), "inputs")
         names = model.coordinate_names
         named = tuple(f"tau.{names[j]}" for j in chosen)
-        if loops:
+        if switch(loops, "loops"):
             from .linear_on_loops import linearize_on_loops
 
             made = linearize_on_loops(model, q, v, tau, chosen, named, outputs, independent, how)
@@ -124,8 +125,7 @@ def linear_model(
 
 def listed(names: Any, what: str) -> list[str]:
     """One name or several, handles included, as a list. ModelError for what is no name."""
-    several = [names] if isinstance(names, str) or not isinstance(names, Iterable) else list(names)
-    found = [getattr(one, "name", one) for one in several]
+    found = [getattr(one, "name", one) for one in several(names)]
     for name in found:
         if not isinstance(name, str):
             raise _core.ModelError(f"{what} takes names, or a list of them, not {name!r:.80}")

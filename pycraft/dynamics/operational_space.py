@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import functools
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from .. import _core
-from ..arguments import text
+from ..arguments import chosen, several, text
 from ..state import at_state
 from .by_realization import output
 from .direct_calls import DirectCalls
@@ -65,12 +66,16 @@ class OperationalSpaceCalls(DirectCalls):
 
 def _of_frames(model: Any, inverse: bool, frame: Any, q: Any, form: str, precision: str | int, out: Any) -> np.ndarray:
     """By kernels, or where they are not sure or know no such precision, by the operators, which say what is singular."""
-    names = [frame] if isinstance(frame, str) or not isinstance(frame, Iterable) else list(frame)
-    names = [text(name, "a frame") for name in names]
-    result = model._calls().operational_space(inverse, names, q) if (form, precision) == ("fast", "double") else None
+    names = [text(name, "a frame") for name in several(frame)]
+    form, plain = chosen(form, "form"), isinstance(precision, str) and precision == "double"
+    kernel = model._calls().operational_space if plain and form == "fast" else None
+    result = kernel(inverse, names, q) if kernel else None
     if result is None:
         try:
-            result = _operator(model.soa, inverse, names).at(q, form=form, precision=precision).dense()
+            by_operators = _operator(model.soa, inverse, names)
+            result = _each_by_itself(functools.partial(kernel, inverse, names), by_operators, q) if kernel else None
+            if result is None:
+                result = by_operators.at(q, form=form, precision=precision).dense()
         except _core.SingularOperatorError as error:
             raise _core.SingularOperatorError(f"{error}{_what_does_not_move(model, names, q)}") from None
     if out is None:
@@ -78,6 +83,21 @@ def _of_frames(model: Any, inverse: bool, frame: Any, q: Any, form: str, precisi
     out = output(out, result.shape)
     out[...] = result
     return out
+
+
+def _each_by_itself(kernel: Any, by_operators: Any, q: Any) -> np.ndarray | None:
+    """Of a batch in some of whose states the kernel is sure: each state as it is alone, whatever states are beside it. Else None."""
+    states = np.asarray(q, float)
+    found = [kernel(one) for one in states] if states.ndim == 2 and len(states) > 1 else []
+    if all(one is None for one in found):
+        return None
+    for i, one in enumerate(found):
+        if one is None:
+            try:
+                found[i] = by_operators.at(states[i]).dense()
+            except _core.Error as error:
+                raise type(error)(f"{error} (state {i} of a batch of {len(found)})") from None
+    return np.stack(found)
 
 
 def _what_does_not_move(model: Any, names: list[str], q: Any) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 from .. import _core
 from ..arguments import chosen, text
 from ..state import at_state
-from .by_realization import checked_forces, output
+from .by_realization import motion_state, output
 from .direct_calls import cached
 from .operational_space import OperationalSpaceCalls
 from .prepared import direct, direct_of
@@ -109,7 +109,7 @@ class SensitivityCalls(OperationalSpaceCalls):
         form="christoffel": C = Hφ(M𝒥̇ + ½(𝓑 + V̄M + MṼ)𝒥) = Γ v, the one for which also ∂(Cv)/∂v = 2C on hinges of one coordinate each;
         "skew": C = Hφ(M𝒥̇ + 𝓑𝒥), 𝒥 = φ*H*, which is skew-consistent too and not Christoffel's.
         """
-        q, v = at_state(self, q, v)
+        q, v, form = *at_state(self, q, v), chosen(form, "form")
         if form == "skew" and str(precision).isdigit():  # of so many digits, as operators are
             return self._coriolis_operator(q, v, precision, out)
         return self._sensitivities().coriolis_matrix(q, v, form, precision, out)
@@ -119,9 +119,8 @@ class SensitivityCalls(OperationalSpaceCalls):
         J = phi.T @ H.T
         J_dot = phi.T @ (turning.T @ self.soa.phi_tilde.T @ H.T + H_dot.T)  # type: ignore[attr-defined]  # the model's
         C = H @ phi @ (M @ J_dot + cross @ J)
-        many = np.broadcast_shapes(np.shape(q)[:-1], np.shape(v)[:-1])  # one of them may be shared by the batch
-        states = np.broadcast_to(q, (*many, np.shape(q)[-1])), np.broadcast_to(v, (*many, self.nv))
-        found = C.at(*states, precision=precision).dense()
+        q, v, *_ = motion_state(self, q, v, np.zeros(self.nv))  # one of them may be shared by the batch
+        found = C.at(q, v, precision=precision).dense()
         result = output(out, found.shape)
         result[...] = found
         return result
@@ -146,7 +145,8 @@ class SensitivityCalls(OperationalSpaceCalls):
         q, v = at_state(self, q)
         if p is None:
             MM, J = self.soa("MM J")  # type: ignore[attr-defined]  # the model's
-            p = (MM + J).at(q, precision=precision) @ np.asarray(v, float)
+            q, v, *_ = motion_state(self, q, v, np.zeros(self.nv))
+            p = (MM + J).at(q, precision=precision) @ v
         tau = np.zeros(self.nv) if tau is None else tau
         return self._sensitivities().hamiltonian(q, p, tau, precision)
 
@@ -156,20 +156,18 @@ class SensitivityCalls(OperationalSpaceCalls):
 
         2 KE = ξ*Dξ and 2 × the acceleration energy's like: (τ-𝒞)*(ℳ+J)⁻¹(τ-𝒞) = ε*D⁻¹ε, both sums over hinges. O(N).
         """
-        q, v = at_state(self, q, v)
-        tau = np.zeros(self.nv) if tau is None else tau
+        q, v, tau, _ = motion_state(self, *at_state(self, q, v), np.zeros(self.nv) if tau is None else tau)
         H, phi, K, psi, I = self.soa("H phi K psi I")  # type: ignore[attr-defined]  # the model's
-        forces = checked_forces(self, tau) - self.bias_forces(q, v, precision=precision)
+        forces = tau - self.bias_forces(q, v, precision=precision)
         whole, inverse = (I + H @ phi @ K).T, I - H @ psi @ K
-        return whole.at(q, precision=precision) @ np.asarray(v, float), inverse.at(q, precision=precision) @ forces
+        return whole.at(q, precision=precision) @ v, inverse.at(q, precision=precision) @ forces
 
     def diagonalised_dynamics(self, q=None, v=None, tau=None, *, precision: str = "double") -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """η, S and m⁻¹τ' of η̇ + Sη = m⁻¹τ', m = [I+HφK]D^½, η = m*v, S skew, τ' = τ less gravity's forces: (nv,), (nv, nv), (nv,).
 
-        2 KE = η*η; S does no work. Cost O(N) for η and m⁻¹τ', O(N²) for S. One state.
+        2 KE = η*η; S does no work. Of a batch with an axis (B, ...) before. Cost O(N) for η and m⁻¹τ', O(N²) for S.
         """
-        q, v = at_state(self, q, v)
-        tau = np.zeros(self.nv) if tau is None else tau
+        q, v, tau, _ = motion_state(self, *at_state(self, q, v), np.zeros(self.nv) if tau is None else tau)
         H, phi, K, psi, M, D, I = self.soa("H phi K psi M D I")  # type: ignore[attr-defined]  # the model's
         cross, V_bar, V_tilde = self.soa("momentum_cross V_bar V_tilde")  # type: ignore[attr-defined]  # the model's
         root = D.sqrt()
@@ -178,9 +176,9 @@ class SensitivityCalls(OperationalSpaceCalls):
         C = H @ phi @ (M @ J.dot() + 0.5 * (cross + V_bar @ M + M @ V_tilde) @ J)
         S = inverse @ C @ inverse.T - m.dot().T @ inverse.T
         rest = np.zeros(self.nv)
-        forces = checked_forces(self, tau) - self.bias_forces(q, rest, precision=precision)
+        forces = tau - self.bias_forces(q, rest, precision=precision)
         bound = {"precision": precision}
-        return m.T.at(q, v, **bound) @ np.asarray(v, float), S.at(q, v, **bound).dense(), inverse.at(q, v, **bound) @ forces
+        return m.T.at(q, v, **bound) @ v, S.at(q, v, **bound).dense(), inverse.at(q, v, **bound) @ forces
 
     @over_threads
     def momentum(self, q=None, v=None, *, precision: str = "double", threads: int = 1) -> Momentum:
@@ -228,4 +226,4 @@ class SensitivityCalls(OperationalSpaceCalls):
         placement: 2 tr(P⁺WΔ), W = blockdiag(E*ΥE); "axes" (nv, 6), by the rows of H in the body's axes, poses held: 2(I - P⁺W)G.
         """
         q, _ = at_state(self, q)
-        return self._sensitivities().log_determinant(over, q, precision)
+        return self._sensitivities().log_determinant(chosen(over, "over"), q, precision)

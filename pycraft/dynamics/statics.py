@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import _core
+from ..arguments import switch
 from ..state import at_state
 from .equilibrium import TOLERANCE, Balance, Equilibrium, checked_tolerance, solved
 from .equilibrium_on_loops import solved_on_loops
@@ -82,6 +83,7 @@ class StaticsCalls:
         ([-1.047198], 'stable')
         """
         model: Any = self
+        limits, stable, loops = switch(limits, "limits"), switch(stable, "stable"), switch(loops, "loops")
         q0, _ = at_state(model, q0)
         tau = np.zeros(self.nv) if tau is None else tau
         given = np.asarray(_core.real_array(tau, "tau"), float)
@@ -89,6 +91,10 @@ class StaticsCalls:
         names, in_world, numbers = pushed(wrenches, wrench_axes)
         held = held_by(model, hold)
         starts = np.asarray(_core.real_array(q0, "q"), float)
+        if starts.ndim not in (1, 2) or starts.shape[-1] != model.nq:
+            raise _core.ModelError(
+                f"q of {model.name!r} takes {model.nq} numbers, or (B, {model.nq}) for a batch, not an array {starts.shape}"
+            )
         if given.ndim not in (1, 2) or given.shape[-1] != self.nv:
             raise _core.ModelError(
                 f"tau of {model.name!r} takes {self.nv} numbers, or (B, {self.nv}) for a batch, not an array {given.shape}"

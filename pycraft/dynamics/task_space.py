@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..arguments import text
+from ..arguments import several, text
 from ..closed import Closed
 from ..state import at_state
 from .direct_calls import cached
@@ -349,8 +349,7 @@ def _listed(frames: Any) -> list[tuple[str, Any]]:
     if isinstance(frames, Mapping):
         pairs = list(frames.items())
     else:
-        several = [frames] if isinstance(frames, str) or not isinstance(frames, Iterable) else list(frames)
-        pairs = [(one, TWIST) for one in several]
+        pairs = [(one, TWIST) for one in several(frames)]
     named = [(text(getattr(frame, "name", frame), "a frame"), directions) for frame, directions in pairs]
     if not named:
         raise _core.ModelError("a task space of no frames: name one body or node at least")
@@ -361,12 +360,12 @@ def _listed(frames: Any) -> list[tuple[str, Any]]:
 
 
 def _rows(frame: str, directions: Any) -> tuple[np.ndarray, list[str]]:
-    several = [directions] if isinstance(directions, str) or not isinstance(directions, Iterable) else list(directions)
-    if all(isinstance(one, str) for one in several):
-        unknown = [one for one in several if one not in TWIST]
-        if unknown or not several or len(set(several)) < len(several):
-            raise _core.ModelError(f"directions of {frame!r}: different ones of {', '.join(TWIST)}, or rows (k, 6); not {several!r:.80}")
-        return np.eye(6)[[TWIST.index(one) for one in several]], [f"{frame}.{one}" for one in several]
+    named = several(directions)
+    if all(isinstance(one, str) for one in named):
+        unknown = [one for one in named if one not in TWIST]
+        if unknown or not named or len(set(named)) < len(named):
+            raise _core.ModelError(f"directions of {frame!r}: different ones of {', '.join(TWIST)}, or rows (k, 6); not {named!r:.80}")
+        return np.eye(6)[[TWIST.index(one) for one in named]], [f"{frame}.{one}" for one in named]
     rows = np.atleast_2d(_core.real_array(directions, f"directions of {frame!r}"))
     if rows.ndim != 2 or rows.shape[1] != 6 or not len(rows):
         raise _core.ModelError(f"directions of {frame!r}: rows (k, 6), not {np.shape(directions)}")

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..arguments import several
 from ..dynamics.task_space import TWIST
 from ..models.limits import pin_coordinates
 from .target_rows import LoopRows, MassCentreRows, PointingRows, PoseRows, Rows
@@ -136,7 +137,7 @@ def _rotations(R: np.ndarray, what: str) -> np.ndarray:
 
 def _tolerance(given: Any, what: str) -> tuple[float, float]:
     pair = np.atleast_1d(_core.real_array(given, what)).tolist()
-    if len(pair) not in (1, 2) or not all(x > 0 and np.isfinite(x) for x in pair):
+    if np.ndim(given) > 1 or len(pair) not in (1, 2) or not all(x > 0 and np.isfinite(x) for x in pair):
         raise _core.ModelError(f"{what}: a positive number for rad and m, or a pair (rad, m), not {given!r}")
     return pair[0], pair[-1]
 
@@ -154,10 +155,10 @@ def _weights(given: dict[str, Any], angular: np.ndarray, what: str) -> np.ndarra
 def _chosen(given: dict[str, Any], possible: tuple[str, ...], what: str) -> list[str]:
     if (directions := given.get("directions")) is None:
         return list(possible)
-    several = [directions] if isinstance(directions, str) or not isinstance(directions, Iterable) else list(directions)
-    if not several or len(set(map(str, several))) < len(several) or any(one not in possible for one in several):
-        raise _core.ModelError(f"directions of the {what}: different ones of {', '.join(possible)}, not {several!r:.80}")
-    return [one for one in possible if one in several]
+    named = several(directions)
+    if not named or len(set(map(str, named))) < len(named) or any(one not in possible for one in map(str, named)):
+        raise _core.ModelError(f"directions of the {what}: different ones of {', '.join(possible)}, not {named!r:.80}")
+    return [one for one in possible if one in named]
 
 
 def _common(given: dict[str, Any], name: str, names: list[str], what: str, overall: tuple[float, float]) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..arguments import seed_of, whole
+from ..arguments import chosen, seed_of, whole
 from ..models.coordinates import coordinate_numbers
 from ..models.limits import CoordinateLimits, checked_q, coordinate_limits, subhinges
 from .descent import Descents, Problem, descend
@@ -29,7 +29,7 @@ def solve_ik(
     """`Multibody.solve_ik`."""
     if whole(iterations, "iterations") < 1 or whole(restarts, "restarts") < 0:
         raise _core.EvaluationError(f"iterations={iterations}, restarts={restarts}: at least 1 and 0")
-    if unreached not in ("answer", "raise"):
+    if chosen(unreached, "unreached") not in ("answer", "raise"):
         raise _core.EvaluationError(f"unreached={unreached!r}: there are 'answer' and 'raise'")
     if not isinstance(limits, (bool, np.bool_)):
         raise _core.EvaluationError(f"limits={limits!r}: there are True and False")

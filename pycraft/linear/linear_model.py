@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from .. import _core
-from ..arguments import one_number
+from ..arguments import one_number, several
 
 METHODS = ("zoh", "foh", "bilinear", "euler", "backward_diff", "impulse")
 """Ways to discretise, SciPy's."""
@@ -93,7 +93,7 @@ class LinearModel:
         if of not in ("states", "inputs", "outputs"):
             raise _core.ModelError(f"of={of!r:.80}: there are 'states', 'inputs' and 'outputs'")
         known = list(getattr(self, of))
-        wanted = [names] if isinstance(names, str) or not isinstance(names, Iterable) else list(names)
+        wanted = several(names)
         for name in wanted:
             if name not in known:
                 raise _core.ModelError(f"{self.model.name!r} linearized has no {of[:-1]} {name!r}; there are {', '.join(known[:20])}")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..arguments import text
+from ..arguments import several, text
 from .asides import Asides
 from .grafting import Removed
 from .handles import Body, Node
@@ -45,7 +45,8 @@ class Coalescing(Locking):
         Raises
         ------
         ModelError
-            An unknown body, one that hangs on a hinge that moves (lock it first), a part. The model is as it was.
+            An unknown body, one that hangs on a hinge that moves (lock it first), one that a loop closes a chain to what it would be one
+            body with, a part. The model is as it was.
 
         Cost: O(N) once, that of some forward dynamics; each evaluation takes a body's step less for each of them.
 
@@ -67,6 +68,7 @@ class Coalescing(Locking):
             numbers = [k for k, size in enumerate(self._hinge_sizes()[1]) if not size]
         else:
             numbers = sorted({self._body_index(name) for name in _names(bodies, "a body")})
+        self._require_open(numbers)
         return self._coalesced_now(numbers)
 
     def split(self, bodies: Any = None) -> list[str]:
@@ -114,8 +116,9 @@ class Coalescing(Locking):
         """Make massless leaves nodes of what carries them, where they are, and again until there are none.
 
         A leaf has nothing outboard; it is massless where it has neither mass nor inertia, and its hinge no rotor inertia. Such bodies move
-        nothing, and forward dynamics refuses the hinges that move them. Their names, nodes and frames stay, fixed to the body that carries
-        them. They are locked and coalesced, so that `split` and `unlock` bring them back.
+        nothing, and forward dynamics refuses the hinges that move them; where a loop is closed or a hinge coupled they carry forces, and
+        stay. The names, nodes and frames of those pruned stay, fixed to the body that carries them. They are locked and coalesced, so that
+        `split` and `unlock` bring them back.
 
         Returns
         -------
@@ -140,10 +143,11 @@ class Coalescing(Locking):
         for body in data:
             if body["parent"] >= 0:
                 outboard[body["parent"]] += 1
-        pruned = []
+        pruned, held = [], self._held_by_loops()
         for k in range(len(data) - 1, -1, -1):
             body = data[k]
-            if not outboard[k] and not body["mass"] and not body["inertia"].any() and not body["hinge"]["rotor_inertia"].any():
+            leaf = not outboard[k] and k not in held
+            if leaf and not body["mass"] and not body["inertia"].any() and not body["hinge"]["rotor_inertia"].any():
                 pruned.append(k)
                 if body["parent"] >= 0:
                     outboard[body["parent"]] -= 1
@@ -170,6 +174,32 @@ class Coalescing(Locking):
         self._bodies_before = kept
         self._hinges_before = {name: one for name, one in self._hinges_before.items() if name in hinges or one["body"] in kept}
         return removed
+
+    # ------------------------------------------------------------------ loops
+    def _closed_between(self) -> dict[str, tuple[int, int]]:
+        """Of each loop that is no coupling the numbers of the bodies that it joins, -1 of the base."""
+        ends = {name: self.loops.ends_of(name) for name in self._kept_loops or () if self.loops[name].kind != "coupling"}
+        return {name: (self._frame_body(b) if b else -1, self._frame_body(a) if a else -1) for name, (b, a) in ends.items()}
+
+    def _held_by_loops(self) -> set[int]:
+        """Numbers of the bodies that loops are closed at, and of those on coupled hinges."""
+        coupled = [self.loops._stands_on(name) for name in self._kept_loops or () if self.loops[name].kind == "coupling"]
+        return {self._hinge_index(hinge) for hinge in set().union(*coupled)}.union(*self._closed_between().values())
+
+    def _require_open(self, numbers: list[int]) -> None:
+        """A loop of a body with itself would say nothing of a motion, and no copy and no file would take it."""
+        joined = set(numbers)
+
+        def carrier(k: int) -> int:
+            while k in joined:
+                k = self._body(k)["parent"]
+            return k
+
+        for name, (b, a) in self._closed_between().items():
+            if carrier(b) == carrier(a):
+                ends = " and ".join(f"body {self._body(k)['name']!r}" if k >= 0 else "the base" for k in (b, a))
+                what = f"loop {name!r} closes a chain between {ends}, which would be one body"
+                raise _core.ModelError(f"{what}; remove that first, or name others")
 
     # ------------------------------------------------------------------ coalescing
     def _coalesced_now(self, numbers: list[int]) -> list[str]:
@@ -272,8 +302,7 @@ _NO_MASS: Mass = (0.0, np.zeros(3), np.zeros((3, 3)))
 
 
 def _names(given: Any, what: str) -> list[str]:
-    several = [given] if isinstance(given, (str, Body, Node)) or not isinstance(given, Iterable) else given
-    return [one.name if isinstance(one, (Body, Node)) else text(one, what) for one in several]
+    return [one.name if isinstance(one, (Body, Node)) else text(one, what) for one in several(given, (str, Body, Node))]
 
 
 def _mass(body: dict[str, Any]) -> Mass:

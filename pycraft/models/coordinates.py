@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from difflib import get_close_matches
 from typing import Any
 
-import numpy as np
-
 from .. import _core
-from ..arguments import whole
+from ..arguments import several, whole
 
 
 def coordinate_numbers(model: Any, given: Any) -> list[int] | None:
@@ -20,16 +18,12 @@ def coordinate_numbers(model: Any, given: Any) -> list[int] | None:
     """
     if given is None:
         return None
-    if isinstance(given, (str, int, np.integer)) or hasattr(given, "v_slice"):
-        given = [given]
     if isinstance(given, Mapping):
         raise _core.ModelError(
             f"coordinates are named by a list, without values, which are those of a state: {list(given)!r}, not {dict(given)!r}"
         )
-    if not isinstance(given, Iterable):
-        raise _core.ModelError(f"coordinates: names of hinges or coordinates, or numbers, not {given!r}")
     numbers: list[int] = []
-    for one in given:
+    for one in several(given):
         numbers += _numbers_of(model, one)
     if len(set(numbers)) < len(numbers):
         twice = next(i for i in numbers if numbers.count(i) > 1)

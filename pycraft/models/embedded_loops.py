@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
 from .. import _core
+from ..arguments import listed
 from ..operators.operator_set import OperatorSet
 from ..state import State, at_state
 
@@ -149,10 +149,8 @@ def _wanted(model: Any, independent: Any) -> list[int] | None:
     """Numbers of the coordinates that a user wants as independent ones."""
     if independent is None:
         return None
-    if isinstance(independent, (str, bytes)) or not isinstance(independent, Iterable):
-        raise _core.ModelError(f"independent: a list of coordinates or hinges, not {independent!r}")
     found: list[int] = []
-    for one in independent:
+    for one in listed(independent, "independent: coordinates or hinges"):
         name = getattr(one, "name", one)
         if name in model.coordinate_names:
             found.append(model.coordinate_names.index(name))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..arguments import name_of, pose_parts, text
+from ..arguments import name_of, pose_parts, switch, text
 from ..closed import Closed
 from ..operators.frame_operators import relative_jacobian
 from ..state import at_state
@@ -111,7 +111,7 @@ class Frame(Closed):
         that stands on this one, and for keeping the pose of one that a function moves.
         """
         on = self._frames._named(on)
-        if not keep_pose:
+        if not switch(keep_pose, "keep_pose"):
             return self._frames._core.attach(self._name, on)
         if self.kind == "moved":
             raise _core.ModelError(
@@ -222,7 +222,7 @@ class Frame(Closed):
         return self._frames._core.jacobian(self._name, self._frames._named(wrt), axes, third, chosen, q, v, self._time(t), precision)
 
     def _present(self, q, v, vdot, t, precision) -> bool:
-        return q is None and v is None and vdot is None and t is None and precision == "double"
+        return q is None and v is None and vdot is None and t is None and isinstance(precision, str) and precision == "double"
 
     def _state(self, q=None, v=None, vdot=None) -> tuple[Any, Any, Any]:
         if isinstance(q, (str, Frame, Body, Node)):

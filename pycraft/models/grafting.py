@@ -229,8 +229,8 @@ class Grafting(WithLoops):
         self._require_new(new_bodies, new_hinges, new_nodes, [frame["name"] for frame in made], loose)
         own, its = Asides(self), Asides(source)
         added = set(map(called, set(nodes) & getattr(source, "_added_nodes", set())))
-        X = _placed(rotation, position)
         self._graft(source, root, parent, rotation, position, places_hinge, new_bodies, new_hinges, new_nodes)
+        X = _placed(rotation, position)  # as they were checked there
         self._added_nodes |= added
         copies = {frame["name"] for frame in frames} | {*bodies, *nodes}
         for frame in made:

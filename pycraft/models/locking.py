@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from .. import _core
-from ..arguments import text
+from ..arguments import several, switch, text
 from .asides import Asides
 from .grafting import Grafting
 from .handles import Hinge
@@ -72,8 +72,8 @@ class Locking(Grafting):
         Raises
         ------
         ModelError
-            A name that is not there, a hinge without coordinates, a hinge that moves where `impulsive` is False; a part, whose structure
-            is the whole's. The model is as it was.
+            A name that is not there, a hinge without coordinates, one whose coordinates a coupling of `loops` is of, a hinge that moves
+            where `impulsive` is False; a part, whose structure is the whole's. The model is as it was.
         SingularHingeError
             Of impulsive locking: a coordinate that stays feels no inertia.
 
@@ -94,7 +94,9 @@ class Locking(Grafting):
         >>> arm.unlock()
         ['hinge2', 'hinge0']
         """
-        chosen = self._hinges_to_lock(hinges)
+        chosen, impulsive = self._hinges_to_lock(hinges), switch(impulsive, "impulsive")
+        for name in chosen:
+            self._require_uncoupled(name)
         numbers = sorted(self._hinge_index(name) for name in chosen)
         data = [self._body(k) for k in numbers]
         names = tuple(body["hinge"]["name"] for body in data)
@@ -168,6 +170,14 @@ class Locking(Grafting):
             kept[now["name"]]["welded"] = (now["placement"]["rotation"], now["placement"]["position"])
         self._hinges_before = kept
 
+    def _require_uncoupled(self, hinge: str) -> None:
+        """What couples a coordinate of a hinge would couple another one, metres for radians, when another hinge has its name, and none
+        when it is locked."""
+        for name in self._kept_loops or ():
+            if self.loops[name].kind == "coupling" and hinge in self.loops._stands_on(name):
+                what = f"hinge {hinge!r} is in use: its coordinates are those of coupling {name!r}"
+                raise _core.ModelError(f"{what}; remove that first, and declare it anew")
+
     # ------------------------------------------------------------------ which hinges
     def _hinges_to_lock(self, hinges: Any) -> list[str]:
         known = self._hinge_sizes()
@@ -176,10 +186,9 @@ class Locking(Grafting):
 
     def _named_among(self, given: Any, known: list[str], why_not: Callable[[str], str]) -> list[str]:
         """The names among those known that are given, each once. ModelError for one that is not, and for a pattern that fits none."""
-        several = [given] if isinstance(given, (str, Hinge)) or not isinstance(given, Iterable) else list(given)
         found: dict[str, None] = {}
         there = set(known)
-        for one in several:
+        for one in several(given, (str, Hinge)):
             name = one.name if isinstance(one, Hinge) else text(one, "a hinge")
             if name in there:
                 found[name] = None

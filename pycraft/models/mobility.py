@@ -88,7 +88,7 @@ def checked_tolerance(tolerance: Any) -> float:
 
 def mobility(model: Any, q: Any, tolerance: Any) -> Mobility:
     """`Multibody.mobility`."""
-    q = np.array(at_state(model, q)[0], float)
+    q = np.array(_core.real_array(at_state(model, q)[0], "q"))
     tolerance = checked_tolerance(tolerance)
     if q.ndim != 1:
         raise _core.ModelError(f"mobility is that of one state, not of an array {q.shape}; mobility_along is of many")

@@ -274,6 +274,8 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, Planning, Structure, 
 
     @classmethod
     def _described(cls, data: Mapping[str, Any]) -> Multibody:
+        if not isinstance(data, Mapping):
+            raise _core.ModelError(f"a description is a dictionary, as description() gives it, not {data!r:.80}")
         keeps = data.get("welds") == "keep" or any(not body["hinge"]["subhinges"] for body in data["bodies"])
         model = cls(data.get("name", "multibody"), welds="keep" if keeps else "lump", strict=bool(data.get("strict", False)))
         names = [body["name"] for body in data["bodies"]]

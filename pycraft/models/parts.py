@@ -115,7 +115,7 @@ class Parts(WithOperators):
     def _part_of(self, numbers: Sequence[int], base: str, name: str | None) -> Multibody:
         from .multibody import Multibody
 
-        if base not in ("fixed", "moving"):
+        if text(base, "the base of a part") not in ("fixed", "moving"):
             raise _core.ModelError(f"base={base!r}: there are 'fixed' and 'moving'")
         if not numbers:
             raise _core.ModelError(f"a part of {self.name!r} has a body at least; none was given")

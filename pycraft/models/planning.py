@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..arguments import whole
+from ..arguments import LARGEST, whole
 from .limits import LimitDistances, checked_q, coordinate_limits
 from .with_operators import WithOperators
 
@@ -29,8 +29,8 @@ class Planning(WithOperators):
         """
         if batch is None:
             return self.zero_q()
-        if whole(batch, "batch") < 0:
-            raise _core.ModelError(f"batch: a number of states, 0 or more, not {batch}")
+        if not 0 <= whole(batch, "batch") <= LARGEST:
+            raise _core.ModelError(f"batch: a number of states, from 0 to {LARGEST}, not {batch}")
         return np.tile(self.zero_q(), (batch, 1))
 
     def distance_to_limits(self, q=None) -> LimitDistances:

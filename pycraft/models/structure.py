@@ -281,13 +281,6 @@ class Structure(Locking):
         trial.take_warnings()  # said of this model already, or to be said of it
         return impulse_into(trial, np.array([twists[other] for other in trial._names()[0]]).ravel())
 
-    def _require_uncoupled(self, hinge: str) -> None:
-        """What couples a coordinate of a hinge would couple another one, metres for radians, when another hinge has its name."""
-        for name in self._kept_loops or ():
-            if self.loops[name].kind == "coupling" and hinge in self.loops._stands_on(name):
-                what = f"hinge {hinge!r} is in use: its coordinates are those of coupling {name!r}"
-                raise _core.ModelError(f"{what}; remove that first, and declare it anew")
-
     def _require_whole(self, way: set[str], body: str) -> None:
         """Effects that take coordinates one by one would take other ones of hinges that are turned, and of the free one another body's."""
         if len(way) < 2:

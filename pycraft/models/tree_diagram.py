@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..arguments import whole
+from ..arguments import switch, whole
 
 if TYPE_CHECKING:
     from .multibody import Multibody
@@ -40,6 +40,7 @@ class _Line(NamedTuple):
 
 def tree_diagram(model: Multibody, most: int | None = 200, nodes: bool = False) -> TreeDiagram:
     """`Multibody.tree`."""
+    nodes = switch(nodes, "nodes")
     most = None if most is None else max(whole(most, "the most lines of a tree"), 1)
     described = model.description()
     bodies = described["bodies"]

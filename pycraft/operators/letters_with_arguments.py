@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .. import _core
-from ..arguments import clipped, text
+from ..arguments import clipped, several, text
 
 if TYPE_CHECKING:
     from .operator_set import OperatorSet
@@ -91,7 +91,7 @@ def _directed_inertia(soa: OperatorSet, nodes: list[str], directions: Any) -> _c
 
 def listed_names(names: str | Sequence[str]) -> list[str]:
     """One name or several as a list. ModelError for what is no name."""
-    listed = [names] if isinstance(names, str) else list(names) if isinstance(names, Iterable) else [names]
+    listed = several(names)
     for name in listed:
         if not isinstance(name, str):
             raise _core.ModelError(f"nodes are called by their names, not by {name!r}")

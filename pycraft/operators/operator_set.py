@@ -11,7 +11,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from .. import _core
-from ..arguments import text
+from ..arguments import several, text
 from ..closed import Closed
 from .letters_with_arguments import NAMES, LetterWithArguments, listed_names
 from .loop_letters import NAMES as _OF_LOOPS
@@ -62,7 +62,7 @@ class OperatorSet(Closed):
         return True
 
     def __call__(self, names: str) -> Any:
-        operators = tuple(getattr(self, name) for name in names.split())
+        operators = tuple(getattr(self, name) for name in text(names, "a set of operators").split())
         return operators[0] if len(operators) == 1 else operators
 
     def __getattr__(self, name: str) -> Any:
@@ -220,8 +220,7 @@ class OperatorSet(Closed):
     def _held(self, prescribed: Any) -> list[bool]:
         if not isinstance(self._source, _core.MultibodyOperators):
             raise _core.ModelError(f"coordinates of {self._source.name!r} are not prescribed: it is no multibody model of its own")
-        several = [prescribed] if isinstance(prescribed, str) or not isinstance(prescribed, Iterable) else list(prescribed)
-        names = [text(getattr(one, "name", one), "what is prescribed") for one in several]
+        names = [text(getattr(one, "name", one), "what is prescribed") for one in several(prescribed)]
         return [bool(one) for one in _core.prescribed_by(self._source.model, names)]
 
     def random_state(self, rng: Any) -> Any:

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import _core
 from ..state import at_state
 from .colour_scale import colour_bar, shade
 from .plane_layout import MOST, model_layout
@@ -41,7 +42,7 @@ class Shares:
     """
 
     def __init__(self, model: Any, q: Any = None):
-        self.model, self.q = copy.copy(model), np.array(at_state(model, q)[0], float)
+        self.model, self.q = copy.copy(model), np.array(_core.real_array(at_state(model, q)[0], "q"))
         model.check_q(self.q)
         self.values = share_values(model, self.q)
         self.by_body = dict(zip(model.bodies, self.values.tolist(), strict=True))

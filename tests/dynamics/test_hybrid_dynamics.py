@@ -312,3 +312,17 @@ def test_refusals_of_numbers_and_of_operators():
     nothing = pc.tree([-1, 0], ["weld", "weld"], seed=1)
     found = nothing.hybrid_dynamics(prescribed=[])
     assert found.vdot.shape == found.tau.shape == (0,)
+
+
+@pytest.mark.parametrize("name", ["panda", "every"])
+def test_derivatives_of_a_state_have_the_bits_that_they_have_alone(name):
+    """In a batch of any size, and shared out over threads: blocks of a batch lie otherwise than those of one state."""
+    model = pc.robots.panda() if name == "panda" else every_kind()
+    rng = np.random.default_rng(3)
+    given = np.array([model.random_state(i).q for i in range(37)]), *rng.normal(size=(3, 37, model.nv))
+    for prescribed in (list(model.hinges)[:1], list(model.hinges)[1::2]):
+        alone = [model.hybrid_dynamics_derivatives(*(x[i] for x in given), prescribed) for i in range(37)]
+        for threads in (1, 3):
+            whole = model.hybrid_dynamics_derivatives(*given, prescribed, threads=threads)
+            for field, found in zip(whole._fields, whole, strict=True):
+                np.testing.assert_array_equal(found, np.stack([getattr(one, field) for one in alone]))

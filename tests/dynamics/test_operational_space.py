@@ -198,3 +198,29 @@ def test_forms(form):
     assert np.abs(model.operational_space_inertia(tip, q, form=form) - known).max() <= bound * np.linalg.cond(exact) * np.abs(known).max()
     with pytest.raises(pc.EvaluationError, match="form"):
         model.operational_space_inertia(tip, q, form="slow")
+
+
+def near_gimbal_lock(size, at):
+    """A gimbal whose middle axis is 1e-5 from lock in some states of a batch: there kernels are not sure, and elsewhere they are."""
+    model = pc.tree([-1, 0], ["gimbal", "pin"], seed=2)
+    Q = np.array([model.random_state(i).q for i in range(size)])
+    Q[at, 1] = np.pi / 2 - 1e-5
+    return model, Q
+
+
+@pytest.mark.parametrize("size", [2, 37, 70])
+def test_a_state_has_the_bits_that_it_has_alone_beside_states_where_kernels_are_not_sure(size):
+    model, Q = near_gimbal_lock(size, [1, size - 1])
+    kernel = model._calls().operational_space
+    assert kernel(False, ["body1"], Q[0]) is not None and kernel(False, ["body1"], Q[1]) is None
+    alone = np.stack([model.operational_space_compliance("body1", q) for q in Q])
+    for threads in (1, 3):
+        np.testing.assert_array_equal(model.operational_space_compliance("body1", Q, threads=threads), alone)
+
+
+def test_the_state_without_an_inertia_is_named_beside_states_where_kernels_are_sure():
+    model = pc.tree([-1, 0], ["free", "gimbal"], seed=2)
+    Q = np.array([model.random_state(i).q for i in range(5)])
+    Q[3, 8] = np.pi / 2  # locked: seven numbers of the free hinge come first
+    with pytest.raises(pc.Error, match=r"state 3 of a batch of 5"):
+        model.operational_space_inertia("body1", Q)

@@ -255,6 +255,21 @@ def test_batches_and_precisions():
     assert m.mass_matrix_derivative(none).shape == (0, m.nv, m.nv, m.nv)
 
 
+@pytest.mark.parametrize("shared", [(0,), (0, 2), (1,), (0, 1), (1, 2)], ids=str)
+def test_what_is_of_one_state_goes_with_every_state_of_a_batch(shared):
+    """As many velocities as coordinates, beside one q, are states and no columns of a matrix."""
+    m = pc.tree([-1, 0], ["ball", "pin"], seed=1)
+    rng = np.random.default_rng(2)
+    given = [np.array([m.random_state(k).q for k in range(m.nv)]), *rng.normal(size=(2, m.nv, m.nv))]
+    given = [x[0] if k in shared else x for k, x in enumerate(given)]
+    one = lambda i: [x if k in shared else x[i] for k, x in enumerate(given)]
+    for call in (m.innovations, m.diagonalised_dynamics, lambda q, v, tau: m.hamiltonian_dynamics(pc.State(q, v), None, tau)):
+        found = call(*given)
+        for i in range(m.nv):
+            for x, y in zip(found, call(*one(i)), strict=True):
+                assert_close(x[i], y, 1e-13)
+
+
 def test_no_coordinates_and_singular_hinges():
     bench = pc.Multibody("bench", welds="keep")
     bench.add_body("table", hinge="weld", mass=1.0, inertia=np.eye(3))

@@ -1,5 +1,8 @@
 """Loops when the structure changes: what they stand on is in use; copies of bodies and merged models bring copies of them."""
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 
@@ -120,3 +123,62 @@ def test_a_coupled_hinge_is_not_left_for_another_one_of_its_name():
     model.loops["gear"].remove()
     slide()
     assert model.hinges["r thigh"].kind == "slider"
+
+
+def copies(model, tmp_path):
+    model.save(tmp_path / "model.toml")
+    return copy.deepcopy(model), pickle.loads(pickle.dumps(model)), pc.load(tmp_path / "model.toml")
+
+
+def test_a_coupled_hinge_is_not_locked(tmp_path):
+    """Its coordinate would be gone, and the model with it: no rows, no copy, no file."""
+    model = closed()
+    before = rows(model, *model.loops)
+    for locking in ("r thigh", "r *", ["l shin", "l thigh"]):
+        with pytest.raises(pc.ModelError, match=r"thigh' is in use: its coordinates are those of coupling 'gear'; remove that first"):
+            model.lock(locking, impulsive=True)
+        assert model.locked == [] and model.nv == 5
+    np.testing.assert_array_equal(rows(model, *model.loops), before)
+    model.lock("? shin", impulsive=True)
+    for again in copies(model, tmp_path):
+        assert again.nv == 3 and np.array_equal(again.loops.residual(), model.loops.residual())
+    model.loops["gear"].remove()
+    assert model.lock("r thigh", impulsive=True).hinges == ("r thigh",)
+
+
+def test_bodies_that_a_loop_joins_are_not_made_one(tmp_path):
+    model = closed()
+    model.add_loop("r thigh", "trunk", "pin", position=(0, -1, 0), name="twice")
+    model.add_loop("trunk", hinge="slider", axis=(1, 0, 0), name="rail")
+    model.loops["gear"].remove()
+    model.lock(["l thigh", "l shin", "trunk"], impulsive=True)
+    for bodies, ends in ((None, "loop 'ground' .* 'l shin' and the base"), ("trunk", "loop 'rail' .* 'trunk' and the base")):
+        with pytest.raises(pc.ModelError, match=f"{ends}, which would be one body; remove that first"):
+            model.coalesce(bodies)
+        assert model.coalesced == []
+    model.loops["rail"].remove()
+    with pytest.raises(pc.ModelError, match="loop 'ground' closes a chain between body 'l shin' and the base"):
+        model.coalesce(["trunk", "l thigh", "l shin"])
+    assert model.coalesce(["trunk", "l thigh"]) == ["trunk", "l thigh"]
+    for again in copies(model, tmp_path):
+        np.testing.assert_array_equal(again.loops.residual(), model.loops.residual())
+    model.lock("r thigh", impulsive=True)
+    with pytest.raises(pc.ModelError, match="loop 'twice' closes a chain between body 'r thigh' and the base"):
+        model.coalesce("r thigh")  # the trunk is the base's already
+    assert model.split() == ["l thigh", "trunk"]
+
+
+def test_a_massless_leaf_that_closes_a_chain_is_not_pruned():
+    """The coupler of a four-bar: welded it would hold the cranks."""
+    bars = pc.chain(2)
+    bars.add_body("coupler", "body1", "pin", position=(1, 0, 0))
+    bars.add_body("hand", "coupler", "pin", position=(0.5, 0, 0))
+    bars.add_body("driven", None, "pin", position=(5, 0, 0))
+    bars.add_loop("coupler", None, "pin", point=(1, 0, 0), name="closure")
+    bars.add_coupling({"driven": 1.0, "hinge0": -2.0}, name="gear")
+    assert bars.prune() == ["hand"]
+    assert bars.coordinate_names == ["hinge0", "hinge1", "coupler", "driven"]
+    bars.loops["closure"].remove()
+    assert bars.prune() == ["coupler"]
+    bars.loops["gear"].remove()
+    assert bars.prune() == ["driven"]

@@ -85,8 +85,8 @@ def input_errors(data: Data, seed: int, truth: Any, exact: Callable[[Data], Any]
 
 def _numbers(name: str, what: str, value: Any, takes: str) -> np.ndarray:
     try:
-        out = np.array(value, float)
-    except (TypeError, ValueError):
+        out = np.array(_core.real_array(value, name))
+    except _core.ModelError:
         raise _core.ModelError(f"{name} of {what} takes {takes}, not {type(value).__name__} {value!r:.60}") from None
     if not np.isfinite(out).all():
         raise _core.ModelError(f"{name} of {what} has an entry that is not finite")
