@@ -39,6 +39,11 @@ CHANGES = {
         ("velocities are left where steps have brought them", "std::copy_n(x_.data(), nv, v);", ";", STATEMENT),
         ("prescribed velocities are brought to rest", "target_[r] = -rates[r];", ";", STATEMENT),
         ("a state that is far off is on its loops", "!(off <= S(reach_of_steps))", "!(off <= S(1e300))"),
+        (
+            "rows that no coordinate moves are closed",
+            "abs(positions[r]) / (size > S(0) ? size : S(1))",
+            "(size > S(0) ? abs(positions[r]) / size : S(0))",
+        ),
     ],
     "cpp/simulation/scene_loops.h": [
         (
@@ -52,6 +57,7 @@ CHANGES = {
             "driven_[first_.back() + i] = motion[held_[i]];",
             "driven_[first_.back() + i] = S(0);",
         ),
+        ("what differences leave of rest is a motion", "held_.empty() ? S(0) : S(slow)", "S(0)"),
         ("a start off the loops is taken", "if (!(to_double(off[r]) <= far))", "if (to_double(off[r]) > 1e300)"),
     ],
     "cpp/recursions/custom_rows.cpp": [

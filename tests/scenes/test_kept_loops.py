@@ -78,10 +78,11 @@ def test_forty_four_bars(method):
 
 @by_each_method
 def test_andrews_squeezer_is_where_the_test_set_has_it(method):
+    """As printed; 1.1e-9 from it is where both methods lead as tolerances shrink, what the printed digits are good to."""
     run = M.andrews(method).simulate(0.03, rtol=1e-10, atol=1e-10, progress=False)
     published = [15.81077119629904, -15.75637105984298, 0.04082224013073101, 0.5244099658805304, -0.5347301163226948, 1.048080741042263]
-    assert np.abs(run.q[-1, :6] - published).max() < 1e-7
-    assert abs(run.q[-1, 6] - 0.5347301163226948) < 1e-7
+    assert np.abs(run.q[-1, :6] - published).max() < 3e-9
+    assert abs(run.q[-1, 6] - 0.5347301163226948) < 1e-10
 
 
 @by_each_method

@@ -143,6 +143,28 @@ def test_a_five_bar_s_tip_is_where_two_circles_meet(angles):
     close((moved[0] - moved[1]) / (2 * h), expected, 1e-9)  # differences of the second order, rounding over h
 
 
+# Andrews' squeezer ----------------------------------------------------------------------------------------------------
+@by_each_method
+def test_andrews_squeezer_starts_as_the_test_set_has_it(method):
+    """Its consistent initial values, 30 digits of two accelerations and two multipliers, those of point B along x and y of the world.
+
+    F. Mazzia, C. Magherini, Test set for initial value problem solvers, 2008. What is computed adds up to 1e5 rad/s² of terms.
+    """
+    scene = M.andrews(method)
+    model = scene.model
+    q, still = model.q, np.zeros(7)
+    said = scene.evaluate(q, still)
+    published = [14222.4439199541138705911625887, -10666.8329399655854029433719415, 0, 0, 0, 0, 0]
+    assert np.abs(said.vdot - published).max() < 1e-9
+    load = said.forces["torque_source"] + said.forces["node_spring"]
+    found = model.constrained_dynamics(q, still, load, method=method)
+    assert np.abs(found.vdot - published).max() < 1e-9
+    gamma = q[2]  # of K3, in whose axes the force on it is
+    close(_turned(found.forces["BE"].b[3:5], gamma), [98.5668703962410896057654982170, -6.12268834425566265503114393122], 1e-12)
+    for other in ("K4E", "K6E"):
+        assert np.abs(found.forces[other].b).max() < 1e-11
+
+
 # Peaucellier ----------------------------------------------------------------------------------------------------------
 def test_a_peaucellier_is_straight_over_its_whole_range():
     """The crank turns from one end to the other, 0.7 cos(a/2) > 0.6, where the rhombus folds; the nearest states are 1e-3 rad off."""
