@@ -89,7 +89,11 @@ AREAS = {
     "pycraft/dynamics/equilibrium_on_loops.py": ["scenes/test_loops_at_rest.py"],
     "cpp/simulation/scene_loops.h": ["scenes/test_kept_loops.py", "scenes/test_steps_on_loops.py"],
     "cpp/numerics/rank_factors.h": ["models/test_constrained_dynamics.py"],
-    "cpp/recursions/loop_tangents.h": ["operators/test_loop_operators.py", "operators/test_embedded.py"],
+    "cpp/recursions/loop_tangents.h": [
+        "operators/test_loop_operators.py",
+        "operators/test_embedded.py",
+        "operators/test_loop_second_derivatives.py",
+    ],
     "cpp/recursions/loop_columns.h": ["models/test_constrained_dynamics.py"],
     "pycraft/dynamics/constrained.py": ["models/test_constrained_dynamics.py"],
     "cpp/dynamics/singular_hinges.h": ["sweeps/test_minimum_norm.py", "sweeps/test_singular_forms.py"],
@@ -232,6 +236,8 @@ AREAS = {
     "cpp/operators/embedded_values.h": ["operators/test_embedded.py", "operators/test_loop_second_derivatives.py"],
     "cpp/operators/independent_direction.cpp": ["operators/test_loop_second_derivatives.py"],
     "cpp/recursions/custom_rows.cpp": ["models/test_custom_loops.py"],
+    "cpp/recursions/curve_rows.cpp": ["models/test_curves.py"],
+    "cpp/model/curve.cpp": ["models/test_curves.py"],
     "cpp/dynamics/embedded_choice.cpp": [
         "dynamics/test_embedded_dynamics.py",
         "scenes/test_kept_loops.py",
