@@ -236,7 +236,7 @@ AREAS = {
     "cpp/operators/embedded_values.h": ["operators/test_embedded.py", "operators/test_loop_second_derivatives.py"],
     "cpp/operators/independent_direction.cpp": ["operators/test_loop_second_derivatives.py"],
     "cpp/recursions/custom_rows.cpp": ["models/test_custom_loops.py"],
-    "cpp/recursions/curve_rows.cpp": ["models/test_curves.py"],
+    "cpp/recursions/curve_rows.cpp": ["models/test_curves.py", "operators/test_loop_second_derivatives.py"],
     "cpp/model/curve.cpp": ["models/test_curves.py"],
     "cpp/dynamics/embedded_choice.cpp": [
         "dynamics/test_embedded_dynamics.py",

@@ -25,8 +25,23 @@ _KEYS: dict[str, tuple[str, ...]] = {kind: _HINGE for kind in _core.hinge_kinds}
     "curve": ("parameters", "coefficients", "closed"),
     "coupling": ("coordinates", "constant"),
 }
-LOOP = ("name", "kind", "a", "b", "axis", "axes", "point", "pitch", "subhinges", "radius", "quadratic", "linear", "constant", "coordinates")
-LOOP += _KEYS["curve"]
+LOOP = (
+    "name",
+    "kind",
+    "a",
+    "b",
+    "axis",
+    "axes",
+    "point",
+    "pitch",
+    "subhinges",
+    "radius",
+    "quadratic",
+    "linear",
+    "constant",
+    "coordinates",
+    *_KEYS["curve"],
+)
 _VECTOR = "three finite numbers: [x, y, z]"
 
 
