@@ -1201,6 +1201,10 @@ class LoopSet:
         """
     def add_coupling(self, name: str, coordinates: collections.abc.Sequence[tuple[str, typing.SupportsInt | typing.SupportsIndex, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]], constant: typing.Any, function: typing.Any) -> None:
         ...
+    def add_curve(self, name: str, a: str, b: str, coefficients: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], closed: bool) -> None:
+        """
+        A point on a curve of polynomials, c and m a power (cpp/model/curve.h).
+        """
     def add_hinge(self, name: str, a: str, b: str, hinge: str, axes: collections.abc.Sequence[typing.Any], point: typing.Any, pitch: typing.Any, subhinges: typing.Any, rotation: typing.Any, position: typing.Any) -> None:
         ...
     def add_pair(self, name: str, a: str, b: str, kind: str, number: typing.Any, quadric: typing.Any) -> None:

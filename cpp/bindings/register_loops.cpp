@@ -11,6 +11,7 @@
 #include "dynamics/loop_calls.h"
 #include "dynamics/recorded_on_loops.h"
 #include "model/checks.h"
+#include "model/curve.h"
 #include "operators/embedded_operators.h"
 #include "operators/loop_operators.h"
 #include "simulation/effects/loop.h"
@@ -31,18 +32,22 @@ struct PythonCoupling {
     f = py::object();
   }
 
-  void operator()(int n, const double* q, double* r, double* gradient, double* second) const {
+  void operator()(int n, const double* q, double* r, double* gradient, double* second, double* third) const {
     py::gil_scoped_acquire gil;
     const py::object given = f(py::array_t<double>(n, q));
     const std::string what = "the function of coupling '" + coupling + "'";
-    if (!py::isinstance<py::tuple>(given) || py::len(given) != 3)
-      throw ModelError(what + " returns (r, gradient, second derivatives), of shapes (), (n,), (n, n); no difference is taken in their place");
+    if (!py::isinstance<py::tuple>(given) || (py::len(given) != 3 && py::len(given) != 4))
+      throw ModelError(what + " returns (r, gradient, second derivatives), of shapes (), (n,), (n, n), and third ones (n, n, n) if it has them; no difference is taken in their place");
     const py::tuple parts = given;
+    if (third && parts.size() == 3)
+      throw EvaluationError("coupling '" + coupling + "' is a function, which has no third derivatives, and they are asked for: of rows twice, or of what they ask where its "
+                            "coordinates move; let it return them (n, n, n) as a fourth, or give polynomials");
     *r = one_number(parts[0], ("r of " + what).c_str());
     if (!std::isfinite(*r)) throw ModelError("r of " + what + " is not a finite number");
     copy(parts[1], "the gradient of " + what, {n}, gradient);
     copy(parts[2], "the second derivatives of " + what, {n, n}, second);
     check_symmetric(n, second, what);
+    if (third) copy(parts[3], "the third derivatives of " + what, {n, n, n}, third);
   }
 
  private:
@@ -137,6 +142,13 @@ void register_loops(py::module_& m) {
         }
         l.set->add_pair(name, std::move(pair));
       }, name, a, b, py::arg("kind"), py::arg("number"), py::arg("quadric"))
+      .def("add_curve", [](Loops& l, const std::string& name, const std::string& a, const std::string& b, const Array& coefficients, bool closed) {
+        if (coefficients.ndim() != 3 || coefficients.shape(2) != 6) throw ModelError("loop '" + name + "': coefficients of a curve are (pieces, order, 6), not " + shape_text(coefficients));
+        FramePair pair{a, b, PairKind::curve};
+        const int pieces = static_cast<int>(coefficients.shape(0)), order = static_cast<int>(coefficients.shape(1));
+        pair.curve = std::make_shared<const Curve>(coefficients.data(), pieces, order, closed, "loop '" + name + "'");
+        l.set->add_pair(name, std::move(pair));
+      }, name, a, b, py::arg("coefficients"), py::arg("closed"), "A point on a curve of polynomials, c and m a power (cpp/model/curve.h).")
       .def("add_coupling", [](Loops& l, const std::string& name, const std::vector<std::tuple<std::string, int, std::vector<double>>>& coordinates,
                               const py::object& constant, const py::object& function) {
         Coupling coupling;
@@ -144,7 +156,7 @@ void register_loops(py::module_& m) {
         coupling.constant = one_number(constant, ("the constant of coupling '" + name + "'").c_str());
         if (!function.is_none())
           coupling.function = [held = std::make_shared<PythonCoupling>(function, name), n = static_cast<int>(coordinates.size())](
-                                  const double* q, double* r, double* gradient, double* second) { (*held)(n, q, r, gradient, second); };
+                                  const double* q, double* r, double* gradient, double* second, double* third) { (*held)(n, q, r, gradient, second, third); };
         l.set->add_coupling(name, std::move(coupling));
       }, name, py::arg("coordinates"), py::arg("constant"), py::arg("function"))
       .def("remove", [](Loops& l, const std::string& name) { l.set->remove(name); }, name)

@@ -8,12 +8,23 @@ namespace pycraft {
 
 namespace {
 
-// Q̇v of a function is Σ ∂²r/∂q_i∂q_j v_i v_j: its derivatives vanish at rest alone.
+// Of Q̇v of functions, Σ ∂²r/∂q_i∂q_j v_i v_j, the derivatives by q and by v, to be added; third ones are asked for where coordinates move.
 template <class S>
-void refuse_moving_functions(const ResolvedLoops& loops, const S* v) {
-  for (const ResolvedLoop& loop : loops.loops)
-    if (loop.loop->coupling.function && std::any_of(loop.v.begin(), loop.v.end(), [&](int j) { return v[j] != S(0); }))
-      throw EvaluationError("coupling '" + loop.loop->name + "' is a function, which has no third derivatives, and its coordinates move: what it asks has derivatives at rest; give polynomials for others");
+void differentiate_functions(const ResolvedLoops& loops, int nv, const S* q, const S* v, S* along_q, S* along_v) {
+  for (const ResolvedLoop& loop : loops.loops) {
+    if (!loop.loop->coupling.function || std::none_of(loop.v.begin(), loop.v.end(), [&](int j) { return v[j] != S(0); })) continue;
+    const size_t n = loop.v.size();
+    std::vector<double> at(n), gradient(n), second(n * n), third(n * n * n);
+    for (size_t i = 0; i < n; ++i) at[i] = to_double(q[loop.q[i]]);
+    double r = 0;
+    loop.loop->coupling.function(at.data(), &r, gradient.data(), second.data(), third.data());
+    const size_t row = size_t(loop.first_row) * nv;
+    for (size_t i = 0; i < n; ++i)
+      for (size_t j = 0; j < n; ++j) {
+        along_v[row + loop.v[j]] += S(2) * S(second[i * n + j]) * v[loop.v[i]];
+        for (size_t k = 0; k < n; ++k) along_q[row + loop.v[k]] += S(third[(i * n + j) * n + k]) * v[loop.v[i]] * v[loop.v[j]];
+      }
+  }
 }
 
 // One state. The rows' own code, with derivatives along one coordinate after the other, then along one velocity after the other.
@@ -24,7 +35,6 @@ void differentiate(const CompiledModel<S>& model, const ResolvedLoops& loops, co
   const S* const vdot = given[2];
   S *const slip = out, *const along_q = slip + size, *const along_v = along_q + size, *const forces = along_v + size;
   std::fill_n(out, 3 * size + nv * nv, S(0));
-  refuse_moving_functions(loops, v.data());
   using T = typename LoopTangents<S>::T;
   LoopBuffers<T> buffers;
   LoopMotion<S> direction{std::vector<S>(nv, S(0)), {}};
@@ -46,6 +56,7 @@ void differentiate(const CompiledModel<S>& model, const ResolvedLoops& loops, co
     moving[j].d[0] = S(0);
     for (int row = 0; row < rows; ++row) along_v[row * nv + j] = bias[row].d[0];
   }
+  differentiate_functions(loops, nv, q.data(), v.data(), along_q, along_v);
 }
 
 }  // namespace

@@ -29,7 +29,7 @@ class LoopCalls : public Batches<LoopWorkspace> {
   void rates(Precision precision, Given q, Given v, double* out);    // Qθ̇, (rows) a state
   void bias(Precision precision, Given q, Given v, double* out);     // Q̇θ̇, (rows) a state
   // Along displacements, and once along velocities: ∂(Qv)/∂q, ∂(Q v̇ + Q̇v)/∂q, ∂(Q̇v)/∂v (rows x nv each), then ∂(Q*λ)/∂q (nv x nv), a state; λ
-  // (rows) is of all states. Cost: nv times the rows. EvaluationError names a function of which third derivatives would be needed.
+  // (rows) is of all states. Cost: nv times the rows. EvaluationError names a function that has no third derivatives where they are needed.
   void derivatives(Precision precision, Given q, Given v, Given vdot, const double* multipliers, double* out);
 
  private:

@@ -19,6 +19,7 @@ void check_rows(const ResolvedLoops& loops) {
     const char* const why = loop.coupling.function ? "it is a function of Python's"
                             : !loop.is_coupling() && loop.pair.kind == PairKind::screw ? "a screw counts its turns"
                             : !loop.is_coupling() && loop.pair.kind == PairKind::custom ? "the nearest place of its hinge is sought"
+                            : !loop.is_coupling() && loop.pair.kind == PairKind::curve ? "the nearest place of its curve is sought"
                                                                                         : nullptr;
     if (why) throw ModelError("loop '" + loop.name + "' cannot be compiled: " + why + "; constrained_dynamics() keeps it");
   }

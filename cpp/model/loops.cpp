@@ -91,6 +91,7 @@ const PairRecord& record_of(PairKind kind) {
       {"wheel", {"contact", "rolling", "sideways"}, 2},
       {"rolling ball", {"contact", "rolling along x", "rolling along y"}, 2},
       {"surface", {"across"}},
+      {"curve", {"across 1", "across 2"}},
   };
   return records[static_cast<int>(kind)];
 }
@@ -154,6 +155,7 @@ void LoopSet::add_pair(const std::string& name, FramePair pair) {
     if (!std::isfinite(sum + slopes)) throw ModelError(what + ": its surface has a number that is not finite");
     if (slopes == 0) throw ModelError(what + ": p·A p + b·p + c with A and b zero is no surface");
   }
+  if (pair.kind == PairKind::curve && !pair.curve) throw ModelError(what + ": a point on a curve has no curve");
   const std::string body = body_of(pair.a);
   if (body == body_of(pair.b))
     throw ModelError(what + " is of " + called(body) + " with itself: " + called(pair.a) + " and " + called(pair.b) +

@@ -1,4 +1,4 @@
-// What a model must keep to beside its tree: loops that close chains, points on surfaces, wheels that roll, blades that do not slip sideways,
+// What a model must keep to beside its tree: loops that close chains, points on surfaces and curves, wheels that roll, blades that do not slip sideways,
 // couplings between coordinates. The model knows nothing of them, as it knows nothing of loose frames (frames.h).
 //
 // Each says one or more rows, numbers in order of declaration. A row of positions has a residual r(q), zero where it is kept; a row of
@@ -32,7 +32,7 @@
 
 namespace pycraft {
 
-enum class PairKind { weld, pin, slider, screw, universal, cylindrical, planar, ball, free, custom, blade, wheel, rolling_ball, surface };
+enum class PairKind { weld, pin, slider, screw, universal, cylindrical, planar, ball, free, custom, blade, wheel, rolling_ball, surface, curve };
 // A row of the table of kinds: what its rows are called, and how many of the last ones are of velocities.
 struct PairRecord {
   const char* name;
@@ -48,6 +48,8 @@ struct Quadric {
   double c = 0;
 };
 
+class Curve;  // model/curve.h
+
 struct FramePair {
   std::string a, b;                              // empty: the base
   PairKind kind = PairKind::weld;
@@ -55,6 +57,7 @@ struct FramePair {
   double number = 0;                             // screw: pitch, m/rad; universal: cosine between the axes; wheels and balls: radius, m
   Quadric surface;                               // of a surface, on a
   std::shared_ptr<const Multibody> permitted;    // of a custom hinge: one body on it
+  std::shared_ptr<const Curve> curve;            // of a point on a curve, on a
 };
 
 // One coordinate of a coupling, and the polynomial of it that the coupling adds: coefficients of 1, q, q², ...
@@ -63,8 +66,9 @@ struct CoupledCoordinate {
   int coordinate = 0;                            // within the hinge
   std::vector<double> coefficients;
 };
-// r of the coordinates, its derivatives and its second derivatives (a square): a user's, in double precision.
-using CouplingFunction = std::function<void(const double* q, double* r, double* gradient, double* second)>;
+// r of the coordinates, its derivatives, its second derivatives (a square) and third ones (a cube): a user's, in double precision. `third` is null
+// where they are not wanted; where they are, EvaluationError from a function that has none.
+using CouplingFunction = std::function<void(const double* q, double* r, double* gradient, double* second, double* third)>;
 struct Coupling {
   std::vector<CoupledCoordinate> coordinates;
   double constant = 0;                           // r = constant + Σ polynomial(q_i)
@@ -102,7 +106,7 @@ class LoopSet {
   // ModelError names the loop and leaves all as it was: a name that is taken, ends on one body, hinges that have no rows, numbers that are none.
   // `hinge` is complete with its placement on a.
   void add_hinge(const std::string& name, const std::string& a, const std::string& b, const Hinge& hinge);
-  // Blades, wheels, balls, surfaces: the end frames as they are.
+  // Blades, wheels, balls, surfaces, curves: the end frames as they are.
   void add_pair(const std::string& name, FramePair pair);
   void add_coupling(const std::string& name, Coupling coupling);
   void remove(const std::string& name);

@@ -11,7 +11,7 @@
 //   about x, y      (-R_yz, R_xz)/√((1 + R_zz)/2): |r| = 2 sin(angle between the axes / 2)
 //   along x, y, z   p;   between the axes   R_zz - cos;   along and about z   p_z - pitch (angle about z + 2π n), n such that |r| is least
 //   custom          what is left of about and along all axes at the nearest place of the hinge (custom_rows.h)
-//   across          the quadric of p;   contact   the height of the wheel's or ball's lowest point
+//   across          the quadric of p;   across 1, 2   along two normals at the nearest place of a curve (curve_rows.h);   contact   the height of the wheel's or ball's lowest point
 //
 // Each is zero where the loop is closed and nowhere else, and smooth but where a turn of half a circle is missing: there 2ε changes its sign,
 // and the direction of (about x, y) is none; its length 2 is right. Exchanging a and b leaves what the rows span, where the loop is closed.
@@ -31,6 +31,7 @@
 
 #include "model/loops.h"
 #include "model/unit_data.h"
+#include "recursions/curve_rows.h"
 #include "recursions/custom_rows.h"
 #include "recursions/motion_functions.h"
 #include "runtime/errors.h"
@@ -148,11 +149,12 @@ void pair_rows(const FramePair& pair, const RelativeMotion<S>& m, PairRow<S>* ou
     case PairKind::wheel: return wheel_rows(pair, m, out);
     case PairKind::rolling_ball: return ball_rows(m, S(pair.number), out);
     case PairKind::surface: out[0] = quadric_row(m, pair.surface); return;
-    case PairKind::custom: {
+    case PairKind::custom: case PairKind::curve: {
       S residual[most_pair_rows], rates[most_pair_rows];
       Vector6<S> gradients[most_pair_rows];
-      custom_rows(*pair.permitted, m.X, m.V, residual, gradients, rates);
-      for (int i = 0; i < most_pair_rows; ++i) out[i].residual = residual[i], out[i].gradient = gradients[i], out[i].rate = rates[i];
+      const bool custom = pair.kind == PairKind::custom;
+      custom ? custom_rows(*pair.permitted, m.X, m.V, residual, gradients, rates) : curve_rows(*pair.curve, m, residual, gradients, rates);
+      for (int i = 0; i < (custom ? most_pair_rows : 2); ++i) out[i].residual = residual[i], out[i].gradient = gradients[i], out[i].rate = rates[i];
       return;
     }
     case PairKind::free: return;
@@ -226,7 +228,7 @@ S coupling_row(const ResolvedLoop& loop, const S* q, const S* v, LoopBuffers<S>&
     w.coordinates.resize(n), w.gradient.resize(n), w.second.resize(n * n);
     for (int i = 0; i < n; ++i) w.coordinates[i] = to_double(q[loop.q[i]]);
     double r = 0;
-    of.function(w.coordinates.data(), &r, w.gradient.data(), w.second.data());
+    of.function(w.coordinates.data(), &r, w.gradient.data(), w.second.data(), nullptr);
     for (int i = 0; i < n; ++i) {
       entry(i, S(w.gradient[i]));
       for (int j = 0; v && j < n; ++j) rate += S(w.second[i * n + j]) * v[loop.v[i]] * v[loop.v[j]];

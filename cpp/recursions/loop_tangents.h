@@ -1,11 +1,12 @@
 // ∂Q along velocities w of the tree, and along twists inserted in its hinges (loop_rows.h): the rows' own code with derivatives carried along,
-// q̇ = N(q) w; of a user's function, which is in double precision, its second derivatives:
+// q̇ = N(q) w; of a user's function, which is in double precision, its second derivatives, and third ones where S carries derivatives:
 //
 //   ∂Q(row, i) = Σ_j ∂²r/∂q_i ∂q_j w_j
 //
-// S may carry derivatives itself: those of ∂Q along a second direction, along which w may move too. A function has none of third order.
+// S may carry derivatives itself: those of ∂Q along a second direction, along which w may move too.
 #pragma once
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -61,23 +62,31 @@ class LoopTangents {
 
  private:
   template <class X>
-  static bool moves(const X&) { return false; }
+  static double rate(const X&) { return 0; }
   template <class X>
-  static bool moves(const Tangent<X, 1>& x) { return !(x.d[0] == X(0)); }
+  static double rate(const Tangent<X, 1>& x) { return to_double(x.d[0]); }
+  // ∂²r in S: its rate is that of third derivatives.
+  template <class X>
+  static void set(X& number, double value, double) { number = X(value); }
+  template <class X>
+  static void set(Tangent<X, 1>& number, double value, double rate) { number = Tangent<X, 1>(value), number.d[0] = X(rate); }
 
   template <class Put>
   void of_function(const ResolvedLoop& loop, Put put) const {
     const size_t n = loop.v.size();
-    std::vector<double> at(n), gradient(n), second(n * n);
-    for (size_t i = 0; i < n; ++i) {
-      at[i] = to_double(at_[loop.q[i]]);
-      if (moves(at_[loop.q[i]]))
-        throw EvaluationError("coupling '" + loop.loop->name + "' is a function, which has no third derivatives: its rows are differentiated once; give polynomials for more");
-    }
+    std::vector<double> at(n), rates(n), gradient(n), second(n * n), third(n * n * n);
+    for (size_t i = 0; i < n; ++i) at[i] = to_double(at_[loop.q[i]]), rates[i] = rate(at_[loop.q[i]]);
+    const bool moves = std::any_of(rates.begin(), rates.end(), [](double one) { return one != 0; });
     double r = 0;
-    loop.loop->coupling.function(at.data(), &r, gradient.data(), second.data());
+    loop.loop->coupling.function(at.data(), &r, gradient.data(), second.data(), moves ? third.data() : nullptr);
     for (size_t i = 0; i < n; ++i)
-      for (size_t j = 0; j < n; ++j) put(loop.first_row, loop.v[i], S(S(second[i * n + j]) * along_[loop.v[j]]));
+      for (size_t j = 0; j < n; ++j) {
+        double along_second = 0;
+        for (size_t k = 0; k < n; ++k) along_second += third[(i * n + j) * n + k] * rates[k];
+        S entry;
+        set(entry, second[i * n + j], along_second);
+        put(loop.first_row, loop.v[i], S(entry * along_[loop.v[j]]));
+      }
   }
   const ResolvedLoops& loops_;
   const std::vector<S>& at_;

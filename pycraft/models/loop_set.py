@@ -13,11 +13,12 @@ from ..arguments import listed, name_of, one_number, pose_parts, text
 from ..closed import Closed
 from ..state import at_state
 from .coordinates import coordinate_numbers
+from .curves import Curve, checked, curve_of, with_normals
 from .handles import Body, Node
 from .hinge_axes import hinge_axes
 
 Relation = Callable[[np.ndarray], Any]
-"""A function of coordinates (n,): (r, its gradient (n,), its second derivatives (n, n))."""
+"""A function of coordinates (n,): (r, its gradient (n,), its second derivatives (n, n)), and if it has them third ones (n, n, n)."""
 
 
 class Loop(Closed):
@@ -46,7 +47,7 @@ class Loop(Closed):
     @property
     def kind(self) -> str:
         """Of its hinge ("pin", ...; "ball" of a gimbal, too, "custom" of one with oblique axes), or "blade", "wheel",
-        "rolling ball", "surface", "coupling"."""
+        "rolling ball", "surface", "curve", "coupling"."""
         return self._loops._core.kind(self._name)
 
     @property
@@ -217,6 +218,13 @@ class Loops(Closed, Mapping):
         slopes = np.zeros(3) if linear is None else _numbers(linear, f"b {what}")
         return self._declare(declared | {"quadratic": A, "linear": slopes, "constant": one_number(constant, f"c {what}")})
 
+    def add_curve(self, b: Any, a: Any, curve: Any, parameters: Any, closed: Any, name: str | None) -> Loop:
+        """A curve for a point: see `Multibody.add_curve`. A `Curve` is taken as it is."""
+        declared = self._ends(a, b, name) | {"kind": "curve"}
+        what = f"loop {declared['name']!r}"
+        found = checked(curve, what) if isinstance(curve, Curve) else curve_of(curve, parameters, closed, what)
+        return self._declare(declared | found._asdict())
+
     def add_coupling(self, coordinates: Any, constant: Any, function: Relation | None, name: str | None) -> Loop:
         """A relation of coordinates: see `Multibody.add_coupling`."""
         name = name_of(name, "a coupling", "coupling")
@@ -249,6 +257,9 @@ class Loops(Closed, Mapping):
         elif kind == "surface":
             surface = (declared["quadratic"], declared["linear"], declared["constant"])
             self._core.add_pair(name, declared["a"], declared["b"], kind, 0.0, surface)
+        elif kind == "curve":
+            curve = Curve(declared["parameters"], declared["coefficients"], declared["closed"])
+            self._core.add_curve(name, declared["a"], declared["b"], with_normals(curve, f"loop {name!r}"), curve.closed)
         elif "radius" in declared:
             self._core.add_pair(name, declared["a"], declared["b"], kind, declared["radius"], None)
         else:

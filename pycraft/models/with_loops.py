@@ -131,7 +131,7 @@ class WithLoops(WithFrames):
         c: float = 0.0,
         name: str | None = None,
     ) -> Loop:
-        """A point stays on a surface of second degree, p·A p + b·p + c = 0; on two of them it stays on a curve. One row, "across".
+        """A point stays on a surface of second degree, p·A p + b·p + c = 0. One row, "across".
 
         Parameters
         ----------
@@ -153,6 +153,47 @@ class WithLoops(WithFrames):
         """
         return self.loops.add_surface(point, on, A, b, c, name)
 
+    def add_curve(
+        self,
+        point: str | Body | Node | None,
+        on: str | Body | Node | None = None,
+        *,
+        curve: Any,
+        parameters: Any = None,
+        closed: bool = False,
+        name: str | None = None,
+    ) -> Loop:
+        """A point stays on a curve: a bead on a wire, a pin in a bent slot. Two rows, "across 1" and "across 2".
+
+        Parameters
+        ----------
+        point : body or node, whose origin it is
+        on : body or node, or None for the base: the curve is given in its frame (m)
+        curve : (n, 3), a piecewise polynomial of SciPy's, or a function
+            Points, with the cubic spline through them, natural or, closed, periodic; a CubicSpline or PPoly of points (3,); a function
+            of one number that returns a point (3,), which is fitted once, to its rounding, by polynomials. It has no corners.
+        parameters : (n,), ascending
+            Of points: lengths from one to the next by default. Of a function, which needs them: (first, last), and what is between.
+        closed : bool
+            The curve ends where it begins, of points with the first one again as the last. An open one goes on straight beyond its ends.
+
+        Rows: with c the nearest place of the curve and n₁, n₂ normals there, n_i·(p - c): |r| is the distance (m). n₂ is the normal of a
+        plane curve's plane, and of others turns about the curve as little as may be. Where a curve crosses itself a point goes on along
+        the branch that it is nearest to. ModelError as for `add_loop`, and by name and parameter for curves that jump, stand still or have
+        corners, and functions that are not smooth. Cost: a distance a piece, and a search on those that may be nearest.
+
+        Examples
+        --------
+        >>> import numpy as np, pycraft as pc
+        >>> mb = pc.Multibody("wire")
+        >>> bead = mb.add_body("bead", hinge="free", mass=1.0, inertia=np.eye(3))
+        >>> mb.add_curve("bead", curve=lambda s: (np.cos(s), np.sin(s), s / 5), parameters=(0, 20), name="helix").rows
+        ['helix: across 1', 'helix: across 2']
+        >>> float(mb.loops["helix"].residual([1, 0, 0, 0, 1.5, 0.0, 0.0]).round(3) @ [1, 0])  # half a metre off, away from the axis
+        -0.5
+        """
+        return self.loops.add_curve(point, on, curve, parameters, closed, name)
+
     def add_coupling(
         self,
         coordinates: Mapping[Any, Any] | Sequence[Any],
@@ -169,7 +210,8 @@ class WithLoops(WithFrames):
             Coordinates by name, number, or hinge of one. Coefficients: a number, of q; or those of 1, q, q², ....
         constant : float
         function : function of the coordinates (n,)
-            Returns (r, gradient (n,), second derivatives (n, n)); rows are then there in double precision. It is called at every state.
+            Returns (r, gradient (n,), second derivatives (n, n)), and if it has them third ones (n, n, n), which second derivatives of
+            rows and linear models in motion take; rows are then there in double precision. It is called at every state.
             `pycraft.Spline` is one through points.
         name : str
             By default "coupling".

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import pycraft as pc
-from support.loop_oracle import LoopOracle
+from support.loop_oracle import LoopOracle, assert_close, check_against
 from support.mechanisms import every_kind
 
 EPS = float(np.finfo(float).eps)
@@ -36,20 +36,6 @@ def hinge_given(kind, rng):
     if kind == "screw":
         given["pitch"] = 0.3
     return given
-
-
-def assert_close(got, expected, scale=1.0):
-    expected = np.array(expected, float)
-    assert got.shape == expected.shape
-    error = np.abs(got - expected).max(initial=0) / (1 + np.abs(expected).max(initial=0))
-    assert error <= 2000 * EPS * scale, f"off by {error:.1e}"
-
-
-def check_against(oracle, loop, scale=1000.0):
-    for precision in ("double", "quad"):
-        assert_close(loop.residual(oracle.state, precision=precision), oracle.residual())
-        assert_close(loop.jacobian(oracle.state, precision=precision), oracle.jacobian(), scale)
-        assert_close(loop.bias(oracle.state, precision=precision), oracle.bias(), scale)
 
 
 def opened(model, b, a, rng):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.interpolate import PPoly
 
 import pycraft as pc
 
@@ -52,6 +53,33 @@ COUPLINGS = [
     (dict(coordinates={"ball": 1.0}), r"hinge 'ball' has 3 coordinates; name one of them"),
     (dict(coordinates={4: 1.0}), r"hinge 'ball' of kind 'ball' has no coordinate 1 that is one number in q"),
 ]
+LINE, RING = [[0, 0, 0], [1, 0, 0], [1, 1, 0]], np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [1.0, 0, 0]])
+CURVES = [
+    (dict(curve=LINE[:1]), r"points \(n, 3\), n at least 2, not \(1, 3\)"),
+    (dict(curve=np.zeros((4, 2))), r"points \(n, 3\), n at least 2, not \(4, 2\)"),
+    (dict(curve=[[0, 0, 0], [0, 0, 0]]), r"points 0 and 1 of its curve are the same"),
+    (dict(curve=[[0, 0, 0], [1, np.nan, 0]]), r"one of their numbers is not finite"),
+    (dict(curve=[[0, 0, 0], [1e200, 0, 0], [1e308, 1, 1]]), r"slopes too large for numbers"),
+    (dict(curve="wire"), r"is not an array of numbers"),
+    (dict(curve=LINE, closed=True), r"n at least 4, not \(3, 3\)"),
+    (dict(curve=RING[:-1], closed=True), r"give its first point again as the last"),
+    (dict(curve=RING, closed="yes"), r"closed is True or False, not 'yes'"),
+    (dict(curve=LINE, parameters=[0, 1]), r"3 points have as many parameters, not 2"),
+    (dict(curve=LINE, parameters=[0, 1, 1]), r"parameters are two numbers at least, finite, and ascend"),
+    (dict(curve=[[0, 0, 0], [1, 0, 0], [0, 0, 0]]), r"stands still or turns back near parameter 1"),
+    (dict(curve=lambda s: (s, s, s)), r"beside a function give parameters=\(first, last\)"),
+    (dict(curve=lambda s: s, parameters=(0, 1)), r"gives three finite numbers, and at 0 it gives 0"),
+    (dict(curve=lambda s: (s, s, np.inf), parameters=(0, 1)), r"gives three finite numbers, and at 0 it gives"),
+    (dict(curve=lambda s: (s, abs(s - 0.3), 0), parameters=(0, 1)), r"not smooth near parameter 0.3"),
+    (dict(curve=lambda s: (s**2, s**3, 0), parameters=(-1, 1)), r"corner at parameter 0"),
+    (dict(curve=lambda s: (0, 0, 0), parameters=(-1, 1)), r"stands still or turns back near parameter -1"),
+    (dict(curve=lambda s: (s, 0, 0), parameters=(0, 1), closed=True), r"jumps at parameter 1; a closed curve ends where it begins"),
+    (dict(curve=PPoly([[[1.0, 2.0]]], [0, 1])), r"a piecewise polynomial gives points \(3,\), not \(2,\)"),
+    (dict(curve=PPoly([[[1.0, 0, 0], [0, 1, 0]], [[0, 0, 0], [1, 0, 0]]], [0, 1, 2])), r"corner at parameter 1"),
+    (dict(curve=PPoly([[[1.0, 0, 0], [0, 1, 0]], [[0, 0, 0], [1, 1, 0]]], [0, 1, 2])), r"jumps at parameter 1; a curve is continuous"),
+    (dict(curve=PPoly([[[1.0, 0, 0]]], [0, 1]), parameters=(0, 1)), r"has its own parameters"),
+    (dict(curve=LINE, on="tip"), r"is of 'body2' with itself: 'tip' and 'body2' stand on it both"),
+]
 OTHERS = [
     ("add_rolling", dict(b="body2", kind="cube"), r"kind='cube' of what rolls: there are 'wheel', 'ball', 'blade'"),
     ("add_rolling", dict(b="body2"), r"a wheel rolls on its radius: give radius= in metres"),
@@ -61,6 +89,7 @@ OTHERS = [
     ("add_surface", dict(point="body2", c=1.0), r"with A and b zero is no surface"),
     ("add_surface", dict(point="body2", b=(0, np.nan, 0)), r"its surface has a number that is not finite"),
     ("add_surface", dict(point="body2", A=np.eye(2)), r"A of the surface of 'base to body2' takes a 3 x 3 matrix"),
+    *(("add_curve", {"point": "body2", "name": "w"} | given, rf"loop 'w'.*{said}") for given, said in CURVES),
 ]
 
 

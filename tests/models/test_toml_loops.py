@@ -7,6 +7,7 @@ import pycraft as pc
 from support.mechanisms import every_kind
 from support.saved_models import saved_and_loaded
 
+RING = np.array([[1.0, 0, 0], [0, 1, 0.1], [-1, 0, 0], [0, -1, 0], [1, 0, 0]])
 TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
 
 
@@ -22,6 +23,8 @@ def with_loops():
     model.add_loop("body3", "eye", "weld", placement=np.block([[np.eye(3), np.ones((3, 1))], [np.zeros((1, 3)), 1]]), name="weld")
     model.add_surface("body9", "body3", A=TURN, b=(0, 1, 1 / 3), c=-1.0, name="surface")
     model.add_surface("body9", b=(0, 1, 0), name="plane")
+    model.add_curve("eye", "body3", curve=[[0, 0, 0], [1, 0.5, 1 / 3], [2, 0, 0]], name="wire")
+    model.add_curve("eye", curve=RING, closed=True, name="ring")
     model.add_rolling("eye", radius=0.3, name="wheel")
     model.add_rolling("eye", kind="ball", radius=1 / 3, name="ball")
     model.add_rolling("eye", "body3", "blade", name="blade")

@@ -46,6 +46,8 @@ def every_loop():
     model.add_rolling(bodies[4], bodies[0], "ball", radius=0.1, name="ball")
     model.add_rolling(bodies[4], None, "blade", name="blade")
     model.add_surface("eye", bodies[3], A=rng.normal(size=(3, 3)), b=rng.normal(size=3), c=0.5, name="bowl")
+    model.add_curve("eye", bodies[3], curve=rng.normal(size=(4, 3)), name="wire")
+    model.add_curve("eye", curve=lambda s: (np.cos(s), np.sin(s), np.cos(2 * s)), parameters=(0, 2 * np.pi), closed=True, name="ring")
     model.add_coupling({0: [0.1, 2.0, -0.3], 1: -3.0}, constant=0.7, name="gear")
     return model
 

@@ -97,7 +97,11 @@ AREAS = {
         "scenes/test_loops_that_leave_nothing.py",
     ],
     "cpp/numerics/rank_factors.h": ["models/test_constrained_dynamics.py"],
-    "cpp/recursions/loop_tangents.h": ["operators/test_loop_operators.py", "operators/test_embedded.py"],
+    "cpp/recursions/loop_tangents.h": [
+        "operators/test_loop_operators.py",
+        "operators/test_embedded.py",
+        "operators/test_loop_second_derivatives.py",
+    ],
     "cpp/recursions/loop_columns.h": ["models/test_constrained_dynamics.py"],
     "pycraft/dynamics/constrained.py": ["models/test_constrained_dynamics.py"],
     "cpp/dynamics/singular_hinges.h": ["sweeps/test_minimum_norm.py", "sweeps/test_singular_forms.py"],
@@ -240,6 +244,8 @@ AREAS = {
     "cpp/operators/embedded_values.h": ["operators/test_embedded.py", "operators/test_loop_second_derivatives.py"],
     "cpp/operators/independent_direction.cpp": ["operators/test_loop_second_derivatives.py"],
     "cpp/recursions/custom_rows.cpp": ["models/test_custom_loops.py"],
+    "cpp/recursions/curve_rows.cpp": ["models/test_curves.py", "operators/test_loop_second_derivatives.py"],
+    "cpp/model/curve.cpp": ["models/test_curves.py"],
     "cpp/dynamics/embedded_choice.cpp": [
         "dynamics/test_embedded_dynamics.py",
         "scenes/test_kept_loops.py",

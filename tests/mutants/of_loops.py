@@ -27,7 +27,8 @@ CHANGES = {
         ("in quad the rounding of states is a direction", "S(64 * epsilon<double>())", "S(0)"),
     ],
     "cpp/dynamics/loop_calls.cpp": [
-        ("functions that move have derivatives", "refuse_moving_functions(loops, v.data());", ";", STATEMENT),
+        ("Q̇v of functions does not change with q", "S(third[(i * n + j) * n + k])", "S(0)"),
+        ("Q̇v of functions does not change with v", "S(2) * S(second[i * n + j])", "S(0)"),
         ("Q̇v is the same beside a state", "along_q[row * nv + j] += bias[row].d[0];", ";", STATEMENT),
     ],
     "cpp/simulation/scene_interbody_forces.h": [
@@ -59,6 +60,17 @@ CHANGES = {
         ),
         ("what differences leave of rest is a motion", "held_.empty() ? S(0) : S(slow)", "S(0)"),
         ("a start off the loops is taken", "if (!(to_double(off[r]) <= far))", "if (to_double(off[r]) > 1e300)"),
+    ],
+    "cpp/recursions/curve_rows.cpp": [
+        ("a place on a curve is that of doubles", "at = at - dot(p - c[0], c[1]) / slope;", ";", STATEMENT),
+        ("normals of a curve do not turn", "along(u, n[0], n[1], n[2])", "along(MotionFunction<S>(at), n[0], n[1], n[2])"),
+        ("points do not bend along a curve", "second[i] * u.dot * u.dot", "S(0)"),
+        ("curves have no centres of curvature", "dot(p - c[0], c[2]) - square", "-square"),
+    ],
+    "cpp/model/curve.cpp": [
+        ("pieces of a curve are passed over that are near", "norm(p - piece.centre) - piece.radius", "norm(p - piece.centre)"),
+        ("an open curve ends", "if (closed) return;", "return;", STATEMENT),
+        ("the nearest place is between two samples", "u - slope / bend", "u - 0 * slope / bend"),
     ],
     "cpp/recursions/custom_rows.cpp": [
         ("a custom hinge permits nothing", "g = g - (basis[b][i] * basis[b][k]) * off.G[k];", ";", STATEMENT),
@@ -117,6 +129,7 @@ CHANGES = {
     ],
     "cpp/recursions/loop_tangents.h": [
         ("∂Q of functions without their second derivatives", "of_function(loop, put);", ";", STATEMENT),
+        ("∂∂Q of functions without their third derivatives", "third[(i * n + j) * n + k] * rates[k]", "0.0"),
     ],
     "cpp/numerics/rank_factors.h": [
         ("multipliers are the least in units of rounding", "unit_[V_.order[i]] * V_.upper(j, i)", "V_.upper(j, i)"),

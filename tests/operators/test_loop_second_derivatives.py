@@ -16,6 +16,7 @@ from support.closed_models import MODELS, MOVING, closed_four_bar
 from support.mechanisms import every_kind
 
 STEP = 1e-5
+CURVE = np.array([[-1.0, 0.3, 0.4], [-0.2, -0.3, 0.2], [0.6, 0.1, -0.2], [1.4, 0.3, 0.5]])  # beside a point, by a quarter of a metre
 HINGES = ("weld", "pin", "slider", "screw", "universal", "cylindrical", "planar", "ball")
 
 
@@ -35,6 +36,7 @@ def open_pairs():
     )
     model.add_rolling(bodies[8], kind="wheel", radius=0.2, name="wheel")
     model.add_surface(bodies[9], bodies[3], A=rng.normal(size=(3, 3)), b=rng.normal(size=3), name="bowl")
+    model.add_curve(bodies[9], bodies[3], curve=model.frame(bodies[9]).pose(wrt=bodies[3])[:3, 3] + CURVE, name="wire")
     model.add_coupling({"hinge1": [0.0, 1.0, 0.5, 0.3], "hinge2": 1.0}, name="gear")
     return model
 
@@ -233,7 +235,29 @@ def test_a_length_out_of_the_plane_breaks_a_planar_loop():
         soa.MM.diff(rover.hinges["arm"].symbol("placement", "x"))
 
 
-def test_functions_have_no_third_derivatives():
+def test_third_derivatives_of_functions():
+    """Rows twice along coordinates and time, of r = x² y³ with all its derivatives, against the polynomial's differences."""
+    model, (x, y) = pc.chain(3, seed=2), (0.7, -0.4)
+
+    def product(q):
+        x, y = q
+        gradient = [2 * x * y**3, 3 * x**2 * y**2]
+        second = [[2 * y**3, 6 * x * y**2], [6 * x * y**2, 6 * x**2 * y]]
+        xxy, xyy = 6 * y**2, 12 * x * y
+        return x**2 * y**3, gradient, second, [[[0, xxy], [xxy, xyy]], [[xxy, xyy], [xyy, 6 * x**2]]]
+
+    model.add_coupling(["hinge2", "hinge0"], function=product, name="product")
+    model.q, model.v = [y, 0.3, x], [2.0, -1.0, 0.5]
+    xxx, xxy, xyy, yyy = 0.0, 6 * y**2, 12 * x * y, 6 * x**2
+    expected = {(2, 2): [xxy, 0, xxx], (0, 2): [xyy, 0, xxy], (2, 0): [xyy, 0, xxy], (0, 0): [yyy, 0, xyy], (0, 1): [0, 0, 0]}
+    for (i, j), row in expected.items():
+        assert close(model.soa.Q.diff(i, j).dense(), np.array([row])), (i, j)
+    vy, vx = model.v[0], model.v[2]
+    along = np.array([[xyy * vx + yyy * vy, 0, xxy * vx + xyy * vy]])
+    assert close(model.soa.Q.diff(0).dot().dense(), along)
+
+
+def test_functions_without_third_derivatives():
     model = MOVING["function"]()
     at = model.coordinate_names.index("hinge3")
     model.soa.Q.diff(at).dense()

@@ -206,9 +206,15 @@ def test_without_freedom_there_is_a_model_of_no_states():
     assert empty.linearize(loops=True).A.shape == (0, 0)
 
 
-def function_of_gears():
+def function_of_gears(third=False):
     model = pc.chain(2)
-    model.add_coupling(["hinge0", "hinge1"], function=lambda q: (q[0] - np.sin(q[1]), [1, -np.cos(q[1])], [[0, 0], [0, np.sin(q[1])]]))
+
+    def follow(q):
+        x, s, c = q[0], np.sin(q[1]), np.cos(q[1])
+        r = (x - s, [1, -c], [[0, 0], [0, s]])
+        return (*r, [[[0, 0], [0, 0]], [[0, 0], [0, c]]]) if third else r
+
+    model.add_coupling(["hinge0", "hinge1"], function=follow)
     model.gravity = (0, -9.81, 0)
     return model
 
@@ -221,8 +227,20 @@ def test_functions_have_derivatives_at_rest():
     fast = model.assemble(state.q, [0.1, 0.1])
     slopes = slopes_on_loops(model, state, found, lambda at: model.constrained_dynamics(at.q, 0 * at.v).vdot[free])
     close(found.A[1:, :1], slopes[:, :1], NEAR)
-    with pytest.raises(pc.EvaluationError, match="is a function, which has no third derivatives, and its coordinates move"):
+    with pytest.raises(
+        pc.EvaluationError, match="is a function, which has no third derivatives, and they are asked for: .* where its coordinates move"
+    ):
         model.linearize(fast.q, fast.v, loops=True)
+
+
+def test_functions_with_third_derivatives_in_motion():
+    model = function_of_gears(third=True)
+    state = model.assemble([0.3, 0.3], [0.8, 0.4])
+    found = model.linearize(state.q, state.v, loops=True)
+    free = [model.coordinate_names.index(found.states[1][2:])]
+    slopes = slopes_on_loops(model, state, found, lambda at: model.constrained_dynamics(at.q, at.v).vdot[free])
+    close(found.A[1:], slopes, NEAR)
+    assert np.abs(found.A[1, 1]) > 0.1  # of velocities, by Q̇v alone
 
 
 REFUSED = {

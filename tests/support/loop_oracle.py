@@ -45,6 +45,24 @@ def between(R):
     return (2 * mpmath.sin(angle / 2) * axis / norm(axis))[:2]
 
 
+def on_curve(pieces, p):
+    """(p - c) along both normals at the nearest place of a curve of coefficients (pieces, order, 6), by a root found in all digits."""
+
+    def at(piece, u, order=0):
+        factors = [mpmath.ff(k, order) * u ** max(k - order, 0) for k in range(len(piece))]
+        return sum(factor * np.array([mpmath.mpf(float(x)) for x in row]) for factor, row in zip(factors, piece, strict=True))
+
+    places = np.linspace(-1, 1, 41)
+    near = np.vander(places, pieces.shape[1], increasing=True) @ pieces[:, :, :3]
+    k, i = divmod(int(np.argmin(np.linalg.norm(near - np.array(p, float), axis=2))), len(places))
+    piece, start = pieces[k], places[i]
+    u = mpmath.findroot(lambda u: (p - at(piece, u)[:3]) @ at(piece, u, 1)[:3], start)
+    off, t, m = p - at(piece, u)[:3], at(piece, u, 1)[:3], at(piece, u)[3:]
+    first = np.cross(m, t)
+    second = np.cross(t, first)
+    return [first @ off / norm(first), second @ off / norm(second)]
+
+
 class LoopOracle:
     """The rows of one loop at its model's present state."""
 
@@ -60,7 +78,7 @@ class LoopOracle:
         given, one = self.given, np.eye(4) * mpmath.mpf(1)
         point = given.get("point", (0, 0, 0))
         axes = given.get("axes", [given["axis"]] * 2 if "axis" in given else [])
-        if self.kind in ("ball", "gimbal", "wheel", "blade", "weld", "free", "surface"):
+        if self.kind in ("ball", "gimbal", "wheel", "blade", "weld", "free", "surface", "curve"):
             in_a = in_b = frame_along(Z, point)
         else:
             in_a, in_b = (frame_along(axis, point) for axis in axes)
@@ -88,6 +106,8 @@ class LoopOracle:
             return [R[2, 2] - self.cosine, *p]
         if kind == "surface":
             return [p @ given["A"] @ p + np.asarray(given["b"]) @ p + given["c"]]
+        if kind == "curve":
+            return on_curve(given["pieces"], p)
         if kind == "wheel":
             return [p[2] - mpmath.mpf(given["radius"]) * mpmath.sin(mpmath.acos(R[2, 2]))]
         if kind == "ball" and "radius" in given:
@@ -136,3 +156,19 @@ class LoopOracle:
             return [
                 float(x) for x in [*second, *((x - y) / (2 * STEP) for x, y in zip(self.speeds(STEP), self.speeds(-STEP), strict=True))]
             ]
+
+
+def assert_close(got, expected, scale=1.0):
+    """To 2000 eps of the largest entry beside 1, as frames are (tests/models/test_frames.py), times `scale`."""
+    expected = np.array(expected, float)
+    assert got.shape == expected.shape
+    error = np.abs(got - expected).max(initial=0) / (1 + np.abs(expected).max(initial=0))
+    assert error <= 2000 * np.finfo(float).eps * scale, f"off by {error:.1e}"
+
+
+def check_against(oracle, loop, scale=1000.0):
+    """A loop's rows at the oracle's state, in double and quad."""
+    for precision in ("double", "quad"):
+        assert_close(loop.residual(oracle.state, precision=precision), oracle.residual())
+        assert_close(loop.jacobian(oracle.state, precision=precision), oracle.jacobian(), scale)
+        assert_close(loop.bias(oracle.state, precision=precision), oracle.bias(), scale)

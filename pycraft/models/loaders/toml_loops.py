@@ -1,8 +1,8 @@
 """Loops of a model in TOML: tables [[loops]], each with its kind, the frames a and b, and what the kind has (docs/models.md, Files).
 
 Of a hinge the arguments of `Multibody.add_loop` by their names, of a custom one its subhinges; of "wheel" and
-"rolling ball" the radius; of "surface" quadratic, linear and constant; of "coupling" constant and
-coordinates = { name = coefficients of 1, q, q², ... }.
+"rolling ball" the radius; of "surface" quadratic, linear and constant; of "curve" parameters, closed, and coefficients, those of each
+piece in turn; of "coupling" constant and coordinates = { name = coefficients of 1, q, q², ... }.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 from ... import _core
+from ..curves import curve_of_pieces
 from ..multibody import Multibody
 from .toml_file import TomlTable
 from .toml_subhinges import subhinges_of
@@ -21,9 +22,26 @@ _KEYS: dict[str, tuple[str, ...]] = {kind: _HINGE for kind in _core.hinge_kinds}
     "wheel": ("radius",),
     "rolling ball": ("radius",),
     "surface": ("quadratic", "linear", "constant"),
+    "curve": ("parameters", "coefficients", "closed"),
     "coupling": ("coordinates", "constant"),
 }
-LOOP = ("name", "kind", "a", "b", "axis", "axes", "point", "pitch", "subhinges", "radius", "quadratic", "linear", "constant", "coordinates")
+LOOP = (
+    "name",
+    "kind",
+    "a",
+    "b",
+    "axis",
+    "axes",
+    "point",
+    "pitch",
+    "subhinges",
+    "radius",
+    "quadratic",
+    "linear",
+    "constant",
+    "coordinates",
+    *_KEYS["curve"],
+)
 _VECTOR = "three finite numbers: [x, y, z]"
 
 
@@ -40,6 +58,9 @@ def add_loop(model: Multibody, table: TomlTable, rotation: Any, position: Any) -
             model.loops.add_coupling(parts["coordinates"], parts["constant"], None, name)
         elif kind == "surface":
             model.loops.add_surface(b, a, parts["quadratic"], parts["linear"], parts["constant"], name)
+        elif kind == "curve":
+            curve = curve_of_pieces(parts["parameters"], parts["coefficients"], parts["closed"], table.label)
+            model.loops.add_curve(b, a, curve, None, False, name)
         elif kind in ("blade", "wheel", "rolling ball"):
             model.loops.add_pair(b, a, kind, parts["radius"], name)
         else:
@@ -58,6 +79,12 @@ def _parts(table: TomlTable, kind: str) -> dict[str, Any]:
             "quadratic": A,
             "linear": table.vector("linear", 3, _VECTOR),
             "constant": table.number("constant", 0.0, "that of the surface"),
+        }
+    if kind == "curve":
+        return {
+            "parameters": table.vector("parameters", None, "a list of finite numbers, between which the pieces are"),
+            "coefficients": table.vectors("coefficients", None, "a list of three finite numbers each: [[x, y, z], ...]"),
+            "closed": table.flag("closed"),
         }
     if kind in ("blade", "wheel", "rolling ball"):
         return {"radius": table.number("radius", 0.0, "in m")}

@@ -10,7 +10,8 @@
 
 a and b are links, the root link where one is not given. Of a hinge the arguments of `Multibody.add_loop`: axis (three numbers an axis),
 point, pitch, and the placement as xyz and rpy; of a custom one the placement and its subhinges; of "wheel" and "rolling ball"
-the radius; of "surface" quadratic (nine), linear and constant; of "coupling" coordinates with coefficients of 1, q, q², ..., and constant.
+the radius; of "surface" quadratic (nine), linear and constant; of "curve" parameters, closed (1 or 0), and coefficients, three numbers of
+each power of each piece in turn; of "coupling" coordinates with coefficients of 1, q, q², ..., and constant.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from ... import _core
+from ..curves import curve_of_pieces
 from ..multibody import Multibody
 from .rotations import rotation_from_rpy
 from .xml_file import Element, XmlFile, label, local_name
@@ -31,6 +33,7 @@ KEYS: dict[str, tuple[str, ...]] = {kind: ("a", "b", *_HINGE) for kind in _core.
     "wheel": ("a", "b", "radius"),
     "rolling ball": ("a", "b", "radius"),
     "surface": ("a", "b", "quadratic", "linear", "constant"),
+    "curve": ("a", "b", "parameters", "coefficients", "closed"),
     "coupling": ("constant",),
 }
 
@@ -59,13 +62,17 @@ def _add(file: XmlFile, model: Multibody, root: str, element: Element) -> None:
             element[0], f"{label(element)} of kind {kind!r} has the element <{local_name(element[0])}>; a coupling has coordinates"
         )
     a, b = (None if (link := element.get(end, root)) == root and not _stands(model, link) else link for end in ("a", "b"))
-    number = {key: file.number(element, key, element, 0.0) for key in ("constant", "radius", "pitch")}
+    number = {key: file.number(element, key, element, 0.0) for key in ("constant", "radius", "pitch", "closed")}
     try:
         if kind == "coupling":
             model.loops.add_coupling(_coordinates(file, element), number["constant"], None, name)
         elif kind == "surface":
             A = np.reshape(file.numbers(element, "quadratic", 9, element, (0.0,) * 9), (3, 3))
             model.loops.add_surface(b, a, A, file.numbers(element, "linear", 3, element, (0.0,) * 3), number["constant"], name)
+        elif kind == "curve":
+            parameters, rows = (np.array(file.numbers(element, key, None, element), float) for key in ("parameters", "coefficients"))
+            rows = rows.reshape(-1, 3) if rows.size % 3 == 0 else rows
+            model.loops.add_curve(b, a, curve_of_pieces(parameters, rows, number["closed"] != 0, label(element)), None, False, name)
         elif kind in ("blade", "wheel", "rolling ball"):
             model.loops.add_pair(b, a, kind, number["radius"], name)
         else:

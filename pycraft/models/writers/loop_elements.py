@@ -43,9 +43,12 @@ def loops_element(model: Multibody, described: dict[str, Any], root: str) -> Ele
     return ours
 
 
+_NUMBERS = ("point", "quadratic", "linear", "radius", "pitch", "constant", "parameters", "coefficients", "closed")
+
+
 def _numbers(loop: dict[str, Any]) -> dict[str, Any]:
     """What a loop has beside its name, ends and coordinates, without zeros."""
-    given: dict[str, Any] = {key: loop.get(key) for key in ("point", "quadratic", "linear", "radius", "pitch", "constant")}
+    given: dict[str, Any] = {key: loop.get(key) for key in _NUMBERS}
     given["xyz"] = loop.get("position")
     if loop.get("axes"):
         given["axis"] = np.concatenate(loop["axes"])

@@ -120,6 +120,9 @@ def loop_data(model: Multibody, loop: dict[str, Any]) -> dict[str, Any]:
         rotation, position = (zero if loop[key] is None else loop[key] for key, zero in (("rotation", np.eye(3)), ("position", _ZERO)))
         data |= _pose({"rotation": rotation, "position": position})
     data |= {key: loop[key] for key in ("quadratic", "linear") if key in loop}
+    if loop["kind"] == "curve":
+        data |= {"parameters": loop["parameters"], "coefficients": loop["coefficients"].reshape(-1, 3)}
+        data |= {"closed": True} if loop["closed"] else {}
     return data | {key: loop[key] for key in ("radius", "pitch", "constant") if not same(loop.get(key, 0.0), 0.0)}
 
 
