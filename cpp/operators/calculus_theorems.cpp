@@ -48,7 +48,7 @@ struct CalculusTheorems : Statements {
   Expression unit(int coordinate) const {
     std::vector<double> e(robot->nv(), 0.0);
     e[coordinate] = 1;
-    return constant(std::move(e), Space::euclidean(1), robot->theta(), "e" + std::to_string(coordinate));
+    return constant(std::move(e), Space::euclidean(1), robot->theta(), std::string("e").append(std::to_string(coordinate)));
   }
   Expression d(const Expression& e) const { return differentiate(e, *along_i); }
   Expression dot(const Expression& e) const { return differentiate(e, *along_time); }

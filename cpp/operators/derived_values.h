@@ -4,9 +4,9 @@
 #include <memory>
 #include <vector>
 
-#include "algebra/trees/tree_values.h"
 #include "numerics/decisions.h"
 #include "operators/derived_operators.h"
+#include "operators/rigid_trees.h"
 #include "recursions/kinematics.h"
 
 namespace pycraft {

@@ -55,4 +55,11 @@ std::shared_ptr<GroupedOperators> grouped_operators(const std::shared_ptr<Multib
 PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_MAKE_VALUES)
 #undef PYCRAFT_MAKE_VALUES
 
+#define PYCRAFT_INSTANTIATE(S)                                 \
+  template class TreeValues<MixedBlocks<RigidBlocks<S>>>;      \
+  template class ReorderedValues<MixedBlocks<RigidBlocks<S>>>; \
+  template class GroupedValues<S>;
+PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_INSTANTIATE)
+#undef PYCRAFT_INSTANTIATE
+
 }  // namespace pycraft

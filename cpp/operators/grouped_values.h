@@ -143,4 +143,11 @@ class GroupedValues final : public ReorderedValues<MixedBlocks<RigidBlocks<S>>> 
   std::vector<InertiaFactors<S>> factors_;
 };
 
+#define PYCRAFT_EXTERN(S)                                             \
+  extern template class TreeValues<MixedBlocks<RigidBlocks<S>>>;      \
+  extern template class ReorderedValues<MixedBlocks<RigidBlocks<S>>>; \
+  extern template class GroupedValues<S>;
+PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_EXTERN)
+#undef PYCRAFT_EXTERN
+
 }  // namespace pycraft

@@ -4,11 +4,10 @@
 #include <algorithm>
 #include <vector>
 
-#include "algebra/trees/tree_values.h"
 #include "model/unit_data.h"
 #include "operators/loop_operators.h"
+#include "operators/rigid_trees.h"
 #include "recursions/loop_tangents.h"
-#include "rigid/rigid_blocks.h"
 
 namespace pycraft {
 

@@ -65,7 +65,9 @@ std::shared_ptr<MultibodyOperators> operators_of(const std::shared_ptr<Multibody
   return made;
 }
 
-#define PYCRAFT_INSTANTIATE(S) template class RigidValues<S>;
+#define PYCRAFT_INSTANTIATE(S)               \
+  template class TreeValues<RigidBlocks<S>>; \
+  template class RigidValues<S>;
 PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_INSTANTIATE)
 #undef PYCRAFT_INSTANTIATE
 

@@ -3,10 +3,10 @@
 
 #include <memory>
 
-#include "algebra/trees/tree_values.h"
 #include "numerics/decisions.h"
 #include "operators/many_columns.h"
 #include "operators/multibody_operators.h"
+#include "operators/rigid_trees.h"
 #include "recursions/kinematics.h"
 #include "recursions/velocities.h"
 
@@ -107,5 +107,9 @@ class RigidValues final : public TreeValues<RigidBlocks<S>> {
   ManyColumns<S> columns_;
   [[no_unique_address]] LinkInverse<S> links_;
 };
+
+#define PYCRAFT_EXTERN(S) extern template class RigidValues<S>;
+PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_EXTERN)
+#undef PYCRAFT_EXTERN
 
 }  // namespace pycraft

@@ -159,7 +159,9 @@ std::string SceneEquations<S, Kind>::name_of(int i) const {
     int k = 0;
     while (k + 1 < model.bodies() && model.q_offset(k + 1) <= i) ++k;
     const int first = model.q_offset(k), count = (k + 1 < model.bodies() ? model.q_offset(k + 1) : nq()) - first;
-    return "coordinate '" + model.body(k).hinge.name + (count > 1 ? "[" + std::to_string(i - first) + "]'" : "'");
+    std::string name = "coordinate '" + model.body(k).hinge.name;
+    if (count > 1) name.append("[").append(std::to_string(i - first)).append("]");
+    return name + "'";
   }
   if (i < nq() + nv()) return "the velocity of '" + model.structure().coordinate_names[i - nq()] + "'";
   for (const auto& e : scene_.effects().effects()) {
