@@ -66,8 +66,8 @@ class KeptRows:
 
 def kept_rows(model: Any, q: np.ndarray, loops: Iterable[str], held: Iterable[int] = ()) -> KeptRows:
     """Of these loops and coordinates. EvaluationError at a singular state: where rows hang together that do not beside it."""
-    slices = model.loops.slices
-    chosen = np.concatenate([np.zeros(0, int), *(np.arange(slices[name].start, slices[name].stop) for name in loops)])
+    of_loop = [model.loops[name].slice for name in loops]
+    chosen = np.concatenate([np.zeros(0, int), *(np.arange(one.start, one.stop) for one in of_loop)])
     fixed = list(held)
     Q = np.vstack([model.loops.jacobian(q)[chosen], np.eye(model.nv)[fixed]])
     of_positions = np.concatenate([np.asarray(model.loops.of_positions, bool)[chosen], np.ones(len(fixed), bool)])

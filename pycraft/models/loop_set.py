@@ -53,8 +53,7 @@ class Loop(Closed):
     @property
     def slice(self) -> slice:
         """Where its rows stand among those of all loops."""
-        first = self._loops._core.first_rows()
-        place = self._loops._place(self._name)
+        place, first = self._loops._place(self._name)
         return slice(first[place], first[place + 1])
 
     @property
@@ -169,12 +168,6 @@ class Loops(Closed, Mapping):
         """Q̇θ̇ (rows,) or (B, rows): what is left of the rows' second derivatives at θ̈ = 0."""
         return self._core.bias(*at_state(self._model, q, v), precision)
 
-    @property
-    def slices(self) -> dict[str, slice]:
-        """Where each loop's rows stand among those of all, by its name."""
-        first = self._core.first_rows()
-        return {name: slice(first[i], first[i + 1]) for i, name in enumerate(self._core.names())}
-
     def coupled(self, name: str) -> list[int]:
         """The numbers of the coordinates that a coupling is of, in its order. KeyError where there is none of that name."""
         terms = self._declared[name].get("terms", ())
@@ -287,10 +280,12 @@ class Loops(Closed, Mapping):
         return f"<loops of {self._model.name!r}: {', '.join(map(repr, self)) or 'none'}>"
 
     # ------------------------------------------------------------------ what they share
-    def _place(self, name: str) -> int:
+    def _place(self, name: str) -> tuple[int, Sequence[int]]:
+        """A loop's number, and where the rows of each begin."""
+        places, first = self.numbered()
         try:
-            return self._core.names().index(name)
-        except ValueError:
+            return places[name], first
+        except KeyError:
             raise _core.ModelError(f"{self._model.name!r} has no loop called {name!r} any more") from None
 
     def _frame(self, frame: Any) -> str:

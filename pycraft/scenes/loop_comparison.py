@@ -195,8 +195,8 @@ class _Comparison:
     def __init__(self, scene: Any, q: Any, v: Any, times: np.ndarray, seconds: float, tell: Callable[[str], None]):
         self.scene, self.model, self.q, self.v, self.times, self.seconds, self.tell = scene, scene.model, q, v, times, seconds, tell
         self.names = scene._kept_loops()
-        slices, rows = self.model.loops.slices, range(len(self.model.loops.rows))
-        self.rows = [i for name in self.names for i in rows[slices[name]]]
+        loops, rows = self.model.loops, range(len(self.model.loops.rows))
+        self.rows = [i for name in self.names for i in rows[loops[name].slice]]
 
     def by(self, method: str, of: Any, **springs: Any) -> tuple[Any, list[str]]:
         """The scene with its loops by a method, and the names of the effects that do that."""

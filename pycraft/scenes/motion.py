@@ -125,7 +125,7 @@ class Motion:
         """(K,) by the loops of the model that have residuals: the largest, m and rad; whether effects keep the loop or not."""
         model = self._unedited_model()
         residual, of_positions = np.abs(model.loops.residual(self.q)), np.asarray(model.loops.of_positions, bool)
-        own = {name: np.arange(len(of_positions))[rows][of_positions[rows]] for name, rows in model.loops.slices.items()}
+        own = {name: np.arange(len(of_positions))[loop.slice][of_positions[loop.slice]] for name, loop in model.loops.items()}
         return {name: residual[..., rows].max(axis=-1) for name, rows in own.items() if len(rows)}
 
     @cached_property

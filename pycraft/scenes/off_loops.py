@@ -26,8 +26,8 @@ def warn_off_the_loops(model: Any, effects: Iterable[Effect], q: np.ndarray, v: 
     if not keeping:
         return
     loops, kept = model.loops, [name for effect in keeping for name in effect.kept(model)]
-    slices, size = loops.slices, len(loops.rows)
-    rows = [row for name in kept for row in range(size)[slices[name]]]
+    size = len(loops.rows)
+    rows = [row for name in kept for row in range(size)[loops[name].slice]]
     for off, how in ((loops.residual(q), "is off"), (np.zeros(size) if v is None else loops.rates(q, v), "moves off")):
         worst = rows[int(np.argmax(np.abs(off[rows])))] if rows else None
         if worst is not None and abs(off[worst]) > FAR:

@@ -368,3 +368,15 @@ def test_what_is_each_loop_s_own_goes_by_name():
     with pytest.raises(KeyError, match="more"):
         got.by_loop["more"]
     assert list(model.constrained_dynamics(q[0], np.zeros(3)).by_loop) == ["gear", "closure", "more"]
+
+
+def test_a_row_that_is_zero_asks_nothing_at_rest_and_is_refused_where_it_moves():
+    model = pc.chain(2)
+    model.add_coupling(["hinge0", "hinge1"], function=lambda q: (q[0] ** 2 / 2, [q[0], 0.0], [[1.0, 0.0], [0.0, 0.0]]), name="bent")
+    tau = np.array([0.3, -0.2])
+    rest = model.constrained_dynamics([0, 0.4], [0, 0], tau)
+    free = model.forward_dynamics([0, 0.4], [0, 0], tau)  # by the kernel: some tens of operations in another order
+    assert np.abs(rest.vdot - free).max() <= 64 * np.finfo(float).eps * np.abs(free).max()
+    assert rest.multipliers.tolist() == [0] and rest.rank == 0
+    with pytest.raises(pc.EvaluationError, match="ask for different accelerations of one motion.*'bent'"):
+        model.constrained_dynamics([0, 0.4], [1, 0], tau)

@@ -202,15 +202,25 @@ def test_batches_and_states():
         assert np.array_equal(model.loops.residual(q)[b], model.loops.residual(state))
         assert np.array_equal(model.loops.jacobian(q)[b], model.loops.jacobian(state))
         assert np.array_equal(model.loops.bias(q, v)[b], model.loops.bias(state))
+        assert np.array_equal(model.loops.rates(q, v)[b], model.loops.rates(state))
+        # sums of nv terms, in another order
+        for precision, eps in (("single", 2.0**-23), ("double", EPS), ("extended", EPS), ("quad", EPS)):
+            Q = model.loops.jacobian(state.q, precision=precision)
+            size = model.nv * eps * (np.abs(Q) @ np.abs(state.v))
+            assert (np.abs(model.loops.rates(state, precision=precision) - Q @ state.v) <= size).all()
+    assert model.loops.rates(q[:0], v[:0]).shape == (0, 6) and not model.loops.rates(q[1], np.zeros(model.nv)).any()
     assert model.loops.jacobian(q[:0]).shape == (0, 6, model.nv) and model.loops.bias(q[:0], v[:0]).shape == (0, 6)
     model.q, model.v = q[1], v[1]
     assert np.array_equal(model.loops.bias(), model.loops.bias(states[1])) and not model.loops.bias(q[1]).any()
     assert model.loops["gear"].slice == slice(5, 6) and np.array_equal(model.loops["gear"].jacobian(), model.loops.jacobian()[5:])
+    gear = model.loops["gear"]
+    model.loops.remove("pin")
+    assert gear.slice == slice(0, 1)  # of the rows that are left
 
 
 def test_no_loops_and_no_coordinates():
     empty = pc.Multibody("nothing", welds="keep")
-    assert empty.loops.residual().shape == (0,) and empty.loops.jacobian().shape == (0, 0) and empty.loops.rows == []
+    assert empty.loops.residual().shape == (0,) and empty.loops.jacobian().shape == (0, 0) and empty.loops.rates().shape == (0,)
     empty.add_body("block", hinge="weld", mass=1.0, position=(1, 0, 0))
     empty.add_loop("block", hinge="ball", name="stay")
     assert (
