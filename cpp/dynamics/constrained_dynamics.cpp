@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
+#include <limits>
 
 #include "algebra/trees/sweeps/articulated_inertia.h"
 #include "algebra/trees/sweeps/mass_matrix.h"
@@ -60,9 +60,8 @@ void ConstrainedWorkspace<S>::find_forces(const Asked& asked, const S* x, const 
 
 template <class S>
 void ConstrainedWorkspace<S>::factor(const S* bias) {
-  using std::sqrt;
   dense_.assign(model_->nv, S(0));
-  unit_.assign(loops_->rows, S(1));
+  unit_squares_.assign(loops_->rows, S(1));
   for (size_t g = 0; g < groups_.groups.size(); ++g) {
     const auto& group = groups_.groups[g];
     const int n = group.coordinates, m = static_cast<int>(group.rows.size());
@@ -80,22 +79,21 @@ void ConstrainedWorkspace<S>::factor(const S* bias) {
       // What rounding of the row itself is, by epsilon: of all entries at once, or of the largest by its own hinge's inertia.
       S square = S(0), own = S(0);
       for (const auto& e : rows_.entries[row]) dense_[e.coordinate] = e.size;
-      half_inverse_tip_to_base(*model_, blocks_, reach, dense_.data(), z_, epsilon_, [&](int k, int i, const S& w) {
-        square += w * w;
-        const S size = dense_[model_->v_offset[k] + i], d = model_->nv_of[k] == 1 ? blocks_.D[blocks_.d_offsets()[k]] : blocks_.pivots(k)[i];
-        own += size * size / d;
+      half_inverse_tip_to_base(*model_, blocks_, reach, dense_.data(), z_, epsilon_, [&](int k, int i, const S& epsilon, const S& d) {
+        const S size = dense_[model_->v_offset[k] + i];
+        square += epsilon * (epsilon / d), own += size * (size / d);
       });
-      const S unit = maximum(square, own) > S(0) ? S(sqrt(maximum(square, own))) : S(1);
-      const S per = S(1) / unit;
+      if (const S larger = maximum(square, own); larger > S(0)) unit_squares_[row] = larger;
       S left = S(0);
       systems_[g].add_column();
       for (const auto& e : rows_.entries[row]) dense_[e.coordinate] = e.value;
-      half_inverse_tip_to_base(*model_, blocks_, reach, dense_.data(), z_, epsilon_,
-                               [&](int k, int i, const S& w) { left += (w * per) * (w * per), systems_[g].add_entry(groups_.place[k] + i, w * per); });
+      half_inverse_tip_to_base(*model_, blocks_, reach, dense_.data(), z_, epsilon_, [&](int k, int i, const S& epsilon, const S& d) {
+        left += epsilon * (epsilon / d);
+        systems_[g].add_entry(groups_.place[k] + i, epsilon, d);
+      });
       for (const auto& e : rows_.entries[row]) dense_[e.coordinate] = S(0);
-      unit_[row] = unit;
-      if (left > rank_tolerance<S>() * rank_tolerance<S>())  // the next row takes the place of one that asks nothing here
-        scale_[c] = unit, active_[g].push_back(row);
+      if (left > rank_tolerance<S>() * rank_tolerance<S>() * unit_squares_[row])  // the next row takes the place of one that asks nothing here
+        scale_[c] = unit_squares_[row], active_[g].push_back(row);
       else
         systems_[g].drop_column();
     }
@@ -119,7 +117,7 @@ void ConstrainedWorkspace<S>::solve(const S* r, S* x) {
 template <class S>
 S ConstrainedWorkspace<S>::energy(const S* x) {
   S square = S(0);
-  half_inverse_tip_to_base(*model_, blocks_, all_, x, z_, epsilon_, [&](int, int, const S& w) { square += w * w; });
+  half_inverse_tip_to_base(*model_, blocks_, all_, x, z_, epsilon_, [&](int, int, const S& epsilon, const S& d) { square += epsilon * (epsilon / d); });
   return square;
 }
 
@@ -149,10 +147,11 @@ void ConstrainedWorkspace<S>::meet(const S* target, bool first) {
     for (size_t c = 0; c < m; ++c) part_[active_[g][c]] = scale_[c];
     if (!first) continue;
     S size = S(0);
-    for (const int row : rows) size = maximum(size, S((rows_.product_size(row, x_.data()) + bias_[row]) / unit_[row]));
-    for (const int row : rows) sizes_[row] = size, off_[row] = abs(asked(row)) / unit_[row];
+    for (const int row : rows) size = maximum(size, S((rows_.product_size(row, x_.data()) + bias_[row]) / unit(row)));
+    for (const int row : rows) sizes_[row] = size, off_[row] = abs(asked(row)) / unit(row);
     for (size_t c = 0; c < m; ++c) off_[active_[g][c]] = abs(conflict_[c]);
     for (const int row : rows) {
+      if (vanishes(off_[row])) continue;
       if (off_[row] <= certified() * size) off_[row] = S(0);
       worst = maximum(worst, off_[row]);
     }
@@ -221,16 +220,17 @@ bool ConstrainedWorkspace<S>::sure(const Asked& asked, const Applied<S>& applied
   using std::abs, std::sqrt;
   const int nv = model_->nv;
   if (std::any_of(x_.begin(), x_.end(), [](const S& x) { return !is_finite(x); })) return true;  // batches say what left its range
+  if (is_recorded<S> && !refuse) return sure_by_squares(asked, applied);
   off_.assign(loops_->rows, S(0));
   S worst = S(0);
   for (const auto& rows : asking_) {
     S size = S(0);  // what has cancelled in the rows: the tree's own accelerations, or those of the result
     for (const int row : rows) {
-      size = maximum(size, S((rows_.product_size(row, x_.data()) + bias_[row]) / unit_[row]));
-      if (!is_recorded<S>) size = maximum(size, sizes_[row]);
+      size = maximum(size, S((rows_.product_size(row, x_.data()) + bias_[row]) / unit(row)));
+      size = maximum(size, sizes_[row]);
     }
     for (const int row : rows) {
-      const S left = abs(rows_.product(row, x_.data()) + c_[row]) / unit_[row];
+      const S left = abs(rows_.product(row, x_.data()) + c_[row]) / unit(row);
       if (left <= certified() * size) continue;
       off_[row] = left;
       worst = maximum(worst, left);
@@ -248,7 +248,7 @@ bool ConstrainedWorkspace<S>::sure(const Asked& asked, const Applied<S>& applied
   const S missed = energy(load_.data());
   // Of less than all that has cancelled, and by squares, which say the same but for factors up to √2: no roots are taken.
   bool small = missed <= certified() * certified() * (carried + driven);
-  if (!small && !is_recorded<S>) {  // costs as much again: recorded numbers leave it to the call itself
+  if (!small) {  // costs as much again
     off_.assign(nv, S(0));
     find_forces(asked, off_.data(), applied);
     small = sqrt(missed) <= certified() * (sqrt(carried) + sqrt(driven) + sqrt(energy(generalized_.data())));
@@ -264,6 +264,40 @@ bool ConstrainedWorkspace<S>::sure(const Asked& asked, const Applied<S>& applied
                           "' (take refine='auto', or a wider precision)");
   }
   return true;
+}
+
+// The same of numbers that are written down, for which it is a large part of all: of rows by squares, which take no roots, of motion by the energy
+// that its forces would give each hinge by itself, with all inboard of it at rest, which takes no sweeps. What has cancelled is what the result is made of.
+template <class S>
+bool ConstrainedWorkspace<S>::sure_by_squares(const Asked& asked, const Applied<S>& applied) {
+  const S bound = certified() * certified(), most = S(std::numeric_limits<double>::max());
+  for (const auto& rows : asking_) {
+    S size = S(0);
+    for (const int row : rows) {
+      const S own = rows_.product_size(row, x_.data()) + bias_[row];
+      size = maximum(size, S(own * own / unit_squares_[row]));
+    }
+    if (!rows.empty() && !(size <= most)) return false;
+    for (const int row : rows) {
+      const S left = rows_.product(row, x_.data()) + c_[row];
+      if (!(left * left <= bound * size * unit_squares_[row])) return false;
+    }
+  }
+  load_.assign(model_->nv, S(0));
+  rows_.add_transposed(lambda_.data(), load_.data());
+  const S size = energy_of_hinges(load_.data()) + energy_of_hinges(asked.tau);
+  find_forces(asked, x_.data(), applied);
+  for (int i = 0; i < model_->nv; ++i) load_[i] += asked.tau[i] - generalized_[i];
+  return energy_of_hinges(load_.data()) <= bound * size && size <= most;
+}
+
+template <class S>
+S ConstrainedWorkspace<S>::energy_of_hinges(const S* x) {
+  S sum = S(0);
+  delta_.assign(x, x + model_->nv);
+  for (int k = 0; k < model_->bodies; ++k) blocks_.solve_D_in_place(k, delta_.data() + model_->v_offset[k], 1);
+  for (int i = 0; i < model_->nv; ++i) sum += x[i] * delta_[i];
+  return sum;
 }
 
 template <class S>

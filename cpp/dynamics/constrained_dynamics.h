@@ -81,6 +81,7 @@ class ConstrainedWorkspace {
   void correct(const Asked& asked, const Applied<S>& applied);
   void add_correction();
   bool sure(const Asked& asked, const Applied<S>& applied, bool refuse);
+  bool sure_by_squares(const Asked& asked, const Applied<S>& applied);
   // The most by which what is returned may miss a row or an equation of motion, of the largest number in it.
   static S certified() { return S(64) * rank_tolerance<S>(); }
   void close(S* q);
@@ -90,6 +91,11 @@ class ConstrainedWorkspace {
   static S largest(const std::vector<S>& of);
   void solve(const S* r, S* x);
   S energy(const S* x);                       // x* (ℳ + J)⁻¹ x
+  S energy_of_hinges(const S* x);             // x* D⁻¹ x
+  S unit(int row) const {                     // of a row: what its rounding is, by epsilon
+    using std::sqrt;
+    return sqrt(unit_squares_[row]);
+  }
   [[noreturn]] void refuse_rows(const std::vector<S>& off, const S& worst, const char* what) const;
 
   const Multibody& source_;
@@ -107,7 +113,7 @@ class ConstrainedWorkspace {
   std::vector<std::vector<int>> active_;      // of those: rows of which columns are not rounding
   std::vector<int> all_, loop_of_;            // bodies, tips first; of rows
   std::vector<Vector6<S>> z_, alpha_;
-  std::vector<S> x_, lambda_, c_, unit_, dense_, epsilon_, scratch_, target_, part_, b_, conflict_, scale_, sizes_, off_, r_, delta_, bias_, moved_, gone_, slip_, added_, generalized_, before_, load_;
+  std::vector<S> x_, lambda_, c_, unit_squares_, dense_, epsilon_, scratch_, target_, part_, b_, conflict_, scale_, sizes_, off_, r_, delta_, bias_, moved_, gone_, slip_, added_, generalized_, before_, load_;
   const HingeTerms terms_;
   std::unique_ptr<RigidDynamics<Wider<S>>> wider_;
 };

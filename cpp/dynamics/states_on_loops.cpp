@@ -59,9 +59,9 @@ void ConstrainedWorkspace<S>::project(const std::shared_ptr<const ResolvedLoops>
   S worst = S(0);
   for (const auto& group : groups_.groups) {
     S size = S(0);
-    for (const int row : group.rows) size = maximum(size, S(bias_[row] / unit_[row]));
+    for (const int row : group.rows) size = maximum(size, S(bias_[row] / unit(row)));
     for (const int row : group.rows)
-      if (const S left = abs(rows_.product(row, x_.data())) / unit_[row]; !(left <= certified() * size)) off_[row] = left == left ? left : S(1), worst = maximum(worst, off_[row]);
+      if (const S left = abs(rows_.product(row, x_.data())) / unit(row); !(left <= certified() * size)) off_[row] = left == left ? left : S(1), worst = maximum(worst, off_[row]);
   }
   if (worst > S(0)) refuse_rows(off_, worst, "no sure velocities on the loops, near a singular state or by rounding (take a wider precision): off are rows");
 }

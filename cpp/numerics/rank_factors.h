@@ -10,6 +10,7 @@
 
 #include "numerics/decisions.h"
 #include "numerics/scalar.h"
+#include "numerics/weighted_gram_schmidt.h"
 
 namespace pycraft {
 
@@ -100,7 +101,7 @@ struct Reflections {
   }
 };
 
-// W*W λ = b with W = V diag(unit), V (n x m) given column by column: λ of the least 2-norm where W has dependent columns.
+// W*W λ = b with W = V diag(unit), W (n x m) given column by column: λ of the least 2-norm where W has dependent columns.
 //
 //   V Π = Q R,   R* y = b/unit in the sense of least squares, by R* = Z T:  y = T⁻¹ Z* (b/unit)      what is left is the conflict in b
 //   R Π* diag(unit) λ = y of the least norm, by (R Π* diag(unit))* = Z' T':  λ = Z' T'⁻* y
@@ -110,26 +111,35 @@ struct Reflections {
 // More than `few` columns are tried in an order in which neighbours share rows, without pivoting, inside the envelope: rows in the order of the
 // first column that has them, so that column j is reflected at rows from `top` to `bottom` alone. For columns in a row, each beside a few others,
 // as of the loops of a ladder, the cost is m. Where a column has less than a thousand tolerances left, or rows run out, all are factored by pivoting.
+// Recorded columns are always tried in an order; few of them are made orthogonal without a root (weighted_gram_schmidt.h).
 template <class S>
 class MinimumNormSystem {
  public:
-  static constexpr int few = 32;
-  // Columns are given one after the other, with the rows that they have.
+  static constexpr int few = 32, few_recorded = 8;
+  // Columns are given one after the other, each by the rows that it has: number/√size.
   void begin(int n) { n_ = n, count_ = 0; }
   void add_column() {
     if (static_cast<int>(given_.size()) == count_) given_.emplace_back();
     given_[count_++].clear();
   }
-  void add_entry(int row, const S& value) { given_[count_ - 1].emplace_back(row, value); }
+  void add_entry(int row, const S& number, const S& size) { given_[count_ - 1].push_back({row, number, size}); }
   void drop_column() { --count_; }
-  int rank() const { return V_.rank; }
-  void factor(const S* unit, const S& tolerance) {
+  int rank() const { return orthogonal_ ? count_ : V_.rank; }
+  // unit_squares (m); tolerance: of columns of V
+  void factor(const S* unit_squares, const S& tolerance) {
+    using std::sqrt;
     const int m = count_;
-    unit_.assign(unit, unit + m);
+    orthogonal_ = is_recorded<S> && m <= few_recorded && make_orthogonal(unit_squares, S(1000) * tolerance);
+    if (orthogonal_) return;
+    unit_.resize(m);
+    for (int j = 0; j < m; ++j) {
+      unit_[j] = sqrt(unit_squares[j]);
+      for (Entry& e : given_[j]) e.number /= sqrt(e.size) * unit_[j];
+    }
     if ((m > few || is_recorded<S>) && factor_in_order(S(1000) * tolerance)) return;
     V_.resize(n_, m);
     for (int j = 0; j < m; ++j)
-      for (const auto& [i, value] : given_[j]) V_.at(i, j) = value;
+      for (const Entry& e : given_[j]) V_.at(e.row, j) = e.number;
     V_.factor(true, tolerance);
     if (V_.rank == m) return;
     Z_.resize(m, V_.rank), scaled_.resize(m, V_.rank);
@@ -143,8 +153,9 @@ class MinimumNormSystem {
   // conflict (m): what of b/unit no λ can meet.
   void solve(const S* b, S* lambda, S* conflict) {
     const int m = count_, r = V_.rank;
-    x_.resize(m), y_.assign(m, S(0));
     std::fill_n(conflict, m, S(0));
+    if (orthogonal_) return columns_.solve(b, lambda);
+    x_.resize(m), y_.assign(m, S(0));
     for (int i = 0; i < m; ++i) x_[i] = b[V_.order[i]] / unit_[V_.order[i]];
     if (r == m) {
       V_.solve_transposed(x_.data()), V_.solve(x_.data());
@@ -161,17 +172,30 @@ class MinimumNormSystem {
   }
 
  private:
+  struct Entry {
+    int row;
+    S number, size;
+  };
+  bool make_orthogonal(const S* unit_squares, const S& tolerance) {
+    columns_.resize(n_, count_);
+    for (int j = 0; j < count_; ++j)
+      for (const Entry& e : given_[j]) columns_.at(e.row, j) = e.number, columns_.size(e.row) = e.size;
+    columns_.factor();
+    for (int j = 0; j < count_; ++j)
+      if (!(columns_.square(j) > tolerance * tolerance * unit_squares[j])) return false;
+    return true;
+  }
   bool factor_in_order(const S& tolerance) {
     using std::abs;
     const int m = count_;
     std::vector<int> order(m), lowest(m, n_), first(n_, m), last(n_, -1), row(n_), place(n_);
     for (int j = 0; j < m; ++j) {
       order[j] = j;
-      for (const auto& [i, value] : given_[j]) lowest[j] = std::min(lowest[j], i);
+      for (const Entry& e : given_[j]) lowest[j] = std::min(lowest[j], e.row);
     }
     std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return lowest[a] < lowest[b]; });
     for (int j = 0; j < m; ++j)
-      for (const auto& [i, value] : given_[order[j]]) first[i] = std::min(first[i], j), last[i] = std::max(last[i], j);
+      for (const Entry& e : given_[order[j]]) first[e.row] = std::min(first[e.row], j), last[e.row] = std::max(last[e.row], j);
     for (int i = 0; i < n_; ++i) row[i] = i;
     std::stable_sort(row.begin(), row.end(), [&](int a, int b) { return first[a] < first[b]; });
     for (int i = 0; i < n_; ++i) place[row[i]] = i;
@@ -186,7 +210,7 @@ class MinimumNormSystem {
     }
     V_.reserve(n_);
     for (int j = 0; j < m; ++j)
-      for (const auto& [i, value] : given_[order[j]]) V_.at(place[i], j) = value;
+      for (const Entry& e : given_[order[j]]) V_.at(place[e.row], j) = e.number;
     V_.order = order;
     V_.factor(false, tolerance);
     if (V_.rank < m) return false;
@@ -194,7 +218,9 @@ class MinimumNormSystem {
   }
 
   int n_ = 0, count_ = 0;
-  std::vector<std::vector<std::pair<int, S>>> given_;
+  bool orthogonal_ = false;
+  std::vector<std::vector<Entry>> given_;
+  WeightedGramSchmidt<S> columns_;
   Reflections<S> V_, Z_, scaled_;
   std::vector<S> unit_, x_, y_;
 };

@@ -153,11 +153,10 @@ struct LoopGroups {
   }
 };
 
-// D^-½ [I - HψK] x over these bodies, tips first; out(k, i, w): of coordinate i of body k. z: scratch, one Vector6 per body.
+// L⁻¹ [I - HψK] x over these bodies, tips first; out(k, i, ε, d): of coordinate i of body k, which D^-½ has as ε/√d. z: scratch, one Vector6 per body.
 template <class S, class F>
 void half_inverse_tip_to_base(const CompiledModel<S>& model, const RigidBlocks<S>& blocks, const std::vector<int>& bodies, const S* x, std::vector<Vector6<S>>& z,
                               std::vector<S>& epsilon, F out) {
-  using std::sqrt;
   for (const int k : bodies) z[k] = Vector6<S>::zero();
   for (const int k : bodies) {
     const int first = model.v_offset[k], n = model.nv_of[k];
@@ -170,11 +169,10 @@ void half_inverse_tip_to_base(const CompiledModel<S>& model, const RigidBlocks<S
     }
     const size_t d = blocks.d_offsets()[k];
     if (n == 1) {
-      const S by = S(1) / sqrt(blocks.D[d]);  // of all rows
-      out(k, 0, S(epsilon[0] * by));
+      out(k, 0, epsilon[0], blocks.D[d]);
     } else {
       forward_substitute(blocks.L.data() + d, n, epsilon.data(), 1);
-      for (int i = 0; i < n; ++i) out(k, i, S(epsilon[i] / sqrt(blocks.pivots(k)[i])));
+      for (int i = 0; i < n; ++i) out(k, i, epsilon[i], blocks.pivots(k)[i]);
     }
     if (const int p = model.parent[k]; p >= 0) z[p] = z[p] + force_to_parent(blocks.pose[k], plus);
   }

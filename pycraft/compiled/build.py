@@ -18,8 +18,9 @@ from pathlib import Path
 from .. import _core
 
 _NATIVE = "-mcpu=native" if platform.machine() in ("arm64", "aarch64") else "-march=native"
-FLAGS = ("-std=c++20", "-O2", _NATIVE, "-ffp-contract=fast", "-fno-math-errno", "-fPIC", "-shared")
-"""Products are contracted with sums where the machine has such an instruction; nothing else of IEEE 754 is given up."""
+FLAGS = ("-std=c++20", "-O2", _NATIVE, "-ffp-contract=fast", "-fno-math-errno", "-fno-tree-slp-vectorize", "-fPIC", "-shared")
+"""Products are contracted with sums where the machine has such an instruction; nothing else of IEEE 754 is given up.
+Neighbours in a formula are not made vectors of: what shuffles them costs more than it brings."""
 
 
 def compiler() -> list[str]:

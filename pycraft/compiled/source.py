@@ -40,12 +40,10 @@ def _headers() -> str:
 def written(graph: Graph, results: np.ndarray, arguments: Sequence[tuple[str, int]], title: str) -> tuple[str, int]:
     """The source, and how many operations a state takes. `arguments`: names and widths of the inputs, `results` nodes of any shape."""
     lines = _Lines(graph, results.ravel().tolist())
-    places = [f"from[{i}]" for i in range(len(arguments))]
     blanks = {
         "@INPUTS@": max(sum(n for _, n in arguments), 1),
         "@OUTPUTS@": max(results.size, 1),
         "@ARRAYS@": len(arguments),
-        "@PLACES@": ", ".join([*places, "y"]),
         "@FUNCTION@": FUNCTION,
     }
     loop = _runtime("loop.h")

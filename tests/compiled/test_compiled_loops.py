@@ -128,6 +128,36 @@ def test_where_it_is_not_sure_the_call_answers(left):
         compiled(flat, np.array([1.0, -1.0, 1.0]), still, out=np.empty(4))
 
 
+@pytest.mark.parametrize("masses", [(1, 1e6, 1e-6), (1e-6, 1e-6, 1e12), (1e12, 1e-6, 1), (1e-6, 1e12, 1)])
+def test_heavy_and_light_rods_keep_what_the_certificates_promise(masses):
+    """Against four times the digits: 64 √ε of the largest, as cpp/dynamics/constrained_dynamics.h has it."""
+    model = n_four_bar(1)
+    model.gravity = (0, -9.81, 0)
+    for body, mass in zip(model.bodies, masses, strict=True):
+        model.bodies[body].inertia = mass * np.array(model.bodies[body].inertia)
+        model.bodies[body].mass *= mass
+    graph, results = loops_graph(model, 400_000)
+    rng = np.random.default_rng(1)
+    angles, speeds = rng.uniform(0.4, 2.6, 8), rng.normal(size=8)
+    Q, V = (np.column_stack([x, -x, x]) for x in (angles, speeds))
+    U = rng.normal(size=(8, 3))
+    found, sound = evaluated(graph, results, {"q": Q, "v": V, "tau": U})
+    wanted = model.constrained_dynamics(Q, V, U, precision="quad").vdot
+    assert sound.all() and np.abs(found - wanted).max() <= 64 * np.sqrt(EPS) * np.abs(wanted).max()
+
+
+def test_what_leaves_the_range_of_its_certificates_is_left_to_the_call(left):
+    """Squares of what has cancelled are no numbers there: they would say yes to anything."""
+    model = slider_crank()
+    compiled, q, still = model.compile("constrained_dynamics"), np.array(model.q), np.zeros(model.nv)
+    moving = model.assemble(model.q, np.ones(model.nv)).v
+    for count, (v, tau) in enumerate(((1e78 * moving, still), (still, 1e155 * np.arange(1.0, model.nv + 1))), 1):
+        wanted = model.constrained_dynamics(q, v, tau).vdot
+        assert np.array_equal(compiled(q, v, tau), wanted) and len(left) == count
+        near = compiled(q, 1e-10 * v, 1e-20 * tau)  # ten digits further in
+        assert np.abs(near - 1e-20 * wanted).max() <= 1e-20 * bound(model, [q]) * np.abs(wanted).max() and len(left) == count
+
+
 def test_a_state_that_misses_its_rows_is_refused_as_by_the_call(left):
     """Rows that ask different accelerations of one motion: two gears of one pair that disagree at speed."""
     model = pc.chain(2)

@@ -1,32 +1,41 @@
-// `taken` states from state b on; how many of them are in doubt: where a guard fails, or an input or a result is not finite.
-template <class S>
-inline std::int64_t run(const double* const* given, const std::int64_t* strides, double* out, std::int64_t b, int taken) {
-  S y[@OUTPUTS@], odd = S{};
-  const S* from[@ARRAYS@ + 1];
-  [[maybe_unused]] S input[lanes<S> == 1 ? 1 : @INPUTS@];
-  for (int i = 0, first = 0; i < @ARRAYS@; first += widths[i++]) {
-    const double* const array = given[i] + b * strides[i];
-    if constexpr (lanes<S> == 1) from[i] = array;
-    else {
-      from[i] = input + first;
-      for (int j = 0; j < widths[i]; ++j)
-        for (int l = 0; l < lanes<S>; ++l) input[first + j][l] = array[(l < taken ? l : taken - 1) * strides[i] + j];
-    }
-    for (int j = 0; j < widths[i]; ++j) odd += from[i][j] - from[i][j];
+// Zero where all n are finite, else not a number: sums of x - x side by side, as each waits for those that it is made of.
+template <int n, class T>
+inline T odd_of(const T* x) {
+  if constexpr (n == 0) return T{};
+  else if constexpr (n == 1) return x[0] - x[0];
+  else if constexpr (n > 32) {
+    T sum = odd_of<n % 8>(x);
+    for (int i = n % 8; i < n; i += 8) sum += odd_of<8>(x + i);
+    return sum;
+  } else return odd_of<n / 2>(x) + odd_of<n - n / 2>(x + n / 2);
+}
+
+// One state, from and to the caller's own arrays: what goes by others waits for them. 1 where it is in doubt: a guard fails, or an input or a result
+// is not finite.
+template <int... i>
+inline std::int64_t run_one(const double* const* given, double* y, std::integer_sequence<int, i...>) {
+  const bool held = evaluate<double>(given[i]..., y);
+  return !(held & ((odd_of<widths[i]>(given[i]) + ... + odd_of<@OUTPUTS@>(y)) == 0));
+}
+
+// `taken` states from state b on; how many of them are in doubt.
+template <int... i>
+inline std::int64_t run(const double* const* given, const std::int64_t* strides, double* out, std::int64_t b, int taken, std::integer_sequence<int, i...>) {
+  Pack y[@OUTPUTS@], input[@INPUTS@];
+  const Pack* from[@ARRAYS@ + 1];
+  for (int k = 0, first = 0; k < @ARRAYS@; first += widths[k++]) {
+    const double* const array = given[k] + b * strides[k];
+    from[k] = input + first;
+    for (int j = 0; j < widths[k]; ++j)
+      for (int l = 0; l < width; ++l) input[first + j][l] = array[(l < taken ? l : taken - 1) * strides[k] + j];
   }
-  const auto held = evaluate<S>(@PLACES@);
-  for (int i = 0; i < @OUTPUTS@; ++i) odd += y[i] - y[i];
-  const auto sound = held & (odd == S{});
+  const auto held = evaluate<Pack>(from[i]..., y);
+  const auto sound = held & ((odd_of<widths[i]>(from[i]) + ... + odd_of<@OUTPUTS@>(y)) == Pack{});
   std::int64_t doubted = 0;
   double* const to = out + b * @OUTPUTS@;
-  if constexpr (lanes<S> == 1) {
-    for (int i = 0; i < @OUTPUTS@; ++i) to[i] = y[i];
-    doubted = !sound;
-  } else {
-    for (int l = 0; l < taken; ++l) {
-      for (int i = 0; i < @OUTPUTS@; ++i) to[l * @OUTPUTS@ + i] = y[i][l];
-      doubted += !sound[l];
-    }
+  for (int l = 0; l < taken; ++l) {
+    for (int j = 0; j < @OUTPUTS@; ++j) to[l * @OUTPUTS@ + j] = y[j][l];
+    doubted += !sound[l];
   }
   return doubted;
 }
@@ -35,8 +44,9 @@ inline std::int64_t run(const double* const* given, const std::int64_t* strides,
 
 // Input i of state b lies at given[i] + b strides[i], its @OUTPUTS@ results at out + @OUTPUTS@ b. How many states are in doubt.
 extern "C" std::int64_t @FUNCTION@(const double* const* given, const std::int64_t* strides, double* out, std::int64_t states) {
-  if (states == 1) return run<double>(given, strides, out, 0, 1);
+  constexpr std::make_integer_sequence<int, @ARRAYS@> all;
+  if (states == 1) return run_one(given, out, all);
   std::int64_t doubted = 0;
-  for (std::int64_t b = 0; b < states; b += width) doubted += run<Pack>(given, strides, out, b, static_cast<int>(states - b < width ? states - b : width));
+  for (std::int64_t b = 0; b < states; b += width) doubted += run(given, strides, out, b, static_cast<int>(states - b < width ? states - b : width), all);
   return doubted;
 }

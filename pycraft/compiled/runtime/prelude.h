@@ -43,11 +43,13 @@ template <class S>
 inline S sine_of(const S& x) { return sine_cosine(wide(x)).sine.v; }
 template <class S>
 inline S cosine_of(const S& x) { return sine_cosine(wide(x)).cosine.v; }
-// As many angles as a pack has, from `first` on, side by side: put together in registers, as what goes by memory waits for it.
+// As many angles as n numbers have, up to a pack, from `first` on, side by side: put together in registers, as what goes by memory waits for it.
 template <int first, int n, int... b>
 inline void pack_of_sines_and_cosines(const double (&angle)[n], double (&s)[n], double (&c)[n], std::integer_sequence<int, b...>) {
   constexpr auto there = [](int i) { return first + i < n ? first + i : n - 1; };
-  const auto of = sine_cosine(wide(Pack{angle[there(b)]...}));
+  Lanes<double, sizeof...(b)> some;
+  some.v = decltype(some.v){angle[there(b)]...};
+  const auto of = sine_cosine(some);
   ((s[there(b)] = of.sine.lane(b), c[there(b)] = of.cosine.lane(b)), ...);
 }
 // Of n angles: packs of states angle by angle; of one state, several angles at once.
@@ -59,7 +61,8 @@ inline void sines_and_cosines(const S (&angle)[n], S (&s)[n], S (&c)[n]) {
       s[i] = of.sine.v, c[i] = of.cosine.v;
     }
   } else if constexpr (first < n) {
-    pack_of_sines_and_cosines<first>(angle, s, c, std::make_integer_sequence<int, width>());
-    sines_and_cosines<first + width>(angle, s, c);
+    constexpr int left = n - first, some = left > 4 ? width : left > 2 && width > 2 ? 4 : 2;
+    pack_of_sines_and_cosines<first>(angle, s, c, std::make_integer_sequence<int, some>());
+    sines_and_cosines<first + some>(angle, s, c);
   }
 }
