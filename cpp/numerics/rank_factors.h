@@ -115,7 +115,7 @@ struct Reflections {
 template <class S>
 class MinimumNormSystem {
  public:
-  static constexpr int few = 32, few_recorded = 8;
+  static constexpr int few = 32, few_recorded = 16;
   // Columns are given one after the other, each by the rows that it has: number/√size.
   void begin(int n) { n_ = n, count_ = 0; }
   void add_column() {

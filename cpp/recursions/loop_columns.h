@@ -153,6 +153,12 @@ struct LoopGroups {
   }
 };
 
+// d: D(k) = L d L*.
+template <class S>
+const S& pivot(const CompiledModel<S>& model, const RigidBlocks<S>& blocks, int k, int i) {
+  return model.nv_of[k] == 1 ? blocks.D[blocks.d_offsets()[k]] : blocks.pivots(k)[i];
+}
+
 // L⁻¹ [I - HψK] x over these bodies, tips first; out(k, i, ε, d): of coordinate i of body k, which D^-½ has as ε/√d. z: scratch, one Vector6 per body.
 template <class S, class F>
 void half_inverse_tip_to_base(const CompiledModel<S>& model, const RigidBlocks<S>& blocks, const std::vector<int>& bodies, const S* x, std::vector<Vector6<S>>& z,
@@ -167,13 +173,8 @@ void half_inverse_tip_to_base(const CompiledModel<S>& model, const RigidBlocks<S
       epsilon[i] = x[first + i] - dot(blocks.H[first + i], zk);
       plus = plus + epsilon[i] * blocks.G[first + i];
     }
-    const size_t d = blocks.d_offsets()[k];
-    if (n == 1) {
-      out(k, 0, epsilon[0], blocks.D[d]);
-    } else {
-      forward_substitute(blocks.L.data() + d, n, epsilon.data(), 1);
-      for (int i = 0; i < n; ++i) out(k, i, epsilon[i], blocks.pivots(k)[i]);
-    }
+    if (n > 1) forward_substitute(blocks.L.data() + blocks.d_offsets()[k], n, epsilon.data(), 1);
+    for (int i = 0; i < n; ++i) out(k, i, epsilon[i], pivot(model, blocks, k, i));
     if (const int p = model.parent[k]; p >= 0) z[p] = z[p] + force_to_parent(blocks.pose[k], plus);
   }
 }
