@@ -18,9 +18,11 @@ CHANGES = {
         ),
         (
             "residuals of loops are measured by what is left",
-            "if (!is_recorded<S>) size = maximum(size, sizes_[row]);",
-            "",
+            "size = maximum(size, sizes_[row]);",
+            ";",
+            STATEMENT,
         ),
+        ("squares of recorded motion that are no numbers are trusted", "<= bound * size && size <= most", "<= bound * size"),
         ("what implicit steps add is not in the residual", "generalized_[j] += added_[j] * x[j];", "static_cast<void>(x);", STATEMENT),
     ],
     "cpp/dynamics/constrained_dynamics.h": [
@@ -130,6 +132,9 @@ CHANGES = {
     "cpp/recursions/loop_tangents.h": [
         ("∂Q of functions without their second derivatives", "of_function(loop, put);", ";", STATEMENT),
         ("∂∂Q of functions without their third derivatives", "third[(i * n + j) * n + k] * rates[k]", "0.0"),
+    ],
+    "cpp/numerics/weighted_gram_schmidt.h": [
+        ("columns made orthogonal stay as they are", "at(k, j) -= u * at(k, i);", ";", STATEMENT),
     ],
     "cpp/numerics/rank_factors.h": [
         ("multipliers are the least in units of rounding", "unit_[V_.order[i]] * V_.upper(j, i)", "V_.upper(j, i)"),

@@ -139,5 +139,5 @@ def test_a_torque_beyond_all_measure_ends_the_run_with_its_time(torque, integrat
     scene = pc.Scene(model)
     scene.add(pc.effects.Loop())
     scene.add(pc.effects.TorqueSource(torque, "crank0"))
-    with pytest.raises(pc.EvaluationError, match=r"at t = .* s, without the error estimate reaching .*'crank0' changes fastest"):
+    with pytest.raises(pc.EvaluationError, match=r"at t = .* s, without the error estimate reaching .*'crank[01]' changes fastest"):
         scene.simulate(0.01, integrator=integrator, progress=False)
