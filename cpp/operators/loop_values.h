@@ -22,13 +22,11 @@ template <class S, class F>
 void loop_rows_on_ends(const CompiledModel<S>& model, const ResolvedLoops& loops, const S* q, LoopBuffers<S>& w, F put) {
   for (const ResolvedLoop& loop : loops.loops) {
     if (loop.loop->is_coupling()) continue;
-    const auto m = along<S>(loop.path, MotionPart::pose, [&](const FrameStep& step) { return loop_step<S>(model, step, q, nullptr, MotionPart::pose, w.hinge, w); });
-    std::fill_n(w.rows, loop.rows, PairRow<S>());
-    pair_rows(loop.loop->pair, m, w.rows);
+    const Pose<S> X = find_rows(model, loop, q, static_cast<const S*>(nullptr), MotionPart::pose, w).X;
     for (int i = 0; i < loop.rows; ++i) {
       const Vector6<S>& g = w.rows[i].gradient;
       put(loop, 1, loop.first_row + i, force_to_parent(renormalised<S>(loop.loop->pair.end_b), g));
-      put(loop, 0, loop.first_row + i, S(-1) * force_to_parent(renormalised<S>(loop.loop->pair.end_a), force_to_parent(m.X, g)));
+      put(loop, 0, loop.first_row + i, S(-1) * force_to_parent(renormalised<S>(loop.loop->pair.end_a), force_to_parent(X, g)));
     }
   }
 }

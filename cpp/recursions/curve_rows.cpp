@@ -3,8 +3,7 @@
 #include <array>
 
 #include "model/curve.h"
-#include "numerics/recorded.h"
-#include "numerics/tangent.h"
+#include "recursions/carried.h"
 #include "recursions/motion_functions.h"
 #include "runtime/errors.h"
 
@@ -90,16 +89,6 @@ void curve_rows(const Curve&, const RelativeMotion<Recorded>&, Recorded*, Vector
 }
 
 #define PYCRAFT_CURVE_ROWS(S) template void curve_rows(const Curve&, const RelativeMotion<S>&, S*, Vector6<S>*, S*);
-template <class S>
-using First = Tangent<S, 1>;
-#define PYCRAFT_CURVE_ROWS_AND_DERIVATIVES(S) \
-  PYCRAFT_CURVE_ROWS(S)                       \
-  PYCRAFT_CURVE_ROWS(First<S>)                \
-  PYCRAFT_CURVE_ROWS(First<First<S>>)
-PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_CURVE_ROWS_AND_DERIVATIVES)
-using Derivatives = Tangent<double, 4>;  // as effects of scenes carry them
-using SecondDerivatives = Tangent<Derivatives, 4>;
-PYCRAFT_CURVE_ROWS(Derivatives)
-PYCRAFT_CURVE_ROWS(SecondDerivatives)
+PYCRAFT_FOR_EACH_CARRIED(PYCRAFT_CURVE_ROWS)
 
 }  // namespace pycraft

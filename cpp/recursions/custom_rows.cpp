@@ -8,8 +8,7 @@
 #include "model/configuration.h"
 #include "model/hinge_kinematics.h"
 #include "model/spanned_twists.h"
-#include "numerics/recorded.h"
-#include "numerics/tangent.h"
+#include "recursions/carried.h"
 #include "runtime/errors.h"
 
 namespace pycraft {
@@ -251,15 +250,6 @@ void custom_rows(const Multibody&, const Pose<Recorded>&, const Vector6<Recorded
 }
 
 #define PYCRAFT_CUSTOM_ROWS(S) template void custom_rows(const Multibody&, const Pose<S>&, const Vector6<S>&, S*, Vector6<S>*, S*);
-#define PYCRAFT_CUSTOM_ROWS_AND_DERIVATIVES(S) \
-  PYCRAFT_CUSTOM_ROWS(S)                       \
-  template void custom_rows(const Multibody&, const Pose<Tangent<S, 1>>&, const Vector6<Tangent<S, 1>>&, Tangent<S, 1>*, Vector6<Tangent<S, 1>>*, Tangent<S, 1>*); \
-  template void custom_rows(const Multibody&, const Pose<Tangent<Tangent<S, 1>, 1>>&, const Vector6<Tangent<Tangent<S, 1>, 1>>&, Tangent<Tangent<S, 1>, 1>*, \
-                            Vector6<Tangent<Tangent<S, 1>, 1>>*, Tangent<Tangent<S, 1>, 1>*);
-PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_CUSTOM_ROWS_AND_DERIVATIVES)
-using Derivatives = Tangent<double, 4>;  // as effects of scenes carry them
-using SecondDerivatives = Tangent<Derivatives, 4>;
-PYCRAFT_CUSTOM_ROWS(Derivatives)
-PYCRAFT_CUSTOM_ROWS(SecondDerivatives)
+PYCRAFT_FOR_EACH_CARRIED(PYCRAFT_CUSTOM_ROWS)
 
 }  // namespace pycraft

@@ -131,10 +131,10 @@ def four_bar_by_hand(seconds: float = 0.1) -> Figure:
     if not np.abs(by_hand - wanted).max() <= 1e-10 * np.abs(wanted).max():  # rounding times what an angle of 0.4 rad leaves of rows
         raise _core.EvaluationError("a four-bar's own equations and its accelerations disagree, in the run that times them")
 
-    def elapsed_in_core(place: str) -> float:
-        return _core.time_compiled(place, FUNCTION, given, 3, seconds)["median"]
+    def clock(place: str) -> Callable[[float], dict[str, float]]:
+        return lambda seconds: _core.time_compiled(place, FUNCTION, given, 3, seconds)
 
-    own, other = (elapsed_in_core(place) for place in (str(compiled.library), library))
+    own, other = in_turn(seconds, clock(str(compiled.library)), clock(library))
     told = f"{1e9 * own:.0f} and {1e9 * other:.0f} ns"
     return Figure("dynamics on loops, a four-bar compiled, over its equations by SymPy, compiled", own / other, "x", BY_HAND, told)
 

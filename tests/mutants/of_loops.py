@@ -126,7 +126,7 @@ CHANGES = {
             STATEMENT,
         ),
     ],
-    "cpp/recursions/loop_rows.h": [
+    "cpp/recursions/loop_pairs.cpp": [
         ("rows of H inboard of a twist stay", "hinge.rows[j] = hinge.rows[j] - cross_motion(xi, hinge.rows[j]);", ";", STATEMENT),
     ],
     "cpp/recursions/loop_tangents.h": [

@@ -65,9 +65,7 @@ class BoundPenalty : public BoundEffect<S> {
       for (size_t i = 0; i < loop.v.size(); ++i) rates_[0] += slopes_[i] * at.v[loop.v[i]];
       return;
     }
-    motion_ = along<S>(loop.path, MotionPart::velocity, [&](const FrameStep& step) { return loop_step(*numbers_, step, at.q, at.v, MotionPart::velocity, buffers_.hinge, buffers_); });
-    std::fill_n(buffers_.rows, loop.rows, PairRow<S>());
-    pair_rows(loop.loop->pair, motion_, buffers_.rows);
+    motion_ = find_rows(*numbers_, loop, at.q, at.v, MotionPart::velocity, buffers_);
     for (int i = 0; i < loop.rows; ++i) residuals_[i] = buffers_.rows[i].residual, rates_[i] = dot(buffers_.rows[i].gradient, motion_.V);
   }
   template <class F>
