@@ -1257,6 +1257,8 @@ class LoopSet:
         """
         Names of all rows, and which are of positions.
         """
+    def sizes(self, q: typing.Any, precision: str | int) -> numpy.typing.NDArray[numpy.float64]:
+        ...
     def springs(self, names: collections.abc.Sequence[str], frequency: typing.SupportsFloat | typing.SupportsIndex, damping_ratio: typing.SupportsFloat | typing.SupportsIndex) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
         """
         Stiffness and damping of the rows of such an effect that is alone.

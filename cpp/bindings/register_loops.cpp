@@ -194,6 +194,9 @@ void register_loops(py::module_& m) {
       .def("residual", [](Loops& l, const py::object& q, Precision precision) {
         return rows_at(l, {{"q", q}}, {l.rows()}, [&](Arguments& given, double* out) { l.calls.residual(precision, given[0], out); });
       }, q, precision)
+      .def("sizes", [](Loops& l, const py::object& q, Precision precision) {
+        return rows_at(l, {{"q", q}}, {l.rows()}, [&](Arguments& given, double* out) { l.calls.sizes(precision, given[0], out); });
+      }, q, precision)
       .def("jacobian", [](Loops& l, const py::object& q, Precision precision) {
         return rows_at(l, {{"q", q}}, {l.rows(), l.set->model().nv()}, [&](Arguments& given, double* out) { l.calls.jacobian(precision, given[0], out); });
       }, q, precision)

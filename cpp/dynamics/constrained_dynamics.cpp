@@ -253,7 +253,11 @@ bool ConstrainedWorkspace<S>::sure(const Asked& asked, const Applied<S>& applied
   for (int i = 0; i < nv; ++i) load_[i] += asked.tau[i] - generalized_[i];
   const S missed = energy(load_.data());
   // Of less than all that has cancelled, and by squares, which say the same but for factors up to √2: no roots are taken.
-  bool small = missed <= certified() * certified() * (carried + driven);
+  S inertia = S(0);
+  for (int k = 0; k < model_->bodies; ++k)
+    for (int i = 0; i < model_->nv_of[k]; ++i) inertia += pivot(*model_, blocks_, k, i);
+  const S of_stopped = S(stopped * stopped) * S(stopped * stopped) * inertia;
+  bool small = missed <= certified() * certified() * (carried + driven) + of_stopped;
   if (!small) {  // costs as much again
     off_.assign(nv, S(0));
     find_forces(asked, off_.data(), applied);
@@ -328,6 +332,8 @@ void ConstrainedWorkspace<S>::accelerate(const std::shared_ptr<const ResolvedLoo
   S fastest = S(0);
   for (int i = 0; i < nv; ++i) fastest = maximum(fastest, S(abs(asked.v[i])));
   for (int r = 0; r < rows; ++r) bias_[r] = abs(c_[r]) + fastest * rows_.product_size(r, asked.v);
+  if constexpr (!is_recorded<S>)  // what velocities that stopped ask of rows is rounding
+    for (int r = 0; r < rows; ++r) bias_[r] += S(stopped * stopped) * size_of(r) / certified();
   if (asked.gains) {
     target_.assign(rows, S(0));
     loop_residuals(*model_, *loops, asked.q, buffers_, target_.data());

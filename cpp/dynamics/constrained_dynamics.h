@@ -31,6 +31,9 @@ S rank_tolerance() {
   return maximum(S(sqrt(epsilon<S>())), S(64 * epsilon<double>()));
 }
 
+// rad/s, m/s: what is slower is what rounding leaves of velocities that stopped.
+inline constexpr double stopped = 1e-13;
+
 // r̈ + 2α ṙ + β² r = 0
 struct Baumgarte {
   double alpha = 0, beta = 0;

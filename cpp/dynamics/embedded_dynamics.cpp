@@ -193,7 +193,7 @@ void EmbeddedWorkspace<S>::accelerate(const std::shared_ptr<const ResolvedLoops>
   loop_bias(*model_, *loops, asked.q, asked.v, buffers_, c_.data());
   S fastest = S(0);
   for (int i = 0; i < nv; ++i) fastest = maximum(fastest, S(abs(asked.v[i])));
-  for (int r = 0; r < rows; ++r) bias_[r] = abs(c_[r]) + fastest * rows_.product_size(r, asked.v);
+  for (int r = 0; r < rows; ++r) bias_[r] = abs(c_[r]) + fastest * rows_.product_size(r, asked.v) + S(stopped * stopped) * size_of(r) / certified();
   for (int r = 0; asked.driven && r < rows; ++r) c_[r] -= asked.driven[r], bias_[r] += abs(asked.driven[r]);
   x_.assign(nv, S(0)), lambda_.assign(rows, S(0)), delta_.resize(nv), load_.resize(nv);
   put_dependent(c_.data(), x_.data());

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "recursions/loop_columns.h"
 #include "recursions/loop_tangents.h"
 
 namespace pycraft {
@@ -66,6 +67,19 @@ void LoopCalls::residual(Precision precision, Given q, double* out) {
   const ModelInUse use(model());
   const auto loops = loops_->resolved();
   run(precision, {q}, loops->rows, out, [&]<class S>(LoopWorkspace<S>& w, const S* const* given, S* r) { loop_residuals(*w.model, *loops, given[0], w.buffers, r); });
+}
+
+void LoopCalls::sizes(Precision precision, Given q, double* out) {
+  const ModelInUse use(model());
+  const auto loops = loops_->resolved();
+  run(precision, {q}, loops->rows, out, [&]<class S>(LoopWorkspace<S>& w, const S* const* given, S* sizes) {
+    LoopRows<S> rows;
+    rows.find(*w.model, *loops, given[0], w.buffers);
+    for (int row = 0; row < loops->rows; ++row) {
+      sizes[row] = S(0);
+      for (const auto& e : rows.entries[row]) sizes[row] = maximum(sizes[row], e.size);
+    }
+  });
 }
 
 void LoopCalls::jacobian(Precision precision, Given q, double* out) {

@@ -25,6 +25,7 @@ class LoopCalls : public Batches<LoopWorkspace> {
   explicit LoopCalls(std::shared_ptr<LoopSet> loops) : Batches(loops->shared_model()), loops_(std::move(loops)) {}
 
   void residual(Precision precision, Given q, double* out);          // (rows) a state, zeros of rows of velocities
+  void sizes(Precision precision, Given q, double* out);             // what rows are measured by, the largest of their entries' (rows) a state
   void jacobian(Precision precision, Given q, double* out);          // Q, (rows x nv) a state
   void rates(Precision precision, Given q, Given v, double* out);    // Qθ̇, (rows) a state
   void bias(Precision precision, Given q, Given v, double* out);     // Q̇θ̇, (rows) a state

@@ -65,7 +65,7 @@ void wheel_rows(const FramePair& pair, const RelativeMotion<S>& m, PairRow<S>* o
   const S radius(pair.number);
   using Function = MotionFunction<S>;
   const Function zero(S(0)), gx = rotation_entry(m, 2, 0), gy = rotation_entry(m, 2, 1), gz = rotation_entry(m, 2, 2), square = gx * gx + gy * gy;
-  if (!(square.value > S(0))) throw EvaluationError("the wheel on '" + pair.b + "' lies flat on its ground: no point of it is the lowest, and its rows have no direction");
+  if (!(square.value > S(0))) throw EvaluationError("the wheel on '" + pair.b + "' lies flat on its ground: no point of it is the lowest, and its rows have no direction; tilt it");
   const Function mu = sqrt(square), ex = gx / mu, ey = gy / mu;
   out[0] = position_entry(m, 2) - radius * mu;
   out[1] = {{zero, zero, Function(-radius), -ey, ex, zero}, m.V};

@@ -113,9 +113,9 @@ class SceneLoops {
     set_rates(v);
     workspace_.find_off(loops_, q, v, rates_.data(), positions, velocities);
     refuse(positions, "is off", "its rows are kept from a state that is on them");
-    S fastest = held_.empty() ? S(0) : S(slow);
+    S fastest = held_.empty() ? S(stopped / far) : S(slow);
     for (size_t i = 0; i < zeros_.size(); ++i) fastest = maximum(fastest, S(v[i] < S(0) ? -v[i] : v[i]));
-    for (S& off : velocities) off = fastest > S(0) ? S(off / fastest) : S(0);
+    for (S& off : velocities) off /= fastest;
     refuse(velocities, "moves off", "Q v = 0 holds of a velocity");
   }
 

@@ -45,7 +45,7 @@ class Compiled:
         if size > MOST_OPERATIONS or results.size > MOST_RESULTS:
             raise _core.EvaluationError(
                 f"{name} comes to {size} operations and {results.size} results in straight lines; compile() writes up to {MOST_OPERATIONS} "
-                f"and {MOST_RESULTS}. prepare() and at(q) take models of any size"
+                f"and {MOST_RESULTS}. The call itself, prepare() and at(q) take models of any size"
             )
         self.name, self.arguments, self.shape = name, tuple(a for a, _ in arguments), results.shape
         title = f"{name}: {', '.join(f'{a} ({n})' for a, n in arguments) or 'no input'} -> {results.shape}"

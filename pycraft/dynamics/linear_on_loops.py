@@ -11,8 +11,8 @@ from ..linear.linear_model import LinearModel, names_of_states, stacked
 from .linearization import linear_model, listed
 from .loop_tangents import KeptRows, TreeDerivatives, kept_rows, on_loops
 
-FAR = 1e-6
-"""What is no state on the loops, as mobility has it."""
+FAR, STOPPED = 1e-6, 1e-13
+"""What is no state on the loops, as mobility has it; rad/s, m/s: what is slower is what rounding leaves of velocities that stopped."""
 
 
 def independent_numbers(model: Any, names: Any) -> list[int] | None:
@@ -87,9 +87,12 @@ def _at(
 
 def _check_on_loops(model: Any, q: np.ndarray, v: np.ndarray) -> None:
     """ModelError for a state that is off the loops, or moves off them, with the row."""
-    rows, Q = model.loops.rows, model.loops.jacobian(q)
-    size = np.abs(v).max(initial=0.0) or 1.0
-    for what, off in (("is off", np.abs(model.loops.residual(q))), ("moves off", np.abs(Q @ v) / size)):
+    rows, sizes = model.loops.rows, model.loops.sizes(q)
+    fastest = max(np.abs(v).max(initial=0.0), STOPPED / FAR)
+    for what, off in (
+        ("is off", np.abs(model.loops.residual(q)) / sizes),
+        ("moves off", np.abs(model.loops.rates(q, v)) / (fastest * sizes)),
+    ):
         worst = int(off.argmax()) if len(rows) else None
         if worst is not None and not off[worst] <= FAR:
             raise _core.ModelError(

@@ -15,6 +15,7 @@ from .limits import pin_coordinates
 _ITERATIONS = 200
 _LARGEST = 1e150  # of residuals and rows: squares are within doubles; there is no way from what is further off
 _RANK = 1e-10  # relative: singular values below are rounding, of rows that hang on others
+_STOPPED = 1e-13  # rad/s, m/s, and of the velocities asked for: less is what rounding leaves of those that stopped
 
 
 class Assembler:
@@ -36,9 +37,19 @@ class Assembler:
         self.kept = coordinate_numbers(model, [] if fix is None else fix) or []
         self._check_kept()
         self.free = np.setdiff1d(np.arange(model.nv), self.kept)
-        model.loops.residual(self.q)  # what is wrong with q is said here
-        moves = sum((model.loops.jacobian(at) != 0).any(axis=0) for at in (self.q, model.random_state().q))
+        model.configuration_rate(self.q, np.zeros(model.nv))  # what is wrong with q is said here
+        elsewhere = model.random_state().q
+        moves = sum((model.loops.jacobian(at) != 0).any(axis=0) for at in (self._with_rows(self.q), elsewhere))
         self.around = self.free[moves[self.free] > 0]
+        self.sizes = np.maximum(model.loops.sizes(self._with_rows(self.q)), model.loops.sizes(elsewhere))
+
+    def _with_rows(self, q: np.ndarray) -> np.ndarray:
+        """q, or another state where the rows have no direction there, as those of a wheel that lies flat."""
+        try:
+            self.model.loops.residual(q)
+        except _core.EvaluationError:
+            return np.asarray(self.model.random_state(1).q)
+        return q
 
     def _check_kept(self) -> None:
         """A rotation is kept whole, or not: one of its three velocities alone says nothing of where it is."""
@@ -61,14 +72,14 @@ class Assembler:
         return self.model.integrate(q, whole)
 
     def solve(self, q: np.ndarray, rows: np.ndarray | None = None) -> tuple[np.ndarray, float]:
-        """The state reached from q, and the largest residual left there."""
+        """The state reached from q, and the largest residual left there, by the sizes of the rows."""
         rows = np.flatnonzero(self.positions) if rows is None else rows
         r, Q = self.equations(q, rows)
         if not r.size or not Q.size or max(np.abs(r).max(), np.abs(Q).max()) > _LARGEST:
-            return q, float(np.abs(r).max(initial=0))
-        mu, grow = 1e-3 * max((Q * Q).sum(axis=0).max(), 1e-30), 2.0
+            return q, self.left(r, rows)
+        mu, grow = 1e-3 * max((Q * Q).sum(axis=0).max(), 1e-300), 2.0
         for _ in range(_ITERATIONS):
-            if np.abs(r).max() <= self.tolerance or np.abs(Q.T @ r).max() <= 1e-14 * np.abs(r).max():
+            if self.left(r, rows) <= self.tolerance or np.abs(Q.T @ r).max() <= 1e-14 * np.abs(r).max():
                 break
             damped = np.vstack([Q, np.sqrt(mu) * np.eye(Q.shape[1])])
             step = np.linalg.lstsq(damped, np.concatenate([-r, np.zeros(Q.shape[1])]), rcond=None)[0]
@@ -84,15 +95,19 @@ class Assembler:
                     break
         return self.refined(q, r, Q, rows)
 
+    def left(self, r: np.ndarray, rows: np.ndarray) -> float:
+        """The largest of these residuals, by how far the coordinates move each row."""
+        return float((np.abs(r) / self.sizes[rows]).max(initial=0))
+
     def refined(self, q: np.ndarray, r: np.ndarray, Q: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, float]:
         """To rounding, from where the rows are kept to the tolerance: undamped steps as long as each leaves less than half."""
-        left = float(np.abs(r).max())
+        left = self.left(r, rows)
         while 0 < left <= self.tolerance:
             onto = self.moved(q, np.linalg.lstsq(Q, -r, rcond=_RANK)[0])
             r, Q = self.equations(onto, rows)
-            if not np.abs(r).max() < left / 2:
+            if not self.left(r, rows) < left / 2:
                 break
-            q, left = onto, float(np.abs(r).max())
+            q, left = onto, self.left(r, rows)
         return q, left
 
     def starts(self, count: int, rng: np.random.Generator) -> Any:
@@ -108,10 +123,13 @@ class Assembler:
         """The velocities that keep all rows with the least change of those that may change. ModelError where there are none."""
         Q = self.model.loops.jacobian(q)
         v = np.array(v, float)
+        asked = np.abs(v).max(initial=0)
         if Q.size and self.free.size:
             v[self.free] += np.linalg.lstsq(Q[:, self.free], -(Q @ v), rcond=_RANK)[0]
+            if np.abs(v).max() <= _STOPPED * asked:
+                v[self.free] = 0
         off = np.abs(Q @ v)
-        if off.max(initial=0) > self.tolerance * (1 + np.abs(v).max(initial=0)) * max(1, np.abs(Q).max(initial=0)):
+        if (off / self.sizes).max(initial=0) > self.tolerance * asked + _STOPPED:
             said = _worst(self.model.loops.rows, off)
             raise _core.ModelError(
                 f"no velocities of {self.model.name!r} keep its loops{self.keeping()}: left are {said}; fix fewer, or give others"
@@ -134,7 +152,7 @@ class Assembler:
             own = own[self.positions[own]]
             if own.size and self.solve(q, own)[1] > self.tolerance:
                 alone.append(loop.name)
-        open_ = [loop.name for loop in loops.values() if residual[loop.slice].max(initial=0) > self.tolerance]
+        open_ = [loop.name for loop in loops.values() if (residual / self.sizes)[loop.slice].max(initial=0) > self.tolerance]
         why = (
             f"{_named(alone)} cannot be closed even without the others"
             if alone
@@ -183,13 +201,19 @@ def _assembled_one(model: Any, q: Any, v: Any, fix: Any, starts: Any, rng: np.ra
     assembler, count = Assembler(model, q, fix, tolerance), clipped(starts, "starts")
     if count < 1:
         raise _core.ModelError(f"starts: how many are tried, at least 1, not {starts!r}")
-    best, smallest = assembler.q, np.inf
+    best, smallest, no_rows = assembler.q, np.inf, None
     for start in assembler.starts(count, rng):
-        found, left = assembler.solve(start)
+        try:
+            found, left = assembler.solve(start)
+        except _core.EvaluationError as error:  # rows that have no direction on the way
+            no_rows = error
+            continue
         if left <= assembler.tolerance:
             return State(found, assembler.velocities(found, v))
         if left < smallest:
             best, smallest = found, left
+    if no_rows is not None and smallest == np.inf:
+        raise no_rows
     raise assembler.refusal(best, count)
 
 
@@ -211,7 +235,10 @@ def branches(model: Any, q0: Any, v0: Any, fix: Any, starts: Any, seed: Any, tol
     found = [first.q]
     turns = turns_of(model)
     for start in assembler.starts(clipped(starts, "starts"), rng):
-        onto, left = assembler.solve(start)
+        try:
+            onto, left = assembler.solve(start)
+        except _core.EvaluationError:
+            continue
         if left <= assembler.tolerance and all(np.abs(between(model, one, onto, turns)).max(initial=0) > 1e-5 for one in found):
             found.append(model.integrate(q, between(model, q, onto, turns)))
     found.sort(key=lambda one: float(np.linalg.norm(between(model, q, one, turns))))

@@ -167,7 +167,11 @@ def _fitted(f: Callable[[float], Any], s: np.ndarray, what: str) -> tuple[np.nda
 
 
 def _point(f: Callable[[float], Any], s: float, what: str) -> np.ndarray:
-    point = _core.real_array(f(float(s)), f"the function of {what}")
+    try:
+        given = f(float(s))
+    except Exception as error:
+        raise _core.ModelError(f"{what}: the function of its curve fails at {s:g}: {type(error).__name__}: {error}") from error
+    point = _core.real_array(given, f"the function of {what}")
     if point.shape != (3,) or not np.isfinite(point).all():
         raise _core.ModelError(
             f"{what}: the function of its curve gives three finite numbers, and at {s:g} it gives {np.asarray(point)!s:.80}"

@@ -138,6 +138,23 @@ class Loops(Closed, Mapping):
         """r (rows,) or (B, rows), zero where the loops are closed, and of rows of velocities; metres, and radians to first order."""
         return self._core.residual(at_state(self._model, q)[0], precision)
 
+    def sizes(self, q=None, *, precision: str = "double") -> np.ndarray:
+        """What each row is measured by, (rows,) or (B, rows): the largest of its entries in Q, of lengths before anything cancels in them.
+
+        Metres and radians a unit of the coordinate that moves it most; one where none does. A residual r is off by r/size of that
+        coordinate, in a watch as in a crane. Cost: the rows' entries; no Q is made.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> arm = pc.chain(2)
+        >>> gear = arm.add_coupling({"hinge0": 1.0, "hinge1": -3.0}, name="gear")
+        >>> arm.loops.sizes([0.5, 0.25]).tolist()
+        [3.0]
+        """
+        sizes = self._core.sizes(at_state(self._model, q)[0], precision)
+        return np.where(sizes > 0, sizes, 1.0)
+
     def jacobian(self, q=None, *, precision: str = "double") -> np.ndarray:
         """Q (rows, nv) or (B, rows, nv): ṙ = Q θ̇, and of rows of velocities what is zero. Exact zeros for hinges that are around no loop.
 

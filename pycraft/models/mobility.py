@@ -12,7 +12,7 @@ from ..arguments import one_number
 from ..closed import Closed
 from ..state import at_state
 
-_CLOSED = 1e-6  # residuals above are no state on the loops
+_CLOSED = 1e-6  # of residuals by the sizes of rows: above is no state on the loops
 _NEIGHBOURS, _STEP = 4, 1e-2
 
 
@@ -70,11 +70,12 @@ def _rank(values: np.ndarray, tolerance: float) -> int:
 
 def check_closed(model: Any, q: np.ndarray) -> None:
     """ModelError where a state, or one of a batch, is not on the loops: with the row that is most off."""
-    rows, off = model.loops.rows, np.abs(model.loops.residual(q))
+    rows, residual = model.loops.rows, np.abs(model.loops.residual(q))
+    off = residual / model.loops.sizes(q)
     if off.max(initial=0) > _CLOSED:
         *sample, worst = np.unravel_index(int(off.argmax()), off.shape)
         where = f" at sample {sample[0]}" if sample else ""
-        said = f"{rows[worst]!r} is off by {off.max():.3g}; mobility is asked at states of assemble()"
+        said = f"{rows[worst]!r} is off by {residual[(*sample, worst)]:.3g}; mobility is asked at states of assemble()"
         raise _core.ModelError(f"{model.name!r} is not on its loops{where}: {said}")
 
 

@@ -259,7 +259,7 @@ class WithLoops(WithFrames):
             How many are tried, q0 the first.
         seed : int or numpy.random.Generator
         tolerance : float
-            The largest residual that counts as closed (m, rad); what is found is then refined to rounding.
+            The largest residual that counts as closed, of each row by its size (`loops.sizes`); what is found is then refined to rounding.
 
         Returns
         -------

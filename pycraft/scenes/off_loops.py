@@ -11,8 +11,8 @@ from ..models.warning import warn
 from .effects.effect import Effect
 from .effects.loops import Loop
 
-FAR = 1e-6
-"""Residuals from here on are no state on the loops, as starts of runs have it."""
+FAR, SLOW = 1e-6, 1e-3
+"""Residuals from here on, by the sizes of rows, are no state on the loops, as starts have it; so rates, by the largest velocity or SLOW."""
 
 
 def warn_off_the_loops(model: Any, effects: Iterable[Effect], q: np.ndarray, v: np.ndarray | None) -> None:
@@ -28,9 +28,14 @@ def warn_off_the_loops(model: Any, effects: Iterable[Effect], q: np.ndarray, v: 
     loops, kept = model.loops, [name for effect in keeping for name in effect.kept(model)]
     size = len(loops.rows)
     rows = [row for name in kept for row in range(size)[loops[name].slice]]
-    for off, how in ((loops.residual(q), "is off"), (np.zeros(size) if v is None else loops.rates(q, v), "moves off")):
-        worst = rows[int(np.argmax(np.abs(off[rows])))] if rows else None
-        if worst is not None and abs(off[worst]) > FAR:
+    sizes = loops.sizes(q)
+    found = [(loops.residual(q), 1.0, "is off")]
+    if v is not None:
+        found.append((loops.rates(q, v), max(np.abs(v).max(initial=0.0), SLOW), "moves off"))
+    for off, fastest, how in found if rows else []:
+        by_size = np.abs(off[rows]) / (fastest * sizes[rows])
+        worst = rows[int(np.argmax(by_size))]
+        if by_size.max() > FAR:
             warn(
                 f"the state {how} row {loops.rows[worst]!r} of {model.name!r} by {abs(off[worst]):.3g}: its accelerations keep that; "
                 "model.assemble(q, v) has a state on the loops"

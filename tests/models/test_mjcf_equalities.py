@@ -104,6 +104,27 @@ def test_the_model_s_state_is_where_mujoco_closes_them(load):
     assert list(model.loops) == ["e", "w", "g"] and np.abs(model.loops.residual()).max() < 1e-14
 
 
+def test_a_weld_that_asks_no_rotation_is_a_ball(load):
+    """MuJoCo has six rows of it, of which three are zero."""
+    model, rows, _ = load('<weld name="e" body1="b" body2="c" anchor=".1 .2 .3" torquescale="0"/>')
+    assert model.loops["e"].kind == "ball"
+    state = model.assemble(model.random_state(1))
+    r, J = rows(state.q)
+    assert np.abs(r).max() < 1e-12 and not J[3:].any()
+    both = np.linalg.svd(np.vstack([J, model.loops.jacobian(state)]), compute_uv=False)
+    assert both[2] > 1e-3 and both[3:].max() < 1e-12
+
+
+def test_equalities_without_names_are_all_kept(load):
+    """Two connects of one pair are a hinge."""
+    pair = '<connect body1="b" body2="c" anchor=".1 .2 .3"/><connect body1="b" body2="c" anchor=".5 .2 .3"/>'
+    model, rows, _ = load(pair + '<joint joint1="t" joint2="y" polycoef="0 1 0 0 0"/><joint joint1="t" joint2="y" polycoef="0 1 0 .1 0"/>')
+    called = ["equality connect of 'b' and 'c'", "equality joint of 't' and 'y'"]
+    assert list(model.loops) == [name + more for name in called for more in ("", " (2)")]
+    q = model.random_state(1).q
+    assert rows(q)[0].shape == model.loops.residual(q).shape == (8,)
+
+
 def test_what_is_left_out_is_named(load):
     fixed = '<body name="p"><geom size=".1"/></body><body name="o" pos="0 0 1"><geom size=".1"/></body>'
     off = '<connect name="off" body1="a" body2="c" anchor="0 0 0" active="false"/><connect body1="p" body2="o" anchor="0 0 0"/>'

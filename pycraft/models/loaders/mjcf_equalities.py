@@ -2,7 +2,7 @@
 
 equality   loop
 connect    a ball at the anchor, or where both sites are
-weld       a weld at the file's relative pose, or that of both sites in each other
+weld       a weld at the file's relative pose, or that of both sites in each other; a ball at its anchor where torquescale is 0
 joint      a coupling: q₁ - ref₁ = Σ a_k (q₂ - ref₂)^k; of one joint q₁ - ref₁ = a₀
 
 Those that are not active when MuJoCo starts, and equalities of tendons and flexes, are left out.
@@ -30,7 +30,7 @@ def add_equalities(m: Any, model: Multibody, bodies: list[str]) -> list[str]:
     left_out = []
     for e in range(m.neq):
         kind, called = int(m.eq_type[e]), _called(m, e, bodies)
-        name = m.equality(e).name or called
+        name = m.equality(e).name or _unused(called, model)
         try:
             if not m.eq_active0[e]:
                 left_out.append(f"{called} (not active)")
@@ -43,6 +43,15 @@ def add_equalities(m: Any, model: Multibody, bodies: list[str]) -> list[str]:
         except _core.ModelError as error:
             left_out.append(f"{called} ({error})")
     return left_out
+
+
+def _unused(called: str, model: Multibody) -> str:
+    """It, or with a number where a loop has it: a hinge is two connects of one pair."""
+    name, count = called, 1
+    while name in model.loops:
+        count += 1
+        name = f"{called} ({count})"
+    return name
 
 
 def _add_pair(m: Any, e: int, model: Multibody, bodies: list[str], name: str) -> None:
@@ -60,7 +69,7 @@ def _add_pair(m: Any, e: int, model: Multibody, bodies: list[str], name: str) ->
         a[:3, :3], a[:3, 3] = rotation_from_quaternion(data[6:10]), data[3:6]
     else:
         a[:3, 3], b[:3, 3] = data[:3], data[3:6]
-    if weld:
+    if weld and data[10] > 0:
         rotation = a[:3, :3] @ b[:3, :3].T
         hinge: dict[str, Any] = dict(hinge="weld", rotation=rotation, position=a[:3, 3] - rotation @ b[:3, 3])
     else:
