@@ -75,7 +75,7 @@ def check_closed(model: Any, q: np.ndarray) -> None:
     if off.max(initial=0) > _CLOSED:
         *sample, worst = np.unravel_index(int(off.argmax()), off.shape)
         where = f" at sample {sample[0]}" if sample else ""
-        said = f"{rows[worst]!r} is off by {residual[(*sample, worst)]:.3g}; mobility is asked at states of assemble()"
+        said = f"{rows[worst]!r} is off by {residual.flat[off.argmax()]:.3g}; mobility is asked at states of assemble()"
         raise _core.ModelError(f"{model.name!r} is not on its loops{where}: {said}")
 
 

@@ -155,7 +155,7 @@ CHANGES = {
     "cpp/operators/loop_values.h": [
         (
             "an end's row without its way to the other end",
-            "S(-1) * force_to_parent(renormalised<S>(loop.loop->pair.end_a), force_to_parent(m.X, g))",
+            "S(-1) * force_to_parent(renormalised<S>(loop.loop->pair.end_a), force_to_parent(X, g))",
             "S(-1) * force_to_parent(renormalised<S>(loop.loop->pair.end_a), g)",
         ),
     ],

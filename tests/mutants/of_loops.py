@@ -27,6 +27,7 @@ CHANGES = {
     ],
     "cpp/dynamics/constrained_dynamics.h": [
         ("in quad the rounding of states is a direction", "S(64 * epsilon<double>())", "S(0)"),
+        ("velocities that stopped break rows", "double stopped = 1e-13;", "double stopped = 1e-300;"),
     ],
     "cpp/dynamics/loop_calls.cpp": [
         ("Q̇v of functions does not change with q", "S(third[(i * n + j) * n + k])", "S(0)"),
@@ -60,7 +61,7 @@ CHANGES = {
             "driven_[first_.back() + i] = motion[held_[i]];",
             "driven_[first_.back() + i] = S(0);",
         ),
-        ("what differences leave of rest is a motion", "held_.empty() ? S(0) : S(slow)", "S(0)"),
+        ("what differences leave of rest is a motion", "held_.empty() ? S(stopped / far) : S(slow)", "S(stopped / far)"),
         ("a start off the loops is taken", "if (!(to_double(off[r]) <= far))", "if (to_double(off[r]) > 1e300)"),
     ],
     "cpp/recursions/curve_rows.cpp": [
