@@ -1,7 +1,8 @@
-"""What the everyday subset leaves out besides the tests that mark themselves: what takes seconds and stands close to a quick test."""
+"""What the everyday subset leaves out beside tests that mark themselves: what takes seconds beside a quick test, and most of many cases."""
 
 import os
 import tempfile
+from collections import defaultdict
 
 # What examples compile is no business of the user's own folder.
 os.environ.setdefault("PYCRAFT_CACHE", os.path.join(tempfile.gettempdir(), f"pycraft-tests-{os.getuid()}"))
@@ -111,6 +112,46 @@ SLOW = {
 }
 
 
+# How many cases of a test the everyday subset takes, spread over those that are not slow by themselves: MOST, and of what takes long fewer.
+MOST = 24
+FEW = {
+    "test_algorithm::test_python_of_every_spelling": 12,
+    "test_certify::test_never_smaller_than_a_tenth_of_truth": 8,
+    "test_checker::test_every_theorem_holds_where_its_hypotheses_are_met": 1,
+    "test_checker::test_one_coefficient_off": 24,
+    "test_checker::test_one_letter_exchanged": 24,
+    "test_cli_processes::test_options": 2,
+    "test_compiled_calls::test_graphs_are_the_calls": 5,
+    "test_compiled_expressions::test_graphs_are_the_plans": 20,
+    "test_curves::test_rows": 1,
+    "test_docs::test_the_blocks_of_a_page_run": 2,
+    "test_docs::test_the_pages_run": 8,
+    "test_forms::test_operators_of_special_models": 2,
+    "test_frames::test_jacobians_and_their_rates": 2,
+    "test_generated_pages::test_the_table_of_contents_lists_them": 0,
+    "test_judge::test_derived_bounds_hold": 1,
+    "test_kernels::test_instruction_sets_agree": 0,
+    "test_kernels_factored::test_digits_of_the_general_recursions": 20,
+    "test_layers::test_other_tools_are_imported_by_interop_and_peers_alone": 0,
+    "test_loop_theorems::test_what_follows_from_the_axioms_is_derived": 2,
+    "test_loops::test_rows_of_hinges": 3,
+    "test_loops_at_rest::test_within_limits": 0,
+    "test_mixed_trees::test_the_catalogue": 2,
+    "test_packs_of_expressions::test_the_bits_of_each_state": 8,
+    "test_packs_of_expressions::test_where_pivots_are_chosen_once": 1,
+    "test_parts::test_every_operator_is_that_of_the_bodies_alone": 1,
+    "test_prove_derivatives::test_the_books_recursion_of_the_derivative_of_upsilon": 0,
+    "test_speed::test_one_command_writes_all": 0,
+    "test_stick_figure::test_every_model_in_every_view": 12,
+    "test_subtrees_in_threads::test_the_bits_of_one_thread": 2,
+    "test_swept_tangents::test_whatever_is_asked": 5,
+    "test_sweeps::test_a_process_that_dies": 1,
+    "test_sweeps::test_statements_over_many_models": 0,
+    "test_target_rows::test_of_poses": 10,
+    "test_threads::test_edits_beside_evaluations": 1,
+}
+
+
 @pytest.fixture(scope="module")
 def browser():
     """Headless Chromium; tests that ask for it are marked `browser`."""
@@ -127,3 +168,12 @@ def pytest_collection_modifyitems(items):
         slow = SLOW.get(item.path.stem)
         if slow and slow(item):
             item.add_marker(pytest.mark.slow)
+    cases = defaultdict(list)
+    for item in items:
+        if not item.get_closest_marker("slow"):
+            cases[item.nodeid.partition("[")[0]].append(item)
+    for test, several in cases.items():
+        count = FEW.get(f"{several[0].path.stem}::{test.rpartition('::')[2]}", MOST)
+        for i, item in enumerate(several):
+            if i * count // len(several) == (i - 1) * count // len(several):
+                item.add_marker(pytest.mark.slow)
