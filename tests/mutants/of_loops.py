@@ -22,7 +22,11 @@ CHANGES = {
             ";",
             STATEMENT,
         ),
-        ("squares of recorded motion that are no numbers are trusted", "<= bound * size && size <= most", "<= bound * size"),
+        (
+            "squares of recorded motion that are no numbers are trusted",
+            "energy_of_hinges(load_.data()) <= bound * size && size <= most",
+            "energy_of_hinges(load_.data()) <= bound * size",
+        ),
         ("what implicit steps add is not in the residual", "generalized_[j] += added_[j] * x[j];", "static_cast<void>(x);", STATEMENT),
     ],
     "cpp/dynamics/constrained_dynamics.h": [
@@ -62,7 +66,7 @@ CHANGES = {
             "driven_[first_.back() + i] = S(0);",
         ),
         ("what differences leave of rest is a motion", "held_.empty() ? S(stopped / far) : S(slow)", "S(stopped / far)"),
-        ("a start off the loops is taken", "if (!(to_double(off[r]) <= far))", "if (to_double(off[r]) > 1e300)"),
+        ("a start off the loops is taken", "to_double(off[r]) <= far", "to_double(off[r]) <= 1e300"),
     ],
     "cpp/recursions/curve_rows.cpp": [
         ("a place on a curve is that of doubles", "at = at - dot(p - c[0], c[1]) / slope;", ";", STATEMENT),
