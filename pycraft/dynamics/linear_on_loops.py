@@ -96,5 +96,5 @@ def _check_on_loops(model: Any, q: np.ndarray, v: np.ndarray) -> None:
         worst = int(off.argmax()) if len(rows) else None
         if worst is not None and not off[worst] <= FAR:
             raise _core.ModelError(
-                f"{model.name!r}: the state given {what} row {rows[worst]!r} by {off[worst]:.3g} of its size; model.assemble(q, v) finds another"
+                f"{model.name!r}: the state given {what} row {rows[worst]!r} by {off[worst]:.3g}; model.assemble(q, v) finds another"
             )
