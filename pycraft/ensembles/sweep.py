@@ -115,6 +115,7 @@ def _work(work: Any, samples: Samples, T: Any, measure: Any, options: dict[str, 
             measure = trajectory if "t_eval" in options else end_of_run
             options = {"t_eval": [0.0, one_number(T, "T")], "dense": False, **options}
         Targets(work, samples)
+        work._warn_of_gravity()  # here, and not by every worker
         return SceneWork(work, list(samples), one_number(T, "T"), options, measure)
     if not callable(work):
         raise _core.ModelError(f"a sweep is of a scene or of a function, not of {work!r:.60}")

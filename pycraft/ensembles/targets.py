@@ -87,12 +87,14 @@ def _setter(scene: Any, name: str) -> Callable[[Any], None]:
         raise _core.ModelError(f"samples: {name!r}: {of!r} has no {attribute!r}; {_near(attribute, known)}")
     if index is None:
         return lambda value: setattr(owner, attribute, value)
-    shape = np.shape(getattr(owner, attribute))
+    completed = owner.completed_for(scene.model) if room == "effects" else owner
+    shape = np.shape(getattr(completed, attribute))
     if len(index) != len(shape) or any(i >= n for i, n in zip(index, shape, strict=True)):
         raise _core.ModelError(f"samples: {name!r}: {attribute} of {of!r} has the shape {shape}")
 
     def component(value: Any) -> None:
-        whole = np.array(getattr(owner, attribute), float)
+        present = getattr(owner, attribute)
+        whole = np.array(getattr(completed, attribute) if present is None else present, float)
         whole[index] = value
         setattr(owner, attribute, whole)
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from .. import _core
 from .checkpoint import Checkpoint, coordinates_of
+from .crossed_limits import CrossedLimit, crossed_limits, crossed_names, unheld_limits
 from .events import EventStates
 from .motion import Motion
 
@@ -63,7 +64,7 @@ class Run(Motion):
         rows = steps if keep is None else {name: x[keep] for name, x in record.samples.items()}
         about = {
             "model": scene.model, "effects": names, "workers": list(calls.workers), "energy": options.energy, "integrator": integrator,
-            "options": options.told, "precision": precision,
+            "options": options.told, "precision": precision, "stops": scene._stops(),
         }  # fmt: skip
         kinds = [*record.own_events, *(event.name for event in events)]
         of, states = record.events
@@ -78,6 +79,19 @@ class Run(Motion):
             about, rows, calls, steps=steps if len(steps["t"]) else None, events=happened, statistics=record.statistics,
             ended_by=kinds[record.ended_by] if record.ended_by >= 0 else None, checkpoint=checkpoint,
         )  # fmt: skip
+
+    # ------------------------------------------------------------------ limits
+    @cached_property
+    def crossed_limits(self) -> list[CrossedLimit]:
+        """The coordinates that left limits of the model which no `Limits` effect of the scene held, in the model's order.
+
+        Each has `coordinate`, `limit`, `upper`, `first` (s) and `farthest`. Looked for at the ends of all steps, or at the rows where the
+        run kept no steps. Empty for a run that was read from a file without its scene. Cost: O(K N), once.
+        """
+        if "stops" not in self._about:
+            return []
+        model, rows = self._unedited_model(), self._steps or {"t": self.t, "q": self.q}
+        return crossed_limits(unheld_limits(model, self._about["stops"]), model.coordinate_names, rows["t"], rows["q"])
 
     # ------------------------------------------------------------------ between the rows
     def at(self, t: Any) -> Motion:
@@ -318,4 +332,5 @@ class Run(Motion):
         steps = self.statistics.get("steps")
         ended = f", ended by {self.ended_by!r}" if self.ended_by else ""
         counted = "" if steps is None else f", {steps} steps"
-        return f"<run of {self.model.name!r}: {len(self.t)} states from {self.t[0]:g} to {self.t[-1]:g} s{counted}{ended}>"
+        crossed = "" if self._edited or not self.crossed_limits else f"; beyond limits: {crossed_names(self.crossed_limits)}"
+        return f"<run of {self.model.name!r}: {len(self.t)} states from {self.t[0]:g} to {self.t[-1]:g} s{counted}{ended}{crossed}>"

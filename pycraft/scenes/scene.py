@@ -12,8 +12,10 @@ from .. import _core
 from ..arguments import chosen, moment, one_number, text
 from ..closed import Closed
 from ..models.grafting import Grafting
+from ..models.warning import warn
 from ..state import at_state, moment_of
-from .effects import Effect, UserEffect
+from .crossed_limits import warn_of_crossed_limits
+from .effects import Effect, Gravity, Limits, PointMassGravity, UserEffect
 from .effects.meanings import Meanings, acted_on
 from .explain import plan_text
 from .filed import Filed
@@ -69,7 +71,9 @@ class Effects(Mapping[str, Effect]):
 
 
 class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed):
-    """A model and the effects that act on it. It starts empty: nothing acts that was not added, the model's own gravity neither.
+    """A model and the effects that act on it. It starts empty: only added effects act, and not even the model's own gravity does.
+
+    A model whose gravity is set and a scene without a gravity effect are told apart once, by a ModelWarning.
 
     Parameters
     ----------
@@ -99,6 +103,7 @@ class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed):
         self._how = (form, _core.checked_refinement(refine, chosen(residual, "residual"), precision), residual, precision)
         self._built: tuple[Any, Any] | None = None
         self._last_run: Run | None = None
+        self._gravity_said = self._limits_said = False
         self._calls()
         if isinstance(model, Grafting):
             model._used_by(self)
@@ -133,7 +138,7 @@ class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed):
         before, core = dict(self._entries), self._fresh_core()
         try:
             for given in effects:
-                effect = given if isinstance(given, Effect) else UserEffect(given)
+                effect = given if isinstance(given, Effect) else _of_function(given)
                 called = core.add("" if name is None else text(name, "an effect"), effect.made_for(self._model), True)
                 self._entries[called] = (effect, True)
                 self._meanings.keep(called, effect, self._model)
@@ -229,6 +234,29 @@ class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed):
             self._built = (now, _core.SceneCalls(self._fresh_core(), form, refine, residual, precision))
         return self._built[1]
 
+    def _warn_of_gravity(self) -> None:
+        """Warn, once for each scene, that the model's own gravity is set and no effect of this scene is a gravity."""
+        if self._gravity_said or not any(self._model.gravity):
+            return
+        if any(isinstance(effect, (Gravity, PointMassGravity)) for effect, _ in self._entries.values()):
+            return
+        self._gravity_said = True
+        g = ", ".join(f"{x:g}" for x in self._model.gravity)
+        warn(
+            f"the gravity of {self._model.name!r}, ({g}) m/s², does not act in this scene: only effects act there. Add "
+            "pc.effects.Gravity(), which takes the model's gravity, or set model.gravity to zero"
+        )
+
+    def _stops(self) -> tuple[Limits, ...]:
+        """The effects on that hold limits."""
+        return tuple(effect for effect, on in self._entries.values() if on and isinstance(effect, Limits))
+
+    def _warn_of_limits(self, run: Run) -> None:
+        """Warn, once for each scene, of coordinates that left limits which no effect holds."""
+        if not self._limits_said and run.crossed_limits:
+            self._limits_said = True
+            warn_of_crossed_limits(self._model.name, run.crossed_limits)
+
     # ------------------------------------------------------------------ states and runs
     def evaluate(self, q=None, v=None, t: float | None = None, *, states=None, step: float = 0.0) -> Evaluation:
         """Accelerations and forces at a state.
@@ -256,6 +284,7 @@ class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed):
         ModelWarning
             A state that is off loops which are kept, or moves off them, with the row and how far; none where gains draw it back.
         """
+        self._warn_of_gravity()
         resting = v is None and q is not None and not hasattr(q, "v")
         t, states = moment_of(q, t, states)
         q, v = at_state(self._model, q, v)
@@ -372,14 +401,39 @@ class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed):
 
     def __str__(self) -> str:
         lines = [f"scene of {self._model.name!r}"]
-        lines += [f"  {'on ' if on else 'off'} {name}: {effect!r}" for name, (effect, on) in self._entries.items()]
+        entries = [(name, self._shown(effect), on) for name, (effect, on) in self._entries.items()]
+        lines += [f"  {'on ' if on else 'off'} {name}: {effect!r}" for name, effect, on in entries]
         return "\n".join(lines if self._entries else [*lines, "  empty"])
+
+    def _shown(self, effect: Effect) -> Effect:
+        """An effect with the values that it takes from the model; as it is where an edit of the model took what it names."""
+        try:
+            return effect.completed_for(self._model)
+        except _core.ModelError:
+            return effect
 
     # ------------------------------------------------------------------ copies
     def __reduce__(self):
         return _again, (type(self), self._model, list((name, effect, on) for name, (effect, on) in self._entries.items()), self._how), {
-            "_run_options": self._run_options
+            "_run_options": self._run_options, "_gravity_said": self._gravity_said, "_limits_said": self._limits_said,
         }  # fmt: skip
+
+
+def _of_function(given: Any) -> UserEffect:
+    """An effect of a user's function. ModelError for what is neither an effect nor a function."""
+    if isinstance(given, type) and issubclass(given, Effect):
+        got = f"the class {given.__name__} (forgotten parentheses?)"
+    elif isinstance(given, type):
+        got = f"the class {given.__name__}; give an object of it"
+    elif isinstance(given, (list, tuple)):
+        got = f"a {type(given).__name__}; write add(*effects) to add each of its items"
+    elif callable(given):
+        return UserEffect(given)
+    elif isinstance(given, str):
+        got = f"the string {given!r:.80}"
+    else:
+        got = f"{given!r:.80}"
+    raise _core.ModelError(f"add() takes an effect, such as pc.effects.Gravity(), or a function f(t, state) -> forces; got {got}")
 
 
 def _again(kind: type[Scene], model: Any, entries: list[tuple[str, Effect, bool]], how: tuple[Any, ...]) -> Scene:

@@ -74,7 +74,9 @@ def simulate(
     """The motion of a scene from a state at t = 0 to T, as `Scene.simulate` says."""
     times, keep = run_times(0.0, T, t_eval)
     q, v = at_state(scene.model, q, v)
-    return _run(scene, options, times, keep, t_eval, events, progress, dense, output, q, v, None)
+    run = _run(scene, options, times, keep, t_eval, events, progress, dense, output, q, v, None)
+    scene._warn_of_limits(run)
+    return run
 
 
 def continued(scene: Any, t: float, T: float, q: Any, v: Any, states: Any, options: RunOptions) -> Run:
@@ -112,7 +114,9 @@ def resume(scene: Any, checkpoint: Any, T: Any, *, t_eval: Any, events: Any, pro
     options = RunOptions(integrator_named(checkpoint.integrator), **told)
     times, keep = run_times(checkpoint.t, T, t_eval)
     zero = scene.model.zero_q(), np.zeros(scene.model.nv)  # the state is the checkpoint's
-    return _run(scene, options, times, keep, t_eval, events, progress, dense, output, *zero, checkpoint.state)
+    run = _run(scene, options, times, keep, t_eval, events, progress, dense, output, *zero, checkpoint.state)
+    scene._warn_of_limits(run)
+    return run
 
 
 def _told(what: Any) -> str:
@@ -123,6 +127,7 @@ def _run(
     scene: Any, options: RunOptions, times: list[float], keep: slice, t_eval: Any, events: Any, progress: bool, dense: bool, output: Any,
     q: Any, v: Any, checkpoint: dict[str, Any] | None, states: Any = (),
 ) -> Run:  # fmt: skip
+    scene._warn_of_gravity()
     wanted: list[Event] = listed_events(events)
     written = None if output is None else checked_output(output)
     calls, chosen = scene._calls(), options.integrator

@@ -11,15 +11,15 @@ import numpy as np
 from .. import _core
 
 
-def shown_fields(effect: Any) -> list[dict[str, Any]]:
-    """Of each parameter its name, its value, and whether it can be set: a number, a list of numbers, or the text of anything else."""
-    return [{"name": name, **_shown(value)} for name, value in _parameters(effect)]
+def shown_fields(effect: Any, model: Any) -> list[dict[str, Any]]:
+    """Return each parameter of an effect in a model's scene: its name, and a number, a list of numbers, or the text of anything else."""
+    return [{"name": name, **_shown(value)} for name, value in _parameters(effect.completed_for(model))]
 
 
 def set_field(scene: Any, effect: str, field: str, value: Any) -> None:
     """One parameter of an effect to a number or a list of numbers. ModelError for what cannot be: the effect is then as it was."""
     changed = scene.effects[effect]
-    before = dict(_parameters(changed)).get(field)
+    before, present = dict(_parameters(changed.completed_for(scene.model))).get(field), getattr(changed, field, None)
     if before is None or "value" not in _shown(before):
         raise _core.ModelError(f"{effect} has no number {field!r} that can be set here")
     given = np.asarray(_core.real_array(value, f"{effect}: {field}"))
@@ -32,7 +32,7 @@ def set_field(scene: Any, effect: str, field: str, value: Any) -> None:
         setattr(changed, field, new)
         scene._calls()
     except BaseException:
-        setattr(changed, field, before)
+        setattr(changed, field, present)
         raise
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,10 @@ from ... import _core
 from ...arguments import one_number
 from .effect import Effect, by_hinge, names_of, numbers_of
 from .functions_of_time import function_of_time
+from .stiffness_by_inertia import stiffness_by_inertia
+
+FREQUENCY = 20.0
+"""rad/s, of a servo's coordinate where no stiffness is given."""
 
 
 def _limits(effect: Any, kind: str) -> tuple[list[float], list[float], float]:
@@ -33,6 +37,8 @@ class TorqueSource(Effect):
     speed_band : share of the speed limit within which what drives further falls to nothing
     """
 
+    _example = "pc.effects.TorqueSource(1.0)"
+
     torque: Any
     hinges: Any = None
     effort_limit: Any = np.inf
@@ -51,7 +57,8 @@ class Servo(Effect):
     Parameters
     ----------
     stiffness, damping : N m/rad or N/m, N m s/rad or N s/m
-        One number or one for each coordinate.
+        One number or one for each coordinate. Stiffness None: ω² (ℳ + J)_jj at q = 0 with ω = 20 rad/s. Damping None: critical,
+        2ω (ℳ + J)_jj, beside a stiffness that is None, else zero.
     target : rad or m
         One number or one for each coordinate; a `Table`, `Spline` or `Harmonic`; or a function of t, whose rate is found by differences
         unless it gives the tuple (position, velocity, acceleration).
@@ -59,15 +66,26 @@ class Servo(Effect):
     effort_limit, speed_limit, speed_band : as of `TorqueSource`
     """
 
-    stiffness: Any
-    damping: Any = 0.0
+    _example = "pc.effects.Servo(stiffness=100.0, damping=20.0)"
+
+    stiffness: Any = None
+    damping: Any = None
     target: Any = 0.0
     hinges: Any = None
     effort_limit: Any = np.inf
     speed_limit: Any = np.inf
     speed_band: float = 0.05
 
+    def completed_for(self, model: _core.Multibody) -> Servo:
+        if self.stiffness is not None:
+            return self if self.damping is not None else replace(self, damping=0.0)
+        coordinates = replace(self, stiffness=0.0, damping=0.0).made_for(model).coordinates
+        stiffness = stiffness_by_inertia(model, coordinates, FREQUENCY, "servo")
+        return replace(self, stiffness=stiffness, damping=2 * stiffness / FREQUENCY if self.damping is None else self.damping)
+
     def made_for(self, model: _core.Multibody) -> _core.Effect:
+        if self.stiffness is None or self.damping is None:
+            return self.completed_for(model).made_for(model)
         kp, kd = numbers_of(self.stiffness, "servo: stiffness"), numbers_of(self.damping, "servo: damping")
         target = function_of_time(self.target, "servo: target", derivatives=True)
         effort, speed, band = _limits(self, "servo")
@@ -88,6 +106,8 @@ class Motor(Effect):
     hinges : names of hinges, coordinates, patterns, or a list of them; None: all
     effort_limit, speed_limit, speed_band : at the hinge, as of `TorqueSource`
     """
+
+    _example = "pc.effects.Motor(0.5, stall_torque=2.0, no_load_speed=300.0, gear_ratio=50.0)"
 
     command: Any
     stall_torque: Any
@@ -118,6 +138,8 @@ class RotorInertia(Effect):
     hinges : names of hinges, coordinates, patterns, or a list of them; None: all
     gear_ratio : n, turns of the rotor for one of the hinge; one number or one for each coordinate
     """
+
+    _example = "pc.effects.RotorInertia(0.01)"
 
     inertia: Any
     hinges: Any = None

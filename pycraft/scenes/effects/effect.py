@@ -12,15 +12,18 @@ import numpy as np
 from ... import _core
 from ...arguments import listed, text
 from ...closed import Closed
+from .checked_arguments import Checked
 
 
-class Effect(Closed):
+class Effect(Closed, metaclass=Checked):
     """An effect: what acts on a model where a scene has it. Its fields can be set; a scene takes the change at its next call.
 
-    Subclasses are dataclasses whose fields are what a user gives, and say in `made_for` what they are in the core.
+    Subclasses are dataclasses whose fields are what a user gives, and say in `made_for` what they are in the core. A class attribute
+    `_example` is the call that an error about its arguments shows.
     """
 
     _changes = 0
+    _example = ""
 
     @classmethod
     def kind(cls) -> str:
@@ -30,6 +33,10 @@ class Effect(Closed):
     def made_for(self, model: _core.Multibody) -> _core.Effect:
         """The effect as the core has it, for a model. ModelError for names that are not there and numbers that make no sense."""
         raise NotImplementedError(f"{type(self).__name__} says in made_for what it is in the core")
+
+    def completed_for(self, model: _core.Multibody) -> Effect:  # noqa: ARG002 - subclasses need it
+        """Return the effect with every value that it takes from a model filled in: itself where it takes none."""
+        return self
 
     def at_states(self, model: _core.Multibody) -> Effect:  # noqa: ARG002 - subclasses need it
         """What it comes to in small steps: itself, or for one that acts in steps the effect that acts at states."""

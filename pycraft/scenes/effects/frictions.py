@@ -21,6 +21,8 @@ class Damping(Effect):
     hinges : names of hinges, coordinates, patterns, or a list of them; None: all
     """
 
+    _example = "pc.effects.Damping(0.1)"
+
     coefficient: Any
     hinges: Any = None
 
@@ -40,6 +42,8 @@ class QuadraticDamping(Effect):
         One number, one for each coordinate, or a dictionary by hinge. A negative one is warned of.
     hinges : names of hinges, coordinates, patterns, or a list of them; None: all
     """
+
+    _example = "pc.effects.QuadraticDamping(0.1)"
 
     coefficient: Any
     hinges: Any = None
@@ -63,6 +67,8 @@ class CoulombFriction(Effect):
     hinges : names of hinges, coordinates, patterns, or a list of them; None: all
     """
 
+    _example = "pc.effects.CoulombFriction(0.5)"
+
     level: Any
     smoothing: float = 0.01
     hinges: Any = None
@@ -85,6 +91,8 @@ class ImplicitDamping(Effect):
         One number, one for each coordinate, or a dictionary by hinge; not negative.
     hinges : names of hinges, coordinates, patterns, or a list of them; None: all
     """
+
+    _example = "pc.effects.ImplicitDamping(0.1)"
 
     coefficient: Any
     hinges: Any = None

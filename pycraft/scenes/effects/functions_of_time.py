@@ -10,10 +10,11 @@ import numpy as np
 
 from ... import _core
 from ...arguments import one_number
+from .checked_arguments import Checked
 from .effect import plain
 
 
-class InTime:
+class InTime(metaclass=Checked):
     """A function of time that the core knows: no Python is called in a run."""
 
     def in_core(self) -> _core.FunctionOfTime:
@@ -38,6 +39,8 @@ class Table(InTime):
     values : (K,) or (K, n)
     """
 
+    _example = "pc.effects.Table([0, 1, 2], [0, 0, 1.0])"
+
     times: Any
     values: Any
 
@@ -58,6 +61,8 @@ class Spline(InTime):
     ends : {"clamped", "natural", "not-a-knot"}
         At the ends: at rest, without curvature, or as SciPy's CubicSpline has it by default.
     """
+
+    _example = "pc.effects.Spline([0, 1, 2], [0, 0.5, 0])"
 
     times: Any
     values: Any
@@ -82,6 +87,8 @@ class Harmonic(InTime):
     frequency : Hz
     phase : rad
     """
+
+    _example = "pc.effects.Harmonic(amplitude=0.5, frequency=2.0)"
 
     amplitude: float
     frequency: float

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
+
+import numpy as np
 
 from ... import _core
 from ...arguments import one_number
 from .effect import Effect, names_of
+
+EARTH = (0.0, 0.0, -9.81)
+"""m/s², where neither the effect nor the model has a gravity."""
 
 
 @dataclass(repr=False, eq=False)
@@ -18,13 +23,20 @@ class Gravity(Effect):
 
     Parameters
     ----------
-    g : (3,) m/s², in the world's axes
+    g : (3,) m/s², in the world's axes; None: the model's own gravity where that is not zero, else (0, 0, -9.81)
+        The model's gravity is read when the scene computes: a later `model.gravity = ...` counts.
     """
 
-    g: Any = (0.0, 0.0, -9.81)
+    g: Any = None
+
+    def completed_for(self, model: _core.Multibody) -> Gravity:
+        if self.g is not None:
+            return self
+        own = np.asarray(model.gravity)
+        return replace(self, g=tuple(own.tolist()) if own.any() else EARTH)
 
     def made_for(self, model: _core.Multibody) -> _core.Effect:
-        return _core.gravity_effect(self.g)
+        return _core.gravity_effect(self.completed_for(model).g)
 
 
 @dataclass(repr=False, eq=False)
@@ -37,6 +49,8 @@ class PointMassGravity(Effect):
     position : (3,) m, the point, in the world's axes
     bodies : names of bodies, patterns, or a list of them; None: all
     """
+
+    _example = "pc.effects.PointMassGravity(3.986e14) for the Earth"
 
     mu: float
     position: Any = (0.0, 0.0, 0.0)
@@ -57,6 +71,8 @@ class GravityGradient(Effect):
     position : (3,) m, the point that attracts, in the world's axes
     bodies : names of bodies, patterns, or a list of them; None: all
     """
+
+    _example = "pc.effects.GravityGradient(3.986e14) for the Earth"
 
     mu: float
     position: Any = (0.0, 0.0, 0.0)

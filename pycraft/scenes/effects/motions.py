@@ -29,6 +29,8 @@ class Prescribed(Effect):
         accelerations at the default, for motions of seconds.
     """
 
+    _example = 'pc.effects.Prescribed("elbow", pc.effects.Harmonic(0.5, 2.0))'
+
     hinge: Any
     motion: Any
     step: float = 1e-3

@@ -27,6 +27,8 @@ class Spring(Effect):
     hinges : names of hinges, coordinates, patterns, or a list of them; None: all but free ones
     """
 
+    _example = "pc.effects.Spring(100.0)"
+
     stiffness: Any
     rest: Any = 0.0
     hinges: Any = None
@@ -51,6 +53,8 @@ class ImplicitSpring(Effect):
     rest : rad or m, one number or one for each coordinate
     hinges : names of hinges, coordinates, patterns, or a list of them; None: all that can have one
     """
+
+    _example = "pc.effects.ImplicitSpring(100.0)"
 
     stiffness: Any
     rest: Any = 0.0
@@ -78,6 +82,8 @@ class NodeSpring(Effect):
     length : m, where it is slack; 0: linear in all directions
     """
 
+    _example = 'pc.effects.NodeSpring("hand", None, stiffness=100.0)'
+
     node_a: Any
     node_b: Any
     stiffness: float
@@ -98,6 +104,8 @@ class NodeDamper(Effect):
     node_a, node_b : names of nodes or bodies; None: the base
     coefficient : N s/m
     """
+
+    _example = 'pc.effects.NodeDamper("hand", None, coefficient=10.0)'
 
     node_a: Any
     node_b: Any
@@ -120,6 +128,8 @@ class Bushing(Effect):
     damping : (6,) or (6, 6), N m s/rad and N s/m
     rest : (4, 4), the pose of b in a where nothing is stretched; None: the same place
     """
+
+    _example = 'pc.effects.Bushing("hand", None, stiffness=1000.0)'
 
     node_a: Any
     node_b: Any

@@ -47,6 +47,8 @@ class Langevin(Effect):
     boltzmann : k, J/K; 1 where temperatures are energies
     """
 
+    _example = "pc.effects.Langevin(temperature=1.0, friction=0.1, period=0.01)"
+
     temperature: float
     friction: Any
     period: float
@@ -78,6 +80,8 @@ class NoseHoover(Effect):
     boltzmann : k, J/K; 1 where temperatures are energies
     """
 
+    _example = "pc.effects.NoseHoover(temperature=1.0, time_constant=0.5)"
+
     temperature: float
     time_constant: float
     chain: int = 3
@@ -107,6 +111,8 @@ class Fixman(Effect):
     temperature : in units of energy over `boltzmann`
     boltzmann : k, J/K; 1 where temperatures are energies
     """
+
+    _example = "pc.effects.Fixman(temperature=1.0)"
 
     temperature: float
     boltzmann: float = 1.0

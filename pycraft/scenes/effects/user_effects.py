@@ -82,6 +82,8 @@ class UserEffect(Effect):
     rates : callable (t, state) -> rates of these; without it the function's method `rates`
     """
 
+    _example = "pc.effects.UserEffect(lambda t, state: -0.1 * state.v)"
+
     function: Any
     states: Any = None
     rates: Any = None
@@ -118,6 +120,8 @@ class Sampled(Effect):
     period : s
     hinges : names of hinges, coordinates, patterns, or a list of them; None: all
     """
+
+    _example = "pc.effects.Sampled(lambda t, state: -0.1 * state.v, period=0.01)"
 
     function: Any
     period: float

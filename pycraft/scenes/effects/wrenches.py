@@ -23,6 +23,8 @@ class Wrench(Effect):
         Those in which it is given: the world's, those of the body that carries the node, or any node's.
     """
 
+    _example = 'pc.effects.Wrench("hand", [0, 0, 0, 0, 0, 1.0])'
+
     node: Any
     wrench: Any
     axes: str = "world"
