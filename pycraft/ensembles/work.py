@@ -73,6 +73,7 @@ class SceneWork:
         if self._targets is None:
             self._targets = Targets(self.scene, self.names)
         q, v = self._targets.set(row)
+        self.scene._limits_said = True  # a sweep has thousands of runs; `crossed_limits` of each says them
         return self.measure(self.scene.simulate(self.T, q, v, progress=False, **self.options))
 
     def __post_init__(self) -> None:

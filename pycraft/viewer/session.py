@@ -67,7 +67,7 @@ class Session:
             return {
                 "edits": self._edits, "figure": figure_data(live.skeleton, states), "ghost": other, "coordinates": self._coordinates(),
                 "effects": [{"name": name, "kind": type(live.scene.effects[name]).__name__, "on": live.scene.is_on(name),
-                             "fields": shown_fields(live.scene.effects[name])} for name in names],
+                             "fields": shown_fields(live.scene.effects[name], live.model)} for name in names],
                 "ghosts": [*(["beside"] if self._beside is not None else []), *(f"without {name}" for name in names)],
                 "ghost_name": self.ghost_name, "letters": list(LETTERS), "loops": list(model.loops),
             }  # fmt: skip

@@ -59,7 +59,7 @@ def test_a_robot_with_effects(here):
     output = run("panda", *(word for effect in effects for word in ("--effect", effect)), "-T", "0.2", "--plot")
     lines = output.splitlines()
     assert lines[:4] == [
-        "scene of 'panda'", "  on  gravity: Gravity()", "  on  damping: Damping(coefficient=0.1)",
+        "scene of 'panda'", "  on  gravity: Gravity(g=(0.0, 0.0, -9.81))", "  on  damping: Damping(coefficient=0.1)",
         "  on  coil: Spring(stiffness=2, rest=0.1, hinges='panda_joint[12]')",
     ]  # fmt: skip
     assert "501 states kept" in output and "wrote panda.png" in output

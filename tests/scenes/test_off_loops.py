@@ -38,10 +38,10 @@ def test_what_keeps_no_loops_says_nothing():
     off = np.array(state.q) + [0.0, 0.0, 0.3]
     scenes = [
         pc.Scene(bars).add(E.Gravity()),
-        pc.Scene(bars).add(E.Loop()).disable("loop"),
-        pc.Scene(bars).add(E.Loop("parallel")),
-        pc.Scene(bars).add(E.Loop(alpha=10.0, beta=10.0)),
-        pc.Scene(bars).add(E.Loop("closure", method="penalty", frequency=100.0)),
+        pc.Scene(bars).add(E.Gravity(), E.Loop()).disable("loop"),
+        pc.Scene(bars).add(E.Gravity(), E.Loop("parallel")),
+        pc.Scene(bars).add(E.Gravity(), E.Loop(alpha=10.0, beta=10.0)),
+        pc.Scene(bars).add(E.Gravity(), E.Loop("closure", method="penalty", frequency=100.0)),
     ]
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -96,7 +96,7 @@ WRONG = [
     (lambda: E.Bushing("tip", "upper", 1.0, rest=2 * np.eye(4)), "bushing"),
     (lambda: E.Sampled(len, 0.0), "sampled: period is 0; it is a positive number of seconds"),
     (lambda: E.Sampled(3, 0.1), "sampled: a controller is a callable"),
-    (lambda: 3, "an effect of a user's is a callable"),
+    (lambda: 3, r"add\(\) takes an effect, .*; got 3"),
 ]
 
 
