@@ -103,7 +103,10 @@ if not _TYPE_CHECKING:  # types see the names above, and no others
                 module = _import_module(f"{__name__}.{room}")
                 globals()[name] = found = getattr(module, name, module)  # the robots are a module themselves
                 return found
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        from .other_names import remedy
+
+        said = "" if name.startswith("_") else remedy("pycraft", name)
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}{said}")
 
     def __dir__():
         return sorted({*globals(), *__all__})

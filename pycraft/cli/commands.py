@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -30,12 +29,26 @@ Root = Annotated[str | None, typer.Option(help="fixed | free: a free hinge first
 Mimic = Annotated[str, typer.Option(help="refuse | couple | lock | free: what becomes of a file's mimic joints.")]
 
 
+def _version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+
+        console.print(f"pycraft {version('pycraft-soa')}", highlight=False)
+        raise typer.Exit()
+
+
+@app.callback()
+def options(
+    version: Annotated[bool, typer.Option("--version", help="Show the version and exit.", callback=_version, is_eager=True)] = False,
+) -> None:
+    """A workbench for the Spatial Operator Algebra over a multibody model."""
+
+
 def load_model(name: str, root: str | None = None, mimic: str = "refuse") -> Any:
     """A robot of the package by name, or a file. ModelError, with the names of the robots, for what is neither."""
     from .. import _core
     from ..models import robots
     from ..models.loaders.load import load
-    from ..models.warning import ModelWarning
 
     if mimic not in MIMIC:
         raise _core.ModelError(f"mimic={mimic!r}: there are {', '.join(map(repr, MIMIC))}")
@@ -43,12 +56,7 @@ def load_model(name: str, root: str | None = None, mimic: str = "refuse") -> Any
         return getattr(robots, name)(**({} if root is None else {"root": root}))
     if not name or not Path(name).exists():
         raise _core.ModelError(f"no file is called {name!r}, and no robot of the package; its robots are {', '.join(robots.names())}")
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", ModelWarning)
-        model = load(name, root=root or "fixed", mimic=mimic)
-    for warning in caught:
-        note(f"warning: {warning.message}")
-    return model
+    return load(name, root=root or "fixed", mimic=mimic)
 
 
 def check_outputs(**paths: Path | None) -> None:

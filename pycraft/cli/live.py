@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from .runs import loaded_scene
+from .runs import FromModel, add_offered, loaded_scene
 from .terminal import note
 
 
@@ -17,15 +17,16 @@ def view(
         list[str] | None,
         typer.Option(help="Add an effect: gravity, damping:0.1, spring:2,rest=0.1,hinges=arm_*; may be repeated."),
     ] = None,
+    from_model: FromModel = False,
     beside: Annotated[str | None, typer.Option(help="A second scene, as the first is given: a ghost that plays with it.")] = None,
     seed: Annotated[int | None, typer.Option(help="Begin at the random state of this seed.")] = None,
-    host: Annotated[str, typer.Option(help="The address that is listened at; this machine alone unless another is given.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(help="Of that address; 0 is a free one.")] = 0,
-    browser: Annotated[bool, typer.Option(help="Whether the page is opened in the browser.")] = True,
+    host: Annotated[str, typer.Option(help="Address to listen on (default: this machine only).")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="Port; 0 picks a free one.")] = 0,
+    browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,
     root: Annotated[str | None, typer.Option(help="Of a model: fixed | free.")] = None,
     mimic: Annotated[str, typer.Option(help="Of a model's file: refuse | couple | lock | free.")] = "refuse",
 ) -> None:
-    """Look at a scene or a model in a page that is live: sliders, time, effects on and off, plots, numbers of picked bodies.
+    """Open a scene or a model in a live browser viewer: sliders, time, effects on and off, plots, values of picked bodies.
 
     pycraft view panda --effect gravity --effect damping:0.5; pycraft view scene.toml. Ctrl-C ends it.
     """
@@ -33,6 +34,7 @@ def view(
     from .commands import check_least
 
     scene = loaded_scene(what, root, mimic)
+    add_offered(scene, from_model)
     for text in effect or []:
         add_from_text(scene, text, f"--effect {text}")
     other = None if beside is None else loaded_scene(beside, None, "refuse")

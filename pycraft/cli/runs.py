@@ -15,6 +15,25 @@ SHOWN = 500
 """States that are kept where --every is left out."""
 
 
+FromModel = Annotated[
+    bool, typer.Option("--from-model", help="Add the effects that the model's file describes: damping, friction, springs, actuators.")
+]
+
+
+def add_offered(scene: Any, wanted: bool) -> None:
+    """Add the effects that the model's file describes where they are wanted, and report what no effect stands for."""
+    if not wanted:
+        return
+    from ..scenes.effects import from_model
+
+    offered = from_model(scene.model)
+    scene.add(*offered)
+    for text in offered.notes:
+        note(f"not offered: {text}")
+    if not offered:
+        note(f"the file of {scene.model.name!r} describes no effects")
+
+
 def run(
     what: Annotated[str, typer.Argument(help="A scene's TOML file; a model's file, a robot or a mechanism by name (pycraft.mechanisms).")],
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the run: .nc (NetCDF), .parquet or .csv.")] = None,
@@ -22,6 +41,7 @@ def run(
         list[str] | None,
         typer.Option(help="Add an effect: gravity, damping:0.1, spring:2,rest=0.1,hinges=arm_*; may be repeated."),
     ] = None,
+    from_model: FromModel = False,
     duration: Annotated[
         float | None, typer.Option("-T", "--duration", help="Seconds to simulate; what a scene's file says if left out.")
     ] = None,
@@ -50,6 +70,7 @@ def run(
     if output is not None:
         _check_output(output)
     scene = loaded_scene(what, root, mimic)
+    add_offered(scene, from_model)
     for text in effect or []:
         add_from_text(scene, text, f"--effect {text}")
     if seed is not None:

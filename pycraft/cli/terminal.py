@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, NoReturn, TextIO
 
 import typer
@@ -46,7 +48,27 @@ class Commands(TyperGroup):
         for stream in (sys.stdout, sys.stderr):
             if hasattr(stream, "reconfigure"):
                 stream.reconfigure(errors="backslashreplace")
-        return _guarded(lambda: super(Commands, self).invoke(ctx))
+        with warnings_as_notes():
+            return _guarded(lambda: super(Commands, self).invoke(ctx))
+
+
+@contextmanager
+def warnings_as_notes() -> Iterator[None]:
+    """Show each ModelWarning as a line on stderr, without the place in the code that led to it."""
+    from ..models.warning import ModelWarning
+
+    with warnings.catch_warnings():
+        others = warnings.showwarning
+        warnings.simplefilter("always", ModelWarning)
+
+        def show(message: Warning | str, category: type[Warning], filename: str, lineno: int, *further: Any, **named: Any) -> None:
+            if issubclass(category, ModelWarning):
+                note(f"warning: {message}")
+            else:
+                others(message, category, filename, lineno, *further, **named)
+
+        warnings.showwarning = show
+        yield
 
 
 def _guarded(run: Callable[[], Any]) -> Any:

@@ -12,6 +12,7 @@ from .. import _core
 from ..arguments import pose_parts, text
 from ..closed import Closed
 from ..dynamics.integration import IntegrationCalls
+from ..other_names import Renamed
 from ..state import State, at_state, random_state
 from .coalescing import Coalescing
 from .handles import Body, Hinge, Named, Node, Vector
@@ -24,7 +25,7 @@ from .structure import Structure
 from .with_loops import WithLoops
 
 
-class Multibody(Closed, IntegrationCalls, Pictures, Parts, Planning, Structure, Coalescing, WithLoops):
+class Multibody(Closed, Renamed, IntegrationCalls, Pictures, Parts, Planning, Structure, Coalescing, WithLoops):
     """A tree of bodies on hinges, with nodes, a state (`q`, `v`) and gravity (zero until it is set).
 
     Build one body by body, or load it (`pycraft.load`). Bodies are kept depth first, children in the order they were added, and
@@ -48,6 +49,8 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, Planning, Structure, 
     >>> mb.nv, mb.coordinate_names
     (2, ['upper', 'lower'])
     """
+
+    _of = "Multibody"
 
     def __init__(self, name: str = "multibody", *, welds: str = "lump", strict: bool = False):
         if not isinstance(welds, str) or welds not in ("lump", "keep"):

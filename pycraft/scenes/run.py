@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..other_names import Renamed
 from .checkpoint import Checkpoint, coordinates_of
 from .crossed_limits import CrossedLimit, crossed_limits, crossed_names, unheld_limits
 from .events import EventStates
 from .motion import Motion
 
 
-class Run(Motion):
+class Run(Motion, Renamed):
     """States of a scene over time, and what follows from them.
 
     Attributes
@@ -42,6 +43,8 @@ class Run(Motion):
     >>> run.at(0.7).frame("lower").position.shape
     (3,)
     """
+
+    _of = "Run"
 
     def __init__(
         self, about: Mapping[str, Any], rows: Mapping[str, np.ndarray], calls: Any = None, *, steps: Mapping[str, np.ndarray] | None = None,

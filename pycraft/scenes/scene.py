@@ -13,6 +13,8 @@ from ..arguments import chosen, moment, one_number, text
 from ..closed import Closed
 from ..models.grafting import Grafting
 from ..models.warning import warn
+from ..models.with_operators import WithOperators
+from ..other_names import Renamed
 from ..state import at_state, moment_of
 from .crossed_limits import warn_of_crossed_limits
 from .effects import Effect, Gravity, Limits, PointMassGravity, UserEffect
@@ -70,7 +72,7 @@ class Effects(Mapping[str, Effect]):
         return "{" + ", ".join(self._entries) + "}"
 
 
-class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed):
+class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed, Renamed):
     """A model and the effects that act on it. It starts empty: only added effects act, and not even the model's own gravity does.
 
     A model whose gravity is set and a scene without a gravity effect are told apart once, by a ModelWarning.
@@ -94,6 +96,8 @@ class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed):
     True
     """
 
+    _of = "Scene"
+
     def __init__(self, model: Any, *, form: str = "fast", refine: Any = 0, residual: str = "same", precision: Any = "double"):
         if not isinstance(model, _core.Multibody):
             raise _core.ModelError(f"a scene is of a model, not of {model!r:.80}")
@@ -107,6 +111,8 @@ class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed):
         self._calls()
         if isinstance(model, Grafting):
             model._used_by(self)
+        if isinstance(model, WithOperators):
+            model.warn()
 
     # ------------------------------------------------------------------ effects
     @property

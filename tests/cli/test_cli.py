@@ -165,3 +165,10 @@ def test_the_table_of_integrators_says_what_was_integrated():
 def test_brackets_of_help_are_kept():
     assert "(extra [peers])" in runner.invoke(app, ["peers", "--help"]).output
     assert "[lab]" in runner.invoke(app, ["--help"]).output
+
+
+def test_version():
+    from importlib.metadata import version
+
+    result = runner.invoke(app, ["--version"])
+    assert result.exit_code == 0 and result.output.strip() == f"pycraft {version('pycraft-soa')}" == f"pycraft {pc.__version__}"

@@ -57,7 +57,8 @@ def test_options_go_before_those_of_the_file(scene):
 def test_a_robot_with_effects(here):
     effects = ["gravity", "damping:0.1", "spring:2, rest=0.1, hinges=panda_joint[12], name=coil"]
     output = run("panda", *(word for effect in effects for word in ("--effect", effect)), "-T", "0.2", "--plot")
-    lines = output.splitlines()
+    lines = [line for line in output.splitlines() if not line.startswith("warning: ")]
+    assert "warning: coordinates of 'panda' left their limits, which no effect of this scene holds: panda_joint4 reached" in output
     assert lines[:4] == [
         "scene of 'panda'", "  on  gravity: Gravity(g=(0.0, 0.0, -9.81))", "  on  damping: Damping(coefficient=0.1)",
         "  on  coil: Spring(stiffness=2, rest=0.1, hinges='panda_joint[12]')",
@@ -65,6 +66,17 @@ def test_a_robot_with_effects(here):
     assert "501 states kept" in output and "wrote panda.png" in output
     assert (here / "panda.png").read_bytes().startswith(b"\x89PNG") and os.listdir() == ["panda.png"]
     assert re.search(r"kinetic \+ potential - work within \d\.\de-\d\d J", output)
+
+
+def test_effects_of_the_model_s_file(here):
+    output = run("panda", "--from-model", "-T", "0.1")
+    assert "on  damping: Damping(coefficient=[0.003," in output and "on  torque_source: TorqueSource(" in output
+    assert "the file of 'chain of 2 rods' describes no effects" in run_of_a_file(here)
+
+
+def run_of_a_file(here):
+    pc.chain(2).save("chain.toml")
+    return run("chain.toml", "--from-model", "-T", "0.1")
 
 
 def test_models_mechanisms_and_seeds(here):

@@ -18,7 +18,7 @@ class Checked(type):
     def __call__(cls, *given: Any, **named: Any) -> Any:
         """Make an object. ModelError for a missing, unknown or surplus argument."""
         try:
-            inspect.signature(cls.__init__).bind(None, *given, **named)
+            inspect.signature(cls.__init__).bind(None, *given, **named)  # type: ignore[misc]  # the class's own, as type.__call__ takes it
         except TypeError as error:
             raise _core.ModelError(_misfit(cls, len(given), named)) from error
         return super().__call__(*given, **named)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from ... import _core
 
 
-def stiffness_by_inertia(model: _core.Multibody, coordinates: Sequence[int], frequency: float, effect: str) -> np.ndarray:
+def stiffness_by_inertia(model: Any, coordinates: Sequence[int], frequency: float, effect: str) -> np.ndarray:
     """Return ω² (ℳ + J)_jj of coordinates, at the model's zero configuration: each by itself then swings with ω.
 
     Under an acceleration of free fall α it gives way by about α/ω², at any size and mass of the model.
