@@ -17,6 +17,9 @@ INDIFFERENT = 1e-9
 TOLERANCE = 1e-9
 """What may be left of forces, as a part of the largest of those that balance."""
 
+ROUNDED = 2e-14
+"""What is left of forces that balance to rounding: sums over some tens of bodies, as a part of the largest."""
+
 FAR = 1e4
 """Radians and metres beyond which a model that goes down the slope of its forces is taken to go on without end."""
 
@@ -178,7 +181,7 @@ class _Search:
         """By SciPy's solvers, then by steps of Newton to rounding."""
         from scipy.optimize import least_squares, root
 
-        if len(self.free):
+        if len(self.free) and not self.balanced(ROUNDED):  # steps from there would follow rounding, far along indifferent directions
             start = np.zeros(len(self.free))
             if not np.isfinite(self.bounds()).any():
                 self.take(root(self.left, start, jac=self.slope, method="hybr", options={"xtol": 1e-13, "factor": 0.5}).x)
