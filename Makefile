@@ -119,28 +119,31 @@ lint: .venv/tested
 	find pycraft -name "*.py" | LC_ALL=C sort | cmp -s - $@ || find pycraft -name "*.py" | LC_ALL=C sort > $@
 FORCE:
 
+# The first build compiles the C++ core: it shows what it compiles, how many of how many, and the time left.
+INSTALL = CMAKE_BUILD_PARALLEL_LEVEL=$(JOBS) $(BIN)/python cpp/build_progress.py -- $(BIN)/python -m pip install -v --no-build-isolation -C build-dir=build --editable
+
 .venv/installed: .venv/requirements .venv/modules $(COMPILED)
-	CMAKE_BUILD_PARALLEL_LEVEL=$(JOBS) $(BIN)/python -m pip install --quiet --no-build-isolation --editable . -C build-dir=build
+	@$(INSTALL) .
 	touch $@
 
 .venv/tested: .venv/installed
-	CMAKE_BUILD_PARALLEL_LEVEL=$(JOBS) $(BIN)/python -m pip install --quiet --no-build-isolation --editable ".[test]" -C build-dir=build
+	@$(INSTALL) ".[test]"
 	touch $@
 
 .venv/peers: .venv/tested
-	CMAKE_BUILD_PARALLEL_LEVEL=$(JOBS) $(BIN)/python -m pip install --quiet --no-build-isolation --editable ".[test,peers]" -C build-dir=build
+	@$(INSTALL) ".[test,peers]"
 	touch $@
 
 .venv/browser: .venv/tested
-	CMAKE_BUILD_PARALLEL_LEVEL=$(JOBS) $(BIN)/python -m pip install --quiet --no-build-isolation --editable ".[test,browser]" -C build-dir=build
+	@$(INSTALL) ".[test,browser]"
 	touch $@
 
 .venv/docs: .venv/installed
-	CMAKE_BUILD_PARALLEL_LEVEL=$(JOBS) $(BIN)/python -m pip install --quiet --no-build-isolation --editable ".[docs]" -C build-dir=build
+	@$(INSTALL) ".[docs]"
 	touch $@
 
 .venv/lab: .venv/installed
-	CMAKE_BUILD_PARALLEL_LEVEL=$(JOBS) $(BIN)/python -m pip install --quiet --no-build-isolation --editable ".[lab]" -C build-dir=build
+	@$(INSTALL) ".[lab]"
 	touch $@
 
 clean:

@@ -100,8 +100,8 @@ class Multibody(Closed, Renamed, IntegrationCalls, Pictures, Parts, Planning, St
         subhinges : list of dicts with "kind", "axis", "point", "pitch"
             Of a custom hinge, and of no other: any sequence of pin, slider, screw, ball, free.
         position, rotation, or placement : (3,), (3, 3), (4, 4)
-            Pose of the hinge's inboard frame in the parent's frame. A rotation that is orthogonal to six digits only is taken for the
-            nearest one.
+            Pose of the hinge's inboard frame in the parent's frame. It must be a rotation; one accurate to six digits
+            is rounded to the nearest.
         mass, com, inertia : kg, (3,) m in the body frame, (3, 3) kg m² about the centre of mass in the body's axes
         rotor_inertia : float or (n,)
             Reflected inertia of rotors along the hinge's coordinates: the hinge-diagonal term J.

@@ -11,7 +11,7 @@ CHANGES = {
         ("foreign origins are answered", "if known and not foreign and", "if known and"),
         ("foreign names of this machine are answered", "host.hostname in LOCAL if", "bool(host.hostname) if"),
     ],
-    "pycraft/viewer/effect_fields.py": [("a refused parameter stays", "        setattr(changed, field, before)\n", "        pass\n")],
+    "pycraft/viewer/effect_fields.py": [("a refused parameter stays", "        setattr(changed, field, present)\n", "        pass\n")],
     "pycraft/scenes/run_page.py": [("the end of a run is no frame", "np.append(times, last) if", "times if")],
     "pycraft/view/web_page.py": [("names are markup", '.replace("<", "\\\\u003c")', "")],
     "pycraft/dynamics/embedded_motion.py": [

@@ -71,6 +71,7 @@ EXAMPLES = {
     "structure": 25,
     "divide_and_conquer": 1,
     "viewing": 12,
+    "coming_from": 3,
 }
 # Pages whose blocks are run one after the other.
 BLOCKS = ["symbolic", "kalman", "accuracy", "evaluation", "statements", "teaching", "proofs", "compiled", "pictures"]

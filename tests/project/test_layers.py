@@ -227,6 +227,7 @@ def test_what_takes_long_to_import_is_imported_where_it_is_used():
 RESTS_ON = {
     "_core": [],
     "closed": ["_core"],
+    "other_names": [],
     "arguments": ["_core"],
     "formula_nodes": [],
     "tidy": ["_core"],
@@ -237,7 +238,7 @@ RESTS_ON = {
     "linear": ["arguments", "tidy"],
     "dynamics": ["state", "linear"],
     "interop": ["_core"],
-    "models": ["operators", "dynamics", "interop"],
+    "models": ["operators", "dynamics", "interop", "other_names"],
     "kalman": ["models"],
     "kinematics": ["models"],
     "recursions": ["models", "formula_nodes"],

@@ -1,4 +1,4 @@
-"""Files and functions that a reader takes in: no file above 400 lines, no function above a screen."""
+"""Files and functions that a reader takes in: no file above 600 lines, no function above a screen."""
 
 import ast
 import re
@@ -16,7 +16,7 @@ SCOPE = re.compile(r"(inline )?(namespace|class|struct|union|enum|extern)\b")
 
 
 def test_files():
-    long = {p.relative_to(ROOT).as_posix(): n for p in (*SOURCES, *TESTS) if (n := len(p.read_text().splitlines())) > 400}
+    long = {p.relative_to(ROOT).as_posix(): n for p in (*SOURCES, *TESTS) if (n := len(p.read_text().splitlines())) > 600}
     assert len(SOURCES) > 300 and len(TESTS) > 100 and not long
 
 
