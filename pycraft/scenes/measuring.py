@@ -57,6 +57,7 @@ def effects_on(scene: Any) -> list[str]:
 def having_on(scene: Any, names: Iterable[str]) -> Any:
     """A scene of the same effects, of which these are on and no others. ModelError where two of them claim the same coordinate."""
     other, wanted = copy.copy(scene), set(names)
+    other._limits_said = True  # one of many runs: the user's own say which limits they cross
     other.disable(*other.effects)
     return other.enable(*(name for name in scene.effects if name in wanted))
 

@@ -85,3 +85,12 @@ def test_nothing_is_crossed_without_coordinates():
     model = pc.Multibody("m")
     model.add_body("b", None, "weld", mass=1.0)
     assert pc.Scene(model).simulate(1.0, **QUIET).crossed_limits == []
+
+
+def test_the_many_runs_of_a_comparison_say_nothing():
+    scene = pc.Scene(sliders((-1, 1))).add(E.Damping(0.01), E.Spring(0.001))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", ModelWarning)
+        scene.compare(T=3.0, q=[0.0], v=[1.0], seconds=0.001)
+    with pytest.warns(ModelWarning, match="s0 reached"):
+        scene.simulate(3.0, [0.0], [1.0], **QUIET)
