@@ -6,6 +6,8 @@ from typing import Any
 
 import pycraft as pc
 
+from .groups import MULTIBODY, PYCRAFT, grouped
+
 
 def public() -> dict[str, Any]:
     """What `import pycraft as pc` promises, by name."""
@@ -20,7 +22,30 @@ def first_sentence(thing: Any) -> str:
     return (sentence[:160] + " …" if len(sentence) > 160 else sentence).replace("|", r"\|").replace("``", "`").replace("*", r"\*")
 
 
+def of_groups(name: str, kind: type, groups: dict[str, str]) -> str:
+    """The page of a class with its members under headings, a table of them first."""
+    parts = [f"# {name}", f"```{{eval-rst}}\n.. autoclass:: pycraft.{name}\n```"]
+    by_heading = grouped(groups, [member for member in dir(kind) if not member.startswith("_")])
+    rows = [f"| [{heading}](#{anchor(heading)}) | {', '.join(f'`{member}`' for member in members)} |" for heading, members in by_heading.items()]
+    parts.append("\n".join(["| | |", "|---|---|", *rows]))
+    for heading, members in by_heading.items():
+        listed = "\n\n".join(f".. {directive(kind, member)}:: pycraft.{name}.{member}" for member in members)
+        parts.append(f"## {heading}\n\n```{{eval-rst}}\n{listed}\n```")
+    return "\n\n".join(parts) + "\n"
+
+
+def anchor(heading: str) -> str:
+    return heading.lower().replace(" ", "-")
+
+
+def directive(kind: type, member: str) -> str:
+    found = inspect.getattr_static(kind, member)
+    return "autoproperty" if isinstance(found, property) else "automethod" if callable(getattr(kind, member)) else "autoattribute"
+
+
 def of_class(name: str, kind: type) -> str:
+    if name == "Multibody":
+        return of_groups(name, kind, MULTIBODY)
     page = f"# {name}\n\n```{{eval-rst}}\n.. autoclass:: pycraft.{name}\n   :members:\n"
     return page + ("   :inherited-members: pybind11_object, object, Exception, Warning, tuple, dict, str\n```\n")
 
@@ -55,7 +80,10 @@ def pages() -> dict[str, str]:
     place = (
         {n: n for n in classes} | {n: f"{n}_module" for n in modules} | {n: "functions" for n in functions} | {n: "errors" for n in errors}
     )
-    rows = [f"| [`{n}`]({place[n]}.md) | {first_sentence(names[n])} |" for n in names]
-    table = "\n".join(["| name | what it is |", "|---|---|", *rows])
+    tables = []
+    for heading, group in grouped(PYCRAFT, list(names)).items():
+        rows = [f"| [`{n}`]({place[n]}.md) | {first_sentence(names[n])} |" for n in group]
+        tables.append("\n".join([f"## {heading}\n", "| name | what it is |", "|---|---|", *rows]))
+    table = "\n\n".join(tables)
     tree = "```{toctree}\n:hidden:\n\n" + "\n".join(page.removeprefix("docs/api/") for page in made) + "\n```"
-    return {"docs/api/index": f"# Every public name\n\nWhat `import pycraft as pc` has, with types.\n\n{table}\n\n{tree}\n", **made}
+    return {"docs/api/index": f"# Reference\n\nEvery public name of `import pycraft as pc`, with types.\n\n{table}\n\n{tree}\n", **made}

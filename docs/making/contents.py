@@ -8,7 +8,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 INDEX = ROOT / "docs" / "index.md"
 # What follows from the code is written when the site is made; docs/index.md names it beside what is committed.
-GENERATED = ("docs/operators/index", "docs/theorems", "docs/api/index", "docs/gallery")
+GENERATED = ("docs/operators/index", "docs/theorems/index", "docs/api/index", "docs/gallery/index")
 
 
 def listed() -> list[str]:

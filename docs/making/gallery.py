@@ -1,10 +1,14 @@
-"""The gallery: every script of docs/gallery with the picture that it draws and the page that it leaves, made when the site is."""
+"""The gallery: every script of docs/gallery with the figure that it draws and the page that it leaves, made when the site is."""
 
 import ast
+import warnings
 from pathlib import Path
 from typing import Any
 
+from pycraft.models.warning import ModelWarning
+
 from .contents import ROOT
+from .dark import darken
 
 SCRIPTS = sorted((ROOT / "docs" / "gallery").glob("*.py"))
 
@@ -20,8 +24,16 @@ def plays(script: Path) -> bool:
     return any(isinstance(node, ast.Name) and node.id == "page" and isinstance(node.ctx, ast.Store) for node in ast.walk(tree))
 
 
+def title(script: Path) -> str:
+    """The title of an example, from the name of its script."""
+    return script.stem.replace("_", " ").capitalize()
+
+
 def draw(script: Path, picture: Path) -> None:
-    """Runs a script and saves the last figure that it left, one that leaves none is an error; and its page beside it, if it leaves one."""
+    """Run a script and save the last figure that it left, for light pages and, beside it, for dark ones; and its page, if it leaves one.
+
+    ValueError for a script that leaves no figure.
+    """
     import matplotlib
 
     matplotlib.use("Agg")
@@ -29,28 +41,43 @@ def draw(script: Path, picture: Path) -> None:
 
     plt.close("all")
     left: dict[str, Any] = {"__name__": "__main__"}
-    exec(compile(script.read_text(encoding="utf-8"), str(script), "exec"), left)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ModelWarning)
+        exec(compile(script.read_text(encoding="utf-8"), str(script), "exec"), left)
     if not plt.get_fignums():
         raise ValueError(f"{script.name} leaves no figure: every example of the gallery draws one")
     picture.parent.mkdir(parents=True, exist_ok=True)
     if plays(script):
         left["page"].save(picture.with_suffix(".html"))
     plt.gcf().savefig(picture, dpi=110, bbox_inches="tight")
+    darken(plt.gcf())
+    plt.gcf().savefig(picture.with_name(f"{picture.stem}_dark.png"), dpi=110, bbox_inches="tight")
     plt.close("all")
 
 
 def pages() -> dict[str, str]:
-    """The page; its pictures are named as the scripts are."""
-    parts = [
-        "# Gallery",
-        f"{len(SCRIPTS)} examples, each whole, with what it draws; what they call `page` plays here, and turns by the mouse.",
-    ]
+    """The gallery as thumbnails, and a page for each example; pictures are named as the scripts are."""
+    cards = []
     for script in SCRIPTS:
-        title = script.stem.replace("_", " ").capitalize()
-        code = script.read_text(encoding="utf-8").partition('"""\n\n')[2].strip()
-        parts += [f"## {title}", said(script), f"![{title}](gallery/{script.stem}.png)"]
-        if plays(script):
-            frame = f'<iframe src="gallery/{script.stem}.html" title="{title}, playing" loading="lazy" class="plays"></iframe>'
-            parts.append(f"```{{raw}} html\n{frame}\n```")
-        parts.append(f"```python\n{code}\n```")
-    return {"docs/gallery": "\n\n".join(parts) + "\n"}
+        cards.append(
+            f":::{{grid-item-card}} {title(script)}\n:link: {script.stem}\n:link-type: doc\n:class-card: example\n\n"
+            f"![{title(script)}]({script.stem}.png){{.only-light}}\n![{title(script)}]({script.stem}_dark.png){{.only-dark}}\n\n"
+            f"{said(script)}\n:::"
+        )
+    tree = "```{toctree}\n:hidden:\n\n" + "\n".join(script.stem for script in SCRIPTS) + "\n```"
+    grid = "::::{grid} 1 2 3 3\n:gutter: 3\n\n" + "\n\n".join(cards) + "\n::::"
+    playing = ", ".join(f"[{title(script)}]({script.stem}.md)" for script in SCRIPTS if plays(script))
+    first = f"# Gallery\n\n{len(SCRIPTS)} short, complete examples, each with the figure that it draws. These also play: {playing}."
+    return {"docs/gallery/index": f"{first}\n\n{grid}\n\n{tree}\n"} | {f"docs/gallery/{script.stem}": example(script) for script in SCRIPTS}
+
+
+def example(script: Path) -> str:
+    """The page of one example: what it shows, its figure, the page that plays, its code."""
+    code = script.read_text(encoding="utf-8").partition('"""\n\n')[2].strip()
+    parts = [f"# {title(script)}", said(script)]
+    if plays(script):
+        frame = f'<iframe src="{script.stem}.html" title="{title(script)}, playing" class="plays"></iframe>'
+        parts.append(f"```{{raw}} html\n{frame}\n```")
+    parts.append(f"![{title(script)}]({script.stem}.png){{.only-light}}\n![{title(script)}]({script.stem}_dark.png){{.only-dark}}")
+    parts.append(f"```python\n{code}\n```")
+    return "\n\n".join(parts) + "\n"

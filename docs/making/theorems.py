@@ -1,5 +1,6 @@
 """The catalogue of theorems as a page, each with its hypotheses, its source and its proof from the definitions."""
 
+import re
 from typing import Any
 
 import pycraft as pc
@@ -33,17 +34,24 @@ def entry(number: int, theorem: Any) -> str:
 
 
 def pages() -> dict[str, str]:
-    """The page, group by group."""
+    """A page for each group, and the list of all theorems first."""
     theorems = list(enumerate(example().soa.theorems()))
-    text = [
-        "# The theorems",
-        "The catalogue as the planner and `arm.soa.check()` have it, each theorem with its hypotheses and, where `pc.prove` finds one, "
-        "with its proof from the definitions ([proofs](proofs.md)).",
-    ]
+    made, listed = {}, []
     for group in dict.fromkeys(theorem.group for _, theorem in theorems):
-        text += [f"## {plain(group)}"]
+        name = re.sub(r"[^a-z0-9]+", "_", group.lower()).strip("_")
+        text, rows = [f"# {plain(group)}"], []
         for number, theorem in theorems:
-            if theorem.group == group:
-                waiting = f"- {plain(theorem.name)}: waits for {theorem.waiting}"
-                text += [waiting if theorem.waiting else entry(number, theorem)]
-    return {"docs/theorems": "\n\n".join(text) + "\n"}
+            if theorem.group != group:
+                continue
+            waiting = f"- {plain(theorem.name)}: waits for {theorem.waiting}"
+            text += [waiting if theorem.waiting else entry(number, theorem)]
+            rows += [waiting if theorem.waiting else f"- [{plain(theorem.name)}](#theorem-{number})"]
+        made[f"docs/theorems/{name}"] = "\n\n".join(text) + "\n"
+        listed += [f"## [{plain(group)}]({name}.md)", "\n".join(rows)]
+    tree = "```{toctree}\n:hidden:\n\n" + "\n".join(page.rpartition("/")[2] for page in made) + "\n```"
+    first = [
+        "# The theorems",
+        f"The {len(theorems)} theorems of the catalogue, as the planner and `arm.soa.check()` have them. Each has its hypotheses and, where "
+        "`pc.prove` finds one, its proof from the definitions ([proofs](../proofs.md)).",
+    ]
+    return {"docs/theorems/index": "\n\n".join([*first, *listed, tree]) + "\n", **made}
