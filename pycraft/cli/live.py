@@ -23,7 +23,7 @@ def view(
     port: Annotated[int, typer.Option(help="Of that address; 0 is a free one.")] = 0,
     browser: Annotated[bool, typer.Option(help="Whether the page is opened in the browser.")] = True,
     root: Annotated[str | None, typer.Option(help="Of a model: fixed | free.")] = None,
-    mimic: Annotated[str, typer.Option(help="Of a model's file: refuse | couple | lock | free.")] = "refuse",
+    mimic: Annotated[str, typer.Option(help="Of a model's file: couple | refuse | lock | free.")] = "couple",
 ) -> None:
     """Look at a scene or a model in a page that is live: sliders, time, effects on and off, plots, numbers of picked bodies.
 
@@ -35,7 +35,7 @@ def view(
     scene = loaded_scene(what, root, mimic)
     for text in effect or []:
         add_from_text(scene, text, f"--effect {text}")
-    other = None if beside is None else loaded_scene(beside, None, "refuse")
+    other = None if beside is None else loaded_scene(beside, None, "couple")
     state: Any = None
     if seed is not None:
         check_least(0, seed=seed)
