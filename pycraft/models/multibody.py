@@ -242,9 +242,9 @@ class Multibody(Closed, IntegrationCalls, Pictures, Parts, Planning, Structure, 
         Warns
         -----
         ModelWarning
-            What the model has beside bodies and hinges and the format does not hold (URDF: gravity, a state; MJCF: some loops; both:
-            `shapes`); loose frames, couplings by functions, meshes that an MJCF file held itself, and what unlocks and splits, which no
-            file holds.
+            What the format does not hold: gravity and a state (URDF), some loops (MJCF), some shapes (ellipsoids in URDF, meshes that
+            MuJoCo does not read in MJCF, meshes without a file of their own in URDF and TOML). What no file holds: loose frames, couplings
+            by functions, what unlocks hinges and splits bodies.
 
         Examples
         --------
