@@ -6,7 +6,9 @@
 #include "simulation/effects/coulomb_friction.h"
 #include "simulation/effects/damping.h"
 #include "simulation/effects/fixman.h"
+#include "simulation/effects/fluid_drag.h"
 #include "simulation/effects/gravity.h"
+#include "simulation/effects/gravity_compensation.h"
 #include "simulation/effects/gravity_gradient.h"
 #include "simulation/effects/implicit_damping.h"
 #include "simulation/effects/implicit_spring.h"
@@ -92,6 +94,25 @@ void register_effects(py::module_& m) {
   m.def("gravity_gradient_effect", [effect](const Multibody& model, double mu, const py::object& position, const Names& bodies) {
     return effect(std::make_shared<GravityGradient>(model, mu, to_vector3(position, "gravity_gradient: position"), bodies));
   }, py::arg("model"), py::arg("mu"), py::arg("position"), py::arg("bodies"));
+  m.def("gravity_compensation_effect", [effect](const Multibody& model, const Names& bodies, const std::vector<double>& share, const std::vector<double>& points, const py::object& g) {
+    return effect(std::make_shared<GravityCompensation>(model, bodies, share, points, to_vector3(g, "gravity_compensation: g")));
+  }, py::arg("model"), py::arg("bodies"), py::arg("share"), py::arg("points"), py::arg("g"));
+  m.def("fluid_drag_effect", [effect](const Multibody& model, double density, double viscosity, const py::object& wind, const std::vector<std::string>& nodes,
+                                      const std::vector<py::array_t<double>>& placements, const std::vector<py::object>& sizes) {
+    std::vector<BoxInFluid> boxes;
+    for (size_t i = 0; i < nodes.size(); ++i) {
+      const Node node = node_named(model, nodes[i], "fluid_drag");
+      if (node.body < 0) throw ModelError("fluid_drag: '" + nodes[i] + "' is on the base, which no fluid moves");
+      const auto X = placements[i].unchecked<2>();
+      Pose<double> pose;
+      for (int r = 0; r < 3; ++r) {
+        pose.p[r] = X(r, 3);
+        for (int c = 0; c < 3; ++c) pose.R(r, c) = X(r, c);
+      }
+      boxes.push_back({node.body, node.pose * pose, to_vector3(sizes[i], "fluid_drag: sizes")});
+    }
+    return effect(std::make_shared<FluidDrag>(density, viscosity, to_vector3(wind, "fluid_drag: wind"), std::move(boxes)));
+  }, py::arg("model"), py::arg("density"), py::arg("viscosity"), py::arg("wind"), py::arg("nodes"), py::arg("placements"), py::arg("sizes"));
   m.def("quadratic_damping_effect", [effect](const Multibody& model, const Names& hinges, const std::vector<double>& coefficient) {
     return effect(std::make_shared<QuadraticDamping>(model, hinges, coefficient));
   }, py::arg("model"), py::arg("hinges"), py::arg("coefficient"));

@@ -9,7 +9,9 @@
 #include "simulation/effects/coulomb_friction.h"
 #include "simulation/effects/damping.h"
 #include "simulation/effects/fixman.h"
+#include "simulation/effects/fluid_drag.h"
 #include "simulation/effects/gravity.h"
+#include "simulation/effects/gravity_compensation.h"
 #include "simulation/effects/gravity_gradient.h"
 #include "simulation/effects/implicit_damping.h"
 #include "simulation/effects/implicit_spring.h"
@@ -63,6 +65,8 @@ std::vector<EffectPointer> every_effect(const Multibody& mb) {
   return {std::make_shared<Gravity>(Vector3<double>{0, 0, -9.81}),
           std::make_shared<PointMassGravity>(mb, 3.0, Vector3<double>{5, 4, 3}, all),
           std::make_shared<GravityGradient>(mb, 3.0, Vector3<double>{5, 4, 3}, all),
+          std::make_shared<GravityCompensation>(mb, all, std::vector<double>{0.7}, std::vector<double>{}, Vector3<double>{0, 0, -9.81}),
+          std::make_shared<FluidDrag>(2.0, 0.3, Vector3<double>{0.1, 0.2, 0.3}, std::vector<BoxInFluid>{{2, Pose<double>{Matrix3<double>::identity(), {0.1, 0, 0}}, {0.1, 0.2, 0.3}}}),
           std::make_shared<Damping>(mb, all, std::vector<double>{0.2}),
           std::make_shared<QuadraticDamping>(mb, all, std::vector<double>{0.2}),
           std::make_shared<CoulombFriction>(mb, all, std::vector<double>{0.2}, 0.1),

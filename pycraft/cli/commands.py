@@ -23,10 +23,11 @@ app = typer.Typer(
     "files and pipes, which have no width of their own, get 140 columns.",
 )
 
-MIMIC = ("refuse", "couple", "lock", "free")
-Model = Annotated[str, typer.Argument(help="A TOML, URDF or MJCF file, or the name of a robot of the package (see pycraft.robots).")]
-Root = Annotated[str | None, typer.Option(help="fixed | free: a free hinge first; fixed if left out, of a robot by name its own.")]
-Mimic = Annotated[str, typer.Option(help="refuse | couple | lock | free: what becomes of a file's mimic joints.")]
+Model = Annotated[str, typer.Argument(help="A TOML, URDF, SDF or MJCF file, or the name of a robot (see pycraft.load).")]
+Root = Annotated[
+    str | None, typer.Option(help="fixed | free: what carries the root link; by default fixed for files, and the robot's own for names.")
+]
+Mimic = Annotated[str, typer.Option(help="couple | refuse | lock | free: what becomes of a file's mimic joints.")]
 
 
 def _version(asked: bool) -> None:
@@ -44,19 +45,11 @@ def options(
     """A workbench for the Spatial Operator Algebra over a multibody model."""
 
 
-def load_model(name: str, root: str | None = None, mimic: str = "refuse") -> Any:
-    """A robot of the package by name, or a file. ModelError, with the names of the robots, for what is neither."""
-    from .. import _core
-    from ..models import robots
+def load_model(name: str, root: str | None = None, mimic: str = "couple") -> Any:
+    """Return the model of a file, or a robot by its name. ModelError, with the nearest names, for what is neither."""
     from ..models.loaders.load import load
 
-    if mimic not in MIMIC:
-        raise _core.ModelError(f"mimic={mimic!r}: there are {', '.join(map(repr, MIMIC))}")
-    if name in robots.names() and not Path(name).is_file():  # none of them has a mimic joint
-        return getattr(robots, name)(**({} if root is None else {"root": root}))
-    if not name or not Path(name).exists():
-        raise _core.ModelError(f"no file is called {name!r}, and no robot of the package; its robots are {', '.join(robots.names())}")
-    return load(name, root=root or "fixed", mimic=mimic)
+    return load(name, root=root, mimic=mimic)
 
 
 def check_outputs(**paths: Path | None) -> None:
@@ -100,7 +93,7 @@ def check_seconds(**durations: float | None) -> None:
 def tour(
     model: Annotated[str | None, typer.Argument(help="A TOML, URDF or MJCF file, or a robot's name; the Panda by default.")] = None,
     root: Root = None,
-    mimic: Mimic = "refuse",
+    mimic: Mimic = "couple",
 ) -> None:
     """Load a real robot, type the book's formulas, factor, invert, and check the theorems."""
     from .tour import run
@@ -117,7 +110,7 @@ def check(
     every: Annotated[bool, typer.Option("--all", help="The long form: residuals, bounds, hypotheses and notes of every theorem.")] = False,
     json: Annotated[bool, typer.Option("--json", help="The report as JSON.")] = False,
     root: Root = None,
-    mimic: Mimic = "refuse",
+    mimic: Mimic = "couple",
 ) -> None:
     """Check every theorem on a model, or the displayed equations of a LaTeX paper (a .tex file, on random trees).
 
@@ -128,7 +121,7 @@ def check(
     check_least(0, states=states, seed=seed)
     wide = int(precision) if precision.isdecimal() else precision
     if model.endswith(".tex"):
-        for option, given in (("all", every), ("root", root is not None), ("mimic", mimic != "refuse")):
+        for option, given in (("all", every), ("root", root is not None), ("mimic", mimic != "couple")):
             if given:
                 fail(f"--{option} belongs to models; a paper is checked on random trees, and shown in full")
         _check_paper(model, states, seed, wide, json)
@@ -225,7 +218,7 @@ def accuracy(
     json: Annotated[Path | None, typer.Option(help="Write the rows as JSON.")] = None,
     plot: Annotated[Path | None, typer.Option(help="Draw error against time (PNG, SVG or PDF).")] = None,
     root: Root = None,
-    mimic: Mimic = "refuse",
+    mimic: Mimic = "couple",
 ) -> None:
     """What accuracy costs on a model: error, time and memory of every form, refinement, precision and method; or of integrators.
 

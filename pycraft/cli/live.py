@@ -24,7 +24,7 @@ def view(
     port: Annotated[int, typer.Option(help="Port; 0 picks a free one.")] = 0,
     browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,
     root: Annotated[str | None, typer.Option(help="Of a model: fixed | free.")] = None,
-    mimic: Annotated[str, typer.Option(help="Of a model's file: refuse | couple | lock | free.")] = "refuse",
+    mimic: Annotated[str, typer.Option(help="Of a model's file: couple | refuse | lock | free.")] = "couple",
 ) -> None:
     """Open a scene or a model in a live browser viewer: sliders, time, effects on and off, plots, values of picked bodies.
 
@@ -37,7 +37,7 @@ def view(
     add_offered(scene, from_model)
     for text in effect or []:
         add_from_text(scene, text, f"--effect {text}")
-    other = None if beside is None else loaded_scene(beside, None, "refuse")
+    other = None if beside is None else loaded_scene(beside, None, "couple")
     state: Any = None
     if seed is not None:
         check_least(0, seed=seed)

@@ -56,7 +56,7 @@ def run(
     plot: Annotated[bool, typer.Option("--plot", help="Draw coordinates, energies and forces: a PNG beside the output, or here.")] = False,
     save: Annotated[Path | None, typer.Option(help="Write the scene, with its effects and these options, as TOML.")] = None,
     root: Annotated[str | None, typer.Option(help="Of a model: fixed | free.")] = None,
-    mimic: Annotated[str, typer.Option(help="Of a model's file: refuse | couple | lock | free.")] = "refuse",
+    mimic: Annotated[str, typer.Option(help="Of a model's file: couple | refuse | lock | free.")] = "couple",
 ) -> None:
     """Simulate a scene: its file, or a model with the effects that are named, and no others.
 
@@ -112,7 +112,7 @@ def loaded_scene(what: str, root: str | None, mimic: str) -> Any:
     known = [name for name, made in vars(mechanisms).items() if getattr(made, "__module__", "") == mechanisms.__name__ and name.islower()]
     is_file = Path(what).is_file()
     if (is_file and _is_scene(what)) or (what in known and what not in robots.names() and not is_file):
-        for option, is_given in (("root", root is not None), ("mimic", mimic != "refuse")):
+        for option, is_given in (("root", root is not None), ("mimic", mimic != "couple")):
             if is_given:
                 fail(f"--{option} belongs to models; a scene has its model with it")
         return load_scene(what) if is_file else getattr(mechanisms, what)()

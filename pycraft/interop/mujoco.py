@@ -13,7 +13,7 @@ base, as MuJoCo has them nowhere else.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,8 +24,14 @@ from .described import Described, described, theirs
 from .packages import required
 
 
-def compiled(path: str) -> Any:
-    """The MjModel that MuJoCo's compiler makes of an MJCF file.
+def compiled(path: str, prepare: Callable[[Any], None] | None = None) -> Any:
+    """Return the MjModel that MuJoCo's compiler makes of an MJCF file.
+
+    Parameters
+    ----------
+    path : path of the file
+    prepare : function of the `MjSpec`, optional
+        Changes the parsed file before it is compiled.
 
     Raises
     ------
@@ -35,15 +41,27 @@ def compiled(path: str) -> Any:
         What MuJoCo refuses, in its words.
     """
     if not isinstance(path, (str, Path)):
-        raise _core.ModelError(f"a file is called by its path, not by {path!r:.60}")
+        raise _core.ModelError(f"an MJCF file is named by its path, not by {path!r:.60}")
     mujoco, path = required("mujoco", "mjcf", f"{path}: MJCF files are read by"), str(path)
     try:
-        return mujoco.MjSpec.from_file(path).compile()
-    except ValueError as error:
+        spec = mujoco.MjSpec.from_file(path)
+        if prepare is not None:
+            prepare(spec)
+        return spec.compile()
+    except (ValueError, IndexError, KeyError, TypeError, RuntimeError, mujoco.FatalError) as error:
+        if isinstance(error, (_core.Error, UnicodeDecodeError)):
+            raise
         said = " ".join(str(error).split())
         found = re.search(r", line (\d+)$", said)
         whole = found is not None and b"<include" not in Path(path).read_bytes()  # or the line may be another file's
         raise _core.ModelError(f"{path}{f':{found[1]}' if found and whole else ''}: MuJoCo refuses the file: {said}") from None
+
+
+def disabled(compiled_model: Any, feature: str) -> bool:
+    """Return whether an MjModel disables a feature, by the name of its flag in MJCF: "gravity", "damper", ..."""
+    mujoco = required("mujoco", "mjcf", "the flags of a MuJoCo model need")
+    names = (feature, "passive") if feature in ("spring", "damper") else (feature,)  # one flag for both before MuJoCo 3.4
+    return any(compiled_model.opt.disableflags & int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name.upper()}", 0)) for name in names)
 
 
 class _Free(NamedTuple):

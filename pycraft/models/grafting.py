@@ -13,6 +13,7 @@ from ..arguments import pose_parts, text
 from .asides import Asides
 from .handles import Body, Node, Vector
 from .hinge_arguments import body_name, frame_name
+from .offers import Offer
 from .shapes import Shape, renamed
 from .with_loops import WithLoops
 
@@ -33,6 +34,7 @@ class Grafting(WithLoops):
     _left_aside: dict[str, np.ndarray]
     _actuators: list[dict[str, Any]]
     _shapes: list[Shape]
+    _offers: list[Offer]
     _added_nodes: set[str]
     _scenes: WeakSet[Any] | None = None
 
@@ -87,6 +89,7 @@ class Grafting(WithLoops):
         aside.put(self)
         self._added_nodes -= gone
         self._shapes = [shape for shape in self._shapes if shape.body not in gone]
+        self._offers = [offer for offer in self._offers if offer.body not in gone]
         for scene, effect, _ in used:
             scene.remove(effect)
         return Removed(bodies, hinges, nodes, [(scene, effect) for scene, effect, _ in used], closed)
@@ -241,6 +244,7 @@ class Grafting(WithLoops):
         own.put(self)
         its.add(self, dict(zip(hinges, new_hinges, strict=True)), called)
         self._shapes = [*self._shapes, *renamed(source._shapes, {*bodies, *nodes}, called)]
+        self._offers = [*self._offers, *renamed(source._offers, {*bodies, *nodes}, called)]
 
 
 def _frames_on(model: Any, carriers: set[str], with_base: bool) -> list[dict[str, Any]]:

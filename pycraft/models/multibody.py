@@ -14,9 +14,11 @@ from ..closed import Closed
 from ..dynamics.integration import IntegrationCalls
 from ..other_names import Renamed
 from ..state import State, at_state, random_state
+from .beside import Beside
 from .coalescing import Coalescing
 from .handles import Body, Hinge, Named, Node, Vector
 from .hinge_arguments import frame_name, hinge_arguments
+from .offers import Offer
 from .parts import Parts
 from .pictures import Pictures
 from .planning import Planning
@@ -25,7 +27,7 @@ from .structure import Structure
 from .with_loops import WithLoops
 
 
-class Multibody(Closed, Renamed, IntegrationCalls, Pictures, Parts, Planning, Structure, Coalescing, WithLoops):
+class Multibody(Closed, Renamed, IntegrationCalls, Pictures, Parts, Planning, Structure, Coalescing, WithLoops, Beside):
     """A tree of bodies on hinges, with nodes, a state (`q`, `v`) and gravity (zero until it is set).
 
     Build one body by body, or load it (`pycraft.load`). Bodies are kept depth first, children in the order they were added, and
@@ -56,10 +58,8 @@ class Multibody(Closed, Renamed, IntegrationCalls, Pictures, Parts, Planning, St
         if not isinstance(welds, str) or welds not in ("lump", "keep"):
             raise _core.ModelError(f"welds={welds!r}: there are 'lump' and 'keep'")
         super().__init__(text(name, "a model"), welds == "keep", strict)
-        self._left_aside: dict[str, np.ndarray] = {}
+        self._begin_beside()
         self._added_nodes: set[str] = set()
-        self._actuators: list[dict[str, Any]] = []
-        self._shapes: list[Shape] = []
 
     # ------------------------------------------------------------------ structure
     def add_body(
@@ -245,9 +245,9 @@ class Multibody(Closed, Renamed, IntegrationCalls, Pictures, Parts, Planning, St
         Warns
         -----
         ModelWarning
-            What the model has beside bodies and hinges and the format does not hold (URDF: gravity, a state; MJCF: some loops; both:
-            `shapes`); loose frames, couplings by functions, meshes that an MJCF file held itself, and what unlocks and splits, which no
-            file holds.
+            What the format does not hold: gravity and a state (URDF), some loops (MJCF), some shapes (ellipsoids in URDF, meshes that
+            MuJoCo does not read in MJCF, meshes without a file of their own in URDF and TOML). What no file holds: loose frames, couplings
+            by functions, what unlocks hinges and splits bodies.
 
         Examples
         --------
@@ -308,25 +308,6 @@ class Multibody(Closed, Renamed, IntegrationCalls, Pictures, Parts, Planning, St
             model.q, model.v = data["q"], data["v"]
         return model
 
-    @property
-    def left_aside(self) -> dict[str, np.ndarray]:
-        """What the model's file says beside the model, by name; empty for a model that was not loaded.
-
-        "gravity" (3,), m/s²; per coordinate (nv,), NaN where the file has none: "damping", "friction", "stiffness", and "effort limit",
-        "velocity limit"; "spring rest" (nq,), where springs are slack, if that is not zero. `pycraft.effects.from_model` makes effects of
-        them; `integrate_ode(..., damping=np.nan_to_num(arm.left_aside["damping"]))` takes the first of these.
-        """
-        return dict(self._left_aside)
-
-    @property
-    def actuators(self) -> list[dict[str, Any]]:
-        """The actuators of the model's file, none for a model that was not loaded: `pycraft.effects.from_model` makes effects of them.
-
-        Each a dictionary: "name", "coordinate", "gear", "gain", "bias" (3,), "force range" (2,), and "why not" of one that no effect is,
-        else None. With a control u the force at the coordinate is gear · clip(gain u + bias · (1, gear q, gear v), force range).
-        """
-        return [dict(actuator) for actuator in self._actuators]
-
     def __reduce__(self):
         return _again, self._told()
 
@@ -340,7 +321,8 @@ class Multibody(Closed, Renamed, IntegrationCalls, Pictures, Parts, Planning, St
     def _told(self) -> tuple[Any, ...]:
         frames = self._kept_frames
         moment = None if frames is None else (frames.t, np.array(frames.vdot))
-        return self.description(), self._left_aside, self._actuators, self._added_nodes, moment, self._shapes
+        beside = self._left_aside, self._actuators, self._added_nodes, moment, self._shapes, self._offers, self._not_read
+        return self.description(), *beside
 
     def __repr__(self) -> str:
         if self._whole is None:
@@ -358,11 +340,14 @@ def _again(
     added_nodes: Collection[str] = (),
     moment: tuple[float, np.ndarray] | None = None,
     shapes: Sequence[Shape] = (),
+    offers: Sequence[Offer] = (),
+    not_read: Sequence[str] = (),
 ) -> Multibody:
     """A copy of a model from its description, what its file said beside it, which nodes were added since, and its frames' t and vdot."""
     model = Multibody.from_description(description)
     model._left_aside, model._actuators = dict(left_aside), [dict(actuator) for actuator in actuators]
     model._added_nodes, model._shapes = set(added_nodes), list(shapes)
+    model._offers, model._not_read = list(offers), list(not_read)
     if moment is not None:
         model.frames.t, model.frames.vdot = moment
     return model

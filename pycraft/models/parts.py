@@ -11,6 +11,7 @@ from .. import _core
 from ..arguments import listed, text
 from ..state import State, at_state
 from .handles import Body, Node
+from .offers import Offer
 from .shapes import Shape
 from .with_operators import WithOperators
 
@@ -28,6 +29,8 @@ class Parts(WithOperators):
     _added_nodes: set[str]
     _actuators: list[dict[str, Any]]
     _shapes: list[Shape]
+    _offers: list[Offer]
+    _not_read: list[str]
 
     # ------------------------------------------------------------------ taking one
     def subgraph(
@@ -138,8 +141,9 @@ class Parts(WithOperators):
                 aside[key] = np.r_[np.full(6 * self._moves, np.nan), values[self.v_index]]
         self._left_aside, self._added_nodes = aside, set()
         own = set(self.coordinate_names)
-        here = {*self.bodies, *self.nodes} if whole._shapes else set()  # type: ignore[attr-defined]  # of a Multibody
+        here = {*self.bodies, *self.nodes} if whole._shapes or whole._offers else set()  # type: ignore[attr-defined]  # of a Multibody
         self._shapes = [shape for shape in whole._shapes if shape.body in here]
+        self._offers, self._not_read = [offer for offer in whole._offers if offer.body in here], list(whole._not_read)
         self._actuators = [dict(actuator) for actuator in whole._actuators if actuator["coordinate"] in own]
 
     # ------------------------------------------------------------------ being one

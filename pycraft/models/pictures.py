@@ -138,11 +138,11 @@ class Pictures:
 
     @property
     def shapes(self) -> list[Shape]:
-        """What the model's file gives its bodies to be seen by, in the file's order; none of a model that was not loaded.
+        """The shapes by which the model's file shows its bodies, in the file's order; none for a model that was not loaded.
 
-        Visuals of a URDF file, geoms of the groups 0 to 2 of an MJCF file, `[[shapes]]` of a TOML file. The viewer and pages of runs draw
-        them; meshes are looked for and read then (extra `meshes`). `Multibody.save` keeps them in TOML, but for meshes that were in an
-        MJCF file itself.
+        Visuals of a URDF or SDF file, geoms of the groups 0 to 2 of an MJCF file, `[[shapes]]` of a TOML file. The viewer and pages of
+        runs draw them, and read meshes then (extra `meshes`). `Multibody.save` writes them; meshes that were in an MJCF file itself go
+        into none.
 
         Examples
         --------
@@ -150,7 +150,15 @@ class Pictures:
         >>> pc.chain(2).shapes
         []
         """
-        return list(self._shapes)
+        return [shape for shape in self._shapes if shape.purpose == "visual"]
+
+    @property
+    def collision_shapes(self) -> list[Shape]:
+        """The shapes by which the model's file lets its bodies touch, in the file's order; none for a model that was not loaded.
+
+        Collisions of a URDF or SDF file, geoms of an MJCF file that collide. No dynamics uses them; `Multibody.save` writes them.
+        """
+        return [shape for shape in self._shapes if shape.purpose == "collision"]
 
     def rerootings(self, q=None, v=None) -> Any:
         """The same motion seen from every base body in turn: a page with a slider for the base, and what changes with it and what stays.

@@ -1,13 +1,13 @@
-"""Shapes that a model's file gives its bodies to be seen by: boxes, spheres, cylinders, capsules, ellipsoids and meshes.
+"""Shapes that a model's file gives its bodies: boxes, spheres, cylinders, capsules, ellipsoids and meshes, to be seen or to touch.
 
-They are beside the model, as what else its file says (`left_aside`): no dynamics knows them. Files of meshes are opened by who draws them.
+They stand beside the model, as does what else its file says (`left_aside`): no dynamics uses them. Whoever draws a mesh opens its file.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -36,6 +36,7 @@ class Shape:
     file : of a mesh as its model's file calls it, "package://robot/arm.stl"; "" of other kinds
     beside : of a mesh, the path of the model's file and the folders of packages, where it is looked for
     triangles : vertices (n, 3) and faces (m, 3) of a mesh that is in the model's file itself; None of others
+    purpose : "visual", what is seen, or "collision", what touches
     """
 
     body: str
@@ -46,15 +47,19 @@ class Shape:
     file: str = ""
     beside: tuple[str, tuple[str, ...]] = ("", ())
     triangles: tuple[np.ndarray, np.ndarray] | None = None
+    purpose: str = "visual"
 
     def __repr__(self) -> str:
         size = " × ".join(f"{x:g}" for x in self.size)
         return f"<{self.kind} {self.file or size} on {self.body or 'the base'!r}>"
 
 
-def renamed(shapes: Iterable[Shape], bodies: set[str], called: Callable[[str], str]) -> list[Shape]:
-    """The shapes on these bodies and nodes, on their copies of other names."""
-    return [replace(shape, body=called(shape.body)) for shape in shapes if shape.body in bodies]
+OnBody = TypeVar("OnBody", bound=Any)  # a dataclass with a field `body`
+
+
+def renamed(things: Iterable[OnBody], bodies: set[str], called: Callable[[str], str]) -> list[OnBody]:
+    """Return the shapes or offers on these bodies and nodes, moved to their copies with other names."""
+    return [replace(thing, body=called(thing.body)) for thing in things if thing.body in bodies]
 
 
 def hex_colour(rgba: Any) -> str:

@@ -20,17 +20,25 @@ SHOWN = 12
 
 
 class Difference(NamedTuple):
-    """One thing in which two models differ: `kind` says what, `physical` whether it is more than a convention."""
+    """One thing in which two models differ.
+
+    `kind` says what; `physical`, whether it is more than a convention; `decides`, whether it alone makes the two move differently, which
+    what is compared in digits does not show.
+    """
 
     kind: str
     text: str
     physical: bool
+    decides: bool = False
 
 
 @dataclass
 class ModelComparison:
-    """What `pycraft.compare` found. True where the two models are one: no physical difference but gravity and rotor inertia, which the
-    numbers then share, and all quantities within their bounds.
+    """What `pycraft.compare` found.
+
+    True where the two models are one: all quantities are within their bounds once gravity and rotor inertia are the same, and no effect of
+    the other model, such as damping or a tendon, moves it differently. Contacts and stops that act at none of the states are named and do
+    not count.
 
     `as_they_are` and `in_common` hold the largest relative difference of each quantity over the states: of the two packages' arrays
     entry by entry, and after conventions, gravity and rotor inertias are made the same. `bounds` is what rounding may leave.
@@ -45,7 +53,8 @@ class ModelComparison:
     bounds: dict[str, float] = field(default_factory=dict)
 
     def __bool__(self) -> bool:
-        return bool(self.in_common) and all(self.in_common[name] <= self.bounds[name] for name in self.in_common)
+        same = all(self.in_common[name] <= self.bounds[name] for name in self.in_common)
+        return bool(self.in_common) and same and not any(difference.decides for difference in self.differences)
 
     @property
     def worst(self) -> float:
@@ -110,7 +119,7 @@ def compare(model: Any, other: Any, *, states: int = 5, seed: int = 0, root: str
     result.differences += [Difference(kind, text, False) for kind, text in twin.conventions()]
     common = _in_common(model, twin, result)
     result.differences += [Difference(kind, text, kind != "body frame") for kind, text in _bodies_apart(model, twin, drawn)]
-    result.differences += [Difference("also there", text, True) for text in twin.left_aside()]
+    result.differences += [Difference(kind, text, True, decides) for kind, text, decides in twin.effects_apart(drawn)]
     for state in drawn:
         _compare_at(result, model, common, twin, state, rng.uniform(-1, 1, model.nv))
     return result

@@ -7,7 +7,7 @@ disagreement beyond its bound is settled in quad precision: both are compared wi
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -18,6 +18,7 @@ import numpy as np
 from .. import _core
 from ..interop import pinocchio as convention
 from ..interop.packages import required
+from ..models.loaders.named_robots import example_folders
 
 GRAVITY = (0.0, 0.0, -9.81)
 QUANTITIES = ("mass matrix", "inverse dynamics", "Jacobians", "inverse", "forward dynamics")
@@ -45,20 +46,10 @@ class Comparison:
 
 
 def robot_files() -> list[Path]:
-    """Every URDF file that the installed example-robot-data ships."""
-    pinocchio = required("pinocchio", "peers", "comparison with Pinocchio needs")  # its prefix holds the data
-
-    for folder in [Path(p) for p in map(str, _prefixes(pinocchio))]:
-        if (folder / "share" / "example-robot-data" / "robots").is_dir():
-            return sorted((folder / "share" / "example-robot-data" / "robots").rglob("*.urdf"))
+    """Return every URDF file of the installed example-robot-data. ModelError where it is not installed."""
+    for folder in example_folders():
+        return sorted(folder.rglob("*.urdf"))
     raise _core.ModelError("example-robot-data is not installed: pip install 'pycraft-soa[peers]'")
-
-
-def _prefixes(module: Any) -> Iterator[Path]:
-    import sys
-
-    yield from (parent for parent in Path(module.__file__).parents if parent.name == "cmeel.prefix")
-    yield from (Path(entry) / "cmeel.prefix" for entry in sys.path)
 
 
 def compare(path: Path, root: str, states: int = 20, seed: int = 0) -> Comparison:

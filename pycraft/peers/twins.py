@@ -6,6 +6,7 @@ Velocities of the two are related by the orthogonal matrix T(q), v_theirs = T v;
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,6 +14,8 @@ import numpy as np
 from .. import _core
 from ..interop import mujoco as mujoco_convention
 from ..interop import pinocchio as pinocchio_convention
+from ..models.loaders import mjcf_effects
+from .effects_apart import Apart, effects_apart
 
 
 class BodyData(NamedTuple):
@@ -57,8 +60,8 @@ class Twin(ABC):
     def conventions(self) -> list[tuple[str, str]]:
         """In what the two packages write the same thing otherwise."""
 
-    def left_aside(self) -> list[str]:
-        """Effects of theirs that a model here does not have."""
+    def effects_apart(self, states: Sequence[Any]) -> list[Apart]:  # noqa: ARG002 - subclasses need it
+        """In what the effects of the two models' files differ; `states` are those that are looked at."""
         return []
 
 
@@ -130,6 +133,9 @@ class OwnTwin(Twin):
     def conventions(self):
         return _order(list(self.model.hinges), list(self.other.hinges))
 
+    def effects_apart(self, states):
+        return effects_apart(self.model, self.other)
+
 
 class PinocchioTwin(Twin):
     """A `pinocchio.Model`."""
@@ -198,7 +204,7 @@ class PinocchioTwin(Twin):
 
 
 class MuJoCoTwin(Twin):
-    """A `mujoco.MjModel`: its rigid-body dynamics, without contacts, constraints, springs and dampers."""
+    """A `mujoco.MjModel`: its rigid-body dynamics; springs, dampers and the like are compared by their numbers."""
 
     def __init__(self, model: Any, other: Any):
         import mujoco
@@ -206,10 +212,10 @@ class MuJoCoTwin(Twin):
         self.model, self.other = model, other
         self._data = mujoco.MjData(other)
         self.name = f"{mujoco_convention.name_of(other)} in MuJoCo"
-        self.gravity = np.array(other.opt.gravity)
+        self.gravity = mjcf_effects.gravity(other)
         self._q, self._v, self._joints = mujoco_convention.order(model, other)
         self.armature = np.empty(model.nv)
-        self.armature[mujoco_convention.permutation(model)[1]] = np.asarray(other.dof_armature)[self._v]
+        self.armature[mujoco_convention.permutation(model)[1]] = mjcf_effects.armature(other)[self._v]
 
     def _move(self, q, v):
         import mujoco
@@ -291,18 +297,26 @@ class MuJoCoTwin(Twin):
             )
         return found
 
-    def left_aside(self):
-        m = self.other
-        present = {
-            "damping": np.any(m.dof_damping),
-            "joint springs": np.any(m.jnt_stiffness),
-            "dry friction": np.any(m.dof_frictionloss),
-            "equality constraints": m.neq,
-            "tendons": m.ntendon,
-            "actuators": m.nu,
-        }
-        names = [name for name, there in present.items() if there]
-        return [f"{', '.join(names)}; not in what is compared"] if names else []
+    def effects_apart(self, states):
+        from ..models.loaders import mjcf
+
+        try:
+            theirs = mjcf.of_compiled(self.other, self.name)
+        except _core.ModelError as error:
+            return [Apart("effects", f"those of MuJoCo's model cannot be read: {error}", True)]
+        return effects_apart(self.model, theirs, any(self._one_sided_act(state) for state in states))
+
+    def _one_sided_act(self, state):
+        """Whether a contact or a stop at a limit pushes at a state."""
+        import mujoco
+
+        qpos, qvel = mujoco_convention.to_mujoco(self.model, state.q, state.v)
+        self._data.qpos[self._q], self._data.qvel[self._v] = qpos, qvel
+        mujoco.mj_forward(self.other, self._data)
+        kinds = mujoco.mjtConstraint
+        both_sides = {int(kind) for kind in (kinds.mjCNSTR_EQUALITY, kinds.mjCNSTR_FRICTION_DOF, kinds.mjCNSTR_FRICTION_TENDON)}
+        rows = self._data.efc_type[: self._data.nefc]
+        return any(self._data.efc_force[row] for row, kind in enumerate(rows) if int(kind) not in both_sides)
 
 
 def _together(pose: np.ndarray, parts: list[tuple[float, np.ndarray, np.ndarray, np.ndarray]]) -> BodyData:

@@ -69,13 +69,13 @@ def referred_model(reference: Any, folder: Path) -> tuple[Any, list[str]]:
     if not isinstance(given, str) or (path is not None and robot is not None):
         raise _core.ModelError('a scene names its model by a path, "arm.toml", or a robot of the package, "panda"')
     if path is not None:
-        how: dict[str, Any] = {"root": "fixed", "mimic": "refuse", "welds": None, **options}
+        how: dict[str, Any] = {"root": "fixed", "mimic": "couple", "welds": None, **options}
         return read(folder / path, **how)
     if robot not in robots.names():
         remedy = nearest(given, robots.names())
         raise _core.ModelError(f"no robot of the package is called {robot!r}; {remedy} A path of a file ends in {', '.join(ENDINGS)}")
     if "mimic" in options:
-        raise _core.ModelError("mimic is of files; no robot of the package has a joint that follows another")
+        raise _core.ModelError("mimic is an option of files; no robot of the package has a joint that follows another")
     try:
         return getattr(robots, given)(**options), []
     except TypeError as error:

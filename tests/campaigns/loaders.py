@@ -122,7 +122,7 @@ def one_round(seed, folder):
         path.write_bytes(damaged(rng, toml(rng), TOML_INSERTS))
     else:
         path.write_bytes(damaged(rng, mjcf(rng) if xml else urdf(rng)))
-    options = {"mimic": str(rng.choice(["refuse", "lock", "free"])), "welds": str(rng.choice(["lump", "keep"]))}
+    options = {"mimic": str(rng.choice(["couple", "refuse", "lock", "free"])), "welds": str(rng.choice(["lump", "keep"]))}
     if not (xml or tables):
         options["root"] = str(rng.choice(["fixed", "free"]))
     begin = time.perf_counter()

@@ -121,7 +121,7 @@ def nothing_measured(monkeypatch):
         ("accuracy panda --error 0", "--error 0.0: a relative error, above zero"),
         ("accuracy panda --root sideways", "root='sideways': there are 'fixed', 'free'"),
         ("accuracy panda --mimic sometimes", "mimic='sometimes': there are"),
-        ("accuracy pandaa", "its robots are puma560, panda"),
+        ("accuracy pandaa", "robots of the package: puma560, panda"),
         ("stability --seeds 0", "--seeds 0: a whole number, 1 or more"),
         ("stability --seeds -1", "--seeds -1"),
         ("stability --steps 0", "--steps 0"),

@@ -77,7 +77,7 @@ def measured(monkeypatch):
 
     def described(x):
         if hasattr(x, "random_state"):
-            return f"{x.name}: {x.nv}, {[h.kind for h in x.hinges.values()]}"
+            return f"{x.name}: {x.nv}, {[h.kind for h in x.hinges.values()]}, {list(x.loops)}"
         if hasattr(x, "tobytes"):
             return np.array(x).tolist()
         if callable(x) or "Console" in type(x).__name__:
@@ -111,7 +111,7 @@ def test_an_option_reaches_what_is_measured(command, option, measured, tmp_path)
     model = tmp_path / "mimicking.urdf"
     model.write_text(MIMICKING.format(links=LINK.format("first") + LINK.format("second")))
     takes_model = any(p.name == "model" for p in COMMANDS[command].params) and option != "model"
-    # Without --mimic such a file is refused, which is another outcome too.
+    # Without --mimic the joint is coupled, which is another outcome.
     start = [command, *([str(model), *([] if option == "mimic" else ["--mimic", "free"])] if takes_model else [])]
     if option == "model":
         variants = BEFORE[command][option]

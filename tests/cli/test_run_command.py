@@ -129,7 +129,7 @@ def test_effects_that_are_refused(effect, text):
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (["nowhere.toml", "-T", "1"], "no file is called 'nowhere.toml', and no robot of the package"),
+        (["nowhere.toml", "-T", "1"], "nowhere.toml: cannot be read: No such file"),
         (["panda"], "how long? give -T SECONDS, or a scene's file T in its table [run]"),
         (["panda", "-T", "1", "--every", "0"], "--every 0: a positive number of seconds"),
         (["panda", "-T", "1", "--every", "1e-12"], "--every 1e-12: 1e+12 states are more than memory holds"),

@@ -47,7 +47,7 @@ def test_a_file_beside_another(shown, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["nothing.toml"], "no file is called 'nothing.toml'"),
+        (["nothing.toml"], "nothing.toml: cannot be read: No such file"),
         (["panda", "--effect", "wind"], "wind"),
         (["panda", "--port", "70000"], "port=70000"),
         (["panda", "--seed", "-1"], "--seed -1"),

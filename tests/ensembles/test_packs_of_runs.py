@@ -44,6 +44,7 @@ EFFECTS = {
     "frictions": lambda: [E.QuadraticDamping(0.3), E.CoulombFriction(0.2, smoothing=0.1)],
     "springs": lambda: [E.Gravity(), E.Spring(3.0, hinges=["ball", "boom", *PINS])],
     "fields": lambda: [E.PointMassGravity(30.0, position=(5, 4, 3)), E.GravityGradient(3.0, position=(5, 4, 3))],
+    "fluids": lambda: [E.Gravity(), E.GravityCompensation(0.6), E.FluidDrag(3.0, 0.5, (0.3, 0.2, 0.1))],
     "between nodes": lambda: [
         E.NodeSpring("tip", "eye", 40.0, length=0.3),
         E.NodeDamper("tip", "eye", 2.0),

@@ -96,7 +96,7 @@ def test_what_is_no_model(given):
     for call in calls:
         with pytest.raises(pc.ModelError, match="takes a model, not"):
             call(given)
-    with pytest.raises(pc.ModelError, match="is called by its path, not by"):
+    with pytest.raises(pc.ModelError, match="is named by its path, not by"):
         mujoco.compiled(given if not isinstance(given, str) else 4)
     with pytest.raises(pc.ModelError, match="name_of takes an MjModel, not"):
         mujoco.name_of(given)

@@ -174,7 +174,7 @@ def test_limits_and_armature(mujoco, write):
 @pytest.mark.peers
 def test_constraints_are_loops_or_left_out_by_name(mujoco, write):
     world = body("a", '<joint name="j"/>', body("b", '<joint name="k"/>'))
-    rest = '<tendon><fixed name="cable"><joint joint="j" coef="1"/></fixed></tendon><equality><joint name="gear" joint1="j"'
+    rest = '<tendon><fixed name="cable" stiffness="3"><joint joint="j" coef="1"/></fixed></tendon><equality><joint name="gear" joint1="j"'
     rest += ' joint2="k"/><connect body1="a" body2="b" anchor="0 0 0"/><weld name="glue" body1="b"/></equality>'
     with pytest.warns(pc.ModelWarning) as caught:
         model = pc.load(write(world, rest))
@@ -182,19 +182,24 @@ def test_constraints_are_loops_or_left_out_by_name(mujoco, write):
         "scene.xml: equality constraints are loops of the model, which direct calls and scenes do not keep: "
         "'gear', \"equality connect of 'a' and 'b'\", 'glue'"
     )
-    assert str(caught[1].message).endswith("scene.xml: left out: tendon 'cable'")
+    assert "Not read, although it changes the motion: tendon 'cable' (stiffness)" in str(caught[1].message)
+    assert model.not_read[0] == "tendon 'cable' (stiffness)"
     assert caught[0].filename == __file__ and model.nv == 2
 
 
 @pytest.mark.peers
-def test_plain_scenes_say_once_what_is_left_aside(mujoco, write, caplog):
-    caplog.set_level("INFO", "pycraft")
+def test_plain_scenes_say_once_what_is_left_aside(mujoco, write):
     world = '<geom type="plane" size="1 1 1"/>' + body("a", '<joint name="j" damping="1" stiffness="2"/>')
     path = write(world, '<actuator><motor joint="j"/></actuator>')
-    with pytest.warns(pc.ModelWarning, match="left aside: gravity .*damping of 1 coordinate; stiffness of 1 coordinate") as caught:
+    with pytest.warns(pc.ModelWarning) as caught:
         pc.load(path)
     assert len(caught) == 1 and caught[0].filename == __file__
-    assert "contacts between its 3 geoms are not read; they are effects" in caplog.text
+    assert str(caught[0].message) == (
+        f"{path}: not in the model: joint damping (1 coordinate), joint springs (1 coordinate), 1 actuator; "
+        "pycraft.effects.from_model(model) makes effects of them. "
+        'Gravity (0.0, 0.0, -9.81) of the file is not set; load(..., gravity="file") sets it. '
+        "Not read, although it changes the motion: contacts (3 geoms)"
+    )
 
 
 @pytest.mark.peers

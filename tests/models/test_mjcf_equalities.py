@@ -130,7 +130,17 @@ def test_what_is_left_out_is_named(load):
     off = '<connect name="off" body1="a" body2="c" anchor="0 0 0" active="false"/><connect body1="p" body2="o" anchor="0 0 0"/>'
     model, _, said = load(off + EQUALITIES["joint"], WORLD + fixed)
     assert list(model.loops) == ["e"]
-    assert (
-        "left out: equality connect 'off' of 'a' and 'c' (not active), equality connect of 'p' and 'o' (loop 'equality connect of"
-        in said[1]
+    assert said[1].endswith("not active in the file, and left out: equality connect 'off' of 'a' and 'c'")
+    assert "equality connect of 'p' and 'o' (loop 'equality connect of" in model.not_read[0]
+
+
+@pytest.mark.parametrize("flag", ["equality", "constraint"])
+def test_equalities_that_a_flag_disables_are_no_loops(tmp_path, flag):
+    pytest.importorskip("mujoco")
+    path = tmp_path / "scene.xml"
+    path.write_text(
+        f'<mujoco><option><flag {flag}="disable"/></option><worldbody>{WORLD}</worldbody><equality>{EQUALITIES["weld"]}</equality></mujoco>'
     )
+    with pytest.warns(pc.ModelWarning, match="not active in the file, and left out: equality weld 'e' of 'b' and 'c'"):
+        model = pc.load(path)
+    assert not model.loops and not any("equality" in text for text in model.not_read)

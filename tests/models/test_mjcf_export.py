@@ -169,7 +169,7 @@ def test_what_a_file_said_beside_the_model_is_said_again(tmp_path):
     assert len(model.left_aside) == 5 and len(model.actuators) == 2
     assert differences(again.description(), model.description()) == []  # all numbers of this file are exact
     model.gravity = (0, 0, -1)
-    with pytest.warns(pc.ModelWarning, match="does not hold the gravity left aside"):
+    with pytest.warns(pc.ModelWarning, match="does not hold the gravity in left_aside"):
         model.save(tmp_path / "other.xml")
 
 

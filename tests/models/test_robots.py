@@ -145,3 +145,42 @@ def test_pickles(name):
     state = model.random_state(2)
     assert np.array_equal(copy.mass_matrix(state.q), model.mass_matrix(state.q))
     assert list(copy.nodes) == list(model.nodes) and list(copy.hinges) == list(model.hinges)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_shapes_show_every_body_where_it_is(name):
+    """Each moving body has shapes, and its own centre of mass lies within 15 cm of one; they are drawn without another package."""
+    from pycraft.view.solids import solids, triangles
+
+    model = robot(name, welds="keep", root="fixed")
+    on = {}
+    for shape in model.shapes:
+        vertices = triangles(shape)[0] @ shape.placement[:3, :3].T + shape.placement[:3, 3]
+        on.setdefault(shape.body, []).append(vertices)
+    bare = {
+        "imu_link",
+        "logo_link",
+        "head_link",
+        "pelvis_contour_link",
+        "waist_roll_link",
+        "panda_link8",
+        "left_rubber_hand",
+        "right_rubber_hand",
+    }
+    for body_name, body in model.bodies.items():
+        if body_name in bare or body.hinge.kind == "weld":
+            continue
+        assert body_name in on, body_name
+        if body.mass:
+            gap = min(np.linalg.norm(np.maximum(0, np.maximum(v.min(0) - body.com, body.com - v.max(0)))) for v in on[body_name])
+            assert gap < 0.15, (body_name, gap)
+    made, missing = solids(robot(name))
+    assert not missing and len(made) == len(model.shapes) > 20
+    assert all(shape.colour is not None for shape in model.shapes) and not model.collision_shapes
+
+
+def test_robots_are_small_files():
+    from importlib.resources import files
+
+    sizes = [file.stat().st_size for file in files("pycraft.models.robots").iterdir() if file.is_file()]
+    assert sum(sizes) < 500_000

@@ -46,10 +46,10 @@ def test_rows_come_back_to_the_last_bit(tmp_path):
 def test_what_files_do_not_hold_is_said(tmp_path):
     model = pc.chain(2)
     model.add_coupling(["hinge0"], function=lambda q: (q[0], [1.0], [[0.0]]), name="cam")
-    with pytest.warns(pc.ModelWarning, match="a file does not hold couplings by functions: cam"):
+    with pytest.warns(pc.ModelWarning, match="no file holds couplings by functions, and these were not written: cam"):
         model.save(tmp_path / "model.toml")
     assert list(pc.load(tmp_path / "model.toml").loops) == []
-    with pytest.warns(pc.ModelWarning, match="a file does not hold couplings by functions: cam"):
+    with pytest.warns(pc.ModelWarning, match="no file holds couplings by functions, and these were not written: cam"):
         model.save(tmp_path / "model.urdf")
 
 

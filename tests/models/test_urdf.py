@@ -325,7 +325,7 @@ def test_a_massless_body_on_a_hinge_warns_at_the_callers_line(load, tmp_path):
     path = tmp_path / "massless.urdf"
     path.write_text(f'<robot name="r">{link("a")}{link("empty", "")}{joint("j", "a", "empty")}</robot>')
     with pytest.warns(pc.ModelWarning, match=r"massless.urdf:2: body 'empty' on hinge 'j' has no mass") as caught:
-        pc.load(path)
+        pc.load(path, root="fixed")
     assert Path(caught[0].filename).name == "test_urdf.py" and len(caught) == 1
 
 

@@ -192,7 +192,7 @@ def test_what_a_file_gave_beside_the_model_is_given_again(tmp_path):
     again = saved_and_loaded(model, tmp_path / "again.urdf")
     assert differences(model.left_aside, again.left_aside) == []
     model.add_body("tool", "b", mass=1, inertia=np.eye(3))
-    with pytest.warns(pc.ModelWarning, match="not saved is what was left aside"):
+    with pytest.warns(pc.ModelWarning, match="its left_aside is not saved"):
         model.save(tmp_path / "again.urdf")
     assert loaded(tmp_path / "again.urdf").left_aside == {}
 

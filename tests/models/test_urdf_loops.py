@@ -85,7 +85,7 @@ def test_ends_that_are_not_given_are_the_root_link(tmp_path):
 def test_functions_are_left_out_with_a_word(tmp_path):
     model = four_bar(0.4, 1.0, 0.8, 1.0)
     model.add_coupling(["crank"], function=lambda q: (q[0], [1.0], [[0.0]]), name="cam")
-    with pytest.warns(pc.ModelWarning, match="does not hold couplings by functions: cam"):
+    with pytest.warns(pc.ModelWarning, match="no file holds couplings by functions, and these were not written: cam"):
         model.save(tmp_path / "model.urdf")
     assert list(pc.load(tmp_path / "model.urdf").loops) == ["closure"]
 

@@ -7,7 +7,7 @@ import ast
 import pathlib
 from dataclasses import dataclass
 
-from . import of_cpp, of_integrators, of_loops, of_methods, of_pictures, of_python, of_scenes, of_view
+from . import of_cpp, of_files, of_integrators, of_loops, of_methods, of_pictures, of_python, of_scenes, of_view
 from .mutant import Mutant, line_of, shown_line
 
 
@@ -28,7 +28,7 @@ def table(changes):
 
 CPP, PYTHON = (
     table(of_cpp.CHANGES | of_integrators.CHANGES | of_loops.CHANGES | of_methods.CHANGES | of_scenes.CHANGES),
-    table(of_python.CHANGES | of_pictures.CHANGES | of_view.CHANGES),
+    table(of_python.CHANGES | of_files.CHANGES | of_pictures.CHANGES | of_view.CHANGES),
 )
 
 

@@ -84,8 +84,8 @@ CHANGES = {
     "pycraft/cli/commands.py": [
         ("check --json without its seed", "states=states, seed=seed, precision=wide, progress", "states=states, precision=wide, progress"),
         ("bench exits with 0", "raise typer.Exit(1 if missed else 0)", "raise typer.Exit(0)"),
-        ("--mimic ignored", 'root=root or "fixed", mimic=mimic', 'root=root or "fixed", mimic="lock"'),
-        ("--root ignored", 'root=root or "fixed", mimic=mimic', 'root="fixed", mimic=mimic'),
+        ("--mimic ignored", "load(name, root=root, mimic=mimic)", 'load(name, root=root, mimic="lock")'),
+        ("--root ignored", "load(name, root=root, mimic=mimic)", 'load(name, root="fixed", mimic=mimic)'),
         ("stability --no-peers ignored", "cases=chosen, peers=peers", "cases=chosen, peers=True"),
         ("stability --seeds ignored", "hard.run(seeds, steps", "hard.run(1, steps"),
         ("peers --seed ignored", "compare_all(states, seed,", "compare_all(states, 0,"),
@@ -344,9 +344,6 @@ CHANGES = {
     "pycraft/models/loaders/toml_lines.py": [
         ("strings end at the first three quotes", '\\"{3,5}|', '\\"{3}|'),
     ],
-    "pycraft/models/loaders/urdf.py": [
-        ("a heavy root link flies off another", "or self.links[self.root].mass or", "or"),
-    ],
     "pycraft/models/tree_diagram.py": [
         ("no lines beside branches", "(along if last is False else blank)", "blank"),
     ],
@@ -356,10 +353,6 @@ CHANGES = {
     "pycraft/view/stick_figure.py": [
         ("markers at other hinges", 'points["joint"][own]', 'points["joint"][: len(own)]'),
         ("a base under what flies", "if not len(ground) and self.skeleton.names:", "if False:"),
-    ],
-    "pycraft/models/loaders/xml_file.py": [
-        ("undeclared entities are dropped", 'if "UNDECLARED_ENTITY" in entry.type_name:', "if False:"),
-        ("entities are expanded", "resolve_entities=False", "resolve_entities=True"),
     ],
     "pycraft/dynamics/equilibrium.py": [
         ("flutter is stable", "or abs(np.imag(value)) > zero", ""),

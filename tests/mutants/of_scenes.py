@@ -3,6 +3,17 @@
 STATEMENT = "statement"
 
 CHANGES = {
+    "cpp/simulation/effects/gravity_compensation.cpp": [
+        ("weights pull down", "(-b.mass) * g_", "b.mass * g_"),
+        ("held bodies have the energy of pulled ones", "b.mass * dot(g_, at.pose[b.body].p + at.pose[b.body].R * b.point)", "S(0)"),
+        ("shares follow the order of the bodies", "in_order(model, names)", 'bodies_named(model, names, "gravity_compensation")'),
+    ],
+    "cpp/simulation/effects/fluid_drag.cpp": [
+        ("the fluid stands still", "transpose_times(at.pose[box.body].R, wind_)", "Vector3<S>::zero()"),
+        ("a wind at rest is no force", "wind[0] == 0 && wind[1] == 0 && wind[2] == 0", "true"),
+        ("forces of boxes at the bodies' origins", "cross(box.pose.p, force)", "Vector3<S>::zero()"),
+        ("bodies with two boxes count twice", "std::find(d.poses.begin(), d.poses.end(), box.body) == d.poses.end()", "true"),
+    ],
     "cpp/simulation/scene_equations.h": [
         ("works are seen by tolerances", "std::ldexp(1.0, 100)", "1.0"),
         ("states within steps are off the loops", "if (settles()) scene_.loops()->bring(q_.data(), v_.data());", ";", STATEMENT),

@@ -72,6 +72,7 @@ EXAMPLES = {
     "divide_and_conquer": 1,
     "viewing": 12,
     "coming_from": 3,
+    "sdf": 5,
 }
 # Pages whose blocks are run one after the other.
 BLOCKS = ["symbolic", "kalman", "accuracy", "evaluation", "statements", "teaching", "proofs", "compiled", "pictures"]
@@ -113,7 +114,8 @@ def test_the_picture_of_the_readme_is_drawn(tmp_path):
 
 
 @pytest.mark.parametrize(("page", "examples"), EXAMPLES.items())
-def test_the_pages_run(page, examples):
+def test_the_pages_run(page, examples, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # some write files
     options = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
     result = doctest.testfile(str(ROOT / "docs" / f"{page}.md"), module_relative=False, optionflags=options)
     assert result.failed == 0 and result.attempted > examples
@@ -169,7 +171,7 @@ def test_the_other_packages_of_the_page_of_comparisons(tmp_path, monkeypatch):
     pytest.importorskip("pinocchio")
     monkeypatch.chdir(tmp_path)
     Path("panda.urdf").write_text((ROBOTS / "panda.urdf").read_text())
-    Path("panda.xml").write_text(pycraft.interop.export.to_mjcf(pycraft.models.robots.panda()))
+    pycraft.models.robots.panda().save("panda.xml")
     block = re.search(r"```python\n(import mujoco.*?)```", (ROOT / "docs" / "comparing.md").read_text(), re.S).group(1)
     names = {"pc": pycraft, "arm": pycraft.models.robots.panda()}
     imports, *compared = block.splitlines()

@@ -6,7 +6,7 @@ import pytest
 import pycraft as pc
 from support.mechanisms import every_kind
 from support.oracle import DIFFERENCE, ROUNDING, agree
-from support.scenes import subhinges
+from support.scenes import place, pushed, speed, subhinges
 
 E = pc.effects
 
@@ -41,19 +41,6 @@ def single(model):
         if kind in ("pin", "slider", "screw"):
             yield q, numbers[0]
         q += {"ball": 4, "free": 7}.get(kind, 1)
-
-
-def pushed(model, state, node, moment, force):
-    """A moment and a force in the world's axes at the origin of a node, as generalized forces."""
-    return model.jacobian(node, state.q, axes="aligned").T @ np.concatenate([moment, force])
-
-
-def place(model, node, state):
-    return np.eye(4) if node is None else model.pose(node, state.q)
-
-
-def speed(model, node, state):
-    return np.zeros(6) if node is None else model.jacobian(node, state.q, axes="aligned") @ state.v
 
 
 # Hinges ---------------------------------------------------------------------------------------------------------------
@@ -268,55 +255,6 @@ def test_gravity(model, state):
     agree(both.forces["gravity_2"], -2 * expected)
 
 
-def of_bodies(model, state, force):
-    """Σ over bodies of (moment, force)(mass, com, inertia), in the world's axes at the centre of mass, as generalized forces."""
-    total = np.zeros(model.nv)
-    for name, body in model.bodies.items():
-        X = model.pose(name, state.q)
-        moment, push = force(body.mass, (X @ [*body.com, 1])[:3], X[:3, :3] @ body.inertia @ X[:3, :3].T)
-        J = model.jacobian(name, state.q, axes="aligned")
-        total += J.T @ np.concatenate([moment + np.cross(X[:3, :3] @ body.com, push), push])
-    return total
-
-
-def test_point_mass_gravity(model, state):
-    mu, at = 3.0, np.array([4.0, -1.0, 2.0])
-    expected = of_bodies(model, state, lambda m, c, _: (np.zeros(3), -mu * m * (c - at) / np.linalg.norm(c - at) ** 3))
-    agree(forces(model, E.PointMassGravity(mu, at), state), expected)
-    some = list(model.bodies)[:3]
-    assert np.abs(forces(model, E.PointMassGravity(mu, at, bodies=some), state) - expected).max() > 1e-3
-
-
-def test_gravity_gradient(model, state):
-    mu, at = 3.0, np.array([4.0, -1.0, 2.0])
-
-    def gradient(_, c, inertia):
-        r = np.linalg.norm(c - at)
-        u = (c - at) / r
-        force = 1.5 * mu / r**4 * ((5 * u @ inertia @ u - np.trace(inertia)) * u - 2 * inertia @ u)
-        return 3 * mu / r**3 * np.cross(u, inertia @ u), force
-
-    agree(forces(model, E.GravityGradient(mu, at), state), of_bodies(model, state, gradient))
-
-
-def test_two_terms_of_a_point_masss_gravity_are_those_of_a_dumbbell():
-    """Two masses close together: point gravity on each, against point gravity and its gradient on the one body that they are."""
-    far, apart, m = np.array([0.0, 0, 50.0]), 0.1, 2.0
-    bodies = pc.Multibody("dumbbell")
-    bodies.add_body("both", hinge="free", mass=2 * m, inertia=np.diag([0, 2 * m * apart**2, 2 * m * apart**2]))
-    q = np.array([0.9, 0.1, 0.4, -0.2, 0.3, 0.2, 0.1])
-    scene = pc.Scene(bodies).add(E.PointMassGravity(1e3, far), E.GravityGradient(1e3, far), E.RotorInertia(1.0))  # a line has no inertia
-    forces = scene.evaluate(q, np.zeros(6)).forces
-    found = forces["point_mass_gravity"] + forces["gravity_gradient"]
-    X = bodies.pose("both", q)
-    exact = np.zeros(6)
-    for side in (-apart, apart):
-        r = (X @ [side, 0, 0, 1])[:3] - far
-        f = X[:3, :3].T @ (-1e3 * m * r / np.linalg.norm(r) ** 3)
-        exact += np.concatenate([np.cross([side, 0, 0], f), f])
-    assert np.abs(found - exact).max() < 1e-3 * (apart / 50) ** 2 * np.abs(exact).max()
-
-
 # Potentials -----------------------------------------------------------------------------------------------------------
 
 
@@ -324,6 +262,7 @@ POTENTIALS = {
     "gravity": E.Gravity(),
     "point_mass_gravity": E.PointMassGravity(5.0, (3, 2, 4)),
     "gravity_gradient": E.GravityGradient(5.0, (3, 2, 4)),
+    "gravity_compensation": E.GravityCompensation(0.7, g=(1, 2, -9)),
     "spring": E.Spring(2.0),
     "implicit_spring": E.ImplicitSpring(2.0, rest=0.3),
     "node_spring": E.NodeSpring("a", "b", 3.0),

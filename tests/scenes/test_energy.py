@@ -46,6 +46,8 @@ EFFECTS = {
     "gravity": lambda m: [E.Gravity()],
     "point mass gravity": lambda m: [E.PointMassGravity(20.0, (5, 3, 4))],
     "gravity gradient": lambda m: [E.GravityGradient(200.0, (5, 3, 4))],
+    "gravity compensation": lambda m: [E.Gravity(), E.GravityCompensation(0.6)],
+    "fluid drag": lambda m: [E.FluidDrag(3.0, 0.5, (0.3, 0.2, 0.1))],
     "damping": lambda m: [E.Damping(0.4)],
     "quadratic damping": lambda m: [E.QuadraticDamping(0.4)],
     "coulomb friction": lambda m: [E.CoulombFriction(0.4, smoothing=0.3)],

@@ -24,7 +24,7 @@ URDF = f"""<robot name="r"><link name="a"/>{"".join(map(LINK.format, "bcde"))}
 def arm(tmp_path):
     path = tmp_path / "r.urdf"
     path.write_text(URDF)
-    with pytest.warns(pc.ModelWarning, match="left aside"):
+    with pytest.warns(pc.ModelWarning, match="not in the model: joint damping"):
         return pc.load(path)
 
 
@@ -51,7 +51,7 @@ def test_the_models_own_gravity_is_offered(arm):
     arm.gravity = (0, 0, -1.62)
     assert E.from_model(arm)["gravity"].g == (0, 0, -1.62)
     assert list(E.from_model(pc.chain(2))) == [] and repr(E.from_model(pc.chain(2))) == "'chain of 2 rods' offers no effects"
-    with pytest.raises(pc.ModelError, match="effects are offered by a model, not by 3"):
+    with pytest.raises(pc.ModelError, match="from_model takes a model, not 3"):
         E.from_model(3)
 
 
@@ -75,7 +75,7 @@ def machine(tmp_path):
     pytest.importorskip("mujoco")
     path = tmp_path / "m.xml"
     path.write_text(MJCF)
-    with pytest.warns(pc.ModelWarning, match="stiffness of 4 coordinates; 9 actuators; the numbers are in left_aside"):
+    with pytest.warns(pc.ModelWarning, match=r"joint springs \(4 coordinates\), 6 actuators; pycraft.effects.from_model\(model\)"):
         return path, pc.load(path)
 
 
@@ -97,6 +97,7 @@ def test_an_mjcf_file(machine):
         "actuator 'curved': its force is no straight line in control, position and velocity",
         "actuator 'of ball': its joint has several coordinates",
         "actuator 'lag': it has a state of its own",
+        "contacts (4 geoms)",
     ]
     assert model.hinges["slide"].rotor_inertia.tolist() == [0.3]  # armature is the model's own
     assert pickle.loads(pickle.dumps(model)).actuators == model.actuators and len(model.actuators) == 9

@@ -22,7 +22,9 @@ EVERY = {
     "CoulombFriction": lambda: E.CoulombFriction({"panda_joint1": 0.3, "panda_joint2": 0.1}, 0.02),
     "Damping": lambda: E.Damping([0.1, 0.2], hinges=["panda_joint1", "panda_joint3"]),
     "Fixman": lambda: E.Fixman(300.0, boltzmann=1.4e-23),
+    "FluidDrag": lambda: E.FluidDrag(1000.0, 1e-3, (0.1, 0, 0), [HAND, "panda_link2"], [[0.1, 0.2, 0.3]] * 2, [np.eye(4)] * 2),
     "Gravity": lambda: E.Gravity(g=(0.1, -0.0, -9.81)),
+    "GravityCompensation": lambda: E.GravityCompensation([1.0, 0.5], [HAND, "panda_link2"], [[0.1, 0, 0], [0, 0, 0.2]], (0, 0, -9.8)),
     "GravityGradient": lambda: E.GravityGradient(3.0, position=(4.0, 0, 0), bodies="panda_link[1-4]"),
     "ImplicitDamping": lambda: E.ImplicitDamping(0.4),
     "ImplicitSpring": lambda: E.ImplicitSpring(2.0, rest=0.1),
@@ -63,7 +65,7 @@ def same_numbers(one, other, seed=1):
 
 
 def test_no_effect_is_forgotten():
-    assert set(EVERY) == set(KINDS) - {"Loop"} and len(EVERY) == 22  # of a model with loops: test_kept_loops.py
+    assert set(EVERY) == set(KINDS) - {"Loop"} and len(EVERY) == 24  # of a model with loops: test_kept_loops.py
 
 
 @pytest.mark.parametrize("name", EVERY)
@@ -77,7 +79,8 @@ def test_every_effect(arm, tmp_path, name):
     same_numbers(scene, pc.Scene.from_dict(json.loads(json.dumps(scene.to_dict()))))
     (read,) = again.effects.values()
     assert type(read) is type(effect) and read.to_dict() == effect.to_dict() | {}
-    assert any(field.default is MISSING for field in fields(effect)) or name in ("Gravity", "Limits", "Servo")  # the model has their values
+    of_the_model = ("FluidDrag", "Gravity", "GravityCompensation", "Limits", "Servo")  # which take their values from it
+    assert any(field.default is MISSING for field in fields(effect)) or name in of_the_model
 
 
 def test_a_whole_scene(arm, tmp_path):
@@ -190,7 +193,10 @@ def test_functions_are_refused_by_name(arm, tmp_path):
         (lambda s, p: s.save(p / "scene.toml", model="pandda"), "no robot of the package is called 'pandda'; did you mean 'panda'?"),
         (lambda s, p: s.save(p / "scene.toml", model=p / "none.toml"), "none.toml: cannot be read: No such file or directory"),
         (lambda s, p: s.to_dict(model={"robot": "panda", "rot": "free"}), "a model that is named has no key 'rot'; did you mean 'root'?"),
-        (lambda s, p: s.to_dict(model={"robot": "panda", "mimic": "lock"}), "mimic is of files; no robot of the package has a joint"),
+        (
+            lambda s, p: s.to_dict(model={"robot": "panda", "mimic": "lock"}),
+            "mimic is an option of files; no robot of the package has a joint",
+        ),
         (lambda s, p: s.to_dict(model={}), 'a scene names its model by a path, "arm.toml", or a robot of the package, "panda"'),
     ],
 )
@@ -282,7 +288,7 @@ def test_errors_of_data(arm):
 
 def test_a_file_of_the_other_kind(arm, tmp_path):
     pc.Scene(arm).save(tmp_path / "scene.toml", model="panda")
-    with pytest.raises(pc.ModelError, match="this file is that of a scene: pycraft.load_scene reads it"):
+    with pytest.raises(pc.ModelError, match="this is the file of a scene; pycraft.load_scene reads it"):
         pc.load(tmp_path / "scene.toml")
     arm.save(tmp_path / "arm.toml")
     with pytest.raises(pc.ModelError, match="a scene has no key 'name'"):

@@ -22,6 +22,8 @@ EFFECTS = {
     "nothing": lambda: [],
     "gravity": lambda: [E.Gravity()],
     "point mass": lambda: [E.PointMassGravity(3.0, (1.0, 2.0, 3.0))],
+    "compensation": lambda: [E.Gravity(), E.GravityCompensation(0.6)],
+    "fluid": lambda: [E.FluidDrag(3.0, 0.5, (0.3, 0.2, 0.1))],
     "damping": lambda: [E.Damping(0.3), E.QuadraticDamping(0.2)],
     "friction": lambda: [E.CoulombFriction(0.3, 0.5)],
     "springs": lambda: [

@@ -50,6 +50,8 @@ EFFECTS = {
     "gravity": lambda: [E.Gravity((1.0, -2.0, -9.0))],
     "point mass": lambda: [E.PointMassGravity(3.0, (1.0, 2.0, 3.0))],
     "gravity gradient": lambda: [E.GravityGradient(50.0, (1.0, 2.0, 6.0))],
+    "compensation": lambda: [E.Gravity(), E.GravityCompensation(0.6)],
+    "fluid": lambda: [E.FluidDrag(0.0, 0.5, (0.3, 0.2, 0.1))],
     "damping": lambda: [E.Damping(0.3), E.QuadraticDamping(0.2)],
     "friction": lambda: [E.CoulombFriction(0.3, 0.5)],
     "springs": lambda: [E.Spring(2.0, hinges=["hinge1", "hinge2"])],

@@ -33,6 +33,8 @@ UNKNOWN = [
     (E.Wrench("tip", np.zeros(6), axes="wold"), "wrench: no node or body .* 'wold'"),
     (E.NodeSpring("mark", "hnad", 1.0), "node_spring: no node or body .* 'hnad'; did you mean 'hand'"),
     (E.PointMassGravity(1.0, bodies="lowr"), "point_mass_gravity: no body of 'arm' is called 'lowr'; did you mean 'lower'"),
+    (E.GravityCompensation(1.0, "lowr"), "gravity_compensation: no body of 'arm' is called 'lowr'; did you mean 'lower'"),
+    (E.FluidDrag(1.0, bodies="lowr", sizes=[[1, 1, 1]], placements=[np.eye(4)]), "fluid_drag: no node or body .* 'lowr'"),
     (E.Motor(1.0, 1.0, 1.0, hinges="wrist2"), "motor: no hinge .* 'wrist2'; did you mean 'wrist'"),
 ]
 
@@ -153,3 +155,25 @@ def test_precisions_that_are_not_there(arm):
             pc.Scene(arm, precision=precision)
     with pytest.raises(pc.EvaluationError, match="fast"):
         pc.Scene(arm, form="slow")
+
+
+@pytest.mark.parametrize(
+    ("effect", "text"),
+    [
+        (E.GravityCompensation([1.0, 2.0]), "gravity_compensation: share"),
+        (E.GravityCompensation(np.nan), "gravity_compensation: share"),
+        (E.GravityCompensation(1.0, "lower", points=[1.0, 2.0]), "points has 2 numbers; it takes three for each of 1 bodies"),
+        (E.GravityCompensation(1.0, "lower", points=[1.0, 2.0, np.inf]), "points has an entry that is inf"),
+        (E.GravityCompensation(g=(0, 0, np.nan)), "gravity_compensation: g has an entry that is"),
+        (E.FluidDrag(-1.0), "fluid_drag: density is -1; it is zero or more"),
+        (E.FluidDrag(viscosity=np.nan), "fluid_drag: viscosity is"),
+        (E.FluidDrag(1.0, wind=(0, np.inf, 0)), "fluid_drag: wind has an entry that is inf"),
+        (E.FluidDrag(1.0, bodies="lower", sizes=[[1, 1, 1]]), "sizes and placements belong together"),
+        (E.FluidDrag(1.0, bodies="lower", sizes=[[1, 1]], placements=[np.eye(4)]), r"sizes \(1, 2\) and placements \(1, 4, 4\) must be"),
+        (E.FluidDrag(1.0, bodies="lower", sizes=[[1, 1, -1]], placements=[np.eye(4)]), "an edge of a box is -1"),
+        (E.FluidDrag(1.0, bodies="mark", sizes=[[1, 1, 1]], placements=[np.eye(4)]), "'mark' is on the base, which no fluid moves"),
+    ],
+)
+def test_fields_and_fluids_that_make_no_sense(arm, effect, text):
+    with pytest.raises(pc.ModelError, match=text):
+        pc.Scene(arm).add(effect)

@@ -66,3 +66,16 @@ def balance(run):
     total = e["kinetic"] + e["potential"] - e["work"].sum(axis=1)
     size = max(np.abs(e["kinetic"]).max(), np.ptp(e["potential"]), np.abs(e["work"]).max(initial=0.0))
     return np.ptp(total) / size
+
+
+def pushed(model, state, node, moment, force):
+    """A moment and a force in the world's axes at the origin of a node, as generalized forces."""
+    return model.jacobian(node, state.q, axes="aligned").T @ np.concatenate([moment, force])
+
+
+def place(model, node, state):
+    return np.eye(4) if node is None else model.pose(node, state.q)
+
+
+def speed(model, node, state):
+    return np.zeros(6) if node is None else model.jacobian(node, state.q, axes="aligned") @ state.v

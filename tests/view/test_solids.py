@@ -150,7 +150,7 @@ def test_what_is_wrong_is_said_and_the_rest_is_shown(path, model):
         "cylinder",
         "capsule",
         "mesh",
-    ] and "sizes of <sphere> are positive; the shape is left out" in words
+    ] and "sizes of <sphere> must be positive; the shape is left out" in words
     pytest.importorskip("trimesh")
     (path.parents[1] / "parts" / "ball.obj").write_text("no mesh")
     made, missing = solids(model)

@@ -71,10 +71,8 @@ def test_urdf_says_once_what_is_left_aside(tmp_path):
     path.write_text(URDF)
     with pytest.warns(pc.ModelWarning) as said:
         arm = pc.load(path)
-    text = (
-        "left aside: damping of 4 coordinates; effort limit of 1 coordinate; velocity limit of 1 coordinate; the numbers are in left_aside"
-    )
-    assert [str(w.message) for w in said] == [f"{path}: {text} of the model"]
+    text = "not in the model: joint damping (4 coordinates), effort limits (1 coordinate), velocity limits (1 coordinate)"
+    assert [str(w.message) for w in said] == [f"{path}: {text}; pycraft.effects.from_model(model) makes effects of them"]
     nan = np.nan
     expected = {"damping": [0.5, 2, 2, 2, nan], "effort limit": [10, nan, nan, nan, nan], "velocity limit": [3, nan, nan, nan, nan]}
     assert arm.left_aside.keys() == expected.keys()
@@ -83,9 +81,9 @@ def test_urdf_says_once_what_is_left_aside(tmp_path):
             np.testing.assert_array_equal(again.left_aside[name], numbers)
     motion = arm.integrate_ode(arm.q, np.ones(5), [0, 1.0], damping=np.nan_to_num(arm.left_aside["damping"]))
     assert motion.v[-1, 0] < 1
-    with pytest.raises(pc.ModelError, match=r"gravity='file', and the file says none"):
+    with pytest.raises(pc.ModelError, match=r"gravity='file', and the file gives none"):
         pc.load(path, gravity="file")
-    with pytest.raises(pc.ModelError, match="gravity='moon': three numbers"):
+    with pytest.raises(pc.ModelError, match="gravity='moon': give three numbers"):
         pc.load(path, gravity="moon")
     with pytest.raises(pc.ModelError, match="gravity takes 3 numbers"):
         pc.load(path, gravity=(0, 0))
@@ -107,7 +105,7 @@ def test_mjcf_gravity_and_damping(tmp_path):
         '<body name="c"><joint name="j" damping="2" stiffness="3" frictionloss="4"/><geom size="1"/></body></body></worldbody></mujoco>'
     )
     with pytest.warns(
-        pc.ModelWarning, match=r'left aside: gravity \(0.0, 1.0, -9.0\), which load\(..., gravity="file"\) takes; damping of 1 coord'
+        pc.ModelWarning, match=r'joint damping \(1 coord.*Gravity \(0.0, 1.0, -9.0\) of the file is not set; load\(..., gravity="file"\)'
     ):
         model = pc.load(path)
     assert not model.gravity.any()
@@ -115,7 +113,7 @@ def test_mjcf_gravity_and_damping(tmp_path):
         np.testing.assert_array_equal(model.left_aside[name], [np.nan] * 6 + [number])
     with pytest.warns(pc.ModelWarning) as said:
         model = pc.load(path, gravity="file")
-    assert model.gravity.tolist() == [0, 1, -9] and "gravity" not in model.left_aside and "left aside: gravity" not in str(said[0].message)
+    assert model.gravity.tolist() == [0, 1, -9] and "gravity" not in model.left_aside and "Gravity" not in str(said[0].message)
 
 
 def test_robots_of_the_package_load_silently(recwarn):

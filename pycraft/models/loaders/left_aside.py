@@ -1,4 +1,4 @@
-"""What a file says and a model does not have: gathered by coordinate, told once, kept as numbers."""
+"""What a file says and a model does not have: gathered by coordinate, reported once, kept as numbers."""
 
 from __future__ import annotations
 
@@ -7,12 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..offers import BoxInFluid, HeldWeight
 from ..warning import warn
 
 if TYPE_CHECKING:
     from ..multibody import Multibody
 
-QUANTITIES = ("damping", "friction", "stiffness", "effort limit", "velocity limit")
+OFF = "the file disables it"
+"""Why an actuator is no effect that gives no force in its own program either."""
+_SHOWN = 12
+"""How many things that are not read a warning names."""
+QUANTITIES = ("damping", "quadratic damping", "friction", "stiffness", "effort limit", "velocity limit")
 """What of a coordinate there is to leave aside; beside them "gravity", and "spring rest" by the coordinates q."""
 
 
@@ -39,7 +44,7 @@ def current(model: Multibody) -> dict[str, np.ndarray]:
     stale = [quantity for quantity, values in left.items() if len(values) != sizes.get(quantity, model.nv)]
     if stale:
         numbers = ", ".join(f"{quantity} of {len(left[quantity])} coordinates" for quantity in stale)
-        warn(f"{model.name!r} was edited since it was loaded and has {model.nv} coordinates: not saved is what was left aside, {numbers}")
+        warn(f"{model.name!r} was edited since it was loaded and has {model.nv} coordinates; its left_aside is not saved: {numbers}")
     return {quantity: values for quantity, values in left.items() if quantity not in stale}
 
 
@@ -49,23 +54,47 @@ def current_actuators(model: Multibody) -> list[dict[str, Any]]:
     gone = [actuator["name"] for actuator in model.actuators if actuator["coordinate"] not in names]
     if gone:
         lost = ", ".join(gone)
-        warn(f"{model.name!r} was edited since it was loaded: not saved are actuators whose coordinates it no longer has, {lost}")
+        warn(f"{model.name!r} was edited since it was loaded; actuators at coordinates that it no longer has are not saved: {lost}")
     return [actuator for actuator in model.actuators if actuator["coordinate"] in names]
 
 
+_NAMES = {
+    "damping": "joint damping",
+    "quadratic damping": "quadratic joint damping",
+    "friction": "joint friction",
+    "stiffness": "joint springs",
+    "effort limit": "effort limits",
+    "velocity limit": "velocity limits",
+}
+"""What warnings call the quantities."""
+
+
 def told(left: Mapping[str, np.ndarray], model: Multibody) -> str:
-    """One line about all of it, and how to get it; empty where nothing is left aside."""
-    parts, drives = [], len(model.actuators)
+    """Return what `load` says of a file: what effects are made of, the gravity, and what is not read; empty where there is nothing."""
+    parts, said = [], []
     for quantity, values in left.items():
-        if quantity == "spring rest":
-            continue  # goes with the stiffness
-        if quantity == "gravity":
-            parts.append(f'gravity {tuple(values.tolist())}, which load(..., gravity="file") takes')
-            continue
-        count = int(np.count_nonzero(~np.isnan(values)))
-        parts.append(f"{quantity} of {count} coordinate{'s' if count > 1 else ''}")
-    if drives:
-        parts.append(f"{drives} actuator{'s' if drives > 1 else ''}")
-    if not parts:
-        return ""
-    return f"left aside: {'; '.join(parts)}; the numbers are in left_aside of the model"
+        if quantity in _NAMES:
+            parts.append(f"{_NAMES[quantity]} ({_count(int(np.count_nonzero(~np.isnan(values))), 'coordinate')})")
+    if drives := [actuator for actuator in model.actuators if actuator["why not"] is None]:
+        parts.append(_count(len(drives), "actuator"))
+    if held := {offer.body for offer in model.offers if isinstance(offer, HeldWeight)}:
+        parts.append(f"gravity compensation ({_count(len(held), 'body')})")
+    if any(isinstance(offer, BoxInFluid) for offer in model.offers):
+        parts.append("the resistance of a fluid")
+    if parts:
+        said.append(f"not in the model: {', '.join(parts)}; pycraft.effects.from_model(model) makes effects of them")
+    if "gravity" in left:
+        said.append(f'Gravity {tuple(left["gravity"].tolist())} of the file is not set; load(..., gravity="file") sets it')
+    unread = [
+        *model.not_read,
+        *(f"actuator {drive['name']!r} ({why})" for drive in model.actuators if (why := drive["why not"]) not in (None, OFF)),
+    ]
+    if unread:
+        shown = unread[:_SHOWN] + [f"... ({len(unread)} in all: model.not_read, model.actuators)"] * (len(unread) > _SHOWN)
+        said.append(f"Not read, although it changes the motion: {', '.join(shown)}")
+    return ". ".join(said)
+
+
+def _count(count: int, what: str) -> str:
+    many = what[:-1] + "ies" if what.endswith("y") else what + "s"
+    return f"{count} {what if count == 1 else many}"

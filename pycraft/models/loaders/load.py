@@ -6,71 +6,75 @@ import gc
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 
 from ... import _core
 from ..multibody import Multibody
 from ..warning import warn
-from . import toml_reader, urdf
+from . import sdf, toml_reader, urdf
 from .left_aside import told
+from .named_robots import find, is_name
 from .toml_file import TomlFile
 from .xml_file import XmlFile
 
-_OPTIONS = {"root": ("fixed", "free"), "mimic": ("refuse", "couple", "lock", "free"), "welds": ("lump", "keep", None)}
+_OPTIONS = {"root": (None, "fixed", "free"), "mimic": ("couple", "refuse", "lock", "free"), "welds": ("lump", "keep", None)}
 
 
 def load(
     path: str | os.PathLike[str],
-    root: str = "fixed",
-    mimic: str = "refuse",
+    root: str | None = None,
+    mimic: str = "couple",
     welds: str | None = None,
     package_dirs: Sequence[str | os.PathLike[str]] = (),
     strict: bool = False,
     *,
     gravity: str | Sequence[float] | None = None,
 ) -> Multibody:
-    """The model of a TOML file (`Multibody.save`), or of a URDF or MJCF file (which of the two, its root element says).
+    """Load the model of a TOML, URDF, SDF or MJCF file, or a robot by its name.
 
-    A TOML file holds a model as it was saved, gravity and state with it. From the others hinges carry the file's joint names,
-    bodies its link names, the model the robot's name. Children come in the order of their joint elements, depth first.
-    Gravity is zero until it is set, also where the file gives it; damping, friction, springs and bounds on efforts and
-    velocities are effects: a warning tells which of them the file has, and `Multibody.left_aside` has their numbers,
-    `Multibody.actuators` those of actuators, and `pycraft.effects.from_model` makes effects of them. Contacts are not read.
+    The root element of an XML file says its format. A TOML file holds a model as `Multibody.save` wrote it, gravity and state with it.
+    From the others hinges take the file's joint names, bodies its link names, and the model the robot's name. Children come in the order
+    of their joint elements, depth first. Gravity is zero until it is set, even where the file gives it. Damping, friction, springs,
+    actuators and bounds on efforts and velocities are effects: a warning names those of the file, and `pycraft.effects.from_model` makes
+    effects of them. `Multibody.not_read` names what changes motions elsewhere and is not read, such as contacts.
 
     Parameters
     ----------
-    path : path of the file
-        One whose name ends in ".toml" is read as TOML.
+    path : path of the file, or name of a robot
+        A file whose name ends in ".toml" is read as TOML. A name is one of `pycraft.robots.names()`, the name of a file of the installed
+        example-robot-data ("anymal"), or a module of the installed robot_descriptions ("ur5_description").
     root : {"fixed", "free"}
-        What carries the root link: the base, or a free hinge called "root" whose body has the root link's name. A link of no
-        mass with a floating joint called "root" is free already. MJCF and TOML files say so themselves; for them there is
-        only "fixed".
-    mimic : {"refuse", "couple", "lock", "free"}
-        A joint that follows another: an error that names it; a joint of its own with a coupling in `Multibody.loops`, called
-        as the joint is; a weld where it stands when the other joint is at zero; a joint that moves on its own.
+        What carries the root link of a URDF or SDF file: the base, or a free hinge called "root" whose body has the root link's name.
+        Without it the root is fixed, except that of a package robot that flies, and a warning tells of a root link with mass. A link of no
+        mass with a floating joint called "root" is free already. MJCF and TOML files say so themselves; for them there is only "fixed".
+    mimic : {"couple", "refuse", "lock", "free"}
+        A joint that follows another becomes a joint of its own with a coupling in `Multibody.loops` that has the joint's name; an error; a
+        weld at the position that it has when the other joint is at zero; a joint that moves on its own.
     welds : {"lump", "keep"}
-        A link on a fixed joint becomes part of the body that moves it and a node with its name (a fixed root link becomes
-        a node of the base), or stays a body with no coordinates. Both give the same mass matrix. Left out: what a TOML file
-        says, "lump" of others.
+        "lump": a link on a fixed joint becomes part of the body that moves it, and a node with its name (a fixed root link becomes a node
+        of the base). "keep": it stays a body without coordinates. Both give the same mass matrix. By default what a TOML file says, "lump"
+        for the others.
     package_dirs : folders
-        Where packages of "package://" names lie. No mesh is opened to load a URDF file; the viewer looks for those of `Multibody.shapes`
-        there: see `pycraft.models.loaders.urdf.resolve_package`.
+        Where packages of "package://" names lie. Loading a URDF file opens no mesh; viewers look for those of `Multibody.shapes` there: see
+        `pycraft.models.loaders.urdf.resolve_package`.
     strict : bool
-        An inertia that violates the triangle inequality is an error instead of a warning.
+        Makes an inertia that violates the triangle inequality an error instead of a warning.
     gravity : (3,) m/s², or "file"
-        The model's gravity; "file": what an MJCF file says. Left out: what a TOML file says, zero of others.
+        The model's gravity; "file" takes what an MJCF or SDF file says. By default what a TOML file says, zero for the others.
 
     Warns
     -----
     ModelWarning
-        Once each, with file and line: inertias that violate the triangle inequality, massless bodies on hinges, limits
-        that are the wrong way round; constraints of an MJCF file that are left out. Once for a file: what is left aside.
+        Once each, with file and line: inertias that violate the triangle inequality, massless bodies on hinges, limits in the wrong order,
+        what the reader overlooks in the file. Once for a file: a root link with mass that is fixed, what is not in the model, what is not
+        read.
 
     Raises
     ------
     ModelError
-        Whatever the file gets wrong, with file, line, element or key, and remedy; in an MJCF file what MuJoCo refuses.
+        Whatever the file gets wrong, with file, line, element or key, and remedy; in an MJCF file what MuJoCo refuses; an unknown name.
     MissingPackageError
         An MJCF file without the package mujoco (extra `mjcf`).
 
@@ -78,26 +82,47 @@ def load(
     --------
     >>> import pycraft as pc
     >>> arm = pc.load("arm.urdf")  # doctest: +SKIP
+    >>> pc.load("ur5").nv
+    6
     """
-    model, words = read(path, root=root, mimic=mimic, welds=welds, package_dirs=package_dirs, strict=strict)
-    _set_gravity(model, gravity, path)
-    if text := told(model.left_aside, model):
-        words = [*words, f"{os.fsdecode(path)}: {text}"]
+    _check_options(root, mimic, welds)
+    if is_name(path):
+        found = find(str(path))
+        if callable(found):
+            if strict:
+                raise _core.ModelError(f"strict=True is for files; pycraft.robots.{path}() takes root and welds")
+            return _package_robot(found, root, welds, gravity)
+        path = found
+    file = _opened(path)
+    model, words = _read(file, root, mimic, welds, strict, package_dirs)
+    _set_gravity(model, gravity, file)
+    if said := told(model.left_aside, model):
+        words = [*words, f"{file.path}: {said}"]
     for text in words:
         warn(text)
     return model
 
 
-def _set_gravity(model: Multibody, gravity: str | Sequence[float] | None, path: str | os.PathLike[str]) -> None:
+def _package_robot(make: object, root: str | None, welds: str | None, gravity: str | Sequence[float] | None) -> Multibody:
+    options = {name: value for name, value in (("root", root), ("welds", welds)) if value is not None}
+    model: Multibody = make(**options)  # type: ignore[operator]  # a function of pycraft.robots
+    if isinstance(gravity, str):
+        raise _core.ModelError(f"gravity={gravity!r}: the robots of the package have no gravity; give three numbers in m/s²")
+    if gravity is not None:
+        model.gravity = gravity
+    return model
+
+
+def _set_gravity(model: Multibody, gravity: str | Sequence[float] | None, file: TomlFile | XmlFile) -> None:
     if isinstance(gravity, str):
         if gravity != "file":
-            raise _core.ModelError(f"gravity={gravity!r}: three numbers in m/s², or 'file'")
+            raise _core.ModelError(f"gravity={gravity!r}: give three numbers in m/s², or 'file'")
         if model.gravity.any():  # of a TOML file
             return
-        if "gravity" not in model.left_aside:
-            text = "gravity='file', and the file says none; a URDF file never does: give three numbers"
-            raise _core.ModelError(f"{os.fsdecode(path)}: {text}")
-        model.gravity = model._left_aside.pop("gravity")
+        if "gravity" not in model.left_aside and getattr(file, "root_name", "robot") == "robot":
+            text = "gravity='file', and the file gives none, as no URDF file does; give three numbers in m/s²"
+            raise _core.ModelError(f"{file.path}: {text}")
+        model.gravity = model._left_aside.pop("gravity", np.zeros(3))  # none where the file disables it
     elif gravity is not None:
         model.gravity = gravity
         model._left_aside.pop("gravity", None)
@@ -106,20 +131,26 @@ def _set_gravity(model: Multibody, gravity: str | Sequence[float] | None, path: 
 def read(
     path: str | os.PathLike[str],
     *,
-    root: str = "fixed",
-    mimic: str = "refuse",
+    root: str | None = "fixed",
+    mimic: str = "couple",
     welds: str | None = None,
     package_dirs: Sequence[str | os.PathLike[str]] = (),
     strict: bool = False,
 ) -> tuple[Multibody, list[str]]:
-    """The model of a file and what `load` warns of, for callers that know the file and decide themselves what to say."""
+    """Return the model of a file and what `load` warns of, for callers that know the file and decide themselves what to report."""
+    _check_options(root, mimic, welds)
+    return _read(_opened(path), root, mimic, welds, strict, package_dirs)
+
+
+def _check_options(root: str | None, mimic: str, welds: str | None) -> None:
     for option, value in (("root", root), ("mimic", mimic), ("welds", welds)):
         if value not in _OPTIONS[option]:
             raise _core.ModelError(f"{option}={value!r}: there are {', '.join(repr(known) for known in _OPTIONS[option] if known)}")
+
+
+def _opened(path: str | os.PathLike[str]) -> TomlFile | XmlFile:
     with _no_collection():
-        if is_toml(path):
-            return toml_reader.read(TomlFile(path), root=root, welds=welds, strict=strict)
-        return _read(XmlFile(path), root, mimic, welds or "lump", strict, package_dirs)
+        return TomlFile(path) if is_toml(path) else XmlFile(path)
 
 
 def is_toml(path: object) -> bool:
@@ -140,15 +171,39 @@ def _no_collection() -> Iterator[None]:
 
 
 def _read(
-    file: XmlFile, root: str, mimic: str, welds: str, strict: bool, package_dirs: Sequence[str | os.PathLike[str]]
+    file: TomlFile | XmlFile,
+    root: str | None,
+    mimic: str,
+    welds: str | None,
+    strict: bool,
+    package_dirs: Sequence[str | os.PathLike[str]],
+) -> tuple[Multibody, list[str]]:
+    with _no_collection(), np.errstate(over="ignore", invalid="ignore"):  # what is not finite then is refused, with its line
+        if isinstance(file, TomlFile):
+            return toml_reader.read(file, root=root or "fixed", welds=welds, strict=strict)
+        try:
+            model, words = _read_xml(file, root, mimic, welds or "lump", strict, package_dirs)
+        except (_core.Error, MemoryError, RecursionError, ImportError):
+            raise
+        except Exception as error:  # of another package, or a case that no reader foresees
+            text = f"the file cannot be read as a model ({type(error).__name__}: {error}); please report it together with the file"
+            raise file.error(file.root, text) from error
+        return model, [*file.warnings, *words]
+
+
+def _read_xml(
+    file: XmlFile, root: str | None, mimic: str, welds: str, strict: bool, package_dirs: Sequence[str | os.PathLike[str]]
 ) -> tuple[Multibody, list[str]]:
     if file.root_name == "robot":
-        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite then is refused, with its line
-            return urdf.read(file, root=root, mimic=mimic, welds=welds, strict=strict, package_dirs=package_dirs)
+        return urdf.read(file, root=root, mimic=mimic, welds=welds, strict=strict, package_dirs=package_dirs)
+    if file.root_name == "sdf":
+        return sdf.read(file, root=root, mimic=mimic, welds=welds, strict=strict, package_dirs=package_dirs)
     if file.root_name == "mujoco":
         from . import mjcf  # its package is an extra
 
-        with np.errstate(over="ignore", invalid="ignore"):
-            return mjcf.read(file, root=root, welds=welds, strict=strict)
-    text = f"<{file.root_name}> is the root element of no format that is read; there are <robot> (URDF) and <mujoco> (MJCF)"
-    raise file.error(file.root, text)
+        return mjcf.read(file, root=root or "fixed", welds=welds, strict=strict)
+    if Path(file.path).suffix.lower() == ".xacro":
+        text = "this is a part of a robot in xacro; expand the file that includes it: pip install xacro, then xacro file.xacro > file.urdf"
+        raise file.error(file.root, text)
+    formats = "there are <robot> (URDF), <sdf> (SDF) and <mujoco> (MJCF)"
+    raise file.error(file.root, f"<{file.root_name}> is not the root element of a format that pycraft reads; {formats}")

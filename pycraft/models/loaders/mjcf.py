@@ -17,15 +17,12 @@ Coordinates are MuJoCo's numbers: a joint's `ref` goes into the placement of its
 or the keyframe called "state" where there is one. A limit that is the largest double is none.
 `pycraft.interop.mujoco` has the order and the velocities of free hinges. `armature` is the rotor inertia.
 
-Not in the model, as they are effects: gravity (zero until it is set), springs, damping and friction of joints, which
-are in `Multibody.left_aside`, and actuators, in `Multibody.actuators`; contacts and fluid forces, which are not read.
-Equality constraints connect, weld and joint are in `Multibody.loops`, with a warning, as dynamics of the tree does not keep them;
-others, tendons and flexes are left out with one that names them.
+What is not in the model as it is an effect, and what is not read at all: `mjcf_effects`. Equality constraints connect, weld and joint are
+in `Multibody.loops`, with a warning, as dynamics of the tree does not keep them.
 """
 
 from __future__ import annotations
 
-import logging
 import sys
 from pathlib import Path
 from typing import Any
@@ -36,12 +33,12 @@ from ... import _core
 from ...interop import mujoco as conventions
 from ..multibody import Multibody
 from .mjcf_actuators import read_actuators
+from .mjcf_effects import armature, by_coordinate, not_read, offers
 from .mjcf_equalities import add_equalities
+from .mjcf_missing import without_missing_files
 from .mjcf_shapes import shapes_of
 from .rotations import rotation_about, rotation_from_quaternion, turned_inertia
-from .xml_file import XmlFile
-
-log = logging.getLogger(__name__)
+from .xml_file import XmlFile, abbreviated
 
 STATE = "state"
 """The keyframe that is the model's state."""
@@ -63,19 +60,26 @@ def read(file: XmlFile, *, root: str, welds: str, strict: bool) -> tuple[Multibo
     """
     if root == "free":
         raise file.error(file.root, 'root="free" is for URDF files; in an MJCF file give the body a <freejoint name="root"/>')
+    missing: list[str] = []
     try:
-        return _Reader(conventions.compiled(file.path), file).model(welds, strict)
+        compiled = conventions.compiled(file.path, lambda spec: missing.extend(without_missing_files(spec, file.path)))
+        model, words = _Reader(compiled, file.root.get("model") or Path(file.path).stem, file.path).model(welds, strict)
+        return model, [*words, *([f"{file.path}: files that are not there, and left out: {abbreviated(missing)}"] if missing else [])]
     except UnicodeDecodeError as error:  # MuJoCo hands names on as bytes
         text = f"a name is not in UTF-8 ({error.reason}), which is how MuJoCo reads files whatever they declare; convert the file"
         raise file.error(file.root, text) from None
 
 
+def of_compiled(compiled: Any, name: str) -> Multibody:
+    """Return the model of an MjModel, without warnings."""
+    return _Reader(compiled, name, name).model("lump", False)[0]
+
+
 class _Reader:
     """One compiled model on its way to a `Multibody`."""
 
-    def __init__(self, compiled: Any, file: XmlFile):
-        self.m, self.path = compiled, file.path
-        self.name = file.root.get("model") or Path(file.path).stem
+    def __init__(self, compiled: Any, name: str, path: str):
+        self.m, self.name, self.path, self.armature = compiled, name, path, armature(compiled)
         self.joint_names = {name for j in range(compiled.njnt) if (name := compiled.joint(j).name)}
         self.bodies = self._body_names()
         self.warnings: list[str] = []
@@ -106,10 +110,11 @@ class _Reader:
         except _core.ModelError as error:
             raise _core.ModelError(f"{self.path}: {error}") from None
         model.q, model.v = self._state(model)
-        self._left_out(model)
-        model._left_aside = self._left_aside(model)
-        model._actuators = read_actuators(self.m, model)
-        model._shapes = shapes_of(self.m, self.bodies)
+        model._not_read = [*self._equalities(model), *not_read(m, self.bodies)]
+        model._left_aside = by_coordinate(m, model)
+        model._actuators = read_actuators(m, model)
+        model._offers = offers(m, self.bodies)
+        model._shapes = shapes_of(m, self.bodies)
         return model, self.warnings + [f"{self.path}: {text}" for _, text in model.take_warnings()]
 
     def _state(self, model: Multibody) -> tuple[np.ndarray, np.ndarray]:
@@ -121,13 +126,17 @@ class _Reader:
 
     def _add_sites(self, model: Multibody) -> None:
         m, frames = self.m, set(self.bodies[1:])
+        renamed = []
         for s in range(m.nsite):
-            if not (name := m.site(s).name):
+            if not (own := m.site(s).name):
                 continue  # nothing could refer to it
-            name = _unused(name, frames, "_site")
+            name = _unused(own, frames, "_site")
+            renamed += [f"{own!r} is {name!r}"] if name != own else []
             frames.add(name)
             on, rotation = int(m.site_bodyid[s]), rotation_from_quaternion(m.site_quat[s])
             model.add_node(name, self.bodies[on] if on else None, position=m.site_pos[s], rotation=rotation)
+        if renamed:
+            self.warnings.append(f"{self.path}: sites with the names of bodies are nodes with other names: {abbreviated(renamed)}")
 
     # ------------------------------------------------------------------ hinges
     def _joints(self, b: int) -> range:
@@ -159,9 +168,9 @@ class _Reader:
         kinds = [int(m.jnt_type[j]) for j in joints]
         dofs = range(int(m.jnt_dofadr[joints[0]]), int(m.jnt_dofadr[joints[0]]) + sum(_V_SIZE[kind] for kind in kinds))
         options: dict[str, Any] = dict(hinge=_KINDS[kinds[0]] if len(kinds) == 1 else "custom")
-        options["rotor_inertia"] = m.dof_armature[dofs]
+        options["rotor_inertia"] = self.armature[dofs]
         if kinds == [_FREE]:  # its coordinates are the body's pose in the world: the body's pos and quat are in qpos0 only
-            if np.any(m.dof_armature[dofs]):
+            if np.any(self.armature[dofs]):
                 self.warnings.append(
                     f"{self.path}: the free joint of body {self.bodies[b]!r} has armature; here it acts along the body's axes, "
                     "in MuJoCo along the world's, so that bias forces differ by armature times ω × v"
@@ -204,38 +213,18 @@ class _Reader:
                 C = _pose(np.eye(3), -reference * axis) @ C
         return placement @ C if not np.array_equal(C, np.eye(4)) else placement, subhinges
 
-    # ------------------------------------------------------------------ what a model does not have
-    def _left_aside(self, model: Multibody) -> dict[str, np.ndarray]:
-        """Gravity, and per coordinate damping, friction and stiffness, where the file has any: see `Multibody.left_aside`."""
-        m, left = self.m, {}
-        if np.any(m.opt.gravity):
-            left["gravity"] = np.array(m.opt.gravity)
-        order = conventions.permutation(model)[1]
-        stiffness = m.jnt_stiffness[m.dof_jntid]
-        for quantity, numbers in (("damping", m.dof_damping), ("friction", m.dof_frictionloss), ("stiffness", stiffness)):
-            if np.any(numbers):
-                values = np.full(m.nv, np.nan)
-                values[order] = np.where(np.asarray(numbers) != 0, numbers, np.nan)
-                left[quantity] = values
-        rest = conventions.from_mujoco(model, m.qpos_spring, np.zeros(m.nv))[0]
-        if "stiffness" in left and not np.array_equal(rest, model.zero_q()):
-            left["spring rest"] = rest
-        return left
-
-    def _left_out(self, model: Multibody) -> None:
-        m = self.m
-        constraints = add_equalities(m, model, self.bodies)
+    # ------------------------------------------------------------------ what direct calls do not keep
+    def _equalities(self, model: Multibody) -> list[str]:
+        """Declare equality constraints as loops, and return those that are none."""
+        left_out, inactive = add_equalities(self.m, model, self.bodies)
         if len(model.loops):
             names = ", ".join(map(repr, model.loops))
             self.warnings.append(
                 f"{self.path}: equality constraints are loops of the model, which direct calls and scenes do not keep: {names}"
             )
-        constraints += [f"tendon {m.tendon(t).name or t!r}" for t in range(m.ntendon)]
-        constraints += [f"flex {f}" for f in range(m.nflex)]
-        if constraints:
-            self.warnings.append(f"{self.path}: left out: {', '.join(constraints)}")
-        if m.npair or np.any((m.geom_contype != 0) | (m.geom_conaffinity != 0)):
-            log.info("%s: contacts between its %d geoms are not read; they are effects", self.path, m.ngeom)
+        if inactive:
+            self.warnings.append(f"{self.path}: not active in the file, and left out: {', '.join(inactive)}")
+        return left_out
 
 
 def _pose(rotation: np.ndarray, position: np.ndarray) -> np.ndarray:

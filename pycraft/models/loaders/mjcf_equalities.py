@@ -5,7 +5,7 @@ connect    a ball at the anchor, or where both sites are
 weld       a weld at the file's relative pose, or that of both sites in each other; a ball at its anchor where torquescale is 0
 joint      a coupling: q₁ - ref₁ = Σ a_k (q₂ - ref₂)^k; of one joint q₁ - ref₁ = a₀
 
-Those that are not active when MuJoCo starts, and equalities of tendons and flexes, are left out.
+Those that are not active when MuJoCo starts or that a flag disables, and equalities of tendons and flexes, are left out.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from numpy.polynomial import Polynomial
 
 from ... import _core
 from ...interop import mujoco as conventions
+from ...interop.mujoco import disabled
 from ..multibody import Multibody
 from .rotations import rotation_from_quaternion
 
@@ -25,15 +26,19 @@ _KINDS = ("connect", "weld", "joint", "tendon", "flex", "flexvert", "flexstrain"
 _SITE = 6  # mjtObj
 
 
-def add_equalities(m: Any, model: Multibody, bodies: list[str]) -> list[str]:
-    """Declares what a model can have, and returns what is left out, by kind, name and objects. `bodies`: by MuJoCo's number."""
-    left_out = []
+def add_equalities(m: Any, model: Multibody, bodies: list[str]) -> tuple[list[str], list[str]]:
+    """Declare the equality constraints that a model can have as loops; return the others, and those that are not active.
+
+    Both by kind, name and objects. `bodies`: names by MuJoCo's number.
+    """
+    left_out, inactive = [], []
+    off = disabled(m, "equality") or disabled(m, "constraint")
     for e in range(m.neq):
         kind, called = int(m.eq_type[e]), _called(m, e, bodies)
         name = m.equality(e).name or _unused(called, model)
         try:
-            if not m.eq_active0[e]:
-                left_out.append(f"{called} (not active)")
+            if off or not m.eq_active0[e]:
+                inactive.append(called)
             elif kind in (_CONNECT, _WELD):
                 _add_pair(m, e, model, bodies, name)
             elif kind == _JOINT:
@@ -42,7 +47,7 @@ def add_equalities(m: Any, model: Multibody, bodies: list[str]) -> list[str]:
                 left_out.append(called)
         except _core.ModelError as error:
             left_out.append(f"{called} ({error})")
-    return left_out
+    return left_out, inactive
 
 
 def _unused(called: str, model: Multibody) -> str:

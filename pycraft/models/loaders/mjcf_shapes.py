@@ -1,4 +1,7 @@
-"""The geoms of a compiled MJCF file as shapes: those that MuJoCo's viewer shows at first, groups 0 to 2; it holds the meshes, too."""
+"""The geoms of a compiled MJCF file as shapes, with the triangles of their meshes.
+
+Geoms of the groups 0 to 2, which MuJoCo's viewer shows at first, are seen; those that collide are collision shapes. Many are both.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +22,8 @@ def shapes_of(m: Any, bodies: list[str]) -> list[Shape]:
     made = []
     for g in range(m.ngeom):
         kind, size, on = int(m.geom_type[g]), np.array(m.geom_size[g]), int(m.geom_bodyid[g])
-        if not _SPHERE <= kind <= _MESH or int(m.geom_group[g]) >= _SHOWN_GROUPS:
+        purposes = ["visual"] * (int(m.geom_group[g]) < _SHOWN_GROUPS) + ["collision"] * bool(m.geom_contype[g] or m.geom_conaffinity[g])
+        if not _SPHERE <= kind <= _MESH or not purposes:
             continue
         placement = np.eye(4)
         placement[:3, :3], placement[:3, 3] = rotation_from_quaternion(m.geom_quat[g]), m.geom_pos[g]
@@ -36,10 +40,10 @@ def shapes_of(m: Any, bodies: list[str]) -> list[Shape]:
         material, colour = int(m.geom_matid[g]), m.geom_rgba[g]
         if material >= 0 and np.array_equal(colour, _NO_COLOUR):
             colour = m.mat_rgba[material]
-        if colour[3] == 0:  # not to be seen
-            continue
-        body = bodies[on] if on else ""
-        made.append(Shape(body, name, tuple(map(float, sizes)), placement, hex_colour(colour), triangles=triangles))
+        if colour[3] == 0:  # it cannot be seen
+            purposes = [purpose for purpose in purposes if purpose != "visual"]
+        body, size_of = bodies[on] if on else "", tuple(map(float, sizes))
+        made += [Shape(body, name, size_of, placement, hex_colour(colour), triangles=triangles, purpose=purpose) for purpose in purposes]
     return made
 
 

@@ -131,6 +131,13 @@ class TomlTable:
             raise self._wrong(key, 'a name in quotes: "..."')
         return self.data[key]
 
+    def texts(self, key: str) -> list[str]:
+        """A list of texts; empty where the key is missing."""
+        value = self.data.get(key, [])
+        if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
+            raise self._wrong(key, 'a list of texts: ["...", "..."]')
+        return list(value)
+
     def choice(self, key: str, among: Sequence[str], default: str) -> str:
         """One of several words."""
         word = self.data.get(key, default)

@@ -17,20 +17,24 @@ from .left_aside import QUANTITIES
 from .rotations import rotation_from_quaternion, rotation_from_rpy
 from .toml_file import TomlFile, TomlTable, nearest
 from .toml_loops import LOOP, add_loop
+from .toml_offers import BOX, HELD, fluid_box, held_weight
 from .toml_shapes import SHAPE, shape_of
 from .toml_subhinges import subhinges_of
 from .xml_file import abbreviated
 
 FORMAT = 1
 """Raised when a file means something else than it did."""
-MODEL = ("format", "name", "gravity", "welds", "strict", "bodies", "nodes", "loops", "state", "left_aside", "actuators", "shapes")
+MODEL = (
+    "format", "name", "gravity", "welds", "strict", "bodies", "nodes", "loops", "state", "left_aside", "actuators", "held_weights",
+    "fluid_boxes", "not_read", "shapes",
+)  # fmt: skip
 POSE = ("position", "rotation", "rpy", "quaternion")
 BODY = (
     "name", "parent", "hinge", "hinge_name", "axis", "axes", "point", "pitch", "subhinges", *POSE, "limits", "rotor_inertia", "mass", "com",
     "inertia",
 )  # fmt: skip
 NODE = ("name", "body", *POSE)
-ACTUATOR = ("name", "coordinate", "gear", "gain", "bias", "force_range", "why_not")
+ACTUATOR = ("name", "coordinate", "gear", "gain", "bias", "control", "force_range", "why_not")
 MOMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 _VECTOR = "three finite numbers: [x, y, z]"
 _LIMITS = "[lower, upper], or [[lower, ...], [upper, ...]] with one of each a subhinge; -inf and inf are no limit"
@@ -64,7 +68,7 @@ def read(file: TomlFile, *, root: str, welds: str | None, strict: bool) -> tuple
         text = 'root="free" is for URDF files; in a TOML file give the body hinge = "free" and hinge_name = "root"'
         raise file.error((), text)
     if "effects" in file.data or "model" in file.data:
-        raise file.error((), "this file is that of a scene: pycraft.load_scene reads it")
+        raise file.error((), "this is the file of a scene; pycraft.load_scene reads it")
     return read_table(TomlTable(file, file.data, (), "a model", MODEL), Path(file.path).stem, welds, strict)
 
 
@@ -86,6 +90,10 @@ def read_table(table: TomlTable, name: str, welds: str | None = None, strict: bo
     if (left := table.table("left_aside", ("gravity", "spring_rest", *QUANTITIES), "left_aside")) is not None:
         model._left_aside = _left_aside(model, left)
     model._actuators = [_actuator(model, actuator) for actuator in table.tables("actuators", ACTUATOR, "actuator", named=True) or []]
+    model._offers = [held_weight(model, held) for held in table.tables("held_weights", HELD, "held weight") or []]
+    boxes = table.tables("fluid_boxes", (*BOX, *POSE), "box in a fluid") or []
+    model._offers += [fluid_box(model, box, *_pose(box)) for box in boxes]
+    model._not_read = table.texts("not_read")
     model._shapes = [shape_of(model, shape, *_pose(shape)) for shape in table.tables("shapes", (*SHAPE, *POSE), "shape", named=True) or []]
     lines = {body.data["name"]: body for body in tables}
     return model, [f"{lines[body].at() if body in lines else table.at()}: {text}" for body, text in model.take_warnings()]
@@ -328,6 +336,7 @@ def _actuator(model: Multibody, table: TomlTable) -> dict[str, Any]:
         "gear": table.number("gear", 1.0, "the ratio of its gear"),
         "gain": table.number("gain", 1.0, "in N m or N for each unit of control"),
         "bias": table.vector("bias", 3, "three finite numbers: [force, force by position, force by velocity]") or [0.0, 0.0, 0.0],
+        "control": table.number("control", 0.0, "the one that stands for zero"),
         "force range": [lower, upper],
         "why not": why_not,
     }

@@ -15,7 +15,7 @@ from ..multibody import Multibody
 from ..shapes import SIZES, Shape
 from .toml_file import TomlTable, nearest
 
-SHAPE = ("kind", "body", "size", "colour", "file", "beside")
+SHAPE = ("kind", "body", "size", "colour", "file", "beside", "purpose")
 _COUNTS = {"box": 3, "sphere": 1, "cylinder": 2, "capsule": 2, "ellipsoid": 3, "mesh": 3}
 
 
@@ -34,10 +34,13 @@ def shape_of(model: Multibody, table: TomlTable, rotation: Any, position: Any) -
         raise table.error("colour", f'{table.label}: colour = {colour!r:.40}; write "#rrggbb", such as "#0072b2"')
     if (kind == "mesh") != ("file" in table):
         raise table.error("file" if "file" in table else None, f"{table.label}: a mesh has a file, and nothing else has one")
-    return Shape(body, kind, tuple(size), _placement(table, rotation, position), colour, table.text("file", ""), _beside(table, kind))
+    purpose = table.choice("purpose", ("visual", "collision"), "visual")
+    placement, file = placement_of(table, rotation, position), table.text("file", "")
+    return Shape(body, kind, tuple(size), placement, colour, file, _beside(table, kind), purpose=purpose)
 
 
-def _placement(table: TomlTable, rotation: Any, position: Any) -> np.ndarray:
+def placement_of(table: TomlTable, rotation: Any, position: Any) -> np.ndarray:
+    """Return the pose (4, 4) of a rotation and a position, either of which may be None. ModelError for what is no rotation."""
     placement = np.eye(4)
     if rotation is not None:
         placement[:3, :3] = rotation

@@ -8,10 +8,10 @@ ball, spherical             ball      quaternion (w, x, y, z); not in the specif
 floating                    free      quaternion, position
 fixed                       weld      none
 
-Visuals are `Multibody.shapes`; collision shapes, transmissions and gazebo blocks are not read. Damping, friction and bounds on
-efforts and velocities are effects: they are in `Multibody.left_aside`. Two elements are our own, which other readers pass over: inside a
-joint `<pycraft rotor_inertia="1.14"/>`, one value per coordinate in kg m² or kg as seen at the joint; in the robot `<pycraft>` with its
-loops (`urdf_loops`).
+Visuals are `Multibody.shapes`, collision shapes `Multibody.collision_shapes`. Damping, friction and bounds on efforts and velocities are
+effects: they are in `Multibody.left_aside`; what other elements do to the motion is named in `Multibody.not_read` (`urdf_not_read`). Two
+elements are our own, which other readers ignore: inside a joint `<pycraft rotor_inertia="1.14"/>`, one value per coordinate in kg m² or kg
+as seen at the joint; in the robot `<pycraft>` with its loops (`urdf_loops`).
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from .left_aside import by_coordinate
 from .rotations import rotation_about
 from .urdf_elements import Elements, Joint, Link
 from .urdf_loops import add_loops
+from .urdf_not_read import not_read
 from .urdf_shapes import shapes_of
 from .xml_file import XmlFile, abbreviated, label
 
@@ -36,7 +37,7 @@ _CUT = "a model is a tree: take one joint out"
 
 
 def read(
-    file: XmlFile, *, root: str, mimic: str, welds: str, strict: bool, package_dirs: Iterable[str | os.PathLike[str]] = ()
+    file: XmlFile, *, root: str | None, mimic: str, welds: str, strict: bool, package_dirs: Iterable[str | os.PathLike[str]] = ()
 ) -> tuple[Multibody, list[str]]:
     """The model of a URDF file, and what is worth a warning about it (each text with file and line).
 
@@ -50,8 +51,19 @@ def read(
         _couple(file, elements.joints, model)
     add_loops(file, model, tree.root)
     model._left_aside = by_coordinate(model, elements.left_aside)
+    model._not_read = not_read(file)
     model._shapes, unread = shapes_of(file, elements, package_dirs)
-    return model, elements.warnings + unread + [tree.with_line(body, text) for body, text in model.take_warnings()]
+    fixed = [] if root is not None else root_is_fixed(file, tree.links[tree.root], tree.is_free())
+    return model, elements.warnings + unread + fixed + [tree.with_line(body, text) for body, text in model.take_warnings()]
+
+
+def root_is_fixed(file: XmlFile, root: Link, free: bool) -> list[str]:
+    """Return the warning about a root link that would move if it were not fixed: one with mass, on no joint to a world."""
+    if free or not (root.mass or np.any(root.inertia)):
+        return []
+    return [
+        f"{file.at(root.element)}: the root {label(root.element)} has mass and is fixed; root='free' makes it float, root='fixed' is silent"
+    ]
 
 
 # Mimic joints ---------------------------------------------------------------------------------------------------------
@@ -64,9 +76,8 @@ def _settle_mimics(file: XmlFile, joints: dict[str, Joint], mimic: str) -> None:
         pairs = abbreviated(f"{j.name!r} follows {m.follows!r} (line {m.element.sourceline})" for j, m in followers.items())
         raise file.error(
             next(iter(followers.values())).element,
-            f"mimic joints are not coupled to the joints they follow: {pairs}; "
-            'load with mimic="couple" to have loops of the model that couple them, with mimic="lock" to weld them at their offsets, or '
-            'with mimic="free" to have them move on their own',
+            f'mimic="refuse", and joints follow others: {pairs}; mimic="couple" makes couplings of them, which are loops of the model, '
+            'mimic="lock" welds them at their offsets, mimic="free" lets them move on their own',
         )
     positions: dict[str, float] = {}
     for joint in followers:
@@ -195,7 +206,7 @@ class _Tree:
         return self.file.error(at if at is not None else owner, text)
 
 
-def _build(tree: _Tree, root: str, welds: str, strict: bool) -> Multibody:
+def _build(tree: _Tree, root: str | None, welds: str, strict: bool) -> Multibody:
     file, joints = tree.file, tree.joints
     root = "fixed" if tree.is_free() else root
     if root == "free" and "root" in joints:
@@ -231,7 +242,7 @@ def resolve_package(uri: str, urdf_path: str | os.PathLike[str], package_dirs: I
     Parameters
     ----------
     uri : str
-        "package://name/rest", "file:///path", or a path, which is relative to the URDF file's folder.
+        "package://name/rest", "model://name/rest", "file:///path", or a path, which is relative to the URDF file's folder.
     urdf_path : path of the URDF file
     package_dirs : folders
         Where packages lie: folders that hold a folder `name` or are called so themselves. Tried first and in order; then
@@ -244,8 +255,8 @@ def resolve_package(uri: str, urdf_path: str | os.PathLike[str], package_dirs: I
     """
     urdf_path = os.fsdecode(urdf_path)
     above = Path(urdf_path).absolute().parent
-    if uri.startswith("package://"):
-        package, _, rest = uri.removeprefix("package://").partition("/")
+    if uri.startswith(("package://", "model://")):
+        package, _, rest = uri.partition("://")[2].partition("/")
         inside = PurePosixPath(rest)
         if package in ("", ".", "..") or inside.is_absolute() or ".." in inside.parts:
             raise _core.ModelError(f"{urdf_path}: {uri!r} leads out of a package; write package://name/path within it")

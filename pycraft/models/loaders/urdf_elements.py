@@ -13,7 +13,7 @@ import numpy as np
 
 from ... import _core
 from .rotations import rotation_from_quaternion, rotation_from_rpy, turned_inertia
-from .xml_file import Element, XmlFile, label, local_name
+from .xml_file import Element, XmlFile, abbreviated, label, local_name, same_elements
 
 HINGES = {
     "revolute": "pin",
@@ -25,7 +25,7 @@ HINGES = {
     "ball": "ball",
     "spherical": "ball",
 }
-_MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+_MOMENTS, _PRINCIPAL = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), ("ixx", "iyy", "izz")
 _IDENTITY, _ZERO, _X = np.eye(3), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)
 _IDENTITY.setflags(write=False)
 _LINK_PARTS, _INERTIAL_PARTS = frozenset({"inertial"}), frozenset({"origin", "mass", "inertia"})
@@ -37,7 +37,7 @@ _LEFT_ASIDE = {
     "limit": (("effort", "effort limit"), ("velocity", "velocity limit")),
 }
 _LARGEST = sys.float_info.max
-_EXPAND = "expand the file first: xacro file.xacro > file.urdf"
+_EXPAND = "expand the file first: pip install xacro, then xacro file.xacro > file.urdf"
 
 
 @dataclass(slots=True)
@@ -100,25 +100,32 @@ class Elements:
         self.file, self.follow = file, follow
         self.warnings: list[str] = []
         self.left_aside: dict[str, dict[str, float]] = {}  # numbers by quantity and joint
-        self._refuse_xacro()
+        self._about_macros()
         self.links = self._named("link", self._link)
         if not self.links:
             raise file.error(file.root, f"{label(file.root)} has no links; a robot has one at least")
         self.joints = self._named("joint", self._joint)
 
-    def _refuse_xacro(self) -> None:
+    def _about_macros(self) -> None:
+        """Ignore elements of xacro with a warning, as other readers do; ModelError for expressions in what is read."""
         if not self.file.may_have_macros:
             return
         # In libxml2: to list the attributes of an element one by one takes time by the square of their number.
-        macros = "//*[contains(name(), 'xacro') or contains(namespace-uri(), 'xacro')]"
-        expressions = "//@*[contains(., '${') or contains(., '$(')]"
-        found: list[Any] = self.file.root.xpath(f"({macros} | {expressions})[1]")
-        for macro in found:
-            if not isinstance(macro, str):
-                raise self.file.error(macro, f"<{local_name(macro)}> is a xacro macro; {_EXPAND}")
-            attribute: Any = macro  # a string that knows its element
+        is_macro = "contains(name(), 'xacro') or contains(namespace-uri(), 'xacro')"
+        macros: list[Any] = self.file.root.xpath(f"//*[{is_macro}]")
+        read = "/*[local-name()='robot'] | /*/*[local-name()='link' or local-name()='joint']"
+        inside = "/*/*[local-name()='link']/*[local-name()='inertial']/descendant-or-self::* | /*/*[local-name()='joint']/descendant::*"
+        expressions: list[Any] = self.file.root.xpath(f"(({read} | {inside})/@*[contains(., '${{') or contains(., '$(')])[1]")
+        if macros and self.file.path.lower().endswith(".xacro"):
+            raise self.file.error(macros[0], f"<{local_name(macros[0])}> is a xacro macro; {_EXPAND}")
+        for attribute in expressions:  # a string that knows its element
             element = attribute.getparent()
-            raise self.file.error(element, f'{label(element)}: {attribute.attrname}="{macro}" is a xacro expression; {_EXPAND}')
+            raise self.file.error(element, f'{label(element)}: {attribute.attrname}="{attribute}" is a xacro expression; {_EXPAND}')
+        if macros:
+            names = abbreviated((f"<{local_name(macro)}> (line {macro.sourceline})" for macro in macros), most=4)
+            self.warnings.append(
+                f"{self.file.at(macros[0])}: elements of xacro are ignored: {names}; if links or joints are missing, {_EXPAND}"
+            )
 
     def _named(self, kind: str, read: Callable[[str, Element], T]) -> dict[str, T]:
         """The root's elements of one kind by name; ModelError where two have the same name."""
@@ -127,6 +134,11 @@ class Elements:
             name = self.file.text(element, "name")
             if name in found:
                 first = found[name].element.sourceline
+                if same_elements(found[name].element, element):
+                    self.warnings.append(
+                        f"{self.file.at(element)}: {kind} {name!r} is repeated word for word, first in line {first}; it counts once"
+                    )
+                    continue
                 raise self.file.error(element, f"{kind} {name!r} is defined twice, first in line {first}; rename one")
             found[name] = read(name, element)
         return found
@@ -155,7 +167,11 @@ class Elements:
         mass = self.file.required(parts, "mass", inertial, element, 'write <mass value="..."/> in kg')
         inertia = self.file.required(parts, "inertia", inertial, element, "write it with six moments, zeros for a point mass")
         rotation, com = self._pose(parts.get("origin"), element)
-        xx, xy, xz, yy, yz, zz = [self.file.number(inertia, moment, element) for moment in _MOMENTS]
+        xx, xy, xz, yy, yz, zz = [self.file.number(inertia, moment, element, None if moment in _PRINCIPAL else 0.0) for moment in _MOMENTS]
+        if len(inertia.attrib) < len(_MOMENTS) and (missing := [moment for moment in _MOMENTS if inertia.get(moment) is None]):
+            self.warnings.append(
+                f"{self.file.at(inertia)}: {label(element)}: {' and '.join(missing)} of its <inertia> are missing and taken for 0"
+            )
         moments = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         if rotation is not _IDENTITY:
             moments = turned_inertia(rotation, moments)

@@ -1,4 +1,4 @@
-"""The visuals of a URDF file as shapes: <visual> with <origin>, <geometry> and <material>. One that is wrong is left out with a warning."""
+"""The visuals and collisions of a URDF file as shapes: <origin>, <geometry>, <material>. A wrong one is left out with a warning."""
 
 from __future__ import annotations
 
@@ -22,25 +22,40 @@ _SIZES = {
 
 
 def shapes_of(file: XmlFile, elements: Elements, package_dirs: Iterable[Any]) -> tuple[list[Shape], list[str]]:
-    """All shapes of the file, on bodies and nodes called as the links are, and warnings of those that cannot be read."""
-    folders = [package_dirs] if isinstance(package_dirs, (str, bytes, os.PathLike)) else package_dirs
-    try:
-        beside = (os.path.abspath(os.fsdecode(file.path)), tuple(os.path.abspath(os.fsdecode(folder)) for folder in folders))
-    except TypeError:
-        raise _core.ModelError(f"package_dirs={package_dirs!r:.60}: folders, by their paths") from None
+    """Return all shapes of the file, on bodies and nodes with the names of the links, and warnings of those that cannot be read."""
+    beside = beside_of(file, package_dirs)
     colours = {material.get("name", ""): colour for material in file.children(file.root, "material") if (colour := _colour(file, material))}
-    found, warnings = [], []
+    found: list[Shape] = []
+    warnings: list[str] = []
+    if next(file.root.iter("{*}visual", "{*}collision"), None) is None:  # a large file that shows nothing
+        return found, warnings
     for name, link in elements.links.items():
-        for visual in file.children(link.element, "visual"):
-            try:
-                found += _shapes(file, elements, visual, name, colours, beside)
-            except _core.ModelError as error:
-                warnings.append(f"{error}; the shape is left out")
+        for purpose in ("visual", "collision"):
+            for element in file.children(link.element, purpose):
+                try:
+                    found += _shapes(file, elements, element, name, colours, beside, purpose)
+                except _core.ModelError as error:
+                    warnings.append(f"{error}; the shape is left out")
     return found, warnings
 
 
+def beside_of(file: XmlFile, package_dirs: Iterable[Any]) -> tuple[str, tuple[str, ...]]:
+    """Return where meshes of a file are looked for: its own path, and the folders of packages, absolute."""
+    folders = [package_dirs] if isinstance(package_dirs, (str, bytes, os.PathLike)) else package_dirs
+    try:
+        return os.path.abspath(os.fsdecode(file.path)), tuple(os.path.abspath(os.fsdecode(folder)) for folder in folders)
+    except TypeError:
+        raise _core.ModelError(f"package_dirs={package_dirs!r:.60}: give folders by their paths") from None
+
+
 def _shapes(
-    file: XmlFile, elements: Elements, visual: Element, link: str, colours: dict[str, str], beside: tuple[str, tuple[str, ...]]
+    file: XmlFile,
+    elements: Elements,
+    visual: Element,
+    link: str,
+    colours: dict[str, str],
+    beside: tuple[str, tuple[str, ...]],
+    purpose: str,
 ) -> list[Shape]:
     placement = np.eye(4)
     origin = next(iter(file.children(visual, "origin")), None)
@@ -54,11 +69,11 @@ def _shapes(
             for element in file.children(geometry, kind):
                 size = [x for attribute, count in attributes for x in file.numbers(element, attribute, count, visual)]
                 if min(size) <= 0:
-                    raise file.error(element, f"{label(visual)}: the sizes of <{kind}> are positive")
-                made.append(Shape(link, kind, tuple(size), placement, colour))
+                    raise file.error(element, f"{label(visual)}: the sizes of <{kind}> must be positive")
+                made.append(Shape(link, kind, tuple(size), placement, colour, purpose=purpose))
         for element in file.children(geometry, "mesh"):
             scale: Sequence[float] = file.numbers(element, "scale", 3, visual, (1.0, 1.0, 1.0))
-            made.append(Shape(link, "mesh", tuple(scale), placement, colour, file.text(element, "filename"), beside))
+            made.append(Shape(link, "mesh", tuple(scale), placement, colour, file.text(element, "filename"), beside, purpose=purpose))
     return made
 
 

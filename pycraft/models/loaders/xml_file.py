@@ -15,6 +15,8 @@ from ... import _core
 from .file_contents import contents
 
 Element: TypeAlias = "etree._Element"
+_DECLARATION = re.compile(rb"<\?xml\s[^>]{0,200}?version\s*=\s*([\"'])([^\"'<>]{0,40})\1[^>]{0,200}?\?>")
+_FIRST_ELEMENT = re.compile(rb"<[A-Za-z_:]")
 
 
 class XmlFile:
@@ -28,6 +30,7 @@ class XmlFile:
     ----------
     path : str
     root : the root element; its local name is `root_name`
+    warnings : what the parser is told to overlook, each text with file and line
 
     Raises
     ------
@@ -37,6 +40,7 @@ class XmlFile:
 
     def __init__(self, path: str | os.PathLike[str]):
         self.path, data = contents(path)
+        self.warnings: list[str] = []
         self.root, parser = self._parse(data)
         self.root_name, self._space = local_name(self.root), _namespace(self.root)
         # Expressions of macros may hide in any element and attribute; whether there can be any is seen from the bytes.
@@ -55,18 +59,48 @@ class XmlFile:
         # Files come from anywhere: nothing is fetched, no entity is expanded, the parser's limits on depth and size stay.
         options = dict(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
         options |= dict(remove_comments=True, remove_pis=True)
+        data = self._repaired(data)
         parser = etree.XMLParser(**options)
         try:
             return etree.fromstring(data, parser), parser
         except etree.XMLSyntaxError as error:
             # Old files use prefixes such as <controller:gazebo_ros> without declaring them, in parts that are not read.
-            if len(parser.error_log) and all(entry.domain_name == "NAMESPACE" for entry in parser.error_log):
+            log = [(entry.domain_name, entry.type_name) for entry in parser.error_log]
+            after_root = [entry.line for entry in parser.error_log if entry.type_name == "ERR_DOCUMENT_END"]
+            if log and all(domain == "NAMESPACE" or kind == "ERR_DOCUMENT_END" for domain, kind in log):
+                if after_root:
+                    self.warnings.append(f"{self.path}:{after_root[0]}: what comes after the end of the root element is ignored")
                 parser = etree.XMLParser(recover=True, **options)
                 return etree.fromstring(data, parser), parser
             line = f":{error.lineno}" if error.lineno else ""
             text = re.sub(r", line \d+, column (\d+)$", r", column \1", error.msg)
             remedy = "; save the file in UTF-8, or declare its encoding in its first line" if "encoding" in text else ""
             raise _core.ModelError(f"{self.path}{line}: not well-formed XML: {text}{remedy}") from None
+
+    def _repaired(self, data: bytes) -> bytes:
+        """The file as the parser takes it: without text before the XML declaration, and with a version that exists."""
+        bom = data[:3] if data.startswith(b"\xef\xbb\xbf") else b""
+        body = data[len(bom) :]
+        declaration = _DECLARATION.search(body)
+        first = _FIRST_ELEMENT.search(body)
+        if declaration is None or (first is not None and declaration.start() > first.start()):
+            if first is not None and (text := body[: first.start()].strip()) and not text.startswith(b"<") and b"\0" not in text:
+                self.warnings.append(f"{self.path}:1: text before the root element is ignored")
+                start = min(at for at in (first.start(), body.find(b"<!")) if at >= 0)
+                return b"\n" * body.count(b"\n", 0, start) + body[start:]
+            return data
+        before, own, after = body[: declaration.start()], declaration[0], body[declaration.end() :]
+        if not re.fullmatch(rb"1\.[0-9]+", version := declaration[2]):
+            self.warnings.append(
+                f"{self.path}: the file declares XML version {version.decode(errors='replace')!r}, which is none; it is read as XML 1.0"
+            )
+            own = own[: declaration.start(2) - declaration.start()] + b"1.0" + own[declaration.end(2) - declaration.start() :]
+        if before:
+            self.warnings.append(
+                f"{self.path}:{body.count(10, 0, declaration.start()) + 1}: what comes before the XML declaration is ignored"
+            )
+            after = b"\n" * before.count(b"\n") + after  # lines keep their numbers
+        return bom + own + after
 
     # ------------------------------------------------------------------ errors
     def at(self, element: Element) -> str:
@@ -83,7 +117,11 @@ class XmlFile:
         return element.findall(f"{{{self._space}}}{name}" if self._space else name)
 
     def parts(self, element: Element, names: frozenset[str]) -> dict[str, Element]:
-        """The children by name, those of these names among them; ModelError if there are several of one: which one counts is not clear."""
+        """The children by name, those of these names among them.
+
+        One that is repeated word for word counts once, with a warning; ModelError for several of a name that differ, as it is not clear
+        which counts.
+        """
         found: dict[str, Element] = {child.tag: child for child in element}
         if not self._space and len(found) == len(element):  # most have one of each, and a large file has them by the million
             return found
@@ -94,9 +132,15 @@ class XmlFile:
                 space, _, name = name[1:].partition("}")
                 if space != self._space:
                     continue
-            if name in names and found.setdefault(name, child) is not child:
-                count, first = len(self.children(element, name)), f"the first in line {found[name].sourceline}"
-                raise self.error(child, f"{label(element)} has {count} elements <{name}>, {first}; keep one")
+            if name in names and (first := found.setdefault(name, child)) is not child:
+                if same_elements(first, child):
+                    self.warnings.append(
+                        f"{self.at(child)}: {label(element)} repeats its <{name}> of line {first.sourceline}; it counts once"
+                    )
+                    continue
+                count = len(self.children(element, name))
+                text = f"{label(element)} has {count} elements <{name}> that differ, the first in line {first.sourceline}; keep one"
+                raise self.error(child, text)
         return found
 
     def required(self, parts: dict[str, Element], name: str, element: Element, owner: Element, remedy: str) -> Element:
@@ -208,6 +252,12 @@ def _float(word: str) -> float:
         return float(word) if word.isascii() and "_" not in word else math.nan
     except ValueError:
         return math.nan
+
+
+def same_elements(one: Element, other: Element) -> bool:
+    """Whether two elements have the same name, attributes and contents, blanks aside."""
+    same = one.tag == other.tag and dict(one.attrib) == dict(other.attrib) and (one.text or "").split() == (other.text or "").split()
+    return same and len(one) == len(other) and all(map(same_elements, one, other))
 
 
 def local_name(element: Element) -> str:

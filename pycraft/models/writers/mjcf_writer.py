@@ -9,8 +9,9 @@ planar, custom of pins and sliders       one a subhinge, called name[0], name[1]
 
 Nodes are sites, rotor inertia is armature. The largest double stands for a side without a limit. Damping, friction, stiffness and where
 springs are slack, which a file before said, go back into joints, actuators into actuators; loops are equality constraints as far as
-MJCF has them (`equality_elements`); the state is a keyframe called "state". There is no geometry, and MuJoCo's compiler is told to leave
-masses and inertias alone; those that are not diagonal it turns into principal axes.
+MJCF has them (`equality_elements`); the state is a keyframe called "state". Shapes are geoms (`shape_elements`): those to be seen in group
+1, without contacts, collision shapes in group 3. Weights that are held are gravcomp, a fluid is in the options. MuJoCo's compiler is told
+to leave masses and inertias alone; those that are not diagonal it turns into principal axes.
 """
 
 from __future__ import annotations
@@ -26,8 +27,10 @@ from ...interop.mujoco import _quaternion, to_mujoco
 from ..loaders.left_aside import current, current_actuators
 from ..loaders.mjcf import STATE
 from ..loaders.xml_file import abbreviated
+from ..offers import BoxInFluid, HeldWeight
 from ..warning import warn
 from .equality_elements import add_equalities
+from .shape_elements import MjcfShapes, lost_text
 from .toml_writer import same
 from .urdf_writer import not_xml
 
@@ -69,16 +72,20 @@ def model_text(model: Multibody, path: str, state: bool) -> str:
         site.set("pos", numbers_text(node["position"]))
         if not np.array_equal(node["rotation"], np.eye(3)):
             site.set("quat", numbers_text(_quaternion(node["rotation"])))
+    unshown = _add_shapes(model, path, root, described, elements)
     joints = [joint for element in elements for joint in element.findall("joint")]
     unsaid += _add_left_aside(model, root, joints)
     of_coordinate = {model.coordinate_names[v.start]: joint.get("name") for joint, _, v in _places(joints) if v.stop - v.start == 1}
     unsaid += _add_actuators(model, root, of_coordinate)
+    unsaid += _add_offers(model, root, described, elements)
     unsaid += add_equalities(model, described, root, elements, of_coordinate)
     if state and not (same(model.q, model.zero_q()) and same(model.v, np.zeros(model.nv))):
         qpos, qvel = to_mujoco(model, model.q, model.v)
         etree.SubElement(etree.SubElement(root, "keyframe"), "key", name=STATE, qpos=numbers_text(qpos), qvel=numbers_text(qvel))
     if unsaid:
         warn(f"{path}: an MJCF file does not hold {', '.join(unsaid)}; a .toml file does")
+    if unshown:
+        warn(f"{path}: shapes that were not written: {lost_text(unshown)}")
     etree.indent(root)
     return f"<!-- Written by PyCraft. SI units and radians. -->\n{etree.tostring(root, encoding='unicode')}\n"
 
@@ -158,6 +165,22 @@ def _unsaid(described: dict[str, Any]) -> list[str]:
     return said
 
 
+def _add_shapes(model: Multibody, path: str, root: Any, described: dict[str, Any], elements: list[Any]) -> list[str]:
+    """Shapes are geoms that have no mass; returns those that MuJoCo does not read."""
+    made = MjcfShapes(root, path)
+    owners = {body["name"]: (element, np.eye(4)) for body, element in zip(described["bodies"], elements, strict=True)}
+    owners[""] = root.find("worldbody"), np.eye(4)
+    for node in described["nodes"]:
+        X = np.eye(4)
+        X[:3, :3], X[:3, 3] = node["rotation"], node["position"]
+        owners[node["name"]] = (elements[node["body"]] if node["body"] >= 0 else root.find("worldbody")), X
+    for shape in model._shapes:
+        if shape.body in owners:
+            element, X = owners[shape.body]
+            made.add(shape, element, X @ shape.placement)
+    return made.lost
+
+
 # What it has ----------------------------------------------------------------------------------------------------------
 
 
@@ -176,7 +199,7 @@ def _add_left_aside(model: Multibody, root: Any, joints: list[Any]) -> list[str]
     for quantity, values in current(model).items():
         if quantity == "gravity":
             if model.gravity.any():
-                unsaid.append("the gravity left aside")
+                unsaid.append("the gravity in left_aside")
             else:
                 root.find("option").set("gravity", numbers_text(values))
         elif quantity == "spring rest":
@@ -193,7 +216,29 @@ def _add_left_aside(model: Multibody, root: Any, joints: list[Any]) -> list[str]
                 elif not np.isnan(own).any() and len(own):
                     joint.set(_JOINT_KEYS[quantity], numbers_text(own[:1]))
         else:
-            unsaid.append(f"the {quantity} left aside")
+            unsaid.append(f"the {quantity} in left_aside")
+    return unsaid
+
+
+def _add_offers(model: Multibody, root: Any, described: dict[str, Any], elements: list[Any]) -> list[str]:
+    """Add weights that are held at the centre of mass, and the fluid of the boxes of all bodies; return the names of the others."""
+    unsaid, bodies = [], {body["name"]: (body, element) for body, element in zip(described["bodies"], elements, strict=True)}
+    boxes = [offer for offer in model.offers if isinstance(offer, BoxInFluid)]
+    for offer in model.offers:
+        if not isinstance(offer, HeldWeight):
+            continue
+        body, element = bodies.get(offer.body, (None, None))
+        if body is None or element is None or not np.allclose(offer.point, body["com"], rtol=0, atol=1e-12) or element.get("gravcomp"):
+            unsaid.append(f"the weight that is held on {offer.body!r}")
+        else:
+            element.set("gravcomp", numbers_text(offer.mass / body["mass"]))
+    if boxes:
+        massive = [name for name, (body, _) in bodies.items() if body["mass"] >= LEAST]
+        if {box.fluid for box in boxes} == {boxes[0].fluid} and sorted(box.body for box in boxes) == sorted(massive):
+            for key, value in zip(("density", "viscosity", "wind"), boxes[0].fluid, strict=True):
+                root.find("option").set(key, numbers_text(value))
+        else:
+            unsaid.append("the fluid, whose boxes are not one for each body")
     return unsaid
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from ... import _core
 from ..warning import warn
 from . import mjcf_writer, toml_writer, urdf_writer
+from .shape_elements import lost_text
 
 if TYPE_CHECKING:
     from ..multibody import Multibody
@@ -29,17 +30,16 @@ def save(model: Multibody, path: str | os.PathLike[str], state: bool = True) -> 
     else:
         kinds = ".toml, which holds every model, .urdf, for what URDF knows, or .xml, for what MJCF knows"
         raise _core.ModelError(f"{shown}: a model's file ends in {kinds}")
-    if loose := model.frames._core.loose_names():
-        warn(f"{shown}: a file does not hold loose frames: {', '.join(loose[:6])}{', ...' if len(loose) > 6 else ''}")
-    if kept := [*model.locked, *model.coalesced]:
-        warn(f"{shown}: a file does not hold what unlocks and splits: {', '.join(kept[:6])}{', ...' if len(kept) > 6 else ''}")
-    unseen = len([shape for shape in model.shapes if shape.triangles is not None or ending != ".toml"])
-    if unseen:
-        what = "meshes that were in the model's own file" if ending == ".toml" else "shapes to be seen by, which .toml does"
-        warn(f"{shown}: a file does not hold {what}: {unseen}")
     functions = [loop["name"] for loop in model.loops._description() if loop.get("function") is not None]
-    if functions and ending in (".toml", ".urdf"):
-        warn(f"{shown}: a file does not hold couplings by functions: {', '.join(functions[:6])}{', ...' if len(functions) > 6 else ''}")
+    for names, what in (
+        (model.frames._core.loose_names(), "loose frames"),
+        ([*model.locked, *model.coalesced], "what unlocks hinges and splits bodies"),
+        (functions if ending in (".toml", ".urdf") else [], "couplings by functions"),
+    ):
+        if names:
+            warn(f"{shown}: no file holds {what}, and these were not written: {', '.join(names[:6])}{', ...' if len(names) > 6 else ''}")
+    if ending == ".toml" and (unsaved := len([shape for shape in model._shapes if shape.triangles is not None])):
+        warn(f"{shown}: shapes that were not written: {lost_text(['mesh without a file of its own'] * unsaved)}")
     write_text(shown, text)
 
 

@@ -13,7 +13,9 @@ import numpy as np
 from ... import _core
 from ..loaders.left_aside import current, current_actuators
 from ..loaders.rotations import rpy_of_rotation
+from ..loaders.toml_offers import offer_data
 from ..loaders.toml_reader import FORMAT, MOMENTS
+from ..offers import BoxInFluid, HeldWeight
 from .toml_text import Inline, document
 
 if TYPE_CHECKING:
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
     from ..shapes import Shape
 
 _HEAD = "# A model of PyCraft: SI units and radians. docs/models.md, Files, says what the keys mean.\n\n"
-_SILENT = {"bias": [0.0, 0.0, 0.0], "force range": [-np.inf, np.inf]}
+_SILENT = {"bias": [0.0, 0.0, 0.0], "control": 0.0, "force range": [-np.inf, np.inf]}
 _ZERO, _Z = np.zeros(3), np.array([0.0, 0.0, 1.0])
 # Of each kind that is given axes: which of its subhinges have them, in order. (Of a plane the normal is given, the axis of the last.)
 _GIVEN_AXES = {
@@ -64,7 +66,12 @@ def model_data(model: Multibody, state: bool = True) -> dict[str, Any]:
         data["left_aside"] = left
     if actuators := current_actuators(model):
         data["actuators"] = [_actuator(actuator) for actuator in actuators]
-    if shapes := [_shape(shape) for shape in model.shapes if shape.triangles is None]:
+    for key, kind in (("held_weights", HeldWeight), ("fluid_boxes", BoxInFluid)):
+        if offers := [offer_data(offer, _pose) for offer in model.offers if isinstance(offer, kind)]:
+            data[key] = offers
+    if model.not_read:
+        data["not_read"] = model.not_read
+    if shapes := [_shape(shape) for shape in model._shapes if shape.triangles is None]:
         data["shapes"] = shapes
     return data
 
@@ -206,8 +213,8 @@ def _left_aside(model: Multibody) -> dict[str, Any]:
 def _actuator(actuator: dict[str, Any]) -> dict[str, Any]:
     """The keys of `Multibody.actuators` as TOML's, without those that say nothing."""
     data: dict[str, Any] = {"name": actuator["name"]}
-    for key in ("coordinate", "gear", "gain", "bias", "force range", "why not"):
-        value = actuator[key]
+    for key in ("coordinate", "gear", "gain", "bias", "control", "force range", "why not"):
+        value = actuator.get(key)
         if value is not None and not (key in _SILENT and same(value, _SILENT[key])):
             data[key.replace(" ", "_")] = value
     return data
@@ -222,6 +229,8 @@ def _shape(shape: Shape) -> dict[str, Any]:
     data |= _pose({"position": shape.placement[:3, 3], "rotation": shape.placement[:3, :3]})
     if shape.colour is not None:
         data["colour"] = shape.colour
+    if shape.purpose != "visual":
+        data["purpose"] = shape.purpose
     if shape.kind == "mesh":
         path, folders = shape.beside
         data |= {"file": shape.file, "beside": [os.path.abspath(os.fsdecode(place)) for place in (path, *folders)]}

@@ -30,12 +30,14 @@ from ..loaders.rotations import nearest_rpy
 from ..loaders.xml_file import abbreviated
 from ..warning import warn
 from .loop_elements import loops_element
+from .shape_elements import UrdfShapes, lost_text
 from .toml_writer import made_by, same
 
 if TYPE_CHECKING:
     from lxml.etree import _Element as Element
 
     from ..multibody import Multibody
+    from ..shapes import Shape
 
 _TYPES = {"pin": "revolute", "slider": "prismatic", "free": "floating"}
 _ZERO = np.zeros(3)
@@ -60,13 +62,20 @@ def model_text(model: Multibody, path: str) -> str:
     described = model.description()
     _refuse(described, path)
     robot = etree.Element("robot", name=described["name"])
-    links = _Links(described, _joint_extras(model))
-    for link in links.elements():
-        robot.append(link)
+    links, shapes = _Links(described, _joint_extras(model)), UrdfShapes(path)
+    made = {}
+    for element in links.elements():
+        robot.append(element)
+        if element.tag == "link":
+            made[element.get("name")] = element
+    for link, own in _by_body(model).items():
+        made[link or links.root].extend(shapes.elements(own))
     if (loops := loops_element(model, described, links.root)) is not None:
         robot.append(loops)
     if unsaid := _unsaid(model):
         warn(f"{path}: a URDF file does not hold {', '.join(unsaid)}; a .toml file does")
+    if shapes.lost:
+        warn(f"{path}: shapes that were not written: {lost_text(shapes.lost)}")
     etree.indent(robot)
     head = '<?xml version="1.0"?>\n<!-- Written by PyCraft. SI units and radians. -->\n'
     return head + etree.tostring(robot, encoding="unicode") + "\n"
@@ -115,12 +124,23 @@ def _unwritable(name: str) -> str:
     return "reads as an expression of xacro" if "${" in name or "$(" in name else ""
 
 
+def _by_body(model: Multibody) -> dict[str, list[Shape]]:
+    """The shapes by the body or node that they are on; those on what was taken out belong to nothing."""
+    found: dict[str, list[Shape]] = {}
+    there = {"", *model.bodies, *model.nodes}
+    for shape in model._shapes:
+        if shape.body in there:
+            found.setdefault(shape.body, []).append(shape)
+    return found
+
+
 def _unsaid(model: Multibody) -> list[str]:
     said = [f"gravity {tuple(model.gravity.tolist())}"] if model.gravity.any() else []
     if not (same(model.q, model.zero_q()) and same(model.v, np.zeros(model.nv))):
         said.append("the state q, v")
     said += ["its actuators"] if model.actuators else []
-    return said + [f"the {name} left aside" for name in ("gravity", "stiffness") if name in model.left_aside]
+    said += ["forces on bodies that its file offered"] if model.offers else []
+    return said + [f"the {name} in left_aside" for name in ("gravity", "stiffness", "quadratic damping") if name in model.left_aside]
 
 
 # What it has ----------------------------------------------------------------------------------------------------------

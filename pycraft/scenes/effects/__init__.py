@@ -2,10 +2,11 @@
 
 from .actuators import Motor, RotorInertia, Servo, TorqueSource
 from .effect import Effect
+from .fluids import FluidDrag
 from .frictions import CoulombFriction, Damping, ImplicitDamping, QuadraticDamping
 from .from_model import Offered, from_model
 from .functions_of_time import Harmonic, Spline, Table
-from .gravities import Gravity, GravityGradient, PointMassGravity
+from .gravities import Gravity, GravityCompensation, GravityGradient, PointMassGravity
 from .loops import Loop
 from .motions import Prescribed
 from .springs import Bushing, ImplicitSpring, NodeDamper, NodeSpring, Spring
@@ -21,7 +22,9 @@ __all__ = [
     "Effect",
     "EffectState",
     "Fixman",
+    "FluidDrag",
     "Gravity",
+    "GravityCompensation",
     "GravityGradient",
     "Harmonic",
     "ImplicitDamping",

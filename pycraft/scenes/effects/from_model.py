@@ -1,4 +1,4 @@
-"""Effects that a model's file speaks of: offered, none added until asked."""
+"""Effects that a model's file speaks of: offered to scenes, and added by nobody but the user."""
 
 from __future__ import annotations
 
@@ -8,15 +8,18 @@ from typing import Any
 import numpy as np
 
 from ... import _core
+from ...models.loaders.left_aside import OFF
+from ...models.offers import BoxInFluid, HeldWeight
 from .actuators import Servo, TorqueSource
 from .effect import Effect
-from .frictions import CoulombFriction, Damping
-from .gravities import Gravity
+from .fluids import FluidDrag
+from .frictions import CoulombFriction, Damping, QuadraticDamping
+from .gravities import Gravity, GravityCompensation
 from .springs import Spring
 
 
 class Offered(Sequence[Effect]):
-    """Effects that a model offers, and in `notes` what its file says besides and no effect is. `scene.add(*offered)` adds them all."""
+    """Effects that a model offers, and in `notes` what its file says and no effect does. `scene.add(*offered)` adds them all."""
 
     def __init__(self, model: str, effects: Iterable[Effect], notes: Iterable[str]):
         self._model, self._effects, self.notes = model, list(effects), list(notes)
@@ -40,20 +43,23 @@ class Offered(Sequence[Effect]):
 
 
 def from_model(model: Any) -> Offered:
-    """The effects that a model's file speaks of, with its numbers: gravity, damping, dry friction, springs, actuators.
+    """Return the effects that a model's file speaks of, with its numbers.
 
-    URDF: `<dynamics damping friction>`, and `<limit effort velocity>` as a torque source without torque that keeps them. MJCF: gravity,
-    damping, frictionloss, stiffness, and actuators with straight characteristics, at control zero (motors as `TorqueSource`, position and
-    velocity servos as `Servo`); armature is the model's rotor inertia already. The model's own gravity, where it is set, is offered, too.
+    URDF and SDF: damping and friction of joints, and bounds of effort and velocity as a torque source without torque that keeps them.
+    MJCF: gravity, damping, frictionloss, stiffness, gravity compensation, the resistance of a fluid, and actuators with straight
+    characteristics, at control zero (motors as `TorqueSource`, position and velocity servos as `Servo`); armature is the model's rotor
+    inertia already. What the file disables by a flag is not offered. The model's own gravity, where it is set, is offered as well.
 
     Returns
     -------
-    Offered : a sequence of effects, also by kind, `offered["damping"]`; shown as a list with what is not offered and why
+    Offered
+        A sequence of effects, also by kind: `offered["damping"]`. Its text lists them, and what is not offered with the reason; `notes`
+        has the latter.
 
     Raises
     ------
     ModelError
-        No model.
+        The argument is no model.
 
     Examples
     --------
@@ -63,21 +69,59 @@ def from_model(model: Any) -> Offered:
     ['damping', 'torque_source']
     """
     if not isinstance(model, _core.Multibody):
-        raise _core.ModelError(f"effects are offered by a model, not by {model!r:.80}")
+        raise _core.ModelError(f"from_model takes a model, not {model!r:.80}")
     left = getattr(model, "left_aside", {})
     effects: list[Effect] = []
     notes: list[str] = []
     gravity = left.get("gravity", model.gravity)
     if np.any(gravity):
         effects.append(Gravity(tuple(np.asarray(gravity).tolist())))
-    for quantity, made in (("damping", Damping), ("friction", CoulombFriction)):
+    for quantity, made in (("damping", Damping), ("quadratic damping", QuadraticDamping), ("friction", CoulombFriction)):
         if quantity in left:
             names, numbers = _numbers(model, left[quantity])
             effects.append(made(numbers, hinges=names))
     effects += _springs(model, left, notes)
+    effects += _of_bodies(model)
     effects += _limited(model, left)
     effects += _drives(model, notes)
-    return Offered(model.name, effects, notes)
+    if kept := list(getattr(model, "loops", ())):
+        shown = ", ".join(map(repr, kept[:4])) + f", ... ({len(kept)} in all)" * (len(kept) > 4)
+        notes.append(f"the loops of the model, {shown}: pycraft.effects.Loop() keeps them")
+    return Offered(model.name, effects, [*notes, *getattr(model, "not_read", [])])
+
+
+def _of_bodies(model: Any) -> list[Effect]:
+    """Weights that are held, by field of gravity, and boxes in fluids, by fluid."""
+    offers = getattr(model, "offers", [])
+    effects: list[Effect] = []
+    for g in dict.fromkeys(offer.g for offer in offers if isinstance(offer, HeldWeight)):
+        held: dict[str, list[tuple[float, np.ndarray]]] = {}
+        for offer in offers:
+            if isinstance(offer, HeldWeight) and offer.g == g:
+                body, placement = _carrier(model, offer.body)
+                held.setdefault(body, []).append((offer.mass, placement[:3, :3] @ offer.point + placement[:3, 3]))
+        bodies, share, points = [], [], []
+        for body, parts in held.items():
+            mass = sum(part for part, _ in parts)
+            if mass and model.bodies[body].mass:
+                bodies.append(body)
+                share.append(mass / model.bodies[body].mass)
+                points.append(sum(part * point for part, point in parts) / mass)
+        if bodies:
+            effects.append(GravityCompensation(np.array(share), bodies=bodies, points=np.array(points), g=g))
+    for fluid in dict.fromkeys(offer.fluid for offer in offers if isinstance(offer, BoxInFluid)):
+        boxes = [offer for offer in offers if isinstance(offer, BoxInFluid) and offer.fluid == fluid]
+        sizes, placements = np.array([box.size for box in boxes]), np.array([box.placement for box in boxes])
+        effects.append(FluidDrag(*fluid, bodies=[box.body for box in boxes], sizes=sizes, placements=placements))
+    return effects
+
+
+def _carrier(model: Any, name: str) -> tuple[str, np.ndarray]:
+    """The body that a body or node is part of, and the pose (4, 4) of the latter there."""
+    if name in model.bodies:
+        return name, np.eye(4)
+    node = model.nodes[name]
+    return node.body.name, node.pose
 
 
 def _numbers(model: Any, values: np.ndarray) -> tuple[list[str], np.ndarray]:
@@ -121,11 +165,15 @@ def _drives(model: Any, notes: list[str]) -> list[Effect]:
     """Actuators, those of one sort in one effect as long as they are on different coordinates."""
     groups: list[tuple[bool, list[dict[str, Any]]]] = []
     for actuator in getattr(model, "actuators", []):
-        offset, position, velocity = actuator["bias"]
+        _, position, velocity = actuator["bias"]
+        offset, (low, high) = _at_rest(actuator), actuator["force range"]
         if why := actuator["why not"] or ("it brakes and has an offset, but no spring" if offset and velocity and not position else None):
-            notes.append(f"actuator {actuator['name']!r}: {why}")
+            notes += [f"actuator {actuator['name']!r}: {why}"] if why != OFF else []
             continue
         servo = bool(position or velocity)
+        if servo and low != -high:
+            both = f"its effect has {max(-low, high):g} both ways"
+            notes.append(f"the force range [{low:g}, {high:g}] of actuator {actuator['name']!r}, which is not symmetric: {both}")
         for of_servos, group in groups:
             if of_servos == servo and all(other["coordinate"] != actuator["coordinate"] for other in group):
                 group.append(actuator)
@@ -135,21 +183,28 @@ def _drives(model: Any, notes: list[str]) -> list[Effect]:
     return [(_servos if servo else _sources)(group) for servo, group in groups]
 
 
+def _at_rest(actuator: dict[str, Any]) -> float:
+    """The force before the gear at position and velocity zero and at the control that stands for zero."""
+    return float(actuator["gain"] * actuator.get("control", 0.0) + actuator["bias"][0])
+
+
 def _common(group: Sequence[dict[str, Any]]) -> tuple[list[str], np.ndarray, np.ndarray, np.ndarray]:
-    """Coordinates, gears, biases and limits of effort."""
-    gear, bias = np.array([a["gear"] for a in group]), np.array([a["bias"] for a in group])
+    """Coordinates, gears, forces at rest and bounds of effort."""
+    gear, rest = np.array([a["gear"] for a in group]), np.array([_at_rest(a) for a in group])
     most = np.array([np.abs(a["force range"]).max() for a in group])
-    return [a["coordinate"] for a in group], gear, bias, np.abs(gear) * most
+    return [a["coordinate"] for a in group], gear, rest, np.abs(gear) * most
 
 
 def _sources(group: Sequence[dict[str, Any]]) -> Effect:
-    names, gear, bias, most = _common(group)
-    return TorqueSource(gear * bias[:, 0], hinges=names, effort_limit=most)
+    names, gear, rest, most = _common(group)
+    low, high = np.array([a["force range"] for a in group]).T
+    return TorqueSource(gear * np.clip(rest, low, high), hinges=names, effort_limit=most)
 
 
 def _servos(group: Sequence[dict[str, Any]]) -> Effect:
     """gear (b₀ + b₁ gear q + b₂ gear v) = kp (r - q) - kd v."""
-    names, gear, bias, most = _common(group)
+    names, gear, rest, most = _common(group)
+    bias = np.array([a["bias"] for a in group])
     stiffness, damping = -bias[:, 1] * gear**2, -bias[:, 2] * gear**2
-    target = np.divide(gear * bias[:, 0], stiffness, out=np.zeros_like(stiffness), where=stiffness != 0)
+    target = np.divide(gear * rest, stiffness, out=np.zeros_like(stiffness), where=stiffness != 0)
     return Servo(stiffness, damping, target=target, hinges=names, effort_limit=most)

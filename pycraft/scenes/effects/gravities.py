@@ -9,7 +9,7 @@ import numpy as np
 
 from ... import _core
 from ...arguments import one_number
-from .effect import Effect, names_of
+from .effect import Effect, names_of, numbers_of
 
 EARTH = (0.0, 0.0, -9.81)
 """m/s², where neither the effect nor the model has a gravity."""
@@ -81,3 +81,36 @@ class GravityGradient(Effect):
     def made_for(self, model: _core.Multibody) -> _core.Effect:
         mu = one_number(self.mu, "gravity_gradient: mu")
         return _core.gravity_gradient_effect(model, mu, self.position, names_of(self.bodies, "gravity_gradient", "bodies"))
+
+
+@dataclass(repr=False, eq=False)
+class GravityCompensation(Effect):
+    """Hold bodies up against uniform gravity: the force -share m g at a point of every body. Potential Σ share m g·c.
+
+    Parameters
+    ----------
+    share : float or (n,)
+        Of each body's weight, one number for all or one for each body: 1 cancels it, 0 leaves it, 2 lifts the body with its weight.
+    bodies : names of bodies, patterns, or a list of them; None: all
+    points : (n, 3) m
+        Where each body is held, in its axes; the centres of mass by default.
+    g : (3,) m/s², in the world's axes
+        The gravity that is compensated; by default the model's own where it is set, else (0, 0, -9.81).
+
+    Raises
+    ------
+    ModelError
+        Unknown bodies, a wrong count of numbers, numbers that are not finite.
+    """
+
+    share: Any = 1.0
+    bodies: Any = None
+    points: Any = None
+    g: Any = None
+
+    def made_for(self, model: _core.Multibody) -> _core.Effect:
+        kind = "gravity_compensation"
+        share = numbers_of(self.share, f"{kind}: share")
+        points = [] if self.points is None else _core.real_array(self.points, f"{kind}: points").ravel().tolist()
+        g = self.g if self.g is not None else model.gravity if model.gravity.any() else (0.0, 0.0, -9.81)
+        return _core.gravity_compensation_effect(model, names_of(self.bodies, kind, "bodies"), share, points, g)
