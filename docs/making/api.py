@@ -22,20 +22,19 @@ def first_sentence(thing: Any) -> str:
     return (sentence[:160] + " …" if len(sentence) > 160 else sentence).replace("|", r"\|").replace("``", "`").replace("*", r"\*")
 
 
-def of_groups(name: str, kind: type, groups: dict[str, str]) -> str:
-    """The page of a class with its members under headings, a table of them first."""
-    parts = [f"# {name}", f"```{{eval-rst}}\n.. autoclass:: pycraft.{name}\n```"]
+def of_groups(name: str, kind: type, groups: dict[str, str]) -> dict[str, str]:
+    """The page of a class with a table of its members by heading, and a page for each heading."""
     by_heading = grouped(groups, [member for member in dir(kind) if not member.startswith("_")])
-    rows = [f"| [{heading}](#{anchor(heading)}) | {', '.join(f'`{member}`' for member in members)} |" for heading, members in by_heading.items()]
-    parts.append("\n".join(["| | |", "|---|---|", *rows]))
+    place = {heading: f"{name}_{heading.lower().replace(' ', '_')}" for heading in by_heading}
+    rows, made = [], {}
     for heading, members in by_heading.items():
+        links = ", ".join(f"{{py:obj}}`{member} <pycraft.{name}.{member}>`" for member in members)
+        rows.append(f"| [{heading}]({place[heading]}.md) | {links} |")
         listed = "\n\n".join(f".. {directive(kind, member)}:: pycraft.{name}.{member}" for member in members)
-        parts.append(f"## {heading}\n\n```{{eval-rst}}\n{listed}\n```")
-    return "\n\n".join(parts) + "\n"
-
-
-def anchor(heading: str) -> str:
-    return heading.lower().replace(" ", "-")
+        made[f"docs/api/{place[heading]}"] = f"# {name}: {heading.lower()}\n\n```{{eval-rst}}\n{listed}\n```\n"
+    table = "\n".join(["| | |", "|---|---|", *rows])
+    tree = "```{toctree}\n:hidden:\n\n" + "\n".join(place.values()) + "\n```"
+    return {f"docs/api/{name}": f"# {name}\n\n```{{eval-rst}}\n.. autoclass:: pycraft.{name}\n```\n\n{table}\n\n{tree}\n", **made}
 
 
 def directive(kind: type, member: str) -> str:
@@ -44,8 +43,6 @@ def directive(kind: type, member: str) -> str:
 
 
 def of_class(name: str, kind: type) -> str:
-    if name == "Multibody":
-        return of_groups(name, kind, MULTIBODY)
     page = f"# {name}\n\n```{{eval-rst}}\n.. autoclass:: pycraft.{name}\n   :members:\n"
     return page + ("   :inherited-members: pybind11_object, object, Exception, Warning, tuple, dict, str\n```\n")
 
@@ -70,9 +67,8 @@ def pages() -> dict[str, str]:
     classes = {n: t for n, t in names.items() if inspect.isclass(t) and n not in errors}
     modules = {n: t for n, t in names.items() if isinstance(t, ModuleType)}
     functions = {n: t for n, t in names.items() if n not in errors and n not in classes and n not in modules}
-    made = {f"docs/api/{n}": of_class(n, t) for n, t in classes.items()} | {
-        f"docs/api/{n}_module": of_module(n, t) for n, t in modules.items()
-    }
+    made = {f"docs/api/{n}": of_class(n, t) for n, t in classes.items() if n != "Multibody"}
+    made |= {f"docs/api/{n}_module": of_module(n, t) for n, t in modules.items()}
     listed = "\n\n".join(f"```{{eval-rst}}\n.. autofunction:: pycraft.{n}\n```" for n in functions)
     made["docs/api/functions"] = f"# Functions\n\nWhat `pycraft` has beside its classes.\n\n{listed}\n"
     listed = "\n\n".join(f"```{{eval-rst}}\n.. autoexception:: pycraft.{n}\n   :show-inheritance:\n```" for n in errors)
@@ -85,5 +81,6 @@ def pages() -> dict[str, str]:
         rows = [f"| [`{n}`]({place[n]}.md) | {first_sentence(names[n])} |" for n in group]
         tables.append("\n".join([f"## {heading}\n", "| name | what it is |", "|---|---|", *rows]))
     table = "\n\n".join(tables)
-    tree = "```{toctree}\n:hidden:\n\n" + "\n".join(page.removeprefix("docs/api/") for page in made) + "\n```"
+    tree = "```{toctree}\n:hidden:\n\nMultibody\n" + "\n".join(page.removeprefix("docs/api/") for page in made) + "\n```"
+    made |= of_groups("Multibody", pc.Multibody, MULTIBODY)
     return {"docs/api/index": f"# Reference\n\nEvery public name of `import pycraft as pc`, with types.\n\n{table}\n\n{tree}\n", **made}

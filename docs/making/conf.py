@@ -10,11 +10,11 @@ copyright = author
 html_title = "PyCraft"
 root_doc = "docs/index"
 
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax", "making.docstrings"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax", "sphinx_design", "making.docstrings"]
 suppress_warnings = ["ref.python"]  # a type in a docstring is words, of which some are names of two classes' members
 
 # ---- pages
-myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence"]
+myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence", "attrs_inline"]
 myst_heading_anchors = 4
 nb_execution_mode = "cache"
 nb_execution_cache_path = str(Path(__file__).parents[2] / "build" / "docs" / "notebooks")
@@ -38,7 +38,9 @@ html_theme = "furo"
 html_copy_source = False
 html_show_sourcelink = False
 html_static_path = ["../static", str(Path(mathjax.__file__).parent / "static/mathjax/es5/tex-svg-full.js")]
+html_favicon = "../static/favicon.svg"
 html_css_files = ["pycraft.css"]
+html_js_files = [("search_in_files.js", {"priority": 200})]  # before Sphinx's own search asks for pages
 mathjax_path = "tex-svg-full.js"
 mathjax3_config = {"svg": {"fontCache": "global", "scale": 0.95}, "tex": {"tags": "none"}}
 pygments_style = "friendly"

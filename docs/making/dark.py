@@ -9,7 +9,7 @@ GROUND, INK = "#131416", "#cfd0d0"
 
 
 def darken(figure: Any) -> None:
-    """Change a Matplotlib figure in place for a dark ground: greys are turned about, and colours that are too dark to be seen are lightened."""
+    """Change a Matplotlib figure in place for a dark ground: greys are turned about, and colours too dark to be seen are lightened."""
     import matplotlib.collections
     import matplotlib.patches
     from matplotlib.axes import Axes
@@ -25,8 +25,6 @@ def darken(figure: Any) -> None:
                 axis.pane.set_facecolor(GROUND)
                 axis.pane.set_edgecolor(INK)
                 axis.line.set_color(INK)
-    for axis in figure.findobj(Axis):
-        axis.set_tick_params(which="both", color=INK, labelcolor=INK)
     for text in figure.findobj(Text):
         text.set_color(turned(text.get_color()))
         if (box := text.get_bbox_patch()) is not None:
@@ -45,6 +43,8 @@ def darken(figure: Any) -> None:
                 colors = getattr(collection, f"get_{name}")()
                 if len(colors):
                     getattr(collection, f"set_{name}")([turned(color) for color in colors])
+    for axis in figure.findobj(Axis):
+        axis.set_tick_params(which="both", color=INK, labelcolor=INK)
 
 
 def turned(color: Any) -> Any:

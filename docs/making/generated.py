@@ -1,8 +1,10 @@
 """The pages that follow from the code, all of them."""
 
+import shutil
 from pathlib import Path
 
 from . import api, gallery, operators, theorems
+from .contents import ROOT
 
 
 def pages() -> dict[str, str]:
@@ -14,7 +16,10 @@ def pages() -> dict[str, str]:
 
 
 def pictures(folder: Path) -> None:
-    """The pictures of these pages, drawn into the folder that they are in."""
+    """The pictures of all pages: those that are committed, and those of the gallery, drawn into the folder that they are in."""
+    (folder / "docs" / "static").mkdir(parents=True, exist_ok=True)
+    for picture in sorted((ROOT / "docs" / "static").glob("*.png")):
+        shutil.copyfile(picture, folder / "docs" / "static" / picture.name)
     for script in gallery.SCRIPTS:
         gallery.draw(script, folder / "docs" / "gallery" / f"{script.stem}.png")
 

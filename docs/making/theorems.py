@@ -24,7 +24,7 @@ def entry(number: int, theorem: Any) -> str:
     where = [*theorem.hypotheses, *(["between bodies on one path from the root"] if theorem.on_one_path else [])]
     said = [f"Holds where {', '.join(where)}" if where else "No hypothesis"]
     said += [USES[theorem.use]] if USES.get(theorem.use) else []
-    parts = [f"(theorem-{number})=\n### {plain(theorem.name)}", f"$$\n{theorem.latex}\n$$", f"{'; '.join(said)}. {source(theorem.source)}."]
+    parts = [f"(theorem-{number})=\n## {plain(theorem.name)}", f"$$\n{theorem.latex}\n$$", f"{'; '.join(said)}. {source(theorem.source)}."]
     proof = pc.prove(theorem.lhs, theorem.rhs)
     if proof:
         parts += [f"<details><summary>Proof</summary>\n\n```text\n{str(proof).strip()}\n```\n\n</details>"]
@@ -38,7 +38,8 @@ def pages() -> dict[str, str]:
     theorems = list(enumerate(example().soa.theorems()))
     made, listed = {}, []
     for group in dict.fromkeys(theorem.group for _, theorem in theorems):
-        name = re.sub(r"[^a-z0-9]+", "_", group.lower()).strip("_")
+        spelled = re.sub(r"\(.*?\)", "", group.lower().replace("φ", "phi").replace("ψ", "psi"))
+        name = re.sub(r"[^a-z0-9]+", "_", spelled).strip("_")
         text, rows = [f"# {plain(group)}"], []
         for number, theorem in theorems:
             if theorem.group != group:
@@ -51,7 +52,7 @@ def pages() -> dict[str, str]:
     tree = "```{toctree}\n:hidden:\n\n" + "\n".join(page.rpartition("/")[2] for page in made) + "\n```"
     first = [
         "# The theorems",
-        f"The {len(theorems)} theorems of the catalogue, as the planner and `arm.soa.check()` have them. Each has its hypotheses and, where "
-        "`pc.prove` finds one, its proof from the definitions ([proofs](../proofs.md)).",
+        f"The {len(theorems)} theorems of the catalogue, as the planner and `arm.soa.check()` have them. Each has its hypotheses and, "
+        "where `pc.prove` finds one, its proof from the definitions ([proofs](../proofs.md)).",
     ]
     return {"docs/theorems/index": "\n\n".join([*first, *listed, tree]) + "\n", **made}

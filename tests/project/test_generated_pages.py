@@ -3,10 +3,11 @@
 import inspect
 import re
 
+import numpy as np
 import pytest
 
 import pycraft as pc
-from making import api, contents, docstrings, gallery, generated, offline, operators, theorems
+from making import api, contents, dark, docstrings, gallery, generated, groups, offline, operators, theorems
 from pycraft import _core
 
 
@@ -20,7 +21,8 @@ def test_the_table_of_contents_lists_them(pages):
     assert set(contents.GENERATED) <= set(pages) and set(contents.GENERATED) <= set(contents.listed())
     for page in set(pages) - set(contents.GENERATED):
         folder, _, name = page.rpartition("/")
-        assert re.search(rf"^{re.escape(name)}$", pages[f"{folder}/index"], re.M), page
+        listed = pages[f"{folder}/index"] + pages.get("docs/api/Multibody", "") * (folder == "docs/api")
+        assert re.search(rf"^{re.escape(name)}$", listed, re.M), page
 
 
 def test_links_between_them_lead_somewhere(pages):
@@ -29,7 +31,7 @@ def test_links_between_them_lead_somewhere(pages):
         for target in re.findall(r"(?<!\\)\]\(([^)\s]+)\)", text):
             file, _, anchor = target.partition("#")
             if file.endswith(".png"):
-                assert page == "docs/gallery", (page, target)
+                assert page.startswith("docs/gallery/"), (page, target)
             elif file:
                 place = ((contents.ROOT / page).parent / file).resolve()
                 assert place.is_file() or place.relative_to(contents.ROOT).with_suffix("").as_posix() in pages, (page, target)
@@ -65,12 +67,14 @@ def test_a_letter_lists_the_theorems_with_it_on_either_side(pages):
 
 
 def test_every_theorem_is_there_with_its_hypotheses_and_its_proof(pages):
-    text = pages["docs/theorems"]
+    text = "\n".join(pages[page] for page in pages if page.startswith("docs/theorems/") and page != "docs/theorems/index")
+    listed = pages["docs/theorems/index"]
     catalogue = operators.example().soa.theorems()
     entries = {int(n): body for n, body in re.findall(r"\(theorem-(\d+)\)=\n(.*?)(?=\n\(theorem-|\Z)", text, re.S)}
     assert set(entries) == {n for n, t in enumerate(catalogue) if not t.waiting} and len(entries) > 140
     for number, entry in entries.items():
         theorem = catalogue[number]
+        assert f"[{operators.plain(theorem.name)}](#theorem-{number})" in listed
         assert operators.plain(theorem.name) in entry and theorem.latex in entry
         assert all(hypothesis in entry for hypothesis in theorem.hypotheses)
         assert ("<details><summary>Proof" in entry) != ("finds no proof" in entry)
@@ -140,16 +144,73 @@ def test_the_gallery_has_twenty_short_examples_or_more(pages):
         written = script.read_text()
         assert len(written.splitlines()) < 30 and max(map(len, written.splitlines())) <= 140, script.name
         assert gallery.said(script).endswith(".") and "import pycraft as pc" in written, script.name
-        assert (f'src="gallery/{script.stem}.html"' in pages["docs/gallery"]) == gallery.plays(script)
-        assert f"(gallery/{script.stem}.png)" in pages["docs/gallery"] and gallery.said(script) in pages["docs/gallery"]
+        page, cards = pages[f"docs/gallery/{script.stem}"], pages["docs/gallery/index"]
+        assert (f'src="{script.stem}.html"' in page) == gallery.plays(script) == (f"]({script.stem}.md)" in cards)
+        for text in (page, cards):
+            assert f"({script.stem}.png)" in text and f"({script.stem}_dark.png)" in text and gallery.said(script) in text
+        assert written.partition('"""\n\n')[2].strip() in page
+
+
+def lightness(path):
+    """The median lightness of a picture: its ground's."""
+    import matplotlib.image
+
+    return float(np.median(matplotlib.image.imread(path)[..., :3] @ (0.299, 0.587, 0.114)))
+
+
+def test_figures_for_dark_pages():
+    """Greys are turned about, colours that are seen stay, and texts stand out from the ground."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+    from matplotlib.colors import to_rgba
+
+    assert np.allclose(dark.turned("white"), to_rgba(dark.GROUND)) and np.allclose(dark.turned("black"), to_rgba(dark.INK))
+    assert dark.turned("tab:orange") == to_rgba("tab:orange") and dark.turned("none") == "none"
+    assert sum(dark.turned("navy")[:3]) > sum(to_rgba("navy")[:3])
+    figure, axes = plt.subplots()
+    axes.plot([0, 1], color="k", label="line")
+    axes.set(title="title", xlabel="x")
+    axes.legend()
+    dark.darken(figure)
+    figure.canvas.draw()
+    texts = [axes.title, axes.xaxis.label, *axes.get_xticklabels(), *axes.get_legend().get_texts()]
+    assert all(np.mean(to_rgba(text.get_color())[:3]) > 0.6 for text in texts)
+    assert np.mean(to_rgba(axes.lines[0].get_color())[:3]) > 0.6 and np.mean(axes.get_facecolor()[:3]) < 0.2
+    plt.close(figure)
+
+
+def test_every_public_name_is_in_one_group(pages):
+    names = [name for name in dir(pc.Multibody) if not name.startswith("_")]
+    by_heading = groups.grouped(groups.MULTIBODY, names)
+    for heading, members in by_heading.items():
+        page = pages[f"docs/api/Multibody_{heading.lower().replace(' ', '_')}"]
+        assert all(re.search(rf"^\.\. auto\w+:: pycraft\.Multibody\.{member}$", page, re.M) for member in members)
+        assert all(f"`{member} <pycraft.Multibody.{member}>`" in pages["docs/api/Multibody"] for member in members)
+    with pytest.raises(ValueError, match="pose must be in one group"):
+        groups.grouped({"a": "pose", "b": "pose"}, ["pose"])
+    with pytest.raises(ValueError, match="jacobian must be in one group"):
+        groups.grouped({"a": "pose"}, ["pose", "jacobian"])
+
+
+def test_the_pictures_of_the_tours_are_there():
+    for name in ("researcher", "teacher", "engineer"):
+        picture = contents.ROOT / "docs" / "static" / f"tour_{name}.png"
+        assert 5_000 < picture.stat().st_size < 60_000
+        assert f"static/tour_{name}.png" in (contents.ROOT / "docs" / "index.md").read_text()
+        assert f"docs/static/tour_{name}.png" in (contents.ROOT / "README.md").read_text()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("script", gallery.SCRIPTS, ids=lambda s: s.stem)
 def test_every_example_of_the_gallery_draws(script, tmp_path):
     gallery.draw(script, tmp_path / "picture.png")
-    picture = (tmp_path / "picture.png").read_bytes()
-    assert picture.startswith(b"\x89PNG") and len(picture) > 5000
+    for name in ("picture", "picture_dark"):
+        picture = (tmp_path / f"{name}.png").read_bytes()
+        assert picture.startswith(b"\x89PNG") and len(picture) > 5000
+    light, dark = (lightness(tmp_path / f"{name}.png") for name in ("picture", "picture_dark"))
+    assert light > 0.6 > 0.4 > dark
     page = tmp_path / "picture.html"
     assert page.is_file() == gallery.plays(script)
     if page.is_file():  # whole, small, and it asks nobody
