@@ -40,6 +40,19 @@ def test_the_package_names_its_headers():
     assert 'INTERFACE_COMPILE_FEATURES "cxx_std_20"' in targets
 
 
+def test_headers_include_each_other_under_pycraft():
+    """So that a header of another package in a folder `model` is not taken for ours."""
+    include = Path(pc.cmake_dir()).parents[2] / "include"
+    assert [folder.name for folder in include.iterdir()] == ["pycraft"]
+    folders = {folder.name for folder in (include / "pycraft").iterdir()}
+    assert {"algebra", "model", "dynamics", "simulation"} <= folders
+    for header in include.rglob("*.h"):
+        for named in re.findall(r'^#include "([^"]+)"', header.read_text(encoding="utf-8"), re.M):
+            assert named.startswith("pycraft/") and (include / named).is_file(), (header.name, named)
+    targets = (Path(pc.cmake_dir()) / "pycraftTargets.cmake").read_text()
+    assert 'INTERFACE_INCLUDE_DIRECTORIES "${_IMPORT_PREFIX}/include"' in targets
+
+
 def test_what_is_missing_is_named(tmp_path):
     """Without the headers the error says what to do. The copy has no Python packages beside it."""
     elsewhere = tmp_path / "lib/cmake/pycraft"
@@ -57,7 +70,11 @@ def test_the_example_of_the_page_runs(tmp_path):
     assert made.returncode == 0, made.stderr
     built = subprocess.run([CMAKE, "--build", str(tmp_path / "build")], capture_output=True, text=True)
     assert built.returncode == 0 and "warning" not in built.stdout, built.stdout[-3000:]
-    shown, *numbers = subprocess.run([str(tmp_path / "build" / "pendulum")], capture_output=True, text=True, check=True).stdout.splitlines()
+    printed = subprocess.run([str(tmp_path / "build" / "pendulum")], capture_output=True, text=True, check=True).stdout.splitlines()
+    shown, *numbers = printed
+    assert [line.split()[:-2] for line in printed[1:]] == [line.split()[:-2] for line in block("text").splitlines()[1:]]
+    for line, on_the_page in zip(printed[1:], block("text").splitlines()[1:], strict=True):
+        assert np.allclose(*([float(x) for x in text.split()[-2:]] for text in (line, on_the_page)), rtol=1e-13, atol=0)
     pendulum = pc.chain(2)
     pendulum.gravity = (0, -9.81, 0)
     H, phi, M = pendulum.soa("H phi M")
