@@ -155,7 +155,8 @@ def _judge(result: Comparison, name: str, mine: Callable[[str], np.ndarray], the
 
 
 def compare_all(states: int = 20, seed: int = 0, progress: Callable[[str], None] | None = None) -> list[Comparison]:
-    """Every robot, fixed and floating."""
+    """Every robot, fixed and floating. MissingPackageError without Pinocchio."""
+    required("pinocchio", "peers", "comparison with Pinocchio needs")
     results = []
     for path in robot_files():
         for root in ("fixed", "free"):

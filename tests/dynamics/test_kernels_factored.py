@@ -41,8 +41,8 @@ def test_a_batch_is_its_states(model, way):
 @pytest.mark.parametrize("ratio", [1.0, 1e3, 1e9, 1e15])
 @each_form
 def test_digits_of_the_general_recursions(model, form, ratio):
-    """At any ratio of masses: half of the states, and all but a tenth, are as near. Roundings of a single one are a
-    matter of chance, by 8; a correction of a few roundings is left out."""
+    """At any ratio of masses half of the states are as near. Roundings of a single one, and of the worst tenth, are a matter of
+    chance and of the processor's instructions, by 8; a correction of a few roundings is left out."""
     model = heavy(model, ratio)
     given = states(model, 40)
     floor = np.array([4, 16, 32]) * EPS * np.sqrt(model.nv)
@@ -57,7 +57,7 @@ def test_digits_of_the_general_recursions(model, form, ratio):
             assert str(error.value) == str(refused), name
             continue
         own, there = (np.percentile(x, [50, 90, 100]) for x in (errors(model, given, **how), general))
-        assert (own <= [2, 2, 8] * there + floor).all(), (name, own, there)
+        assert (own <= [2, 8, 8] * there + floor).all(), (name, own, there)
 
 
 @each_form

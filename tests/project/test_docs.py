@@ -71,7 +71,7 @@ EXAMPLES = {
     "structure": 25,
     "divide_and_conquer": 1,
     "viewing": 12,
-    "coming_from": 3,
+    "coming_from": 2,
     "sdf": 5,
 }
 # Pages whose blocks are run one after the other.
