@@ -214,6 +214,7 @@ def accuracy(
     seconds: Annotated[float, typer.Option(help="Seconds per figure.")] = 0.05,
     duration: Annotated[float | None, typer.Option(help="Seconds of the motion that is integrated; 1 if left out.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the states and forces.")] = 0,
+    front: Annotated[bool, typer.Option("--front", help="Print the Pareto front alone.")] = False,
     csv: Annotated[Path | None, typer.Option(help="Write the rows as CSV.")] = None,
     json: Annotated[Path | None, typer.Option(help="Write the rows as JSON.")] = None,
     plot: Annotated[Path | None, typer.Option(help="Draw error against time (PNG, SVG or PDF).")] = None,
@@ -236,6 +237,8 @@ def accuracy(
         fail("--form and --precision belong to the table of forms; --integration has --method, an integrator")
     if duration is not None and not integration:
         fail("--duration belongs to --integration")
+    if front and integration:
+        fail("--front belongs to the table of forms; --integration has few rows")
     notes = []
 
     def run() -> Any:
@@ -267,7 +270,10 @@ def accuracy(
             )
 
     table = run()
-    console.print(table.table(console.width))
+    best_rows = [row for row in table if front and row["pareto"]]
+    console.print((table.part(best_rows) if best_rows else table).table(console.width))
+    if front:
+        notes.append(f"the Pareto front: {len(best_rows)} of {len(table)} rows")
     if integration:
         notes.append(f"reference: {table.reference}; its own error {table.reference_error:.1e}")
     for text in notes:
