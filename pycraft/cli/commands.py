@@ -238,7 +238,7 @@ def accuracy(
     if duration is not None and not integration:
         fail("--duration belongs to --integration")
     if front and integration:
-        fail("--front belongs to the table of forms; --integration has few rows")
+        fail("--front belongs to the table of forms")
     notes = []
 
     def run() -> Any:
@@ -270,10 +270,7 @@ def accuracy(
             )
 
     table = run()
-    best_rows = [row for row in table if front and row["pareto"]]
-    console.print((table.part(best_rows) if best_rows else table).table(console.width))
-    if front:
-        notes.append(f"the Pareto front: {len(best_rows)} of {len(table)} rows")
+    console.print((table.part(table.front) if front else table).table(console.width))
     if integration:
         notes.append(f"reference: {table.reference}; its own error {table.reference_error:.1e}")
     for text in notes:
