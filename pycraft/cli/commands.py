@@ -201,6 +201,9 @@ def _write(table: Any, csv: Path | None, json: Path | None, plot: Path | None) -
         axes = table.plot()
         figure = axes.figure if hasattr(axes, "figure") else axes[0].figure
         figure.savefig(plot, dpi=150, bbox_inches="tight")
+    for path in (csv, json, plot):
+        if path:
+            note(f"wrote {path}")
 
 
 @app.command()
@@ -278,9 +281,6 @@ def accuracy(
     for reason, labels in table.refusals.items():
         console.print(f"[bold]refused:[/] {escape('; '.join(labels))}: {escape(reason)}", highlight=False)
     _write(table, csv, json, plot)
-    for path in (csv, json, plot):
-        if path:
-            note(f"wrote {path}")
     if all(row["refused"] for row in table):
         fail("every row is refused", 1)
     if error is not None:
