@@ -96,7 +96,7 @@ class Locking(Grafting):
         ['hinge2', 'hinge0']
         """
         chosen, impulsive = self._hinges_to_lock(hinges), switch(impulsive, "impulsive")
-        held = self._held_couplings({name: self.q[self.hinges[name].q_slice] for name in chosen})
+        held = self._held_couplings({name: self.q[self._slices(self._hinge_index(name))[0]] for name in chosen})
         numbers = sorted(self._hinge_index(name) for name in chosen)
         data = [self._body(k) for k in numbers]
         names = tuple(body["hinge"]["name"] for body in data)
