@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable
 from functools import lru_cache
 
-from .determinants import as_logarithms
+from .determinant_equations import as_logarithms
 from .formula import FUNCTIONS, INDEXED, SYMBOLS, Call, Formula, Letter, Node, Number, Power, Star, inverted, product, starred, total
 from .spelling import spelled
 from .standard_letters import GUARDED, STANDARD

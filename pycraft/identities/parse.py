@@ -20,7 +20,7 @@ from .. import _core
 from .block_reading import is_by_block, refuse_by_block
 from .book import read_book
 from .definitions import Definition, meant, parted
-from .determinants import as_logarithms
+from .determinant_equations import as_logarithms
 from .spelling import Spelled, spelled
 from .standard_letters import STANDARD
 from .vocabulary import FUNCTIONS, WITH_ARGUMENTS, Misread, ParseError, SpacesError, Vocabulary, decimal, is_number, is_operator, power

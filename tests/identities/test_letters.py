@@ -177,3 +177,19 @@ def test_a_paper_defines_its_letters(tmp_path):
         (1, "holds"), (2, "defines"), (3, "defines"), (3, "holds"), (4, "holds"), (5, "fails"), (6, "not read")
     ], repr(report)  # fmt: skip
     assert "where L = I + H φ K" in report.equations[0].understood
+
+
+def test_letters_of_the_book_are_not_made_of_ones_own():
+    """G is another letter here; P, which the book makes of its own G, is not changed, and neither is z, whose P and T are the book's."""
+    assert pc.check("G := φ*; z = ψ(KT + Pa + b)", states=1, search=False)
+    assert pc.check("T ∈ Θ; ε = T - Hψ(KT + Pa + b)", states=1, search=False)  # with this T, z is made of it
+    assert pc.check(r"A := \psi\,P; A = \psi\, P", states=1, search=False)
+
+
+def test_a_determinant_by_block_has_its_sign():
+    """Blocks whose pivots are exchanged an odd number of times: of a permutation of two rows det is -1."""
+    from pycraft.identities.block_values import _pivots
+
+    for n in (2, 3, 5):
+        x = np.random.default_rng(n).normal(size=(n, n))[::-1].copy()
+        assert np.prod(_pivots(x)) == pytest.approx(np.linalg.det(x), rel=1e-12)
