@@ -13,7 +13,7 @@ from ..arguments import whole
 from ..operators.operator_set import OperatorSet
 from ..progress_bar import StepProgress
 from .block_check import check_by_block
-from .block_reading import is_by_block
+from .block_reading import says_by_block
 from .drawn_vectors import drawn_vectors
 from .judge import FAILS, BoundState, Verdict, judge_states, ladder
 from .parse import Statement, Statements, check_has_space
@@ -137,7 +137,9 @@ def check(
     statement : str, or a pair (lhs, rhs) of expressions
         As text in Python's spelling, the book's (Unicode or ASCII) or LaTeX: ``"HψMψ*H* == D"``, ``"inv(psi) == inv(phi) + K*H"``. `MM`
         is the mass matrix HφMφ*H*, `N` the number of coordinates. Operators with bodies behind them make a statement by block,
-        ``"Ω(i,j) = Υ(i)ψ(i,j), i above j"``: it is checked for every choice of bodies of which its relations hold.
+        ``"Ω(i,j) = Υ(i)ψ(i,j), i above j"``: it is checked for every choice of bodies of which its relations hold. Letters of one's own
+        stand before it, ``"A := I + HφK; MM + J = A D A*"``, and vectors, ``"x ∈ Θ; ..."``; those of the equations of motion
+        (T, θ̈, 𝒞, α, f, z, ε, ν, ...) are known.
     model : Multibody, OperatorSet or None
         None: random trees that between them meet and break every standard hypothesis, deep and wide ones among them, moving and in
         gravity (text only; see `pycraft.truth` for where it is true and where not).
@@ -183,7 +185,7 @@ def check(
     operators: Any = None if model is None else getattr(model, "soa", model)
     if model is not None and not isinstance(operators, OperatorSet):
         raise _core.EvaluationError(f"a statement is checked on a model or its operators (model.soa), not on {model!r:.80}")
-    if isinstance(statement, str) and is_by_block(statement, [] if operators is None else [name for name, *_ in operators.V.blocks]):
+    if isinstance(statement, str) and says_by_block(statement, [] if operators is None else [name for name, *_ in operators.V.blocks]):
         return check_by_block(statement, operators, states=states, seed=seed, precision=precision)
     if model is None:
         if not isinstance(statement, str):
