@@ -25,13 +25,16 @@ py::dict node_dict(const Node& n) {
   return d;
 }
 
+py::array_t<double> read_only(py::array_t<double> a) {
+  a.attr("setflags")(py::arg("write") = false);
+  return a;
+}
+
 // Read-only, and without a copy: the array keeps the numbers alive.
 py::array_t<double> view(const SharedNumbers& numbers) {
   using Held = std::shared_ptr<const void>;
   const py::capsule holder(new Held(numbers.holder()), [](void* held) { delete static_cast<Held*>(held); });
-  py::array_t<double> a(static_cast<py::ssize_t>(numbers.size()), numbers.data(), holder);
-  a.attr("setflags")(py::arg("write") = false);
-  return a;
+  return read_only(py::array_t<double>(static_cast<py::ssize_t>(numbers.size()), numbers.data(), holder));
 }
 
 }  // namespace
@@ -171,7 +174,7 @@ void register_multibody(py::module_& m) {
         const std::string name = " limit of hinge '" + mb.body(k).hinge.name + "'";
         mb.set_limits(k, list_of_numbers(lower, ("lower" + name).c_str()), list_of_numbers(upper, ("upper" + name).c_str()));
       })
-      .def_property("gravity", [](const Multibody& mb) { return to_numpy(mb.gravity()); },
+      .def_property("gravity", [](const Multibody& mb) { return read_only(to_numpy(mb.gravity())); },
                     [](Multibody& mb, const py::object& g) { mb.set_gravity(to_vector3(g, "gravity")); },
                     "Gravity acceleration in world axes, m/s²; zero until it is set.")
       .def_property("q", [](const Multibody& mb) {
