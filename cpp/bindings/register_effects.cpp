@@ -50,8 +50,9 @@ void register_effects(py::module_& m) {
   m.def("piecewise_polynomial", [shared](std::vector<double> breaks, const Array& coefficients, int size) {
     return shared(piecewise_polynomial(std::move(breaks), {coefficients.data(), coefficients.data() + coefficients.size()}, size));
   }, py::arg("breaks"), py::arg("coefficients"), py::arg("size"));
-  m.def("harmonic", [shared](double amplitude, double frequency, double phase, double offset) { return shared(harmonic(amplitude, frequency, phase, offset)); }, py::arg("amplitude"),
-        py::arg("frequency"), py::arg("phase"), py::arg("offset"));
+  m.def("harmonic", [shared](Bounds amplitude, Bounds frequency, Bounds phase, Bounds offset) {
+    return shared(harmonic(std::move(amplitude), std::move(frequency), std::move(phase), std::move(offset)));
+  }, py::arg("amplitude"), py::arg("frequency"), py::arg("phase"), py::arg("offset"));
   m.def("python_function_of_time", [](const py::object& call, int size, const std::string& what) {
     return std::shared_ptr<FunctionOfTime>(std::make_shared<PythonFunctionOfTime>(call, size, what));
   }, py::arg("call"), py::arg("size"), py::arg("what"));

@@ -91,6 +91,7 @@ void run_in(CompiledScene<S>& scene, const std::vector<double>& q, const std::ve
   }
   record.nq = scene.numbers().nq, record.nv = scene.numbers().nv, record.own = scene.effects().own(), record.works = pair.equations->integrals();
   record.own_events = pair.equations->event_names();
+  for (std::string& name : pair.equations->jump_names()) record.own_events.push_back(std::move(name));
   const std::vector<double>& own = asked.own;
   if (!own.empty() && static_cast<int>(own.size()) != record.own)
     throw ModelError("the effects have " + std::to_string(record.own) + " states of their own, not " + std::to_string(own.size()));
@@ -202,6 +203,7 @@ void between_in(CompiledScene<S>& scene, const IntegratorOptions* options, const
     const S t(times[i]), t0(rows.t[k]), t1(rows.t[k + 1]);
     if (i == 0 || at[i - 1] != k) {
       x0 = row(k, k + 1), x1 = row(k + 1, k + 1);
+      pair.equations->between(t0, t1);
       own_output = pair.stepper && pair.stepper->again(t0, x0, t1);
       if (!own_output) hermite.set(t0, x0, t1, x1);
     }

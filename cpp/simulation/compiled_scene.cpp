@@ -38,6 +38,7 @@ CompiledScene<S>::CompiledScene(const Scene& scene, const Solving& how)
     for (const HingeTerm& h : e->declared.resists) terms.inertia[h.coordinate] += h.damping;
     impulsive_.push_back({e.get(), std::make_unique<HybridDynamics<S>>(scene.model(), terms, how, Vector3<double>{0, 0, 0})});
   }
+  if (!forces_.jumping().empty() && !loops_) jumping_ = std::make_unique<HybridDynamics<S>>(scene.model(), hinge_terms(scene), how, Vector3<double>{0, 0, 0});
   for (int list = 0; list < static_cast<int>(lists_.size()); ++list) plan(static_cast<SceneList>(list));
 }
 
@@ -262,6 +263,24 @@ void CompiledScene<S>::give_impulses(const S& t, const S* q, S* v, const S* own,
     for (int j = 0; j < nv_; ++j) energy += work_[j] * (v[j] + change_[j] / S(2)), v[j] += change_[j];
     if (e.worker >= 0) gained[e.worker] += energy;
   }
+}
+
+template <class S>
+void CompiledScene<S>::change_velocities(const S& t, const S* q, S* v, const S* wanted, S* gained) {
+  std::fill_n(gained, forces_.workers().size(), S(0));
+  std::fill(work_.begin(), work_.end(), S(0));
+  for (int j : prescribed_) work_[j] = wanted[j] - v[j];
+  if (loops_) {
+    loops_->change_velocities(t, q, work_.data(), needed_.data(), change_.data());
+  } else {
+    jumping_->run(q, nullptr, work_.data(), nullptr, change_.data());
+    for (int j : prescribed_) needed_[j] = change_[j], change_[j] = work_[j];
+  }
+  for (const auto& e : forces_.effects())
+    for (int j : e->declared.prescribed)
+      if (e->worker >= 0) gained[e->worker] += needed_[j] * (v[j] + change_[j] / S(2));
+  for (int j = 0; j < nv_; ++j) v[j] += change_[j];
+  for (int j : prescribed_) v[j] = wanted[j];
 }
 
 #define PYCRAFT_INSTANTIATE(S) template class CompiledScene<S>;

@@ -52,6 +52,10 @@ class CompiledScene {
   void set_step(const S& h);
   // Impulses that fall on t change v; gained: the kinetic energy that each effect which does work gave by them. SingularHingeError as above.
   void give_impulses(const S& t, const S* q, S* v, const S* own, S* gained);
+  // Prescribed velocities become those of `wanted` (nv), all others what the impulse of that makes of them:
+  //   (ℳ + J)_ff Δv_f = -(ℳ + J)_fp Δv_p,   p = (ℳ + J)_pf Δv_f + (ℳ + J)_pp Δv_p,
+  // on loops with their impulse Q*λ. gained: by effects that do work, Σ p (v + v⁺)/2, which is the change of the kinetic energy.
+  void change_velocities(const S& t, const S* q, S* v, const S* wanted, S* gained);
   // Where effects keep loops: a start that is off them is refused, what drifts off them is taken back.
   SceneLoops<S>* loops() { return loops_.get(); }
   bool gives_impulses() const { return !impulsive_.empty(); }
@@ -148,6 +152,7 @@ class CompiledScene {
     std::unique_ptr<HybridDynamics<S>> solver;  // of ℳ + J + C
   };
   std::vector<Impulsive> impulsive_;
+  std::unique_ptr<HybridDynamics<S>> jumping_;  // of ℳ + J; null: no prescribed velocity jumps
   // ---- of the state that is being worked at
   const S *v_ = nullptr, *u_ = nullptr;  // u: what the solver is given; null, as wrenches, where no effect gives any
   const Vector6<S>* wrenches_ = nullptr;

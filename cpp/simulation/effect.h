@@ -21,6 +21,7 @@
 #include "model/multibody.h"
 #include "numerics/scalar.h"
 #include "numerics/tangent.h"
+#include "simulation/function_of_time.h"
 #include "spatial/pose.h"
 
 namespace pycraft {
@@ -48,6 +49,7 @@ struct KeptLoops {
 struct Declaration {
   // ---- needs
   bool time = false;                 // whether it is another one at another time
+  std::vector<Knot> knots;           // where it goes over from one function of time to another; rates that jump there are of velocities that it prescribes
   bool velocities = false;           // whether it depends on them
   bool only_in_motion = false;       // nothing is given at rest: a statics query passes it over
   std::vector<int> poses, twists;    // of these bodies
@@ -117,6 +119,7 @@ class BoundEffect {
   virtual void sample(const At<S>&, S*) {}  // to what it holds
   virtual void impulses(const At<S>&, std::uint64_t, S*) {}  // number so and so, added to generalized impulses (nv)
   virtual void events(const At<S>&, S*) {}
+  virtual void event_rates(const At<S>&, S*) {}  // of those functions, along the motion
   virtual std::optional<Edge> edge(const At<S>&) { return {}; }
   // Positions, velocities and accelerations of its prescribed coordinates, to their places among all; what is null is not asked for. Whether they
   // are finite, and quaternions have a direction.

@@ -59,9 +59,18 @@ class Equations {
   virtual double next_stop(double) const { return std::numeric_limits<double>::infinity(); }
   virtual void stop(const S&, State&) {}
   virtual bool jumps() const { return false; }
-  // Functions of t and x at whose zeros the equations are others, by whose they are: a step ends there.
+  // Times known beforehand at which functions of time go over from one expression to another: a step ends there. The first after t.
+  virtual double next_knot(double) const { return std::numeric_limits<double>::infinity(); }
+  // Until the next such call rates are asked for from `from` to `to`: where one of these is a knot, functions of time have there the values that
+  // they have inside.
+  virtual void between(const S&, const S&) {}
+  // Velocities that jump at a knot t, from what they are in x to what follows: numbers of those that do, among these.
+  virtual std::vector<std::string> jump_names() const { return {}; }
+  virtual std::vector<int> jump(const S&, State&) { return {}; }
+  // Functions of t and x at whose zeros the equations are others, by whose they are: a step ends there. And their rates.
   virtual std::vector<std::string> event_names() const { return {}; }
   virtual void events(const S&, const State&, S*) {}
+  virtual void event_rates(const S&, const State&, S*) {}
   // What number i of x is, for errors.
   virtual std::string name_of(int i) const { return "number " + std::to_string(i) + " of the state"; }
 

@@ -47,6 +47,11 @@ class PiecewisePolynomial : public InAnyScalar<PiecewisePolynomial> {
     order_ = static_cast<int>(c_.size()) / (pieces_ * size_) - 1;
   }
   int size() const override { return size_; }
+  std::vector<Knot> knots() const override {
+    std::vector<Knot> all;
+    for (size_t i = 0; i < breaks_.size(); ++i) all.push_back({breaks_[i], jumps(i, 0), jumps(i, 1)});
+    return all;
+  }
   // Horner's scheme, with its derivatives.
   template <class S>
   void find(const S& t, S* value, S* rate, S* second) const {
@@ -69,25 +74,52 @@ class PiecewisePolynomial : public InAnyScalar<PiecewisePolynomial> {
   }
 
  private:
+  // Whether a derivative of this order, 0 or 1, differs on both sides of break i by more than what its terms are rounded to: sums of order_ + 1
+  // terms, whose coefficients are rounded sums of values and slopes themselves, at a time that is known to ε of the breaks, so that 64 ε of the
+  // sizes of all these are none.
+  bool jumps(size_t i, int derivative) const {
+    for (int j = 0; j < size_; ++j) {
+      double sides[2] = {0, 0}, sizes = 0;
+      for (int side = 0; side < 2; ++side) {
+        const bool held = side == 0 ? i == 0 : i + 1 == breaks_.size();
+        if (held && derivative == 1) continue;
+        const int piece = static_cast<int>(i) - ((side == 0) != held ? 1 : 0);
+        const double s = piece == static_cast<int>(i) ? 0 : breaks_[i] - breaks_[i - 1];
+        double power = 1;
+        for (int m = order_ - derivative; m >= 0; --m, power *= s) {
+          const double term = (derivative == 1 ? order_ - m : 1) * c_[(size_t(m) * pieces_ + piece) * size_ + j] * power;
+          sides[side] += term, sizes += std::abs(term);
+          const int left = order_ - derivative - m;  // of its rate: the power of the term
+          if (left > 0 && s > 0) sizes += left * std::abs(term) / s * (std::abs(breaks_[i]) + std::abs(breaks_[i - 1]));
+        }
+      }
+      if (std::abs(sides[1] - sides[0]) > 64 * epsilon<double>() * sizes) return true;
+    }
+    return false;
+  }
   std::vector<double> breaks_, c_;
   int size_, pieces_, order_;
 };
 
 class Harmonic : public InAnyScalar<Harmonic> {
  public:
-  Harmonic(double amplitude, double frequency, double phase, double offset) : amplitude_(amplitude), frequency_(frequency), phase_(phase), offset_(offset) {}
-  int size() const override { return 1; }
+  Harmonic(std::vector<double> amplitude, std::vector<double> frequency, std::vector<double> phase, std::vector<double> offset)
+      : amplitude_(std::move(amplitude)), frequency_(std::move(frequency)), phase_(std::move(phase)), offset_(std::move(offset)) {}
+  int size() const override { return static_cast<int>(amplitude_.size()); }
   template <class S>
   void find(const S& t, S* value, S* rate, S* second) const {
     using std::cos, std::sin, std::atan2;
-    const S w = S(2) * S(frequency_) * atan2(S(0), S(-1)), angle = w * t + S(phase_), a(amplitude_);
-    if (value) *value = S(offset_) + a * sin(angle);
-    if (rate) *rate = a * w * cos(angle);
-    if (second) *second = -(a * w * w) * sin(angle);
+    const S half_turn = atan2(S(0), S(-1));
+    for (size_t j = 0; j < amplitude_.size(); ++j) {
+      const S w = S(2) * S(frequency_[j]) * half_turn, angle = w * t + S(phase_[j]), a(amplitude_[j]);
+      if (value) value[j] = S(offset_[j]) + a * sin(angle);
+      if (rate) rate[j] = a * w * cos(angle);
+      if (second) second[j] = -(a * w * w) * sin(angle);
+    }
   }
 
  private:
-  double amplitude_, frequency_, phase_, offset_;
+  std::vector<double> amplitude_, frequency_, phase_, offset_;
 };
 
 void require_finite_numbers(const std::vector<double>& x, const char* what) {
@@ -114,9 +146,12 @@ TimeFunction piecewise_polynomial(std::vector<double> breaks, std::vector<double
   return std::make_shared<PiecewisePolynomial>(std::move(breaks), std::move(coefficients), size);
 }
 
-TimeFunction harmonic(double amplitude, double frequency, double phase, double offset) {
-  require_finite_numbers({amplitude, frequency, phase, offset}, "a number");
-  return std::make_shared<Harmonic>(amplitude, frequency, phase, offset);
+TimeFunction harmonic(std::vector<double> amplitude, std::vector<double> frequency, std::vector<double> phase, std::vector<double> offset) {
+  for (const auto* part : {&amplitude, &frequency, &phase, &offset}) {
+    require_finite_numbers(*part, "a number");
+    if (part->size() != amplitude.size() || part->empty()) throw ModelError("a harmonic function of time has as many amplitudes, frequencies, phases and offsets");
+  }
+  return std::make_shared<Harmonic>(std::move(amplitude), std::move(frequency), std::move(phase), std::move(offset));
 }
 
 }  // namespace pycraft

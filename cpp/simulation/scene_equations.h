@@ -39,6 +39,7 @@ class SceneEquations : public Kind<S> {
 
   // x of a state at t: own states as they are at first where own is null; samples are taken, prescribed coordinates set, works zero.
   State initial(const S& t, const S* q, const S* v, const S* own) {
+    between(t, S(std::numeric_limits<double>::infinity()));
     State x = placed(t, q, v, own);
     if (scene_.loops()) scene_.loops()->check_start(x.data(), x.data() + nq());
     settle(t, x);
@@ -55,8 +56,9 @@ class SceneEquations : public Kind<S> {
   // Between the ends of a step, where no samples are taken and states need not be on loops.
   State initial_between(const S& t, const S* q, const S* v, const S* own) { return placed(t, q, v, own); }
 
-  void evaluate(const S& t, const S* q, const S* v, const S* rest, S* vdot, S* rest_rate) override {
+  void evaluate(const S& now, const S* q, const S* v, const S* rest, S* vdot, S* rest_rate) override {
     if ((++evaluations & 63) == 0) check_interrupt();
+    const S t = inside(now);
     place(t, q, v);
     if (works_ > 0)
       scene_.accelerations_and_powers(t, this->at_q_, this->at_v_, rest, vdot, rest_rate + own_);
@@ -90,15 +92,54 @@ class SceneEquations : public Kind<S> {
     }
     scene_.effects().sample(t, false, x.data(), v, own);
   }
+  double next_knot(double t) const override { return scene_.effects().next_knot(t); }
+  void between(const S& from, const S& to) override {
+    const auto knot = [&](const S& t) { return std::isfinite(to_double(t)) && S(to_double(t)) == t && scene_.effects().is_knot(to_double(t)); };
+    const auto rounding = [](const S& t) { return S(2) * epsilon<S>() * maximum(S(t < S(0) ? -t : t), S(std::ldexp(1.0, -200))); };
+    begins_ = knot(from), ends_ = knot(to);
+    if (begins_) from_ = from, first_ = from + rounding(from);
+    if (ends_) to_ = to, last_ = to - rounding(to);
+  }
+  std::vector<std::string> jump_names() const override {
+    std::vector<std::string> names;
+    for (int number : scene_.effects().jumping()) names.push_back(scene_.effects().effects()[number]->name);
+    return names;
+  }
+  std::vector<int> jump(const S& t, State& x) override {
+    const std::vector<int> which = scene_.effects().jumping(to_double(t));
+    std::vector<int> found;
+    if (which.empty() || S(to_double(t)) != t) return found;
+    S *const v = x.data() + nq(), *const own = v + nv();
+    std::copy_n(v, nv(), v_.data());
+    scene_.effects().prescribe(inside(t), nullptr, v_.data(), nullptr);
+    if (std::equal(v, v + nv(), v_.begin())) return found;  // it has happened
+    scene_.change_velocities(t, x.data(), v, v_.data(), gained_.data());
+    for (int i = 0; i < works_; ++i) own[own_ + i] += gained_[i] / unit_of_work();
+    const std::vector<int>& all = scene_.effects().jumping();
+    for (int number : which) found.push_back(static_cast<int>(std::find(all.begin(), all.end(), number) - all.begin()));
+    return found;
+  }
   std::vector<std::string> event_names() const override { return scene_.effects().event_names(); }
   void events(const S& t, const State& x, S* out) override {
-    std::copy_n(x.data(), nq(), q_.data()), std::copy_n(x.data() + nq(), nv(), v_.data());
-    scene_.effects().prescribe(t, q_.data(), v_.data(), nullptr);
+    take(t, x);
     scene_.effects().events(t, q_.data(), v_.data(), x.data() + nq() + nv(), out);
+  }
+  void event_rates(const S& t, const State& x, S* out) override {
+    take(t, x);
+    scene_.effects().event_rates(t, q_.data(), v_.data(), x.data() + nq() + nv(), out);
   }
   std::string name_of(int i) const override;
 
+ protected:
+  // t, or the time next to it where it is an end that is a knot.
+  S inside(const S& t) const { return begins_ && !(t > from_) ? first_ : ends_ && !(t < to_) ? last_ : t; }
+
  private:
+  // q and v at a state, prescribed coordinates as they are.
+  void take(const S& t, const State& x) {
+    std::copy_n(x.data(), nq(), q_.data()), std::copy_n(x.data() + nq(), nv(), v_.data());
+    if (!scene_.prescribed().empty()) set_prescribed(t, q_.data(), v_.data());
+  }
   State placed(const S& t, const S* q, const S* v, const S* own) {
     State x(q, q + nq());
     x.insert(x.end(), v, v + nv());
@@ -112,7 +153,12 @@ class SceneEquations : public Kind<S> {
     if (stops()) scene_.effects().sample(t, first, x.data(), x.data() + nq(), x.data() + nq() + nv());
   }
   void prescribe(const S& t, State& x) {
-    if (!scene_.prescribed().empty()) scene_.effects().prescribe(t, x.data(), x.data() + nq(), nullptr);
+    if (!scene_.prescribed().empty()) set_prescribed(t, x.data(), x.data() + nq());
+  }
+  // Positions do not jump at a knot.
+  void set_prescribed(const S& t, S* q, S* v) {
+    scene_.effects().prescribe(t, q, v, nullptr);
+    if (const S at = inside(t); at != t) scene_.effects().prescribe(at, nullptr, v, nullptr);
   }
   struct InTurn : StatesInTurn {
     InTurn(SceneEquations& of, Stages<S>& given) : equations(of), stages(given) {}
@@ -121,8 +167,9 @@ class SceneEquations : public Kind<S> {
     SceneEquations& equations;
     Stages<S>& stages;
   };
-  PreparedLinks* ask(const S& t, const State& x, State& rate) {
+  PreparedLinks* ask(const S& now, const State& x, State& rate) {
     ++evaluations;
+    const S t = inside(now);
     const S *q = x.data(), *v = q + nq();
     S *const vdot = rate.data() + nq(), *const rest_rate = vdot + nv();
     place(t, q, v);
@@ -150,6 +197,8 @@ class SceneEquations : public Kind<S> {
   CompiledScene<S>& scene_;
   int own_, works_;
   State q_, v_, gained_;
+  bool begins_ = false, ends_ = false;  // whether functions of time go over into others where the present piece does
+  S from_ = S(0), to_ = S(0), first_ = S(0), last_ = S(0);
 };
 
 template <class S, template <class> class Kind>

@@ -38,11 +38,15 @@ SceneForces<S>::SceneForces(const Scene& scene, std::shared_ptr<const CompiledMo
     own_ += d.own();
     if (d.work) made->worker = static_cast<int>(workers_.size()), workers_.push_back(made->number), join(d.wrenches, counted);
     if (!d.coordinates.empty()) forced_ = nv;
+    for (const Knot& knot : d.knots) knots_.push_back(knot.t);
+    if (!d.prescribed.empty() && std::any_of(d.knots.begin(), d.knots.end(), [](const Knot& k) { return k.rates_jump; })) jumping_.push_back(made->number);
     made->ways = ways_to_base(numbers_->parent, d.wrenches);
     made->kept.assign(d.wrenches.size(), Vector6<S>::zero());
     join(d.poses, placed), join(d.twists, moved), join(d.wrenches, wrenched_);
     effects_.push_back(std::move(made));
   }
+  std::sort(knots_.begin(), knots_.end());
+  knots_.erase(std::unique(knots_.begin(), knots_.end()), knots_.end());
   const auto reach = [&](std::vector<int> more_placed, std::vector<int> all_moved) {
     join(placed, more_placed), join(all_moved, more_placed);
     return Reach{ways_to_base(numbers_->parent, more_placed), ways_to_base(numbers_->parent, all_moved)};
@@ -169,6 +173,28 @@ double SceneForces<S>::next_stop(double t) const {
 }
 
 template <class S>
+double SceneForces<S>::next_knot(double t) const {
+  const auto next = std::upper_bound(knots_.begin(), knots_.end(), t);
+  return next == knots_.end() ? std::numeric_limits<double>::infinity() : *next;
+}
+
+template <class S>
+bool SceneForces<S>::is_knot(double t) const {
+  return std::binary_search(knots_.begin(), knots_.end(), t);
+}
+
+template <class S>
+std::vector<int> SceneForces<S>::jumping(double t) const {
+  std::vector<int> found;
+  for (int number : jumping_) {
+    const std::vector<Knot>& knots = effects_[number]->declared.knots;
+    const auto at = std::lower_bound(knots.begin(), knots.end(), t, [](const Knot& k, double t) { return k.t < t; });
+    if (at != knots.end() && at->t == t && at->rates_jump) found.push_back(number);
+  }
+  return found;
+}
+
+template <class S>
 std::vector<std::string> SceneForces<S>::event_names() const {
   std::vector<std::string> names;
   for (const auto& e : effects_) names.insert(names.end(), e->declared.events, e->name);
@@ -181,6 +207,16 @@ void SceneForces<S>::events(const S& t, const S* q, const S* v, const S* own, S*
   place(read_), move(read_);
   for (auto& e : effects_) {
     if (e->declared.events > 0) e->bound->events(at_of(*e), out);
+    out += e->declared.events;
+  }
+}
+
+template <class S>
+void SceneForces<S>::event_rates(const S& t, const S* q, const S* v, const S* own, S* out) {
+  start(t, q, v, own);
+  place(read_), move(read_);
+  for (auto& e : effects_) {
+    if (e->declared.events > 0) e->bound->event_rates(at_of(*e), out);
     out += e->declared.events;
   }
 }

@@ -75,11 +75,18 @@ class SceneForces {
   }
   // Controllers whose sample falls on t (all of them where `first`): what they hold, in place in `own`.
   void sample(const S& t, bool first, const S* q, const S* v, S* own);
+  // The first knot of a function of time after t; infinite where there is none. Whether there is one at t; numbers of the effects whose prescribed
+  // velocities jump at t, and of all whose do anywhere.
+  double next_knot(double t) const;
+  bool is_knot(double t) const;
+  std::vector<int> jumping(double t) const;
+  const std::vector<int>& jumping() const { return jumping_; }
   // The first sample or impulse after t, no earlier than a rounding of it; infinite where there is none.
   double next_stop(double t) const;
   // The functions whose zeros say where effects are others: one after another, and the names of the effects that they are of.
   std::vector<std::string> event_names() const;
   void events(const S& t, const S* q, const S* v, const S* own, S* out);
+  void event_rates(const S& t, const S* q, const S* v, const S* own, S* out);
   // EvaluationError that names the effect of forces that are not finite and the time; nothing where there is none.
   void look_for_culprits();
 
@@ -95,7 +102,8 @@ class SceneForces {
   std::shared_ptr<const CompiledModel<S>> numbers_;
   std::vector<std::string> coordinate_names_, body_names_;
   std::vector<std::unique_ptr<Active<S>>> effects_;
-  std::vector<int> workers_, wrenched_;
+  std::vector<int> workers_, wrenched_, jumping_;
+  std::vector<double> knots_;                           // of all effects, rising
   SceneKinematics<S> kinematics_;
   Reach read_, works_, whole_;
   int own_ = 0;

@@ -20,8 +20,9 @@ SceneLinearized::SceneLinearized(CompiledScene<double>& scene, bool works)
   sum_.resize(nv()), y_rate_.resize(own());
 }
 
-void SceneLinearized::linearize(const double& t, const double& h, const double* q, const double* v, const double* rest, const double* vdot, const double* rest_rate, Linearization& out) {
+void SceneLinearized::linearize(const double& now, const double& h, const double* q, const double* v, const double* rest, const double* vdot, const double* rest_rate, Linearization& out) {
   const int n = nv() + own();
+  const double t = inside(now);
   out.mass = Eigen::MatrixXd::Identity(n, n), out.along_u = Eigen::MatrixXd::Zero(n, nv()), out.along_z = Eigen::MatrixXd::Zero(n, n), out.along_t = Eigen::VectorXd::Zero(n);
   differentiate_motion(q, v, vdot, out);
   if (forces_)

@@ -46,6 +46,18 @@ class SceneLoops {
     embedded_ = std::make_unique<EmbeddedWorkspace<S>>(model, free_terms(terms));
   }
 
+  // (ℳ + J) Δv = Q*λ + Σ p, Q Δv = 0, Δv(j) as given at every prescribed coordinate: Δv of all, and the impulses p that prescribed motion needs.
+  void change_velocities(const S& t, const S* q, const S* given, S* needed, S* change) {
+    const bool drawn = std::exchange(drawn_, false);
+    const Applied<S> none{Vector3<S>::zero()};
+    try {
+      accelerate(t, q, nullptr, nullptr, none, given, needed, change);
+    } catch (...) {
+      drawn_ = drawn;
+      throw;
+    }
+    drawn_ = drawn;
+  }
   // q, v, tau (null: none), what acts on bodies, θ̈ of prescribed coordinates by coordinate: θ̈ of all, and what their motion needs beside tau.
   void accelerate(const S& t, const S* q, const S* v, const S* tau, const Applied<S>& applied, const S* motion, S* needed, S* vdot) {
     if (!v) v = zeros_.data();

@@ -76,13 +76,13 @@ std::vector<EffectPointer> every_effect(const Multibody& mb) {
           std::make_shared<NodeSpring>(mb, "a", "b", 3.0, 0.2),
           std::make_shared<NodeDamper>(mb, "a", "b", 0.5),
           std::make_shared<Bushing>(mb, "", "b", six, six, Pose<double>::identity()),
-          std::make_shared<TorqueSource>(mb, all, harmonic(1, 2, 3, 4), DriveLimits{{2.0}, {0.5}, 0.5}),
+          std::make_shared<TorqueSource>(mb, all, harmonic({1}, {2}, {3}, {4}), DriveLimits{{2.0}, {0.5}, 0.5}),
           std::make_shared<Servo>(mb, all, std::vector<double>{3.0}, std::vector<double>{0.3}, piecewise_polynomial({0, 1, 2}, {1, -1, 0.5, 0.2}, 1), DriveLimits{}),
           std::make_shared<Motor>(mb, all, constant_in_time({0.4}), MotorNumbers{{1}, {20}, {3}, {0.01}}, DriveLimits{}),
           std::make_shared<RotorInertia>(mb, all, std::vector<double>{0.2}, std::vector<double>{2.0}),
           std::make_shared<Limits>(mb, all, std::vector<double>{30}, std::vector<double>{0.2}, std::vector<double>{-0.1}, std::vector<double>{0.1}),
           std::make_shared<Wrench>(mb, "b", constant_in_time({1, 2, 3, 4, 5, 6}), "a"),
-          std::make_shared<PrescribedMotion>(mb, pin, harmonic(0.3, 1, 0, 0.1))};
+          std::make_shared<PrescribedMotion>(mb, pin, harmonic({0.3}, {1}, {0}, {0.1}))};
 }
 
 // A tank that empties: its level is a state, and what flows out pushes.

@@ -5,13 +5,11 @@ STATEMENT = "statement"
 CHANGES = {
     "cpp/simulation/integrators/integrate.cpp": [
         ("lengths of quaternions walk", "scale_quaternions<S>(equations_.model(), lengths_.data(), x.data());", ";", STATEMENT),
-        ("a sample is taken a piece too late", "forwards_ ? std::min(stop, target) : target", "target"),
-        (
-            "a stepper keeps its slope over a sample",
-            "watcher_.step(t_, x_);\n      stepper_.forget();",
-            "watcher_.step(t_, x_);",
-            STATEMENT,
-        ),
+        ("a sample is taken a piece too late", "forwards_ ? std::min({stop, knot, target}) : target", "target"),
+        ("a stepper keeps its slope over a sample", "stepper_.forget();\n    watch_.forget();", "watch_.forget();", STATEMENT),
+        ("knots are stepped over", "forwards_ ? equations_.next_knot(to_double(t_)) : never", "never"),
+        ("a run ends behind a jump", "if (knot < plan_.times.back()) jump();", "jump();", STATEMENT),
+        ("what goes on does not begin with a jump", "if (plan_.resumed) jump();", ";", STATEMENT),
         ("a run goes on from where its last step was cut short", "whole_ || !stepper_.cut()", "true"),
         ("a run goes on behind its terminal event", "sample_to(c.t, x_);\n", "sample_to(t_, x_);\n", STATEMENT),
         ("an event knows no state of its own", "t_ = c.t, x_ = c.x;", "t_ = c.t;", STATEMENT),
@@ -71,5 +69,8 @@ CHANGES = {
             STATEMENT,
         ),
         ("a zero is found by halving once", "i < 300", "i < 1"),
+        ("what turned within a step has not been beyond", "if (!(gc > S(0))) return true;", "if (!(gc > S(0))) return false;", STATEMENT),
+        ("tangents keep away from zero at once", "std::min(ga, gb) / S(2)", "S(-1e300)"),
+        ("what is due at the end of a run is not found", "-last * due", "S(0)"),
     ],
 }

@@ -18,7 +18,9 @@ CHANGES = {
         ("works are seen by tolerances", "std::ldexp(1.0, 100)", "1.0"),
         ("states within steps are off the loops", "if (settles()) scene_.loops()->bring(q_.data(), v_.data());", ";", STATEMENT),
         ("what is taken onto the loops goes on as it was", "scene_.loops() && scene_.loops()->settles()", "scene_.loops() != nullptr"),
-        ("prescribed coordinates drift", "scene_.effects().prescribe(t, x.data(), x.data() + nq(), nullptr);", ";", STATEMENT),
+        ("prescribed coordinates drift", "set_prescribed(t, x.data(), x.data() + nq());", ";", STATEMENT),
+        ("a step that ends at a knot sees what follows", "ends_ && !(t < to_)", "false"),
+        ("a step that begins at a knot sees what was", "begins_ && !(t > from_)", "false"),
         (
             "a controller is not asked at the start",
             "if (stops()) scene_.effects().sample(t, first, x.data(), x.data() + nq(), x.data() + nq() + nv());",
@@ -83,6 +85,7 @@ CHANGES = {
     "cpp/simulation/function_of_time.cpp": [
         ("tables go on beyond their ends", "before || after ? S(0) : S(1)", "S(1)"),
         ("curvatures are half", "moving * S(2) * half", "moving * half"),
+        ("nothing jumps at a knot", "std::abs(sides[1] - sides[0]) > 64 * epsilon<double>() * sizes", "false"),
     ],
     "cpp/simulation/effects/bushing.cpp": [
         ("a is pushed where b is", "moment + cross(x.apart, force)", "moment"),
@@ -93,6 +96,7 @@ CHANGES = {
     ],
     "cpp/simulation/effects/limits.cpp": [
         ("a stop that is touched is smooth", 'if (d == S(0)) return Edge{"is just at its stop", s.v};', ";", STATEMENT),
+        ("stops turn the other way", "*out++ = s.inward * at.v[s.v];", "*out++ = -s.inward * at.v[s.v];", STATEMENT),
         ("stops pull", "factor > S(0) ? factor : S(0)", "factor"),
         ("what a stop stores counts as work", "(pushed(at, s) - S(1))", "pushed(at, s)"),
     ],

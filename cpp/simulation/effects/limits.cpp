@@ -46,6 +46,9 @@ class BoundLimits : public BoundEffect<S> {
   void events(const At<S>& at, S* out) override {
     for (const Stop& s : stops_) *out++ = -beyond(at, s);
   }
+  void event_rates(const At<S>& at, S* out) override {
+    for (const Stop& s : stops_) *out++ = s.inward * at.v[s.v];
+  }
   std::optional<Edge> edge(const At<S>& at) override {
     for (const Stop& s : stops_) {
       const S d = beyond(at, s);

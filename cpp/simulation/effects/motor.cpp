@@ -65,7 +65,7 @@ Motor::Motor(const Multibody& model, const Names& hinges, TimeFunction of_time, 
 
 Declaration Motor::declaration() const {
   Declaration d;
-  d.time = !command->constant(), d.foreign = command->foreign();
+  d.time = !command->constant(), d.foreign = command->foreign(), d.knots = command->knots();
   d.velocities = d.work = true;
   d.coordinates = coordinates;
   for (size_t i = 0; i < coordinates.size(); ++i)

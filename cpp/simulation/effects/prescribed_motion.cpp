@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "model/checks.h"
 #include "runtime/errors.h"
 
 namespace pycraft {
@@ -82,11 +83,15 @@ PrescribedMotion::PrescribedMotion(const Multibody& model, const Names& hinges, 
   if (motion->size() != numbers)
     throw ModelError("prescribed: the motion gives " + std::to_string(motion->size()) + " numbers; " + (numbers == 1 ? "coordinate" : "the coordinates from") + " '" +
                      names[coordinates_[0]] + "'" + (numbers == 1 ? " takes one" : " on take " + std::to_string(numbers) + ", as they have in q"));
+  for (const Knot& knot : motion->knots())
+    if (knot.values_jump)
+      throw ModelError("prescribed: the motion of coordinate '" + names[coordinates_[0]] + "'" + (numbers == 1 ? "" : " and others") + " jumps at t = " + short_number(knot.t) +
+                       " s, which no body can; velocities may jump, by an impulse: lead it from place to place (pc.effects.Table, Spline)");
 }
 
 Declaration PrescribedMotion::declaration() const {
   Declaration d;
-  d.time = !motion->constant(), d.foreign = motion->foreign();
+  d.time = !motion->constant(), d.foreign = motion->foreign(), d.knots = motion->knots();
   d.prescribed = coordinates_;
   d.work = true;
   return d;

@@ -4,6 +4,8 @@
 // v = q̇ and v̇ = q̈. Of a ball with the quaternion Q of any length, and of a free subhinge with the position p besides,
 //
 //   ω = 2 (Q* Q̇)/|Q|²,   ω̇ = 2 (Q* Q̈)/|Q|² - 4 (Q·Q̇)(Q* Q̇)/|Q|⁴,     u = R* ṗ,   u̇ = R* p̈ - ω × u        (vector parts)
+//
+// Where v jumps, at a knot of the function, an impulse acts (CompiledScene::change_velocities). Positions that jump are an error.
 #pragma once
 
 #include "simulation/effect.h"

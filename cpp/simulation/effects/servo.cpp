@@ -52,7 +52,7 @@ Servo::Servo(const Multibody& model, const Names& hinges, const std::vector<doub
 
 Declaration Servo::declaration() const {
   Declaration d;
-  d.time = !target->constant(), d.foreign = target->foreign();
+  d.time = !target->constant(), d.foreign = target->foreign(), d.knots = target->knots();
   d.velocities = d.work = true;
   for (const auto& [q, v] : coordinates) d.coordinates.push_back(v);
   return d;

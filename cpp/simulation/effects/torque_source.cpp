@@ -51,7 +51,7 @@ TorqueSource::TorqueSource(const Multibody& model, const Names& hinges, TimeFunc
 
 Declaration TorqueSource::declaration() const {
   Declaration d;
-  d.time = !torque->constant(), d.foreign = torque->foreign();
+  d.time = !torque->constant(), d.foreign = torque->foreign(), d.knots = torque->knots();
   d.coordinates = coordinates;
   d.work = true;
   return d;

@@ -48,7 +48,7 @@ Wrench::Wrench(const Multibody& model, const std::string& on, TimeFunction given
 
 Declaration Wrench::declaration() const {
   Declaration d;
-  d.time = !wrench->constant(), d.foreign = wrench->foreign();
+  d.time = !wrench->constant(), d.foreign = wrench->foreign(), d.knots = wrench->knots();
   d.wrenches = {node.body};
   d.work = true;
   if (!fixed) d.poses = {node.body};

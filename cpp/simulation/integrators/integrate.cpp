@@ -34,19 +34,24 @@ class Run {
   const IntegratorRecord& record() const { return record_of(options_.integrator); }
   static EventFunctions<S> with_those_of(Equations<S>& equations, const EventFunctions<S>& given) {
     EventFunctions<S> all;
-    const std::vector<std::string> own = equations.event_names();
+    const std::vector<std::string> own = equations.event_names(), jumps = equations.jump_names();
     for (const std::string& name : own) all.kinds.push_back({name, 0, false, true});
+    for (const std::string& name : jumps) all.kinds.push_back({name, 0, false, false, true});
     all.kinds.insert(all.kinds.end(), given.kinds.begin(), given.kinds.end());
-    const int n = static_cast<int>(own.size());
-    all.value = [&equations, &given, n, values = State(own.size())](int i, const S& t, const State& x) mutable {
-      if (i >= n) return given.value(i - n, t, x);
+    const int n = static_cast<int>(own.size()), others = n + static_cast<int>(jumps.size());
+    all.value = [&equations, &given, n, others, values = State(own.size())](int i, const S& t, const State& x) mutable {
+      if (i >= others) return given.value(i - others, t, x);
+      if (i >= n) return S(1);
       equations.events(t, x, values.data());
       return values[i];
     };
-    all.all = [&equations, &given, n](const S& t, const State& x, S* out) {
+    all.all = [&equations, &given, n, others](const S& t, const State& x, S* out) {
       if (n > 0) equations.events(t, x, out);
-      for (size_t i = 0; i < given.kinds.size(); ++i) out[n + i] = given.value(static_cast<int>(i), t, x);
+      std::fill(out + n, out + others, S(1));
+      for (size_t i = 0; i < given.kinds.size(); ++i) out[others + i] = given.value(static_cast<int>(i), t, x);
     };
+    all.known = own.size();
+    all.rates = [&equations](const S& t, const State& x, S* out) { equations.event_rates(t, x, out); };
     return all;
   }
 
@@ -60,9 +65,13 @@ class Run {
     }
     kept_.lengths = lengths_;
     keep();
-    watcher_.step(t_, x_), watcher_.sample(t_, x_);
+    watcher_.step(t_, x_);
+    if (plan_.resumed) jump();  // one that fell on the end of what is gone on from
+    watcher_.sample(t_, x_);
     if (times.size() == 1) return;
-    if (equations_.stops() && !forwards_) refuse(options_.integrator, "a controller is sampled or an impulse acts, and time runs backwards");
+    if (equations_.stops()) stop_ = equations_.next_stop(to_double(t_));
+    if (!forwards_ && (equations_.stops() || equations_.next_knot(-std::numeric_limits<double>::infinity()) < times.front()))
+      refuse(options_.integrator, "a controller is sampled, an impulse acts or a function of time has knots, and time runs backwards");
     stepper_.start(t_, x_, S(times.back()), plan_.resumed ? &plan_.resumed->pace : nullptr);
     watch_.begin(t_, x_, plan_.resumed ? &plan_.resumed->signs : nullptr);
     keep();
@@ -71,19 +80,41 @@ class Run {
 
   // To the next time at which a step must end.
   void piece() {
-    const double target = at_times_ ? plan_.times[next_] : plan_.times.back(), stop = equations_.stops() ? equations_.next_stop(to_double(t_)) : std::numeric_limits<double>::infinity();
-    to_ = S(forwards_ ? std::min(stop, target) : target);
+    const double never = std::numeric_limits<double>::infinity(), target = at_times_ ? plan_.times[next_] : plan_.times.back();
+    const double stop = stop_, knot = forwards_ ? equations_.next_knot(to_double(t_)) : never;
+    to_ = S(forwards_ ? std::min({stop, knot, target}) : target);
+    equations_.between(t_, to_);
+    stepper_.plan(S(at_times_ ? to_double(to_) : std::min(stop, knot)));
     stepper_.begin(t_, x_, to_);
     while (!there() && end_.event < 0) step();
     if (end_.event >= 0) return;
     t_ = to_;
-    if (stop <= target) {
+    if (to_ == S(knot)) {
+      if (knot < plan_.times.back()) jump();  // else it is what follows that begins with it
+      begin_anew();
+    }
+    if (to_ == S(stop)) {
       equations_.stop(t_, x_);
+      stop_ = equations_.next_stop(to_double(t_));
       if (equations_.jumps()) watcher_.step(t_, x_);
-      stepper_.forget();
-      whole_ = true, fresh_ = true;
+      begin_anew();
     }
     while (next_ < plan_.times.size() && S(plan_.times[next_]) == t_) watcher_.sample(t_, x_), ++next_;
+  }
+  void jump() {
+    equations_.between(t_, S(std::numeric_limits<double>::infinity()));
+    const std::vector<int> which = equations_.jump(t_, x_);
+    if (which.empty()) return;
+    finish(t_, x_);
+    watcher_.step(t_, x_);
+    const int first = static_cast<int>(equations_.event_names().size());
+    for (int each : which) watcher_.event(first + each, t_, x_);
+  }
+  // Where rates or states are others than those at the end of the last step.
+  void begin_anew() {
+    stepper_.forget();
+    watch_.forget();
+    whole_ = true, fresh_ = true;
   }
   // What is left is no step any more, but the rounding of the times themselves.
   bool there() const {
@@ -113,11 +144,21 @@ class Run {
       scale_quaternions<S>(equations_.model(), lengths_.data(), x.data());
   }
   void look_for_events() {
+    using std::abs;
     const auto within = [&](const S& t, State& x) {
       stepper_.within(kept_.t, kept_.x, t, x);
       finish(t, x);
     };
-    for (const Crossing<S>& c : watch_.in_step(kept_.t, kept_.x, t_, x_, within)) {
+    bool set = false;
+    const auto roughly = [&](const S& t, State& x) {
+      if (stepper_.interpolate(t, x)) return;
+      if (!set) between_.set(kept_.t, kept_.x, t_, x_);
+      set = true;
+      between_.at(t, x);
+    };
+    // Every step rounds the time.
+    const S due = t_ == S(plan_.times.back()) ? S(static_cast<double>(4 + end_.cost.steps)) * epsilon<S>() * std::max(S(abs(t_)), S(abs(S(plan_.times.front())))) : S(0);
+    for (const Crossing<S>& c : watch_.in_step(kept_.t, kept_.x, t_, x_, within, roughly, due)) {
       watch_.pass(c);
       if (!c.counts) continue;
       const EventKind& kind = events_.kinds[c.event];
@@ -125,8 +166,7 @@ class Run {
       if (!kind.terminal && !kind.ends_step) continue;
       sample_to(c.t, x_);
       t_ = c.t, x_ = c.x;
-      stepper_.forget();
-      whole_ = true, fresh_ = true;
+      begin_anew();
       if (kind.terminal)
         end_.event = c.event;
       else if (!there())
@@ -186,6 +226,7 @@ class Run {
   HermiteOutput<S> between_;
   Checkpoint<S> kept_;
   S t_, to_ = S(0);
+  double stop_ = std::numeric_limits<double>::infinity();  // the next one
   size_t next_ = 1;
   bool at_times_, forwards_ = true;
   bool whole_ = false, fresh_ = false;  // where the run stands: a step had to end there; and what follows is counted anew

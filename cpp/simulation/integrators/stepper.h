@@ -45,6 +45,8 @@ class Stepper {
   virtual ~Stepper() = default;
   // A run from (t, x) to `last`; resumed: as one that was left with this pace.
   virtual void start(const S& t, const State& x, const S& last, const Pace<S>* resumed) = 0;
+  // Where the piece that begins next would end if nothing were asked for before, infinite: nowhere. Told before `begin`.
+  virtual void plan(const S&) {}
   // The next piece of it, to `end`: no step goes beyond.
   virtual void begin(const S& t, const State& x, const S& end) = 0;
   // One step; t is the end itself where it is reached. EvaluationError where no step can be taken.
@@ -199,7 +201,9 @@ class ControlledSteps : public Stepper<S> {
   int short_ = 0;  // steps in a row that were as short as times are rounded
 };
 
-// As many equal steps in a piece as make each at most options.step. Method::Needs says how it has accelerations found.
+// Steps of options.step; in a piece that ends by itself, as at a knot or where a controller is sampled, as many equal ones as make each at most that.
+// Where a run ends before, the last one is shorter, so that the steps of a run that goes on are those of one that never ended. Method::Needs says how
+// it has accelerations found.
 template <class S, class Method>
 class FixedSteps : public Stepper<S> {
  public:
@@ -211,20 +215,22 @@ class FixedSteps : public Stepper<S> {
     resumed_ = resumed && !(resumed->size == S(0));  // else steps were to be counted anew
     if (resumed) pace_ = *resumed;
   }
+  void plan(const S& whole) override { whole_ = whole; }
   void begin(const S& t, const State&, const S& end) override {
     using std::abs;
     end_ = end;
     if (!resumed_) {
-      pace_ = {S(options_.step), t, 0};
-      count_ = steps_to(end);
-      // What is no more than the rounding of the times themselves makes no step another one.
-      if (const S off = S(count_) * pace_.size - (end - t); abs(off) > S(4) * epsilon<S>() * std::max(S(abs(end)), S(abs(t)))) pace_.size = (end - t) / S(count_);
-    } else {
-      count_ = steps_to(end);
+      pace_ = {end < t ? -S(options_.step) : S(options_.step), t, 0};
+      if (std::isfinite(to_double(whole_))) {
+        const long count = steps_to(whole_);
+        // What is no more than the rounding of the times themselves makes no step another one.
+        if (const S off = S(count) * pace_.size - (whole_ - t); abs(off) > S(4) * epsilon<S>() * std::max(S(abs(whole_)), S(abs(t)))) pace_.size = (whole_ - t) / S(count);
+      }
     }
+    count_ = steps_to(end);
     resumed_ = false;
     const S over = pace_.origin + S(count_) * pace_.size - end;
-    shortened_ = abs(over) > S(1e-9) * abs(pace_.size);
+    shortened_ = abs(over) > S(4) * epsilon<S>() * std::max(S(abs(end)), S(abs(pace_.origin)));
   }
   void advance(S& t, State& x) override {
     const S from = t;
@@ -256,7 +262,7 @@ class FixedSteps : public Stepper<S> {
   Needs& equations_;
   Method method_;
   IntegratorOptions options_;
-  S end_ = S(0);
+  S end_ = S(0), whole_ = S(HUGE_VAL);
   long count_ = 1;
   bool resumed_ = false, shortened_ = false;
 };
