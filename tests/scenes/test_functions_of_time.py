@@ -63,10 +63,8 @@ def test_a_state_in_the_place_of_hinges(state):
 
 
 def test_what_linear_models_hold():
-    """A sampled controller's force is a constant between samples: of no part in A, though `evaluate` asks the controller anew."""
+    """A sampled controller's force is a constant between samples: of no part in A."""
     arm = pc.chain(1)
     held = pc.Scene(arm).add(E.Sampled(lambda t, state: -5.0 * state.q, 0.1))
     free = pc.Scene(arm)
     assert np.array_equal(held.linearize([0.3], [0.2]).A[:2, :2], free.linearize([0.3], [0.2]).A)
-    slope = (held.evaluate([0.31], [0.2]).vdot - held.evaluate([0.29], [0.2]).vdot) / 0.02
-    assert abs(slope[0]) > 1

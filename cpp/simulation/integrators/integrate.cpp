@@ -116,6 +116,11 @@ class Run {
     watch_.forget();
     whole_ = true, fresh_ = true;
   }
+  // Beyond a stop forces may be far larger than any that chose the last step, and no estimate of an error need see them in one as long.
+  void begin_slowly() {
+    stepper_.start(t_, x_, S(plan_.times.back()), nullptr);
+    stepper_.begin(t_, x_, to_);
+  }
   // What is left is no step any more, but the rounding of the times themselves.
   bool there() const {
     using std::abs;
@@ -170,7 +175,7 @@ class Run {
       if (kind.terminal)
         end_.event = c.event;
       else if (!there())
-        stepper_.begin(t_, x_, to_);
+        begin_slowly();
       return;
     }
     sample_to(t_, x_);
