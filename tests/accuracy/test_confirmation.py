@@ -32,7 +32,7 @@ def test_what_is_not_confirmed_is_said():
         raise pc.EvaluationError("no step could be taken")
 
     for second, words in (
-        (lambda: TIMES + 0.1, "NOT CONFIRMED: another differs by 1.0e-01 rad or m, 1 digits agree"),
+        (lambda: TIMES + 0.03, "NOT CONFIRMED: another differs by 3.0e-02 rad or m, 1 digits agree"),
         (lambda: np.nan * TIMES, "NOT CONFIRMED: another differs by nan rad or m, 0 digits agree"),
         (nothing, "NOT CONFIRMED: another gives no motion .no step could be taken."),
     ):
@@ -48,7 +48,7 @@ def scene():
 
 def test_tables_say_to_how_many_digits_both_methods_agree(scene):
     """Regular motions of a second, in extended precision at 1e-16: twelve digits at least."""
-    one = scene.accuracy(T=0.5, integrators="dopri5", tolerances=1e-6, forms="fast", precisions="double", without=[], seconds=0)
+    one = scene.accuracy(T=0.5, integrators="dopri5", tolerances=1e-6, forms="fast", precisions="double", seconds=0)
     two = pc.work_precision(scene.model, [0.3, 0.2], duration=0.5, integrators="dopri5", tolerances=1e-6, seconds=0)
     for table in (one, two):
         assert table.about["confirmed_digits"] >= 12 and table.reference_error < 1e-12
@@ -70,7 +70,7 @@ def test_a_reference_that_differs_resolves_nothing(scene, monkeypatch):
 
     monkeypatch.setattr(scene_accuracy, "_by", off)
     with pytest.warns(pc.ModelWarning, match="the reference is not confirmed: bulirsch-stoer in extended precision differs by 1.0e-03"):
-        table = scene.accuracy(T=0.5, integrators="dopri5", tolerances=1e-6, forms="fast", precisions="double", without=[], seconds=0)
+        table = scene.accuracy(T=0.5, integrators="dopri5", tolerances=1e-6, forms="fast", precisions="double", seconds=0)
     assert table.reference_error == pytest.approx(1e-3, rel=1e-3) and not any(row["resolved"] for row in table)
     assert table.about["confirmed_digits"] == 0 and "NOT CONFIRMED" in repr(table)
 

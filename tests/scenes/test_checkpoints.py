@@ -13,7 +13,7 @@ import pycraft as pc
 from support.runs import CASES, FIXED
 
 E = pc.effects
-ONE_STEP = ["dopri5", "cash-karp54", "dop853", "rosenbrock4", *FIXED]
+ONE_STEP = ["dopri5", "auto", "cash-karp54", "dop853", "rosenbrock4", *FIXED]
 
 
 def options_of(integrator):

@@ -12,7 +12,7 @@ E = pc.effects
 
 def test_the_table_is_of_all_integrators():
     table = {row["name"]: row for row in _core.integrator_table()}
-    assert list(table) == _core.integrators() and set(table) == {*CONTROLLED, *FIXED}
+    assert list(table) == _core.integrators() and set(table) == {*CONTROLLED, *FIXED, "auto"}
     assert {name for name, row in table.items() if not row["controlled"]} == set(FIXED)
     assert all(table[name]["order"] == order for name, order in FIXED.items())
 
@@ -39,7 +39,7 @@ def test_orders_of_controlled_steps(integrator, order, case):
     """The same with steps that the tolerance leaves alone: all of one size."""
     T = 0.5
     scene, end = CASES[case](), exact(case, T)
-    counts = (2, 4, 8) if order == 8 else (32, 64, 128)
+    counts = (32, 64, 128) if order < 8 else (8, 16, 32) if case == "double pendulum" else (2, 4, 8)
     errors = []
     for n in counts:
         run = scene.simulate(T, integrator=integrator, rtol=1e3, atol=1e3, step=T / n, max_step=T / n, energy=False)
@@ -160,4 +160,4 @@ def test_the_balance_of_energy_is_the_integrators_error(integrator):
     settings = [{"step": h} for h in (0.02, 0.005)] if integrator in FIXED else [{"rtol": r, "atol": r} for r in (1e-5, 1e-8)]
     spread = [np.ptp(scene.simulate(0.5, integrator=integrator, **one).balance) for one in settings]
     better = 4.0 ** FIXED[integrator] if integrator in FIXED else 1000
-    assert spread[1] < spread[0] / (0.3 * better) + 1e-12 and spread[1] < 1e-3, spread
+    assert spread[1] < spread[0] / (0.15 * better) + 1e-12 and spread[1] < 1e-3, spread

@@ -166,7 +166,7 @@ def test_table_and_files(table, monkeypatch, tmp_path):
     assert "Pareto front" in repr(table)
     monkeypatch.setenv("COLUMNS", "80")
     lines = repr(table).split("\n")
-    assert max(map(len, lines)) <= 80 and "* Pareto front" in lines[-1]
+    assert max(map(len, lines)) <= 80 and any("* Pareto front" in line for line in lines[-4:])
     table.to_csv(tmp_path / "loops.csv")
     assert (tmp_path / "loops.csv").read_text().splitlines()[0].split(",") == list(table.columns)
 
