@@ -259,7 +259,7 @@ def test_an_explicit_step_beyond_its_stability(effect):
     with pytest.warns(
         pc.ModelWarning, match=r"energy balance of this run changes by .* steps of 0.05 s are too long for 'semi-implicit-euler'"
     ):
-        scene.simulate(1.0, [0.1], [1.0], integrator="semi-implicit-euler", step=0.05, **QUIET)
+        scene.simulate(0.6, [0.1], [1.0], integrator="semi-implicit-euler", step=0.05, **QUIET)
     with warnings.catch_warnings():
         warnings.simplefilter("error", pc.ModelWarning)
         scene.simulate(0.5, [0.1], [1.0], integrator="semi-implicit-euler", step=1e-6, t_eval=[0.5], **QUIET)
