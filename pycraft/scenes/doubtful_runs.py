@@ -1,4 +1,4 @@
-"""What is said of a run whose numbers are not to be trusted: its energy balance is lost, or its motion is below the tolerances."""
+"""What is said of a run that is doubtful: its steps are held by stability, its energy balance is lost, its motion is below the tolerances."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from .. import _core
 from ..dynamics.integrator_names import takes_one_size
+from ..dynamics.stiff_motion import TAKE, TAKE_DOUBLE, stiffness_text
 from ..models.warning import warn
 from .motion import Motion
 
@@ -76,3 +77,14 @@ def _below_atol(run: Any, rows: Mapping[str, np.ndarray]) -> str:
         f"this motion is smaller than its tolerance: no coordinate is farther than {displaced:.2g} rad or m from zero or moves by more "
         f"than {by:.2g} in a step, and atol = {atol:g} allows that as the error of each step. Take atol = {1e-3 * moved:.0e} or less"
     )
+
+
+def warn_of_stiffness(scene: Any, integrator: str, found: Mapping[str, Any]) -> None:
+    """Warn, once for each scene, that the motion is stiff, of what, and which integrator to take."""
+    if scene._stiffness_said:
+        return
+    scene._stiffness_said = True
+    remedy = TAKE if scene._how[3] == "double" else TAKE_DOUBLE
+    if scene._keeps_loops():
+        remedy = "Take integrator='rosenbrock4' with the loops held by springs (Loop(method='penalty')), or a softer law"
+    warn(stiffness_text(f"the scene of {scene.model.name!r}", integrator, found, remedy))

@@ -14,11 +14,10 @@ from ..dynamics.integrator_names import IntegratorName, integrator_named
 from ..progress_bar import RunProgress
 from ..state import at_state
 from .checkpoint import Checkpoint, coordinates_of
-from .doubtful_runs import warn_of_doubts
+from .doubtful_runs import warn_of_doubts, warn_of_stiffness
 from .events import Event, events_for_core, listed_events
 from .run import Run
 from .runs_on_disk import checked_output
-from .stiff_motion import warn_of_stiffness
 
 
 @dataclass
