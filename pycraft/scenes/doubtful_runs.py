@@ -1,4 +1,4 @@
-"""What is said of a run that is doubtful: its steps are held by stability, its energy balance is lost, its motion is below the tolerances."""
+"""What is said of doubtful runs: steps that stability holds, an energy balance that is lost, a motion below the tolerances."""
 
 from __future__ import annotations
 
