@@ -70,7 +70,9 @@ def check_by_block(text: str, given: OperatorSet | None, *, states: int, seed: i
             found[str(spec)] = (spec, operators, _on_model(read, operators, spec.states(operators._model, 1), precision))
     said = {name: entry for name, entry in found.items() if entry[2].counted}
     if not said:
-        raise _core.EvaluationError(f"{text!r}: no bodies are as it says on {'the random trees' if given is None else 'the model'}")
+        where = "the random trees" if given is None else "the model"
+        chains = "; k+1 and k-1 are bodies of serial chains: write ℘(k) and Σ_{j∈C(k)} for a tree" if read.of_chains else ""
+        raise _core.EvaluationError(f"{text!r}: no bodies are as it says on {where}{chains}")
     whole = Verdict([j for _, _, on in said.values() for j in on.verdict.judgements])
     report = CheckReport.of(text, whole, [*said], read.understood)
     count = sum(on.counted for _, _, on in said.values())
@@ -89,13 +91,16 @@ def _on_model(read: BlockStatement, operators: Any, states: list[Any], precision
     found = _OnModel()
     parents, names = operators._source.parents, _names(operators)
     fixed = {name: body for name, _, body in operators.V.blocks}
+    if read.of_chains and any(p != k - 1 for k, p in enumerate(parents)):
+        return found
     unknown = [x for x in read.indices if len(x) > 2]
     if unknown:
         raise ParseError(f"no body is called {unknown[0]!r}; there are {', '.join(names[:12])}")
     chosen = [
         bodies
         for bodies in choices(read.indices, parents, read.relations, fixed)
-        if all(parents[bodies[x]] >= 0 for x in read.needs_parent if x in bodies)
+        if all(parents[bodies[x]] >= 0 for x in read.beside("parent") if x in bodies)
+        and all(bodies[x] in parents for x in read.beside("child") if x in bodies)
     ]
     if not chosen:
         return found
@@ -124,7 +129,7 @@ def _judged(
     among = list(range(len(chosen)))
     decides = telling(read.text)
     for step, name in enumerate(ladder(precision)):
-        blocks = Blocks(at, operators, name)
+        blocks = Blocks(at, operators, name, read.definitions)
         with mpmath.workdps(_DIGITS):
             if step == 2 and any(apart):  # where it is false, some bodies are enough
                 among = sorted(among, key=lambda i: -apart[i])[:WORST]

@@ -2,8 +2,10 @@
 
 An operator with bodies behind it is one of its blocks: X(i,j) leads from body j to body i, X(k) of a block-diagonal operator is X(k,k),
 x(k) of a vector its entries of body k. As in the book X*(i,j) is the transpose of X(i,j); D⁻¹(k) is D(k)⁻¹. Bodies are small letters from c
-to z, 𝒫(k) or parent(k), or a body's own name. Σ_{j∈C(k)} or Σ_{j∈children(k)} sums the product behind it over the children of k, Σ_j over
-all bodies. Behind a comma or "where" stands which bodies are meant, see `block_relations`.
+to z, ℘(k), 𝒫(k) or parent(k), or a body's own name; on serial chains, numbered from the tip as in the book, k+1 is the parent of k and k-1
+what it carries. Σ_{j∈C(k)} or Σ_{j∈children(k)} sums the product behind it over the children of k, Σ_{j∈path(k)} over k and the bodies
+between it and the base, Σ_{j∈outboard(k)} over k and all that it carries, Σ_j over all bodies; ∏ multiplies numbers so. Behind a comma or
+"where" stands which bodies are meant, see `block_relations`.
 """
 
 from __future__ import annotations
@@ -15,23 +17,28 @@ from functools import lru_cache
 
 from ..formula_nodes import parts
 from .block_relations import Relation, relations
-from .formula import INDEXED, SYMBOLS, Formula, Letter, Node, Power, rebuilt, starred, written
-from .formula_reading import Book
+from .definitions import Definition, parted
+from .formula import INDEXED, Formula, Letter, Node, Power, rebuilt, starred, written
+from .formula_reading import LETTERS, Book
 from .spelling import Spelled, spelled
+from .standard_letters import GUARDED
 from .vocabulary import Misread, ParseError
 
 VARIABLE = r"[c-z]\d?"
-_PARENT = rf"(?:parent|℘|P)\s*\(\s*(?P<of>{VARIABLE})\s*\)"
+_PARENT = rf"(?:(?:parent|℘|P)\s*\(\s*(?P<of>{VARIABLE})\s*\)|(?P<at>{VARIABLE})\s*(?P<next>[+-])\s*1(?!\w))"
+_GROUPS = {"C": "children", "C_force": "children", "child": "children", "path": "path", "outboard": "outboard", "children": "children"}
 _SUFFIX = r"(?:\^\*|\^-1|\^T|'|\*)?"
 
 
 @dataclass(frozen=True)
 class SumOver(Node):
-    """Σ inner over the children of a body, or over all bodies where `of` is empty."""
+    """Σ inner, or ∏ inner, over the children of a body, its path to the base or all outboard of it; over all bodies where `of` is empty."""
 
     index: str
     of: str
     inner: Node
+    among: str = "children"
+    multiplied: bool = False
 
     @property
     def children(self) -> tuple[Node, ...]:
@@ -46,24 +53,38 @@ class BlockStatement:
     formula: Formula
     indices: tuple[str, ...]
     relations: tuple[Relation, ...]
+    definitions: tuple[Definition, ...] = ()
 
     @property
     def understood(self) -> str:
         """How it was read."""
-        meant = ", ".join(map(str, self.relations))
+        meant = ", ".join([*map(str, self.relations), *(d.typed for d in self.definitions)])
         return " = ".join(map(shown, self.formula)) + (f", {meant}" if meant else "")
 
-    @property
-    def needs_parent(self) -> set[str]:
-        """The letters of bodies that must hang on another."""
+    def beside(self, what: str) -> set[str]:
+        """The letters of bodies of which the parent, or the child, is spoken of: bodies that have one."""
         found = {a for side in self.formula for node in parts(side) if isinstance(node, Letter) for a in node.arguments}
-        return {a[len("parent(") : -1] for a in found if a.startswith("parent(")}
+        return {a[len(what) + 1 : -1] for a in found if a.startswith(f"{what}(")}
+
+    @property
+    def of_chains(self) -> bool:
+        """Whether bodies are numbered along a serial chain: k+1 or k-1 stand in it."""
+        return bool(re.search(rf"(?<![\w)]){VARIABLE}\s*[+-]\s*1(?!\w)", spelled(self.text).text)) and bool(
+            self.beside("child") | self.beside("parent")
+        )
 
 
 def is_by_block(text: str, bodies: Iterable[str] = (), own: Iterable[str] = ()) -> bool:
-    """Whether blocks of bodies stand in a text; `own` are letters that stand for something else."""
-    found = _block(tuple(bodies)).finditer(spelled(_divided(text)[0]).text)
+    """Whether blocks of bodies stand in a text; `own` are letters that are defined for it, and bodies are none of them."""
+    found = _block(tuple(bodies), frozenset(own)).finditer(spelled(_divided(text)[0]).text)
     return any(m["name"] and not {a.strip() for a in m["arguments"].split(",")} & {*own} for m in found)
+
+
+def says_by_block(text: str, bodies: Iterable[str] = ()) -> bool:
+    """`is_by_block`, of a statement with the definitions around it."""
+    named = [*bodies]
+    definitions, claim = parted(text, lambda said, own: is_by_block(said, named, own))
+    return is_by_block(claim, named, [d.name for d in definitions])
 
 
 def refuse_by_block(text: str, own: Iterable[str] = ()) -> None:
@@ -83,7 +104,9 @@ def read_by_block(text: str, bodies: Iterable[str] = ()) -> BlockStatement:
     ParseError
         It does not read as one; the place is shown.
     """
-    said, meant = _divided(text)
+    definitions, claim = parted(text, lambda said, own: is_by_block(said, bodies, own))
+    own = frozenset(d.name for d in definitions)
+    said, meant = _divided(claim)
     source = spelled(said)
     try:
         if re.search(r"\.T|@", source.text) and re.search(r"\)\s*\*\s*\w", source.text):
@@ -92,13 +115,15 @@ def read_by_block(text: str, bodies: Iterable[str] = ()) -> BlockStatement:
         if len(sides) != 1:
             raise ParseError(f"{'one side' if not sides else 'more than two sides'}; a statement is lhs = rhs")
         (at, behind) = sides[0]
-        left = _BlockBook(source.text[:at], 0, tuple(bodies)).whole()
-        right = _BlockBook(source.text[behind:], behind, tuple(bodies)).whole()
+        left = _BlockBook(source.text[:at], 0, tuple(bodies), own).whole()
+        right = _BlockBook(source.text[behind:], behind, tuple(bodies), own).whole()
         free = _free((left, right), {*bodies})
-        return BlockStatement(text, (left, right), free, tuple(relations(meant, free, len(said))))
+        return BlockStatement(claim, (left, right), free, tuple(relations(meant, free, len(said))), tuple(definitions))
     except Misread as error:
         place = (
-            Spelled(text, text, list(range(len(text) + 1))).place(error.at) if error.at >= len(said) and meant else source.place(error.at)
+            Spelled(claim, claim, list(range(len(claim) + 1))).place(error.at)
+            if error.at >= len(said) and meant
+            else source.place(error.at)
         )
         lines = "".join(f"\n    {line}" for line in place.split("\n"))
         raise ParseError(f"{text!r} does not read as a statement by block.\n  {error.message}{lines}") from None
@@ -109,7 +134,8 @@ def read_by_block(text: str, bodies: Iterable[str] = ()) -> BlockStatement:
 def shown(node: Node) -> str:
     """A side as the book prints it."""
     if isinstance(node, SumOver):
-        return f"Σ_{{{node.index}{f' ∈ children({node.of})' if node.of else ''}}} {shown(node.inner)}"
+        sign = "∏" if node.multiplied else "Σ"
+        return f"{sign}_{{{node.index}{f' ∈ {node.among}({node.of})' if node.of else ''}}} {shown(node.inner)}"
     stands = {
         child: Letter(f"\0{i}") for i, child in enumerate(dict.fromkeys(node.children)) if any(isinstance(p, SumOver) for p in parts(child))
     }
@@ -125,20 +151,23 @@ def _divided(text: str) -> tuple[str, str]:
     """The statement, and what is said behind its first comma outside of brackets, or behind "where"."""
     depth = 0
     for i, c in enumerate(text):
+        if i and text[i - 1] == "\\" and c in ",;:{}":
+            continue
         depth += (c in "([{") - (c in ")]}")
         if depth == 0 and (c in ",;" or re.match(r"\b(where|for|if|with)\b", text[i:]) and (i == 0 or not text[i - 1].isalnum())):
             return text[:i], text[i:]
     return text, ""
 
 
-@lru_cache(maxsize=8)
-def _block(bodies: tuple[str, ...]) -> re.Pattern[str]:
+@lru_cache(maxsize=32)
+def _block(bodies: tuple[str, ...], defined: frozenset[str] = frozenset()) -> re.Pattern[str]:
     """A letter with bodies, an optional suffix between; functions and the letters that take other arguments are passed over."""
     from .vocabulary import FUNCTIONS
 
     own = (rf"'?\"?{re.escape(name)}'?\"?(?!\w)" for name in sorted(bodies, key=len, reverse=True))
-    body = "|".join([_PARENT.replace("?P<of>", "?:"), rf"{VARIABLE}(?!\w)", *own])
-    names = "|".join(re.escape(n) for n in sorted({*SYMBOLS} - {*INDEXED, "I", "N"} | {"X", "V"}, key=lambda n: (-len(n), n)))
+    body = "|".join([re.sub(r"\?P<\w+>", "?:", _PARENT), rf"{VARIABLE}(?!\w)", *own])
+    letters = (LETTERS | defined) - {"I", "N"}
+    names = "|".join((r"(?<![A-Za-z])" if n in GUARDED else "") + re.escape(n) for n in sorted(letters, key=lambda n: (-len(n), n)))
     passed = "|".join(re.escape(n) for n in (*FUNCTIONS, *INDEXED))
     return re.compile(
         rf"(?:(?:{passed})\s*(?=\())|(?P<name>{names})\s*(?P<suffix>{_SUFFIX})\s*\(\s*(?P<arguments>(?:{body})(?:\s*,\s*(?:{body}))*)\s*\)"
@@ -146,26 +175,27 @@ def _block(bodies: tuple[str, ...]) -> re.Pattern[str]:
 
 
 _SUM = re.compile(
-    rf"\s*(?:Σ|∑|\\sum|sum(?=_))\s*_?\s*(?P<open>[{{(])?\s*(?:\\?forall|∀)?\s*(?P<index>{VARIABLE})"
-    rf"(?:\s*(?:∈|\\in|\bin\b)\s*(?:C|children|child)\s*\(\s*(?P<of>{VARIABLE})\s*\))?\s*(?(open)[}})])"
+    rf"\s*(?P<sign>Σ|∑|sum(?=_)|∏|Π|prod(?=_))\s*_?\s*(?P<open>[{{(])?\s*(?:\\?forall|∀)?\s*(?P<index>{VARIABLE})"
+    rf"(?:\s*(?:∈|\\in|\bin\b)\s*(?P<among>C(?:_force)?|children|child|path|outboard)\s*\(\s*(?P<of>{VARIABLE})\s*\))?\s*(?(open)[}})])"
 )
 
 
 class _BlockBook(Book):
     """The book's reading, with blocks of bodies and sums over bodies among its factors."""
 
-    def __init__(self, source: str, begin: int, bodies: tuple[str, ...]):
+    def __init__(self, source: str, begin: int, bodies: tuple[str, ...], own: frozenset[str] = frozenset()):
         self._bodies, self._begin = bodies, begin
-        super().__init__(source)
+        super().__init__(source, own)
 
     def _token(self, source: str, at: int) -> tuple[str, str, int] | None:
         space = len(source[at:]) - len(source[at:].lstrip())
-        block = _block(self._bodies).match(source, at + space)
+        block = _block(self._bodies, self._own).match(source, at + space)
         if block is not None and block["name"]:
             return "block", f"{block['name']};{block['suffix']};{block['arguments']}", block.end()
         summed = _SUM.match(source, at)
         if summed is not None:
-            return "over", f"{summed['index']};{summed['of'] or ''}", summed.end()
+            among = _GROUPS[summed["among"] or "children"]
+            return "over", f"{summed['index']};{summed['of'] or ''};{among};{summed['sign'][0] in '∏Πp'}", summed.end()
         return super()._token(source, at)
 
     def _stumbled(self, message: str, at: int) -> ParseError:
@@ -178,12 +208,13 @@ class _BlockBook(Book):
         kind, text = self._next()
         if kind == "over":
             self._take()
-            index, of = text.split(";")
-            return SumOver(index, of, self._product())
+            index, of, among, multiplied = text.split(";")
+            return SumOver(index, of, self._product(), among, multiplied == "True")
         if kind == "block":
             self._take()
             name, suffix, arguments = text.split(";")
-            named = Letter({"X": "X_world", "V": "velocity"}.get(name, name), tuple(map(_bare, arguments.split(","))))
+            name = name if name in self._own else {"X": "X_world", "V": "velocity"}.get(name, name)
+            named = Letter(name, tuple(map(_bare, arguments.split(","))))
             if suffix == "^-1" and len(named.arguments) > 1:
                 raise self._stumbled(f"of the inverse of a block or a block of the inverse? write inv({name}({arguments}))", self._at)
             return starred(named) if suffix and suffix != "^-1" else Power(named, -1) if suffix else named
@@ -193,7 +224,9 @@ class _BlockBook(Book):
 def _bare(argument: str) -> str:
     argument = argument.strip().strip("'\"")
     found = re.fullmatch(_PARENT, argument)
-    return f"parent({found['of']})" if found else argument
+    if found is None:
+        return argument
+    return f"parent({found['of']})" if found["of"] else f"{'parent' if found['next'] == '+' else 'child'}({found['at']})"
 
 
 def _free(sides: Iterable[Node], bodies: set[str]) -> tuple[str, ...]:
@@ -206,7 +239,7 @@ def _free(sides: Iterable[Node], bodies: set[str]) -> tuple[str, ...]:
             bound = bound | {node.index}
         if isinstance(node, Letter):
             for a in node.arguments:
-                letter = a[len("parent(") : -1] if a.startswith("parent(") else a
+                letter = re.sub(r"^(?:parent|child)\((.*)\)$", r"\1", a)
                 if letter not in bound and letter not in bodies and node.name not in INDEXED:
                     yield letter
         for child in node.children:

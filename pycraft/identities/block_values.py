@@ -6,7 +6,8 @@ of it, to first order, and the rounding of the few operations on blocks themselv
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,8 +16,11 @@ import numpy as np
 
 from .. import _core
 from .block_reading import SumOver, shown
+from .block_relations import ancestors
+from .definitions import Definition, drawn
 from .formula import Call, Letter, Node, Number, Power, Product, Star, Sum
 from .judge import BoundState
+from .parse import Statements
 from .residual_bounds import EPSILON, Roundings
 from .vocabulary import ParseError
 
@@ -47,8 +51,11 @@ ANY: Place = ("any", "")
 class Blocks:
     """The blocks of a model's letters at one state, in one precision."""
 
-    def __init__(self, at: BoundState, operators: Any, precision: str | int):
-        self._at, self._operators, self.precision = at, operators, precision
+    def __init__(self, at: BoundState, operators: Any, precision: str | int, definitions: Sequence[Definition] = ()):
+        self._at, self._operators, self.precision, self._definitions = at, operators, precision, definitions
+        vector = drawn()
+        vdot = vector("vdot", operators.Theta)
+        self._statements = Statements(operators, {"vdot": vdot}, vector=vector, derive=lambda x, _, soa: x.dot(vdot=vdot))
         self._matrices: dict[str, tuple[Any, Any, float]] = {}
         self.parents: Sequence[int] = operators._source.parents
         self.epsilon = EPSILON[precision]
@@ -72,10 +79,10 @@ class Blocks:
         return self._matrices[name]
 
     def _operator(self, name: str) -> Any:
-        if name == "MM":
-            H, phi, M = self._operators("H phi M")
-            return H @ phi @ M @ phi.T @ H.T
-        return getattr(self._operators, name)
+        made = self._statements.letter(name, self._definitions)
+        if not isinstance(made, _core.Operator) or made.domain is None:
+            raise ParseError(f"{name} is no operator between two spaces: it has no blocks")
+        return made
 
     def of(self, letter: Letter, bodies: dict[str, int]) -> Block:
         """The block of a letter; raises ParseError where it has none."""
@@ -102,6 +109,8 @@ class Blocks:
     def _body(self, argument: str, bodies: dict[str, int]) -> int:
         if argument.startswith("parent("):
             return self.parents[bodies[argument[len("parent(") : -1]]]
+        if argument.startswith("child("):
+            return list(self.parents).index(bodies[argument[len("child(") : -1]])
         return bodies[argument]
 
 
@@ -110,6 +119,23 @@ def _part(space: Any, body: int, letter: Letter) -> slice:
     if found is None:
         raise ParseError(f"{shown(letter)}: {space.name} is not cut into bodies")
     return found
+
+
+_AMONG: dict[str, Callable[[Sequence[int], int], list[int]]] = {
+    "children": lambda parents, of: [k for k, p in enumerate(parents) if p == of],
+    "path": lambda parents, of: ancestors(parents, of),
+    "outboard": lambda parents, of: [k for k in range(len(parents)) if of in ancestors(parents, k)],
+}
+
+
+def _multiplied(values: list[Block], node: Node, eps: float) -> Block:
+    """The product of numbers."""
+    if any(v.domain is not None for v in values):
+        raise _core.SpaceError(f"{shown(node)}: ∏ multiplies numbers, such as det D(k)")
+    whole = Block(np.asarray(1.0), None, None, 0.0)
+    for v in values:
+        whole = _times(whole, v, (node, node), eps)
+    return whole
 
 
 _DUAL = {"V": "F", "F": "V"}
@@ -135,9 +161,11 @@ def value(node: Node, blocks: Blocks, bodies: dict[str, int]) -> Block:
         case Star(inner=inner):
             x = value(inner, blocks, bodies)
             return x if x.domain is None else Block(x.array.T, _dual(x.domain), _dual(x.codomain), x.error)
-        case SumOver(index=index, of=of, inner=inner):
-            over = [k for k, p in enumerate(blocks.parents) if not of or p == bodies[of]]
+        case SumOver(index=index, of=of, inner=inner, among=among, multiplied=multiplied):
+            over = _AMONG[among](blocks.parents, bodies[of]) if of else range(len(blocks.parents))
             values = [value(inner, blocks, {**bodies, index: k}) for k in over]
+            if multiplied:
+                return _multiplied(values, node, eps)
             if not values:
                 return Block(np.zeros((1, 1)), ANY, ANY)
             array, error = values[0].array, sum(v.error for v in values)
@@ -153,7 +181,7 @@ def value(node: Node, blocks: Blocks, bodies: dict[str, int]) -> Block:
             return _sum([value(term, blocks, bodies) for term in terms], signs, node, eps)
         case Power(inner=inner, exponent=-1):
             return _inverse(value(inner, blocks, bodies), inner, eps)
-        case Call(function=("trace" | "logdet") as function, inner=inner):
+        case Call(function=("trace" | "logdet" | "det") as function, inner=inner):
             return _number(function, value(inner, blocks, bodies), inner, eps)
     raise ParseError(f"{shown(node)}: of blocks there are products, sums, transposes, inverses, traces and ln det")
 
@@ -198,22 +226,34 @@ def _sum(values: list[Block], signs: Sequence[int], node: Node, eps: float) -> B
     return Block(total, first.codomain, first.domain, sum(v.error for v in values) + eps * sum(map(_norm, arrays)))
 
 
-def _eliminated(a: Any) -> tuple[Any, Any]:
-    """(the inverse of a block, its pivots), by elimination with partial pivoting, in the block's own numbers."""
+def _eliminated(a: Any) -> Any:
+    """The inverse of a block, by elimination with partial pivoting, in the block's own numbers."""
     n = len(a)
     work = np.concatenate([a, np.eye(n).astype(a.dtype) if a.dtype != object else np.eye(n).astype(int).astype(object)], axis=1)
-    pivots = []
     for k in range(n):
         row = k + int(np.argmax([abs(x) for x in work[k:, k]]))
         if not work[row, k]:
             raise _core.SingularOperatorError("a block without an inverse")
         work[[k, row]] = work[[row, k]]
-        pivots.append(work[k, k])
         work[k] = work[k] / work[k, k]
         for i in range(n):
             if i != k:
                 work[i] = work[i] - work[i, k] * work[k]
-    return work[:, n:], pivots
+    return work[:, n:]
+
+
+def _pivots(a: Any) -> list[Any]:
+    """Of elimination with partial pivoting, in the block's own numbers; their product is the determinant."""
+    work, pivots = a.copy(), []
+    for k in range(len(work)):
+        row = k + int(np.argmax([abs(x) for x in work[k:, k]]))
+        if not work[row, k]:
+            raise _core.SingularOperatorError("a block without an inverse")
+        if row != k:
+            work[[k, row]] = work[[row, k]]
+        pivots.append(work[k, k] if row == k else -work[k, k])
+        work[k + 1 :, k:] -= np.outer(work[k + 1 :, k] / work[k, k], work[k, k:])
+    return pivots
 
 
 def _inverse(x: Block, inner: Node, eps: float) -> Block:
@@ -221,7 +261,7 @@ def _inverse(x: Block, inner: Node, eps: float) -> Block:
         raise _core.SpaceError(f"{shown(inner)} has no inverse: it leads from {place_text(x.domain)} to {place_text(x.codomain)}")
     if x.codomain == ANY:
         return Block(1 / x.array, ANY, ANY)
-    made = _eliminated(x.array)[0]
+    made = _eliminated(x.array)
     size = _norm(made)
     return Block(made, x.domain, x.codomain, size**2 * (x.error + eps * len(made) * x.norm))
 
@@ -232,7 +272,11 @@ def _number(function: str, x: Block, inner: Node, eps: float) -> Block:
     n = len(x.array)
     if function == "trace":
         return Block(np.asarray(sum(x.array[k, k] for k in range(n))), None, None, float(np.sqrt(n)) * (x.error + eps * x.norm))
-    inverse, pivots = _eliminated(x.array)
+    pivots = _pivots(x.array)
+    inverse = np.linalg.inv(np.asarray(x.array, float))  # of which the bound takes the size alone
+    if function == "det":
+        size = np.asarray(math.prod(pivots[1:], start=pivots[0]) if n else 1.0)
+        return Block(size, None, None, abs(float(size)) * _norm(inverse) * (x.error + eps * n * x.norm))
     log = mpmath.log if x.array.dtype == object else np.log
     total = np.asarray(sum((log(abs(p)) for p in pivots), start=0 * x.array.flat[0] if n else 0.0))
     return Block(total, None, None, _norm(inverse) * (x.error + eps * n * x.norm) + eps * abs(float(total)))

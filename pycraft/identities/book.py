@@ -13,7 +13,8 @@ from typing import Any
 from lark import Lark, Token, Transformer, Tree, exceptions
 
 from .. import _core
-from .vocabulary import FUNCTIONS, SCALARS, WITH_ARGUMENTS, Misread, ParseError, Vocabulary, decimal, is_operator, needs_arguments, power
+from .standard_letters import GUARDED
+from .vocabulary import FUNCTIONS, SCALARS, WITH_ARGUMENTS, Misread, ParseError, Vocabulary, decimal, is_operator, power
 
 _BOOK = r"""
 start: side (("==" | "=") side)?
@@ -100,8 +101,6 @@ def _stumble(source: str, at: int, vocabulary: Vocabulary) -> Misread:
             else f"not understood at {rest[:12]!r}",
             at,
         )
-    if name in WITH_ARGUMENTS:
-        return Misread(needs_arguments(name), at)
     if name and name not in vocabulary.names:
         return Misread(vocabulary.unknown(name), at)
     return Misread(f"not understood at {rest[:12]!r}", at)
@@ -113,14 +112,14 @@ def _tree(source: str, names: tuple[str, ...]) -> Tree:
     return _parser(names).parse(source)
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=32)
 def _parser(names: tuple[str, ...]) -> Lark:
     longest_first = sorted(names, key=lambda n: (-len(n), n))
     grammar = _BOOK % {
         "functions": "|".join(sorted(FUNCTIONS, key=len, reverse=True)),
         "scalars": "|".join(sorted(SCALARS, key=len, reverse=True)),
         "indexed": "|".join(WITH_ARGUMENTS),
-        "names": "(" + "|".join(re.escape(n) for n in longest_first) + ")",
+        "names": "(" + "|".join((r"(?<![A-Za-z])" if n in GUARDED else "") + re.escape(n) for n in longest_first) + ")",
     }
     return Lark(grammar, parser="earley", lexer="dynamic")
 

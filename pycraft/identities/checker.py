@@ -11,8 +11,9 @@ import numpy as np
 from .. import _core
 from ..arguments import whole
 from ..operators.operator_set import OperatorSet
+from ..progress_bar import StepProgress
 from .block_check import check_by_block
-from .block_reading import is_by_block
+from .block_reading import says_by_block
 from .drawn_vectors import drawn_vectors
 from .judge import FAILS, BoundState, Verdict, judge_states, ladder
 from .parse import Statement, Statements, check_has_space
@@ -21,7 +22,7 @@ from .statement_text import statement_text, telling_of
 from .vocabulary import is_operator
 
 
-def check_model(operators: Any, *, states: int = 3, seed: int = 0, precision: str | int = "extended", progress: Any = None) -> Report:
+def check_model(operators: Any, *, states: int = 3, seed: int = 0, precision: str | int = "extended", progress: Any = True) -> Report:
     """Check every theorem on the model of `operators`, at the present state and at `states` random ones.
 
     A theorem holds if its residual falls with epsilon and is below a derived bound that decides (see `judge`): in a scalar wider than
@@ -32,7 +33,8 @@ def check_model(operators: Any, *, states: int = 3, seed: int = 0, precision: st
     ----------
     states : random states, drawn from `seed`
     precision : the first scalar beside double, "extended", "quad", 50 or 100 digits
-    progress : called with each theorem's name, if given
+    progress : True: a bar in a terminal or notebook if it takes more than a second; False: none; a function: called with each theorem's
+        name
     """
     check_wider(precision)
     _check_seed(seed)
@@ -47,10 +49,11 @@ def check_model(operators: Any, *, states: int = 3, seed: int = 0, precision: st
         BoundState(operators, s)
         for s in ([None] if model is None else [_present(model), *(operators.random_state(rng) for _ in range(states))])
     ]
-    for theorem in operators.theorems():
-        if progress is not None:
-            progress(theorem.name)
-        report.findings.append(check_theorem(theorem, theorem.unmet(source), drawn, rng, precision))
+    theorems = operators.theorems()
+    with StepProgress(len(theorems), "theorems", progress) as bar:
+        for theorem in theorems:
+            bar(theorem.name)
+            report.findings.append(check_theorem(theorem, theorem.unmet(source), drawn, rng, precision))
     report.seconds = time.perf_counter() - begin
     return report
 
@@ -134,7 +137,9 @@ def check(
     statement : str, or a pair (lhs, rhs) of expressions
         As text in Python's spelling, the book's (Unicode or ASCII) or LaTeX: ``"HψMψ*H* == D"``, ``"inv(psi) == inv(phi) + K*H"``. `MM`
         is the mass matrix HφMφ*H*, `N` the number of coordinates. Operators with bodies behind them make a statement by block,
-        ``"Ω(i,j) = Υ(i)ψ(i,j), i above j"``: it is checked for every choice of bodies of which its relations hold.
+        ``"Ω(i,j) = Υ(i)ψ(i,j), i above j"``: it is checked for every choice of bodies of which its relations hold. Letters of one's own
+        stand before it, ``"A := I + HφK; MM + J = A D A*"``, and vectors, ``"x ∈ Θ; ..."``; those of the equations of motion
+        (T, θ̈, 𝒞, α, f, z, ε, ν, ...) are known.
     model : Multibody, OperatorSet or None
         None: random trees that between them meet and break every standard hypothesis, deep and wide ones among them, moving and in
         gravity (text only; see `pycraft.truth` for where it is true and where not).
@@ -180,7 +185,7 @@ def check(
     operators: Any = None if model is None else getattr(model, "soa", model)
     if model is not None and not isinstance(operators, OperatorSet):
         raise _core.EvaluationError(f"a statement is checked on a model or its operators (model.soa), not on {model!r:.80}")
-    if isinstance(statement, str) and is_by_block(statement, [] if operators is None else [name for name, *_ in operators.V.blocks]):
+    if isinstance(statement, str) and says_by_block(statement, [] if operators is None else [name for name, *_ in operators.V.blocks]):
         return check_by_block(statement, operators, states=states, seed=seed, precision=precision)
     if model is None:
         if not isinstance(statement, str):

@@ -11,9 +11,11 @@ from fractions import Fraction
 
 from .. import _core
 from ..formula_nodes import Node, Product, Suffixed, flat
+from .standard_letters import STANDARD
 
 SYMBOLS = {s.name: s.text for s in _core.symbols} | {"MM": "ℳ", "I": "I", "N": "N"}
-FUNCTIONS = ("inv", "blockdiag", "sqrt", "trace", "tr", "logdet", "norm")
+_SHOWN = {name: known.text for name, known in STANDARD.items()} | SYMBOLS | {"vdot": "θ̈"}
+FUNCTIONS = ("inv", "blockdiag", "sqrt", "trace", "tr", "logdet", "det", "norm")
 INDEXED = tuple(s.name for s in _core.symbols if s.takes != "nothing")
 
 
@@ -115,7 +117,7 @@ def written(node: Node, shown: bool = False) -> str:
     """As text that reads in one way only; `shown`: as the book prints it."""
     match node:
         case Letter(name=name, arguments=arguments):
-            return (SYMBOLS.get(name, name) if shown else name) + (f"({', '.join(arguments)})" if arguments else "")
+            return (_SHOWN.get(name, name) if shown else name) + (f"({', '.join(arguments)})" if arguments else "")
         case Number(value=value):
             return _number(value)
         case Star(inner=inner):

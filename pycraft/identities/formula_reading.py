@@ -4,58 +4,68 @@ from __future__ import annotations
 
 import ast
 import re
+from collections.abc import Iterable
 from functools import lru_cache
 
+from .determinant_equations import as_logarithms
 from .formula import FUNCTIONS, INDEXED, SYMBOLS, Call, Formula, Letter, Node, Number, Power, Star, inverted, product, starred, total
 from .spelling import spelled
+from .standard_letters import GUARDED, STANDARD
 from .vocabulary import ParseError, decimal
 
+_PLAIN = (set(SYMBOLS) - set(INDEXED)) | {"X", "V", "vdot", *STANDARD}
+LETTERS = frozenset(_PLAIN | {f"{name}_dot" for name in _PLAIN - {"I", "N"} if not name.endswith("dot")})
+"""Letters that formulas have without definitions."""
 
-def read_formula(text: str) -> Formula:
-    """Both sides of a statement. Python's reading where the text has `@`, `.T` or a call of `inv`, else the book's.
+
+def read_formula(text: str, own: Iterable[str] = ()) -> Formula:
+    """Both sides of a statement, `own` the names of letters that were defined for it.
+
+    Python's reading where the text has `@`, `.T` or a call of `inv`, else the book's.
 
     Raises ParseError where it is no statement.
     """
-    source = spelled(text).text
+    source = as_logarithms(spelled(text).text)
     is_python = re.search(r"@|\.T\b|\.inv\(|\binv\(", source) and "^" not in source
     sides = re.split(r"==?", source)
     if len(sides) != 2:
         raise ParseError(f"{text!r} has {'one side' if len(sides) == 1 else 'more than two sides'}; a statement is lhs == rhs")
-    left, right = (_python(side) if is_python else Book(side).whole() for side in sides)
+    defined = frozenset(own)
+    left, right = (_python(side, LETTERS | defined) if is_python else Book(side, defined).whole() for side in sides)
     return left, right
 
 
-def _python(source: str) -> Node:
+def _python(source: str, names: frozenset[str]) -> Node:
     try:
-        return _from_ast(ast.parse(source.strip(), mode="eval").body)
+        return _from_ast(ast.parse(source.strip(), mode="eval").body, names)
     except SyntaxError as error:
         raise ParseError(f"not understood: {source.strip()!r}") from error
 
 
-def _from_ast(node: ast.AST) -> Node:
+def _from_ast(node: ast.AST, names: frozenset[str]) -> Node:
     match node:
         case ast.Constant(value=int() | float() as value):
             return Number(decimal(str(value)))
-        case ast.Name(id=name) if name in SYMBOLS:
+        case ast.Name(id=name) if name in names:
             return Letter(name)
         case ast.UnaryOp(op=ast.USub(), operand=inner):
-            return total([(-1, _from_ast(inner))])
+            return total([(-1, _from_ast(inner, names))])
         case ast.BinOp(left=left, op=ast.Add(), right=right):
-            return total([(1, _from_ast(left)), (1, _from_ast(right))])
+            return total([(1, _from_ast(left, names)), (1, _from_ast(right, names))])
         case ast.BinOp(left=left, op=ast.Sub(), right=right):
-            return total([(1, _from_ast(left)), (-1, _from_ast(right))])
+            return total([(1, _from_ast(left, names)), (-1, _from_ast(right, names))])
         case ast.BinOp(left=left, op=ast.Mult() | ast.MatMult(), right=right):
-            return product(_from_ast(left), _from_ast(right))
+            return product(_from_ast(left, names), _from_ast(right, names))
         case ast.BinOp(left=left, op=ast.Div(), right=ast.Constant(value=int() | float() as value)):
-            return product(Number(1 / decimal(str(value))), _from_ast(left))
+            return product(Number(1 / decimal(str(value))), _from_ast(left, names))
         case ast.BinOp(left=left, op=ast.Pow(), right=right):
-            return Power(_from_ast(left), int(ast.literal_eval(right)))
+            return Power(_from_ast(left, names), int(ast.literal_eval(right)))
         case ast.Attribute(value=inner, attr="T"):
-            return Star(_from_ast(inner))
+            return Star(_from_ast(inner, names))
         case ast.Call(func=ast.Attribute(value=inner, attr=method), args=[]) if method in FUNCTIONS:
-            return _call(method, _from_ast(inner))
+            return _call(method, _from_ast(inner, names))
         case ast.Call(func=ast.Name(id=name), args=[inner]) if name in FUNCTIONS:
-            return _call(name, _from_ast(inner))
+            return _call(name, _from_ast(inner, names))
         case ast.Call(func=ast.Name(id=name), args=arguments) if name in INDEXED:
             return Letter(name, tuple(ast.unparse(a) for a in arguments))
     raise ParseError(f"{ast.unparse(node)!r} is no operator expression")
@@ -65,9 +75,9 @@ def _call(function: str, inner: Node) -> Node:
     return Power(inner, -1) if function == "inv" else Call({"tr": "trace"}.get(function, function), inner)
 
 
-@lru_cache(maxsize=1)
-def _tokens() -> re.Pattern[str]:
-    names = "|".join(re.escape(n) for n in sorted((set(SYMBOLS) - set(INDEXED)) | {"X", "V"}, key=lambda n: (-len(n), n)))
+@lru_cache(maxsize=32)
+def _tokens(letters: frozenset[str]) -> re.Pattern[str]:
+    names = "|".join((r"(?<![A-Za-z])" if n in GUARDED else "") + re.escape(n) for n in sorted(letters, key=lambda n: (-len(n), n)))
     functions = "|".join(FUNCTIONS)
     return re.compile(
         rf"\s*(?:(?P<number>\d+\.?\d*(?:[eE][+-]?\d+)?)|(?P<function>(?:{functions})\b|√)|(?P<indexed>(?:{'|'.join(INDEXED)})\s*\([^()]*\))"
@@ -79,7 +89,8 @@ def _tokens() -> re.Pattern[str]:
 class Book:
     """The book's reading: juxtaposition multiplies, a postfix star transposes."""
 
-    def __init__(self, source: str):
+    def __init__(self, source: str, own: frozenset[str] = frozenset()):
+        self._own, self._names = own, LETTERS | own
         self._tokens: list[tuple[str, str]] = []
         self._places: list[int] = []
         self._end = len(source)
@@ -94,7 +105,7 @@ class Book:
 
     def _token(self, source: str, at: int) -> tuple[str, str, int] | None:
         """(kind, text, where it ends) of what stands at a place."""
-        found = _tokens().match(source, at)
+        found = _tokens(self._names).match(source, at)
         return None if found is None else (str(found.lastgroup), found[str(found.lastgroup)], found.end())
 
     def _stumbled(self, message: str, at: int) -> ParseError:
@@ -168,7 +179,7 @@ class Book:
         if kind == "number":
             return Number(decimal(text))
         if kind == "name":
-            return Letter({"X": "X_world", "V": "velocity"}.get(text, text))
+            return Letter(text if text in self._own else {"X": "X_world", "V": "velocity"}.get(text, text))
         if kind == "indexed":
             name, _, arguments = text.partition("(")
             return Letter(name.strip(), tuple(a.strip().strip("'\"") for a in arguments[:-1].split(",")))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from .definitions import Definition, drawn
 from .formula import INDEXED, SYMBOLS, Call, Formula, Letter, Node, Number, Power, Product, Star, Sum
+from .parse import Statements
 
 
 class Misfit(Exception):
@@ -27,10 +29,13 @@ class Value:
 
 
 class DenseLetters(Mapping[str, Value]):
-    """The letters of a model at its state, as dense arrays; the duals of their spaces."""
+    """The letters of a model at its state, as dense arrays, and those that are defined by others; the duals of their spaces."""
 
-    def __init__(self, model: Any):
-        self._operators = model.soa
+    def __init__(self, model: Any, definitions: Sequence[Definition] = ()):
+        self._operators, self._definitions = model.soa, definitions
+        vector = drawn()
+        vdot = vector("vdot", model.soa.Theta)
+        self._statements = Statements(model.soa, {"vdot": vdot}, vector=vector, derive=lambda x, _, soa: x.dot(vdot=vdot))
         self._values: dict[Any, Value] = {}
         self.dual: dict[str | None, str | None] = {None: None, "any": "any"}
         self._plain = [name for name in SYMBOLS if name not in (*INDEXED, "MM", "I", "N")]
@@ -40,6 +45,8 @@ class DenseLetters(Mapping[str, Value]):
         self._values["N"] = Value(np.array(float(model.nv)), None, None)
         for name in self._plain:
             self._store(name, getattr(model.soa, name))
+        for made in definitions:
+            self._values.pop(made.name, None)
 
     def _store(self, key: Any, operator: _core.Operator) -> None:
         self._values[key] = Value(np.asarray(operator.dense(), float), operator.codomain.name, operator.domain.name)
@@ -60,6 +67,14 @@ class DenseLetters(Mapping[str, Value]):
         return self._values[key]
 
     def __getitem__(self, name: str) -> Value:
+        if name not in self._values:
+            try:
+                made = self._statements.letter(name, self._definitions)
+                if not isinstance(made, _core.Operator) or made.domain is None:
+                    raise Misfit
+                self._store(name, made)
+            except (_core.Error, ArithmeticError, TypeError, ValueError) as error:
+                raise Misfit from error
         return self._values[name]
 
     def __iter__(self) -> Iterator[str]:

@@ -3,30 +3,36 @@ r"""The displayed equations of a LaTeX paper, each with its verdict: `pycraft ch
 Displays are ``\[ \]``, ``$$ $$`` and the environments of equation, align, gather, multline, eqnarray and their like. Rows are joined where
 one begins with a sign and chained where one begins with an equals sign: A = B = C is A = B and B = C. Macros that the paper defines are
 expanded, arguments such as ``(\theta, \dot\theta)`` behind an operator are left out. What is true under a standard hypothesis alone
-(J = 0, say) is told apart from what is false: papers say their hypotheses in words. An equation that does not read as a statement of
-operators is listed with the reason, never left out; one of operators whose spaces do not fit is false.
+(J = 0, say) is told apart from what is false: papers say their hypotheses in words. An equation with one letter on its left that is not
+known, or with :=, defines it for all equations of the paper. An equation that does not read as a statement of operators is listed with the
+reason, never left out; one of operators whose spaces do not fit is false.
 """
 
 from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from .. import _core
+from .block_reading import says_by_block
+from .definitions import Definition, is_letter, letter_name, pieces
+from .family import Spec
+from .parse import Statements
 from .spelling import spelled
 from .terminal_report import WIDTH, wrapped
-from .vocabulary import ParseError, SpacesError
+from .vocabulary import ParseError, SpacesError, is_known
 
 _ENVIRONMENTS = "equation|align|alignat|flalign|gather|multline|eqnarray|displaymath|math|dmath"
 _DISPLAY = re.compile(
     rf"\\begin\{{(?P<env>({_ENVIRONMENTS})\*?)\}}(?P<body>.*?)\\end\{{(?P=env)\}}|\\\[(?P<bracket>.*?)\\\]|(?<!\\)\$\$(?P<dollar>.*?)(?<!\\)\$\$",
     re.S,
 )
-_EQUALS = re.compile(r"(?<![<>!:=])=(?!=)|(?<=:)=|==|≡|≜")
+_EQUALS = re.compile(r":=|(?<![<>!=])=(?!=)|==|≡|≜|≝|\\(?:triangleq|coloneqq|equiv)(?![A-Za-z])")
+_DEFINITIONS = (":=", "≜", "≝", "\\triangleq", "\\coloneqq")
 _DEFINES = re.compile(
     r"\\(?:re)?newcommand\*?\s*\{?\s*\\([A-Za-z]+)\s*\}?(?:\[(\d)\])?\s*\{|\\def\s*\\([A-Za-z]+)\s*\{|\\DeclareMathOperator\*?\s*\{?\\([A-Za-z]+)\}?\s*\{"
 )
@@ -36,15 +42,15 @@ _DEFINES = re.compile(
 _ANGLE = r"(?:\\d?dot\s*(?:\{\s*(?:\\theta|q)\s*\}|\s(?:\\theta|q)|\\theta)|\\theta|q)"
 _ARGUMENTS = re.compile(rf"(?<=[A-Za-z}}\])])\s*(?:\\left)?\(\s*{_ANGLE}(?:\s*,\s*{_ANGLE})*\s*(?:\\right)?\)")
 
-HOLDS, TRUE_WHERE, FAILS, UNDECIDED, NOT_READ = "holds", "true where", "fails", "undecided", "not read"
+HOLDS, TRUE_WHERE, FAILS, UNDECIDED, NOT_READ, DEFINES = "holds", "true where", "fails", "undecided", "not read", "defines"
 
 
 @dataclass
 class Equation:
     """One statement of a paper.
 
-    `verdict` is "holds", "fails", "undecided" or "not read", or "true where", with the hypotheses in `where`. `understood` is how it was
-    read, `note` what else is to be said: the smallest counterexample, the reason why it was not read.
+    `verdict` is "holds", "fails", "undecided" or "not read", "defines" of what defines a letter, or "true where", with the hypotheses in
+    `where`. `understood` is how it was read, `note` what else is to be said: the smallest counterexample, the reason why it was not read.
     """
 
     line: int
@@ -84,7 +90,7 @@ class PaperReport:
 
     def summary(self) -> str:
         told: dict[str, int] = {}
-        for verdict in (FAILS, UNDECIDED, TRUE_WHERE, HOLDS, NOT_READ):
+        for verdict in (FAILS, UNDECIDED, TRUE_WHERE, HOLDS, DEFINES, NOT_READ):
             for e in self.equations:
                 if e.verdict == verdict:
                     told[e.headline] = told.get(e.headline, 0) + 1
@@ -137,13 +143,108 @@ def check_paper(
         return check(text, model, states=states, seed=seed, search=search, precision=precision)
 
     check_wider(precision)
-    source = _read(Path(path))
+    statements = [Said(line, *pair) for line, latex in equations(_read(Path(path))) for pair in _sides(latex)]
+    letters = _Letters(statements, model, checked)
     found: list[Equation] = []
-    for line, latex in equations(source):
+    for said in statements:
         if progress is not None:
-            progress(f"line {line}")
-        found += _judged(line, latex, checked, model is None)
+            progress(f"line {said.line}")
+        found.append(letters.definitions.get(said) or _judged(said, letters.before(said), checked, model is None))
     return PaperReport(str(path), found)
+
+
+@dataclass(frozen=True)
+class Said:
+    """A statement of a paper: its line, its sides ("" where there is no equals sign), and the sign between them."""
+
+    line: int
+    lhs: str
+    rhs: str
+    sign: str
+
+    @property
+    def text(self) -> str:
+        return f"{self.lhs} = {self.rhs}" if self.rhs else self.lhs
+
+
+def _sides(latex: str) -> Iterator[tuple[str, str, str]]:
+    """(lhs, rhs, sign) for each equals sign of a row that stands outside of brackets; several statements stand apart by commas."""
+    rows = pieces(latex, ",")
+    if len(rows) > 1 and (says_by_block(latex) or not all(len(_chain(row)) > 1 for row in rows)):
+        rows = [latex]
+    for row in rows:
+        sides = _chain(row)
+        if len(sides) < 2:
+            yield row.strip(), "", ""
+        for (lhs, _), (rhs, sign) in zip(sides, sides[1:], strict=False):
+            yield lhs, rhs, sign
+
+
+def _chain(row: str) -> list[tuple[str, str]]:
+    """(side, the sign before it)."""
+    found: list[tuple[str, str]] = []
+    begin, sign = 0, ""
+    for match in _EQUALS.finditer(row):
+        before = re.sub(r"\\[{}]", "", row[: match.start()])
+        if sum(before.count(c) for c in "([{") <= sum(before.count(c) for c in ")]}"):
+            found.append((row[begin : match.start()].strip(), sign))
+            begin, sign = match.end(), match[0]
+    return [*found, (row[begin:].strip(), sign)]
+
+
+class _Letters:
+    """The letters that a paper defines, and by which of its statements."""
+
+    def __init__(self, statements: Sequence[Said], model: Any, check: Callable[[str], Any]):
+        self.definitions: dict[Said, Equation] = {}
+        self._made: list[tuple[Said, Definition]] = []
+        for said in statements:
+            if not said.rhs or not is_letter(said.lhs):
+                continue
+            name = letter_name(said.lhs)
+            told = said.sign in _DEFINITIONS
+            if (
+                is_known(name)
+                and not (told and not self._holds(said.text, check))
+                or not told
+                and any(d.name == name for _, d in self._made)
+            ):
+                continue
+            self._made.append((said, Definition(name, said.rhs, f"{said.lhs} := {said.rhs}")))
+        operators = getattr(model if model is not None else Spec((-1, 0), ("pin", "pin"), True, 1).model(), "soa", model)
+        for said, made in self._made:
+            try:
+                Statements(operators).letter(made.name, [d for s, d in self._made if s == said or d.name != made.name])
+            except (_core.Error, ArithmeticError, TypeError, ValueError) as error:
+                self.definitions[said] = Equation(said.line, said.text, NOT_READ, note=str(error).split("\n", 1)[-1])
+            else:
+                self.definitions[said] = Equation(said.line, said.text, DEFINES)
+        self._made = [(said, made) for said, made in self._made if self.definitions[said].verdict == DEFINES]
+
+    @staticmethod
+    def _holds(text: str, check: Callable[[str], Any]) -> bool:
+        """Whether what is said to define a letter of the book is so."""
+        try:
+            report = check(text)
+        except (_core.Error, ArithmeticError):
+            return False
+        return report.verdict == HOLDS or bool(report.true_where)
+
+    def before(self, said: Said) -> str:
+        """The definitions that a statement needs, as they stand before it: of each letter the last one above it, else the first below."""
+        chosen: dict[str, tuple[Said, Definition]] = {}
+        for at, made in self._made:
+            if made.name not in chosen or at.line <= said.line:
+                chosen[made.name] = at, made
+        needed: list[str] = []
+        todo = [said.text]
+        while todo:
+            text = spelled(todo.pop()).text
+            for name, (_, made) in chosen.items():
+                if name not in needed and name in text:
+                    needed.append(name)
+                    todo.append(made.what)
+        return "".join(f"{made.typed}; " for name, (_, made) in chosen.items() if name in needed)
 
 
 def _read(path: Path) -> str:
@@ -155,32 +256,28 @@ def _read(path: Path) -> str:
         raise _core.ModelError(f"{path}: {error.strerror or error}") from None
 
 
-def _judged(line: int, latex: str, check: Callable[[str], Any], on_trees: bool) -> Iterator[Equation]:
-    """One equation for each equals sign of a row. A model of one's own meets its hypotheses or does not; random trees do both."""
+def _judged(said: Said, before: str, check: Callable[[str], Any], on_trees: bool) -> Equation:
+    """A statement, with the definitions before it. A model of one's own meets its hypotheses or does not; random trees do both."""
     from .truth import in_words
 
-    sides = [side.strip() for side in _EQUALS.split(latex)]
-    if len(sides) < 2:
-        yield Equation(line, latex, NOT_READ, note="  it has no equals sign")
-        return
-    for lhs, rhs in zip(sides, sides[1:], strict=False):
-        text = f"{lhs} = {rhs}"
-        try:
-            report = check(text)
-        except SpacesError as error:
-            yield Equation(line, text, FAILS, note="  spaces do not fit\n" + str(error).split("\n", 1)[-1])
-        except _core.SpaceError as error:  # of a statement by block
-            yield Equation(line, text, FAILS, note=f"  spaces do not fit\n  {error}")
-        except ParseError as error:
-            yield Equation(line, text, NOT_READ, note=str(error).split("\n", 1)[-1])
-        except _core.Error as error:
-            yield Equation(line, text, NOT_READ, note=f"  {error}")
-        else:
-            where = ", or where ".join(map(in_words, report.true_where)) if report.verdict == FAILS and on_trees else ""
-            details = report.details()
-            if report.verdict == HOLDS or where:
-                details = [detail for detail in details if detail.startswith("  read as")]
-            yield Equation(line, text, TRUE_WHERE if where else report.verdict, report.understood, "\n".join(details), where)
+    line, text = said.line, said.text
+    if not said.rhs:
+        return Equation(line, text, NOT_READ, note="  it has no equals sign")
+    try:
+        report = check(before + text)
+    except SpacesError as error:
+        return Equation(line, text, FAILS, note="  spaces do not fit\n" + str(error).split("\n", 1)[-1])
+    except _core.SpaceError as error:  # of a statement by block
+        return Equation(line, text, FAILS, note=f"  spaces do not fit\n  {error}")
+    except ParseError as error:
+        return Equation(line, text, NOT_READ, note=str(error).split("\n", 1)[-1])
+    except _core.Error as error:
+        return Equation(line, text, NOT_READ, note=f"  {error}")
+    where = ", or where ".join(map(in_words, report.true_where)) if report.verdict == FAILS and on_trees else ""
+    details = report.details()
+    if report.verdict == HOLDS or where:
+        details = [detail for detail in details if detail.startswith("  read as")]
+    return Equation(line, text, TRUE_WHERE if where else report.verdict, report.understood, "\n".join(details), where)
 
 
 # ------------------------------------------------------------------ LaTeX

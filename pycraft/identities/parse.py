@@ -11,15 +11,18 @@ from __future__ import annotations
 import ast
 import operator
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
 from .. import _core
-from .block_reading import refuse_by_block
+from .block_reading import is_by_block, refuse_by_block
 from .book import read_book
+from .definitions import Definition, meant, parted
+from .determinant_equations import as_logarithms
 from .spelling import Spelled, spelled
+from .standard_letters import STANDARD
 from .vocabulary import FUNCTIONS, WITH_ARGUMENTS, Misread, ParseError, SpacesError, Vocabulary, decimal, is_number, is_operator, power
 
 __all__ = ["ParseError", "Statement", "Statements", "check_has_space"]
@@ -27,41 +30,91 @@ __all__ = ["ParseError", "Statement", "Statements", "check_has_space"]
 
 @dataclass
 class Statement:
-    """Two sides, as expressions of one model, and the text they were read from. A lone expression has no right side."""
+    """Two sides, as expressions of one model, and the text they were read from. A lone expression has no right side.
+
+    `letters` are those that were defined around it, or stand for others, and what they stand for, as they are shown.
+    """
 
     lhs: Any
     rhs: Any
     text: str
     reading: str
+    letters: dict[str, str] = field(default_factory=dict)
+    _shown: Callable[[], Statement] | None = None
 
     @property
     def understood(self) -> str:
-        """The statement as it was read, in the package's own letters."""
-        return _text(self.lhs) + ("" if self.rhs is None else f" = {_text(self.rhs)}")
+        """The statement as it was read, in the package's own letters, and what other letters in it stand for."""
+        at = self
+        if self._shown is not None:
+            try:
+                at = self._shown()
+            except (_core.Error, ArithmeticError, TypeError, ValueError, AttributeError):
+                pass  # a letter that stands for itself has no inverse, root or rate that could be shown
+        text = _text(at.lhs) + ("" if at.rhs is None else f" = {_text(at.rhs)}")
+        where = "; ".join(f"{name} = {what}" for name, what in self.letters.items()) if at is not self else ""
+        return (f"{text}, where {where}" if where else text).replace("vdot", "θ̈")
 
 
 class Statements:
-    """Reads statements on the letters of one model."""
+    """Reads statements on the letters of one model; `vector(name, space)` makes the vectors of which a statement says no more."""
 
-    def __init__(self, operators: Any, extra: Mapping[str, Any] | None = None, **options: Any):
-        self._vocabulary = Vocabulary(operators, extra, **options)
+    def __init__(
+        self, operators: Any, extra: Mapping[str, Any] | None = None, *, vector: Callable[[str, Any], Any] = _core.vector, **options: Any
+    ):
+        self._operators, self._vector = operators, vector
+        self._vocabulary = Vocabulary(operators, extra, read=self._meaning, **options)
 
     def read(self, text: str) -> Statement:
-        """The statement, by the one reading whose names and spaces fit.
+        """The statement, by the one reading whose names and spaces fit, with the definitions before and behind it.
 
         Raises
         ------
         ParseError
             Nothing fits (the reasons of both readings are shown), or both do. SpacesError where only the spaces do not fit.
         """
-        refuse_by_block(text, self._vocabulary.own)
+        definitions, claim = parted(text, self._is_by_block)
+        refuse_by_block(claim, self._vocabulary.own | {d.name for d in definitions})
+        source = spelled(claim)
+        vocabulary = self._with(definitions)
+        refusal: ParseError | None = None
+        for choice in vocabulary.choices(" ".join([source.text, *(spelled(d.what).text for d in definitions)])):
+            try:
+                return self._fitting(source, text, claim, self._with(definitions, choice))
+            except ParseError as error:
+                refusal = refusal or error
+        assert refusal is not None
+        raise refusal
+
+    def letter(self, name: str, definitions: Sequence[Definition]) -> Any:
+        """What a letter stands for, with these definitions. Raises ParseError."""
+        return self._with(definitions).operator(name)
+
+    def _is_by_block(self, claim: str, own: Iterable[str]) -> bool:
+        return is_by_block(claim, own=self._vocabulary.own | {*own})
+
+    def _with(self, definitions: Sequence[Definition], choice: Mapping[str, int] | None = None) -> Vocabulary:
+        return self._vocabulary.with_letters(definitions, {}, choice or {})
+
+    def _meaning(self, what: str, vocabulary: Vocabulary, name: str) -> Any:
+        """What a definition says, in the words that it sees."""
+
+        def expression(text: str) -> Any:
+            found = self._fitting(spelled(text), text, text, vocabulary)
+            if found.rhs is not None:
+                raise ParseError(f"{name} := {text} is a statement: a letter stands for one expression")
+            return found.lhs
+
+        return meant(Definition(name, what, f"{name} := {what}"), self._operators, expression, self._vector)[0]
+
+    def _fitting(self, source: Spelled, text: str, claim: str, vocabulary: Vocabulary) -> Statement:
+        """The one of both readings that fits."""
         found: list[Statement] = []
         reasons: dict[str, str] = {}
         place, misfits = "", False
-        source = spelled(text)
         for reading in ("Python", "the book"):
             try:
-                found.append(self._read(source, text, reading))
+                found.append(self._read(source, text, reading, vocabulary))
             # The core's errors of names, spaces and models are TypeErrors and ValueErrors; what Python finds wrong reads no better.
             except (TypeError, ValueError, AttributeError, ArithmeticError, RecursionError) as error:
                 reasons[reading] = "it divides by zero" if isinstance(error, ZeroDivisionError) else str(error)
@@ -72,15 +125,21 @@ class Statements:
                 del reasons["Python"]
             why = "\n".join(f"  read as {reading}: {reason}" if len(reasons) == 2 else f"  {reason}" for reading, reason in reasons.items())
             kind = SpacesError if misfits else ParseError
-            raise kind(f"{text!r} does not read as a statement of operators.\n{why}{place}")
+            raise kind(f"{claim!r} does not read as a statement of operators.\n{why}{place}")
         first = found[0]
         if len(found) == 2 and not (_same(first.lhs, found[1].lhs) and _same(first.rhs, found[1].rhs)):
             shown = "\n".join(f"  {s.reading}: {_text(s.lhs)} = {_text(s.rhs)}" for s in found)
-            raise ParseError(f"{text!r} reads in two ways and both fit:\n{shown}\nwrite .T for a transpose, or juxtapose to multiply")
+            raise ParseError(f"{claim!r} reads in two ways and both fit:\n{shown}\nwrite .T for a transpose, or juxtapose to multiply")
+        if vocabulary.used:
+            used = reversed(vocabulary.used.items())
+            first.letters = {STANDARD[n].text if n in STANDARD else n: _shown_text(spelled(what).text) for n, (what, _) in used}
+            reading, themselves = first.reading, vocabulary.standing_for_themselves()
+            first._shown = lambda: self._read(source, text, reading, themselves)
         return first
 
-    def _read(self, source: Spelled, text: str, reading: str) -> Statement:
-        sides = self._read_python(source.text) if reading == "Python" else read_book(source.text, self._vocabulary)
+    def _read(self, source: Spelled, text: str, reading: str, vocabulary: Vocabulary) -> Statement:
+        read_sides = self._read_python if reading == "Python" else read_book
+        sides = read_sides(as_logarithms(source.text), vocabulary)
         lhs, rhs = sides if len(sides) == 2 else (sides[0], None)
         lhs, rhs = _balance(lhs, rhs), _balance(rhs, lhs) if rhs is not None else None
         if rhs is not None:
@@ -88,7 +147,7 @@ class Statements:
         return Statement(lhs, rhs, text, reading)
 
     # ------------------------------------------------------------------ Python's reading: Python's own parser
-    def _read_python(self, source: str) -> list[Any]:
+    def _read_python(self, source: str, vocabulary: Vocabulary) -> list[Any]:
         source = source.lstrip()
         try:
             source = _comparison(source)
@@ -98,10 +157,10 @@ class Statements:
         if isinstance(tree, ast.Compare):
             if len(tree.ops) != 1 or not isinstance(tree.ops[0], ast.Eq):
                 raise ParseError("a statement is lhs == rhs")
-            return [self._evaluate(tree.left, source), self._evaluate(tree.comparators[0], source)]
-        return [self._evaluate(tree, source)]
+            return [self._evaluate(tree.left, source, vocabulary), self._evaluate(tree.comparators[0], source, vocabulary)]
+        return [self._evaluate(tree, source, vocabulary)]
 
-    def _evaluate(self, node: ast.AST, source: str) -> Any:
+    def _evaluate(self, node: ast.AST, source: str, vocabulary: Vocabulary) -> Any:
         match node:
             case ast.Constant(value=int() as value):
                 return Fraction(value)
@@ -110,22 +169,30 @@ class Statements:
             case ast.Call(func=ast.Name(id="Fraction"), args=[ast.Constant(value=int() as a), ast.Constant(value=int() as b)]) if b:
                 return Fraction(a, b)
             case ast.Name(id=name):
-                return self._vocabulary.operator(name)
+                return vocabulary.operator(name)
             case ast.UnaryOp(op=ast.USub(), operand=inner):
-                return -self._evaluate(inner, source)
+                return -self._evaluate(inner, source, vocabulary)
             case ast.BinOp(left=left, op=ast.Pow(), right=right):
-                return power(self._evaluate(left, source), self._evaluate(right, source))
+                return power(self._evaluate(left, source, vocabulary), self._evaluate(right, source, vocabulary))
             case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
-                return _combine(_BINARY[type(op)], self._evaluate(left, source), self._evaluate(right, source))
+                return _combine(_BINARY[type(op)], self._evaluate(left, source, vocabulary), self._evaluate(right, source, vocabulary))
             case ast.Attribute(value=inner, attr="T"):
-                return self._evaluate(inner, source).T
+                return self._evaluate(inner, source, vocabulary).T
             case ast.Call(func=ast.Attribute(value=inner, attr=("inv" | "sqrt" | "trace" | "logdet" | "norm") as method), args=[]):
-                return getattr(self._evaluate(inner, source), method)()
+                return getattr(self._evaluate(inner, source, vocabulary), method)()
             case ast.Call(func=ast.Name(id=name), args=[inner]) if name in FUNCTIONS:
-                return FUNCTIONS[name](self._evaluate(inner, source))
+                return FUNCTIONS[name](self._evaluate(inner, source, vocabulary))
             case ast.Call(func=ast.Name(id=name), args=arguments) if name in WITH_ARGUMENTS:
-                return self._vocabulary.indexed(name, [ast.unparse(a) for a in arguments])
+                return vocabulary.indexed(name, [ast.unparse(a) for a in arguments])
         raise ParseError(f"{ast.unparse(node)!r} is no operator expression")
+
+
+def _shown_text(what: str) -> str:
+    """The text of a definition as it is shown: the table's letters for the grammar's names."""
+    return re.sub(r"[A-Za-z_]+", lambda m: _SHOWN.get(m[0], m[0]), re.sub(r"\s+", " ", what).strip()).replace(" ^*", "*").replace("^*", "*")
+
+
+_SHOWN = {s.name: s.text for s in _core.symbols} | {n: known.text for n, known in STANDARD.items()} | {"MM": "ℳ", "vdot": "θ̈"}
 
 
 def _comparison(source: str) -> str:

@@ -1,17 +1,27 @@
-"""The words of statements: operators by their typed names, functions, powers; and the errors of text that cannot be read."""
+"""The words of statements: operators by their typed names, functions, powers; and the errors of text that cannot be read.
+
+A name is looked for among what the caller adds, the definitions of the statement, the dialect, the letters of the operator table, and those
+of the equations of motion (`standard_letters`), in this order; X_dot is the rate ∂_tX where no letter is called so.
+"""
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from copy import copy
 from difflib import get_close_matches
 from fractions import Fraction
 from numbers import Real
 from typing import Any, TypeGuard
 
+import numpy as np
+
 from .. import _core
+from .any_nodes import any_nodes
 from .directions import COORDINATES, along, coordinates_meant
 from .spelling import Spelled
+from .standard_letters import STANDARD
 
 
 class Written:
@@ -49,7 +59,13 @@ _ALIASES = {
     **{name.replace("_", ""): name for name in _NAMES if "_" in name},
     "E_phi": "E",
     "Ephi": "E",
+    "theta_ddot": "vdot",
 }
+
+
+def is_known(name: str) -> bool:
+    """Whether a name stands for something without a definition."""
+    return name in _NAMES or name in _ALIASES or name in STANDARD or name in ("MM", "I", "N", "vdot")
 
 
 class ParseError(_core.EvaluationError):
@@ -73,37 +89,131 @@ class Misread(ParseError):
         return "".join(f"\n    {line}" for line in source.place(self.at).split("\n"))
 
 
+Read = Callable[[str, "Vocabulary", str], Any]
+"""What a text defines, in the words of a vocabulary, as the letter of a name."""
+
+
 class Vocabulary:
     """The operators of one model by every name that is typed for them, ℳ, I, N, and what the caller adds.
 
-    `derive(x, "i" | "j" | "t", operators)` is what ∂ makes of an expression.
+    `derive(x, "i" | "j" | "t", operators)` is what ∂ makes of an expression; `read` makes one of the text of a definition.
     """
 
-    def __init__(self, operators: Any, extra: Mapping[str, Any] | None = None, derive: Callable[[Any, str, Any], Any] = along):
-        self._derive = derive
+    def __init__(
+        self,
+        operators: Any,
+        extra: Mapping[str, Any] | None = None,
+        derive: Callable[[Any, str, Any], Any] = along,
+        read: Read | None = None,
+    ):
+        self._derive, self._read = derive, read
         H, phi, M = operators("H phi M")
         self._own = {"MM": H @ phi @ M @ phi.T @ H.T, "I": operators.I, "N": operators.Theta.dimension}
         self._own |= {"vdot": _core.vector("vdot", operators.Theta), **(extra or {})}
         self._operators = operators
+        self._definitions: tuple[Any, ...] = ()
+        self._dialect: Mapping[str, str] = {}
+        self._choice: Mapping[str, int] = {}
+        self._seen = math.inf
+        self._open: tuple[tuple[str, str], ...] = ()
+        self._made: dict[tuple[str, str], Any] = {}
+        self.used: dict[str, tuple[str, Any]] = {}
+
+    def _as(self, **changes: Any) -> Vocabulary:
+        other = copy(self)
+        for name, value in changes.items():
+            setattr(other, f"_{name}", value)
+        return other
+
+    def with_letters(self, definitions: Sequence[Any], dialect: Mapping[str, str], choice: Mapping[str, int]) -> Vocabulary:
+        """The same words and those of definitions and a dialect; of letters with several meanings those that are chosen."""
+        other = self._as(definitions=tuple(definitions), dialect=dialect, choice=choice, made={})
+        other.used = {}
+        return other
+
+    def choices(self, text: str) -> Iterator[dict[str, int]]:
+        """The meanings that letters of a text may have."""
+        several = [
+            name
+            for name, known in STANDARD.items()
+            if len(known.meanings) > 1 and name in text and name not in self._own and name not in {d.name for d in self._definitions}
+        ]
+        for chosen in itertools.product(*(range(len(STANDARD[name].meanings)) for name in several)):
+            yield dict(zip(several, chosen, strict=True))
 
     @property
     def own(self) -> set[str]:
         """Names that are not the table's."""
-        return {*self._own}
+        return {*self._own, *(d.name for d in self._definitions), *self._dialect}
 
     @property
     def names(self) -> set[str]:
         """Names that stand alone, without arguments."""
-        return {*(_NAMES - set(WITH_ARGUMENTS)), *_ALIASES, *self._own}
+        letters = {*_NAMES, *_ALIASES, *STANDARD, *self.own}
+        return letters | {f"{name}_dot" for name in letters - {"I", "N"} if not name.endswith("dot")}
 
     def operator(self, name: str) -> Any:
         if name in self._own:
             return self._own[name]
+        named = [i for i, d in enumerate(self._definitions) if d.name == name]
+        if named and (named[0] < self._seen or not self._is_known(name)):
+            index = max((i for i in named if i < self._seen), default=named[0])
+            return self._defined(name, self._definitions[index].what, dict(seen=index))
+        if name in self._dialect:
+            return self._defined(name, self._dialect[name], dict(definitions=(), dialect={}, own=self._of_the_book()))
         if name in WITH_ARGUMENTS:
-            raise ParseError(needs_arguments(name))
-        if name not in _NAMES and name not in _ALIASES:
-            raise ParseError(self.unknown(name))
-        return getattr(self._operators, _ALIASES.get(name, name))
+            return self._of_any(name)
+        if name in _NAMES or _ALIASES.get(name, "vdot") != "vdot":
+            return getattr(self._operators, _ALIASES.get(name, name))
+        if name in _ALIASES:
+            return self.operator(_ALIASES[name])
+        if name in STANDARD:
+            # Of the definitions in force those of the equations of motion reach others of them: z is made with the T that is given.
+            among = tuple(d for d in self._definitions if d.name in STANDARD)
+            return self._defined(
+                name, STANDARD[name].meanings[self._choice.get(name, 0)], dict(definitions=among, dialect={}, own=self._of_the_book())
+            )
+        if name.endswith("_dot") and name.removesuffix("_dot") in self.names:
+            return self.derivative(self.operator(name.removesuffix("_dot")), "t")
+        raise ParseError(self.unknown(name))
+
+    def _of_the_book(self) -> dict[str, Any]:
+        """What the caller adds, but for letters of the table with another meaning: of these no letter of the book is made."""
+        return {name: value for name, value in self._own.items() if name in STANDARD or name not in _NAMES}
+
+    def _is_known(self, name: str) -> bool:
+        return name in self._dialect or is_known(name)
+
+    def _of_any(self, name: str) -> Any:
+        """A letter without its arguments: of any nodes, Δ of the coordinate i."""
+        if name == "Delta":
+            return self.indexed(name, [COORDINATES[0]])
+        return getattr(self._operators, name)(any_nodes(self._operators))
+
+    def _defined(self, name: str, what: str, scope: dict[str, Any]) -> Any:
+        """What a letter stands for, worked out once."""
+        key = name, what
+        if key in self._open:
+            raise ParseError(f"{name} is defined by itself")
+        if key not in self._made:
+            if self._read is None:
+                raise ParseError(f"{name} is defined by text, and nothing reads it here")
+            self._made[key] = self._read(what, self._as(**scope, open=(*self._open, key)), name)
+        value = self._made[key]
+        self.used.setdefault(name, (what, value))
+        return value
+
+    def standing_for_themselves(self) -> Vocabulary:
+        """The same words, letters that were used and defined by letters of their own, with no more than a name and spaces."""
+        extra = {}
+        for name, (_, value) in self.used.items():
+            if isinstance(value, _core.Operator) and value.domain is not None and value.kind not in ("vector", "symbol"):
+                shown = STANDARD[name].text if name in STANDARD else name
+                if value.domain.name == "R^1":
+                    extra[name] = _core.vector(shown, value.codomain)
+                elif max(value.shape) <= LARGEST_SHOWN:
+                    extra[name] = _core.constant(np.zeros(value.shape), value.domain, value.codomain, shown)
+        return self._as(own={**self._own, **extra})
 
     def indexed(self, name: str, arguments: list[str]) -> Any:
         arguments = [a.strip().strip("'\"") for a in arguments]
@@ -120,15 +230,26 @@ class Vocabulary:
     def unknown(self, name: str) -> str:
         """What to say of a name that stands for nothing."""
         if name == "det":
-            return "a determinant is read by its logarithm: ln det A"
+            return "a determinant is read by its logarithm, ln det A, or where both sides are products of determinants"
         if name.startswith("\\"):
             return f"the command {name.partition('_')[0]} is not known here"
+        for ending, remedy in _ENDINGS.items():
+            if name.endswith(ending) and name.removesuffix(ending) in self.names:
+                return remedy.format(name.removesuffix(ending), name)
         near = get_close_matches(name, [*self.names, *WITH_ARGUMENTS, *FUNCTIONS], cutoff=0.7)
-        return f"no operator is called {name!r}" + (f"; the nearest names are {', '.join(near)}" if near else "")
+        return f"no operator is called {name!r}" + (
+            f"; the nearest names are {', '.join(near)}" if near else f"; define it: {name} := …; statement"
+        )
 
 
-def needs_arguments(name: str) -> str:
-    return f"{name} needs its arguments, as in {name}({'hinge' if name == 'Delta' else 'body'})"
+_ENDINGS = {
+    "_ddot": "two dots over {0} are not read: write ∂_t(∂_t {0}), or define {1}",
+    "_tilde": "{0} has no tilde in the book: define {1} := …",
+    "_bar": "{0} has no bar in the book: define {1} := …",
+    "_hat": "{0} has no hat in the book: define {1} := …",
+}
+LARGEST_SHOWN = 200
+"""Rows and columns of matrices that stand for a letter where a statement is shown as it was read."""
 
 
 def decimal(text: str) -> Fraction:

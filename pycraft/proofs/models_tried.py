@@ -33,7 +33,11 @@ def example(hypotheses: Sequence[str] = ()) -> Any:
         kinds = ["free", "ball", "pin", "slider"]
     if "single-DOF hinges" in hypotheses:
         kinds = ["pin", "slider", "pin", "screw"]
-    return tree([-1, 0, 1, 2] if "serial chain" in hypotheses else [-1, 0, 0, 1], kinds, seed=3, rotor_inertia="J = 0" not in hypotheses)
+    parents = [-1, 0, 1, 2] if "serial chain" in hypotheses else [-1, 0, 0, 1]
+    model = tree(parents, kinds, seed=3, rotor_inertia="J = 0" not in hypotheses)
+    for k in range(len(parents)):  # with the nodes of the random trees that statements are checked on
+        model.add_node(f"node{k}", f"body{k}", position=(0.3 * k + 0.1, 0.2, -0.1))
+    return model
 
 
 def examples(hypotheses: Sequence[str] = ()) -> list[Any]:

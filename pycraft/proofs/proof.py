@@ -116,6 +116,8 @@ class Proof:
     def hypotheses(self) -> list[str]:
         """Names of the hypotheses that steps or their lemmas use."""
         used = dict.fromkeys(e.hypothesis for e in self.rests_on if e.kind == "hypothesis" and e.hypothesis)
+        if "single-DOF hinges" in used:  # their H is constant
+            used.pop("constant H", None)
         return [*(name for name in HYPOTHESES if name in used), *(name for name in used if name not in HYPOTHESES)]
 
     @property

@@ -22,7 +22,7 @@ from .axioms import theory
 from .cases import by_cases
 from .completion import complete
 from .derivation import DerivativeProblem
-from .derivative import TIME, derivative
+from .derivative import TIME, Formula, derivative
 from .equations import Equation, Step, joined, numbered, opened
 from .models_tried import example, examples, operators_of, operators_of_sources
 from .nesting import within_reach
@@ -93,7 +93,18 @@ def prove(lhs: Any, rhs: Any = None, model: Any = None, *, assume: Iterable[str]
     else:
         read = Statement(*_sides(lhs, rhs), "", "expressions")
         read_on = reading(operators_of(model) if model is not None else _letters_of(read), define)
-    return by_cases(assume, lambda case: _prove(read, model, assumptions(read_on, case), read_on.unknown))
+    proof = by_cases(assume, lambda case: _prove(read, model, assumptions(read_on, case), read_on.unknown))
+    if texts and not proof and not proof.note and _has_rates(read):  # a longer way, on which other rules meet
+        longer = reading(read_on.operators, define, written_out=True)
+        again = longer.statement(lhs)
+        found = by_cases(assume, lambda case: _prove(again, model, assumptions(longer, case), longer.unknown))
+        return found or proof
+    return proof
+
+
+def _has_rates(read: Statement) -> bool:
+    """Whether derivatives are letters of a statement."""
+    return any(isinstance(side, Formula) for side in (read.lhs, read.rhs))
 
 
 @within_reach("prove")
@@ -196,6 +207,8 @@ def _prove(read: Statement, model: Any, assumed: Sequence[Assumption] = (), unkn
             void = void or impossible
             continue
         proof.verify_where_possible(own)
+        if model is None and read.reading != "expressions":  # there is no model at hand
+            proof.unmet = []
         return proof
     return Proof.of_statement(read, problem, [left, right], [], nearest or (p, q), void)
 
@@ -307,7 +320,10 @@ def _settings(problem: DerivativeProblem) -> Iterator[tuple[Setting, list[tuple[
     if names & {"Ḣ", "a"} or TIME in problem.alphabet.along.values():
         constant.append((Equation("hypothesis", "Ḣ = 0", {("Ḣ",): ONE}, {}, hypothesis="constant H"), ("Ḣ",)))
     possible += ["single-DOF hinges"] * bool(deltas) + ["constant H"] * bool(constant)
-    composite, velocities = "R" in names or bool(problem.relations), bool(names & mechanics.NAMES)
+    composite, velocities = (
+        "R" in names or bool(problem.relations),
+        bool(names & mechanics.NAMES) or TIME in problem.alphabet.along.values(),
+    )
     for size in range(len(possible) + 1):
         for chosen in itertools.combinations(possible, size):
             extra = list(rules) + constant * ("constant H" in chosen)

@@ -7,17 +7,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from .. import _core
-from ..identities.directions import COORDINATES, coordinates_meant
+from ..identities.block_reading import is_by_block
+from ..identities.definitions import Definition, letter_name, meant, parted
+from ..identities.directions import COORDINATES, along, coordinates_meant
 from ..identities.parse import ParseError, Statement, Statements
 from .derivative import TIME, derivative
 from .proof import HYPOTHESES
-
-_SPACE = r"Θ|Theta|V|F|R\^?\d*"
-_MAP = re.compile(rf"({_SPACE})\s*(?:→|->)\s*({_SPACE})$")
-_VECTOR = re.compile(rf"({_SPACE})$")
 
 
 @dataclass
@@ -38,11 +34,13 @@ class Reading:
     ----------
     extra : one's own letters by their names
     unknown : names of operators of which nothing is known but their spaces
+    written_out : whether derivatives are worked out as they are read, and are no letters of their own
     """
 
     operators: Any
     extra: dict[str, Any] = field(default_factory=dict)
     unknown: set[str] = field(default_factory=set)
+    written_out: bool = False
 
     def define(self, name: str, what: Any) -> None:
         """A letter: an expression, or text: an expression, a space for a vector, "Θ → V" for an operator of which nothing more is known.
@@ -52,45 +50,36 @@ class Reading:
         ParseError
             Text that is none of these; a name that is none.
         """
-        name = name.strip()
-        if not name.isidentifier():
-            raise ParseError(f"{name!r} is no name for a letter: letters, digits and _, beginning with a letter")
         if isinstance(what, str):
-            what = self._from_text(name, what.strip())
-        self.extra[name] = what
+            self._add(Definition(letter_name(name), what.strip(), f"{name} := {what}"))
+        else:
+            self.extra[letter_name(name)] = what
 
-    def _from_text(self, name: str, text: str) -> Any:
-        if (found := _VECTOR.match(text)) is not None:
-            return _core.vector(name, self._space(found[1]))
-        if (found := _MAP.match(text)) is not None:
-            self.unknown.add(name)
-            domain, codomain = self._space(found[1]), self._space(found[2])
-            rng = np.random.default_rng([*name.encode()])
-            return _core.constant(rng.uniform(-1, 1, (codomain.dimension, domain.dimension)), domain, codomain, name)
-        read = Statements(self.operators, self.extra, derive=_formula).read(text)
-        if read.rhs is not None:
-            raise ParseError(f"{name} := {text} is a statement: a letter stands for one expression")
-        return read.lhs
+    def _add(self, made: Definition) -> None:
+        def expression(text: str) -> Any:
+            read = self._statements().read(text)
+            if read.rhs is not None:
+                raise ParseError(f"{made.typed} is a statement: a letter stands for one expression")
+            return read.lhs
 
-    def _space(self, name: str) -> Any:
-        if name.startswith("R"):
-            return _core.euclidean(int(name.removeprefix("R").removeprefix("^") or 1))
-        return self.operators.Theta if name in ("Θ", "Theta") else getattr(self.operators, name)
+        self.extra[made.name], nothing_known = meant(made, self.operators, expression)
+        if nothing_known:
+            self.unknown.add(made.name)
+
+    def _statements(self, more: Mapping[str, Any] | None = None) -> Statements:
+        return Statements(self.operators, {**(more or {}), **self.extra}, derive=along if self.written_out else _formula)
 
     def statement(self, text: str) -> Statement:
-        """The statement at the end of the text, after its definitions. Raises ParseError."""
-        *definitions, claim = text.split(";")
-        for definition in definitions:
-            name, sign, what = _parted(definition)
-            if not sign:
-                raise ParseError(f"{definition.strip()!r} is no definition: write name := expression, name : Θ → Θ, or name ∈ Θ")
-            self.define(name, what)
-        return self.read(claim.strip())
+        """The statement, with the definitions before and behind it. Raises ParseError."""
+        definitions, claim = parted(text, lambda said, own: is_by_block(said, own=[*self.extra, *own]))
+        for made in definitions:
+            self._add(made)
+        return self.read(claim)
 
     def read(self, text: str) -> Statement:
         """Both sides. N stays the trace of I: what is proved is said of every model, so no model's number of coordinates may enter."""
         try:
-            return Statements(self.operators, {"N": _core.identity(self.operators.Theta).trace(), **self.extra}, derive=_formula).read(text)
+            return self._statements({"N": _core.identity(self.operators.Theta).trace()}).read(text)
         except ParseError as error:
             if re.search(r"\bN\b", text) and "N" not in self.extra:
                 raise ParseError(
@@ -111,24 +100,15 @@ class Reading:
 
 
 def _formula(x: Any, direction: str, operators: Any) -> Any:
-    """∂x of what is proved of every model: a letter of its own, of which the product rule and ∂E_φ = E_φΔ_i speak."""
+    """∂x of what is proved of every model: a letter of which the product rule and ∂E_φ = E_φΔ_i speak; of a number, worked out."""
     if isinstance(x, _core.Scalar):
-        raise _core.EvaluationError(f"∂({x.text()}): derivatives of operators are proved; that of ln det X is tr(X⁻¹∂X), of tr X tr(∂X)")
+        return along(x, direction, operators)
     return derivative(x, TIME if direction == "t" else coordinates_meant(operators)[COORDINATES.index(direction)])
 
 
-def _parted(definition: str) -> tuple[str, str, str]:
-    """(name, the sign of the definition, what it stands for)."""
-    for sign in (":=", "∈", " in ", ":"):
-        name, found, what = definition.partition(sign)
-        if found:
-            return name, found, what
-    return "", "", ""
-
-
-def reading(operators: Any, define: Mapping[str, Any] | None) -> Reading:
+def reading(operators: Any, define: Mapping[str, Any] | None, written_out: bool = False) -> Reading:
     """The letters of a model and one's own."""
-    made = Reading(operators)
+    made = Reading(operators, written_out=written_out)
     for name, what in (define or {}).items():
         made.define(name, what)
     return made

@@ -8,7 +8,7 @@ random trees (`truth`).
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from html import escape
 from typing import Any
@@ -16,6 +16,7 @@ from typing import Any
 from .. import _core
 from ..identities.block_reading import refuse_by_block
 from ..identities.budget import Budget
+from ..identities.definitions import Definition, parted
 from ..identities.edits import Slip, changed
 from ..identities.family import HYPOTHESES, Spec
 from ..identities.formula import Formula, written_statement
@@ -133,11 +134,13 @@ def repair(statement: str, *, most: int = 3, budget: float = 5.0) -> Repairs:
           true where J = 0; proved
     """
     begin, spending = time.perf_counter(), Budget(budget)
-    refuse_by_block(as_text(statement))
-    formula = read_formula(statement)
-    models = small_models()
+    definitions, claim = parted(as_text(statement))
+    refuse_by_block(claim)
+    formula = read_formula(claim, [d.name for d in definitions])
+    models = small_models(definitions)
+    before = "".join(f"{d.typed}; " for d in definitions)
     result = Repairs(statement)
-    if _is_close(formula, models) and (own := _found(formula, None, spending)) is not None:
+    if _is_close(formula, models) and (own := _found(formula, None, spending, before)) is not None:
         needs = own.where[0]
         result.was_true = f"TRUE where {in_words(needs)}" if needs else "TRUE on every tree"
         result.seconds = time.perf_counter() - begin
@@ -150,7 +153,7 @@ def repair(statement: str, *, most: int = 3, budget: float = 5.0) -> Repairs:
         if spending.over:
             left_out = len(near) - i
             break
-        found = _found(new, slip, spending)
+        found = _found(new, slip, spending, before)
         result.found += [] if found is None else [found]
     if left_out:
         what = f"{left_out} formulas that hold on small chains were not looked at" if left_out > 0 else "not every change was tried"
@@ -169,9 +172,9 @@ def _is_close(formula: Formula, models: list[DenseLetters]) -> bool:
         return False
 
 
-def _found(formula: Formula, slip: Slip | None, spending: Budget) -> Repair | None:
+def _found(formula: Formula, slip: Slip | None, spending: Budget, before: str = "") -> Repair | None:
     """The formula with where it is true and its proof; None where it is not, or that is not known within the budget."""
-    source = written_statement(formula)
+    source = before + written_statement(formula)
     proof = _proof(source)
     where = [frozenset(proof.hypotheses)] if proof and {*proof.hypotheses} <= {*HYPOTHESES} else []
     if not where or len(where[0]) > FEW:
@@ -204,16 +207,16 @@ def nearest(formula: Formula, models: list[DenseLetters], spending: Budget | Non
     return sorted(near, key=lambda item: item[1].cost), tried, whole
 
 
-def small_models() -> list[DenseLetters]:
-    """The letters of two small chains without J, at states at which they move."""
-    return [_letters(spec) for spec in _SMALL]
+def small_models(definitions: Sequence[Definition] = ()) -> list[DenseLetters]:
+    """The letters of two small chains without J, at states at which they move, and those of definitions."""
+    return [_letters(spec, definitions) for spec in _SMALL]
 
 
-def _letters(spec: Spec) -> DenseLetters:
+def _letters(spec: Spec, definitions: Sequence[Definition] = ()) -> DenseLetters:
     model = spec.model()
     state = spec.states(model, 1)[0]
     model.q, model.v = state.q, state.v
-    return DenseLetters(model)
+    return DenseLetters(model, definitions)
 
 
 def _proof(source: str) -> Any:

@@ -234,3 +234,15 @@ def test_a_search_that_tried_too_little_says_so():
     text = repr(report).replace("\n    ", " ")
     assert report.untried and not report.true_where
     assert "FALSE in general; hypotheses under which it may be true were not all tried" in text and "not all were tried" in text
+
+
+def test_a_map_is_saved_as_a_page_or_a_picture(tmp_path):
+    found = pc.truth("HG == I", smallest_case=False)
+    page = found.save(tmp_path / "map.html").read_text()
+    assert page.startswith("<!DOCTYPE html>") and found._repr_html_() in page and "src=" not in page
+    for ending, begins in ((".png", b"\x89PNG"), (".pdf", b"%PDF"), (".svg", b"<?xml")):
+        assert found.save(tmp_path / f"map{ending}").read_bytes().startswith(begins)
+    with pytest.raises(pc.EvaluationError, match="a truth map is written to a file that ends in .html, .png, .svg, .pdf"):
+        found.save(tmp_path / "map.gif")
+    with pytest.raises(FileNotFoundError):
+        found.save(tmp_path / "nowhere" / "map.png")

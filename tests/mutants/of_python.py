@@ -2,10 +2,20 @@
 
 CHANGES = {
     "pycraft/viewer/live_scene.py": [
-        ("every piece begins at t = 0", "continued(self.scene, self.t, self.t + seconds", "continued(self.scene, 0.0, seconds"),
+        ("every piece begins at t = 0", "continued(self.acting, self.t, self.t + seconds", "continued(self.acting, 0.0, seconds"),
         ("effects' own states are not kept", "self._keep(run.states[-1])", "pass"),
-        ("the ghost has all effects", " and called != name)", ")"),
+        ("the ghost has all effects", " and called != off)", ")"),
         ("velocities are those of the bodies' origins", " + np.cross(V[:, :3], places)", ""),
+    ],
+    "pycraft/viewer/hands.py": [
+        ("a push has no moment about the body's origin", "np.cross(arm, self.force)", "np.zeros(3)"),
+        ("a push is not damped", " - self.damping * velocity", ""),
+        ("a push is as stiff for light bodies", ", STIFFEST * mass / seconds**2)", ", np.inf)"),
+        ("free hinges are led", 'if kind != "free"', ""),
+    ],
+    "pycraft/scenes/animated_bodies.py": [
+        ("keys may lie on far sides of the sphere", "q[:-1]) < 0", "q[:-1]) < -2"),
+        ("the film is as long as the run", "(times - times[0]) / faster", "times - times[0]"),
     ],
     "pycraft/viewer/server.py": [
         ("foreign origins are answered", "if known and not foreign and", "if known and"),
@@ -150,6 +160,18 @@ CHANGES = {
         ("accents move the caret", "sum(not unicodedata.combining(c) for c in self.typed[begin:origin])", "origin - begin"),
         ("powers of ten upside down", 'r"\\1e\\2"', 'r"\\1e-\\2"'),
     ],
+    "pycraft/identities/definitions.py": [
+        ("definitions behind in the order of the text", "for d in reversed(made_behind)", "for d in made_behind"),
+        ("spaces of LaTeX divide a text", 'if i and text[i - 1] == "\\\\" and c in ",;:{}":', "if False:"),
+    ],
+    "pycraft/identities/vocabulary.py": [
+        ("letters of the book are made of the user's", "dict(definitions=among, dialect={}, own=self._of_the_book())", "dict(dialect={})"),
+        ("a letter has its first meaning", "self._choice.get(name, 0)", "0"),
+    ],
+    "pycraft/identities/standard_letters.py": [
+        ("forces without rotors", '"H f + J vdot"', '"H f"'),
+        ("a Coriolis matrix without its transposed half", "momentum_cross + V_bar M + M V_tilde", "momentum_cross"),
+    ],
     "pycraft/identities/truth.py": [
         (
             "hypotheses do not imply each other",
@@ -178,7 +200,8 @@ CHANGES = {
     ],
     "pycraft/identities/block_values.py": [
         ("a block's transpose is the block", "Block(x.array.T, _dual(x.domain)", "Block(x.array, _dual(x.domain)"),
-        ("children are all bodies", "if not of or p == bodies[of]]", "if True]"),
+        ("children are all bodies", "[k for k, p in enumerate(parents) if p == of]", "[*range(len(parents))]"),
+        ("determinants without signs", "pivots.append(work[k, k] if row == k else -work[k, k])", "pivots.append(work[k, k])"),
         ("extended numbers are doubles", "high.astype(np.longdouble) + low.astype(np.longdouble)", "high.astype(np.longdouble)"),
     ],
     "pycraft/identities/block_check.py": [
@@ -365,7 +388,7 @@ CHANGES = {
         ("frames stand where they are now", "model.frame(frame).pose(q, t=t)", "model.frame(frame).pose(q)"),
     ],
     "pycraft/dynamics/hybrid.py": [
-        ("prepared calls of an edited model stay slow", "ready[0] = made()  # of the model as it is now", "pass"),
+        ("prepared calls of an edited model stay slow", "self._ready = self._made()  # of the model as it is now", "pass"),
     ],
     "pycraft/models/structure.py": [
         ("a root moves away from what acts on it", "in scene._acting_on(set(range(free.start, free.stop)))", "in ()"),

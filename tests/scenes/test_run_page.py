@@ -114,11 +114,11 @@ def test_events_are_marked():
 
 
 def test_pages_are_small_and_alike(run, tmp_path):
-    """64 bytes a body and frame, and what every page has: under 40 kB."""
+    """64 bytes a body and frame, and what every page has: under 50 kB."""
     page = run.to_html(fps=100)
     assert page.html == run.to_html(fps=100).html
     assert len(held(page)["poses"]) == 64 * 2 * 201
-    assert len(page.html) - len(json.dumps(held(page))) < 40_000
+    assert len(page.html) - len(json.dumps(held(page))) < 50_000
     run.animate(tmp_path / "film.html", fps=30)
     run.to_html(tmp_path / "page.html", fps=30)
     assert (tmp_path / "film.html").stat().st_size > 10 * (tmp_path / "page.html").stat().st_size
