@@ -271,7 +271,9 @@ def _explain(report: CheckReport, text: str, **options: Any) -> None:
         else:
             if found.partial:
                 count = sum(cell.models for cell in found)
-                report.notes.append(f"every hypothesis was tried, on {count} models in all; the search ended {spent}, before the largest models")
+                report.notes.append(
+                    f"every hypothesis was tried, on {count} models in all; the search ended {spent}, before the largest models"
+                )
             report.true_where = saving(found, options.get("traits"))
 
 

@@ -89,7 +89,14 @@ def nan_at(shape, *place):
 def test_a_nan_in_a_batch_is_named_with_its_state(axis):
     model = pc.chain(3)
     given = {name: np.zeros((5, 3)) for name in ("q", "v", "tau")} | {axis: nan_at((5, 3), 2, 1)}
-    calls = {"forward_dynamics": 3, "inverse_dynamics": 3, "interbody_forces": 3, "bias_forces": 2, "mass_matrix": 1, "mass_matrix_inverse": 1}
+    calls = {
+        "forward_dynamics": 3,
+        "inverse_dynamics": 3,
+        "interbody_forces": 3,
+        "bias_forces": 2,
+        "mass_matrix": 1,
+        "mass_matrix_inverse": 1,
+    }
     for call, takes in calls.items():
         chosen = list(given.values())[:takes]
         if axis not in list(given)[:takes]:
