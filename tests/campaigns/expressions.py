@@ -386,7 +386,7 @@ def seed_run(seed, expressions=EXPRESSIONS, note=None):
     return done, faults
 
 
-REFUSED = ("comes from outside and computes in double precision only",)
+REFUSED = ("comes from outside and computes in double precision only", "have no derivative here")
 """Messages that refuse a way for a reason of its own."""
 
 

@@ -87,14 +87,24 @@ def test_trace_and_determinant_beside_refined_solves():
         assert float(op.logdet().at(model.q, refine=1)) == pytest.approx(np.linalg.slogdet(wanted)[1], abs=256 * condition * EPS["double"])
 
 
-def test_functions_of_named_vectors_beside_refined_solves():
-    """Blocks made of a vector that changes from run to run: the twin takes the vector as it is now."""
-    model = pc.chain(4, seed=1)
+def test_functions_of_vectors_beside_refined_solves():
+    """Blocks made of velocities, and of accelerations that are named and change from run to run: the twin takes them as they are now."""
+    model, rng = pc.chain(4, seed=1), np.random.default_rng(0)
     model.v = model.random_state(1).v
-    soa = model.soa
-    moving = soa.H @ soa.V_bar @ soa.H.T + soa.I
-    A, B = (soa.MM + 3 * moving).inv(), (soa.MM + 2 * soa.I).inv()
+    soa, a, w = model.soa, pc.vector("a", model.soa.Theta), pc.vector("w", model.soa.Theta)
+    moving = soa.H @ soa.M @ soa.V_tilde @ soa.H.T
+    A, B = soa.MM + 0.2 * moving + 3 * soa.I, soa.MM + 2 * soa.I
+    C = A + 0.1 * moving.dot(vdot=a)
     for v in (model.v, -2 * model.v, model.v):
-        bound = (A + B).at(model.q, v, refine=1)
-        dense = np.linalg.inv((soa.MM + 3 * moving).at(model.q, v).dense()) + np.linalg.inv((soa.MM + 2 * soa.I).at(model.q, v).dense())
-        np.testing.assert_allclose(bound.dense(), dense, rtol=0, atol=1e-12 * np.abs(dense).max())
+        dense = np.linalg.inv(A.at(model.q, v).dense()) + np.linalg.inv(B.at(model.q, v).dense())
+        for refine in (0, 1, "auto"):
+            bound = (A.inv() + B.inv()).at(model.q, v, refine=refine)
+            np.testing.assert_allclose(bound.dense(), dense, rtol=0, atol=1e-12 * np.abs(dense).max())
+    for refine in (0, 1):
+        solve = ((C.inv() + B.inv()) @ w).at(model.q, model.v, refine=refine)
+        for _ in range(3):
+            x, y = rng.normal(size=(2, 4))
+            columns = [(C @ w).at(model.q, model.v).value(a=x, w=e) for e in np.eye(4)]
+            whole = np.array(columns).T
+            wanted = np.linalg.solve(whole, y) + np.linalg.solve(B.at(model.q).dense(), y)
+            np.testing.assert_allclose(solve.value(a=x, w=y), wanted, rtol=0, atol=1e-12 * np.abs(wanted).max())
