@@ -16,10 +16,16 @@ _TO_Y_UP = {0: (0.0, 0.0, 0.5**0.5, 0.5**0.5), 1: (0.0, 0.0, 0.0, 1.0), 2: (-(0.
 """x, y, z, w of the turn from the world's upright axis to y, which is upright in glTF."""
 
 
+def checked_gltf(path: Any) -> Path:
+    """A path that glTF can be written to; the same errors as `to_gltf`, before a run and not after it."""
+    target = writable_target(path, ENDINGS, "glTF")
+    _pygltflib()
+    return target
+
+
 def to_gltf(run: Any, output: Any, fps: Any, speed: Any) -> Path:
     """`Run.to_gltf`."""
-    target = writable_target(output, ENDINGS, "glTF")
-    pygltflib = _pygltflib()
+    target, pygltflib = checked_gltf(output), _pygltflib()
     document = _Document(pygltflib, AnimatedBodies(run, fps, speed)).made
     if target.suffix == ".gltf":
         document.convert_buffers(pygltflib.BufferFormat.DATAURI)

@@ -15,9 +15,16 @@ from .animated_bodies import AnimatedBodies, Solid, linear_colour
 ENDINGS = (".usda", ".usdc", ".usd")
 
 
+def checked_usd(path: Any) -> Path:
+    """A path that USD can be written to; the same errors as `to_usd`, before a run and not after it."""
+    target = writable_target(path, ENDINGS, "USD")
+    _usd()
+    return target
+
+
 def to_usd(run: Any, output: Any, fps: Any, speed: Any) -> Path:
     """`Run.to_usd`."""
-    target = writable_target(output, ENDINGS, "USD")
+    target = checked_usd(output)
     Gf, Usd, UsdGeom, Vt = _usd()
     seen = AnimatedBodies(run, fps, speed)
     stage = Usd.Stage.CreateInMemory()

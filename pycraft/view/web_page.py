@@ -26,7 +26,8 @@ def web_page(name: str, title: str, data: dict[str, Any], texts: dict[str, str],
     Examples
     --------
     >>> from pycraft.view.web_page import web_page
-    >>> "<script>" in web_page("film", "a < b", {"key": "</script>"}, {"said": "", "speeds": ""}).split("</script>")[0]
+    >>> texts = dict.fromkeys(("said", "speeds", "notes", "crossed"), "")
+    >>> "<script>" in web_page("film", "a < b", {"key": "</script>"}, texts).split("</script>")[0]
     False
     """
     own = "'self'" if asks else "'none'"
