@@ -639,7 +639,8 @@ class Scalar:
         """
     def gradient(self, over: str = 'coordinates') -> typing.Any:
         """
-        All derivatives at once, as an array: over "coordinates" (nv,), or (B, nv) where a batch is bound. Of ln det(HφMφ*H* [+ J]) and
+        All derivatives at once, as an array: over "coordinates" (nv,), or (B, nv) where a batch is bound; where loops are embedded along the
+        independent coordinates, zero where nothing moves. Of ln det(HφMφ*H* [+ J]) and
         ln det D in three sweeps, O(N), and then also over "inertias", "geometry", "axes" (see
         Multibody.log_determinant_gradient); of any other scalar one derivative after the other, O(N) each.
         """
@@ -1475,6 +1476,10 @@ def _loop_operators_again(arg0: typing.Any) -> typing.Any:
     """
 def _make(arg0: str, arg1: collections.abc.Sequence[Operator], arg2: float | fractions.Fraction) -> Operator:
     ...
+def _moved(operands: collections.abc.Sequence[Operator]) -> SkoSource:
+    """
+    Whose coordinates diff() is along: embedded loops or a multibody model; None where nothing moves.
+    """
 def _parted(mass: tuple, name: str, pose: tuple, welded: tuple, welded_name: str) -> tuple:
     """
     The first body's mass properties without those of the one welded to it.
