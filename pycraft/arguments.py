@@ -152,7 +152,7 @@ class FixedList(list[Any]):
     def __init__(self, items: Iterable[Any]):
         super().__init__(map(fixed, items))
 
-    __setitem__ = __delitem__ = __iadd__ = __imul__ = append = extend = insert = pop = remove = clear = sort = reverse = _refuse  # type: ignore[assignment]
+    __setitem__ = __delitem__ = __iadd__ = __imul__ = append = extend = insert = pop = remove = clear = sort = reverse = _refuse  # type: ignore[assignment]  # none of them changes anything
 
     def __reduce__(self) -> tuple[type, tuple[list[Any]]]:
         return type(self), (list(self),)
@@ -164,7 +164,7 @@ class FixedMapping(dict[Any, Any]):
     def __init__(self, items: Mapping[Any, Any]):
         super().__init__({key: fixed(value) for key, value in items.items()})
 
-    __setitem__ = __delitem__ = __ior__ = clear = pop = popitem = setdefault = update = _refuse  # type: ignore[assignment]
+    __setitem__ = __delitem__ = __ior__ = clear = pop = popitem = setdefault = update = _refuse  # type: ignore[assignment]  # none of them changes anything
 
     def __reduce__(self) -> tuple[type, tuple[dict[Any, Any]]]:
         return type(self), (dict(self),)
