@@ -278,7 +278,7 @@ void CompiledScene<S>::change_velocities(const S& t, const S* q, S* v, const S* 
   }
   for (const auto& e : forces_.effects())
     for (int j : e->declared.prescribed)
-      if (e->worker >= 0) gained[e->worker] += needed_[j] * (v[j] + change_[j] / S(2));
+      if (e->worker >= 0) gained[e->worker] += needed_[j] * (S(2) * v[j] + change_[j]) / S(2);
   for (int j = 0; j < nv_; ++j) v[j] += change_[j];
   for (int j : prescribed_) v[j] = wanted[j];
 }
