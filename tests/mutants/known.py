@@ -105,6 +105,7 @@ AREAS = {
     "cpp/recursions/loop_columns.h": ["models/test_constrained_dynamics.py"],
     "pycraft/dynamics/constrained.py": ["models/test_constrained_dynamics.py"],
     "cpp/dynamics/singular_hinges.h": ["sweeps/test_minimum_norm.py", "sweeps/test_singular_forms.py"],
+    "cpp/model/rotor_forces.h": ["dynamics/test_rotors.py", "scenes/test_rotors_of_scenes.py"],
     "cpp/recursions/point_accelerations.h": ["dynamics/test_galilean.py"],
     "cpp/rigid/rigid_elimination.h": ["sweeps/test_singular_hinges.py", "sweeps/test_refinement_rounding.py"],
     "cpp/rigid/rigid_residuals.h": ["sweeps/test_singular_hinges.py", "sweeps/test_refinement_rounding.py"],
