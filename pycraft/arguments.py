@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -139,3 +140,73 @@ def limit_pair(what: str, limits: Any) -> tuple[Any, Any]:
     except (TypeError, ValueError):
         raise _core.ModelError(f"limits of {what} are a pair (lower, upper), not {limits!r}") from None
     return lower, upper
+
+
+def _refuse(self: Any, *_: Any, **__: Any) -> Any:
+    raise TypeError(f"this {type(self).__mro__[1].__name__} stays as it is: set the field that holds it anew")
+
+
+class FixedList(list[Any]):
+    """A list that stays as it is."""
+
+    def __init__(self, items: Iterable[Any]):
+        super().__init__(map(fixed, items))
+
+    __setitem__ = __delitem__ = __iadd__ = __imul__ = append = extend = insert = pop = remove = clear = sort = reverse = _refuse  # type: ignore[assignment]  # none of them changes anything
+
+    def __reduce__(self) -> tuple[type, tuple[list[Any]]]:
+        return type(self), (list(self),)
+
+
+class FixedMapping(dict[Any, Any]):
+    """A mapping that stays as it is."""
+
+    def __init__(self, items: Mapping[Any, Any]):
+        super().__init__({key: fixed(value) for key, value in items.items()})
+
+    __setitem__ = __delitem__ = __ior__ = clear = pop = popitem = setdefault = update = _refuse  # type: ignore[assignment]  # none of them changes anything
+
+    def __reduce__(self) -> tuple[type, tuple[dict[Any, Any]]]:
+        return type(self), (dict(self),)
+
+
+def fixed(value: Any) -> Any:
+    """A copy of what a user gave that nobody can change: read-only arrays, and lists, mappings and sets that stay as they are.
+
+    A piecewise polynomial of SciPy's is copied with its arrays; anything else is itself, as is a read-only array with numbers of its own.
+    """
+    if type(value) is np.ndarray and value.base is None and not value.flags.writeable:
+        return value
+    if isinstance(value, np.ndarray) or (hasattr(value, "__array__") and not isinstance(value, np.generic)):
+        return read_only(np.array(value))
+    if isinstance(value, tuple) and hasattr(value, "_fields"):
+        return type(value)(*map(fixed, value))
+    if isinstance(value, tuple):
+        return tuple(map(fixed, value))
+    if isinstance(value, list):
+        return FixedList(value)
+    if isinstance(value, Mapping):
+        return FixedMapping(value)
+    if isinstance(value, set):
+        return frozenset(value)
+    if callable(value) and isinstance(getattr(value, "c", None), np.ndarray) and isinstance(getattr(value, "x", None), np.ndarray):
+        own = copy(value)
+        own.c, own.x = read_only(np.array(value.c)), read_only(np.array(value.x))
+        return own
+    return value
+
+
+def read_only(array: np.ndarray) -> np.ndarray:
+    """The array itself, which can no longer be written."""
+    array.setflags(write=False)
+    return array
+
+
+class Fixed:
+    """A frozen dataclass that copies what it is given, and gives out what nobody can change."""
+
+    def __post_init__(self) -> None:
+        self.__setstate__(dict(vars(self)))
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update({name: fixed(value) for name, value in state.items()})

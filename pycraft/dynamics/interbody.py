@@ -246,6 +246,16 @@ def is_reaction(part: Any) -> bool:
     return part == "reaction"
 
 
+def refuse_state(hinges: Any) -> None:
+    """ModelError where a state stands in the place of names of hinges."""
+    if (
+        hasattr(hinges, "q")
+        or isinstance(hinges, np.ndarray)
+        or (isinstance(hinges, Sequence) and any(isinstance(x, (int, float)) for x in hinges))
+    ):
+        raise _core.ModelError("the first argument names hinges, and numbers of a state are given: write interbody_forces(q=q, v=v)")
+
+
 def hinge_numbers(model: Any, hinges: Any) -> Any:
     """What picks the rows of these hinges: a number of one, a list of several."""
     if hinges is None:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import fixed
 from .offers import Offer
 from .shapes import Shape
 
@@ -29,9 +30,9 @@ class Beside:
         "gravity" (3,), m/s²; per coordinate (nv,), NaN where the file has none: "damping", "quadratic damping", "friction", "stiffness",
         and "effort limit", "velocity limit"; "spring rest" (nq,), where springs are slack, if that is not zero.
         `pycraft.effects.from_model` makes effects of them; `integrate_ode(..., damping=np.nan_to_num(arm.left_aside["damping"]))` takes
-        the first of these.
+        the first of these. The arrays are read-only.
         """
-        return dict(self._left_aside)
+        return {name: fixed(values) for name, values in self._left_aside.items()}
 
     @property
     def actuators(self) -> list[dict[str, Any]]:
@@ -41,7 +42,7 @@ class Beside:
         and "why not" of one that no effect is, else None. With a control u the force at the coordinate is gear · clip(gain u + bias · (1,
         gear q, gear v), force range).
         """
-        return [dict(actuator) for actuator in self._actuators]
+        return [{key: fixed(value) for key, value in actuator.items()} for actuator in self._actuators]
 
     @property
     def offers(self) -> list[Offer]:

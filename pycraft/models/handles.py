@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..arguments import limit_pair, pose_parts, text, whole
+from ..arguments import limit_pair, pose_parts, read_only, text, whole
 from ..closed import Closed
 from .with_operators import WithOperators
 
@@ -36,7 +36,8 @@ def _source(model: WithOperators) -> _core.MultibodyOperators:
 class Body(Closed):
     """A body of a model: `.mass` (kg), `.com` (3,) in the body frame (m), `.inertia` (3, 3) about the centre of mass (kg m²).
 
-    The values can be set; each is checked (see `Multibody.add_body`). `.hinge` is the hinge that carries the body.
+    The values can be set; each is checked (see `Multibody.add_body`). Arrays are copied on the way in, and read-only. `.hinge` is the
+    hinge that carries the body.
     """
 
     def __init__(self, model: WithOperators, name: str):
@@ -64,7 +65,7 @@ class Body(Closed):
 
     @property
     def com(self) -> np.ndarray:
-        return self._data()["com"]
+        return read_only(self._data()["com"])
 
     @com.setter
     def com(self, value: Vector) -> None:
@@ -72,7 +73,7 @@ class Body(Closed):
 
     @property
     def inertia(self) -> np.ndarray:
-        return self._data()["inertia"]
+        return read_only(self._data()["inertia"])
 
     @inertia.setter
     def inertia(self, value: np.ndarray) -> None:
@@ -114,6 +115,7 @@ class Hinge(Closed):
     """A hinge: `.kind`, `.subhinges` (kind, axis, point, pitch of each), `.placement` (4, 4), `.q_slice`, `.v_slice`, `.rotor_inertia`.
 
     `.placement` is the pose of the hinge's inboard frame in the parent body's frame; `.limits` are (lower, upper) per coordinate, or None.
+    Arrays are copied on the way in, and read-only.
     """
 
     def __init__(self, model: WithOperators, name: str):
@@ -136,14 +138,15 @@ class Hinge(Closed):
 
     @property
     def subhinges(self) -> list[dict[str, Any]]:
-        return self._data()["subhinges"]
+        parts = self._data()["subhinges"]
+        return [{key: read_only(value) if isinstance(value, np.ndarray) else value for key, value in part.items()} for part in parts]
 
     @property
     def placement(self) -> np.ndarray:
         pose = np.eye(4)
         placement = self._data()["placement"]
         pose[:3, :3], pose[:3, 3] = placement["rotation"], placement["position"]
-        return pose
+        return read_only(pose)
 
     @placement.setter
     def placement(self, pose: np.ndarray) -> None:
@@ -153,7 +156,7 @@ class Hinge(Closed):
     @property
     def rotor_inertia(self) -> np.ndarray:
         """Inertia that a rotor adds along each coordinate, reflected through its gear (kg m² or kg): the block J(k)."""
-        return self._data()["rotor_inertia"]
+        return read_only(self._data()["rotor_inertia"])
 
     @rotor_inertia.setter
     def rotor_inertia(self, value: float | Vector) -> None:
@@ -188,7 +191,7 @@ class Hinge(Closed):
     @property
     def limits(self) -> tuple[np.ndarray, np.ndarray] | None:
         data = self._data()
-        return (data["lower"], data["upper"]) if len(data["lower"]) else None
+        return (read_only(data["lower"]), read_only(data["upper"])) if len(data["lower"]) else None
 
     @limits.setter
     def limits(self, limits: tuple[float | Vector, float | Vector] | None) -> None:
@@ -236,7 +239,7 @@ class Node(Closed):
     def pose(self) -> np.ndarray:
         data, pose = self._data(), np.eye(4)
         pose[:3, :3], pose[:3, 3] = data["rotation"], data["position"]
-        return pose
+        return read_only(pose)
 
     def __repr__(self) -> str:
         return f"<node {self.name!r} on {self.body.name if self.body else 'the base'!r}>"

@@ -6,9 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arguments import Fixed
+
 
 @dataclass(frozen=True, eq=False)
-class HeldWeight:
+class HeldWeight(Fixed):
     """A part of a body that is held up against gravity.
 
     Attributes
@@ -26,7 +28,7 @@ class HeldWeight:
 
 
 @dataclass(frozen=True, eq=False)
-class BoxInFluid:
+class BoxInFluid(Fixed):
     """A box that a fluid resists: see `pycraft.effects.FluidDrag`.
 
     Attributes

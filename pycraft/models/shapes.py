@@ -11,6 +11,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from ..arguments import Fixed
+
 SIZES = {
     "box": "lengths of its edges",
     "sphere": "radius",
@@ -23,7 +25,7 @@ SIZES = {
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class Shape(Fixed):
     """One shape.
 
     Attributes

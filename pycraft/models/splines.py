@@ -13,7 +13,7 @@ from .. import _core
 class Spline:
     """``follower = s(driver)``, s the cubic spline through points: the `function` of a coupling of two coordinates, [driver, follower].
 
-    s has two continuous derivatives everywhere. Beyond its ends, where its curvature is zero, it goes on straight; a periodic one repeats.
+    s has two continuous derivatives between its ends. Beyond them it goes on straight; a periodic one repeats.
 
     Parameters
     ----------
@@ -23,13 +23,18 @@ class Spline:
         Those of the one that follows, there.
     periodic : bool
         The last point is the first one, a period on: of a cam, driver[-1] - driver[0] = 2π. At least three points.
+    ends : {"not-a-knot", "natural", "clamped"}; not of a periodic one
+        "not-a-knot": one cubic through the first two intervals, and one through the last two, as SciPy's CubicSpline has it. With a
+        function's own values at distance h, s is off by O(h⁴) everywhere; its curvature ends at the ends, where accelerations jump if
+        they are passed. "natural": without curvature at the ends, so that nothing jumps there; off by O(h²) near them where the
+        function has some. "clamped": without slope, off by O(h).
 
     Raises
     ------
     ModelError
         Arrays of other shapes, numbers that are not finite, drivers that do not ascend, ends of a periodic spline that differ.
 
-    Source: C. de Boor, A Practical Guide to Splines, Springer 2001, ch. IV (natural and periodic cubic splines), by SciPy's CubicSpline.
+    Source: C. de Boor, A Practical Guide to Splines, Springer 2001, ch. IV, by SciPy's CubicSpline.
 
     Examples
     --------
@@ -41,9 +46,13 @@ class Spline:
     0.05
     """
 
-    def __init__(self, driver: Any, follower: Any, *, periodic: bool = False):
+    def __init__(self, driver: Any, follower: Any, *, periodic: bool = False, ends: str = "not-a-knot"):
         from scipy.interpolate import CubicSpline
 
+        if ends not in ("not-a-knot", "natural", "clamped"):
+            raise _core.ModelError(f"a spline's ends are 'not-a-knot', 'natural' or 'clamped', not {ends!r:.80}")
+        if periodic and ends != "not-a-knot":
+            raise _core.ModelError(f"a periodic spline has no ends; leave out ends={ends!r}")
         x, y = (np.array(_core.real_array(given, f"{what} of a spline")) for given, what in ((driver, "driver"), (follower, "follower")))
         least = 3 if periodic else 2
         if x.ndim != 1 or x.shape != y.shape or len(x) < least:
@@ -59,7 +68,7 @@ class Spline:
         y[-1] = y[0] if periodic else y[-1]
         try:
             with np.errstate(all="ignore"):
-                spline = CubicSpline(x, y, bc_type="periodic" if periodic else "natural")
+                spline = CubicSpline(x, y, bc_type="periodic" if periodic else ends)
         except ValueError:  # of slopes that are not finite
             spline = None
         if spline is None or not np.isfinite(spline.c).all():

@@ -10,7 +10,7 @@ from .. import _core
 from ..arguments import moment
 from ..dynamics.equilibrium import TOLERANCE, Balance, Equilibrium, solved
 from ..dynamics.equilibrium_on_loops import solved_on_loops
-from ..dynamics.interbody import forces_of_scene
+from ..dynamics.interbody import forces_of_scene, refuse_state
 from ..dynamics.statics import held_by
 from ..state import at_state, moment_of
 
@@ -49,6 +49,7 @@ class Statics:
         >>> scene.interbody_forces("hinge0", [0.0]).tolist()  # falling from level, the pin carries a quarter of the weight
         [0.0, 0.0, 0.0, 0.0, 2.5, 0.0]
         """
+        refuse_state(hinges)
         t, states = moment_of(q, t, states)
         q, v = (np.asarray(_core.real_array(x, name), float) for x, name in zip(at_state(self.model, q, v), "qv", strict=True))
         for x, name, width in ((q, "q", self.model.nq), (v, "v", self.model.nv)):

@@ -62,8 +62,16 @@ def run_times(start: float, T: Any, t_eval: Any) -> tuple[list[float], slice]:
     if t_eval is None:
         return [start, end], slice(None)
     times = np.atleast_1d(_core.real_array(t_eval, "t_eval"))
-    if times.ndim != 1 or not times.size or not np.isfinite(times).all() or not (np.diff(times) > 0).all():
-        raise _core.EvaluationError("t_eval: a rising list of times in seconds")
+    if times.ndim != 1 or not times.size:
+        raise _core.EvaluationError(f"t_eval: times (K,) in seconds, one at least, not an array {times.shape}")
+    if not np.isfinite(times).all():
+        at = int(np.flatnonzero(~np.isfinite(times))[0])
+        raise _core.EvaluationError(f"t_eval: entry {at} is {times[at]:g}; times are finite numbers of seconds")
+    if not (np.diff(times) > 0).all():
+        at = int(np.flatnonzero(~(np.diff(times) > 0))[0])
+        raise _core.EvaluationError(
+            f"t_eval: entry {at + 1} is {times[at + 1]:g} s after {times[at]:g} s; times rise: np.unique(t_eval) sorts them"
+        )
     if times[0] < start or times[-1] > end:
         raise _core.EvaluationError(f"t_eval goes from {times[0]:g} to {times[-1]:g} s; the run goes from {start:g} to T = {end:g} s")
     before, after = times[0] > start, times[-1] < end

@@ -199,7 +199,7 @@ def test_a_placement_that_is_set_on_the_carrier_moves_along():
     model = pc.chain(3, seed=1)
     model.lock("hinge1")
     model.coalesce()
-    moved = model.hinges["hinge2"].placement
+    moved = model.hinges["hinge2"].placement.copy()
     moved[:3, 3] += (0.0, 0.5, 0.0)
     model.hinges["hinge2"].placement = moved
     pose = model.pose("body2")

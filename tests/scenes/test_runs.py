@@ -177,7 +177,7 @@ def test_progress_is_shown_in_a_terminal(monkeypatch, capsys):
         (dict(max_step=0.0), "max_step=0.0: a step is a positive number of seconds"),
         (dict(T=0.0), "T=0: a run lasts a positive number of seconds"),
         (dict(T=np.inf), "T=inf: a run lasts"),
-        (dict(t_eval=[0.5, 0.2]), "t_eval: a rising list of times"),
+        (dict(t_eval=[0.5, 0.2]), r"t_eval: entry 1 is 0.2 s after 0.5 s; times rise"),
         (dict(t_eval=[0.5, 2.0]), "t_eval goes from 0.5 to 2 s; the run goes from 0 to T = 1 s"),
         (dict(rtol=1e-20, atol=1e-20), "rtol=1e-20 and atol=1e-20 are below what the precision holds"),
         (dict(atol=0.0), "atol is positive"),

@@ -77,7 +77,7 @@ WRONG = [
     (lambda: E.TorqueSource(E.Table([0, 1], [1, 2, 3])), r"a table takes times \(K,\) and values"),
     (
         lambda: E.TorqueSource(E.Spline([0, 1], [1, 2], ends="loose")),
-        "a spline's ends are 'clamped', 'natural' or 'not-a-knot', not 'loose'",
+        "a spline's ends are 'not-a-knot', 'natural' or 'clamped', not 'loose'",
     ),
     (lambda: E.Servo(1.0, [1, 2]), "servo: damping takes one number, or one for each of its 3"),
     (lambda: E.Motor(1.0, 0.0, 1.0), "motor: stall_torque is 0; it is positive"),
@@ -132,7 +132,7 @@ def test_what_drives_instead_of_braking_is_warned_of(arm, effect):
         (dict(integrator="rk4"), "integrator 'rk4' takes steps of one size: give step="),
         (dict(step=-1.0), "step=-1.0: a step is a positive number"),
         (dict(rtol=0, atol=1e-20), "are below what the precision holds"),
-        (dict(t_eval=[0.5, 0.2]), "t_eval: a rising list of times"),
+        (dict(t_eval=[0.5, 0.2]), r"t_eval: entry 1 is 0.2 s after 0.5 s; times rise"),
         (dict(t_eval=[0.5, 2.0]), "t_eval goes from 0.5 to 2 s; the run goes from 0 to T = 1 s"),
         (dict(t_eval=[]), "t_eval: a rising list"),
         (dict(normalise="often"), "normalise='often': there are 'never' and 'each step'"),

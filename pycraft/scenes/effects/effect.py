@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ... import _core
-from ...arguments import listed, text
+from ...arguments import fixed, listed, text
 from ...closed import Closed
 from .checked_arguments import Checked
 
@@ -18,12 +18,16 @@ from .checked_arguments import Checked
 class Effect(Closed, metaclass=Checked):
     """An effect: what acts on a model where a scene has it. Its fields can be set; a scene takes the change at its next call.
 
+    What is given is copied: fields hold read-only arrays, and lists and mappings that stay as they are. A number in one of them is
+    changed by setting the field anew.
+
     Subclasses are dataclasses whose fields are what a user gives, and say in `made_for` what they are in the core. A class attribute
     `_example` is the call that an error about its arguments shows.
     """
 
     _changes = 0
     _example = ""
+    _several: tuple[str, ...] = ()  # fields whose items are values each
 
     @classmethod
     def kind(cls) -> str:
@@ -43,9 +47,13 @@ class Effect(Closed, metaclass=Checked):
         return self
 
     def __setattr__(self, name: str, value: Any) -> None:
-        super().__setattr__(name, value)
+        super().__setattr__(name, fixed(value) if name in getattr(self, "__dataclass_fields__", ()) else value)
         if not name.startswith("_"):
             object.__setattr__(self, "_changes", self._changes + 1)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        own = {field.name for field in fields(self)}  # type: ignore[arg-type]  # subclasses are dataclasses
+        self.__dict__.update({name: fixed(value) if name in own else value for name, value in state.items()})
 
     def named(self) -> set[str]:
         """What its fields name of a model: bodies, nodes, hinges, and of coordinates "hinge[j]" the hinge, too."""
@@ -55,7 +63,7 @@ class Effect(Closed, metaclass=Checked):
     def by_coordinate(self) -> set[str]:
         """Hinges whose coordinates it takes one by one: "hinge[j]", and lists of numbers by hinge; "" where a list is of those of all."""
         found: set[str] = set()
-        values = [getattr(self, field.name) for field in fields(self)]  # type: ignore[arg-type]  # subclasses are dataclasses
+        values = self.values()
         for value in values:
             for name in _each_text(value):
                 hinge, bracket, _ = name.partition("[")
@@ -66,6 +74,15 @@ class Effect(Closed, metaclass=Checked):
         if listed and hasattr(self, "hinges"):
             chosen = self.hinges
             found.update({""} if chosen is None else ("" if set(name) & set("*?") else name for name in _each_text(chosen)))
+        return found
+
+    def values(self, besides: tuple[str, ...] = ()) -> list[Any]:
+        """What its fields hold, besides these: each a value that may be of all coordinates or of each."""
+        found: list[Any] = []
+        for field in fields(self):  # type: ignore[arg-type]  # subclasses are dataclasses
+            value = getattr(self, field.name)
+            several = field.name in self._several and isinstance(value, (list, tuple))
+            found += [] if field.name in besides else value if several else [value]
         return found
 
     def parameters(self) -> dict[str, Any]:

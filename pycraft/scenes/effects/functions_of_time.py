@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from ... import _core
-from ...arguments import one_number
+from ...arguments import Fixed, one_number
 from .checked_arguments import Checked
 from .effect import plain
 
 
-class InTime(metaclass=Checked):
-    """A function of time that the core knows: no Python is called in a run."""
+class InTime(Fixed, metaclass=Checked):
+    """A function of time that the core knows: no Python is called in a run. Arrays are copied on the way in, and read-only."""
 
     def in_core(self) -> _core.FunctionOfTime:
         raise NotImplementedError
@@ -58,21 +58,27 @@ class Spline(InTime):
     ----------
     times : (K,) s, rising
     values : (K,) or (K, n)
-    ends : {"clamped", "natural", "not-a-knot"}
-        At the ends: at rest, without curvature, or as SciPy's CubicSpline has it by default.
+    ends : {"not-a-knot", "natural", "clamped"}
+        "not-a-knot": one cubic through the first two intervals, and one through the last two, as SciPy's CubicSpline has it. With a
+        function's own values at distance h it is off by O(h⁴) everywhere. "natural": without curvature at the ends, off by O(h²) near
+        them where the function has some. "clamped": at rest at the ends, off by O(h) near them where the function is not.
+
+    Where it is not at rest at an end, its rate jumps to zero there.
+
+    Source: C. de Boor, A Practical Guide to Splines, Springer 2001, ch. IV.
     """
 
     _example = "pc.effects.Spline([0, 1, 2], [0, 0.5, 0])"
 
     times: Any
     values: Any
-    ends: str = "clamped"
+    ends: str = "not-a-knot"
 
     def in_core(self) -> _core.FunctionOfTime:
         from scipy.interpolate import CubicSpline
 
-        if self.ends not in ("clamped", "natural", "not-a-knot"):
-            raise _core.ModelError(f"a spline's ends are 'clamped', 'natural' or 'not-a-knot', not {self.ends!r}")
+        if self.ends not in ("not-a-knot", "natural", "clamped"):
+            raise _core.ModelError(f"a spline's ends are 'not-a-knot', 'natural' or 'clamped', not {self.ends!r}")
         t, y = _points(self.times, self.values, "a spline")
         return _core.piecewise_polynomial(t.tolist(), CubicSpline(t, y, bc_type=self.ends).c, y.shape[1])
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -61,22 +60,17 @@ def acted_on(effect: Effect, model: Any) -> set[int]:
 
 def chosen(effect: Effect) -> list[str] | None:
     """Names of hinges and coordinates, and patterns, that it was given; None where it has no such, or acts on all."""
-    for value in _values(effect):
+    for value in effect.values():
         if isinstance(value, Mapping):
             return names_of(list(value), effect.kind())
     return names_of(getattr(effect, "hinges", getattr(effect, "hinge", None)), effect.kind())
-
-
-def _values(effect: Effect, besides: tuple[str, ...] = ()) -> list[Any]:
-    names = [field.name for field in fields(effect)]  # type: ignore[arg-type]  # subclasses are dataclasses
-    return [getattr(effect, name) for name in names if name not in besides]
 
 
 def _listed(effect: Effect) -> bool:
     """Whether some of its numbers are of coordinates one by one, in their order; those that depend on time may be."""
     if not hasattr(effect, "hinges"):
         return False
-    given = _values(effect, besides=("hinges", "function"))
+    given = effect.values(besides=("hinges", "function"))
     return any(isinstance(x, InTime) or callable(x) or (isinstance(x, (list, tuple, np.ndarray)) and np.size(x) > 1) for x in given)
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import log1p
 from typing import Any
 
 from ... import _core
@@ -24,18 +26,26 @@ class Limits(Effect):
     stiffness : N m/rad or N/m, k; one number or one for each coordinate
         None: ω² (ℳ + J)_jj at q = 0 with ω = 150 rad/s. A bounce then lasts about 20 ms, and a stop gives way by about g/ω² = 0.4 mm
         under a body's own weight.
-    dissipation : s/rad or s/m, a; about 3/2 (1 - e)/v for a coefficient of restitution e at the speed v
+    dissipation : s/rad or s/m, a; one number or one for each coordinate
     lower, upper : rad or m, one number or one for each coordinate; None: those of the model's hinges (`hinge.limits`)
     hinges : names of hinges, coordinates, patterns, or a list of them; None: all that have a limit
+    restitution : (e, v), in the place of `dissipation`
+        What meets a stop at the speed v, rad/s or m/s, leaves it at e v, 0 < e ≤ 1, where the stop is all that acts; each of the two one
+        number or one for each coordinate. Then a = α/v with α(1 + e) = ln((1 + α)/(1 - αe)), whatever the stiffness and the mass.
+        Slower ones lose a smaller share.
+
+    Source: K. H. Hunt, F. R. E. Crossley, J. Applied Mechanics 42, 1975; α follows by integrating v dv/(1 + a v) from v to -e v.
     """
 
     _example = "pc.effects.Limits(1e4)"
+    _several = ("restitution",)
 
     stiffness: Any = None
     dissipation: Any = 0.0
     lower: Any = None
     upper: Any = None
     hinges: Any = None
+    restitution: Any = None
 
     def completed_for(self, model: _core.Multibody) -> Limits:
         if self.stiffness is not None:
@@ -46,6 +56,53 @@ class Limits(Effect):
     def made_for(self, model: _core.Multibody) -> _core.Effect:
         if self.stiffness is None:
             return self.completed_for(model).made_for(model)
-        numbers = numbers_of(self.stiffness, "limits: stiffness"), numbers_of(self.dissipation, "limits: dissipation")
+        numbers = numbers_of(self.stiffness, "limits: stiffness"), self._dissipation()
         bounds = [[] if x is None else numbers_of(x, f"limits: {what}") for x, what in ((self.lower, "lower"), (self.upper, "upper"))]
         return _core.limits_effect(model, names_of(self.hinges, "limits"), *numbers, *bounds)
+
+    def _dissipation(self) -> list[float]:
+        given = numbers_of(self.dissipation, "limits: dissipation")
+        if self.restitution is None:
+            return given
+        if any(given):
+            raise _core.ModelError("limits: dissipation and restitution say the same thing in two ways; give one of them")
+        if not isinstance(self.restitution, Sequence) or len(self.restitution) != 2:
+            raise _core.ModelError(
+                f"limits: restitution is a pair (e, v), a coefficient and the speed where it holds, not {self.restitution!r:.80}"
+            )
+        shares, speeds = (
+            numbers_of(part, f"limits: {what} of restitution") for part, what in zip(self.restitution, ("e", "v"), strict=True)
+        )
+        if len(shares) != len(speeds) and 1 not in (len(shares), len(speeds)):
+            raise _core.ModelError(
+                f"limits: restitution has {len(shares)} coefficients and {len(speeds)} speeds; one number, or one for each coordinate"
+            )
+        count = max(len(shares), len(speeds))
+        return [dissipation(e, v) for e, v in zip(shares * (count // len(shares)), speeds * (count // len(speeds)), strict=True)]
+
+
+def dissipation(e: float, v: float) -> float:
+    """The a of a stop that gives back e v of a speed v: α/v, α(1 + e) = ln((1 + α)/(1 - αe)), by bisection. ModelError for others."""
+    if not 1e-300 < e <= 1:
+        raise _core.ModelError(f"limits: a coefficient of restitution is above 0 and no more than 1, not {e:g}")
+    if not 0 < v < float("inf"):
+        raise _core.ModelError(f"limits: restitution holds at a speed v that is positive and finite, not {v:g}")
+    low, high = 0.0, 1.0 / e
+    for _ in range(200):  # more than it takes until the two are neighbours
+        middle = (low + high) / 2
+        if middle * e < 1 and _log_beyond(middle) < _log_beyond(-middle * e):
+            low = middle
+        else:
+            high = middle
+    return low / v
+
+
+def _log_beyond(x: float) -> float:
+    """ln(1 + x) - x, to rounding of its own for a small x."""
+    if abs(x) > 0.1:
+        return log1p(x) - x
+    term, total = x, 0.0
+    for n in range(2, 20):
+        term *= -x
+        total += term / n
+    return total
