@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import csv
 import json
 import math
@@ -43,6 +44,12 @@ class TidyTable:
 
     def __getitem__(self, index: int) -> dict[str, Any]:
         return self.rows[index]
+
+    def part(self, rows: list[dict[str, Any]]) -> Any:
+        """The same table with some of its rows."""
+        other = copy.copy(self)
+        other.rows = list(rows)
+        return other
 
     # ------------------------------------------------------------------ ways out
     def to_pandas(self) -> Any:
@@ -95,6 +102,11 @@ class TidyTable:
         """Signs of `legend` for what the last column of the table says in words, where a terminal is too narrow for these."""
         return ""
 
+    @property
+    def note(self) -> str:
+        """A sentence below the displayed table."""
+        return ""
+
     def table(self, width: int | None = None) -> Any:
         """The rows as a rich table for a terminal of this width (the present one's where left out): no number and no word is cut.
 
@@ -122,7 +134,13 @@ class TidyTable:
                 del titles[self.common]
         own = _widths(titles.values(), cells)
         own[0] = max(12, min(own[0], width - sum(own[1:]) - len(own) + 1))
-        table = Table(title=plain(self.title), caption="; ".join(legend) or None, box=None, pad_edge=False, header_style="bold")
+        table = Table(
+            title=plain(self.title),
+            caption="\n".join(filter(None, ["; ".join(legend), plain(self.note)])) or None,
+            box=None,
+            pad_edge=False,
+            header_style="bold",
+        )
         table.title_justify = table.caption_justify = "left"
         table.padding = (0, 1, 0, 0)
         table.min_width = min(width, cell_len(self.title))
@@ -147,14 +165,18 @@ class TidyTable:
         return "\n".join(line.rstrip() for line in console.file.getvalue().rstrip().split("\n"))  # type: ignore[attr-defined]  # a StringIO
 
     def _repr_html_(self) -> str:
+        last = len(self.shown) - 1
+        kept = ["text-align:left;white-space:" + ("nowrap" if 0 < i < last else "normal") for i in range(last + 1)]  # numbers in one piece
         head = "".join(f"<th style='text-align:left'>{escape(heading)}</th>" for heading in self.shown.values())
         body = "".join(
             f"<tr style='{'font-weight:bold' if 'bold' in self.style(row) else ''}'>"
-            + "".join(f"<td style='text-align:left'>{escape(self.cell(key, row))}</td>" for key in self.shown)
+            + "".join(f"<td style='{style}'>{escape(self.cell(key, row))}</td>" for key, style in zip(self.shown, kept, strict=True))
             + "</tr>"
             for row in self.rows
         )
-        return f"<p><b>{escape(self.title)}</b></p><table style='font-size:85%'><tr>{head}</tr>{body}</table>"
+        note = f"<p>{escape(self.note)}</p>" if self.note else ""
+        table = f"<table style='font-size:85%;table-layout:auto'><tr>{head}</tr>{body}</table>"
+        return f"<p><b>{escape(self.title)}</b></p><div style='overflow-x:auto'>{table}</div>{note}"
 
 
 def terminal_width() -> int:

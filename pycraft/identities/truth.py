@@ -7,18 +7,22 @@ import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from .. import _core
+from ..file_targets import writable_target
+from ..progress_bar import StepProgress
 from .budget import Budget
-from .family import CELLS, CONSTANT, EVERY, HYPOTHESES, ONE, WITH_J, Cell, family, nilpotency, read_on, specs
+from .family import CELLS, CONSTANT, EVERY, HYPOTHESES, ONE, VARIANTS, WITH_J, Cell, Spec, family, nilpotency, read_on, specs
 from .judge import FAILS, HOLDS, UNDECIDED
 from .parse import Statements, as_text
 from .search import Counterexample, judged, smallest, understood
 from .terminal_report import STYLES, monospace, read_as, text_of, wrapped
-from .truth_picture import truth_html, truth_plot
+from .truth_picture import truth_html, truth_page, truth_plot, truth_size
 
 TRUE, FALSE, UNREAD = "true", "FALSE", "not said"
+PICTURES = (".png", ".svg", ".pdf")
 _WORDS = {HOLDS: TRUE, FAILS: FALSE, UNDECIDED: UNDECIDED}
 
 
@@ -56,6 +60,8 @@ class TruthMap:
     seconds: float = 0.0
     understood: str = ""
     """How the text was read, in the package's own letters."""
+    partial: bool = False
+    """Whether a budget ended before the large models of every cell were tried."""
 
     def __iter__(self) -> Iterator[CellTruth]:
         return iter(self.cells)
@@ -127,6 +133,21 @@ class TruthMap:
         """The map as a picture: true and false tiles, in the false ones the smallest cases drawn as trees; returns the axes."""
         return truth_plot(self, ax)
 
+    def save(self, path: Any) -> Path:
+        """Write the map: as a page (".html") or as the picture of `plot` (".png", ".svg", ".pdf").
+
+        EvaluationError for another ending, OSError where it cannot be written.
+        """
+        target = writable_target(path, (".html", *PICTURES), "a truth map")
+        if target.suffix == ".html":
+            target.write_text(truth_page(self), encoding="utf-8")
+            return target
+        from matplotlib.figure import Figure
+
+        axes = self.plot(Figure(figsize=truth_size(self), layout="constrained").subplots())
+        axes.figure.savefig(target, dpi=150)
+        return target
+
 
 def implied(chosen: frozenset[str]) -> frozenset[str]:
     """The hypotheses with those that they imply: hinges of one coordinate have a constant H."""
@@ -154,6 +175,7 @@ def truth(
     precision: str | int = "extended",
     budget: float = 5.0,
     vectors: Mapping[str, str] | None = None,
+    progress: bool = True,
 ) -> TruthMap:
     """The truth map of a statement: where it is true, over chains and trees, J, hinge kinds and bases.
 
@@ -164,11 +186,13 @@ def truth(
     precision : the first scalar beside double
     budget : CPU seconds for the smallest cases, of all cells together
     vectors : names of the vectors in the text, and of their spaces, "Θ", "V" or "F"
+    progress : whether a bar is shown in a terminal or notebook if it takes more than a second
 
     Returns
     -------
     TruthMap
-        It prints as a table, shows as one in a notebook, `.plot()` draws it; `.where` are the fewest hypotheses under which it is true.
+        It prints as a table, shows as one in a notebook, `.plot()` draws it, `.save(path)` writes it; `.where` are the fewest
+        hypotheses under which it is true.
 
     Raises
     ------
@@ -182,14 +206,16 @@ def truth(
     'TRUE where J = 0'
     """
     begin = time.perf_counter()
-    made = truth_within(as_text(statement), Budget(math.inf), precision, vectors)
+    made = truth_within(as_text(statement), Budget(math.inf), precision, vectors, progress)
     assert made is not None
     false = [c for c in made.cells if c.example is not None]
     whole = Budget(budget)
-    for i, found in enumerate(false if smallest_case else []):
-        left = whole.left / (len(false) - i)
-        only: dict[str, Any] = dict(meets=found.cell.least, allowed=found.cell.holds, vectors=vectors)
-        found.example = smallest(statement, precision=precision, budget=left, found=found.example, **only)
+    with StepProgress(len(false), "smallest cases", progress) as bar:
+        for i, found in enumerate(false if smallest_case else []):
+            bar(", ".join((found.cell.shape, found.cell.J, found.cell.hinges, found.cell.base)))
+            left = whole.left / (len(false) - i)
+            only: dict[str, Any] = dict(meets=found.cell.least, allowed=found.cell.holds, vectors=vectors)
+            found.example = smallest(statement, precision=precision, budget=left, found=found.example, **only)
     made.seconds = time.perf_counter() - begin
     return made
 
@@ -222,37 +248,57 @@ def _refusal(statement: str, model: Any) -> Exception | None:
 
 
 def truth_within(
-    statement: str, budget: Budget, precision: str | int = "extended", vectors: Mapping[str, str] | None = None
+    statement: str,
+    budget: Budget,
+    precision: str | int = "extended",
+    vectors: Mapping[str, str] | None = None,
+    progress: bool = True,
 ) -> TruthMap | None:
-    """The truth map without smallest cases; None where the budget ends first."""
+    """The truth map without smallest cases. Every cell is tried on a small model first; where the budget ends after that and before the
+    large ones were tried, the map is `partial`, and None where it ends earlier."""
     begin = time.perf_counter()
-    depth, cells = depth_for(statement, vectors), []
-    for cell in CELLS:
-        found = _cell_truth(statement, cell, depth, precision, vectors, budget)
-        if found is None:
-            return None
-        cells.append(found)
-    return TruthMap(statement, cells, time.perf_counter() - begin, understood(statement))
+    depth = depth_for(statement, vectors)
+    cells = [_CellTrial(cell) for cell in CELLS]
+    rounds = [(turn, trial) for turn in range(VARIANTS) for trial in cells]
+    partial = False
+    with StepProgress(len(rounds), "models in the cells of the truth map", progress) as bar:
+        for turn, trial in rounds:
+            cell = trial.cell
+            bar(", ".join((cell.shape, cell.J, cell.hinges, cell.base)))
+            if trial.refuted is not None:
+                continue
+            if budget.over:
+                if turn == 0:
+                    return None
+                partial = True
+                break
+            trial.judge(statement, specs(cell, depth)[turn], precision, vectors)
+    return TruthMap(statement, [trial.truth() for trial in cells], time.perf_counter() - begin, understood(statement), partial)
 
 
-def _cell_truth(
-    statement: str, cell: Cell, depth: int, precision: str | int, vectors: Mapping[str, str] | None, budget: Budget
-) -> CellTruth | None:
-    """The models of a cell up to the first that refutes; None where the budget ends before."""
-    found = []
-    for spec in specs(cell, depth):
-        if budget.over:
-            return None
+class _CellTrial:
+    """The models of a cell one after the other, up to the first that refutes."""
+
+    def __init__(self, cell: Cell):
+        self.cell = cell
+        self.refuted: Counterexample | None = None
+        self._found: list[str] = []
+
+    def judge(self, statement: str, spec: Spec, precision: str | int, vectors: Mapping[str, str] | None) -> None:
         verdict = judged(statement, spec, 1, precision, vectors)
         if verdict is None:
-            continue
-        found.append(verdict.verdict)
+            return
+        self._found.append(verdict.verdict)
         if verdict.verdict == FAILS:
             shown = verdict.shown
-            return CellTruth(cell, FALSE, len(found), Counterexample(spec, shown.state, shown.decisive.residual))
-    if not found:
-        return CellTruth(cell, UNREAD, 0)
-    return CellTruth(cell, UNDECIDED if UNDECIDED in found else TRUE, len(found))
+            self.refuted = Counterexample(spec, shown.state, shown.decisive.residual)
+
+    def truth(self) -> CellTruth:
+        if self.refuted is not None:
+            return CellTruth(self.cell, FALSE, len(self._found), self.refuted)
+        if not self._found:
+            return CellTruth(self.cell, UNREAD, 0)
+        return CellTruth(self.cell, UNDECIDED if UNDECIDED in self._found else TRUE, len(self._found))
 
 
 def saving(found: TruthMap, traits: Callable[[], dict[str, bool]] | None = None) -> list[frozenset[str]]:
@@ -273,7 +319,7 @@ def explained(
 ) -> tuple[TruthMap | None, Counterexample | None]:
     """(the truth map of a false statement, the case that tells most): the smallest of all where a hypothesis saves it; else the
     smallest that meets all hypotheses under which it still fails, so that it is not blamed on what the true formula does not hold for
-    either. No map where it takes more than the budget, CPU seconds for each of the two."""
+    either. No map where the budget, CPU seconds for each of the two, ends before every cell was tried on one model."""
     found_map = truth_within(statement, Budget(budget), precision, vectors)
     saved = saving(found_map, traits) if found_map is not None else []
     start: Counterexample | None = found

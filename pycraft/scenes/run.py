@@ -29,7 +29,8 @@ class Run(Motion, Renamed):
     ended_by : the name of the event that ended the run, None where it reached its end
     statistics : evaluations of the accelerations, steps, rejected steps, seconds, linearizations (of integrators that solve by
         derivatives), solutions (of variational ones: of the equations of a step), in_packs (accelerations that were found beside those of
-        other runs of a sweep), and how often each pass ran
+        other runs of a sweep), and how often each pass ran; "stiffness" where stability held the steps of an explicit method (t, step,
+        rate, effect, coordinate); of "auto" "switches", (t, the method that took steps from then on)
 
     What follows from the states is computed when it is first asked for, and kept. StaleOperatorError once the model was edited: the rest is
     of the model as it was.
@@ -78,8 +79,13 @@ class Run(Motion, Renamed):
         kept = record.checkpoint
         what = scene.model.name, tuple(names), coordinates_of(scene.model), precision
         checkpoint = Checkpoint(sum(kept["t"]), *what, integrator, options.told, dict(kept))
+        statistics = dict(record.statistics)
+        if record.stiffness is not None:
+            statistics["stiffness"] = record.stiffness
+        if integrator == "auto":
+            statistics["switches"] = [(t, ("dopri5", "rosenbrock4")[method]) for t, method in record.switches]
         return cls(
-            about, rows, calls, steps=steps if len(steps["t"]) else None, events=happened, statistics=record.statistics,
+            about, rows, calls, steps=steps if len(steps["t"]) else None, events=happened, statistics=statistics,
             ended_by=kinds[record.ended_by] if record.ended_by >= 0 else None, checkpoint=checkpoint,
         )  # fmt: skip
 
@@ -100,10 +106,10 @@ class Run(Motion, Renamed):
     def at(self, t: Any) -> Motion:
         """The states at one time, or at several.
 
-        By the dense output of the integrator where it has one of its own ("dopri5", order 4; "rosenbrock4", order 3), else by Hermite's
-        interpolation in q, v, v̇ on the group between the ends of steps: errors of a step of size h are O(h⁶) in q, O(h⁵) in v and O(h⁴)
-        in works and effects' own states (docs/simulation.md). A run that was pickled or read from a file has the latter, and straight
-        lines for works and states.
+        By the dense output of the integrator where it has one of its own ("dopri5", order 4; "dop853", 7; "rosenbrock4", 3), else by
+        Hermite's interpolation in q, v, v̇ on the group between the ends of steps: errors of a step of size h are O(h⁶) in q, O(h⁵) in v
+        and O(h⁴) in works and effects' own states (docs/simulation.md). A run that was pickled or read from a file has the latter, and
+        straight lines for works and states.
 
         Parameters
         ----------
@@ -132,9 +138,7 @@ class Run(Motion, Renamed):
         order = np.argsort(times, kind="stable")
         steps = np.clip(np.searchsorted(rows["t"], times[order], side="left") - 1, 0, len(rows["t"]) - 2)
         if self._calls is not None:
-            integrator = self._about["integrator"] if ":" not in self._about["integrator"] else ""
-            t, q, v, states, work = (rows[name] for name in ("t", "q", "v", "states", "work"))
-            found = _core.scene_between(self._calls, integrator, t, q, v, states, work, times[order].tolist(), steps.tolist())
+            found = self._by_dense_output(rows, times[order], steps)
         else:
             found = self._interpolated(rows, times[order], steps)
         last = np.searchsorted(rows["t"], times[order], side="right") - 1
@@ -142,6 +146,21 @@ class Run(Motion, Renamed):
         found = {name: np.where(jumped.reshape(-1, *[1] * (x.ndim - 1)), rows[name][last], x) for name, x in found.items()}
         back = np.argsort(order, kind="stable")
         return {name: x[back] for name, x in found.items()}
+
+    def _by_dense_output(self, rows: Mapping[str, np.ndarray], times: np.ndarray, steps: np.ndarray) -> dict[str, np.ndarray]:
+        """By that of the method which took each step, for times that rise."""
+        integrator = self._about["integrator"] if ":" not in self._about["integrator"] else ""
+        t, q, v, states, work = (rows[name] for name in ("t", "q", "v", "states", "work"))
+        switches = self.statistics.get("switches", [])
+        since = np.searchsorted([at for at, _ in switches], t[steps], side="right") - 1
+        stiff = np.array([i >= 0 and switches[i][1] == "rosenbrock4" for i in since], bool)
+        parts = [
+            (mask, _core.scene_between(self._calls, method, t, q, v, states, work, times[mask].tolist(), steps[mask].tolist()))
+            for mask, method in ((~stiff, integrator), (stiff, "rosenbrock4"))
+            if mask.any()
+        ]
+        back = np.argsort(np.concatenate([np.flatnonzero(mask) for mask, _ in parts]))
+        return {name: np.concatenate([part[name] for _, part in parts])[back] for name in parts[0][1]}
 
     def _interpolated(self, rows: Mapping[str, np.ndarray], times: np.ndarray, steps: np.ndarray) -> dict[str, np.ndarray]:
         t, vdot = rows["t"], self._vdot_of_steps
@@ -181,6 +200,10 @@ class Run(Motion, Renamed):
 
     def save(self, path: str | Path) -> None:
         """Write the run, by the path's ending: ".nc" (NetCDF), ".parquet" or ".csv". `pycraft.load_run` reads the first two.
+
+        A file holds every state of the run: q, v, their derivatives, energies and forces. A stiff scene takes many steps: 2 s of Talos
+        against its stops are 15,880 states, 25 MB of NetCDF and 57 MB of CSV. `simulate(T, t_eval=np.linspace(0, T, 200), dense=False)`
+        keeps 200 states and nothing between them.
 
         Raises
         ------
@@ -253,7 +276,7 @@ class Run(Motion, Renamed):
     ) -> Any:
         """The run as one page of HTML that plays by itself, without a network: a figure that can be turned, a slider of time, and plots.
 
-        The browser draws it from the bodies' poses in single precision: 64 bytes a body and frame, and some 30 kB besides. The page's own
+        The browser draws it from the bodies' poses in single precision: 64 bytes a body and frame, and some 45 kB besides. The page's own
         policy forbids it to send requests. `animate` makes pictures, films and GIFs instead.
 
         Parameters
@@ -294,6 +317,75 @@ class Run(Motion, Renamed):
         if target is not None:
             page.save(target)
         return page
+
+    def to_gltf(self, output: Any, *, fps: float = 30.0, speed: float = 1.0) -> Path:
+        """Write the run as animated glTF 2.0, which Blender, three.js, Babylon.js, Windows, macOS and most engines open.
+
+        A node for each body, with the triangles of its shapes in full and keyframes of its pose in the world; bodies without shapes
+        are sticks and balls. Poses are in single precision; players interpolate between frames, rotations on the sphere. The world's
+        upright axis, which gravity is nearest to, becomes glTF's y. Written by pygltflib (extra [gltf]).
+
+        Parameters
+        ----------
+        output : path that ends in ".glb" (one binary file) or ".gltf" (text, its numbers inside)
+        fps : keyframes a second of the film
+        speed : seconds of the run in a second of the film
+
+        Returns
+        -------
+        Path
+            The file. 28 bytes a body and frame, and 72 a triangle.
+
+        Raises
+        ------
+        EvaluationError
+            Another ending, more than 100 MB of poses, pygltflib missing.
+        OSError
+            A path that cannot be written.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> run = pc.mechanisms.double_pendulum().simulate(2.0, q=[1.0, 2.0])
+        >>> run.to_gltf("swing.glb")  # doctest: +SKIP
+        PosixPath('swing.glb')
+        """
+        from .run_gltf import to_gltf
+
+        return to_gltf(self, output, fps, speed)
+
+    def to_usd(self, output: Any, *, fps: float = 30.0, speed: float = 1.0) -> Path:
+        """Write the run as USD, which Omniverse, Blender, Houdini, Maya and usdview open.
+
+        A transform for each body, with time samples of its pose in the world in double precision, and meshes of its shapes below it; bodies
+        without shapes are sticks and balls. Metres; upright is the axis that gravity is nearest to. Written by usd-core (extra [usd]).
+
+        Parameters
+        ----------
+        output : path that ends in ".usda" (text), ".usdc" (binary) or ".usd"
+        fps, speed : as `to_gltf` takes them
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        EvaluationError
+            Another ending, more than 100 MB of poses, usd-core missing.
+        OSError
+            A path that cannot be written.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> pc.mechanisms.double_pendulum().simulate(0.2).to_usd("swing.usda")  # doctest: +SKIP
+        PosixPath('swing.usda')
+        """
+        from .run_usd import to_usd
+
+        return to_usd(self, output, fps, speed)
 
     def lost_digits(self, states: int = 8, **options: Any) -> Any:
         """Where the forward dynamics of the run's states loses digits, as colour on the robot over time, with the next rung and its price.

@@ -30,7 +30,7 @@ def model_html(model: Any) -> str:
     facts += [f"gravity ({', '.join(f'{x:g}' for x in gravity)}) m/s²" if gravity.any() else "no gravity"]
     facts += [f"{count} loop{'s' * (count > 1)}"] if (count := len(model.loops)) else []
     small = (
-        "margin:0;overflow:auto;max-height:340px;background:transparent;color:inherit;"
+        "margin:0;overflow:auto;max-height:340px;white-space:pre;overflow-wrap:normal;word-break:normal;background:transparent;color:inherit;"
         "font:12px/1.35 'DejaVu Sans Mono',ui-monospace,monospace"
     )
     tree = f'<pre style="{small}">{escape(str(model.tree(LISTED)))}</pre>'
@@ -51,10 +51,10 @@ def _figure(model: Any, bodies: list[dict[str, Any]]) -> str:
         for a, b in at.bones
     ]
     x, y = at.base
-    parts.append(f"<rect x='{x - 5:.1f}' y='{y - 5:.1f}' width='10' height='10' fill='currentColor'><title>base</title></rect>")
+    parts.append(f"<rect x='{x - 5:.1f}' y='{y - 5:.1f}' width='10' height='10' fill='currentColor'><title>base </title></rect>")
     size = _SIZE if len(bodies) < 60 else 3.0
     for (x, y), body in zip(at.bodies, bodies, strict=True):
-        title = f"{body['name']}, on {body['hinge']['kind']} {body['hinge']['name']}"
+        title = f"{body['name']}, on {body['hinge']['kind']} {body['hinge']['name']} "  # words apart where drawings are taken out
         parts.append(_mark(body["hinge"]["kind"], x, y, size, title))
     kinds = Counter(body["hinge"]["kind"] for body in bodies)
     for i, (kind, count) in enumerate(kinds.items()):

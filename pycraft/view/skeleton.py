@@ -124,13 +124,18 @@ class Skeleton:
         """Triangles of the model's shapes, and why others are not shown: see `solids`."""
         return solids(self.model)
 
+    def is_loose(self) -> bool:
+        """Whether nothing holds the model: every body on the base is on a free hinge."""
+        roots = [kind for kind, body in zip(self.kinds, self.model.description()["bodies"], strict=True) if body["parent"] < 0]
+        return bool(roots) and all(kind == "free" for kind in roots)
+
     def is_grounded(self) -> bool:
         """Whether the base is shown at its origin: unless that lies far off what it carries."""
         poses = self.poses(self.model.zero_q())
         hinges = placed(poses, *self.lines["ground"])[:, 1]
         carried = np.concatenate([hinges, *(placed(poses, *self.points[kind]) for kind in ("joint", "mass"))])
         reach = np.ptp(carried, axis=0).max() if len(carried) else 0.0
-        return reach == 0 or not len(hinges) or bool(np.linalg.norm(hinges, axis=1).min() <= _FAR * reach)
+        return bool(reach == 0 or not len(hinges) or np.linalg.norm(hinges, axis=1).min() <= _FAR * reach)
 
     def normals(self) -> tuple[int, ...]:
         """Normals (0, 1, 2 for x, y, z) of the coordinate planes that the model can never leave; none for most models."""

@@ -1,5 +1,6 @@
 """The command line: what it prints, and how it ends."""
 
+import csv
 import json
 import re
 from importlib import import_module
@@ -118,6 +119,7 @@ def nothing_measured(monkeypatch):
         ("accuracy panda --duration 2", "--duration belongs to --integration"),
         ("accuracy panda --integration --duration inf", "--duration inf"),
         ("accuracy panda --integration --form ud", "--form and --precision belong to the table of forms"),
+        ("accuracy panda --integration --front", "--front belongs to the table of forms"),
         ("accuracy panda --error 0", "--error 0.0: a relative error, above zero"),
         ("accuracy panda --root sideways", "root='sideways': there are 'fixed', 'free'"),
         ("accuracy panda --mimic sometimes", "mimic='sometimes': there are"),
@@ -149,6 +151,17 @@ def test_the_accuracy_table_and_its_cheapest_row(tmp_path):
     assert result.exit_code == 1 and "12 degrees of freedom" in result.output and "the best is" in result.output
 
 
+def test_the_front_of_the_accuracy_table(tmp_path):
+    """The terminal shows its rows alone, the files hold all."""
+    result = runner.invoke(app, f"accuracy ur5 {QUICK} --front --csv {tmp_path}/a.csv".split())
+    assert result.exit_code == 0, result.output
+    with open(tmp_path / "a.csv", encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    front = [row["way"] for row in rows if row["pareto"] == "True"]
+    shown = [line for line in result.output.splitlines() if line.startswith("fast")]
+    assert len(shown) == len(front) < len(rows)
+
+
 def test_every_row_refused():
     result = runner.invoke(app, "accuracy ur5 --seconds 0 --method articulated --form ud --precision 100".split())
     assert result.exit_code == 1
@@ -158,7 +171,7 @@ def test_every_row_refused():
 def test_the_table_of_integrators_says_what_was_integrated():
     result = runner.invoke(app, "accuracy panda --integration --seconds 0 --method dopri5 --duration 0.05 --seed 3".split())
     assert result.exit_code == 0, result.output
-    for words in ("0.05 s, gravity (0, 0, -9.81) m/s²", "of seed 3, at rest", "reference: fehlberg78", "the model has no gravity"):
+    for words in ("0.05 s, gravity (0, 0, -9.81) m/s²", "of seed 3, at rest", "reference: dop853", "the model has no gravity"):
         assert words in result.output
 
 
