@@ -316,7 +316,7 @@ def _shade(live: LiveScene, name: str) -> tuple[dict[str, Any] | None, list[str]
     except _core.Error as error:
         return None, [f"no shares: {error}"]
     high = float(values.max(initial=0.0)) or 1.0
-    label = f"tr Υ(k)M(k): {values.sum():.4g} of N = {live.model.nv}"
+    label = f"degrees of freedom by body, tr Υ(k)M(k): {values.sum():.4g} of N = {live.model.nv}"
     return {"values": values.tolist(), "low": 0.0, "high": high, "label": label}, []
 
 

@@ -242,7 +242,7 @@ def test_bodies_are_coloured_by_their_shares(browser, view):
         until(page, "figure.shade !== null")
         shares = view.session.live.model.dof_shares(view.session.live.q)
         assert page.evaluate("figure.shade.values") == pytest.approx(list(shares.values))
-        assert page.evaluate("figure.shade.label") == "tr Υ(k)M(k): 2 of N = 2" and differing(first, pixels(page)) > MOVED
+        assert page.evaluate("figure.shade.label") == "degrees of freedom by body, tr Υ(k)M(k): 2 of N = 2" and differing(first, pixels(page)) > MOVED
         colours = page.evaluate("[0, 1].map((k) => figure.shadeOf(k))")
         assert len(set(colours)) == 2 and colours[int(np.argmax(shares.values))] == "rgb(189, 223, 38)"
         page.select_option("#shade", "")
