@@ -11,6 +11,7 @@ from typing import Any
 
 from .. import _core
 from .budget import Budget
+from .dialects import in_dialect
 from .family import CELLS, CONSTANT, EVERY, HYPOTHESES, ONE, WITH_J, Cell, family, nilpotency, read_on, specs
 from .judge import FAILS, HOLDS, UNDECIDED
 from .parse import Statements, as_text
@@ -154,6 +155,7 @@ def truth(
     precision: str | int = "extended",
     budget: float = 5.0,
     vectors: Mapping[str, str] | None = None,
+    dialect: str | None = None,
 ) -> TruthMap:
     """The truth map of a statement: where it is true, over chains and trees, J, hinge kinds and bases.
 
@@ -164,6 +166,7 @@ def truth(
     precision : the first scalar beside double
     budget : CPU seconds for the smallest cases, of all cells together
     vectors : names of the vectors in the text, and of their spaces, "Θ", "V" or "F"
+    dialect : the school in whose letters it is written, see `check`
 
     Returns
     -------
@@ -182,7 +185,8 @@ def truth(
     'TRUE where J = 0'
     """
     begin = time.perf_counter()
-    made = truth_within(as_text(statement), Budget(math.inf), precision, vectors)
+    statement = in_dialect(as_text(statement), dialect)
+    made = truth_within(statement, Budget(math.inf), precision, vectors)
     assert made is not None
     false = [c for c in made.cells if c.example is not None]
     whole = Budget(budget)
